@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "core/executor.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include <chrono>
+
+namespace lensforge {
+
+void KernelProfile::add(const char* kernel, double seconds) {
+  const std::scoped_lock lock(mutex_);
+  Entry& entry = entries_[kernel];
+  entry.seconds += seconds;
+  ++entry.calls;
+}
+
+std::map<std::string, KernelProfile::Entry> KernelProfile::entries() const {
+  const std::scoped_lock lock(mutex_);
+  return entries_;
+}
+
+void KernelProfile::clear() {
+  const std::scoped_lock lock(mutex_);
+  entries_.clear();
+}
+
+struct Executor::Arena {
+  explicit Arena(int threads) : tasks(threads) {}
+  tbb::task_arena tasks;
+};
+
+Executor Executor::serial() { return {}; }
+
+Executor Executor::cpu(int threads) {
+  Executor executor;
+  executor.arena_ = std::make_shared<Arena>(threads > 0 ? threads : tbb::task_arena::automatic);
+  return executor;
+}
+
+Executor Executor::with_profile(KernelProfile* profile) const {
+  Executor copy = *this;
+  copy.profile_ = profile;
+  return copy;
+}
+
+int Executor::concurrency() const { return arena_ ? arena_->tasks.max_concurrency() : 1; }
+
+void Executor::run(const char* kernel, std::int64_t count, std::int64_t grain, Chunk chunk,
+                   const void* body) const {
+  if (count <= 0) return;
+  const auto start = std::chrono::steady_clock::now();
+  if (!arena_) {
+    chunk(body, 0, count, 0);
+  } else {
+    const auto run_range = [&](const tbb::blocked_range<std::int64_t>& range) {
+      chunk(body, range.begin(), range.end(), tbb::this_task_arena::current_thread_index());
+    };
+    const tbb::blocked_range<std::int64_t> all(0, count, static_cast<std::size_t>(grain));
+    arena_->tasks.execute([&] { tbb::parallel_for(all, run_range); });
+  }
+  if (profile_ != nullptr) {
+    const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
+    profile_->add(kernel, elapsed.count());
+  }
+}
+
+}  // namespace lensforge

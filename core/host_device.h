@@ -1,0 +1,9 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+/// Marks a per-item function that runs on the CPU and, compiled by nvcc, on the GPU as well.
+#if defined(__CUDACC__)
+#define LF_HD __host__ __device__
+#else
+#define LF_HD
+#endif

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "core/image.h"
+#include "core/metrics.h"
+#include "core/optical_setup.h"
+#include "core/surface_mesh.h"
+
+namespace lensforge {
+
+/// A designed lens: what one command hands to the next.
+struct Lens {
+  SurfaceMesh surface;  ///< The optical surface, z ≥ thickness; mm, lens frame.
+  OpticalSetup setup;
+  SurfaceModel model = SurfaceModel::kFacet;  ///< The model it was designed with.
+  Image target;                               ///< Working picture, linear light.
+  Image render;                               ///< What the lens projects under `model`.
+  ImageMetrics facet_metrics;
+  ImageMetrics smooth_metrics;
+  nlohmann::json provenance = nlohmann::json::object();
+};
+
+/// Names of the files in a lens folder (interface.md, "The lens folder").
+namespace lens_file {
+inline constexpr const char* kJson = "lens.json";
+inline constexpr const char* kSurface = "surface.ply";
+inline constexpr const char* kTargetPng = "target.png";
+inline constexpr const char* kTargetExr = "target.exr";
+inline constexpr const char* kRenderPng = "render.png";
+inline constexpr const char* kRenderExr = "render.exr";
+inline constexpr const char* kError = "error.png";
+inline constexpr const char* kConvergence = "convergence.csv";
+}  // namespace lens_file
+
+/// Writes every file of the lens folder but convergence.csv; each is written beside and renamed, and
+/// lens.json comes last, so that a folder with a lens.json is always whole.
+/// @throw RunError if something cannot be written.
+void write_lens(const Lens& lens, const std::filesystem::path& folder);
+
+/// Reads a lens folder back.
+/// @throw InputError naming the folder or file and the field if something is missing, of another
+///        version, of another type, or contradicts itself.
+Lens read_lens(const std::filesystem::path& folder);
+
+}  // namespace lensforge

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <functional>
+#include <stop_token>
+#include <string>
+#include <utility>
+
+namespace lensforge {
+
+/// How far a piece of long work has come, in its own units of work.
+struct Progress {
+  std::string stage;   ///< What is being done, e.g. "design level 3/4".
+  double done = 0.0;   ///< Units of work finished.
+  double total = 0.0;  ///< Units of work in all; 0 where unknown.
+  std::string detail;  ///< One short free text, e.g. "MAE 0.0123".
+};
+
+/// Progress sink and stop token, handed as the last argument to everything that runs long.
+/// A default-constructed one neither reports nor stops.
+class RunControl {
+ public:
+  RunControl() = default;
+  RunControl(std::stop_token stop, std::function<void(const Progress&)> sink)
+      : stop_(std::move(stop)), sink_(std::move(sink)) {}
+
+  /// True once the caller wants the work to end; to be asked at least once a second.
+  [[nodiscard]] bool stop_requested() const { return stop_.stop_requested(); }
+
+  void report(const Progress& progress) const {
+    if (sink_) sink_(progress);
+  }
+
+ private:
+  std::stop_token stop_;
+  std::function<void(const Progress&)> sink_;
+};
+
+}  // namespace lensforge
