@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "core/executor.h"
+#include "core/image.h"
+#include "core/lens.h"
+#include "core/run_control.h"
+#include "design/energy/weights.h"
+
+namespace lensforge {
+
+/// Everything that shapes a design but the picture itself.
+struct DesignOptions {
+  double width = 100.0;         ///< Lens width, mm, > 0; the height follows the picture.
+  double focal_length = 300.0;  ///< z of the receiving plane, mm, > thickness.
+  double ior = 1.49;            ///< Refractive index, > 1.
+  double thickness = 5.0;       ///< Least z of the finished surface, mm, > 0.
+  int pixels = 256;             ///< Longer side of the working picture; at most the source's.
+  double mesh_ratio = 1.25;     ///< Mesh vertices per pixel side, 0.25 … 8.
+  int rounds = 6;               ///< Alternations per level, ≥ 1 (Sun et al., section 3.4).
+  int iterations = 60;          ///< Most L-BFGS iterations of one round, ≥ 1.
+  SurfaceModel model = SurfaceModel::kFacet;  ///< What is optimised.
+  ViewSide view = ViewSide::kFront;
+  ObjectiveWeights weights;
+  /// File that takes a checkpoint after every round; none is written if empty.
+  std::filesystem::path checkpoint;
+  /// Go on from `checkpoint`. Same picture and options → same result as without interruption.
+  bool resume = false;
+};
+
+/// One iteration of the optimiser, a row of convergence.csv.
+struct ConvergenceRow {
+  std::string stage;
+  int level = 0;
+  int round = 0;
+  int iteration = 0;
+  EnergyValues energy;  ///< Unweighted terms and their weighted total.
+  double mae = 0.0;     ///< Display-encoded, at the level's resolution.
+  double seconds = 0.0; ///< Since the start of the design, interruptions not counted.
+};
+
+struct DesignResult {
+  enum class Status { kDone, kInterrupted, kFailed };
+  Status status = Status::kFailed;
+  std::string message;  ///< Why it ended, in one line.
+  Lens lens;            ///< The best surface so far, at the resolution that was reached.
+  std::vector<ConvergenceRow> convergence;
+};
+
+/// Shapes a lens that projects `target` (linear light, any size, not all black).
+/// Coarse to fine over picture and mesh (Sun et al., section 3.4 and Appendix E).
+/// @throw InputError if an option breaks its rule, the picture is all black, or a checkpoint to
+///        resume from is missing, corrupt, or belongs to another picture or other options.
+DesignResult design_lens(const Image& target, const DesignOptions& options,
+                         const Executor& executor, const RunControl& control);
+
+/// The text of convergence.csv: a header and one line per row.
+std::string convergence_csv(const std::vector<ConvergenceRow>& rows);
+
+}  // namespace lensforge
