@@ -76,9 +76,8 @@ void parallel_for(const Executor& executor, const char* kernel, std::int64_t cou
 /// Sums `functor(i)`, an array of N doubles, over i in 0 … count − 1. The sum is taken per block of
 /// fixed length and then over the blocks in order: the same bits for any number of threads.
 template <std::size_t N, class Functor>
-std::array<double, N> parallel_sum(const Executor& executor, const char* kernel,
-                                   std::int64_t count, const Functor& functor,
-                                   std::int64_t block = kDefaultGrain) {
+std::array<double, N> parallel_sum(const Executor& executor, const char* kernel, std::int64_t count,
+                                   const Functor& functor, std::int64_t block = kDefaultGrain) {
   using Sum = std::array<double, N>;
   const std::int64_t blocks = (count + block - 1) / block;
   std::vector<Sum> partial(static_cast<std::size_t>(blocks), Sum{});

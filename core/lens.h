@@ -35,8 +35,8 @@ inline constexpr const char* kError = "error.png";
 inline constexpr const char* kConvergence = "convergence.csv";
 }  // namespace lens_file
 
-/// Writes every file of the lens folder but convergence.csv; each is written beside and renamed, and
-/// lens.json comes last, so that a folder with a lens.json is always whole.
+/// Writes every file of the lens folder but convergence.csv; each is written beside and renamed,
+/// and lens.json comes last, so that a folder with a lens.json is always whole.
 /// @throw RunError if something cannot be written.
 void write_lens(const Lens& lens, const std::filesystem::path& folder);
 

@@ -7,11 +7,11 @@ namespace lensforge {
 
 /// How close a projected picture is to its target (interface.md, "Metrics").
 struct ImageMetrics {
-  double mae = 0.0;         ///< Mean absolute error of the display-encoded values, 0 … 1.
-  double psnr = 0.0;        ///< Peak signal-to-noise ratio of the same, dB; +inf when equal.
-  double ssim = 0.0;        ///< As scikit-image's structural_similarity, data_range = 1.
-  double mae_linear = 0.0;  ///< Mean absolute error of linear flux ÷ largest target flux.
-  double flux_inside = 1.0; ///< Share of the flux that lands on the image rectangle.
+  double mae = 0.0;          ///< Mean absolute error of the display-encoded values, 0 … 1.
+  double psnr = 0.0;         ///< Peak signal-to-noise ratio of the same, dB; +inf when equal.
+  double ssim = 0.0;         ///< As scikit-image's structural_similarity, data_range = 1.
+  double mae_linear = 0.0;   ///< Mean absolute error of linear flux ÷ largest target flux.
+  double flux_inside = 1.0;  ///< Share of the flux that lands on the image rectangle.
 };
 
 /// Compares `render` with `target`, both linear light relative to the same white. Sets all but

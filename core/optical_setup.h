@@ -17,8 +17,8 @@ enum class ViewSide { kFront, kRear };
 /// flat entry face lies in z = 0, parallel light travels along +z, the receiving plane is
 /// z = focal_length.
 struct OpticalSetup {
-  double ior = 1.49;            ///< Refractive index of the lens against air, > 1.
-  double focal_length = 300.0;  ///< z of the receiving plane, mm; above the surface.
+  double ior = 1.49;                         ///< Refractive index of the lens against air, > 1.
+  double focal_length = 300.0;               ///< z of the receiving plane, mm; above the surface.
   Eigen::Vector2d lens_size{100.0, 100.0};   ///< mm
   Eigen::Vector2d image_size{100.0, 100.0};  ///< mm, on the receiving plane
   Eigen::Vector2d image_origin{0.0, 0.0};    ///< mm, corner of least x and y

@@ -18,7 +18,7 @@ struct GridShape {
 /// A triangle mesh as flat arrays, millimetres in the lens frame (x right, y away, z along the
 /// light; seen from +z the triangles run counter-clockwise).
 struct SurfaceMesh {
-  Eigen::Matrix3Xd vertices;   ///< 3 × V, mm. On a grid vertex (column, row) is row·columns+column.
+  Eigen::Matrix3Xd vertices;  ///< 3 × V, mm. On a grid vertex (column, row) is row·columns+column.
   Eigen::Matrix3Xi triangles;  ///< 3 × T, vertex numbers.
   GridShape grid;              ///< Set when the vertices are the rows of a grid, y upwards.
 

@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "core/files.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdint>
+#include <cstring>
+#include <random>
+#include <string>
+#include <system_error>
+#include <utility>
+
+#include "core/error.h"
+
+namespace lensforge {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string reason(int error) { return std::generic_category().message(error); }
+
+[[noreturn]] void fail_to_write(const fs::path& path, int error) {
+  throw RunError(path.string() + ": cannot be written: " + reason(error));
+}
+
+/// An open file descriptor that closes itself.
+class Descriptor {
+ public:
+  explicit Descriptor(int number) : number_(number) {}
+  ~Descriptor() { close(); }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+
+  [[nodiscard]] int number() const { return number_; }
+  /// Returns 0 or an errno value; some file systems report a full disk only here.
+  int close() {
+    const int number = std::exchange(number_, -1);
+    return number >= 0 && ::close(number) != 0 ? errno : 0;
+  }
+
+ private:
+  int number_;
+};
+
+/// An empty file of our own, or why there is none (an errno value).
+struct Beside {
+  fs::path path;
+  int error = 0;
+};
+
+/// Makes an empty file with a name of its own in the folder of `path`, with its extension, so that
+/// writers which choose their format by the name work.
+Beside make_beside(const fs::path& path) {
+  std::random_device random;
+  for (;;) {
+    const std::string number = std::to_string(random());
+    const std::string name = std::string(".").append(path.stem().string()) + ".partial-" + number +
+                             path.extension().string();
+    fs::path beside = path.parent_path() / name;
+    const Descriptor file(::open(beside.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0666));
+    if (file.number() >= 0) return {std::move(beside), 0};
+    if (errno != EEXIST) return {{}, errno};
+  }
+}
+
+/// Removes the file it was given unless it was released.
+class RemoveUnlessDone {
+ public:
+  explicit RemoveUnlessDone(fs::path path) : path_(std::move(path)) {}
+  ~RemoveUnlessDone() {
+    std::error_code ignored;
+    if (!path_.empty()) fs::remove(path_, ignored);
+  }
+  RemoveUnlessDone(const RemoveUnlessDone&) = delete;
+  RemoveUnlessDone& operator=(const RemoveUnlessDone&) = delete;
+  void release() { path_.clear(); }
+
+ private:
+  fs::path path_;
+};
+
+/// Flushes a file or folder to the disk. EINVAL and ENOTSUP mean that this file system has nothing
+/// to flush, which is no failure.
+void flush_to_disk(const fs::path& file, const fs::path& named_in_error) {
+  Descriptor opened(::open(file.empty() ? "." : file.c_str(), O_RDONLY | O_CLOEXEC));
+  if (opened.number() < 0) fail_to_write(named_in_error, errno);
+  if (::fsync(opened.number()) != 0 && errno != EINVAL && errno != ENOTSUP) {
+    fail_to_write(named_in_error, errno);
+  }
+  if (const int error = opened.close(); error != 0) fail_to_write(named_in_error, error);
+}
+
+void write_all(int descriptor, std::string_view content, const fs::path& named_in_error) {
+  while (!content.empty()) {
+    const ssize_t written = ::write(descriptor, content.data(), content.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) fail_to_write(named_in_error, errno);
+    content.remove_prefix(static_cast<std::size_t>(written));
+  }
+}
+
+}  // namespace
+
+void write_whole_file(const fs::path& path,
+                      const std::function<void(const fs::path& beside)>& write) {
+  const auto [beside, error] = make_beside(path);
+  if (error != 0) fail_to_write(path, error);
+  RemoveUnlessDone guard(beside);
+  write(beside);
+  flush_to_disk(beside, path);
+  if (::rename(beside.c_str(), path.c_str()) != 0) fail_to_write(path, errno);
+  guard.release();
+  // The new name itself is only safe once the folder is.
+  flush_to_disk(path.parent_path(), path);
+}
+
+void write_whole_file(const fs::path& path, std::string_view content) {
+  write_whole_file(path, [&](const fs::path& beside) {
+    Descriptor file(::open(beside.c_str(), O_WRONLY | O_TRUNC | O_CLOEXEC));
+    if (file.number() < 0) fail_to_write(path, errno);
+    write_all(file.number(), content, path);
+    if (const int error = file.close(); error != 0) fail_to_write(path, error);
+  });
+}
+
+void require_writable_folder(const fs::path& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (!fs::is_directory(folder)) {
+    const std::string why = error ? error.message() : reason(ENOTDIR);
+    throw InputError(folder.string() + ": cannot be made a folder: " + why);
+  }
+  const Beside probe = make_beside(folder / "probe");
+  const RemoveUnlessDone remove_probe(probe.path);
+  if (probe.error != 0) {
+    throw InputError(folder.string() +
+                     ": files cannot be made in this folder: " + reason(probe.error));
+  }
+}
+
+}  // namespace lensforge

@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "core/mesh_io.h"
+
+#include <OpenMesh/Core/IO/MeshIO.hh>
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cerrno>
+#include <charconv>
+#include <cstdint>
+#include <cstring>
+#include <fstream>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <sstream>
+#include <string>
+#include <system_error>
+#include <vector>
+
+#include "core/error.h"
+#include "core/files.h"
+#include "core/mesh_importer.h"
+#include "core/openmesh_silence.h"
+
+namespace lensforge {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Records are copied as they lie in memory.
+static_assert(std::endian::native == std::endian::little, "write_ply writes little-endian PLY");
+
+constexpr std::size_t kVertexBytes = 3 * sizeof(double);
+constexpr std::size_t kTriangleBytes = 1 + 3 * sizeof(std::int32_t);
+
+struct Counts {
+  std::int64_t vertices = 0;
+  std::int64_t triangles = 0;
+};
+
+std::string ply_header(const Counts& counts) {
+  return "ply\nformat binary_little_endian 1.0\nelement vertex " + std::to_string(counts.vertices) +
+         "\nproperty double x\nproperty double y\nproperty double z\nelement face " +
+         std::to_string(counts.triangles) +
+         "\nproperty list uchar int vertex_indices\nend_header\n";
+}
+
+std::int64_t number_after(const std::string& text, const std::string& words) {
+  std::int64_t number = -1;
+  if (const auto at = text.find(words); at != std::string::npos) {
+    std::from_chars(text.data() + at + words.size(), text.data() + text.size(), number);
+  }
+  return number;
+}
+
+[[noreturn]] void refuse(const fs::path& path, const std::string& why) {
+  throw InputError(path.string() + ": " + why);
+}
+
+/// The counts in the header if the file is in the very form that write_ply() makes.
+std::optional<Counts> own_form(std::ifstream& file) {
+  std::string head(ply_header({INT32_MAX, INT32_MAX}).size(), '\0');
+  file.read(head.data(), static_cast<std::streamsize>(head.size()));
+  head.resize(static_cast<std::size_t>(file.gcount()));
+  file.clear();
+  const Counts counts{number_after(head, "element vertex "), number_after(head, "element face ")};
+  if (counts.vertices < 0 || counts.vertices > INT32_MAX) return std::nullopt;
+  if (counts.triangles < 0 || counts.triangles > INT32_MAX) return std::nullopt;
+  const std::string header = ply_header(counts);
+  if (!head.starts_with(header)) return std::nullopt;
+  file.seekg(static_cast<std::streamoff>(header.size()));
+  return counts;
+}
+
+/// OpenMesh reads PLY coordinates as float; our own form is read here, bit for bit.
+SurfaceMesh read_own_form(std::ifstream& file, const Counts& counts, const fs::path& path) {
+  const std::uintmax_t expected = ply_header(counts).size() +
+                                  static_cast<std::uintmax_t>(counts.vertices) * kVertexBytes +
+                                  static_cast<std::uintmax_t>(counts.triangles) * kTriangleBytes;
+  if (const std::uintmax_t size = fs::file_size(path); size != expected) {
+    refuse(path, "is " + std::to_string(size) + " bytes long, its header calls for " +
+                     std::to_string(expected) + ": it is truncated or corrupt");
+  }
+  SurfaceMesh mesh;
+  mesh.vertices.resize(3, counts.vertices);
+  mesh.triangles.resize(3, counts.triangles);
+  file.read(reinterpret_cast<char*>(mesh.vertices.data()),
+            static_cast<std::streamsize>(counts.vertices) * std::streamsize{kVertexBytes});
+  std::array<char, kTriangleBytes> record{};
+  for (Eigen::Index t = 0; t < mesh.triangles.cols(); ++t) {
+    file.read(record.data(), kTriangleBytes);
+    if (record[0] != 3) refuse(path, "face " + std::to_string(t) + " is no triangle");
+    std::memcpy(mesh.triangles.col(t).data(), &record[1], kTriangleBytes - 1);
+  }
+  if (!file) refuse(path, "cannot be read to its end");
+  return mesh;
+}
+
+SurfaceMesh read_through_openmesh(const fs::path& path) {
+  const OpenMeshSilence silence;
+  MeshImporter importer;
+  OpenMesh::IO::Options options;
+  bool read = false;
+  try {
+    read = OpenMesh::IO::IOManager().read(path.string(), importer, options);
+  } catch (const std::exception&) {
+    read = false;
+  }
+  if (!read) refuse(path, "is corrupt or no PLY, OBJ, STL or OFF mesh");
+  if (const std::string problem = importer.problem(); !problem.empty()) refuse(path, problem);
+  return importer.mesh();
+}
+
+void check_mesh(const SurfaceMesh& mesh, const fs::path& path) {
+  if (mesh.triangle_count() == 0) refuse(path, "holds no triangles");
+  for (Eigen::Index v = 0; v < mesh.vertices.cols(); ++v) {
+    if (mesh.vertices.col(v).allFinite()) continue;
+    std::ostringstream message;
+    message << "vertex " << v << " is at (" << mesh.vertices.col(v).transpose()
+            << "): coordinates must be finite";
+    refuse(path, message.str());
+  }
+  for (Eigen::Index t = 0; t < mesh.triangles.cols(); ++t) {
+    for (const int v : mesh.triangles.col(t)) {
+      if (v >= 0 && v < mesh.vertices.cols()) continue;
+      refuse(path, "face " + std::to_string(t) + " uses vertex " + std::to_string(v) +
+                       ": there are only 0 ... " + std::to_string(mesh.vertices.cols() - 1));
+    }
+  }
+}
+
+void write_blocks(const SurfaceMesh& mesh, std::ofstream& file) {
+  file << ply_header({mesh.vertex_count(), mesh.triangle_count()});
+  file.write(reinterpret_cast<const char*>(mesh.vertices.data()),
+             mesh.vertex_count() * std::streamsize{kVertexBytes});
+  std::array<char, kTriangleBytes> record{3};
+  for (Eigen::Index t = 0; t < mesh.triangles.cols() && file; ++t) {
+    std::memcpy(&record[1], mesh.triangles.col(t).data(), kTriangleBytes - 1);
+    file.write(record.data(), kTriangleBytes);
+  }
+  file.flush();
+}
+
+}  // namespace
+
+SurfaceMesh read_mesh(const fs::path& path) {
+  std::error_code error;
+  const fs::file_status status = fs::status(path, error);
+  if (!fs::exists(status)) refuse(path, "cannot be read: " + error.message());
+  if (fs::is_directory(status)) refuse(path, "is a folder, not a mesh file");
+  std::ifstream file(path, std::ios::binary);
+  if (!file) refuse(path, "cannot be read: " + std::generic_category().message(errno));
+  if (file.peek() == std::ifstream::traits_type::eof()) refuse(path, "is empty");
+  const std::optional<Counts> counts = own_form(file);
+  SurfaceMesh mesh = counts ? read_own_form(file, *counts, path) : read_through_openmesh(path);
+  check_mesh(mesh, path);
+  return mesh;
+}
+
+void write_ply(const SurfaceMesh& mesh, const fs::path& path) {
+  static_assert(sizeof(int) == sizeof(std::int32_t));
+  write_whole_file(path, [&](const fs::path& beside) {
+    errno = 0;
+    std::ofstream file(beside, std::ios::binary | std::ios::trunc);
+    write_blocks(mesh, file);
+    if (file) return;
+    throw RunError(path.string() + ": cannot be written: " +
+                   (errno != 0 ? std::generic_category().message(errno) : "unknown reason"));
+  });
+}
+
+}  // namespace lensforge
