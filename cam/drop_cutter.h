@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "cam/ball_cutter.h"
+#include "cam/contact_features.h"
+#include "core/executor.h"
+#include "core/surface_mesh.h"
+
+namespace lensforge {
+
+/// Where a ball that was let down came to rest.
+struct CutterLocation {
+  double tip = kNoContact;     ///< Height of the tip, mm; kNoContact if nothing is under the ball.
+  std::int32_t triangle = -1;  ///< A triangle that holds the ball up; −1 if none does.
+
+  [[nodiscard]] bool rests() const { return triangle >= 0; }
+};
+
+/// Lets a ball-end mill down on a mesh: for any (x, y) the lowest height of the tip at which the
+/// ball touches the mesh and cuts into none of it; exact, over facets, edges and vertices.
+///
+/// The mesh need not be a height field or a manifold; triangles may be vertical, upside down, thin,
+/// without area, or doubled. Triangles lie once each in the cells of a grid over x and y, by size
+/// in grids of doubling cells; a cell or triangle is passed over when even its highest point, as
+/// near as it comes, could not lift the ball any more.
+class DropCutter {
+ public:
+  /// @param radius  of the ball, mm, > 0.
+  /// @pre all coordinates are finite and all vertex numbers in range.
+  DropCutter(const SurfaceMesh& mesh, double radius, const Executor& executor);
+
+  /// The location of the tip over p (mm). Equal to the largest triangle_tip() over all triangles to
+  /// 1e-12 mm (DropCutter.EqualsBruteForce…). `near`, a location close by, makes it faster and does
+  /// not change the result by a bit.
+  [[nodiscard]] CutterLocation drop(const Eigen::Vector2d& p,
+                                    const CutterLocation& near = {}) const;
+
+  /// drop() for many points; the same bits for any number of threads. @pre sizes are equal.
+  void drop(std::span<const Eigen::Vector2d> points, std::span<CutterLocation> locations,
+            const Executor& executor) const;
+
+  [[nodiscard]] double radius() const { return radius_; }
+  /// Box of the mesh's vertices that belong to triangles; empty without triangles.
+  [[nodiscard]] const Eigen::AlignedBox3d& bounds() const { return bounds_; }
+
+ private:
+  /// Box seen from above and highest z, relative to the grid's origin, rounded outwards.
+  struct Reach {
+    float x_min, x_max, y_min, y_max, z_max;
+  };
+  /// Grid whose cells are no smaller than its triangles; they sit in the cell of their box's
+  /// centre.
+  struct Level {
+    double cell = 0.0;  ///< Side of a cell, mm.
+    int columns = 0;
+    int rows = 0;
+    std::vector<std::int64_t> begin;  ///< First item of each cell, row by row, and the end.
+    std::vector<Reach> reach;         ///< Of all items of a cell.
+  };
+  struct Item {
+    FacetContact facet;
+    ContactFeatures features = 0;
+  };
+  struct Search;
+
+  void lay_out_levels(double finest_cell, double largest_extent);
+  void sort_into_cells(const SurfaceMesh& mesh, const std::vector<double>& extents);
+  void fill_items(const SurfaceMesh& mesh, const Executor& executor);
+  void bound_cells();
+  void search_level(const Level& level, Search& search) const;
+  void search_cell(const Level& level, std::size_t cell, Search& search) const;
+  void try_item(std::size_t item, Search& search) const;
+  void try_boundary(std::size_t item, const Barycentric& at, Search& search) const;
+
+  double radius_;
+  Eigen::AlignedBox3d bounds_;
+  std::vector<Level> levels_;
+  // Items are triangles in the order of levels and cells; all of the same length.
+  std::vector<Reach> reach_;
+  std::vector<Item> items_;
+  std::vector<Eigen::Matrix3d> corners_;  ///< Columns a, b, c; bc is the longest side.
+  std::vector<std::int32_t> triangle_of_;
+  std::vector<std::int32_t> item_of_;  ///< Inverse of triangle_of_.
+};
+
+}  // namespace lensforge
