@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "app/command_line.h"
+
+#include <algorithm>
+#include <array>
+#include <exception>
+#include <new>
+
+#include "app/commands.h"
+#include "app/console.h"
+#include "app/exit_code.h"
+#include "app/option_set.h"
+#include "core/error.h"
+
+namespace lensforge::app {
+namespace {
+
+struct Subcommand {
+  const char* name;
+  int (*run)(const Arguments&);
+  const char* usage;
+  const char* summary;
+};
+
+constexpr std::array kSubcommands{
+    Subcommand{"design", design_command, "design TARGET --out DIR", "picture to lens folder"},
+    Subcommand{"render", render_command, "render DIR|MESH",
+               "lens or any mesh to picture and metrics"},
+    Subcommand{"cam", cam_command, "cam DIR", "lens folder to G-code (into DIR/cam/)"},
+    Subcommand{"info", info_command, "info DIR|FILE", "what it is, in one screen"},
+};
+
+std::string overall_help() {
+  std::string text = "lensforge " + std::string(version()) +
+                     ": from a picture to the milled lens that projects it\n\nUsage:\n";
+  for (const Subcommand& command : kSubcommands) {
+    const std::string usage = std::string("  lensforge ") + command.usage;
+    text += usage + std::string(38 - std::min<std::size_t>(usage.size(), 37), ' ') +
+            command.summary + "\n";
+  }
+  text +=
+      "\n  lensforge COMMAND --help tells a command's options, their units and defaults\n"
+      "  lensforge --version\n\n"
+      "Exit codes: 0 done; 1 failed while running; 2 bad usage or input; 3 done, but a stated\n"
+      "limit was not met; 130 interrupted, with everything done so far kept.\n";
+  return text;
+}
+
+int dispatch(const Arguments& arguments) {
+  if (arguments.empty()) throw InputError("no command given; lensforge --help lists them");
+  const std::string& name = arguments.front();
+  if (name == "--help" || name == "-h" || name == "help") throw HelpText(overall_help());
+  if (name == "--version") throw HelpText(version_line());
+  for (const Subcommand& command : kSubcommands) {
+    if (name == command.name) return command.run({arguments.begin() + 1, arguments.end()});
+  }
+  throw InputError(name + ": no such command; lensforge --help lists them");
+}
+
+int guarded(const Arguments& arguments) {
+  const bool json = std::find(arguments.begin(), arguments.end(), "--json") != arguments.end();
+  try {
+    return dispatch(arguments);
+  } catch (const HelpText& help) {
+    print_to_stdout(help.text);
+    return kDone;
+  } catch (const InputError& e) {
+    return report_error(e.what(), kBadInput, json);
+  } catch (const std::bad_alloc&) {
+    return report_error("not enough memory", kFailed, json);
+  } catch (const std::exception& e) {
+    return report_error(e.what(), kFailed, json);
+  }
+}
+
+}  // namespace
+
+int run_command_line(const std::vector<std::string>& arguments) noexcept {
+  try {
+    return guarded(arguments);
+  } catch (const std::exception& e) {
+    // Only printing can have failed here, so stdout is of no use any more.
+    return report_error(e.what(), kFailed, false);
+  }
+}
+
+}  // namespace lensforge::app

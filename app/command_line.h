@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace lensforge::app {
+
+/// Runs the subcommand that `arguments` (without the program's name) asks for and returns the exit
+/// code of interface.md. Every error ends up as one line on stderr; nothing is thrown.
+int run_command_line(const std::vector<std::string>& arguments) noexcept;
+
+}  // namespace lensforge::app

@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace lensforge::app {
+
+using Arguments = std::vector<std::string>;
+
+/// One subcommand each: `arguments` are those after its name; the result is the exit code.
+/// @throw HelpText for --help and --version; InputError, RunError as the libraries do.
+int design_command(const Arguments& arguments);
+int render_command(const Arguments& arguments);
+int cam_command(const Arguments& arguments);
+int info_command(const Arguments& arguments);
+
+}  // namespace lensforge::app

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+
+namespace lensforge::app {
+
+/// Names that `design` adds to those of core/lens.h.
+namespace design_file {
+inline constexpr const char* kCheckpoint = "checkpoint.bin";
+inline constexpr const char* kOverview = "overview.png";
+}  // namespace design_file
+
+/// What an output folder holds of an earlier design.
+struct EarlierDesign {
+  bool lens = false;        ///< A lens.json: of a finished or an interrupted design.
+  bool checkpoint = false;  ///< Something to go on from.
+
+  static EarlierDesign in(const std::filesystem::path& folder);
+};
+
+/// @throw InputError if `folder` holds an earlier design and neither `resume` nor `force` says what
+///        to do with it.
+void refuse_to_overwrite(const std::filesystem::path& folder, bool resume, bool force);
+
+/// Removes every file that lensforge writes into a lens folder, the G-code made from it included,
+/// and only those.
+void remove_earlier_design(const std::filesystem::path& folder);
+
+}  // namespace lensforge::app

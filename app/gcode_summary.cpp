@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "app/gcode_summary.h"
+
+#include <algorithm>
+#include <cctype>
+#include <charconv>
+#include <fstream>
+#include <string_view>
+
+#include "core/error.h"
+
+namespace lensforge::app {
+namespace {
+
+constexpr std::size_t kMostHeaderLines = 12;
+
+struct SplitLine {
+  std::string code;     ///< Upper case, without spaces and comments.
+  std::string comment;  ///< Text of the comments.
+};
+
+SplitLine split(const std::string& line) {
+  SplitLine parts;
+  bool in_brackets = false;
+  for (std::size_t i = 0; i < line.size(); ++i) {
+    const char c = line[i];
+    if (!in_brackets && c == ';') {
+      parts.comment += line.substr(i + 1);
+      break;
+    }
+    if (c == '(' || c == ')') {
+      in_brackets = c == '(';
+    } else if (in_brackets) {
+      parts.comment += c;
+    } else if (std::isspace(static_cast<unsigned char>(c)) == 0) {
+      parts.code += static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+    }
+  }
+  return parts;
+}
+
+/// Takes the line's X, Y and Z words into `box`. @return whether there was one.
+bool take_words(std::string_view code, Eigen::AlignedBox3d& box) {
+  bool any = false;
+  for (std::size_t i = 0; i + 1 < code.size(); ++i) {
+    const std::size_t axis = std::string_view("XYZ").find(code[i]);
+    if (axis == std::string_view::npos) continue;
+    double value = 0.0;
+    const auto [end, error] =
+        std::from_chars(code.data() + i + 1, code.data() + code.size(), value);
+    if (error != std::errc()) continue;
+    const auto k = static_cast<Eigen::Index>(axis);
+    box.min()[k] = std::min(box.min()[k], value);
+    box.max()[k] = std::max(box.max()[k], value);
+    any = true;
+  }
+  return any;
+}
+
+}  // namespace
+
+GcodeSummary summarise_gcode(const std::filesystem::path& path) {
+  std::ifstream file(path);
+  if (!file || std::filesystem::is_directory(path)) {
+    throw InputError(path.string() + ": cannot be read");
+  }
+  GcodeSummary summary;
+  bool in_header = true;
+  for (std::string line; std::getline(file, line); ++summary.lines) {
+    if (line.find('\0') != std::string::npos) {
+      throw InputError(path.string() + ": line " + std::to_string(summary.lines + 1) +
+                       ": not G-code, it holds a zero byte");
+    }
+    const SplitLine parts = split(line);
+    in_header = in_header && (parts.code.empty() || parts.code == "%");
+    if (in_header && !parts.comment.empty() && summary.header.size() < kMostHeaderLines) {
+      summary.header.push_back(parts.comment);
+    }
+    if (take_words(parts.code, summary.extent)) ++summary.moves;
+  }
+  return summary;
+}
+
+}  // namespace lensforge::app

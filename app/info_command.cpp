@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <filesystem>
+
+#include "app/commands.h"
+#include "app/console.h"
+#include "app/exit_code.h"
+#include "app/gcode_summary.h"
+#include "app/json_output.h"
+#include "app/option_set.h"
+#include "core/image_io.h"
+#include "core/lens.h"
+#include "core/mesh_io.h"
+
+namespace lensforge::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// What is known of a thing, for people and for programs.
+struct Description {
+  nlohmann::json json;
+  std::string text;
+
+  void line(const std::string& name, const std::string& value) {
+    text +=
+        "  " + name + std::string(14 - std::min<std::size_t>(name.size(), 13), ' ') + value + "\n";
+  }
+};
+
+std::string range_text(double low, double high) {
+  return fixed(low, 4) + " ... " + fixed(high, 4) + " mm";
+}
+
+void describe_extent(Description& d, const Eigen::AlignedBox3d& box) {
+  for (int k = 0; k < 3; ++k) {
+    if (!(box.min()[k] <= box.max()[k])) continue;
+    const std::string axis(1, "xyz"[k]);
+    d.line(axis, range_text(box.min()[k], box.max()[k]));
+    d.json[axis] = {box.min()[k], box.max()[k]};
+  }
+}
+
+void describe_mesh(Description& d, const SurfaceMesh& mesh) {
+  d.line("mesh", std::to_string(mesh.vertex_count()) + " vertices, " +
+                     std::to_string(mesh.triangle_count()) + " triangles");
+  d.json["vertices"] = mesh.vertex_count();
+  d.json["triangles"] = mesh.triangle_count();
+  const Eigen::Vector3d low = mesh.vertices.rowwise().minCoeff();
+  const Eigen::Vector3d high = mesh.vertices.rowwise().maxCoeff();
+  describe_extent(d, {low, high});
+}
+
+void describe_setup(Description& d, const OpticalSetup& setup) {
+  d.line("lens", fixed(setup.lens_size.x(), 2) + " x " + fixed(setup.lens_size.y(), 2) +
+                     " mm, refractive index " + fixed(setup.ior, 4));
+  d.line("wall", "z = " + fixed(setup.focal_length, 2) + " mm, picture " +
+                     fixed(setup.image_size.x(), 2) + " x " + fixed(setup.image_size.y(), 2) +
+                     " mm, seen from the " + (setup.view == ViewSide::kFront ? "front" : "rear"));
+  d.line("picture", size_text(setup.pixels.x(), setup.pixels.y()) + " pixels");
+  d.json["lens_size"] = {setup.lens_size.x(), setup.lens_size.y()};
+  d.json["image_size"] = {setup.image_size.x(), setup.image_size.y()};
+  d.json["pixels"] = {setup.pixels.x(), setup.pixels.y()};
+  d.json["focal_length"] = setup.focal_length;
+  d.json["ior"] = setup.ior;
+}
+
+void describe_provenance(Description& d, const nlohmann::json& provenance) {
+  d.json["provenance"] = provenance;
+  for (const auto& [name, value] : provenance.items()) {
+    if (value.is_object()) continue;
+    d.line(name, value.is_string() ? value.get<std::string>() : value.dump());
+  }
+}
+
+Description describe_lens(const fs::path& folder) {
+  const Lens lens = read_lens(folder);
+  Description d{{{"kind", "lens"}, {"model", model_word(lens.model)}}, {}};
+  describe_setup(d, lens.setup);
+  d.line("model", model_word(lens.model));
+  const GridShape grid = lens.surface.grid;
+  if (grid.is_grid()) d.line("grid", size_text(grid.columns, grid.rows));
+  d.json["grid"] = {grid.columns, grid.rows};
+  describe_mesh(d, lens.surface);
+  d.line("facet", metrics_text(lens.facet_metrics));
+  d.line("smooth", metrics_text(lens.smooth_metrics));
+  d.json["metrics"] = {{"facet", metrics_json(lens.facet_metrics)},
+                       {"smooth", metrics_json(lens.smooth_metrics)}};
+  describe_provenance(d, lens.provenance);
+  return d;
+}
+
+Description describe_gcode(const fs::path& path) {
+  const GcodeSummary summary = summarise_gcode(path);
+  Description d{{{"kind", "gcode"}}, {}};
+  for (const std::string& comment : summary.header) d.line("comment", comment);
+  d.line("program", std::to_string(summary.lines) + " lines, " + std::to_string(summary.moves) +
+                        " with a position");
+  d.json["header"] = summary.header;
+  d.json["lines"] = summary.lines;
+  d.json["moves"] = summary.moves;
+  describe_extent(d, summary.extent);
+  return d;
+}
+
+Description describe_picture(const fs::path& path) {
+  const LoadedImage loaded = read_image(path);
+  const auto values = loaded.image.values();
+  const double count = static_cast<double>(values.size());
+  const double mean = loaded.image.total() / count;
+  const double black = static_cast<double>(std::count(values.begin(), values.end(), 0.0F)) / count;
+  Description d{{{"kind", "picture"}}, {}};
+  d.line("picture", size_text(loaded.image.columns(), loaded.image.rows()) + " pixels");
+  d.line("mean", fixed(mean, 4) + " of display white, in linear light");
+  d.line("exact black", fixed(100.0 * black, 2) + " % of the pixels");
+  for (const std::string& change : loaded.changes) d.line("read as", change);
+  d.json["pixels"] = {loaded.image.columns(), loaded.image.rows()};
+  d.json["mean"] = mean;
+  d.json["share_black"] = black;
+  d.json["changes"] = loaded.changes;
+  return d;
+}
+
+bool has_extension(const fs::path& path, std::initializer_list<const char*> extensions) {
+  std::string own = path.extension().string();
+  std::transform(own.begin(), own.end(), own.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return std::find(extensions.begin(), extensions.end(), own) != extensions.end();
+}
+
+Description describe(const fs::path& path) {
+  if (fs::is_directory(path)) return describe_lens(path);
+  if (has_extension(path, {".ngc", ".nc", ".gcode", ".tap"})) return describe_gcode(path);
+  if (!has_extension(path, {".ply", ".obj", ".stl", ".off"})) return describe_picture(path);
+  Description d{{{"kind", "mesh"}}, {}};
+  describe_mesh(d, read_mesh(path));
+  return d;
+}
+
+}  // namespace
+
+int info_command(const Arguments& command_line) {
+  std::string source;
+  OptionSet options("info", "Says what a lens folder, mesh, picture or G-code program is.");
+  options.positional("SOURCE", source, "lens folder, mesh, picture or G-code program");
+  options.parse(command_line);
+  Description d = describe(source);
+  d.json["command"] = "info";
+  d.json["source"] = source;
+  const Console console(options.common().json, options.common().quiet);
+  console.result(d.json, source + ": " + d.json["kind"].get<std::string>() + "\n" + d.text);
+  return kDone;
+}
+
+}  // namespace lensforge::app

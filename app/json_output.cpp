@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "app/json_output.h"
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+
+namespace lensforge::app {
+
+nlohmann::json metrics_json(const ImageMetrics& metrics) {
+  const bool finite = std::isfinite(metrics.psnr);
+  return {{"mae", metrics.mae},
+          {"psnr", finite ? nlohmann::json(metrics.psnr) : nlohmann::json(nullptr)},
+          {"ssim", metrics.ssim},
+          {"mae_linear", metrics.mae_linear},
+          {"flux_inside", metrics.flux_inside}};
+}
+
+std::string metrics_text(const ImageMetrics& metrics) {
+  return "MAE " + fixed(metrics.mae, 4) + "  PSNR " + fixed(metrics.psnr, 1) + " dB  SSIM " +
+         fixed(metrics.ssim, 3) + "  linear MAE " + fixed(metrics.mae_linear, 4) +
+         "  flux inside " + fixed(100.0 * metrics.flux_inside, 1) + " %";
+}
+
+std::string fixed(double value, int digits) {
+  std::array<char, 64> text{};
+  std::snprintf(text.data(), text.size(), "%.*f", digits, value);
+  return text.data();
+}
+
+std::string size_text(long columns, long rows) {
+  return std::to_string(columns) + " x " + std::to_string(rows);
+}
+
+std::string model_word(SurfaceModel model) {
+  return model == SurfaceModel::kFacet ? "facet" : "smooth";
+}
+
+}  // namespace lensforge::app

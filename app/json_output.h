@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "core/metrics.h"
+#include "core/optical_setup.h"
+
+/// The words and numbers that more than one command prints.
+namespace lensforge::app {
+
+/// {"mae", "psnr", "ssim", "mae_linear", "flux_inside"}; psnr is null where it is infinite.
+nlohmann::json metrics_json(const ImageMetrics& metrics);
+
+/// One line: "MAE 0.0123  PSNR 31.2 dB  SSIM 0.961  linear MAE 0.0042  flux inside 99.8 %".
+std::string metrics_text(const ImageMetrics& metrics);
+
+/// A number with `digits` digits after the point.
+std::string fixed(double value, int digits);
+
+/// Joins two counts as "256 x 192".
+std::string size_text(long columns, long rows);
+
+std::string model_word(SurfaceModel model);
+
+}  // namespace lensforge::app

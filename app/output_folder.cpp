@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "app/output_folder.h"
+
+#include <string>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "core/files.h"
+
+namespace lensforge::app {
+
+namespace fs = std::filesystem;
+
+OutputFolder::OutputFolder(fs::path path) : path_(std::move(path)) {
+  std::error_code ignored;
+  existed_ = fs::exists(path_, ignored);
+  require_writable_folder(path_);
+}
+
+OutputFolder::~OutputFolder() {
+  std::error_code ignored;
+  if (!existed_) fs::remove(path_, ignored);  // Only succeeds on an empty folder.
+}
+
+void OutputFolder::remove_partial_files() const {
+  // write_whole_file() names them .NAME.partial-NUMBER.EXTENSION.
+  std::error_code ignored;
+  std::vector<fs::path> partial;
+  for (const auto& entry : fs::directory_iterator(path_, ignored)) {
+    const std::string name = entry.path().filename().string();
+    if (name.front() == '.' && name.find(".partial-") != std::string::npos) {
+      partial.push_back(entry.path());
+    }
+  }
+  for (const fs::path& path : partial) fs::remove(path, ignored);
+}
+
+}  // namespace lensforge::app

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+
+namespace lensforge::app {
+
+/// A folder that a command writes into: made if it is not there, and taken away again if nothing
+/// was put into it.
+class OutputFolder {
+ public:
+  /// @throw InputError if files cannot be made in `path`.
+  explicit OutputFolder(std::filesystem::path path);
+  ~OutputFolder();
+  OutputFolder(const OutputFolder&) = delete;
+  OutputFolder& operator=(const OutputFolder&) = delete;
+
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+
+  /// Removes what a process that was killed here was about to write.
+  void remove_partial_files() const;
+
+ private:
+  std::filesystem::path path_;
+  bool existed_;
+};
+
+}  // namespace lensforge::app

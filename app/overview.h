@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "core/image.h"
+#include "core/lens.h"
+
+namespace lensforge::app {
+
+/// One picture for people: the target, the projected picture and the surface side by side, each in
+/// the orientation of the target. The surface is shown as a relief lit from the upper left whose
+/// contrast is stretched, so that creases far too shallow to see stand out.
+Image draw_overview(const Lens& lens);
+
+/// The relief alone, `columns` × `rows`, linear light.
+Image draw_relief(const SurfaceMesh& mesh, const OpticalSetup& setup, int columns, int rows);
+
+}  // namespace lensforge::app

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "app/progress_display.h"
+
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdio>
+
+namespace lensforge::app {
+namespace {
+
+constexpr std::chrono::milliseconds kBarInterval{100};
+constexpr std::chrono::seconds kLineInterval{5};
+constexpr int kBarWidth = 24;
+constexpr int kUsualTerminalWidth = 80;
+
+std::size_t terminal_width() {
+  winsize size{};
+  const bool known = ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0;
+  return known ? size.ws_col : kUsualTerminalWidth;
+}
+
+std::string clock_text(double seconds) {
+  const int whole = static_cast<int>(seconds);
+  char text[32];
+  std::snprintf(text, sizeof text, "%d:%02d", whole / 60, whole % 60);
+  return text;
+}
+
+std::string bar(double share, int width) {
+  const int filled = static_cast<int>(share * width);
+  return "[" + std::string(static_cast<std::size_t>(filled), '#') +
+         std::string(static_cast<std::size_t>(width - filled), '.') + "] ";
+}
+
+}  // namespace
+
+std::string progress_line(const Progress& progress, double seconds, int bar_width) {
+  std::string line = progress.stage + "  ";
+  if (progress.total > 0.0) {
+    const double share = std::clamp(progress.done / progress.total, 0.0, 1.0);
+    if (bar_width > 0) line += bar(share, bar_width);
+    line += std::to_string(static_cast<int>(100.0 * share)) + " %  ";
+  }
+  if (!progress.detail.empty()) line += progress.detail + "  ";
+  return line + clock_text(seconds);
+}
+
+ProgressDisplay::ProgressDisplay(bool quiet)
+    : quiet_(quiet), terminal_(isatty(STDERR_FILENO) != 0), shown_(start_) {}
+
+ProgressDisplay::~ProgressDisplay() {
+  if (bar_drawn_) std::fputs("\r\033[K", stderr);
+}
+
+std::function<void(const Progress&)> ProgressDisplay::sink() {
+  if (quiet_) return {};
+  return [this](const Progress& progress) { show(progress); };
+}
+
+void ProgressDisplay::show(const Progress& progress) {
+  const std::lock_guard lock(mutex_);
+  const Clock::time_point now = Clock::now();
+  const Clock::duration wait = terminal_ ? Clock::duration(kBarInterval) : kLineInterval;
+  if (now - shown_ < wait) return;
+  shown_ = now;
+  const double seconds = std::chrono::duration<double>(now - start_).count();
+  std::string line = progress_line(progress, seconds, terminal_ ? kBarWidth : 0);
+  if (terminal_) {
+    line.resize(std::min(line.size(), terminal_width() - 1));
+    std::fprintf(stderr, "\r%s\033[K", line.c_str());
+    bar_drawn_ = true;
+  } else {
+    std::fprintf(stderr, "%s\n", line.c_str());
+  }
+}
+
+}  // namespace lensforge::app

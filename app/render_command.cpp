@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <filesystem>
+#include <optional>
+
+#include "app/commands.h"
+#include "app/console.h"
+#include "app/exit_code.h"
+#include "app/json_output.h"
+#include "app/option_set.h"
+#include "app/render_setup.h"
+#include "core/error.h"
+#include "core/image_io.h"
+#include "core/lens.h"
+#include "core/mesh_io.h"
+#include "design/render_lens.h"
+
+namespace lensforge::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct RenderArguments {
+  std::string source;
+  std::string out;
+  std::string target;
+  int pixels = 256;
+  double image_width = 100.0;
+  SurfaceModel model = SurfaceModel::kFacet;
+  OpticalSetup setup;  ///< What the options for ior, focal length and view write to.
+};
+
+/// What is rendered and, if known, what it should look like.
+struct Scene {
+  SurfaceMesh surface;
+  OpticalSetup setup;
+  SurfaceModel model = SurfaceModel::kFacet;
+  std::optional<Image> target;
+};
+
+void add_render_options(OptionSet& options, RenderArguments& arguments) {
+  options.positional("SOURCE", arguments.source, "lens folder, or mesh: .ply, .obj, .stl, .off");
+  options.text("--out", arguments.out, "FILE", "write the picture to this .png or .exr");
+  options.text("--target", arguments.target, "PICTURE", "compare with this; a lens has its own");
+  options.choice("--model", arguments.model,
+                 {{"facet", SurfaceModel::kFacet}, {"smooth", SurfaceModel::kSmooth}},
+                 "surface model of the picture; a lens has its own default");
+  options.integer("--pixels", arguments.pixels, Limits::between(1, kMaxImageSide),
+                  "longer side of the picture; a lens has its own default");
+  options.length("--focal", arguments.setup.focal_length, Limits::above(0),
+                 "z of the wall; a lens has its own default");
+  options.number("--ior", arguments.setup.ior, Limits::above(1), "",
+                 "refractive index; a lens has its own default");
+  options.choice("--view", arguments.setup.view,
+                 {{"front", ViewSide::kFront}, {"rear", ViewSide::kRear}},
+                 "side from which the picture is seen; a lens has its own default");
+  options.length("--image-width", arguments.image_width, Limits::above(0),
+                 "width of the picture on the wall; a lens has its own default, a mesh its width");
+}
+
+Scene load(const std::string& source) {
+  if (fs::is_directory(source)) {
+    Lens lens = read_lens(source);
+    return {std::move(lens.surface), lens.setup, lens.model, std::move(lens.target)};
+  }
+  SurfaceMesh mesh = read_mesh(source);
+  const OpticalSetup setup = setup_for_mesh(mesh, RenderArguments{}.pixels);
+  return {std::move(mesh), setup, RenderArguments{}.model, std::nullopt};
+}
+
+/// The scene with everything that the options say instead.
+Scene adjusted(Scene scene, const OptionSet& options, const RenderArguments& arguments) {
+  OpticalSetup& setup = scene.setup;
+  if (options.given("--model")) scene.model = arguments.model;
+  if (options.given("--focal")) setup.focal_length = arguments.setup.focal_length;
+  if (options.given("--ior")) setup.ior = arguments.setup.ior;
+  if (options.given("--view")) setup.view = arguments.setup.view;
+  if (options.given("--image-width")) setup = with_image_width(setup, arguments.image_width);
+  if (options.given("--pixels")) setup = with_longer_side(setup, arguments.pixels);
+  if (options.given("--target")) scene.target = read_image(arguments.target).image;
+  if (scene.target) scene.target = resample(*scene.target, setup.pixels.x(), setup.pixels.y());
+  require_wall_above(scene.surface, setup);
+  return scene;
+}
+
+/// Without a target there is no white to relate to: a PNG shows the brightest pixel as white.
+Image scaled_to_white(Image image, const Console& console) {
+  const float white = *std::max_element(image.values().begin(), image.values().end());
+  if (!(white > 0.0F)) return image;
+  console.note("no target: white is the brightest pixel, " + fixed(white, 2) + " times even light");
+  for (float& value : image.values()) value /= white;
+  return image;
+}
+
+/// What a command says at the end, and what it wrote.
+struct Rendering {
+  Image image;
+  nlohmann::json json;
+  std::string text;
+};
+
+Rendering compare_models(const Scene& scene, const Executor& executor) {
+  Rendering rendering;
+  for (const SurfaceModel model : {SurfaceModel::kFacet, SurfaceModel::kSmooth}) {
+    Image* image = model == scene.model ? &rendering.image : nullptr;
+    const ImageMetrics metrics =
+        evaluate(scene.surface, scene.setup, model, *scene.target, image, executor);
+    const std::string word = model_word(model);
+    rendering.json["metrics"][word] = metrics_json(metrics);
+    rendering.text +=
+        "  " + word + std::string(8 - word.size(), ' ') + metrics_text(metrics) + "\n";
+  }
+  return rendering;
+}
+
+Rendering render_alone(const Scene& scene, const Executor& executor) {
+  const RenderResult result = render_surface(scene.surface, scene.setup, scene.model, executor);
+  return {result.image,
+          {{"flux_inside", result.flux_inside}},
+          "  " + model_word(scene.model) + "  flux inside " + fixed(100.0 * result.flux_inside, 1) +
+              " %\n"};
+}
+
+void require_picture_name(const std::string& out) {
+  const std::string extension = fs::path(out).extension().string();
+  if (!out.empty() && extension != ".png" && extension != ".exr") {
+    throw InputError("--out " + out + ": must end in .png or .exr");
+  }
+}
+
+}  // namespace
+
+int render_command(const Arguments& command_line) {
+  RenderArguments arguments;
+  OptionSet options("render", "Renders a lens or any mesh and compares it with its target.");
+  add_render_options(options, arguments);
+  options.parse(command_line);
+  require_picture_name(arguments.out);
+  const Console console(options.common().json, options.common().quiet);
+  const Scene scene = adjusted(load(arguments.source), options, arguments);
+  Rendering rendering = scene.target ? compare_models(scene, options.executor())
+                                     : render_alone(scene, options.executor());
+  if (!arguments.out.empty()) {
+    const bool scale = !scene.target && fs::path(arguments.out).extension() == ".png";
+    write_image(scale ? scaled_to_white(rendering.image, console) : rendering.image, arguments.out);
+    rendering.json["out"] = arguments.out;
+  }
+  rendering.json["command"] = "render";
+  rendering.json["source"] = arguments.source;
+  rendering.json["model"] = model_word(scene.model);
+  rendering.json["pixels"] = {scene.setup.pixels.x(), scene.setup.pixels.y()};
+  console.result(rendering.json, arguments.source + "\n" + rendering.text);
+  return kDone;
+}
+
+}  // namespace lensforge::app

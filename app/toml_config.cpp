@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "app/toml_config.h"
+
+#include <toml++/toml.h>
+
+#include <algorithm>
+#include <sstream>
+
+#include "core/error.h"
+
+namespace lensforge::app {
+namespace {
+
+std::string value_text(const std::string& key, const toml::node& value) {
+  if (const auto* text = value.as_string()) return text->get();
+  if (const auto* flag = value.as_boolean()) return flag->get() ? "true" : "false";
+  if (!value.is_number()) {
+    throw InputError("--config: key " + key + ": must be a string, a number or a boolean");
+  }
+  std::ostringstream text;
+  text.precision(17);
+  if (const auto* whole = value.as_integer()) text << whole->get();
+  if (const auto* real = value.as_floating_point()) text << real->get();
+  return text.str();
+}
+
+toml::table parsed(std::istream& input) {
+  try {
+    return toml::parse(input);
+  } catch (const toml::parse_error& e) {
+    throw InputError("--config: line " + std::to_string(e.source().begin.line) +
+                     ": not TOML: " + std::string(e.description()));
+  }
+}
+
+}  // namespace
+
+std::string TomlConfig::to_config(const CLI::App* /*app*/, bool /*default_also*/,
+                                  bool /*write_description*/, std::string /*prefix*/) const {
+  return {};
+}
+
+std::vector<CLI::ConfigItem> TomlConfig::from_config(std::istream& input) const {
+  std::vector<CLI::ConfigItem> read;
+  for (const auto& [key, value] : parsed(input)) {
+    CLI::ConfigItem item;
+    item.name = std::string(key.str());
+    if (std::find(keys_.begin(), keys_.end(), item.name) == keys_.end()) {
+      throw InputError("--config: key " + item.name + ": the command has no such option");
+    }
+    item.inputs = {value_text(item.name, value)};
+    read.push_back(std::move(item));
+  }
+  return read;
+}
+
+}  // namespace lensforge::app

@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "core/image_io.h"
+#include "scenario/driver.h"
+
+namespace lensforge::scenario {
+namespace {
+
+using ::testing::HasSubstr;
+
+const std::vector<std::string> kLensFiles{"convergence.csv", "error.png",  "lens.json",
+                                          "overview.png",    "render.exr", "render.png",
+                                          "surface.ply",     "target.exr", "target.png"};
+
+class Fixtures : public Scenario, public ::testing::WithParamInterface<const char*> {};
+
+TEST_P(Fixtures, BecomeALens) {
+  Arguments design = small_design(picture(GetParam()), path("lens"));
+  design.emplace_back("--json");
+  const Outcome outcome = run(design);
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_EQ(listing(at("lens")), kLensFiles);
+  const nlohmann::json result = outcome.json();
+  EXPECT_EQ(result["status"], "done");
+  EXPECT_LT(result["metrics"]["facet"]["mae"], 0.2);
+  EXPECT_GT(result["metrics"]["facet"]["flux_inside"], 0.9);
+}
+
+INSTANTIATE_TEST_SUITE_P(All, Fixtures,
+                         ::testing::Values("portrait.png", "logo.png", "rings.png", "stripes.png"),
+                         [](const auto& test) {
+                           const std::string name = test.param;
+                           return name.substr(0, name.find('.'));
+                         });
+
+class Chain : public Scenario {
+ protected:
+  void design_stripes() {
+    const Outcome outcome = run(small_design(picture("stripes.png"), path("lens")));
+    ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  }
+};
+
+TEST_F(Chain, EveryFixtureIsATestCase) {
+  EXPECT_EQ(listing(LENSFORGE_PICTURES),
+            (std::vector<std::string>{"logo.png", "portrait.png", "rings.png", "stripes.png"}));
+}
+
+TEST_F(Chain, APictureThatIsNotSquareKeepsItsShape) {
+  design_stripes();
+  const nlohmann::json lens = nlohmann::json::parse(content(at("lens/lens.json")));
+  EXPECT_EQ(lens["pixels"][0], 32);
+  EXPECT_EQ(lens["pixels"][1], 21);
+  EXPECT_EQ(lens["lens_size"][0], 100.0);
+  const Image render = read_image(at("lens/render.png")).image;
+  EXPECT_EQ(render.columns(), 32);
+  EXPECT_EQ(render.rows(), 21);
+}
+
+TEST_F(Chain, ProvenanceTellsHowTheLensWasMade) {
+  design_stripes();
+  const nlohmann::json made = nlohmann::json::parse(content(at("lens/lens.json")))["provenance"];
+  EXPECT_THAT(made["program"].get<std::string>(), HasSubstr("lensforge "));
+  EXPECT_EQ(made["options"]["pixels"], 32);
+  EXPECT_EQ(made["options"]["quality"], "draft");
+  EXPECT_EQ(made["options"]["weight-gradient"], 1000.0);
+  EXPECT_EQ(made["device"], "cpu");
+  EXPECT_EQ(made["threads"], 2);
+  EXPECT_GT(made["seconds"], 0.0);
+}
+
+TEST_F(Chain, RenderOfALensRepeatsItsMetricsAndPicture) {
+  design_stripes();
+  const Outcome outcome = run({"render", path("lens"), "--json", "--out", path("again.exr")});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const nlohmann::json lens = nlohmann::json::parse(content(at("lens/lens.json")));
+  const nlohmann::json metrics = outcome.json()["metrics"];
+  for (const char* model : {"facet", "smooth"}) {
+    for (const char* metric : {"mae", "psnr", "ssim", "flux_inside"}) {
+      EXPECT_EQ(metrics[model][metric], lens["metrics"][model][metric]) << model << metric;
+    }
+  }
+  EXPECT_EQ(read_image(at("again.exr")).image, read_image(at("lens/render.exr")).image);
+}
+
+TEST_F(Chain, RenderTakesAnotherResolution) {
+  design_stripes();
+  ASSERT_EQ(run({"render", path("lens"), "--pixels", "48", "--out", path("fine.png")}).exit_code,
+            0);
+  const Image picture = read_image(at("fine.png")).image;
+  EXPECT_EQ(picture.columns(), 48);
+}
+
+TEST_F(Chain, RenderOfABareMeshNeedsNoTarget) {
+  design_stripes();
+  const Outcome outcome = run(
+      {"render", path("lens/surface.ply"), "--json", "--pixels", "32", "--out", path("mesh.png")});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_GT(outcome.json()["flux_inside"], 0.9);
+  EXPECT_TRUE(fs::exists(at("mesh.png")));
+  const Outcome compared = run({"render", path("lens/surface.ply"), "--json", "--pixels", "32",
+                                "--target", picture("stripes.png")});
+  ASSERT_EQ(compared.exit_code, 0) << compared.err;
+  EXPECT_LT(compared.json()["metrics"]["facet"]["mae"], 0.2);
+}
+
+TEST_F(Chain, CamWritesAProgramAndAReport) {
+  design_stripes();
+  const Outcome outcome =
+      run({"cam", path("lens"), "--pitch", "1mm", "--tool-diameter", "2mm", "--json"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_EQ(outcome.json()["status"], "done");
+  EXPECT_EQ(listing(at("lens/cam")), (std::vector<std::string>{"finish.ngc", "report.json"}));
+  const nlohmann::json report = nlohmann::json::parse(content(at("lens/cam/report.json")));
+  EXPECT_TRUE(report.contains("z_offset"));
+  const nlohmann::json info = run({"info", path("lens/cam/finish.ngc"), "--json"}).json();
+  EXPECT_EQ(info["kind"], "gcode");
+  EXPECT_GT(info["moves"], 100);
+}
+
+TEST_F(Chain, CamGivesTheSameBytesOnOneAndTwoThreads) {
+  design_stripes();
+  const Arguments cam = {"cam", path("lens"), "--pitch", "1mm", "--tool-diameter", "2mm"};
+  Arguments one = cam;
+  one.insert(one.end(), {"--threads", "1"});
+  ASSERT_EQ(run(one).exit_code, 0);
+  const std::string program = content(at("lens/cam/finish.ngc"));
+  Arguments two = cam;
+  two.insert(two.end(), {"--threads", "2"});
+  ASSERT_EQ(run(two).exit_code, 0);
+  EXPECT_TRUE(content(at("lens/cam/finish.ngc")) == program);
+}
+
+TEST_F(Chain, InfoKnowsEveryKindOfFile) {
+  design_stripes();
+  for (const auto& [source, kind] :
+       std::vector<std::pair<std::string, std::string>>{{path("lens"), "lens"},
+                                                        {path("lens/surface.ply"), "mesh"},
+                                                        {path("lens/render.exr"), "picture"},
+                                                        {picture("logo.png"), "picture"}}) {
+    const Outcome json = run({"info", source, "--json"});
+    ASSERT_EQ(json.exit_code, 0) << json.err;
+    EXPECT_EQ(json.json()["kind"], kind);
+    const Outcome text = run({"info", source});
+    EXPECT_THAT(text.out, HasSubstr(kind));
+    EXPECT_LT(std::count(text.out.begin(), text.out.end(), '\n'), 25);
+  }
+  EXPECT_GT(run({"info", picture("logo.png"), "--json"}).json()["share_black"], 0.5);
+}
+
+TEST_F(Chain, QuietSaysNothingOnStderr) {
+  Arguments design = small_design(picture("stripes.png"), path("lens"));
+  design.emplace_back("--quiet");
+  EXPECT_EQ(run(design).err, "");
+}
+
+TEST_F(Chain, ForceReplacesADesignAndTheProgramMadeFromIt) {
+  design_stripes();
+  ASSERT_EQ(run({"cam", path("lens"), "--pitch", "2mm", "--tool-diameter", "4mm"}).exit_code, 0);
+  Arguments again = small_design(picture("rings.png"), path("lens"));
+  again.emplace_back("--force");
+  ASSERT_EQ(run(again).exit_code, 0);
+  EXPECT_EQ(listing(at("lens")), kLensFiles);
+}
+
+}  // namespace
+}  // namespace lensforge::scenario

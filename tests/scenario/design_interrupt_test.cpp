@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <csignal>
+
+#include "scenario/driver.h"
+
+namespace lensforge::scenario {
+namespace {
+
+using std::chrono::milliseconds;
+
+/// A design of a few seconds with many checkpoints.
+class DesignInterrupt : public Scenario {
+ protected:
+  Arguments design(const std::string& out, const Arguments& extra = {}) const {
+    Arguments arguments = {
+        "design", picture("rings.png"), "--out", path(out),   "--pixels", "64", "--quality",
+        "draft",  "--rounds",           "4",     "--threads", "2"};
+    arguments.insert(arguments.end(), extra.begin(), extra.end());
+    return arguments;
+  }
+
+  void expect_same_lens(const std::string& a, const std::string& b) const {
+    for (const char* file : {"surface.ply", "render.exr", "render.png", "target.exr"}) {
+      ASSERT_TRUE(fs::exists(at(a) / file));
+      EXPECT_TRUE(content(at(a) / file) == content(at(b) / file)) << file;
+    }
+  }
+};
+
+TEST_F(DesignInterrupt, KilledAtAnyMomentAndResumedGivesTheSameLens) {
+  const Outcome whole = run(design("whole"));
+  ASSERT_EQ(whole.exit_code, 0) << whole.err;
+  for (const double share : {0.02, 0.2, 0.45, 0.7, 0.9, 0.98}) {
+    const std::string out = "killed" + std::to_string(share);
+    Process process(design(out));
+    if (process.runs_for(milliseconds(static_cast<int>(1000.0 * share * whole.seconds)))) {
+      process.send(SIGKILL);
+    }
+    process.wait();
+    const Outcome resumed = run(design(out, {"--resume"}));
+    ASSERT_EQ(resumed.exit_code, 0) << resumed.err;
+    expect_same_lens("whole", out);
+    EXPECT_EQ(listing(at("whole")), listing(at(out)));
+  }
+}
+
+TEST_F(DesignInterrupt, KilledAgainAndAgainStillArrives) {
+  ASSERT_EQ(run(design("whole")).exit_code, 0);
+  int kills = 0;
+  for (int wait = 300;; wait += 150) {
+    Process process(design("killed", {"--resume"}));
+    if (!process.runs_for(milliseconds(wait))) {
+      EXPECT_EQ(process.wait().exit_code, 0);
+      break;
+    }
+    process.send(SIGKILL);
+    process.wait();
+    ++kills;
+  }
+  EXPECT_GE(kills, 1);
+  expect_same_lens("whole", "killed");
+}
+
+TEST_F(DesignInterrupt, CtrlCKeepsWhatWasReachedAndIsResumable) {
+  ASSERT_EQ(run(design("whole")).exit_code, 0);
+  for (const int signal : {SIGINT, SIGTERM}) {
+    fs::remove_all(at("stopped"));
+    Process process(design("stopped"));
+    ASSERT_TRUE(process.runs_for(milliseconds(400)));
+    process.send(signal);
+    const auto sent = std::chrono::steady_clock::now();
+    const Outcome stopped = process.wait();
+    EXPECT_EQ(stopped.exit_code, 130) << stopped.err;
+    EXPECT_LT(std::chrono::steady_clock::now() - sent, std::chrono::seconds(1));
+    EXPECT_EQ(run({"info", path("stopped")}).exit_code, 0);
+    ASSERT_EQ(run(design("stopped", {"--resume"})).exit_code, 0);
+    expect_same_lens("whole", "stopped");
+  }
+}
+
+TEST_F(DesignInterrupt, CtrlCOnALargeDesignIsHonouredWithinASecond) {
+  Process process(
+      {"design", picture("portrait.png"), "--out", path("lens"), "--mesh-ratio", "2.5"});
+  ASSERT_TRUE(process.runs_for(std::chrono::seconds(6)));
+  process.send(SIGINT);
+  const auto sent = std::chrono::steady_clock::now();
+  EXPECT_EQ(process.wait().exit_code, 130);
+  const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - sent;
+  RecordProperty("seconds", std::to_string(taken.count()));
+  EXPECT_LT(taken.count(), 1.0);
+}
+
+TEST_F(DesignInterrupt, SecondCtrlCEndsAtOnce) {
+  Process process(design("lens"));
+  ASSERT_TRUE(process.runs_for(milliseconds(300)));
+  process.send(SIGINT);
+  process.send(SIGINT);
+  EXPECT_EQ(process.wait().exit_code, 130);
+}
+
+TEST_F(DesignInterrupt, AFinishedDesignHasNothingToResume) {
+  ASSERT_EQ(run(small_design(picture("rings.png"), path("lens"))).exit_code, 0);
+  const auto written = fs::last_write_time(at("lens/lens.json"));
+  Arguments again = small_design(picture("rings.png"), path("lens"));
+  again.emplace_back("--resume");
+  const Outcome outcome = run(again);
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, ::testing::HasSubstr("finished"));
+  EXPECT_EQ(fs::last_write_time(at("lens/lens.json")), written);
+}
+
+TEST_F(DesignInterrupt, ACheckpointOfOtherOptionsIsRefused) {
+  Process process(design("lens"));
+  ASSERT_TRUE(process.runs_for(milliseconds(1200)));
+  process.send(SIGINT);
+  ASSERT_EQ(process.wait().exit_code, 130);
+  const std::vector<std::string> before = listing(at("lens"));
+  expect_refusal(run(design("lens", {"--resume", "--ior", "1.6", "--quiet"})), 2, {"checkpoint"});
+  expect_refusal(run(design("lens")), 2, {"--resume", "--force"});
+  EXPECT_EQ(listing(at("lens")), before);
+}
+
+TEST_F(DesignInterrupt, ACorruptCheckpointIsRefused) {
+  fs::create_directory(at("lens"));
+  write(at("lens/checkpoint.bin"), "no checkpoint");
+  expect_refusal(run(design("lens", {"--resume", "--quiet"})), 2, {"checkpoint.bin"});
+}
+
+TEST_F(DesignInterrupt, OneAndTwoThreadsGiveTheSameBytes) {
+  Arguments one = design("one");
+  one.back() = "1";
+  ASSERT_EQ(run(one).exit_code, 0);
+  ASSERT_EQ(run(design("two")).exit_code, 0);
+  expect_same_lens("one", "two");
+}
+
+}  // namespace
+}  // namespace lensforge::scenario

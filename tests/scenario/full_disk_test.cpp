@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <sys/mount.h>
+
+#include "scenario/driver.h"
+
+namespace lensforge::scenario {
+namespace {
+
+constexpr unsigned long kKibibyte = 1024;
+
+class FullDisk : public Scenario {
+ protected:
+  /// No partial file may be left; whatever is there was written whole.
+  void expect_nothing_half_written(const fs::path& folder) const {
+    for (const std::string& name : listing(folder)) {
+      EXPECT_THAT(name, ::testing::Not(::testing::HasSubstr("partial")));
+    }
+    EXPECT_FALSE(fs::exists(folder / "lens.json"));
+  }
+};
+
+/// A small file system of its own, which only root can have.
+class SmallDisk {
+ public:
+  SmallDisk(const fs::path& where, const std::string& size) : where_(where) {
+    fs::create_directories(where);
+    mounted_ = mount("none", where.c_str(), "tmpfs", 0, ("size=" + size).c_str()) == 0;
+  }
+  ~SmallDisk() {
+    if (mounted_) umount2(where_.c_str(), MNT_DETACH);
+  }
+  SmallDisk(const SmallDisk&) = delete;
+  SmallDisk& operator=(const SmallDisk&) = delete;
+
+  [[nodiscard]] bool mounted() const { return mounted_; }
+
+ private:
+  fs::path where_;
+  bool mounted_ = false;
+};
+
+TEST_F(FullDisk, DesignSaysSoAndKeepsNoHalfFile) {
+  const SmallDisk disk(at("disk"), "64k");
+  if (!disk.mounted()) GTEST_SKIP() << "file systems can only be mounted by root";
+  Arguments design = small_design(picture("rings.png"), path("disk/lens"));
+  design.emplace_back("--quiet");
+  expect_refusal(run(design), 1, {"disk/lens", "No space left on device"});
+  expect_nothing_half_written(at("disk/lens"));
+}
+
+TEST_F(FullDisk, DesignUnderAFileSizeLimitFailsAndIsResumable) {
+  Arguments design = small_design(picture("rings.png"), path("lens"));
+  design.emplace_back("--quiet");
+  expect_refusal(run(design, 8 * kKibibyte), 1, {"lens", "File too large"});
+  expect_nothing_half_written(at("lens"));
+  design.emplace_back("--resume");
+  EXPECT_EQ(run(design).exit_code, 0);
+}
+
+TEST_F(FullDisk, CamUnderAFileSizeLimitLeavesNoProgram) {
+  ASSERT_EQ(run(small_design(picture("rings.png"), path("lens"))).exit_code, 0);
+  expect_refusal(run({"cam", path("lens"), "--pitch", "2mm", "--quiet"}, 8 * kKibibyte), 1,
+                 {"finish.ngc", "File too large"});
+  EXPECT_EQ(listing(at("lens/cam")), std::vector<std::string>{});
+}
+
+TEST_F(FullDisk, RenderUnderAFileSizeLimitLeavesNoPicture) {
+  ASSERT_EQ(run(small_design(picture("rings.png"), path("lens"))).exit_code, 0);
+  expect_refusal(
+      run({"render", path("lens"), "--out", path("big.exr"), "--pixels", "256", "--quiet"},
+          8 * kKibibyte),
+      1, {"big.exr", "File too large"});
+  EXPECT_FALSE(fs::exists(at("big.exr")));
+}
+
+}  // namespace
+}  // namespace lensforge::scenario

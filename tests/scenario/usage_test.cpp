@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "scenario/driver.h"
+
+namespace lensforge::scenario {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+class Usage : public Scenario {
+ protected:
+  /// A design that is refused for `extra`, before anything is written.
+  void expect_option_refused(const Arguments& extra, const std::vector<std::string>& parts) {
+    Arguments arguments = {"design", picture("rings.png"), "--out", path("lens")};
+    arguments.insert(arguments.end(), extra.begin(), extra.end());
+    expect_refusal(run(arguments), 2, parts);
+    EXPECT_FALSE(fs::exists(at("lens")));
+  }
+};
+
+TEST_F(Usage, HelpOfEveryCommandIsPrintedOnStdout) {
+  for (const Arguments& arguments : std::vector<Arguments>{
+           {"--help"}, {"design", "--help"}, {"render", "-h"}, {"cam", "--help"}, {"info", "-h"}}) {
+    const Outcome outcome = run(arguments);
+    EXPECT_EQ(outcome.exit_code, 0);
+    EXPECT_THAT(outcome.out, HasSubstr("lensforge"));
+    EXPECT_EQ(outcome.err, "");
+  }
+}
+
+TEST_F(Usage, HelpNamesDefaultsAndUnits) {
+  const std::string help = run({"design", "--help"}).out;
+  EXPECT_THAT(help, HasSubstr("--width MM = 100"));
+  EXPECT_THAT(help, HasSubstr("--ior NUMBER = 1.49"));
+  EXPECT_THAT(help, HasSubstr("--quality draft|standard|paper = standard"));
+}
+
+TEST_F(Usage, VersionIsOneLine) {
+  for (const Arguments& arguments : std::vector<Arguments>{{"--version"}, {"cam", "--version"}}) {
+    const Outcome outcome = run(arguments);
+    EXPECT_EQ(outcome.exit_code, 0);
+    EXPECT_THAT(outcome.out, ::testing::MatchesRegex("lensforge [0-9]+\\.[0-9]+\\.[0-9]+\n"));
+  }
+}
+
+TEST_F(Usage, NoCommandIsRefused) { expect_refusal(run({}), 2, {"no command"}); }
+
+TEST_F(Usage, UnknownCommandIsRefused) { expect_refusal(run({"desing"}), 2, {"desing"}); }
+
+TEST_F(Usage, MissingArgumentsAreRefused) {
+  expect_refusal(run({"design"}), 2, {"required"});
+  expect_refusal(run({"design", picture("rings.png")}), 2, {"--out"});
+  expect_refusal(run({"render"}), 2, {"SOURCE"});
+  expect_refusal(run({"cam"}), 2, {"DIR"});
+  expect_refusal(run({"info"}), 2, {"SOURCE"});
+}
+
+TEST_F(Usage, UnknownOptionIsRefused) { expect_option_refused({"--widht", "5"}, {"--widht"}); }
+
+TEST_F(Usage, SecondValueIsRefused) {
+  expect_option_refused({"--width", "50", "--width", "60"}, {"--width"});
+}
+
+TEST_F(Usage, OptionsThatBreakTheirRuleAreRefused) {
+  expect_option_refused({"--focal", "0"}, {"--focal", "0", "above 0"});
+  expect_option_refused({"--focal", "-3cm"}, {"--focal", "-3cm", "above 0"});
+  expect_option_refused({"--ior", "0.9"}, {"--ior", "0.9", "above 1"});
+  expect_option_refused({"--ior", "nan"}, {"--ior", "nan"});
+  expect_option_refused({"--width", "10furlongs"}, {"--width", "furlongs"});
+  expect_option_refused({"--width", "inf"}, {"--width", "inf"});
+  expect_option_refused({"--width="}, {"--width"});
+  expect_option_refused({"--rounds", "2.5"}, {"--rounds", "2.5", "whole number"});
+  expect_option_refused({"--quality", "best"}, {"--quality", "best", "draft, standard, paper"});
+  expect_option_refused({"--mesh-ratio", "9"}, {"--mesh-ratio", "9", "0.25 to 8"});
+  expect_option_refused({"--weight-edge", "-1"}, {"--weight-edge", "-1", "at least 0"});
+  expect_option_refused({"--threads", "-1"}, {"--threads", "-1"});
+  expect_option_refused({"--pixels", "193"}, {"--pixels 193", "192"});
+  expect_option_refused({"--thickness", "40cm"}, {"--focal", "thickness"});
+}
+
+TEST_F(Usage, CudaIsRefusedByABuildWithoutIt) {
+  expect_option_refused({"--device", "cuda"}, {"--device cuda", "no CUDA"});
+}
+
+TEST_F(Usage, AnErrorWithJsonIsAnObjectAndALine) {
+  const Outcome outcome = run({"design", path("none.png"), "--out", path("lens"), "--json"});
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_EQ(outcome.json()["exit_code"], 2);
+  EXPECT_THAT(outcome.json()["error"].get<std::string>(), HasSubstr("none.png"));
+  EXPECT_EQ(outcome.err, "lensforge: " + outcome.json()["error"].get<std::string>() + "\n");
+}
+
+TEST_F(Usage, ConfigFileSetsOptionsAndTheCommandLineWins) {
+  write(at("lens.toml"),
+        "pixels = 16\nior = 1.6 # glass\nwidth = \"4cm\"\nrounds = 1\n"
+        "quality = \"draft\"\njson = true\n");
+  const Outcome outcome = run({"design", picture("rings.png"), "--out", path("lens"), "--config",
+                               path("lens.toml"), "--width", "50mm"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_EQ(outcome.json()["lens_size"][0], 50.0);
+  EXPECT_EQ(outcome.json()["pixels"][0], 16);
+  EXPECT_EQ(run({"info", path("lens"), "--json"}).json()["ior"], 1.6);
+}
+
+TEST_F(Usage, BrokenConfigFilesAreRefused) {
+  write(at("unknown.toml"), "pixles = 16\n");
+  expect_option_refused({"--config", path("unknown.toml")}, {"--config", "pixles"});
+  write(at("value.toml"), "ior = 0.5\n");
+  expect_option_refused({"--config", path("value.toml")}, {"--ior 0.5", "above 1"});
+  write(at("syntax.toml"), "pixels = = 3\n");
+  expect_option_refused({"--config", path("syntax.toml")}, {"--config", "line 1"});
+  write(at("table.toml"), "[design]\npixels = 3\n");
+  expect_option_refused({"--config", path("table.toml")}, {"--config", "design"});
+  expect_option_refused({"--config", path("missing.toml")}, {"missing.toml"});
+}
+
+TEST_F(Usage, AResultThatCannotBePrintedFails) {
+  const std::string shell = std::string("\"") + LENSFORGE_COMMAND + "\" info \"" +
+                            picture("rings.png") + "\" >/dev/full 2>\"" + path("err") + "\"";
+  const int status = std::system(shell.c_str());
+  EXPECT_EQ(WEXITSTATUS(status), 1);
+  EXPECT_THAT(content(at("err")), StartsWith("lensforge: standard output: "));
+}
+
+}  // namespace
+}  // namespace lensforge::scenario
