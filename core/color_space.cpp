@@ -45,7 +45,10 @@ std::optional<ColorSpace> parse_color_space(const std::string& name) {
   if (is_one_of(Names{"rec709", "bt709", "rec.709", "itu-r bt.709"})) {
     return ColorSpace{Curve::kRec709, 1.0};
   }
-  if (lower.starts_with("gamma")) return parse_gamma(std::string_view(lower).substr(5));
+  for (const std::string_view prefix : {"gammacorrected", "gamma"}) {
+    if (lower.starts_with(prefix))
+      return parse_gamma(std::string_view(lower).substr(prefix.size()));
+  }
   return std::nullopt;
 }
 

@@ -35,7 +35,7 @@ Executor Executor::serial() { return {}; }
 
 Executor Executor::cpu(int threads) {
   Executor executor;
-  executor.arena_ = std::make_shared<Arena>(threads > 0 ? threads : tbb::task_arena::automatic);
+  executor.arena_ = std::make_shared<Arena>(threads > 0 ? threads : +tbb::task_arena::automatic);
   return executor;
 }
 

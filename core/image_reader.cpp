@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 
 #include <algorithm>
@@ -18,6 +19,8 @@
 #include "core/error.h"
 #include "core/image_io.h"
 #include "core/jpeg_outline.h"
+#include "core/png_outline.h"
+#include "core/tiff_outline.h"
 
 namespace lensforge {
 namespace {
@@ -42,8 +45,27 @@ void check_size(const fs::path& path, std::int64_t columns, std::int64_t rows) {
                    " pixels: at most " + std::to_string(kMaxImageSide) + " a side are read");
 }
 
-/// Everything that can be told from the bytes alone, before a decoder is trusted with them.
-void check_file(const fs::path& path) {
+void check_jpeg(const fs::path& path, std::istream& file) {
+  const auto jpeg = read_jpeg_outline(file);
+  if (!jpeg) return;
+  check_size(path, jpeg->columns, jpeg->rows);
+  if (!jpeg->complete) refuse(path, "is truncated: the JPEG data end before their end marker");
+}
+
+EssentialPng check_png(const fs::path& path, std::istream& file) {
+  const auto size = read_png_size(file);
+  if (!size) return {};
+  check_size(path, size->columns, size->rows);
+  file.clear();
+  file.seekg(0);
+  EssentialPng png = read_essential_png(file);
+  if (!png.problem.empty()) refuse(path, png.problem);
+  return png;
+}
+
+/// Everything that can be told from the bytes alone, before a decoder is trusted with them. PNG
+/// files come back as they are to be decoded.
+EssentialPng check_file(const fs::path& path) {
   std::error_code error;
   const fs::file_status status = fs::status(path, error);
   if (!fs::exists(status)) refuse(path, "cannot be read: " + error.message());
@@ -52,20 +74,25 @@ void check_file(const fs::path& path) {
   std::ifstream file(path, std::ios::binary);
   if (!file) refuse(path, "cannot be read: " + std::generic_category().message(errno));
   if (file.peek() == std::ifstream::traits_type::eof()) refuse(path, "is empty");
-  if (const auto jpeg = read_jpeg_outline(file)) {
-    check_size(path, jpeg->columns, jpeg->rows);
-    if (!jpeg->complete) refuse(path, "is truncated: the JPEG data end before their end marker");
-  }
+  check_jpeg(path, file);
+  file.clear();
+  if (!tiff_pixels_are_inside(file)) refuse(path, "is truncated: it ends before its TIFF data do");
+  file.clear();
+  file.seekg(0);
+  return check_png(path, file);
 }
 
 /// An open picture file and what its header says.
 class Source {
  public:
-  explicit Source(const fs::path& path) : path_(path) {
+  explicit Source(const fs::path& path)
+      : path_(path), png_(check_file(path)), png_reader_(png_.bytes.data(), png_.bytes.size()) {
     OIIO::ImageSpec hints;
     // Alpha is applied here, in linear light, and not by OpenImageIO to the encoded values.
     hints.attribute("oiio:UnassociatedAlpha", 1);
-    input_ = OIIO::ImageInput::open(path.string(), &hints);
+    OIIO::Filesystem::IOProxy* const memory = png_.bytes.empty() ? nullptr : &png_reader_;
+    if (memory != nullptr) hints.attribute("oiio:ioproxy", OIIO::TypeDesc::PTR, &memory);
+    input_ = OIIO::ImageInput::open(memory != nullptr ? "picture.png" : path.string(), &hints);
     if (!input_) refuse(path, "is no picture that can be read: " + OIIO::geterror());
     spec_ = input_->spec();
     check_size(path, spec_.width, spec_.height);
@@ -77,7 +104,19 @@ class Source {
 
   [[nodiscard]] const OIIO::ImageSpec& spec() const { return spec_; }
   [[nodiscard]] const fs::path& path() const { return path_; }
-  [[nodiscard]] bool is_exr() const { return std::string_view(input_->format_name()) == "openexr"; }
+  [[nodiscard]] bool is(std::string_view format) const { return format == input_->format_name(); }
+
+  /// Name of the embedded ICC profile; empty without one.
+  [[nodiscard]] std::string color_profile() const {
+    const std::string name = spec_.get_string_attribute("ICCProfile:profile_description");
+    return name.empty() ? png_.color_profile : name;
+  }
+  /// To be asked when the first picture is read: the file stands at the next one afterwards.
+  [[nodiscard]] bool has_more_pictures() {
+    const bool more = input_->seek_subimage(1, 0);
+    input_->geterror();
+    return more;
+  }
 
   /// Rows that are read at once: tiles must be whole.
   [[nodiscard]] int band_rows() const {
@@ -107,6 +146,8 @@ class Source {
 
  private:
   fs::path path_;
+  EssentialPng png_;  ///< Empty for other formats.
+  OIIO::Filesystem::IOMemReader png_reader_;
   std::unique_ptr<OIIO::ImageInput> input_;
   OIIO::ImageSpec spec_;
 };
@@ -118,9 +159,11 @@ struct Channels {
   int left_out = 0;
 };
 
-Channels choose_channels(const OIIO::ImageSpec& spec) {
+Channels choose_channels(const OIIO::ImageSpec& spec, bool is_gif) {
   Channels channels;
   channels.alpha = spec.alpha_channel < spec.nchannels ? spec.alpha_channel : -1;
+  // OpenImageIO's GIF reader names its alpha channel but does not declare it.
+  if (is_gif) channels.alpha = spec.channelindex("A");
   const std::array<int, 3> named{spec.channelindex("R"), spec.channelindex("G"),
                                  spec.channelindex("B")};
   std::vector<int> others;
@@ -253,7 +296,7 @@ struct Window {
 /// count.
 Window shown_window(const Source& source, std::vector<std::string>& changes) {
   const OIIO::ImageSpec& spec = source.spec();
-  if (!source.is_exr() || spec.full_width < 1 || spec.full_height < 1) {
+  if (!source.is("openexr") || spec.full_width < 1 || spec.full_height < 1) {
     return {spec.width, spec.height, 0, 0};
   }
   const Window window{spec.full_width, spec.full_height, spec.x - spec.full_x,
@@ -311,11 +354,9 @@ Image upright(Image image, int orientation) {
   return turned;
 }
 
-void report_header(const OIIO::ImageSpec& spec, std::vector<std::string>& changes) {
-  if (const int pictures = spec.get_int_attribute("oiio:subimages", 1); pictures > 1) {
-    changes.push_back("only the first of " + std::to_string(pictures) + " pictures read");
-  }
-  const std::string profile = spec.get_string_attribute("ICCProfile:profile_description");
+void report_header(Source& source, std::vector<std::string>& changes) {
+  if (source.has_more_pictures()) changes.emplace_back("only the first of several pictures read");
+  const std::string profile = source.color_profile();
   if (!profile.empty() && profile.find("sRGB") == std::string::npos) {
     changes.push_back("embedded colour profile '" + profile + "' not applied");
   }
@@ -324,15 +365,15 @@ void report_header(const OIIO::ImageSpec& spec, std::vector<std::string>& change
 }  // namespace
 
 LoadedImage read_image(const fs::path& path) {
-  check_file(path);
   Source source(path);
   LoadedImage loaded;
   const ColorSpace space = declared_color_space(source.spec(), loaded.changes);
-  Flattener flattener(source, choose_channels(source.spec()), Decoder(space, source.spec()));
+  Flattener flattener(source, choose_channels(source.spec(), source.is("gif")),
+                      Decoder(space, source.spec()));
   const Window window = shown_window(source, loaded.changes);
   loaded.image = read_pixels(source, window, flattener);
   flattener.report(loaded.changes);
-  report_header(source.spec(), loaded.changes);
+  report_header(source, loaded.changes);
   if (const int orientation = source.spec().get_int_attribute("Orientation", 1);
       orientation > 1 && orientation <= 8) {
     loaded.image = upright(std::move(loaded.image), orientation);
