@@ -84,7 +84,7 @@ struct CamResult {
 /// Makes the finishing program of a lens: zig-zag rows of a ball-end mill (finish_raster.h) written
 /// as G-code (gcode_writer.h). Writes cam_file::kFinish and then cam_file::kReport into `folder`,
 /// each whole or not at all; on an interruption neither, and what an earlier run left stays. Memory
-/// does not grow with the number of rows; the same bytes come out for any number of threads.
+/// does not grow with the number of rows; the program has the same bytes for any number of threads.
 /// @throw InputError naming option, value and rule if an option breaks its rule; naming the surface
 ///        if it has no triangles, is no height field over the lens's rectangle or does not cover
 ///        it.
