@@ -1,6 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
 #include <filesystem>
+#include <functional>
+#include <mutex>
+#include <stop_token>
+#include <string>
+#include <vector>
 
 #include "app/commands.h"
 #include "app/console.h"
@@ -21,6 +26,8 @@ namespace lensforge::app {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr int kLeastPixels = 2;  ///< Of the picture's longer side.
 
 struct DesignArguments {
   std::string target;
@@ -46,7 +53,7 @@ void add_lens_options(OptionSet& options, DesignOptions& design) {
 }
 
 void add_effort_options(OptionSet& options, DesignOptions& design) {
-  options.integer("--pixels", design.pixels, Limits::at_least(2),
+  options.integer("--pixels", design.pixels, Limits::at_least(kLeastPixels),
                   "longer side of the working picture, never more than the picture has");
   options.number("--mesh-ratio", design.mesh_ratio, Limits::between(0.25, 8), "",
                  "mesh vertices per pixel side");
@@ -82,27 +89,33 @@ void add_design_options(OptionSet& options, DesignArguments& arguments) {
 }
 
 /// The working resolution: what was asked for, else the default or what the picture has.
-int working_pixels(const OptionSet& options, const Image& picture, int pixels) {
+int working_pixels(const OptionSet& options, const DesignArguments& arguments,
+                   const Image& picture) {
   const int longer = std::max(picture.columns(), picture.rows());
+  const int pixels = arguments.design.pixels;
+  if (longer < kLeastPixels) {
+    throw InputError(arguments.target + ": has " + size_text(picture.columns(), picture.rows()) +
+                     " pixels; its longer side needs at least " + std::to_string(kLeastPixels));
+  }
   if (pixels <= longer) return pixels;
   if (!options.given("--pixels")) return longer;
   throw InputError("--pixels " + std::to_string(pixels) + ": the picture's longer side has only " +
                    std::to_string(longer) + " pixels");
 }
 
-Image load_target(const DesignArguments& arguments, const Console& console) {
-  LoadedImage loaded = read_image(arguments.target);
+/// Everything that was changed about the picture, in words.
+std::vector<std::string> changes_made(const LoadedImage& loaded, const DesignArguments& arguments) {
+  std::vector<std::string> changes;
   for (const std::string& change : loaded.changes) {
-    console.note(arguments.target + ": " + change);
+    changes.push_back(arguments.target + ": " + change);
   }
-  return std::move(loaded.image);
-}
-
-void note_resolution(const Image& picture, int pixels, const Console& console) {
-  if (pixels < std::max(picture.columns(), picture.rows())) {
-    console.note("picture of " + size_text(picture.columns(), picture.rows()) + " resampled to " +
-                 std::to_string(pixels) + " pixels on the longer side");
+  const Image& picture = loaded.image;
+  if (arguments.design.pixels < std::max(picture.columns(), picture.rows())) {
+    changes.push_back(arguments.target + ": " + size_text(picture.columns(), picture.rows()) +
+                      " pixels resampled to " + std::to_string(arguments.design.pixels) +
+                      " on the longer side");
   }
+  return changes;
 }
 
 nlohmann::json provenance(const OptionSet& options, const DesignResult& result) {
@@ -162,42 +175,48 @@ int finish(const OptionSet& options, const OutputFolder& folder, DesignResult& r
   return done ? kDone : kInterrupted;
 }
 
-/// Decides where a --resume starts. @return false if there is nothing left to do.
-bool prepare_resume(DesignArguments& arguments, const Console& console) {
-  const EarlierDesign earlier = EarlierDesign::in(arguments.out);
-  if (!arguments.resume || earlier.checkpoint) return true;
-  if (earlier.lens) return false;
-  console.note("--resume: no checkpoint in " + arguments.out + " yet, starting at the beginning");
-  arguments.resume = false;
-  return true;
-}
-
 int report_finished(const DesignArguments& arguments, const Console& console) {
   console.result({{"command", "design"}, {"out", arguments.out}, {"status", "done"}},
                  arguments.out + ": the design is finished, there is nothing to resume\n");
   return kDone;
 }
 
+/// Runs the design. `begin` is called once, as soon as the library has accepted all its input.
+DesignResult shape(const OptionSet& options, const DesignOptions& design, const Image& target,
+                   const std::stop_token& stop, const std::function<void()>& begin) {
+  std::once_flag begun;
+  ProgressDisplay progress(options.common().quiet);
+  const auto show = progress.sink();
+  const RunControl control(stop, [&](const Progress& p) {
+    std::call_once(begun, begin);
+    if (show) show(p);
+  });
+  DesignResult result = design_lens(target, design, options.executor(), control);
+  std::call_once(begun, begin);
+  return result;
+}
+
 int run(const OptionSet& options, DesignArguments& arguments) {
   const InterruptWatch interrupt;
   const Console console(options.common().json, options.common().quiet);
   refuse_to_overwrite(arguments.out, arguments.resume, arguments.force);
-  const Image target = load_target(arguments, console);
-  if (!prepare_resume(arguments, console)) return report_finished(arguments, console);
+  const LoadedImage loaded = read_image(arguments.target);
+  const EarlierDesign earlier = EarlierDesign::in(arguments.out);
+  if (arguments.resume && earlier.lens && !earlier.checkpoint) {
+    return report_finished(arguments, console);
+  }
   DesignOptions& design = arguments.design;
-  design.pixels = working_pixels(options, target, design.pixels);
-  note_resolution(target, design.pixels, console);
+  design.pixels = working_pixels(options, arguments, loaded.image);
   const OutputFolder folder(arguments.out);
   folder.remove_partial_files();
-  if (arguments.force && !arguments.resume) remove_earlier_design(folder.path());
   design.checkpoint = folder.path() / design_file::kCheckpoint;
-  design.resume = arguments.resume;
-  DesignResult result;
-  {
-    ProgressDisplay progress(options.common().quiet);
-    const RunControl control(interrupt.token(), progress.sink());
-    result = design_lens(target, design, options.executor(), control);
-  }
+  // A design that was killed before its first checkpoint starts at the beginning.
+  design.resume = arguments.resume && earlier.checkpoint;
+  const auto begin = [&] {
+    for (const std::string& change : changes_made(loaded, arguments)) console.note(change);
+    if (arguments.force && !design.resume) remove_earlier_design(folder.path());
+  };
+  DesignResult result = shape(options, design, loaded.image, interrupt.token(), begin);
   return finish(options, folder, result);
 }
 

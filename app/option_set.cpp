@@ -100,7 +100,6 @@ struct OptionSet::Parser {
 OptionSet::OptionSet(const std::string& command, const std::string& description)
     : parser_(std::make_unique<Parser>(command, description)) {
   parser_->app.formatter(std::make_shared<Formatter>());
-  add_common();
 }
 
 OptionSet::~OptionSet() = default;
@@ -188,6 +187,7 @@ void OptionSet::add_choice(const std::string& name, const std::vector<std::strin
 }
 
 void OptionSet::add_common() {
+  const auto own_getters = parser_->getters;
   const Choices<std::string> devices{{"auto", "auto"}, {"cpu", "cpu"}, {"cuda", "cuda"}};
   flag("--json", common_.json, "print one JSON object with the result, nothing else, on stdout");
   flag("--quiet", common_.quiet, "no progress and no messages on stderr, errors excepted");
@@ -203,10 +203,11 @@ void OptionSet::add_common() {
        {"--json", "--quiet", "--threads", "--device", "--config", "--help", "--version"}) {
     app.get_option(name)->group(kCommonGroup);
   }
-  parser_->getters.clear();
+  parser_->getters = own_getters;
 }
 
 void OptionSet::parse(const Arguments& arguments) {
+  add_common();
   CLI::App& app = parser_->app;
   std::vector<std::string> names;
   for (const CLI::Option* option : app.get_options()) {

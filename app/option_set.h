@@ -78,6 +78,7 @@ class OptionSet {
         [&value, choices] { return word_of(value, choices); });
   }
 
+  /// To be called once, after all options were added.
   /// @throw HelpText; InputError naming option, value and rule.
   void parse(const Arguments& arguments);
 

@@ -29,9 +29,11 @@ std::string clock_text(double seconds) {
 }
 
 std::string bar(double share, int width) {
-  const int filled = static_cast<int>(share * width);
-  return "[" + std::string(static_cast<std::size_t>(filled), '#') +
-         std::string(static_cast<std::size_t>(width - filled), '.') + "] ";
+  const auto all = static_cast<std::size_t>(width);
+  const auto filled = static_cast<std::size_t>(share * width);
+  std::string text = "[";
+  text.append(filled, '#').append(all - filled, '.').append("] ");
+  return text;
 }
 
 }  // namespace
