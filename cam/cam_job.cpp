@@ -64,6 +64,7 @@ GcodeOptions gcode_options(const CamOptions& options, const CamResult& result) {
   gcode.spin_up = options.spin_up;
   gcode.feed = options.feed;
   gcode.plunge = options.plunge;
+  gcode.blend_tolerance = options.tolerance;
   gcode.safe_z = result.stock_top + options.safe_height + result.z_offset;
   return gcode;
 }

@@ -39,6 +39,7 @@ struct CamOptions {
   double safe_height = 5.0;  ///< Rapid moves run this far above the top of the blank, mm, > 0.
   double spin_up = 3.0;      ///< Dwell after the spindle was switched on, s, ≥ 0.
   /// Farthest that the path may run from the drop curve, mm, ≥ 4 · 10^−decimals (finish_raster.h).
+  /// LinuxCNC is told to cut corners of the path by no more than as much again.
   double tolerance = 0.0005;
   /// Farthest that the direction of a move may differ from the drop curve's, rad, > 0, ≤ 1.
   double slope_tolerance = 1e-3;

@@ -14,9 +14,9 @@ namespace {
 constexpr std::size_t kLongestLine = 80;       ///< Grbl 1.1 refuses more with error:11.
 constexpr std::size_t kBufferBytes = 1 << 16;  ///< Text collected before it goes to the stream.
 
-/// A number of up to three decimals without trailing zeros: feeds, speeds, seconds.
+/// A number of up to six decimals without trailing zeros: feeds, speeds, seconds, tolerances.
 std::string plain_number(double value) {
-  std::string text = decimal_text(value, 3);
+  std::string text = decimal_text(value, 6);
   text.erase(text.find_last_not_of('0') + 1);
   if (text.back() == '.') text.pop_back();
   return text;
@@ -65,7 +65,12 @@ void GcodeWriter::begin(const std::vector<std::string>& comments, int reserved) 
   line("G21 G90 G17 G94");
   line("G40 G49 G80");
   line("G54");
-  if (options_.post == Post::kLinuxcnc) line("T1 M6");
+  if (options_.post == Post::kLinuxcnc) {
+    if (options_.blend_tolerance > 0.0) {
+      line(std::string("G64 P").append(plain_number(options_.blend_tolerance)));
+    }
+    line("T1 M6");
+  }
   move(0, {std::nullopt, std::nullopt, options_.safe_z}, std::nullopt);
   line(std::string("S").append(plain_number(options_.spindle_rpm)).append(" M3"));
   if (options_.spin_up > 0.0) line(std::string("G4 P").append(plain_number(options_.spin_up)));

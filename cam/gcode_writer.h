@@ -33,6 +33,9 @@ struct GcodeOptions {
   double feed = 0.0;     ///< mm/min
   double plunge = 0.0;   ///< mm/min, straight down.
   double safe_z = 0.0;   ///< Z of rapid moves.
+  /// How far LinuxCNC may cut corners to keep its feed, mm; without a limit it keeps the feed at
+  /// any distance. 0 leaves the machine's setting, and Grbl cuts none.
+  double blend_tolerance = 0.0;
 };
 
 /// Writes one tool's program as G-code for a three-axis mill: millimetres (G21), absolute (G90), XY

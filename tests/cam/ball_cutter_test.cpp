@@ -125,7 +125,7 @@ TEST(BallCutter, OrientationDoesNotMatter) {
 TEST(BallCutter, AgreesWithTheDefinition) {
   Random random(2);
   int contacts = 0;
-  for (int i = 0; i < 900; ++i) {
+  for (int i = 0; i < 600; ++i) {
     const double side = i % 3 == 0 ? 0.05 : i % 3 == 1 ? 0.3 : 3.0;
     const auto m = triangle(random.point(side, 0.3 * side), random.point(side, 0.3 * side),
                             random.point(side, 0.3 * side));
@@ -139,7 +139,7 @@ TEST(BallCutter, AgreesWithTheDefinition) {
     ++contacts;
     EXPECT_NEAR(tip, slow, 1e-12) << "case " << i;
   }
-  EXPECT_GT(contacts, 300);
+  EXPECT_GT(contacts, 200);
 }
 
 TEST(BallCutter, SteepAndThinFacetsAgreeWithTheDefinitionNearby) {
@@ -147,7 +147,7 @@ TEST(BallCutter, SteepAndThinFacetsAgreeWithTheDefinitionNearby) {
   // answers for points within 1e-12 mm.
   Random random(3);
   int contacts = 0;
-  for (int i = 0; i < 300; ++i) {
+  for (int i = 0; i < 160; ++i) {
     const double flat = std::pow(10.0, -random.in(1.0, 9.0));
     Eigen::Vector3d a = random.point(0.2, 0.5);
     Eigen::Vector3d b = random.point(0.2, 0.5);
@@ -168,7 +168,7 @@ TEST(BallCutter, SteepAndThinFacetsAgreeWithTheDefinitionNearby) {
     EXPECT_LE(tip, high + 1e-12) << "case " << i;
     if (tip > kNoContact) ++contacts;
   }
-  EXPECT_GT(contacts, 100);
+  EXPECT_GT(contacts, 50);
 }
 
 }  // namespace

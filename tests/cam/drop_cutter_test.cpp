@@ -118,8 +118,10 @@ TEST(DropCutter, EqualsBruteForceOnSteepFacets) {
     SurfaceMesh mesh = testing::grid_mesh(12, 6, 2.2, 1.0, [](double, double) { return 0.0; });
     for (std::int64_t v = 0; v < mesh.vertex_count(); ++v) {
       const int column = static_cast<int>(v % 12);
-      mesh.vertices(0, v) = (column / 2) * 0.4 + (column % 2) * lean;
-      mesh.vertices(2, v) = ((column + 1) / 2) % 2 * 0.7 + random.in(0.0, 0.01);
+      const int wall = column / 2;
+      const int level = (column + 1) / 2 % 2;
+      mesh.vertices(0, v) = 0.4 * wall + lean * (column % 2);
+      mesh.vertices(2, v) = 0.7 * level + random.in(0.0, 0.01);
     }
     expect_equal_to_brute_force(mesh, kRadius, 200, random);
   }
@@ -262,6 +264,7 @@ TEST(DropCutter, SameBitsForAnyThreadsAndAnyStart) {
   const DropCutter one(mesh, kRadius, Executor::serial());
   const DropCutter two(mesh, kRadius, Executor::cpu(2));
   std::vector<Eigen::Vector2d> points;
+  points.reserve(20000);
   for (int i = 0; i < 20000; ++i) {
     points.emplace_back(std::fmod(i * 0.7548776662466927, 1.0) * 10.0,
                         std::fmod(i * 0.5698402909980532, 1.0) * 10.0);

@@ -114,6 +114,23 @@ TEST(FinishRaster, NeverGougesDeeperThanTheTolerance) {
   }
 }
 
+TEST(FinishRaster, LinksBetweenRowsDoNotTouchThePart) {
+  const SurfaceMesh mesh = small_relief();
+  const DropCutter cutter(mesh, kRadius, Executor::serial());
+  const RasterPlan plan = plan_finish_raster(square(kSide), kRadius, {});
+  const auto rows = all_rows(cutter, plan, Executor::serial());
+  for (std::size_t r = 1; r < rows.size(); ++r) {
+    const Eigen::Vector3d& from = rows[r - 1].points.back();
+    const Eigen::Vector3d link = rows[r].points.front() - from;
+    EXPECT_EQ(link.x(), 0.0);
+    for (double part = 0.0; part <= 1.0; part += 0.02) {
+      const Eigen::Vector3d tip = from + part * link;
+      const double clearance = tip.z() - cutter.drop(tip.head<2>()).tip;
+      EXPECT_GT(clearance, 0.5 * kRadius);
+    }
+  }
+}
+
 TEST(FinishRaster, KeepsTheDirectionOfTheDropCurve) {
   const SurfaceMesh mesh = testing::grid_mesh(21, 21, kSide, kSide, [](double x, double y) {
     return 0.1 * std::sin(1.5 * x) * std::cos(1.3 * y);

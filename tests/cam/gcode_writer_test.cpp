@@ -78,6 +78,19 @@ TEST(GcodeWriter, GrblHasNoToolChange) {
   EXPECT_EQ(out.str().find("M6"), std::string::npos);
 }
 
+TEST(GcodeWriter, LimitsCornerBlendingWhereTheControllerKnowsIt) {
+  for (const Post post : {Post::kLinuxcnc, Post::kGrbl}) {
+    std::ostringstream out;
+    GcodeOptions options = small_tool();
+    options.post = post;
+    options.blend_tolerance = 0.00004;
+    GcodeWriter writer(out, options);
+    writer.begin({}, 0);
+    writer.end();
+    EXPECT_EQ(out.str().find("\nG64 P0.00004\n") != std::string::npos, post == Post::kLinuxcnc);
+  }
+}
+
 TEST(GcodeWriter, ModalWordsAreNotRepeated) {
   const auto lines = body(small_tool(), [](GcodeWriter& writer) {
     writer.plunge_to({0.0, 0.0, -1.0});

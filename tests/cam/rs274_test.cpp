@@ -183,7 +183,8 @@ TEST_F(Rs274, SeesTheModesAndTheSpindle) {
   const std::string text = read_with(rs274_, folder / cam_file::kFinish).text;
   for (const char* call :
        {"USE_LENGTH_UNITS(CANON_UNITS_MM)", "SELECT_PLANE(CANON_PLANE_XY)", "CHANGE_TOOL(1)",
-        "SET_SPINDLE_SPEED(0, 23000.0000)", "START_SPINDLE_CLOCKWISE(0)", "DWELL(3.0000)"}) {
+        "SET_SPINDLE_SPEED(0, 23000.0000)", "START_SPINDLE_CLOCKWISE(0)", "DWELL(3.0000)",
+        "SET_MOTION_CONTROL_MODE(CANON_CONTINUOUS, 0.000500)"}) {
     EXPECT_NE(text.find(call), std::string::npos) << call;
   }
   EXPECT_LT(text.find("START_SPINDLE_CLOCKWISE"), text.find("STRAIGHT_FEED"));
