@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "design/checkpoint.h"
+
+#include <bit>
+#include <cstddef>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <nlohmann/json.hpp>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "core/error.h"
+#include "core/files.h"
+#include "design/grid_mesh.h"
+
+// File: the magic line, then a JSON header on one line, then the vertices as little-endian doubles,
+// then a FNV-1a hash of all that goes before.
+namespace lensforge {
+
+namespace {
+
+using nlohmann::json;
+
+constexpr std::string_view kMagic = "lensforge checkpoint 1\n";
+
+static_assert(std::endian::native == std::endian::little, "checkpoints are little-endian");
+
+/// Fowler–Noll–Vo 1a, 64 bit.
+class Hash {
+ public:
+  void add(std::string_view bytes) {
+    for (const char c : bytes) {
+      value_ = (value_ ^ static_cast<unsigned char>(c)) * 0x100000001b3ULL;
+    }
+  }
+  [[nodiscard]] std::uint64_t value() const { return value_; }
+
+ private:
+  std::uint64_t value_ = 0xcbf29ce484222325ULL;
+};
+
+template <class T>
+std::string_view bytes_of(std::span<const T> values) {
+  return {reinterpret_cast<const char*>(values.data()), values.size_bytes()};
+}
+
+json to_json(const ObjectiveWeights& w) {
+  return {w.image, w.gradient, w.boundary, w.smooth, w.barrier, w.edge, w.laplacian};
+}
+
+json to_json(const ConvergenceRow& row) {
+  const EnergyValues& e = row.energy;
+  return {row.stage, row.level, row.round, row.iteration, e.image, e.gradient, e.boundary,
+          e.barrier, e.face,    e.edge,    e.laplacian,   e.total, row.mae,    row.seconds};
+}
+
+ConvergenceRow row_from_json(const json& j) {
+  ConvergenceRow row;
+  row.stage = j.at(0);
+  row.level = j.at(1);
+  row.round = j.at(2);
+  row.iteration = j.at(3);
+  EnergyValues& e = row.energy;
+  int next = 4;
+  for (double* value : {&e.image, &e.gradient, &e.boundary, &e.barrier, &e.face, &e.edge,
+                        &e.laplacian, &e.total, &row.mae, &row.seconds}) {
+    *value = j.at(static_cast<std::size_t>(next++));
+  }
+  return row;
+}
+
+[[noreturn]] void refuse(const std::filesystem::path& path, const std::string& why) {
+  throw InputError("checkpoint '" + path.string() + "' " + why);
+}
+
+std::string read_bytes(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  if (!file) refuse(path, "cannot be read: there is nothing to resume from");
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+/// The parts of a checkpoint file, hash and magic verified.
+struct Parts {
+  json header;
+  std::string_view vertices;
+};
+
+Parts split(const std::string& content, const std::filesystem::path& path) {
+  std::string_view rest = content;
+  if (!rest.starts_with(kMagic)) refuse(path, "is not a checkpoint of this version");
+  std::uint64_t stored = 0;
+  if (rest.size() < kMagic.size() + sizeof(stored)) refuse(path, "is truncated");
+  std::memcpy(&stored, rest.data() + rest.size() - sizeof(stored), sizeof(stored));
+  rest.remove_suffix(sizeof(stored));
+  Hash hash;
+  hash.add(rest);
+  if (hash.value() != stored) refuse(path, "is damaged: its check sum does not match");
+  rest.remove_prefix(kMagic.size());
+  const std::size_t end = rest.find('\n');
+  if (end == std::string_view::npos) refuse(path, "has no header");
+  return {json::parse(rest.substr(0, end), nullptr, false), rest.substr(end + 1)};
+}
+
+}  // namespace
+
+std::uint64_t design_fingerprint(const Image& target, const DesignOptions& options) {
+  const json description = {target.columns(),
+                            target.rows(),
+                            options.width,
+                            options.focal_length,
+                            options.ior,
+                            options.thickness,
+                            options.pixels,
+                            options.mesh_ratio,
+                            options.levels,
+                            options.rounds,
+                            options.iterations,
+                            static_cast<int>(options.model),
+                            static_cast<int>(options.view),
+                            to_json(options.weights)};
+  Hash hash;
+  hash.add(description.dump());
+  hash.add(bytes_of(target.values()));
+  return hash.value();
+}
+
+void write_checkpoint(const Checkpoint& checkpoint, const std::filesystem::path& path) {
+  json rows = json::array();
+  for (const ConvergenceRow& row : checkpoint.convergence) rows.push_back(to_json(row));
+  const json header = {{"fingerprint", checkpoint.fingerprint},
+                       {"level", checkpoint.level},
+                       {"round", checkpoint.round},
+                       {"seconds", checkpoint.seconds},
+                       {"columns", checkpoint.mesh.grid.columns},
+                       {"rows", checkpoint.mesh.grid.rows},
+                       {"convergence", rows}};
+  std::string content(kMagic);
+  content += header.dump();
+  content += '\n';
+  content += bytes_of(std::span<const double>(
+      checkpoint.mesh.vertices.data(), static_cast<std::size_t>(checkpoint.mesh.vertices.size())));
+  Hash hash;
+  hash.add(content);
+  const std::uint64_t value = hash.value();
+  content += bytes_of(std::span<const std::uint64_t>(&value, 1));
+  write_whole_file(path, content);
+}
+
+Checkpoint read_checkpoint(const std::filesystem::path& path) {
+  const std::string content = read_bytes(path);
+  const Parts parts = split(content, path);
+  try {
+    Checkpoint checkpoint;
+    checkpoint.fingerprint = parts.header.at("fingerprint");
+    checkpoint.level = parts.header.at("level");
+    checkpoint.round = parts.header.at("round");
+    checkpoint.seconds = parts.header.at("seconds");
+    for (const json& row : parts.header.at("convergence")) {
+      checkpoint.convergence.push_back(row_from_json(row));
+    }
+    const GridShape shape{parts.header.at("columns"), parts.header.at("rows")};
+    checkpoint.mesh = make_grid_mesh(Eigen::Vector2d::Ones(), shape, 0.0);
+    if (parts.vertices.size() !=
+        static_cast<std::size_t>(checkpoint.mesh.vertices.size()) * sizeof(double)) {
+      refuse(path, "does not hold as many vertices as it says");
+    }
+    std::memcpy(checkpoint.mesh.vertices.data(), parts.vertices.data(), parts.vertices.size());
+    return checkpoint;
+  } catch (const json::exception& error) {
+    refuse(path, std::string("has a bad header: ") + error.what());
+  }
+}
+
+}  // namespace lensforge

@@ -1,0 +1,288 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "design/design_lens.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <optional>
+#include <sstream>
+
+#include "core/error.h"
+#include "core/image_io.h"
+#include "design/checkpoint.h"
+#include "design/grid_mesh.h"
+#include "design/level_plan.h"
+#include "design/render_lens.h"
+#include "design/rendering_guided.h"
+#include "design/transport/transport_start.h"
+
+namespace lensforge {
+
+namespace {
+
+/// A level's remaining rounds are skipped when one has lowered the objective by less than this
+/// share: L-BFGS started afresh at a stationary point finds nothing either.
+constexpr double kIdleRound = 1e-3;
+
+/// Shortest side of a working picture: below it there is nothing to shape.
+constexpr int kLeastPixels = 4;
+
+/// Steps in which a mesh that a new level's barriers refuse is drawn back to the even grid.
+constexpr int kRelaxSteps = 10;
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+OpticalSetup make_setup(const DesignOptions& options, const Eigen::Vector2i& pixels) {
+  OpticalSetup setup;
+  setup.ior = options.ior;
+  setup.focal_length = options.focal_length;
+  setup.lens_size = {options.width, options.width * pixels.y() / pixels.x()};
+  setup.image_size = setup.lens_size;
+  setup.pixels = pixels;
+  setup.view = options.view;
+  return setup;
+}
+
+/// Lowers or lifts the surface so that its thinnest place is `thickness` above the entry face.
+void rest_on_thickness(SurfaceMesh& mesh, double thickness) {
+  mesh.vertices.row(2).array() += thickness - mesh.vertices.row(2).minCoeff();
+}
+
+void require(bool rule, const std::string& option, double value, const char* text) {
+  if (rule) return;
+  std::ostringstream message;
+  message << option << " is " << value << ": " << text;
+  throw InputError(message.str());
+}
+
+void validate_weights(const ObjectiveWeights& w) {
+  const auto check = [](const char* name, double value) {
+    require(std::isfinite(value) && value >= 0.0, name, value,
+            "a weight must be a number of at least 0");
+  };
+  check("--weight-image", w.image);
+  check("--weight-gradient", w.gradient);
+  check("--weight-boundary", w.boundary);
+  check("--weight-smooth", w.smooth);
+  check("--weight-barrier", w.barrier);
+  check("--weight-edge", w.edge);
+  check("--weight-laplacian", w.laplacian);
+}
+
+void validate_options(const DesignOptions& o) {
+  require(std::isfinite(o.width) && o.width > 0.0, "--width", o.width, "must be above 0 mm");
+  require(std::isfinite(o.ior) && o.ior > 1.0, "--ior", o.ior, "must be above 1");
+  require(std::isfinite(o.thickness) && o.thickness > 0.0, "--thickness", o.thickness,
+          "must be above 0 mm");
+  require(std::isfinite(o.focal_length) && o.focal_length > o.thickness, "--focal", o.focal_length,
+          "must be above the thickness of the lens (mm)");
+  require(o.pixels >= 1 && o.pixels <= kMaxImageSide, "--pixels", o.pixels, "must be 1 to 16384");
+  require(o.mesh_ratio >= 0.25 && o.mesh_ratio <= 8.0, "--mesh-ratio", o.mesh_ratio,
+          "must be 0.25 to 8");
+  require(o.levels >= 1, "--levels", o.levels, "must be at least 1");
+  require(o.rounds >= 1, "--rounds", o.rounds, "must be at least 1");
+  require(o.iterations >= 1, "--iterations", o.iterations, "must be at least 1");
+  validate_weights(o.weights);
+}
+
+/// The coarse-to-fine schedule of one design, level by level and round by round.
+class Schedule {
+ public:
+  Schedule(const Image& target, const DesignOptions& options, const Executor& executor,
+           const RunControl& control)
+      : options_(options), executor_(executor), control_(control) {
+    const Eigen::Vector2i pixels = working_size(target.columns(), target.rows(), options.pixels);
+    target_ = resample(target, pixels.x(), pixels.y());
+    setup_ = make_setup(options, pixels);
+    levels_ = plan_levels(pixels, options);
+    state_.fingerprint = design_fingerprint(target_, options);
+    state_.mesh = make_grid_mesh(setup_.lens_size, levels_.front().grid, options.thickness);
+    if (options.resume) resume();
+    spent_before_ = state_.seconds;
+  }
+
+  DesignResult run() {
+    save();
+    while (state_.level < static_cast<int>(levels_.size()) && !stopped_) run_level();
+    return finish();
+  }
+
+ private:
+  void resume() {
+    Checkpoint saved = read_checkpoint(options_.checkpoint);
+    if (saved.fingerprint != state_.fingerprint) {
+      throw InputError("checkpoint '" + options_.checkpoint.string() +
+                       "' belongs to another picture or other options");
+    }
+    state_ = std::move(saved);
+  }
+
+  [[nodiscard]] double seconds() const { return spent_before_ + seconds_since(start_); }
+
+  void run_level() {
+    const Level& level = levels_[static_cast<std::size_t>(state_.level)];
+    OpticalSetup setup = setup_;
+    setup.pixels = level.pixels;
+    const Image target = resample(target_, level.pixels.x(), level.pixels.y());
+    if (state_.mesh.grid != level.grid) {
+      state_.mesh = regrid(state_.mesh, setup.lens_size, level.grid);
+    }
+    if (state_.level == 0 && state_.round == 0) {
+      report("transport", 0);
+      start_from_transport(target, setup, state_.mesh);
+    }
+    ObjectiveOptions objective;
+    objective.weights = options_.weights;
+    objective.model = options_.model;
+    objective.nu = level.nu;
+    objective.area = default_area_barrier(setup, state_.mesh.triangle_count());
+    RenderingGuided stage(state_.mesh, setup, target, objective, executor_);
+    relax(stage);
+    while (state_.round < options_.rounds && !stopped_) run_round(stage);
+    if (stopped_) return;
+    state_.round = 0;
+    ++state_.level;
+    save();
+  }
+
+  /// Draws the mesh's x and y back towards the even grid until no barrier refuses it.
+  void relax(RenderingGuided& stage) {
+    const SurfaceMesh flat = make_grid_mesh(setup_.lens_size, state_.mesh.grid, 0.0);
+    const SurfaceMesh fine = state_.mesh;
+    for (int step = 1; !stage.feasible(state_.mesh) && step <= kRelaxSteps; ++step) {
+      const double share = static_cast<double>(step) / kRelaxSteps;
+      state_.mesh.vertices.topRows<2>() =
+          (1.0 - share) * fine.vertices.topRows<2>() + share * flat.vertices.topRows<2>();
+    }
+  }
+
+  /// One alternation of Sun et al., section 3.4, of which only the rendering-guided half is done.
+  void run_round(RenderingGuided& stage) {
+    rest_on_thickness(state_.mesh, options_.thickness);
+    LbfgsOptions optimizer;
+    optimizer.max_iterations = options_.iterations;
+    const LbfgsSummary summary = stage.run(
+        optimizer,
+        [this](int iteration, const DesignObjective::Evaluation& e) {
+          return record(iteration, e);
+        },
+        state_.mesh);
+    stopped_ = summary.status == LbfgsSummary::Status::kStopped;
+    failure_ = summary.status == LbfgsSummary::Status::kInfeasibleStart ? summary.message : "";
+    if (stopped_) return;
+    const double fall = summary.initial_value - summary.value;
+    const bool idle = fall <= kIdleRound * summary.initial_value;
+    state_.round = idle ? options_.rounds : state_.round + 1;
+    if (state_.round < options_.rounds) save();
+  }
+
+  bool record(int iteration, const DesignObjective::Evaluation& e) {
+    state_.convergence.push_back(
+        {"render", state_.level, state_.round, iteration, e.energy, e.mae, seconds()});
+    char detail[64];
+    std::snprintf(detail, sizeof(detail), "MAE %.4f", e.mae);
+    report(detail, iteration);
+    return !control_.stop_requested();
+  }
+
+  void report(const std::string& detail, int iteration) const {
+    const std::string stage = "design, level " + std::to_string(state_.level + 1) + " of " +
+                              std::to_string(levels_.size());
+    control_.report({stage, work_done(iteration), work_total(), detail});
+  }
+
+  /// Iterations weighted by their picture's size.
+  [[nodiscard]] double level_work(std::size_t level) const {
+    return static_cast<double>(options_.rounds) * options_.iterations *
+           levels_[level].pixels.cast<double>().prod();
+  }
+  [[nodiscard]] double work_total() const {
+    double sum = 0.0;
+    for (std::size_t l = 0; l < levels_.size(); ++l) sum += level_work(l);
+    return sum;
+  }
+  [[nodiscard]] double work_done(int iteration) const {
+    const auto level = static_cast<std::size_t>(state_.level);
+    double sum = 0.0;
+    for (std::size_t l = 0; l < level; ++l) sum += level_work(l);
+    const double rounds = state_.round + static_cast<double>(iteration) / options_.iterations;
+    return sum + level_work(level) * rounds / options_.rounds;
+  }
+
+  void save() {
+    state_.seconds = seconds();
+    if (!options_.checkpoint.empty()) write_checkpoint(state_, options_.checkpoint);
+  }
+
+  DesignResult finish() {
+    DesignResult result;
+    using Status = DesignResult::Status;
+    result.status = stopped_ ? Status::kInterrupted : Status::kDone;
+    result.message = stopped_ ? "interrupted" : "all levels done";
+    if (!failure_.empty()) {
+      result.status = Status::kFailed;
+      result.message = failure_;
+    }
+    rest_on_thickness(state_.mesh, options_.thickness);
+    Lens& lens = result.lens;
+    lens.surface = std::move(state_.mesh);
+    lens.setup = setup_;
+    lens.model = options_.model;
+    lens.target = target_;
+    const bool facet = options_.model == SurfaceModel::kFacet;
+    lens.facet_metrics = evaluate(lens.surface, setup_, SurfaceModel::kFacet, target_,
+                                  facet ? &lens.render : nullptr, executor_);
+    lens.smooth_metrics = evaluate(lens.surface, setup_, SurfaceModel::kSmooth, target_,
+                                   facet ? nullptr : &lens.render, executor_);
+    result.convergence = std::move(state_.convergence);
+    return result;
+  }
+
+  const DesignOptions& options_;
+  const Executor& executor_;
+  const RunControl& control_;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+  double spent_before_ = 0.0;
+  Image target_;
+  OpticalSetup setup_;
+  std::vector<Level> levels_;
+  Checkpoint state_;
+  bool stopped_ = false;
+  std::string failure_;
+};
+
+}  // namespace
+
+DesignResult design_lens(const Image& target, const DesignOptions& options,
+                         const Executor& executor, const RunControl& control) {
+  validate_options(options);
+  require(std::max(target.columns(), target.rows()) >= options.pixels, "--pixels", options.pixels,
+          "must be at most the picture's longer side");
+  const Eigen::Vector2i pixels = working_size(target.columns(), target.rows(), options.pixels);
+  require(pixels.minCoeff() >= kLeastPixels, "the working picture's shorter side",
+          pixels.minCoeff(), "must be at least 4 pixels");
+  if (!(target.total() > 0.0)) {
+    throw InputError("the picture is all black: there is no light to place");
+  }
+  return Schedule(target, options, executor, control).run();
+}
+
+std::string convergence_csv(const std::vector<ConvergenceRow>& rows) {
+  std::ostringstream out;
+  out.precision(9);
+  out << "stage,level,round,iteration,image,gradient,boundary,barrier,face,edge,laplacian,total,"
+         "mae,seconds\n";
+  for (const ConvergenceRow& r : rows) {
+    const EnergyValues& e = r.energy;
+    out << r.stage << ',' << r.level << ',' << r.round << ',' << r.iteration << ',' << e.image
+        << ',' << e.gradient << ',' << e.boundary << ',' << e.barrier << ',' << e.face << ','
+        << e.edge << ',' << e.laplacian << ',' << e.total << ',' << r.mae << ',' << r.seconds
+        << '\n';
+  }
+  return out.str();
+}
+
+}  // namespace lensforge

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+
+#include "core/host_device.h"
+#include "design/optics/facet.h"
+#include "design/optics/image_triangle.h"
+#include "design/optics/projection.h"
+
+/// Smooth model: one ray per vertex, refracted at the vertex normal; image triangles share corners
+/// and stretch. It is what a milled and polished part does.
+namespace lensforge {
+
+/// Normal of a vertex: the sum of the area normals around it, normalised (area weighting).
+struct VertexNormal {
+  Eigen::Vector3d n;
+  double length;  ///< |sum of area normals|, mm²·2
+
+  LF_HD explicit VertexNormal(const Eigen::Vector3d& area_normal_sum)
+      : n(area_normal_sum), length(area_normal_sum.norm()) {
+    n /= length;
+  }
+};
+
+/// Where the ray of a vertex lands, in pixel coordinates. @pre n transmits.
+LF_HD inline Eigen::Vector2d project_vertex(const Eigen::Vector3d& p, const Eigen::Vector3d& n,
+                                            const Projection& optics) {
+  return optics.land(p, refracted_slope(n, optics.eta));
+}
+
+/// Adjoint of project_vertex(): adds to p_bar, returns n_bar.
+LF_HD inline Eigen::Vector3d project_vertex_adjoint(const Eigen::Vector3d& p,
+                                                    const Eigen::Vector3d& n,
+                                                    const Projection& optics,
+                                                    const Eigen::Vector2d& u_bar,
+                                                    Eigen::Vector3d& p_bar) {
+  Eigen::Vector2d m_bar(0.0, 0.0);
+  optics.land_adjoint(p, refracted_slope(n, optics.eta), u_bar, p_bar, m_bar);
+  return refracted_slope_adjoint(n, optics.eta, m_bar);
+}
+
+}  // namespace lensforge

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "design/optimize/cosine_transform.h"
+
+#include <fftw3.h>
+
+#include <cmath>
+#include <cstddef>
+#include <mutex>
+#include <numbers>
+
+namespace lensforge {
+
+namespace {
+
+/// FFTW's planner is not thread-safe; its execution is.
+std::mutex& planner_mutex() {
+  static std::mutex mutex;
+  return mutex;
+}
+
+}  // namespace
+
+struct CosineTransform::Plan {
+  Plan(int columns, int rows)
+      : count(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows)) {
+    const std::scoped_lock lock(planner_mutex());
+    data = fftw_alloc_real(count);
+    plan = fftw_plan_r2r_2d(rows, columns, data, data, FFTW_REDFT00, FFTW_REDFT00, FFTW_ESTIMATE);
+  }
+  ~Plan() {
+    const std::scoped_lock lock(planner_mutex());
+    fftw_destroy_plan(plan);
+    fftw_free(data);
+  }
+  Plan(const Plan&) = delete;
+  Plan& operator=(const Plan&) = delete;
+
+  std::size_t count;
+  double* data = nullptr;
+  fftw_plan plan = nullptr;
+};
+
+CosineTransform::CosineTransform(int columns, int rows)
+    : plan_(std::make_unique<Plan>(columns, rows)), columns_(columns), rows_(rows) {}
+
+CosineTransform::~CosineTransform() = default;
+
+std::span<double> CosineTransform::values() { return {plan_->data, plan_->count}; }
+
+void CosineTransform::run() { fftw_execute(plan_->plan); }
+
+double CosineTransform::inverse_scale() const {
+  return 1.0 / (4.0 * (columns_ - 1.0) * (rows_ - 1.0));
+}
+
+double CosineTransform::eigenvalue(int k, int n, double spacing) {
+  return (2.0 - 2.0 * std::cos(std::numbers::pi * k / (n - 1))) / (spacing * spacing);
+}
+
+}  // namespace lensforge

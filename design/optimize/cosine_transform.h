@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <memory>
+#include <span>
+
+namespace lensforge {
+
+/// A two-dimensional cosine transform of the first kind (DCT-I) of a grid of nodes, in place, in a
+/// buffer of its own. It diagonalises differences with mirrored ends (Neumann borders). DCT-I
+/// because its lengths, 2(n − 1), are smooth numbers for our grids, while n is often prime (641).
+/// Plans without timing, so that every run takes the same path and gives the same bits.
+class CosineTransform {
+ public:
+  /// @pre columns, rows ≥ 2.
+  CosineTransform(int columns, int rows);
+  ~CosineTransform();
+  CosineTransform(const CosineTransform&) = delete;
+  CosineTransform& operator=(const CosineTransform&) = delete;
+
+  /// The buffer, row by row.
+  [[nodiscard]] std::span<double> values();
+  /// Transforms the buffer. Doing it twice multiplies by inverse_scale()⁻¹.
+  void run();
+  /// 1 / (4 (columns − 1) (rows − 1)).
+  [[nodiscard]] double inverse_scale() const;
+
+  /// Eigenvalue of the negative second difference along n nodes: (2 − 2 cos(πk/(n − 1)))/spacing².
+  static double eigenvalue(int k, int n, double spacing);
+
+ private:
+  struct Plan;
+  std::unique_ptr<Plan> plan_;
+  int columns_;
+  int rows_;
+};
+
+}  // namespace lensforge

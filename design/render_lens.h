@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "core/executor.h"
+#include "core/image.h"
+#include "core/metrics.h"
+#include "core/optical_setup.h"
+#include "core/surface_mesh.h"
+
+namespace lensforge {
+
+/// A projected picture.
+struct RenderResult {
+  Image image;  ///< Linear flux relative to a uniformly lit picture; mean = flux_inside.
+  double flux_inside = 0.0;  ///< Share of the lens's flux that lands on the image rectangle.
+};
+
+/// Renders what a surface throws onto the image rectangle of `setup`, exactly (no sampling).
+RenderResult render_surface(const SurfaceMesh& mesh, const OpticalSetup& setup, SurfaceModel model,
+                            const Executor& executor);
+
+/// Renders a surface and compares it with `target` (linear light). The picture is scaled so that
+/// the lens's whole flux would equal the target's total; `rendered` takes it unless null.
+/// @pre target has setup.pixels columns and rows.
+ImageMetrics evaluate(const SurfaceMesh& mesh, const OpticalSetup& setup, SurfaceModel model,
+                      const Image& target, Image* rendered, const Executor& executor);
+
+}  // namespace lensforge

@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "design/rendering_guided.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <numbers>
+
+namespace lensforge {
+
+namespace {
+
+/// Image motion, in pixels, of the finite difference that measures curvature.
+constexpr double kProbePixels = 0.02;
+
+/// Share of the grid Laplacian's lowest eigenvalue that bounds the height preconditioner: below
+/// it the lens as a whole tilts and bends.
+constexpr double kHeightFloor = 0.5;
+constexpr double kHeightPower = 2.0;
+
+/// Smoothing of the x and y steps: shifts longer than two cells are favoured.
+constexpr double kShiftFloor = 0.25;
+constexpr double kShiftPower = 1.0;
+
+double lowest_eigenvalue(const GridShape& shape) {
+  const double longest = std::max(shape.columns, shape.rows) - 1.0;
+  return std::numbers::pi * std::numbers::pi / (longest * longest);
+}
+
+/// A fixed sequence of ±1 that has no preferred frequency (SplitMix64).
+double sign_at(std::uint64_t i) {
+  std::uint64_t z = (i + 1) * 0x9e3779b97f4a7c15ULL;
+  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ULL;
+  z = (z ^ (z >> 27)) * 0x94d049bb133111ebULL;
+  return ((z ^ (z >> 31)) & 1U) != 0 ? 1.0 : -1.0;
+}
+
+double cell_aspect(const OpticalSetup& setup, const GridShape& shape) {
+  return setup.lens_size.y() / (shape.rows - 1) / (setup.lens_size.x() / (shape.columns - 1));
+}
+
+}  // namespace
+
+RenderingGuided::RenderingGuided(const SurfaceMesh& mesh, const OpticalSetup& setup,
+                                 const Image& target, const ObjectiveOptions& options,
+                                 const Executor& executor)
+    : setup_(setup),
+      executor_(executor),
+      objective_(mesh, setup, target, options, executor),
+      preconditioner_(mesh.grid, cell_aspect(setup, mesh.grid), objective_.movable(), executor),
+      cell_(setup.lens_size.x() / (mesh.grid.columns - 1)) {
+  preconditioner_.z.floor = kHeightFloor * lowest_eigenvalue(mesh.grid);
+  preconditioner_.z.power = kHeightPower;
+  preconditioner_.xy.floor = kShiftFloor;
+  preconditioner_.xy.power = kShiftPower;
+}
+
+bool RenderingGuided::feasible(const SurfaceMesh& mesh) {
+  Eigen::Matrix3Xd gradient;
+  return objective_.evaluate(mesh.vertices, gradient).feasible;
+}
+
+/// P^½ applied to random signs, in z or in x and y.
+Eigen::Matrix3Xd RenderingGuided::probe(bool heights) {
+  Eigen::Matrix3Xd signs = Eigen::Matrix3Xd::Zero(3, objective_.movable().cols());
+  for (Eigen::Index v = 0; v < signs.cols(); ++v) {
+    for (int k = 0; k < 3; ++k) {
+      if ((k == 2) == heights) signs(k, v) = sign_at(static_cast<std::uint64_t>(3 * v + k));
+    }
+  }
+  Eigen::VectorXd result;
+  preconditioner_.apply_root(signs.reshaped(), result);
+  return result.reshaped(3, signs.cols());
+}
+
+/// Root mean square of P^½ H P^½ applied to random signs in z or in x and y, H by a central
+/// difference of the gradient; 0 if the neighbourhood is not allowed.
+double RenderingGuided::preconditioned_curvature(const Eigen::Matrix3Xd& vertices, bool heights) {
+  const Eigen::Matrix3Xd direction = probe(heights);
+  const double count = static_cast<double>(direction.cols());
+  const double rms = std::sqrt(direction.squaredNorm() / count);
+  const double motion = heights ? rms / cell_ * (setup_.ior - 1.0) * setup_.focal_length : rms;
+  const double step = kProbePixels * setup_.image_size.x() / setup_.pixels.x() / motion;
+  Eigen::Matrix3Xd forward;
+  Eigen::Matrix3Xd backward;
+  const bool ok = objective_.evaluate(vertices + step * direction, forward).feasible &&
+                  objective_.evaluate(vertices - step * direction, backward).feasible;
+  if (!ok) return 0.0;
+  Eigen::VectorXd curved;
+  preconditioner_.apply_root(((forward - backward) / (2.0 * step)).reshaped(), curved);
+  const auto rows = curved.reshaped(3, direction.cols());
+  const double sum = heights ? rows.row(2).squaredNorm() : 0.5 * rows.topRows(2).squaredNorm();
+  return std::sqrt(sum / count);
+}
+
+/// Scales both parts of the preconditioner so that the preconditioned curvature along random
+/// directions is one: then neither x, y nor z is left behind.
+void RenderingGuided::calibrate(const Eigen::Matrix3Xd& vertices) {
+  for (const bool heights : {false, true}) {
+    GridSymbol& symbol = heights ? preconditioner_.z : preconditioner_.xy;
+    symbol.scale = 1.0;
+    const double curvature = preconditioned_curvature(vertices, heights);
+    if (curvature > 0.0) symbol.scale = 1.0 / curvature;
+  }
+}
+
+LbfgsSummary RenderingGuided::run(const LbfgsOptions& options, const Observer& observe,
+                                  SurfaceMesh& mesh) {
+  objective_.relinearize(mesh.vertices);
+  calibrate(mesh.vertices);
+  DesignObjective::Evaluation last;
+  Eigen::Matrix3Xd slope;
+  const Objective function = [&](const Eigen::VectorXd& x, Eigen::VectorXd& gradient) {
+    last = objective_.evaluate(x.reshaped(3, mesh.vertices.cols()), slope);
+    if (!last.feasible) return kInfinity;
+    gradient = slope.reshaped();
+    return last.energy.total;
+  };
+  const Preconditioner precondition = [this](const Eigen::VectorXd& g, Eigen::VectorXd& r) {
+    preconditioner_.apply(g, r);
+  };
+  const LbfgsObserver watch = [&](int iteration, double) { return observe(iteration, last); };
+  Eigen::VectorXd x = mesh.vertices.reshaped();
+  const LbfgsSummary summary = minimize_lbfgs(function, precondition, options, watch, executor_, x);
+  mesh.vertices = x.reshaped(3, mesh.vertices.cols());
+  return summary;
+}
+
+}  // namespace lensforge
