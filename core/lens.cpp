@@ -247,7 +247,7 @@ void check_surface(const SurfaceMesh& mesh, const OpticalSetup& setup, const fs:
 SurfaceMesh read_surface(const JsonFields& fields, const OpticalSetup& setup,
                          const fs::path& folder) {
   const fs::path name = fields.text("surface");
-  if (name.empty() || name != name.filename()) {
+  if (name.empty() || name == ".." || name != name.filename()) {
     fields.refuse("surface", "it must be the name of a file in the lens folder");
   }
   SurfaceMesh mesh = read_mesh(folder / name);

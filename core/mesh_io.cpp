@@ -5,11 +5,15 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cctype>
 #include <cerrno>
 #include <charconv>
 #include <cstdint>
 #include <cstring>
+#include <exception>
 #include <fstream>
+#include <ios>
+#include <iterator>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -97,13 +101,58 @@ SurfaceMesh read_own_form(std::ifstream& file, const Counts& counts, const fs::p
   return mesh;
 }
 
+/// OpenMesh takes a text STL that ends early for a smaller mesh.
+void check_stl_end(std::ifstream& file, const fs::path& path) {
+  constexpr std::streamoff kTail = 1024;  // Room for "endsolid" and the longest name.
+  file.clear();
+  file.seekg(0);
+  std::string head(84, '\0');
+  file.read(head.data(), static_cast<std::streamsize>(head.size()));
+  if (!head.starts_with("solid")) return;
+  std::uint32_t triangles = 0;
+  std::memcpy(&triangles, &head[80], sizeof triangles);
+  const auto size = static_cast<std::streamoff>(fs::file_size(path));
+  if (file && size == 84 + std::streamoff{50} * triangles) return;  // Binary after all.
+  file.clear();
+  file.seekg(std::max(std::streamoff{0}, size - kTail));
+  const std::string tail{std::istreambuf_iterator<char>(file), {}};
+  if (tail.find("endsolid") == std::string::npos)
+    refuse(path, "is truncated: it has no 'endsolid'");
+}
+
+/// The extension without its dot, in small letters.
+std::string format_of(const fs::path& path) {
+  std::string format = path.extension().string();
+  format.erase(0, 1);
+  std::transform(format.begin(), format.end(), format.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return format;
+}
+
+/// PLY and OFF say beforehand how much there is to read. Where it is missing OpenMesh's readers
+/// make numbers up or never return, so a read that fails ends them.
+bool read_counted(const fs::path& path, MeshImporter& importer) {
+  std::ifstream file(path, std::ios::binary);
+  file.exceptions(std::ios::failbit | std::ios::badbit);
+  OpenMesh::IO::Options options;
+  return OpenMesh::IO::IOManager().read(file, format_of(path), importer, options);
+}
+
+bool read_uncounted(const fs::path& path, MeshImporter& importer) {
+  OpenMesh::IO::Options options;
+  return OpenMesh::IO::IOManager().read(path.string(), importer, options);
+}
+
 SurfaceMesh read_through_openmesh(const fs::path& path) {
   const OpenMeshSilence silence;
   MeshImporter importer;
-  OpenMesh::IO::Options options;
   bool read = false;
   try {
-    read = OpenMesh::IO::IOManager().read(path.string(), importer, options);
+    const std::string format = format_of(path);
+    read = format == "ply" || format == "off" ? read_counted(path, importer)
+                                              : read_uncounted(path, importer);
+  } catch (const std::ios::failure&) {
+    refuse(path, "is truncated or corrupt");
   } catch (const std::exception&) {
     read = false;
   }
@@ -117,8 +166,8 @@ void check_mesh(const SurfaceMesh& mesh, const fs::path& path) {
   for (Eigen::Index v = 0; v < mesh.vertices.cols(); ++v) {
     if (mesh.vertices.col(v).allFinite()) continue;
     std::ostringstream message;
-    message << "vertex " << v << " is at (" << mesh.vertices.col(v).transpose()
-            << "): coordinates must be finite";
+    message << "vertex " << v << " is at (" << mesh.vertices(0, v) << ", " << mesh.vertices(1, v)
+            << ", " << mesh.vertices(2, v) << "): coordinates must be finite";
     refuse(path, message.str());
   }
   for (Eigen::Index t = 0; t < mesh.triangles.cols(); ++t) {
@@ -153,7 +202,13 @@ SurfaceMesh read_mesh(const fs::path& path) {
   if (!file) refuse(path, "cannot be read: " + std::generic_category().message(errno));
   if (file.peek() == std::ifstream::traits_type::eof()) refuse(path, "is empty");
   const std::optional<Counts> counts = own_form(file);
-  SurfaceMesh mesh = counts ? read_own_form(file, *counts, path) : read_through_openmesh(path);
+  SurfaceMesh mesh;
+  if (counts) {
+    mesh = read_own_form(file, *counts, path);
+  } else {
+    check_stl_end(file, path);
+    mesh = read_through_openmesh(path);
+  }
   check_mesh(mesh, path);
   return mesh;
 }

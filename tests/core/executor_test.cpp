@@ -49,7 +49,8 @@ TEST(Executor, WorkerNumbersStayBelowConcurrency) {
 
 TEST(Executor, SumsHaveTheSameBitsForAnyNumberOfThreads) {
   const auto item = [](std::int64_t i) {
-    return std::array<double, 2>{std::sin(static_cast<double>(i)), 1.0 / static_cast<double>(i + 1)};
+    return std::array<double, 2>{std::sin(static_cast<double>(i)),
+                                 1.0 / static_cast<double>(i + 1)};
   };
   const auto reference = parallel_sum<2>(Executor::serial(), "sum", 123'457, item);
   for (const Executor& executor : executors()) {

@@ -96,7 +96,7 @@ TEST(Files, AFullDiskIsAnErrorWithFileAndReasonAndLeavesNothing) {
 
 TEST(Files, AMissingFolderIsAnErrorWithFileAndReason) {
   const TempFolder folder;
-  const fs::path path = folder / "missing" / "data.txt";
+  const fs::path path = folder / "missing/data.txt";
   EXPECT_THAT(message_of<RunError>([&] { write_whole_file(path, "x"); }),
               AllOf(StartsWith(path.string() + ": "), HasSubstr("No such file or directory")));
 }

@@ -45,8 +45,7 @@ TEST(ImagePlane, ToMmUndoesToPixels) {
 
 TEST(ImagePlane, ScaleIsTheDerivativeOfToPixels) {
   const ImagePlane plane(oblong_setup(ViewSide::kFront));
-  const Eigen::Vector2d step =
-      plane.to_pixels({1.0, 1.0}) - plane.to_pixels({0.0, 0.0});
+  const Eigen::Vector2d step = plane.to_pixels({1.0, 1.0}) - plane.to_pixels({0.0, 0.0});
   EXPECT_LT((step - plane.pixels_per_mm()).norm(), 1e-12);
 }
 

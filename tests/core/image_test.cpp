@@ -32,7 +32,8 @@ TEST(Image, EncodedValuesAreClippedToTheDisplay) {
   image.at(1, 0) = 0.5F;
   image.at(2, 0) = 1.0F;
   image.at(3, 0) = 9.0F;
-  EXPECT_EQ(encoded_values(image), (std::vector<double>{0.0, encode(0.5), encode(1.0), encode(1.0)}));
+  EXPECT_EQ(encoded_values(image),
+            (std::vector<double>{0.0, encode(0.5), encode(1.0), encode(1.0)}));
 }
 
 }  // namespace

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <tuple>
+
 #include "core/error.h"
 #include "core/temp_folder.h"
 
@@ -30,34 +32,34 @@ TEST(JsonFields, ReadsEveryType) {
 
 TEST(JsonFields, AMissingFieldIsNamedWithItsPath) {
   const JsonFields fields(kDocument, "f.json");
-  EXPECT_EQ(message_of<InputError>([&] { fields.number("ior"); }),
+  EXPECT_EQ(message_of<InputError>([&] { std::ignore = fields.number("ior"); }),
             "f.json: field 'ior' is missing");
-  EXPECT_EQ(message_of<InputError>([&] { fields.object("inner").text("other"); }),
+  EXPECT_EQ(message_of<InputError>([&] { std::ignore = fields.object("inner").text("other"); }),
             "f.json: field 'inner.other' is missing");
 }
 
 TEST(JsonFields, AMistypedFieldIsNamedWithItsValue) {
   const JsonFields fields(kDocument, "f.json");
-  EXPECT_EQ(message_of<InputError>([&] { fields.number("text"); }),
+  EXPECT_EQ(message_of<InputError>([&] { std::ignore = fields.number("text"); }),
             "f.json: field 'text' is \"abc\": it must be a number");
-  EXPECT_EQ(message_of<InputError>([&] { fields.text("number"); }),
+  EXPECT_EQ(message_of<InputError>([&] { std::ignore = fields.text("number"); }),
             "f.json: field 'number' is 1.5: it must be a text");
-  EXPECT_EQ(message_of<InputError>([&] { fields.integer("number"); }),
+  EXPECT_EQ(message_of<InputError>([&] { std::ignore = fields.integer("number"); }),
             "f.json: field 'number' is 1.5: it must be a whole number");
-  EXPECT_EQ(message_of<InputError>([&] { fields.integer("big"); }),
+  EXPECT_EQ(message_of<InputError>([&] { std::ignore = fields.integer("big"); }),
             "f.json: field 'big' is 3000000000: it must be a whole number");
-  EXPECT_EQ(message_of<InputError>([&] { fields.number_pair("triple"); }),
+  EXPECT_EQ(message_of<InputError>([&] { std::ignore = fields.number_pair("triple"); }),
             "f.json: field 'triple' is [1,2,3]: it must be two numbers");
-  EXPECT_EQ(message_of<InputError>([&] { fields.integer_pair("pair"); }),
+  EXPECT_EQ(message_of<InputError>([&] { std::ignore = fields.integer_pair("pair"); }),
             "f.json: field 'pair' is [1,2.5]: it must be two whole numbers");
-  EXPECT_EQ(message_of<InputError>([&] { fields.object("nothing"); }),
+  EXPECT_EQ(message_of<InputError>([&] { std::ignore = fields.object("nothing"); }),
             "f.json: field 'nothing' is null: it must be an object");
 }
 
 TEST(JsonFields, ALongValueIsCutToOneLine) {
   const json document{{"text", std::string(500, 'x')}};
   const JsonFields fields(document, "f.json");
-  EXPECT_LT(message_of<InputError>([&] { fields.number("text"); }).size(), 150U);
+  EXPECT_LT(message_of<InputError>([&] { std::ignore = fields.number("text"); }).size(), 150U);
 }
 
 TEST(JsonFields, WhatIsNoObjectIsRefused) {

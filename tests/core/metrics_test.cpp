@@ -47,8 +47,8 @@ double slow_similarity(const Image& a, const Image& b, int window) {
         va += (p - ma) * (p - ma) / (n - 1), vb += (q - mb) * (q - mb) / (n - 1);
         cov += (p - ma) * (q - mb) / (n - 1);
       });
-      total += (2 * ma * mb + 1e-4) * (2 * cov + 9e-4) /
-               ((ma * ma + mb * mb + 1e-4) * (va + vb + 9e-4));
+      total +=
+          (2 * ma * mb + 1e-4) * (2 * cov + 9e-4) / ((ma * ma + mb * mb + 1e-4) * (va + vb + 9e-4));
     }
   }
   return total / windows;
@@ -68,8 +68,8 @@ struct Figures {
   double ssim, psnr, mae;
 };
 constexpr Figures kFigures[] = {{64, 40, 0.987358921650494, 27.8023302818346, 0.033189396445638},
-    {7, 7, 0.943840291006487, 28.3790158078839, 0.030346326486246},
-    {9, 31, 0.983730210910659, 27.9779017694242, 0.032229784281148}};
+                                {7, 7, 0.943840291006487, 28.3790158078839, 0.030346326486246},
+                                {9, 31, 0.983730210910659, 27.9779017694242, 0.032229784281148}};
 
 TEST(Metrics, SsimPsnrAndMaeAgreeWithScikitImage) {
   for (const Figures& figures : kFigures) {

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <OpenImageIO/imageio.h>
+#include <gtest/gtest.h>
+
+#include <cstddef>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace lensforge::testing {
+
+/// Writes `pixels` (channels side by side, row by row) as `spec` says, straight through
+/// OpenImageIO, and without turning unassociated alpha into associated.
+inline void write_raw(const std::filesystem::path& path, OIIO::ImageSpec spec,
+                      const std::vector<float>& pixels) {
+  spec.attribute("oiio:UnassociatedAlpha", spec.get_int_attribute("oiio:UnassociatedAlpha", 1));
+  const auto output = OIIO::ImageOutput::create(path.string());
+  ASSERT_TRUE(output) << OIIO::geterror();
+  ASSERT_TRUE(output->open(path.string(), spec)) << output->geterror();
+  const bool written = spec.tile_width > 0 ? output->write_tiles(0, spec.width, 0, spec.height, 0,
+                                                                 1, OIIO::TypeFloat, pixels.data())
+                                           : output->write_image(OIIO::TypeFloat, pixels.data());
+  ASSERT_TRUE(written) << output->geterror();
+  ASSERT_TRUE(output->close()) << output->geterror();
+}
+
+/// 1 × 1 spec of so many channels.
+inline OIIO::ImageSpec pixel_spec(int channels, OIIO::TypeDesc type) {
+  return OIIO::ImageSpec(1, 1, channels, type);
+}
+
+/// A grey ramp from 0 to 1 over columns and rows, as many values as the spec has.
+inline std::vector<float> ramp(const OIIO::ImageSpec& spec) {
+  std::vector<float> values;
+  const auto count = static_cast<float>(spec.width * spec.height - 1);
+  for (int pixel = 0; pixel < spec.width * spec.height; ++pixel) {
+    values.insert(values.end(), static_cast<std::size_t>(spec.nchannels),
+                  static_cast<float>(pixel) / count);
+  }
+  return values;
+}
+
+}  // namespace lensforge::testing
