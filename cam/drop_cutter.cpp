@@ -22,6 +22,10 @@ constexpr double kReachMargin = 1e-6;
 /// sixth more. On triangles of R/8: 0.25 R is best, 0.125 R and 0.75 R cost two fifths more.
 constexpr double kCellPerRadius = 0.25;
 
+/// Cells are this much larger than nine tenths of the triangles: rounding of equal triangles must
+/// not send a part of them to a second grid.
+constexpr double kCellPerTriangle = 1.001;
+
 /// Most cells of a grid per triangle; beyond it cells grow, so that memory stays in proportion.
 constexpr double kCellsPerTriangle = 4.0;
 
@@ -184,7 +188,8 @@ double finest_cell(std::vector<double> extents, double radius, const Eigen::Alig
   const double area = bounds.sizes().x() * bounds.sizes().y();
   const double cells = kCellsPerTriangle * static_cast<double>(extents.size()) + 64.0;
   const double longest_row = bounds.sizes().head<2>().maxCoeff() / cells;
-  return std::max({*nth, kCellPerRadius * radius, std::sqrt(area / cells), longest_row});
+  return std::max(
+      {kCellPerTriangle * *nth, kCellPerRadius * radius, std::sqrt(area / cells), longest_row});
 }
 
 }  // namespace
