@@ -11,7 +11,7 @@ add_library(lensforge_options INTERFACE)
 target_compile_options(lensforge_options INTERFACE
   -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wnon-virtual-dtor -Wold-style-cast)
 # Contraction stays off so that the same source gives the same bits at every optimisation level.
-target_compile_options(lensforge_options INTERFACE -ffp-contract=off)
+target_compile_options(lensforge_options INTERFACE -ffp-contract=off -fno-math-errno)
 if(LENSFORGE_WERROR)
   target_compile_options(lensforge_options INTERFACE -Werror)
 endif()

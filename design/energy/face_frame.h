@@ -22,15 +22,21 @@ LF_HD inline FaceFrame face_frame(const Corners& t) {
   return {area_normal(t).normalized(), (t.v1 - t.v0).normalized(), (t.v0 + t.v1 + t.v2) / 3.0};
 }
 
-/// Adjoint of face_frame(): adds to the corners' derivatives.
-LF_HD inline void face_frame_adjoint(const Corners& t, const FaceFrame& frame, const FaceFrame& bar,
-                                     Corners& grad) {
-  area_normal_adjoint(t, normalize_adjoint(frame.n, area_normal(t).norm(), bar.n), grad);
+/// The part of face_frame()'s adjoint that goes through e1 and c: adds to the corners' derivatives.
+LF_HD inline void tangent_adjoint(const Corners& t, const FaceFrame& frame, const FaceFrame& bar,
+                                  Corners& grad) {
   const Eigen::Vector3d edge_bar = normalize_adjoint(frame.e1, (t.v1 - t.v0).norm(), bar.e1);
   const Eigen::Vector3d third = bar.c / 3.0;
   grad.v0 += third - edge_bar;
   grad.v1 += third + edge_bar;
   grad.v2 += third;
+}
+
+/// Adjoint of face_frame(): adds to the corners' derivatives.
+LF_HD inline void face_frame_adjoint(const Corners& t, const FaceFrame& frame, const FaceFrame& bar,
+                                     Corners& grad) {
+  area_normal_adjoint(t, normalize_adjoint(frame.n, area_normal(t).norm(), bar.n), grad);
+  tangent_adjoint(t, frame, bar, grad);
 }
 
 }  // namespace lensforge

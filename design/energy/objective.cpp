@@ -102,7 +102,7 @@ double DesignObjective::measure_faces(const Eigen::Matrix3Xd& vertices) {
     const Corners t = corners(vertices, i);
     const FaceFrame frame = face_frame(t);
     frames_[at(i)] = frame;
-    const double area = 0.5 * area_normal(t).z();
+    const double area = 0.5 * doubled_projected_area(t);
     return std::array<double, 1>{area_barrier(area, options_.area).value +
                                  reflection_barrier(frame.n.z(), optics_.eta).value};
   };
@@ -185,7 +185,7 @@ bool DesignObjective::land_vertices(const Eigen::Matrix3Xd& vertices) {
 ImageTriangle DesignObjective::image_triangle(const Eigen::Matrix3Xd& vertices,
                                               std::int64_t face) const {
   const Corners t = corners(vertices, face);
-  const double doubled = area_normal(t).z();
+  const double doubled = doubled_projected_area(t);
   if (options_.model == SurfaceModel::kFacet) {
     return project_facet(t, frames_[at(face)].n, doubled, optics_, lens_area_);
   }
@@ -243,79 +243,79 @@ void DesignObjective::pull_back_vertices(const Eigen::Matrix3Xd& vertices, Evalu
   parallel_for(executor_, "pull back vertices", vertices.cols(), pull);
 }
 
-/// The picture's derivative by one face: adds to the corners and to the unit normal; returns E_bdr
-/// of the face (0 in the smooth model, where pull_back_vertices() has counted it).
-double DesignObjective::image_adjoint(const Eigen::Matrix3Xd& vertices, std::int64_t face,
-                                      Corners& grad, Eigen::Vector3d& n_bar) {
-  const Corners t = corners(vertices, face);
-  Eigen::Vector3d area_bar = Eigen::Vector3d::Zero();  // by the area normal
-  double boundary = 0.0;
+/// The picture's derivative by one face; returns E_bdr of the face (0 in the smooth model, where
+/// pull_back_vertices() has counted it).
+double DesignObjective::image_adjoint(std::int64_t face, const Corners& t, FaceBar& bar) const {
   if (options_.model == SurfaceModel::kFacet) {
-    const ImageTriangle image = image_triangle(vertices, face);
-    ImageTriangle bar = deposit_adjoint(image, cotangent_.view());
-    boundary = boundary_term(image, flux_.columns(), flux_.rows(), options_.weights.boundary, bar);
-    n_bar += project_facet_adjoint(t, frames_[at(face)].n, optics_, bar, grad);
-    area_bar.z() = 0.5 * bar.flux / lens_area_;
-  } else {
-    const auto v = triangles_.col(face);
-    for (int k = 0; k < 3; ++k) area_bar += vertex_normal_bar_.col(v[k]);
-    area_bar.z() += 0.5 * triangle_bar_[at(face)].flux / lens_area_;
+    const Eigen::Vector3d& n = frames_[at(face)].n;
+    const ImageTriangle image = project_facet(t, n, doubled_projected_area(t), optics_, lens_area_);
+    ImageTriangle image_bar = deposit_adjoint(image, cotangent_.view());
+    const double boundary =
+        boundary_term(image, flux_.columns(), flux_.rows(), options_.weights.boundary, image_bar);
+    bar.frame.n += project_facet_adjoint(t, n, optics_, image_bar, bar.corners);
+    bar.area_normal.z() += 0.5 * image_bar.flux / lens_area_;
+    return boundary;
   }
-  area_normal_adjoint(t, area_bar, grad);
-  return boundary;
+  const auto v = triangles_.col(face);
+  for (int k = 0; k < 3; ++k) bar.area_normal += vertex_normal_bar_.col(v[k]);
+  bar.area_normal.z() += 0.5 * triangle_bar_[at(face)].flux / lens_area_;
+  return 0.0;
 }
 
-/// Barriers of one face, weighted: adds to the corners and to the unit normal, returns E_barr.
-double DesignObjective::barrier_adjoint(const Corners& t, const FaceFrame& frame, Corners& grad,
-                                        Eigen::Vector3d& n_bar) const {
+/// Weighted derivatives of a face's barriers; returns its E_barr.
+double DesignObjective::barrier_adjoint(std::int64_t face, const Corners& t, FaceBar& bar) const {
   const double weight = options_.weights.barrier;
-  const ValueSlope area = area_barrier(0.5 * area_normal(t).z(), options_.area);
-  const ValueSlope reflection = reflection_barrier(frame.n.z(), optics_.eta);
-  area_normal_adjoint(t, Eigen::Vector3d(0.0, 0.0, 0.5 * weight * area.slope), grad);
-  n_bar.z() += weight * reflection.slope;
+  const ValueSlope area = area_barrier(0.5 * doubled_projected_area(t), options_.area);
+  const ValueSlope reflection = reflection_barrier(frames_[at(face)].n.z(), optics_.eta);
+  bar.area_normal.z() += 0.5 * weight * area.slope;
+  bar.frame.n.z() += weight * reflection.slope;
   return area.value + reflection.value;
 }
 
-/// E_face and the linear part of E_edge at one face, weighted derivatives by its frame and area.
-void DesignObjective::smoothness_adjoint(std::int64_t face, FaceFrame& bar, double& area_bar,
-                                         double& face_value, double& edge_value) const {
+/// Weighted derivatives of E_face and of the linear part of E_edge by one face's frame and area
+/// normal, and its own share of both values.
+DesignObjective::Smoothness DesignObjective::smoothness_adjoint(std::int64_t face,
+                                                                double doubled_area,
+                                                                FaceBar& bar) const {
   const double weight = options_.weights.smooth;
-  const double area = area_bar;
   const WeingartenMap& map = maps_[at(face)];
   const FaceFrame& frame = frames_[at(face)];
   WeingartenMap map_bar;  // Vanishes in sum, since the map is the minimiser.
   FaceFrame other;
-  area_bar = 0.0;
-  face_value = mean_curvature_term(map, area, weight, map_bar, area_bar);
-  edge_value = 0.0;
+  double area_bar = 0.0;
+  Smoothness values;
+  values.face = mean_curvature_term(map, 0.5 * doubled_area, weight, map_bar, area_bar);
+  bar.area_normal += 0.5 * area_bar * frame.n;
   for (int k = 0; k < 3; ++k) {
     const int j = topology_.neighbours(k, face);
     if (j < 0) continue;
     const FaceFrame& neighbour = frames_[at(j)];
     const double w = edge_weights_(k, face);
-    edge_value += w * NeighbourOffset(frame, neighbour).mismatch(map);
     const double scaled = weight * options_.weights.edge * w;
-    mismatch_adjoint(frame, neighbour, map, scaled, bar, other, map_bar);
-    mismatch_adjoint(neighbour, frame, maps_[at(j)], scaled, other, bar, map_bar);
+    values.edge += w * mismatch_adjoint(frame, neighbour, map, scaled, bar.frame, other, map_bar);
+    mismatch_adjoint(neighbour, frame, maps_[at(j)], scaled, other, bar.frame, map_bar);
   }
+  return values;
 }
 
 void DesignObjective::pull_back_faces(const Eigen::Matrix3Xd& vertices, Evaluation& result) {
   const bool smooth = options_.weights.smooth > 0.0;
   const auto pull = [&](std::int64_t i) {
     const Corners t = corners(vertices, i);
-    Corners grad;
-    FaceFrame bar;
+    const double doubled_area = area_normal(t).norm();
+    FaceBar bar;
     std::array<double, 4> values{};
-    values[0] = image_adjoint(vertices, i, grad, bar.n);
-    values[1] = barrier_adjoint(t, frames_[at(i)], grad, bar.n);
+    values[0] = image_adjoint(i, t, bar);
+    values[1] = barrier_adjoint(i, t, bar);
     if (smooth) {
-      double area_bar = 0.5 * area_normal(t).norm();
-      smoothness_adjoint(i, bar, area_bar, values[2], values[3]);
-      area_normal_adjoint(t, 0.5 * area_bar * frames_[at(i)].n, grad);
+      const Smoothness smoothness = smoothness_adjoint(i, doubled_area, bar);
+      values[2] = smoothness.face;
+      values[3] = smoothness.edge;
+      tangent_adjoint(t, frames_[at(i)], bar.frame, bar.corners);
     }
-    face_frame_adjoint(t, frames_[at(i)], bar, grad);
-    corner_bar_[at(i)] = grad;
+    bar.area_normal += normalize_adjoint(frames_[at(i)].n, doubled_area, bar.frame.n);
+    area_normal_adjoint(t, bar.area_normal, bar.corners);
+    corner_bar_[at(i)] = bar.corners;
     return values;
   };
   const auto sums = parallel_sum<4>(executor_, "face adjoint", triangles_.cols(), pull);

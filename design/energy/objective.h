@@ -75,12 +75,19 @@ class DesignObjective {
   void compare_picture(std::span<const double> flux, Evaluation& result);
   void pull_back_vertices(const Eigen::Matrix3Xd& vertices, Evaluation& result);
   void pull_back_faces(const Eigen::Matrix3Xd& vertices, Evaluation& result);
-  double image_adjoint(const Eigen::Matrix3Xd& vertices, std::int64_t face, Corners& grad,
-                       Eigen::Vector3d& n_bar);
-  double barrier_adjoint(const Corners& t, const FaceFrame& frame, Corners& grad,
-                         Eigen::Vector3d& n_bar) const;
-  void smoothness_adjoint(std::int64_t face, FaceFrame& bar, double& area_bar, double& face_value,
-                          double& edge_value) const;
+  /// Derivatives by what a face is made of; summed up and carried to its corners at the end.
+  struct FaceBar {
+    Corners corners;
+    FaceFrame frame;
+    Eigen::Vector3d area_normal{0.0, 0.0, 0.0};
+  };
+  struct Smoothness {
+    double face = 0.0;
+    double edge = 0.0;
+  };
+  double image_adjoint(std::int64_t face, const Corners& t, FaceBar& bar) const;
+  double barrier_adjoint(std::int64_t face, const Corners& t, FaceBar& bar) const;
+  Smoothness smoothness_adjoint(std::int64_t face, double doubled_area, FaceBar& bar) const;
   void gather_vertices(Eigen::Matrix3Xd& gradient);
 
   Executor executor_;

@@ -47,10 +47,10 @@ struct NeighbourOffset {
 };
 
 /// Adjoint of (frame i, frame j, M_i) ↦ δ(i, j): adds weight × the derivatives by both frames and
-/// by M_i.
-LF_HD inline void mismatch_adjoint(const FaceFrame& i, const FaceFrame& j, const WeingartenMap& m,
-                                   double weight, FaceFrame& i_bar, FaceFrame& j_bar,
-                                   WeingartenMap& m_bar) {
+/// by M_i, and returns δ.
+LF_HD inline double mismatch_adjoint(const FaceFrame& i, const FaceFrame& j, const WeingartenMap& m,
+                                     double weight, FaceFrame& i_bar, FaceFrame& j_bar,
+                                     WeingartenMap& m_bar) {
   const NeighbourOffset offset(i, j);
   const double inverse = 1.0 / offset.d.squaredNorm();
   const Eigen::Vector2d r = offset.residual(m);
@@ -74,6 +74,7 @@ LF_HD inline void mismatch_adjoint(const FaceFrame& i, const FaceFrame& j, const
   j_bar.n += normal_bar;
   i_bar.n += i.e1.cross(e2_bar) - normal_bar;
   i_bar.e1 += d_bar.x() * centroid - r_bar.x() * normal + e2_bar.cross(i.n);
+  return r.squaredNorm() * inverse;
 }
 
 /// Ψ_ν(√h) = 1 − exp(−h/(2ν²)) (Welsch function, Sun et al., Eq. 14) and its slope by h.

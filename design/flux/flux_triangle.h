@@ -7,6 +7,7 @@
 
 #include "core/host_device.h"
 #include "design/flux/edge_walk.h"
+#include "design/flux/quadrants.h"
 #include "design/optics/image_triangle.h"
 
 /// The flux that one image triangle gives to every pixel, exactly, and its adjoint.
@@ -52,18 +53,17 @@ struct FluxAccumulator {
 #endif
   }
 
-  /// Gives `here` to pixel (row, column) and `next` to the pixel on its right; pixels outside the
-  /// picture lose theirs.
-  LF_HD void add_pair(int row, int column, std::int64_t here, std::int64_t next) const {
-    if (row < 0 || row >= rows) return;
-    if (column >= 0 && column < columns) {
-      add(row, column, here);
-      add(row, column + 1, -here);
-    }
-    if (next != 0 && column + 1 >= 0 && column + 1 < columns) {
-      add(row, column + 1, next);
-      add(row, column + 2, -next);
-    }
+  /// Gives flux to one pixel; nothing happens outside the picture.
+  LF_HD void add_pixel(int row, int column, std::int64_t amount) const {
+    if (row < 0 || row >= rows || column < 0 || column >= columns) return;
+    add(row, column, amount);
+    add(row, column + 1, -amount);
+  }
+  /// Gives flux to two neighbouring pixels of a row. @pre both lie in the picture.
+  LF_HD void add_inside(int row, int column, std::int64_t here, std::int64_t next) const {
+    add(row, column, here);
+    add(row, column + 1, next - here);
+    add(row, column + 2, -next);
   }
 };
 
@@ -85,107 +85,32 @@ struct FluxCotangent {
 
 namespace flux_detail {
 
-/// Smallest box of whole pixels around a triangle, and its longest extent.
-struct PixelBox {
-  int c0, c1, r0, r1;
-  double x0, x1, y0, y1;
-
-  LF_HD explicit PixelBox(const ImageTriangle& t)
-      : x0(std::fmin(t.p0.x(), std::fmin(t.p1.x(), t.p2.x()))),
-        x1(std::fmax(t.p0.x(), std::fmax(t.p1.x(), t.p2.x()))),
-        y0(std::fmin(t.p0.y(), std::fmin(t.p1.y(), t.p2.y()))),
-        y1(std::fmax(t.p0.y(), std::fmax(t.p1.y(), t.p2.y()))) {
-    c0 = cell(x0);
-    c1 = cell(x1);
-    r0 = cell(y0);
-    r1 = cell(y1);
-  }
-  /// Column or row of a coordinate, kept within what an int can hold.
-  LF_HD static int cell(double value) {
-    return static_cast<int>(std::floor(std::fmin(std::fmax(value, -1e9), 1e9)));
-  }
-  [[nodiscard]] LF_HD bool misses(int columns, int rows) const {
-    // Written so that a NaN or infinite corner also counts as a miss.
-    return !(x1 >= 0.0 && x0 <= columns && y1 >= 0.0 && y0 <= rows && x1 - x0 < 1e9 &&
-             y1 - y0 < 1e9);
-  }
-  [[nodiscard]] LF_HD bool within_one_pixel() const { return c0 == c1 && r0 == r1; }
-  [[nodiscard]] LF_HD bool within_two_by_two() const { return c1 - c0 <= 1 && r1 - r0 <= 1; }
-  [[nodiscard]] LF_HD double extent() const { return std::fmax(x1 - x0, y1 - y0); }
-};
-
 LF_HD inline std::int64_t to_units(double flux) {
   return static_cast<std::int64_t>(std::llrint(flux * kFluxUnits));
 }
 
-/// Areas left and right of x = 0 under an edge from (u0, y0) to (u1, y1), ∮ x dy on either side.
-struct SideAreas {
-  double left = 0.0;
-  double right = 0.0;
-
-  LF_HD void add_edge(double u0, double y0, double u1, double y1) {
-    const double dy = y1 - y0;
-    if (u0 >= 0.0 && u1 >= 0.0) {
-      right += 0.5 * (u0 + u1) * dy;
-    } else if (u0 <= 0.0 && u1 <= 0.0) {
-      left += 0.5 * (u0 + u1) * dy;
-    } else {
-      const double per = 0.5 * dy / (u1 - u0);
-      const double square0 = u0 * u0 * per;
-      const double square1 = u1 * u1 * per;
-      left += u0 < 0.0 ? -square0 : square1;
-      right += u0 < 0.0 ? square1 : -square0;
-    }
-  }
-};
-
-/// The four parts of a triangle that a vertical and a horizontal line cut it into.
-struct QuadrantAreas {
-  SideAreas above;  ///< y below the horizontal line: the upper row of the picture.
-  SideAreas below;
-
-  /// Adds the edge a → b, given relative to the crossing of the two lines.
-  LF_HD void add_edge(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
-    if (a.y() <= 0.0 && b.y() <= 0.0) {
-      above.add_edge(a.x(), a.y(), b.x(), b.y());
-    } else if (a.y() >= 0.0 && b.y() >= 0.0) {
-      below.add_edge(a.x(), a.y(), b.x(), b.y());
-    } else {
-      const double x = a.x() + (b.x() - a.x()) * (a.y() / (a.y() - b.y()));
-      SideAreas& first = a.y() < 0.0 ? above : below;
-      SideAreas& second = a.y() < 0.0 ? below : above;
-      first.add_edge(a.x(), a.y(), x, 0.0);
-      second.add_edge(x, 0.0, b.x(), b.y());
-    }
-  }
-};
-
-/// Deposit of a triangle that touches at most 2 × 2 pixels, in closed form. Untouched pixels get
-/// exactly nothing, and no density enters, so that a triangle may be as small as it likes.
+/// Deposit of a triangle that touches at most 2 × 2 pixels. Untouched pixels get exactly nothing,
+/// and no density enters, so that a triangle may be as small as it likes.
 LF_HD inline void deposit_small(const ImageTriangle& t, const PixelBox& box,
                                 const FluxAccumulator& image) {
-  // Where no pixel border crosses the box, a line along the box's own side keeps offsets small.
-  const Eigen::Vector2d origin(box.c0 < box.c1 ? box.c1 : box.x0,
-                               box.r0 < box.r1 ? box.r1 : box.y0);
-  const Eigen::Vector2d a = t.p0 - origin;
-  const Eigen::Vector2d b = t.p1 - origin;
-  const Eigen::Vector2d c = t.p2 - origin;
-  QuadrantAreas parts;
-  parts.add_edge(a, b);
-  parts.add_edge(b, c);
-  parts.add_edge(c, a);
-  const double area =
-      (parts.above.left + parts.above.right) + (parts.below.left + parts.below.right);
-  const double density = t.flux / area;
-  const bool two_columns = box.c0 < box.c1;
-  const bool two_rows = box.r0 < box.r1;
-  const auto give = [&](const SideAreas& side, int row) {
-    const std::int64_t left = to_units(density * side.left);
-    const std::int64_t right = to_units(density * side.right);
-    image.add_pair(row, box.c0, two_columns ? left : right, two_columns ? right : 0);
-  };
-  if (two_rows) give(parts.above, box.r0);
-  give(parts.below, box.r1);
+  const Quadrants areas = quadrant_areas(t, box.crossing());
+  const double density = t.flux / areas.sum();
+  const std::int64_t above_left = to_units(density * areas.above_left);
+  const std::int64_t above_right = to_units(density * areas.above_right);
+  const std::int64_t below_left = to_units(density * areas.below_left);
+  const std::int64_t below_right = to_units(density * areas.below_right);
+  // Without a border in the box everything counts as right of it (below it).
+  const int left = box.c1 - 1;
+  const int above = box.r1 - 1;
+  if (left >= 0 && above >= 0 && box.c1 < image.columns && box.r1 < image.rows) {
+    image.add_inside(above, left, above_left, above_right);
+    image.add_inside(box.r1, left, below_left, below_right);
+    return;
+  }
+  image.add_pixel(above, left, above_left);
+  image.add_pixel(above, box.c1, above_right);
+  image.add_pixel(box.r1, left, below_left);
+  image.add_pixel(box.r1, box.c1, below_right);
 }
 
 /// Row differences of ρ × (covered area) of one edge. Quantised per end point, so that the pieces
@@ -267,9 +192,9 @@ LF_HD inline bool is_small_needle(double doubled, double extent) {
 LF_HD inline void deposit(const ImageTriangle& t, const FluxAccumulator& image) {
   namespace detail = flux_detail;
   const detail::PixelBox box(t);
-  if (t.flux == 0.0 || box.misses(image.columns, image.rows)) return;
+  if (t.flux == 0.0 || box.misses(t, image.columns, image.rows)) return;
   if (box.within_one_pixel()) {
-    image.add_pair(box.r0, box.c0, detail::to_units(t.flux), 0);
+    image.add_pixel(box.r0, box.c0, detail::to_units(t.flux));
     return;
   }
   const double doubled = doubled_area(t.p0, t.p1, t.p2);
@@ -277,7 +202,7 @@ LF_HD inline void deposit(const ImageTriangle& t, const FluxAccumulator& image) 
   if (small ? detail::is_small_needle(doubled, box.extent())
             : detail::is_needle(t, doubled, box.extent())) {
     detail::Needle(t).walk(image.columns, image.rows, [&](int row, int column, double share) {
-      image.add_pair(row, column, detail::to_units(t.flux * share), 0);
+      image.add_pixel(row, column, detail::to_units(t.flux * share));
     });
     return;
   }
@@ -326,6 +251,40 @@ struct GatherEdge {
   }
 };
 
+/// Adds to p_bar and q_bar the derivatives of G by the ends of the edge p → q.
+LF_HD inline void add_swept(const Eigen::Vector2d& p, const Eigen::Vector2d& q,
+                            const HatWeights& weights, Eigen::Vector2d& p_bar,
+                            Eigen::Vector2d& q_bar) {
+  const Eigen::Vector2d normal(q.y() - p.y(), p.x() - q.x());
+  p_bar += weights.start * normal;
+  q_bar += weights.end * normal;
+}
+
+/// G and its derivatives by the corners for a triangle within 2 × 2 pixels.
+LF_HD inline double gather_small(const ImageTriangle& t, const PixelBox& box,
+                                 const FluxCotangent& cotangent, ImageTriangle& bar) {
+  const Eigen::Vector2d crossing = box.crossing();
+  const Quadrants g{cotangent.at(box.r1 - 1, box.c1 - 1), cotangent.at(box.r1 - 1, box.c1),
+                    cotangent.at(box.r1, box.c1 - 1), cotangent.at(box.r1, box.c1)};
+  const Eigen::Vector2d a = t.p0 - crossing;
+  const Eigen::Vector2d b = t.p1 - crossing;
+  const Eigen::Vector2d c = t.p2 - crossing;
+  add_swept(a, b, HatWeights(a, b, g), bar.p0, bar.p1);
+  add_swept(b, c, HatWeights(b, c, g), bar.p1, bar.p2);
+  add_swept(c, a, HatWeights(c, a, g), bar.p2, bar.p0);
+  return quadrant_areas(t, crossing).dot(g);
+}
+
+/// G and its derivatives by the corners for any triangle.
+LF_HD inline double gather_large(const ImageTriangle& t, const FluxCotangent& cotangent,
+                                 ImageTriangle& bar) {
+  GatherEdge gather{cotangent};
+  gather.edge(t.p0, t.p1, bar.p0, bar.p1);
+  gather.edge(t.p1, t.p2, bar.p1, bar.p2);
+  gather.edge(t.p2, t.p0, bar.p2, bar.p0);
+  return gather.integral;
+}
+
 /// Adds scale × ∂(doubled signed area)/∂corners.
 LF_HD inline void doubled_area_adjoint(const ImageTriangle& t, double scale, ImageTriangle& bar) {
   bar.p0 += scale * Eigen::Vector2d(t.p1.y() - t.p2.y(), t.p2.x() - t.p1.x());
@@ -342,26 +301,25 @@ LF_HD inline ImageTriangle deposit_adjoint(const ImageTriangle& t, const FluxCot
   namespace detail = flux_detail;
   ImageTriangle bar;
   const detail::PixelBox box(t);
-  if (box.misses(cotangent.columns, cotangent.rows)) return bar;
+  if (box.misses(t, cotangent.columns, cotangent.rows)) return bar;
   if (box.within_one_pixel()) {
     bar.flux = cotangent.at(box.r0, box.c0);
     return bar;
   }
   const double doubled = doubled_area(t.p0, t.p1, t.p2);
-  if (box.within_two_by_two() ? detail::is_small_needle(doubled, box.extent())
-                              : detail::is_needle(t, doubled, box.extent())) {
+  const bool small = box.within_two_by_two();
+  if (small ? detail::is_small_needle(doubled, box.extent())
+            : detail::is_needle(t, doubled, box.extent())) {
     detail::Needle(t).walk(
         cotangent.columns, cotangent.rows,
         [&](int row, int column, double share) { bar.flux += share * cotangent.at(row, column); });
     return bar;
   }
-  detail::GatherEdge gather{cotangent};
-  gather.edge(t.p0, t.p1, bar.p0, bar.p1);
-  gather.edge(t.p1, t.p2, bar.p1, bar.p2);
-  gather.edge(t.p2, t.p0, bar.p2, bar.p0);
+  const double integral = small ? detail::gather_small(t, box, cotangent, bar)
+                                : detail::gather_large(t, cotangent, bar);
   // E = Φ G / A, so dE = (G/A) dΦ + (Φ/A)(dG − (G/A) dA).
   const double area = 0.5 * doubled;
-  const double mean = gather.integral / area;
+  const double mean = integral / area;
   const double density = t.flux / area;
   detail::doubled_area_adjoint(t, -0.5 * mean, bar);
   bar.p0 *= density;

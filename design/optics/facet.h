@@ -22,6 +22,12 @@ LF_HD inline Eigen::Vector3d area_normal(const Corners& t) {
   return (t.v1 - t.v0).cross(t.v2 - t.v0);
 }
 
+/// Twice the signed area of a triangle's projection onto the entry face: the z of area_normal().
+LF_HD inline double doubled_projected_area(const Corners& t) {
+  return (t.v1.x() - t.v0.x()) * (t.v2.y() - t.v0.y()) -
+         (t.v1.y() - t.v0.y()) * (t.v2.x() - t.v0.x());
+}
+
 /// Adjoint of area_normal(): adds to the corners' derivatives.
 LF_HD inline void area_normal_adjoint(const Corners& t, const Eigen::Vector3d& bar, Corners& grad) {
   const Eigen::Vector3d d1 = (t.v2 - t.v0).cross(bar);
