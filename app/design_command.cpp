@@ -57,6 +57,8 @@ void add_effort_options(OptionSet& options, DesignOptions& design) {
                   "longer side of the working picture, never more than the picture has");
   options.number("--mesh-ratio", design.mesh_ratio, Limits::between(0.25, 8), "",
                  "mesh vertices per pixel side");
+  options.integer("--levels", design.levels, Limits::between(1, 16),
+                  "resolutions from coarse to fine, each twice the one before");
   options.integer("--rounds", design.rounds, Limits::between(1, 1000), "rounds at each resolution");
   options.choice("--quality", design.iterations, {{"draft", 20}, {"standard", 60}, {"paper", 200}},
                  "most iterations of one round: 20, 60 or 200");

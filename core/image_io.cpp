@@ -60,8 +60,6 @@ void write_exr(const Image& image, const fs::path& path) {
   spec.attribute("compression", "zip");
   // Else OpenImageIO adds the time, and the same picture would give another file every second.
   spec.attribute("DateTime", "");
-  // OpenImageIO would put in the time of writing; equal pictures are to be equal files.
-  spec.attribute("DateTime", "1970:01:01 00:00:00");
   write_encoded(path, spec, ".exr", image.values().data());
 }
 
