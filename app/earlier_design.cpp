@@ -29,10 +29,9 @@ void refuse_to_overwrite(const fs::path& folder, bool resume, bool force) {
 void remove_earlier_design(const fs::path& folder) {
   // lens.json goes first: without it the folder is no lens any more.
   std::error_code ignored;
-  for (const char* name :
-       {lens_file::kJson, design_file::kCheckpoint, lens_file::kSurface, lens_file::kTargetPng,
-        lens_file::kTargetExr, lens_file::kRenderPng, lens_file::kRenderExr, lens_file::kError,
-        lens_file::kConvergence, design_file::kOverview}) {
+  for (const char* name : {lens_file::kJson, lens_file::kSurface, lens_file::kTargetPng,
+                           lens_file::kTargetExr, lens_file::kRenderPng, lens_file::kRenderExr,
+                           lens_file::kError, lens_file::kConvergence, design_file::kOverview}) {
     fs::remove(folder / name, ignored);
   }
   for (const char* name : {cam_file::kFinish, cam_file::kReport}) {

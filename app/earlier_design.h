@@ -24,7 +24,7 @@ struct EarlierDesign {
 void refuse_to_overwrite(const std::filesystem::path& folder, bool resume, bool force);
 
 /// Removes every file that lensforge writes into a lens folder, the G-code made from it included,
-/// and only those.
+/// and only those. The checkpoint stays: the new design has replaced it by its own.
 void remove_earlier_design(const std::filesystem::path& folder);
 
 }  // namespace lensforge::app

@@ -107,6 +107,17 @@ TEST_F(DesignInterrupt, SecondCtrlCEndsAtOnce) {
   EXPECT_EQ(process.wait().exit_code, 130);
 }
 
+TEST_F(DesignInterrupt, AForcedDesignIsResumableToo) {
+  ASSERT_EQ(run(design("whole")).exit_code, 0);
+  ASSERT_EQ(run(small_design(picture("stripes.png"), path("lens"))).exit_code, 0);
+  Process process(design("lens", {"--force"}));
+  wait_for_checkpoint(process, "lens");
+  process.send(SIGINT);
+  ASSERT_EQ(process.wait().exit_code, 130);
+  ASSERT_EQ(run(design("lens", {"--resume"})).exit_code, 0);
+  expect_same_lens("whole", "lens");
+}
+
 TEST_F(DesignInterrupt, AFinishedDesignHasNothingToResume) {
   ASSERT_EQ(run(small_design(picture("rings.png"), path("lens"))).exit_code, 0);
   const auto written = fs::last_write_time(at("lens/lens.json"));
