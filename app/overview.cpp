@@ -13,10 +13,12 @@
 namespace lensforge::app {
 namespace {
 
-constexpr int kPanelSide = 512;    ///< Longer side of one panel, pixels.
-constexpr int kGap = 8;            ///< Between panels, pixels.
-constexpr int kSamples = 2;        ///< Relief samples per pixel side.
-constexpr double kStretch = 0.01;  ///< Share of the relief that may clip at either end.
+constexpr int kPanelSide = 512;       ///< Longer side of one panel, pixels.
+constexpr int kGap = 8;               ///< Between panels, pixels.
+constexpr int kSamples = 2;           ///< Relief samples per pixel side.
+constexpr int kSwellShare = 24;       ///< A swell is wider than this share of the longer side.
+constexpr float kFlattening = 0.85F;  ///< Share of the swells that is taken away.
+constexpr double kStretch = 0.01;     ///< Share of the relief that may clip at either end.
 
 /// Brightness of a surface in raking light, to first order in its slopes; unscaled. The light comes
 /// from the viewer's upper left.
@@ -52,6 +54,45 @@ void fill(Image& image, const PixelTriangle& t, float value) {
     for (int c = c0; c <= c1; ++c) {
       if (t.contains({c + 0.5, r + 0.5})) image.at(c, r) = value;
     }
+  }
+}
+
+/// The mean over a window of 2·radius + 1 pixels along one row or column, cut at the ends.
+void blur_line(const float* values, float* means, int count, std::ptrdiff_t stride, int radius) {
+  std::vector<double> sums(static_cast<std::size_t>(count) + 1, 0.0);
+  for (int i = 0; i < count; ++i) {
+    sums[static_cast<std::size_t>(i) + 1] = sums[static_cast<std::size_t>(i)] + values[i * stride];
+  }
+  for (int i = 0; i < count; ++i) {
+    const int first = std::max(0, i - radius);
+    const int last = std::min(count, i + radius + 1);
+    const double sum = sums[static_cast<std::size_t>(last)] - sums[static_cast<std::size_t>(first)];
+    means[i * stride] = static_cast<float>(sum / (last - first));
+  }
+}
+
+Image blurred(const Image& image, int radius) {
+  const int columns = image.columns();
+  const int rows = image.rows();
+  Image along_rows(columns, rows);
+  for (int r = 0; r < rows; ++r) {
+    const std::ptrdiff_t start = static_cast<std::ptrdiff_t>(r) * columns;
+    blur_line(image.values().data() + start, along_rows.values().data() + start, columns, 1,
+              radius);
+  }
+  Image means(columns, rows);
+  for (int c = 0; c < columns; ++c) {
+    blur_line(along_rows.values().data() + c, means.values().data() + c, rows, columns, radius);
+  }
+  return means;
+}
+
+/// Takes most of the broad swells away, under which the picture's own creases would not show.
+void flatten_swells(Image& image) {
+  const int radius = std::max(1, std::max(image.columns(), image.rows()) / kSwellShare);
+  const Image swells = blurred(blurred(image, radius), radius);
+  for (std::size_t i = 0; i < image.values().size(); ++i) {
+    image.values()[i] -= kFlattening * swells.values()[i];
   }
 }
 
@@ -95,6 +136,7 @@ Image draw_relief(const SurfaceMesh& mesh, const OpticalSetup& setup, int column
                               plane.to_pixels(c.head<2>())};
     fill(image, shown, static_cast<float>(raking_light(normal, toward_left)));
   }
+  flatten_swells(image);
   stretch_contrast(image);
   return resample(image, columns, rows);
 }

@@ -7,8 +7,9 @@
 namespace lensforge::app {
 
 /// One picture for people: the target, the projected picture and the surface side by side, each in
-/// the orientation of the target. The surface is shown as a relief lit from the upper left whose
-/// contrast is stretched, so that creases far too shallow to see stand out.
+/// the orientation of the target. The surface is shown as a relief lit from the upper left, its
+/// broad swells flattened and its contrast stretched, so that creases far too shallow to see stand
+/// out.
 Image draw_overview(const Lens& lens);
 
 /// The relief alone, `columns` × `rows`, linear light.
