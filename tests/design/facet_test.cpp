@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "design/optics/facet.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "design/finite_difference.h"
+#include "design/random_corners.h"
+#include "design/snell.h"
+#include "design/test_setups.h"
+
+namespace lensforge {
+namespace {
+
+using testing::Random;
+using testing::random_corners;
+
+const Projection kOptics(testing::setup_of({100.0, 80.0}, {50, 40}, 300.0));
+
+TEST(Facet, AreaNormalIsTwiceTheAreaLong) {
+  const Corners t{{0.0, 0.0, 2.0}, {3.0, 0.0, 2.0}, {0.0, 4.0, 2.0}};
+  EXPECT_EQ(area_normal(t), Eigen::Vector3d(0.0, 0.0, 12.0));
+}
+
+TEST(Facet, AreaNormalAdjointEqualsCentralDifferences) {
+  Random random(1);
+  for (int i = 0; i < 200; ++i) {
+    const Corners t = random_corners(random);
+    const Eigen::Vector3d bar = random.vector3();
+    const auto f = [&](const Eigen::VectorXd& x) {
+      return bar.dot(area_normal(testing::unpack_corners(x)));
+    };
+    Corners grad;
+    area_normal_adjoint(t, bar, grad);
+    const Eigen::VectorXd expected = testing::numeric_gradient(f, testing::pack(t), 1e-2);
+    EXPECT_LT(testing::gradient_error(testing::pack(grad), expected), 1e-9);
+  }
+}
+
+TEST(Facet, NormalizeAdjointEqualsCentralDifferences) {
+  Random random(2);
+  for (int i = 0; i < 200; ++i) {
+    const Eigen::Vector3d whole = random.magnitude(1e-3, 1e3) * random.near_z(3.0);
+    const Eigen::Vector3d bar = random.vector3();
+    const double length = whole.norm();
+    const auto f = [&](const Eigen::VectorXd& x) { return bar.dot(x.normalized()); };
+    const Eigen::VectorXd expected = testing::numeric_gradient(f, whole, 1e-3 * length);
+    EXPECT_LT(testing::gradient_error(normalize_adjoint(whole / length, length, bar), expected),
+              1e-9);
+  }
+}
+
+TEST(Facet, AllCornersTakeTheSameSlope) {
+  Random random(3);
+  for (int i = 0; i < 200; ++i) {
+    const Corners t = random_corners(random);
+    const Eigen::Vector3d n = area_normal(t).normalized();
+    const ImageTriangle image = project_facet(t, n, area_normal(t).z(), kOptics, 8000.0);
+    const Eigen::Vector2d m = testing::slope_by_angles(n, 1.49);
+    const auto lands = [&](const Eigen::Vector3d& v) -> Eigen::Vector2d {
+      const Eigen::Vector2d mm = v.head<2>() + (300.0 - v.z()) * m;
+      return {(100.0 - mm.x()) / 2.0, (80.0 - mm.y()) / 2.0};
+    };
+    EXPECT_LT((image.p0 - lands(t.v0)).norm(), 1e-10);
+    EXPECT_LT((image.p1 - lands(t.v1)).norm(), 1e-10);
+    EXPECT_LT((image.p2 - lands(t.v2)).norm(), 1e-10);
+  }
+}
+
+TEST(Facet, FluxIsTheShareOfTheEntryFace) {
+  const Corners t{{10.0, 10.0, 5.0}, {20.0, 10.0, 6.0}, {10.0, 14.0, 5.5}};
+  const Eigen::Vector3d normal = area_normal(t);
+  const ImageTriangle image =
+      project_facet(t, normal.normalized(), normal.z(), kOptics, 100.0 * 80.0);
+  EXPECT_NEAR(image.flux, 20.0 / 8000.0, 1e-17);
+}
+
+TEST(Facet, TooSteepAFacetIsDark) {
+  const Corners t{{10.0, 10.0, 5.0}, {11.0, 10.0, 7.0}, {10.0, 11.0, 5.0}};
+  const Eigen::Vector3d normal = area_normal(t);
+  ASSERT_LT(normal.normalized().z(), std::cos(std::asin(1.0 / 1.49)));
+  EXPECT_EQ(project_facet(t, normal.normalized(), normal.z(), kOptics, 8000.0).flux, 0.0);
+}
+
+TEST(Facet, ProjectAdjointEqualsCentralDifferences) {
+  Random random(4);
+  for (int i = 0; i < 200; ++i) {
+    const Corners t = random_corners(random);
+    const Eigen::Vector3d n = area_normal(t).normalized();
+    const ImageTriangle bar{random.vector2(), random.vector2(), random.vector2(), 0.0};
+    Eigen::VectorXd x(12);
+    x << testing::pack(t), n;
+    const auto f = [&](const Eigen::VectorXd& at) {
+      const ImageTriangle image =
+          project_facet(testing::unpack_corners(at.head<9>()), at.tail<3>(), 1.0, kOptics, 1.0);
+      return bar.p0.dot(image.p0) + bar.p1.dot(image.p1) + bar.p2.dot(image.p2);
+    };
+    Corners grad;
+    const Eigen::Vector3d n_bar = project_facet_adjoint(t, n, kOptics, bar, grad);
+    Eigen::VectorXd computed(12);
+    computed << testing::pack(grad), n_bar;
+    EXPECT_LT(testing::gradient_error(computed, testing::numeric_gradient(f, x, 3e-4)), 1e-8);
+  }
+}
+
+}  // namespace
+}  // namespace lensforge

@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "design/optimize/grid_preconditioner.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Eigenvalues>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "design/random_input.h"
+
+namespace lensforge {
+namespace {
+
+using testing::Random;
+
+constexpr GridShape kShape{7, 6};
+constexpr int kVertices = 42;
+constexpr double kAspect = 0.87;
+
+/// x held on the left and right, y on the lower and upper border, as on a lens.
+Eigen::Matrix3Xd movable() {
+  Eigen::Matrix3Xd result = Eigen::Matrix3Xd::Ones(3, kVertices);
+  for (int v = 0; v < kVertices; ++v) {
+    if (v % 7 == 0 || v % 7 == 6) result(0, v) = 0.0;
+    if (v < 7 || v >= 35) result(1, v) = 0.0;
+  }
+  return result;
+}
+
+class GridPreconditionerTest : public ::testing::Test {
+ protected:
+  GridPreconditionerTest() : preconditioner_(kShape, kAspect, movable(), Executor::serial()) {
+    preconditioner_.xy = {0.7, 0.25, 1.0};
+    preconditioner_.z = {3.0, 0.05, 2.0};
+  }
+
+  Eigen::VectorXd apply(const Eigen::VectorXd& g) {
+    Eigen::VectorXd r;
+    preconditioner_.apply(g, r);
+    return r;
+  }
+  Eigen::VectorXd apply_root(const Eigen::VectorXd& g) {
+    Eigen::VectorXd r;
+    preconditioner_.apply_root(g, r);
+    return r;
+  }
+  Eigen::MatrixXd matrix() {
+    Eigen::MatrixXd p(3 * kVertices, 3 * kVertices);
+    for (Eigen::Index i = 0; i < p.cols(); ++i) {
+      p.col(i) = apply(Eigen::VectorXd::Unit(p.cols(), i));
+    }
+    return p;
+  }
+
+  GridPreconditioner preconditioner_;
+};
+
+Eigen::VectorXd random_vector(std::uint64_t seed) {
+  Random random(seed);
+  Eigen::VectorXd g(3 * kVertices);
+  for (double& x : g) x = random.between(-1.0, 1.0);
+  return g;
+}
+
+TEST_F(GridPreconditionerTest, IsSymmetric) {
+  const Eigen::MatrixXd p = matrix();
+  EXPECT_LT((p - p.transpose()).cwiseAbs().maxCoeff(), 1e-12 * p.cwiseAbs().maxCoeff());
+}
+
+TEST_F(GridPreconditionerTest, IsPositiveDefiniteOnMovableCoordinates) {
+  const Eigen::MatrixXd p = matrix();
+  const Eigen::VectorXd free = movable().reshaped();
+  std::vector<int> kept;
+  for (int i = 0; i < static_cast<int>(free.size()); ++i) {
+    if (free[i] != 0.0) kept.push_back(i);
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(p(kept, kept));
+  EXPECT_GT(solver.eigenvalues().minCoeff(), 1e-3);
+}
+
+TEST_F(GridPreconditionerTest, HeldCoordinatesStayZeroAndAreNotRead) {
+  const Eigen::VectorXd free = movable().reshaped();
+  Eigen::VectorXd g = random_vector(1);
+  const Eigen::VectorXd r = apply(g);
+  for (Eigen::Index i = 0; i < g.size(); ++i) {
+    if (free[i] == 0.0) {
+      EXPECT_EQ(r[i], 0.0);
+      g[i] = 1e3;
+    }
+  }
+  EXPECT_EQ(apply(g), r);
+  EXPECT_EQ((apply_root(g).array() * (1.0 - free.array())).abs().maxCoeff(), 0.0);
+}
+
+TEST_F(GridPreconditionerTest, RootTwiceIsTheWholeForHeights) {
+  Eigen::VectorXd g = random_vector(2);
+  // The root's square is the whole only where nothing is held in between, as for the heights.
+  for (Eigen::Index i = 0; i < g.size(); ++i) {
+    if (i % 3 != 2) g[i] = 0.0;
+  }
+  EXPECT_LT((apply_root(apply_root(g)) - apply(g)).norm(), 1e-12 * apply(g).norm());
+}
+
+TEST_F(GridPreconditionerTest, HeightsAreTheInverseBiharmonicOperator) {
+  // On a cosine the operator is a number: s / (μ + λ)².
+  const double lambda = 2.0 - 2.0 * std::cos(std::numbers::pi * 2.0 / 6.0) +
+                        (2.0 - 2.0 * std::cos(std::numbers::pi / 5.0)) / (kAspect * kAspect);
+  // The operator is symmetric in plain sums, its cosines carry the roots of the end weights.
+  Eigen::VectorXd g = Eigen::VectorXd::Zero(3 * kVertices);
+  for (int v = 0; v < kVertices; ++v) {
+    const int c = v % 7;
+    const int r = v / 7;
+    const double ends = (c == 0 || c == 6 ? 0.5 : 1.0) * (r == 0 || r == 5 ? 0.5 : 1.0);
+    g[3 * v + 2] = std::sqrt(ends) * std::cos(std::numbers::pi * 2.0 * c / 6.0) *
+                   std::cos(std::numbers::pi * r / 5.0);
+  }
+  const double expected = 3.0 / std::pow(0.05 + lambda, 2);
+  EXPECT_LT((apply(g) - expected * g).norm(), 1e-13);
+}
+
+TEST_F(GridPreconditionerTest, CoordinatesDoNotMix) {
+  for (int k = 0; k < 3; ++k) {
+    Eigen::VectorXd g = Eigen::VectorXd::Zero(3 * kVertices);
+    g[3 * 17 + k] = 1.0;
+    const Eigen::VectorXd r = apply(g);
+    for (Eigen::Index i = 0; i < r.size(); ++i) {
+      EXPECT_EQ(i % 3 == k || r[i] == 0.0, true) << i;
+    }
+    EXPECT_GT(r[3 * 17 + k], 0.0);
+  }
+}
+
+TEST_F(GridPreconditionerTest, ThreadCountDoesNotChangeABit) {
+  GridPreconditioner parallel(kShape, kAspect, movable(), Executor::cpu(2));
+  parallel.xy = preconditioner_.xy;
+  parallel.z = preconditioner_.z;
+  Eigen::VectorXd r;
+  parallel.apply(random_vector(3), r);
+  EXPECT_EQ(r, apply(random_vector(3)));
+}
+
+}  // namespace
+}  // namespace lensforge

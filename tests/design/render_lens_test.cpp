@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "design/render_lens.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "core/metrics.h"
+#include "design/ray_tracer.h"
+#include "design/test_setups.h"
+
+namespace lensforge {
+namespace {
+
+using testing::height_field;
+using testing::setup_of;
+
+constexpr SurfaceModel kModels[] = {SurfaceModel::kFacet, SurfaceModel::kSmooth};
+const Eigen::Vector2d kSize(20.0, 16.0);
+
+TEST(RenderLens, APlaneGivesAPictureOfExactlyOne) {
+  const SurfaceMesh mesh = make_grid_mesh(kSize, {51, 47}, 5.0);
+  for (const SurfaceModel model : kModels) {
+    for (const Eigen::Vector2i& pixels : {Eigen::Vector2i(40, 32), Eigen::Vector2i(23, 19)}) {
+      const RenderResult result =
+          render_surface(mesh, setup_of(kSize, pixels, 150.0), model, Executor::cpu(2));
+      EXPECT_NEAR(result.flux_inside, 1.0, 1e-12);
+      for (const float value : result.image.values()) ASSERT_EQ(value, 1.0F);
+    }
+  }
+}
+
+TEST(RenderLens, APrismMovesTheWholePicture) {
+  // Tilted along x only: the image keeps its height and is as wide as the projection of its beam.
+  const double tilt = 0.15;
+  const SurfaceMesh mesh =
+      height_field(kSize, {41, 37}, [&](double x, double) { return 5.0 + std::tan(tilt) * x; });
+  OpticalSetup setup = setup_of(kSize, {40, 32}, 150.0);
+  const double slope = std::tan(testing::refracted_angle(tilt, setup.ior) - tilt);
+  const double left = (150.0 - 5.0) * slope;
+  const double width = kSize.x() * (1.0 - std::tan(tilt) * slope);
+  setup.image_origin = {left, 0.0};
+  setup.image_size = {width, kSize.y()};
+  for (const SurfaceModel model : kModels) {
+    const RenderResult result = render_surface(mesh, setup, model, Executor::serial());
+    EXPECT_NEAR(result.flux_inside, 1.0, 1e-10);
+    for (const float value : result.image.values()) ASSERT_NEAR(value, 1.0, 1e-6);
+    OpticalSetup beside = setup;
+    beside.image_origin.x() += 0.5 * width;
+    EXPECT_NEAR(render_surface(mesh, beside, model, Executor::serial()).flux_inside, 0.5, 1e-10);
+  }
+}
+
+TEST(RenderLens, AThinParaboloidScalesItsImage) {
+  const double radius = 2000.0;
+  const Eigen::Vector2d centre = 0.5 * kSize;
+  for (const double sign : {-1.0, 1.0}) {
+    const SurfaceMesh mesh = height_field(kSize, {101, 95}, [&](double x, double y) {
+      return 5.0 + sign * (Eigen::Vector2d(x, y) - centre).squaredNorm() / (2.0 * radius);
+    });
+    OpticalSetup setup = setup_of(kSize, {16, 16}, 505.0);
+    const double scale = 1.0 + sign * 500.0 * 0.49 / radius;
+    // Half of the image's extent: all inside, so the brightness is that of the middle.
+    setup.image_size = 0.5 * scale * kSize;
+    setup.image_origin = centre - 0.5 * setup.image_size;
+    EXPECT_NEAR(render_surface(mesh, setup, SurfaceModel::kSmooth, Executor::serial()).flux_inside,
+                0.25, 2e-5);
+    // Facets do not stretch: seen at the scale of a facet their light is uneven.
+    EXPECT_NEAR(render_surface(mesh, setup, SurfaceModel::kFacet, Executor::serial()).flux_inside,
+                0.25, 2e-3);
+  }
+}
+
+/// A mesh of one small triangle near the lens's corner of least x and y.
+SurfaceMesh triangle_near_origin() {
+  SurfaceMesh mesh;
+  mesh.vertices.resize(3, 3);
+  mesh.vertices << 0.2, 0.6, 0.2, 1.2, 1.2, 1.8, 5.0, 5.0, 5.0;
+  mesh.triangles.resize(3, 1);
+  mesh.triangles << 0, 1, 2;
+  return mesh;
+}
+
+TEST(RenderLens, FrontViewShowsTheLensCornerOfSmallXAndYAtTheLowerRight) {
+  const OpticalSetup setup = setup_of(kSize, {20, 8}, 150.0);
+  const RenderResult result =
+      render_surface(triangle_near_origin(), setup, SurfaceModel::kFacet, Executor::serial());
+  EXPECT_NEAR(result.flux_inside, 0.12 / 320.0, 1e-12);
+  EXPECT_NEAR(result.image.at(19, 7), 160.0 * 0.12 / 320.0, 1e-7);
+}
+
+TEST(RenderLens, RearViewShowsTheLensCornerOfSmallXAndYAtTheLowerLeft) {
+  OpticalSetup setup = setup_of(kSize, {20, 8}, 150.0);
+  setup.view = ViewSide::kRear;
+  const RenderResult result =
+      render_surface(triangle_near_origin(), setup, SurfaceModel::kFacet, Executor::serial());
+  EXPECT_NEAR(result.image.at(0, 7), 160.0 * 0.12 / 320.0, 1e-7);
+}
+
+class RenderLensModels : public ::testing::TestWithParam<SurfaceModel> {};
+
+TEST_P(RenderLensModels, AgreesWithAForwardRayTraceWithinItsErrorBars) {
+  const SurfaceMesh mesh = height_field(kSize, {23, 21}, testing::bumps);
+  const OpticalSetup setup = setup_of(kSize, {16, 16}, 150.0);
+  const RenderResult rendered = render_surface(mesh, setup, GetParam(), Executor::cpu(2));
+  constexpr std::int64_t kRays = 4'000'000;
+  const std::vector<std::int64_t> hits =
+      testing::RayTracer(mesh, setup, GetParam()).trace(kRays, 2026);
+  double chi_square = 0.0;
+  double worst = 0.0;
+  for (std::size_t i = 0; i < hits.size(); ++i) {
+    const double share = static_cast<double>(rendered.image.values()[i]) / 256.0;
+    const double deviation = std::sqrt(share * (1.0 - share) * kRays);
+    ASSERT_GT(share * kRays, 100.0);
+    const double z = (static_cast<double>(hits[i]) - share * kRays) / deviation;
+    chi_square += z * z;
+    worst = std::max(worst, std::fabs(z));
+  }
+  RecordProperty("chi_square", std::to_string(chi_square));
+  RecordProperty("worst_z", std::to_string(worst));
+  EXPECT_LT(worst, 5.0);
+  // 256 degrees of freedom: mean 256, standard deviation 22.6.
+  EXPECT_NEAR(chi_square, 256.0, 5.0 * 22.6);
+}
+
+TEST_P(RenderLensModels, TheBumpsOfTheRayTraceMatter) {
+  const OpticalSetup setup = setup_of(kSize, {16, 16}, 150.0);
+  const SurfaceMesh mesh = height_field(kSize, {23, 21}, testing::bumps);
+  const Image image = render_surface(mesh, setup, GetParam(), Executor::serial()).image;
+  const auto [low, high] = std::minmax_element(image.values().begin(), image.values().end());
+  EXPECT_GT(*high, 2.0F * *low);
+}
+
+TEST_P(RenderLensModels, ThreadCountDoesNotChangeABit) {
+  const OpticalSetup setup = setup_of(kSize, {40, 32}, 150.0);
+  const SurfaceMesh mesh = height_field(kSize, {60, 55}, testing::bumps);
+  const RenderResult serial = render_surface(mesh, setup, GetParam(), Executor::serial());
+  for (const int threads : {1, 2}) {
+    const RenderResult result = render_surface(mesh, setup, GetParam(), Executor::cpu(threads));
+    EXPECT_EQ(serial.image, result.image);
+    EXPECT_EQ(serial.flux_inside, result.flux_inside);
+  }
+}
+
+TEST_P(RenderLensModels, EvaluateScalesTheLensToTheTargetsTotal) {
+  const OpticalSetup setup = setup_of(kSize, {20, 16}, 150.0);
+  const SurfaceMesh mesh = height_field(kSize, {26, 24}, testing::bumps);
+  const Image target = testing::random_picture(20, 16, 0.1, 3);
+  Image shown;
+  const ImageMetrics metrics =
+      evaluate(mesh, setup, GetParam(), target, &shown, Executor::serial());
+  const RenderResult plain = render_surface(mesh, setup, GetParam(), Executor::serial());
+  EXPECT_EQ(metrics.flux_inside, plain.flux_inside);
+  EXPECT_NEAR(shown.total(), plain.flux_inside * target.total(), 1e-5 * target.total());
+  const ImageMetrics expected = compare(shown, target);
+  EXPECT_EQ(metrics.mae, expected.mae);
+  EXPECT_EQ(metrics.psnr, expected.psnr);
+  EXPECT_EQ(metrics.ssim, expected.ssim);
+  EXPECT_EQ(metrics.mae_linear, expected.mae_linear);
+  EXPECT_EQ(evaluate(mesh, setup, GetParam(), target, nullptr, Executor::serial()).mae,
+            metrics.mae);
+}
+
+INSTANTIATE_TEST_SUITE_P(RenderLens, RenderLensModels, ::testing::ValuesIn(kModels),
+                         testing::model_name);
+
+}  // namespace
+}  // namespace lensforge
