@@ -27,6 +27,9 @@ class RunControl {
   /// True once the caller wants the work to end; to be asked at least once a second.
   [[nodiscard]] bool stop_requested() const { return stop_.stop_requested(); }
 
+  /// The token itself, to hand on with another sink.
+  [[nodiscard]] std::stop_token stop_token() const { return stop_; }
+
   void report(const Progress& progress) const {
     if (sink_) sink_(progress);
   }

@@ -131,8 +131,8 @@ class Schedule {
       state_.mesh = regrid(state_.mesh, setup.lens_size, level.grid);
     }
     if (state_.level == 0 && state_.round == 0) {
-      report("transport", 0);
-      start_from_transport(target, setup, state_.mesh);
+      stopped_ = !start(target, setup);
+      if (stopped_) return;
     }
     ObjectiveOptions objective;
     objective.weights = options_.weights;
@@ -146,6 +146,13 @@ class Schedule {
     state_.round = 0;
     ++state_.level;
     save();
+  }
+
+  /// Starts the mesh from the transport map; false if asked to stop.
+  bool start(const Image& target, const OpticalSetup& setup) {
+    const auto pass_on = [this](const Progress& p) { report(p.stage, 0); };
+    return start_from_transport(target, setup, RunControl(control_.stop_token(), pass_on),
+                                state_.mesh);
   }
 
   /// Draws the mesh's x and y back towards the even grid until no barrier refuses it.

@@ -13,9 +13,11 @@ namespace {
 /// Longer side of the coarsest picture (Sun et al., Appendix E).
 constexpr double kCoarsestPixels = 32.0;
 
-/// α_max and α_min of Sun et al., Appendix E.
+/// α_max and α_min of Sun et al., Appendix E, which leaves them open. Measured on the 256² portrait
+/// fixture, MAE of the facet and of the smooth model: 0.0189 and 0.0195 with 1 at the end (the edge
+/// term outweighs the picture), 0.0098 and 0.0131 with 3, 0.0152 and 0.0266 with 10 (ripples).
 constexpr double kNuStart = 10.0;
-constexpr double kNuEnd = 1.0;
+constexpr double kNuEnd = 3.0;
 
 int rounded(double value, int least) {
   return std::max(least, static_cast<int>(std::lround(value)));

@@ -123,18 +123,22 @@ class Iteration {
 
 }  // namespace
 
-MongeAmpereResult solve_monge_ampere(const Image& picture, const MongeAmpereOptions& options) {
+MongeAmpereResult solve_monge_ampere(const Image& picture, const MongeAmpereOptions& options,
+                                     const RunControl& control) {
   Iteration iteration(picture, options.floor);
   double change = 0.0;
   int done = 0;
   bool converged = false;
-  while (done < options.max_iterations && !converged) {
+  while (done < options.max_iterations && !converged && !control.stop_requested()) {
     change = iteration.step();
     ++done;
     converged = change <= options.tolerance;
+    control.report(
+        {"transport", static_cast<double>(done), static_cast<double>(options.max_iterations), ""});
   }
   MongeAmpereResult result = iteration.result();
   result.converged = converged;
+  result.stopped = control.stop_requested();
   result.iterations = done;
   result.last_change = change;
   return result;

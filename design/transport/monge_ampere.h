@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 
 #include "core/image.h"
+#include "core/run_control.h"
 
 namespace lensforge {
 
@@ -18,6 +19,7 @@ struct MongeAmpereOptions {
 
 struct MongeAmpereResult {
   bool converged = false;
+  bool stopped = false;  ///< The caller asked for an end; the map is not finished.
   int iterations = 0;
   double last_change = 0.0;  ///< Largest movement in the last iteration, pixels.
   int columns = 0;           ///< Nodes: one more than pixels along each side.
@@ -30,6 +32,7 @@ struct MongeAmpereResult {
 /// the iteration Δu ← √(u_xx² + u_yy² + 2 u_xy² + 2/ρ(∇u)) (Benamou, Froese & Oberman 2010, their
 /// second method), every Poisson problem exactly under the cosine transform.
 /// @param picture  linear light, not all black; at least 2 × 2 pixels.
-MongeAmpereResult solve_monge_ampere(const Image& picture, const MongeAmpereOptions& options);
+MongeAmpereResult solve_monge_ampere(const Image& picture, const MongeAmpereOptions& options,
+                                     const RunControl& control);
 
 }  // namespace lensforge

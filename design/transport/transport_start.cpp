@@ -92,8 +92,10 @@ class HeightGrid {
 
 }  // namespace
 
-void start_from_transport(const Image& picture, const OpticalSetup& setup, SurfaceMesh& mesh) {
-  const MongeAmpereResult map = solve_monge_ampere(picture, MongeAmpereOptions{});
+bool start_from_transport(const Image& picture, const OpticalSetup& setup,
+                          const RunControl& control, SurfaceMesh& mesh) {
+  const MongeAmpereResult map = solve_monge_ampere(picture, MongeAmpereOptions{}, control);
+  if (map.stopped) return false;
   const ImagePlane plane(setup);
   const double distance = setup.focal_length - mesh.vertices.row(2).mean();
   const Eigen::Vector2d mm_per_pixel = plane.pixels_per_mm().cwiseInverse();
@@ -108,6 +110,7 @@ void start_from_transport(const Image& picture, const OpticalSetup& setup, Surfa
     const Eigen::Vector2d pixel = plane.to_pixels(mesh.vertices.col(v).head<2>());
     mesh.vertices(2, v) += heights.at(pixel.x(), pixel.y());
   }
+  return true;
 }
 
 }  // namespace lensforge

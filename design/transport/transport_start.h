@@ -3,6 +3,7 @@
 
 #include "core/image.h"
 #include "core/optical_setup.h"
+#include "core/run_control.h"
 #include "core/surface_mesh.h"
 
 namespace lensforge {
@@ -14,6 +15,8 @@ namespace lensforge {
 /// The map is continuous (solve_monge_ampere()); refraction is inverted for the slope that each ray
 /// needs and the slopes are integrated in the least-squares sense, a Poisson problem. x and y stay.
 /// @pre the lens's outline equals the image rectangle; picture has setup.pixels.
-void start_from_transport(const Image& picture, const OpticalSetup& setup, SurfaceMesh& mesh);
+/// @return false if the caller asked to stop; the mesh is then unchanged.
+bool start_from_transport(const Image& picture, const OpticalSetup& setup,
+                          const RunControl& control, SurfaceMesh& mesh);
 
 }  // namespace lensforge
