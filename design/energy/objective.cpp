@@ -278,23 +278,25 @@ DesignObjective::Smoothness DesignObjective::smoothness_adjoint(std::int64_t fac
                                                                 double doubled_area,
                                                                 FaceBar& bar) const {
   const double weight = options_.weights.smooth;
-  const WeingartenMap& map = maps_[at(face)];
-  const FaceFrame& frame = frames_[at(face)];
-  WeingartenMap map_bar;  // Vanishes in sum, since the map is the minimiser.
-  FaceFrame other;
+  const CurvedFace here{frames_[at(face)], maps_[at(face)]};
+  CurvedFace here_bar;   // Its map part vanishes in sum, since the map is the minimiser.
+  CurvedFace there_bar;  // The neighbours gather their own part themselves.
   double area_bar = 0.0;
   Smoothness values;
-  values.face = mean_curvature_term(map, 0.5 * doubled_area, weight, map_bar, area_bar);
-  bar.area_normal += 0.5 * area_bar * frame.n;
+  values.face = mean_curvature_term(here.map, 0.5 * doubled_area, weight, here_bar.map, area_bar);
+  bar.area_normal += 0.5 * area_bar * here.frame.n;
   for (int k = 0; k < 3; ++k) {
     const int j = topology_.neighbours(k, face);
     if (j < 0) continue;
-    const FaceFrame& neighbour = frames_[at(j)];
+    const CurvedFace there{frames_[at(j)], maps_[at(j)]};
     const double w = edge_weights_(k, face);
     const double scaled = weight * options_.weights.edge * w;
-    values.edge += w * mismatch_adjoint(frame, neighbour, map, scaled, bar.frame, other, map_bar);
-    mismatch_adjoint(neighbour, frame, maps_[at(j)], scaled, other, bar.frame, map_bar);
+    values.edge += w * mismatch_adjoint(here, there.frame, scaled, here_bar, there_bar.frame);
+    mismatch_adjoint(there, here.frame, scaled, there_bar, here_bar.frame);
   }
+  bar.frame.n += here_bar.frame.n;
+  bar.frame.e1 += here_bar.frame.e1;
+  bar.frame.c += here_bar.frame.c;
   return values;
 }
 

@@ -25,6 +25,12 @@ struct WeingartenMap {
   [[nodiscard]] LF_HD double mean_curvature() const { return 0.5 * (a + b); }
 };
 
+/// A face's frame with its map, or the derivatives by them.
+struct CurvedFace {
+  FaceFrame frame;
+  WeingartenMap map;
+};
+
 /// Local coordinates of a neighbour (Sun et al., Eqs. 11 and 12).
 struct NeighbourOffset {
   Eigen::Vector2d d;  ///< mm
@@ -46,11 +52,14 @@ struct NeighbourOffset {
   }
 };
 
-/// Adjoint of (frame i, frame j, M_i) ↦ δ(i, j): adds weight × the derivatives by both frames and
-/// by M_i, and returns δ.
-LF_HD inline double mismatch_adjoint(const FaceFrame& i, const FaceFrame& j, const WeingartenMap& m,
-                                     double weight, FaceFrame& i_bar, FaceFrame& j_bar,
-                                     WeingartenMap& m_bar) {
+/// Adjoint of (frame and map of i, frame j) ↦ δ(i, j): adds weight × the derivatives by all of
+/// them, and returns δ.
+LF_HD inline double mismatch_adjoint(const CurvedFace& face, const FaceFrame& j, double weight,
+                                     CurvedFace& face_bar, FaceFrame& j_bar) {
+  const FaceFrame& i = face.frame;
+  const WeingartenMap& m = face.map;
+  FaceFrame& i_bar = face_bar.frame;
+  WeingartenMap& m_bar = face_bar.map;
   const NeighbourOffset offset(i, j);
   const double inverse = 1.0 / offset.d.squaredNorm();
   const Eigen::Vector2d r = offset.residual(m);

@@ -138,9 +138,9 @@ struct DepositEdge {
 /// whose peak is where the third corner projects to.
 struct Needle {
   Eigen::Vector2d a, b;
-  double peak;  ///< Parameter of the tent's peak on a → b.
+  double peak = 0.0;  ///< Parameter of the tent's peak on a → b.
 
-  LF_HD explicit Needle(const ImageTriangle& t) : a(t.p0), b(t.p1), peak(0.0) {
+  LF_HD explicit Needle(const ImageTriangle& t) : a(t.p0), b(t.p1) {
     Eigen::Vector2d third = t.p2;
     if ((t.p2 - t.p1).squaredNorm() > (b - a).squaredNorm()) {
       a = t.p1;

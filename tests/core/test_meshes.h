@@ -11,7 +11,9 @@ inline SurfaceMesh grid_mesh(int columns, int rows, double step = 1.0, double he
   mesh.grid = {columns, rows};
   mesh.vertices.resize(3, Eigen::Index{columns} * rows);
   for (int v = 0; v < columns * rows; ++v) {
-    mesh.vertices.col(v) << step * (v % columns), step * (v / columns), height;
+    const int column = v % columns;
+    const int row = v / columns;
+    mesh.vertices.col(v) << step * column, step * row, height;
   }
   mesh.triangles.resize(3, Eigen::Index{2} * (columns - 1) * (rows - 1));
   Eigen::Index t = 0;
