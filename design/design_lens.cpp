@@ -245,6 +245,10 @@ class Schedule {
     lens.smooth_metrics = evaluate(lens.surface, setup_, SurfaceModel::kSmooth, target_,
                                    facet ? nullptr : &lens.render, executor_);
     result.convergence = std::move(state_.convergence);
+    // Rounds that ended early have left a rest.
+    if (result.status == Status::kDone) {
+      control_.report({"design", work_total(), work_total(), "done"});
+    }
     return result;
   }
 

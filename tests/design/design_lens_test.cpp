@@ -1,0 +1,373 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "design/design_lens.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <sstream>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "core/error.h"
+#include "core/temp_folder.h"
+#include "design/render_lens.h"
+#include "design/test_setups.h"
+
+namespace lensforge {
+namespace {
+
+using ::testing::HasSubstr;
+using testing::message_of;
+using testing::TempFolder;
+using Status = DesignResult::Status;
+
+/// Small enough for a fraction of a second.
+DesignOptions small_options() {
+  DesignOptions options;
+  options.pixels = 28;
+  options.rounds = 3;
+  options.iterations = 5;
+  return options;
+}
+
+DesignOptions two_level_options() {
+  DesignOptions options = small_options();
+  options.pixels = 48;
+  options.levels = 2;
+  options.rounds = 2;
+  options.iterations = 3;
+  return options;
+}
+
+const Image& picture() {
+  static const Image image = testing::spot_picture(56, 40);
+  return image;
+}
+
+DesignResult design(const DesignOptions& options, const Executor& executor = Executor::serial(),
+                    const RunControl& control = {}) {
+  return design_lens(picture(), options, executor, control);
+}
+
+/// A design that is stopped when its iteration number `iterations` is reported; at 0 while it works
+/// on the transport map.
+DesignResult design_stopped_at(int iterations, const DesignOptions& options) {
+  std::stop_source stop;
+  int seen = 0;
+  const RunControl control(stop.get_token(), [&](const Progress& p) {
+    if (p.detail.starts_with("MAE")) ++seen;
+    if (seen == iterations) stop.request_stop();
+  });
+  return design(options, Executor::serial(), control);
+}
+
+TEST(DesignLens, ThreadCountDoesNotChangeABit) {
+  const DesignResult serial = design(two_level_options());
+  for (const int threads : {1, 2}) {
+    const DesignResult parallel = design(two_level_options(), Executor::cpu(threads));
+    EXPECT_EQ(parallel.lens.surface.vertices, serial.lens.surface.vertices);
+    EXPECT_EQ(parallel.lens.render, serial.lens.render);
+    ASSERT_EQ(parallel.convergence.size(), serial.convergence.size());
+    EXPECT_EQ(parallel.convergence.back().energy.total, serial.convergence.back().energy.total);
+  }
+}
+
+/// Rows but for the time they took.
+std::string timeless_csv(std::vector<ConvergenceRow> rows) {
+  for (ConvergenceRow& row : rows) row.seconds = 0.0;
+  return convergence_csv(rows);
+}
+
+class DesignLensInterrupted : public ::testing::TestWithParam<int> {};
+
+TEST_P(DesignLensInterrupted, ResumesToTheSameBits) {
+  const TempFolder folder;
+  DesignOptions options = two_level_options();
+  const DesignResult whole = design(options);
+  ASSERT_EQ(whole.status, Status::kDone);
+  options.checkpoint = folder / "checkpoint";
+  const DesignResult part = design_stopped_at(GetParam(), options);
+  EXPECT_EQ(part.status, Status::kInterrupted);
+  EXPECT_EQ(static_cast<int>(part.convergence.size()), GetParam());
+  EXPECT_TRUE(part.lens.surface.vertices.allFinite());
+  options.resume = true;
+  const DesignResult resumed = design(options);
+  EXPECT_EQ(resumed.status, Status::kDone);
+  EXPECT_EQ(resumed.lens.surface.vertices, whole.lens.surface.vertices);
+  EXPECT_EQ(timeless_csv(resumed.convergence), timeless_csv(whole.convergence));
+  EXPECT_EQ(resumed.lens.render, whole.lens.render);
+}
+
+// Two levels of two rounds of three iterations each.
+INSTANTIATE_TEST_SUITE_P(AtIteration, DesignLensInterrupted,
+                         ::testing::Values(0, 1, 3, 4, 6, 7, 11, 12),
+                         ::testing::PrintToStringParamName());
+
+TEST(DesignLens, ResumesAgainAndAgain) {
+  const TempFolder folder;
+  DesignOptions options = two_level_options();
+  const DesignResult whole = design(options);
+  options.checkpoint = folder / "checkpoint";
+  DesignResult part = design_stopped_at(2, options);
+  options.resume = true;
+  // The fourth iteration belongs to the next round: each resumption finishes one.
+  for (int i = 0; i < 10 && part.status == Status::kInterrupted; ++i) {
+    part = design_stopped_at(4, options);
+  }
+  EXPECT_EQ(part.status, Status::kDone);
+  EXPECT_EQ(part.lens.surface.vertices, whole.lens.surface.vertices);
+}
+
+TEST(DesignLens, ResumingAFinishedDesignGivesItBack) {
+  const TempFolder folder;
+  DesignOptions options = small_options();
+  options.checkpoint = folder / "checkpoint";
+  const DesignResult whole = design(options);
+  options.resume = true;
+  const DesignResult again = design(options);
+  EXPECT_EQ(again.status, Status::kDone);
+  EXPECT_EQ(again.lens.surface.vertices, whole.lens.surface.vertices);
+}
+
+TEST(DesignLens, ResumeRefusesAnotherPictureOtherOptionsAndNoCheckpoint) {
+  const TempFolder folder;
+  DesignOptions options = small_options();
+  options.checkpoint = folder / "checkpoint";
+  options.resume = true;
+  EXPECT_THAT(message_of<InputError>([&] { design(options); }), HasSubstr("checkpoint"));
+  options.resume = false;
+  design(options);
+  options.resume = true;
+  const Image other = testing::random_picture(56, 40, 0.1, 1);
+  EXPECT_THAT(message_of<InputError>(
+                  [&] { design_lens(other, options, Executor::serial(), RunControl()); }),
+              HasSubstr("another picture or other options"));
+  options.ior = 1.5;
+  EXPECT_THAT(message_of<InputError>([&] { design(options); }),
+              HasSubstr("another picture or other options"));
+}
+
+TEST(DesignLens, ACheckpointThatCannotBeWrittenIsARunError) {
+  const TempFolder folder;
+  DesignOptions options = small_options();
+  options.checkpoint = folder / "no" / "such" / "folder";
+  message_of<RunError>([&] { design(options); });
+}
+
+void expect_reports_reach_their_total(const Image& image, const DesignOptions& options) {
+  std::vector<Progress> reports;
+  const RunControl control({}, [&](const Progress& p) { reports.push_back(p); });
+  ASSERT_EQ(design_lens(image, options, Executor::serial(), control).status, Status::kDone);
+  ASSERT_FALSE(reports.empty());
+  EXPECT_EQ(reports.front().done, 0.0);
+  for (std::size_t i = 0; i < reports.size(); ++i) {
+    EXPECT_EQ(reports[i].total, reports.front().total);
+    EXPECT_GE(reports[i].done, i > 0 ? reports[i - 1].done : 0.0) << i;
+    EXPECT_FALSE(reports[i].stage.empty());
+  }
+  EXPECT_DOUBLE_EQ(reports.back().done, reports.back().total);
+}
+
+TEST(DesignLens, ProgressRunsFromZeroToItsTotal) {
+  expect_reports_reach_their_total(picture(), small_options());
+  expect_reports_reach_their_total(picture(), two_level_options());
+}
+
+TEST(DesignLens, ProgressReachesItsTotalThoughRoundsHaveNothingToDo) {
+  DesignOptions options = small_options();
+  options.weights = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
+  ASSERT_TRUE(design(options).convergence.empty());
+  expect_reports_reach_their_total(picture(), options);
+}
+
+TEST(DesignLens, ConvergenceRowsAreWellFormed) {
+  const DesignResult result = design(two_level_options());
+  ASSERT_FALSE(result.convergence.empty());
+  const ConvergenceRow* before = nullptr;
+  for (const ConvergenceRow& row : result.convergence) {
+    EXPECT_FALSE(row.stage.empty());
+    EXPECT_TRUE(std::isfinite(row.energy.total));
+    EXPECT_TRUE(row.mae > 0.0 && row.mae < 1.0);
+    if (before != nullptr && row.level == before->level && row.round == before->round) {
+      EXPECT_EQ(row.iteration, before->iteration + 1);
+      EXPECT_LE(row.energy.total, before->energy.total);
+    } else {
+      EXPECT_EQ(row.iteration, 1);
+    }
+    EXPECT_GE(row.seconds, before == nullptr ? 0.0 : before->seconds);
+    before = &row;
+  }
+  EXPECT_EQ(before->level, 1);
+}
+
+TEST(DesignLens, ConvergenceCsvHasALineForEveryRow) {
+  ConvergenceRow row;
+  row.stage = "render";
+  row.iteration = 7;
+  row.energy.image = 0.25;
+  row.mae = 0.125;
+  std::istringstream csv(convergence_csv({row, row}));
+  std::string header;
+  std::string line;
+  std::getline(csv, header);
+  EXPECT_EQ(header,
+            "stage,level,round,iteration,image,gradient,boundary,barrier,face,edge,laplacian,total,"
+            "mae,seconds");
+  int lines = 0;
+  while (std::getline(csv, line)) {
+    EXPECT_EQ(line, "render,0,0,7,0.25,0,0,0,0,0,0,0,0.125,0");
+    ++lines;
+  }
+  EXPECT_EQ(lines, 2);
+}
+
+class DesignLensModels : public ::testing::TestWithParam<SurfaceModel> {};
+
+INSTANTIATE_TEST_SUITE_P(DesignLens, DesignLensModels,
+                         ::testing::Values(SurfaceModel::kFacet, SurfaceModel::kSmooth),
+                         testing::model_name);
+
+TEST_P(DesignLensModels, ComesFarCloserToThePictureThanAFlatLens) {
+  DesignOptions options = small_options();
+  options.model = GetParam();
+  options.rounds = 2;
+  options.iterations = 30;
+  const DesignResult result = design(options);
+  const Lens& lens = result.lens;
+  const SurfaceMesh flat = make_grid_mesh(lens.setup.lens_size, lens.surface.grid, 5.0);
+  const double before =
+      evaluate(flat, lens.setup, GetParam(), lens.target, nullptr, Executor::serial()).mae;
+  const double after =
+      GetParam() == SurfaceModel::kFacet ? lens.facet_metrics.mae : lens.smooth_metrics.mae;
+  RecordProperty("mae_flat", std::to_string(before));
+  RecordProperty("mae_designed", std::to_string(after));
+  EXPECT_LT(after, 0.25 * before);
+}
+
+TEST_P(DesignLensModels, LensAgreesWithItsOwnRendering) {
+  DesignOptions options = small_options();
+  options.model = GetParam();
+  options.view = ViewSide::kRear;
+  const Lens lens = design(options).lens;
+  EXPECT_EQ(lens.model, GetParam());
+  EXPECT_EQ(lens.setup.view, ViewSide::kRear);
+  EXPECT_EQ(lens.setup.pixels, Eigen::Vector2i(28, 20));
+  EXPECT_EQ(lens.target.columns(), 28);
+  EXPECT_NEAR(lens.setup.lens_size.y(), 100.0 * 20.0 / 28.0, 1e-12);
+  EXPECT_EQ(lens.surface.vertices.row(2).minCoeff(), options.thickness);
+  for (const SurfaceModel model : {SurfaceModel::kFacet, SurfaceModel::kSmooth}) {
+    Image render;
+    const ImageMetrics expected =
+        evaluate(lens.surface, lens.setup, model, lens.target, &render, Executor::serial());
+    const bool facet = model == SurfaceModel::kFacet;
+    EXPECT_EQ((facet ? lens.facet_metrics : lens.smooth_metrics).mae, expected.mae);
+    EXPECT_EQ(lens.render == render, model == GetParam());
+  }
+}
+
+TEST(DesignLens, LastRowsErrorIsThatOfTheLens) {
+  const DesignResult result = design(small_options());
+  EXPECT_NEAR(result.convergence.back().mae, result.lens.facet_metrics.mae,
+              0.02 * result.lens.facet_metrics.mae);
+}
+
+struct BadOption {
+  std::string name;
+  std::string value;
+  std::function<void(DesignOptions&)> set;
+
+  friend std::ostream& operator<<(std::ostream& out, const BadOption& o) {
+    return out << o.name << ' ' << o.value;
+  }
+};
+
+std::vector<BadOption> bad_options() {
+  using O = DesignOptions;
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const double inf = std::numeric_limits<double>::infinity();
+  return {{"--width", "0", [](O& o) { o.width = 0.0; }},
+          {"--width", "-3", [](O& o) { o.width = -3.0; }},
+          {"--width", "nan", [=](O& o) { o.width = nan; }},
+          {"--width", "inf", [=](O& o) { o.width = inf; }},
+          {"--focal", "0", [](O& o) { o.focal_length = 0.0; }},
+          {"--focal", "5", [](O& o) { o.focal_length = 5.0; }},
+          {"--focal", "inf", [=](O& o) { o.focal_length = inf; }},
+          {"--ior", "1", [](O& o) { o.ior = 1.0; }},
+          {"--ior", "0.5", [](O& o) { o.ior = 0.5; }},
+          {"--ior", "nan", [=](O& o) { o.ior = nan; }},
+          {"--thickness", "0", [](O& o) { o.thickness = 0.0; }},
+          {"--pixels", "0", [](O& o) { o.pixels = 0; }},
+          {"--pixels", "57", [](O& o) { o.pixels = 57; }},
+          {"--pixels", "1000000", [](O& o) { o.pixels = 1000000; }},
+          {"--mesh-ratio", "0.2", [](O& o) { o.mesh_ratio = 0.2; }},
+          {"--mesh-ratio", "8.5", [](O& o) { o.mesh_ratio = 8.5; }},
+          {"--mesh-ratio", "nan", [=](O& o) { o.mesh_ratio = nan; }},
+          {"--levels", "0", [](O& o) { o.levels = 0; }},
+          {"--rounds", "0", [](O& o) { o.rounds = 0; }},
+          {"--iterations", "-1", [](O& o) { o.iterations = -1; }},
+          {"--weight-image", "-1", [](O& o) { o.weights.image = -1.0; }},
+          {"--weight-gradient", "nan", [=](O& o) { o.weights.gradient = nan; }},
+          {"--weight-boundary", "inf", [=](O& o) { o.weights.boundary = inf; }},
+          {"--weight-smooth", "-0.5", [](O& o) { o.weights.smooth = -0.5; }},
+          {"--weight-barrier", "-1", [](O& o) { o.weights.barrier = -1.0; }},
+          {"--weight-edge", "-1", [](O& o) { o.weights.edge = -1.0; }},
+          {"--weight-laplacian", "-1", [](O& o) { o.weights.laplacian = -1.0; }}};
+}
+
+TEST(DesignLens, BadOptionsAreRefusedByNameAndValue) {
+  for (const BadOption& bad : bad_options()) {
+    SCOPED_TRACE(bad);
+    DesignOptions options = small_options();
+    bad.set(options);
+    const std::string message = message_of<InputError>([&] { design(options); });
+    EXPECT_THAT(message, HasSubstr(bad.name));
+    // Large values may be written with an exponent.
+    if (bad.value != "1000000") {
+      EXPECT_THAT(message, HasSubstr(" " + bad.value));
+    }
+  }
+}
+
+TEST(DesignLens, AnAllBlackPictureIsRefused) {
+  EXPECT_THAT(message_of<InputError>([] {
+                design_lens(Image(40, 40), small_options(), Executor::serial(), RunControl());
+              }),
+              HasSubstr("black"));
+}
+
+TEST(DesignLens, APictureOfOnePixelIsRefused) {
+  DesignOptions options = small_options();
+  options.pixels = 1;
+  EXPECT_THAT(message_of<InputError>([&] {
+                design_lens(Image(1, 1, 1.0F), options, Executor::serial(), RunControl());
+              }),
+              HasSubstr("1: must be at least 4 pixels"));
+}
+
+TEST(DesignLens, ABadOptionWritesNoCheckpoint) {
+  const TempFolder folder;
+  DesignOptions options = small_options();
+  options.checkpoint = folder / "checkpoint";
+  options.ior = 0.9;
+  message_of<InputError>([&] { design(options); });
+  EXPECT_EQ(folder.file_count(), 0U);
+}
+
+TEST(DesignLens, BlackRegionsAreNoObstacle) {
+  Image image = testing::spot_picture(28, 20);
+  for (int r = 0; r < 20; ++r) {
+    for (int c = 0; c < 11; ++c) image.at(c, r) = 0.0F;
+  }
+  const DesignResult result = design_lens(image, small_options(), Executor::serial(), RunControl());
+  EXPECT_EQ(result.status, Status::kDone);
+  EXPECT_TRUE(result.lens.surface.vertices.allFinite());
+  EXPECT_TRUE(std::isfinite(result.lens.facet_metrics.mae));
+}
+
+}  // namespace
+}  // namespace lensforge
