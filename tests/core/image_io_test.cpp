@@ -4,17 +4,15 @@
 #include <OpenImageIO/imageio.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 
-#include <chrono>
+#include <algorithm>
 #include <cmath>
-#include <functional>
-#include <limits>
-#include <random>
-#include <thread>
+#include <cstddef>
+#include <filesystem>
+#include <string>
+#include <utility>
+#include <vector>
 
-#include "core/error.h"
-#include "core/full_disk.h"
 #include "core/sample_files.h"
 #include "core/temp_folder.h"
 #include "core/test_images.h"
@@ -24,21 +22,15 @@ namespace lensforge {
 namespace {
 
 namespace fs = std::filesystem;
-using lensforge::testing::FullDisk;
-using lensforge::testing::message_of;
 using lensforge::testing::pixel_spec;
 using lensforge::testing::ramp;
-using lensforge::testing::read_bytes;
 using lensforge::testing::TempFolder;
 using lensforge::testing::view;
 using lensforge::testing::write_bytes;
 using lensforge::testing::write_raw;
 using OIIO::TypeDesc;
-using ::testing::AllOf;
 using ::testing::ElementsAre;
-using ::testing::HasSubstr;
 using ::testing::IsEmpty;
-using ::testing::StartsWith;
 
 constexpr const char* kLuminanceChange = "colour turned to luminance (Rec. 709)";
 constexpr const char* kAlphaChange = "transparency flattened onto black";
@@ -48,20 +40,6 @@ float light_of_pixel(const fs::path& path, const OIIO::ImageSpec& spec,
                      const std::vector<float>& stored) {
   write_raw(path, spec, stored);
   return read_image(path).image.at(0, 0);
-}
-
-std::string refusal(const fs::path& path) {
-  const std::string message = message_of<InputError>([&] { read_image(path); });
-  EXPECT_THAT(message, StartsWith(path.string() + ": "));
-  return message;
-}
-
-Image random_image(int columns, int rows) {
-  std::mt19937 random(7);
-  std::uniform_real_distribution<float> uniform(0.0F, 1.0F);
-  Image image(columns, rows);
-  for (float& value : image.values()) value = uniform(random);
-  return image;
 }
 
 // ---- depths, channels, formats
@@ -348,266 +326,6 @@ TEST(ImageIo, AnExrIsFittedToItsDisplayWindow) {
 TEST(ImageIo, AOnePixelPictureIsRead) {
   const TempFolder folder;
   EXPECT_EQ(light_of_pixel(folder / "1.png", pixel_spec(1, TypeDesc::UINT8), {1.0F}), 1.0F);
-}
-
-// ---- refusals
-
-TEST(ImageIo, RefusesAMissingFile) {
-  const TempFolder folder;
-  EXPECT_THAT(refusal(folder / "none.png"), HasSubstr("No such file or directory"));
-}
-
-TEST(ImageIo, RefusesAFolder) {
-  const TempFolder folder;
-  fs::create_directory(folder / "d.png");
-  EXPECT_THAT(refusal(folder / "d.png"), HasSubstr("is a folder"));
-}
-
-TEST(ImageIo, RefusesADevice) {
-  EXPECT_THAT(refusal("/dev/zero"), HasSubstr("is no regular file"));
-}
-
-TEST(ImageIo, RefusesAnEmptyFile) {
-  const TempFolder folder;
-  write_bytes(folder / "e.png", "");
-  EXPECT_THAT(refusal(folder / "e.png"), HasSubstr("is empty"));
-}
-
-TEST(ImageIo, RefusesWhatIsNoPictureUnderAnyName) {
-  const TempFolder folder;
-  for (const char* name : {"t.png", "t.jpg", "t.tif", "t.exr", "t.txt", "t"}) {
-    write_bytes(folder / name, "This is a letter and not a picture.\n");
-    EXPECT_THAT(refusal(folder / name), HasSubstr("is no picture that can be read")) << name;
-  }
-}
-
-/// Cuts a written file at many places, also just before its end, and expects a refusal that prints
-/// nothing.
-void expect_every_cut_is_refused(const std::string& name, OIIO::ImageSpec spec, std::size_t tail) {
-  const TempFolder folder;
-  const Image values = random_image(spec.width * spec.nchannels, spec.height);
-  const std::vector<float> pixels(values.values().begin(), values.values().end());
-  write_raw(folder / name, spec, pixels);
-  const std::string bytes = read_bytes(folder / name);
-  ASSERT_EQ(read_image(folder / name).image.columns(), spec.width);
-  ::testing::internal::CaptureStderr();
-  for (int part = 1; part <= 30; ++part) {
-    const std::size_t cut =
-        part < 30 ? bytes.size() * static_cast<std::size_t>(part) / 30 : bytes.size() - tail;
-    write_bytes(folder / name, std::string_view(bytes).substr(0, cut));
-    EXPECT_THROW(read_image(folder / name), InputError) << name << " cut to " << cut;
-  }
-  EXPECT_EQ(::testing::internal::GetCapturedStderr(), "") << name;
-  EXPECT_EQ(OIIO::geterror(), "");
-}
-
-TEST(ImageIo, RefusesATruncatedPng) {
-  expect_every_cut_is_refused("a.png", OIIO::ImageSpec(40, 30, 3, TypeDesc::UINT8), 1);
-  expect_every_cut_is_refused("b.png", OIIO::ImageSpec(40, 30, 2, TypeDesc::UINT16), 12);
-}
-
-TEST(ImageIo, RefusesATruncatedJpeg) {
-  expect_every_cut_is_refused("a.jpg", OIIO::ImageSpec(40, 30, 3, TypeDesc::UINT8), 1);
-  OIIO::ImageSpec progressive(40, 30, 3, TypeDesc::UINT8);
-  progressive.attribute("jpeg:progressive", 1);
-  expect_every_cut_is_refused("b.jpg", progressive, 2);
-}
-
-TEST(ImageIo, RefusesATruncatedTiff) {
-  for (const char* compression : {"none", "lzw", "zip"}) {
-    OIIO::ImageSpec spec(40, 30, 3, TypeDesc::UINT8);
-    spec.attribute("compression", compression);
-    expect_every_cut_is_refused("a.tif", spec, 40);
-  }
-}
-
-TEST(ImageIo, RefusesATruncatedExr) {
-  expect_every_cut_is_refused("a.exr", OIIO::ImageSpec(40, 30, 3, TypeDesc::HALF), 1);
-}
-
-TEST(ImageIo, RefusesAPngWithADamagedChunk) {
-  const TempFolder folder;
-  OIIO::ImageSpec spec(40, 30, 1, TypeDesc::UINT8);
-  write_raw(folder / "a.png", spec, ramp(spec));
-  std::string bytes = read_bytes(folder / "a.png");
-  bytes[bytes.size() / 2] = static_cast<char>(~bytes[bytes.size() / 2]);
-  write_bytes(folder / "a.png", bytes);
-  EXPECT_THAT(refusal(folder / "a.png"), HasSubstr("is corrupt"));
-}
-
-TEST(ImageIo, RefusesThirtyThousandPixelsASideFastAndWithoutTheirMemory) {
-  const TempFolder folder;
-  write_bytes(folder / "h.png", view(lensforge::testing::kHugePng));
-  // A progressive JPEG header: its decoder would allocate the whole picture on opening.
-  write_bytes(folder / "h.jpg",
-              std::string_view("\xff\xd8\xff\xc2\0\x0b\x08\x75\x30\x75\x30\x01\x01"
-                               "\x11\0\xff\xd9",
-                               17));
-  for (const std::string name : {"h.tif", "h.exr"}) {
-    OIIO::ImageSpec spec(30'000, 1, 1, TypeDesc::HALF);
-    write_raw(folder / name, spec, std::vector<float>(30'000, 0.0F));
-  }
-  rusage before{};
-  rusage after{};
-  ::getrusage(RUSAGE_SELF, &before);
-  const auto start = std::chrono::steady_clock::now();
-  for (const char* name : {"h.png", "h.jpg", "h.tif", "h.exr"}) {
-    EXPECT_THAT(refusal(folder / name), AllOf(HasSubstr("30000"), HasSubstr("at most 16384")));
-  }
-  ::getrusage(RUSAGE_SELF, &after);
-  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(2));
-  EXPECT_LT(after.ru_maxrss - before.ru_maxrss, 100'000);
-}
-
-TEST(ImageIo, RefusesValuesThatAreNotFiniteOrNegativeNamingPixelAndValue) {
-  const TempFolder folder;
-  const float infinity = std::numeric_limits<float>::infinity();
-  const std::vector<std::pair<float, std::string>> bad{
-      {-0.25F, "-0.25"}, {infinity, "inf"}, {std::nanf(""), "nan"}};
-  for (const auto& [value, text] : bad) {
-    OIIO::ImageSpec spec(4, 3, 3, TypeDesc::FLOAT);
-    std::vector<float> pixels(36, 0.5F);
-    pixels[3 * 6 + 1] = value;
-    write_raw(folder / "v.exr", spec, pixels);
-    EXPECT_THAT(refusal(folder / "v.exr"),
-                HasSubstr("pixel (column 2, row 1) has the value " + text +
-                          " in channel G: values must be finite and not negative"));
-  }
-}
-
-TEST(ImageIo, RefusesAnAlphaThatIsNotFinite) {
-  const TempFolder folder;
-  write_raw(folder / "v.exr", pixel_spec(4, TypeDesc::FLOAT), {0.F, 0.F, 0.F, std::nanf("")});
-  EXPECT_THAT(refusal(folder / "v.exr"), HasSubstr("in channel A"));
-}
-
-// ---- resampling
-
-TEST(Resample, TheSameSizeIsTheSamePicture) {
-  const Image image = random_image(13, 7);
-  EXPECT_EQ(resample(image, 13, 7), image);
-}
-
-TEST(Resample, EveryResultIsTheMeanOfItsArea) {
-  const Image image = random_image(10, 7);
-  // Reference: on the common multiple of both grids every cell belongs to one pixel of each.
-  const Image result = resample(image, 4, 3);
-  for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 4; ++column) {
-      double sum = 0.0;
-      for (int i = 0; i < 10 * 7; ++i) {
-        sum += image.at((column * 10 + i % 10) / 4, (row * 7 + i / 10) / 3);
-      }
-      EXPECT_NEAR(result.at(column, row), sum / 70.0, 1e-7);
-    }
-  }
-}
-
-TEST(Resample, TheMeanIsKept) {
-  const Image image = random_image(101, 67);
-  const double mean = image.total() / (101.0 * 67.0);
-  for (const auto& [columns, rows] : std::vector<std::pair<int, int>>{
-           {1, 1}, {50, 30}, {100, 66}, {102, 68}, {256, 311}, {7, 500}}) {
-    const double resampled = resample(image, columns, rows).total() / (columns * rows);
-    EXPECT_NEAR(resampled / mean, 1.0, 1e-6) << columns << " x " << rows;
-  }
-}
-
-TEST(Resample, EnlargingByAWholeNumberRepeatsPixels) {
-  const Image image = random_image(3, 2);
-  const Image large = resample(image, 9, 4);
-  for (int row = 0; row < 4; ++row) {
-    for (int column = 0; column < 9; ++column) {
-      EXPECT_FLOAT_EQ(large.at(column, row), image.at(column / 3, row / 2));
-    }
-  }
-}
-
-// ---- writing
-
-TEST(ImageIo, AWrittenPngIsSixteenBitGreyAndComesBackWithinAStep) {
-  const TempFolder folder;
-  const Image image = random_image(31, 17);
-  write_image(image, folder / "a.png");
-  const auto input = OIIO::ImageInput::open((folder / "a.png").string());
-  ASSERT_TRUE(input);
-  EXPECT_EQ(input->spec().format, TypeDesc::UINT16);
-  EXPECT_EQ(input->spec().nchannels, 1);
-  EXPECT_EQ(input->spec().get_string_attribute("oiio:ColorSpace"), "sRGB");
-  const LoadedImage loaded = read_image(folder / "a.png");
-  EXPECT_THAT(loaded.changes, IsEmpty());
-  for (std::size_t i = 0; i < image.values().size(); ++i) {
-    EXPECT_NEAR(encode(loaded.image.values()[i]), encode(image.values()[i]), 0.51 / 65535.0);
-  }
-}
-
-TEST(ImageIo, AWrittenPngIsClippedToTheDisplay) {
-  const TempFolder folder;
-  Image image(2, 1, -1.0F);
-  image.at(1, 0) = 5.0F;
-  write_image(image, folder / "a.png");
-  EXPECT_THAT(read_image(folder / "a.png").image.values(), ElementsAre(0.0F, 1.0F));
-}
-
-TEST(ImageIo, AWrittenExrComesBackBitForBit) {
-  const TempFolder folder;
-  Image image = random_image(31, 17);
-  image.at(0, 0) = 12345.678F;
-  image.at(1, 0) = 1e-30F;
-  write_image(image, folder / "a.exr");
-  const LoadedImage loaded = read_image(folder / "a.exr");
-  EXPECT_EQ(loaded.image, image);
-  EXPECT_THAT(loaded.changes, IsEmpty());
-  const auto input = OIIO::ImageInput::open((folder / "a.exr").string());
-  EXPECT_THAT(input->spec().channelnames, ElementsAre("Y"));
-  EXPECT_EQ(input->spec().format, TypeDesc::FLOAT);
-}
-
-TEST(ImageIo, WritingTwiceGivesTheSameBytes) {
-  const TempFolder folder;
-  const Image image = random_image(31, 17);
-  for (const std::string extension : {".png", ".exr"}) {
-    write_image(image, folder / ("a" + extension));
-    // Past the next second, which a time stamp in the file would show.
-    std::this_thread::sleep_for(std::chrono::milliseconds(1100));
-    write_image(image, folder / ("b" + extension));
-    EXPECT_EQ(read_bytes(folder / ("a" + extension)), read_bytes(folder / ("b" + extension)));
-  }
-}
-
-TEST(ImageIo, AColourPictureIsWrittenAsEightBitPng) {
-  const TempFolder folder;
-  write_image(ColorImage{2, 1, {255, 0, 0, 10, 20, 30}}, folder / "c.png");
-  const auto input = OIIO::ImageInput::open((folder / "c.png").string());
-  ASSERT_TRUE(input);
-  EXPECT_EQ(input->spec().format, TypeDesc::UINT8);
-  std::vector<unsigned char> rgb(6);
-  ASSERT_TRUE(input->read_image(0, 0, 0, 3, TypeDesc::UINT8, rgb.data()));
-  EXPECT_THAT(rgb, ElementsAre(255, 0, 0, 10, 20, 30));
-}
-
-TEST(ImageIo, AnotherExtensionIsRefused) {
-  const TempFolder folder;
-  EXPECT_THAT(message_of<InputError>([&] { write_image(Image(1, 1), folder / "a.jpg"); }),
-              HasSubstr("extension '.jpg' is not written"));
-  EXPECT_EQ(folder.file_count(), 0U);
-}
-
-TEST(ImageIo, AFullDiskNamesFileAndReasonAndLeavesNothing) {
-  const TempFolder folder;
-  const Image image = random_image(128, 128);
-  const FullDisk full(1000);
-  for (const std::string name : {"a.png", "a.exr"}) {
-    EXPECT_THAT(message_of<RunError>([&] { write_image(image, folder / name); }),
-                AllOf(StartsWith((folder / name).string() + ": "), HasSubstr("File too large")));
-  }
-  EXPECT_EQ(folder.file_count(), 0U);
-}
-
-TEST(ImageIo, AMissingFolderNamesFileAndReason) {
-  const TempFolder folder;
-  EXPECT_THAT(message_of<RunError>([&] { write_image(Image(1, 1), folder / "no/a.png"); }),
-              HasSubstr("No such file or directory"));
 }
 
 }  // namespace

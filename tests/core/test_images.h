@@ -6,8 +6,11 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <random>
 #include <string>
 #include <vector>
+
+#include "core/image.h"
 
 namespace lensforge::testing {
 
@@ -40,6 +43,15 @@ inline std::vector<float> ramp(const OIIO::ImageSpec& spec) {
                   static_cast<float>(pixel) / count);
   }
   return values;
+}
+
+/// Uniform light in [0, 1), the same for every call.
+inline Image random_image(int columns, int rows) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<float> uniform(0.0F, 1.0F);
+  Image image(columns, rows);
+  for (float& value : image.values()) value = uniform(random);
+  return image;
 }
 
 }  // namespace lensforge::testing
