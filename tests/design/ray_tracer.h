@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -42,7 +43,7 @@ class RayTracer {
     Random random(seed);
     const int columns = setup_.pixels.x();
     const int rows = setup_.pixels.y();
-    std::vector<std::int64_t> hits(static_cast<std::size_t>(columns * rows), 0);
+    std::vector<std::int64_t> hits(index(0, rows, columns), 0);
     for (std::int64_t i = 0; i < rays; ++i) {
       const Eigen::Vector2d p(random.between(0.0, setup_.lens_size.x()),
                               random.between(0.0, setup_.lens_size.y()));
@@ -52,7 +53,7 @@ class RayTracer {
       const int column = static_cast<int>(std::floor(from_far.x() * columns));
       const int row = static_cast<int>(std::floor(from_far.y() * rows));
       if (column < 0 || column >= columns || row < 0 || row >= rows) continue;
-      ++hits[static_cast<std::size_t>(row * columns + column)];
+      ++hits[index(column, row, columns)];
     }
     return hits;
   }
@@ -82,6 +83,10 @@ class RayTracer {
     return hit.head<2>();
   }
 
+  static std::size_t index(int column, int row, int columns) {
+    return static_cast<std::size_t>(row) * static_cast<std::size_t>(columns) +
+           static_cast<std::size_t>(column);
+  }
   [[nodiscard]] int bucket(double position, double size) const {
     return std::clamp(static_cast<int>(position / size * kBuckets), 0, kBuckets - 1);
   }
@@ -95,7 +100,7 @@ class RayTracer {
          ++v) {
       for (int u = bucket(low.x(), setup_.lens_size.x());
            u <= bucket(high.x(), setup_.lens_size.x()); ++u) {
-        buckets_[static_cast<std::size_t>(v * kBuckets + u)].push_back(t);
+        buckets_[index(u, v, kBuckets)].push_back(t);
       }
     }
   }
@@ -107,7 +112,7 @@ class RayTracer {
     const int v = bucket(p.y(), setup_.lens_size.y());
     double best = -1e9;
     Eigen::Vector2d result(1e9, 1e9);
-    for (const int t : buckets_[static_cast<std::size_t>(v * kBuckets + u)]) {
+    for (const int t : buckets_[index(u, v, kBuckets)]) {
       const Eigen::Vector3d share = barycentric(t, p);
       if (share.minCoeff() <= best) continue;
       best = share.minCoeff();
