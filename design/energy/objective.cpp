@@ -185,12 +185,12 @@ bool DesignObjective::land_vertices(const Eigen::Matrix3Xd& vertices) {
 ImageTriangle DesignObjective::image_triangle(const Eigen::Matrix3Xd& vertices,
                                               std::int64_t face) const {
   const Corners t = corners(vertices, face);
-  const double doubled = doubled_projected_area(t);
   if (options_.model == SurfaceModel::kFacet) {
-    return project_facet(t, frames_[at(face)].n, doubled, optics_, lens_area_);
+    return project_facet(t, RefractedBeam(frames_[at(face)].n, optics_.eta), optics_, lens_area_);
   }
   const auto v = triangles_.col(face);
-  return {landing_.col(v[0]), landing_.col(v[1]), landing_.col(v[2]), 0.5 * doubled / lens_area_};
+  return {landing_.col(v[0]), landing_.col(v[1]), landing_.col(v[2]),
+          0.5 * doubled_projected_area(t) / lens_area_};
 }
 
 /// E_img, E_grad, MAE, and the cotangent picture.
@@ -248,11 +248,12 @@ void DesignObjective::pull_back_vertices(const Eigen::Matrix3Xd& vertices, Evalu
 double DesignObjective::image_adjoint(std::int64_t face, const Corners& t, FaceBar& bar) const {
   if (options_.model == SurfaceModel::kFacet) {
     const Eigen::Vector3d& n = frames_[at(face)].n;
-    const ImageTriangle image = project_facet(t, n, doubled_projected_area(t), optics_, lens_area_);
+    const RefractedBeam beam(n, optics_.eta);
+    const ImageTriangle image = project_facet(t, beam, optics_, lens_area_);
     ImageTriangle image_bar = deposit_adjoint(image, cotangent_.view());
     const double boundary =
         boundary_term(image, flux_.columns(), flux_.rows(), options_.weights.boundary, image_bar);
-    bar.frame.n += project_facet_adjoint(t, n, optics_, image_bar, bar.corners);
+    bar.frame.n += project_facet_adjoint(t, n, beam, optics_, image_bar, bar.corners);
     bar.area_normal.z() += 0.5 * image_bar.flux / lens_area_;
     return boundary;
   }
@@ -304,7 +305,7 @@ void DesignObjective::pull_back_faces(const Eigen::Matrix3Xd& vertices, Evaluati
   const bool smooth = options_.weights.smooth > 0.0;
   const auto pull = [&](std::int64_t i) {
     const Corners t = corners(vertices, i);
-    const double doubled_area = area_normal(t).norm();
+    const double doubled_area = frames_[at(i)].n.dot(area_normal(t));  // |N|, without its root
     FaceBar bar;
     std::array<double, 4> values{};
     values[0] = image_adjoint(i, t, bar);

@@ -70,10 +70,6 @@ struct Quadrants {
   [[nodiscard]] LF_HD double sum() const {
     return (above_left + above_right) + (below_left + below_right);
   }
-  [[nodiscard]] LF_HD double dot(const Quadrants& other) const {
-    return (above_left * other.above_left + above_right * other.above_right) +
-           (below_left * other.below_left + below_right * other.below_right);
-  }
   [[nodiscard]] LF_HD double at(bool right, bool below) const {
     const double above_value = right ? above_right : above_left;
     const double below_value = right ? below_right : below_left;

@@ -45,30 +45,26 @@ LF_HD inline Eigen::Vector3d normalize_adjoint(const Eigen::Vector3d& n, double 
 
 /// Facet model: the whole triangle sends out one parallel beam (Sun et al., section 3.2).
 ///
-/// @param n  unit normal of the triangle; @param lens_area  area of the lens's outline, mm².
+/// @param beam  what its unit normal refracts; @param lens_area  mm².
 /// @return the image triangle; its flux is the share of the light that the triangle's projection
-///         onto the entry face takes (Eq. 1), 0 where the triangle does not transmit.
-LF_HD inline ImageTriangle project_facet(const Corners& t, const Eigen::Vector3d& n,
-                                         double doubled_projected_area, const Projection& optics,
-                                         double lens_area) {
-  if (!optics.transmits(n)) return {};
-  const Eigen::Vector2d m = refracted_slope(n, optics.eta);
-  return {optics.land(t.v0, m), optics.land(t.v1, m), optics.land(t.v2, m),
-          0.5 * doubled_projected_area / lens_area};
+///         onto the entry face takes (Eq. 1).
+LF_HD inline ImageTriangle project_facet(const Corners& t, const RefractedBeam& beam,
+                                         const Projection& optics, double lens_area) {
+  return {optics.land(t.v0, beam.m), optics.land(t.v1, beam.m), optics.land(t.v2, beam.m),
+          0.5 * doubled_projected_area(t) / lens_area};
 }
 
 /// Adjoint of project_facet() without the flux: adds to the corners' derivatives directly and
 /// returns n_bar, the derivative by the unit normal.
-/// @pre the triangle transmits.
 LF_HD inline Eigen::Vector3d project_facet_adjoint(const Corners& t, const Eigen::Vector3d& n,
+                                                   const RefractedBeam& beam,
                                                    const Projection& optics,
                                                    const ImageTriangle& bar, Corners& grad) {
-  const Eigen::Vector2d m = refracted_slope(n, optics.eta);
   Eigen::Vector2d m_bar(0.0, 0.0);
-  optics.land_adjoint(t.v0, m, bar.p0, grad.v0, m_bar);
-  optics.land_adjoint(t.v1, m, bar.p1, grad.v1, m_bar);
-  optics.land_adjoint(t.v2, m, bar.p2, grad.v2, m_bar);
-  return refracted_slope_adjoint(n, optics.eta, m_bar);
+  optics.land_adjoint(t.v0, beam.m, bar.p0, grad.v0, m_bar);
+  optics.land_adjoint(t.v1, beam.m, bar.p1, grad.v1, m_bar);
+  optics.land_adjoint(t.v2, beam.m, bar.p2, grad.v2, m_bar);
+  return beam.adjoint(n, optics.eta, m_bar);
 }
 
 }  // namespace lensforge

@@ -35,22 +35,30 @@ LF_HD inline Eigen::Vector3d refract_adjoint(const Eigen::Vector3d& a, const Eig
   return k * b_bar + (n.dot(b_bar) * k_by_c) * a;
 }
 
-/// Slope (dx/dz, dy/dz) of parallel light along +z after a surface of unit normal n.
-/// @pre n_z > 0 and no total internal reflection.
-LF_HD inline Eigen::Vector2d refracted_slope(const Eigen::Vector3d& n, double eta) {
-  const Eigen::Vector3d b = refract(Eigen::Vector3d(0.0, 0.0, 1.0), n, eta);
-  return Eigen::Vector2d(b.x(), b.y()) / b.z();
-}
+/// Parallel light along +z after a surface of unit normal n, with what its adjoint needs again.
+/// b = k n + η ẑ with k = √s − η n_z.
+struct RefractedBeam {
+  double root;       ///< √s
+  double inverse_z;  ///< 1/b_z
+  double k;
+  Eigen::Vector2d m;  ///< Slope (dx/dz, dy/dz).
 
-/// Adjoint of refracted_slope(): n_bar for a given m_bar.
-LF_HD inline Eigen::Vector3d refracted_slope_adjoint(const Eigen::Vector3d& n, double eta,
-                                                     const Eigen::Vector2d& m_bar) {
-  const Eigen::Vector3d a(0.0, 0.0, 1.0);
-  const Eigen::Vector3d b = refract(a, n, eta);
-  const double inverse = 1.0 / b.z();
-  const double z_bar = -(m_bar.x() * b.x() + m_bar.y() * b.y()) * inverse * inverse;
-  return refract_adjoint(a, n, eta,
-                         Eigen::Vector3d(m_bar.x() * inverse, m_bar.y() * inverse, z_bar));
-}
+  /// @pre n_z > 0 and no total internal reflection.
+  LF_HD RefractedBeam(const Eigen::Vector3d& n, double eta)
+      : root(std::sqrt(refracted_cosine_squared(n.z(), eta))),
+        inverse_z(1.0 / (root * n.z() + eta * (1.0 - n.z() * n.z()))),
+        k(root - eta * n.z()),
+        m(k * inverse_z * n.x(), k * inverse_z * n.y()) {}
+
+  /// Adjoint of n ↦ m: n_bar for a given m_bar.
+  [[nodiscard]] LF_HD Eigen::Vector3d adjoint(const Eigen::Vector3d& n, double eta,
+                                              const Eigen::Vector2d& m_bar) const {
+    const Eigen::Vector3d b_bar = inverse_z * Eigen::Vector3d(m_bar.x(), m_bar.y(), -m.dot(m_bar));
+    const double k_by_nz = eta * eta * n.z() / root - eta;
+    Eigen::Vector3d n_bar = k * b_bar;
+    n_bar.z() += n.dot(b_bar) * k_by_nz;
+    return n_bar;
+  }
+};
 
 }  // namespace lensforge

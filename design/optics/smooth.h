@@ -26,7 +26,7 @@ struct VertexNormal {
 /// Where the ray of a vertex lands, in pixel coordinates. @pre n transmits.
 LF_HD inline Eigen::Vector2d project_vertex(const Eigen::Vector3d& p, const Eigen::Vector3d& n,
                                             const Projection& optics) {
-  return optics.land(p, refracted_slope(n, optics.eta));
+  return optics.land(p, RefractedBeam(n, optics.eta).m);
 }
 
 /// Adjoint of project_vertex(): adds to p_bar, returns n_bar.
@@ -35,9 +35,10 @@ LF_HD inline Eigen::Vector3d project_vertex_adjoint(const Eigen::Vector3d& p,
                                                     const Projection& optics,
                                                     const Eigen::Vector2d& u_bar,
                                                     Eigen::Vector3d& p_bar) {
+  const RefractedBeam beam(n, optics.eta);
   Eigen::Vector2d m_bar(0.0, 0.0);
-  optics.land_adjoint(p, refracted_slope(n, optics.eta), u_bar, p_bar, m_bar);
-  return refracted_slope_adjoint(n, optics.eta, m_bar);
+  optics.land_adjoint(p, beam.m, u_bar, p_bar, m_bar);
+  return beam.adjoint(n, optics.eta, m_bar);
 }
 
 }  // namespace lensforge

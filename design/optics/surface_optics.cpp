@@ -24,9 +24,10 @@ std::vector<ImageTriangle> project_facets(const SurfaceMesh& mesh, const Optical
   std::vector<ImageTriangle> triangles(static_cast<std::size_t>(mesh.triangle_count()));
   parallel_for(executor, "project facets", mesh.triangle_count(), [&](std::int64_t i) {
     const Corners t = corners_of(mesh, i);
-    const Eigen::Vector3d normal = area_normal(t);
+    const Eigen::Vector3d n = area_normal(t).normalized();
+    if (!optics.transmits(n)) return;  // An image triangle without flux.
     triangles[static_cast<std::size_t>(i)] =
-        project_facet(t, normal.normalized(), normal.z(), optics, lens_area);
+        project_facet(t, RefractedBeam(n, optics.eta), optics, lens_area);
   });
   return triangles;
 }

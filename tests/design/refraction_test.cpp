@@ -54,7 +54,7 @@ TEST(Refraction, KeepsUnitLengthPlaneAndDirectionOfTravel) {
 TEST(Refraction, PerpendicularLightGoesStraightOn) {
   const Eigen::Vector3d n = Eigen::Vector3d(0.2, -0.4, 0.7).normalized();
   EXPECT_LT((refract(n, n, 1.49) - n).norm(), 1e-15);
-  EXPECT_EQ(refracted_slope({0.0, 0.0, 1.0}, 1.49), Eigen::Vector2d(0.0, 0.0));
+  EXPECT_EQ(RefractedBeam({0.0, 0.0, 1.0}, 1.49).m, Eigen::Vector2d(0.0, 0.0));
 }
 
 TEST(Refraction, LightIsTotallyReflectedBeyondTheCriticalAngle) {
@@ -80,7 +80,7 @@ TEST(Refraction, SlopeIsTheTangentOfTheDeflection) {
   for (int i = 0; i < 2000; ++i) {
     const double eta = random.between(1.1, 2.0);
     const Eigen::Vector3d n = random.near_z(0.9 * std::asin(1.0 / eta));
-    EXPECT_LT((refracted_slope(n, eta) - testing::slope_by_angles(n, eta)).norm(), 1e-12);
+    EXPECT_LT((RefractedBeam(n, eta).m - testing::slope_by_angles(n, eta)).norm(), 1e-12);
   }
 }
 
@@ -88,8 +88,8 @@ TEST(Refraction, SlopeOfATiltedSurfacePointsDownhill) {
   // A surface that rises with x has a normal towards −x and sends light to +x: a prism's base is
   // where its light goes.
   const Eigen::Vector3d n = Eigen::Vector3d(-0.1, 0.0, 1.0).normalized();
-  EXPECT_GT(refracted_slope(n, 1.49).x(), 0.0);
-  EXPECT_NEAR(refracted_slope(n, 1.49).x(), 0.1 * 0.49, 1e-3);
+  EXPECT_GT(RefractedBeam(n, 1.49).m.x(), 0.0);
+  EXPECT_NEAR(RefractedBeam(n, 1.49).m.x(), 0.1 * 0.49, 1e-3);
 }
 
 TEST(Refraction, AdjointEqualsCentralDifferences) {
@@ -117,8 +117,9 @@ TEST(Refraction, SlopeAdjointEqualsCentralDifferences) {
     const Eigen::Vector3d n = random.near_z(0.8 * std::asin(1.0 / eta));
     const Eigen::Vector2d m_bar = random.vector2();
     const Eigen::VectorXd expected = testing::numeric_gradient(
-        [&](const Eigen::VectorXd& x) { return m_bar.dot(refracted_slope(x, eta)); }, n, 3e-4);
-    const double error = testing::gradient_error(refracted_slope_adjoint(n, eta, m_bar), expected);
+        [&](const Eigen::VectorXd& x) { return m_bar.dot(RefractedBeam(x, eta).m); }, n, 3e-4);
+    const double error =
+        testing::gradient_error(RefractedBeam(n, eta).adjoint(n, eta, m_bar), expected);
     ASSERT_LT(error, 1e-8);
     worst = std::max(worst, error);
   }
