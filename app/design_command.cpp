@@ -68,15 +68,18 @@ void add_weight_options(OptionSet& options, DesignArguments& arguments) {
   const Limits limits = Limits::at_least(0);
   ObjectiveWeights& weights = arguments.design.weights;
   options.number("--smoothness", arguments.smoothness, limits, "", "factor on --weight-smooth");
-  options.number("--weight-image", weights.image, limits, "", "picture term (Sun et al., Eq. 17)");
-  options.number("--weight-gradient", weights.gradient, limits, "", "picture gradient term");
-  options.number("--weight-boundary", weights.boundary, limits, "", "straight rim term");
-  options.number("--weight-smooth", weights.smooth, limits, "", "all smoothness terms (Eq. 18)");
+  options.number("--weight-image", weights.image, limits, "",
+                 "picture values (Sun et al., Eq. 18, lambda 1)");
+  options.number("--weight-gradient", weights.gradient, limits, "", "picture gradients (lambda 2)");
+  options.number("--weight-boundary", weights.boundary, limits, "",
+                 "light outside the picture (lambda 3)");
+  options.number("--weight-smooth", weights.smooth, limits, "", "all smoothness terms (lambda 4)");
   options.number("--weight-barrier", weights.barrier, limits, "",
-                 "barriers against collapsed facets and total internal reflection");
-  options.number("--weight-edge", weights.edge, limits, "", "bending between facets, in Eq. 18");
+                 "barriers against collapsed facets and total reflection (lambda 5)");
+  options.number("--weight-edge", weights.edge, limits, "",
+                 "bending across edges, within the smoothness terms (Eq. 17, tau 1)");
   options.number("--weight-laplacian", weights.laplacian, limits, "",
-                 "evenness of the mesh, in Eq. 18");
+                 "evenness of the mesh, within the smoothness terms (Eq. 17, tau 2)");
 }
 
 void add_design_options(OptionSet& options, DesignArguments& arguments) {

@@ -161,11 +161,13 @@ Checkpoint read_checkpoint(const std::filesystem::path& path) {
       checkpoint.convergence.push_back(row_from_json(row));
     }
     const GridShape shape{parts.header.at("columns"), parts.header.at("rows")};
-    checkpoint.mesh = make_grid_mesh(Eigen::Vector2d::Ones(), shape, 0.0);
-    if (parts.vertices.size() !=
-        static_cast<std::size_t>(checkpoint.mesh.vertices.size()) * sizeof(double)) {
+    const std::size_t count = parts.vertices.size() / (3 * sizeof(double));
+    if (shape.columns < 2 || shape.rows < 2 ||
+        static_cast<std::size_t>(shape.columns) * static_cast<std::size_t>(shape.rows) != count ||
+        parts.vertices.size() != count * 3 * sizeof(double)) {
       refuse(path, "does not hold as many vertices as it says");
     }
+    checkpoint.mesh = make_grid_mesh(Eigen::Vector2d::Ones(), shape, 0.0);
     std::memcpy(checkpoint.mesh.vertices.data(), parts.vertices.data(), parts.vertices.size());
     return checkpoint;
   } catch (const json::exception& error) {

@@ -106,7 +106,7 @@ class Schedule {
 
   DesignResult run() {
     save();
-    while (state_.level < static_cast<int>(levels_.size()) && !stopped_) run_level();
+    while (state_.level < static_cast<int>(levels_.size()) && !ended()) run_level();
     return finish();
   }
 
@@ -119,6 +119,9 @@ class Schedule {
     }
     state_ = std::move(saved);
   }
+
+  /// True once the schedule is not to go on: asked to stop, or a start that no step can leave.
+  [[nodiscard]] bool ended() const { return stopped_ || !failure_.empty(); }
 
   [[nodiscard]] double seconds() const { return spent_before_ + seconds_since(start_); }
 
@@ -141,8 +144,8 @@ class Schedule {
     objective.area = default_area_barrier(setup, state_.mesh.triangle_count());
     RenderingGuided stage(state_.mesh, setup, target, objective, executor_);
     relax(stage);
-    while (state_.round < options_.rounds && !stopped_) run_round(stage);
-    if (stopped_) return;
+    while (state_.round < options_.rounds && !ended()) run_round(stage);
+    if (ended()) return;
     state_.round = 0;
     ++state_.level;
     save();
@@ -178,8 +181,8 @@ class Schedule {
         },
         state_.mesh);
     stopped_ = summary.status == LbfgsSummary::Status::kStopped;
-    failure_ = summary.status == LbfgsSummary::Status::kInfeasibleStart ? summary.message : "";
-    if (stopped_) return;
+    if (summary.status == LbfgsSummary::Status::kInfeasibleStart) failure_ = summary.message;
+    if (ended()) return;
     const double fall = summary.initial_value - summary.value;
     const bool idle = fall <= kIdleRound * summary.initial_value;
     state_.round = idle ? options_.rounds : state_.round + 1;

@@ -121,7 +121,7 @@ LbfgsSummary RenderingGuided::run(const LbfgsOptions& options, const Observer& o
   };
   const LbfgsObserver watch = [&](int iteration, double) { return observe(iteration, last); };
   Eigen::VectorXd x = mesh.vertices.reshaped();
-  const LbfgsSummary summary = minimize_lbfgs(function, precondition, options, watch, executor_, x);
+  LbfgsSummary summary = minimize_lbfgs(function, precondition, options, watch, executor_, x);
   mesh.vertices = x.reshaped(3, mesh.vertices.cols());
   return summary;
 }

@@ -35,7 +35,7 @@ struct ObjectiveOptions {
 /// positions alone.
 ///
 /// The Weingarten maps are eliminated. Ψ_ν is concave in h, so that at a given surface E_edge has a
-/// majorant linear in h, Σ Ψ(h⁰) + w (h − h⁰) with w = Ψ'(h⁰), tight there; with w held, every
+/// majorant linear in h, Σ Ψ(h⁰) + w (h − h⁰) with w = Ψ'(h⁰), tight at h⁰; with w held, every
 /// face's best map is a 3 × 3 least-squares solution, and by the envelope theorem the gradient by
 /// the vertices is the partial one. relinearize() moves h⁰ to a new surface; between two calls
 /// the objective is one smooth function, never less than Eq. 18.

@@ -14,7 +14,8 @@
 /// that sums over a closed polygon telescope exactly.
 namespace lensforge {
 
-/// One piece of an edge. `column` is −1 for a piece left of the picture (it covers one row).
+/// One piece of an edge. `column` is −1 for a piece left of the picture; of such a piece only row,
+/// y0 and y1 mean anything.
 struct EdgePiece {
   int column;
   int row;

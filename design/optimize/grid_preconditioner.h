@@ -30,7 +30,8 @@ class GridPreconditioner {
   GridSymbol xy;
   GridSymbol z;
 
-  /// r ← P g, or P^½ g; both 3 V numbers, x y z of each vertex in turn.
+  /// r ← P g, or P^½ g (exact where no coordinate is held); both 3 V numbers, x y z of each vertex
+  /// in turn.
   void apply(const Eigen::VectorXd& g, Eigen::VectorXd& r);
   void apply_root(const Eigen::VectorXd& g, Eigen::VectorXd& r);
 
