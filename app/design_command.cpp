@@ -27,7 +27,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kLeastPixels = 2;  ///< Of the picture's longer side.
+constexpr int kLeastPixels = 4;  ///< Of the picture's longer side.
 
 struct DesignArguments {
   std::string target;
