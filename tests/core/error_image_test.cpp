@@ -11,7 +11,8 @@ namespace {
 using Color = std::array<unsigned char, 3>;
 
 Color color_at(const ColorImage& image, int column, int row) {
-  const auto pixel = static_cast<std::size_t>(3 * (row * image.columns + column));
+  const int index = 3 * (row * image.columns + column);
+  const auto pixel = static_cast<std::size_t>(index);
   return {image.rgb[pixel], image.rgb[pixel + 1], image.rgb[pixel + 2]};
 }
 

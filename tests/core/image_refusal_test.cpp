@@ -39,7 +39,7 @@ using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
 std::string refusal(const fs::path& path) {
-  const std::string message = message_of<InputError>([&] { read_image(path); });
+  std::string message = message_of<InputError>([&] { read_image(path); });
   EXPECT_THAT(message, StartsWith(path.string() + ": "));
   return message;
 }
@@ -75,7 +75,8 @@ TEST(ImageIo, RefusesWhatIsNoPictureUnderAnyName) {
 
 /// Cuts a written file at many places, also just before its end, and expects a refusal that prints
 /// nothing.
-void expect_every_cut_is_refused(const std::string& name, OIIO::ImageSpec spec, std::size_t tail) {
+void expect_every_cut_is_refused(const std::string& name, const OIIO::ImageSpec& spec,
+                                 std::size_t tail) {
   const TempFolder folder;
   const Image values = random_image(spec.width * spec.nchannels, spec.height);
   const std::vector<float> pixels(values.values().begin(), values.values().end());

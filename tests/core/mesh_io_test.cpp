@@ -39,7 +39,7 @@ SurfaceMesh rough_grid(int columns, int rows) {
 
 std::string refusal(const fs::path& path) {
   ::testing::internal::CaptureStderr();
-  const std::string message = message_of<InputError>([&] { read_mesh(path); });
+  std::string message = message_of<InputError>([&] { read_mesh(path); });
   EXPECT_EQ(::testing::internal::GetCapturedStderr(), "") << path;
   EXPECT_THAT(message, StartsWith(path.string() + ": "));
   return message;

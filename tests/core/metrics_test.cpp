@@ -38,7 +38,8 @@ double slow_similarity(const Image& a, const Image& b, int window) {
       double ma = 0, mb = 0, va = 0, vb = 0, cov = 0;
       const auto each = [&](const auto& visit) {
         for (int i = 0; i < window * window; ++i) {
-          const auto k = static_cast<std::size_t>((r + i / window) * a.columns() + c + i % window);
+          const int index = (r + i / window) * a.columns() + c + i % window;
+          const auto k = static_cast<std::size_t>(index);
           visit(x[k], y[k]);
         }
       };

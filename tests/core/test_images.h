@@ -30,7 +30,7 @@ inline void write_raw(const std::filesystem::path& path, OIIO::ImageSpec spec,
 }
 
 /// 1 × 1 spec of so many channels.
-inline OIIO::ImageSpec pixel_spec(int channels, OIIO::TypeDesc type) {
+inline OIIO::ImageSpec pixel_spec(int channels, const OIIO::TypeDesc& type) {
   return OIIO::ImageSpec(1, 1, channels, type);
 }
 
