@@ -23,8 +23,8 @@ inline constexpr int kShiftFade = 4;
 /// The same surface on another grid over the same rectangle: displacements from the flat mesh's
 /// positions and heights are interpolated by cubics (Catmull–Rom), once along rows and once across.
 /// Planes are kept, but for the cells next to the left and right border whose widths differ (there
-/// by about 1 % of a cell's rise). Border vertices stay on the border. @pre mesh.grid is set and at least
-/// 2 × 2.
+/// by about 1 % of a cell's rise). Border vertices stay on the border. @pre mesh.grid is set and at
+/// least 2 × 2.
 SurfaceMesh regrid(const SurfaceMesh& mesh, const Eigen::Vector2d& size, const GridShape& shape);
 
 }  // namespace lensforge
