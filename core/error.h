@@ -19,6 +19,12 @@ class RunError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// The caller asked for an end (RunControl) and the work was dropped where it stood.
+class Interrupted : public std::runtime_error {
+ public:
+  Interrupted() : std::runtime_error("interrupted") {}
+};
+
 /// Prints the broken condition with its values to stderr and aborts: a bug in lensforge itself.
 [[noreturn]] void check_failed(const char* condition, const char* file, int line,
                                const std::string& values);

@@ -6,6 +6,9 @@
 #include <tbb/task_arena.h>
 
 #include <chrono>
+#include <utility>
+
+#include "core/error.h"
 
 namespace lensforge {
 
@@ -45,20 +48,29 @@ Executor Executor::with_profile(KernelProfile* profile) const {
   return copy;
 }
 
+Executor Executor::with_stop(std::stop_token stop) const {
+  Executor copy = *this;
+  copy.stop_ = std::move(stop);
+  return copy;
+}
+
 int Executor::concurrency() const { return arena_ ? arena_->tasks.max_concurrency() : 1; }
 
 void Executor::run(const char* kernel, std::int64_t count, std::int64_t grain, Chunk chunk,
                    const void* body) const {
+  if (stop_.stop_requested()) throw Interrupted();
   if (count <= 0) return;
   const auto start = std::chrono::steady_clock::now();
   if (!arena_) {
     chunk(body, 0, count, 0);
   } else {
     const auto run_range = [&](const tbb::blocked_range<std::int64_t>& range) {
+      if (stop_.stop_requested()) return;
       chunk(body, range.begin(), range.end(), tbb::this_task_arena::current_thread_index());
     };
     const tbb::blocked_range<std::int64_t> all(0, count, static_cast<std::size_t>(grain));
     arena_->tasks.execute([&] { tbb::parallel_for(all, run_range); });
+    if (stop_.stop_requested()) throw Interrupted();
   }
   if (profile_ != nullptr) {
     const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;

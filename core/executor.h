@@ -8,6 +8,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -41,12 +42,16 @@ class Executor {
   /// The same executor that also records the time of every kernel into `profile` (not owned).
   [[nodiscard]] Executor with_profile(KernelProfile* profile) const;
 
+  /// The same executor whose kernels end as soon as `stop` is requested: run() then throws
+  /// Interrupted, and what the kernel was to write is left half done.
+  [[nodiscard]] Executor with_stop(std::stop_token stop) const;
+
   /// Upper bound of the worker numbers handed to kernels: workers are 0 … concurrency() − 1.
   [[nodiscard]] int concurrency() const;
 
   using Chunk = void (*)(const void* body, std::int64_t begin, std::int64_t end, int worker);
   /// Calls `chunk` on ranges that cover 0 … count − 1, each at least `grain` long but for the last.
-  /// An exception thrown by a chunk reaches the caller.
+  /// An exception thrown by a chunk reaches the caller. @throw Interrupted, see with_stop().
   void run(const char* kernel, std::int64_t count, std::int64_t grain, Chunk chunk,
            const void* body) const;
 
@@ -54,6 +59,7 @@ class Executor {
   struct Arena;
   std::shared_ptr<Arena> arena_;  ///< Null for the serial executor.
   KernelProfile* profile_ = nullptr;
+  std::stop_token stop_;
 };
 
 /// Items that one task handles at least: below this the scheduling costs more than the work.

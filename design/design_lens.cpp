@@ -106,7 +106,7 @@ class Schedule {
 
   DesignResult run() {
     save();
-    while (state_.level < static_cast<int>(levels_.size()) && !ended()) run_level();
+    while (state_.level < static_cast<int>(levels_.size()) && !ended()) run_level_unless_stopped();
     return finish();
   }
 
@@ -125,6 +125,14 @@ class Schedule {
 
   [[nodiscard]] double seconds() const { return spent_before_ + seconds_since(start_); }
 
+  void run_level_unless_stopped() {
+    try {
+      run_level();
+    } catch (const Interrupted&) {
+      stopped_ = true;
+    }
+  }
+
   void run_level() {
     const Level& level = levels_[static_cast<std::size_t>(state_.level)];
     OpticalSetup setup = setup_;
@@ -142,7 +150,8 @@ class Schedule {
     objective.model = options_.model;
     objective.nu = level.nu;
     objective.area = default_area_barrier(setup, state_.mesh.triangle_count());
-    RenderingGuided stage(state_.mesh, setup, target, objective, executor_);
+    RenderingGuided stage(state_.mesh, setup, target, objective,
+                          executor_.with_stop(control_.stop_token()));
     relax(stage);
     while (state_.round < options_.rounds && !ended()) run_round(stage);
     if (ended()) return;

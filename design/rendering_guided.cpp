@@ -6,6 +6,8 @@
 #include <cstdint>
 #include <numbers>
 
+#include "core/error.h"
+
 namespace lensforge {
 
 namespace {
@@ -121,9 +123,15 @@ LbfgsSummary RenderingGuided::run(const LbfgsOptions& options, const Observer& o
   };
   const LbfgsObserver watch = [&](int iteration, double) { return observe(iteration, last); };
   Eigen::VectorXd x = mesh.vertices.reshaped();
-  LbfgsSummary summary = minimize_lbfgs(function, precondition, options, watch, executor_, x);
-  mesh.vertices = x.reshaped(3, mesh.vertices.cols());
-  return summary;
+  const auto keep_best = [&] { mesh.vertices = x.reshaped(3, mesh.vertices.cols()); };
+  try {
+    LbfgsSummary summary = minimize_lbfgs(function, precondition, options, watch, executor_, x);
+    keep_best();
+    return summary;
+  } catch (const Interrupted&) {
+    keep_best();
+    throw;
+  }
 }
 
 }  // namespace lensforge

@@ -26,6 +26,7 @@ class RenderingGuided {
 
   /// Improves `mesh` by at most `options.max_iterations` steps, from scratch: the outcome depends
   /// on the mesh alone, so that a run resumed from it goes the same way.
+  /// @throw Interrupted if the executor is stopped; `mesh` then holds the best surface so far.
   LbfgsSummary run(const LbfgsOptions& options, const Observer& observe, SurfaceMesh& mesh);
 
   /// True if the objective is finite there.

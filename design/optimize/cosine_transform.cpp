@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <mutex>
 #include <numbers>
+#include <vector>
 
 namespace lensforge {
 
@@ -51,6 +52,21 @@ void CosineTransform::run() { fftw_execute(plan_->plan); }
 
 double CosineTransform::inverse_scale() const {
   return 1.0 / (4.0 * (columns_ - 1.0) * (rows_ - 1.0));
+}
+
+void CosineTransform::solve_poisson() {
+  std::vector<double> across(static_cast<std::size_t>(columns_));
+  for (int c = 0; c < columns_; ++c) {
+    across[static_cast<std::size_t>(c)] = eigenvalue(c, columns_, 1.0);
+  }
+  run();
+  double* value = plan_->data;
+  for (int r = 0; r < rows_; ++r) {
+    const double down = eigenvalue(r, rows_, 1.0);
+    for (const double lambda : across) *value++ *= -inverse_scale() / (lambda + down);
+  }
+  plan_->data[0] = 0.0;  // The mean, which no Laplacian can give.
+  run();
 }
 
 double CosineTransform::eigenvalue(int k, int n, double spacing) {

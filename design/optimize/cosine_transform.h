@@ -25,6 +25,10 @@ class CosineTransform {
   /// 1 / (4 (columns − 1) (rows − 1)).
   [[nodiscard]] double inverse_scale() const;
 
+  /// Replaces f in the buffer by the solution of Δφ = f − mean(f) of mean zero: second differences
+  /// at unit spacing, mirrored at the borders.
+  void solve_poisson();
+
   /// Eigenvalue of the negative second difference along n nodes: (2 − 2 cos(πk/(n − 1)))/spacing².
   static double eigenvalue(int k, int n, double spacing);
 

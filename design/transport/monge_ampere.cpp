@@ -34,7 +34,7 @@ class Iteration {
     for (int r = 0; r < rows_; ++r) {
       for (int c = 0; c < columns_; ++c) right[index(c, r)] = laplacian_to_be(c, r) - 2.0;
     }
-    solve_poisson();
+    transform_.solve_poisson();
     double change = 0.0;
     const std::vector<double> before = std::exchange(phi_, {right.begin(), right.end()});
     for (int r = 0; r < rows_; ++r) {
@@ -95,21 +95,6 @@ class Iteration {
                               at(phi_, c + 1, r - 1) + at(phi_, c - 1, r - 1));
     const Eigen::Vector2d landing = Eigen::Vector2d(c, r) + gradient(phi_, c, r);
     return std::sqrt(xx * xx + yy * yy + 2.0 * xy * xy + 2.0 / density(landing));
-  }
-
-  /// Replaces the transform's values f by the solution of Δφ = f − mean(f) of mean zero.
-  void solve_poisson() {
-    const auto values = transform_.values();
-    transform_.run();
-    const double scale = transform_.inverse_scale();
-    for (int r = 0; r < rows_; ++r) {
-      for (int c = 0; c < columns_; ++c) {
-        const double lambda = CosineTransform::eigenvalue(c, columns_, 1.0) +
-                              CosineTransform::eigenvalue(r, rows_, 1.0);
-        values[index(c, r)] *= c + r == 0 ? 0.0 : -scale / lambda;
-      }
-    }
-    transform_.run();
   }
 
   int columns_;

@@ -40,7 +40,7 @@ class HeightGrid {
             divergence(slope, 1, r, rows_, index(c, r), columns_);
       }
     }
-    solve_poisson();
+    transform_.solve_poisson();
     heights_.assign(values.begin(), values.end());
   }
 
@@ -68,20 +68,6 @@ class HeightGrid {
     const double behind = i > 0 ? 0.5 * (here + slope(k, node - stride)) : 0.0;
     if (i == 0) return 2.0 * ahead;
     return i + 1 == n ? -2.0 * behind : ahead - behind;
-  }
-
-  void solve_poisson() {
-    const auto values = transform_.values();
-    transform_.run();
-    for (int r = 0; r < rows_; ++r) {
-      for (int c = 0; c < columns_; ++c) {
-        const double lambda = CosineTransform::eigenvalue(c, columns_, 1.0) +
-                              CosineTransform::eigenvalue(r, rows_, 1.0);
-        double& value = values[static_cast<std::size_t>(index(c, r))];
-        value *= c + r == 0 ? 0.0 : -transform_.inverse_scale() / lambda;
-      }
-    }
-    transform_.run();
   }
 
   int columns_;

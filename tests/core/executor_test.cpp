@@ -6,7 +6,10 @@
 #include <atomic>
 #include <cmath>
 #include <stdexcept>
+#include <stop_token>
 #include <vector>
+
+#include "core/error.h"
 
 namespace lensforge {
 namespace {
@@ -78,6 +81,22 @@ TEST(Executor, AProfileCountsCallsPerKernel) {
   EXPECT_GE(profile.entries().at("a").seconds, 0.0);
   profile.clear();
   EXPECT_TRUE(profile.entries().empty());
+}
+
+TEST(Executor, AStopEndsARunningKernelAndRefusesTheNext) {
+  for (const Executor& executor : {Executor::cpu(1), Executor::cpu(2)}) {
+    std::stop_source source;
+    const Executor stoppable = executor.with_stop(source.get_token());
+    std::atomic<int> calls = 0;
+    const auto stop_early = [&](std::int64_t) {
+      ++calls;
+      source.request_stop();
+    };
+    EXPECT_THROW(parallel_for(stoppable, "stopped", 1'000'000, stop_early), Interrupted);
+    EXPECT_LT(calls, 1'000'000);
+    EXPECT_THROW(parallel_for(stoppable, "next", 1, stop_early), Interrupted);
+    EXPECT_NO_THROW(parallel_for(executor, "without", 1, stop_early));
+  }
 }
 
 }  // namespace

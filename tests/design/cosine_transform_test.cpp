@@ -82,6 +82,18 @@ TEST(CosineTransform, DiagonalizesSecondDifferences) {
   EXPECT_LT((transformed(differences) - expected).cwiseAbs().maxCoeff(), 1e-11);
 }
 
+TEST(CosineTransform, SolvesPoissonsEquationUpToTheMean) {
+  const Eigen::MatrixXd phi = random_nodes(4);
+  const Eigen::MatrixXd laplacian =
+      -second_difference(kColumns, 1.0) * phi - phi * second_difference(kRows, 1.0).transpose();
+  CosineTransform transform(kColumns, kRows);
+  Eigen::Map<Eigen::MatrixXd> buffer(transform.values().data(), kColumns, kRows);
+  buffer = laplacian.array() + 3.0;  // The mean has no solution and is dropped.
+  transform.solve_poisson();
+  const Eigen::MatrixXd offset = phi - buffer;
+  EXPECT_LT((offset.array() - offset(0, 0)).abs().maxCoeff(), 1e-12);
+}
+
 TEST(CosineTransform, EigenvaluesRunFromZeroToFourOverSquaredSpacing) {
   EXPECT_EQ(CosineTransform::eigenvalue(0, 7, 0.5), 0.0);
   EXPECT_DOUBLE_EQ(CosineTransform::eigenvalue(6, 7, 0.5), 16.0);
