@@ -20,10 +20,7 @@ GridShape grid_of(std::int64_t columns) {
 }
 
 void count_triangles(benchmark::State& state, const SurfaceMesh& mesh) {
-  state.counters["triangles"] = static_cast<double>(mesh.triangle_count());
-  state.counters["ns_per_triangle"] = benchmark::Counter(
-      static_cast<double>(mesh.triangle_count()) * 1e-9,
-      benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
+  state.SetItemsProcessed(state.iterations() * mesh.triangle_count());
 }
 
 /// Image triangles in memory → picture.
