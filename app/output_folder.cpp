@@ -33,7 +33,7 @@ void OutputFolder::remove_partial_files() const {
       partial.push_back(entry.path());
     }
   }
-  for (const fs::path& path : partial) fs::remove(path, ignored);
+  for (const fs::path& path : partial) fs::remove_all(path, ignored);
 }
 
 }  // namespace lensforge::app

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <csignal>
+#include <fstream>
 
 #include "scenario/driver.h"
 
@@ -53,6 +54,15 @@ TEST_F(DesignInterrupt, KilledAtAnyMomentAndResumedGivesTheSameLens) {
     expect_same_lens("whole", out);
     EXPECT_EQ(listing(at("whole")), listing(at(out)));
   }
+}
+
+TEST_F(DesignInterrupt, WhatAKilledRunWasWritingIsRemoved) {
+  const fs::path half = at("a") / ".lens.partial-7";
+  fs::create_directories(half);
+  std::ofstream(half / "surface.ply") << "ply";
+  std::ofstream(at("a") / ".convergence.partial-7.csv") << "stage";
+  ASSERT_EQ(run(design("a")).exit_code, 0);
+  for (const std::string& name : listing(at("a"))) EXPECT_NE(name.front(), '.') << name;
 }
 
 TEST_F(DesignInterrupt, KilledAgainAndAgainStillArrives) {
