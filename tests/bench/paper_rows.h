@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <limits>
+#include <string>
+#include <vector>
+
+/// What is designed to stand beside the figures of Sun, Deng and Zhang, "End-to-end Surface
+/// Optimization for Light Control" (Tables 1 and 2, Fig. 10).
+namespace lensforge::bench {
+
+inline constexpr double kNotGiven = std::numeric_limits<double>::quiet_NaN();
+
+/// What the paper reports for a picture of the same kind; NaN where it reports nothing.
+struct PaperFigures {
+  std::string picture;             ///< Its name there.
+  double mae = kNotGiven;          ///< Table 1: the paper's own rendering.
+  double traced_mae = kNotGiven;   ///< Table 2, column "Ours".
+  double traced_ssim = kNotGiven;  ///< Same.
+};
+
+enum class RowGroup { kPaper, kSmooth, kPhotograph, kAblation };
+
+/// One design.
+struct PaperRow {
+  std::string name;  ///< Of its folder.
+  RowGroup group = RowGroup::kPaper;
+  std::string title;                 ///< Of the picture, as printed.
+  std::string picture;               ///< File.
+  int pixels = 256;                  ///< Longer side.
+  std::vector<std::string> options;  ///< Of `lensforge design`, besides --pixels and --out.
+  PaperFigures paper;
+  std::string variant;  ///< Ablation only: what is left out.
+};
+
+/// Where the pictures lie and how far to shrink the work.
+struct RowChoice {
+  std::string fixtures;                   ///< Folder of the generated pictures.
+  std::string photographs;                ///< Folder of camera.png, rocket.jpg and text.png.
+  int most_pixels = 0;                    ///< Longer sides are cut to this; 0 leaves them.
+  int ablation_pixels = 256;              ///< Longer side of the ablation's pictures.
+  std::vector<std::string> only;          ///< Keep rows whose name contains one of these; or all.
+  std::vector<std::string> more_options;  ///< Added to every design.
+};
+
+/// All rows that `choice` asks for, in the order in which they are run: the paper's kinds
+/// first, the ablation last. Whether the pictures are there is not looked at.
+std::vector<PaperRow> choose_rows(const RowChoice& choice);
+
+/// The ablation's variants in the order of Fig. 10, "full" last.
+const std::vector<std::string>& ablation_variants();
+
+}  // namespace lensforge::bench
