@@ -32,7 +32,9 @@ TEST_P(Fixtures, BecomeALens) {
 }
 
 INSTANTIATE_TEST_SUITE_P(All, Fixtures,
-                         ::testing::Values("portrait.png", "logo.png", "rings.png", "stripes.png"),
+                         ::testing::Values("portrait.png", "logo.png", "city.png", "butterfly.png",
+                                           "relief.png", "calligraphy.png", "rings.png",
+                                           "stripes.png"),
                          [](const auto& test) {
                            const std::string name = test.param;
                            return name.substr(0, name.find('.'));
@@ -48,7 +50,8 @@ class Chain : public Scenario {
 
 TEST_F(Chain, EveryFixtureIsATestCase) {
   EXPECT_EQ(listing(LENSFORGE_PICTURES),
-            (std::vector<std::string>{"logo.png", "portrait.png", "rings.png", "stripes.png"}));
+            (std::vector<std::string>{"butterfly.png", "calligraphy.png", "city.png", "logo.png",
+                                      "portrait.png", "relief.png", "rings.png", "stripes.png"}));
 }
 
 TEST_F(Chain, APictureThatIsNotSquareKeepsItsShape) {
