@@ -240,10 +240,13 @@ std::string paper_report(const Results& results, const std::string& machine) {
 
 std::string progress_line(const PaperResult& result) {
   if (!result.done()) return result.row.name + ": " + excuse(result) + " (" + result.message + ")";
-  std::string text = result.row.name + ": MAE " + thousandths(number(own_metrics(result), "mae")) +
-                     "e-3, by ray trace " + thousandths(number(result.trace, "mae")) +
-                     "e-3, SSIM " + decimals(number(result.trace, "ssim"), 3) + ", " +
-                     decimals(result.wall_seconds, 0) + " s";
+  std::string text =
+      result.row.name + ": MAE " + thousandths(number(own_metrics(result), "mae")) + "e-3";
+  if (!result.trace.is_null()) {
+    text += ", by ray trace " + thousandths(number(result.trace, "mae")) + "e-3, SSIM " +
+            decimals(number(result.trace, "ssim"), 3);
+  }
+  text += ", " + decimals(result.wall_seconds, 0) + " s";
   return result.reused ? text + " (from an earlier run)" : text;
 }
 

@@ -99,7 +99,7 @@ class RowRun {
     result_.cpu_seconds = row["cpu_seconds"];
     result_.peak_mib = row["peak_mib"];
     result_.resumed = row["resumed"];
-    result_.trace = row["trace"];
+    if (row["asked_rays"] == programs_.rays) result_.trace = row["trace"];
     result_.reused = true;
     result_.other_build = row["build"] != asked_["build"];
     // The build that made the design stays on record when a ray trace is added to it.
@@ -145,9 +145,11 @@ class RowRun {
   }
 
   void trace() {
-    const std::vector<std::string> words = {programs_.ray_trace.string(), folder_.string(),
-                                            "--json", "--out",
-                                            (folder_ / "ray_trace.exr").string()};
+    std::vector<std::string> words = {programs_.ray_trace.string(), folder_.string(), "--json",
+                                      "--out", (folder_ / "ray_trace.exr").string()};
+    if (programs_.rays > 0) {
+      words.insert(words.end(), {"--rays", std::to_string(programs_.rays)});
+    }
     const ChildResult child = run_child(words, log("trace-out"), log("trace"));
     if (child.exit_code == 0) result_.trace = read_json(log("trace-out"));
   }
@@ -158,6 +160,7 @@ class RowRun {
     row["cpu_seconds"] = result_.cpu_seconds;
     row["peak_mib"] = result_.peak_mib;
     row["resumed"] = result_.resumed;
+    row["asked_rays"] = programs_.rays;
     row["trace"] = result_.trace;
     write_whole_file(folder_ / kRow, row.dump(2));
   }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -38,6 +39,7 @@ struct PaperPrograms {
   std::filesystem::path design;     ///< lensforge
   std::filesystem::path ray_trace;  ///< Need not be there.
   std::filesystem::path out;
+  std::int64_t rays = 0;  ///< Of each ray trace; 0 leaves it to ray_trace.
 };
 
 /// Designs a lens and ray-traces it in child processes, or takes what an earlier call left in the

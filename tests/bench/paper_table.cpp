@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cstdint>
 #include <cstdio>
 #include <exception>
 #include <string>
@@ -22,6 +23,7 @@ struct Arguments {
   RowChoice choice;
   std::string out = LENSFORGE_PAPER_OUT;
   std::string photographs = "../shared/targets";
+  std::int64_t rays = 0;
   bool list = false;
 };
 
@@ -41,6 +43,8 @@ void add_options(CLI::App& app, Arguments& arguments) {
   app.add_option("--photographs", arguments.photographs,
                  "folder of camera.png, rocket.jpg and text.png")
       ->capture_default_str();
+  app.add_option("--rays", arguments.rays, "rays of each ray trace; as ray_trace unless given")
+      ->check(CLI::PositiveNumber);
   app.add_flag("--list", arguments.list, "print the rows' names and end");
   app.footer(
       "What follows -- is added to the options of every design, such as -- --quality paper.");
@@ -54,7 +58,8 @@ void run(Arguments& arguments) {
     for (const PaperRow& row : rows) std::printf("%s\n", row.name.c_str());
     return;
   }
-  const PaperPrograms programs = {LENSFORGE_COMMAND, LENSFORGE_RAY_TRACE, arguments.out};
+  const PaperPrograms programs = {LENSFORGE_COMMAND, LENSFORGE_RAY_TRACE, arguments.out,
+                                  arguments.rays};
   require_writable_folder(programs.out);
   const std::string machine = machine_line();
   std::vector<PaperResult> results;
