@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+namespace lensforge {
+
+/// A graph with positive edge weights: its Laplacian is the Newton matrix of optimal transport.
+struct WeightedGraph {
+  struct Edge {
+    int a;
+    int b;
+    double weight;
+  };
+  int nodes = 0;
+  std::vector<Edge> edges;
+};
+
+/// Solves Σ_b weight_ab (x_a − x_b) = right_a by a supernodal Cholesky factorisation. Parts that do
+/// not hang together are held in place by a diagonal of 1e-13 relative to their own.
+/// @pre right sums to about 0.
+/// @return x up to a constant; not finite if the factorisation broke down.
+Eigen::VectorXd solve_laplacian(const WeightedGraph& graph, const Eigen::VectorXd& right);
+
+}  // namespace lensforge
