@@ -24,7 +24,8 @@ constexpr std::size_t kClusterSize = 4;
 bool is_two_dimensional(const Eigen::Matrix2Xd& sites) {
   const Eigen::Matrix2Xd offsets = sites.colwise() - sites.rowwise().mean();
   const Eigen::Matrix2d spread = offsets * offsets.transpose();
-  return spread.determinant() > 1e-12 * spread.trace() * spread.trace();
+  const double determinant = spread(0, 0) * spread(1, 1) - spread(0, 1) * spread(1, 0);
+  return determinant > 1e-12 * spread.trace() * spread.trace();
 }
 
 double extent_of(const Eigen::Matrix2Xd& sites) {
