@@ -34,4 +34,9 @@ PowerCells measure_cells(const PowerDiagram& diagram, const SummedDensity& densi
 std::vector<Moments> cell_moments(const PowerDiagram& diagram, const SummedDensity& density,
                                   const Executor& executor);
 
+/// H(w) = Σ (−∫ (|x − c|² − w) ρ dx − wanted·w), convex; its gradient by w is mass − wanted
+/// (Sun et al., 3.4 and Appendix C).
+double transport_energy(const PowerDiagram& diagram, const std::vector<Moments>& cells,
+                        const Eigen::VectorXd& wanted);
+
 }  // namespace lensforge

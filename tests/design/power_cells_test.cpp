@@ -1,0 +1,206 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "design/transport/power_cells.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stop_token>
+#include <string>
+
+#include "core/error.h"
+#include "design/finite_difference.h"
+#include "design/test_setups.h"
+#include "design/transport_scenes.h"
+
+namespace lensforge {
+namespace {
+
+using testing::Random;
+
+PowerDiagram diagram_of(const Eigen::Matrix2Xd& sites, const Eigen::VectorXd& weights) {
+  return {sites, weights, spatial_order(sites), std::stop_token()};
+}
+
+Eigen::VectorXd random_weights(Eigen::Index count, double size, Random& random) {
+  return Eigen::VectorXd::NullaryExpr(count, [&] { return random.between(-size, size); });
+}
+
+/// Largest difference of masses and moments to those of cells cut by hand, in units of the total.
+double worst_difference(const PowerDiagram& diagram, const SummedDensity& density) {
+  const Executor executor = Executor::serial();
+  const PowerCells cells = measure_cells(diagram, density, executor);
+  const std::vector<Moments> moments = cell_moments(diagram, density, executor);
+  const double size = std::max(density.columns(), density.rows());
+  double worst = 0.0;
+  for (Eigen::Index i = 0; i < diagram.sites().cols(); ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    const Moments slow =
+        testing::slow_moments(testing::power_cell(diagram.sites(), diagram.weights(), i,
+                                                  density.columns(), density.rows()),
+                              density);
+    worst = std::max(
+        {worst, std::fabs(cells.mass[k] - slow.mass), std::fabs(moments[k].mass - slow.mass),
+         std::fabs(moments[k].x - slow.x) / size, std::fabs(moments[k].y - slow.y) / size,
+         std::fabs(moments[k].second - slow.second) / (size * size)});
+  }
+  return worst / density.total();
+}
+
+TEST(PowerCells, AgreeWithCellsCutFromHalfPlanesAndPixels) {
+  Random random(3);
+  double worst = 0.0;
+  for (int round = 0; round < 12; ++round) {
+    const int columns = 3 + random.below(12);
+    const int rows = 3 + random.below(12);
+    const Image picture = testing::random_picture(columns, rows, round % 3 == 0 ? -0.5 : 0.0, 5);
+    Image clipped = picture;
+    for (float& v : clipped.values()) v = std::max(v, 0.0F);
+    const SummedDensity density(clipped, 7.0);
+    const Eigen::Matrix2Xd sites =
+        testing::random_sites(1 + random.below(40), {columns, rows}, round % 2, random);
+    const double size = round % 4 == 0 ? 0.0 : 0.3 * columns * rows / 40.0 * (1 + round);
+    worst = std::max(
+        worst,
+        worst_difference(diagram_of(sites, random_weights(sites.cols(), size, random)), density));
+  }
+  RecordProperty("worst", std::to_string(worst));
+  EXPECT_LT(worst, 1e-13);
+}
+
+TEST(PowerCells, OfSitesOnALineAreStrips) {
+  const SummedDensity density(testing::random_picture(9, 6, 0.1, 8), 1.0);
+  Random random(4);
+  for (const Eigen::Vector2d& along :
+       {Eigen::Vector2d(1, 0), Eigen::Vector2d(0.5, 0.25), Eigen::Vector2d(0, -0.5)}) {
+    Eigen::Matrix2Xd sites(2, 7);
+    for (Eigen::Index i = 0; i < 7; ++i) {
+      sites.col(i) = Eigen::Vector2d(1.0, 3.0) + static_cast<double>(i) * along;
+    }
+    EXPECT_LT(worst_difference(diagram_of(sites, random_weights(7, 0.3, random)), density), 1e-13);
+  }
+}
+
+TEST(PowerCells, OfARegularGridCoverItsCorners) {
+  // All vertices lie on pixel corners, four cells meet in each, borders run along the picture's.
+  Eigen::Matrix2Xd sites(2, 36);
+  for (int i = 0; i < 36; ++i) sites.col(i) = Eigen::Vector2d(i % 6 - 0.5, i / 6 - 0.5);
+  const SummedDensity density(testing::random_picture(4, 4, 0.1, 9), 1.0);
+  EXPECT_LT(worst_difference(diagram_of(sites, Eigen::VectorXd::Zero(36)), density), 1e-13);
+}
+
+TEST(PowerCells, ASingleSiteHoldsEverything) {
+  const SummedDensity density(testing::random_picture(5, 4, 0.1, 2), 3.0);
+  for (const Eigen::Vector2d& site : {Eigen::Vector2d(2, 2), Eigen::Vector2d(-40, 90)}) {
+    const PowerDiagram diagram = diagram_of(site, Eigen::VectorXd::Zero(1));
+    EXPECT_NEAR(measure_cells(diagram, density, Executor::serial()).mass[0], 3.0, 1e-14);
+  }
+}
+
+TEST(PowerCells, HiddenSitesHoldNothing) {
+  Random random(6);
+  Eigen::Matrix2Xd sites = testing::random_sites(30, {8, 8}, 0.0, random);
+  Eigen::VectorXd weights = Eigen::VectorXd::Zero(30);
+  weights[11] = -100.0;
+  const PowerDiagram diagram = diagram_of(sites, weights);
+  EXPECT_EQ(diagram.hidden(), std::vector<int>{11});
+  const SummedDensity density(Image(8, 8, 1.0F), 1.0);
+  EXPECT_EQ(measure_cells(diagram, density, Executor::serial()).mass[11], 0.0);
+}
+
+/// ∂mass/∂w as a dense matrix.
+Eigen::MatrixXd newton_matrix(const PowerDiagram& diagram, const SummedDensity& density) {
+  const PowerCells cells = measure_cells(diagram, density, Executor::serial());
+  Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(diagram.sites().cols(), diagram.sites().cols());
+  for (const PowerCells::Border& b : cells.borders) {
+    matrix(b.left, b.right) -= b.mass;
+    matrix(b.right, b.left) -= b.mass;
+    matrix(b.left, b.left) += b.mass;
+    matrix(b.right, b.right) += b.mass;
+  }
+  return matrix;
+}
+
+TEST(PowerCells, NewtonMatrixIsTheDerivativeOfTheMasses) {
+  Random random(7);
+  const SummedDensity density(testing::random_picture(10, 7, 0.0, 4), 5.0);
+  const Eigen::Matrix2Xd sites = testing::random_sites(25, {10, 7}, 0.3, random);
+  const Eigen::VectorXd weights = random_weights(25, 0.5, random);
+  const Eigen::MatrixXd matrix = newton_matrix(diagram_of(sites, weights), density);
+  double worst = 0.0;
+  for (Eigen::Index i = 0; i < 25; ++i) {
+    const auto mass = [&](const Eigen::VectorXd& w) {
+      return measure_cells(diagram_of(sites, w), density, Executor::serial())
+          .mass[static_cast<std::size_t>(i)];
+    };
+    worst =
+        std::max(worst, (testing::numeric_gradient(mass, weights, 1e-5) - matrix.row(i).transpose())
+                            .cwiseAbs()
+                            .maxCoeff());
+  }
+  RecordProperty("worst", std::to_string(worst));
+  // Vertices that cross a pixel border within the difference make a kink.
+  EXPECT_LT(worst, 1e-4 * matrix.cwiseAbs().maxCoeff());
+}
+
+TEST(PowerCells, EnergyGradientIsTheMassError) {
+  Random random(8);
+  const SummedDensity density(testing::random_picture(9, 9, 0.0, 11), 2.0);
+  const Eigen::Matrix2Xd sites = testing::random_sites(20, {9, 9}, 0.2, random);
+  const Eigen::VectorXd weights = random_weights(20, 0.5, random);
+  const Eigen::VectorXd wanted = Eigen::VectorXd::Constant(20, 0.1);
+  const auto energy = [&](const Eigen::VectorXd& w) {
+    const PowerDiagram diagram = diagram_of(sites, w);
+    return transport_energy(diagram, cell_moments(diagram, density, Executor::serial()), wanted);
+  };
+  const PowerCells cells = measure_cells(diagram_of(sites, weights), density, Executor::serial());
+  const Eigen::Map<const Eigen::VectorXd> mass(cells.mass.data(), 20);
+  EXPECT_LT(
+      testing::gradient_error(mass - wanted, testing::numeric_gradient(energy, weights, 1e-3)),
+      1e-6);
+}
+
+TEST(PowerCells, AreTheSameOnOneAndTwoThreads) {
+  const SummedDensity density(testing::logo_picture(64), 1.0);
+  Random random(9);
+  const Eigen::Matrix2Xd sites = testing::random_sites(5000, {64, 64}, 0.1, random);
+  const PowerDiagram diagram = diagram_of(sites, random_weights(5000, 0.5, random));
+  const PowerCells one = measure_cells(diagram, density, Executor::cpu(1));
+  const PowerCells two = measure_cells(diagram, density, Executor::cpu(2));
+  EXPECT_EQ(one.mass, two.mass);
+  ASSERT_EQ(one.borders.size(), two.borders.size());
+  for (std::size_t e = 0; e < one.borders.size(); ++e) {
+    ASSERT_EQ(one.borders[e].mass, two.borders[e].mass);
+  }
+}
+
+TEST(PowerDiagram, StopsWhileItInserts) {
+  std::stop_source stop;
+  stop.request_stop();
+  const Eigen::Matrix2Xd sites = testing::face_sites(20, 16);
+  EXPECT_THROW(PowerDiagram(sites, Eigen::VectorXd::Zero(sites.cols()), spatial_order(sites),
+                            stop.get_token()),
+               Interrupted);
+}
+
+TEST(PowerDiagram, PlacesPointsInTrianglesAndOnTheHull) {
+  Eigen::Matrix2Xd sites(2, 4);
+  sites << 0, 4, 4, 0, 0, 0, 4, 4;
+  const PowerDiagram diagram = diagram_of(sites, Eigen::VectorXd::Zero(4));
+  Eigen::Matrix2Xd points(2, 3);
+  points << 1, 9, -3, 2, 1, -5;
+  const auto places = diagram.locate(points, testing::numbers(3));
+  Eigen::Matrix2Xd expected(2, 3);
+  expected << 1, 4, 0, 2, 1, 0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    Eigen::Vector2d at = Eigen::Vector2d::Zero();
+    for (std::size_t j = 0; j < 3; ++j) {
+      at += places[k].share[static_cast<Eigen::Index>(j)] * sites.col(places[k].sites[j]);
+    }
+    EXPECT_LT((at - expected.col(static_cast<Eigen::Index>(k))).norm(), 1e-14);
+    EXPECT_NEAR(places[k].share.sum(), 1.0, 1e-15);
+  }
+}
+
+}  // namespace
+}  // namespace lensforge
