@@ -13,6 +13,7 @@ namespace {
 /// An edge's contribution to the cell on its left; that of the right gets the opposite.
 struct MassContribution {
   double mass = 0.0;
+  double area = 0.0;
   double weighted_length = 0.0;  ///< ∫ρ dℓ
   double length = 0.0;
 
@@ -21,12 +22,14 @@ struct MassContribution {
     const double dy = piece.y1 - piece.y0;
     const double middle = 0.5 * (piece.x0 + piece.x1) - piece.column;
     mass += dy * (pixel.mass + pixel.value * middle);
+    area += dy * (piece.column + middle);
     const double piece_length = std::sqrt(dx * dx + dy * dy);
     length += piece_length;
     weighted_length += pixel.value * piece_length;
   }
   void add_border(const SummedDensity& density, double y, double sign) {
     mass += sign * density.right_border(y).mass;
+    area += sign * density.columns() * y;
   }
 };
 
@@ -139,14 +142,18 @@ PowerCells measure_cells(const PowerDiagram& diagram, const SummedDensity& densi
   const auto sums = walk_all<MassContribution>(edges, density, executor);
   PowerCells cells;
   cells.mass.resize(static_cast<std::size_t>(sites.cols()));
+  cells.area.resize(static_cast<std::size_t>(sites.cols()));
   cells.borders.reserve(edges.size());
   const auto corner = static_cast<std::size_t>(corner_site(diagram, edges, density));
   cells.mass[corner] += density.total();
+  cells.area[corner] += static_cast<double>(density.columns()) * density.rows();
   for (std::size_t e = 0; e < edges.size(); ++e) {
     const auto left = static_cast<std::size_t>(edges[e].left);
     const auto right = static_cast<std::size_t>(edges[e].right);
     cells.mass[left] += sums[e].mass;
     cells.mass[right] -= sums[e].mass;
+    cells.area[left] += sums[e].area;
+    cells.area[right] -= sums[e].area;
     if (!(sums[e].length > 0.0)) continue;
     const double scale = 0.5 / (sites.col(edges[e].left) - sites.col(edges[e].right)).norm();
     cells.borders.push_back(

@@ -17,6 +17,7 @@ namespace lensforge {
 /// cell is ever cut with a pixel.
 struct PowerCells {
   std::vector<double> mass;  ///< Per site, ∫ρ over its cell.
+  std::vector<double> area;  ///< Per site, the part of the picture in its cell, pixels².
   struct Border {
     int left;
     int right;

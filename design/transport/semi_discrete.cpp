@@ -112,14 +112,19 @@ class TransportSolver {
   }
 
   /// Weights and centroids of the given sites from those of the merged ones.
-  void write(const PowerState& state, const Eigen::Matrix2Xd& sites) {
+  void write(const PowerState& state, const Eigen::Matrix2Xd& sites,
+             const Eigen::VectorXd& masses) {
     const Stage sharp = stage(0.0, 0.0);
     const PowerCells cells = measure_cells(state.diagram, sharp.density, executor_);
     const Eigen::Matrix2Xd centroids = cell_centroids(state.diagram, sharp.density, executor_);
     const Eigen::VectorXd& weights = state.diagram.weights();
+    const Image even(picture_.columns(), picture_.rows(), 1.0F);
+    const std::vector<double> areas =
+        measure_cells(state.diagram, SummedDensity(even, even.total()), executor_).mass;
     result_.mass_error = mass_error(level(0), cells);
     result_.weights.resize(sites.cols());
     result_.centroids.resize(2, sites.cols());
+    result_.areas = Eigen::VectorXd::Zero(sites.cols());
     const double mean = weights.mean();
     std::vector<int> massless;
     for (Eigen::Index i = 0; i < sites.cols(); ++i) {
@@ -130,6 +135,7 @@ class TransportSolver {
       }
       result_.weights[i] = weights[p] - mean;
       result_.centroids.col(i) = centroids.col(p);
+      result_.areas[i] = areas[static_cast<std::size_t>(p)] * masses[i] / merged_.masses[p];
     }
     write_massless(state, sites, centroids, mean, massless);
   }
@@ -300,7 +306,7 @@ TransportResult solve_semi_discrete(const Eigen::Matrix2Xd& sites, const Eigen::
     std::optional<PowerState> state;
     if (start != nullptr && start->sites.cols() == sites.cols()) state = solver.solve_warm(*start);
     if (!state) state = solver.solve_cold();
-    if (state && state->diagram.sites().cols() > 0) solver.write(*state, sites);
+    if (state && state->diagram.sites().cols() > 0) solver.write(*state, sites, masses);
     const bool good = state && result.mass_error <= options.tolerance;
     result.status =
         good ? TransportResult::Status::kConverged : TransportResult::Status::kNotConverged;

@@ -42,6 +42,9 @@ struct TransportResult {
   /// top of each other share one cell; sites without mass get the interpolated centroids of the
   /// cells around their place.
   Eigen::Matrix2Xd centroids;
+  /// n, pixels²: how much of the picture, dark parts included, a site's cell covers. Sites that share
+  /// a cell share it as they share its mass.
+  Eigen::VectorXd areas;
   double mass_error = 0.0;  ///< max |mass − wanted| / wanted over the sites of positive mass.
   std::vector<TransportStep> steps;
 
