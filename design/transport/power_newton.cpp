@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "design/transport/laplacian_solver.h"
+#include "design/transport/multigrid.h"
 
 namespace lensforge {
 
@@ -18,6 +19,15 @@ constexpr double kCouplingFloor = 1e-9;
 
 /// Halvings of a step before it is given up.
 constexpr int kMaxHalvings = 24;
+
+/// Sites above which multigrid takes over from the factorisation. Processor seconds for a Newton
+/// system on 2 cores (OpenBLAS under CHOLMOD), logo on black: equal at 14,720 sites, 0.08 against
+/// 0.2 at 58,880, 1.1 against 4 at 942,080; black pixels take no more iterations than grey ones.
+constexpr int kDirectLimit = 12000;
+
+/// Residual of the multigrid solution. Steps are as many as with exact directions (58,880 sites:
+/// 31 on a photograph, 56 on the logo, both ways); a tenth of it costs a third more time.
+constexpr double kDirectionTolerance = 1e-2;
 
 Eigen::Map<const Eigen::VectorXd> masses_of(const PowerCells& cells) {
   return {cells.mass.data(), static_cast<Eigen::Index>(cells.mass.size())};
@@ -32,6 +42,19 @@ WeightedGraph coupling(const PowerState& state, const SummedDensity& density) {
     graph.edges.push_back({b.left, b.right, b.mass + even * b.area});
   }
   return graph;
+}
+
+/// The Newton direction of the weights.
+Eigen::VectorXd newton_direction(const PowerState& state, const SummedDensity& density,
+                                 const Eigen::VectorXd& residual, const Executor& executor) {
+  const WeightedGraph graph = coupling(state, density);
+  if (graph.nodes <= kDirectLimit) return solve_laplacian(graph, residual);
+  MultigridOptions options;
+  options.tolerance = kDirectionTolerance;
+  MultigridSolution solution = solve_by_multigrid(graph, residual, options, executor);
+  // Not seen yet; the factorisation is slower but takes any weights.
+  if (!(solution.residual <= options.tolerance)) return solve_laplacian(graph, residual);
+  return std::move(solution.x);
 }
 
 }  // namespace
@@ -54,7 +77,7 @@ bool balance_masses(const SiteLevel& level, const SummedDensity& density,
   double error = mass_error(level, state.cells);
   while (error > control.mass_error) {
     const Eigen::VectorXd residual = level.masses - masses_of(state.cells);
-    const Eigen::VectorXd direction = solve_laplacian(coupling(state, density), residual);
+    const Eigen::VectorXd direction = newton_direction(state, density, residual, executor);
     if (!direction.allFinite()) return false;
     bool accepted = false;
     double length = 2.0;

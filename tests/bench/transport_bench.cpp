@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Semi-discrete optimal transport from scratch, onto a picture of 512² pixels, by the faces of a
+// grid mesh. Names read transport_PICTURE/MESH-COLUMNS; a table of Newton steps and processor
+// seconds per level follows every run. Memory is the process's peak so far: run one case alone
+// (--benchmark_filter) to learn its own.
+#include <benchmark/benchmark.h>
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <vector>
+
+#include "core/image_io.h"
+#include "design/transport/semi_discrete.h"
+#include "design/transport_scenes.h"
+
+namespace lensforge::bench {
+namespace {
+
+constexpr int kPixels = 512;
+
+struct LevelSum {
+  int sites = 0;
+  int steps = 0;
+  double wall = 0.0;
+  double cpu = 0.0;
+};
+
+void print_levels(const TransportResult& result) {
+  std::vector<LevelSum> levels;
+  for (const TransportStep& step : result.steps) {
+    const auto l = static_cast<std::size_t>(step.level);
+    if (levels.size() <= l) levels.resize(l + 1);
+    levels[l].sites = step.sites;
+    ++levels[l].steps;
+    levels[l].wall += step.seconds;
+    levels[l].cpu += step.cpu_seconds;
+  }
+  std::reverse(levels.begin(), levels.end());
+  for (const LevelSum& level : levels) {
+    std::printf("%9d sites: %3d Newton steps, %7.2f s, %7.2f s of processor time\n", level.sites,
+                level.steps, level.wall, level.cpu);
+  }
+}
+
+void transport(benchmark::State& state, const Image& picture) {
+  const Eigen::Matrix2Xd sites =
+      testing::face_sites(static_cast<int>(state.range(0)), picture.columns());
+  const Eigen::VectorXd masses = Eigen::VectorXd::Ones(sites.cols());
+  TransportResult result;
+  for (auto _ : state) {
+    result = solve_semi_discrete(sites, masses, picture, {}, Executor::cpu(2), {});
+  }
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  print_levels(result);
+  state.SetLabel(result.message);
+  state.counters["sites"] = static_cast<double>(sites.cols());
+  state.counters["steps"] = static_cast<double>(result.steps.size());
+  state.counters["mass_error"] = result.mass_error;
+  state.counters["peak_MiB"] = static_cast<double>(usage.ru_maxrss) / 1024.0;
+}
+
+void transport_even(benchmark::State& state) { transport(state, Image(kPixels, kPixels, 0.5F)); }
+
+void transport_photograph(benchmark::State& state) {
+  const std::filesystem::path file = std::filesystem::path(LENSFORGE_TARGETS) / "camera.png";
+  if (!std::filesystem::exists(file)) {
+    state.SkipWithError("the photograph is not there");
+    return;
+  }
+  transport(state, resample(read_image(file).image, kPixels, kPixels));
+}
+
+void transport_logo(benchmark::State& state) { transport(state, testing::logo_picture(kPixels)); }
+
+/// 3,680, 58,880 and 942,080 faces.
+void sizes(benchmark::internal::Benchmark* bench) {
+  bench->Unit(benchmark::kSecond)->UseRealTime()->MeasureProcessCPUTime()->Iterations(1);
+  for (const int columns : {40, 160, 640}) bench->Arg(columns);
+}
+
+BENCHMARK(transport_even)->Apply(sizes);
+BENCHMARK(transport_photograph)->Apply(sizes);
+BENCHMARK(transport_logo)->Apply(sizes);
+
+}  // namespace
+}  // namespace lensforge::bench
