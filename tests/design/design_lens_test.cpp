@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <functional>
 #include <limits>
 #include <sstream>
@@ -54,8 +55,8 @@ DesignResult design(const DesignOptions& options, const Executor& executor = Exe
   return design_lens(picture(), options, executor, control);
 }
 
-/// A design that is stopped when its iteration number `iterations` is reported; at 0 while it works
-/// on the transport map.
+/// A design that is stopped when its iteration number `iterations` on the picture is reported; at 0
+/// while it works on the transport map.
 DesignResult design_stopped_at(int iterations, const DesignOptions& options) {
   std::stop_source stop;
   int seen = 0;
@@ -77,6 +78,10 @@ TEST(DesignLens, ThreadCountDoesNotChangeABit) {
   }
 }
 
+std::ptrdiff_t count_rows(const DesignResult& result, const std::string& stage) {
+  return std::ranges::count(result.convergence, stage, &ConvergenceRow::stage);
+}
+
 /// Rows but for the time they took.
 std::string timeless_csv(std::vector<ConvergenceRow> rows) {
   for (ConvergenceRow& row : rows) row.seconds = 0.0;
@@ -93,7 +98,7 @@ TEST_P(DesignLensInterrupted, ResumesToTheSameBits) {
   options.checkpoint = folder / "checkpoint";
   const DesignResult part = design_stopped_at(GetParam(), options);
   EXPECT_EQ(part.status, Status::kInterrupted);
-  EXPECT_EQ(static_cast<int>(part.convergence.size()), GetParam());
+  EXPECT_EQ(count_rows(part, "render"), GetParam());
   EXPECT_TRUE(part.lens.surface.vertices.allFinite());
   options.resume = true;
   const DesignResult resumed = design(options);
@@ -180,29 +185,65 @@ TEST(DesignLens, ProgressRunsFromZeroToItsTotal) {
 
 TEST(DesignLens, ProgressReachesItsTotalThoughRoundsHaveNothingToDo) {
   DesignOptions options = small_options();
-  options.weights = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
-  ASSERT_TRUE(design(options).convergence.empty());
+  options.weights = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
+  ASSERT_EQ(count_rows(design(options), "render"), 0);
   expect_reports_reach_their_total(picture(), options);
 }
 
-TEST(DesignLens, ConvergenceRowsAreWellFormed) {
-  const DesignResult result = design(two_level_options());
-  ASSERT_FALSE(result.convergence.empty());
-  const ConvergenceRow* before = nullptr;
-  for (const ConvergenceRow& row : result.convergence) {
-    EXPECT_FALSE(row.stage.empty());
-    EXPECT_TRUE(std::isfinite(row.energy.total));
-    EXPECT_TRUE(row.mae > 0.0 && row.mae < 1.0);
-    if (before != nullptr && row.level == before->level && row.round == before->round) {
-      EXPECT_EQ(row.iteration, before->iteration + 1);
-      EXPECT_LE(row.energy.total, before->energy.total);
-    } else {
-      EXPECT_EQ(row.iteration, 1);
-    }
-    EXPECT_GE(row.seconds, before == nullptr ? 0.0 : before->seconds);
-    before = &row;
+void expect_well_formed(const ConvergenceRow& row) {
+  EXPECT_TRUE(std::isfinite(row.energy.total));
+  if (row.stage == "transport") {
+    EXPECT_TRUE(std::isfinite(row.mass_error) && row.mass_error >= 0.0);
+    EXPECT_EQ(row.energy.total, 0.0);
+  } else {
+    EXPECT_EQ(row.mass_error, 0.0);
   }
-  EXPECT_EQ(before->level, 1);
+  EXPECT_EQ(row.mae > 0.0 && row.mae < 1.0, row.stage == "render");
+  EXPECT_EQ(row.energy.image > 0.0, row.stage == "render");
+  EXPECT_EQ(row.energy.align > 0.0, row.stage == "update");
+}
+
+/// A row is the next iteration of the one before, or the first of another stage.
+void expect_follows(const ConvergenceRow& before, const ConvergenceRow& row) {
+  EXPECT_GE(row.seconds, before.seconds);
+  const bool same = row.level == before.level && row.round == before.round;
+  // A round may have two transports.
+  if (!same || row.stage != before.stage || (row.stage == "transport" && row.iteration == 1)) {
+    EXPECT_EQ(row.iteration, 1);
+    return;
+  }
+  EXPECT_EQ(row.iteration, before.iteration + 1);
+  if (row.stage != "transport") {
+    EXPECT_LE(row.energy.total, before.energy.total);
+  }
+}
+
+TEST(DesignLens, ConvergenceRowsAreWellFormed) {
+  DesignOptions options = two_level_options();
+  options.update_iterations = 2;
+  const DesignResult result = design(options);
+  for (const char* stage : {"transport", "update", "render"}) {
+    EXPECT_GT(count_rows(result, stage), 0) << stage;
+  }
+  for (std::size_t i = 0; i < result.convergence.size(); ++i) {
+    expect_well_formed(result.convergence[i]);
+    if (i > 0) expect_follows(result.convergence[i - 1], result.convergence[i]);
+  }
+  EXPECT_EQ(result.convergence.front().iteration, 1);
+  EXPECT_EQ(result.convergence.back().level, 1);
+}
+
+TEST(DesignLens, StagesThatAreSwitchedOffDoNotRun) {
+  DesignOptions options = small_options();
+  options.transport_rounds = 0;
+  EXPECT_EQ(count_rows(design(options), "transport"), 0);
+  EXPECT_GT(count_rows(design(options), "render"), 0);
+  options.transport_rounds = 1;
+  options.rendering_guided = false;
+  const DesignResult transported = design(options);
+  EXPECT_EQ(transported.status, Status::kDone);
+  EXPECT_GT(count_rows(transported, "transport"), 0);
+  EXPECT_EQ(count_rows(transported, "render") + count_rows(transported, "update"), 0);
 }
 
 TEST(DesignLens, ConvergenceCsvHasALineForEveryRow) {
@@ -210,17 +251,20 @@ TEST(DesignLens, ConvergenceCsvHasALineForEveryRow) {
   row.stage = "render";
   row.iteration = 7;
   row.energy.image = 0.25;
+  row.energy.align = 3.5;
+  row.energy.flux = 4.5;
+  row.mass_error = 0.75;
   row.mae = 0.125;
   std::istringstream csv(convergence_csv({row, row}));
   std::string header;
   std::string line;
   std::getline(csv, header);
   EXPECT_EQ(header,
-            "stage,level,round,iteration,image,gradient,boundary,barrier,face,edge,laplacian,total,"
-            "mae,seconds");
+            "stage,level,round,iteration,image,gradient,boundary,barrier,face,edge,laplacian,align,"
+            "flux,total,mass_error,mae,seconds");
   int lines = 0;
   while (std::getline(csv, line)) {
-    EXPECT_EQ(line, "render,0,0,7,0.25,0,0,0,0,0,0,0,0.125,0");
+    EXPECT_EQ(line, "render,0,0,7,0.25,0,0,0,0,0,0,3.5,4.5,0,0.75,0.125,0");
     ++lines;
   }
   EXPECT_EQ(lines, 2);
@@ -310,13 +354,20 @@ std::vector<BadOption> bad_options() {
           {"--levels", "0", [](O& o) { o.levels = 0; }},
           {"--rounds", "0", [](O& o) { o.rounds = 0; }},
           {"--iterations", "-1", [](O& o) { o.iterations = -1; }},
+          {"--transport-rounds", "-1", [](O& o) { o.transport_rounds = -1; }},
+          {"--update-iterations", "-1", [](O& o) { o.update_iterations = -1; }},
+          {"--spread", "-0.1", [](O& o) { o.spread = -0.1; }},
+          {"--spread", "0.96", [](O& o) { o.spread = 0.96; }},
+          {"--spread", "nan", [=](O& o) { o.spread = nan; }},
           {"--weight-image", "-1", [](O& o) { o.weights.image = -1.0; }},
           {"--weight-gradient", "nan", [=](O& o) { o.weights.gradient = nan; }},
           {"--weight-boundary", "inf", [=](O& o) { o.weights.boundary = inf; }},
           {"--weight-smooth", "-0.5", [](O& o) { o.weights.smooth = -0.5; }},
           {"--weight-barrier", "-1", [](O& o) { o.weights.barrier = -1.0; }},
           {"--weight-edge", "-1", [](O& o) { o.weights.edge = -1.0; }},
-          {"--weight-laplacian", "-1", [](O& o) { o.weights.laplacian = -1.0; }}};
+          {"--weight-laplacian", "-1", [](O& o) { o.weights.laplacian = -1.0; }},
+          {"--weight-align", "-1", [](O& o) { o.weights.align = -1.0; }},
+          {"--weight-flux", "inf", [=](O& o) { o.weights.flux = inf; }}};
 }
 
 TEST(DesignLens, BadOptionsAreRefusedByNameAndValue) {

@@ -32,8 +32,8 @@ Eigen::Matrix3Xd movable() {
 class GridPreconditionerTest : public ::testing::Test {
  protected:
   GridPreconditionerTest() : preconditioner_(kShape, kAspect, movable(), Executor::serial()) {
-    preconditioner_.xy = {0.7, 0.25, 1.0};
-    preconditioner_.z = {3.0, 0.05, 2.0};
+    preconditioner_.xy = {.scale = 0.7, .floor = 0.25, .power = 1.0, .growth = 0.6};
+    preconditioner_.z = {.scale = 3.0, .floor = 0.05, .power = 2.0, .growth = 0.0};
   }
 
   Eigen::VectorXd apply(const Eigen::VectorXd& g) {
@@ -103,21 +103,62 @@ TEST_F(GridPreconditionerTest, RootTwiceIsTheWholeForHeights) {
   EXPECT_LT((apply_root(apply_root(g)) - apply(g)).norm(), 1e-12 * apply(g).norm());
 }
 
-TEST_F(GridPreconditionerTest, HeightsAreTheInverseBiharmonicOperator) {
-  // On a cosine the operator is a number: s / (μ + λ)².
-  const double lambda = 2.0 - 2.0 * std::cos(std::numbers::pi * 2.0 / 6.0) +
-                        (2.0 - 2.0 * std::cos(std::numbers::pi / 5.0)) / (kAspect * kAspect);
-  // The operator is symmetric in plain sums, its cosines carry the roots of the end weights.
+/// A cosine of `i` half waves across and `j` along in coordinate k. The operator is symmetric in
+/// plain sums, its cosines carry the roots of the end weights.
+Eigen::VectorXd cosine_mode(int k, int i, int j) {
   Eigen::VectorXd g = Eigen::VectorXd::Zero(3 * kVertices);
   for (int v = 0; v < kVertices; ++v) {
     const int c = v % 7;
     const int r = v / 7;
     const double ends = (c == 0 || c == 6 ? 0.5 : 1.0) * (r == 0 || r == 5 ? 0.5 : 1.0);
-    g[3 * v + 2] = std::sqrt(ends) * std::cos(std::numbers::pi * 2.0 * c / 6.0) *
-                   std::cos(std::numbers::pi * r / 5.0);
+    g[3 * v + k] = std::sqrt(ends) * std::cos(std::numbers::pi * i * c / 6.0) *
+                   std::cos(std::numbers::pi * j * r / 5.0);
   }
-  const double expected = 3.0 / std::pow(0.05 + lambda, 2);
+  return g;
+}
+
+/// Eigenvalue of the grid Laplacian, by the difference of neighbours.
+double cosine_eigenvalue(int i, int j) {
+  return 2.0 - 2.0 * std::cos(std::numbers::pi * i / 6.0) +
+         (2.0 - 2.0 * std::cos(std::numbers::pi * j / 5.0)) / (kAspect * kAspect);
+}
+
+TEST_F(GridPreconditionerTest, HeightsAreTheInverseBiharmonicOperator) {
+  // On a cosine the operator is a number: s / (μ + λ)².
+  const Eigen::VectorXd g = cosine_mode(2, 2, 1);
+  const double expected = 3.0 / std::pow(0.05 + cosine_eigenvalue(2, 1), 2);
   EXPECT_LT((apply(g) - expected * g).norm(), 1e-13);
+}
+
+TEST_F(GridPreconditionerTest, GrowthDampsEveryCosineByItsEigenvalue) {
+  for (const double power : {1.0, 1.5, 2.0}) {
+    preconditioner_.z = {.scale = 3.0, .floor = 0.05, .power = power, .growth = 0.4};
+    // The lowest mode's factor magnifies rounding in all others.
+    const double tolerance = 1e-14 * 3.0 / std::pow(0.05, power);
+    for (int i = 0; i < 7; ++i) {
+      for (int j = 0; j < 6; ++j) {
+        const Eigen::VectorXd g = cosine_mode(2, i, j);
+        const double lambda = cosine_eigenvalue(i, j);
+        const double expected = 3.0 / std::pow(0.05 + lambda, power) / (1.0 + 0.4 * lambda);
+        EXPECT_LT((apply(g) - expected * g).norm(), tolerance * g.norm());
+        EXPECT_LT((apply_root(g) - std::sqrt(expected) * g).norm(), tolerance * g.norm());
+      }
+    }
+  }
+}
+
+TEST_F(GridPreconditionerTest, GrowthOfTheShiftsIsTheirOwn) {
+  GridPreconditioner free(kShape, kAspect, Eigen::Matrix3Xd::Ones(3, kVertices),
+                          Executor::serial());
+  free.xy = preconditioner_.xy;
+  free.z = preconditioner_.z;
+  for (int k = 0; k < 2; ++k) {
+    const Eigen::VectorXd g = cosine_mode(k, 3, 4);
+    const double lambda = cosine_eigenvalue(3, 4);
+    Eigen::VectorXd r;
+    free.apply(g, r);
+    EXPECT_LT((r - 0.7 / (0.25 + lambda) / (1.0 + 0.6 * lambda) * g).norm(), 1e-13);
+  }
 }
 
 TEST_F(GridPreconditionerTest, CoordinatesDoNotMix) {
