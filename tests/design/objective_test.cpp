@@ -310,8 +310,8 @@ TEST(Objective, HeldCoordinatesHaveNoGradient) {
 
 TEST(Objective, DefaultAreaBarrierIsAShareOfTheMeanTriangle) {
   const AreaBarrier barrier = default_area_barrier(kSetup, 960);
-  EXPECT_DOUBLE_EQ(barrier.lower, 0.01 * 0.5);
-  EXPECT_DOUBLE_EQ(barrier.upper, 0.05 * 0.5);
+  EXPECT_DOUBLE_EQ(barrier.lower, 0.001 * 0.5);
+  EXPECT_DOUBLE_EQ(barrier.upper, 0.005 * 0.5);
 }
 
 }  // namespace
