@@ -40,11 +40,11 @@ bool go_on(int, const DesignObjective::Evaluation&) { return true; }
 /// The lens that transport makes of a flat one.
 SurfaceMesh transported() {
   SurfaceMesh mesh = make_grid_mesh(kSize, kShape, 5.0);
-  const FaceTransport transport =
-      transport_faces(mesh, kSetup, SurfaceModel::kFacet, testing::spot_picture(28, 20),
-                      TransportOptions{}, Executor::serial(), RunControl(), nullptr);
-  EXPECT_TRUE(transport.result.converged());
-  aim_faces(transport.correspondence, kSetup, Executor::serial(), mesh);
+  const FaceLight light = face_light(mesh, kSetup, SurfaceModel::kFacet, Executor::serial());
+  const TransportResult result = transport_faces(
+      light, testing::spot_picture(28, 20), TransportOptions{}, Executor::serial(), RunControl());
+  EXPECT_TRUE(result.converged());
+  aim_faces({result.centroids, light.flux}, kSetup, Executor::serial(), mesh);
   return mesh;
 }
 
