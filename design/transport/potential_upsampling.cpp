@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <compare>
 #include <cstddef>
 #include <limits>
 #include <span>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -230,7 +230,9 @@ class Mending {
       const int giver = best_giver(i, share);
       if (giver >= 0) takings.push_back({giver, distance(giver, i), i});
     }
-    std::sort(takings.begin(), takings.end());
+    std::sort(takings.begin(), takings.end(), [](const Taking& a, const Taking& b) {
+      return std::tie(a.giver, a.distance, a.taker) < std::tie(b.giver, b.distance, b.taker);
+    });
     Eigen::VectorXd psi = psi_;
     for (std::size_t begin = 0; begin < takings.size();) {
       std::size_t end = begin;
@@ -254,7 +256,6 @@ class Mending {
     int giver;
     double distance;
     int taker;
-    auto operator<=>(const Taking&) const = default;
   };
   [[nodiscard]] double distance(int i, int j) const {
     return (level_.sites.col(i) - level_.sites.col(j)).norm();

@@ -43,8 +43,9 @@ double wall_seconds() {
 }
 double cpu_seconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
-void check_input(const Eigen::Matrix2Xd& sites, const Eigen::VectorXd& masses,
-                 const Image& density) {
+void check_input(const Eigen::Matrix2Xd& sites, const Eigen::VectorXd& masses, const Image& density,
+                 const TransportStart* start) {
+  if (sites.cols() == 0) throw InputError("transport: no sites");
   if (masses.size() != sites.cols()) {
     throw InputError("transport: " + std::to_string(sites.cols()) + " sites but " +
                      std::to_string(masses.size()) + " masses");
@@ -54,6 +55,11 @@ void check_input(const Eigen::Matrix2Xd& sites, const Eigen::VectorXd& masses,
     throw InputError("transport: a mass is negative or not finite");
   }
   if (!(masses.sum() > 0.0)) throw InputError("transport: the masses sum to 0");
+  if (start != nullptr &&
+      (start->sites.cols() != sites.cols() || start->weights.size() != sites.cols() ||
+       start->centroids.cols() != sites.cols())) {
+    throw InputError("transport: the start is of another number of sites");
+  }
   const double total = density.total();
   if (!(total > 0.0) || !std::isfinite(total)) {
     throw InputError("transport: the density sums to " + std::to_string(total));
@@ -118,9 +124,6 @@ class TransportSolver {
     const PowerCells cells = measure_cells(state.diagram, sharp.density, executor_);
     const Eigen::Matrix2Xd centroids = cell_centroids(state.diagram, sharp.density, executor_);
     const Eigen::VectorXd& weights = state.diagram.weights();
-    const Image even(picture_.columns(), picture_.rows(), 1.0F);
-    const std::vector<double> areas =
-        measure_cells(state.diagram, SummedDensity(even, even.total()), executor_).mass;
     result_.mass_error = mass_error(level(0), cells);
     result_.weights.resize(sites.cols());
     result_.centroids.resize(2, sites.cols());
@@ -135,7 +138,7 @@ class TransportSolver {
       }
       result_.weights[i] = weights[p] - mean;
       result_.centroids.col(i) = centroids.col(p);
-      result_.areas[i] = areas[static_cast<std::size_t>(p)] * masses[i] / merged_.masses[p];
+      result_.areas[i] = cells.area[static_cast<std::size_t>(p)] * masses[i] / merged_.masses[p];
     }
     write_massless(state, sites, centroids, mean, massless);
   }
@@ -296,15 +299,14 @@ class TransportSolver {
 
 TransportResult solve_semi_discrete(const Eigen::Matrix2Xd& sites, const Eigen::VectorXd& masses,
                                     const Image& density, const TransportOptions& options,
-                                    const Executor& executor, const RunControl& control,
-                                    const TransportStart* start) {
-  check_input(sites, masses, density);
+                                    const Executor& executor, const RunControl& control) {
+  check_input(sites, masses, density, options.start);
   TransportResult result;
   try {
     TransportSolver solver(merge_coincident(sites, masses), density, options, executor, control,
                            result);
     std::optional<PowerState> state;
-    if (start != nullptr && start->sites.cols() == sites.cols()) state = solver.solve_warm(*start);
+    if (options.start != nullptr) state = solver.solve_warm(*options.start);
     if (!state) state = solver.solve_cold();
     if (state && state->diagram.sites().cols() > 0) solver.write(*state, sites, masses);
     const bool good = state && result.mass_error <= options.tolerance;

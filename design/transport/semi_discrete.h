@@ -11,11 +11,21 @@
 
 namespace lensforge {
 
+/// The result of an earlier round for the same site numbers, to start from.
+struct TransportStart {
+  Eigen::Matrix2Xd sites;      ///< 2 × n, where the sites were.
+  Eigen::VectorXd weights;     ///< n
+  Eigen::Matrix2Xd centroids;  ///< 2 × n
+};
+
 struct TransportOptions {
   /// Ends when no cell's mass differs from the wanted one by more than this share of it.
   double tolerance = 1e-4;
   /// Newton steps over all levels after which the solver gives up.
   int max_newton_steps = 1000;
+  /// Where to start from; not owned. Its weights are moved along to first order. If cells start
+  /// empty and cannot be mended, or a step fails, the solver starts afresh. nullptr: from nothing.
+  const TransportStart* start = nullptr;
 };
 
 /// One Newton step, for the log.
@@ -42,20 +52,13 @@ struct TransportResult {
   /// top of each other share one cell; sites without mass get the interpolated centroids of the
   /// cells around their place.
   Eigen::Matrix2Xd centroids;
-  /// n, pixels²: how much of the picture, dark parts included, a site's cell covers. Sites that share
-  /// a cell share it as they share its mass.
+  /// n, pixels²: how much of the picture, dark parts included, a site's cell covers. Sites that
+  /// share a cell share it as they share its mass.
   Eigen::VectorXd areas;
   double mass_error = 0.0;  ///< max |mass − wanted| / wanted over the sites of positive mass.
   std::vector<TransportStep> steps;
 
   [[nodiscard]] bool converged() const { return status == Status::kConverged; }
-};
-
-/// The result of an earlier round for the same site numbers, to start from.
-struct TransportStart {
-  Eigen::Matrix2Xd sites;      ///< 2 × n, where the sites were.
-  Eigen::VectorXd weights;     ///< n
-  Eigen::Matrix2Xd centroids;  ///< 2 × n
 };
 
 /// Semi-discrete optimal transport of a picture onto sites under the squared distance (Sun et al.,
@@ -66,13 +69,10 @@ struct TransportStart {
 ///                 picture and on top of each other.
 /// @param masses   n, not negative.
 /// @param density  linear light; scaled so that its integral is the sum of the masses.
-/// @param start    optional; its weights are moved along to first order. If cells start empty and
-///                 cannot be mended, the solver starts afresh.
 /// @throw InputError if a site is not finite, a mass is negative or not finite, the masses or the
 ///        density sum to 0, or the sizes disagree.
 TransportResult solve_semi_discrete(const Eigen::Matrix2Xd& sites, const Eigen::VectorXd& masses,
                                     const Image& density, const TransportOptions& options,
-                                    const Executor& executor, const RunControl& control,
-                                    const TransportStart* start = nullptr);
+                                    const Executor& executor, const RunControl& control);
 
 }  // namespace lensforge

@@ -85,7 +85,8 @@ TEST(PowerCells, OfSitesOnALineAreStrips) {
 TEST(PowerCells, OfARegularGridCoverItsCorners) {
   // All vertices lie on pixel corners, four cells meet in each, borders run along the picture's.
   Eigen::Matrix2Xd sites(2, 36);
-  for (int i = 0; i < 36; ++i) sites.col(i) = Eigen::Vector2d(i % 6 - 0.5, i / 6 - 0.5);
+  const Eigen::Vector2d half(0.5, 0.5);
+  for (int i = 0; i < 36; ++i) sites.col(i) = Eigen::Vector2d(i % 6, i / 6) - half;
   const SummedDensity density(testing::random_picture(4, 4, 0.1, 9), 1.0);
   EXPECT_LT(worst_difference(diagram_of(sites, Eigen::VectorXd::Zero(36)), density), 1e-13);
 }

@@ -25,8 +25,10 @@ using testing::Random;
 
 TransportResult solve(const Eigen::Matrix2Xd& sites, const Image& density,
                       const TransportStart* start = nullptr) {
-  return solve_semi_discrete(sites, Eigen::VectorXd::Ones(sites.cols()), density, {},
-                             Executor::cpu(2), {}, start);
+  TransportOptions options;
+  options.start = start;
+  return solve_semi_discrete(sites, Eigen::VectorXd::Ones(sites.cols()), density, options,
+                             Executor::cpu(2), {});
 }
 
 /// Largest relative mass error, measured anew.
@@ -67,7 +69,8 @@ TEST(SemiDiscrete, BalancesAPhotograph) {
 
 TEST(SemiDiscrete, EvenPictureOfRegularSitesHasEqualWeights) {
   Eigen::Matrix2Xd sites(2, 64);
-  for (int i = 0; i < 64; ++i) sites.col(i) = Eigen::Vector2d(i % 8 + 0.5, i / 8 + 0.5);
+  const Eigen::Vector2d half(0.5, 0.5);
+  for (int i = 0; i < 64; ++i) sites.col(i) = Eigen::Vector2d(i % 8, i / 8) + half;
   const TransportResult result = solve(sites, Image(8, 8, 1.0F));
   ASSERT_TRUE(result.converged());
   EXPECT_LT(result.weights.cwiseAbs().maxCoeff(), 1e-4);
@@ -148,6 +151,12 @@ TEST(SemiDiscrete, FallsBackFromAUselessStart) {
   EXPECT_TRUE(result.converged()) << result.message;
 }
 
+TEST(SemiDiscrete, RefusesAStartOfOtherSites) {
+  const TransportStart start{Eigen::Matrix2Xd::Zero(2, 3), Eigen::VectorXd::Zero(3),
+                             Eigen::Matrix2Xd::Zero(2, 3)};
+  EXPECT_THROW(solve(testing::face_sites(4, 8), Image(8, 8, 1.0F), &start), InputError);
+}
+
 TEST(SemiDiscrete, CoincidentSitesShareACell) {
   Eigen::Matrix2Xd sites = testing::face_sites(12, 32);
   sites.col(5) = sites.col(40);
@@ -159,7 +168,6 @@ TEST(SemiDiscrete, CoincidentSitesShareACell) {
 }
 
 TEST(SemiDiscrete, SitesMayLieOutsideAndFoldOver) {
-  Random random(12);
   Eigen::Matrix2Xd sites = testing::face_sites(16, 40);
   for (Eigen::Index i = 0; i < sites.cols(); ++i) {
     const double x = sites(0, i);
