@@ -34,6 +34,7 @@ struct DesignArguments {
   std::string out;
   DesignOptions design;
   double smoothness = 1.0;
+  bool transport_alone = false;
   bool resume = false;
   bool force = false;
 };
@@ -52,7 +53,8 @@ void add_lens_options(OptionSet& options, DesignOptions& design) {
                  "picture seen on a wall from the lens's side, or on a screen from behind");
 }
 
-void add_effort_options(OptionSet& options, DesignOptions& design) {
+void add_effort_options(OptionSet& options, DesignArguments& arguments) {
+  DesignOptions& design = arguments.design;
   options.integer("--pixels", design.pixels, Limits::at_least(kLeastPixels),
                   "longer side of the working picture, never more than the picture has");
   options.number("--mesh-ratio", design.mesh_ratio, Limits::between(0.25, 8), "",
@@ -60,6 +62,14 @@ void add_effort_options(OptionSet& options, DesignOptions& design) {
   options.integer("--levels", design.levels, Limits::between(1, 16),
                   "resolutions from coarse to fine, each twice the one before");
   options.integer("--rounds", design.rounds, Limits::between(1, 1000), "rounds at each resolution");
+  options.integer("--transport-rounds", design.transport_rounds, Limits::between(0, 1000),
+                  "rounds that begin with optimal transport; 0 starts from a flat surface");
+  options.flag("--no-rendering-guided", arguments.transport_alone,
+               "leave out rendering-guided optimisation: transport alone");
+  options.number("--spread", design.spread, Limits::between(0, 0.95), "",
+                 "share of the facets spread evenly over the picture instead of the lens");
+  options.integer("--update-iterations", design.update_iterations, Limits::between(0, 10000),
+                  "most iterations of the correspondence-guided update (Sun et al., Eq. 20)");
   options.choice("--quality", design.iterations, {{"draft", 20}, {"standard", 60}, {"paper", 200}},
                  "most iterations of one round: 20, 60 or 200");
 }
@@ -80,13 +90,17 @@ void add_weight_options(OptionSet& options, DesignArguments& arguments) {
                  "bending across edges, within the smoothness terms (Eq. 17, tau 1)");
   options.number("--weight-laplacian", weights.laplacian, limits, "",
                  "evenness of the mesh, within the smoothness terms (Eq. 17, tau 2)");
+  options.number("--weight-align", weights.align, limits, "",
+                 "distance to where transport wants the light (Eq. 20, gamma 1)");
+  options.number("--weight-flux", weights.flux, limits, "",
+                 "change of the facets' flux by the update (Eq. 20, gamma 2)");
 }
 
 void add_design_options(OptionSet& options, DesignArguments& arguments) {
   options.positional("TARGET", arguments.target, "picture to project: PNG, JPEG, TIFF, EXR, ...");
   options.required_text("--out", arguments.out, "DIR", "lens folder to write");
   add_lens_options(options, arguments.design);
-  add_effort_options(options, arguments.design);
+  add_effort_options(options, arguments);
   add_weight_options(options, arguments);
   options.flag("--resume", arguments.resume,
                "go on with the interrupted design in --out, given the same picture and options");
@@ -233,6 +247,7 @@ int design_command(const Arguments& command_line) {
   add_design_options(options, arguments);
   options.parse(command_line);
   arguments.design.weights.smooth *= arguments.smoothness;
+  arguments.design.rendering_guided = !arguments.transport_alone;
   return run(options, arguments);
 }
 

@@ -2,6 +2,7 @@
 #include "design/checkpoint.h"
 
 #include <bit>
+#include <cmath>
 #include <cstddef>
 #include <cstring>
 #include <fstream>
@@ -23,7 +24,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::string_view kMagic = "lensforge checkpoint 1\n";
+constexpr std::string_view kMagic = "lensforge checkpoint 2\n";
 
 static_assert(std::endian::native == std::endian::little, "checkpoints are little-endian");
 
@@ -47,13 +48,15 @@ std::string_view bytes_of(std::span<const T> values) {
 }
 
 json to_json(const ObjectiveWeights& w) {
-  return {w.image, w.gradient, w.boundary, w.smooth, w.barrier, w.edge, w.laplacian};
+  return {w.image, w.gradient,  w.boundary, w.smooth, w.barrier,
+          w.edge,  w.laplacian, w.align,    w.flux};
 }
 
 json to_json(const ConvergenceRow& row) {
   const EnergyValues& e = row.energy;
-  return {row.stage, row.level, row.round, row.iteration, e.image, e.gradient, e.boundary,
-          e.barrier, e.face,    e.edge,    e.laplacian,   e.total, row.mae,    row.seconds};
+  return {row.stage,  row.level, row.round,      row.iteration, e.image,     e.gradient,
+          e.boundary, e.barrier, e.face,         e.edge,        e.laplacian, e.align,
+          e.flux,     e.total,   row.mass_error, row.mae,       row.seconds};
 }
 
 ConvergenceRow row_from_json(const json& j) {
@@ -64,8 +67,9 @@ ConvergenceRow row_from_json(const json& j) {
   row.iteration = j.at(3);
   EnergyValues& e = row.energy;
   int next = 4;
-  for (double* value : {&e.image, &e.gradient, &e.boundary, &e.barrier, &e.face, &e.edge,
-                        &e.laplacian, &e.total, &row.mae, &row.seconds}) {
+  for (double* value :
+       {&e.image, &e.gradient, &e.boundary, &e.barrier, &e.face, &e.edge, &e.laplacian, &e.align,
+        &e.flux, &e.total, &row.mass_error, &row.mae, &row.seconds}) {
     *value = j.at(static_cast<std::size_t>(next++));
   }
   return row;
@@ -117,6 +121,10 @@ std::uint64_t design_fingerprint(const Image& target, const DesignOptions& optio
                             options.levels,
                             options.rounds,
                             options.iterations,
+                            options.transport_rounds,
+                            options.rendering_guided,
+                            options.spread,
+                            options.update_iterations,
                             static_cast<int>(options.model),
                             static_cast<int>(options.view),
                             to_json(options.weights)};
@@ -132,6 +140,8 @@ void write_checkpoint(const Checkpoint& checkpoint, const std::filesystem::path&
   const json header = {{"fingerprint", checkpoint.fingerprint},
                        {"level", checkpoint.level},
                        {"round", checkpoint.round},
+                       {"value", std::isfinite(checkpoint.value) ? json(checkpoint.value) : json()},
+                       {"transporting", checkpoint.transporting},
                        {"seconds", checkpoint.seconds},
                        {"columns", checkpoint.mesh.grid.columns},
                        {"rows", checkpoint.mesh.grid.rows},
@@ -156,6 +166,9 @@ Checkpoint read_checkpoint(const std::filesystem::path& path) {
     checkpoint.fingerprint = parts.header.at("fingerprint");
     checkpoint.level = parts.header.at("level");
     checkpoint.round = parts.header.at("round");
+    const json& value = parts.header.at("value");
+    if (!value.is_null()) checkpoint.value = value;
+    checkpoint.transporting = parts.header.at("transporting");
     checkpoint.seconds = parts.header.at("seconds");
     for (const json& row : parts.header.at("convergence")) {
       checkpoint.convergence.push_back(row_from_json(row));

@@ -8,6 +8,7 @@
 #include "core/image.h"
 #include "core/surface_mesh.h"
 #include "design/design_lens.h"
+#include "design/energy/barrier.h"
 
 namespace lensforge {
 
@@ -16,8 +17,10 @@ struct Checkpoint {
   std::uint64_t fingerprint = 0;  ///< Of picture and options, see design_fingerprint().
   int level = 0;                  ///< Level and round to be done next.
   int round = 0;
-  double seconds = 0.0;  ///< Spent so far.
-  SurfaceMesh mesh;      ///< A grid mesh.
+  double value = kInfinity;  ///< Objective after the level's last round.
+  bool transporting = true;  ///< The level's next round may begin with transport.
+  double seconds = 0.0;      ///< Spent so far.
+  SurfaceMesh mesh;          ///< A grid mesh.
   std::vector<ConvergenceRow> convergence;
 };
 

@@ -11,19 +11,25 @@
 #include "core/error.h"
 #include "core/image_io.h"
 #include "design/checkpoint.h"
+#include "design/face_transport.h"
 #include "design/grid_mesh.h"
+#include "design/guided_optimization.h"
 #include "design/level_plan.h"
 #include "design/render_lens.h"
-#include "design/rendering_guided.h"
-#include "design/transport/transport_start.h"
+#include "design/transport/vertex_spread.h"
 
 namespace lensforge {
 
 namespace {
 
-/// A level's remaining rounds are skipped when one has lowered the objective by less than this
-/// share: L-BFGS started afresh at a stationary point finds nothing either.
+/// A round that lowers the objective by less than this share has brought nothing: if it began with
+/// transport, the level's further rounds do without; if not, the level ends.
 constexpr double kIdleRound = 1e-3;
+
+/// Mass error that ends a transport, and the Newton steps after which it goes as far as it came:
+/// what is left is below the error of taking a face's light for a point.
+constexpr double kTransportTolerance = 1e-2;
+constexpr int kMostNewtonSteps = 150;
 
 /// Shortest side of a working picture: below it there is nothing to shape.
 constexpr int kLeastPixels = 4;
@@ -70,6 +76,8 @@ void validate_weights(const ObjectiveWeights& w) {
   check("--weight-barrier", w.barrier);
   check("--weight-edge", w.edge);
   check("--weight-laplacian", w.laplacian);
+  check("--weight-align", w.align);
+  check("--weight-flux", w.flux);
 }
 
 void validate_options(const DesignOptions& o) {
@@ -85,6 +93,10 @@ void validate_options(const DesignOptions& o) {
   require(o.levels >= 1, "--levels", o.levels, "must be at least 1");
   require(o.rounds >= 1, "--rounds", o.rounds, "must be at least 1");
   require(o.iterations >= 1, "--iterations", o.iterations, "must be at least 1");
+  require(o.transport_rounds >= 0, "--transport-rounds", o.transport_rounds, "must be at least 0");
+  require(o.update_iterations >= 0, "--update-iterations", o.update_iterations,
+          "must be at least 0");
+  require(o.spread >= 0.0 && o.spread <= 0.95, "--spread", o.spread, "must be 0 to 0.95");
   validate_weights(o.weights);
 }
 
@@ -133,78 +145,162 @@ class Schedule {
     }
   }
 
+  /// What is to be solved at one resolution.
+  struct Problem {
+    OpticalSetup setup;
+    Image target;
+    ObjectiveOptions objective;
+  };
+
+  [[nodiscard]] Problem make_problem(const Level& level) const {
+    Problem problem;
+    problem.setup = setup_;
+    problem.setup.pixels = level.pixels;
+    problem.target = resample(target_, level.pixels.x(), level.pixels.y());
+    problem.objective.weights = options_.weights;
+    problem.objective.model = options_.model;
+    problem.objective.nu = level.nu;
+    problem.objective.area = default_area_barrier(problem.setup, state_.mesh.triangle_count());
+    return problem;
+  }
+
   void run_level() {
     const Level& level = levels_[static_cast<std::size_t>(state_.level)];
-    OpticalSetup setup = setup_;
-    setup.pixels = level.pixels;
-    const Image target = resample(target_, level.pixels.x(), level.pixels.y());
     if (state_.mesh.grid != level.grid) {
-      state_.mesh = regrid(state_.mesh, setup.lens_size, level.grid);
+      state_.mesh = regrid(state_.mesh, setup_.lens_size, level.grid);
     }
-    if (state_.level == 0 && state_.round == 0) {
-      stopped_ = !start(target, setup);
-      if (stopped_) return;
-    }
-    ObjectiveOptions objective;
-    objective.weights = options_.weights;
-    objective.model = options_.model;
-    objective.nu = level.nu;
-    objective.area = default_area_barrier(setup, state_.mesh.triangle_count());
-    RenderingGuided stage(state_.mesh, setup, target, objective,
-                          executor_.with_stop(control_.stop_token()));
-    relax(stage);
-    while (state_.round < options_.rounds && !ended()) run_round(stage);
+    const Problem problem = make_problem(level);
+    GuidedOptimization stage(state_.mesh, problem.setup, problem.target, problem.objective,
+                             stoppable_);
+    while (state_.round < options_.rounds && !ended()) run_round(problem, stage);
     if (ended()) return;
     state_.round = 0;
+    state_.value = kInfinity;
+    state_.transporting = true;
     ++state_.level;
     save();
   }
 
-  /// Starts the mesh from the transport map; false if asked to stop.
-  bool start(const Image& target, const OpticalSetup& setup) {
-    const auto pass_on = [this](const Progress& p) { report(p.stage, 0); };
-    return start_from_transport(target, setup, RunControl(control_.stop_token(), pass_on),
-                                state_.mesh);
+  /// One alternation of Sun et al., section 3.4.
+  void run_round(const Problem& problem, GuidedOptimization& stage) {
+    const SurfaceMesh before = state_.mesh;
+    rest_on_thickness(state_.mesh, options_.thickness);
+    const bool transports = state_.transporting && state_.round < options_.transport_rounds;
+    if (transports) transport(problem);
+    relax(stage);
+    if (options_.rendering_guided) follow_picture(stage);
+    if (ended()) return;
+    const double value = stage.value(state_.mesh);
+    const bool idle = value >= (1.0 - kIdleRound) * state_.value;
+    if (value <= state_.value) {
+      state_.value = value;
+    } else {
+      state_.mesh = before;
+    }
+    if (idle) state_.transporting = false;
+    state_.round = idle && !transports ? options_.rounds : state_.round + 1;
+    if (state_.round < options_.rounds) save();
+  }
+
+  /// The correspondence-guided half of a round; the mesh stays as it is where transport finds
+  /// nothing. Works on a copy: a mesh that an interruption left between two steps would be of no
+  /// use.
+  void transport(const Problem& problem) {
+    SurfaceMesh mesh = state_.mesh;
+    std::optional<Matching> matching = match(problem, mesh);
+    if (matching && state_.level == 0 && state_.round == 0 && options_.spread > 0.0) {
+      if (!spread_vertices(matching->areas / matching->areas.sum(), options_.spread, problem.setup,
+                           stoppable_, RunControl(control_.stop_token(), {}), mesh)) {
+        throw Interrupted();
+      }
+      matching = match(problem, mesh);
+    }
+    if (!matching) {
+      state_.transporting = false;
+      return;
+    }
+    aim_faces(matching->wanted, problem.setup, stoppable_, mesh);
+    if (options_.update_iterations > 0) {
+      follow_correspondence(problem, std::move(matching->wanted), mesh);
+    }
+    state_.mesh = std::move(mesh);
+  }
+
+  struct Matching {
+    Correspondence wanted;
+    Eigen::VectorXd areas;
+  };
+
+  /// Transport of a mesh's light to the picture; nothing if it has not come near.
+  [[nodiscard]] std::optional<Matching> match(const Problem& problem, const SurfaceMesh& mesh) {
+    const auto pass_on = [this](const Progress& p) { report(p.detail, 0); };
+    TransportOptions options;
+    options.tolerance = kTransportTolerance;
+    options.max_newton_steps = kMostNewtonSteps;
+    FaceLight light = face_light(mesh, problem.setup, options_.model, stoppable_);
+    TransportResult result = transport_faces(light, problem.target, options, stoppable_,
+                                             RunControl(control_.stop_token(), pass_on));
+    if (result.status == TransportResult::Status::kStopped) throw Interrupted();
+    int number = 0;
+    for (const TransportStep& step : result.steps) {
+      ConvergenceRow row;
+      row.stage = "transport";
+      row.level = state_.level;
+      row.round = state_.round;
+      row.iteration = ++number;
+      row.mass_error = step.mass_error;
+      row.seconds = seconds();
+      state_.convergence.push_back(row);
+    }
+    if (result.centroids.cols() == 0) return std::nullopt;
+    return Matching{{std::move(result.centroids), std::move(light.flux)}, std::move(result.areas)};
+  }
+
+  void follow_correspondence(const Problem& problem, Correspondence wanted, SurfaceMesh& mesh) {
+    GuidedOptimization update(mesh, problem.setup, std::move(wanted), problem.objective,
+                              stoppable_);
+    if (!std::isfinite(update.value(mesh))) return;
+    LbfgsOptions optimizer;
+    optimizer.max_iterations = options_.update_iterations;
+    update.run(optimizer, observer("update"), mesh);
   }
 
   /// Draws the mesh's x and y back towards the even grid until no barrier refuses it.
-  void relax(RenderingGuided& stage) {
+  void relax(GuidedOptimization& stage) {
     const SurfaceMesh flat = make_grid_mesh(setup_.lens_size, state_.mesh.grid, 0.0);
     const SurfaceMesh fine = state_.mesh;
-    for (int step = 1; !stage.feasible(state_.mesh) && step <= kRelaxSteps; ++step) {
+    for (int step = 1; !std::isfinite(stage.value(state_.mesh)) && step <= kRelaxSteps; ++step) {
       const double share = static_cast<double>(step) / kRelaxSteps;
       state_.mesh.vertices.topRows<2>() =
           (1.0 - share) * fine.vertices.topRows<2>() + share * flat.vertices.topRows<2>();
     }
   }
 
-  /// One alternation of Sun et al., section 3.4, of which only the rendering-guided half is done.
-  void run_round(RenderingGuided& stage) {
-    rest_on_thickness(state_.mesh, options_.thickness);
+  /// The rendering-guided half of a round.
+  void follow_picture(GuidedOptimization& stage) {
     LbfgsOptions optimizer;
     optimizer.max_iterations = options_.iterations;
-    const LbfgsSummary summary = stage.run(
-        optimizer,
-        [this](int iteration, const DesignObjective::Evaluation& e) {
-          return record(iteration, e);
-        },
-        state_.mesh);
+    const LbfgsSummary summary = stage.run(optimizer, observer("render"), state_.mesh);
     stopped_ = summary.status == LbfgsSummary::Status::kStopped;
     if (summary.status == LbfgsSummary::Status::kInfeasibleStart) failure_ = summary.message;
-    if (ended()) return;
-    const double fall = summary.initial_value - summary.value;
-    const bool idle = fall <= kIdleRound * summary.initial_value;
-    state_.round = idle ? options_.rounds : state_.round + 1;
-    if (state_.round < options_.rounds) save();
   }
 
-  bool record(int iteration, const DesignObjective::Evaluation& e) {
-    state_.convergence.push_back(
-        {"render", state_.level, state_.round, iteration, e.energy, e.mae, seconds()});
-    char detail[64];
-    std::snprintf(detail, sizeof(detail), "MAE %.4f", e.mae);
-    report(detail, iteration);
-    return !control_.stop_requested();
+  GuidedOptimization::Observer observer(const char* stage) {
+    return [this, stage](int iteration, const DesignObjective::Evaluation& e) {
+      ConvergenceRow row;
+      row.stage = stage;
+      row.level = state_.level;
+      row.round = state_.round;
+      row.iteration = iteration;
+      row.energy = e.energy;
+      row.mae = e.mae;
+      row.seconds = seconds();
+      state_.convergence.push_back(row);
+      char detail[64];
+      std::snprintf(detail, sizeof(detail), "MAE %.4f", e.mae);
+      report(detail, iteration);
+      return !control_.stop_requested();
+    };
   }
 
   void report(const std::string& detail, int iteration) const {
@@ -267,6 +363,7 @@ class Schedule {
   const DesignOptions& options_;
   const Executor& executor_;
   const RunControl& control_;
+  Executor stoppable_ = executor_.with_stop(control_.stop_token());
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
   double spent_before_ = 0.0;
   Image target_;
@@ -296,14 +393,17 @@ DesignResult design_lens(const Image& target, const DesignOptions& options,
 std::string convergence_csv(const std::vector<ConvergenceRow>& rows) {
   std::ostringstream out;
   out.precision(9);
-  out << "stage,level,round,iteration,image,gradient,boundary,barrier,face,edge,laplacian,total,"
-         "mae,seconds\n";
+  out << "stage,level,round,iteration,image,gradient,boundary,barrier,face,edge,laplacian,align,"
+         "flux,total,mass_error,mae,seconds\n";
   for (const ConvergenceRow& r : rows) {
     const EnergyValues& e = r.energy;
-    out << r.stage << ',' << r.level << ',' << r.round << ',' << r.iteration << ',' << e.image
-        << ',' << e.gradient << ',' << e.boundary << ',' << e.barrier << ',' << e.face << ','
-        << e.edge << ',' << e.laplacian << ',' << e.total << ',' << r.mae << ',' << r.seconds
-        << '\n';
+    out << r.stage << ',' << r.level << ',' << r.round << ',' << r.iteration;
+    for (const double value :
+         {e.image, e.gradient, e.boundary, e.barrier, e.face, e.edge, e.laplacian, e.align, e.flux,
+          e.total, r.mass_error, r.mae, r.seconds}) {
+      out << ',' << value;
+    }
+    out << '\n';
   }
   return out.str();
 }

@@ -26,8 +26,15 @@ struct DesignOptions {
   /// closer than over coarse levels (256² photograph: MAE 0.055 with one level, 0.064 with two,
   /// 0.10 with four).
   int levels = 1;
-  int rounds = 6;       ///< Alternations per level, ≥ 1 (Sun et al., section 3.4).
-  int iterations = 60;  ///< Most L-BFGS iterations of one round, ≥ 1.
+  int rounds = 6;  ///< Alternations per level, ≥ 1 (Sun et al., section 3.4).
+  /// Rounds of a level that begin with transport, ≥ 0; 0 starts from a flat surface.
+  int transport_rounds = 6;
+  bool rendering_guided = true;  ///< False leaves the rounds their transport alone.
+  /// Share of the facets that is spread evenly over the picture instead of the lens, 0 … 0.95; see
+  /// spread_vertices().
+  double spread = 0.5;
+  int update_iterations = 0;  ///< Most L-BFGS iterations on Sun et al., Eq. 20, in a round, ≥ 0.
+  int iterations = 60;        ///< Most L-BFGS iterations of one round, ≥ 1.
   SurfaceModel model = SurfaceModel::kFacet;  ///< What is optimised.
   ViewSide view = ViewSide::kFront;
   ObjectiveWeights weights;
@@ -37,14 +44,18 @@ struct DesignOptions {
   bool resume = false;
 };
 
-/// One iteration of the optimiser, a row of convergence.csv.
+/// One iteration, a row of convergence.csv.
 struct ConvergenceRow {
+  /// "transport" for a Newton step, "update" for a step of the correspondence-guided update,
+  /// "render" for one of rendering-guided optimisation.
   std::string stage;
   int level = 0;
   int round = 0;
   int iteration = 0;
-  EnergyValues energy;   ///< Unweighted terms and their weighted total.
-  double mae = 0.0;      ///< Display-encoded, at the level's resolution.
+  EnergyValues energy;      ///< Unweighted terms and their weighted total.
+  double mass_error = 0.0;  ///< Of a Newton step: max |mass − wanted| / wanted over the cells.
+  /// Display-encoded, at the level's resolution; 0 where no picture is rendered.
+  double mae = 0.0;
   double seconds = 0.0;  ///< Since the start of the design, interruptions not counted.
 };
 

@@ -59,11 +59,11 @@ void add_fit_equations(const NeighbourOffset& offset, double weight, Eigen::Matr
 
 AreaBarrier default_area_barrier(const OpticalSetup& setup, std::int64_t triangles) {
   const double mean = setup.lens_size.prod() / static_cast<double>(triangles);
-  return {0.01 * mean, 0.05 * mean};
+  return {0.001 * mean, 0.005 * mean};
 }
 
 DesignObjective::DesignObjective(const SurfaceMesh& mesh, const OpticalSetup& setup,
-                                 const Image& target, const ObjectiveOptions& options,
+                                 const DesignGoal& goal, const ObjectiveOptions& options,
                                  const Executor& executor)
     : executor_(executor),
       options_(options),
@@ -72,15 +72,19 @@ DesignObjective::DesignObjective(const SurfaceMesh& mesh, const OpticalSetup& se
       triangles_(mesh.triangles),
       topology_(make_topology(mesh)),
       movable_(movable_coordinates(mesh.vertices, setup.lens_size)),
-      target_(encoded_values(target)),
-      target_total_(target.total()),
       frames_(at(mesh.triangle_count())),
       maps_(at(mesh.triangle_count())),
       edge_weights_(Eigen::Matrix3Xd::Zero(3, mesh.triangle_count())),
-      flux_(target.columns(), target.rows()),
-      cotangent_(target.columns(), target.rows()),
-      error_(target_.size()),
+      flux_(setup.pixels.x(), setup.pixels.y()),
+      cotangent_(setup.pixels.x(), setup.pixels.y()),
       corner_bar_(at(mesh.triangle_count())) {
+  if (const Image* target = std::get_if<Image>(&goal)) {
+    target_ = encoded_values(*target);
+    target_total_ = target->total();
+    error_.resize(target_.size());
+  } else {
+    correspondence_ = std::get<Correspondence>(goal);
+  }
   if (options.model == SurfaceModel::kSmooth) {
     landing_.resize(2, mesh.vertex_count());
     vertex_normals_.resize(3, mesh.vertex_count());
@@ -213,18 +217,29 @@ void DesignObjective::compare_picture(std::span<const double> flux, Evaluation& 
   cotangent_.prepare(executor_);
 }
 
-/// Smooth model: derivatives by the landing points, carried to positions and normal sums.
-void DesignObjective::pull_back_vertices(const Eigen::Matrix3Xd& vertices, Evaluation& result) {
+/// Weighted derivatives of what the goal says of one image triangle.
+DesignObjective::GoalValues DesignObjective::goal_adjoint(std::int64_t face,
+                                                          const ImageTriangle& image,
+                                                          ImageTriangle& bar) const {
+  const ObjectiveWeights& w = options_.weights;
   const double columns = flux_.columns();
   const double rows = flux_.rows();
+  if (correspondence_) {
+    return {0.0, correspondence_term(image, correspondence_->centroids.col(face),
+                                     correspondence_->flux[face], columns * rows, w, bar)};
+  }
+  bar = deposit_adjoint(image, cotangent_.view());
+  return {boundary_term(image, columns, rows, w.boundary, bar), {}};
+}
+
+/// Smooth model: derivatives by the landing points, carried to positions and normal sums.
+DesignObjective::GoalValues DesignObjective::pull_back_vertices(const Eigen::Matrix3Xd& vertices) {
   const auto gather_face = [&](std::int64_t i) {
-    const ImageTriangle image = image_triangle(vertices, i);
-    triangle_bar_[at(i)] = deposit_adjoint(image, cotangent_.view());
-    return std::array<double, 1>{
-        boundary_term(image, columns, rows, options_.weights.boundary, triangle_bar_[at(i)])};
+    triangle_bar_[at(i)] = {};
+    const GoalValues v = goal_adjoint(i, image_triangle(vertices, i), triangle_bar_[at(i)]);
+    return std::array<double, 3>{v.boundary, v.correspondence.align, v.correspondence.flux};
   };
-  result.energy.boundary =
-      parallel_sum<1>(executor_, "flux adjoint", triangles_.cols(), gather_face)[0];
+  const auto sums = parallel_sum<3>(executor_, "flux adjoint", triangles_.cols(), gather_face);
   const auto pull = [&](std::int64_t v) {
     Eigen::Vector2d u_bar = Eigen::Vector2d::Zero();
     const auto k = at(v);
@@ -241,26 +256,27 @@ void DesignObjective::pull_back_vertices(const Eigen::Matrix3Xd& vertices, Evalu
     vertex_normal_bar_.col(v) = normalize_adjoint(normal.n, normal.length, n_bar);
   };
   parallel_for(executor_, "pull back vertices", vertices.cols(), pull);
+  return {sums[0], {sums[1], sums[2]}};
 }
 
-/// The picture's derivative by one face; returns E_bdr of the face (0 in the smooth model, where
-/// pull_back_vertices() has counted it).
-double DesignObjective::image_adjoint(std::int64_t face, const Corners& t, FaceBar& bar) const {
+/// The goal's derivative by one face; returns its values (0 in the smooth model, where
+/// pull_back_vertices() has counted them).
+DesignObjective::GoalValues DesignObjective::image_adjoint(std::int64_t face, const Corners& t,
+                                                           FaceBar& bar) const {
   if (options_.model == SurfaceModel::kFacet) {
     const Eigen::Vector3d& n = frames_[at(face)].n;
     const RefractedBeam beam(n, optics_.eta);
     const ImageTriangle image = project_facet(t, beam, optics_, lens_area_);
-    ImageTriangle image_bar = deposit_adjoint(image, cotangent_.view());
-    const double boundary =
-        boundary_term(image, flux_.columns(), flux_.rows(), options_.weights.boundary, image_bar);
+    ImageTriangle image_bar;
+    const GoalValues values = goal_adjoint(face, image, image_bar);
     bar.frame.n += project_facet_adjoint(t, n, beam, optics_, image_bar, bar.corners);
     bar.area_normal.z() += 0.5 * image_bar.flux / lens_area_;
-    return boundary;
+    return values;
   }
   const auto v = triangles_.col(face);
   for (int k = 0; k < 3; ++k) bar.area_normal += vertex_normal_bar_.col(v[k]);
   bar.area_normal.z() += 0.5 * triangle_bar_[at(face)].flux / lens_area_;
-  return 0.0;
+  return {};
 }
 
 /// Weighted derivatives of a face's barriers; returns its E_barr.
@@ -301,31 +317,31 @@ DesignObjective::Smoothness DesignObjective::smoothness_adjoint(std::int64_t fac
   return values;
 }
 
-void DesignObjective::pull_back_faces(const Eigen::Matrix3Xd& vertices, Evaluation& result) {
+DesignObjective::GoalValues DesignObjective::pull_back_faces(const Eigen::Matrix3Xd& vertices,
+                                                             EnergyValues& energy) {
   const bool smooth = options_.weights.smooth > 0.0;
   const auto pull = [&](std::int64_t i) {
     const Corners t = corners(vertices, i);
     const double doubled_area = frames_[at(i)].n.dot(area_normal(t));  // |N|, without its root
     FaceBar bar;
-    std::array<double, 4> values{};
-    values[0] = image_adjoint(i, t, bar);
-    values[1] = barrier_adjoint(i, t, bar);
+    const GoalValues goal = image_adjoint(i, t, bar);
+    const double barrier = barrier_adjoint(i, t, bar);
+    Smoothness smoothness;
     if (smooth) {
-      const Smoothness smoothness = smoothness_adjoint(i, doubled_area, bar);
-      values[2] = smoothness.face;
-      values[3] = smoothness.edge;
+      smoothness = smoothness_adjoint(i, doubled_area, bar);
       tangent_adjoint(t, frames_[at(i)], bar.frame, bar.corners);
     }
     bar.area_normal += normalize_adjoint(frames_[at(i)].n, doubled_area, bar.frame.n);
     area_normal_adjoint(t, bar.area_normal, bar.corners);
     corner_bar_[at(i)] = bar.corners;
-    return values;
+    return std::array<double, 6>{goal.boundary, goal.correspondence.align, goal.correspondence.flux,
+                                 barrier,       smoothness.face,           smoothness.edge};
   };
-  const auto sums = parallel_sum<4>(executor_, "face adjoint", triangles_.cols(), pull);
-  if (options_.model == SurfaceModel::kFacet) result.energy.boundary = sums[0];
-  result.energy.barrier = sums[1];
-  result.energy.face = sums[2];
-  if (smooth) result.energy.edge = sums[3] + edge_offset_;
+  const auto sums = parallel_sum<6>(executor_, "face adjoint", triangles_.cols(), pull);
+  energy.barrier = sums[3];
+  energy.face = sums[4];
+  if (smooth) energy.edge = sums[5] + edge_offset_;
+  return {sums[0], {sums[1], sums[2]}};
 }
 
 void DesignObjective::gather_vertices(Eigen::Matrix3Xd& gradient) {
@@ -350,16 +366,23 @@ DesignObjective::Evaluation DesignObjective::evaluate(const Eigen::Matrix3Xd& ve
   if (!std::isfinite(measure_faces(vertices))) return result;
   if (options_.model == SurfaceModel::kSmooth && !land_vertices(vertices)) return result;
   result.feasible = true;
-  const auto source = [&](std::int64_t i) { return image_triangle(vertices, i); };
-  compare_picture(flux_.render(executor_, triangles_.cols(), source), result);
+  if (!correspondence_) {
+    const auto source = [&](std::int64_t i) { return image_triangle(vertices, i); };
+    compare_picture(flux_.render(executor_, triangles_.cols(), source), result);
+  }
   if (options_.weights.smooth > 0.0) fit_maps(vertices);
-  if (options_.model == SurfaceModel::kSmooth) pull_back_vertices(vertices, result);
-  pull_back_faces(vertices, result);
+  const bool smooth_model = options_.model == SurfaceModel::kSmooth;
+  const GoalValues by_vertex = smooth_model ? pull_back_vertices(vertices) : GoalValues{};
+  const GoalValues by_face = pull_back_faces(vertices, result.energy);
+  const GoalValues& goal = smooth_model ? by_vertex : by_face;
   gradient.resize(3, vertices.cols());
   gather_vertices(gradient);
 
   const ObjectiveWeights& w = options_.weights;
   EnergyValues& e = result.energy;
+  e.boundary = goal.boundary;
+  e.align = goal.correspondence.align;
+  e.flux = goal.correspondence.flux;
   const double pixel_area_scale = std::fabs(optics_.plane.pixels_per_mm().prod());
   if (w.smooth * w.laplacian > 0.0) {
     e.laplacian =
@@ -368,6 +391,7 @@ DesignObjective::Evaluation DesignObjective::evaluate(const Eigen::Matrix3Xd& ve
   }
   gradient.array() *= movable_.array();
   e.total = w.image * e.image + w.gradient * e.gradient + w.boundary * e.boundary +
+            w.align * e.align + w.flux * e.flux +
             w.smooth * (e.face + w.edge * e.edge + w.laplacian * e.laplacian) +
             w.barrier * e.barrier;
   return result;

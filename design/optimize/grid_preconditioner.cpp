@@ -28,6 +28,7 @@ GridPreconditioner::GridPreconditioner(const GridShape& shape, double aspect,
                                        const Eigen::Matrix3Xd& movable, const Executor& executor)
     : shape_(shape),
       movable_(movable),
+      sizes_(Eigen::VectorXd::Ones(movable.cols())),
       executor_(executor),
       eigen_x_(second_difference_eigenvalues(shape.columns, 1.0)),
       eigen_y_(second_difference_eigenvalues(shape.rows, aspect)),
@@ -43,6 +44,9 @@ void GridPreconditioner::apply_coordinate(const Eigen::VectorXd& g, int k, doubl
   const int columns = shape_.columns;
   const int rows = shape_.rows;
   const double normalize = std::pow(symbol.scale, exponent) * transform.inverse_scale();
+  const auto freedom = [&](Eigen::Index v) {
+    return movable_(k, v) * std::pow(sizes_[v], symbol.size_power * exponent);
+  };
   const auto each = [&](const auto& body) {
     for (int row = 0; row < rows; ++row) {
       for (int column = 0; column < columns; ++column) {
@@ -52,17 +56,19 @@ void GridPreconditioner::apply_coordinate(const Eigen::VectorXd& g, int k, doubl
     }
   };
   each([&](Eigen::Index v, int, int, double weight) {
-    data[v] = movable_(k, v) * g[3 * v + k] / weight;
+    data[v] = freedom(v) * g[3 * v + k] / weight;
   });
   transform.run();
   const double power = -symbol.power * exponent;
   each([&](Eigen::Index v, int column, int row, double) {
-    const double base = symbol.floor + eigen_x_[column] + eigen_y_[row];
-    data[v] *= normalize * (power == -2.0 ? 1.0 / (base * base) : std::pow(base, power));
+    const double lambda = eigen_x_[column] + eigen_y_[row];
+    const double base = symbol.floor + lambda;
+    const double decay = power == -2.0 ? 1.0 / (base * base) : std::pow(base, power);
+    data[v] *= normalize * decay * std::pow(1.0 + symbol.growth * lambda, -exponent);
   });
   transform.run();
   each([&](Eigen::Index v, int, int, double weight) {
-    r[3 * v + k] = movable_(k, v) * data[v] * weight;
+    r[3 * v + k] = freedom(v) * data[v] * weight;
   });
 }
 

@@ -31,16 +31,18 @@ TEST(CorrespondenceTerm, IsTheSquaredDistanceOfTheCentroidAndTheSquaredExcessOfF
   // Centroid (3, 4), wanted at (1, 5); of 1/100 of the light 1/120 is wanted, of 480 pixels 4.8
   // and 4.
   ImageTriangle bar;
-  const CorrespondenceValues v = correspondence_term(
-      {{1.0, 2.0}, {5.0, 4.0}, {3.0, 6.0}, 0.01}, {1.0, 5.0}, 1.0 / 120.0, kPixels, 2.0, 3.0, bar);
+  const CorrespondenceValues v =
+      correspondence_term({{1.0, 2.0}, {5.0, 4.0}, {3.0, 6.0}, 0.01}, {1.0, 5.0}, 1.0 / 120.0,
+                          kPixels, {.align = 2.0, .flux = 3.0}, bar);
   EXPECT_DOUBLE_EQ(v.align, 4.0 + 1.0);
   EXPECT_NEAR(v.flux, 0.64, 1e-13);
 }
 
 TEST(CorrespondenceTerm, VanishesWhereTheLightIsAsWanted) {
   ImageTriangle bar;
-  const CorrespondenceValues v = correspondence_term({{1.0, 2.0}, {5.0, 4.0}, {3.0, 6.0}, 0.01},
-                                                     {3.0, 4.0}, 0.01, kPixels, 2.0, 3.0, bar);
+  const CorrespondenceValues v =
+      correspondence_term({{1.0, 2.0}, {5.0, 4.0}, {3.0, 6.0}, 0.01}, {3.0, 4.0}, 0.01, kPixels,
+                          {.align = 2.0, .flux = 3.0}, bar);
   EXPECT_EQ(v.align, 0.0);
   EXPECT_EQ(v.flux, 0.0);
   EXPECT_TRUE(pack(bar).isZero());
@@ -49,7 +51,7 @@ TEST(CorrespondenceTerm, VanishesWhereTheLightIsAsWanted) {
 TEST(CorrespondenceTerm, ShapeOfATriangleDoesNotMatter) {
   ImageTriangle ignored;
   const auto value = [&](const ImageTriangle& t) {
-    return correspondence_term(t, {7.0, 7.0}, 0.02, kPixels, 1.0, 1.0, ignored);
+    return correspondence_term(t, {7.0, 7.0}, 0.02, kPixels, {.align = 1.0, .flux = 1.0}, ignored);
   };
   const CorrespondenceValues flat = value({{1.0, 2.0}, {5.0, 4.0}, {3.0, 6.0}, 0.01});
   const CorrespondenceValues turned = value({{8.0, -1.0}, {-2.0, 11.0}, {3.0, 2.0}, 0.01});
@@ -70,13 +72,14 @@ TEST(CorrespondenceTerm, AdjointAddsAndEqualsCentralDifferences) {
     x[6] = random.between(0.0, 0.01);
     const auto f = [&](const Eigen::VectorXd& at) {
       ImageTriangle ignored;
-      const CorrespondenceValues v =
-          correspondence_term(unpack(at), centroid, flux, kPixels, 0.0, 0.0, ignored);
+      const CorrespondenceValues v = correspondence_term(unpack(at), centroid, flux, kPixels,
+                                                         {.align = 0.0, .flux = 0.0}, ignored);
       return align_weight * v.align + flux_weight * v.flux;
     };
     const Eigen::VectorXd before = Eigen::VectorXd::LinSpaced(7, -1.0, 1.0);
     ImageTriangle bar = unpack(before);
-    correspondence_term(unpack(x), centroid, flux, kPixels, align_weight, flux_weight, bar);
+    correspondence_term(unpack(x), centroid, flux, kPixels,
+                        {.align = align_weight, .flux = flux_weight}, bar);
     const Eigen::VectorXd computed = pack(bar) - before;
     const Eigen::VectorXd expected = testing::numeric_gradient(f, x, 1e-3);
     // Corners and flux have scales of their own.

@@ -13,13 +13,14 @@
 
 namespace lensforge {
 
-/// Rendering-guided optimisation of a grid mesh at one resolution (Sun et al., section 3.3): L-BFGS
-/// on the objective with a biharmonic preconditioner whose scales are measured, not guessed.
-class RenderingGuided {
+/// Optimisation of a grid mesh at one resolution: rendering-guided if the goal is a picture (Sun et
+/// al., section 3.3), correspondence-guided if it is a correspondence (section 3.4). L-BFGS with a
+/// preconditioner whose scales are measured, not guessed.
+class GuidedOptimization {
  public:
   /// @param mesh  a grid mesh; it gives connectivity and which coordinates are held.
-  RenderingGuided(const SurfaceMesh& mesh, const OpticalSetup& setup, const Image& target,
-                  const ObjectiveOptions& options, const Executor& executor);
+  GuidedOptimization(const SurfaceMesh& mesh, const OpticalSetup& setup, const DesignGoal& goal,
+                     const ObjectiveOptions& options, const Executor& executor);
 
   /// Told after every iteration; false ends the run.
   using Observer = std::function<bool(int iteration, const DesignObjective::Evaluation&)>;
@@ -29,8 +30,9 @@ class RenderingGuided {
   /// @throw Interrupted if the executor is stopped; `mesh` then holds the best surface so far.
   LbfgsSummary run(const LbfgsOptions& options, const Observer& observe, SurfaceMesh& mesh);
 
-  /// True if the objective is finite there.
-  [[nodiscard]] bool feasible(const SurfaceMesh& mesh);
+  /// The objective there, its Welsch weights taken from there too; infinite where it is not
+  /// allowed.
+  [[nodiscard]] double value(const SurfaceMesh& mesh);
 
  private:
   void calibrate(const Eigen::Matrix3Xd& vertices);

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+
+#include "core/executor.h"
+#include "core/image.h"
+#include "core/lens.h"
+#include "core/optical_setup.h"
+#include "core/run_control.h"
+#include "core/surface_mesh.h"
+#include "design/energy/correspondence_term.h"
+#include "design/transport/semi_discrete.h"
+
+namespace lensforge {
+
+/// Where the light of every face of a surface lands.
+struct FaceLight {
+  Eigen::Matrix2Xd landing;  ///< Centroids c' of the image triangles, pixel coordinates, 2 × F.
+  Eigen::VectorXd flux;      ///< Shares of the lens's total, F.
+};
+FaceLight face_light(const SurfaceMesh& mesh, const OpticalSetup& setup, SurfaceModel model,
+                     const Executor& executor);
+
+/// Face-based optimal transport (Sun et al., section 3.4): the least movement of the light of all
+/// faces, each taken as a point at the centroid of its image triangle, that makes the picture.
+/// Every call solves it afresh: after a round of optimisation the sites lie so differently in the
+/// small that the last round's weights leave cells empty, and mending those takes longer than the
+/// hierarchy of levels does.
+TransportResult transport_faces(const FaceLight& light, const Image& target,
+                                const TransportOptions& options, const Executor& executor,
+                                const RunControl& control);
+
+/// Gives the mesh the heights that send the light of every face nearest to its wanted centroid, x
+/// and y staying: refraction is inverted for the gradient that each face needs, fit_heights() does
+/// the rest. It moves light over any distance in one step, which descent on Eq. 20 cannot.
+void aim_faces(const Correspondence& correspondence, const OpticalSetup& setup,
+               const Executor& executor, SurfaceMesh& mesh);
+
+}  // namespace lensforge

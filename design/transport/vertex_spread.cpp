@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "design/transport/vertex_spread.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <utility>
+
+#include "core/image_plane.h"
+#include "design/flux/flux_image.h"
+#include "design/optics/image_triangle.h"
+#include "design/transport/monge_ampere.h"
+
+namespace lensforge {
+
+namespace {
+
+/// Most vertices per mean cell: what lies between black and bright may serve any image area.
+constexpr double kMostDense = 30.0;
+
+/// Area that a triangle keeps at least, a third of what kMostDense leaves it. The transport map is
+/// monotone, but its differences over a pixel need not be where the density jumps: a step to the
+/// sixtyfold folded triangles over.
+constexpr double kLeastShrinkage = 0.01;
+
+/// Most passes of smoothing against that; one is enough for that step.
+constexpr int kMostSmoothing = 8;
+
+/// Wanted density of vertices on the lens, drawn on a grid of setup.pixels.
+Image vertex_density(const Eigen::VectorXd& image_area, double share, const OpticalSetup& setup,
+                     const Executor& executor, const SurfaceMesh& mesh) {
+  const Eigen::Vector2d scale = setup.pixels.cast<double>().cwiseQuotient(setup.lens_size);
+  const double lens_pixels = setup.pixels.cast<double>().prod();
+  const auto triangle = [&](std::int64_t f) {
+    const auto corner = [&](int k) -> Eigen::Vector2d {
+      return mesh.vertices.col(mesh.triangles(k, f)).head<2>().cwiseProduct(scale);
+    };
+    ImageTriangle t{.p0 = corner(0), .p1 = corner(1), .p2 = corner(2), .flux = 0.0};
+    const double even = 0.5 * doubled_area(t.p0, t.p1, t.p2) / lens_pixels;
+    t.flux = (1.0 - share) * even + share * image_area[f];
+    return t;
+  };
+  FluxImage flux(setup.pixels.x(), setup.pixels.y());
+  const auto values = flux.render(executor, mesh.triangles.cols(), triangle);
+  Image density(setup.pixels.x(), setup.pixels.y());
+  std::transform(values.begin(), values.end(), density.values().begin(), [&](double v) {
+    return static_cast<float>(std::min(v * lens_pixels, kMostDense));
+  });
+  return density;
+}
+
+/// A vector field on the pixels' corners, bilinear between them.
+Eigen::Vector2d sample(const MongeAmpereResult& map, const Eigen::Vector2d& p) {
+  const int c = std::clamp(static_cast<int>(p.x()), 0, map.columns - 2);
+  const int r = std::clamp(static_cast<int>(p.y()), 0, map.rows - 2);
+  const double fx = p.x() - c;
+  const double fy = p.y() - r;
+  const Eigen::Index i = static_cast<Eigen::Index>(r) * map.columns + c;
+  const auto& d = map.displacement;
+  return (1.0 - fy) * ((1.0 - fx) * d.col(i) + fx * d.col(i + 1)) +
+         fy * ((1.0 - fx) * d.col(i + map.columns) + fx * d.col(i + map.columns + 1));
+}
+
+/// One pass of the binomial filter along rows and columns, mirrored at the borders.
+void smooth(Image& density) {
+  const Image before = density;
+  for (int r = 0; r < density.rows(); ++r) {
+    for (int c = 0; c < density.columns(); ++c) {
+      double sum = 0.0;
+      for (int dr = -1; dr <= 1; ++dr) {
+        for (int dc = -1; dc <= 1; ++dc) {
+          const int column = std::clamp(c + dc, 0, density.columns() - 1);
+          const int row = std::clamp(r + dr, 0, density.rows() - 1);
+          sum += (dr == 0 ? 2.0 : 1.0) * (dc == 0 ? 2.0 : 1.0) *
+                 static_cast<double>(before.at(column, row));
+        }
+      }
+      density.at(c, r) = static_cast<float>(sum / 16.0);
+    }
+  }
+}
+
+SurfaceMesh moved_by(const MongeAmpereResult& map, const OpticalSetup& setup, SurfaceMesh mesh) {
+  const Eigen::Vector2d scale = setup.pixels.cast<double>().cwiseQuotient(setup.lens_size);
+  for (Eigen::Index v = 0; v < mesh.vertices.cols(); ++v) {
+    const Eigen::Vector2d at = mesh.vertices.col(v).head<2>().cwiseProduct(scale);
+    mesh.vertices.col(v).head<2>() += sample(map, at).cwiseQuotient(scale);
+  }
+  return mesh;
+}
+
+/// True if every triangle has kept its orientation and some of its area.
+bool in_order(const SurfaceMesh& moved, const SurfaceMesh& before) {
+  const auto area = [](const SurfaceMesh& mesh, Eigen::Index f) {
+    const auto corner = [&](int k) -> Eigen::Vector2d {
+      return mesh.vertices.col(mesh.triangles(k, f)).head<2>();
+    };
+    return doubled_area(corner(0), corner(1), corner(2));
+  };
+  for (Eigen::Index f = 0; f < moved.triangles.cols(); ++f) {
+    if (area(moved, f) < kLeastShrinkage * area(before, f)) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+bool spread_vertices(const Eigen::VectorXd& image_area, double share, const OpticalSetup& setup,
+                     const Executor& executor, const RunControl& control, SurfaceMesh& mesh) {
+  Image density = vertex_density(image_area, share, setup, executor, mesh);
+  MongeAmpereOptions options;
+  options.floor = 0.0;  // The even share is floor enough.
+  for (int pass = 0; pass <= kMostSmoothing; ++pass) {
+    const MongeAmpereResult map = solve_monge_ampere(density, options, control);
+    if (map.stopped) return false;
+    SurfaceMesh moved = moved_by(map, setup, mesh);
+    if (in_order(moved, mesh)) {
+      mesh = std::move(moved);
+      return true;
+    }
+    smooth(density);
+  }
+  return true;
+}
+
+}  // namespace lensforge

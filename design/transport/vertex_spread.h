@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+
+#include "core/executor.h"
+#include "core/optical_setup.h"
+#include "core/run_control.h"
+#include "core/surface_mesh.h"
+
+namespace lensforge {
+
+/// Moves the vertices of an even grid mesh so that they follow the picture, not the lens. Light of
+/// uniform density leaves hardly any lens area to the dark parts of a picture: a dark pixel gets a
+/// fraction of one facet of an even mesh, and shows as dots (facet model) or as the streak of a
+/// stretched triangle (smooth model). Afterwards a share of the facets is spread evenly over the
+/// picture, dark or bright.
+///
+/// The density of vertices on the lens, (1 − share) + share × (image area per lens area), is
+/// brought about by a transport map from the even grid (solve_monge_ampere()). Every triangle keeps
+/// its orientation: where the density jumps so that some would not, it is smoothed first; if that
+/// is of no use, the mesh stays.
+/// @param image_area  what part of the image rectangle every face serves, F values of sum 1.
+/// @param share  0 … 0.95.
+/// @return false if the caller asked to stop; the mesh is then unchanged.
+bool spread_vertices(const Eigen::VectorXd& image_area, double share, const OpticalSetup& setup,
+                     const Executor& executor, const RunControl& control, SurfaceMesh& mesh);
+
+}  // namespace lensforge
