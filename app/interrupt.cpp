@@ -1,47 +1,55 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "app/interrupt.h"
 
-#include <pthread.h>
+#include <semaphore.h>
 #include <unistd.h>
+
+#include <array>
+#include <csignal>
 
 #include "app/exit_code.h"
 
-// The signals are blocked everywhere and one thread waits for them: no handler, so nothing has to
-// be async-signal-safe. The same signal wakes the thread when the watch ends.
+// The handler does no more than wake a thread, so that nothing else has to be async-signal-safe.
+// Blocking the signals and waiting for them would not do: libraries that are only linked in
+// (OpenBLAS is) start threads of their own before main(), and those have the signals open.
 namespace lensforge::app {
 namespace {
 
-bool is_ignored(int signal) {
-  struct sigaction action {};
-  sigaction(signal, nullptr, &action);
-  return action.sa_handler == SIG_IGN;
-}
+constexpr std::array kSignals = {SIGINT, SIGTERM, SIGHUP};
+
+/// A handler reaches nothing but globals.
+sem_t wake;                                            // NOLINT: see above
+std::array<struct sigaction, kSignals.size()> before;  // NOLINT: see above
+
+void wake_waiter(int /*signal*/) { sem_post(&wake); }
 
 }  // namespace
 
 InterruptWatch::InterruptWatch() {
-  sigemptyset(&watched_);
-  sigaddset(&watched_, SIGUSR1);
-  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
-    if (!is_ignored(signal)) sigaddset(&watched_, signal);
+  sem_init(&wake, 0, 0);
+  struct sigaction action {};
+  action.sa_handler = wake_waiter;
+  action.sa_flags = SA_RESTART;
+  sigemptyset(&action.sa_mask);
+  for (std::size_t i = 0; i < kSignals.size(); ++i) {
+    sigaction(kSignals[i], nullptr, &before[i]);
+    if (before[i].sa_handler != SIG_IGN) sigaction(kSignals[i], &action, nullptr);
   }
-  pthread_sigmask(SIG_BLOCK, &watched_, &mask_before_);
   waiter_ = std::thread([this] { wait_for_signals(); });
 }
 
 InterruptWatch::~InterruptWatch() {
+  for (std::size_t i = 0; i < kSignals.size(); ++i) sigaction(kSignals[i], &before[i], nullptr);
   finished_ = true;
-  pthread_kill(waiter_.native_handle(), SIGUSR1);
+  sem_post(&wake);
   waiter_.join();
-  pthread_sigmask(SIG_SETMASK, &mask_before_, nullptr);
+  sem_destroy(&wake);
 }
 
 void InterruptWatch::wait_for_signals() {
   while (true) {
-    int signal = 0;
-    if (sigwait(&watched_, &signal) != 0) continue;
+    if (sem_wait(&wake) != 0) continue;
     if (finished_) return;
-    if (signal == SIGUSR1) continue;
     if (!stop_.request_stop()) _exit(kInterrupted);
   }
 }

@@ -2,15 +2,14 @@
 #pragma once
 
 #include <atomic>
-#include <csignal>
 #include <stop_token>
 #include <thread>
 
 namespace lensforge::app {
 
 /// Turns the first Ctrl-C (SIGINT), SIGTERM or SIGHUP into a stop request; the second ends the
-/// process at once with exit code 130. Signals that the caller had ignored stay ignored.
-/// @pre made before any other thread, which all inherit the signal mask; at most one at a time.
+/// process at once with exit code 130. Signals that the caller had ignored stay ignored. At most
+/// one at a time.
 class InterruptWatch {
  public:
   InterruptWatch();
@@ -23,8 +22,6 @@ class InterruptWatch {
  private:
   void wait_for_signals();
 
-  sigset_t watched_{};
-  sigset_t mask_before_{};
   std::stop_source stop_;
   std::atomic<bool> finished_ = false;
   std::thread waiter_;

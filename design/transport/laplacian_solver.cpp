@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "design/transport/laplacian_solver.h"
 
-#include <Eigen/CholmodSupport>
+#include <Eigen/SparseCholesky>
 #include <Eigen/SparseCore>
 #include <algorithm>
 #include <cstddef>
@@ -39,9 +39,7 @@ Sparse laplacian(const WeightedGraph& graph) {
 }  // namespace
 
 Eigen::VectorXd solve_laplacian(const WeightedGraph& graph, const Eigen::VectorXd& right) {
-  Eigen::CholmodSupernodalLLT<Sparse, Eigen::Lower> factor;
-  factor.cholmod().print = 0;
-  factor.compute(laplacian(graph));
+  const Eigen::SimplicialLDLT<Sparse, Eigen::Lower> factor(laplacian(graph));
   if (factor.info() != Eigen::Success) {
     return Eigen::VectorXd::Constant(graph.nodes, std::numeric_limits<double>::quiet_NaN());
   }

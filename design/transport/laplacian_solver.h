@@ -17,8 +17,9 @@ struct WeightedGraph {
   std::vector<Edge> edges;
 };
 
-/// Solves Σ_b weight_ab (x_a − x_b) = right_a by a supernodal Cholesky factorisation. Parts that do
-/// not hang together are held in place by a diagonal of 1e-13 relative to their own.
+/// Solves Σ_b weight_ab (x_a − x_b) = right_a by a sparse Cholesky factorisation (Eigen's: it
+/// brings no multi-threaded BLAS into the process, whose bits would hang on the machine). Parts
+/// that do not hang together are held in place by a diagonal of 1e-13 relative to their own.
 /// @pre right sums to about 0.
 /// @return x up to a constant; not finite if the factorisation broke down.
 Eigen::VectorXd solve_laplacian(const WeightedGraph& graph, const Eigen::VectorXd& right);

@@ -21,8 +21,9 @@ constexpr double kCouplingFloor = 1e-9;
 constexpr int kMaxHalvings = 24;
 
 /// Sites above which multigrid takes over from the factorisation. Processor seconds for a Newton
-/// system on 2 cores (OpenBLAS under CHOLMOD), logo on black: equal at 14,720 sites, 0.08 against
-/// 0.2 at 58,880, 1.1 against 4 at 942,080; black pixels take no more iterations than grey ones.
+/// system on 2 cores (CHOLMOD, supernodal, on OpenBLAS), logo on black: equal at 14,720 sites, 0.08
+/// against 0.2 at 58,880, 1.1 against 4 at 942,080; black pixels take no more iterations than grey
+/// ones.
 constexpr int kDirectLimit = 12000;
 
 /// Residual of the multigrid solution. Steps are as many as with exact directions (58,880 sites:

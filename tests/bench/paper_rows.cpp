@@ -74,7 +74,7 @@ struct Variant {
 /// Fig. 10, columns from left to right.
 const std::vector<Variant>& variants() {
   static const std::vector<Variant> all = {
-      {"without transport", "no-transport", {"--no-transport"}},
+      {"without transport", "no-transport", {"--transport-rounds", "0"}},
       {"without rendering-guided optimisation", "no-rendering-guided", {"--no-rendering-guided"}},
       {"one transport only", "one-transport", {"--transport-rounds", "1"}},
       {"without E_grad", "no-gradient", {"--weight-gradient", "0"}},
