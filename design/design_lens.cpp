@@ -31,6 +31,10 @@ constexpr double kIdleRound = 1e-3;
 constexpr double kTransportTolerance = 1e-2;
 constexpr int kMostNewtonSteps = 150;
 
+/// Times that heights are fitted to a transport; each brings them nearer by the sag over the focal
+/// length, a hundredth or so.
+constexpr int kAimPasses = 3;
+
 /// Shortest side of a working picture: below it there is nothing to shape.
 constexpr int kLeastPixels = 4;
 
@@ -184,7 +188,6 @@ class Schedule {
   /// One alternation of Sun et al., section 3.4.
   void run_round(const Problem& problem, GuidedOptimization& stage) {
     const SurfaceMesh before = state_.mesh;
-    rest_on_thickness(state_.mesh, options_.thickness);
     const bool transports = state_.transporting && state_.round < options_.transport_rounds;
     if (transports) transport(problem);
     relax(stage);
@@ -219,7 +222,11 @@ class Schedule {
       state_.transporting = false;
       return;
     }
-    aim_faces(matching->wanted, problem.setup, stoppable_, mesh);
+    // Heights enter the aim themselves, and lifting the surface scales the picture.
+    for (int pass = 0; pass < kAimPasses; ++pass) {
+      aim_faces(matching->wanted, problem.setup, stoppable_, mesh);
+      rest_on_thickness(mesh, options_.thickness);
+    }
     if (options_.update_iterations > 0) {
       follow_correspondence(problem, std::move(matching->wanted), mesh);
     }
@@ -252,6 +259,10 @@ class Schedule {
       row.seconds = seconds();
       state_.convergence.push_back(row);
     }
+    if (!result.converged()) {
+      remark_ = "; transport of round " + std::to_string(state_.round + 1) + " ended early (" +
+                result.message + ")";
+    }
     if (result.centroids.cols() == 0) return std::nullopt;
     return Matching{{std::move(result.centroids), std::move(light.flux)}, std::move(result.areas)};
   }
@@ -262,7 +273,8 @@ class Schedule {
     if (!std::isfinite(update.value(mesh))) return;
     LbfgsOptions optimizer;
     optimizer.max_iterations = options_.update_iterations;
-    update.run(optimizer, observer("update"), mesh);
+    const LbfgsSummary summary = update.run(optimizer, observer("update"), mesh);
+    if (summary.status == LbfgsSummary::Status::kStopped) throw Interrupted();
   }
 
   /// Draws the mesh's x and y back towards the even grid until no barrier refuses it.
@@ -336,7 +348,7 @@ class Schedule {
     DesignResult result;
     using Status = DesignResult::Status;
     result.status = stopped_ ? Status::kInterrupted : Status::kDone;
-    result.message = stopped_ ? "interrupted" : "all levels done";
+    result.message = stopped_ ? "interrupted" : "all levels done" + remark_;
     if (!failure_.empty()) {
       result.status = Status::kFailed;
       result.message = failure_;
@@ -372,6 +384,7 @@ class Schedule {
   Checkpoint state_;
   bool stopped_ = false;
   std::string failure_;
+  std::string remark_;  ///< What the user should know of a design that got done.
 };
 
 }  // namespace
