@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <string>
+
+namespace lensforge {
+
+/// What the spindle does, as far as it could be verified.
+enum class SpindleState {
+  kStopped,
+  kChanging,  ///< Asked to turn or to stop, not yet verified.
+  kAtSpeed,   ///< Verified: several readings in a row, no fault.
+  kFailed,    ///< Fault register, lost speed, or silence on the bus beyond its time-out.
+};
+
+/// One look at the spindle and the interlocks.
+struct GuardReport {
+  SpindleState spindle = SpindleState::kStopped;
+  double rpm = 0.0;           ///< Last reading.
+  bool interlocks_ok = true;  ///< Door, vacuum, coolant, e-stop: each as its map expects it.
+  std::string reason;         ///< What is wrong, naming device, signal, value and rule; or empty.
+};
+
+/// Spindle and interlocks of a machine, watched beside the controller.
+class Guard {
+ public:
+  virtual ~Guard() = default;
+  /// Asks for `rpm`, clockwise seen from above where `clockwise`; returns at once.
+  virtual void spin(double rpm, bool clockwise) = 0;
+  /// Asks for a stop; returns at once.
+  virtual void stop() = 0;
+  /// Reads whatever is due by the poll intervals and tells where things stand. Never throws for
+  /// what the bus or a device does: that is kFailed and a reason. Bounded in time.
+  virtual GuardReport poll() = 0;
+};
+
+}  // namespace lensforge
