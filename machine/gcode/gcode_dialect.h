@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+namespace lensforge {
+
+/// What a controller's firmware takes, apart from its settings.
+struct GcodeDialect {
+  std::string name;
+  std::size_t max_characters = 0;    ///< Of a line as sent, compacted, without its end.
+  std::int64_t max_line_number = 0;  ///< Largest N word.
+  bool tool_change = false;          ///< T and M6.
+  bool refuses_after_error = false;  ///< Until an empty line, every line is answered by the error.
+  std::size_t rx_bytes = 0;          ///< Usual size of the receive buffer.
+  int planner_blocks = 0;            ///< Usual number of motions it looks ahead.
+};
+
+/// Grbl 1.1: a line buffer of 80 with its end, 128 bytes received, 15 motions planned, no T and M6.
+GcodeDialect grbl_dialect();
+
+/// grblHAL: a line buffer of 257 with its end, 1024 bytes received, 35 to 100 motions planned.
+GcodeDialect grblhal_dialect();
+
+/// "grbl" or "grblhal" → dialect. @throw InputError naming `option` and the value.
+GcodeDialect parse_dialect(std::string_view name, const std::string& option);
+
+}  // namespace lensforge

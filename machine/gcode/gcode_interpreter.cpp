@@ -1,0 +1,369 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "machine/gcode/gcode_interpreter.h"
+
+#include <cmath>
+#include <string>
+#include <string_view>
+
+#include "machine/gcode/modal_words.h"
+
+namespace lensforge {
+namespace {
+
+constexpr double kMillimetresPerInch = 25.4;
+constexpr double kLargestTool = 255.0;
+
+std::string with_number(const std::string& word, double value) {
+  return word + " with the number " + std::to_string(value);
+}
+
+/// One line on its way through a copy of the state.
+class BlockRun {
+ public:
+  BlockRun(const GcodeBlock& block, const GcodeDialect& dialect, GcodeState& state,
+           GcodeEffect& effect)
+      : block_(block), dialect_(dialect), words_(block, dialect), state_(state), effect_(effect) {}
+
+  void run() {
+    check_number();
+    set_modes();
+    set_feed();
+    set_machine();
+    const bool moves = find_motion();
+    refuse_unused();
+    if (moves) move();
+    set_stop();
+  }
+
+ private:
+  [[noreturn]] void refuse(const std::string& reason) const {
+    throw GcodeError(block_.line, reason);
+  }
+
+  /// The value of a letter that this line uses.
+  std::optional<double> use(char letter) {
+    const auto value = block_.value(letter);
+    if (value) used_ += letter;
+    return value;
+  }
+
+  void check_number() const {
+    if (block_.number && *block_.number > dialect_.max_line_number) {
+      refuse(std::string("N").append(std::to_string(*block_.number)) + ": " + dialect_.name +
+             " knows none above " + std::to_string(dialect_.max_line_number));
+    }
+  }
+
+  void set_modes() {
+    if (const auto word = words_[ModalGroup::kUnits]) state_.inches = *word == 200;
+    if (const auto word = words_[ModalGroup::kPlane]) {
+      state_.plane = *word == 170 ? ArcPlane::kXY : *word == 180 ? ArcPlane::kZX : ArcPlane::kYZ;
+    }
+    if (const auto word = words_[ModalGroup::kDistance]) state_.absolute = *word == 900;
+    if (const auto word = words_[ModalGroup::kCoordinateSystem]) {
+      state_.coordinate_system = *word / 10 - 54;
+    }
+    if (const auto word = words_[ModalGroup::kMotion]) state_.motion = motion_mode(*word);
+  }
+
+  static MotionMode motion_mode(int tenths) {
+    switch (tenths) {
+      case 0:
+        return MotionMode::kRapid;
+      case 10:
+        return MotionMode::kFeed;
+      case 20:
+        return MotionMode::kArcClockwise;
+      case 30:
+        return MotionMode::kArcCounterClockwise;
+      default:
+        return MotionMode::kNone;
+    }
+  }
+
+  /// Millimetres of a length of the program.
+  [[nodiscard]] double length(double value) const {
+    return state_.inches.value_or(false) ? value * kMillimetresPerInch : value;
+  }
+
+  void set_feed() {
+    if (const auto word = words_[ModalGroup::kFeedMode]) {
+      const bool inverse_time = *word == 930;
+      // The number in force means something else in the other mode.
+      if (inverse_time != state_.inverse_time) state_.feed.reset();
+      state_.inverse_time = inverse_time;
+    }
+    const auto feed = use('F');
+    if (!feed) return;
+    if (!(*feed > 0.0)) refuse(with_number("F", *feed) + ": a feed is above 0");
+    if (state_.inverse_time) {
+      moves_per_minute_ = *feed;
+    } else {
+      state_.feed = length(*feed);
+      if (!state_.inches) refuse("F before G20 or G21: its unit is not known");
+    }
+  }
+
+  void set_machine() {
+    if (const auto tool = use('T')) set_tool(*tool);
+    if (words_[ModalGroup::kToolChange]) effect_.tool_change = state_.tool;
+    if (const auto rpm = use('S')) {
+      if (*rpm < 0.0) refuse(with_number("S", *rpm) + ": a speed is not negative");
+      state_.rpm = *rpm;
+      effect_.spindle_changed = true;
+    }
+    if (const auto word = words_[ModalGroup::kSpindle]) {
+      state_.spindle = *word == 30   ? SpindleTurn::kClockwise
+                       : *word == 40 ? SpindleTurn::kCounterClockwise
+                                     : SpindleTurn::kOff;
+      effect_.spindle_changed = true;
+    }
+    if (const auto word = words_[ModalGroup::kCoolant]) {
+      state_.mist = *word == 70 || (state_.mist && *word != 90);
+      state_.flood = *word == 80 || (state_.flood && *word != 90);
+    }
+  }
+
+  void set_tool(double tool) {
+    if (tool < 0.0 || tool > kLargestTool || tool != std::floor(tool)) {
+      refuse(with_number("T", tool) + ": tools are numbered 0 … 255");
+    }
+    state_.tool = static_cast<int>(tool);
+  }
+
+  [[nodiscard]] bool has_axes() const {
+    return block_.value('X') || block_.value('Y') || block_.value('Z');
+  }
+
+  /// Decides what the coordinates belong to, and takes the words that go with it.
+  bool find_motion() {
+    const auto special = words_[ModalGroup::kNonModal];
+    const auto motion = words_[ModalGroup::kMotion];
+    if (special == 40) {
+      if (motion && *motion != 800) refuse("G4 beside a motion");
+      if (has_axes()) refuse("G4 beside coordinates");
+      take_dwell();
+      return false;
+    }
+    if (special == 280 || special == 300) {
+      if (motion) refuse("G28 and G30 stand without another motion");
+      return true;
+    }
+    return find_plain_motion(special == 530, motion.has_value());
+  }
+
+  bool find_plain_motion(bool machine_coordinates, bool stated) {
+    if (!has_axes()) {
+      if (machine_coordinates) refuse("G53 without coordinates");
+      if (stated && is_arc()) refuse("an arc without coordinates");
+      const bool feeds = stated && state_.motion == MotionMode::kFeed;
+      if (feeds && !state_.inverse_time && !state_.feed) refuse("G1 before a feed F");
+      return false;
+    }
+    if (state_.motion == MotionMode::kNone) refuse("coordinates after G80, without a motion");
+    if (machine_coordinates && is_arc()) refuse("G53 takes G0 and G1 only");
+    return true;
+  }
+
+  [[nodiscard]] bool is_arc() const {
+    return state_.motion == MotionMode::kArcClockwise ||
+           state_.motion == MotionMode::kArcCounterClockwise;
+  }
+
+  void take_dwell() {
+    const auto seconds = use('P');
+    if (!seconds) refuse("G4 without P");
+    if (*seconds < 0.0) refuse(with_number("G4 P", *seconds) + ": a time is not negative");
+    effect_.dwell = *seconds;
+  }
+
+  [[nodiscard]] bool goes_home() const {
+    return words_.has(ModalGroup::kNonModal, 280) || words_.has(ModalGroup::kNonModal, 300);
+  }
+
+  void refuse_unused() const {
+    const bool arc = is_arc() && !goes_home();
+    for (const GcodeWord& word : block_.words()) {
+      const std::string_view of_motions = arc ? "XYZIJKR" : "XYZ";
+      const bool used = word.letter == 'G' || word.letter == 'M' ||
+                        used_.find(word.letter) != std::string::npos ||
+                        of_motions.find(word.letter) != std::string_view::npos;
+      if (!used) refuse(std::string(1, word.letter) + " belongs to no word of this line");
+    }
+  }
+
+  void move() {
+    if (!state_.inches) refuse("a motion before G20 or G21: its unit is not known");
+    if (goes_home()) return go_home();
+    GcodeMotion motion = new_motion(target());
+    if (is_arc()) motion.arc = arc_to(motion.end);
+    motion.rapid = state_.motion == MotionMode::kRapid;
+    if (!motion.rapid) motion.feed = feed_over(motion.length());
+    add(motion);
+  }
+
+  [[nodiscard]] Eigen::Vector3d target() const {
+    const bool machine = words_.has(ModalGroup::kNonModal, 530);
+    Eigen::Vector3d target = state_.position;
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto value = block_.value("XYZ"[axis]);
+      if (!value) continue;
+      if (machine) {
+        target[axis] = length(*value);
+      } else if (state_.absolute) {
+        target[axis] = length(*value) + state_.origin()[axis];
+      } else {
+        target[axis] += length(*value);
+      }
+    }
+    return target;
+  }
+
+  [[nodiscard]] GcodeMotion new_motion(const Eigen::Vector3d& end) const {
+    GcodeMotion motion;
+    motion.start = state_.position;
+    motion.end = end;
+    motion.line = block_.line;
+    motion.offset = block_.offset;
+    motion.number = block_.number;
+    return motion;
+  }
+
+  [[nodiscard]] Arc arc_to(const Eigen::Vector3d& end) const {
+    ArcRequest request;
+    request.plane = state_.plane;
+    request.clockwise = state_.motion == MotionMode::kArcClockwise;
+    bool offset = false;
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto value = block_.value("IJK"[axis]);
+      offset = offset || value.has_value();
+      request.offset[axis] = length(value.value_or(0.0));
+    }
+    const auto radius = block_.value('R');
+    if (radius && offset) refuse("an arc with both R and I J K");
+    if (!radius && !offset) refuse("an arc without R and without I J K");
+    if (radius) request.radius = length(*radius);
+    if (!has_axis_in_plane()) refuse("an arc without a coordinate in its plane");
+    const ArcResult result = make_arc(state_.position, end, request);
+    if (!result.reason.empty()) refuse(result.reason);
+    return result.arc;
+  }
+
+  [[nodiscard]] bool has_axis_in_plane() const {
+    const char normal = state_.plane == ArcPlane::kXY   ? 'Z'
+                        : state_.plane == ArcPlane::kZX ? 'Y'
+                                                        : 'X';
+    for (const char axis : {'X', 'Y', 'Z'}) {
+      if (axis != normal && block_.value(axis)) return true;
+    }
+    return false;
+  }
+
+  [[nodiscard]] double feed_over(double length) const {
+    if (state_.inverse_time) {
+      if (!moves_per_minute_) refuse("a motion under G93 without F on its line");
+      return *moves_per_minute_ * length;
+    }
+    if (!state_.feed) refuse("a motion before a feed F");
+    return *state_.feed;
+  }
+
+  /// By way of the point that the line names, then to the stored place in the axes that it names,
+  /// or in all if it names none.
+  void go_home() {
+    const bool first = words_.has(ModalGroup::kNonModal, 280);
+    const auto& home = first ? state_.g28 : state_.g30;
+    if (!home) refuse(std::string(first ? "G28" : "G30") + ": its stored place is not known");
+    Eigen::Vector3d last = *home;
+    if (has_axes()) {
+      add(rapid_to(target()));
+      for (int axis = 0; axis < 3; ++axis) {
+        if (!block_.value("XYZ"[axis])) last[axis] = state_.position[axis];
+      }
+    }
+    add(rapid_to(last));
+  }
+
+  [[nodiscard]] GcodeMotion rapid_to(const Eigen::Vector3d& end) const {
+    GcodeMotion motion = new_motion(end);
+    motion.rapid = true;
+    return motion;
+  }
+
+  void add(const GcodeMotion& motion) {
+    state_.position = motion.end;
+    effect_.add(motion);
+  }
+
+  void set_stop() {
+    const auto word = words_[ModalGroup::kStop];
+    if (!word) return;
+    effect_.pauses = *word == 0 || *word == 10;
+    effect_.ends = !effect_.pauses;
+    if (effect_.ends) reset_modes();
+  }
+
+  /// What M2 and M30 put back, in Grbl and in RS-274/NGC.
+  void reset_modes() {
+    state_.motion = MotionMode::kFeed;
+    state_.plane = ArcPlane::kXY;
+    state_.absolute = true;
+    state_.inverse_time = false;
+    state_.coordinate_system = 0;
+    state_.spindle = SpindleTurn::kOff;
+    state_.mist = state_.flood = false;
+    effect_.spindle_changed = true;
+  }
+
+  const GcodeBlock& block_;
+  const GcodeDialect& dialect_;
+  ModalWords words_;
+  GcodeState& state_;
+  GcodeEffect& effect_;
+  std::optional<double> moves_per_minute_;  ///< F under G93.
+  std::string used_;
+};
+
+}  // namespace
+
+GcodeInterpreter::GcodeInterpreter(const GcodeDialect& dialect, const GcodeState& start)
+    : dialect_(dialect), state_(start) {}
+
+GcodeEffect GcodeInterpreter::run(const GcodeBlock& block) {
+  GcodeEffect effect;
+  if (block.percent) {
+    run_percent(block, effect);
+    return effect;
+  }
+  if (block.empty()) return effect;
+  if (ended_) throw GcodeError(block.line, "words after the end of the program");
+  GcodeState next = state_;
+  BlockRun(block, dialect_, next, effect).run();
+  state_ = next;
+  begun_ = true;
+  ended_ = effect.ends;
+  return effect;
+}
+
+void GcodeInterpreter::run_percent(const GcodeBlock& block, GcodeEffect& effect) {
+  ++percents_;
+  const bool begins = percents_ == 1 && !begun_;
+  if (percents_ > 2 || (percents_ == 1 && begun_ && !ended_)) {
+    throw GcodeError(block.line, "% neither at the begin nor at the end of the program");
+  }
+  if (!begins && !ended_) {
+    effect.ends = true;
+    ended_ = true;
+  }
+}
+
+void GcodeInterpreter::check_length(const GcodeText& text, std::size_t added) const {
+  const std::size_t length = compact_gcode(text.text, added == 0).size() + added;
+  if (length > dialect_.max_characters) {
+    throw GcodeError(text.line, std::to_string(length) + " characters to send, more than the " +
+                                    std::to_string(dialect_.max_characters) + " that " +
+                                    dialect_.name + " takes");
+  }
+}
+
+}  // namespace lensforge

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <span>
+
+#include "machine/gcode/gcode_block.h"
+#include "machine/gcode/gcode_dialect.h"
+#include "machine/gcode/gcode_motion.h"
+#include "machine/gcode/gcode_state.h"
+
+namespace lensforge {
+
+/// What one line makes the machine do, in this order: tool, spindle, dwell, motions, stop.
+class GcodeEffect {
+ public:
+  std::optional<int> tool_change;  ///< M6, with the tool.
+  bool spindle_changed = false;    ///< M3, M4, M5 or S: a word stood, whether or not it changes.
+  double dwell = 0.0;              ///< G4, s.
+  bool pauses = false;             ///< M0, M1
+  bool ends = false;               ///< M2, M30, or the second %.
+
+  /// None, one, or two for G28 and G30 by way of a point.
+  [[nodiscard]] std::span<const GcodeMotion> motions() const { return {motions_.data(), size_}; }
+  void add(const GcodeMotion& motion) { motions_[size_++] = motion; }
+
+ private:
+  std::array<GcodeMotion, 2> motions_;
+  std::size_t size_ = 0;
+};
+
+/// Follows a program as a Grbl-family controller would, more strictly.
+///
+/// Known: G0 G1 G2 G3 G80, G4, G17 G18 G19, G20 G21, G28 G30, G40 G49 G61, G53, G54 … G59, G90 G91,
+/// G91.1, G93 G94, M0 M1 M2 M30, M3 M4 M5, M6 and T where the dialect has them, M7 M8 M9, F, S.
+/// Refused beside unknown words: two words of one group, a motion before G20 or G21, before a feed
+/// or without its coordinates, words that nothing uses, words after the end of the program, what
+/// changes the controller's stored offsets (G10, G28.1, G30.1, G92), lines too long for the
+/// dialect.
+class GcodeInterpreter {
+ public:
+  /// @param start  where the tool is and what is in force; fresh from a reset as it stands.
+  explicit GcodeInterpreter(const GcodeDialect& dialect, const GcodeState& start = {});
+
+  /// Runs one line. @throw GcodeError; the state is then as before.
+  GcodeEffect run(const GcodeBlock& block);
+
+  /// Refuses a line that, as sent, is longer than the dialect's buffer.
+  /// @param added  characters that the sender puts before it, its own N word.
+  /// @throw GcodeError
+  void check_length(const GcodeText& text, std::size_t added) const;
+
+  [[nodiscard]] const GcodeState& state() const { return state_; }
+  /// M2, M30 or the second % was run.
+  [[nodiscard]] bool ended() const { return ended_; }
+
+ private:
+  void run_percent(const GcodeBlock& block, GcodeEffect& effect);
+
+  GcodeDialect dialect_;
+  GcodeState state_;
+  int percents_ = 0;
+  bool begun_ = false;
+  bool ended_ = false;
+};
+
+}  // namespace lensforge

@@ -1,0 +1,209 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "machine/gcode/gcode_interpreter.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/error.h"
+#include "machine/gcode_text.h"
+
+namespace lensforge {
+namespace {
+
+using Eigen::Vector3d;
+using ::testing::HasSubstr;
+
+GcodeEffect effect_of(const std::string& line, const GcodeDialect& dialect = grblhal_dialect()) {
+  GcodeText text;
+  text.text = line;
+  GcodeInterpreter interpreter(dialect);
+  return interpreter.run(parse_gcode_block(text));
+}
+
+TEST(GcodeInterpreter, FollowsAFinishingProgram) {
+  const ProgramRun run = run_program(
+      "(job)\nG21 G90 G17 G94\nG40 G49 G80\nG54\nG0 Z5\nS23000 M3\nG4 P2.5\nX1 Y2\n"
+      "G1 Z-0.5 F150\nX2 F500\nG0 Z5\nM5\nM2\n");
+  ASSERT_EQ(run.refusal, "");
+  ASSERT_EQ(run.motions.size(), 5U);
+  EXPECT_TRUE(run.motions[0].rapid);
+  EXPECT_EQ(run.motions[1].end, Vector3d(1, 2, 5));
+  EXPECT_EQ(run.motions[2].end, Vector3d(1, 2, -0.5));
+  EXPECT_EQ(run.motions[2].feed, 150.0);
+  EXPECT_EQ(run.motions[3].end, Vector3d(2, 2, -0.5));
+  EXPECT_EQ(run.motions[3].feed, 500.0);
+  EXPECT_EQ(run.motions[3].line, 10);
+  EXPECT_EQ(run.motions[3].start, run.motions[2].end);
+  EXPECT_EQ(run.state.spindle, SpindleTurn::kOff);
+}
+
+TEST(GcodeInterpreter, InchesBecomeMillimetres) {
+  const ProgramRun run = run_program("G20\nG1 X1 F10\nG21 X1\nG20 G91 X1\nG2 X2 I1\n");
+  ASSERT_EQ(run.refusal, "");
+  EXPECT_DOUBLE_EQ(run.motions[0].end.x(), 25.4);
+  EXPECT_DOUBLE_EQ(run.motions[0].feed, 254.0);
+  EXPECT_DOUBLE_EQ(run.motions[1].end.x(), 1.0);
+  EXPECT_DOUBLE_EQ(run.motions[1].feed, 254.0);
+  EXPECT_DOUBLE_EQ(run.motions[2].end.x(), 26.4);
+  EXPECT_DOUBLE_EQ(run.motions[3].arc->radius, 25.4);
+}
+
+TEST(GcodeInterpreter, WorkOffsetsAndMachineCoordinates) {
+  GcodeState start;
+  start.origins[0] = {10, 20, 30};
+  start.origins[5] = {100, 0, 0};
+  start.position = {1, 1, 1};
+  const ProgramRun run =
+      run_program("G21\nG0 X1\nG53 G0 Z-2\nG59 Y5\nG53 X7\nG91 X1\n", grbl_dialect(), start);
+  ASSERT_EQ(run.refusal, "");
+  EXPECT_EQ(run.motions[0].end, Vector3d(11, 1, 1));
+  EXPECT_EQ(run.motions[1].end, Vector3d(11, 1, -2));
+  EXPECT_EQ(run.motions[2].end, Vector3d(11, 5, -2));
+  EXPECT_EQ(run.motions[3].end, Vector3d(7, 5, -2));
+  EXPECT_EQ(run.motions[4].end, Vector3d(8, 5, -2));
+}
+
+TEST(GcodeInterpreter, InverseTimeIsFeedTimesLength) {
+  const ProgramRun run = run_program("G21 G93\nG1 X10 F2\nY30 F0.5\nG94 F100\nX0\n");
+  ASSERT_EQ(run.refusal, "");
+  EXPECT_DOUBLE_EQ(run.motions[0].feed, 20.0);
+  EXPECT_DOUBLE_EQ(run.motions[1].feed, 15.0);
+  EXPECT_DOUBLE_EQ(run.motions[2].feed, 100.0);
+  EXPECT_THAT(run_program("G21 G93\nG1 X10 F2\nY30\n").refusal,
+              HasSubstr("line 3: a motion under G93"));
+  EXPECT_THAT(run_program("G21 F100 G1 X1\nG93\nG94\nX2\n").refusal, HasSubstr("line 4"));
+}
+
+TEST(GcodeInterpreter, HomesByWayOfTheNamedPoint) {
+  GcodeState start;
+  start.g28 = Vector3d(-5, -6, -1);
+  start.position = {1, 2, 3};
+  const ProgramRun all = run_program("G21\nG28\n", grbl_dialect(), start);
+  ASSERT_EQ(all.motions.size(), 1U);
+  EXPECT_EQ(all.motions[0].end, Vector3d(-5, -6, -1));
+  const ProgramRun one = run_program("G21\nG91 G28 Z0\n", grbl_dialect(), start);
+  ASSERT_EQ(one.motions.size(), 2U);
+  EXPECT_EQ(one.motions[0].end, Vector3d(1, 2, 3));
+  EXPECT_EQ(one.motions[1].end, Vector3d(1, 2, -1));
+  EXPECT_THAT(run_program("G21\nG30\n", grbl_dialect(), start).refusal,
+              HasSubstr("G30: its stored place is not known"));
+}
+
+TEST(GcodeInterpreter, ArcsInEveryPlane) {
+  const ProgramRun run = run_program(
+      "G21 G90 F100\nG17 G2 X1 Y1 I1 J0\nG18 G3 X2 Z1 R1\nG19 G2 Y2 Z2 R-3\nG17 G3 I2 X2\n");
+  ASSERT_EQ(run.refusal, "");
+  ASSERT_EQ(run.motions.size(), 4U);
+  EXPECT_LT(run.motions[0].arc->sweep, 0.0);
+  EXPECT_EQ(run.motions[1].arc->third, 1);
+  EXPECT_EQ(run.motions[2].arc->third, 0);
+  EXPECT_NEAR(run.motions[3].arc->length(), 12.566370614359172, 1e-12);
+}
+
+TEST(GcodeInterpreter, TellsWhatElseALineDoes) {
+  EXPECT_EQ(effect_of("G4 P1.5").dwell, 1.5);
+  EXPECT_TRUE(effect_of("M0").pauses);
+  EXPECT_TRUE(effect_of("M1").pauses);
+  EXPECT_TRUE(effect_of("M2").ends);
+  EXPECT_TRUE(effect_of("M30").ends);
+  EXPECT_EQ(effect_of("T3 M6").tool_change, 3);
+  EXPECT_TRUE(effect_of("S1000").spindle_changed);
+  EXPECT_TRUE(effect_of("M4").spindle_changed);
+  EXPECT_FALSE(effect_of("M8").spindle_changed);
+  EXPECT_FALSE(effect_of("G21 G90").pauses);
+}
+
+TEST(GcodeInterpreter, RefusesWithLineAndReason) {
+  const std::pair<const char*, const char*> cases[] = {
+      {"G0 X1", "before G20 or G21"},
+      {"G21\nG1 X1", "line 2: a motion before a feed F"},
+      {"G21\nG1", "G1 before a feed F"},
+      {"F100", "F before G20 or G21"},
+      {"G21 F0", "a feed is above 0"},
+      {"G21 F-5", "a feed is above 0"},
+      {"S-1", "a speed is not negative"},
+      {"G21\nG0 G1 X1", "another word of its group"},
+      {"G17 G18", "another word of its group"},
+      {"M3 M5", "another word of its group"},
+      {"G20 G21", "another word of its group"},
+      {"G4", "G4 without P"},
+      {"G4 P-1", "a time is not negative"},
+      {"G4 P1 X1", "G4 beside coordinates"},
+      {"G21\nG0 G4 P1", "G4 beside a motion"},
+      {"G21\nG80\nX1", "coordinates after G80"},
+      {"G53", "G53 without coordinates"},
+      {"G21 F10\nG53 G2 X1 I1", "G53 takes G0 and G1 only"},
+      {"G21 F10\nG2 I1", "an arc without coordinates"},
+      {"G21 F10\nG2 Z1 I1", "without a coordinate in its plane"},
+      {"G21 F10\nG2 X1", "without R and without I J K"},
+      {"G21 F10\nG2 X1 I1 R1", "both R and I J K"},
+      {"G21 F10\nG2 X5 R1", "too small to reach"},
+      {"G21 F10\nG2 X5 I1", "off the circle"},
+      {"G21\nG0 X1 I1", "I belongs to no word"},
+      {"P1", "P belongs to no word"},
+      {"L2 P1 X0", "L is no word"},
+      {"G10 P1", "G10 changes the controller's stored offsets"},
+      {"G92 X0", "G92 changes the controller's stored offsets"},
+      {"G28.1", "G28.1 changes the controller's stored offsets"},
+      {"G64", "G64 is not supported for grbl"},
+      {"G41", "G41 is not supported"},
+      {"G38.2 Z-1", "G38.2 is not supported"},
+      {"M98 P1", "M98 is not supported"},
+      {"M6", "M6 is not supported for grbl"},
+      {"T1", "T: grbl knows no tool change"},
+      {"A1", "A is no word that grbl knows"},
+      {"G21\nM2\nG0 X1", "line 3: words after the end"},
+      {"%\nG21\n%\nG0 X1", "words after the end"},
+      {"G21\n%", "% neither at the begin nor at the end"},
+      {"%\n%\n%", "% neither"},
+      {"N10000000 G21", "knows none above 9999999"},
+  };
+  for (const auto& [program, reason] : cases) {
+    EXPECT_THAT(run_program(program).refusal, HasSubstr(reason)) << program;
+  }
+  EXPECT_THROW(effect_of("T300"), GcodeError);
+}
+
+TEST(GcodeInterpreter, ARefusedLineLeavesTheStateAsItWas) {
+  GcodeInterpreter interpreter(grbl_dialect());
+  GcodeText text;
+  text.text = "G21 G90 F100 G1 X1";
+  interpreter.run(parse_gcode_block(text));
+  text.text = "G91 G20 M3 S100 X1 R1";
+  EXPECT_THROW(interpreter.run(parse_gcode_block(text)), GcodeError);
+  EXPECT_TRUE(interpreter.state().absolute);
+  EXPECT_EQ(interpreter.state().inches, false);
+  EXPECT_EQ(interpreter.state().spindle, SpindleTurn::kOff);
+  EXPECT_EQ(interpreter.state().position, Vector3d(1, 0, 0));
+}
+
+TEST(GcodeInterpreter, MayEndWithPercentAfterTheEnd) {
+  EXPECT_EQ(run_program("%\nG21\nM30\n%\n").refusal, "");
+  EXPECT_EQ(run_program("G21\nM30\n%\n(rest)\n\n").refusal, "");
+  EXPECT_EQ(run_program("%\nG21\nG0 X1\n%\n").refusal, "");
+}
+
+TEST(GcodeInterpreter, MeasuresLinesAsTheyAreSent) {
+  const std::string longest = "G1 X" + std::string("12345678.12345678");
+  std::string line = longest;
+  for (const char axis : {'Y', 'Z', 'F'}) line += std::string(" ") + axis + "12345678.12345678";
+  GcodeText text;
+  text.text = line;  // 20 + 3·18 = 74 characters to send
+  const GcodeInterpreter interpreter(grbl_dialect());
+  EXPECT_NO_THROW(interpreter.check_length(text, 0));
+  EXPECT_NO_THROW(interpreter.check_length(text, 5));
+  EXPECT_THROW(interpreter.check_length(text, 6), GcodeError);
+  EXPECT_NO_THROW(GcodeInterpreter(grblhal_dialect()).check_length(text, 6));
+  const std::string comment = "(" + std::string(200, 'x') + ")";
+  text.text = comment;
+  EXPECT_NO_THROW(interpreter.check_length(text, 0));
+}
+
+TEST(GcodeDialect, IsKnownByName) {
+  EXPECT_EQ(parse_dialect("grbl", "--dialect").max_characters, 79U);
+  EXPECT_EQ(parse_dialect("grblhal", "--dialect").rx_bytes, 1024U);
+  EXPECT_THROW(parse_dialect("marlin", "--dialect"), InputError);
+}
+
+}  // namespace
+}  // namespace lensforge
