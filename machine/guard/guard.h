@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 namespace lensforge {
 
@@ -21,6 +22,23 @@ struct GuardReport {
   std::string reason;         ///< What is wrong, naming device, signal, value and rule; or empty.
 };
 
+/// What a record of the guard tells.
+enum class GuardEvent {
+  kCommand,    ///< Start, change of speed or stop was asked for.
+  kState,      ///< The spindle's state changed.
+  kSpeed,      ///< A speed, now and then while it stays and at once when it moves.
+  kTrouble,    ///< A fault, a loss of speed or of the bus; empty text: it is over.
+  kInterlock,  ///< An interlock changed; empty text: all are as they should be.
+};
+
+/// One entry for the job's journal, to be set against the line that runs at the time.
+struct GuardRecord {
+  double time = 0.0;  ///< s of the guard's clock.
+  GuardEvent event = GuardEvent::kSpeed;
+  double rpm = 0.0;
+  std::string text;
+};
+
 /// Spindle and interlocks of a machine, watched beside the controller.
 class Guard {
  public:
@@ -32,6 +50,8 @@ class Guard {
   /// Reads whatever is due by the poll intervals and tells where things stand. Never throws for
   /// what the bus or a device does: that is kFailed and a reason. Bounded in time.
   virtual GuardReport poll() = 0;
+  /// Hands over what happened since the last call, oldest first.
+  virtual std::vector<GuardRecord> take_records() { return {}; }
 };
 
 }  // namespace lensforge

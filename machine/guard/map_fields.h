@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <toml++/toml.h>
+
+#include <initializer_list>
+#include <set>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace lensforge {
+
+/// A number that a register map may hold: its key, least and greatest value.
+struct NumberRule {
+  std::string key;
+  double least;
+  double most;
+};
+
+/// A table of a register map, read strictly: every getter remembers its key, and finish() refuses
+/// any key that none asked for. All throw InputError naming file, key, value and rule.
+class MapFields {
+ public:
+  MapFields(const toml::table& table, std::string file, std::string path)
+      : table_(table), file_(std::move(file)), path_(std::move(path)) {}
+
+  [[nodiscard]] bool has(const std::string& key) const { return table_.contains(key); }
+  /// Not blank, one line, at most 200 bytes.
+  [[nodiscard]] std::string text(const std::string& key);
+  [[nodiscard]] std::string one_of(const std::string& key,
+                                   std::initializer_list<std::string_view> words);
+  [[nodiscard]] double number(const NumberRule& rule);
+  [[nodiscard]] double number_or(const NumberRule& rule, double otherwise);
+  [[nodiscard]] int whole(const NumberRule& rule);
+  [[nodiscard]] int whole_or(const NumberRule& rule, int otherwise);
+  [[nodiscard]] bool flag_or(const std::string& key, bool otherwise);
+  [[nodiscard]] MapFields table(const std::string& key);
+  /// The tables of an array that is there and not empty.
+  [[nodiscard]] std::vector<MapFields> tables(const std::string& key);
+  /// The keys of this table, as they stand.
+  [[nodiscard]] std::vector<std::string> keys() const;
+  /// @throw InputError for a key that none asked for.
+  void finish() const;
+
+  /// "spindle.status.speed" for the key "speed" of this table.
+  [[nodiscard]] std::string name_of(const std::string& key) const;
+  /// Where the map has this table, e.g. "spindle.status".
+  [[nodiscard]] const std::string& path() const { return path_; }
+  /// @throw InputError: file, key, the value as it stands, the rule.
+  [[noreturn]] void refuse(const std::string& key, const std::string& rule) const;
+
+ private:
+  const toml::node& required(const std::string& key);
+
+  const toml::table& table_;
+  std::string file_;
+  std::string path_;
+  std::set<std::string> known_;
+};
+
+}  // namespace lensforge

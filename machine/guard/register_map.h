@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "machine/guard/register_bus.h"
+
+namespace lensforge {
+
+/// A register that is read again and again.
+struct ReadSignal {
+  std::string key;  ///< Where the map has it, e.g. "spindle.status.speed".
+  RegisterAddress at;
+  std::uint16_t mask = 0xFFFF;  ///< Bits that count; the others are cleared before anything else.
+  double interval = 0.1;        ///< s between readings.
+  int retries = 3;              ///< Failed readings in a row that are borne.
+};
+
+/// value = raw * scale + offset, in rpm or in Hz (then rpm = value * rpm_per_hz).
+struct SpeedScale {
+  bool in_hertz = true;
+  double scale = 1.0;
+  double offset = 0.0;
+  bool is_signed = false;  ///< The raw value is a two's complement: its size is the speed.
+};
+
+struct SpeedSignal {
+  ReadSignal signal;
+  SpeedScale scale;
+};
+
+/// Clear where the masked value is `clear`; otherwise a fault, named by `texts` where it can be.
+struct FaultSignal {
+  ReadSignal signal;
+  std::uint16_t clear = 0;
+  std::map<std::uint16_t, std::string> texts;
+};
+
+/// True where the masked value is `expected`.
+struct FlagSignal {
+  ReadSignal signal;
+  std::uint16_t expected = 1;
+};
+
+struct DirectionSignal {
+  ReadSignal signal;
+  std::uint16_t forward = 0;  ///< Masked value while turning clockwise, seen from above.
+  std::uint16_t reverse = 1;
+};
+
+/// One write of a command.
+struct WriteStep {
+  RegisterAddress at;
+  std::uint16_t value = 0;
+};
+
+/// What a host-driven spindle is told. Each command is its steps in order.
+struct SpindleCommands {
+  RegisterAddress set_speed;
+  SpeedScale scale;
+  std::vector<WriteStep> run_forward;
+  std::vector<WriteStep> run_reverse;  ///< Empty: this spindle must not turn counter-clockwise.
+  std::vector<WriteStep> stop;
+  int retries = 3;  ///< Failed writes in a row that are borne.
+};
+
+struct SpindleMap {
+  double rpm_min = 0.0;
+  double rpm_max = 0.0;
+  double rpm_per_hz = 60.0;     ///< 60 for a motor with one pair of poles.
+  double tolerance = 0.05;      ///< Share of the speed asked for that a reading may be off.
+  int verify_reads = 3;         ///< Good readings in a row before at-speed or stopped is believed.
+  int lost_reads = 2;           ///< Bad readings in a row that are a loss of speed.
+  double stopped_rpm = 60.0;    ///< At most this is standing still.
+  double spin_up_limit = 15.0;  ///< s from the command to at-speed.
+  double spin_down_limit = 30.0;            ///< s from the command to stopped.
+  std::optional<SpindleCommands> commands;  ///< None: only a controller-driven spindle.
+  SpeedSignal speed;
+  std::optional<FaultSignal> fault;  ///< None only where the map says why.
+  std::optional<FlagSignal> at_speed;
+  std::optional<DirectionSignal> direction;
+};
+
+struct Interlock {
+  std::string name;  ///< "door", "vacuum", "coolant", "e-stop" ...
+  FlagSignal flag;
+};
+
+struct BusTransport {
+  bool is_tcp = false;
+  std::string device;  ///< RTU: the serial port.
+  int baud = 9600;     ///< RTU.
+  char parity = 'N';   ///< RTU: N, E or O.
+  int stop_bits = 1;   ///< RTU.
+  std::string host;    ///< TCP.
+  int port = 502;      ///< TCP.
+  int unit = 1;
+  double response_timeout = 0.3;     ///< s from the request to the first byte of the answer.
+  double byte_timeout = 0.05;        ///< s between bytes; 0: the response time-out spans them all.
+  double connect_timeout = 1.0;      ///< s, TCP.
+  double request_gap = 0.01;         ///< s of quiet before a request, at least.
+  double late_answer_window = 0.3;   ///< s, RTU: after a time-out the line is left alone this long
+                                     ///< and what comes is thrown away: an RTU answer has no number
+                                     ///< and a late one would pass for the answer to the next.
+  double reconnect_pause = 0.2;      ///< s before the first new connection; doubles ...
+  double reconnect_pause_max = 3.0;  ///< ... up to this.
+  double silence_limit = 2.0;        ///< s without one good answer: the device is lost.
+};
+
+/// One device on a Modbus: how it is reached, what its registers mean.
+struct RegisterMap {
+  std::string name;
+  BusTransport transport;
+  std::optional<SpindleMap> spindle;
+  std::vector<Interlock> interlocks;
+};
+
+/// @return rpm that a raw (masked) register value stands for, never negative.
+double rpm_of_raw(const SpeedScale& scale, double rpm_per_hz, std::uint16_t raw);
+/// @return the raw value nearest to `rpm`; nothing where 16 bits do not hold it.
+std::optional<std::uint16_t> raw_of_rpm(const SpeedScale& scale, double rpm_per_hz, double rpm);
+/// @return e.g. "holding register 0x200B".
+std::string address_text(const RegisterAddress& at);
+
+}  // namespace lensforge
