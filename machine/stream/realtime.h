@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+namespace lensforge {
+
+/// Bytes on which a Grbl-family controller acts at once, wherever in the stream they stand.
+namespace realtime {
+inline constexpr char kStatusReport = '?';
+inline constexpr char kFeedHold = '!';
+inline constexpr char kCycleStart = '~';
+inline constexpr char kSoftReset = '\x18';
+inline constexpr char kFeedTo100 = '\x90';
+inline constexpr char kFeedUp10 = '\x91';
+inline constexpr char kFeedDown10 = '\x92';
+inline constexpr char kFeedUp1 = '\x93';
+inline constexpr char kFeedDown1 = '\x94';
+}  // namespace realtime
+
+}  // namespace lensforge

@@ -1,0 +1,194 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "machine/stream/journal.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <chrono>
+#include <csignal>
+#include <string>
+
+#include "core/full_disk.h"
+#include "core/temp_folder.h"
+
+namespace lensforge {
+namespace {
+
+using ::testing::HasSubstr;
+using testing::message_of;
+using testing::read_bytes;
+using testing::TempFolder;
+using testing::write_bytes;
+
+const JobIdentity kJob{std::string(64, 'a'), 12345, "lens.ngc"};
+
+JobProgress at_line(std::int64_t line) {
+  JobProgress at;
+  at.sent = line + 2;
+  at.acknowledged = line + 1;
+  at.executed = line;
+  at.byte = line * 20;
+  at.state = "Run";
+  at.position = Eigen::Vector3d(0.5 * static_cast<double>(line), -1.25, 3.0);
+  at.spindle = "at speed";
+  at.rpm = 22950.0;
+  return at;
+}
+
+class JournalTest : public ::testing::Test {
+ protected:
+  [[nodiscard]] std::filesystem::path path() const { return folder_ / "job.journal"; }
+  /// A journal of a run that ended in a hold at line 40.
+  void write_held() const {
+    const auto journal = Journal::create(path(), kJob, {});
+    for (std::int64_t line = 1; line <= 40; ++line) {
+      journal->before_sending(line + 2);
+      journal->progress(at_line(line));
+    }
+    journal->note(40, "rpm fell to 21000");
+    journal->end("held", "the door was opened", at_line(40));
+  }
+
+ private:
+  TempFolder folder_;
+};
+
+using Journals = JournalTest;
+
+TEST_F(Journals, ReadBackAsWritten) {
+  write_held();
+  const JournalRecord record = read_journal(path());
+  EXPECT_TRUE(record.job.same_program(kJob));
+  EXPECT_EQ(record.job.name, "lens.ngc");
+  EXPECT_FALSE(record.finished);
+  EXPECT_EQ(record.status, "held");
+  EXPECT_EQ(record.reason, "the door was opened");
+  EXPECT_EQ(record.last.sent, 42);
+  EXPECT_EQ(record.last.acknowledged, 41);
+  EXPECT_EQ(record.last.executed, 40);
+  EXPECT_EQ(record.last.byte, 800);
+  EXPECT_EQ(*record.last.position, Eigen::Vector3d(20.0, -1.25, 3.0));
+  EXPECT_EQ(record.last.spindle, "at speed");
+  EXPECT_EQ(record.last.rpm, 22950.0);
+  EXPECT_EQ(record.runs, 1);
+  EXPECT_EQ(record.torn, 0);
+}
+
+TEST_F(Journals, KnowAFinishedJob) {
+  Journal::create(path(), kJob, {})->end("done", "", at_line(9));
+  EXPECT_TRUE(read_journal(path()).finished);
+}
+
+TEST_F(Journals, OfADeadProcessBoundWhatWasSentByItsReservations) {
+  const pid_t child = ::fork();
+  if (child == 0) {
+    const auto journal = Journal::create(path(), kJob, {});
+    for (std::int64_t line = 1; line <= 1000; ++line) {
+      journal->before_sending(line);
+      if (line % 10 == 0) journal->progress(at_line(line - 3));
+    }
+    ::kill(::getpid(), SIGKILL);
+  }
+  ::waitpid(child, nullptr, 0);
+  const JournalRecord record = read_journal(path());
+  EXPECT_EQ(record.status, "");
+  EXPECT_EQ(record.last.executed, 997);
+  EXPECT_GE(record.last.sent, 1000);
+  EXPECT_LT(record.last.sent, 1000 + (1 << 17));
+}
+
+TEST_F(Journals, GoOnWhereTheyEnded) {
+  write_held();
+  const JournalRecord before = read_journal(path());
+  Journal::resume(path(), before, {})->end("held", "again", at_line(30));
+  const JournalRecord after = read_journal(path());
+  EXPECT_EQ(after.runs, 2);
+  EXPECT_EQ(after.reason, "again");
+  EXPECT_EQ(after.last.executed, 40) << "lines that an earlier run carried out stay carried out";
+  EXPECT_EQ(after.last.sent, 42);
+}
+
+TEST_F(Journals, CutATornRecordWhereverItIsTorn) {
+  write_held();
+  const std::string whole = read_bytes(path());
+  const std::size_t last = whole.rfind('\n', whole.size() - 2) + 1;
+  for (std::size_t size = last; size < whole.size(); ++size) {
+    write_bytes(path(), whole.substr(0, size));
+    const JournalRecord record = read_journal(path());
+    EXPECT_EQ(record.bytes, static_cast<std::int64_t>(last));
+    EXPECT_EQ(record.torn, static_cast<std::int64_t>(size - last));
+    EXPECT_EQ(record.status, "");
+    EXPECT_EQ(record.last.executed, 40);
+  }
+  Journal::resume(path(), read_journal(path()), {})->end("held", "again", at_line(41));
+  EXPECT_EQ(read_journal(path()).last.executed, 41);
+  EXPECT_EQ(read_journal(path()).torn, 0);
+}
+
+TEST_F(Journals, DamagedBeforeTheirEndAreRefused) {
+  write_held();
+  const std::string whole = read_bytes(path());
+  for (std::size_t at = 0; at + 400 < whole.size(); at += 97) {
+    std::string damaged = whole;
+    damaged[at] = static_cast<char>(damaged[at] ^ 4);
+    write_bytes(path(), damaged);
+    EXPECT_THROW(read_journal(path()), InputError) << at;
+  }
+}
+
+TEST_F(Journals, RefuseWhatIsNone) {
+  EXPECT_THAT(message_of<InputError>([&] { read_journal(path()); }), HasSubstr("job.journal"));
+  for (const char* bytes : {"", "G0 X1\n", "00000000 {}\n"}) {
+    write_bytes(path(), bytes);
+    EXPECT_THROW(read_journal(path()), InputError) << bytes;
+  }
+}
+
+TEST_F(Journals, AreWrittenByOneSenderOnly) {
+  const auto journal = Journal::create(path(), kJob, {});
+  EXPECT_THAT(message_of<InputError>([&] { Journal::create(path(), kJob, {}); }),
+              HasSubstr("another sender"));
+}
+
+TEST_F(Journals, SayThatTheDiskIsFullAndStayReadable) {
+  const auto journal = Journal::create(path(), kJob, {});
+  journal->before_sending(1);
+  std::int64_t line = 0;
+  std::string message;
+  {
+    const testing::FullDisk full(8192);
+    message = message_of<JournalFailed>([&] {
+      for (line = 1; line < 10000; ++line) journal->progress(at_line(line));
+    });
+  }
+  EXPECT_THAT(message, HasSubstr("job.journal"));
+  EXPECT_THAT(message, HasSubstr("File too large"));
+  EXPECT_GT(line, 10);
+  const JournalRecord record = read_journal(path());
+  EXPECT_EQ(record.last.executed, line - 1);
+  EXPECT_EQ(record.torn, 0) << "what was written of the record that did not fit is taken back";
+}
+
+TEST_F(Journals, TakeFastLinesWithFewReservations) {
+  const auto journal = Journal::create(path(), kJob, {});
+  for (std::int64_t line = 1; line <= 1'000'000; ++line) journal->before_sending(line);
+  EXPECT_LT(std::filesystem::file_size(path()), 10'000U);
+}
+
+TEST(JobIdentity, IsTheFileAndNotItsName) {
+  const TempFolder folder;
+  write_bytes(folder / "a.ngc", "abc");
+  write_bytes(folder / "b.ngc", "abc");
+  write_bytes(folder / "c.ngc", "abd");
+  const JobIdentity a = identify_job(folder / "a.ngc");
+  EXPECT_EQ(a.sha256, "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+  EXPECT_EQ(a.bytes, 3);
+  EXPECT_TRUE(a.same_program(identify_job(folder / "b.ngc")));
+  EXPECT_FALSE(a.same_program(identify_job(folder / "c.ngc")));
+  EXPECT_THROW(identify_job(folder / "d.ngc"), InputError);
+  EXPECT_THROW(identify_job(folder.path()), InputError);
+}
+
+}  // namespace
+}  // namespace lensforge
