@@ -36,7 +36,7 @@ class BusSession {
   double not_before_;
   double pause_;
   int silences_ = 0;
-  bool discard_first_ = false;
+  bool discard_first_ = true;
 };
 
 }  // namespace lensforge

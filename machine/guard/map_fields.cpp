@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "machine/guard/map_fields.h"
 
+#include <algorithm>
 #include <cmath>
 #include <sstream>
 
@@ -33,21 +34,27 @@ std::string range_text(const NumberRule& rule) {
   return number_text(rule.least) + " to " + number_text(rule.most);
 }
 
+bool is_control(char c) { return static_cast<unsigned char>(c) < ' ' || c == '\x7F'; }
+
 bool is_one_line(const std::string& text) {
-  for (const char c : text) {
-    if (static_cast<unsigned char>(c) < ' ') return false;
-  }
+  if (std::any_of(text.begin(), text.end(), is_control)) return false;
   return text.find_first_not_of(' ') != std::string::npos && text.size() <= kLongestText;
 }
 
 }  // namespace
+
+std::string one_line(std::string text) {
+  std::replace_if(text.begin(), text.end(), is_control, '?');
+  return text;
+}
 
 std::string MapFields::name_of(const std::string& key) const {
   return path_.empty() ? key : path_ + "." + key;
 }
 
 void MapFields::refuse(const std::string& key, const std::string& rule) const {
-  throw InputError(file_ + ": " + name_of(key) + ": " + shown(table_.get(key)) + ": " + rule);
+  throw InputError(
+      one_line(file_ + ": " + name_of(key) + ": " + shown(table_.get(key)) + ": " + rule));
 }
 
 const toml::node& MapFields::required(const std::string& key) {
@@ -66,7 +73,7 @@ std::string MapFields::text(const std::string& key) {
 
 std::string MapFields::one_of(const std::string& key,
                               std::initializer_list<std::string_view> words) {
-  const std::string value = text(key);
+  std::string value = text(key);
   std::string list;
   for (const std::string_view word : words) {
     if (value == word) return value;

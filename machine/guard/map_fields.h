@@ -18,6 +18,9 @@ struct NumberRule {
   double most;
 };
 
+/// @return `text` with a question mark for each control character.
+std::string one_line(std::string text);
+
 /// A table of a register map, read strictly: every getter remembers its key, and finish() refuses
 /// any key that none asked for. All throw InputError naming file, key, value and rule.
 class MapFields {

@@ -116,7 +116,7 @@ void ModbusBus::discard() {
 
 std::uint16_t ModbusBus::read(const RegisterAddress& at) {
   LF_CHECK(is_open(), endpoint_text(transport_));
-  keep_gap();
+  begin_request();
   std::uint8_t bit = 0;
   std::uint16_t word = 0;
   int count = 0;
@@ -139,7 +139,7 @@ std::uint16_t ModbusBus::read(const RegisterAddress& at) {
 // is taken as bytes and compared here.
 void ModbusBus::write(const RegisterAddress& at, std::uint16_t value) {
   LF_CHECK(is_open(), endpoint_text(transport_));
-  keep_gap();
+  begin_request();
   const std::vector<std::uint8_t> request = write_request(at, value);
   const std::vector<std::uint8_t> answer = answer_to(request);
   if (answer.size() >= 2 && answer[0] == (request[0] | 0x80)) {
@@ -171,10 +171,12 @@ std::vector<std::uint8_t> ModbusBus::answer_to(const std::vector<std::uint8_t>& 
   return {answer.begin() + header, answer.begin() + end};
 }
 
-void ModbusBus::keep_gap() {
+/// Whatever still lies there was not asked for by the request that comes now.
+void ModbusBus::begin_request() {
   SteadyClock clock;
   const double early = last_exchange_ + transport_.request_gap - clock.now();
   if (early > 0.0) clock.wait(early);
+  discard();
 }
 
 void ModbusBus::fail(int error) const {

@@ -34,7 +34,7 @@ class ModbusBus final : public RegisterBus {
     void operator()(_modbus* context) const;
   };
   [[noreturn]] void fail(int error) const;
-  void keep_gap();
+  void begin_request();
   std::vector<std::uint8_t> answer_to(const std::vector<std::uint8_t>& request);
 
   BusTransport transport_;

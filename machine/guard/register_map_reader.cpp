@@ -280,8 +280,8 @@ toml::table parsed(std::string_view text, const std::string& file) {
   try {
     return toml::parse(text);
   } catch (const toml::parse_error& e) {
-    throw InputError(file + ": line " + std::to_string(e.source().begin.line) +
-                     ": not TOML: " + std::string(e.description()));
+    throw InputError(one_line(file + ": line " + std::to_string(e.source().begin.line) +
+                              ": not TOML: " + std::string(e.description())));
   }
 }
 

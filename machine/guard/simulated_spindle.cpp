@@ -7,6 +7,8 @@
 namespace lensforge {
 namespace {
 
+constexpr double kAnswerTime = 0.01;  // s, of a device that has a request waiting
+
 bool same_place(const RegisterAddress& read, const RegisterAddress& at) {
   return read.function == at.function && read.address == at.address;
 }
@@ -41,9 +43,9 @@ class SimulatedSpindle::Bus final : public RegisterBus {
     spindle_.advance();
     const std::uint16_t value = spindle_.value_at(at);
     if (late_ && late_->arrives <= now() + time_out()) {
-      const std::uint16_t wrong = late_->value;
-      late_.reset();
-      return wrong;
+      const Late wrong = *late_;
+      late_ = Late{wrong.arrives + kAnswerTime, value};  // ... and so on, one behind
+      return wrong.value;
     }
     answer(value);
     return value;
