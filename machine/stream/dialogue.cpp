@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+
+#include "machine/stream/controller_codes.h"
+#include "machine/stream/controller_info.h"
+#include "machine/stream/realtime.h"
+
+namespace lensforge {
+namespace {
+
+constexpr double kAskAgain = 0.5;          ///< Between two ? to a controller that is silent, s.
+constexpr double kStatusPause = 0.2;       ///< Between two ? otherwise: five a second.
+constexpr double kStopCheck = 0.1;         ///< Longest wait without a look at the stop token, s.
+constexpr double kQuietAfterBanner = 0.3;  ///< Start-up lines and messages follow a banner, s.
+
+using Kind = Reply::Kind;
+
+[[noreturn]] void silence(const std::string& what) {
+  throw StreamFault(FaultKind::kStall, "no answer from the controller: " + what);
+}
+
+}  // namespace
+
+bool at_rest(const StatusReport& report) {
+  switch (report.state) {
+    case MachineState::kIdle:
+    case MachineState::kAlarm:
+    case MachineState::kCheck:
+    case MachineState::kSleep:
+    case MachineState::kTool:
+      return true;
+    case MachineState::kHold:
+      return report.sub_state.value_or(0) == 0;
+    case MachineState::kDoor:
+      return report.sub_state.value_or(0) <= 1;
+    default:
+      return false;
+  }
+}
+
+void Dialogue::pause_until_reply(double until) {
+  if (stop_.stop_requested()) throw StreamFault(FaultKind::kInterrupted, "interrupted");
+  wire_.flush();
+  const double wait = std::clamp(until - clock_.now(), 0.0, kStopCheck);
+  wire_.receive(wait, [this](const Reply& reply) { replies_.push_back(reply); });
+}
+
+std::optional<StatusReport> Dialogue::ask_status(double timeout) {
+  const double end = clock_.now() + timeout;
+  while (clock_.now() < end) {
+    replies_.clear();
+    wire_.urgent(realtime::kStatusReport);
+    const double until = std::min(end, clock_.now() + kAskAgain);
+    while (clock_.now() < until) {
+      pause_until_reply(until);
+      for (const Reply& reply : replies_) {
+        if (reply.status) return reply.status;
+      }
+      replies_.clear();
+    }
+  }
+  return std::nullopt;
+}
+
+StatusReport Dialogue::wake(double timeout) {
+  const std::optional<StatusReport> report = ask_status(timeout);
+  if (!report) silence("is it switched on, is it the right port and speed?");
+  return *report;
+}
+
+StatusReport Dialogue::status(double timeout) {
+  const std::optional<StatusReport> report = ask_status(timeout);
+  if (!report) silence("?");
+  return *report;
+}
+
+std::vector<Reply> Dialogue::ask(const std::string& line, double timeout) {
+  replies_.clear();
+  wire_.line(line);
+  std::vector<Reply> answer;
+  const double end = clock_.now() + timeout;
+  while (clock_.now() < end) {
+    pause_until_reply(end);
+    for (const Reply& reply : replies_) {
+      if (reply.kind == Kind::kOk) return answer;
+      if (reply.kind == Kind::kError) {
+        throw StreamFault(FaultKind::kError, line + " was refused: " + explain_error(reply.code));
+      }
+      if (reply.kind == Kind::kAlarm) {
+        throw StreamFault(FaultKind::kAlarm, line + ": " + explain_alarm(reply.code));
+      }
+      if (reply.kind == Kind::kUnknown) {
+        throw StreamFault(FaultKind::kGarbledReply, line + ": '" + reply.text + "'");
+      }
+      answer.push_back(reply);
+    }
+    replies_.clear();
+  }
+  silence(line);
+}
+
+std::string Dialogue::reset(double timeout) {
+  replies_.clear();
+  wire_.discard();
+  wire_.urgent(realtime::kSoftReset);
+  const double end = clock_.now() + timeout;
+  std::string banner;
+  double until = end;
+  while (clock_.now() < until) {
+    pause_until_reply(until);
+    for (const Reply& reply : replies_) {
+      if (reply.kind != Kind::kBanner) continue;
+      banner = reply.text;
+      until = clock_.now() + kQuietAfterBanner;
+    }
+    replies_.clear();
+  }
+  if (banner.empty()) silence("reset");
+  return banner;
+}
+
+StatusReport Dialogue::hold(double timeout) {
+  wire_.discard();
+  wire_.urgent(realtime::kFeedHold);
+  const double end = clock_.now() + timeout;
+  while (clock_.now() < end) {
+    const StatusReport report = status();
+    if (at_rest(report)) return report;
+    pause_until_reply(clock_.now() + kStatusPause);
+  }
+  throw StreamFault(FaultKind::kStall, "the machine does not come to rest in a feed hold");
+}
+
+}  // namespace lensforge

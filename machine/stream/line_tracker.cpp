@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "machine/stream/line_tracker.h"
+
+#include <algorithm>
+
+namespace lensforge {
+
+LineTracker::LineTracker(const TrackerOptions& options)
+    : options_(options),
+      sent_(options.first_line - 1),
+      acknowledged_(options.first_line - 1),
+      executed_(options.first_line - 1) {}
+
+void LineTracker::send(const OutgoingLine& line, double now) {
+  const std::size_t bytes = line.text.size() + 1;
+  flying_.push_back({line.line, line.next_offset, bytes, line.dwell, line.travel, now, line.alone});
+  bytes_ += bytes;
+  dwell_ += line.dwell;
+  sent_ = std::max(sent_, line.line);
+}
+
+void LineTracker::acknowledge() {
+  const Flying taken = flying_.front();
+  flying_.pop_front();
+  bytes_ -= taken.bytes;
+  dwell_ = flying_.empty() ? 0.0 : dwell_ - taken.dwell;
+  acknowledged_ = std::max(acknowledged_, taken.line);
+  offset_ = std::max(offset_, taken.next_offset);
+  if (taken.travel <= 0.0 || taken.travel < options_.block_travel) return;
+  waiting_.push_back(taken.line);
+  const auto kept = static_cast<std::size_t>(options_.planner_blocks + 1 + kStepLag);
+  if (waiting_.size() <= kept) return;
+  waiting_.pop_front();
+  note_executed(waiting_.front() - 1);
+}
+
+void LineTracker::report(const StatusReport& report, bool at_rest) {
+  if (!report.line || *report.line == 0) return;
+  // N words begin again after the largest; the motion is not newer than the last line taken.
+  const std::int64_t largest = options_.largest_number;
+  const std::int64_t newest = ProgramFeed::number_of(std::max<std::int64_t>(sent_, 1), largest);
+  const std::int64_t behind = (newest - *report.line % largest + largest) % largest;
+  note_executed(sent_ - behind - 1 - (at_rest ? 0 : kStepLag));
+}
+
+void LineTracker::all_done() {
+  waiting_.clear();
+  note_executed(acknowledged_);
+}
+
+/// A line that was not taken is not carried out, even if later ones were: Grbl goes on with what it
+/// has received after an error.
+void LineTracker::note_executed(std::int64_t line) {
+  executed_ = std::max(executed_, std::min(line, acknowledged_));
+}
+
+std::size_t LineTracker::bytes_before(double time) const {
+  std::size_t bytes = 0;
+  for (const Flying& line : flying_) {
+    if (line.sent_at >= time) break;
+    bytes += line.bytes;
+  }
+  return bytes;
+}
+
+std::size_t LineTracker::oldest_bytes() const {
+  return flying_.empty() ? 0 : flying_.front().bytes;
+}
+
+std::int64_t LineTracker::oldest_line() const { return flying_.empty() ? 0 : flying_.front().line; }
+
+}  // namespace lensforge

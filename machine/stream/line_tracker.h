@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+
+#include "machine/stream/program_feed.h"
+#include "machine/stream/status_report.h"
+
+namespace lensforge {
+
+/// What decides how a controller's reports are read.
+struct TrackerOptions {
+  std::int64_t first_line = 1;  ///< Every line before it counts as carried out.
+  int planner_blocks = 15;      ///< Motions that the controller holds at most.
+  double block_travel = 0.0;    ///< A motion that moves an axis this far is a block for sure, mm.
+  std::int64_t largest_number = 9'999'999;  ///< Of an N word.
+};
+
+/// Which lines are on their way, taken and carried out.
+///
+/// Where the controller reports Ln:, every line before that motion is carried out but for those
+/// that lie cut into steps already: up to kStepLag lines while it moves, none once it stands.
+/// Elsewhere the last planner_blocks + 1 + kStepLag taken lines that were motions for sure may
+/// still be waiting, and nothing before them.
+class LineTracker {
+ public:
+  /// Lines by which Ln: may run ahead of the cutter: the step buffer of Grbl holds 6 segments, that
+  /// of grblHAL 10, each of one motion at least.
+  static constexpr std::int64_t kStepLag = 10;
+
+  explicit LineTracker(const TrackerOptions& options);
+
+  /// A line is handed over at `now`.
+  void send(const OutgoingLine& line, double now);
+  /// The controller took the oldest line on its way. @pre !empty()
+  void acknowledge();
+  /// The controller tells what it does. @param at_rest  it stands still.
+  void report(const StatusReport& report, bool at_rest);
+  /// Everything that was taken is carried out.
+  void all_done();
+
+  [[nodiscard]] bool empty() const { return flying_.empty(); }
+  [[nodiscard]] std::size_t count() const { return flying_.size(); }
+  /// Bytes on their way, line ends included.
+  [[nodiscard]] std::size_t bytes() const { return bytes_; }
+  /// The part of bytes() that was handed over before `time`, and the length of the oldest line.
+  [[nodiscard]] std::size_t bytes_before(double time) const;
+  [[nodiscard]] std::size_t oldest_bytes() const;
+  /// The line that is to be answered next, 0 for none.
+  [[nodiscard]] std::int64_t oldest_line() const;
+  /// Dwells on their way, s.
+  [[nodiscard]] double dwell() const { return dwell_; }
+  /// Whether a line that must be alone is on its way.
+  [[nodiscard]] bool alone() const { return !flying_.empty() && flying_.back().alone; }
+
+  [[nodiscard]] std::int64_t sent() const { return sent_; }
+  [[nodiscard]] std::int64_t acknowledged() const { return acknowledged_; }
+  [[nodiscard]] std::int64_t executed() const { return executed_; }
+  [[nodiscard]] std::int64_t offset() const { return offset_; }
+
+ private:
+  struct Flying {
+    std::int64_t line;
+    std::int64_t next_offset;
+    std::size_t bytes;
+    double dwell;
+    double travel;
+    double sent_at;
+    bool alone;
+  };
+
+  void note_executed(std::int64_t line);
+
+  TrackerOptions options_;
+  std::deque<Flying> flying_;
+  std::deque<std::int64_t> waiting_;  ///< Taken motions that may lie in the planner.
+  std::size_t bytes_ = 0;
+  double dwell_ = 0.0;
+  std::int64_t sent_;
+  std::int64_t acknowledged_;
+  std::int64_t executed_;
+  std::int64_t offset_ = 0;
+};
+
+}  // namespace lensforge

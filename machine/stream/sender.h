@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <stop_token>
+#include <string>
+
+#include "machine/guard/guard.h"
+#include "machine/link/clock.h"
+#include "machine/link/link.h"
+#include "machine/stream/buffer_audit.h"
+#include "machine/stream/controller_info.h"
+#include "machine/stream/journal.h"
+#include "machine/stream/line_tracker.h"
+#include "machine/stream/program_feed.h"
+#include "machine/stream/stream_fault.h"
+#include "machine/stream/wire.h"
+
+namespace lensforge {
+
+/// How a program is streamed. Times in s.
+struct SenderOptions {
+  /// Keep the controller's receive buffer filled instead of waiting for each line's ok.
+  bool character_counting = false;
+  double status_interval = 0.2;   ///< Between two ?, ≥ 0.2: five a second.
+  double reply_timeout = 3.0;     ///< A ? that stays unanswered for longer is a stall.
+  double progress_timeout = 5.0;  ///< Neither a reply nor motion for longer is a stall.
+  double spindle_timeout = 60.0;  ///< For the spindle to reach a speed or to stop.
+  double hold_timeout = 15.0;     ///< For the machine to come to rest in a feed hold.
+  /// A hold from outside ends the job after this; 0 waits for ever.
+  double hold_limit = 0.0;
+};
+
+/// What an operator asks for while a job runs.
+enum class OperatorKey { kHold, kResume, kFeedUp, kFeedDown, kFeedNormal };
+
+/// Where a job stands; told with every status report and with every message.
+struct SendEvent {
+  StatusReport report;                      ///< The last one.
+  std::optional<Eigen::Vector3d> position;  ///< Machine coordinates, mm.
+  std::int64_t sent = 0;
+  std::int64_t acknowledged = 0;
+  std::int64_t executed = 0;
+  std::int64_t byte = 0;  ///< Offset behind the acknowledged line.
+  double rpm_asked = 0.0;
+  double rpm_measured = 0.0;  ///< Of the guard, or what the controller reports.
+  double seconds = 0.0;       ///< Since the job began.
+  std::string message;        ///< A sentence for the operator, or empty.
+};
+
+/// The caller's end of a running job.
+struct SendControl {
+  std::stop_token stop;   ///< Feed hold, wait, soft reset.
+  std::stop_token reset;  ///< Soft reset at once.
+  std::function<void(const SendEvent&)> watch;
+  std::function<std::optional<OperatorKey>()> keys;
+};
+
+enum class SendStatus {
+  kDone,         ///< The program came to its end and the machine stands still.
+  kInterrupted,  ///< Somebody asked for the end: held, then reset.
+  kFault,        ///< Held, see the fault.
+};
+
+/// How a job ended.
+struct SendResult {
+  SendStatus status = SendStatus::kFault;
+  FaultKind fault = FaultKind::kNone;
+  std::string reason;             ///< In one line.
+  std::int64_t sent = 0;          ///< Last line that was handed over, in part or whole.
+  std::int64_t acknowledged = 0;  ///< Every line up to it was taken.
+  std::int64_t executed = 0;      ///< Every line up to it was carried out, at least.
+  bool at_rest = false;           ///< The controller said that nothing moves any more.
+  double seconds = 0.0;
+
+  [[nodiscard]] bool done() const { return status == SendStatus::kDone; }
+};
+
+/// What a sender works with; all but guard and journal are needed, all must outlive it.
+struct SenderParts {
+  Wire& wire;
+  Clock& clock;
+  Guard* guard = nullptr;      ///< Without one, the controller's own report is what is verified.
+  Journal* journal = nullptr;  ///< Without one, nothing can be resumed.
+};
+
+/// Streams a program to a controller of the Grbl family.
+///
+/// Lines with motion at feed only leave while the spindle is verified; before a change of spindle
+/// or tool, a pause and the end everything sent is carried out. Whatever goes wrong: nothing more
+/// of the program leaves, a feed hold does, the spindle stays as it is, and the journal says why.
+class Sender {
+ public:
+  Sender(const SenderParts& parts, const ControllerInfo& info, const SenderOptions& options,
+         std::int64_t first_line);
+
+  /// Streams all that `feed` gives. Never throws for what happens on the link, at the spindle, on
+  /// the disk or in the program.
+  SendResult run(ProgramFeed& feed, const SendControl& control);
+
+ private:
+  enum class Phase {
+    kStreaming,
+    kAnswer,   ///< A barrier line is on its way.
+    kSpindle,  ///< It was taken; the spindle is to be verified.
+    kEnding,   ///< Nothing is left to send.
+    kDone,
+  };
+
+  // sender.cpp: what leaves.
+  void step();
+  void fill();
+  [[nodiscard]] bool room_for(const OutgoingLine& line) const;
+  [[nodiscard]] bool drained() const;
+  void hand_over();
+  void obey_operator();
+  [[nodiscard]] double wait_time() const;
+  void ask_status();
+
+  // sender_watch.cpp: what comes in, and what should.
+  void take(const Reply& reply);
+  void take_ok();
+  void take_status(const StatusReport& report);
+  void judge_state(const StatusReport& report);
+  void pass_barrier();
+  void watch_guard();
+  void verify_spindle();
+  void watch_for_stall();
+  void note(const std::string& text);
+  void tell(const std::string& message);
+  [[nodiscard]] JobProgress progress() const;
+
+  // sender_end.cpp: how it ends.
+  SendResult end(SendStatus status, FaultKind fault, std::string reason);
+  SendResult stop_for(FaultKind fault, std::string reason);
+  void hold(FaultKind fault);
+  void wait_for_banner();
+  void take_while_stopping(const Reply& reply);
+
+  Wire& wire_;
+  Clock& clock_;
+  Guard* guard_;
+  Journal* journal_;
+  const ControllerInfo& info_;
+  SenderOptions options_;
+  LineTracker tracker_;
+  BufferAudit audit_;
+  ProgramFeed* feed_ = nullptr;
+  const SendControl* control_ = nullptr;
+
+  Phase phase_ = Phase::kStreaming;
+  std::optional<OutgoingLine> next_;
+  OutgoingLine barrier_;
+  bool held_ = false;              ///< The controller is in a hold that we do not wait out.
+  bool held_by_operator_ = false;  ///< … because the operator asked for it here.
+  double held_since_ = 0.0;
+
+  SpindleOrder spindle_;  ///< Asked for.
+  bool verified_ = true;  ///< It does what was asked for.
+  double spindle_since_ = 0.0;
+  GuardReport guarded_;
+  double guard_due_ = 0.0;
+
+  StatusReport report_;
+  int idle_reports_ = 0;  ///< In a row, asked for after the last line was sent or taken.
+  double status_due_ = 0.0;
+  std::optional<double> asked_since_;  ///< A ? is unanswered.
+  bool stale_ = false;  ///< The report under way was asked for before a line moved on.
+  double progress_at_ = 0.0;
+  std::optional<Eigen::Vector3d> position_;
+  double started_ = 0.0;
+  bool at_rest_ = false;
+  bool banner_seen_ = false;
+};
+
+}  // namespace lensforge
