@@ -54,8 +54,9 @@ std::uint16_t BusSession::exchange(const std::function<std::uint16_t()>& exchang
 // time-out is counted from the request, not from the failure: a simulated bus fails at once.
 void BusSession::recover(BusFault fault, double started) {
   if (fault == BusFault::kRefused) return;
-  const double given_up = std::max(clock_.now(), started + transport_.response_timeout);
   if (fault == BusFault::kDown) return hang_up(clock_.now());
+  const double waited = fault == BusFault::kSilent ? transport_.response_timeout : 0.0;
+  const double given_up = std::max(clock_.now(), started + waited);
   ++silences_;
   if (transport_.is_tcp || silences_ >= kSilencesBeforeReopen) return hang_up(given_up);
   discard_first_ = true;

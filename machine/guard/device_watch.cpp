@@ -53,11 +53,15 @@ bool DeviceWatch::read_one(std::size_t index, std::vector<Reading>& readings) {
   }
   if (answered) {
     silent_since_.reset();
+    unanswered_ = 0;
     polled.due = started + polled.signal.interval;
-  } else if (!silent_since_) {
-    silent_since_ = started;
+    return true;
   }
-  return answered;
+  polled.due = clock_.now();  // behind the others: one dead register must not starve them
+  ++unanswered_;
+  last_error_ = polled.error;
+  if (!silent_since_) silent_since_ = started;
+  return false;
 }
 
 std::optional<std::string> DeviceWatch::write(const RegisterAddress& at, std::uint16_t value) {
@@ -72,9 +76,11 @@ std::optional<std::string> DeviceWatch::write(const RegisterAddress& at, std::ui
 std::string DeviceWatch::trouble(std::size_t signal) const {
   const Polled& polled = polled_[signal];
   const std::string name = polled.signal.key + " (" + address_text(polled.signal.at) + "): ";
-  if (polled.failures > polled.signal.retries) {
-    return name + polled.error + ", " + std::to_string(polled.failures) +
-           " times in a row: " + std::to_string(polled.signal.retries) + " retries are borne";
+  const int failures = std::max(polled.failures, unanswered_);
+  if (failures > polled.signal.retries) {
+    return name + (polled.failures == failures ? polled.error : last_error_) + ", " +
+           std::to_string(failures) + " times in a row: " + std::to_string(polled.signal.retries) +
+           " retries are borne";
   }
   const double silence = silent_since_ ? clock_.now() - *silent_since_ : 0.0;
   if (silence <= silence_limit_) return {};

@@ -10,7 +10,8 @@
 namespace lensforge {
 
 /// Polls the signals of one device, each at its interval, and tells which of them cannot be read
-/// any more: more failures in a row than its retries, or silence beyond the device's limit.
+/// any more: more failures in a row than its retries, its own or the whole device's, or silence
+/// beyond the device's limit.
 class DeviceWatch {
  public:
   struct Reading {
@@ -49,6 +50,8 @@ class DeviceWatch {
   Clock& clock_;
   std::vector<Polled> polled_;
   std::optional<double> silent_since_;  ///< The first request since which none was answered.
+  std::string last_error_;
+  int unanswered_ = 0;  ///< Requests in a row.
 };
 
 }  // namespace lensforge

@@ -139,11 +139,15 @@ void SpindleGuard::spin(double rpm, bool clockwise) {
   watch_.expect_speed(rpm, clockwise, now);
   record(GuardEvent::kCommand, std::string("spin ") + number_text(rpm) + " rpm " +
                                    (clockwise ? "clockwise" : "counter-clockwise"));
-  if (!refused.empty()) {
-    watch_.refuse(refused);
-  } else if (!writes) {
-    watch_.command_taken(now);
-  }
+  if (!refused.empty()) watch_.refuse(refused);
+  if (options_.owner == SpindleOwner::kController) watch_.command_taken(now);
+  give_up_failed_start();
+}
+
+// A start that has failed must not reach the drive minutes later, when the bus is back and a hand
+// is near the tool; a stop that comes late does no harm.
+void SpindleGuard::give_up_failed_start() {
+  if (!stopping_ && watch_.state() == SpindleState::kFailed) pending_.clear();
 }
 
 void SpindleGuard::stop() {
@@ -177,15 +181,13 @@ void SpindleGuard::send_commands() {
   }
 }
 
-// A start that is given up must not reach the drive minutes later, when the bus is back and a hand
-// is near the tool; a stop that comes late does no harm.
 void SpindleGuard::command_failed(const std::string& error) {
   ++failed_writes_;
+  watch_.command_failed(error);
   const int retries = spindle().commands->retries;
   if (failed_writes_ <= retries) return;
   watch_.refuse(error + ", " + std::to_string(failed_writes_) +
                 " times in a row: " + std::to_string(retries) + " retries are borne");
-  if (!stopping_) pending_.clear();
 }
 
 void SpindleGuard::apply(Device& device, const DeviceWatch::Reading& reading) {
@@ -236,13 +238,29 @@ std::string SpindleGuard::interlock_trouble() const {
   return all;
 }
 
-GuardReport SpindleGuard::poll() {
-  send_commands();
+void SpindleGuard::read_signals() {
   for (Device& device : devices_) {
     for (const DeviceWatch::Reading& reading : device.watch.poll()) apply(device, reading);
   }
+}
+
+// Commands go before readings. While they fail, the two take turns at starting, as the one that
+// fails leaves the bus in a pause and the other nothing to do: a command that is not taken keeps no
+// interlock from being read, and readings that fail keep no stop from being tried.
+void SpindleGuard::exchange() {
+  const bool ready = devices_[spindle_device_].watch.ready();
+  const bool commands_first = commands_first_;
+  if (commands_first) send_commands();
+  read_signals();
+  if (!commands_first) send_commands();
+  if (ready) commands_first_ = failed_writes_ == 0 || !commands_first;
+}
+
+GuardReport SpindleGuard::poll() {
+  exchange();
   watch_.set_bus_trouble(spindle_bus_trouble());
   watch_.check_time(clock_.now());
+  give_up_failed_start();
   const std::string interlocks = interlock_trouble();
   GuardReport report{watch_.state(), watch_.rpm(), interlocks.empty(), watch_.reason()};
   if (!report.reason.empty()) report.reason = devices_[spindle_device_].name + ": " + report.reason;

@@ -36,9 +36,9 @@ struct GuardedDevice {
 /// long as its exchanges, of which at most one a device runs into a time-out (BackgroundGuard
 /// keeps that off a sender's thread).
 ///
-/// A failure never stops the spindle: only stop() does. A start whose command is not taken is
-/// given up; a stop is tried until it is taken. Interlocks that were not read yet, or cannot be
-/// read, are not ok.
+/// A failure never stops the spindle: only stop() does. A start that fails, or is asked for while
+/// something is wrong, is given up for good; a stop is tried until it is taken. Interlocks that
+/// were not read yet, or cannot be read, are not ok.
 class SpindleGuard final : public Guard {
  public:
   /// @throw InputError unless exactly one device has a spindle, with commands where the host is to
@@ -80,6 +80,9 @@ class SpindleGuard final : public Guard {
   [[nodiscard]] const SpindleMap& spindle() const { return spindle_map_; }
   [[nodiscard]] std::string refusal(double rpm, bool clockwise) const;
   [[nodiscard]] std::deque<WriteStep> start_steps(double rpm, bool clockwise) const;
+  void give_up_failed_start();
+  void exchange();
+  void read_signals();
   void send_commands();
   void command_failed(const std::string& error);
   void apply(Device& device, const DeviceWatch::Reading& reading);
@@ -102,6 +105,7 @@ class SpindleGuard final : public Guard {
   std::deque<WriteStep> pending_;
   bool stopping_ = false;  ///< What is pending is a stop.
   int failed_writes_ = 0;
+  bool commands_first_ = true;
   Running asked_ = Running::kNo;
   Running running_ = Running::kNo;  ///< What the device last took.
 

@@ -21,6 +21,7 @@ void SpindleWatch::ask(Goal goal, double now) {
   goal_ = goal;
   asked_at_ = now;
   taken_ = false;
+  command_error_.clear();
   verified_ = false;
   good_reads_ = 0;
   bad_reads_ = 0;
@@ -28,7 +29,7 @@ void SpindleWatch::ask(Goal goal, double now) {
   direction_ = {};
   latched_.clear();
   speed_trouble_.clear();
-  if (goal == Goal::kSpeed && !bus_trouble_.empty()) latched_ = bus_trouble_;
+  if (goal == Goal::kSpeed) latched_ = reason();
 }
 
 void SpindleWatch::expect_speed(double rpm, bool clockwise, double now) {
@@ -155,20 +156,25 @@ void SpindleWatch::judge(double now) {
   check_time(now);
 }
 
+/// What has kept the request from being verified.
+std::string SpindleWatch::unverified_text() const {
+  if (!taken_) {
+    return "the command was not taken" +
+           (command_error_.empty() ? "" : " (" + command_error_ + ")");
+  }
+  if (good_reads_ < map_.verify_reads) return speed_text();
+  if (map_.at_speed && !at_speed_.good) return "the at-speed signal stays off";
+  if (map_.direction && !direction_.good) return direction_text();
+  return "its other signals could not be read";
+}
+
 void SpindleWatch::check_time(double now) {
   if (verified_ || goal_ == Goal::kNone) return;
   const bool spins_up = goal_ == Goal::kSpeed;
   const double limit = spins_up ? map_.spin_up_limit : map_.spin_down_limit;
   if (now - asked_at_ <= limit || !speed_trouble_.empty()) return;
-  const bool speed_good = good_reads_ >= map_.verify_reads;
-  const std::string what = !taken_                            ? "the command was not taken"
-                           : !speed_good                      ? speed_text()
-                           : map_.at_speed && !at_speed_.good ? "the at-speed signal stays off"
-                           : map_.direction && !direction_.good
-                               ? direction_text()
-                               : "its fault register could not be read";
-  fail(speed_trouble_,
-       what + " " + number_text(limit) + " s after the " + (spins_up ? "start" : "stop"));
+  fail(speed_trouble_, unverified_text() + " " + number_text(limit) + " s after the " +
+                           (spins_up ? "start" : "stop"));
 }
 
 SpindleState SpindleWatch::state() const {

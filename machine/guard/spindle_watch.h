@@ -9,8 +9,9 @@
 namespace lensforge {
 
 /// Judges readings of a spindle against what was asked of it. Pure logic: time and readings come in
-/// through the calls, nothing is read or written. A failure while a speed is asked for stays until
-/// the next request; while stopping or idle it lasts as long as its cause.
+/// through the calls, nothing is read or written. A failure while a speed is asked for, or one that
+/// stands when it is asked for, stays until the next request; while stopping or idle it lasts as
+/// long as its cause.
 class SpindleWatch {
  public:
   explicit SpindleWatch(const SpindleMap& map) : map_(map) {}
@@ -19,6 +20,8 @@ class SpindleWatch {
   void expect_stop(double now);
   /// The device has taken the command: readings from now on count.
   void command_taken(double now);
+  /// The device has not taken it yet.
+  void command_failed(const std::string& error) { command_error_ = error; }
 
   void see_speed(double rpm, double now);
   void see_fault(std::uint16_t code, double now);
@@ -52,6 +55,7 @@ class SpindleWatch {
   [[nodiscard]] bool flags_are_good() const;
   [[nodiscard]] std::string speed_text() const;
   [[nodiscard]] std::string direction_text() const;
+  [[nodiscard]] std::string unverified_text() const;
   void note_flag(Flag& flag, bool good, double now, const std::string& trouble);
 
   SpindleMap map_;
@@ -60,6 +64,7 @@ class SpindleWatch {
   bool clockwise_ = true;
   double asked_at_ = 0.0;
   bool taken_ = true;
+  std::string command_error_;
   bool verified_ = false;
 
   double rpm_ = 0.0;

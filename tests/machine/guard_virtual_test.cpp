@@ -181,7 +181,7 @@ TEST(SpindleGuard, FailsWhereTheBusFallsSilentAndStaysFailed) {
   EXPECT_LE(taken, 2.0 + 0.1 + 2 * kStep);
   EXPECT_THAT(shop.guard.poll().reason,
               AllOf(HasSubstr("YL620: spindle.status.speed (holding register 0x200B)"),
-                    HasSubstr("no answer"), HasSubstr("are borne")));
+                    HasSubstr("no "), HasSubstr("are borne")));
   EXPECT_EQ(shop.spindle.asked_rpm(), 12000.0);
   EXPECT_EQ(shop.run(20.0).spindle, SpindleState::kFailed) << "the bus is back, and yet";
   shop.reach(12000.0);
@@ -240,6 +240,43 @@ TEST(SpindleGuard, BelievesNoStartThatIsEchoedWrong) {
   EXPECT_EQ(shop.spindle.rpm(), 0.0);
 }
 
+// One register that is never answered: it alone is named, and the others go on being read.
+TEST(SpindleGuard, NamesTheRegisterThatIsNeverAnswered) {
+  RegisterMap device = testing::shipped_map("yl620");
+  RegisterMap map = device;
+  map.spindle->fault->signal.at.address = 0x3000;
+  device.spindle->fault.reset();
+  Workshop shop(device, map, SpindleOwner::kHost);
+  shop.guard.spin(12000.0, true);
+  const GuardReport report = shop.run(10.0);
+  EXPECT_EQ(report.spindle, SpindleState::kFailed);
+  EXPECT_THAT(report.reason, HasSubstr("spindle.status.fault (holding register 0x3000)"));
+  EXPECT_NEAR(report.rpm, 12000.0, 10.0);
+}
+
+// The device obeys, and does not answer: reading fails as well as stopping does.
+TEST(SpindleGuard, AStopIsSentThroughASilence) {
+  Workshop shop("yl620");
+  shop.reach(12000.0);
+  shop.trouble(SpindleTrouble::kSilent);
+  shop.run(5.0);
+  shop.guard.stop();
+  shop.run(3.0);
+  EXPECT_EQ(shop.spindle.asked_rpm(), 0.0);
+}
+
+TEST(SpindleGuard, ReadsInterlocksWhileCommandsFail) {
+  RegisterMap map = testing::shipped_map("generic_plc");
+  Workshop shop(map, map, SpindleOwner::kHost);
+  shop.trouble(SpindleTrouble::kWrongEcho);
+  shop.guard.stop();
+  shop.run(3.0);
+  shop.trouble(SpindleTrouble::kInterlock, 100.0, 0.0, "door");
+  const GuardReport report = shop.run(6.0);
+  EXPECT_TRUE(shop.guard.commands_pending());
+  EXPECT_THAT(report.reason, HasSubstr("PLC: door: reads 0: 1 is needed"));
+}
+
 TEST(SpindleGuard, FailsWhereTheDeviceRefuses) {
   Workshop shop("yl620");
   shop.trouble(SpindleTrouble::kRefuses);
@@ -257,6 +294,16 @@ TEST(SpindleGuard, AStartThatWasGivenUpIsNeverSentLater) {
   shop.run(120.0);
   EXPECT_EQ(shop.spindle.asked_rpm(), 0.0);
   EXPECT_EQ(shop.spindle.rpm(), 0.0);
+}
+
+TEST(SpindleGuard, StartsNothingWhileAFaultStands) {
+  Workshop shop("generic_plc");
+  shop.trouble(SpindleTrouble::kFault, 5.0, 1.0);
+  shop.run(1.0);
+  shop.guard.spin(12000.0, true);
+  EXPECT_EQ(shop.run(30.0).spindle, SpindleState::kFailed);
+  EXPECT_EQ(shop.spindle.asked_rpm(), 0.0);
+  shop.reach(12000.0);
 }
 
 TEST(SpindleGuard, AStopIsTriedUntilItIsTaken) {
