@@ -23,15 +23,15 @@ using Kind = Reply::Kind;
 
 bool at_rest(const StatusReport& report) {
   switch (report.state) {
-    case MachineState::kIdle:
-    case MachineState::kAlarm:
-    case MachineState::kCheck:
-    case MachineState::kSleep:
-    case MachineState::kTool:
+    case ReportedState::kIdle:
+    case ReportedState::kAlarm:
+    case ReportedState::kCheck:
+    case ReportedState::kSleep:
+    case ReportedState::kTool:
       return true;
-    case MachineState::kHold:
+    case ReportedState::kHold:
       return report.sub_state.value_or(0) == 0;
-    case MachineState::kDoor:
+    case ReportedState::kDoor:
       return report.sub_state.value_or(0) <= 1;
     default:
       return false;
@@ -124,7 +124,7 @@ StatusReport Dialogue::hold(double timeout) {
   wire_.urgent(realtime::kFeedHold);
   const double end = clock_.now() + timeout;
   while (clock_.now() < end) {
-    const StatusReport report = status();
+    StatusReport report = status();
     if (at_rest(report)) return report;
     pause_until_reply(clock_.now() + kStatusPause);
   }

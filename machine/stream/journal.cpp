@@ -99,6 +99,13 @@ void Journal::fail(int error) const {
                       ": the journal cannot be kept: " + std::generic_category().message(error));
 }
 
+void Journal::origins(const WorkOrigins& origins) {
+  nlohmann::json list = nlohmann::json::array();
+  for (const Eigen::Vector3d& at : origins) list.push_back({at.x(), at.y(), at.z()});
+  append({{"kind", "origins"}, {"origins", list}});
+  request_flush(true);
+}
+
 /// Half of a reservation is left when the next is asked for, so the disk has that long.
 /// Reservations grow with the rate of lines until one is enough for a second or so.
 void Journal::reserve(std::int64_t line) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <condition_variable>
 #include <cstdint>
 #include <filesystem>
@@ -37,17 +38,21 @@ struct JobProgress {
   double rpm = 0.0;                         ///< Last reading.
 };
 
+/// Where G54 … G59 begin, machine coordinates, mm.
+using WorkOrigins = std::array<Eigen::Vector3d, 6>;
+
 /// What the sender may have done at most, and has done at least.
 struct JournalRecord {
   JobIdentity job;
-  bool finished = false;   ///< The program came to its end.
-  std::string status;      ///< How the last run ended; empty if it just ceased.
-  std::string reason;      ///< Why.
-  JobProgress last;        ///< Of the last record that tells; sent, acknowledged and executed are
-                           ///< the farthest of all runs, sent including what was reserved.
-  std::int64_t runs = 0;   ///< Times that the job was begun or resumed.
-  std::int64_t bytes = 0;  ///< Length of the valid part of the file.
-  std::int64_t torn = 0;   ///< Bytes behind it: a record cut short.
+  bool finished = false;  ///< The program came to its end.
+  std::string status;     ///< How the last run ended; empty if it just ceased.
+  std::string reason;     ///< Why.
+  JobProgress last;       ///< Of the last record that tells; sent, acknowledged and executed are
+                          ///< the farthest of all runs, sent including what was reserved.
+  std::optional<WorkOrigins> origins;  ///< When the job was begun.
+  std::int64_t runs = 0;               ///< Times that the job was begun or resumed.
+  std::int64_t bytes = 0;              ///< Length of the valid part of the file.
+  std::int64_t torn = 0;               ///< Bytes behind it: a record cut short.
 };
 
 /// When the journal is flushed to the disk.
@@ -77,6 +82,8 @@ class Journal {
   Journal(const Journal&) = delete;
   Journal& operator=(const Journal&) = delete;
 
+  /// Where the part lies, so that a later run can tell that it still does. @throw JournalFailed
+  void origins(const WorkOrigins& origins);
   /// To be called before each line is sent. Reserves enough lines ahead that it seldom has to wait
   /// for the disk. @throw JournalFailed
   void before_sending(std::int64_t line) {

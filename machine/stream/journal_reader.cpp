@@ -58,6 +58,13 @@ void take(const nlohmann::json& record, JournalRecord& journal, Bounds& bounds) 
     take_progress(record, journal.last);
     bounds.told = std::max(bounds.told, record.value("sent", std::int64_t{0}));
   }
+  if (kind == "origins" && !journal.origins) {
+    WorkOrigins& origins = journal.origins.emplace();
+    for (std::size_t i = 0; i < origins.size(); ++i) {
+      const auto& at = record["origins"].at(i);
+      origins[i] = Eigen::Vector3d(at.at(0), at.at(1), at.at(2));
+    }
+  }
   if (kind == "end") {
     bounds.reserved = 0;
     journal.status = record.value("status", "");

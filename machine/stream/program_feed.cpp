@@ -11,6 +11,9 @@ namespace {
 constexpr std::array kStoredWords = {100, 280, 281, 300, 301, 540, 550, 560,
                                      570, 580, 590, 920, 921, 922, 923};
 
+/// G words, times ten, that use the axis words of their line.
+constexpr std::array kMotionWords = {0, 10, 20, 30, 100, 280, 281, 300, 301, 800, 920};
+
 bool touches_settings(const GcodeBlock& block) {
   const auto words = block.words();
   return std::any_of(words.begin(), words.end(), [](const GcodeWord& word) {
@@ -26,10 +29,13 @@ bool has_axis_word(const GcodeBlock& block) {
   });
 }
 
-bool has_g_word(const GcodeBlock& block) {
+/// Whether a word says what the axis words are for.
+bool has_motion_word(const GcodeBlock& block) {
   const auto words = block.words();
-  return std::any_of(words.begin(), words.end(),
-                     [](const GcodeWord& word) { return word.letter == 'G'; });
+  return std::any_of(words.begin(), words.end(), [](const GcodeWord& word) {
+    return word.letter == 'G' &&
+           std::find(kMotionWords.begin(), kMotionWords.end(), word.tenths) != kMotionWords.end();
+  });
 }
 
 const char* motion_word(MotionMode mode) {
@@ -88,7 +94,7 @@ std::optional<OutgoingLine> ProgramFeed::made_ready(const GcodeText& text) {
   line.alone = touches_settings(block);
   note_effect(effect, before, line);
   // Picked up in the middle, the first line cannot lean on a motion word that was never sent.
-  if (first_ && options_.first_line > 1 && has_axis_word(block) && !has_g_word(block)) {
+  if (first_ && options_.first_line > 1 && has_axis_word(block) && !has_motion_word(block)) {
     line.text = std::string(motion_word(before.motion)).append(line.text);
   }
   first_ = false;

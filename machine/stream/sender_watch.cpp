@@ -134,7 +134,7 @@ void Sender::take_status(const StatusReport& report) {
   position_ = position;
   judge_state(report);
   tracker_.report(report, lensforge::at_rest(report));
-  const bool idle = report.state == MachineState::kIdle &&
+  const bool idle = report.state == ReportedState::kIdle &&
                     (!report.room || report.room->blocks >= info_.planner_blocks);
   idle_reports_ = idle && !stale_ ? idle_reports_ + 1 : 0;
   stale_ = false;
@@ -150,14 +150,14 @@ void Sender::take_status(const StatusReport& report) {
 
 void Sender::judge_state(const StatusReport& report) {
   switch (report.state) {
-    case MachineState::kIdle:
-    case MachineState::kRun:
+    case ReportedState::kIdle:
+    case ReportedState::kRun:
       held_ = false;
       return;
-    case MachineState::kTool:
+    case ReportedState::kTool:
       if (phase_ == Phase::kAnswer && barrier_.tool_change) return;
       break;
-    case MachineState::kHold:
+    case ReportedState::kHold:
       if (phase_ == Phase::kAnswer && barrier_.pauses) return;
       if (!held_) {
         held_since_ = clock_.now();
@@ -168,11 +168,11 @@ void Sender::judge_state(const StatusReport& report) {
         throw StreamFault(FaultKind::kHeld, "held for longer than allowed");
       }
       return;
-    case MachineState::kAlarm:
+    case ReportedState::kAlarm:
       throw StreamFault(FaultKind::kAlarm, report.sub_state.value_or(0) > 0
                                                ? explain_alarm(*report.sub_state)
                                                : "the controller is in alarm");
-    case MachineState::kDoor:
+    case ReportedState::kDoor:
       throw StreamFault(FaultKind::kDoor, "the controller reports its safety door open");
     default:
       break;
@@ -193,7 +193,7 @@ void Sender::watch_for_stall() {
   if (phase_ == Phase::kAnswer) allowed += options_.spindle_timeout;
   if (clock_.now() - progress_at_ <= allowed) return;
   const std::string line = line_words(tracker_.oldest_line());
-  if (report_.state == MachineState::kIdle) {
+  if (report_.state == ReportedState::kIdle) {
     throw StreamFault(FaultKind::kCountMismatch,
                       "the controller is idle, but " + line + " was never answered");
   }

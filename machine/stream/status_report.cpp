@@ -13,17 +13,17 @@ namespace {
 constexpr std::size_t kMostAxes = 8;
 constexpr std::size_t kLongestName = 12;
 
-constexpr std::array<std::pair<std::string_view, MachineState>, 10> kStates{
-    {{"Idle", MachineState::kIdle},
-     {"Run", MachineState::kRun},
-     {"Hold", MachineState::kHold},
-     {"Jog", MachineState::kJog},
-     {"Alarm", MachineState::kAlarm},
-     {"Door", MachineState::kDoor},
-     {"Check", MachineState::kCheck},
-     {"Home", MachineState::kHome},
-     {"Sleep", MachineState::kSleep},
-     {"Tool", MachineState::kTool}}};
+constexpr std::array<std::pair<std::string_view, ReportedState>, 10> kStates{
+    {{"Idle", ReportedState::kIdle},
+     {"Run", ReportedState::kRun},
+     {"Hold", ReportedState::kHold},
+     {"Jog", ReportedState::kJog},
+     {"Alarm", ReportedState::kAlarm},
+     {"Door", ReportedState::kDoor},
+     {"Check", ReportedState::kCheck},
+     {"Home", ReportedState::kHome},
+     {"Sleep", ReportedState::kSleep},
+     {"Tool", ReportedState::kTool}}};
 
 /// A field being read: whether it is as it should be.
 using Parse = bool (*)(std::string_view, StatusReport&);
@@ -170,7 +170,7 @@ bool read_field(std::string_view text, StatusReport& report) {
 
 }  // namespace
 
-std::string_view state_name(MachineState state) {
+std::string_view state_name(ReportedState state) {
   for (const auto& [name, value] : kStates) {
     if (value == state) return name;
   }

@@ -11,7 +11,7 @@
 namespace lensforge {
 
 /// What a controller says that it is doing.
-enum class MachineState {
+enum class ReportedState {
   kIdle,
   kRun,
   kHold,
@@ -25,7 +25,7 @@ enum class MachineState {
 };
 
 /// "Idle", "Run" …
-std::string_view state_name(MachineState state);
+std::string_view state_name(ReportedState state);
 
 /// Free room in a controller's buffers.
 struct BufferRoom {
@@ -36,7 +36,7 @@ struct BufferRoom {
 /// One answer to ?. Lengths and speeds are in the controller's reporting unit: mm, or inch
 /// under $13=1.
 struct StatusReport {
-  MachineState state = MachineState::kIdle;
+  ReportedState state = ReportedState::kIdle;
   std::optional<int> sub_state;  ///< Hold:0 … Door:3, Alarm:N of grblHAL.
   std::optional<Eigen::Vector3d> machine_position;
   std::optional<Eigen::Vector3d> work_position;

@@ -97,8 +97,7 @@ class FastController : public Link, public Clock {
     if (line_ == "$I") return "[VER:1.1h.20190830:]\r\n[OPT:VN,15,128]\r\nok\r\n";
     if (line_ == "$$") return "$13=0\r\n$30=24000\r\n$32=0\r\n$100=250.000\r\nok\r\n";
     if (line_ == "$#") return "[G54:10.000,20.000,-30.000]\r\n[TLO:0.000]\r\nok\r\n";
-    const std::string other = answer ? answer(line_, received) : "ok\r\n";
-    return other;
+    return answer ? answer(line_, received) : "ok\r\n";
   }
 
  public:

@@ -126,7 +126,7 @@ TEST(StatusReport, ReadsEveryField) {
       "<Hold:1|MPos:1.000,-2.500,3.125|Bf:15,128|Ln:99999|FS:500,8000|Pn:XDH|WCO:0.000,1.551,5.664"
       "|Ov:100,50,120|A:SF>");
   ASSERT_TRUE(report);
-  EXPECT_EQ(report->state, MachineState::kHold);
+  EXPECT_EQ(report->state, ReportedState::kHold);
   EXPECT_EQ(report->sub_state, 1);
   EXPECT_EQ(*report->machine_position, Eigen::Vector3d(1.0, -2.5, 3.125));
   EXPECT_EQ(report->room->blocks, 15);

@@ -109,7 +109,7 @@ class SenderTest : public ::testing::Test {
 TEST_F(SenderTest, LearnsTheControllerFromItsAnswers) {
   Wire wire(controller);
   Dialogue dialogue(wire, controller, {});
-  EXPECT_EQ(dialogue.wake(5.0).state, MachineState::kIdle);
+  EXPECT_EQ(dialogue.wake(5.0).state, ReportedState::kIdle);
   const ControllerInfo info = learn_controller(dialogue, dialogue.reset());
   EXPECT_EQ(info.dialect.name, "grbl");
   EXPECT_TRUE(info.line_numbers);
@@ -326,7 +326,7 @@ TEST_F(SenderTest, AHoldFromOutsideIsWaitedOut) {
   int reports = 0;
   control.watch = [&](const SendEvent& event) {
     if (event.acknowledged == 9 && reports++ == 0) controller.state = "Hold:0";
-    if (reports > 0 && event.report.state == MachineState::kHold && ++reports == 20) {
+    if (reports > 0 && event.report.state == ReportedState::kHold && ++reports == 20) {
       controller.state = "Idle";
     }
   };

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <istream>
+#include <limits>
+#include <optional>
+#include <string>
+
+#include "core/run_control.h"
+#include "machine/gcode/gcode_dialect.h"
+#include "machine/gcode/gcode_state.h"
+#include "machine/planner/planner_model.h"
+
+namespace lensforge {
+
+/// What a whole program asks for. Machine coordinates, mm, where the start state has the origins of
+/// the coordinate systems, else the program's own.
+struct ProgramFacts {
+  std::int64_t lines = 0;       ///< Of the file.
+  std::int64_t sent_lines = 0;  ///< That the controller gets.
+  std::int64_t sent_bytes = 0;  ///< Of those, with their ends, without N words.
+  std::int64_t motions = 0;
+  bool inches = false;             ///< G20 stands somewhere.
+  Eigen::AlignedBox3d extent;      ///< Of all motions.
+  Eigen::AlignedBox3d cut_extent;  ///< Of those at feed.
+  std::int64_t lowest_line = 0;    ///< Where Z is lowest.
+  double top_feed = 0.0;           ///< mm/min
+  std::int64_t top_feed_line = 0;
+  double top_rpm = 0.0;
+  std::int64_t top_rpm_line = 0;
+  double least_rpm = std::numeric_limits<double>::infinity();  ///< Of those that turn.
+  std::optional<double> plunge_feed;                           ///< Slowest straight down, mm/min.
+  double rapid_z = -std::numeric_limits<double>::infinity();   ///< Highest end of a rapid.
+  std::int64_t tool_changes = 0;
+  std::int64_t pauses = 0;
+  bool ends = false;               ///< M2, M30 or the second %.
+  bool leaves_spindle_on = false;  ///< At its end.
+  PlanTime time;
+};
+
+/// How a program is looked at.
+struct FactsOptions {
+  GcodeDialect dialect;
+  GcodeState start;
+  PlannerSettings planner;
+  double spin_up = 0.0;  ///< Seconds for each change of the spindle.
+};
+
+/// Reads and runs every line of a program, in constant memory.
+/// @throw GcodeError for the first line that the dialect or the sender refuses, cutting with the
+///        spindle off included; Interrupted; RunError if the file cannot be read.
+ProgramFacts examine_program(std::istream& in, const FactsOptions& options,
+                             const RunControl& control);
+
+}  // namespace lensforge

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <istream>
+#include <string>
+#include <vector>
+
+#include "core/run_control.h"
+#include "machine/stream/controller_info.h"
+#include "machine/stream/journal.h"
+#include "machine/stream/program_facts.h"
+#include "machine/stream/program_feed.h"
+
+namespace lensforge {
+
+/// How a job is taken up again. Lengths in mm.
+struct ResumeOptions {
+  std::int64_t margin = 20;  ///< Lines before the last one carried out that are cut again at least.
+  /// Length of path, cut before, over which the tool comes down onto it.
+  double ramp = 2.0;
+  double lift = 0.3;          ///< Height above the path at which the ramp begins.
+  double plunge_feed = 60.0;  ///< Where the program has none straight down, mm/min.
+};
+
+/// How a job goes on: the sender's own lines, then the program from a line on.
+struct ResumePlan {
+  std::int64_t line = 1;         ///< First line of the program that is sent.
+  std::int64_t offset = 0;       ///< Where it begins in the file.
+  GcodeState state;              ///< In force before it, the tool at the end of the ramp.
+  std::int64_t entry_line = 1;   ///< First line of whose motion something is cut again.
+  std::int64_t overlap_end = 0;  ///< Last line of which something may be cut twice.
+  std::deque<OutgoingLine> before;
+  std::vector<std::string> steps;  ///< The same for the operator, in plain sentences.
+};
+
+/// Plans how to go on after `record`, no later than `margin` lines before the last that was carried
+/// out. The tool goes up to where it stands now, over the entry, down above the path at feed, and
+/// comes down onto what was cut before along the path itself, its height above it falling to zero
+/// with zero slope, so that it leaves no mark. Where the path before does not allow that, the
+/// program's own approach is run again.
+/// @param info  of the homed machine: its Z is the retract height.
+/// @throw InputError if the job is finished, or the coordinate system has moved since.
+ResumePlan plan_resume(std::istream& program, const JournalRecord& record,
+                       const ControllerInfo& info, const ProgramFacts& facts,
+                       const ResumeOptions& options);
+
+}  // namespace lensforge

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "machine/stream/session.h"
+
+#include <algorithm>
+#include <array>
+
+#include "core/error.h"
+#include "machine/stream/program_feed.h"
+
+namespace lensforge {
+namespace {
+
+constexpr double kAnswerTimeout = 5.0;
+constexpr double kCheckTimeout = 10.0;
+constexpr std::int64_t kLinesBetweenReports = 256;
+
+/// What must be so before a reset: nothing moves, and it is ours to take over.
+void require_rest(Dialogue& dialogue, const StatusReport& report, bool resume) {
+  if (report.state == ReportedState::kDoor) {
+    throw InputError("the controller reports its safety door open; close it first");
+  }
+  const bool free = report.state == ReportedState::kIdle || report.state == ReportedState::kAlarm ||
+                    report.state == ReportedState::kCheck || report.state == ReportedState::kSleep;
+  if (free) return;
+  if (!resume) {
+    throw InputError("the controller is in state " + std::string(state_name(report.state)) +
+                     ": end what it does, or continue a job with --resume");
+  }
+  dialogue.hold();
+}
+
+}  // namespace
+
+ControllerInfo open_session(Wire& wire, Clock& clock, const SessionOptions& options,
+                            const std::stop_token& stop) {
+  Dialogue dialogue(wire, clock, stop);
+  require_rest(dialogue, dialogue.wake(options.wake_timeout), options.resume);
+  const std::string banner = dialogue.reset();
+  if (options.home) dialogue.ask("$H", options.home_timeout);
+  return learn_controller(dialogue, banner);
+}
+
+double measure_round_trip(Wire& wire, Clock& clock, const std::stop_token& stop) {
+  Dialogue dialogue(wire, clock, stop);
+  std::array<double, 5> times{};
+  for (double& time : times) {
+    const double begin = clock.now();
+    dialogue.ask("", kAnswerTimeout);
+    time = clock.now() - begin;
+  }
+  std::sort(times.begin(), times.end());
+  return times[times.size() / 2];
+}
+
+std::int64_t check_on_controller(Wire& wire, Clock& clock, std::istream& program,
+                                 const ControllerInfo& info, const RunControl& control) {
+  Dialogue dialogue(wire, clock, control.stop_token());
+  dialogue.ask("$C", kAnswerTimeout);
+  FeedOptions options;
+  options.dialect = info.dialect;
+  options.start = info.start;
+  ProgramFeed feed(program, options);
+  std::int64_t checked = 0;
+  while (const std::optional<OutgoingLine> line = feed.next()) {
+    try {
+      dialogue.ask(line->text, kCheckTimeout);
+    } catch (const StreamFault& fault) {
+      throw StreamFault(fault.kind(), "line " + std::to_string(line->line) + ": " + fault.what());
+    }
+    if (++checked % kLinesBetweenReports == 0) {
+      control.report({"checking on the controller", static_cast<double>(line->next_offset), 0.0,
+                      "line " + std::to_string(line->line)});
+    }
+  }
+  dialogue.reset();
+  return checked;
+}
+
+}  // namespace lensforge
