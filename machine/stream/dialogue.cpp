@@ -16,7 +16,7 @@ constexpr double kQuietAfterBanner = 0.3;  ///< Start-up lines and messages foll
 using Kind = Reply::Kind;
 
 [[noreturn]] void silence(const std::string& what) {
-  throw StreamFault(FaultKind::kStall, "no answer from the controller: " + what);
+  throw StreamFault(StopCause::kStall, "no answer from the controller: " + what);
 }
 
 }  // namespace
@@ -39,7 +39,7 @@ bool at_rest(const StatusReport& report) {
 }
 
 void Dialogue::pause_until_reply(double until) {
-  if (stop_.stop_requested()) throw StreamFault(FaultKind::kInterrupted, "interrupted");
+  if (stop_.stop_requested()) throw StreamFault(StopCause::kInterrupted, "interrupted");
   wire_.flush();
   const double wait = std::clamp(until - clock_.now(), 0.0, kStopCheck);
   wire_.receive(wait, [this](const Reply& reply) { replies_.push_back(reply); });
@@ -84,13 +84,13 @@ std::vector<Reply> Dialogue::ask(const std::string& line, double timeout) {
     for (const Reply& reply : replies_) {
       if (reply.kind == Kind::kOk) return answer;
       if (reply.kind == Kind::kError) {
-        throw StreamFault(FaultKind::kError, line + " was refused: " + explain_error(reply.code));
+        throw StreamFault(StopCause::kError, line + " was refused: " + explain_error(reply.code));
       }
       if (reply.kind == Kind::kAlarm) {
-        throw StreamFault(FaultKind::kAlarm, line + ": " + explain_alarm(reply.code));
+        throw StreamFault(StopCause::kAlarm, line + ": " + explain_alarm(reply.code));
       }
       if (reply.kind == Kind::kUnknown) {
-        throw StreamFault(FaultKind::kGarbledReply, line + ": '" + reply.text + "'");
+        throw StreamFault(StopCause::kGarbledReply, line + ": '" + reply.text + "'");
       }
       answer.push_back(reply);
     }
@@ -128,7 +128,7 @@ StatusReport Dialogue::hold(double timeout) {
     if (at_rest(report)) return report;
     pause_until_reply(clock_.now() + kStatusPause);
   }
-  throw StreamFault(FaultKind::kStall, "the machine does not come to rest in a feed hold");
+  throw StreamFault(StopCause::kStall, "the machine does not come to rest in a feed hold");
 }
 
 }  // namespace lensforge

@@ -16,6 +16,9 @@ namespace {
 /// Coordinate systems are told with three decimals, mm.
 constexpr double kOriginTolerance = 0.0015;
 
+/// A move that goes less than this part of its height across is a plunge or a retract.
+constexpr double kLeastShareAcross = 0.1;
+
 /// Motions kept to choose the entry among.
 constexpr std::size_t kHistory = 4096;
 
@@ -26,10 +29,16 @@ struct Done {
   GcodeState before;
   GcodeState after;
   std::vector<GcodeMotion> motions;
-  /// Straight or arc at feed, nothing else: fit to be retraced.
   [[nodiscard]] bool cuts() const {
     return !motions.empty() && std::none_of(motions.begin(), motions.end(),
                                             [](const GcodeMotion& m) { return m.rapid; });
+  }
+  /// A cut along which a tool can come down: none straight down or up.
+  [[nodiscard]] bool leads_along() const {
+    return cuts() && std::all_of(motions.begin(), motions.end(), [](const GcodeMotion& m) {
+             const Eigen::Vector3d step = m.end - m.start;
+             return m.arc || step.head<2>().norm() >= kLeastShareAcross * std::abs(step.z());
+           });
   }
 };
 
@@ -71,7 +80,7 @@ std::vector<GcodeMotion> ramp_path(const History& history, double length) {
     const bool same_frame = at->after.coordinate_system == history.state.coordinate_system &&
                             spindle_order(at->after) == spindle_order(history.state) &&
                             at->after.tool == history.state.tool;
-    if (!at->cuts() || !same_frame) return {};
+    if (!at->leads_along() || !same_frame) return {};
     for (auto motion = at->motions.rbegin(); motion != at->motions.rend(); ++motion) {
       path.insert(path.begin(), *motion);
       found += motion->length();

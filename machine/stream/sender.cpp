@@ -68,21 +68,21 @@ SendResult Sender::run(ProgramFeed& feed, const SendControl& control) {
   started_ = progress_at_ = clock_.now();
   try {
     while (phase_ != Phase::kDone) step();
-    return end(SendStatus::kDone, FaultKind::kNone, "the program came to its end");
+    return end(SendStatus::kDone, StopCause::kNone, "the program came to its end");
   } catch (const StreamFault& fault) {
-    return stop_for(fault.kind(), fault.what());
+    return stop_for(fault.cause(), fault.what());
   } catch (const LinkLost& lost) {
-    return stop_for(FaultKind::kLinkLost, lost.what());
+    return stop_for(StopCause::kLinkLost, lost.what());
   } catch (const JournalFailed& failed) {
-    return stop_for(FaultKind::kJournal, failed.what());
+    return stop_for(StopCause::kJournal, failed.what());
   } catch (const std::runtime_error& refused) {
-    return stop_for(FaultKind::kProgram, refused.what());
+    return stop_for(StopCause::kProgram, refused.what());
   }
 }
 
 void Sender::step() {
   if (control_->reset.stop_requested() || control_->stop.stop_requested()) {
-    throw StreamFault(FaultKind::kInterrupted, "interrupted");
+    throw StreamFault(StopCause::kInterrupted, "interrupted");
   }
   obey_operator();
   fill();
@@ -94,7 +94,7 @@ void Sender::step() {
 }
 
 void Sender::fill() {
-  while (phase_ == Phase::kStreaming && !held_) {
+  while (phase_ == Phase::kStreaming && !held_ && (guard_ == nullptr || guard_ready_)) {
     if (!next_) next_ = feed_->next();
     if (!next_) {
       phase_ = Phase::kEnding;
@@ -121,11 +121,16 @@ bool Sender::drained() const { return tracker_.empty() && idle_reports_ >= kIdle
 
 void Sender::hand_over() {
   if (next_->cuts && !(spindle_.turning() && verified_)) {
-    throw StreamFault(FaultKind::kSpindle, "line " + std::to_string(next_->line) +
+    throw StreamFault(StopCause::kSpindle, "line " + std::to_string(next_->line) +
                                                " moves at feed, but the spindle is not verified "
                                                "to turn");
   }
   if (journal_ != nullptr) journal_->before_sending(next_->line);
+  if (next_->barrier) {
+    barrier_ = *next_;
+    phase_ = Phase::kAnswer;
+    command_spindle();
+  }
   const double now = clock_.now();
   // Time during which there was nothing to wait for is no stall.
   if (tracker_.empty()) progress_at_ = now;
@@ -133,11 +138,20 @@ void Sender::hand_over() {
   tracker_.send(*next_, now);
   idle_reports_ = 0;
   stale_ = true;
-  if (next_->barrier) {
-    barrier_ = *next_;
-    phase_ = Phase::kAnswer;
-  }
   next_.reset();
+}
+
+/// Before the line itself leaves, so that a guard which only watches knows what is to come.
+void Sender::command_spindle() {
+  if (!barrier_.spindle) return;
+  spindle_ = *barrier_.spindle;
+  verified_ = false;
+  if (guard_ == nullptr) return;
+  if (spindle_.turning()) {
+    guard_->spin(spindle_.rpm, spindle_.turn == SpindleTurn::kClockwise);
+  } else {
+    guard_->stop();
+  }
 }
 
 void Sender::obey_operator() {
@@ -161,7 +175,7 @@ void Sender::ask_status() {
   const double now = clock_.now();
   if (now < status_due_) return;
   if (asked_since_ && now - *asked_since_ > options_.reply_timeout) {
-    throw StreamFault(FaultKind::kStall, "the controller has not answered ? for " +
+    throw StreamFault(StopCause::kStall, "the controller has not answered ? for " +
                                              std::to_string(static_cast<int>(now - *asked_since_)) +
                                              " s");
   }
@@ -180,10 +194,14 @@ void Sender::watch_guard() {
   for (const GuardRecord& record : guard_->take_records()) {
     if (!record.text.empty()) note(record.text);
   }
-  if (!guarded_.interlocks_ok) throw StreamFault(FaultKind::kInterlock, guarded_.reason);
+  guard_ready_ = guard_ready_ || guarded_.interlocks_ok;
+  const bool may_be_unread = !guard_ready_ && clock_.now() - started_ <= options_.guard_timeout;
+  if (!guarded_.interlocks_ok && !may_be_unread) {
+    throw StreamFault(StopCause::kInterlock, guarded_.reason);
+  }
   const bool watched = spindle_.turning() && phase_ != Phase::kSpindle && verified_;
   if (watched && guarded_.spindle != SpindleState::kAtSpeed) {
-    throw StreamFault(FaultKind::kSpindle, "the spindle lost its speed: " + guarded_.reason + ", " +
+    throw StreamFault(StopCause::kSpindle, "the spindle lost its speed: " + guarded_.reason + ", " +
                                                std::to_string(static_cast<int>(guarded_.rpm)) +
                                                " rpm read");
   }

@@ -30,6 +30,7 @@ struct SenderOptions {
   double progress_timeout = 5.0;  ///< Neither a reply nor motion for longer is a stall.
   double spindle_timeout = 60.0;  ///< For the spindle to reach a speed or to stop.
   double hold_timeout = 15.0;     ///< For the machine to come to rest in a feed hold.
+  double guard_timeout = 5.0;     ///< For all interlocks to be read once, at the beginning.
   /// A hold from outside ends the job after this; 0 waits for ever.
   double hold_limit = 0.0;
 };
@@ -62,13 +63,13 @@ struct SendControl {
 enum class SendStatus {
   kDone,         ///< The program came to its end and the machine stands still.
   kInterrupted,  ///< Somebody asked for the end: held, then reset.
-  kFault,        ///< Held, see the fault.
+  kFault,        ///< Held, see the cause.
 };
 
 /// How a job ended.
 struct SendResult {
   SendStatus status = SendStatus::kFault;
-  FaultKind fault = FaultKind::kNone;
+  StopCause cause = StopCause::kNone;
   std::string reason;             ///< In one line.
   std::int64_t sent = 0;          ///< Last line that was handed over, in part or whole.
   std::int64_t acknowledged = 0;  ///< Every line up to it was taken.
@@ -126,6 +127,7 @@ class Sender {
   void take_status(const StatusReport& report);
   void judge_state(const StatusReport& report);
   void pass_barrier();
+  void command_spindle();
   void watch_guard();
   void verify_spindle();
   void watch_for_stall();
@@ -134,9 +136,9 @@ class Sender {
   [[nodiscard]] JobProgress progress() const;
 
   // sender_end.cpp: how it ends.
-  SendResult end(SendStatus status, FaultKind fault, std::string reason);
-  SendResult stop_for(FaultKind fault, std::string reason);
-  void hold(FaultKind fault);
+  SendResult end(SendStatus status, StopCause cause, std::string reason);
+  SendResult stop_for(StopCause cause, std::string reason);
+  void hold(StopCause cause);
   void wait_for_banner();
   void take_while_stopping(const Reply& reply);
 
@@ -163,6 +165,7 @@ class Sender {
   double spindle_since_ = 0.0;
   GuardReport guarded_;
   double guard_due_ = 0.0;
+  bool guard_ready_ = false;  ///< Every interlock was read and found as it should be.
 
   StatusReport report_;
   int idle_reports_ = 0;  ///< In a row, asked for after the last line was sent or taken.

@@ -17,19 +17,19 @@ constexpr double kReadWait = 0.05;    ///< Longest wait without a look at the se
 
 /// Nothing more of the program leaves from here on. The feed hold comes before all else; what the
 /// controller has received but not begun stays where it is.
-SendResult Sender::stop_for(FaultKind fault, std::string reason) {
+SendResult Sender::stop_for(StopCause cause, std::string reason) {
   wire_.discard();
   try {
-    if (fault != FaultKind::kLinkLost) hold(fault);
+    if (cause != StopCause::kLinkLost) hold(cause);
   } catch (const LinkLost& lost) {
     reason += "; then " + std::string(lost.what());
   }
-  const bool asked = fault == FaultKind::kInterrupted;
-  return end(asked ? SendStatus::kInterrupted : SendStatus::kFault, fault, std::move(reason));
+  const bool asked = cause == StopCause::kInterrupted;
+  return end(asked ? SendStatus::kInterrupted : SendStatus::kFault, cause, std::move(reason));
 }
 
-void Sender::hold(FaultKind fault) {
-  const bool interrupted = fault == FaultKind::kInterrupted;
+void Sender::hold(StopCause cause) {
+  const bool interrupted = cause == StopCause::kInterrupted;
   const auto reset_now = [&] { return interrupted && control_->reset.stop_requested(); };
   const double end = clock_.now() + options_.hold_timeout;
   double hold_due = clock_.now();
@@ -74,10 +74,10 @@ void Sender::wait_for_banner() {
   }
 }
 
-SendResult Sender::end(SendStatus status, FaultKind fault, std::string reason) {
+SendResult Sender::end(SendStatus status, StopCause cause, std::string reason) {
   SendResult result;
   result.status = status;
-  result.fault = fault;
+  result.cause = cause;
   result.reason = std::move(reason);
   result.sent = tracker_.sent();
   result.acknowledged = tracker_.acknowledged();
@@ -91,11 +91,11 @@ SendResult Sender::end(SendStatus status, FaultKind fault, std::string reason) {
                                                                   : "fault";
     journal_->end(word, result.reason, progress());
   } catch (const JournalFailed& failed) {
-    if (fault == FaultKind::kJournal) return result;
+    if (cause == StopCause::kJournal) return result;
     result.reason += "; and " + std::string(failed.what());
     if (!result.done()) return result;
     result.status = SendStatus::kFault;
-    result.fault = FaultKind::kJournal;
+    result.cause = StopCause::kJournal;
   }
   return result;
 }

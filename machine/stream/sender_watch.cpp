@@ -53,12 +53,12 @@ void Sender::take(const Reply& reply) {
     case Reply::Kind::kStatus:
       return take_status(*reply.status);
     case Reply::Kind::kError:
-      throw StreamFault(FaultKind::kError, line_words(tracker_.oldest_line()) +
+      throw StreamFault(StopCause::kError, line_words(tracker_.oldest_line()) +
                                                " was refused: " + explain_error(reply.code));
     case Reply::Kind::kAlarm:
-      throw StreamFault(FaultKind::kAlarm, explain_alarm(reply.code));
+      throw StreamFault(StopCause::kAlarm, explain_alarm(reply.code));
     case Reply::Kind::kBanner:
-      throw StreamFault(FaultKind::kReset, "the controller started afresh: " + reply.text);
+      throw StreamFault(StopCause::kReset, "the controller started afresh: " + reply.text);
     case Reply::Kind::kMessage:
       note("controller: " + reply.value);
       return;
@@ -70,12 +70,12 @@ void Sender::take(const Reply& reply) {
     default:
       break;
   }
-  throw StreamFault(FaultKind::kGarbledReply, "not a reply to anything: '" + reply.text + "'");
+  throw StreamFault(StopCause::kGarbledReply, "not a reply to anything: '" + reply.text + "'");
 }
 
 void Sender::take_ok() {
   if (tracker_.empty()) {
-    throw StreamFault(FaultKind::kCountMismatch, "an ok came, but no line waits for one");
+    throw StreamFault(StopCause::kCountMismatch, "an ok came, but no line waits for one");
   }
   tracker_.acknowledge();
   progress_at_ = clock_.now();
@@ -88,23 +88,15 @@ void Sender::pass_barrier() {
   tracker_.all_done();
   phase_ = barrier_.ends ? Phase::kEnding : Phase::kStreaming;
   if (!barrier_.spindle) return;
-  spindle_ = *barrier_.spindle;
-  verified_ = false;
   spindle_since_ = clock_.now();
   if (!barrier_.ends) phase_ = Phase::kSpindle;
-  if (guard_ == nullptr) return;
-  if (spindle_.turning()) {
-    guard_->spin(spindle_.rpm, spindle_.turn == SpindleTurn::kClockwise);
-  } else {
-    guard_->stop();
-  }
 }
 
 void Sender::verify_spindle() {
   std::optional<bool> as_asked;
   if (guard_ != nullptr) {
     const bool failed = guarded_.spindle == SpindleState::kFailed;
-    if (failed) throw StreamFault(FaultKind::kSpindle, "the spindle failed: " + guarded_.reason);
+    if (failed) throw StreamFault(StopCause::kSpindle, "the spindle failed: " + guarded_.reason);
     as_asked =
         guarded_.spindle == (spindle_.turning() ? SpindleState::kAtSpeed : SpindleState::kStopped);
   } else {
@@ -116,7 +108,7 @@ void Sender::verify_spindle() {
     return;
   }
   if (clock_.now() - spindle_since_ <= options_.spindle_timeout) return;
-  throw StreamFault(FaultKind::kSpindle,
+  throw StreamFault(StopCause::kSpindle,
                     as_asked ? "the spindle did not come to " +
                                    std::to_string(std::lround(spindle_.rpm)) + " rpm in time"
                              : "the controller does not tell whether the spindle turns");
@@ -140,7 +132,7 @@ void Sender::take_status(const StatusReport& report) {
   stale_ = false;
   if (options_.character_counting) {
     const std::string mismatch = audit_.check(report, tracker_, clock_.now());
-    if (!mismatch.empty()) throw StreamFault(FaultKind::kCountMismatch, mismatch);
+    if (!mismatch.empty()) throw StreamFault(StopCause::kCountMismatch, mismatch);
   }
   if (drained()) tracker_.all_done();
   if (guard_ == nullptr && phase_ == Phase::kSpindle) verify_spindle();
@@ -165,19 +157,19 @@ void Sender::judge_state(const StatusReport& report) {
       }
       held_ = true;
       if (options_.hold_limit > 0.0 && clock_.now() - held_since_ > options_.hold_limit) {
-        throw StreamFault(FaultKind::kHeld, "held for longer than allowed");
+        throw StreamFault(StopCause::kHeld, "held for longer than allowed");
       }
       return;
     case ReportedState::kAlarm:
-      throw StreamFault(FaultKind::kAlarm, report.sub_state.value_or(0) > 0
+      throw StreamFault(StopCause::kAlarm, report.sub_state.value_or(0) > 0
                                                ? explain_alarm(*report.sub_state)
                                                : "the controller is in alarm");
     case ReportedState::kDoor:
-      throw StreamFault(FaultKind::kDoor, "the controller reports its safety door open");
+      throw StreamFault(StopCause::kDoor, "the controller reports its safety door open");
     default:
       break;
   }
-  throw StreamFault(FaultKind::kUnexpectedState,
+  throw StreamFault(StopCause::kUnexpectedState,
                     "the controller is in state " + std::string(state_name(report.state)));
 }
 
@@ -194,10 +186,10 @@ void Sender::watch_for_stall() {
   if (clock_.now() - progress_at_ <= allowed) return;
   const std::string line = line_words(tracker_.oldest_line());
   if (report_.state == ReportedState::kIdle) {
-    throw StreamFault(FaultKind::kCountMismatch,
+    throw StreamFault(StopCause::kCountMismatch,
                       "the controller is idle, but " + line + " was never answered");
   }
-  throw StreamFault(FaultKind::kStall, "no motion, and no answer to " + line);
+  throw StreamFault(StopCause::kStall, "no motion, and no answer to " + line);
 }
 
 void Sender::note(const std::string& text) {

@@ -65,7 +65,7 @@ std::int64_t check_on_controller(Wire& wire, Clock& clock, std::istream& program
     try {
       dialogue.ask(line->text, kCheckTimeout);
     } catch (const StreamFault& fault) {
-      throw StreamFault(fault.kind(), "line " + std::to_string(line->line) + ": " + fault.what());
+      throw StreamFault(fault.cause(), "line " + std::to_string(line->line) + ": " + fault.what());
     }
     if (++checked % kLinesBetweenReports == 0) {
       control.report({"checking on the controller", static_cast<double>(line->next_offset), 0.0,

@@ -3,39 +3,39 @@
 
 namespace lensforge {
 
-std::string_view fault_name(FaultKind kind) {
-  switch (kind) {
-    case FaultKind::kNone:
+std::string_view cause_name(StopCause cause) {
+  switch (cause) {
+    case StopCause::kNone:
       return "none";
-    case FaultKind::kInterrupted:
+    case StopCause::kInterrupted:
       return "interrupted";
-    case FaultKind::kGarbledReply:
+    case StopCause::kGarbledReply:
       return "garbled reply";
-    case FaultKind::kCountMismatch:
+    case StopCause::kCountMismatch:
       return "reply count";
-    case FaultKind::kError:
+    case StopCause::kError:
       return "error";
-    case FaultKind::kAlarm:
+    case StopCause::kAlarm:
       return "alarm";
-    case FaultKind::kReset:
+    case StopCause::kReset:
       return "reset";
-    case FaultKind::kStall:
+    case StopCause::kStall:
       return "stall";
-    case FaultKind::kLinkLost:
+    case StopCause::kLinkLost:
       return "link lost";
-    case FaultKind::kDoor:
+    case StopCause::kDoor:
       return "door";
-    case FaultKind::kHeld:
+    case StopCause::kHeld:
       return "held";
-    case FaultKind::kUnexpectedState:
+    case StopCause::kUnexpectedState:
       return "unexpected state";
-    case FaultKind::kSpindle:
+    case StopCause::kSpindle:
       return "spindle";
-    case FaultKind::kInterlock:
+    case StopCause::kInterlock:
       return "interlock";
-    case FaultKind::kJournal:
+    case StopCause::kJournal:
       return "journal";
-    case FaultKind::kProgram:
+    case StopCause::kProgram:
       return "program";
   }
   return {};

@@ -8,7 +8,7 @@
 namespace lensforge {
 
 /// Why a stream was stopped.
-enum class FaultKind {
+enum class StopCause {
   kNone,
   kInterrupted,      ///< Somebody asked for it.
   kGarbledReply,     ///< A reply that no controller sends.
@@ -28,17 +28,17 @@ enum class FaultKind {
 };
 
 /// "garbled reply", "link lost" …
-std::string_view fault_name(FaultKind kind);
+std::string_view cause_name(StopCause cause);
 
 /// A reason to stop the stream, on its way to the place that stops it.
 class StreamFault : public std::runtime_error {
  public:
-  StreamFault(FaultKind kind, const std::string& reason)
-      : std::runtime_error(reason), kind_(kind) {}
-  [[nodiscard]] FaultKind kind() const { return kind_; }
+  StreamFault(StopCause cause, const std::string& reason)
+      : std::runtime_error(reason), cause_(cause) {}
+  [[nodiscard]] StopCause cause() const { return cause_; }
 
  private:
-  FaultKind kind_;
+  StopCause cause_;
 };
 
 }  // namespace lensforge

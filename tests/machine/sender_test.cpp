@@ -97,9 +97,9 @@ class SenderTest : public ::testing::Test {
     };
   }
 
-  void expect_held(const SendResult& result, FaultKind fault, const std::string& reason) {
+  void expect_held(const SendResult& result, StopCause cause, const std::string& reason) {
     EXPECT_EQ(result.status, SendStatus::kFault);
-    EXPECT_EQ(fault_name(result.fault), fault_name(fault));
+    EXPECT_EQ(cause_name(result.cause), cause_name(cause));
     EXPECT_THAT(result.reason, HasSubstr(reason));
     EXPECT_TRUE(result.at_rest);
     EXPECT_THAT(controller.urgent, ElementsAre("!"));
@@ -195,7 +195,7 @@ TEST_F(SenderTest, PartialWritesLoseNothing) {
 TEST_F(SenderTest, AnErrorHoldsAndNamesTheLine) {
   answer_to("X2F500", "error:22\r\n");
   const SendResult result = send(kProgram);
-  expect_held(result, FaultKind::kError, "line 9");
+  expect_held(result, StopCause::kError, "line 9");
   EXPECT_THAT(result.reason, HasSubstr("no feed"));
   EXPECT_EQ(result.acknowledged, 8);
   EXPECT_LE(result.executed, 8);
@@ -203,21 +203,21 @@ TEST_F(SenderTest, AnErrorHoldsAndNamesTheLine) {
 }
 
 TEST_F(SenderTest, EveryOtherBadReplyHoldsToo) {
-  const std::vector<std::tuple<std::string, FaultKind, std::string>> cases = {
-      {"ALARM:1\r\n", FaultKind::kAlarm, "limit switch"},
-      {"o\x7fk\r\n", FaultKind::kGarbledReply, "not a reply"},
-      {"ok\r\nok\r\n", FaultKind::kCountMismatch, "no line waits"},
-      {"\r\nGrbl 1.1h ['$' for help]\r\n", FaultKind::kReset, "started afresh"},
-      {"", FaultKind::kCountMismatch, "never answered"},
-      {"<Door:1|MPos:0,0,0>\r\n", FaultKind::kDoor, "door"},
-      {"<Alarm|MPos:0,0,0>\r\n", FaultKind::kAlarm, "alarm"},
-      {"<Sleep|MPos:0,0,0>\r\n", FaultKind::kUnexpectedState, "Sleep"},
-      {"$30=1000\r\n", FaultKind::kGarbledReply, "not a reply"}};
-  for (const auto& [reply, fault, reason] : cases) {
+  const std::vector<std::tuple<std::string, StopCause, std::string>> cases = {
+      {"ALARM:1\r\n", StopCause::kAlarm, "limit switch"},
+      {"o\x7fk\r\n", StopCause::kGarbledReply, "not a reply"},
+      {"ok\r\nok\r\n", StopCause::kCountMismatch, "no line waits"},
+      {"\r\nGrbl 1.1h ['$' for help]\r\n", StopCause::kReset, "started afresh"},
+      {"", StopCause::kCountMismatch, "never answered"},
+      {"<Door:1|MPos:0,0,0>\r\n", StopCause::kDoor, "door"},
+      {"<Alarm|MPos:0,0,0>\r\n", StopCause::kAlarm, "alarm"},
+      {"<Sleep|MPos:0,0,0>\r\n", StopCause::kUnexpectedState, "Sleep"},
+      {"$30=1000\r\n", StopCause::kGarbledReply, "not a reply"}};
+  for (const auto& [reply, cause, reason] : cases) {
     controller = FastController();
     answer_to("M5", reply);  // A barrier: what comes after it waits for the answer.
     const SendResult result = send(kProgram);
-    expect_held(result, fault, reason);
+    expect_held(result, cause, reason);
     EXPECT_EQ(controller.lines.back(), "N12M5") << reply;
   }
 }
@@ -238,7 +238,7 @@ TEST_F(SenderTest, SilenceIsAStall) {
   ProgramFeed feed(text, {info.dialect, true, {}, 1, 0, {}});
   Sender sender({wire, mute}, info, options, 1);
   const SendResult result = sender.run(feed, control);
-  EXPECT_EQ(result.fault, FaultKind::kStall);
+  EXPECT_EQ(result.cause, StopCause::kStall);
   EXPECT_FALSE(result.at_rest);
 }
 
@@ -247,7 +247,7 @@ TEST_F(SenderTest, NothingCutsBeforeTheSpindleIsVerified) {
   lame.lame = true;
   guard = &lame;
   const SendResult result = send(kProgram);
-  expect_held(result, FaultKind::kSpindle, "12000 rpm in time");
+  expect_held(result, StopCause::kSpindle, "12000 rpm in time");
   EXPECT_EQ(controller.lines.back(), "N5S12000M3");
   EXPECT_THAT(lame.orders, ElementsAre("cw 12000")) << "a spindle that turns is left turning";
 }
@@ -257,12 +257,12 @@ TEST_F(SenderTest, AClampedSpeedIsNotTheSpeedAskedFor) {
     if (line.find("M3") != std::string::npos) controller.spindle = 1000.0;  // $30
     return std::string("ok\r\n");
   };
-  expect_held(send(kProgram), FaultKind::kSpindle, "12000 rpm in time");
+  expect_held(send(kProgram), StopCause::kSpindle, "12000 rpm in time");
 }
 
 TEST_F(SenderTest, CutsWithoutASpindleAreRefused) {
   const SendResult result = send("G21 G90\nG1 X1 F100\n");
-  expect_held(result, FaultKind::kSpindle, "line 2");
+  expect_held(result, StopCause::kSpindle, "line 2");
   EXPECT_THAT(controller.lines, ElementsAre("N1G21G90"));
 }
 
@@ -288,7 +288,7 @@ TEST_F(SenderTest, TroubleAtTheGuardHolds) {
       spindle.troubled = spindle.troubled || line.find("X2") != std::string::npos;
       return std::string("ok\r\n");
     };
-    expect_held(send(kProgram), interlock ? FaultKind::kInterlock : FaultKind::kSpindle, "vacuum");
+    expect_held(send(kProgram), interlock ? StopCause::kInterlock : StopCause::kSpindle, "vacuum");
     EXPECT_THAT(spindle.orders, ElementsAre("cw 12000"));
     EXPECT_EQ(controller.lines.back().substr(0, 3), "N9X");
   }
@@ -342,7 +342,7 @@ TEST_F(SenderTest, AHoldBeyondTheLimitEndsTheJob) {
   control.watch = [&](const SendEvent& event) {
     if (event.acknowledged == 9) controller.state = "Hold:0";
   };
-  expect_held(send(kProgram), FaultKind::kHeld, "longer than allowed");
+  expect_held(send(kProgram), StopCause::kHeld, "longer than allowed");
 }
 
 TEST_F(SenderTest, TheOperatorsKeysBecomeRealtimeBytes) {
@@ -379,7 +379,7 @@ TEST_F(SenderTest, AFullDiskForTheJournalHolds) {
   for (int i = 0; i < 2000; ++i) program += "G1 X" + std::to_string(i) + "\n";
   const testing::FullDisk full(16384);
   const SendResult result = send(program);
-  expect_held(result, FaultKind::kJournal, "File too large");
+  expect_held(result, StopCause::kJournal, "File too large");
   EXPECT_LT(controller.lines.size(), 2000U);
 }
 
@@ -400,7 +400,7 @@ TEST_F(SenderTest, TheJournalKnowsHowItEnded) {
 }
 
 TEST_F(SenderTest, SpindleAndCutInOneLineIsRefused) {
-  expect_held(send("G21 G90\nG1 X1 F100 S1000 M3\n"), FaultKind::kProgram, "line 2");
+  expect_held(send("G21 G90\nG1 X1 F100 S1000 M3\n"), StopCause::kProgram, "line 2");
 }
 
 }  // namespace
