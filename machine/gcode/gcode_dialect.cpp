@@ -21,6 +21,7 @@ GcodeDialect grblhal_dialect() {
   dialect.max_characters = 255;
   dialect.max_line_number = 9'999'999;
   dialect.tool_change = true;
+  dialect.mist = true;
   dialect.refuses_after_error = true;
   dialect.rx_bytes = 1024;
   dialect.planner_blocks = 35;

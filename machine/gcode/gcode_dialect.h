@@ -14,6 +14,7 @@ struct GcodeDialect {
   std::size_t max_characters = 0;    ///< Of a line as sent, compacted, without its end.
   std::int64_t max_line_number = 0;  ///< Largest N word.
   bool tool_change = false;          ///< T and M6.
+  bool mist = false;                 ///< M7; Grbl has it only where built so ([OPT: says M).
   bool refuses_after_error = false;  ///< Until an empty line, every line is answered by the error.
   std::size_t rx_bytes = 0;          ///< Usual size of the receive buffer.
   int planner_blocks = 0;            ///< Usual number of motions it looks ahead.

@@ -298,8 +298,9 @@ class BlockRun {
   void set_stop() {
     const auto word = words_[ModalGroup::kStop];
     if (!word) return;
-    effect_.pauses = *word == 0 || *word == 10;
-    effect_.ends = !effect_.pauses;
+    effect_.pauses = *word == 0;
+    effect_.optional_stop = *word == 10;
+    effect_.ends = *word == 20 || *word == 300;
     if (effect_.ends) reset_modes();
   }
 

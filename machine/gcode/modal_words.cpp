@@ -110,9 +110,9 @@ ModalWords::ModalWords(const GcodeBlock& block, const GcodeDialect& dialect) {
     if (word.letter != 'G' && word.letter != 'M') continue;
     const auto group = word.letter == 'G' ? g_group(word.tenths) : m_group(word.tenths);
     if (!group) refuse_unknown(block, word, dialect);
-    if (*group == ModalGroup::kToolChange && !dialect.tool_change) {
-      refuse_unknown(block, word, dialect);
-    }
+    const bool lacks_tools = *group == ModalGroup::kToolChange && !dialect.tool_change;
+    const bool lacks_mist = *group == ModalGroup::kCoolant && word.tenths == 70 && !dialect.mist;
+    if (lacks_tools || lacks_mist) refuse_unknown(block, word, dialect);
     std::optional<int>& slot = words_[static_cast<std::size_t>(*group)];
     if (slot) {
       throw GcodeError(block.line, word_name(word) + " stands beside another word of its group");

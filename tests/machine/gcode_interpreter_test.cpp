@@ -103,7 +103,8 @@ TEST(GcodeInterpreter, ArcsInEveryPlane) {
 TEST(GcodeInterpreter, TellsWhatElseALineDoes) {
   EXPECT_EQ(effect_of("G4 P1.5").dwell, 1.5);
   EXPECT_TRUE(effect_of("M0").pauses);
-  EXPECT_TRUE(effect_of("M1").pauses);
+  EXPECT_TRUE(effect_of("M1").optional_stop);
+  EXPECT_FALSE(effect_of("M1").pauses);
   EXPECT_TRUE(effect_of("M2").ends);
   EXPECT_TRUE(effect_of("M30").ends);
   EXPECT_EQ(effect_of("T3 M6").tool_change, 3);
@@ -150,6 +151,7 @@ TEST(GcodeInterpreter, RefusesWithLineAndReason) {
       {"G38.2 Z-1", "G38.2 is not supported"},
       {"M98 P1", "M98 is not supported"},
       {"M6", "M6 is not supported for grbl"},
+      {"M7", "M7 is not supported for grbl"},
       {"T1", "T: grbl knows no tool change"},
       {"A1", "A is no word that grbl knows"},
       {"G21\nM2\nG0 X1", "line 3: words after the end"},
