@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <functional>
 #include <optional>
+#include <thread>
 
 #include "machine/guard/background_guard.h"
 #include "machine/guard/modbus_bus.h"
@@ -167,7 +168,7 @@ TEST_P(RealBus, FailsWhereAnswersAreLateAndTakesNoneForAnother) {
   EXPECT_THAT(shop_.last().reason, HasSubstr("no "));
   EXPECT_NEAR(shop_.last().rpm, 12000.0, 120.0);
   shop_.server().set_manner(Manner::kHonest);
-  shop_.clock().wait(0.6);
+  shop_.clock().wait(0.4);
   ASSERT_TRUE(shop_.reach(6000.0)) << shop_.last().reason;
   for (const GuardRecord& record : shop_.guard().take_records()) {
     EXPECT_THAT(record.text, ::testing::Not(HasSubstr("fault"))) << "a speed was taken for a code";
@@ -204,6 +205,21 @@ TEST_P(RealBus, DeliversAStopBeforeItGoes) {
   ASSERT_TRUE(shop_.reach(12000.0)) << shop_.last().reason;
   shop_.guard().stop();
   shop_.close_guard();
+  ModbusBus reader(shop_.map().transport);
+  reader.open();
+  EXPECT_EQ(reader.read({3, 0x2000}), 0x01);
+}
+
+TEST_P(RealBus, GoesOnTryingAStopWhileItGoes) {
+  ASSERT_TRUE(shop_.reach(12000.0)) << shop_.last().reason;
+  shop_.server().set_manner(Manner::kWrongEcho);
+  shop_.guard().stop();
+  std::thread heals([this] {
+    shop_.clock().wait(0.3);
+    shop_.server().set_manner(Manner::kHonest);
+  });
+  shop_.close_guard();
+  heals.join();
   ModbusBus reader(shop_.map().transport);
   reader.open();
   EXPECT_EQ(reader.read({3, 0x2000}), 0x01);
@@ -285,34 +301,40 @@ TEST(ModbusBus, IsBoundedWhereNobodyIsThere) {
   }
 }
 
-/// Answers, and then keeps the thread, as a resolver or a driver can.
-class StuckBus final : public RegisterBus {
+/// All registers read 0. One answer of all may keep the thread long, as a resolver or a driver can.
+class ZeroBus final : public RegisterBus {
  public:
+  ZeroBus(double each, int stuck_at) : each_(each), stuck_at_(stuck_at) {}
   void open() override { open_ = true; }
   void close() override { open_ = false; }
   [[nodiscard]] bool is_open() const override { return open_; }
   void discard() override {}
   std::uint16_t read(const RegisterAddress& /*at*/) override {
-    if (++reads_ == 50) SteadyClock().wait(0.6);
+    SteadyClock().wait(++reads_ == stuck_at_ ? 0.6 : each_);
     return 0;
   }
   void write(const RegisterAddress& /*at*/, std::uint16_t /*value*/) override {}
 
  private:
+  double each_;
+  int stuck_at_;
   bool open_ = false;
   int reads_ = 0;
 };
 
-TEST(BackgroundGuard, AReportThatIsTooOldIsAFailure) {
-  const RegisterMap map = parse_register_map(
-      testing::drive_map("kind = \"tcp\"\nhost = \"127.0.0.1\"\nport = 1\nunit = 1\n"
-                         "connect_timeout = 0.2"),
-      "drive.toml");
-  SteadyClock clock;
+std::unique_ptr<SpindleGuard> guard_over(std::unique_ptr<RegisterBus> bus, Clock& clock) {
   std::vector<GuardedDevice> devices;
-  devices.push_back({map, std::make_unique<StuckBus>()});
-  BackgroundGuard guard(std::make_unique<SpindleGuard>(std::move(devices), GuardOptions{}, clock),
-                        0.2);
+  devices.push_back(
+      {parse_register_map(testing::drive_map("kind = \"tcp\"\nhost = \"127.0.0.1\"\nport = 1\n"
+                                             "unit = 1\nconnect_timeout = 0.2"),
+                          "drive.toml"),
+       std::move(bus)});
+  return std::make_unique<SpindleGuard>(std::move(devices), GuardOptions{}, clock);
+}
+
+TEST(BackgroundGuard, AReportThatIsTooOldIsAFailure) {
+  SteadyClock clock;
+  BackgroundGuard guard(guard_over(std::make_unique<ZeroBus>(0.0, 50), clock), 0.2);
   std::string reason;
   const double end = clock.now() + 3.0;
   while (clock.now() < end && reason.find("kept its thread") == std::string::npos) {
@@ -323,6 +345,20 @@ TEST(BackgroundGuard, AReportThatIsTooOldIsAFailure) {
     clock.wait(0.002);
   }
   EXPECT_THAT(reason, HasSubstr("at most 0.2 s are borne"));
+}
+
+// A round of readings takes 0.1 s and is under way when the request comes: what it brings is old.
+TEST(BackgroundGuard, AReportThatWasBegunBeforeARequestSaysNothing) {
+  SteadyClock clock;
+  BackgroundGuard guard(guard_over(std::make_unique<ZeroBus>(0.02, -1), clock), 2.0);
+  const double end = clock.now() + 5.0;
+  while (guard.poll().spindle != SpindleState::kStopped && clock.now() < end) clock.wait(0.002);
+  ASSERT_EQ(guard.poll().spindle, SpindleState::kStopped);
+  clock.wait(0.03);
+  guard.spin(12000.0, true);
+  for (const double start = clock.now(); clock.now() < start + 0.4; clock.wait(0.002)) {
+    ASSERT_EQ(guard.poll().spindle, SpindleState::kChanging) << clock.now() - start;
+  }
 }
 
 TEST(BackgroundGuard, SaysNothingOldAfterARequest) {

@@ -240,7 +240,7 @@ byte_timeout = 0.05
 request_gap = 0.0
 reconnect_pause = 0.05
 reconnect_pause_max = 0.2
-silence_limit = 0.5
+silence_limit = 0.4
 
 [spindle]
 rpm_min = 1000
@@ -250,7 +250,7 @@ tolerance = 0.05
 verify_reads = 3
 lost_reads = 2
 stopped_rpm = 60
-spin_up_limit = 0.7
+spin_up_limit = 0.5
 spin_down_limit = 2.0
 
 [spindle.commands]

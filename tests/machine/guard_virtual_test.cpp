@@ -2,70 +2,18 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cmath>
-#include <functional>
 
-#include "core/error.h"
-#include "core/temp_folder.h"
-#include "machine/guard/simulated_spindle.h"
-#include "machine/guard/spindle_guard.h"
-#include "machine/guard_clock.h"
+#include "machine/guard_workshop.h"
 
 namespace lensforge {
 namespace {
 
 using ::testing::AllOf;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-using testing::ManualClock;
-using testing::message_of;
-using ::testing::Not;
-
-constexpr double kRamp = 8000.0;  // rpm/s
-constexpr double kStep = 0.01;    // s between two polls
-
-std::vector<GuardedDevice> one_device(RegisterMap map, std::unique_ptr<RegisterBus> bus) {
-  std::vector<GuardedDevice> devices;
-  devices.push_back({std::move(map), std::move(bus)});
-  return devices;
-}
-
-/// A guard over a simulated spindle, in virtual time that starts at 1000 s.
-struct Workshop {
-  explicit Workshop(const std::string& name, SpindleOwner owner = SpindleOwner::kHost)
-      : Workshop(testing::shipped_map(name), testing::shipped_map(name), owner) {}
-  Workshop(const RegisterMap& device, const RegisterMap& map, SpindleOwner owner)
-      : spindle(device, clock, kRamp), guard(one_device(map, spindle.bus()), {owner}, clock) {}
-
-  /// Polls for `seconds`; @return the last report.
-  GuardReport run(double seconds) {
-    GuardReport report;
-    for (const double end = clock.now() + seconds; clock.now() < end; clock.wait(kStep)) {
-      report = guard.poll();
-      at_speed_while_still |= report.spindle == SpindleState::kAtSpeed && spindle.rpm() == 0.0;
-    }
-    return report;
-  }
-  /// Polls until the spindle is in `state`; @return how long that took, or `limit`.
-  double time_to(SpindleState state, double limit = 100.0) {
-    const double start = clock.now();
-    while (clock.now() - start < limit && guard.poll().spindle != state) clock.wait(kStep);
-    return clock.now() - start;
-  }
-  void reach(double rpm) {
-    guard.spin(rpm, true);
-    ASSERT_LT(time_to(SpindleState::kAtSpeed), 100.0) << guard.poll().reason;
-  }
-  void trouble(SpindleTrouble trouble, double duration = 1e9, double value = 0.0,
-               const std::string& name = {}) {
-    spindle.add({trouble, clock.now(), clock.now() + duration, value, name});
-  }
-
-  ManualClock clock;
-  SimulatedSpindle spindle;
-  SpindleGuard guard;
-  bool at_speed_while_still = false;
-};
+using testing::kStep;
+using testing::Workshop;
 
 class EveryShippedMap : public ::testing::TestWithParam<std::string> {};
 
@@ -242,39 +190,28 @@ TEST(SpindleGuard, BelievesNoStartThatIsEchoedWrong) {
 
 // One register that is never answered: it alone is named, and the others go on being read.
 TEST(SpindleGuard, NamesTheRegisterThatIsNeverAnswered) {
-  RegisterMap device = testing::shipped_map("yl620");
-  RegisterMap map = device;
-  map.spindle->fault->signal.at.address = 0x3000;
-  device.spindle->fault.reset();
-  Workshop shop(device, map, SpindleOwner::kHost);
-  shop.guard.spin(12000.0, true);
+  Workshop shop("yl620");
+  shop.mute_address = 0x2008;
+  shop.spindle.drive(9000.0, true);
   const GuardReport report = shop.run(10.0);
   EXPECT_EQ(report.spindle, SpindleState::kFailed);
-  EXPECT_THAT(report.reason, HasSubstr("spindle.status.fault (holding register 0x3000)"));
-  EXPECT_NEAR(report.rpm, 12000.0, 10.0);
+  EXPECT_THAT(report.reason,
+              HasSubstr("YL620: spindle.status.fault (holding register 0x2008): no"));
+  EXPECT_NEAR(report.rpm, 9000.0, 10.0);
 }
 
-// The device obeys, and does not answer: reading fails as well as stopping does.
+// First nothing gets through, then the device obeys and does not answer: reading fails as well as
+// stopping does, and must not keep the stop from being tried.
 TEST(SpindleGuard, AStopIsSentThroughASilence) {
   Workshop shop("yl620");
   shop.reach(12000.0);
-  shop.trouble(SpindleTrouble::kSilent);
+  shop.trouble(SpindleTrouble::kDown, 5.0);
+  shop.spindle.add({SpindleTrouble::kSilent, shop.clock.now() + 5.0, 1e9, 0.0, {}});
+  shop.guard.stop();
   shop.run(5.0);
-  shop.guard.stop();
-  shop.run(3.0);
+  EXPECT_EQ(shop.spindle.asked_rpm(), 12000.0);
+  shop.run(8.0);
   EXPECT_EQ(shop.spindle.asked_rpm(), 0.0);
-}
-
-TEST(SpindleGuard, ReadsInterlocksWhileCommandsFail) {
-  RegisterMap map = testing::shipped_map("generic_plc");
-  Workshop shop(map, map, SpindleOwner::kHost);
-  shop.trouble(SpindleTrouble::kWrongEcho);
-  shop.guard.stop();
-  shop.run(3.0);
-  shop.trouble(SpindleTrouble::kInterlock, 100.0, 0.0, "door");
-  const GuardReport report = shop.run(6.0);
-  EXPECT_TRUE(shop.guard.commands_pending());
-  EXPECT_THAT(report.reason, HasSubstr("PLC: door: reads 0: 1 is needed"));
 }
 
 TEST(SpindleGuard, FailsWhereTheDeviceRefuses) {
@@ -298,11 +235,13 @@ TEST(SpindleGuard, AStartThatWasGivenUpIsNeverSentLater) {
 
 TEST(SpindleGuard, StartsNothingWhileAFaultStands) {
   Workshop shop("generic_plc");
-  shop.trouble(SpindleTrouble::kFault, 5.0, 1.0);
+  shop.trouble(SpindleTrouble::kFault, 1.0, 1.0);
   shop.run(1.0);
   shop.guard.spin(12000.0, true);
-  EXPECT_EQ(shop.run(30.0).spindle, SpindleState::kFailed);
-  EXPECT_EQ(shop.spindle.asked_rpm(), 0.0);
+  const GuardReport report = shop.run(10.0);
+  EXPECT_EQ(report.spindle, SpindleState::kFailed);
+  EXPECT_EQ(report.reason, "PLC: fault 1: drive fault") << "over, and yet the start has failed";
+  EXPECT_THAT(shop.writes, ElementsAre());
   shop.reach(12000.0);
 }
 
@@ -347,142 +286,33 @@ TEST(SpindleGuard, NoticesThatTheSpindleTurnsTheOtherWay) {
   EXPECT_THAT(report.reason, HasSubstr("V20: does not turn clockwise"));
 }
 
-// The V20's start begins with the word that stops it.
+// The V20's start begins with the word that stops it. 18000 rpm are 300 Hz of 400: 12288 of 16384.
 TEST(SpindleGuard, ChangesTheSpeedOfARunningSpindleWithoutANewStart) {
   Workshop shop("siemens_v20");
   shop.reach(12000.0);
-  shop.guard.spin(18000.0, true);
-  double least = 1e9;
-  while (shop.guard.poll().spindle != SpindleState::kAtSpeed) {
-    least = std::min(least, shop.spindle.asked_rpm());
-    shop.clock.wait(kStep);
-  }
+  EXPECT_THAT(shop.writes, ElementsAre(8192, 0x047E, 0x047F));
+  shop.writes.clear();
+  shop.reach(18000.0);
+  EXPECT_THAT(shop.writes, ElementsAre(12288));
   EXPECT_NEAR(shop.spindle.rpm(), 18000.0, 900.0);
-  EXPECT_GE(least, 12000.0);
+  shop.trouble(SpindleTrouble::kFault, 1.0, 8.0);
+  shop.run(3.0);
+  shop.writes.clear();
+  shop.reach(18000.0);
+  EXPECT_THAT(shop.writes, ElementsAre(12288, 0x047E, 0x047F)) << "after a failure, a whole start";
 }
 
-TEST(SpindleGuard, InterlocksAreNotOkBeforeTheyAreRead) {
-  Workshop shop("generic_plc");
-  shop.trouble(SpindleTrouble::kSilent);
-  const GuardReport report = shop.guard.poll();
-  EXPECT_FALSE(report.interlocks_ok);
-  EXPECT_THAT(report.reason, AllOf(HasSubstr("PLC: door: not read yet"), HasSubstr("e-stop")));
-}
-
-TEST(SpindleGuard, TellsWhichInterlockIsOpen) {
-  Workshop shop("generic_plc");
-  shop.reach(12000.0);
-  EXPECT_TRUE(shop.run(1.0).interlocks_ok);
-  shop.trouble(SpindleTrouble::kInterlock, 1.0, 0.0, "vacuum");
-  const GuardReport report = shop.run(0.25);
-  EXPECT_FALSE(report.interlocks_ok);
-  EXPECT_EQ(report.reason, "PLC: vacuum: reads 0: 1 is needed");
-  EXPECT_EQ(report.spindle, SpindleState::kAtSpeed);
-  EXPECT_TRUE(shop.run(1.5).interlocks_ok);
-}
-
-TEST(SpindleGuard, InterlocksThatCannotBeReadAreNotOk) {
-  Workshop shop("generic_plc");
-  EXPECT_TRUE(shop.run(1.0).interlocks_ok);
-  shop.trouble(SpindleTrouble::kSilent);
-  const GuardReport report = shop.run(3.0);
-  EXPECT_FALSE(report.interlocks_ok);
-  EXPECT_THAT(report.reason, HasSubstr("door (discrete input 0x0000): no"));
-}
-
-/// A drive on one bus, interlocks on another.
-TEST(SpindleGuard, WatchesSeveralDevices) {
-  ManualClock clock;
-  RegisterMap plc_map = testing::shipped_map("generic_plc");
-  plc_map.spindle.reset();
-  SimulatedSpindle drive(testing::shipped_map("yl620"), clock, kRamp);
-  SimulatedSpindle plc(plc_map, clock);
-  std::vector<GuardedDevice> devices;
-  devices.push_back({plc_map, plc.bus()});
-  devices.push_back({testing::shipped_map("yl620"), drive.bus()});
-  SpindleGuard guard(std::move(devices), {}, clock);
-  const auto run = [&](double seconds) {
-    GuardReport report;
-    for (const double end = clock.now() + seconds; clock.now() < end; clock.wait(kStep)) {
-      report = guard.poll();
-    }
-    return report;
-  };
-  guard.spin(12000.0, true);
-  GuardReport report = run(5.0);
-  EXPECT_EQ(report.spindle, SpindleState::kAtSpeed) << report.reason;
-  EXPECT_TRUE(report.interlocks_ok);
-  plc.add({SpindleTrouble::kDown, clock.now(), 1e9, 0.0, {}});
-  report = run(3.0);
-  EXPECT_EQ(report.spindle, SpindleState::kAtSpeed) << "the drive's bus is well";
-  EXPECT_FALSE(report.interlocks_ok);
-}
-
-TEST(SpindleGuard, NeedsExactlyOneSpindleWithCommandsForTheHost) {
-  ManualClock clock;
+TEST(SpindleGuard, FailsBySilenceWhereRetriesAreMany) {
   RegisterMap map = testing::shipped_map("yl620");
-  SimulatedSpindle spindle(map, clock);
-  const auto guard_of = [&](std::vector<RegisterMap> maps, SpindleOwner owner) {
-    return message_of<InputError>([&] {
-      std::vector<GuardedDevice> devices;
-      for (RegisterMap& each : maps) devices.push_back({std::move(each), spindle.bus()});
-      SpindleGuard guard(std::move(devices), {owner}, clock);
-    });
-  };
-  RegisterMap silent = testing::shipped_map("generic_plc");
-  silent.spindle.reset();
-  EXPECT_THAT(guard_of({silent}, SpindleOwner::kHost), HasSubstr("one must have a spindle"));
-  EXPECT_THAT(guard_of({map, map}, SpindleOwner::kHost), HasSubstr("only one may have a spindle"));
-  map.spindle->commands.reset();
-  EXPECT_THAT(guard_of({map}, SpindleOwner::kHost), HasSubstr("YL620: has no spindle.commands"));
-}
-
-std::string told(const std::vector<GuardRecord>& records, GuardEvent event) {
-  std::string all;
-  for (const GuardRecord& record : records) {
-    if (record.event == event) all += record.text + "|";
-  }
-  return all;
-}
-
-TEST(SpindleGuard, RecordsCommandsStatesSpeedsAndTroubles) {
-  Workshop shop("generic_plc");
-  shop.run(1.0);
+  map.spindle->speed.signal.retries = 100;
+  map.spindle->fault->signal.retries = 100;
+  Workshop shop(map, map, SpindleOwner::kHost);
   shop.reach(12000.0);
-  shop.run(10.0);
-  shop.trouble(SpindleTrouble::kInterlock, 1.0, 0.0, "door");
-  shop.run(2.0);
-  shop.trouble(SpindleTrouble::kFault, 1e9, 1.0);
-  shop.run(1.0);
-  const std::vector<GuardRecord> records = shop.guard.take_records();
-  EXPECT_EQ(told(records, GuardEvent::kCommand), "spin 12000 rpm clockwise|");
-  EXPECT_EQ(told(records, GuardEvent::kState), "stopped|changing|at speed|failed|");
-  EXPECT_EQ(told(records, GuardEvent::kTrouble), "PLC: fault 1: drive fault|");
-  EXPECT_EQ(told(records, GuardEvent::kInterlock), "PLC: door: reads 0: 1 is needed||");
-  const auto speeds = std::count_if(records.begin(), records.end(), [](const GuardRecord& record) {
-    return record.event == GuardEvent::kSpeed;
-  });
-  // 1.5 s of ramp at 10 Hz, then one a second for 12 s, then the fall for 1 s at 10 Hz
-  EXPECT_GE(speeds, 25);
-  EXPECT_LE(speeds, 45);
-  EXPECT_TRUE(std::is_sorted(records.begin(), records.end(),
-                             [](const auto& a, const auto& b) { return a.time < b.time; }));
-  EXPECT_TRUE(shop.guard.take_records().empty());
-}
-
-TEST(SimulatedSpindle, RampsAsItsRateSays) {
-  ManualClock clock;
-  SimulatedSpindle spindle(testing::shipped_map("yl620"), clock, 4000.0);
-  spindle.drive(10000.0, false);
-  clock.wait(1.0);
-  EXPECT_NEAR(spindle.rpm(), -4000.0, 1e-6);
-  clock.wait(9.0);
-  EXPECT_NEAR(spindle.rpm(), -10000.0, 1e-6);
-  spindle.add({SpindleTrouble::kFault, clock.now() + 1.0, clock.now() + 2.0, 1.0, {}});
-  clock.wait(1.5);
-  EXPECT_NEAR(spindle.rpm(), -8000.0, 1e-6);
-  clock.wait(9.0);
-  EXPECT_EQ(spindle.rpm(), 0.0) << "a drive that tripped waits for a new start";
+  shop.trouble(SpindleTrouble::kSilent);
+  const double taken = shop.time_to(SpindleState::kFailed);
+  EXPECT_GE(taken, 2.0);
+  EXPECT_LE(taken, 2.0 + 0.1 + 2 * kStep);
+  EXPECT_THAT(shop.guard.poll().reason, HasSubstr("no good answer for 2"));
 }
 
 }  // namespace
