@@ -7,6 +7,7 @@
 #include <sstream>
 #include <utility>
 
+#include "machine/guard/modbus_bus.h"
 #include "machine/link/steady_clock.h"
 
 namespace lensforge {
@@ -130,6 +131,17 @@ double stale_limit_of(const std::vector<RegisterMap>& maps) {
                  16.0 * to.byte_timeout;
   }
   return silence + time_outs;
+}
+
+std::unique_ptr<BackgroundGuard> guard_devices(const std::vector<RegisterMap>& maps,
+                                               const GuardOptions& options, Clock& clock) {
+  std::vector<GuardedDevice> devices;
+  devices.reserve(maps.size());
+  for (const RegisterMap& map : maps) {
+    devices.push_back({map, std::make_unique<ModbusBus>(map.transport)});
+  }
+  return std::make_unique<BackgroundGuard>(
+      std::make_unique<SpindleGuard>(std::move(devices), options, clock), stale_limit_of(maps));
 }
 
 }  // namespace lensforge

@@ -58,4 +58,10 @@ class BackgroundGuard final : public Guard {
 /// each device a connection and an exchange that run into their time-outs.
 double stale_limit_of(const std::vector<RegisterMap>& maps);
 
+/// A guard of real devices, one a map, over ModbusBus and on a thread of its own; connects by and
+/// by.
+/// @param clock  the steady one; must outlive the guard. @throw InputError as SpindleGuard does.
+std::unique_ptr<BackgroundGuard> guard_devices(const std::vector<RegisterMap>& maps,
+                                               const GuardOptions& options, Clock& clock);
+
 }  // namespace lensforge

@@ -32,7 +32,7 @@ class Shop {
     if (!is_tcp) terminals_.emplace();
     revive();
     map_ = parse_register_map(testing::drive_map(transport()), "drive.toml");
-    guard_.emplace(guard_over(map_), stale_limit_of({map_}));
+    guard_ = guard_devices({map_}, {}, clock_);
   }
 
   BackgroundGuard& guard() { return *guard_; }
@@ -81,19 +81,13 @@ class Shop {
            "\"\nbaud = 19200\nparity = \"none\"\nstop_bits = 1\nunit = 1\n"
            "late_answer_window = 0.2";
   }
-  std::unique_ptr<SpindleGuard> guard_over(const RegisterMap& map) {
-    std::vector<GuardedDevice> devices;
-    devices.push_back({map, std::make_unique<ModbusBus>(map.transport)});
-    return std::make_unique<SpindleGuard>(std::move(devices), GuardOptions{}, clock_);
-  }
-
   bool is_tcp_;
   int port_ = 0;
   SteadyClock clock_;
   std::optional<TerminalPair> terminals_;
   std::unique_ptr<DriveServer> server_;
   RegisterMap map_;
-  std::optional<BackgroundGuard> guard_;
+  std::unique_ptr<BackgroundGuard> guard_;
   GuardReport last_;
   double longest_poll_ = 0.0;
 };
