@@ -135,6 +135,22 @@ double SimQueue::run(double seconds) {
   return used;
 }
 
+ExecutedPiece SimQueue::piece_of(const Block& block) const {
+  ExecutedPiece piece;
+  piece.start = block.start;
+  piece.end = block.move.target;
+  piece.feed = block.move.rapid ? 0.0 : block.move.feed;
+  piece.rapid = block.move.rapid;
+  piece.jog = block.move.jog;
+  piece.number = block.move.number;
+  piece.received = block.move.received;
+  piece.spindle = block.spindle;
+  piece.rpm = block.rpm;
+  piece.begin_time = block.begin_time;
+  piece.end_time = now;
+  return piece;
+}
+
 void SimQueue::begin_front() {
   Block& block = blocks_.front();
   if (block.begun) return;
@@ -142,25 +158,16 @@ void SimQueue::begin_front() {
   block.begin_time = now;
   block.spindle = spindle;
   block.rpm = rpm;
+  if (begun) begun(piece_of(block));
 }
 
 void SimQueue::end_front(bool complete) {
   const Block block = blocks_.front();
   const Eigen::Vector3d end = complete ? block.move.target : on_steps(position());
   if (ended && (block.begun || complete)) {
-    ExecutedPiece piece;
-    piece.start = block.start;
+    ExecutedPiece piece = piece_of(block);
     piece.end = end;
-    piece.feed = block.move.rapid ? 0.0 : block.move.feed;
-    piece.rapid = block.move.rapid;
-    piece.jog = block.move.jog;
     piece.complete = complete;
-    piece.number = block.move.number;
-    piece.received = block.move.received;
-    piece.spindle = block.spindle;
-    piece.rpm = block.rpm;
-    piece.begin_time = block.begin_time;
-    piece.end_time = now;
     ended(piece);
   }
   position_ = end;

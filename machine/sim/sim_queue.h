@@ -33,6 +33,8 @@ class SimQueue {
 
   /// Hears of every piece that ended, whole or not.
   std::function<void(const ExecutedPiece&)> ended;
+  /// Hears of every piece that begins.
+  std::function<void(const ExecutedPiece&)> begun;
 
   [[nodiscard]] bool empty() const { return blocks_.empty(); }
   [[nodiscard]] int room() const { return capacity_ - static_cast<int>(blocks_.size()); }
@@ -92,6 +94,7 @@ class SimQueue {
   [[nodiscard]] Eigen::Vector3d on_steps(const Eigen::Vector3d& point) const;
   [[nodiscard]] Phase phase() const;
   void plan();
+  [[nodiscard]] ExecutedPiece piece_of(const Block& block) const;
   void begin_front();
   void end_front(bool complete);
 

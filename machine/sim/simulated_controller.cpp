@@ -23,13 +23,16 @@ SimulatedController::SimulatedController(const SimulatedOptions& options, const 
       queue_(settings_, options.planner_blocks),
       gcode_(settings_, options_) {
   slip_ = options_.stands_at;
-  queue_.ended = [this](const ExecutedPiece& piece) {
-    if (!watch_.piece) return;
+  const auto tell = [this](const std::function<void(const ExecutedPiece&)>& whom,
+                           const ExecutedPiece& piece) {
+    if (!whom) return;
     ExecutedPiece truly = piece;
     truly.start += slip_;
     truly.end += slip_;
-    watch_.piece(truly);
+    whom(truly);
   };
+  queue_.ended = [this, tell](const ExecutedPiece& piece) { tell(watch_.piece, piece); };
+  queue_.begun = [this, tell](const ExecutedPiece& piece) { tell(watch_.begins, piece); };
   power_up();
 }
 

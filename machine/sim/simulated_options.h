@@ -60,7 +60,8 @@ struct MachineEvent {
 
 /// Who watches the machine. Called as things happen, so that any length of program fits.
 struct MachineWatch {
-  std::function<void(const ExecutedPiece&)> piece;
+  std::function<void(const ExecutedPiece&)> piece;   ///< A piece ended.
+  std::function<void(const ExecutedPiece&)> begins;  ///< A piece begins; `end` is where it leads.
   std::function<void(const MachineEvent&)> event;
 };
 

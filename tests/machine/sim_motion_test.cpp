@@ -297,6 +297,20 @@ TEST(SimulatedMotion, SleepEndsInAnAlarm) {
   EXPECT_THAT(talk.listen(0.1), HasSubstr("to unlock]"));
 }
 
+TEST(SimulatedMotion, TellsOfAPieceAsItBegins) {
+  Talk talk(ready_grbl());
+  talk.command("G21 G91 G1 X10 F600");
+  talk.command("N3 X10");
+  talk.listen(0.3);
+  ASSERT_EQ(talk.begun.size(), 1U);
+  EXPECT_EQ(talk.begun[0].end, Vector3d(10, 0, 0));
+  EXPECT_TRUE(talk.pieces.empty());
+  talk.settle();
+  ASSERT_EQ(talk.begun.size(), 2U);
+  EXPECT_EQ(talk.begun[1].number, 3);
+  EXPECT_EQ(talk.begun[1].begin_time, talk.pieces[0].end_time);
+}
+
 TEST(SimulatedMotion, PiecesCarryLineAndSpindle) {
   Talk talk(ready_grbl());
   talk.command("G21 G91 S1000 M3");

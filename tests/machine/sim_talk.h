@@ -98,6 +98,7 @@ class Talk {
   }
 
   std::vector<ExecutedPiece> pieces;
+  std::vector<ExecutedPiece> begun;
   std::vector<std::string> events;
   SimulatedMachine machine;
   std::unique_ptr<Link> link;
@@ -106,6 +107,7 @@ class Talk {
   MachineWatch watch() {
     MachineWatch made;
     made.piece = [this](const ExecutedPiece& piece) { pieces.push_back(piece); };
+    made.begins = [this](const ExecutedPiece& piece) { begun.push_back(piece); };
     made.event = [this](const MachineEvent& event) { events.push_back(event.what); };
     return made;
   }
