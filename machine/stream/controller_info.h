@@ -45,22 +45,23 @@ class Dialogue {
   Dialogue(Wire& wire, Clock& clock, std::stop_token stop)
       : wire_(wire), clock_(clock), stop_(std::move(stop)) {}
 
-  /// Waits until the controller says something that makes sense; boards that start when the port is
-  /// opened take two seconds. @throw StreamFault kStall
-  StatusReport wake(double timeout);
+  /// Asks until a report comes or the time is over; boards that start when the port is opened take
+  /// two seconds. @throw StreamFault for a request to stop.
+  std::optional<StatusReport> ask_status(double timeout);
+  /// What to say if there is none. @throw StreamFault kStall
+  [[noreturn]] static void silence();
   /// Sends a line and waits for its ok. @return what came before it.
   /// @throw StreamFault for an error, an alarm, nonsense, silence or a request to stop.
   std::vector<Reply> ask(const std::string& line, double timeout);
   /// A report that was asked for now. @throw StreamFault
   StatusReport status(double timeout = 3.0);
   /// Soft reset, and what the controller says of itself. @pre nothing moves. @throw StreamFault
-  std::string reset(double timeout = 5.0);
+  std::string reset(double timeout = 10.0);
   /// Feed hold, until nothing moves any more. @throw StreamFault
   StatusReport hold(double timeout = 20.0);
 
  private:
   void pause_until_reply(double until);
-  std::optional<StatusReport> ask_status(double timeout);
 
   Wire& wire_;
   Clock& clock_;

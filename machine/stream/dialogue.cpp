@@ -11,12 +11,13 @@ namespace {
 constexpr double kAskAgain = 0.5;          ///< Between two ? to a controller that is silent, s.
 constexpr double kStatusPause = 0.2;       ///< Between two ? otherwise: five a second.
 constexpr double kStopCheck = 0.1;         ///< Longest wait without a look at the stop token, s.
+constexpr double kResetAgain = 1.5;        ///< A reset that got lost is sent again, s.
 constexpr double kQuietAfterBanner = 0.3;  ///< Start-up lines and messages follow a banner, s.
 
 using Kind = Reply::Kind;
 
-[[noreturn]] void silence(const std::string& what) {
-  throw StreamFault(StopCause::kStall, "no answer from the controller: " + what);
+[[noreturn]] void no_answer_to(const std::string& what) {
+  throw StreamFault(StopCause::kStall, "the controller does not answer " + what);
 }
 
 }  // namespace
@@ -62,15 +63,11 @@ std::optional<StatusReport> Dialogue::ask_status(double timeout) {
   return std::nullopt;
 }
 
-StatusReport Dialogue::wake(double timeout) {
-  const std::optional<StatusReport> report = ask_status(timeout);
-  if (!report) silence("is it switched on, is it the right port and speed?");
-  return *report;
-}
+void Dialogue::silence() { no_answer_to("?; is it switched on, is it the right port and speed?"); }
 
 StatusReport Dialogue::status(double timeout) {
   const std::optional<StatusReport> report = ask_status(timeout);
-  if (!report) silence("?");
+  if (!report) no_answer_to("?");
   return *report;
 }
 
@@ -96,17 +93,21 @@ std::vector<Reply> Dialogue::ask(const std::string& line, double timeout) {
     }
     replies_.clear();
   }
-  silence(line);
+  no_answer_to(line);
 }
 
 std::string Dialogue::reset(double timeout) {
   replies_.clear();
   wire_.discard();
-  wire_.urgent(realtime::kSoftReset);
   const double end = clock_.now() + timeout;
   std::string banner;
   double until = end;
+  double again = clock_.now();
   while (clock_.now() < until) {
+    if (banner.empty() && clock_.now() >= again) {
+      wire_.urgent(realtime::kSoftReset);
+      again = clock_.now() + kResetAgain;
+    }
     pause_until_reply(until);
     for (const Reply& reply : replies_) {
       if (reply.kind != Kind::kBanner) continue;
@@ -115,7 +116,7 @@ std::string Dialogue::reset(double timeout) {
     }
     replies_.clear();
   }
-  if (banner.empty()) silence("reset");
+  if (banner.empty()) no_answer_to("a reset");
   return banner;
 }
 

@@ -9,6 +9,7 @@ LineTracker::LineTracker(const TrackerOptions& options)
     : options_(options),
       sent_(options.first_line - 1),
       acknowledged_(options.first_line - 1),
+      known_(options.first_line - 1),
       executed_(options.first_line - 1) {}
 
 void LineTracker::send(const OutgoingLine& line, double now) {
@@ -31,27 +32,34 @@ void LineTracker::acknowledge() {
   const auto kept = static_cast<std::size_t>(options_.planner_blocks + 1 + kStepLag);
   if (waiting_.size() <= kept) return;
   waiting_.pop_front();
-  note_executed(waiting_.front() - 1);
+  note_known(waiting_.front() - 1);
 }
 
-void LineTracker::report(const StatusReport& report, bool at_rest) {
-  if (!report.line || *report.line == 0) return;
-  // N words begin again after the largest; the motion is not newer than the last line taken.
-  const std::int64_t largest = options_.largest_number;
-  const std::int64_t newest = ProgramFeed::number_of(std::max<std::int64_t>(sent_, 1), largest);
-  const std::int64_t behind = (newest - *report.line % largest + largest) % largest;
-  note_executed(sent_ - behind - 1 - (at_rest ? 0 : kStepLag));
+void LineTracker::report(const StatusReport& report, bool at_rest, double now) {
+  if (report.line && *report.line != 0) {
+    // N words begin again after the largest; the motion is not newer than the last line taken.
+    const std::int64_t largest = options_.largest_number;
+    const std::int64_t newest = ProgramFeed::number_of(std::max<std::int64_t>(sent_, 1), largest);
+    const std::int64_t behind = (newest - *report.line % largest + largest) % largest;
+    note_known(sent_ - behind - 1 - (at_rest ? 0 : kStepLag));
+  }
+  untrusted_.push_back({now, known_});
+  while (untrusted_.front().time <= now - kTrust) {
+    executed_ = std::max(executed_, untrusted_.front().line);
+    untrusted_.pop_front();
+  }
 }
 
 void LineTracker::all_done() {
   waiting_.clear();
-  note_executed(acknowledged_);
+  untrusted_.clear();
+  known_ = executed_ = std::max(executed_, acknowledged_);
 }
 
 /// A line that was not taken is not carried out, even if later ones were: Grbl goes on with what it
 /// has received after an error.
-void LineTracker::note_executed(std::int64_t line) {
-  executed_ = std::max(executed_, std::min(line, acknowledged_));
+void LineTracker::note_known(std::int64_t line) {
+  known_ = std::max(known_, std::min(line, acknowledged_));
 }
 
 std::size_t LineTracker::bytes_before(double time) const {

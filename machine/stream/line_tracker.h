@@ -23,12 +23,16 @@ struct TrackerOptions {
 /// Where the controller reports Ln:, every line before that motion is carried out but for those
 /// that lie cut into steps already: up to kStepLag lines while it moves, none once it stands.
 /// Elsewhere the last planner_blocks + 1 + kStepLag taken lines that were motions for sure may
-/// still be waiting, and nothing before them.
+/// still be waiting, and nothing before them. Either counts only after kTrust: by then a line that
+/// was lost or spoilt on its way has shown in replies or buffers. At a standstill with everything
+/// answered it counts at once.
 class LineTracker {
  public:
   /// Lines by which Ln: may run ahead of the cutter: the step buffer of Grbl holds 6 segments, that
   /// of grblHAL 10, each of one motion at least.
   static constexpr std::int64_t kStepLag = 10;
+  /// s
+  static constexpr double kTrust = 2.0;
 
   explicit LineTracker(const TrackerOptions& options);
 
@@ -36,8 +40,8 @@ class LineTracker {
   void send(const OutgoingLine& line, double now);
   /// The controller took the oldest line on its way. @pre !empty()
   void acknowledge();
-  /// The controller tells what it does. @param at_rest  it stands still.
-  void report(const StatusReport& report, bool at_rest);
+  /// The controller tells what it does at `now`. @param at_rest  it stands still.
+  void report(const StatusReport& report, bool at_rest, double now);
   /// Everything that was taken is carried out.
   void all_done();
 
@@ -71,7 +75,13 @@ class LineTracker {
     bool alone;
   };
 
-  void note_executed(std::int64_t line);
+  /// What is carried out as far as is known, not trusted yet.
+  struct Known {
+    double time;
+    std::int64_t line;
+  };
+
+  void note_known(std::int64_t line);
 
   TrackerOptions options_;
   std::deque<Flying> flying_;
@@ -80,6 +90,8 @@ class LineTracker {
   double dwell_ = 0.0;
   std::int64_t sent_;
   std::int64_t acknowledged_;
+  std::int64_t known_;           ///< Carried out as it seems.
+  std::deque<Known> untrusted_;  ///< known_ at the reports of the last kTrust seconds.
   std::int64_t executed_;
   std::int64_t offset_ = 0;
 };

@@ -62,7 +62,7 @@ void Sender::take_while_stopping(const Reply& reply) {
   report_ = *reply.status;
   position_ = info_.machine_position(report_);
   at_rest_ = lensforge::at_rest(report_);
-  tracker_.report(report_, at_rest_);
+  tracker_.report(report_, at_rest_, clock_.now());
 }
 
 void Sender::wait_for_banner() {

@@ -125,7 +125,7 @@ void Sender::take_status(const StatusReport& report) {
   report_.overrides = overrides;  // Told now and then only.
   position_ = position;
   judge_state(report);
-  tracker_.report(report, lensforge::at_rest(report));
+  tracker_.report(report, lensforge::at_rest(report), clock_.now());
   const bool idle = report.state == ReportedState::kIdle &&
                     (!report.room || report.room->blocks >= info_.planner_blocks);
   idle_reports_ = idle && !stale_ ? idle_reports_ + 1 : 0;

@@ -16,7 +16,8 @@ constexpr std::int64_t kLinesBetweenReports = 256;
 
 /// What must be so before a reset: nothing moves, and it is ours to take over.
 void require_rest(Dialogue& dialogue, const StatusReport& report, bool resume) {
-  if (report.state == ReportedState::kDoor) {
+  // Door:0 is closed again, and waits to be resumed as a hold does.
+  if (report.state == ReportedState::kDoor && report.sub_state != 0) {
     throw InputError("the controller reports its safety door open; close it first");
   }
   const bool free = report.state == ReportedState::kIdle || report.state == ReportedState::kAlarm ||
@@ -34,7 +35,10 @@ void require_rest(Dialogue& dialogue, const StatusReport& report, bool resume) {
 ControllerInfo open_session(Wire& wire, Clock& clock, const SessionOptions& options,
                             const std::stop_token& stop) {
   Dialogue dialogue(wire, clock, stop);
-  require_rest(dialogue, dialogue.wake(options.wake_timeout), options.resume);
+  const std::optional<StatusReport> report = dialogue.ask_status(options.wake_timeout);
+  if (report) require_rest(dialogue, *report, options.resume);
+  // After a limit was hit, Grbl answers nothing but a reset; homing then finds the position again.
+  if (!report && !options.home) dialogue.silence();
   const std::string banner = dialogue.reset();
   if (options.home) dialogue.ask("$H", options.home_timeout);
   return learn_controller(dialogue, banner);
