@@ -47,10 +47,13 @@ struct Case {
 
 /// What came of it.
 struct Outcome {
-  bool struck = false;                  ///< The mishap came to pass before the job's end.
-  bool finished_at_once = false;        ///< The job came to its end in spite of it.
-  StopCause cause = StopCause::kNone;   ///< What the sender stopped for; kNone for a killed one.
-  bool resumed = false;                 ///< A second run took it to its end.
+  bool struck = false;                 ///< The mishap came to pass before the job's end.
+  bool finished_at_once = false;       ///< The job came to its end in spite of it.
+  StopCause cause = StopCause::kNone;  ///< What the sender stopped for; kNone for a killed one.
+  bool resumed = false;                ///< A second run took it to its end.
+  /// Bytes lost on their way to the controller glued two lines into one that it took for good: Grbl
+  /// has no check sum that could tell.
+  bool spoilt = false;
   std::int64_t overlap = 0;             ///< Lines that were carried out twice.
   std::vector<std::string> violations;  ///< Invariants that were broken.
 };
