@@ -30,7 +30,7 @@ class BlockRun {
     set_feed();
     set_machine();
     const bool moves = find_motion();
-    refuse_unused();
+    refuse_unused(moves);
     if (moves) move();
     set_stop();
   }
@@ -157,7 +157,9 @@ class BlockRun {
       if (machine_coordinates) refuse("G53 without coordinates");
       if (stated && is_arc()) refuse("an arc without coordinates");
       const bool feeds = stated && state_.motion == MotionMode::kFeed;
-      if (feeds && !state_.inverse_time && !state_.feed) refuse("G1 before a feed F");
+      const bool fed =
+          state_.inverse_time ? moves_per_minute_.has_value() : state_.feed.has_value();
+      if (feeds && !fed) refuse("G1 before a feed F");
       return false;
     }
     if (state_.motion == MotionMode::kNone) refuse("coordinates after G80, without a motion");
@@ -181,8 +183,8 @@ class BlockRun {
     return words_.has(ModalGroup::kNonModal, 280) || words_.has(ModalGroup::kNonModal, 300);
   }
 
-  void refuse_unused() const {
-    const bool arc = is_arc() && !goes_home();
+  void refuse_unused(bool moves) const {
+    const bool arc = moves && is_arc() && !goes_home();
     for (const GcodeWord& word : block_.words()) {
       const std::string_view of_motions = arc ? "XYZIJKR" : "XYZ";
       const bool used = word.letter == 'G' || word.letter == 'M' ||

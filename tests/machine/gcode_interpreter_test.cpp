@@ -119,6 +119,8 @@ TEST(GcodeInterpreter, RefusesWithLineAndReason) {
       {"G0 X1", "before G20 or G21"},
       {"G21\nG1 X1", "line 2: a motion before a feed F"},
       {"G21\nG1", "G1 before a feed F"},
+      {"G21 G93 G1", "G1 before a feed F"},
+      {"G21 F9 G2 X2 I1\nI1", "I belongs to no word"},
       {"F100", "F before G20 or G21"},
       {"G21 F0", "a feed is above 0"},
       {"G21 F-5", "a feed is above 0"},
