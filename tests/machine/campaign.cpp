@@ -295,19 +295,20 @@ std::optional<SendResult> disturbed_run(const Case& what, const Extent& extent,
   return result;
 }
 
-/// Lines with an N word among the cuts of a range of pieces.
-std::set<std::int64_t> numbers_of(const std::vector<ExecutedPiece>& pieces, std::size_t begin,
-                                  std::size_t end) {
+/// N words of the cuts that began between two moments.
+std::set<std::int64_t> numbers_of(const std::vector<ExecutedPiece>& pieces, double from,
+                                  double to) {
   std::set<std::int64_t> numbers;
-  for (std::size_t i = begin; i < end; ++i) {
-    if (!pieces[i].rapid && pieces[i].number > 0) numbers.insert(pieces[i].number);
+  for (const ExecutedPiece& piece : pieces) {
+    const bool then = piece.begin_time >= from && piece.begin_time < to;
+    if (then && !piece.rapid && piece.number > 0) numbers.insert(piece.number);
   }
   return numbers;
 }
 
-void check_overlap(const Workshop& workshop, std::size_t resumed_at, Outcome& outcome) {
-  const auto first = numbers_of(workshop.pieces, 0, resumed_at);
-  const auto second = numbers_of(workshop.pieces, resumed_at, workshop.pieces.size());
+void check_overlap(const Workshop& workshop, double resumed_at, Outcome& outcome) {
+  const auto first = numbers_of(workshop.pieces, 0.0, resumed_at);
+  const auto second = numbers_of(workshop.pieces, resumed_at, 1e300);
   std::vector<std::int64_t> twice;
   std::set_intersection(first.begin(), first.end(), second.begin(), second.end(),
                         std::back_inserter(twice));
@@ -347,10 +348,11 @@ Outcome run_case(const Case& what, const fs::path& folder) {
   const std::optional<SendResult> first = disturbed_run(what, extent, engine, workshop, outcome);
   const std::size_t at_end = workshop.pieces.size();
   workshop.machine().wait(kAftermath);
-  const std::size_t resumed_at = workshop.pieces.size();
+  const std::size_t at_resume = workshop.pieces.size();
+  const double resumed_at = workshop.machine().now();
   outcome.cause = first ? first->cause : StopCause::kNone;
   outcome.finished_at_once = first && first->done();
-  if (first && first->at_rest && resumed_at > at_end) {
+  if (first && first->at_rest && at_resume > at_end) {
     outcome.violations.emplace_back("the machine moved after it had come to rest");
   }
   if (!outcome.finished_at_once) {
