@@ -70,8 +70,8 @@ void add_effort_options(OptionSet& options, DesignArguments& arguments) {
                  "share of the facets spread evenly over the picture instead of the lens");
   options.integer("--update-iterations", design.update_iterations, Limits::between(0, 10000),
                   "most iterations of the correspondence-guided update (Sun et al., Eq. 20)");
-  options.choice("--quality", design.iterations, {{"draft", 20}, {"standard", 60}, {"paper", 200}},
-                 "most iterations of one round: 20, 60 or 200");
+  options.choice("--quality", design.iterations, {{"draft", 20}, {"standard", 100}, {"paper", 300}},
+                 "most iterations of one round: 20, 100 or 300");
 }
 
 void add_weight_options(OptionSet& options, DesignArguments& arguments) {

@@ -5,7 +5,6 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <optional>
 #include <sstream>
 
 #include "core/error.h"
@@ -30,6 +29,12 @@ constexpr double kIdleRound = 1e-3;
 /// what is left is below the error of taking a face's light for a point.
 constexpr double kTransportTolerance = 1e-2;
 constexpr int kMostNewtonSteps = 150;
+
+/// On a mesh that has been spread: Newton steps under one blur and floor after which its own
+/// transport is given up, and the share of black pixels above which it is not tried (logo, 69 %
+/// black, spread over dark and bright: 43 and 59 steps in two stages, and no end).
+constexpr int kMostStageSteps = 25;
+constexpr double kMostBlack = 0.3;
 
 /// Times that heights are fitted to a transport; each brings them nearer by the sag over the focal
 /// length, a hundredth or so.
@@ -59,6 +64,16 @@ OpticalSetup make_setup(const DesignOptions& options, const Eigen::Vector2i& pix
 /// Lowers or lifts the surface so that its thinnest place is `thickness` above the entry face.
 void rest_on_thickness(SurfaceMesh& mesh, double thickness) {
   mesh.vertices.row(2).array() += thickness - mesh.vertices.row(2).minCoeff();
+}
+
+/// Share of the pixels that are black (kBlack).
+double black_share(const Image& picture) {
+  const auto pixels = static_cast<double>(picture.values().size());
+  const double black = kBlack * picture.total() / pixels;
+  const auto dark = [&](float value) { return static_cast<double>(value) <= black; };
+  return static_cast<double>(
+             std::count_if(picture.values().begin(), picture.values().end(), dark)) /
+         pixels;
 }
 
 void require(bool rule, const std::string& option, double value, const char* text) {
@@ -210,46 +225,49 @@ class Schedule {
   /// use.
   void transport(const Problem& problem) {
     SurfaceMesh mesh = state_.mesh;
-    std::optional<Matching> matching = match(problem, mesh);
-    if (matching && state_.level == 0 && state_.round == 0 && options_.spread > 0.0) {
-      if (!spread_vertices(matching->areas / matching->areas.sum(), options_.spread, problem.setup,
-                           stoppable_, RunControl(control_.stop_token(), {}), mesh)) {
-        throw Interrupted();
-      }
-      matching = match(problem, mesh);
-    }
-    if (!matching) {
-      state_.transporting = false;
-      return;
-    }
-    // Heights enter the aim themselves, and lifting the surface scales the picture.
-    for (int pass = 0; pass < kAimPasses; ++pass) {
-      aim_faces(matching->wanted, problem.setup, stoppable_, mesh);
-      rest_on_thickness(mesh, options_.thickness);
-    }
-    if (options_.update_iterations > 0) {
-      follow_correspondence(problem, std::move(matching->wanted), mesh);
-    }
-    state_.mesh = std::move(mesh);
-  }
-
-  struct Matching {
-    Correspondence wanted;
-    Eigen::VectorXd areas;
-  };
-
-  /// Transport of a mesh's light to the picture; nothing if it has not come near.
-  [[nodiscard]] std::optional<Matching> match(const Problem& problem, const SurfaceMesh& mesh) {
-    const auto pass_on = [this](const Progress& p) { report(p.detail, 0); };
     TransportOptions options;
     options.tolerance = kTransportTolerance;
     options.max_newton_steps = kMostNewtonSteps;
-    FaceLight light = face_light(mesh, problem.setup, options_.model, stoppable_);
-    TransportResult result = transport_faces(light, problem.target, options, stoppable_,
-                                             RunControl(control_.stop_token(), pass_on));
-    if (result.status == TransportResult::Status::kStopped) throw Interrupted();
+    Matching matching = match(problem, mesh, options);
+    if (matching.result.centroids.cols() == 0) {
+      state_.transporting = false;
+      return;
+    }
+    if (!matching.result.converged()) {
+      remark_ = "; transport of round " + std::to_string(state_.round + 1) + " ended early (" +
+                matching.result.message + ")";
+    }
+    if (state_.level == 0 && state_.round == 0 && options_.spread > 0.0) {
+      spread(problem, matching.result, mesh);
+      matching = match_spread(problem, std::move(matching), mesh);
+    }
+    const Correspondence wanted{std::move(matching.result.centroids),
+                                std::move(matching.light.flux)};
+    // Heights enter the aim themselves, and lifting the surface scales the picture.
+    for (int pass = 0; pass < kAimPasses; ++pass) {
+      aim_faces(wanted, problem.setup, stoppable_, mesh);
+      rest_on_thickness(mesh, options_.thickness);
+    }
+    if (options_.update_iterations > 0) follow_correspondence(problem, wanted, mesh);
+    state_.mesh = std::move(mesh);
+  }
+
+  /// A mesh's light and its transport to the picture.
+  struct Matching {
+    FaceLight light;
+    TransportResult result;
+  };
+
+  [[nodiscard]] Matching match(const Problem& problem, const SurfaceMesh& mesh,
+                               const TransportOptions& options) {
+    const auto pass_on = [this](const Progress& p) { report(p.detail, 0); };
+    Matching matching;
+    matching.light = face_light(mesh, problem.setup, options_.model, stoppable_);
+    matching.result = transport_faces(matching.light, problem.target, options, stoppable_,
+                                      RunControl(control_.stop_token(), pass_on));
+    if (matching.result.status == TransportResult::Status::kStopped) throw Interrupted();
     int number = 0;
-    for (const TransportStep& step : result.steps) {
+    for (const TransportStep& step : matching.result.steps) {
       ConvergenceRow row;
       row.stage = "transport";
       row.level = state_.level;
@@ -259,17 +277,42 @@ class Schedule {
       row.seconds = seconds();
       state_.convergence.push_back(row);
     }
-    if (!result.converged()) {
-      remark_ = "; transport of round " + std::to_string(state_.round + 1) + " ended early (" +
-                result.message + ")";
-    }
-    if (result.centroids.cols() == 0) return std::nullopt;
-    return Matching{{std::move(result.centroids), std::move(light.flux)}, std::move(result.areas)};
+    return matching;
   }
 
-  void follow_correspondence(const Problem& problem, Correspondence wanted, SurfaceMesh& mesh) {
-    GuidedOptimization update(mesh, problem.setup, std::move(wanted), problem.objective,
-                              stoppable_);
+  /// Facets are needed where there is light. A smooth surface also needs narrow triangles at its
+  /// creases, which send their light into the black between; there it is that cells own the black.
+  void spread(const Problem& problem, const TransportResult& result, SurfaceMesh& mesh) {
+    const Eigen::VectorXd& areas =
+        options_.model == SurfaceModel::kFacet ? result.lit_areas : result.areas;
+    if (!spread_vertices(areas / areas.sum(), options_.spread, problem.setup, stoppable_,
+                         RunControl(control_.stop_token(), {}), mesh)) {
+      throw Interrupted();
+    }
+  }
+
+  /// The transport of a mesh that has been spread, from that of the even mesh. Solved anew, it
+  /// brings out detail in the dark that the even mesh has no facets for; where black leaves cells
+  /// too thin for Newton steps, the even mesh's map has to do.
+  [[nodiscard]] Matching match_spread(const Problem& problem, Matching even,
+                                      const SurfaceMesh& mesh) {
+    if (black_share(problem.target) <= kMostBlack) {
+      TransportOptions options;
+      options.tolerance = kTransportTolerance;
+      options.max_stage_steps = kMostStageSteps;
+      Matching fine = match(problem, mesh, options);
+      if (fine.result.converged()) return fine;
+    }
+    Matching mapped;
+    mapped.light = face_light(mesh, problem.setup, options_.model, stoppable_);
+    const BrenierMap map(even.light.landing, even.result, problem.target);
+    mapped.result.centroids = map_faces(mapped.light, map, stoppable_);
+    return mapped;
+  }
+
+  void follow_correspondence(const Problem& problem, const Correspondence& wanted,
+                             SurfaceMesh& mesh) {
+    GuidedOptimization update(mesh, problem.setup, wanted, problem.objective, stoppable_);
     if (!std::isfinite(update.value(mesh))) return;
     LbfgsOptions optimizer;
     optimizer.max_iterations = options_.update_iterations;

@@ -31,13 +31,13 @@ struct DesignOptions {
   /// moves light over distances, but takes a facet for a point and so undoes what optimisation has
   /// done in the small: the last rounds do without (128² portrait, facet MAE: 0.0077 with 1, 0.0072
   /// with 3).
-  int transport_rounds = 3;
+  int transport_rounds = 1;
   bool rendering_guided = true;  ///< False leaves the rounds their transport alone.
   /// Share of the facets that is spread evenly over the picture instead of the lens, 0 … 0.95; see
   /// spread_vertices().
-  double spread = 0.5;
+  double spread = 0.7;
   int update_iterations = 0;  ///< Most L-BFGS iterations on Sun et al., Eq. 20, in a round, ≥ 0.
-  int iterations = 60;        ///< Most L-BFGS iterations of one round, ≥ 1.
+  int iterations = 100;       ///< Most L-BFGS iterations of one round, ≥ 1.
   SurfaceModel model = SurfaceModel::kFacet;  ///< What is optimised.
   ViewSide view = ViewSide::kFront;
   ObjectiveWeights weights;

@@ -32,6 +32,14 @@ TransportResult transport_faces(const FaceLight& light, const Image& target,
   return solve_semi_discrete(light.landing, light.flux, target, options, executor, control);
 }
 
+Eigen::Matrix2Xd map_faces(const FaceLight& light, const BrenierMap& map,
+                           const Executor& executor) {
+  Eigen::Matrix2Xd landing(2, light.landing.cols());
+  parallel_for(executor, "map faces", landing.cols(),
+               [&](std::int64_t f) { landing.col(f) = map(light.landing.col(f)); });
+  return landing;
+}
+
 void aim_faces(const Correspondence& correspondence, const OpticalSetup& setup,
                const Executor& executor, SurfaceMesh& mesh) {
   const ImagePlane plane(setup);

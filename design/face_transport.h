@@ -10,6 +10,7 @@
 #include "core/run_control.h"
 #include "core/surface_mesh.h"
 #include "design/energy/correspondence_term.h"
+#include "design/transport/brenier_map.h"
 #include "design/transport/semi_discrete.h"
 
 namespace lensforge {
@@ -30,6 +31,9 @@ FaceLight face_light(const SurfaceMesh& mesh, const OpticalSetup& setup, Surface
 TransportResult transport_faces(const FaceLight& light, const Image& target,
                                 const TransportOptions& options, const Executor& executor,
                                 const RunControl& control);
+
+/// Where the light of every face lands if it follows a transport map.
+Eigen::Matrix2Xd map_faces(const FaceLight& light, const BrenierMap& map, const Executor& executor);
 
 /// Gives the mesh the heights that send the light of every face nearest to its wanted centroid, x
 /// and y staying: refraction is inverted for the gradient that each face needs, fit_heights() does

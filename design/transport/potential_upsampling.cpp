@@ -198,6 +198,10 @@ constexpr int kMendingRounds = 60;
 /// Rings of neighbours that are asked for room: two, and more only while none of them has any.
 constexpr int kRings = 2;
 constexpr int kMostRings = 12;
+/// Neighbours that are asked at most: a site beside a wide black part borders on thousands.
+constexpr std::size_t kMostAsked = 256;
+/// Share of the cells above which mending is given up: it mends stragglers, a round at a time.
+constexpr double kMostEmpty = 0.15;
 
 /// Takers of one cell in a round, and where along its extent, in standard deviations from the
 /// centroid towards the taker, each one's border is put: nearer sites cut closer, else the farther
@@ -278,6 +282,7 @@ class Mending {
       const std::size_t end = seen.size();
       for (; begin < end; ++begin) {
         for (const int j : neighbourhood_.of(seen[begin])) {
+          if (seen.size() > kMostAsked) return best;
           if (std::find(seen.begin(), seen.end(), j) != seen.end()) continue;
           seen.push_back(j);
           if (has_share(j, share) && (best < 0 || tangent(j, i) > tangent(best, i))) best = j;
@@ -295,13 +300,13 @@ class Mending {
   Eigen::VectorXd psi_;
 };
 
-/// Least mass over wanted mass.
-double least_share(const SiteLevel& level, const PowerCells& cells) {
-  double least = std::numeric_limits<double>::infinity();
+/// How many cells hold less than `share` of their wanted mass.
+std::size_t count_below(const SiteLevel& level, const PowerCells& cells, double share) {
+  std::size_t count = 0;
   for (std::size_t i = 0; i < cells.mass.size(); ++i) {
-    least = std::min(least, cells.mass[i] / level.masses[static_cast<Eigen::Index>(i)]);
+    if (cells.mass[i] < share * level.masses[static_cast<Eigen::Index>(i)]) ++count;
   }
-  return least;
+  return count;
 }
 
 }  // namespace
@@ -310,12 +315,14 @@ bool mend_empty_cells(const SiteLevel& level, const SummedDensity& density,
                       const Executor& executor, const std::stop_token& stop, PowerState& state) {
   for (int round = 0; round < kMendingRounds; ++round) {
     const double share = round < kThoroughRounds ? kNearlyEmpty : kEmpty;
-    if (least_share(level, state.cells) >= share) return true;
-    if (!state.diagram.is_planar()) return false;
+    const std::size_t empty = count_below(level, state.cells, share);
+    if (empty == 0) return true;
+    const double most = kMostEmpty * static_cast<double>(state.cells.mass.size());
+    if (static_cast<double>(empty) > most || !state.diagram.is_planar()) return false;
     Mending mending(state, level, density, executor);
     state = power_state(level, mending.weights(share), density, executor, stop);
   }
-  return least_share(level, state.cells) >= kEmpty;
+  return count_below(level, state.cells, kEmpty) == 0;
 }
 
 }  // namespace lensforge

@@ -30,8 +30,13 @@ constexpr double kFirstBlur = 0.125;
 /// Blur falls by this factor from stage to stage, and to 0 from below kLeastBlur pixels.
 constexpr double kBlurFactor = 0.5;
 constexpr double kLeastBlur = 0.1;
-/// Evenly spread share of the light while there is blur, so that no density vanishes.
+/// Evenly spread share of the light while there is blur, so that no density vanishes; without blur
+/// it falls by kFloorFactor from stage to stage, and to 0 from below kLeastFloor. At once to 0,
+/// cells that lie in black lose all of their mass, and no Newton step helps (logo, mesh spread over
+/// it).
 constexpr double kFloor = 1e-4;
+constexpr double kFloorFactor = 0.1;
+constexpr double kLeastFloor = 1e-9;
 /// Mass errors that end a stage, and a level before it is upsampled.
 constexpr double kStageError = 0.5;
 constexpr double kLevelError = 1e-2;
@@ -64,6 +69,14 @@ void check_input(const Eigen::Matrix2Xd& sites, const Eigen::VectorXd& masses, c
   if (!(total > 0.0) || !std::isfinite(total)) {
     throw InputError("transport: the density sums to " + std::to_string(total));
   }
+}
+
+/// A density of 1 wherever the picture is not black.
+SummedDensity lit_part(const Image& picture) {
+  const double black = kBlack * picture.total() / static_cast<double>(picture.values().size());
+  Image lit = picture;
+  for (float& value : lit.values()) value = static_cast<double>(value) > black ? 1.0F : 0.0F;
+  return {lit, lit.total()};
 }
 
 /// A density on the way to the picture itself.
@@ -128,6 +141,8 @@ class TransportSolver {
     result_.weights.resize(sites.cols());
     result_.centroids.resize(2, sites.cols());
     result_.areas = Eigen::VectorXd::Zero(sites.cols());
+    result_.lit_areas = Eigen::VectorXd::Zero(sites.cols());
+    const PowerCells lit = measure_cells(state.diagram, lit_part(picture_), executor_);
     const double mean = weights.mean();
     std::vector<int> massless;
     for (Eigen::Index i = 0; i < sites.cols(); ++i) {
@@ -138,7 +153,9 @@ class TransportSolver {
       }
       result_.weights[i] = weights[p] - mean;
       result_.centroids.col(i) = centroids.col(p);
-      result_.areas[i] = cells.area[static_cast<std::size_t>(p)] * masses[i] / merged_.masses[p];
+      const double share = masses[i] / merged_.masses[p];
+      result_.areas[i] = cells.area[static_cast<std::size_t>(p)] * share;
+      result_.lit_areas[i] = lit.mass[static_cast<std::size_t>(p)] * share;
     }
     write_massless(state, sites, centroids, mean, massless);
   }
@@ -187,14 +204,16 @@ class TransportSolver {
                            std::to_string(levels_.size()),
                        static_cast<double>(result_.steps.size()), 0.0,
                        "mass error " + std::to_string(step.mass_error)});
-      return static_cast<int>(result_.steps.size()) < options_.max_newton_steps;
+      return number < options_.max_stage_steps &&
+             static_cast<int>(result_.steps.size()) < options_.max_newton_steps;
     };
     const bool done =
         balance_masses(level(l), s.density, {goal, observe, stop()}, executor_, state);
     if (!done) {
-      result_.message = static_cast<int>(result_.steps.size()) < options_.max_newton_steps
-                            ? "no Newton step lowers the mass error"
-                            : "Newton step limit reached";
+      const bool limited = number >= options_.max_stage_steps ||
+                           static_cast<int>(result_.steps.size()) >= options_.max_newton_steps;
+      result_.message =
+          limited ? "Newton step limit reached" : "no Newton step lowers the mass error";
     }
     return done;
   }
@@ -215,12 +234,14 @@ class TransportSolver {
         return false;
     }
     if (!finest) return true;
-    for (const double floor : {kFloor, 0.0}) {
+    for (double floor = kFloor; floor > kLeastFloor; floor *= kFloorFactor) {
       const Stage s = stage(0.0, floor);
       state.cells = measure_cells(state.diagram, s.density, executor_);
-      if (!run_stage(l, s, floor > 0.0 ? kStageError : options_.tolerance, state)) return false;
+      if (!run_stage(l, s, kStageError, state)) return false;
     }
-    return true;
+    const Stage sharp = stage(0.0, 0.0);
+    state.cells = measure_cells(state.diagram, sharp.density, executor_);
+    return run_stage(l, sharp, options_.tolerance, state);
   }
 
   /// The coarsest level's start, balanced under the first blur.

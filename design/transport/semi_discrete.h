@@ -23,10 +23,16 @@ struct TransportOptions {
   double tolerance = 1e-4;
   /// Newton steps over all levels after which the solver gives up.
   int max_newton_steps = 1000;
+  /// Newton steps under one blur and floor after which the solver gives up: where it gets on at
+  /// all, a dozen do.
+  int max_stage_steps = 1000;
   /// Where to start from; not owned. Its weights are moved along to first order. If cells start
   /// empty and cannot be mended, or a step fails, the solver starts afresh. nullptr: from nothing.
   const TransportStart* start = nullptr;
 };
+
+/// Share of the mean light below which a pixel counts as black.
+inline constexpr double kBlack = 1e-3;
 
 /// One Newton step, for the log.
 struct TransportStep {
@@ -55,7 +61,8 @@ struct TransportResult {
   /// n, pixels²: how much of the picture, dark parts included, a site's cell covers. Sites that
   /// share a cell share it as they share its mass.
   Eigen::VectorXd areas;
-  double mass_error = 0.0;  ///< max |mass − wanted| / wanted over the sites of positive mass.
+  Eigen::VectorXd lit_areas;  ///< n, pixels²: the same without what is black (kBlack).
+  double mass_error = 0.0;    ///< max |mass − wanted| / wanted over the sites of positive mass.
   std::vector<TransportStep> steps;
 
   [[nodiscard]] bool converged() const { return status == Status::kConverged; }

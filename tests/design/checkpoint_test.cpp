@@ -183,7 +183,7 @@ TEST(DesignFingerprint, ChangesWithEverythingThatShapesTheResult) {
                                     [](DesignOptions& o) { o.levels = 2; },
                                     [](DesignOptions& o) { o.rounds = 5; },
                                     [](DesignOptions& o) { o.iterations = 61; },
-                                    [](DesignOptions& o) { o.transport_rounds = 1; },
+                                    [](DesignOptions& o) { o.transport_rounds = 2; },
                                     [](DesignOptions& o) { o.rendering_guided = false; },
                                     [](DesignOptions& o) { o.spread = 0.4; },
                                     [](DesignOptions& o) { o.update_iterations = 7; },

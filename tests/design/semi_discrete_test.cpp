@@ -238,6 +238,29 @@ TEST(SemiDiscrete, RefusesWhatMakesNoSense) {
   EXPECT_THROW(run(sites, ones, Image(8, 8, 0.0F)), InputError);
 }
 
+TEST(SemiDiscrete, LitAreasAddUpToWhatIsNotBlack) {
+  const Image picture = testing::logo_picture(64);
+  const TransportResult result = solve(testing::face_sites(24, 64), picture);
+  ASSERT_TRUE(result.converged()) << result.message;
+  const auto lit = std::count_if(picture.values().begin(), picture.values().end(),
+                                 [](float value) { return value > 0.0F; });
+  EXPECT_NEAR(result.lit_areas.sum(), static_cast<double>(lit), 1e-6);
+  EXPECT_NEAR(result.areas.sum(), 64.0 * 64.0, 1e-6);
+  EXPECT_GE((result.areas - result.lit_areas).minCoeff(), -1e-9);
+}
+
+TEST(SemiDiscrete, SaysThatAStageRanOutOfSteps) {
+  TransportOptions options;
+  options.max_stage_steps = 1;
+  const Eigen::Matrix2Xd sites = testing::face_sites(16, 40);
+  const TransportResult result =
+      solve_semi_discrete(sites, Eigen::VectorXd::Ones(sites.cols()), testing::logo_picture(40),
+                          options, Executor::serial(), {});
+  EXPECT_EQ(result.status, TransportResult::Status::kNotConverged);
+  for (const TransportStep& step : result.steps) EXPECT_EQ(step.number, 0);
+  EXPECT_NE(result.message.find("limit"), std::string::npos);
+}
+
 TEST(SemiDiscrete, SaysThatItRanOutOfSteps) {
   TransportOptions options;
   options.max_newton_steps = 2;
