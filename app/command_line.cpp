@@ -27,6 +27,7 @@ constexpr std::array kSubcommands{
     Subcommand{"render", render_command, "render DIR|MESH",
                "lens or any mesh to picture and metrics"},
     Subcommand{"cam", cam_command, "cam DIR", "lens folder to G-code (into DIR/cam/)"},
+    Subcommand{"send", send_command, "send FILE.ngc --port PORT", "G-code to a controller"},
     Subcommand{"info", info_command, "info DIR|FILE", "what it is, in one screen"},
 };
 

@@ -25,7 +25,7 @@ void wake_waiter(int /*signal*/) { sem_post(&wake); }
 
 }  // namespace
 
-InterruptWatch::InterruptWatch() {
+InterruptWatch::InterruptWatch(SecondInterrupt second) : second_(second) {
   sem_init(&wake, 0, 0);
   struct sigaction action {};
   action.sa_handler = wake_waiter;
@@ -50,7 +50,9 @@ void InterruptWatch::wait_for_signals() {
   while (true) {
     if (sem_wait(&wake) != 0) continue;
     if (finished_) return;
-    if (!stop_.request_stop()) _exit(kInterrupted);
+    if (stop_.request_stop()) continue;
+    if (second_ == SecondInterrupt::kRequest && second_stop_.request_stop()) continue;
+    _exit(kInterrupted);
   }
 }
 

@@ -7,22 +7,31 @@
 
 namespace lensforge::app {
 
+/// What the second interrupt does.
+enum class SecondInterrupt {
+  kExit,     ///< Ends the process at once with exit code 130.
+  kRequest,  ///< Is a request of its own (InterruptWatch::second_token()); the third ends it.
+};
+
 /// Turns the first Ctrl-C (SIGINT), SIGTERM or SIGHUP into a stop request; the second ends the
-/// process at once with exit code 130. Signals that the caller had ignored stay ignored. At most
-/// one at a time.
+/// process at once with exit code 130, or is a request of its own. Signals that the caller had
+/// ignored stay ignored. At most one at a time.
 class InterruptWatch {
  public:
-  InterruptWatch();
+  explicit InterruptWatch(SecondInterrupt second = SecondInterrupt::kExit);
   ~InterruptWatch();
   InterruptWatch(const InterruptWatch&) = delete;
   InterruptWatch& operator=(const InterruptWatch&) = delete;
 
   [[nodiscard]] std::stop_token token() const { return stop_.get_token(); }
+  [[nodiscard]] std::stop_token second_token() const { return second_stop_.get_token(); }
 
  private:
   void wait_for_signals();
 
+  SecondInterrupt second_;
   std::stop_source stop_;
+  std::stop_source second_stop_;
   std::atomic<bool> finished_ = false;
   std::thread waiter_;
 };

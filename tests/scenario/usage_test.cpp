@@ -19,8 +19,12 @@ class Usage : public Scenario {
 };
 
 TEST_F(Usage, HelpOfEveryCommandIsPrintedOnStdout) {
-  for (const Arguments& arguments : std::vector<Arguments>{
-           {"--help"}, {"design", "--help"}, {"render", "-h"}, {"cam", "--help"}, {"info", "-h"}}) {
+  for (const Arguments& arguments : std::vector<Arguments>{{"--help"},
+                                                           {"design", "--help"},
+                                                           {"render", "-h"},
+                                                           {"cam", "--help"},
+                                                           {"send", "-h"},
+                                                           {"info", "-h"}}) {
     const Outcome outcome = run(arguments);
     EXPECT_EQ(outcome.exit_code, 0);
     EXPECT_THAT(outcome.out, HasSubstr("lensforge"));
