@@ -1,0 +1,187 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <cctype>
+#include <filesystem>
+
+#include "app/commands.h"
+#include "app/console.h"
+#include "app/exit_code.h"
+#include "app/json_output.h"
+#include "app/option_set.h"
+#include "app/output_folder.h"
+#include "core/error.h"
+#include "core/image_io.h"
+#include "core/lens.h"
+#include "core/mesh_io.h"
+#include "design/render_lens.h"
+#include "export/closed_solid.h"
+#include "export/height_map.h"
+#include "export/mesh_formats.h"
+
+namespace lensforge::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+enum class Format { kByExtension, kStl, kObj, kPly, k3mf, kExr, kPng };
+enum class SurfaceChoice { kDesigned, kMilled };
+
+struct ExportArguments {
+  std::string source;
+  std::string out;
+  Format format = Format::kByExtension;
+  SurfaceChoice surface = SurfaceChoice::kDesigned;
+  int pixels = 1024;
+};
+
+const OptionSet::Choices<Format> kFormats{{"stl", Format::kStl}, {"obj", Format::kObj},
+                                          {"ply", Format::kPly}, {"3mf", Format::k3mf},
+                                          {"exr", Format::kExr}, {"png", Format::kPng}};
+
+void add_export_options(OptionSet& options, ExportArguments& arguments) {
+  options.positional("DIR", arguments.source, "lens folder");
+  options.required_text("--out", arguments.out, "FILE", "where to write; its folder is made");
+  OptionSet::Choices<Format> formats{{"extension", Format::kByExtension}};
+  formats.insert(formats.end(), kFormats.begin(), kFormats.end());
+  options.choice("--format", arguments.format, formats,
+                 "closed solid as stl (binary), obj, ply or 3mf; height map as exr (32-bit, mm) or "
+                 "png (16-bit grey)");
+  options.choice("--surface", arguments.surface,
+                 {{"designed", SurfaceChoice::kDesigned}, {"milled", SurfaceChoice::kMilled}},
+                 "the lens's surface, or what the cutter leaves: DIR/cam/milled.ply");
+  options.integer("--pixels", arguments.pixels, Limits::between(2, kMaxImageSide),
+                  "longer side of a height map");
+}
+
+bool is_height_map(Format format) { return format == Format::kExr || format == Format::kPng; }
+
+std::string word_of(Format format) {
+  for (const auto& [word, meaning] : kFormats) {
+    if (meaning == format) return word;
+  }
+  return {};
+}
+
+/// The format that --format or the extension asks for.
+Format chosen_format(const ExportArguments& arguments) {
+  if (arguments.format != Format::kByExtension) return arguments.format;
+  std::string extension = fs::path(arguments.out).extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  std::string known;
+  for (const auto& [word, meaning] : kFormats) {
+    if (extension == "." + word) return meaning;
+    known += (known.empty() ? "." : ", .") + word;
+  }
+  throw InputError("--out " + arguments.out + ": must end in one of " + known +
+                   ", or --format must say what to write");
+}
+
+void require_fitting_options(const OptionSet& options, Format format) {
+  if (options.given("--pixels") && !is_height_map(format)) {
+    throw InputError("--pixels: is for height maps (exr, png), not for " + word_of(format));
+  }
+}
+
+void require_file_target(const std::string& out) {
+  if (fs::is_directory(out)) throw InputError("--out " + out + ": is a folder, not a file");
+}
+
+/// What is exported and what it is called in messages.
+struct Source {
+  Lens lens;  ///< Its surface is the one to export.
+  std::string name;
+};
+
+Source load(const ExportArguments& arguments) {
+  Source source{read_lens(arguments.source), ""};
+  fs::path file = fs::path(arguments.source) / lens_file::kSurface;
+  if (arguments.surface == SurfaceChoice::kMilled) {
+    file = fs::path(arguments.source) / "cam" / "milled.ply";
+    source.lens.surface = read_mesh(file);
+  }
+  source.name = file.string();
+  height_field_outline(source.lens.surface, source.name);
+  return source;
+}
+
+/// What a command says at the end.
+struct Report {
+  nlohmann::json json;
+  std::string text;
+};
+
+void write_solid(const Source& source, Format format, const std::string& out, Report& report) {
+  const SurfaceMesh solid = closed_solid(source.lens.surface, source.name);
+  const std::string title = "lensforge " + std::string(version()) + " lens, millimetres";
+  if (format == Format::kStl) write_stl(solid, title, out);
+  if (format == Format::kObj) write_obj(solid, title, out);
+  if (format == Format::kPly) write_ply(solid, out);
+  if (format == Format::k3mf) write_3mf(solid, title, out);
+  const double volume = enclosed_volume(solid);
+  report.json["triangles"] = solid.triangle_count();
+  report.json["volume_mm3"] = volume;
+  report.text = "  solid     " + std::to_string(solid.triangle_count()) + " triangles, " +
+                fixed(volume / 1000.0, 3) + " cm3\n";
+}
+
+void write_height_map(const Source& source, const ExportArguments& arguments, Format format,
+                      const Executor& executor, Report& report) {
+  const SmoothSurface surface(source.lens.surface);
+  const Image heights = height_map(surface, arguments.pixels, executor);
+  const double pixel = surface.box().sizes().x() / heights.columns();
+  report.json["pixels"] = {heights.columns(), heights.rows()};
+  report.json["pixel_mm"] = pixel;
+  report.text = "  heights   " + size_text(heights.columns(), heights.rows()) + " pixels of " +
+                fixed(pixel, 6) + " mm\n";
+  if (format == Format::kExr) {
+    write_image(heights, fs::path(arguments.out));
+    return;
+  }
+  const GreyScale scale = write_grey_relief(heights, arguments.out);
+  report.json["black_mm"] = scale.black;
+  report.json["white_mm"] = scale.white;
+  report.text += "  grey      black is z = " + fixed(scale.black, 6) +
+                 " mm, white is z = " + fixed(scale.white, 6) + " mm\n";
+}
+
+/// The picture of the surface as facets and as the smooth part that is made of them.
+void compare_pictures(const Lens& lens, const Executor& executor, Report& report) {
+  for (const SurfaceModel model : {SurfaceModel::kFacet, SurfaceModel::kSmooth}) {
+    const ImageMetrics metrics =
+        evaluate(lens.surface, lens.setup, model, lens.target, nullptr, executor);
+    const std::string word = model_word(model);
+    report.json["metrics"][word] = metrics_json(metrics);
+    report.text += "  " + word + std::string(10 - word.size(), ' ') + metrics_text(metrics) + "\n";
+  }
+}
+
+}  // namespace
+
+int export_command(const Arguments& command_line) {
+  ExportArguments arguments;
+  OptionSet options("export", "Writes a lens as a closed solid or height map for other programs.");
+  add_export_options(options, arguments);
+  options.parse(command_line);
+  const Format format = chosen_format(arguments);
+  require_fitting_options(options, format);
+  require_file_target(arguments.out);
+  const Console console(options.common().json, options.common().quiet);
+  const Source source = load(arguments);
+  const OutputFolder folder(fs::absolute(arguments.out).parent_path());
+  Report report;
+  if (is_height_map(format)) {
+    write_height_map(source, arguments, format, options.executor(), report);
+  } else {
+    write_solid(source, format, arguments.out, report);
+  }
+  compare_pictures(source.lens, options.executor(), report);
+  report.json["command"] = "export";
+  report.json["out"] = arguments.out;
+  report.json["format"] = word_of(format);
+  report.json["bytes"] = fs::file_size(arguments.out);
+  console.result(report.json, arguments.out + "\n" + report.text);
+  return kDone;
+}
+
+}  // namespace lensforge::app

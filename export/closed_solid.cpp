@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "export/closed_solid.h"
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <cstddef>
+#include <numbers>
+
+#include "core/error.h"
+#include "core/mesh_topology.h"
+
+namespace lensforge {
+namespace {
+
+constexpr int kNone = -1;
+
+[[noreturn]] void refuse(const std::string& name, const std::string& why) {
+  throw InputError(name + ": " + why);
+}
+
+double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+  return a.x() * b.y() - a.y() * b.x();
+}
+
+Eigen::Vector2d flat(const SurfaceMesh& mesh, int vertex) {
+  return mesh.vertices.col(vertex).head<2>();
+}
+
+Eigen::Vector2d middle(const SurfaceMesh& mesh) {
+  const auto xy = mesh.vertices.topRows<2>();
+  return 0.5 * (xy.rowwise().minCoeff() + xy.rowwise().maxCoeff());
+}
+
+void require_faces_up(const SurfaceMesh& surface, const std::string& name) {
+  for (Eigen::Index t = 0; t < surface.triangles.cols(); ++t) {
+    const Eigen::Vector3i v = surface.triangles.col(t);
+    const Eigen::Vector2d a = flat(surface, v[0]);
+    if (cross(flat(surface, v[1]) - a, flat(surface, v[2]) - a) > 0.0) continue;
+    refuse(name, "is no height field: triangle " + std::to_string(t) +
+                     " is folded over, upright or turned down");
+  }
+}
+
+void require_above_back(const SurfaceMesh& surface, const std::string& name) {
+  const double lowest = surface.vertices.row(2).minCoeff();
+  if (lowest > 0.0) return;
+  refuse(name, "reaches down to z = " + std::to_string(lowest) +
+                   " mm: it must lie above its back, z = 0");
+}
+
+/// For every vertex of the outline the one that follows it, else kNone.
+std::vector<int> successors(const SurfaceMesh& surface, const std::string& name) {
+  const MeshTopology topology = make_topology(surface);
+  std::vector<int> next(static_cast<std::size_t>(surface.vertex_count()), kNone);
+  for (Eigen::Index t = 0; t < surface.triangles.cols(); ++t) {
+    for (int k = 0; k < 3; ++k) {
+      if (topology.neighbours(k, t) >= 0) continue;
+      int& successor = next[static_cast<std::size_t>(surface.triangles(k, t))];
+      if (successor != kNone) refuse(name, "has parts that touch in one point only");
+      successor = surface.triangles((k + 1) % 3, t);
+    }
+  }
+  return next;
+}
+
+std::vector<int> walk(const std::vector<int>& next, const std::string& name) {
+  std::size_t count = 0;
+  int first = kNone;
+  for (std::size_t v = 0; v < next.size(); ++v) {
+    if (next[v] == kNone) continue;
+    if (first == kNone) first = static_cast<int>(v);
+    ++count;
+  }
+  if (first == kNone) refuse(name, "has no outline: it must be an open surface");
+  std::vector<int> loop{first};
+  for (int v = next[static_cast<std::size_t>(first)]; v != first;
+       v = next[static_cast<std::size_t>(v)]) {
+    loop.push_back(v);
+  }
+  if (loop.size() != count) refuse(name, "has holes or several pieces");
+  return loop;
+}
+
+/// An outline that turns once around a point from which all of it is seen crosses itself nowhere;
+/// with triangles that all face up the surface then covers every point below it once.
+void require_seen_from_middle(const SurfaceMesh& surface, const std::vector<int>& loop,
+                              const std::string& name) {
+  const Eigen::Vector2d centre = middle(surface);
+  double angle = 0.0;
+  for (std::size_t i = 0; i < loop.size(); ++i) {
+    const Eigen::Vector2d a = flat(surface, loop[i]) - centre;
+    const Eigen::Vector2d b = flat(surface, loop[(i + 1) % loop.size()]) - centre;
+    if (!(cross(a, b) > 0.0)) refuse(name, "has an outline that is not seen whole from its middle");
+    angle += std::atan2(cross(a, b), a.dot(b));
+  }
+  if (angle > 3.0 * std::numbers::pi) refuse(name, "winds around its middle more than once");
+}
+
+}  // namespace
+
+std::vector<int> height_field_outline(const SurfaceMesh& surface, const std::string& name) {
+  require_above_back(surface, name);
+  require_faces_up(surface, name);
+  std::vector<int> loop = walk(successors(surface, name), name);
+  require_seen_from_middle(surface, loop, name);
+  return loop;
+}
+
+SurfaceMesh closed_solid(const SurfaceMesh& surface, const std::string& name) {
+  const std::vector<int> loop = height_field_outline(surface, name);
+  const auto around = static_cast<int>(loop.size());
+  const auto top_vertices = static_cast<int>(surface.vertex_count());
+  const int centre = top_vertices + around;
+  SurfaceMesh solid;
+  solid.vertices.resize(3, Eigen::Index{centre} + 1);
+  solid.vertices.leftCols(top_vertices) = surface.vertices;
+  solid.triangles.resize(3, surface.triangle_count() + Eigen::Index{3} * around);
+  solid.triangles.leftCols(surface.triangle_count()) = surface.triangles;
+  Eigen::Index t = surface.triangle_count();
+  for (int i = 0; i < around; ++i) {
+    const int a = loop[static_cast<std::size_t>(i)];
+    const int b = loop[static_cast<std::size_t>((i + 1) % around)];
+    const int a_back = top_vertices + i;
+    const int b_back = top_vertices + (i + 1) % around;
+    solid.vertices.col(a_back) << flat(surface, a), 0.0;
+    solid.triangles.col(t++) << b, a, a_back;
+    solid.triangles.col(t++) << b, a_back, b_back;
+    solid.triangles.col(t++) << b_back, a_back, centre;
+  }
+  solid.vertices.col(centre) << middle(surface), 0.0;
+  return solid;
+}
+
+double enclosed_volume(const SurfaceMesh& solid) {
+  double volume = 0.0;
+  for (Eigen::Index t = 0; t < solid.triangles.cols(); ++t) {
+    volume += solid.corner(t, 0).dot(solid.corner(t, 1).cross(solid.corner(t, 2)));
+  }
+  return volume / 6.0;
+}
+
+}  // namespace lensforge

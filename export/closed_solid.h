@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/surface_mesh.h"
+
+namespace lensforge {
+
+/// The vertices around a surface's outline, counter-clockwise seen from +z, each once.
+/// @param name  what to call the surface in the error.
+/// @throw InputError unless the surface is a height field in one piece without holes above z = 0:
+///        every triangle faces +z, and every point of the outline is seen from its middle.
+std::vector<int> height_field_outline(const SurfaceMesh& surface, const std::string& name);
+
+/// The watertight solid between a surface and the plane z = 0: the surface's own triangles first,
+/// then walls, then the flat back; all of them face outwards.
+/// @throw InputError as height_field_outline().
+SurfaceMesh closed_solid(const SurfaceMesh& surface, const std::string& name);
+
+/// Volume enclosed by a closed mesh whose triangles face outwards, mm³.
+double enclosed_volume(const SurfaceMesh& solid);
+
+}  // namespace lensforge

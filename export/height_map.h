@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+
+#include "core/executor.h"
+#include "core/image.h"
+#include "export/smooth_surface.h"
+
+namespace lensforge {
+
+/// Heights in mm on a raster that covers the surface's rectangle, taken at the middles of the
+/// pixels, seen from +z with y upwards (row 0 is the farthest). 0 where there is no surface.
+/// @param longer_side  pixels on the longer side; the other one follows the rectangle.
+Image height_map(const SmoothSurface& surface, int longer_side, const Executor& executor);
+
+/// Heights that stand for black and white in a grey picture.
+struct GreyScale {
+  double black = 0.0;  ///< mm
+  double white = 0.0;  ///< mm
+};
+
+/// Writes a height map as 16-bit grey PNG, linear between the lowest and the highest value, as
+/// laser and relief programs read it; whole or not at all.
+/// @throw RunError if it cannot be written.
+GreyScale write_grey_relief(const Image& heights, const std::filesystem::path& path);
+
+}  // namespace lensforge

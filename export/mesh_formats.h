@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "core/surface_mesh.h"
+
+/// Meshes in the formats that printers, CAM programs and viewers read; millimetres. Each file
+/// appears whole or not at all. PLY is core/mesh_io.h's.
+namespace lensforge {
+
+/// Binary STL; coordinates are rounded to 32-bit floats (4e-6 mm at 100 mm).
+/// @throw RunError if it cannot be written.
+void write_stl(const SurfaceMesh& mesh, const std::string& title,
+               const std::filesystem::path& path);
+
+/// Wavefront OBJ; coordinates read back as the same doubles. `title` becomes a comment.
+/// @throw RunError if it cannot be written.
+void write_obj(const SurfaceMesh& mesh, const std::string& title,
+               const std::filesystem::path& path);
+
+/// 3MF core specification 1.2: one object, unit millimetre, coordinates to 1e-9 mm.
+/// @pre the mesh is closed. @throw RunError if it cannot be written.
+void write_3mf(const SurfaceMesh& mesh, const std::string& title,
+               const std::filesystem::path& path);
+
+}  // namespace lensforge

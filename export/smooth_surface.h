@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "core/surface_mesh.h"
+
+namespace lensforge {
+
+/// Height and slopes of a surface above a point.
+struct SurfacePoint {
+  double z = 0.0;                                   ///< mm
+  Eigen::Vector2d slope = Eigen::Vector2d::Zero();  ///< ∂z/∂x, ∂z/∂y
+};
+
+/// The smooth surface of the vertex-normal model: it passes through every vertex of a height field
+/// with the vertex's own normal (the sum of the area normals around it) and has continuous slopes
+/// everywhere. Between the vertices it is the reduced Clough–Tocher interpolant: three cubics per
+/// triangle, the slope across an edge linear along the edge.
+class SmoothSurface {
+ public:
+  /// @pre every triangle faces +z (height_field_outline()).
+  explicit SmoothSurface(const SurfaceMesh& mesh);
+
+  /// Nothing outside of the mesh.
+  [[nodiscard]] std::optional<SurfacePoint> at(const Eigen::Vector2d& xy) const;
+
+  [[nodiscard]] const Eigen::AlignedBox2d& box() const { return box_; }
+  [[nodiscard]] const SurfaceMesh& mesh() const { return mesh_; }
+  /// Slopes at the vertices, 2 × V.
+  [[nodiscard]] const Eigen::Matrix2Xd& slopes() const { return slopes_; }
+
+ private:
+  struct Place {
+    std::int64_t triangle = -1;
+    Eigen::Vector3d weights = Eigen::Vector3d::Zero();  ///< Barycentric.
+  };
+
+  [[nodiscard]] std::int64_t bin_of(const Eigen::Vector2d& xy) const;
+  [[nodiscard]] Eigen::Vector2i bin_cell(const Eigen::Vector2d& xy) const;
+  [[nodiscard]] Place locate(const Eigen::Vector2d& xy) const;
+  [[nodiscard]] SurfacePoint evaluate(const Place& place) const;
+  void fill_bins();
+
+  SurfaceMesh mesh_;
+  Eigen::Matrix2Xd slopes_;
+  Eigen::AlignedBox2d box_;
+  Eigen::Vector2i bins_{1, 1};
+  /// Triangles that may cover bin b are bin_triangles_[bin_begin_[b] … bin_begin_[b+1]).
+  std::vector<std::int64_t> bin_begin_;
+  std::vector<std::int32_t> bin_triangles_;
+};
+
+}  // namespace lensforge
