@@ -158,7 +158,7 @@ std::vector<Eigen::Vector3d> ramp_points(const std::vector<GcodeMotion>& path, d
   std::vector<Eigen::Vector3d> points;
   const auto add = [&](const GcodeMotion& motion, double part, double along) {
     const double left = std::clamp(1.0 - (along - begin) / ramp, 0.0, 1.0);
-    points.push_back(point_of(motion, part) + Eigen::Vector3d(0.0, 0.0, lift * left * left));
+    points.emplace_back(point_of(motion, part) + Eigen::Vector3d(0.0, 0.0, lift * left * left));
   };
   double before = 0.0;
   for (const GcodeMotion& motion : path) {

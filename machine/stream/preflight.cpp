@@ -59,11 +59,11 @@ void check_spindle(const ProgramFacts& facts, const ControllerInfo& info, Findin
                              ", but the controller turns at least " + setting_text(31, *least));
   }
   if (info.setting(32).value_or(0.0) == 1.0) {
-    found.refusals.push_back(
+    found.refusals.emplace_back(
         "$32=1: the controller is in laser mode, where a spindle is not waited for; set $32=0");
   }
   if (facts.leaves_spindle_on) {
-    found.warnings.push_back("the program ends with the spindle on");
+    found.warnings.emplace_back("the program ends with the spindle on");
   }
 }
 
@@ -88,21 +88,21 @@ void check_travel(const ProgramFacts& facts, const ControllerInfo& info, Finding
 void check_state(const ControllerInfo& info, Findings& found) {
   const bool homed = info.status.homed.value_or(true);
   if (info.status.state == ReportedState::kAlarm || (homing_on(info) && !homed)) {
-    found.refusals.push_back(
+    found.refusals.emplace_back(
         "the machine is not homed, or in alarm: home it with --home (or $H) first");
   } else if (info.status.state != ReportedState::kIdle) {
     found.refusals.push_back("the controller is in state " +
                              std::string(state_name(info.status.state)) + "; it must be Idle");
   }
   if (!homing_on(info)) {
-    found.warnings.push_back(
+    found.warnings.emplace_back(
         "$22=0: homing is off, so travel is not checked and nothing can be resumed after a fault");
   }
 }
 
 void check_reports(const ControllerInfo& info, Findings& found) {
   if (!info.reports_room) {
-    found.warnings.push_back("the controller does not report its buffers (Bf:, see $10)");
+    found.warnings.emplace_back("the controller does not report its buffers (Bf:, see $10)");
   }
   if (!info.line_numbers) {
     found.warnings.push_back(
@@ -155,7 +155,7 @@ Findings check_program(const ProgramFacts& facts, const ControllerInfo& info) {
   check_travel(facts, info, found);
   check_feeds(facts, info, found);
   check_reports(info, found);
-  if (!facts.ends) found.warnings.push_back("the program has no end (M2 or M30)");
+  if (!facts.ends) found.warnings.emplace_back("the program has no end (M2 or M30)");
   return found;
 }
 

@@ -81,10 +81,8 @@ std::vector<GcodeMotion> ramp_path(const History& history, double length) {
                             spindle_order(at->after) == spindle_order(history.state) &&
                             at->after.tool == history.state.tool;
     if (!at->leads_along() || !same_frame) return {};
-    for (auto motion = at->motions.rbegin(); motion != at->motions.rend(); ++motion) {
-      path.insert(path.begin(), *motion);
-      found += motion->length();
-    }
+    path.insert(path.begin(), at->motions.begin(), at->motions.end());
+    for (const GcodeMotion& motion : at->motions) found += motion.length();
   }
   if (found < length) return {};
   return path;

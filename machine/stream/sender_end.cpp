@@ -51,6 +51,8 @@ void Sender::hold(StopCause cause) {
   }
   if (!interrupted) return;
   wire_.urgent(realtime::kSoftReset);
+  // The reset stops a spindle that the controller drives; one driven from here goes with it.
+  if (guard_ != nullptr) guard_->stop();
   wait_for_banner();
 }
 
@@ -71,6 +73,7 @@ void Sender::wait_for_banner() {
   while (!banner_seen_ && clock_.now() < end) {
     wire_.flush();
     wire_.receive(kReadWait, [this](const Reply& reply) { take_while_stopping(reply); });
+    if (guard_ != nullptr) guard_->poll();
   }
 }
 

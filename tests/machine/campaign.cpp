@@ -97,7 +97,7 @@ class Workshop {
     options.hold_limit = 20.0;
     Sender sender({wire, clock, guarded() ? guard_.get() : nullptr, journal.get()}, info, options,
                   feed_options.first_line);
-    const SendResult result = sender.run(feed, {});
+    SendResult result = sender.run(feed, {});
     if (spy.line_after_hold) violations.emplace_back("a line left after the feed hold");
     extent.written = spy.written;
     note_end();

@@ -305,6 +305,17 @@ TEST_F(SenderTest, AStopRequestHoldsThenResets) {
   EXPECT_EQ(controller.lines.back(), "N9X2F500");
 }
 
+TEST_F(SenderTest, AStopRequestStopsASpindleThatIsDrivenFromHere) {
+  FakeGuard spindle;
+  guard = &spindle;
+  controller.answer = [&](const std::string& line, std::int64_t) {
+    if (line.find("X2") != std::string::npos) stop.request_stop();
+    return std::string("ok\r\n");
+  };
+  EXPECT_EQ(send(kProgram).status, SendStatus::kInterrupted);
+  EXPECT_THAT(spindle.orders, ElementsAre("cw 12000", "stop"));
+}
+
 TEST_F(SenderTest, ASecondStopRequestResetsAtOnce) {
   controller.hold_from_idle = false;  // Never comes to rest.
   controller.answer = [&](const std::string& line, std::int64_t) {
