@@ -10,6 +10,7 @@
 #include "core/error.h"
 #include "core/image_io.h"
 #include "design/checkpoint.h"
+#include "design/crease_alignment.h"
 #include "design/face_transport.h"
 #include "design/grid_mesh.h"
 #include "design/guided_optimization.h"
@@ -238,8 +239,7 @@ class Schedule {
                 matching.result.message + ")";
     }
     if (state_.level == 0 && state_.round == 0 && options_.spread > 0.0) {
-      spread(problem, matching.result, mesh);
-      matching = match_spread(problem, std::move(matching), mesh);
+      matching = fit_mesh(problem, matching, mesh);
     }
     const Correspondence wanted{std::move(matching.result.centroids),
                                 std::move(matching.light.flux)};
@@ -291,11 +291,13 @@ class Schedule {
     }
   }
 
-  /// The transport of a mesh that has been spread, from that of the even mesh. Solved anew, it
-  /// brings out detail in the dark that the even mesh has no facets for; where black leaves cells
-  /// too thin for Newton steps, the even mesh's map has to do.
-  [[nodiscard]] Matching match_spread(const Problem& problem, Matching even,
-                                      const SurfaceMesh& mesh) {
+  /// Spreads the mesh, aligns it to the creases of the even mesh's transport, and finds its own
+  /// transport. Solved anew, that brings out detail in the dark that the even mesh has no facets
+  /// for; where black leaves cells too thin for Newton steps, the even mesh's map has to do.
+  [[nodiscard]] Matching fit_mesh(const Problem& problem, const Matching& even, SurfaceMesh& mesh) {
+    spread(problem, even.result, mesh);
+    const BrenierMap map(even.light.landing, even.result, problem.target);
+    align_to_creases(map, problem.setup, mesh);
     if (black_share(problem.target) <= kMostBlack) {
       TransportOptions options;
       options.tolerance = kTransportTolerance;
@@ -305,7 +307,6 @@ class Schedule {
     }
     Matching mapped;
     mapped.light = face_light(mesh, problem.setup, options_.model, stoppable_);
-    const BrenierMap map(even.light.landing, even.result, problem.target);
     mapped.result.centroids = map_faces(mapped.light, map, stoppable_);
     return mapped;
   }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <iterator>
 
 #include "design/transport/potential_upsampling.h"
 
@@ -55,17 +56,27 @@ int BrenierMap::bucket_of(double coordinate, Eigen::Index axis) const {
   return std::clamp(bucket, 0, buckets_[axis] - 1);
 }
 
-void BrenierMap::gather(const Eigen::Vector2d& p, std::vector<int>& found) const {
+std::vector<int> BrenierMap::around(const Eigen::Vector2d& p) const {
   const int column = bucket_of(p.x(), 0);
   const int row = bucket_of(p.y(), 1);
   const int left = std::max(0, column - kReach);
   const int right = std::min(buckets_.x() - 1, column + kReach);
+  std::vector<int> found;
   for (int r = std::max(0, row - kReach); r <= std::min(buckets_.y() - 1, row + kReach); ++r) {
-    const auto first = static_cast<std::size_t>(r * buckets_.x() + left);
-    const auto last = static_cast<std::size_t>(r * buckets_.x() + right);
-    found.insert(found.end(), members_.begin() + begin_[first],
-                 members_.begin() + begin_[last + 1]);
+    const int first = begin_[static_cast<std::size_t>(r * buckets_.x() + left)];
+    const int last = begin_[static_cast<std::size_t>(r * buckets_.x() + right) + 1];
+    std::copy_if(members_.begin() + first, members_.begin() + last, std::back_inserter(found),
+                 [&](int site) { return lit_[static_cast<std::size_t>(site)] != 0; });
   }
+  return found;
+}
+
+int BrenierMap::highest(const std::vector<int>& sites, const Eigen::Vector2d& p) const {
+  int best = -1;
+  for (const int site : sites) {
+    if (best < 0 || plane_at(site, p) > plane_at(best, p)) best = site;
+  }
+  return best;
 }
 
 double BrenierMap::plane_at(int site, const Eigen::Vector2d& p) const {
@@ -86,12 +97,11 @@ bool BrenierMap::is_lit_between(const Eigen::Vector2d& a, const Eigen::Vector2d&
   return true;
 }
 
-Eigen::Matrix2d BrenierMap::slope_at(int site, const std::vector<int>& around) const {
+Eigen::Matrix2d BrenierMap::slope_at(int site, const std::vector<int>& others) const {
   Eigen::Matrix2d moments = Eigen::Matrix2d::Zero();
   Eigen::Matrix2d products = Eigen::Matrix2d::Zero();
-  for (const int other : around) {
-    const auto i = static_cast<std::size_t>(other);
-    if (other == site || lit_[i] == 0) continue;
+  for (const int other : others) {
+    if (other == site) continue;
     const Eigen::Vector2d d = sites_.col(other) - sites_.col(site);
     if (!is_lit_between(centroids_.col(site), centroids_.col(other))) continue;
     const double weight = 1.0 / (d.squaredNorm() + spacing_ * spacing_);
@@ -104,23 +114,31 @@ Eigen::Matrix2d BrenierMap::slope_at(int site, const std::vector<int>& around) c
 }
 
 Eigen::Vector2d BrenierMap::operator()(const Eigen::Vector2d& p) const {
-  std::vector<int> around;
-  gather(p, around);
-  int best = -1;
-  for (const int site : around) {
-    if (lit_[static_cast<std::size_t>(site)] == 0) continue;
-    if (best < 0 || plane_at(site, p) > plane_at(best, p)) best = site;
-  }
+  const std::vector<int> sites = around(p);
+  const int best = highest(sites, p);
   if (best < 0) {
     Eigen::Index nearest = 0;
     (sites_.colwise() - p).colwise().squaredNorm().minCoeff(&nearest);
     return centroids_.col(nearest);
   }
   const Eigen::Vector2d landing =
-      (centroids_.col(best) + slope_at(best, around) * (p - sites_.col(best)))
+      (centroids_.col(best) + slope_at(best, sites) * (p - sites_.col(best)))
           .cwiseMax(0.0)
           .cwiseMin(Eigen::Vector2d(density_.columns(), density_.rows()));
   return is_lit(landing) ? landing : Eigen::Vector2d(centroids_.col(best));
+}
+
+std::optional<Eigen::Vector2d> BrenierMap::way_to_crease(const Eigen::Vector2d& p) const {
+  std::vector<int> sites = around(p);
+  const int here = highest(sites, p);
+  if (here < 0) return std::nullopt;
+  const Eigen::Vector2d landing = centroids_.col(here);
+  std::erase_if(sites, [&](int s) { return is_lit_between(landing, centroids_.col(s)); });
+  const int there = highest(sites, p);
+  if (there < 0) return std::nullopt;
+  // Where the two planes are level.
+  const Eigen::Vector2d jump = centroids_.col(there) - landing;
+  return (plane_at(here, p) - plane_at(there, p)) / jump.squaredNorm() * jump;
 }
 
 }  // namespace lensforge

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <vector>
 
 #include "core/image.h"
@@ -27,14 +28,20 @@ class BrenierMap {
   /// T(p), pixel coordinates; within the picture.
   [[nodiscard]] Eigen::Vector2d operator()(const Eigen::Vector2d& p) const;
 
+  /// The way from p to the nearest point of the crease between p's side and the next one across
+  /// black; nothing where no site around has another side.
+  [[nodiscard]] std::optional<Eigen::Vector2d> way_to_crease(const Eigen::Vector2d& p) const;
+
  private:
   [[nodiscard]] int bucket_of(double coordinate, Eigen::Index axis) const;
-  /// Sites in the buckets around p.
-  void gather(const Eigen::Vector2d& p, std::vector<int>& found) const;
+  /// Sites in the buckets around p whose cells' centroids lie in light.
+  [[nodiscard]] std::vector<int> around(const Eigen::Vector2d& p) const;
+  /// The one of `sites` whose plane is the highest at p; −1 if there are none.
+  [[nodiscard]] int highest(const std::vector<int>& sites, const Eigen::Vector2d& p) const;
   [[nodiscard]] double plane_at(int site, const Eigen::Vector2d& p) const;
   [[nodiscard]] bool is_lit(const Eigen::Vector2d& at) const;
   [[nodiscard]] bool is_lit_between(const Eigen::Vector2d& a, const Eigen::Vector2d& b) const;
-  [[nodiscard]] Eigen::Matrix2d slope_at(int site, const std::vector<int>& around) const;
+  [[nodiscard]] Eigen::Matrix2d slope_at(int site, const std::vector<int>& others) const;
 
   const Eigen::Matrix2Xd& sites_;
   const Eigen::Matrix2Xd& centroids_;

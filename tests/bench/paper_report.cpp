@@ -224,7 +224,8 @@ std::string paper_report(const Results& results, const std::string& machine) {
   const std::string ablation = ablation_table(results);
   if (!ablation.empty()) {
     text +=
-        "\nAs Fig. 10: the method with a part left out, by its own rendering. The paper prints\n"
+        "\nAs Fig. 10: the method with a part left out or changed, by its own rendering. The paper "
+        "prints\n"
         "its figures only within the pictures.\n\n" +
         ablation;
   }
