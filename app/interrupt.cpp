@@ -8,6 +8,7 @@
 #include <csignal>
 
 #include "app/exit_code.h"
+#include "app/terminal_keys.h"
 
 // The handler does no more than wake a thread, so that nothing else has to be async-signal-safe.
 // Blocking the signals and waiting for them would not do: libraries that are only linked in
@@ -46,12 +47,15 @@ InterruptWatch::~InterruptWatch() {
   sem_destroy(&wake);
 }
 
+void InterruptWatch::interrupt() { sem_post(&wake); }
+
 void InterruptWatch::wait_for_signals() {
   while (true) {
     if (sem_wait(&wake) != 0) continue;
     if (finished_) return;
     if (stop_.request_stop()) continue;
     if (second_ == SecondInterrupt::kRequest && second_stop_.request_stop()) continue;
+    restore_terminal();
     _exit(kInterrupted);
   }
 }

@@ -23,6 +23,9 @@ class InterruptWatch {
   InterruptWatch(const InterruptWatch&) = delete;
   InterruptWatch& operator=(const InterruptWatch&) = delete;
 
+  /// Acts as a signal does.
+  static void interrupt();
+
   [[nodiscard]] std::stop_token token() const { return stop_.get_token(); }
   [[nodiscard]] std::stop_token second_token() const { return second_stop_.get_token(); }
 

@@ -11,10 +11,14 @@
 #include "app/console.h"
 #include "app/exit_code.h"
 #include "app/interrupt.h"
+#include "app/job_events.h"
+#include "app/job_log.h"
+#include "app/operator_view.h"
 #include "app/option_set.h"
 #include "app/progress_display.h"
 #include "app/send_output.h"
 #include "app/send_settings.h"
+#include "app/terminal_keys.h"
 #include "core/error.h"
 #include "machine/guard/background_guard.h"
 #include "machine/link/serial_link.h"
@@ -76,15 +80,20 @@ class SendRun {
       : options_(options),
         settings_(settings),
         console_(console),
+        warn_([this](const std::string& text) { console_.note(text); }),
+        log_(settings, warn_),
+        events_(settings, warn_),
         interrupt_(SecondInterrupt::kRequest) {}
 
   /// @throw what the libraries throw
   int run() {
     summary_.job = identify_job(settings_.file);
-    if (settings_.port.empty()) {
-      examine_alone();
-    } else {
-      with_controller();
+    log_.begin(options_, summary_.job);
+    try {
+      carry_out();
+    } catch (const std::exception& refused) {
+      log_.line(std::string("nothing was sent: ") + refused.what());
+      throw;
     }
     for (const std::string& warning : summary_.findings.warnings) {
       console_.note("warning: " + warning);
@@ -94,6 +103,14 @@ class SendRun {
   }
 
  private:
+  void carry_out() {
+    if (settings_.port.empty()) {
+      examine_alone();
+    } else {
+      with_controller();
+    }
+  }
+
   /// Against nothing but the dialect; positions are the program's own.
   void examine_alone() {
     FactsOptions facts;
@@ -113,6 +130,7 @@ class SendRun {
     session.resume = settings_.resume;
     session.home = settings_.home || settings_.resume || port.machine;
     summary_.controller = open_session(wire, port.clock(), session, interrupt_.token());
+    log_.controller(*summary_.controller);
     check(wire, port);
     if (settings_.dry_run) return check_mode(wire, port);
     std::unique_ptr<BackgroundGuard> guard;
@@ -166,6 +184,7 @@ class SendRun {
     facts.planner.bytes_per_second = rate.bytes_per_second;
     summary_.facts = examine(facts);
     summary_.findings = check_program(summary_.facts, info);
+    log_.preflight(summary_.facts, summary_.findings);
     if (summary_.findings.refusals.empty()) return;
     std::string all;
     for (const std::string& refusal : summary_.findings.refusals) {
@@ -189,16 +208,30 @@ class SendRun {
     ProgramFeed feed(program, feed_options);
     Sender sender({wire, port.clock(), guard, journal.get()}, info, settings_.sender,
                   feed_options.first_line);
-    ProgressDisplay display(options_.common().quiet);
-    const auto sink = display.sink();
-    SendControl control;
-    control.stop = interrupt_.token();
-    control.reset = interrupt_.second_token();
+    summary_.result = run_watched(sender, feed, feed_options.first_offset);
+    log_.end(*summary_.result);
+    events_.end(*summary_.result);
+  }
+
+  /// The job before the operator's eyes, on record, and under the keys.
+  SendResult run_watched(Sender& sender, ProgramFeed& feed, std::int64_t first_byte) {
+    const ControllerInfo& info = *summary_.controller;
+    const JobView job{summary_.job.bytes,          summary_.facts.lines, first_byte,
+                      summary_.facts.time.seconds, info.planner_blocks,  info.rx_bytes};
+    TimeLeft left(job);
+    events_.begin(summary_.job, job);
+    TerminalKeys keys(&InterruptWatch::interrupt);
+    if (keys.active()) console_.note("keys: " + std::string(kKeyHelp));
+    OperatorView view(options_.common().quiet, job);
+    SendControl control{interrupt_.token(), interrupt_.second_token(), {}, {}};
+    control.keys = [&] { return keys.next(); };
     control.watch = [&](const SendEvent& event) {
-      if (!event.message.empty()) console_.note(event.message);
-      if (sink) sink(progress_of(event, summary_.job.bytes, summary_.facts.time.seconds));
+      left.take(event);
+      view.take(event, left.seconds());
+      log_.take(event);
+      events_.take(event, left.seconds());
     };
-    summary_.result = sender.run(feed, control);
+    return sender.run(feed, control);
   }
 
   std::unique_ptr<Journal> begin_journal(FeedOptions& feed) {
@@ -212,6 +245,7 @@ class SendRun {
     std::ifstream program(settings_.file, std::ios::binary);
     summary_.plan = plan_resume(program, *record_, *summary_.controller, summary_.facts, entry);
     confirm();
+    log_.resume(*summary_.plan);
     feed.first_line = summary_.plan->line;
     feed.first_offset = summary_.plan->offset;
     feed.before = summary_.plan->before;
@@ -251,6 +285,9 @@ class SendRun {
   const OptionSet& options_;
   const SendSettings& settings_;
   const Console& console_;
+  Warn warn_;
+  JobLog log_;
+  JobEvents events_;
   InterruptWatch interrupt_;
   std::optional<JournalRecord> record_;
   SendSummary summary_;
@@ -260,10 +297,12 @@ class SendRun {
 
 int send_command(const Arguments& command_line) {
   SendSettings settings;
-  OptionSet options("send", "Streams a G-code program to a Grbl-family controller.");
+  OptionSet options("send",
+                    "Streams a G-code program to a Grbl-family controller. Keys while it runs: " +
+                        std::string(kKeyHelp) + ".");
   add_send_options(options, settings);
   options.parse(command_line);
-  require_consistent(settings);
+  require_consistent(settings, options.common().json);
   const Console console(options.common().json, options.common().quiet);
   try {
     return SendRun(options, settings, console).run();

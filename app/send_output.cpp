@@ -1,23 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "app/send_output.h"
 
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <cstdio>
-
 #include "app/json_output.h"
+#include "app/operator_view.h"
 
 namespace lensforge::app {
 namespace {
-
-std::string clock_text(double seconds) {
-  const long whole = std::lround(seconds);
-  std::array<char, 64> text{};
-  std::snprintf(text.data(), text.size(), "%ld:%02ld:%02ld", whole / 3600, whole / 60 % 60,
-                whole % 60);
-  return text.data();
-}
 
 nlohmann::json box_json(const Eigen::AlignedBox3d& box) {
   if (box.isEmpty()) return nullptr;
@@ -65,32 +53,35 @@ nlohmann::json result_json(const SendResult& result) {
           {"seconds", result.seconds}};
 }
 
-std::string facts_text(const ProgramFacts& facts) {
-  return "  program      " + std::to_string(facts.lines) + " lines, " +
-         std::to_string(facts.motions) + " motions, up to F" + fixed(facts.top_feed, 0) + " and S" +
-         fixed(facts.top_rpm, 0) + "\n" +                        //
-         "  motion       " + box_text(facts.extent) + " mm\n" +  //
-         "  time         " + clock_text(facts.time.seconds) +
-         (facts.time.stream_limited()
-              ? ", " + clock_text(facts.time.stream_limited_seconds) + " as lines arrive"
-              : std::string()) +
-         "\n";
-}
-
 std::string result_text(const SendResult& result) {
   return "  sent         up to line " + std::to_string(result.sent) + "\n" +  //
          "  taken        up to line " + std::to_string(result.acknowledged) + "\n" +
          "  carried out  up to line " + std::to_string(result.executed) + " for sure\n" +
          "  machine      " +
          (result.at_rest ? "stands still" : "was not seen to come to rest: look at it") + "\n" +
-         "  took         " + clock_text(result.seconds) + "\n";
+         "  took         " + duration_text(result.seconds) + "\n";
 }
 
 }  // namespace
 
+std::string facts_text(const ProgramFacts& facts) {
+  return "  program      " + std::to_string(facts.lines) + " lines, " +
+         std::to_string(facts.motions) + " motions, up to F" + fixed(facts.top_feed, 0) + " and S" +
+         fixed(facts.top_rpm, 0) + "\n" +                        //
+         "  motion       " + box_text(facts.extent) + " mm\n" +  //
+         "  time         " + duration_text(facts.time.seconds) +
+         (facts.time.stream_limited()
+              ? ", " + duration_text(facts.time.stream_limited_seconds) + " as lines arrive"
+              : std::string()) +
+         "\n";
+}
+
 std::string status_word(const SendSummary& summary) {
-  if (!summary.result) return "checked";
-  switch (summary.result->status) {
+  return summary.result ? status_word(summary.result->status) : "checked";
+}
+
+std::string status_word(SendStatus status) {
+  switch (status) {
     case SendStatus::kDone:
       return "done";
     case SendStatus::kInterrupted:
@@ -136,25 +127,6 @@ std::string send_text(const SendSettings& settings, const SendSummary& summary) 
   }
   if (summary.result) text += result_text(*summary.result);
   return text;
-}
-
-Progress progress_of(const SendEvent& event, std::int64_t bytes, double estimate) {
-  Progress progress;
-  progress.stage = "sending";
-  progress.done = static_cast<double>(event.byte);
-  progress.total = static_cast<double>(bytes);
-  std::string detail(state_name(event.report.state));
-  detail += "  line " + std::to_string(event.acknowledged);
-  if (event.position) {
-    detail += "  X" + fixed(event.position->x(), 2) + " Y" + fixed(event.position->y(), 2) + " Z" +
-              fixed(event.position->z(), 3);
-  }
-  if (event.report.feed) detail += "  F" + fixed(*event.report.feed, 0);
-  detail += "  S" + fixed(event.rpm_asked, 0) + "/" + fixed(event.rpm_measured, 0);
-  if (event.report.room) detail += "  free " + std::to_string(event.report.room->blocks);
-  if (estimate > event.seconds) detail += "  left " + clock_text(estimate - event.seconds);
-  progress.detail = detail;
-  return progress;
 }
 
 }  // namespace lensforge::app

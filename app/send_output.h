@@ -6,7 +6,6 @@
 #include <string>
 
 #include "app/send_settings.h"
-#include "core/run_control.h"
 #include "machine/stream/controller_info.h"
 #include "machine/stream/preflight.h"
 #include "machine/stream/program_facts.h"
@@ -29,10 +28,13 @@ struct SendSummary {
 /// "done", "interrupted", "fault", or "checked" of a dry run.
 std::string status_word(const SendSummary& summary);
 
+/// "done", "interrupted" or "fault".
+std::string status_word(SendStatus status);
+
+/// Size, extent and time of a program, a line each.
+std::string facts_text(const ProgramFacts& facts);
+
 nlohmann::json send_json(const OptionSet& options, const SendSummary& summary);
 std::string send_text(const SendSettings& settings, const SendSummary& summary);
-
-/// One line on a running job for the progress display.
-Progress progress_of(const SendEvent& event, std::int64_t bytes, double estimate);
 
 }  // namespace lensforge::app

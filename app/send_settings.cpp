@@ -36,6 +36,10 @@ void add_guard_options(OptionSet& options, SendSettings& send) {
 
 void add_journal_options(OptionSet& options, SendSettings& send) {
   options.text("--journal", send.journal, "FILE", "journal; FILE.ngc.journal without it");
+  options.text("--log", send.log, "FILE",
+               "log to hand to somebody else, appended; FILE.ngc.log without it");
+  options.text("--events", send.events, "FILE",
+               "append what happens as JSON, one object a line; - is standard output");
   options.flag("--resume", send.resume, "go on after a fault, with homing and a safe way back in");
   options.flag("--restart", send.restart, "begin again in spite of an unfinished journal");
   options.flag("--yes", send.yes, "do not ask before resuming");
@@ -65,7 +69,10 @@ void add_send_options(OptionSet& options, SendSettings& settings) {
   add_journal_options(options, settings);
 }
 
-void require_consistent(const SendSettings& settings) {
+void require_consistent(const SendSettings& settings, bool json) {
+  if (json && settings.events == "-") {
+    throw InputError("--events -: standard output belongs to the result with --json");
+  }
   if (settings.port.empty() && !settings.dry_run) {
     throw InputError("--port: which controller? Only a --dry-run goes without");
   }
@@ -78,6 +85,7 @@ void require_consistent(const SendSettings& settings) {
   if (settings.spindle.empty() && !settings.interlocks.empty()) {
     throw InputError("--interlocks " + settings.interlocks + ": needs --spindle as well");
   }
+  if (settings.log == "-") throw InputError("--log -: has to be a file");
   const bool simulated = settings.port.starts_with("sim:");
   if (simulated && !settings.spindle.empty()) {
     throw InputError("--spindle " + settings.spindle +

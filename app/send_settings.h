@@ -21,6 +21,8 @@ struct SendSettings {
   std::string port;
   std::string dialect = "grbl";
   std::string journal;     ///< FILE.journal if empty.
+  std::string log;         ///< FILE.log if empty.
+  std::string events;      ///< JSON lines go here; none if empty.
   std::string spindle;     ///< MAP[@PLACE]; empty for none.
   std::string interlocks;  ///< MAP[@PLACE] of a device without a spindle; empty for none.
   SpindleOwner owner = SpindleOwner::kHost;
@@ -38,13 +40,16 @@ struct SendSettings {
     return journal.empty() ? std::filesystem::path(file + ".journal")
                            : std::filesystem::path(journal);
   }
+  [[nodiscard]] std::filesystem::path log_path() const {
+    return log.empty() ? std::filesystem::path(file + ".log") : std::filesystem::path(log);
+  }
 };
 
 /// Adds every option of the command.
 void add_send_options(OptionSet& options, SendSettings& settings);
 
 /// @throw InputError for options that exclude each other or are missing.
-void require_consistent(const SendSettings& settings);
+void require_consistent(const SendSettings& settings, bool json);
 
 /// The register maps that --spindle and --interlocks name, with their places. @throw InputError
 std::vector<RegisterMap> register_maps(const SendSettings& settings);

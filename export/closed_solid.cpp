@@ -106,6 +106,20 @@ std::vector<int> height_field_outline(const SurfaceMesh& surface, const std::str
   return loop;
 }
 
+void require_rectangle(const SurfaceMesh& surface, const std::vector<int>& outline,
+                       const std::string& name) {
+  constexpr double kOnBorder = 1e-9;  // mm
+  const auto xy = surface.vertices.topRows<2>();
+  const Eigen::Array2d low = xy.rowwise().minCoeff();
+  const Eigen::Array2d high = xy.rowwise().maxCoeff();
+  for (const int v : outline) {
+    const Eigen::Array2d p = flat(surface, v);
+    if ((p - low).min(high - p).minCoeff() <= kOnBorder) continue;
+    refuse(name, "has an outline that is no rectangle: vertex " + std::to_string(v) +
+                     " of it lies inside the surrounding one");
+  }
+}
+
 SurfaceMesh closed_solid(const SurfaceMesh& surface, const std::string& name) {
   const std::vector<int> loop = height_field_outline(surface, name);
   const auto around = static_cast<int>(loop.size());

@@ -14,6 +14,10 @@ namespace lensforge {
 ///        every triangle faces +z, and every point of the outline is seen from its middle.
 std::vector<int> height_field_outline(const SurfaceMesh& surface, const std::string& name);
 
+/// @throw InputError unless every vertex of the outline lies on the rectangle around the surface.
+void require_rectangle(const SurfaceMesh& surface, const std::vector<int>& outline,
+                       const std::string& name);
+
 /// The watertight solid between a surface and the plane z = 0: the surface's own triangles first,
 /// then walls, then the flat back; all of them face outwards.
 /// @throw InputError as height_field_outline().

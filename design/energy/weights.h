@@ -11,9 +11,8 @@ namespace lensforge {
 ///   0.0058 and 0.0031, portrait 0.0084, 0.0071 and 0.0072. Even E_grad itself ends lower on the
 ///   logo without it (23, 16, 14).
 /// - λ4, for which it has 20: what E_edge weighs hangs on ν, whose scale the paper leaves open.
-/// With
-///   the ν of plan_levels(), smooth model, 128² portrait, MAE after 300 iterations: 0.0050 with
-///   0.2, 0.0026 with 0.02.
+///   128² portrait, smooth model, MAE after 300 iterations with the ν of plan_levels(): 0.0050
+///   with 0.2, 0.0026 with 0.02.
 /// Lengths enter the terms in working-picture pixels, the paper's unit of length.
 struct ObjectiveWeights {
   double image = 1e2;       ///< λ1, E_img

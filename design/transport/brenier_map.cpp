@@ -38,8 +38,7 @@ BrenierMap::BrenierMap(const Eigen::Matrix2Xd& sites, const TransportResult& res
   spacing_ = std::sqrt(std::max(size.prod(), 1e-12) / static_cast<double>(sites.cols()));
   buckets_ = (size / spacing_).cast<int>() + Eigen::Vector2i::Ones();
   const auto number = [&](Eigen::Index i) {
-    return static_cast<std::size_t>(bucket_of(sites(1, i), 1) * buckets_.x() +
-                                    bucket_of(sites(0, i), 0));
+    return bucket(bucket_of(sites(0, i), 0), bucket_of(sites(1, i), 1));
   };
   begin_.assign(static_cast<std::size_t>(buckets_.prod()) + 1, 0);
   for (Eigen::Index i = 0; i < sites.cols(); ++i) ++begin_[number(i) + 1];
@@ -56,6 +55,11 @@ int BrenierMap::bucket_of(double coordinate, Eigen::Index axis) const {
   return std::clamp(bucket, 0, buckets_[axis] - 1);
 }
 
+std::size_t BrenierMap::bucket(int column, int row) const {
+  return static_cast<std::size_t>(row) * static_cast<std::size_t>(buckets_.x()) +
+         static_cast<std::size_t>(column);
+}
+
 std::vector<int> BrenierMap::around(const Eigen::Vector2d& p) const {
   const int column = bucket_of(p.x(), 0);
   const int row = bucket_of(p.y(), 1);
@@ -63,8 +67,8 @@ std::vector<int> BrenierMap::around(const Eigen::Vector2d& p) const {
   const int right = std::min(buckets_.x() - 1, column + kReach);
   std::vector<int> found;
   for (int r = std::max(0, row - kReach); r <= std::min(buckets_.y() - 1, row + kReach); ++r) {
-    const int first = begin_[static_cast<std::size_t>(r * buckets_.x() + left)];
-    const int last = begin_[static_cast<std::size_t>(r * buckets_.x() + right) + 1];
+    const int first = begin_[bucket(left, r)];
+    const int last = begin_[bucket(right, r) + 1];
     std::copy_if(members_.begin() + first, members_.begin() + last, std::back_inserter(found),
                  [&](int site) { return lit_[static_cast<std::size_t>(site)] != 0; });
   }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <optional>
 #include <vector>
 
@@ -34,6 +35,7 @@ class BrenierMap {
 
  private:
   [[nodiscard]] int bucket_of(double coordinate, Eigen::Index axis) const;
+  [[nodiscard]] std::size_t bucket(int column, int row) const;
   /// Sites in the buckets around p whose cells' centroids lie in light.
   [[nodiscard]] std::vector<int> around(const Eigen::Vector2d& p) const;
   /// The one of `sites` whose plane is the highest at p; −1 if there are none.

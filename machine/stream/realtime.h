@@ -14,6 +14,12 @@ inline constexpr char kFeedUp10 = '\x91';
 inline constexpr char kFeedDown10 = '\x92';
 inline constexpr char kFeedUp1 = '\x93';
 inline constexpr char kFeedDown1 = '\x94';
+inline constexpr char kRapidTo100 = '\x95';
+inline constexpr char kRapidTo50 = '\x96';
+inline constexpr char kRapidTo25 = '\x97';
+inline constexpr char kSpindleTo100 = '\x99';
+inline constexpr char kSpindleUp10 = '\x9A';
+inline constexpr char kSpindleDown10 = '\x9B';
 }  // namespace realtime
 
 }  // namespace lensforge

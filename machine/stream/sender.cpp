@@ -44,9 +44,26 @@ char realtime_byte(OperatorKey key) {
     case OperatorKey::kFeedDown:
       return realtime::kFeedDown10;
     case OperatorKey::kFeedNormal:
+      return realtime::kFeedTo100;
+    case OperatorKey::kRapidFull:
+      return realtime::kRapidTo100;
+    case OperatorKey::kRapidHalf:
+      return realtime::kRapidTo50;
+    case OperatorKey::kRapidQuarter:
+      return realtime::kRapidTo25;
+    case OperatorKey::kSpindleUp:
+      return realtime::kSpindleUp10;
+    case OperatorKey::kSpindleDown:
+      return realtime::kSpindleDown10;
+    case OperatorKey::kSpindleNormal:
       break;
   }
-  return realtime::kFeedTo100;
+  return realtime::kSpindleTo100;
+}
+
+bool of_spindle(OperatorKey key) {
+  return key == OperatorKey::kSpindleUp || key == OperatorKey::kSpindleDown ||
+         key == OperatorKey::kSpindleNormal;
 }
 
 }  // namespace
@@ -156,11 +173,16 @@ void Sender::command_spindle() {
 
 void Sender::obey_operator() {
   if (!control_->keys) return;
-  const std::optional<OperatorKey> key = control_->keys();
-  if (!key) return;
-  wire_.urgent(realtime_byte(*key));
-  if (*key == OperatorKey::kHold) held_by_operator_ = true;
-  if (*key == OperatorKey::kResume) held_by_operator_ = false;
+  while (const std::optional<OperatorKey> key = control_->keys()) obey(*key);
+}
+
+void Sender::obey(OperatorKey key) {
+  if (of_spindle(key) && guard_ != nullptr) {
+    return note("no override of the spindle: its speed is verified over Modbus");
+  }
+  wire_.urgent(realtime_byte(key));
+  if (key == OperatorKey::kHold) held_by_operator_ = true;
+  if (key == OperatorKey::kResume) held_by_operator_ = false;
 }
 
 double Sender::wait_time() const {
@@ -191,9 +213,7 @@ void Sender::watch_guard() {
   if (guard_ == nullptr || clock_.now() < guard_due_) return;
   guard_due_ = clock_.now() + kGuardInterval;
   guarded_ = guard_->poll();
-  for (const GuardRecord& record : guard_->take_records()) {
-    if (!record.text.empty()) note(record.text);
-  }
+  take_guard_records();
   guard_ready_ = guard_ready_ || guarded_.interlocks_ok;
   const bool may_be_unread = !guard_ready_ && clock_.now() - started_ <= options_.guard_timeout;
   if (!guarded_.interlocks_ok && !may_be_unread) {
@@ -206,6 +226,21 @@ void Sender::watch_guard() {
                                                " rpm read");
   }
   if (phase_ == Phase::kSpindle) verify_spindle();
+}
+
+/// Speeds come by the second: the journal has them in its progress already.
+void Sender::take_guard_records() {
+  for (const GuardRecord& record : guard_->take_records()) {
+    if (record.event == GuardEvent::kSpeed) {
+      const std::string rpm = std::to_string(static_cast<int>(record.rpm));
+      tell(SendEventKind::kReading, "the spindle turns at " + rpm + " rpm");
+    } else if (!record.text.empty()) {
+      note(record.text);
+    } else {
+      note(record.event == GuardEvent::kInterlock ? "all interlocks are as they should be"
+                                                  : "the trouble with the spindle is over");
+    }
+  }
 }
 
 }  // namespace lensforge

@@ -36,10 +36,31 @@ struct SenderOptions {
 };
 
 /// What an operator asks for while a job runs.
-enum class OperatorKey { kHold, kResume, kFeedUp, kFeedDown, kFeedNormal };
+enum class OperatorKey {
+  kHold,
+  kResume,
+  kFeedUp,    ///< By 10 % of the feed in the program.
+  kFeedDown,  ///< Likewise.
+  kFeedNormal,
+  kRapidFull,
+  kRapidHalf,
+  kRapidQuarter,
+  kSpindleUp,  ///< By 10 % of the speed in the program; not under a guard, which expects that one.
+  kSpindleDown,  ///< Likewise.
+  kSpindleNormal,
+};
+
+/// What a SendEvent is about.
+enum class SendEventKind {
+  kStatus,   ///< A status report came; no message.
+  kNote,     ///< Something happened that the operator should know.
+  kReading,  ///< A speed of the spindle, now and then while it stays and when it moves.
+  kStop,     ///< The stream is being stopped: the reason. The feed hold is on its way.
+};
 
 /// Where a job stands; told with every status report and with every message.
 struct SendEvent {
+  SendEventKind kind = SendEventKind::kStatus;
   StatusReport report;                      ///< The last one.
   std::optional<Eigen::Vector3d> position;  ///< Machine coordinates, mm.
   std::int64_t sent = 0;
@@ -118,6 +139,7 @@ class Sender {
   [[nodiscard]] bool drained() const;
   void hand_over();
   void obey_operator();
+  void obey(OperatorKey key);
   [[nodiscard]] double wait_time() const;
   void ask_status();
 
@@ -126,19 +148,22 @@ class Sender {
   void take_ok();
   void take_status(const StatusReport& report);
   void judge_state(const StatusReport& report);
+  void take_overrides(const StatusReport& report);
+  void go_on();
   void pass_barrier();
   void command_spindle();
   void watch_guard();
+  void take_guard_records();
   void verify_spindle();
   void watch_for_stall();
   void note(const std::string& text);
-  void tell(const std::string& message);
+  void tell(SendEventKind kind, const std::string& message);
   [[nodiscard]] JobProgress progress() const;
 
   // sender_end.cpp: how it ends.
   SendResult end(SendStatus status, StopCause cause, std::string reason);
   SendResult stop_for(StopCause cause, std::string reason);
-  void hold(StopCause cause);
+  void hold(StopCause cause, const std::string& reason);
   void wait_for_banner();
   void take_while_stopping(const Reply& reply);
 

@@ -20,7 +20,11 @@ constexpr double kReadWait = 0.05;    ///< Longest wait without a look at the se
 SendResult Sender::stop_for(StopCause cause, std::string reason) {
   wire_.discard();
   try {
-    if (cause != StopCause::kLinkLost) hold(cause);
+    if (cause != StopCause::kLinkLost) {
+      hold(cause, reason);
+    } else {
+      tell(SendEventKind::kStop, reason);
+    }
   } catch (const LinkLost& lost) {
     reason += "; then " + std::string(lost.what());
   }
@@ -28,13 +32,14 @@ SendResult Sender::stop_for(StopCause cause, std::string reason) {
   return end(asked ? SendStatus::kInterrupted : SendStatus::kFault, cause, std::move(reason));
 }
 
-void Sender::hold(StopCause cause) {
+void Sender::hold(StopCause cause, const std::string& reason) {
   const bool interrupted = cause == StopCause::kInterrupted;
   const auto reset_now = [&] { return interrupted && control_->reset.stop_requested(); };
   const double end = clock_.now() + options_.hold_timeout;
   double hold_due = clock_.now();
   double status_due = clock_.now();
   at_rest_ = false;
+  bool told = false;
   while (!at_rest_ && !reset_now() && clock_.now() < end) {
     const double now = clock_.now();
     if (now >= hold_due) {
@@ -46,6 +51,8 @@ void Sender::hold(StopCause cause) {
       status_due = now + kStatusPause;
     }
     wire_.flush();
+    if (!told) tell(SendEventKind::kStop, reason);
+    told = true;
     const double wait = std::min(kReadWait, std::max(status_due - now, 0.0));
     wire_.receive(wait, [this](const Reply& reply) { take_while_stopping(reply); });
   }

@@ -119,10 +119,7 @@ void Sender::take_status(const StatusReport& report) {
   const std::optional<Eigen::Vector3d> position = info_.machine_position(report);
   const bool moved = position && position_ && (*position - *position_).norm() > kMotion;
   if (moved || report.line != report_.line) progress_at_ = clock_.now();
-  const std::optional<Eigen::Vector3i> overrides =
-      report.overrides ? report.overrides : report_.overrides;
-  report_ = report;
-  report_.overrides = overrides;  // Told now and then only.
+  take_overrides(report);
   position_ = position;
   judge_state(report);
   tracker_.report(report, lensforge::at_rest(report), clock_.now());
@@ -137,15 +134,25 @@ void Sender::take_status(const StatusReport& report) {
   if (drained()) tracker_.all_done();
   if (guard_ == nullptr && phase_ == Phase::kSpindle) verify_spindle();
   if (journal_ != nullptr) journal_->progress(progress());
-  tell({});
+  tell(SendEventKind::kStatus, {});
+}
+
+/// Controllers tell overrides now and then only.
+void Sender::take_overrides(const StatusReport& report) {
+  const Eigen::Vector3i before = report_.overrides.value_or(Eigen::Vector3i::Constant(100));
+  report_ = report;
+  if (!report_.overrides) report_.overrides = before;
+  const Eigen::Vector3i& now = *report_.overrides;
+  if (now == before) return;
+  note("overrides: feed " + std::to_string(now.x()) + " %, rapids " + std::to_string(now.y()) +
+       " %, spindle " + std::to_string(now.z()) + " %");
 }
 
 void Sender::judge_state(const StatusReport& report) {
   switch (report.state) {
     case ReportedState::kIdle:
     case ReportedState::kRun:
-      held_ = false;
-      return;
+      return go_on();
     case ReportedState::kTool:
       if (phase_ == Phase::kAnswer && barrier_.tool_change) return;
       break;
@@ -173,6 +180,12 @@ void Sender::judge_state(const StatusReport& report) {
                     "the controller is in state " + std::string(state_name(report.state)));
 }
 
+void Sender::go_on() {
+  if (!held_) return;
+  held_ = false;
+  note("goes on after a hold of " + std::to_string(std::lround(clock_.now() - held_since_)) + " s");
+}
+
 void Sender::watch_for_stall() {
   const bool waits_for_somebody =
       held_ || (phase_ == Phase::kAnswer && (barrier_.pauses || barrier_.tool_change));
@@ -194,12 +207,13 @@ void Sender::watch_for_stall() {
 
 void Sender::note(const std::string& text) {
   if (journal_ != nullptr) journal_->note(tracker_.executed(), text);
-  tell(text);
+  tell(SendEventKind::kNote, text);
 }
 
-void Sender::tell(const std::string& message) {
+void Sender::tell(SendEventKind kind, const std::string& message) {
   if (!control_->watch) return;
   SendEvent event;
+  event.kind = kind;
   event.report = report_;
   event.position = position_;
   event.sent = tracker_.sent();
