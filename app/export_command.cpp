@@ -172,7 +172,8 @@ int export_command(const Arguments& command_line) {
   const Console console(options.common().json, options.common().quiet);
   const Source source = load(arguments);
   const OutputFolder folder(fs::absolute(arguments.out).parent_path());
-  Report report{.within_tolerance = true};
+  Report report;
+  report.within_tolerance = true;
   if (format == Format::kStep) {
     report = export_step(source.lens, source.name, arguments.out, arguments.step, options);
   } else if (is_height_map(format)) {

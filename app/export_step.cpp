@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "app/export_step.h"
+
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <ctime>
+
+#include "app/interrupt.h"
+#include "app/json_output.h"
+#include "app/progress_display.h"
+#include "core/error.h"
+#include "design/render_lens.h"
+#include "export/closed_solid.h"
+#include "machine/stream/job_identity.h"
+
+namespace lensforge::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::array kStepOptions{"--tolerance", "--normal-tolerance", "--max-points", "--schema",
+                                  "--author"};
+
+/// When the surface was made: the same lens then gives the same bytes at any time.
+std::string time_of(const fs::path& file) {
+  struct stat about {};
+  if (::stat(file.c_str(), &about) != 0) return {};
+  std::tm utc{};
+  ::gmtime_r(&about.st_mtime, &utc);
+  std::array<char, 32> text{};
+  return {text.data(), std::strftime(text.data(), text.size(), "%Y-%m-%dT%H:%M:%S", &utc)};
+}
+
+StepHeader header_of(const fs::path& source, const std::string& author) {
+  return {.name = "lensforge lens",
+          .description = "optical surface sha256:" + identify_job(source).sha256,
+          .author = author,
+          .program = "lensforge " + std::string(version()),
+          .time_stamp = time_of(source)};
+}
+
+std::string scientific(double value) {
+  std::array<char, 32> text{};
+  const int length = std::snprintf(text.data(), text.size(), "%.2g", value);
+  return {text.data(), static_cast<std::size_t>(length)};
+}
+
+nlohmann::json certificate(const SplineNet& net) {
+  nlohmann::json patches = nlohmann::json::array();
+  for (std::size_t i = 0; i < net.patches.size(); ++i) {
+    const SplinePatch& patch = net.patches[i];
+    patches.push_back({{"x", {patch.box.min().x(), patch.box.max().x()}},
+                       {"y", {patch.box.min().y(), patch.box.max().y()}},
+                       {"cells", patch.cells},
+                       {"height_error_mm", patch.error.height},
+                       {"normal_error_rad", patch.error.normal}});
+  }
+  return patches;
+}
+
+void describe_fit(const SplineNet& net, const FitOptions& fit, StepReport& report) {
+  const FitError error = net.error();
+  report.within_tolerance = holds(error, fit);
+  const auto good =
+      std::count_if(net.patches.begin(), net.patches.end(),
+                    [&](const SplinePatch& patch) { return holds(patch.error, fit); });
+  report.json["height_error_mm"] = error.height;
+  report.json["normal_error_rad"] = error.normal;
+  report.json["within_tolerance"] = report.within_tolerance;
+  report.json["patches_within_tolerance"] = good;
+  report.json["control_points"] = net.control_points();
+  report.json["patches"] = certificate(net);
+  report.text += "  fit       " + std::to_string(good) + " of " +
+                 std::to_string(net.patches.size()) + " patches within tolerance, " +
+                 std::to_string(net.control_points()) + " control points\n" + "  worst     " +
+                 scientific(error.height) + " mm (limit " + scientific(fit.tolerance) +
+                 "), normal " + scientific(error.normal) + " rad (limit " +
+                 scientific(fit.normal_tolerance) + ")\n";
+}
+
+void describe_solid(const StepContent& content, const Lens& lens, const std::string& name,
+                    StepReport& report) {
+  const double facets = enclosed_volume(closed_solid(lens.surface, name));
+  report.json["faces"] = content.faces;
+  report.json["volume_mm3"] = content.volume;
+  report.json["mesh_volume_mm3"] = facets;
+  report.text += "  solid     " + std::to_string(content.faces) + " faces, " +
+                 fixed(content.volume / 1000.0, 3) + " cm3 (facets: " + fixed(facets / 1000.0, 3) +
+                 "), read back valid and closed\n";
+}
+
+/// The picture of the splines, sampled twice as densely as the mesh.
+void describe_picture(const SplineNet& net, const Lens& lens, const Executor& executor,
+                      StepReport& report) {
+  const auto cells = static_cast<double>(lens.surface.triangle_count()) / 2.0;
+  const Eigen::Vector2d size(net.x.back() - net.x.front(), net.y.back() - net.y.front());
+  const Eigen::Vector2d count = 2.0 * size / std::sqrt(size.prod() / cells);
+  const GridShape shape{static_cast<int>(count.x()) + 2, static_cast<int>(count.y()) + 2};
+  const ImageMetrics metrics = evaluate(sampled(net, shape), lens.setup, SurfaceModel::kSmooth,
+                                        lens.target, nullptr, executor);
+  report.json["metrics"]["solid"] = metrics_json(metrics);
+  report.text += "  solid     " + metrics_text(metrics) + "\n";
+}
+
+}  // namespace
+
+void add_step_options(OptionSet& options, StepArguments& arguments) {
+  options.length("--tolerance", arguments.fit.tolerance, Limits::between(1e-6, 1.0),
+                 "step: farthest of the splines from the smooth surface");
+  options.number("--normal-tolerance", arguments.fit.normal_tolerance, Limits::between(1e-6, 0.1),
+                 "rad", "step: largest angle between the normals of both");
+  options.integer("--max-points", arguments.max_points, Limits::between(0, 10'000'000),
+                  "step: control points at most, about 70 bytes each; 0 takes four a vertex, "
+                  "600000 at most");
+  options.choice("--schema", arguments.schema,
+                 {{"ap214", StepSchema::kAp214}, {"ap242", StepSchema::kAp242}},
+                 "step: application protocol");
+  options.text("--author", arguments.author, "NAME", "step: author in the header");
+}
+
+void require_no_step_options(const OptionSet& options, const std::string& format) {
+  for (const char* name : kStepOptions) {
+    if (options.given(name)) {
+      throw InputError(std::string(name) + ": is for step, not for " + format);
+    }
+  }
+}
+
+StepReport export_step(const Lens& lens, const fs::path& source, const fs::path& out,
+                       const StepArguments& arguments, const OptionSet& options) {
+  const std::string name = source.string();
+  require_rectangle(lens.surface, height_field_outline(lens.surface, name), name);
+  const InterruptWatch interrupt;
+  ProgressDisplay progress(options.common().quiet);
+  const RunControl control(interrupt.token(), progress.sink());
+  FitOptions fit = arguments.fit;
+  fit.max_control_points = arguments.max_points;
+  const SplineNet net =
+      fit_spline_net(SmoothSurface(lens.surface), fit, options.executor(), control);
+  const StepContent content =
+      write_step(net, header_of(source, arguments.author), arguments.schema, out);
+  StepReport report;
+  describe_solid(content, lens, name, report);
+  describe_fit(net, fit, report);
+  describe_picture(net, lens, options.executor(), report);
+  return report;
+}
+
+}  // namespace lensforge::app

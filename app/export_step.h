@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "app/option_set.h"
+#include "core/lens.h"
+#include "export/spline_net.h"
+#include "export/step_file.h"
+
+namespace lensforge::app {
+
+/// The options that only a STEP file has.
+struct StepArguments {
+  FitOptions fit;
+  int max_points = 0;
+  StepSchema schema = StepSchema::kAp214;
+  std::string author;
+};
+
+void add_step_options(OptionSet& options, StepArguments& arguments);
+
+/// @throw InputError naming an option that was given though `format` has no use for it.
+void require_no_step_options(const OptionSet& options, const std::string& format);
+
+/// What was written: for programs, for people, and whether the tolerances hold.
+struct StepReport {
+  nlohmann::json json;
+  std::string text;
+  bool within_tolerance = false;
+};
+
+/// Fits and writes `lens.surface`. @param source  the file that it was read from.
+/// @throw InputError if its outline is no rectangle; RunError; Interrupted.
+StepReport export_step(const Lens& lens, const std::filesystem::path& source,
+                       const std::filesystem::path& out, const StepArguments& arguments,
+                       const OptionSet& options);
+
+}  // namespace lensforge::app

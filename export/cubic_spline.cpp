@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "export/cubic_spline.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace lensforge {
+namespace {
+
+constexpr int kDegree = 3;
+
+/// Knot i of the fourfold-ended knot vector over [0, cells].
+double knot(int i, int cells) { return std::clamp(i - kDegree, 0, cells); }
+
+int cell_of(double t, int cells) {
+  return std::clamp(static_cast<int>(std::floor(t)), 0, cells - 1);
+}
+
+/// The values of the functions of one degree that are not zero in a cell (Cox–de Boor).
+std::array<double, 4> functions(double t, int cell, int cells, int degree) {
+  std::array<double, 4> n{1.0};
+  const int span = cell + kDegree;
+  for (int p = 1; p <= degree; ++p) {
+    double saved = 0.0;
+    for (int r = 0; r < p; ++r) {
+      const double right = knot(span + r + 1, cells);
+      const double left = knot(span + r + 1 - p, cells);
+      const auto i = static_cast<std::size_t>(r);
+      const double share = n[i] / (right - left);
+      n[i] = saved + (right - t) * share;
+      saved = (t - left) * share;
+    }
+    n[static_cast<std::size_t>(p)] = saved;
+  }
+  return n;
+}
+
+/// Coefficient of the refined spline: the blossom of the piece over `cell` at three of its knots.
+double blossom(const Eigen::VectorXd& coefficients, int cell, const std::array<double, 3>& at) {
+  const auto cells = static_cast<int>(coefficients.size()) - kDegree;
+  std::array<double, 4> d{};
+  for (int j = 0; j < 4; ++j) d[static_cast<std::size_t>(j)] = coefficients[cell + j];
+  for (int r = 1; r <= kDegree; ++r) {
+    for (int j = kDegree; j >= r; --j) {
+      const double left = knot(cell + j, cells);
+      const double right = knot(cell + j + kDegree + 1 - r, cells);
+      const double share = (at[static_cast<std::size_t>(r - 1)] - left) / (right - left);
+      const auto i = static_cast<std::size_t>(j);
+      d[i] = (1.0 - share) * d[i - 1] + share * d[i];
+    }
+  }
+  return d[3];
+}
+
+}  // namespace
+
+CubicBasis cubic_basis(double t, int cells) {
+  CubicBasis basis;
+  basis.first = cell_of(t, cells);
+  basis.value = functions(t, basis.first, cells, kDegree);
+  const std::array<double, 4> lower = functions(t, basis.first, cells, kDegree - 1);
+  for (int j = 0; j < kDegree; ++j) {
+    const double width = knot(basis.first + j + 4, cells) - knot(basis.first + j + 1, cells);
+    const double slope = kDegree * lower[static_cast<std::size_t>(j)] / width;
+    basis.slope[static_cast<std::size_t>(j)] -= slope;
+    basis.slope[static_cast<std::size_t>(j) + 1] += slope;
+  }
+  return basis;
+}
+
+double greville_point(int i, int cells) {
+  return (knot(i + 1, cells) + knot(i + 2, cells) + knot(i + 3, cells)) / 3.0;
+}
+
+Eigen::SparseMatrix<double, Eigen::RowMajor> basis_matrix(const std::vector<double>& points,
+                                                          int cells, bool slopes) {
+  Eigen::SparseMatrix<double, Eigen::RowMajor> matrix(static_cast<Eigen::Index>(points.size()),
+                                                      cells + kDegree);
+  matrix.reserve(Eigen::VectorXi::Constant(matrix.rows(), 4));
+  for (std::size_t row = 0; row < points.size(); ++row) {
+    const CubicBasis basis = cubic_basis(points[row], cells);
+    for (int j = 0; j < 4; ++j) {
+      const auto i = static_cast<std::size_t>(j);
+      matrix.insert(static_cast<Eigen::Index>(row), basis.first + j) =
+          slopes ? basis.slope[i] : basis.value[i];
+    }
+  }
+  matrix.makeCompressed();
+  return matrix;
+}
+
+Eigen::VectorXd refined_spline(const Eigen::VectorXd& coefficients, int factor) {
+  const auto cells = static_cast<int>(coefficients.size()) - kDegree;
+  const int fine = cells * factor;
+  Eigen::VectorXd result(fine + kDegree);
+  for (int i = 0; i < result.size(); ++i) {
+    const std::array<double, 3> at{knot(i + 1, fine) / factor, knot(i + 2, fine) / factor,
+                                   knot(i + 3, fine) / factor};
+    result[i] = blossom(coefficients, cell_of(knot(i, fine) / factor, cells), at);
+  }
+  return result;
+}
+
+}  // namespace lensforge

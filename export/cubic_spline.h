@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/SparseCore>
+#include <array>
+#include <vector>
+
+/// Cubic B-splines over [0, cells] with a knot at every whole number, fourfold at both ends: cells
+/// + 3 coefficients; the ends' values are the first and last one.
+namespace lensforge {
+
+/// The four basis functions that are not zero at a point: numbers first … first + 3.
+struct CubicBasis {
+  int first = 0;
+  std::array<double, 4> value{};
+  std::array<double, 4> slope{};  ///< Derivatives by t.
+};
+
+/// @pre 0 ≤ t ≤ cells, cells ≥ 1.
+CubicBasis cubic_basis(double t, int cells);
+
+/// Where coefficient `i` sits: with it as coefficient the spline is t itself.
+double greville_point(int i, int cells);
+
+/// One row per point with the values (or slopes) of all cells + 3 basis functions.
+Eigen::SparseMatrix<double, Eigen::RowMajor> basis_matrix(const std::vector<double>& points,
+                                                          int cells, bool slopes);
+
+/// The same spline with every cell cut into `factor` cells (Oslo algorithm); its coefficients
+/// belong to [0, factor·cells].
+Eigen::VectorXd refined_spline(const Eigen::VectorXd& coefficients, int factor);
+
+}  // namespace lensforge

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <vector>
+
+#include "core/executor.h"
+#include "core/run_control.h"
+#include "export/smooth_surface.h"
+
+namespace lensforge {
+
+/// Largest distances between a fit and the smooth surface.
+struct FitError {
+  double height = 0.0;  ///< mm, along z
+  double normal = 0.0;  ///< rad, angle between the normals
+};
+
+/// A bicubic B-spline height field over a rectangle: `cells` × `cells` knot cells, twice
+/// continuously differentiable inside. x and y are linear in the parameters.
+struct SplinePatch {
+  Eigen::AlignedBox2d box;
+  int cells = 0;
+  Eigen::MatrixXd
+      heights;     ///< (cells + 3) × (cells + 3) coefficients in mm; row index runs along x.
+  FitError error;  ///< Largest on a raster ten times as dense as the knots.
+
+  /// @pre xy lies in the box.
+  [[nodiscard]] SurfacePoint at(const Eigen::Vector2d& xy) const;
+  /// Volume between the patch and z = 0, mm³; exact.
+  [[nodiscard]] double volume() const;
+};
+
+/// The heights along a line between two patches, or along the rim: a cubic B-spline that both
+/// patches contain.
+struct SplineEdge {
+  int cells = 0;
+  Eigen::VectorXd heights;  ///< cells + 3 coefficients, mm
+};
+
+/// A rectangle tiled with spline patches that join with equal heights and slopes.
+struct SplineNet {
+  int columns = 0;
+  int rows = 0;
+  std::vector<double> x;             ///< columns + 1 lines, mm
+  std::vector<double> y;             ///< rows + 1 lines, mm
+  std::vector<SplinePatch> patches;  ///< Patch (column, row) is row·columns + column.
+  std::vector<SplineEdge> edges_x;   ///< Along x: (column, line) is line·columns + column.
+  std::vector<SplineEdge> edges_y;   ///< Along y: (line, row) is row·(columns + 1) + line.
+
+  [[nodiscard]] FitError error() const;
+  [[nodiscard]] double volume() const;
+  [[nodiscard]] std::int64_t control_points() const;
+  /// @pre xy lies in the rectangle.
+  [[nodiscard]] SurfacePoint at(const Eigen::Vector2d& xy) const;
+};
+
+struct FitOptions {
+  double tolerance = 1e-4;         ///< mm, > 0; on SplinePatch::error.height
+  double normal_tolerance = 1e-4;  ///< rad, > 0; on SplinePatch::error.normal
+  /// Control points of all patches together at most; what bounds the file's size (about 70 bytes
+  /// each). Patches that fail are refined until it is used up. 0: four for each vertex of the mesh,
+  /// kMostControlPoints at most.
+  std::int64_t max_control_points = 0;
+};
+
+[[nodiscard]] bool holds(const FitError& error, const FitOptions& options);
+
+/// Fits a net of spline patches to a smooth surface over its rectangle by least squares. A patch
+/// whose error is beyond a tolerance gets twice the knots each way, until all hold, a patch has
+/// kMostCells, or the control points are used up; net.error() says which tolerances hold.
+/// @pre the surface covers its whole box. @throw Interrupted.
+SplineNet fit_spline_net(const SmoothSurface& surface, const FitOptions& options,
+                         const Executor& executor, const RunControl& control);
+
+/// Largest difference between a patch and the surface on a raster of `density` points a knot cell
+/// each way, borders included.
+FitError measure_patch(const SplinePatch& patch, const SmoothSurface& surface, int density);
+
+/// The net's surface as a regular grid of columns × rows vertices.
+SurfaceMesh sampled(const SplineNet& net, const GridShape& shape);
+
+/// Knot cells of a patch each way, at least and at most.
+inline constexpr int kFewestCells = 4;
+inline constexpr int kMostCells = 256;
+
+/// What fits a STEP file of 45 MB.
+inline constexpr std::int64_t kMostControlPoints = 600'000;
+
+/// Raster of the certificate, points a knot cell each way.
+inline constexpr int kCertificateDensity = 10;
+
+}  // namespace lensforge

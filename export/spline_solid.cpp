@@ -1,0 +1,262 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "export/spline_solid.h"
+
+#include <BRepBuilderAPI_MakeEdge.hxx>
+#include <BRepBuilderAPI_MakeFace.hxx>
+#include <BRep_Builder.hxx>
+#include <Geom2d_Line.hxx>
+#include <Geom_BSplineCurve.hxx>
+#include <Geom_BSplineSurface.hxx>
+#include <Precision.hxx>
+#include <TopoDS_Edge.hxx>
+#include <TopoDS_Shell.hxx>
+#include <TopoDS_Vertex.hxx>
+#include <TopoDS_Wire.hxx>
+#include <array>
+#include <cmath>
+#include <gp_Pln.hxx>
+
+#include "export/cubic_spline.h"
+
+// Curves and surfaces are parametrised by x and y themselves, so that a patch's edges are straight
+// lines in its parameter plane with the same parameter as in space.
+namespace lensforge {
+namespace {
+
+constexpr int kDegree = 3;
+
+/// x and y of control points are whole multiples of this (mm), which keeps files short: it turns
+/// normals by less than 1e-6 rad at the finest knots that occur (0.02 mm).
+constexpr double kPositionStep = 1e-7;
+
+double control_position(double from, double to, int i, int cells) {
+  const double at = from + (to - from) * greville_point(i, cells) / cells;
+  return std::round(at / kPositionStep) * kPositionStep;
+}
+
+TColStd_Array1OfReal knots(double from, double to, int cells) {
+  TColStd_Array1OfReal result(1, cells + 1);
+  for (int i = 0; i <= cells; ++i) result(i + 1) = from + (to - from) * i / cells;
+  return result;
+}
+
+TColStd_Array1OfInteger multiplicities(int cells) {
+  TColStd_Array1OfInteger result(1, cells + 1);
+  result.Init(1);
+  result(1) = kDegree + 1;
+  result(cells + 1) = kDegree + 1;
+  return result;
+}
+
+Handle(Geom_BSplineSurface) surface_of(const SplinePatch& patch) {
+  const int n = patch.cells;
+  const Eigen::Vector2d low = patch.box.min();
+  const Eigen::Vector2d high = patch.box.max();
+  TColgp_Array2OfPnt poles(1, n + kDegree, 1, n + kDegree);
+  for (int i = 0; i < n + kDegree; ++i) {
+    for (int j = 0; j < n + kDegree; ++j) {
+      poles(i + 1, j + 1) = gp_Pnt(control_position(low.x(), high.x(), i, n),
+                                   control_position(low.y(), high.y(), j, n), patch.heights(i, j));
+    }
+  }
+  return new Geom_BSplineSurface(poles, knots(low.x(), high.x(), n), knots(low.y(), high.y(), n),
+                                 multiplicities(n), multiplicities(n), kDegree, kDegree);
+}
+
+/// The curve above a line of the net; axis 0 runs along x, 1 along y.
+Handle(Geom_BSplineCurve)
+    curve_of(const SplineEdge& edge, int axis, double from, double to, double line) {
+  TColgp_Array1OfPnt poles(1, edge.cells + kDegree);
+  for (int i = 0; i < edge.cells + kDegree; ++i) {
+    const double along = control_position(from, to, i, edge.cells);
+    poles(i + 1) =
+        axis == 0 ? gp_Pnt(along, line, edge.heights[i]) : gp_Pnt(line, along, edge.heights[i]);
+  }
+  return new Geom_BSplineCurve(poles, knots(from, to, edge.cells), multiplicities(edge.cells),
+                               kDegree);
+}
+
+/// Builds vertices first, then edges, then faces, so that all are shared.
+class SolidBuilder {
+ public:
+  explicit SolidBuilder(const SplineNet& net) : net_(net) {
+    make_vertices();
+    make_edges();
+  }
+
+  NamedSolid build() {
+    builder_.MakeShell(shell_);
+    for (int row = 0; row < net_.rows; ++row) {
+      for (int column = 0; column < net_.columns; ++column) add_patch(column, row);
+    }
+    for (int side = 0; side < 4; ++side) add_wall(side);
+    add_back();
+    shell_.Closed(true);
+    builder_.MakeSolid(result_.solid);
+    builder_.Add(result_.solid, shell_);
+    return result_;
+  }
+
+ private:
+  using Edges = std::vector<TopoDS_Shape>;
+
+  [[nodiscard]] double x(int line) const { return net_.x[static_cast<std::size_t>(line)]; }
+  [[nodiscard]] double y(int line) const { return net_.y[static_cast<std::size_t>(line)]; }
+  [[nodiscard]] TopoDS_Vertex& vertex(int column, int row) {
+    return vertices_[static_cast<std::size_t>(row * (net_.columns + 1) + column)];
+  }
+  [[nodiscard]] TopoDS_Edge& edge_x(int column, int line) {
+    return edges_x_[static_cast<std::size_t>(line * net_.columns + column)];
+  }
+  [[nodiscard]] TopoDS_Edge& edge_y(int line, int row) {
+    return edges_y_[static_cast<std::size_t>(row * (net_.columns + 1) + line)];
+  }
+
+  TopoDS_Vertex make_vertex(const gp_Pnt& at) {
+    TopoDS_Vertex vertex;
+    builder_.MakeVertex(vertex, at, Precision::Confusion());
+    return vertex;
+  }
+
+  void make_vertices() {
+    for (int row = 0; row <= net_.rows; ++row) {
+      for (int column = 0; column <= net_.columns; ++column) {
+        const Eigen::Vector2d xy(x(column), y(row));
+        vertices_.push_back(make_vertex(gp_Pnt(xy.x(), xy.y(), corner_height(column, row))));
+      }
+    }
+    for (int side = 0; side < 4; ++side) {
+      back_vertices_[static_cast<std::size_t>(side)] =
+          make_vertex(gp_Pnt(x(corner_column(side)), y(corner_row(side)), 0.0));
+    }
+  }
+
+  [[nodiscard]] double corner_height(int column, int row) const {
+    const bool last = column == net_.columns;
+    const auto& edge =
+        net_.edges_x[static_cast<std::size_t>(row * net_.columns + (last ? column - 1 : column))];
+    return last ? edge.heights[edge.heights.size() - 1] : edge.heights[0];
+  }
+
+  /// The rectangle's corners counter-clockwise from (0, 0).
+  [[nodiscard]] int corner_column(int side) const {
+    return side % 4 == 1 || side % 4 == 2 ? net_.columns : 0;
+  }
+  [[nodiscard]] int corner_row(int side) const { return side % 4 >= 2 ? net_.rows : 0; }
+
+  TopoDS_Edge make_edge(const Handle(Geom_BSplineCurve) & curve, const TopoDS_Vertex& from,
+                        const TopoDS_Vertex& to) {
+    TopoDS_Edge edge;
+    builder_.MakeEdge(edge, curve, Precision::Confusion());
+    builder_.Add(edge, from.Oriented(TopAbs_FORWARD));
+    builder_.Add(edge, to.Oriented(TopAbs_REVERSED));
+    builder_.Range(edge, curve->FirstParameter(), curve->LastParameter());
+    return edge;
+  }
+
+  void make_edges() {
+    for (int line = 0; line <= net_.rows; ++line) {
+      for (int c = 0; c < net_.columns; ++c) {
+        const SplineEdge& spline = net_.edges_x[edges_x_.size()];
+        edges_x_.push_back(make_edge(curve_of(spline, 0, x(c), x(c + 1), y(line)), vertex(c, line),
+                                     vertex(c + 1, line)));
+      }
+    }
+    for (int r = 0; r < net_.rows; ++r) {
+      for (int line = 0; line <= net_.columns; ++line) {
+        const SplineEdge& spline = net_.edges_y[edges_y_.size()];
+        edges_y_.push_back(make_edge(curve_of(spline, 1, y(r), y(r + 1), x(line)), vertex(line, r),
+                                     vertex(line, r + 1)));
+      }
+    }
+    for (int side = 0; side < 4; ++side) {
+      const auto i = static_cast<std::size_t>(side);
+      const TopoDS_Vertex& top = vertex(corner_column(side), corner_row(side));
+      uprights_[i] = BRepBuilderAPI_MakeEdge(back_vertices_[i], top).Edge();
+      back_edges_[i] =
+          BRepBuilderAPI_MakeEdge(back_vertices_[i], back_vertices_[(i + 1) % 4]).Edge();
+    }
+  }
+
+  void add_pcurve(const TopoDS_Edge& edge, int axis, double line, const TopoDS_Face& face) {
+    const Handle(Geom2d_Line) pcurve =
+        axis == 0 ? new Geom2d_Line(gp_Pnt2d(0.0, line), gp_Dir2d(1.0, 0.0))
+                  : new Geom2d_Line(gp_Pnt2d(line, 0.0), gp_Dir2d(0.0, 1.0));
+    builder_.UpdateEdge(edge, pcurve, face, Precision::Confusion());
+  }
+
+  TopoDS_Wire make_wire(const Edges& edges) {
+    TopoDS_Wire wire;
+    builder_.MakeWire(wire);
+    for (const TopoDS_Shape& edge : edges) builder_.Add(wire, edge);
+    wire.Closed(true);
+    return wire;
+  }
+
+  void add_face(const TopoDS_Face& face, const char* name) {
+    builder_.Add(shell_, face);
+    result_.names.emplace_back(face, name);
+  }
+
+  void add_patch(int c, int r) {
+    TopoDS_Face face;
+    const SplinePatch& patch = net_.patches[static_cast<std::size_t>(r * net_.columns + c)];
+    builder_.MakeFace(face, surface_of(patch), Precision::Confusion());
+    add_pcurve(edge_x(c, r), 0, y(r), face);
+    add_pcurve(edge_x(c, r + 1), 0, y(r + 1), face);
+    add_pcurve(edge_y(c, r), 1, x(c), face);
+    add_pcurve(edge_y(c + 1, r), 1, x(c + 1), face);
+    builder_.Add(face, make_wire({edge_x(c, r), edge_y(c + 1, r), edge_x(c, r + 1).Reversed(),
+                                  edge_y(c, r).Reversed()}));
+    add_face(face, "optical surface");
+  }
+
+  /// The top edges of a side in the order of a walk around the wall, which is against the rim.
+  Edges rim_of(int side) {
+    Edges edges;
+    for (int i = 0; i < (side % 2 == 0 ? net_.columns : net_.rows); ++i) {
+      if (side == 0) edges.push_back(edge_x(net_.columns - 1 - i, 0).Reversed());
+      if (side == 1) edges.push_back(edge_y(net_.columns, net_.rows - 1 - i).Reversed());
+      if (side == 2) edges.push_back(edge_x(i, net_.rows));
+      if (side == 3) edges.push_back(edge_y(0, i));
+    }
+    return edges;
+  }
+
+  void add_wall(int side) {
+    const auto i = static_cast<std::size_t>(side);
+    Edges edges{back_edges_[i], uprights_[(i + 1) % 4]};
+    const Edges rim = rim_of(side);
+    edges.insert(edges.end(), rim.begin(), rim.end());
+    edges.push_back(uprights_[i].Reversed());
+    static constexpr std::array<std::array<double, 2>, 4> kOutwards{
+        {{0.0, -1.0}, {1.0, 0.0}, {0.0, 1.0}, {-1.0, 0.0}}};
+    const gp_Dir outwards(kOutwards[i][0], kOutwards[i][1], 0.0);
+    const gp_Pnt at(x(corner_column(side)), y(corner_row(side)), 0.0);
+    add_face(BRepBuilderAPI_MakeFace(gp_Pln(at, outwards), make_wire(edges)).Face(), "side wall");
+  }
+
+  void add_back() {
+    Edges edges;
+    for (std::size_t i = 4; i-- > 0;) edges.push_back(back_edges_[i].Reversed());
+    const gp_Pln plane(gp_Pnt(x(0), y(0), 0.0), gp_Dir(0.0, 0.0, -1.0));
+    add_face(BRepBuilderAPI_MakeFace(plane, make_wire(edges)).Face(), "back");
+  }
+
+  const SplineNet& net_;
+  BRep_Builder builder_;
+  TopoDS_Shell shell_;
+  NamedSolid result_;
+  std::vector<TopoDS_Vertex> vertices_;
+  std::vector<TopoDS_Edge> edges_x_;
+  std::vector<TopoDS_Edge> edges_y_;
+  std::array<TopoDS_Vertex, 4> back_vertices_;
+  std::array<TopoDS_Edge, 4> back_edges_;
+  std::array<TopoDS_Edge, 4> uprights_;
+};
+
+}  // namespace
+
+NamedSolid make_spline_solid(const SplineNet& net) { return SolidBuilder(net).build(); }
+
+}  // namespace lensforge

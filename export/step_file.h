@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "export/spline_net.h"
+
+namespace lensforge {
+
+/// Application protocol of a STEP file.
+enum class StepSchema { kAp214, kAp242 };
+
+/// What the header section says; ASCII.
+struct StepHeader {
+  std::string name;         ///< Of the part.
+  std::string description;  ///< One line: what it was made from.
+  std::string author;
+  std::string program;
+  std::string time_stamp;  ///< ISO 8601; the same input then gives the same bytes.
+};
+
+/// What a STEP file holds, as OpenCASCADE sees it.
+struct StepContent {
+  int solids = 0;
+  int faces = 0;
+  bool valid = false;   ///< BRepCheck_Analyzer finds nothing.
+  bool closed = false;  ///< Every edge has a face on both sides.
+  double volume = 0.0;  ///< mm³
+
+  [[nodiscard]] bool is_one_solid() const { return solids == 1 && valid && closed; }
+};
+
+/// Writes the solid between a spline net and the plane z = 0 as STEP in millimetres: the patches
+/// are faces named "optical surface", the four walls "side wall", the flat one "back". The file is
+/// read back before it appears under its name: one solid, valid, closed, the net's volume to 1e-6.
+/// @pre the net lies above z = 0. @throw RunError if it cannot be written or does not read back so.
+StepContent write_step(const SplineNet& net, const StepHeader& header, StepSchema schema,
+                       const std::filesystem::path& path);
+
+/// @throw InputError if the file cannot be read or holds no shape.
+StepContent inspect_step(const std::filesystem::path& path);
+
+}  // namespace lensforge
