@@ -26,21 +26,22 @@ constexpr double kLeastShrinkage = 0.01;
 constexpr int kMostSmoothing = 8;
 
 /// Wanted density of vertices on the lens, drawn on a grid of setup.pixels.
-Image vertex_density(const Eigen::VectorXd& image_area, double share, const OpticalSetup& setup,
-                     const Executor& executor, const SurfaceMesh& mesh) {
+Image vertex_density(const ServedAreas& served, double share, const OpticalSetup& setup,
+                     const Executor& executor) {
+  const double all = served.areas.sum();
   const Eigen::Vector2d scale = setup.pixels.cast<double>().cwiseQuotient(setup.lens_size);
   const double lens_pixels = setup.pixels.cast<double>().prod();
   const auto triangle = [&](std::int64_t f) {
     const auto corner = [&](int k) -> Eigen::Vector2d {
-      return mesh.vertices.col(mesh.triangles(k, f)).head<2>().cwiseProduct(scale);
+      return served.mesh.corner(f, k).head<2>().cwiseProduct(scale);
     };
     ImageTriangle t{.p0 = corner(0), .p1 = corner(1), .p2 = corner(2), .flux = 0.0};
     const double even = 0.5 * doubled_area(t.p0, t.p1, t.p2) / lens_pixels;
-    t.flux = (1.0 - share) * even + share * image_area[f];
+    t.flux = (1.0 - share) * even + share * served.areas[f] / all;
     return t;
   };
   FluxImage flux(setup.pixels.x(), setup.pixels.y());
-  const auto values = flux.render(executor, mesh.triangles.cols(), triangle);
+  const auto values = flux.render(executor, served.mesh.triangle_count(), triangle);
   Image density(setup.pixels.x(), setup.pixels.y());
   std::transform(values.begin(), values.end(), density.values().begin(), [&](double v) {
     return static_cast<float>(std::min(v * lens_pixels, kMostDense));
@@ -104,9 +105,9 @@ bool in_order(const SurfaceMesh& moved, const SurfaceMesh& before) {
 
 }  // namespace
 
-bool spread_vertices(const Eigen::VectorXd& image_area, double share, const OpticalSetup& setup,
+bool spread_vertices(const ServedAreas& served, double share, const OpticalSetup& setup,
                      const Executor& executor, const RunControl& control, SurfaceMesh& mesh) {
-  Image density = vertex_density(image_area, share, setup, executor, mesh);
+  Image density = vertex_density(served, share, setup, executor);
   MongeAmpereOptions options;
   options.floor = 0.0;  // The even share is floor enough.
   for (int pass = 0; pass <= kMostSmoothing; ++pass) {

@@ -10,6 +10,12 @@
 
 namespace lensforge {
 
+/// What part of the image rectangle the light of every face of a mesh serves.
+struct ServedAreas {
+  const SurfaceMesh& mesh;
+  const Eigen::VectorXd& areas;  ///< F values, in any unit.
+};
+
 /// Moves the vertices of an even grid mesh so that they follow the picture, not the lens. Light of
 /// uniform density leaves hardly any lens area to the dark parts of a picture: a dark pixel gets a
 /// fraction of one facet of an even mesh, and shows as dots (facet model) or as the streak of a
@@ -20,10 +26,10 @@ namespace lensforge {
 /// brought about by a transport map from the even grid (solve_monge_ampere()). Every triangle keeps
 /// its orientation: where the density jumps so that some would not, it is smoothed first; if that
 /// is of no use, the mesh stays.
-/// @param image_area  what part of the image rectangle every face serves, F values of sum 1.
+/// @param served  of an even mesh over the same lens, which may be another and coarser one.
 /// @param share  0 … 0.95.
 /// @return false if the caller asked to stop; the mesh is then unchanged.
-bool spread_vertices(const Eigen::VectorXd& image_area, double share, const OpticalSetup& setup,
+bool spread_vertices(const ServedAreas& served, double share, const OpticalSetup& setup,
                      const Executor& executor, const RunControl& control, SurfaceMesh& mesh);
 
 }  // namespace lensforge

@@ -40,7 +40,7 @@ double dark_spot(double x, double y) { return std::hypot(x - 0.4, y - 0.55) < 0.
 
 SurfaceMesh spread(const std::function<double(double, double)>& density, double share) {
   SurfaceMesh mesh = make_grid_mesh(kSize, kShape, 5.0);
-  EXPECT_TRUE(spread_vertices(image_area(mesh, density), share, kSetup, Executor::serial(),
+  EXPECT_TRUE(spread_vertices({mesh, image_area(mesh, density)}, share, kSetup, Executor::serial(),
                               RunControl(), mesh));
   return mesh;
 }
@@ -153,8 +153,8 @@ TEST(VertexSpread, LeavesTheMeshAloneWhenAskedToStop) {
   SurfaceMesh mesh = flat;
   std::stop_source stop;
   stop.request_stop();
-  EXPECT_FALSE(spread_vertices(image_area(mesh, falling_ramp), 0.5, kSetup, Executor::serial(),
-                               RunControl(stop.get_token(), {}), mesh));
+  EXPECT_FALSE(spread_vertices({mesh, image_area(mesh, falling_ramp)}, 0.5, kSetup,
+                               Executor::serial(), RunControl(stop.get_token(), {}), mesh));
   EXPECT_EQ(mesh.vertices, flat.vertices);
 }
 
@@ -162,8 +162,8 @@ TEST(VertexSpread, ThreadCountDoesNotChangeABit) {
   const SurfaceMesh serial = spread(dark_spot, 0.5);
   for (const int threads : {1, 2}) {
     SurfaceMesh mesh = make_grid_mesh(kSize, kShape, 5.0);
-    spread_vertices(image_area(mesh, dark_spot), 0.5, kSetup, Executor::cpu(threads), RunControl(),
-                    mesh);
+    spread_vertices({mesh, image_area(mesh, dark_spot)}, 0.5, kSetup, Executor::cpu(threads),
+                    RunControl(), mesh);
     EXPECT_EQ(mesh.vertices, serial.vertices);
   }
 }
