@@ -22,8 +22,7 @@ constexpr int kCommand = 0;
 constexpr int kFrequency = 1;
 constexpr int kFault = 8;
 constexpr int kOutput = 11;
-constexpr double kRamp = 150000.0;  // rpm/s
-constexpr int kWaitMs = 5;          // a server looks this often whether it is to end
+constexpr int kWaitMs = 5;  // a server looks this often whether it is to end
 
 double now() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
@@ -166,11 +165,12 @@ void DriveServer::advance() {
   const double time = now();
   const std::uint16_t* registers = mapping_of(mapping_)->tab_registers;
   const double asked = registers[kFrequency] * 6.0;
+  told_to_turn_ = registers[kCommand] == 0x12 || registers[kCommand] == 0x22;
   double target = 0.0;
   if (registers[kCommand] == 0x12) target = asked;
   if (registers[kCommand] == 0x22) target = -asked;
   if (manner_ == Manner::kLies || fault_ != 0) target = 0.0;
-  const double most = kRamp * (time - moved_at_);
+  const double most = ramp_ * (time - moved_at_);
   rpm_ = rpm_ + std::clamp(target - rpm_, -most, most);
   moved_at_ = time;
 }

@@ -39,6 +39,10 @@ class DriveServer {
   void set_manner(Manner manner) { manner_ = manner; }
   void set_fault(std::uint16_t code) { fault_ = code; }
   void set_door(bool closed) { door_closed_ = closed; }
+  /// How fast the shaft changes its speed, rpm/s.
+  void set_ramp(double ramp) { ramp_ = ramp; }
+  /// Whether the last command was to turn.
+  [[nodiscard]] bool told_to_turn() const { return told_to_turn_; }
   /// What the shaft does, rpm; negative: counter-clockwise.
   [[nodiscard]] double rpm() const { return rpm_; }
   [[nodiscard]] int requests() const { return requests_; }
@@ -57,6 +61,8 @@ class DriveServer {
   std::atomic<Manner> manner_ = Manner::kHonest;
   std::atomic<std::uint16_t> fault_ = 0;
   std::atomic<bool> door_closed_ = true;
+  std::atomic<double> ramp_ = 150000.0;
+  std::atomic<bool> told_to_turn_ = false;
   std::atomic<double> rpm_ = 0.0;
   std::atomic<int> requests_ = 0;
   void* mapping_ = nullptr;  ///< modbus_mapping_t, of the thread alone.

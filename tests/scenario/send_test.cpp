@@ -1,32 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <csignal>
-#include <mutex>
 #include <set>
-#include <sstream>
 #include <thread>
 
-#include "machine/sim/pty_controller.h"
 #include "machine/stream/journal.h"
 #include "scenario/driver.h"
+#include "scenario/mill.h"
 
 namespace lensforge::scenario {
 namespace {
 
 using ::testing::HasSubstr;
-
-/// A zig-zag of about a minute.
-std::string zig_zag(int rows) {
-  std::ostringstream text;
-  text << "G21 G90 G17 G94\nG54\nG0 Z-30\nS12000 M3\nG0 X-200 Y-150\nG1 Z-32 F300\nF600\n";
-  for (int row = 0; row < rows; ++row) {
-    for (int i = 1; i <= 20; ++i) {
-      text << "G1 X" << -200.0 + 0.5 * (row % 2 == 0 ? i : 20 - i) << "\n";
-    }
-    text << "G1 Y" << -150.0 + 0.2 * (row + 1) << "\n";
-  }
-  text << "G0 Z-20\nM5\nM2\n";
-  return text.str();
-}
 
 class Send : public Scenario {
  protected:
@@ -80,41 +64,6 @@ TEST_F(Send, RefusesPortsAndOptionsThatAreNone) {
   expect_refusal(run(send({"--port", "sim:", "--spindle", "h100"})), 2, {"--spindle"});
   expect_refusal(run(send({"--port", "/dev/null", "--spindle", "huanyang"})), 2, {"Modbus"});
 }
-
-/// A mill behind a pseudo-terminal, some times as fast as a real one.
-class Mill {
- public:
-  explicit Mill(double speed = 20.0) : controller_(simulated_grbl(), speed, watch()) {}
-  [[nodiscard]] const std::string& path() const { return controller_.path(); }
-  [[nodiscard]] std::vector<ExecutedPiece> pieces() {
-    const std::lock_guard lock(mutex_);
-    return pieces_;
-  }
-  /// Waits until so many pieces were cut.
-  bool cut(std::size_t count) {
-    for (int i = 0; i < 3000; ++i) {
-      std::size_t cuts = 0;
-      for (const ExecutedPiece& piece : pieces()) cuts += piece.rapid ? 0 : 1;
-      if (cuts >= count) return true;
-      std::this_thread::sleep_for(std::chrono::milliseconds(5));
-    }
-    return false;
-  }
-
- private:
-  MachineWatch watch() {
-    MachineWatch watch;
-    watch.piece = [this](const ExecutedPiece& piece) {
-      const std::lock_guard lock(mutex_);
-      pieces_.push_back(piece);
-    };
-    return watch;
-  }
-
-  std::mutex mutex_;
-  std::vector<ExecutedPiece> pieces_;
-  PtyController controller_;
-};
 
 /// Every numbered line of the zig-zag was cut to its end.
 void expect_whole(Mill& mill, int rows) {
