@@ -28,7 +28,7 @@ constexpr std::array kSubcommands{
                "lens or any mesh to picture and metrics"},
     Subcommand{"cam", cam_command, "cam DIR", "lens folder to G-code (into DIR/cam/)"},
     Subcommand{"export", export_command, "export DIR --out FILE",
-               "lens folder to .stl, .obj, .ply, .3mf, height map"},
+               "lens folder to .step, .stl, .obj, .ply, .3mf, height map"},
     Subcommand{"send", send_command, "send FILE.ngc --port PORT", "G-code to a controller"},
     Subcommand{"info", info_command, "info DIR|FILE", "what it is, in one screen"},
 };

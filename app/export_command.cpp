@@ -159,6 +159,21 @@ void compare_pictures(const Lens& lens, const Executor& executor, Report& report
   }
 }
 
+Report write(const Source& source, const ExportArguments& arguments, Format format,
+             const OptionSet& options) {
+  if (format == Format::kStep) {
+    return export_step(source.lens, source.name, arguments.out, arguments.step, options);
+  }
+  Report report;
+  report.within_tolerance = true;
+  if (is_height_map(format)) {
+    write_height_map(source, arguments, format, options.executor(), report);
+  } else {
+    write_solid(source, format, arguments.out, report);
+  }
+  return report;
+}
+
 }  // namespace
 
 int export_command(const Arguments& command_line) {
@@ -172,15 +187,7 @@ int export_command(const Arguments& command_line) {
   const Console console(options.common().json, options.common().quiet);
   const Source source = load(arguments);
   const OutputFolder folder(fs::absolute(arguments.out).parent_path());
-  Report report;
-  report.within_tolerance = true;
-  if (format == Format::kStep) {
-    report = export_step(source.lens, source.name, arguments.out, arguments.step, options);
-  } else if (is_height_map(format)) {
-    write_height_map(source, arguments, format, options.executor(), report);
-  } else {
-    write_solid(source, format, arguments.out, report);
-  }
+  Report report = write(source, arguments, format, options);
   compare_pictures(source.lens, options.executor(), report);
   report.json["command"] = "export";
   report.json["out"] = arguments.out;

@@ -280,7 +280,10 @@ class NetFitter {
   }
 
   void certify(int i) {
-    patch(i).error = measure_patch(patch(i), surface_, kCertificateDensity);
+    const double mesh_cells = kMeshCellsPerPatch / patch(i).cells;
+    const double density = kCertificateDensity * std::max(1.0, mesh_cells);
+    const FitError found = measure_patch(patch(i), surface_, static_cast<int>(std::ceil(density)));
+    patch(i).error = {kCertificateMargin * found.height, kCertificateMargin * found.normal};
     certified_[static_cast<std::size_t>(i)] = 1;
   }
 

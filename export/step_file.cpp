@@ -11,6 +11,7 @@
 #include <Message_Messenger.hxx>
 #include <Message_PrinterOStream.hxx>
 #include <STEPConstruct.hxx>
+#include <STEPControl_Controller.hxx>
 #include <STEPControl_Reader.hxx>
 #include <STEPControl_Writer.hxx>
 #include <Standard_Failure.hxx>
@@ -34,6 +35,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
+/// Share by which OpenCASCADE's volume of the file may differ from the splines' own integral.
+constexpr double kVolumeShare = 1e-6;
+
 [[noreturn]] void fail_to_write(const fs::path& path, const std::string& why) {
   throw RunError(path.string() + ": cannot be written: " + why);
 }
@@ -49,6 +53,7 @@ Handle(TCollection_HAsciiString) text(const std::string& value) {
 
 /// OpenCASCADE keeps what a file is to look like in process-wide settings.
 void set_up_writing(const StepHeader& header, StepSchema schema) {
+  STEPControl_Controller::Init();
   Interface_Static::SetCVal("write.step.schema",
                             schema == StepSchema::kAp214 ? "AP214IS" : "AP242DIS");
   Interface_Static::SetCVal("write.step.unit", "MM");
@@ -98,9 +103,6 @@ TopoDS_Shape read_shape(const fs::path& path) {
   return reader.OneShape();
 }
 
-/// Shares by which OpenCASCADE's volume of the file may differ from the splines' own integral.
-constexpr double kVolumeShare = 1e-6;
-
 void require_read_back(const StepContent& content, double volume, const fs::path& path) {
   if (!content.is_one_solid()) fail_to_write(path, "it does not read back as one closed solid");
   if (std::abs(content.volume - volume) <= kVolumeShare * volume) return;
@@ -114,8 +116,8 @@ StepContent write_step(const SplineNet& net, const StepHeader& header, StepSchem
                        const fs::path& path) {
   silence_opencascade();
   const NamedSolid solid = make_spline_solid(net);
-  STEPControl_Writer writer;
   set_up_writing(header, schema);
+  STEPControl_Writer writer;
   if (writer.Transfer(solid.solid, STEPControl_ManifoldSolidBrep) != IFSelect_RetDone) {
     fail_to_write(path, "OpenCASCADE cannot put the solid into STEP");
   }
@@ -142,7 +144,7 @@ StepContent inspect_step(const fs::path& path) {
   content.valid = BRepCheck_Analyzer(shape).IsValid();
   content.closed = shells_are_closed(shape);
   GProp_GProps properties;
-  BRepGProp::VolumeProperties(shape, properties);
+  BRepGProp::VolumeProperties(shape, properties, kVolumeShare / 10.0);
   content.volume = properties.Mass();
   return content;
 }

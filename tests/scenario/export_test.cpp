@@ -40,6 +40,40 @@ TEST_F(Export, EveryMeshFormatHoldsAClosedSolid) {
   }
 }
 
+TEST_F(Export, StepIsOneSolidWithACertificateForEveryPatch) {
+  const Outcome outcome = run({"export", path("lens"), "--out", path("lens.step"), "--json",
+                               "--author", "A. Turner", "--schema", "ap242"});
+  ASSERT_EQ(outcome.exit_code, 3) << outcome.err;  // A coarse mesh has creases of a facet's width.
+  const nlohmann::json result = outcome.json();
+  EXPECT_FALSE(result["within_tolerance"]);
+  EXPECT_GT(result["normal_error_rad"], 1e-4);
+  EXPECT_EQ(result["faces"], result["patches"].size() + 5);
+  for (const nlohmann::json& patch : result["patches"]) {
+    EXPECT_LE(patch["height_error_mm"], result["height_error_mm"]);
+    EXPECT_LE(patch["normal_error_rad"], result["normal_error_rad"]);
+  }
+  EXPECT_TRUE(result["metrics"].contains("solid"));
+  const std::string step = content(at("lens.step"));
+  EXPECT_THAT(step, HasSubstr("A. Turner"));
+  EXPECT_THAT(step, HasSubstr("AP242"));
+  EXPECT_THAT(step, HasSubstr("sha256:"));
+}
+
+TEST_F(Export, StepMeetsTolerancesThatItsMeshAllows) {
+  const Outcome outcome = run({"export", path("lens"), "--out", path("lens.stp"), "--json",
+                               "--tolerance", "0.5mm", "--normal-tolerance", "0.1"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_TRUE(outcome.json()["within_tolerance"]);
+  EXPECT_EQ(outcome.json()["format"], "step");
+}
+
+TEST_F(Export, SameLensGivesTheSameStepBytes) {
+  run({"export", path("lens"), "--out", path("a.step"), "--max-points", "2000", "--threads", "1"});
+  run({"export", path("lens"), "--out", path("b.step"), "--max-points", "2000", "--threads", "2"});
+  EXPECT_TRUE(content(at("a.step")) == content(at("b.step")));
+  EXPECT_GT(content(at("a.step")).size(), 1000U);
+}
+
 TEST_F(Export, HeightMapsHaveTheAskedSize) {
   for (const char* name : {"lens.exr", "lens.png"}) {
     const Outcome outcome =
@@ -63,6 +97,11 @@ TEST_F(Export, BadOptionsAreRefused) {
   expect_refused({"--out", path("lens.stl"), "--pixels", "100"}, {"--pixels", "stl"});
   expect_refused({"--out", path("lens.png"), "--pixels", "1"}, {"--pixels", "1"});
   expect_refused({"--out", path("lens.stl"), "--surface", "milled"}, {"milled.ply"});
+  expect_refused({"--out", path("lens.step"), "--tolerance", "0"}, {"--tolerance", "0"});
+  expect_refused({"--out", path("lens.step"), "--tolerance", "5cm"}, {"--tolerance", "5cm"});
+  expect_refused({"--out", path("lens.step"), "--normal-tolerance", "nan"}, {"--normal-tolerance"});
+  expect_refused({"--out", path("lens.stl"), "--tolerance", "1um"}, {"--tolerance", "stl"});
+  expect_refused({"--out", path("lens.step"), "--schema", "ap203"}, {"--schema", "ap203"});
   expect_refused({}, {"--out"});
 }
 
@@ -84,7 +123,7 @@ TEST_F(Export, SurfaceBelowTheBackIsRefused) {
 }
 
 TEST_F(Export, FileSizeLimitLeavesNothing) {
-  for (const char* name : {"lens.stl", "lens.3mf", "lens.exr"}) {
+  for (const char* name : {"lens.stl", "lens.3mf", "lens.exr", "lens.step"}) {
     const Outcome outcome = run({"export", path("lens"), "--out", path(name), "--quiet"}, 2048);
     expect_refusal(outcome, 1, {name, "File too large"});
     EXPECT_FALSE(fs::exists(at(name)));

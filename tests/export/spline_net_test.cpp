@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "export/spline_net.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "export/closed_solid.h"
+#include "export/cubic_spline.h"
+#include "export/sample_surfaces.h"
+
+namespace lensforge::testing {
+namespace {
+
+SplineNet fitted(const SmoothSurface& surface, std::int64_t points = 0) {
+  FitOptions options;
+  options.max_control_points = points;
+  return fit_spline_net(surface, options, Executor::serial(), RunControl());
+}
+
+TEST(CubicSpline, BasisSumsToOneAndSlopesAreItsDerivatives) {
+  constexpr double kStep = 1e-6;
+  for (const int cells : {1, 2, 3, 9}) {
+    for (double t = 0.01; t < cells - 0.01; t += 0.0837) {
+      const CubicBasis b = cubic_basis(t, cells);
+      double sum = 0.0;
+      double place = 0.0;
+      double slope = 0.0;
+      for (int j = 0; j < 4; ++j) {
+        sum += b.value[static_cast<std::size_t>(j)];
+        place += b.value[static_cast<std::size_t>(j)] * greville_point(b.first + j, cells);
+        slope += b.slope[static_cast<std::size_t>(j)] * greville_point(b.first + j, cells);
+      }
+      EXPECT_NEAR(sum, 1.0, 1e-14);
+      EXPECT_NEAR(place, t, 1e-13);
+      EXPECT_NEAR(slope, 1.0, 1e-13);
+      const CubicBasis after = cubic_basis(t + kStep, cells);
+      const CubicBasis before = cubic_basis(t - kStep, cells);
+      if (after.first != before.first) continue;
+      for (std::size_t j = 0; j < 4; ++j) {
+        EXPECT_NEAR((after.value[j] - before.value[j]) / (2.0 * kStep), b.slope[j], 1e-8);
+      }
+    }
+  }
+}
+
+TEST(CubicSpline, RefinementKeepsTheSpline) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> unit(-1.0, 1.0);
+  for (const int cells : {1, 2, 4, 7}) {
+    for (const int factor : {1, 2, 8}) {
+      const Eigen::VectorXd coarse =
+          Eigen::VectorXd::NullaryExpr(cells + 3, [&] { return unit(random); });
+      const Eigen::VectorXd fine = refined_spline(coarse, factor);
+      std::vector<double> at;
+      std::vector<double> fine_at;
+      for (int i = 0; i <= 20 * cells; ++i) {
+        at.push_back(i / 20.0);
+        fine_at.push_back(i / 20.0 * factor);
+      }
+      const Eigen::VectorXd a = basis_matrix(at, cells, false) * coarse;
+      const Eigen::VectorXd b = basis_matrix(fine_at, cells * factor, false) * fine;
+      EXPECT_LT((a - b).cwiseAbs().maxCoeff(), 1e-12);
+    }
+  }
+}
+
+TEST(SplineNet, KeepsAPlaneToTheRoundingOfItsHeights) {
+  const auto plane = [](double x, double y) { return 5.0 + 0.1 * x - 0.05 * y; };
+  const SmoothSurface surface(surface_of({80.0, 70.0}, {81, 81}, plane));
+  const SplineNet net = fitted(surface);
+  EXPECT_GT(net.patches.size(), 1U);
+  EXPECT_LT(net.error().height, 1e-8);
+  EXPECT_LT(net.error().normal, 1e-8);
+  EXPECT_NEAR(net.volume(), 80.0 * 70.0 * (5.0 + 4.0 - 1.75), 1e-3);
+}
+
+TEST(SplineNet, PatchesJoinWithEqualHeightsAndSlopes) {
+  const SmoothSurface surface(noisy_lens());
+  SplineNet net = fitted(surface, 8000);
+  const SmoothSurface fine(smooth_lens(101));
+  for (const SplineNet& n : {net, fitted(fine, 20000)}) {
+    bool unequal = false;
+    for (int line = 1; line < n.columns; ++line) {
+      for (int r = 0; r < n.rows; ++r) {
+        const SplinePatch& a = n.patches[static_cast<std::size_t>(r * n.columns + line - 1)];
+        const SplinePatch& b = n.patches[static_cast<std::size_t>(r * n.columns + line)];
+        unequal = unequal || a.cells != b.cells;
+        for (int i = 0; i <= 50; ++i) {
+          const double y = a.box.min().y() + a.box.sizes().y() * i / 50.0;
+          const SurfacePoint left = a.at({a.box.max().x(), y});
+          const SurfacePoint right = b.at({b.box.min().x(), y});
+          EXPECT_NEAR(left.z, right.z, 2e-8);
+          EXPECT_LT((left.slope - right.slope).norm(), 2e-6);
+        }
+      }
+    }
+  }
+}
+
+/// The certificate was taken on a raster; a denser one, and points at random, find nothing worse.
+TEST(SplineNet, CertificateHoldsBetweenItsPoints) {
+  for (const SurfaceMesh& mesh : {smooth_lens(101), creased_lens(), noisy_lens()}) {
+    const SmoothSurface surface(mesh);
+    const SplineNet net = fitted(surface, 12000);
+    std::mt19937 random(11);
+    std::uniform_real_distribution<double> unit(0.0, 1.0);
+    for (const SplinePatch& patch : net.patches) {
+      const FitError denser = measure_patch(patch, surface, 2 * kCertificateDensity + 1);
+      EXPECT_LE(denser.height, patch.error.height);
+      EXPECT_LE(denser.normal, patch.error.normal);
+      for (int i = 0; i < 500; ++i) {
+        const Eigen::Array2d share(unit(random), unit(random));
+        const Eigen::Vector2d xy = patch.box.min() + (share * patch.box.sizes().array()).matrix();
+        const auto truth = surface.at(xy);
+        ASSERT_TRUE(truth);
+        const SurfacePoint fit = patch.at(xy);
+        EXPECT_LE(std::abs(fit.z - truth->z), patch.error.height);
+        EXPECT_LE((fit.slope - truth->slope).norm(), 1.2 * patch.error.normal);  // Slopes ≥ angles.
+      }
+    }
+  }
+}
+
+TEST(SplineNet, ErrorFallsWithTheKnots) {
+  const SmoothSurface surface(smooth_lens(41));
+  double before = 1.0;
+  for (const std::int64_t points : {100, 400, 1400, 5000, 20000}) {
+    const double now = fitted(surface, points).error().normal;
+    EXPECT_LT(now, before);
+    before = now;
+  }
+}
+
+TEST(SplineNet, ControlPointsStayWithinTheirLimit) {
+  const SmoothSurface surface(creased_lens());
+  for (const std::int64_t points : {500, 3000}) {
+    EXPECT_LE(fitted(surface, points).control_points(), points);
+  }
+}
+
+TEST(SplineNet, IsTheSameForAnyNumberOfThreads) {
+  const SmoothSurface surface(smooth_lens(101));
+  FitOptions options;
+  options.max_control_points = 10000;
+  const SplineNet one = fit_spline_net(surface, options, Executor::serial(), RunControl());
+  const SplineNet three = fit_spline_net(surface, options, Executor::cpu(3), RunControl());
+  ASSERT_EQ(one.patches.size(), three.patches.size());
+  for (std::size_t i = 0; i < one.patches.size(); ++i) {
+    EXPECT_EQ(one.patches[i].heights, three.patches[i].heights);
+  }
+}
+
+TEST(SplineNet, SampledMeshIsTheNet) {
+  const SmoothSurface surface(smooth_lens());
+  const SplineNet net = fitted(surface, 5000);
+  const SurfaceMesh mesh = sampled(net, {200, 160});
+  EXPECT_NEAR(enclosed_volume(closed_solid(mesh, "net")), net.volume(), 1e-5 * net.volume());
+}
+
+}  // namespace
+}  // namespace lensforge::testing

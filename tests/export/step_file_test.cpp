@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "export/step_file.h"
+
+#include <gmock/gmock.h>
+
+#include "core/error.h"
+#include "core/temp_folder.h"
+#include "export/closed_solid.h"
+#include "export/part21.h"
+#include "export/sample_surfaces.h"
+
+namespace lensforge::testing {
+namespace {
+
+using ::testing::HasSubstr;
+
+class StepFile : public ::testing::Test {
+ protected:
+  SplineNet fitted(const SurfaceMesh& mesh, std::int64_t points = 4000) {
+    FitOptions options;
+    options.max_control_points = points;
+    return fit_spline_net(SmoothSurface(mesh), options, Executor::serial(), RunControl());
+  }
+
+  StepContent write(const SplineNet& net, StepSchema schema = StepSchema::kAp214) {
+    return write_step(net, {"part 7", "sha256:0123", "N. N.", "lensforge 9", "2020-02-02T02:02:02"},
+                      schema, path_);
+  }
+
+  TempFolder folder_;
+  std::filesystem::path path_ = folder_ / "lens.step";
+};
+
+TEST_F(StepFile, ReadsBackAsOneClosedSolidOfTheSameVolume) {
+  for (const SurfaceMesh& mesh : {smooth_lens(71), creased_lens(), noisy_lens()}) {
+    const SplineNet net = fitted(mesh);
+    const StepContent content = write(net);
+    EXPECT_TRUE(content.valid);
+    EXPECT_TRUE(content.closed);
+    EXPECT_EQ(content.solids, 1);
+    EXPECT_EQ(content.faces, static_cast<int>(net.patches.size()) + 5);
+    EXPECT_NEAR(content.volume, net.volume(), 1e-6 * net.volume());
+    const double facets = enclosed_volume(closed_solid(mesh, "mesh"));
+    EXPECT_NEAR(content.volume, facets, 2e-4 * facets);
+  }
+}
+
+/// Without OpenCASCADE: the file's own numbers give the net's surface.
+TEST_F(StepFile, SplinesEvaluatedByAnIndependentReaderAreTheSurface) {
+  const SurfaceMesh mesh = noisy_lens();
+  const SmoothSurface surface(mesh);
+  const SplineNet net = fitted(mesh, 3000);
+  write(net);
+  const Part21File file = parse_part21(read_bytes(path_));
+  int optical = 0;
+  for (const int face : file.all("ADVANCED_FACE")) {
+    if (!file.records.at(face).parameters.starts_with("('optical surface'")) continue;
+    ++optical;
+    const Part21Surface s = surface_of_face(file, face);
+    for (int i = 0; i <= 12; ++i) {
+      for (int j = 0; j <= 12; ++j) {
+        const double u = std::lerp(s.knots_u.front(), s.knots_u.back(), i / 12.0);
+        const double v = std::lerp(s.knots_v.front(), s.knots_v.back(), j / 12.0);
+        const Eigen::Vector3d p = s.at(u, v);
+        EXPECT_NEAR(p.x(), u, 1e-7);
+        EXPECT_NEAR(p.y(), v, 1e-7);
+        EXPECT_NEAR(p.z(), net.at({u, v}).z, 1e-7);
+        const auto truth = surface.at({u, v});
+        ASSERT_TRUE(truth);
+        EXPECT_NEAR(p.z(), truth->z, net.error().height + 1e-7);
+      }
+    }
+  }
+  EXPECT_EQ(optical, static_cast<int>(net.patches.size()));
+}
+
+TEST_F(StepFile, FacesAreNamedAndEveryEdgeHasTwoFaces) {
+  write(fitted(smooth_lens(71)));
+  const Part21File file = parse_part21(read_bytes(path_));
+  std::map<std::string, int> names;
+  for (const int face : file.all("ADVANCED_FACE")) {
+    ++names[split_parameters(file.records.at(face).parameters).front()];
+  }
+  EXPECT_EQ(names.size(), 3U);
+  EXPECT_EQ(names["'side wall'"], 4);
+  EXPECT_EQ(names["'back'"], 1);
+  std::map<std::string, std::string> senses;
+  for (const int oriented : file.all("ORIENTED_EDGE")) {
+    const auto parts = split_parameters(file.records.at(oriented).parameters);
+    senses[parts.at(3)] += parts.at(4);
+  }
+  EXPECT_EQ(senses.size(), file.all("EDGE_CURVE").size());
+  for (const auto& [edge, sense] : senses) {
+    EXPECT_TRUE(sense == ".T..F." || sense == ".F..T.") << edge << ' ' << sense;
+  }
+}
+
+TEST_F(StepFile, HeaderNamesAuthorProgramAndSource) {
+  write(fitted(smooth_lens()));
+  const std::string header = parse_part21(read_bytes(path_)).header;
+  for (const char* part : {"'part 7'", "'sha256:0123'", "'N. N.'", "'lensforge 9'",
+                           "'2020-02-02T02:02:02'", "AUTOMOTIVE_DESIGN"}) {
+    EXPECT_THAT(header, HasSubstr(part));
+  }
+}
+
+TEST_F(StepFile, LengthsAreMillimetres) {
+  write(fitted(smooth_lens()));
+  EXPECT_THAT(read_bytes(path_), HasSubstr("SI_UNIT(.MILLI.,.METRE.)"));
+}
+
+TEST_F(StepFile, Ap242IsAnOption) {
+  EXPECT_TRUE(write(fitted(smooth_lens()), StepSchema::kAp242).is_one_solid());
+  EXPECT_THAT(parse_part21(read_bytes(path_)).header, HasSubstr("AP242"));
+}
+
+TEST_F(StepFile, TargetThatCannotBeWrittenIsNamed) {
+  path_ = folder_ / "missing" / "lens.step";
+  const SplineNet net = fitted(smooth_lens(), 500);
+  EXPECT_THAT(message_of<RunError>([&] { write(net); }), HasSubstr(path_.string()));
+  EXPECT_EQ(folder_.file_count(), 0U);
+}
+
+TEST_F(StepFile, WhatIsNoStepFileIsRefused) {
+  EXPECT_THAT(message_of<InputError>([&] { inspect_step(folder_ / "none.step"); }),
+              HasSubstr("none.step"));
+  write_bytes(path_, "solid lens\nendsolid\n");
+  EXPECT_THAT(message_of<InputError>([&] { inspect_step(path_); }), HasSubstr("lens.step"));
+}
+
+}  // namespace
+}  // namespace lensforge::testing
