@@ -93,12 +93,14 @@ void describe_solid(const StepContent& content, const Lens& lens, const std::str
                  "), read back valid and closed\n";
 }
 
-/// The picture of the splines, sampled twice as densely as the mesh.
+/// Points at which the splines are sampled for their picture: with six a mesh cell each way the MAE
+/// still fell by 0.0005 from four (a 128-pixel portrait), so what is printed is on the safe side.
+constexpr double kPicturePoints = 1e6;
+
 void describe_picture(const SplineNet& net, const Lens& lens, const Executor& executor,
                       StepReport& report) {
-  const auto cells = static_cast<double>(lens.surface.triangle_count()) / 2.0;
   const Eigen::Vector2d size(net.x.back() - net.x.front(), net.y.back() - net.y.front());
-  const Eigen::Vector2d count = 2.0 * size / std::sqrt(size.prod() / cells);
+  const Eigen::Vector2d count = size / std::sqrt(size.prod() / kPicturePoints);
   const GridShape shape{static_cast<int>(count.x()) + 2, static_cast<int>(count.y()) + 2};
   const ImageMetrics metrics = evaluate(sampled(net, shape), lens.setup, SurfaceModel::kSmooth,
                                         lens.target, nullptr, executor);
@@ -115,7 +117,7 @@ void add_step_options(OptionSet& options, StepArguments& arguments) {
                  "rad", "step: largest angle between the normals of both");
   options.integer("--max-points", arguments.max_points, Limits::between(0, 10'000'000),
                   "step: control points at most, about 70 bytes each; 0 takes four a vertex, "
-                  "600000 at most");
+                  "560000 at most");
   options.choice("--schema", arguments.schema,
                  {{"ap214", StepSchema::kAp214}, {"ap242", StepSchema::kAp242}},
                  "step: application protocol");

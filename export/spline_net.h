@@ -87,7 +87,7 @@ inline constexpr int kFewestCells = 4;
 inline constexpr int kMostCells = 256;
 
 /// What fits a STEP file of 45 MB.
-inline constexpr std::int64_t kMostControlPoints = 600'000;
+inline constexpr std::int64_t kMostControlPoints = 560'000;
 
 /// Raster of the certificate: points each way in a knot cell and in a cell of the mesh.
 inline constexpr int kCertificateDensity = 10;
