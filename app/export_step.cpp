@@ -51,8 +51,7 @@ std::string scientific(double value) {
 
 nlohmann::json certificate(const SplineNet& net) {
   nlohmann::json patches = nlohmann::json::array();
-  for (std::size_t i = 0; i < net.patches.size(); ++i) {
-    const SplinePatch& patch = net.patches[i];
+  for (const SplinePatch& patch : net.patches) {
     patches.push_back({{"x", {patch.box.min().x(), patch.box.max().x()}},
                        {"y", {patch.box.min().y(), patch.box.max().y()}},
                        {"cells", patch.cells},

@@ -16,9 +16,10 @@ Image height_map(const SmoothSurface& surface, int longer_side, const Executor& 
   const int rows = std::max(1, static_cast<int>(std::lround(size.y() / pixel)));
   Image image(columns, rows);
   parallel_for(executor, "height map", std::int64_t{columns} * rows, [&](std::int64_t i) {
-    const auto column = static_cast<double>(i % columns);
-    const auto row = static_cast<double>(i / columns);
-    const Eigen::Array2d share((column + 0.5) / columns, 1.0 - (row + 0.5) / rows);
+    const std::int64_t column = i % columns;
+    const std::int64_t row = i / columns;
+    const Eigen::Array2d share((static_cast<double>(column) + 0.5) / columns,
+                               1.0 - (static_cast<double>(row) + 0.5) / rows);
     const auto point = surface.at(surface.box().min() + (share * size.array()).matrix());
     if (point) image.values()[static_cast<std::size_t>(i)] = static_cast<float>(point->z);
   });

@@ -70,7 +70,7 @@ class NetFitter {
     net_.rows = std::max(1, static_cast<int>(std::lround(size.y() / side)));
     net_.x = lines(surface.box().min().x(), surface.box().max().x(), net_.columns);
     net_.y = lines(surface.box().min().y(), surface.box().max().y(), net_.rows);
-    net_.patches.resize(static_cast<std::size_t>(net_.columns) * net_.rows);
+    net_.patches.resize(table_index(0, net_.rows, net_.columns));
     for (int i = 0; i < patch_count(); ++i) {
       const int c = i % net_.columns;
       const int r = i / net_.columns;
@@ -144,9 +144,8 @@ class NetFitter {
   [[nodiscard]] EdgeSplines fit_edge(int column, int row, int axis, int cells) const {
     const int along = axis;
     const int other = 1 - axis;
-    const Corner a = corners_[static_cast<std::size_t>(row * (net_.columns + 1) + column)];
-    const Corner b =
-        corners_[static_cast<std::size_t>((row + axis) * (net_.columns + 1) + column + other)];
+    const Corner a = corners_[table_index(column, row, net_.columns + 1)];
+    const Corner b = corners_[table_index(column + other, row + axis, net_.columns + 1)];
     const Eigen::Vector2d from(x(column), y(row));
     const double length = axis == 0 ? x(column + 1) - x(column) : y(row + 1) - y(row);
     const double third = length / cells / 3.0;
@@ -180,6 +179,7 @@ class NetFitter {
 
   static std::vector<SplineEdge> rounded_edges(const std::vector<EdgeSplines>& edges) {
     std::vector<SplineEdge> result;
+    result.reserve(edges.size());
     for (const EdgeSplines& e : edges) {
       result.push_back({static_cast<int>(e.height.size()) - 3, e.height.unaryExpr(&rounded)});
     }
@@ -189,14 +189,14 @@ class NetFitter {
   void fit_edges() {
     const int columns = net_.columns;
     const int rows = net_.rows;
-    corners_.resize(static_cast<std::size_t>((columns + 1) * (rows + 1)));
+    corners_.resize(table_index(0, rows + 1, columns + 1));
     parallel_for(
         executor_, "spline corners", std::int64_t{columns + 1} * (rows + 1), [&](std::int64_t i) {
           corners_[static_cast<std::size_t>(i)] =
               corner_at(static_cast<int>(i % (columns + 1)), static_cast<int>(i / (columns + 1)));
         });
-    edges_x_.resize(static_cast<std::size_t>(columns * (rows + 1)));
-    edges_y_.resize(static_cast<std::size_t>((columns + 1) * rows));
+    edges_x_.resize(table_index(0, rows + 1, columns));
+    edges_y_.resize(table_index(0, rows, columns + 1));
     parallel_for(
         executor_, "spline edges", static_cast<std::int64_t>(edges_x_.size()),
         [&](std::int64_t i) {
@@ -232,10 +232,10 @@ class NetFitter {
     const auto rise = [&](const EdgeSplines& e, double step) -> Eigen::VectorXd {
       return step * refined_spline(e.across, n / (static_cast<int>(e.across.size()) - 3));
     };
-    const EdgeSplines& low = edges_x_[static_cast<std::size_t>(r * net_.columns + c)];
-    const EdgeSplines& high = edges_x_[static_cast<std::size_t>((r + 1) * net_.columns + c)];
-    const EdgeSplines& left = edges_y_[static_cast<std::size_t>(r * (net_.columns + 1) + c)];
-    const EdgeSplines& right = edges_y_[static_cast<std::size_t>(r * (net_.columns + 1) + c + 1)];
+    const EdgeSplines& low = edges_x_[table_index(c, r, net_.columns)];
+    const EdgeSplines& high = edges_x_[table_index(c, r + 1, net_.columns)];
+    const EdgeSplines& left = edges_y_[table_index(c, r, net_.columns + 1)];
+    const EdgeSplines& right = edges_y_[table_index(c + 1, r, net_.columns + 1)];
     net.col(0) = height(low);
     net.col(1) = net.col(0) + rise(low, third.y());
     net.col(n + 2) = height(high);
@@ -309,7 +309,7 @@ class NetFitter {
       const int r = i / net_.columns;
       for (int row = std::max(0, r - 1); row <= std::min(net_.rows - 1, r + 1); ++row) {
         for (int col = std::max(0, c - 1); col <= std::min(net_.columns - 1, c + 1); ++col) {
-          result[static_cast<std::size_t>(row * net_.columns + col)] = 1;
+          result[table_index(col, row, net_.columns)] = 1;
         }
       }
     }

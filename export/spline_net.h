@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -39,6 +40,11 @@ struct SplineEdge {
   int cells = 0;
   Eigen::VectorXd heights;  ///< cells + 3 coefficients, mm
 };
+
+/// Place of (column, row) in a table with `columns` columns that is stored row by row.
+inline std::size_t table_index(int column, int row, int columns) {
+  return static_cast<std::size_t>(std::int64_t{row} * columns + column);
+}
 
 /// A rectangle tiled with spline patches that join with equal heights and slopes.
 struct SplineNet {

@@ -103,13 +103,13 @@ class SolidBuilder {
   [[nodiscard]] double x(int line) const { return net_.x[static_cast<std::size_t>(line)]; }
   [[nodiscard]] double y(int line) const { return net_.y[static_cast<std::size_t>(line)]; }
   [[nodiscard]] TopoDS_Vertex& vertex(int column, int row) {
-    return vertices_[static_cast<std::size_t>(row * (net_.columns + 1) + column)];
+    return vertices_[table_index(column, row, net_.columns + 1)];
   }
   [[nodiscard]] TopoDS_Edge& edge_x(int column, int line) {
-    return edges_x_[static_cast<std::size_t>(line * net_.columns + column)];
+    return edges_x_[table_index(column, line, net_.columns)];
   }
   [[nodiscard]] TopoDS_Edge& edge_y(int line, int row) {
-    return edges_y_[static_cast<std::size_t>(row * (net_.columns + 1) + line)];
+    return edges_y_[table_index(line, row, net_.columns + 1)];
   }
 
   TopoDS_Vertex make_vertex(const gp_Pnt& at) {
@@ -133,8 +133,7 @@ class SolidBuilder {
 
   [[nodiscard]] double corner_height(int column, int row) const {
     const bool last = column == net_.columns;
-    const auto& edge =
-        net_.edges_x[static_cast<std::size_t>(row * net_.columns + (last ? column - 1 : column))];
+    const auto& edge = net_.edges_x[table_index((last ? column - 1 : column), row, net_.columns)];
     return last ? edge.heights[edge.heights.size() - 1] : edge.heights[0];
   }
 
@@ -200,7 +199,7 @@ class SolidBuilder {
 
   void add_patch(int c, int r) {
     TopoDS_Face face;
-    const SplinePatch& patch = net_.patches[static_cast<std::size_t>(r * net_.columns + c)];
+    const SplinePatch& patch = net_.patches[table_index(c, r, net_.columns)];
     builder_.MakeFace(face, surface_of(patch), Precision::Confusion());
     add_pcurve(edge_x(c, r), 0, y(r), face);
     add_pcurve(edge_x(c, r + 1), 0, y(r + 1), face);

@@ -83,8 +83,8 @@ TEST(SplineNet, PatchesJoinWithEqualHeightsAndSlopes) {
     bool unequal = false;
     for (int line = 1; line < n.columns; ++line) {
       for (int r = 0; r < n.rows; ++r) {
-        const SplinePatch& a = n.patches[static_cast<std::size_t>(r * n.columns + line - 1)];
-        const SplinePatch& b = n.patches[static_cast<std::size_t>(r * n.columns + line)];
+        const SplinePatch& a = n.patches[table_index(line - 1, r, n.columns)];
+        const SplinePatch& b = n.patches[table_index(line, r, n.columns)];
         unequal = unequal || a.cells != b.cells;
         for (int i = 0; i <= 50; ++i) {
           const double y = a.box.min().y() + a.box.sizes().y() * i / 50.0;
