@@ -71,7 +71,7 @@ TEST_F(Chain, ProvenanceTellsHowTheLensWasMade) {
   EXPECT_THAT(made["program"].get<std::string>(), HasSubstr("lensforge "));
   EXPECT_EQ(made["options"]["pixels"], 32);
   EXPECT_EQ(made["options"]["quality"], "draft");
-  EXPECT_EQ(made["options"]["weight-gradient"], 1000.0);
+  EXPECT_EQ(made["options"]["weight-image"], 100.0);
   EXPECT_EQ(made["device"], "cpu");
   EXPECT_EQ(made["threads"], 2);
   EXPECT_GT(made["seconds"], 0.0);
