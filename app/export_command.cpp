@@ -176,7 +176,7 @@ Report write(const Source& source, const ExportArguments& arguments, Format form
 
 }  // namespace
 
-int export_command(const Arguments& command_line) {
+int export_command(const Arguments& command_line) try {
   ExportArguments arguments;
   OptionSet options("export", "Writes a lens as a closed solid or height map for other programs.");
   add_export_options(options, arguments);
@@ -197,6 +197,10 @@ int export_command(const Arguments& command_line) {
   if (report.within_tolerance) return kDone;
   console.note("warning: the tolerances do not hold everywhere; --max-points gives more room");
   return kLimitMissed;
+} catch (const Interrupted&) {
+  const bool json =
+      std::find(command_line.begin(), command_line.end(), "--json") != command_line.end();
+  return report_error("interrupted; nothing was written", kInterrupted, json);
 }
 
 }  // namespace lensforge::app
