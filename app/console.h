@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <cstddef>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <string_view>
@@ -14,6 +15,9 @@ void print_to_stdout(std::string_view text);
 /// Prints "lensforge: message" as one line on stderr and, with `json`, {"error", "exit_code"} on
 /// stdout. Returns `exit_code`; never throws.
 int report_error(const std::string& message, int exit_code, bool json) noexcept;
+
+/// Characters in a line of the terminal on stderr; 80 where that cannot be told.
+std::size_t terminal_width();
 
 /// Where a command's words go: messages to stderr, the result to stdout.
 class Console {

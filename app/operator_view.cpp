@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "app/operator_view.h"
 
-#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -18,16 +17,9 @@ namespace {
 constexpr std::chrono::milliseconds kRedraw{150};
 constexpr std::chrono::seconds kPlainLine{5};
 constexpr int kBarWidth = 24;
-constexpr int kUsualTerminalWidth = 80;
 /// The pace is trusted once so much was cut, share of the file and s.
 constexpr double kPaceShare = 0.01;
 constexpr double kPaceSeconds = 20.0;
-
-std::size_t terminal_width() {
-  winsize size{};
-  const bool known = ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0;
-  return known ? size.ws_col : kUsualTerminalWidth;
-}
 
 std::string bar(double share) {
   const auto filled = static_cast<std::size_t>(share * kBarWidth);

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "app/progress_display.h"
 
-#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cstdio>
+
+#include "app/console.h"
 
 namespace lensforge::app {
 namespace {
@@ -13,13 +14,6 @@ namespace {
 constexpr std::chrono::milliseconds kBarInterval{100};
 constexpr std::chrono::seconds kLineInterval{5};
 constexpr int kBarWidth = 24;
-constexpr int kUsualTerminalWidth = 80;
-
-std::size_t terminal_width() {
-  winsize size{};
-  const bool known = ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0;
-  return known ? size.ws_col : kUsualTerminalWidth;
-}
 
 std::string clock_text(double seconds) {
   const int whole = static_cast<int>(seconds);
