@@ -9,10 +9,10 @@
 #include <system_error>
 #include <utility>
 
-#include "cam/decimal_text.h"
-#include "cam/drop_cutter.h"
-#include "cam/finish_raster.h"
-#include "cam/height_field.h"
+#include "cam/contact/drop_cutter.h"
+#include "cam/contact/height_field.h"
+#include "cam/path/finish_raster.h"
+#include "core/decimal_text.h"
 #include "core/error.h"
 #include "core/files.h"
 

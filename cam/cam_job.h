@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "cam/gcode_writer.h"
+#include "cam/post/gcode_writer.h"
 #include "core/executor.h"
 #include "core/lens.h"
 #include "core/run_control.h"

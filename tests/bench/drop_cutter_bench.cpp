@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "cam/cam_meshes.h"
-#include "cam/drop_cutter.h"
-#include "cam/finish_raster.h"
+#include "cam/contact/drop_cutter.h"
+#include "cam/path/finish_raster.h"
 
 namespace lensforge {
 namespace {

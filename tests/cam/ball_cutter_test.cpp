@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "cam/ball_cutter.h"
+#include "cam/contact/ball_cutter.h"
 
 #include <gtest/gtest.h>
 

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "cam/cam_meshes.h"
-#include "cam/height_field.h"
+#include "cam/contact/height_field.h"
 #include "core/error.h"
 #include "core/full_disk.h"
 #include "core/temp_folder.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "cam/drop_cutter.h"
+#include "cam/contact/drop_cutter.h"
 
 #include <gtest/gtest.h>
 

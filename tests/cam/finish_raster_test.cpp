@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "cam/finish_raster.h"
+#include "cam/path/finish_raster.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "cam/gcode_writer.h"
+#include "cam/post/gcode_writer.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "cam/decimal_text.h"
+#include "core/decimal_text.h"
 #include "core/error.h"
 
 namespace lensforge {

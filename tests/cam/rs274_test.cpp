@@ -16,8 +16,8 @@
 
 #include "cam/cam_job.h"
 #include "cam/cam_meshes.h"
-#include "cam/drop_cutter.h"
-#include "cam/finish_raster.h"
+#include "cam/contact/drop_cutter.h"
+#include "cam/path/finish_raster.h"
 #include "core/temp_folder.h"
 
 namespace lensforge {

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "cam/gcode_writer.h"
+#include "cam/post/gcode_writer.h"
 
 #include <charconv>
 #include <cmath>
 #include <cstddef>
 
-#include "cam/decimal_text.h"
+#include "core/decimal_text.h"
 #include "core/error.h"
 
 namespace lensforge {

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "cam/contact_features.h"
+#include "cam/contact/contact_features.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cstddef>
 #include <utility>
 
-#include "cam/ball_cutter.h"
+#include "cam/contact/ball_cutter.h"
 
 namespace lensforge {
 namespace {

@@ -7,7 +7,7 @@
 #include <functional>
 #include <vector>
 
-#include "cam/drop_cutter.h"
+#include "cam/contact/drop_cutter.h"
 #include "core/executor.h"
 #include "core/run_control.h"
 

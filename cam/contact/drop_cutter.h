@@ -7,8 +7,8 @@
 #include <span>
 #include <vector>
 
-#include "cam/ball_cutter.h"
-#include "cam/contact_features.h"
+#include "cam/contact/ball_cutter.h"
+#include "cam/contact/contact_features.h"
 #include "core/executor.h"
 #include "core/surface_mesh.h"
 

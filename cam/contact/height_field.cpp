@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "cam/height_field.h"
+#include "cam/contact/height_field.h"
 
 #include <cmath>
 #include <cstdint>
 #include <string>
 
-#include "cam/decimal_text.h"
+#include "core/decimal_text.h"
 #include "core/error.h"
 
 namespace lensforge {

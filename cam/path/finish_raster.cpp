@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "cam/finish_raster.h"
+#include "cam/path/finish_raster.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@
 #include <numbers>
 #include <string>
 
-#include "cam/decimal_text.h"
+#include "core/decimal_text.h"
 #include "core/error.h"
 
 namespace lensforge {

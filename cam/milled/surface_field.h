@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <vector>
+
+#include "core/executor.h"
+
+namespace lensforge {
+
+/// A rectangle of nodes of a regular grid: node (i, j) lies at origin + spacing · (i, j).
+struct GridWindow {
+  Eigen::Vector2d origin{0.0, 0.0};   ///< mm
+  Eigen::Vector2d spacing{0.0, 0.0};  ///< mm, nearly square
+  std::int64_t columns = 0;           ///< Nodes along x.
+  std::int64_t rows = 0;              ///< Nodes along y.
+
+  [[nodiscard]] Eigen::Vector2d node(std::int64_t i, std::int64_t j) const {
+    return {origin.x() + spacing.x() * static_cast<double>(i),
+            origin.y() + spacing.y() * static_cast<double>(j)};
+  }
+};
+
+/// Heights and slopes at the nodes of a window, row by row from the least y.
+struct SurfacePatch {
+  GridWindow window;
+  std::vector<double> z;        ///< mm, lens frame.
+  std::vector<double> slope_x;  ///< ∂z/∂x, of the surface itself, not a difference of heights.
+  std::vector<double> slope_y;  ///< ∂z/∂y
+  std::vector<std::int32_t> cut;  ///< Which cut touched the node; nodes of one smooth piece share
+                                  ///< it. Empty where a surface has no such pieces.
+};
+
+/// A surface that is known as finely as one likes, window by window, so that a whole lens never has
+/// to be in memory: the designed one, what a ball can reach of it, what a program leaves, what
+/// polishing makes of that.
+class SurfaceField {
+ public:
+  SurfaceField() = default;
+  SurfaceField(const SurfaceField&) = delete;
+  SurfaceField& operator=(const SurfaceField&) = delete;
+  virtual ~SurfaceField() = default;
+
+  /// Fills `patch` for a window inside the lens's rectangle; the same bits whatever windows the
+  /// grid is cut into and for any number of threads. @throw Interrupted as the executor does.
+  virtual void sample(const GridWindow& window, const Executor& executor,
+                      SurfacePatch& patch) const = 0;
+};
+
+}  // namespace lensforge
