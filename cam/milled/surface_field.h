@@ -10,17 +10,25 @@
 
 namespace lensforge {
 
-/// A rectangle of nodes of a regular grid: node (i, j) lies at origin + spacing · (i, j).
+/// A rectangle of nodes of a regular grid: node (i, j) of the window lies at origin + spacing ·
+/// (first_column + i, first_row + j), so that it has the same coordinates, to the bit, in every
+/// window of the grid.
 struct GridWindow {
-  Eigen::Vector2d origin{0.0, 0.0};   ///< mm
+  Eigen::Vector2d origin{0.0, 0.0};   ///< Of the grid, mm.
   Eigen::Vector2d spacing{0.0, 0.0};  ///< mm, nearly square
   std::int64_t columns = 0;           ///< Nodes along x.
   std::int64_t rows = 0;              ///< Nodes along y.
+  std::int64_t first_column = 0;      ///< Of the window, in the grid.
+  std::int64_t first_row = 0;
 
-  [[nodiscard]] Eigen::Vector2d node(std::int64_t i, std::int64_t j) const {
-    return {origin.x() + spacing.x() * static_cast<double>(i),
-            origin.y() + spacing.y() * static_cast<double>(j)};
+  [[nodiscard]] double x(std::int64_t i) const {
+    return origin.x() + spacing.x() * static_cast<double>(first_column + i);
   }
+  [[nodiscard]] double y(std::int64_t j) const {
+    return origin.y() + spacing.y() * static_cast<double>(first_row + j);
+  }
+  [[nodiscard]] Eigen::Vector2d node(std::int64_t i, std::int64_t j) const { return {x(i), y(j)}; }
+  [[nodiscard]] std::int64_t size() const { return columns * rows; }
 };
 
 /// Heights and slopes at the nodes of a window, row by row from the least y.
@@ -29,8 +37,9 @@ struct SurfacePatch {
   std::vector<double> z;        ///< mm, lens frame.
   std::vector<double> slope_x;  ///< ∂z/∂x, of the surface itself, not a difference of heights.
   std::vector<double> slope_y;  ///< ∂z/∂y
-  std::vector<std::int32_t> cut;  ///< Which cut touched the node; nodes of one smooth piece share
-                                  ///< it. Empty where a surface has no such pieces.
+  /// Which piece the node lies on: nodes of one smooth piece share it, between nodes of two pieces
+  /// the slope may jump. Empty where the whole surface is smooth.
+  std::vector<std::int32_t> cut;
 };
 
 /// A surface that is known as finely as one likes, window by window, so that a whole lens never has
