@@ -111,7 +111,11 @@ void DropCutter::drop(std::span<const Eigen::Vector2d> points, std::span<CutterL
   parallel_for(executor, "drop cutter", (count + kRun - 1) / kRun, drop_run, 1);
 }
 
-void DropCutter::search_level(const Level& level, Search& search) const {
+/// Calls `visit` with the number of every cell whose triangles can lie under a ball with its axis in
+/// the box, local coordinates.
+template <class Visit>
+void DropCutter::visit_cells(const Level& level, const Eigen::AlignedBox2d& axis,
+                             const Visit& visit) const {
   const double window = radius_ + 0.5 * level.cell + kReachMargin;
   const auto first = [&](double at) {
     return static_cast<int>(std::max(0.0, std::floor((at - window) / level.cell)));
@@ -119,14 +123,60 @@ void DropCutter::search_level(const Level& level, Search& search) const {
   const auto last = [&](double at, int cells) {
     return static_cast<int>(std::min(cells - 1.0, std::floor((at + window) / level.cell)));
   };
-  const int column_end = last(search.x, level.columns);
-  const int row_end = last(search.y, level.rows);
-  for (int row = first(search.y); row <= row_end; ++row) {
+  const int column_end = last(axis.max().x(), level.columns);
+  const int row_end = last(axis.max().y(), level.rows);
+  for (int row = first(axis.min().y()); row <= row_end; ++row) {
     const std::size_t row_begin = index_of(row) * index_of(level.columns);
-    for (int column = first(search.x); column <= column_end; ++column) {
-      search_cell(level, row_begin + index_of(column), search);
+    for (int column = first(axis.min().x()); column <= column_end; ++column) {
+      visit(row_begin + index_of(column));
     }
   }
+}
+
+/// A height that the tip nowhere falls below between two places: the triangle that holds it at one
+/// of them would still hold it at the other, and what one triangle holds is concave.
+double DropCutter::floor_between(const Eigen::Vector2d& from, const Eigen::Vector2d& to) const {
+  const CutterLocation at_from = drop(from);
+  const CutterLocation at_to = drop(to, at_from);
+  if (!at_from.rests() || !at_to.rests()) return kNoContact;
+  const auto held = [&](const CutterLocation& location, const Eigen::Vector2d& other) {
+    const std::size_t item = index_of(item_of_[index_of(location.triangle)]);
+    return std::min(location.tip, triangle_tip(other, radius_, corners_[item]));
+  };
+  return std::max(held(at_from, to), held(at_to, from));
+}
+
+void DropCutter::find_contenders(const Eigen::Vector2d& from, const Eigen::Vector2d& to,
+                                 std::vector<Contender>& contenders) const {
+  contenders.clear();
+  if (levels_.empty()) return;
+  const Eigen::Vector3d& origin = bounds_.min();
+  Eigen::AlignedBox2d axis(Eigen::Vector2d(from - origin.head<2>()));
+  axis.extend(Eigen::Vector2d(to - origin.head<2>()));
+  const double centre = floor_between(from, to) - kReachMargin - origin.z() + radius_;
+  const auto out_of = [&](const Reach& reach) {
+    const double dx = std::max({reach.x_min - axis.max().x(), axis.min().x() - reach.x_max, 0.0});
+    const double dy = std::max({reach.y_min - axis.max().y(), axis.min().y() - reach.y_max, 0.0});
+    const double room = radius_ * radius_ - (dx * dx + dy * dy);
+    const double need = centre - reach.z_max;
+    return room < 0.0 || (need > 0.0 && need * need > room);
+  };
+  for (const Level& level : levels_) {
+    visit_cells(level, axis, [&](std::size_t cell) {
+      if (out_of(level.reach[cell])) return;
+      for (std::size_t i = index_of(level.begin[cell]); i < index_of(level.begin[cell + 1]); ++i) {
+        if (out_of(reach_[i])) continue;
+        contenders.push_back({triangle_of_[i], items_[i].features, &items_[i].facet, &corners_[i]});
+      }
+    });
+  }
+  std::sort(contenders.begin(), contenders.end(),
+            [](const Contender& a, const Contender& b) { return a.triangle < b.triangle; });
+}
+
+void DropCutter::search_level(const Level& level, Search& search) const {
+  const Eigen::AlignedBox2d axis(Eigen::Vector2d(search.x, search.y));
+  visit_cells(level, axis, [&](std::size_t cell) { search_cell(level, cell, search); });
 }
 
 void DropCutter::search_cell(const Level& level, std::size_t cell, Search& search) const {

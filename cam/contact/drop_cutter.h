@@ -22,6 +22,14 @@ struct CutterLocation {
   [[nodiscard]] bool rests() const { return triangle >= 0; }
 };
 
+/// A triangle that may hold the ball up; the pointers live as long as the drop-cutter.
+struct Contender {
+  std::int32_t triangle = -1;
+  ContactFeatures features = 0;              ///< Which edges and corners it stands for.
+  const FacetContact* facet = nullptr;       ///< From `corners`.
+  const Eigen::Matrix3d* corners = nullptr;  ///< Columns a, b, c; bc is the longest side.
+};
+
 /// Lets a ball-end mill down on a mesh: for any (x, y) the lowest height of the tip at which the
 /// ball touches the mesh and cuts into none of it; exact, over facets, edges and vertices.
 ///
@@ -44,6 +52,11 @@ class DropCutter {
   /// drop() for many points; the same bits for any number of threads. @pre sizes are equal.
   void drop(std::span<const Eigen::Vector2d> points, std::span<CutterLocation> locations,
             const Executor& executor) const;
+
+  /// Every triangle that holds the ball up somewhere on the way from `from` to `to` (mm), by its
+  /// number; others as well. Short ways have few. Over `contenders`, which is emptied first.
+  void find_contenders(const Eigen::Vector2d& from, const Eigen::Vector2d& to,
+                       std::vector<Contender>& contenders) const;
 
   [[nodiscard]] double radius() const { return radius_; }
   /// Box of the mesh's vertices that belong to triangles; empty without triangles.
@@ -73,6 +86,9 @@ class DropCutter {
   void sort_into_cells(const SurfaceMesh& mesh, const std::vector<double>& extents);
   void fill_items(const SurfaceMesh& mesh, const Executor& executor);
   void bound_cells();
+  [[nodiscard]] double floor_between(const Eigen::Vector2d& from, const Eigen::Vector2d& to) const;
+  template <class Visit>
+  void visit_cells(const Level& level, const Eigen::AlignedBox2d& axis, const Visit& visit) const;
   void search_level(const Level& level, Search& search) const;
   void search_cell(const Level& level, std::size_t cell, Search& search) const;
   void try_item(std::size_t item, Search& search) const;

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <vector>
+
+#include "cam/contact/curve_piece.h"
+
+namespace lensforge {
+
+/// The largest of concave curve pieces over one coordinate, kept as the pieces that are on top.
+class CurveEnvelope {
+ public:
+  void clear() { pieces_.clear(); }
+  /// @pre piece.concave() and piece.begin ≤ piece.end.
+  void insert(const CurvePiece& piece);
+  /// In order, without overlaps; with gaps where nothing was inserted. Error against the largest
+  /// value: kEnvelopeTie (CurveEnvelope.IsTheLargestOfItsPieces).
+  [[nodiscard]] const std::vector<CurvePiece>& pieces() const { return pieces_; }
+
+ private:
+  void append(const CurvePiece& piece, double from, double to);
+  void contest(const CurvePiece& old, const CurvePiece& fresh, double from, double to);
+
+  std::vector<CurvePiece> pieces_;
+  std::vector<CurvePiece> merged_;
+};
+
+/// Curves that are no farther apart than this, mm, are one: rounding of a height is 1e-13.
+inline constexpr double kEnvelopeTie = 1e-12;
+/// Pieces shorter than this, mm, are left to their neighbours: at a slope of 10 the height is off
+/// by 1e-10 mm.
+inline constexpr double kShortestPiece = 1e-11;
+
+}  // namespace lensforge

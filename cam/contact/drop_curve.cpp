@@ -1,0 +1,268 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cam/contact/drop_curve.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+
+#include "cam/contact/ball_cutter.h"
+#include "cam/contact/curve_envelope.h"
+
+// Notation: u runs along the line and v across it, v = v* on the line. R is the ball's radius. An
+// edge starts at its upper end; e is its direction seen from above, `run` its length seen from
+// above, k = u_z / length its incline (≤ 0).
+namespace lensforge {
+namespace {
+
+/// Length of the stretches that are searched one at a time, in radii: longer ones have more
+/// contenders each, shorter ones repeat them more often. Measured on the benchmark's lens.
+constexpr double kStretchPerRadius = 0.3;
+
+/// Edges steeper than this, run ÷ length, stand for their upper vertex: the ball leaves one for the
+/// other within R · 1e-6 of it.
+constexpr double kSteepEdge = 1e-6;
+
+/// A facet's line is trusted from this length on, mm; shorter, its edges stand for it.
+constexpr double kShortestFacet = 1e-10;
+
+struct Stretch {
+  AxisLine line;
+  double radius;
+  double from, to;
+
+  [[nodiscard]] double u(const Eigen::Vector2d& p) const { return p[line.along]; }
+  [[nodiscard]] double v(const Eigen::Vector2d& p) const { return p[1 - line.along]; }
+};
+
+/// Where c0 + c1·(u − origin) ≥ −margin narrows from … to.
+void clip(double at_from, double at_to, double margin, double& from, double& to) {
+  const double low = at_from + margin;
+  const double high = at_to + margin;
+  if (low >= 0.0 && high >= 0.0) return;
+  if (low < 0.0 && high < 0.0) {
+    to = from - 1.0;
+    return;
+  }
+  const double width = to - from;
+  const double zero = from + width * (low / (low - high));
+  (low < 0.0 ? from : to) = zero;
+}
+
+/// The stretch on which the tangent contact lies inside the facet.
+bool facet_reach(const FacetContact& facet, const Stretch& stretch, double& from, double& to) {
+  for (int k = 0; k < 3 && to >= from; ++k) {
+    const Barycentric a = contact_point(facet, stretch.line.at(from));
+    const Barycentric b = contact_point(facet, stretch.line.at(to));
+    const double at_from = k == 0 ? a.a : k == 1 ? a.b : a.c;
+    const double at_to = k == 0 ? b.a : k == 1 ? b.b : b.c;
+    clip(at_from, at_to, kFacetMargin, from, to);
+  }
+  return to - from > kShortestFacet;
+}
+
+void offer_facet(const Contender& contender, const Stretch& stretch, CurveEnvelope& envelope) {
+  const FacetContact& facet = *contender.facet;
+  if (facet.shape == FacetShape::kNone) return;
+  CurvePiece piece;
+  piece.begin = stretch.from;
+  piece.end = stretch.to;
+  if (!facet_reach(facet, stretch, piece.begin, piece.end)) return;
+  piece.feature = std::int64_t{8} * contender.triangle;
+  if (facet.shape == FacetShape::kRegular) {
+    piece.u0 = stretch.u(facet.origin);
+    piece.rise = stretch.u(facet.slope);
+    piece.height =
+        facet.tip + stretch.v(facet.slope) * (stretch.line.across - stretch.v(facet.origin));
+  } else {
+    // Heights at points of the facet itself: never above the true ones.
+    const auto tip = [&](double u) {
+      const Eigen::Vector2d p = stretch.line.at(u);
+      const Eigen::Matrix3d& corners = *contender.corners;
+      return tip_at(contact_point(facet, p), p, stretch.radius, corners.col(0), corners.col(1),
+                    corners.col(2));
+    };
+    piece.u0 = piece.begin;
+    piece.height = tip(piece.begin);
+    piece.rise = (tip(piece.end) - piece.height) / (piece.end - piece.begin);
+    if (!std::isfinite(piece.rise) || !std::isfinite(piece.height)) return;
+  }
+  envelope.insert(piece);
+}
+
+/// Narrows begin … end to where the line passes under the ball's flank.
+bool clip_arc(CurvePiece& piece) {
+  const double most = std::sqrt(piece.rho2 * (1.0 - CurvePiece::kSteepest));
+  if (piece.rate == 0.0) return std::abs(piece.offset) <= most && piece.end > piece.begin;
+  const double a = piece.u0 + (-most - piece.offset) / piece.rate;
+  const double b = piece.u0 + (most - piece.offset) / piece.rate;
+  piece.begin = std::max(piece.begin, std::min(a, b));
+  piece.end = std::min(piece.end, std::max(a, b));
+  return piece.end > piece.begin;
+}
+
+void offer_vertex(const Eigen::Vector3d& q, std::int64_t feature, const Stretch& stretch,
+                  CurveEnvelope& envelope) {
+  const double off = stretch.line.across - stretch.v(q.head<2>());
+  CurvePiece piece{stretch.from, stretch.to};
+  piece.rho2 = stretch.radius * stretch.radius - off * off;
+  if (!(piece.rho2 > 0.0)) return;
+  piece.u0 = stretch.u(q.head<2>());
+  piece.height = q.z() - stretch.radius;
+  piece.bow = 1.0;
+  piece.rate = 1.0;
+  piece.feature = feature;
+  if (clip_arc(piece)) envelope.insert(piece);
+}
+
+/// An edge as the ball sees it from the line.
+struct Edge {
+  CurvePiece piece;
+  double run = 0.0;
+  double k = 0.0;
+  double e_u = 0.0, e_v = 0.0;
+  double v_top = 0.0;  ///< v* − v of the upper end.
+
+  /// Where along the edge it touches, 0 … run from its upper end.
+  [[nodiscard]] double touch(double u, double radius) const {
+    const double t = u - piece.u0;
+    const double d = e_u * v_top - e_v * t;
+    return e_u * t + e_v * v_top + k * std::sqrt(std::max(radius * radius - d * d, 0.0));
+  }
+};
+
+Edge make_edge(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Stretch& stretch) {
+  const bool a_on_top = a.z() > b.z() || (a.z() == b.z() && a.x() > b.x());
+  const Eigen::Vector3d& top = a_on_top ? a : b;
+  const Eigen::Vector3d way = (a_on_top ? b : a) - top;
+  Edge edge;
+  edge.run = way.head<2>().norm();
+  const double length = way.norm();
+  if (!(edge.run > kSteepEdge * length)) return Edge{};
+  edge.k = way.z() / length;
+  edge.e_u = stretch.u(way.head<2>()) / edge.run;
+  edge.e_v = stretch.v(way.head<2>()) / edge.run;
+  edge.v_top = stretch.line.across - stretch.v(top.head<2>());
+  const double incline = way.z() / edge.run;
+  edge.piece.u0 = stretch.u(top.head<2>());
+  edge.piece.height = top.z() - stretch.radius + incline * edge.e_v * edge.v_top;
+  edge.piece.rise = incline * edge.e_u;
+  edge.piece.bow = length / edge.run;
+  edge.piece.rho2 = stretch.radius * stretch.radius;
+  edge.piece.offset = edge.e_u * edge.v_top;
+  edge.piece.rate = -edge.e_v;
+  edge.piece.begin = stretch.from;
+  edge.piece.end = stretch.to;
+  return edge;
+}
+
+/// Appends where on the line the ball touches the edge at c: touch(u) = c squares to
+/// (s_u − c)² + k² d² = k² R², a quadratic A t² + 2 B t + C = 0 with B² − AC = k² (A R² − w²), w
+/// being the line's distance from that point of the edge across the line.
+void add_crossings(const Edge& edge, double c, double radius, std::vector<double>& places) {
+  const double k2 = edge.k * edge.k;
+  const double a = edge.e_u * edge.e_u + k2 * edge.e_v * edge.e_v;
+  const double w = edge.v_top - c * edge.e_v;
+  const double rest = a * radius * radius - w * w;
+  if (!(a > 0.0)) return;
+  const double b = edge.e_u * (edge.e_v * edge.v_top - c) - k2 * edge.e_u * edge.v_top * edge.e_v;
+  const double root = std::abs(edge.k) * std::sqrt(std::max(rest, 0.0));
+  places.push_back(edge.piece.u0 + (-b - root) / a);
+  places.push_back(edge.piece.u0 + (-b + root) / a);
+}
+
+void offer_edge(const Eigen::Vector3d& a, const Eigen::Vector3d& b, std::int64_t feature,
+                const Stretch& stretch, CurveEnvelope& envelope) {
+  Edge edge = make_edge(a, b, stretch);
+  if (edge.run == 0.0) return;
+  edge.piece.feature = feature;
+  if (!clip_arc(edge.piece)) return;
+  std::vector<double> places{edge.piece.begin, edge.piece.end};
+  add_crossings(edge, 0.0, stretch.radius, places);
+  add_crossings(edge, edge.run, stretch.radius, places);
+  for (double& place : places) place = std::clamp(place, edge.piece.begin, edge.piece.end);
+  std::sort(places.begin(), places.end());
+  CurvePiece piece = edge.piece;
+  for (std::size_t i = 1; i < places.size(); ++i) {
+    if (places[i] - places[i - 1] <= kShortestPiece) continue;
+    const double touch = edge.touch(0.5 * (places[i] + places[i - 1]), stretch.radius);
+    if (touch < 0.0 || touch > edge.run) continue;
+    piece.begin = places[i - 1];
+    piece.end = places[i];
+    envelope.insert(piece);
+  }
+}
+
+/// Which edges and corners of a triangle can hold the ball on the stretch: as in DropCutter, none
+/// that a regular facet's tangent contact lies on the near side of all along.
+ContactFeatures boundary_in_play(const Contender& contender, const Stretch& stretch) {
+  const FacetContact& facet = *contender.facet;
+  if (facet.shape != FacetShape::kRegular) return contender.features;
+  const Barycentric from = contact_point(facet, stretch.line.at(stretch.from));
+  const Barycentric to = contact_point(facet, stretch.line.at(stretch.to));
+  const std::array<double, 3> across{std::min(from.c, to.c), std::min(from.a, to.a),
+                                     std::min(from.b, to.b)};
+  ContactFeatures features = contender.features;
+  for (int k = 0; k < 3; ++k) {
+    if (across[static_cast<std::size_t>(k)] >= 0.0) {
+      features &= static_cast<ContactFeatures>(~edge_bit(k));
+    }
+  }
+  const bool inside = *std::min_element(across.begin(), across.end()) >= 0.0;
+  return inside ? ContactFeatures{0} : features;
+}
+
+void offer_boundary(const Contender& contender, const Stretch& stretch, CurveEnvelope& envelope) {
+  const ContactFeatures features = boundary_in_play(contender, stretch);
+  const Eigen::Matrix3d& corners = *contender.corners;
+  const std::int64_t first = std::int64_t{8} * contender.triangle;
+  for (int k = 0; k < 3; ++k) {
+    if ((features & edge_bit(k)) == 0) continue;
+    offer_edge(corners.col(k), corners.col((k + 1) % 3), first + 1 + k, stretch, envelope);
+  }
+  for (int k = 0; k < 3; ++k) {
+    if ((features & corner_bit(k)) == 0) continue;
+    offer_vertex(corners.col(k), first + 4 + k, stretch, envelope);
+  }
+}
+
+/// Appends the pieces of a stretch; what rounding left between two pieces goes to the first.
+void append(const std::vector<CurvePiece>& pieces, std::vector<CurvePiece>& curve) {
+  for (const CurvePiece& piece : pieces) {
+    if (!curve.empty() && piece.begin - curve.back().end < 1e-9) {
+      if (curve.back().feature == piece.feature) {
+        curve.back().end = piece.end;
+        continue;
+      }
+      curve.back().end = piece.begin;
+    }
+    curve.push_back(piece);
+  }
+}
+
+}  // namespace
+
+std::vector<CurvePiece> drop_curve(const DropCutter& cutter, const AxisLine& line, double from,
+                                   double to) {
+  std::vector<CurvePiece> curve;
+  std::vector<Contender> contenders;
+  CurveEnvelope envelope;
+  // Stretches end at fixed places, so that a line has the same curve whatever part of it is asked
+  // for.
+  const double length = kStretchPerRadius * cutter.radius();
+  for (auto i = static_cast<std::int64_t>(std::floor(from / length));; ++i) {
+    const double begin = std::max(from, static_cast<double>(i) * length);
+    const double end = std::min(to, static_cast<double>(i + 1) * length);
+    if (begin >= to) return curve;
+    if (end <= begin) continue;
+    const Stretch stretch{line, cutter.radius(), begin, end};
+    cutter.find_contenders(line.at(begin), line.at(end), contenders);
+    envelope.clear();
+    for (const Contender& one : contenders) offer_facet(one, stretch, envelope);
+    for (const Contender& one : contenders) offer_boundary(one, stretch, envelope);
+    append(envelope.pieces(), curve);
+  }
+}
+
+}  // namespace lensforge
