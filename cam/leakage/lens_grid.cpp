@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cam/leakage/lens_grid.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "core/error.h"
+
+namespace lensforge {
+namespace {
+
+constexpr double kFinestSpacing = 1e-4;
+constexpr double kLargestSide = 1000.0;
+
+void check(const Eigen::Vector2d& size, double spacing) {
+  const bool fits = size.minCoeff() > 0.0 && size.maxCoeff() <= kLargestSide;
+  if (!fits) {
+    throw InputError("lens size is " + std::to_string(size.x()) + " x " + std::to_string(size.y()) +
+                     " mm: both sides must be above 0 and at most 1000");
+  }
+  if (!(spacing >= kFinestSpacing) || !std::isfinite(spacing)) {
+    throw InputError("spacing of the rendered surface is " + std::to_string(spacing) +
+                     " mm: must be at least 0.0001");
+  }
+}
+
+}  // namespace
+
+GridWindow lens_grid(const Eigen::Vector2d& size, double spacing) {
+  check(size, spacing);
+  const auto cells = [&](double side) {
+    return std::max<std::int64_t>(1, std::llround(std::ceil(side / spacing * (1.0 - 1e-12))));
+  };
+  const auto spacing_of = [](double side, std::int64_t nodes) {
+    const auto count = static_cast<double>(nodes - 1);
+    const double even = side / count;
+    return even * count > side ? std::nextafter(even, 0.0) : even;
+  };
+  GridWindow grid;
+  grid.columns = cells(size.x()) + 1;
+  grid.rows = cells(size.y()) + 1;
+  grid.spacing = {spacing_of(size.x(), grid.columns), spacing_of(size.y(), grid.rows)};
+  return grid;
+}
+
+GridWindow window_of(const GridWindow& grid, const CellRange& range, std::int64_t halo) {
+  GridWindow window = grid;
+  const std::int64_t column = std::max<std::int64_t>(0, range.column - halo);
+  const std::int64_t row = std::max<std::int64_t>(0, range.row - halo);
+  window.first_column = grid.first_column + column;
+  window.first_row = grid.first_row + row;
+  window.columns = std::min(grid.columns, range.column + range.columns + 1 + halo) - column;
+  window.rows = std::min(grid.rows, range.row + range.rows + 1 + halo) - row;
+  return window;
+}
+
+CellRange all_cells(const GridWindow& grid) { return {0, 0, grid.columns - 1, grid.rows - 1}; }
+
+std::vector<CellRange> tiles_of(const CellRange& range, std::int64_t side) {
+  LF_CHECK(side > 0, std::to_string(side));
+  std::vector<CellRange> tiles;
+  for (std::int64_t row = 0; row < range.rows; row += side) {
+    for (std::int64_t column = 0; column < range.columns; column += side) {
+      tiles.push_back({range.column + column, range.row + row,
+                       std::min(side, range.columns - column), std::min(side, range.rows - row)});
+    }
+  }
+  return tiles;
+}
+
+}  // namespace lensforge

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "cam/leakage/lens_grid.h"
+#include "cam/milled/surface_field.h"
+#include "core/executor.h"
+#include "core/image.h"
+#include "core/optical_setup.h"
+#include "core/run_control.h"
+
+namespace lensforge {
+
+/// What a surface throws onto the picture: share of the lens's flux per pixel, row by row from the
+/// top.
+struct FluxPicture {
+  int columns = 0;
+  int rows = 0;
+  std::vector<double> flux;
+
+  /// Share of the flux that lands on the picture at all.
+  [[nodiscard]] double inside() const;
+  /// The picture with `total` as the sum that all of the lens's flux would have.
+  [[nodiscard]] Image image(double total) const;
+};
+
+/// What every surface of a lens is rendered with.
+struct FieldRenderSetup {
+  OpticalSetup optics;
+  GridWindow grid;          ///< Over the whole lens, see lens_grid().
+  std::int64_t tile = 768;  ///< Side of the tiles that are sampled at once, cells: 30 MB.
+};
+
+/// Renders a surface tile by tile: memory does not grow with the grid. Every image triangle is
+/// deposited exactly (design/flux); what is neglected is how the slope bends inside a triangle.
+/// Same bits for any tile and any number of threads.
+/// @throw Interrupted if `control` or the executor asks for an end.
+FluxPicture render_field(const SurfaceField& field, const FieldRenderSetup& setup,
+                         const Executor& executor, const RunControl& control);
+
+/// What a part of the lens throws, as shares of the whole lens's flux.
+FluxPicture render_cells(const SurfaceField& field, const FieldRenderSetup& setup,
+                         const CellRange& cells, const Executor& executor,
+                         const RunControl& control);
+
+}  // namespace lensforge

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cam/leakage/surface_tile.h"
+
+#include <algorithm>
+#include <string>
+
+#include "core/error.h"
+
+namespace lensforge {
+
+namespace {
+
+double area_of(const GridWindow& grid) {
+  return grid.spacing.x() * static_cast<double>(grid.columns - 1) * grid.spacing.y() *
+         static_cast<double>(grid.rows - 1);
+}
+
+}  // namespace
+
+SurfaceTile::SurfaceTile(const OpticalSetup& setup, const GridWindow& grid)
+    : optics_(setup),
+      grid_(grid),
+      lens_area_(area_of(grid)),
+      triangle_flux_(0.5 * grid.spacing.prod() / lens_area_) {}
+
+void SurfaceTile::load(const SurfaceField& field, const CellRange& range,
+                       const Executor& executor) {
+  range_ = range;
+  halo_columns_ = std::min<std::int64_t>(1, range.column);
+  halo_rows_ = std::min<std::int64_t>(1, range.row);
+  const GridWindow window = window_of(grid_, range, 1);
+  field.sample(window, executor, patch_);
+  patch_.window = window;
+  const std::int64_t count = window.size();
+  LF_CHECK(static_cast<std::int64_t>(patch_.z.size()) == count, std::to_string(patch_.z.size()));
+  landing_.resize(static_cast<std::size_t>(count));
+  parallel_for(executor, "land nodes", count, [this](std::int64_t i) {
+    const auto k = static_cast<std::size_t>(i);
+    const Eigen::Vector2d at =
+        patch_.window.node(i % patch_.window.columns, i / patch_.window.columns);
+    landing_[k] = land_of(optics_, at, patch_.z[k], {patch_.slope_x[k], patch_.slope_y[k]});
+  });
+}
+
+/// Derivative of the slope along one axis, from the neighbours on the same cut; zero where there
+/// are none, so that the node's own beam is kept.
+Eigen::Vector2d SurfaceTile::bend_along(std::size_t node, std::int64_t step, bool has_before,
+                                        bool has_after) const {
+  const auto offset = static_cast<std::size_t>(step);
+  const std::int32_t cut = patch_.cut[node];
+  const bool before = has_before && patch_.cut[node - offset] == cut;
+  const bool after = has_after && patch_.cut[node + offset] == cut;
+  const std::size_t low = before ? node - offset : node;
+  const std::size_t high = after ? node + offset : node;
+  if (low == high) return {0.0, 0.0};
+  const double spacing = step == 1 ? grid_.spacing.x() : grid_.spacing.y();
+  const double distance = spacing * static_cast<double>(int{before} + int{after});
+  return Eigen::Vector2d(patch_.slope_x[high] - patch_.slope_x[low],
+                         patch_.slope_y[high] - patch_.slope_y[low]) /
+         distance;
+}
+
+SurfaceSide SurfaceTile::side_of(std::size_t node) const {
+  const GridWindow& window = patch_.window;
+  const std::int64_t i = static_cast<std::int64_t>(node) % window.columns;
+  const std::int64_t j = static_cast<std::int64_t>(node) / window.columns;
+  SurfaceSide side;
+  side.place = window.node(i, j);
+  side.z = patch_.z[node];
+  side.slope = {patch_.slope_x[node], patch_.slope_y[node]};
+  side.cut = patch_.cut[node];
+  const Eigen::Vector2d by_x = bend_along(node, 1, i > 0, i + 1 < window.columns);
+  const Eigen::Vector2d by_y = bend_along(node, window.columns, j > 0, j + 1 < window.rows);
+  const double twist = 0.5 * (by_x.y() + by_y.x());
+  side.bend << by_x.x(), twist, twist, by_y.y();
+  return side;
+}
+
+}  // namespace lensforge

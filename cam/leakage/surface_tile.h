@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "cam/leakage/crease_split.h"
+#include "cam/leakage/lens_grid.h"
+#include "cam/milled/surface_field.h"
+#include "core/executor.h"
+#include "core/optical_setup.h"
+#include "design/optics/image_triangle.h"
+#include "design/optics/projection.h"
+
+namespace lensforge {
+
+/// The image triangles of a rectangle of a sampled surface: two a cell, their corners where the
+/// refracted ray of the node's own slope lands; a triangle across a crease (nodes of different
+/// SurfacePatch::cut) is split by split_at_crease(). Keeps its buffers between tiles.
+class SurfaceTile {
+ public:
+  /// @param grid  the whole lens; fluxes are shares of its area.
+  SurfaceTile(const OpticalSetup& setup, const GridWindow& grid);
+
+  /// Samples the surface over `range` with one more node on every side where the grid has one, so
+  /// that creases on the tile's rim are split as they are inside.
+  void load(const SurfaceField& field, const CellRange& range, const Executor& executor);
+
+  [[nodiscard]] const CellRange& range() const { return range_; }
+  [[nodiscard]] std::int64_t cells() const { return range_.columns * range_.rows; }
+
+  /// Height at node (i, j) counted from the tile's least corner, mm.
+  [[nodiscard]] double height(std::int64_t i, std::int64_t j) const {
+    return patch_.z[node_of(i, j)];
+  }
+  /// Place of the same node, mm.
+  [[nodiscard]] Eigen::Vector2d place(std::int64_t i, std::int64_t j) const {
+    return grid_.node(range_.column + i, range_.row + j);
+  }
+
+  /// Hands the image triangles of a cell, counted row by row, to `sink`.
+  template <class Sink>
+  void visit_cell(std::int64_t cell, const Sink& sink) const {
+    const std::int64_t i = cell % range_.columns;
+    const std::int64_t j = cell / range_.columns;
+    const std::size_t a = node_of(i, j);
+    const std::size_t d = node_of(i, j + 1);
+    visit_triangle(a, a + 1, d + 1, sink);
+    visit_triangle(a, d + 1, d, sink);
+  }
+
+ private:
+  [[nodiscard]] std::size_t node_of(std::int64_t i, std::int64_t j) const {
+    return static_cast<std::size_t>((j + halo_rows_) * patch_.window.columns + i + halo_columns_);
+  }
+  [[nodiscard]] bool is_smooth(std::size_t a, std::size_t b, std::size_t c) const {
+    return patch_.cut.empty() || (patch_.cut[a] == patch_.cut[b] && patch_.cut[a] == patch_.cut[c]);
+  }
+  template <class Sink>
+  void visit_triangle(std::size_t a, std::size_t b, std::size_t c, const Sink& sink) const {
+    if (is_smooth(a, b, c)) {
+      sink(ImageTriangle{landing_[a], landing_[b], landing_[c], triangle_flux_});
+    } else {
+      split_at_crease({side_of(a), side_of(b), side_of(c)}, optics_, lens_area_, sink);
+    }
+  }
+  [[nodiscard]] SurfaceSide side_of(std::size_t node) const;
+  [[nodiscard]] Eigen::Vector2d bend_along(std::size_t node, std::int64_t step, bool has_before,
+                                           bool has_after) const;
+
+  Projection optics_;
+  GridWindow grid_;
+  double lens_area_;
+  double triangle_flux_;
+  CellRange range_;
+  std::int64_t halo_columns_ = 0;  ///< Nodes of the patch left of the tile.
+  std::int64_t halo_rows_ = 0;
+  SurfacePatch patch_;
+  std::vector<Eigen::Vector2d> landing_;  ///< One per node, pixel coordinates; NaN without light.
+};
+
+}  // namespace lensforge
