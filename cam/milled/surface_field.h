@@ -42,6 +42,16 @@ struct SurfacePatch {
   std::vector<std::int32_t> cut;
 };
 
+/// Makes room for a window's nodes. @param cuts  whether the surface has pieces.
+inline void resize_patch(const GridWindow& window, bool cuts, SurfacePatch& patch) {
+  const auto count = static_cast<std::size_t>(window.size());
+  patch.window = window;
+  patch.z.resize(count);
+  patch.slope_x.resize(count);
+  patch.slope_y.resize(count);
+  patch.cut.resize(cuts ? count : 0);
+}
+
 /// A surface that is known as finely as one likes, window by window, so that a whole lens never has
 /// to be in memory: the designed one, what a ball can reach of it, what a program leaves, what
 /// polishing makes of that.

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+
+#include "cam/milled/ball_path.h"
+
+/// The lower envelope of a ball that is swept along one move.
+///
+/// Notation: R ball radius, c(s) way of its centre, q a place seen from above. The ball cuts down
+/// to
+///     z(q) = min over s of  c.z(s) − √(R² − |q − c.xy(s)|²).
+/// The minimum lies at an end of the way or where the derivative is zero; the surface's normal
+/// there is the ball's, (c − (q, z))/R. In a vertical plane at the distance w from that of the way
+/// the ball is a circle of radius r = √(R² − w²).
+namespace lensforge {
+
+/// Height where a ball does not pass over.
+inline constexpr double kUncut = std::numeric_limits<double>::infinity();
+
+/// Height of the lower side of a ball around `centre` over q; kUncut outside of it.
+inline double ball_below(const Eigen::Vector3d& centre, double radius, double x, double y) {
+  const double dx = x - centre.x();
+  const double dy = y - centre.y();
+  const double room = radius * radius - (dx * dx + dy * dy);
+  return room >= 0.0 ? centre.z() - std::sqrt(room) : kUncut;
+}
+
+/// Slopes of a ball's lower side over q. @pre q is under the ball.
+inline Eigen::Vector2d ball_slope(const Eigen::Vector3d& centre, double radius,
+                                  const Eigen::Vector2d& q) {
+  const Eigen::Vector2d offset = q - centre.head<2>();
+  return offset / std::sqrt(std::max(radius * radius - offset.squaredNorm(), 0.0));
+}
+
+/// A straight move, prepared. On a line of slope m the derivative is zero at
+/// s = s_q − r m/√(1 + m²), and z is convex in s, so that s clamped to the move is the minimum.
+struct StraightSweep {
+  double x = 0.0, y = 0.0, z = 0.0;  ///< Start.
+  double ux = 0.0, uy = 0.0;         ///< Heading; zero for a vertical move.
+  double run = 0.0;                  ///< Length seen from above.
+  double slope = 0.0;                ///< m
+  double sine = 0.0;                 ///< m/√(1 + m²)
+
+  explicit StraightSweep(const BallMove& move) {
+    const Eigen::Vector3d way = move.end - move.start;
+    run = way.head<2>().norm();
+    x = move.start.x();
+    y = move.start.y();
+    z = run > 0.0 ? move.start.z() : std::min(move.start.z(), move.end.z());
+    if (!(run > 0.0)) return;
+    ux = way.x() / run;
+    uy = way.y() / run;
+    slope = way.z() / run;
+    sine = slope / std::sqrt(1.0 + slope * slope);
+  }
+
+  /// s of the ball that cuts deepest over q.
+  [[nodiscard]] double foot(double radius, double qx, double qy) const {
+    const double dx = qx - x;
+    const double dy = qy - y;
+    const double w = ux * dy - uy * dx;
+    const double r = std::sqrt(std::max(radius * radius - w * w, 0.0));
+    return std::min(std::max(ux * dx + uy * dy - r * sine, 0.0), run);
+  }
+
+  [[nodiscard]] Eigen::Vector3d centre(double s) const {
+    return {x + s * ux, y + s * uy, z + s * slope};
+  }
+};
+
+/// A circular move, prepared: an arc in a horizontal plane or in one along an axis.
+class ArcSweep {
+ public:
+  /// @pre the arc turns less than half a turn and does not rise.
+  explicit ArcSweep(const Arc& arc);
+
+  /// Centre of the ball that cuts deepest over q; where none does, one that does not either.
+  [[nodiscard]] Eigen::Vector3d centre(double radius, double qx, double qy) const;
+
+ private:
+  [[nodiscard]] bool contains(double first, double second) const;
+  [[nodiscard]] Eigen::Vector3d point(double first, double second) const;
+
+  int first_, second_, third_;
+  Eigen::Vector3d centre_;
+  double radius_;
+  double turn_;            ///< 1 counter-clockwise, −1 clockwise.
+  Eigen::Vector2d begin_;  ///< Start and end relative to the centre, in the plane.
+  Eigen::Vector2d end_;
+};
+
+}  // namespace lensforge

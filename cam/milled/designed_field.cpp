@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cam/milled/designed_field.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/decimal_text.h"
+#include "core/error.h"
+
+namespace lensforge {
+namespace {
+
+/// Nodes along either side of the blocks that are filled at once.
+constexpr std::int64_t kBlockSide = 64;
+
+/// Nodes this far outside of a facet, in units of its height over an edge, count as on it, so that
+/// no gap opens between neighbours.
+constexpr double kOnFacet = 1e-9;
+
+/// One facet seen from above.
+struct Facet {
+  Eigen::Vector3d corner;                ///< The first.
+  Eigen::Vector2d slope;                 ///< ∂z/∂x, ∂z/∂y
+  Eigen::Vector2d low, high;             ///< Box.
+  Eigen::Matrix<double, 3, 2> gradient;  ///< Of the barycentric coordinates.
+
+  Facet(const SurfaceMesh& mesh, std::int32_t triangle) : corner(mesh.corner(triangle, 0)) {
+    const Eigen::Vector3d b = mesh.corner(triangle, 1);
+    const Eigen::Vector3d c = mesh.corner(triangle, 2);
+    const Eigen::Vector3d u = b - corner;
+    const Eigen::Vector3d v = c - corner;
+    const Eigen::Vector3d normal = u.cross(v);
+    slope = -normal.head<2>() / normal.z();
+    low = corner.cwiseMin(b).cwiseMin(c).head<2>();
+    high = corner.cwiseMax(b).cwiseMax(c).head<2>();
+    gradient.row(1) = Eigen::RowVector2d(v.y(), -v.x()) / normal.z();
+    gradient.row(2) = Eigen::RowVector2d(-u.y(), u.x()) / normal.z();
+    gradient.row(0) = -gradient.row(1) - gradient.row(2);
+  }
+
+  [[nodiscard]] Eigen::Vector3d barycentric(double x, double y) const {
+    Eigen::Vector3d at = gradient * Eigen::Vector2d(x - corner.x(), y - corner.y());
+    at[0] += 1.0;
+    return at;
+  }
+
+  [[nodiscard]] double height(double x, double y) const {
+    return corner.z() + slope.x() * (x - corner.x()) + slope.y() * (y - corner.y());
+  }
+
+  /// How far a point lies beyond the line through an edge at most, mm; ≤ 0 inside.
+  [[nodiscard]] double outside(double x, double y) const {
+    const Eigen::Vector3d at = barycentric(x, y);
+    return (-at.array() / gradient.rowwise().norm().array()).maxCoeff();
+  }
+};
+
+/// First and last node of a row of `count` nodes in from … to, by their coordinate.
+template <class Coordinate>
+std::pair<std::int64_t, std::int64_t> nodes_between(const Coordinate& at, double spacing,
+                                                    std::int64_t begin, std::int64_t end,
+                                                    std::pair<double, double> range) {
+  const auto guess = [&](double x) {
+    const double k = std::clamp((x - at(begin)) / spacing, -1.0, static_cast<double>(end - begin));
+    return begin + static_cast<std::int64_t>(std::floor(k));
+  };
+  return {std::max(begin, guess(range.first) - 1), std::min(end, guess(range.second) + 2)};
+}
+
+/// A block of a window's nodes: columns and rows [begin, end).
+struct NodeBlock {
+  std::int64_t column, column_end, row, row_end;
+};
+
+class BlockFiller {
+ public:
+  BlockFiller(const FacetGrid& grid, const NodeBlock& block, SurfacePatch& patch)
+      : grid_(grid), block_(block), patch_(patch) {}
+
+  void fill() {
+    const GridWindow& window = patch_.window;
+    for (std::int64_t j = block_.row; j < block_.row_end; ++j) {
+      for (std::int64_t i = block_.column; i < block_.column_end; ++i) patch_.cut[node(i, j)] = -1;
+    }
+    const Eigen::AlignedBox2d box(window.node(block_.column, block_.row),
+                                  window.node(block_.column_end - 1, block_.row_end - 1));
+    const std::vector<std::int32_t> near = grid_.near(box);
+    for (const std::int32_t t : near) fill_facet(t);
+    for (std::int64_t j = block_.row; j < block_.row_end; ++j) {
+      for (std::int64_t i = block_.column; i < block_.column_end; ++i) {
+        if (patch_.cut[node(i, j)] < 0) fill_beside(near, i, j);
+      }
+    }
+  }
+
+ private:
+  [[nodiscard]] std::size_t node(std::int64_t i, std::int64_t j) const {
+    return static_cast<std::size_t>(j * patch_.window.columns + i);
+  }
+
+  void put(const Facet& facet, std::int32_t triangle, std::int64_t i, std::int64_t j) {
+    const std::size_t n = node(i, j);
+    patch_.z[n] = facet.height(patch_.window.x(i), patch_.window.y(j));
+    patch_.slope_x[n] = facet.slope.x();
+    patch_.slope_y[n] = facet.slope.y();
+    patch_.cut[n] = triangle;
+  }
+
+  void fill_facet(std::int32_t triangle) {
+    const GridWindow& window = patch_.window;
+    const Facet facet(grid_.mesh(), triangle);
+    const auto [row, row_end] =
+        nodes_between([&](std::int64_t j) { return window.y(j); }, window.spacing.y(), block_.row,
+                      block_.row_end, {facet.low.y(), facet.high.y()});
+    const auto [column, column_end] =
+        nodes_between([&](std::int64_t i) { return window.x(i); }, window.spacing.x(),
+                      block_.column, block_.column_end, {facet.low.x(), facet.high.x()});
+    for (std::int64_t j = row; j < row_end; ++j) {
+      for (std::int64_t i = column; i < column_end; ++i) {
+        if (patch_.cut[node(i, j)] >= 0) continue;
+        if (facet.barycentric(window.x(i), window.y(j)).minCoeff() < -kOnFacet) continue;
+        put(facet, triangle, i, j);
+      }
+    }
+  }
+
+  void fill_beside(const std::vector<std::int32_t>& near, std::int64_t i, std::int64_t j) {
+    const Eigen::Vector2d q = patch_.window.node(i, j);
+    double nearest = FacetGrid::kRim;
+    for (const std::int32_t t : near) {
+      const Facet facet(grid_.mesh(), t);
+      const double outside = facet.outside(q.x(), q.y());
+      if (outside >= nearest) continue;
+      nearest = outside;
+      put(facet, t, i, j);
+    }
+    if (patch_.cut[node(i, j)] >= 0) return;
+    throw InputError("surface: nothing at x " + decimal_text(q.x(), 3) + " y " +
+                     decimal_text(q.y(), 3) + " mm; it has to cover the whole lens");
+  }
+
+  const FacetGrid& grid_;
+  NodeBlock block_;
+  SurfacePatch& patch_;
+};
+
+}  // namespace
+
+void FacetField::sample(const GridWindow& window, const Executor& executor,
+                        SurfacePatch& patch) const {
+  resize_patch(window, true, patch);
+  const std::int64_t across = (window.columns + kBlockSide - 1) / kBlockSide;
+  const std::int64_t blocks = across * ((window.rows + kBlockSide - 1) / kBlockSide);
+  const auto fill = [&](std::int64_t b) {
+    const std::int64_t column = b % across * kBlockSide;
+    const std::int64_t row = b / across * kBlockSide;
+    BlockFiller(grid_,
+                {column, std::min(window.columns, column + kBlockSide), row,
+                 std::min(window.rows, row + kBlockSide)},
+                patch)
+        .fill();
+  };
+  parallel_for(executor, "designed surface", blocks, fill, 1);
+}
+
+}  // namespace lensforge

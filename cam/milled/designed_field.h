@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "cam/milled/facet_grid.h"
+#include "cam/milled/surface_field.h"
+#include "core/surface_mesh.h"
+
+namespace lensforge {
+
+/// The facets of a mesh as they are; `cut` is the number of the facet, the lowest one on a seam.
+/// Nodes beside the mesh, up to FacetGrid::kRim, lie on the plane of the nearest facet.
+class FacetField final : public SurfaceField {
+ public:
+  /// @param mesh  must outlive the field. @pre every triangle faces +z, and there is one.
+  explicit FacetField(const SurfaceMesh& mesh) : grid_(mesh) {}
+
+  /// @throw InputError naming a node that is farther than that from the mesh.
+  void sample(const GridWindow& window, const Executor& executor,
+              SurfacePatch& patch) const override;
+
+  [[nodiscard]] const FacetGrid& grid() const { return grid_; }
+
+ private:
+  FacetGrid grid_;
+};
+
+}  // namespace lensforge

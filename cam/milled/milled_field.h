@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <vector>
+
+#include "cam/milled/ball_path.h"
+#include "cam/milled/surface_field.h"
+
+namespace lensforge {
+
+/// What programs leave of a blank: the lower envelope of the balls swept along every move, in
+/// double precision; slopes are those of the ball that touched the node last
+/// (MilledField.EqualsBruteForce…).
+///
+/// `cut` is 0 where the blank's top was not touched; else it tells the piece of the path
+/// (BallPath), counted through all paths from 1.
+class MilledField final : public SurfaceField {
+ public:
+  /// @param paths      of one blank, each of one ball; moves above the blank cost nothing.
+  /// @param blank_top  mm, lens frame.
+  MilledField(std::vector<BallPath> paths, double blank_top);
+
+  void sample(const GridWindow& window, const Executor& executor,
+              SurfacePatch& patch) const override;
+
+ private:
+  /// A part of a move no longer than a cell: box of the ball's centre seen from above and its least
+  /// z, rounded outwards.
+  struct Span {
+    float x_min, x_max, y_min, y_max, z_min;
+    std::int32_t move;
+  };
+  /// Spans in the cell of their box's centre.
+  struct SpanGrid {
+    Eigen::Vector2d origin{0.0, 0.0};
+    double cell = 0.0;  ///< Side of a cell, mm.
+    std::int64_t columns = 0;
+    std::int64_t rows = 0;
+    std::vector<std::int64_t> begin;  ///< First span of each cell, row by row, and the end.
+    std::vector<Span> spans;
+    std::int32_t first_cut = 1;  ///< Of the path's pieces.
+  };
+  /// A span and a height below which it cuts no node of a block.
+  struct Candidate {
+    double bound;
+    std::int64_t span;
+  };
+  struct Block;
+
+  static std::vector<Span> spans_of(const BallPath& path, double blank_top);
+  static SpanGrid make_grid(const std::vector<Span>& spans, double cell);
+  static std::vector<Candidate> candidates_of(const SpanGrid& grid, const Block& block);
+  void cut_block(std::size_t path, Block& block) const;
+  void write_block(const Block& block, SurfacePatch& patch) const;
+  [[nodiscard]] Eigen::Vector2d slope_at(std::size_t path, const BallMove& move,
+                                         const Eigen::Vector2d& q) const;
+
+  std::vector<BallPath> paths_;
+  std::vector<SpanGrid> grids_;
+  double blank_top_;
+};
+
+}  // namespace lensforge
