@@ -4,30 +4,28 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
-#include <fstream>
-#include <iterator>
 
 #include "core/error.h"
-#include "machine/guard/map_fields.h"
+#include "core/toml_fields.h"
 #include "machine/guard/map_folder.h"
 
 namespace lensforge {
 namespace {
 
-constexpr std::uintmax_t kLargestFile = 1U << 20U;
+constexpr const char* kKind = "a register map";
 constexpr double kMaxRpm = 200000.0;
 /// The rates that libmodbus sets; for any other it takes 9600 without a word.
 constexpr std::array kBauds = {1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200, 230400};
 
-std::uint16_t word(MapFields& fields, const std::string& key) {
+std::uint16_t word(TomlFields& fields, const std::string& key) {
   return static_cast<std::uint16_t>(fields.whole({key, 0, 65535}));
 }
 
-std::uint16_t word_or(MapFields& fields, const std::string& key, std::uint16_t otherwise) {
+std::uint16_t word_or(TomlFields& fields, const std::string& key, std::uint16_t otherwise) {
   return static_cast<std::uint16_t>(fields.whole_or({key, 0, 65535}, otherwise));
 }
 
-RegisterAddress read_address(MapFields& fields) {
+RegisterAddress read_address(TomlFields& fields) {
   const RegisterAddress at{fields.whole({"function", 0, 255}), fields.whole({"address", 0, 65535})};
   if (at.function < 1 || at.function > 4) {
     fields.refuse("function",
@@ -37,7 +35,7 @@ RegisterAddress read_address(MapFields& fields) {
   return at;
 }
 
-RegisterAddress write_address(MapFields& fields) {
+RegisterAddress write_address(TomlFields& fields) {
   const RegisterAddress at{fields.whole({"function", 0, 255}), fields.whole({"address", 0, 65535})};
   if (at.function != 5 && at.function != 6 && at.function != 15 && at.function != 16) {
     fields.refuse("function", "writing takes 5 or 15 (coil), 6 or 16 (holding register)");
@@ -49,7 +47,7 @@ bool is_bit(const RegisterAddress& at) {
   return at.function == 1 || at.function == 2 || at.function == 5 || at.function == 15;
 }
 
-ReadSignal read_signal(MapFields& fields) {
+ReadSignal read_signal(TomlFields& fields) {
   ReadSignal signal;
   signal.key = fields.path();
   signal.at = read_address(fields);
@@ -61,7 +59,7 @@ ReadSignal read_signal(MapFields& fields) {
 }
 
 /// A value that is compared with masked readings must lie within the mask.
-std::uint16_t masked_word(MapFields& fields, const std::string& key, const ReadSignal& signal) {
+std::uint16_t masked_word(TomlFields& fields, const std::string& key, const ReadSignal& signal) {
   const std::uint16_t value = word(fields, key);
   if ((value & ~signal.mask) != 0) {
     fields.refuse(key, "has bits outside the mask, so that no reading can ever equal it");
@@ -69,7 +67,7 @@ std::uint16_t masked_word(MapFields& fields, const std::string& key, const ReadS
   return value;
 }
 
-SpeedScale read_scale(MapFields& fields) {
+SpeedScale read_scale(TomlFields& fields) {
   SpeedScale scale;
   scale.in_hertz = fields.one_of("quantity", {"hz", "rpm"}) == "hz";
   scale.scale = fields.number({"scale", 1e-6, 1e6});
@@ -78,7 +76,7 @@ SpeedScale read_scale(MapFields& fields) {
   return scale;
 }
 
-SpeedSignal read_speed(MapFields fields) {
+SpeedSignal read_speed(TomlFields fields) {
   SpeedSignal speed;
   speed.signal = read_signal(fields);
   if (is_bit(speed.signal.at)) fields.refuse("function", "a speed is no bit: 3 or 4 is needed");
@@ -87,14 +85,14 @@ SpeedSignal read_speed(MapFields fields) {
   return speed;
 }
 
-FlagSignal read_flag(MapFields& fields) {
+FlagSignal read_flag(TomlFields& fields) {
   FlagSignal flag;
   flag.signal = read_signal(fields);
   flag.expected = masked_word(fields, "expected", flag.signal);
   return flag;
 }
 
-DirectionSignal read_direction(MapFields fields) {
+DirectionSignal read_direction(TomlFields fields) {
   DirectionSignal direction;
   direction.signal = read_signal(fields);
   direction.forward = masked_word(fields, "forward", direction.signal);
@@ -106,7 +104,7 @@ DirectionSignal read_direction(MapFields fields) {
   return direction;
 }
 
-std::uint16_t fault_code(const MapFields& texts, const std::string& key) {
+std::uint16_t fault_code(const TomlFields& texts, const std::string& key) {
   unsigned code = 0;
   const char* end = key.data() + key.size();
   const auto [stop, error] = std::from_chars(key.data(), end, code);
@@ -116,12 +114,12 @@ std::uint16_t fault_code(const MapFields& texts, const std::string& key) {
   return static_cast<std::uint16_t>(code);
 }
 
-FaultSignal read_fault(MapFields fields) {
+FaultSignal read_fault(TomlFields fields) {
   FaultSignal fault;
   fault.signal = read_signal(fields);
   fault.clear = masked_word(fields, "clear", fault.signal);
   if (fields.has("texts")) {
-    MapFields texts = fields.table("texts");
+    TomlFields texts = fields.table("texts");
     for (const std::string& key : texts.keys()) {
       fault.texts[fault_code(texts, key)] = texts.text(key);
     }
@@ -130,9 +128,9 @@ FaultSignal read_fault(MapFields fields) {
   return fault;
 }
 
-std::vector<WriteStep> read_steps(MapFields& commands, const std::string& key) {
+std::vector<WriteStep> read_steps(TomlFields& commands, const std::string& key) {
   std::vector<WriteStep> steps;
-  for (MapFields& fields : commands.tables(key)) {
+  for (TomlFields& fields : commands.tables(key)) {
     WriteStep step{write_address(fields), word(fields, "value")};
     if (is_bit(step.at) && step.value > 1) fields.refuse("value", "a coil takes 0 or 1");
     fields.finish();
@@ -141,16 +139,16 @@ std::vector<WriteStep> read_steps(MapFields& commands, const std::string& key) {
   return steps;
 }
 
-void check_speed_range(const SpindleMap& spindle, const MapFields& fields) {
+void check_speed_range(const SpindleMap& spindle, const TomlFields& fields) {
   for (const double rpm : {spindle.rpm_min, spindle.rpm_max}) {
     if (raw_of_rpm(spindle.commands->scale, spindle.rpm_per_hz, rpm)) continue;
     fields.refuse("scale", "rpm_min to rpm_max must fit into the register with this scale");
   }
 }
 
-SpindleCommands read_commands(MapFields fields, SpindleMap& spindle) {
+SpindleCommands read_commands(TomlFields fields, SpindleMap& spindle) {
   SpindleCommands commands;
-  MapFields speed = fields.table("set_speed");
+  TomlFields speed = fields.table("set_speed");
   commands.set_speed = write_address(speed);
   if (is_bit(commands.set_speed)) speed.refuse("function", "a speed is no bit: 6 or 16 is needed");
   commands.scale = read_scale(speed);
@@ -166,7 +164,7 @@ SpindleCommands read_commands(MapFields fields, SpindleMap& spindle) {
 }
 
 /// A map without a fault register has to say why, so that nobody leaves it out unawares.
-void read_fault_or_reason(MapFields& status, SpindleMap& spindle) {
+void read_fault_or_reason(TomlFields& status, SpindleMap& spindle) {
   if (status.has("fault")) {
     spindle.fault = read_fault(status.table("fault"));
   } else if (status.has("no_fault_register")) {
@@ -178,11 +176,11 @@ void read_fault_or_reason(MapFields& status, SpindleMap& spindle) {
   }
 }
 
-void read_status(MapFields status, SpindleMap& spindle) {
+void read_status(TomlFields status, SpindleMap& spindle) {
   spindle.speed = read_speed(status.table("speed"));
   read_fault_or_reason(status, spindle);
   if (status.has("at_speed")) {
-    MapFields fields = status.table("at_speed");
+    TomlFields fields = status.table("at_speed");
     spindle.at_speed = read_flag(fields);
     fields.finish();
   }
@@ -190,7 +188,7 @@ void read_status(MapFields status, SpindleMap& spindle) {
   status.finish();
 }
 
-SpindleMap read_spindle(MapFields fields) {
+SpindleMap read_spindle(TomlFields fields) {
   SpindleMap spindle;
   spindle.rpm_min = fields.number({"rpm_min", 1.0, kMaxRpm});
   spindle.rpm_max = fields.number({"rpm_max", 1.0, kMaxRpm});
@@ -211,9 +209,9 @@ SpindleMap read_spindle(MapFields fields) {
   return spindle;
 }
 
-std::vector<Interlock> read_interlocks(MapFields& root) {
+std::vector<Interlock> read_interlocks(TomlFields& root) {
   std::vector<Interlock> interlocks;
-  for (MapFields& fields : root.tables("interlocks")) {
+  for (TomlFields& fields : root.tables("interlocks")) {
     const std::string name = fields.text("name");
     for (const Interlock& other : interlocks) {
       if (other.name == name) fields.refuse("name", "is the name of an interlock above");
@@ -225,7 +223,7 @@ std::vector<Interlock> read_interlocks(MapFields& root) {
   return interlocks;
 }
 
-void read_serial(MapFields& fields, BusTransport& transport) {
+void read_serial(TomlFields& fields, BusTransport& transport) {
   transport.device = fields.text("device");
   transport.baud = fields.whole({"baud", 1200, 230400});
   if (std::find(kBauds.begin(), kBauds.end(), transport.baud) == kBauds.end()) {
@@ -240,14 +238,14 @@ void read_serial(MapFields& fields, BusTransport& transport) {
   transport.late_answer_window = fields.number({"late_answer_window", 0.0, 30.0});
 }
 
-void read_network(MapFields& fields, BusTransport& transport) {
+void read_network(TomlFields& fields, BusTransport& transport) {
   transport.host = fields.text("host");
   transport.port = fields.whole({"port", 1, 65535});
   transport.unit = fields.whole({"unit", 0, 255});
   transport.connect_timeout = fields.number({"connect_timeout", 0.01, 30.0});
 }
 
-BusTransport read_transport(MapFields fields) {
+BusTransport read_transport(TomlFields fields) {
   BusTransport transport;
   transport.is_tcp = fields.one_of("kind", {"rtu", "tcp"}) == "tcp";
   if (transport.is_tcp) {
@@ -268,7 +266,7 @@ BusTransport read_transport(MapFields fields) {
   return transport;
 }
 
-void check_protocol(MapFields& root) {
+void check_protocol(TomlFields& root) {
   (void)root.one_of("format", {"lensforge.register-map"});
   if (root.whole({"version", 0, 1e6}) != 1) root.refuse("version", "this program reads version 1");
   const std::string protocol = root.text("protocol");
@@ -276,20 +274,11 @@ void check_protocol(MapFields& root) {
   if (protocol != "modbus") root.refuse("protocol", "must be modbus");
 }
 
-toml::table parsed(std::string_view text, const std::string& file) {
-  try {
-    return toml::parse(text);
-  } catch (const toml::parse_error& e) {
-    throw InputError(one_line(file + ": line " + std::to_string(e.source().begin.line) +
-                              ": not TOML: " + std::string(e.description())));
-  }
-}
-
 }  // namespace
 
 RegisterMap parse_register_map(std::string_view text, const std::string& file) {
-  const toml::table table = parsed(text, file);
-  MapFields root(table, file, "");
+  const toml::table table = parse_toml(text, file);
+  TomlFields root(table, {file, kKind});
   check_protocol(root);
   RegisterMap map;
   map.name = root.text("name");
@@ -304,17 +293,7 @@ RegisterMap parse_register_map(std::string_view text, const std::string& file) {
 }
 
 RegisterMap read_register_map(const std::filesystem::path& path) {
-  std::error_code error;
-  const std::uintmax_t size = std::filesystem::file_size(path, error);
-  if (error) throw InputError(path.string() + ": cannot be read: " + error.message());
-  if (size > kLargestFile) {
-    throw InputError(path.string() + ": " + std::to_string(size) +
-                     " bytes: a register map has at most 1 MiB");
-  }
-  std::ifstream file(path, std::ios::binary);
-  const std::string text{std::istreambuf_iterator<char>(file), {}};
-  if (!file) throw InputError(path.string() + ": cannot be read");
-  return parse_register_map(text, path.string());
+  return parse_register_map(read_toml_file(path, kKind), path.string());
 }
 
 void set_endpoint(RegisterMap& map, const std::string& endpoint) {

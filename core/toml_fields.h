@@ -3,6 +3,7 @@
 
 #include <toml++/toml.h>
 
+#include <filesystem>
 #include <initializer_list>
 #include <set>
 #include <string>
@@ -11,7 +12,7 @@
 
 namespace lensforge {
 
-/// A number that a register map may hold: its key, least and greatest value.
+/// A number that a TOML document may hold: its key, least and greatest value.
 struct NumberRule {
   std::string key;
   double least;
@@ -21,26 +22,45 @@ struct NumberRule {
 /// @return `text` with a question mark for each control character.
 std::string one_line(std::string text);
 
-/// A table of a register map, read strictly: every getter remembers its key, and finish() refuses
+/// Where a document comes from and what it is, for messages.
+struct TomlSource {
+  std::string file;  ///< As the user named it.
+  std::string kind;  ///< With its article: "a register map".
+};
+
+/// @throw InputError naming file and line if `text` is not TOML.
+toml::table parse_toml(std::string_view text, const std::string& file);
+
+/// The text of a small file. @throw InputError naming the file and why it cannot be read, or that
+/// it has more than 1 MiB.
+std::string read_toml_file(const std::filesystem::path& path, const std::string& kind);
+
+/// A table of a TOML document, read strictly: every getter remembers its key, and finish() refuses
 /// any key that none asked for. All throw InputError naming file, key, value and rule.
-class MapFields {
+class TomlFields {
  public:
-  MapFields(const toml::table& table, std::string file, std::string path)
-      : table_(table), file_(std::move(file)), path_(std::move(path)) {}
+  /// @param table  must outlive the fields.
+  TomlFields(const toml::table& table, TomlSource source, std::string path = {})
+      : table_(table), source_(std::move(source)), path_(std::move(path)) {}
 
   [[nodiscard]] bool has(const std::string& key) const { return table_.contains(key); }
   /// Not blank, one line, at most 200 bytes.
   [[nodiscard]] std::string text(const std::string& key);
+  /// As text(), or `otherwise` where the key is missing.
+  [[nodiscard]] std::string text_or(const std::string& key, const std::string& otherwise);
+  /// An array of strings, each as text(); it may be empty.
+  [[nodiscard]] std::vector<std::string> texts(const std::string& key);
   [[nodiscard]] std::string one_of(const std::string& key,
                                    std::initializer_list<std::string_view> words);
   [[nodiscard]] double number(const NumberRule& rule);
   [[nodiscard]] double number_or(const NumberRule& rule, double otherwise);
   [[nodiscard]] int whole(const NumberRule& rule);
   [[nodiscard]] int whole_or(const NumberRule& rule, int otherwise);
+  [[nodiscard]] bool flag(const std::string& key);
   [[nodiscard]] bool flag_or(const std::string& key, bool otherwise);
-  [[nodiscard]] MapFields table(const std::string& key);
+  [[nodiscard]] TomlFields table(const std::string& key);
   /// The tables of an array that is there and not empty.
-  [[nodiscard]] std::vector<MapFields> tables(const std::string& key);
+  [[nodiscard]] std::vector<TomlFields> tables(const std::string& key);
   /// The keys of this table, as they stand.
   [[nodiscard]] std::vector<std::string> keys() const;
   /// @throw InputError for a key that none asked for.
@@ -48,7 +68,7 @@ class MapFields {
 
   /// "spindle.status.speed" for the key "speed" of this table.
   [[nodiscard]] std::string name_of(const std::string& key) const;
-  /// Where the map has this table, e.g. "spindle.status".
+  /// Where the document has this table, e.g. "spindle.status".
   [[nodiscard]] const std::string& path() const { return path_; }
   /// @throw InputError: file, key, the value as it stands, the rule.
   [[noreturn]] void refuse(const std::string& key, const std::string& rule) const;
@@ -57,7 +77,7 @@ class MapFields {
   const toml::node& required(const std::string& key);
 
   const toml::table& table_;
-  std::string file_;
+  TomlSource source_;
   std::string path_;
   std::set<std::string> known_;
 };

@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "machine/guard/map_fields.h"
+#include "core/toml_fields.h"
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
+#include <iterator>
 #include <sstream>
+#include <system_error>
 
 #include "core/error.h"
 
@@ -11,6 +14,7 @@ namespace lensforge {
 namespace {
 
 constexpr std::size_t kLongestText = 200;
+constexpr std::uintmax_t kLargestFile = 1U << 20U;
 
 /// The value as the file has it; a table or an array only by its kind.
 std::string shown(const toml::node* value) {
@@ -48,31 +52,72 @@ std::string one_line(std::string text) {
   return text;
 }
 
-std::string MapFields::name_of(const std::string& key) const {
+toml::table parse_toml(std::string_view text, const std::string& file) {
+  try {
+    return toml::parse(text);
+  } catch (const toml::parse_error& e) {
+    throw InputError(one_line(file + ": line " + std::to_string(e.source().begin.line) +
+                              ": not TOML: " + std::string(e.description())));
+  }
+}
+
+std::string read_toml_file(const std::filesystem::path& path, const std::string& kind) {
+  std::error_code error;
+  const std::uintmax_t size = std::filesystem::file_size(path, error);
+  if (error) throw InputError(path.string() + ": cannot be read: " + error.message());
+  if (size > kLargestFile) {
+    throw InputError(path.string() + ": " + std::to_string(size) + " bytes: " + kind +
+                     " has at most 1 MiB");
+  }
+  std::ifstream file(path, std::ios::binary);
+  std::string text{std::istreambuf_iterator<char>(file), {}};
+  if (!file) throw InputError(path.string() + ": cannot be read");
+  return text;
+}
+
+std::string TomlFields::name_of(const std::string& key) const {
   return path_.empty() ? key : path_ + "." + key;
 }
 
-void MapFields::refuse(const std::string& key, const std::string& rule) const {
+void TomlFields::refuse(const std::string& key, const std::string& rule) const {
   throw InputError(
-      one_line(file_ + ": " + name_of(key) + ": " + shown(table_.get(key)) + ": " + rule));
+      one_line(source_.file + ": " + name_of(key) + ": " + shown(table_.get(key)) + ": " + rule));
 }
 
-const toml::node& MapFields::required(const std::string& key) {
+const toml::node& TomlFields::required(const std::string& key) {
   known_.insert(key);
   const toml::node* value = table_.get(key);
-  if (value == nullptr) refuse(key, "a register map needs this key");
+  if (value == nullptr) refuse(key, source_.kind + " needs this key");
   return *value;
 }
 
-std::string MapFields::text(const std::string& key) {
+std::string TomlFields::text(const std::string& key) {
   const auto* value = required(key).as_string();
   if (value == nullptr) refuse(key, "must be a string");
   if (!is_one_line(value->get())) refuse(key, "must be one line of 1 to 200 bytes, not blank");
   return value->get();
 }
 
-std::string MapFields::one_of(const std::string& key,
-                              std::initializer_list<std::string_view> words) {
+std::string TomlFields::text_or(const std::string& key, const std::string& otherwise) {
+  known_.insert(key);
+  return has(key) ? text(key) : otherwise;
+}
+
+std::vector<std::string> TomlFields::texts(const std::string& key) {
+  const auto* value = required(key).as_array();
+  if (value == nullptr) refuse(key, "must be an array of strings");
+  std::vector<std::string> all;
+  for (const toml::node& entry : *value) {
+    const auto* line = entry.as_string();
+    if (line == nullptr) refuse(key, "must be an array of strings");
+    if (!is_one_line(line->get())) refuse(key, "must hold lines of 1 to 200 bytes, not blank");
+    all.push_back(line->get());
+  }
+  return all;
+}
+
+std::string TomlFields::one_of(const std::string& key,
+                               std::initializer_list<std::string_view> words) {
   std::string value = text(key);
   std::string list;
   for (const std::string_view word : words) {
@@ -82,7 +127,7 @@ std::string MapFields::one_of(const std::string& key,
   refuse(key, "must be one of: " + list);
 }
 
-double MapFields::number(const NumberRule& rule) {
+double TomlFields::number(const NumberRule& rule) {
   const toml::node& node = required(rule.key);
   const auto value = node.is_number() ? node.value<double>() : std::nullopt;
   if (!value || !std::isfinite(*value)) refuse(rule.key, "must be a finite number");
@@ -92,56 +137,59 @@ double MapFields::number(const NumberRule& rule) {
   return *value;
 }
 
-double MapFields::number_or(const NumberRule& rule, double otherwise) {
+double TomlFields::number_or(const NumberRule& rule, double otherwise) {
   known_.insert(rule.key);
   return has(rule.key) ? number(rule) : otherwise;
 }
 
-int MapFields::whole(const NumberRule& rule) {
+int TomlFields::whole(const NumberRule& rule) {
   if (!required(rule.key).is_integer()) refuse(rule.key, "must be a whole number");
   return static_cast<int>(number(rule));
 }
 
-int MapFields::whole_or(const NumberRule& rule, int otherwise) {
+int TomlFields::whole_or(const NumberRule& rule, int otherwise) {
   known_.insert(rule.key);
   return has(rule.key) ? whole(rule) : otherwise;
 }
 
-bool MapFields::flag_or(const std::string& key, bool otherwise) {
-  known_.insert(key);
-  if (!has(key)) return otherwise;
+bool TomlFields::flag(const std::string& key) {
   const auto* value = required(key).as_boolean();
   if (value == nullptr) refuse(key, "must be true or false");
   return value->get();
 }
 
-MapFields MapFields::table(const std::string& key) {
-  const auto* value = required(key).as_table();
-  if (value == nullptr) refuse(key, "must be a table");
-  return {*value, file_, name_of(key)};
+bool TomlFields::flag_or(const std::string& key, bool otherwise) {
+  known_.insert(key);
+  return has(key) ? flag(key) : otherwise;
 }
 
-std::vector<MapFields> MapFields::tables(const std::string& key) {
+TomlFields TomlFields::table(const std::string& key) {
+  const auto* value = required(key).as_table();
+  if (value == nullptr) refuse(key, "must be a table");
+  return {*value, source_, name_of(key)};
+}
+
+std::vector<TomlFields> TomlFields::tables(const std::string& key) {
   const auto* value = required(key).as_array();
   if (value == nullptr || value->empty()) refuse(key, "must be an array of tables, one at least");
-  std::vector<MapFields> all;
+  std::vector<TomlFields> all;
   for (const toml::node& entry : *value) {
     if (!entry.is_table()) refuse(key, "must be an array of tables, one at least");
-    all.emplace_back(*entry.as_table(), file_,
+    all.emplace_back(*entry.as_table(), source_,
                      name_of(key) + "[" + std::to_string(all.size()) + "]");
   }
   return all;
 }
 
-std::vector<std::string> MapFields::keys() const {
+std::vector<std::string> TomlFields::keys() const {
   std::vector<std::string> all;
   for (const auto& [key, value] : table_) all.emplace_back(key.str());
   return all;
 }
 
-void MapFields::finish() const {
+void TomlFields::finish() const {
   for (const std::string& key : keys()) {
-    if (!known_.contains(key)) refuse(key, "a register map has no such key here");
+    if (!known_.contains(key)) refuse(key, source_.kind + " has no such key here");
   }
 }
 
