@@ -65,21 +65,10 @@ Beside make_beside(const fs::path& path) {
   }
 }
 
-/// Removes the file it was given unless it was released.
-class RemoveUnlessDone {
- public:
-  explicit RemoveUnlessDone(fs::path path) : path_(std::move(path)) {}
-  ~RemoveUnlessDone() {
-    std::error_code ignored;
-    if (!path_.empty()) fs::remove(path_, ignored);
-  }
-  RemoveUnlessDone(const RemoveUnlessDone&) = delete;
-  RemoveUnlessDone& operator=(const RemoveUnlessDone&) = delete;
-  void release() { path_.clear(); }
-
- private:
-  fs::path path_;
-};
+void remove_quietly(const fs::path& path) {
+  std::error_code ignored;
+  if (!path.empty()) fs::remove(path, ignored);
+}
 
 /// Flushes a file or folder to the disk. EINVAL and ENOTSUP mean that this file system has nothing
 /// to flush, which is no failure.
@@ -103,17 +92,35 @@ void write_all(int descriptor, std::string_view content, const fs::path& named_i
 
 }  // namespace
 
+PendingFile::PendingFile(fs::path path) : path_(std::move(path)) {
+  auto [beside, error] = make_beside(path_);
+  if (error != 0) fail_to_write(path_, error);
+  beside_ = std::move(beside);
+}
+
+PendingFile::~PendingFile() { remove_quietly(beside_); }
+
+PendingFile::PendingFile(PendingFile&& other) noexcept
+    : path_(std::move(other.path_)), beside_(std::exchange(other.beside_, {})) {}
+
+void PendingFile::publish() {
+  flush_to_disk(beside_, path_);
+  if (::rename(beside_.c_str(), path_.c_str()) != 0) fail_to_write(path_, errno);
+  beside_.clear();
+  // The new name itself is only safe once the folder is.
+  flush_to_disk(path_.parent_path(), path_);
+}
+
+void PendingFile::publish_as(fs::path path) {
+  path_ = std::move(path);
+  publish();
+}
+
 void write_whole_file(const fs::path& path,
                       const std::function<void(const fs::path& beside)>& write) {
-  const auto [beside, error] = make_beside(path);
-  if (error != 0) fail_to_write(path, error);
-  RemoveUnlessDone guard(beside);
-  write(beside);
-  flush_to_disk(beside, path);
-  if (::rename(beside.c_str(), path.c_str()) != 0) fail_to_write(path, errno);
-  guard.release();
-  // The new name itself is only safe once the folder is.
-  flush_to_disk(path.parent_path(), path);
+  PendingFile file(path);
+  write(file.beside());
+  file.publish();
 }
 
 void write_whole_file(const fs::path& path, std::string_view content) {
@@ -133,7 +140,7 @@ void require_writable_folder(const fs::path& folder) {
     throw InputError(folder.string() + ": cannot be made a folder: " + why);
   }
   const Beside probe = make_beside(folder / "probe");
-  const RemoveUnlessDone remove_probe(probe.path);
+  remove_quietly(probe.path);
   if (probe.error != 0) {
     throw InputError(folder.string() +
                      ": files cannot be made in this folder: " + reason(probe.error));

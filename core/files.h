@@ -7,6 +7,29 @@
 
 namespace lensforge {
 
+/// A file in the making: it is written beside `path` (same folder, same extension) and appears
+/// under its name, whole, with publish(); without that nothing is left behind.
+class PendingFile {
+ public:
+  /// Makes the empty file beside. @throw RunError naming the file and the system's reason.
+  explicit PendingFile(std::filesystem::path path);
+  ~PendingFile();
+  PendingFile(PendingFile&& other) noexcept;
+  PendingFile& operator=(PendingFile&&) = delete;
+
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+  /// Where to write.
+  [[nodiscard]] const std::filesystem::path& beside() const { return beside_; }
+  /// Flushes it to disk and renames it to path(). @throw RunError naming the file and the reason.
+  void publish();
+  /// publish() under another name. @pre in the same folder.
+  void publish_as(std::filesystem::path path);
+
+ private:
+  std::filesystem::path path_;
+  std::filesystem::path beside_;  ///< Empty once it is published.
+};
+
 /// Lets `write` make a file beside `path` (same extension), flushes it to disk and renames it to
 /// `path`: the file appears whole or not at all, and nothing is left behind if `write` throws.
 /// @throw RunError naming the file and the system's reason.

@@ -6,6 +6,7 @@
 
 #include <fstream>
 #include <string>
+#include <utility>
 
 #include "core/error.h"
 #include "core/full_disk.h"
@@ -50,6 +51,28 @@ TEST(Files, ANewFileHasTheRightsOfAnyOther) {
   write_whole_file(folder / "ours", "x");
   write_bytes(folder / "theirs", "x");
   EXPECT_EQ(fs::status(folder / "ours").permissions(), fs::status(folder / "theirs").permissions());
+}
+
+TEST(Files, APendingFileAppearsWhenItIsPublishedOnly) {
+  const TempFolder folder;
+  {
+    PendingFile dropped(folder / "a.txt");
+    write_bytes(dropped.beside(), "a");
+    PendingFile moved(std::move(dropped));
+    EXPECT_EQ(folder.file_count(), 1U);
+    EXPECT_FALSE(fs::exists(folder / "a.txt"));
+  }
+  EXPECT_EQ(folder.file_count(), 0U);
+  PendingFile kept(folder / "b.txt");
+  write_bytes(kept.beside(), "b");
+  kept.publish();
+  EXPECT_EQ(read_bytes(folder / "b.txt"), "b");
+  PendingFile renamed(folder / "b.txt");
+  write_bytes(renamed.beside(), "c");
+  renamed.publish_as(folder / "c.txt");
+  EXPECT_EQ(read_bytes(folder / "b.txt"), "b");
+  EXPECT_EQ(read_bytes(folder / "c.txt"), "c");
+  EXPECT_EQ(folder.file_count(), 2U);
 }
 
 TEST(Files, TheFileBesideHasTheSameFolderAndExtension) {
