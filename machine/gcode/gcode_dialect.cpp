@@ -28,6 +28,42 @@ GcodeDialect grblhal_dialect() {
   return dialect;
 }
 
+GcodeDialect linuxcnc_dialect() {
+  GcodeDialect dialect;
+  dialect.name = "linuxcnc";
+  dialect.max_characters = 255;
+  dialect.max_line_number = 99'999;
+  dialect.tool_change = true;
+  dialect.mist = true;
+  dialect.planner_blocks = 50;
+  dialect.path_blending = true;
+  dialect.tool_length = true;
+  return dialect;
+}
+
+GcodeDialect fanuc_dialect() {
+  GcodeDialect dialect;
+  dialect.name = "fanuc";
+  dialect.max_characters = 255;
+  dialect.max_line_number = 99'999'999;
+  dialect.tool_change = true;
+  dialect.mist = true;
+  dialect.planner_blocks = 40;
+  dialect.contour_control = true;
+  dialect.tool_length = true;
+  dialect.program_number = true;
+  dialect.dwell_unit = 1e-3;
+  return dialect;
+}
+
+std::optional<GcodeDialect> find_dialect(std::string_view name) {
+  for (const GcodeDialect& dialect :
+       {grbl_dialect(), grblhal_dialect(), linuxcnc_dialect(), fanuc_dialect()}) {
+    if (dialect.name == name) return dialect;
+  }
+  return std::nullopt;
+}
+
 GcodeDialect parse_dialect(std::string_view name, const std::string& option) {
   if (name == "grbl") return grbl_dialect();
   if (name == "grblhal") return grblhal_dialect();

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -18,6 +19,11 @@ struct GcodeDialect {
   bool refuses_after_error = false;  ///< Until an empty line, every line is answered by the error.
   std::size_t rx_bytes = 0;          ///< Usual size of the receive buffer.
   int planner_blocks = 0;            ///< Usual number of motions it looks ahead.
+  bool path_blending = false;        ///< G64, with P the tolerance in mm, and G61.1.
+  bool contour_control = false;      ///< G5.1 with Q.
+  bool tool_length = false;          ///< G43 with H.
+  bool program_number = false;       ///< An O word alone on the first line.
+  double dwell_unit = 1.0;           ///< Seconds that G4 P1 waits.
 };
 
 /// Grbl 1.1: a line buffer of 80 with its end, 128 bytes received, 15 motions planned, no T and M6.
@@ -26,7 +32,18 @@ GcodeDialect grbl_dialect();
 /// grblHAL: a line buffer of 257 with its end, 1024 bytes received, 35 to 100 motions planned.
 GcodeDialect grblhal_dialect();
 
-/// "grbl" or "grblhal" → dialect. @throw InputError naming `option` and the value.
+/// LinuxCNC 2.9: lines of 255, T and M6, G64 with a tolerance. No byte limits apply: it reads
+/// files.
+GcodeDialect linuxcnc_dialect();
+
+/// Fanuc-family mill (Series 0i and 30i): O number, T and M6, G43 with H, G5.1 with Q, dwell in ms.
+GcodeDialect fanuc_dialect();
+
+/// A controller that programs can be read for: grbl, grblhal, linuxcnc or fanuc; else nothing.
+std::optional<GcodeDialect> find_dialect(std::string_view name);
+
+/// A controller that can be sent to: "grbl" or "grblhal" → dialect. @throw InputError naming
+/// `option` and the value.
 GcodeDialect parse_dialect(std::string_view name, const std::string& option);
 
 }  // namespace lensforge

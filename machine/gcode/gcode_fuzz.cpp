@@ -73,7 +73,12 @@ std::int64_t run_program(const std::string& program, const GcodeDialect& dialect
 
 std::int64_t fuzz_gcode(const std::uint8_t* data, std::size_t size) {
   const std::string program(data, data + size);
-  return run_program(program, grbl_dialect()) + run_program(program, grblhal_dialect());
+  std::int64_t lines = 0;
+  for (const GcodeDialect& dialect :
+       {grbl_dialect(), grblhal_dialect(), linuxcnc_dialect(), fanuc_dialect()}) {
+    lines += run_program(program, dialect);
+  }
+  return lines;
 }
 
 }  // namespace lensforge

@@ -26,7 +26,10 @@ class BlockRun {
 
   void run() {
     check_number();
+    if (take_program_number()) return;
     set_modes();
+    set_path_control();
+    set_tool_length();
     set_feed();
     set_machine();
     const bool moves = find_motion();
@@ -52,6 +55,45 @@ class BlockRun {
       refuse(std::string("N").append(std::to_string(*block_.number)) + ": " + dialect_.name +
              " knows none above " + std::to_string(dialect_.max_line_number));
     }
+  }
+
+  /// @return whether the line is nothing but an O word.
+  bool take_program_number() {
+    const auto number = use('O');
+    if (!number) return false;
+    if (block_.words().size() > 1) refuse("O stands alone on its line");
+    if (!(*number >= 1.0) || *number != std::floor(*number)) {
+      refuse(with_number("O", *number) + ": programs are numbered from 1");
+    }
+    return true;
+  }
+
+  void set_path_control() {
+    const auto word = words_[ModalGroup::kPathControl];
+    if (!word) return;
+    if (*word == 51) {
+      if (!use('Q')) refuse("G5.1 without Q");
+      return;
+    }
+    state_.blending.reset();
+    if (*word != 640) return;
+    if (words_.has(ModalGroup::kNonModal, 40)) refuse("G64 beside G4");
+    const double tolerance = use('P').value_or(0.0);
+    if (tolerance < 0.0) refuse(with_number("G64 P", tolerance) + ": a tolerance is not negative");
+    state_.blending = length(tolerance);
+  }
+
+  void set_tool_length() {
+    const auto word = words_[ModalGroup::kToolLength];
+    if (!word) return;
+    state_.tool_length = 0;
+    if (*word == 490) return;
+    const auto offset = use('H');
+    if (!offset) refuse("G43 without H");
+    if (*offset < 0.0 || *offset > kLargestTool || *offset != std::floor(*offset)) {
+      refuse(with_number("H", *offset) + ": tool offsets are numbered 0 … 255");
+    }
+    state_.tool_length = static_cast<int>(*offset);
   }
 
   void set_modes() {
@@ -176,7 +218,7 @@ class BlockRun {
     const auto seconds = use('P');
     if (!seconds) refuse("G4 without P");
     if (*seconds < 0.0) refuse(with_number("G4 P", *seconds) + ": a time is not negative");
-    effect_.dwell = *seconds;
+    effect_.dwell = *seconds * dialect_.dwell_unit;
   }
 
   [[nodiscard]] bool goes_home() const {
@@ -340,6 +382,7 @@ GcodeEffect GcodeInterpreter::run(const GcodeBlock& block) {
   }
   if (block.empty()) return effect;
   if (ended_) throw GcodeError(block.line, "words after the end of the program");
+  if (begun_ && block.value('O')) throw GcodeError(block.line, "O after the program's first line");
   GcodeState next = state_;
   BlockRun(block, dialect_, next, effect).run();
   state_ = next;

@@ -35,7 +35,8 @@ class GcodeEffect {
 /// Follows a program as a Grbl-family controller would, more strictly.
 ///
 /// Known: G0 G1 G2 G3 G80, G4, G17 G18 G19, G20 G21, G28 G30, G40 G49 G61, G53, G54 … G59, G90 G91,
-/// G91.1, G93 G94, M0 M1 M2 M30, M3 M4 M5, M6 and T where the dialect has them, M7 M8 M9, F, S.
+/// G91.1, G93 G94, M0 M1 M2 M30, M3 M4 M5, M7 M8 M9, F, S; where the dialect has them M6 and T, G43
+/// with H (coordinates stay those of the tip), G64 with P, G61.1, G5.1 with Q and a leading O word.
 /// Refused beside unknown words: two words of one group, a motion before G20 or G21, before a feed
 /// or without its coordinates, words that nothing uses, words after the end of the program, what
 /// changes the controller's stored offsets (G10, G28.1, G30.1, G92), lines too long for the

@@ -25,10 +25,13 @@ struct GcodeState {
   std::optional<double> feed;  ///< F under G94, mm/min.
   int coordinate_system = 0;   ///< 0 for G54 … 5 for G59.
   SpindleTurn spindle = SpindleTurn::kOff;
-  double rpm = 0.0;    ///< S
-  bool mist = false;   ///< M7
-  bool flood = false;  ///< M8
-  int tool = 0;        ///< T
+  double rpm = 0.0;     ///< S
+  bool mist = false;    ///< M7
+  bool flood = false;   ///< M8
+  int tool = 0;         ///< T
+  int tool_length = 0;  ///< H of G43; 0 after G49.
+  /// G64: how far corners may be cut, mm; 0 is without limit. Nothing outside G64.
+  std::optional<double> blending;
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
   /// Where G54 … G59 begin, offsets of the controller included; its `$#` tells.
   std::array<Eigen::Vector3d, 6> origins{Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(),

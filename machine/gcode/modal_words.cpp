@@ -35,6 +35,7 @@ std::optional<ModalGroup> g_group(int tenths) {
       return ModalGroup::kUnits;
     case 400:
       return ModalGroup::kCutterCompensation;
+    case 430:
     case 490:
       return ModalGroup::kToolLength;
     case 540:
@@ -44,7 +45,10 @@ std::optional<ModalGroup> g_group(int tenths) {
     case 580:
     case 590:
       return ModalGroup::kCoordinateSystem;
+    case 51:
     case 610:
+    case 611:
+    case 640:
       return ModalGroup::kPathControl;
     case 900:
     case 910:
@@ -81,6 +85,24 @@ std::optional<ModalGroup> m_group(int tenths) {
   }
 }
 
+/// Whether a word that some controllers know is unknown to this one.
+bool lacks(const GcodeDialect& dialect, const GcodeWord& word) {
+  if (word.letter == 'M') {
+    return (word.tenths == 60 && !dialect.tool_change) || (word.tenths == 70 && !dialect.mist);
+  }
+  switch (word.tenths) {
+    case 51:
+      return !dialect.contour_control;
+    case 430:
+      return !dialect.tool_length;
+    case 611:
+    case 640:
+      return !dialect.path_blending;
+    default:
+      return false;
+  }
+}
+
 [[noreturn]] void refuse_unknown(const GcodeBlock& block, const GcodeWord& word,
                                  const GcodeDialect& dialect) {
   const int tenths = word.tenths;
@@ -96,7 +118,10 @@ void refuse_letter(const GcodeBlock& block, char letter, const GcodeDialect& dia
   if (letter == 'T' && !dialect.tool_change) {
     throw GcodeError(block.line, "T: " + dialect.name + " knows no tool change");
   }
-  if (kLetters.find(letter) == std::string_view::npos) {
+  const bool known =
+      kLetters.find(letter) != std::string_view::npos || (letter == 'H' && dialect.tool_length) ||
+      (letter == 'Q' && dialect.contour_control) || (letter == 'O' && dialect.program_number);
+  if (!known) {
     throw GcodeError(block.line,
                      std::string(1, letter) + " is no word that " + dialect.name + " knows");
   }
@@ -110,9 +135,7 @@ ModalWords::ModalWords(const GcodeBlock& block, const GcodeDialect& dialect) {
     if (word.letter != 'G' && word.letter != 'M') continue;
     const auto group = word.letter == 'G' ? g_group(word.tenths) : m_group(word.tenths);
     if (!group) refuse_unknown(block, word, dialect);
-    const bool lacks_tools = *group == ModalGroup::kToolChange && !dialect.tool_change;
-    const bool lacks_mist = *group == ModalGroup::kCoolant && word.tenths == 70 && !dialect.mist;
-    if (lacks_tools || lacks_mist) refuse_unknown(block, word, dialect);
+    if (lacks(dialect, word)) refuse_unknown(block, word, dialect);
     std::optional<int>& slot = words_[static_cast<std::size_t>(*group)];
     if (slot) {
       throw GcodeError(block.line, word_name(word) + " stands beside another word of its group");

@@ -16,6 +16,7 @@ const char* const kSeeds[] = {
     "F500\nM5\nM2\n%\n",
     "G20\r\nG91\r\nN10 G2 X1 Y1 I.5 J0.5 F10\r\nG3 X-1 R2\r\nG18 G2 X1 Z1 R-3\r\nG19\r\nG53 G0 "
     "Z0\r\n",
+    "%\nO100\nG21 T1 M6\nG43 H1\nG5.1 Q1\nG4 P500\nG91 G28 Z0\nG64 P0.01\nG61.1\nM30\n%\n",
     "G21 T1 M6\rG93 G1 X1 F2\r(comment)\rX2 F3 ; rest\rM8\rM9\rG80\rM30",
 };
 
@@ -49,7 +50,13 @@ const char* const kPieces[] = {"(",
                                "[",
                                "F0",
                                "T",
-                               "P1"};
+                               "P1",
+                               "O1",
+                               "H2",
+                               "G43",
+                               "G64",
+                               "G61.1",
+                               "G5.1Q1"};
 
 std::string mutated(std::mt19937_64& engine) {
   std::string text = kSeeds[engine() % std::size(kSeeds)];
@@ -100,8 +107,8 @@ TEST(GcodeFuzz, RandomBytesBreakNoPromise) {
 }
 
 TEST(GcodeFuzz, SeedsPassWhole) {
-  EXPECT_EQ(fuzz(kSeeds[0]), 2 * 12);  // both dialects
-  EXPECT_EQ(fuzz(kSeeds[2]), 8);       // grblHAL only: T
+  EXPECT_EQ(fuzz(kSeeds[0]), 4 * 12);  // every dialect
+  EXPECT_EQ(fuzz(kSeeds[3]), 3 * 8);   // not Grbl: T
 }
 
 }  // namespace

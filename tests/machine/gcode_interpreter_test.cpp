@@ -168,6 +168,54 @@ TEST(GcodeInterpreter, RefusesWithLineAndReason) {
   EXPECT_THROW(effect_of("T300"), GcodeError);
 }
 
+TEST(GcodeInterpreter, LinuxcncLimitsBlending) {
+  const ProgramRun run = run_program("G21\nG64 P0.002\nG43 H3\n", linuxcnc_dialect());
+  ASSERT_EQ(run.refusal, "");
+  EXPECT_EQ(run.state.blending, 0.002);
+  EXPECT_EQ(run.state.tool_length, 3);
+  EXPECT_EQ(run_program("G20\nG64 P0.001\n", linuxcnc_dialect()).state.blending, 0.0254);
+  EXPECT_EQ(run_program("G64\n", linuxcnc_dialect()).state.blending, 0.0);
+  EXPECT_FALSE(run_program("G64\nG61.1\n", linuxcnc_dialect()).state.blending);
+  EXPECT_EQ(run_program("G43 H3\nG49\n", linuxcnc_dialect()).state.tool_length, 0);
+}
+
+TEST(GcodeInterpreter, FanucProgramsBeginWithTheirNumber) {
+  GcodeState start;
+  start.g28 = Vector3d(0, 0, 100);
+  const ProgramRun run = run_program(
+      "%\nO1000 (part)\nG21 G90\nG91 G28 Z0.\nG90\nT2 M6\nG43 H2 G0 Z5.\nG5.1 Q1\nM30\n%\n",
+      fanuc_dialect(), start);
+  ASSERT_EQ(run.refusal, "");
+  ASSERT_EQ(run.motions.size(), 3U);
+  EXPECT_EQ(run.motions[1].end, Vector3d(0, 0, 100));
+  EXPECT_EQ(run.motions[2].end, Vector3d(0, 0, 5));
+  EXPECT_EQ(run.state.tool, 2);
+  EXPECT_EQ(effect_of("G4 P1500", fanuc_dialect()).dwell, 1.5);
+}
+
+TEST(GcodeInterpreter, RefusesWhatADialectMisuses) {
+  const std::pair<const char*, const char*> cases[] = {
+      {"G21\nO1", "O after the program's first line"},
+      {"O1 G21", "O stands alone"},
+      {"O0", "programs are numbered from 1"},
+      {"O1.5", "programs are numbered from 1"},
+      {"G43", "G43 without H"},
+      {"G43 H1.5", "tool offsets are numbered"},
+      {"H1", "H belongs to no word"},
+      {"G5.1", "G5.1 without Q"},
+      {"Q1", "Q belongs to no word"},
+      {"G64", "G64 is not supported for fanuc"},
+      {"G43 G49 H1", "another word of its group"},
+  };
+  for (const auto& [program, reason] : cases) {
+    EXPECT_THAT(run_program(program, fanuc_dialect()).refusal, HasSubstr(reason)) << program;
+  }
+  EXPECT_THAT(run_program("G64 P-1", linuxcnc_dialect()).refusal, HasSubstr("not negative"));
+  EXPECT_THAT(run_program("G64 G4 P1", linuxcnc_dialect()).refusal, HasSubstr("G64 beside G4"));
+  EXPECT_THAT(run_program("O1", linuxcnc_dialect()).refusal, HasSubstr("O is no word"));
+  EXPECT_THAT(run_program("G43").refusal, HasSubstr("G43 is not supported for grbl"));
+}
+
 TEST(GcodeInterpreter, ARefusedLineLeavesTheStateAsItWas) {
   GcodeInterpreter interpreter(grbl_dialect());
   GcodeText text;
@@ -206,6 +254,10 @@ TEST(GcodeInterpreter, MeasuresLinesAsTheyAreSent) {
 TEST(GcodeDialect, IsKnownByName) {
   EXPECT_EQ(parse_dialect("grbl", "--dialect").max_characters, 79U);
   EXPECT_EQ(parse_dialect("grblhal", "--dialect").rx_bytes, 1024U);
+  EXPECT_EQ(find_dialect("linuxcnc")->name, "linuxcnc");
+  EXPECT_EQ(find_dialect("fanuc")->name, "fanuc");
+  EXPECT_FALSE(find_dialect("marlin"));
+  EXPECT_THROW(parse_dialect("fanuc", "--dialect"), InputError);
   EXPECT_THROW(parse_dialect("marlin", "--dialect"), InputError);
 }
 
