@@ -18,6 +18,8 @@ struct ToolSection {
   double diameter = 0.0;  ///< mm
   double from = 0.0;      ///< mm above the tip
   double to = 0.0;        ///< mm above the tip
+
+  friend bool operator==(const ToolSection&, const ToolSection&) = default;
 };
 
 /// A milling cutter, how it is clamped and how it is run.
@@ -35,6 +37,7 @@ struct Tool {
   double plunge = 150.0;  ///< Feed straight down, mm/min.
 
   [[nodiscard]] double radius() const { return 0.5 * diameter; }
+  friend bool operator==(const Tool&, const Tool&) = default;
 };
 
 }  // namespace lensforge

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <vector>
+
+#include "cam/contact/drop_cutter.h"
+#include "cam/tool/cutter_profile.h"
+#include "core/surface_mesh.h"
+
+namespace lensforge {
+
+/// Lets tools of any profile down on a mesh: for any (x, y) the lowest height of the tip at which
+/// the profile cuts into no triangle; exact, over facets, edges and vertices. One index serves
+/// every profile. For the finishing ball, which needs millions of points a second, there is
+/// DropCutter.
+///
+/// Triangles lie in the cells of a grid by their boxes' centres; over it stands a pyramid, each
+/// node the box of four below it and its highest point. A search goes down the node that could lift
+/// the tool most, and passes over those that could not lift it further than what it rests on
+/// already.
+class ProfileCutter {
+ public:
+  /// @pre all coordinates are finite and all vertex numbers in range.
+  explicit ProfileCutter(const SurfaceMesh& mesh);
+
+  /// The location of the tip over p (mm). Equal to the largest profile_triangle_tip() over all
+  /// triangles to 1e-12 mm (ProfileCutter.EqualsBruteForce…). `near`, a location close by, makes it
+  /// faster and changes the height by no more than rounding. A profile of radius 0 answers the
+  /// surface's own height.
+  [[nodiscard]] CutterLocation drop(const CutterProfile& profile, const Eigen::Vector2d& p,
+                                    const CutterLocation& near = {}) const;
+
+  /// Box of the mesh's vertices that belong to triangles; empty without triangles.
+  [[nodiscard]] const Eigen::AlignedBox3d& bounds() const { return bounds_; }
+
+ private:
+  /// Box seen from above, relative to the grid's origin, rounded outwards; highest corner, exact.
+  struct Node {
+    float x_min, x_max, y_min, y_max;
+    std::int32_t top;  ///< The item that has it.
+    double z_max;
+  };
+  struct Level {
+    int columns = 0;
+    int rows = 0;
+    std::vector<Node> nodes;
+  };
+  struct Search;
+
+  void sort_into_cells(const SurfaceMesh& mesh, double cell);
+  void build_pyramid();
+  void search_node(std::size_t level, int column, int row, Search& search) const;
+  void search_cell(std::size_t cell, Search& search) const;
+  void try_item(std::int64_t item, Search& search) const;
+
+  Eigen::AlignedBox3d bounds_;
+  std::vector<Level> levels_;        ///< From the cells to a single node.
+  std::vector<std::int64_t> begin_;  ///< First item of each cell, row by row, and the end.
+  // Items are triangles in the order of cells; all of the same length.
+  std::vector<Node> boxes_;
+  std::vector<Eigen::Matrix3d> corners_;
+  std::vector<std::int32_t> triangle_of_;
+  std::vector<std::int32_t> item_of_;  ///< Inverse of triangle_of_.
+};
+
+}  // namespace lensforge
