@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -59,6 +60,10 @@ class DropCutter {
                        std::vector<Contender>& contenders) const;
 
   [[nodiscard]] double radius() const { return radius_; }
+  /// Corners of a triangle of the mesh, in some order, as columns.
+  [[nodiscard]] const Eigen::Matrix3d& corners(std::int32_t triangle) const {
+    return corners_[static_cast<std::size_t>(item_of_[static_cast<std::size_t>(triangle)])];
+  }
   /// Box of the mesh's vertices that belong to triangles; empty without triangles.
   [[nodiscard]] const Eigen::AlignedBox3d& bounds() const { return bounds_; }
 

@@ -11,7 +11,7 @@
 #include "cam/cam_meshes.h"
 #include "cam/contact/drop_cutter.h"
 #include "cam/milled_paths.h"
-#include "cam/path/finish_raster.h"
+#include "cam/milled_tiles.h"
 
 namespace lensforge {
 namespace {
@@ -305,16 +305,7 @@ SurfaceMesh creased_mesh(unsigned seed, double side) {
 
 BallPath finishing_path(const SurfaceMesh& mesh, double side) {
   const DropCutter cutter(mesh, kRadius, Executor::serial());
-  const RasterPlan plan =
-      plan_finish_raster({Eigen::Vector2d(0.0, 0.0), Eigen::Vector2d(side, side)}, kRadius, {});
-  BallPath path(kRadius, 0.0);
-  std::vector<Eigen::Vector3d> tips;
-  for (std::int64_t row = 0; row < plan.rows; ++row) {
-    const RasterRow cut = cut_row(cutter, plan, row);
-    tips.insert(tips.end(), cut.points.begin(), cut.points.end());
-  }
-  testing::add_polyline(path, tips);
-  return path;
+  return testing::raster_path(cutter, side, kPitch, 0.0193);
 }
 
 /// z(q) of one straight move by trisection, z being convex along it.

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include <gtest/gtest.h>
-
 #include <Eigen/Core>
-#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <vector>
 
+#include "cam/contact/drop_cutter.h"
 #include "cam/milled/ball_path.h"
 #include "cam/milled/surface_field.h"
 
@@ -45,35 +44,32 @@ inline SurfacePatch sampled(const SurfaceField& field, const GridWindow& window)
   return patch;
 }
 
-/// Samples the grid in tiles of several sizes with three threads: every bit has to be as in one
-/// serial piece.
-inline void expect_same_bits_in_tiles(const SurfaceField& field, const GridWindow& whole) {
-  const SurfacePatch all = sampled(field, whole);
-  for (const std::int64_t tile : {whole.columns, std::int64_t{37}, std::int64_t{64}}) {
-    for (std::int64_t row = 0; row < whole.rows; row += tile) {
-      for (std::int64_t column = 0; column < whole.columns; column += tile) {
-        GridWindow part = whole;
-        part.first_column = column;
-        part.first_row = row;
-        part.columns = std::min(tile, whole.columns - column);
-        part.rows = std::min(tile, whole.rows - row);
-        SurfacePatch patch;
-        field.sample(part, Executor::cpu(3), patch);
-        ASSERT_EQ(patch.cut.size(), all.cut.empty() ? 0U : patch.z.size());
-        for (std::int64_t n = 0; n < part.size(); ++n) {
-          const auto a = static_cast<std::size_t>(n);
-          const auto b = static_cast<std::size_t>((row + n / part.columns) * whole.columns +
-                                                  column + n % part.columns);
-          ASSERT_EQ(patch.z[a], all.z[b]);
-          ASSERT_EQ(patch.slope_x[a], all.slope_x[b]);
-          ASSERT_EQ(patch.slope_y[a], all.slope_y[b]);
-          if (!all.cut.empty()) {
-            ASSERT_EQ(patch.cut[a], all.cut[b]);
-          }
-        }
-      }
+/// A zig-zag raster with links from row to row, `pitch` apart, over a square from (0, 0) and a
+/// radius beyond it: the drop-cutter's tips every `step`, rounded to a ten-thousandth as a program
+/// has them; where nothing is under the ball the row is left out.
+inline BallPath raster_path(const DropCutter& cutter, double side, double pitch, double step) {
+  const auto rounded = [](double value) { return std::round(value * 1e4) / 1e4; };
+  BallPath path(cutter.radius(), 0.0);
+  GcodeMotion motion;
+  const double beyond = 0.7 * cutter.radius();
+  const auto rows = static_cast<std::int64_t>((side + 2.0 * beyond) / pitch);
+  const auto points = static_cast<std::int64_t>((side + 2.0 * beyond) / step);
+  bool begun = false;
+  for (std::int64_t row = 0; row <= rows; ++row) {
+    CutterLocation near;
+    for (std::int64_t k = 0; k <= points; ++k) {
+      const std::int64_t along = row % 2 == 0 ? k : points - k;
+      const Eigen::Vector2d p(rounded(static_cast<double>(along) * step - beyond),
+                              rounded(static_cast<double>(row) * pitch - beyond));
+      near = cutter.drop(p, near);
+      if (!near.rests()) continue;
+      motion.start = motion.end;
+      motion.end = {p.x(), p.y(), rounded(near.tip)};
+      if (begun) path.add(motion);
+      begun = true;
     }
   }
+  return path;
 }
 
 }  // namespace lensforge::testing

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "cam/contact/drop_cutter.h"
+#include "cam/milled/designed_field.h"
+#include "cam/milled/facet_reach.h"
+#include "cam/milled/lowest_ball.h"
+#include "cam/milled/surface_field.h"
+
+namespace lensforge {
+
+/// What a ball cannot reach of a surface, at the nodes of a patch.
+struct CreasePatch {
+  std::vector<double> depth;  ///< Left standing above the designed surface, mm; 0 where reached.
+  std::vector<double> width;  ///< Of the fillet: largest distance of its ball's contacts, mm; or 0.
+};
+
+/// What a ball can reach of a surface when its rows lie infinitely close: the morphological closing
+/// of the surface by the ball. Where the ball that is tangent to the designed surface cuts into
+/// nothing the two surfaces are one; elsewhere it is the lower side of the ball that reaches
+/// deepest (LowestBallSearch), with that ball's normal.
+///
+/// Two faces whose normals are Δ apart keep a fillet R·tan(Δ/2) wide on either face, and
+/// R(1/cos(Δ/2) − 1) is left standing over the crease; the ball touches them 2R·sin(Δ/2) apart.
+class RoundedField final : public SurfaceField {
+ public:
+  /// A fillet's `cut`; elsewhere it is that of the designed surface, empty where that has none.
+  static constexpr std::int32_t kFillet = -1;
+
+  /// Rounds the facets of a mesh. All must outlive the field; `cutter` was built on the mesh of
+  /// `designed`.
+  RoundedField(const FacetField& designed, const DropCutter& cutter, const Executor& executor);
+
+  /// Rounds any surface, of which the mesh of `cutter` is an approximation within `error`, mm:
+  /// fillets follow the mesh, everything else the surface. Both must outlive the field.
+  RoundedField(const SurfaceField& designed, const DropCutter& cutter, double error);
+
+  void sample(const GridWindow& window, const Executor& executor,
+              SurfacePatch& patch) const override;
+
+  /// sample() that tells as well what was left standing.
+  void sample(const GridWindow& window, const Executor& executor, SurfacePatch& patch,
+              CreasePatch& creases) const;
+
+ private:
+  const SurfaceField& designed_;
+  double radius_;
+  LowestBallSearch search_;
+  std::optional<FacetReach> reach_;  ///< Of facets.
+};
+
+}  // namespace lensforge
