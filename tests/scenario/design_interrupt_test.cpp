@@ -18,8 +18,8 @@ class DesignInterrupt : public Scenario {
  protected:
   Arguments design(const std::string& out, const Arguments& extra = {}) const {
     Arguments arguments = {
-        "design", picture("rings.png"), "--out", path(out),   "--pixels", "48", "--quality",
-        "draft",  "--rounds",           "4",     "--threads", "2"};
+        "design", picture(picture_), "--out", path(out),  "--model", model_,      "--pixels",
+        "48",     "--quality",       "draft", "--rounds", "4",       "--threads", "2"};
     arguments.insert(arguments.end(), extra.begin(), extra.end());
     return arguments;
   }
@@ -31,28 +31,57 @@ class DesignInterrupt : public Scenario {
     }
   }
 
+  /// A design without interruption, and the same killed after shares of its time and resumed.
+  void kill_and_resume(const std::vector<double>& shares) const {
+    const Outcome whole = run(design(model_ + "-whole"));
+    ASSERT_EQ(whole.exit_code, 0) << whole.err;
+    for (const double share : shares) {
+      const std::string out = model_ + "-killed" + std::to_string(share);
+      Process process(design(out));
+      if (process.runs_for(milliseconds(static_cast<int>(1000.0 * share * whole.seconds)))) {
+        process.send(SIGKILL);
+      }
+      process.wait();
+      const Outcome resumed = run(design(out, {"--resume"}));
+      ASSERT_EQ(resumed.exit_code, 0) << resumed.err;
+      expect_same_lens(model_ + "-whole", out);
+      EXPECT_EQ(listing(at(model_ + "-whole")), listing(at(out)));
+    }
+  }
+
+  void expect_one_and_two_threads_agree() const {
+    Arguments one = design(model_ + "-one");
+    one.back() = "1";
+    ASSERT_EQ(run(one).exit_code, 0);
+    ASSERT_EQ(run(design(model_ + "-two")).exit_code, 0);
+    expect_same_lens(model_ + "-one", model_ + "-two");
+  }
+
   void expect_same_lens(const std::string& a, const std::string& b) const {
     for (const char* file : {"surface.ply", "render.exr", "render.png", "target.exr"}) {
       ASSERT_TRUE(fs::exists(at(a) / file));
       EXPECT_TRUE(content(at(a) / file) == content(at(b) / file)) << file;
     }
   }
+
+  std::string picture_ = "rings.png";
+  std::string model_ = "facet";
+};
+
+/// Much of it black: its transport takes another way.
+class DesignOnBlackInterrupt : public DesignInterrupt {
+ protected:
+  DesignOnBlackInterrupt() { picture_ = "logo.png"; }
 };
 
 TEST_F(DesignInterrupt, KilledAtAnyMomentAndResumedGivesTheSameLens) {
-  const Outcome whole = run(design("whole"));
-  ASSERT_EQ(whole.exit_code, 0) << whole.err;
-  for (const double share : {0.1, 0.4, 0.7, 0.9, 0.98}) {
-    const std::string out = "killed" + std::to_string(share);
-    Process process(design(out));
-    if (process.runs_for(milliseconds(static_cast<int>(1000.0 * share * whole.seconds)))) {
-      process.send(SIGKILL);
-    }
-    process.wait();
-    const Outcome resumed = run(design(out, {"--resume"}));
-    ASSERT_EQ(resumed.exit_code, 0) << resumed.err;
-    expect_same_lens("whole", out);
-    EXPECT_EQ(listing(at("whole")), listing(at(out)));
+  kill_and_resume({0.1, 0.4, 0.7, 0.9, 0.98});
+}
+
+TEST_F(DesignOnBlackInterrupt, KilledAndResumedGivesTheSameLens) {
+  for (const char* model : {"facet", "smooth"}) {
+    model_ = model;
+    kill_and_resume({0.2, 0.6});
   }
 }
 
@@ -157,12 +186,12 @@ TEST_F(DesignInterrupt, ACorruptCheckpointIsRefused) {
   expect_refusal(run(design("lens", {"--resume", "--quiet"})), 2, {"checkpoint.bin"});
 }
 
-TEST_F(DesignInterrupt, OneAndTwoThreadsGiveTheSameBytes) {
-  Arguments one = design("one");
-  one.back() = "1";
-  ASSERT_EQ(run(one).exit_code, 0);
-  ASSERT_EQ(run(design("two")).exit_code, 0);
-  expect_same_lens("one", "two");
+TEST_F(DesignInterrupt, OneAndTwoThreadsGiveTheSameBytes) { expect_one_and_two_threads_agree(); }
+
+TEST_F(DesignOnBlackInterrupt, OneAndTwoThreadsGiveTheSameBytes) {
+  expect_one_and_two_threads_agree();
+  model_ = "smooth";
+  expect_one_and_two_threads_agree();
 }
 
 }  // namespace
