@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Geometry>
+#include <vector>
+
+#include "cam/milled/surface_field.h"
+
+namespace lensforge {
+
+/// What polishing does to a surface; all lengths in mm.
+struct PolishModel {
+  double sigma = 0.0;  ///< Of the Gaussian that heights are averaged with, ≥ 0; 0: not polished.
+  double rim_depth = 0.0;   ///< Taken off in addition at the rim, ≥ 0.
+  double rim_length = 1.0;  ///< Distance over which that falls to 1/e of itself, > 0.
+};
+
+/// A polished surface: heights averaged with a round Gaussian, slopes with the same one, which is
+/// the same as the slopes of the averaged heights, since the convolution commutes with the
+/// derivative. It is the linear model of a soft wheel that follows the form and wears down what is
+/// narrower than its contact, σ. Beyond the rim the surface goes on with its slopes mirrored and
+/// its heights turned about the rim, so that a plane stays a plane.
+///
+/// Over-polish (Sun et al., section 4.4 and Fig. 14: altered normals along the boundary send light
+/// inwards and leave the image's border black): from each side of the lens, at the distance d,
+/// rim_depth · exp(−d / rim_length) is taken off as well.
+class PolishedField final : public SurfaceField {
+ public:
+  /// The kernel ends here, in σ: 6e-7 of its weight lies beyond.
+  static constexpr double kReach = 5.0;
+
+  /// @param surface  is what is polished; must outlive the field.
+  /// @param lens     its rectangle.
+  /// @throw InputError naming a number of the model that breaks its rule.
+  PolishedField(const SurfaceField& surface, const Eigen::AlignedBox2d& lens,
+                const PolishModel& model);
+
+  /// Windows should be spaced by no more than σ. `cut` is that of the surface if σ is 0, else
+  /// empty.
+  void sample(const GridWindow& window, const Executor& executor,
+              SurfacePatch& patch) const override;
+
+ private:
+  /// Nodes of one axis of a window, in the grid: those asked for, and those of the lens that their
+  /// kernels reach.
+  struct Axis {
+    std::int64_t begin, end;            ///< Asked for.
+    std::int64_t sampled, sampled_end;  ///< Sampled.
+    std::int64_t rim, rim_end;          ///< Of the lens.
+    std::vector<double> kernel;         ///< Weights of the nodes 0, 1, … away.
+  };
+
+  [[nodiscard]] Axis make_axis(int axis, const GridWindow& window) const;
+  void take_off_rim(const Executor& executor, SurfacePatch& patch) const;
+
+  const SurfaceField& surface_;
+  Eigen::AlignedBox2d lens_;
+  PolishModel model_;
+};
+
+}  // namespace lensforge

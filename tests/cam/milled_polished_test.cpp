@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <functional>
+#include <numbers>
+
+#include "cam/milled/polished_field.h"
+#include "cam/milled_paths.h"
+#include "cam/milled_tiles.h"
+#include "core/error.h"
+
+namespace lensforge {
+namespace {
+
+const Eigen::AlignedBox2d kLens(Eigen::Vector2d(0.0, 0.0), Eigen::Vector2d(2.0, 1.5));
+
+/// A surface of known heights and slopes.
+class Formula final : public SurfaceField {
+ public:
+  using Function = std::function<Eigen::Vector3d(double, double)>;  ///< z, ∂z/∂x, ∂z/∂y
+  explicit Formula(Function function) : function_(std::move(function)) {}
+
+  void sample(const GridWindow& window, const Executor& /*executor*/,
+              SurfacePatch& patch) const override {
+    resize_patch(window, true, patch);
+    for (std::int64_t n = 0; n < window.size(); ++n) {
+      const Eigen::Vector2d q = window.node(n % window.columns, n / window.columns);
+      EXPECT_TRUE(kLens.exteriorDistance(q) < 1e-9);
+      const Eigen::Vector3d at = function_(q.x(), q.y());
+      const auto i = static_cast<std::size_t>(n);
+      patch.z[i] = at[0];
+      patch.slope_x[i] = at[1];
+      patch.slope_y[i] = at[2];
+      patch.cut[i] = 7;
+    }
+  }
+
+ private:
+  Function function_;
+};
+
+Eigen::Vector3d plane(double x, double y) { return {5.0 + 0.3 * x - 0.2 * y, 0.3, -0.2}; }
+
+GridWindow whole_lens() { return testing::window_at({0.0, 0.0}, 0.01, 201, 151); }
+
+TEST(PolishedField, APlaneStaysAPlaneToTheRim) {
+  const Formula surface(plane);
+  const SurfacePatch patch =
+      testing::sampled(PolishedField(surface, kLens, {0.03, 0.0, 1.0}), whole_lens());
+  for (std::int64_t n = 0; n < patch.window.size(); ++n) {
+    const Eigen::Vector2d q = patch.window.node(n % 201, n / 201);
+    const auto i = static_cast<std::size_t>(n);
+    EXPECT_NEAR(patch.z[i], plane(q.x(), q.y())[0], 1e-13);
+    EXPECT_NEAR(patch.slope_x[i], 0.3, 1e-14);
+    EXPECT_NEAR(patch.slope_y[i], -0.2, 1e-14);
+  }
+  EXPECT_TRUE(patch.cut.empty());
+}
+
+TEST(PolishedField, AWaveFadesAsTheGaussiansTransferFunctionSays) {
+  const double k = 2.0 * std::numbers::pi / 0.2;
+  const double l = 2.0 * std::numbers::pi / 0.5;
+  const Formula surface([&](double x, double y) {
+    return Eigen::Vector3d(std::sin(k * x + l * y), k * std::cos(k * x + l * y),
+                           l * std::cos(k * x + l * y));
+  });
+  const double sigma = 0.03;
+  const SurfacePatch patch = testing::sampled(PolishedField(surface, kLens, {sigma, 0.0, 1.0}),
+                                              testing::window_at({0.5, 0.4}, 0.01, 60, 50));
+  const double fade = std::exp(-0.5 * sigma * sigma * (k * k + l * l));
+  for (std::int64_t n = 0; n < patch.window.size(); ++n) {
+    const Eigen::Vector2d q = patch.window.node(n % 60, n / 60);
+    const double phase = k * q.x() + l * q.y();
+    const auto i = static_cast<std::size_t>(n);
+    EXPECT_NEAR(patch.z[i], fade * std::sin(phase), 2e-6);
+    EXPECT_NEAR(patch.slope_x[i], fade * k * std::cos(phase), 2e-6 * k);
+    EXPECT_NEAR(patch.slope_y[i], fade * l * std::cos(phase), 2e-6 * l);
+  }
+}
+
+TEST(PolishedField, AScallopsEdgeFadesToTheClosedForm) {
+  // A roof |x − 1|: heights become σ√(2/π) on the ridge, slopes erf((x − 1)/(σ√2)).
+  const Formula surface([](double x, double) {
+    return Eigen::Vector3d(std::abs(x - 1.0), x < 1.0 ? -1.0 : x > 1.0 ? 1.0 : 0.0, 0.0);
+  });
+  const double sigma = 0.05;
+  const GridWindow window = testing::window_at({0.0, 0.0}, 0.005, 401, 3);
+  const SurfacePatch patch =
+      testing::sampled(PolishedField(surface, kLens, {sigma, 0.0, 1.0}), window);
+  EXPECT_NEAR(patch.z[200], sigma * std::sqrt(2.0 / std::numbers::pi), 1e-4);
+  for (std::size_t i = 0; i < 401; ++i) {
+    const double x = window.x(static_cast<std::int64_t>(i));
+    EXPECT_NEAR(patch.slope_x[i], std::erf((x - 1.0) / (sigma * std::sqrt(2.0))), 1e-3);
+  }
+}
+
+TEST(PolishedField, SlopesAreThoseOfTheHeights) {
+  const Formula surface([](double x, double y) {
+    return Eigen::Vector3d(x * x * y + 0.3 * x, 2.0 * x * y + 0.3, x * x);
+  });
+  const PolishedField field(surface, kLens, {0.04, 0.02, 0.3});
+  const GridWindow window = testing::window_at({0.5, 0.5}, 0.01, 30, 20);
+  const SurfacePatch patch = testing::sampled(field, window);
+  for (std::size_t j = 1; j < 19; ++j) {
+    for (std::size_t i = 1; i < 29; ++i) {
+      const std::size_t n = j * 30 + i;
+      EXPECT_NEAR((patch.z[n + 1] - patch.z[n - 1]) / 0.02, patch.slope_x[n], 1e-4);
+      EXPECT_NEAR((patch.z[n + 30] - patch.z[n - 30]) / 0.02, patch.slope_y[n], 1e-4);
+    }
+  }
+}
+
+TEST(PolishedField, OverPolishFallsOffFromTheRimAndTiltsItInwards) {
+  const Formula surface(plane);
+  const double depth = 0.02;
+  const double length = 0.1;
+  const SurfacePatch patch =
+      testing::sampled(PolishedField(surface, kLens, {0.0, depth, length}), whole_lens());
+  EXPECT_EQ(patch.cut[0], 7);
+  for (std::int64_t i = 0; i < 201; ++i) {
+    const Eigen::Vector2d q = patch.window.node(i, 75);
+    const double low = depth * std::exp(-q.x() / length);
+    const double high = depth * std::exp(-(2.0 - q.x()) / length);
+    const double across = 2.0 * depth * std::exp(-0.75 / length);
+    const auto n = static_cast<std::size_t>(75 * 201 + i);
+    EXPECT_NEAR(patch.z[n], plane(q.x(), q.y())[0] - low - high - across, 1e-13);
+    EXPECT_NEAR(patch.slope_x[n], 0.3 + (low - high) / length, 1e-13);
+  }
+}
+
+TEST(PolishedField, WithoutPolishNothingChanges) {
+  const Formula surface(plane);
+  const SurfacePatch plain = testing::sampled(surface, whole_lens());
+  const SurfacePatch patch = testing::sampled(PolishedField(surface, kLens, {}), whole_lens());
+  EXPECT_EQ(patch.z, plain.z);
+  EXPECT_EQ(patch.slope_x, plain.slope_x);
+  EXPECT_EQ(patch.cut, plain.cut);
+}
+
+TEST(PolishedField, RefusesNumbersThatBreakTheirRule) {
+  const Formula surface(plane);
+  EXPECT_THROW(PolishedField(surface, kLens, {-0.01, 0.0, 1.0}), InputError);
+  EXPECT_THROW(PolishedField(surface, kLens, {0.01, -1.0, 1.0}), InputError);
+  EXPECT_THROW(PolishedField(surface, kLens, {0.01, 0.0, 0.0}), InputError);
+  EXPECT_THROW(PolishedField(surface, kLens, {std::nan(""), 0.0, 1.0}), InputError);
+}
+
+TEST(PolishedField, SameBitsForAnyTilesAndThreads) {
+  const Formula surface([](double x, double y) {
+    return Eigen::Vector3d(std::sin(9.0 * x) * y, 9.0 * std::cos(9.0 * x) * y, std::sin(9.0 * x));
+  });
+  testing::expect_same_bits_in_tiles(PolishedField(surface, kLens, {0.03, 0.01, 0.2}),
+                                     whole_lens());
+}
+
+}  // namespace
+}  // namespace lensforge

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <stop_token>
+#include <utility>
+
+#include "cam/cam_meshes.h"
+#include "cam/milled/crease_map.h"
+#include "cam/milled/designed_field.h"
+#include "cam/milled/field_tiles.h"
+#include "cam/milled_paths.h"
+
+namespace lensforge {
+namespace {
+
+constexpr double kRadius = 0.2;
+
+TEST(FieldTiles, EveryCellOfTheGridLiesInOneTile) {
+  GridWindow grid = testing::window_at({0.0, 0.0}, 0.01, 83, 41);
+  grid.first_column = 5;
+  grid.first_row = 7;
+  std::set<std::pair<std::int64_t, std::int64_t>> cells;
+  std::int64_t count = 0;
+  for (const GridWindow& tile : cut_into_tiles(grid, 16)) {
+    EXPECT_LE(tile.columns, 17);
+    EXPECT_GE(tile.columns, 2);
+    for (std::int64_t j = 0; j + 1 < tile.rows; ++j) {
+      for (std::int64_t i = 0; i + 1 < tile.columns; ++i) {
+        cells.emplace(tile.first_column + i, tile.first_row + j);
+        ++count;
+      }
+    }
+  }
+  EXPECT_EQ(count, 82 * 40);
+  EXPECT_EQ(static_cast<std::int64_t>(cells.size()), count);
+  EXPECT_EQ(*cells.begin(), std::make_pair(std::int64_t{5}, std::int64_t{7}));
+}
+
+TEST(FieldTiles, TilesArriveInOrderUntilAStopIsRequested) {
+  const SurfaceMesh mesh = testing::grid_mesh(5, 5, 3.0, 3.0, [](double, double) { return 2.0; });
+  const FacetField field(mesh);
+  std::stop_source stop;
+  std::int64_t nodes = 0;
+  const auto visit = [&](const SurfacePatch& patch) {
+    nodes += patch.window.size();
+    stop.request_stop();
+  };
+  const GridWindow grid = testing::window_at({0.0, 0.0}, 0.002, 1301, 50);
+  EXPECT_FALSE(for_each_tile(field, grid, Executor::serial(),
+                             {stop.get_token(), [](const Progress&) {}}, visit));
+  EXPECT_EQ(nodes, (kTileSide + 1) * 50);
+  nodes = 0;
+  EXPECT_TRUE(for_each_tile(field, grid, Executor::serial(), {}, visit));
+  EXPECT_EQ(nodes, 1302 * 50);
+}
+
+TEST(FieldTiles, MeshOfASampledMeshIsTheMesh) {
+  const SurfaceMesh mesh = testing::grid_mesh(9, 7, 4.0, 3.0, testing::lens_relief);
+  const SurfacePatch patch =
+      testing::sampled(FacetField(mesh), testing::window_at({0.0, 0.0}, 0.5, 9, 7));
+  const SurfaceMesh back = mesh_of(patch);
+  EXPECT_EQ(back.triangles, mesh.triangles);
+  EXPECT_EQ(back.grid, mesh.grid);
+  EXPECT_LT((back.vertices - mesh.vertices).cwiseAbs().maxCoeff(), 1e-12);
+}
+
+TEST(CreaseMap, FindsTheGroovesDepthWidthAndShare) {
+  // Two grooves along y: at x = 1 with a turn of 2·atan(0.3), at x = 3 of 2·atan(0.1).
+  const SurfaceMesh mesh = testing::grid_mesh(9, 5, 4.0, 2.0, [](double x, double) {
+    return 5.0 + (x < 2.0 ? 0.3 * std::abs(x - 1.0) : 0.2 + 0.1 * std::abs(x - 3.0));
+  });
+  const FacetField designed(mesh);
+  const DropCutter cutter(mesh, kRadius, Executor::serial());
+  const RoundedField field(designed, cutter, Executor::serial());
+  const GridWindow grid = testing::window_at({0.0, 0.0}, 0.0025, 1601, 801);
+  const CreaseMap map = map_creases(field, grid, {1.0, 10, 0.9}, Executor::cpu(2), {});
+  ASSERT_TRUE(map.complete);
+  EXPECT_EQ(map.columns, 4);
+  EXPECT_EQ(map.rows, 2);
+  const double half = std::atan(0.3);
+  const double shallow = std::atan(0.1);
+  ASSERT_GE(map.worst.size(), 3U);
+  EXPECT_NEAR(map.worst[0].place.x(), 1.0, 1e-9);
+  EXPECT_NEAR(map.worst[0].depth, kRadius * (1.0 / std::cos(half) - 1.0), 1e-12);
+  EXPECT_NEAR(map.worst[0].width, 2.0 * kRadius * std::sin(half), 1e-12);
+  EXPECT_NEAR(map.worst[2].depth, kRadius * (1.0 / std::cos(shallow) - 1.0), 1e-12);
+  EXPECT_TRUE(std::is_sorted(map.worst.begin(), map.worst.end(),
+                             [](const auto& a, const auto& b) { return a.depth > b.depth; }));
+  const double width = 2.0 * kRadius * (std::sin(half) + std::sin(shallow));
+  EXPECT_NEAR(map.fillets, width / 4.0, 2.0 * 0.0025 / 4.0);
+  EXPECT_NEAR(map.depth[1], kRadius * (1.0 / std::cos(half) - 1.0), 1e-6);
+}
+
+TEST(CreaseMap, ASurfaceWithoutValleysHasNone) {
+  const SurfaceMesh mesh = testing::grid_mesh(
+      9, 5, 4.0, 2.0, [](double x, double y) { return 5.0 - 0.1 * std::abs(x - 2.0) + 0.2 * y; });
+  const FacetField designed(mesh);
+  const DropCutter cutter(mesh, kRadius, Executor::serial());
+  const RoundedField field(designed, cutter, Executor::serial());
+  const CreaseMap map = map_creases(field, testing::window_at({0.0, 0.0}, 0.02, 201, 101), {},
+                                    Executor::serial(), {});
+  EXPECT_TRUE(map.worst.empty());
+  EXPECT_EQ(map.fillets, 0.0);
+}
+
+}  // namespace
+}  // namespace lensforge
