@@ -176,26 +176,31 @@ std::array<unsigned char, 3> false_color(double share) {
   return color;
 }
 
-ColorImage error_image(const Image& render, const Image& target) {
-  LF_CHECK(render.columns() == target.columns() && render.rows() == target.rows(),
-           std::to_string(render.columns()) + "x" + std::to_string(render.rows()));
-  LF_CHECK(!target.empty(), "no pixels");
-  const std::vector<double> errors = absolute_errors(render, target);
-  const Scale scale = choose_scale(errors);
-  const int zoom = enlargement(target.columns(), target.rows());
-  const int width = target.columns() * zoom;
-  const int height = std::max(target.rows() * zoom, kShorterSide);
+ColorImage false_color_image(const std::vector<double>& values, int columns, int rows) {
+  LF_CHECK(columns > 0 && rows > 0 && std::ssize(values) == std::ptrdiff_t{columns} * rows,
+           std::to_string(values.size()));
+  const Scale scale = choose_scale(values);
+  const int zoom = enlargement(columns, rows);
+  const int width = columns * zoom;
+  const int height = std::max(rows * zoom, kShorterSide);
   Canvas canvas(width + kLegendWidth, height, kPaper);
   std::size_t pixel = 0;
-  for (int row = 0; row < target.rows(); ++row) {
-    for (int column = 0; column < target.columns(); ++column) {
-      canvas.fill(column * zoom, row * zoom, zoom, zoom, false_color(errors[pixel++] / scale.top));
+  for (int row = 0; row < rows; ++row) {
+    for (int column = 0; column < columns; ++column) {
+      canvas.fill(column * zoom, row * zoom, zoom, zoom, false_color(values[pixel++] / scale.top));
     }
   }
   const int text_half = kGlyphRows * kFontScale / 2;
   draw_legend(canvas, width + kMargin, kMargin + text_half, height - 2 * (kMargin + text_half),
               scale);
   return std::move(canvas).image();
+}
+
+ColorImage error_image(const Image& render, const Image& target) {
+  LF_CHECK(render.columns() == target.columns() && render.rows() == target.rows(),
+           std::to_string(render.columns()) + "x" + std::to_string(render.rows()));
+  LF_CHECK(!target.empty(), "no pixels");
+  return false_color_image(absolute_errors(render, target), target.columns(), target.rows());
 }
 
 }  // namespace lensforge

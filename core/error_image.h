@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <vector>
 
 #include "core/image.h"
 #include "core/image_io.h"
@@ -12,11 +13,14 @@ namespace lensforge {
 /// each step lighter than the last.
 std::array<unsigned char, 3> false_color(double share);
 
-/// |encode(render) − encode(target)| in false colour, each pixel enlarged by a whole number so that
-/// the shorter side has at least 256, with a colour bar and its labels at the right. The scale runs
-/// from 0 to the 99.5th percentile of the error, rounded up to 1, 2 or 5 times a power of ten,
-/// 0.001 at least; errors above it show the bar's top colour, and the top label then reads ">…".
-/// @pre equal sizes.
+/// Values ≥ 0 in false colour, each pixel enlarged by a whole number so that the shorter side has
+/// at least 256, with a colour bar and its labels at the right. The scale runs from 0 to the 99.5th
+/// percentile of the values, rounded up to 1, 2 or 5 times a power of ten, 0.001 at least; values
+/// above it show the bar's top colour, and the top label then reads ">…".
+/// @param values  columns × rows, row by row from the top. @pre neither is 0.
+ColorImage false_color_image(const std::vector<double>& values, int columns, int rows);
+
+/// |encode(render) − encode(target)| as a false_color_image(). @pre equal sizes.
 ColorImage error_image(const Image& render, const Image& target);
 
 }  // namespace lensforge

@@ -29,17 +29,34 @@ std::string extension_of(const fs::path& path) {
   return extension;
 }
 
-void write_encoded(const fs::path& path, const OIIO::ImageSpec& spec, const std::string& extension,
-                   const void* pixels) {
+/// @param what  what to name in messages.
+std::vector<unsigned char> encoded(const std::string& what, const OIIO::ImageSpec& spec,
+                                   const std::string& extension, const void* pixels) {
   std::vector<unsigned char> bytes;
   OIIO::Filesystem::IOVecOutput memory(bytes);
   const std::string name = "picture" + extension;
   const auto output = OIIO::ImageOutput::create(name, &memory);
-  if (!output) throw RunError(path.string() + ": cannot be written: " + OIIO::geterror());
+  if (!output) throw RunError(what + ": cannot be written: " + OIIO::geterror());
   if (!output->open(name, spec) || !output->write_image(spec.format, pixels) || !output->close()) {
-    throw RunError(path.string() + ": cannot be written: " + output->geterror());
+    throw RunError(what + ": cannot be written: " + output->geterror());
   }
+  return bytes;
+}
+
+void write_bytes(const fs::path& path, const std::vector<unsigned char>& bytes) {
   write_whole_file(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+}
+
+void write_encoded(const fs::path& path, const OIIO::ImageSpec& spec, const std::string& extension,
+                   const void* pixels) {
+  write_bytes(path, encoded(path.string(), spec, extension, pixels));
+}
+
+std::vector<unsigned char> png_of(const std::string& what, const ColorImage& image) {
+  OIIO::ImageSpec spec(image.columns, image.rows, 3, OIIO::TypeDesc::UINT8);
+  LF_CHECK(!image.rgb.empty() && image.rgb.size() == spec.image_bytes(), what);
+  spec.attribute("oiio:ColorSpace", "sRGB");
+  return encoded(what, spec, ".png", image.rgb.data());
 }
 
 void write_png(const Image& image, const fs::path& path) {
@@ -75,10 +92,9 @@ void write_image(const Image& image, const fs::path& path) {
 }
 
 void write_image(const ColorImage& image, const fs::path& path) {
-  OIIO::ImageSpec spec(image.columns, image.rows, 3, OIIO::TypeDesc::UINT8);
-  LF_CHECK(!image.rgb.empty() && image.rgb.size() == spec.image_bytes(), path.string());
-  spec.attribute("oiio:ColorSpace", "sRGB");
-  write_encoded(path, spec, ".png", image.rgb.data());
+  write_bytes(path, png_of(path.string(), image));
 }
+
+std::vector<unsigned char> encode_png(const ColorImage& image) { return png_of("picture", image); }
 
 }  // namespace lensforge

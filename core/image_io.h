@@ -45,4 +45,7 @@ struct ColorImage {
 /// Writes an 8-bit PNG; whole or not at all. @throw RunError if it cannot be written.
 void write_image(const ColorImage& image, const std::filesystem::path& path);
 
+/// The bytes of the same PNG. @throw RunError if it cannot be encoded.
+std::vector<unsigned char> encode_png(const ColorImage& image);
+
 }  // namespace lensforge
