@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <initializer_list>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "core/image.h"
+#include "core/image_io.h"
+
+/// Pieces of HTML. Everything that takes `text` escapes it; `html` is put in as it is.
+namespace lensforge {
+
+/// &, <, >, " and ' as entities; control characters but tab and newline become spaces.
+std::string escape_html(std::string_view text);
+
+/// <tag attributes>html</tag>. @param attributes  HTML, without the leading space.
+std::string element(std::string_view tag, std::string_view attributes, std::string_view html);
+
+/// One text after the other.
+std::string joined(std::initializer_list<std::string_view> texts);
+
+/// A column of a table: its heading (text), and whether it holds numbers.
+struct TableColumn {
+  std::string heading;
+  bool numbers = false;
+};
+
+/// A table whose cells are HTML; on narrow screens each row is a block with its headings in front.
+std::string html_table(std::span<const TableColumn> columns,
+                       const std::vector<std::vector<std::string>>& rows);
+
+/// A share as percent with three significant digits: "1.30 %", "0.0412 %"; 0 is "0 %".
+std::string percent_text(double share);
+/// Millimetres as micrometres with two decimals: "4.02 µm".
+std::string micrometre_text(double mm);
+/// "3 h 12 min", "12 min", "40 s".
+std::string duration_text(double minutes);
+/// A whole number with thin spaces between thousands.
+std::string count_text(std::int64_t count);
+/// A ratio to one as "85 : 1"; infinite as "no light in the dark".
+std::string contrast_text(double contrast);
+
+/// Base 64 (RFC 4648, with padding).
+std::string base64(std::span<const unsigned char> bytes);
+/// The picture as a data URI.
+std::string png_uri(const ColorImage& image);
+/// The picture as shown, 8 bits grey.
+ColorImage grey_picture(const Image& image);
+
+/// Replaces every {{NAME}} of `page` by its value; values are not looked through again.
+/// @pre every name in the page has a value.
+std::string fill_in(std::string_view page,
+                    std::span<const std::pair<std::string_view, std::string>> values);
+
+}  // namespace lensforge

@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "cam/leakage/leak_map.h"
+#include "cam/leakage/leakage.h"
+#include "cam/path/operation.h"
+#include "cam/report/verdict.h"
+#include "cam/tool/tool.h"
+#include "core/image.h"
+
+namespace lensforge {
+
+/// A value on a regular raster over the lens's rectangle, row by row from the least y.
+struct LensRaster {
+  int columns = 0;
+  int rows = 0;
+  std::vector<float> values;
+
+  [[nodiscard]] bool empty() const { return values.empty(); }
+};
+
+/// A map over the lens that the report shows in false colour, with its colour bar.
+struct ReportMap {
+  std::string title;
+  std::string note;  ///< What one sees, in a sentence.
+  std::string unit;  ///< Of the values.
+  LensRaster raster;
+};
+
+/// A box with what it is called; mm, lens frame.
+struct NamedBox {
+  std::string name;
+  Eigen::AlignedBox3d box;
+};
+
+/// How the blank is put on the machine; mm, lens frame.
+struct SetupSheet {
+  std::string machine;
+  std::string material;
+  Eigen::AlignedBox3d part;                        ///< The lens, entry face in z = 0.
+  Eigen::AlignedBox3d blank;                       ///< The block before the first cut.
+  Eigen::Vector3d zero = Eigen::Vector3d::Zero();  ///< Where the program's X0 Y0 Z0 lies.
+  std::string zero_words;                          ///< "top of the blank, lower left corner …"
+  std::string up_words;                            ///< Which face lies up and which down.
+  std::vector<NamedBox> keep_outs;                 ///< Clamps and whatever else no tool may enter.
+};
+
+/// One program or part of one, as the operator runs it.
+struct ReportOperation {
+  OperationSummary summary;
+  std::string file;
+  double feed = 0.0;  ///< mm/min
+  double spindle_rpm = 0.0;
+  double minutes = 0.0;  ///< By the machine model.
+  std::int64_t lines = 0;
+  double lines_per_second = 0.0;  ///< That the controller has to take, at most.
+};
+
+/// One line of a table of what was chosen: "Stepover", "0.060 mm".
+struct ReportParameter {
+  std::string name;
+  std::string value;
+};
+
+/// Parameters under one heading.
+struct ParameterGroup {
+  std::string title;
+  std::vector<ReportParameter> parameters;
+};
+
+/// One line of what --compare ranks.
+struct ReportChoice {
+  std::string choice;  ///< "tool 0.3 mm, pitch 0.04 mm"
+  double leakage = 0.0;
+  double dark_flux = 0.0;
+  double mae = 0.0;
+  double hours = 0.0;
+  bool chosen = false;  ///< What the rest of the report is about.
+};
+
+/// A tool's path, thinned out to be looked at; mm, lens frame.
+struct ReportPath {
+  std::string operation;
+  std::vector<Eigen::Vector3f> points;
+};
+
+/// Everything that report.html and report.json say.
+struct ReportData {
+  std::string job;      ///< Name of the part.
+  std::string program;  ///< "lensforge 0.1.0"
+  std::string made;     ///< Date, as text; left out if empty.
+  std::string lens_id;  ///< Hash of the lens folder or the like; left out if empty.
+  std::string part;     ///< "lens" or "mould"
+
+  Image target;           ///< Linear light.
+  LeakageResult leakage;  ///< designed, chain and the other surfaces.
+  std::vector<std::string> shown =
+      {};  ///< Names of the surfaces whose pictures stand side by side.
+  LeakageOptions leakage_options;
+  std::vector<LeakPlace> places;        ///< Worst first.
+  Eigen::Vector2d lens_size{0.0, 0.0};  ///< mm
+
+  Verdict verdict;
+  std::vector<Tool> tools;
+  std::vector<ReportOperation> operations;
+  std::vector<ParameterGroup> parameters;
+  SetupSheet setup;
+  double z_offset = 0.0;  ///< Program Z = lens-frame z + z_offset.
+  double seconds = 0.0;   ///< Spent on making all this.
+  std::vector<std::string> warnings;
+
+  LensRaster surface;            ///< Heights of the part, mm, for the view.
+  std::vector<ReportMap> maps;   ///< Height, fillet, …
+  std::vector<ReportPath> path;  ///< For the view.
+  std::vector<ReportChoice> choices;
+
+  [[nodiscard]] double minutes() const;
+};
+
+}  // namespace lensforge

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cam/report/report_html.h"
+
+#include <array>
+#include <string_view>
+#include <utility>
+
+#include "cam/report/html_text.h"
+#include "cam/report/sections.h"
+#include "report_page.h"
+
+namespace lensforge {
+
+double ReportData::minutes() const {
+  double sum = 0.0;
+  for (const ReportOperation& operation : operations) sum += operation.minutes;
+  return sum;
+}
+
+std::string report_html(const ReportData& data) {
+  namespace section = report_section;
+  const std::array<std::pair<std::string_view, std::string>, 18> values{{
+      {"TITLE", escape_html(data.job + " – cutting report")},
+      {"STYLE", std::string(report_page::kStyle)},
+      {"HEADER", section::header(data)},
+      {"PICTURES", section::pictures(data)},
+      {"VERDICT", section::verdict(data)},
+      {"PLACES", section::places(data)},
+      {"WORK", section::work(data)},
+      {"WARNINGS", section::warnings(data)},
+      {"SETUP", section::setup(data)},
+      {"OPERATIONS", section::operations(data)},
+      {"CERTIFICATES", section::certificates(data)},
+      {"LEAKAGE", section::leakage(data)},
+      {"MAPS", section::maps(data)},
+      {"VIEW", section::view(data)},
+      {"CHOICES", section::choices(data)},
+      {"PARAMETERS", section::parameters(data)},
+      {"FOOTER", section::footer(data)},
+      {"SCRIPT", std::string(report_page::kScript)},
+  }};
+  return fill_in(report_page::kHtml, values);
+}
+
+}  // namespace lensforge

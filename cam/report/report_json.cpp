@@ -1,0 +1,189 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cam/report/report_json.h"
+
+#include <cmath>
+
+#include "cam/report/leak_words.h"
+
+namespace lensforge {
+namespace {
+
+using nlohmann::json;
+
+json number(double value) { return std::isfinite(value) ? json(value) : json(nullptr); }
+
+json pair(const Eigen::Vector2d& v) { return {v.x(), v.y()}; }
+json triple(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+
+json box_json(const Eigen::AlignedBox3d& box) {
+  if (box.isEmpty()) return nullptr;
+  return {{"min", triple(box.min())}, {"max", triple(box.max())}};
+}
+
+template <class Items, class Make>
+json list(const Items& items, const Make& make) {
+  json array = json::array();
+  for (const auto& item : items) array.push_back(make(item));
+  return array;
+}
+
+json check_json(const LimitCheck& check) {
+  return {{"name", check.key},    {"words", check.name}, {"value", number(check.value)},
+          {"limit", check.limit}, {"unit", check.unit},  {"pass", check.passes()}};
+}
+
+json quality_json(const RenderedSurface& surface) {
+  const PictureQuality& q = surface.quality;
+  return {{"name", surface.name},
+          {"mae", q.metrics.mae},
+          {"psnr", number(q.metrics.psnr)},
+          {"ssim", q.metrics.ssim},
+          {"mae_linear", q.metrics.mae_linear},
+          {"flux_inside", q.metrics.flux_inside},
+          {"leakage", q.leakage},
+          {"dark_flux", q.dark_flux},
+          {"dark_over_bright", q.dark_ratio},
+          {"contrast", number(q.contrast())}};
+}
+
+json cause_json(const CausePart& part) {
+  return {{"cause", part.cause},
+          {"leakage", part.leakage},
+          {"dark_flux", part.dark_flux},
+          {"dark_over_bright", part.dark_ratio}};
+}
+
+json leakage_json(const ReportData& data) {
+  const LeakageResult& result = data.leakage;
+  const PictureQuality& part = result.part().quality;
+  return {{"share", part.leakage},
+          {"dark_flux", part.dark_flux},
+          {"contrast", number(part.contrast())},
+          {"dark_below_mean_share", data.leakage_options.dark_below},
+          {"bright_from_mean_share", data.leakage_options.bright_from},
+          {"dark_pixels", result.dark_pixels},
+          {"bright_pixels", result.bright_pixels},
+          {"causes", list(result.parts, cause_json)}};
+}
+
+json surfaces_json(const LeakageResult& result) {
+  json surfaces = json::array({quality_json(result.designed)});
+  for (const RenderedSurface& surface : result.others) surfaces.push_back(quality_json(surface));
+  for (const RenderedSurface& surface : result.steps) surfaces.push_back(quality_json(surface));
+  return surfaces;
+}
+
+json place_json(const LeakPlace& place) {
+  return {{"place", pair(place.place)},
+          {"side", place.side},
+          {"leakage", place.leakage},
+          {"dark_flux", place.dark_flux},
+          {"height_difference", place.height.value},
+          {"height_place", pair(place.height.place)},
+          {"lands_at_pixel", pair(place.lands)},
+          {"causes", list(place.parts, cause_json)},
+          {"words", leak_words(place)}};
+}
+
+json tool_json(const Tool& tool) {
+  const char* shape = tool.shape == CutterShape::kBall   ? "ball"
+                      : tool.shape == CutterShape::kBull ? "bull"
+                                                         : "flat";
+  return {{"number", tool.number},
+          {"name", tool.name},
+          {"shape", shape},
+          {"diameter", tool.diameter},
+          {"corner_radius", tool.corner_radius},
+          {"teeth", tool.teeth},
+          {"flute_length", tool.flute_length},
+          {"spindle_rpm", tool.spindle_rpm},
+          {"feed_mm_per_min", tool.feed},
+          {"plunge_mm_per_min", tool.plunge}};
+}
+
+json extreme_json(const Extreme& extreme) {
+  return {{"value", extreme.value}, {"place", triple(extreme.place)}};
+}
+
+json operation_json(const ReportOperation& operation) {
+  const OperationSummary& s = operation.summary;
+  json object{{"name", s.name},
+              {"file", operation.file},
+              {"tool", s.tool},
+              {"passes", s.passes},
+              {"moves", s.moves},
+              {"arcs", s.arcs},
+              {"lines", operation.lines},
+              {"lines_per_second", operation.lines_per_second},
+              {"feed_mm_per_min", operation.feed},
+              {"spindle_rpm", operation.spindle_rpm},
+              {"minutes", operation.minutes},
+              {"cutting_length", s.cutting_length},
+              {"rapid_length", s.rapid_length},
+              {"stepover", s.stepover},
+              {"stepdown", s.stepdown},
+              {"allowance", s.allowance},
+              {"extent", box_json(s.tip)},
+              {"warnings", s.warnings}};
+  if (s.certified) {
+    object["certificate"] = {{"gouge", extreme_json(s.certificate.gouge)},
+                             {"excess", extreme_json(s.certificate.excess)},
+                             {"slope_rad", extreme_json(s.certificate.slope)}};
+  }
+  return object;
+}
+
+json setup_json(const SetupSheet& setup) {
+  const auto box = [](const NamedBox& item) {
+    return json{{"name", item.name}, {"box", box_json(item.box)}};
+  };
+  return {{"machine", setup.machine},     {"material", setup.material},
+          {"part", box_json(setup.part)}, {"blank", box_json(setup.blank)},
+          {"zero", triple(setup.zero)},   {"zero_words", setup.zero_words},
+          {"up_words", setup.up_words},   {"keep_outs", list(setup.keep_outs, box)}};
+}
+
+json group_json(const ParameterGroup& group) {
+  json object = json::object();
+  for (const ReportParameter& parameter : group.parameters) {
+    object[parameter.name] = parameter.value;
+  }
+  return {{"title", group.title}, {"parameters", object}};
+}
+
+json choice_json(const ReportChoice& choice) {
+  return {{"choice", choice.choice}, {"leakage", choice.leakage}, {"dark_flux", choice.dark_flux},
+          {"mae", choice.mae},       {"hours", choice.hours},     {"chosen", choice.chosen}};
+}
+
+}  // namespace
+
+json report_json(const ReportData& data) {
+  json report{
+      {"format", "lensforge.cam"},
+      {"version", 1},
+      {"program", data.program},
+      {"units", "mm"},
+      {"job", data.job},
+      {"part", data.part},
+      {"lens_id", data.lens_id},
+      {"z_offset", data.z_offset},
+      {"minutes", data.minutes()},
+      {"tools", list(data.tools, tool_json)},
+      {"operations", list(data.operations, operation_json)},
+      {"setup", setup_json(data.setup)},
+      {"parameters", list(data.parameters, group_json)},
+      {"verdict",
+       {{"pass", data.verdict.passes()}, {"checks", list(data.verdict.checks, check_json)}}},
+      {"places", list(data.places, place_json)},
+      {"choices", list(data.choices, choice_json)},
+      {"warnings", data.warnings},
+      {"seconds", data.seconds}};
+  if (!data.leakage.steps.empty()) {
+    report["leakage"] = leakage_json(data);
+    report["surfaces"] = surfaces_json(data.leakage);
+  }
+  return report;
+}
+
+}  // namespace lensforge

@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <nlohmann/json.hpp>
+
+#include "cam/report/report_data.h"
+
+namespace lensforge {
+
+/// What the report says, without its pictures, as the fields that report.json has for it (lengths
+/// in mm, flux as shares, what is infinite as null): "z_offset", "verdict", "surfaces", "leakage",
+/// "places", "tools", "operations", "setup", "parameters", "warnings", "choices", …
+nlohmann::json report_json(const ReportData& data);
+
+}  // namespace lensforge

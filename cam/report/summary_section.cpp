@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <cmath>
+
+#include "cam/report/html_text.h"
+#include "cam/report/leak_words.h"
+#include "cam/report/relief_picture.h"
+#include "cam/report/sections.h"
+#include "core/decimal_text.h"
+
+// The first screen: verdict, pictures, worst places, minutes and tools.
+namespace lensforge {
+namespace {
+
+std::string figure(const ColorImage& picture, const std::string& alt, const std::string& caption) {
+  return element("figure", "",
+                 "<img src=\"" + png_uri(picture) + "\" alt=\"" + escape_html(alt) + "\">" +
+                     element("figcaption", "", caption));
+}
+
+std::string caption(const std::string& title, const std::string& note) {
+  return element("b", "", escape_html(title)) + "<br>" + note;
+}
+
+/// The surfaces of a result by name, in the chain's order.
+std::vector<const RenderedSurface*> surfaces_of(const LeakageResult& result) {
+  std::vector<const RenderedSurface*> surfaces{&result.designed};
+  for (const RenderedSurface& surface : result.others) surfaces.push_back(&surface);
+  for (const RenderedSurface& surface : result.steps) surfaces.push_back(&surface);
+  return surfaces;
+}
+
+std::string surface_figure(const RenderedSurface& surface, const Image& target) {
+  const PictureQuality& quality = surface.quality;
+  const std::string note = "MAE " + decimal_text(quality.metrics.mae, 4) + ", SSIM " +
+                           decimal_text(quality.metrics.ssim, 3) + "<br>leaks " +
+                           percent_text(quality.leakage);
+  return figure(grey_picture(surface.picture.image(target.total())),
+                "What the surface “" + surface.name + "” throws", caption(surface.name, note));
+}
+
+std::string leakage_figure(const LeakageResult& result) {
+  const std::vector<double> map = surplus(result.part().picture, result.designed.picture);
+  const FluxPicture& part = result.part().picture;
+  const double top = scale_top(map);
+  const ColorImage picture = scaled_picture(map, part.columns, part.rows, top);
+  const std::string note =
+      "black: none; white: " + decimal_text(top, top < 0.1 ? 3 : 2) +
+      " × the mean light or more, where the design puts less" +
+      element("span", "class=\"scale\"",
+              "0 <img src=\"" + png_uri(scale_picture()) + "\" alt=\"colour scale\"> " +
+                  decimal_text(top, top < 0.1 ? 3 : 2));
+  return figure(picture, "Where light leaks to", caption("Leakage", note));
+}
+
+std::string check_value(double value, const LimitCheck& check) {
+  return escape_html(decimal_text(value, check.decimals) +
+                     (check.unit.empty() ? "" : " " + check.unit));
+}
+
+std::string tool_words(const Tool& tool) {
+  const std::string shape = tool.shape == CutterShape::kBall   ? "ball"
+                            : tool.shape == CutterShape::kBull ? "bull-nose"
+                                                               : "flat";
+  const std::string name = tool.name.empty() ? "" : " – " + tool.name;
+  return joined({"T", std::to_string(tool.number), ": ", decimal_text(tool.diameter, 2), " mm ",
+                 shape, name});
+}
+
+}  // namespace
+
+namespace report_section {
+
+std::string header(const ReportData& data) {
+  std::string under = data.part;
+  for (const std::string* text : {&data.program, &data.made, &data.lens_id}) {
+    if (!text->empty()) under += " · " + *text;
+  }
+  const std::string title = element("h1", "", escape_html("Cutting report: " + data.job)) +
+                            element("div", "class=\"soft\"", escape_html(under));
+  if (data.verdict.checks.empty()) return element("div", "", title);
+  const int failures = data.verdict.failures();
+  const std::string words = failures == 0
+                                ? "✔ Within all limits"
+                                : "✘ " + std::to_string(failures) +
+                                      (failures == 1 ? " limit not met" : " limits not met");
+  return element("div", "", title) +
+         element("div", failures == 0 ? "class=\"verdict good\"" : "class=\"verdict bad\"", words);
+}
+
+std::string pictures(const ReportData& data) {
+  if (data.leakage.steps.empty()) return "";
+  std::string figures;
+  for (const RenderedSurface* surface : surfaces_of(data.leakage)) {
+    const bool wanted =
+        std::find(data.shown.begin(), data.shown.end(), surface->name) != data.shown.end();
+    if (wanted) figures += surface_figure(*surface, data.target);
+  }
+  return element("div", "class=\"pictures\"", figures + leakage_figure(data.leakage));
+}
+
+std::string verdict(const ReportData& data) {
+  if (data.verdict.checks.empty()) return "";
+  std::vector<std::vector<std::string>> rows;
+  for (const LimitCheck& check : data.verdict.checks) {
+    const bool good = check.passes();
+    rows.push_back({escape_html(check.name), check_value(check.value, check),
+                    check_value(check.limit, check),
+                    element("span", good ? "class=\"state good\"" : "class=\"state bad\"",
+                            good ? "✔ met" : "✘ not met")});
+  }
+  const std::vector<TableColumn> columns{
+      {"what", false}, {"found", true}, {"at most", true}, {"limit", false}};
+  return element("div", "", element("h3", "", "Limits") + html_table(columns, rows));
+}
+
+std::string places(const ReportData& data) {
+  if (data.places.empty()) return "";
+  std::string items;
+  for (const LeakPlace& place : data.places) {
+    items += element("li", "",
+                     element("b", "",
+                             "x " + decimal_text(place.place.x(), 1) + " y " +
+                                 decimal_text(place.place.y(), 1) + " mm") +
+                         " " + escape_html(leak_words(place)));
+  }
+  return element("div", "",
+                 element("h3", "", "Worst places on the " + escape_html(data.part)) +
+                     element("ol", "class=\"places\"", items));
+}
+
+std::string work(const ReportData& data) {
+  std::string html;
+  if (!data.operations.empty()) {
+    html += element("h3", "", "Time on the machine") +
+            element("div", "class=\"big\"", duration_text(data.minutes()));
+    std::string items;
+    for (const ReportOperation& operation : data.operations) {
+      items += element(
+          "div", "", escape_html(operation.summary.name) + ": " + duration_text(operation.minutes));
+    }
+    html += items;
+  }
+  if (!data.tools.empty()) {
+    std::string items;
+    for (const Tool& tool : data.tools) items += element("div", "", escape_html(tool_words(tool)));
+    html += element("h3", "style=\"margin-top:.9rem\"", "Tools") + items;
+  }
+  return element("div", "", html);
+}
+
+std::string footer(const ReportData& data) {
+  std::string text =
+      "Lengths in mm, lens frame: origin at the lens's lower left corner seen from "
+      "above, x right, y away, z up from the entry face. Program Z = z " +
+      std::string(data.z_offset < 0.0 ? "− " : "+ ") + decimal_text(std::abs(data.z_offset), 4) +
+      " mm.";
+  if (data.seconds > 0.0) text += " Made in " + decimal_text(data.seconds, 0) + " s.";
+  return escape_html(text);
+}
+
+}  // namespace report_section
+}  // namespace lensforge

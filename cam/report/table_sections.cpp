@@ -1,0 +1,254 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <cmath>
+
+#include "cam/report/html_text.h"
+#include "cam/report/sections.h"
+#include "core/decimal_text.h"
+
+namespace lensforge::report_section {
+namespace {
+
+using Row = std::vector<std::string>;
+
+std::string section(const std::string& title, const std::string& html) {
+  return element("section", "", element("h2", "", escape_html(title)) + html);
+}
+
+/// A table whose rows turn into blocks on a narrow screen.
+std::string stacked(const std::vector<TableColumn>& columns, const std::vector<Row>& rows) {
+  return element("div", "class=\"stack\"", html_table(columns, rows));
+}
+
+/// Program coordinates of a place, as the machine's display shows them.
+std::string place_text(const Eigen::Vector3d& place, double z_offset) {
+  return joined({"X ", decimal_text(place.x(), 2), " Y ", decimal_text(place.y(), 2), " Z ",
+                 decimal_text(place.z() + z_offset, 3)});
+}
+
+std::string box_text(const Eigen::AlignedBox3d& box) {
+  const Eigen::Vector3d size = box.sizes();
+  return decimal_text(size.x(), 1) + " × " + decimal_text(size.y(), 1) + " × " +
+         decimal_text(size.z(), 2) + " mm";
+}
+
+std::string facts(const std::vector<ReportParameter>& parameters) {
+  std::vector<Row> rows;
+  for (const ReportParameter& parameter : parameters) {
+    rows.push_back({escape_html(parameter.name), element("b", "", escape_html(parameter.value))});
+  }
+  std::string body;
+  for (const Row& row : rows) {
+    body += element("tr", "", element("td", "", row[0]) + element("td", "", row[1]));
+  }
+  return element("table", "", element("tbody", "", body));
+}
+
+std::string certificate_cell(const Extreme& extreme, const std::string& value, double z_offset) {
+  if (extreme.value == 0.0) return "none";
+  return element("b", "", value) + "<br>" +
+         element("span", "class=\"soft\"", place_text(extreme.place, z_offset));
+}
+
+/// A difference with its sign.
+std::string signed_text(double value, const std::string& text) {
+  return joined({value > 0.0 ? "+" : "", text});
+}
+
+Row cause_row(const CausePart& part) {
+  return {escape_html(part.cause), signed_text(part.leakage, percent_text(part.leakage)),
+          signed_text(part.dark_flux, percent_text(part.dark_flux)),
+          signed_text(part.dark_ratio, decimal_text(part.dark_ratio, 5))};
+}
+
+std::string cause_table(const ReportData& data) {
+  const PictureQuality& first = data.leakage.designed.quality;
+  const PictureQuality& last = data.leakage.part().quality;
+  std::vector<Row> rows{{"as designed", percent_text(first.leakage), percent_text(first.dark_flux),
+                         decimal_text(first.dark_ratio, 5)}};
+  for (const CausePart& part : data.leakage.parts) rows.push_back(cause_row(part));
+  const auto bold = [](const std::string& html) { return element("b", "", html); };
+  rows.push_back({bold("the part"), bold(percent_text(last.leakage)),
+                  bold(percent_text(last.dark_flux)), bold(decimal_text(last.dark_ratio, 5))});
+  return stacked(
+      {{"cause", false}, {"leakage", true}, {"light in dark parts", true}, {"dark ÷ bright", true}},
+      rows);
+}
+
+std::string quality_table(const LeakageResult& result) {
+  std::vector<Row> rows;
+  const auto add = [&rows](const RenderedSurface& surface) {
+    const PictureQuality& q = surface.quality;
+    rows.push_back({escape_html(surface.name), decimal_text(q.metrics.mae, 4),
+                    std::isfinite(q.metrics.psnr) ? decimal_text(q.metrics.psnr, 1) + " dB" : "∞",
+                    decimal_text(q.metrics.ssim, 3), percent_text(q.leakage),
+                    percent_text(q.dark_flux), contrast_text(q.contrast()),
+                    percent_text(q.metrics.flux_inside)});
+  };
+  add(result.designed);
+  for (const RenderedSurface& surface : result.others) add(surface);
+  add(result.part());
+  return stacked({{"surface", false},
+                  {"MAE", true},
+                  {"PSNR", true},
+                  {"SSIM", true},
+                  {"leakage", true},
+                  {"light in dark parts", true},
+                  {"contrast", true},
+                  {"light on the picture", true}},
+                 rows);
+}
+
+}  // namespace
+
+std::string warnings(const ReportData& data) {
+  std::string items;
+  for (const std::string& warning : data.warnings) items += element("li", "", escape_html(warning));
+  for (const ReportOperation& operation : data.operations) {
+    for (const std::string& warning : operation.summary.warnings) {
+      items += element("li", "", escape_html(operation.summary.name + ": " + warning));
+    }
+  }
+  if (items.empty()) return "";
+  return element("section", "class=\"warnings\"",
+                 element("h3", "", "⚠ Before you start") + element("ul", "", items));
+}
+
+std::string setup(const ReportData& data) {
+  const SetupSheet& sheet = data.setup;
+  if (sheet.blank.isEmpty()) return "";
+  std::vector<ReportParameter> list{{"Machine", sheet.machine},
+                                    {"Blank", box_text(sheet.blank) + ", " + sheet.material},
+                                    {"Part", box_text(sheet.part)},
+                                    {"Program zero", sheet.zero_words},
+                                    {"Which way up", sheet.up_words}};
+  for (const NamedBox& clamp : sheet.keep_outs) {
+    const Eigen::Vector3d low = clamp.box.min() - sheet.zero;
+    const Eigen::Vector3d high = clamp.box.max() - sheet.zero;
+    const auto span = [&](const char* axis, int k) {
+      return std::string(axis) + " " + decimal_text(low[k], 1) + " … " + decimal_text(high[k], 1);
+    };
+    list.push_back(
+        {"Keep out: " + clamp.name, span("X", 0) + ", " + span("Y", 1) + ", " + span("Z", 2)});
+  }
+  const auto drawing = [&sheet](bool from_above, const std::string& caption) {
+    return element("figure", "",
+                   setup_drawing(sheet, from_above) + element("figcaption", "", caption));
+  };
+  const std::string drawings =
+      element("div", "class=\"setup\"",
+              drawing(true,
+                      "<b>From above.</b> Solid: blank; dashed: part; red: program zero; "
+                      "hatched: keep out. The operator stands below the drawing.") +
+                  drawing(false,
+                          "<b>From the front.</b> The table is below; the tool comes from "
+                          "above."));
+  return section("Setup", facts(list) + drawings);
+}
+
+std::string operations(const ReportData& data) {
+  if (data.operations.empty()) return "";
+  std::vector<Row> rows;
+  for (const ReportOperation& op : data.operations) {
+    const OperationSummary& s = op.summary;
+    const std::string step =
+        decimal_text(s.stepover, 3) + " mm" +
+        (s.stepdown > 0.0 ? ", down " + decimal_text(s.stepdown, 2) + " mm" : std::string());
+    rows.push_back({element("b", "", escape_html(s.name)), joined({"T", std::to_string(s.tool)}),
+                    element("code", "", escape_html(op.file)), decimal_text(op.spindle_rpm, 0),
+                    decimal_text(op.feed, 0), step, micrometre_text(s.allowance),
+                    decimal_text(1e-3 * s.cutting_length, 1) + " m", count_text(op.lines),
+                    decimal_text(op.lines_per_second, 0), duration_text(op.minutes)});
+  }
+  return section("Operations, in order", stacked({{"operation", false},
+                                                  {"tool", false},
+                                                  {"program", false},
+                                                  {"rpm", true},
+                                                  {"feed mm/min", true},
+                                                  {"stepover", true},
+                                                  {"leaves", true},
+                                                  {"cutting length", true},
+                                                  {"lines", true},
+                                                  {"lines/s", true},
+                                                  {"time", true}},
+                                                 rows));
+}
+
+std::string certificates(const ReportData& data) {
+  std::vector<Row> rows;
+  for (const ReportOperation& op : data.operations) {
+    if (!op.summary.certified) continue;
+    const PathCertificate& c = op.summary.certificate;
+    rows.push_back(
+        {element("b", "", escape_html(op.summary.name)),
+         certificate_cell(c.gouge, micrometre_text(c.gouge.value), data.z_offset),
+         certificate_cell(c.excess, micrometre_text(c.excess.value), data.z_offset),
+         certificate_cell(c.slope, decimal_text(1e3 * c.slope.value, 2) + " mrad", data.z_offset)});
+  }
+  if (rows.empty()) return "";
+  return section("Certificates",
+                 element("p", "",
+                         "Known for every move over its whole length, against the exact "
+                         "path of the tool; places are the program’s coordinates, mm.") +
+                     stacked({{"operation", false},
+                              {"deepest gouge", false},
+                              {"most material left", false},
+                              {"largest error of direction", false}},
+                             rows));
+}
+
+std::string leakage(const ReportData& data) {
+  if (data.leakage.steps.empty()) return "";
+  const LeakageOptions& o = data.leakage_options;
+  const std::string words =
+      "Leakage is the share of the light that lands where the design puts less. Dark parts are "
+      "pixels of the target below " +
+      percent_text(o.dark_below) + " of its mean (" + count_text(data.leakage.dark_pixels) +
+      " pixels), bright ones those from " + percent_text(o.bright_from) + " on (" +
+      count_text(data.leakage.bright_pixels) +
+      "). Contrast is the bright pixels’ mean to the dark ones’. Each cause is what it adds to "
+      "those above it; polishing is in every line, so the causes sum to the part.";
+  return section("Light and leakage",
+                 quality_table(data.leakage) +
+                     element("h3", "style=\"margin-top:1.2rem\"", "Leakage by cause") +
+                     cause_table(data) + element("p", "class=\"soft\"", escape_html(words)));
+}
+
+std::string choices(const ReportData& data) {
+  if (data.choices.empty()) return "";
+  std::string body;
+  int rank = 0;
+  for (const ReportChoice& choice : data.choices) {
+    const std::string name = escape_html(choice.choice) + (choice.chosen ? " – this report" : "");
+    std::string cells = element("td", "data-label=\"rank\"", std::to_string(++rank));
+    const auto cell = [&cells](const char* label, const std::string& html) {
+      cells += element("td", "class=\"number\" data-label=\"" + std::string(label) + "\"", html);
+    };
+    cells += element("td", "data-label=\"choice\"", name);
+    cell("leakage", percent_text(choice.leakage));
+    cell("light in dark parts", percent_text(choice.dark_flux));
+    cell("MAE", decimal_text(choice.mae, 4));
+    cell("time", duration_text(60.0 * choice.hours));
+    body += element("tr", choice.chosen ? "class=\"chosen\"" : "", cells);
+  }
+  const std::string head = element(
+      "tr", "",
+      "<th>rank</th><th>choice</th><th class=\"number\">leakage</th><th class=\"number\">light in "
+      "dark parts</th><th class=\"number\">MAE</th><th class=\"number\">time</th>");
+  return section(
+      "Other choices, least leakage first",
+      element("div", "class=\"stack\"",
+              element("table", "", element("thead", "", head) + element("tbody", "", body))));
+}
+
+std::string parameters(const ReportData& data) {
+  if (data.parameters.empty()) return "";
+  std::string groups;
+  for (const ParameterGroup& group : data.parameters) {
+    groups +=
+        element("div", "", element("h3", "", escape_html(group.title)) + facts(group.parameters));
+  }
+  return section("Process parameters", element("div", "class=\"columns\"", groups));
+}
+
+}  // namespace lensforge::report_section

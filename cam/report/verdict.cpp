@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cam/report/verdict.h"
+
+#include <algorithm>
+
+#include "core/error.h"
+
+namespace lensforge {
+
+bool Verdict::passes() const { return failures() == 0; }
+
+int Verdict::failures() const {
+  return static_cast<int>(std::count_if(checks.begin(), checks.end(),
+                                        [](const LimitCheck& check) { return !check.passes(); }));
+}
+
+Verdict judge_cut(const CutFindings& findings, const CutLimits& limits) {
+  struct Shown {
+    const char* unit;
+    double scale;
+    int decimals;
+  };
+  constexpr Shown kPercent{"%", 100.0, 2};
+  constexpr Shown kMicrometres{"µm", 1000.0, 2};
+  Verdict verdict;
+  const auto check = [&](const char* key, const char* name, std::optional<double> value,
+                         double limit, const Shown& shown) {
+    if (!(limit >= 0.0)) {
+      throw InputError("limit " + std::string(key) + " is " + std::to_string(limit) +
+                       ": must be at least 0");
+    }
+    if (!value) return;
+    verdict.checks.push_back(
+        {key, name, shown.scale * *value, shown.scale * limit, shown.unit, shown.decimals});
+  };
+  check("leakage", "light that lands where the design puts less", findings.leakage, limits.leakage,
+        kPercent);
+  check("dark_flux", "light in the dark parts of the picture", findings.dark_flux, limits.dark_flux,
+        kPercent);
+  check("mae_increase", "picture error (MAE) added by cutting", findings.mae_increase,
+        limits.mae_increase, {"", 1.0, 4});
+  check("gouge", "deepest gouge", findings.gouge, limits.gouge, kMicrometres);
+  check("excess", "most material left between points", findings.excess, limits.excess,
+        kMicrometres);
+  check("slope", "largest error of direction", findings.slope, limits.slope, {"mrad", 1e3, 2});
+  check("fillet_depth", "deepest groove that the ball cannot clear", findings.fillet_depth,
+        limits.fillet_depth, kMicrometres);
+  check("block_rate", "lines a second for the controller", findings.block_rate, limits.block_rate,
+        {"lines/s", 1.0, 0});
+  return verdict;
+}
+
+}  // namespace lensforge

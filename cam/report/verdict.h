@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace lensforge {
+
+/// Most that a part may have of each fault before the report advises against cutting it.
+struct CutLimits {
+  double leakage = 0.05;       ///< Share of the light that lands where the design puts less.
+  double dark_flux = 0.02;     ///< Share of the light in the target's dark parts.
+  double mae_increase = 0.01;  ///< MAE of the part less that of the design.
+  double gouge = 0.001;        ///< Deepest cut below the surface the tool should leave, mm.
+  double excess = 0.002;       ///< Most material left above it between passes, mm.
+  double slope = 0.002;        ///< Largest error of a move's direction, rad.
+  double fillet_depth = 0.01;  ///< Most material that the ball leaves in a crease, mm.
+  double block_rate = 1000.0;  ///< Lines a second that the controller takes.
+
+  friend bool operator==(const CutLimits&, const CutLimits&) = default;
+};
+
+/// What was found, in the units of CutLimits; what was not measured is left out of the verdict.
+struct CutFindings {
+  std::optional<double> leakage;
+  std::optional<double> dark_flux;
+  std::optional<double> mae_increase;
+  std::optional<double> gouge;
+  std::optional<double> excess;
+  std::optional<double> slope;
+  std::optional<double> fillet_depth;
+  std::optional<double> block_rate;
+};
+
+/// One finding against its limit, in the unit that it is shown in.
+struct LimitCheck {
+  std::string key;   ///< As in CutLimits.
+  std::string name;  ///< In words.
+  double value = 0.0;
+  double limit = 0.0;  ///< The value may be at most this.
+  std::string unit;    ///< "%", "µm", "mrad", "lines/s" or none.
+  int decimals = 0;    ///< That are shown.
+
+  /// A value that is no number does not pass.
+  [[nodiscard]] bool passes() const { return value <= limit; }
+};
+
+/// All findings against their limits.
+struct Verdict {
+  std::vector<LimitCheck> checks;
+
+  [[nodiscard]] bool passes() const;
+  [[nodiscard]] int failures() const;
+};
+
+/// @throw InputError naming the limit and its value if one is negative or no number.
+Verdict judge_cut(const CutFindings& findings, const CutLimits& limits);
+
+}  // namespace lensforge

@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <span>
+
+#include "cam/report/html_text.h"
+#include "cam/report/relief_picture.h"
+#include "cam/report/sections.h"
+#include "core/decimal_text.h"
+
+namespace lensforge::report_section {
+namespace {
+
+/// Vertices along a side at most: 16-bit indices reach 65,536 of them.
+constexpr int kMostNodes = 240;
+
+/// Points of a path at most, so that the page stays small.
+constexpr std::size_t kMostPoints = 60000;
+
+/// Colours that differ in lightness too, so that they read in grey and to colour-blind eyes.
+constexpr std::array<std::array<double, 3>, 5> kPathColors{{{0.00, 0.30, 0.60},
+                                                            {0.85, 0.45, 0.00},
+                                                            {0.55, 0.05, 0.25},
+                                                            {0.10, 0.50, 0.25},
+                                                            {0.3, 0.3, 0.3}}};
+
+/// Numbers as base 64 of 16-bit integers, little-endian, 0 … 65535 for low … high.
+class Quantised {
+ public:
+  void add(double value, double low, double high) {
+    const double share = high > low ? (value - low) / (high - low) : 0.0;
+    const auto number =
+        static_cast<std::uint16_t>(std::lround(65535.0 * std::clamp(share, 0.0, 1.0)));
+    bytes_.push_back(static_cast<unsigned char>(number & 0xffU));
+    bytes_.push_back(static_cast<unsigned char>(number >> 8U));
+  }
+  [[nodiscard]] std::string text() const { return base64(bytes_); }
+
+ private:
+  std::vector<unsigned char> bytes_;
+};
+
+int thinned(int count, int most) { return std::min(count, most); }
+
+nlohmann::json surface_json(const ReportData& data) {
+  const LensRaster& surface = data.surface;
+  const auto [low, high] = std::minmax_element(surface.values.begin(), surface.values.end());
+  const int columns = thinned(surface.columns, kMostNodes);
+  const int rows = thinned(surface.rows, kMostNodes);
+  const auto source = [](int i, int count, int of) {
+    return count > 1 ? static_cast<int>(std::lround(double(i) * (of - 1) / (count - 1))) : 0;
+  };
+  Quantised heights;
+  for (int r = 0; r < rows; ++r) {
+    for (int c = 0; c < columns; ++c) {
+      const int at =
+          source(r, rows, surface.rows) * surface.columns + source(c, columns, surface.columns);
+      heights.add(surface.values[static_cast<std::size_t>(at)], *low, *high);
+    }
+  }
+  return {{"columns", columns},           {"rows", rows}, {"width", data.lens_size.x()},
+          {"height", data.lens_size.y()}, {"low", *low},  {"high", *high},
+          {"heights", heights.text()}};
+}
+
+nlohmann::json path_json(const ReportPath& path, std::size_t number) {
+  Eigen::AlignedBox3f box;
+  for (const Eigen::Vector3f& point : path.points) box.extend(point);
+  const std::size_t step = (path.points.size() + kMostPoints - 1) / kMostPoints;
+  Quantised points;
+  for (std::size_t i = 0; i < path.points.size(); i += std::max<std::size_t>(1, step)) {
+    for (int k = 0; k < 3; ++k) points.add(path.points[i][k], box.min()[k], box.max()[k]);
+  }
+  return {{"color", kPathColors[number % kPathColors.size()]},
+          {"low", {box.min().x(), box.min().y(), box.min().z()}},
+          {"high", {box.max().x(), box.max().y(), box.max().z()}},
+          {"points", points.text()}};
+}
+
+/// JSON inside a script element: no "<" may stand in it.
+std::string script_json(const nlohmann::json& value) {
+  std::string text;
+  for (const char c : value.dump()) {
+    if (c == '<') {
+      text.append("\\u003c");
+    } else {
+      text.push_back(c);
+    }
+  }
+  return text;
+}
+
+std::string path_box(const ReportPath& path, std::size_t number, bool shown) {
+  const std::array<double, 3>& color = kPathColors[number % kPathColors.size()];
+  const auto byte = [&color](std::size_t k) { return std::to_string(std::lround(255 * color[k])); };
+  const std::string rgb = joined({byte(0), ",", byte(1), ",", byte(2)});
+  return element("label", "",
+                 "<input type=\"checkbox\" data-path=\"" + std::to_string(number) + "\"" +
+                     (shown ? " checked" : "") + "><span class=\"swatch\" style=\"color:rgb(" +
+                     rgb + ")\"></span>path of " + escape_html(path.operation));
+}
+
+std::string controls(const ReportData& data) {
+  std::string html = "<button type=\"button\" data-reset>Reset view</button>";
+  html += "<label><input type=\"checkbox\" data-surface checked>surface</label>";
+  for (std::size_t k = 0; k < data.path.size(); ++k) {
+    html += path_box(data.path[k], k, k + 1 == data.path.size());
+  }
+  html +=
+      "<label><input type=\"range\" data-raise min=\"1\" max=\"30\" value=\"8\" "
+      "aria-label=\"enlarge height\"><span data-raised></span></label>";
+  return element("div", "class=\"controls\"", html);
+}
+
+}  // namespace
+
+std::string view(const ReportData& data) {
+  if (data.surface.empty()) return "";
+  nlohmann::json all = surface_json(data);
+  all["paths"] = nlohmann::json::array();
+  for (std::size_t k = 0; k < data.path.size(); ++k) {
+    all["paths"].push_back(path_json(data.path[k], k));
+  }
+  const std::string still = "<img class=\"still\" src=\"" +
+                            png_uri(relief_picture(data.surface, data.lens_size)) +
+                            "\" alt=\"Relief of the surface, seen from above\">";
+  const std::string canvas =
+      "<canvas tabindex=\"0\" aria-label=\"Surface and tool paths in three dimensions\"></canvas>";
+  const std::string help =
+      element("p", "class=\"soft screen\"",
+              "Drag to turn, wheel or two fingers to zoom, shift and drag to move. Keys: arrows "
+              "turn, + and − zoom, W A S D move, 0 resets. The path is thinned out.");
+  const std::string data_script =
+      "<script type=\"application/json\" id=\"view-data\">" + script_json(all) + "</script>";
+  return element("section", "",
+                 element("h2", "", "Surface and path") +
+                     element("div", "class=\"view\" id=\"view\"", controls(data) + canvas + still) +
+                     help + data_script);
+}
+
+}  // namespace lensforge::report_section

@@ -1,0 +1,216 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "cam/report/html_text.h"
+#include "cam/report/leak_words.h"
+#include "cam/report/report_html.h"
+#include "cam/report/report_json.h"
+#include "cam/report/verdict.h"
+#include "core/error.h"
+
+namespace lensforge {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+FluxPicture picture(double first) {
+  return {8, 8, [first] {
+            std::vector<double> flux(64, (1.0 - first) / 63.0);
+            flux[0] = first;
+            return flux;
+          }()};
+}
+
+RenderedSurface surface(const std::string& name, double first, double leakage) {
+  RenderedSurface rendered{name, picture(first), {}};
+  rendered.quality.leakage = leakage;
+  rendered.quality.metrics.psnr = std::numeric_limits<double>::infinity();
+  return rendered;
+}
+
+/// A report in which every text field holds `text`.
+ReportData report_of(const std::string& text) {
+  ReportData data;
+  data.job = data.program = data.made = data.lens_id = data.part = text;
+  data.target = Image(8, 8, 0.5F);
+  data.leakage.designed = surface(text, 0.0, 0.0);
+  data.leakage.steps = {surface(text, 0.1, 0.1)};
+  data.leakage.others = {surface(text, 0.2, 0.2)};
+  data.leakage.parts = {{text, 0.1, 0.02, 0.001}};
+  data.shown = {text};
+  data.lens_size = {10.0, 10.0};
+  LeakPlace place;
+  place.place = {4.12, 3.75};
+  place.height = {0.004, {4.1, 3.7}};
+  place.leakage = 0.013;
+  place.parts = {{text, 0.013, 0.0, 0.0}};
+  data.places = {place};
+  data.verdict.checks = {{text, text, 2.0, 1.0, text, 2}};
+  Tool tool;
+  tool.name = text;
+  data.tools = {tool};
+  ReportOperation operation;
+  operation.summary.name = operation.file = text;
+  operation.summary.warnings = {text};
+  operation.summary.certified = true;
+  operation.summary.certificate.gouge = {0.0004, {1.0, 2.0, 3.0}};
+  operation.minutes = 90.0;
+  data.operations = {operation};
+  data.parameters = {{text, {{text, text}}}};
+  data.setup.machine = data.setup.material = data.setup.zero_words = data.setup.up_words = text;
+  data.setup.part = {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(10, 10, 6)};
+  data.setup.blank = {Eigen::Vector3d(-3, -3, 0), Eigen::Vector3d(13, 13, 6.5)};
+  data.setup.keep_outs = {{text, {Eigen::Vector3d(-9, 2, 0), Eigen::Vector3d(-3, 8, 9)}}};
+  data.warnings = {text};
+  data.surface = {3, 3, std::vector<float>{0, 1, 2, 1, 2, 3, 2, 3, 5}};
+  data.maps = {{text, text, text, data.surface}};
+  data.path = {{text, {{0, 0, 1}, {1, 0, 2}}}};
+  data.choices = {{text, 0.1, 0.02, 0.01, 1.5, true}};
+  return data;
+}
+
+TEST(Report, EscapesEveryText) {
+  const std::string html = report_html(report_of("<script>alert('x')</script>&\"{{STYLE}}"));
+  EXPECT_THAT(html, Not(HasSubstr("<script>alert")));
+  EXPECT_THAT(html, Not(HasSubstr("alert('x')")));
+  EXPECT_THAT(html, HasSubstr("&lt;script&gt;alert(&#39;x&#39;)&lt;/script&gt;&amp;&quot;"));
+  // A text that looks like a placeholder stays what it is.
+  EXPECT_THAT(html, HasSubstr("&quot;{{STYLE}}"));
+}
+
+TEST(Report, NeedsNothingFromOutside) {
+  const std::string html = report_html(report_of("logo"));
+  EXPECT_THAT(html, Not(HasSubstr("http:")));
+  EXPECT_THAT(html, Not(HasSubstr("https:")));
+  EXPECT_THAT(html, Not(HasSubstr("@import")));
+  EXPECT_THAT(html, Not(HasSubstr("url(\"")));
+  for (std::size_t at = html.find("src=\""); at != std::string::npos;
+       at = html.find("src=\"", at + 1)) {
+    EXPECT_EQ(html.compare(at + 5, 22, "data:image/png;base64,"), 0) << html.substr(at, 40);
+  }
+}
+
+TEST(Report, SaysTheVerdictFirst) {
+  ReportData data = report_of("logo");
+  const std::string bad = report_html(data);
+  EXPECT_THAT(bad, HasSubstr("1 limit not met"));
+  EXPECT_LT(bad.find("1 limit not met"), bad.find("class=\"pictures\""));
+  data.verdict.checks[0].value = 0.5;
+  EXPECT_THAT(report_html(data), HasSubstr("Within all limits"));
+}
+
+TEST(Report, LeavesOutWhatIsNotThere) {
+  ReportData data;
+  data.job = "bare";
+  const std::string html = report_html(data);
+  EXPECT_THAT(html, HasSubstr("bare"));
+  for (const char* missing :
+       {"Setup", "Certificates", "Worst places", "<canvas", "Other choices"}) {
+    EXPECT_THAT(html, Not(HasSubstr(missing))) << missing;
+  }
+}
+
+TEST(Report, PlacesAreInProgramCoordinates) {
+  ReportData data = report_of("finish");
+  data.z_offset = -8.5;
+  EXPECT_THAT(report_html(data), HasSubstr("X 1.00 Y 2.00 Z -5.500"));
+  EXPECT_EQ(report_json(data)["z_offset"], -8.5);
+}
+
+TEST(Report, JsonSaysTheSame) {
+  const nlohmann::json json = report_json(report_of("logo"));
+  EXPECT_EQ(json["format"], "lensforge.cam");
+  EXPECT_EQ(json["units"], "mm");
+  EXPECT_EQ(json["verdict"]["pass"], false);
+  EXPECT_EQ(json["minutes"], 90.0);
+  EXPECT_EQ(json["leakage"]["share"], 0.1);
+  EXPECT_EQ(json["surfaces"].size(), 3U);
+  EXPECT_TRUE(json["surfaces"][0]["psnr"].is_null());
+  EXPECT_TRUE(json["surfaces"][0]["contrast"].is_null());
+  EXPECT_EQ(json["operations"][0]["certificate"]["gouge"]["value"], 0.0004);
+  EXPECT_EQ(json["places"][0]["causes"][0]["leakage"], 0.013);
+  EXPECT_EQ(nlohmann::json::parse(json.dump()), json);
+}
+
+TEST(LeakWords, SayWhatIsWrongWhereAndWhatHelps) {
+  LeakPlace place;
+  place.height = {0.004, {41.2, 37.5}};
+  place.leakage = 0.013;
+  place.dark_flux = 0.009;
+  place.parts = {{leak_cause::kPolish, 0.001, 0.0, 0.0}, {leak_cause::kCrease, 0.012, 0.0, 0.0}};
+  EXPECT_EQ(main_cause(place), leak_cause::kCrease);
+  EXPECT_EQ(leak_words(place),
+            "The groove at x 41.2 y 37.5 keeps 4.0 µm; 1.30 % of the light leaks from here, "
+            "0.900 % of all into dark parts of the picture. The ball does not reach into the "
+            "groove: half its diameter leaves about half as much.");
+}
+
+TEST(Verdict, ComparesWithTheLimitsInShownUnits) {
+  CutFindings findings;
+  findings.leakage = 0.031;
+  findings.gouge = 0.0015;
+  const Verdict verdict = judge_cut(findings, {});
+  ASSERT_EQ(verdict.checks.size(), 2U);
+  EXPECT_TRUE(verdict.checks[0].passes());
+  EXPECT_NEAR(verdict.checks[0].value, 3.1, 1e-12);
+  EXPECT_EQ(verdict.checks[1].unit, "µm");
+  EXPECT_FALSE(verdict.checks[1].passes());
+  EXPECT_EQ(verdict.failures(), 1);
+  EXPECT_FALSE(verdict.passes());
+}
+
+TEST(Verdict, ANumberThatIsNoneDoesNotPass) {
+  CutFindings findings;
+  findings.slope = std::nan("");
+  EXPECT_FALSE(judge_cut(findings, {}).passes());
+}
+
+TEST(Verdict, RefusesALimitBelowZero) {
+  CutLimits limits;
+  limits.dark_flux = -0.1;
+  EXPECT_THROW((void)judge_cut({}, limits), InputError);
+}
+
+TEST(HtmlText, Base64IsThatOfTheStandard) {
+  // RFC 4648, section 10.
+  const std::vector<std::pair<std::string, std::string>> vectors{{"", ""},
+                                                                 {"f", "Zg=="},
+                                                                 {"fo", "Zm8="},
+                                                                 {"foo", "Zm9v"},
+                                                                 {"foob", "Zm9vYg=="},
+                                                                 {"fooba", "Zm9vYmE="},
+                                                                 {"foobar", "Zm9vYmFy"}};
+  for (const auto& [text, encoded] : vectors) {
+    const std::vector<unsigned char> bytes(text.begin(), text.end());
+    EXPECT_EQ(base64(bytes), encoded);
+  }
+}
+
+TEST(HtmlText, NumbersReadAsPeopleWriteThem) {
+  EXPECT_EQ(percent_text(0.013), "1.30 %");
+  EXPECT_EQ(percent_text(0.000412), "0.0412 %");
+  EXPECT_EQ(percent_text(0.5), "50.0 %");
+  EXPECT_EQ(percent_text(1.0), "100 %");
+  EXPECT_EQ(percent_text(0.0), "0 %");
+  EXPECT_EQ(percent_text(1e-12), "below 0.00001 %");
+  EXPECT_EQ(micrometre_text(0.00402), "4.02 µm");
+  EXPECT_EQ(duration_text(0.5), "30 s");
+  EXPECT_EQ(duration_text(12.4), "12 min");
+  EXPECT_EQ(duration_text(192.0), "3 h 12 min");
+  EXPECT_EQ(count_text(942080), "942\u202f080");
+  EXPECT_EQ(count_text(-1234567), "-1\u202f234\u202f567");
+  EXPECT_EQ(count_text(999), "999");
+  EXPECT_EQ(contrast_text(85.2), "85 : 1");
+  EXPECT_EQ(contrast_text(std::numeric_limits<double>::infinity()), "no light in the dark");
+}
+
+}  // namespace
+}  // namespace lensforge
