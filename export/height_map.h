@@ -5,7 +5,7 @@
 
 #include "core/executor.h"
 #include "core/image.h"
-#include "export/smooth_surface.h"
+#include "core/smooth_surface.h"
 
 namespace lensforge {
 

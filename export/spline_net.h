@@ -9,7 +9,7 @@
 
 #include "core/executor.h"
 #include "core/run_control.h"
-#include "export/smooth_surface.h"
+#include "core/smooth_surface.h"
 
 namespace lensforge {
 

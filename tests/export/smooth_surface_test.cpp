@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/smooth_surface.h"
+#include "core/smooth_surface.h"
 
 #include <gtest/gtest.h>
 

@@ -29,6 +29,13 @@ class SmoothSurface {
   /// Nothing outside of the mesh.
   [[nodiscard]] std::optional<SurfacePoint> at(const Eigen::Vector2d& xy) const;
 
+  /// The point of a triangle with these barycentric weights, none below 0.
+  [[nodiscard]] SurfacePoint in_triangle(std::int64_t triangle,
+                                         const Eigen::Vector3d& weights) const;
+  /// Largest second derivative in any direction over a triangle, 1/mm: they are linear on each
+  /// third, so that its corners say all.
+  [[nodiscard]] double bend(std::int64_t triangle) const;
+
   [[nodiscard]] const Eigen::AlignedBox2d& box() const { return box_; }
   [[nodiscard]] const SurfaceMesh& mesh() const { return mesh_; }
   /// Slopes at the vertices, 2 × V.
@@ -43,7 +50,6 @@ class SmoothSurface {
   [[nodiscard]] std::int64_t bin_of(const Eigen::Vector2d& xy) const;
   [[nodiscard]] Eigen::Vector2i bin_cell(const Eigen::Vector2d& xy) const;
   [[nodiscard]] Place locate(const Eigen::Vector2d& xy) const;
-  [[nodiscard]] SurfacePoint evaluate(const Place& place) const;
   void fill_bins();
 
   SurfaceMesh mesh_;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/smooth_surface.h"
+#include "core/smooth_surface.h"
 
 #include <algorithm>
 #include <array>
@@ -101,7 +101,42 @@ struct Third {
     const Eigen::Vector2d slope(du * v.y() - dv * u.y(), dv * u.x() - du * v.x());
     return {q.dot(b), slope / cross(u, v)};
   }
+
+  /// Largest second derivative in any direction at the corners: from the coefficients next to each
+  /// along u and v, the second derivatives along them, and from these those along x and y.
+  [[nodiscard]] double bend() const {
+    Eigen::Matrix2d frame;
+    frame << p[1] - p[0], p[2] - p[0];
+    const Eigen::Matrix2d inverse = frame.inverse();
+    double most = 0.0;
+    const auto corner = [&](double uu, double uv, double vv) {
+      Eigen::Matrix2d second;
+      second << uu, uv, uv, vv;
+      const Eigen::Matrix2d h = 6.0 * inverse.transpose() * second * inverse;
+      const double mean = 0.5 * (h(0, 0) + h(1, 1));
+      const double half = std::hypot(0.5 * (h(0, 0) - h(1, 1)), h(0, 1));
+      most = std::max(most, std::abs(mean) + half);
+    };
+    corner(ijj - 2.0 * iij + iii, ijc - iij - iic + iii, icc - 2.0 * iic + iii);
+    corner(jjj - 2.0 * ijj + iij, jjc - ijj - ijc + iij, jcc - 2.0 * ijc + iij);
+    corner(jjc - 2.0 * ijc + iic, jcc - ijc - icc + iic, ccc - 2.0 * icc + iic);
+    return most;
+  }
 };
+
+Corners make_corners(const SurfaceMesh& mesh, const Eigen::Matrix2Xd& slopes,
+                     std::int64_t triangle) {
+  Corners corners;
+  for (int k = 0; k < 3; ++k) {
+    const int v = mesh.triangles(k, triangle);
+    const auto i = static_cast<std::size_t>(k);
+    corners.p[i] = mesh.vertices.col(v).head<2>();
+    corners.z[i] = mesh.vertices(2, v);
+    corners.slope[i] = slopes.col(v);
+  }
+  corners.centroid = (corners.p[0] + corners.p[1] + corners.p[2]) / 3.0;
+  return corners;
+}
 
 }  // namespace
 
@@ -170,28 +205,30 @@ SmoothSurface::Place SmoothSurface::locate(const Eigen::Vector2d& xy) const {
   return best;
 }
 
-SurfacePoint SmoothSurface::evaluate(const Place& place) const {
-  Corners corners;
-  for (int k = 0; k < 3; ++k) {
-    const int v = mesh_.triangles(k, place.triangle);
-    const auto i = static_cast<std::size_t>(k);
-    corners.p[i] = mesh_.vertices.col(v).head<2>();
-    corners.z[i] = mesh_.vertices(2, v);
-    corners.slope[i] = slopes_.col(v);
-  }
-  corners.centroid = (corners.p[0] + corners.p[1] + corners.p[2]) / 3.0;
+SurfacePoint SmoothSurface::in_triangle(std::int64_t triangle,
+                                        const Eigen::Vector3d& weights) const {
   int k = 0;
-  const double least = place.weights.minCoeff(&k);
+  const double least = weights.minCoeff(&k);
   const int i = (k + 1) % 3;
   const int j = (k + 2) % 3;
-  const Third third(corners, static_cast<std::size_t>(i), static_cast<std::size_t>(j));
-  return third.at({place.weights[i] - least, place.weights[j] - least, 3.0 * least});
+  const Third third(make_corners(mesh_, slopes_, triangle), static_cast<std::size_t>(i),
+                    static_cast<std::size_t>(j));
+  return third.at({weights[i] - least, weights[j] - least, 3.0 * least});
+}
+
+double SmoothSurface::bend(std::int64_t triangle) const {
+  const Corners corners = make_corners(mesh_, slopes_, triangle);
+  double most = 0.0;
+  for (std::size_t i = 0; i < 3; ++i) {
+    most = std::max(most, Third(corners, i, (i + 1) % 3).bend());
+  }
+  return most;
 }
 
 std::optional<SurfacePoint> SmoothSurface::at(const Eigen::Vector2d& xy) const {
   const Place place = locate(xy);
   if (place.triangle < 0) return std::nullopt;
-  return evaluate(place);
+  return in_triangle(place.triangle, place.weights);
 }
 
 }  // namespace lensforge
