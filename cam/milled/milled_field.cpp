@@ -66,6 +66,12 @@ double cell_of(const BallPath& path) {
 
 }  // namespace
 
+/// Nodes of a block: columns and rows [first, second).
+struct MilledField::NodeRange {
+  std::pair<std::int64_t, std::int64_t> columns;
+  std::pair<std::int64_t, std::int64_t> rows;
+};
+
 /// Nodes of a window that are cut at once, and what has cut them deepest so far.
 struct MilledField::Block {
   std::int64_t column = 0, row = 0;  ///< First node, in the window.
@@ -76,6 +82,11 @@ struct MilledField::Block {
   std::array<std::int32_t, kBlockNodes> path{};
   std::int32_t cutting = 0;  ///< The path that is being tried.
   double radius = 0.0;       ///< Of its ball.
+  // A plane that the surface is about parallel to, see lay_plane().
+  Eigen::Vector2d slope{0.0, 0.0};
+  double secant = 1.0;
+  Eigen::Vector2d touch{0.0, 0.0};  ///< From a ball's centre to where it touches such a plane.
+  std::array<double, kBlockNodes> plane{};
 
   Block(const GridWindow& window, std::int64_t block, double blank_top) {
     const std::int64_t across = (window.columns + kBlockSide - 1) / kBlockSide;
@@ -85,27 +96,72 @@ struct MilledField::Block {
     rows = std::min(kBlockSide, window.rows - row);
     for (std::int64_t i = 0; i < columns; ++i) x[index_of(i)] = window.x(column + i);
     for (std::int64_t j = 0; j < rows; ++j) y[index_of(j)] = window.y(row + j);
-    z.fill(blank_top);
+    z.fill(-kUncut);  // Beyond the window: never the highest.
+    for (std::int64_t j = 0; j < rows; ++j) {
+      const auto begin = z.begin() + j * kBlockSide;
+      std::fill(begin, begin + columns, blank_top);
+    }
     move.fill(-1);
   }
 
   [[nodiscard]] double x_end() const { return x[index_of(columns - 1)]; }
   [[nodiscard]] double y_end() const { return y[index_of(rows - 1)]; }
 
-  [[nodiscard]] double highest() const {
-    double highest = z[0];
+  /// Heights count from a plane through (x[0], y[0], 0) from now on, where bounds are concerned.
+  void lay_plane(const Eigen::Vector2d& gradient) {
+    slope = gradient;
+    secant = std::sqrt(1.0 + gradient.squaredNorm());
+    touch = gradient * (radius / secant);
     for (std::int64_t j = 0; j < rows; ++j) {
       for (std::int64_t i = 0; i < columns; ++i) {
-        highest = std::max(highest, z[index_of(j * kBlockSide + i)]);
+        plane[index_of(j * kBlockSide + i)] = plane_at(x[index_of(i)], y[index_of(j)]);
       }
     }
-    return highest;
   }
 
-  /// How near the span comes to the block, squared.
-  [[nodiscard]] double distance2(const Span& span) const {
+  [[nodiscard]] double plane_at(double at_x, double at_y) const {
+    return slope.x() * (at_x - x[0]) + slope.y() * (at_y - y[0]);
+  }
+
+  /// Of all nodes above the plane. Four at a time: one long chain of comparisons is slow.
+  [[nodiscard]] double highest_node() const {
+    std::array<double, 4> high{-kUncut, -kUncut, -kUncut, -kUncut};
+    for (std::size_t n = 0; n < kBlockNodes; n += 4) {
+      for (std::size_t k = 0; k < 4; ++k) {
+        const double above_plane = z[n + k] - plane[n + k];
+        high[k] = above_plane > high[k] ? above_plane : high[k];
+      }
+    }
+    return std::max(std::max(high[0], high[1]), std::max(high[2], high[3]));
+  }
+
+  /// True if a ball with its centre in the span can be over a node.
+  [[nodiscard]] bool reached_by(const Span& span) const {
     const double dx = std::max({x[0] - span.x_max, span.x_min - x_end(), 0.0});
     const double dy = std::max({y[0] - span.y_max, span.y_min - y_end(), 0.0});
+    return dx * dx + dy * dy <= radius * radius;
+  }
+
+  /// The least height above the plane at which a ball of the span, a part of `way`, touches
+  /// a plane that is parallel to it: R·√(1 + g²) below the centre.
+  [[nodiscard]] double touch_height(const Span& span, const BallMove& way) const {
+    const double along_x = slope.x() * ((slope.x() > 0.0 ? span.x_max : span.x_min) - x[0]);
+    const double along_y = slope.y() * ((slope.y() > 0.0 ? span.y_max : span.y_min) - y[0]);
+    double least = double{span.z_min} - along_x - along_y;
+    if (way.arc < 0) {
+      least = std::max(least, std::min(way.start.z() - plane_at(way.start.x(), way.start.y()),
+                                       way.end.z() - plane_at(way.end.x(), way.end.y())));
+    }
+    return least - radius * secant - kBoundMargin;
+  }
+
+  /// Distance from where that plane is touched to the nearest node, squared. As the ball's
+  /// curvature is at least 1/R, over a node that far away it is higher by distance²/(2R) or more.
+  [[nodiscard]] double beside2(const Span& span) const {
+    const double px = touch.x();
+    const double py = touch.y();
+    const double dx = std::max({x[0] - (span.x_max + px), span.x_min + px - x_end(), 0.0});
+    const double dy = std::max({y[0] - (span.y_max + py), span.y_min + py - y_end(), 0.0});
     return dx * dx + dy * dy;
   }
 
@@ -117,25 +173,26 @@ struct MilledField::Block {
     path[node] = cutting;
   }
 
-  /// Columns of row j that the span's ball can reach: [first, second).
-  [[nodiscard]] std::pair<std::int64_t, std::int64_t> columns_under(const Span& span,
-                                                                    std::int64_t j) const {
-    const double at = y[index_of(j)];
-    const double dy = std::max({at - span.y_max, span.y_min - at, 0.0});
-    const double room = radius * radius - dy * dy;
-    if (room < 0.0) return {0, 0};
-    const double half = std::sqrt(room);
-    std::int64_t begin = 0;
-    std::int64_t end = columns;
-    while (begin < end && x[index_of(begin)] < span.x_min - half) ++begin;
-    while (end > begin && x[index_of(end - 1)] > span.x_max + half) --end;
-    return {begin, end};
+  /// Nodes over which the span's ball can be below `highest` at all.
+  [[nodiscard]] NodeRange nodes_under(const Candidate& candidate, const Span& span,
+                                      double highest) const {
+    const double room = 2.0 * radius * (highest - candidate.touch_height);
+    const double half = std::sqrt(std::max(room, 0.0)) + kBoundMargin;
+    const auto range = [&](const auto& at, std::int64_t count, double low, double high) {
+      std::int64_t begin = 0;
+      std::int64_t end = count;
+      while (begin < end && at[index_of(begin)] < low - half) ++begin;
+      while (end > begin && at[index_of(end - 1)] > high + half) --end;
+      return std::make_pair(begin, end);
+    };
+    return {range(x, columns, span.x_min + touch.x(), span.x_max + touch.x()),
+            range(y, rows, span.y_min + touch.y(), span.y_max + touch.y())};
   }
 
-  void cut_straight(const StraightSweep& sweep, const Span& span) {
+  void cut_straight(const StraightSweep& sweep, std::int32_t by, const NodeRange& range) {
     std::array<double, kBlockSide> height{};
-    for (std::int64_t j = 0; j < rows; ++j) {
-      const auto [begin, end] = columns_under(span, j);
+    const auto [begin, end] = range.columns;
+    for (std::int64_t j = range.rows.first; j < range.rows.second; ++j) {
       const double qy = y[index_of(j)];
       for (std::int64_t i = begin; i < end; ++i) {
         const double qx = x[index_of(i)];
@@ -143,19 +200,18 @@ struct MilledField::Block {
         height[index_of(i)] = ball_below(sweep.centre(s), radius, qx, qy);
       }
       for (std::int64_t i = begin; i < end; ++i) {
-        offer(index_of(j * kBlockSide + i), height[index_of(i)], span.move);
+        offer(index_of(j * kBlockSide + i), height[index_of(i)], by);
       }
     }
   }
 
-  void cut_arc(const ArcSweep& sweep, const Span& span) {
-    for (std::int64_t j = 0; j < rows; ++j) {
-      const auto [begin, end] = columns_under(span, j);
-      for (std::int64_t i = begin; i < end; ++i) {
+  void cut_arc(const ArcSweep& sweep, std::int32_t by, const NodeRange& range) {
+    for (std::int64_t j = range.rows.first; j < range.rows.second; ++j) {
+      for (std::int64_t i = range.columns.first; i < range.columns.second; ++i) {
         const double qx = x[index_of(i)];
         const double qy = y[index_of(j)];
         offer(index_of(j * kBlockSide + i),
-              ball_below(sweep.centre(radius, qx, qy), radius, qx, qy), span.move);
+              ball_below(sweep.centre(radius, qx, qy), radius, qx, qy), by);
       }
     }
   }
@@ -219,9 +275,9 @@ MilledField::SpanGrid MilledField::make_grid(const std::vector<Span>& spans, dou
   return grid;
 }
 
-/// Spans that may cut into the block, those first that may cut deepest.
-std::vector<MilledField::Candidate> MilledField::candidates_of(const SpanGrid& grid,
-                                                               const Block& block) {
+/// Calls `action` with the number of every span that may be over a node of the block.
+template <class Action>
+void MilledField::for_each_span(const SpanGrid& grid, const Block& block, const Action& action) {
   const double reach = block.radius + 0.5 * grid.cell + kRounding;
   const auto cell_at = [&](double at, double origin, std::int64_t count) {
     const double cell = std::floor((at - origin) / grid.cell);
@@ -231,18 +287,57 @@ std::vector<MilledField::Candidate> MilledField::candidates_of(const SpanGrid& g
   const std::int64_t last = cell_at(block.x_end() + reach, grid.origin.x(), grid.columns);
   const std::int64_t row_begin = cell_at(block.y[0] - reach, grid.origin.y(), grid.rows);
   const std::int64_t row_end = cell_at(block.y_end() + reach, grid.origin.y(), grid.rows);
-  const double highest = block.highest();
-  std::vector<Candidate> candidates;
   for (std::int64_t row = row_begin; row <= row_end; ++row) {
     const std::int64_t end = grid.begin[index_of(row * grid.columns + last + 1)];
     for (std::int64_t s = grid.begin[index_of(row * grid.columns + first)]; s < end; ++s) {
-      const Span& span = grid.spans[index_of(s)];
-      const double room = block.radius * block.radius - block.distance2(span);
-      if (room < 0.0) continue;
-      const double bound = double{span.z_min} - std::sqrt(room) - kBoundMargin;
-      if (bound <= highest) candidates.push_back({bound, s});
+      if (block.reached_by(grid.spans[index_of(s)])) action(s);
     }
   }
+}
+
+/// Gradient of the plane that fits the centres of spans best; it may be any as far as results are
+/// concerned, the better it is the fewer spans are tried.
+Eigen::Vector2d MilledField::mean_slope(const SpanGrid& grid, const std::vector<Candidate>& spans) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
+  for (const Candidate& candidate : spans) {
+    const Span& span = grid.spans[index_of(candidate.span)];
+    const Span& first = grid.spans[index_of(spans.front().span)];
+    const Eigen::Vector3d at(double{span.x_min} - double{first.x_min},
+                             double{span.y_min} - double{first.y_min},
+                             double{span.z_min} - double{first.z_min});
+    sum += at;
+    squares += at * at.transpose();
+  }
+  const auto count = static_cast<double>(spans.size());
+  const Eigen::Matrix3d spread = squares - sum * sum.transpose() / count;
+  const double determinant = spread.topLeftCorner<2, 2>().determinant();
+  constexpr double kOneLine = 1e-3;  // Less than this share of the square: no plane to be found.
+  const double trace = spread.topLeftCorner<2, 2>().trace();
+  if (!(determinant > kOneLine * trace * trace)) return Eigen::Vector2d::Zero();
+  const Eigen::Vector2d slope =
+      spread.topLeftCorner<2, 2>().inverse() * spread.topRightCorner<2, 1>();
+  return slope.cwiseMax(-1.0).cwiseMin(1.0);
+}
+
+/// Spans that may cut into the block, those first that may cut deepest below its plane.
+std::vector<MilledField::Candidate> MilledField::candidates_of(std::size_t path,
+                                                               Block& block) const {
+  const SpanGrid& grid = grids_[path];
+  std::vector<Candidate> candidates;
+  for_each_span(grid, block, [&](std::int64_t s) { candidates.push_back({0.0, 0.0, s}); });
+  if (candidates.empty()) return candidates;
+  block.lay_plane(mean_slope(grid, candidates));
+  const double highest = block.highest_node();
+  std::size_t kept = 0;
+  for (Candidate candidate : candidates) {
+    const Span& span = grid.spans[index_of(candidate.span)];
+    const BallMove& move = paths_[path].moves()[static_cast<std::size_t>(span.move)];
+    candidate.touch_height = block.touch_height(span, move);
+    candidate.bound = candidate.touch_height + block.beside2(span) / (2.0 * block.radius);
+    if (candidate.bound <= highest) candidates[kept++] = candidate;
+  }
+  candidates.resize(kept);
   std::sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
     return a.bound < b.bound || (a.bound == b.bound && a.span < b.span);
   });
@@ -255,14 +350,17 @@ void MilledField::cut_block(std::size_t path, Block& block) const {
   if (grid.spans.empty()) return;
   block.cutting = static_cast<std::int32_t>(path);
   block.radius = paths_[path].radius();
-  for (const Candidate& candidate : candidates_of(grid, block)) {
-    if (candidate.bound > block.highest()) break;
+  for (const Candidate& candidate : candidates_of(path, block)) {
+    const double highest = block.highest_node();
+    if (candidate.bound > highest) break;
     const Span& span = grid.spans[index_of(candidate.span)];
+    const NodeRange range = block.nodes_under(candidate, span, highest);
     const BallMove& move = paths_[path].moves()[static_cast<std::size_t>(span.move)];
     if (move.arc < 0) {
-      block.cut_straight(StraightSweep(move), span);
+      block.cut_straight(StraightSweep(move), span.move, range);
     } else {
-      block.cut_arc(ArcSweep(paths_[path].arcs()[static_cast<std::size_t>(move.arc)]), span);
+      block.cut_arc(ArcSweep(paths_[path].arcs()[static_cast<std::size_t>(move.arc)]), span.move,
+                    range);
     }
   }
 }

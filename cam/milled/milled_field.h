@@ -43,16 +43,22 @@ class MilledField final : public SurfaceField {
     std::vector<Span> spans;
     std::int32_t first_cut = 1;  ///< Of the path's pieces.
   };
-  /// A span and a height below which it cuts no node of a block.
+  /// A span; above a plane through the block, where its ball touches a parallel one, and a height
+  /// below which it cuts no node of the block.
   struct Candidate {
     double bound;
+    double touch_height;
     std::int64_t span;
   };
+  struct NodeRange;
   struct Block;
 
   static std::vector<Span> spans_of(const BallPath& path, double blank_top);
   static SpanGrid make_grid(const std::vector<Span>& spans, double cell);
-  static std::vector<Candidate> candidates_of(const SpanGrid& grid, const Block& block);
+  template <class Action>
+  static void for_each_span(const SpanGrid& grid, const Block& block, const Action& action);
+  static Eigen::Vector2d mean_slope(const SpanGrid& grid, const std::vector<Candidate>& spans);
+  [[nodiscard]] std::vector<Candidate> candidates_of(std::size_t path, Block& block) const;
   void cut_block(std::size_t path, Block& block) const;
   void write_block(const Block& block, SurfacePatch& patch) const;
   [[nodiscard]] Eigen::Vector2d slope_at(std::size_t path, const BallMove& move,
