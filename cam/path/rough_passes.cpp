@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cam/path/rough_passes.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/error.h"
+
+namespace lensforge {
+namespace {
+
+/// Chords run at most this part of the spacing above the nodes: on slopes of a tenth as much as
+/// asking the surface at intervals costs.
+constexpr double kChordShare = 0.1;
+
+/// Material thinner than this is none: rounding of heights.
+constexpr double kNothing = 1e-9;
+
+std::int64_t intervals(double length, double step) {
+  return std::max<std::int64_t>(1, static_cast<std::int64_t>(std::ceil(length / step - 1e-9)));
+}
+
+}  // namespace
+
+PassGrid::PassGrid(const TipFloor& floor, const PassLayout& layout, const Executor& executor,
+                   const RunControl& control)
+    : layout_(layout) {
+  const int along = layout.along == PassAxis::kX ? 0 : 1;
+  const Eigen::Vector2d size = layout.area.sizes();
+  passes_ = intervals(size[1 - along], layout.stepover) + 1;
+  count_ = intervals(size[along], layout.spacing) + 1;
+  stepover_ = size[1 - along] / static_cast<double>(passes_ - 1);
+  spacing_ = size[along] / static_cast<double>(count_ - 1);
+  nodes_.resize(static_cast<std::size_t>(passes_ * count_));
+  excess_.resize(static_cast<std::size_t>(passes_));
+  const auto fill_pass = [&](std::int64_t pass) {
+    if (!control.stop_requested()) fill(pass, floor);
+  };
+  parallel_for(executor, "tip floor", passes_, fill_pass, 1);
+  if (control.stop_requested()) throw Interrupted();
+}
+
+Eigen::Vector2d PassGrid::place(std::int64_t pass, double node) const {
+  const double forward = spacing_ * node;
+  const double aside = stepover_ * static_cast<double>(pass);
+  return layout_.area.min() + (layout_.along == PassAxis::kX ? Eigen::Vector2d(forward, aside)
+                                                             : Eigen::Vector2d(aside, forward));
+}
+
+void PassGrid::fill(std::int64_t pass, const TipFloor& floor) {
+  double* const nodes = &nodes_[static_cast<std::size_t>(pass * count_)];
+  Extreme& excess = excess_[static_cast<std::size_t>(pass)];
+  TipFloor::Trace trace;
+  double before = kNoContact;
+  for (std::int64_t i = 0; i < count_; ++i) {
+    const auto at = static_cast<double>(i);
+    const double after =
+        i + 1 < count_ ? floor.over(place(pass, at + 0.5), 0.5 * spacing_, trace) : kNoContact;
+    nodes[i] = std::max(before, after);
+    const Eigen::Vector2d p = place(pass, at);
+    const double above = nodes[i] - floor.over(p, 0.0, trace);
+    if (above > excess.value) excess = {above, {p.x(), p.y(), nodes[i]}};
+    before = after;
+  }
+}
+
+double PassGrid::lowest() const { return *std::min_element(nodes_.begin(), nodes_.end()); }
+
+Extreme PassGrid::excess() const {
+  const auto less = [](const Extreme& a, const Extreme& b) { return a.value < b.value; };
+  return *std::max_element(excess_.begin(), excess_.end(), less);
+}
+
+std::vector<TipPath> PassGrid::parts(std::int64_t pass, double level, double previous) const {
+  const auto cuts = [&](std::int64_t i) {
+    return node(pass, i) < previous - kNothing &&
+           layout_.material.contains(place(pass, static_cast<double>(i)));
+  };
+  std::vector<TipPath> all;
+  for (std::int64_t i = 0; i < count_; ++i) {
+    if (!cuts(i)) continue;
+    std::int64_t end = i;
+    while (end + 1 < count_ && cuts(end + 1)) ++end;
+    const std::int64_t first = std::max<std::int64_t>(0, i - 1);
+    const std::int64_t last = std::min(count_ - 1, end + 1);
+    if (last > first) all.push_back(chords(pass, first, last, level));
+    i = end;
+  }
+  return all;
+}
+
+/// Greedy: every chord leaves on the nodes' height or above, with the least slope that clears all
+/// nodes passed, and runs as far as it stays within the chord's share of them.
+TipPath PassGrid::chords(std::int64_t pass, std::int64_t begin, std::int64_t end,
+                         double level) const {
+  const double gate = kChordShare * spacing_;
+  const auto height = [&](std::int64_t i) { return std::max(level, node(pass, i)); };
+  TipPath path;
+  const auto add = [&](std::int64_t i, double z) {
+    const Eigen::Vector2d p = place(pass, static_cast<double>(i));
+    path.emplace_back(p.x(), p.y(), z);
+  };
+  add(begin, height(begin));
+  for (std::int64_t from = begin; from < end;) {
+    const double z = path.back().z();
+    double least = -HUGE_VAL;
+    double most = HUGE_VAL;
+    std::int64_t reached = from;
+    for (std::int64_t to = from + 1; to <= end; ++to) {
+      const double run = spacing_ * static_cast<double>(to - from);
+      const double low = std::max(least, (height(to) - z) / run);
+      most = std::min(most, (height(to) + gate - z) / run);
+      if (low > most) break;
+      least = low;
+      reached = to;
+    }
+    const double run = spacing_ * static_cast<double>(reached - from);
+    add(reached, std::max(height(reached), z + least * run));
+    from = reached;
+  }
+  return path;
+}
+
+}  // namespace lensforge

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <vector>
+
+#include "cam/contact/profile_cutter.h"
+#include "cam/path/operation.h"
+#include "cam/tool/cutter_profile.h"
+#include "core/executor.h"
+
+namespace lensforge {
+
+/// What is left of the blank while it is cut: for each cell of a grid a height that no material in
+/// it exceeds. Always an upper bound: a cell is lowered only to where the cutter has swept all of
+/// it. Above the true material by at most what the cutter's silhouette and path rise over a cell.
+class StockMap {
+ public:
+  /// @param blank  box of the material, mm, lens frame.
+  /// @param cell   side of a cell at most, mm, > 0.
+  StockMap(const Eigen::AlignedBox3d& blank, double cell);
+
+  /// Takes away what the cutter sweeps on a straight way of its tip. mm.
+  /// @return how far the material stood above the cutter's silhouette at most, and the tip there:
+  ///         the depth of cut, as seen at the centres of cells; 0 in air.
+  Extreme cut(const CutterProfile& profile, const Eigen::Vector3d& from, const Eigen::Vector3d& to);
+
+  /// Lowest height of the tip over p at which the profile certainly touches no material, mm;
+  /// kNoContact if there is none under it.
+  [[nodiscard]] double drop(const CutterProfile& profile, const Eigen::Vector2d& p);
+
+  /// True if the profile over p is above some of the blank, seen from above.
+  [[nodiscard]] bool under(const CutterProfile& profile, const Eigen::Vector2d& p) const;
+
+  [[nodiscard]] const Eigen::AlignedBox3d& blank() const { return blank_; }
+  /// Side of a cell, mm.
+  [[nodiscard]] double cell() const { return cell_; }
+  /// No material is above this, mm.
+  [[nodiscard]] double highest();
+  /// Cells along x and along y.
+  [[nodiscard]] Eigen::Vector2i shape() const { return {columns_, rows_}; }
+  [[nodiscard]] Eigen::Vector2d centre(int column, int row) const;
+  [[nodiscard]] double height(int column, int row) const { return heights_[index(column, row)]; }
+
+ private:
+  /// Square of cells with an upper bound of their heights, made exact again when it is asked for.
+  struct Block {
+    double highest;
+    bool stale;
+  };
+  /// Cells or blocks that a disc may meet: first and last, both included.
+  struct Window {
+    int column_begin, column_end, row_begin, row_end;
+  };
+
+  [[nodiscard]] std::size_t index(int column, int row) const {
+    return static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) +
+           static_cast<std::size_t>(column);
+  }
+  [[nodiscard]] Window cells_in(const Eigen::Vector2d& p, double radius) const;
+  [[nodiscard]] double distance(const Eigen::Vector2d& p, const Window& cells) const;
+  void stamp(const CutterProfile& profile, const Eigen::Vector3d& tip, Extreme& deepest);
+  [[nodiscard]] Window cells_of(int block_column, int block_row) const;
+  double block_height(int block_column, int block_row);
+
+  Eigen::AlignedBox3d blank_;
+  double cell_;
+  int columns_;
+  int rows_;
+  int block_columns_;
+  std::vector<double> heights_;
+  std::vector<Block> blocks_;
+};
+
+/// The most material that is left on a surface: height of the stock above it, as an upper bound at
+/// the cells' centres, and where. Between centres it can be more by the surface's slope times 0.71
+/// cells. @param surface  a height field.
+Extreme most_left(const StockMap& stock, const ProfileCutter& surface, const Executor& executor);
+
+}  // namespace lensforge

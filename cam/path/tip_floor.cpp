@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cam/path/tip_floor.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "cam/contact/profile_contact.h"
+
+namespace lensforge {
+
+TipFloor::TipFloor(const ProfileCutter& surface, const Tool& tool, double allowance,
+                   const std::vector<KeepOut>& keep_outs, double clearance)
+    : surface_(surface), keep_outs_(keep_outs), clearance_(clearance) {
+  for (const CutterProfile& part : whole_profile(tool)) {
+    parts_.push_back(grown(part, allowance));
+    whole_.push_back(widened(part, clearance));
+  }
+  hold_ = parts_.front().flat() + parts_.front().corner / std::numbers::sqrt2;
+}
+
+double TipFloor::over(const Eigen::Vector2d& p, double reach, Trace& trace) const {
+  trace.resize(parts_.size());
+  const Eigen::Vector2d rim =
+      p.cwiseMax(surface_.bounds().min().head<2>()).cwiseMin(surface_.bounds().max().head<2>());
+  const double beyond = (p - rim).norm();
+  const Eigen::Vector2d held = beyond > hold_ ? rim + (p - rim) * (hold_ / beyond) : p;
+  double floor = kNoContact;
+  for (std::size_t part = 0; part < parts_.size(); ++part) {
+    // A shank is most often so high that not even the surface's highest point could reach it.
+    if (surface_.bounds().max().z() - parts_[part].base <= floor) continue;
+    trace[part] = surface_.drop(widened(parts_[part], reach), held, trace[part]);
+    floor = std::max(floor, trace[part].tip);
+  }
+  for (const KeepOut& box : keep_outs_) {
+    for (const CutterProfile& part : whole_) {
+      const double tip =
+          profile_box_tip(widened(part, reach), p, Eigen::AlignedBox3d(box.low, box.high));
+      floor = std::max(floor, tip + clearance_);
+    }
+  }
+  return floor;
+}
+
+}  // namespace lensforge
