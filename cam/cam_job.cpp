@@ -9,7 +9,7 @@
 #include <system_error>
 #include <utility>
 
-#include "cam/contact/drop_cutter.h"
+#include "cam/contact/cut_surface.h"
 #include "cam/contact/height_field.h"
 #include "cam/path/finish_raster.h"
 #include "core/decimal_text.h"
@@ -86,7 +86,8 @@ std::vector<std::string> head_comments(const CamOptions& options, const RasterPl
               decimal_text(options.feed, 0) + ", plunge " + decimal_text(options.plunge, 0) +
               " mm/min",
           "X " + decimal_text(low.x(), d) + " to " + decimal_text(high.x(), d) + ", Y " +
-              decimal_text(plan.row_y(0), d) + " to " + decimal_text(plan.row_y(plan.rows - 1), d)};
+              decimal_text(plan.row_place(0), d) + " to " +
+              decimal_text(plan.row_place(plan.rows - 1), d)};
 }
 
 std::vector<std::string> late_comments(const CamOptions& options, const CamResult& result) {
@@ -99,7 +100,6 @@ std::vector<std::string> late_comments(const CamOptions& options, const CamResul
 
 void take_summary(const RasterSummary& summary, const CamOptions& options, CamResult& result) {
   result.rows = summary.rows;
-  result.samples = summary.samples;
   result.points = summary.points;
   result.cutting_length = summary.length;
   result.length_over_feed_min = summary.length / options.feed;
@@ -127,14 +127,13 @@ class FinishProgram {
   void begin(const std::vector<std::string>& comments) { writer_.begin(comments, kLateComments); }
 
   void add(const RasterRow& row) {
-    for (const Eigen::Vector3d& point : row.points) {
-      if (cutting_) {
-        writer_.cut_to(point + lift_);
-      } else {
-        writer_.plunge_to(point + lift_);
-      }
-      cutting_ = true;
+    if (cutting_) {
+      writer_.cut_to(row.start + lift_);
+    } else {
+      writer_.plunge_to(row.start + lift_);
     }
+    cutting_ = true;
+    for (const PathMove& move : row.moves) writer_.cut_to(move.end + lift_);
     check();
   }
 
@@ -164,7 +163,7 @@ class FinishProgram {
 /// Everything that a run needs beside its options.
 struct Job {
   const CamOptions& options;
-  const DropCutter& cutter;
+  const CutSurface& surface;
   const RasterPlan& plan;
   const Executor& executor;
   const RunControl& control;
@@ -177,7 +176,8 @@ void write_program(const Job& job, const fs::path& path, CamResult& result) {
     FinishProgram program(beside, path, gcode_options(job.options, result), result.z_offset);
     program.begin(head_comments(job.options, job.plan, result));
     const auto sink = [&](const RasterRow& row) { program.add(row); };
-    const RasterSummary summary = cut_raster(job.cutter, job.plan, job.executor, sink, job.control);
+    const RasterSummary summary =
+        cut_raster(job.surface, job.plan, job.executor, sink, job.control);
     if (!summary.complete) throw Stopped{};
     take_summary(summary, job.options, result);
     result.lines = program.end();
@@ -228,9 +228,10 @@ void warn_of_grbl(const CamOptions& options, CamResult& result) {
 
 RasterPlan plan_for(const CamOptions& options, const HeightField& field) {
   const Eigen::AlignedBox2d surface(field.box.min().head<2>(), field.box.max().head<2>());
-  return plan_finish_raster(
-      surface, 0.5 * options.tool_diameter,
-      {options.pitch, options.tolerance, options.slope_tolerance, resolution_of(options)});
+  RasterOptions raster{options.pitch, options.tolerance, options.slope_tolerance,
+                       resolution_of(options)};
+  raster.z_zero = -z_offset_of(options, field.box.max().z());
+  return plan_finish_raster(surface, 0.5 * options.tool_diameter, raster);
 }
 
 CamResult start_result(const CamOptions& options, const HeightField& field,
@@ -240,7 +241,6 @@ CamResult start_result(const CamOptions& options, const HeightField& field,
   result.stock_top = result.surface_top + options.stock;
   result.z_offset = z_offset_of(options, result.surface_top);
   result.pitch = plan.pitch;
-  result.sample_spacing = plan.spacing;
   return result;
 }
 
@@ -254,9 +254,9 @@ CamResult make_finish_program(const Lens& lens, const CamOptions& options, const
   require_writable_folder(folder);
   const RasterPlan plan = plan_for(options, field);
   CamResult result = start_result(options, field, plan);
-  const DropCutter cutter(lens.surface, plan.radius, executor);
+  const FacetSurface surface(lens.surface, plan.radius, executor);
   try {
-    write_program({options, cutter, plan, executor, control}, folder / cam_file::kFinish, result);
+    write_program({options, surface, plan, executor, control}, folder / cam_file::kFinish, result);
   } catch (const Stopped&) {
     result.status = CamResult::Status::kInterrupted;
     result.message = "interrupted; no program was written";

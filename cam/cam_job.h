@@ -66,11 +66,9 @@ struct CamResult {
   std::vector<std::filesystem::path> files;  ///< What was written.
 
   std::int64_t rows = 0;        ///< Passes along x, those outside the rim included.
-  std::int64_t samples = 0;     ///< Points at which the drop curve was evaluated.
   std::int64_t points = 0;      ///< Cutter location points of the path, that is cutting moves + 1.
   std::int64_t lines = 0;       ///< Lines of the program.
   double pitch = 0.0;           ///< Stepover as cut, ≤ CamOptions::pitch.
-  double sample_spacing = 0.0;  ///< Distance of drop-curve samples along a row.
   double cutting_length = 0.0;  ///< Length of all moves at cutting feed.
   /// cutting_length ÷ feed, minutes. No promise: acceleration makes the real time longer.
   double length_over_feed_min = 0.0;

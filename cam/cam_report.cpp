@@ -49,8 +49,6 @@ nlohmann::json cam_report(const CamOptions& options, const CamResult& result) {
              {"file", cam_file::kFinish},
              {"rows", result.rows},
              {"pitch", result.pitch},
-             {"samples", result.samples},
-             {"sample_spacing", result.sample_spacing},
              {"points", result.points},
              {"lines", result.lines},
              {"cutting_length", result.cutting_length},

@@ -2,17 +2,37 @@
 #include "cam/contact/curve_envelope.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 
 namespace lensforge {
 namespace {
+
+/// Whether two pieces are one curve but for rounding, as a vertex and an edge that ends there at a
+/// right angle to the line are: bounds would tell so only on stretches of a micrometre.
+bool same_curve(const CurvePiece& a, const CurvePiece& b, double from, double to) {
+  constexpr double kRounding = 1e-13;
+  if (std::abs(a.bow - b.bow) > kRounding || std::abs(a.rho2 - b.rho2) > kRounding) return false;
+  const auto off = [](const CurvePiece& piece, double u) {
+    return piece.offset + piece.rate * (u - piece.u0);
+  };
+  const double sign = a.rate * b.rate < 0.0 ? -1.0 : 1.0;
+  for (const double u : {from, to}) {
+    if (std::abs(off(a, u) - sign * off(b, u)) > kRounding) return false;
+    if (std::abs(a.height + a.rise * (u - a.u0) - b.height - b.rise * (u - b.u0)) > kRounding) {
+      return false;
+    }
+  }
+  return true;
+}
 
 /// Whether `fresh` is above `old` by more than a tie anywhere, as far as one look tells.
 bool may_rise_above(const CurvePiece& fresh, const CurvePiece& old) {
   const double from = std::max(fresh.begin, old.begin);
   const double to = std::min(fresh.end, old.end);
   if (to - from <= kShortestPiece) return false;
-  return difference_bounds(fresh, old, from, to).high > kEnvelopeTie;
+  return difference_bounds(fresh, old, from, to).high > kEnvelopeTie &&
+         !same_curve(fresh, old, from, to);
 }
 
 /// Where to look next when the bounds leave it open who is on top: where the difference's chord
@@ -44,6 +64,7 @@ void CurveEnvelope::contest(const CurvePiece& old, const CurvePiece& fresh, doub
   const Range above = difference_bounds(fresh, old, from, to);
   if (above.high <= kEnvelopeTie || to - from <= kShortestPiece) return append(old, from, to);
   if (above.low >= 0.0) return append(fresh, from, to);
+  if (same_curve(fresh, old, from, to)) return append(old, from, to);
   const double middle = split_point(fresh, old, from, to);
   contest(old, fresh, from, middle);
   contest(old, fresh, middle, to);

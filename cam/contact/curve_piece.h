@@ -49,18 +49,19 @@ struct CurvePiece {
     const double d = offset + rate * (u - u0);
     return rise - bow * rate * d / std::sqrt(std::fmax(rho2 - d * d, kSteepest * rho2));
   }
-  /// Largest |z″| between two places, 1/mm: it grows towards the ends of the arc.
-  [[nodiscard]] double most_curvature(double from, double to) const {
-    if (straight()) return 0.0;
-    const double d = std::fmax(std::abs(offset + rate * (from - u0)),
-                               std::abs(offset + rate * (to - u0)));
-    const double r2 = std::fmax(rho2 - d * d, kSteepest * rho2);
-    return std::abs(bow) * rate * rate * rho2 / (r2 * std::sqrt(r2));
-  }
-
   /// Arcs end where they are 1 : 30,000 from vertical: what holds a ball there is a wall.
   static constexpr double kSteepest = 1e-9;
 };
+
+/// How far a piece can be off its chord between two places, mm: its end tangents meet no farther
+/// away, because it bends one way only. Falls by the square of the distance of the places.
+inline double bulge(const CurvePiece& piece, double from, double to) {
+  if (piece.straight()) return 0.0;
+  const double chord = (piece.value(to) - piece.value(from)) / (to - from);
+  const double left = std::abs(piece.slope(from) - chord);
+  const double right = std::abs(piece.slope(to) - chord);
+  return left + right > 0.0 ? (to - from) * left * right / (left + right) : 0.0;
+}
 
 /// Largest and smallest value of a difference.
 struct Range {
@@ -68,23 +69,13 @@ struct Range {
   double high = 0.0;
 };
 
-/// Bounds of a − b between two places where both hold: chords and end tangents enclose a curve that
-/// bends one way only. The bounds close in by the square of the distance of the places.
+/// Bounds of a − b between two places where both hold.
 inline Range difference_bounds(const CurvePiece& a, const CurvePiece& b, double from, double to) {
   const double at_from = a.value(from) - b.value(from);
   const double at_to = a.value(to) - b.value(to);
   Range range{std::fmin(at_from, at_to), std::fmax(at_from, at_to)};
-  const double width = to - from;
-  // How far a curve bulges over its chord: the tangents' meeting point.
-  const auto bulge = [&](const CurvePiece& piece) {
-    if (piece.straight()) return 0.0;
-    const double chord = (piece.value(to) - piece.value(from)) / width;
-    const double left = std::abs(piece.slope(from) - chord);
-    const double right = std::abs(piece.slope(to) - chord);
-    return left + right > 0.0 ? width * left * right / (left + right) : 0.0;
-  };
-  const double bulge_a = bulge(a);
-  const double bulge_b = bulge(b);
+  const double bulge_a = bulge(a, from, to);
+  const double bulge_b = bulge(b, from, to);
   range.high += (a.concave() ? bulge_a : 0.0) + (b.concave() ? 0.0 : bulge_b);
   range.low -= (a.concave() ? 0.0 : bulge_a) + (b.concave() ? bulge_b : 0.0);
   return range;

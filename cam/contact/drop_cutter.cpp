@@ -111,8 +111,8 @@ void DropCutter::drop(std::span<const Eigen::Vector2d> points, std::span<CutterL
   parallel_for(executor, "drop cutter", (count + kRun - 1) / kRun, drop_run, 1);
 }
 
-/// Calls `visit` with the number of every cell whose triangles can lie under a ball with its axis in
-/// the box, local coordinates.
+/// Calls `visit` with the number of every cell whose triangles can lie under a ball with its axis
+/// in the box, local coordinates.
 template <class Visit>
 void DropCutter::visit_cells(const Level& level, const Eigen::AlignedBox2d& axis,
                              const Visit& visit) const {

@@ -7,25 +7,49 @@
 #include <functional>
 #include <vector>
 
-#include "cam/contact/drop_cutter.h"
+#include "cam/contact/cut_surface.h"
+#include "cam/path/arc_fit.h"
+#include "cam/path/move.h"
+#include "cam/path/operation.h"
+#include "cam/path/row_profile.h"
 #include "core/executor.h"
 #include "core/run_control.h"
 
 namespace lensforge {
 
+/// In which sense rows are cut. A spindle that turns clockwise, as they do, has the material that
+/// is left on its right when it climbs.
+enum class RasterOrder : std::uint8_t {
+  kZigZag,        ///< To and fro, always at feed.
+  kClimb,         ///< One way; back through the air above the row just cut.
+  kConventional,  ///< The other way.
+};
+
 /// What shapes a finishing raster but the surface and the ball.
 struct RasterOptions {
   double pitch = 0.06;            ///< Stepover between rows at most, mm, > 0.
   double tolerance = 0.0005;      ///< Farthest from the drop curve, mm, ≥ 4 · resolution.
-  double slope_tolerance = 1e-3;  ///< Largest error of a move's direction, rad, > 0.
-  double resolution = 1e-4;       ///< Unit of the program's last decimal, mm, > 0.
+  double slope_tolerance = 1e-3;  ///< Largest difference of slope over a kSlopeStretch, > 0.
+  double resolution = 1e-6;       ///< Unit of the program's last decimal, mm, > 0.
+  double z_zero = 0.0;            ///< Height that the program calls 0, mm, lens frame.
+  int along = 0;                  ///< 0: rows along x; 1: along y.
+  RasterOrder order = RasterOrder::kZigZag;
+  bool arcs = false;  ///< Arcs in the rows' planes, G18 along x and G19 along y.
 };
 
-/// Slope up to which the raster's promises hold: rise over run of the surface, and of the drop
-/// curve across the rim. Lenses stay below 0.5.
+/// Stepover at which a ball leaves scallops of this height, mm, square to a surface that rises
+/// across the rows by `steepest` (rise over run): 2 √(2Rh − h²) along it.
+/// @throw InputError unless 0 < scallop < radius.
+double pitch_for_scallop(double radius, double scallop, double steepest);
+
+/// Decimals from 4 to 6, the least whose rounding turns a kSlopeStretch by no more than a quarter
+/// of the slope tolerance and moves a point by no more than a quarter of the tolerance.
+int decimals_for(double tolerance, double slope_tolerance);
+
+/// Slope up to which a surface is finished to its rim: rise over run. Lenses stay below 0.5.
 inline constexpr double kSteepestSlope = 1.0;
 
-/// A zig-zag finishing raster over a rectangle: rows along x, one behind the other along y.
+/// A finishing raster over a rectangle: rows along x (or y), one behind the other along y (x).
 ///
 /// The rim: a surface that falls towards its rim is touched by a ball whose centre is beyond it, so
 /// rows and the raster as a whole run on. Out to reach() = R/√2 the ball rolls over the rim as the
@@ -41,34 +65,33 @@ struct RasterPlan {
   double pitch = 0.0;     ///< Stepover as cut: rows lie on both borders of the surface.
   std::int64_t rows = 0;  ///< Of them rows_outside beyond either border.
   std::int64_t rows_outside = 0;
-  std::int64_t samples = 0;  ///< Drop-curve samples a row, before creases are searched.
-  double spacing = 0.0;      ///< Distance of samples at most, mm.
 
   /// How far beyond the rim the tip follows the drop curve, mm.
   [[nodiscard]] double reach() const;
-  /// y of a row, mm, to the program's resolution.
-  [[nodiscard]] double row_y(std::int64_t row) const;
+  /// y (or x) of a row, mm, to the program's resolution.
+  [[nodiscard]] double row_place(std::int64_t row) const;
+  /// The way of a row; beyond reach() the drop curve is taken at the nearest place within it, where
+  /// it is no lower, since that place is nearer to all of the surface.
+  [[nodiscard]] RowSpan row_span(std::int64_t row) const;
+  [[nodiscard]] bool forward(std::int64_t row) const;
 };
 
-/// Lays out the raster. Samples are s = √(0.7 R · tolerance) apart: the drop curve is the largest
-/// of curves whose second derivative is at least −(1 + M²)^(3/2)/R, M being its slope, so between
-/// samples it rises above their chord by at most (1 + M²)^(3/2) s²/(8R) ≤ tolerance/4 for M ≤ 1.
 RasterPlan plan_finish_raster(const Eigen::AlignedBox2d& surface, double radius,
                               const RasterOptions& options);
 
-/// One pass: cutter location points (tool tip, mm, lens frame; x and y to the program's resolution)
-/// in the order of travel, even rows towards +x.
+/// One pass from `start`; x, y, z and centres lie on the program's grid.
 struct RasterRow {
-  std::vector<Eigen::Vector3d> points;
-  std::int64_t samples = 0;  ///< Points at which the drop curve was evaluated.
+  Eigen::Vector3d start = Eigen::Vector3d::Zero();
+  std::vector<PathMove> moves;  ///< All kCut, feed 0.
+  PathCertificate certificate;  ///< Against the drop curve as continued beyond the rim.
+  std::int64_t pieces = 0;      ///< Of the drop curve's polyline.
+
+  [[nodiscard]] const Eigen::Vector3d& end() const {
+    return moves.empty() ? start : moves.back().end;
+  }
 };
 
-/// Cuts one row: samples the drop curve, halves intervals next to a crease until its place is
-/// known, and keeps as few samples as the tolerances allow. Between neighbouring points the drop
-/// curve rises above the path by at most the tolerance (the deepest gouge) and falls below it by at
-/// most the tolerance, rounding of z to the resolution included; every chord is within
-/// slope_tolerance of the direction of each sample interval that it replaces
-/// (FinishRaster.NeverGougesDeeperThanTheTolerance).
+/// Cuts one row (fit_row()).
 /// @throw InputError if there is nothing under the ball somewhere on the row.
 RasterRow cut_row(const DropCutter& cutter, const RasterPlan& plan, std::int64_t row);
 
@@ -76,15 +99,18 @@ RasterRow cut_row(const DropCutter& cutter, const RasterPlan& plan, std::int64_t
 struct RasterSummary {
   bool complete = false;  ///< False if it was stopped.
   std::int64_t rows = 0;
-  std::int64_t samples = 0;
-  std::int64_t points = 0;
-  double length = 0.0;      ///< Of the path with the links from row to row, mm.
+  std::int64_t pieces = 0;
+  std::int64_t points = 0;  ///< Starts of rows and ends of moves.
+  std::int64_t arcs = 0;
+  double length = 0.0;      ///< Of the rows and of straight links from row to row, mm.
   Eigen::AlignedBox3d tip;  ///< Box of all points.
+  PathCertificate certificate;
 };
 
 /// Cuts all rows, several at a time, and hands them to `sink` in order: the same rows for any
 /// number of threads. Memory does not grow with the number of rows.
-RasterSummary cut_raster(const DropCutter& cutter, const RasterPlan& plan, const Executor& executor,
+RasterSummary cut_raster(const CutSurface& surface, const RasterPlan& plan,
+                         const Executor& executor,
                          const std::function<void(const RasterRow&)>& sink,
                          const RunControl& control);
 

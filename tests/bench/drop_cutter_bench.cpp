@@ -2,7 +2,6 @@
 // Drop-cutter, ball of 0.2 mm, on a lens of 942,080 triangles: 641 × 737 vertices, 100 × 100 mm.
 #include <benchmark/benchmark.h>
 
-#include <Eigen/Geometry>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -10,7 +9,6 @@
 
 #include "cam/cam_meshes.h"
 #include "cam/contact/drop_cutter.h"
-#include "cam/path/finish_raster.h"
 
 namespace lensforge {
 namespace {
@@ -92,28 +90,6 @@ void OneFacetPerPoint(benchmark::State& state) {
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(points.size()));
 }
 BENCHMARK(OneFacetPerPoint);
-
-/// Rows of the finishing raster as cut: samples, creases, simplification.
-void FinishRasterRows(benchmark::State& state) {
-  const auto executor = Executor::cpu(static_cast<int>(state.range(0)));
-  const Eigen::AlignedBox2d surface(Eigen::Vector2d(0.0, 0.0), Eigen::Vector2d(100.0, 100.0));
-  const RasterPlan plan = plan_finish_raster(surface, kRadius, {});
-  constexpr std::int64_t kRows = 32;
-  std::vector<RasterRow> rows(kRows);
-  const auto cut = [&](std::int64_t i) {
-    rows[static_cast<std::size_t>(i)] = cut_row(lens_cutter(), plan, 700 + i);
-  };
-  for (auto _ : state) parallel_for(executor, "finish raster", kRows, cut, 1);
-  std::int64_t samples = 0;
-  std::int64_t points = 0;
-  for (const RasterRow& row : rows) {
-    samples += row.samples;
-    points += static_cast<std::int64_t>(row.points.size());
-  }
-  state.SetItemsProcessed(state.iterations() * samples);
-  state.counters["points_per_row"] = static_cast<double>(points) / kRows;
-}
-BENCHMARK(FinishRasterRows)->ArgName("threads")->Arg(1)->Arg(2)->UseRealTime();
 
 void DropCutterBuild(benchmark::State& state) {
   const auto executor = Executor::cpu(static_cast<int>(state.range(0)));

@@ -5,11 +5,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <stop_token>
 #include <vector>
 
 #include "cam/cam_meshes.h"
 #include "core/error.h"
+#include "machine/gcode/arc.h"
 
 namespace lensforge {
 namespace {
@@ -28,22 +30,30 @@ SurfaceMesh small_relief() {
   });
 }
 
-std::vector<RasterRow> all_rows(const DropCutter& cutter, const RasterPlan& plan,
+FacetSurface facets(const SurfaceMesh& mesh) { return {mesh, kRadius, Executor::serial()}; }
+
+std::vector<RasterRow> all_rows(const CutSurface& surface, const RasterPlan& plan,
                                 const Executor& executor) {
   std::vector<RasterRow> rows;
-  cut_raster(cutter, plan, executor, [&](const RasterRow& row) { rows.push_back(row); }, {});
+  cut_raster(surface, plan, executor, [&](const RasterRow& row) { rows.push_back(row); }, {});
   return rows;
+}
+
+std::vector<Eigen::Vector3d> points_of(const RasterRow& row) {
+  std::vector<Eigen::Vector3d> points{row.start};
+  for (const PathMove& move : row.moves) points.push_back(move.end);
+  return points;
 }
 
 TEST(FinishRaster, RowsLieOnBothBordersAndNoFartherApartThanThePitch) {
   const RasterPlan plan = plan_finish_raster(square(100.0), kRadius, {});
   EXPECT_EQ(plan.rows - 2 * plan.rows_outside, 1668);
-  EXPECT_EQ(plan.row_y(plan.rows_outside), 0.0);
-  EXPECT_EQ(plan.row_y(plan.rows - 1 - plan.rows_outside), 100.0);
-  EXPECT_LE(plan.row_y(0), -plan.reach());
-  EXPECT_GE(plan.row_y(plan.rows - 1), 100.0 + plan.reach());
+  EXPECT_EQ(plan.row_place(plan.rows_outside), 0.0);
+  EXPECT_EQ(plan.row_place(plan.rows - 1 - plan.rows_outside), 100.0);
+  EXPECT_LE(plan.row_place(0), -plan.reach());
+  EXPECT_GE(plan.row_place(plan.rows - 1), 100.0 + plan.reach());
   for (std::int64_t row = 1; row < plan.rows; ++row) {
-    EXPECT_LE(plan.row_y(row) - plan.row_y(row - 1), 0.06 + 1e-4);
+    EXPECT_LE(plan.row_place(row) - plan.row_place(row - 1), 0.06 + 1e-4);
   }
 }
 
@@ -55,62 +65,79 @@ TEST(FinishRaster, AWholeNumberOfPitchesCostsNoRowMore) {
 
 TEST(FinishRaster, ZigZagsAndTurnsAroundOutsideTheRim) {
   const SurfaceMesh mesh = small_relief();
-  const DropCutter cutter(mesh, kRadius, Executor::serial());
-  const RasterPlan plan = plan_finish_raster(square(kSide), kRadius, {});
-  const auto rows = all_rows(cutter, plan, Executor::serial());
-  ASSERT_EQ(static_cast<std::int64_t>(rows.size()), plan.rows);
-  for (std::size_t r = 0; r < rows.size(); ++r) {
-    const auto& points = rows[r].points;
-    const bool forward = r % 2 == 0;
-    EXPECT_DOUBLE_EQ((forward ? points.front() : points.back()).x(), -kRadius);
-    EXPECT_DOUBLE_EQ((forward ? points.back() : points.front()).x(), kSide + kRadius);
-    for (std::size_t i = 1; i < points.size(); ++i) {
-      EXPECT_EQ(points[i].x() > points[i - 1].x(), forward);
-      EXPECT_EQ(points[i].y(), plan.row_y(static_cast<std::int64_t>(r)));
+  for (const int along : {0, 1}) {
+    RasterOptions options;
+    options.along = along;
+    const RasterPlan plan = plan_finish_raster(square(kSide), kRadius, options);
+    const auto rows = all_rows(facets(mesh), plan, Executor::serial());
+    ASSERT_EQ(static_cast<std::int64_t>(rows.size()), plan.rows);
+    for (std::size_t r = 0; r < rows.size(); ++r) {
+      const auto points = points_of(rows[r]);
+      const bool forward = r % 2 == 0;
+      EXPECT_DOUBLE_EQ((forward ? points.front() : points.back())[along], -kRadius);
+      EXPECT_DOUBLE_EQ((forward ? points.back() : points.front())[along], kSide + kRadius);
+      for (std::size_t i = 1; i < points.size(); ++i) {
+        EXPECT_EQ(points[i][along] > points[i - 1][along], forward);
+        EXPECT_EQ(points[i][1 - along], plan.row_place(static_cast<std::int64_t>(r)));
+      }
     }
   }
 }
 
-/// Largest and smallest of path − drop curve over a row, at places `step` apart.
-std::pair<double, double> deviation(const DropCutter& cutter, const RasterRow& row, double step,
-                                    double x_min, double x_max) {
-  double deepest = 0.0;
-  double highest = 0.0;
-  CutterLocation near;
-  for (std::size_t i = 1; i < row.points.size(); ++i) {
-    Eigen::Vector3d a = row.points[i - 1];
-    Eigen::Vector3d b = row.points[i];
-    if (a.x() > b.x()) std::swap(a, b);
-    for (double x = std::max(a.x(), x_min); x < std::min(b.x(), x_max); x += step) {
-      const double path = a.z() + (b.z() - a.z()) * (x - a.x()) / (b.x() - a.x());
-      near = cutter.drop({x, a.y()}, near);
-      deepest = std::max(deepest, near.tip - path);
-      highest = std::max(highest, path - near.tip);
+/// Climbing, a spindle that turns clockwise has the rows still to come on its right.
+TEST(FinishRaster, OneWayRowsKeepTheMaterialOnOneSide) {
+  for (const int along : {0, 1}) {
+    for (const RasterOrder order : {RasterOrder::kClimb, RasterOrder::kConventional}) {
+      RasterOptions options;
+      options.along = along;
+      options.order = order;
+      const RasterPlan plan = plan_finish_raster(square(kSide), kRadius, options);
+      Eigen::Vector2d way = Eigen::Vector2d::Unit(along) * (plan.forward(0) ? 1.0 : -1.0);
+      const Eigen::Vector2d right(way.y(), -way.x());
+      const Eigen::Vector2d ahead = Eigen::Vector2d::Unit(1 - along);
+      EXPECT_EQ(right.dot(ahead) > 0.0, order == RasterOrder::kClimb);
+      EXPECT_EQ(plan.forward(0), plan.forward(1));
     }
   }
-  return {deepest, highest};
 }
 
-TEST(FinishRaster, NeverGougesDeeperThanTheTolerance) {
+/// Every move with its arcs as a controller runs them, against the drop-cutter at many places.
+TEST(FinishRaster, TheProgramsMotionKeepsTheCertificate) {
   const SurfaceMesh mesh = small_relief();
   const DropCutter cutter(mesh, kRadius, Executor::serial());
-  for (const double tolerance : {0.0005, 0.002, 0.00005}) {
+  for (const int along : {0, 1}) {
     RasterOptions options;
-    options.tolerance = tolerance;
-    options.slope_tolerance = 1.0;
-    options.resolution = 1e-5;
+    options.along = along;
+    options.arcs = true;
+    options.slope_tolerance = 5e-3;
+    options.tolerance = 0.001;
     const RasterPlan plan = plan_finish_raster(square(kSide), kRadius, options);
-    for (std::int64_t r = 0; r < plan.rows; r += 7) {
-      const double y = plan.row_y(r);
-      if (y < -plan.reach() || y > kSide + plan.reach()) continue;
-      const double beyond = std::max({0.0, -y, y - kSide});
-      const double reach = std::sqrt(plan.reach() * plan.reach() - beyond * beyond);
-      const auto [deepest, highest] =
-          deviation(cutter, cut_row(cutter, plan, r), 0.0007, -reach, kSide + reach);
-      // z is rounded when it is written: half a unit less is left.
-      EXPECT_LE(deepest, tolerance - 0.5 * options.resolution);
-      EXPECT_LE(highest, tolerance - 0.5 * options.resolution);
+    int arcs = 0;
+    for (const std::int64_t r : {20, 33, 50}) {
+      const RasterRow row = cut_row(cutter, plan, r);
+      EXPECT_LE(row.certificate.gouge.value, options.tolerance);
+      EXPECT_LE(row.certificate.excess.value, options.tolerance);
+      Eigen::Vector3d from = row.start;
+      for (const PathMove& move : row.moves) {
+        ArcRequest request{along == 0 ? ArcPlane::kZX : ArcPlane::kYZ, move.clockwise,
+                           move.centre - from, std::nullopt};
+        const ArcResult arc = move.arc_axis >= 0 ? make_arc(from, move.end, request) : ArcResult{};
+        ASSERT_EQ(arc.reason, "");
+        EXPECT_LT(std::abs(arc.arc.sweep), 3.1);
+        arcs += move.arc_axis >= 0 ? 1 : 0;
+        for (double part = 0.0; part <= 1.0; part += 0.05) {
+          const Eigen::Vector3d tip = move.arc_axis >= 0
+                                          ? arc.arc.at(part)
+                                          : Eigen::Vector3d(from + part * (move.end - from));
+          if (tip[along] < 0.0 || tip[along] > kSide) continue;
+          const double error = tip.z() - cutter.drop(tip.head<2>()).tip;
+          ASSERT_LE(error, row.certificate.excess.value + 1e-9);
+          ASSERT_GE(error, -row.certificate.gouge.value - 1e-9);
+        }
+        from = move.end;
+      }
     }
+    EXPECT_GT(arcs, 10);
   }
 }
 
@@ -118,48 +145,15 @@ TEST(FinishRaster, LinksBetweenRowsDoNotTouchThePart) {
   const SurfaceMesh mesh = small_relief();
   const DropCutter cutter(mesh, kRadius, Executor::serial());
   const RasterPlan plan = plan_finish_raster(square(kSide), kRadius, {});
-  const auto rows = all_rows(cutter, plan, Executor::serial());
+  const auto rows = all_rows(facets(mesh), plan, Executor::serial());
   for (std::size_t r = 1; r < rows.size(); ++r) {
-    const Eigen::Vector3d& from = rows[r - 1].points.back();
-    const Eigen::Vector3d link = rows[r].points.front() - from;
+    const Eigen::Vector3d from = rows[r - 1].end();
+    const Eigen::Vector3d link = rows[r].start - from;
     EXPECT_EQ(link.x(), 0.0);
     for (double part = 0.0; part <= 1.0; part += 0.02) {
       const Eigen::Vector3d tip = from + part * link;
       const double clearance = tip.z() - cutter.drop(tip.head<2>()).tip;
       EXPECT_GT(clearance, 0.5 * kRadius);
-    }
-  }
-}
-
-TEST(FinishRaster, KeepsTheDirectionOfTheDropCurve) {
-  const SurfaceMesh mesh = testing::grid_mesh(21, 21, kSide, kSide, [](double x, double y) {
-    return 0.1 * std::sin(1.5 * x) * std::cos(1.3 * y);
-  });
-  const DropCutter cutter(mesh, kRadius, Executor::serial());
-  RasterOptions options;
-  options.tolerance = 0.004;
-  for (const double slope_tolerance : {1e-4, 1e-3, 1e-2}) {
-    options.slope_tolerance = slope_tolerance;
-    const RasterPlan plan = plan_finish_raster(square(kSide), kRadius, options);
-    const RasterRow row = cut_row(cutter, plan, plan.rows / 2);
-    // Where the curve is straight for two sample intervals, one of them lies on the straight part
-    // whole, and its direction has to be the path's.
-    std::size_t i = 1;
-    const double y = plan.row_y(plan.rows / 2);
-    std::vector<Eigen::Vector3d> points = row.points;
-    if (points.front().x() > points.back().x()) std::reverse(points.begin(), points.end());
-    for (double x = 0.1; x < kSide - 0.1; x += 0.0113) {
-      const double h = plan.spacing;
-      const double before = cutter.drop({x - h, y}).tip;
-      const double at = cutter.drop({x, y}).tip;
-      const double after = cutter.drop({x + h, y}).tip;
-      if (std::abs(before - 2.0 * at + after) > 1e-13) continue;
-      while (points[i].x() < x) ++i;
-      // A move that begins or ends within the probe may belong to the crease beside it.
-      if (points[i].x() < x + plan.spacing || points[i - 1].x() > x - plan.spacing) continue;
-      const double path =
-          std::atan2(points[i].z() - points[i - 1].z(), points[i].x() - points[i - 1].x());
-      EXPECT_NEAR(path, std::atan((after - before) / (2.0 * h)), slope_tolerance * 1.0001);
     }
   }
 }
@@ -173,7 +167,7 @@ TEST(FinishRaster, LooserTolerancesNeedFewerPoints) {
   loose.slope_tolerance = 0.05;
   const auto count = [&](const RasterOptions& options) {
     const RasterPlan plan = plan_finish_raster(square(kSide), kRadius, options);
-    return cut_row(cutter, plan, plan.rows / 2).points.size();
+    return cut_row(cutter, plan, plan.rows / 2).moves.size();
   };
   EXPECT_LT(count(loose) * 3, count(tight));
 }
@@ -184,18 +178,20 @@ TEST(FinishRaster, FinishesTheSurfaceToTheRim) {
   const SurfaceMesh mesh = testing::grid_mesh(41, 41, 2.0, 2.0, [](double x, double y) {
     return -0.9 * std::max(std::abs(x - 1.0), std::abs(y - 1.0));
   });
-  const DropCutter cutter(mesh, kRadius, Executor::serial());
   const RasterPlan plan = plan_finish_raster(square(2.0), kRadius, {});
-  const auto rows = all_rows(cutter, plan, Executor::serial());
+  std::vector<std::vector<Eigen::Vector3d>> rows;
+  for (const RasterRow& row : all_rows(facets(mesh), plan, Executor::serial())) {
+    rows.push_back(points_of(row));
+  }
   const double scallop = kRadius - std::sqrt(kRadius * kRadius - 0.03 * 0.03 * 1.81);
   for (double along = 0.05; along < 2.0; along += 0.093) {
     for (const Eigen::Vector3d& rim :
          {Eigen::Vector3d(along, 0.0, -0.9), Eigen::Vector3d(2.0, along, -0.9)}) {
       double nearest = 1.0;
-      for (const RasterRow& row : rows) {
-        for (std::size_t i = 1; i < row.points.size(); ++i) {
-          const Eigen::Vector3d a = row.points[i - 1] + Eigen::Vector3d(0.0, 0.0, kRadius);
-          const Eigen::Vector3d u = row.points[i] - row.points[i - 1];
+      for (const auto& row : rows) {
+        for (std::size_t i = 1; i < row.size(); ++i) {
+          const Eigen::Vector3d a = row[i - 1] + Eigen::Vector3d(0.0, 0.0, kRadius);
+          const Eigen::Vector3d u = row[i] - row[i - 1];
           const double part = std::clamp(u.dot(rim - a) / u.squaredNorm(), 0.0, 1.0);
           nearest = std::min(nearest, (a + part * u - rim).norm());
         }
@@ -208,36 +204,42 @@ TEST(FinishRaster, FinishesTheSurfaceToTheRim) {
 
 TEST(FinishRaster, SameRowsForAnyThreads) {
   const SurfaceMesh mesh = small_relief();
-  const DropCutter cutter(mesh, kRadius, Executor::serial());
-  const RasterPlan plan = plan_finish_raster(square(kSide), kRadius, {});
-  const auto one = all_rows(cutter, plan, Executor::serial());
-  const auto two = all_rows(cutter, plan, Executor::cpu(2));
+  RasterOptions options;
+  options.arcs = true;
+  const RasterPlan plan = plan_finish_raster(square(kSide), kRadius, options);
+  const auto one = all_rows(facets(mesh), plan, Executor::serial());
+  const auto two = all_rows(facets(mesh), plan, Executor::cpu(2));
   ASSERT_EQ(one.size(), two.size());
-  for (std::size_t r = 0; r < one.size(); ++r) EXPECT_EQ(one[r].points, two[r].points);
+  for (std::size_t r = 0; r < one.size(); ++r) {
+    EXPECT_EQ(points_of(one[r]), points_of(two[r]));
+    EXPECT_EQ(one[r].certificate.slope.value, two[r].certificate.slope.value);
+  }
 }
 
 TEST(FinishRaster, CountsWhatItCuts) {
   const SurfaceMesh mesh = small_relief();
-  const DropCutter cutter(mesh, kRadius, Executor::serial());
   const RasterPlan plan = plan_finish_raster(square(kSide), kRadius, {});
   std::vector<Eigen::Vector3d> path;
-  const RasterSummary summary = cut_raster(
-      cutter, plan, Executor::serial(),
-      [&](const RasterRow& row) { path.insert(path.end(), row.points.begin(), row.points.end()); },
-      {});
+  double gouge = 0.0;
+  const auto sink = [&](const RasterRow& row) {
+    const auto points = points_of(row);
+    path.insert(path.end(), points.begin(), points.end());
+    gouge = std::max(gouge, row.certificate.gouge.value);
+  };
+  const RasterSummary summary = cut_raster(facets(mesh), plan, Executor::serial(), sink, {});
   double length = 0.0;
   for (std::size_t i = 1; i < path.size(); ++i) length += (path[i] - path[i - 1]).norm();
   EXPECT_TRUE(summary.complete);
   EXPECT_EQ(summary.rows, plan.rows);
   EXPECT_EQ(summary.points, static_cast<std::int64_t>(path.size()));
-  EXPECT_GE(summary.samples, plan.rows * plan.samples);
+  EXPECT_EQ(summary.certificate.gouge.value, gouge);
+  EXPECT_GT(gouge, 0.0);
   EXPECT_NEAR(summary.length, length, 1e-9);
   EXPECT_DOUBLE_EQ(summary.tip.min().x(), -kRadius);
 }
 
 TEST(FinishRaster, StopsWithinABatch) {
   const SurfaceMesh mesh = small_relief();
-  const DropCutter cutter(mesh, kRadius, Executor::serial());
   const RasterPlan plan = plan_finish_raster(square(kSide), kRadius, {});
   std::stop_source source;
   int reports = 0;
@@ -246,10 +248,26 @@ TEST(FinishRaster, StopsWithinABatch) {
     if (++reports == 2) source.request_stop();
   });
   const RasterSummary summary = cut_raster(
-      cutter, plan, Executor::serial(), [](const RasterRow&) {}, control);
+      facets(mesh), plan, Executor::serial(), [](const RasterRow&) {}, control);
   EXPECT_FALSE(summary.complete);
   EXPECT_EQ(reports, 2);
   EXPECT_LT(summary.rows, plan.rows);
+}
+
+TEST(FinishRaster, PitchForAScallopLeavesThatScallop) {
+  const double pitch = pitch_for_scallop(kRadius, 0.002, 0.0);
+  EXPECT_NEAR(kRadius - std::sqrt(kRadius * kRadius - 0.25 * pitch * pitch), 0.002, 1e-15);
+  // On a slope of 1 the distance along the surface is √2 times that of the rows.
+  EXPECT_NEAR(pitch_for_scallop(kRadius, 0.002, 1.0) * std::sqrt(2.0), pitch, 1e-15);
+  EXPECT_THROW(pitch_for_scallop(kRadius, 0.2, 0.0), InputError);
+  EXPECT_THROW(pitch_for_scallop(kRadius, 0.0, 0.0), InputError);
+}
+
+TEST(FinishRaster, DecimalsFollowFromTheTolerances) {
+  EXPECT_EQ(decimals_for(0.0005, 1e-3), 6);
+  EXPECT_EQ(decimals_for(0.0005, 8e-3), 5);
+  EXPECT_EQ(decimals_for(0.0005, 0.5), 4);
+  EXPECT_EQ(decimals_for(0.0001, 0.5), 5);
 }
 
 TEST(FinishRaster, RefusesAHoleInTheSurface) {

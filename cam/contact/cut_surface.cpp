@@ -1,0 +1,201 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cam/contact/cut_surface.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <numeric>
+
+namespace lensforge {
+namespace {
+
+/// Facets are taken this far beyond the ball, mm: rounding.
+constexpr double kWindowMargin = 1e-6;
+
+/// What a triangle makes of a bend of 1/mm, before it is split.
+struct Interpolation {
+  double height = 0.0;  ///< mm² · bend
+  double slope = 0.0;   ///< mm · bend
+};
+
+Interpolation interpolation_of(const SurfaceMesh& mesh, std::int64_t triangle) {
+  std::array<double, 3> side{};
+  for (int k = 0; k < 3; ++k) {
+    const Eigen::Vector3d way = mesh.corner(triangle, (k + 1) % 3) - mesh.corner(triangle, k);
+    side[static_cast<std::size_t>(k)] = way.head<2>().norm();
+  }
+  std::sort(side.begin(), side.end());
+  const Eigen::Vector3d u = mesh.corner(triangle, 1) - mesh.corner(triangle, 0);
+  const Eigen::Vector3d v = mesh.corner(triangle, 2) - mesh.corner(triangle, 0);
+  const double area = 0.5 * std::abs(u.x() * v.y() - u.y() * v.x());
+  const bool obtuse = side[0] * side[0] + side[1] * side[1] <= side[2] * side[2];
+  const double around = obtuse ? 0.5 * side[2] : side[0] * side[1] * side[2] / (4.0 * area);
+  const double inscribed = 2.0 * area / (side[0] + side[1] + side[2]);
+  return {0.5 * around * around, side[2] * side[1] * (side[0] + 4.0 * inscribed) / (4.0 * area)};
+}
+
+int splits_for(const Interpolation& shape, double bend, const SmoothCutOptions& options) {
+  const double needed = std::max(std::sqrt(bend * shape.height / options.deviation),
+                                 bend * shape.slope / options.slope_deviation);
+  return static_cast<int>(std::clamp(std::ceil(needed), 1.0, double{kMostSplits}));
+}
+
+/// The parts of one triangle that a window touches.
+class TriangleParts {
+ public:
+  TriangleParts(const SmoothSurface& surface, std::int64_t triangle, int n,
+                const Eigen::AlignedBox2d& window)
+      : surface_(surface), triangle_(triangle), n_(n), window_(window) {
+    for (int k = 0; k < 3; ++k) corner_.col(k) = surface.mesh().corner(triangle, k).head<2>();
+  }
+
+  /// Calls `emit` with the places (i, j) of the corners of each part: i steps towards the second
+  /// corner, j towards the third.
+  template <class Emit>
+  void for_each(const Emit& emit) const {
+    using Place = Eigen::Vector2i;
+    for (int j = 0; j < n_; ++j) {
+      for (int i = 0; i + j < n_; ++i) {
+        offer({Place(i, j), Place(i + 1, j), Place(i, j + 1)}, emit);
+        if (i + j + 1 < n_) offer({Place(i + 1, j), Place(i + 1, j + 1), Place(i, j + 1)}, emit);
+      }
+    }
+  }
+
+  template <class Visit>
+  void for_each_point(const Visit& visit) const {
+    for (int j = 0; j <= n_; ++j) {
+      for (int i = 0; i + j <= n_; ++i) visit(Eigen::Vector2i(i, j));
+    }
+  }
+
+  [[nodiscard]] std::int64_t point_count() const { return std::int64_t{n_ + 1} * (n_ + 2) / 2; }
+
+  /// Of a point, counted as for_each_point() visits them.
+  [[nodiscard]] std::int64_t number(const Eigen::Vector2i& place) const {
+    const std::int64_t j = place.y();
+    return j * (n_ + 1) - j * (j - 1) / 2 + place.x();
+  }
+
+  [[nodiscard]] Eigen::Vector3d weights(const Eigen::Vector2i& place) const {
+    return Eigen::Vector3d(n_ - place.x() - place.y(), place.x(), place.y()) / n_;
+  }
+
+  [[nodiscard]] Eigen::Vector3d point(const Eigen::Vector2i& place) const {
+    const Eigen::Vector3d w = weights(place);
+    const Eigen::Vector2d xy = corner_ * w;
+    return {xy.x(), xy.y(), surface_.in_triangle(triangle_, w).z};
+  }
+
+ private:
+  template <class Emit>
+  void offer(const std::array<Eigen::Vector2i, 3>& places, const Emit& emit) const {
+    Eigen::AlignedBox2d box;
+    for (const Eigen::Vector2i& place : places) {
+      box.extend(Eigen::Vector2d(corner_ * weights(place)));
+    }
+    if (window_.intersects(box)) emit(places);
+  }
+
+  const SmoothSurface& surface_;
+  std::int64_t triangle_;
+  int n_;
+  const Eigen::AlignedBox2d& window_;
+  Eigen::Matrix<double, 2, 3> corner_;
+};
+
+Eigen::AlignedBox2d box_of(const SurfaceMesh& mesh, std::int64_t triangle) {
+  Eigen::AlignedBox2d box;
+  for (int k = 0; k < 3; ++k) box.extend(Eigen::Vector2d(mesh.corner(triangle, k).head<2>()));
+  return box;
+}
+
+}  // namespace
+
+SmoothCutSurface::SmoothCutSurface(const SurfaceMesh& mesh, double radius,
+                                   const SmoothCutOptions& options, const Executor& executor)
+    : surface_(mesh), radius_(radius), splits_(static_cast<std::size_t>(mesh.triangle_count())) {
+  std::vector<SurfaceDeviation> off(splits_.size());
+  parallel_for(executor, "smooth surface", mesh.triangle_count(), [&](std::int64_t t) {
+    const auto i = static_cast<std::size_t>(t);
+    const Interpolation shape = interpolation_of(mesh, t);
+    const double bend = surface_.bend(t);
+    const int n = splits_for(shape, bend, options);
+    splits_[i] = static_cast<std::uint8_t>(n);
+    off[i] = {bend * shape.height / (n * n), bend * shape.slope / n};
+  });
+  for (const SurfaceDeviation& one : off) {
+    deviation_.height = std::max(deviation_.height, one.height);
+    deviation_.slope = std::max(deviation_.slope, one.slope);
+  }
+  const double area = surface_.box().volume();
+  const double longest = surface_.box().sizes().maxCoeff();
+  const double per_band = static_cast<double>(facet_count()) / area * longest;
+  band_ = static_cast<double>(options.facets_at_once) / per_band - 2.0 * radius_;
+}
+
+std::int64_t SmoothCutSurface::facet_count() const {
+  std::int64_t count = 0;
+  for (const std::uint8_t n : splits_) count += std::int64_t{n} * n;
+  return count;
+}
+
+SurfaceMesh SmoothCutSurface::facets(const Eigen::AlignedBox2d& window,
+                                     const Executor& executor) const {
+  const SurfaceMesh& mesh = surface_.mesh();
+  std::vector<std::int64_t> triangles;
+  for (std::int64_t t = 0; t < mesh.triangle_count(); ++t) {
+    if (window.intersects(box_of(mesh, t))) triangles.push_back(t);
+  }
+  // Facets and points before each triangle; neighbours have points of their own along their edge.
+  std::vector<std::int64_t> begin(triangles.size() + 1, 0);
+  std::vector<std::int64_t> points(triangles.size() + 1, 0);
+  const auto parts_of = [&](std::int64_t i) {
+    const std::int64_t t = triangles[static_cast<std::size_t>(i)];
+    return TriangleParts(surface_, t, splits_[static_cast<std::size_t>(t)], window);
+  };
+  const auto count = static_cast<std::int64_t>(triangles.size());
+  constexpr std::int64_t kGrain = 16;
+  const auto count_parts = [&](std::int64_t i) {
+    const TriangleParts parts = parts_of(i);
+    std::int64_t& facets = begin[static_cast<std::size_t>(i) + 1];
+    parts.for_each([&](const auto& /*places*/) { ++facets; });
+    points[static_cast<std::size_t>(i) + 1] = facets > 0 ? parts.point_count() : 0;
+  };
+  parallel_for(executor, "count facets", count, count_parts, kGrain);
+  std::partial_sum(begin.begin(), begin.end(), begin.begin());
+  std::partial_sum(points.begin(), points.end(), points.begin());
+
+  SurfaceMesh fine;
+  fine.triangles.resize(3, begin.back());
+  fine.vertices.resize(3, points.back());
+  const auto make_parts = [&](std::int64_t i) {
+    const TriangleParts parts = parts_of(i);
+    const std::int64_t first = points[static_cast<std::size_t>(i)];
+    if (points[static_cast<std::size_t>(i) + 1] == first) return;
+    parts.for_each_point([&](const Eigen::Vector2i& place) {
+      fine.vertices.col(first + parts.number(place)) = parts.point(place);
+    });
+    std::int64_t facet = begin[static_cast<std::size_t>(i)];
+    parts.for_each([&](const auto& places) {
+      for (int k = 0; k < 3; ++k) {
+        fine.triangles(k, facet) =
+            static_cast<int>(first + parts.number(places[static_cast<std::size_t>(k)]));
+      }
+      ++facet;
+    });
+  };
+  parallel_for(executor, "make facets", count, make_parts, kGrain);
+  return fine;
+}
+
+std::shared_ptr<const DropCutter> SmoothCutSurface::cutter(const Eigen::AlignedBox2d& axis,
+                                                           const Executor& executor) const {
+  const Eigen::Vector2d around = Eigen::Vector2d::Constant(radius_ + kWindowMargin);
+  const Eigen::AlignedBox2d window(Eigen::Vector2d(axis.min() - around),
+                                   Eigen::Vector2d(axis.max() + around));
+  return std::make_shared<const DropCutter>(facets(window, executor), radius_, executor);
+}
+
+}  // namespace lensforge

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <vector>
+
+#include "cam/contact/drop_cutter.h"
+#include "core/executor.h"
+#include "core/smooth_surface.h"
+#include "core/surface_mesh.h"
+
+namespace lensforge {
+
+/// How far the triangles that are cut may lie from the surface that is meant, everywhere.
+struct SurfaceDeviation {
+  double height = 0.0;  ///< mm, along z
+  double slope = 0.0;   ///< Difference of slopes, no less than the angle in rad.
+};
+
+/// The surface that a strategy cuts, as drop-cutters for parts of it.
+class CutSurface {
+ public:
+  CutSurface() = default;
+  CutSurface(const CutSurface&) = delete;
+  CutSurface& operator=(const CutSurface&) = delete;
+  virtual ~CutSurface() = default;
+
+  /// A drop-cutter that holds all of the surface that a ball with its axis in the box can touch.
+  /// Drop curves have the same bits whatever box they are taken from.
+  [[nodiscard]] virtual std::shared_ptr<const DropCutter> cutter(
+      const Eigen::AlignedBox2d& axis, const Executor& executor) const = 0;
+  [[nodiscard]] virtual double radius() const = 0;
+  [[nodiscard]] virtual SurfaceDeviation deviation() const { return {}; }
+  /// How far, mm, the axis should move at most across the rows that share a cutter, so that it
+  /// fits in memory.
+  [[nodiscard]] virtual double band() const { return std::numeric_limits<double>::infinity(); }
+};
+
+/// The facets of a mesh as they are.
+class FacetSurface final : public CutSurface {
+ public:
+  /// @param radius  of the ball, mm, > 0.
+  FacetSurface(const SurfaceMesh& mesh, double radius, const Executor& executor)
+      : cutter_(std::make_shared<const DropCutter>(mesh, radius, executor)) {}
+
+  [[nodiscard]] std::shared_ptr<const DropCutter> cutter(
+      const Eigen::AlignedBox2d& /*axis*/, const Executor& /*executor*/) const override {
+    return cutter_;
+  }
+  [[nodiscard]] double radius() const override { return cutter_->radius(); }
+
+ private:
+  std::shared_ptr<const DropCutter> cutter_;
+};
+
+/// How finely a smooth surface is cut into facets. Where a triangle would need more than
+/// kMostSplits, as at a crease, it gets no more, and deviation() says so.
+struct SmoothCutOptions {
+  double deviation = 2e-5;        ///< Of a facet from the surface, mm, > 0.
+  double slope_deviation = 4e-3;  ///< Of a facet's slopes from the surface's, > 0.
+  /// Facets that a cutter holds at most, about: 260 bytes each.
+  std::int64_t facets_at_once = 4'000'000;
+};
+
+/// Parts of a triangle's edges at most.
+inline constexpr int kMostSplits = 48;
+
+/// The smooth surface through a mesh's vertices (SmoothSurface), as facets between points of it:
+/// every triangle in n² equal parts, n from how it bends. Facets are made for a band at a time.
+///
+/// On a triangle of second derivatives ≤ c an interpolant is off by c r²/2 at most, r being the
+/// radius of the smallest circle around it, and its slopes by c l₁ l₂ (l₃ + 4 r_in) / (4 A), l₁ ≥
+/// l₂ ≥ l₃ (Shewchuk, "What is a good linear element?", 2002). Triangles of other n beside each
+/// other leave slits no higher than that.
+class SmoothCutSurface final : public CutSurface {
+ public:
+  /// @param radius  of the ball, mm, > 0.
+  /// @pre every triangle faces +z.
+  SmoothCutSurface(const SurfaceMesh& mesh, double radius, const SmoothCutOptions& options,
+                   const Executor& executor);
+
+  [[nodiscard]] std::shared_ptr<const DropCutter> cutter(const Eigen::AlignedBox2d& axis,
+                                                         const Executor& executor) const override;
+  [[nodiscard]] double radius() const override { return radius_; }
+  [[nodiscard]] SurfaceDeviation deviation() const override { return deviation_; }
+  [[nodiscard]] double band() const override { return band_; }
+
+  /// The facets that lie in a window or touch it, in the order of the mesh's triangles.
+  [[nodiscard]] SurfaceMesh facets(const Eigen::AlignedBox2d& window,
+                                   const Executor& executor) const;
+  [[nodiscard]] const SmoothSurface& surface() const { return surface_; }
+  /// Facets of the whole surface.
+  [[nodiscard]] std::int64_t facet_count() const;
+
+ private:
+  SmoothSurface surface_;
+  double radius_;
+  std::vector<std::uint8_t> splits_;  ///< n of each triangle.
+  SurfaceDeviation deviation_;
+  double band_ = 0.0;
+};
+
+}  // namespace lensforge

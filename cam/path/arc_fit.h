@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "cam/path/row_error.h"
+#include "cam/path/row_profile.h"
+
+namespace lensforge {
+
+/// How closely moves follow a row's drop curve, and what numbers a program can hold.
+struct FitOptions {
+  double tolerance = 0.0005;      ///< Farthest from the drop curve, mm.
+  double slope_tolerance = 1e-3;  ///< Largest difference of slope over a kSlopeStretch.
+  double resolution = 1e-6;       ///< Unit of the program's last decimal, mm.
+  double z_zero = 0.0;            ///< Height that the program calls 0, mm.
+  bool arcs = false;              ///< Whether moves may be arcs of circles.
+};
+
+/// Radius of an arc at most, mm: a controller that reckons in single precision places a point of it
+/// to a tenth of a micrometre.
+inline constexpr double kLargestArc = 1000.0;
+
+struct FittedRow {
+  Eigen::Vector2d start = Eigen::Vector2d::Zero();
+  std::vector<RowMove> moves;
+};
+
+/// The value on the program's grid that is nearest to `value` mm.
+double to_resolution(double value, double resolution);
+
+/// Covers a row's drop curve with straight moves and arcs, greedily: from every end the move that
+/// reaches the farthest joint within the tolerances. Moves begin and end on the drop curve to the
+/// resolution, and hold the tolerances over their whole length (RowError) unless not even the way
+/// to the next joint does, because rounding turns it: certify_row() says what came of it.
+FittedRow fit_row(const RowProfile& profile, const FitOptions& options);
+
+/// How far straight moves between joints may be off.
+double joint_bow(const FitOptions& options);
+
+}  // namespace lensforge

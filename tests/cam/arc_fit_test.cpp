@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cam/path/arc_fit.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <vector>
+
+#include "cam/adversarial_meshes.h"
+
+namespace lensforge {
+namespace {
+
+constexpr double kRadius = 0.2;
+
+bool on_grid(double value, double resolution) {
+  const double units = value / resolution;
+  return std::abs(units - std::round(units)) < 1e-6;
+}
+
+RowProfile profile_of(const DropCutter& cutter, const FitOptions& options) {
+  return row_profile(cutter, {{0, 1.9}, 0.2, 3.8, 0.3, 3.7}, joint_bow(options));
+}
+
+FitOptions with_arcs(bool arcs) {
+  FitOptions options;
+  options.arcs = arcs;
+  return options;
+}
+
+TEST(ArcFit, HoldsItsTolerancesOnEveryMesh) {
+  for (const auto& [name, mesh] : testing::adversarial_meshes()) {
+    if (name == "soup" || name == "steps" || name == "rough noise") continue;  // Walls.
+    const DropCutter cutter(mesh, kRadius, Executor::serial());
+    for (const bool arcs : {false, true}) {
+      const FitOptions options = with_arcs(arcs);
+      const RowProfile profile = profile_of(cutter, options);
+      const FittedRow row = fit_row(profile, options);
+      const PathCertificate certificate = certify_row(profile, row.start, row.moves);
+      EXPECT_LE(certificate.gouge.value, options.tolerance) << name;
+      EXPECT_LE(certificate.excess.value, options.tolerance) << name;
+      EXPECT_LE(certificate.slope.value, 1.3 * options.slope_tolerance) << name;
+    }
+  }
+}
+
+/// Beside walls a joint is off by what the curve falls within one unit of the last decimal.
+TEST(ArcFit, HoldsTheHeightTightlyBesideWalls) {
+  for (const auto& [name, mesh] : testing::adversarial_meshes()) {
+    const DropCutter cutter(mesh, kRadius, Executor::serial());
+    const FitOptions options = with_arcs(true);
+    const RowProfile profile = profile_of(cutter, options);
+    const FittedRow row = fit_row(profile, options);
+    const PathCertificate certificate = certify_row(profile, row.start, row.moves);
+    EXPECT_LE(certificate.gouge.value, options.tolerance + 100.0 * options.resolution) << name;
+    EXPECT_LE(certificate.excess.value, options.tolerance + 100.0 * options.resolution) << name;
+  }
+}
+
+TEST(ArcFit, WritesNumbersOnTheProgramsGrid) {
+  const SurfaceMesh mesh = testing::grid_mesh(28, 31, 4.0, 4.0, testing::lens_relief);
+  const DropCutter cutter(mesh, kRadius, Executor::serial());
+  FitOptions options = with_arcs(true);
+  options.resolution = 1e-5;
+  options.slope_tolerance = 8e-3;
+  options.z_zero = 6.1234567891;
+  const FittedRow row = fit_row(profile_of(cutter, options), options);
+  Eigen::Vector2d from = row.start;
+  int arcs = 0;
+  for (const RowMove& move : row.moves) {
+    EXPECT_TRUE(on_grid(move.end.x(), options.resolution));
+    EXPECT_TRUE(on_grid(move.end.y() - options.z_zero, options.resolution));
+    if (move.arc) {
+      ++arcs;
+      EXPECT_TRUE(on_grid(move.centre.x(), options.resolution));
+      EXPECT_TRUE(on_grid(move.centre.y() - options.z_zero, options.resolution));
+      const double radius = (from - move.centre).norm();
+      EXPECT_LE(radius, 1.01 * kLargestArc);
+      // What Grbl allows is 0.005 mm.
+      EXPECT_NEAR((move.end - move.centre).norm(), radius, 2.0 * options.resolution);
+    }
+    EXPECT_GT(move.end.x(), from.x());
+    from = move.end;
+  }
+  EXPECT_GT(arcs, 0);
+}
+
+/// A cylinder of fine facets: the drop curve is a circle of radius 5 + R, and one arc an eighth
+/// round says it all.
+TEST(ArcFit, FindsTheCircleOfACylinder) {
+  const SurfaceMesh mesh = testing::grid_mesh(
+      4001, 3, 4.0, 4.0, [](double x, double) { return std::sqrt(25.0 - (x - 2.0) * (x - 2.0)); });
+  const DropCutter cutter(mesh, kRadius, Executor::serial());
+  const FitOptions options = with_arcs(true);
+  const RowProfile profile =
+      row_profile(cutter, {{0, 1.9}, 0.3, 3.7, 0.3, 3.7}, joint_bow(options));
+  const FittedRow row = fit_row(profile, options);
+  const FittedRow lines = fit_row(profile, with_arcs(false));
+  EXPECT_LE(row.moves.size(), 3U);
+  EXPECT_GT(lines.moves.size(), 50 * row.moves.size());
+  EXPECT_NEAR((row.start - row.moves[0].centre).norm(), 5.0 + kRadius, 0.01);
+  EXPECT_NEAR(row.moves[0].centre.x(), 2.0, 0.01);
+}
+
+/// A ridge of a right angle is a quarter of a circle of the ball's radius.
+TEST(ArcFit, RollsOverARidgeInOneArc) {
+  const SurfaceMesh mesh = testing::grid_mesh(
+      41, 3, 4.0, 4.0, [](double x, double) { return 5.0 - 0.8 * std::abs(x - 2.0); });
+  const DropCutter cutter(mesh, kRadius, Executor::serial());
+  const FitOptions options = with_arcs(true);
+  const FittedRow row = fit_row(profile_of(cutter, options), options);
+  const auto arc = std::find_if(row.moves.begin(), row.moves.end(), [](const RowMove& move) {
+    return move.arc && move.end.x() > 2.0 && move.end.x() < 2.2;
+  });
+  ASSERT_NE(arc, row.moves.end());
+  EXPECT_TRUE(arc->cap);
+  EXPECT_NEAR(arc->centre.x(), 2.0, 1e-3);
+  EXPECT_NEAR((arc->end - arc->centre).norm(), kRadius, 1e-3);
+}
+
+TEST(ArcFit, FollowsAPlaneInOneMove) {
+  const SurfaceMesh mesh =
+      testing::grid_mesh(33, 33, 4.0, 4.0, [](double x, double y) { return 0.2 * x + 0.1 * y; });
+  const DropCutter cutter(mesh, kRadius, Executor::serial());
+  const FitOptions options = with_arcs(true);
+  const FittedRow row =
+      fit_row(row_profile(cutter, {{0, 1.9}, 0.3, 3.7, 0.3, 3.7}, joint_bow(options)), options);
+  EXPECT_EQ(row.moves.size(), 1U);
+}
+
+}  // namespace
+}  // namespace lensforge
