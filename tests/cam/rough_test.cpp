@@ -99,7 +99,7 @@ struct Job {
 
   RoughResult rough() {
     moves.clear();
-    const RoughResult result =
+    RoughResult result =
         cut_rough({surface, workshop, stock}, Executor::serial(), into(moves), RunControl{});
     seen = simulate(moves, workshop.tool(result.summary.tool), dexels);
     return result;

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "core/surface_mesh.h"
+
+namespace lensforge {
+
+/// How a mould differs from the part that is cast from it.
+struct MouldOptions {
+  double shrinkage = 0.0;  ///< Share of its size that the cast loses, in 0 … 0.2.
+  double thickness = 5.0;  ///< Of the mould where it is thinnest, mm, > 0.
+};
+
+/// The surface to cut into a mould so that what is cast on it has the lens's optical surface: the
+/// lens turned over about its y axis onto the mould, with all lengths 1/(1 − shrinkage) as long.
+/// So it is mirrored from left to right seen from above, its valleys are the lens's ridges, and the
+/// cast, turned back, is neither mirrored nor negative.
+/// @return mm, in a lens frame of its own: from (0, 0) on, entry face z = 0, triangles
+///         counter-clockwise seen from +z; a grid stays a grid.
+/// @pre the lens's rectangle begins at (0, 0).
+/// @throw InputError naming option, value and rule.
+SurfaceMesh mould_surface(const SurfaceMesh& lens, const MouldOptions& options);
+
+}  // namespace lensforge
