@@ -86,9 +86,9 @@ double square_sum(const LeakMap& map, const CellRange& square) {
   return sum;
 }
 
-bool overlap(const CellRange& a, const CellRange& b) {
-  return a.column < b.column + b.columns && b.column < a.column + a.columns &&
-         a.row < b.row + b.rows && b.row < a.row + a.rows;
+/// Whether two squares of one size are less than their side apart.
+bool are_near(const CellRange& a, const CellRange& b) {
+  return std::abs(a.column - b.column) < 2 * a.columns && std::abs(a.row - b.row) < 2 * a.rows;
 }
 
 /// All squares of span × span map cells (fewer on a small map) with their sums, worst first.
@@ -107,13 +107,13 @@ std::vector<std::pair<double, CellRange>> ranked_squares(const LeakMap& map, std
   return squares;
 }
 
-/// Worst squares that do not overlap and that do leak.
+/// Worst squares that do leak, apart from one another.
 std::vector<CellRange> worst_squares(const LeakMap& map, const LeakPlaceOptions& options) {
   std::vector<CellRange> worst;
   for (const auto& [sum, square] : ranked_squares(map, std::max(1, options.span))) {
     if (sum <= 0.0 || std::ssize(worst) >= options.count) break;
     const auto meets = [&square = square](const CellRange& other) {
-      return overlap(square, other);
+      return are_near(square, other);
     };
     if (std::none_of(worst.begin(), worst.end(), meets)) worst.push_back(square);
   }
@@ -153,7 +153,7 @@ class PlaceStudy {
     return render_cells(*surface.field, setup_, cells, executor_, RunControl());
   }
 
-  /// Sets where the square lies, its worst cell and its largest difference of height.
+  /// Sets where the square lies, and the middle and height of its worst cell.
   void find_spot(const LeakMap& map, const CellRange& square, LeakPlace& place) const {
     const GridWindow& grid = setup_.grid;
     const std::int64_t m = map.grid_cells;
@@ -166,11 +166,9 @@ class PlaceStudy {
       const std::int64_t column = square.column + k % square.columns;
       const std::int64_t row = square.row + k / square.columns;
       const std::size_t cell = index_of(row * map.columns + column);
-      if (std::abs(map.height[cell].value) > std::abs(place.height.value)) {
-        place.height = map.height[cell];
-      }
       if (map.leakage[cell] <= most) continue;
       most = map.leakage[cell];
+      place.height = map.height[cell];
       const Eigen::Vector2d middle =
           grid.node(column * m, row * m) + 0.5 * static_cast<double>(m) * grid.spacing;
       place.place = middle.cwiseMin(grid.node(grid.columns - 1, grid.rows - 1));

@@ -53,13 +53,13 @@ struct LeakPlace {
   double leakage = 0.0;    ///< Share of the lens's flux that leaves here and lands where the design
                            ///< puts less, less what would by design.
   double dark_flux = 0.0;  ///< Of the lens's flux, into dark pixels, likewise.
-  HeightDifference height;          ///< Largest difference of height there.
+  HeightDifference height;          ///< Largest difference of height in the worst cell.
   Eigen::Vector2d lands{0.0, 0.0};  ///< Centre of that light, pixel coordinates.
   std::vector<CausePart> parts;     ///< `leakage` and `dark_flux` by cause; dark_ratio stays 0.
 };
 
-/// The places that leak most, worst first; none overlaps another. `map` gives the places, the chain
-/// the causes. @throw Interrupted as the executor does.
+/// The places that leak most, worst first, a square's side or more apart. `map` gives the places,
+/// the chain the causes. @throw Interrupted as the executor does.
 std::vector<LeakPlace> worst_places(const LeakMap& map, const LeakageChain& chain,
                                     const LeakageResult& result, const FieldRenderSetup& setup,
                                     const LeakPlaceOptions& options, const Executor& executor);

@@ -12,8 +12,8 @@ namespace {
 
 /// What the surface has there that it should not have.
 std::string fault_words(const LeakPlace& place, const std::string& cause) {
-  const std::string at = " at x " + decimal_text(place.height.place.x(), 1) + " y " +
-                         decimal_text(place.height.place.y(), 1);
+  const std::string at =
+      joined({" at x ", decimal_text(place.place.x(), 1), " y ", decimal_text(place.place.y(), 1)});
   const std::string depth = decimal_text(1e3 * std::abs(place.height.value), 1) + " µm";
   const bool left = place.height.value > 0.0;
   if (cause == leak_cause::kCrease && left) return "The groove" + at + " keeps " + depth;
@@ -56,7 +56,7 @@ std::string leak_words(const LeakPlace& place) {
   std::string words = fault_words(place, cause) + "; " + percent_text(place.leakage) +
                       " of the light leaks from here";
   if (place.dark_flux > 0.0) {
-    words += ", " + percent_text(place.dark_flux) + " of all into dark parts of the picture";
+    words += ", " + percent_text(place.dark_flux) + " into dark parts of the picture";
   }
   const std::string remedy = remedy_words(cause);
   return words + "." + (remedy.empty() ? "" : " " + remedy);

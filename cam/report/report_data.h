@@ -10,6 +10,7 @@
 #include "cam/leakage/leak_map.h"
 #include "cam/leakage/leakage.h"
 #include "cam/path/operation.h"
+#include "cam/report/path_sketch.h"
 #include "cam/report/verdict.h"
 #include "cam/tool/tool.h"
 #include "core/image.h"
@@ -82,12 +83,6 @@ struct ReportChoice {
   double mae = 0.0;
   double hours = 0.0;
   bool chosen = false;  ///< What the rest of the report is about.
-};
-
-/// A tool's path, thinned out to be looked at; mm, lens frame.
-struct ReportPath {
-  std::string operation;
-  std::vector<Eigen::Vector3f> points;
 };
 
 /// Everything that report.html and report.json say.

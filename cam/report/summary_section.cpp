@@ -44,12 +44,11 @@ std::string leakage_figure(const LeakageResult& result) {
   const FluxPicture& part = result.part().picture;
   const double top = scale_top(map);
   const ColorImage picture = scaled_picture(map, part.columns, part.rows, top);
-  const std::string note =
-      "black: none; white: " + decimal_text(top, top < 0.1 ? 3 : 2) +
-      " × the mean light or more, where the design puts less" +
-      element("span", "class=\"scale\"",
-              "0 <img src=\"" + png_uri(scale_picture()) + "\" alt=\"colour scale\"> " +
-                  decimal_text(top, top < 0.1 ? 3 : 2));
+  const std::string most = decimal_text(top, top < 0.1 ? 3 : 2);
+  const std::string bar =
+      "0 <img src=\"" + png_uri(scale_picture()) + "\" alt=\"colour scale\"> " + most;
+  const std::string note = "light where the design puts less, in units of the picture’s mean" +
+                           element("span", "class=\"scale\"", bar);
   return figure(picture, "Where light leaks to", caption("Leakage", note));
 }
 
@@ -118,11 +117,7 @@ std::string places(const ReportData& data) {
   if (data.places.empty()) return "";
   std::string items;
   for (const LeakPlace& place : data.places) {
-    items += element("li", "",
-                     element("b", "",
-                             "x " + decimal_text(place.place.x(), 1) + " y " +
-                                 decimal_text(place.place.y(), 1) + " mm") +
-                         " " + escape_html(leak_words(place)));
+    items += element("li", "", escape_html(leak_words(place)));
   }
   return element("div", "",
                  element("h3", "", "Worst places on the " + escape_html(data.part)) +

@@ -156,7 +156,7 @@ std::string operations(const ReportData& data) {
         (s.stepdown > 0.0 ? ", down " + decimal_text(s.stepdown, 2) + " mm" : std::string());
     rows.push_back({element("b", "", escape_html(s.name)), joined({"T", std::to_string(s.tool)}),
                     element("code", "", escape_html(op.file)), decimal_text(op.spindle_rpm, 0),
-                    decimal_text(op.feed, 0), step, micrometre_text(s.allowance),
+                    decimal_text(op.feed, 0), step, decimal_text(s.allowance, 3) + " mm",
                     decimal_text(1e-3 * s.cutting_length, 1) + " m", count_text(op.lines),
                     decimal_text(op.lines_per_second, 0), duration_text(op.minutes)});
   }

@@ -33,19 +33,16 @@ Verdict judge_cut(const CutFindings& findings, const CutLimits& limits) {
     verdict.checks.push_back(
         {key, name, shown.scale * *value, shown.scale * limit, shown.unit, shown.decimals});
   };
-  check("leakage", "light that lands where the design puts less", findings.leakage, limits.leakage,
-        kPercent);
-  check("dark_flux", "light in the dark parts of the picture", findings.dark_flux, limits.dark_flux,
-        kPercent);
-  check("mae_increase", "picture error (MAE) added by cutting", findings.mae_increase,
-        limits.mae_increase, {"", 1.0, 4});
+  check("leakage", "leakage", findings.leakage, limits.leakage, kPercent);
+  check("dark_flux", "light in dark parts", findings.dark_flux, limits.dark_flux, kPercent);
+  check("mae_increase", "picture error (MAE) added", findings.mae_increase, limits.mae_increase,
+        {"", 1.0, 4});
   check("gouge", "deepest gouge", findings.gouge, limits.gouge, kMicrometres);
-  check("excess", "most material left between points", findings.excess, limits.excess,
+  check("excess", "material left by the path", findings.excess, limits.excess, kMicrometres);
+  check("slope", "error of direction", findings.slope, limits.slope, {"mrad", 1e3, 2});
+  check("fillet_depth", "deepest groove not cleared", findings.fillet_depth, limits.fillet_depth,
         kMicrometres);
-  check("slope", "largest error of direction", findings.slope, limits.slope, {"mrad", 1e3, 2});
-  check("fillet_depth", "deepest groove that the ball cannot clear", findings.fillet_depth,
-        limits.fillet_depth, kMicrometres);
-  check("block_rate", "lines a second for the controller", findings.block_rate, limits.block_rate,
+  check("block_rate", "load of the controller", findings.block_rate, limits.block_rate,
         {"lines/s", 1.0, 0});
   return verdict;
 }

@@ -17,9 +17,6 @@ namespace {
 /// Vertices along a side at most: 16-bit indices reach 65,536 of them.
 constexpr int kMostNodes = 240;
 
-/// Points of a path at most, so that the page stays small.
-constexpr std::size_t kMostPoints = 60000;
-
 /// Colours that differ in lightness too, so that they read in grey and to colour-blind eyes.
 constexpr std::array<std::array<double, 3>, 5> kPathColors{{{0.00, 0.30, 0.60},
                                                             {0.85, 0.45, 0.00},
@@ -68,15 +65,21 @@ nlohmann::json surface_json(const ReportData& data) {
 
 nlohmann::json path_json(const ReportPath& path, std::size_t number) {
   Eigen::AlignedBox3f box;
-  for (const Eigen::Vector3f& point : path.points) box.extend(point);
-  const std::size_t step = (path.points.size() + kMostPoints - 1) / kMostPoints;
+  for (const auto& strip : path.strips) {
+    for (const Eigen::Vector3f& point : strip) box.extend(point);
+  }
   Quantised points;
-  for (std::size_t i = 0; i < path.points.size(); i += std::max<std::size_t>(1, step)) {
-    for (int k = 0; k < 3; ++k) points.add(path.points[i][k], box.min()[k], box.max()[k]);
+  nlohmann::json lengths = nlohmann::json::array();
+  for (const auto& strip : path.strips) {
+    lengths.push_back(strip.size());
+    for (const Eigen::Vector3f& point : strip) {
+      for (int k = 0; k < 3; ++k) points.add(point[k], box.min()[k], box.max()[k]);
+    }
   }
   return {{"color", kPathColors[number % kPathColors.size()]},
           {"low", {box.min().x(), box.min().y(), box.min().z()}},
           {"high", {box.max().x(), box.max().y(), box.max().z()}},
+          {"strips", lengths},
           {"points", points.text()}};
 }
 
@@ -100,7 +103,8 @@ std::string path_box(const ReportPath& path, std::size_t number, bool shown) {
   return element("label", "",
                  "<input type=\"checkbox\" data-path=\"" + std::to_string(number) + "\"" +
                      (shown ? " checked" : "") + "><span class=\"swatch\" style=\"color:rgb(" +
-                     rgb + ")\"></span>path of " + escape_html(path.operation));
+                     rgb + ")\"></span>path of " + escape_html(path.operation) +
+                     (path.every > 1 ? ", one pass in " + std::to_string(path.every) : ""));
 }
 
 std::string controls(const ReportData& data) {
@@ -132,7 +136,7 @@ std::string view(const ReportData& data) {
   const std::string help =
       element("p", "class=\"soft screen\"",
               "Drag to turn, wheel or two fingers to zoom, shift and drag to move. Keys: arrows "
-              "turn, + and − zoom, W A S D move, 0 resets. The path is thinned out.");
+              "turn, + and − zoom, W A S D move, 0 resets.");
   const std::string data_script =
       "<script type=\"application/json\" id=\"view-data\">" + script_json(all) + "</script>";
   return element("section", "",

@@ -4,12 +4,14 @@
 
 #include <cmath>
 #include <limits>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "cam/report/html_text.h"
 #include "cam/report/leak_words.h"
+#include "cam/report/path_sketch.h"
 #include "cam/report/report_html.h"
 #include "cam/report/report_json.h"
 #include "cam/report/verdict.h"
@@ -72,7 +74,7 @@ ReportData report_of(const std::string& text) {
   data.warnings = {text};
   data.surface = {3, 3, std::vector<float>{0, 1, 2, 1, 2, 3, 2, 3, 5}};
   data.maps = {{text, text, text, data.surface}};
-  data.path = {{text, {{0, 0, 1}, {1, 0, 2}}}};
+  data.path = {{text, {{{0, 0, 1}, {1, 0, 2}}}, 1}};
   data.choices = {{text, 0.1, 0.02, 0.01, 1.5, true}};
   return data;
 }
@@ -142,15 +144,70 @@ TEST(Report, JsonSaysTheSame) {
 
 TEST(LeakWords, SayWhatIsWrongWhereAndWhatHelps) {
   LeakPlace place;
-  place.height = {0.004, {41.2, 37.5}};
+  place.place = {41.2, 37.5};
+  place.height = {0.004, {41.21, 37.48}};
   place.leakage = 0.013;
   place.dark_flux = 0.009;
   place.parts = {{leak_cause::kPolish, 0.001, 0.0, 0.0}, {leak_cause::kCrease, 0.012, 0.0, 0.0}};
   EXPECT_EQ(main_cause(place), leak_cause::kCrease);
   EXPECT_EQ(leak_words(place),
             "The groove at x 41.2 y 37.5 keeps 4.0 µm; 1.30 % of the light leaks from here, "
-            "0.900 % of all into dark parts of the picture. The ball does not reach into the "
+            "0.900 % into dark parts of the picture. The ball does not reach into the "
             "groove: half its diameter leaves about half as much.");
+}
+
+/// Rows along x, one millimetre apart, to and fro, entered by a rapid and a plunge.
+std::vector<PathMove> zigzag(int rows) {
+  std::vector<PathMove> moves;
+  const auto go = [&moves](MoveKind kind, double x, double y, double z) {
+    PathMove move;
+    move.kind = kind;
+    move.end = {x, y, z};
+    moves.push_back(move);
+  };
+  go(MoveKind::kRapid, 0.0, 0.0, 9.0);
+  go(MoveKind::kPlunge, 0.0, 0.0, 1.0);
+  for (int row = 0; row < rows; ++row) {
+    for (int step = 0; step <= 100; ++step) {
+      const double x = 0.1 * (row % 2 == 0 ? step : 100 - step);
+      go(MoveKind::kCut, x, row, 1.0);
+    }
+  }
+  return moves;
+}
+
+TEST(PathSketch, KeepsWholePassesAndBoundsThePoints) {
+  PathSketch all("finish", 0.01, 100000);
+  PathSketch few("finish", 0.5, 500);
+  const std::vector<PathMove> moves = zigzag(301);
+  all.add(std::span(moves).first(1000));
+  all.add(std::span(moves).subspan(1000));
+  few.add(moves);
+  EXPECT_EQ(all.path().every, 1);
+  EXPECT_EQ(all.path().strips.size(), 301U);
+  const ReportPath thinned = few.path();
+  std::size_t points = 0;
+  for (const auto& strip : thinned.strips) {
+    points += strip.size();
+    // From one end of a row to the other, nowhere else.
+    EXPECT_GE(std::abs(strip.back().x() - strip.front().x()), 9.9F);
+    EXPECT_LE(std::abs(strip.back().y() - strip.front().y()), 1.0F);
+  }
+  EXPECT_LE(points, 500U);
+  EXPECT_GE(points, 200U);
+  EXPECT_GE(thinned.every, 8);
+}
+
+TEST(PathSketch, DrawsNothingWhereTheToolIsLifted) {
+  std::vector<PathMove> moves = zigzag(1);
+  const std::vector<PathMove> again = zigzag(1);
+  moves.insert(moves.end(), again.begin(), again.end());
+  PathSketch sketch("rough", 0.01);
+  sketch.add(moves);
+  const ReportPath path = sketch.path();
+  ASSERT_EQ(path.strips.size(), 2U);
+  for (const Eigen::Vector3f& point : path.strips[0]) EXPECT_LE(point.y(), 0.0F);
+  EXPECT_EQ(path.strips[1].back(), Eigen::Vector3f(10.0F, 0.0F, 1.0F));
 }
 
 TEST(Verdict, ComparesWithTheLimitsInShownUnits) {

@@ -97,7 +97,7 @@
     `attribute vec3 point; uniform mat4 view; uniform float raise;
      void main() { gl_Position = view * vec4(point.xy, point.z * raise, 1.0);
        gl_Position.z -= 0.0015 * gl_Position.w; }`,
-    `precision mediump float; uniform vec3 color; void main() { gl_FragColor = vec4(color, 1.0); }`);
+    `precision mediump float; uniform vec3 color; void main() { gl_FragColor = vec4(color, 0.55); }`);
 
   function buffer(target, values) {
     const made = gl.createBuffer();
@@ -121,7 +121,7 @@
   };
   const paths = data.paths.map((path) => {
     const points = pathPoints(path);
-    return { color: path.color, shown: true, points: buffer(gl.ARRAY_BUFFER, points), count: points.length / 3 };
+    return { color: path.color, shown: true, points: buffer(gl.ARRAY_BUFFER, points), strips: path.strips };
   });
 
   // ---- Camera ----
@@ -168,7 +168,11 @@
     gl.uniformMatrix4fv(gl.getUniformLocation(lineProgram, "view"), false, view);
     gl.uniform1f(gl.getUniformLocation(lineProgram, "raise"), raise);
     gl.uniform3f(gl.getUniformLocation(lineProgram, "color"), ...path.color);
-    gl.drawArrays(gl.LINE_STRIP, 0, path.count);
+    let first = 0;
+    for (const length of path.strips) {
+      gl.drawArrays(gl.LINE_STRIP, first, length);
+      first += length;
+    }
   }
 
   let asked = false;
@@ -181,6 +185,8 @@
     gl.clearColor(0.933, 0.945, 0.957, 1);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     gl.enable(gl.DEPTH_TEST);
+    gl.enable(gl.BLEND);
+    gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
     const view = viewMatrix();
     if (showSurface) drawSurface(view);
     for (const path of paths) if (path.shown) drawPath(path, view);
