@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cam/post/post_check.h"
+
+#include <string>
+#include <utility>
+
+#include "cam/post/post_text.h"
+#include "core/error.h"
+#include "machine/gcode/gcode_interpreter.h"
+
+namespace lensforge {
+namespace {
+
+/// Where a reference point is put while lines are tried out, mm.
+constexpr double kReferenceZ = 100.0;
+
+GcodeText text_of(const std::string& line) {
+  GcodeText text;
+  text.text = line;
+  text.line = 1;
+  return text;
+}
+
+/// A small program of the description, run line by line.
+class Trial {
+ public:
+  Trial(const PostDescription& post, const TomlFields& fields)
+      : post_(post), fields_(fields), interpreter_(post.reader, start_state()) {
+    texts_ = {{"job", "part"},   {"number", std::to_string(post.first_program_number)},
+              {"tool", "1"},     {"rpm", "23000"},
+              {"dwell", "2500"}, {"tolerance", "0.0005"}};
+    append_coordinate(texts_["safe_z"], 5, 0, post);
+    texts_["coolant"] = post.flood.empty() ? post.mist : post.flood;
+    texts_["coolant_off"] = post.coolant_off;
+  }
+
+  /// Runs the lines of a key.
+  void run(const std::string& key, const std::vector<std::string>& lines) {
+    for (const std::string& line : lines) {
+      check_placeholders(key, line);
+      if (const auto filled = fill_line(line, texts_)) run_line(key, *filled);
+    }
+  }
+
+  void require(const std::string& key, bool holds, const std::string& rule) const {
+    if (!holds) fields_.refuse(key, rule);
+  }
+
+  [[nodiscard]] const GcodeInterpreter& interpreter() const { return interpreter_; }
+
+ private:
+  static GcodeState start_state() {
+    GcodeState state;
+    state.g28 = state.g30 = Eigen::Vector3d(0.0, 0.0, kReferenceZ);
+    return state;
+  }
+
+  void check_placeholders(const std::string& key, const std::string& line) const {
+    std::size_t close = 0;
+    for (std::size_t open = line.find('{'); open != std::string::npos;
+         open = line.find('{', close)) {
+      close = line.find('}', open);
+      const bool known = close != std::string::npos &&
+                         is_placeholder(std::string_view(line).substr(open + 1, close - open - 1));
+      if (!known) fields_.refuse(key, "'" + line + "': no such placeholder");
+    }
+  }
+
+  void run_line(const std::string& key, const std::string& line) {
+    if (line.size() > post_.longest_line) {
+      fields_.refuse(key, "'" + line + "' is longer than lines.longest");
+    }
+    try {
+      for (const char c : line) {
+        const bool plain = c >= ' ' && c < '\x7f' && c != '?' && c != '!' && c != '~';
+        if (!plain) throw GcodeError(1, "characters must be printable ASCII but ? ! ~");
+      }
+      const GcodeEffect effect = interpreter_.run(parse_gcode_block(text_of(line)));
+      if (key == "spindle" && !effect.motions().empty()) {
+        throw GcodeError(1, "these lines must not move the machine");
+      }
+    } catch (const GcodeError& error) {
+      const std::string reason = error.what();
+      fields_.refuse(key, "'" + line + "': " + reason.substr(reason.find(": ") + 2));
+    }
+  }
+
+  const PostDescription& post_;
+  const TomlFields& fields_;
+  GcodeInterpreter interpreter_;
+  PlaceholderTexts texts_;
+};
+
+bool writes_as_programs_are(const GcodeState& state) {
+  return state.inches == false && state.absolute && !state.inverse_time;
+}
+
+/// Whether `word` alone on a line makes `holds` true of the state.
+template <class Holds>
+void check_word(const PostDescription& post, const TomlFields& fields, const std::string& key,
+                const std::string& word, const Holds& holds) {
+  Trial trial(post, fields);
+  trial.run(key, {word});
+  trial.require(key, holds(trial.interpreter().state()),
+                "does not do what the key says, for reader " + post.reader.name);
+}
+
+void check_plane(const PostDescription& post, const TomlFields& fields, const std::string& key,
+                 ArcPlane plane) {
+  const std::size_t normal = plane == ArcPlane::kXY ? 2 : plane == ArcPlane::kZX ? 1 : 0;
+  // From another plane than that of a reset, so that a word that does nothing is found.
+  const std::string other = plane == ArcPlane::kXY ? "G19" : "G17";
+  Trial trial(post, fields);
+  trial.run(key, {other, post.planes[normal]});
+  trial.require(key, trial.interpreter().state().plane == plane,
+                "is not the word of this plane for reader " + post.reader.name);
+}
+
+void check_motions(const PostDescription& post, const TomlFields& fields) {
+  const std::pair<const char*, MotionMode> motions[] = {
+      {"rapid", MotionMode::kRapid},
+      {"feed", MotionMode::kFeed},
+      {"clockwise", MotionMode::kArcClockwise},
+      {"counter_clockwise", MotionMode::kArcCounterClockwise}};
+  for (std::size_t i = 0; i < std::size(motions); ++i) {
+    const std::string line = i < 2 ? post.motions[i] + " X1" : post.motions[i] + " X1 I0.5";
+    Trial trial(post, fields);
+    trial.run(motions[i].first, {"G21 G17 F100", line});
+    trial.require(motions[i].first, trial.interpreter().state().motion == motions[i].second,
+                  "is not the word of this motion for reader " + post.reader.name);
+  }
+}
+
+}  // namespace
+
+void check_words(const PostDescription& post, const TomlFields& fields) {
+  check_motions(post, fields);
+  check_plane(post, fields, "plane_xy", ArcPlane::kXY);
+  check_plane(post, fields, "plane_zx", ArcPlane::kZX);
+  check_plane(post, fields, "plane_yz", ArcPlane::kYZ);
+  const auto mist = [](const GcodeState& state) { return state.mist; };
+  const auto flood = [](const GcodeState& state) { return state.flood; };
+  const auto off = [](const GcodeState& state) { return !state.mist && !state.flood; };
+  if (!post.mist.empty()) check_word(post, fields, "mist", post.mist, mist);
+  if (!post.flood.empty()) check_word(post, fields, "flood", post.flood, flood);
+  if (!post.coolant_off.empty()) check_word(post, fields, "coolant_off", post.coolant_off, off);
+}
+
+void check_program_lines(const PostDescription& post, const TomlFields& fields) {
+  Trial trial(post, fields);
+  const auto& state = trial.interpreter();
+  trial.run("head", post.head);
+  trial.run("start", post.start);
+  trial.require("start", writes_as_programs_are(state.state()),
+                "must set millimetres (G21), absolute coordinates (G90) and feed per minute (G94)");
+  for (int tool = 0; tool < 2; ++tool) {
+    trial.run("tool", post.tool);
+    trial.require("tool", !post.changes_tools() || state.state().tool == 1,
+                  "must name the tool: T{tool}");
+    trial.run("spindle", post.spindle);
+    trial.require("spindle",
+                  state.state().spindle != SpindleTurn::kOff && state.state().rpm == 23000.0,
+                  "must start the spindle at S{rpm}");
+    trial.require("tool", writes_as_programs_are(state.state()),
+                  "must leave millimetres, absolute coordinates and feed per minute in force");
+    trial.run("tool_end", post.tool_end);
+    trial.require("tool_end", state.state().spindle == SpindleTurn::kOff, "must stop the spindle");
+  }
+  trial.run("end", post.end);
+  trial.require("end", state.ended(), "must end the program (M2 or M30)");
+}
+
+}  // namespace lensforge

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "machine/gcode/gcode_dialect.h"
+
+namespace lensforge {
+
+/// How arcs are written.
+enum class ArcForm {
+  kCentre,  ///< I J K from the start point to the centre.
+  kRadius,  ///< R
+  kNone,    ///< Not at all: chords.
+};
+
+/// Which lines bear an N word.
+enum class LineNumbers {
+  kNone,
+  kOperations,  ///< The first of each operation.
+  kAll,
+};
+
+/// A dialect of G-code as data: what cam/post/linuxcnc.toml and its neighbours hold, key by key.
+struct PostDescription {
+  std::string name;
+  std::string extension;  ///< Of files, without the point.
+  GcodeDialect reader;    ///< Our own parser for such programs.
+
+  int most_decimals = 6;  ///< Of coordinates.
+  bool trailing_zeros = true;
+  bool whole_with_point = false;  ///< "500." in F.
+  int feed_decimals = 3;
+
+  std::size_t longest_line = 80;  ///< Without its end.
+  bool crlf = false;
+  bool percent = false;
+  bool spaces = true;
+  bool repeat_motion = false;
+  LineNumbers numbers = LineNumbers::kNone;
+  std::int64_t first_number = 10;
+  std::int64_t number_step = 10;
+  std::int64_t largest_number = 99990;
+  std::uintmax_t largest_file = 0;  ///< Bytes; 0 without limit.
+
+  std::string comment_open = "(";
+  std::string comment_close = ")";
+  bool upper_case_comments = false;
+
+  std::array<std::string, 4> motions{"G0", "G1", "G2", "G3"};
+  /// By the number of the axis that the plane is normal to: YZ, ZX, XY.
+  std::array<std::string, 3> planes{"G19", "G18", "G17"};
+  std::string mist;  ///< Empty where there is none; flood likewise.
+  std::string flood;
+  std::string coolant_off;
+
+  ArcForm arcs = ArcForm::kCentre;
+  bool helix = true;
+
+  // Lines with placeholders, see post_text.h.
+  std::int64_t first_program_number = 1;
+  std::vector<std::string> head;
+  std::vector<std::string> start;
+  std::vector<std::string> tool;  ///< Empty: no tool change, one file for each tool.
+  std::vector<std::string> spindle;
+  std::vector<std::string> tool_end;
+  std::vector<std::string> end;
+
+  [[nodiscard]] bool changes_tools() const { return !tool.empty(); }
+};
+
+/// Names of the descriptions that are built in: linuxcnc, grbl, fanuc.
+std::vector<std::string> builtin_posts();
+
+/// Reads a description. Its lines are tried out: what they make of a small program has to be read
+/// by the description's own reader, in millimetres, absolute, feed per minute, spindle running
+/// where it cuts and ended at the end.
+/// @param file  its name in messages.
+/// @throw InputError naming file, key, value and rule; keys that it does not know are refused.
+PostDescription parse_post(std::string_view toml, const std::string& file);
+
+/// A built-in name, or the path of a TOML file (with a slash or ending in .toml).
+/// @throw InputError naming `option` and the value if it is neither; as parse_post().
+PostDescription find_post(const std::string& name_or_path, const std::string& option);
+
+}  // namespace lensforge

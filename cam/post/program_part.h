@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "cam/post/block_writer.h"
+#include "cam/post/post_text.h"
+#include "cam/post/program_plan.h"
+#include "cam/post/program_text.h"
+
+namespace lensforge {
+
+/// What every file of a plan is written from; all must outlive what uses it.
+struct ProgramContext {
+  const ProgramPlan& plan;
+  const PostDescription& post;
+  const ProgramSettings& settings;
+};
+
+/// Where an operation begins in a file.
+struct OperationStart {
+  std::size_t operation = 0;  ///< Index in the plan.
+  std::int64_t line = 0;      ///< Counted from 1.
+};
+
+/// One file in the making: a complete program that begins with a retract to the safe height and
+/// ends there with the spindle off.
+class ProgramPart {
+ public:
+  /// Writes the header and the words that all programs begin with.
+  /// @param operations  of the plan that the file may hold, its reserved comments among them.
+  /// @param number      what {number} stands for.
+  ProgramPart(const ProgramContext& context, const std::filesystem::path& path,
+              std::vector<std::size_t> operations, std::int64_t number);
+
+  /// Changes the tool if need be and starts its spindle; the tool is at the safe height then.
+  void begin_operation(std::size_t operation);
+  /// Over the point at the safe height and down to it at the tool's plunge feed.
+  void plunge_to(const Eigen::Vector3d& point);
+  void move(const PathMove& move);
+  /// Whether the program would still be within `limit` bytes after this move and its end.
+  [[nodiscard]] bool has_room(const PathMove& move, std::uintmax_t limit) const;
+  /// Retract, spindle off, end; all is in the file then but what finish() fills in.
+  void end();
+  /// @param late  comments in place of those reserved, kLateComments and one an operation.
+  void finish(const std::vector<std::string>& late) { text_.finish(late); }
+
+  static constexpr int kLateComments = 4;
+
+  [[nodiscard]] const std::vector<std::size_t>& operations() const { return operations_; }
+  [[nodiscard]] std::span<const OperationStart> starts() const { return starts_; }
+  [[nodiscard]] const PathDigest& digest() const { return blocks_.digest(); }
+  [[nodiscard]] const ProgramText& text() const { return text_; }
+  [[nodiscard]] PendingFile& file() { return text_.file(); }
+
+ private:
+  void write_header();
+  void write_lines(const std::vector<std::string>& lines);
+  void change_tool(const Tool& tool);
+  [[nodiscard]] Eigen::Vector3d placed(const Eigen::Vector3d& point) const;
+  [[nodiscard]] std::size_t tail_bytes() const;
+
+  const ProgramContext& context_;
+  std::vector<std::size_t> operations_;
+  ProgramText text_;
+  BlockWriter blocks_;
+  PlaceholderTexts texts_;
+  std::vector<OperationStart> starts_;
+  std::optional<int> tool_;
+  double plunge_ = 0.0;
+  std::size_t tail_bytes_ = 0;
+};
+
+/// A tool in words: "T3: ball 0.4 mm, 23000 rpm, feed 500, plunge 150 mm/min".
+std::string tool_text(const Tool& tool);
+
+}  // namespace lensforge

@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cam/post/program_reader.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <fstream>
+#include <system_error>
+
+#include "core/error.h"
+#include "machine/gcode/program_seal.h"
+
+namespace lensforge {
+namespace {
+
+constexpr std::int64_t kLinesBetweenReports = 1 << 14;
+constexpr double kReferenceZ = 100.0;  ///< mm
+
+GcodeState start_state() {
+  GcodeState state;
+  state.g28 = state.g30 = Eigen::Vector3d(0.0, 0.0, kReferenceZ);
+  return state;
+}
+
+/// Length of the line as a controller would get it: compact_gcode() without making the text.
+std::size_t sent_bytes(std::string_view text) {
+  std::size_t bytes = 0;
+  bool in_brackets = false;
+  for (const char c : text) {
+    if (c == ';' && !in_brackets) break;
+    if (c == '(') in_brackets = true;
+    if (!in_brackets && c != ' ' && c != '\t' && c != '%') ++bytes;
+    if (c == ')') in_brackets = false;
+  }
+  return bytes == 0 ? 0 : bytes + 1;
+}
+
+bool goes_to_reference(const GcodeBlock& block) {
+  return std::any_of(block.words().begin(), block.words().end(), [](const GcodeWord& word) {
+    return word.letter == 'G' && (word.tenths == 280 || word.tenths == 300);
+  });
+}
+
+/// What a part is cut with has to stand in the program, not in the controller's memory.
+class Checks {
+ public:
+  void take(const ProgramLine& line) {
+    for (const GcodeMotion& motion : line.effect.motions()) {
+      if (!motion.rapid) check_cut(motion, line.state);
+    }
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if (line.block.value("XYZ"[axis])) known_[axis] = true;
+    }
+  }
+
+ private:
+  void check_cut(const GcodeMotion& motion, const GcodeState& state) const {
+    if (state.spindle == SpindleTurn::kOff || !(state.rpm > 0.0)) {
+      throw GcodeError(motion.line, "moves at feed while the spindle is off");
+    }
+    if (!(known_[0] && known_[1] && known_[2])) {
+      throw GcodeError(motion.line, "moves at feed from a place that the program has not stated");
+    }
+    if (state.inches.value_or(true)) throw GcodeError(motion.line, "is not in millimetres");
+  }
+
+  bool known_[3] = {false, false, false};
+};
+
+/// One pass through a file.
+class Walk {
+ public:
+  Walk(std::istream& in, const GcodeDialect& dialect)
+      : reader_(in), interpreter_(dialect, start_state()), longest_(dialect.max_characters) {}
+
+  void run(const LineSink& sink, const RunControl& control) {
+    while (const auto text = reader_.next()) {
+      take(*text, sink);
+      if (text->line % kLinesBetweenReports != 0) continue;
+      if (control.stop_requested()) throw Interrupted();
+    }
+    if (!interpreter_.ended()) throw GcodeError(last_line_, "the program has no end (M2 or M30)");
+  }
+
+ private:
+  void take(const GcodeText& text, const LineSink& sink) {
+    last_line_ = text.line;
+    const GcodeBlock block = parse_gcode_block(text);
+    const std::size_t bytes = sent_bytes(text.text);
+    if (bytes > longest_ + 1) interpreter_.check_length(text, 0);
+    const GcodeEffect effect = interpreter_.run(block);
+    const ProgramLine line{block, effect, interpreter_.state(), bytes};
+    checks_.take(line);
+    sink(line);
+  }
+
+  GcodeReader reader_;
+  GcodeInterpreter interpreter_;
+  Checks checks_;
+  std::size_t longest_;
+  std::int64_t last_line_ = 0;
+};
+
+}  // namespace
+
+void walk_program(const std::filesystem::path& path, const GcodeDialect& dialect,
+                  const LineSink& sink, const RunControl& control) {
+  std::ifstream file(path, std::ios::binary);
+  if (!file || std::filesystem::is_directory(path)) {
+    const int why = std::filesystem::is_directory(path) ? EISDIR : errno;
+    throw InputError(path.string() + ": cannot be read: " + std::generic_category().message(why));
+  }
+  try {
+    Walk(file, dialect).run(sink, control);
+  } catch (const GcodeError& error) {
+    throw InputError(path.string() + ": " + error.what());
+  }
+}
+
+void ReadingCollector::take(const ProgramLine& line) {
+  reading_.lines = line.block.line;
+  if (line.state.tool != 0 && line.effect.tool_change) {
+    auto& tools = reading_.tools;
+    const bool known = std::find(tools.begin(), tools.end(), line.state.tool) != tools.end();
+    if (!known) tools.push_back(line.state.tool);
+  }
+  if (line.effect.motions().empty() || goes_to_reference(line.block)) return;
+  for (const GcodeMotion& motion : line.effect.motions()) take_motion(motion);
+  if (!line.effect.motions().back().rapid) reading_.blending = line.state.blending;
+}
+
+void ReadingCollector::take_motion(const GcodeMotion& motion) {
+  ++reading_.motions;
+  if (motion.rapid) {
+    reading_.rapids.extend(motion.end);
+    reading_.rapid_length += motion.length();
+    return;
+  }
+  reading_.cutting.extend(motion.bounds());
+  reading_.cutting_length += motion.length();
+  reading_.arcs += motion.arc ? 1 : 0;
+  const bool first = reading_.most_feed == 0.0;
+  reading_.least_feed = first ? motion.feed : std::min(reading_.least_feed, motion.feed);
+  reading_.most_feed = std::max(reading_.most_feed, motion.feed);
+}
+
+ProgramReading read_program(const std::filesystem::path& path, const GcodeDialect& dialect,
+                            const MotionSink& sink, const RunControl& control) {
+  ReadingCollector collector;
+  walk_program(
+      path, dialect,
+      [&](const ProgramLine& line) {
+        collector.take(line);
+        if (line.effect.motions().empty() || goes_to_reference(line.block)) return;
+        for (const GcodeMotion& motion : line.effect.motions()) sink(motion, line.state.tool);
+      },
+      control);
+  ProgramReading reading = collector.reading();
+  reading.seal_holds = check_seal(path);
+  return reading;
+}
+
+}  // namespace lensforge

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/run_control.h"
+#include "machine/gcode/gcode_interpreter.h"
+
+namespace lensforge {
+
+/// One line of a program with what it does.
+struct ProgramLine {
+  const GcodeBlock& block;
+  const GcodeEffect& effect;
+  const GcodeState& state;  ///< After the line.
+  std::size_t bytes = 0;    ///< As sent, without blanks and comments, with its end; 0 for nothing.
+};
+
+using LineSink = std::function<void(const ProgramLine&)>;
+
+/// Hands every line of a program to `sink`, in constant memory. G28 and G30 go to Z 100 mm above
+/// X0 Y0: where they really go only the machine knows.
+/// @throw InputError naming file, line and reason for the first line that the dialect refuses, that
+///        is longer than it takes, that cuts with the spindle off or with an unknown height, and
+///        for a program without an end or with motions that are not in millimetres;
+///        Interrupted; RunError if the file cannot be read.
+void walk_program(const std::filesystem::path& path, const GcodeDialect& dialect,
+                  const LineSink& sink, const RunControl& control);
+
+/// What a whole program says; program coordinates, mm. Motions by G28 and G30 count nowhere.
+struct ProgramReading {
+  Eigen::AlignedBox3d cutting;  ///< Of all motions at feed, arcs over their whole length.
+  Eigen::AlignedBox3d rapids;   ///< Of all ends of rapids.
+  double cutting_length = 0.0;
+  double rapid_length = 0.0;
+  std::int64_t lines = 0;
+  std::int64_t motions = 0;
+  std::int64_t arcs = 0;
+  std::vector<int> tools;   ///< In the order of their first use; empty where none is named.
+  double least_feed = 0.0;  ///< mm/min; 0 without a motion at feed.
+  double most_feed = 0.0;
+  std::optional<double> blending;  ///< G64 P in force at the last motion at feed, mm.
+  std::optional<bool> seal_holds;  ///< machine/gcode/program_seal.h; nothing without a seal.
+};
+
+/// Collects a reading line by line.
+class ReadingCollector {
+ public:
+  void take(const ProgramLine& line);
+  [[nodiscard]] const ProgramReading& reading() const { return reading_; }
+
+ private:
+  void take_motion(const GcodeMotion& motion);
+
+  ProgramReading reading_;
+};
+
+/// Takes the motions of a program, one by one; `tool` is the number of the last T word, 0 without.
+using MotionSink = std::function<void(const GcodeMotion& motion, int tool)>;
+
+/// Streams all motions of a program to `sink`, in constant memory; those by G28 and G30 are left
+/// out, so that a motion may start elsewhere than where the one before it ended.
+/// @throw as walk_program()
+ProgramReading read_program(const std::filesystem::path& path, const GcodeDialect& dialect,
+                            const MotionSink& sink, const RunControl& control);
+
+}  // namespace lensforge

@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cam/post/post_description.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "cam/post_plans.h"
+#include "core/error.h"
+
+namespace lensforge {
+namespace {
+
+using lensforge::testing::message_of;
+using lensforge::testing::post_text_with;
+using lensforge::testing::TempFolder;
+using lensforge::testing::write_bytes;
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+TEST(PostDescription, ThreeAreBuiltIn) {
+  EXPECT_THAT(builtin_posts(), ElementsAre("linuxcnc", "grbl", "fanuc"));
+  for (const std::string& name : builtin_posts()) {
+    const PostDescription post = find_post(name, "--post");
+    EXPECT_EQ(post.name, name);
+    EXPECT_EQ(post.reader.name, name);
+    EXPECT_LE(post.longest_line, 80U);
+  }
+  EXPECT_FALSE(find_post("grbl", "--post").changes_tools());
+  EXPECT_TRUE(find_post("fanuc", "--post").percent);
+}
+
+TEST(PostDescription, AUsersFileIsReadByItsPath) {
+  const TempFolder folder;
+  write_bytes(folder / "mine.toml", post_text_with("name = \"linuxcnc\"", "name = \"mine\""));
+  EXPECT_EQ(find_post((folder / "mine.toml").string(), "--post").name, "mine");
+  EXPECT_THAT(message_of<InputError>([] { (void)find_post("haas", "--post"); }),
+              AllOf(StartsWith("--post: 'haas' is none of linuxcnc, grbl, fanuc"),
+                    HasSubstr(".toml file")));
+  EXPECT_THAT(message_of<InputError>([] { (void)find_post("no/such.toml", "--post"); }),
+              HasSubstr("no/such.toml: cannot be read"));
+}
+
+TEST(PostDescription, FaultsAreNamedWithFileKeyValueAndRule) {
+  struct Fault {
+    const char* from;
+    const char* to;
+    const char* message;
+  };
+  const Fault faults[] = {
+      {"format = \"lensforge.post\"", "format = \"x\"", "f.toml: format: 'x': must be one of"},
+      {"version = 1", "version = 2", "f.toml: version: 2: this program reads version 1"},
+      {"extension = \"ngc\"", "extension = \"../x\"", "extension: '../x': must be 1 to 8 letters"},
+      {"reader = \"linuxcnc\"", "reader = \"haas\"", "reader: 'haas': must be one of"},
+      {"most_decimals = 6", "most_decimals = 7", "numbers.most_decimals: 7: must be in 0 to 6"},
+      {"trailing_zeros = true", "trailing_zeros = 1", "numbers.trailing_zeros: 1: must be true"},
+      {"feed_decimals = 3", "", "numbers.feed_decimals: missing: a post description needs"},
+      {"longest = 80", "longest = 300", "lines.longest: 300: must be in 40 to 250"},
+      {"longest = 80", "width = 80", "lines.longest: missing"},
+      {"percent = false", "percent = false\ntilde = 1",
+       "lines.tilde: 1: a post description has no"},
+      {"largest_file = 0", "largest_file = 99", "lines.largest_file: 99: must be 0 or at least"},
+      {"largest_number = 99990", "largest_number = 5",
+       "lines.largest_number: 5: must not be below"},
+      {"open = \"(\"", "open = \"<\"", "comments.open: '<': must be one of"},
+      {"close = \")\"", "", "comments.close: missing: must be )"},
+      {"rapid = \"G0\"", "rapid = \"G1\"", "words.rapid: 'G1': is not the word of this motion"},
+      {"clockwise = \"G2\"", "clockwise = \"G3\"",
+       "words.clockwise: 'G3': is not the word of this"},
+      {"plane_zx = \"G18\"", "plane_zx = \"G19\"",
+       "words.plane_zx: 'G19': is not the word of this"},
+      {"plane_xy = \"G17\"", "plane_xy = \"G90\"",
+       "words.plane_xy: 'G90': is not the word of this"},
+      {"flood = \"M8\"", "flood = \"M7\"", "words.flood: 'M7': does not do what the key says"},
+      {"flood = \"M8\"", "flood = \"M88\"", "words.flood: 'M88': 'M88': M88 is not supported"},
+      {"coolant_off = \"M9\"", "", "words.coolant_off: missing: is needed"},
+      {"form = \"centre\"", "form = \"i\"", "arcs.form: 'i': must be one of"},
+      {"\"G54\"", "\"G54\", \"G77\"", "program.start: an array: 'G77': G77 is not supported"},
+      {"G21 G90 G17", "G20 G90 G17", "program.start: an array: must set millimetres"},
+      {"G21 G90 G17", "G21 G91 G17", "program.start: an array: must set millimetres"},
+      {"T{tool} M6", "T{tol} M6", "program.tool: an array: 'T{tol} M6': no such placeholder"},
+      {"T{tool} M6", "T2 M6", "program.tool: an array: must name the tool"},
+      {"T{tool} M6", "T{tool M6", "no such placeholder"},
+      {"S{rpm} M3", "S{rpm}", "program.spindle: an array: must start the spindle"},
+      {"S{rpm} M3", "S900 M3", "program.spindle: an array: must start the spindle at S{rpm}"},
+      {"S{rpm} M3", "S{rpm} M3 G0 Z9", "these lines must not move the machine"},
+      {"tool_end = [\"M5\", ", "tool_end = [", "program.tool_end: an array: must stop"},
+      {"\"{coolant_off}\", \"M2\"]", "\"{coolant_off}\"]", "program.end: an array: must end"},
+      {"head = []", "head = [\"(what?)\"]", "characters must be printable ASCII but"},
+      {"head = []", "head = [\"(\\u00e4)\"]", "characters must be printable ASCII but"},
+      {"head = []", "head = [\"(open\"]", "program.head: an array: '(open': comment without"},
+  };
+  for (const Fault& fault : faults) {
+    const std::string text = post_text_with(fault.from, fault.to);
+    EXPECT_THAT(message_of<InputError>([&] { (void)parse_post(text, "f.toml"); }),
+                AllOf(StartsWith("f.toml: "), HasSubstr(fault.message)))
+        << fault.to;
+  }
+  EXPECT_THAT(message_of<InputError>([] { (void)parse_post("x = ", "f.toml"); }),
+              HasSubstr("f.toml: line 1: not TOML"));
+}
+
+}  // namespace
+}  // namespace lensforge
