@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cam/path/collision.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "cam/contact/profile_contact.h"
+#include "cam/path/move_pieces.h"
+#include "core/decimal_text.h"
+#include "core/error.h"
+
+namespace lensforge {
+namespace {
+
+/// Parts of moves, mm: a cell of the stock map on blanks up to 200 mm.
+constexpr double kPiece = 0.1;
+
+/// A rapid move this little in the stock map's material is in air: the map overstates material
+/// beside the cutter's path by what the silhouette rises over a cell, mm.
+constexpr double kRapidMargin = 0.05;
+
+bool only_rises(const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
+  return to.z() >= from.z() && from.head<2>() == to.head<2>();
+}
+
+}  // namespace
+
+/// One part of the tool that is too low somewhere.
+struct CollisionCheck::Touch {
+  const std::string& part;
+  std::string obstacle;
+  Eigen::Vector3d place;
+  double depth;
+};
+
+std::string Collision::sentence() const {
+  return "in '" + operation + "' tool " + std::to_string(tool) + " (" + part + ") touches " +
+         obstacle + " in " + std::to_string(moves) + (moves == 1 ? " move" : " moves") +
+         ", first at x " + decimal_text(first_place.x(), 1) + " y " +
+         decimal_text(first_place.y(), 1) + ", by " + decimal_text(worst.value, 2) +
+         " mm at most, at x " + decimal_text(worst.place.x(), 1) + " y " +
+         decimal_text(worst.place.y(), 1);
+}
+
+CollisionCheck::CollisionCheck(const ProfileCutter& surface, const Workshop& workshop,
+                               StockMap stock)
+    : surface_(surface), workshop_(workshop), stock_(std::move(stock)) {}
+
+void CollisionCheck::begin(const std::string& operation, const Tool& tool) {
+  operation_ = operation;
+  tool_ = &tool;
+  placed_ = false;
+  move_ = 0;
+  highest_ = stock_.highest();
+  parts_ = {{cutting_profile(tool), "cutter"}};
+  for (const CutterProfile& profile : shank_profiles(tool)) {
+    const bool flutes = parts_.size() == 1;
+    parts_.push_back(
+        {profile, flutes ? "tool above its flutes"
+                         : "section of " + decimal_text(2.0 * profile.radius, 1) + " mm"});
+  }
+  last_move_.assign(collisions_.size(), -1);
+}
+
+void CollisionCheck::check(std::span<const PathMove> moves) {
+  LF_CHECK(tool_ != nullptr, "begin() first");
+  for (const PathMove& move : moves) {
+    if (!placed_) at_ = move.end;
+    placed_ = true;
+    check_boxes(move);
+    check_material(move);
+    at_ = move.end;
+    ++move_;
+  }
+}
+
+void CollisionCheck::check_boxes(const PathMove& move) {
+  for (const KeepOut& box : workshop_.keep_outs) {
+    const Eigen::AlignedBox3d body(box.low, box.high);
+    split_move(at_, move, kPiece, [&](const MovePiece& piece) {
+      if (piece.lowest >= box.high.z()) return;
+      for (const Part& part : parts_) {
+        const CutterProfile swept = widened(part.profile, piece.reach);
+        const double depth = profile_box_tip(swept, piece.middle(), body) - piece.lowest;
+        if (depth > 0.0) note({part.name, "the keep-out box '" + box.name + "'", piece.to, depth});
+      }
+    });
+  }
+}
+
+/// Parts that are above all material take no search; the cutter is asked about in rapid moves.
+void CollisionCheck::check_material(const PathMove& move) {
+  const bool rapid = move.kind == MoveKind::kRapid;
+  if (rapid && only_rises(at_, move.end)) return;
+  split_move(at_, move, kPiece, [&](const MovePiece& piece) {
+    for (std::size_t i = rapid ? 0 : 1; i < parts_.size(); ++i) {
+      const CutterProfile& profile = parts_[i].profile;
+      const double margin = i == 0 ? kRapidMargin : 0.0;
+      const double lowest = piece.lowest + margin;
+      if (lowest + profile.base >= highest_) continue;
+      const double depth = stock_.drop(widened(profile, piece.reach), piece.middle()) - lowest;
+      if (depth <= 0.0) continue;
+      note({parts_[i].name, material_at(profile, piece.middle(), piece.lowest), piece.to, depth});
+    }
+    if (!rapid) (void)stock_.cut(parts_[0].profile, piece.from, piece.to);
+  });
+}
+
+std::string CollisionCheck::material_at(const CutterProfile& profile, const Eigen::Vector2d& p,
+                                        double lowest) const {
+  return surface_.drop(profile, p).tip > lowest ? "the lens" : "the blank";
+}
+
+void CollisionCheck::note(const Touch& touch) {
+  const auto same = [&](const Collision& other) {
+    return other.operation == operation_ && other.tool == tool_->number &&
+           other.part == touch.part && other.obstacle == touch.obstacle;
+  };
+  auto found = std::find_if(collisions_.begin(), collisions_.end(), same);
+  if (found == collisions_.end()) {
+    Collision first;
+    first.operation = operation_;
+    first.tool = tool_->number;
+    first.part = touch.part;
+    first.obstacle = touch.obstacle;
+    first.first_move = move_;
+    first.first_place = touch.place;
+    collisions_.push_back(first);
+    last_move_.push_back(-1);
+    found = collisions_.end() - 1;
+  }
+  std::int64_t& last = last_move_[static_cast<std::size_t>(found - collisions_.begin())];
+  if (last != move_) ++found->moves;
+  last = move_;
+  if (touch.depth > found->worst.value) found->worst = {touch.depth, touch.place};
+}
+
+}  // namespace lensforge
