@@ -24,6 +24,9 @@ constexpr double kStretchPerRadius = 0.3;
 /// other within R · 1e-6 of it.
 constexpr double kSteepEdge = 1e-6;
 
+/// How much, mm or mm², quick looks at where an edge or corner is touched leave to rounding.
+constexpr double kTouchMargin = 1e-9;
+
 /// A facet's line is trusted from this length on, mm; shorter, its edges stand for it.
 constexpr double kShortestFacet = 1e-10;
 
@@ -36,30 +39,34 @@ struct Stretch {
   [[nodiscard]] double v(const Eigen::Vector2d& p) const { return p[1 - line.along]; }
 };
 
-/// Where c0 + c1·(u − origin) ≥ −margin narrows from … to.
-void clip(double at_from, double at_to, double margin, double& from, double& to) {
-  const double low = at_from + margin;
-  const double high = at_to + margin;
-  if (low >= 0.0 && high >= 0.0) return;
-  if (low < 0.0 && high < 0.0) {
-    to = from - 1.0;
-    return;
-  }
-  const double width = to - from;
-  const double zero = from + width * (low / (low - high));
-  (low < 0.0 ? from : to) = zero;
+/// Where the ball touches a facet's plane with its axis at both ends of a stretch; linear between.
+struct PlaneContact {
+  std::array<double, 3> from{};  ///< Barycentric.
+  std::array<double, 3> to{};
+};
+
+PlaneContact plane_contact(const FacetContact& facet, const Stretch& stretch) {
+  const Barycentric a = contact_point(facet, stretch.line.at(stretch.from));
+  const Barycentric b = contact_point(facet, stretch.line.at(stretch.to));
+  return {{a.a, a.b, a.c}, {b.a, b.b, b.c}};
 }
 
-/// The stretch on which the tangent contact lies inside the facet.
-bool facet_reach(const FacetContact& facet, const Stretch& stretch, double& from, double& to) {
-  for (int k = 0; k < 3 && to >= from; ++k) {
-    const Barycentric a = contact_point(facet, stretch.line.at(from));
-    const Barycentric b = contact_point(facet, stretch.line.at(to));
-    const double at_from = k == 0 ? a.a : k == 1 ? a.b : a.c;
-    const double at_to = k == 0 ? b.a : k == 1 ? b.b : b.c;
-    clip(at_from, at_to, kFacetMargin, from, to);
+/// Narrows begin … end to where the tangent contact lies inside the facet.
+bool clip_to_facet(const PlaneContact& contact, CurvePiece& piece) {
+  double low = 0.0;
+  double high = 1.0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const double from = contact.from[k] + kFacetMargin;
+    const double to = contact.to[k] + kFacetMargin;
+    if (from < 0.0 && to < 0.0) return false;
+    if (from < 0.0) low = std::max(low, from / (from - to));
+    if (to < 0.0) high = std::min(high, from / (from - to));
   }
-  return to - from > kShortestFacet;
+  const double begin = piece.begin;
+  const double width = piece.end - piece.begin;
+  if (low > 0.0) piece.begin = begin + low * width;
+  if (high < 1.0) piece.end = begin + high * width;
+  return piece.end - piece.begin > kShortestFacet;
 }
 
 void offer_facet(const Contender& contender, const Stretch& stretch, CurveEnvelope& envelope) {
@@ -68,7 +75,7 @@ void offer_facet(const Contender& contender, const Stretch& stretch, CurveEnvelo
   CurvePiece piece;
   piece.begin = stretch.from;
   piece.end = stretch.to;
-  if (!facet_reach(facet, stretch, piece.begin, piece.end)) return;
+  if (!clip_to_facet(plane_contact(facet, stretch), piece)) return;
   piece.feature = std::int64_t{8} * contender.triangle;
   if (facet.shape == FacetShape::kRegular) {
     piece.u0 = stretch.u(facet.origin);
@@ -102,8 +109,27 @@ bool clip_arc(CurvePiece& piece) {
   return piece.end > piece.begin;
 }
 
-void offer_vertex(const Eigen::Vector3d& q, std::int64_t feature, const Stretch& stretch,
-                  CurveEnvelope& envelope) {
+/// Whether a ball on the stretch can rest on corner q of a triangle whose corner `other` is
+/// another: from q the edge there must lead away from the ball's centre, (p − q, √(R² − |p − q|²))
+/// · (other − q) ≤ 0.
+bool may_rest_on(const Eigen::Vector3d& q, const Eigen::Vector3d& other, const CurvePiece& arc,
+                 const Stretch& stretch) {
+  const Eigen::Vector3d way = other - q;
+  const double from = arc.begin - arc.u0;
+  const double to = arc.end - arc.u0;
+  const double low = std::sqrt(std::max(arc.rho2 - std::max(from * from, to * to), 0.0));
+  const double nearest = std::clamp(0.0, from, to);
+  const double high = std::sqrt(std::max(arc.rho2 - nearest * nearest, 0.0));
+  const double along = stretch.u(way.head<2>());
+  const double across = stretch.v(way.head<2>()) * (stretch.line.across - stretch.v(q.head<2>()));
+  const double least =
+      std::min(along * from, along * to) + across + std::min(way.z() * low, way.z() * high);
+  return least <= kTouchMargin;
+}
+
+void offer_vertex(const Eigen::Matrix3d& corners, int k, std::int64_t feature,
+                  const Stretch& stretch, CurveEnvelope& envelope) {
+  const Eigen::Vector3d q = corners.col(k);
   const double off = stretch.line.across - stretch.v(q.head<2>());
   CurvePiece piece{stretch.from, stretch.to};
   piece.rho2 = stretch.radius * stretch.radius - off * off;
@@ -113,7 +139,10 @@ void offer_vertex(const Eigen::Vector3d& q, std::int64_t feature, const Stretch&
   piece.bow = 1.0;
   piece.rate = 1.0;
   piece.feature = feature;
-  if (clip_arc(piece)) envelope.insert(piece);
+  if (!clip_arc(piece)) return;
+  if (!may_rest_on(q, corners.col((k + 1) % 3), piece, stretch)) return;
+  if (!may_rest_on(q, corners.col((k + 2) % 3), piece, stretch)) return;
+  envelope.insert(piece);
 }
 
 /// An edge as the ball sees it from the line.
@@ -131,6 +160,22 @@ struct Edge {
     return e_u * t + e_v * v_top + k * std::sqrt(std::max(radius * radius - d * d, 0.0));
   }
 };
+
+/// Whether a ball on the piece can touch the edge between its ends, at a quick look.
+bool may_touch(const Edge& edge) {
+  const CurvePiece& piece = edge.piece;
+  const double d_from = piece.offset + piece.rate * (piece.begin - piece.u0);
+  const double d_to = piece.offset + piece.rate * (piece.end - piece.u0);
+  const double farthest = std::max(d_from * d_from, d_to * d_to);
+  const double nearest = d_from * d_to <= 0.0 ? 0.0 : std::min(d_from * d_from, d_to * d_to);
+  const double low = edge.k * std::sqrt(std::max(piece.rho2 - nearest, 0.0));
+  const double high = edge.k * std::sqrt(std::max(piece.rho2 - farthest, 0.0));
+  const double rest = edge.e_v * edge.v_top;
+  const double s_from = edge.e_u * (piece.begin - piece.u0) + rest;
+  const double s_to = edge.e_u * (piece.end - piece.u0) + rest;
+  return std::max(s_from, s_to) + high >= -kTouchMargin &&
+         std::min(s_from, s_to) + low <= edge.run + kTouchMargin;
+}
 
 Edge make_edge(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Stretch& stretch) {
   const bool a_on_top = a.z() > b.z() || (a.z() == b.z() && a.x() > b.x());
@@ -177,7 +222,7 @@ void offer_edge(const Eigen::Vector3d& a, const Eigen::Vector3d& b, std::int64_t
   Edge edge = make_edge(a, b, stretch);
   if (edge.run == 0.0) return;
   edge.piece.feature = feature;
-  if (!clip_arc(edge.piece)) return;
+  if (!clip_arc(edge.piece) || !may_touch(edge)) return;
   std::vector<double> places{edge.piece.begin, edge.piece.end};
   add_crossings(edge, 0.0, stretch.radius, places);
   add_crossings(edge, edge.run, stretch.radius, places);
@@ -199,10 +244,12 @@ void offer_edge(const Eigen::Vector3d& a, const Eigen::Vector3d& b, std::int64_t
 ContactFeatures boundary_in_play(const Contender& contender, const Stretch& stretch) {
   const FacetContact& facet = *contender.facet;
   if (facet.shape != FacetShape::kRegular) return contender.features;
-  const Barycentric from = contact_point(facet, stretch.line.at(stretch.from));
-  const Barycentric to = contact_point(facet, stretch.line.at(stretch.to));
-  const std::array<double, 3> across{std::min(from.c, to.c), std::min(from.a, to.a),
-                                     std::min(from.b, to.b)};
+  const PlaneContact contact = plane_contact(facet, stretch);
+  std::array<double, 3> across{};
+  for (std::size_t k = 0; k < 3; ++k) {
+    const std::size_t corner = (k + 2) % 3;
+    across[k] = std::min(contact.from[corner], contact.to[corner]);
+  }
   ContactFeatures features = contender.features;
   for (int k = 0; k < 3; ++k) {
     if (across[static_cast<std::size_t>(k)] >= 0.0) {
@@ -223,7 +270,7 @@ void offer_boundary(const Contender& contender, const Stretch& stretch, CurveEnv
   }
   for (int k = 0; k < 3; ++k) {
     if ((features & corner_bit(k)) == 0) continue;
-    offer_vertex(corners.col(k), first + 4 + k, stretch, envelope);
+    offer_vertex(corners, k, first + 4 + k, stretch, envelope);
   }
 }
 

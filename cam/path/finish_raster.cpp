@@ -7,9 +7,6 @@
 #include <numbers>
 #include <string>
 
-#include "core/decimal_text.h"
-#include "core/error.h"
-
 namespace lensforge {
 namespace {
 
@@ -68,14 +65,6 @@ std::vector<PathMove> in_space(const FittedRow& fitted, const RowFrame& frame, b
   return moves;
 }
 
-/// Arcs of rows turn by less than half a circle.
-double length_of(const Eigen::Vector3d& start, const PathMove& move) {
-  const double chord = (move.end - start).norm();
-  if (move.arc_axis < 0) return chord;
-  const double radius = (start - move.centre).norm();
-  return 2.0 * radius * std::asin(std::min(0.5 * chord / radius, 1.0));
-}
-
 std::int64_t rows_at_once(const CutSurface& surface, const RasterPlan& plan) {
   const double rows = std::floor(surface.band() / plan.pitch) + 1.0;
   return static_cast<std::int64_t>(std::clamp(rows, 1.0, static_cast<double>(kBatchRows)));
@@ -97,7 +86,7 @@ void add_row(const RasterRow& row, Eigen::Vector3d& last, RasterSummary& summary
   summary.tip.extend(row.start);
   last = row.start;
   for (const PathMove& move : row.moves) {
-    summary.length += length_of(last, move);
+    summary.length += row_move_length(last, move);
     summary.tip.extend(move.end);
     summary.arcs += move.arc_axis >= 0 ? 1 : 0;
     last = move.end;
@@ -112,13 +101,15 @@ void add_row(const RasterRow& row, Eigen::Vector3d& last, RasterSummary& summary
 
 }  // namespace
 
-double pitch_for_scallop(double radius, double scallop, double steepest) {
-  if (!(scallop > 0.0 && scallop < radius)) {
-    throw InputError("scallop: " + decimal_text(scallop, 6) +
-                     " mm; it has to be above 0 and below the ball's radius");
-  }
-  const double along = 2.0 * std::sqrt(2.0 * radius * scallop - scallop * scallop);
-  return along / std::sqrt(1.0 + steepest * steepest);
+double row_move_length(const Eigen::Vector3d& start, const PathMove& move) {
+  const double chord = (move.end - start).norm();
+  if (move.arc_axis < 0) return chord;
+  const double radius = (start - move.centre).norm();
+  return 2.0 * radius * std::asin(std::min(0.5 * chord / radius, 1.0));
+}
+
+double pitch_on_slope(double pitch, double steepest) {
+  return pitch / std::sqrt(1.0 + steepest * steepest);
 }
 
 int decimals_for(double tolerance, double slope_tolerance) {
@@ -158,12 +149,12 @@ RowSpan RasterPlan::row_span(std::int64_t row) const {
 /// Rows are cut in the order of ascending y (or x): what is left lies at +y, on the right of a tool
 /// that moves towards −x, or at +x, on the right of one that moves towards +y.
 bool RasterPlan::forward(std::int64_t row) const {
-  switch (options.order) {
-    case RasterOrder::kClimb:
+  switch (options.style) {
+    case PassStyle::kClimb:
       return options.along == 1;
-    case RasterOrder::kConventional:
+    case PassStyle::kConventional:
       return options.along == 0;
-    case RasterOrder::kZigZag:
+    case PassStyle::kZigzag:
       break;
   }
   return row % 2 == 0;

@@ -12,18 +12,11 @@
 #include "cam/path/move.h"
 #include "cam/path/operation.h"
 #include "cam/path/row_profile.h"
+#include "cam/tool/process.h"
 #include "core/executor.h"
 #include "core/run_control.h"
 
 namespace lensforge {
-
-/// In which sense rows are cut. A spindle that turns clockwise, as they do, has the material that
-/// is left on its right when it climbs.
-enum class RasterOrder : std::uint8_t {
-  kZigZag,        ///< To and fro, always at feed.
-  kClimb,         ///< One way; back through the air above the row just cut.
-  kConventional,  ///< The other way.
-};
 
 /// What shapes a finishing raster but the surface and the ball.
 struct RasterOptions {
@@ -33,14 +26,13 @@ struct RasterOptions {
   double resolution = 1e-6;       ///< Unit of the program's last decimal, mm, > 0.
   double z_zero = 0.0;            ///< Height that the program calls 0, mm, lens frame.
   int along = 0;                  ///< 0: rows along x; 1: along y.
-  RasterOrder order = RasterOrder::kZigZag;
+  PassStyle style = PassStyle::kZigzag;
   bool arcs = false;  ///< Arcs in the rows' planes, G18 along x and G19 along y.
 };
 
-/// Stepover at which a ball leaves scallops of this height, mm, square to a surface that rises
-/// across the rows by `steepest` (rise over run): 2 √(2Rh − h²) along it.
-/// @throw InputError unless 0 < scallop < radius.
-double pitch_for_scallop(double radius, double scallop, double steepest);
+/// Stepover of rows that lie `pitch` apart along a surface that rises across them by `steepest`
+/// (rise over run): what keeps finish_pitch()'s scallop there, too.
+double pitch_on_slope(double pitch, double steepest);
 
 /// Decimals from 4 to 6, the least whose rounding turns a kSlopeStretch by no more than a quarter
 /// of the slope tolerance and moves a point by no more than a quarter of the tolerance.
@@ -90,6 +82,9 @@ struct RasterRow {
     return moves.empty() ? start : moves.back().end;
   }
 };
+
+/// Length of a straight move or of an arc of less than half a circle, mm.
+double row_move_length(const Eigen::Vector3d& start, const PathMove& move);
 
 /// Cuts one row (fit_row()).
 /// @throw InputError if there is nothing under the ball somewhere on the row.

@@ -87,15 +87,15 @@ TEST(FinishRaster, ZigZagsAndTurnsAroundOutsideTheRim) {
 /// Climbing, a spindle that turns clockwise has the rows still to come on its right.
 TEST(FinishRaster, OneWayRowsKeepTheMaterialOnOneSide) {
   for (const int along : {0, 1}) {
-    for (const RasterOrder order : {RasterOrder::kClimb, RasterOrder::kConventional}) {
+    for (const PassStyle style : {PassStyle::kClimb, PassStyle::kConventional}) {
       RasterOptions options;
       options.along = along;
-      options.order = order;
+      options.style = style;
       const RasterPlan plan = plan_finish_raster(square(kSide), kRadius, options);
       Eigen::Vector2d way = Eigen::Vector2d::Unit(along) * (plan.forward(0) ? 1.0 : -1.0);
       const Eigen::Vector2d right(way.y(), -way.x());
       const Eigen::Vector2d ahead = Eigen::Vector2d::Unit(1 - along);
-      EXPECT_EQ(right.dot(ahead) > 0.0, order == RasterOrder::kClimb);
+      EXPECT_EQ(right.dot(ahead) > 0.0, style == PassStyle::kClimb);
       EXPECT_EQ(plan.forward(0), plan.forward(1));
     }
   }
@@ -254,13 +254,13 @@ TEST(FinishRaster, StopsWithinABatch) {
   EXPECT_LT(summary.rows, plan.rows);
 }
 
-TEST(FinishRaster, PitchForAScallopLeavesThatScallop) {
-  const double pitch = pitch_for_scallop(kRadius, 0.002, 0.0);
+TEST(FinishRaster, PitchForAScallopLeavesThatScallopOnSlopes) {
+  FinishProcess process;
+  process.scallop = 0.002;
+  const double pitch = finish_pitch(process, kRadius);
   EXPECT_NEAR(kRadius - std::sqrt(kRadius * kRadius - 0.25 * pitch * pitch), 0.002, 1e-15);
   // On a slope of 1 the distance along the surface is √2 times that of the rows.
-  EXPECT_NEAR(pitch_for_scallop(kRadius, 0.002, 1.0) * std::sqrt(2.0), pitch, 1e-15);
-  EXPECT_THROW(pitch_for_scallop(kRadius, 0.2, 0.0), InputError);
-  EXPECT_THROW(pitch_for_scallop(kRadius, 0.0, 0.0), InputError);
+  EXPECT_NEAR(pitch_on_slope(pitch, 1.0) * std::sqrt(2.0), pitch, 1e-15);
 }
 
 TEST(FinishRaster, DecimalsFollowFromTheTolerances) {
