@@ -81,11 +81,15 @@ class Renderer {
     LF_CHECK(surface.field != nullptr, surface.name);
     const double before = rendered_++;
     const auto known = pictures_.find(surface.field);
-    if (known != pictures_.end()) return known->second;
+    if (known != pictures_.end() && !surface.grid) return known->second;
     const RunControl part(control_.stop_token(), [&](const Progress& p) {
       control_.report({"render surfaces", before + p.done / p.total, surfaces_, surface.name});
     });
-    return pictures_[surface.field] = render_field(*surface.field, setup_, executor_, part);
+    FieldRenderSetup setup = setup_;
+    if (surface.grid) setup.grid = *surface.grid;
+    FluxPicture picture = render_field(*surface.field, setup, executor_, part);
+    if (!surface.grid) pictures_[surface.field] = picture;
+    return picture;
   }
 
  private:

@@ -28,9 +28,14 @@ void check(const Eigen::Vector2d& size, double spacing) {
 }  // namespace
 
 GridWindow lens_grid(const Eigen::Vector2d& size, double spacing) {
-  check(size, spacing);
-  const auto cells = [&](double side) {
-    return std::max<std::int64_t>(1, std::llround(std::ceil(side / spacing * (1.0 - 1e-12))));
+  return lens_grid(size, Eigen::Vector2d::Constant(spacing));
+}
+
+GridWindow lens_grid(const Eigen::Vector2d& size, const Eigen::Vector2d& spacing) {
+  check(size, spacing.x());
+  check(size, spacing.y());
+  const auto cells = [](double side, double step) {
+    return std::max<std::int64_t>(1, std::llround(std::ceil(side / step * (1.0 - 1e-12))));
   };
   const auto spacing_of = [](double side, std::int64_t nodes) {
     const auto count = static_cast<double>(nodes - 1);
@@ -38,8 +43,8 @@ GridWindow lens_grid(const Eigen::Vector2d& size, double spacing) {
     return even * count > side ? std::nextafter(even, 0.0) : even;
   };
   GridWindow grid;
-  grid.columns = cells(size.x()) + 1;
-  grid.rows = cells(size.y()) + 1;
+  grid.columns = cells(size.x(), spacing.x()) + 1;
+  grid.rows = cells(size.y(), spacing.y()) + 1;
   grid.spacing = {spacing_of(size.x(), grid.columns), spacing_of(size.y(), grid.rows)};
   return grid;
 }

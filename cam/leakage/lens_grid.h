@@ -15,6 +15,9 @@ namespace lensforge {
 /// up.
 GridWindow lens_grid(const Eigen::Vector2d& size, double spacing);
 
+/// The same with a spacing of its own along x and y.
+GridWindow lens_grid(const Eigen::Vector2d& size, const Eigen::Vector2d& spacing);
+
 /// A rectangle of cells of a grid; cell (i, j) lies between nodes (i, j) and (i + 1, j + 1).
 struct CellRange {
   std::int64_t column = 0;
