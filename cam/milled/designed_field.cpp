@@ -76,10 +76,13 @@ struct NodeBlock {
   std::int64_t column, column_end, row, row_end;
 };
 
+/// Finds the facet of every node of a block and asks `surface(facet, triangle, q)` for the point.
+template <class Surface>
 class BlockFiller {
  public:
-  BlockFiller(const FacetGrid& grid, const NodeBlock& block, SurfacePatch& patch)
-      : grid_(grid), block_(block), patch_(patch) {}
+  BlockFiller(const FacetGrid& grid, const Surface& surface, const NodeBlock& block,
+              SurfacePatch& patch)
+      : grid_(grid), surface_(surface), block_(block), patch_(patch) {}
 
   void fill() {
     const GridWindow& window = patch_.window;
@@ -104,9 +107,10 @@ class BlockFiller {
 
   void put(const Facet& facet, std::int32_t triangle, std::int64_t i, std::int64_t j) {
     const std::size_t n = node(i, j);
-    patch_.z[n] = facet.height(patch_.window.x(i), patch_.window.y(j));
-    patch_.slope_x[n] = facet.slope.x();
-    patch_.slope_y[n] = facet.slope.y();
+    const SurfacePoint point = surface_(facet, triangle, patch_.window.node(i, j));
+    patch_.z[n] = point.z;
+    patch_.slope_x[n] = point.slope.x();
+    patch_.slope_y[n] = point.slope.y();
     patch_.cut[n] = triangle;
   }
 
@@ -144,27 +148,56 @@ class BlockFiller {
   }
 
   const FacetGrid& grid_;
+  const Surface& surface_;
   NodeBlock block_;
   SurfacePatch& patch_;
 };
 
-}  // namespace
-
-void FacetField::sample(const GridWindow& window, const Executor& executor,
-                        SurfacePatch& patch) const {
-  resize_patch(window, true, patch);
+template <class Surface>
+void fill_window(const FacetGrid& grid, const Surface& surface, const Executor& executor,
+                 SurfacePatch& patch) {
+  const GridWindow& window = patch.window;
   const std::int64_t across = (window.columns + kBlockSide - 1) / kBlockSide;
   const std::int64_t blocks = across * ((window.rows + kBlockSide - 1) / kBlockSide);
   const auto fill = [&](std::int64_t b) {
     const std::int64_t column = b % across * kBlockSide;
     const std::int64_t row = b / across * kBlockSide;
-    BlockFiller(grid_,
+    BlockFiller(grid, surface,
                 {column, std::min(window.columns, column + kBlockSide), row,
                  std::min(window.rows, row + kBlockSide)},
                 patch)
         .fill();
   };
   parallel_for(executor, "designed surface", blocks, fill, 1);
+}
+
+}  // namespace
+
+void FacetField::sample(const GridWindow& window, const Executor& executor,
+                        SurfacePatch& patch) const {
+  resize_patch(window, true, patch);
+  const auto point = [](const Facet& facet, std::int32_t /*triangle*/, const Eigen::Vector2d& q) {
+    return SurfacePoint{facet.height(q.x(), q.y()), facet.slope};
+  };
+  fill_window(grid_, point, executor, patch);
+}
+
+void SmoothField::sample(const GridWindow& window, const Executor& executor,
+                         SurfacePatch& patch) const {
+  resize_patch(window, true, patch);
+  const auto point = [this](const Facet& facet, std::int32_t triangle, const Eigen::Vector2d& q) {
+    Eigen::Vector3d weights = facet.barycentric(q.x(), q.y()).cwiseMax(0.0);
+    weights /= weights.sum();
+    Eigen::Vector2d at(0.0, 0.0);
+    for (int k = 0; k < 3; ++k) {
+      at += weights[k] * surface_.mesh().corner(triangle, k).head<2>();
+    }
+    SurfacePoint found = surface_.in_triangle(triangle, weights);
+    found.z += found.slope.dot(q - at);
+    return found;
+  };
+  fill_window(grid_, point, executor, patch);
+  patch.cut.clear();
 }
 
 }  // namespace lensforge

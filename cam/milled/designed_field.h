@@ -3,6 +3,7 @@
 
 #include "cam/milled/facet_grid.h"
 #include "cam/milled/surface_field.h"
+#include "core/smooth_surface.h"
 #include "core/surface_mesh.h"
 
 namespace lensforge {
@@ -21,6 +22,22 @@ class FacetField final : public SurfaceField {
   [[nodiscard]] const FacetGrid& grid() const { return grid_; }
 
  private:
+  FacetGrid grid_;
+};
+
+/// The smooth surface through a mesh's vertices; no pieces. Nodes beside the mesh, up to
+/// FacetGrid::kRim, lie on the tangent plane of the rim.
+class SmoothField final : public SurfaceField {
+ public:
+  /// @param surface  must outlive the field.
+  explicit SmoothField(const SmoothSurface& surface) : surface_(surface), grid_(surface.mesh()) {}
+
+  /// @throw InputError naming a node that is farther than that from the mesh.
+  void sample(const GridWindow& window, const Executor& executor,
+              SurfacePatch& patch) const override;
+
+ private:
+  const SmoothSurface& surface_;
   FacetGrid grid_;
 };
 

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <Eigen/Geometry>
 #include <cstdint>
 #include <optional>
+#include <utility>
 #include <vector>
 
+#include "cam/contact/cut_surface.h"
 #include "cam/contact/drop_cutter.h"
 #include "cam/milled/designed_field.h"
 #include "cam/milled/facet_reach.h"
@@ -35,9 +38,14 @@ class RoundedField final : public SurfaceField {
   /// `designed`.
   RoundedField(const FacetField& designed, const DropCutter& cutter, const Executor& executor);
 
-  /// Rounds any surface, of which the mesh of `cutter` is an approximation within `error`, mm:
-  /// fillets follow the mesh, everything else the surface. Both must outlive the field.
-  RoundedField(const SurfaceField& designed, const DropCutter& cutter, double error);
+  /// Rounds any surface, of which the facets of `cut` are an approximation; fillets follow those,
+  /// everything else the surface. Facets are made for a square of kPatch at a time. Both must
+  /// outlive the field.
+  /// @param error  how far those facets may lie from the surface, mm: a ball that cuts no deeper
+  ///               into them does not count as held.
+  RoundedField(const SurfaceField& designed, const CutSurface& cut, double error);
+
+  static constexpr double kPatch = 10.0;  ///< mm
 
   void sample(const GridWindow& window, const Executor& executor,
               SurfacePatch& patch) const override;
@@ -47,10 +55,23 @@ class RoundedField final : public SurfaceField {
               CreasePatch& creases) const;
 
  private:
+  /// Nodes of a window: columns and rows [first, second).
+  struct Range {
+    std::pair<std::int64_t, std::int64_t> columns;
+    std::pair<std::int64_t, std::int64_t> rows;
+  };
+
+  void round_facets_of(const Range& range, const Eigen::AlignedBox2d& box, const Executor& executor,
+                       SurfacePatch& patch, CreasePatch& creases) const;
+  void round(const LowestBallSearch& search, const Range& range, const Executor& executor,
+             SurfacePatch& patch, CreasePatch& creases) const;
+
   const SurfaceField& designed_;
   double radius_;
-  LowestBallSearch search_;
-  std::optional<FacetReach> reach_;  ///< Of facets.
+  double error_ = 0.0;
+  const CutSurface* cut_ = nullptr;         ///< Null for the facets of a mesh.
+  std::optional<LowestBallSearch> search_;  ///< Of the facets of a mesh.
+  std::optional<FacetReach> reach_;
 };
 
 }  // namespace lensforge

@@ -75,5 +75,39 @@ TEST(FacetField, SameBitsForAnyTilesAndThreads) {
                                      testing::window_at({0.0, 0.0}, 0.0157, 150, 180));
 }
 
+TEST(SmoothField, EqualsTheSmoothSurfaceAndHasItsSlopes) {
+  const SmoothSurface surface(shaken_relief());
+  const SmoothField field(surface);
+  const SurfacePatch patch =
+      testing::sampled(field, testing::window_at({0.0, 0.0}, 0.0125, 241, 321));
+  EXPECT_TRUE(patch.cut.empty());
+  for (std::int64_t n = 0; n < patch.window.size(); n += 3) {
+    const auto point = surface.at(patch.window.node(n % 241, n / 241));
+    ASSERT_TRUE(point.has_value());
+    const auto i = static_cast<std::size_t>(n);
+    EXPECT_NEAR(patch.z[i], point->z, 1e-12);
+    EXPECT_NEAR(patch.slope_x[i], point->slope.x(), 1e-9);
+    EXPECT_NEAR(patch.slope_y[i], point->slope.y(), 1e-9);
+  }
+}
+
+TEST(SmoothField, ContinuesTheRimOnItsTangentPlane) {
+  const SmoothSurface surface(testing::grid_mesh(
+      5, 5, 1.0, 1.0, [](double x, double y) { return 2.0 + 0.1 * x - 0.2 * y; }));
+  const SmoothField field(surface);
+  const SurfacePatch patch =
+      testing::sampled(field, testing::window_at({-0.01, -0.01}, 0.51, 3, 3));
+  for (std::int64_t n = 0; n < 9; ++n) {
+    const Eigen::Vector2d q = patch.window.node(n % 3, n / 3);
+    EXPECT_NEAR(patch.z[static_cast<std::size_t>(n)], 2.0 + 0.1 * q.x() - 0.2 * q.y(), 1e-13);
+  }
+}
+
+TEST(SmoothField, SameBitsForAnyTilesAndThreads) {
+  const SmoothSurface surface(shaken_relief());
+  testing::expect_same_bits_in_tiles(SmoothField(surface),
+                                     testing::window_at({0.0, 0.0}, 0.0157, 150, 180));
+}
+
 }  // namespace
 }  // namespace lensforge

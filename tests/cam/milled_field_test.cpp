@@ -304,8 +304,7 @@ SurfaceMesh creased_mesh(unsigned seed, double side) {
 }
 
 BallPath finishing_path(const SurfaceMesh& mesh, double side) {
-  const DropCutter cutter(mesh, kRadius, Executor::serial());
-  return testing::raster_path(cutter, side, kPitch, 0.0193);
+  return testing::raster_path(DropCutter(mesh, kRadius, Executor::serial()), side, kPitch, 0.0193);
 }
 
 /// z(q) of one straight move by trisection, z being convex along it.

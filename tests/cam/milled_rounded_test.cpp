@@ -187,7 +187,8 @@ TEST(RoundedField, EqualsTheBestOfManyBalls) {
 
 TEST(RoundedField, LeavingOutFacetsThatCannotBeCutChangesNoBit) {
   const Rounded rounded(creased_relief());
-  const RoundedField plain(rounded.designed, rounded.cutter, 0.0);
+  const FacetSurface facets(rounded.mesh, kRadius, Executor::serial());
+  const RoundedField plain(rounded.designed, facets, 0.0);
   const GridWindow window = testing::window_at({0.0, 0.0}, 0.01, 200, 200);
   const SurfacePatch a = testing::sampled(rounded.field, window);
   const SurfacePatch b = testing::sampled(plain, window);
@@ -201,6 +202,52 @@ TEST(RoundedField, SameBitsForAnyTilesAndThreads) {
   const Rounded rounded(creased_relief());
   testing::expect_same_bits_in_tiles(rounded.field,
                                      testing::window_at({0.0, 0.0}, 0.0131, 150, 150));
+}
+
+/// A bowl whose bend at its bottom is sharper than the ball: z = √(x² + a²), of radius a there.
+SurfaceMesh sharp_bowl(double a) {
+  return testing::grid_mesh(41, 11, 2.0, 0.5, [&](double x, double /*y*/) {
+    return 3.0 + 0.5 * std::sqrt((x - 1.0) * (x - 1.0) + a * a);
+  });
+}
+
+TEST(RoundedField, SmoothSurfaceKeepsWhatTheBallDoesNotReach) {
+  const SurfaceMesh mesh = sharp_bowl(0.05);
+  const SmoothSurface surface(mesh);
+  const SmoothField designed(surface);
+  const SmoothCutSurface cut(mesh, kRadius, {1e-4, 5e-2, 1'000'000}, Executor::serial());
+  const RoundedField field(designed, cut, 1e-4);
+  const GridWindow window = testing::window_at({0.5, 0.25}, 0.005, 201, 3);
+  SurfacePatch patch;
+  CreasePatch creases;
+  field.sample(window, Executor::serial(), patch, creases);
+  const SurfacePatch plain = testing::sampled(designed, window);
+  const auto cutter =
+      cut.cutter({Eigen::Vector2d(0.2, 0.0), Eigen::Vector2d(1.8, 0.5)}, Executor::serial());
+  std::size_t held = 0;
+  for (std::size_t i = 201; i < 402; i += 10) {
+    const auto column = static_cast<std::int64_t>(i - 201);
+    EXPECT_NEAR(patch.z[i], best_of_many(*cutter, window.node(column, 1)), 1e-4);
+    held += creases.depth[i] > 0.0 ? 1 : 0;
+    if (creases.depth[i] == 0.0) {
+      EXPECT_EQ(patch.z[i], plain.z[i]);
+    }
+  }
+  EXPECT_GT(held, 2U);
+  EXPECT_LT(held, 15U);
+  EXPECT_GT(creases.depth[301], 1e-3);
+  EXPECT_NEAR(patch.slope_x[301], 0.0, 5e-2);
+}
+
+TEST(RoundedField, SmoothSurfaceHasTheSameBitsForAnyTilesAndThreads) {
+  const SurfaceMesh mesh = testing::grid_mesh(41, 9, 22.0, 4.0, [](double x, double y) {
+    return testing::lens_relief(x, y) + 0.2 * std::abs(x - 9.9);
+  });
+  const SmoothSurface surface(mesh);
+  const SmoothField designed(surface);
+  const SmoothCutSurface cut(mesh, kRadius, {1e-3, 0.2, 1'000'000}, Executor::serial());
+  testing::expect_same_bits_in_tiles(RoundedField(designed, cut, 1e-3),
+                                     testing::window_at({9.0, 1.0}, 0.02, 120, 60));
 }
 
 }  // namespace

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cam/milled/cast_field.h"
+
+#include <algorithm>
+#include <cstddef>
+
+namespace lensforge {
+namespace {
+
+/// The mould's nodes under a window of the lens: mirrored along x.
+GridWindow under(const GridWindow& lens, const CastFrame& frame) {
+  const Eigen::Vector2d last = lens.node(lens.columns - 1, 0);
+  return {frame.scale * Eigen::Vector2d(frame.width - last.x(), lens.origin.y()),
+          frame.scale * lens.spacing, lens.columns, lens.rows};
+}
+
+template <class Value>
+void mirror_rows(const GridWindow& window, std::vector<Value>& values) {
+  const auto columns = static_cast<std::ptrdiff_t>(window.columns);
+  for (auto row = values.begin(); row != values.end(); row += columns) {
+    std::reverse(row, row + columns);
+  }
+}
+
+}  // namespace
+
+void CastField::sample(const GridWindow& window, const Executor& executor,
+                       SurfacePatch& patch) const {
+  mould_.sample(under(window, frame_), executor, patch);
+  patch.window = window;
+  for (std::vector<double>* values : {&patch.z, &patch.slope_x, &patch.slope_y}) {
+    mirror_rows(window, *values);
+  }
+  mirror_rows(window, patch.cut);
+  // z = top − (Z − thickness) / scale with X = scale (width − x), Y = scale y: the slope along x
+  // changes its sign twice.
+  for (double& z : patch.z) z = frame_.top - (z - frame_.thickness) / frame_.scale;
+  for (double& slope : patch.slope_y) slope = -slope;
+}
+
+}  // namespace lensforge
