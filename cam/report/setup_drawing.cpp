@@ -10,7 +10,7 @@ namespace lensforge::report_section {
 namespace {
 
 constexpr double kWidth = 480.0;
-constexpr double kMargin = 46.0;
+constexpr double kMargin = 66.0;
 
 /// A view of the setup: two of the three axes drawn right and up.
 struct DrawnView {
@@ -87,7 +87,7 @@ std::string zero_mark(const DrawnView& view, const SetupSheet& setup) {
 std::string dimensions(const DrawnView& view, const SetupSheet& setup) {
   const Eigen::AlignedBox2d blank = view.flat(setup.blank);
   const double middle = 0.5 * (view.y(blank.min().y()) + view.y(blank.max().y()));
-  return words(0.5 * (view.x(blank.min().x()) + view.x(blank.max().x())), view.height() - 14.0,
+  return words(0.5 * (view.x(blank.min().x()) + view.x(blank.max().x())), view.height() - 24.0,
                "font-size=\"15\" text-anchor=\"middle\"",
                "blank " + decimal_text(blank.sizes().x(), 1) + " mm") +
          words(kWidth - 6.0, middle + 5.0,

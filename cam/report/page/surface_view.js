@@ -6,7 +6,7 @@
   const holder = document.getElementById("view");
   if (!holder) return;
   const canvas = holder.querySelector("canvas");
-  const gl = canvas.getContext("webgl", { antialias: true });
+  const gl = canvas.getContext("webgl", { antialias: true, alpha: false });
   if (!gl) {
     holder.classList.add("flat");
     return;
@@ -125,7 +125,7 @@
   });
 
   // ---- Camera ----
-  const start = { turn: -0.6, tilt: 0.85, distance: 1.75 * size, x: 0, y: 0 };
+  const start = { turn: -0.6, tilt: 0.85, distance: 2.05 * size, x: 0, y: 0 };
   let camera = Object.assign({}, start);
   let raise = 1;
   let showSurface = true;
