@@ -11,6 +11,7 @@
 #include "cam/cam_meshes.h"
 #include "cam/contact/drop_cutter.h"
 #include "cam/milled/milled_field.h"
+#include "cam/milled/polished_field.h"
 #include "cam/milled/rounded_field.h"
 #include "cam/milled_paths.h"
 
@@ -72,6 +73,22 @@ void RoundedNodes(benchmark::State& state) {
   run(state, field);
 }
 BENCHMARK(RoundedNodes)->ArgName("threads")->Arg(1)->Arg(2)->UseRealTime();
+
+/// Of a smooth surface through the vertices.
+void SmoothNodes(benchmark::State& state) {
+  static const SmoothSurface surface(lens_mesh());
+  static const SmoothField field(surface);
+  run(state, field);
+}
+BENCHMARK(SmoothNodes)->ArgName("threads")->Arg(1)->Arg(2)->UseRealTime();
+
+/// What polishing costs beside the facets that are polished.
+void PolishedNodes(benchmark::State& state) {
+  const Eigen::AlignedBox2d lens(Eigen::Vector2d(0.0, 0.0), Eigen::Vector2d(kSide, kSide));
+  const PolishedField field(lens_facets(), lens, {0.03, 0.0, 1.0});
+  run(state, field);
+}
+BENCHMARK(PolishedNodes)->ArgName("threads")->Arg(1)->Arg(2)->UseRealTime();
 
 }  // namespace
 }  // namespace lensforge
