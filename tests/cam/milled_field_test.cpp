@@ -12,6 +12,7 @@
 #include "cam/contact/drop_cutter.h"
 #include "cam/milled_paths.h"
 #include "cam/milled_tiles.h"
+#include "cam/path/finish_raster.h"
 
 namespace lensforge {
 namespace {
@@ -303,8 +304,34 @@ SurfaceMesh creased_mesh(unsigned seed, double side) {
   });
 }
 
-BallPath finishing_path(const SurfaceMesh& mesh, double side) {
-  return testing::raster_path(DropCutter(mesh, kRadius, Executor::serial()), side, kPitch, 0.0193);
+/// A finishing raster over a square from (0, 0) as it is cut, with straight links.
+BallPath finishing_path(const SurfaceMesh& mesh, double side, const RasterOptions& options) {
+  const DropCutter cutter(mesh, kRadius, Executor::serial());
+  const RasterPlan plan = plan_finish_raster(
+      {Eigen::Vector2d(0.0, 0.0), Eigen::Vector2d(side, side)}, cutter.radius(), options);
+  BallPath path(cutter.radius(), 0.0);
+  GcodeMotion motion;
+  for (std::int64_t row = 0; row < plan.rows; ++row) {
+    const RasterRow cut = cut_row(cutter, plan, row);
+    const Eigen::Vector3d start = cut.start;
+    if (row > 0) testing::add_polyline(path, {motion.end, start});
+    motion.end = start;
+    for (const PathMove& move : cut.moves) {
+      motion.start = motion.end;
+      motion.end = move.end;
+      motion.arc.reset();
+      if (move.arc_axis >= 0) {
+        const ArcPlane plane = move.arc_axis == 0   ? ArcPlane::kYZ
+                               : move.arc_axis == 1 ? ArcPlane::kZX
+                                                    : ArcPlane::kXY;
+        motion.arc = testing::arc_motion(plane, move.clockwise, motion.start, move.end,
+                                         move.centre - motion.start)
+                         .arc;
+      }
+      path.add(motion);
+    }
+  }
+  return path;
 }
 
 /// z(q) of one straight move by trisection, z being convex along it.
@@ -345,7 +372,7 @@ double angle_between(const Eigen::Vector2d& slope, const Eigen::Vector3d& normal
 void expect_equals_brute_force(unsigned seed, std::int64_t step) {
   const double side = 1.6;
   const SurfaceMesh mesh = creased_mesh(seed, side);
-  const BallPath path = finishing_path(mesh, side);
+  const BallPath path = finishing_path(mesh, side, {});
   const MilledField field({path}, kBlankTop);
   const SurfacePatch patch =
       testing::sampled(field, testing::window_at({0.31, 0.27}, 0.001, 1000, 1000));
@@ -379,9 +406,26 @@ TEST(MilledField, EqualsBruteForceOnFinishingRowsOverCreases) {
   for (const unsigned seed : {1U, 2U, 3U}) expect_equals_brute_force(seed, 2999);
 }
 
+TEST(MilledField, RowsOfArcsLeaveWhatRowsOfChordsLeaveWithinTheTolerances) {
+  const double side = 1.6;
+  const SurfaceMesh mesh = creased_mesh(5, side);
+  RasterOptions options;
+  const BallPath chords = finishing_path(mesh, side, options);
+  options.arcs = true;
+  const BallPath arcs = finishing_path(mesh, side, options);
+  EXPECT_GT(arcs.arcs().size(), 10U);
+  const GridWindow window = testing::window_at({0.2, 0.2}, 0.0093, 120, 120);
+  const SurfacePatch a = testing::sampled(MilledField({chords}, kBlankTop), window);
+  const SurfacePatch b = testing::sampled(MilledField({arcs}, kBlankTop), window);
+  double worst = 0.0;
+  for (std::size_t i = 0; i < a.z.size(); ++i) worst = std::max(worst, std::abs(a.z[i] - b.z[i]));
+  EXPECT_LE(worst, 2.2 * options.tolerance);
+  EXPECT_GT(worst, 0.0);
+}
+
 TEST(MilledField, SameBitsForAnyTilesAndThreads) {
   const double side = 1.6;
-  const MilledField field({finishing_path(creased_mesh(7, side), side)}, kBlankTop);
+  const MilledField field({finishing_path(creased_mesh(7, side), side, {})}, kBlankTop);
   testing::expect_same_bits_in_tiles(field, testing::window_at({0.1, 0.1}, 0.0037, 150, 140));
 }
 
