@@ -21,7 +21,7 @@ void check_format(TomlFields& root) {
 }
 
 std::string read_extension(TomlFields& root) {
-  const std::string extension = root.text("extension");
+  std::string extension = root.text("extension");
   const bool plain = std::all_of(extension.begin(), extension.end(), [](char c) {
     return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z');
   });
@@ -129,6 +129,7 @@ bool is_path(const std::string& name) {
 
 std::vector<std::string> builtin_posts() {
   std::vector<std::string> names;
+  names.reserve(kBuiltinPosts.size());
   for (const BuiltinPost& post : kBuiltinPosts) names.emplace_back(post.name);
   return names;
 }
