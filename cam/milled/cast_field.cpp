@@ -10,7 +10,7 @@ namespace {
 /// The mould's nodes under a window of the lens: mirrored along x.
 GridWindow under(const GridWindow& lens, const CastFrame& frame) {
   const Eigen::Vector2d last = lens.node(lens.columns - 1, 0);
-  return {frame.scale * Eigen::Vector2d(frame.width - last.x(), lens.origin.y()),
+  return {frame.scale * Eigen::Vector2d(frame.width - last.x(), last.y()),
           frame.scale * lens.spacing, lens.columns, lens.rows};
 }
 
