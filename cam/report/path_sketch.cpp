@@ -15,10 +15,10 @@ void PathSketch::add(std::span<const PathMove> moves) {
       begin_strip();
     } else if (step.dot(heading_) < 0.0) {
       begin_strip();
-      strip_.push_back(last_.cast<float>());
+      strip_.emplace_back(last_.cast<float>());
       heading_ = step;
     } else if (strip_.empty()) {
-      strip_.push_back(last_.cast<float>());
+      strip_.emplace_back(last_.cast<float>());
     }
     if (heading_.isZero() && !strip_.empty()) heading_ = step;
     const Eigen::Vector3f end = move.end.cast<float>();
@@ -39,7 +39,7 @@ ReportPath PathSketch::path() const {
 void PathSketch::begin_strip() {
   heading_.setZero();
   if (strip_.empty()) return;
-  if (strip_.back() != last_.cast<float>()) strip_.push_back(last_.cast<float>());
+  if (strip_.back() != last_.cast<float>()) strip_.emplace_back(last_.cast<float>());
   if (strips_++ % kept_.every == 0 && strip_.size() > 1) {
     points_ += strip_.size();
     kept_.strips.push_back(std::move(strip_));

@@ -14,12 +14,12 @@ constexpr double kMargin = 66.0;
 
 /// A view of the setup: two of the three axes drawn right and up.
 struct DrawnView {
-  int right;
+  int right = 0;
   int up;
   Eigen::AlignedBox2d all;
   double scale;
 
-  DrawnView(const SetupSheet& setup, bool from_above) : right(0), up(from_above ? 1 : 2) {
+  DrawnView(const SetupSheet& setup, bool from_above) : up(from_above ? 1 : 2) {
     all.extend(flat(setup.blank));
     all.extend(flat(setup.part));
     for (const NamedBox& clamp : setup.keep_outs) all.extend(flat(clamp.box));

@@ -33,13 +33,11 @@ std::string box_text(const Eigen::AlignedBox3d& box) {
 }
 
 std::string facts(const std::vector<ReportParameter>& parameters) {
-  std::vector<Row> rows;
-  for (const ReportParameter& parameter : parameters) {
-    rows.push_back({escape_html(parameter.name), element("b", "", escape_html(parameter.value))});
-  }
   std::string body;
-  for (const Row& row : rows) {
-    body += element("tr", "", element("td", "", row[0]) + element("td", "", row[1]));
+  for (const ReportParameter& parameter : parameters) {
+    body += element("tr", "",
+                    element("td", "", escape_html(parameter.name)) +
+                        element("td", "", element("b", "", escape_html(parameter.value))));
   }
   return element("table", "", element("tbody", "", body));
 }
