@@ -113,6 +113,22 @@ TEST(DropCurve, EqualsTheDropCutterOnAdversarialMeshes) {
   }
 }
 
+/// Wherever it begins and ends, also next to where it was searched in stretches.
+TEST(DropCurve, IsTheSameWhateverPartIsAskedFor) {
+  const SurfaceMesh mesh = testing::crease_mesh(24, 4.0, 0.7, 0.3);
+  const DropCutter cutter(mesh, kRadius, Executor::serial());
+  for (int i = 1; i < 150; ++i) {
+    for (const double off : {0.0, 1e-17, -1e-16, 1e-12, -1e-9, 1e-7}) {
+      const double from = 0.02 * i + off;
+      const auto curve = drop_curve(cutter, {0, 1.7}, from, from + 0.5);
+      ASSERT_EQ(curve.front().begin, from);
+      ASSERT_EQ(curve.back().end, from + 0.5);
+      ASSERT_NEAR(curve.front().value(from), cutter.drop({from, 1.7}).tip, 1e-9);
+      ASSERT_NEAR(curve.back().value(from + 0.5), cutter.drop({from + 0.5, 1.7}).tip, 1e-9);
+    }
+  }
+}
+
 TEST(DropCurve, IsStraightOnAPlane) {
   const SurfaceMesh mesh =
       testing::grid_mesh(9, 9, 4.0, 4.0, [](double x, double y) { return 0.3 * x - 0.2 * y; });
