@@ -26,19 +26,19 @@ std::string place_rings(const ReportData& data) {
     const std::string x = decimal_text(place.place.x(), 3);
     const std::string y = decimal_text(size.y() - place.place.y(), 3);
     const auto ring = [&](const char* color, double width) {
-      return "<circle cx=\"" + x + "\" cy=\"" + y + "\" r=\"" +
-             decimal_text(std::max(3.5 * unit, 0.5 * place.side), 3) +
-             "\" fill=\"none\" stroke=\"" + color + "\" stroke-width=\"" +
-             decimal_text(width * unit, 3) + "\"/>";
+      return joined({"<circle cx=\"", x, "\" cy=\"", y, "\" r=\"",
+                     decimal_text(std::max(3.5 * unit, 0.5 * place.side), 3),
+                     "\" fill=\"none\" stroke=\"", color, "\" stroke-width=\"",
+                     decimal_text(width * unit, 3), "\"/>"});
     };
-    rings += ring("#000", 1.6) + ring("#fff", 0.8);
+    rings.append(ring("#000", 1.6)).append(ring("#fff", 0.8));
     const double left = place.place.x() > 0.85 * size.x() ? -9.0 : 4.5;
-    rings += "<text x=\"" + decimal_text(place.place.x() + left * unit, 3) + "\" y=\"" +
-             decimal_text(size.y() - place.place.y() - 3.0 * unit, 3) + "\" font-size=\"" +
-             decimal_text(7.0 * unit, 3) +
-             "\" font-weight=\"700\" fill=\"#fff\" stroke=\"#000\" stroke-width=\"" +
-             decimal_text(1.4 * unit, 3) + "\" paint-order=\"stroke\">" + std::to_string(k + 1) +
-             "</text>";
+    rings.append(joined({"<text x=\"", decimal_text(place.place.x() + left * unit, 3), "\" y=\"",
+                         decimal_text(size.y() - place.place.y() - 3.0 * unit, 3),
+                         "\" font-size=\"", decimal_text(7.0 * unit, 3),
+                         "\" font-weight=\"700\" fill=\"#fff\" stroke=\"#000\" stroke-width=\"",
+                         decimal_text(1.4 * unit, 3), "\" paint-order=\"stroke\">",
+                         std::to_string(k + 1), "</text>"}));
   }
   return "<svg viewBox=\"0 0 " + decimal_text(size.x(), 3) + " " + decimal_text(size.y(), 3) +
          "\" aria-hidden=\"true\" font-family=\"Arial, sans-serif\">" + rings + "</svg>";

@@ -77,7 +77,8 @@ ColorImage raster_picture(const LensRaster& raster, double low, double high) {
   const double range = high > low ? high - low : 1.0;
   for (int row = raster.rows - 1; row >= 0; --row) {
     for (int column = 0; column < raster.columns; ++column) {
-      const float value = raster.values[static_cast<std::size_t>(row * raster.columns + column)];
+      const int at = row * raster.columns + column;
+      const float value = raster.values[static_cast<std::size_t>(at)];
       append(image, false_color((static_cast<double>(value) - low) / range));
     }
   }
