@@ -41,12 +41,8 @@ std::vector<GcodeMotion> motions_of(const ProgramFiles& files, const PostDescrip
 /// Compares motions with the moves that they were written from.
 class Comparison {
  public:
-  Comparison(const PostDescription& post, const ProgramSettings& settings,
-             const std::vector<GcodeMotion>& motions)
-      : post_(post),
-        settings_(settings),
-        motions_(motions),
-        scale_(std::pow(10.0, settings.decimals)) {}
+  Comparison(const ProgramSettings& settings, const std::vector<GcodeMotion>& motions)
+      : settings_(settings), motions_(motions), scale_(std::pow(10.0, settings.decimals)) {}
 
   void run(const std::vector<PathMove>& moves) {
     for (const PathMove& move : moves) {
@@ -166,7 +162,6 @@ class Comparison {
     return sweep;
   }
 
-  const PostDescription& post_;
   const ProgramSettings& settings_;
   const std::vector<GcodeMotion>& motions_;
   double scale_;
@@ -212,7 +207,7 @@ TEST(PostProperty, WhatIsReadBackIsWhatWasToBeCut) {
       settings.decimals = std::min(post.most_decimals, 3 + static_cast<int>(seed % 4));
       const ProgramFiles files = write_programs(plan_of(moves), post, settings, folder.path(), {});
       const auto motions = motions_of(files, post);
-      Comparison(post, settings, motions).run(moves);
+      Comparison(settings, motions).run(moves);
       if (::testing::Test::HasFailure()) {
         FAIL() << post.name << ", arcs " << static_cast<int>(post.arcs) << ", seed " << seed
                << ", decimals " << settings.decimals;
