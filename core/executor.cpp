@@ -5,12 +5,20 @@
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
+#include <Eigen/Core>
 #include <chrono>
 #include <utility>
 
 #include "core/error.h"
 
 namespace lensforge {
+
+namespace {
+
+/// Entries that one task of a scalar product handles.
+constexpr std::int64_t kVectorBlock = 16384;
+
+}  // namespace
 
 void KernelProfile::add(const char* kernel, double seconds) {
   const std::scoped_lock lock(mutex_);
@@ -54,6 +62,12 @@ Executor Executor::with_stop(std::stop_token stop) const {
   return copy;
 }
 
+Executor Executor::with_device(Device device) const {
+  Executor copy = *this;
+  copy.device_ = device;
+  return copy;
+}
+
 int Executor::concurrency() const { return arena_ ? arena_->tasks.max_concurrency() : 1; }
 
 void Executor::run(const char* kernel, std::int64_t count, std::int64_t grain, Chunk chunk,
@@ -76,6 +90,19 @@ void Executor::run(const char* kernel, std::int64_t count, std::int64_t grain, C
     const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
     profile_->add(kernel, elapsed.count());
   }
+}
+
+double dot(const Executor& executor, std::span<const double> a, std::span<const double> b) {
+  using Vector = Eigen::Map<const Eigen::VectorXd>;
+  const Vector left(a.data(), static_cast<Eigen::Index>(a.size()));
+  const Vector right(b.data(), static_cast<Eigen::Index>(b.size()));
+  const std::int64_t blocks = (left.size() + kVectorBlock - 1) / kVectorBlock;
+  const auto block = [&](std::int64_t i) {
+    const Eigen::Index begin = i * kVectorBlock;
+    const Eigen::Index length = std::min<Eigen::Index>(kVectorBlock, left.size() - begin);
+    return std::array<double, 1>{left.segment(begin, length).dot(right.segment(begin, length))};
+  };
+  return parallel_sum<1>(executor, "dot", blocks, block, 1)[0];
 }
 
 }  // namespace lensforge

@@ -8,6 +8,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <span>
 #include <stop_token>
 #include <string>
 #include <vector>
@@ -31,9 +32,31 @@ class KernelProfile {
   std::map<std::string, Entry> entries_;
 };
 
+/// The processor that renders and optimises.
+enum class Device { kCpu, kCuda };
+
+/// A sum that is asked for later: an executor with memory of its own need not be waited for.
+template <std::size_t N>
+struct FinishedSum {
+  std::array<double, N> value{};
+  [[nodiscard]] const std::array<double, N>& get() const { return value; }
+};
+
 /// Where kernels run. A small value that is passed down; copies share the same thread arena.
+///
+/// Kernels written for any executor (`template <class Exec>`) keep to what this one and the CUDA
+/// one (core/cuda/cuda_executor.h) have in common: Buffer, PendingSum, concurrency(),
+/// parallel_for(), parallel_for_worker(), pending_sum(), scan_rows(), dot(), fill_zero(), upload()
+/// and download().
 class Executor {
  public:
+  /// Memory that its kernels read and write.
+  template <class T>
+  using Buffer = std::vector<T>;
+  /// Result of pending_sum(); zeros where nothing was summed.
+  template <std::size_t N>
+  using PendingSum = FinishedSum<N>;
+
   /// Runs everything in the calling thread, in index order.
   static Executor serial();
   /// Runs on oneTBB with `threads` threads; 0 takes all that the process may use.
@@ -45,6 +68,14 @@ class Executor {
   /// The same executor whose kernels end as soon as `stop` is requested: run() then throws
   /// Interrupted, and what the kernel was to write is left half done.
   [[nodiscard]] Executor with_stop(std::stop_token stop) const;
+
+  /// The same executor that asks the stages which can do so to work on `device`. Kernels handed to
+  /// this executor itself run on the CPU all the same.
+  [[nodiscard]] Executor with_device(Device device) const;
+  [[nodiscard]] Device device() const { return device_; }
+
+  [[nodiscard]] KernelProfile* profile() const { return profile_; }
+  [[nodiscard]] const std::stop_token& stop_token() const { return stop_; }
 
   /// Upper bound of the worker numbers handed to kernels: workers are 0 … concurrency() − 1.
   [[nodiscard]] int concurrency() const;
@@ -60,6 +91,7 @@ class Executor {
   std::shared_ptr<Arena> arena_;  ///< Null for the serial executor.
   KernelProfile* profile_ = nullptr;
   std::stop_token stop_;
+  Device device_ = Device::kCpu;
 };
 
 /// Items that one task handles at least: below this the scheduling costs more than the work.
@@ -75,6 +107,20 @@ void parallel_for(const Executor& executor, const char* kernel, std::int64_t cou
       [](const void* body, std::int64_t begin, std::int64_t end, int /*worker*/) {
         const Functor& f = *static_cast<const Functor*>(body);
         for (std::int64_t i = begin; i < end; ++i) f(i);
+      },
+      &functor);
+}
+
+/// parallel_for() whose functor is also told which worker calls it, `functor(i, worker)`; calls of
+/// one worker do not run at the same time.
+template <class Functor>
+void parallel_for_worker(const Executor& executor, const char* kernel, std::int64_t count,
+                         const Functor& functor, std::int64_t grain = kDefaultGrain) {
+  executor.run(
+      kernel, count, grain,
+      [](const void* body, std::int64_t begin, std::int64_t end, int worker) {
+        const Functor& f = *static_cast<const Functor*>(body);
+        for (std::int64_t i = begin; i < end; ++i) f(i, worker);
       },
       &functor);
 }
@@ -102,6 +148,58 @@ std::array<double, N> parallel_sum(const Executor& executor, const char* kernel,
     for (std::size_t k = 0; k < N; ++k) total[k] += sum[k];
   }
   return total;
+}
+
+/// parallel_sum() whose result `.get()` gives.
+template <std::size_t N, class Functor>
+FinishedSum<N> pending_sum(const Executor& executor, const char* kernel, std::int64_t count,
+                           const Functor& functor) {
+  return {parallel_sum<N>(executor, kernel, count, functor)};
+}
+
+/// Rows that one task of scan_rows() handles at least.
+inline constexpr std::int64_t kRowGrain = 16;
+
+/// Running sums along rows: in every row r calls `scan.store(r, c, sum)` with the sum of
+/// `scan.item(r, 0 … c)`, of type Scan::Value, for c = 0 … columns − 1.
+template <class Scan>
+void scan_rows(const Executor& executor, const char* kernel, std::int64_t rows, int columns,
+               const Scan& scan) {
+  const auto scan_row = [&](std::int64_t r) {
+    typename Scan::Value running{};
+    for (int c = 0; c < columns; ++c) {
+      running += scan.item(r, c);
+      scan.store(r, c, running);
+    }
+  };
+  parallel_for(executor, kernel, rows, scan_row, kRowGrain);
+}
+
+/// Scalar product, in fixed order.
+double dot(const Executor& executor, std::span<const double> a, std::span<const double> b);
+
+/// Sets every byte to zero.
+template <class T>
+void fill_zero(const Executor& /*executor*/, std::vector<T>& buffer) {
+  std::fill(buffer.begin(), buffer.end(), T{});
+}
+
+/// Copies from the caller's memory to the executor's, and back. @pre both have the same length.
+template <class T>
+void upload(const Executor& /*executor*/, std::span<const T> from, std::span<T> to) {
+  std::copy(from.begin(), from.end(), to.begin());
+}
+template <class T>
+void download(const Executor& /*executor*/, std::span<const T> from, std::span<T> to) {
+  std::copy(from.begin(), from.end(), to.begin());
+}
+
+/// A buffer of the executor that holds a copy of `values`.
+template <class T, class Exec>
+typename Exec::template Buffer<T> buffer_of(const Exec& executor, std::span<const T> values) {
+  typename Exec::template Buffer<T> buffer(values.size());
+  upload(executor, values, std::span<T>(buffer.data(), buffer.size()));
+  return buffer;
 }
 
 }  // namespace lensforge

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 
 #include "core/host_device.h"
 #include "core/optical_setup.h"
@@ -25,8 +26,8 @@ class ImagePlane {
     offset_ = -scale_.cwiseProduct(zero);
   }
 
-  [[nodiscard]] LF_HD int columns() const { return columns_; }
-  [[nodiscard]] LF_HD int rows() const { return rows_; }
+  [[nodiscard]] LF_HD int columns() const { return static_cast<int>(columns_); }
+  [[nodiscard]] LF_HD int rows() const { return static_cast<int>(rows_); }
 
   /// Millimetres on the receiving plane → pixel coordinates.
   [[nodiscard]] LF_HD Eigen::Vector2d to_pixels(const Eigen::Vector2d& mm) const {
@@ -40,8 +41,8 @@ class ImagePlane {
   [[nodiscard]] LF_HD const Eigen::Vector2d& pixels_per_mm() const { return scale_; }
 
  private:
-  int columns_;
-  int rows_;
+  std::int64_t columns_;  ///< Wide, so that no bytes are left unset before the vectors.
+  std::int64_t rows_;
   Eigen::Vector2d scale_;
   Eigen::Vector2d offset_;
 };

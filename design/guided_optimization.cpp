@@ -4,10 +4,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <memory>
 #include <numbers>
 #include <variant>
 
-#include "core/error.h"
+#include "design/guided_stage_on.h"
 #include "design/optics/image_triangle.h"
 
 namespace lensforge {
@@ -73,51 +74,58 @@ double cell_aspect(const OpticalSetup& setup, const GridShape& shape) {
   return setup.lens_size.y() / (shape.rows - 1) / (setup.lens_size.x() / (shape.columns - 1));
 }
 
+std::unique_ptr<GuidedStage> make_stage(const SurfaceMesh& mesh, const OpticalSetup& setup,
+                                        const DesignGoal& goal, const ObjectiveOptions& options,
+                                        const Executor& executor) {
+  const double aspect = cell_aspect(setup, mesh.grid);
+#if defined(LENSFORGE_CUDA)
+  if (executor.device() == Device::kCuda) {
+    return make_cuda_stage(mesh, setup, aspect, goal, options, executor);
+  }
+#endif
+  return std::make_unique<GuidedStageOn<Executor>>(mesh, setup, aspect, goal, options, executor);
+}
+
 }  // namespace
 
 GuidedOptimization::GuidedOptimization(const SurfaceMesh& mesh, const OpticalSetup& setup,
                                        const DesignGoal& goal, const ObjectiveOptions& options,
                                        const Executor& executor)
     : setup_(setup),
-      executor_(executor),
-      objective_(mesh, setup, goal, options, executor),
-      preconditioner_(mesh.grid, cell_aspect(setup, mesh.grid), objective_.movable(), executor),
-      cell_(setup.lens_size.x() / (mesh.grid.columns - 1)) {
-  preconditioner_.z.floor = kHeightFloor * lowest_eigenvalue(mesh.grid);
-  preconditioner_.z.power =
-      std::holds_alternative<Image>(goal) ? kPictureHeightPower : kCorrespondenceHeightPower;
+      cell_(setup.lens_size.x() / (mesh.grid.columns - 1)),
+      stage_(make_stage(mesh, setup, goal, options, executor)) {
+  z_.floor = kHeightFloor * lowest_eigenvalue(mesh.grid);
+  z_.power = std::holds_alternative<Image>(goal) ? kPictureHeightPower : kCorrespondenceHeightPower;
   if (std::holds_alternative<Image>(goal) && options.weights.image > 0.0) {
     // E_grad adds a Laplacian in the picture to E_img's Hessian.
     const double cells_per_pixel = setup.image_size.x() / setup.pixels.x() / cell_;
     const double growth =
         options.weights.gradient / options.weights.image * cells_per_pixel * cells_per_pixel;
-    preconditioner_.z.growth = growth;
-    preconditioner_.xy.growth = growth;
+    z_.growth = growth;
+    xy_.growth = growth;
   }
-  preconditioner_.xy.floor = kShiftFloor;
-  preconditioner_.xy.power = kShiftPower;
-  preconditioner_.z.size_power = kHeightSizePower;
-  preconditioner_.xy.size_power = kShiftSizePower;
+  xy_.floor = kShiftFloor;
+  xy_.power = kShiftPower;
+  z_.size_power = kHeightSizePower;
+  xy_.size_power = kShiftSizePower;
 }
 
 double GuidedOptimization::value(const SurfaceMesh& mesh) {
-  objective_.relinearize(mesh.vertices);
+  stage_->relinearize(mesh.vertices);
   Eigen::Matrix3Xd gradient;
-  const DesignObjective::Evaluation e = objective_.evaluate(mesh.vertices, gradient);
+  const ObjectiveEvaluation e = stage_->evaluate(mesh.vertices, gradient);
   return e.feasible ? e.energy.total : kInfinity;
 }
 
 /// P^½ applied to random signs, in z or in x and y.
 Eigen::Matrix3Xd GuidedOptimization::probe(bool heights) {
-  Eigen::Matrix3Xd signs = Eigen::Matrix3Xd::Zero(3, objective_.movable().cols());
+  Eigen::Matrix3Xd signs = Eigen::Matrix3Xd::Zero(3, stage_->movable().cols());
   for (Eigen::Index v = 0; v < signs.cols(); ++v) {
     for (int k = 0; k < 3; ++k) {
       if ((k == 2) == heights) signs(k, v) = sign_at(static_cast<std::uint64_t>(3 * v + k));
     }
   }
-  Eigen::VectorXd result;
-  preconditioner_.apply_root(signs.reshaped(), result);
-  return result.reshaped(3, signs.cols());
+  return stage_->apply_root(signs);
 }
 
 /// Root mean square of P^½ H P^½ applied to random signs in z or in x and y, H by a central
@@ -133,13 +141,12 @@ double GuidedOptimization::preconditioned_curvature(const Eigen::Matrix3Xd& vert
   Eigen::Matrix3Xd backward;
   for (int halvings = 0;; ++halvings, step *= 0.5) {
     if (halvings == kMostHalvings) return 0.0;
-    if (objective_.evaluate(vertices + step * direction, forward).feasible &&
-        objective_.evaluate(vertices - step * direction, backward).feasible) {
+    if (stage_->evaluate(vertices + step * direction, forward).feasible &&
+        stage_->evaluate(vertices - step * direction, backward).feasible) {
       break;
     }
   }
-  Eigen::VectorXd curved;
-  preconditioner_.apply_root(((forward - backward) / (2.0 * step)).reshaped(), curved);
+  const Eigen::VectorXd curved = stage_->apply_root((forward - backward) / (2.0 * step)).reshaped();
   const auto rows = curved.reshaped(3, direction.cols());
   const double sum = heights ? rows.row(2).squaredNorm() : 0.5 * rows.topRows(2).squaredNorm();
   return std::sqrt(sum / count);
@@ -149,40 +156,21 @@ double GuidedOptimization::preconditioned_curvature(const Eigen::Matrix3Xd& vert
 /// directions is one: then neither x, y nor z is left behind.
 void GuidedOptimization::calibrate(const Eigen::Matrix3Xd& vertices) {
   for (const bool heights : {false, true}) {
-    GridSymbol& symbol = heights ? preconditioner_.z : preconditioner_.xy;
+    GridSymbol& symbol = heights ? z_ : xy_;
     symbol.scale = 1.0;
+    stage_->set_symbols(xy_, z_);
     const double curvature = preconditioned_curvature(vertices, heights);
     if (curvature > 0.0) symbol.scale = 1.0 / curvature;
   }
+  stage_->set_symbols(xy_, z_);
 }
 
 LbfgsSummary GuidedOptimization::run(const LbfgsOptions& options, const Observer& observe,
                                      SurfaceMesh& mesh) {
-  objective_.relinearize(mesh.vertices);
-  preconditioner_.set_cell_sizes(cell_sizes(mesh));
+  stage_->relinearize(mesh.vertices);
+  stage_->set_cell_sizes(cell_sizes(mesh));
   calibrate(mesh.vertices);
-  DesignObjective::Evaluation last;
-  Eigen::Matrix3Xd slope;
-  const Objective function = [&](const Eigen::VectorXd& x, Eigen::VectorXd& gradient) {
-    last = objective_.evaluate(x.reshaped(3, mesh.vertices.cols()), slope);
-    if (!last.feasible) return kInfinity;
-    gradient = slope.reshaped();
-    return last.energy.total;
-  };
-  const Preconditioner precondition = [this](const Eigen::VectorXd& g, Eigen::VectorXd& r) {
-    preconditioner_.apply(g, r);
-  };
-  const LbfgsObserver watch = [&](int iteration, double) { return observe(iteration, last); };
-  Eigen::VectorXd x = mesh.vertices.reshaped();
-  const auto keep_best = [&] { mesh.vertices = x.reshaped(3, mesh.vertices.cols()); };
-  try {
-    LbfgsSummary summary = minimize_lbfgs(function, precondition, options, watch, executor_, x);
-    keep_best();
-    return summary;
-  } catch (const Interrupted&) {
-    keep_best();
-    throw;
-  }
+  return stage_->minimize(options, observe, mesh.vertices);
 }
 
 }  // namespace lensforge

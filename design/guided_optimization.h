@@ -1,21 +1,20 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include <functional>
+#include <memory>
 
 #include "core/executor.h"
-#include "core/image.h"
 #include "core/optical_setup.h"
 #include "core/surface_mesh.h"
 #include "design/energy/objective.h"
-#include "design/optimize/grid_preconditioner.h"
+#include "design/guided_stage.h"
 #include "design/optimize/lbfgs.h"
 
 namespace lensforge {
 
 /// Optimisation of a grid mesh at one resolution: rendering-guided if the goal is a picture (Sun et
 /// al., section 3.3), correspondence-guided if it is a correspondence (section 3.4). L-BFGS with a
-/// preconditioner whose scales are measured, not guessed.
+/// preconditioner whose scales are measured, not guessed. Works on the executor's device.
 class GuidedOptimization {
  public:
   /// @param mesh  a grid mesh; it gives connectivity and which coordinates are held.
@@ -23,7 +22,7 @@ class GuidedOptimization {
                      const ObjectiveOptions& options, const Executor& executor);
 
   /// Told after every iteration; false ends the run.
-  using Observer = std::function<bool(int iteration, const DesignObjective::Evaluation&)>;
+  using Observer = GuidedStage::Observer;
 
   /// Improves `mesh` by at most `options.max_iterations` steps, from scratch: the outcome depends
   /// on the mesh alone, so that a run resumed from it goes the same way.
@@ -40,10 +39,10 @@ class GuidedOptimization {
   [[nodiscard]] Eigen::Matrix3Xd probe(bool heights);
 
   OpticalSetup setup_;
-  Executor executor_;
-  DesignObjective objective_;
-  GridPreconditioner preconditioner_;
   double cell_;  ///< Width of a grid cell, mm.
+  GridSymbol xy_;
+  GridSymbol z_;
+  std::unique_ptr<GuidedStage> stage_;
 };
 
 }  // namespace lensforge

@@ -3,9 +3,9 @@
 
 #include <numeric>
 #include <span>
+#include <vector>
 
-#include "design/flux/flux_image.h"
-#include "design/optics/surface_optics.h"
+#include "design/render_flux.h"
 
 namespace lensforge {
 
@@ -19,14 +19,19 @@ Image scaled(std::span<const double> flux, int columns, int rows, double factor)
   return image;
 }
 
+std::vector<double> flux_of(const SurfaceMesh& mesh, const OpticalSetup& setup, SurfaceModel model,
+                            const Executor& executor) {
+#if defined(LENSFORGE_CUDA)
+  if (executor.device() == Device::kCuda) return render_flux_cuda(mesh, setup, model, executor);
+#endif
+  return render_flux(mesh, setup, model, executor);
+}
+
 RenderResult render_scaled(const SurfaceMesh& mesh, const OpticalSetup& setup, SurfaceModel model,
                            double total, const Executor& executor) {
-  const int columns = setup.pixels.x();
-  const int rows = setup.pixels.y();
-  FluxImage image(columns, rows);
-  const auto triangles = project_surface(mesh, setup, model, executor);
-  const std::span<const double> flux = image.render(executor, triangles);
-  return {scaled(flux, columns, rows, total), std::accumulate(flux.begin(), flux.end(), 0.0)};
+  const std::vector<double> flux = flux_of(mesh, setup, model, executor);
+  return {scaled(flux, setup.pixels.x(), setup.pixels.y(), total),
+          std::accumulate(flux.begin(), flux.end(), 0.0)};
 }
 
 }  // namespace

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include <span>
+#include <cstdint>
 
 namespace lensforge {
 
@@ -9,7 +9,9 @@ namespace lensforge {
 struct PictureError {
   int columns = 0;
   int rows = 0;
-  std::span<const double> error;  ///< g − g̃ per pixel.
+  const double* error = nullptr;  ///< g − g̃ per pixel, in the memory of the executor.
+
+  [[nodiscard]] std::int64_t count() const { return static_cast<std::int64_t>(columns) * rows; }
 };
 
 }  // namespace lensforge

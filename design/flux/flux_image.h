@@ -1,22 +1,27 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
-#include <vector>
 
 #include "core/executor.h"
+#include "design/flux/flux_kernels.h"
 #include "design/flux/flux_triangle.h"
 #include "design/optics/image_triangle.h"
 
 namespace lensforge {
 
 /// Adds up image triangles into a picture of flux, bit-identically for any number of threads and
-/// any order of triangles. Keeps its buffers between pictures.
-class FluxImage {
+/// any order of triangles. Keeps its buffers, in the memory of the executor, between pictures.
+template <class Exec>
+class FluxImageOn {
  public:
   /// @pre columns, rows ≥ 1.
-  FluxImage(int columns, int rows);
+  FluxImageOn(int columns, int rows)
+      : columns_(columns),
+        rows_(rows),
+        flux_(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows)) {}
 
   [[nodiscard]] int columns() const { return columns_; }
   [[nodiscard]] int rows() const { return rows_; }
@@ -25,50 +30,58 @@ class FluxImage {
   /// several threads), and returns the flux of every pixel as a share of the lens's total, row by
   /// row from the top. The values stay valid until the next call. Work: pixels crossed by edges.
   template <class Source>
-  std::span<const double> render(const Executor& executor, std::int64_t count,
-                                 const Source& source) {
-    clear(executor);
-    const auto work = [&](std::int64_t begin, std::int64_t end, int worker) {
-      const FluxAccumulator image = accumulator(worker);
-      for (std::int64_t i = begin; i < end; ++i) deposit(source(i), image);
-    };
-    executor.run(
-        "flux deposit", count, kDefaultGrain,
-        [](const void* body, std::int64_t begin, std::int64_t end, int worker) {
-          (*static_cast<const decltype(work)*>(body))(begin, end, worker);
-        },
-        &work);
-    return resolve(executor);
+  std::span<const double> render(const Exec& executor, std::int64_t count, const Source& source) {
+    const int workers = executor.concurrency();
+    const std::size_t size = units_per_picture() * static_cast<std::size_t>(workers);
+    if (units_.size() != size) units_ = Units(size);
+    fill_zero(executor, units_);
+    const auto stride = static_cast<std::int64_t>(units_per_picture());
+    parallel_for_worker(executor, "flux deposit", count,
+                        DepositFlux<Source>{source, {units_.data(), columns_, rows_}, stride});
+    scan_rows(executor, "flux resolve", rows_, columns_,
+              ResolveFlux{units_.data(), flux_.data(), columns_, stride, workers});
+    return {flux_.data(), flux_.size()};
   }
 
-  /// render() of triangles in memory.
-  std::span<const double> render(const Executor& executor,
-                                 std::span<const ImageTriangle> triangles) {
+  /// render() of triangles in the executor's memory.
+  std::span<const double> render(const Exec& executor, std::span<const ImageTriangle> triangles) {
     return render(executor, static_cast<std::int64_t>(triangles.size()),
-                  [triangles](std::int64_t i) { return triangles[static_cast<std::size_t>(i)]; });
+                  StoredTriangles{triangles.data()});
   }
 
  private:
-  [[nodiscard]] FluxAccumulator accumulator(int worker);
-  void clear(const Executor& executor);
-  std::span<const double> resolve(const Executor& executor);
+  using Units = typename Exec::template Buffer<std::int64_t>;
+
+  [[nodiscard]] std::size_t units_per_picture() const {
+    return (static_cast<std::size_t>(columns_) + 1) * static_cast<std::size_t>(rows_);
+  }
 
   int columns_;
   int rows_;
-  std::vector<std::vector<std::int64_t>> units_;  ///< One picture of row differences per worker.
-  std::vector<double> flux_;
+  Units units_;  ///< One picture of row differences per worker.
+  typename Exec::template Buffer<double> flux_;
 };
 
+using FluxImage = FluxImageOn<Executor>;
+
 /// ∂E/∂(pixel flux) prepared for deposit_adjoint().
-class FluxCotangentImage {
+template <class Exec>
+class FluxCotangentImageOn {
  public:
   /// Takes columns × rows derivatives, row by row from the top.
-  FluxCotangentImage(int columns, int rows);
+  FluxCotangentImageOn(int columns, int rows)
+      : columns_(columns),
+        rows_(rows),
+        pixel_(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows)),
+        suffix_((static_cast<std::size_t>(columns) + 1) * static_cast<std::size_t>(rows)) {}
 
   /// Derivatives to be filled in; call prepare() afterwards.
-  [[nodiscard]] std::span<double> pixels() { return pixel_; }
+  [[nodiscard]] std::span<double> pixels() { return {pixel_.data(), pixel_.size()}; }
   /// Sums the rows from the right.
-  void prepare(const Executor& executor);
+  void prepare(const Exec& executor) {
+    scan_rows(executor, "flux cotangent", rows_, columns_,
+              SumFromRight{pixel_.data(), suffix_.data(), columns_});
+  }
   [[nodiscard]] FluxCotangent view() const {
     return {pixel_.data(), suffix_.data(), columns_, rows_};
   }
@@ -76,8 +89,13 @@ class FluxCotangentImage {
  private:
   int columns_;
   int rows_;
-  std::vector<double> pixel_;
-  std::vector<double> suffix_;
+  typename Exec::template Buffer<double> pixel_;
+  typename Exec::template Buffer<double> suffix_;
 };
+
+using FluxCotangentImage = FluxCotangentImageOn<Executor>;
+
+extern template class FluxImageOn<Executor>;
+extern template class FluxCotangentImageOn<Executor>;
 
 }  // namespace lensforge

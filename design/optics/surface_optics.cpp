@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "design/optics/surface_optics.h"
 
-#include <cmath>
 #include <cstddef>
-#include <limits>
 
 #include "design/optics/facet.h"
 #include "design/optics/projection.h"
-#include "design/optics/smooth.h"
+#include "design/optics/surface_kernels.h"
 
 namespace lensforge {
 
@@ -17,51 +15,27 @@ Corners corners_of(const SurfaceMesh& mesh, std::int64_t t) {
   return {mesh.corner(t, 0), mesh.corner(t, 1), mesh.corner(t, 2)};
 }
 
-std::vector<ImageTriangle> project_facets(const SurfaceMesh& mesh, const OpticalSetup& setup,
-                                          const Executor& executor) {
-  const Projection optics(setup);
-  const double lens_area = setup.lens_size.prod();
+SurfaceView view_of(const SurfaceMesh& mesh, const OpticalSetup& setup) {
+  return {mesh.triangles.data(), mesh.vertices.data(), Projection(setup), setup.lens_size.prod()};
+}
+
+template <class Project>
+std::vector<ImageTriangle> project_all(const char* kernel, const SurfaceMesh& mesh,
+                                       const Project& project, const Executor& executor) {
   std::vector<ImageTriangle> triangles(static_cast<std::size_t>(mesh.triangle_count()));
-  parallel_for(executor, "project facets", mesh.triangle_count(), [&](std::int64_t i) {
-    const Corners t = corners_of(mesh, i);
-    const Eigen::Vector3d n = area_normal(t).normalized();
-    if (!optics.transmits(n)) return;  // An image triangle without flux.
-    triangles[static_cast<std::size_t>(i)] =
-        project_facet(t, RefractedBeam(n, optics.eta), optics, lens_area);
-  });
+  parallel_for(executor, kernel, mesh.triangle_count(),
+               [&](std::int64_t i) { triangles[static_cast<std::size_t>(i)] = project(i); });
   return triangles;
 }
 
 /// Landing points of all vertices; NaN where a vertex does not transmit.
-Eigen::Matrix2Xd project_vertices(const SurfaceMesh& mesh, const Projection& optics,
-                                  const Executor& executor) {
+Eigen::Matrix2Xd land_rays(const SurfaceMesh& mesh, const SurfaceView& surface,
+                           const Executor& executor) {
   const Eigen::Matrix3Xd normals = vertex_area_normals(mesh);
   Eigen::Matrix2Xd landing(2, mesh.vertex_count());
-  parallel_for(executor, "project vertices", mesh.vertex_count(), [&](std::int64_t v) {
-    const Eigen::Vector3d n = VertexNormal(normals.col(v)).n;
-    if (optics.transmits(n)) {
-      landing.col(v) = project_vertex(mesh.vertices.col(v), n, optics);
-    } else {
-      landing.col(v).setConstant(std::numeric_limits<double>::quiet_NaN());
-    }
-  });
+  parallel_for(executor, "project vertices", mesh.vertex_count(),
+               LandRay{surface, normals.data(), landing.data()});
   return landing;
-}
-
-std::vector<ImageTriangle> project_smooth(const SurfaceMesh& mesh, const OpticalSetup& setup,
-                                          const Executor& executor) {
-  const Eigen::Matrix2Xd landing = project_vertices(mesh, Projection(setup), executor);
-  const double lens_area = setup.lens_size.prod();
-  std::vector<ImageTriangle> triangles(static_cast<std::size_t>(mesh.triangle_count()));
-  parallel_for(executor, "project smooth", mesh.triangle_count(), [&](std::int64_t i) {
-    const Eigen::Vector3i v = mesh.triangles.col(i);
-    ImageTriangle& image = triangles[static_cast<std::size_t>(i)];
-    image = {landing.col(v[0]), landing.col(v[1]), landing.col(v[2]),
-             0.5 * area_normal(corners_of(mesh, i)).z() / lens_area};
-    const bool lit = image.p0.allFinite() && image.p1.allFinite() && image.p2.allFinite();
-    if (!lit || image.flux < 0.0) image = {};
-  });
-  return triangles;
 }
 
 }  // namespace
@@ -77,8 +51,12 @@ Eigen::Matrix3Xd vertex_area_normals(const SurfaceMesh& mesh) {
 
 std::vector<ImageTriangle> project_surface(const SurfaceMesh& mesh, const OpticalSetup& setup,
                                            SurfaceModel model, const Executor& executor) {
-  return model == SurfaceModel::kFacet ? project_facets(mesh, setup, executor)
-                                       : project_smooth(mesh, setup, executor);
+  const SurfaceView surface = view_of(mesh, setup);
+  if (model == SurfaceModel::kFacet) {
+    return project_all("project facets", mesh, ProjectFacet{surface}, executor);
+  }
+  const Eigen::Matrix2Xd landing = land_rays(mesh, surface, executor);
+  return project_all("project smooth", mesh, ProjectSmooth{surface, landing.data()}, executor);
 }
 
 }  // namespace lensforge

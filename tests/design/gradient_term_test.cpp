@@ -23,20 +23,20 @@ TEST(GradientTerm, IsTheSumOfSquaredForwardDifferences) {
       if (r + 1 < kTermRows) expected += std::pow(rows(c, r + 1) - rows(c, r), 2);
     }
   }
-  EXPECT_NEAR(testing::value_of(&gradient_term, error), expected, 1e-12);
+  EXPECT_NEAR(testing::value_of(&gradient_term<Executor>, error), expected, 1e-12);
 }
 
 TEST(GradientTerm, IgnoresAConstantOffset) {
   const Eigen::VectorXd offset = Eigen::VectorXd::Constant(kTermColumns * kTermRows, 0.7);
-  EXPECT_EQ(testing::value_of(&gradient_term, offset), 0.0);
+  EXPECT_EQ(testing::value_of(&gradient_term<Executor>, offset), 0.0);
 }
 
 TEST(GradientTerm, AdjointEqualsCentralDifferences) {
-  testing::expect_adjoint_equals_central_differences(&gradient_term);
+  testing::expect_adjoint_equals_central_differences(&gradient_term<Executor>);
 }
 
 TEST(GradientTerm, ThreadCountDoesNotChangeABit) {
-  testing::expect_same_bits_for_any_thread_count(&gradient_term);
+  testing::expect_same_bits_for_any_thread_count(&gradient_term<Executor>);
 }
 
 }  // namespace

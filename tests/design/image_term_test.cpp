@@ -13,15 +13,15 @@ using testing::kTermRows;
 
 TEST(ImageTerm, IsTheSumOfSquares) {
   const Eigen::VectorXd error = testing::random_error(kTermColumns * kTermRows, 3);
-  EXPECT_NEAR(testing::value_of(&image_term, error), error.squaredNorm(), 1e-12);
+  EXPECT_NEAR(testing::value_of(&image_term<Executor>, error), error.squaredNorm(), 1e-12);
 }
 
 TEST(ImageTerm, AdjointEqualsCentralDifferences) {
-  testing::expect_adjoint_equals_central_differences(&image_term);
+  testing::expect_adjoint_equals_central_differences(&image_term<Executor>);
 }
 
 TEST(ImageTerm, ThreadCountDoesNotChangeABit) {
-  testing::expect_same_bits_for_any_thread_count(&image_term);
+  testing::expect_same_bits_for_any_thread_count(&image_term<Executor>);
 }
 
 }  // namespace

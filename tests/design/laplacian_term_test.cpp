@@ -13,17 +13,25 @@ using testing::Random;
 
 const Eigen::Vector2d kSize(12.0, 10.0);
 
+/// E_lap of `vertices`; adds weight × its derivative to `gradient`.
+double evaluate(const SurfaceMesh& mesh, const Eigen::Matrix3Xd& vertices, double weight,
+                Eigen::Matrix3Xd& gradient, const Executor& executor = Executor::serial()) {
+  const MeshOn<Executor> arrays(mesh, make_topology(mesh), executor);
+  Eigen::Matrix2Xd shares(2, vertices.cols());
+  const LaplacianDistance distance{arrays.view(), vertices.data(), shares.data()};
+  return laplacian_term(executor, distance, weight, gradient.data()).get()[0];
+}
+
 double value_of(const SurfaceMesh& mesh, const Eigen::Matrix3Xd& vertices) {
   Eigen::Matrix3Xd ignored = Eigen::Matrix3Xd::Zero(3, vertices.cols());
-  return laplacian_term(Executor::serial(), vertices, make_topology(mesh), 1.0, ignored);
+  return evaluate(mesh, vertices, 1.0, ignored);
 }
 
 TEST(LaplacianTerm, IsZeroWhereEveryVertexIsAmongItsNeighbours) {
   // The middle of a grid mesh is regular; an affine map keeps it so.
   SurfaceMesh mesh = make_grid_mesh(kSize, {30, 9}, 5.0);
   Eigen::Matrix3Xd gradient = Eigen::Matrix3Xd::Zero(3, mesh.vertices.cols());
-  const MeshTopology topology = make_topology(mesh);
-  laplacian_term(Executor::serial(), mesh.vertices, topology, 1.0, gradient);
+  evaluate(mesh, mesh.vertices, 1.0, gradient);
   EXPECT_LT(gradient.col(4 * 30 + 15).norm(), 1e-14);
 }
 
@@ -47,7 +55,7 @@ TEST(LaplacianTerm, AdjointEqualsCentralDifferences) {
   SurfaceMesh mesh = make_grid_mesh(kSize, {8, 7}, 5.0);
   for (double& x : mesh.vertices.reshaped()) x += 0.2 * random.between(-1.0, 1.0);
   Eigen::Matrix3Xd gradient = Eigen::Matrix3Xd::Constant(3, mesh.vertices.cols(), 2.0);
-  laplacian_term(Executor::cpu(2), mesh.vertices, make_topology(mesh), 0.4, gradient);
+  evaluate(mesh, mesh.vertices, 0.4, gradient, Executor::cpu(2));
   const auto f = [&](const Eigen::VectorXd& x) {
     return 0.4 * value_of(mesh, x.reshaped(3, mesh.vertices.cols()));
   };

@@ -18,7 +18,8 @@ namespace lensforge::testing {
 inline constexpr int kTermColumns = 9;
 inline constexpr int kTermRows = 7;
 
-using PictureTerm = double (*)(const Executor&, const PictureError&, double, std::span<double>);
+using PictureTerm = FinishedSum<1> (*)(const Executor&, const PictureError&, double,
+                                       std::span<double>);
 
 inline Eigen::VectorXd random_error(int count, std::uint64_t seed) {
   Random random(seed);
@@ -27,19 +28,15 @@ inline Eigen::VectorXd random_error(int count, std::uint64_t seed) {
   return error;
 }
 
-inline std::span<const double> view(const Eigen::VectorXd& values) {
-  return {values.data(), static_cast<std::size_t>(values.size())};
-}
-
 inline double value_of(PictureTerm term, const Eigen::VectorXd& error) {
   std::vector<double> ignored(static_cast<std::size_t>(error.size()));
-  return term(Executor::serial(), {kTermColumns, kTermRows, view(error)}, 1.0, ignored);
+  return term(Executor::serial(), {kTermColumns, kTermRows, error.data()}, 1.0, ignored).get()[0];
 }
 
 inline void expect_adjoint_equals_central_differences(PictureTerm term) {
   const Eigen::VectorXd error = random_error(kTermColumns * kTermRows, 1);
   std::vector<double> bar(static_cast<std::size_t>(error.size()), 5.0);
-  term(Executor::serial(), {kTermColumns, kTermRows, view(error)}, 0.3, bar);
+  term(Executor::serial(), {kTermColumns, kTermRows, error.data()}, 0.3, bar);
   const Eigen::VectorXd expected = numeric_gradient(
       [&](const Eigen::VectorXd& x) { return 0.3 * value_of(term, x); }, error, 1e-2);
   const Eigen::Map<const Eigen::VectorXd> computed(bar.data(), error.size());
@@ -49,11 +46,11 @@ inline void expect_adjoint_equals_central_differences(PictureTerm term) {
 inline void expect_same_bits_for_any_thread_count(PictureTerm term) {
   constexpr int kSide = 150;
   const Eigen::VectorXd error = random_error(kSide * kSide, 2);
-  const PictureError picture{kSide, kSide, view(error)};
+  const PictureError picture{kSide, kSide, error.data()};
   std::vector<double> serial(static_cast<std::size_t>(error.size()));
   std::vector<double> parallel(serial.size());
-  const double value = term(Executor::serial(), picture, 0.3, serial);
-  EXPECT_EQ(value, term(Executor::cpu(2), picture, 0.3, parallel));
+  const double value = term(Executor::serial(), picture, 0.3, serial).get()[0];
+  EXPECT_EQ(value, term(Executor::cpu(2), picture, 0.3, parallel).get()[0]);
   EXPECT_EQ(serial, parallel);
 }
 

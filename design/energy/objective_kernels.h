@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+
+#include "core/host_device.h"
+#include "core/transfer.h"
+#include "design/energy/face_fit.h"
+#include "design/energy/objective_view.h"
+#include "design/energy/reflection_barrier.h"
+#include "design/optics/smooth.h"
+
+/// What the objective does for one face, vertex or pixel on the way to its value: surface → frames,
+/// Weingarten maps, landing points, picture error. The way back is in objective_adjoint.h.
+namespace lensforge {
+
+/// Frame of a face; its share of E_barr, which is infinite where the surface is not allowed.
+struct MeasureFace {
+  ObjectiveView o;
+
+  LF_HD std::array<double, 1> operator()(std::int64_t i) const {
+    const Corners t = o.corners(i);
+    const FaceFrame frame = face_frame(t);
+    o.frames[i] = frame;
+    const double area = 0.5 * doubled_projected_area(t);
+    return {area_barrier(area, o.options.area).value +
+            reflection_barrier(frame.n.z(), o.optics.eta).value};
+  }
+};
+
+/// The map of a face that minimises H²A + τ1 Σ w δ. @pre frames are up to date.
+struct FitMap {
+  ObjectiveView o;
+
+  LF_HD void operator()(std::int64_t i) const {
+    FaceFit fit;
+    for (int k = 0; k < 3; ++k) {
+      const int j = o.mesh.neighbour(i, k);
+      if (j < 0) continue;
+      fit.add(NeighbourOffset(o.frames[i], o.frames[j]),
+              o.options.weights.edge * o.edge_weights[3 * i + k]);
+    }
+    fit.add_mean_curvature(area_normal(o.corners(i)).norm());
+    o.maps[i] = fit.solve();
+  }
+};
+
+/// Equal weights for all of a face's edges, as on a flat surface.
+struct ResetEdgeWeights {
+  ObjectiveView o;
+
+  LF_HD void operator()(std::int64_t i) const {
+    const double flat = welsch(0.0, o.options.nu).slope;
+    for (int k = 0; k < 3; ++k) {
+      o.edge_weights[3 * i + k] = o.mesh.neighbour(i, k) < 0 ? 0.0 : flat;
+    }
+  }
+};
+
+/// Welsch weights of a face's edges from its map and its neighbours'; its half of Σ Ψ(h⁰) − w h⁰.
+struct ReweightEdges {
+  ObjectiveView o;
+
+  /// h of edge k of a face, which is not on the boundary.
+  [[nodiscard]] LF_HD double mismatch(std::int64_t face, int k) const {
+    const int j = o.mesh.neighbour(face, k);
+    const FaceFrame& frame_i = o.frames[face];
+    const FaceFrame& frame_j = o.frames[j];
+    return NeighbourOffset(frame_i, frame_j).mismatch(o.maps[face]) +
+           NeighbourOffset(frame_j, frame_i).mismatch(o.maps[j]);
+  }
+  LF_HD std::array<double, 1> operator()(std::int64_t i) const {
+    double offset = 0.0;
+    for (int k = 0; k < 3; ++k) {
+      if (o.mesh.neighbour(i, k) < 0) continue;
+      const double h = mismatch(i, k);
+      const ValueSlope psi = welsch(h, o.options.nu);
+      o.edge_weights[3 * i + k] = psi.slope;
+      offset += 0.5 * (psi.value - psi.slope * h);
+    }
+    return {offset};
+  }
+};
+
+/// Smooth model: normal and landing point of a vertex; 1 where it does not transmit, else 0.
+struct LandVertex {
+  ObjectiveView o;
+
+  LF_HD std::array<double, 1> operator()(std::int64_t v) const {
+    Eigen::Vector3d sum(0.0, 0.0, 0.0);
+    const MeshView& mesh = o.mesh;
+    for (auto c = mesh.vertex_corner_begin[v]; c < mesh.vertex_corner_begin[v + 1]; ++c) {
+      sum += area_normal(o.corners(mesh.vertex_corners[c] / 3));
+    }
+    column3(o.vertex_normals, v) = sum;
+    const Eigen::Vector3d n = VertexNormal(sum).n;
+    if (!o.optics.transmits(n)) return {1.0};
+    column2(o.landing, v) = project_vertex(column3(o.vertices, v), n, o.optics);
+    return {0.0};
+  }
+};
+
+/// |g − g̃| of a pixel; sets its error and clears its cotangent.
+struct ComparePixel {
+  const double* flux;
+  const double* target;
+  double target_total;
+  double* error;
+  double* bar;
+
+  LF_HD std::array<double, 1> operator()(std::int64_t i) const {
+    error[i] = encode(target_total * flux[i]) - target[i];
+    bar[i] = 0.0;
+    return {std::fabs(error[i])};
+  }
+};
+
+/// Cotangent of a pixel: by its display-encoded value → by its flux.
+struct EncodeAdjoint {
+  const double* flux;
+  double target_total;
+  double* bar;
+
+  LF_HD void operator()(std::int64_t i) const {
+    bar[i] *= encode_slope(target_total * flux[i]) * target_total;
+  }
+};
+
+}  // namespace lensforge

@@ -1,0 +1,310 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <variant>
+#include <vector>
+
+#include "core/executor.h"
+#include "core/image.h"
+#include "core/mesh_topology.h"
+#include "core/surface_mesh.h"
+#include "design/energy/gradient_term.h"
+#include "design/energy/image_term.h"
+#include "design/energy/laplacian_term.h"
+#include "design/energy/mesh_view.h"
+#include "design/energy/objective_adjoint.h"
+#include "design/energy/objective_kernels.h"
+#include "design/energy/objective_options.h"
+#include "design/flux/flux_image.h"
+
+namespace lensforge {
+
+/// DesignObjective on any executor: all arrays, the vertices and the gradient too, lie in its
+/// memory, and only sums come back to the caller.
+template <class Exec>
+class DesignObjectiveOn {
+ public:
+  DesignObjectiveOn(const SurfaceMesh& mesh, const OpticalSetup& setup, const DesignGoal& goal,
+                    const ObjectiveOptions& options, const Exec& executor);
+
+  /// DesignObjective::relinearize() and evaluate() of 3 × V numbers in the executor's memory.
+  void relinearize(const double* vertices);
+  ObjectiveEvaluation evaluate(const double* vertices, double* gradient);
+
+  /// DesignObjective::movable(), in the caller's memory.
+  [[nodiscard]] const Eigen::Matrix3Xd& movable() const { return movable_; }
+
+ private:
+  template <class T>
+  using Buffer = typename Exec::template Buffer<T>;
+
+  void take(const Image& target);
+  void take(const Correspondence& wanted);
+  [[nodiscard]] ObjectiveView view(const double* vertices);
+  [[nodiscard]] bool allowed(const ObjectiveView& o);
+  /// Sums of one evaluation; not asked for before all kernels are on their way.
+  struct Sums;
+  void compare_picture(const ObjectiveView& o, Sums& sums);
+  void pull_back(const ObjectiveView& o, double* gradient, Sums& sums);
+  void add_laplacian(const ObjectiveView& o, double* gradient, Sums& sums);
+  [[nodiscard]] EnergyValues energies(const Sums& sums) const;
+  /// mm² → square pixels.
+  [[nodiscard]] double pixels_per_area() const {
+    return std::fabs(optics_.plane.pixels_per_mm().prod());
+  }
+
+  Exec executor_;
+  ObjectiveOptions options_;
+  Projection optics_;
+  double lens_area_;
+  MeshOn<Exec> mesh_;
+  Eigen::Matrix3Xd movable_;
+  Buffer<double> movable_here_;
+
+  Buffer<double> target_;
+  double target_total_ = 0.0;
+  Buffer<double> wanted_centroids_;
+  Buffer<double> wanted_flux_;
+
+  Buffer<FaceFrame> frames_;
+  Buffer<WeingartenMap> maps_;
+  Buffer<double> edge_weights_;
+  double edge_offset_ = 0.0;  ///< Σ Ψ(h⁰) − w h⁰ over the edges.
+
+  FluxImageOn<Exec> flux_;
+  FluxCotangentImageOn<Exec> cotangent_;
+  Buffer<double> error_;
+  Buffer<Corners> corner_bar_;
+  Buffer<double> laplacian_shares_;
+
+  Buffer<double> vertex_normals_;
+  Buffer<double> landing_;
+  Buffer<ImageTriangle> triangle_bar_;
+  Buffer<double> vertex_bar_;
+  Buffer<double> vertex_normal_bar_;
+};
+
+namespace objective_detail {
+
+/// Relative distance from the lens's border within which a vertex counts as lying on it.
+inline constexpr double kBorderTolerance = 1e-9;
+
+/// Sweeps of iteratively reweighted least squares that relinearize() does from equal weights. Three
+/// settle which edges count as creases; more change the weights by less than they change between
+/// two rounds.
+inline constexpr int kReweightingSweeps = 3;
+
+inline Eigen::Matrix3Xd movable_coordinates(const Eigen::Matrix3Xd& vertices,
+                                            const Eigen::Vector2d& size) {
+  Eigen::Matrix3Xd movable = Eigen::Matrix3Xd::Ones(3, vertices.cols());
+  for (Eigen::Index v = 0; v < vertices.cols(); ++v) {
+    for (int k = 0; k < 2; ++k) {
+      const double tolerance = kBorderTolerance * size[k];
+      const double position = vertices(k, v);
+      if (position < tolerance || position > size[k] - tolerance) movable(k, v) = 0.0;
+    }
+  }
+  return movable;
+}
+
+/// A matrix's entries, column by column.
+template <class Matrix>
+std::span<const double> entries(const Matrix& matrix) {
+  return {matrix.data(), static_cast<std::size_t>(matrix.size())};
+}
+
+}  // namespace objective_detail
+
+template <class Exec>
+DesignObjectiveOn<Exec>::DesignObjectiveOn(const SurfaceMesh& mesh, const OpticalSetup& setup,
+                                           const DesignGoal& goal, const ObjectiveOptions& options,
+                                           const Exec& executor)
+    : executor_(executor),
+      options_(options),
+      optics_(setup),
+      lens_area_(setup.lens_size.prod()),
+      mesh_(mesh, make_topology(mesh), executor),
+      movable_(objective_detail::movable_coordinates(mesh.vertices, setup.lens_size)),
+      movable_here_(buffer_of(executor, objective_detail::entries(movable_))),
+      flux_(setup.pixels.x(), setup.pixels.y()),
+      cotangent_(setup.pixels.x(), setup.pixels.y()) {
+  const auto faces = static_cast<std::size_t>(mesh.triangle_count());
+  const auto vertices = static_cast<std::size_t>(mesh.vertex_count());
+  frames_ = Buffer<FaceFrame>(faces);
+  maps_ = Buffer<WeingartenMap>(faces);
+  edge_weights_ = Buffer<double>(3 * faces);
+  corner_bar_ = Buffer<Corners>(faces);
+  laplacian_shares_ = Buffer<double>(2 * vertices);
+  fill_zero(executor_, maps_);
+  fill_zero(executor_, edge_weights_);
+  std::visit([this](const auto& wanted) { this->take(wanted); }, goal);
+  if (options.model == SurfaceModel::kSmooth) {
+    landing_ = Buffer<double>(2 * vertices);
+    vertex_normals_ = Buffer<double>(3 * vertices);
+    vertex_bar_ = Buffer<double>(3 * vertices);
+    vertex_normal_bar_ = Buffer<double>(3 * vertices);
+    triangle_bar_ = Buffer<ImageTriangle>(faces);
+  }
+  const Buffer<double> start = buffer_of(executor_, objective_detail::entries(mesh.vertices));
+  relinearize(start.data());
+}
+
+template <class Exec>
+void DesignObjectiveOn<Exec>::take(const Image& target) {
+  const std::vector<double> encoded = encoded_values(target);
+  target_ = buffer_of(executor_, std::span<const double>(encoded));
+  target_total_ = target.total();
+  error_ = Buffer<double>(encoded.size());
+}
+
+template <class Exec>
+void DesignObjectiveOn<Exec>::take(const Correspondence& wanted) {
+  wanted_centroids_ = buffer_of(executor_, objective_detail::entries(wanted.centroids));
+  wanted_flux_ = buffer_of(executor_, objective_detail::entries(wanted.flux));
+}
+
+template <class Exec>
+ObjectiveView DesignObjectiveOn<Exec>::view(const double* vertices) {
+  return {.options = options_,
+          .lens_area = lens_area_,
+          .optics = optics_,
+          .mesh = mesh_.view(),
+          .vertices = vertices,
+          .columns = static_cast<double>(flux_.columns()),
+          .rows = static_cast<double>(flux_.rows()),
+          .cotangent = cotangent_.view(),
+          .wanted_centroids = wanted_centroids_.size() > 0 ? wanted_centroids_.data() : nullptr,
+          .wanted_flux = wanted_flux_.data(),
+          .frames = frames_.data(),
+          .maps = maps_.data(),
+          .edge_weights = edge_weights_.data(),
+          .corner_bar = corner_bar_.data(),
+          .vertex_normals = vertex_normals_.data(),
+          .landing = landing_.data(),
+          .triangle_bar = triangle_bar_.data(),
+          .vertex_bar = vertex_bar_.data(),
+          .vertex_normal_bar = vertex_normal_bar_.data()};
+}
+
+template <class Exec>
+void DesignObjectiveOn<Exec>::relinearize(const double* vertices) {
+  if (options_.weights.smooth == 0.0 || options_.weights.edge == 0.0) return;
+  const ObjectiveView o = view(vertices);
+  const std::int64_t faces = o.mesh.faces;
+  static_cast<void>(pending_sum<1>(executor_, "face frames", faces, MeasureFace{o}));
+  parallel_for(executor_, "welsch reset", faces, ResetEdgeWeights{o});
+  for (int sweep = 0; sweep < objective_detail::kReweightingSweeps; ++sweep) {
+    parallel_for(executor_, "weingarten fit", faces, FitMap{o});
+    edge_offset_ = pending_sum<1>(executor_, "welsch weights", faces, ReweightEdges{o}).get()[0];
+  }
+}
+
+/// Frames, and in the smooth model landing points; false where a barrier is infinite.
+template <class Exec>
+bool DesignObjectiveOn<Exec>::allowed(const ObjectiveView& o) {
+  const auto barrier = pending_sum<1>(executor_, "face frames", o.mesh.faces, MeasureFace{o});
+  if (!std::isfinite(barrier.get()[0])) return false;
+  if (o.facets()) return true;
+  return pending_sum<1>(executor_, "land vertices", o.mesh.vertices, LandVertex{o}).get()[0] == 0.0;
+}
+
+template <class Exec>
+struct DesignObjectiveOn<Exec>::Sums {
+  template <std::size_t N>
+  using Pending = typename Exec::template PendingSum<N>;
+
+  Pending<1> absolute_error;
+  Pending<1> image;
+  Pending<1> gradient;
+  Pending<3> images;  ///< Smooth model: E_bdr, E_align, E_flux.
+  Pending<6> faces;   ///< FaceSums
+  Pending<1> laplacian;
+};
+
+/// Renders the picture and makes its cotangent: E_img, E_grad, MAE.
+template <class Exec>
+void DesignObjectiveOn<Exec>::compare_picture(const ObjectiveView& o, Sums& sums) {
+  const auto flux = flux_.render(executor_, o.mesh.faces, FaceLightSource{o});
+  const std::span<double> bar = cotangent_.pixels();
+  const PictureError picture{flux_.columns(), flux_.rows(), error_.data()};
+  const ComparePixel compare{flux.data(), target_.data(), target_total_, error_.data(), bar.data()};
+  sums.absolute_error = pending_sum<1>(executor_, "picture error", picture.count(), compare);
+  sums.image = image_term(executor_, picture, options_.weights.image, bar);
+  sums.gradient = gradient_term(executor_, picture, options_.weights.gradient, bar);
+  parallel_for(executor_, "encode adjoint", picture.count(),
+               EncodeAdjoint{flux.data(), target_total_, bar.data()});
+  cotangent_.prepare(executor_);
+}
+
+/// From the goal, the barriers and the smoothness terms back to the vertices.
+template <class Exec>
+void DesignObjectiveOn<Exec>::pull_back(const ObjectiveView& o, double* gradient, Sums& sums) {
+  const std::int64_t faces = o.mesh.faces;
+  if (!o.facets()) {
+    sums.images = pending_sum<3>(executor_, "flux adjoint", faces, PullBackImage{o});
+    parallel_for(executor_, "pull back vertices", o.mesh.vertices, PullBackVertex{o});
+  }
+  sums.faces = pending_sum<6>(executor_, "face adjoint", faces, PullBackFace{o});
+  parallel_for(executor_, "gather vertices", o.mesh.vertices, GatherVertex{o, gradient});
+}
+
+template <class Exec>
+void DesignObjectiveOn<Exec>::add_laplacian(const ObjectiveView& o, double* gradient, Sums& sums) {
+  const ObjectiveWeights& w = options_.weights;
+  const double weight = w.smooth * w.laplacian * pixels_per_area();
+  const LaplacianDistance distance{o.mesh, o.vertices, laplacian_shares_.data()};
+  sums.laplacian = laplacian_term(executor_, distance, weight, gradient);
+}
+
+template <class Exec>
+EnergyValues DesignObjectiveOn<Exec>::energies(const Sums& sums) const {
+  const ObjectiveWeights& w = options_.weights;
+  const bool facets = options_.model == SurfaceModel::kFacet;
+  const FaceSums faces = sums.faces.get();
+  const std::array<double, 3> images = sums.images.get();
+  EnergyValues e;
+  e.image = sums.image.get()[0];
+  e.gradient = sums.gradient.get()[0];
+  e.boundary = facets ? faces[0] : images[0];
+  e.align = facets ? faces[1] : images[1];
+  e.flux = facets ? faces[2] : images[2];
+  e.barrier = faces[3];
+  e.face = faces[4];
+  if (w.smooth > 0.0) e.edge = faces[5] + edge_offset_;
+  e.laplacian = pixels_per_area() * sums.laplacian.get()[0];
+  e.total = w.image * e.image + w.gradient * e.gradient + w.boundary * e.boundary +
+            w.align * e.align + w.flux * e.flux +
+            w.smooth * (e.face + w.edge * e.edge + w.laplacian * e.laplacian) +
+            w.barrier * e.barrier;
+  return e;
+}
+
+template <class Exec>
+ObjectiveEvaluation DesignObjectiveOn<Exec>::evaluate(const double* vertices, double* gradient) {
+  ObjectiveEvaluation result;
+  const ObjectiveView o = view(vertices);
+  if (!allowed(o)) return result;
+  Sums sums;
+  const bool follows_picture = o.wanted_centroids == nullptr;
+  if (follows_picture) compare_picture(o, sums);
+  if (options_.weights.smooth > 0.0) {
+    parallel_for(executor_, "weingarten fit", o.mesh.faces, FitMap{o});
+  }
+  pull_back(o, gradient, sums);
+  if (options_.weights.smooth * options_.weights.laplacian > 0.0) {
+    add_laplacian(o, gradient, sums);
+  }
+  parallel_for(executor_, "hold borders", 3 * o.mesh.vertices,
+               HoldCoordinate{movable_here_.data(), gradient});
+  result.feasible = true;
+  result.energy = energies(sums);
+  if (follows_picture) result.mae = sums.absolute_error.get()[0] / (o.columns * o.rows);
+  return result;
+}
+
+}  // namespace lensforge

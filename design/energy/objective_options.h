@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <variant>
+
+#include "core/image.h"
+#include "core/optical_setup.h"
+#include "design/energy/area_barrier.h"
+#include "design/energy/correspondence_term.h"
+#include "design/energy/weights.h"
+
+namespace lensforge {
+
+/// The area that a lens's outline keeps for itself: which thresholds its area barrier has.
+/// ε1 = 0.1 % and ε2 = 0.5 % of the mean projected triangle: dark parts need small facets (a
+/// facet's flux is its projected area), and a thousandth still divides without loss of digits.
+AreaBarrier default_area_barrier(const OpticalSetup& setup, std::int64_t triangles);
+
+struct ObjectiveOptions {
+  ObjectiveWeights weights;
+  SurfaceModel model = SurfaceModel::kFacet;
+  double nu = 1.0;               ///< ν of the Welsch function, 1/mm, > 0.
+  AreaBarrier area{1e-6, 5e-6};  ///< mm²
+};
+
+/// What a surface is shaped after: a picture in linear light (Sun et al., Eq. 18), or where
+/// transport wants the light of each face (Eq. 20).
+using DesignGoal = std::variant<Image, Correspondence>;
+
+struct ObjectiveEvaluation {
+  bool feasible = false;  ///< False where a barrier is infinite; nothing else is set then.
+  EnergyValues energy;
+  double mae = 0.0;  ///< Mean |g − g̃|, display-encoded, not clipped; 0 for a correspondence.
+};
+
+}  // namespace lensforge

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <limits>
+
+#include "core/host_device.h"
+#include "design/optics/columns.h"
+#include "design/optics/facet.h"
+#include "design/optics/projection.h"
+#include "design/optics/smooth.h"
+
+/// What rendering a surface does for one triangle or vertex.
+namespace lensforge {
+
+/// A mesh's arrays in the memory of an executor, and the optics that it is seen through.
+struct SurfaceView {
+  const int* triangles;    ///< 3 × T
+  const double* vertices;  ///< 3 × V, mm
+  Projection optics;
+  double lens_area;  ///< mm²
+
+  [[nodiscard]] LF_HD Corners corners(std::int64_t i) const {
+    return corners_at(triangles + 3 * i, vertices);
+  }
+};
+
+/// Facet model: the image triangle of a triangle; without flux where it does not transmit.
+struct ProjectFacet {
+  SurfaceView surface;
+
+  LF_HD ImageTriangle operator()(std::int64_t i) const {
+    const Corners t = surface.corners(i);
+    const Eigen::Vector3d n = area_normal(t).normalized();
+    if (!surface.optics.transmits(n)) return {};
+    return project_facet(t, RefractedBeam(n, surface.optics.eta), surface.optics,
+                         surface.lens_area);
+  }
+};
+
+/// Smooth model: where a vertex's ray lands; NaN where it does not transmit.
+struct LandRay {
+  SurfaceView surface;
+  const double* normals;  ///< 3 × V, vertex_area_normals().
+  double* landing;        ///< 2 × V
+
+  LF_HD void operator()(std::int64_t v) const {
+    const Eigen::Vector3d n = VertexNormal(column3(normals, v)).n;
+    if (surface.optics.transmits(n)) {
+      column2(landing, v) = project_vertex(column3(surface.vertices, v), n, surface.optics);
+    } else {
+      column2(landing, v).setConstant(std::numeric_limits<double>::quiet_NaN());
+    }
+  }
+};
+
+/// Smooth model: the image triangle of a triangle; without flux where it is not lit from below.
+struct ProjectSmooth {
+  SurfaceView surface;
+  const double* landing;  ///< 2 × V
+
+  LF_HD static bool is_finite(const Eigen::Vector2d& p) {
+    return std::fabs(p.x()) < std::numeric_limits<double>::infinity() &&
+           std::fabs(p.y()) < std::numeric_limits<double>::infinity();
+  }
+  LF_HD ImageTriangle operator()(std::int64_t i) const {
+    const int* v = surface.triangles + 3 * i;
+    const ImageTriangle image{column2(landing, v[0]), column2(landing, v[1]),
+                              column2(landing, v[2]),
+                              0.5 * area_normal(surface.corners(i)).z() / surface.lens_area};
+    const bool lit = is_finite(image.p0) && is_finite(image.p1) && is_finite(image.p2);
+    return lit && !(image.flux < 0.0) ? image : ImageTriangle{};
+  }
+};
+
+}  // namespace lensforge

@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <numbers>
+#include <span>
+#include <vector>
+
+#include "core/executor.h"
+#include "core/host_device.h"
+#include "core/surface_mesh.h"
+#include "design/optimize/grid_symbol.h"
+#include "design/optimize/grid_transforms.h"
+
+namespace lensforge {
+
+/// What the preconditioner's kernels read and write, raw arrays in the memory of an executor. The
+/// planes hold one coordinate each, row by row, in the basis in which the transform is orthogonal.
+struct PreconditionerView {
+  int columns;
+  int rows;
+  const double* movable;  ///< 3 × V
+  const double* sizes;    ///< V
+  const double* eigen_x;  ///< Eigenvalues of the second differences along a row.
+  const double* eigen_y;
+  GridSymbol symbols[3];  ///< Of x, y and z.
+  double exponent;        ///< The preconditioner is taken to this power.
+  double* planes[3];
+
+  [[nodiscard]] LF_HD int row(std::int64_t v) const { return static_cast<int>(v) / columns; }
+  [[nodiscard]] LF_HD int column(std::int64_t v) const { return static_cast<int>(v) % columns; }
+
+  /// √ of the end weights ½, 1, …, 1, ½ in which the cosine transform is orthogonal.
+  [[nodiscard]] LF_HD static double root_end_weight(int i, int n) {
+    return i == 0 || i == n - 1 ? std::numbers::sqrt2 / 2.0 : 1.0;
+  }
+  [[nodiscard]] LF_HD double weight(std::int64_t v) const {
+    return root_end_weight(column(v), columns) * root_end_weight(row(v), rows);
+  }
+  /// How freely coordinate k of a vertex moves.
+  [[nodiscard]] LF_HD double freedom(std::int64_t v, int k) const {
+    return movable[3 * v + k] * std::pow(sizes[v], symbols[k].size_power * exponent);
+  }
+};
+
+/// Gradient of a vertex → planes.
+struct EnterPlanes {
+  PreconditionerView p;
+  const double* g;
+
+  LF_HD void operator()(std::int64_t v) const {
+    for (int k = 0; k < 3; ++k) p.planes[k][v] = p.freedom(v, k) * g[3 * v + k] / p.weight(v);
+  }
+};
+
+/// Multiplies a coefficient of every transformed plane by its symbol.
+struct ScaleCoefficient {
+  PreconditionerView p;
+  double normalize[3];  ///< s^exponent, and the scale of the transform and its inverse.
+
+  LF_HD void operator()(std::int64_t v) const {
+    const double lambda = p.eigen_x[p.column(v)] + p.eigen_y[p.row(v)];
+    for (int k = 0; k < 3; ++k) {
+      const GridSymbol& symbol = p.symbols[k];
+      const double power = -symbol.power * p.exponent;
+      const double base = symbol.floor + lambda;
+      const double decay = power == -2.0 ? 1.0 / (base * base) : std::pow(base, power);
+      p.planes[k][v] *= normalize[k] * decay * std::pow(1.0 + symbol.growth * lambda, -p.exponent);
+    }
+  }
+};
+
+/// Planes → step of a vertex.
+struct LeavePlanes {
+  PreconditionerView p;
+  double* r;
+
+  LF_HD void operator()(std::int64_t v) const {
+    for (int k = 0; k < 3; ++k) r[3 * v + k] = p.freedom(v, k) * p.planes[k][v] * p.weight(v);
+  }
+};
+
+/// GridPreconditioner on any executor; vectors lie in its memory.
+template <class Exec>
+class GridPreconditionerOn {
+ public:
+  GridPreconditionerOn(const GridShape& shape, double aspect, const Eigen::Matrix3Xd& movable,
+                       const Exec& executor)
+      : shape_(shape),
+        executor_(executor),
+        movable_(buffer_of(
+            executor,
+            std::span<const double>(movable.data(), static_cast<std::size_t>(movable.size())))),
+        sizes_(static_cast<std::size_t>(movable.cols())),
+        eigen_x_(eigenvalues(shape.columns, 1.0, executor)),
+        eigen_y_(eigenvalues(shape.rows, aspect, executor)),
+        transforms_(shape.columns, shape.rows, executor) {
+    set_cell_sizes(Eigen::VectorXd::Ones(movable.cols()));
+  }
+
+  GridSymbol xy;
+  GridSymbol z;
+
+  /// GridPreconditioner::set_cell_sizes(), from the caller's memory.
+  void set_cell_sizes(const Eigen::VectorXd& sizes) {
+    upload(executor_, std::span<const double>(sizes.data(), sizes_.size()),
+           std::span<double>(sizes_.data(), sizes_.size()));
+  }
+
+  /// r ← P^exponent g, both 3 V numbers.
+  void apply(std::span<const double> g, double exponent, std::span<double> r) {
+    const PreconditionerView p = view(exponent);
+    const std::int64_t vertices = static_cast<std::int64_t>(sizes_.size());
+    parallel_for(executor_, "enter planes", vertices, EnterPlanes{p, g.data()});
+    transforms_.run();
+    const double scale_xy = std::pow(xy.scale, exponent) * inverse_scale();
+    const double scale_z = std::pow(z.scale, exponent) * inverse_scale();
+    parallel_for(executor_, "scale coefficients", vertices,
+                 ScaleCoefficient{p, {scale_xy, scale_xy, scale_z}});
+    transforms_.run();
+    parallel_for(executor_, "leave planes", vertices, LeavePlanes{p, r.data()});
+  }
+
+ private:
+  using Vector = typename Exec::template Buffer<double>;
+
+  /// Eigenvalues of the second difference with mirrored ends.
+  static Vector eigenvalues(int n, double spacing, const Exec& executor) {
+    std::vector<double> values(static_cast<std::size_t>(n));
+    for (int k = 0; k < n; ++k) {
+      values[static_cast<std::size_t>(k)] = CosineTransform::eigenvalue(k, n, spacing);
+    }
+    return buffer_of(executor, std::span<const double>(values));
+  }
+  /// Of a transform and its inverse.
+  [[nodiscard]] double inverse_scale() const {
+    return 1.0 / (4.0 * (shape_.columns - 1.0) * (shape_.rows - 1.0));
+  }
+  [[nodiscard]] PreconditionerView view(double exponent) {
+    return {shape_.columns,
+            shape_.rows,
+            movable_.data(),
+            sizes_.data(),
+            eigen_x_.data(),
+            eigen_y_.data(),
+            {xy, xy, z},
+            exponent,
+            {transforms_.plane(0), transforms_.plane(1), transforms_.plane(2)}};
+  }
+
+  GridShape shape_;
+  Exec executor_;
+  Vector movable_;
+  Vector sizes_;
+  Vector eigen_x_;
+  Vector eigen_y_;
+  GridTransforms<Exec> transforms_;
+};
+
+}  // namespace lensforge

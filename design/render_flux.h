@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "core/executor.h"
+#include "core/optical_setup.h"
+#include "core/surface_mesh.h"
+#include "design/flux/flux_image.h"
+#include "design/optics/surface_kernels.h"
+#include "design/optics/surface_optics.h"
+
+namespace lensforge {
+
+/// Flux that a surface sends to every pixel, as shares of the lens's total, row by row from the
+/// top; computed on any executor, returned in the caller's memory.
+template <class Exec>
+std::vector<double> render_flux(const SurfaceMesh& mesh, const OpticalSetup& setup,
+                                SurfaceModel model, const Exec& executor) {
+  const auto numbers = [](const auto& matrix) {
+    return std::span(matrix.data(), static_cast<std::size_t>(matrix.size()));
+  };
+  const auto triangles = buffer_of(executor, numbers(mesh.triangles));
+  const auto vertices = buffer_of(executor, numbers(mesh.vertices));
+  const SurfaceView surface{triangles.data(), vertices.data(), Projection(setup),
+                            setup.lens_size.prod()};
+  FluxImageOn<Exec> image(setup.pixels.x(), setup.pixels.y());
+  std::vector<double> flux(static_cast<std::size_t>(setup.pixels.prod()));
+  const std::int64_t count = mesh.triangle_count();
+  if (model == SurfaceModel::kFacet) {
+    download(executor, image.render(executor, count, ProjectFacet{surface}), std::span(flux));
+    return flux;
+  }
+  const Eigen::Matrix3Xd sums = vertex_area_normals(mesh);
+  const auto normals = buffer_of(executor, numbers(sums));
+  typename Exec::template Buffer<double> landing(2 * static_cast<std::size_t>(sums.cols()));
+  parallel_for(executor, "project vertices", mesh.vertex_count(),
+               LandRay{surface, normals.data(), landing.data()});
+  const ProjectSmooth source{surface, landing.data()};
+  download(executor, image.render(executor, count, source), std::span(flux));
+  return flux;
+}
+
+#if defined(LENSFORGE_CUDA)
+/// render_flux() on the GPU. @throw RunError if its memory does not suffice.
+std::vector<double> render_flux_cuda(const SurfaceMesh& mesh, const OpticalSetup& setup,
+                                     SurfaceModel model, const Executor& executor);
+#endif
+
+}  // namespace lensforge
