@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+# CUDA, where nvcc is found: sets LENSFORGE_HAS_CUDA and offers lensforge_cuda_sources().
+
+option(LENSFORGE_CUDA "Build for NVIDIA GPUs too, where nvcc is found" ON)
+option(LENSFORGE_CUDA_FMA "Let the GPU contract a·b + c; without, it rounds as the CPU does" OFF)
+set(LENSFORGE_HAS_CUDA OFF)
+if(NOT LENSFORGE_CUDA)
+  return()
+endif()
+
+find_program(LENSFORGE_NVCC nvcc HINTS "$ENV{CUDA_PATH}/bin" /usr/local/cuda/bin)
+mark_as_advanced(LENSFORGE_NVCC)
+if(LENSFORGE_NVCC AND NOT CMAKE_CUDA_COMPILER)
+  set(CMAKE_CUDA_COMPILER "${LENSFORGE_NVCC}")
+endif()
+if(NOT DEFINED CMAKE_CUDA_ARCHITECTURES)
+  # Turing to Hopper, and PTX for what comes after.
+  set(CMAKE_CUDA_ARCHITECTURES 75-real 80-real 86-real 89-real 90)
+endif()
+include(CheckLanguage)
+check_language(CUDA)
+if(NOT CMAKE_CUDA_COMPILER)
+  message(STATUS "No nvcc: building for the CPU alone")
+  return()
+endif()
+enable_language(CUDA)
+find_package(CUDAToolkit 12.0)
+if(NOT CUDAToolkit_FOUND OR NOT TARGET CUDA::cufft)
+  message(STATUS "No CUDA runtime or cuFFT of version 12 or later: building for the CPU alone")
+  return()
+endif()
+set(LENSFORGE_HAS_CUDA ON)
+if(NOT DEFINED CMAKE_CUDA20_STANDARD_COMPILE_OPTION)  # CMake 3.25 does not know it.
+  set(CMAKE_CUDA20_STANDARD_COMPILE_OPTION -std=c++20)
+  set(CMAKE_CUDA20_EXTENSION_COMPILE_OPTION -std=c++20)
+endif()
+set(CMAKE_CUDA_STANDARD 20)
+set(CMAKE_CUDA_STANDARD_REQUIRED ON)
+set(CMAKE_CUDA_EXTENSIONS OFF)
+set(CMAKE_CUDA_RUNTIME_LIBRARY Static)
+message(STATUS "GPU: CUDA ${CUDAToolkit_VERSION}, architectures ${CMAKE_CUDA_ARCHITECTURES}")
+
+# How .cu files are compiled. 20012: Eigen 3.4 marks functions that need no mark. Constexpr functions
+# of the standard library (std::array, std::span) may run on the device.
+add_library(lensforge_cuda_options INTERFACE)
+target_compile_options(lensforge_cuda_options INTERFACE
+  --expt-relaxed-constexpr -diag-suppress=20012
+  -Xcompiler=-Wall,-Wextra,-Wshadow,-Wnon-virtual-dtor,-ffp-contract=off,-fno-math-errno)
+if(NOT LENSFORGE_CUDA_FMA)
+  target_compile_options(lensforge_cuda_options INTERFACE -fmad=false)
+endif()
+if(LENSFORGE_WERROR)
+  target_compile_options(lensforge_cuda_options INTERFACE
+    -Werror=all-warnings,cross-execution-space-call -Xcompiler=-Werror)
+endif()
+
+# lensforge_cuda_sources(ROOM SOURCES ... [LINK ...])
+# Adds files that need CUDA to a room; its code knows by LENSFORGE_CUDA that they are there. They
+# form a library of their own, because .cu files do not take the options of the C++ files.
+function(lensforge_cuda_sources room)
+  cmake_parse_arguments(arg "" "" "SOURCES;LINK" ${ARGN})
+  add_library(lensforge_${room}_cuda OBJECT ${arg_SOURCES})
+  get_target_property(includes lensforge_${room} INCLUDE_DIRECTORIES)
+  get_target_property(links lensforge_${room} INTERFACE_LINK_LIBRARIES)
+  target_include_directories(lensforge_${room}_cuda PRIVATE ${includes})
+  target_link_libraries(lensforge_${room}_cuda
+    PRIVATE ${links} lensforge_cuda_options CUDA::cudart_static ${arg_LINK})
+  target_sources(lensforge_${room} PRIVATE $<TARGET_OBJECTS:lensforge_${room}_cuda>)
+  target_link_libraries(lensforge_${room} PUBLIC CUDA::cudart_static PRIVATE ${arg_LINK})
+  target_compile_definitions(lensforge_${room} PUBLIC LENSFORGE_CUDA)
+endfunction()

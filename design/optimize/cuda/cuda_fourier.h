@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cufft.h>
+
+#include "core/cuda/cuda_executor.h"
+#include "design/optimize/extended_transforms.h"
+#include "design/optimize/grid_transforms.h"
+
+namespace lensforge {
+
+/// cuFFT as ExtendedTransforms asks for it.
+class CudaFourier {
+ public:
+  /// @throw RunError if cuFFT cannot plan it.
+  CudaFourier(const EvenExtension& size, int planes, const CudaExecutor& executor);
+  ~CudaFourier();
+  CudaFourier(const CudaFourier&) = delete;
+  CudaFourier& operator=(const CudaFourier&) = delete;
+
+  /// Both in the GPU's memory; `in` is overwritten.
+  void run(double* in, double* out);
+
+ private:
+  CudaExecutor executor_;
+  cufftHandle plan_ = 0;
+};
+
+template <>
+class GridTransforms<CudaExecutor> : public ExtendedTransforms<CudaExecutor, CudaFourier> {
+ public:
+  using ExtendedTransforms::ExtendedTransforms;
+};
+
+}  // namespace lensforge

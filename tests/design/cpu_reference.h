@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "core/optical_setup.h"
+#include "design/guided_stage.h"
+#include "design/objective_setups.h"
+#include "design/optics/image_triangle.h"
+
+/// What the CPU computes, to be compared with other executors. Compiled apart: nvcc, which compiles
+/// the tests on a GPU, would round the CPU's part in other places than the C++ compiler does.
+namespace lensforge::testing {
+
+std::vector<double> cpu_flux(const std::vector<ImageTriangle>& triangles);
+/// Sums from the right of `rows` rows.
+std::vector<double> cpu_cotangent_sums(const std::vector<double>& pixels, int rows);
+std::vector<double> cpu_render(SurfaceModel model);
+/// The stage on the rough mesh.
+std::unique_ptr<GuidedStage> cpu_stage(SurfaceModel model, Goal goal);
+
+}  // namespace lensforge::testing

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <gtest/gtest-spi.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <csignal>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "design/emulated_executor.h"
+#include "design/executor_parity.h"
+#include "design/render_flux.h"
+#include "design/stage_on_rough_mesh.h"
+
+namespace lensforge::testing {
+namespace {
+
+struct EmulatedSide {
+  using Exec = EmulatedExecutor;
+  static Exec make(const Executor& options) { return Exec(options); }
+  static std::unique_ptr<GuidedStage> stage(SurfaceModel model, Goal goal,
+                                            const Executor& options) {
+    return stage_on(model, goal, Exec(options));
+  }
+  static std::vector<double> render(SurfaceModel model) {
+    return render_flux(rough_mesh(), kSetup, model, Exec(Executor::serial()));
+  }
+  static std::string missing() { return ""; }
+};
+
+INSTANTIATE_TYPED_TEST_SUITE_P(EmulatedGpu, ExecutorParity, EmulatedSide);
+
+/// Triangles that are made while they are deposited, against triangles in memory.
+TEST(RenderFlux, IsTheSameAsOfProjectedTriangles) {
+  for (const SurfaceModel model : kModels) {
+    FluxImage image(kSetup.pixels.x(), kSetup.pixels.y());
+    const auto direct = image.render(
+        Executor::serial(), project_surface(rough_mesh(), kSetup, model, Executor::serial()));
+    EXPECT_EQ(cpu_render(model), std::vector<double>(direct.begin(), direct.end()));
+  }
+}
+
+struct ReadFirst {
+  const double* values;
+  double* out;
+  void operator()(std::int64_t /*i*/) const { *out = *values; }
+};
+
+TEST(EmulatedGpuDeathTest, ItsMemoryIsNotTheCallers) {
+  EmulatedBuffer<double> buffer(3);
+  EXPECT_EXIT(static_cast<void>(*static_cast<volatile double*>(buffer.data())),
+              ::testing::KilledBySignal(SIGSEGV), "");
+}
+
+TEST(EmulatedGpu, FreshMemoryIsNotANumber) {
+  const EmulatedExecutor executor(Executor::serial());
+  const EmulatedBuffer<double> buffer(3);
+  for (const double value : fetched(executor, std::span(buffer.data(), buffer.size()))) {
+    EXPECT_TRUE(std::isnan(value));
+  }
+}
+
+TEST(EmulatedGpu, NoticesAKernelThatIsGivenTheCallersMemory) {
+  const EmulatedExecutor executor(Executor::serial());
+  std::vector<double> mine{1.0};
+  EmulatedBuffer<double> there(1);
+  EXPECT_NONFATAL_FAILURE(parallel_for(executor, "wrong", 1, ReadFirst{mine.data(), there.data()}),
+                          "points to the caller's memory");
+}
+
+}  // namespace
+}  // namespace lensforge::testing
