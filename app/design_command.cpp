@@ -137,13 +137,14 @@ std::vector<std::string> changes_made(const LoadedImage& loaded, const DesignArg
   return changes;
 }
 
-nlohmann::json provenance(const OptionSet& options, const DesignResult& result) {
+nlohmann::json provenance(const OptionSet& options, const ChosenDevice& device,
+                          const DesignResult& result) {
   const bool done = result.status == DesignResult::Status::kDone;
   return {{"program", "lensforge " + std::string(version())},
           {"options", options.used()},
           {"seconds", result.convergence.empty() ? 0.0 : result.convergence.back().seconds},
-          {"device", "cpu"},
-          {"threads", options.executor().concurrency()},
+          {"device", device.word},
+          {"threads", device.executor.concurrency()},
           {"status", done ? "done" : "interrupted"},
           {"message", result.message}};
 }
@@ -181,10 +182,11 @@ std::string summary_text(const fs::path& folder, const DesignResult& result) {
 }
 
 /// Stores what came out and says so. @return the exit code.
-int finish(const OptionSet& options, const OutputFolder& folder, DesignResult& result) {
+int finish(const OptionSet& options, const ChosenDevice& device, const OutputFolder& folder,
+           DesignResult& result) {
   if (result.status == DesignResult::Status::kFailed) throw RunError(result.message);
   const bool done = result.status == DesignResult::Status::kDone;
-  result.lens.provenance = provenance(options, result);
+  result.lens.provenance = provenance(options, device, result);
   if (result.lens.surface.triangle_count() > 0) write_folder(folder, result);
   std::error_code ignored;
   if (done) fs::remove(folder.path() / design_file::kCheckpoint, ignored);
@@ -201,16 +203,17 @@ int report_finished(const DesignArguments& arguments, const Console& console) {
 }
 
 /// Runs the design. `begin` is called once, as soon as the library has accepted all its input.
-DesignResult shape(const OptionSet& options, const DesignOptions& design, const Image& target,
-                   const std::stop_token& stop, const std::function<void()>& begin) {
+DesignResult shape(bool quiet, const Executor& executor, const DesignOptions& design,
+                   const Image& target, const std::stop_token& stop,
+                   const std::function<void()>& begin) {
   std::once_flag begun;
-  ProgressDisplay progress(options.common().quiet);
+  ProgressDisplay progress(quiet);
   const auto show = progress.sink();
   const RunControl control(stop, [&](const Progress& p) {
     std::call_once(begun, begin);
     if (show) show(p);
   });
-  DesignResult result = design_lens(target, design, options.executor(), control);
+  DesignResult result = design_lens(target, design, executor, control);
   std::call_once(begun, begin);
   return result;
 }
@@ -231,12 +234,15 @@ int run(const OptionSet& options, DesignArguments& arguments) {
   design.checkpoint = folder.path() / design_file::kCheckpoint;
   // A design that was killed before its first checkpoint starts at the beginning.
   design.resume = arguments.resume && earlier.checkpoint;
+  const ChosenDevice device = options.device_executor();
   const auto begin = [&] {
+    if (device.executor.device() != Device::kCpu) console.note("computing on " + device.word);
     for (const std::string& change : changes_made(loaded, arguments)) console.note(change);
     if (arguments.force && !design.resume) remove_earlier_design(folder.path());
   };
-  DesignResult result = shape(options, design, loaded.image, interrupt.token(), begin);
-  return finish(options, folder, result);
+  DesignResult result = shape(options.common().quiet, device.executor, design, loaded.image,
+                              interrupt.token(), begin);
+  return finish(options, device, folder, result);
 }
 
 }  // namespace

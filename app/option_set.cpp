@@ -8,6 +8,7 @@
 
 #include "app/toml_config.h"
 #include "core/error.h"
+#include "core/gpu.h"
 #include "core/units.h"
 
 namespace lensforge::app {
@@ -193,7 +194,8 @@ void OptionSet::add_common() {
   flag("--quiet", common_.quiet, "no progress and no messages on stderr, errors excepted");
   integer("--threads", common_.threads, Limits::between(0, kMostThreads),
           "threads to use, 0 for all; never changes a result");
-  choice("--device", common_.device, devices, "where to compute");
+  choice("--device", common_.device, devices,
+         "where to optimise and render; auto: a GPU if there is one");
   CLI::App& app = parser_->app;
   app.set_config("--config", "", "read options from this TOML file; the command line wins")
       ->type_name("FILE.toml");
@@ -226,7 +228,10 @@ void OptionSet::parse(const Arguments& arguments) {
   } catch (const CLI::ParseError& e) {
     throw InputError(std::string(e.what()) + "; " + app.get_name() + " --help lists the options");
   }
-  if (common_.device == "cuda") throw InputError("--device cuda: this build has no CUDA");
+  if (common_.device == "cuda") {
+    const Gpu gpu = find_gpu();
+    if (!gpu.usable) throw InputError("--device cuda: " + gpu.reason);
+  }
 }
 
 bool OptionSet::given(const std::string& name) const { return parser_->app.count(name) > 0; }
@@ -240,5 +245,12 @@ nlohmann::json OptionSet::used() const {
 }
 
 Executor OptionSet::executor() const { return Executor::cpu(common_.threads); }
+
+ChosenDevice OptionSet::device_executor() const {
+  if (common_.device == "cpu") return {executor(), "cpu"};
+  const Gpu gpu = find_gpu();
+  if (!gpu.usable) return {executor(), "cpu"};
+  return {executor().with_device(Device::kCuda), "cuda: " + gpu.name};
+}
 
 }  // namespace lensforge::app

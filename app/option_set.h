@@ -44,6 +44,12 @@ struct CommonOptions {
   std::string device = "auto";
 };
 
+/// Where a command computes.
+struct ChosenDevice {
+  Executor executor;
+  std::string word;  ///< "cpu", or "cuda: " and the GPU's name.
+};
+
 /// The options of one command, read from the command line and --config. Each option names where its
 /// value goes; what is there beforehand is the default that --help shows.
 class OptionSet {
@@ -88,8 +94,10 @@ class OptionSet {
   [[nodiscard]] nlohmann::json used() const;
 
   [[nodiscard]] const CommonOptions& common() const { return common_; }
-  /// The executor that --threads and --device ask for.
+  /// The CPU executor that --threads asks for.
   [[nodiscard]] Executor executor() const;
+  /// executor() on the device that --device asks for; `auto` takes a GPU where there is one.
+  [[nodiscard]] ChosenDevice device_executor() const;
 
  private:
   struct Parser;

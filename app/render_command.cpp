@@ -138,14 +138,16 @@ int render_command(const Arguments& command_line) {
   require_picture_name(arguments.out);
   const Console console(options.common().json, options.common().quiet);
   const Scene scene = adjusted(load(arguments.source), options, arguments);
-  Rendering rendering = scene.target ? compare_models(scene, options.executor())
-                                     : render_alone(scene, options.executor());
+  const ChosenDevice device = options.device_executor();
+  Rendering rendering =
+      scene.target ? compare_models(scene, device.executor) : render_alone(scene, device.executor);
   if (!arguments.out.empty()) {
     const bool scale = !scene.target && fs::path(arguments.out).extension() == ".png";
     write_image(scale ? scaled_to_white(rendering.image, console) : rendering.image, arguments.out);
     rendering.json["out"] = arguments.out;
   }
   rendering.json["command"] = "render";
+  rendering.json["device"] = device.word;
   rendering.json["source"] = arguments.source;
   rendering.json["model"] = model_word(scene.model);
   rendering.json["pixels"] = {scene.setup.pixels.x(), scene.setup.pixels.y()};
