@@ -62,6 +62,7 @@ TEST(EmulatedGpu, FreshMemoryIsNotANumber) {
 }
 
 TEST(EmulatedGpu, NoticesAKernelThatIsGivenTheCallersMemory) {
+  if (!EmulatedExecutor::kFindsAddresses) GTEST_SKIP() << "not in this kind of build";
   const EmulatedExecutor executor(Executor::serial());
   std::vector<double> mine{1.0};
   EmulatedBuffer<double> there(1);
