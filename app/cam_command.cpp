@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
 #include <filesystem>
+#include <map>
+#include <string>
 
+#include "app/cam_settings.h"
 #include "app/commands.h"
 #include "app/console.h"
 #include "app/exit_code.h"
@@ -10,6 +14,7 @@
 #include "app/output_folder.h"
 #include "app/progress_display.h"
 #include "cam/cam_job.h"
+#include "cam/report/report_json.h"
 #include "core/error.h"
 
 namespace lensforge::app {
@@ -17,61 +22,46 @@ namespace {
 
 namespace fs = std::filesystem;
 
-void add_tool_options(OptionSet& options, CamOptions& cam) {
-  options.length("--tool-diameter", cam.tool_diameter, Limits::above(0), "ball-end mill");
-  options.length("--pitch", cam.pitch, Limits::above(0), "stepover between rows at most");
-  options.number("--spindle", cam.spindle_rpm, Limits::above(0), "rpm", "spindle speed");
-  options.number("--spin-up", cam.spin_up, Limits::at_least(0), "s", "wait after spindle start");
-  options.number("--feed", cam.feed, Limits::above(0), "mm/min", "cutting feed");
-  options.number("--plunge", cam.plunge, Limits::above(0), "mm/min", "feed straight down");
+std::string operation_text(const ReportOperation& operation) {
+  return "  " + operation.summary.name +
+         std::string(10 - std::min<std::size_t>(9, operation.summary.name.size()), ' ') +
+         operation.file + ", " + std::to_string(operation.lines) + " moves, " +
+         fixed(operation.minutes, 1) + " min\n";
 }
 
-void add_blank_options(OptionSet& options, CamOptions& cam) {
-  options.length("--stock", cam.stock, Limits::at_least(0),
-                 "top of the blank above the surface's highest point");
-  options.length("--safe-height", cam.safe_height, Limits::above(0),
-                 "height of rapid moves above the top of the blank");
-  options.choice("--z-zero", cam.z_zero,
-                 {{"stock", ZZero::kStock}, {"table", ZZero::kTable}, {"lens", ZZero::kLens}},
-                 "Z0: top of the blank, the table below it, or the lens's highest point");
+std::string surface_text(const RenderedSurface& surface) {
+  return "  " + surface.name + "   " + metrics_text(surface.quality.metrics) + ", leaks " +
+         fixed(100.0 * surface.quality.leakage, 2) + " %\n";
 }
 
-void add_program_options(OptionSet& options, CamOptions& cam) {
-  options.length("--tolerance", cam.tolerance, Limits::above(0),
-                 "farthest that the path runs from the exact one");
-  options.number("--slope-tolerance", cam.slope_tolerance, Limits::above(0), "rad",
-                 "farthest that a move's direction is from the exact one");
-  options.integer("--decimals", cam.decimals, Limits::between(4, 6), "digits after the point");
-  options.choice("--post", cam.post, {{"linuxcnc", Post::kLinuxcnc}, {"grbl", Post::kGrbl}},
-                 "dialect of the controller");
-}
-
-std::string folder_name(const fs::path& folder) {
-  const fs::path whole = fs::absolute(folder).lexically_normal();
-  return (whole.has_filename() ? whole : whole.parent_path()).filename().string();
+std::string limit_text(const LimitCheck& check) {
+  return "  limit not met: " + check.name + " " + fixed(check.value, check.decimals) +
+         (check.unit.empty() ? "" : " " + check.unit) + ", at most " +
+         fixed(check.limit, check.decimals) + "\n";
 }
 
 std::string summary_text(const fs::path& folder, const CamResult& result) {
-  const Eigen::Vector3d size = result.tip.sizes();
-  return folder.string() + ": " + result.message + "\n" +                                //
-         "  program      " + std::to_string(result.lines) + " lines, " +                 //
-         std::to_string(result.rows) + " rows at " + fixed(result.pitch, 4) + " mm\n" +  //
-         "  tool tip     " + fixed(size.x(), 2) + " x " + fixed(size.y(), 2) + " x " +
-         fixed(size.z(), 3) + " mm, " + fixed(result.deepest_cut, 3) + " mm into the blank\n" +
-         "  length       " + fixed(result.cutting_length / 1000.0, 1) + " m, " +
-         fixed(result.length_over_feed_min, 1) +
-         " min at the feed; acceleration makes it longer\n" +
-         "  Z            program Z = lens z + " + fixed(result.z_offset, 4) + " mm\n";
+  const ReportData& report = result.report;
+  std::string text = folder.string() + ": " + result.message + "\n";
+  for (const ReportOperation& operation : report.operations) text += operation_text(operation);
+  text += "  in all    " + fixed(report.minutes(), 1) + " min\n";
+  if (!report.leakage.steps.empty()) {
+    text += surface_text(report.leakage.designed);
+    for (const RenderedSurface& surface : report.leakage.others) text += surface_text(surface);
+  }
+  for (const LimitCheck& check : report.verdict.checks) {
+    if (!check.passes()) text += limit_text(check);
+  }
+  return text + "  Z         program Z = lens z + " + fixed(report.z_offset, 4) + " mm\n";
 }
 
-nlohmann::json summary_json(const OptionSet& options, const CamOptions& cam,
-                            const CamResult& result) {
+nlohmann::json summary_json(const OptionSet& options, const CamResult& result) {
   nlohmann::json json = {
       {"command", "cam"},          {"status", result.done() ? "done" : "interrupted"},
-      {"message", result.message}, {"warnings", result.warnings},
+      {"message", result.message}, {"warnings", result.report.warnings},
       {"options", options.used()}, {"files", nlohmann::json::array()}};
   for (const fs::path& file : result.files) json["files"].push_back(file.string());
-  if (result.done()) json["report"] = cam_report(cam, result);
+  if (result.done()) json["report"] = report_json(result.report);
   return json;
 }
 
@@ -82,31 +72,51 @@ CamResult run(const OptionSet& options, const CamOptions& cam, const Lens& lens,
   folder.remove_partial_files();
   ProgressDisplay progress(options.common().quiet);
   const RunControl control(interrupt.token(), progress.sink());
-  return make_finish_program(lens, cam, out, options.executor(), control);
+  return make_cut(lens, cam, out, options.executor(), control);
+}
+
+/// The option that states a limit; none for what is a matter of safety.
+const char* option_of(const std::string& key) {
+  static const std::map<std::string, const char*> options{{"leakage", "--max-leakage"},
+                                                          {"dark_flux", "--max-dark"},
+                                                          {"mae_increase", "--max-mae-increase"},
+                                                          {"excess", "--max-excess"},
+                                                          {"slope", "--max-slope"},
+                                                          {"fillet_depth", "--max-fillet"}};
+  const auto found = options.find(key);
+  return found == options.end() ? nullptr : found->second;
+}
+
+/// Limits of quality count only where they were stated; their defaults are advice.
+int exit_code(const OptionSet& options, const CamResult& result) {
+  if (!result.done()) return kInterrupted;
+  for (const LimitCheck& check : result.report.verdict.checks) {
+    const char* const option = option_of(check.key);
+    if (!check.passes() && (option == nullptr || options.given(option))) return kLimitMissed;
+  }
+  return kDone;
 }
 
 }  // namespace
 
 int cam_command(const Arguments& command_line) {
-  std::string source;
-  CamOptions cam;
-  OptionSet options("cam", "Makes the finishing program of a lens: DIR/cam/finish.ngc and report.");
-  options.positional("DIR", source, "lens folder");
-  add_tool_options(options, cam);
-  add_blank_options(options, cam);
-  add_program_options(options, cam);
+  CamSettings settings;
+  OptionSet options("cam", "Makes the programs that mill a lens and foretells what it will throw.");
+  add_cam_options(options, settings);
   options.parse(command_line);
   const Console console(options.common().json, options.common().quiet);
-  const Lens lens = read_lens(source);
-  cam.job = folder_name(source);
+  const Lens lens = read_lens(settings.source);
+  const CamOptions cam = cam_options(options, settings);
+  if (settings.show_workshop) {
+    print_to_stdout(workshop_toml(cam.workshop));
+    return kDone;
+  }
   validate(cam, lens.setup);
-  const fs::path out = fs::path(source) / "cam";
-  const CamResult result = run(options, cam, lens, out);
-  if (result.status == CamResult::Status::kFailed) throw RunError(result.message);
-  for (const std::string& warning : result.warnings) console.note("warning: " + warning);
-  console.result(summary_json(options, cam, result),
-                 result.done() ? summary_text(out, result) : result.message + "\n");
-  return result.done() ? kDone : kInterrupted;
+  const CamResult result = run(options, cam, lens, settings.folder());
+  for (const std::string& warning : result.report.warnings) console.note("warning: " + warning);
+  console.result(summary_json(options, result),
+                 result.done() ? summary_text(settings.folder(), result) : result.message + "\n");
+  return exit_code(options, result);
 }
 
 }  // namespace lensforge::app

@@ -34,9 +34,7 @@ void remove_earlier_design(const fs::path& folder) {
                            lens_file::kError, lens_file::kConvergence, design_file::kOverview}) {
     fs::remove(folder / name, ignored);
   }
-  for (const char* name : {cam_file::kFinish, cam_file::kReport}) {
-    fs::remove(folder / "cam" / name, ignored);
-  }
+  remove_cut(folder / "cam");
   fs::remove(folder / "cam", ignored);
 }
 

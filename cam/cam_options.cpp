@@ -1,19 +1,21 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "cam/cam_options.h"
+
 #include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <string>
 
-#include "cam/cam_job.h"
 #include "core/error.h"
 
 namespace lensforge {
 namespace {
 
-constexpr double kMaxFeed = 1e5;        ///< mm/min; beyond what any mill can follow.
-constexpr double kMaxSpindleRpm = 1e6;  ///< Ten times the fastest spindles.
-constexpr double kMaxLength = 1000.0;   ///< mm; of heights above the part.
-constexpr double kMaxSpinUp = 3600.0;   ///< s
+constexpr double kMaxSpinUp = 3600.0;    ///< s
+constexpr double kMaxShrinkage = 0.2;    ///< More than any casting resin loses.
+constexpr double kMaxPolish = 1.0;       ///< mm; beyond it no picture is left.
+constexpr double kFinestSample = 1e-3;   ///< mm
+constexpr double kCoarsestSample = 1.0;  ///< mm
 
 std::string number(double value) {
   char text[32];
@@ -32,46 +34,63 @@ void require_in(const char* option, double value, double low, double high) {
   }
 }
 
-void require_above_zero(const char* option, double value, double high) {
-  if (!(value > 0.0 && value <= high)) {
-    refuse(option, value, "is not above 0 and at most " + number(high));
+void validate_decimals(const CamOptions& options) {
+  if (options.decimals == 0) return;
+  require_in("--decimals", options.decimals, 4, options.post.most_decimals);
+  const double tolerance = options.workshop.process.finish.tolerance;
+  const double finest = 4.0 * std::pow(10.0, -options.decimals);
+  if (!(tolerance >= finest * (1.0 - 1e-12))) {
+    refuse("--tolerance", tolerance,
+           "is not at least 4 units of the last decimal, " + number(finest) + " mm");
+  }
+}
+
+void validate_polish(const CamOptions& options) {
+  require_in("--polish-sigma", options.polish.sigma, 0.0, kMaxPolish);
+  require_in("--rim-depth", options.polish.rim_depth, 0.0, kMaxPolish);
+  if (options.sample_spacing == 0.0) return;
+  require_in("--sample-spacing", options.sample_spacing, kFinestSample, kCoarsestSample);
+  if (options.polish.sigma > 0.0 && options.sample_spacing > options.polish.sigma) {
+    refuse("--sample-spacing", options.sample_spacing,
+           "is larger than --polish-sigma, " + number(options.polish.sigma) +
+               " mm, which it could not show");
   }
 }
 
 }  // namespace
 
-ZZero parse_z_zero(std::string_view name) {
-  if (name == "stock") return ZZero::kStock;
-  if (name == "table") return ZZero::kTable;
-  if (name == "lens") return ZZero::kLens;
-  throw InputError("--z-zero: '" + std::string(name) + "' is none of stock, table, lens");
+const char* name_of(ZZero zero) {
+  switch (zero) {
+    case ZZero::kStock:
+      return "stock";
+    case ZZero::kLens:
+      return "lens";
+    case ZZero::kTable:
+      break;
+  }
+  return "table";
+}
+
+double sample_spacing(const CamOptions& options) {
+  if (options.sample_spacing > 0.0) return options.sample_spacing;
+  const FinishProcess& finish = options.workshop.process.finish;
+  const double pitch = finish_pitch(finish, options.workshop.tool(finish.tool).radius());
+  return std::clamp(std::max(pitch / 6.0, options.polish.sigma / 3.0), kFinestSample,
+                    kCoarsestSample);
 }
 
 void validate(const CamOptions& options, const OpticalSetup& setup) {
-  require_above_zero("--tool-diameter", options.tool_diameter, kMaxLength);
+  validate(options.workshop, "workshop");
+  const Tool& ball = options.workshop.tool(options.workshop.process.finish.tool);
   const double smallest = setup.lens_size.minCoeff();
-  if (!(options.tool_diameter < smallest)) {
-    refuse("--tool-diameter", options.tool_diameter,
+  if (!(ball.diameter < smallest)) {
+    refuse("--tool-diameter", ball.diameter,
            "is not smaller than the lens, whose shorter side is " + number(smallest) + " mm");
   }
-  require_above_zero("--pitch", options.pitch, kMaxLength);
-  if (options.pitch > options.tool_diameter) {
-    refuse("--pitch", options.pitch,
-           "is larger than the tool diameter, " + number(options.tool_diameter) + " mm");
-  }
-  require_above_zero("--spindle", options.spindle_rpm, kMaxSpindleRpm);
-  require_above_zero("--feed", options.feed, kMaxFeed);
-  require_above_zero("--plunge", options.plunge, kMaxFeed);
-  require_in("--stock", options.stock, 0.0, kMaxLength);
-  require_above_zero("--safe-height", options.safe_height, kMaxLength);
   require_in("--spin-up", options.spin_up, 0.0, kMaxSpinUp);
-  require_in("--decimals", options.decimals, 4, 6);
-  const double finest = 4.0 * std::pow(10.0, -options.decimals);
-  if (!(options.tolerance >= finest * (1.0 - 1e-12) && options.tolerance <= kMaxLength)) {
-    refuse("--tolerance", options.tolerance,
-           "is not at least 4 units of the last decimal, " + number(finest) + " mm");
-  }
-  require_above_zero("--slope-tolerance", options.slope_tolerance, 1.0);
+  require_in("--shrinkage", options.shrinkage, 0.0, kMaxShrinkage);
+  validate_decimals(options);
+  validate_polish(options);
 }
 
 }  // namespace lensforge

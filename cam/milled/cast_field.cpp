@@ -7,11 +7,13 @@
 namespace lensforge {
 namespace {
 
-/// The mould's nodes under a window of the lens: mirrored along x.
+/// The mould's nodes under a window of the lens: mirrored along x, so that columns count down.
 GridWindow under(const GridWindow& lens, const CastFrame& frame) {
-  const Eigen::Vector2d last = lens.node(lens.columns - 1, 0);
-  return {frame.scale * Eigen::Vector2d(frame.width - last.x(), last.y()),
-          frame.scale * lens.spacing, lens.columns, lens.rows};
+  GridWindow mould = lens;
+  mould.origin = frame.scale * Eigen::Vector2d(frame.width - lens.origin.x(), lens.origin.y());
+  mould.spacing = frame.scale * lens.spacing;
+  mould.first_column = -(lens.first_column + lens.columns - 1);
+  return mould;
 }
 
 template <class Value>

@@ -23,47 +23,56 @@ void check(const char* name, double value, bool fits, const char* rule) {
                    " mm: must be " + rule);
 }
 
-std::vector<double> gaussian(double sigma, double spacing) {
+/// A Gaussian's weights and those of its derivative, made exact for straight lines.
+PolishKernel make_kernel(double sigma, double spacing) {
   const auto reach = static_cast<std::int64_t>(std::ceil(PolishedField::kReach * sigma / spacing));
-  std::vector<double> kernel;
+  PolishKernel kernel;
   double sum = 0.0;
+  double moment = 0.0;
   for (std::int64_t k = 0; k <= reach; ++k) {
-    const double t = static_cast<double>(k) * spacing / sigma;
-    kernel.push_back(std::exp(-0.5 * t * t));
-    sum += (k == 0 ? 1.0 : 2.0) * kernel.back();
+    const auto place = static_cast<double>(k);
+    const double t = place * spacing / sigma;
+    const double weight = std::exp(-0.5 * t * t);
+    kernel.average.push_back(weight);
+    kernel.slope.push_back(weight * place);
+    sum += (k == 0 ? 1.0 : 2.0) * weight;
+    moment += 2.0 * weight * place * place * spacing;
   }
-  for (double& weight : kernel) weight /= sum;
+  for (double& weight : kernel.average) weight /= sum;
+  for (double& weight : kernel.slope) weight /= moment;
   return kernel;
 }
 
-/// How a value goes on beyond the rim.
-enum class Beyond { kMirrored, kTurned };
-
-/// One line of a node's neighbours, `stride` apart: value(k) for k in low … high.
+/// One line of a node's neighbours, `stride` apart: value(k) for k in low … high. Beyond the rim
+/// heights go on turned about it.
 struct Line {
   const double* at;  ///< The node's own value.
   std::int64_t stride;
   std::int64_t low, high;  ///< Neighbours that lie on the lens: low ≤ 0 ≤ high.
-  Beyond beyond;
 
   [[nodiscard]] double operator[](std::int64_t k) const {
     if (k >= low && k <= high) return at[k * stride];
     const std::int64_t rim = k < low ? low : high;
     const double inside = at[std::clamp(2 * rim - k, low, high) * stride];
-    return beyond == Beyond::kMirrored ? inside : 2.0 * at[rim * stride] - inside;
+    return 2.0 * at[rim * stride] - inside;
   }
 };
 
-double averaged(const Line& line, const std::vector<double>& kernel) {
-  const auto reach = static_cast<std::int64_t>(kernel.size()) - 1;
-  double sum = kernel[0] * line.at[0];
-  if (line.low <= -reach && line.high >= reach) {
-    for (std::int64_t k = 1; k <= reach; ++k) {
-      sum += kernel[index_of(k)] * (line.at[-k * line.stride] + line.at[k * line.stride]);
-    }
-    return sum;
+double averaged(const Line& line, const PolishKernel& kernel) {
+  const auto reach = static_cast<std::int64_t>(kernel.average.size()) - 1;
+  double sum = kernel.average[0] * line.at[0];
+  for (std::int64_t k = 1; k <= reach; ++k) {
+    sum += kernel.average[index_of(k)] * (line[-k] + line[k]);
   }
-  for (std::int64_t k = 1; k <= reach; ++k) sum += kernel[index_of(k)] * (line[-k] + line[k]);
+  return sum;
+}
+
+double sloped(const Line& line, const PolishKernel& kernel) {
+  const auto reach = static_cast<std::int64_t>(kernel.slope.size()) - 1;
+  double sum = 0.0;
+  for (std::int64_t k = 1; k <= reach; ++k) {
+    sum += kernel.slope[index_of(k)] * (line[k] - line[-k]);
+  }
   return sum;
 }
 
@@ -87,8 +96,8 @@ PolishedField::Axis PolishedField::make_axis(int axis, const GridWindow& window)
   const double high = std::floor((lens_.max()[axis] - origin) / spacing + kOnRim);
   result.rim = std::min(static_cast<std::int64_t>(low), result.begin);
   result.rim_end = std::max(static_cast<std::int64_t>(high) + 1, result.end);
-  result.kernel = gaussian(model_.sigma, spacing);
-  const auto reach = static_cast<std::int64_t>(result.kernel.size()) - 1;
+  result.kernel = make_kernel(model_.sigma, spacing);
+  const auto reach = static_cast<std::int64_t>(result.kernel.average.size()) - 1;
   result.sampled = std::max(result.begin - reach, result.rim);
   result.sampled_end = std::min(result.end + reach, result.rim_end);
   return result;
@@ -111,29 +120,31 @@ void PolishedField::sample(const GridWindow& window, const Executor& executor,
   SurfacePatch raw;
   surface_.sample(around, executor, raw);
   resize_patch(window, false, patch);
-  const auto filter = [&](const std::vector<double>& in, std::vector<double>& out, Beyond beyond) {
-    std::vector<double> half(index_of(around.rows * window.columns));
-    const auto along_x = [&](std::int64_t row) {
-      for (std::int64_t i = x.begin; i < x.end; ++i) {
-        const Line line{&in[index_of(row * around.columns + i - x.sampled)], 1, x.sampled - i,
-                        x.sampled_end - 1 - i, beyond};
-        half[index_of(row * window.columns + i - x.begin)] = averaged(line, x.kernel);
-      }
-    };
-    parallel_for(executor, "polish along x", around.rows, along_x, 4);
-    const auto along_y = [&](std::int64_t row) {
-      const std::int64_t j = row + y.begin;
-      for (std::int64_t i = 0; i < window.columns; ++i) {
-        const Line line{&half[index_of((j - y.sampled) * window.columns + i)], window.columns,
-                        y.sampled - j, y.sampled_end - 1 - j, beyond};
-        out[index_of(row * window.columns + i)] = averaged(line, y.kernel);
-      }
-    };
-    parallel_for(executor, "polish along y", window.rows, along_y, 4);
+  std::vector<double> average(index_of(around.rows * window.columns));
+  std::vector<double> slope(average.size());
+  const auto along_x = [&](std::int64_t row) {
+    for (std::int64_t i = x.begin; i < x.end; ++i) {
+      const Line line{&raw.z[index_of(row * around.columns + i - x.sampled)], 1, x.sampled - i,
+                      x.sampled_end - 1 - i};
+      const std::size_t n = index_of(row * window.columns + i - x.begin);
+      average[n] = averaged(line, x.kernel);
+      slope[n] = sloped(line, x.kernel);
+    }
   };
-  filter(raw.z, patch.z, Beyond::kTurned);
-  filter(raw.slope_x, patch.slope_x, Beyond::kMirrored);
-  filter(raw.slope_y, patch.slope_y, Beyond::kMirrored);
+  parallel_for(executor, "polish along x", around.rows, along_x, 4);
+  const auto along_y = [&](std::int64_t row) {
+    const std::int64_t j = row + y.begin;
+    for (std::int64_t i = 0; i < window.columns; ++i) {
+      const std::size_t from = index_of((j - y.sampled) * window.columns + i);
+      const std::size_t n = index_of(row * window.columns + i);
+      const Line line{&average[from], window.columns, y.sampled - j, y.sampled_end - 1 - j};
+      patch.z[n] = averaged(line, y.kernel);
+      patch.slope_y[n] = sloped(line, y.kernel);
+      patch.slope_x[n] =
+          averaged({&slope[from], window.columns, y.sampled - j, y.sampled_end - 1 - j}, y.kernel);
+    }
+  };
+  parallel_for(executor, "polish along y", window.rows, along_y, 4);
   take_off_rim(executor, patch);
 }
 

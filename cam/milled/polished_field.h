@@ -8,6 +8,13 @@
 
 namespace lensforge {
 
+/// Weights of the nodes 0, 1, … away, of their sum for averages and of the difference of the two
+/// sides for slopes.
+struct PolishKernel {
+  std::vector<double> average;
+  std::vector<double> slope;  ///< 1/mm
+};
+
 /// What polishing does to a surface; all lengths in mm.
 struct PolishModel {
   double sigma = 0.0;  ///< Of the Gaussian that heights are averaged with, ≥ 0; 0: not polished.
@@ -15,11 +22,14 @@ struct PolishModel {
   double rim_length = 1.0;  ///< Distance over which that falls to 1/e of itself, > 0.
 };
 
-/// A polished surface: heights averaged with a round Gaussian, slopes with the same one, which is
-/// the same as the slopes of the averaged heights, since the convolution commutes with the
-/// derivative. It is the linear model of a soft wheel that follows the form and wears down what is
-/// narrower than its contact, σ. Beyond the rim the surface goes on with its slopes mirrored and
-/// its heights turned about the rim, so that a plane stays a plane.
+/// A polished surface: heights averaged with a round Gaussian, and the slopes of the averaged
+/// heights, by the Gaussian's derivative. It is the linear model of a soft wheel that follows the
+/// form and wears down what is narrower than its contact, σ. Beyond the rim the surface goes on
+/// with its heights turned about the rim, so that a plane stays a plane.
+///
+/// The slopes that the surface has itself are not used: between the passes of a ball they jump by
+/// 0.3 rad, and sampled a few times a pass their sixth harmonic alone, 0.016 rad, comes back as a
+/// wave of millimetres where heights alias by nanometres.
 ///
 /// Over-polish (Sun et al., section 4.4 and Fig. 14: altered normals along the boundary send light
 /// inwards and leave the image's border black): from each side of the lens, at the distance d,
@@ -47,7 +57,7 @@ class PolishedField final : public SurfaceField {
     std::int64_t begin, end;            ///< Asked for.
     std::int64_t sampled, sampled_end;  ///< Sampled.
     std::int64_t rim, rim_end;          ///< Of the lens.
-    std::vector<double> kernel;         ///< Weights of the nodes 0, 1, … away.
+    PolishKernel kernel;
   };
 
   [[nodiscard]] Axis make_axis(int axis, const GridWindow& window) const;

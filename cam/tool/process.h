@@ -16,7 +16,7 @@ enum class PassStyle {
 /// Level-by-level roughing.
 struct RoughProcess {
   bool enabled = true;
-  int tool = 1;                 ///< Tool::number
+  int tool = 3;                 ///< Tool::number
   double stepdown = 1.0;        ///< Between levels at most, mm, > 0.
   double stepover = 1.2;        ///< Between passes at most, mm, in 0 … its diameter.
   double allowance = 0.2;       ///< Left on the surface, along its normal, mm, ≥ 0.
@@ -44,7 +44,7 @@ struct SemiProcess {
 
 /// The ball's raster that makes the optical surface.
 struct FinishProcess {
-  int tool = 3;                   ///< Tool::number, a ball.
+  int tool = 1;                   ///< Tool::number, a ball.
   double pitch = 0.06;            ///< Between passes at most, mm, in 0 … its diameter.
   double scallop = 0.0;           ///< If > 0, mm: the pitch follows from it, see finish_pitch().
   double tolerance = 0.0005;      ///< Farthest from the drop curve, mm, > 0.

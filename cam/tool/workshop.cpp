@@ -117,7 +117,7 @@ void check_keep_outs(const Rules& rules, const Workshop& workshop) {
 
 Tool rough_tool() {
   Tool tool;
-  tool.number = 1;
+  tool.number = 3;
   tool.name = "3 mm flat end mill, 2 flutes";
   tool.shape = CutterShape::kFlat;
   tool.diameter = 3.0;
@@ -142,7 +142,7 @@ Tool semi_tool() {
 
 Tool finish_tool() {
   Tool tool;
-  tool.number = 3;
+  tool.number = 1;
   tool.name = "0.4 mm ball-end mill, 2 flutes";
   tool.diameter = 0.4;
   tool.flute_length = 0.8;

@@ -57,7 +57,7 @@ struct Material {
   friend bool operator==(const Material&, const Material&) = default;
 };
 
-/// The tools of the defaults: 1 a 3 mm flat end mill to rough, 2 a 1 mm ball to semi-finish, 3 the
+/// The tools of the defaults: 3 a 3 mm flat end mill to rough, 2 a 1 mm ball to semi-finish, 1 the
 /// 0.4 mm ball of the paper (Sun et al., Section 5) to finish.
 std::vector<Tool> default_tools();
 

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
 #include <limits>
 #include <stop_token>
 #include <string>
@@ -29,100 +30,134 @@ using ::testing::HasSubstr;
 Lens small_lens(double width = 3.0, double height = 2.0) {
   Lens lens;
   lens.setup.lens_size = {width, height};
+  lens.setup.image_size = {width, height};
+  lens.setup.pixels = {12, 8};
+  lens.setup.focal_length = 12.0;
   lens.surface = testing::grid_mesh(21, 17, width, height, testing::lens_relief);
+  lens.target = Image(12, 8, 1.0F);
   return lens;
+}
+
+/// Coarse enough for a test, with everything that a cut has.
+CamOptions coarse() {
+  CamOptions options;
+  options.sample_spacing = 0.03;
+  return options;
+}
+
+CamOptions programs_only() {
+  CamOptions options;
+  options.render = false;
+  return options;
 }
 
 CamResult run(const Lens& lens, const CamOptions& options, const TempFolder& folder,
               const RunControl& control = {}) {
-  return make_finish_program(lens, options, folder.path(), Executor::cpu(2), control);
+  return make_cut(lens, options, folder.path(), Executor::cpu(2), control);
 }
 
-TEST(CamJob, WritesProgramAndReport) {
+TEST(CamJob, WritesProgramsPicturesAndReport) {
   const TempFolder folder;
-  const CamResult result = run(small_lens(), {}, folder);
+  const CamResult result = run(small_lens(), coarse(), folder);
   EXPECT_TRUE(result.done()) << result.message;
-  EXPECT_EQ(folder.file_count(), 2U);
+  std::vector<std::string> names;
+  for (const auto& file : result.files) names.push_back(file.filename().string());
+  EXPECT_THAT(names,
+              ::testing::ElementsAre("rough.ngc", "semi.ngc", "finish.ngc", "milled.ply",
+                                     "milled.png", "leakage.png", "report.html", "report.json"));
+  EXPECT_EQ(folder.file_count(), names.size());
   const auto report = nlohmann::json::parse(read_bytes(folder / "report.json"));
-  EXPECT_DOUBLE_EQ(report["z_offset"].get<double>(), result.z_offset);
-  EXPECT_EQ(report["operations"][0]["points"].get<std::int64_t>(), result.points);
-  const std::string program = read_bytes(folder / "finish.ngc");
-  EXPECT_EQ(std::count(program.begin(), program.end(), '\n'), result.lines);
-  EXPECT_THAT(program, HasSubstr("(" + std::to_string(result.lines) + " lines"));
-  EXPECT_NEAR(result.length_over_feed_min, result.cutting_length / 500.0, 1e-12);
-  EXPECT_NEAR(result.stock_top, result.surface_top + 0.5, 1e-12);
-  EXPECT_NEAR(result.deepest_cut, result.stock_top - result.tip.min().z(), 1e-12);
+  EXPECT_DOUBLE_EQ(report["z_offset"].get<double>(), result.report.z_offset);
+  EXPECT_EQ(report["operations"].size(), 3U);
+  EXPECT_GT(report["operations"][2]["minutes"].get<double>(), 0.0);
 }
 
-TEST(CamJob, TheProgramHoldsThePathThatWasCounted) {
+/// The light that leaks is what the causes add up to, and each cause counts for nothing where it is
+/// not there.
+TEST(CamJob, TheSplitAddsUpAndCausesThatAreNotThereCountNothing) {
   const TempFolder folder;
-  const CamResult result = run(small_lens(), {}, folder);
-  std::istringstream program(read_bytes(folder / "finish.ngc"));
-  Eigen::Vector3d at = Eigen::Vector3d::Zero();
-  double length = 0.0;
-  std::int64_t cuts = 0;
-  bool cutting = false;
-  for (std::string line; std::getline(program, line);) {
-    if (line[0] == '(' || line[0] == 'M' || line[0] == 'S' || line[0] == 'T') continue;
-    if (line.starts_with("G0")) cutting = false;
-    Eigen::Vector3d to = at;
-    for (int k = 0; k < 3; ++k) {
-      const auto place = line.find("XYZ"[k]);
-      if (place != std::string::npos) to[k] = std::stod(line.substr(place + 1));
+  CamOptions options = coarse();
+  options.polish.sigma = 0.0;
+  const LeakageResult leakage = run(small_lens(), options, folder).report.leakage;
+  double sum = 0.0;
+  for (const CausePart& part : leakage.parts) {
+    sum += part.leakage;
+    if (part.cause == leak_cause::kPolish) {
+      EXPECT_EQ(part.leakage, 0.0);
     }
-    if (cutting && !(to - at).isZero()) {
-      length += (to - at).norm();
-      ++cuts;
+    if (part.cause == leak_cause::kScallop) {
+      EXPECT_GT(part.leakage, 0.01);
     }
-    if (line.starts_with("G1")) cutting = true;
-    at = to;
   }
-  EXPECT_EQ(cuts, result.points - 1);
-  EXPECT_NEAR(length, result.cutting_length, 1e-5 * static_cast<double>(cuts));
+  EXPECT_NEAR(sum, leakage.part().quality.leakage, 1e-12);
 }
 
-TEST(CamJob, SameProgramForAnyThreads) {
+TEST(CamJob, SameFilesForAnyThreads) {
   const TempFolder one;
   const TempFolder two;
-  make_finish_program(small_lens(), {}, one.path(), Executor::serial(), {});
-  make_finish_program(small_lens(), {}, two.path(), Executor::cpu(2), {});
-  EXPECT_EQ(read_bytes(one / "finish.ngc"), read_bytes(two / "finish.ngc"));
+  const CamResult result = make_cut(small_lens(), coarse(), one.path(), Executor::serial(), {});
+  make_cut(small_lens(), coarse(), two.path(), Executor::cpu(2), {});
+  for (const auto& file : result.files) {
+    const std::string name = file.filename().string();
+    if (name.starts_with("report")) continue;  // It tells the seconds that it took.
+    EXPECT_EQ(read_bytes(one / name), read_bytes(two / name)) << name;
+  }
 }
 
-TEST(CamJob, ZZeroShiftsTheProgram) {
-  CamOptions options;
-  options.stock = 0.25;
+TEST(CamJob, ZZeroShiftsThePrograms) {
+  CamOptions options = programs_only();
+  options.workshop.stock.allowance = 0.25;
   const Lens lens = small_lens();
   const double top = lens.surface.vertices.row(2).maxCoeff();
-  for (const auto& [name, offset] : std::vector<std::pair<const char*, double>>{
-           {"stock", -top - 0.25}, {"lens", -top}, {"table", 0.0}}) {
+  for (const auto& [zero, offset] : std::vector<std::pair<ZZero, double>>{
+           {ZZero::kStock, -top - 0.25}, {ZZero::kLens, -top}, {ZZero::kTable, 0.0}}) {
     const TempFolder folder;
-    options.z_zero = parse_z_zero(name);
-    EXPECT_DOUBLE_EQ(run(lens, options, folder).z_offset, offset) << name;
+    options.z_zero = zero;
+    EXPECT_DOUBLE_EQ(run(lens, options, folder).report.z_offset, offset) << name_of(zero);
     char safe[40];
-    std::snprintf(safe, sizeof safe, "G0 Z%.5f\n", top + 0.25 + 5.0 + offset);
+    std::snprintf(safe, sizeof safe, "G0 Z%.6f\n", top + 0.25 + 5.0 + offset);
     EXPECT_THAT(read_bytes(folder / "finish.ngc"), HasSubstr(safe));
   }
-  EXPECT_THROW(parse_z_zero("floor"), InputError);
 }
 
-TEST(CamJob, StoppedLeavesWhatWasThere) {
+TEST(CamJob, StoppedWhileProgramsAreMadeLeavesWhatWasThere) {
   const TempFolder folder;
   lensforge::testing::write_bytes(folder / "finish.ngc", "old");
+  lensforge::testing::write_bytes(folder / "report.json", "old");
   std::stop_source source;
   const RunControl control(source.get_token(), [&](const Progress&) { source.request_stop(); });
-  const CamResult result = run(small_lens(), {}, folder, control);
-  EXPECT_EQ(result.status, CamResult::Status::kInterrupted);
-  EXPECT_EQ(folder.file_count(), 1U);
+  EXPECT_EQ(run(small_lens(), coarse(), folder, control).status, CamResult::Status::kInterrupted);
+  EXPECT_EQ(folder.file_count(), 2U);
   EXPECT_EQ(read_bytes(folder / "finish.ngc"), "old");
+}
+
+TEST(CamJob, StoppedLaterLeavesNewProgramsWithoutAnOldReport) {
+  const TempFolder folder;
+  lensforge::testing::write_bytes(folder / "report.html", "old");
+  std::stop_source source;
+  const RunControl control(source.get_token(), [&](const Progress& progress) {
+    if (progress.stage == "render surfaces") source.request_stop();
+  });
+  EXPECT_EQ(run(small_lens(), coarse(), folder, control).status, CamResult::Status::kInterrupted);
+  EXPECT_EQ(folder.file_count(), 3U);
+  EXPECT_FALSE(std::filesystem::exists(folder / "report.html"));
+}
+
+TEST(CamJob, RemoveCutLeavesOtherFiles) {
+  const TempFolder folder;
+  run(small_lens(), coarse(), folder);
+  lensforge::testing::write_bytes(folder / "finishing-notes.txt", "mine");
+  remove_cut(folder.path());
+  EXPECT_EQ(folder.file_count(), 1U);
 }
 
 TEST(CamJob, FullDiskLeavesNothing) {
   const TempFolder folder;
   {
     const FullDisk full(20000);
-    const std::string message = message_of<RunError>([&] { run(small_lens(), {}, folder); });
-    EXPECT_THAT(message, AllOf(HasSubstr("finish.ngc"), HasSubstr("File too large")));
+    const std::string message =
+        message_of<RunError>([&] { run(small_lens(), programs_only(), folder); });
+    EXPECT_THAT(message, AllOf(HasSubstr(".ngc"), HasSubstr("File too large")));
   }
   EXPECT_EQ(folder.file_count(), 0U);
 }
@@ -130,28 +165,37 @@ TEST(CamJob, FullDiskLeavesNothing) {
 TEST(CamJob, UnwritableFolderIsRefused) {
   const TempFolder folder;
   lensforge::testing::write_bytes(folder / "cam", "a file");
-  EXPECT_THROW(make_finish_program(small_lens(), {}, folder / "cam", Executor::serial(), {}),
+  EXPECT_THROW(make_cut(small_lens(), programs_only(), folder / "cam", Executor::serial(), {}),
                InputError);
 }
 
 TEST(CamJob, WarnsOfWhatAnOperatorShouldQuestion) {
   const TempFolder folder;
-  CamOptions options;
-  EXPECT_THAT(run(small_lens(), options, folder).warnings,
-              ::testing::ElementsAre(HasSubstr("rough the blank")));
+  CamOptions options = programs_only();
   Lens plate = small_lens();
   plate.surface.vertices.row(2).setConstant(6.0);
-  options.stock = 0.1;
-  EXPECT_THAT(run(plate, options, folder).warnings, ::testing::IsEmpty());
-  options.post = Post::kGrbl;
-  EXPECT_THAT(run(plate, options, folder).warnings, ::testing::Contains(HasSubstr("$30")));
+  EXPECT_THAT(run(plate, options, folder).report.warnings, ::testing::IsEmpty());
+  options.post = find_post("grbl", "--post");
+  EXPECT_THAT(run(plate, options, folder).report.warnings, ::testing::Contains(HasSubstr("$30")));
+  options.workshop.machine.travel.x() = 5.0;
+  EXPECT_THAT(run(plate, options, folder).report.warnings,
+              ::testing::Contains(HasSubstr("travel")));
   for (std::int64_t v = 0; v < plate.surface.vertex_count(); ++v) {
     plate.surface.vertices(2, v) = 6.0 + 1.2 * plate.surface.vertices(0, v);
   }
-  EXPECT_THAT(run(plate, options, folder).warnings, ::testing::Contains(HasSubstr("rises by")));
-  options.decimals = 4;
-  EXPECT_THAT(run(small_lens(), options, folder).warnings,
-              ::testing::Contains(HasSubstr("use more decimals")));
+  EXPECT_THAT(run(plate, options, folder).report.warnings,
+              ::testing::Contains(HasSubstr("rises by")));
+}
+
+TEST(CamJob, AClampInTheWayIsACollision) {
+  const TempFolder folder;
+  CamOptions options = programs_only();
+  options.workshop.process.rough.enabled = false;
+  options.workshop.process.semi.enabled = false;
+  options.workshop.keep_outs.push_back({"vice", {1.0, 0.5, 0.0}, {2.0, 1.5, 20.0}});
+  const ReportData report = run(small_lens(), options, folder).report;
+  EXPECT_FALSE(report.verdict.passes());
+  EXPECT_THAT(report.warnings, ::testing::Contains(HasSubstr("vice")));
 }
 
 /// Sets one option to a bad value; the message has to name all of `words`.
@@ -163,39 +207,17 @@ struct BadOption {
 
 TEST(CamJob, BadOptionsAreNamedWithValueAndRule) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-  constexpr double kInf = std::numeric_limits<double>::infinity();
-  const auto diameter = [](CamOptions& o, double v) { o.tool_diameter = v; };
-  const auto pitch = [](CamOptions& o, double v) { o.pitch = v; };
-  const auto spindle = [](CamOptions& o, double v) { o.spindle_rpm = v; };
-  const auto feed = [](CamOptions& o, double v) { o.feed = v; };
-  const auto plunge = [](CamOptions& o, double v) { o.plunge = v; };
-  const auto stock = [](CamOptions& o, double v) { o.stock = v; };
-  const auto safe = [](CamOptions& o, double v) { o.safe_height = v; };
-  const auto spin_up = [](CamOptions& o, double v) { o.spin_up = v; };
-  const auto decimals = [](CamOptions& o, double v) { o.decimals = static_cast<int>(v); };
-  const auto tolerance = [](CamOptions& o, double v) { o.tolerance = v; };
-  const auto slope = [](CamOptions& o, double v) { o.slope_tolerance = v; };
-  std::vector<BadOption> cases;
-  for (const double bad : {0.0, -1.0, kNan, kInf}) {
-    cases.push_back({"--tool-diameter", bad, diameter});
-    cases.push_back({"--pitch", bad, pitch});
-    cases.push_back({"--spindle", bad, spindle});
-    cases.push_back({"--feed", bad, feed});
-    cases.push_back({"--plunge", bad, plunge});
-    cases.push_back({"--safe-height", bad, safe});
-    cases.push_back({"--tolerance", bad, tolerance});
-    cases.push_back({"--slope-tolerance", bad, slope});
-  }
-  for (const double bad : {-0.1, kNan, kInf}) {
-    cases.push_back({"--stock", bad, stock});
-    cases.push_back({"--spin-up", bad, spin_up});
-  }
-  cases.push_back({"--tool-diameter: 2 is not smaller than the lens", 2.0, diameter});
-  cases.push_back({"--pitch: 0.5 is larger than the tool diameter, 0.4 mm", 0.5, pitch});
-  cases.push_back({"--decimals: 3 is not between 4 and 6", 3, decimals});
-  cases.push_back({"--decimals: 7", 7, decimals});
-  cases.push_back({"--tolerance: 3e-05 is not at least 4 units", 3e-5, tolerance});
-  cases.push_back({"--slope-tolerance: 1.1", 1.1, slope});
+  const std::vector<BadOption> cases{
+      {"--tool-diameter: 2 is not smaller than the lens", 2.0,
+       [](CamOptions& o, double v) { o.workshop.tools.back().diameter = v; }},
+      {"pitch", 0.5, [](CamOptions& o, double v) { o.workshop.process.finish.pitch = v; }},
+      {"--decimals: 3", 3, [](CamOptions& o, double v) { o.decimals = static_cast<int>(v); }},
+      {"--decimals: 7", 7, [](CamOptions& o, double v) { o.decimals = static_cast<int>(v); }},
+      {"--spin-up", -0.1, [](CamOptions& o, double v) { o.spin_up = v; }},
+      {"--spin-up", kNan, [](CamOptions& o, double v) { o.spin_up = v; }},
+      {"--shrinkage", 0.3, [](CamOptions& o, double v) { o.shrinkage = v; }},
+      {"--polish-sigma", kNan, [](CamOptions& o, double v) { o.polish.sigma = v; }},
+      {"--sample-spacing", 0.1, [](CamOptions& o, double v) { o.sample_spacing = v; }}};
   const Lens lens = small_lens();
   const TempFolder folder;
   for (const BadOption& bad : cases) {
@@ -209,7 +231,7 @@ TEST(CamJob, BadOptionsAreNamedWithValueAndRule) {
 TEST(CamJob, SurfacesThatCannotBeCutAreRefused) {
   const TempFolder folder;
   const auto refusal = [&](const Lens& lens) {
-    return message_of<InputError>([&] { run(lens, {}, folder); });
+    return message_of<InputError>([&] { run(lens, programs_only(), folder); });
   };
   Lens lens = small_lens();
   lens.surface.triangles.resize(3, 0);
@@ -236,7 +258,7 @@ TEST(CamJob, SurfacesThatCannotBeCutAreRefused) {
   lens.surface.triangles.col(102) = lens.surface.triangles.col(103);
   EXPECT_NO_THROW(inspect_height_field(lens.surface, Eigen::Vector2d(3.0, 2.0)));
   lens.surface.triangles.conservativeResize(3, lens.surface.triangle_count() / 2);
-  EXPECT_THROW(run(lens, {}, folder), InputError);
+  EXPECT_THROW(run(lens, programs_only(), folder), InputError);
   EXPECT_EQ(folder.file_count(), 0U);
 }
 

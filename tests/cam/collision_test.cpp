@@ -160,7 +160,7 @@ TEST(Collision, DefaultRoughingAndSemiFinishingTouchNothing) {
     StockMap stock = whole_blank(workshop, surface.bounds());
     CollisionCheck check(surface, workshop, stock);
     const MoveSink sink = [&](std::span<const PathMove> moves) { check.check(moves); };
-    check.begin("rough", workshop.tool(1));
+    check.begin("rough", workshop.tool(3));
     (void)cut_rough({surface, workshop, stock}, Executor::serial(), sink, RunControl{});
     check.begin("semi", workshop.tool(2));
     (void)cut_semi({surface, workshop, stock}, Executor::serial(), sink, RunControl{});

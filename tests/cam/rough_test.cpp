@@ -156,7 +156,7 @@ TEST(Semi, LeavesLittleForTheFinishingBall) {
 
   // The finishing ball, at any place over the lens and as far beyond as its raster turns.
   const CutterProfile ball{0.2, 0.2, 0.0};
-  const TipFloor floor(job.surface, job.workshop.tool(3), 0.0, job.workshop.keep_outs, 0.5);
+  const TipFloor floor(job.surface, job.workshop.tool(1), 0.0, job.workshop.keep_outs, 0.5);
   TipFloor::Trace trace;
   double deepest = 0.0;
   for (double y = -0.2; y <= 9.2; y += 0.1) {
@@ -231,9 +231,9 @@ TEST(Rough, WalksAroundClamps) {
   const RoughResult rough = job.rough();
   expect_safe(job.seen);
   ASSERT_EQ(rough.summary.warnings.size(), 1u);
-  EXPECT_THAT(rough.summary.warnings[0], ::testing::HasSubstr("'left clamp' keeps tool 1 from"));
+  EXPECT_THAT(rough.summary.warnings[0], ::testing::HasSubstr("'left clamp' keeps tool 3 from"));
   const Eigen::AlignedBox3d clamp(workshop.keep_outs[0].low, workshop.keep_outs[0].high);
-  const std::vector<CutterProfile> parts = whole_profile(workshop.tool(1));
+  const std::vector<CutterProfile> parts = whole_profile(workshop.tool(3));
   Eigen::Vector3d at = job.moves.front().end;
   for (const PathMove& move : job.moves) {
     for (double part = 0.0; part <= 1.0; part += 0.02) {

@@ -105,7 +105,7 @@ class Rs274Parser {
 inline Rs274Reading read_with_rs274(const std::filesystem::path& rs274,
                                     const std::filesystem::path& program) {
   const TempFolder scratch;
-  write_bytes(scratch / "tool.tbl", "T1 P1 Z0 D0.4\nT2 P2 Z0 D3\n");
+  write_bytes(scratch / "tool.tbl", "T1 P1 Z0 D0.4\nT2 P2 Z0 D1\nT3 P3 Z0 D3\n");
   write_bytes(scratch / "scratch.var", "");
   const std::filesystem::path out = scratch / "out.canon";
   const std::string command = "HOME='" + scratch.path().string() + "' '" + rs274.string() +

@@ -118,7 +118,7 @@ TEST(Workshop, WrittenTomlReadsBackEqual) {
   shop.process.rough.enabled = false;
   shop.process.rough.style = PassStyle::kClimb;
   shop.process.semi.along = PassAxis::kY;
-  shop.process.finish = {3,    0.04, 0.001, 2e-4, 5e-4, PassStyle::kConventional, PassAxis::kY,
+  shop.process.finish = {1,    0.04, 0.001, 2e-4, 5e-4, PassStyle::kConventional, PassAxis::kY,
                          true, true};
   EXPECT_EQ(parse_workshop(workshop_toml(shop), "other"), shop);
 }
@@ -143,8 +143,8 @@ TEST(Workshop, RefusalsNameFileKeyValueAndRule) {
             "shop.toml: rough.stepover: 3.5: is wider than the tool, 3 mm");
   EXPECT_EQ(refusal("[semi]\nallowance = 0.3\n"),
             "shop.toml: semi.allowance: 0.3: must not be above that of roughing, 0.2 mm");
-  EXPECT_EQ(refusal("[finish]\ntool = 1\n"),
-            "shop.toml: finish.tool: 1: the finishing tool has to be a ball");
+  EXPECT_EQ(refusal("[finish]\ntool = 3\n"),
+            "shop.toml: finish.tool: 3: the finishing tool has to be a ball");
   EXPECT_EQ(refusal("[machine]\nspindle_max_rpm = 20000\n"),
             "shop.toml: tool[0].spindle_rpm: 23000: the machine's spindle turns at 3000 to 20000");
   EXPECT_EQ(refusal("[stock]\nmargin = \"wide\"\n"),
@@ -153,17 +153,17 @@ TEST(Workshop, RefusalsNameFileKeyValueAndRule) {
 
 TEST(Workshop, RefusesToolsThatCannotBe) {
   const std::string tool =
-      "[[tool]]\nnumber = 3\nshape = \"bull\"\ndiameter = 0.4\nflute_length = 1.0\nfeed = 500\n"
+      "[[tool]]\nnumber = 1\nshape = \"bull\"\ndiameter = 0.4\nflute_length = 1.0\nfeed = 500\n"
       "plunge = 150\n";
   const std::string off = "[rough]\nenabled = false\n[semi]\nenabled = false\n";
   EXPECT_EQ(refusal(tool + "corner_radius = 0.3\n" + off),
             "shop.toml: tool[0].corner_radius: 0.3: must not be above half the diameter");
-  EXPECT_EQ(refusal(tool + tool + off), "shop.toml: tool[0].number: 3: two tools have this number");
+  EXPECT_EQ(refusal(tool + tool + off), "shop.toml: tool[0].number: 1: two tools have this number");
   EXPECT_EQ(refusal(tool + "[[tool.section]]\ndiameter = 4.0\nfrom = 0.5\nto = 9.0\n" + off),
             "shop.toml: tool[0].section[0].from: 0.5: must not be below the part before it, which "
             "ends at "
             "1 mm");
-  EXPECT_EQ(refusal("[[tool]]\nnumber = 3\n" + off),
+  EXPECT_EQ(refusal("[[tool]]\nnumber = 1\n" + off),
             "shop.toml: tool[0].diameter: missing: a workshop needs this key");
   EXPECT_EQ(refusal("[[keep_out]]\nname = \"clamp\"\nlow_x = 1.0\n"),
             "shop.toml: keep_out[0].high: 0: must be above low in x");

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <cstdlib>
+#include <map>
 
 #include "core/image_io.h"
 #include "core/metrics.h"
@@ -45,6 +46,14 @@ class Chain : public Scenario {
   void design_stripes() {
     const Outcome outcome = run(small_design(picture("stripes.png"), path("lens")));
     ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  }
+
+  /// A coarse cut of that lens, in seconds.
+  [[nodiscard]] Arguments cam(const Arguments& more) const {
+    Arguments arguments = {"cam", path("lens"), "--pitch",   "1mm",  "--tool-diameter",
+                           "2mm", "--no-semi",  "--surface", "facet"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return arguments;
   }
 };
 
@@ -115,11 +124,12 @@ TEST_F(Chain, RenderOfABareMeshNeedsNoTarget) {
 
 TEST_F(Chain, CamWritesAProgramAndAReport) {
   design_stripes();
-  const Outcome outcome =
-      run({"cam", path("lens"), "--pitch", "1mm", "--tool-diameter", "2mm", "--json"});
+  const Outcome outcome = run(cam({"--json"}));
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_EQ(outcome.json()["status"], "done");
-  EXPECT_EQ(listing(at("lens/cam")), (std::vector<std::string>{"finish.ngc", "report.json"}));
+  EXPECT_EQ(listing(at("lens/cam")),
+            (std::vector<std::string>{"finish.ngc", "leakage.png", "milled.ply", "milled.png",
+                                      "report.html", "report.json", "rough.ngc"}));
   const nlohmann::json report = nlohmann::json::parse(content(at("lens/cam/report.json")));
   EXPECT_TRUE(report.contains("z_offset"));
   const nlohmann::json info = run({"info", path("lens/cam/finish.ngc"), "--json"}).json();
@@ -130,8 +140,8 @@ TEST_F(Chain, CamWritesAProgramAndAReport) {
 TEST_F(Chain, LinuxcncAcceptsTheProgram) {
   if (!fs::exists(LENSFORGE_RS274)) GTEST_SKIP() << "no rs274; ./bootstrap test fetches it";
   design_stripes();
-  ASSERT_EQ(run({"cam", path("lens"), "--pitch", "1mm", "--tool-diameter", "2mm"}).exit_code, 0);
-  write(at("tool.tbl"), "T1 P1 Z0 D2\n");
+  ASSERT_EQ(run(cam({"--no-render"})).exit_code, 0);
+  write(at("tool.tbl"), "T1 P1 Z0 D2\nT3 P3 Z0 D3\n");
   write(at("job.var"), "");
   const std::string command = "cd '" + path("") + "' && HOME=. '" + LENSFORGE_RS274 +
                               "' -t tool.tbl -v job.var -g lens/cam/finish.ngc job.canon";
@@ -143,15 +153,44 @@ TEST_F(Chain, LinuxcncAcceptsTheProgram) {
 
 TEST_F(Chain, CamGivesTheSameBytesOnOneAndTwoThreads) {
   design_stripes();
-  const Arguments cam = {"cam", path("lens"), "--pitch", "1mm", "--tool-diameter", "2mm"};
-  Arguments one = cam;
-  one.insert(one.end(), {"--threads", "1"});
-  ASSERT_EQ(run(one).exit_code, 0);
-  const std::string program = content(at("lens/cam/finish.ngc"));
-  Arguments two = cam;
-  two.insert(two.end(), {"--threads", "2"});
-  ASSERT_EQ(run(two).exit_code, 0);
-  EXPECT_TRUE(content(at("lens/cam/finish.ngc")) == program);
+  std::map<std::string, std::string> files;
+  ASSERT_EQ(run(cam({"--threads", "1"})).exit_code, 0);
+  for (const char* file : {"finish.ngc", "rough.ngc", "milled.ply", "milled.png", "leakage.png"}) {
+    files[file] = content(at("lens/cam") / file);
+  }
+  ASSERT_EQ(run(cam({"--threads", "2"})).exit_code, 0);
+  for (const auto& [file, bytes] : files) {
+    EXPECT_TRUE(content(at("lens/cam") / file) == bytes) << file;
+  }
+}
+
+TEST_F(Chain, CamTellsALimitThatWasStatedAndIsNotMet) {
+  design_stripes();
+  const Outcome outcome = run(cam({"--max-leakage", "0.0001"}));
+  EXPECT_EQ(outcome.exit_code, 3);
+  EXPECT_THAT(outcome.out, HasSubstr("limit not met: leakage"));
+}
+
+TEST_F(Chain, TheWorkshopIsShownAndReadBack) {
+  design_stripes();
+  const Outcome shown = run(cam({"--show-workshop"}));
+  ASSERT_EQ(shown.exit_code, 0) << shown.err;
+  EXPECT_FALSE(fs::exists(at("lens/cam")));
+  write(at("shop.toml"), shown.out);
+  const Outcome again =
+      run({"cam", path("lens"), "--workshop", path("shop.toml"), "--no-semi", "--show-workshop"});
+  EXPECT_EQ(again.out, shown.out);
+  write(at("shop.toml"), shown.out + "\n[surprise]\nkey = 1\n");
+  expect_refusal(run(cam({"--workshop", path("shop.toml")})), 2, {"shop.toml", "surprise"});
+}
+
+TEST_F(Chain, AMouldIsCutAndItsCastIsForetold) {
+  design_stripes();
+  const Outcome outcome = run(cam({"--part", "mould", "--shrinkage", "0.01", "--json"}));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const nlohmann::json report = outcome.json()["report"];
+  EXPECT_EQ(report["part"], "mould");
+  EXPECT_NEAR(report["setup"]["part"]["max"][0].get<double>(), 100.0 / 0.99, 1e-6);
 }
 
 TEST_F(Chain, InfoKnowsEveryKindOfFile) {
@@ -179,7 +218,7 @@ TEST_F(Chain, QuietSaysNothingOnStderr) {
 
 TEST_F(Chain, ForceReplacesADesignAndTheProgramMadeFromIt) {
   design_stripes();
-  ASSERT_EQ(run({"cam", path("lens"), "--pitch", "2mm", "--tool-diameter", "4mm"}).exit_code, 0);
+  ASSERT_EQ(run(cam({"--no-render"})).exit_code, 0);
   Arguments again = small_design(picture("rings.png"), path("lens"));
   again.emplace_back("--force");
   ASSERT_EQ(run(again).exit_code, 0);

@@ -59,7 +59,8 @@ TEST_F(FullDisk, DesignUnderAFileSizeLimitFailsAndIsResumable) {
 
 TEST_F(FullDisk, CamUnderAFileSizeLimitLeavesNoProgram) {
   ASSERT_EQ(run(small_design(picture("rings.png"), path("lens"))).exit_code, 0);
-  expect_refusal(run({"cam", path("lens"), "--pitch", "2mm", "--tool-diameter", "4mm", "--quiet"},
+  expect_refusal(run({"cam", path("lens"), "--pitch", "2mm", "--tool-diameter", "4mm", "--no-rough",
+                      "--no-semi", "--quiet"},
                      8 * kKibibyte),
                  1, {"finish.ngc", "File too large"});
   EXPECT_EQ(listing(at("lens/cam")), std::vector<std::string>{});

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "cam/leakage/leakage.h"
+#include "cam/milled/polished_field.h"
+#include "cam/path/finish_raster.h"
+#include "cam/post/post_description.h"
+#include "cam/post/program_plan.h"
+#include "cam/report/verdict.h"
+#include "cam/tool/workshop.h"
+#include "core/optical_setup.h"
+
+namespace lensforge {
+
+/// Where program Z = 0 lies.
+enum class ZZero {
+  kStock,  ///< Top of the blank.
+  kTable,  ///< What the blank lies on: z = 0 of the lens frame.
+  kLens,   ///< Highest point of the finished surface.
+};
+
+/// What is milled.
+enum class PartKind {
+  kLens,
+  kMould,  ///< The negative, from which lenses are cast.
+};
+
+/// Everything that shapes the cut of a lens and what is foretold of it, but the lens itself.
+struct CamOptions {
+  Workshop workshop;  ///< Machine, blank, clamps, tools, process.
+  PostDescription post = find_post("linuxcnc", "--post");
+  ProgramGrouping grouping = ProgramGrouping::kOperation;
+  std::uintmax_t largest_file = 0;  ///< Bytes of a program, ≥ 65536; 0 for the dialect's limit.
+  double spin_up = 3.0;             ///< Dwell after the spindle was switched on, s, 0 … 3600.
+  Coolant coolant = Coolant::kOff;
+  /// Digits after the point in the programs, 4 … 6; 0 takes what the tolerances ask for.
+  int decimals = 0;
+  bool arcs = true;  ///< Arcs in the finishing rows, where the dialect has them.
+  ZZero z_zero = ZZero::kStock;
+  std::string job = "lens";  ///< Name of the part.
+
+  PartKind part = PartKind::kLens;
+  double shrinkage = 0.0;  ///< Of what is cast in a mould, share of a length, 0 … 0.2.
+  /// What is cut: the facets as they are, or the smooth surface through the mesh's vertices.
+  SurfaceModel surface = SurfaceModel::kSmooth;
+
+  bool render = true;  ///< Compute what the part will project; else programs only.
+  PolishModel polish{0.03, 0.0, 1.0};
+  /// Of the surface that is rendered, mm, 0.001 … 1; 0 takes a sixth of the pitch, or a third of
+  /// the polish's σ if that is more.
+  double sample_spacing = 0.0;
+  LeakageOptions leakage;
+  CutLimits limits;
+};
+
+/// The spacing at which the surface is sampled, mm.
+double sample_spacing(const CamOptions& options);
+
+/// @throw InputError naming option, value and rule if an option breaks its rule on its own or
+///        against the size of the lens.
+void validate(const CamOptions& options, const OpticalSetup& setup);
+
+/// "stock", "table" or "lens".
+const char* name_of(ZZero zero);
+
+}  // namespace lensforge

@@ -1,0 +1,255 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cam/cut_plan.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "cam/contact/mould.h"
+#include "core/decimal_text.h"
+#include "core/error.h"
+
+namespace lensforge {
+namespace {
+
+/// Distance of points kept of a path that is only looked at, mm.
+constexpr double kSketchSpacing = 0.5;
+
+/// Unit of a program's last decimal where nothing is rounded, mm.
+constexpr double kUnrounded = 1e-9;
+
+/// How finely the smooth surface is cut into facets: heights a fifth of the path's tolerance, and
+/// slopes that polishing averages over several facets.
+constexpr SmoothCutOptions kSmoothCut{1e-4, 2e-2};
+
+SurfaceMesh mesh_to_cut(const Lens& lens, const CamOptions& options) {
+  if (options.part == PartKind::kLens) return lens.surface;
+  return mould_surface(lens.surface, {options.shrinkage});
+}
+
+Eigen::Vector2d size_to_cut(const Lens& lens, const CamOptions& options) {
+  const double shrinkage = options.part == PartKind::kLens ? 0.0 : options.shrinkage;
+  return lens.setup.lens_size / (1.0 - shrinkage);
+}
+
+double z_offset_of(ZZero zero, double surface_top, double blank_top) {
+  switch (zero) {
+    case ZZero::kStock:
+      return -blank_top;
+    case ZZero::kLens:
+      return -surface_top;
+    case ZZero::kTable:
+      break;
+  }
+  return 0.0;
+}
+
+const char* zero_words(ZZero zero) {
+  switch (zero) {
+    case ZZero::kStock:
+      return "top of the blank";
+    case ZZero::kLens:
+      return "highest point of the finished surface";
+    case ZZero::kTable:
+      break;
+  }
+  return "flat face that the blank lies on";
+}
+
+std::unique_ptr<CutSurface> surface_to_cut(const SurfaceMesh& mesh, const CamOptions& options,
+                                           double radius, const Executor& executor) {
+  if (options.surface == SurfaceModel::kFacet) {
+    return std::make_unique<FacetSurface>(mesh, radius, executor);
+  }
+  return std::make_unique<SmoothCutSurface>(mesh, radius, kSmoothCut, executor);
+}
+
+int decimals_of(const CamOptions& options) {
+  if (options.decimals > 0) return options.decimals;
+  const FinishProcess& finish = options.workshop.process.finish;
+  return std::min(options.post.most_decimals,
+                  decimals_for(finish.tolerance, finish.slope_tolerance));
+}
+
+}  // namespace
+
+CutPlan::CutPlan(const Lens& lens, const CamOptions& options, const Executor& executor)
+    : lens_(lens),
+      options_(options),
+      executor_(executor),
+      mesh_(mesh_to_cut(lens, options)),
+      field_(inspect_height_field(mesh_, size_to_cut(lens, options))),
+      blank_(options_.workshop.stock.box(field_.box)),
+      z_offset_(z_offset_of(options.z_zero, field_.box.max().z(), blank_.max().z())),
+      decimals_(decimals_of(options_)),
+      profile_(mesh_),
+      stock_(whole_blank(options_.workshop, field_.box)),
+      surface_(surface_to_cut(mesh_, options_, ball().radius(), executor)),
+      collisions_(profile_, options_.workshop, whole_blank(options_.workshop, field_.box)) {}
+
+std::optional<CastFrame> CutPlan::mould() const {
+  if (options_.part == PartKind::kLens) return std::nullopt;
+  const auto& lens = lens_.surface.vertices;
+  return CastFrame{1.0 / (1.0 - options_.shrinkage), lens.row(0).maxCoeff(), lens.row(2).maxCoeff(),
+                   MouldOptions{}.thickness};
+}
+
+double CutPlan::resolution() const { return std::pow(10.0, -decimals_); }
+
+double CutPlan::safe_z() const {
+  double top = blank_.max().z();
+  for (const KeepOut& clamp : options_.workshop.keep_outs) top = std::max(top, clamp.high.z());
+  return to_resolution(top + options_.workshop.process.safe_height + z_offset_, resolution()) -
+         z_offset_;
+}
+
+RasterPlan CutPlan::raster(PassAxis along, double resolution) const {
+  RasterOptions raster;
+  raster.pitch = finish_pitch(finish(), ball().radius());
+  if (finish().scallop > 0.0) raster.pitch = pitch_on_slope(raster.pitch, field_.steepest);
+  raster.tolerance = finish().tolerance;
+  raster.slope_tolerance = finish().slope_tolerance;
+  raster.resolution = resolution;
+  raster.z_zero = -z_offset_;
+  raster.along = along == PassAxis::kX ? 0 : 1;
+  raster.style = finish().style;
+  raster.arcs = options_.arcs && options_.post.arcs != ArcForm::kNone;
+  return plan_finish_raster(rectangle(), ball().radius(), raster);
+}
+
+std::vector<RasterPlan> CutPlan::rasters(double resolution) const {
+  std::vector<RasterPlan> plans{raster(finish().along, resolution)};
+  const PassAxis across = finish().along == PassAxis::kX ? PassAxis::kY : PassAxis::kX;
+  if (finish().cross) plans.push_back(raster(across, resolution));
+  return plans;
+}
+
+MoveSink CutPlan::watched(const std::string& operation, const Tool& tool, const MoveSink& sink) {
+  sketches_.push_back(std::make_unique<PathSketch>(operation, kSketchSpacing));
+  PathSketch* const sketch = sketches_.back().get();
+  collisions_.begin(operation, tool);
+  return [this, sketch, sink](std::span<const PathMove> moves) {
+    sketch->add(moves);
+    collisions_.check(moves);
+    sink(moves);
+  };
+}
+
+std::vector<ReportPath> CutPlan::shown_path() const {
+  std::vector<ReportPath> paths;
+  for (const auto& sketch : sketches_) paths.push_back(sketch->path());
+  return paths;
+}
+
+ProgramOperation CutPlan::rough_operation(const RunControl& control) {
+  const Tool& tool = options_.workshop.tool(options_.workshop.process.rough.tool);
+  return {"rough", tool, {}, [this, &tool, &control](const MoveSink& sink) {
+            const RoughSite site{profile_, options_.workshop, stock_};
+            return cut_rough(site, executor_, watched("rough", tool, sink), control).summary;
+          }};
+}
+
+ProgramOperation CutPlan::semi_operation(const RunControl& control) {
+  const Tool& tool = options_.workshop.tool(options_.workshop.process.semi.tool);
+  return {"semi", tool, {}, [this, &tool, &control](const MoveSink& sink) {
+            const RoughSite site{profile_, options_.workshop, stock_};
+            return cut_semi(site, executor_, watched("semi", tool, sink), control).summary;
+          }};
+}
+
+ProgramOperation CutPlan::finish_operation(const std::string& name, const RasterPlan& plan,
+                                           const RunControl& control) {
+  const std::string rows = std::to_string(plan.rows) + " rows along " +
+                           (plan.options.along == 0 ? "X" : "Y") + ", stepover " +
+                           decimal_text(plan.pitch, 5) + " mm";
+  return {name, ball(), {rows}, [this, name, plan, &control](const MoveSink& sink) {
+            return cut_finish(*surface_, plan, {name, ball(), safe_z()}, executor_,
+                              watched(name, ball(), sink), control);
+          }};
+}
+
+PencilOptions CutPlan::pencil_options(double resolution) const {
+  PencilOptions pencil;
+  pencil.resolution = resolution;
+  pencil.z_zero = -z_offset_;
+  pencil.clearance = options_.workshop.process.clearance;
+  return pencil;
+}
+
+OperationSummary CutPlan::run_pencil(double resolution, const MoveSink& sink,
+                                     const RunControl& control) const {
+  const PencilOptions pencil = pencil_options(resolution);
+  const auto cutter = surface_->cutter(rectangle(), executor_);
+  return cut_pencil(*cutter, find_valleys(mesh_, ball().radius(), pencil), pencil,
+                    {"pencil", ball(), safe_z()}, sink, control);
+}
+
+ProgramOperation CutPlan::pencil_operation(const RunControl& control) {
+  return {"pencil", ball(), {}, [this, &control](const MoveSink& sink) {
+            return run_pencil(resolution(), watched("pencil", ball(), sink), control);
+          }};
+}
+
+ProgramPlan CutPlan::programs(const RunControl& control) {
+  ProgramPlan plan;
+  plan.job = options_.job;
+  plan.z_offset = z_offset_;
+  plan.safe_z = safe_z() + z_offset_;
+  plan.comments = {"units: mm; X0 Y0: lower left corner of the lens",
+                   std::string("Z0: ") + zero_words(options_.z_zero),
+                   "top of the blank: Z " + decimal_text(blank_.max().z() + z_offset_, decimals_)};
+  if (options_.workshop.process.rough.enabled) plan.operations.push_back(rough_operation(control));
+  if (options_.workshop.process.semi.enabled) plan.operations.push_back(semi_operation(control));
+  const std::vector<RasterPlan> finishing = rasters(resolution());
+  plan.operations.push_back(finish_operation("finish", finishing.front(), control));
+  if (finishing.size() > 1) {
+    plan.operations.push_back(finish_operation("cross", finishing.back(), control));
+  }
+  if (finish().pencil) plan.operations.push_back(pencil_operation(control));
+  return plan;
+}
+
+ProgramSettings CutPlan::settings() const {
+  ProgramSettings settings;
+  settings.decimals = decimals_;
+  settings.blend_tolerance = finish().tolerance;
+  settings.spin_up = options_.spin_up;
+  settings.coolant = options_.coolant;
+  settings.grouping = options_.grouping;
+  settings.largest_file = options_.largest_file;
+  settings.planner = planner_settings(options_.workshop.machine);
+  return settings;
+}
+
+FinishPaths CutPlan::finish_paths(const ProgramFiles& programs, const RunControl& control) const {
+  FinishPaths paths;
+  for (const RasterPlan& plan : rasters(kUnrounded)) {
+    paths.ideal.push_back(ideal_path(*surface_, plan, executor_, control));
+    BallPath fitted(plan.radius, 0.0);
+    const OperationSummary summary = cut_finish(*surface_, plan, {"finish", ball(), safe_z()},
+                                                executor_, path_sink(fitted), control);
+    if (!summary.complete) throw Interrupted();
+    paths.fitted.push_back(std::move(fitted));
+  }
+  if (finish().pencil) {
+    // No row: its points lie on the drop surface already, so that there is nothing more exact.
+    BallPath pencil(ball().radius(), 0.0);
+    if (!run_pencil(kUnrounded, path_sink(pencil), control).complete) throw Interrupted();
+    paths.ideal.push_back(pencil);
+    paths.fitted.push_back(std::move(pencil));
+  }
+  BallPath written(ball().radius(), z_offset_);
+  for (const ProgramFile& file : programs.files) {
+    const bool finishes =
+        std::any_of(file.operations.begin(), file.operations.end(), [&](const OperationTime& time) {
+          return programs.summaries[time.operation].tool == ball().number;
+        });
+    if (finishes) {
+      read_path(file.path, options_.post.reader, ball().number, written, control);
+    }
+  }
+  paths.written.push_back(std::move(written));
+  return paths;
+}
+
+}  // namespace lensforge

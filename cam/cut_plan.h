@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "cam/cam_options.h"
+#include "cam/contact/cut_surface.h"
+#include "cam/contact/height_field.h"
+#include "cam/contact/profile_cutter.h"
+#include "cam/finish_paths.h"
+#include "cam/milled/cast_field.h"
+#include "cam/path/collision.h"
+#include "cam/path/finish_operation.h"
+#include "cam/path/finish_raster.h"
+#include "cam/path/pencil.h"
+#include "cam/path/rough.h"
+#include "cam/path/stock_map.h"
+#include "cam/post/program_writer.h"
+#include "cam/report/path_sketch.h"
+#include "core/executor.h"
+#include "core/lens.h"
+#include "core/run_control.h"
+#include "core/surface_mesh.h"
+
+namespace lensforge {
+
+/// What is cut out of which blank, and the operations that do it.
+class CutPlan {
+ public:
+  /// @param lens  must outlive the plan. @pre validate(options, lens.setup) passed.
+  /// @throw InputError naming the surface if it is no height field over the lens's rectangle.
+  CutPlan(const Lens& lens, const CamOptions& options, const Executor& executor);
+  CutPlan(const CutPlan&) = delete;
+  CutPlan& operator=(const CutPlan&) = delete;
+
+  /// The programs' plan: roughing, semi-finishing, finishing, as far as they are wanted. Its
+  /// operations work on this object, one after the other, once.
+  [[nodiscard]] ProgramPlan programs(const RunControl& control);
+  [[nodiscard]] ProgramSettings settings() const;
+
+  /// The finishing ball's ways, from the exact drop curves to the written programs.
+  /// @throw Interrupted; InputError or RunError if a program cannot be read back.
+  [[nodiscard]] FinishPaths finish_paths(const ProgramFiles& programs,
+                                         const RunControl& control) const;
+
+  [[nodiscard]] const CamOptions& options() const { return options_; }
+  /// What is cut: the lens's surface or the mould's; mm, in a lens frame of its own.
+  [[nodiscard]] const SurfaceMesh& mesh() const { return mesh_; }
+  /// The same for the finishing ball.
+  [[nodiscard]] const CutSurface& surface() const { return *surface_; }
+  /// Where the lens lies in the mould, if there is one.
+  [[nodiscard]] std::optional<CastFrame> mould() const;
+  [[nodiscard]] const Eigen::AlignedBox3d& part_box() const { return field_.box; }
+  /// Size and steepness of what is cut.
+  [[nodiscard]] const HeightField& field() const { return field_; }
+  [[nodiscard]] const Eigen::AlignedBox3d& blank() const { return blank_; }
+  [[nodiscard]] double z_offset() const { return z_offset_; }
+  /// Between finishing rows, as cut, mm.
+  [[nodiscard]] double pitch() const { return rasters(resolution()).front().pitch; }
+  [[nodiscard]] int decimals() const { return decimals_; }
+  /// What touches something that it must not, as far as programs() were streamed.
+  [[nodiscard]] const std::vector<Collision>& collisions() const {
+    return collisions_.collisions();
+  }
+  /// Every operation's way, thinned out, as far as programs() were streamed.
+  [[nodiscard]] std::vector<ReportPath> shown_path() const;
+
+ private:
+  [[nodiscard]] const FinishProcess& finish() const { return options_.workshop.process.finish; }
+  [[nodiscard]] const Tool& ball() const { return options_.workshop.tool(finish().tool); }
+  [[nodiscard]] double resolution() const;
+  /// The finishing raster, and the one across if it is wanted.
+  [[nodiscard]] std::vector<RasterPlan> rasters(double resolution) const;
+  [[nodiscard]] RasterPlan raster(PassAxis along, double resolution) const;
+  [[nodiscard]] double safe_z() const;
+  /// Of what is cut, seen from above.
+  [[nodiscard]] Eigen::AlignedBox2d rectangle() const {
+    return {field_.box.min().head<2>(), field_.box.max().head<2>()};
+  }
+  ProgramOperation rough_operation(const RunControl& control);
+  ProgramOperation semi_operation(const RunControl& control);
+  ProgramOperation finish_operation(const std::string& name, const RasterPlan& plan,
+                                    const RunControl& control);
+  ProgramOperation pencil_operation(const RunControl& control);
+  [[nodiscard]] PencilOptions pencil_options(double resolution) const;
+  OperationSummary run_pencil(double resolution, const MoveSink& sink,
+                              const RunControl& control) const;
+  /// The sink behind a sketch of the operation and a look for collisions.
+  MoveSink watched(const std::string& operation, const Tool& tool, const MoveSink& sink);
+
+  const Lens& lens_;
+  CamOptions options_;
+  Executor executor_;
+  SurfaceMesh mesh_;
+  HeightField field_;
+  Eigen::AlignedBox3d blank_;
+  double z_offset_ = 0.0;
+  int decimals_ = 5;
+  ProfileCutter profile_;
+  StockMap stock_;
+  std::unique_ptr<CutSurface> surface_;
+  CollisionCheck collisions_;
+  std::vector<std::unique_ptr<PathSketch>> sketches_;
+};
+
+}  // namespace lensforge

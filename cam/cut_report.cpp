@@ -1,0 +1,234 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cam/cut_report.h"
+
+#include <algorithm>
+#include <string>
+
+#include "core/decimal_text.h"
+
+namespace lensforge {
+namespace {
+
+constexpr double kMicrometres = 1e3;
+constexpr double kSecondsPerMinute = 60.0;
+
+std::string mm(double value, int decimals) { return decimal_text(value, decimals) + " mm"; }
+
+const char* zero_words(ZZero zero) {
+  switch (zero) {
+    case ZZero::kStock:
+      return "lower left corner of the lens, top of the blank";
+    case ZZero::kLens:
+      return "lower left corner of the lens, highest point of the finished surface";
+    case ZZero::kTable:
+      break;
+  }
+  return "lower left corner of the lens, the face that the blank lies on";
+}
+
+SetupSheet setup_sheet(const CutPlan& plan) {
+  const CamOptions& options = plan.options();
+  const bool lens = options.part == PartKind::kLens;
+  SetupSheet sheet;
+  sheet.machine = options.workshop.machine.name;
+  sheet.material = lens ? options.workshop.material.name : "mould material";
+  sheet.part = plan.part_box();
+  sheet.blank = plan.blank();
+  sheet.zero = {0.0, 0.0, -plan.z_offset()};
+  sheet.zero_words = zero_words(options.z_zero);
+  sheet.up_words = lens ? "polished flat face down; the optical surface is cut from above"
+                        : "the mould's cavity is cut from above";
+  for (const KeepOut& clamp : options.workshop.keep_outs) {
+    sheet.keep_outs.push_back({clamp.name, {clamp.low, clamp.high}});
+  }
+  return sheet;
+}
+
+/// Files that an operation stands in: "finish_1.ngc, finish_2.ngc".
+std::string files_of(const ProgramFiles& programs, std::size_t operation) {
+  std::string names;
+  for (const ProgramFile& file : programs.files) {
+    const bool holds =
+        std::any_of(file.operations.begin(), file.operations.end(),
+                    [&](const OperationTime& time) { return time.operation == operation; });
+    if (holds) names += (names.empty() ? "" : ", ") + file.path.filename().string();
+  }
+  return names;
+}
+
+std::vector<ReportOperation> report_operations(const CutPlan& plan, const ProgramFiles& programs) {
+  std::vector<ReportOperation> operations;
+  for (std::size_t i = 0; i < programs.summaries.size(); ++i) {
+    const Tool& tool = plan.options().workshop.tool(programs.summaries[i].tool);
+    const ProgramTime& time = programs.times[i];
+    operations.push_back({programs.summaries[i], files_of(programs, i), tool.feed, tool.spindle_rpm,
+                          time.seconds / kSecondsPerMinute, time.lines,
+                          time.peak_lines_per_second});
+  }
+  return operations;
+}
+
+std::vector<Tool> tools_of(const CutPlan& plan, const ProgramFiles& programs) {
+  std::vector<Tool> tools;
+  for (const OperationSummary& summary : programs.summaries) {
+    const bool known = std::any_of(tools.begin(), tools.end(),
+                                   [&](const Tool& tool) { return tool.number == summary.tool; });
+    if (!known) tools.push_back(plan.options().workshop.tool(summary.tool));
+  }
+  return tools;
+}
+
+ParameterGroup finish_parameters(const CutPlan& plan) {
+  const FinishProcess& finish = plan.options().workshop.process.finish;
+  return {"Finishing",
+          {{"Stepover", mm(plan.pitch(), 4)},
+           {"Rows along", finish.along == PassAxis::kX ? "X" : "Y"},
+           {"Tolerance", mm(finish.tolerance, 5)},
+           {"Slope tolerance", decimal_text(1e3 * finish.slope_tolerance, 2) + " mrad"},
+           {"Decimals", std::to_string(plan.decimals())},
+           {"Surface", plan.options().surface == SurfaceModel::kSmooth
+                           ? "smooth, through the mesh's vertices"
+                           : "facets of the mesh"}}};
+}
+
+ParameterGroup polish_parameters(const CamOptions& options) {
+  ParameterGroup group{"Polishing, as assumed",
+                       {{"Gaussian σ", mm(options.polish.sigma, 3)},
+                        {"Sampled every", mm(sample_spacing(options), 4)}}};
+  if (options.polish.rim_depth > 0.0) {
+    group.parameters.push_back(
+        {"Taken off at the rim",
+         mm(options.polish.rim_depth, 4) + ", falling over " + mm(options.polish.rim_length, 2)});
+  }
+  return group;
+}
+
+/// The certificates of all finishing operations in one.
+PathCertificate whole_certificate(const ProgramFiles& programs) {
+  PathCertificate whole;
+  const auto take = [](Extreme& to, const Extreme& from) {
+    if (from.value > to.value) to = from;
+  };
+  for (const OperationSummary& summary : programs.summaries) {
+    if (!summary.certified || summary.allowance > 0.0) continue;
+    take(whole.gouge, summary.certificate.gouge);
+    take(whole.excess, summary.certificate.excess);
+    take(whole.slope, summary.certificate.slope);
+  }
+  return whole;
+}
+
+CutFindings findings_of(const ProgramFiles& programs, const std::optional<Prediction>& prediction) {
+  const PathCertificate certificate = whole_certificate(programs);
+  CutFindings findings;
+  findings.gouge = certificate.gouge.value;
+  findings.excess = certificate.excess.value;
+  findings.slope = certificate.slope.value;
+  findings.block_rate = programs.total.peak_lines_per_second;
+  if (!prediction) return findings;
+  const PictureQuality& part = prediction->leakage.part().quality;
+  findings.leakage = part.leakage;
+  findings.dark_flux = part.dark_flux;
+  findings.mae_increase =
+      std::max(0.0, part.metrics.mae - prediction->leakage.designed.quality.metrics.mae);
+  findings.fillet_depth =
+      prediction->creases.worst.empty() ? 0.0 : prediction->creases.worst[0].depth;
+  return findings;
+}
+
+ReportMap fillet_map(const CreaseMap& creases) {
+  ReportMap map{"Material left in creases",
+                "What the ball cannot reach, the most in every square.",
+                "µm",
+                {static_cast<int>(creases.columns), static_cast<int>(creases.rows), {}}};
+  for (const float depth : creases.depth) {
+    map.raster.values.push_back(static_cast<float>(kMicrometres) * depth);
+  }
+  return map;
+}
+
+ReportMap fillet_share_map(const CreaseMap& creases) {
+  ReportMap map{"Light concerned by creases",
+                "Share of every square that is fillet instead of the designed surface.",
+                "%",
+                {static_cast<int>(creases.columns), static_cast<int>(creases.rows), {}}};
+  for (const float share : creases.share) map.raster.values.push_back(100.0F * share);
+  return map;
+}
+
+std::vector<std::string> warnings_of(const CutPlan& plan, const ProgramFiles& programs) {
+  std::vector<std::string> warnings;
+  for (const Collision& collision : plan.collisions()) warnings.push_back(collision.sentence());
+  const Eigen::Vector3d travel = plan.options().workshop.machine.travel;
+  if ((plan.blank().sizes().array() > travel.array()).any()) {
+    warnings.push_back("the blank is larger than the machine's travel of " +
+                       decimal_text(travel.x(), 0) + " x " + decimal_text(travel.y(), 0) + " x " +
+                       decimal_text(travel.z(), 0) + " mm");
+  }
+  const HeightField& field = plan.field();
+  if (field.steepest > kSteepestSlope) {
+    warnings.push_back("the surface rises by " + decimal_text(field.steepest, 2) +
+                       " mm a millimetre at x " + decimal_text(field.steepest_place.x(), 2) +
+                       " y " + decimal_text(field.steepest_place.y(), 2) +
+                       ": on slopes above 1 a rim may be left uncut");
+  }
+  if (plan.options().post.name == "grbl") {
+    double fastest = 0.0;
+    for (const Tool& tool : tools_of(plan, programs)) fastest = std::max(fastest, tool.spindle_rpm);
+    warnings.push_back(
+        "Grbl runs the spindle no faster than its setting $30, silently: it has to "
+        "be at least " +
+        decimal_text(fastest, 0));
+  }
+  if (programs.total.starved > 0) {
+    warnings.push_back(
+        "the controller will wait for lines " + std::to_string(programs.total.starved) +
+        " times at " + decimal_text(plan.options().workshop.machine.lines_per_second, 0) +
+        " lines a second: the cut then takes " +
+        decimal_text(programs.total.stream_limited_seconds / kSecondsPerMinute, 0) + " minutes");
+  }
+  return warnings;
+}
+
+void add_prediction(const Prediction& prediction, const Lens& lens, ReportData& data) {
+  data.target = lens.target;
+  data.leakage = prediction.leakage;
+  data.shown = {surface_name::kDesigned, surface_name::kRounded, surface_name::kMilled,
+                surface_name::kPolished};
+  data.places = prediction.places;
+  data.surface = prediction.surface;
+  data.maps = {prediction.height, fillet_map(prediction.creases),
+               fillet_share_map(prediction.creases)};
+}
+
+}  // namespace
+
+ReportData make_report(const CutPlan& plan, const ProgramFiles& programs,
+                       const std::optional<Prediction>& prediction, const Lens& lens) {
+  const CamOptions& options = plan.options();
+  ReportData data;
+  data.job = options.job;
+  data.program = "lensforge " LENSFORGE_VERSION;
+  data.part = options.part == PartKind::kLens ? "lens" : "mould";
+  data.lens_size = lens.setup.lens_size;
+  data.leakage_options = options.leakage;
+  data.operations = report_operations(plan, programs);
+  data.tools = tools_of(plan, programs);
+  data.parameters = {finish_parameters(plan)};
+  data.setup = setup_sheet(plan);
+  data.z_offset = plan.z_offset();
+  data.warnings = warnings_of(plan, programs);
+  data.path = plan.shown_path();
+  if (prediction) {
+    data.parameters.push_back(polish_parameters(options));
+    add_prediction(*prediction, lens, data);
+  }
+  CutLimits limits = options.limits;
+  limits.block_rate = options.workshop.machine.lines_per_second;
+  data.verdict = judge_cut(findings_of(programs, prediction), limits);
+  const auto collisions = static_cast<double>(plan.collisions().size());
+  data.verdict.checks.push_back({"collisions", "Collisions", collisions, 0.0, "", 0});
+  return data;
+}
+
+}  // namespace lensforge

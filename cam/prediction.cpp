@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cam/prediction.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "cam/leakage/lens_grid.h"
+#include "cam/leakage/render_field.h"
+#include "cam/milled/field_tiles.h"
+#include "core/error.h"
+
+namespace lensforge {
+namespace {
+
+/// Side of the cells in which leaking light is looked for, mm: a groove of a few of them is what an
+/// operator can find again.
+constexpr double kLeakCell = 1.0;
+
+/// Nodes along the longer side of the surface that the report shows.
+constexpr double kViewNodes = 240.0;
+
+constexpr double kMicrometres = 1e3;
+
+/// A whole surface, coarsely.
+SurfacePatch coarse_patch(const SurfaceField& field, const Lens& lens, double spacing,
+                          const Executor& executor) {
+  SurfacePatch patch;
+  field.sample(lens_grid(lens.setup.lens_size, spacing), executor, patch);
+  return patch;
+}
+
+LensRaster raster_of(const SurfacePatch& patch) {
+  LensRaster raster;
+  raster.columns = static_cast<int>(patch.window.columns);
+  raster.rows = static_cast<int>(patch.window.rows);
+  raster.values.assign(patch.z.begin(), patch.z.end());
+  return raster;
+}
+
+/// Of the cells of a leak map.
+ReportMap height_map(const LeakMap& map) {
+  ReportMap heights{"Height",
+                    "Polished part against the design, the largest difference in every square; "
+                    "below 0 too much is taken off.",
+                    "µm",
+                    {static_cast<int>(map.columns), static_cast<int>(map.rows), {}}};
+  for (const HeightDifference& difference : map.height) {
+    heights.raster.values.push_back(static_cast<float>(kMicrometres * difference.value));
+  }
+  return heights;
+}
+
+}  // namespace
+
+Prediction predict_part(const PartSurfaces& surfaces, const Lens& lens, const CamOptions& options,
+                        const Executor& executor, const RunControl& control) {
+  Prediction result;
+  const GridWindow grid = lens_grid(lens.setup.lens_size, sample_spacing(options));
+  const FieldRenderSetup setup{lens.setup, grid};
+  const LeakageChain chain = surfaces.chain();
+  result.leakage = measure_leakage(chain, lens.target, setup, options.leakage, executor, control);
+  const std::vector<double> weights =
+      pixels_with_surplus(result.leakage.part().picture, result.leakage.designed.picture);
+  const LeakMap map =
+      map_leakage(chain.designed, chain.part(), setup, weights, kLeakCell, executor);
+  result.places = worst_places(map, chain, result.leakage, setup, {}, executor);
+  result.creases = map_creases(surfaces.rounded(), grid, {}, executor, control);
+  if (!result.creases.complete) throw Interrupted();
+  result.height = height_map(map);
+  const double spacing = lens.setup.lens_size.maxCoeff() / kViewNodes;
+  result.surface = raster_of(coarse_patch(surfaces.milled(), lens, spacing, executor));
+  result.milled = mesh_of(coarse_patch(surfaces.milled(), lens, kMeshSpacing, executor));
+  return result;
+}
+
+}  // namespace lensforge
