@@ -81,7 +81,7 @@ TEST_F(DesignInterrupt, KilledAtAnyMomentAndResumedGivesTheSameLens) {
 TEST_F(DesignOnBlackInterrupt, KilledAndResumedGivesTheSameLens) {
   for (const char* model : {"facet", "smooth"}) {
     model_ = model;
-    kill_and_resume({0.2, 0.6});
+    kill_and_resume({0.4});
   }
 }
 
