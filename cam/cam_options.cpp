@@ -59,16 +59,16 @@ void validate_polish(const CamOptions& options) {
 
 }  // namespace
 
-const char* name_of(ZZero zero) {
+const char* words_for(ZZero zero) {
   switch (zero) {
     case ZZero::kStock:
-      return "stock";
+      return "top of the blank";
     case ZZero::kLens:
-      return "lens";
+      return "highest point of the finished surface";
     case ZZero::kTable:
       break;
   }
-  return "table";
+  return "the face that the blank lies on";
 }
 
 double sample_spacing(const CamOptions& options) {

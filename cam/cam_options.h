@@ -64,7 +64,7 @@ double sample_spacing(const CamOptions& options);
 ///        against the size of the lens.
 void validate(const CamOptions& options, const OpticalSetup& setup);
 
-/// "stock", "table" or "lens".
-const char* name_of(ZZero zero);
+/// The height in plain words: "top of the blank".
+const char* words_for(ZZero zero);
 
 }  // namespace lensforge

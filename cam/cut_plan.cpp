@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "cam/contact/mould.h"
+#include "cam/path/rough_links.h"
 #include "core/decimal_text.h"
 #include "core/error.h"
 
@@ -44,18 +45,6 @@ double z_offset_of(ZZero zero, double surface_top, double blank_top) {
   return 0.0;
 }
 
-const char* zero_words(ZZero zero) {
-  switch (zero) {
-    case ZZero::kStock:
-      return "top of the blank";
-    case ZZero::kLens:
-      return "highest point of the finished surface";
-    case ZZero::kTable:
-      break;
-  }
-  return "flat face that the blank lies on";
-}
-
 std::unique_ptr<CutSurface> surface_to_cut(const SurfaceMesh& mesh, const CamOptions& options,
                                            double radius, const Executor& executor) {
   if (options.surface == SurfaceModel::kFacet) {
@@ -85,7 +74,7 @@ CutPlan::CutPlan(const Lens& lens, const CamOptions& options, const Executor& ex
       profile_(mesh_),
       stock_(whole_blank(options_.workshop, field_.box)),
       surface_(surface_to_cut(mesh_, options_, ball().radius(), executor)),
-      collisions_(profile_, options_.workshop, whole_blank(options_.workshop, field_.box)) {}
+      collisions_(profile_, options_.workshop, stock_) {}
 
 std::optional<CastFrame> CutPlan::mould() const {
   if (options_.part == PartKind::kLens) return std::nullopt;
@@ -97,9 +86,7 @@ std::optional<CastFrame> CutPlan::mould() const {
 double CutPlan::resolution() const { return std::pow(10.0, -decimals_); }
 
 double CutPlan::safe_z() const {
-  double top = blank_.max().z();
-  for (const KeepOut& clamp : options_.workshop.keep_outs) top = std::max(top, clamp.high.z());
-  return to_resolution(top + options_.workshop.process.safe_height + z_offset_, resolution()) -
+  return to_resolution(safe_height_of(options_.workshop, blank_) + z_offset_, resolution()) -
          z_offset_;
 }
 
@@ -196,7 +183,7 @@ ProgramPlan CutPlan::programs(const RunControl& control) {
   plan.z_offset = z_offset_;
   plan.safe_z = safe_z() + z_offset_;
   plan.comments = {"units: mm; X0 Y0: lower left corner of the lens",
-                   std::string("Z0: ") + zero_words(options_.z_zero),
+                   std::string("Z0: ") + words_for(options_.z_zero),
                    "top of the blank: Z " + decimal_text(blank_.max().z() + z_offset_, decimals_)};
   if (options_.workshop.process.rough.enabled) plan.operations.push_back(rough_operation(control));
   if (options_.workshop.process.semi.enabled) plan.operations.push_back(semi_operation(control));

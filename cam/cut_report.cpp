@@ -14,18 +14,6 @@ constexpr double kSecondsPerMinute = 60.0;
 
 std::string mm(double value, int decimals) { return decimal_text(value, decimals) + " mm"; }
 
-const char* zero_words(ZZero zero) {
-  switch (zero) {
-    case ZZero::kStock:
-      return "lower left corner of the lens, top of the blank";
-    case ZZero::kLens:
-      return "lower left corner of the lens, highest point of the finished surface";
-    case ZZero::kTable:
-      break;
-  }
-  return "lower left corner of the lens, the face that the blank lies on";
-}
-
 SetupSheet setup_sheet(const CutPlan& plan) {
   const CamOptions& options = plan.options();
   const bool lens = options.part == PartKind::kLens;
@@ -35,7 +23,7 @@ SetupSheet setup_sheet(const CutPlan& plan) {
   sheet.part = plan.part_box();
   sheet.blank = plan.blank();
   sheet.zero = {0.0, 0.0, -plan.z_offset()};
-  sheet.zero_words = zero_words(options.z_zero);
+  sheet.zero_words = std::string("lower left corner of the lens, ") + words_for(options.z_zero);
   sheet.up_words = lens ? "polished flat face down; the optical surface is cut from above"
                         : "the mould's cavity is cut from above";
   for (const KeepOut& clamp : options.workshop.keep_outs) {

@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "cam/leakage/lens_grid.h"
 #include "cam/leakage/render_field.h"
-#include "cam/milled/field_tiles.h"
+#include "cam/milled/lens_grid.h"
+#include "cam/milled/sampled_mesh.h"
 #include "core/error.h"
 
 namespace lensforge {

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/float_bounds.h"
 
 namespace lensforge {
 namespace {
@@ -45,14 +46,6 @@ ContactFeatures rotate_features(ContactFeatures features, int first) {
     if ((features & corner_bit((k + first) % 3)) != 0) rotated |= corner_bit(k);
   }
   return rotated;
-}
-
-float below(double value) {
-  return std::nextafter(static_cast<float>(value), -std::numeric_limits<float>::infinity());
-}
-
-float above(double value) {
-  return std::nextafter(static_cast<float>(value), std::numeric_limits<float>::infinity());
 }
 
 std::size_t index_of(std::int64_t value) { return static_cast<std::size_t>(value); }
@@ -329,9 +322,9 @@ void DropCutter::fill_items(const SurfaceMesh& mesh, const Executor& executor) {
     items_[item].features = rotate_features(features[index_of(t)], apex);
     const Eigen::Vector3d low = corners.rowwise().minCoeff() - bounds_.min();
     const Eigen::Vector3d high = corners.rowwise().maxCoeff() - bounds_.min();
-    reach_[item] = {below(low.x() - kReachMargin), above(high.x() + kReachMargin),
-                    below(low.y() - kReachMargin), above(high.y() + kReachMargin),
-                    above(high.z() + kReachMargin)};
+    reach_[item] = {float_below(low.x() - kReachMargin), float_above(high.x() + kReachMargin),
+                    float_below(low.y() - kReachMargin), float_above(high.y() + kReachMargin),
+                    float_above(high.z() + kReachMargin)};
   };
   parallel_for(executor, "drop cutter items", static_cast<std::int64_t>(features.size()), fill);
 }

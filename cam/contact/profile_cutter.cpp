@@ -8,20 +8,13 @@
 #include <limits>
 
 #include "cam/contact/profile_contact.h"
+#include "core/float_bounds.h"
 
 namespace lensforge {
 namespace {
 
 /// Cells per triangle: two triangles a cell keep the pyramid as small as the items.
 constexpr double kCellsPerTriangle = 0.5;
-
-float below(double value) {
-  return std::nextafter(static_cast<float>(value), -std::numeric_limits<float>::infinity());
-}
-
-float above(double value) {
-  return std::nextafter(static_cast<float>(value), std::numeric_limits<float>::infinity());
-}
 
 std::size_t index_of(std::int64_t value) { return static_cast<std::size_t>(value); }
 
@@ -95,12 +88,9 @@ void ProfileCutter::sort_into_cells(const SurfaceMesh& mesh, double cell) {
     corners << mesh.corner(triangle, 0), mesh.corner(triangle, 1), mesh.corner(triangle, 2);
     const Eigen::Vector3d low = corners.rowwise().minCoeff() - bounds_.min();
     const Eigen::Vector3d high = corners.rowwise().maxCoeff() - bounds_.min();
-    boxes_[item] = {below(low.x()),
-                    above(high.x()),
-                    below(low.y()),
-                    above(high.y()),
-                    static_cast<std::int32_t>(item),
-                    corners.row(2).maxCoeff()};
+    boxes_[item] = {
+        float_below(low.x()),  float_above(high.x()),           float_below(low.y()),
+        float_above(high.y()), static_cast<std::int32_t>(item), corners.row(2).maxCoeff()};
     triangle_of_[item] = static_cast<std::int32_t>(t);
     item_of_[t] = static_cast<std::int32_t>(item);
   }

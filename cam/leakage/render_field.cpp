@@ -3,10 +3,11 @@
 
 #include <algorithm>
 #include <numeric>
+#include <span>
 
-#include "cam/leakage/flux_sum.h"
 #include "cam/leakage/surface_tile.h"
 #include "core/error.h"
+#include "design/flux/flux_image.h"
 
 namespace lensforge {
 
@@ -28,18 +29,20 @@ FluxPicture render_cells(const SurfaceField& field, const FieldRenderSetup& setu
                          const CellRange& cells, const Executor& executor,
                          const RunControl& control) {
   const Eigen::Vector2i pixels = setup.optics.pixels;
-  FluxSum sum(pixels.x(), pixels.y(), executor);
+  FluxImage image(pixels.x(), pixels.y());
+  image.begin(executor);
   SurfaceTile tile(setup.optics, setup.grid);
   const std::vector<CellRange> tiles = tiles_of(cells, setup.tile);
   for (std::size_t t = 0; t < tiles.size(); ++t) {
     if (control.stop_requested()) throw Interrupted();
     tile.load(field, tiles[t], executor);
-    sum.add(executor, tile.cells(), [&tile](std::int64_t cell, const FluxAccumulator& image) {
-      tile.visit_cell(cell, [&image](const ImageTriangle& piece) { deposit(piece, image); });
+    image.add(executor, tile.cells(), [&tile](std::int64_t cell, const FluxAccumulator& sum) {
+      tile.visit_cell(cell, [&sum](const ImageTriangle& piece) { deposit(piece, sum); });
     });
     control.report({"render", static_cast<double>(t + 1), static_cast<double>(tiles.size()), ""});
   }
-  return {pixels.x(), pixels.y(), sum.flux()};
+  const std::span<const double> flux = image.resolve(executor);
+  return {pixels.x(), pixels.y(), {flux.begin(), flux.end()}};
 }
 
 }  // namespace lensforge

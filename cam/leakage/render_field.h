@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "cam/leakage/lens_grid.h"
+#include "cam/milled/lens_grid.h"
 #include "cam/milled/surface_field.h"
 #include "core/executor.h"
 #include "core/image.h"

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "cam/leakage/crease_split.h"
-#include "cam/leakage/lens_grid.h"
+#include "cam/milled/lens_grid.h"
 #include "cam/milled/surface_field.h"
 #include "core/executor.h"
 #include "core/optical_setup.h"

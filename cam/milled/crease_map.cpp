@@ -6,11 +6,14 @@
 #include <cstddef>
 #include <string>
 
-#include "cam/milled/field_tiles.h"
+#include "cam/milled/lens_grid.h"
 #include "core/error.h"
 
 namespace lensforge {
 namespace {
+
+/// Cells along a tile's side.
+constexpr std::int64_t kTileSide = 1024;
 
 /// What is known of a cell while tiles come in.
 struct Cell {
@@ -100,12 +103,13 @@ CreaseMap map_creases(const RoundedField& field, const GridWindow& grid,
                       const RunControl& control) {
   LF_CHECK(options.cell > 0.0, std::to_string(options.cell));
   MapBuilder builder(grid, options.cell);
-  const std::vector<GridWindow> tiles = cut_into_tiles(grid);
+  const std::vector<CellRange> tiles = tiles_of(all_cells(grid), kTileSide);
   SurfacePatch patch;
   CreasePatch creases;
   double done = 0.0;
-  for (const GridWindow& tile : tiles) {
+  for (const CellRange& cells : tiles) {
     if (control.stop_requested()) return builder.finish(options);
+    const GridWindow tile = window_of(grid, cells, 0);
     field.sample(tile, executor, patch, creases);
     builder.add(patch, creases, tile.first_column == grid.first_column,
                 tile.first_row == grid.first_row);

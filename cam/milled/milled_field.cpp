@@ -10,6 +10,7 @@
 
 #include "cam/milled/ball_sweep.h"
 #include "core/error.h"
+#include "core/float_bounds.h"
 
 namespace lensforge {
 namespace {
@@ -32,14 +33,6 @@ constexpr double kBoundMargin = 1e-9;
 constexpr double kRounding = 1e-3;
 
 std::size_t index_of(std::int64_t value) { return static_cast<std::size_t>(value); }
-
-float below(double value) {
-  return std::nextafter(static_cast<float>(value), -std::numeric_limits<float>::infinity());
-}
-
-float above(double value) {
-  return std::nextafter(static_cast<float>(value), std::numeric_limits<float>::infinity());
-}
 
 Eigen::AlignedBox3d box_of(const BallPath& path, const BallMove& move, double from, double to) {
   if (move.arc >= 0) {
@@ -239,8 +232,9 @@ std::vector<MilledField::Span> MilledField::spans_of(const BallPath& path, doubl
       const Eigen::AlignedBox3d box =
           box_of(path, move, k / double(parts), (k + 1) / double(parts));
       if (box.min().z() - path.radius() >= blank_top) continue;
-      spans.push_back({below(box.min().x()), above(box.max().x()), below(box.min().y()),
-                       above(box.max().y()), below(box.min().z()), static_cast<std::int32_t>(m)});
+      spans.push_back({float_below(box.min().x()), float_above(box.max().x()),
+                       float_below(box.min().y()), float_above(box.max().y()),
+                       float_below(box.min().z()), static_cast<std::int32_t>(m)});
     }
   }
   return spans;

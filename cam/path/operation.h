@@ -20,7 +20,7 @@ struct Extreme {
 struct PathCertificate {
   Extreme gouge;   ///< Deepest that the path runs below the drop curve, mm, ≥ 0.
   Extreme excess;  ///< Highest that it runs above, mm, ≥ 0.
-  Extreme slope;   ///< Largest difference of direction where the drop curve has one, rad.
+  Extreme slope;   ///< Largest difference of mean slope over any 5 µm of a move, rad.
 };
 
 /// What one operation came to; mm, lens frame.

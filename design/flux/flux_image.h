@@ -31,16 +31,10 @@ class FluxImageOn {
   /// row from the top. The values stay valid until the next call. Work: pixels crossed by edges.
   template <class Source>
   std::span<const double> render(const Exec& executor, std::int64_t count, const Source& source) {
-    const int workers = executor.concurrency();
-    const std::size_t size = units_per_picture() * static_cast<std::size_t>(workers);
-    if (units_.size() != size) units_ = Units(size);
-    fill_zero(executor, units_);
-    const auto stride = static_cast<std::int64_t>(units_per_picture());
+    begin(executor);
     parallel_for_worker(executor, "flux deposit", count,
-                        DepositFlux<Source>{source, {units_.data(), columns_, rows_}, stride});
-    scan_rows(executor, "flux resolve", rows_, columns_,
-              ResolveFlux{units_.data(), flux_.data(), columns_, stride, workers});
-    return {flux_.data(), flux_.size()};
+                        DepositFlux<Source>{source, {units_.data(), columns_, rows_}, stride()});
+    return resolve(executor);
   }
 
   /// render() of triangles in the executor's memory.
@@ -49,11 +43,40 @@ class FluxImageOn {
                   StoredTriangles{triangles.data()});
   }
 
+  /// Begins a picture that is made of parts: add() them, then resolve().
+  void begin(const Exec& executor) {
+    const auto workers = static_cast<std::size_t>(executor.concurrency());
+    if (units_.size() != units_per_picture() * workers) {
+      units_ = Units(units_per_picture() * workers);
+    }
+    fill_zero(executor, units_);
+  }
+
+  /// Calls `item(i, image)` for i = 0 … count − 1, at the same time from several threads; each
+  /// deposits as many triangles as it likes into `image`, a FluxAccumulator. CPU only.
+  /// @pre begin() was called with an executor of the same concurrency.
+  template <class Item>
+  void add(const Exec& executor, std::int64_t count, const Item& item) {
+    parallel_for_worker(executor, "flux deposit", count,
+                        DepositItem<Item>{item, {units_.data(), columns_, rows_}, stride()});
+  }
+
+  /// The flux of every pixel of all that was added, as render() returns it.
+  std::span<const double> resolve(const Exec& executor) {
+    scan_rows(executor, "flux resolve", rows_, columns_,
+              ResolveFlux{units_.data(), flux_.data(), columns_, stride(), executor.concurrency()});
+    return {flux_.data(), flux_.size()};
+  }
+
  private:
   using Units = typename Exec::template Buffer<std::int64_t>;
 
   [[nodiscard]] std::size_t units_per_picture() const {
     return (static_cast<std::size_t>(columns_) + 1) * static_cast<std::size_t>(rows_);
+  }
+
+  [[nodiscard]] std::int64_t stride() const {
+    return static_cast<std::int64_t>(units_per_picture());
   }
 
   int columns_;

@@ -29,6 +29,18 @@ struct DepositFlux {
   }
 };
 
+/// Hands item i the picture of its worker to deposit into.
+template <class Item>
+struct DepositItem {
+  const Item& item;
+  FluxAccumulator first;  ///< Worker 0's.
+  std::int64_t stride;    ///< Units from one worker's picture to the next.
+
+  void operator()(std::int64_t i, int worker) const {
+    item(i, FluxAccumulator{first.units + stride * worker, first.columns, first.rows});
+  }
+};
+
 /// Row differences of all workers → flux, along a row from the left.
 struct ResolveFlux {
   using Value = std::uint64_t;  ///< Sums on the way are taken modulo 2⁶⁴.

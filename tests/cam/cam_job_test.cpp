@@ -113,7 +113,7 @@ TEST(CamJob, ZZeroShiftsThePrograms) {
            {ZZero::kStock, -top - 0.25}, {ZZero::kLens, -top}, {ZZero::kTable, 0.0}}) {
     const TempFolder folder;
     options.z_zero = zero;
-    EXPECT_DOUBLE_EQ(run(lens, options, folder).report.z_offset, offset) << name_of(zero);
+    EXPECT_DOUBLE_EQ(run(lens, options, folder).report.z_offset, offset) << words_for(zero);
     char safe[40];
     std::snprintf(safe, sizeof safe, "G0 Z%.6f\n", top + 0.25 + 5.0 + offset);
     EXPECT_THAT(read_bytes(folder / "finish.ngc"), HasSubstr(safe));

@@ -4,13 +4,13 @@
 #include <algorithm>
 #include <cmath>
 #include <set>
-#include <stop_token>
 #include <utility>
 
 #include "cam/cam_meshes.h"
 #include "cam/milled/crease_map.h"
 #include "cam/milled/designed_field.h"
-#include "cam/milled/field_tiles.h"
+#include "cam/milled/lens_grid.h"
+#include "cam/milled/sampled_mesh.h"
 #include "cam/milled_paths.h"
 
 namespace lensforge {
@@ -24,7 +24,8 @@ TEST(FieldTiles, EveryCellOfTheGridLiesInOneTile) {
   grid.first_row = 7;
   std::set<std::pair<std::int64_t, std::int64_t>> cells;
   std::int64_t count = 0;
-  for (const GridWindow& tile : cut_into_tiles(grid, 16)) {
+  for (const CellRange& range : tiles_of(all_cells(grid), 16)) {
+    const GridWindow tile = window_of(grid, range, 0);
     EXPECT_LE(tile.columns, 17);
     EXPECT_GE(tile.columns, 2);
     for (std::int64_t j = 0; j + 1 < tile.rows; ++j) {
@@ -37,24 +38,6 @@ TEST(FieldTiles, EveryCellOfTheGridLiesInOneTile) {
   EXPECT_EQ(count, 82 * 40);
   EXPECT_EQ(static_cast<std::int64_t>(cells.size()), count);
   EXPECT_EQ(*cells.begin(), std::make_pair(std::int64_t{5}, std::int64_t{7}));
-}
-
-TEST(FieldTiles, TilesArriveInOrderUntilAStopIsRequested) {
-  const SurfaceMesh mesh = testing::grid_mesh(5, 5, 3.0, 3.0, [](double, double) { return 2.0; });
-  const FacetField field(mesh);
-  std::stop_source stop;
-  std::int64_t nodes = 0;
-  const auto visit = [&](const SurfacePatch& patch) {
-    nodes += patch.window.size();
-    stop.request_stop();
-  };
-  const GridWindow grid = testing::window_at({0.0, 0.0}, 0.002, 1301, 50);
-  EXPECT_FALSE(for_each_tile(field, grid, Executor::serial(),
-                             {stop.get_token(), [](const Progress&) {}}, visit));
-  EXPECT_EQ(nodes, (kTileSide + 1) * 50);
-  nodes = 0;
-  EXPECT_TRUE(for_each_tile(field, grid, Executor::serial(), {}, visit));
-  EXPECT_EQ(nodes, 1302 * 50);
 }
 
 TEST(FieldTiles, MeshOfASampledMeshIsTheMesh) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "cam/leakage/lens_grid.h"
+#include "cam/milled/lens_grid.h"
 
 #include <algorithm>
 #include <cmath>
