@@ -38,12 +38,21 @@ Sparse laplacian(const WeightedGraph& graph) {
 
 }  // namespace
 
-Eigen::VectorXd solve_laplacian(const WeightedGraph& graph, const Eigen::VectorXd& right) {
-  const Eigen::SimplicialLDLT<Sparse, Eigen::Lower> factor(laplacian(graph));
-  if (factor.info() != Eigen::Success) {
-    return Eigen::VectorXd::Constant(graph.nodes, std::numeric_limits<double>::quiet_NaN());
+struct LaplacianFactor::Factor {
+  Eigen::SimplicialLDLT<Sparse, Eigen::Lower> cholesky;
+};
+
+LaplacianFactor::LaplacianFactor(const WeightedGraph& graph) : factor_(std::make_unique<Factor>()) {
+  factor_->cholesky.compute(laplacian(graph));
+}
+
+LaplacianFactor::~LaplacianFactor() = default;
+
+Eigen::VectorXd LaplacianFactor::solve(const Eigen::VectorXd& right) const {
+  if (factor_->cholesky.info() != Eigen::Success) {
+    return Eigen::VectorXd::Constant(right.size(), std::numeric_limits<double>::quiet_NaN());
   }
-  return factor.solve(right);
+  return factor_->cholesky.solve(right);
 }
 
 }  // namespace lensforge

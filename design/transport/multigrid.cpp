@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <utility>
 #include <vector>
 
@@ -146,6 +147,20 @@ Vector multiply(const Rows& rows, const Vector& x, const Executor& executor) {
   return y;
 }
 
+WeightedGraph graph_of(const Rows& rows) {
+  WeightedGraph graph;
+  graph.nodes = static_cast<int>(rows.size());
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    for (auto k = static_cast<std::size_t>(rows.first[i]);
+         k < static_cast<std::size_t>(rows.first[i + 1]); ++k) {
+      if (rows.other[k] > static_cast<std::int32_t>(i)) {
+        graph.edges.push_back({static_cast<int>(i), rows.other[k], rows.weight[k]});
+      }
+    }
+  }
+  return graph;
+}
+
 /// Below this many nodes the equation is solved directly.
 constexpr std::size_t kDirectSize = 1500;
 
@@ -166,6 +181,7 @@ class Hierarchy {
       levels_.back().aggregate = std::move(aggregate);
       levels_.push_back({aggregated(paired, second, count), {}});
     }
+    coarsest_ = std::make_unique<LaplacianFactor>(graph_of(levels_.back().rows));
   }
 
   [[nodiscard]] const Rows& finest() const { return levels_.front().rows; }
@@ -230,21 +246,10 @@ class Hierarchy {
   }
 
   [[nodiscard]] Vector solve_coarsest(const Vector& right) const {
-    WeightedGraph graph;
-    const Rows& rows = levels_.back().rows;
-    graph.nodes = static_cast<int>(rows.size());
-    for (std::size_t i = 0; i < rows.size(); ++i) {
-      for (auto k = static_cast<std::size_t>(rows.first[i]);
-           k < static_cast<std::size_t>(rows.first[i + 1]); ++k) {
-        if (rows.other[k] > static_cast<std::int32_t>(i)) {
-          graph.edges.push_back({static_cast<int>(i), rows.other[k], rows.weight[k]});
-        }
-      }
-    }
     Eigen::VectorXd b =
         Eigen::Map<const Eigen::VectorXd>(right.data(), static_cast<Eigen::Index>(right.size()));
     b.array() -= b.mean();
-    const Eigen::VectorXd x = solve_laplacian(graph, b);
+    const Eigen::VectorXd x = coarsest_->solve(b);
     return {x.data(), x.data() + x.size()};
   }
 
@@ -260,6 +265,7 @@ class Hierarchy {
 
   const Executor& executor_;
   std::vector<Level> levels_;
+  std::unique_ptr<LaplacianFactor> coarsest_;  ///< A cycle asks for several solutions.
 };
 
 }  // namespace

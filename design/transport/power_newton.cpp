@@ -55,12 +55,12 @@ WeightedGraph coupling(const PowerState& state, const SummedDensity& density) {
 Eigen::VectorXd newton_direction(const PowerState& state, const SummedDensity& density,
                                  const Eigen::VectorXd& residual, const Executor& executor) {
   const WeightedGraph graph = coupling(state, density);
-  if (graph.nodes <= kDirectLimit) return solve_laplacian(graph, residual);
+  if (graph.nodes <= kDirectLimit) return LaplacianFactor(graph).solve(residual);
   MultigridOptions options;
   options.tolerance = kDirectionTolerance;
   MultigridSolution solution = solve_by_multigrid(graph, residual, options, executor);
   // Not seen yet; the factorisation is slower but takes any weights.
-  if (!(solution.residual <= options.tolerance)) return solve_laplacian(graph, residual);
+  if (!(solution.residual <= options.tolerance)) return LaplacianFactor(graph).solve(residual);
   return std::move(solution.x);
 }
 

@@ -51,7 +51,7 @@ TEST(LaplacianSolver, MeetsTheEquation) {
   Random random(1);
   const WeightedGraph graph = grid_graph(30, 3.0, random);
   const Eigen::VectorXd right = random_right(graph.nodes, random);
-  const Eigen::VectorXd x = solve_laplacian(graph, right);
+  const Eigen::VectorXd x = LaplacianFactor(graph).solve(right);
   EXPECT_LT((laplacian_times(graph, x) - right).norm(), 1e-7 * right.norm());
 }
 
@@ -61,7 +61,7 @@ TEST(LaplacianSolver, LoosePartsDoNotMatter) {
   graph.edges = {{0, 1, 2.0}, {2, 3, 1e-3}};  // two pairs and a node without any tie
   Eigen::VectorXd right(5);
   right << 1.0, -1.0, 1.0, -1.0, 0.0;
-  const Eigen::VectorXd x = solve_laplacian(graph, right);
+  const Eigen::VectorXd x = LaplacianFactor(graph).solve(right);
   ASSERT_TRUE(x.allFinite());
   EXPECT_NEAR(x[0] - x[1], 0.5, 1e-6);
   EXPECT_NEAR(x[2] - x[3], 1000.0, 1e-3);
@@ -85,7 +85,7 @@ TEST(Multigrid, AgreesWithTheFactorisation) {
   Random random(3);
   const WeightedGraph graph = grid_graph(80, 2.0, random);
   const Eigen::VectorXd right = random_right(graph.nodes, random);
-  Eigen::VectorXd direct = solve_laplacian(graph, right);
+  Eigen::VectorXd direct = LaplacianFactor(graph).solve(right);
   Eigen::VectorXd iterated = solve_by_multigrid(graph, right, {1e-10, 200}, Executor::serial()).x;
   direct.array() -= direct.mean();
   iterated.array() -= iterated.mean();
