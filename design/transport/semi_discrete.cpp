@@ -102,7 +102,8 @@ class TransportSolver {
       } else {
         state = stretched(l);
       }
-      if (!descend(l, *state)) return state;
+      // What a coarser level got is nothing to the given sites.
+      if (!descend(l, *state) && l > 0) return std::nullopt;
     }
     return state;
   }

@@ -252,6 +252,19 @@ TEST(SemiDiscrete, EndsWhenAskedToStop) {
   EXPECT_EQ(result.steps.size(), 3U);
 }
 
+TEST(SemiDiscrete, ALevelThatCannotBeBalancedLeavesNoMap) {
+  TransportOptions options;
+  options.max_newton_steps = 4;  // All on the coarsest level.
+  const Eigen::Matrix2Xd sites = testing::face_sites(40, 64);
+  const TransportResult result =
+      solve_semi_discrete(sites, Eigen::VectorXd::Ones(sites.cols()), testing::logo_picture(64),
+                          options, Executor::serial(), {});
+  EXPECT_EQ(result.status, TransportResult::Status::kNotConverged);
+  EXPECT_EQ(result.message, "Newton step limit reached");
+  EXPECT_EQ(result.centroids.cols(), 0);
+  EXPECT_EQ(result.weights.size(), 0);
+}
+
 TEST(DensityBlur, KeepsTheTotalAndSpreadsExponentially) {
   Image picture(40, 30);
   picture.at(20, 11) = 1.0F;
