@@ -22,8 +22,7 @@ Eigen::VectorXd potential_of_weights(const Eigen::Matrix2Xd& sites,
 }
 
 Eigen::Matrix2Xd cell_centroids(const PowerDiagram& diagram, const SummedDensity& density,
-                                const Executor& executor) {
-  const std::vector<Moments> moments = cell_moments(diagram, density, executor);
+                                const std::vector<Moments>& moments) {
   // Far below any cell that Newton steps keep, far above the rounding of differences of sums.
   const double least = 1e-12 * density.total();
   Eigen::Matrix2Xd centroids = diagram.sites();
@@ -81,10 +80,12 @@ struct PotentialSamples {
   }
 };
 
-PotentialSamples mirrored_samples(const PowerState& coarse, const SummedDensity& density,
-                                  const Eigen::Matrix2Xd& fine, const Executor& executor) {
+PotentialSamples mirrored_samples(const PowerState& coarse, CellStage& stage,
+                                  const Eigen::Matrix2Xd& fine) {
+  const SummedDensity& density = stage.density();
   const Eigen::Matrix2Xd& sites = coarse.diagram.sites();
-  const Eigen::Matrix2Xd slopes = cell_centroids(coarse.diagram, density, executor);
+  const Eigen::Matrix2Xd slopes =
+      cell_centroids(coarse.diagram, density, stage.moments(coarse.edges));
   const Eigen::VectorXd psi = potential_of_weights(sites, coarse.diagram.weights());
   PotentialSamples samples;
   for (Eigen::Index i = 0; i < sites.cols(); ++i) {
@@ -134,10 +135,10 @@ std::vector<PowerDiagram::Place> hidden_places(const PowerDiagram& diagram) {
 
 }  // namespace
 
-Eigen::VectorXd upsampled_weights(const PowerState& coarse, const SummedDensity& density,
+Eigen::VectorXd upsampled_weights(const PowerState& coarse, CellStage& stage,
                                   const Eigen::Matrix2Xd& fine, const std::vector<int>& order,
-                                  const Executor& executor, const std::stop_token& stop) {
-  const PotentialSamples samples = mirrored_samples(coarse, density, fine, executor);
+                                  const std::stop_token& stop) {
+  const PotentialSamples samples = mirrored_samples(coarse, stage, fine);
   Eigen::Matrix2Xd sites(2, static_cast<Eigen::Index>(samples.sites.size()));
   Eigen::VectorXd psi(sites.cols());
   for (Eigen::Index i = 0; i < sites.cols(); ++i) {
@@ -216,13 +217,12 @@ constexpr std::array<std::array<double, kMostTakers>, kMostTakers> kCuts = {{
 /// One round of mending.
 class Mending {
  public:
-  Mending(const PowerState& state, const SiteLevel& level, const SummedDensity& density,
-          const Executor& executor)
+  Mending(const PowerState& state, const SiteLevel& level, CellStage& stage)
       : state_(state),
         level_(level),
         neighbourhood_(state.diagram),
-        moments_(cell_moments(state.diagram, density, executor)),
-        centroids_(cell_centroids(state.diagram, density, executor)),
+        moments_(stage.moments(state.edges)),
+        centroids_(cell_centroids(state.diagram, stage.density(), moments_)),
         psi_(potential_of_weights(level.sites, state.diagram.weights())) {}
 
   /// New weights; cells below `share` of their wanted mass are given room.
@@ -310,16 +310,16 @@ std::size_t count_below(const SiteLevel& level, const PowerCells& cells, double 
 
 }  // namespace
 
-bool mend_empty_cells(const SiteLevel& level, const SummedDensity& density,
-                      const Executor& executor, const std::stop_token& stop, PowerState& state) {
+bool mend_empty_cells(const SiteLevel& level, const Executor& executor, const std::stop_token& stop,
+                      CellStage& stage, PowerState& state) {
   for (int round = 0; round < kMendingRounds; ++round) {
     const double share = round < kThoroughRounds ? kNearlyEmpty : kEmpty;
     const std::size_t empty = count_below(level, state.cells, share);
     if (empty == 0) return true;
     const double most = kMostEmpty * static_cast<double>(state.cells.mass.size());
     if (static_cast<double>(empty) > most || !state.diagram.is_planar()) return false;
-    Mending mending(state, level, density, executor);
-    state = power_state(level, mending.weights(share), density, executor, stop);
+    const Mending mending(state, level, stage);
+    state = power_state(level, mending.weights(share), executor, stop, stage);
   }
   return count_below(level, state.cells, kEmpty) == 0;
 }

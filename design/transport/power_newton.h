@@ -4,25 +4,27 @@
 #include <Eigen/Core>
 #include <functional>
 #include <stop_token>
+#include <vector>
 
 #include "core/executor.h"
-#include "design/transport/power_cells.h"
+#include "design/transport/cell_edges.h"
+#include "design/transport/cell_stage.h"
 #include "design/transport/power_diagram.h"
 #include "design/transport/site_levels.h"
-#include "design/transport/summed_density.h"
 
 namespace lensforge {
 
 /// A power diagram and what its cells hold.
 struct PowerState {
   PowerDiagram diagram;
+  CellEdges edges;
   PowerCells cells;
 };
 
-/// Cuts the plane by `weights` and measures. @throw Interrupted
+/// Cuts the plane by `weights` and measures. The triangulation is found on the CPU, by `executor`.
+/// @throw Interrupted
 PowerState power_state(const SiteLevel& level, const Eigen::VectorXd& weights,
-                       const SummedDensity& density, const Executor& executor,
-                       const std::stop_token& stop);
+                       const Executor& executor, const std::stop_token& stop, CellStage& stage);
 
 /// max |mass − wanted| / wanted.
 double mass_error(const SiteLevel& level, const PowerCells& cells);
@@ -45,9 +47,14 @@ struct NewtonControl {
 /// the graph Laplacian L = ∂mass/∂w and is halved until the residual falls and every cell keeps
 /// half of min(least mass at the start, least wanted mass) (Kitagawa, Mérigot & Thibert 2019,
 /// Algorithm 1).
-/// @pre every cell of `state` has positive mass under `density`.
+/// @pre `state` was the last to be measured, and every cell of it has positive mass.
 /// @return true if the error fell below control.mass_error. @throw Interrupted
-bool balance_masses(const SiteLevel& level, const SummedDensity& density,
-                    const NewtonControl& control, const Executor& executor, PowerState& state);
+bool balance_masses(const SiteLevel& level, const NewtonControl& control, const Executor& executor,
+                    CellStage& stage, PowerState& state);
+
+/// H(w) = Σ (−∫ (|x − c|² − w) ρ dx − wanted·w), convex; its gradient by w is mass − wanted
+/// (Sun et al., 3.4 and Appendix C).
+double transport_energy(const PowerDiagram& diagram, const std::vector<Moments>& cells,
+                        const Eigen::VectorXd& wanted);
 
 }  // namespace lensforge

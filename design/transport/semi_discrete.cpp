@@ -6,11 +6,13 @@
 #include <cmath>
 #include <cstddef>
 #include <ctime>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
 
 #include "core/error.h"
+#include "design/transport/cell_stage.h"
 #include "design/transport/density_blur.h"
 #include "design/transport/potential_upsampling.h"
 #include "design/transport/power_newton.h"
@@ -64,19 +66,21 @@ void check_input(const Eigen::Matrix2Xd& sites, const Eigen::VectorXd& masses,
   }
 }
 
+using Density = std::shared_ptr<const SummedDensity>;
+
 /// A density of 1 wherever the picture is not black.
-SummedDensity lit_part(const Image& picture) {
+Density lit_part(const Image& picture) {
   const double black = kBlack * picture.total() / static_cast<double>(picture.values().size());
   Image lit = picture;
   for (float& value : lit.values()) value = static_cast<double>(value) > black ? 1.0F : 0.0F;
-  return {lit, lit.total()};
+  return std::make_shared<SummedDensity>(lit, lit.total());
 }
 
 /// A density on the way to the picture itself.
 struct Stage {
   double blur;
   double floor;
-  SummedDensity density;
+  Density density;
 };
 
 /// The hierarchy, what is known on it, and the log.
@@ -111,16 +115,18 @@ class TransportSolver {
   /// Weights and centroids of the given sites from those of the merged ones.
   void write(const PowerState& state, const Eigen::Matrix2Xd& sites,
              const Eigen::VectorXd& masses) {
-    const Stage sharp = stage(0.0, 0.0);
-    const PowerCells cells = measure_cells(state.diagram, sharp.density, executor_);
-    const Eigen::Matrix2Xd centroids = cell_centroids(state.diagram, sharp.density, executor_);
+    cells_->set_density(stage(0.0, 0.0).density);
+    const PowerCells cells = cells_->measure(state.edges);
+    const Eigen::Matrix2Xd centroids =
+        cell_centroids(state.diagram, cells_->density(), cells_->moments(state.edges));
     const Eigen::VectorXd& weights = state.diagram.weights();
     result_.mass_error = mass_error(level(0), cells);
     result_.weights.resize(sites.cols());
     result_.centroids.resize(2, sites.cols());
     result_.areas = Eigen::VectorXd::Zero(sites.cols());
     result_.lit_areas = Eigen::VectorXd::Zero(sites.cols());
-    const PowerCells lit = measure_cells(state.diagram, lit_part(picture_), executor_);
+    cells_->set_density(lit_part(picture_));
+    const PowerCells lit = cells_->measure(state.edges);
     const double mean = weights.mean();
     std::vector<int> massless;
     for (Eigen::Index i = 0; i < sites.cols(); ++i) {
@@ -143,7 +149,8 @@ class TransportSolver {
   [[nodiscard]] std::stop_token stop() const { return control_.stop_token(); }
 
   [[nodiscard]] Stage stage(double blur, double floor) const {
-    return {blur, floor, SummedDensity(soften(picture_, blur, floor), merged_.masses.sum())};
+    return {blur, floor,
+            std::make_shared<SummedDensity>(soften(picture_, blur, floor), merged_.masses.sum())};
   }
 
   [[nodiscard]] double level_blur(int l) const {
@@ -151,8 +158,17 @@ class TransportSolver {
     return kBlurPerCell * std::sqrt(area / static_cast<double>(level(l).sites.cols()));
   }
 
-  [[nodiscard]] PowerState measured(int l, const Eigen::VectorXd& weights, const Stage& s) const {
-    return power_state(level(l), weights, s.density, executor_, stop());
+  /// Begins a level: its sites go to the device.
+  PowerState measured(int l, const Eigen::VectorXd& weights, const Stage& s) {
+    cells_ = make_cell_stage(level(l).sites, executor_);
+    cells_->set_density(s.density);
+    return power_state(level(l), weights, executor_, stop(), *cells_);
+  }
+
+  /// The same diagram under another density.
+  void refill(const Stage& s, PowerState& state) {
+    cells_->set_density(s.density);
+    state.cells = cells_->measure(state.edges);
   }
 
   std::optional<PowerState> fail(std::string message) {
@@ -180,8 +196,7 @@ class TransportSolver {
       return number < options_.max_stage_steps &&
              static_cast<int>(result_.steps.size()) < options_.max_newton_steps;
     };
-    const bool done =
-        balance_masses(level(l), s.density, {goal, observe, stop()}, executor_, state);
+    const bool done = balance_masses(level(l), {goal, observe, stop()}, executor_, *cells_, state);
     if (!done) {
       const bool limited = number >= options_.max_stage_steps ||
                            static_cast<int>(result_.steps.size()) >= options_.max_newton_steps;
@@ -202,25 +217,25 @@ class TransportSolver {
       blur = finest ? kBlurFactor * blur : std::max(last, kBlurFactor * blur);
       if (finest && blur <= kLeastBlur) break;
       const Stage s = stage(blur, kFloor);
-      state.cells = measure_cells(state.diagram, s.density, executor_);
+      refill(s, state);
       if (!run_stage(l, s, !finest && blur == last ? kLevelError : kStageError, state))
         return false;
     }
     if (!finest) return true;
     for (double floor = kFloor; floor > kLeastFloor; floor *= kFloorFactor) {
       const Stage s = stage(0.0, floor);
-      state.cells = measure_cells(state.diagram, s.density, executor_);
+      refill(s, state);
       if (!run_stage(l, s, kStageError, state)) return false;
     }
     const Stage sharp = stage(0.0, 0.0);
-    state.cells = measure_cells(state.diagram, sharp.density, executor_);
+    refill(sharp, state);
     return run_stage(l, sharp, options_.tolerance, state);
   }
 
   /// The coarsest level's start, balanced under the first blur.
   PowerState stretched(int l) {
     const Stage first = stage(kFirstBlur * std::max(picture_.columns(), picture_.rows()), kFloor);
-    PowerState state = measured(l, stretched_weights(level(l).sites, first.density), first);
+    PowerState state = measured(l, stretched_weights(level(l).sites, *first.density), first);
     run_stage(l, first, kStageError, state);
     return state;
   }
@@ -228,10 +243,10 @@ class TransportSolver {
   /// A level's start from the solved one above, under that one's blur.
   std::optional<PowerState> upsampled(int l, const PowerState& coarse) {
     const Stage s = stage(level_blur(l + 1), kFloor);
-    PowerState state = measured(
-        l, upsampled_weights(coarse, s.density, level(l).sites, level(l).order, executor_, stop()),
-        s);
-    if (!mend_empty_cells(level(l), s.density, executor_, stop(), state)) return std::nullopt;
+    cells_->set_density(s.density);
+    PowerState state =
+        measured(l, upsampled_weights(coarse, *cells_, level(l).sites, level(l).order, stop()), s);
+    if (!mend_empty_cells(level(l), executor_, stop(), *cells_, state)) return std::nullopt;
     if (!run_stage(l, s, kStageError, state)) return std::nullopt;
     return state;
   }
@@ -273,6 +288,7 @@ class TransportSolver {
   const RunControl& control_;
   TransportResult& result_;
   std::vector<SiteLevel> levels_;
+  std::unique_ptr<CellStage> cells_;  ///< Of the level that is worked on.
 };
 
 }  // namespace

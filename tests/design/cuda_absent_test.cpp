@@ -9,6 +9,7 @@
 #include "design/cpu_reference.h"
 #include "design/emulated_executor.h"
 #include "design/executor_parity.h"
+#include "design/transport_parity.h"
 
 namespace lensforge::testing {
 namespace {
@@ -25,6 +26,7 @@ struct AbsentSide {
 };
 
 INSTANTIATE_TYPED_TEST_SUITE_P(Cuda, ExecutorParity, AbsentSide);
+INSTANTIATE_TYPED_TEST_SUITE_P(Cuda, TransportParity, AbsentSide);
 
 }  // namespace
 }  // namespace lensforge::testing

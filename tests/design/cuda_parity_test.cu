@@ -16,6 +16,7 @@
 #include "design/render_flux.h"
 #include "design/stage_on_rough_mesh.h"
 #include "design/test_setups.h"
+#include "design/transport_parity.h"
 
 namespace lensforge::testing {
 namespace {
@@ -38,6 +39,7 @@ struct CudaSide {
 };
 
 INSTANTIATE_TYPED_TEST_SUITE_P(Cuda, ExecutorParity, CudaSide);
+INSTANTIATE_TYPED_TEST_SUITE_P(Cuda, TransportParity, CudaSide);
 
 class Cuda : public ::testing::Test {
  protected:

@@ -10,6 +10,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <limits>
 #include <map>
 #include <new>
 #include <span>
@@ -36,16 +37,23 @@ class EmulatedMemory {
     return memory;
   }
 
+  /// From now on there are this many bytes more, as on a GPU whose memory others take.
+  void limit_to(std::size_t more) { limit_ = used_ + more; }
+  void lift_limit() { limit_ = std::numeric_limits<std::size_t>::max(); }
+
   void* allocate(std::size_t bytes) {
+    if (bytes > limit_ - used_) throw RunError("too little memory");
     void* address =
         mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
     if (address == MAP_FAILED) throw std::bad_alloc();
     std::memset(address, 0xFF, bytes);
     mprotect(address, bytes, PROT_NONE);
     regions_[address] = bytes;
+    used_ += bytes;
     return address;
   }
   void release(void* address) {
+    used_ -= regions_.at(address);
     munmap(address, regions_.at(address));
     regions_.erase(address);
   }
@@ -61,6 +69,8 @@ class EmulatedMemory {
 
  private:
   std::map<void*, std::size_t> regions_;
+  std::size_t used_ = 0;
+  std::size_t limit_ = std::numeric_limits<std::size_t>::max();
 };
 
 /// While it lives, the emulated GPU's memory can be touched.

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -13,6 +14,7 @@
 #include "design/executor_parity.h"
 #include "design/render_flux.h"
 #include "design/stage_on_rough_mesh.h"
+#include "design/transport_parity.h"
 
 namespace lensforge::testing {
 namespace {
@@ -31,6 +33,7 @@ struct EmulatedSide {
 };
 
 INSTANTIATE_TYPED_TEST_SUITE_P(EmulatedGpu, ExecutorParity, EmulatedSide);
+INSTANTIATE_TYPED_TEST_SUITE_P(EmulatedGpu, TransportParity, EmulatedSide);
 
 /// Triangles that are made while they are deposited, against triangles in memory.
 TEST(RenderFlux, IsTheSameAsOfProjectedTriangles) {
@@ -68,6 +71,18 @@ TEST(EmulatedGpu, NoticesAKernelThatIsGivenTheCallersMemory) {
   EmulatedBuffer<double> there(1);
   EXPECT_NONFATAL_FAILURE(parallel_for(executor, "wrong", 1, ReadFirst{mine.data(), there.data()}),
                           "points to the caller's memory");
+}
+
+TEST(EmulatedGpu, TooLittleMemoryEndsAMeasurementAndHarmsNoLaterOne) {
+  const CellScene& scene = logo_scene();
+  const auto stage = stage_of(scene, EmulatedExecutor(Executor::serial()));
+  for (const std::size_t more : {std::size_t{1000}, 50 * scene.edges.edges.size()}) {
+    EmulatedMemory::instance().limit_to(more);
+    EXPECT_THROW(stage->measure(scene.edges), RunError);
+    EmulatedMemory::instance().lift_limit();
+  }
+  const std::vector<double> expected = cpu_stage_of(scene)->measure(scene.edges).mass;
+  EXPECT_LE(largest_difference(stage->measure(scene.edges).mass, expected, 1.0), 1e-9);
 }
 
 }  // namespace

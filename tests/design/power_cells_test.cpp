@@ -1,21 +1,24 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/transport/power_cells.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <stop_token>
 #include <string>
+#include <vector>
 
 #include "core/error.h"
 #include "design/finite_difference.h"
 #include "design/test_setups.h"
+#include "design/transport/power_newton.h"
 #include "design/transport_scenes.h"
 
 namespace lensforge {
 namespace {
 
+using testing::cell_moments;
+using testing::measure_cells;
 using testing::Random;
 
 PowerDiagram diagram_of(const Eigen::Matrix2Xd& sites, const Eigen::VectorXd& weights) {
@@ -112,13 +115,17 @@ TEST(PowerCells, HiddenSitesHoldNothing) {
 
 /// ∂mass/∂w as a dense matrix.
 Eigen::MatrixXd newton_matrix(const PowerDiagram& diagram, const SummedDensity& density) {
-  const PowerCells cells = measure_cells(diagram, density, Executor::serial());
+  testing::MeasuredDiagram measured(diagram, density, Executor::serial());
+  measured.cells();
+  const std::vector<EdgeMeasure> edges = measured.stage.edge_measures(measured.edges);
   Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(diagram.sites().cols(), diagram.sites().cols());
-  for (const PowerCells::Border& b : cells.borders) {
-    matrix(b.left, b.right) -= b.mass;
-    matrix(b.right, b.left) -= b.mass;
-    matrix(b.left, b.left) += b.mass;
-    matrix(b.right, b.right) += b.mass;
+  for (std::size_t e = 0; e < edges.size(); ++e) {
+    const int left = measured.edges.edges[e].left;
+    const int right = measured.edges.edges[e].right;
+    matrix(left, right) -= edges[e].coupling;
+    matrix(right, left) -= edges[e].coupling;
+    matrix(left, left) += edges[e].coupling;
+    matrix(right, right) += edges[e].coupling;
   }
   return matrix;
 }
@@ -167,12 +174,14 @@ TEST(PowerCells, AreTheSameOnOneAndTwoThreads) {
   Random random(9);
   const Eigen::Matrix2Xd sites = testing::random_sites(5000, {64, 64}, 0.1, random);
   const PowerDiagram diagram = diagram_of(sites, random_weights(5000, 0.5, random));
-  const PowerCells one = measure_cells(diagram, density, Executor::cpu(1));
-  const PowerCells two = measure_cells(diagram, density, Executor::cpu(2));
-  EXPECT_EQ(one.mass, two.mass);
-  ASSERT_EQ(one.borders.size(), two.borders.size());
-  for (std::size_t e = 0; e < one.borders.size(); ++e) {
-    ASSERT_EQ(one.borders[e].mass, two.borders[e].mass);
+  testing::MeasuredDiagram one(diagram, density, Executor::cpu(1));
+  testing::MeasuredDiagram two(diagram, density, Executor::cpu(2));
+  EXPECT_EQ(one.cells().mass, two.cells().mass);
+  const std::vector<EdgeMeasure> expected = one.stage.edge_measures(one.edges);
+  const std::vector<EdgeMeasure> edges = two.stage.edge_measures(two.edges);
+  ASSERT_EQ(edges.size(), expected.size());
+  for (std::size_t e = 0; e < edges.size(); ++e) {
+    ASSERT_EQ(edges[e].coupling, expected[e].coupling);
   }
 }
 

@@ -15,12 +15,14 @@
 #include "design/optimize/lbfgs.h"
 #include "design/test_setups.h"
 #include "design/transport/density_blur.h"
-#include "design/transport/power_cells.h"
+#include "design/transport/power_newton.h"
 #include "design/transport_scenes.h"
 
 namespace lensforge {
 namespace {
 
+using testing::cell_moments;
+using testing::measure_cells;
 using testing::Random;
 
 TransportResult solve(const Eigen::Matrix2Xd& sites, const Image& density) {

@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <cmath>
 #include <cstddef>
+#include <memory>
 #include <numeric>
 #include <vector>
 
@@ -12,6 +13,7 @@
 #include "design/clip_reference.h"
 #include "design/grid_mesh.h"
 #include "design/random_input.h"
+#include "design/transport/cell_stage_on.h"
 #include "design/transport/power_diagram.h"
 #include "design/transport/summed_density.h"
 
@@ -68,6 +70,31 @@ inline std::vector<int> numbers(Eigen::Index count) {
   return order;
 }
 
+/// A power diagram in a stage, under one density.
+template <class Exec>
+struct MeasuredDiagram {
+  CellEdges edges;
+  CellStageOn<Exec> stage;
+
+  MeasuredDiagram(const PowerDiagram& diagram, const SummedDensity& density, const Exec& executor)
+      : edges(cell_edges(diagram, density.columns(), density.rows(), Executor::serial())),
+        stage(diagram.sites(), executor) {
+    stage.set_density(std::make_shared<SummedDensity>(density));
+  }
+  PowerCells cells() { return stage.measure(edges); }
+  std::vector<Moments> moments() { return stage.moments(edges); }
+};
+
+inline PowerCells measure_cells(const PowerDiagram& diagram, const SummedDensity& density,
+                                const Executor& executor) {
+  return MeasuredDiagram(diagram, density, executor).cells();
+}
+
+inline std::vector<Moments> cell_moments(const PowerDiagram& diagram, const SummedDensity& density,
+                                         const Executor& executor) {
+  return MeasuredDiagram(diagram, density, executor).moments();
+}
+
 /// The slow way to a power cell: the picture's rectangle cut by every half-plane.
 inline Polygon power_cell(const Eigen::Matrix2Xd& sites, const Eigen::VectorXd& weights,
                           Eigen::Index i, int columns, int rows) {
@@ -111,7 +138,7 @@ inline Moments slow_moments(const Polygon& cell, const SummedDensity& density) {
     if (strip.empty()) continue;
     for (int c = 0; c < density.columns(); ++c) {
       const Moments part = polygon_moments(clip_to_column(strip, c));
-      const double value = density.pixel(c, r).value;
+      const double value = density.view().pixel(c, r).value;
       sum += {value * part.mass, value * part.x, value * part.y, value * part.second};
     }
   }
