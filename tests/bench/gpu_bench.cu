@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "bench/gpu_rates.h"
+#include "bench/gpu_transport.h"
 #include "bench/lens_scene.h"
 #include "core/cuda/cuda_executor.h"
 #include "core/gpu.h"
@@ -139,21 +140,9 @@ void print_kernels(const GpuRates& rates) {
   iterate(2, gpu());  // Loads all code.
   const int iterations = 20;
   iterate(iterations, gpu().with_profile(&profile));
-  std::printf("\n%-20s %10s %12s %10s %12s\n", "kernel", "calls", "us a call", "least MB",
-              "of copy rate");
-  for (const auto& [kernel, entry] : profile.entries()) {
-    const double seconds = entry.seconds / static_cast<double>(entry.calls);
-    const auto found = least_bytes().find(kernel);
-    if (found == least_bytes().end()) {
-      std::printf("%-20s %10lld %12.1f\n", kernel.c_str(), static_cast<long long>(entry.calls),
-                  1e6 * seconds);
-      continue;
-    }
-    const double bytes = found->second.total();
-    std::printf("%-20s %10lld %12.1f %10.2f %11.0f%%\n", kernel.c_str(),
-                static_cast<long long>(entry.calls), 1e6 * seconds, 1e-6 * bytes,
-                100.0 * bytes / seconds / rates.copy);
-  }
+  std::map<std::string, double> bytes;
+  for (const auto& [kernel, least] : least_bytes()) bytes[kernel] = least.total();
+  print_kernel_rows(profile, bytes, rates);
 }
 
 void design(const Image& picture, const char* name) {
@@ -192,6 +181,7 @@ void run_all() {
               1e3 * evaluation_seconds(mesh, ObjectiveWeights{}));
   const double iteration = iterate(kTimedIterations, gpu());
   std::printf("%.1f iterations a second; 600 of them %.1f s\n", 1.0 / iteration, 600.0 * iteration);
+  print_transport(rates);
   design(fixtures::draw_portrait(256), "portrait");
   design(fixtures::draw_logo(512), "logo");
 }

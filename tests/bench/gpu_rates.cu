@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
 #include <cstddef>
+#include <cstdio>
 #include <functional>
 #include <limits>
 
@@ -71,6 +72,22 @@ GpuRates measure_gpu_rates() {
   });
   rates.operations = 16.0 * kSteps * kBlocks * kThreads / seconds;
   return rates;
+}
+
+void print_kernel_rows(const KernelProfile& profile,
+                       const std::map<std::string, double>& least_bytes, const GpuRates& rates) {
+  std::printf("\n%-20s %10s %12s %10s %12s\n", "kernel", "calls", "us a call", "least MB",
+              "of copy rate");
+  for (const auto& [kernel, entry] : profile.entries()) {
+    const double seconds = entry.seconds / static_cast<double>(entry.calls);
+    std::printf("%-20s %10lld %12.1f", kernel.c_str(), static_cast<long long>(entry.calls),
+                1e6 * seconds);
+    if (const auto found = least_bytes.find(kernel); found != least_bytes.end()) {
+      std::printf(" %10.2f %11.0f%%", 1e-6 * found->second,
+                  100.0 * found->second / seconds / rates.copy);
+    }
+    std::printf("\n");
+  }
 }
 
 }  // namespace lensforge::bench

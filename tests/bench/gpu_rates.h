@@ -1,6 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <map>
+#include <string>
+
+#include "core/executor.h"
+
 namespace lensforge::bench {
 
 /// What a GPU does at most, measured: what kernels are held against.
@@ -10,5 +15,9 @@ struct GpuRates {
 };
 
 GpuRates measure_gpu_rates();
+
+/// A line per kernel: calls, time, the bytes that it moves at least, their share of the copy rate.
+void print_kernel_rows(const KernelProfile& profile,
+                       const std::map<std::string, double>& least_bytes, const GpuRates& rates);
 
 }  // namespace lensforge::bench

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Semi-discrete optimal transport from scratch, onto a picture of 512² pixels, by the faces of a
-// grid mesh. Names read transport_PICTURE/MESH-COLUMNS; a table of Newton steps and processor
+// grid mesh, and the parts of one Newton step (58,880 sites). Names read
+// transport_PICTURE/MESH-COLUMNS; a table of Newton steps and processor
 // seconds per level follows every run. Memory is the process's peak so far: run one case alone
 // (--benchmark_filter) to learn its own.
 #include <benchmark/benchmark.h>
@@ -9,9 +10,12 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
+#include <memory>
 #include <vector>
 
 #include "core/image_io.h"
+#include "design/transport/cell_stage.h"
+#include "design/transport/density_blur.h"
 #include "design/transport/semi_discrete.h"
 #include "design/transport_scenes.h"
 
@@ -75,12 +79,72 @@ void transport_photograph(benchmark::State& state) {
 
 void transport_logo(benchmark::State& state) { transport(state, testing::logo_picture(kPixels)); }
 
+/// The parts of one Newton step: cells of the grid's faces on the logo, softened as on the way to
+/// it.
+struct NewtonParts {
+  Eigen::Matrix2Xd sites = testing::face_sites(160, kPixels);
+  std::vector<int> order = spatial_order(sites);
+  Eigen::VectorXd weights = Eigen::VectorXd::Zero(sites.cols());
+  PowerDiagram diagram{sites, weights, order, {}};
+  Executor executor = Executor::cpu(2);
+  CellEdges edges = cell_edges(diagram, kPixels, kPixels, executor);
+  std::unique_ptr<CellStage> stage = make_cell_stage(sites, executor);
+
+  NewtonParts() {
+    stage->set_density(std::make_shared<SummedDensity>(
+        soften(testing::logo_picture(kPixels), 4.0, 1e-4), static_cast<double>(sites.cols())));
+  }
+};
+
+void step_triangulation(benchmark::State& state) {
+  const NewtonParts parts;
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(PowerDiagram(parts.sites, parts.weights, parts.order, {}));
+  }
+}
+
+void step_edges(benchmark::State& state) {
+  const NewtonParts parts;
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(cell_edges(parts.diagram, kPixels, kPixels, parts.executor));
+  }
+}
+
+void step_masses(benchmark::State& state) {
+  const NewtonParts parts;
+  for (auto _ : state) benchmark::DoNotOptimize(parts.stage->measure(parts.edges));
+}
+
+void step_moments(benchmark::State& state) {
+  const NewtonParts parts;
+  for (auto _ : state) benchmark::DoNotOptimize(parts.stage->moments(parts.edges));
+}
+
+void step_direction(benchmark::State& state) {
+  const NewtonParts parts;
+  const std::vector<double> mass = parts.stage->measure(parts.edges).mass;
+  const Eigen::VectorXd residual =
+      1.0 - Eigen::Map<const Eigen::ArrayXd>(mass.data(), parts.sites.cols());
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(parts.stage->newton_direction(parts.edges, residual));
+  }
+}
+
 /// 3,680, 58,880 and 942,080 faces.
 void sizes(benchmark::internal::Benchmark* bench) {
   bench->Unit(benchmark::kSecond)->UseRealTime()->MeasureProcessCPUTime()->Iterations(1);
   for (const int columns : {40, 160, 640}) bench->Arg(columns);
 }
 
+void in_milliseconds(benchmark::internal::Benchmark* bench) {
+  bench->Unit(benchmark::kMillisecond)->UseRealTime()->MeasureProcessCPUTime();
+}
+
+BENCHMARK(step_triangulation)->Apply(in_milliseconds);
+BENCHMARK(step_edges)->Apply(in_milliseconds);
+BENCHMARK(step_masses)->Apply(in_milliseconds);
+BENCHMARK(step_moments)->Apply(in_milliseconds);
+BENCHMARK(step_direction)->Apply(in_milliseconds);
 BENCHMARK(transport_even)->Apply(sizes);
 BENCHMARK(transport_photograph)->Apply(sizes);
 BENCHMARK(transport_logo)->Apply(sizes);
