@@ -102,25 +102,30 @@ struct Third {
     return {q.dot(b), slope / cross(u, v)};
   }
 
-  /// Largest second derivative in any direction at the corners: from the coefficients next to each
+  [[nodiscard]] SmoothPatch patch() const {
+    return {p, {iii, jjj, ccc, iij, ijj, iic, jjc, ijc, icc, jcc}};
+  }
+
+  /// Second derivatives in any direction at the corners: from the coefficients next to each
   /// along u and v, the second derivatives along them, and from these those along x and y.
-  [[nodiscard]] double bend() const {
+  [[nodiscard]] BendRange bend_range() const {
     Eigen::Matrix2d frame;
     frame << p[1] - p[0], p[2] - p[0];
     const Eigen::Matrix2d inverse = frame.inverse();
-    double most = 0.0;
+    BendRange range{HUGE_VAL, -HUGE_VAL};
     const auto corner = [&](double uu, double uv, double vv) {
       Eigen::Matrix2d second;
       second << uu, uv, uv, vv;
       const Eigen::Matrix2d h = 6.0 * inverse.transpose() * second * inverse;
       const double mean = 0.5 * (h(0, 0) + h(1, 1));
-      const double half = std::hypot(0.5 * (h(0, 0) - h(1, 1)), h(0, 1));
-      most = std::max(most, std::abs(mean) + half);
+      const double skew = 0.5 * (h(0, 0) - h(1, 1));
+      const double half = std::sqrt(skew * skew + h(0, 1) * h(0, 1));
+      range = {std::min(range.least, mean - half), std::max(range.largest, mean + half)};
     };
     corner(ijj - 2.0 * iij + iii, ijc - iij - iic + iii, icc - 2.0 * iic + iii);
     corner(jjj - 2.0 * ijj + iij, jjc - ijj - ijc + iij, jcc - 2.0 * ijc + iij);
     corner(jjc - 2.0 * ijc + iic, jcc - ijc - icc + iic, ccc - 2.0 * icc + iic);
-    return most;
+    return range;
   }
 };
 
@@ -216,13 +221,25 @@ SurfacePoint SmoothSurface::in_triangle(std::int64_t triangle,
   return third.at({weights[i] - least, weights[j] - least, 3.0 * least});
 }
 
-double SmoothSurface::bend(std::int64_t triangle) const {
+std::optional<SmoothPatch> SmoothSurface::patch_at(const Eigen::Vector2d& xy) const {
+  const Place place = locate(xy);
+  if (place.triangle < 0) return std::nullopt;
+  int k = 0;
+  place.weights.minCoeff(&k);
+  const Corners corners = make_corners(mesh_, slopes_, place.triangle);
+  return Third(corners, static_cast<std::size_t>((k + 1) % 3),
+               static_cast<std::size_t>((k + 2) % 3))
+      .patch();
+}
+
+BendRange SmoothSurface::bend_range(std::int64_t triangle) const {
   const Corners corners = make_corners(mesh_, slopes_, triangle);
-  double most = 0.0;
+  BendRange range{HUGE_VAL, -HUGE_VAL};
   for (std::size_t i = 0; i < 3; ++i) {
-    most = std::max(most, Third(corners, i, (i + 1) % 3).bend());
+    const BendRange third = Third(corners, i, (i + 1) % 3).bend_range();
+    range = {std::min(range.least, third.least), std::max(range.largest, third.largest)};
   }
-  return most;
+  return range;
 }
 
 std::optional<SurfacePoint> SmoothSurface::at(const Eigen::Vector2d& xy) const {

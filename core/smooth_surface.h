@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "core/smooth_patch.h"
 #include "core/surface_mesh.h"
 
 namespace lensforge {
@@ -15,6 +16,12 @@ namespace lensforge {
 struct SurfacePoint {
   double z = 0.0;                                   ///< mm
   Eigen::Vector2d slope = Eigen::Vector2d::Zero();  ///< ∂z/∂x, ∂z/∂y
+};
+
+/// Least and largest of a surface's second derivatives in any direction, 1/mm.
+struct BendRange {
+  double least = 0.0;
+  double largest = 0.0;
 };
 
 /// The smooth surface of the vertex-normal model: it passes through every vertex of a height field
@@ -32,9 +39,11 @@ class SmoothSurface {
   /// The point of a triangle with these barycentric weights, none below 0.
   [[nodiscard]] SurfacePoint in_triangle(std::int64_t triangle,
                                          const Eigen::Vector3d& weights) const;
-  /// Largest second derivative in any direction over a triangle, 1/mm: they are linear on each
-  /// third, so that its corners say all.
-  [[nodiscard]] double bend(std::int64_t triangle) const;
+  /// The cubic around a point: nothing outside of the mesh.
+  [[nodiscard]] std::optional<SmoothPatch> patch_at(const Eigen::Vector2d& xy) const;
+
+  /// Over a triangle: second derivatives are linear on each third, so that its corners say all.
+  [[nodiscard]] BendRange bend_range(std::int64_t triangle) const;
 
   [[nodiscard]] const Eigen::AlignedBox2d& box() const { return box_; }
   [[nodiscard]] const SurfaceMesh& mesh() const { return mesh_; }

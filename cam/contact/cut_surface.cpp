@@ -117,10 +117,12 @@ SmoothCutSurface::SmoothCutSurface(const SurfaceMesh& mesh, double radius,
                                    const SmoothCutOptions& options, const Executor& executor)
     : surface_(mesh), radius_(radius), splits_(static_cast<std::size_t>(mesh.triangle_count())) {
   std::vector<SurfaceDeviation> off(splits_.size());
+  std::vector<BendRange> bends(splits_.size());
   parallel_for(executor, "smooth surface", mesh.triangle_count(), [&](std::int64_t t) {
     const auto i = static_cast<std::size_t>(t);
     const Interpolation shape = interpolation_of(mesh, t);
-    const double bend = surface_.bend(t);
+    bends[i] = surface_.bend_range(t);
+    const double bend = std::max(std::abs(bends[i].least), std::abs(bends[i].largest));
     const int n = splits_for(shape, bend, options);
     splits_[i] = static_cast<std::uint8_t>(n);
     off[i] = {bend * shape.height / (n * n), bend * shape.slope / n};
@@ -129,6 +131,7 @@ SmoothCutSurface::SmoothCutSurface(const SurfaceMesh& mesh, double radius,
     deviation_.height = std::max(deviation_.height, one.height);
     deviation_.slope = std::max(deviation_.slope, one.slope);
   }
+  bed_.emplace(surface_, radius, bends);
   const double area = surface_.box().volume();
   const double longest = surface_.box().sizes().maxCoeff();
   const double per_band = static_cast<double>(facet_count()) / area * longest;

@@ -5,9 +5,11 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "cam/contact/drop_cutter.h"
+#include "cam/contact/smooth_roll.h"
 #include "core/executor.h"
 #include "core/smooth_surface.h"
 #include "core/surface_mesh.h"
@@ -33,6 +35,9 @@ class CutSurface {
   [[nodiscard]] virtual std::shared_ptr<const DropCutter> cutter(
       const Eigen::AlignedBox2d& axis, const Executor& executor) const = 0;
   [[nodiscard]] virtual double radius() const = 0;
+  /// The surface without facets, on which most drop curves can be followed more closely; none where
+  /// the facets are what is meant.
+  [[nodiscard]] virtual const SmoothBed* bed() const { return nullptr; }
   [[nodiscard]] virtual SurfaceDeviation deviation() const { return {}; }
   /// How far, mm, the axis should move at most across the rows that share a cutter, so that it
   /// fits in memory.
@@ -85,6 +90,7 @@ class SmoothCutSurface final : public CutSurface {
   [[nodiscard]] std::shared_ptr<const DropCutter> cutter(const Eigen::AlignedBox2d& axis,
                                                          const Executor& executor) const override;
   [[nodiscard]] double radius() const override { return radius_; }
+  [[nodiscard]] const SmoothBed* bed() const override { return &*bed_; }
   [[nodiscard]] SurfaceDeviation deviation() const override { return deviation_; }
   [[nodiscard]] double band() const override { return band_; }
 
@@ -101,6 +107,7 @@ class SmoothCutSurface final : public CutSurface {
   std::vector<std::uint8_t> splits_;  ///< n of each triangle.
   SurfaceDeviation deviation_;
   double band_ = 0.0;
+  std::optional<SmoothBed> bed_;
 };
 
 }  // namespace lensforge

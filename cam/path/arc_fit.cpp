@@ -20,18 +20,38 @@ constexpr double kArcRoom = 0.98;
 
 using Points = std::vector<Eigen::Vector2d>;
 
-/// The joints on the program's grid, each once.
-Points grid_points(const RowProfile& profile, const FitOptions& options) {
-  Points points;
-  points.reserve(profile.joints.size());
+/// Unit of numbers that are not rounded, mm: what is left is that of doubles.
+constexpr double kUnrounded = 1e-12;
+
+/// Moves that look as if they held are shortened by this part as long as they do not.
+constexpr std::size_t kShorten = 8;
+
+/// How near to the tolerances a look at the joints alone goes: what lies between adds to it.
+constexpr double kLookShare = 0.95;
+
+/// Where moves may begin and end.
+struct Joints {
+  Points exact;                ///< On the drop curve.
+  Points written;              ///< On the program's grid.
+  std::vector<double> height;  ///< Of the drop curve at the written places.
+};
+
+/// Each place on the grid once.
+Joints joints_of(const RowProfile& profile, const FitOptions& options) {
+  Joints joints;
+  joints.exact.reserve(profile.joints.size());
+  joints.written.reserve(profile.joints.size());
   std::size_t hint = 0;
   for (const double joint : profile.joints) {
     const double u = to_resolution(joint, options.resolution);
-    if (!points.empty() && u <= points.back().x()) continue;
+    if (!joints.written.empty() && u <= joints.written.back().x()) continue;
     const double z = profile.at(std::clamp(u, profile.u.front(), profile.u.back()), hint);
-    points.emplace_back(u, options.z_zero + to_resolution(z - options.z_zero, options.resolution));
+    joints.height.push_back(z);
+    joints.written.emplace_back(
+        u, options.z_zero + to_resolution(z - options.z_zero, options.resolution));
+    joints.exact.emplace_back(joint, profile.at(joint, hint));
   }
-  return points;
+  return joints;
 }
 
 /// Whether the arc from a to b is the graph of a height, and away from where it is steep.
@@ -75,78 +95,106 @@ std::optional<RowMove> arc_through(const Points& points, std::size_t from, std::
 class RowFit {
  public:
   RowFit(const RowProfile& profile, const FitOptions& options)
-      : options_(options), points_(grid_points(profile, options)), error_(profile) {}
+      : options_(options), joints_(joints_of(profile, options)), error_(profile) {}
 
   FittedRow run() {
-    FittedRow row{points_.front(), {}};
-    const std::size_t last = points_.size() - 1;
+    const std::size_t last = joints_.written.size() - 1;
     std::size_t at = 0;
     std::size_t limit = last;
     std::size_t stuck = 0;  // The joint from which no move held, and how often it was retried.
     int retries = 0;
     while (at < last) {
-      const Reach reach = best_reach(at, limit);
+      const std::size_t settled = error_.size();
+      std::optional<Reach> reach = best_reach(at, limit);
       const bool may_retry = at > stuck || retries < kRetries;
-      if (reach.joint == at && may_retry && !steps_.empty() && at - steps_.back().from > 1) {
+      if (!reach && may_retry && !steps_.empty() && at - steps_.back().from > 1) {
         retries = at > stuck ? 1 : retries + 1;
         stuck = std::max(stuck, at);
         limit = at - 1;
         at = steps_.back().from;
         error_.resize(steps_.back().settled);
         steps_.pop_back();
-        row.moves.pop_back();
         continue;
       }
-      const std::size_t joint = std::max(reach.joint, at + 1);
-      steps_.push_back({at, error_.size()});
-      row.moves.push_back(reach.arc ? *arc_through(points_, at, joint, options_) : straight(joint));
-      error_.add(points_[at], row.moves.back());
-      at = joint;
+      if (!reach) {
+        reach = Reach{at + 1, RowMove{joints_.written[at + 1]}};
+        error_.add(joints_.written[at], reach->move);
+      }
+      steps_.push_back({at, settled, *reach});
+      at = reach->joint;
       limit = last;
     }
-    return row;
+    return result();
   }
 
  private:
   struct Reach {
     std::size_t joint = 0;
-    bool arc = false;
+    RowMove move;
   };
-  /// What there was before a move.
   struct Step {
     std::size_t from = 0;     ///< Its first joint.
-    std::size_t settled = 0;  ///< Nodes of the error.
+    std::size_t settled = 0;  ///< Nodes of the error before it.
+    Reach reach;
   };
 
-  /// The farthest joint up to `limit` that one move from `from` reaches; `from` if there is none.
-  Reach best_reach(std::size_t from, std::size_t limit) {
-    const std::size_t by_line = farthest(from, limit, false);
-    if (!options_.arcs) return {by_line, false};
-    const std::size_t by_arc = farthest(from, limit, true);
-    return by_arc > by_line ? Reach{by_arc, true} : Reach{by_line, false};
+  [[nodiscard]] std::optional<RowMove> move_to(std::size_t from, std::size_t to, bool arc) const {
+    if (arc) return arc_through(joints_.written, from, to, options_);
+    return RowMove{joints_.written[to]};
   }
 
-  [[nodiscard]] RowMove straight(std::size_t to) const { return RowMove{points_[to]}; }
+  /// The farthest joint up to `limit` that one move from `from` reaches, as far as looks at the
+  /// joints tell; its nodes are added to the error.
+  std::optional<Reach> best_reach(std::size_t from, std::size_t limit) {
+    std::size_t by_line = farthest(from, limit, false);
+    std::size_t by_arc = options_.arcs ? farthest(from, limit, true) : from;
+    while (std::max(by_line, by_arc) > from) {
+      const bool arc = by_arc > by_line;
+      std::size_t& joint = arc ? by_arc : by_line;
+      const std::optional<RowMove> move = move_to(from, joint, arc);
+      if (move && holds(from, *move)) return Reach{joint, *move};
+      joint -= (joint - from + kShorten - 1) / kShorten;
+    }
+    return std::nullopt;
+  }
 
-  [[nodiscard]] bool reaches(std::size_t from, std::size_t to, bool arc) {
-    const std::optional<RowMove> move =
-        arc ? arc_through(points_, from, to, options_) : straight(to);
-    if (!move) return false;
+  /// Whether the move keeps the tolerances; its nodes are added to the error if so.
+  bool holds(std::size_t from, const RowMove& move) {
     const std::size_t settled = error_.size();
-    error_.add(points_[from], *move);
-    const bool holds = error_.holds(settled, options_.tolerance, options_.slope_tolerance);
+    error_.add(joints_.written[from], move);
+    if (error_.holds(settled, options_.tolerance, options_.slope_tolerance)) return true;
     error_.resize(settled);
-    return holds;
+    return false;
   }
 
-  /// The farthest joint that one move reaches, as far as doubling and halving steps tell; `from` if
-  /// there is none.
+  /// Whether a move keeps the tolerances at its joints: few, but a good guess of the whole.
+  [[nodiscard]] bool looks_good(std::size_t from, std::size_t to, bool arc) {
+    const std::optional<RowMove> move = move_to(from, to, arc);
+    if (!move) return false;
+    const CurvePiece curve = move_curve(joints_.written[from], *move);
+    const double slope = kLookShare * options_.slope_tolerance;
+    look_.clear();
+    std::size_t back = 0;  // The last joint a kSlopeStretch or more behind.
+    for (std::size_t j = from; j <= to; ++j) {
+      const double u = joints_.written[j].x();
+      look_.push_back(curve.value(u) - joints_.height[j]);
+      if (std::abs(look_.back()) > kLookShare * options_.tolerance) return false;
+      const auto behind = [&](std::size_t i) { return u - joints_.written[from + i].x(); };
+      while (from + back + 1 < j && behind(back + 1) >= kSlopeStretch) ++back;
+      if (behind(back) < kSlopeStretch) continue;
+      if (std::abs(look_.back() - look_[back]) > slope * behind(back)) return false;
+    }
+    return true;
+  }
+
+  /// The farthest joint that one move seems to reach, as far as doubling and halving steps tell;
+  /// `from` if there is none.
   std::size_t farthest(std::size_t from, std::size_t last, bool arc) {
     std::size_t good = from;
     std::size_t bad = last + 1;
     // Two steps may hold where one does not: rounding turns a short move more.
     for (std::size_t step = arc ? 2 : 1; from + step <= last; step *= 2) {
-      if (reaches(from, from + step, arc)) {
+      if (looks_good(from, from + step, arc)) {
         good = from + step;
       } else if (good > from || step >= 4) {
         bad = from + step;
@@ -156,7 +204,7 @@ class RowFit {
     if (good == from) return from;
     while (bad - good > 1) {
       const std::size_t middle = good + (bad - good) / 2;
-      if (middle <= last && reaches(from, middle, arc)) {
+      if (middle <= last && looks_good(from, middle, arc)) {
         good = middle;
       } else {
         bad = middle;
@@ -165,10 +213,28 @@ class RowFit {
     return good;
   }
 
+  [[nodiscard]] FittedRow result() const {
+    FittedRow row;
+    row.start = joints_.written.front();
+    row.unrounded.start = joints_.exact.front();
+    FitOptions unrounded = options_;
+    unrounded.resolution = kUnrounded;
+    for (const Step& step : steps_) {
+      const Reach& reach = step.reach;
+      row.moves.push_back(reach.move);
+      std::optional<RowMove> move;
+      if (reach.move.arc) move = arc_through(joints_.exact, step.from, reach.joint, unrounded);
+      row.unrounded.moves.push_back(move.value_or(RowMove{joints_.exact[reach.joint]}));
+    }
+    row.certificate = error_.certificate();
+    return row;
+  }
+
   FitOptions options_;
-  Points points_;
+  Joints joints_;
   RowError error_;
   std::vector<Step> steps_;
+  std::vector<double> look_;  ///< Errors at the joints that were looked at last.
 };
 
 }  // namespace

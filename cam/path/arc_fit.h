@@ -22,18 +22,24 @@ struct FitOptions {
 /// to a tenth of a micrometre.
 inline constexpr double kLargestArc = 1000.0;
 
-struct FittedRow {
+/// A way along a row.
+struct RowWay {
   Eigen::Vector2d start = Eigen::Vector2d::Zero();
   std::vector<RowMove> moves;
+};
+
+struct FittedRow : RowWay {
+  RowWay unrounded;             ///< The same moves before their numbers are rounded.
+  PathCertificate certificate;  ///< certify_row() of the rounded ones.
 };
 
 /// The value on the program's grid that is nearest to `value` mm.
 double to_resolution(double value, double resolution);
 
-/// Covers a row's drop curve with straight moves and arcs, greedily: from every end the move that
-/// reaches the farthest joint within the tolerances. Moves begin and end on the drop curve to the
-/// resolution, and hold the tolerances over their whole length (RowError) unless not even the way
-/// to the next joint does, because rounding turns it: certify_row() says what came of it.
+/// Covers a row's drop curve with straight moves and arcs, greedily: from every end a move that
+/// reaches about the farthest joint within the tolerances. Moves begin and end on the drop curve to
+/// the resolution, and hold the tolerances over their whole length (RowError) unless not even the
+/// way to the next joint does, because rounding turns it: the certificate says what came of it.
 FittedRow fit_row(const RowProfile& profile, const FitOptions& options);
 
 /// How far straight moves between joints may be off.

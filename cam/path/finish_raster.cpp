@@ -172,11 +172,11 @@ RasterPlan plan_finish_raster(const Eigen::AlignedBox2d& surface, double radius,
   return plan;
 }
 
-RasterRow cut_row(const DropCutter& cutter, const RasterPlan& plan, std::int64_t row) {
+RasterRow cut_row(const RowCurves& curves, const RasterPlan& plan, std::int64_t row) {
   const FitOptions fit = fit_options(plan.options);
-  const RowProfile profile = row_profile(cutter, plan.row_span(row), joint_bow(fit));
+  const RowProfile profile = curves.profile(plan.row_span(row), joint_bow(fit));
   const FittedRow fitted = fit_row(profile, fit);
-  const PathCertificate certificate = certify_row(profile, fitted.start, fitted.moves);
+  const PathCertificate& certificate = fitted.certificate;
   const RowFrame frame(plan.options.along, plan.row_place(row));
   const bool forward = plan.forward(row);
   const Eigen::Vector2d& first = forward ? fitted.start : fitted.moves.back().end;
@@ -200,11 +200,11 @@ RasterSummary cut_raster(const CutSurface& surface, const RasterPlan& plan,
   for (std::int64_t begin = 0; begin < plan.rows; begin += most) {
     const std::int64_t count = std::min(most, plan.rows - begin);
     if (control.stop_requested()) return summary;
-    const auto cutter = surface.cutter(axis_box(plan, begin, count), executor);
+    const RowCurves curves(surface, axis_box(plan, begin, count), executor);
     batch.assign(static_cast<std::size_t>(count), {});
     const auto cut = [&](std::int64_t i) {
       if (control.stop_requested()) return;
-      batch[static_cast<std::size_t>(i)] = cut_row(*cutter, plan, begin + i);
+      batch[static_cast<std::size_t>(i)] = cut_row(curves, plan, begin + i);
     };
     parallel_for(executor, "finish raster", count, cut, 1);
     if (control.stop_requested()) return summary;

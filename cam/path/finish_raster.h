@@ -88,7 +88,7 @@ double row_move_length(const Eigen::Vector3d& start, const PathMove& move);
 
 /// Cuts one row (fit_row()).
 /// @throw InputError if there is nothing under the ball somewhere on the row.
-RasterRow cut_row(const DropCutter& cutter, const RasterPlan& plan, std::int64_t row);
+RasterRow cut_row(const RowCurves& curves, const RasterPlan& plan, std::int64_t row);
 
 /// What a raster added up to.
 struct RasterSummary {

@@ -7,6 +7,17 @@
 namespace lensforge {
 namespace {
 
+/// Length of the chords of a move's curve that are off by kProfileError at most, mm: wherever it is
+/// no steeper than at its ends, a circle bends by ρ²/(ρ² − d²)^1.5 at most, d being the distance
+/// from its centre along u.
+double longest_chord(const CurvePiece& curve) {
+  if (curve.straight()) return HUGE_VAL;
+  const double out = std::max(std::abs(curve.begin - curve.u0), std::abs(curve.end - curve.u0));
+  const double rise2 = curve.rho2 - out * out;
+  if (!(rise2 > CurvePiece::kSteepest * curve.rho2)) return 0.0;
+  return std::sqrt(8.0 * kProfileError * rise2 * std::sqrt(rise2) / curve.rho2);
+}
+
 /// How far a controller's way from start to end can be off the circle through the start, along z:
 /// where rounding leaves two radii, some keep the first and jump, some wind from one to the other.
 double radius_slack(const Eigen::Vector2d& start, const RowMove& move, const CurvePiece& curve) {
@@ -42,14 +53,25 @@ void RowError::add(const Eigen::Vector2d& start, const RowMove& move) {
   nodes_.push_back({start.x(), start.y() - first, slack, start.y()});
   std::size_t next = hint + 1;
   while (next > 0 && profile_.u[next - 1] > start.x()) --next;
+  const double chord = longest_chord(curve);
   double from = start.x();
   for (; next < profile_.u.size() && profile_.u[next] < move.end.x(); ++next) {
     if (profile_.u[next] <= start.x()) continue;
-    follow(curve, from, {profile_.u[next], profile_.z[next]}, slack);
-    from = profile_.u[next];
+    const Eigen::Vector2d to(profile_.u[next], profile_.z[next]);
+    if (to.x() - from <= chord) {
+      add_node(curve, to, slack);
+    } else {
+      follow(curve, from, to, slack);
+    }
+    from = to.x();
   }
   hint_ = next > 0 ? next - 1 : 0;
   follow(curve, from, {move.end.x(), profile_.at(move.end.x(), hint_)}, slack);
+}
+
+void RowError::add_node(const CurvePiece& curve, const Eigen::Vector2d& at, double slack) {
+  const double path = curve.value(at.x());
+  nodes_.push_back({at.x(), path - at.y(), slack, path});
 }
 
 /// Appends the nodes from the last one to `to`, a point of the drop curve between which and the
@@ -64,8 +86,7 @@ void RowError::follow(const CurvePiece& curve, double from, const Eigen::Vector2
     follow(curve, middle.x(), to, slack);
     return;
   }
-  const double path = curve.value(to.x());
-  nodes_.push_back({to.x(), path - to.y(), slack, path});
+  add_node(curve, to, slack);
 }
 
 double RowError::error_at(double u, std::size_t& hint, double& slack) const {

@@ -56,6 +56,7 @@ class RowError {
     double slope = 0.0;
     std::size_t node = 0;
   };
+  void add_node(const CurvePiece& curve, const Eigen::Vector2d& at, double slack);
   void follow(const CurvePiece& curve, double from, const Eigen::Vector2d& to, double slack);
   [[nodiscard]] double error_at(double u, std::size_t& hint, double& slack) const;
   [[nodiscard]] Turn most_turn(std::size_t first, double enough) const;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "cam/contact/drop_curve.h"
 #include "core/decimal_text.h"
@@ -19,6 +20,14 @@ constexpr double kParabolaTurn = 0.1;
 
 /// Gaps up to this length, mm, are rounding.
 constexpr double kGap = 1e-8;
+
+/// Length of the stretches that a ball rolls along at once, and of those it is given up on, in
+/// radii: on longer ones the bounds of what bends where are coarser.
+constexpr double kStretch = 0.125;
+constexpr double kLeastStretch = 0.005;
+
+/// Places this near before the end of a stretch, in stretches, belong to the next: rounding.
+constexpr double kSameStretch = 1e-6;
 
 [[noreturn]] void throw_nothing_under(const AxisLine& line, double u) {
   const Eigen::Vector2d p = line.at(u);
@@ -62,13 +71,43 @@ void add_joints(const CurvePiece& piece, double from, double to, double bow, Row
   profile.joints.push_back(to);
 }
 
-void require_cover(const std::vector<CurvePiece>& curve, const RowSpan& span) {
-  double covered = span.held_from;
+void require_cover(const std::vector<CurvePiece>& curve, const AxisLine& line, double from,
+                   double to) {
+  double covered = from;
   for (const CurvePiece& piece : curve) {
     if (piece.begin - covered > kGap) break;
     covered = piece.end;
   }
-  if (span.held_to - covered > kGap) throw_nothing_under(span.line, covered);
+  if (to - covered > kGap) throw_nothing_under(line, covered);
+}
+
+/// Appends the drop curve of facets.
+void add_facets(const DropCutter& cutter, const AxisLine& line, double from, double to, double bow,
+                RowProfile& profile) {
+  const std::vector<CurvePiece> curve = drop_curve(cutter, line, from, to);
+  require_cover(curve, line, from, to);
+  profile.u.reserve(profile.u.size() + 4 * curve.size());
+  profile.z.reserve(profile.z.size() + 4 * curve.size());
+  for (const CurvePiece& piece : curve) {
+    // A wall may end in a jump.
+    add_node(piece.begin, piece.value(piece.begin), profile);
+    follow(piece, piece.begin, piece.end, profile);
+    add_joints(piece, piece.begin, piece.end, bow, profile);
+  }
+}
+
+/// Appends the nodes of a smooth stretch, every so many of them a joint.
+void add_nodes(const CurveNodes& nodes, double bow, RowProfile& profile) {
+  const std::size_t last = nodes.u.size() - 1;
+  const double skip = std::max(1.0, std::floor(std::sqrt(bow / std::max(nodes.error, 1e-300))));
+  const double parts = std::ceil(static_cast<double>(last) / skip);
+  const auto stride = static_cast<std::size_t>(std::ceil(static_cast<double>(last) / parts));
+  const bool repeats = profile.u.back() == nodes.u.front() && profile.z.back() == nodes.z.front();
+  for (std::size_t i = repeats ? 1 : 0; i <= last; ++i) {
+    add_node(nodes.u[i], nodes.z[i], profile);
+    if (i > 0 && (i % stride == 0 || i == last)) profile.joints.push_back(nodes.u[i]);
+  }
+  profile.error = std::max(profile.error, nodes.error);
 }
 
 }  // namespace
@@ -82,22 +121,58 @@ double RowProfile::at(double place, std::size_t& hint) const {
   return z[hint] + (z[hint + 1] - z[hint]) * ((place - u[hint]) / width);
 }
 
-RowProfile row_profile(const DropCutter& cutter, const RowSpan& span, double bow) {
-  std::vector<CurvePiece> curve = drop_curve(cutter, span.line, span.held_from, span.held_to);
-  require_cover(curve, span);
-  RowProfile profile;
-  profile.u.reserve(4 * curve.size());
-  profile.z.reserve(4 * curve.size());
-  const double first = curve.front().value(curve.front().begin);
-  add_node(span.from, first, profile);
-  profile.joints = {span.from, span.held_from};
-  add_node(span.held_from, first, profile);
-  for (const CurvePiece& piece : curve) {
-    // A wall may end in a jump.
-    add_node(piece.begin, piece.value(piece.begin), profile);
-    follow(piece, piece.begin, piece.end, profile);
-    add_joints(piece, piece.begin, piece.end, bow, profile);
+RowCurves::RowCurves(const DropCutter& cutter) : given_(&cutter) {}
+
+RowCurves::RowCurves(const CutSurface& surface, const Eigen::AlignedBox2d& axis,
+                     const Executor& executor)
+    : surface_(&surface), axis_(axis) {
+  if (surface.bed() == nullptr) made_ = surface.cutter(axis, executor);
+}
+
+const DropCutter& RowCurves::facets() const {
+  if (given_ != nullptr) return *given_;
+  std::call_once(once_, [&] {
+    // By one thread: the others wait here.
+    if (!made_) made_ = surface_->cutter(axis_, Executor::serial());
+  });
+  return *made_;
+}
+
+/// Stretches end at fixed places. One that cannot be rolled along is halved down to kLeastStretch:
+/// shorter ones are judged more finely. What is left open at last is cut from facets.
+void RowCurves::roll(const RowSpan& span, double bow, RowProfile& profile) const {
+  SmoothRoll ball(*surface_->bed(), span.line);
+  const double length = kStretch * surface_->radius();
+  const double least = kLeastStretch * surface_->radius();
+  double open = span.held_from;  // From here to `begin` the curve is not known yet.
+  double begin = span.held_from;
+  while (begin < span.held_to) {
+    double end = std::min((std::floor(begin / length + kSameStretch) + 1.0) * length, span.held_to);
+    std::optional<CurveNodes> nodes = ball.follow(begin, end, kProfileError);
+    while (!nodes && end - begin > least) {
+      end = 0.5 * (begin + end);
+      nodes = ball.follow(begin, end, kProfileError);
+    }
+    if (nodes) {
+      if (open < begin) add_facets(facets(), span.line, open, begin, bow, profile);
+      add_nodes(*nodes, bow, profile);
+      open = end;
+    }
+    begin = end;
   }
+  if (open < begin) add_facets(facets(), span.line, open, begin, bow, profile);
+}
+
+RowProfile RowCurves::profile(const RowSpan& span, double bow) const {
+  RowProfile profile;
+  add_node(span.from, 0.0, profile);
+  profile.joints = {span.from, span.held_from};
+  if (surface_ != nullptr && surface_->bed() != nullptr) {
+    roll(span, bow, profile);
+  } else {
+    add_facets(facets(), span.line, span.held_from, span.held_to, bow, profile);
+  }
+  profile.z.front() = profile.z[1];
   add_node(span.to, profile.z.back(), profile);
   profile.joints.push_back(span.to);
   return profile;

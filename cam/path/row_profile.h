@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <Eigen/Geometry>
 #include <cstddef>
+#include <memory>
+#include <mutex>
 #include <vector>
 
 #include "cam/contact/curve_piece.h"
+#include "cam/contact/cut_surface.h"
 #include "cam/contact/drop_cutter.h"
 
 namespace lensforge {
@@ -35,8 +39,32 @@ struct RowProfile {
 /// 2e-5 rad to a certificate. Reached but on walls steeper than 1 : 1000.
 inline constexpr double kProfileError = 5e-8;
 
-/// @param bow  of chords between joints on arcs at most, about, mm, > 0.
-/// @throw InputError if there is nothing under the ball somewhere on the row.
-RowProfile row_profile(const DropCutter& cutter, const RowSpan& span, double bow);
+/// Drop curves for rows that lie beside each other.
+///
+/// On a smooth surface they follow a ball that rolls on the surface itself (SmoothRoll). Where it
+/// cannot, because the surface bends upwards about as sharply as the ball, they follow the facets
+/// of the surface, and may step by CutSurface::deviation() where they go over.
+class RowCurves {
+ public:
+  /// Of facets. `cutter` must outlive this.
+  explicit RowCurves(const DropCutter& cutter);
+  /// @param axis  where the tool's axis goes on all rows. `surface` must outlive this.
+  RowCurves(const CutSurface& surface, const Eigen::AlignedBox2d& axis, const Executor& executor);
+
+  /// @param bow  of chords between joints on arcs at most, about, mm, > 0.
+  /// @throw InputError if there is nothing under the ball somewhere on the row.
+  [[nodiscard]] RowProfile profile(const RowSpan& span, double bow) const;
+
+ private:
+  void roll(const RowSpan& span, double bow, RowProfile& profile) const;
+  /// Made when the first row asks for it.
+  [[nodiscard]] const DropCutter& facets() const;
+
+  const CutSurface* surface_ = nullptr;
+  Eigen::AlignedBox2d axis_;
+  mutable std::once_flag once_;
+  mutable std::shared_ptr<const DropCutter> made_;
+  const DropCutter* given_ = nullptr;
+};
 
 }  // namespace lensforge

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The whole finishing raster with its certificate, ball of 0.2 mm, stepover 0.06 mm, on a lens of
-// 942,080 triangles: 641 × 737 vertices, 100 × 100 mm.
+// The finishing raster with its certificate, ball of 0.2 mm, stepover 0.06 mm, on lenses of
+// 100 × 100 mm: 641 × 737 vertices (942,080 triangles) or 321 × 369 (235,520).
 #include <benchmark/benchmark.h>
 #include <sys/resource.h>
 
@@ -15,72 +15,102 @@ namespace lensforge {
 namespace {
 
 constexpr double kRadius = 0.2;
+constexpr double kSide = 100.0;
 
-const SurfaceMesh& lens_mesh() {
-  static const SurfaceMesh mesh = testing::grid_mesh(641, 737, 100.0, 100.0, testing::lens_relief);
-  return mesh;
+/// What cam cuts: CutPlan's kSmoothCut.
+constexpr SmoothCutOptions kSmoothCut{1e-4, 2e-2};
+
+/// A lens of about `kilo_triangles` thousand triangles.
+const SurfaceMesh& lens_mesh(std::int64_t kilo_triangles) {
+  static const SurfaceMesh large = testing::grid_mesh(641, 737, kSide, kSide, testing::lens_relief);
+  static const SurfaceMesh small = testing::grid_mesh(321, 369, kSide, kSide, testing::lens_relief);
+  return kilo_triangles > 500 ? large : small;
 }
 
-RasterPlan lens_plan(bool arcs) {
-  const Eigen::AlignedBox2d surface(Eigen::Vector2d(0.0, 0.0), Eigen::Vector2d(100.0, 100.0));
+/// Rows on a strip of `width` mm through the middle of the lens.
+RasterPlan strip_plan(double width, bool arcs) {
+  const double begin = 0.5 * (kSide - width);
+  const Eigen::AlignedBox2d strip(Eigen::Vector2d(0.0, begin),
+                                  Eigen::Vector2d(kSide, begin + width));
   RasterOptions options;
   options.arcs = arcs;
-  return plan_finish_raster(surface, kRadius, options);
+  return plan_finish_raster(strip, kRadius, options);
+}
+
+/// Seconds that all threads of this process have worked.
+double cpu_seconds() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  const auto seconds = [](const timeval& time) {
+    return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
+  };
+  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
 }
 
 /// Gouge, excess and peak memory are what was reached, not what is allowed.
-void tell(const RasterSummary& summary, const SurfaceDeviation& deviation,
+void tell(const RasterSummary& summary, const SurfaceDeviation& deviation, double seconds,
           benchmark::State& state) {
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
+  state.counters["cpu_s"] = seconds;
+  state.counters["rows"] = static_cast<double>(summary.rows);
   state.counters["moves"] = static_cast<double>(summary.points);
   state.counters["arcs"] = static_cast<double>(summary.arcs);
   state.counters["pieces"] = static_cast<double>(summary.pieces);
+  state.counters["cpu_us_per_move"] = 1e6 * seconds / static_cast<double>(summary.points);
   state.counters["gouge_nm"] = 1e6 * summary.certificate.gouge.value;
   state.counters["excess_nm"] = 1e6 * summary.certificate.excess.value;
   state.counters["slope_mrad"] = 1e3 * summary.certificate.slope.value;
+  state.counters["slope_x"] = summary.certificate.slope.place.x();
+  state.counters["slope_y"] = summary.certificate.slope.place.y();
   state.counters["deviation_nm"] = 1e6 * deviation.height;
   state.counters["slope_deviation_mrad"] = 1e3 * deviation.slope;
   state.counters["peak_MB"] = static_cast<double>(usage.ru_maxrss) / 1024.0;
 }
 
+RasterSummary cut_strip(const CutSurface& surface, const benchmark::State& state,
+                        const Executor& executor) {
+  const RasterPlan plan = strip_plan(static_cast<double>(state.range(1)), state.range(2) != 0);
+  return cut_raster(surface, plan, executor, [](const RasterRow&) {}, {});
+}
+
 void FinishFacets(benchmark::State& state) {
-  const auto executor = Executor::cpu(static_cast<int>(state.range(0)));
+  const auto executor = Executor::cpu(2);
+  const SurfaceMesh& mesh = lens_mesh(state.range(0));
   for (auto _ : state) {
-    const FacetSurface surface(lens_mesh(), kRadius, executor);
-    const RasterSummary summary =
-        cut_raster(surface, lens_plan(state.range(1) != 0), executor, [](const RasterRow&) {}, {});
-    tell(summary, surface.deviation(), state);
+    const double start = cpu_seconds();
+    const FacetSurface surface(mesh, kRadius, executor);
+    const RasterSummary summary = cut_strip(surface, state, executor);
+    tell(summary, surface.deviation(), cpu_seconds() - start, state);
   }
 }
-BENCHMARK(FinishFacets)
-    ->ArgNames({"threads", "arcs"})
-    ->Args({2, 0})
-    ->Args({2, 1})
-    ->Iterations(1)
-    ->UseRealTime()
-    ->Unit(benchmark::kSecond);
 
 void FinishSmooth(benchmark::State& state) {
-  const auto executor = Executor::cpu(static_cast<int>(state.range(0)));
+  const auto executor = Executor::cpu(2);
+  const SurfaceMesh& mesh = lens_mesh(state.range(0));
   for (auto _ : state) {
-    const SmoothCutSurface surface(lens_mesh(), kRadius, {}, executor);
-    const RasterSummary summary =
-        cut_raster(surface, lens_plan(state.range(1) != 0), executor, [](const RasterRow&) {}, {});
-    tell(summary, surface.deviation(), state);
+    const double start = cpu_seconds();
+    const SmoothCutSurface surface(mesh, kRadius, kSmoothCut, executor);
+    const RasterSummary summary = cut_strip(surface, state, executor);
+    tell(summary, surface.deviation(), cpu_seconds() - start, state);
     state.counters["facets"] = static_cast<double>(surface.facet_count());
   }
 }
-BENCHMARK(FinishSmooth)
-    ->ArgNames({"threads", "arcs"})
-    ->Args({2, 1})
-    ->Iterations(1)
-    ->UseRealTime()
-    ->Unit(benchmark::kSecond);
+
+/// A strip of 2 mm, and the whole lens.
+void sizes(benchmark::internal::Benchmark* bench) {
+  bench->ArgNames({"ktriangles", "mm", "arcs"});
+  for (const std::int64_t kilo_triangles : {235, 942}) {
+    for (const std::int64_t width : {2, 100}) bench->Args({kilo_triangles, width, 1});
+  }
+  bench->Iterations(1)->UseRealTime()->Unit(benchmark::kSecond);
+}
+BENCHMARK(FinishFacets)->Apply(sizes);
+BENCHMARK(FinishSmooth)->Apply(sizes);
 
 /// The exact drop curve along rows through the middle of the lens.
 void DropCurveRows(benchmark::State& state) {
-  const DropCutter cutter(lens_mesh(), kRadius, Executor::cpu());
+  const DropCutter cutter(lens_mesh(942), kRadius, Executor::cpu());
   std::int64_t row = 0;
   std::int64_t pieces = 0;
   for (auto _ : state) {

@@ -21,7 +21,7 @@ bool on_grid(double value, double resolution) {
 }
 
 RowProfile profile_of(const DropCutter& cutter, const FitOptions& options) {
-  return row_profile(cutter, {{0, 1.9}, 0.2, 3.8, 0.3, 3.7}, joint_bow(options));
+  return RowCurves(cutter).profile({{0, 1.9}, 0.2, 3.8, 0.3, 3.7}, joint_bow(options));
 }
 
 FitOptions with_arcs(bool arcs) {
@@ -39,6 +39,9 @@ TEST(ArcFit, HoldsItsTolerancesOnEveryMesh) {
       const RowProfile profile = profile_of(cutter, options);
       const FittedRow row = fit_row(profile, options);
       const PathCertificate certificate = certify_row(profile, row.start, row.moves);
+      EXPECT_EQ(certificate.gouge.value, row.certificate.gouge.value);
+      EXPECT_EQ(certificate.excess.value, row.certificate.excess.value);
+      EXPECT_EQ(certificate.slope.value, row.certificate.slope.value);
       EXPECT_LE(certificate.gouge.value, options.tolerance) << name;
       EXPECT_LE(certificate.excess.value, options.tolerance) << name;
       EXPECT_LE(certificate.slope.value, 1.3 * options.slope_tolerance) << name;
@@ -87,6 +90,24 @@ TEST(ArcFit, WritesNumbersOnTheProgramsGrid) {
   EXPECT_GT(arcs, 0);
 }
 
+/// What rounding does to a move is no more than what it does to its numbers.
+TEST(ArcFit, MovesBeforeRoundingDifferByTheLastDecimal) {
+  const SurfaceMesh mesh = testing::grid_mesh(28, 31, 4.0, 4.0, testing::lens_relief);
+  const DropCutter cutter(mesh, kRadius, Executor::serial());
+  FitOptions options = with_arcs(true);
+  options.resolution = 1e-5;
+  options.slope_tolerance = 8e-3;
+  const FittedRow row = fit_row(profile_of(cutter, options), options);
+  ASSERT_EQ(row.moves.size(), row.unrounded.moves.size());
+  double most = 0.0;
+  for (std::size_t i = 0; i < row.moves.size(); ++i) {
+    const Eigen::Vector2d off = row.moves[i].end - row.unrounded.moves[i].end;
+    most = std::max(most, off.cwiseAbs().maxCoeff());
+  }
+  EXPECT_LE(most, 0.75 * options.resolution);
+  EXPECT_GT(most, 0.4 * options.resolution);
+}
+
 /// A cylinder of fine facets: the drop curve is a circle of radius 5 + R, and one arc an eighth
 /// round says it all.
 TEST(ArcFit, FindsTheCircleOfACylinder) {
@@ -95,7 +116,7 @@ TEST(ArcFit, FindsTheCircleOfACylinder) {
   const DropCutter cutter(mesh, kRadius, Executor::serial());
   const FitOptions options = with_arcs(true);
   const RowProfile profile =
-      row_profile(cutter, {{0, 1.9}, 0.3, 3.7, 0.3, 3.7}, joint_bow(options));
+      RowCurves(cutter).profile({{0, 1.9}, 0.3, 3.7, 0.3, 3.7}, joint_bow(options));
   const FittedRow row = fit_row(profile, options);
   const FittedRow lines = fit_row(profile, with_arcs(false));
   EXPECT_LE(row.moves.size(), 3U);
@@ -125,8 +146,8 @@ TEST(ArcFit, FollowsAPlaneInOneMove) {
       testing::grid_mesh(33, 33, 4.0, 4.0, [](double x, double y) { return 0.2 * x + 0.1 * y; });
   const DropCutter cutter(mesh, kRadius, Executor::serial());
   const FitOptions options = with_arcs(true);
-  const FittedRow row =
-      fit_row(row_profile(cutter, {{0, 1.9}, 0.3, 3.7, 0.3, 3.7}, joint_bow(options)), options);
+  const FittedRow row = fit_row(
+      RowCurves(cutter).profile({{0, 1.9}, 0.3, 3.7, 0.3, 3.7}, joint_bow(options)), options);
   EXPECT_EQ(row.moves.size(), 1U);
 }
 

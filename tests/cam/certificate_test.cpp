@@ -96,7 +96,7 @@ TEST(Certificate, BoundsCarelessPathsSharply) {
   for (const auto& [name, mesh] : testing::adversarial_meshes()) {
     const DropCutter cutter(mesh, kRadius, Executor::serial());
     for (const AxisLine& line : {AxisLine{0, 1.234}, AxisLine{1, 2.345}}) {
-      const RowProfile profile = row_profile(cutter, inner_span(line), 1e-4);
+      const RowProfile profile = RowCurves(cutter).profile(inner_span(line), 1e-4);
       EXPECT_LE(profile.error, kProfileError) << name;
       const Path path = careless_path(profile, random);
       const PathCertificate certificate = certify_row(profile, path.start, path.moves);
@@ -112,7 +112,7 @@ TEST(Certificate, NamesThePlacesOfItsExtremes) {
   const SurfaceMesh mesh = testing::crease_mesh(24, 4.0, 0.7, 0.3);
   const DropCutter cutter(mesh, kRadius, Executor::serial());
   const AxisLine line{0, 1.7};
-  const RowProfile profile = row_profile(cutter, inner_span(line), 1e-4);
+  const RowProfile profile = RowCurves(cutter).profile(inner_span(line), 1e-4);
   std::mt19937 random(8);
   const Path path = careless_path(profile, random);
   const PathCertificate certificate = certify_row(profile, path.start, path.moves);
@@ -128,7 +128,7 @@ TEST(Certificate, OfAPathOnThePlaneIsRoundingOnly) {
   const SurfaceMesh mesh =
       testing::grid_mesh(9, 9, 4.0, 4.0, [](double x, double) { return 0.25 * x; });
   const DropCutter cutter(mesh, kRadius, Executor::serial());
-  const RowProfile profile = row_profile(cutter, inner_span({0, 2.0}), 1e-4);
+  const RowProfile profile = RowCurves(cutter).profile(inner_span({0, 2.0}), 1e-4);
   std::size_t hint = 0;
   const Eigen::Vector2d start(0.3, profile.at(0.3, hint));
   RowMove move;
@@ -149,7 +149,7 @@ TEST(Certificate, OfAPathOnThePlaneIsRoundingOnly) {
 TEST(Certificate, CoversBothRadiiOfARoundedArc) {
   const SurfaceMesh mesh = testing::grid_mesh(3, 3, 4.0, 4.0, [](double, double) { return 1.0; });
   const DropCutter cutter(mesh, kRadius, Executor::serial());
-  const RowProfile profile = row_profile(cutter, inner_span({0, 2.0}), 1e-4);
+  const RowProfile profile = RowCurves(cutter).profile(inner_span({0, 2.0}), 1e-4);
   RowMove move;
   move.arc = true;
   move.cap = true;

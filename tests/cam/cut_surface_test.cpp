@@ -128,8 +128,8 @@ TEST(CutSurface, ASmoothSurfaceNeedsFewerMovesThanItsFacets) {
   const auto moves = [&](const CutSurface& surface) {
     const RowSpan span = plan.row_span(plan.rows / 2);
     const Eigen::AlignedBox2d axis(span.line.at(span.held_from), span.line.at(span.held_to));
-    const auto cutter = surface.cutter(axis, Executor::serial());
-    return cut_row(*cutter, plan, plan.rows / 2).moves.size();
+    const RowCurves curves(surface, axis, Executor::serial());
+    return cut_row(curves, plan, plan.rows / 2).moves.size();
   };
   EXPECT_LT(2 * moves(smooth), moves(facets));
 }

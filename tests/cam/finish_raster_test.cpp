@@ -114,7 +114,7 @@ TEST(FinishRaster, TheProgramsMotionKeepsTheCertificate) {
     const RasterPlan plan = plan_finish_raster(square(kSide), kRadius, options);
     int arcs = 0;
     for (const std::int64_t r : {20, 33, 50}) {
-      const RasterRow row = cut_row(cutter, plan, r);
+      const RasterRow row = cut_row(RowCurves(cutter), plan, r);
       EXPECT_LE(row.certificate.gouge.value, options.tolerance);
       EXPECT_LE(row.certificate.excess.value, options.tolerance);
       Eigen::Vector3d from = row.start;
@@ -167,7 +167,7 @@ TEST(FinishRaster, LooserTolerancesNeedFewerPoints) {
   loose.slope_tolerance = 0.05;
   const auto count = [&](const RasterOptions& options) {
     const RasterPlan plan = plan_finish_raster(square(kSide), kRadius, options);
-    return cut_row(cutter, plan, plan.rows / 2).moves.size();
+    return cut_row(RowCurves(cutter), plan, plan.rows / 2).moves.size();
   };
   EXPECT_LT(count(loose) * 3, count(tight));
 }
@@ -274,7 +274,7 @@ TEST(FinishRaster, RefusesAHoleInTheSurface) {
   const SurfaceMesh mesh = testing::grid_mesh(5, 5, 1.0, 1.0, [](double, double) { return 1.0; });
   const DropCutter cutter(mesh, kRadius, Executor::serial());
   const RasterPlan plan = plan_finish_raster(square(kSide), kRadius, {});
-  EXPECT_THROW(cut_row(cutter, plan, plan.rows / 2), InputError);
+  EXPECT_THROW(cut_row(RowCurves(cutter), plan, plan.rows / 2), InputError);
 }
 
 }  // namespace

@@ -312,7 +312,7 @@ BallPath finishing_path(const SurfaceMesh& mesh, double side, const RasterOption
   BallPath path(cutter.radius(), 0.0);
   GcodeMotion motion;
   for (std::int64_t row = 0; row < plan.rows; ++row) {
-    const RasterRow cut = cut_row(cutter, plan, row);
+    const RasterRow cut = cut_row(RowCurves(cutter), plan, row);
     const Eigen::Vector3d start = cut.start;
     if (row > 0) testing::add_polyline(path, {motion.end, start});
     motion.end = start;

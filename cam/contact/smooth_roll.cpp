@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cam/contact/smooth_roll.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+// Notation: p place of the axis, q contact, d = q − p, R radius, s = √(R² − |d|²) height of the
+// centre above the contact, g = ∇f(q) = ∇z − d/s, H = ∇²f = ∇²z − (1 + d dᵀ/s²)/s.
+namespace lensforge {
+namespace {
+
+/// Newton's method ends where |g| is below this: the tip then is exact to g²/(2m) ≤ 5e-11 mm for
+/// R = 0.2 mm, m ≥ 0.2/R being what f bends down by at least.
+constexpr double kFlat = 1e-5;
+
+/// Steps at most; two are usual.
+constexpr int kMostSteps = 40;
+
+/// Contacts are sought no farther from the axis than this, in radii.
+constexpr double kFarthest = 0.98;
+
+using Fixed = std::array<bool, 2>;
+
+/// Which coordinates of the contact are held at the rectangle's rim by the gradient.
+Fixed held_by_rim(const Eigen::Vector2d& q, const Eigen::Vector2d& gradient,
+                  const Eigen::AlignedBox2d& box) {
+  Fixed fixed{};
+  for (int k = 0; k < 2; ++k) {
+    fixed[static_cast<std::size_t>(k)] =
+        (q[k] <= box.min()[k] && gradient[k] < 0.0) || (q[k] >= box.max()[k] && gradient[k] > 0.0);
+  }
+  return fixed;
+}
+
+/// x of H x = b with the fixed coordinates of x zero and their equations left out.
+Eigen::Vector2d solve_free(const Eigen::Matrix2d& h, const Eigen::Vector2d& b, const Fixed& fixed) {
+  if (fixed[0] && fixed[1]) return Eigen::Vector2d::Zero();
+  if (fixed[0]) return {0.0, b.y() / h(1, 1)};
+  if (fixed[1]) return {b.x() / h(0, 0), 0.0};
+  const double det = h(0, 0) * h(1, 1) - h(0, 1) * h(1, 0);
+  return Eigen::Vector2d(h(1, 1) * b.x() - h(0, 1) * b.y(), h(0, 0) * b.y() - h(1, 0) * b.x()) /
+         det;
+}
+
+Eigen::Vector2d clamped(const Eigen::Vector2d& q, const Eigen::AlignedBox2d& box) {
+  return q.cwiseMax(box.min()).cwiseMin(box.max());
+}
+
+}  // namespace
+
+std::optional<SurfaceShape> SmoothRoll::shape_at(const Eigen::Vector2d& q) {
+  if (!patch_ || !patch_->contains(q)) patch_ = bed_.surface().patch_at(q);
+  if (!patch_) return std::nullopt;
+  return patch_->at(q);
+}
+
+/// Newton's method with the step halved as long as f falls. Where the gradient points over the rim
+/// a coordinate stays there. By concavity no other point of the surface holds the ball higher than
+/// g²/(2m) above f(q), m = 1/R − bend.
+std::optional<SmoothRoll::Rest> SmoothRoll::rest_at(double u, const Eigen::Vector2d& guess,
+                                                    double steepest_bend) {
+  const Eigen::AlignedBox2d& box = bed_.surface().box();
+  const double radius = bed_.radius();
+  const double least_bend = 1.0 / radius - steepest_bend;
+  const Eigen::Vector2d p = line_.at(u);
+  Eigen::Vector2d q = clamped(guess, box);
+  Eigen::Vector2d before = clamped(p, box);
+  double height = -HUGE_VAL;
+  for (int step = 0; step < kMostSteps; ++step) {
+    const Eigen::Vector2d d = q - p;
+    const double s2 = radius * radius - d.squaredNorm();
+    if (!(d.norm() < kFarthest * radius)) {
+      if (q == before) return std::nullopt;
+      q = 0.5 * (q + before);
+      continue;
+    }
+    const std::optional<SurfaceShape> shape = shape_at(q);
+    if (!shape) return std::nullopt;
+    const double s = std::sqrt(s2);
+    const double f = shape->z + s - radius;
+    const Eigen::Vector2d gradient = shape->slope - d / s;
+    const Fixed fixed = held_by_rim(q, gradient, box);
+    const Eigen::Vector2d g(fixed[0] ? 0.0 : gradient.x(), fixed[1] ? 0.0 : gradient.y());
+    const bool flat = g.squaredNorm() <= kFlat * kFlat;
+    if (!flat && f < height) {
+      q = 0.5 * (q + before);
+      continue;
+    }
+    const Eigen::Matrix2d ball = -(Eigen::Matrix2d::Identity() + d * d.transpose() / s2) / s;
+    const Eigen::Matrix2d bend = shape->bend + ball;
+    if (flat) {
+      const Eigen::Vector2d along =
+          line_.along == 0 ? Eigen::Vector2d(1.0, 0.0) : Eigen::Vector2d(0.0, 1.0);
+      return Rest{q, solve_free(bend, ball * along, fixed), f,
+                  g.squaredNorm() / (2.0 * least_bend)};
+    }
+    before = q;
+    height = f;
+    q = clamped(q - solve_free(bend, g, fixed), box);
+  }
+  return std::nullopt;
+}
+
+/// Between the rests the contact moves by v du at most, v = ‖(∇²f)⁻¹ (1 + d dᵀ/s²)/s‖ ≤ (R/s) /
+/// (1 − bR), so it lies in the box of both contacts with half of that around, and cannot be farther
+/// from the axis than kSteepest as long as these are not.
+std::optional<double> SmoothRoll::sharpest(double from, const Rest& first, double to,
+                                           const Rest& last, double bend) const {
+  const double radius = bed_.radius();
+  const double steep = 1.0 / std::sqrt(1.0 - kSteepest * kSteepest);
+  const double rate = steep / (1.0 - bend * radius);
+  const double half = 0.5 * (to - from);
+  const double out = std::max((first.q - line_.at(from)).norm(), (last.q - line_.at(to)).norm()) +
+                     (1.0 + rate) * half;
+  if (out > kSteepest * radius) return std::nullopt;
+  Eigen::AlignedBox2d box(first.q);
+  box.extend(last.q);
+  const Eigen::Vector2d around = Eigen::Vector2d::Constant(rate * half);
+  box = {Eigen::Vector2d(box.min() - around), Eigen::Vector2d(box.max() + around)};
+  const BendRange range = bed_.bends().over(box);
+  const double up = range.largest / (1.0 - range.largest * radius);
+  const double flank = radius * radius / std::pow(radius * radius - out * out, 1.5);
+  const Eigen::AlignedBox2d& whole = bed_.surface().box();
+  const bool rim = box.min()[line_.along] <= whole.min()[line_.along] ||
+                   box.max()[line_.along] >= whole.max()[line_.along];
+  return std::max({up, -range.least, rim ? flank : 0.0});
+}
+
+std::optional<CurveNodes> SmoothRoll::follow(double from, double to, double error) {
+  const double radius = bed_.radius();
+  Eigen::AlignedBox2d foot(line_.at(from));
+  foot.extend(line_.at(to));
+  const Eigen::Vector2d around = Eigen::Vector2d::Constant(radius);
+  foot = {Eigen::Vector2d(foot.min() - around), Eigen::Vector2d(foot.max() + around)};
+  const double bend = bed_.bends().over(foot).largest;
+  if (bend * radius > SmoothBed::kMostBend) return std::nullopt;
+  const std::optional<Rest> first = rest_at(from, last_.value_or(line_.at(from)), bend);
+  if (!first) return std::nullopt;
+  const std::optional<Rest> last = rest_at(to, first->q + (to - from) * first->rate, bend);
+  if (!last) return std::nullopt;
+  const std::optional<double> sharp = sharpest(from, *first, to, *last, bend);
+  if (!sharp) return std::nullopt;
+  // A chord of length h is off by bend · h²/8.
+  const double steps = std::max(1.0, std::ceil((to - from) * std::sqrt(*sharp / (8.0 * error))));
+  CurveNodes nodes{{from}, {first->tip}, 0.0};
+  double doubt = std::max(first->doubt, last->doubt);
+  const double step = (to - from) / steps;
+  Rest at = *first;
+  for (double i = 1.0; i < steps; i += 1.0) {
+    const double u = from + i * step;
+    const std::optional<Rest> next = rest_at(u, at.q + (u - nodes.u.back()) * at.rate, bend);
+    if (!next) return std::nullopt;
+    at = *next;
+    doubt = std::max(doubt, at.doubt);
+    nodes.u.push_back(u);
+    nodes.z.push_back(at.tip);
+  }
+  nodes.u.push_back(to);
+  nodes.z.push_back(last->tip);
+  nodes.error = 0.125 * *sharp * step * step + doubt;
+  last_ = last->q;
+  return nodes;
+}
+
+}  // namespace lensforge

@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cam/contact/smooth_roll.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <vector>
+
+#include "cam/cam_meshes.h"
+#include "cam/contact/cut_surface.h"
+#include "cam/contact/drop_cutter.h"
+#include "cam/path/row_profile.h"
+
+namespace lensforge {
+namespace {
+
+constexpr double kRadius = 0.2;
+constexpr double kSide = 3.0;
+
+/// Waves and a crease that a ball rolls through; triangles of 0.14 mm.
+SurfaceMesh relief() {
+  return testing::grid_mesh(22, 23, kSide, kSide, [](double x, double y) {
+    return 6.0 + 0.1 * std::sin(2.2 * x + 0.4) * std::cos(1.7 * y) +
+           0.05 * std::cos(1.5 * x - 3.0 * y) + 0.02 * std::abs(x - 1.7 + 0.3 * y);
+  });
+}
+
+SmoothCutSurface cut_surface(const SurfaceMesh& mesh, double deviation = 2e-6) {
+  SmoothCutOptions options;
+  options.deviation = deviation;
+  options.slope_deviation = 1.0;
+  return {mesh, kRadius, options, Executor::cpu(2)};
+}
+
+double at(const CurveNodes& nodes, double u) {
+  const auto next = std::lower_bound(nodes.u.begin() + 1, nodes.u.end() - 1, u) - nodes.u.begin();
+  const auto i = static_cast<std::size_t>(next);
+  const double part = (u - nodes.u[i - 1]) / (nodes.u[i] - nodes.u[i - 1]);
+  return nodes.z[i - 1] + part * (nodes.z[i] - nodes.z[i - 1]);
+}
+
+/// The highest that any of a great many points of the surface around p holds the tip.
+double brute_tip(const SmoothSurface& surface, const Eigen::Vector2d& p, double spacing) {
+  double best = kNoContact;
+  for (double dx = -kRadius; dx <= kRadius; dx += spacing) {
+    for (double dy = -kRadius; dy <= kRadius; dy += spacing) {
+      const double r2 = kRadius * kRadius - dx * dx - dy * dy;
+      const Eigen::Vector2d q =
+          (p + Eigen::Vector2d(dx, dy)).cwiseMax(surface.box().min()).cwiseMin(surface.box().max());
+      if (r2 < 0.0 || (q - p).norm() > kRadius) continue;
+      const double s = std::sqrt(kRadius * kRadius - (q - p).squaredNorm());
+      best = std::max(best, surface.at(q)->z + s - kRadius);
+    }
+  }
+  return best;
+}
+
+TEST(SmoothPatch, EqualsTheSurfaceAndItsDifferences) {
+  const SmoothSurface surface(relief());
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> place(0.05, kSide - 0.05);
+  constexpr double kStep = 1e-4;
+  for (int i = 0; i < 500; ++i) {
+    const Eigen::Vector2d q(place(random), place(random));
+    const auto patch = surface.patch_at(q);
+    ASSERT_TRUE(patch && patch->contains(q));
+    const SurfaceShape shape = patch->at(q);
+    const auto exact = surface.at(q);
+    EXPECT_NEAR(shape.z, exact->z, 1e-13);
+    EXPECT_LT((shape.slope - exact->slope).norm(), 1e-11);
+    for (int k = 0; k < 2; ++k) {
+      const Eigen::Vector2d way = kStep * Eigen::Vector2d::Unit(k);
+      const Eigen::Vector2d bend =
+          (patch->at(q + way).slope - patch->at(q - way).slope) / (2.0 * kStep);
+      EXPECT_LT((shape.bend.col(k) - bend).norm(), 1e-6);
+    }
+  }
+}
+
+TEST(SmoothPatch, BendStaysInTheRangeOfItsTriangle) {
+  const SurfaceMesh mesh = relief();
+  const SmoothSurface surface(mesh);
+  double sharp = 0.0;
+  for (std::int64_t t = 0; t < mesh.triangle_count(); ++t) {
+    const BendRange range = surface.bend_range(t);
+    for (int k = 0; k < 3; ++k) {
+      const Eigen::Vector3d q = 0.5 * mesh.corner(t, k) + 0.25 * mesh.corner(t, (k + 1) % 3) +
+                                0.25 * mesh.corner(t, (k + 2) % 3);
+      const Eigen::Matrix2d bend = surface.patch_at(q.head<2>())->at(q.head<2>()).bend;
+      const double mean = 0.5 * bend.trace();
+      const double half = std::sqrt(std::max(mean * mean - bend.determinant(), 0.0));
+      EXPECT_LE(mean + half, range.largest + 1e-9);
+      EXPECT_GE(mean - half, range.least - 1e-9);
+      sharp = std::max(sharp, (mean + half) / std::max(range.largest, 1e-3));
+    }
+  }
+  EXPECT_GT(sharp, 0.5);
+}
+
+/// The bounds are those of the drop surface itself, at the rim, too.
+TEST(SmoothRoll, EqualsBruteForceOverTheSmoothSurface) {
+  const SmoothCutSurface surface = cut_surface(relief());
+  for (const AxisLine& line : {AxisLine{0, 1.234}, AxisLine{1, 0.777}, AxisLine{0, -0.05}}) {
+    SmoothRoll ball(*surface.bed(), line);
+    for (const double from : {-0.1, 0.0, 0.4, 1.5, 2.98, 3.08}) {
+      const auto nodes = ball.follow(from, from + 0.004, 1e-7);
+      ASSERT_TRUE(nodes) << from;
+      EXPECT_LE(nodes->error, 1.01e-7);
+      const double u = from + 0.0013;
+      const double brute = brute_tip(surface.surface(), line.at(u), 0.001);
+      // Points 1 µm apart miss the highest by (0.7 µm)²/2 · (1/R + bend) at most.
+      EXPECT_GE(at(*nodes, u), brute - nodes->error);
+      EXPECT_LE(at(*nodes, u), brute + nodes->error + 2e-6);
+    }
+  }
+}
+
+/// The facets of the same surface hold the ball as high, but for what they deviate.
+TEST(SmoothRoll, RowsKeepTheirDistanceFromTheFacets) {
+  const SmoothCutSurface surface = cut_surface(relief(), 1e-5);
+  const auto cutter =
+      surface.cutter({Eigen::Vector2d(0.0, 0.0), Eigen::Vector2d(kSide, kSide)}, Executor::cpu(2));
+  const double most = surface.deviation().height;
+  ASSERT_LT(most, 1.1e-5);
+  for (const AxisLine& line : {AxisLine{0, 1.234}, AxisLine{1, 1.71}, AxisLine{0, 3.1}}) {
+    const RowSpan span{line, -0.2, kSide + 0.2, -0.09, kSide + 0.09};
+    const Eigen::AlignedBox2d axis(line.at(span.held_from), line.at(span.held_to));
+    const RowProfile profile = RowCurves(surface, axis, Executor::serial()).profile(span, 2.5e-6);
+    EXPECT_LE(profile.error, kProfileError * 1.01);
+    std::size_t hint = 0;
+    CutterLocation near;
+    for (double u = span.held_from; u <= span.held_to; u += 0.00137) {
+      near = cutter->drop(line.at(u), near);
+      ASSERT_NEAR(profile.at(u, hint), near.tip, most + profile.error) << u;
+    }
+  }
+}
+
+/// A sphere of radius 5 is rolled along on one of radius 5 + R.
+TEST(SmoothRoll, RollsOnASphereAlongACircle) {
+  const SurfaceMesh mesh = testing::grid_mesh(121, 121, kSide, kSide, [](double x, double y) {
+    return std::sqrt(25.0 - (x - 1.5) * (x - 1.5) - (y - 1.5) * (y - 1.5));
+  });
+  const SmoothCutSurface surface = cut_surface(mesh, 1e-4);
+  const AxisLine line{0, 1.3};
+  SmoothRoll ball(*surface.bed(), line);
+  for (double from = 0.5; from < 2.5; from += 0.025) {
+    const auto nodes = ball.follow(from, from + 0.025, 1e-8);
+    ASSERT_TRUE(nodes);
+    for (std::size_t i = 0; i < nodes->u.size(); ++i) {
+      const double x = nodes->u[i] - 1.5;
+      const double exact = std::sqrt(5.2 * 5.2 - x * x - 0.2 * 0.2) - kRadius;
+      EXPECT_NEAR(nodes->z[i], exact, 2e-7);  // What the interpolant is off the sphere.
+    }
+  }
+}
+
+/// In a groove that bends as sharply as the ball there may be two contacts: that is not rolled
+/// through, and the row follows the facets there.
+TEST(SmoothRoll, LeavesSharpGroovesToTheFacets) {
+  const SurfaceMesh mesh = testing::grid_mesh(
+      61, 3, kSide, kSide, [](double x, double) { return 1.0 + 0.6 * std::abs(x - 1.513); });
+  const SmoothCutSurface surface = cut_surface(mesh);
+  const AxisLine line{0, 1.5};
+  SmoothRoll ball(*surface.bed(), line);
+  EXPECT_FALSE(ball.follow(1.51, 1.515, kProfileError));
+  EXPECT_TRUE(ball.follow(0.7, 0.705, kProfileError));
+  const RowSpan span{line, 0.2, 2.8, 0.3, 2.7};
+  const Eigen::AlignedBox2d axis(line.at(0.3), line.at(2.7));
+  const RowProfile profile = RowCurves(surface, axis, Executor::serial()).profile(span, 2.5e-6);
+  const auto cutter = surface.cutter(axis, Executor::serial());
+  std::size_t hint = 0;
+  for (double u = 0.3; u <= 2.7; u += 0.0013) {
+    EXPECT_NEAR(profile.at(u, hint), cutter->drop(line.at(u)).tip,
+                surface.deviation().height + kProfileError);
+  }
+}
+
+}  // namespace
+}  // namespace lensforge
