@@ -184,6 +184,10 @@ class RowFit {
       if (behind(back) < kSlopeStretch) continue;
       if (std::abs(look_.back() - look_[back]) > slope * behind(back)) return false;
     }
+    for (std::size_t i = look_.size() - 1; i-- > 0;) {
+      if (joints_.written[to].x() - joints_.written[from + i].x() > kSlopeStretch) break;
+      if (std::abs(look_.back() - look_[i]) > slope * kSlopeStretch) return false;
+    }
     return true;
   }
 

@@ -102,7 +102,8 @@ double RowError::error_at(double u, std::size_t& hint, double& slack) const {
 
 /// The difference over a stretch is linear between places where one end of it passes a node: it is
 /// largest at one of them. Stops at the first that is more than enough.
-RowError::Turn RowError::most_turn(std::size_t first, double enough) const {
+/// @param goes_on  whether stretches may reach beyond the end, where the error stays as it is.
+RowError::Turn RowError::most_turn(std::size_t first, double enough, bool goes_on) const {
   Turn most;
   if (nodes_.size() < 2) return most;
   const double begin = nodes_.front().u;
@@ -123,8 +124,13 @@ RowError::Turn RowError::most_turn(std::size_t first, double enough) const {
   while (i > 0 && nodes_[i - 1].u + kSlopeStretch >= nodes_[first].u) --i;
   for (; i < nodes_.size() && most.slope <= enough; ++i) {
     const double u = nodes_[i].u + kSlopeStretch;
-    if (u > end) break;
-    offer(i, error_at(u, ahead, slack), slack);
+    if (u <= end) {
+      offer(i, error_at(u, ahead, slack), slack);
+    } else if (goes_on) {
+      offer(i, nodes_.back().error, nodes_.back().slack);
+    } else {
+      break;
+    }
   }
   return most;
 }
@@ -133,7 +139,7 @@ bool RowError::holds(std::size_t first, double tolerance, double slope_tolerance
   for (std::size_t i = first; i < nodes_.size(); ++i) {
     if (std::abs(nodes_[i].error) + nodes_[i].slack > tolerance) return false;
   }
-  return most_turn(first, slope_tolerance).slope <= slope_tolerance;
+  return most_turn(first, slope_tolerance, true).slope <= slope_tolerance;
 }
 
 PathCertificate RowError::certificate() const {
@@ -145,7 +151,7 @@ PathCertificate RowError::certificate() const {
     if (gouge > certificate.gouge.value) certificate.gouge = {gouge, place(node)};
     if (excess > certificate.excess.value) certificate.excess = {excess, place(node)};
   }
-  const Turn turn = most_turn(0, HUGE_VAL);
+  const Turn turn = most_turn(0, HUGE_VAL, false);
   if (turn.slope > 0.0) certificate.slope = {turn.slope, place(nodes_[turn.node])};
   return certificate;
 }

@@ -39,7 +39,8 @@ class RowError {
   void resize(std::size_t size) { nodes_.resize(size); }
 
   /// Whether path and drop curve differ nowhere by more than `tolerance` (mm) from node `first` on,
-  /// and in slope over no kSlopeStretch that ends there by more than `slope_tolerance`.
+  /// and in slope over no kSlopeStretch that ends there by more than `slope_tolerance`; beyond the
+  /// last node the difference is taken to stay as it is, which a next move about does.
   [[nodiscard]] bool holds(std::size_t first, double tolerance, double slope_tolerance) const;
 
   /// Bounds over the whole row; places are (u, path's height, 0).
@@ -59,7 +60,7 @@ class RowError {
   void add_node(const CurvePiece& curve, const Eigen::Vector2d& at, double slack);
   void follow(const CurvePiece& curve, double from, const Eigen::Vector2d& to, double slack);
   [[nodiscard]] double error_at(double u, std::size_t& hint, double& slack) const;
-  [[nodiscard]] Turn most_turn(std::size_t first, double enough) const;
+  [[nodiscard]] Turn most_turn(std::size_t first, double enough, bool goes_on) const;
 
   const RowProfile& profile_;
   std::vector<Node> nodes_;

@@ -138,6 +138,25 @@ const DropCutter& RowCurves::facets() const {
   return *made_;
 }
 
+/// Facets lie off the surface that is rolled on by CutSurface::deviation() at most. So that a path
+/// does not step where one goes over into the other, the facets' curve is lifted by what it is off
+/// at its ends, in between by a share of both.
+void RowCurves::bridge(const RowSpan& span, double from, const CurveNodes* next, double to,
+                       double bow, RowProfile& profile) const {
+  const std::size_t first = profile.u.size();
+  const double begins = profile.z.back();
+  add_facets(facets(), span.line, from, to, bow, profile);
+  const double at_end = next != nullptr ? next->z.front() - profile.z.back() : 0.0;
+  const double at_begin = first > 1 ? begins - profile.z[first] : at_end;
+  const double most = surface_->deviation().height;
+  const double left = std::clamp(at_begin, -most, most);
+  const double right = std::clamp(next != nullptr ? at_end : at_begin, -most, most);
+  for (std::size_t i = first; i < profile.u.size(); ++i) {
+    const double part = (profile.u[i] - from) / (to - from);
+    profile.z[i] += left + part * (right - left);
+  }
+}
+
 /// Stretches end at fixed places. One that cannot be rolled along is halved down to kLeastStretch:
 /// shorter ones are judged more finely. What is left open at last is cut from facets.
 void RowCurves::roll(const RowSpan& span, double bow, RowProfile& profile) const {
@@ -154,13 +173,13 @@ void RowCurves::roll(const RowSpan& span, double bow, RowProfile& profile) const
       nodes = ball.follow(begin, end, kProfileError);
     }
     if (nodes) {
-      if (open < begin) add_facets(facets(), span.line, open, begin, bow, profile);
+      if (open < begin) bridge(span, open, &*nodes, begin, bow, profile);
       add_nodes(*nodes, bow, profile);
       open = end;
     }
     begin = end;
   }
-  if (open < begin) add_facets(facets(), span.line, open, begin, bow, profile);
+  if (open < begin) bridge(span, open, nullptr, begin, bow, profile);
 }
 
 RowProfile RowCurves::profile(const RowSpan& span, double bow) const {

@@ -43,7 +43,7 @@ inline constexpr double kProfileError = 5e-8;
 ///
 /// On a smooth surface they follow a ball that rolls on the surface itself (SmoothRoll). Where it
 /// cannot, because the surface bends upwards about as sharply as the ball, they follow the facets
-/// of the surface, and may step by CutSurface::deviation() where they go over.
+/// of the surface, whose heights are off by CutSurface::deviation().
 class RowCurves {
  public:
   /// Of facets. `cutter` must outlive this.
@@ -57,6 +57,8 @@ class RowCurves {
 
  private:
   void roll(const RowSpan& span, double bow, RowProfile& profile) const;
+  void bridge(const RowSpan& span, double from, const CurveNodes* next, double to, double bow,
+              RowProfile& profile) const;
   /// Made when the first row asks for it.
   [[nodiscard]] const DropCutter& facets() const;
 
