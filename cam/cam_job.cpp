@@ -112,7 +112,7 @@ class Job {
   }
 
  private:
-  Prediction predict(const ProgramFiles& programs) const {
+  Prediction predict(const ProgramFiles& programs) {
     MeantSurface cut(plan_.mesh(), options_.surface);
     const auto rounded = cut.rounded(plan_.surface(), cut_rectangle(), executor_);
     // A mould's own surface is another than that of the lens that is cast in it.
@@ -121,7 +121,7 @@ class Job {
     const Eigen::AlignedBox2d rectangle(Eigen::Vector2d(0.0, 0.0), lens_.setup.lens_size);
     const PartSurfaces surfaces({lens ? lens->field() : cut.field(), *rounded, rectangle,
                                  plan_.blank().max().z(), plan_.mould()},
-                                plan_.finish_paths(programs, control_), options_.polish);
+                                plan_.take_finish_paths(programs, control_), options_.polish);
     return predict_part(surfaces, lens_, options_, executor_, control_);
   }
 

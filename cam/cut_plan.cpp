@@ -19,8 +19,8 @@ constexpr double kSketchSpacing = 0.5;
 /// Unit of a program's last decimal where nothing is rounded, mm.
 constexpr double kUnrounded = 1e-9;
 
-/// How finely the smooth surface is cut into facets: heights a fifth of the path's tolerance, and
-/// slopes that polishing averages over several facets.
+/// How finely the smooth surface is cut into facets, which are followed only in grooves that bend
+/// as sharply as the ball (RowCurves), by the pencil, and where the ball's reach is judged.
 constexpr SmoothCutOptions kSmoothCut{1e-4, 2e-2};
 
 SurfaceMesh mesh_to_cut(const Lens& lens, const CamOptions& options) {
@@ -101,6 +101,7 @@ RasterPlan CutPlan::raster(PassAxis along, double resolution) const {
   raster.along = along == PassAxis::kX ? 0 : 1;
   raster.style = finish().style;
   raster.arcs = options_.arcs && options_.post.arcs != ArcForm::kNone;
+  raster.traces = options_.render;
   return plan_finish_raster(rectangle(), ball().radius(), raster);
 }
 
@@ -150,8 +151,14 @@ ProgramOperation CutPlan::finish_operation(const std::string& name, const Raster
                            (plan.options.along == 0 ? "X" : "Y") + ", stepover " +
                            decimal_text(plan.pitch, 5) + " mm";
   return {name, ball(), {rows}, [this, name, plan, &control](const MoveSink& sink) {
-            return cut_finish(*surface_, plan, {name, ball(), safe_z()}, executor_,
-                              watched(name, ball(), sink), control);
+            FinishRun run{name, ball(), safe_z(), {}};
+            if (plan.options.traces) {
+              paths_.ideal.emplace_back(plan.radius, 0.0);
+              paths_.fitted.emplace_back(plan.radius, 0.0);
+              run.look = [this](const RasterRow& row) { add_row(row, paths_); };
+            }
+            return cut_finish(*surface_, plan, run, executor_, watched(name, ball(), sink),
+                              control);
           }};
 }
 
@@ -208,16 +215,8 @@ ProgramSettings CutPlan::settings() const {
   return settings;
 }
 
-FinishPaths CutPlan::finish_paths(const ProgramFiles& programs, const RunControl& control) const {
-  FinishPaths paths;
-  for (const RasterPlan& plan : rasters(kUnrounded)) {
-    paths.ideal.push_back(ideal_path(*surface_, plan, executor_, control));
-    BallPath fitted(plan.radius, 0.0);
-    const OperationSummary summary = cut_finish(*surface_, plan, {"finish", ball(), safe_z()},
-                                                executor_, path_sink(fitted), control);
-    if (!summary.complete) throw Interrupted();
-    paths.fitted.push_back(std::move(fitted));
-  }
+FinishPaths CutPlan::take_finish_paths(const ProgramFiles& programs, const RunControl& control) {
+  FinishPaths paths = std::move(paths_);
   if (finish().pencil) {
     // No row: its points lie on the drop surface already, so that there is nothing more exact.
     BallPath pencil(ball().radius(), 0.0);

@@ -43,10 +43,11 @@ class CutPlan {
   [[nodiscard]] ProgramPlan programs(const RunControl& control);
   [[nodiscard]] ProgramSettings settings() const;
 
-  /// The finishing ball's ways, from the exact drop curves to the written programs.
+  /// The finishing ball's ways, from the exact drop curves to the written programs; the former are
+  /// handed over, so once. @pre programs() was streamed, and CamOptions::render is set.
   /// @throw Interrupted; InputError or RunError if a program cannot be read back.
-  [[nodiscard]] FinishPaths finish_paths(const ProgramFiles& programs,
-                                         const RunControl& control) const;
+  [[nodiscard]] FinishPaths take_finish_paths(const ProgramFiles& programs,
+                                              const RunControl& control);
 
   [[nodiscard]] const CamOptions& options() const { return options_; }
   /// What is cut: the lens's surface or the mould's; mm, in a lens frame of its own.
@@ -106,6 +107,7 @@ class CutPlan {
   std::unique_ptr<CutSurface> surface_;
   CollisionCheck collisions_;
   std::vector<std::unique_ptr<PathSketch>> sketches_;
+  FinishPaths paths_;  ///< As far as programs() were streamed.
 };
 
 }  // namespace lensforge

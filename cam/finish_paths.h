@@ -4,11 +4,9 @@
 #include <filesystem>
 #include <vector>
 
-#include "cam/contact/cut_surface.h"
 #include "cam/milled/ball_path.h"
 #include "cam/path/finish_raster.h"
 #include "cam/path/move.h"
-#include "core/executor.h"
 #include "core/run_control.h"
 #include "machine/gcode/gcode_dialect.h"
 
@@ -16,14 +14,14 @@ namespace lensforge {
 
 /// The finishing ball's ways in the lens frame, from what is meant to what is written.
 struct FinishPaths {
-  std::vector<BallPath> ideal;    ///< Along the exact drop curves.
+  std::vector<BallPath> ideal;    ///< Along the exact drop curves, to kExactRow.
   std::vector<BallPath> fitted;   ///< The moves before their numbers are rounded.
   std::vector<BallPath> written;  ///< As the programs have them.
 };
 
-/// The rows of a raster along the exact drop curves, to kProfileError. @throw Interrupted
-BallPath ideal_path(const CutSurface& surface, const RasterPlan& plan, const Executor& executor,
-                    const RunControl& control);
+/// Adds a row's exact way and that of its moves before rounding to the last of `ideal` and of
+/// `fitted`. @pre the row has traces.
+void add_row(const RasterRow& row, FinishPaths& paths);
 
 /// A MoveSink that hands moves at feed to a path.
 MoveSink path_sink(BallPath& path);

@@ -10,7 +10,7 @@ namespace lensforge {
 namespace {
 
 /// Part of the tolerances that chords between joints may use up.
-constexpr double kJointShare = 0.5;
+constexpr double kJointShare = 0.2;
 
 /// How often the move before is shortened to let one from its end hold.
 constexpr int kRetries = 4;

@@ -138,7 +138,10 @@ OperationSummary cut_finish(const CutSurface& surface, const RasterPlan& plan, c
   summary.tool = run.tool.number;
   summary.stepover = plan.pitch;
   FinishMoves moves(plan, run, sink, summary);
-  const auto add = [&](const RasterRow& row) { moves.add(row); };
+  const auto add = [&](const RasterRow& row) {
+    moves.add(row);
+    if (run.look) run.look(row);
+  };
   const RasterSummary raster = cut_raster(surface, plan, executor, add, control);
   if (!raster.complete) return summary;
   moves.end();

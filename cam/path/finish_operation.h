@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <functional>
 #include <string>
 
 #include "cam/contact/cut_surface.h"
@@ -18,6 +19,7 @@ struct FinishRun {
   std::string name = "finish";  ///< OperationSummary::name; "cross" for a raster across.
   Tool tool;                    ///< A ball of the plan's radius.
   double safe_z = 0.0;          ///< Height of rapids, mm, lens frame, on the program's grid.
+  std::function<void(const RasterRow&)> look = {};  ///< Is shown every row as well, in order.
 };
 
 /// The moves of a raster in order, from the safe height to the safe height.

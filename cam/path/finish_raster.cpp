@@ -13,6 +13,9 @@ namespace {
 /// Rows that are cut at the same time: a few tenths of a second of work, so that a stop is heard.
 constexpr std::int64_t kBatchRows = 16;
 
+/// Unit of the last decimal of exact ways, mm.
+constexpr double kExactResolution = 1e-12;
+
 FitOptions fit_options(const RasterOptions& options) {
   return {options.tolerance, options.slope_tolerance, options.resolution, options.z_zero,
           options.arcs};
@@ -51,18 +54,26 @@ class RowFrame {
   AxisLine line_;
 };
 
-std::vector<PathMove> in_space(const FittedRow& fitted, const RowFrame& frame, bool forward) {
-  std::vector<PathMove> moves;
-  moves.reserve(fitted.moves.size());
+RasterWay in_space(const RowWay& way, const RowFrame& frame, bool forward) {
+  RasterWay result;
+  const Eigen::Vector2d& first = forward ? way.start : way.moves.back().end;
+  result.start = frame.point(first.x(), first.y());
+  result.moves.reserve(way.moves.size());
   if (forward) {
-    for (const RowMove& move : fitted.moves) moves.push_back(frame.move(move, move.end, true));
-    return moves;
+    for (const RowMove& move : way.moves) result.moves.push_back(frame.move(move, move.end, true));
+    return result;
   }
-  for (std::size_t i = fitted.moves.size(); i-- > 0;) {
-    const Eigen::Vector2d& end = i > 0 ? fitted.moves[i - 1].end : fitted.start;
-    moves.push_back(frame.move(fitted.moves[i], end, false));
+  for (std::size_t i = way.moves.size(); i-- > 0;) {
+    const Eigen::Vector2d& end = i > 0 ? way.moves[i - 1].end : way.start;
+    result.moves.push_back(frame.move(way.moves[i], end, false));
   }
-  return moves;
+  return result;
+}
+
+/// For the exact way of a row: decimals are those of doubles, and arcs save memory.
+FitOptions exact_fit(const FitOptions& fit) {
+  return {kExactRow * fit.tolerance, kExactRow * fit.slope_tolerance, kExactResolution, fit.z_zero,
+          true};
 }
 
 std::int64_t rows_at_once(const CutSurface& surface, const RasterPlan& plan) {
@@ -179,10 +190,11 @@ RasterRow cut_row(const RowCurves& curves, const RasterPlan& plan, std::int64_t 
   const PathCertificate& certificate = fitted.certificate;
   const RowFrame frame(plan.options.along, plan.row_place(row));
   const bool forward = plan.forward(row);
-  const Eigen::Vector2d& first = forward ? fitted.start : fitted.moves.back().end;
-  RasterRow result;
-  result.start = frame.point(first.x(), first.y());
-  result.moves = in_space(fitted, frame, forward);
+  RasterRow result{in_space(fitted, frame, forward), {}, {}, {}, 0};
+  if (plan.options.traces) {
+    result.exact = in_space(fit_row(profile, exact_fit(fit)), frame, forward);
+    result.unrounded = in_space(fitted.unrounded, frame, forward);
+  }
   result.certificate = {frame.placed(certificate.gouge), frame.placed(certificate.excess),
                         frame.placed(certificate.slope)};
   result.pieces = static_cast<std::int64_t>(profile.u.size()) - 1;

@@ -27,7 +27,8 @@ struct RasterOptions {
   double z_zero = 0.0;            ///< Height that the program calls 0, mm, lens frame.
   int along = 0;                  ///< 0: rows along x; 1: along y.
   PassStyle style = PassStyle::kZigzag;
-  bool arcs = false;  ///< Arcs in the rows' planes, G18 along x and G19 along y.
+  bool arcs = false;    ///< Arcs in the rows' planes, G18 along x and G19 along y.
+  bool traces = false;  ///< Rows also tell RasterRow::exact and unrounded.
 };
 
 /// Stepover of rows that lie `pitch` apart along a surface that rises across them by `steepest`
@@ -71,10 +72,16 @@ struct RasterPlan {
 RasterPlan plan_finish_raster(const Eigen::AlignedBox2d& surface, double radius,
                               const RasterOptions& options);
 
-/// One pass from `start`; x, y, z and centres lie on the program's grid.
-struct RasterRow {
+/// The tip's way over a row.
+struct RasterWay {
   Eigen::Vector3d start = Eigen::Vector3d::Zero();
   std::vector<PathMove> moves;  ///< All kCut, feed 0.
+};
+
+/// One pass; x, y, z and centres lie on the program's grid.
+struct RasterRow : RasterWay {
+  RasterWay exact;              ///< The drop curve to kExactRow, if asked for.
+  RasterWay unrounded;          ///< The same moves before their numbers are rounded, if asked for.
   PathCertificate certificate;  ///< Against the drop curve as continued beyond the rim.
   std::int64_t pieces = 0;      ///< Of the drop curve's polyline.
 
@@ -82,6 +89,9 @@ struct RasterRow {
     return moves.empty() ? start : moves.back().end;
   }
 };
+
+/// What the exact way of a row is off the drop curve at most, as a share of the tolerances.
+inline constexpr double kExactRow = 0.2;
 
 /// Length of a straight move or of an arc of less than half a circle, mm.
 double row_move_length(const Eigen::Vector3d& start, const PathMove& move);
