@@ -14,6 +14,7 @@
 #include "app/output_folder.h"
 #include "app/progress_display.h"
 #include "cam/cam_job.h"
+#include "cam/cut_compare.h"
 #include "cam/report/report_json.h"
 #include "core/error.h"
 
@@ -97,6 +98,38 @@ int exit_code(const OptionSet& options, const CamResult& result) {
   return kDone;
 }
 
+std::string choice_text(const ReportChoice& choice) {
+  return "  " + choice.choice + "   leaks " + fixed(100.0 * choice.leakage, 2) + " %, dark " +
+         fixed(100.0 * choice.dark_flux, 2) + " %, MAE " + fixed(choice.mae, 4) + ", " +
+         fixed(choice.hours, 2) + " h\n";
+}
+
+int compare(const OptionSet& options, const CamSettings& settings, const CamOptions& cam,
+            const Lens& lens) {
+  const CutChoices choices = parse_choices(settings.compare, "--compare");
+  const Console console(options.common().json, options.common().quiet);
+  const InterruptWatch interrupt;
+  const OutputFolder folder(settings.folder());
+  folder.remove_partial_files();
+  ProgressDisplay progress(options.common().quiet);
+  const RunControl control(interrupt.token(), progress.sink());
+  const CutComparison result =
+      compare_cuts(lens, cam, choices, folder.path(), options.executor(), control);
+  nlohmann::json json = {{"command", "cam"},
+                         {"status", result.complete ? "done" : "interrupted"},
+                         {"options", options.used()},
+                         {"choices", nlohmann::json::array()},
+                         {"files", nlohmann::json::array()}};
+  std::string text = result.complete ? "finishing, least leakage first:\n" : "interrupted\n";
+  for (const ReportChoice& choice : result.ranking) {
+    json["choices"].push_back(choice_json(choice));
+    text += choice_text(choice);
+  }
+  if (result.complete) json["files"].push_back(result.page.string());
+  console.result(json, text);
+  return result.complete ? kDone : kInterrupted;
+}
+
 }  // namespace
 
 int cam_command(const Arguments& command_line) {
@@ -112,6 +145,7 @@ int cam_command(const Arguments& command_line) {
     return kDone;
   }
   validate(cam, lens.setup);
+  if (!settings.compare.empty()) return compare(options, settings, cam, lens);
   const CamResult result = run(options, cam, lens, settings.folder());
   for (const std::string& warning : result.report.warnings) console.note("warning: " + warning);
   console.result(summary_json(options, result),

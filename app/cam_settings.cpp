@@ -119,6 +119,9 @@ void add_limit_options(OptionSet& options, CutLimits& limits) {
 }
 
 void add_prediction_options(OptionSet& options, CamSettings& s) {
+  options.texts("--compare", s.compare, "KEY=MM,…",
+                "rank choices by leakage and hours instead of making programs: tool=0.3,0.4 "
+                "pitch=0.04,0.06 (finishing only)");
   options.flag("--no-render", s.no_render, "programs only, without what the part will project");
   options.length("--polish-sigma", s.cam.polish.sigma, Limits::at_least(0),
                  "polishing averages heights with a Gaussian of this σ");
@@ -133,24 +136,6 @@ void add_prediction_options(OptionSet& options, CamSettings& s) {
   add_limit_options(options, s.cam.limits);
 }
 
-/// The tool in another diameter: flutes and neck in proportion, shank and holder as they are.
-void resize(Tool& tool, double diameter) {
-  const double scale = diameter / tool.diameter;
-  tool.diameter = diameter;
-  tool.corner_radius *= scale;
-  tool.flute_length *= scale;
-  tool.name = "diameter as given";
-  double lift = 0.0;
-  for (ToolSection& section : tool.sections) {
-    if (&section == &tool.sections.front()) {
-      lift = (scale - 1.0) * section.to;
-      section = {scale * section.diameter, scale * section.from, scale * section.to};
-    } else {
-      section = {std::max(section.diameter, diameter), section.from + lift, section.to + lift};
-    }
-  }
-}
-
 /// Puts what was given over the workshop.
 void overrule(const OptionSet& options, const CamSettings& s, Workshop& workshop) {
   Process& process = workshop.process;
@@ -158,9 +143,10 @@ void overrule(const OptionSet& options, const CamSettings& s, Workshop& workshop
   const auto take = [&](const char* name, auto& to, const auto& from) {
     if (options.given(name)) to = from;
   };
-  if (options.given("--tool-diameter")) resize(ball, s.finish_tool.diameter);
+  if (options.given("--tool-diameter")) ball = resized(ball, s.finish_tool.diameter);
   if (options.given("--rough-tool")) {
-    resize(tool_of(workshop, process.rough.tool), s.rough_tool);
+    Tool& rough = tool_of(workshop, process.rough.tool);
+    rough = resized(rough, s.rough_tool);
   }
   take("--spindle", ball.spindle_rpm, s.finish_tool.spindle_rpm);
   take("--feed", ball.feed, s.finish_tool.feed);

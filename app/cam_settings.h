@@ -23,6 +23,7 @@ struct CamSettings {
   bool no_semi = false;
   bool no_arcs = false;
   bool no_render = false;
+  std::vector<std::string> compare;  ///< What to compare; empty: make programs.
   Tool finish_tool;
   Process process;
   Stock stock;

@@ -137,6 +137,12 @@ void OptionSet::text(const std::string& name, std::string& value, const std::str
   add(name, type, help, set, [&value] { return nlohmann::json(value); });
 }
 
+void OptionSet::texts(const std::string& name, std::vector<std::string>& values,
+                      const std::string& type, const std::string& help) {
+  parser_->app.add_option(name, values, help)->type_name(type);
+  parser_->getters.emplace_back(name, [&values] { return nlohmann::json(values); });
+}
+
 void OptionSet::flag(const std::string& name, bool& value, const std::string& help) {
   parser_->app.add_flag(name, value, help);
   parser_->getters.emplace_back(name, [&value] { return nlohmann::json(value); });

@@ -64,6 +64,9 @@ class OptionSet {
                      const std::string& help);
   void text(const std::string& name, std::string& value, const std::string& type,
             const std::string& help);
+  /// An option that takes one word or more, up to the next option.
+  void texts(const std::string& name, std::vector<std::string>& values, const std::string& type,
+             const std::string& help);
   void flag(const std::string& name, bool& value, const std::string& help);
   void length(const std::string& name, double& mm, const Limits& limits, const std::string& help);
   void number(const std::string& name, double& value, const Limits& limits, const std::string& unit,

@@ -26,7 +26,8 @@ std::string fault_words(const LeakPlace& place, const std::string& cause) {
 
 std::string remedy_words(const std::string& cause) {
   if (cause == leak_cause::kCrease) {
-    return "The ball does not reach into the groove: half its diameter leaves about half as much.";
+    return "The ball does not reach into the groove: --compare tool=… tells what a smaller one "
+           "leaves.";
   }
   if (cause == leak_cause::kScallop) {
     return "Ridges between the passes survive polishing: a smaller stepover or more polishing "

@@ -42,4 +42,29 @@ std::string report_html(const ReportData& data) {
   return fill_in(report_page::kHtml, values);
 }
 
+std::string compare_html(const ReportData& data) {
+  namespace section = report_section;
+  const std::array<std::pair<std::string_view, std::string>, 18> values{{
+      {"TITLE", escape_html(data.job + " – choices compared")},
+      {"STYLE", std::string(report_page::kStyle)},
+      {"HEADER", section::header(data)},
+      {"PICTURES", ""},
+      {"VERDICT", ""},
+      {"PLACES", ""},
+      {"WORK", ""},
+      {"WARNINGS", ""},
+      {"SETUP", ""},
+      {"OPERATIONS", ""},
+      {"CERTIFICATES", ""},
+      {"LEAKAGE", ""},
+      {"MAPS", ""},
+      {"VIEW", ""},
+      {"CHOICES", section::choices(data)},
+      {"PARAMETERS", section::parameters(data)},
+      {"FOOTER", ""},
+      {"SCRIPT", ""},
+  }};
+  return fill_in(report_page::kHtml, values);
+}
+
 }  // namespace lensforge

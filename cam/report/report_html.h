@@ -12,4 +12,7 @@ namespace lensforge {
 /// places, minutes, tools; what `data` leaves empty is left out.
 std::string report_html(const ReportData& data);
 
+/// A page of the choices alone.
+std::string compare_html(const ReportData& data);
+
 }  // namespace lensforge

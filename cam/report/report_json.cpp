@@ -151,12 +151,12 @@ json group_json(const ParameterGroup& group) {
   return {{"title", group.title}, {"parameters", object}};
 }
 
+}  // namespace
+
 json choice_json(const ReportChoice& choice) {
   return {{"choice", choice.choice}, {"leakage", choice.leakage}, {"dark_flux", choice.dark_flux},
           {"mae", choice.mae},       {"hours", choice.hours},     {"chosen", choice.chosen}};
 }
-
-}  // namespace
 
 json report_json(const ReportData& data) {
   json report{

@@ -234,7 +234,8 @@ std::string choices(const ReportData& data) {
       "<th>rank</th><th>choice</th><th class=\"number\">leakage</th><th class=\"number\">light in "
       "dark parts</th><th class=\"number\">MAE</th><th class=\"number\">time</th>");
   return section(
-      "Other choices, least leakage first",
+      data.operations.empty() ? "Choices, least leakage first"
+                              : "Other choices, least leakage first",
       element("div", "class=\"stack\"",
               element("table", "", element("thead", "", head) + element("tbody", "", body))));
 }

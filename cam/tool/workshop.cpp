@@ -187,4 +187,22 @@ void validate(const Workshop& workshop, const std::string& file) {
   check_process(rules, workshop);
 }
 
+Tool resized(Tool tool, double diameter) {
+  const double scale = diameter / tool.diameter;
+  tool.diameter = diameter;
+  tool.corner_radius *= scale;
+  tool.flute_length *= scale;
+  tool.name = "diameter as given";
+  double lift = 0.0;
+  for (ToolSection& section : tool.sections) {
+    if (&section == &tool.sections.front()) {
+      lift = (scale - 1.0) * section.to;
+      section = {scale * section.diameter, scale * section.from, scale * section.to};
+    } else {
+      section = {std::max(section.diameter, diameter), section.from + lift, section.to + lift};
+    }
+  }
+  return tool;
+}
+
 }  // namespace lensforge

@@ -92,4 +92,8 @@ Workshop read_workshop(const std::filesystem::path& path);
 /// The workshop as commented TOML: parse_workshop() returns it unchanged.
 std::string workshop_toml(const Workshop& workshop);
 
+/// The tool in another diameter, mm, > 0: flutes and neck in proportion, shank and holder as they
+/// are.
+Tool resized(Tool tool, double diameter);
+
 }  // namespace lensforge

@@ -153,7 +153,7 @@ TEST(LeakWords, SayWhatIsWrongWhereAndWhatHelps) {
   EXPECT_EQ(leak_words(place),
             "The groove at x 41.2 y 37.5 keeps 4.0 µm; 1.30 % of the light leaks from here, "
             "0.900 % into dark parts of the picture. The ball does not reach into the "
-            "groove: half its diameter leaves about half as much.");
+            "groove: --compare tool=… tells what a smaller one leaves.");
 }
 
 /// Rows along x, one millimetre apart, to and fro, entered by a rapid and a plunge.

@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cam/cut_compare.h"
+
+#include <algorithm>
+#include <string_view>
+#include <system_error>
+#include <tuple>
+#include <utility>
+
+#include "cam/cam_job.h"
+#include "cam/report/report_html.h"
+#include "core/decimal_text.h"
+#include "core/error.h"
+#include "core/files.h"
+#include "core/units.h"
+
+namespace lensforge {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kMinutesPerHour = 60.0;
+
+/// One combination.
+struct Choice {
+  std::string name;
+  CamOptions options;
+};
+
+/// A folder that is gone in the end.
+class PassingFolder {
+ public:
+  explicit PassingFolder(fs::path path) : path_(std::move(path)) {
+    std::error_code error;
+    fs::create_directories(path_, error);
+    if (error) throw InputError(path_.string() + ": cannot be made: " + error.message());
+  }
+  ~PassingFolder() {
+    std::error_code ignored;
+    fs::remove_all(path_, ignored);
+  }
+  PassingFolder(const PassingFolder&) = delete;
+  PassingFolder& operator=(const PassingFolder&) = delete;
+  [[nodiscard]] const fs::path& path() const { return path_; }
+
+ private:
+  fs::path path_;
+};
+
+/// A length without zeros at its end.
+std::string trimmed(double value) {
+  std::string text = decimal_text(value, 4);
+  text.erase(text.find_last_not_of('0') + 1);
+  if (text.back() == '.') text.pop_back();
+  return text;
+}
+
+std::vector<double> lengths_of(std::string_view list, const std::string& where) {
+  std::vector<double> values;
+  while (true) {
+    const std::size_t comma = list.find(',');
+    const double value = parse_length_mm(list.substr(0, comma), where);
+    if (!(value > 0.0)) {
+      throw InputError(where + ": " + std::string(list.substr(0, comma)) + " is not above 0");
+    }
+    if (std::find(values.begin(), values.end(), value) != values.end()) {
+      throw InputError(where + ": " + std::string(list.substr(0, comma)) + " stands there twice");
+    }
+    values.push_back(value);
+    if (comma == std::string_view::npos) return values;
+    list.remove_prefix(comma + 1);
+  }
+}
+
+std::vector<Choice> combinations(const CamOptions& options, const CutChoices& choices) {
+  Workshop workshop = options.workshop;
+  workshop.process.rough.enabled = false;
+  workshop.process.semi.enabled = false;
+  const FinishProcess& finish = workshop.process.finish;
+  const auto or_own = [](const std::vector<double>& values, double own) {
+    return values.empty() ? std::vector<double>{own} : values;
+  };
+  std::vector<Choice> all;
+  for (const double tool : or_own(choices.tools, workshop.tool(finish.tool).diameter)) {
+    for (const double pitch : or_own(choices.pitches, finish.pitch)) {
+      Choice choice{"tool " + trimmed(tool) + " mm, pitch " + trimmed(pitch) + " mm", options};
+      choice.options.workshop = workshop;
+      choice.options.render = true;
+      for (Tool& one : choice.options.workshop.tools) {
+        if (one.number == finish.tool && one.diameter != tool) one = resized(one, tool);
+      }
+      choice.options.workshop.process.finish.pitch = pitch;
+      // A pitch that is given goes before one that follows from a scallop.
+      if (!choices.pitches.empty()) choice.options.workshop.process.finish.scallop = 0.0;
+      all.push_back(std::move(choice));
+    }
+  }
+  return all;
+}
+
+ReportChoice ranked(const Choice& choice, const ReportData& report) {
+  const PictureQuality& part = report.leakage.part().quality;
+  return {choice.name,
+          part.leakage,
+          part.dark_flux,
+          part.metrics.mae,
+          report.minutes() / kMinutesPerHour,
+          false};
+}
+
+}  // namespace
+
+CutChoices parse_choices(std::span<const std::string> words, const std::string& option) {
+  CutChoices choices;
+  for (const std::string& word : words) {
+    const std::size_t equals = word.find('=');
+    const std::string key = word.substr(0, equals);
+    if (equals == std::string::npos || (key != "tool" && key != "pitch")) {
+      throw InputError(option + ": " + word + " is not tool=MM,MM… or pitch=MM,MM…");
+    }
+    std::vector<double>& values = key == "tool" ? choices.tools : choices.pitches;
+    if (!values.empty()) throw InputError(option + ": " + key + " stands there twice");
+    values = lengths_of(std::string_view(word).substr(equals + 1), option + " " + key);
+  }
+  const auto count_of = [](const std::vector<double>& values) {
+    return std::max<std::size_t>(values.size(), 1);
+  };
+  const std::size_t count = count_of(choices.tools) * count_of(choices.pitches);
+  if (count > kMostChoices) {
+    throw InputError(option + ": " + std::to_string(count) + " combinations are more than " +
+                     std::to_string(kMostChoices));
+  }
+  return choices;
+}
+
+CutComparison compare_cuts(const Lens& lens, const CamOptions& options, const CutChoices& choices,
+                           const fs::path& folder, const Executor& executor,
+                           const RunControl& control) {
+  const std::vector<Choice> all = combinations(options, choices);
+  for (const Choice& choice : all) {
+    validate(choice.options.workshop, "workshop");
+    validate(choice.options, lens.setup);
+  }
+  CutComparison comparison;
+  ReportData page;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const std::string place =
+        "choice " + std::to_string(i + 1) + "/" + std::to_string(all.size()) + ", ";
+    const RunControl one(control.stop_token(), [&](const Progress& progress) {
+      control.report({place + progress.stage, progress.done, progress.total, progress.detail});
+    });
+    const PassingFolder passing(folder / (".compare.partial-" + std::to_string(i + 1)));
+    const CamResult result = make_cut(lens, all[i].options, passing.path(), executor, one);
+    if (!result.done()) return comparison;
+    comparison.ranking.push_back(ranked(all[i], result.report));
+    page.job = result.report.job;
+    page.program = result.report.program;
+    page.part = result.report.part;
+  }
+  std::stable_sort(comparison.ranking.begin(), comparison.ranking.end(),
+                   [](const ReportChoice& a, const ReportChoice& b) {
+                     return std::tie(a.leakage, a.hours) < std::tie(b.leakage, b.hours);
+                   });
+  page.choices = comparison.ranking;
+  page.parameters = {{"Compared",
+                      {{"Operations", "finishing only"},
+                       {"Polishing, Gaussian σ", trimmed(options.polish.sigma) + " mm"}}}};
+  comparison.page = folder / kComparePage;
+  write_whole_file(comparison.page, compare_html(page));
+  comparison.complete = true;
+  return comparison;
+}
+
+}  // namespace lensforge

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "cam/cam_options.h"
+#include "cam/report/report_data.h"
+#include "core/executor.h"
+#include "core/lens.h"
+#include "core/run_control.h"
+
+namespace lensforge {
+
+/// What is to be compared: every tool with every pitch.
+struct CutChoices {
+  std::vector<double> tools;    ///< Diameters of the finishing ball, mm; none: the workshop's.
+  std::vector<double> pitches;  ///< mm; none: the workshop's.
+};
+
+/// Combinations at most.
+inline constexpr std::size_t kMostChoices = 64;
+
+/// Reads words such as "tool=0.3,0.4mm" and "pitch=0.04".
+/// @param option  where they come from, for messages.
+/// @throw InputError naming option, word and rule.
+CutChoices parse_choices(std::span<const std::string> words, const std::string& option);
+
+/// Where compare_cuts() writes its table.
+inline constexpr const char* kComparePage = "compare.html";
+
+struct CutComparison {
+  bool complete = false;              ///< False if it was stopped.
+  std::vector<ReportChoice> ranking;  ///< Least leakage first, then least hours; finishing only.
+  std::filesystem::path page;         ///< What was written; empty unless complete.
+};
+
+/// Plans, times and foretells the finishing of every combination as make_cut() does, and ranks
+/// them. Programs are made in a folder of their own below `folder` and removed again. Roughing and
+/// semi-finishing are left out: they are the same for all.
+/// @throw InputError before any work if an option breaks its rule in some combination; RunError.
+CutComparison compare_cuts(const Lens& lens, const CamOptions& options, const CutChoices& choices,
+                           const std::filesystem::path& folder, const Executor& executor,
+                           const RunControl& control);
+
+}  // namespace lensforge

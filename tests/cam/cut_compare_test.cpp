@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cam/cut_compare.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "cam/cam_job.h"
+#include "cam/cam_meshes.h"
+#include "core/error.h"
+#include "core/temp_folder.h"
+
+namespace lensforge {
+namespace {
+
+using lensforge::testing::message_of;
+using lensforge::testing::read_bytes;
+using lensforge::testing::TempFolder;
+using ::testing::HasSubstr;
+
+Lens small_lens() {
+  Lens lens;
+  lens.setup.lens_size = {3.0, 2.0};
+  lens.setup.image_size = {3.0, 2.0};
+  lens.setup.pixels = {12, 8};
+  lens.setup.focal_length = 12.0;
+  lens.surface = testing::grid_mesh(21, 17, 3.0, 2.0, testing::lens_relief);
+  lens.target = Image(12, 8, 1.0F);
+  return lens;
+}
+
+CamOptions coarse() {
+  CamOptions options;
+  options.sample_spacing = 0.03;
+  return options;
+}
+
+CutChoices parse(const std::vector<std::string>& words) {
+  return parse_choices(words, "--compare");
+}
+
+TEST(CutCompare, RanksEveryCombinationAsTheCutItselfTells) {
+  const Lens lens = small_lens();
+  const TempFolder folder;
+  const CutComparison result =
+      compare_cuts(lens, coarse(), parse({"tool=0.4,0.3", "pitch=0.1,0.2"}), folder.path(),
+                   Executor::cpu(2), {});
+  ASSERT_TRUE(result.complete);
+  ASSERT_EQ(result.ranking.size(), 4U);
+  for (std::size_t i = 1; i < 4; ++i) {
+    EXPECT_LE(result.ranking[i - 1].leakage, result.ranking[i].leakage);
+  }
+  EXPECT_EQ(folder.file_count(), 1U);
+  EXPECT_THAT(read_bytes(result.page), HasSubstr("tool 0.3 mm, pitch 0.2 mm"));
+
+  CamOptions alone = coarse();
+  alone.workshop.process.rough.enabled = false;
+  alone.workshop.process.semi.enabled = false;
+  alone.workshop.process.finish.pitch = 0.1;
+  const TempFolder other;
+  const ReportData report = make_cut(lens, alone, other.path(), Executor::cpu(2), {}).report;
+  for (const ReportChoice& choice : result.ranking) {
+    if (choice.choice != "tool 0.4 mm, pitch 0.1 mm") continue;
+    EXPECT_DOUBLE_EQ(choice.leakage, report.leakage.part().quality.leakage);
+    EXPECT_DOUBLE_EQ(choice.hours, report.minutes() / 60.0);
+  }
+}
+
+TEST(CutCompare, StoppedLeavesNothing) {
+  const TempFolder folder;
+  std::stop_source source;
+  const RunControl control(source.get_token(), [&](const Progress& progress) {
+    if (progress.stage.starts_with("choice 2/2")) source.request_stop();
+  });
+  const CutComparison result = compare_cuts(small_lens(), coarse(), parse({"pitch=0.1,0.2"}),
+                                            folder.path(), Executor::serial(), control);
+  EXPECT_FALSE(result.complete);
+  EXPECT_EQ(result.ranking.size(), 1U);
+  EXPECT_EQ(folder.file_count(), 0U);
+}
+
+TEST(CutCompare, BadChoicesAreNamedWithValueAndRule) {
+  const auto refusal = [](const std::vector<std::string>& words) {
+    return message_of<InputError>([&] { parse(words); });
+  };
+  EXPECT_THAT(refusal({"feed=3"}), HasSubstr("--compare: feed=3 is not tool="));
+  EXPECT_THAT(refusal({"tool"}), HasSubstr("--compare: tool is not"));
+  EXPECT_THAT(refusal({"tool="}), HasSubstr("--compare tool"));
+  EXPECT_THAT(refusal({"tool=0.3,,0.4"}), HasSubstr("--compare tool"));
+  EXPECT_THAT(refusal({"pitch=0.1,wide"}), HasSubstr("--compare pitch"));
+  EXPECT_THAT(refusal({"pitch=0"}), HasSubstr("--compare pitch: 0 is not above 0"));
+  EXPECT_THAT(refusal({"pitch=-0.1"}), HasSubstr("--compare pitch"));
+  EXPECT_THAT(refusal({"pitch=0.1,0.1"}), HasSubstr("0.1 stands there twice"));
+  EXPECT_THAT(refusal({"pitch=0.1", "pitch=0.2"}), HasSubstr("pitch stands there twice"));
+  EXPECT_THAT(refusal({"tool=1,2,3,4,5,6,7,8,9", "pitch=1,2,3,4,5,6,7,8"}),
+              HasSubstr("72 combinations are more than 64"));
+}
+
+/// Before the first combination is planned.
+TEST(CutCompare, ChoicesThatCannotBeCutAreRefusedAtOnce) {
+  const TempFolder folder;
+  const std::string message = message_of<InputError>([&] {
+    compare_cuts(small_lens(), coarse(), parse({"tool=0.4,2"}), folder.path(), Executor::serial(),
+                 {});
+  });
+  EXPECT_THAT(message, HasSubstr("--tool-diameter: 2"));
+  EXPECT_EQ(folder.file_count(), 0U);
+}
+
+}  // namespace
+}  // namespace lensforge
