@@ -4,21 +4,14 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <limits>
+
+#include "core/float_bounds.h"
 
 namespace lensforge {
 namespace {
 
 /// Cells at most: 32 MB.
 constexpr double kMostCells = 4e6;
-
-float float_under(double value) {
-  return std::nextafter(static_cast<float>(value), -std::numeric_limits<float>::infinity());
-}
-
-float float_over(double value) {
-  return std::nextafter(static_cast<float>(value), std::numeric_limits<float>::infinity());
-}
 
 }  // namespace
 
@@ -32,7 +25,7 @@ BendMap::BendMap(const SmoothSurface& surface, std::span<const BendRange> bends,
     Eigen::AlignedBox2d box;
     for (int k = 0; k < 3; ++k) box.extend(Eigen::Vector2d(mesh.corner(t, k).head<2>()));
     const BendRange& range = bends[static_cast<std::size_t>(t)];
-    const Cell bend{float_under(range.least), float_over(range.largest)};
+    const Cell bend{float_below(range.least), float_above(range.largest)};
     for (std::int64_t row = row_of(box.min().y()); row <= row_of(box.max().y()); ++row) {
       for (std::int64_t column = column_of(box.min().x()); column <= column_of(box.max().x());
            ++column) {
