@@ -24,7 +24,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-enum class Format { kByExtension, kStep, kStl, kObj, kPly, k3mf, kExr, kPng };
+enum class Format { kByExtension, kStep, kIges, kStl, kObj, kPly, k3mf, kExr, kPng };
 enum class SurfaceChoice { kDesigned, kMilled };
 
 struct ExportArguments {
@@ -37,18 +37,19 @@ struct ExportArguments {
 };
 
 const OptionSet::Choices<Format> kFormats{
-    {"step", Format::kStep}, {"stl", Format::kStl}, {"obj", Format::kObj}, {"ply", Format::kPly},
-    {"3mf", Format::k3mf},   {"exr", Format::kExr}, {"png", Format::kPng}};
+    {"step", Format::kStep}, {"iges", Format::kIges}, {"stl", Format::kStl}, {"obj", Format::kObj},
+    {"ply", Format::kPly},   {"3mf", Format::k3mf},   {"exr", Format::kExr}, {"png", Format::kPng}};
 
 void add_export_options(OptionSet& options, ExportArguments& arguments) {
   options.positional("DIR", arguments.source, "lens folder");
   options.required_text("--out", arguments.out, "FILE", "where to write; its folder is made");
   OptionSet::Choices<Format> formats{{"extension", Format::kByExtension}};
   formats.insert(formats.end(), kFormats.begin(), kFormats.end());
-  options.choice("--format", arguments.format, formats,
-                 "solid as step; closed mesh as stl (binary), obj, ply or 3mf; height map as exr "
-                 "(32-bit, mm) or "
-                 "png (16-bit grey)");
+  options.choice(
+      "--format", arguments.format, formats,
+      "solid as step or iges; closed mesh as stl (binary), obj, ply or 3mf; height map as exr "
+      "(32-bit, mm) or "
+      "png (16-bit grey)");
   options.choice("--surface", arguments.surface,
                  {{"designed", SurfaceChoice::kDesigned}, {"milled", SurfaceChoice::kMilled}},
                  "the lens's surface, or what the cutter leaves: DIR/cam/milled.ply");
@@ -58,6 +59,8 @@ void add_export_options(OptionSet& options, ExportArguments& arguments) {
 }
 
 bool is_height_map(Format format) { return format == Format::kExr || format == Format::kPng; }
+
+bool is_spline_solid(Format format) { return format == Format::kStep || format == Format::kIges; }
 
 std::string word_of(Format format) {
   for (const auto& [word, meaning] : kFormats) {
@@ -74,8 +77,9 @@ Format chosen_format(const ExportArguments& arguments) {
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   std::string known;
   for (const auto& [word, meaning] : kFormats) {
-    if (extension == "." + word || (extension == ".stp" && meaning == Format::kStep))
-      return meaning;
+    if (extension == "." + word) return meaning;
+    if (extension == ".stp" && meaning == Format::kStep) return meaning;
+    if (extension == ".igs" && meaning == Format::kIges) return meaning;
     known += (known.empty() ? "." : ", .") + word;
   }
   throw InputError("--out " + arguments.out + ": must end in one of " + known +
@@ -86,7 +90,10 @@ void require_fitting_options(const OptionSet& options, Format format) {
   if (options.given("--pixels") && !is_height_map(format)) {
     throw InputError("--pixels: is for height maps (exr, png), not for " + word_of(format));
   }
-  if (format != Format::kStep) require_no_step_options(options, word_of(format));
+  if (!is_spline_solid(format)) require_no_step_options(options, word_of(format));
+  if (format == Format::kIges && options.given("--schema")) {
+    throw InputError("--schema: is for step, not for iges");
+  }
 }
 
 void require_file_target(const std::string& out) {
@@ -161,8 +168,10 @@ void compare_pictures(const Lens& lens, const Executor& executor, Report& report
 
 Report write(const Source& source, const ExportArguments& arguments, Format format,
              const OptionSet& options) {
-  if (format == Format::kStep) {
-    return export_step(source.lens, source.name, arguments.out, arguments.step, options);
+  if (is_spline_solid(format)) {
+    StepArguments step = arguments.step;
+    step.iges = format == Format::kIges;
+    return export_step(source.lens, source.name, arguments.out, step, options);
   }
   Report report;
   report.within_tolerance = true;

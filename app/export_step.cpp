@@ -15,6 +15,7 @@
 #include "core/error.h"
 #include "design/render_lens.h"
 #include "export/closed_solid.h"
+#include "export/iges_file.h"
 #include "machine/stream/job_identity.h"
 
 namespace lensforge::app {
@@ -69,19 +70,22 @@ void describe_fit(const SplineNet& net, const FitOptions& fit, StepReport& repor
                     [&](const SplinePatch& patch) { return holds(patch.error, fit); });
   report.json["height_error_mm"] = error.height;
   report.json["normal_error_rad"] = error.normal;
+  report.json["height_rms_mm"] = error.height_rms;
+  report.json["normal_rms_rad"] = error.normal_rms;
   report.json["within_tolerance"] = report.within_tolerance;
   report.json["patches_within_tolerance"] = good;
   report.json["control_points"] = net.control_points();
   report.json["patches"] = certificate(net);
-  report.text += "  fit       " + std::to_string(good) + " of " +
-                 std::to_string(net.patches.size()) + " patches within tolerance, " +
-                 std::to_string(net.control_points()) + " control points\n" + "  worst     " +
-                 scientific(error.height) + " mm (limit " + scientific(fit.tolerance) +
-                 "), normal " + scientific(error.normal) + " rad (limit " +
-                 scientific(fit.normal_tolerance) + ")\n";
+  report.text +=
+      "  fit       " + std::to_string(good) + " of " + std::to_string(net.patches.size()) +
+      " patches within tolerance, " + std::to_string(net.control_points()) + " control points\n" +
+      "  worst     " + scientific(error.height) + " mm (limit " + scientific(fit.tolerance) +
+      "), normal " + scientific(error.normal) + " rad (limit " + scientific(fit.normal_tolerance) +
+      ")\n" + "  rms       " + scientific(error.height_rms) + " mm, normal " +
+      scientific(error.normal_rms) + " rad\n";
 }
 
-void describe_solid(const StepContent& content, const Lens& lens, const std::string& name,
+void describe_solid(const SolidContent& content, const Lens& lens, const std::string& name,
                     StepReport& report) {
   const double facets = enclosed_volume(closed_solid(lens.surface, name));
   report.json["faces"] = content.faces;
@@ -111,22 +115,22 @@ void describe_picture(const SplineNet& net, const Lens& lens, const Executor& ex
 
 void add_step_options(OptionSet& options, StepArguments& arguments) {
   options.length("--tolerance", arguments.fit.tolerance, Limits::between(1e-6, 1.0),
-                 "step: farthest of the splines from the smooth surface");
+                 "step, iges: farthest of the splines from the smooth surface");
   options.number("--normal-tolerance", arguments.fit.normal_tolerance, Limits::between(1e-6, 0.1),
-                 "rad", "step: largest angle between the normals of both");
+                 "rad", "step, iges: largest angle to the normals of the vertex-normal model");
   options.integer("--max-points", arguments.max_points, Limits::between(0, 10'000'000),
-                  "step: control points at most, about 70 bytes each; 0 takes four a vertex, "
+                  "step, iges: control points at most, about 70 bytes each; 0 takes four a vertex, "
                   "560000 at most");
   options.choice("--schema", arguments.schema,
                  {{"ap214", StepSchema::kAp214}, {"ap242", StepSchema::kAp242}},
                  "step: application protocol");
-  options.text("--author", arguments.author, "NAME", "step: author in the header");
+  options.text("--author", arguments.author, "NAME", "step, iges: author in the header");
 }
 
 void require_no_step_options(const OptionSet& options, const std::string& format) {
   for (const char* name : kStepOptions) {
     if (options.given(name)) {
-      throw InputError(std::string(name) + ": is for step, not for " + format);
+      throw InputError(std::string(name) + ": is for step and iges, not for " + format);
     }
   }
 }
@@ -142,8 +146,9 @@ StepReport export_step(const Lens& lens, const fs::path& source, const fs::path&
   fit.max_control_points = arguments.max_points;
   const SplineNet net =
       fit_spline_net(SmoothSurface(lens.surface), fit, options.executor(), control);
-  const StepContent content =
-      write_step(net, header_of(source, arguments.author), arguments.schema, out);
+  const StepHeader header = header_of(source, arguments.author);
+  const SolidContent content = arguments.iges ? write_iges(net, header, out)
+                                              : write_step(net, header, arguments.schema, out);
   StepReport report;
   describe_solid(content, lens, name, report);
   describe_fit(net, fit, report);

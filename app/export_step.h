@@ -12,12 +12,13 @@
 
 namespace lensforge::app {
 
-/// The options that only a STEP file has.
+/// The options that only a solid of splines has.
 struct StepArguments {
   FitOptions fit;
   int max_points = 0;
   StepSchema schema = StepSchema::kAp214;
   std::string author;
+  bool iges = false;  ///< IGES instead of STEP.
 };
 
 void add_step_options(OptionSet& options, StepArguments& arguments);

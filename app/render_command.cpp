@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
+#include <cctype>
 #include <filesystem>
 #include <optional>
 
@@ -14,6 +15,7 @@
 #include "core/lens.h"
 #include "core/mesh_io.h"
 #include "design/render_lens.h"
+#include "export/solid_surface.h"
 
 namespace lensforge::app {
 namespace {
@@ -39,12 +41,14 @@ struct Scene {
 };
 
 void add_render_options(OptionSet& options, RenderArguments& arguments) {
-  options.positional("SOURCE", arguments.source, "lens folder, or mesh: .ply, .obj, .stl, .off");
+  options.positional("SOURCE", arguments.source,
+                     "lens folder; mesh: .ply, .obj, .stl, .off; "
+                     "solid: .step, .stp");
   options.text("--out", arguments.out, "FILE", "write the picture to this .png or .exr");
   options.text("--target", arguments.target, "PICTURE", "compare with this; a lens has its own");
   options.choice("--model", arguments.model,
                  {{"facet", SurfaceModel::kFacet}, {"smooth", SurfaceModel::kSmooth}},
-                 "surface model of the picture; a lens has its own default");
+                 "surface model of the picture; a lens has its own default, a solid is smooth");
   options.integer("--pixels", arguments.pixels, Limits::between(1, kMaxImageSide),
                   "longer side of the picture; a lens has its own default");
   options.length("--focal", arguments.setup.focal_length, Limits::above(0),
@@ -58,7 +62,26 @@ void add_render_options(OptionSet& options, RenderArguments& arguments) {
                  "width of the picture on the wall; a lens has its own default, a mesh its width");
 }
 
-Scene load(const std::string& source) {
+bool is_step(const std::string& source) {
+  std::string extension = fs::path(source).extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return extension == ".step" || extension == ".stp";
+}
+
+/// Points at which a solid is sampled, as export does for the picture that it prints.
+constexpr double kSolidPoints = 1e6;
+
+Scene load_solid(const std::string& source, const Executor& executor, const Console& console) {
+  SolidSurface solid = read_solid_surface(source, kSolidPoints, executor);
+  console.note(std::to_string(solid.faces) + (solid.faces == 1 ? " face" : " faces") +
+               (solid.by_name ? " named \"optical surface\"" : " told by shape: look up"));
+  const OpticalSetup setup = setup_for_mesh(solid.mesh, RenderArguments{}.pixels);
+  return {std::move(solid.mesh), setup, SurfaceModel::kSmooth, std::nullopt};
+}
+
+Scene load(const std::string& source, const Executor& executor, const Console& console) {
+  if (is_step(source)) return load_solid(source, executor, console);
   if (fs::is_directory(source)) {
     Lens lens = read_lens(source);
     return {std::move(lens.surface), lens.setup, lens.model, std::move(lens.target)};
@@ -137,7 +160,8 @@ int render_command(const Arguments& command_line) {
   options.parse(command_line);
   require_picture_name(arguments.out);
   const Console console(options.common().json, options.common().quiet);
-  const Scene scene = adjusted(load(arguments.source), options, arguments);
+  const Scene scene =
+      adjusted(load(arguments.source, options.executor(), console), options, arguments);
   const ChosenDevice device = options.device_executor();
   Rendering rendering =
       scene.target ? compare_models(scene, device.executor) : render_alone(scene, device.executor);

@@ -248,4 +248,15 @@ std::optional<SurfacePoint> SmoothSurface::at(const Eigen::Vector2d& xy) const {
   return in_triangle(place.triangle, place.weights);
 }
 
+std::optional<SurfacePoint> SmoothSurface::model_at(const Eigen::Vector2d& xy) const {
+  const Place place = locate(xy);
+  if (place.triangle < 0) return std::nullopt;
+  SurfacePoint point = in_triangle(place.triangle, place.weights);
+  point.slope.setZero();
+  for (int k = 0; k < 3; ++k) {
+    point.slope += place.weights[k] * slopes_.col(mesh_.triangles(k, place.triangle));
+  }
+  return point;
+}
+
 }  // namespace lensforge

@@ -36,6 +36,10 @@ class SmoothSurface {
   /// Nothing outside of the mesh.
   [[nodiscard]] std::optional<SurfacePoint> at(const Eigen::Vector2d& xy) const;
 
+  /// The surface's height, and the slopes of the vertex-normal model itself: linear between the
+  /// vertices, as render_surface() takes them. Nothing outside of the mesh.
+  [[nodiscard]] std::optional<SurfacePoint> model_at(const Eigen::Vector2d& xy) const;
+
   /// The point of a triangle with these barycentric weights, none below 0.
   [[nodiscard]] SurfacePoint in_triangle(std::int64_t triangle,
                                          const Eigen::Vector3d& weights) const;

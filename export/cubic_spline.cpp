@@ -35,7 +35,7 @@ std::array<double, 4> functions(double t, int cell, int cells, int degree) {
   return n;
 }
 
-/// Coefficient of the refined spline: the blossom of the piece over `cell` at three of its knots.
+/// Coefficient of a part of the spline: the blossom of the piece over `cell` at three of its knots.
 double blossom(const Eigen::VectorXd& coefficients, int cell, const std::array<double, 3>& at) {
   const auto cells = static_cast<int>(coefficients.size()) - kDegree;
   std::array<double, 4> d{};
@@ -89,16 +89,19 @@ Eigen::SparseMatrix<double, Eigen::RowMajor> basis_matrix(const std::vector<doub
   return matrix;
 }
 
-Eigen::VectorXd refined_spline(const Eigen::VectorXd& coefficients, int factor) {
-  const auto cells = static_cast<int>(coefficients.size()) - kDegree;
-  const int fine = cells * factor;
-  Eigen::VectorXd result(fine + kDegree);
-  for (int i = 0; i < result.size(); ++i) {
-    const std::array<double, 3> at{knot(i + 1, fine) / factor, knot(i + 2, fine) / factor,
-                                   knot(i + 3, fine) / factor};
-    result[i] = blossom(coefficients, cell_of(knot(i, fine) / factor, cells), at);
+Eigen::MatrixXd restriction(int cells, int from, int to) {
+  const int count = to - from;
+  Eigen::MatrixXd matrix(count + kDegree, count + kDegree);
+  for (int k = 0; k < matrix.cols(); ++k) {
+    Eigen::VectorXd unit = Eigen::VectorXd::Zero(cells + kDegree);
+    unit[from + k] = 1.0;
+    for (int i = 0; i < matrix.rows(); ++i) {
+      const std::array<double, 3> at{from + knot(i + 1, count), from + knot(i + 2, count),
+                                     from + knot(i + 3, count)};
+      matrix(i, k) = blossom(unit, from + cell_of(knot(i, count), count), at);
+    }
   }
-  return result;
+  return matrix;
 }
 
 }  // namespace lensforge

@@ -27,8 +27,9 @@ double greville_point(int i, int cells);
 Eigen::SparseMatrix<double, Eigen::RowMajor> basis_matrix(const std::vector<double>& points,
                                                           int cells, bool slopes);
 
-/// The same spline with every cell cut into `factor` cells (Oslo algorithm); its coefficients
-/// belong to [0, factor·cells].
-Eigen::VectorXd refined_spline(const Eigen::VectorXd& coefficients, int factor);
+/// What takes coefficients from … to + 2 of a spline over [0, cells] to the coefficients, over
+/// [0, to − from], of the same spline between its knots `from` and `to` (Oslo algorithm).
+/// @pre 0 ≤ from < to ≤ cells.
+Eigen::MatrixXd restriction(int cells, int from, int to);
 
 }  // namespace lensforge

@@ -1,46 +1,42 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <Eigen/Eigenvalues>
+#include <Eigen/SparseCore>
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <map>
-#include <numeric>
 
 #include "core/error.h"
 #include "export/cubic_spline.h"
-#include "export/line_fit.h"
 #include "export/spline_net.h"
 
-// Patches join with equal heights and slopes because everything on a line between two of them comes
-// from one place: at a corner the height, both slopes and the twist; along an edge two cubic
-// splines, the height and the slope across, on the coarser one of the two patches' knots. The two
-// outer rings of a patch's coefficients follow from its four edges; least squares gives the rest,
-// so that patches do not wait for one another.
+// One spline over the whole rectangle is fitted and then cut into patches, which keeps them joined
+// with equal curvature. What is minimised is the squared difference of the slopes from those of the
+// vertex-normal model, which are what throws the picture, plus a little of the heights' own, which
+// pins what slopes leave open. Both are sums over a tensor grid of samples, so that in the basis
+// that diagonalises mass and stiffness of each direction the solution is one division a coefficient
+// (fast diagonalisation, Lynch, Rice and Thomas 1964).
 namespace lensforge {
 namespace {
 
 /// Mesh cells that a patch covers each way when it covers no less than kFewestPatches.
 constexpr double kMeshCellsPerPatch = 32.0;
 
-/// Density at which a patch is judged before its certificate, which costs ten times as much.
-constexpr int kTrialDensity = 3;
+/// Samples a knot cell each way: three to eight give pictures whose MAE differ by 0.0001.
+constexpr int kSamples = 4;
+
+/// Heights weigh as much as slopes for waves of this many mesh cells. Heights and normals of a
+/// designed mesh contradict each other from cell to cell, and light goes by normals: with 0.5
+/// instead of 16 the picture of a smooth 128² portrait has MAE 0.0082 instead of 0.0056, with 50
+/// it is the same.
+constexpr double kHeightReach = 16.0;
 
 /// Coefficients are rounded to this (mm): it adds less than 1e-6 rad at the finest knots that occur
 /// (0.02 mm) and keeps files short.
 constexpr double kHeightStep = 1e-8;
 
+using Basis = Eigen::SparseMatrix<double, Eigen::RowMajor>;
+
 double rounded(double value) { return std::round(value / kHeightStep) * kHeightStep; }
-
-struct Corner {
-  double z = 0.0;
-  Eigen::Vector2d slope = Eigen::Vector2d::Zero();
-  double twist = 0.0;  ///< ∂²z/∂x∂y
-};
-
-/// Height and slope across along a line between two corners, cells + 3 coefficients each.
-struct EdgeSplines {
-  Eigen::VectorXd height;
-  Eigen::VectorXd across;
-};
 
 std::vector<double> lines(double from, double to, int count) {
   std::vector<double> result;
@@ -54,6 +50,32 @@ std::int64_t control_point_limit(const FitOptions& options, const SurfaceMesh& m
   return std::min(kMostControlPoints, kPerVertex * mesh.vertex_count());
 }
 
+/// One direction of the tensor product.
+struct Axis {
+  double low = 0.0;   ///< mm
+  double cell = 0.0;  ///< mm
+  int cells = 0;
+  std::vector<double> points;  ///< Samples, in cells from `low`.
+  Basis values;                ///< Of the splines at the samples.
+  Basis slopes;                ///< The same, 1/mm.
+  Eigen::MatrixXd modes;       ///< Columns: unit mass, diagonal stiffness.
+  Eigen::VectorXd stiffness;   ///< Of the modes, 1/mm².
+};
+
+Axis make_axis(double low, double high, int cells) {
+  Axis axis{low, (high - low) / cells, cells, {}, {}, {}, {}, {}};
+  for (int i = 0; i < kSamples * cells; ++i) axis.points.push_back((i + 0.5) / kSamples);
+  axis.values = basis_matrix(axis.points, cells, false);
+  axis.slopes = basis_matrix(axis.points, cells, true) / axis.cell;
+  const Basis mass = axis.values.transpose() * axis.values;
+  const Basis stiffness = axis.slopes.transpose() * axis.slopes;
+  const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> solver{Eigen::MatrixXd(stiffness),
+                                                                         Eigen::MatrixXd(mass)};
+  axis.modes = solver.eigenvectors();
+  axis.stiffness = solver.eigenvalues();
+  return axis;
+}
+
 class NetFitter {
  public:
   NetFitter(const SmoothSurface& surface, const FitOptions& options, const Executor& executor,
@@ -64,285 +86,178 @@ class NetFitter {
         control_(control),
         limit_(control_point_limit(options, surface.mesh())) {
     const Eigen::Vector2d size = surface.box().sizes();
-    const double cells = 0.5 * static_cast<double>(surface.mesh().triangle_count());
-    const double side = kMeshCellsPerPatch * std::sqrt(size.prod() / cells);
-    net_.columns = std::max(1, static_cast<int>(std::lround(size.x() / side)));
-    net_.rows = std::max(1, static_cast<int>(std::lround(size.y() / side)));
+    const double mesh_cells = 0.5 * static_cast<double>(surface.mesh().triangle_count());
+    mesh_cell_ = std::sqrt(size.prod() / mesh_cells);
+    divide(kMeshCellsPerPatch * mesh_cell_);
     net_.x = lines(surface.box().min().x(), surface.box().max().x(), net_.columns);
     net_.y = lines(surface.box().min().y(), surface.box().max().y(), net_.rows);
     net_.patches.resize(table_index(0, net_.rows, net_.columns));
-    for (int i = 0; i < patch_count(); ++i) {
-      const int c = i % net_.columns;
-      const int r = i / net_.columns;
-      patch(i).box = {Eigen::Vector2d(x(c), y(r)), Eigen::Vector2d(x(c + 1), y(r + 1))};
-      patch(i).cells = kFewestCells;
-    }
-    for (int cells_each_way = kFewestCells; cells_each_way <= kMostCells; cells_each_way *= 2) {
-      line_fits_.emplace(cells_each_way, LineFit(cells_each_way));
-    }
   }
 
   SplineNet fit() {
-    std::vector<char> changed(net_.patches.size(), 1);
-    certified_.assign(net_.patches.size(), 0);
-    do {
-      fit_edges();
-      fit_changed(with_neighbours(changed));
+    const int most = most_cells();
+    for (int cells = std::min(kFewestCells, most);; cells = std::min(2 * cells, most)) {
+      cut(solve(cells), cells);
+      certify();
       report();
-      changed = refine();
-    } while (std::find(changed.begin(), changed.end(), 1) != changed.end());
-    certify();
-    net_.edges_x = rounded_edges(edges_x_);
-    net_.edges_y = rounded_edges(edges_y_);
-    return std::move(net_);
+      if (cells == most || all_hold()) return std::move(net_);
+    }
   }
 
  private:
-  [[nodiscard]] double x(int line) const { return net_.x[static_cast<std::size_t>(line)]; }
-  [[nodiscard]] double y(int line) const { return net_.y[static_cast<std::size_t>(line)]; }
   [[nodiscard]] int patch_count() const { return static_cast<int>(net_.patches.size()); }
-  SplinePatch& patch(int i) { return net_.patches[static_cast<std::size_t>(i)]; }
-  [[nodiscard]] const SplinePatch& patch(int i) const {
-    return net_.patches[static_cast<std::size_t>(i)];
+
+  /// Patches about `side` wide, or wider where the control points would not do for them.
+  void divide(double side) {
+    const Eigen::Vector2d size = surface_.box().sizes();
+    constexpr std::int64_t kLeast = (kFewestCells + 3) * (kFewestCells + 3);
+    do {
+      net_.columns = std::max(1, static_cast<int>(std::lround(size.x() / side)));
+      net_.rows = std::max(1, static_cast<int>(std::lround(size.y() / side)));
+      side *= 1.25;
+    } while (net_.columns * net_.rows > 1 && kLeast * net_.columns * net_.rows > limit_);
   }
 
-  /// Knot cells of the patch at (column, row), or `otherwise` off the net.
-  [[nodiscard]] int cells_at(int column, int row, int otherwise) const {
-    const bool inside = column >= 0 && row >= 0 && column < net_.columns && row < net_.rows;
-    return inside ? patch(row * net_.columns + column).cells : otherwise;
+  /// Cells a patch each way that the control points allow.
+  [[nodiscard]] int most_cells() const {
+    const double points = static_cast<double>(limit_) / patch_count();
+    const int across = kMostCellsAcross / std::max(net_.columns, net_.rows);
+    const int most = std::min({static_cast<int>(std::sqrt(points)) - 3, kMostCells, across});
+    return std::max(1, most);
   }
 
-  [[nodiscard]] SurfacePoint sample(double at_x, double at_y) const {
+  [[nodiscard]] SurfacePoint sample(const Eigen::Vector2d& at) const {
     const auto& box = surface_.box();
-    const Eigen::Vector2d xy(std::clamp(at_x, box.min().x(), box.max().x()),
-                             std::clamp(at_y, box.min().y(), box.max().y()));
-    const auto point = surface_.at(xy);
+    const Eigen::Vector2d xy = at.cwiseMax(box.min()).cwiseMin(box.max());
+    const auto point = surface_.model_at(xy);
     LF_CHECK(point.has_value(), std::to_string(xy.x()) + ", " + std::to_string(xy.y()));
     return *point;
   }
 
-  [[nodiscard]] Corner corner_at(int column, int row) const {
-    const SurfacePoint point = sample(x(column), y(row));
-    int finest = kFewestCells;
-    for (const int c : {column - 1, column}) {
-      for (const int r : {row - 1, row}) finest = std::max(finest, cells_at(c, r, 0));
-    }
-    // The twist is the surface's mean one over the knot cells around the corner.
-    const double dx = (x(1) - x(0)) / finest;
-    const double dy = (y(1) - y(0)) / finest;
-    const auto& box = surface_.box();
-    const double left = std::max(x(column) - dx, box.min().x());
-    const double right = std::min(x(column) + dx, box.max().x());
-    const double low = std::max(y(row) - dy, box.min().y());
-    const double high = std::min(y(row) + dy, box.max().y());
-    const double z_of_corners =
-        sample(right, high).z - sample(left, high).z - sample(right, low).z + sample(left, low).z;
-    return {point.z, point.slope, z_of_corners / ((right - left) * (high - low))};
-  }
-
-  /// @param axis  along which the edge runs: 0 for x, 1 for y.
-  [[nodiscard]] EdgeSplines fit_edge(int column, int row, int axis, int cells) const {
-    const int along = axis;
-    const int other = 1 - axis;
-    const Corner a = corners_[table_index(column, row, net_.columns + 1)];
-    const Corner b = corners_[table_index(column + other, row + axis, net_.columns + 1)];
-    const Eigen::Vector2d from(x(column), y(row));
-    const double length = axis == 0 ? x(column + 1) - x(column) : y(row + 1) - y(row);
-    const double third = length / cells / 3.0;
-    const LineFit& line = line_fits_.at(cells);
-    const auto count = static_cast<Eigen::Index>(line.points().size());
-    Eigen::VectorXd heights(count);
-    Eigen::VectorXd slopes(count);
-    for (Eigen::Index i = 0; i < count; ++i) {
-      const double step = line.points()[static_cast<std::size_t>(i)] / cells * length;
-      const Eigen::Vector2d xy = from + step * Eigen::Vector2d::Unit(along);
-      const SurfacePoint point = sample(xy.x(), xy.y());
-      heights[i] = point.z;
-      slopes[i] = point.slope[other];
-    }
-    return {
-        line.fit(heights, ends(a.z, a.slope[along] * third, b.z, b.slope[along] * third, cells)),
-        line.fit(slopes,
-                 ends(a.slope[other], a.twist * third, b.slope[other], b.twist * third, cells))};
-  }
-
-  /// Coefficients with value and a third of a cell's rise given at both ends.
-  static Eigen::VectorXd ends(double value_a, double rise_a, double value_b, double rise_b,
-                              int cells) {
-    Eigen::VectorXd coefficients = Eigen::VectorXd::Zero(cells + 3);
-    coefficients[0] = value_a;
-    coefficients[1] = value_a + rise_a;
-    coefficients[cells + 1] = value_b - rise_b;
-    coefficients[cells + 2] = value_b;
-    return coefficients;
-  }
-
-  static std::vector<SplineEdge> rounded_edges(const std::vector<EdgeSplines>& edges) {
-    std::vector<SplineEdge> result;
-    result.reserve(edges.size());
-    for (const EdgeSplines& e : edges) {
-      result.push_back({static_cast<int>(e.height.size()) - 3, e.height.unaryExpr(&rounded)});
-    }
-    return result;
-  }
-
-  void fit_edges() {
-    const int columns = net_.columns;
-    const int rows = net_.rows;
-    corners_.resize(table_index(0, rows + 1, columns + 1));
+  /// The right-hand side: what the samples say of every coefficient.
+  [[nodiscard]] Eigen::MatrixXd moments(const Axis& x, const Axis& y, double height_weight) const {
+    const auto columns = static_cast<Eigen::Index>(x.points.size());
+    const auto rows = static_cast<Eigen::Index>(y.points.size());
+    Eigen::MatrixXd by_slope(y.cells + 3, columns);
+    Eigen::MatrixXd by_value(y.cells + 3, columns);
     parallel_for(
-        executor_, "spline corners", std::int64_t{columns + 1} * (rows + 1), [&](std::int64_t i) {
-          corners_[static_cast<std::size_t>(i)] =
-              corner_at(static_cast<int>(i % (columns + 1)), static_cast<int>(i / (columns + 1)));
-        });
-    edges_x_.resize(table_index(0, rows + 1, columns));
-    edges_y_.resize(table_index(0, rows, columns + 1));
-    parallel_for(
-        executor_, "spline edges", static_cast<std::int64_t>(edges_x_.size()),
+        executor_, "spline samples", columns,
         [&](std::int64_t i) {
-          const auto c = static_cast<int>(i % columns);
-          const auto line = static_cast<int>(i / columns);
-          const int cells =
-              std::min(cells_at(c, line - 1, kMostCells), cells_at(c, line, kMostCells));
-          edges_x_[static_cast<std::size_t>(i)] = fit_edge(c, line, 0, cells);
-        },
-        1);
-    parallel_for(
-        executor_, "spline edges", static_cast<std::int64_t>(edges_y_.size()),
-        [&](std::int64_t i) {
-          const auto line = static_cast<int>(i % (columns + 1));
-          const auto r = static_cast<int>(i / (columns + 1));
-          const int cells =
-              std::min(cells_at(line - 1, r, kMostCells), cells_at(line, r, kMostCells));
-          edges_y_[static_cast<std::size_t>(i)] = fit_edge(line, r, 1, cells);
-        },
-        1);
-  }
-
-  /// The two outer rings of a patch's coefficients; the rest is zero.
-  [[nodiscard]] Eigen::MatrixXd rim(int i) const {
-    const int c = i % net_.columns;
-    const int r = i / net_.columns;
-    const int n = patch(i).cells;
-    const Eigen::Vector2d third = patch(i).box.sizes() / (3.0 * n);
-    Eigen::MatrixXd net = Eigen::MatrixXd::Zero(n + 3, n + 3);
-    const auto height = [&](const EdgeSplines& e) {
-      return refined_spline(e.height, n / (static_cast<int>(e.height.size()) - 3));
-    };
-    const auto rise = [&](const EdgeSplines& e, double step) -> Eigen::VectorXd {
-      return step * refined_spline(e.across, n / (static_cast<int>(e.across.size()) - 3));
-    };
-    const EdgeSplines& low = edges_x_[table_index(c, r, net_.columns)];
-    const EdgeSplines& high = edges_x_[table_index(c, r + 1, net_.columns)];
-    const EdgeSplines& left = edges_y_[table_index(c, r, net_.columns + 1)];
-    const EdgeSplines& right = edges_y_[table_index(c + 1, r, net_.columns + 1)];
-    net.col(0) = height(low);
-    net.col(1) = net.col(0) + rise(low, third.y());
-    net.col(n + 2) = height(high);
-    net.col(n + 1) = net.col(n + 2) - rise(high, third.y());
-    net.row(0) = height(left);
-    net.row(1) = net.row(0).transpose() + rise(left, third.x());
-    net.row(n + 2) = height(right);
-    net.row(n + 1) = net.row(n + 2).transpose() - rise(right, third.x());
-    return net;
-  }
-
-  void fit_patch(int i) {
-    const LineFit& line = line_fits_.at(patch(i).cells);
-    const auto count = static_cast<Eigen::Index>(line.points().size());
-    const Eigen::AlignedBox2d& box = patch(i).box;
-    const Eigen::Vector2d cell = box.sizes() / patch(i).cells;
-    Eigen::MatrixXd samples(count, count);
-    for (Eigen::Index u = 0; u < count; ++u) {
-      for (Eigen::Index v = 0; v < count; ++v) {
-        samples(u, v) =
-            sample(box.min().x() + cell.x() * line.points()[static_cast<std::size_t>(u)],
-                   box.min().y() + cell.y() * line.points()[static_cast<std::size_t>(v)])
-                .z;
-      }
-    }
-    patch(i).heights = line.fit(samples, rim(i)).unaryExpr(&rounded);
-  }
-
-  void fit_changed(const std::vector<char>& changed) {
-    parallel_for(
-        executor_, "spline patches", patch_count(),
-        [&](std::int64_t index) {
-          const auto i = static_cast<int>(index);
-          if (changed[static_cast<std::size_t>(i)] == 0 || control_.stop_requested()) return;
-          fit_patch(i);
-          patch(i).error = measure_patch(patch(i), surface_, kTrialDensity);
-          certified_[static_cast<std::size_t>(i)] = 0;
-          if (holds(patch(i).error, options_)) certify(i);
+          if (control_.stop_requested()) return;
+          Eigen::Matrix3Xd found(3, rows);
+          for (Eigen::Index j = 0; j < rows; ++j) {
+            const auto at = static_cast<std::size_t>(j);
+            const SurfacePoint p = sample({x.low + x.points[static_cast<std::size_t>(i)] * x.cell,
+                                           y.low + y.points[at] * y.cell});
+            found.col(j) << p.slope, p.z;
+          }
+          by_slope.col(i) = y.values.transpose() * found.row(0).transpose();
+          by_value.col(i) = y.slopes.transpose() * found.row(1).transpose() +
+                            height_weight * (y.values.transpose() * found.row(2).transpose());
         },
         1);
     if (control_.stop_requested()) throw Interrupted();
+    return x.slopes.transpose() * by_slope.transpose() +
+           x.values.transpose() * by_value.transpose();
   }
 
-  void certify(int i) {
-    const double mesh_cells = kMeshCellsPerPatch / patch(i).cells;
-    const double density = kCertificateDensity * std::max(1.0, mesh_cells);
-    const FitError found = measure_patch(patch(i), surface_, static_cast<int>(std::ceil(density)));
-    patch(i).error = {kCertificateMargin * found.height, kCertificateMargin * found.normal};
-    certified_[static_cast<std::size_t>(i)] = 1;
+  /// Coefficients of the spline over the whole rectangle with `cells` a patch each way.
+  [[nodiscard]] Eigen::MatrixXd solve(int cells) const {
+    const Axis x = make_axis(net_.x.front(), net_.x.back(), cells * net_.columns);
+    const Axis y = make_axis(net_.y.front(), net_.y.back(), cells * net_.rows);
+    const double reach = kHeightReach * mesh_cell_;
+    const double height_weight = 1.0 / (reach * reach);
+    Eigen::MatrixXd amount = x.modes.transpose() * moments(x, y, height_weight) * y.modes;
+    for (Eigen::Index j = 0; j < amount.cols(); ++j) {
+      amount.col(j).array() /= x.stiffness.array() + (y.stiffness[j] + height_weight);
+    }
+    return x.modes * amount * y.modes.transpose();
+  }
+
+  /// Cuts the whole spline into the net's patches and edges.
+  void cut(const Eigen::MatrixXd& whole, int cells) {
+    std::vector<Eigen::MatrixXd> onto_x;
+    std::vector<Eigen::MatrixXd> onto_y;
+    for (int c = 0; c < net_.columns; ++c) {
+      onto_x.push_back(restriction(cells * net_.columns, cells * c, cells * (c + 1)));
+    }
+    for (int r = 0; r < net_.rows; ++r) {
+      onto_y.push_back(restriction(cells * net_.rows, cells * r, cells * (r + 1)));
+    }
+    for (int i = 0; i < patch_count(); ++i) {
+      const int c = i % net_.columns;
+      const int r = i / net_.columns;
+      const auto column = static_cast<std::size_t>(c);
+      const auto row = static_cast<std::size_t>(r);
+      SplinePatch& patch = net_.patches[static_cast<std::size_t>(i)];
+      patch.box = {Eigen::Vector2d(net_.x[column], net_.y[row]),
+                   Eigen::Vector2d(net_.x[column + 1], net_.y[row + 1])};
+      patch.cells = cells;
+      const auto block = whole.block(cells * c, cells * r, cells + 3, cells + 3);
+      patch.heights = (onto_x[column] * block * onto_y[row].transpose()).unaryExpr(&rounded);
+      if (c > 0) patch.heights.row(0) = neighbour(c - 1, r).heights.row(cells + 2);
+      if (r > 0) patch.heights.col(0) = neighbour(c, r - 1).heights.col(cells + 2);
+    }
+    take_edges(cells);
+  }
+
+  [[nodiscard]] const SplinePatch& neighbour(int column, int row) const {
+    return net_.patches[table_index(column, row, net_.columns)];
+  }
+
+  void take_edges(int cells) {
+    net_.edges_x.clear();
+    net_.edges_y.clear();
+    for (int line = 0; line <= net_.rows; ++line) {
+      for (int c = 0; c < net_.columns; ++c) {
+        const Eigen::MatrixXd& heights = neighbour(c, std::min(line, net_.rows - 1)).heights;
+        net_.edges_x.push_back({cells, heights.col(line < net_.rows ? 0 : cells + 2)});
+      }
+    }
+    for (int r = 0; r < net_.rows; ++r) {
+      for (int line = 0; line <= net_.columns; ++line) {
+        const Eigen::MatrixXd& heights = neighbour(std::min(line, net_.columns - 1), r).heights;
+        net_.edges_y.push_back({cells, heights.row(line < net_.columns ? 0 : cells + 2)});
+      }
+    }
   }
 
   void certify() {
+    const SplinePatch& first = net_.patches.front();
+    const double mesh_cells = first.box.sizes().maxCoeff() / first.cells / mesh_cell_;
+    const double density = std::max<double>(kLeastDensity, kCertificateDensity * mesh_cells);
     parallel_for(
-        executor_, "spline certificate", patch_count(),
+        executor_, "spline errors", patch_count(),
         [&](std::int64_t i) {
-          if (certified_[static_cast<std::size_t>(i)] == 0) certify(static_cast<int>(i));
+          if (control_.stop_requested()) return;
+          SplinePatch& patch = net_.patches[static_cast<std::size_t>(i)];
+          patch.error = measure_patch(patch, surface_, static_cast<int>(std::ceil(density)));
         },
         1);
-  }
-
-  [[nodiscard]] double excess(const FitError& error) const {
-    return std::max(error.height / options_.tolerance, error.normal / options_.normal_tolerance);
-  }
-
-  /// Marks the patches that touch a marked one as well: their edges and corners changed.
-  [[nodiscard]] std::vector<char> with_neighbours(const std::vector<char>& marked) const {
-    std::vector<char> result = marked;
-    for (int i = 0; i < patch_count(); ++i) {
-      if (marked[static_cast<std::size_t>(i)] == 0) continue;
-      const int c = i % net_.columns;
-      const int r = i / net_.columns;
-      for (int row = std::max(0, r - 1); row <= std::min(net_.rows - 1, r + 1); ++row) {
-        for (int col = std::max(0, c - 1); col <= std::min(net_.columns - 1, c + 1); ++col) {
-          result[table_index(col, row, net_.columns)] = 1;
-        }
-      }
+    if (control_.stop_requested()) throw Interrupted();
+    measure_vertices();
+    for (SplinePatch& patch : net_.patches) {
+      patch.error.height *= kCertificateMargin;
+      patch.error.normal *= kCertificateMargin;
     }
-    return result;
   }
 
-  /// Patches that fail and may be refined, the coarsest first and of these the worst: light goes
-  /// astray by the share of the lens that is off, not by how far a few creases are.
-  [[nodiscard]] std::vector<int> candidates() const {
-    std::vector<int> order;
-    for (int i = 0; i < patch_count(); ++i) {
-      if (!holds(patch(i).error, options_) && patch(i).cells < kMostCells) order.push_back(i);
+  /// The model bends at vertices, so that differences are largest there.
+  void measure_vertices() {
+    const SurfaceMesh& mesh = surface_.mesh();
+    for (Eigen::Index v = 0; v < mesh.vertices.cols(); ++v) {
+      const Eigen::Vector2d xy = mesh.vertices.col(v).head<2>();
+      SplinePatch& patch = net_.patches[static_cast<std::size_t>(net_.patch_at(xy))];
+      const FitError found =
+          difference(patch.at(xy), {mesh.vertices(2, v), surface_.slopes().col(v)});
+      patch.error.height = std::max(patch.error.height, found.height);
+      patch.error.normal = std::max(patch.error.normal, found.normal);
     }
-    std::stable_sort(order.begin(), order.end(), [&](int a, int b) {
-      if (patch(a).cells != patch(b).cells) return patch(a).cells < patch(b).cells;
-      return excess(patch(a).error) > excess(patch(b).error);
-    });
-    return order;
   }
 
-  std::vector<char> refine() {
-    std::vector<char> changed(net_.patches.size(), 0);
-    std::int64_t points = 0;
-    for (const SplinePatch& p : net_.patches) points += std::int64_t{p.cells + 3} * (p.cells + 3);
-    for (const int i : candidates()) {
-      const std::int64_t now = std::int64_t{patch(i).cells + 3} * (patch(i).cells + 3);
-      const std::int64_t then = std::int64_t{2 * patch(i).cells + 3} * (2 * patch(i).cells + 3);
-      if (points + then - now > limit_) continue;
-      points += then - now;
-      patch(i).cells *= 2;
-      changed[static_cast<std::size_t>(i)] = 1;
-    }
-    return changed;
+  [[nodiscard]] bool all_hold() const {
+    return std::all_of(net_.patches.begin(), net_.patches.end(),
+                       [&](const SplinePatch& patch) { return holds(patch.error, options_); });
   }
 
   void report() const {
@@ -355,13 +270,9 @@ class NetFitter {
   const FitOptions& options_;
   const Executor& executor_;
   const RunControl& control_;
-  std::int64_t limit_;  ///< Control points at most.
+  std::int64_t limit_;      ///< Control points at most.
+  double mesh_cell_ = 0.0;  ///< Side of a square as large as a mesh cell, mm.
   SplineNet net_;
-  std::map<int, LineFit> line_fits_;
-  std::vector<Corner> corners_;
-  std::vector<EdgeSplines> edges_x_;
-  std::vector<EdgeSplines> edges_y_;
-  std::vector<char> certified_;
 };
 
 }  // namespace

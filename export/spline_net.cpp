@@ -85,11 +85,17 @@ double SplinePatch::volume() const {
 }
 
 FitError SplineNet::error() const {
+  const double area = (x.back() - x.front()) * (y.back() - y.front());
   FitError worst;
   for (const SplinePatch& patch : patches) {
     worst.height = std::max(worst.height, patch.error.height);
     worst.normal = std::max(worst.normal, patch.error.normal);
+    const double share = patch.box.volume() / area;
+    worst.height_rms += share * patch.error.height_rms * patch.error.height_rms;
+    worst.normal_rms += share * patch.error.normal_rms * patch.error.normal_rms;
   }
+  worst.height_rms = std::sqrt(worst.height_rms);
+  worst.normal_rms = std::sqrt(worst.normal_rms);
   return worst;
 }
 
@@ -105,9 +111,12 @@ std::int64_t SplineNet::control_points() const {
   return count;
 }
 
+int SplineNet::patch_at(const Eigen::Vector2d& xy) const {
+  return interval_of(y, xy.y()) * columns + interval_of(x, xy.x());
+}
+
 SurfacePoint SplineNet::at(const Eigen::Vector2d& xy) const {
-  const int patch = interval_of(y, xy.y()) * columns + interval_of(x, xy.x());
-  return patches[static_cast<std::size_t>(patch)].at(xy);
+  return patches[static_cast<std::size_t>(patch_at(xy))].at(xy);
 }
 
 SurfaceMesh sampled(const SplineNet& net, const GridShape& shape) {
@@ -133,12 +142,17 @@ SurfaceMesh sampled(const SplineNet& net, const GridShape& shape) {
   return mesh;
 }
 
+FitError difference(const SurfacePoint& a, const SurfacePoint& b) {
+  return {.height = std::abs(a.z - b.z), .normal = angle_between(a.slope, b.slope)};
+}
+
 bool holds(const FitError& error, const FitOptions& options) {
   return error.height <= options.tolerance && error.normal <= options.normal_tolerance;
 }
 
 FitError measure_patch(const SplinePatch& patch, const SmoothSurface& surface, int density) {
-  FitError worst;
+  FitError error;
+  double points = 0.0;
   for (int cell = 0; cell < patch.cells; ++cell) {
     const Strip strip = evaluate_strip(patch, cell, density);
     for (Eigen::Index i = 0; i < strip.z.rows(); ++i) {
@@ -146,15 +160,21 @@ FitError measure_patch(const SplinePatch& patch, const SmoothSurface& surface, i
         const Eigen::Array2d share(strip.u[static_cast<std::size_t>(i)],
                                    strip.v[static_cast<std::size_t>(j)]);
         const Eigen::Vector2d step = (share / patch.cells * patch.box.sizes().array()).matrix();
-        const auto point = surface.at(patch.box.min() + step);
+        const auto point = surface.model_at(patch.box.min() + step);
         if (!point) continue;
-        const Eigen::Vector2d slope(strip.zx(i, j), strip.zy(i, j));
-        worst.height = std::max(worst.height, std::abs(strip.z(i, j) - point->z));
-        worst.normal = std::max(worst.normal, angle_between(slope, point->slope));
+        const FitError found =
+            difference({strip.z(i, j), {strip.zx(i, j), strip.zy(i, j)}}, *point);
+        error.height = std::max(error.height, found.height);
+        error.normal = std::max(error.normal, found.normal);
+        error.height_rms += found.height * found.height;
+        error.normal_rms += found.normal * found.normal;
+        points += 1.0;
       }
     }
   }
-  return worst;
+  error.height_rms = std::sqrt(error.height_rms / std::max(points, 1.0));
+  error.normal_rms = std::sqrt(error.normal_rms / std::max(points, 1.0));
+  return error;
 }
 
 }  // namespace lensforge

@@ -13,14 +13,17 @@
 
 namespace lensforge {
 
-/// Largest distances between a fit and the smooth surface.
+/// How far a fit is from the smooth surface's heights and from the normals of the vertex-normal
+/// model (SmoothSurface::model_at()).
 struct FitError {
-  double height = 0.0;  ///< mm, along z
-  double normal = 0.0;  ///< rad, angle between the normals
+  double height = 0.0;      ///< Largest, mm along z
+  double normal = 0.0;      ///< Largest angle, rad
+  double height_rms = 0.0;  ///< Root of the mean square over the area
+  double normal_rms = 0.0;
 };
 
 /// A bicubic B-spline height field over a rectangle: `cells` × `cells` knot cells, twice
-/// continuously differentiable inside. x and y are linear in the parameters.
+/// continuously differentiable. x and y are linear in the parameters.
 struct SplinePatch {
   Eigen::AlignedBox2d box;
   int cells = 0;
@@ -46,7 +49,7 @@ inline std::size_t table_index(int column, int row, int columns) {
   return static_cast<std::size_t>(std::int64_t{row} * columns + column);
 }
 
-/// A rectangle tiled with spline patches that join with equal heights and slopes.
+/// A rectangle tiled with spline patches that join with equal heights, slopes and curvatures.
 struct SplineNet {
   int columns = 0;
   int rows = 0;
@@ -61,45 +64,51 @@ struct SplineNet {
   [[nodiscard]] std::int64_t control_points() const;
   /// @pre xy lies in the rectangle.
   [[nodiscard]] SurfacePoint at(const Eigen::Vector2d& xy) const;
+  /// Number of the patch that holds a point of the rectangle.
+  [[nodiscard]] int patch_at(const Eigen::Vector2d& xy) const;
 };
 
 struct FitOptions {
   double tolerance = 1e-4;         ///< mm, > 0; on SplinePatch::error.height
   double normal_tolerance = 1e-4;  ///< rad, > 0; on SplinePatch::error.normal
   /// Control points of all patches together at most; what bounds the file's size (about 70 bytes
-  /// each). Patches that fail are refined until it is used up. 0: four for each vertex of the mesh,
-  /// kMostControlPoints at most.
+  /// each). 0: four for each vertex of the mesh, kMostControlPoints at most.
   std::int64_t max_control_points = 0;
 };
 
+/// Height difference and angle between the normals of two surfaces at a point.
+FitError difference(const SurfacePoint& a, const SurfacePoint& b);
+
 [[nodiscard]] bool holds(const FitError& error, const FitOptions& options);
 
-/// Fits a net of spline patches to a smooth surface over its rectangle by least squares. A patch
-/// whose error is beyond a tolerance gets twice the knots each way, until all hold, a patch has
-/// kMostCells, or the control points are used up; net.error() says which tolerances hold.
+/// Fits one spline to the vertex-normal model over the surface's rectangle by least squares, slopes
+/// before heights, and cuts it into a net of patches. Until both tolerances hold everywhere, or the
+/// control points are used up, the knots are doubled; net.error() says which tolerances hold.
 /// @pre the surface covers its whole box. @throw Interrupted.
 SplineNet fit_spline_net(const SmoothSurface& surface, const FitOptions& options,
                          const Executor& executor, const RunControl& control);
 
-/// Largest difference between a patch and the surface on a raster of `density` points a knot cell
+/// Differences between a patch and the surface on a raster of `density` points a knot cell
 /// each way, borders included.
 FitError measure_patch(const SplinePatch& patch, const SmoothSurface& surface, int density);
 
 /// The net's surface as a regular grid of columns × rows vertices.
 SurfaceMesh sampled(const SplineNet& net, const GridShape& shape);
 
-/// Knot cells of a patch each way, at least and at most.
+/// Knot cells of a patch each way, at least (given enough control points) and at most.
 inline constexpr int kFewestCells = 4;
 inline constexpr int kMostCells = 256;
+/// Knot cells of a whole net each way at most: time grows with their third power.
+inline constexpr int kMostCellsAcross = 2048;
 
 /// What fits a STEP file of 45 MB.
 inline constexpr std::int64_t kMostControlPoints = 560'000;
 
-/// Raster of the certificate: points each way in a knot cell and in a cell of the mesh.
-inline constexpr int kCertificateDensity = 10;
+/// Raster of the certificate: points each way in a cell of the mesh, and in a knot cell at least.
+inline constexpr int kCertificateDensity = 6;
+inline constexpr int kLeastDensity = 3;
 
-/// The certificate is the largest error on its raster times this, for points in between: on a
-/// raster twice as dense, noisy, creased and smooth lenses have shown up to 1.12 times as much.
+/// The certificate is the largest error on its raster and at the mesh's vertices times this.
 inline constexpr double kCertificateMargin = 1.25;
 
 }  // namespace lensforge

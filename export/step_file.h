@@ -11,7 +11,7 @@ namespace lensforge {
 /// Application protocol of a STEP file.
 enum class StepSchema { kAp214, kAp242 };
 
-/// What the header section says; ASCII.
+/// What the header of a solid's file says; ASCII.
 struct StepHeader {
   std::string name;         ///< Of the part.
   std::string description;  ///< One line: what it was made from.
@@ -20,8 +20,8 @@ struct StepHeader {
   std::string time_stamp;  ///< ISO 8601; the same input then gives the same bytes.
 };
 
-/// What a STEP file holds, as OpenCASCADE sees it.
-struct StepContent {
+/// What a file of solids holds, as OpenCASCADE sees it.
+struct SolidContent {
   int solids = 0;
   int faces = 0;
   bool valid = false;   ///< BRepCheck_Analyzer finds nothing.
@@ -35,10 +35,10 @@ struct StepContent {
 /// are faces named "optical surface", the four walls "side wall", the flat one "back". The file is
 /// read back before it appears under its name: one solid, valid, closed, the net's volume to 1e-6.
 /// @pre the net lies above z = 0. @throw RunError if it cannot be written or does not read back so.
-StepContent write_step(const SplineNet& net, const StepHeader& header, StepSchema schema,
-                       const std::filesystem::path& path);
+SolidContent write_step(const SplineNet& net, const StepHeader& header, StepSchema schema,
+                        const std::filesystem::path& path);
 
 /// @throw InputError if the file cannot be read or holds no shape.
-StepContent inspect_step(const std::filesystem::path& path);
+SolidContent inspect_step(const std::filesystem::path& path);
 
 }  // namespace lensforge

@@ -3,6 +3,9 @@
 
 #include <gmock/gmock.h>
 
+#include <array>
+#include <cstdio>
+
 #include "core/error.h"
 #include "core/temp_folder.h"
 #include "export/closed_solid.h"
@@ -22,7 +25,7 @@ class StepFile : public ::testing::Test {
     return fit_spline_net(SmoothSurface(mesh), options, Executor::serial(), RunControl());
   }
 
-  StepContent write(const SplineNet& net, StepSchema schema = StepSchema::kAp214) {
+  SolidContent write(const SplineNet& net, StepSchema schema = StepSchema::kAp214) {
     return write_step(net, {"part 7", "sha256:0123", "N. N.", "lensforge 9", "2020-02-02T02:02:02"},
                       schema, path_);
   }
@@ -34,7 +37,7 @@ class StepFile : public ::testing::Test {
 TEST_F(StepFile, ReadsBackAsOneClosedSolidOfTheSameVolume) {
   for (const SurfaceMesh& mesh : {smooth_lens(71), creased_lens(), noisy_lens()}) {
     const SplineNet net = fitted(mesh);
-    const StepContent content = write(net);
+    const SolidContent content = write(net);
     EXPECT_TRUE(content.valid);
     EXPECT_TRUE(content.closed);
     EXPECT_EQ(content.solids, 1);
@@ -112,6 +115,33 @@ TEST_F(StepFile, LengthsAreMillimetres) {
 TEST_F(StepFile, Ap242IsAnOption) {
   EXPECT_TRUE(write(fitted(smooth_lens()), StepSchema::kAp242).is_one_solid());
   EXPECT_THAT(parse_part21(read_bytes(path_)).header, HasSubstr("AP242"));
+}
+
+/// What a shell command prints.
+std::string output_of(const std::string& command) {
+  std::string text;
+  FILE* pipe = ::popen(command.c_str(), "r");
+  std::array<char, 256> part{};
+  while (std::fgets(part.data(), part.size(), pipe) != nullptr) text += part.data();
+  ::pclose(pipe);
+  return text;
+}
+
+TEST_F(StepFile, GmshReadsOneSolidOfTheSameVolume) {
+  if (output_of("command -v gmsh").empty()) GTEST_SKIP() << "gmsh is not installed";
+  const SplineNet net = fitted(noisy_lens());
+  write(net);
+  write_bytes(folder_ / "volume.geo", R"(SetFactory("OpenCASCADE");
+v() = ShapeFromFile("lens.step");
+m = Mass Volume {v(0)};
+Printf("solids %g volume %.12g", #v(), m);
+)");
+  const std::string said =
+      output_of("cd '" + folder_.path().string() + "' && gmsh -v 3 volume.geo -parse_and_exit");
+  const std::string start = "solids 1 volume ";
+  ASSERT_THAT(said, HasSubstr(start));
+  const double volume = std::stod(said.substr(said.find(start) + start.size()));
+  EXPECT_NEAR(volume, net.volume(), 1e-6 * net.volume());
 }
 
 TEST_F(StepFile, TargetThatCannotBeWrittenIsNamed) {

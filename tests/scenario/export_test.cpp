@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+
 #include "core/image_io.h"
 #include "core/mesh_io.h"
 #include "scenario/driver.h"
@@ -57,6 +59,39 @@ TEST_F(Export, StepIsOneSolidWithACertificateForEveryPatch) {
   EXPECT_THAT(step, HasSubstr("A. Turner"));
   EXPECT_THAT(step, HasSubstr("AP242"));
   EXPECT_THAT(step, HasSubstr("sha256:"));
+}
+
+/// Written, read back and rendered, the solid throws what export said that its splines throw.
+TEST_F(Export, RenderedStepFileIsThePictureThatExportPrinted) {
+  const nlohmann::json written =
+      run({"export", path("lens"), "--out", path("lens.step"), "--json"}).json();
+  const nlohmann::json lens = nlohmann::json::parse(content(at("lens/lens.json")));
+  const int pixels = std::max(lens["pixels"][0].get<int>(), lens["pixels"][1].get<int>());
+  const Outcome outcome =
+      run({"render", path("lens.step"), "--target", path("lens/target.exr"), "--pixels",
+           std::to_string(pixels), "--focal", std::to_string(lens["focal_length"].get<double>()),
+           "--ior", std::to_string(lens["ior"].get<double>()), "--json"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const nlohmann::json rendered = outcome.json();
+  EXPECT_EQ(rendered["model"], "smooth");
+  EXPECT_THAT(outcome.err, HasSubstr("optical surface"));
+  const double printed = written["metrics"]["solid"]["mae"];
+  EXPECT_NEAR(rendered["metrics"]["smooth"]["mae"].get<double>(), printed, 1e-4);
+}
+
+TEST_F(Export, IgesIsOneSolid) {
+  const Outcome outcome = run({"export", path("lens"), "--out", path("lens.igs"), "--json",
+                               "--normal-tolerance", "0.1", "--tolerance", "0.5mm"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_EQ(outcome.json()["format"], "iges");
+  EXPECT_EQ(outcome.json()["faces"], outcome.json()["patches"].size() + 5);
+  expect_refused({"--out", path("lens.igs"), "--schema", "ap242"}, {"--schema", "iges"});
+}
+
+TEST_F(Export, RenderRefusesWhatIsNoSolid) {
+  write(at("part.step"), "ISO-10303-21;\nHEADER;\nENDSEC;\n");
+  expect_refusal(run({"render", path("part.step"), "--quiet"}), 2, {"part.step"});
+  expect_refusal(run({"render", path("none.step"), "--quiet"}), 2, {"none.step", "missing"});
 }
 
 TEST_F(Export, StepMeetsTolerancesThatItsMeshAllows) {
@@ -123,7 +158,7 @@ TEST_F(Export, SurfaceBelowTheBackIsRefused) {
 }
 
 TEST_F(Export, FileSizeLimitLeavesNothing) {
-  for (const char* name : {"lens.stl", "lens.3mf", "lens.exr", "lens.step"}) {
+  for (const char* name : {"lens.stl", "lens.3mf", "lens.exr", "lens.step", "lens.igs"}) {
     const Outcome outcome = run({"export", path("lens"), "--out", path(name), "--quiet"}, 2048);
     expect_refusal(outcome, 1, {name, "File too large"});
     EXPECT_FALSE(fs::exists(at(name)));

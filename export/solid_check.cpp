@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "export/solid_check.h"
+
+#include <BRepCheck_Analyzer.hxx>
+#include <BRepGProp.hxx>
+#include <BRep_Tool.hxx>
+#include <GProp_GProps.hxx>
+#include <Message.hxx>
+#include <Message_Messenger.hxx>
+#include <Message_PrinterOStream.hxx>
+#include <STEPControl_Reader.hxx>
+#include <TopExp_Explorer.hxx>
+#include <cerrno>
+#include <cmath>
+#include <system_error>
+
+#include "core/error.h"
+
+namespace lensforge {
+namespace {
+
+/// Share by which OpenCASCADE's volume of the file may differ from the splines' own integral.
+constexpr double kVolumeShare = 1e-6;
+
+bool shells_are_closed(const TopoDS_Shape& shape) {
+  for (TopExp_Explorer at(shape, TopAbs_SHELL); at.More(); at.Next()) {
+    if (!BRep_Tool::IsClosed(at.Current())) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+void silence_opencascade() {
+  Message::DefaultMessenger()->RemovePrinters(STANDARD_TYPE(Message_PrinterOStream));
+}
+
+int count_shapes(const TopoDS_Shape& shape, TopAbs_ShapeEnum kind) {
+  int number = 0;
+  for (TopExp_Explorer at(shape, kind); at.More(); at.Next()) ++number;
+  return number;
+}
+
+TopoDS_Shape read_step_shape(const std::filesystem::path& path) {
+  silence_opencascade();
+  STEPControl_Reader reader;
+  if (reader.ReadFile(path.c_str()) != IFSelect_RetDone) {
+    throw InputError(path.string() + ": is missing or no STEP file");
+  }
+  reader.TransferRoots();
+  if (reader.NbShapes() == 0) throw InputError(path.string() + ": holds no shape");
+  return reader.OneShape();
+}
+
+SolidContent inspect_shape(const TopoDS_Shape& shape) {
+  SolidContent content;
+  content.solids = count_shapes(shape, TopAbs_SOLID);
+  content.faces = count_shapes(shape, TopAbs_FACE);
+  content.valid = BRepCheck_Analyzer(shape).IsValid();
+  content.closed = shells_are_closed(shape);
+  GProp_GProps properties;
+  BRepGProp::VolumeProperties(shape, properties, kVolumeShare / 10.0);
+  content.volume = properties.Mass();
+  return content;
+}
+
+void require_read_back(const SolidContent& content, double volume,
+                       const std::filesystem::path& path) {
+  if (!content.is_one_solid()) fail_to_write(path, "it does not read back as one closed solid");
+  if (std::abs(content.volume - volume) <= kVolumeShare * volume) return;
+  fail_to_write(path, "it reads back with a volume of " + std::to_string(content.volume) +
+                          " mm^3 instead of " + std::to_string(volume));
+}
+
+void fail_to_write(const std::filesystem::path& path, const std::string& why) {
+  throw RunError(path.string() + ": cannot be written: " + why);
+}
+
+std::string last_system_error() {
+  return errno != 0 ? std::generic_category().message(errno) : "unknown reason";
+}
+
+}  // namespace lensforge

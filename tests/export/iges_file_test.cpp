@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "export/iges_file.h"
+
+#include <gmock/gmock.h>
+
+#include "core/error.h"
+#include "core/temp_folder.h"
+#include "export/sample_surfaces.h"
+
+namespace lensforge::testing {
+namespace {
+
+using ::testing::HasSubstr;
+
+class IgesFile : public ::testing::Test {
+ protected:
+  static SplineNet fitted() {
+    FitOptions options;
+    options.max_control_points = 3000;
+    return fit_spline_net(SmoothSurface(smooth_lens(71)), options, Executor::serial(),
+                          RunControl());
+  }
+
+  static SolidContent write(const SplineNet& net, const std::filesystem::path& path) {
+    return write_iges(net, {"part 7", "", "N. N.", "lensforge 9", "2020-02-03T04:05:06"}, path);
+  }
+
+  TempFolder folder_;
+};
+
+TEST_F(IgesFile, ReadsBackAsOneClosedSolidOfTheSameVolume) {
+  const SplineNet net = fitted();
+  const SolidContent content = write(net, folder_ / "lens.igs");
+  EXPECT_TRUE(content.is_one_solid());
+  EXPECT_EQ(content.faces, static_cast<int>(net.patches.size()) + 5);
+  EXPECT_NEAR(content.volume, net.volume(), 1e-6 * net.volume());
+}
+
+/// Lines of 80 columns, unit flag 2, and a manifold solid (entity 186) among the entries.
+TEST_F(IgesFile, SaysMillimetresAuthorAndSolidWithoutOpenCascade) {
+  write(fitted(), folder_ / "lens.igs");
+  const std::string text = read_bytes(folder_ / "lens.igs");
+  std::string header;
+  std::string entries;
+  for (std::size_t at = 0; at + 80 <= text.size(); at += 81) {
+    ASSERT_EQ(text[at + 80], '\n');
+    const std::string line = text.substr(at, 80);
+    if (line[72] == 'G') header += line.substr(0, 72);
+    if (line[72] == 'D') entries += line.substr(0, 8);
+  }
+  for (const char* part : {",2,2HMM,", "5HN. N.", "15H20200203.040506", "11Hlensforge 9"}) {
+    EXPECT_THAT(header, HasSubstr(part));
+  }
+  EXPECT_THAT(entries, HasSubstr("     186"));
+}
+
+TEST_F(IgesFile, TargetThatCannotBeWrittenIsNamed) {
+  const std::filesystem::path path = folder_ / "missing" / "lens.igs";
+  const SplineNet net = fitted();
+  EXPECT_THAT(message_of<RunError>([&] { write(net, path); }), HasSubstr(path.string()));
+}
+
+TEST_F(IgesFile, WhatIsNoIgesFileIsRefused) {
+  write_bytes(folder_ / "lens.igs", "solid lens\nendsolid\n");
+  EXPECT_THAT(message_of<InputError>([&] { inspect_iges(folder_ / "lens.igs"); }),
+              HasSubstr("lens.igs"));
+}
+
+}  // namespace
+}  // namespace lensforge::testing
