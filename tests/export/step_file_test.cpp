@@ -127,6 +127,15 @@ std::string output_of(const std::string& command) {
   return text;
 }
 
+/// The volume that another program prints after "solids 1 volume "; it runs in `folder`.
+double volume_by(const std::string& command, const std::filesystem::path& folder) {
+  const std::string said = output_of("cd '" + folder.string() + "' && " + command);
+  const std::string start = "solids 1 volume ";
+  EXPECT_THAT(said, HasSubstr(start));
+  const std::size_t at = said.find(start);
+  return at == std::string::npos ? 0.0 : std::stod(said.substr(at + start.size()));
+}
+
 TEST_F(StepFile, GmshReadsOneSolidOfTheSameVolume) {
   if (output_of("command -v gmsh").empty()) GTEST_SKIP() << "gmsh is not installed";
   const SplineNet net = fitted(noisy_lens());
@@ -136,11 +145,21 @@ v() = ShapeFromFile("lens.step");
 m = Mass Volume {v(0)};
 Printf("solids %g volume %.12g", #v(), m);
 )");
-  const std::string said =
-      output_of("cd '" + folder_.path().string() + "' && gmsh -v 3 volume.geo -parse_and_exit");
-  const std::string start = "solids 1 volume ";
-  ASSERT_THAT(said, HasSubstr(start));
-  const double volume = std::stod(said.substr(said.find(start) + start.size()));
+  const double volume = volume_by("gmsh -v 3 volume.geo -parse_and_exit", folder_.path());
+  EXPECT_NEAR(volume, net.volume(), 1e-6 * net.volume());
+}
+
+TEST_F(StepFile, FreeCadReadsOneSolidOfTheSameVolume) {
+  if (output_of("command -v freecadcmd").empty()) GTEST_SKIP() << "freecadcmd is not installed";
+  const SplineNet net = fitted(noisy_lens());
+  write(net);
+  write_bytes(folder_ / "volume.py", R"(import Part
+s = Part.Shape()
+s.read("lens.step")
+if s.isValid():
+    print("solids %d volume %.12g" % (len(s.Solids), s.Volume))
+)");
+  const double volume = volume_by("freecadcmd volume.py </dev/null 2>&1", folder_.path());
   EXPECT_NEAR(volume, net.volume(), 1e-6 * net.volume());
 }
 
