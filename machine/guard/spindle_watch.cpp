@@ -183,7 +183,11 @@ SpindleState SpindleWatch::state() const {
   return goal_ == Goal::kSpeed ? SpindleState::kAtSpeed : SpindleState::kStopped;
 }
 
+// A drive that trips is often seen to lose speed before its fault is read: both are told then.
 std::string SpindleWatch::reason() const {
+  if (!latched_.empty() && latched_.find(fault_trouble_) == std::string::npos) {
+    return latched_ + "; " + fault_trouble_;
+  }
   for (const std::string* trouble : {&latched_, &fault_trouble_, &bus_trouble_, &speed_trouble_}) {
     if (!trouble->empty()) return *trouble;
   }

@@ -188,11 +188,14 @@ TEST_P(RealBus, FailsOnGarbledAnswers) {
 TEST_P(RealBus, TellsFaultsAndInterlocks) {
   ASSERT_TRUE(shop_.reach(12000.0)) << shop_.last().reason;
   shop_.server().set_door(false);
-  EXPECT_LT(shop_.time_to([](const GuardReport& report) { return !report.interlocks_ok; }), 0.3);
+  EXPECT_LT(shop_.time_to([](const GuardReport& report) { return !report.interlocks_ok; }), 1.5);
   EXPECT_THAT(shop_.last().reason, HasSubstr("drive: door: reads 0: 1 is needed"));
   shop_.server().set_fault(9);
-  EXPECT_LT(shop_.time_to(SpindleState::kFailed), 0.3);
-  EXPECT_THAT(shop_.last().reason, HasSubstr("drive: fault 9: too hot"));
+  EXPECT_LT(shop_.time_to([](const GuardReport& report) {
+    return report.reason.find("fault 9: too hot") != std::string::npos;
+  }),
+            1.5);
+  EXPECT_EQ(shop_.last().spindle, SpindleState::kFailed);
 }
 
 TEST_P(RealBus, DeliversAStopBeforeItGoes) {

@@ -123,6 +123,16 @@ TEST_F(SpindleWatchTest, FailsAtOnceOnAFaultAndStaysFailedUntilTheNextRequest) {
   EXPECT_EQ(watch_.state(), SpindleState::kAtSpeed);
 }
 
+TEST_F(SpindleWatchTest, TellsTheFaultOfADriveThatWasSeenToLoseSpeedFirst) {
+  reach(10000.0);
+  watch_.see_speed(7000.0, 2.0);
+  watch_.see_speed(5000.0, 2.1);
+  EXPECT_THAT(watch_.reason(), HasSubstr("speed reads 5000 rpm"));
+  watch_.see_fault(2, 2.2);
+  EXPECT_THAT(watch_.reason(),
+              AllOf(HasSubstr("speed reads 5000 rpm"), HasSubstr("; fault 2: spindle too hot")));
+}
+
 TEST_F(SpindleWatchTest, NamesAFaultWithoutText) {
   watch_.see_fault(77, 1.0);
   EXPECT_EQ(watch_.reason(), "fault 77: no text in the register map");

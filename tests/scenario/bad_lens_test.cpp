@@ -8,7 +8,7 @@ namespace {
 class BadLens : public Scenario {
  protected:
   void SetUp() override {
-    ASSERT_EQ(run(small_design(picture("stripes.png"), path("lens"))).exit_code, 0);
+    place_small_lens(at("lens"));
     json_ = nlohmann::json::parse(content(at("lens/lens.json")));
   }
 

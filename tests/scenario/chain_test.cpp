@@ -43,12 +43,7 @@ INSTANTIATE_TEST_SUITE_P(All, Fixtures,
 
 class Chain : public Scenario {
  protected:
-  void design_stripes() {
-    const Outcome outcome = run(small_design(picture("stripes.png"), path("lens")));
-    ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
-  }
-
-  /// A coarse cut of that lens, in seconds.
+  /// A coarse cut of the lens in the folder, in seconds.
   [[nodiscard]] Arguments cam(const Arguments& more) const {
     Arguments arguments = {"cam", path("lens"), "--pitch",   "1mm",  "--tool-diameter",
                            "2mm", "--no-semi",  "--surface", "facet"};
@@ -64,7 +59,7 @@ TEST_F(Chain, EveryFixtureIsATestCase) {
 }
 
 TEST_F(Chain, APictureThatIsNotSquareKeepsItsShape) {
-  design_stripes();
+  place_small_lens(at("lens"));
   const nlohmann::json lens = nlohmann::json::parse(content(at("lens/lens.json")));
   EXPECT_EQ(lens["pixels"][0], 32);
   EXPECT_EQ(lens["pixels"][1], 21);
@@ -75,7 +70,7 @@ TEST_F(Chain, APictureThatIsNotSquareKeepsItsShape) {
 }
 
 TEST_F(Chain, ProvenanceTellsHowTheLensWasMade) {
-  design_stripes();
+  place_small_lens(at("lens"));
   const nlohmann::json made = nlohmann::json::parse(content(at("lens/lens.json")))["provenance"];
   EXPECT_THAT(made["program"].get<std::string>(), HasSubstr("lensforge "));
   EXPECT_EQ(made["options"]["pixels"], 32);
@@ -88,7 +83,7 @@ TEST_F(Chain, ProvenanceTellsHowTheLensWasMade) {
 }
 
 TEST_F(Chain, RenderOfALensRepeatsItsMetricsAndPicture) {
-  design_stripes();
+  place_small_lens(at("lens"));
   const Outcome outcome = run({"render", path("lens"), "--json", "--out", path("again.exr")});
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   const nlohmann::json lens = nlohmann::json::parse(content(at("lens/lens.json")));
@@ -102,7 +97,7 @@ TEST_F(Chain, RenderOfALensRepeatsItsMetricsAndPicture) {
 }
 
 TEST_F(Chain, RenderTakesAnotherResolution) {
-  design_stripes();
+  place_small_lens(at("lens"));
   ASSERT_EQ(run({"render", path("lens"), "--pixels", "48", "--out", path("fine.png")}).exit_code,
             0);
   const Image picture = read_image(at("fine.png")).image;
@@ -110,7 +105,7 @@ TEST_F(Chain, RenderTakesAnotherResolution) {
 }
 
 TEST_F(Chain, RenderOfABareMeshNeedsNoTarget) {
-  design_stripes();
+  place_small_lens(at("lens"));
   const Outcome outcome = run(
       {"render", path("lens/surface.ply"), "--json", "--pixels", "32", "--out", path("mesh.png")});
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
@@ -123,7 +118,7 @@ TEST_F(Chain, RenderOfABareMeshNeedsNoTarget) {
 }
 
 TEST_F(Chain, CamWritesAProgramAndAReport) {
-  design_stripes();
+  place_small_lens(at("lens"));
   const Outcome outcome = run(cam({"--json"}));
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_EQ(outcome.json()["status"], "done");
@@ -139,7 +134,7 @@ TEST_F(Chain, CamWritesAProgramAndAReport) {
 
 TEST_F(Chain, LinuxcncAcceptsTheProgram) {
   if (!fs::exists(LENSFORGE_RS274)) GTEST_SKIP() << "no rs274; ./bootstrap test fetches it";
-  design_stripes();
+  place_small_lens(at("lens"));
   ASSERT_EQ(run(cam({"--no-render"})).exit_code, 0);
   write(at("tool.tbl"), "T1 P1 Z0 D2\nT3 P3 Z0 D3\n");
   write(at("job.var"), "");
@@ -152,7 +147,7 @@ TEST_F(Chain, LinuxcncAcceptsTheProgram) {
 }
 
 TEST_F(Chain, CamGivesTheSameBytesOnOneAndTwoThreads) {
-  design_stripes();
+  place_small_lens(at("lens"));
   std::map<std::string, std::string> files;
   ASSERT_EQ(run(cam({"--threads", "1"})).exit_code, 0);
   for (const char* file : {"finish.ngc", "rough.ngc", "milled.ply", "milled.png", "leakage.png"}) {
@@ -165,14 +160,14 @@ TEST_F(Chain, CamGivesTheSameBytesOnOneAndTwoThreads) {
 }
 
 TEST_F(Chain, CamTellsALimitThatWasStatedAndIsNotMet) {
-  design_stripes();
+  place_small_lens(at("lens"));
   const Outcome outcome = run(cam({"--max-leakage", "0.0001"}));
   EXPECT_EQ(outcome.exit_code, 3);
   EXPECT_THAT(outcome.out, HasSubstr("limit not met: leakage"));
 }
 
 TEST_F(Chain, TheWorkshopIsShownAndReadBack) {
-  design_stripes();
+  place_small_lens(at("lens"));
   const Outcome shown = run(cam({"--show-workshop"}));
   ASSERT_EQ(shown.exit_code, 0) << shown.err;
   EXPECT_FALSE(fs::exists(at("lens/cam")));
@@ -185,7 +180,7 @@ TEST_F(Chain, TheWorkshopIsShownAndReadBack) {
 }
 
 TEST_F(Chain, AMouldIsCutAndItsCastIsForetold) {
-  design_stripes();
+  place_small_lens(at("lens"));
   const Outcome outcome = run(cam({"--part", "mould", "--shrinkage", "0.01", "--json"}));
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   const nlohmann::json report = outcome.json()["report"];
@@ -194,7 +189,7 @@ TEST_F(Chain, AMouldIsCutAndItsCastIsForetold) {
 }
 
 TEST_F(Chain, InfoKnowsEveryKindOfFile) {
-  design_stripes();
+  place_small_lens(at("lens"));
   for (const auto& [source, kind] :
        std::vector<std::pair<std::string, std::string>>{{path("lens"), "lens"},
                                                         {path("lens/surface.ply"), "mesh"},
@@ -217,7 +212,7 @@ TEST_F(Chain, QuietSaysNothingOnStderr) {
 }
 
 TEST_F(Chain, ForceReplacesADesignAndTheProgramMadeFromIt) {
-  design_stripes();
+  place_small_lens(at("lens"));
   ASSERT_EQ(run(cam({"--no-render"})).exit_code, 0);
   Arguments again = small_design(picture("rings.png"), path("lens"));
   again.emplace_back("--force");

@@ -115,6 +115,20 @@ Arguments small_design(const std::string& target, const std::string& out) {
           "--rounds", "2",    "--quality", "draft", "--threads", "2"};
 }
 
+void place_small_lens(const fs::path& folder) {
+  struct Kept {
+    fs::path folder = make_folder();
+    Outcome made = run(small_design(picture("stripes.png"), (folder / "lens").string()));
+    ~Kept() {
+      std::error_code ignored;
+      fs::remove_all(folder, ignored);
+    }
+  };
+  static const Kept kept;
+  ASSERT_EQ(kept.made.exit_code, 0) << kept.made.err;
+  fs::copy(kept.folder / "lens", folder, fs::copy_options::recursive);
+}
+
 std::string content(const fs::path& file) {
   std::ifstream stream(file, std::ios::binary);
   std::ostringstream text;

@@ -74,6 +74,8 @@ std::string picture(const std::string& name);
 
 /// `design` of a small picture into `out`, a second or so of work.
 Arguments small_design(const std::string& target, const std::string& out);
+/// Puts what small_design() makes of stripes.png into `folder`; designed once per program.
+void place_small_lens(const fs::path& folder);
 
 std::string content(const fs::path& file);
 void write(const fs::path& file, const std::string& content);

@@ -12,9 +12,7 @@ using ::testing::HasSubstr;
 
 class Export : public Scenario {
  protected:
-  void SetUp() override {
-    ASSERT_EQ(run(small_design(picture("stripes.png"), path("lens"))).exit_code, 0);
-  }
+  void SetUp() override { place_small_lens(at("lens")); }
 
   void expect_refused(const Arguments& options, const std::vector<std::string>& parts) {
     Arguments arguments = {"export", path("lens"), "--quiet"};

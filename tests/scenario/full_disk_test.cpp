@@ -58,7 +58,7 @@ TEST_F(FullDisk, DesignUnderAFileSizeLimitFailsAndIsResumable) {
 }
 
 TEST_F(FullDisk, CamUnderAFileSizeLimitLeavesNoProgram) {
-  ASSERT_EQ(run(small_design(picture("rings.png"), path("lens"))).exit_code, 0);
+  place_small_lens(at("lens"));
   expect_refusal(run({"cam", path("lens"), "--pitch", "2mm", "--tool-diameter", "4mm", "--no-rough",
                       "--no-semi", "--quiet"},
                      8 * kKibibyte),
@@ -67,7 +67,7 @@ TEST_F(FullDisk, CamUnderAFileSizeLimitLeavesNoProgram) {
 }
 
 TEST_F(FullDisk, RenderUnderAFileSizeLimitLeavesNoPicture) {
-  ASSERT_EQ(run(small_design(picture("rings.png"), path("lens"))).exit_code, 0);
+  place_small_lens(at("lens"));
   expect_refusal(
       run({"render", path("lens"), "--out", path("big.exr"), "--pixels", "256", "--quiet"},
           8 * kKibibyte),
