@@ -6,6 +6,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "core/slope_heights.h"
+
 // Notation: a triangle's corners are 0, 1, 2, its centroid c. Bernstein coefficients of the cubic
 // on the third (i, j, c) are named after their indices: iij lies a third of the way from i to j.
 namespace lensforge {
@@ -146,6 +148,7 @@ Corners make_corners(const SurfaceMesh& mesh, const Eigen::Matrix2Xd& slopes,
 }  // namespace
 
 SmoothSurface::SmoothSurface(const SurfaceMesh& mesh) : mesh_(mesh), slopes_(vertex_slopes(mesh)) {
+  mesh_.vertices.row(2) = fit_heights(mesh, slopes_).transpose();
   const auto xy = mesh_.vertices.topRows<2>();
   box_ = {Eigen::Vector2d(xy.rowwise().minCoeff()), Eigen::Vector2d(xy.rowwise().maxCoeff())};
   const double side = std::sqrt(2.0 * box_.volume() / static_cast<double>(mesh_.triangle_count()));

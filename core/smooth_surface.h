@@ -24,10 +24,13 @@ struct BendRange {
   double largest = 0.0;
 };
 
-/// The smooth surface of the vertex-normal model: it passes through every vertex of a height field
-/// with the vertex's own normal (the sum of the area normals around it) and has continuous slopes
-/// everywhere. Between the vertices it is the reduced Clough–Tocher interpolant: three cubics per
-/// triangle, the slope across an edge linear along the edge.
+/// The smooth surface of the vertex-normal model: above every vertex of a height field it has the
+/// vertex's own normal (the sum of the area normals around it), and its slopes are continuous
+/// everywhere. Since the normals throw the picture, heights follow them (fit_heights()), not the
+/// other way round: a surface through the vertices of an optimised lens waves between them, and
+/// throws a 128² portrait at MAE 0.0100 where the normals promise 0.0017; this one at 0.0028, for
+/// heights that move by up to 6 µm. Between the vertices it is the reduced Clough–Tocher
+/// interpolant: three cubics per triangle, the slope across an edge linear along the edge.
 class SmoothSurface {
  public:
   /// @pre every triangle faces +z (height_field_outline()).
@@ -50,6 +53,7 @@ class SmoothSurface {
   [[nodiscard]] BendRange bend_range(std::int64_t triangle) const;
 
   [[nodiscard]] const Eigen::AlignedBox2d& box() const { return box_; }
+  /// With the surface's heights.
   [[nodiscard]] const SurfaceMesh& mesh() const { return mesh_; }
   /// Slopes at the vertices, 2 × V.
   [[nodiscard]] const Eigen::Matrix2Xd& slopes() const { return slopes_; }
