@@ -10,6 +10,7 @@
 #include "cam/cut_plan.h"
 #include "cam/cut_report.h"
 #include "cam/milled/designed_field.h"
+#include "cam/milled/held_field.h"
 #include "cam/part_surfaces.h"
 #include "cam/prediction.h"
 #include "cam/report/report_html.h"
@@ -33,30 +34,31 @@ class MeantSurface {
   MeantSurface(const SurfaceMesh& mesh, SurfaceModel model) {
     if (model == SurfaceModel::kFacet) {
       facets_.emplace(mesh);
+      held_.emplace(*facets_);
     } else {
       smooth_.emplace(mesh);
       field_.emplace(*smooth_);
+      held_.emplace(*field_);
     }
   }
 
-  [[nodiscard]] const SurfaceField& field() const {
-    return facets_ ? static_cast<const SurfaceField&>(*facets_) : *field_;
-  }
+  [[nodiscard]] const SurfaceField& field() const { return *held_; }
 
   /// What the ball of `cut` can reach of it; both must outlive the result.
   [[nodiscard]] std::unique_ptr<RoundedField> rounded(const CutSurface& cut,
                                                       const Eigen::AlignedBox2d& rectangle,
                                                       const Executor& executor) {
-    if (!facets_) return std::make_unique<RoundedField>(*field_, cut, cut.deviation().height);
-    const FacetField& facets = *facets_;
+    if (!facets_)
+      return std::make_unique<RoundedField>(*held_, cut, cut.deviation().height, executor);
     cutter_ = cut.cutter(rectangle, executor);
-    return std::make_unique<RoundedField>(facets, *cutter_, executor);
+    return std::make_unique<RoundedField>(*held_, facets_->grid(), *cutter_, executor);
   }
 
  private:
   std::optional<FacetField> facets_;
   std::optional<SmoothSurface> smooth_;
   std::optional<SmoothField> field_;
+  std::optional<HeldField> held_;
   std::shared_ptr<const DropCutter> cutter_;
 };
 

@@ -10,8 +10,8 @@ PartSurfaces::PartSurfaces(const Design& design, FinishPaths paths, const Polish
       ideal_(std::move(paths.ideal), design.blank_top),
       fitted_(std::move(paths.fitted), design.blank_top),
       written_(std::move(paths.written), design.blank_top) {
-  raw_ = {&design.surface, on_lens(design.rounded), on_lens(ideal_), on_lens(fitted_),
-          on_lens(written_)};
+  raw_ = {&design.surface, held(on_lens(design.rounded)), on_lens(ideal_), on_lens(fitted_),
+          held(on_lens(written_))};
   for (const SurfaceField* field : raw_) {
     polished_.push_back(std::make_unique<PolishedField>(*field, design.rectangle, polish));
   }
@@ -21,6 +21,11 @@ const SurfaceField* PartSurfaces::on_lens(const SurfaceField& cut) {
   if (!design_.mould) return &cut;
   cast_.push_back(std::make_unique<CastField>(cut, *design_.mould));
   return cast_.back().get();
+}
+
+const SurfaceField* PartSurfaces::held(const SurfaceField* field) {
+  held_.push_back(std::make_unique<HeldField>(*field));
+  return held_.back().get();
 }
 
 LeakageChain PartSurfaces::chain() const {

@@ -9,6 +9,7 @@
 #include "cam/finish_paths.h"
 #include "cam/leakage/leakage.h"
 #include "cam/milled/cast_field.h"
+#include "cam/milled/held_field.h"
 #include "cam/milled/milled_field.h"
 #include "cam/milled/polished_field.h"
 #include "cam/milled/rounded_field.h"
@@ -16,12 +17,12 @@
 namespace lensforge {
 
 /// Every surface between the design and the polished part, each with one cause of wrong light more
-/// than the one before (LeakageChain).
+/// than the one before (LeakageChain). Tiles are held (HeldField): not for several threads at once.
 class PartSurfaces {
  public:
   /// What is designed and what mills it. All must outlive the surfaces.
   struct Design {
-    const SurfaceField& surface;     ///< Of the lens.
+    const SurfaceField& surface;     ///< Of the lens; held, if tiles are to be shared.
     const RoundedField& rounded;     ///< Of what is cut, lens or mould.
     Eigen::AlignedBox2d rectangle;   ///< Of the lens, mm.
     double blank_top = 0.0;          ///< mm
@@ -40,11 +41,15 @@ class PartSurfaces {
   /// As the lens has it: cast if it is cut in a mould.
   const SurfaceField* on_lens(const SurfaceField& cut);
 
+  /// For surfaces that are rendered themselves and polished.
+  const SurfaceField* held(const SurfaceField* field);
+
   Design design_;
   MilledField ideal_;
   MilledField fitted_;
   MilledField written_;
   std::vector<std::unique_ptr<CastField>> cast_;
+  std::vector<std::unique_ptr<HeldField>> held_;
   std::vector<const SurfaceField*> raw_;                  ///< In the order of the chain.
   std::vector<std::unique_ptr<PolishedField>> polished_;  ///< Likewise.
 };

@@ -115,7 +115,10 @@ Eigen::AlignedBox2d box_of(const SurfaceMesh& mesh, std::int64_t triangle) {
 
 SmoothCutSurface::SmoothCutSurface(const SurfaceMesh& mesh, double radius,
                                    const SmoothCutOptions& options, const Executor& executor)
-    : surface_(mesh), radius_(radius), splits_(static_cast<std::size_t>(mesh.triangle_count())) {
+    : surface_(mesh),
+      grid_(surface_.mesh()),
+      radius_(radius),
+      splits_(static_cast<std::size_t>(mesh.triangle_count())) {
   std::vector<SurfaceDeviation> off(splits_.size());
   std::vector<BendRange> bends(splits_.size());
   parallel_for(executor, "smooth surface", mesh.triangle_count(), [&](std::int64_t t) {
@@ -147,15 +150,13 @@ std::int64_t SmoothCutSurface::facet_count() const {
 SurfaceMesh SmoothCutSurface::facets(const Eigen::AlignedBox2d& window,
                                      const Executor& executor) const {
   const SurfaceMesh& mesh = surface_.mesh();
-  std::vector<std::int64_t> triangles;
-  for (std::int64_t t = 0; t < mesh.triangle_count(); ++t) {
-    if (window.intersects(box_of(mesh, t))) triangles.push_back(t);
-  }
+  std::vector<std::int32_t> triangles = grid_.near(window);
+  std::erase_if(triangles, [&](std::int32_t t) { return !window.intersects(box_of(mesh, t)); });
   // Facets and points before each triangle; neighbours have points of their own along their edge.
   std::vector<std::int64_t> begin(triangles.size() + 1, 0);
   std::vector<std::int64_t> points(triangles.size() + 1, 0);
   const auto parts_of = [&](std::int64_t i) {
-    const std::int64_t t = triangles[static_cast<std::size_t>(i)];
+    const std::int32_t t = triangles[static_cast<std::size_t>(i)];
     return TriangleParts(surface_, t, splits_[static_cast<std::size_t>(t)], window);
   };
   const auto count = static_cast<std::int64_t>(triangles.size());

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "cam/contact/drop_cutter.h"
+#include "cam/contact/facet_grid.h"
 #include "cam/contact/smooth_roll.h"
 #include "core/executor.h"
 #include "core/smooth_surface.h"
@@ -103,6 +104,7 @@ class SmoothCutSurface final : public CutSurface {
 
  private:
   SmoothSurface surface_;
+  FacetGrid grid_;
   double radius_;
   std::vector<std::uint8_t> splits_;  ///< n of each triangle.
   SurfaceDeviation deviation_;

@@ -68,36 +68,37 @@ struct Judge {
   }
 };
 
-/// Renders surfaces, each once.
-class Renderer {
+/// Pictures of every surface of a chain, each rendered once. Steps come first: what they are made
+/// of, among others the designed surface, is then at hand.
+class ChainPictures {
  public:
-  Renderer(const FieldRenderSetup& setup, const Executor& executor, const RunControl& control,
-           const LeakageChain& chain)
+  ChainPictures(const LeakageChain& chain, const FieldRenderSetup& setup, const Executor& executor,
+                const RunControl& control)
       : setup_(setup), executor_(executor), control_(control) {
-    surfaces_ = 1.0 + static_cast<double>(chain.steps.size() + chain.others.size());
+    std::vector<const SurfaceField*> fields;
+    const auto take = [&](const NamedSurface& surface) {
+      LF_CHECK(surface.field != nullptr, surface.name);
+      const bool known = std::find(fields.begin(), fields.end(), surface.field) != fields.end();
+      if (!surface.grid && !known) fields.push_back(surface.field);
+    };
+    for (const NamedSurface& step : chain.steps) take(step);
+    take(chain.designed);
+    for (const NamedSurface& other : chain.others) take(other);
+    std::vector<FluxPicture> rendered = render_fields(fields, setup, executor, control);
+    for (std::size_t f = 0; f < fields.size(); ++f) pictures_[fields[f]] = std::move(rendered[f]);
   }
 
-  FluxPicture render(const NamedSurface& surface) {
-    LF_CHECK(surface.field != nullptr, surface.name);
-    const double before = rendered_++;
-    const auto known = pictures_.find(surface.field);
-    if (known != pictures_.end() && !surface.grid) return known->second;
-    const RunControl part(control_.stop_token(), [&](const Progress& p) {
-      control_.report({"render surfaces", before + p.done / p.total, surfaces_, surface.name});
-    });
+  [[nodiscard]] FluxPicture of(const NamedSurface& surface) const {
+    if (!surface.grid) return pictures_.at(surface.field);
     FieldRenderSetup setup = setup_;
-    if (surface.grid) setup.grid = *surface.grid;
-    FluxPicture picture = render_field(*surface.field, setup, executor_, part);
-    if (!surface.grid) pictures_[surface.field] = picture;
-    return picture;
+    setup.grid = *surface.grid;
+    return render_field(*surface.field, setup, executor_, control_);
   }
 
  private:
   const FieldRenderSetup& setup_;
   const Executor& executor_;
   const RunControl& control_;
-  double surfaces_ = 0.0;
-  double rendered_ = 0.0;
   std::map<const SurfaceField*, FluxPicture> pictures_;
 };
 
@@ -148,16 +149,16 @@ LeakageResult measure_leakage(const LeakageChain& chain, const Image& target,
   LF_CHECK(!chain.steps.empty(), chain.designed.name);
   LF_CHECK(target.columns() == setup.optics.pixels.x() && target.rows() == setup.optics.pixels.y(),
            std::to_string(target.columns()) + "x" + std::to_string(target.rows()));
-  Renderer renderer(setup, executor, control, chain);
+  const ChainPictures pictures(chain, setup, executor, control);
   LeakageResult result;
-  result.designed = {chain.designed.name, renderer.render(chain.designed), {}};
+  result.designed = {chain.designed.name, pictures.of(chain.designed), {}};
   const double mean = mean_of(target);
   const Judge judge{target, result.designed.picture,
                     mask_of(target, [&](double v) { return v < options.dark_below * mean; }),
                     mask_of(target, [&](double v) { return v >= options.bright_from * mean; })};
   result.designed.quality = judge.judge(result.designed.picture);
   const auto add = [&](const NamedSurface& surface, std::vector<RenderedSurface>& to) {
-    to.push_back({surface.name, renderer.render(surface), {}});
+    to.push_back({surface.name, pictures.of(surface), {}});
     to.back().quality = judge.judge(to.back().picture);
   };
   for (const NamedSurface& step : chain.steps) add(step, result.steps);

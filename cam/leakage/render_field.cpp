@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <numeric>
 #include <span>
+#include <utility>
 
 #include "cam/leakage/surface_tile.h"
 #include "core/error.h"
@@ -20,6 +21,45 @@ Image FluxPicture::image(double total) const {
   return image;
 }
 
+namespace {
+
+std::vector<FluxPicture> render_parts(std::span<const SurfaceField* const> fields,
+                                      const FieldRenderSetup& setup, const CellRange& cells,
+                                      const Executor& executor, const RunControl& control) {
+  const Eigen::Vector2i pixels = setup.optics.pixels;
+  std::vector<FluxImage> images;
+  for (std::size_t f = 0; f < fields.size(); ++f) {
+    images.emplace_back(pixels.x(), pixels.y()).begin(executor);
+  }
+  SurfaceTile tile(setup.optics, setup.grid);
+  const std::vector<CellRange> tiles = tiles_of(cells, setup.tile);
+  for (std::size_t t = 0; t < tiles.size(); ++t) {
+    for (std::size_t f = 0; f < fields.size(); ++f) {
+      if (control.stop_requested()) throw Interrupted();
+      tile.load(*fields[f], tiles[t], executor);
+      images[f].add(executor, tile.cells(), [&tile](std::int64_t cell, const FluxAccumulator& sum) {
+        tile.visit_cell(cell, [&sum](const ImageTriangle& piece) { deposit(piece, sum); });
+      });
+    }
+    control.report({"render surfaces", static_cast<double>(t + 1),
+                    static_cast<double>(tiles.size()), "tiles"});
+  }
+  std::vector<FluxPicture> pictures;
+  for (FluxImage& image : images) {
+    const std::span<const double> flux = image.resolve(executor);
+    pictures.push_back({pixels.x(), pixels.y(), {flux.begin(), flux.end()}});
+  }
+  return pictures;
+}
+
+}  // namespace
+
+std::vector<FluxPicture> render_fields(std::span<const SurfaceField* const> fields,
+                                       const FieldRenderSetup& setup, const Executor& executor,
+                                       const RunControl& control) {
+  return render_parts(fields, setup, all_cells(setup.grid), executor, control);
+}
+
 FluxPicture render_field(const SurfaceField& field, const FieldRenderSetup& setup,
                          const Executor& executor, const RunControl& control) {
   return render_cells(field, setup, all_cells(setup.grid), executor, control);
@@ -28,21 +68,8 @@ FluxPicture render_field(const SurfaceField& field, const FieldRenderSetup& setu
 FluxPicture render_cells(const SurfaceField& field, const FieldRenderSetup& setup,
                          const CellRange& cells, const Executor& executor,
                          const RunControl& control) {
-  const Eigen::Vector2i pixels = setup.optics.pixels;
-  FluxImage image(pixels.x(), pixels.y());
-  image.begin(executor);
-  SurfaceTile tile(setup.optics, setup.grid);
-  const std::vector<CellRange> tiles = tiles_of(cells, setup.tile);
-  for (std::size_t t = 0; t < tiles.size(); ++t) {
-    if (control.stop_requested()) throw Interrupted();
-    tile.load(field, tiles[t], executor);
-    image.add(executor, tile.cells(), [&tile](std::int64_t cell, const FluxAccumulator& sum) {
-      tile.visit_cell(cell, [&sum](const ImageTriangle& piece) { deposit(piece, sum); });
-    });
-    control.report({"render", static_cast<double>(t + 1), static_cast<double>(tiles.size()), ""});
-  }
-  const std::span<const double> flux = image.resolve(executor);
-  return {pixels.x(), pixels.y(), {flux.begin(), flux.end()}};
+  const SurfaceField* const one = &field;
+  return std::move(render_parts({&one, 1}, setup, cells, executor, control).front());
 }
 
 }  // namespace lensforge

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "cam/milled/lens_grid.h"
@@ -39,6 +40,13 @@ struct FieldRenderSetup {
 /// @throw Interrupted if `control` or the executor asks for an end.
 FluxPicture render_field(const SurfaceField& field, const FieldRenderSetup& setup,
                          const Executor& executor, const RunControl& control);
+
+/// Renders several surfaces, tile by tile each tile of all of them in order, so that surfaces which
+/// are made from one another can share samples (HeldField). One picture per surface, with the bits
+/// that it has alone.
+std::vector<FluxPicture> render_fields(std::span<const SurfaceField* const> fields,
+                                       const FieldRenderSetup& setup, const Executor& executor,
+                                       const RunControl& control);
 
 /// What a part of the lens throws, as shares of the whole lens's flux.
 FluxPicture render_cells(const SurfaceField& field, const FieldRenderSetup& setup,

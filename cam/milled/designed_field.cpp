@@ -2,8 +2,10 @@
 #include "cam/milled/designed_field.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -76,7 +78,55 @@ struct NodeBlock {
   std::int64_t column, column_end, row, row_end;
 };
 
-/// Finds the facet of every node of a block and asks `surface(facet, triangle, q)` for the point.
+/// A facet's own points.
+struct FlatFacet {
+  const Facet& facet;
+
+  [[nodiscard]] SurfacePoint operator()(const Eigen::Vector2d& q) const {
+    return {facet.height(q.x(), q.y()), facet.slope};
+  }
+};
+
+/// The smooth surface over a facet: of its three cubics, those that are asked for.
+class SmoothFacet {
+ public:
+  SmoothFacet(const SmoothSurface& surface, const Facet& facet, std::int32_t triangle)
+      : surface_(surface), facet_(facet) {
+    for (int k = 0; k < 3; ++k) corners_.col(k) = surface.mesh().corner(triangle, k).head<2>();
+  }
+
+  /// Beside the facet: on the tangent plane of the nearest point of its rim, about.
+  [[nodiscard]] SurfacePoint operator()(const Eigen::Vector2d& q) {
+    Eigen::Vector3d weights = facet_.barycentric(q.x(), q.y()).cwiseMax(0.0);
+    weights /= weights.sum();
+    const Eigen::Vector2d at = corners_ * weights;
+    int third = 0;
+    weights.minCoeff(&third);
+    const SurfaceShape shape = patch(third).at(at);
+    return {shape.z + shape.slope.dot(q - at), shape.slope};
+  }
+
+ private:
+  /// The cubic of the points whose weight of `corner` is least, found from the middle of its third.
+  [[nodiscard]] const SmoothPatch& patch(int corner) {
+    std::optional<SmoothPatch>& patch = patches_[static_cast<std::size_t>(corner)];
+    if (!patch) {
+      Eigen::Vector3d middle = Eigen::Vector3d::Constant(4.0 / 9.0);
+      middle[corner] = 1.0 / 9.0;
+      patch = surface_.patch_at(corners_ * middle);
+      LF_CHECK(patch.has_value(), std::to_string(corner));
+    }
+    return *patch;
+  }
+
+  const SmoothSurface& surface_;
+  const Facet& facet_;
+  Eigen::Matrix<double, 2, 3> corners_;
+  std::array<std::optional<SmoothPatch>, 3> patches_;
+};
+
+/// Finds the facet of every node of a block and the point over it: `surface(facet, triangle)` makes
+/// what gives the points of a facet.
 template <class Surface>
 class BlockFiller {
  public:
@@ -105,9 +155,10 @@ class BlockFiller {
     return static_cast<std::size_t>(j * patch_.window.columns + i);
   }
 
-  void put(const Facet& facet, std::int32_t triangle, std::int64_t i, std::int64_t j) {
+  template <class Points>
+  void put(Points& points, std::int32_t triangle, std::int64_t i, std::int64_t j) {
     const std::size_t n = node(i, j);
-    const SurfacePoint point = surface_(facet, triangle, patch_.window.node(i, j));
+    const SurfacePoint point = points(patch_.window.node(i, j));
     patch_.z[n] = point.z;
     patch_.slope_x[n] = point.slope.x();
     patch_.slope_y[n] = point.slope.y();
@@ -117,6 +168,7 @@ class BlockFiller {
   void fill_facet(std::int32_t triangle) {
     const GridWindow& window = patch_.window;
     const Facet facet(grid_.mesh(), triangle);
+    auto points = surface_(facet, triangle);
     const auto [row, row_end] =
         nodes_between([&](std::int64_t j) { return window.y(j); }, window.spacing.y(), block_.row,
                       block_.row_end, {facet.low.y(), facet.high.y()});
@@ -127,7 +179,7 @@ class BlockFiller {
       for (std::int64_t i = column; i < column_end; ++i) {
         if (patch_.cut[node(i, j)] >= 0) continue;
         if (facet.barycentric(window.x(i), window.y(j)).minCoeff() < -kOnFacet) continue;
-        put(facet, triangle, i, j);
+        put(points, triangle, i, j);
       }
     }
   }
@@ -140,7 +192,8 @@ class BlockFiller {
       const double outside = facet.outside(q.x(), q.y());
       if (outside >= nearest) continue;
       nearest = outside;
-      put(facet, t, i, j);
+      auto points = surface_(facet, t);
+      put(points, t, i, j);
     }
     if (patch_.cut[node(i, j)] >= 0) return;
     throw InputError("surface: nothing at x " + decimal_text(q.x(), 3) + " y " +
@@ -176,27 +229,19 @@ void fill_window(const FacetGrid& grid, const Surface& surface, const Executor& 
 void FacetField::sample(const GridWindow& window, const Executor& executor,
                         SurfacePatch& patch) const {
   resize_patch(window, true, patch);
-  const auto point = [](const Facet& facet, std::int32_t /*triangle*/, const Eigen::Vector2d& q) {
-    return SurfacePoint{facet.height(q.x(), q.y()), facet.slope};
+  const auto points = [](const Facet& facet, std::int32_t /*triangle*/) {
+    return FlatFacet{facet};
   };
-  fill_window(grid_, point, executor, patch);
+  fill_window(grid_, points, executor, patch);
 }
 
 void SmoothField::sample(const GridWindow& window, const Executor& executor,
                          SurfacePatch& patch) const {
   resize_patch(window, true, patch);
-  const auto point = [this](const Facet& facet, std::int32_t triangle, const Eigen::Vector2d& q) {
-    Eigen::Vector3d weights = facet.barycentric(q.x(), q.y()).cwiseMax(0.0);
-    weights /= weights.sum();
-    Eigen::Vector2d at(0.0, 0.0);
-    for (int k = 0; k < 3; ++k) {
-      at += weights[k] * surface_.mesh().corner(triangle, k).head<2>();
-    }
-    SurfacePoint found = surface_.in_triangle(triangle, weights);
-    found.z += found.slope.dot(q - at);
-    return found;
+  const auto points = [this](const Facet& facet, std::int32_t triangle) {
+    return SmoothFacet(surface_, facet, triangle);
   };
-  fill_window(grid_, point, executor, patch);
+  fill_window(grid_, points, executor, patch);
   patch.cut.clear();
 }
 

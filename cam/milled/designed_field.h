@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "cam/milled/facet_grid.h"
+#include "cam/contact/facet_grid.h"
 #include "cam/milled/surface_field.h"
 #include "core/smooth_surface.h"
 #include "core/surface_mesh.h"

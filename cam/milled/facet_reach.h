@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "cam/milled/facet_grid.h"
+#include "cam/contact/facet_grid.h"
 #include "core/executor.h"
 
 namespace lensforge {

@@ -43,37 +43,31 @@ PolishKernel make_kernel(double sigma, double spacing) {
   return kernel;
 }
 
-/// One line of a node's neighbours, `stride` apart: value(k) for k in low … high. Beyond the rim
-/// heights go on turned about it.
-struct Line {
-  const double* at;  ///< The node's own value.
-  std::int64_t stride;
-  std::int64_t low, high;  ///< Neighbours that lie on the lens: low ≤ 0 ≤ high.
-
-  [[nodiscard]] double operator[](std::int64_t k) const {
-    if (k >= low && k <= high) return at[k * stride];
-    const std::int64_t rim = k < low ? low : high;
-    const double inside = at[std::clamp(2 * rim - k, low, high) * stride];
-    return 2.0 * at[rim * stride] - inside;
+/// Averages over the neighbours of many nodes at once: `values(k)` points to the k-th neighbours of
+/// nodes 0 … count − 1. Every node's sum runs outwards, whatever nodes are beside it.
+template <class Values>
+void average(const Values& values, const PolishKernel& kernel, std::int64_t count, double* out) {
+  const double* const own = values(0);
+  for (std::int64_t n = 0; n < count; ++n) out[n] = kernel.average[0] * own[n];
+  for (std::int64_t k = 1; k <= kernel.reach(); ++k) {
+    const double weight = kernel.average[index_of(k)];
+    const double* const before = values(-k);
+    const double* const after = values(k);
+    for (std::int64_t n = 0; n < count; ++n) out[n] += weight * (before[n] + after[n]);
   }
-};
-
-double averaged(const Line& line, const PolishKernel& kernel) {
-  const auto reach = static_cast<std::int64_t>(kernel.average.size()) - 1;
-  double sum = kernel.average[0] * line.at[0];
-  for (std::int64_t k = 1; k <= reach; ++k) {
-    sum += kernel.average[index_of(k)] * (line[-k] + line[k]);
-  }
-  return sum;
 }
 
-double sloped(const Line& line, const PolishKernel& kernel) {
-  const auto reach = static_cast<std::int64_t>(kernel.slope.size()) - 1;
-  double sum = 0.0;
-  for (std::int64_t k = 1; k <= reach; ++k) {
-    sum += kernel.slope[index_of(k)] * (line[k] - line[-k]);
+/// Slopes likewise.
+template <class Values>
+void differentiate(const Values& values, const PolishKernel& kernel, std::int64_t count,
+                   double* out) {
+  std::fill(out, out + count, 0.0);
+  for (std::int64_t k = 1; k <= kernel.reach(); ++k) {
+    const double weight = kernel.slope[index_of(k)];
+    const double* const before = values(-k);
+    const double* const after = values(k);
+    for (std::int64_t n = 0; n < count; ++n) out[n] += weight * (after[n] - before[n]);
   }
-  return sum;
 }
 
 }  // namespace
@@ -120,32 +114,71 @@ void PolishedField::sample(const GridWindow& window, const Executor& executor,
   SurfacePatch raw;
   surface_.sample(around, executor, raw);
   resize_patch(window, false, patch);
-  std::vector<double> average(index_of(around.rows * window.columns));
-  std::vector<double> slope(average.size());
+  // Averages and slopes along x of every row that the kernel along y reaches.
+  const std::int64_t rows = window.rows + 2 * y.kernel.reach();
+  std::vector<double> averages(index_of(rows * window.columns));
+  std::vector<double> slopes(averages.size());
   const auto along_x = [&](std::int64_t row) {
-    for (std::int64_t i = x.begin; i < x.end; ++i) {
-      const Line line{&raw.z[index_of(row * around.columns + i - x.sampled)], 1, x.sampled - i,
-                      x.sampled_end - 1 - i};
-      const std::size_t n = index_of(row * window.columns + i - x.begin);
-      average[n] = averaged(line, x.kernel);
-      slope[n] = sloped(line, x.kernel);
-    }
+    const std::vector<double> line = turned_line(x, &raw.z[index_of(row * around.columns)]);
+    const auto values = [&](std::int64_t k) { return &line[index_of(x.kernel.reach() + k)]; };
+    const std::int64_t to = row + y.sampled - y.begin + y.kernel.reach();
+    average(values, x.kernel, window.columns, &averages[index_of(to * window.columns)]);
+    differentiate(values, x.kernel, window.columns, &slopes[index_of(to * window.columns)]);
   };
   parallel_for(executor, "polish along x", around.rows, along_x, 4);
+  turn_rows(y, window.columns, averages);
+  turn_rows(y, window.columns, slopes);
   const auto along_y = [&](std::int64_t row) {
-    const std::int64_t j = row + y.begin;
-    for (std::int64_t i = 0; i < window.columns; ++i) {
-      const std::size_t from = index_of((j - y.sampled) * window.columns + i);
-      const std::size_t n = index_of(row * window.columns + i);
-      const Line line{&average[from], window.columns, y.sampled - j, y.sampled_end - 1 - j};
-      patch.z[n] = averaged(line, y.kernel);
-      patch.slope_y[n] = sloped(line, y.kernel);
-      patch.slope_x[n] =
-          averaged({&slope[from], window.columns, y.sampled - j, y.sampled_end - 1 - j}, y.kernel);
-    }
+    const auto rows_of = [&](const std::vector<double>& from) {
+      return [&, row](std::int64_t k) {
+        return &from[index_of((row + y.kernel.reach() + k) * window.columns)];
+      };
+    };
+    const std::size_t n = index_of(row * window.columns);
+    average(rows_of(averages), y.kernel, window.columns, &patch.z[n]);
+    differentiate(rows_of(averages), y.kernel, window.columns, &patch.slope_y[n]);
+    average(rows_of(slopes), y.kernel, window.columns, &patch.slope_x[n]);
   };
   parallel_for(executor, "polish along y", window.rows, along_y, 4);
   take_off_rim(executor, patch);
+}
+
+/// Where the value of neighbour `at` of an axis comes from beyond the rim: turned about the last
+/// node on the lens.
+PolishedField::Turned PolishedField::Axis::turned(std::int64_t at) const {
+  const std::int64_t last = at < sampled ? sampled : sampled_end - 1;
+  return {last, std::clamp(2 * last - at, sampled, sampled_end - 1)};
+}
+
+/// A row's heights from `reach` before the nodes asked for to `reach` after them. @param heights of
+/// the nodes that were sampled.
+std::vector<double> PolishedField::turned_line(const Axis& x, const double* heights) {
+  std::vector<double> line;
+  line.reserve(index_of(x.end - x.begin + 2 * x.kernel.reach()));
+  for (std::int64_t i = x.begin - x.kernel.reach(); i < x.end + x.kernel.reach(); ++i) {
+    if (i >= x.sampled && i < x.sampled_end) {
+      line.push_back(heights[i - x.sampled]);
+      continue;
+    }
+    const Turned from = x.turned(i);
+    line.push_back(2.0 * heights[from.rim - x.sampled] - heights[from.inside - x.sampled]);
+  }
+  return line;
+}
+
+/// Fills the rows beyond the rim likewise. @param values  row by row from `reach` before the nodes
+/// asked for.
+void PolishedField::turn_rows(const Axis& y, std::int64_t columns, std::vector<double>& values) {
+  const std::int64_t first = y.begin - y.kernel.reach();
+  const auto row_of = [&](std::int64_t j) { return &values[index_of((j - first) * columns)]; };
+  for (std::int64_t j = first; j < y.end + y.kernel.reach(); ++j) {
+    if (j >= y.sampled && j < y.sampled_end) continue;
+    const Turned from = y.turned(j);
+    const double* const rim = row_of(from.rim);
+    const double* const inside = row_of(from.inside);
+    double* const to = row_of(j);
+    for (std::int64_t i = 0; i < columns; ++i) to[i] = 2.0 * rim[i] - inside[i];
+  }
 }
 
 void PolishedField::take_off_rim(const Executor& executor, SurfacePatch& patch) const {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <cstdint>
 #include <vector>
 
 #include "cam/milled/surface_field.h"
@@ -13,6 +14,8 @@ namespace lensforge {
 struct PolishKernel {
   std::vector<double> average;
   std::vector<double> slope;  ///< 1/mm
+
+  [[nodiscard]] std::int64_t reach() const { return static_cast<std::int64_t>(average.size()) - 1; }
 };
 
 /// What polishing does to a surface; all lengths in mm.
@@ -51,6 +54,10 @@ class PolishedField final : public SurfaceField {
               SurfacePatch& patch) const override;
 
  private:
+  /// A node beyond the rim is twice the one on it less the one inside.
+  struct Turned {
+    std::int64_t rim, inside;
+  };
   /// Nodes of one axis of a window, in the grid: those asked for, and those of the lens that their
   /// kernels reach.
   struct Axis {
@@ -58,9 +65,13 @@ class PolishedField final : public SurfaceField {
     std::int64_t sampled, sampled_end;  ///< Sampled.
     std::int64_t rim, rim_end;          ///< Of the lens.
     PolishKernel kernel;
+
+    [[nodiscard]] Turned turned(std::int64_t at) const;
   };
 
   [[nodiscard]] Axis make_axis(int axis, const GridWindow& window) const;
+  static std::vector<double> turned_line(const Axis& x, const double* heights);
+  static void turn_rows(const Axis& y, std::int64_t columns, std::vector<double>& values);
   void take_off_rim(const Executor& executor, SurfacePatch& patch) const;
 
   const SurfaceField& surface_;

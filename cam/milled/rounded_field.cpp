@@ -15,17 +15,24 @@ constexpr std::int64_t kRun = 256;
 
 std::size_t index_of(std::int64_t value) { return static_cast<std::size_t>(value); }
 
+TangentPlane plane_at(const SurfacePatch& patch, std::size_t node) {
+  return {patch.z[node], {patch.slope_x[node], patch.slope_y[node]}};
+}
+
 }  // namespace
 
-RoundedField::RoundedField(const FacetField& designed, const DropCutter& cutter,
-                           const Executor& executor)
+RoundedField::RoundedField(const SurfaceField& designed, const FacetGrid& grid,
+                           const DropCutter& cutter, const Executor& executor)
     : designed_(designed),
       radius_(cutter.radius()),
       search_(LowestBallSearch(cutter)),
-      reach_(FacetReach(designed.grid(), radius_, executor)) {}
+      reach_(FacetReach(grid, radius_, executor)) {}
 
-RoundedField::RoundedField(const SurfaceField& designed, const CutSurface& cut, double error)
-    : designed_(designed), radius_(cut.radius()), error_(error), cut_(&cut) {}
+RoundedField::RoundedField(const SurfaceField& designed, const CutSurface& cut, double error,
+                           const Executor& executor)
+    : designed_(designed), radius_(cut.radius()), error_(error), cut_(&cut) {
+  if (cut.bed() != nullptr) smooth_reach_.emplace(*cut.bed(), executor);
+}
 
 void RoundedField::sample(const GridWindow& window, const Executor& executor,
                           SurfacePatch& patch) const {
@@ -42,34 +49,62 @@ void RoundedField::sample(const GridWindow& window, const Executor& executor, Su
     round(*search_, {{0, window.columns}, {0, window.rows}}, executor, patch, creases);
     return;
   }
-  // Squares are laid from (0, 0), so that a node's facets do not depend on the window.
-  const auto square_of = [](double x) { return std::floor(x / kPatch); };
-  const auto end_of = [&](std::int64_t begin, std::int64_t count, const auto& at) {
-    std::int64_t end = begin + 1;
-    while (end < count && square_of(at(end)) == square_of(at(begin))) ++end;
-    return end;
+  const std::vector<Range> squares = squares_of(window);
+  const auto round_square = [&](std::int64_t i) {
+    round_facets_of(squares[index_of(i)], patch, creases);
   };
-  const auto x = [&](std::int64_t i) { return window.x(i); };
-  const auto y = [&](std::int64_t j) { return window.y(j); };
-  for (std::int64_t row = 0; row < window.rows;) {
-    const std::int64_t row_end = end_of(row, window.rows, y);
-    for (std::int64_t column = 0; column < window.columns;) {
-      const std::int64_t column_end = end_of(column, window.columns, x);
-      const Eigen::Vector2d corner(square_of(x(column)) * kPatch, square_of(y(row)) * kPatch);
-      round_facets_of({{column, column_end}, {row, row_end}},
-                      {corner, corner + Eigen::Vector2d(kPatch, kPatch)}, executor, patch, creases);
-      column = column_end;
-    }
-    row = row_end;
-  }
+  parallel_for(executor, "rounded squares", std::ssize(squares), round_square, 1);
 }
 
-void RoundedField::round_facets_of(const Range& range, const Eigen::AlignedBox2d& box,
-                                   const Executor& executor, SurfacePatch& patch,
+/// Squares of kPatch, counted from (0, 0).
+std::vector<RoundedField::Range> RoundedField::squares_of(const GridWindow& window) {
+  const auto parts = [](std::int64_t count, const auto& at) {
+    std::vector<std::pair<std::int64_t, std::int64_t>> found;
+    const auto square_of = [&](std::int64_t i) { return std::floor(at(i) / kPatch); };
+    for (std::int64_t begin = 0; begin < count;) {
+      std::int64_t end = begin + 1;
+      while (end < count && square_of(end) == square_of(begin)) ++end;
+      found.emplace_back(begin, end);
+      begin = end;
+    }
+    return found;
+  };
+  const auto columns = parts(window.columns, [&](std::int64_t i) { return window.x(i); });
+  std::vector<Range> squares;
+  for (const auto& rows : parts(window.rows, [&](std::int64_t j) { return window.y(j); })) {
+    for (const auto& some : columns) squares.push_back({some, rows});
+  }
+  return squares;
+}
+
+/// Facets are made where nodes may be in a fillet, and for these alone.
+void RoundedField::round_facets_of(const Range& range, SurfacePatch& patch,
                                    CreasePatch& creases) const {
+  Eigen::AlignedBox2d doubtful;
+  for (std::int64_t row = range.rows.first; row < range.rows.second; ++row) {
+    for (std::int64_t i = range.columns.first; i < range.columns.second; ++i) {
+      const std::size_t n = index_of(row * patch.window.columns + i);
+      const Eigen::Vector2d q = patch.window.node(i, row);
+      if (!surely_free(n, tangent_ball(q, plane_at(patch, n)), patch)) doubtful.extend(q);
+    }
+  }
+  if (doubtful.isEmpty()) return;
   const Eigen::Vector2d around(radius_, radius_);
-  const auto cutter = cut_->cutter({box.min() - around, box.max() + around}, executor);
-  round(LowestBallSearch(*cutter, error_), range, executor, patch, creases);
+  const Executor serial = Executor::serial();
+  const auto cutter = cut_->cutter({doubtful.min() - around, doubtful.max() + around}, serial);
+  round(LowestBallSearch(*cutter, error_), range, serial, patch, creases);
+}
+
+bool RoundedField::surely_free(std::size_t node, const Eigen::Vector3d& centre,
+                               const SurfacePatch& patch) const {
+  if (reach_) return reach_->surely_free(patch.cut[node], centre);
+  return smooth_reach_ && smooth_reach_->surely_free(centre.head<2>());
+}
+
+Eigen::Vector3d RoundedField::tangent_ball(const Eigen::Vector2d& q,
+                                           const TangentPlane& plane) const {
+  const Eigen::Vector3d up(-plane.slope.x(), -plane.slope.y(), 1.0);
+  return Eigen::Vector3d(q.x(), q.y(), plane.z) + radius_ * up.normalized();
 }
 
 void RoundedField::round(const LowestBallSearch& search, const Range& range,
@@ -85,11 +120,8 @@ void RoundedField::round(const LowestBallSearch& search, const Range& range,
     for (std::int64_t i = begin; i < std::min(range.columns.second, begin + kRun); ++i) {
       const std::size_t n = index_of(row * patch.window.columns + i);
       const Eigen::Vector2d q = patch.window.node(i, row);
-      const TangentPlane plane{patch.z[n], {patch.slope_x[n], patch.slope_y[n]}};
-      const Eigen::Vector3d normal =
-          Eigen::Vector3d(-plane.slope.x(), -plane.slope.y(), 1.0).normalized();
-      const Eigen::Vector3d tangent = Eigen::Vector3d(q.x(), q.y(), plane.z) + radius_ * normal;
-      if (reach_ && reach_->surely_free(patch.cut[n], tangent)) continue;
+      const TangentPlane plane = plane_at(patch, n);
+      if (surely_free(n, tangent_ball(q, plane), patch)) continue;
       const LowestBall ball = search.over(q, plane, near);
       if (!(ball.z > plane.z)) continue;
       patch.z[n] = ball.z;

@@ -12,6 +12,7 @@
 #include "cam/milled/designed_field.h"
 #include "cam/milled/facet_reach.h"
 #include "cam/milled/lowest_ball.h"
+#include "cam/milled/smooth_reach.h"
 #include "cam/milled/surface_field.h"
 
 namespace lensforge {
@@ -35,17 +36,19 @@ class RoundedField final : public SurfaceField {
   static constexpr std::int32_t kFillet = -1;
 
   /// Rounds the facets of a mesh. All must outlive the field; `cutter` was built on the mesh of
-  /// `designed`.
-  RoundedField(const FacetField& designed, const DropCutter& cutter, const Executor& executor);
+  /// `grid`, and `designed` samples its facets.
+  RoundedField(const SurfaceField& designed, const FacetGrid& grid, const DropCutter& cutter,
+               const Executor& executor);
 
   /// Rounds any surface, of which the facets of `cut` are an approximation; fillets follow those,
-  /// everything else the surface. Facets are made for a square of kPatch at a time. Both must
-  /// outlive the field.
+  /// everything else the surface. Facets are made for a square of kPatch at a time, and where the
+  /// surface bends less than the ball not at all. Both must outlive the field.
   /// @param error  how far those facets may lie from the surface, mm: a ball that cuts no deeper
   ///               into them does not count as held.
-  RoundedField(const SurfaceField& designed, const CutSurface& cut, double error);
+  RoundedField(const SurfaceField& designed, const CutSurface& cut, double error,
+               const Executor& executor);
 
-  static constexpr double kPatch = 10.0;  ///< mm
+  static constexpr double kPatch = 2.0;  ///< mm
 
   void sample(const GridWindow& window, const Executor& executor,
               SurfacePatch& patch) const override;
@@ -61,17 +64,23 @@ class RoundedField final : public SurfaceField {
     std::pair<std::int64_t, std::int64_t> rows;
   };
 
-  void round_facets_of(const Range& range, const Eigen::AlignedBox2d& box, const Executor& executor,
-                       SurfacePatch& patch, CreasePatch& creases) const;
+  static std::vector<Range> squares_of(const GridWindow& window);
+  void round_facets_of(const Range& range, SurfacePatch& patch, CreasePatch& creases) const;
   void round(const LowestBallSearch& search, const Range& range, const Executor& executor,
              SurfacePatch& patch, CreasePatch& creases) const;
+  /// Centre of the ball that touches the surface from above over q.
+  [[nodiscard]] Eigen::Vector3d tangent_ball(const Eigen::Vector2d& q,
+                                             const TangentPlane& plane) const;
+  [[nodiscard]] bool surely_free(std::size_t node, const Eigen::Vector3d& centre,
+                                 const SurfacePatch& patch) const;
 
   const SurfaceField& designed_;
   double radius_;
   double error_ = 0.0;
   const CutSurface* cut_ = nullptr;         ///< Null for the facets of a mesh.
   std::optional<LowestBallSearch> search_;  ///< Of the facets of a mesh.
-  std::optional<FacetReach> reach_;
+  std::optional<FacetReach> reach_;         ///< Likewise.
+  std::optional<SmoothReach> smooth_reach_;
 };
 
 }  // namespace lensforge

@@ -69,7 +69,8 @@ void MilledNodes(benchmark::State& state) { run(state, milled_lens()); }
 BENCHMARK(MilledNodes)->ArgName("threads")->Arg(1)->Arg(2)->UseRealTime();
 
 void RoundedNodes(benchmark::State& state) {
-  static const RoundedField field(lens_facets(), lens_cutter(), Executor::cpu());
+  static const RoundedField field(lens_facets(), lens_facets().grid(), lens_cutter(),
+                                  Executor::cpu());
   run(state, field);
 }
 BENCHMARK(RoundedNodes)->ArgName("threads")->Arg(1)->Arg(2)->UseRealTime();

@@ -21,7 +21,7 @@ struct Rounded {
       : mesh(surface),
         cutter(mesh, kRadius, Executor::serial()),
         designed(mesh),
-        field(designed, cutter, Executor::serial()) {}
+        field(designed, designed.grid(), cutter, Executor::serial()) {}
 
   SurfaceMesh mesh;
   DropCutter cutter;
@@ -188,7 +188,7 @@ TEST(RoundedField, EqualsTheBestOfManyBalls) {
 TEST(RoundedField, LeavingOutFacetsThatCannotBeCutChangesNoBit) {
   const Rounded rounded(creased_relief());
   const FacetSurface facets(rounded.mesh, kRadius, Executor::serial());
-  const RoundedField plain(rounded.designed, facets, 0.0);
+  const RoundedField plain(rounded.designed, facets, 0.0, Executor::serial());
   const GridWindow window = testing::window_at({0.0, 0.0}, 0.01, 200, 200);
   const SurfacePatch a = testing::sampled(rounded.field, window);
   const SurfacePatch b = testing::sampled(plain, window);
@@ -216,7 +216,7 @@ TEST(RoundedField, SmoothSurfaceKeepsWhatTheBallDoesNotReach) {
   const SmoothSurface surface(mesh);
   const SmoothField designed(surface);
   const SmoothCutSurface cut(mesh, kRadius, {1e-4, 5e-2, 1'000'000}, Executor::serial());
-  const RoundedField field(designed, cut, 1e-4);
+  const RoundedField field(designed, cut, 1e-4, Executor::serial());
   const GridWindow window = testing::window_at({0.5, 0.25}, 0.005, 201, 3);
   SurfacePatch patch;
   CreasePatch creases;
@@ -246,8 +246,46 @@ TEST(RoundedField, SmoothSurfaceHasTheSameBitsForAnyTilesAndThreads) {
   const SmoothSurface surface(mesh);
   const SmoothField designed(surface);
   const SmoothCutSurface cut(mesh, kRadius, {1e-3, 0.2, 1'000'000}, Executor::serial());
-  testing::expect_same_bits_in_tiles(RoundedField(designed, cut, 1e-3),
+  testing::expect_same_bits_in_tiles(RoundedField(designed, cut, 1e-3, Executor::serial()),
                                      testing::window_at({9.0, 1.0}, 0.02, 120, 60));
+}
+
+/// Facets of a smooth surface without what it is said to bend.
+class BareFacets final : public CutSurface {
+ public:
+  explicit BareFacets(const SmoothCutSurface& cut) : cut_(cut) {}
+  [[nodiscard]] std::shared_ptr<const DropCutter> cutter(const Eigen::AlignedBox2d& axis,
+                                                         const Executor& executor) const override {
+    return cut_.cutter(axis, executor);
+  }
+  [[nodiscard]] double radius() const override { return cut_.radius(); }
+
+ private:
+  const SmoothCutSurface& cut_;
+};
+
+TEST(RoundedField, PlacesThatBendLessThanTheBallNeedNoFacets) {
+  const SurfaceMesh mesh = testing::grid_mesh(41, 21, 4.0, 2.0, [](double x, double y) {
+    return testing::lens_relief(x, y) + 0.3 * std::abs(x - 1.9 - 0.2 * y);
+  });
+  const SmoothSurface surface(mesh);
+  const SmoothField designed(surface);
+  const SmoothCutSurface cut(mesh, kRadius, {1e-4, 5e-2, 1'000'000}, Executor::serial());
+  const SmoothReach reach(*cut.bed(), Executor::serial());
+  const GridWindow window = testing::window_at({0.0, 0.0}, 0.04, 101, 51);
+  const SurfacePatch plain = testing::sampled(
+      RoundedField(designed, BareFacets(cut), cut.deviation().height, Executor::serial()), window);
+  const SurfacePatch patch = testing::sampled(
+      RoundedField(designed, cut, cut.deviation().height, Executor::serial()), window);
+  EXPECT_EQ(patch.z, plain.z);
+  EXPECT_EQ(patch.slope_x, plain.slope_x);
+  EXPECT_EQ(patch.slope_y, plain.slope_y);
+  std::int64_t free = 0;
+  for (std::int64_t n = 0; n < window.size(); ++n) {
+    free += reach.surely_free(window.node(n % 101, n / 101)) ? 1 : 0;
+  }
+  EXPECT_GT(free, window.size() / 2);
+  EXPECT_LT(free, window.size());
 }
 
 }  // namespace

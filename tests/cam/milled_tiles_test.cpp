@@ -9,6 +9,7 @@
 #include "cam/cam_meshes.h"
 #include "cam/milled/crease_map.h"
 #include "cam/milled/designed_field.h"
+#include "cam/milled/held_field.h"
 #include "cam/milled/lens_grid.h"
 #include "cam/milled/sampled_mesh.h"
 #include "cam/milled_paths.h"
@@ -50,6 +51,48 @@ TEST(FieldTiles, MeshOfASampledMeshIsTheMesh) {
   EXPECT_LT((back.vertices - mesh.vertices).cwiseAbs().maxCoeff(), 1e-12);
 }
 
+/// Counts how often it is sampled.
+class CountedField final : public SurfaceField {
+ public:
+  explicit CountedField(const SurfaceField& field) : field_(field) {}
+  void sample(const GridWindow& window, const Executor& executor,
+              SurfacePatch& patch) const override {
+    ++count;
+    field_.sample(window, executor, patch);
+  }
+  mutable int count = 0;
+
+ private:
+  const SurfaceField& field_;
+};
+
+TEST(HeldField, GivesPartsOfWhatItHoldsAndSamplesOthers) {
+  const SurfaceMesh mesh = testing::grid_mesh(9, 7, 4.0, 3.0, testing::lens_relief);
+  const FacetField facets(mesh);
+  const CountedField counted(facets);
+  const HeldField held(counted);
+  const GridWindow whole = testing::window_at({0.0, 0.0}, 0.1, 41, 31);
+  GridWindow part = whole;
+  part.first_column = 3;
+  part.first_row = 5;
+  part.columns = 11;
+  part.rows = 26;
+  const SurfacePatch all = testing::sampled(held, whole);
+  const SurfacePatch some = testing::sampled(held, part);
+  EXPECT_EQ(counted.count, 1);
+  EXPECT_EQ(all.z, testing::sampled(facets, whole).z);
+  const SurfacePatch own = testing::sampled(facets, part);
+  EXPECT_EQ(some.z, own.z);
+  EXPECT_EQ(some.slope_x, own.slope_x);
+  EXPECT_EQ(some.slope_y, own.slope_y);
+  EXPECT_EQ(some.cut, own.cut);
+  GridWindow shifted = part;
+  shifted.origin.x() = 0.05;
+  EXPECT_EQ(testing::sampled(held, shifted).z, testing::sampled(facets, shifted).z);
+  EXPECT_EQ(testing::sampled(held, whole).z, all.z);
+  EXPECT_EQ(counted.count, 3);
+}
+
 TEST(CreaseMap, FindsTheGroovesDepthWidthAndShare) {
   // Two grooves along y: at x = 1 with a turn of 2·atan(0.3), at x = 3 of 2·atan(0.1).
   const SurfaceMesh mesh = testing::grid_mesh(9, 5, 4.0, 2.0, [](double x, double) {
@@ -57,7 +100,7 @@ TEST(CreaseMap, FindsTheGroovesDepthWidthAndShare) {
   });
   const FacetField designed(mesh);
   const DropCutter cutter(mesh, kRadius, Executor::serial());
-  const RoundedField field(designed, cutter, Executor::serial());
+  const RoundedField field(designed, designed.grid(), cutter, Executor::serial());
   const GridWindow grid = testing::window_at({0.0, 0.0}, 0.0025, 1601, 801);
   const CreaseMap map = map_creases(field, grid, {1.0, 10, 0.9}, Executor::cpu(2), {});
   ASSERT_TRUE(map.complete);
@@ -82,7 +125,7 @@ TEST(CreaseMap, ASurfaceWithoutValleysHasNone) {
       9, 5, 4.0, 2.0, [](double x, double y) { return 5.0 - 0.1 * std::abs(x - 2.0) + 0.2 * y; });
   const FacetField designed(mesh);
   const DropCutter cutter(mesh, kRadius, Executor::serial());
-  const RoundedField field(designed, cutter, Executor::serial());
+  const RoundedField field(designed, designed.grid(), cutter, Executor::serial());
   const CreaseMap map = map_creases(field, testing::window_at({0.0, 0.0}, 0.02, 201, 101), {},
                                     Executor::serial(), {});
   EXPECT_TRUE(map.worst.empty());

@@ -111,6 +111,21 @@ TEST(RenderField, APrismShiftsTheLight) {
       1e-5);
 }
 
+TEST(RenderField, SurfacesRenderedTogetherHaveThePicturesTheyHaveAlone) {
+  const AnalyticField flat(testing::plane({0.11, -0.07}));
+  const AnalyticField bent([](const Eigen::Vector2d& p) {
+    return SurfacePoint{6.0 - p.squaredNorm() / 30.0, -p / 15.0, p.x() < 2.013 ? 1 : 2};
+  });
+  const FieldRenderSetup setup = setup_of(0.05, 19);
+  const std::vector<const SurfaceField*> fields{&flat, &bent};
+  const std::vector<FluxPicture> pictures =
+      render_fields(fields, setup, Executor::cpu(2), RunControl());
+  ASSERT_EQ(pictures.size(), 2U);
+  EXPECT_EQ(pictures[0].flux, render(flat, setup).flux);
+  EXPECT_EQ(pictures[1].flux, render(bent, setup).flux);
+  EXPECT_NE(pictures[0].flux, pictures[1].flux);
+}
+
 TEST(RenderField, ACylinderSpreadsTheLightAsRaysDo) {
   const AnalyticField field([](const Eigen::Vector2d& p) {
     const double x = p.x() - 1.7;

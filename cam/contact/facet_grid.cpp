@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "cam/milled/facet_grid.h"
+#include "cam/contact/facet_grid.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cam/milled/held_field.h"
+
+#include <algorithm>
+#include <cstddef>
+
+namespace lensforge {
+namespace {
+
+bool same_grid(const GridWindow& a, const GridWindow& b) {
+  return a.origin == b.origin && a.spacing == b.spacing;
+}
+
+bool contains(const GridWindow& all, const GridWindow& part) {
+  return part.first_column >= all.first_column && part.first_row >= all.first_row &&
+         part.first_column + part.columns <= all.first_column + all.columns &&
+         part.first_row + part.rows <= all.first_row + all.rows;
+}
+
+/// Copies the part of a patch's values that lies in a window.
+template <class Value>
+void copy_part(const GridWindow& all, const std::vector<Value>& from, const GridWindow& part,
+               std::vector<Value>& to) {
+  if (to.empty()) return;
+  const std::int64_t column = part.first_column - all.first_column;
+  const std::int64_t row = part.first_row - all.first_row;
+  for (std::int64_t j = 0; j < part.rows; ++j) {
+    const auto begin = from.begin() + (row + j) * all.columns + column;
+    std::copy(begin, begin + part.columns, to.begin() + j * part.columns);
+  }
+}
+
+}  // namespace
+
+void HeldField::sample(const GridWindow& window, const Executor& executor,
+                       SurfacePatch& patch) const {
+  const GridWindow& all = held_.window;
+  if (!same_grid(all, window) || !contains(all, window)) {
+    held_.window = {};  // Until the sample is whole.
+    field_.sample(window, executor, held_);
+    held_.window = window;
+  }
+  resize_patch(window, !held_.cut.empty(), patch);
+  copy_part(all, held_.z, window, patch.z);
+  copy_part(all, held_.slope_x, window, patch.slope_x);
+  copy_part(all, held_.slope_y, window, patch.slope_y);
+  copy_part(all, held_.cut, window, patch.cut);
+}
+
+}  // namespace lensforge

@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What `lensforge cam` with its defaults costs for one lens folder: seconds and processor seconds
+// of every stage, seconds of every kernel, peak memory.
+//   cam_bench LENS_FOLDER OUT_FOLDER [THREADS] [smooth|facet]
+#include <sys/resource.h>
+
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <exception>
+#include <filesystem>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "cam/cam_job.h"
+#include "core/lens.h"
+
+namespace lensforge {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+/// Seconds that all threads of this process have worked.
+double cpu_seconds() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  const auto seconds = [](const timeval& time) {
+    return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
+  };
+  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
+}
+
+double peak_megabytes() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<double>(usage.ru_maxrss) / 1024.0;
+}
+
+/// Prints what passed since it was told last, under the name of the stage that was told.
+class StageClock {
+ public:
+  void tell(const std::string& stage) {
+    if (stage == stage_) return;
+    end();
+    stage_ = stage;
+  }
+
+  void end() {
+    const Clock::time_point now = Clock::now();
+    const double cpu = cpu_seconds();
+    std::printf("%-28s %8.1f s %8.1f cpu s %8.0f MB\n", stage_.c_str(),
+                std::chrono::duration<double>(now - last_).count(), cpu - cpu_, peak_megabytes());
+    std::fflush(stdout);
+    last_ = now;
+    cpu_ = cpu;
+  }
+
+ private:
+  std::string stage_ = "begin";
+  Clock::time_point last_ = Clock::now();
+  double cpu_ = 0.0;
+};
+
+int run(const std::vector<std::string>& words) {
+  if (words.size() < 2) {
+    std::fprintf(stderr, "usage: cam_bench LENS_FOLDER OUT_FOLDER [THREADS] [smooth|facet]\n");
+    return EXIT_FAILURE;
+  }
+  StageClock clock;
+  const Lens lens = read_lens(words[0]);
+  KernelProfile profile;
+  const Executor executor =
+      Executor::cpu(words.size() > 2 ? std::stoi(words[2]) : 0).with_profile(&profile);
+  CamOptions options;
+  if (words.size() > 3 && words[3] == "facet") options.surface = SurfaceModel::kFacet;
+  const RunControl control({}, [&](const Progress& progress) { clock.tell(progress.stage); });
+  const CamResult result = make_cut(lens, options, words[1], executor, control);
+  clock.tell("all");
+  std::printf("%-28s %8.1f s %8.1f cpu s %8.0f MB\n", "all", result.report.seconds, cpu_seconds(),
+              peak_megabytes());
+  for (const auto& [kernel, entry] : profile.entries()) {
+    if (entry.seconds < 0.05) continue;
+    std::printf("  %-26s %8.1f s %8lld calls\n", kernel.c_str(), entry.seconds,
+                static_cast<long long>(entry.calls));
+  }
+  const PictureQuality& part = result.report.leakage.part().quality;
+  std::printf("minutes %.1f, leakage %.5f, MAE %.5f\n", result.report.minutes(), part.leakage,
+              part.metrics.mae);
+  return result.done() ? EXIT_SUCCESS : EXIT_FAILURE;
+}
+
+}  // namespace
+}  // namespace lensforge
+
+int main(int argc, char** argv) {
+  try {
+    return lensforge::run({argv + 1, argv + argc});
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "cam_bench: %s\n", error.what());
+    return EXIT_FAILURE;
+  }
+}
