@@ -2,6 +2,7 @@
 #include "cam/cam_job.h"
 
 #include <chrono>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <system_error>
@@ -28,35 +29,43 @@ namespace fs = std::filesystem;
 
 using Clock = std::chrono::steady_clock;
 
+/// How finely the smooth surface is cut into facets where the ball's reach is judged: only heights
+/// count, since a fillet's slopes are the ball's.
+constexpr SmoothCutOptions kReachCut{1e-4, std::numeric_limits<double>::infinity()};
+
 /// A surface as it is meant: the facets of a mesh, or the smooth surface through its vertices.
 class MeantSurface {
  public:
-  MeantSurface(const SurfaceMesh& mesh, SurfaceModel model) {
+  /// @param radius  of the ball.
+  MeantSurface(const SurfaceMesh& mesh, SurfaceModel model, double radius,
+               const Executor& executor) {
     if (model == SurfaceModel::kFacet) {
       facets_.emplace(mesh);
       held_.emplace(*facets_);
     } else {
-      smooth_.emplace(mesh);
-      field_.emplace(*smooth_);
+      smooth_.emplace(mesh, radius, kReachCut, executor);
+      field_.emplace(smooth_->surface());
       held_.emplace(*field_);
     }
   }
 
   [[nodiscard]] const SurfaceField& field() const { return *held_; }
 
-  /// What the ball of `cut` can reach of it; both must outlive the result.
+  /// What the ball can reach of it. `cut` is the same surface; both must outlive the result.
   [[nodiscard]] std::unique_ptr<RoundedField> rounded(const CutSurface& cut,
                                                       const Eigen::AlignedBox2d& rectangle,
                                                       const Executor& executor) {
-    if (!facets_)
-      return std::make_unique<RoundedField>(*held_, cut, cut.deviation().height, executor);
+    if (!facets_) {
+      return std::make_unique<RoundedField>(*held_, *smooth_, smooth_->deviation().height,
+                                            executor);
+    }
     cutter_ = cut.cutter(rectangle, executor);
     return std::make_unique<RoundedField>(*held_, facets_->grid(), *cutter_, executor);
   }
 
  private:
   std::optional<FacetField> facets_;
-  std::optional<SmoothSurface> smooth_;
+  std::optional<SmoothCutSurface> smooth_;
   std::optional<SmoothField> field_;
   std::optional<HeldField> held_;
   std::shared_ptr<const DropCutter> cutter_;
@@ -115,11 +124,12 @@ class Job {
 
  private:
   Prediction predict(const ProgramFiles& programs) {
-    MeantSurface cut(plan_.mesh(), options_.surface);
+    const double radius = plan_.surface().radius();
+    MeantSurface cut(plan_.mesh(), options_.surface, radius, executor_);
     const auto rounded = cut.rounded(plan_.surface(), cut_rectangle(), executor_);
     // A mould's own surface is another than that of the lens that is cast in it.
     std::optional<MeantSurface> lens;
-    if (plan_.mould()) lens.emplace(lens_.surface, options_.surface);
+    if (plan_.mould()) lens.emplace(lens_.surface, options_.surface, radius, executor_);
     const Eigen::AlignedBox2d rectangle(Eigen::Vector2d(0.0, 0.0), lens_.setup.lens_size);
     const PartSurfaces surfaces({lens ? lens->field() : cut.field(), *rounded, rectangle,
                                  plan_.blank().max().z(), plan_.mould()},

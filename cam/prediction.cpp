@@ -21,6 +21,23 @@ constexpr double kViewNodes = 240.0;
 
 constexpr double kMicrometres = 1e3;
 
+/// How much coarser the surface as milled is rendered along the passes: each of its triangles is
+/// spread over many pixels across them, by the scallops.
+constexpr double kAlongPasses = 3.0;
+
+/// The chain with a grid of its own for the surface as milled, unless passes cross.
+LeakageChain chain_of(const PartSurfaces& surfaces, const Lens& lens, const CamOptions& options) {
+  LeakageChain chain = surfaces.chain();
+  const FinishProcess& finish = options.workshop.process.finish;
+  if (finish.cross) return chain;
+  Eigen::Vector2d spacing = Eigen::Vector2d::Constant(sample_spacing(options));
+  spacing[finish.along == PassAxis::kX ? 0 : 1] *= kAlongPasses;
+  for (NamedSurface& other : chain.others) {
+    if (other.field == &surfaces.milled()) other.grid = lens_grid(lens.setup.lens_size, spacing);
+  }
+  return chain;
+}
+
 /// A whole surface, coarsely.
 SurfacePatch coarse_patch(const SurfaceField& field, const Lens& lens, double spacing,
                           const Executor& executor) {
@@ -57,7 +74,7 @@ Prediction predict_part(const PartSurfaces& surfaces, const Lens& lens, const Ca
   Prediction result;
   const GridWindow grid = lens_grid(lens.setup.lens_size, sample_spacing(options));
   const FieldRenderSetup setup{lens.setup, grid};
-  const LeakageChain chain = surfaces.chain();
+  const LeakageChain chain = chain_of(surfaces, lens, options);
   result.leakage = measure_leakage(chain, lens.target, setup, options.leakage, executor, control);
   const std::vector<double> weights =
       pixels_with_surplus(result.leakage.part().picture, result.leakage.designed.picture);

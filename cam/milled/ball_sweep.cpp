@@ -45,6 +45,22 @@ Eigen::Vector3d ArcSweep::point(double first, double second) const {
   return p;
 }
 
+std::optional<GraphArc> ArcSweep::graph(double radius) const {
+  constexpr double kFlatter = 1.001;  // Well away from r = ρ, where a cap's feet run together.
+  if (third_ == 2 || radius_ < kFlatter * radius) return std::nullopt;
+  const bool z_first = first_ == 2;
+  const double begin_up = z_first ? begin_.x() : begin_.y();
+  const double end_up = z_first ? end_.x() : end_.y();
+  if (!(begin_up * end_up > 0.0)) return std::nullopt;
+  const double begin = z_first ? begin_.y() : begin_.x();
+  const double end = z_first ? end_.y() : end_.x();
+  GraphArc arc{third_ == 1, centre_.x(), centre_.y(), centre_.z(), radius_};
+  arc.side = begin_up > 0.0 ? 1.0 : -1.0;
+  arc.low = std::min(begin, end);
+  arc.high = std::max(begin, end);
+  return arc;
+}
+
 /// Zeros of the derivative. In a horizontal plane: the point of the circle that is nearest to q. In
 /// a vertical one: the line from the arc's centre through the ball's meets the circle of radius r
 /// at a right angle, so q lies under the ball at the distance ρ + r from the arc's centre where the

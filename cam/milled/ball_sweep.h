@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <optional>
 
 #include "cam/milled/ball_path.h"
 
@@ -74,11 +75,41 @@ struct StraightSweep {
   }
 };
 
+/// A circular move in a vertical plane along an axis that is a graph over that axis and bends less
+/// than the ball, prepared: finishing rows have no others.
+///
+/// Where z's derivative along the way is zero, the way bends down by 1/ρ at most and the ball's
+/// lower side up by 1/r ≥ 1/R > 1/ρ, so that z is least there, and there alone: the zero, clamped
+/// to the move, is the minimum. The line from the arc's centre through the ball's meets the circle
+/// of radius r at a right angle, so that q lies under the ball at the distance ρ − r from the arc's
+/// centre on a cap and at ρ + r in a bowl.
+struct GraphArc {
+  bool along_x = true;
+  double x = 0.0, y = 0.0, z = 0.0;  ///< Centre.
+  double rho = 0.0;                  ///< Radius.
+  double side = 1.0;                 ///< 1 for a cap, −1 for a bowl.
+  double low = 0.0, high = 0.0;      ///< Where the move ends, along its axis from the centre.
+
+  /// Height of the lower side of the ball that cuts deepest over q.
+  [[nodiscard]] double below(double radius, double qx, double qy) const {
+    const double across = along_x ? qy - y : qx - x;
+    const double out = along_x ? qx - x : qy - y;
+    const double r = std::sqrt(std::max(radius * radius - across * across, 0.0));
+    const double h = std::min(std::max(out * (rho / (rho - side * r)), low), high);
+    const double top = z + side * std::sqrt(std::max(rho * rho - h * h, 0.0));
+    const double room = radius * radius - across * across - (out - h) * (out - h);
+    return room >= 0.0 ? top - std::sqrt(room) : kUncut;
+  }
+};
+
 /// A circular move, prepared: an arc in a horizontal plane or in one along an axis.
 class ArcSweep {
  public:
   /// @pre the arc turns less than half a turn and does not rise.
   explicit ArcSweep(const Arc& arc);
+
+  /// The arc as a GraphArc, if it is one for a ball of this radius.
+  [[nodiscard]] std::optional<GraphArc> graph(double radius) const;
 
   /// Centre of the ball that cuts deepest over q; where none does, one that does not either.
   [[nodiscard]] Eigen::Vector3d centre(double radius, double qx, double qy) const;

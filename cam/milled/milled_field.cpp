@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -182,31 +183,38 @@ struct MilledField::Block {
             range(y, rows, span.y_min + touch.y(), span.y_max + touch.y())};
   }
 
-  void cut_straight(const StraightSweep& sweep, std::int32_t by, const NodeRange& range) {
+  /// Offers what a move leaves at every node of a range: `below(x, y)`.
+  template <class Below>
+  void cut(const NodeRange& range, std::int32_t by, const Below& below) {
     std::array<double, kBlockSide> height{};
     const auto [begin, end] = range.columns;
     for (std::int64_t j = range.rows.first; j < range.rows.second; ++j) {
       const double qy = y[index_of(j)];
-      for (std::int64_t i = begin; i < end; ++i) {
-        const double qx = x[index_of(i)];
-        const double s = sweep.foot(radius, qx, qy);
-        height[index_of(i)] = ball_below(sweep.centre(s), radius, qx, qy);
-      }
+      for (std::int64_t i = begin; i < end; ++i) height[index_of(i)] = below(x[index_of(i)], qy);
       for (std::int64_t i = begin; i < end; ++i) {
         offer(index_of(j * kBlockSide + i), height[index_of(i)], by);
       }
     }
   }
 
+  void cut_straight(const StraightSweep& sweep, std::int32_t by, const NodeRange& range) {
+    cut(range, by, [&, r = radius](double qx, double qy) {
+      return ball_below(sweep.centre(sweep.foot(r, qx, qy)), r, qx, qy);
+    });
+  }
+
+  void cut_graph(const GraphArc& arc, std::int32_t by, const NodeRange& range) {
+    cut(range, by, [arc, r = radius](double qx, double qy) { return arc.below(r, qx, qy); });
+  }
+
   void cut_arc(const ArcSweep& sweep, std::int32_t by, const NodeRange& range) {
-    for (std::int64_t j = range.rows.first; j < range.rows.second; ++j) {
-      for (std::int64_t i = range.columns.first; i < range.columns.second; ++i) {
-        const double qx = x[index_of(i)];
-        const double qy = y[index_of(j)];
-        offer(index_of(j * kBlockSide + i),
-              ball_below(sweep.centre(radius, qx, qy), radius, qx, qy), by);
-      }
+    if (const std::optional<GraphArc> graph = sweep.graph(radius)) {
+      cut_graph(*graph, by, range);
+      return;
     }
+    cut(range, by, [&, r = radius](double qx, double qy) {
+      return ball_below(sweep.centre(r, qx, qy), r, qx, qy);
+    });
   }
 };
 

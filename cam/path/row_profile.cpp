@@ -26,6 +26,9 @@ constexpr double kGap = 1e-8;
 constexpr double kStretch = 0.125;
 constexpr double kLeastStretch = 0.005;
 
+/// Length of the stretches that facets are made for at once, mm.
+constexpr double kFacetStretch = 1.0;
+
 /// Places this near before the end of a stretch, in stretches, belong to the next: rounding.
 constexpr double kSameStretch = 1e-6;
 
@@ -129,13 +132,32 @@ RowCurves::RowCurves(const CutSurface& surface, const Eigen::AlignedBox2d& axis,
   if (surface.bed() == nullptr) made_ = surface.cutter(axis, executor);
 }
 
-const DropCutter& RowCurves::facets() const {
-  if (given_ != nullptr) return *given_;
-  std::call_once(once_, [&] {
+const DropCutter& RowCurves::facets(int along, std::int64_t number) const {
+  Stretch& stretch = [&]() -> Stretch& {
+    const std::lock_guard lock(mutex_);
+    return stretches_[number];
+  }();
+  std::call_once(stretch.once, [&] {
+    Eigen::AlignedBox2d axis = axis_;
+    const auto place = static_cast<double>(number);
+    axis.min()[along] = std::max(axis.min()[along], place * kFacetStretch);
+    axis.max()[along] = std::min(axis.max()[along], (place + 1.0) * kFacetStretch);
     // By one thread: the others wait here.
-    if (!made_) made_ = surface_->cutter(axis_, Executor::serial());
+    stretch.cutter = surface_->cutter(axis, Executor::serial());
   });
-  return *made_;
+  return *stretch.cutter;
+}
+
+/// Facets are made for the stretches where they are followed.
+void RowCurves::follow_facets(const RowSpan& span, double from, double to, double bow,
+                              RowProfile& profile) const {
+  for (double at = from; at < to;) {
+    const double number = std::floor(at / kFacetStretch);
+    const double end = std::min(to, (number + 1.0) * kFacetStretch);
+    const DropCutter& cutter = facets(span.line.along, static_cast<std::int64_t>(number));
+    add_facets(cutter, span.line, at, end, bow, profile);
+    at = end;
+  }
 }
 
 /// Facets lie off the surface that is rolled on by CutSurface::deviation() at most. So that a path
@@ -145,7 +167,7 @@ void RowCurves::bridge(const RowSpan& span, double from, const CurveNodes* next,
                        double bow, RowProfile& profile) const {
   const std::size_t first = profile.u.size();
   const double begins = profile.z.back();
-  add_facets(facets(), span.line, from, to, bow, profile);
+  follow_facets(span, from, to, bow, profile);
   const double at_end = next != nullptr ? next->z.front() - profile.z.back() : 0.0;
   const double at_begin = first > 1 ? begins - profile.z[first] : at_end;
   const double most = surface_->deviation().height;
@@ -189,7 +211,8 @@ RowProfile RowCurves::profile(const RowSpan& span, double bow) const {
   if (surface_ != nullptr && surface_->bed() != nullptr) {
     roll(span, bow, profile);
   } else {
-    add_facets(facets(), span.line, span.held_from, span.held_to, bow, profile);
+    const DropCutter& cutter = given_ != nullptr ? *given_ : *made_;
+    add_facets(cutter, span.line, span.held_from, span.held_to, bow, profile);
   }
   profile.z.front() = profile.z[1];
   add_node(span.to, profile.z.back(), profile);

@@ -3,6 +3,8 @@
 
 #include <Eigen/Geometry>
 #include <cstddef>
+#include <cstdint>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <vector>
@@ -59,13 +61,21 @@ class RowCurves {
   void roll(const RowSpan& span, double bow, RowProfile& profile) const;
   void bridge(const RowSpan& span, double from, const CurveNodes* next, double to, double bow,
               RowProfile& profile) const;
-  /// Made when the first row asks for it.
-  [[nodiscard]] const DropCutter& facets() const;
+  void follow_facets(const RowSpan& span, double from, double to, double bow,
+                     RowProfile& profile) const;
+  /// Of a stretch of rows along x or y, made when the first row asks for it.
+  [[nodiscard]] const DropCutter& facets(int along, std::int64_t number) const;
+
+  struct Stretch {
+    std::once_flag once;
+    std::shared_ptr<const DropCutter> cutter;
+  };
 
   const CutSurface* surface_ = nullptr;
   Eigen::AlignedBox2d axis_;
-  mutable std::once_flag once_;
-  mutable std::shared_ptr<const DropCutter> made_;
+  mutable std::mutex mutex_;
+  mutable std::map<std::int64_t, Stretch> stretches_;
+  std::shared_ptr<const DropCutter> made_;  ///< Of a surface of facets.
   const DropCutter* given_ = nullptr;
 };
 
