@@ -181,8 +181,10 @@ std::vector<std::string> warnings_of(const CutPlan& plan, const ProgramFiles& pr
 void add_prediction(const Prediction& prediction, const Lens& lens, ReportData& data) {
   data.target = lens.target;
   data.leakage = prediction.leakage;
-  data.shown = {surface_name::kDesigned, surface_name::kRounded, surface_name::kMilled,
-                surface_name::kPolished};
+  data.shown = {{surface_name::kDesigned, "what is meant"},
+                {surface_name::kRounded, "the most that the ball can reach"},
+                {surface_name::kMilled, "before polishing: its ridges scatter light"},
+                {surface_name::kPolished, "the finished part"}};
   data.places = prediction.places;
   data.surface = prediction.surface;
   data.maps = {prediction.height, fillet_map(prediction.creases),
@@ -215,7 +217,7 @@ ReportData make_report(const CutPlan& plan, const ProgramFiles& programs,
   limits.block_rate = options.workshop.machine.lines_per_second;
   data.verdict = judge_cut(findings_of(programs, prediction), limits);
   const auto collisions = static_cast<double>(plan.collisions().size());
-  data.verdict.checks.push_back({"collisions", "Collisions", collisions, 0.0, "", 0});
+  data.verdict.checks.push_back({"collisions", "collisions", collisions, 0.0, "", 0});
   return data;
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 
@@ -42,25 +43,29 @@ struct CurvePiece {
     const double linear = height + rise * t;
     if (straight()) return linear;
     const double d = offset + rate * t;
-    return linear + bow * std::sqrt(std::fmax(rho2 - d * d, 0.0));
+    return linear + bow * std::sqrt(std::max(rho2 - d * d, 0.0));
   }
   [[nodiscard]] double slope(double u) const {
     if (straight()) return rise;
     const double d = offset + rate * (u - u0);
-    return rise - bow * rate * d / std::sqrt(std::fmax(rho2 - d * d, kSteepest * rho2));
+    return rise - bow * rate * d / std::sqrt(std::max(rho2 - d * d, kSteepest * rho2));
   }
   /// Arcs end where they are 1 : 30,000 from vertical: what holds a ball there is a wall.
   static constexpr double kSteepest = 1e-9;
 };
 
-/// How far a piece can be off its chord between two places, mm: its end tangents meet no farther
-/// away, because it bends one way only. Falls by the square of the distance of the places.
-inline double bulge(const CurvePiece& piece, double from, double to) {
+/// How far a piece can be off its chord between two places of known height, mm: its end tangents
+/// meet no farther away, because it bends one way only. Falls by the square of the distance of the
+/// places.
+inline double bulge(const CurvePiece& piece, double from, double at_from, double to, double at_to) {
   if (piece.straight()) return 0.0;
-  const double chord = (piece.value(to) - piece.value(from)) / (to - from);
+  const double chord = (at_to - at_from) / (to - from);
   const double left = std::abs(piece.slope(from) - chord);
   const double right = std::abs(piece.slope(to) - chord);
   return left + right > 0.0 ? (to - from) * left * right / (left + right) : 0.0;
+}
+inline double bulge(const CurvePiece& piece, double from, double to) {
+  return bulge(piece, from, piece.value(from), to, piece.value(to));
 }
 
 /// Largest and smallest value of a difference.
@@ -71,11 +76,13 @@ struct Range {
 
 /// Bounds of a − b between two places where both hold.
 inline Range difference_bounds(const CurvePiece& a, const CurvePiece& b, double from, double to) {
-  const double at_from = a.value(from) - b.value(from);
-  const double at_to = a.value(to) - b.value(to);
-  Range range{std::fmin(at_from, at_to), std::fmax(at_from, at_to)};
-  const double bulge_a = bulge(a, from, to);
-  const double bulge_b = bulge(b, from, to);
+  const double a_from = a.value(from);
+  const double a_to = a.value(to);
+  const double b_from = b.value(from);
+  const double b_to = b.value(to);
+  const double bulge_a = bulge(a, from, a_from, to, a_to);
+  const double bulge_b = bulge(b, from, b_from, to, b_to);
+  Range range{std::min(a_from - b_from, a_to - b_to), std::max(a_from - b_from, a_to - b_to)};
   range.high += (a.concave() ? bulge_a : 0.0) + (b.concave() ? 0.0 : bulge_b);
   range.low -= (a.concave() ? 0.0 : bulge_a) + (b.concave() ? bulge_b : 0.0);
   return range;

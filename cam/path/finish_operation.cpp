@@ -116,7 +116,7 @@ void warn(const RasterOptions& options, OperationSummary& summary) {
     if (extreme.value <= options.tolerance) return;
     summary.warnings.push_back("the path runs " + decimal_text(1e3 * extreme.value, 3) + " µm " +
                                what + " the exact one" + place(extreme) + ", more than the " +
-                               decimal_text(1e3 * options.tolerance, 3) + " µm allowed");
+                               decimal_text(1e3 * options.tolerance, 3) + " µm aimed at");
   };
   warn_of_height(certificate.gouge, "below");
   warn_of_height(certificate.excess, "above");
@@ -125,7 +125,7 @@ void warn(const RasterOptions& options, OperationSummary& summary) {
                              decimal_text(1e3 * certificate.slope.value, 2) +
                              " mrad over a stretch of " + decimal_text(1e3 * kSlopeStretch, 0) +
                              " µm" + place(certificate.slope) + ", more than the " +
-                             decimal_text(1e3 * options.slope_tolerance, 2) + " mrad allowed");
+                             decimal_text(1e3 * options.slope_tolerance, 2) + " mrad aimed at");
 }
 
 }  // namespace

@@ -32,9 +32,13 @@ std::string place_rings(const ReportData& data) {
                      decimal_text(width * unit, 3), "\"/>"});
     };
     rings.append(ring("#000", 1.6)).append(ring("#fff", 0.8));
+    // The number stays on the map.
     const double left = place.place.x() > 0.85 * size.x() ? -9.0 : 4.5;
-    rings.append(joined({"<text x=\"", decimal_text(place.place.x() + left * unit, 3), "\" y=\"",
-                         decimal_text(size.y() - place.place.y() - 3.0 * unit, 3),
+    const double text_x =
+        std::max(std::min(place.place.x() + left * unit, size.x() - 5.0 * unit), unit);
+    const double text_y =
+        std::max(std::min(size.y() - place.place.y() - 3.0 * unit, size.y() - unit), 6.5 * unit);
+    rings.append(joined({"<text x=\"", decimal_text(text_x, 3), "\" y=\"", decimal_text(text_y, 3),
                          "\" font-size=\"", decimal_text(7.0 * unit, 3),
                          "\" font-weight=\"700\" fill=\"#fff\" stroke=\"#000\" stroke-width=\"",
                          decimal_text(1.4 * unit, 3), "\" paint-order=\"stroke\">",

@@ -85,6 +85,12 @@ struct ReportChoice {
   bool chosen = false;  ///< What the rest of the report is about.
 };
 
+/// A surface whose picture is shown.
+struct ShownSurface {
+  std::string name;   ///< RenderedSurface::name
+  std::string words;  ///< What it is, in a few words.
+};
+
 /// Everything that report.html and report.json say.
 struct ReportData {
   std::string job;      ///< Name of the part.
@@ -93,10 +99,9 @@ struct ReportData {
   std::string lens_id;  ///< Hash of the lens folder or the like; left out if empty.
   std::string part;     ///< "lens" or "mould"
 
-  Image target;           ///< Linear light.
-  LeakageResult leakage;  ///< designed, chain and the other surfaces.
-  std::vector<std::string> shown =
-      {};  ///< Names of the surfaces whose pictures stand side by side.
+  Image target;                     ///< Linear light.
+  LeakageResult leakage;            ///< designed, chain and the other surfaces.
+  std::vector<ShownSurface> shown;  ///< Whose pictures stand side by side.
   LeakageOptions leakage_options;
   std::vector<LeakPlace> places;        ///< Worst first.
   Eigen::Vector2d lens_size{0.0, 0.0};  ///< mm

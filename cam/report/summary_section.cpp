@@ -30,9 +30,11 @@ std::vector<const RenderedSurface*> surfaces_of(const LeakageResult& result) {
   return surfaces;
 }
 
-std::string surface_figure(const RenderedSurface& surface, const Image& target) {
+std::string surface_figure(const RenderedSurface& surface, const std::string& words,
+                           const Image& target) {
   const PictureQuality& quality = surface.quality;
-  const std::string note = "MAE " + decimal_text(quality.metrics.mae, 4) + ", SSIM " +
+  const std::string note = element("span", "class=\"soft\"", escape_html(words)) + "<br>MAE " +
+                           decimal_text(quality.metrics.mae, 4) + ", SSIM " +
                            decimal_text(quality.metrics.ssim, 3) + "<br>leaks " +
                            percent_text(quality.leakage);
   return figure(grey_picture(surface.picture.image(target.total())),
@@ -91,9 +93,9 @@ std::string pictures(const ReportData& data) {
   if (data.leakage.steps.empty()) return "";
   std::string figures;
   for (const RenderedSurface* surface : surfaces_of(data.leakage)) {
-    const bool wanted =
-        std::find(data.shown.begin(), data.shown.end(), surface->name) != data.shown.end();
-    if (wanted) figures += surface_figure(*surface, data.target);
+    const auto shown = std::find_if(data.shown.begin(), data.shown.end(),
+                                    [&](const auto& one) { return one.name == surface->name; });
+    if (shown != data.shown.end()) figures += surface_figure(*surface, shown->words, data.target);
   }
   return element("div", "class=\"pictures\"", figures + leakage_figure(data.leakage));
 }

@@ -49,14 +49,19 @@ std::string certificate_cell(const Extreme& extreme, const std::string& value, d
 }
 
 /// A difference with its sign.
-std::string signed_text(double value, const std::string& text) {
-  return joined({value > 0.0 ? "+" : "", text});
+std::string signed_percent(double share) {
+  const std::string text = percent_text(share);
+  const bool number = text.front() >= '0' && text.front() <= '9';
+  return joined({share > 0.0 && number ? "+" : "", text});
+}
+
+std::string signed_decimal(double value, int decimals) {
+  return joined({value > 0.0 ? "+" : "", decimal_text(value, decimals)});
 }
 
 Row cause_row(const CausePart& part) {
-  return {escape_html(part.cause), signed_text(part.leakage, percent_text(part.leakage)),
-          signed_text(part.dark_flux, percent_text(part.dark_flux)),
-          signed_text(part.dark_ratio, decimal_text(part.dark_ratio, 5))};
+  return {escape_html(part.cause), signed_percent(part.leakage), signed_percent(part.dark_flux),
+          signed_decimal(part.dark_ratio, 5)};
 }
 
 std::string cause_table(const ReportData& data) {
@@ -85,7 +90,10 @@ std::string quality_table(const LeakageResult& result) {
   };
   add(result.designed);
   for (const RenderedSurface& surface : result.others) add(surface);
-  add(result.part());
+  const auto is_part = [&](const RenderedSurface& surface) {
+    return surface.picture.flux == result.part().picture.flux;
+  };
+  if (std::none_of(result.others.begin(), result.others.end(), is_part)) add(result.part());
   return stacked({{"surface", false},
                   {"MAE", true},
                   {"PSNR", true},

@@ -47,7 +47,7 @@ ReportData report_of(const std::string& text) {
   data.leakage.steps = {surface(text, 0.1, 0.1)};
   data.leakage.others = {surface(text, 0.2, 0.2)};
   data.leakage.parts = {{text, 0.1, 0.02, 0.001}};
-  data.shown = {text};
+  data.shown = {{text, text}};
   data.lens_size = {10.0, 10.0};
   LeakPlace place;
   place.place = {4.12, 3.75};
@@ -257,7 +257,9 @@ TEST(HtmlText, NumbersReadAsPeopleWriteThem) {
   EXPECT_EQ(percent_text(0.5), "50.0 %");
   EXPECT_EQ(percent_text(1.0), "100 %");
   EXPECT_EQ(percent_text(0.0), "0 %");
-  EXPECT_EQ(percent_text(1e-12), "below 0.00001 %");
+  EXPECT_EQ(percent_text(1e-12), "below 0.001 %");
+  EXPECT_EQ(percent_text(-3e-6), "above −0.001 %");
+  EXPECT_EQ(percent_text(1.31e-5), "0.0013 %");
   EXPECT_EQ(micrometre_text(0.00402), "4.02 µm");
   EXPECT_EQ(duration_text(0.5), "30 s");
   EXPECT_EQ(duration_text(12.4), "12 min");
