@@ -90,15 +90,17 @@ struct GraphArc {
   double side = 1.0;                 ///< 1 for a cap, −1 for a bowl.
   double low = 0.0, high = 0.0;      ///< Where the move ends, along its axis from the centre.
 
-  /// Height of the lower side of the ball that cuts deepest over q.
-  [[nodiscard]] double below(double radius, double qx, double qy) const {
+  /// Along the axis, from the arc's centre: where the ball is that cuts deepest over q.
+  [[nodiscard]] double foot(double radius, double qx, double qy) const {
     const double across = along_x ? qy - y : qx - x;
     const double out = along_x ? qx - x : qy - y;
     const double r = std::sqrt(std::max(radius * radius - across * across, 0.0));
-    const double h = std::min(std::max(out * (rho / (rho - side * r)), low), high);
+    return std::min(std::max(out * (rho / (rho - side * r)), low), high);
+  }
+
+  [[nodiscard]] Eigen::Vector3d centre(double h) const {
     const double top = z + side * std::sqrt(std::max(rho * rho - h * h, 0.0));
-    const double room = radius * radius - across * across - (out - h) * (out - h);
-    return room >= 0.0 ? top - std::sqrt(room) : kUncut;
+    return {along_x ? x + h : x, along_x ? y : y + h, top};
   }
 };
 

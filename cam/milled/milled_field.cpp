@@ -60,6 +60,44 @@ double cell_of(const BallPath& path) {
 
 }  // namespace
 
+/// Slopes that moves leave. Nodes beside each other mostly ask for the same one.
+class MilledField::MoveSlopes {
+ public:
+  explicit MoveSlopes(const std::vector<BallPath>& paths) : paths_(paths) {}
+
+  Eigen::Vector2d at(std::size_t path, std::int32_t move, const Eigen::Vector2d& q) {
+    const double radius = paths_[path].radius();
+    if (path != path_ || move != move_) prepare(path, move);
+    if (straight_) {
+      return ball_slope(straight_->centre(straight_->foot(radius, q.x(), q.y())), radius, q);
+    }
+    if (graph_) return ball_slope(graph_->centre(graph_->foot(radius, q.x(), q.y())), radius, q);
+    return ball_slope(arc_->centre(radius, q.x(), q.y()), radius, q);
+  }
+
+ private:
+  void prepare(std::size_t path, std::int32_t move) {
+    path_ = path;
+    move_ = move;
+    straight_.reset();
+    graph_.reset();
+    const BallMove& way = paths_[path].moves()[static_cast<std::size_t>(move)];
+    if (way.arc < 0) {
+      straight_.emplace(way);
+      return;
+    }
+    arc_.emplace(paths_[path].arcs()[static_cast<std::size_t>(way.arc)]);
+    graph_ = arc_->graph(paths_[path].radius());
+  }
+
+  const std::vector<BallPath>& paths_;
+  std::size_t path_ = 0;
+  std::int32_t move_ = -1;
+  std::optional<StraightSweep> straight_;
+  std::optional<GraphArc> graph_;
+  std::optional<ArcSweep> arc_;
+};
+
 /// Nodes of a block: columns and rows [first, second).
 struct MilledField::NodeRange {
   std::pair<std::int64_t, std::int64_t> columns;
@@ -204,7 +242,9 @@ struct MilledField::Block {
   }
 
   void cut_graph(const GraphArc& arc, std::int32_t by, const NodeRange& range) {
-    cut(range, by, [arc, r = radius](double qx, double qy) { return arc.below(r, qx, qy); });
+    cut(range, by, [arc, r = radius](double qx, double qy) {
+      return ball_below(arc.centre(arc.foot(r, qx, qy)), r, qx, qy);
+    });
   }
 
   void cut_arc(const ArcSweep& sweep, std::int32_t by, const NodeRange& range) {
@@ -368,6 +408,7 @@ void MilledField::cut_block(std::size_t path, Block& block) const {
 }
 
 void MilledField::write_block(const Block& block, SurfacePatch& patch) const {
+  MoveSlopes slopes(paths_);
   for (std::int64_t j = 0; j < block.rows; ++j) {
     for (std::int64_t i = 0; i < block.columns; ++i) {
       const std::size_t from = index_of(j * kBlockSide + i);
@@ -377,26 +418,15 @@ void MilledField::write_block(const Block& block, SurfacePatch& patch) const {
       std::int32_t cut = 0;
       if (block.move[from] >= 0) {
         const auto p = static_cast<std::size_t>(block.path[from]);
-        const BallMove& move = paths_[p].moves()[static_cast<std::size_t>(block.move[from])];
-        slope = slope_at(p, move, {block.x[index_of(i)], block.y[index_of(j)]});
-        cut = grids_[p].first_cut + move.piece;
+        const std::int32_t move = block.move[from];
+        slope = slopes.at(p, move, {block.x[index_of(i)], block.y[index_of(j)]});
+        cut = grids_[p].first_cut + paths_[p].moves()[static_cast<std::size_t>(move)].piece;
       }
       patch.slope_x[to] = slope.x();
       patch.slope_y[to] = slope.y();
       patch.cut[to] = cut;
     }
   }
-}
-
-Eigen::Vector2d MilledField::slope_at(std::size_t path, const BallMove& move,
-                                      const Eigen::Vector2d& q) const {
-  const double radius = paths_[path].radius();
-  if (move.arc < 0) {
-    const StraightSweep sweep(move);
-    return ball_slope(sweep.centre(sweep.foot(radius, q.x(), q.y())), radius, q);
-  }
-  const ArcSweep sweep(paths_[path].arcs()[static_cast<std::size_t>(move.arc)]);
-  return ball_slope(sweep.centre(radius, q.x(), q.y()), radius, q);
 }
 
 void MilledField::sample(const GridWindow& window, const Executor& executor,

@@ -50,6 +50,7 @@ class MilledField final : public SurfaceField {
     double touch_height;
     std::int64_t span;
   };
+  class MoveSlopes;
   struct NodeRange;
   struct Block;
 
@@ -61,8 +62,6 @@ class MilledField final : public SurfaceField {
   [[nodiscard]] std::vector<Candidate> candidates_of(std::size_t path, Block& block) const;
   void cut_block(std::size_t path, Block& block) const;
   void write_block(const Block& block, SurfacePatch& patch) const;
-  [[nodiscard]] Eigen::Vector2d slope_at(std::size_t path, const BallMove& move,
-                                         const Eigen::Vector2d& q) const;
 
   std::vector<BallPath> paths_;
   std::vector<SpanGrid> grids_;

@@ -77,7 +77,9 @@ std::string header(const ReportData& data) {
   for (const std::string* text : {&data.program, &data.made, &data.lens_id}) {
     if (!text->empty()) under += " · " + *text;
   }
-  const std::string title = element("h1", "", escape_html("Cutting report: " + data.job)) +
+  const bool compares = data.operations.empty() && !data.choices.empty();
+  const std::string heading = compares ? "Ways to finish, compared: " : "Cutting report: ";
+  const std::string title = element("h1", "", escape_html(heading + data.job)) +
                             element("div", "class=\"soft\"", escape_html(under));
   if (data.verdict.checks.empty()) return element("div", "", title);
   const int failures = data.verdict.failures();

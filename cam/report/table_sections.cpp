@@ -234,18 +234,24 @@ std::string choices(const ReportData& data) {
     cell("leakage", percent_text(choice.leakage));
     cell("light in dark parts", percent_text(choice.dark_flux));
     cell("MAE", decimal_text(choice.mae, 4));
-    cell("time", duration_text(60.0 * choice.hours));
+    cell("finishing time", duration_text(60.0 * choice.hours));
     body += element("tr", choice.chosen ? "class=\"chosen\"" : "", cells);
   }
   const std::string head = element(
       "tr", "",
       "<th>rank</th><th>choice</th><th class=\"number\">leakage</th><th class=\"number\">light in "
-      "dark parts</th><th class=\"number\">MAE</th><th class=\"number\">time</th>");
-  return section(
-      data.operations.empty() ? "Choices, least leakage first"
-                              : "Other choices, least leakage first",
-      element("div", "class=\"stack\"",
-              element("table", "", element("thead", "", head) + element("tbody", "", body))));
+      "dark parts</th><th class=\"number\">MAE</th><th class=\"number\">finishing time</th>");
+  const bool alone = data.operations.empty();
+  const std::string note =
+      alone
+          ? element("p", "",
+                    "Computed, not cut: no program was written. The best is at the top; cut it by "
+                    "running cam with its tool and pitch.")
+          : "";
+  return section(alone ? "Choices, least leakage first" : "Other choices, least leakage first",
+                 note + element("div", "class=\"stack\"",
+                                element("table", "",
+                                        element("thead", "", head) + element("tbody", "", body))));
 }
 
 std::string parameters(const ReportData& data) {
