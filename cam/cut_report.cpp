@@ -79,6 +79,23 @@ ParameterGroup finish_parameters(const CutPlan& plan) {
                            : "facets of the mesh"}}};
 }
 
+template <class Level>
+ReportParameter entry_parameter(const char* name, const Level& level) {
+  const std::string angle = ", at most " + decimal_text(level.ramp_angle_deg, 1) + "°";
+  if (level.entry == EntryStyle::kRamp) return {name, "along the pass" + angle};
+  return {name, "down a helix of radius " + mm(level.helix_radius, 2) + angle};
+}
+
+/// How the tools before the finishing one get into material.
+ParameterGroup entry_parameters(const Process& process) {
+  ParameterGroup group{"Into material", {}};
+  if (process.rough.enabled) group.parameters.push_back(entry_parameter("Roughing", process.rough));
+  if (process.semi.enabled) {
+    group.parameters.push_back(entry_parameter("Semi-finishing", process.semi));
+  }
+  return group;
+}
+
 ParameterGroup polish_parameters(const CamOptions& options) {
   ParameterGroup group{"Polishing, as assumed",
                        {{"Gaussian σ", mm(options.polish.sigma, 3)},
@@ -205,6 +222,10 @@ ReportData make_report(const CutPlan& plan, const ProgramFiles& programs,
   data.operations = report_operations(plan, programs);
   data.tools = tools_of(plan, programs);
   data.parameters = {finish_parameters(plan)};
+  const Process& process = options.workshop.process;
+  if (process.rough.enabled || process.semi.enabled) {
+    data.parameters.push_back(entry_parameters(process));
+  }
   data.setup = setup_sheet(plan);
   data.z_offset = plan.z_offset();
   data.warnings = warnings_of(plan, programs);

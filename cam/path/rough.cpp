@@ -28,6 +28,7 @@ struct Raster {
   double stepover;
   double allowance;
   double ramp_angle_deg;
+  double helix_radius;  ///< mm; 0 for ramps.
   double spacing;
   PassStyle style;
   PassAxis along;
@@ -40,6 +41,7 @@ Raster raster_of(const char* name, const Workshop& workshop, const Following& pr
           process.stepover,
           process.allowance,
           process.ramp_angle_deg,
+          process.entry == EntryStyle::kHelix ? process.helix_radius : 0.0,
           process.spacing,
           process.style,
           process.along};
@@ -119,7 +121,7 @@ class RasterRun {
         moves_(moves),
         links_({site.workshop, raster.tool, floor, site.stock,
                 safe_height_of(site.workshop, site.stock.blank()), raster.ramp_angle_deg,
-                raster.spacing},
+                raster.helix_radius, raster.spacing},
                moves),
         backwards_(starts_backwards(raster)) {}
 

@@ -39,9 +39,10 @@ StockMap whole_blank(const Workshop& workshop, const Eigen::AlignedBox3d& surfac
 /// through.
 ///
 /// Into material the tool goes along its pass, to and fro, no steeper than the ramp angle against
-/// the pass, never straight down. Between neighbouring passes it stays down; elsewhere it takes the
-/// quicker of a way at feed just above all material that may be left and a rapid one at the safe
-/// height. Clamps are walked around: what is under them stays uncut, and a warning says so.
+/// the pass, or down a helix where one fits (EntryStyle), never straight down. Between neighbouring
+/// passes it stays down; elsewhere it takes the quicker of a way at feed just above all material
+/// that may be left and a rapid one at the safe height. Clamps are walked around: what is under
+/// them stays uncut, and a warning says so.
 /// @throw Interrupted if `control` asks for an end; what went to `sink` before is part of a cut.
 RoughResult cut_rough(const RoughSite& site, const Executor& executor, const MoveSink& sink,
                       const RunControl& control);

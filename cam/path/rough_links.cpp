@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cam/path/rough_links.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -11,6 +12,10 @@ namespace {
 /// Material no thicker than this is entered without a ramp: what a cell of the stock map, which is
 /// an upper bound, may show where there is none, mm.
 constexpr double kThinMaterial = 0.01;
+
+/// Rise over run of the floor on a helix' circle at most: lenses have no more. Over a rim or beside
+/// a clamp, where there is more, another circle or a ramp is taken.
+constexpr double kSteepestHelix = 0.5;
 
 /// A path cut off after some length seen from above, with that length up to each point.
 struct Prefix {
@@ -37,6 +42,30 @@ double length_of(const TipPath& path) {
 
 Eigen::Vector3d at_height(const Eigen::Vector3d& p, double z) { return {p.x(), p.y(), z}; }
 
+double steepest_of(const TipPath& path) {
+  double steepest = 0.0;
+  for (std::size_t i = 1; i < path.size(); ++i) {
+    const Eigen::Vector3d way = path[i] - path[i - 1];
+    steepest = std::max(steepest, std::abs(way.z()) / way.head<2>().norm());
+  }
+  return steepest;
+}
+
+/// A closed circle around `centre` from `begin` on, counter-clockwise, in chords no longer than
+/// `spacing` and no fewer than twelve, at the height of `begin`.
+TipPath circle_from(const Eigen::Vector3d& begin, const Eigen::Vector2d& centre, double spacing) {
+  const Eigen::Vector2d arm = begin.head<2>() - centre;
+  const double around = 2.0 * std::numbers::pi;
+  const double count = std::max(12.0, std::ceil(around * arm.norm() / spacing));
+  TipPath circle{begin};
+  for (double i = 1.0; i < count; ++i) {
+    const Eigen::Vector2d p = centre + Eigen::Rotation2Dd(around * i / count) * arm;
+    circle.emplace_back(p.x(), p.y(), begin.z());
+  }
+  circle.push_back(begin);
+  return circle;
+}
+
 }  // namespace
 
 double safe_height_of(const Workshop& workshop, const Eigen::AlignedBox3d& blank) {
@@ -53,8 +82,62 @@ void RoughLinks::enter(const TipPath& path) {
   travel(begin);
   const double air = site_.stock.drop(parts_.front(), begin.head<2>());
   const double lift = air - begin.z();
-  if (lift > kThinMaterial) ramp(path, lift);
+  if (lift > kThinMaterial && !helix(path)) ramp(path, lift);
   moves_.feed(MoveKind::kPlunge, begin);
+}
+
+/// Tried are the circles ahead, where the pass goes anyway, to its left and right, and behind.
+bool RoughLinks::helix(const TipPath& path) {
+  if (!(site_.helix_radius > 0.0)) return false;
+  const Eigen::Vector3d& begin = path.front();
+  const Eigen::Vector2d ahead = site_.helix_radius * (path[1] - begin).head<2>().normalized();
+  const Eigen::Vector2d left(-ahead.y(), ahead.x());
+  for (const Eigen::Vector2d& way :
+       {ahead, left, Eigen::Vector2d(-left), Eigen::Vector2d(-ahead)}) {
+    TipPath circle = circle_from(begin, begin.head<2>() + way, site_.spacing);
+    lift_to_floor(circle);
+    if (steepest_of(circle) > kSteepestHelix) continue;
+    wind_down(circle);
+    const double rest = circle.front().z() - begin.z();
+    if (rest > kThinMaterial) ramp(path, rest);
+    return true;
+  }
+  return false;
+}
+
+/// Every point as high as the floor over the chords beside it, so that none of them is below it
+/// anywhere on its length.
+void RoughLinks::lift_to_floor(TipPath& circle) const {
+  TipFloor::Trace trace;
+  const double lowest = circle.front().z();
+  double before = lowest;  // Of the last chord, which ends where the first begins.
+  for (std::size_t i = 1; i < circle.size(); ++i) {
+    const Eigen::Vector2d middle = 0.5 * (circle[i - 1] + circle[i]).head<2>();
+    const double reach = 0.5 * (circle[i] - circle[i - 1]).head<2>().norm();
+    const double floor = site_.floor.over(middle, reach, trace);
+    circle[i - 1].z() = std::max({lowest, before, floor});
+    before = floor;
+  }
+  circle.front().z() = std::max(circle.front().z(), before);
+  circle.back() = circle.front();
+}
+
+/// From above all material on the circle, so that it is met from above only.
+void RoughLinks::wind_down(const TipPath& circle) {
+  double lift = 0.0;
+  for (const Eigen::Vector3d& p : circle) {
+    lift = std::max(lift, site_.stock.drop(parts_.front(), p.head<2>()) - p.z());
+  }
+  const double steepest = std::tan(site_.ramp_angle_deg * std::numbers::pi / 180.0);
+  const double turns = std::ceil(lift / (steepest * length_of(circle)) - 1e-9);
+  const auto chords = static_cast<double>(circle.size() - 1);
+  moves_.feed(MoveKind::kPlunge, at_height(circle.front(), circle.front().z() + lift));
+  for (double turn = 0.0; turn < turns; ++turn) {
+    for (std::size_t i = 1; i < circle.size(); ++i) {
+      const double left = 1.0 - (turn + static_cast<double>(i) / chords) / turns;
+      moves_.feed(MoveKind::kPlunge, at_height(circle[i], circle[i].z() + left * lift));
+    }
+  }
 }
 
 /// Forth and back along the first of the path, as often as its length asks for, sinking all the

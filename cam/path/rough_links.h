@@ -18,7 +18,8 @@ struct LinkSite {
   StockMap& stock;
   double safe_z = 0.0;  ///< Of rapid moves, mm.
   double ramp_angle_deg = 3.0;
-  double spacing = 0.1;  ///< Of points at which floor and stock are asked for, mm.
+  double helix_radius = 0.0;  ///< Of the axis' circle when entering, mm; 0 for ramps.
+  double spacing = 0.1;       ///< Of points at which floor and stock are asked for, mm.
 };
 
 /// Height of rapid moves in a workshop: Process::safe_height above blank and clamps, mm.
@@ -29,8 +30,10 @@ class RoughLinks {
  public:
   RoughLinks(const LinkSite& site, RoughMoves& moves);
 
-  /// To the beginning of `path` and into the material there, if there is any: along the path, to
-  /// and fro, no steeper against it than the ramp angle. Ends at the beginning of the path.
+  /// To the beginning of `path` and into the material there, if there is any, no steeper against
+  /// path and floor than the ramp angle: down a helix through that beginning, counter-clockwise,
+  /// which a tool that turns clockwise cuts in climb, where one of four circles is nowhere steep;
+  /// else along the path, to and fro. Ends at the beginning of the path.
   void enter(const TipPath& path);
 
   /// Straight to `end` at feed, no lower than `level` and the floor, which may cut.
@@ -45,6 +48,9 @@ class RoughLinks {
   [[nodiscard]] std::optional<double> clear_height(const Eigen::Vector3d& to);
   [[nodiscard]] double air_above(const Eigen::Vector2d& p);
   void travel(const Eigen::Vector3d& to);
+  bool helix(const TipPath& path);
+  void lift_to_floor(TipPath& circle) const;
+  void wind_down(const TipPath& circle);
   void ramp(const TipPath& path, double lift);
 
   LinkSite site_;

@@ -13,6 +13,12 @@ enum class PassStyle {
   kConventional,  ///< One way, uncut material on the left.
 };
 
+/// How a tool gets down into material.
+enum class EntryStyle {
+  kRamp,   ///< Along its pass, to and fro.
+  kHelix,  ///< On a circle where one fits, else along its pass.
+};
+
 /// Level-by-level roughing.
 struct RoughProcess {
   bool enabled = true;
@@ -21,7 +27,9 @@ struct RoughProcess {
   double stepover = 1.2;        ///< Between passes at most, mm, in 0 … its diameter.
   double allowance = 0.2;       ///< Left on the surface, along its normal, mm, ≥ 0.
   double ramp_angle_deg = 3.0;  ///< Steepest way into material, degrees, in 0.1 … 45.
-  double spacing = 0.1;         ///< Of points at which the surface is asked for, mm, > 0.
+  EntryStyle entry = EntryStyle::kRamp;
+  double helix_radius = 1.0;  ///< Of the axis' circle, mm, in 0 … the tool's radius.
+  double spacing = 0.1;       ///< Of points at which the surface is asked for, mm, > 0.
   PassStyle style = PassStyle::kZigzag;
   PassAxis along = PassAxis::kX;
 
@@ -35,7 +43,9 @@ struct SemiProcess {
   double stepover = 0.15;       ///< Between passes at most, mm, in 0 … its diameter.
   double allowance = 0.03;      ///< Left on the surface, along its normal, mm, ≥ 0.
   double ramp_angle_deg = 3.0;  ///< Steepest way into material, degrees, in 0.1 … 45.
-  double spacing = 0.05;        ///< Of points at which the surface is asked for, mm, > 0.
+  EntryStyle entry = EntryStyle::kRamp;
+  double helix_radius = 0.3;  ///< Of the axis' circle, mm, in 0 … the tool's radius.
+  double spacing = 0.05;      ///< Of points at which the surface is asked for, mm, > 0.
   PassStyle style = PassStyle::kZigzag;
   PassAxis along = PassAxis::kX;
 

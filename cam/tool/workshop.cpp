@@ -85,6 +85,16 @@ void check_step(const Rules& rules, const Workshop& workshop, const StepRule& ru
              "is wider than the tool, " + number(tool->diameter) + " mm");
 }
 
+/// A wider circle would leave a core standing.
+template <class Level>
+void check_entry(const Rules& rules, const Workshop& workshop, const char* table,
+                 const Level& level) {
+  if (!level.enabled || level.entry != EntryStyle::kHelix) return;
+  const double radius = workshop.tool(level.tool).radius();
+  rules.hold(level.helix_radius <= radius, std::string(table) + ".helix_radius", level.helix_radius,
+             "is above half the tool's diameter, " + number(radius) + " mm");
+}
+
 void check_process(const Rules& rules, const Workshop& workshop) {
   const Process& process = workshop.process;
   const auto& [rough, semi, finish] = std::tie(process.rough, process.semi, process.finish);
@@ -92,6 +102,8 @@ void check_process(const Rules& rules, const Workshop& workshop) {
     check_step(rules, workshop, {"rough", "stepover", rough.tool, rough.stepover});
   }
   if (semi.enabled) check_step(rules, workshop, {"semi", "stepover", semi.tool, semi.stepover});
+  check_entry(rules, workshop, "rough", rough);
+  check_entry(rules, workshop, "semi", semi);
   if (rough.enabled && semi.enabled) {
     rules.hold(semi.allowance <= rough.allowance, "semi.allowance", semi.allowance,
                "must not be above that of roughing, " + number(rough.allowance) + " mm");

@@ -26,9 +26,11 @@ using Words = std::initializer_list<std::string_view>;
 const Words kShapes = {"ball", "bull", "flat"};
 const Words kAxes = {"x", "y"};
 const Words kStyles = {"zigzag", "climb", "conventional"};
+const Words kEntries = {"ramp", "helix"};
 const Words& words_of(CutterShape /*any*/) { return kShapes; }
 const Words& words_of(PassAxis /*any*/) { return kAxes; }
 const Words& words_of(PassStyle /*any*/) { return kStyles; }
+const Words& words_of(EntryStyle /*any*/) { return kEntries; }
 
 template <class Enum>
 std::string word_for(Enum value) {
@@ -231,6 +233,9 @@ void describe_following(Visitor& v, Level& process) {
   v.number({"stepover", kLeast, 100.0}, process.stepover, "mm between passes at most");
   v.number({"allowance", 0.0, 100.0}, process.allowance, "mm left on the surface");
   v.number({"ramp_angle_deg", 0.1, 45.0}, process.ramp_angle_deg, "steepest way into material");
+  v.word("entry", process.entry, "ramp along the pass, or helix where one fits");
+  v.number({"helix_radius", kLeast, 50.0}, process.helix_radius,
+           "mm, of the tool's axis; half its diameter at most");
   v.number({"spacing", 0.001, 10.0}, process.spacing,
            "mm between points where the surface is asked for");
   v.word("style", process.style, "zigzag, climb or conventional");

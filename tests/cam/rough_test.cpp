@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "cam/adversarial_meshes.h"
 #include "cam/cam_meshes.h"
 #include "cam/contact/profile_contact.h"
 #include "cam/dexel_stock.h"
@@ -122,7 +123,7 @@ struct Job {
 };
 
 void expect_safe(const Witnessed& seen) {
-  EXPECT_EQ(seen.rapid_in_material, 0.0);
+  EXPECT_LE(seen.rapid_in_material, 1e-12);   // Rounding.
   EXPECT_LE(seen.plunge_in_material, 0.011);  // RoughLinks takes 0.01 mm for none.
   EXPECT_LE(seen.link_in_material, 1e-9);
 }
@@ -200,6 +201,97 @@ TEST(Rough, EveryStyleAndAxisIsSafe) {
       expect_safe(job.seen);
       EXPECT_GE(job.left().least, 0.2 - 1e-9);
       EXPECT_LT(rough.most_left.value, 0.8);
+    }
+  }
+}
+
+/// Moves into material that go round: along neither axis.
+std::int64_t turning_entries(const Moves& moves) {
+  std::int64_t turning = 0;
+  Eigen::Vector3d at = moves.front().end;
+  for (const PathMove& move : moves) {
+    const Eigen::Vector2d way = (move.end - at).head<2>().cwiseAbs();
+    turning += move.kind == MoveKind::kPlunge && way.minCoeff() > 1e-9 ? 1 : 0;
+    at = move.end;
+  }
+  return turning;
+}
+
+TEST(Rough, AHelixIsAsSafeAsARampAndNoSteeper) {
+  for (const PassStyle style : {PassStyle::kZigzag, PassStyle::kClimb}) {
+    Workshop workshop;
+    workshop.process.rough.style = style;
+    workshop.process.rough.entry = EntryStyle::kHelix;
+    workshop.process.semi.entry = EntryStyle::kHelix;
+    workshop.stock.margin = 8.0;  // A pocket in the blank.
+    Job job(small_lens(), workshop);
+    const double slope =
+        0.5 + std::tan(workshop.process.rough.ramp_angle_deg * std::numbers::pi / 180.0);
+    for (const bool semi : {false, true}) {
+      const RoughResult result = semi ? job.semi() : job.rough();
+      expect_safe(job.seen);
+      EXPECT_GT(turning_entries(job.moves), 20);
+      EXPECT_LE(job.seen.steepest_ramp, slope);
+      EXPECT_GE(job.left().least, result.summary.allowance - 1e-9);
+    }
+    EXPECT_LE(job.left().most, 0.1);
+  }
+}
+
+/// Down a cylinder of the helix' own radius: the blank's top, left at the ramp's angle.
+TEST(Rough, AHelixIsOneOnAFlatSurface) {
+  Workshop workshop;
+  workshop.process.rough.entry = EntryStyle::kHelix;
+  workshop.process.rough.helix_radius = 1.2;
+  workshop.process.rough.allowance = 0.0;  // A flat floor, at the rim, too.
+  workshop.process.semi.enabled = false;
+  workshop.stock.margin = 8.0;
+  Job job(testing::grid_mesh(3, 3, 12.0, 9.0, [](double, double) { return 5.0; }), workshop);
+  (void)job.rough();
+  expect_safe(job.seen);
+  const double angle = workshop.process.rough.ramp_angle_deg * std::numbers::pi / 180.0;
+  EXPECT_LE(job.seen.steepest_ramp, std::tan(angle) * (1.0 + 1e-9));
+  std::vector<Eigen::Vector3d> helix;
+  for (const PathMove& move : job.moves) {
+    if (move.kind == MoveKind::kPlunge) {
+      helix.push_back(move.end);
+    } else if (!helix.empty()) {
+      break;
+    }
+  }
+  ASSERT_GT(helix.size(), 12U);
+  Eigen::AlignedBox2d box;
+  for (const Eigen::Vector3d& p : helix) box.extend(Eigen::Vector2d(p.head<2>()));
+  EXPECT_NEAR(box.sizes().x(), 2.4, 0.01);
+  const Eigen::Vector2d middle = box.center();
+  for (const Eigen::Vector3d& p : helix) EXPECT_NEAR((p.head<2>() - middle).norm(), 1.2, 0.01);
+}
+
+/// Walls, noise, needles and loose triangles: nothing of the tool or its allowance goes into them,
+/// whichever way it enters.
+TEST(Rough, NeverGougesAdversarialMeshes) {
+  for (const auto& [name, mesh] : testing::adversarial_meshes()) {
+    if (name.starts_with("ridge") || name.starts_with("valley")) continue;  // Time.
+    for (const EntryStyle entry : {EntryStyle::kRamp, EntryStyle::kHelix}) {
+      Workshop workshop;
+      workshop.stock.margin = 0.5;
+      workshop.tools[0].shape = CutterShape::kBull;
+      workshop.tools[0].diameter = 1.5;
+      workshop.tools[0].corner_radius = 0.3;
+      workshop.tools[0].sections = {{1.5, 8.0, 20.0}, {19.0, 20.0, 50.0}};
+      workshop.process.rough.stepover = 0.6;
+      workshop.process.rough.stepdown = 0.6;
+      workshop.process.rough.entry = entry;
+      workshop.process.rough.helix_radius = 0.5;
+      workshop.process.semi.stepover = 0.4;
+      workshop.process.semi.entry = entry;
+      Job job(mesh, workshop);
+      (void)job.rough();
+      EXPECT_GE(job.left().least, 0.2 - 1e-9) << name;
+      expect_safe(job.seen);
+      (void)job.semi();
+      EXPECT_GE(job.left().least, 0.03 - 1e-9) << name;
+      expect_safe(job.seen);
     }
   }
 }

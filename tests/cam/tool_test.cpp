@@ -118,6 +118,8 @@ TEST(Workshop, WrittenTomlReadsBackEqual) {
   shop.process.rough.enabled = false;
   shop.process.rough.style = PassStyle::kClimb;
   shop.process.semi.along = PassAxis::kY;
+  shop.process.semi.entry = EntryStyle::kHelix;
+  shop.process.semi.helix_radius = 0.45;
   shop.process.finish = {1,    0.04, 0.001, 2e-4, 5e-4, PassStyle::kConventional, PassAxis::kY,
                          true, true};
   EXPECT_EQ(parse_workshop(workshop_toml(shop), "other"), shop);
@@ -141,6 +143,8 @@ TEST(Workshop, RefusalsNameFileKeyValueAndRule) {
   EXPECT_EQ(refusal("[rough]\ntool = 9\n"), "shop.toml: rough.tool: 9: no tool has this number");
   EXPECT_EQ(refusal("[rough]\nstepover = 3.5\n"),
             "shop.toml: rough.stepover: 3.5: is wider than the tool, 3 mm");
+  EXPECT_EQ(refusal("[semi]\nentry = \"helix\"\nhelix_radius = 0.6\n"),
+            "shop.toml: semi.helix_radius: 0.6: is above half the tool's diameter, 0.5 mm");
   EXPECT_EQ(refusal("[semi]\nallowance = 0.3\n"),
             "shop.toml: semi.allowance: 0.3: must not be above that of roughing, 0.2 mm");
   EXPECT_EQ(refusal("[finish]\ntool = 3\n"),
