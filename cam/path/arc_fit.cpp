@@ -61,7 +61,12 @@ bool is_graph(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const RowMove&
          (a.y() > move.centre.y()) == move.cap && (b.y() > move.centre.y()) == move.cap;
 }
 
-/// The arc from one point to another that follows the points between them best. With s along the
+/// The arc from one point to another that follows the points between them best. It is free of its
+/// neighbours' tangents, which differ by no more than the slope tolerance: where curvature changes
+/// at the rate k, an arc of length h is k h³/125 off the curve and k h²/12 off its slope, each of a
+/// biarc, bound to tangents at its ends, k h³/40 and k h²/6. Measured on rows of designed lenses,
+/// biarcs take 1.1 (facets) to 1.7 times (smooth surfaces) as many moves for the same tolerances,
+/// and a free choice between both none fewer. With s along the
 /// chord of length L and h square to it, circles through both ends are h = q (s (L − s) − h²) with
 /// their centre 1/(2q) below the chord's middle: q by least squares.
 std::optional<RowMove> arc_through(const Points& points, std::size_t from, std::size_t to,
