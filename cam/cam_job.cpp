@@ -14,6 +14,7 @@
 #include "cam/milled/held_field.h"
 #include "cam/part_surfaces.h"
 #include "cam/prediction.h"
+#include "cam/remedies.h"
 #include "cam/report/report_html.h"
 #include "cam/report/report_json.h"
 #include "core/error.h"
@@ -134,7 +135,12 @@ class Job {
     const PartSurfaces surfaces({lens ? lens->field() : cut.field(), *rounded, rectangle,
                                  plan_.blank().max().z(), plan_.mould()},
                                 plan_.take_finish_paths(programs, control_), options_.polish);
-    return predict_part(surfaces, lens_, options_, executor_, control_);
+    Prediction prediction = predict_part(surfaces, lens_, options_, executor_, control_);
+    if (options_.remedies) {
+      try_remedies({plan_, lens_, surfaces.designed(), prediction.leakage}, prediction.places,
+                   executor_, control_);
+    }
+    return prediction;
   }
 
   [[nodiscard]] Eigen::AlignedBox2d cut_rectangle() const {

@@ -48,7 +48,8 @@ struct CamOptions {
   /// What is cut: the facets as they are, or the smooth surface through the mesh's vertices.
   SurfaceModel surface = SurfaceModel::kSmooth;
 
-  bool render = true;  ///< Compute what the part will project; else programs only.
+  bool render = true;    ///< Compute what the part will project; else programs only.
+  bool remedies = true;  ///< Try what helps where most light leaks, if it is computed.
   PolishModel polish{0.03, 0.0, 1.0};
   /// Of the surface that is rendered, mm, 0.001 … 1; 0 takes a sixth of the pitch, or a third of
   /// the polish's σ if that is more.

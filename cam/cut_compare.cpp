@@ -9,9 +9,9 @@
 
 #include "cam/cam_job.h"
 #include "cam/report/report_html.h"
-#include "core/decimal_text.h"
 #include "core/error.h"
 #include "core/files.h"
+#include "core/trimmed_decimal.h"
 #include "core/units.h"
 
 namespace lensforge {
@@ -47,14 +47,6 @@ class PassingFolder {
   fs::path path_;
 };
 
-/// A length without zeros at its end.
-std::string trimmed(double value) {
-  std::string text = decimal_text(value, 4);
-  text.erase(text.find_last_not_of('0') + 1);
-  if (text.back() == '.') text.pop_back();
-  return text;
-}
-
 std::vector<double> lengths_of(std::string_view list, const std::string& where) {
   std::vector<double> values;
   while (true) {
@@ -83,9 +75,12 @@ std::vector<Choice> combinations(const CamOptions& options, const CutChoices& ch
   std::vector<Choice> all;
   for (const double tool : or_own(choices.tools, workshop.tool(finish.tool).diameter)) {
     for (const double pitch : or_own(choices.pitches, finish.pitch)) {
-      Choice choice{"tool " + trimmed(tool) + " mm, pitch " + trimmed(pitch) + " mm", options};
+      Choice choice{
+          "tool " + trimmed_decimal(tool, 4) + " mm, pitch " + trimmed_decimal(pitch, 4) + " mm",
+          options};
       choice.options.workshop = workshop;
       choice.options.render = true;
+      choice.options.remedies = false;
       for (Tool& one : choice.options.workshop.tools) {
         if (one.number == finish.tool && one.diameter != tool) one = resized(one, tool);
       }
@@ -162,9 +157,10 @@ CutComparison compare_cuts(const Lens& lens, const CamOptions& options, const Cu
                      return std::tie(a.leakage, a.hours) < std::tie(b.leakage, b.hours);
                    });
   page.choices = comparison.ranking;
-  page.parameters = {{"Compared",
-                      {{"Operations", "finishing only"},
-                       {"Polishing, Gaussian σ", trimmed(options.polish.sigma) + " mm"}}}};
+  page.parameters = {
+      {"Compared",
+       {{"Operations", "finishing only"},
+        {"Polishing, Gaussian σ", trimmed_decimal(options.polish.sigma, 4) + " mm"}}}};
   comparison.page = folder / kComparePage;
   write_whole_file(comparison.page, compare_html(page));
   comparison.complete = true;

@@ -19,10 +19,6 @@ constexpr double kSketchSpacing = 0.5;
 /// Unit of a program's last decimal where nothing is rounded, mm.
 constexpr double kUnrounded = 1e-9;
 
-/// How finely the smooth surface is cut into facets, which are followed only in grooves that bend
-/// as sharply as the ball (RowCurves), by the pencil, and where the ball's reach is judged.
-constexpr SmoothCutOptions kSmoothCut{1e-4, 2e-2};
-
 SurfaceMesh mesh_to_cut(const Lens& lens, const CamOptions& options) {
   if (options.part == PartKind::kLens) return lens.surface;
   return mould_surface(lens.surface, {options.shrinkage});
@@ -43,21 +39,6 @@ double z_offset_of(ZZero zero, double surface_top, double blank_top) {
       break;
   }
   return 0.0;
-}
-
-std::unique_ptr<CutSurface> surface_to_cut(const SurfaceMesh& mesh, const CamOptions& options,
-                                           double radius, const Executor& executor) {
-  if (options.surface == SurfaceModel::kFacet) {
-    return std::make_unique<FacetSurface>(mesh, radius, executor);
-  }
-  return std::make_unique<SmoothCutSurface>(mesh, radius, kSmoothCut, executor);
-}
-
-int decimals_of(const CamOptions& options) {
-  if (options.decimals > 0) return options.decimals;
-  const FinishProcess& finish = options.workshop.process.finish;
-  return std::min(options.post.most_decimals,
-                  decimals_for(finish.tolerance, finish.slope_tolerance));
 }
 
 }  // namespace
@@ -83,33 +64,10 @@ std::optional<CastFrame> CutPlan::mould() const {
                    MouldOptions{}.thickness};
 }
 
-double CutPlan::resolution() const { return std::pow(10.0, -decimals_); }
-
 double CutPlan::safe_z() const {
-  return to_resolution(safe_height_of(options_.workshop, blank_) + z_offset_, resolution()) -
+  return to_resolution(safe_height_of(options_.workshop, blank_) + z_offset_,
+                       resolution_of(options_)) -
          z_offset_;
-}
-
-RasterPlan CutPlan::raster(PassAxis along, double resolution) const {
-  RasterOptions raster;
-  raster.pitch = finish_pitch(finish(), ball().radius());
-  if (finish().scallop > 0.0) raster.pitch = pitch_on_slope(raster.pitch, field_.steepest);
-  raster.tolerance = finish().tolerance;
-  raster.slope_tolerance = finish().slope_tolerance;
-  raster.resolution = resolution;
-  raster.z_zero = -z_offset_;
-  raster.along = along == PassAxis::kX ? 0 : 1;
-  raster.style = finish().style;
-  raster.arcs = options_.arcs && options_.post.arcs != ArcForm::kNone;
-  raster.traces = options_.render;
-  return plan_finish_raster(rectangle(), ball().radius(), raster);
-}
-
-std::vector<RasterPlan> CutPlan::rasters(double resolution) const {
-  std::vector<RasterPlan> plans{raster(finish().along, resolution)};
-  const PassAxis across = finish().along == PassAxis::kX ? PassAxis::kY : PassAxis::kX;
-  if (finish().cross) plans.push_back(raster(across, resolution));
-  return plans;
 }
 
 MoveSink CutPlan::watched(const std::string& operation, const Tool& tool, const MoveSink& sink) {
@@ -162,17 +120,10 @@ ProgramOperation CutPlan::finish_operation(const std::string& name, const Raster
           }};
 }
 
-PencilOptions CutPlan::pencil_options(double resolution) const {
-  PencilOptions pencil;
-  pencil.resolution = resolution;
-  pencil.z_zero = -z_offset_;
-  pencil.clearance = options_.workshop.process.clearance;
-  return pencil;
-}
-
 OperationSummary CutPlan::run_pencil(double resolution, const MoveSink& sink,
                                      const RunControl& control) const {
-  const PencilOptions pencil = pencil_options(resolution);
+  PencilOptions pencil = pencil_options(options_, z_offset_);
+  pencil.resolution = resolution;
   const auto cutter = surface_->cutter(rectangle(), executor_);
   return cut_pencil(*cutter, find_valleys(mesh_, ball().radius(), pencil), pencil,
                     {"pencil", ball(), safe_z()}, sink, control);
@@ -180,7 +131,7 @@ OperationSummary CutPlan::run_pencil(double resolution, const MoveSink& sink,
 
 ProgramOperation CutPlan::pencil_operation(const RunControl& control) {
   return {"pencil", ball(), {}, [this, &control](const MoveSink& sink) {
-            return run_pencil(resolution(), watched("pencil", ball(), sink), control);
+            return run_pencil(resolution_of(options_), watched("pencil", ball(), sink), control);
           }};
 }
 
@@ -194,7 +145,7 @@ ProgramPlan CutPlan::programs(const RunControl& control) {
                    "top of the blank: Z " + decimal_text(blank_.max().z() + z_offset_, decimals_)};
   if (options_.workshop.process.rough.enabled) plan.operations.push_back(rough_operation(control));
   if (options_.workshop.process.semi.enabled) plan.operations.push_back(semi_operation(control));
-  const std::vector<RasterPlan> finishing = rasters(resolution());
+  const std::vector<RasterPlan> finishing = finish_rasters(options_, ground());
   plan.operations.push_back(finish_operation("finish", finishing.front(), control));
   if (finishing.size() > 1) {
     plan.operations.push_back(finish_operation("cross", finishing.back(), control));

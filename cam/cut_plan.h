@@ -13,6 +13,7 @@
 #include "cam/contact/height_field.h"
 #include "cam/contact/profile_cutter.h"
 #include "cam/finish_paths.h"
+#include "cam/finish_setup.h"
 #include "cam/milled/cast_field.h"
 #include "cam/path/collision.h"
 #include "cam/path/finish_operation.h"
@@ -61,8 +62,13 @@ class CutPlan {
   [[nodiscard]] const HeightField& field() const { return field_; }
   [[nodiscard]] const Eigen::AlignedBox3d& blank() const { return blank_; }
   [[nodiscard]] double z_offset() const { return z_offset_; }
+  /// Of what is cut, seen from above.
+  [[nodiscard]] Eigen::AlignedBox2d rectangle() const {
+    return {field_.box.min().head<2>(), field_.box.max().head<2>()};
+  }
+  [[nodiscard]] FinishGround ground() const { return {rectangle(), field_.steepest, z_offset_}; }
   /// Between finishing rows, as cut, mm.
-  [[nodiscard]] double pitch() const { return rasters(resolution()).front().pitch; }
+  [[nodiscard]] double pitch() const { return finish_rasters(options_, ground()).front().pitch; }
   [[nodiscard]] int decimals() const { return decimals_; }
   /// What touches something that it must not, as far as programs() were streamed.
   [[nodiscard]] const std::vector<Collision>& collisions() const {
@@ -73,22 +79,13 @@ class CutPlan {
 
  private:
   [[nodiscard]] const FinishProcess& finish() const { return options_.workshop.process.finish; }
-  [[nodiscard]] const Tool& ball() const { return options_.workshop.tool(finish().tool); }
-  [[nodiscard]] double resolution() const;
-  /// The finishing raster, and the one across if it is wanted.
-  [[nodiscard]] std::vector<RasterPlan> rasters(double resolution) const;
-  [[nodiscard]] RasterPlan raster(PassAxis along, double resolution) const;
+  [[nodiscard]] const Tool& ball() const { return finishing_ball(options_); }
   [[nodiscard]] double safe_z() const;
-  /// Of what is cut, seen from above.
-  [[nodiscard]] Eigen::AlignedBox2d rectangle() const {
-    return {field_.box.min().head<2>(), field_.box.max().head<2>()};
-  }
   ProgramOperation rough_operation(const RunControl& control);
   ProgramOperation semi_operation(const RunControl& control);
   ProgramOperation finish_operation(const std::string& name, const RasterPlan& plan,
                                     const RunControl& control);
   ProgramOperation pencil_operation(const RunControl& control);
-  [[nodiscard]] PencilOptions pencil_options(double resolution) const;
   OperationSummary run_pencil(double resolution, const MoveSink& sink,
                               const RunControl& control) const;
   /// The sink behind a sketch of the operation and a look for collisions.

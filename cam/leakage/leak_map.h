@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "cam/leakage/leakage.h"
@@ -45,6 +46,13 @@ struct LeakPlaceOptions {
   int count = 3;  ///< Places at most, ≥ 0.
 };
 
+/// What would leak from a place if one thing were changed.
+struct LeakTrial {
+  std::string change;      ///< "a 0.3 mm ball"
+  double leakage = 0.0;    ///< As LeakPlace::leakage, in the same pixels.
+  double dark_flux = 0.0;  ///< As LeakPlace::dark_flux.
+};
+
 /// A part of the lens from which light leaks.
 struct LeakPlace {
   CellRange cells;                  ///< Of the rendered grid.
@@ -56,6 +64,7 @@ struct LeakPlace {
   HeightDifference height;          ///< Largest difference of height in the worst cell.
   Eigen::Vector2d lands{0.0, 0.0};  ///< Centre of that light, pixel coordinates.
   std::vector<CausePart> parts;     ///< `leakage` and `dark_flux` by cause; dark_ratio stays 0.
+  std::vector<LeakTrial> trials;    ///< Of remedies, if any were tried.
 };
 
 /// The places that leak most, worst first, a square's side or more apart. `map` gives the places,

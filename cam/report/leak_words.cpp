@@ -10,6 +10,9 @@
 namespace lensforge {
 namespace {
 
+constexpr double kHelps = 0.8;      ///< A remedy leaves this share of a leak at most.
+constexpr double kNearHalf = 0.05;  ///< Shares this near to a half are called that.
+
 /// What the surface has there that it should not have.
 std::string fault_words(const LeakPlace& place, const std::string& cause) {
   const std::string at =
@@ -24,23 +27,39 @@ std::string fault_words(const LeakPlace& place, const std::string& cause) {
          (left ? " stands " + depth + " too high" : " lies " + depth + " too low");
 }
 
-std::string remedy_words(const std::string& cause) {
-  if (cause == leak_cause::kCrease) {
-    return "The ball does not reach into the groove: --compare tool=… tells what a smaller one "
-           "leaves.";
+/// The first that halves the leak, else the one that leaves least.
+const LeakTrial& best_trial(const LeakPlace& place) {
+  const auto halves = [&](const LeakTrial& trial) { return trial.leakage <= 0.5 * place.leakage; };
+  const auto first = std::find_if(place.trials.begin(), place.trials.end(), halves);
+  if (first != place.trials.end()) return *first;
+  return *std::min_element(
+      place.trials.begin(), place.trials.end(),
+      [](const LeakTrial& a, const LeakTrial& b) { return a.leakage < b.leakage; });
+}
+
+std::string sentence(std::string words) {
+  const char first = words.front();
+  if (first >= 'a' && first <= 'z') words.front() = static_cast<char>(first - 'a' + 'A');
+  return words;
+}
+
+std::string remedy_words(const LeakPlace& place) {
+  if (place.trials.empty()) return "";
+  const LeakTrial& best = best_trial(place);
+  const double left = std::max(0.0, best.leakage);
+  const double share = left / place.leakage;
+  if (share > kHelps) {
+    std::string tried;
+    for (const LeakTrial& trial : place.trials) {
+      tried += joined({tried.empty() ? "" : ", ", "with ", trial.change, " ",
+                       percent_text(std::max(0.0, trial.leakage))});
+      if (&trial == &place.trials.front()) tried += " would still leak";
+    }
+    return "Nothing that was tried helps much: " + tried + ".";
   }
-  if (cause == leak_cause::kScallop) {
-    return "Ridges between the passes survive polishing: a smaller stepover or more polishing "
-           "helps.";
-  }
-  if (cause == leak_cause::kChord) {
-    return "The path cuts corners: smaller tolerances help.";
-  }
-  if (cause == leak_cause::kDecimals) return "The program is rounded: one more decimal helps.";
-  if (cause == leak_cause::kPolish) {
-    return "Polishing rounds what the design wants sharp: polish less here.";
-  }
-  return "";
+  const bool half = std::abs(share - 0.5) < kNearHalf;
+  return sentence(best.change) + " would " + (half ? "halve it, to " : "bring it down to ") +
+         percent_text(left) + ".";
 }
 
 }  // namespace
@@ -59,7 +78,7 @@ std::string leak_words(const LeakPlace& place) {
   if (place.dark_flux > 0.0) {
     words += ", " + percent_text(place.dark_flux) + " into dark parts of the picture";
   }
-  const std::string remedy = remedy_words(cause);
+  const std::string remedy = remedy_words(place);
   return words + "." + (remedy.empty() ? "" : " " + remedy);
 }
 

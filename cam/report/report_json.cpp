@@ -73,6 +73,10 @@ json surfaces_json(const LeakageResult& result) {
   return surfaces;
 }
 
+json trial_json(const LeakTrial& trial) {
+  return {{"change", trial.change}, {"leakage", trial.leakage}, {"dark_flux", trial.dark_flux}};
+}
+
 json place_json(const LeakPlace& place) {
   return {{"place", pair(place.place)},
           {"side", place.side},
@@ -82,6 +86,7 @@ json place_json(const LeakPlace& place) {
           {"height_place", pair(place.height.place)},
           {"lands_at_pixel", pair(place.lands)},
           {"causes", list(place.parts, cause_json)},
+          {"trials", list(place.trials, trial_json)},
           {"words", leak_words(place)}};
 }
 

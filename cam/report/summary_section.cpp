@@ -119,12 +119,13 @@ std::string verdict(const ReportData& data) {
 
 std::string places(const ReportData& data) {
   if (data.places.empty()) return "";
+  const std::string lens = data.part == "mould" ? "lens that is cast" : "lens";
   std::string items;
   for (const LeakPlace& place : data.places) {
     items += element("li", "", escape_html(leak_words(place)));
   }
   return element("div", "",
-                 element("h3", "", "Worst places on the " + escape_html(data.part)) +
+                 element("h3", "", joined({"Worst places on the ", lens})) +
                      element("ol", "class=\"places\"", items));
 }
 

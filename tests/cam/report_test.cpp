@@ -20,6 +20,7 @@
 namespace lensforge {
 namespace {
 
+using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
@@ -152,8 +153,28 @@ TEST(LeakWords, SayWhatIsWrongWhereAndWhatHelps) {
   EXPECT_EQ(main_cause(place), leak_cause::kCrease);
   EXPECT_EQ(leak_words(place),
             "The groove at x 41.2 y 37.5 keeps 4.0 µm; 1.30 % of the light leaks from here, "
-            "0.900 % into dark parts of the picture. The ball does not reach into the "
-            "groove: --compare tool=… tells what a smaller one leaves.");
+            "0.900 % into dark parts of the picture.");
+}
+
+TEST(LeakWords, SayWhatHelpsAsFarAsItWasTried) {
+  LeakPlace place;
+  place.height.value = -0.001;
+  place.leakage = 0.02;
+  place.parts = {{leak_cause::kCrease, 0.02, 0.0, 0.0}};
+  place.trials = {{"a 0.3 mm ball", 0.015, 0.0}, {"a 0.2 mm ball", 0.0098, 0.0}};
+  EXPECT_THAT(leak_words(place), EndsWith(" A 0.2 mm ball would halve it, to 0.980 %."));
+  place.trials.pop_back();
+  EXPECT_THAT(leak_words(place), EndsWith(" A 0.3 mm ball would bring it down to 1.50 %."));
+  // The largest that halves it, not the one that leaves least.
+  place.trials = {{"a 0.3 mm ball", 0.006, 0.0}, {"a 0.2 mm ball", 0.001, 0.0}};
+  EXPECT_THAT(leak_words(place), EndsWith(" A 0.3 mm ball would bring it down to 0.600 %."));
+  place.trials = {{"a 0.3 mm ball", 0.019, 0.0}, {"a 0.2 mm ball", 0.021, 0.0}};
+  EXPECT_THAT(leak_words(place),
+              EndsWith(" Nothing that was tried helps much: with a 0.3 mm ball 1.90 % would still "
+                       "leak, with a 0.2 mm ball 2.10 %."));
+  // Less than nothing is nothing: other light fills the pixels.
+  place.trials = {{"half the tolerances", -0.001, 0.0}};
+  EXPECT_THAT(leak_words(place), EndsWith(" Half the tolerances would bring it down to 0 %."));
 }
 
 /// Rows along x, one millimetre apart, to and fro, entered by a rapid and a plunge.

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cam/finish_setup.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace lensforge {
+namespace {
+
+/// How finely the smooth surface is cut into facets, which are followed only in grooves that bend
+/// as sharply as the ball (RowCurves), by the pencil, and where the ball's reach is judged.
+constexpr SmoothCutOptions kSmoothCut{1e-4, 2e-2};
+
+RasterPlan finish_raster(const CamOptions& options, const FinishGround& ground, PassAxis along) {
+  const FinishProcess& finish = options.workshop.process.finish;
+  const double radius = finishing_ball(options).radius();
+  RasterOptions raster;
+  raster.pitch = finish_pitch(finish, radius);
+  if (finish.scallop > 0.0) raster.pitch = pitch_on_slope(raster.pitch, ground.steepest);
+  raster.tolerance = finish.tolerance;
+  raster.slope_tolerance = finish.slope_tolerance;
+  raster.resolution = resolution_of(options);
+  raster.z_zero = -ground.z_offset;
+  raster.along = along == PassAxis::kX ? 0 : 1;
+  raster.style = finish.style;
+  raster.arcs = options.arcs && options.post.arcs != ArcForm::kNone;
+  raster.traces = options.render;
+  return plan_finish_raster(ground.rectangle, radius, raster);
+}
+
+}  // namespace
+
+const Tool& finishing_ball(const CamOptions& options) {
+  return options.workshop.tool(options.workshop.process.finish.tool);
+}
+
+std::unique_ptr<CutSurface> surface_to_cut(const SurfaceMesh& mesh, const CamOptions& options,
+                                           double radius, const Executor& executor) {
+  if (options.surface == SurfaceModel::kFacet) {
+    return std::make_unique<FacetSurface>(mesh, radius, executor);
+  }
+  return std::make_unique<SmoothCutSurface>(mesh, radius, kSmoothCut, executor);
+}
+
+int decimals_of(const CamOptions& options) {
+  if (options.decimals > 0) return options.decimals;
+  const FinishProcess& finish = options.workshop.process.finish;
+  return std::min(options.post.most_decimals,
+                  decimals_for(finish.tolerance, finish.slope_tolerance));
+}
+
+double resolution_of(const CamOptions& options) { return std::pow(10.0, -decimals_of(options)); }
+
+std::vector<RasterPlan> finish_rasters(const CamOptions& options, const FinishGround& ground) {
+  const FinishProcess& finish = options.workshop.process.finish;
+  std::vector<RasterPlan> plans{finish_raster(options, ground, finish.along)};
+  const PassAxis across = finish.along == PassAxis::kX ? PassAxis::kY : PassAxis::kX;
+  if (finish.cross) plans.push_back(finish_raster(options, ground, across));
+  return plans;
+}
+
+PencilOptions pencil_options(const CamOptions& options, double z_offset) {
+  PencilOptions pencil;
+  pencil.resolution = resolution_of(options);
+  pencil.z_zero = -z_offset;
+  pencil.clearance = options.workshop.process.clearance;
+  return pencil;
+}
+
+}  // namespace lensforge

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Geometry>
+#include <memory>
+#include <vector>
+
+#include "cam/cam_options.h"
+#include "cam/contact/cut_surface.h"
+#include "cam/path/finish_raster.h"
+#include "cam/path/pencil.h"
+#include "core/executor.h"
+#include "core/surface_mesh.h"
+
+namespace lensforge {
+
+/// The finishing ball.
+const Tool& finishing_ball(const CamOptions& options);
+
+/// The surface that a ball of this radius (mm, > 0) cuts: CamOptions::surface of a mesh.
+std::unique_ptr<CutSurface> surface_to_cut(const SurfaceMesh& mesh, const CamOptions& options,
+                                           double radius, const Executor& executor);
+
+/// Digits after the point in the programs: as chosen, or what the tolerances ask for.
+int decimals_of(const CamOptions& options);
+
+/// Unit of the programs' last decimal, mm.
+double resolution_of(const CamOptions& options);
+
+/// What the finishing is laid out on; mm, lens frame.
+struct FinishGround {
+  Eigen::AlignedBox2d rectangle;  ///< Of what is cut.
+  double steepest = 0.0;          ///< Rise over run of its steepest place.
+  double z_offset = 0.0;          ///< Program Z − lens-frame z.
+};
+
+/// The finishing raster, and the one across if it is wanted.
+std::vector<RasterPlan> finish_rasters(const CamOptions& options, const FinishGround& ground);
+
+/// For the pass along the creases.
+PencilOptions pencil_options(const CamOptions& options, double z_offset);
+
+}  // namespace lensforge

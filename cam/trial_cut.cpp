@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cam/trial_cut.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <optional>
+
+#include "cam/finish_paths.h"
+#include "cam/finish_setup.h"
+#include "cam/leakage/render_field.h"
+#include "cam/milled/cast_field.h"
+#include "cam/milled/milled_field.h"
+#include "cam/milled/polished_field.h"
+#include "core/error.h"
+
+namespace lensforge {
+namespace {
+
+/// A part of a grid, on that grid or a finer one.
+struct CellGrid {
+  GridWindow grid;
+  CellRange cells;
+};
+
+/// Every cell cut into the same number of parts a side, so that none is wider than `spacing`.
+CellGrid refined(const GridWindow& grid, const CellRange& cells, double spacing) {
+  const auto parts = std::max<std::int64_t>(
+      1, std::llround(std::ceil(grid.spacing.maxCoeff() / spacing * (1.0 - 1e-9))));
+  CellGrid fine{grid, cells};
+  fine.grid.spacing /= static_cast<double>(parts);
+  fine.grid.columns = (grid.columns - 1) * parts + 1;
+  fine.grid.rows = (grid.rows - 1) * parts + 1;
+  for (std::int64_t* count :
+       {&fine.cells.column, &fine.cells.row, &fine.cells.columns, &fine.cells.rows}) {
+    *count *= parts;
+  }
+  return fine;
+}
+
+Eigen::AlignedBox2d box_of(const GridWindow& grid, const CellRange& cells) {
+  return {grid.node(cells.column, cells.row),
+          grid.node(cells.column + cells.columns, cells.row + cells.rows)};
+}
+
+/// Where a rectangle of the lens is cut: mirrored along x and larger in a mould (CastFrame).
+Eigen::AlignedBox2d in_mould(const Eigen::AlignedBox2d& lens,
+                             const std::optional<CastFrame>& mould) {
+  if (!mould) return lens;
+  const double s = mould->scale;
+  return {Eigen::Vector2d(s * (mould->width - lens.max().x()), s * lens.min().y()),
+          Eigen::Vector2d(s * (mould->width - lens.min().x()), s * lens.max().y())};
+}
+
+Eigen::AlignedBox2d grown_within(const Eigen::AlignedBox2d& box, double beyond,
+                                 const Eigen::AlignedBox2d& limits) {
+  const Eigen::Vector2d all = Eigen::Vector2d::Constant(beyond);
+  return Eigen::AlignedBox2d(box.min() - all, box.max() + all).intersection(limits);
+}
+
+/// The rows of a raster that cross a box, no longer than the box: on the same places.
+RasterPlan raster_around(const RasterPlan& whole, const Eigen::AlignedBox2d& box) {
+  const int across = 1 - whole.options.along;
+  const double begin = whole.surface.min()[across];
+  Eigen::AlignedBox2d part = box;
+  const double first = std::floor((box.min()[across] - begin) / whole.pitch);
+  const double last = std::ceil((box.max()[across] - begin) / whole.pitch);
+  part.min()[across] = begin + std::max(0.0, first) * whole.pitch;
+  part.max()[across] = std::min(begin + last * whole.pitch, whole.surface.max()[across]);
+  RasterOptions options = whole.options;
+  options.pitch = whole.pitch;
+  options.traces = false;
+  return plan_finish_raster(part, whole.radius, options);
+}
+
+/// The runs of a valley's places that lie in a box.
+std::vector<Valley> parts_in(const Valley& valley, const Eigen::AlignedBox2d& box) {
+  std::vector<Valley> parts(1);
+  for (const Eigen::Vector2d& place : valley) {
+    if (box.contains(place)) {
+      parts.back().push_back(place);
+    } else if (!parts.back().empty()) {
+      parts.emplace_back();
+    }
+  }
+  std::erase_if(parts, [](const Valley& part) { return part.size() < 2; });
+  return parts;
+}
+
+double weighted(const std::vector<double>& weights, const FluxPicture& now,
+                const FluxPicture& before) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < weights.size(); ++i) {
+    sum += weights[i] * (now.flux[i] - before.flux[i]);
+  }
+  return sum;
+}
+
+}  // namespace
+
+TrialCut::TrialCut(const TrialSite& site, const CamOptions& changed, const Executor& executor)
+    : site_(site), options_(changed), executor_(executor), surface_(&site.plan.surface()) {
+  const double radius = finishing_ball(changed).radius();
+  if (radius == surface_->radius()) return;
+  own_ = surface_to_cut(site.plan.mesh(), changed, radius, executor);
+  surface_ = own_.get();
+}
+
+BallPath TrialCut::path_around(const Eigen::AlignedBox2d& box, const RunControl& control) const {
+  BallPath path(surface_->radius(), 0.0);
+  const MoveSink sink = path_sink(path);
+  for (const RasterPlan& whole : finish_rasters(options_, site_.plan.ground())) {
+    const auto add = [&](const RasterRow& row) {
+      const PathMove start{MoveKind::kRapid, row.start};
+      sink({&start, 1});
+      sink(row.moves);
+    };
+    const RasterPlan plan = raster_around(whole, box);
+    if (!cut_raster(*surface_, plan, executor_, add, control).complete) throw Interrupted();
+  }
+  if (options_.workshop.process.finish.pencil) add_pencil(box, path, control);
+  return path;
+}
+
+void TrialCut::add_pencil(const Eigen::AlignedBox2d& box, BallPath& path,
+                          const RunControl& control) const {
+  const PencilOptions pencil = pencil_options(options_, site_.plan.z_offset());
+  std::vector<Valley> inside;
+  for (const Valley& valley : find_valleys(site_.plan.mesh(), surface_->radius(), pencil)) {
+    for (Valley& part : parts_in(valley, box)) inside.push_back(std::move(part));
+  }
+  if (inside.empty()) return;
+  const FinishRun run{"pencil", finishing_ball(options_), site_.plan.blank().max().z()};
+  const auto cutter = surface_->cutter(box, executor_);
+  if (!cut_pencil(*cutter, inside, pencil, run, path_sink(path), control).complete) {
+    throw Interrupted();
+  }
+}
+
+/// Rows reach as far as the polishing does and a diameter beyond, because the last radius of a row
+/// is level and what it cuts reaches a radius farther.
+LeakTrial TrialCut::at(const LeakPlace& place, const RunControl& control) const {
+  const RunControl silent(control.stop_token(), {});
+  const CamOptions& before = site_.plan.options();
+  const GridWindow grid = lens_grid(site_.lens.setup.lens_size, sample_spacing(before));
+  const CellGrid fine = refined(grid, place.cells, sample_spacing(options_));
+  const std::optional<CastFrame> mould = site_.plan.mould();
+  const double polished = PolishedField::kReach * options_.polish.sigma + grid.spacing.maxCoeff();
+  const double beyond = (mould ? mould->scale : 1.0) * polished + 2.0 * surface_->radius();
+  const Eigen::AlignedBox2d box =
+      grown_within(in_mould(box_of(grid, place.cells), mould), beyond, site_.plan.rectangle());
+  const MilledField milled({path_around(box, silent)}, site_.plan.blank().max().z());
+  std::optional<CastField> cast;
+  if (mould) cast.emplace(milled, *mould);
+  const SurfaceField& raw = cast ? static_cast<const SurfaceField&>(*cast) : milled;
+  const Eigen::Vector2d size = site_.lens.setup.lens_size;
+  const PolishedField part(raw, {Eigen::Vector2d(0.0, 0.0), size}, options_.polish);
+  const FieldRenderSetup setup{site_.lens.setup, fine.grid};
+  const FluxPicture designed = render_cells(site_.designed, setup, fine.cells, executor_, silent);
+  const FluxPicture now = render_cells(part, setup, fine.cells, executor_, silent);
+  const LeakageResult& leakage = site_.leakage;
+  const std::vector<double> more =
+      pixels_with_surplus(leakage.part().picture, leakage.designed.picture);
+  return {"", weighted(more, now, designed), weighted(leakage.dark, now, designed)};
+}
+
+}  // namespace lensforge

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Geometry>
+#include <memory>
+
+#include "cam/cam_options.h"
+#include "cam/contact/cut_surface.h"
+#include "cam/cut_plan.h"
+#include "cam/leakage/leak_map.h"
+#include "cam/leakage/leakage.h"
+#include "cam/milled/surface_field.h"
+#include "core/executor.h"
+#include "core/lens.h"
+#include "core/run_control.h"
+
+namespace lensforge {
+
+/// A cut that was foretold, of which places are to be tried again.
+struct TrialSite {
+  const CutPlan& plan;
+  const Lens& lens;
+  const SurfaceField& designed;  ///< Of the lens.
+  const LeakageResult& leakage;
+};
+
+/// Cuts places of a foretold cut again, with other options: the finishing rows and valleys around a
+/// place are planned, fitted and rounded as make_cut() does, and the light of the place is traced
+/// from the surface that they leave, cast and polished. What differs from a whole new cut is that
+/// rows begin where the place does, so that their moves join elsewhere, and that light is counted
+/// in the pixels where the foretold cut has too much.
+class TrialCut {
+ public:
+  /// @param changed  may differ from the plan's options in finishing tool and process, decimals,
+  ///                 tolerances and polishing.
+  /// All references must outlive this. @pre `changed` is valid for the lens.
+  TrialCut(const TrialSite& site, const CamOptions& changed, const Executor& executor);
+
+  /// What would leak from a place. @throw Interrupted
+  [[nodiscard]] LeakTrial at(const LeakPlace& place, const RunControl& control) const;
+
+ private:
+  [[nodiscard]] BallPath path_around(const Eigen::AlignedBox2d& box,
+                                     const RunControl& control) const;
+  void add_pencil(const Eigen::AlignedBox2d& box, BallPath& path, const RunControl& control) const;
+
+  TrialSite site_;
+  const CamOptions& options_;
+  const Executor& executor_;
+  std::unique_ptr<CutSurface> own_;  ///< Where the ball is another.
+  const CutSurface* surface_;
+};
+
+}  // namespace lensforge

@@ -1,0 +1,209 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cam/remedies.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "cam/cam_job.h"
+#include "cam/cam_meshes.h"
+#include "cam/finish_setup.h"
+#include "cam/milled/designed_field.h"
+#include "cam/prediction.h"
+#include "cam/report/leak_words.h"
+#include "cam/tool/standard_balls.h"
+#include "core/temp_folder.h"
+
+namespace lensforge {
+namespace {
+
+using lensforge::testing::TempFolder;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+/// A lens with a groove along y, whose light leaves a gap on the wall.
+Lens grooved_lens() {
+  Lens lens;
+  lens.setup.lens_size = {3.0, 2.0};
+  lens.setup.image_size = {6.0, 2.0};
+  lens.setup.image_origin = {-1.5, 0.0};
+  lens.setup.pixels = {24, 8};
+  lens.setup.focal_length = 12.0;
+  lens.surface = testing::grid_mesh(31, 11, 3.0, 2.0,
+                                    [](double x, double) { return 6.0 + 0.2 * std::abs(x - 1.5); });
+  lens.target = Image(24, 8, 1.0F);
+  for (int r = 0; r < 8; ++r) {
+    for (int c = 8; c < 16; ++c) lens.target.at(c, r) = 0.0F;
+  }
+  return lens;
+}
+
+CamOptions facets_polished() {
+  CamOptions options;
+  options.surface = SurfaceModel::kFacet;
+  options.workshop.process.rough.enabled = false;
+  options.workshop.process.semi.enabled = false;
+  return options;
+}
+
+/// A cut and what is foretold of it, with all that trials need.
+class Foretold {
+ public:
+  Foretold(Lens lens, const CamOptions& options)
+      : lens_(std::move(lens)),
+        options_(options),
+        plan_(lens_, options_, Executor::cpu(2)),
+        cut_(plan_.mesh()),
+        designed_(lens_.surface) {
+    const TempFolder folder;
+    const RunControl control;
+    const ProgramFiles programs =
+        write_programs(plan_.programs(control), options_.post, plan_.settings(), folder.path(), {});
+    cutter_ = plan_.surface().cutter(plan_.rectangle(), executor_);
+    rounded_.emplace(cut_, *cutter_, executor_);
+    const Eigen::AlignedBox2d rectangle(Eigen::Vector2d(0.0, 0.0), lens_.setup.lens_size);
+    surfaces_.emplace(PartSurfaces::Design{designed_, *rounded_, rectangle, plan_.blank().max().z(),
+                                           plan_.mould()},
+                      plan_.take_finish_paths(programs, control), options_.polish);
+    prediction_ = predict_part(*surfaces_, lens_, options_, executor_, control);
+  }
+
+  [[nodiscard]] TrialSite site() const { return {plan_, lens_, designed_, prediction_.leakage}; }
+  [[nodiscard]] const Executor& executor() const { return executor_; }
+  [[nodiscard]] const PartSurfaces& surfaces() const { return *surfaces_; }
+  [[nodiscard]] const Prediction& prediction() const { return prediction_; }
+
+ private:
+  Lens lens_;
+  CamOptions options_;
+  Executor executor_ = Executor::cpu(2);
+  CutPlan plan_;
+  FacetField cut_;
+  FacetField designed_;
+  std::shared_ptr<const DropCutter> cutter_;
+  std::optional<RoundedField> rounded_;
+  std::optional<PartSurfaces> surfaces_;
+  Prediction prediction_;
+};
+
+TEST(TrialCut, WithNothingChangedLeaksWhatWasForetold) {
+  for (const PartKind part : {PartKind::kLens, PartKind::kMould}) {
+    const bool lens = part == PartKind::kLens;
+    CamOptions options = facets_polished();
+    options.part = part;
+    options.shrinkage = lens ? 0.0 : 0.004;
+    options.workshop.process.finish.cross = lens;
+    options.workshop.process.finish.pencil = lens;
+    const Foretold cut(grooved_lens(), options);
+    ASSERT_FALSE(cut.prediction().places.empty());
+    const LeakPlace& place = cut.prediction().places[0];
+    ASSERT_GT(place.leakage, 1e-4);
+    const LeakTrial trial = TrialCut(cut.site(), options, cut.executor()).at(place, {});
+    // Moves join at other places where rows begin elsewhere.
+    EXPECT_NEAR(trial.leakage, place.leakage, 0.01 * place.leakage);
+    EXPECT_NEAR(trial.dark_flux, place.dark_flux, 0.01 * place.leakage);
+  }
+}
+
+/// A place in the middle, beside which the lens goes on.
+TEST(TrialCut, OfAPartOfTheLensLeaksAsThatPartDoes) {
+  const CamOptions options = facets_polished();
+  const Foretold cut(grooved_lens(), options);
+  const FieldRenderSetup setup{cut.site().lens.setup,
+                               lens_grid({3.0, 2.0}, sample_spacing(options))};
+  LeakPlace place = cut.prediction().places[0];
+  place.cells = {120, 70, 60, 40};
+  const PartSurfaces& surfaces = cut.surfaces();
+  const LeakageResult& leakage = cut.prediction().leakage;
+  const auto light = [&](const SurfaceField& field) {
+    return render_cells(field, setup, place.cells, cut.executor(), {});
+  };
+  const FluxPicture now = light(surfaces.part());
+  const FluxPicture designed = light(surfaces.designed());
+  const std::vector<double> more =
+      pixels_with_surplus(leakage.part().picture, leakage.designed.picture);
+  double leaks = 0.0;
+  for (std::size_t i = 0; i < more.size(); ++i) {
+    leaks += more[i] * (now.flux[i] - designed.flux[i]);
+  }
+  ASSERT_GT(leaks, 1e-4);
+  const LeakTrial trial = TrialCut(cut.site(), options, cut.executor()).at(place, {});
+  EXPECT_NEAR(trial.leakage, leaks, 0.01 * leaks);
+}
+
+/// What a trial says of a smaller ball is what a whole cut with it comes to.
+TEST(Remedies, SmallerBallsAreTriedUntilTheLeakIsHalved) {
+  const TempFolder folder;
+  CamOptions options = facets_polished();
+  // A ball whose fillet is wider than what polishing rounds.
+  options.workshop.tools.back() = resized(options.workshop.tools.back(), 1.0);
+  options.workshop.process.finish.pitch = 0.06;
+  options.polish.sigma = 0.03;
+  const Lens lens = grooved_lens();
+  const ReportData report = make_cut(lens, options, folder.path(), Executor::cpu(2), {}).report;
+  ASSERT_EQ(report.places.size(), 1U);
+  const LeakPlace& place = report.places[0];
+  EXPECT_EQ(main_cause(place), leak_cause::kCrease);
+  ASSERT_FALSE(place.trials.empty());
+  EXPECT_EQ(place.trials[0].change, "a 0.8 mm ball");
+  EXPECT_LT(place.trials[0].leakage, place.leakage);
+  ASSERT_GE(place.trials.size(), 3U);
+  EXPECT_EQ(place.trials[2].change, "a 0.5 mm ball");
+  for (std::size_t i = 1; i < place.trials.size(); ++i) {
+    EXPECT_GT(place.trials[i - 1].leakage, 0.5 * place.leakage);
+  }
+  CamOptions smaller = options;
+  smaller.workshop.tools.back() = resized(smaller.workshop.tools.back(), 0.8);
+  smaller.remedies = false;
+  const LeakageResult leakage =
+      make_cut(lens, smaller, folder.path(), Executor::cpu(2), {}).report.leakage;
+  const PictureQuality& part = leakage.part().quality;
+  const double dark = part.dark_flux - leakage.designed.quality.dark_flux;
+  // One place is the whole lens here; pixels of surplus may be others.
+  EXPECT_NEAR(place.trials[0].leakage, part.leakage, 0.05 * part.leakage);
+  EXPECT_NEAR(place.trials[0].dark_flux, dark, 0.05 * part.leakage);
+}
+
+TEST(Remedies, EveryCauseHasOneOfItsOwn) {
+  CamOptions options = facets_polished();
+  options.decimals = 5;
+  const Foretold cut(grooved_lens(), options);
+  std::vector<LeakPlace> places;
+  for (const char* cause :
+       {leak_cause::kPolish, leak_cause::kScallop, leak_cause::kChord, leak_cause::kDecimals}) {
+    places.push_back(cut.prediction().places[0]);
+    places.back().parts = {{cause, 1.0, 0.0, 0.0}};
+  }
+  try_remedies(cut.site(), places, cut.executor(), {});
+  std::vector<std::string> changes;
+  for (const LeakPlace& place : places) {
+    ASSERT_EQ(place.trials.size(), 1U);
+    changes.push_back(place.trials[0].change);
+    EXPECT_TRUE(std::isfinite(place.trials[0].leakage));
+  }
+  EXPECT_THAT(changes, ElementsAre("half as much polishing", HasSubstr("a pitch of 0.0"),
+                                   "half the tolerances", "one more decimal"));
+}
+
+TEST(Remedies, NoneIsTriedUnlessAskedFor) {
+  const TempFolder folder;
+  CamOptions options = facets_polished();
+  options.remedies = false;
+  const ReportData report =
+      make_cut(grooved_lens(), options, folder.path(), Executor::cpu(2), {}).report;
+  EXPECT_TRUE(report.places.at(0).trials.empty());
+}
+
+TEST(StandardBalls, AreTheNextSmallerOnes) {
+  EXPECT_THAT(smaller_balls(0.4, 3), ElementsAre(0.3, 0.2, 0.1));
+  EXPECT_THAT(smaller_balls(0.45, 2), ElementsAre(0.4, 0.3));
+  EXPECT_THAT(smaller_balls(3.0, 1), ElementsAre(2.5));
+  EXPECT_TRUE(smaller_balls(0.1, 3).empty());
+}
+
+}  // namespace
+}  // namespace lensforge
