@@ -15,6 +15,7 @@
 #include "app/progress_display.h"
 #include "cam/cam_job.h"
 #include "cam/cut_compare.h"
+#include "cam/report/leak_words.h"
 #include "cam/report/report_json.h"
 #include "core/error.h"
 
@@ -49,6 +50,7 @@ std::string summary_text(const fs::path& folder, const CamResult& result) {
   if (!report.leakage.steps.empty()) {
     text += surface_text(report.leakage.designed);
     for (const RenderedSurface& surface : report.leakage.others) text += surface_text(surface);
+    for (const LeakPlace& place : report.places) text += "  " + leak_words(place) + "\n";
   }
   for (const LimitCheck& check : report.verdict.checks) {
     if (!check.passes()) text += limit_text(check);

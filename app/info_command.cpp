@@ -11,6 +11,7 @@
 #include "core/image_io.h"
 #include "core/lens.h"
 #include "core/mesh_io.h"
+#include "machine/gcode/program_seal.h"
 
 namespace lensforge::app {
 namespace {
@@ -96,6 +97,9 @@ Description describe_gcode(const fs::path& path) {
   for (const std::string& comment : summary.header) d.line("comment", comment);
   d.line("program", std::to_string(summary.lines) + " lines, " + std::to_string(summary.moves) +
                         " with a position");
+  const std::optional<bool> seal = check_seal(path);
+  d.line("seal", seal_words(seal));
+  d.json["seal_holds"] = seal_json(seal);
   d.json["header"] = summary.header;
   d.json["lines"] = summary.lines;
   d.json["moves"] = summary.moves;

@@ -32,6 +32,15 @@ std::string size_text(long columns, long rows) {
   return std::to_string(columns) + " x " + std::to_string(rows);
 }
 
+nlohmann::json seal_json(const std::optional<bool>& holds) {
+  return holds ? nlohmann::json(*holds) : nlohmann::json(nullptr);
+}
+
+std::string seal_words(const std::optional<bool>& holds) {
+  if (!holds) return "none: nothing tells whether it was changed";
+  return *holds ? "holds: as cam wrote it" : "broken: changed or cut short since cam wrote it";
+}
+
 std::string model_word(SurfaceModel model) {
   return model == SurfaceModel::kFacet ? "facet" : "smooth";
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 
 #include "core/metrics.h"
@@ -21,6 +22,10 @@ std::string fixed(double value, int digits);
 
 /// Joins two counts as "256 x 192".
 std::string size_text(long columns, long rows);
+
+/// What check_seal() said of a program: true, false, or null without a seal; and in words.
+nlohmann::json seal_json(const std::optional<bool>& holds);
+std::string seal_words(const std::optional<bool>& holds);
 
 std::string model_word(SurfaceModel model);
 

@@ -20,6 +20,7 @@
 #include "app/send_settings.h"
 #include "app/terminal_keys.h"
 #include "core/error.h"
+#include "machine/gcode/program_seal.h"
 #include "machine/guard/background_guard.h"
 #include "machine/link/serial_link.h"
 #include "machine/link/steady_clock.h"
@@ -90,6 +91,7 @@ class SendRun {
     summary_.job = identify_job(settings_.file);
     log_.begin(options_, summary_.job);
     try {
+      check_seal_of_program();
       carry_out();
     } catch (const std::exception& refused) {
       log_.line(std::string("nothing was sent: ") + refused.what());
@@ -103,6 +105,21 @@ class SendRun {
   }
 
  private:
+  /// A program that was changed or cut short since cam wrote it is named before anything else.
+  void check_seal_of_program() {
+    summary_.seal_holds = check_seal(settings_.file);
+    if (summary_.seal_holds.value_or(true)) return;
+    const std::string broken =
+        settings_.file +
+        ": its seal does not hold: it is not as cam wrote it, it was changed or "
+        "cut short";
+    if (!settings_.allow_changed) {
+      throw InputError(broken + "; make it anew, or use --allow-changed if that is meant");
+    }
+    warn_("warning: " + broken);
+    log_.line("warning: " + broken);
+  }
+
   void carry_out() {
     if (settings_.port.empty()) {
       examine_alone();

@@ -98,6 +98,7 @@ nlohmann::json send_json(const OptionSet& options, const SendSummary& summary) {
                          {"options", options.used()},
                          {"sha256", summary.job.sha256},
                          {"bytes", summary.job.bytes},
+                         {"seal_holds", seal_json(summary.seal_holds)},
                          {"program", facts_json(summary.facts)},
                          {"warnings", summary.findings.warnings}};
   if (summary.controller) {
@@ -122,6 +123,7 @@ std::string send_text(const SendSettings& settings, const SendSummary& summary) 
   std::string text = settings.file + ": " + status_word(summary);
   if (summary.result && !summary.result->done()) text += ": " + summary.result->reason;
   text.append("\n").append(facts_text(summary.facts));
+  text.append("  seal         ").append(seal_words(summary.seal_holds)).append("\n");
   if (summary.checked_lines) {
     text += "  controller   checked " + std::to_string(*summary.checked_lines) + " lines ($C)\n";
   }

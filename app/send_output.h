@@ -17,6 +17,7 @@ namespace lensforge::app {
 /// All that a run of `lensforge send` found out.
 struct SendSummary {
   JobIdentity job;
+  std::optional<bool> seal_holds;  ///< machine/gcode/program_seal.h; nothing without a seal.
   ProgramFacts facts;
   std::optional<ControllerInfo> controller;
   Findings findings;

@@ -65,6 +65,8 @@ void add_send_options(OptionSet& options, SendSettings& settings) {
   options.flag("--dry-run", settings.dry_run,
                "check only: the program, and with --port the controller, which runs it in its "
                "check mode ($C)");
+  options.flag("--allow-changed", settings.allow_changed,
+               "send a program that is not as cam wrote it: warn instead of refusing");
   add_guard_options(options, settings);
   add_journal_options(options, settings);
 }

@@ -30,6 +30,7 @@ struct SendSettings {
   bool resume = false;
   bool restart = false;
   bool yes = false;
+  bool allow_changed = false;  ///< Send a program whose seal does not hold.
   bool home = false;
   int margin = 20;
   double spin_up = 5.0;  ///< s, for the estimate of the time.
