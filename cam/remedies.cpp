@@ -67,13 +67,24 @@ Change with_half_the_polish(const CamOptions& options) {
   return change;
 }
 
-std::optional<Change> change_against(const std::string& cause, const CutPlan& plan) {
+/// What less polishing leaves of scallops, rows that lie closer make up for.
+Change with_half_the_polish_and_pitch(const CamOptions& options, double pitch) {
+  Change change = with_half_the_polish(with_half_the_pitch(options, pitch).options);
+  change.words = with_half_the_pitch(options, pitch).words + " and " + change.words;
+  return change;
+}
+
+/// What is tried against a cause but for creases, one after the other.
+std::vector<Change> changes_against(const std::string& cause, const CutPlan& plan) {
   const CamOptions& options = plan.options();
-  if (cause == leak_cause::kScallop) return with_half_the_pitch(options, plan.pitch());
-  if (cause == leak_cause::kChord) return with_half_the_tolerances(options);
-  if (cause == leak_cause::kDecimals) return with_another_decimal(options);
-  if (cause == leak_cause::kPolish) return with_half_the_polish(options);
-  return std::nullopt;
+  if (cause == leak_cause::kScallop) return {with_half_the_pitch(options, plan.pitch())};
+  if (cause == leak_cause::kChord) return {with_half_the_tolerances(options)};
+  if (cause == leak_cause::kPolish) {
+    return {with_half_the_polish(options), with_half_the_polish_and_pitch(options, plan.pitch())};
+  }
+  const auto finer = with_another_decimal(options);
+  if (cause == leak_cause::kDecimals && finer) return {*finer};
+  return {};
 }
 
 bool is_valid(const CamOptions& options, const Lens& lens) {
@@ -139,8 +150,8 @@ void try_remedies(const TrialSite& site, std::vector<LeakPlace>& places, const E
       const std::vector<std::string> causes = causes_of(place);
       if (rank >= causes.size() || is_halved(&place)) continue;
       if (causes[rank] == leak_cause::kCrease) creased.push_back(&place);
-      if (const auto change = change_against(causes[rank], site.plan)) {
-        trials.run(*change, {&place});
+      for (const Change& change : changes_against(causes[rank], site.plan)) {
+        if (!is_halved(&place)) trials.run(change, {&place});
       }
     }
     for (const double diameter : smaller_balls(finishing_ball(options).diameter, kMostBalls)) {

@@ -181,12 +181,15 @@ TEST(Remedies, EveryCauseHasOneOfItsOwn) {
   try_remedies(cut.site(), places, cut.executor(), {});
   std::vector<std::string> changes;
   for (const LeakPlace& place : places) {
-    ASSERT_EQ(place.trials.size(), 1U);
-    changes.push_back(place.trials[0].change);
-    EXPECT_TRUE(std::isfinite(place.trials[0].leakage));
+    for (const LeakTrial& trial : place.trials) {
+      changes.push_back(trial.change);
+      EXPECT_TRUE(std::isfinite(trial.leakage));
+    }
   }
-  EXPECT_THAT(changes, ElementsAre("half as much polishing", HasSubstr("a pitch of 0.0"),
-                                   "half the tolerances", "one more decimal"));
+  EXPECT_THAT(
+      changes,
+      ElementsAre("half as much polishing", "a pitch of 0.0294 mm and half as much polishing",
+                  "a pitch of 0.0294 mm", "half the tolerances", "one more decimal"));
 }
 
 TEST(Remedies, NoneIsTriedUnlessAskedFor) {
