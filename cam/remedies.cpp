@@ -127,8 +127,9 @@ std::vector<std::string> causes_of(const LeakPlace& place) {
                 [&](const CausePart& part) { return part.leakage < kLeastPart * place.leakage; });
   std::stable_sort(parts.begin(), parts.end(),
                    [](const CausePart& a, const CausePart& b) { return a.leakage > b.leakage; });
-  std::vector<std::string> causes;
-  for (const CausePart& part : parts) causes.push_back(part.cause);
+  std::vector<std::string> causes(parts.size());
+  std::transform(parts.begin(), parts.end(), causes.begin(),
+                 [](const CausePart& part) { return part.cause; });
   return causes;
 }
 
