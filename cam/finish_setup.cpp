@@ -8,7 +8,7 @@ namespace lensforge {
 namespace {
 
 /// How finely the smooth surface is cut into facets, which are followed only in grooves that bend
-/// as sharply as the ball (RowCurves), by the pencil, and where the ball's reach is judged.
+/// as sharply as the ball (RowCurves), and by the pencil.
 constexpr SmoothCutOptions kSmoothCut{1e-4, 2e-2};
 
 RasterPlan finish_raster(const CamOptions& options, const FinishGround& ground, PassAxis along) {
