@@ -137,8 +137,8 @@ class Job {
                                 plan_.take_finish_paths(programs, control_), options_.polish);
     Prediction prediction = predict_part(surfaces, lens_, options_, executor_, control_);
     if (options_.remedies) {
-      try_remedies({plan_, lens_, surfaces.designed(), prediction.leakage}, prediction.places,
-                   executor_, control_);
+      try_remedies({plan_, lens_, surfaces.designed(), surfaces.part(), prediction.leakage},
+                   prediction.places, executor_, control_);
     }
     return prediction;
   }

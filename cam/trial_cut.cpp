@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <optional>
 
 #include "cam/finish_paths.h"
@@ -87,11 +86,22 @@ std::vector<Valley> parts_in(const Valley& valley, const Eigen::AlignedBox2d& bo
   return parts;
 }
 
-double weighted(const std::vector<double>& weights, const FluxPicture& now,
-                const FluxPicture& before) {
-  double sum = 0.0;
-  for (std::size_t i = 0; i < weights.size(); ++i) {
-    sum += weights[i] * (now.flux[i] - before.flux[i]);
+/// What the light of a place changes in a picture when `now` takes the place of `before`.
+struct Exchange {
+  double leakage = 0.0;
+  double dark_flux = 0.0;
+};
+
+Exchange exchange(const LeakageResult& foretold, const FluxPicture& before,
+                  const FluxPicture& now) {
+  const std::vector<double>& part = foretold.part().picture.flux;
+  const std::vector<double>& designed = foretold.designed.picture.flux;
+  Exchange sum;
+  for (std::size_t i = 0; i < part.size(); ++i) {
+    const double more = now.flux[i] - before.flux[i];
+    sum.leakage +=
+        std::max(0.0, part[i] + more - designed[i]) - std::max(0.0, part[i] - designed[i]);
+    sum.dark_flux += foretold.dark[i] * more;
   }
   return sum;
 }
@@ -155,13 +165,12 @@ LeakTrial TrialCut::at(const LeakPlace& place, const RunControl& control) const 
   const SurfaceField& raw = cast ? static_cast<const SurfaceField&>(*cast) : milled;
   const Eigen::Vector2d size = site_.lens.setup.lens_size;
   const PolishedField part(raw, {Eigen::Vector2d(0.0, 0.0), size}, options_.polish);
-  const FieldRenderSetup setup{site_.lens.setup, fine.grid};
-  const FluxPicture designed = render_cells(site_.designed, setup, fine.cells, executor_, silent);
-  const FluxPicture now = render_cells(part, setup, fine.cells, executor_, silent);
-  const LeakageResult& leakage = site_.leakage;
-  const std::vector<double> more =
-      pixels_with_surplus(leakage.part().picture, leakage.designed.picture);
-  return {"", weighted(more, now, designed), weighted(leakage.dark, now, designed)};
+  const OpticalSetup& optics = site_.lens.setup;
+  const FluxPicture foretold =
+      render_cells(site_.part, {optics, grid}, place.cells, executor_, silent);
+  const FluxPicture now = render_cells(part, {optics, fine.grid}, fine.cells, executor_, silent);
+  const Exchange change = exchange(site_.leakage, foretold, now);
+  return {"", place.leakage + change.leakage, place.dark_flux + change.dark_flux};
 }
 
 }  // namespace lensforge

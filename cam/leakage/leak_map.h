@@ -49,7 +49,7 @@ struct LeakPlaceOptions {
 /// What would leak from a place if one thing were changed.
 struct LeakTrial {
   std::string change;      ///< "a 0.3 mm ball"
-  double leakage = 0.0;    ///< As LeakPlace::leakage, in the same pixels.
+  double leakage = 0.0;    ///< As LeakPlace::leakage, with all else as it is.
   double dark_flux = 0.0;  ///< As LeakPlace::dark_flux.
 };
 
