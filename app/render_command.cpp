@@ -35,6 +35,7 @@ struct RenderArguments {
 /// What is rendered and, if known, what it should look like.
 struct Scene {
   SurfaceMesh surface;
+  std::optional<Eigen::Matrix3Xd> normals;  ///< Of a solid's own surface, for the smooth model.
   OpticalSetup setup;
   SurfaceModel model = SurfaceModel::kFacet;
   std::optional<Image> target;
@@ -70,25 +71,26 @@ bool is_step(const std::string& source) {
 }
 
 /// Points at which a solid is sampled, as export does for the picture that it prints.
-constexpr double kSolidPoints = 1e6;
+constexpr double kSolidPoints = 4e6;
 
 Scene load_solid(const std::string& source, const Executor& executor, const Console& console) {
   SolidSurface solid = read_solid_surface(source, kSolidPoints, executor);
   console.note(std::to_string(solid.faces) + (solid.faces == 1 ? " face" : " faces") +
                (solid.by_name ? " named \"optical surface\"" : " told by shape: look up"));
-  const OpticalSetup setup = setup_for_mesh(solid.mesh, RenderArguments{}.pixels);
-  return {std::move(solid.mesh), setup, SurfaceModel::kSmooth, std::nullopt};
+  SampledSurface& samples = solid.samples;
+  const OpticalSetup setup = setup_for_mesh(samples.mesh, RenderArguments{}.pixels);
+  return {std::move(samples.mesh), std::move(samples.normals), setup, SurfaceModel::kSmooth, {}};
 }
 
 Scene load(const std::string& source, const Executor& executor, const Console& console) {
   if (is_step(source)) return load_solid(source, executor, console);
   if (fs::is_directory(source)) {
     Lens lens = read_lens(source);
-    return {std::move(lens.surface), lens.setup, lens.model, std::move(lens.target)};
+    return {std::move(lens.surface), {}, lens.setup, lens.model, std::move(lens.target)};
   }
   SurfaceMesh mesh = read_mesh(source);
   const OpticalSetup setup = setup_for_mesh(mesh, RenderArguments{}.pixels);
-  return {std::move(mesh), setup, RenderArguments{}.model, std::nullopt};
+  return {std::move(mesh), {}, setup, RenderArguments{}.model, {}};
 }
 
 /// The scene with everything that the options say instead.
@@ -122,12 +124,22 @@ struct Rendering {
   std::string text;
 };
 
+bool has_normals_for(SurfaceModel model, const Scene& scene) {
+  return model == SurfaceModel::kSmooth && scene.normals.has_value();
+}
+
+ImageMetrics judge(const Scene& scene, SurfaceModel model, Image* image, const Executor& executor) {
+  if (has_normals_for(model, scene)) {
+    return evaluate(scene.surface, *scene.normals, scene.setup, *scene.target, image, executor);
+  }
+  return evaluate(scene.surface, scene.setup, model, *scene.target, image, executor);
+}
+
 Rendering compare_models(const Scene& scene, const Executor& executor) {
   Rendering rendering;
   for (const SurfaceModel model : {SurfaceModel::kFacet, SurfaceModel::kSmooth}) {
     Image* image = model == scene.model ? &rendering.image : nullptr;
-    const ImageMetrics metrics =
-        evaluate(scene.surface, scene.setup, model, *scene.target, image, executor);
+    const ImageMetrics metrics = judge(scene, model, image, executor);
     const std::string word = model_word(model);
     rendering.json["metrics"][word] = metrics_json(metrics);
     rendering.text +=
@@ -137,7 +149,10 @@ Rendering compare_models(const Scene& scene, const Executor& executor) {
 }
 
 Rendering render_alone(const Scene& scene, const Executor& executor) {
-  const RenderResult result = render_surface(scene.surface, scene.setup, scene.model, executor);
+  const RenderResult result =
+      has_normals_for(scene.model, scene)
+          ? render_surface(scene.surface, *scene.normals, scene.setup, executor)
+          : render_surface(scene.surface, scene.setup, scene.model, executor);
   return {result.image,
           {{"flux_inside", result.flux_inside}},
           "  " + model_word(scene.model) + "  flux inside " + fixed(100.0 * result.flux_inside, 1) +

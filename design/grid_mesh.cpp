@@ -10,31 +10,6 @@ namespace lensforge {
 
 namespace {
 
-/// Shift of a vertex of an odd row, in cells.
-double row_shift(int column, int cells) {
-  const int from_border = std::min(column, cells - column);
-  return 0.5 * std::min(1.0, static_cast<double>(from_border) / kShiftFade);
-}
-
-/// x of a flat mesh's vertex, in cells.
-double rest_column(int column, int row, int cells) {
-  return column + (row % 2 == 1 ? row_shift(column, cells) : 0.0);
-}
-
-/// Where x (in cells) lies in a row: a column and the fraction to the next one.
-struct RowPosition {
-  int column;
-  double fraction;
-};
-
-RowPosition locate(double x, int row, int cells) {
-  int column = std::clamp(static_cast<int>(std::floor(x)), 0, cells - 1);
-  while (column > 0 && rest_column(column, row, cells) > x) --column;
-  const double left = rest_column(column, row, cells);
-  const double right = rest_column(column + 1, row, cells);
-  return {column, std::clamp((x - left) / (right - left), 0.0, 1.0)};
-}
-
 /// Displacement (x, y from the flat position) and height of a grid surface at a flat position.
 class GridField {
  public:
@@ -51,7 +26,7 @@ class GridField {
  private:
   [[nodiscard]] Eigen::Vector3d along_row(int row, double x) const {
     const int cells_x = mesh_.grid.columns - 1;
-    const RowPosition p = locate(x / size_.x() * cells_x, row, cells_x);
+    const RowPosition p = locate_in_row(x / size_.x() * cells_x, row, cells_x);
     return interpolate_cubic(p.column, p.fraction, cells_x, [&](int column) -> Eigen::Vector3d {
       const Eigen::Index i = static_cast<Eigen::Index>(row) * mesh_.grid.columns + column;
       return mesh_.vertices.col(i) - flat_.vertices.col(i);

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 
+#include "core/grid_layout.h"
 #include "core/surface_mesh.h"
 
 namespace lensforge {
@@ -16,9 +17,6 @@ inline constexpr double kRowsPerColumn = 1.15;
 /// and right border the shift fades out over kShiftFade cells, so that all rows end on the border.
 /// @pre shape.columns, shape.rows ≥ 2.
 SurfaceMesh make_grid_mesh(const Eigen::Vector2d& size, const GridShape& shape, double z);
-
-/// Cells next to the border over which the half-cell shift of odd rows grows from 0 to its full.
-inline constexpr int kShiftFade = 4;
 
 /// The same surface on another grid over the same rectangle: displacements from the flat mesh's
 /// positions and heights are interpolated by cubics (Catmull–Rom), once along rows and once across.

@@ -16,9 +16,11 @@ namespace lensforge {
 
 /// Flux that a surface sends to every pixel, as shares of the lens's total, row by row from the
 /// top; computed on any executor, returned in the caller's memory.
+/// @param normals_given  3 × V, those of the smooth model; nullptr takes the mesh's own.
 template <class Exec>
 std::vector<double> render_flux(const SurfaceMesh& mesh, const OpticalSetup& setup,
-                                SurfaceModel model, const Exec& executor) {
+                                SurfaceModel model, const Exec& executor,
+                                const Eigen::Matrix3Xd* normals_given = nullptr) {
   const auto numbers = [](const auto& matrix) {
     return std::span(matrix.data(), static_cast<std::size_t>(matrix.size()));
   };
@@ -33,7 +35,8 @@ std::vector<double> render_flux(const SurfaceMesh& mesh, const OpticalSetup& set
     download(executor, image.render(executor, count, ProjectFacet{surface}), std::span(flux));
     return flux;
   }
-  const Eigen::Matrix3Xd sums = vertex_area_normals(mesh);
+  const Eigen::Matrix3Xd sums =
+      normals_given != nullptr ? *normals_given : vertex_area_normals(mesh);
   const auto normals = buffer_of(executor, numbers(sums));
   typename Exec::template Buffer<double> landing(2 * static_cast<std::size_t>(sums.cols()));
   parallel_for(executor, "project vertices", mesh.vertex_count(),

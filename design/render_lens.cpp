@@ -27,28 +27,47 @@ std::vector<double> flux_of(const SurfaceMesh& mesh, const OpticalSetup& setup, 
   return render_flux(mesh, setup, model, executor);
 }
 
-RenderResult render_scaled(const SurfaceMesh& mesh, const OpticalSetup& setup, SurfaceModel model,
-                           double total, const Executor& executor) {
-  const std::vector<double> flux = flux_of(mesh, setup, model, executor);
+RenderResult result_of(const std::vector<double>& flux, const OpticalSetup& setup, double total) {
   return {scaled(flux, setup.pixels.x(), setup.pixels.y(), total),
           std::accumulate(flux.begin(), flux.end(), 0.0)};
+}
+
+double pixel_count(const OpticalSetup& setup) {
+  return static_cast<double>(setup.pixels.x()) * setup.pixels.y();
+}
+
+ImageMetrics judged(RenderResult result, const Image& target, Image* rendered) {
+  ImageMetrics metrics = compare(result.image, target);
+  metrics.flux_inside = result.flux_inside;
+  if (rendered != nullptr) *rendered = std::move(result.image);
+  return metrics;
 }
 
 }  // namespace
 
 RenderResult render_surface(const SurfaceMesh& mesh, const OpticalSetup& setup, SurfaceModel model,
                             const Executor& executor) {
-  const double pixels = static_cast<double>(setup.pixels.x()) * setup.pixels.y();
-  return render_scaled(mesh, setup, model, pixels, executor);
+  return result_of(flux_of(mesh, setup, model, executor), setup, pixel_count(setup));
+}
+
+RenderResult render_surface(const SurfaceMesh& mesh, const Eigen::Matrix3Xd& normals,
+                            const OpticalSetup& setup, const Executor& executor) {
+  return result_of(render_flux(mesh, setup, SurfaceModel::kSmooth, executor, &normals), setup,
+                   pixel_count(setup));
 }
 
 ImageMetrics evaluate(const SurfaceMesh& mesh, const OpticalSetup& setup, SurfaceModel model,
                       const Image& target, Image* rendered, const Executor& executor) {
-  RenderResult result = render_scaled(mesh, setup, model, target.total(), executor);
-  ImageMetrics metrics = compare(result.image, target);
-  metrics.flux_inside = result.flux_inside;
-  if (rendered != nullptr) *rendered = std::move(result.image);
-  return metrics;
+  return judged(result_of(flux_of(mesh, setup, model, executor), setup, target.total()), target,
+                rendered);
+}
+
+ImageMetrics evaluate(const SurfaceMesh& mesh, const Eigen::Matrix3Xd& normals,
+                      const OpticalSetup& setup, const Image& target, Image* rendered,
+                      const Executor& executor) {
+  const std::vector<double> flux =
+      render_flux(mesh, setup, SurfaceModel::kSmooth, executor, &normals);
+  return judged(result_of(flux, setup, target.total()), target, rendered);
 }
 
 }  // namespace lensforge

@@ -25,4 +25,14 @@ RenderResult render_surface(const SurfaceMesh& mesh, const OpticalSetup& setup, 
 ImageMetrics evaluate(const SurfaceMesh& mesh, const OpticalSetup& setup, SurfaceModel model,
                       const Image& target, Image* rendered, const Executor& executor);
 
+/// The same for a smooth surface that is known by its own normals at the vertices, 3 × V with
+/// z > 0: what the triangles between them hide does not matter. Computed on the CPU.
+RenderResult render_surface(const SurfaceMesh& mesh, const Eigen::Matrix3Xd& normals,
+                            const OpticalSetup& setup, const Executor& executor);
+
+/// evaluate() by the normals given.
+ImageMetrics evaluate(const SurfaceMesh& mesh, const Eigen::Matrix3Xd& normals,
+                      const OpticalSetup& setup, const Image& target, Image* rendered,
+                      const Executor& executor);
+
 }  // namespace lensforge

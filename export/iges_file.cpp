@@ -47,6 +47,18 @@ void fill_header(const StepHeader& header, const fs::path& path, IGESControl_Wri
   writer.Model()->SetGlobalSection(section);
 }
 
+TopoDS_Shape read_iges_shape(const fs::path& path) {
+  silence_opencascade();
+  IGESControl_Controller::Init();
+  IGESControl_Reader reader;
+  if (reader.ReadFile(path.c_str()) != IFSelect_RetDone) {
+    throw InputError(path.string() + ": is missing or no IGES file");
+  }
+  reader.TransferRoots();
+  if (reader.NbShapes() == 0) throw InputError(path.string() + ": holds no shape");
+  return reader.OneShape();
+}
+
 }  // namespace
 
 SolidContent write_iges(const SplineNet& net, const StepHeader& header, const fs::path& path) {
@@ -63,22 +75,12 @@ SolidContent write_iges(const SplineNet& net, const StepHeader& header, const fs
   write_whole_file(path, [&](const fs::path& beside) {
     errno = 0;
     if (!writer.Write(beside.c_str())) fail_to_write(path, last_system_error());
-    content = inspect_iges(beside);
+    content = inspect_shape(read_iges_shape(beside), net.volume());
     require_read_back(content, net.volume(), path);
   });
   return content;
 }
 
-SolidContent inspect_iges(const fs::path& path) {
-  silence_opencascade();
-  IGESControl_Controller::Init();
-  IGESControl_Reader reader;
-  if (reader.ReadFile(path.c_str()) != IFSelect_RetDone) {
-    throw InputError(path.string() + ": is missing or no IGES file");
-  }
-  reader.TransferRoots();
-  if (reader.NbShapes() == 0) throw InputError(path.string() + ": holds no shape");
-  return inspect_shape(reader.OneShape());
-}
+SolidContent inspect_iges(const fs::path& path) { return inspect_shape(read_iges_shape(path)); }
 
 }  // namespace lensforge

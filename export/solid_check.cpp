@@ -10,6 +10,7 @@
 #include <Message_PrinterOStream.hxx>
 #include <STEPControl_Reader.hxx>
 #include <TopExp_Explorer.hxx>
+#include <array>
 #include <cerrno>
 #include <cmath>
 #include <system_error>
@@ -21,6 +22,21 @@ namespace {
 
 /// Share by which OpenCASCADE's volume of the file may differ from the splines' own integral.
 constexpr double kVolumeShare = 1e-6;
+
+/// Relative errors that OpenCASCADE's integration is asked for, one after the other until the
+/// volume is the expected one. It comes out far better than asked for (1e-4: a portrait's 119,025
+/// control points to 1.4e-8 in 1.3 s; 1e-7: to 2e-9 in 11 s).
+constexpr std::array kIntegrationErrors{1e-4, 1e-7};
+
+double volume_of(const TopoDS_Shape& shape, double error) {
+  GProp_GProps properties;
+  BRepGProp::VolumeProperties(shape, properties, error);
+  return properties.Mass();
+}
+
+bool is_same_volume(double found, double expected) {
+  return std::abs(found - expected) <= kVolumeShare * expected;
+}
 
 bool shells_are_closed(const TopoDS_Shape& shape) {
   for (TopExp_Explorer at(shape, TopAbs_SHELL); at.More(); at.Next()) {
@@ -52,22 +68,23 @@ TopoDS_Shape read_step_shape(const std::filesystem::path& path) {
   return reader.OneShape();
 }
 
-SolidContent inspect_shape(const TopoDS_Shape& shape) {
+SolidContent inspect_shape(const TopoDS_Shape& shape, std::optional<double> expected) {
   SolidContent content;
   content.solids = count_shapes(shape, TopAbs_SOLID);
   content.faces = count_shapes(shape, TopAbs_FACE);
   content.valid = BRepCheck_Analyzer(shape).IsValid();
   content.closed = shells_are_closed(shape);
-  GProp_GProps properties;
-  BRepGProp::VolumeProperties(shape, properties, kVolumeShare / 10.0);
-  content.volume = properties.Mass();
+  for (const double error : kIntegrationErrors) {
+    content.volume = volume_of(shape, error);
+    if (expected && is_same_volume(content.volume, *expected)) break;
+  }
   return content;
 }
 
 void require_read_back(const SolidContent& content, double volume,
                        const std::filesystem::path& path) {
   if (!content.is_one_solid()) fail_to_write(path, "it does not read back as one closed solid");
-  if (std::abs(content.volume - volume) <= kVolumeShare * volume) return;
+  if (is_same_volume(content.volume, volume)) return;
   fail_to_write(path, "it reads back with a volume of " + std::to_string(content.volume) +
                           " mm^3 instead of " + std::to_string(volume));
 }

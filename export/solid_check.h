@@ -2,6 +2,7 @@
 #pragma once
 
 #include <TopoDS_Shape.hxx>
+#include <optional>
 #include <string>
 
 #include "export/step_file.h"
@@ -17,7 +18,8 @@ int count_shapes(const TopoDS_Shape& shape, TopAbs_ShapeEnum kind);
 /// @throw InputError if the file cannot be read or holds no shape. Lengths become millimetres.
 TopoDS_Shape read_step_shape(const std::filesystem::path& path);
 
-SolidContent inspect_shape(const TopoDS_Shape& shape);
+/// @param expected  the volume in mm³, if known: coarse integration that finds it is enough.
+SolidContent inspect_shape(const TopoDS_Shape& shape, std::optional<double> expected = {});
 
 /// @throw RunError naming `path` unless `content` is one closed solid of `volume` mm³.
 void require_read_back(const SolidContent& content, double volume,

@@ -17,6 +17,7 @@
 #include <XSControl_TransferReader.hxx>
 #include <XSControl_WorkSession.hxx>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <memory>
 #include <optional>
@@ -26,8 +27,10 @@
 #include "core/error.h"
 #include "export/solid_check.h"
 
-// A point of the raster is found on a face by Newton's method in the face's own parameters, from
-// where the point before it was.
+// Splines that fill the rectangles of their parameters, as export writes them, are sampled evenly
+// over their knot cells, which are small where the lens has much to say. Other faces are sampled on
+// a raster over the lens; a point of it is found on a face by Newton's method in the face's own
+// parameters, from where the point before it was. Normals are the faces' own.
 namespace lensforge {
 namespace {
 
@@ -45,8 +48,8 @@ constexpr double kNear = 1e-6;
 /// Heights above one point that differ by more than this are two surfaces, mm.
 constexpr double kSameHeight = 1e-3;
 
-/// Every so many points all faces are asked, not only the first that has the point.
-constexpr std::int64_t kOverlapStride = 97;
+/// Points of the raster on which all faces are asked whether they lie above one another.
+constexpr double kOverlapPoints = 1e4;
 
 [[noreturn]] void refuse(const fs::path& path, const std::string& why) {
   throw InputError(path.string() + ": " + why);
@@ -55,6 +58,12 @@ constexpr std::int64_t kOverlapStride = 97;
 struct Parameters {
   double u = 0.0;
   double v = 0.0;
+};
+
+/// A point of a face and the normal there, z > 0.
+struct FacePoint {
+  Eigen::Vector3d point;
+  Eigen::Vector3d normal;
 };
 
 /// One face and how it is evaluated. Not for use by two threads at once.
@@ -95,11 +104,33 @@ class FaceSampler {
     return range;
   }
 
-  /// z of the face above a point, or nothing where the face is not.
-  [[nodiscard]] std::optional<double> height(const Eigen::Vector2d& xy) {
+  /// The face above a point, or nothing where it is not.
+  [[nodiscard]] std::optional<FacePoint> above(const Eigen::Vector2d& xy) {
     if (!last_) last_ = nearest_probe(xy);
-    if (const auto z = newton(*last_, xy)) return z;
+    if (const auto found = newton(*last_, xy)) return found;
     return newton(nearest_probe(xy), xy);
+  }
+
+  /// Knot cells along u and v; nothing unless the face is a spline over its whole rectangle.
+  [[nodiscard]] std::optional<std::array<int, 2>> knot_cells() const {
+    if (surface_.GetType() != GeomAbs_BSplineSurface) return std::nullopt;
+    constexpr int kBorderPoints = 64;
+    for (int i = 0; i <= kBorderPoints; ++i) {
+      const double t = static_cast<double>(i) / kBorderPoints;
+      const double u = std::lerp(low_.u, high_.u, t);
+      const double v = std::lerp(low_.v, high_.v, t);
+      for (const Parameters& at :
+           {Parameters{u, low_.v}, Parameters{u, high_.v}, Parameters{low_.u, v},
+            Parameters{high_.u, v}, Parameters{u, v}}) {
+        if (!contains(at)) return std::nullopt;
+      }
+    }
+    return std::array<int, 2>{surface_.NbUKnots() - 1, surface_.NbVKnots() - 1};
+  }
+
+  /// The point at these shares of the way along u and v.
+  [[nodiscard]] FacePoint at(double share_u, double share_v) const {
+    return point_at({std::lerp(low_.u, high_.u, share_u), std::lerp(low_.v, high_.v, share_v)});
   }
 
  private:
@@ -120,7 +151,17 @@ class FaceSampler {
         ->at;
   }
 
-  [[nodiscard]] std::optional<double> newton(Parameters at, const Eigen::Vector2d& xy) {
+  [[nodiscard]] FacePoint point_at(const Parameters& at) const {
+    gp_Pnt point;
+    gp_Vec du;
+    gp_Vec dv;
+    surface_.D1(at.u, at.v, point, du, dv);
+    gp_Vec normal = du.Crossed(dv);
+    if (normal.Z() < 0.0) normal.Reverse();
+    return {{point.X(), point.Y(), point.Z()}, {normal.X(), normal.Y(), normal.Z()}};
+  }
+
+  [[nodiscard]] std::optional<FacePoint> newton(Parameters at, const Eigen::Vector2d& xy) {
     constexpr int kMostSteps = 20;
     for (int step = 0; step < kMostSteps; ++step) {
       gp_Pnt point;
@@ -131,7 +172,7 @@ class FaceSampler {
       if (miss.norm() < kNear) {
         if (!contains(at)) return std::nullopt;
         last_ = at;
-        return point.Z();
+        return point_at(at);
       }
       Eigen::Matrix2d derivative;
       derivative << du.X(), dv.X(), du.Y(), dv.Y();
@@ -264,116 +305,179 @@ Raster make_raster(const std::vector<OpticalFace>& faces, double points, const f
   return raster;
 }
 
-/// Heights along rows of the raster.
+/// Points along rows of a raster.
 class RowSampler {
  public:
   RowSampler(const std::vector<OpticalFace>& faces, const Raster& raster)
       : faces_(faces), raster_(raster), samplers_(faces.size()) {}
 
-  /// z of every point of a row, NaN where there is no face.
-  [[nodiscard]] Eigen::VectorXd row(int number) {
-    Eigen::VectorXd heights(raster_.shape.columns);
-    for (int c = 0; c < raster_.shape.columns; ++c) {
-      const Eigen::Vector2d xy = raster_.at(c, number);
-      heights[c] = first_height(xy);
-      const std::int64_t point = std::int64_t{number} * raster_.shape.columns + c;
-      if (point % kOverlapStride == 0) overlaps_ = overlaps_ || is_covered_twice(xy, heights[c]);
+  /// Of the face that had the point before, or else of the first one that has this one.
+  [[nodiscard]] std::optional<FacePoint> at(int column, int row) {
+    const Eigen::Vector2d xy = raster_.at(column, row);
+    if (const auto found = above(last_, xy)) return found;
+    for (std::size_t i = 0; i < faces_.size(); ++i) {
+      const auto found = above(i, xy);
+      if (!found) continue;
+      last_ = i;
+      return found;
     }
-    return heights;
+    return std::nullopt;
   }
 
-  [[nodiscard]] bool overlaps() const { return overlaps_; }
+  [[nodiscard]] bool is_covered_twice(int column, int row) {
+    std::optional<double> first;
+    for (std::size_t i = 0; i < faces_.size(); ++i) {
+      const auto found = above(i, raster_.at(column, row));
+      if (!found) continue;
+      const double z = found->point.z();
+      if (first && std::abs(z - *first) > kSameHeight) return true;
+      first = z;
+    }
+    return false;
+  }
 
  private:
-  [[nodiscard]] std::optional<double> height(std::size_t face, const Eigen::Vector2d& xy) {
+  [[nodiscard]] std::optional<FacePoint> above(std::size_t face, const Eigen::Vector2d& xy) {
     constexpr double kNearSquared = kNear * kNear;
     if (faces_[face].box.squaredExteriorDistance(xy) > kNearSquared) return std::nullopt;
     if (!samplers_[face]) samplers_[face] = std::make_unique<FaceSampler>(faces_[face].face);
-    return samplers_[face]->height(xy);
-  }
-
-  /// Of the face that had the point before, or else of the first one that has this one.
-  [[nodiscard]] double first_height(const Eigen::Vector2d& xy) {
-    if (const auto z = height(last_, xy)) return *z;
-    for (std::size_t i = 0; i < faces_.size(); ++i) {
-      const auto z = height(i, xy);
-      if (!z) continue;
-      last_ = i;
-      return *z;
-    }
-    return std::nan("");
-  }
-
-  [[nodiscard]] bool is_covered_twice(const Eigen::Vector2d& xy, double z) {
-    for (std::size_t i = 0; i < faces_.size(); ++i) {
-      const auto other = height(i, xy);
-      if (other && std::abs(*other - z) > kSameHeight) return true;
-    }
-    return false;
+    return samplers_[face]->above(xy);
   }
 
   const std::vector<OpticalFace>& faces_;
   const Raster& raster_;
   std::vector<std::unique_ptr<FaceSampler>> samplers_;
   std::size_t last_ = 0;
-  bool overlaps_ = false;
 };
 
-/// Heights of the whole raster, one column of the matrix per row of it.
-Eigen::MatrixXd sample(const std::vector<OpticalFace>& faces, const Raster& raster,
-                       const fs::path& path, const Executor& executor) {
+/// Calls `visit(sampler, column, row)` for every point of a raster, some rows at a time.
+template <class Visit>
+void for_each_point(const std::vector<OpticalFace>& faces, const Raster& raster,
+                    const Executor& executor, const Visit& visit) {
   constexpr int kRowsPerBand = 16;
   const int bands = (raster.shape.rows + kRowsPerBand - 1) / kRowsPerBand;
-  Eigen::MatrixXd heights(raster.shape.columns, raster.shape.rows);
-  std::vector<char> overlaps(static_cast<std::size_t>(bands), 0);
   parallel_for(
       executor, "solid surface", bands,
       [&](std::int64_t band) {
         RowSampler sampler(faces, raster);
         const auto first = static_cast<int>(band) * kRowsPerBand;
         const int end = std::min(first + kRowsPerBand, raster.shape.rows);
-        for (int r = first; r < end; ++r) heights.col(r) = sampler.row(r);
-        overlaps[static_cast<std::size_t>(band)] = sampler.overlaps() ? 1 : 0;
+        for (int r = first; r < end; ++r) {
+          for (int c = 0; c < raster.shape.columns; ++c) visit(sampler, c, r);
+        }
       },
       1);
-  if (std::find(overlaps.begin(), overlaps.end(), 1) != overlaps.end()) {
-    refuse(path, "its optical surface is no height field: parts of it lie above one another");
-  }
-  return heights;
 }
 
-/// The raster's points that have a height, and the triangles all of whose corners have one.
-SurfaceMesh mesh_of(const Raster& raster, const Eigen::MatrixXd& heights) {
-  const int columns = raster.shape.columns;
-  const int rows = raster.shape.rows;
-  Eigen::MatrixXi number = Eigen::MatrixXi::Constant(columns, rows, -1);
-  std::vector<Eigen::Vector3d> vertices;
-  for (int r = 0; r < rows; ++r) {
-    for (int c = 0; c < columns; ++c) {
-      if (std::isnan(heights(c, r))) continue;
-      number(c, r) = static_cast<int>(vertices.size());
-      const Eigen::Vector2d xy = raster.at(c, r);
-      vertices.emplace_back(xy.x(), xy.y(), heights(c, r));
+void require_height_field(const std::vector<OpticalFace>& faces, const fs::path& path,
+                          const Executor& executor) {
+  const Raster raster = make_raster(faces, kOverlapPoints, path);
+  std::vector<char> twice(static_cast<std::size_t>(raster.shape.rows), 0);
+  for_each_point(faces, raster, executor, [&](RowSampler& sampler, int c, int r) {
+    if (sampler.is_covered_twice(c, r)) twice[static_cast<std::size_t>(r)] = 1;
+  });
+  if (std::find(twice.begin(), twice.end(), 1) == twice.end()) return;
+  refuse(path, "its optical surface is no height field: parts of it lie above one another");
+}
+
+/// Puts points of grids and the triangles between them together.
+class SurfaceBuilder {
+ public:
+  /// A grid's points row by row; triangles only where all corners are.
+  void add(const std::vector<std::optional<FacePoint>>& points, const GridShape& shape) {
+    std::vector<int> number(points.size(), -1);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      if (!points[i]) continue;
+      number[i] = static_cast<int>(vertices_.size());
+      vertices_.push_back(points[i]->point);
+      normals_.push_back(points[i]->normal);
+    }
+    for (int r = 0; r + 1 < shape.rows; ++r) {
+      for (int c = 0; c + 1 < shape.columns; ++c) {
+        const int a = number[table(c, r, shape)];
+        const int b = number[table(c + 1, r, shape)];
+        const int d = number[table(c, r + 1, shape)];
+        const int e = number[table(c + 1, r + 1, shape)];
+        add_triangle(a, b, e);
+        add_triangle(a, e, d);
+      }
     }
   }
-  std::vector<Eigen::Vector3i> triangles;
-  for (int r = 0; r + 1 < rows; ++r) {
-    for (int c = 0; c + 1 < columns; ++c) {
-      const Eigen::Vector3i low(number(c, r), number(c + 1, r), number(c + 1, r + 1));
-      const Eigen::Vector3i high(number(c, r), number(c + 1, r + 1), number(c, r + 1));
-      if (low.minCoeff() >= 0) triangles.push_back(low);
-      if (high.minCoeff() >= 0) triangles.push_back(high);
+
+  [[nodiscard]] SampledSurface build() const {
+    SampledSurface result;
+    result.mesh.vertices.resize(3, static_cast<Eigen::Index>(vertices_.size()));
+    result.normals.resize(3, result.mesh.vertices.cols());
+    result.mesh.triangles.resize(3, static_cast<Eigen::Index>(triangles_.size()));
+    for (std::size_t i = 0; i < vertices_.size(); ++i) {
+      result.mesh.vertices.col(static_cast<Eigen::Index>(i)) = vertices_[i];
+      result.normals.col(static_cast<Eigen::Index>(i)) = normals_[i];
     }
+    for (std::size_t i = 0; i < triangles_.size(); ++i) {
+      result.mesh.triangles.col(static_cast<Eigen::Index>(i)) = triangles_[i];
+    }
+    return result;
   }
-  SurfaceMesh mesh;
-  mesh.vertices =
-      Eigen::Map<const Eigen::Matrix3Xd>(vertices.empty() ? nullptr : vertices.front().data(), 3,
-                                         static_cast<Eigen::Index>(vertices.size()));
-  mesh.triangles =
-      Eigen::Map<const Eigen::Matrix3Xi>(triangles.empty() ? nullptr : triangles.front().data(), 3,
-                                         static_cast<Eigen::Index>(triangles.size()));
-  if (static_cast<Eigen::Index>(vertices.size()) == heights.size()) mesh.grid = raster.shape;
-  return mesh;
+
+ private:
+  static std::size_t table(int column, int row, const GridShape& shape) {
+    return static_cast<std::size_t>(std::int64_t{row} * shape.columns + column);
+  }
+
+  /// Counter-clockwise seen from above, whichever way round the face's parameters are.
+  void add_triangle(int a, int b, int c) {
+    if (std::min({a, b, c}) < 0) return;
+    const auto place = [&](int i) { return vertices_[static_cast<std::size_t>(i)]; };
+    const bool turned = (place(b) - place(a)).cross(place(c) - place(a)).z() < 0.0;
+    triangles_.push_back(turned ? Eigen::Vector3i(a, c, b) : Eigen::Vector3i(a, b, c));
+  }
+
+  std::vector<Eigen::Vector3d> vertices_;
+  std::vector<Eigen::Vector3d> normals_;
+  std::vector<Eigen::Vector3i> triangles_;
+};
+
+SampledSurface on_raster(const std::vector<OpticalFace>& faces, double points, const fs::path& path,
+                         const Executor& executor) {
+  const Raster raster = make_raster(faces, points, path);
+  const GridShape& shape = raster.shape;
+  std::vector<std::optional<FacePoint>> found(static_cast<std::size_t>(shape.columns) *
+                                              static_cast<std::size_t>(shape.rows));
+  for_each_point(faces, raster, executor, [&](RowSampler& sampler, int c, int r) {
+    found[static_cast<std::size_t>(std::int64_t{r} * shape.columns + c)] = sampler.at(c, r);
+  });
+  SurfaceBuilder builder;
+  builder.add(found, shape);
+  return builder.build();
+}
+
+/// Nothing unless every face is a spline over its whole rectangle.
+std::optional<SampledSurface> on_knots(const std::vector<OpticalFace>& faces, double points) {
+  std::vector<std::array<int, 2>> cells;
+  double all = 0.0;
+  for (const OpticalFace& face : faces) {
+    const auto found = FaceSampler(face.face).knot_cells();
+    if (!found) return std::nullopt;
+    cells.push_back(*found);
+    all += double{1} * cells.back()[0] * cells.back()[1];
+  }
+  constexpr double kMostDensity = 256.0;
+  const auto density =
+      static_cast<int>(std::clamp(std::ceil(std::sqrt(points / all)), 2.0, kMostDensity));
+  SurfaceBuilder builder;
+  for (std::size_t i = 0; i < faces.size(); ++i) {
+    const FaceSampler sampler(faces[i].face);
+    const GridShape shape{cells[i][0] * density + 1, cells[i][1] * density + 1};
+    std::vector<std::optional<FacePoint>> grid;
+    for (int r = 0; r < shape.rows; ++r) {
+      for (int c = 0; c < shape.columns; ++c) {
+        grid.emplace_back(sampler.at(static_cast<double>(c) / (shape.columns - 1),
+                                     static_cast<double>(r) / (shape.rows - 1)));
+      }
+    }
+    builder.add(grid, shape);
+  }
+  return builder.build();
 }
 
 }  // namespace
@@ -382,11 +486,11 @@ SolidSurface read_solid_surface(const fs::path& path, double points, const Execu
   const Solid solid = read_solid(path);
   std::vector<OpticalFace> faces;
   for (const TopoDS_Face& face : optical_faces(solid, path)) faces.push_back(with_box(face));
-  const Raster raster = make_raster(faces, points, path);
-  SolidSurface surface{mesh_of(raster, sample(faces, raster, path, executor)),
-                       static_cast<int>(faces.size()), !solid.named.empty()};
-  if (surface.mesh.triangle_count() == 0) refuse(path, "its optical surface cannot be sampled");
-  return surface;
+  require_height_field(faces, path, executor);
+  std::optional<SampledSurface> samples = on_knots(faces, points);
+  if (!samples) samples = on_raster(faces, points, path, executor);
+  if (samples->mesh.triangle_count() == 0) refuse(path, "its optical surface cannot be sampled");
+  return {std::move(*samples), static_cast<int>(faces.size()), !solid.named.empty()};
 }
 
 }  // namespace lensforge

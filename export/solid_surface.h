@@ -4,13 +4,13 @@
 #include <filesystem>
 
 #include "core/executor.h"
-#include "core/surface_mesh.h"
+#include "export/sampled_surface.h"
 
 namespace lensforge {
 
 /// The optical surface of a solid from any program.
 struct SolidSurface {
-  SurfaceMesh mesh;      ///< Points of the surface above a square raster, mm.
+  SampledSurface samples;
   int faces = 0;         ///< Of the solid that make it up.
   bool by_name = false;  ///< They are called "optical surface"; otherwise they were told by shape.
 };
@@ -18,7 +18,9 @@ struct SolidSurface {
 /// Reads a STEP file's one solid and samples its optical surface: the faces named "optical
 /// surface", or else all curved faces that look up, or else all flat ones that look up (+z).
 /// Lengths are converted to millimetres; the solid stays where it is in its own coordinates.
-/// @param points  of the raster, about.
+/// Splines are sampled over their knot cells, as the lens that they were made from; faces with
+/// other outlines or of other kinds on a square raster.
+/// @param points  in all, about.
 /// @throw InputError naming the file if there is no solid or several, if no face looks up, if the
 ///        optical faces overhang or lie above one another, or if their extent is less than 0.1 mm
 ///        or above 10 m, as it is with a wrong length unit.

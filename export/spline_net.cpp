@@ -9,30 +9,11 @@
 namespace lensforge {
 namespace {
 
-/// Integral over [0, cells] of every basis function.
-Eigen::VectorXd basis_integrals(int cells) {
-  Eigen::VectorXd integrals(cells + 3);
-  for (int i = 0; i < integrals.size(); ++i) {
-    // A quarter of its support's length.
-    const int from = std::max(i - 3, 0);
-    const int to = std::min(i + 1, cells);
-    integrals[i] = 0.25 * (to - from);
-  }
-  return integrals;
-}
-
 double angle_between(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
   const Eigen::Vector3d m = Eigen::Vector3d(-a.x(), -a.y(), 1.0).normalized();
   const Eigen::Vector3d n = Eigen::Vector3d(-b.x(), -b.y(), 1.0).normalized();
   return 2.0 * std::asin(std::min(1.0, 0.5 * (m - n).norm()));
 }
-
-/// Points on one row of cells: heights and slopes of a patch, one row per x.
-struct Strip {
-  std::vector<double> u;
-  std::vector<double> v;
-  Eigen::MatrixXd z, zx, zy;
-};
 
 std::vector<double> raster(int from_cell, int to_cell, int density) {
   std::vector<double> points;
@@ -42,17 +23,58 @@ std::vector<double> raster(int from_cell, int to_cell, int density) {
   return points;
 }
 
-Strip evaluate_strip(const SplinePatch& patch, int cell, int density) {
-  Strip strip{raster(cell, cell + 1, density), raster(0, patch.cells, density), {}, {}, {}};
-  const Eigen::Vector2d cell_size = patch.box.sizes() / patch.cells;
-  const auto across = basis_matrix(strip.v, patch.cells, false);
-  const Eigen::MatrixXd rows = basis_matrix(strip.u, patch.cells, false) * patch.heights;
-  const Eigen::MatrixXd row_slopes = basis_matrix(strip.u, patch.cells, true) * patch.heights;
-  strip.z = rows * across.transpose();
-  strip.zx = row_slopes * across.transpose() / cell_size.x();
-  strip.zy = rows * basis_matrix(strip.v, patch.cells, true).transpose() / cell_size.y();
-  return strip;
-}
+/// Gauss–Legendre nodes in every cell: exact to the ninth degree, one more than a volume has.
+struct Gauss {
+  static constexpr int kNodes = 5;
+  static constexpr std::array<double, kNodes> kNode{0.046910077030668, 0.230765344947158, 0.5,
+                                                    0.769234655052842, 0.953089922969332};
+  static constexpr std::array<double, kNodes> kWeight{0.118463442528095, 0.239314335249683,
+                                                      0.284444444444444, 0.239314335249683,
+                                                      0.118463442528095};
+
+  static std::vector<double> points(int cells) {
+    std::vector<double> result;
+    for (int i = 0; i < cells; ++i) {
+      for (const double node : kNode) result.push_back(i + node);
+    }
+    return result;
+  }
+};
+
+/// x, y, z of a patch and their derivatives on a tensor grid of points (in cells), one row per u.
+class PatchTable {
+ public:
+  PatchTable(const SplinePatch& patch, const std::vector<double>& u, const std::vector<double>& v) {
+    const Eigen::Vector2d cell = patch.box.sizes() / patch.cells;
+    const Eigen::MatrixXd across = basis_matrix(v, patch.cells, false).transpose();
+    const Eigen::MatrixXd bent = basis_matrix(v, patch.cells, true).transpose() / cell.y();
+    const auto along = basis_matrix(u, patch.cells, false);
+    const auto steep = basis_matrix(u, patch.cells, true);
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Eigen::MatrixXd rows = along * patch.coefficients[k];
+      value_[k] = rows * across;
+      by_u_[k] = (steep * patch.coefficients[k]) * across / cell.x();
+      by_v_[k] = rows * bent;
+    }
+  }
+
+  [[nodiscard]] Eigen::Index rows() const { return value_[0].rows(); }
+  [[nodiscard]] Eigen::Index columns() const { return value_[0].cols(); }
+  [[nodiscard]] SplinePoint at(Eigen::Index i, Eigen::Index j) const {
+    return spline_point(take(value_, i, j), take(by_u_, i, j), take(by_v_, i, j));
+  }
+  /// Height times the area that a unit of the parameters covers.
+  [[nodiscard]] double volume(Eigen::Index i, Eigen::Index j) const {
+    return value_[2](i, j) * (by_u_[0](i, j) * by_v_[1](i, j) - by_u_[1](i, j) * by_v_[0](i, j));
+  }
+
+ private:
+  using Table = std::array<Eigen::MatrixXd, 3>;
+  static Eigen::Vector3d take(const Table& table, Eigen::Index i, Eigen::Index j) {
+    return {table[0](i, j), table[1](i, j), table[2](i, j)};
+  }
+  Table value_, by_u_, by_v_;
+};
 
 int interval_of(const std::vector<double>& lines, double at) {
   const auto above = std::upper_bound(lines.begin(), lines.end(), at);
@@ -62,30 +84,56 @@ int interval_of(const std::vector<double>& lines, double at) {
 
 }  // namespace
 
-SurfacePoint SplinePatch::at(const Eigen::Vector2d& xy) const {
-  const Eigen::Array2d share = (xy - box.min()).array() / box.sizes().array();
+SplinePoint spline_point(const Eigen::Vector3d& p, const Eigen::Vector3d& du,
+                         const Eigen::Vector3d& dv) {
+  const double area = du.x() * dv.y() - dv.x() * du.y();
+  return {p.head<2>(),
+          {p.z(),
+           Eigen::Vector2d(du.z() * dv.y() - dv.z() * du.y(), dv.z() * du.x() - du.z() * dv.x()) /
+               area}};
+}
+
+PatchFrame SplinePatch::frame(const Eigen::Vector2d& uv) const {
+  const Eigen::Array2d share = (uv - box.min()).array() / box.sizes().array();
   const Eigen::Array2d t = (share * cells).max(0.0).min(cells);
-  const CubicBasis u = cubic_basis(t.x(), cells);
-  const CubicBasis v = cubic_basis(t.y(), cells);
-  SurfacePoint point;
+  const CubicBasis bu = cubic_basis(t.x(), cells);
+  const CubicBasis bv = cubic_basis(t.y(), cells);
+  const Eigen::Vector2d scale = cells / box.sizes().array();
+  PatchFrame frame;
   for (std::size_t i = 0; i < 4; ++i) {
     for (std::size_t j = 0; j < 4; ++j) {
-      const double c = heights(u.first + static_cast<int>(i), v.first + static_cast<int>(j));
-      point.z += c * u.value[i] * v.value[j];
-      point.slope += c * Eigen::Vector2d(u.slope[i] * v.value[j], u.value[i] * v.slope[j]);
+      const int row = bu.first + static_cast<int>(i);
+      const int column = bv.first + static_cast<int>(j);
+      const Eigen::Vector3d c(coefficients[0](row, column), coefficients[1](row, column),
+                              coefficients[2](row, column));
+      frame.point += c * (bu.value[i] * bv.value[j]);
+      frame.by_u += c * (bu.slope[i] * bv.value[j] * scale.x());
+      frame.by_v += c * (bu.value[i] * bv.slope[j] * scale.y());
     }
   }
-  point.slope = (point.slope.array() * cells / box.sizes().array()).matrix();
-  return point;
+  return frame;
+}
+
+SplinePoint SplinePatch::at(const Eigen::Vector2d& uv) const {
+  const PatchFrame f = frame(uv);
+  return spline_point(f.point, f.by_u, f.by_v);
 }
 
 double SplinePatch::volume() const {
-  const Eigen::VectorXd weights = basis_integrals(cells);
-  return weights.dot(heights * weights) * box.volume() / (double{1} * cells * cells);
+  const std::vector<double> points = Gauss::points(cells);
+  const PatchTable table(*this, points, points);
+  double sum = 0.0;
+  for (Eigen::Index i = 0; i < table.rows(); ++i) {
+    for (Eigen::Index j = 0; j < table.columns(); ++j) {
+      sum += Gauss::kWeight[static_cast<std::size_t>(i % Gauss::kNodes)] *
+             Gauss::kWeight[static_cast<std::size_t>(j % Gauss::kNodes)] * table.volume(i, j);
+    }
+  }
+  return sum * box.volume() / (double{1} * cells * cells);
 }
 
 FitError SplineNet::error() const {
-  const double area = (x.back() - x.front()) * (y.back() - y.front());
+  const double area = (u.back() - u.front()) * (v.back() - v.front());
   FitError worst;
   for (const SplinePatch& patch : patches) {
     worst.height = std::max(worst.height, patch.error.height);
@@ -107,39 +155,60 @@ double SplineNet::volume() const {
 
 std::int64_t SplineNet::control_points() const {
   std::int64_t count = 0;
-  for (const SplinePatch& patch : patches) count += patch.heights.size();
+  for (const SplinePatch& patch : patches) count += patch.coefficients[0].size();
   return count;
 }
 
-int SplineNet::patch_at(const Eigen::Vector2d& xy) const {
-  return interval_of(y, xy.y()) * columns + interval_of(x, xy.x());
+int SplineNet::patch_at(const Eigen::Vector2d& uv) const {
+  return interval_of(v, uv.y()) * columns + interval_of(u, uv.x());
 }
 
-SurfacePoint SplineNet::at(const Eigen::Vector2d& xy) const {
-  return patches[static_cast<std::size_t>(patch_at(xy))].at(xy);
+SplinePoint SplineNet::at(const Eigen::Vector2d& uv) const {
+  return patches[static_cast<std::size_t>(patch_at(uv))].at(uv);
 }
 
-SurfaceMesh sampled(const SplineNet& net, const GridShape& shape) {
-  SurfaceMesh mesh;
+std::optional<Eigen::Vector2d> SplineNet::parameters_of(const Eigen::Vector2d& xy,
+                                                        const Eigen::Vector2d& start) const {
+  constexpr int kMostSteps = 30;
+  constexpr double kNear = 1e-9;  // mm
+  const Eigen::Vector2d low(u.front(), v.front());
+  const Eigen::Vector2d high(u.back(), v.back());
+  Eigen::Vector2d uv = start.cwiseMax(low).cwiseMin(high);
+  for (int step = 0; step < kMostSteps; ++step) {
+    const PatchFrame f = patches[static_cast<std::size_t>(patch_at(uv))].frame(uv);
+    const Eigen::Vector2d miss = xy - f.point.head<2>();
+    if (miss.norm() < kNear) return uv;
+    Eigen::Matrix2d derivative;
+    derivative << f.by_u.head<2>(), f.by_v.head<2>();
+    uv = (uv + derivative.inverse() * miss).cwiseMax(low).cwiseMin(high);
+  }
+  return std::nullopt;
+}
+
+SampledSurface sampled(const SplineNet& net, const GridShape& shape) {
+  SampledSurface result;
+  SurfaceMesh& mesh = result.mesh;
   mesh.grid = shape;
   mesh.vertices.resize(3, Eigen::Index{shape.columns} * shape.rows);
   mesh.triangles.resize(3, Eigen::Index{2} * (shape.columns - 1) * (shape.rows - 1));
-  const Eigen::Vector2d low(net.x.front(), net.y.front());
-  const Eigen::Vector2d size = Eigen::Vector2d(net.x.back(), net.y.back()) - low;
+  result.normals.resize(3, mesh.vertices.cols());
+  const Eigen::Vector2d low(net.u.front(), net.v.front());
+  const Eigen::Vector2d size = Eigen::Vector2d(net.u.back(), net.v.back()) - low;
   Eigen::Index t = 0;
   for (int r = 0; r < shape.rows; ++r) {
     for (int c = 0; c < shape.columns; ++c) {
       const Eigen::Array2d share(static_cast<double>(c) / (shape.columns - 1),
                                  static_cast<double>(r) / (shape.rows - 1));
-      const Eigen::Vector2d xy = low + (share * size.array()).matrix();
-      const int v = r * shape.columns + c;
-      mesh.vertices.col(v) << xy, net.at(xy).z;
+      const SplinePoint point = net.at(low + (share * size.array()).matrix());
+      const int at = r * shape.columns + c;
+      mesh.vertices.col(at) << point.xy, point.surface.z;
+      result.normals.col(at) << -point.surface.slope, 1.0;
       if (c + 1 == shape.columns || r + 1 == shape.rows) continue;
-      mesh.triangles.col(t++) << v, v + 1, v + shape.columns + 1;
-      mesh.triangles.col(t++) << v, v + shape.columns + 1, v + shape.columns;
+      mesh.triangles.col(t++) << at, at + 1, at + shape.columns + 1;
+      mesh.triangles.col(t++) << at, at + shape.columns + 1, at + shape.columns;
     }
   }
-  return mesh;
+  return result;
 }
 
 FitError difference(const SurfacePoint& a, const SurfacePoint& b) {
@@ -153,17 +222,15 @@ bool holds(const FitError& error, const FitOptions& options) {
 FitError measure_patch(const SplinePatch& patch, const SmoothSurface& surface, int density) {
   FitError error;
   double points = 0.0;
+  const std::vector<double> across = raster(0, patch.cells, density);
   for (int cell = 0; cell < patch.cells; ++cell) {
-    const Strip strip = evaluate_strip(patch, cell, density);
-    for (Eigen::Index i = 0; i < strip.z.rows(); ++i) {
-      for (Eigen::Index j = 0; j < strip.z.cols(); ++j) {
-        const Eigen::Array2d share(strip.u[static_cast<std::size_t>(i)],
-                                   strip.v[static_cast<std::size_t>(j)]);
-        const Eigen::Vector2d step = (share / patch.cells * patch.box.sizes().array()).matrix();
-        const auto point = surface.model_at(patch.box.min() + step);
-        if (!point) continue;
-        const FitError found =
-            difference({strip.z(i, j), {strip.zx(i, j), strip.zy(i, j)}}, *point);
+    const PatchTable table(patch, raster(cell, cell + 1, density), across);
+    for (Eigen::Index i = 0; i < table.rows(); ++i) {
+      for (Eigen::Index j = 0; j < table.columns(); ++j) {
+        const SplinePoint at = table.at(i, j);
+        const auto model = surface.model_at(nearest_inside(surface.box(), at.xy));
+        if (!model) continue;
+        const FitError found = difference(at.surface, *model);
         error.height = std::max(error.height, found.height);
         error.normal = std::max(error.normal, found.normal);
         error.height_rms += found.height * found.height;

@@ -3,13 +3,16 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "core/executor.h"
 #include "core/run_control.h"
 #include "core/smooth_surface.h"
+#include "export/sampled_surface.h"
 
 namespace lensforge {
 
@@ -18,30 +21,52 @@ namespace lensforge {
 struct FitError {
   double height = 0.0;      ///< Largest, mm along z
   double normal = 0.0;      ///< Largest angle, rad
-  double height_rms = 0.0;  ///< Root of the mean square over the area
+  double height_rms = 0.0;  ///< Root of the mean square over the parameters
   double normal_rms = 0.0;
 };
 
-/// A bicubic B-spline height field over a rectangle: `cells` × `cells` knot cells, twice
-/// continuously differentiable. x and y are linear in the parameters.
+/// A point of a height field, seen from above, and its height and slopes there.
+struct SplinePoint {
+  Eigen::Vector2d xy = Eigen::Vector2d::Zero();  ///< mm
+  SurfacePoint surface;
+};
+
+/// The point with these coordinates and derivatives by two parameters.
+SplinePoint spline_point(const Eigen::Vector3d& p, const Eigen::Vector3d& du,
+                         const Eigen::Vector3d& dv);
+
+/// A point of a patch and its derivatives by the parameters.
+struct PatchFrame {
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();
+  Eigen::Vector3d by_u = Eigen::Vector3d::Zero();
+  Eigen::Vector3d by_v = Eigen::Vector3d::Zero();
+};
+
+/// The point of a box that is nearest: rounding may put points of the rim outside.
+inline Eigen::Vector2d nearest_inside(const Eigen::AlignedBox2d& box, const Eigen::Vector2d& at) {
+  return at.cwiseMax(box.min()).cwiseMin(box.max());
+}
+
+/// A bicubic B-spline surface over a rectangle of parameters: `cells` × `cells` knot cells, twice
+/// continuously differentiable, one height above every (x, y).
 struct SplinePatch {
-  Eigen::AlignedBox2d box;
+  Eigen::AlignedBox2d box;  ///< Of the parameters (u, v), mm on the lens while its grid is flat.
   int cells = 0;
-  Eigen::MatrixXd
-      heights;     ///< (cells + 3) × (cells + 3) coefficients in mm; row index runs along x.
+  /// Coefficients of x, y and z in mm, (cells + 3) × (cells + 3) each; row index runs along u.
+  std::array<Eigen::MatrixXd, 3> coefficients;
   FitError error;  ///< Certificate: no point of the patch is farther off.
 
-  /// @pre xy lies in the box.
-  [[nodiscard]] SurfacePoint at(const Eigen::Vector2d& xy) const;
+  /// @pre uv lies in the box, as for frame().
+  [[nodiscard]] PatchFrame frame(const Eigen::Vector2d& uv) const;
+  [[nodiscard]] SplinePoint at(const Eigen::Vector2d& uv) const;
   /// Volume between the patch and z = 0, mm³; exact.
   [[nodiscard]] double volume() const;
 };
 
-/// The heights along a line between two patches, or along the rim: a cubic B-spline that both
-/// patches contain.
+/// A line between two patches, or on the rim: a cubic B-spline that both patches contain.
 struct SplineEdge {
   int cells = 0;
-  Eigen::VectorXd heights;  ///< cells + 3 coefficients, mm
+  Eigen::Matrix3Xd coefficients;  ///< 3 × (cells + 3), mm
 };
 
 /// Place of (column, row) in a table with `columns` columns that is stored row by row.
@@ -49,29 +74,34 @@ inline std::size_t table_index(int column, int row, int columns) {
   return static_cast<std::size_t>(std::int64_t{row} * columns + column);
 }
 
-/// A rectangle tiled with spline patches that join with equal heights, slopes and curvatures.
+/// A rectangle tiled with spline patches that join with equal heights, slopes and curvatures. The
+/// parameters' rectangle is the lens's own, corner for corner and side for side.
 struct SplineNet {
   int columns = 0;
   int rows = 0;
-  std::vector<double> x;             ///< columns + 1 lines, mm
-  std::vector<double> y;             ///< rows + 1 lines, mm
+  std::vector<double> u;             ///< columns + 1 lines, mm
+  std::vector<double> v;             ///< rows + 1 lines, mm
   std::vector<SplinePatch> patches;  ///< Patch (column, row) is row·columns + column.
-  std::vector<SplineEdge> edges_x;   ///< Along x: (column, line) is line·columns + column.
-  std::vector<SplineEdge> edges_y;   ///< Along y: (line, row) is row·(columns + 1) + line.
+  std::vector<SplineEdge> edges_u;   ///< Along u: (column, line) is line·columns + column.
+  std::vector<SplineEdge> edges_v;   ///< Along v: (line, row) is row·(columns + 1) + line.
 
   [[nodiscard]] FitError error() const;
   [[nodiscard]] double volume() const;
   [[nodiscard]] std::int64_t control_points() const;
-  /// @pre xy lies in the rectangle.
-  [[nodiscard]] SurfacePoint at(const Eigen::Vector2d& xy) const;
-  /// Number of the patch that holds a point of the rectangle.
-  [[nodiscard]] int patch_at(const Eigen::Vector2d& xy) const;
+  /// @pre uv lies in the rectangle.
+  [[nodiscard]] SplinePoint at(const Eigen::Vector2d& uv) const;
+  /// Number of the patch that holds a point of the parameters.
+  [[nodiscard]] int patch_at(const Eigen::Vector2d& uv) const;
+  /// Parameters of the point above xy by Newton's method from `start`; nothing if it does not
+  /// come there.
+  [[nodiscard]] std::optional<Eigen::Vector2d> parameters_of(const Eigen::Vector2d& xy,
+                                                             const Eigen::Vector2d& start) const;
 };
 
 struct FitOptions {
   double tolerance = 1e-4;         ///< mm, > 0; on SplinePatch::error.height
   double normal_tolerance = 1e-4;  ///< rad, > 0; on SplinePatch::error.normal
-  /// Control points of all patches together at most; what bounds the file's size (about 70 bytes
+  /// Control points of all patches together at most; what bounds the file's size (about 72 bytes
   /// each). 0: four for each vertex of the mesh, kMostControlPoints at most.
   std::int64_t max_control_points = 0;
 };
@@ -82,8 +112,10 @@ FitError difference(const SurfacePoint& a, const SurfacePoint& b);
 [[nodiscard]] bool holds(const FitError& error, const FitOptions& options);
 
 /// Fits one spline to the vertex-normal model over the surface's rectangle by least squares, slopes
-/// before heights, and cuts it into a net of patches. Until both tolerances hold everywhere, or the
-/// control points are used up, the knots are doubled; net.error() says which tolerances hold.
+/// before heights, and cuts it into a net of patches. Seen from above its knot lines follow the
+/// vertices of a grid that has moved (GridWarp), so that knots are dense where vertices are. Until
+/// both tolerances hold everywhere, or the control points are used up, the knots are doubled;
+/// net.error() says which tolerances hold.
 /// @pre the surface covers its whole box. @throw Interrupted.
 SplineNet fit_spline_net(const SmoothSurface& surface, const FitOptions& options,
                          const Executor& executor, const RunControl& control);
@@ -92,8 +124,8 @@ SplineNet fit_spline_net(const SmoothSurface& surface, const FitOptions& options
 /// each way, borders included.
 FitError measure_patch(const SplinePatch& patch, const SmoothSurface& surface, int density);
 
-/// The net's surface as a regular grid of columns × rows vertices.
-SurfaceMesh sampled(const SplineNet& net, const GridShape& shape);
+/// The net's surface and its own normals at columns × rows points, evenly over the parameters.
+SampledSurface sampled(const SplineNet& net, const GridShape& shape);
 
 /// Knot cells of a patch each way, at least (given enough control points) and at most.
 inline constexpr int kFewestCells = 4;
@@ -102,7 +134,7 @@ inline constexpr int kMostCells = 256;
 inline constexpr int kMostCellsAcross = 2048;
 
 /// What fits a STEP file of 45 MB.
-inline constexpr std::int64_t kMostControlPoints = 560'000;
+inline constexpr std::int64_t kMostControlPoints = 575'000;
 
 /// Raster of the certificate: points each way in a cell of the mesh, and in a knot cell at least.
 inline constexpr int kCertificateDensity = 6;

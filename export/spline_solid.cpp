@@ -16,23 +16,12 @@
 #include <cmath>
 #include <gp_Pln.hxx>
 
-#include "export/cubic_spline.h"
-
-// Curves and surfaces are parametrised by x and y themselves, so that a patch's edges are straight
-// lines in its parameter plane with the same parameter as in space.
+// Edges run along lines of the net's parameters: straight lines in the parameter planes of their
+// faces, with the same parameter as in space.
 namespace lensforge {
 namespace {
 
 constexpr int kDegree = 3;
-
-/// x and y of control points are whole multiples of this (mm), which keeps files short: it turns
-/// normals by less than 1e-6 rad at the finest knots that occur (0.02 mm).
-constexpr double kPositionStep = 1e-7;
-
-double control_position(double from, double to, int i, int cells) {
-  const double at = from + (to - from) * greville_point(i, cells) / cells;
-  return std::round(at / kPositionStep) * kPositionStep;
-}
 
 TColStd_Array1OfReal knots(double from, double to, int cells) {
   TColStd_Array1OfReal result(1, cells + 1);
@@ -53,24 +42,21 @@ Handle(Geom_BSplineSurface) surface_of(const SplinePatch& patch) {
   const Eigen::Vector2d low = patch.box.min();
   const Eigen::Vector2d high = patch.box.max();
   TColgp_Array2OfPnt poles(1, n + kDegree, 1, n + kDegree);
+  const auto& [x, y, z] = patch.coefficients;
   for (int i = 0; i < n + kDegree; ++i) {
     for (int j = 0; j < n + kDegree; ++j) {
-      poles(i + 1, j + 1) = gp_Pnt(control_position(low.x(), high.x(), i, n),
-                                   control_position(low.y(), high.y(), j, n), patch.heights(i, j));
+      poles(i + 1, j + 1) = gp_Pnt(x(i, j), y(i, j), z(i, j));
     }
   }
   return new Geom_BSplineSurface(poles, knots(low.x(), high.x(), n), knots(low.y(), high.y(), n),
                                  multiplicities(n), multiplicities(n), kDegree, kDegree);
 }
 
-/// The curve above a line of the net; axis 0 runs along x, 1 along y.
-Handle(Geom_BSplineCurve)
-    curve_of(const SplineEdge& edge, int axis, double from, double to, double line) {
+Handle(Geom_BSplineCurve) curve_of(const SplineEdge& edge, double from, double to) {
   TColgp_Array1OfPnt poles(1, edge.cells + kDegree);
   for (int i = 0; i < edge.cells + kDegree; ++i) {
-    const double along = control_position(from, to, i, edge.cells);
-    poles(i + 1) =
-        axis == 0 ? gp_Pnt(along, line, edge.heights[i]) : gp_Pnt(line, along, edge.heights[i]);
+    const Eigen::Vector3d p = edge.coefficients.col(i);
+    poles(i + 1) = gp_Pnt(p.x(), p.y(), p.z());
   }
   return new Geom_BSplineCurve(poles, knots(from, to, edge.cells), multiplicities(edge.cells),
                                kDegree);
@@ -100,16 +86,16 @@ class SolidBuilder {
  private:
   using Edges = std::vector<TopoDS_Shape>;
 
-  [[nodiscard]] double x(int line) const { return net_.x[static_cast<std::size_t>(line)]; }
-  [[nodiscard]] double y(int line) const { return net_.y[static_cast<std::size_t>(line)]; }
+  [[nodiscard]] double u(int line) const { return net_.u[static_cast<std::size_t>(line)]; }
+  [[nodiscard]] double v(int line) const { return net_.v[static_cast<std::size_t>(line)]; }
   [[nodiscard]] TopoDS_Vertex& vertex(int column, int row) {
     return vertices_[table_index(column, row, net_.columns + 1)];
   }
-  [[nodiscard]] TopoDS_Edge& edge_x(int column, int line) {
-    return edges_x_[table_index(column, line, net_.columns)];
+  [[nodiscard]] TopoDS_Edge& edge_u(int column, int line) {
+    return edges_u_[table_index(column, line, net_.columns)];
   }
-  [[nodiscard]] TopoDS_Edge& edge_y(int line, int row) {
-    return edges_y_[table_index(line, row, net_.columns + 1)];
+  [[nodiscard]] TopoDS_Edge& edge_v(int line, int row) {
+    return edges_v_[table_index(line, row, net_.columns + 1)];
   }
 
   TopoDS_Vertex make_vertex(const gp_Pnt& at) {
@@ -121,20 +107,25 @@ class SolidBuilder {
   void make_vertices() {
     for (int row = 0; row <= net_.rows; ++row) {
       for (int column = 0; column <= net_.columns; ++column) {
-        const Eigen::Vector2d xy(x(column), y(row));
-        vertices_.push_back(make_vertex(gp_Pnt(xy.x(), xy.y(), corner_height(column, row))));
+        vertices_.push_back(make_vertex(corner(column, row)));
       }
     }
     for (int side = 0; side < 4; ++side) {
-      back_vertices_[static_cast<std::size_t>(side)] =
-          make_vertex(gp_Pnt(x(corner_column(side)), y(corner_row(side)), 0.0));
+      back_vertices_[static_cast<std::size_t>(side)] = make_vertex(foot(side));
     }
   }
 
-  [[nodiscard]] double corner_height(int column, int row) const {
+  [[nodiscard]] gp_Pnt corner(int column, int row) const {
     const bool last = column == net_.columns;
-    const auto& edge = net_.edges_x[table_index((last ? column - 1 : column), row, net_.columns)];
-    return last ? edge.heights[edge.heights.size() - 1] : edge.heights[0];
+    const auto& edge = net_.edges_u[table_index((last ? column - 1 : column), row, net_.columns)];
+    const Eigen::Vector3d p = edge.coefficients.col(last ? edge.coefficients.cols() - 1 : 0);
+    return {p.x(), p.y(), p.z()};
+  }
+
+  /// Below a corner of the rectangle.
+  [[nodiscard]] gp_Pnt foot(int side) const {
+    const gp_Pnt top = corner(corner_column(side), corner_row(side));
+    return {top.X(), top.Y(), 0.0};
   }
 
   /// The rectangle's corners counter-clockwise from (0, 0).
@@ -156,16 +147,16 @@ class SolidBuilder {
   void make_edges() {
     for (int line = 0; line <= net_.rows; ++line) {
       for (int c = 0; c < net_.columns; ++c) {
-        const SplineEdge& spline = net_.edges_x[edges_x_.size()];
-        edges_x_.push_back(make_edge(curve_of(spline, 0, x(c), x(c + 1), y(line)), vertex(c, line),
-                                     vertex(c + 1, line)));
+        const SplineEdge& spline = net_.edges_u[edges_u_.size()];
+        edges_u_.push_back(
+            make_edge(curve_of(spline, u(c), u(c + 1)), vertex(c, line), vertex(c + 1, line)));
       }
     }
     for (int r = 0; r < net_.rows; ++r) {
       for (int line = 0; line <= net_.columns; ++line) {
-        const SplineEdge& spline = net_.edges_y[edges_y_.size()];
-        edges_y_.push_back(make_edge(curve_of(spline, 1, y(r), y(r + 1), x(line)), vertex(line, r),
-                                     vertex(line, r + 1)));
+        const SplineEdge& spline = net_.edges_v[edges_v_.size()];
+        edges_v_.push_back(
+            make_edge(curve_of(spline, v(r), v(r + 1)), vertex(line, r), vertex(line, r + 1)));
       }
     }
     for (int side = 0; side < 4; ++side) {
@@ -201,12 +192,12 @@ class SolidBuilder {
     TopoDS_Face face;
     const SplinePatch& patch = net_.patches[table_index(c, r, net_.columns)];
     builder_.MakeFace(face, surface_of(patch), Precision::Confusion());
-    add_pcurve(edge_x(c, r), 0, y(r), face);
-    add_pcurve(edge_x(c, r + 1), 0, y(r + 1), face);
-    add_pcurve(edge_y(c, r), 1, x(c), face);
-    add_pcurve(edge_y(c + 1, r), 1, x(c + 1), face);
-    builder_.Add(face, make_wire({edge_x(c, r), edge_y(c + 1, r), edge_x(c, r + 1).Reversed(),
-                                  edge_y(c, r).Reversed()}));
+    add_pcurve(edge_u(c, r), 0, v(r), face);
+    add_pcurve(edge_u(c, r + 1), 0, v(r + 1), face);
+    add_pcurve(edge_v(c, r), 1, u(c), face);
+    add_pcurve(edge_v(c + 1, r), 1, u(c + 1), face);
+    builder_.Add(face, make_wire({edge_u(c, r), edge_v(c + 1, r), edge_u(c, r + 1).Reversed(),
+                                  edge_v(c, r).Reversed()}));
     add_face(face, "optical surface");
   }
 
@@ -214,10 +205,10 @@ class SolidBuilder {
   Edges rim_of(int side) {
     Edges edges;
     for (int i = 0; i < (side % 2 == 0 ? net_.columns : net_.rows); ++i) {
-      if (side == 0) edges.push_back(edge_x(net_.columns - 1 - i, 0).Reversed());
-      if (side == 1) edges.push_back(edge_y(net_.columns, net_.rows - 1 - i).Reversed());
-      if (side == 2) edges.push_back(edge_x(i, net_.rows));
-      if (side == 3) edges.push_back(edge_y(0, i));
+      if (side == 0) edges.push_back(edge_u(net_.columns - 1 - i, 0).Reversed());
+      if (side == 1) edges.push_back(edge_v(net_.columns, net_.rows - 1 - i).Reversed());
+      if (side == 2) edges.push_back(edge_u(i, net_.rows));
+      if (side == 3) edges.push_back(edge_v(0, i));
     }
     return edges;
   }
@@ -231,14 +222,14 @@ class SolidBuilder {
     static constexpr std::array<std::array<double, 2>, 4> kOutwards{
         {{0.0, -1.0}, {1.0, 0.0}, {0.0, 1.0}, {-1.0, 0.0}}};
     const gp_Dir outwards(kOutwards[i][0], kOutwards[i][1], 0.0);
-    const gp_Pnt at(x(corner_column(side)), y(corner_row(side)), 0.0);
-    add_face(BRepBuilderAPI_MakeFace(gp_Pln(at, outwards), make_wire(edges)).Face(), "side wall");
+    add_face(BRepBuilderAPI_MakeFace(gp_Pln(foot(side), outwards), make_wire(edges)).Face(),
+             "side wall");
   }
 
   void add_back() {
     Edges edges;
     for (std::size_t i = 4; i-- > 0;) edges.push_back(back_edges_[i].Reversed());
-    const gp_Pln plane(gp_Pnt(x(0), y(0), 0.0), gp_Dir(0.0, 0.0, -1.0));
+    const gp_Pln plane(foot(0), gp_Dir(0.0, 0.0, -1.0));
     add_face(BRepBuilderAPI_MakeFace(plane, make_wire(edges)).Face(), "back");
   }
 
@@ -247,8 +238,8 @@ class SolidBuilder {
   TopoDS_Shell shell_;
   NamedSolid result_;
   std::vector<TopoDS_Vertex> vertices_;
-  std::vector<TopoDS_Edge> edges_x_;
-  std::vector<TopoDS_Edge> edges_y_;
+  std::vector<TopoDS_Edge> edges_u_;
+  std::vector<TopoDS_Edge> edges_v_;
   std::array<TopoDS_Vertex, 4> back_vertices_;
   std::array<TopoDS_Edge, 4> back_edges_;
   std::array<TopoDS_Edge, 4> uprights_;

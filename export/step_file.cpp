@@ -75,7 +75,7 @@ SolidContent write_step(const SplineNet& net, const StepHeader& header, StepSche
     if (writer.Write(beside.c_str()) != IFSelect_RetDone) {
       fail_to_write(path, last_system_error());
     }
-    content = inspect_step(beside);
+    content = inspect_shape(read_step_shape(beside), net.volume());
     require_read_back(content, net.volume(), path);
   });
   return content;

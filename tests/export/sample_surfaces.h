@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <numbers>
 #include <random>
 
 #include "core/surface_mesh.h"
@@ -46,6 +47,21 @@ inline SurfaceMesh noisy_lens(std::uint32_t seed = 7) {
     const bool inside =
         column > 0 && row > 0 && column + 1 < mesh.grid.columns && row + 1 < mesh.grid.rows;
     if (inside) mesh.vertices.col(v).head<2>() += 0.2 * Eigen::Vector2d(unit(random), unit(random));
+  }
+  return mesh;
+}
+
+/// A steep rise in the middle, to which the vertices have moved: cells are a fifth as wide there.
+inline SurfaceMesh crowded_lens(int columns = 41) {
+  const auto rows = static_cast<int>(std::lround((columns - 1) * kRowsPerColumn * 0.8)) + 1;
+  SurfaceMesh mesh = make_grid_mesh({30.0, 24.0}, {columns, rows}, 0.0);
+  constexpr double kTwoPi = 2.0 * std::numbers::pi;
+  for (Eigen::Index v = 0; v < mesh.vertices.cols(); ++v) {
+    double& x = mesh.vertices(0, v);
+    double& y = mesh.vertices(1, v);
+    x += 0.8 * std::sin(kTwoPi * x / 30.0) * 30.0 / kTwoPi;
+    y += 0.3 * std::sin(kTwoPi * y / 24.0) * 24.0 / kTwoPi;
+    mesh.vertices(2, v) = 5.0 + 0.2 * std::tanh((x - 15.0) / 0.7) + 0.1 * std::sin(0.2 * y);
   }
   return mesh;
 }

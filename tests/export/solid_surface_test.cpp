@@ -61,17 +61,19 @@ TEST_F(SolidSurfaceOf, SphereIsRoundAndHasItsHeights) {
   const SolidSurface surface = read();
   EXPECT_EQ(surface.faces, 1);
   EXPECT_FALSE(surface.by_name);
-  EXPECT_GT(surface.mesh.vertex_count(), 1400);  // π/4 of the raster.
-  EXPECT_LT(surface.mesh.vertex_count(), 1700);
-  for (Eigen::Index v = 0; v < surface.mesh.vertex_count(); ++v) {
-    const Eigen::Vector3d p = surface.mesh.vertices.col(v);
+  EXPECT_GT(surface.samples.mesh.vertex_count(), 1400);  // π/4 of the raster.
+  EXPECT_LT(surface.samples.mesh.vertex_count(), 1700);
+  for (Eigen::Index v = 0; v < surface.samples.mesh.vertex_count(); ++v) {
+    const Eigen::Vector3d p = surface.samples.mesh.vertices.col(v);
     EXPECT_NEAR(p.z(), std::sqrt(2500.0 - p.head<2>().squaredNorm()) - 45.0, 1e-6);
+    const Eigen::Vector3d outwards = (p + Eigen::Vector3d(0.0, 0.0, 45.0)) / 50.0;
+    EXPECT_LT((surface.samples.normals.col(v).normalized() - outwards).norm(), 1e-6);
   }
 }
 
 TEST_F(SolidSurfaceOf, InchesBecomeMillimetres) {
   write(lens_of_a_sphere(), "INCH");
-  EXPECT_NEAR(read().mesh.vertices.row(0).maxCoeff(), 12.0, 0.8);
+  EXPECT_NEAR(read().samples.mesh.vertices.row(0).maxCoeff(), 12.0, 0.8);
 }
 
 TEST_F(SolidSurfaceOf, OurOwnFileIsFoundByNameAndIsTheNet) {
@@ -83,10 +85,14 @@ TEST_F(SolidSurfaceOf, OurOwnFileIsFoundByNameAndIsTheNet) {
   const SolidSurface surface = read(5000);
   EXPECT_TRUE(surface.by_name);
   EXPECT_EQ(surface.faces, static_cast<int>(net.patches.size()));
-  EXPECT_TRUE(surface.mesh.grid.is_grid());
-  for (Eigen::Index v = 0; v < surface.mesh.vertex_count(); ++v) {
-    const Eigen::Vector3d p = surface.mesh.vertices.col(v);
-    EXPECT_NEAR(p.z(), net.at(p.head<2>()).z, 2e-7);
+  for (Eigen::Index v = 0; v < surface.samples.mesh.vertex_count(); ++v) {
+    const Eigen::Vector3d p = surface.samples.mesh.vertices.col(v);
+    const auto uv = net.parameters_of(p.head<2>(), p.head<2>());
+    ASSERT_TRUE(uv);
+    const SurfacePoint point = net.at(*uv).surface;
+    EXPECT_NEAR(p.z(), point.z, 2e-7);
+    const Eigen::Vector3d normal(-point.slope.x(), -point.slope.y(), 1.0);
+    EXPECT_LT((surface.samples.normals.col(v).normalized() - normal.normalized()).norm(), 1e-6);
   }
 }
 
@@ -94,8 +100,7 @@ TEST_F(SolidSurfaceOf, BoxShowsItsTop) {
   write(BRepPrimAPI_MakeBox(gp_Pnt(1, 2, 3), gp_Pnt(11, 12, 8)).Shape());
   const SolidSurface surface = read();
   EXPECT_EQ(surface.faces, 1);
-  EXPECT_TRUE(surface.mesh.grid.is_grid());
-  EXPECT_LT((surface.mesh.vertices.row(2).array() - 8.0).abs().maxCoeff(), 1e-9);
+  EXPECT_LT((surface.samples.mesh.vertices.row(2).array() - 8.0).abs().maxCoeff(), 1e-9);
 }
 
 TEST_F(SolidSurfaceOf, WhatIsNoLensIsRefusedInWords) {

@@ -65,10 +65,10 @@ TEST_F(StepFile, SplinesEvaluatedByAnIndependentReaderAreTheSurface) {
         const double u = std::lerp(s.knots_u.front(), s.knots_u.back(), i / 12.0);
         const double v = std::lerp(s.knots_v.front(), s.knots_v.back(), j / 12.0);
         const Eigen::Vector3d p = s.at(u, v);
-        EXPECT_NEAR(p.x(), u, 1e-7);
-        EXPECT_NEAR(p.y(), v, 1e-7);
-        EXPECT_NEAR(p.z(), net.at({u, v}).z, 1e-7);
-        const auto truth = surface.at({u, v});
+        const SplinePoint fitted_point = net.at({u, v});
+        EXPECT_LT((p.head<2>() - fitted_point.xy).norm(), 1e-9);
+        EXPECT_NEAR(p.z(), fitted_point.surface.z, 1e-9);
+        const auto truth = surface.at(nearest_inside(surface.box(), p.head<2>()));
         ASSERT_TRUE(truth);
         EXPECT_NEAR(p.z(), truth->z, net.error().height + 1e-7);
       }
@@ -136,9 +136,12 @@ double volume_by(const std::string& command, const std::filesystem::path& folder
   return at == std::string::npos ? 0.0 : std::stod(said.substr(at + start.size()));
 }
 
+/// Both integrate with a few points a face: to 1e-6 where x and y are even in the parameters, to
+/// 1e-4 where knots follow moved vertices (ReadsBackAsOneClosedSolidOfTheSameVolume is exact
+/// there).
 TEST_F(StepFile, GmshReadsOneSolidOfTheSameVolume) {
   if (output_of("command -v gmsh").empty()) GTEST_SKIP() << "gmsh is not installed";
-  const SplineNet net = fitted(noisy_lens());
+  const SplineNet net = fitted(smooth_lens());
   write(net);
   write_bytes(folder_ / "volume.geo", R"(SetFactory("OpenCASCADE");
 v() = ShapeFromFile("lens.step");
@@ -151,7 +154,7 @@ Printf("solids %g volume %.12g", #v(), m);
 
 TEST_F(StepFile, FreeCadReadsOneSolidOfTheSameVolume) {
   if (output_of("command -v freecadcmd").empty()) GTEST_SKIP() << "freecadcmd is not installed";
-  const SplineNet net = fitted(noisy_lens());
+  const SplineNet net = fitted(smooth_lens());
   write(net);
   write_bytes(folder_ / "volume.py", R"(import Part
 s = Part.Shape()
