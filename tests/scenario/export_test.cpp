@@ -117,6 +117,41 @@ TEST_F(Export, HeightMapsHaveTheAskedSize) {
   }
 }
 
+/// What stands in for the cut is the design, 0.1 mm higher.
+TEST_F(Export, EveryFormatTakesTheMilledSurface) {
+  SurfaceMesh mesh = read_mesh(at("lens/surface.ply"));
+  const double area = mesh.vertices.row(0).maxCoeff() * mesh.vertices.row(1).maxCoeff();
+  mesh.vertices.row(2).array() += 0.1;
+  fs::create_directory(at("lens/cam"));
+  write_ply(mesh, at("lens/cam/milled.ply"));
+  for (const std::string name : {"a.stl", "a.obj", "a.ply", "a.3mf", "a.step", "a.igs", "a.png"}) {
+    Arguments arguments{"export", path("lens"), "--out", path(name), "--json"};
+    if (name == "a.step" || name == "a.igs") {
+      arguments.insert(arguments.end(), {"--max-points", "1000"});
+    }
+    const nlohmann::json designed = run(arguments).json();
+    arguments.insert(arguments.end(), {"--surface", "milled"});
+    const nlohmann::json milled = run(arguments).json();
+    if (name == "a.png") {
+      EXPECT_NEAR(milled["black_mm"].get<double>() - designed["black_mm"].get<double>(), 0.1, 1e-6);
+      continue;
+    }
+    const double risen = milled["volume_mm3"].get<double>() - designed["volume_mm3"].get<double>();
+    EXPECT_NEAR(risen, 0.1 * area, 0.01 * area) << name;
+  }
+}
+
+TEST_F(Export, WhatIsNoLensIsRefusedAndNothingIsWritten) {
+  for (const char* name : {"out.step", "out.igs", "out.stl", "out.exr"}) {
+    const Outcome outcome = run({"export", path("nowhere"), "--out", path(name), "--quiet"});
+    expect_refusal(outcome, 2, {"nowhere"});
+  }
+  const nlohmann::json lens = nlohmann::json::parse(content(at("lens/lens.json")));
+  move_vertex(lens["grid"][0].get<int>() * 3 + 5, {20.0, 0.0, 0.0});
+  expect_refused({"--out", path("out.step")}, {"surface.ply", "triangle"});
+  EXPECT_EQ(listing(at("")), std::vector<std::string>{"lens"});
+}
+
 TEST_F(Export, FormatGoesBeforeTheExtension) {
   ASSERT_EQ(run({"export", path("lens"), "--out", path("part.obj"), "--format", "stl"}).exit_code,
             0);
