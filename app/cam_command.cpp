@@ -141,7 +141,8 @@ int cam_command(const Arguments& command_line) {
   options.parse(command_line);
   const Console console(options.common().json, options.common().quiet);
   const Lens lens = read_lens(settings.source);
-  const CamOptions cam = cam_options(options, settings);
+  CamOptions cam = cam_options(options, settings);
+  cam.surface = settings.surface.value_or(lens.model);
   if (settings.show_workshop) {
     print_to_stdout(workshop_toml(cam.workshop));
     return kDone;

@@ -80,9 +80,11 @@ void add_blank_options(OptionSet& options, CamSettings& s) {
                  "mill the lens, or the mould to cast it in");
   options.number("--shrinkage", s.cam.shrinkage, Limits::between(0, 0.2), "",
                  "of what is cast in the mould, share of a length");
-  options.choice("--surface", s.cam.surface,
-                 {{"smooth", SurfaceModel::kSmooth}, {"facet", SurfaceModel::kFacet}},
-                 "cut the smooth surface through the vertices, or the facets as they are");
+  options.choice("--surface", s.surface,
+                 {{"designed", std::nullopt},
+                  {"smooth", SurfaceModel::kSmooth},
+                  {"facet", SurfaceModel::kFacet}},
+                 "cut what was designed, the smooth surface over the mesh, or its facets");
 }
 
 void add_program_options(OptionSet& options, CamSettings& s) {

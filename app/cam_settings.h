@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,7 +24,8 @@ struct CamSettings {
   bool no_semi = false;
   bool no_arcs = false;
   bool no_render = false;
-  std::vector<std::string> compare;  ///< What to compare; empty: make programs.
+  std::vector<std::string> compare;     ///< What to compare; empty: make programs.
+  std::optional<SurfaceModel> surface;  ///< To cut; none: the model of the design.
   Tool finish_tool;
   Process process;
   Stock stock;

@@ -45,7 +45,7 @@ struct CamOptions {
 
   PartKind part = PartKind::kLens;
   double shrinkage = 0.0;  ///< Of what is cast in a mould, share of a length, 0 … 0.2.
-  /// What is cut: the facets as they are, or the smooth surface through the mesh's vertices.
+  /// What is cut: the facets as they are, or the smooth surface over the mesh (SmoothSurface).
   SurfaceModel surface = SurfaceModel::kSmooth;
 
   bool render = true;    ///< Compute what the part will project; else programs only.

@@ -75,7 +75,7 @@ ParameterGroup finish_parameters(const CutPlan& plan) {
            {"Slope tolerance", decimal_text(1e3 * finish.slope_tolerance, 2) + " mrad"},
            {"Decimals", std::to_string(plan.decimals())},
            {"Surface", plan.options().surface == SurfaceModel::kSmooth
-                           ? "smooth, through the mesh's vertices"
+                           ? "smooth, over the mesh"
                            : "facets of the mesh"}}};
 }
 

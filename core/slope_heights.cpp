@@ -14,8 +14,7 @@ namespace {
 /// change keeps it near the mesh's.
 constexpr double kAnchor = 1e-9;
 
-/// Weight of edges that end on the border, where half of the triangles that make a normal are
-/// missing: the heights inside are not to follow it.
+/// Weight of edges that end on the border: the heights inside are not to follow its normals.
 constexpr double kBorderWeight = 1e-2;
 
 struct Edge {

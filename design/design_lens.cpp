@@ -182,9 +182,6 @@ class Schedule {
     problem.setup.pixels = level.pixels;
     problem.target = resample(target_, level.pixels.x(), level.pixels.y());
     problem.objective.weights = options_.weights;
-    if (options_.model == SurfaceModel::kSmooth) {
-      problem.objective.weights.smooth *= kSmoothModelFactor;
-    }
     problem.objective.model = options_.model;
     problem.objective.nu = level.nu;
     problem.objective.area = default_area_barrier(problem.setup, state_.mesh.triangle_count());

@@ -14,6 +14,7 @@ namespace lensforge {
 ///   with the ν of plan_levels() its share of the total soon exceeds the picture's. Facets, MAE in
 ///   thousandths after six rounds with 2e-2, 2e-3 and 2e-4: 128² portrait 3.3, 3.2 and 3.1; 96²
 ///   logo 0.50, 0.36 and 0.42; 64² relief with 2.5 vertices per pixel side 0.060, 0.015 and 0.006.
+///   Smooth, 128² portrait with 2e-2 and 2e-3: by the normals 1.7 and 1.0, as a surface 2.8 and 2.2.
 /// Lengths enter the terms in working-picture pixels, the paper's unit of length.
 struct ObjectiveWeights {
   double image = 1e2;       ///< λ1, E_img
@@ -40,11 +41,5 @@ struct EnergyValues {
   double flux = 0.0;
   double total = 0.0;
 };
-
-/// What λ4 is multiplied by under the smooth model: a surface through vertices of which height and
-/// normal contradict each other throws another picture than the normals promise. 128² portrait, MAE
-/// in thousandths with 2e-2 and 2e-3: by the normals 1.7 and 1.0, as a surface 10.2 and 12.9, and
-/// as cut and polished 22.6 and 29.1.
-inline constexpr double kSmoothModelFactor = 10.0;
 
 }  // namespace lensforge

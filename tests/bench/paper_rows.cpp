@@ -22,6 +22,7 @@ PaperRow make_row(RowGroup group, const std::string& title, const std::string& p
   row.picture = picture;
   row.pixels = pixels;
   row.options = std::move(options);
+  if (group != RowGroup::kSmooth) row.options.insert(row.options.end(), {"--model", "facet"});
   return row;
 }
 

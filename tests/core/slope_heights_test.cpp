@@ -36,8 +36,13 @@ struct Contradiction {
     for (double& s : slopes.reshaped()) s = unit(random);
   }
 
-  /// One row per corner of a triangle and so per edge of it, weighted so that every edge counts
-  /// once; the heights' mean is held by one more row.
+  [[nodiscard]] bool is_on_border(int v) const {
+    const int column = v % mesh.grid.columns;
+    const int row = v / mesh.grid.columns;
+    return column == 0 || row == 0 || column + 1 == mesh.grid.columns || row + 1 == mesh.grid.rows;
+  }
+
+  /// One row per edge, those that end on the border weighted down; one more holds the mean.
   [[nodiscard]] Eigen::VectorXd dense_solution() const {
     const Eigen::Index n = mesh.vertex_count();
     Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(n * n, n);
@@ -47,10 +52,10 @@ struct Contradiction {
         const int a = std::min(mesh.triangles(k, t), mesh.triangles((k + 1) % 3, t));
         const int b = std::max(mesh.triangles(k, t), mesh.triangles((k + 1) % 3, t));
         const Eigen::Vector2d step = (mesh.vertices.col(b) - mesh.vertices.col(a)).head<2>();
-        matrix.row(a * n + b).setZero();
-        matrix(a * n + b, a) = -1.0;
-        matrix(a * n + b, b) = 1.0;
-        right[a * n + b] = 0.5 * (slopes.col(a) + slopes.col(b)).dot(step);
+        const double root = is_on_border(a) || is_on_border(b) ? 0.1 : 1.0;  // Of the weight.
+        matrix(a * n + b, a) = -root;
+        matrix(a * n + b, b) = root;
+        right[a * n + b] = root * 0.5 * (slopes.col(a) + slopes.col(b)).dot(step);
       }
     }
     matrix.row(0).setOnes();

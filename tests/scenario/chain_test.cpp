@@ -132,6 +132,23 @@ TEST_F(Chain, CamWritesAProgramAndAReport) {
   EXPECT_GT(info["moves"], 100);
 }
 
+TEST_F(Chain, WhatIsDesignedSmoothIsTheDefaultAndIsCutSmooth) {
+  place_small_lens(at("facets"));
+  ASSERT_EQ(run({"design", picture("stripes.png"), "--out", path("smooth"), "--pixels", "32",
+                 "--rounds", "1", "--quality", "draft"})
+                .exit_code,
+            0);
+  EXPECT_EQ(nlohmann::json::parse(content(at("smooth/lens.json")))["model"], "smooth");
+  for (const auto& [name, surface] :
+       {std::pair("smooth", "smooth, over the mesh"), {"facets", "facets of the mesh"}}) {
+    ASSERT_EQ(run({"cam", path(name), "--pitch", "2mm", "--tool-diameter", "4mm", "--no-rough",
+                   "--no-semi", "--no-render"})
+                  .exit_code,
+              0);
+    EXPECT_THAT(content(at(name) / "cam/report.html"), HasSubstr(surface));
+  }
+}
+
 TEST_F(Chain, LinuxcncAcceptsTheProgram) {
   if (!fs::exists(LENSFORGE_RS274)) GTEST_SKIP() << "no rs274; ./bootstrap test fetches it";
   place_small_lens(at("lens"));

@@ -111,8 +111,8 @@ std::string picture(const std::string& name) {
 }
 
 Arguments small_design(const std::string& target, const std::string& out) {
-  return {"design",   target, "--out",     out,     "--pixels",  "32",
-          "--rounds", "2",    "--quality", "draft", "--threads", "2"};
+  return {"design", target,     "--out", out,         "--pixels", "32",        "--model",
+          "facet",  "--rounds", "2",     "--quality", "draft",    "--threads", "2"};
 }
 
 void place_small_lens(const fs::path& folder) {
