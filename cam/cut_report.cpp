@@ -74,9 +74,8 @@ ParameterGroup finish_parameters(const CutPlan& plan) {
            {"Tolerance", mm(finish.tolerance, 5)},
            {"Slope tolerance", decimal_text(1e3 * finish.slope_tolerance, 2) + " mrad"},
            {"Decimals", std::to_string(plan.decimals())},
-           {"Surface", plan.options().surface == SurfaceModel::kSmooth
-                           ? "smooth, over the mesh"
-                           : "facets of the mesh"}}};
+           {"Surface", plan.options().surface == SurfaceModel::kSmooth ? "smooth, over the mesh"
+                                                                       : "facets of the mesh"}}};
 }
 
 template <class Level>

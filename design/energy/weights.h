@@ -14,7 +14,8 @@ namespace lensforge {
 ///   with the ν of plan_levels() its share of the total soon exceeds the picture's. Facets, MAE in
 ///   thousandths after six rounds with 2e-2, 2e-3 and 2e-4: 128² portrait 3.3, 3.2 and 3.1; 96²
 ///   logo 0.50, 0.36 and 0.42; 64² relief with 2.5 vertices per pixel side 0.060, 0.015 and 0.006.
-///   Smooth, 128² portrait with 2e-2 and 2e-3: by the normals 1.7 and 1.0, as a surface 2.8 and 2.2.
+///   Smooth, 128² portrait with 2e-2 and 2e-3: by the normals 1.7 and 1.0, as a surface 2.8
+///   and 2.2.
 /// Lengths enter the terms in working-picture pixels, the paper's unit of length.
 struct ObjectiveWeights {
   double image = 1e2;       ///< λ1, E_img

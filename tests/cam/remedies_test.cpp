@@ -63,7 +63,7 @@ class Foretold {
     const ProgramFiles programs =
         write_programs(plan_.programs(control), options_.post, plan_.settings(), folder.path(), {});
     cutter_ = plan_.surface().cutter(plan_.rectangle(), executor_);
-    rounded_.emplace(cut_, *cutter_, executor_);
+    rounded_.emplace(cut_, cut_.grid(), *cutter_, executor_);
     const Eigen::AlignedBox2d rectangle(Eigen::Vector2d(0.0, 0.0), lens_.setup.lens_size);
     surfaces_.emplace(PartSurfaces::Design{designed_, *rounded_, rectangle, plan_.blank().max().z(),
                                            plan_.mould()},
