@@ -141,8 +141,8 @@ TEST_F(Chain, WhatIsDesignedSmoothIsTheDefaultAndIsCutSmooth) {
   EXPECT_EQ(nlohmann::json::parse(content(at("smooth/lens.json")))["model"], "smooth");
   for (const auto& [name, surface] :
        {std::pair("smooth", "smooth, over the mesh"), {"facets", "facets of the mesh"}}) {
-    ASSERT_EQ(run({"cam", path(name), "--pitch", "2mm", "--tool-diameter", "4mm", "--no-rough",
-                   "--no-semi", "--no-render"})
+    ASSERT_EQ(run({"cam", path(name), "--pitch", "2mm", "--tool-diameter", "4mm", "--no-semi",
+                   "--no-render"})
                   .exit_code,
               0);
     EXPECT_THAT(content(at(name) / "cam/report.html"), HasSubstr(surface));
