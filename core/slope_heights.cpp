@@ -28,7 +28,7 @@ std::vector<Edge> edges_of(const SurfaceMesh& mesh) {
   sides.reserve(static_cast<std::size_t>(3 * mesh.triangle_count()));
   for (Eigen::Index t = 0; t < mesh.triangles.cols(); ++t) {
     for (int k = 0; k < 3; ++k) {
-      sides.push_back(std::minmax(mesh.triangles(k, t), mesh.triangles((k + 1) % 3, t)));
+      sides.emplace_back(std::minmax(mesh.triangles(k, t), mesh.triangles((k + 1) % 3, t)));
     }
   }
   std::sort(sides.begin(), sides.end());
