@@ -86,8 +86,7 @@ void add_weight_options(OptionSet& options, DesignArguments& arguments) {
   options.number("--weight-gradient", weights.gradient, limits, "", "picture gradients (lambda 2)");
   options.number("--weight-boundary", weights.boundary, limits, "",
                  "light outside the picture (lambda 3)");
-  options.number("--weight-smooth", weights.smooth, limits, "",
-                 "all smoothness terms (lambda 4); ten times as much with --model smooth");
+  options.number("--weight-smooth", weights.smooth, limits, "", "all smoothness terms (lambda 4)");
   options.number("--weight-barrier", weights.barrier, limits, "",
                  "barriers against collapsed facets and total reflection (lambda 5)");
   options.number("--weight-edge", weights.edge, limits, "",

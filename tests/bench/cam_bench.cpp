@@ -2,8 +2,6 @@
 // What `lensforge cam` with its defaults costs for one lens folder: seconds and processor seconds
 // of every stage, seconds of every kernel, peak memory.
 //   cam_bench LENS_FOLDER OUT_FOLDER [THREADS] [smooth|facet]
-#include <sys/resource.h>
-
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
@@ -13,29 +11,16 @@
 #include <utility>
 #include <vector>
 
+#include "bench/process_usage.h"
 #include "cam/cam_job.h"
 #include "core/lens.h"
 
 namespace lensforge {
 namespace {
 
+using bench::cpu_seconds;
+using bench::peak_megabytes;
 using Clock = std::chrono::steady_clock;
-
-/// Seconds that all threads of this process have worked.
-double cpu_seconds() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  const auto seconds = [](const timeval& time) {
-    return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
-  };
-  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
-}
-
-double peak_megabytes() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return static_cast<double>(usage.ru_maxrss) / 1024.0;
-}
 
 /// Prints what passed since it was told last, under the name of the stage that was told.
 class StageClock {

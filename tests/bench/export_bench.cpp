@@ -3,10 +3,10 @@
 // pictures of 128², 256² and 512². Tolerances that cannot hold make the fit use all its control
 // points, as lenses with creases do.
 #include <benchmark/benchmark.h>
-#include <sys/resource.h>
 
 #include <cstdint>
 
+#include "bench/process_usage.h"
 #include "cam/cam_meshes.h"
 #include "core/temp_folder.h"
 #include "export/spline_net.h"
@@ -23,19 +23,6 @@ GridShape grid_of(std::int64_t pixels) {
   return {cells + 1, cells * 23 / 20 + 1};
 }
 
-double cpu_seconds(const rusage& usage) {
-  const auto seconds = [](const timeval& time) {
-    return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
-  };
-  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
-}
-
-rusage usage_now() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return usage;
-}
-
 /// Memory is the largest of the process so far: run one size alone to judge it.
 void tell(const SplineNet& net, const std::filesystem::path& file, double seconds,
           benchmark::State& state) {
@@ -47,7 +34,7 @@ void tell(const SplineNet& net, const std::filesystem::path& file, double second
   state.counters["height_um"] = 1e3 * error.height;
   state.counters["normal_mrad"] = 1e3 * error.normal;
   state.counters["normal_rms_mrad"] = 1e3 * error.normal_rms;
-  state.counters["peak_MB"] = static_cast<double>(usage_now().ru_maxrss) / 1024.0;
+  state.counters["peak_MB"] = bench::peak_megabytes();
 }
 
 void ExportStep(benchmark::State& state) {
@@ -60,11 +47,11 @@ void ExportStep(benchmark::State& state) {
   options.tolerance = 1e-9;
   options.normal_tolerance = 1e-9;
   for (auto _ : state) {
-    const double start = cpu_seconds(usage_now());
+    const double start = bench::cpu_seconds();
     const SplineNet net =
         fit_spline_net(SmoothSurface(mesh), options, Executor::cpu(2), RunControl());
     write_step(net, {"lens", "", "", "lensforge", "2020-02-02T02:02:02"}, StepSchema::kAp214, file);
-    tell(net, file, cpu_seconds(usage_now()) - start, state);
+    tell(net, file, bench::cpu_seconds() - start, state);
   }
 }
 BENCHMARK(ExportStep)

@@ -2,11 +2,11 @@
 // The finishing raster with its certificate, ball of 0.2 mm, stepover 0.06 mm, on lenses of
 // 100 × 100 mm: 641 × 737 vertices (942,080 triangles) or 321 × 369 (235,520).
 #include <benchmark/benchmark.h>
-#include <sys/resource.h>
 
 #include <Eigen/Geometry>
 #include <cstdint>
 
+#include "bench/process_usage.h"
 #include "cam/cam_meshes.h"
 #include "cam/contact/drop_curve.h"
 #include "cam/path/finish_raster.h"
@@ -37,21 +37,9 @@ RasterPlan strip_plan(double width, bool arcs) {
   return plan_finish_raster(strip, kRadius, options);
 }
 
-/// Seconds that all threads of this process have worked.
-double cpu_seconds() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  const auto seconds = [](const timeval& time) {
-    return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
-  };
-  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
-}
-
 /// Gouge, excess and peak memory are what was reached, not what is allowed.
 void tell(const RasterSummary& summary, const SurfaceDeviation& deviation, double seconds,
           benchmark::State& state) {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
   state.counters["cpu_s"] = seconds;
   state.counters["rows"] = static_cast<double>(summary.rows);
   state.counters["moves"] = static_cast<double>(summary.points);
@@ -65,7 +53,7 @@ void tell(const RasterSummary& summary, const SurfaceDeviation& deviation, doubl
   state.counters["slope_y"] = summary.certificate.slope.place.y();
   state.counters["deviation_nm"] = 1e6 * deviation.height;
   state.counters["slope_deviation_mrad"] = 1e3 * deviation.slope;
-  state.counters["peak_MB"] = static_cast<double>(usage.ru_maxrss) / 1024.0;
+  state.counters["peak_MB"] = bench::peak_megabytes();
 }
 
 RasterSummary cut_strip(const CutSurface& surface, const benchmark::State& state,
@@ -78,10 +66,10 @@ void FinishFacets(benchmark::State& state) {
   const auto executor = Executor::cpu(2);
   const SurfaceMesh& mesh = lens_mesh(state.range(0));
   for (auto _ : state) {
-    const double start = cpu_seconds();
+    const double start = bench::cpu_seconds();
     const FacetSurface surface(mesh, kRadius, executor);
     const RasterSummary summary = cut_strip(surface, state, executor);
-    tell(summary, surface.deviation(), cpu_seconds() - start, state);
+    tell(summary, surface.deviation(), bench::cpu_seconds() - start, state);
   }
 }
 
@@ -89,10 +77,10 @@ void FinishSmooth(benchmark::State& state) {
   const auto executor = Executor::cpu(2);
   const SurfaceMesh& mesh = lens_mesh(state.range(0));
   for (auto _ : state) {
-    const double start = cpu_seconds();
+    const double start = bench::cpu_seconds();
     const SmoothCutSurface surface(mesh, kRadius, kSmoothCut, executor);
     const RasterSummary summary = cut_strip(surface, state, executor);
-    tell(summary, surface.deviation(), cpu_seconds() - start, state);
+    tell(summary, surface.deviation(), bench::cpu_seconds() - start, state);
     state.counters["facets"] = static_cast<double>(surface.facet_count());
   }
 }
