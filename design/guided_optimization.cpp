@@ -10,6 +10,7 @@
 
 #include "design/guided_stage_on.h"
 #include "design/optics/image_triangle.h"
+#include "design/optimize/levelling.h"
 
 namespace lensforge {
 
@@ -39,6 +40,9 @@ constexpr double kShiftPower = 1.0;
 /// 12600 with 1/2 and 3/2, 12900 with 1/2 and 2; 20600 with x, y unscaled.
 constexpr double kHeightSizePower = 0.5;
 constexpr double kShiftSizePower = 1.5;
+
+/// Probes of the curvature that is levelled; more bring nothing.
+constexpr std::uint64_t kLevellingProbes = 4;
 
 double lowest_eigenvalue(const GridShape& shape) {
   const double longest = std::max(shape.columns, shape.rows) - 1.0;
@@ -92,6 +96,7 @@ GuidedOptimization::GuidedOptimization(const SurfaceMesh& mesh, const OpticalSet
                                        const DesignGoal& goal, const ObjectiveOptions& options,
                                        const Executor& executor)
     : setup_(setup),
+      grid_(mesh.grid),
       cell_(setup.lens_size.x() / (mesh.grid.columns - 1)),
       stage_(make_stage(mesh, setup, goal, options, executor)) {
   z_.floor = kHeightFloor * lowest_eigenvalue(mesh.grid);
@@ -106,8 +111,6 @@ GuidedOptimization::GuidedOptimization(const SurfaceMesh& mesh, const OpticalSet
   }
   xy_.floor = kShiftFloor;
   xy_.power = kShiftPower;
-  z_.size_power = kHeightSizePower;
-  xy_.size_power = kShiftSizePower;
 }
 
 double GuidedOptimization::value(const SurfaceMesh& mesh) {
@@ -118,57 +121,86 @@ double GuidedOptimization::value(const SurfaceMesh& mesh) {
 }
 
 /// P^½ applied to random signs, in z or in x and y.
-Eigen::Matrix3Xd GuidedOptimization::probe(bool heights) {
+Eigen::Matrix3Xd GuidedOptimization::probe(bool heights, std::uint64_t number) {
   Eigen::Matrix3Xd signs = Eigen::Matrix3Xd::Zero(3, stage_->movable().cols());
+  const std::uint64_t first = number * static_cast<std::uint64_t>(signs.size());
   for (Eigen::Index v = 0; v < signs.cols(); ++v) {
     for (int k = 0; k < 3; ++k) {
-      if ((k == 2) == heights) signs(k, v) = sign_at(static_cast<std::uint64_t>(3 * v + k));
+      if ((k == 2) == heights) signs(k, v) = sign_at(first + static_cast<std::uint64_t>(3 * v + k));
     }
   }
   return stage_->apply_root(signs);
 }
 
-/// Root mean square of P^½ H P^½ applied to random signs in z or in x and y, H by a central
-/// difference of the gradient; 0 if the neighbourhood is not allowed.
-double GuidedOptimization::preconditioned_curvature(const Eigen::Matrix3Xd& vertices,
-                                                    bool heights) {
-  const Eigen::Matrix3Xd direction = probe(heights);
-  const double count = static_cast<double>(direction.cols());
-  const double rms = std::sqrt(direction.squaredNorm() / count);
+/// Squares, per vertex, of P^½ H P^½ applied to random signs in z or in x and y, H by a central
+/// difference of the gradient; none if the neighbourhood is not allowed.
+Eigen::VectorXd GuidedOptimization::squared_curvatures(const Eigen::Matrix3Xd& vertices,
+                                                       bool heights, std::uint64_t number) {
+  const Eigen::Matrix3Xd direction = probe(heights, number);
+  const double rms = std::sqrt(direction.squaredNorm() / static_cast<double>(direction.cols()));
   const double motion = heights ? rms / cell_ * (setup_.ior - 1.0) * setup_.focal_length : rms;
   double step = kProbePixels * setup_.image_size.x() / setup_.pixels.x() / motion;
   Eigen::Matrix3Xd forward;
   Eigen::Matrix3Xd backward;
   for (int halvings = 0;; ++halvings, step *= 0.5) {
-    if (halvings == kMostHalvings) return 0.0;
+    if (halvings == kMostHalvings) return {};
     if (stage_->evaluate(vertices + step * direction, forward).feasible &&
         stage_->evaluate(vertices - step * direction, backward).feasible) {
       break;
     }
   }
-  const Eigen::VectorXd curved = stage_->apply_root((forward - backward) / (2.0 * step)).reshaped();
-  const auto rows = curved.reshaped(3, direction.cols());
-  const double sum = heights ? rows.row(2).squaredNorm() : 0.5 * rows.topRows(2).squaredNorm();
-  return std::sqrt(sum / count);
+  const Eigen::Matrix3Xd curved = stage_->apply_root((forward - backward) / (2.0 * step));
+  if (heights) return curved.row(2).cwiseAbs2();
+  return 0.5 * curved.topRows<2>().colwise().squaredNorm();
+}
+
+/// Lets every vertex shift as far in x and y as the preconditioned curvature around it asks for.
+/// What sizes of cells do not tell is how steeply the picture's error rises there: in the dark by
+/// far the most. MAE in thousandths after six rounds without and with it: facets, 128² portrait 3.2
+/// and 2.6, 96² logo 0.36 and 0.39, 160 × 80 calligraphy 2.7 and 3.1; smooth, 128² portrait 0.98 and
+/// 0.92, 96² logo 2.6 and 2.1. The heights' curvature is even enough as it is: levelling it too
+/// gives 2.5, 0.34, 3.5, 0.93 and 1.9.
+void GuidedOptimization::level_shifts(const Eigen::Matrix3Xd& vertices, Eigen::Matrix3Xd& reach) {
+  Eigen::VectorXd squares = Eigen::VectorXd::Zero(vertices.cols());
+  for (std::uint64_t number = 1; number <= kLevellingProbes; ++number) {
+    const Eigen::VectorXd probed = squared_curvatures(vertices, false, number);
+    if (probed.size() == 0) return;
+    squares += probed;
+  }
+  const Eigen::ArrayXd share = levelling_factors(squares, grid_);
+  reach.topRows<2>().array().rowwise() *= share.transpose();
+  stage_->set_reach(reach);
 }
 
 /// Scales both parts of the preconditioner so that the preconditioned curvature along random
 /// directions is one: then neither x, y nor z is left behind.
 void GuidedOptimization::calibrate(const Eigen::Matrix3Xd& vertices) {
   for (const bool heights : {false, true}) {
-    GridSymbol& symbol = heights ? z_ : xy_;
-    symbol.scale = 1.0;
-    stage_->set_symbols(xy_, z_);
-    const double curvature = preconditioned_curvature(vertices, heights);
-    if (curvature > 0.0) symbol.scale = 1.0 / curvature;
+    const Eigen::VectorXd squares = squared_curvatures(vertices, heights, 0);
+    const double curvature = squares.size() > 0 ? std::sqrt(squares.mean()) : 0.0;
+    if (curvature > 0.0) (heights ? z_ : xy_).scale = 1.0 / curvature;
   }
+  stage_->set_symbols(xy_, z_);
+}
+
+/// P as for even curvature: by the grid and its cells' sizes.
+void GuidedOptimization::begin_preconditioner(const SurfaceMesh& mesh, Eigen::Matrix3Xd& reach) {
+  const Eigen::ArrayXd sizes = cell_sizes(mesh);
+  reach.resize(3, sizes.size());
+  reach.topRows<2>().rowwise() = sizes.pow(kShiftSizePower).matrix().transpose();
+  reach.row(2) = sizes.pow(kHeightSizePower).matrix();
+  stage_->set_reach(reach);
+  xy_.scale = 1.0;
+  z_.scale = 1.0;
   stage_->set_symbols(xy_, z_);
 }
 
 LbfgsSummary GuidedOptimization::run(const LbfgsOptions& options, const Observer& observe,
                                      SurfaceMesh& mesh) {
   stage_->relinearize(mesh.vertices);
-  stage_->set_cell_sizes(cell_sizes(mesh));
+  Eigen::Matrix3Xd reach;
+  begin_preconditioner(mesh, reach);
+  level_shifts(mesh.vertices, reach);
   calibrate(mesh.vertices);
   return stage_->minimize(options, observe, mesh.vertices);
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <cstdint>
 #include <memory>
 
 #include "core/executor.h"
@@ -35,10 +36,14 @@ class GuidedOptimization {
 
  private:
   void calibrate(const Eigen::Matrix3Xd& vertices);
-  [[nodiscard]] double preconditioned_curvature(const Eigen::Matrix3Xd& vertices, bool heights);
-  [[nodiscard]] Eigen::Matrix3Xd probe(bool heights);
+  void begin_preconditioner(const SurfaceMesh& mesh, Eigen::Matrix3Xd& reach);
+  void level_shifts(const Eigen::Matrix3Xd& vertices, Eigen::Matrix3Xd& reach);
+  [[nodiscard]] Eigen::VectorXd squared_curvatures(const Eigen::Matrix3Xd& vertices, bool heights,
+                                                   std::uint64_t number);
+  [[nodiscard]] Eigen::Matrix3Xd probe(bool heights, std::uint64_t number);
 
   OpticalSetup setup_;
+  GridShape grid_;
   double cell_;  ///< Width of a grid cell, mm.
   GridSymbol xy_;
   GridSymbol z_;

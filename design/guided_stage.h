@@ -33,7 +33,7 @@ class GuidedStage {
 
   /// See GridPreconditioner.
   virtual void set_symbols(const GridSymbol& xy, const GridSymbol& z) = 0;
-  virtual void set_cell_sizes(const Eigen::VectorXd& sizes) = 0;
+  virtual void set_reach(const Eigen::Matrix3Xd& reach) = 0;
   virtual Eigen::Matrix3Xd apply_root(const Eigen::Matrix3Xd& g) = 0;
 
   /// Moves `vertices` to the best surface found, also where an exception ends the run.

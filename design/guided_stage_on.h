@@ -49,8 +49,8 @@ class GuidedStageOn final : public GuidedStage {
     preconditioner_.z = z;
   }
 
-  void set_cell_sizes(const Eigen::VectorXd& sizes) override {
-    preconditioner_.set_cell_sizes(sizes);
+  void set_reach(const Eigen::Matrix3Xd& reach) override {
+    preconditioner_.set_reach(reach);
   }
 
   Eigen::Matrix3Xd apply_root(const Eigen::Matrix3Xd& g) override {

@@ -25,11 +25,11 @@ class GridPreconditioner : private GridPreconditionerOn<Executor> {
   using GridPreconditionerOn<Executor>::xy;
   using GridPreconditionerOn<Executor>::z;
 
-  /// Relative sizes of the cells around every vertex, V factors > 0, 1 to start with: a step that
-  /// suits a large cell would turn a small one over.
-  using GridPreconditionerOn<Executor>::set_cell_sizes;
+  /// How far each coordinate of each vertex moves beside the others, 3 × V factors > 0, 1 to start
+  /// with: a step that suits a large cell would turn a small one over.
+  using GridPreconditionerOn<Executor>::set_reach;
 
-  /// r ← P g, or about P^½ g (exact where no coordinate is held and all cells have one size); both
+  /// r ← P g, or about P^½ g (exact where no coordinate is held and all reach equally far); both
   /// 3 V numbers, x y z of each vertex in turn.
   void apply(const Eigen::VectorXd& g, Eigen::VectorXd& r) { apply_power(g, 1.0, r); }
   void apply_root(const Eigen::VectorXd& g, Eigen::VectorXd& r) { apply_power(g, 0.5, r); }

@@ -23,7 +23,7 @@ struct PreconditionerView {
   int columns;
   int rows;
   const double* movable;  ///< 3 × V
-  const double* sizes;    ///< V
+  const double* reach;    ///< 3 × V
   const double* eigen_x;  ///< Eigenvalues of the second differences along a row.
   const double* eigen_y;
   GridSymbol symbols[3];  ///< Of x, y and z.
@@ -42,7 +42,7 @@ struct PreconditionerView {
   }
   /// How freely coordinate k of a vertex moves.
   [[nodiscard]] LF_HD double freedom(std::int64_t v, int k) const {
-    return movable[3 * v + k] * std::pow(sizes[v], symbols[k].size_power * exponent);
+    return movable[3 * v + k] * std::pow(reach[3 * v + k], exponent);
   }
 };
 
@@ -94,26 +94,26 @@ class GridPreconditionerOn {
         movable_(buffer_of(
             executor,
             std::span<const double>(movable.data(), static_cast<std::size_t>(movable.size())))),
-        sizes_(static_cast<std::size_t>(movable.cols())),
+        reach_(static_cast<std::size_t>(movable.size())),
         eigen_x_(eigenvalues(shape.columns, 1.0, executor)),
         eigen_y_(eigenvalues(shape.rows, aspect, executor)),
         transforms_(shape.columns, shape.rows, executor) {
-    set_cell_sizes(Eigen::VectorXd::Ones(movable.cols()));
+    set_reach(Eigen::Matrix3Xd::Ones(3, movable.cols()));
   }
 
   GridSymbol xy;
   GridSymbol z;
 
-  /// GridPreconditioner::set_cell_sizes(), from the caller's memory.
-  void set_cell_sizes(const Eigen::VectorXd& sizes) {
-    upload(executor_, std::span<const double>(sizes.data(), sizes_.size()),
-           std::span<double>(sizes_.data(), sizes_.size()));
+  /// GridPreconditioner::set_reach(), from the caller's memory.
+  void set_reach(const Eigen::Matrix3Xd& reach) {
+    upload(executor_, std::span<const double>(reach.data(), reach_.size()),
+           std::span<double>(reach_.data(), reach_.size()));
   }
 
   /// r ← P^exponent g, both 3 V numbers.
   void apply(std::span<const double> g, double exponent, std::span<double> r) {
     const PreconditionerView p = view(exponent);
-    const std::int64_t vertices = static_cast<std::int64_t>(sizes_.size());
+    const std::int64_t vertices = static_cast<std::int64_t>(reach_.size() / 3);
     parallel_for(executor_, "enter planes", vertices, EnterPlanes{p, g.data()});
     transforms_.run();
     const double scale_xy = std::pow(xy.scale, exponent) * inverse_scale();
@@ -143,7 +143,7 @@ class GridPreconditionerOn {
     return {shape_.columns,
             shape_.rows,
             movable_.data(),
-            sizes_.data(),
+            reach_.data(),
             eigen_x_.data(),
             eigen_y_.data(),
             {xy, xy, z},
@@ -154,7 +154,7 @@ class GridPreconditionerOn {
   GridShape shape_;
   Exec executor_;
   Vector movable_;
-  Vector sizes_;
+  Vector reach_;
   Vector eigen_x_;
   Vector eigen_y_;
   GridTransforms<Exec> transforms_;

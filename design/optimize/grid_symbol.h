@@ -10,8 +10,6 @@ struct GridSymbol {
   double floor = 0.0;   ///< μ
   double power = 2.0;   ///< p
   double growth = 0.0;  ///< γ: the symbol is s / ((μ + λ)^p (1 + γλ)).
-  /// The coordinate moves in proportion to this power of the cells' sizes.
-  double size_power = 0.0;
 };
 
 }  // namespace lensforge

@@ -89,14 +89,14 @@ std::vector<double> cotangent_sums(const std::vector<double>& pixels, int rows,
   return fetched(executor, std::span<const double>(image.view().suffix, size));
 }
 
-/// Symbols as GuidedOptimization would set them, about, and uneven cells.
+/// Symbols as GuidedOptimization would set them, about, and uneven reach.
 inline void set_symbols(GuidedStage& stage) {
-  stage.set_symbols({.scale = 1e-4, .floor = 0.25, .power = 1.0, .size_power = 1.5},
-                    {.scale = 1e-7, .floor = 0.005, .growth = 0.1, .size_power = 0.5});
+  stage.set_symbols({.scale = 1e-4, .floor = 0.25, .power = 1.0},
+                    {.scale = 1e-7, .floor = 0.005, .growth = 0.1});
   Random random(5);
-  Eigen::VectorXd sizes(stage.movable().cols());
-  for (double& size : sizes) size = random.between(0.3, 1.0);
-  stage.set_cell_sizes(sizes);
+  Eigen::Matrix3Xd reach(3, stage.movable().cols());
+  for (double& factor : reach.reshaped()) factor = random.between(0.3, 1.0);
+  stage.set_reach(reach);
 }
 
 /// Largest relative difference of any energy term.

@@ -182,23 +182,16 @@ TEST_F(GridPreconditionerTest, ThreadCountDoesNotChangeABit) {
   EXPECT_EQ(r, apply(random_vector(3)));
 }
 
-TEST_F(GridPreconditionerTest, CellSizesScaleBothSides) {
+TEST_F(GridPreconditionerTest, ReachScalesBothSides) {
   const Eigen::VectorXd g = random_vector(21);
   Random random(5);
-  Eigen::VectorXd sizes(kVertices);
-  for (double& size : sizes) size = random.between(0.1, 1.0);
+  Eigen::Matrix3Xd reach(3, kVertices);
+  for (double& factor : reach.reshaped()) factor = random.between(0.1, 2.0);
   const auto scaled = [&](const Eigen::VectorXd& v) {
-    Eigen::VectorXd result = v;
-    for (int i = 0; i < kVertices; ++i) {
-      result.segment<2>(3 * i) *= std::pow(sizes[i], 1.5);
-      result[3 * i + 2] *= std::sqrt(sizes[i]);
-    }
-    return result;
+    return Eigen::VectorXd(v.cwiseProduct(reach.reshaped()));
   };
   const Eigen::VectorXd expected = scaled(apply(scaled(g)));
-  preconditioner_.xy.size_power = 1.5;
-  preconditioner_.z.size_power = 0.5;
-  preconditioner_.set_cell_sizes(sizes);
+  preconditioner_.set_reach(reach);
   EXPECT_LT((apply(g) - expected).norm(), 1e-12 * expected.norm());
 }
 
