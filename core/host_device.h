@@ -7,3 +7,11 @@
 #else
 #define LF_HD
 #endif
+
+/// Marks a function that is to be part of its caller, so that what the caller does not use of it is
+/// not computed.
+#if defined(__CUDACC__)
+#define LF_INLINE __forceinline__
+#else
+#define LF_INLINE [[gnu::always_inline]] inline
+#endif

@@ -157,8 +157,8 @@ Eigen::VectorXd GuidedOptimization::squared_curvatures(const Eigen::Matrix3Xd& v
 /// Lets every vertex shift as far in x and y as the preconditioned curvature around it asks for.
 /// What sizes of cells do not tell is how steeply the picture's error rises there: in the dark by
 /// far the most. MAE in thousandths after six rounds without and with it: facets, 128² portrait 3.2
-/// and 2.6, 96² logo 0.36 and 0.39, 160 × 80 calligraphy 2.7 and 3.1; smooth, 128² portrait 0.98 and
-/// 0.92, 96² logo 2.6 and 2.1. The heights' curvature is even enough as it is: levelling it too
+/// and 2.6, 96² logo 0.36 and 0.39, 160 × 80 calligraphy 2.7 and 3.1; smooth, 128² portrait 0.98
+/// and 0.92, 96² logo 2.6 and 2.1. The heights' curvature is even enough as it is: levelling it too
 /// gives 2.5, 0.34, 3.5, 0.93 and 1.9.
 void GuidedOptimization::level_shifts(const Eigen::Matrix3Xd& vertices, Eigen::Matrix3Xd& reach) {
   Eigen::VectorXd squares = Eigen::VectorXd::Zero(vertices.cols());

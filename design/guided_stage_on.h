@@ -49,9 +49,7 @@ class GuidedStageOn final : public GuidedStage {
     preconditioner_.z = z;
   }
 
-  void set_reach(const Eigen::Matrix3Xd& reach) override {
-    preconditioner_.set_reach(reach);
-  }
+  void set_reach(const Eigen::Matrix3Xd& reach) override { preconditioner_.set_reach(reach); }
 
   Eigen::Matrix3Xd apply_root(const Eigen::Matrix3Xd& g) override {
     send(g, x_);

@@ -13,47 +13,57 @@ namespace lensforge {
 /// Tikhonov share that keeps the fit of a face with one neighbour (a mesh corner) determined.
 inline constexpr double kFitRegularization = 1e-9;
 
-/// Solution of a symmetric positive definite system by Cholesky factorisation; only the matrix's
-/// lower triangle is read. Written out because Eigen's LLT does not run on a GPU; the order of
-/// operations is the same, and so are the bits (FaceFit.SolvesToTheBitsOfEigen).
+/// Solution of a symmetric positive definite system, m = L D Lᵀ; only the matrix's lower triangle
+/// is read. Written out because Eigen's factorisations do not run on a GPU, and without roots and
+/// with three divisions because every face solves one in every evaluation.
 LF_HD inline Eigen::Vector3d solve_positive(const Eigen::Matrix3d& m,
                                             const Eigen::Vector3d& right) {
-  const double l00 = std::sqrt(m(0, 0));
-  const double l10 = m(1, 0) / l00;
-  const double l20 = m(2, 0) / l00;
-  const double l11 = std::sqrt(m(1, 1) - l10 * l10);
-  const double l21 = (m(2, 1) - l20 * l10) / l11;
-  const double l22 = std::sqrt(m(2, 2) - (l20 * l20 + l21 * l21));
-  const double y0 = right[0] / l00;
-  const double y1 = (right[1] - l10 * y0) / l11;
-  const double y2 = (right[2] - (l20 * y0 + l21 * y1)) / l22;
-  const double x2 = y2 / l22;
-  const double x1 = (y1 - l21 * x2) / l11;
-  const double x0 = (y0 - (l10 * x1 + l20 * x2)) / l00;
-  return {x0, x1, x2};
+  const double inverse0 = 1.0 / m(0, 0);
+  const double l10 = m(1, 0) * inverse0;
+  const double l20 = m(2, 0) * inverse0;
+  const double inverse1 = 1.0 / (m(1, 1) - l10 * m(1, 0));
+  const double d21 = m(2, 1) - l20 * m(1, 0);
+  const double l21 = d21 * inverse1;
+  const double d2 = m(2, 2) - l20 * m(2, 0) - l21 * d21;
+  const double y1 = right[1] - l10 * right[0];
+  const double y2 = right[2] - l20 * right[0] - l21 * y1;
+  const double x2 = y2 / d2;
+  const double x1 = y1 * inverse1 - l21 * x2;
+  return {right[0] * inverse0 - l10 * x1 - l20 * x2, x1, x2};
 }
 
 /// Normal equations of the map (a, b, c) that minimises H²A + Σ w |M d̄ − n̄|²/|d̄|².
 struct FaceFit {
-  Eigen::Matrix3d matrix = Eigen::Matrix3d::Zero();
-  Eigen::Vector3d right = Eigen::Vector3d::Zero();
+  double xx = 0.0;  ///< Σ w d̄x²/|d̄|², and so on.
+  double yy = 0.0;
+  double xy = 0.0;
+  double curvature = 0.0;  ///< Of H²A by a + b, A/4.
+  Eigen::Vector3d right{0.0, 0.0, 0.0};
 
   /// Adds a neighbour's share w |M d̄ − n̄|²/|d̄|².
   LF_HD void add(const NeighbourOffset& offset, double weight) {
     const double w = weight / offset.d.squaredNorm();
-    const Eigen::Vector3d row_x(offset.d.x(), 0.0, offset.d.y());
-    const Eigen::Vector3d row_y(0.0, offset.d.y(), offset.d.x());
-    matrix += w * (row_x * row_x.transpose() + row_y * row_y.transpose());
-    right += w * (offset.n.x() * row_x + offset.n.y() * row_y);
+    const double wx = w * offset.d.x();
+    const double wy = w * offset.d.y();
+    xx += wx * offset.d.x();
+    yy += wy * offset.d.y();
+    xy += wx * offset.d.y();
+    right += Eigen::Vector3d(wx * offset.n.x(), wy * offset.n.y(),
+                             wy * offset.n.x() + wx * offset.n.y());
   }
   /// Adds H²A. @param doubled_area  of the face, mm².
-  LF_HD void add_mean_curvature(double doubled_area) {
-    matrix.topLeftCorner<2, 2>().array() += 0.125 * doubled_area;
-  }
-  [[nodiscard]] LF_HD WeingartenMap solve() {
-    const double tikhonov = kFitRegularization * matrix.trace();
-    matrix.diagonal() += tikhonov * Eigen::Vector3d(1.0, 1.0, 2.0);
-    const Eigen::Vector3d m = solve_positive(matrix, right);
+  LF_HD void add_mean_curvature(double doubled_area) { curvature += 0.125 * doubled_area; }
+
+  [[nodiscard]] LF_HD WeingartenMap solve() const {
+    const double tikhonov = kFitRegularization * 2.0 * (xx + yy + curvature);
+    Eigen::Matrix3d lower;
+    lower(0, 0) = xx + curvature + tikhonov;
+    lower(1, 0) = curvature;
+    lower(2, 0) = xy;
+    lower(1, 1) = yy + curvature + tikhonov;
+    lower(2, 1) = xy;
+    lower(2, 2) = xx + yy + 2.0 * tikhonov;
+    const Eigen::Vector3d m = solve_positive(lower, right);
     return {m[0], m[1], m[2]};
   }
 };

@@ -53,9 +53,9 @@ struct NeighbourOffset {
 };
 
 /// Adjoint of (frame and map of i, frame j) ↦ δ(i, j): adds weight × the derivatives by all of
-/// them, and returns δ.
-LF_HD inline double mismatch_adjoint(const CurvedFace& face, const FaceFrame& j, double weight,
-                                     CurvedFace& face_bar, FaceFrame& j_bar) {
+/// them, and returns δ. Inline, so that derivatives that a caller leaves unread cost nothing.
+LF_HD LF_INLINE double mismatch_adjoint(const CurvedFace& face, const FaceFrame& j, double weight,
+                                        CurvedFace& face_bar, FaceFrame& j_bar) {
   const FaceFrame& i = face.frame;
   const WeingartenMap& m = face.map;
   FaceFrame& i_bar = face_bar.frame;

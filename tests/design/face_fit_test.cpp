@@ -10,7 +10,7 @@
 namespace lensforge {
 namespace {
 
-TEST(FaceFit, SolvesToTheBitsOfEigen) {
+TEST(FaceFit, SolvesAsEigenDoes) {
   testing::Random random(1);
   for (int i = 0; i < 1000; ++i) {
     Eigen::Matrix3d root;
@@ -19,7 +19,8 @@ TEST(FaceFit, SolvesToTheBitsOfEigen) {
         root * root.transpose() + random.magnitude(1e-6, 1.0) * Eigen::Matrix3d::Identity();
     const Eigen::Vector3d right = random.vector3();
     const Eigen::Vector3d expected = matrix.llt().solve(right);
-    EXPECT_EQ(solve_positive(matrix, right), expected) << matrix << '\n' << right;
+    const double tolerance = 1e-9 * expected.norm();  // Condition numbers of up to 1e7.
+    EXPECT_LT((solve_positive(matrix, right) - expected).norm(), tolerance) << matrix;
   }
 }
 
