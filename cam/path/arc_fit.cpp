@@ -6,6 +6,8 @@
 #include <cstddef>
 #include <optional>
 
+#include "cam/path/row_joints.h"
+
 namespace lensforge {
 namespace {
 
@@ -18,8 +20,6 @@ constexpr int kRetries = 4;
 /// Arcs end this far from vertical: slope 5.
 constexpr double kArcRoom = 0.98;
 
-using Points = std::vector<Eigen::Vector2d>;
-
 /// Unit of numbers that are not rounded, mm: what is left is that of doubles.
 constexpr double kUnrounded = 1e-12;
 
@@ -29,36 +29,43 @@ constexpr std::size_t kShorten = 8;
 /// How near to the tolerances a look at the joints alone goes: what lies between adds to it.
 constexpr double kLookShare = 0.95;
 
-/// Where moves may begin and end.
-struct Joints {
-  Points exact;                ///< On the drop curve.
-  Points written;              ///< On the program's grid.
-  std::vector<double> height;  ///< Of the drop curve at the written places.
-};
-
-/// Each place on the grid once.
-Joints joints_of(const RowProfile& profile, const FitOptions& options) {
-  Joints joints;
-  joints.exact.reserve(profile.joints.size());
-  joints.written.reserve(profile.joints.size());
-  std::size_t hint = 0;
-  for (const double joint : profile.joints) {
-    const double u = to_resolution(joint, options.resolution);
-    if (!joints.written.empty() && u <= joints.written.back().x()) continue;
-    const double z = profile.at(std::clamp(u, profile.u.front(), profile.u.back()), hint);
-    joints.height.push_back(z);
-    joints.written.emplace_back(
-        u, options.z_zero + to_resolution(z - options.z_zero, options.resolution));
-    joints.exact.emplace_back(joint, profile.at(joint, hint));
-  }
-  return joints;
-}
+/// What the choice of an arc's centre may turn its ends by, in slope tolerances, and how many
+/// places to either side are looked at.
+constexpr double kCentreTurn = 0.02;
+constexpr double kCentreTries = 16.0;
 
 /// Whether the arc from a to b is the graph of a height, and away from where it is steep.
 bool is_graph(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const RowMove& move) {
   const double room = kArcRoom * (a - move.centre).norm();
   return std::abs(a.x() - move.centre.x()) < room && std::abs(b.x() - move.centre.x()) < room &&
          (a.y() > move.centre.y()) == move.cap && (b.y() > move.centre.y()) == move.cap;
+}
+
+/// The place on the program's grid near the bisector of a and b, `out` to the left of the chord,
+/// from which both are equally far as nearly as can be: what the radii differ by, about (b − a) ·
+/// (a + b − 2c) / 2ρ, counts as slack. Along the bisector the centre has room: moved by d it turns
+/// the arc's ends by L d / 2ρ².
+Eigen::Vector2d written_centre(const Eigen::Vector2d& a, const Eigen::Vector2d& b, double out,
+                               const FitOptions& options) {
+  const Eigen::Vector2d way = b - a;
+  const Eigen::Vector2d middle = 0.5 * (a + b);
+  const Eigen::Vector2d up = Eigen::Vector2d(-way.y(), way.x()) / way.norm();
+  const double radius2 = out * out + 0.25 * way.squaredNorm();
+  const double room = kCentreTurn * options.slope_tolerance * 2.0 * radius2 / way.norm();
+  const double step = std::max(room / kCentreTries, options.grid.resolution);
+  const auto tries = static_cast<int>(std::min(kCentreTries, room / step));
+  Eigen::Vector2d best;
+  double least = HUGE_VAL;
+  for (int i = -tries; i <= tries; ++i) {
+    Eigen::Vector2d c = middle + (out + i * step) * up;
+    c = {options.grid.place(c.x()), options.grid.height(c.y())};
+    const double misfit = std::abs(way.dot(middle - c));
+    if (misfit < least) {
+      least = misfit;
+      best = c;
+    }
+  }
+  return best;
 }
 
 /// The arc from one point to another that follows the points between them best. It is free of its
@@ -69,8 +76,8 @@ bool is_graph(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const RowMove&
 /// and a free choice between both none fewer. With s along the
 /// chord of length L and h square to it, circles through both ends are h = q (s (L − s) − h²) with
 /// their centre 1/(2q) below the chord's middle: q by least squares.
-std::optional<RowMove> arc_through(const Points& points, std::size_t from, std::size_t to,
-                                   const FitOptions& options) {
+std::optional<RowMove> arc_through(const std::vector<Eigen::Vector2d>& points, std::size_t from,
+                                   std::size_t to, const FitOptions& options) {
   const Eigen::Vector2d& a = points[from];
   const Eigen::Vector2d& b = points[to];
   const double length = (b - a).norm();
@@ -89,10 +96,7 @@ std::optional<RowMove> arc_through(const Points& points, std::size_t from, std::
   const double q = above / weight;
   if (!(2.0 * std::abs(q) * kLargestArc > 1.0)) return std::nullopt;
   RowMove move{b, true, q > 0.0};
-  move.centre = 0.5 * (a + b) - up / (2.0 * q);
-  move.centre.x() = to_resolution(move.centre.x(), options.resolution);
-  move.centre.y() =
-      options.z_zero + to_resolution(move.centre.y() - options.z_zero, options.resolution);
+  move.centre = written_centre(a, b, -1.0 / (2.0 * q), options);
   return is_graph(a, b, move) ? std::optional(move) : std::nullopt;
 }
 
@@ -100,7 +104,7 @@ std::optional<RowMove> arc_through(const Points& points, std::size_t from, std::
 class RowFit {
  public:
   RowFit(const RowProfile& profile, const FitOptions& options)
-      : options_(options), joints_(joints_of(profile, options)), error_(profile) {}
+      : options_(options), joints_(row_joints(profile, options.grid)), error_(profile) {}
 
   FittedRow run() {
     const std::size_t last = joints_.written.size() - 1;
@@ -121,10 +125,7 @@ class RowFit {
         steps_.pop_back();
         continue;
       }
-      if (!reach) {
-        reach = Reach{at + 1, RowMove{joints_.written[at + 1]}};
-        error_.add(joints_.written[at], reach->move);
-      }
+      if (!reach) reach = straightest(at, last);
       steps_.push_back({at, settled, *reach});
       at = reach->joint;
       limit = last;
@@ -161,6 +162,29 @@ class RowFit {
       joint -= (joint - from + kShorten - 1) / kShorten;
     }
     return std::nullopt;
+  }
+
+  /// The straight move from a joint that rounding turns least, of those of doubled lengths that
+  /// keep the height; where heights are coarse and directions fine, none keeps both. Its nodes are
+  /// added to the error.
+  Reach straightest(std::size_t from, std::size_t last) {
+    const std::size_t settled = error_.size();
+    std::size_t best = from + 1;
+    double least = HUGE_VAL;
+    for (std::size_t step = 1; from + step <= last; step *= 2) {
+      error_.add(joints_.written[from], RowMove{joints_.written[from + step]});
+      const bool close = error_.holds(settled, options_.tolerance, HUGE_VAL);
+      const double turn = error_.turn(settled);
+      error_.resize(settled);
+      if (step > 1 && !close) break;
+      if (turn < least) {
+        least = turn;
+        best = from + step;
+      }
+    }
+    const RowMove move{joints_.written[best]};
+    error_.add(joints_.written[from], move);
+    return {best, move};
   }
 
   /// Whether the move keeps the tolerances; its nodes are added to the error if so.
@@ -227,7 +251,7 @@ class RowFit {
     row.start = joints_.written.front();
     row.unrounded.start = joints_.exact.front();
     FitOptions unrounded = options_;
-    unrounded.resolution = kUnrounded;
+    unrounded.grid.resolution = kUnrounded;
     for (const Step& step : steps_) {
       const Reach& reach = step.reach;
       row.moves.push_back(reach.move);
@@ -240,19 +264,13 @@ class RowFit {
   }
 
   FitOptions options_;
-  Joints joints_;
+  RowJoints joints_;
   RowError error_;
   std::vector<Step> steps_;
   std::vector<double> look_;  ///< Errors at the joints that were looked at last.
 };
 
 }  // namespace
-
-double to_resolution(double value, double resolution) {
-  // Dividing by the inverse, a power of ten, gives the double next to the decimal number.
-  const double inverse = std::round(1.0 / resolution);
-  return std::round(value * inverse) / inverse;
-}
 
 double joint_bow(const FitOptions& options) {
   return kJointShare * std::min(options.tolerance, options.slope_tolerance * kSlopeStretch);

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "cam/path/row_error.h"
+#include "cam/path/row_joints.h"
 #include "cam/path/row_profile.h"
 
 namespace lensforge {
@@ -13,9 +14,8 @@ namespace lensforge {
 struct FitOptions {
   double tolerance = 0.0005;      ///< Farthest from the drop curve, mm.
   double slope_tolerance = 1e-3;  ///< Largest difference of slope over a kSlopeStretch.
-  double resolution = 1e-6;       ///< Unit of the program's last decimal, mm.
-  double z_zero = 0.0;            ///< Height that the program calls 0, mm.
-  bool arcs = false;              ///< Whether moves may be arcs of circles.
+  ProgramGrid grid;
+  bool arcs = false;  ///< Whether moves may be arcs of circles.
 };
 
 /// Radius of an arc at most, mm: a controller that reckons in single precision places a point of it
@@ -32,9 +32,6 @@ struct FittedRow : RowWay {
   RowWay unrounded;             ///< The same moves before their numbers are rounded.
   PathCertificate certificate;  ///< certify_row() of the rounded ones.
 };
-
-/// The value on the program's grid that is nearest to `value` mm.
-double to_resolution(double value, double resolution);
 
 /// Covers a row's drop curve with straight moves and arcs, greedily: from every end a move that
 /// reaches about the farthest joint within the tolerances. Moves begin and end on the drop curve to

@@ -17,7 +17,9 @@ constexpr std::int64_t kBatchRows = 16;
 constexpr double kExactResolution = 1e-12;
 
 FitOptions fit_options(const RasterOptions& options) {
-  return {options.tolerance, options.slope_tolerance, options.resolution, options.z_zero,
+  return {options.tolerance,
+          options.slope_tolerance,
+          {options.resolution, options.z_zero},
           options.arcs};
 }
 
@@ -72,7 +74,9 @@ RasterWay in_space(const RowWay& way, const RowFrame& frame, bool forward) {
 
 /// For the exact way of a row: decimals are those of doubles, and arcs save memory.
 FitOptions exact_fit(const FitOptions& fit) {
-  return {kExactRow * fit.tolerance, kExactRow * fit.slope_tolerance, kExactResolution, fit.z_zero,
+  return {kExactRow * fit.tolerance,
+          kExactRow * fit.slope_tolerance,
+          {kExactResolution, fit.grid.z_zero},
           true};
 }
 
@@ -185,7 +189,8 @@ RasterPlan plan_finish_raster(const Eigen::AlignedBox2d& surface, double radius,
 
 RasterRow cut_row(const RowCurves& curves, const RasterPlan& plan, std::int64_t row) {
   const FitOptions fit = fit_options(plan.options);
-  const RowProfile profile = curves.profile(plan.row_span(row), joint_bow(fit));
+  RowProfile profile = curves.profile(plan.row_span(row), joint_bow(fit));
+  level_ends(fit.grid, profile);
   const FittedRow fitted = fit_row(profile, fit);
   const PathCertificate& certificate = fitted.certificate;
   const RowFrame frame(plan.options.along, plan.row_place(row));

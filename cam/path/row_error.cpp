@@ -7,15 +7,15 @@
 namespace lensforge {
 namespace {
 
-/// Length of the chords of a move's curve that are off by kProfileError at most, mm: wherever it is
+/// Length of the chords of a move's curve that are off by `error` at most, mm: wherever it is
 /// no steeper than at its ends, a circle bends by ρ²/(ρ² − d²)^1.5 at most, d being the distance
 /// from its centre along u.
-double longest_chord(const CurvePiece& curve) {
+double longest_chord(const CurvePiece& curve, double error) {
   if (curve.straight()) return HUGE_VAL;
   const double out = std::max(std::abs(curve.begin - curve.u0), std::abs(curve.end - curve.u0));
   const double rise2 = curve.rho2 - out * out;
   if (!(rise2 > CurvePiece::kSteepest * curve.rho2)) return 0.0;
-  return std::sqrt(8.0 * kProfileError * rise2 * std::sqrt(rise2) / curve.rho2);
+  return std::sqrt(8.0 * error * rise2 * std::sqrt(rise2) / curve.rho2);
 }
 
 /// How far a controller's way from start to end can be off the circle through the start, along z:
@@ -47,13 +47,13 @@ CurvePiece move_curve(const Eigen::Vector2d& start, const RowMove& move) {
 void RowError::add(const Eigen::Vector2d& start, const RowMove& move) {
   const CurvePiece curve = move_curve(start, move);
   const double misfit = move.arc ? radius_slack(start, move, curve) : 0.0;
-  const double slack = profile_.error + misfit + (move.arc ? kProfileError : 0.0);
+  const double slack = profile_.error + misfit + (move.arc ? profile_.finest : 0.0);
   std::size_t hint = hint_;
   const double first = profile_.at(start.x(), hint);
   nodes_.push_back({start.x(), start.y() - first, slack, start.y()});
   std::size_t next = hint + 1;
   while (next > 0 && profile_.u[next - 1] > start.x()) --next;
-  const double chord = longest_chord(curve);
+  const double chord = longest_chord(curve, profile_.finest);
   double from = start.x();
   for (; next < profile_.u.size() && profile_.u[next] < move.end.x(); ++next) {
     if (profile_.u[next] <= start.x()) continue;
@@ -78,7 +78,7 @@ void RowError::add_node(const CurvePiece& curve, const Eigen::Vector2d& at, doub
 /// last node the drop curve is straight.
 void RowError::follow(const CurvePiece& curve, double from, const Eigen::Vector2d& to,
                       double slack) {
-  if (bulge(curve, from, to.x()) > kProfileError) {
+  if (bulge(curve, from, to.x()) > profile_.finest) {
     const Node& last = nodes_.back();
     const Eigen::Vector2d begin(from, last.path - last.error);
     const Eigen::Vector2d middle = 0.5 * (begin + to);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cmath>
 #include <cstddef>
 #include <span>
 #include <vector>
@@ -42,6 +43,11 @@ class RowError {
   /// and in slope over no kSlopeStretch that ends there by more than `slope_tolerance`; beyond the
   /// last node the difference is taken to stay as it is, which a next move about does.
   [[nodiscard]] bool holds(std::size_t first, double tolerance, double slope_tolerance) const;
+
+  /// The largest difference of slope from node `first` on, as holds() takes it.
+  [[nodiscard]] double turn(std::size_t first) const {
+    return most_turn(first, HUGE_VAL, true).slope;
+  }
 
   /// Bounds over the whole row; places are (u, path's height, 0).
   [[nodiscard]] PathCertificate certificate() const;

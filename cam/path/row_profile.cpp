@@ -18,6 +18,10 @@ constexpr double kFinestStep = 1e-9;
 /// Arcs whose slope turns by less than this count as parabolas.
 constexpr double kParabolaTurn = 0.1;
 
+/// How far a polyline is off, as a share of what chords between joints may be: what a certificate
+/// adds for it, 4 times as much, is a tenth of the tolerances then.
+constexpr double kBowShare = 0.125;
+
 /// Gaps up to this length, mm, are rounding.
 constexpr double kGap = 1e-8;
 
@@ -43,10 +47,10 @@ void add_node(double u, double z, RowProfile& profile) {
   profile.z.push_back(z);
 }
 
-/// Appends the nodes after `from` up to `to` that keep the polyline within kProfileError.
+/// Appends the nodes after `from` up to `to` that keep the polyline within its error.
 void follow(const CurvePiece& piece, double from, double to, RowProfile& profile) {
   const double off = bulge(piece, from, to);
-  if (off > kProfileError && to - from > kFinestStep) {
+  if (off > profile.finest && to - from > kFinestStep) {
     const double middle = 0.5 * (from + to);
     follow(piece, from, middle, profile);
     follow(piece, middle, to, profile);
@@ -189,10 +193,10 @@ void RowCurves::roll(const RowSpan& span, double bow, RowProfile& profile) const
   double begin = span.held_from;
   while (begin < span.held_to) {
     double end = std::min((std::floor(begin / length + kSameStretch) + 1.0) * length, span.held_to);
-    std::optional<CurveNodes> nodes = ball.follow(begin, end, kProfileError);
+    std::optional<CurveNodes> nodes = ball.follow(begin, end, profile.finest);
     while (!nodes && end - begin > least) {
       end = 0.5 * (begin + end);
-      nodes = ball.follow(begin, end, kProfileError);
+      nodes = ball.follow(begin, end, profile.finest);
     }
     if (nodes) {
       if (open < begin) bridge(span, open, &*nodes, begin, bow, profile);
@@ -206,6 +210,7 @@ void RowCurves::roll(const RowSpan& span, double bow, RowProfile& profile) const
 
 RowProfile RowCurves::profile(const RowSpan& span, double bow) const {
   RowProfile profile;
+  profile.finest = std::min(kProfileError, kBowShare * bow);
   add_node(span.from, 0.0, profile);
   profile.joints = {span.from, span.held_from};
   if (surface_ != nullptr && surface_->bed() != nullptr) {

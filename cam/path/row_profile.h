@@ -23,6 +23,10 @@ struct RowSpan {
   double held_from = 0.0, held_to = 0.0;
 };
 
+/// Farthest that the polyline of a profile may be off, mm: both ends of a kSlopeStretch then add
+/// 2e-5 rad to a certificate. Reached but on walls steeper than 1 : 1000.
+inline constexpr double kProfileError = 5e-8;
+
 /// The drop curve of a row as a polyline that is nowhere farther from it than `error`, an upper
 /// bound: what fits and certificates are made against.
 struct RowProfile {
@@ -31,15 +35,12 @@ struct RowProfile {
   /// Where moves may well begin and end, ascending: where the curve goes over from one piece to the
   /// next, and on its arcs so close that chords between them are `bow` off.
   std::vector<double> joints;
-  double error = 0.0;  ///< mm
+  double error = 0.0;             ///< mm
+  double finest = kProfileError;  ///< What chords are meant to be off at most, mm.
 
   /// Height on the polyline. `hint` is where the search begins and the segment it ended in.
   [[nodiscard]] double at(double place, std::size_t& hint) const;
 };
-
-/// Farthest that the polyline of a profile may be off, mm: both ends of a kSlopeStretch then add
-/// 2e-5 rad to a certificate. Reached but on walls steeper than 1 : 1000.
-inline constexpr double kProfileError = 5e-8;
 
 /// Drop curves for rows that lie beside each other.
 ///
@@ -53,7 +54,8 @@ class RowCurves {
   /// @param axis  where the tool's axis goes on all rows. `surface` must outlive this.
   RowCurves(const CutSurface& surface, const Eigen::AlignedBox2d& axis, const Executor& executor);
 
-  /// @param bow  of chords between joints on arcs at most, about, mm, > 0.
+  /// @param bow  of chords between joints on arcs at most, about, mm, > 0. The polyline is off by
+  ///             kBowShare of it, but by no more than kProfileError.
   /// @throw InputError if there is nothing under the ball somewhere on the row.
   [[nodiscard]] RowProfile profile(const RowSpan& span, double bow) const;
 

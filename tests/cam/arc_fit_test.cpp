@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "cam/adversarial_meshes.h"
+#include "cam/contact/cut_surface.h"
 
 namespace lensforge {
 namespace {
@@ -57,8 +58,9 @@ TEST(ArcFit, HoldsTheHeightTightlyBesideWalls) {
     const RowProfile profile = profile_of(cutter, options);
     const FittedRow row = fit_row(profile, options);
     const PathCertificate certificate = certify_row(profile, row.start, row.moves);
-    EXPECT_LE(certificate.gouge.value, options.tolerance + 100.0 * options.resolution) << name;
-    EXPECT_LE(certificate.excess.value, options.tolerance + 100.0 * options.resolution) << name;
+    EXPECT_LE(certificate.gouge.value, options.tolerance + 100.0 * options.grid.resolution) << name;
+    EXPECT_LE(certificate.excess.value, options.tolerance + 100.0 * options.grid.resolution)
+        << name;
   }
 }
 
@@ -66,23 +68,23 @@ TEST(ArcFit, WritesNumbersOnTheProgramsGrid) {
   const SurfaceMesh mesh = testing::grid_mesh(28, 31, 4.0, 4.0, testing::lens_relief);
   const DropCutter cutter(mesh, kRadius, Executor::serial());
   FitOptions options = with_arcs(true);
-  options.resolution = 1e-5;
+  options.grid.resolution = 1e-5;
   options.slope_tolerance = 8e-3;
-  options.z_zero = 6.1234567891;
+  options.grid.z_zero = 6.1234567891;
   const FittedRow row = fit_row(profile_of(cutter, options), options);
   Eigen::Vector2d from = row.start;
   int arcs = 0;
   for (const RowMove& move : row.moves) {
-    EXPECT_TRUE(on_grid(move.end.x(), options.resolution));
-    EXPECT_TRUE(on_grid(move.end.y() - options.z_zero, options.resolution));
+    EXPECT_TRUE(on_grid(move.end.x(), options.grid.resolution));
+    EXPECT_TRUE(on_grid(move.end.y() - options.grid.z_zero, options.grid.resolution));
     if (move.arc) {
       ++arcs;
-      EXPECT_TRUE(on_grid(move.centre.x(), options.resolution));
-      EXPECT_TRUE(on_grid(move.centre.y() - options.z_zero, options.resolution));
+      EXPECT_TRUE(on_grid(move.centre.x(), options.grid.resolution));
+      EXPECT_TRUE(on_grid(move.centre.y() - options.grid.z_zero, options.grid.resolution));
       const double radius = (from - move.centre).norm();
       EXPECT_LE(radius, 1.01 * kLargestArc);
       // What Grbl allows is 0.005 mm.
-      EXPECT_NEAR((move.end - move.centre).norm(), radius, 2.0 * options.resolution);
+      EXPECT_NEAR((move.end - move.centre).norm(), radius, 0.1 * options.grid.resolution);
     }
     EXPECT_GT(move.end.x(), from.x());
     from = move.end;
@@ -95,7 +97,7 @@ TEST(ArcFit, MovesBeforeRoundingDifferByTheLastDecimal) {
   const SurfaceMesh mesh = testing::grid_mesh(28, 31, 4.0, 4.0, testing::lens_relief);
   const DropCutter cutter(mesh, kRadius, Executor::serial());
   FitOptions options = with_arcs(true);
-  options.resolution = 1e-5;
+  options.grid.resolution = 1e-5;
   options.slope_tolerance = 8e-3;
   const FittedRow row = fit_row(profile_of(cutter, options), options);
   ASSERT_EQ(row.moves.size(), row.unrounded.moves.size());
@@ -104,8 +106,31 @@ TEST(ArcFit, MovesBeforeRoundingDifferByTheLastDecimal) {
     const Eigen::Vector2d off = row.moves[i].end - row.unrounded.moves[i].end;
     most = std::max(most, off.cwiseAbs().maxCoeff());
   }
-  EXPECT_LE(most, 0.75 * options.resolution);
-  EXPECT_GT(most, 0.4 * options.resolution);
+  EXPECT_LE(most, 0.75 * options.grid.resolution);
+  EXPECT_GT(most, 0.1 * options.grid.resolution);
+}
+
+/// Rounding must not break moves up: a tenth of the tolerance takes about √10 (arcs of changing
+/// curvature) to 10 times (lines) as many moves.
+TEST(ArcFit, MovesGrowSlowlyAsDirectionsGetFiner) {
+  const SurfaceMesh mesh = testing::grid_mesh(28, 31, 4.0, 4.0, [](double x, double y) {
+    return 6.0 + 0.1 * std::sin(1.7 * x + 0.4) * std::cos(1.1 * y);
+  });
+  const SmoothCutSurface surface(mesh, kRadius, {1e-4, 2e-2}, Executor::serial());
+  const RowSpan span{{0, 1.9}, -0.2, 4.2, -0.14, 4.14};
+  const RowCurves curves(surface, {span.line.at(-0.2), span.line.at(4.2)}, Executor::serial());
+  std::vector<std::size_t> moves;
+  for (const double slope_tolerance : {1e-3, 3e-4, 1e-4}) {
+    FitOptions options = with_arcs(true);
+    options.slope_tolerance = slope_tolerance;
+    RowProfile profile = curves.profile(span, joint_bow(options));
+    level_ends(options.grid, profile);
+    const FittedRow row = fit_row(profile, options);
+    moves.push_back(row.moves.size());
+    EXPECT_LE(row.certificate.slope.value, slope_tolerance);
+  }
+  EXPECT_LT(moves[1], 4 * moves[0]);
+  EXPECT_LT(moves[2], 10 * moves[0]);
 }
 
 /// A cylinder of fine facets: the drop curve is a circle of radius 5 + R, and one arc an eighth
