@@ -6,10 +6,12 @@
 #include <memory>
 #include <optional>
 #include <system_error>
+#include <utility>
 
 #include "cam/contact/drop_cutter.h"
 #include "cam/cut_plan.h"
 #include "cam/cut_report.h"
+#include "cam/finish_setup.h"
 #include "cam/milled/designed_field.h"
 #include "cam/milled/held_field.h"
 #include "cam/part_surfaces.h"
@@ -37,16 +39,15 @@ constexpr SmoothCutOptions kReachCut{1e-4, std::numeric_limits<double>::infinity
 /// A surface as it is meant: the facets of a mesh, or the smooth surface through its vertices.
 class MeantSurface {
  public:
-  /// @param radius  of the ball.
-  MeantSurface(const SurfaceMesh& mesh, SurfaceModel model, double radius,
-               const Executor& executor) {
-    if (model == SurfaceModel::kFacet) {
+  /// @param smooth  smooth_surface() of the mesh.
+  MeantSurface(const SurfaceMesh& mesh, std::shared_ptr<const SmoothSurface> smooth)
+      : smooth_(std::move(smooth)) {
+    if (smooth_) {
+      field_.emplace(*smooth_);
+      held_.emplace(*field_);
+    } else {
       facets_.emplace(mesh);
       held_.emplace(*facets_);
-    } else {
-      smooth_.emplace(mesh, radius, kReachCut, executor);
-      field_.emplace(smooth_->surface());
-      held_.emplace(*field_);
     }
   }
 
@@ -56,9 +57,9 @@ class MeantSurface {
   [[nodiscard]] std::unique_ptr<RoundedField> rounded(const CutSurface& cut,
                                                       const Eigen::AlignedBox2d& rectangle,
                                                       const Executor& executor) {
-    if (!facets_) {
-      return std::make_unique<RoundedField>(*held_, *smooth_, smooth_->deviation().height,
-                                            executor);
+    if (smooth_) {
+      reach_.emplace(smooth_, cut.radius(), kReachCut, executor);
+      return std::make_unique<RoundedField>(*held_, *reach_, reach_->deviation().height, executor);
     }
     cutter_ = cut.cutter(rectangle, executor);
     return std::make_unique<RoundedField>(*held_, facets_->grid(), *cutter_, executor);
@@ -66,7 +67,8 @@ class MeantSurface {
 
  private:
   std::optional<FacetField> facets_;
-  std::optional<SmoothCutSurface> smooth_;
+  std::shared_ptr<const SmoothSurface> smooth_;
+  std::optional<SmoothCutSurface> reach_;
   std::optional<SmoothField> field_;
   std::optional<HeldField> held_;
   std::shared_ptr<const DropCutter> cutter_;
@@ -125,12 +127,13 @@ class Job {
 
  private:
   Prediction predict(const ProgramFiles& programs) {
-    const double radius = plan_.surface().radius();
-    MeantSurface cut(plan_.mesh(), options_.surface, radius, executor_);
+    MeantSurface cut(plan_.mesh(), plan_.smooth());
     const auto rounded = cut.rounded(plan_.surface(), cut_rectangle(), executor_);
     // A mould's own surface is another than that of the lens that is cast in it.
     std::optional<MeantSurface> lens;
-    if (plan_.mould()) lens.emplace(lens_.surface, options_.surface, radius, executor_);
+    if (plan_.mould()) {
+      lens.emplace(lens_.surface, smooth_surface(lens_.surface, options_.surface));
+    }
     const Eigen::AlignedBox2d rectangle(Eigen::Vector2d(0.0, 0.0), lens_.setup.lens_size);
     const PartSurfaces surfaces({lens ? lens->field() : cut.field(), *rounded, rectangle,
                                  plan_.blank().max().z(), plan_.mould()},

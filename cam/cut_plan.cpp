@@ -54,7 +54,8 @@ CutPlan::CutPlan(const Lens& lens, const CamOptions& options, const Executor& ex
       decimals_(decimals_of(options_)),
       profile_(mesh_),
       stock_(whole_blank(options_.workshop, field_.box)),
-      surface_(surface_to_cut(mesh_, options_, ball().radius(), executor)),
+      smooth_(smooth_surface(mesh_, options_.surface)),
+      surface_(surface_to_cut(mesh_, smooth_, ball().radius(), executor)),
       collisions_(profile_, options_.workshop, stock_) {}
 
 std::optional<CastFrame> CutPlan::mould() const {
@@ -122,10 +123,9 @@ ProgramOperation CutPlan::finish_operation(const std::string& name, const Raster
 
 OperationSummary CutPlan::run_pencil(double resolution, const MoveSink& sink,
                                      const RunControl& control) const {
-  PencilOptions pencil = pencil_options(options_, z_offset_);
+  PencilOptions pencil = pencil_options(options_, z_offset_, field_.box.max().z());
   pencil.resolution = resolution;
-  const auto cutter = surface_->cutter(rectangle(), executor_);
-  return cut_pencil(*cutter, find_valleys(mesh_, ball().radius(), pencil), pencil,
+  return cut_pencil(*surface_, find_valleys(mesh_, ball().radius(), pencil), pencil,
                     {"pencil", ball(), safe_z()}, sink, control);
 }
 

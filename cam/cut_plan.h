@@ -53,6 +53,8 @@ class CutPlan {
   [[nodiscard]] const CamOptions& options() const { return options_; }
   /// What is cut: the lens's surface or the mould's; mm, in a lens frame of its own.
   [[nodiscard]] const SurfaceMesh& mesh() const { return mesh_; }
+  /// The smooth surface over it, unless its facets are what is meant.
+  [[nodiscard]] const std::shared_ptr<const SmoothSurface>& smooth() const { return smooth_; }
   /// The same for the finishing ball.
   [[nodiscard]] const CutSurface& surface() const { return *surface_; }
   /// Where the lens lies in the mould, if there is one.
@@ -101,6 +103,7 @@ class CutPlan {
   int decimals_ = 5;
   ProfileCutter profile_;
   StockMap stock_;
+  std::shared_ptr<const SmoothSurface> smooth_;
   std::unique_ptr<CutSurface> surface_;
   CollisionCheck collisions_;
   std::vector<std::unique_ptr<PathSketch>> sketches_;

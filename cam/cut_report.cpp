@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <string>
 
+#include "cam/report/html_text.h"
 #include "core/decimal_text.h"
 
 namespace lensforge {
@@ -160,8 +161,25 @@ ReportMap fillet_share_map(const CreaseMap& creases) {
   return map;
 }
 
+/// Why tools touch the blank where nothing was roughed; empty if the first one's flutes are long
+/// enough. What another program has roughed is not known: the blank counts as whole.
+std::string unroughed_warning(const CutPlan& plan, const ProgramFiles& programs) {
+  const Workshop& workshop = plan.options().workshop;
+  if (workshop.process.rough.enabled || programs.summaries.empty()) return "";
+  const OperationSummary& first = programs.summaries.front();
+  const Tool& tool = workshop.tool(first.tool);
+  const double depth = plan.blank().max().z() - first.tip.min().z();
+  if (depth <= tool.flute_length) return "";
+  return joined({"nothing is roughed: '", first.name, "' cuts ", decimal_text(depth, 1),
+                 " mm deep into the whole blank, tool ", std::to_string(tool.number), " has ",
+                 decimal_text(tool.flute_length, 1),
+                 " mm of flutes; run a roughing program first, or take a tool with longer flutes"});
+}
+
 std::vector<std::string> warnings_of(const CutPlan& plan, const ProgramFiles& programs) {
   std::vector<std::string> warnings;
+  const std::string unroughed = unroughed_warning(plan, programs);
+  if (!unroughed.empty()) warnings.push_back(unroughed);
   for (const Collision& collision : plan.collisions()) warnings.push_back(collision.sentence());
   const Eigen::Vector3d travel = plan.options().workshop.machine.travel;
   if ((plan.blank().sizes().array() > travel.array()).any()) {

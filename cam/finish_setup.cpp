@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace lensforge {
 namespace {
@@ -34,12 +35,16 @@ const Tool& finishing_ball(const CamOptions& options) {
   return options.workshop.tool(options.workshop.process.finish.tool);
 }
 
-std::unique_ptr<CutSurface> surface_to_cut(const SurfaceMesh& mesh, const CamOptions& options,
+std::shared_ptr<const SmoothSurface> smooth_surface(const SurfaceMesh& mesh, SurfaceModel model) {
+  if (model == SurfaceModel::kFacet) return nullptr;
+  return std::make_shared<const SmoothSurface>(mesh);
+}
+
+std::unique_ptr<CutSurface> surface_to_cut(const SurfaceMesh& mesh,
+                                           std::shared_ptr<const SmoothSurface> smooth,
                                            double radius, const Executor& executor) {
-  if (options.surface == SurfaceModel::kFacet) {
-    return std::make_unique<FacetSurface>(mesh, radius, executor);
-  }
-  return std::make_unique<SmoothCutSurface>(mesh, radius, kSmoothCut, executor);
+  if (!smooth) return std::make_unique<FacetSurface>(mesh, radius, executor);
+  return std::make_unique<SmoothCutSurface>(std::move(smooth), radius, kSmoothCut, executor);
 }
 
 int decimals_of(const CamOptions& options) {
@@ -59,10 +64,11 @@ std::vector<RasterPlan> finish_rasters(const CamOptions& options, const FinishGr
   return plans;
 }
 
-PencilOptions pencil_options(const CamOptions& options, double z_offset) {
+PencilOptions pencil_options(const CamOptions& options, double z_offset, double top) {
   PencilOptions pencil;
   pencil.resolution = resolution_of(options);
   pencil.z_zero = -z_offset;
+  pencil.top = top;
   pencil.clearance = options.workshop.process.clearance;
   return pencil;
 }

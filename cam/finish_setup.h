@@ -10,6 +10,7 @@
 #include "cam/path/finish_raster.h"
 #include "cam/path/pencil.h"
 #include "core/executor.h"
+#include "core/smooth_surface.h"
 #include "core/surface_mesh.h"
 
 namespace lensforge {
@@ -17,8 +18,13 @@ namespace lensforge {
 /// The finishing ball.
 const Tool& finishing_ball(const CamOptions& options);
 
-/// The surface that a ball of this radius (mm, > 0) cuts: CamOptions::surface of a mesh.
-std::unique_ptr<CutSurface> surface_to_cut(const SurfaceMesh& mesh, const CamOptions& options,
+/// The smooth surface over a mesh; none if its facets are what is meant.
+std::shared_ptr<const SmoothSurface> smooth_surface(const SurfaceMesh& mesh, SurfaceModel model);
+
+/// The surface that a ball of this radius (mm, > 0) cuts.
+/// @param smooth  smooth_surface() of the mesh.
+std::unique_ptr<CutSurface> surface_to_cut(const SurfaceMesh& mesh,
+                                           std::shared_ptr<const SmoothSurface> smooth,
                                            double radius, const Executor& executor);
 
 /// Digits after the point in the programs: as chosen, or what the tolerances ask for.
@@ -37,7 +43,7 @@ struct FinishGround {
 /// The finishing raster, and the one across if it is wanted.
 std::vector<RasterPlan> finish_rasters(const CamOptions& options, const FinishGround& ground);
 
-/// For the pass along the creases.
-PencilOptions pencil_options(const CamOptions& options, double z_offset);
+/// For the pass along the creases. @param top  highest point of what is cut, mm, lens frame.
+PencilOptions pencil_options(const CamOptions& options, double z_offset, double top);
 
 }  // namespace lensforge

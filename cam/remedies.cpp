@@ -2,6 +2,7 @@
 #include "cam/remedies.h"
 
 #include <algorithm>
+#include <map>
 #include <optional>
 #include <string>
 #include <utility>
@@ -100,23 +101,39 @@ bool is_valid(const CamOptions& options, const Lens& lens) {
 class Trials {
  public:
   Trials(const TrialSite& site, const Executor& executor, const RunControl& control)
-      : site_(site), executor_(executor), control_(control) {}
+      : site_(site),
+        executor_(executor),
+        control_(control),
+        now_(TrialCut(site, site.plan.options(), executor).work(control)) {}
 
   void run(const Change& change, const std::vector<LeakPlace*>& places) {
     if (places.empty() || !is_valid(change.options, site_.lens)) return;
     const TrialCut cut(site_, change.options, executor_);
+    const TrialCut::Work& work = work_of(change, cut);
     for (LeakPlace* place : places) {
       if (control_.stop_requested()) throw Interrupted();
-      place->trials.push_back(cut.at(*place, control_));
-      place->trials.back().change = change.words;
+      LeakTrial trial = cut.at(*place, control_);
+      trial.change = change.words;
+      trial.moves = work.moves / now_.moves;
+      trial.minutes = work.minutes / now_.minutes;
+      place->trials.push_back(trial);
       control_.report({"remedies", ++done_, 0.0, change.words});
     }
   }
 
  private:
+  /// The same change may be tried for several places.
+  const TrialCut::Work& work_of(const Change& change, const TrialCut& cut) {
+    const auto known = works_.find(change.words);
+    if (known != works_.end()) return known->second;
+    return works_.emplace(change.words, cut.work(control_)).first->second;
+  }
+
   const TrialSite& site_;
   const Executor& executor_;
   const RunControl& control_;
+  TrialCut::Work now_;
+  std::map<std::string, TrialCut::Work> works_;  ///< By what changes are called.
   double done_ = 0.0;
 };
 

@@ -112,8 +112,34 @@ TrialCut::TrialCut(const TrialSite& site, const CamOptions& changed, const Execu
     : site_(site), options_(changed), executor_(executor), surface_(&site.plan.surface()) {
   const double radius = finishing_ball(changed).radius();
   if (radius == surface_->radius()) return;
-  own_ = surface_to_cut(site.plan.mesh(), changed, radius, executor);
+  own_ = surface_to_cut(site.plan.mesh(), site.plan.smooth(), radius, executor);
   surface_ = own_.get();
+}
+
+TrialCut::Work TrialCut::work(const RunControl& control) const {
+  Work work;
+  for (RasterPlan plan : finish_rasters(options_, site_.plan.ground())) {
+    plan.options.traces = false;
+    std::vector<Work> rows(kWorkRows);
+    parallel_for(executor_, "remedies' work", kWorkRows, [&](std::int64_t i) {
+      if (control.stop_requested()) return;
+      const std::int64_t number = plan.rows * (2 * i + 1) / (2 * kWorkRows);
+      const RowSpan span = plan.row_span(number);
+      Eigen::AlignedBox2d axis(span.line.at(span.from));
+      axis.extend(span.line.at(span.to));
+      const RowCurves curves(*surface_, axis, Executor::serial());
+      const RasterRow row = cut_row(curves, plan, number);
+      Work& one = rows[static_cast<std::size_t>(i)];
+      one.moves = static_cast<double>(row.moves.size());
+      one.minutes = (span.to - span.from + plan.pitch) / finishing_ball(options_).feed;
+    });
+    if (control.stop_requested()) throw Interrupted();
+    for (const Work& one : rows) {
+      work.moves += one.moves * static_cast<double>(plan.rows) / kWorkRows;
+      work.minutes += one.minutes * static_cast<double>(plan.rows) / kWorkRows;
+    }
+  }
+  return work;
 }
 
 BallPath TrialCut::path_around(const Eigen::AlignedBox2d& box, const RunControl& control) const {
@@ -134,15 +160,15 @@ BallPath TrialCut::path_around(const Eigen::AlignedBox2d& box, const RunControl&
 
 void TrialCut::add_pencil(const Eigen::AlignedBox2d& box, BallPath& path,
                           const RunControl& control) const {
-  const PencilOptions pencil = pencil_options(options_, site_.plan.z_offset());
+  const PencilOptions pencil =
+      pencil_options(options_, site_.plan.z_offset(), site_.plan.part_box().max().z());
   std::vector<Valley> inside;
   for (const Valley& valley : find_valleys(site_.plan.mesh(), surface_->radius(), pencil)) {
     for (Valley& part : parts_in(valley, box)) inside.push_back(std::move(part));
   }
   if (inside.empty()) return;
   const FinishRun run{"pencil", finishing_ball(options_), site_.plan.blank().max().z()};
-  const auto cutter = surface_->cutter(box, executor_);
-  if (!cut_pencil(*cutter, inside, pencil, run, path_sink(path), control).complete) {
+  if (!cut_pencil(*surface_, inside, pencil, run, path_sink(path), control).complete) {
     throw Interrupted();
   }
 }
@@ -170,7 +196,10 @@ LeakTrial TrialCut::at(const LeakPlace& place, const RunControl& control) const 
       render_cells(site_.part, {optics, grid}, place.cells, executor_, silent);
   const FluxPicture now = render_cells(part, {optics, fine.grid}, fine.cells, executor_, silent);
   const Exchange change = exchange(site_.leakage, foretold, now);
-  return {"", place.leakage + change.leakage, place.dark_flux + change.dark_flux};
+  LeakTrial trial;
+  trial.leakage = place.leakage + change.leakage;
+  trial.dark_flux = place.dark_flux + change.dark_flux;
+  return trial;
 }
 
 }  // namespace lensforge

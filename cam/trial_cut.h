@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <cstdint>
 #include <memory>
 
 #include "cam/cam_options.h"
@@ -37,6 +38,15 @@ class TrialCut {
   ///                 tolerances and polishing.
   /// All references must outlive this. @pre `changed` is valid for the lens.
   TrialCut(const TrialSite& site, const CamOptions& changed, const Executor& executor);
+
+  /// What the rows of the finishing rasters come to over the whole lens.
+  struct Work {
+    double moves = 0.0;
+    double minutes = 0.0;  ///< Length ÷ feed.
+  };
+  /// From kWorkRows rows of every raster, evenly spread. @throw Interrupted
+  [[nodiscard]] Work work(const RunControl& control) const;
+  static constexpr std::int64_t kWorkRows = 6;
 
   /// What would leak from a place. @throw Interrupted
   [[nodiscard]] LeakTrial at(const LeakPlace& place, const RunControl& control) const;

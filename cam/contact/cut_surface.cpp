@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <numeric>
+#include <utility>
 
 namespace lensforge {
 namespace {
@@ -113,18 +114,19 @@ Eigen::AlignedBox2d box_of(const SurfaceMesh& mesh, std::int64_t triangle) {
 
 }  // namespace
 
-SmoothCutSurface::SmoothCutSurface(const SurfaceMesh& mesh, double radius,
+SmoothCutSurface::SmoothCutSurface(std::shared_ptr<const SmoothSurface> surface, double radius,
                                    const SmoothCutOptions& options, const Executor& executor)
-    : surface_(mesh),
-      grid_(surface_.mesh()),
+    : surface_(std::move(surface)),
+      grid_(surface_->mesh()),
       radius_(radius),
-      splits_(static_cast<std::size_t>(mesh.triangle_count())) {
+      splits_(static_cast<std::size_t>(surface_->mesh().triangle_count())) {
+  const SurfaceMesh& mesh = surface_->mesh();
   std::vector<SurfaceDeviation> off(splits_.size());
   std::vector<BendRange> bends(splits_.size());
   parallel_for(executor, "smooth surface", mesh.triangle_count(), [&](std::int64_t t) {
     const auto i = static_cast<std::size_t>(t);
     const Interpolation shape = interpolation_of(mesh, t);
-    bends[i] = surface_.bend_range(t);
+    bends[i] = surface_->bend_range(t);
     const double bend = std::max(std::abs(bends[i].least), std::abs(bends[i].largest));
     const int n = splits_for(shape, bend, options);
     splits_[i] = static_cast<std::uint8_t>(n);
@@ -134,9 +136,9 @@ SmoothCutSurface::SmoothCutSurface(const SurfaceMesh& mesh, double radius,
     deviation_.height = std::max(deviation_.height, one.height);
     deviation_.slope = std::max(deviation_.slope, one.slope);
   }
-  bed_.emplace(surface_, radius, bends);
-  const double area = surface_.box().volume();
-  const double longest = surface_.box().sizes().maxCoeff();
+  bed_.emplace(*surface_, radius, bends);
+  const double area = surface_->box().volume();
+  const double longest = surface_->box().sizes().maxCoeff();
   const double per_band = static_cast<double>(facet_count()) / area * longest;
   band_ = static_cast<double>(options.facets_at_once) / per_band - 2.0 * radius_;
 }
@@ -149,7 +151,7 @@ std::int64_t SmoothCutSurface::facet_count() const {
 
 SurfaceMesh SmoothCutSurface::facets(const Eigen::AlignedBox2d& window,
                                      const Executor& executor) const {
-  const SurfaceMesh& mesh = surface_.mesh();
+  const SurfaceMesh& mesh = surface_->mesh();
   std::vector<std::int32_t> triangles = grid_.near(window);
   std::erase_if(triangles, [&](std::int32_t t) { return !window.intersects(box_of(mesh, t)); });
   // Facets and points before each triangle; neighbours have points of their own along their edge.
@@ -157,7 +159,7 @@ SurfaceMesh SmoothCutSurface::facets(const Eigen::AlignedBox2d& window,
   std::vector<std::int64_t> points(triangles.size() + 1, 0);
   const auto parts_of = [&](std::int64_t i) {
     const std::int32_t t = triangles[static_cast<std::size_t>(i)];
-    return TriangleParts(surface_, t, splits_[static_cast<std::size_t>(t)], window);
+    return TriangleParts(*surface_, t, splits_[static_cast<std::size_t>(t)], window);
   };
   const auto count = static_cast<std::int64_t>(triangles.size());
   constexpr std::int64_t kGrain = 16;

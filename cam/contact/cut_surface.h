@@ -86,7 +86,10 @@ class SmoothCutSurface final : public CutSurface {
   /// @param radius  of the ball, mm, > 0.
   /// @pre every triangle faces +z.
   SmoothCutSurface(const SurfaceMesh& mesh, double radius, const SmoothCutOptions& options,
-                   const Executor& executor);
+                   const Executor& executor)
+      : SmoothCutSurface(std::make_shared<const SmoothSurface>(mesh), radius, options, executor) {}
+  SmoothCutSurface(std::shared_ptr<const SmoothSurface> surface, double radius,
+                   const SmoothCutOptions& options, const Executor& executor);
 
   [[nodiscard]] std::shared_ptr<const DropCutter> cutter(const Eigen::AlignedBox2d& axis,
                                                          const Executor& executor) const override;
@@ -98,12 +101,12 @@ class SmoothCutSurface final : public CutSurface {
   /// The facets that lie in a window or touch it, in the order of the mesh's triangles.
   [[nodiscard]] SurfaceMesh facets(const Eigen::AlignedBox2d& window,
                                    const Executor& executor) const;
-  [[nodiscard]] const SmoothSurface& surface() const { return surface_; }
+  [[nodiscard]] const SmoothSurface& surface() const { return *surface_; }
   /// Facets of the whole surface.
   [[nodiscard]] std::int64_t facet_count() const;
 
  private:
-  SmoothSurface surface_;
+  std::shared_ptr<const SmoothSurface> surface_;
   FacetGrid grid_;
   double radius_;
   std::vector<std::uint8_t> splits_;  ///< n of each triangle.

@@ -51,6 +51,8 @@ struct LeakTrial {
   std::string change;      ///< "a 0.3 mm ball"
   double leakage = 0.0;    ///< As LeakPlace::leakage, with all else as it is.
   double dark_flux = 0.0;  ///< As LeakPlace::dark_flux.
+  double moves = 1.0;      ///< Of the whole lens's finishing, as a multiple of those without it.
+  double minutes = 1.0;    ///< Likewise, at the finishing feed.
 };
 
 /// A part of the lens from which light leaks.

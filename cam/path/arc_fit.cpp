@@ -34,6 +34,10 @@ constexpr double kLookShare = 0.95;
 constexpr double kCentreTurn = 0.02;
 constexpr double kCentreTries = 16.0;
 
+/// What the radii of an arc may differ by without a look for a better centre, in what the slope
+/// tolerance allows over a kSlopeStretch.
+constexpr double kMisfit = 0.01;
+
 /// Whether the arc from a to b is the graph of a height, and away from where it is steep.
 bool is_graph(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const RowMove& move) {
   const double room = kArcRoom * (a - move.centre).norm();
@@ -56,8 +60,10 @@ Eigen::Vector2d written_centre(const Eigen::Vector2d& a, const Eigen::Vector2d& 
   const auto tries = static_cast<int>(std::min(kCentreTries, room / step));
   Eigen::Vector2d best;
   double least = HUGE_VAL;
-  for (int i = -tries; i <= tries; ++i) {
-    Eigen::Vector2d c = middle + (out + i * step) * up;
+  const double enough = kMisfit * options.slope_tolerance * kSlopeStretch * std::sqrt(radius2);
+  for (int i = 0; i <= 2 * tries && least > enough; ++i) {
+    const double beside = step * (i % 2 == 0 ? i / 2 : -(i + 1) / 2);
+    Eigen::Vector2d c = middle + (out + beside) * up;
     c = {options.grid.place(c.x()), options.grid.height(c.y())};
     const double misfit = std::abs(way.dot(middle - c));
     if (misfit < least) {

@@ -18,6 +18,9 @@ namespace {
 /// A chain goes on over a vertex if it turns by less than this there: 60°.
 constexpr double kStraightOn = 0.5;
 
+/// Points of a valley that share a drop-cutter: about a millimetre.
+constexpr std::size_t kStretchPoints = 100;
+
 /// An edge at the bottom of a valley.
 struct ValleyEdge {
   int a = 0, b = 0;        ///< Vertices.
@@ -165,25 +168,44 @@ Valley spaced(const Valley& valley, const PencilOptions& options) {
   return points;
 }
 
-/// The tip on a valley: the drop height, raised by what the drop curve can rise between points.
-std::vector<Eigen::Vector3d> raised(const DropCutter& cutter, const Valley& points,
-                                    const PencilOptions& options) {
+/// A valley at the drop height, raised by what the drop curve can rise between points.
+struct RaisedValley {
+  std::vector<Eigen::Vector3d> tips;
+  Extreme excess;  ///< At the points.
+};
+
+CutterLocation resting(const DropCutter& cutter, const Eigen::Vector2d& p,
+                       const CutterLocation& near) {
+  const CutterLocation location = cutter.drop(p, near);
+  if (!location.rests()) {
+    throw InputError("surface: nothing under the tool at x " + decimal_text(p.x(), 3) + " y " +
+                     decimal_text(p.y(), 3) + " mm, on a valley");
+  }
+  return location;
+}
+
+/// A cutter for each stretch: the facets of a whole smooth surface would fill gigabytes.
+RaisedValley raised(const CutSurface& surface, const Valley& points, const PencilOptions& options) {
   constexpr double kSecant2 = 1.0 + kSteepestSlope * kSteepestSlope;
   const double rise =
-      kSecant2 * std::sqrt(kSecant2) * options.spacing * options.spacing / (8.0 * cutter.radius());
-  std::vector<Eigen::Vector3d> tips;
-  CutterLocation near;
-  for (const Eigen::Vector2d& p : points) {
-    near = cutter.drop(p, near);
-    if (!near.rests()) {
-      throw InputError("surface: nothing under the tool at x " + decimal_text(p.x(), 3) + " y " +
-                       decimal_text(p.y(), 3) + " mm, on a valley");
+      kSecant2 * std::sqrt(kSecant2) * options.spacing * options.spacing / (8.0 * surface.radius());
+  RaisedValley valley;
+  for (std::size_t begin = 0; begin < points.size(); begin += kStretchPoints) {
+    const std::size_t end = std::min(begin + kStretchPoints, points.size());
+    Eigen::AlignedBox2d box;
+    for (std::size_t i = begin; i < end; ++i) box.extend(points[i]);
+    const auto cutter = surface.cutter(box, Executor::serial());
+    CutterLocation near;
+    for (std::size_t i = begin; i < end; ++i) {
+      near = resting(*cutter, points[i], near);
+      const double z = near.tip + rise + 0.5 * options.resolution - options.z_zero;
+      valley.tips.emplace_back(points[i].x(), points[i].y(),
+                               options.z_zero + to_resolution(z, options.resolution));
+      const double excess = valley.tips.back().z() - near.tip;
+      if (excess > valley.excess.value) valley.excess = {excess, valley.tips.back()};
     }
-    const double z = near.tip + rise + 0.5 * options.resolution;
-    tips.emplace_back(p.x(), p.y(),
-                      options.z_zero + to_resolution(z - options.z_zero, options.resolution));
   }
-  return tips;
+  return valley;
 }
 
 class PencilMoves {
@@ -244,23 +266,21 @@ std::vector<Valley> find_valleys(const SurfaceMesh& mesh, double radius,
   return nearest_next(std::move(valleys));
 }
 
-OperationSummary cut_pencil(const DropCutter& cutter, const std::vector<Valley>& valleys,
+OperationSummary cut_pencil(const CutSurface& surface, const std::vector<Valley>& valleys,
                             const PencilOptions& options, const FinishRun& run,
                             const MoveSink& sink, const RunControl& control) {
   OperationSummary summary;
   summary.name = "pencil";
   summary.tool = run.tool.number;
-  const double top = cutter.bounds().max().z() + options.clearance;
+  const double top = options.top + options.clearance;
   const double hop = options.z_zero + to_resolution(top - options.z_zero, options.resolution);
   PencilMoves moves(run, hop, sink, summary);
   for (const Valley& valley : valleys) {
     if (control.stop_requested()) return summary;
-    const Valley points = spaced(valley, options);
-    const std::vector<Eigen::Vector3d> tips = raised(cutter, points, options);
-    moves.add(tips);
-    for (const Eigen::Vector3d& tip : tips) {
-      const double excess = tip.z() - cutter.drop(tip.head<2>()).tip;
-      if (excess > summary.certificate.excess.value) summary.certificate.excess = {excess, tip};
+    const RaisedValley tips = raised(surface, spaced(valley, options), options);
+    moves.add(tips.tips);
+    if (tips.excess.value > summary.certificate.excess.value) {
+      summary.certificate.excess = tips.excess;
     }
     control.report({"cam pencil", static_cast<double>(summary.passes),
                     static_cast<double>(valleys.size()), std::to_string(summary.moves) + " moves"});

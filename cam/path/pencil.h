@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "cam/contact/drop_cutter.h"
+#include "cam/contact/cut_surface.h"
 #include "cam/path/finish_operation.h"
 #include "cam/path/move.h"
 #include "cam/path/operation.h"
@@ -21,7 +21,8 @@ struct PencilOptions {
   double spacing = 0.01;      ///< Of points along a valley at most, mm, > 0.
   double resolution = 1e-6;   ///< Unit of the program's last decimal, mm, > 0.
   double z_zero = 0.0;        ///< Height that the program calls 0, mm, lens frame.
-  double clearance = 0.5;     ///< Over the surface's highest point on ways between valleys, mm.
+  double top = 0.0;           ///< Highest point of the surface, mm, lens frame.
+  double clearance = 0.5;     ///< Over it on ways between valleys, mm.
 };
 
 /// A valley as the ball follows it: places of its axis, mm.
@@ -44,7 +45,7 @@ std::vector<Valley> find_valleys(const SurfaceMesh& mesh, double radius,
 /// @pre the surface is finished but for its valleys and nowhere steeper than kSteepestSlope.
 /// @return complete is false if `control` asked for an end.
 /// @throw InputError if there is nothing under the ball somewhere on a valley.
-OperationSummary cut_pencil(const DropCutter& cutter, const std::vector<Valley>& valleys,
+OperationSummary cut_pencil(const CutSurface& surface, const std::vector<Valley>& valleys,
                             const PencilOptions& options, const FinishRun& run,
                             const MoveSink& sink, const RunControl& control);
 

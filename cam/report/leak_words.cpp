@@ -6,11 +6,13 @@
 
 #include "cam/report/html_text.h"
 #include "core/decimal_text.h"
+#include "core/trimmed_decimal.h"
 
 namespace lensforge {
 namespace {
 
 constexpr double kHelps = 0.8;      ///< A remedy leaves this share of a leak at most.
+constexpr double kSameWork = 0.05;  ///< Shares of work that make no difference.
 constexpr double kNearHalf = 0.05;  ///< Shares this near to a half are called that.
 
 /// What the surface has there that it should not have.
@@ -43,6 +45,21 @@ std::string sentence(std::string words) {
   return words;
 }
 
+std::string times(double factor) { return trimmed_decimal(factor, 1) + " times"; }
+
+bool is_more(double factor) { return factor > 1.0 + kSameWork; }
+
+/// What a remedy costs in finishing: " for 1.4 times as many moves and 2 times the minutes".
+std::string cost_words(const LeakTrial& trial) {
+  if (is_more(trial.moves) && is_more(trial.minutes)) {
+    return " for " + times(trial.moves) + " as many finishing moves and " + times(trial.minutes) +
+           " the finishing time";
+  }
+  if (is_more(trial.moves)) return " for " + times(trial.moves) + " as many finishing moves";
+  if (is_more(trial.minutes)) return " for " + times(trial.minutes) + " the finishing time";
+  return "";
+}
+
 std::string remedy_words(const LeakPlace& place) {
   if (place.trials.empty()) return "";
   const LeakTrial& best = best_trial(place);
@@ -59,7 +76,7 @@ std::string remedy_words(const LeakPlace& place) {
   }
   const bool half = std::abs(share - 0.5) < kNearHalf;
   return sentence(best.change) + " would " + (half ? "halve it, to " : "bring it down to ") +
-         percent_text(left) + ".";
+         percent_text(left) + cost_words(best) + ".";
 }
 
 }  // namespace

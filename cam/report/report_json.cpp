@@ -74,7 +74,11 @@ json surfaces_json(const LeakageResult& result) {
 }
 
 json trial_json(const LeakTrial& trial) {
-  return {{"change", trial.change}, {"leakage", trial.leakage}, {"dark_flux", trial.dark_flux}};
+  return {{"change", trial.change},
+          {"leakage", trial.leakage},
+          {"dark_flux", trial.dark_flux},
+          {"finishing_moves_factor", trial.moves},
+          {"finishing_minutes_factor", trial.minutes}};
 }
 
 json place_json(const LeakPlace& place) {

@@ -187,6 +187,18 @@ TEST(CamJob, WarnsOfWhatAnOperatorShouldQuestion) {
               ::testing::Contains(HasSubstr("rises by")));
 }
 
+TEST(CamJob, WarnsWhereFlutesAreTooShortForABlankThatNobodyRoughed) {
+  const TempFolder folder;
+  CamOptions options = programs_only();
+  options.workshop.process.rough.enabled = false;
+  options.workshop.stock.allowance = 3.0;
+  const std::vector<std::string> warnings = run(small_lens(), options, folder).report.warnings;
+  EXPECT_THAT(warnings, ::testing::Contains(HasSubstr("nothing is roughed: 'semi' cuts")));
+  options.workshop.process.rough.enabled = true;
+  EXPECT_THAT(run(small_lens(), options, folder).report.warnings,
+              ::testing::Not(::testing::Contains(HasSubstr("nothing is roughed"))));
+}
+
 TEST(CamJob, AClampInTheWayIsACollision) {
   const TempFolder folder;
   CamOptions options = programs_only();

@@ -88,8 +88,10 @@ TEST(Pencil, NeverGouges) {
     };
     PencilOptions options;
     options.least_length = 0.3;
+    options.top = mesh.vertices.row(2).maxCoeff();
+    const FacetSurface surface(mesh, kRadius, Executor::serial());
     const OperationSummary summary =
-        cut_pencil(cutter, find_valleys(mesh, kRadius, options), options, pencil_run(), sink, {});
+        cut_pencil(surface, find_valleys(mesh, kRadius, options), options, pencil_run(), sink, {});
     EXPECT_TRUE(summary.complete);
     EXPECT_EQ(summary.moves, static_cast<std::int64_t>(moves.size()));
     EXPECT_TRUE(name.find("valley") == std::string::npos || summary.passes > 0) << name;
@@ -108,6 +110,27 @@ TEST(Pencil, NeverGouges) {
     EXPECT_LE(summary.certificate.excess.value, highest + 1e-9);
     EXPECT_LE(summary.certificate.excess.value, 2e-4);
   }
+}
+
+/// Facets of a smooth surface are made stretch by stretch: the path is that over all of them.
+TEST(Pencil, FollowsASmoothSurfaceAsAWhole) {
+  const SurfaceMesh mesh = straight_valley(0.3, 0.1);
+  const SmoothCutSurface surface(mesh, kRadius, {1e-4, 2e-2}, Executor::serial());
+  const auto whole = surface.cutter({Eigen::Vector2d(0.0, 0.0), Eigen::Vector2d(kSide, kSide)},
+                                    Executor::serial());
+  PencilOptions options;
+  options.top = mesh.vertices.row(2).maxCoeff();
+  std::int64_t points = 0;
+  const MoveSink sink = [&](std::span<const PathMove> some) {
+    for (const PathMove& move : some) {
+      if (move.kind != MoveKind::kCut) continue;
+      ++points;
+      EXPECT_NEAR(move.end.z() - whole->drop(move.end.head<2>()).tip, 1.77e-4, 1e-6);
+    }
+  };
+  const std::vector<Valley> valleys = find_valleys(mesh, kRadius, options);
+  EXPECT_TRUE(cut_pencil(surface, valleys, options, pencil_run(), sink, {}).complete);
+  EXPECT_GT(points, 390);
 }
 
 }  // namespace

@@ -172,6 +172,12 @@ TEST(LeakWords, SayWhatHelpsAsFarAsItWasTried) {
   EXPECT_THAT(leak_words(place),
               EndsWith(" Nothing that was tried helps much: with a 0.3 mm ball 1.90 % would still "
                        "leak, with a 0.2 mm ball 2.10 %."));
+  place.trials = {{"half the tolerances", 0.004, 0.0, 1.42, 1.0}};
+  EXPECT_THAT(leak_words(place),
+              EndsWith(" down to 0.400 % for 1.4 times as many finishing moves."));
+  place.trials = {{"a pitch of 0.03 mm", 0.004, 0.0, 2.04, 2.0}};
+  EXPECT_THAT(leak_words(place), EndsWith(" for 2 times as many finishing moves and 2 times the "
+                                          "finishing time."));
   // Less than nothing is nothing: other light fills the pixels.
   place.trials = {{"half the tolerances", -0.001, 0.0}};
   EXPECT_THAT(leak_words(place), EndsWith(" Half the tolerances would bring it down to 0 %."));
