@@ -81,9 +81,9 @@ Eigen::Vector2d written_centre(const Eigen::Vector2d& a, const Eigen::Vector2d& 
 /// biarcs take 1.1 (facets) to 1.7 times (smooth surfaces) as many moves for the same tolerances,
 /// and a free choice between both none fewer. With s along the
 /// chord of length L and h square to it, circles through both ends are h = q (s (L − s) − h²) with
-/// their centre 1/(2q) below the chord's middle: q by least squares.
+/// their centre 1/(2q) below the chord's middle: q by least squares. `largest` is the radius, mm.
 std::optional<RowMove> arc_through(const std::vector<Eigen::Vector2d>& points, std::size_t from,
-                                   std::size_t to, const FitOptions& options) {
+                                   std::size_t to, const FitOptions& options, double largest) {
   const Eigen::Vector2d& a = points[from];
   const Eigen::Vector2d& b = points[to];
   const double length = (b - a).norm();
@@ -100,7 +100,7 @@ std::optional<RowMove> arc_through(const std::vector<Eigen::Vector2d>& points, s
   }
   if (!(weight > 0.0)) return std::nullopt;
   const double q = above / weight;
-  if (!(2.0 * std::abs(q) * kLargestArc > 1.0)) return std::nullopt;
+  if (!(2.0 * std::abs(q) * largest > 1.0)) return std::nullopt;
   RowMove move{b, true, q > 0.0};
   move.centre = written_centre(a, b, -1.0 / (2.0 * q), options);
   return is_graph(a, b, move) ? std::optional(move) : std::nullopt;
@@ -151,7 +151,7 @@ class RowFit {
   };
 
   [[nodiscard]] std::optional<RowMove> move_to(std::size_t from, std::size_t to, bool arc) const {
-    if (arc) return arc_through(joints_.written, from, to, options_);
+    if (arc) return arc_through(joints_.written, from, to, options_, kLargestArc);
     return RowMove{joints_.written[to]};
   }
 
@@ -262,7 +262,10 @@ class RowFit {
       const Reach& reach = step.reach;
       row.moves.push_back(reach.move);
       std::optional<RowMove> move;
-      if (reach.move.arc) move = arc_through(joints_.exact, step.from, reach.joint, unrounded);
+      // An arc as flat as may be must stay one without its rounding.
+      if (reach.move.arc) {
+        move = arc_through(joints_.exact, step.from, reach.joint, unrounded, 2.0 * kLargestArc);
+      }
       row.unrounded.moves.push_back(move.value_or(RowMove{joints_.exact[reach.joint]}));
     }
     row.certificate = error_.certificate();
