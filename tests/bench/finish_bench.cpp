@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The finishing raster with its certificate, as cam cuts by default (ball of 0.2 mm, stepover
-// 0.06 mm), on lenses of 100 × 100 mm: 641 × 737 vertices (942,080 triangles) or 321 × 369 (235,520).
+// 0.06 mm), on lenses of 100 × 100 mm: 641 × 737 vertices (942,080 triangles) or 321 × 369
+// (235,520).
 #include <benchmark/benchmark.h>
 
 #include <Eigen/Geometry>
