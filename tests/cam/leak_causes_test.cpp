@@ -95,10 +95,12 @@ TEST(LeakCauses, ChordsVanishWithTheTolerances) {
   });
 }
 
+/// Unpolished, nodes on the ridges between rows fall to either side by rounding.
 TEST(LeakCauses, DecimalsVanishWithTheLastDigit) {
   expect_vanishing(leak_cause::kDecimals, {4, 5, 6}, [](CamOptions& o, double decimals) {
     o.decimals = static_cast<int>(decimals);
     o.sample_spacing = 0.005;
+    o.polish.sigma = 0.02;
   });
 }
 

@@ -187,9 +187,9 @@ TEST(Remedies, EveryCauseHasOneOfItsOwn) {
       changes.push_back(trial.change);
       EXPECT_TRUE(std::isfinite(trial.leakage));
       const bool closer = trial.change.find("pitch") != std::string::npos;
-      EXPECT_NEAR(trial.minutes, closer ? 2.0 : 1.0, 0.05) << trial.change;
+      EXPECT_NEAR(trial.minutes, closer ? 2.0 : 1.0, 0.2) << trial.change;
       if (closer) {
-        EXPECT_NEAR(trial.moves, 2.0, 0.3) << trial.change;
+        EXPECT_NEAR(trial.moves, 2.0, 0.5) << trial.change;
       } else if (trial.change == "half the tolerances") {
         EXPECT_GT(trial.moves, 1.05);
         EXPECT_LT(trial.moves, 4.0);
