@@ -14,6 +14,7 @@
 #include "app/progress_display.h"
 #include "core/error.h"
 #include "design/render_lens.h"
+#include "design/wanted_picture.h"
 #include "export/closed_solid.h"
 #include "export/iges_file.h"
 #include "machine/stream/job_identity.h"
@@ -50,6 +51,10 @@ std::string scientific(double value) {
   return {text.data(), static_cast<std::size_t>(length)};
 }
 
+std::string place_text(const Eigen::Vector2d& xy) {
+  return "x " + fixed(xy.x(), 2) + ", y " + fixed(xy.y(), 2);
+}
+
 nlohmann::json certificate(const SplineNet& net) {
   nlohmann::json patches = nlohmann::json::array();
   for (const SplinePatch& patch : net.patches) {
@@ -61,7 +66,8 @@ nlohmann::json certificate(const SplineNet& net) {
                        {"y", range(1)},
                        {"cells", patch.cells},
                        {"height_error_mm", patch.error.height},
-                       {"normal_error_rad", patch.error.normal}});
+                       {"normal_error_rad", patch.error.normal},
+                       {"share_within_tolerance", patch.error.share_within()}});
   }
   return patches;
 }
@@ -76,17 +82,22 @@ void describe_fit(const SplineNet& net, const FitOptions& fit, StepReport& repor
   report.json["normal_error_rad"] = error.normal;
   report.json["height_rms_mm"] = error.height_rms;
   report.json["normal_rms_rad"] = error.normal_rms;
+  report.json["worst_height_at_mm"] = {error.height_at.x(), error.height_at.y()};
+  report.json["worst_normal_at_mm"] = {error.normal_at.x(), error.normal_at.y()};
+  report.json["share_within_tolerance"] = error.share_within();
   report.json["within_tolerance"] = report.within_tolerance;
   report.json["patches_within_tolerance"] = good;
   report.json["control_points"] = net.control_points();
   report.json["patches"] = certificate(net);
-  report.text +=
-      "  fit       " + std::to_string(good) + " of " + std::to_string(net.patches.size()) +
-      " patches within tolerance, " + std::to_string(net.control_points()) + " control points\n" +
-      "  worst     " + scientific(error.height) + " mm (limit " + scientific(fit.tolerance) +
-      "), normal " + scientific(error.normal) + " rad (limit " + scientific(fit.normal_tolerance) +
-      ")\n" + "  rms       " + scientific(error.height_rms) + " mm, normal " +
-      scientific(error.normal_rms) + " rad\n";
+  report.text += "  fit       " + std::to_string(good) + " of " +
+                 std::to_string(net.patches.size()) + " patches within tolerance, " +
+                 fixed(100.0 * error.share_within(), 1) + " % of the area, " +
+                 std::to_string(net.control_points()) + " control points\n" + "  worst     " +
+                 scientific(error.height) + " mm at " + place_text(error.height_at) + " (limit " +
+                 scientific(fit.tolerance) + "), normal " + scientific(error.normal) + " rad at " +
+                 place_text(error.normal_at) + " (limit " + scientific(fit.normal_tolerance) +
+                 ")\n" + "  rms       " + scientific(error.height_rms) + " mm, normal " +
+                 scientific(error.normal_rms) + " rad\n";
 }
 
 void describe_solid(const SolidContent& content, const Lens& lens, const std::string& name,
@@ -119,6 +130,13 @@ void describe_picture(const SplineNet& net, const Lens& lens, const Executor& ex
       evaluate(solid.mesh, solid.normals, lens.setup, lens.target, nullptr, executor);
   report.json["metrics"]["solid"] = metrics_json(metrics);
   report.text += "  solid     " + metrics_text(metrics) + "\n";
+}
+
+PictureGoal goal_of(const WantedPicture& wanted) {
+  return {.reach = wanted.reach(), .miss = [&wanted](const SampledSurface& solid) {
+            WantedPicture::Comparison found = wanted.compare(solid.mesh, solid.normals);
+            return PictureMiss{found.excess, std::move(found.missing)};
+          }};
 }
 
 }  // namespace
@@ -154,15 +172,17 @@ StepReport export_step(const Lens& lens, const fs::path& source, const fs::path&
   const RunControl control(interrupt.token(), progress.sink());
   FitOptions fit = arguments.fit;
   fit.max_control_points = arguments.max_points;
-  const SplineNet net =
-      fit_spline_net(SmoothSurface(lens.surface), fit, options.executor(), control);
+  const Executor executor = options.executor();
+  const WantedPicture wanted(lens.surface, lens.setup, lens.target, executor);
+  fit.picture = goal_of(wanted);
+  const SplineNet net = fit_spline_net(SmoothSurface(lens.surface), fit, executor, control);
   const StepHeader header = header_of(source, arguments.author);
   const SolidContent content = arguments.iges ? write_iges(net, header, out)
                                               : write_step(net, header, arguments.schema, out);
   StepReport report;
   describe_solid(content, lens, name, report);
   describe_fit(net, fit, report);
-  describe_picture(net, lens, options.executor(), report);
+  describe_picture(net, lens, executor, report);
   return report;
 }
 

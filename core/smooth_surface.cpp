@@ -262,4 +262,18 @@ std::optional<SurfacePoint> SmoothSurface::model_at(const Eigen::Vector2d& xy) c
   return point;
 }
 
+Eigen::Matrix2d SmoothSurface::model_bend(const Eigen::Vector2d& xy) const {
+  const Place place = locate(xy);
+  if (place.triangle < 0) return Eigen::Matrix2d::Zero();
+  const Eigen::Vector3i corners = mesh_.triangles.col(place.triangle);
+  Eigen::Matrix2d sides;
+  Eigen::Matrix2d changes;
+  for (int k = 0; k < 2; ++k) {
+    const int to = corners[k + 1];
+    sides.col(k) = mesh_.vertices.col(to).head<2>() - mesh_.vertices.col(corners[0]).head<2>();
+    changes.col(k) = slopes_.col(to) - slopes_.col(corners[0]);
+  }
+  return changes * sides.inverse();
+}
+
 }  // namespace lensforge

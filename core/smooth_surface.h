@@ -43,6 +43,11 @@ class SmoothSurface {
   /// vertices, as render_surface() takes them. Nothing outside of the mesh.
   [[nodiscard]] std::optional<SurfacePoint> model_at(const Eigen::Vector2d& xy) const;
 
+  /// How the model's slopes change along x and y (columns) around a point, 1/mm: constant on a
+  /// triangle, and no second derivatives of any surface where slopes contradict each other. Zero
+  /// outside of the mesh.
+  [[nodiscard]] Eigen::Matrix2d model_bend(const Eigen::Vector2d& xy) const;
+
   /// The point of a triangle with these barycentric weights, none below 0.
   [[nodiscard]] SurfacePoint in_triangle(std::int64_t triangle,
                                          const Eigen::Vector3d& weights) const;

@@ -14,4 +14,7 @@ struct SampledSurface {
   Eigen::Matrix3Xd normals;  ///< 3 × V, z > 0, of any length.
 };
 
+/// A grid of points that are still to be filled in, row by row, and the triangles between them.
+SampledSurface make_samples(const GridShape& shape);
+
 }  // namespace lensforge

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include <Eigen/Eigenvalues>
-#include <Eigen/SparseCore>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -9,45 +7,23 @@
 #include "core/error.h"
 #include "export/cubic_spline.h"
 #include "export/grid_warp.h"
+#include "export/light_fit.h"
+#include "export/slope_fit.h"
 #include "export/spline_net.h"
 
-// One spline over the whole rectangle is fitted and then cut into patches, which keeps them joined
-// with equal curvature. Its x and y are given first (GridWarp): with knots where vertices are
-// dense, 30,481 control points throw the picture of a smooth 128² portrait with MAE 0.0031, where
-// on even knot lines 115,600 give 0.0047. What is then minimised over z is the squared difference
-// of the derivatives by the parameters from those that the vertex-normal model's slopes ask for,
-// which are what throws the picture (for parameters that turn and scale but do not shear this is
-// the difference of the slopes themselves, over the area), plus a little of the heights' own, which
-// pins what slopes leave open. Both are sums over a tensor grid of samples, so that in the basis
-// that diagonalises mass and stiffness of each direction the solution is one division a coefficient
-// (fast diagonalisation, Lynch, Rice and Thomas 1964).
+// One spline over the whole rectangle is fitted (SlopeFit, LightFit) and then cut into patches,
+// which keeps them joined with equal curvature.
 namespace lensforge {
 namespace {
 
 /// Mesh cells that a patch covers each way when it covers no less than kFewestPatches.
 constexpr double kMeshCellsPerPatch = 32.0;
 
-/// Samples a knot cell each way: three to eight give pictures whose MAE differ by 0.0001.
-constexpr int kSamples = 4;
-
-/// Heights weigh as much as slopes for waves of this many mesh cells. Heights and normals of a
-/// designed mesh contradict each other from cell to cell, and light goes by normals: with 0.5
-/// instead of 16 the picture of a smooth 128² portrait has MAE 0.0082 instead of 0.0056, with 50
-/// it is the same.
-constexpr double kHeightReach = 16.0;
-
 /// Heights are rounded to the first (mm), which keeps files short, and coefficients where patches
 /// are cut from the whole to the second, which keeps them joined: 1e-5 and 1e-6 rad at the finest
 /// knots that occur (0.01 mm).
 constexpr double kHeightStep = 1e-7;
 constexpr double kCutStep = 1e-8;
-
-/// Least share of its even area to which the parameters' map may squeeze a place.
-constexpr double kLeastArea = 1e-3;
-
-/// Coefficients of x and y.
-using Plan = std::array<Eigen::MatrixXd, 2>;
-using Basis = Eigen::SparseMatrix<double, Eigen::RowMajor>;
 
 double rounded_height(double value) { return std::round(value / kHeightStep) * kHeightStep; }
 double rounded_cut(double value) { return std::round(value / kCutStep) * kCutStep; }
@@ -64,50 +40,6 @@ std::int64_t control_point_limit(const FitOptions& options, const SurfaceMesh& m
   return std::min(kMostControlPoints, kPerVertex * mesh.vertex_count());
 }
 
-/// One direction of the tensor product.
-struct Axis {
-  int cells = 0;
-  std::vector<double> points;  ///< Samples, in cells.
-  Basis values;                ///< Of the splines at the samples.
-  Basis slopes;                ///< The same, 1/mm.
-  Eigen::MatrixXd modes;       ///< Columns: unit mass, diagonal stiffness.
-  Eigen::VectorXd stiffness;   ///< Of the modes, 1/mm².
-};
-
-Axis make_axis(double length, int cells) {
-  Axis axis{cells, {}, {}, {}, {}, {}};
-  for (int i = 0; i < kSamples * cells; ++i) axis.points.push_back((i + 0.5) / kSamples);
-  axis.values = basis_matrix(axis.points, cells, false);
-  axis.slopes = basis_matrix(axis.points, cells, true) * (cells / length);
-  const Basis mass = axis.values.transpose() * axis.values;
-  const Basis stiffness = axis.slopes.transpose() * axis.slopes;
-  const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> solver{Eigen::MatrixXd(stiffness),
-                                                                         Eigen::MatrixXd(mass)};
-  axis.modes = solver.eigenvectors();
-  axis.stiffness = solver.eigenvalues();
-  return axis;
-}
-
-/// Places and derivatives by the parameters along a line of samples.
-struct PlanLine {
-  Eigen::Matrix2Xd xy, by_u, by_v;
-};
-
-/// The line at sample number `i` along u.
-PlanLine plan_line(const Plan& plan, const Axis& u, const Axis& v, Eigen::Index i) {
-  PlanLine line{Eigen::Matrix2Xd(2, v.values.rows()), {}, {}};
-  line.by_u = line.by_v = line.xy;
-  for (Eigen::Index k = 0; k < 2; ++k) {
-    const Eigen::MatrixXd& c = plan[static_cast<std::size_t>(k)];
-    const Eigen::VectorXd along = (u.values.row(i) * c).transpose();
-    const Eigen::VectorXd steep = (u.slopes.row(i) * c).transpose();
-    line.xy.row(k) = (v.values * along).transpose();
-    line.by_v.row(k) = (v.slopes * along).transpose();
-    line.by_u.row(k) = (v.values * steep).transpose();
-  }
-  return line;
-}
-
 class NetFitter {
  public:
   NetFitter(const SmoothSurface& surface, const FitOptions& options, const Executor& executor,
@@ -118,9 +50,7 @@ class NetFitter {
         executor_(executor),
         control_(control),
         limit_(control_point_limit(options, surface.mesh())) {
-    const Eigen::Vector2d size = surface.box().sizes();
-    const double mesh_cells = 0.5 * static_cast<double>(surface.mesh().triangle_count());
-    mesh_cell_ = std::sqrt(size.prod() / mesh_cells);
+    mesh_cell_ = mesh_cell(surface);
     divide(kMeshCellsPerPatch * mesh_cell_);
     net_.u = lines(surface.box().min().x(), surface.box().max().x(), net_.columns);
     net_.v = lines(surface.box().min().y(), surface.box().max().y(), net_.rows);
@@ -130,12 +60,22 @@ class NetFitter {
   SplineNet fit() {
     const int most = most_cells();
     for (int cells = std::min(kFewestCells, most);; cells = std::min(2 * cells, most)) {
-      cut(solve(cells), cells);
+      const SlopeFit slopes = slope_fit(cells);
+      const Eigen::MatrixXd heights = slopes.solve();
+      cut(slopes.plan(), heights, cells);
       report(cells, most);
       // Most of the time of a certificate is saved where vertices alone say no.
-      if (cells < most && !vertices_hold()) continue;
+      if (vertices_hold()) {
+        certify();
+        if (all_hold()) return std::move(net_);
+      }
+      if (cells < most) continue;
+      if (options_.picture.miss) {
+        LightFit light(slopes, options_.picture, executor_, control_);
+        cut(slopes.plan(), light.follow(heights), cells);
+      }
       certify();
-      if (cells == most || all_hold()) return std::move(net_);
+      return std::move(net_);
     }
   }
 
@@ -161,84 +101,14 @@ class NetFitter {
     return std::max(1, most);
   }
 
-  [[nodiscard]] SurfacePoint sample(const Eigen::Vector2d& at) const {
-    const Eigen::Vector2d xy = nearest_inside(surface_.box(), at);
-    const auto point = surface_.model_at(xy);
-    LF_CHECK(point.has_value(), std::to_string(xy.x()) + ", " + std::to_string(xy.y()));
-    return *point;
-  }
-
-  /// As much of the vertices' movement as can be followed without a fold.
-  [[nodiscard]] Plan make_plan(const Axis& u, const Axis& v) const {
-    for (double share = 1.0; share > 0.0; share -= 0.25) {
-      Plan plan = warp_.control_points(u.cells, v.cells, share);
-      if (least_area(plan, u, v) > kLeastArea) return plan;
-    }
-    return warp_.control_points(u.cells, v.cells, 0.0);
-  }
-
-  /// Over all samples.
-  [[nodiscard]] double least_area(const Plan& plan, const Axis& u, const Axis& v) const {
-    Eigen::VectorXd least(u.values.rows());
-    parallel_for(executor_, "spline plan", least.size(), [&](std::int64_t i) {
-      const PlanLine line = plan_line(plan, u, v, i);
-      const Eigen::ArrayXd area = line.by_u.row(0).array() * line.by_v.row(1).array() -
-                                  line.by_u.row(1).array() * line.by_v.row(0).array();
-      least[i] = area.minCoeff();
-    });
-    return least.minCoeff();
-  }
-
-  /// The right-hand side: what the samples say of every coefficient.
-  [[nodiscard]] Eigen::MatrixXd moments(const Plan& plan, const Axis& u, const Axis& v,
-                                        double height_weight) const {
-    Eigen::MatrixXd by_slope(v.cells + 3, u.values.rows());
-    Eigen::MatrixXd by_value(v.cells + 3, u.values.rows());
-    parallel_for(
-        executor_, "spline samples", u.values.rows(),
-        [&](std::int64_t i) {
-          if (control_.stop_requested()) return;
-          const PlanLine line = plan_line(plan, u, v, i);
-          Eigen::Matrix3Xd wanted(3, line.xy.cols());
-          for (Eigen::Index j = 0; j < wanted.cols(); ++j) {
-            const SurfacePoint p = sample(line.xy.col(j));
-            wanted.col(j) << p.slope.dot(line.by_u.col(j)), p.slope.dot(line.by_v.col(j)), p.z;
-          }
-          by_slope.col(i) = v.values.transpose() * wanted.row(0).transpose();
-          by_value.col(i) = v.slopes.transpose() * wanted.row(1).transpose() +
-                            height_weight * (v.values.transpose() * wanted.row(2).transpose());
-        },
-        1);
-    if (control_.stop_requested()) throw Interrupted();
-    return u.slopes.transpose() * by_slope.transpose() +
-           u.values.transpose() * by_value.transpose();
-  }
-
-  /// Coefficients of the spline over the whole rectangle with `cells` a patch each way.
-  [[nodiscard]] std::array<Eigen::MatrixXd, 3> solve(int cells) const {
-    const Eigen::Vector2d size = surface_.box().sizes();
-    std::array<Axis, 2> axes;
-    parallel_for(
-        executor_, "spline axes", 2,
-        [&](std::int64_t k) {
-          const int patches = k == 0 ? net_.columns : net_.rows;
-          axes[static_cast<std::size_t>(k)] = make_axis(size[k], cells * patches);
-        },
-        1);
-    const auto& [u, v] = axes;
-    Plan plan = make_plan(u, v);
-    const double reach = kHeightReach * mesh_cell_;
-    const double height_weight = 1.0 / (reach * reach);
-    Eigen::MatrixXd amount = u.modes.transpose() * moments(plan, u, v, height_weight) * v.modes;
-    for (Eigen::Index j = 0; j < amount.cols(); ++j) {
-      amount.col(j).array() /= u.stiffness.array() + (v.stiffness[j] + height_weight);
-    }
-    const Eigen::MatrixXd heights = u.modes * amount * v.modes.transpose();
-    return {std::move(plan[0]), std::move(plan[1]), heights.unaryExpr(&rounded_height)};
+  [[nodiscard]] SlopeFit slope_fit(int cells) const {
+    return {surface_, warp_, {cells * net_.columns, cells * net_.rows}, executor_, control_};
   }
 
   /// Cuts the whole spline into the net's patches and edges.
-  void cut(const std::array<Eigen::MatrixXd, 3>& whole, int cells) {
+  void cut(const SplinePlan& plan, const Eigen::MatrixXd& heights, int cells) {
+    const std::array<Eigen::MatrixXd, 3> whole{plan[0], plan[1],
+                                               heights.unaryExpr(&rounded_height)};
     std::vector<Eigen::MatrixXd> onto_u;
     std::vector<Eigen::MatrixXd> onto_v;
     for (int c = 0; c < net_.columns; ++c) {
@@ -318,7 +188,8 @@ class NetFitter {
         [&](std::int64_t i) {
           if (control_.stop_requested()) return;
           SplinePatch& patch = net_.patches[static_cast<std::size_t>(i)];
-          patch.error = measure_patch(patch, surface_, static_cast<int>(std::ceil(density)));
+          patch.error =
+              measure_patch(patch, surface_, options_, static_cast<int>(std::ceil(density)));
         },
         1);
     if (control_.stop_requested()) throw Interrupted();
@@ -339,15 +210,15 @@ class NetFitter {
       if (!uv) continue;
       const int patch = net_.patch_at(*uv);
       const SplinePoint point = net_.patches[static_cast<std::size_t>(patch)].at(*uv);
-      tell(patch, difference(point.surface, {mesh.vertices(2, v), surface_.slopes().col(v)}));
+      FitError found = difference(point.surface, {mesh.vertices(2, v), surface_.slopes().col(v)});
+      found.height_at = found.normal_at = mesh.vertices.col(v).head<2>();
+      tell(patch, found);
     }
   }
 
   void measure_vertices() {
     for_each_vertex([&](int number, const FitError& found) {
-      FitError& error = net_.patches[static_cast<std::size_t>(number)].error;
-      error.height = std::max(error.height, found.height);
-      error.normal = std::max(error.normal, found.normal);
+      net_.patches[static_cast<std::size_t>(number)].error.raise(found);
     });
   }
 

@@ -63,9 +63,12 @@ class PatchTable {
   [[nodiscard]] SplinePoint at(Eigen::Index i, Eigen::Index j) const {
     return spline_point(take(value_, i, j), take(by_u_, i, j), take(by_v_, i, j));
   }
-  /// Height times the area that a unit of the parameters covers.
+  /// That a unit of the parameters covers, seen from above.
+  [[nodiscard]] double area(Eigen::Index i, Eigen::Index j) const {
+    return by_u_[0](i, j) * by_v_[1](i, j) - by_u_[1](i, j) * by_v_[0](i, j);
+  }
   [[nodiscard]] double volume(Eigen::Index i, Eigen::Index j) const {
-    return value_[2](i, j) * (by_u_[0](i, j) * by_v_[1](i, j) - by_u_[1](i, j) * by_v_[0](i, j));
+    return value_[2](i, j) * area(i, j);
   }
 
  private:
@@ -136,8 +139,9 @@ FitError SplineNet::error() const {
   const double area = (u.back() - u.front()) * (v.back() - v.front());
   FitError worst;
   for (const SplinePatch& patch : patches) {
-    worst.height = std::max(worst.height, patch.error.height);
-    worst.normal = std::max(worst.normal, patch.error.normal);
+    worst.raise(patch.error);
+    worst.area += patch.error.area;
+    worst.area_within += patch.error.area_within;
     const double share = patch.box.volume() / area;
     worst.height_rms += share * patch.error.height_rms * patch.error.height_rms;
     worst.normal_rms += share * patch.error.normal_rms * patch.error.normal_rms;
@@ -186,29 +190,47 @@ std::optional<Eigen::Vector2d> SplineNet::parameters_of(const Eigen::Vector2d& x
 }
 
 SampledSurface sampled(const SplineNet& net, const GridShape& shape) {
-  SampledSurface result;
-  SurfaceMesh& mesh = result.mesh;
-  mesh.grid = shape;
-  mesh.vertices.resize(3, Eigen::Index{shape.columns} * shape.rows);
-  mesh.triangles.resize(3, Eigen::Index{2} * (shape.columns - 1) * (shape.rows - 1));
-  result.normals.resize(3, mesh.vertices.cols());
+  SampledSurface result = make_samples(shape);
   const Eigen::Vector2d low(net.u.front(), net.v.front());
   const Eigen::Vector2d size = Eigen::Vector2d(net.u.back(), net.v.back()) - low;
-  Eigen::Index t = 0;
   for (int r = 0; r < shape.rows; ++r) {
     for (int c = 0; c < shape.columns; ++c) {
       const Eigen::Array2d share(static_cast<double>(c) / (shape.columns - 1),
                                  static_cast<double>(r) / (shape.rows - 1));
       const SplinePoint point = net.at(low + (share * size.array()).matrix());
       const int at = r * shape.columns + c;
-      mesh.vertices.col(at) << point.xy, point.surface.z;
+      result.mesh.vertices.col(at) << point.xy, point.surface.z;
       result.normals.col(at) << -point.surface.slope, 1.0;
-      if (c + 1 == shape.columns || r + 1 == shape.rows) continue;
-      mesh.triangles.col(t++) << at, at + 1, at + shape.columns + 1;
-      mesh.triangles.col(t++) << at, at + shape.columns + 1, at + shape.columns;
     }
   }
   return result;
+}
+
+void FitError::raise(const FitError& other) {
+  if (other.height > height) {
+    height = other.height;
+    height_at = other.height_at;
+  }
+  if (other.normal > normal) {
+    normal = other.normal;
+    normal_at = other.normal_at;
+  }
+}
+
+void FitError::add(FitError other, const Eigen::Vector2d& at) {
+  other.height_at = other.normal_at = at;
+  raise(other);
+  height_rms += other.height * other.height;
+  normal_rms += other.normal * other.normal;
+  area += other.area;
+  area_within += other.area_within;
+}
+
+void FitError::divide(double points, double unit_area) {
+  height_rms = std::sqrt(height_rms / points);
+  normal_rms = std::sqrt(normal_rms / points);
+  area *= unit_area / points;
+  area_within *= unit_area / points;
 }
 
 FitError difference(const SurfacePoint& a, const SurfacePoint& b) {
@@ -219,7 +241,8 @@ bool holds(const FitError& error, const FitOptions& options) {
   return error.height <= options.tolerance && error.normal <= options.normal_tolerance;
 }
 
-FitError measure_patch(const SplinePatch& patch, const SmoothSurface& surface, int density) {
+FitError measure_patch(const SplinePatch& patch, const SmoothSurface& surface,
+                       const FitOptions& options, int density) {
   FitError error;
   double points = 0.0;
   const std::vector<double> across = raster(0, patch.cells, density);
@@ -230,17 +253,15 @@ FitError measure_patch(const SplinePatch& patch, const SmoothSurface& surface, i
         const SplinePoint at = table.at(i, j);
         const auto model = surface.model_at(nearest_inside(surface.box(), at.xy));
         if (!model) continue;
-        const FitError found = difference(at.surface, *model);
-        error.height = std::max(error.height, found.height);
-        error.normal = std::max(error.normal, found.normal);
-        error.height_rms += found.height * found.height;
-        error.normal_rms += found.normal * found.normal;
+        FitError found = difference(at.surface, *model);
+        found.area = table.area(i, j);
+        found.area_within = holds(found, options) ? found.area : 0.0;
+        error.add(found, at.xy);
         points += 1.0;
       }
     }
   }
-  error.height_rms = std::sqrt(error.height_rms / std::max(points, 1.0));
-  error.normal_rms = std::sqrt(error.normal_rms / std::max(points, 1.0));
+  error.divide(std::max(points, 1.0), patch.box.volume());
   return error;
 }
 

@@ -12,6 +12,7 @@
 #include "core/executor.h"
 #include "core/run_control.h"
 #include "core/smooth_surface.h"
+#include "export/picture_goal.h"
 #include "export/sampled_surface.h"
 
 namespace lensforge {
@@ -23,6 +24,18 @@ struct FitError {
   double normal = 0.0;      ///< Largest angle, rad
   double height_rms = 0.0;  ///< Root of the mean square over the parameters
   double normal_rms = 0.0;
+  double area = 0.0;                                    ///< mm², seen from above
+  double area_within = 0.0;                             ///< Where both tolerances hold
+  Eigen::Vector2d height_at = Eigen::Vector2d::Zero();  ///< x, y of the largest ones, mm
+  Eigen::Vector2d normal_at = Eigen::Vector2d::Zero();
+
+  [[nodiscard]] double share_within() const { return area > 0.0 ? area_within / area : 0.0; }
+  /// Takes the other's largest errors where they are larger.
+  void raise(const FitError& other);
+  /// Adds a point's errors, squares for roots of means; divide() ends this, with the points and
+  /// the parameters' area.
+  void add(FitError other, const Eigen::Vector2d& at);
+  void divide(double points, double unit_area);
 };
 
 /// A point of a height field, seen from above, and its height and slopes there.
@@ -104,6 +117,7 @@ struct FitOptions {
   /// Control points of all patches together at most; what bounds the file's size (about 72 bytes
   /// each). 0: four for each vertex of the mesh, kMostControlPoints at most.
   std::int64_t max_control_points = 0;
+  PictureGoal picture;  ///< What a fit that cannot hold the tolerances keeps instead.
 };
 
 /// Height difference and angle between the normals of two surfaces at a point.
@@ -115,14 +129,16 @@ FitError difference(const SurfacePoint& a, const SurfacePoint& b);
 /// before heights, and cuts it into a net of patches. Seen from above its knot lines follow the
 /// vertices of a grid that has moved (GridWarp), so that knots are dense where vertices are. Until
 /// both tolerances hold everywhere, or the control points are used up, the knots are doubled;
-/// net.error() says which tolerances hold.
+/// net.error() says which tolerances hold. Where they do not, heights change until the spline
+/// throws the picture that the model throws (options.picture).
 /// @pre the surface covers its whole box. @throw Interrupted.
 SplineNet fit_spline_net(const SmoothSurface& surface, const FitOptions& options,
                          const Executor& executor, const RunControl& control);
 
 /// Differences between a patch and the surface on a raster of `density` points a knot cell
 /// each way, borders included.
-FitError measure_patch(const SplinePatch& patch, const SmoothSurface& surface, int density);
+FitError measure_patch(const SplinePatch& patch, const SmoothSurface& surface,
+                       const FitOptions& options, int density);
 
 /// The net's surface and its own normals at columns × rows points, evenly over the parameters.
 SampledSurface sampled(const SplineNet& net, const GridShape& shape);

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "design/wanted_picture.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "design/optics/projection.h"
+#include "design/render_lens.h"
+
+namespace lensforge {
+namespace {
+
+/// Between the middles of pixels linearly, as on the border pixel outside of them; zero off the
+/// picture.
+double picture_at(const Image& image, const Eigen::Vector2d& at) {
+  const Eigen::Array2d size(image.columns(), image.rows());
+  if ((at.array() < 0.0).any() || (at.array() > size).any()) return 0.0;
+  const Eigen::Array2d middle = (at.array() - 0.5).max(0.0).min(size - 1.0);
+  const Eigen::Array2i low = middle.floor().cast<int>();
+  const Eigen::Array2i high = (low + 1).min(size.cast<int>() - 1);
+  const Eigen::Array2d share = middle - low.cast<double>();
+  const auto along = [&](int row) {
+    return std::lerp(double{image.at(low.x(), row)}, double{image.at(high.x(), row)}, share.x());
+  };
+  return std::lerp(along(low.y()), along(high.y()), share.y());
+}
+
+/// wanted − thrown; one is an evenly lit picture of `total` flux as large as the lens.
+Image difference(const Image& wanted, const Image& thrown, const OpticalSetup& setup,
+                 double total) {
+  Image image(wanted.columns(), wanted.rows());
+  if (!(total > 0.0)) return image;
+  const double unit = total / static_cast<double>(wanted.values().size()) *
+                      setup.image_size.prod() / setup.lens_size.prod();
+  for (std::size_t i = 0; i < image.values().size(); ++i) {
+    const double missing = double{wanted.values()[i]} - double{thrown.values()[i]};
+    image.values()[i] = static_cast<float>(missing / unit);
+  }
+  return image;
+}
+
+}  // namespace
+
+WantedPicture::WantedPicture(const SurfaceMesh& mesh, const OpticalSetup& setup,
+                             const Image& target, const Executor& executor)
+    : setup_(setup),
+      target_(target),
+      executor_(executor),
+      reach_((setup.ior - 1.0) * (setup.focal_length - mesh.vertices.row(2).mean())) {
+  mae_ = evaluate(mesh, setup, SurfaceModel::kSmooth, target, &wanted_, executor).mae;
+}
+
+WantedPicture::Comparison WantedPicture::compare(const SurfaceMesh& mesh,
+                                                 const Eigen::Matrix3Xd& normals) const {
+  Image thrown;
+  const double mae = evaluate(mesh, normals, setup_, target_, &thrown, executor_).mae;
+  const Image missing = difference(wanted_, thrown, setup_, target_.total());
+  const Projection optics(setup_);
+  Comparison result{mae - mae_, Eigen::VectorXd::Zero(mesh.vertex_count())};
+  parallel_for(executor_, "missing flux", mesh.vertex_count(), [&](std::int64_t v) {
+    const Eigen::Vector3d n = normals.col(v).normalized();
+    if (!optics.transmits(n)) return;
+    const Eigen::Vector2d lands = optics.land(mesh.vertices.col(v), RefractedBeam(n, optics.eta).m);
+    result.missing[v] = picture_at(missing, lands);
+  });
+  return result;
+}
+
+}  // namespace lensforge

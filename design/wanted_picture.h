@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+
+#include "core/executor.h"
+#include "core/image.h"
+#include "core/optical_setup.h"
+#include "core/surface_mesh.h"
+
+namespace lensforge {
+
+/// The picture that a mesh throws by its vertex normals, and what other surfaces' pictures lack of
+/// it.
+class WantedPicture {
+ public:
+  /// Keeps references to all but the mesh. @pre target has setup.pixels columns and rows.
+  WantedPicture(const SurfaceMesh& mesh, const OpticalSetup& setup, const Image& target,
+                const Executor& executor);
+
+  struct Comparison {
+    double excess = 0.0;      ///< MAE against the target above that of the wanted picture.
+    Eigen::VectorXd missing;  ///< Per vertex: wanted − thrown flux where its light lands, between
+                              ///< the pixels' middles linearly, relative to an evenly lit picture.
+  };
+
+  /// Of a smooth surface that is known by its own normals, 3 × V with z > 0.
+  [[nodiscard]] Comparison compare(const SurfaceMesh& mesh, const Eigen::Matrix3Xd& normals) const;
+
+  /// How far light moves on the receiving plane for a unit of slope, mm: to first order.
+  [[nodiscard]] double reach() const { return reach_; }
+
+ private:
+  const OpticalSetup& setup_;
+  const Image& target_;
+  const Executor& executor_;
+  Image wanted_;
+  double mae_ = 0.0;
+  double reach_;
+};
+
+}  // namespace lensforge

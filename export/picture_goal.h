@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+
+#include "export/sampled_surface.h"
+
+namespace lensforge {
+
+/// How far the picture that a surface throws is from the one that it is to throw.
+struct PictureMiss {
+  double excess = 0.0;  ///< By how much its MAE is above that of the wanted picture.
+  /// Per point: flux that is missing where the point's light lands, wanted − thrown, relative to
+  /// an evenly lit picture.
+  Eigen::VectorXd missing;
+};
+
+/// The picture that a fit is to keep; optics is known to who asks for it.
+struct PictureGoal {
+  double reach = 0.0;  ///< mm that light moves on the receiving plane for a slope of 1, > 0.
+  std::function<PictureMiss(const SampledSurface&)> miss;  ///< Empty: no picture is to be kept.
+};
+
+}  // namespace lensforge

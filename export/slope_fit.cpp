@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "export/slope_fit.h"
+
+#include <cmath>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "core/error.h"
+#include "export/spline_net.h"
+
+// The spline's x and y are given first (GridWarp): with knots where vertices are dense, 30,481
+// control points throw the picture of a smooth 128² portrait with MAE 0.0031, where on even knot
+// lines 115,600 give 0.0047. What is then minimised over z is the squared difference of the
+// derivatives by the parameters from those that the vertex-normal model's slopes ask for, which are
+// what throws the picture (for parameters that turn and scale but do not shear this is the
+// difference of the slopes themselves, over the area), plus a little of the heights' own, which
+// pins what slopes leave open. Both are sums over a tensor grid of samples, so that in the basis
+// that diagonalises mass and stiffness of each direction the solution is one division a coefficient
+// (fast diagonalisation, Lynch, Rice and Thomas 1964).
+namespace lensforge {
+namespace {
+
+/// Samples a knot cell each way: three to eight give pictures whose MAE differ by 0.0001.
+constexpr int kSamples = 4;
+
+/// Heights weigh as much as slopes for waves of this many mesh cells. Heights and normals of a
+/// designed mesh contradict each other from cell to cell, and light goes by normals: with 0.5
+/// instead of 16 the picture of a smooth 128² portrait has MAE 0.0082 instead of 0.0056, with 50
+/// it is the same.
+constexpr double kHeightReach = 16.0;
+
+/// Least share of its even area to which the parameters' map may squeeze a place.
+constexpr double kLeastArea = 1e-3;
+
+AxisSamples make_axis(int cells, double length) {
+  std::vector<double> at;
+  for (int i = 0; i < kSamples * cells; ++i) at.push_back((i + 0.5) / kSamples);
+  return {at, cells, length};
+}
+
+SplineGrid make_grid(const std::array<int, 2>& cells, const Eigen::Vector2d& size) {
+  return {make_axis(cells[0], size.x()), make_axis(cells[1], size.y())};
+}
+
+std::array<AxisModes, 2> make_modes(const SplineGrid& grid, const Executor& executor) {
+  std::array<std::optional<AxisModes>, 2> modes;
+  parallel_for(
+      executor, "spline axes", 2,
+      [&](std::int64_t k) { modes[static_cast<std::size_t>(k)].emplace(k == 0 ? grid.u : grid.v); },
+      1);
+  return {std::move(*modes[0]), std::move(*modes[1])};
+}
+
+}  // namespace
+
+double mesh_cell(const SmoothSurface& surface) {
+  return std::sqrt(2.0 * surface.box().volume() /
+                   static_cast<double>(surface.mesh().triangle_count()));
+}
+
+SurfacePoint model_near(const SmoothSurface& surface, const Eigen::Vector2d& xy) {
+  const Eigen::Vector2d inside = nearest_inside(surface.box(), xy);
+  const auto point = surface.model_at(inside);
+  LF_CHECK(point.has_value(), std::to_string(inside.x()) + ", " + std::to_string(inside.y()));
+  return *point;
+}
+
+SlopeFit::SlopeFit(const SmoothSurface& surface, const GridWarp& warp,
+                   const std::array<int, 2>& cells, const Executor& executor,
+                   const RunControl& control)
+    : surface_(surface),
+      executor_(executor),
+      control_(control),
+      grid_(make_grid(cells, surface.box().sizes())),
+      modes_(make_modes(grid_, executor)),
+      plan_(make_plan(warp)),
+      height_weight_(std::pow(kHeightReach * mesh_cell(surface), -2.0)) {}
+
+/// As much of the vertices' movement as can be followed without a fold.
+SplinePlan SlopeFit::make_plan(const GridWarp& warp) const {
+  for (double share = 1.0; share > 0.0; share -= 0.25) {
+    SplinePlan plan = warp.control_points(grid_.u.cells, grid_.v.cells, share);
+    if (least_area(plan) > kLeastArea) return plan;
+  }
+  return warp.control_points(grid_.u.cells, grid_.v.cells, 0.0);
+}
+
+/// Over all samples.
+double SlopeFit::least_area(const SplinePlan& plan) const {
+  Eigen::VectorXd least(grid_.u.values.rows());
+  parallel_for(executor_, "spline plan", least.size(), [&](std::int64_t i) {
+    const PlanLine line = grid_.plan_line(plan, i);
+    const Eigen::ArrayXd area = line.by_u.row(0).array() * line.by_v.row(1).array() -
+                                line.by_u.row(1).array() * line.by_v.row(0).array();
+    least[i] = area.minCoeff();
+  });
+  return least.minCoeff();
+}
+
+Eigen::MatrixXd SlopeFit::solve() const {
+  const auto wanted_along = [&](std::int64_t i) {
+    const PlanLine line = grid_.plan_line(plan_, i);
+    Eigen::MatrixX3d wanted = Eigen::MatrixX3d::Zero(line.xy.cols(), 3);
+    if (control_.stop_requested()) return wanted;
+    for (Eigen::Index j = 0; j < wanted.rows(); ++j) {
+      const SurfacePoint p = model_near(surface_, line.xy.col(j));
+      wanted.row(j) << p.slope.dot(line.by_u.col(j)), p.slope.dot(line.by_v.col(j)),
+          height_weight_ * p.z;
+    }
+    return wanted;
+  };
+  const Eigen::MatrixXd moments = grid_.moments(executor_, wanted_along);
+  if (control_.stop_requested()) throw Interrupted();
+  return heights_of(moments);
+}
+
+Eigen::MatrixXd SlopeFit::heights_of(const Eigen::MatrixXd& moments) const {
+  const auto& [u, v] = modes_;
+  Eigen::MatrixXd amount = u.modes.transpose() * moments * v.modes;
+  for (Eigen::Index j = 0; j < amount.cols(); ++j) {
+    amount.col(j).array() /= u.stiffness.array() + (v.stiffness[j] + height_weight_);
+  }
+  return u.modes * amount * v.modes.transpose();
+}
+
+}  // namespace lensforge

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+
+#include "core/executor.h"
+#include "core/run_control.h"
+#include "core/smooth_surface.h"
+#include "export/grid_warp.h"
+#include "export/spline_grid.h"
+
+namespace lensforge {
+
+/// Side of a square as large as two triangles of the surface's mesh, mm.
+double mesh_cell(const SmoothSurface& surface);
+
+/// The vertex-normal model's height and slopes, at the nearest point of the surface's box.
+SurfacePoint model_near(const SmoothSurface& surface, const Eigen::Vector2d& xy);
+
+/// Heights of one spline over a surface's whole rectangle by least squares, all parameters alike.
+class SlopeFit {
+ public:
+  /// Keeps references. @param cells  knot cells along u and v, ≥ 1.
+  SlopeFit(const SmoothSurface& surface, const GridWarp& warp, const std::array<int, 2>& cells,
+           const Executor& executor, const RunControl& control);
+
+  /// Coefficients of z, mm. @throw Interrupted.
+  [[nodiscard]] Eigen::MatrixXd solve() const;
+
+  /// The coefficients that have these moments: what solve() ends with.
+  [[nodiscard]] Eigen::MatrixXd heights_of(const Eigen::MatrixXd& moments) const;
+
+  [[nodiscard]] const SmoothSurface& surface() const { return surface_; }
+  [[nodiscard]] const SplinePlan& plan() const { return plan_; }
+  [[nodiscard]] const SplineGrid& grid() const { return grid_; }
+  /// What a squared height counts beside a squared slope, 1/mm².
+  [[nodiscard]] double height_weight() const { return height_weight_; }
+
+ private:
+  [[nodiscard]] SplinePlan make_plan(const GridWarp& warp) const;
+  [[nodiscard]] double least_area(const SplinePlan& plan) const;
+
+  const SmoothSurface& surface_;
+  const Executor& executor_;
+  const RunControl& control_;
+  SplineGrid grid_;
+  std::array<AxisModes, 2> modes_;
+  SplinePlan plan_;
+  double height_weight_;
+};
+
+}  // namespace lensforge
