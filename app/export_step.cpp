@@ -17,6 +17,7 @@
 #include "design/wanted_picture.h"
 #include "export/closed_solid.h"
 #include "export/iges_file.h"
+#include "export/normal_bound.h"
 #include "machine/stream/job_identity.h"
 
 namespace lensforge::app {
@@ -100,6 +101,16 @@ void describe_fit(const SplineNet& net, const FitOptions& fit, StepReport& repor
                  scientific(error.normal_rms) + " rad\n";
 }
 
+void describe_bound(const SmoothSurface& surface, const FitOptions& fit, StepReport& report) {
+  const NormalBound bound = normal_bound(surface, fit.normal_tolerance);
+  report.json["least_possible_normal_error_rad"] = bound.largest;
+  report.json["share_no_surface_can_hold"] = bound.share_above;
+  report.text +=
+      "  possible  normals of the mesh contradict each other: " + scientific(bound.largest) +
+      " rad off at least at " + place_text(bound.at) + "; on " +
+      fixed(100.0 * bound.share_above, 1) + " % of the area no surface holds the limit\n";
+}
+
 void describe_solid(const SolidContent& content, const Lens& lens, const std::string& name,
                     StepReport& report) {
   const double facets = enclosed_volume(closed_solid(lens.surface, name));
@@ -175,13 +186,15 @@ StepReport export_step(const Lens& lens, const fs::path& source, const fs::path&
   const Executor executor = options.executor();
   const WantedPicture wanted(lens.surface, lens.setup, lens.target, executor);
   fit.picture = goal_of(wanted);
-  const SplineNet net = fit_spline_net(SmoothSurface(lens.surface), fit, executor, control);
+  const SmoothSurface surface(lens.surface);
+  const SplineNet net = fit_spline_net(surface, fit, executor, control);
   const StepHeader header = header_of(source, arguments.author);
   const SolidContent content = arguments.iges ? write_iges(net, header, out)
                                               : write_step(net, header, arguments.schema, out);
   StepReport report;
   describe_solid(content, lens, name, report);
   describe_fit(net, fit, report);
+  describe_bound(surface, fit, report);
   describe_picture(net, lens, executor, report);
   return report;
 }

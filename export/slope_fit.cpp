@@ -75,6 +75,7 @@ SlopeFit::SlopeFit(const SmoothSurface& surface, const GridWarp& warp,
       grid_(make_grid(cells, surface.box().sizes())),
       modes_(make_modes(grid_, executor)),
       plan_(make_plan(warp)),
+      areas_(area_moments()),
       height_weight_(std::pow(kHeightReach * mesh_cell(surface), -2.0)) {}
 
 /// As much of the vertices' movement as can be followed without a fold.
@@ -99,20 +100,41 @@ double SlopeFit::least_area(const SplinePlan& plan) const {
 }
 
 Eigen::MatrixXd SlopeFit::solve() const {
+  Eigen::VectorXd volumes(grid_.u.values.rows());
   const auto wanted_along = [&](std::int64_t i) {
     const PlanLine line = grid_.plan_line(plan_, i);
     Eigen::MatrixX3d wanted = Eigen::MatrixX3d::Zero(line.xy.cols(), 3);
+    volumes[i] = 0.0;
     if (control_.stop_requested()) return wanted;
     for (Eigen::Index j = 0; j < wanted.rows(); ++j) {
       const SurfacePoint p = model_near(surface_, line.xy.col(j));
       wanted.row(j) << p.slope.dot(line.by_u.col(j)), p.slope.dot(line.by_v.col(j)),
           height_weight_ * p.z;
+      volumes[i] += p.z * line.derivative(j).determinant();
     }
     return wanted;
   };
   const Eigen::MatrixXd moments = grid_.moments(executor_, wanted_along);
   if (control_.stop_requested()) throw Interrupted();
-  return heights_of(moments);
+  const Eigen::MatrixXd heights = heights_of(moments);
+  const double missing = volumes.sum() - heights.cwiseProduct(areas_).sum();
+  return heights.array() + missing / areas_.sum();
+}
+
+/// Of the samples' areas: what a height says of the volume.
+Eigen::MatrixXd SlopeFit::area_moments() const {
+  return grid_.moments(executor_, [&](std::int64_t i) {
+    const PlanLine line = grid_.plan_line(plan_, i);
+    Eigen::MatrixX3d areas = Eigen::MatrixX3d::Zero(line.xy.cols(), 3);
+    for (Eigen::Index j = 0; j < areas.rows(); ++j) {
+      areas(j, 2) = line.derivative(j).determinant();
+    }
+    return areas;
+  });
+}
+
+Eigen::MatrixXd SlopeFit::without_volume(const Eigen::MatrixXd& change) const {
+  return change.array() - change.cwiseProduct(areas_).sum() / areas_.sum();
 }
 
 Eigen::MatrixXd SlopeFit::heights_of(const Eigen::MatrixXd& moments) const {

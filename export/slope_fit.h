@@ -25,11 +25,14 @@ class SlopeFit {
   SlopeFit(const SmoothSurface& surface, const GridWarp& warp, const std::array<int, 2>& cells,
            const Executor& executor, const RunControl& control);
 
-  /// Coefficients of z, mm. @throw Interrupted.
+  /// Coefficients of z, mm, with the surface's volume. @throw Interrupted.
   [[nodiscard]] Eigen::MatrixXd solve() const;
 
   /// The coefficients that have these moments: what solve() ends with.
   [[nodiscard]] Eigen::MatrixXd heights_of(const Eigen::MatrixXd& moments) const;
+
+  /// A change of heights less the constant that would change the volume.
+  [[nodiscard]] Eigen::MatrixXd without_volume(const Eigen::MatrixXd& change) const;
 
   [[nodiscard]] const SmoothSurface& surface() const { return surface_; }
   [[nodiscard]] const SplinePlan& plan() const { return plan_; }
@@ -40,6 +43,7 @@ class SlopeFit {
  private:
   [[nodiscard]] SplinePlan make_plan(const GridWarp& warp) const;
   [[nodiscard]] double least_area(const SplinePlan& plan) const;
+  [[nodiscard]] Eigen::MatrixXd area_moments() const;
 
   const SmoothSurface& surface_;
   const Executor& executor_;
@@ -47,6 +51,7 @@ class SlopeFit {
   SplineGrid grid_;
   std::array<AxisModes, 2> modes_;
   SplinePlan plan_;
+  Eigen::MatrixXd areas_;
   double height_weight_;
 };
 

@@ -13,6 +13,7 @@
 #include <STEPControl_Controller.hxx>
 #include <STEPControl_Writer.hxx>
 #include <TopoDS_Compound.hxx>
+#include <cstdlib>
 
 #include "core/error.h"
 #include "core/temp_folder.h"
@@ -76,14 +77,16 @@ TEST_F(SolidSurfaceOf, InchesBecomeMillimetres) {
   EXPECT_NEAR(read().samples.mesh.vertices.row(0).maxCoeff(), 12.0, 0.8);
 }
 
-TEST_F(SolidSurfaceOf, OurOwnFileIsFoundByNameAndIsTheNet) {
+SplineNet written_net(const std::filesystem::path& path) {
   FitOptions options;
   options.max_control_points = 3000;
-  const SplineNet net =
+  SplineNet net =
       fit_spline_net(SmoothSurface(smooth_lens(71)), options, Executor::serial(), RunControl());
-  write_step(net, {"lens", "", "", "lensforge", "2020-02-02T02:02:02"}, StepSchema::kAp214, path_);
-  const SolidSurface surface = read(5000);
-  EXPECT_TRUE(surface.by_name);
+  write_step(net, {"lens", "", "", "lensforge", "2020-02-02T02:02:02"}, StepSchema::kAp214, path);
+  return net;
+}
+
+void expect_surface_is(const SplineNet& net, const SolidSurface& surface) {
   EXPECT_EQ(surface.faces, static_cast<int>(net.patches.size()));
   for (Eigen::Index v = 0; v < surface.samples.mesh.vertex_count(); ++v) {
     const Eigen::Vector3d p = surface.samples.mesh.vertices.col(v);
@@ -94,6 +97,31 @@ TEST_F(SolidSurfaceOf, OurOwnFileIsFoundByNameAndIsTheNet) {
     const Eigen::Vector3d normal(-point.slope.x(), -point.slope.y(), 1.0);
     EXPECT_LT((surface.samples.normals.col(v).normalized() - normal.normalized()).norm(), 1e-6);
   }
+}
+
+TEST_F(SolidSurfaceOf, OurOwnFileIsFoundByNameAndIsTheNet) {
+  const SplineNet net = written_net(path_);
+  const SolidSurface surface = read(5000);
+  EXPECT_TRUE(surface.by_name);
+  expect_surface_is(net, surface);
+}
+
+/// Another program's file: FreeCAD reads ours and writes it anew.
+TEST_F(SolidSurfaceOf, WhatFreeCadWritesAnewIsStillTheNet) {
+  if (std::system("command -v freecadcmd > /dev/null") != 0) {
+    GTEST_SKIP() << "freecadcmd is not installed";
+  }
+  const SplineNet net = written_net(folder_ / "lens.step");
+  write_bytes(folder_ / "anew.py", R"(import Part
+s = Part.Shape()
+s.read("lens.step")
+s.exportStep("solid.step")
+)");
+  const std::string command =
+      "cd '" + folder_.path().string() + "' && freecadcmd anew.py < /dev/null > freecad.log 2>&1";
+  ASSERT_EQ(std::system(command.c_str()), 0);
+  EXPECT_THAT(read_bytes(path_), HasSubstr("FreeCAD"));
+  expect_surface_is(net, read(5000));
 }
 
 TEST_F(SolidSurfaceOf, BoxShowsItsTop) {

@@ -6,9 +6,12 @@
 #include <random>
 
 #include "design/design_lens.h"
+#include "design/render_lens.h"
+#include "design/wanted_picture.h"
 #include "export/closed_solid.h"
 #include "export/cubic_spline.h"
 #include "export/grid_warp.h"
+#include "export/normal_bound.h"
 #include "export/sample_surfaces.h"
 #include "fixtures/scenes.h"
 
@@ -167,6 +170,47 @@ TEST(SplineNet, FollowsNormalsAsWellAsTheSmoothSurface) {
   EXPECT_LT(of_net, of_surface);
 }
 
+/// A design whose normals contradict each other, as those of all smooth designs do.
+Lens smooth_design() {
+  DesignOptions options;
+  options.pixels = 40;
+  options.rounds = 1;
+  options.iterations = 60;
+  options.model = SurfaceModel::kSmooth;
+  DesignResult design =
+      design_lens(fixtures::draw_portrait(80), options, Executor::cpu(2), RunControl());
+  EXPECT_EQ(design.status, DesignResult::Status::kDone) << design.message;
+  return std::move(design.lens);
+}
+
+/// MAE of the net's picture, rendered from other points than the fit took.
+double picture_error(const SplineNet& net, const Lens& lens) {
+  const SampledSurface solid = sampled(net, {413, 477});
+  return evaluate(solid.mesh, solid.normals, lens.setup, lens.target, nullptr, Executor::cpu(2))
+      .mae;
+}
+
+/// Round trip: what the mesh's normals throw, the splines throw to 1e-4, which the fit of slopes
+/// alone misses.
+TEST(SplineNet, KeepsThePictureThatNoSurfaceHasTheNormalsFor) {
+  const Lens lens = smooth_design();
+  const Executor executor = Executor::cpu(2);
+  const SmoothSurface surface(lens.surface);
+  const double wanted =
+      evaluate(lens.surface, lens.setup, SurfaceModel::kSmooth, lens.target, nullptr, executor).mae;
+  EXPECT_GT(picture_error(fitted(surface), lens), wanted + 2e-4);
+  const WantedPicture picture(lens.surface, lens.setup, lens.target, executor);
+  FitOptions options;
+  options.picture = {picture.reach(), [&](const SampledSurface& solid) {
+                       auto found = picture.compare(solid.mesh, solid.normals);
+                       return PictureMiss{found.excess, std::move(found.missing)};
+                     }};
+  const SplineNet net = fit_spline_net(surface, options, executor, RunControl());
+  EXPECT_LT(picture_error(net, lens), wanted + 1e-4);
+  const SplineNet serial = fit_spline_net(surface, options, Executor::serial(), RunControl());
+  EXPECT_EQ(net.patches.back().coefficients, serial.patches.back().coefficients);
+}
+
 /// The same surface and as many control points: knots that follow the crowded vertices are nearer
 /// to the model than even ones.
 TEST(SplineNet, KnotsAreDenseWhereVerticesAre) {
@@ -205,6 +249,42 @@ TEST(GridWarp, ControlPointsKeepTheBordersAndNeverFoldARowOfVertices) {
   for (Eigen::Index i = 1; i < x.rows(); ++i) {
     EXPECT_GT((x.row(i) - x.row(i - 1)).minCoeff(), 0.0);
   }
+}
+
+/// Closed forms: a plane's slopes and, at its inner vertices, a paraboloid's agree with a surface;
+/// moving vertices at random makes normals contradict each other, which no number of knots mends.
+TEST(NormalBound, IsNothingForSurfacesAndBelowEveryFit) {
+  const auto plane = [](double x, double y) { return 5.0 + 0.1 * x - 0.05 * y; };
+  const SmoothSurface flat(surface_of({30.0, 24.0}, {31, 29}, plane));
+  EXPECT_LT(normal_bound(flat, 1e-4).largest, 1e-12);
+  EXPECT_EQ(normal_bound(flat, 1e-4).share_above, 0.0);
+  for (const SurfaceMesh& mesh : {noisy_lens(), creased_lens(), crowded_lens()}) {
+    const SmoothSurface surface(mesh);
+    const NormalBound bound = normal_bound(surface, 1e-4);
+    EXPECT_GT(bound.largest, 0.0);
+    for (const std::int64_t points : {3000, 12000}) {
+      const FitError error = fitted(surface, points).error();
+      EXPECT_GE(error.normal, bound.largest);
+      EXPECT_GE(error.area - error.area_within, 0.0);
+      EXPECT_NEAR(error.area, surface.box().volume(), 0.01 * surface.box().volume());
+    }
+  }
+  EXPECT_GT(normal_bound(SmoothSurface(noisy_lens()), 1e-4).share_above, 0.5);
+}
+
+/// Where the certificate says that errors are largest, they are about so large.
+TEST(SplineNet, TellsWhereTheWorstPlacesAre) {
+  const SmoothSurface surface(creased_lens());
+  const SplineNet net = fitted(surface, 3000);
+  const FitError error = net.error();
+  const auto uv = net.parameters_of(error.normal_at, error.normal_at);
+  ASSERT_TRUE(uv);
+  const auto model = surface.model_at(error.normal_at);
+  ASSERT_TRUE(model);
+  const FitError there = difference(net.at(*uv).surface, *model);
+  EXPECT_NEAR(there.normal * kCertificateMargin, error.normal, 1e-6);
+  EXPECT_LT(error.share_within(), 0.999);
+  EXPECT_GT(error.share_within(), 0.001);
 }
 
 TEST(SplineNet, ErrorFallsWithTheKnots) {

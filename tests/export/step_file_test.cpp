@@ -34,6 +34,37 @@ class StepFile : public ::testing::Test {
   std::filesystem::path path_ = folder_ / "lens.step";
 };
 
+/// Below the smooth surface: cubics over the thirds of triangles, for which Stroud's rule of four
+/// points is exact.
+double volume_below(const SmoothSurface& surface) {
+  const Eigen::Vector3d middle = Eigen::Vector3d::Constant(1.0 / 3.0);
+  double volume = 0.0;
+  for (Eigen::Index t = 0; t < surface.mesh().triangle_count(); ++t) {
+    const Eigen::Vector3d a = surface.mesh().corner(t, 1) - surface.mesh().corner(t, 0);
+    const Eigen::Vector3d b = surface.mesh().corner(t, 2) - surface.mesh().corner(t, 0);
+    double mean = 0.0;
+    for (int k = 0; k < 3; ++k) {
+      const std::array<Eigen::Vector3d, 3> corner{Eigen::Vector3d::Unit(k),
+                                                  Eigen::Vector3d::Unit((k + 1) % 3), middle};
+      const Eigen::Vector3d center = (corner[0] + corner[1] + corner[2]) / 3.0;
+      mean -= 27.0 / 48.0 / 3.0 * surface.in_triangle(t, center).z;
+      for (const Eigen::Vector3d& c : corner) {
+        mean += 25.0 / 48.0 / 3.0 * surface.in_triangle(t, 0.4 * c + 0.6 * center).z;
+      }
+    }
+    volume += 0.5 * a.cross(b).z() * mean;
+  }
+  return volume;
+}
+
+/// Facets have another volume than the smooth surface through them; the solid has the latter's.
+TEST_F(StepFile, HasTheVolumeBelowTheSmoothSurface) {
+  for (const SurfaceMesh& mesh : {smooth_lens(71), creased_lens(), noisy_lens(), crowded_lens()}) {
+    const double volume = volume_below(SmoothSurface(mesh));
+    EXPECT_NEAR(write(fitted(mesh)).volume, volume, 1e-6 * volume);
+  }
+}
+
 TEST_F(StepFile, ReadsBackAsOneClosedSolidOfTheSameVolume) {
   for (const SurfaceMesh& mesh : {smooth_lens(71), creased_lens(), noisy_lens()}) {
     const SplineNet net = fitted(mesh);

@@ -47,6 +47,9 @@ TEST_F(Export, StepIsOneSolidWithACertificateForEveryPatch) {
   const nlohmann::json result = outcome.json();
   EXPECT_FALSE(result["within_tolerance"]);
   EXPECT_GT(result["normal_error_rad"], 1e-4);
+  EXPECT_GE(result["normal_error_rad"], result["least_possible_normal_error_rad"]);
+  EXPECT_LT(result["share_within_tolerance"], 1.0);
+  EXPECT_LE(result["worst_normal_at_mm"][0], 100.0);
   EXPECT_EQ(result["faces"], result["patches"].size() + 5);
   for (const nlohmann::json& patch : result["patches"]) {
     EXPECT_LE(patch["height_error_mm"], result["height_error_mm"]);
@@ -75,6 +78,7 @@ TEST_F(Export, RenderedStepFileIsThePictureThatExportPrinted) {
   EXPECT_THAT(outcome.err, HasSubstr("optical surface"));
   const double printed = written["metrics"]["solid"]["mae"];
   EXPECT_NEAR(rendered["metrics"]["smooth"]["mae"].get<double>(), printed, 1e-4);
+  EXPECT_LE(printed, written["metrics"]["smooth"]["mae"].get<double>() + 1e-4);
 }
 
 TEST_F(Export, IgesIsOneSolid) {
