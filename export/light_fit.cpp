@@ -52,6 +52,7 @@ constexpr double kMostPerCell = 3.0;
 
 AxisSamples make_points(int cells, int per_cell, double length) {
   std::vector<double> at;
+  at.reserve(static_cast<std::size_t>(cells) * static_cast<std::size_t>(per_cell) + 1);
   for (int i = 0; i <= cells * per_cell; ++i) at.push_back(static_cast<double>(i) / per_cell);
   return {at, cells, length};
 }

@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "core/error.h"
 #include "export/spline_net.h"
@@ -34,8 +35,8 @@ constexpr double kHeightReach = 16.0;
 constexpr double kLeastArea = 1e-3;
 
 AxisSamples make_axis(int cells, double length) {
-  std::vector<double> at;
-  for (int i = 0; i < kSamples * cells; ++i) at.push_back((i + 0.5) / kSamples);
+  std::vector<double> at(static_cast<std::size_t>(kSamples) * static_cast<std::size_t>(cells));
+  for (std::size_t i = 0; i < at.size(); ++i) at[i] = (static_cast<double>(i) + 0.5) / kSamples;
   return {at, cells, length};
 }
 
