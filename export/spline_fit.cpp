@@ -111,6 +111,8 @@ class NetFitter {
                                                heights.unaryExpr(&rounded_height)};
     std::vector<Eigen::MatrixXd> onto_u;
     std::vector<Eigen::MatrixXd> onto_v;
+    onto_u.reserve(static_cast<std::size_t>(net_.columns));
+    onto_v.reserve(static_cast<std::size_t>(net_.rows));
     for (int c = 0; c < net_.columns; ++c) {
       onto_u.push_back(restriction(cells * net_.columns, cells * c, cells * (c + 1)));
     }
