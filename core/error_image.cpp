@@ -4,12 +4,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <cstdio>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "core/error.h"
+#include "core/trimmed_decimal.h"
 
 namespace lensforge {
 namespace {
@@ -127,14 +127,6 @@ int enlargement(int columns, int rows) {
   return std::max(1, std::min(wanted, kLongerSide / std::max(columns, rows)));
 }
 
-std::string label(double value) {
-  std::array<char, 16> text{};
-  const int length = std::snprintf(text.data(), text.size(), "%.5f", value);
-  std::string_view digits(text.data(), static_cast<std::size_t>(length));
-  digits = digits.substr(0, digits.find_last_not_of('0') + 1);
-  return std::string(digits.ends_with('.') ? digits.substr(0, digits.size() - 1) : digits);
-}
-
 /// The colour bar from row `top` down over `height` rows, its labels to the right.
 void draw_legend(Canvas& canvas, int left, int top, int height, const Scale& scale) {
   canvas.fill(left - 1, top - 1, kBarWidth + 2, height + 2, kInk);
@@ -148,7 +140,7 @@ void draw_legend(Canvas& canvas, int left, int top, int height, const Scale& sca
     canvas.fill(left + kBarWidth, row, kMargin / 2, 1, kInk);
     const bool above = tick == kTicks && scale.exceeded;
     canvas.write(left + kBarWidth + kMargin, row - kGlyphRows * kFontScale / 2,
-                 std::string(above ? ">" : "").append(label(share * scale.top)));
+                 std::string(above ? ">" : "").append(trimmed_decimal(share * scale.top, 5)));
   }
 }
 

@@ -9,6 +9,7 @@
 #include <system_error>
 
 #include "core/error.h"
+#include "core/number_text.h"
 
 namespace lensforge {
 namespace {
@@ -26,12 +27,6 @@ std::string shown(const toml::node* value) {
     if constexpr (!toml::is_table<decltype(node)> && !toml::is_array<decltype(node)>) text << node;
   });
   return text.str().substr(0, kLongestText);
-}
-
-std::string number_text(double value) {
-  std::ostringstream text;
-  text << value;
-  return text.str();
 }
 
 std::string range_text(const NumberRule& rule) {
