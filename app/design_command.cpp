@@ -29,10 +29,7 @@ namespace fs = std::filesystem;
 
 constexpr int kLeastPixels = 4;  ///< Of the picture's longer side.
 
-/// The smooth model is the default because it makes the better part (README).
 struct DesignArguments {
-  DesignArguments() { design.model = SurfaceModel::kSmooth; }
-
   std::string target;
   std::string out;
   DesignOptions design;

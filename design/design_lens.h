@@ -40,8 +40,8 @@ struct DesignOptions {
   /// the heights is nearer than they lead (128² portrait, two rounds, facet MAE: 0.0048 with none,
   /// 0.0059 with 50).
   int update_iterations = 0;
-  int iterations = 100;                       ///< Most L-BFGS iterations of one round, ≥ 1.
-  SurfaceModel model = SurfaceModel::kFacet;  ///< What is optimised.
+  int iterations = 100;                        ///< Most L-BFGS iterations of one round, ≥ 1.
+  SurfaceModel model = SurfaceModel::kSmooth;  ///< What is optimised; smooth makes the better part.
   ViewSide view = ViewSide::kFront;
   ObjectiveWeights weights;
   /// File that takes a checkpoint after every round; none is written if empty.

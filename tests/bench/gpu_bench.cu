@@ -147,6 +147,7 @@ void print_kernels(const GpuRates& rates) {
 
 void design(const Image& picture, const char* name) {
   DesignOptions options;
+  options.model = SurfaceModel::kFacet;
   options.pixels = picture.columns();
   const double begin = now();
   const DesignResult result = design_lens(picture, options, gpu(), {});

@@ -187,7 +187,7 @@ TEST(DesignFingerprint, ChangesWithEverythingThatShapesTheResult) {
                                     [](DesignOptions& o) { o.rendering_guided = false; },
                                     [](DesignOptions& o) { o.spread = 0.4; },
                                     [](DesignOptions& o) { o.update_iterations = 7; },
-                                    [](DesignOptions& o) { o.model = SurfaceModel::kSmooth; },
+                                    [](DesignOptions& o) { o.model = SurfaceModel::kFacet; },
                                     [](DesignOptions& o) { o.view = ViewSide::kRear; },
                                     [](DesignOptions& o) { o.weights.image = 1.0; },
                                     [](DesignOptions& o) { o.weights.gradient = 1.0; },

@@ -31,6 +31,7 @@ using Status = DesignResult::Status;
 /// Small enough for a fraction of a second.
 DesignOptions small_options() {
   DesignOptions options;
+  options.model = SurfaceModel::kFacet;
   options.pixels = 28;
   options.rounds = 3;
   options.iterations = 5;
@@ -426,6 +427,7 @@ TEST(DesignLens, BlackRegionsAreNoObstacle) {
 TEST(DesignLens, PureBlackStaysBlack) {
   const Image logo = testing::logo_picture(64);
   DesignOptions options;
+  options.model = SurfaceModel::kFacet;
   options.pixels = 64;
   options.rounds = 1;
   const DesignResult result = design_lens(logo, options, Executor::cpu(2), RunControl());

@@ -136,6 +136,7 @@ TEST(SplineNet, CertificateHoldsBetweenItsPoints) {
 /// Creases, moved vertices, a rectangle (3:2) and a square, both models.
 TEST(SplineNet, CertificateHoldsOnDesignsOfFixtures) {
   DesignOptions options;
+  options.model = SurfaceModel::kFacet;
   options.pixels = 32;
   options.rounds = 1;
   options.iterations = 20;
