@@ -23,13 +23,22 @@ Eigen::Vector3d turned_away(Random& random, const Eigen::Vector3d& n, double ang
   return std::cos(angle) * n + std::sin(angle) * sideways;
 }
 
+struct Ray {
+  double eta;
+  Eigen::Vector3d normal;
+  Eigen::Vector3d direction;  ///< Less than the critical angle away from the normal.
+};
+
+Ray random_ray(Random& random) {
+  const double eta = random.between(1.01, 2.5);
+  const Eigen::Vector3d n = random.near_z(std::numbers::pi);
+  return {eta, n, turned_away(random, n, random.between(0.0, 0.99 * std::asin(1 / eta)))};
+}
+
 TEST(Refraction, FollowsSnellsLaw) {
   Random random(1);
   for (int i = 0; i < 5000; ++i) {
-    const double eta = random.between(1.01, 2.5);
-    const Eigen::Vector3d n = random.near_z(std::numbers::pi);
-    const Eigen::Vector3d a =
-        turned_away(random, n, random.between(0.0, 0.99 * std::asin(1 / eta)));
+    const auto [eta, n, a] = random_ray(random);
     const Eigen::Vector3d b = refract(a, n, eta);
     EXPECT_NEAR(n.cross(b).norm(), eta * n.cross(a).norm(), 1e-14);
     EXPECT_LT((b - testing::refract_by_angles(a, n, eta)).norm(), 1e-14);
@@ -39,10 +48,7 @@ TEST(Refraction, FollowsSnellsLaw) {
 TEST(Refraction, KeepsUnitLengthPlaneAndDirectionOfTravel) {
   Random random(2);
   for (int i = 0; i < 5000; ++i) {
-    const double eta = random.between(1.01, 2.5);
-    const Eigen::Vector3d n = random.near_z(std::numbers::pi);
-    const Eigen::Vector3d a =
-        turned_away(random, n, random.between(0.0, 0.99 * std::asin(1 / eta)));
+    const auto [eta, n, a] = random_ray(random);
     const Eigen::Vector3d b = refract(a, n, eta);
     EXPECT_NEAR(b.norm(), 1.0, 1e-14);
     EXPECT_NEAR(b.dot(n.cross(a)), 0.0, 1e-14);
