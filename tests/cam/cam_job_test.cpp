@@ -23,20 +23,10 @@ namespace {
 using lensforge::testing::FullDisk;
 using lensforge::testing::message_of;
 using lensforge::testing::read_bytes;
+using lensforge::testing::small_lens;
 using lensforge::testing::TempFolder;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
-
-Lens small_lens(double width = 3.0, double height = 2.0) {
-  Lens lens;
-  lens.setup.lens_size = {width, height};
-  lens.setup.image_size = {width, height};
-  lens.setup.pixels = {12, 8};
-  lens.setup.focal_length = 12.0;
-  lens.surface = testing::grid_mesh(21, 17, width, height, testing::lens_relief);
-  lens.target = Image(12, 8, 1.0F);
-  return lens;
-}
 
 /// Coarse enough for a test, with everything that a cut has.
 CamOptions coarse() {

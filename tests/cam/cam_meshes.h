@@ -7,7 +7,8 @@
 #include <functional>
 #include <numbers>
 
-#include "core/surface_mesh.h"
+#include "core/lens.h"
+#include "core/test_meshes.h"
 
 namespace lensforge::testing {
 
@@ -18,23 +19,12 @@ using HeightFunction = std::function<double(double, double)>;
 /// split along the same diagonal.
 inline SurfaceMesh grid_mesh(int columns, int rows, double width, double height,
                              const HeightFunction& z) {
-  SurfaceMesh mesh;
-  mesh.grid = {columns, rows};
-  mesh.vertices.resize(3, std::int64_t{columns} * rows);
+  SurfaceMesh mesh = grid_mesh(columns, rows);
   for (int r = 0; r < rows; ++r) {
     for (int c = 0; c < columns; ++c) {
       const double x = width * c / (columns - 1);
       const double y = height * r / (rows - 1);
       mesh.vertices.col(std::int64_t{r} * columns + c) << x, y, z(x, y);
-    }
-  }
-  mesh.triangles.resize(3, std::int64_t{2} * (columns - 1) * (rows - 1));
-  std::int64_t t = 0;
-  for (int r = 0; r + 1 < rows; ++r) {
-    for (int c = 0; c + 1 < columns; ++c) {
-      const int v = r * columns + c;
-      mesh.triangles.col(t++) << v, v + 1, v + columns + 1;
-      mesh.triangles.col(t++) << v, v + columns + 1, v + columns;
     }
   }
   return mesh;
@@ -50,6 +40,18 @@ inline double lens_relief(double x, double y) {
   const double crease_a = std::abs(std::remainder(x + 0.3 * y, 12.5)) * 0.05;
   const double crease_b = std::abs(std::remainder(y - 0.2 * x, 17.0)) * 0.04;
   return 6.0 + waves + crease_a + crease_b;
+}
+
+/// A lens of that relief, its light on a wall of its own size 12 mm away; an even grey is wanted.
+inline Lens small_lens(double width = 3.0, double height = 2.0) {
+  Lens lens;
+  lens.setup.lens_size = {width, height};
+  lens.setup.image_size = {width, height};
+  lens.setup.pixels = {12, 8};
+  lens.setup.focal_length = 12.0;
+  lens.surface = grid_mesh(21, 17, width, height, lens_relief);
+  lens.target = Image(12, 8, 1.0F);
+  return lens;
 }
 
 }  // namespace lensforge::testing

@@ -18,19 +18,9 @@ namespace {
 
 using lensforge::testing::message_of;
 using lensforge::testing::read_bytes;
+using lensforge::testing::small_lens;
 using lensforge::testing::TempFolder;
 using ::testing::HasSubstr;
-
-Lens small_lens() {
-  Lens lens;
-  lens.setup.lens_size = {3.0, 2.0};
-  lens.setup.image_size = {3.0, 2.0};
-  lens.setup.pixels = {12, 8};
-  lens.setup.focal_length = 12.0;
-  lens.surface = testing::grid_mesh(21, 17, 3.0, 2.0, testing::lens_relief);
-  lens.target = Image(12, 8, 1.0F);
-  return lens;
-}
 
 CamOptions coarse() {
   CamOptions options;

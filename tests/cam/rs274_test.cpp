@@ -26,8 +26,6 @@ class Rs274 : public ::testing::Test {
                       "tests/cam/fetch_rs274.sh build/rs274";
     }
     rs274_ = *found;
-    lens_.setup.lens_size = {2.0, 1.5};
-    lens_.surface = testing::grid_mesh(15, 12, 2.0, 1.5, testing::lens_relief);
     options_.render = false;
   }
 
@@ -48,7 +46,7 @@ class Rs274 : public ::testing::Test {
   }
 
   std::filesystem::path rs274_;
-  Lens lens_;
+  Lens lens_ = lensforge::testing::small_lens(2.0, 1.5);
   CamOptions options_;
   TempFolder folder_;
 };
