@@ -2,11 +2,11 @@
 #include "cam/cam_options.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <string>
 
 #include "core/error.h"
+#include "core/number_text.h"
 
 namespace lensforge {
 namespace {
@@ -17,20 +17,14 @@ constexpr double kMaxPolish = 1.0;       ///< mm; beyond it no picture is left.
 constexpr double kFinestSample = 1e-3;   ///< mm
 constexpr double kCoarsestSample = 1.0;  ///< mm
 
-std::string number(double value) {
-  char text[32];
-  const auto [end, error] = std::to_chars(text, text + sizeof text, value);
-  return error == std::errc() ? std::string(text, end) : std::string("?");
-}
-
 [[noreturn]] void refuse(const char* option, double value, const std::string& rule) {
-  throw InputError(std::string(option) + ": " + number(value) + " " + rule);
+  throw InputError(std::string(option) + ": " + shortest_text(value) + " " + rule);
 }
 
 /// NaN fails every comparison and so is refused as well.
 void require_in(const char* option, double value, double low, double high) {
   if (!(value >= low && value <= high)) {
-    refuse(option, value, "is not between " + number(low) + " and " + number(high));
+    refuse(option, value, "is not between " + shortest_text(low) + " and " + shortest_text(high));
   }
 }
 
@@ -41,7 +35,7 @@ void validate_decimals(const CamOptions& options) {
   const double finest = 4.0 * std::pow(10.0, -options.decimals);
   if (!(tolerance >= finest * (1.0 - 1e-12))) {
     refuse("--tolerance", tolerance,
-           "is not at least 4 units of the last decimal, " + number(finest) + " mm");
+           "is not at least 4 units of the last decimal, " + shortest_text(finest) + " mm");
   }
 }
 
@@ -52,7 +46,7 @@ void validate_polish(const CamOptions& options) {
   require_in("--sample-spacing", options.sample_spacing, kFinestSample, kCoarsestSample);
   if (options.polish.sigma > 0.0 && options.sample_spacing > options.polish.sigma) {
     refuse("--sample-spacing", options.sample_spacing,
-           "is larger than --polish-sigma, " + number(options.polish.sigma) +
+           "is larger than --polish-sigma, " + shortest_text(options.polish.sigma) +
                " mm, which it could not show");
   }
 }
@@ -84,8 +78,9 @@ void validate(const CamOptions& options, const OpticalSetup& setup) {
   const Tool& ball = options.workshop.tool(options.workshop.process.finish.tool);
   const double smallest = setup.lens_size.minCoeff();
   if (!(ball.diameter < smallest)) {
-    refuse("--tool-diameter", ball.diameter,
-           "is not smaller than the lens, whose shorter side is " + number(smallest) + " mm");
+    refuse(
+        "--tool-diameter", ball.diameter,
+        "is not smaller than the lens, whose shorter side is " + shortest_text(smallest) + " mm");
   }
   require_in("--spin-up", options.spin_up, 0.0, kMaxSpinUp);
   require_in("--shrinkage", options.shrinkage, 0.0, kMaxShrinkage);

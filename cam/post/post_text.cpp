@@ -6,8 +6,8 @@
 #include <charconv>
 #include <cmath>
 
-#include "core/decimal_text.h"
 #include "core/error.h"
+#include "core/trimmed_decimal.h"
 
 namespace lensforge {
 namespace {
@@ -48,16 +48,9 @@ std::optional<std::string> fill_line(std::string_view line, const PlaceholderTex
   return filled;
 }
 
-std::string plain_number(double value, int decimals) {
-  std::string text = decimal_text(value, decimals);
-  if (decimals > 0) text.erase(text.find_last_not_of('0') + 1);
-  if (text.back() == '.') text.pop_back();
-  return text;
-}
-
 std::string feed_text(const PostDescription& post, double feed) {
   const double least = std::pow(10.0, -post.feed_decimals);
-  std::string text = plain_number(std::max(feed, least), post.feed_decimals);
+  std::string text = trimmed_decimal(std::max(feed, least), post.feed_decimals);
   if (post.whole_with_point && text.find('.') == std::string::npos) text += '.';
   return text;
 }

@@ -21,9 +21,6 @@ bool is_placeholder(std::string_view name);
 /// @pre check_program_lines() took the line.
 std::optional<std::string> fill_line(std::string_view line, const PlaceholderTexts& texts);
 
-/// A number of up to `decimals` decimals without trailing zeros: feeds, speeds, tolerances.
-std::string plain_number(double value, int decimals);
-
 /// A feed as the dialect writes it: rounded to its decimals, but not to 0.
 std::string feed_text(const PostDescription& post, double feed);
 

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/trimmed_decimal.h"
 
 namespace lensforge {
 namespace {
@@ -33,10 +34,10 @@ PlaceholderTexts texts_of(const ProgramContext& context, std::int64_t number) {
   texts["job"] = comment_text(context.post, context.plan.job, kJobCharacters);
   texts["number"] = std::to_string(number);
   if (settings.spin_up > 0.0) {
-    texts["dwell"] = plain_number(settings.spin_up / context.post.reader.dwell_unit, 3);
+    texts["dwell"] = trimmed_decimal(settings.spin_up / context.post.reader.dwell_unit, 3);
   }
   if (settings.blend_tolerance > 0.0) {
-    texts["tolerance"] = plain_number(settings.blend_tolerance, 6);
+    texts["tolerance"] = trimmed_decimal(settings.blend_tolerance, 6);
   }
   append_coordinate(texts["safe_z"], std::llround(context.plan.safe_z * scale), settings.decimals,
                     context.post);
@@ -62,9 +63,11 @@ const char* shape_word(CutterShape shape) {
 std::string tool_text(const Tool& tool) {
   std::string text = std::string("T").append(std::to_string(tool.number)).append(": ");
   text += shape_word(tool.shape);
-  text.append(" ").append(plain_number(tool.diameter, 3)).append(" mm, ");
-  text.append(plain_number(tool.spindle_rpm, 0)).append(" rpm, F ");
-  text.append(plain_number(tool.feed, 0)).append(", plunge ").append(plain_number(tool.plunge, 0));
+  text.append(" ").append(trimmed_decimal(tool.diameter, 3)).append(" mm, ");
+  text.append(trimmed_decimal(tool.spindle_rpm, 0)).append(" rpm, F ");
+  text.append(trimmed_decimal(tool.feed, 0))
+      .append(", plunge ")
+      .append(trimmed_decimal(tool.plunge, 0));
   if (!tool.name.empty()) text.append(", ").append(tool.name);
   return text;
 }
@@ -122,7 +125,7 @@ void ProgramPart::change_tool(const Tool& tool) {
   if (tool_) write_lines(context_.post.tool_end);
   tool_ = tool.number;
   texts_["tool"] = std::to_string(tool.number);
-  texts_["rpm"] = plain_number(tool.spindle_rpm, 3);
+  texts_["rpm"] = trimmed_decimal(tool.spindle_rpm, 3);
   write_lines(context_.post.tool);
   blocks_.rapid_to_height(context_.plan.safe_z);
   for (const std::string& line : context_.post.spindle) {

@@ -2,7 +2,6 @@
 #include "cam/post/program_writer.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <memory>
 #include <optional>
@@ -13,6 +12,7 @@
 #include "cam/post/program_part.h"
 #include "core/error.h"
 #include "core/files.h"
+#include "core/number_text.h"
 #include "machine/gcode/program_seal.h"
 
 namespace lensforge {
@@ -24,14 +24,8 @@ constexpr std::uintmax_t kSmallestLimit = 1 << 16;  ///< Bytes; head, end and on
 constexpr double kEarlySplit = 0.9;  ///< Share of the limit from which a rapid is a place to split.
 constexpr double kMostSeconds = 3600.0;
 
-std::string number(double value) {
-  char text[32];
-  const auto [end, error] = std::to_chars(text, text + sizeof text, value);
-  return error == std::errc() ? std::string(text, end) : std::string("?");
-}
-
 void require(bool holds, const char* what, double value, const std::string& rule) {
-  if (!holds) throw InputError(std::string(what) + ": " + number(value) + " " + rule);
+  if (!holds) throw InputError(std::string(what) + ": " + shortest_text(value) + " " + rule);
 }
 
 /// Operations that share a file, and the file's name.

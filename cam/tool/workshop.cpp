@@ -2,19 +2,13 @@
 #include "cam/tool/workshop.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 
 #include "core/error.h"
+#include "core/number_text.h"
 
 namespace lensforge {
 namespace {
-
-std::string number(double value) {
-  char text[32];
-  const auto [end, error] = std::to_chars(text, text + sizeof text, value);
-  return error == std::errc() ? std::string(text, end) : std::string("?");
-}
 
 /// Throws for one file.
 class Rules {
@@ -22,7 +16,7 @@ class Rules {
   explicit Rules(std::string file) : file_(std::move(file)) {}
 
   void hold(bool rule, const std::string& key, double value, const std::string& words) const {
-    if (!rule) throw InputError(file_ + ": " + key + ": " + number(value) + ": " + words);
+    if (!rule) throw InputError(file_ + ": " + key + ": " + shortest_text(value) + ": " + words);
   }
 
  private:
@@ -39,9 +33,9 @@ void check_sections(const Rules& rules, const Tool& tool, std::size_t index) {
     const ToolSection& section = tool.sections[s];
     const std::string key = key_of("tool", index, "section") + "[" + std::to_string(s) + "].";
     rules.hold(section.from >= top, key + "from", section.from,
-               "must not be below the part before it, which ends at " + number(top) + " mm");
+               "must not be below the part before it, which ends at " + shortest_text(top) + " mm");
     rules.hold(section.to > section.from, key + "to", section.to,
-               "must be above from, " + number(section.from) + " mm");
+               "must be above from, " + shortest_text(section.from) + " mm");
     top = section.to;
   }
 }
@@ -59,8 +53,8 @@ void check_tool(const Rules& rules, const Workshop& workshop, std::size_t index)
   const double rpm = tool.spindle_rpm;
   rules.hold(rpm >= workshop.machine.spindle_min_rpm && rpm <= workshop.machine.spindle_max_rpm,
              key_of("tool", index, "spindle_rpm"), rpm,
-             "the machine's spindle turns at " + number(workshop.machine.spindle_min_rpm) + " to " +
-                 number(workshop.machine.spindle_max_rpm));
+             "the machine's spindle turns at " + shortest_text(workshop.machine.spindle_min_rpm) +
+                 " to " + shortest_text(workshop.machine.spindle_max_rpm));
   rules.hold(tool.feed <= workshop.machine.max_rate.head<2>().maxCoeff(),
              key_of("tool", index, "feed"), tool.feed, "is faster than the machine's axes");
   rules.hold(tool.plunge <= workshop.machine.max_rate.z(), key_of("tool", index, "plunge"),
@@ -82,7 +76,7 @@ void check_step(const Rules& rules, const Workshop& workshop, const StepRule& ru
   rules.hold(tool != workshop.tools.end(), rule.table + ".tool", rule.tool,
              "no tool has this number");
   rules.hold(rule.step <= tool->diameter, rule.table + "." + rule.key, rule.step,
-             "is wider than the tool, " + number(tool->diameter) + " mm");
+             "is wider than the tool, " + shortest_text(tool->diameter) + " mm");
 }
 
 /// A wider circle would leave a core standing.
@@ -92,7 +86,7 @@ void check_entry(const Rules& rules, const Workshop& workshop, const char* table
   if (!level.enabled || level.entry != EntryStyle::kHelix) return;
   const double radius = workshop.tool(level.tool).radius();
   rules.hold(level.helix_radius <= radius, std::string(table) + ".helix_radius", level.helix_radius,
-             "is above half the tool's diameter, " + number(radius) + " mm");
+             "is above half the tool's diameter, " + shortest_text(radius) + " mm");
 }
 
 void check_process(const Rules& rules, const Workshop& workshop) {
@@ -106,14 +100,14 @@ void check_process(const Rules& rules, const Workshop& workshop) {
   check_entry(rules, workshop, "semi", semi);
   if (rough.enabled && semi.enabled) {
     rules.hold(semi.allowance <= rough.allowance, "semi.allowance", semi.allowance,
-               "must not be above that of roughing, " + number(rough.allowance) + " mm");
+               "must not be above that of roughing, " + shortest_text(rough.allowance) + " mm");
   }
   check_step(rules, workshop, {"finish", "pitch", finish.tool, finish.pitch});
   const Tool& ball = workshop.tool(finish.tool);
   rules.hold(ball.shape == CutterShape::kBall, "finish.tool", finish.tool,
              "the finishing tool has to be a ball");
   rules.hold(finish.scallop < ball.radius(), "finish.scallop", finish.scallop,
-             "must be below the ball's radius, " + number(ball.radius()) + " mm");
+             "must be below the ball's radius, " + shortest_text(ball.radius()) + " mm");
 }
 
 void check_keep_outs(const Rules& rules, const Workshop& workshop) {
