@@ -176,6 +176,7 @@ void add_cam_options(OptionSet& options, CamSettings& settings) {
   settings.stock = defaults.stock;
   settings.finish_tool = defaults.tool(defaults.process.finish.tool);
   settings.rough_tool = defaults.tool(defaults.process.rough.tool).diameter;
+  settings.post = settings.cam.post.name;
   options.positional("DIR", settings.source, "lens folder");
   add_tool_options(options, settings);
   add_raster_options(options, settings);

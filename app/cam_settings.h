@@ -17,9 +17,9 @@ struct CamSettings {
   std::string source;
   std::string workshop;  ///< TOML file; empty for the defaults.
   bool show_workshop = false;
-  std::string post = "linuxcnc";
+  std::string post;  ///< NAME|FILE.toml
   double split_mb = 0.0;
-  double rough_tool = 3.0;
+  double rough_tool = 0.0;  ///< Diameter, mm.
   bool no_rough = false;
   bool no_semi = false;
   bool no_arcs = false;
