@@ -3,19 +3,11 @@
 
 #include <algorithm>
 #include <numeric>
-#include <sstream>
+
+#include "core/number_text.h"
 
 namespace lensforge {
-namespace {
-
-std::string number_text(double value) {
-  std::ostringstream text;
-  text.precision(3);
-  text << value;
-  return text.str();
-}
-
-}  // namespace
+namespace {}  // namespace
 
 std::size_t DeviceWatch::add(const ReadSignal& signal) {
   polled_.push_back({signal, clock_.now(), 0, {}});
@@ -84,8 +76,8 @@ std::string DeviceWatch::trouble(std::size_t signal) const {
   }
   const double silence = silent_since_ ? clock_.now() - *silent_since_ : 0.0;
   if (silence <= silence_limit_) return {};
-  return name + "no good answer for " + number_text(silence) + " s: at most " +
-         number_text(silence_limit_) + " s are borne";
+  return name + "no good answer for " + number_text(silence, 3) + " s: at most " +
+         number_text(silence_limit_, 3) + " s are borne";
 }
 
 }  // namespace lensforge

@@ -3,36 +3,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <sstream>
 #include <utility>
 
 #include "core/error.h"
+#include "core/number_text.h"
+#include "machine/guard/spindle_state_name.h"
 
 namespace lensforge {
 namespace {
 
 /// Hours of records at one a second, if nobody takes them.
 constexpr std::size_t kMostRecords = 20000;
-
-std::string number_text(double value) {
-  std::ostringstream text;
-  text.precision(6);
-  text << value;
-  return text.str();
-}
-
-const char* state_text(SpindleState state) {
-  switch (state) {
-    case SpindleState::kStopped:
-      return "stopped";
-    case SpindleState::kChanging:
-      return "changing";
-    case SpindleState::kAtSpeed:
-      return "at speed";
-    default:
-      return "failed";
-  }
-}
 
 SpindleMap only_spindle(const std::vector<GuardedDevice>& devices, SpindleOwner owner) {
   const SpindleMap* found = nullptr;
@@ -275,7 +256,8 @@ void SpindleGuard::record(GuardEvent event, const std::string& text) {
 }
 
 void SpindleGuard::record_changes(const GuardReport& report, const std::string& interlock_trouble) {
-  if (report.spindle != reported_.spindle) record(GuardEvent::kState, state_text(report.spindle));
+  if (report.spindle != reported_.spindle)
+    record(GuardEvent::kState, spindle_state_name(report.spindle));
   if (report.reason != reported_.reason) record(GuardEvent::kTrouble, report.reason);
   if (interlock_trouble != reported_interlock_) {
     record(GuardEvent::kInterlock, interlock_trouble);

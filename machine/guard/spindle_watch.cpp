@@ -3,19 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <sstream>
+
+#include "core/number_text.h"
 
 namespace lensforge {
-namespace {
-
-std::string number_text(double value) {
-  std::ostringstream text;
-  text.precision(6);
-  text << value;
-  return text.str();
-}
-
-}  // namespace
+namespace {}  // namespace
 
 void SpindleWatch::ask(Goal goal, double now) {
   goal_ = goal;

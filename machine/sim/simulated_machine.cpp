@@ -84,26 +84,23 @@ std::string SimulatedMachine::read(std::int64_t opened, double wait) {
 /// Time passes until `deadline`, or until a byte has come to the host.
 void SimulatedMachine::run_to_first_byte(double deadline) {
   while (now() < deadline && first_arrival() > now()) {
-    double next = std::min(deadline, first_arrival());
-    if (outgoing_read_ < outgoing_.size()) next = std::min(next, next_byte_);
-    if (door_until_ > now()) next = std::min(next, door_until_);
-    controller_.run_until(next);
-    hear();
-    deliver();
-    end_timed_faults();
+    run_to_next_event(std::min(deadline, first_arrival()));
   }
 }
 
 void SimulatedMachine::run_until(double time) {
-  while (now() < time) {
-    double next = time;
-    if (outgoing_read_ < outgoing_.size()) next = std::min(next, next_byte_);
-    if (door_until_ > now()) next = std::min(next, door_until_);
-    controller_.run_until(next);
-    hear();
-    deliver();
-    end_timed_faults();
-  }
+  while (now() < time) run_to_next_event(time);
+}
+
+/// Time passes until `time`, or until a byte has come to the controller or the door moves.
+void SimulatedMachine::run_to_next_event(double time) {
+  double next = time;
+  if (outgoing_read_ < outgoing_.size()) next = std::min(next, next_byte_);
+  if (door_until_ > now()) next = std::min(next, door_until_);
+  controller_.run_until(next);
+  hear();
+  deliver();
+  end_timed_faults();
 }
 
 /// Hands every byte that has arrived by now to the controller.

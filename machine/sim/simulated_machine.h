@@ -70,6 +70,7 @@ class SimulatedMachine : public Clock {
   void require_open(std::int64_t opened) const;
   void run_until(double time);
   void run_to_first_byte(double deadline);
+  void run_to_next_event(double time);
   void deliver();
   void hear();
   void carry_to_host(const Spoken& spoken);

@@ -2,10 +2,9 @@
 #include "machine/stream/entry_lines.h"
 
 #include <algorithm>
-#include <array>
-#include <charconv>
 #include <cmath>
-#include <string_view>
+
+#include "core/trimmed_decimal.h"
 
 namespace lensforge {
 namespace {
@@ -18,19 +17,6 @@ constexpr double kPointDistance = 0.1;
 
 /// What rounding makes of equal heights, mm.
 constexpr double kSameHeight = 1e-4;
-
-/// Fixed decimals without zeros behind.
-std::string number(double value, int decimals) {
-  std::array<char, 64> text{};
-  const auto [end, error] = std::to_chars(text.data(), text.data() + text.size(), value,
-                                          std::chars_format::fixed, decimals);
-  std::string digits(text.data(), end);
-  if (digits.find('.') != std::string::npos) {
-    digits.erase(digits.find_last_not_of('0') + 1);
-    if (digits.back() == '.') digits.pop_back();
-  }
-  return digits == "-0" ? "0" : digits;
-}
 
 /// Builds the lines one after another, in the program's unit and work coordinates.
 class EntryWriter {
@@ -80,7 +66,8 @@ class EntryWriter {
 
   [[nodiscard]] std::string word(char letter, double value) const {
     std::string text(1, letter);
-    return text.append(inches_ ? number(value / kMillimetresPerInch, 6) : number(value, 5));
+    return text.append(inches_ ? trimmed_decimal(value / kMillimetresPerInch, 6)
+                               : trimmed_decimal(value, 5));
   }
 
   OutgoingLine& add(const std::string& text) {
@@ -102,7 +89,7 @@ class EntryWriter {
     const SpindleOrder order = spindle_order(entry_.state);
     if (!order.turning()) return;
     const bool clockwise = order.turn == SpindleTurn::kClockwise;
-    OutgoingLine& line = add("S" + number(order.rpm, 3) + (clockwise ? "M3" : "M4"));
+    OutgoingLine& line = add("S" + trimmed_decimal(order.rpm, 3) + (clockwise ? "M3" : "M4"));
     line.spindle = order;
     line.barrier = true;
   }
@@ -181,11 +168,11 @@ std::vector<Eigen::Vector3d> ramp_points(const std::vector<GcodeMotion>& path, d
 
 std::string point_text(const Eigen::Vector3d& point) {
   std::string text = "X";
-  return text.append(number(point.x(), 3))
+  return text.append(trimmed_decimal(point.x(), 3))
       .append(" Y")
-      .append(number(point.y(), 3))
+      .append(trimmed_decimal(point.y(), 3))
       .append(" Z")
-      .append(number(point.z(), 3));
+      .append(trimmed_decimal(point.z(), 3));
 }
 
 std::deque<OutgoingLine> entry_lines(const Entry& entry, std::int64_t line, std::int64_t offset) {
@@ -197,19 +184,21 @@ std::vector<std::string> entry_steps(const Entry& entry) {
   const Eigen::Vector3d first = writer.targets().front();
   const SpindleOrder order = spindle_order(entry.state);
   std::vector<std::string> steps;
-  steps.push_back("go up to machine Z" + number(writer.retract_z(), 3));
+  steps.push_back("go up to machine Z" + trimmed_decimal(writer.retract_z(), 3));
   if (entry.state.tool > 0) {
     steps.push_back("tool " + std::to_string(entry.state.tool) + " must be in the spindle");
   }
   if (order.turning()) {
-    steps.push_back("start the spindle at " + number(order.rpm, 0) + " rpm and verify it");
+    steps.push_back("start the spindle at " + trimmed_decimal(order.rpm, 0) + " rpm and verify it");
   }
   steps.push_back("go over machine " + point_text({first.x(), first.y(), writer.retract_z()}));
-  steps.push_back("go down to machine Z" + number(writer.clear_z(first.z()), 3) + ", then at F" +
-                  number(writer.plunge_feed(), 1) + " to Z" + number(first.z(), 3));
+  steps.push_back("go down to machine Z" + trimmed_decimal(writer.clear_z(first.z()), 3) +
+                  ", then at F" + trimmed_decimal(writer.plunge_feed(), 1) + " to Z" +
+                  trimmed_decimal(first.z(), 3));
   if (!entry.path.empty()) {
-    steps.push_back("come down onto the path, cut before, over " + number(entry.options.ramp, 3) +
-                    " mm of it from " + number(entry.options.lift, 3) + " mm above");
+    steps.push_back("come down onto the path, cut before, over " +
+                    trimmed_decimal(entry.options.ramp, 3) + " mm of it from " +
+                    trimmed_decimal(entry.options.lift, 3) + " mm above");
   }
   return steps;
 }

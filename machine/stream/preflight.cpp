@@ -3,9 +3,9 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 
+#include "core/trimmed_decimal.h"
 #include "machine/stream/line_tracker.h"
 
 namespace lensforge {
@@ -25,13 +25,8 @@ constexpr char kForceOrigin = 'Z';
 
 constexpr std::array kAxes = {'X', 'Y', 'Z'};
 
-/// Up to three decimals, no zeros behind: 12.5, 23000.
-std::string number(double value) {
-  std::array<char, 64> text{};
-  const auto [end, error] =
-      std::to_chars(text.data(), text.data() + text.size(), std::round(value * 1000.0) / 1000.0);
-  return {text.data(), end};
-}
+/// Up to three decimals: 12.5, 23000.
+std::string number(double value) { return trimmed_decimal(value, 3); }
 
 std::string setting_text(int number_of, double value) {
   return std::string("$").append(std::to_string(number_of)).append("=").append(number(value));

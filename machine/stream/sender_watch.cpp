@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <cmath>
 
+#include "machine/guard/spindle_state_name.h"
 #include "machine/stream/controller_codes.h"
 #include "machine/stream/sender.h"
 
@@ -28,20 +29,6 @@ std::optional<bool> reported_spindle(const StatusReport& report, const SpindleOr
     return (report.accessories->find_first_of("SC") != std::string::npos) == order.turning();
   }
   return std::nullopt;
-}
-
-std::string_view spindle_word(const GuardReport& report) {
-  switch (report.spindle) {
-    case SpindleState::kStopped:
-      return "stopped";
-    case SpindleState::kChanging:
-      return "changing";
-    case SpindleState::kAtSpeed:
-      return "at speed";
-    case SpindleState::kFailed:
-      break;
-  }
-  return "failed";
 }
 
 }  // namespace
@@ -235,7 +222,7 @@ JobProgress Sender::progress() const {
   at.byte = tracker_.offset();
   at.state = state_name(report_.state);
   at.position = position_;
-  at.spindle = guard_ != nullptr ? spindle_word(guarded_) : "as reported";
+  at.spindle = guard_ != nullptr ? spindle_state_name(guarded_.spindle) : "as reported";
   at.rpm = guard_ != nullptr ? guarded_.rpm : report_.spindle_rpm.value_or(0.0);
   return at;
 }
