@@ -50,7 +50,7 @@ bool is_graph(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const RowMove&
 /// (a + b − 2c) / 2ρ, counts as slack. Along the bisector the centre has room: moved by d it turns
 /// the arc's ends by L d / 2ρ².
 Eigen::Vector2d written_centre(const Eigen::Vector2d& a, const Eigen::Vector2d& b, double out,
-                               const FitOptions& options) {
+                               const RowFitOptions& options) {
   const Eigen::Vector2d way = b - a;
   const Eigen::Vector2d middle = 0.5 * (a + b);
   const Eigen::Vector2d up = Eigen::Vector2d(-way.y(), way.x()) / way.norm();
@@ -83,7 +83,7 @@ Eigen::Vector2d written_centre(const Eigen::Vector2d& a, const Eigen::Vector2d& 
 /// chord of length L and h square to it, circles through both ends are h = q (s (L − s) − h²) with
 /// their centre 1/(2q) below the chord's middle: q by least squares. `largest` is the radius, mm.
 std::optional<RowMove> arc_through(const std::vector<Eigen::Vector2d>& points, std::size_t from,
-                                   std::size_t to, const FitOptions& options, double largest) {
+                                   std::size_t to, const RowFitOptions& options, double largest) {
   const Eigen::Vector2d& a = points[from];
   const Eigen::Vector2d& b = points[to];
   const double length = (b - a).norm();
@@ -109,7 +109,7 @@ std::optional<RowMove> arc_through(const std::vector<Eigen::Vector2d>& points, s
 /// Covers one row; keeps the error of what is settled.
 class RowFit {
  public:
-  RowFit(const RowProfile& profile, const FitOptions& options)
+  RowFit(const RowProfile& profile, const RowFitOptions& options)
       : options_(options), joints_(row_joints(profile, options.grid)), error_(profile) {}
 
   FittedRow run() {
@@ -256,7 +256,7 @@ class RowFit {
     FittedRow row;
     row.start = joints_.written.front();
     row.unrounded.start = joints_.exact.front();
-    FitOptions unrounded = options_;
+    RowFitOptions unrounded = options_;
     unrounded.grid.resolution = kUnrounded;
     for (const Step& step : steps_) {
       const Reach& reach = step.reach;
@@ -272,7 +272,7 @@ class RowFit {
     return row;
   }
 
-  FitOptions options_;
+  RowFitOptions options_;
   RowJoints joints_;
   RowError error_;
   std::vector<Step> steps_;
@@ -281,11 +281,11 @@ class RowFit {
 
 }  // namespace
 
-double joint_bow(const FitOptions& options) {
+double joint_bow(const RowFitOptions& options) {
   return kJointShare * std::min(options.tolerance, options.slope_tolerance * kSlopeStretch);
 }
 
-FittedRow fit_row(const RowProfile& profile, const FitOptions& options) {
+FittedRow fit_row(const RowProfile& profile, const RowFitOptions& options) {
   return RowFit(profile, options).run();
 }
 

@@ -11,7 +11,7 @@
 namespace lensforge {
 
 /// How closely moves follow a row's drop curve, and what numbers a program can hold.
-struct FitOptions {
+struct RowFitOptions {
   double tolerance = 0.0005;      ///< Farthest from the drop curve, mm.
   double slope_tolerance = 1e-3;  ///< Largest difference of slope over a kSlopeStretch.
   ProgramGrid grid;
@@ -37,9 +37,9 @@ struct FittedRow : RowWay {
 /// reaches about the farthest joint within the tolerances. Moves begin and end on the drop curve to
 /// the resolution, and hold the tolerances over their whole length (RowError) unless not even the
 /// way to the next joint does, because rounding turns it: the certificate says what came of it.
-FittedRow fit_row(const RowProfile& profile, const FitOptions& options);
+FittedRow fit_row(const RowProfile& profile, const RowFitOptions& options);
 
 /// How far straight moves between joints may be off.
-double joint_bow(const FitOptions& options);
+double joint_bow(const RowFitOptions& options);
 
 }  // namespace lensforge

@@ -16,7 +16,7 @@ constexpr std::int64_t kBatchRows = 16;
 /// Unit of the last decimal of exact ways, mm.
 constexpr double kExactResolution = 1e-12;
 
-FitOptions fit_options(const RasterOptions& options) {
+RowFitOptions fit_options(const RasterOptions& options) {
   return {options.tolerance,
           options.slope_tolerance,
           {options.resolution, options.z_zero},
@@ -73,7 +73,7 @@ RasterWay in_space(const RowWay& way, const RowFrame& frame, bool forward) {
 }
 
 /// For the exact way of a row: decimals are those of doubles, and arcs save memory.
-FitOptions exact_fit(const FitOptions& fit) {
+RowFitOptions exact_fit(const RowFitOptions& fit) {
   return {kExactRow * fit.tolerance,
           kExactRow * fit.slope_tolerance,
           {kExactResolution, fit.grid.z_zero},
@@ -188,7 +188,7 @@ RasterPlan plan_finish_raster(const Eigen::AlignedBox2d& surface, double radius,
 }
 
 RasterRow cut_row(const RowCurves& curves, const RasterPlan& plan, std::int64_t row) {
-  const FitOptions fit = fit_options(plan.options);
+  const RowFitOptions fit = fit_options(plan.options);
   RowProfile profile = curves.profile(plan.row_span(row), joint_bow(fit));
   level_ends(fit.grid, profile);
   const FittedRow fitted = fit_row(profile, fit);

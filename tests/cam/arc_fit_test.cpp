@@ -21,12 +21,12 @@ bool on_grid(double value, double resolution) {
   return std::abs(units - std::round(units)) < 1e-6;
 }
 
-RowProfile profile_of(const DropCutter& cutter, const FitOptions& options) {
+RowProfile profile_of(const DropCutter& cutter, const RowFitOptions& options) {
   return RowCurves(cutter).profile({{0, 1.9}, 0.2, 3.8, 0.3, 3.7}, joint_bow(options));
 }
 
-FitOptions with_arcs(bool arcs) {
-  FitOptions options;
+RowFitOptions with_arcs(bool arcs) {
+  RowFitOptions options;
   options.arcs = arcs;
   return options;
 }
@@ -36,7 +36,7 @@ TEST(ArcFit, HoldsItsTolerancesOnEveryMesh) {
     if (name == "soup" || name == "steps" || name == "rough noise") continue;  // Walls.
     const DropCutter cutter(mesh, kRadius, Executor::serial());
     for (const bool arcs : {false, true}) {
-      const FitOptions options = with_arcs(arcs);
+      const RowFitOptions options = with_arcs(arcs);
       const RowProfile profile = profile_of(cutter, options);
       const FittedRow row = fit_row(profile, options);
       const PathCertificate certificate = certify_row(profile, row.start, row.moves);
@@ -54,7 +54,7 @@ TEST(ArcFit, HoldsItsTolerancesOnEveryMesh) {
 TEST(ArcFit, HoldsTheHeightTightlyBesideWalls) {
   for (const auto& [name, mesh] : testing::adversarial_meshes()) {
     const DropCutter cutter(mesh, kRadius, Executor::serial());
-    const FitOptions options = with_arcs(true);
+    const RowFitOptions options = with_arcs(true);
     const RowProfile profile = profile_of(cutter, options);
     const FittedRow row = fit_row(profile, options);
     const PathCertificate certificate = certify_row(profile, row.start, row.moves);
@@ -67,7 +67,7 @@ TEST(ArcFit, HoldsTheHeightTightlyBesideWalls) {
 TEST(ArcFit, WritesNumbersOnTheProgramsGrid) {
   const SurfaceMesh mesh = testing::grid_mesh(28, 31, 4.0, 4.0, testing::lens_relief);
   const DropCutter cutter(mesh, kRadius, Executor::serial());
-  FitOptions options = with_arcs(true);
+  RowFitOptions options = with_arcs(true);
   options.grid.resolution = 1e-5;
   options.slope_tolerance = 8e-3;
   options.grid.z_zero = 6.1234567891;
@@ -96,7 +96,7 @@ TEST(ArcFit, WritesNumbersOnTheProgramsGrid) {
 TEST(ArcFit, MovesBeforeRoundingDifferByTheLastDecimal) {
   const SurfaceMesh mesh = testing::grid_mesh(28, 31, 4.0, 4.0, testing::lens_relief);
   const DropCutter cutter(mesh, kRadius, Executor::serial());
-  FitOptions options = with_arcs(true);
+  RowFitOptions options = with_arcs(true);
   options.grid.resolution = 1e-5;
   options.slope_tolerance = 8e-3;
   const FittedRow row = fit_row(profile_of(cutter, options), options);
@@ -121,7 +121,7 @@ TEST(ArcFit, MovesGrowSlowlyAsDirectionsGetFiner) {
   const RowCurves curves(surface, {span.line.at(-0.2), span.line.at(4.2)}, Executor::serial());
   std::vector<std::size_t> moves;
   for (const double slope_tolerance : {1e-3, 3e-4, 1e-4}) {
-    FitOptions options = with_arcs(true);
+    RowFitOptions options = with_arcs(true);
     options.slope_tolerance = slope_tolerance;
     RowProfile profile = curves.profile(span, joint_bow(options));
     level_ends(options.grid, profile);
@@ -139,7 +139,7 @@ TEST(ArcFit, FindsTheCircleOfACylinder) {
   const SurfaceMesh mesh = testing::grid_mesh(
       4001, 3, 4.0, 4.0, [](double x, double) { return std::sqrt(25.0 - (x - 2.0) * (x - 2.0)); });
   const DropCutter cutter(mesh, kRadius, Executor::serial());
-  const FitOptions options = with_arcs(true);
+  const RowFitOptions options = with_arcs(true);
   const RowProfile profile =
       RowCurves(cutter).profile({{0, 1.9}, 0.3, 3.7, 0.3, 3.7}, joint_bow(options));
   const FittedRow row = fit_row(profile, options);
@@ -155,7 +155,7 @@ TEST(ArcFit, RollsOverARidgeInOneArc) {
   const SurfaceMesh mesh = testing::grid_mesh(
       41, 3, 4.0, 4.0, [](double x, double) { return 5.0 - 0.8 * std::abs(x - 2.0); });
   const DropCutter cutter(mesh, kRadius, Executor::serial());
-  const FitOptions options = with_arcs(true);
+  const RowFitOptions options = with_arcs(true);
   const FittedRow row = fit_row(profile_of(cutter, options), options);
   const auto arc = std::find_if(row.moves.begin(), row.moves.end(), [](const RowMove& move) {
     return move.arc && move.end.x() > 2.0 && move.end.x() < 2.2;
@@ -170,7 +170,7 @@ TEST(ArcFit, FollowsAPlaneInOneMove) {
   const SurfaceMesh mesh =
       testing::grid_mesh(33, 33, 4.0, 4.0, [](double x, double y) { return 0.2 * x + 0.1 * y; });
   const DropCutter cutter(mesh, kRadius, Executor::serial());
-  const FitOptions options = with_arcs(true);
+  const RowFitOptions options = with_arcs(true);
   const FittedRow row = fit_row(
       RowCurves(cutter).profile({{0, 1.9}, 0.3, 3.7, 0.3, 3.7}, joint_bow(options)), options);
   EXPECT_EQ(row.moves.size(), 1U);
