@@ -80,7 +80,7 @@ class EntryWriter {
 
   void modes() {
     add(std::string(inches_ ? "G20" : "G21") + "G90G94G17");
-    add("G" + std::to_string(54 + entry_.state.coordinate_system)).alone = true;
+    add(std::string("G").append(std::to_string(54 + entry_.state.coordinate_system))).alone = true;
   }
 
   void up() { add("G53G0" + word('Z', retract_z())).travel = retract_z(); }
