@@ -1,28 +1,20 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "design/wanted_picture.h"
 
-#include <algorithm>
 #include <cmath>
 
+#include "core/image_sample.h"
 #include "design/optics/projection.h"
 #include "design/render_lens.h"
 
 namespace lensforge {
 namespace {
 
-/// Between the middles of pixels linearly, as on the border pixel outside of them; zero off the
-/// picture.
+/// Zero off the picture.
 double picture_at(const Image& image, const Eigen::Vector2d& at) {
   const Eigen::Array2d size(image.columns(), image.rows());
   if ((at.array() < 0.0).any() || (at.array() > size).any()) return 0.0;
-  const Eigen::Array2d middle = (at.array() - 0.5).max(0.0).min(size - 1.0);
-  const Eigen::Array2i low = middle.floor().cast<int>();
-  const Eigen::Array2i high = (low + 1).min(size.cast<int>() - 1);
-  const Eigen::Array2d share = middle - low.cast<double>();
-  const auto along = [&](int row) {
-    return std::lerp(double{image.at(low.x(), row)}, double{image.at(high.x(), row)}, share.x());
-  };
-  return std::lerp(along(low.y()), along(high.y()), share.y());
+  return bilinear(image, at);
 }
 
 /// wanted − thrown; one is an evenly lit picture of `total` flux as large as the lens.

@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "core/grid_triangles.h"
+
 namespace lensforge {
 
 SurfaceMesh mesh_of(const SurfacePatch& patch) {
@@ -15,16 +17,7 @@ SurfaceMesh mesh_of(const SurfacePatch& patch) {
     mesh.vertices.col(n) << window.node(n % window.columns, n / window.columns),
         patch.z[static_cast<std::size_t>(n)];
   }
-  mesh.triangles.resize(3, 2 * (window.columns - 1) * (window.rows - 1));
-  std::int64_t t = 0;
-  for (int row = 0; row + 1 < mesh.grid.rows; ++row) {
-    for (int column = 0; column + 1 < mesh.grid.columns; ++column) {
-      const int a = row * mesh.grid.columns + column;
-      const int d = a + mesh.grid.columns;
-      mesh.triangles.col(t++) << a, a + 1, d + 1;
-      mesh.triangles.col(t++) << a, d + 1, d;
-    }
-  }
+  mesh.triangles = grid_triangles(mesh.grid);
   return mesh;
 }
 

@@ -42,7 +42,8 @@ struct PreconditionerView {
   }
   /// How freely coordinate k of a vertex moves.
   [[nodiscard]] LF_HD double freedom(std::int64_t v, int k) const {
-    return movable[3 * v + k] * std::pow(reach[3 * v + k], exponent);
+    const double far = reach[3 * v + k];
+    return movable[3 * v + k] * (exponent == 1.0 ? far : std::pow(far, exponent));
   }
 };
 

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/image_sample.h"
 #include "design/optimize/cosine_transform.h"
 
 namespace lensforge {
@@ -76,15 +77,7 @@ class Iteration {
 
   /// Floored density of mean 1 at a point in pixel coordinates, bilinear between pixel centres.
   [[nodiscard]] double density(const Eigen::Vector2d& y) const {
-    const double x = std::clamp(y.x() - 0.5, 0.0, picture_.columns() - 1.0);
-    const double v = std::clamp(y.y() - 0.5, 0.0, picture_.rows() - 1.0);
-    const int c = std::min(static_cast<int>(x), picture_.columns() - 2);
-    const int r = std::min(static_cast<int>(v), picture_.rows() - 2);
-    const double fx = x - c;
-    const double fy = v - r;
-    const double top = (1.0 - fx) * picture_.at(c, r) + fx * picture_.at(c + 1, r);
-    const double below = (1.0 - fx) * picture_.at(c, r + 1) + fx * picture_.at(c + 1, r + 1);
-    return floor_ + scale_ * ((1.0 - fy) * top + fy * below);
+    return floor_ + scale_ * bilinear(picture_, y);
   }
 
   [[nodiscard]] double laplacian_to_be(int c, int r) const {

@@ -7,7 +7,6 @@
 #include "core/number_text.h"
 
 namespace lensforge {
-namespace {}  // namespace
 
 std::size_t DeviceWatch::add(const ReadSignal& signal) {
   polled_.push_back({signal, clock_.now(), 0, {}});

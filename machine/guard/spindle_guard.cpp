@@ -256,8 +256,9 @@ void SpindleGuard::record(GuardEvent event, const std::string& text) {
 }
 
 void SpindleGuard::record_changes(const GuardReport& report, const std::string& interlock_trouble) {
-  if (report.spindle != reported_.spindle)
+  if (report.spindle != reported_.spindle) {
     record(GuardEvent::kState, spindle_state_name(report.spindle));
+  }
   if (report.reason != reported_.reason) record(GuardEvent::kTrouble, report.reason);
   if (interlock_trouble != reported_interlock_) {
     record(GuardEvent::kInterlock, interlock_trouble);

@@ -7,7 +7,6 @@
 #include "core/number_text.h"
 
 namespace lensforge {
-namespace {}  // namespace
 
 void SpindleWatch::ask(Goal goal, double now) {
   goal_ = goal;
