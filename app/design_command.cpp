@@ -83,7 +83,8 @@ void add_weight_options(OptionSet& options, DesignArguments& arguments) {
   options.number("--weight-gradient", weights.gradient, limits, "", "picture gradients (lambda 2)");
   options.number("--weight-boundary", weights.boundary, limits, "",
                  "light outside the picture (lambda 3)");
-  options.number("--weight-smooth", weights.smooth, limits, "", "all smoothness terms (lambda 4)");
+  options.number("--weight-smooth", weights.smooth, limits, "",
+                 "all smoothness terms (lambda 4); facets take 0.00002 unless it is given");
   options.number("--weight-barrier", weights.barrier, limits, "",
                  "barriers against collapsed facets and total reflection (lambda 5)");
   options.number("--weight-edge", weights.edge, limits, "",
@@ -252,7 +253,11 @@ int design_command(const Arguments& command_line) {
   OptionSet options("design", "Shapes a lens that projects a picture.");
   add_design_options(options, arguments);
   options.parse(command_line);
-  arguments.design.weights.smooth *= arguments.smoothness;
+  ObjectiveWeights& weights = arguments.design.weights;
+  if (!options.given("--weight-smooth")) {
+    weights.smooth = default_smoothness(arguments.design.model);
+  }
+  weights.smooth *= arguments.smoothness;
   arguments.design.rendering_guided = !arguments.transport_alone;
   return run(options, arguments);
 }

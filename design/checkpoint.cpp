@@ -16,15 +16,15 @@
 #include "core/files.h"
 #include "design/grid_mesh.h"
 
-// File: the magic line, then a JSON header on one line, then the vertices as little-endian doubles,
-// then a FNV-1a hash of all that goes before.
+// File: the magic line, then a JSON header on one line, then as little-endian doubles the vertices
+// and, if the header says so, the reach of their steps, then a FNV-1a hash of all that goes before.
 namespace lensforge {
 
 namespace {
 
 using nlohmann::json;
 
-constexpr std::string_view kMagic = "lensforge checkpoint 2\n";
+constexpr std::string_view kMagic = "lensforge checkpoint 3\n";
 
 static_assert(std::endian::native == std::endian::little, "checkpoints are little-endian");
 
@@ -47,6 +47,10 @@ std::string_view bytes_of(std::span<const T> values) {
   return {reinterpret_cast<const char*>(values.data()), values.size_bytes()};
 }
 
+std::span<const double> entries(const Eigen::Matrix3Xd& matrix) {
+  return {matrix.data(), static_cast<std::size_t>(matrix.size())};
+}
+
 json to_json(const ObjectiveWeights& w) {
   return {w.image, w.gradient,  w.boundary, w.smooth, w.barrier,
           w.edge,  w.laplacian, w.align,    w.flux};
@@ -54,9 +58,9 @@ json to_json(const ObjectiveWeights& w) {
 
 json to_json(const ConvergenceRow& row) {
   const EnergyValues& e = row.energy;
-  return {row.stage,  row.level, row.round,      row.iteration, e.image,     e.gradient,
-          e.boundary, e.barrier, e.face,         e.edge,        e.laplacian, e.align,
-          e.flux,     e.total,   row.mass_error, row.mae,       row.seconds};
+  return {row.stage,  row.level,  row.round, row.iteration,  e.image, e.unlit,
+          e.gradient, e.boundary, e.barrier, e.face,         e.edge,  e.laplacian,
+          e.align,    e.flux,     e.total,   row.mass_error, row.mae, row.seconds};
 }
 
 ConvergenceRow row_from_json(const json& j) {
@@ -68,8 +72,8 @@ ConvergenceRow row_from_json(const json& j) {
   EnergyValues& e = row.energy;
   int next = 4;
   for (double* value :
-       {&e.image, &e.gradient, &e.boundary, &e.barrier, &e.face, &e.edge, &e.laplacian, &e.align,
-        &e.flux, &e.total, &row.mass_error, &row.mae, &row.seconds}) {
+       {&e.image, &e.unlit, &e.gradient, &e.boundary, &e.barrier, &e.face, &e.edge, &e.laplacian,
+        &e.align, &e.flux, &e.total, &row.mass_error, &row.mae, &row.seconds}) {
     *value = j.at(static_cast<std::size_t>(next++));
   }
   return row;
@@ -88,7 +92,7 @@ std::string read_bytes(const std::filesystem::path& path) {
 /// The parts of a checkpoint file, hash and magic verified.
 struct Parts {
   json header;
-  std::string_view vertices;
+  std::string_view numbers;
 };
 
 Parts split(const std::string& content, const std::filesystem::path& path) {
@@ -137,6 +141,8 @@ std::uint64_t design_fingerprint(const Image& target, const DesignOptions& optio
 void write_checkpoint(const Checkpoint& checkpoint, const std::filesystem::path& path) {
   json rows = json::array();
   for (const ConvergenceRow& row : checkpoint.convergence) rows.push_back(to_json(row));
+  const StepScales& steps = checkpoint.scales;
+  const json scales = steps.known() ? json{steps.xy, steps.z} : json();
   const json header = {{"fingerprint", checkpoint.fingerprint},
                        {"level", checkpoint.level},
                        {"round", checkpoint.round},
@@ -145,12 +151,13 @@ void write_checkpoint(const Checkpoint& checkpoint, const std::filesystem::path&
                        {"seconds", checkpoint.seconds},
                        {"columns", checkpoint.mesh.grid.columns},
                        {"rows", checkpoint.mesh.grid.rows},
+                       {"scales", scales},
                        {"convergence", rows}};
   std::string content(kMagic);
   content += header.dump();
   content += '\n';
-  content += bytes_of(std::span<const double>(
-      checkpoint.mesh.vertices.data(), static_cast<std::size_t>(checkpoint.mesh.vertices.size())));
+  content += bytes_of(entries(checkpoint.mesh.vertices));
+  content += bytes_of(entries(steps.reach));
   Hash hash;
   hash.add(content);
   const std::uint64_t value = hash.value();
@@ -174,14 +181,22 @@ Checkpoint read_checkpoint(const std::filesystem::path& path) {
       checkpoint.convergence.push_back(row_from_json(row));
     }
     const GridShape shape{parts.header.at("columns"), parts.header.at("rows")};
-    const std::size_t count = parts.vertices.size() / (3 * sizeof(double));
+    const json& scales = parts.header.at("scales");
+    const std::size_t bytes = parts.numbers.size() / (scales.is_null() ? 1 : 2);
+    const std::size_t count = bytes / (3 * sizeof(double));
     if (shape.columns < 2 || shape.rows < 2 ||
         static_cast<std::size_t>(shape.columns) * static_cast<std::size_t>(shape.rows) != count ||
-        parts.vertices.size() != count * 3 * sizeof(double)) {
+        parts.numbers.size() != count * 3 * sizeof(double) * (scales.is_null() ? 1 : 2)) {
       refuse(path, "does not hold as many vertices as it says");
     }
     checkpoint.mesh = make_grid_mesh(Eigen::Vector2d::Ones(), shape, 0.0);
-    std::memcpy(checkpoint.mesh.vertices.data(), parts.vertices.data(), parts.vertices.size());
+    std::memcpy(checkpoint.mesh.vertices.data(), parts.numbers.data(), bytes);
+    if (!scales.is_null()) {
+      checkpoint.scales.xy = scales.at(0);
+      checkpoint.scales.z = scales.at(1);
+      checkpoint.scales.reach.resizeLike(checkpoint.mesh.vertices);
+      std::memcpy(checkpoint.scales.reach.data(), parts.numbers.data() + bytes, bytes);
+    }
     return checkpoint;
   } catch (const json::exception& error) {
     refuse(path, std::string("has a bad header: ") + error.what());

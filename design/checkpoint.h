@@ -9,6 +9,7 @@
 #include "core/surface_mesh.h"
 #include "design/design_lens.h"
 #include "design/energy/barrier.h"
+#include "design/guided_optimization.h"
 
 namespace lensforge {
 
@@ -21,6 +22,7 @@ struct Checkpoint {
   bool transporting = true;  ///< The level's next round may begin with transport.
   double seconds = 0.0;      ///< Spent so far.
   SurfaceMesh mesh;          ///< A grid mesh.
+  StepScales scales;         ///< Of the level's further rounds.
   std::vector<ConvergenceRow> convergence;
 };
 

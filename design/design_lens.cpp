@@ -23,7 +23,8 @@ namespace lensforge {
 namespace {
 
 /// A round that lowers the objective by less than this share has brought nothing: if it began with
-/// transport, the level's further rounds do without; if not, the level ends.
+/// transport, the level's further rounds do without; if its steps were scaled for an earlier
+/// surface, the next one measures them anew; if neither, the level ends.
 constexpr double kIdleRound = 1e-3;
 
 /// Mass error that ends a transport, and the Newton steps after which it goes as far as it came:
@@ -32,9 +33,11 @@ constexpr double kTransportTolerance = 1e-2;
 constexpr int kMostNewtonSteps = 150;
 
 /// On a mesh that has been spread: Newton steps under one blur and floor after which its own
-/// transport is given up, and the share of black pixels above which it is not tried (logo, 69 %
-/// black, spread over dark and bright: 43 and 59 steps in two stages, and no end).
+/// transport ends, the share of the light that may be in the wrong place then (a few cells with
+/// next to no light hold up all others), and the share of black pixels above which it is not tried
+/// (logo, 69 % black, spread over dark and bright: 43 and 59 steps in two stages, and no end).
 constexpr int kMostStageSteps = 25;
+constexpr double kMostMisplaced = 0.05;
 constexpr double kMostBlack = 0.3;
 
 /// Faces of the even mesh whose transport shapes the mesh: a finer one is not worth it. On the
@@ -201,6 +204,7 @@ class Schedule {
     state_.round = 0;
     state_.value = kInfinity;
     state_.transporting = true;
+    state_.scales = {};
     ++state_.level;
     save();
   }
@@ -211,6 +215,7 @@ class Schedule {
     const bool transports = state_.transporting && state_.round < options_.transport_rounds;
     if (transports) transport(problem);
     relax(stage);
+    const bool rescaled = !state_.scales.known();
     if (options_.rendering_guided) follow_picture(stage);
     if (ended()) return;
     const double value = stage.value(state_.mesh);
@@ -220,8 +225,12 @@ class Schedule {
     } else {
       state_.mesh = before;
     }
-    if (idle) state_.transporting = false;
-    state_.round = idle && !transports ? options_.rounds : state_.round + 1;
+    if (idle) {
+      state_.transporting = false;
+      state_.scales = {};
+    }
+    const bool exhausted = idle && rescaled && !transports;
+    state_.round = exhausted ? options_.rounds : state_.round + 1;
     if (state_.round < options_.rounds) save();
   }
 
@@ -301,7 +310,9 @@ class Schedule {
     // Facets are needed where there is light. A smooth surface also needs narrow triangles at its
     // creases, which send their light into the black between; there it is that cells own the black.
     const bool facet = options_.model == SurfaceModel::kFacet;
-    const ServedAreas served{even_mesh, facet ? even.result.lit_areas : even.result.areas};
+    const Eigen::VectorXd areas =
+        facet ? favour_dark({even_mesh, even.result.lit_areas}) : even.result.areas;
+    const ServedAreas served{even_mesh, areas};
     if (!spread_vertices(served, options_.spread, problem.setup, stoppable_,
                          RunControl(control_.stop_token(), {}), mesh)) {
       throw Interrupted();
@@ -313,7 +324,7 @@ class Schedule {
       options.tolerance = kTransportTolerance;
       options.max_stage_steps = kMostStageSteps;
       Matching fine = match(problem, mesh, options);
-      if (fine.result.converged()) return fine;
+      if (fine.result.misplaced <= kMostMisplaced) return fine;
     }
     Matching mapped;
     mapped.light = face_light(mesh, problem.setup, options_.model, stoppable_);
@@ -346,7 +357,8 @@ class Schedule {
   void follow_picture(GuidedOptimization& stage) {
     LbfgsOptions optimizer;
     optimizer.max_iterations = options_.iterations;
-    const LbfgsSummary summary = stage.run(optimizer, observer("render"), state_.mesh);
+    const LbfgsSummary summary =
+        stage.run(optimizer, observer("render"), state_.scales, state_.mesh);
     stopped_ = summary.status == LbfgsSummary::Status::kStopped;
     if (summary.status == LbfgsSummary::Status::kInfeasibleStart) failure_ = summary.message;
   }
@@ -460,14 +472,15 @@ DesignResult design_lens(const Image& target, const DesignOptions& options,
 std::string convergence_csv(const std::vector<ConvergenceRow>& rows) {
   std::ostringstream out;
   out.precision(9);
-  out << "stage,level,round,iteration,image,gradient,boundary,barrier,face,edge,laplacian,align,"
+  out << "stage,level,round,iteration,image,unlit,gradient,boundary,barrier,face,edge,laplacian,"
+         "align,"
          "flux,total,mass_error,mae,seconds\n";
   for (const ConvergenceRow& r : rows) {
     const EnergyValues& e = r.energy;
     out << r.stage << ',' << r.level << ',' << r.round << ',' << r.iteration;
     for (const double value :
-         {e.image, e.gradient, e.boundary, e.barrier, e.face, e.edge, e.laplacian, e.align, e.flux,
-          e.total, r.mass_error, r.mae, r.seconds}) {
+         {e.image, e.unlit, e.gradient, e.boundary, e.barrier, e.face, e.edge, e.laplacian, e.align,
+          e.flux, e.total, r.mass_error, r.mae, r.seconds}) {
       out << ',' << value;
     }
     out << '\n';

@@ -195,13 +195,27 @@ void GuidedOptimization::begin_preconditioner(const SurfaceMesh& mesh, Eigen::Ma
   stage_->set_symbols(xy_, z_);
 }
 
-LbfgsSummary GuidedOptimization::run(const LbfgsOptions& options, const Observer& observe,
-                                     SurfaceMesh& mesh) {
-  stage_->relinearize(mesh.vertices);
-  Eigen::Matrix3Xd reach;
-  begin_preconditioner(mesh, reach);
-  level_shifts(mesh.vertices, reach);
+StepScales GuidedOptimization::measure_scales(const SurfaceMesh& mesh) {
+  StepScales scales;
+  begin_preconditioner(mesh, scales.reach);
+  level_shifts(mesh.vertices, scales.reach);
   calibrate(mesh.vertices);
+  scales.xy = xy_.scale;
+  scales.z = z_.scale;
+  return scales;
+}
+
+LbfgsSummary GuidedOptimization::run(const LbfgsOptions& options, const Observer& observe,
+                                     StepScales& scales, SurfaceMesh& mesh) {
+  stage_->relinearize(mesh.vertices);
+  if (scales.known()) {
+    xy_.scale = scales.xy;
+    z_.scale = scales.z;
+    stage_->set_reach(scales.reach);
+    stage_->set_symbols(xy_, z_);
+  } else {
+    scales = measure_scales(mesh);
+  }
   return stage_->minimize(options, observe, mesh.vertices);
 }
 

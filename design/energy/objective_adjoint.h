@@ -9,6 +9,7 @@
 #include "design/energy/mean_curvature.h"
 #include "design/energy/objective_view.h"
 #include "design/energy/reflection_barrier.h"
+#include "design/energy/unlit_term.h"
 #include "design/optics/smooth.h"
 
 /// What the objective does for one face or vertex on the way from the picture's cotangent back to
@@ -18,6 +19,7 @@ namespace lensforge {
 /// What the goal says of one face or of all.
 struct GoalValues {
   double boundary = 0.0;
+  double unlit = 0.0;
   CorrespondenceValues correspondence;
 };
 
@@ -38,11 +40,18 @@ LF_HD inline GoalValues goal_adjoint(const ObjectiveView& o, std::int64_t face,
                                      const ImageTriangle& image, ImageTriangle& bar) {
   const ObjectiveWeights& w = o.options.weights;
   if (o.wanted_centroids != nullptr) {
-    return {0.0, correspondence_term(image, column2(o.wanted_centroids, face), o.wanted_flux[face],
-                                     o.columns * o.rows, w, bar)};
+    return {0.0, 0.0,
+            correspondence_term(image, column2(o.wanted_centroids, face), o.wanted_flux[face],
+                                o.columns * o.rows, w, bar)};
   }
   bar = deposit_adjoint(image, o.cotangent);
-  return {boundary_term(image, o.columns, o.rows, w.boundary, bar), {}};
+  GoalValues values;
+  values.boundary = boundary_term(image, o.columns, o.rows, w.boundary, bar);
+  if (o.led != nullptr && o.led[face] != kNoPixel) {
+    const std::int32_t pixel = o.led[face];
+    values.unlit = unlit_term(image, pixel, o.cotangent.columns, o.target[pixel], w.image, bar);
+  }
+  return values;
 }
 
 /// The goal's derivative by one face; returns its values (0 in the smooth model, where
@@ -103,8 +112,9 @@ LF_HD inline SmoothnessValues smoothness_adjoint(const ObjectiveView& o, std::in
   return values;
 }
 
-/// Values of a face that are summed over all: E_bdr, E_align, E_flux, E_barr, E_face, E_edge.
-using FaceSums = std::array<double, 6>;
+/// Values of a face that are summed over all: E_bdr, E_unlit, E_align, E_flux, E_barr, E_face,
+/// E_edge.
+using FaceSums = std::array<double, 7>;
 
 /// Derivatives of everything by one face's corners.
 struct PullBackFace {
@@ -125,8 +135,13 @@ struct PullBackFace {
     bar.area_normal += normalize_adjoint(frame.n, doubled_area, bar.frame.n);
     area_normal_adjoint(t, bar.area_normal, bar.corners);
     o.corner_bar[i] = bar.corners;
-    return {goal.boundary, goal.correspondence.align, goal.correspondence.flux,
-            barrier,       smoothness.face,           smoothness.edge};
+    return {goal.boundary,
+            goal.unlit,
+            goal.correspondence.align,
+            goal.correspondence.flux,
+            barrier,
+            smoothness.face,
+            smoothness.edge};
   }
 };
 

@@ -30,6 +30,17 @@ struct MeasureFace {
   }
 };
 
+/// Centroid of what a face throws onto the receiving plane. @pre as for image_triangle().
+struct FaceCentroid {
+  ObjectiveView o;
+  double* centroids;  ///< 2 × F, pixel coordinates.
+
+  LF_HD void operator()(std::int64_t i) const {
+    const ImageTriangle t = o.image_triangle(i);
+    column2(centroids, i) = (t.p0 + t.p1 + t.p2) / 3.0;
+  }
+};
+
 /// The map of a face that minimises H²A + τ1 Σ w δ. @pre frames are up to date.
 struct FitMap {
   ObjectiveView o;

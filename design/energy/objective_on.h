@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -20,6 +21,7 @@
 #include "design/energy/objective_adjoint.h"
 #include "design/energy/objective_kernels.h"
 #include "design/energy/objective_options.h"
+#include "design/energy/unlit_pixels.h"
 #include "design/flux/flux_image.h"
 
 namespace lensforge {
@@ -46,6 +48,7 @@ class DesignObjectiveOn {
   void take(const Image& target);
   void take(const Correspondence& wanted);
   [[nodiscard]] ObjectiveView view(const double* vertices);
+  void find_unlit(const ObjectiveView& o);
   [[nodiscard]] bool allowed(const ObjectiveView& o);
   /// Sums of one evaluation; not asked for before all kernels are on their way.
   struct Sums;
@@ -68,6 +71,8 @@ class DesignObjectiveOn {
 
   Buffer<double> target_;
   double target_total_ = 0.0;
+  std::vector<double> wanted_light_;  ///< The target's linear light, in the caller's memory.
+  Buffer<std::int32_t> led_;          ///< Empty if no facet is led to an unlit pixel.
   Buffer<double> wanted_centroids_;
   Buffer<double> wanted_flux_;
 
@@ -159,6 +164,7 @@ void DesignObjectiveOn<Exec>::take(const Image& target) {
   const std::vector<double> encoded = encoded_values(target);
   target_ = buffer_of(executor_, std::span<const double>(encoded));
   target_total_ = target.total();
+  wanted_light_.assign(target.values().begin(), target.values().end());
   error_ = Buffer<double>(encoded.size());
 }
 
@@ -180,6 +186,8 @@ ObjectiveView DesignObjectiveOn<Exec>::view(const double* vertices) {
           .cotangent = cotangent_.view(),
           .wanted_centroids = wanted_centroids_.size() > 0 ? wanted_centroids_.data() : nullptr,
           .wanted_flux = wanted_flux_.data(),
+          .target = target_.data(),
+          .led = led_.size() > 0 ? led_.data() : nullptr,
           .frames = frames_.data(),
           .maps = maps_.data(),
           .edge_weights = edge_weights_.data(),
@@ -193,14 +201,37 @@ ObjectiveView DesignObjectiveOn<Exec>::view(const double* vertices) {
 
 template <class Exec>
 void DesignObjectiveOn<Exec>::relinearize(const double* vertices) {
-  if (options_.weights.smooth == 0.0 || options_.weights.edge == 0.0) return;
+  led_ = {};
   const ObjectiveView o = view(vertices);
   const std::int64_t faces = o.mesh.faces;
   static_cast<void>(pending_sum<1>(executor_, "face frames", faces, MeasureFace{o}));
+  if (!wanted_light_.empty() && o.facets()) find_unlit(o);
+  if (options_.weights.smooth == 0.0 || options_.weights.edge == 0.0) return;
   parallel_for(executor_, "welsch reset", faces, ResetEdgeWeights{o});
   for (int sweep = 0; sweep < objective_detail::kReweightingSweeps; ++sweep) {
     parallel_for(executor_, "weingarten fit", faces, FitMap{o});
     edge_offset_ = pending_sum<1>(executor_, "welsch weights", faces, ReweightEdges{o}).get()[0];
+  }
+}
+
+/// Leads facets to the pixels that no facet reaches. @pre frames are up to date.
+template <class Exec>
+void DesignObjectiveOn<Exec>::find_unlit(const ObjectiveView& o) {
+  Eigen::Matrix2Xd centroids(2, o.mesh.faces);
+  const std::span<double> centroids_here(centroids.data(),
+                                         static_cast<std::size_t>(centroids.size()));
+  Buffer<double> measured(centroids_here.size());
+  parallel_for(executor_, "face centroids", o.mesh.faces, FaceCentroid{o, measured.data()});
+  download(executor_, std::span<const double>(measured.data(), measured.size()), centroids_here);
+  const auto flux = flux_.render(executor_, o.mesh.faces, FaceLightSource{o});
+  std::vector<double> light(flux.size());
+  download(executor_, flux, std::span<double>(light));
+  for (double& value : light) value *= target_total_;
+  const LitPicture picture{flux_.columns(), flux_.rows(), light, wanted_light_};
+  const std::vector<std::int32_t> led = lead_to_unlit_pixels(picture, centroids);
+  const auto is_led = [](std::int32_t pixel) { return pixel != kNoPixel; };
+  if (std::any_of(led.begin(), led.end(), is_led)) {
+    led_ = buffer_of(executor_, std::span<const std::int32_t>(led));
   }
 }
 
@@ -222,7 +253,7 @@ struct DesignObjectiveOn<Exec>::Sums {
   Pending<1> image;
   Pending<1> gradient;
   Pending<3> images;  ///< Smooth model: E_bdr, E_align, E_flux.
-  Pending<6> faces;   ///< FaceSums
+  Pending<7> faces;   ///< FaceSums
   Pending<1> laplacian;
 };
 
@@ -249,7 +280,7 @@ void DesignObjectiveOn<Exec>::pull_back(const ObjectiveView& o, double* gradient
     sums.images = pending_sum<3>(executor_, "flux adjoint", faces, PullBackImage{o});
     parallel_for(executor_, "pull back vertices", o.mesh.vertices, PullBackVertex{o});
   }
-  sums.faces = pending_sum<6>(executor_, "face adjoint", faces, PullBackFace{o});
+  sums.faces = pending_sum<7>(executor_, "face adjoint", faces, PullBackFace{o});
   parallel_for(executor_, "gather vertices", o.mesh.vertices, GatherVertex{o, gradient});
 }
 
@@ -271,13 +302,14 @@ EnergyValues DesignObjectiveOn<Exec>::energies(const Sums& sums) const {
   e.image = sums.image.get()[0];
   e.gradient = sums.gradient.get()[0];
   e.boundary = facets ? faces[0] : images[0];
-  e.align = facets ? faces[1] : images[1];
-  e.flux = facets ? faces[2] : images[2];
-  e.barrier = faces[3];
-  e.face = faces[4];
-  if (w.smooth > 0.0) e.edge = faces[5] + edge_offset_;
+  e.unlit = faces[1];
+  e.align = facets ? faces[2] : images[1];
+  e.flux = facets ? faces[3] : images[2];
+  e.barrier = faces[4];
+  e.face = faces[5];
+  if (w.smooth > 0.0) e.edge = faces[6] + edge_offset_;
   e.laplacian = pixels_per_area() * sums.laplacian.get()[0];
-  e.total = w.image * e.image + w.gradient * e.gradient + w.boundary * e.boundary +
+  e.total = w.image * (e.image + e.unlit) + w.gradient * e.gradient + w.boundary * e.boundary +
             w.align * e.align + w.flux * e.flux +
             w.smooth * (e.face + w.edge * e.edge + w.laplacian * e.laplacian) +
             w.barrier * e.barrier;

@@ -8,6 +8,7 @@
 #include "design/energy/face_frame.h"
 #include "design/energy/mesh_view.h"
 #include "design/energy/objective_options.h"
+#include "design/energy/unlit_pixels.h"
 #include "design/energy/weingarten.h"
 #include "design/flux/flux_triangle.h"
 #include "design/optics/projection.h"
@@ -28,6 +29,8 @@ struct ObjectiveView {
   FluxCotangent cotangent;
   const double* wanted_centroids;  ///< 2 × F, Correspondence::centroids; null for a picture.
   const double* wanted_flux;       ///< F, Correspondence::flux.
+  const double* target;            ///< Display-encoded, row by row; of a picture.
+  const std::int32_t* led;         ///< F, lead_to_unlit_pixels(); null if no facet is led.
 
   FaceFrame* frames;
   WeingartenMap* maps;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "core/optical_setup.h"
+
 namespace lensforge {
 
 /// Weights of the objective (Sun et al., Eqs. 17, 18 and 20). All ≥ 0; values of their Appendix E
@@ -11,11 +13,8 @@ namespace lensforge {
 ///   0.0058 and 0.0031, portrait 0.0084, 0.0071 and 0.0072. Even E_grad itself ends lower on the
 ///   logo without it (23, 16, 14).
 /// - λ4, for which it has 20: what E_edge weighs hangs on ν, whose scale the paper leaves open, and
-///   with the ν of plan_levels() its share of the total soon exceeds the picture's. Facets, MAE in
-///   thousandths after six rounds with 2e-2, 2e-3 and 2e-4: 128² portrait 3.3, 3.2 and 3.1; 96²
-///   logo 0.50, 0.36 and 0.42; 64² relief with 2.5 vertices per pixel side 0.060, 0.015 and 0.006.
-///   Smooth, 128² portrait with 2e-2 and 2e-3: by the normals 1.7 and 1.0, as a surface 2.8
-///   and 2.2.
+///   with the ν of plan_levels() its share of the total soon exceeds the picture's. See
+///   default_smoothness().
 /// Lengths enter the terms in working-picture pixels, the paper's unit of length.
 struct ObjectiveWeights {
   double image = 1e2;       ///< λ1, E_img
@@ -29,9 +28,19 @@ struct ObjectiveWeights {
   double flux = 1e1;        ///< γ2, E_flux
 };
 
+/// λ4 by what is optimised. MAE in thousandths after six rounds with 2e-3, 2e-4 and 2e-5. Facets:
+/// 64² relief with 2.5 vertices per pixel side 0.012, 0.006 and 0.001, butterfly so 0.024, 0.012
+/// and 0.005, city so 0.35, 0.21 and 0.18; 128² portrait 2.5, 2.6 and 2.6; 256 × 128 calligraphy
+/// 2.9, 2.8 and 2.8. Smooth, as a surface: 128² portrait 1.75, 1.76 and 1.78, 96² logo 4.7 and,
+/// with 2e-5, 6.0.
+inline double default_smoothness(SurfaceModel model) {
+  return model == SurfaceModel::kFacet ? 2e-5 : 2e-3;
+}
+
 /// Values of the terms before weighting, and the weighted total.
 struct EnergyValues {
   double image = 0.0;
+  double unlit = 0.0;  ///< E_unlit, weighted by λ1 as well; see unlit_term.h.
   double gradient = 0.0;
   double boundary = 0.0;
   double barrier = 0.0;

@@ -37,6 +37,10 @@ double mass_error(const SiteLevel& level, const PowerCells& cells) {
   return ((masses_of(cells) - level.masses).array().abs() / level.masses.array()).maxCoeff();
 }
 
+double misplaced_share(const SiteLevel& level, const PowerCells& cells) {
+  return 0.5 * (masses_of(cells) - level.masses).lpNorm<1>() / level.masses.sum();
+}
+
 bool balance_masses(const SiteLevel& level, const NewtonControl& control, const Executor& executor,
                     CellStage& stage, PowerState& state) {
   const double least = 0.5 * std::min(masses_of(state.cells).minCoeff(), level.masses.minCoeff());

@@ -29,6 +29,9 @@ PowerState power_state(const SiteLevel& level, const Eigen::VectorXd& weights,
 /// max |mass − wanted| / wanted.
 double mass_error(const SiteLevel& level, const PowerCells& cells);
 
+/// Share of all mass that is in the wrong cell, ½ Σ |mass − wanted|.
+double misplaced_share(const SiteLevel& level, const PowerCells& cells);
+
 /// What one accepted step did.
 struct NewtonStep {
   double length = 0.0;      ///< Share of the Newton direction.

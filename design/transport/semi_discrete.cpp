@@ -121,6 +121,7 @@ class TransportSolver {
         cell_centroids(state.diagram, cells_->density(), cells_->moments(state.edges));
     const Eigen::VectorXd& weights = state.diagram.weights();
     result_.mass_error = mass_error(level(0), cells);
+    result_.misplaced = misplaced_share(level(0), cells);
     result_.weights.resize(sites.cols());
     result_.centroids.resize(2, sites.cols());
     result_.areas = Eigen::VectorXd::Zero(sites.cols());

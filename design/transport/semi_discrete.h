@@ -53,6 +53,7 @@ struct TransportResult {
   Eigen::VectorXd areas;
   Eigen::VectorXd lit_areas;  ///< n, pixels²: the same without what is black (kBlack).
   double mass_error = 0.0;    ///< max |mass − wanted| / wanted over the sites of positive mass.
+  double misplaced = 1.0;  ///< Share of all mass that is in the wrong cell, ½ Σ |mass − wanted|.
   std::vector<TransportStep> steps;
 
   [[nodiscard]] bool converged() const { return status == Status::kConverged; }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <limits>
 #include <utility>
 
 #include "core/image_plane.h"
@@ -24,6 +25,11 @@ constexpr double kLeastShrinkage = 0.01;
 
 /// Most passes of smoothing against that; one is enough for that step.
 constexpr int kMostSmoothing = 8;
+
+/// See favour_dark().
+constexpr double kDarkPower = 0.3;
+constexpr double kDarkCost = 0.1;
+constexpr int kDarkHalvings = 10;  ///< Of the interval that p is sought in.
 
 /// Wanted density of vertices on the lens, drawn on a grid of setup.pixels.
 Image vertex_density(const ServedAreas& served, double share, const OpticalSetup& setup,
@@ -104,6 +110,32 @@ bool in_order(const SurfaceMesh& moved, const SurfaceMesh& before) {
 }
 
 }  // namespace
+
+Eigen::VectorXd favour_dark(const ServedAreas& served) {
+  const Eigen::Index faces = served.areas.size();
+  Eigen::ArrayXd light(faces);
+  for (Eigen::Index f = 0; f < faces; ++f) {
+    const auto corner = [&](int k) -> Eigen::Vector2d {
+      return served.mesh.corner(f, k).head<2>();
+    };
+    light[f] = 0.5 * doubled_area(corner(0), corner(1), corner(2));
+  }
+  const double all = served.areas.sum();
+  const Eigen::ArrayXd brightness =
+      light / light.sum() / (served.areas.array() / all).max(std::numeric_limits<double>::min());
+  const auto favoured = [&](double power) -> Eigen::VectorXd {
+    return served.areas.array() * brightness.pow(-power);
+  };
+  const double most = (1.0 + kDarkCost) * all;
+  double low = 0.0;
+  double high = kDarkPower;
+  if (favoured(high).sum() <= most) low = high;
+  for (int k = 0; low < high && k < kDarkHalvings; ++k) {
+    const double middle = 0.5 * (low + high);
+    (favoured(middle).sum() <= most ? low : high) = middle;
+  }
+  return favoured(low);
+}
 
 bool spread_vertices(const ServedAreas& served, double share, const OpticalSetup& setup,
                      const Executor& executor, const RunControl& control, SurfaceMesh& mesh) {

@@ -34,13 +34,15 @@ Checkpoint sample() {
   checkpoint.mesh = make_grid_mesh({10.0, 8.0}, {7, 6}, 5.0);
   testing::Random random(1);
   for (double& x : checkpoint.mesh.vertices.reshaped()) x += random.magnitude(1e-17, 1.0);
+  checkpoint.scales = {1e-3 * checkpoint.mesh.vertices, 1.0 / 3.0, 1e-9 / 7.0};
   for (int i = 1; i <= 3; ++i) {
     ConvergenceRow row;
     row.stage = "render";
     row.level = 1;
     row.round = 2;
     row.iteration = i;
-    row.energy = {0.1 * i, 1e-17, 1e17, 1.0 / 3.0, 0.2, 0.3, 0.4, 1.0 / 9.0, 1e-9 / 3.0, 1e-300};
+    row.energy = {0.1 * i, 0.7, 1e-17,     1e17,       1.0 / 3.0, 0.2,
+                  0.3,     0.4, 1.0 / 9.0, 1e-9 / 3.0, 1e-300};
     row.mass_error = 1.0 / 11.0;
     row.mae = 1.0 / 7.0;
     row.seconds = 0.7 * i;
@@ -85,6 +87,9 @@ TEST(Checkpoint, ComesBackToTheBit) {
   EXPECT_EQ(after.mesh.vertices, before.mesh.vertices);
   EXPECT_EQ(after.mesh.triangles, before.mesh.triangles);
   EXPECT_EQ(after.mesh.grid, before.mesh.grid);
+  EXPECT_EQ(after.scales.reach, before.scales.reach);
+  EXPECT_EQ(after.scales.xy, before.scales.xy);
+  EXPECT_EQ(after.scales.z, before.scales.z);
   EXPECT_EQ(convergence_csv(after.convergence), convergence_csv(before.convergence));
   ASSERT_EQ(after.convergence.size(), 3U);
   EXPECT_EQ(after.convergence[2].energy.barrier, 1.0 / 3.0);
@@ -106,6 +111,14 @@ TEST(Checkpoint, AValueThatIsNotKnownYetStaysInfinite) {
     EXPECT_EQ(after.value, kInfinity);
     EXPECT_EQ(after.transporting, transporting);
   }
+}
+
+TEST(Checkpoint, ScalesThatAreNotKnownYetStayUnknown) {
+  const TempFolder folder;
+  Checkpoint before = sample();
+  before.scales = {};
+  write_checkpoint(before, folder / "checkpoint");
+  EXPECT_FALSE(read_checkpoint(folder / "checkpoint").scales.known());
 }
 
 TEST(Checkpoint, LeavesNothingBesideIt) {
@@ -141,7 +154,7 @@ TEST(Checkpoint, ExtraBytesAreRefused) {
 
 TEST(Checkpoint, AnotherVersionIsRefused) {
   const TempFolder folder;
-  const std::string other = forged(sample_bytes(folder), "checkpoint 2", "checkpoint 1");
+  const std::string other = forged(sample_bytes(folder), "checkpoint 3", "checkpoint 2");
   EXPECT_THAT(refusal_of(folder, other), HasSubstr("version"));
 }
 

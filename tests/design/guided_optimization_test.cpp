@@ -90,6 +90,31 @@ TEST(GuidedOptimization, KeepsTheOutline) {
   }
 }
 
+TEST(GuidedOptimization, KnownScalesAreKeptAndOthersMeasured) {
+  SurfaceMesh mesh = make_grid_mesh(kSize, kShape, 5.0);
+  GuidedOptimization stage(mesh, kSetup, testing::spot_picture(28, 20), options_for(mesh),
+                           Executor::serial());
+  LbfgsOptions options;
+  options.max_iterations = 4;
+  StepScales scales;
+  stage.run(options, go_on, scales, mesh);
+  ASSERT_TRUE(scales.known());
+  const StepScales first = scales;
+  const SurfaceMesh middle = mesh;
+  stage.run(options, go_on, scales, mesh);
+  EXPECT_EQ(scales.reach, first.reach);
+  EXPECT_EQ(scales.xy, first.xy);
+  EXPECT_EQ(scales.z, first.z);
+  SurfaceMesh measured = middle;
+  stage.run(options, go_on, measured);
+  EXPECT_NE(measured.vertices, mesh.vertices);
+  SurfaceMesh again = middle;
+  GuidedOptimization fresh(middle, kSetup, testing::spot_picture(28, 20), options_for(middle),
+                           Executor::serial());
+  fresh.run(options, go_on, scales, again);
+  EXPECT_EQ(again.vertices, mesh.vertices);
+}
+
 TEST(GuidedOptimization, OutcomeDependsOnTheMeshAlone) {
   SurfaceMesh first = make_grid_mesh(kSize, kShape, 5.0);
   GuidedOptimization stage(first, kSetup, testing::spot_picture(28, 20), options_for(first),

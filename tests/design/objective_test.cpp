@@ -149,7 +149,7 @@ TEST_P(ObjectiveModels, TotalIsTheWeightedSumOfTheTerms) {
   DesignObjective objective = objective_of(mesh, options_of(GetParam(), kWeights));
   const EnergyValues e = evaluate_at(objective, mesh.vertices).energy;
   EXPECT_NEAR(e.total,
-              1e2 * e.image + 1e3 * e.gradient + 1e-3 * e.boundary +
+              1e2 * (e.image + e.unlit) + 1e3 * e.gradient + 1e-3 * e.boundary +
                   2e1 * (e.face + 3.0 * e.edge + 0.2 * e.laplacian) + 1e-8 * e.barrier,
               1e-12 * e.total);
   for (const double term :

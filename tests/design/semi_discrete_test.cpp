@@ -228,6 +228,25 @@ TEST(SemiDiscrete, SaysThatAStageRanOutOfSteps) {
   EXPECT_NE(result.message.find("limit"), std::string::npos);
 }
 
+TEST(SemiDiscrete, SaysHowMuchLightIsMisplaced) {
+  const Eigen::Matrix2Xd sites = testing::face_sites(16, 40);
+  const Image picture = testing::spot_picture(40, 40);
+  EXPECT_LT(solve(sites, picture).misplaced, 1e-4);
+  TransportOptions rough;
+  rough.max_stage_steps = 1;  // Ends on a blurred picture.
+  const auto count = static_cast<double>(sites.cols());
+  const TransportResult result = solve_semi_discrete(sites, Eigen::VectorXd::Ones(sites.cols()),
+                                                     picture, rough, Executor::serial(), {});
+  ASSERT_EQ(result.weights.size(), sites.cols());
+  const PowerDiagram diagram(sites, result.weights, spatial_order(sites), {});
+  const std::vector<double> mass =
+      measure_cells(diagram, SummedDensity(picture, count), Executor::serial()).mass;
+  double wrong = 0.0;
+  for (const double m : mass) wrong += 0.5 * std::fabs(m - 1.0);
+  EXPECT_GT(result.misplaced, 1e-4);
+  EXPECT_NEAR(result.misplaced, wrong / count, 1e-9);
+}
+
 TEST(SemiDiscrete, SaysThatItRanOutOfSteps) {
   TransportOptions options;
   options.max_newton_steps = 2;

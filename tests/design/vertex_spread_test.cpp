@@ -49,6 +49,57 @@ double largest_motion(const SurfaceMesh& mesh) {
   return (mesh.vertices - make_grid_mesh(kSize, kShape, 5.0).vertices).cwiseAbs().maxCoeff();
 }
 
+/// A twentieth of the lens serves a third of the picture.
+double dark_corner(double x, double y) { return x < 0.25 && y < 0.2 ? 10.0 : 1.0; }
+
+TEST(FavourDark, EvenBrightnessChangesNothing) {
+  const SurfaceMesh mesh = make_grid_mesh(kSize, kShape, 5.0);
+  const Eigen::VectorXd areas = image_area(mesh, uniform);
+  EXPECT_LT((favour_dark({mesh, areas}) - areas).cwiseAbs().maxCoeff(), 1e-9 * areas.maxCoeff());
+}
+
+TEST(FavourDark, WeighsByAPowerOfTheBrightness) {
+  const SurfaceMesh mesh = make_grid_mesh(kSize, kShape, 5.0);
+  const Eigen::VectorXd areas = image_area(mesh, dark_spot);
+  const Eigen::VectorXd weighed = favour_dark({mesh, areas});
+  // Of two faces of the same size one is as many times darker as it serves more.
+  const Eigen::ArrayXd light = projected_areas(mesh).array();
+  const Eigen::ArrayXd darkness = areas.array() / light;
+  const Eigen::ArrayXd weight = weighed.array() / areas.array();
+  Eigen::Index dark = 0;
+  Eigen::Index bright = 0;
+  darkness.maxCoeff(&dark);
+  darkness.minCoeff(&bright);
+  const double power =
+      std::log(weight[dark] / weight[bright]) / std::log(darkness[dark] / darkness[bright]);
+  for (Eigen::Index f = 0; f < areas.size(); ++f) {
+    EXPECT_NEAR(weight[f] / weight[bright], std::pow(darkness[f] / darkness[bright], power), 1e-9);
+  }
+  EXPECT_GT(power, 0.0);
+  EXPECT_LE(power, 0.3 + 1e-12);
+}
+
+TEST(FavourDark, TakesNoMoreThanATenthFromTheOthers) {
+  const SurfaceMesh mesh = make_grid_mesh(kSize, kShape, 5.0);
+  const Eigen::VectorXd some = image_area(mesh, dark_corner);
+  const Eigen::VectorXd half = image_area(mesh, left_half_serves_three_quarters);
+  for (const Eigen::VectorXd& areas : {some, half}) {
+    const double cost = favour_dark({mesh, areas}).sum() / areas.sum();
+    EXPECT_GT(cost, 1.001);
+    EXPECT_LE(cost, 1.1);
+  }
+  EXPECT_NEAR(favour_dark({mesh, some}).sum() / some.sum(), 1.1, 1e-3);
+}
+
+TEST(FavourDark, BlackServesNothingStill) {
+  const SurfaceMesh mesh = make_grid_mesh(kSize, kShape, 5.0);
+  Eigen::VectorXd areas = image_area(mesh, falling_ramp);
+  areas.head(areas.size() / 3).setZero();
+  const Eigen::VectorXd weighed = favour_dark({mesh, areas});
+  EXPECT_EQ(weighed.head(areas.size() / 3).cwiseAbs().maxCoeff(), 0.0);
+  EXPECT_TRUE(weighed.allFinite());
+}
+
 TEST(VertexSpread, AnEvenlyServedPictureLeavesTheMesh) {
   EXPECT_LT(largest_motion(spread(uniform, 0.9)), 1e-4);
 }
