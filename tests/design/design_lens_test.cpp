@@ -253,6 +253,7 @@ TEST(DesignLens, ConvergenceCsvHasALineForEveryRow) {
   row.stage = "render";
   row.iteration = 7;
   row.energy.image = 0.25;
+  row.energy.unlit = 0.5;
   row.energy.align = 3.5;
   row.energy.flux = 4.5;
   row.mass_error = 0.75;
@@ -262,11 +263,11 @@ TEST(DesignLens, ConvergenceCsvHasALineForEveryRow) {
   std::string line;
   std::getline(csv, header);
   EXPECT_EQ(header,
-            "stage,level,round,iteration,image,gradient,boundary,barrier,face,edge,laplacian,align,"
-            "flux,total,mass_error,mae,seconds");
+            "stage,level,round,iteration,image,unlit,gradient,boundary,barrier,face,edge,laplacian,"
+            "align,flux,total,mass_error,mae,seconds");
   int lines = 0;
   while (std::getline(csv, line)) {
-    EXPECT_EQ(line, "render,0,0,7,0.25,0,0,0,0,0,0,3.5,4.5,0,0.75,0.125,0");
+    EXPECT_EQ(line, "render,0,0,7,0.25,0.5,0,0,0,0,0,0,3.5,4.5,0,0.75,0.125,0");
     ++lines;
   }
   EXPECT_EQ(lines, 2);
