@@ -33,7 +33,7 @@ constexpr double kTransportTolerance = 1e-2;
 constexpr int kMostNewtonSteps = 150;
 
 /// On a mesh that has been spread: Newton steps under one blur and floor after which its own
-/// transport ends, the share of the light that may be in the wrong place then (a few cells with
+/// transport ends, the share of the light that may be in the wrong place then (cells that hold
 /// next to no light hold up all others), and the share of black pixels above which it is not tried
 /// (logo, 69 % black, spread over dark and bright: 43 and 59 steps in two stages, and no end).
 constexpr int kMostStageSteps = 25;
