@@ -24,8 +24,10 @@ inline constexpr double kUnlitMargin = 0.25;
 /// @param pixel  row by row from the top of a picture of `columns`.
 LF_HD inline double unlit_term(const ImageTriangle& t, std::int64_t pixel, std::int64_t columns,
                                double wanted, double weight, ImageTriangle& bar) {
-  const Eigen::Vector2d inner(static_cast<double>(pixel % columns) + kUnlitMargin,
-                              static_cast<double>(pixel / columns) + kUnlitMargin);
+  const std::int64_t row = pixel / columns;
+  const std::int64_t column = pixel % columns;
+  const Eigen::Vector2d inner(static_cast<double>(column) + kUnlitMargin,
+                              static_cast<double>(row) + kUnlitMargin);
   const double side = 1.0 - 2.0 * kUnlitMargin;
   const Eigen::Vector2d offset = excess_outside((t.p0 + t.p1 + t.p2) / 3.0 - inner, side, side);
   const double stiffness = wanted * wanted;
