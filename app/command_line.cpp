@@ -11,6 +11,7 @@
 #include "app/exit_code.h"
 #include "app/option_set.h"
 #include "core/error.h"
+#include "core/version.h"
 
 namespace lensforge::app {
 namespace {
@@ -34,8 +35,8 @@ constexpr std::array kSubcommands{
 };
 
 std::string overall_help() {
-  std::string text = "lensforge " + std::string(version()) +
-                     ": from a picture to the milled lens that projects it\n\nUsage:\n";
+  std::string text =
+      program_mark() + ": from a picture to the milled lens that projects it\n\nUsage:\n";
   for (const Subcommand& command : kSubcommands) {
     const std::string usage = std::string("  lensforge ") + command.usage;
     text += usage + std::string(38 - std::min<std::size_t>(usage.size(), 37), ' ') +

@@ -4,23 +4,15 @@
 #include <sys/ioctl.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
 
 #include "core/error.h"
+#include "core/printable.h"
 
 namespace lensforge::app {
 namespace {
-
-/// Messages quote what the user typed and what libraries say; both may hold line breaks.
-std::string on_one_line(std::string text) {
-  while (!text.empty() && (text.back() == '\n' || text.back() == ' ')) text.pop_back();
-  std::replace_if(
-      text.begin(), text.end(), [](char c) { return c == '\n' || c == '\r' || c == '\t'; }, ' ');
-  return text;
-}
 
 /// File names need not be UTF-8, which JSON has to be: other bytes become U+FFFD.
 std::string dump(const nlohmann::json& object) {
@@ -45,7 +37,7 @@ void print_to_stdout(std::string_view text) {
 
 int report_error(const std::string& message, int exit_code, bool json) noexcept {
   try {
-    const std::string line = on_one_line(message);
+    const std::string line = printable_line(message);
     std::fprintf(stderr, "lensforge: %s\n", line.c_str());
     if (json) print_to_stdout(dump({{"error", line}, {"exit_code", exit_code}}));
   } catch (const std::exception&) {
@@ -55,7 +47,7 @@ int report_error(const std::string& message, int exit_code, bool json) noexcept 
 }
 
 void Console::note(const std::string& message) const {
-  if (!quiet_) std::fprintf(stderr, "lensforge: %s\n", on_one_line(message).c_str());
+  if (!quiet_) std::fprintf(stderr, "lensforge: %s\n", printable_line(message).c_str());
 }
 
 void Console::result(const nlohmann::json& object, const std::string& text) const {

@@ -20,6 +20,7 @@
 #include "core/error.h"
 #include "core/files.h"
 #include "core/image_io.h"
+#include "core/version.h"
 #include "design/design_lens.h"
 
 namespace lensforge::app {
@@ -141,7 +142,7 @@ std::vector<std::string> changes_made(const LoadedImage& loaded, const DesignArg
 nlohmann::json provenance(const OptionSet& options, const ChosenDevice& device,
                           const DesignResult& result) {
   const bool done = result.status == DesignResult::Status::kDone;
-  return {{"program", "lensforge " + std::string(version())},
+  return {{"program", program_mark()},
           {"options", options.used()},
           {"seconds", result.convergence.empty() ? 0.0 : result.convergence.back().seconds},
           {"device", device.word},
@@ -152,7 +153,7 @@ nlohmann::json provenance(const OptionSet& options, const ChosenDevice& device,
 
 void write_folder(const OutputFolder& folder, const DesignResult& result) {
   write_whole_file(folder.path() / lens_file::kConvergence, convergence_csv(result.convergence));
-  write_image(draw_overview(result.lens), folder.path() / design_file::kOverview);
+  write_image(draw_overview(result.lens), folder.path() / lens_file::kOverview);
   write_lens(result.lens, folder.path());
 }
 
@@ -190,7 +191,7 @@ int finish(const OptionSet& options, const ChosenDevice& device, const OutputFol
   result.lens.provenance = provenance(options, device, result);
   if (result.lens.surface.triangle_count() > 0) write_folder(folder, result);
   std::error_code ignored;
-  if (done) fs::remove(folder.path() / design_file::kCheckpoint, ignored);
+  if (done) fs::remove(folder.path() / lens_file::kCheckpoint, ignored);
   const Console console(options.common().json, options.common().quiet);
   console.result(summary_json(folder.path(), result), summary_text(folder.path(), result));
   if (!done) console.note("interrupted; the same command with --resume goes on");
@@ -232,7 +233,7 @@ int run(const OptionSet& options, DesignArguments& arguments) {
   design.pixels = working_pixels(options, arguments, loaded.image);
   const OutputFolder folder(arguments.out);
   folder.remove_partial_files();
-  design.checkpoint = folder.path() / design_file::kCheckpoint;
+  design.checkpoint = folder.path() / lens_file::kCheckpoint;
   // A design that was killed before its first checkpoint starts at the beginning.
   design.resume = arguments.resume && earlier.checkpoint;
   const ChosenDevice device = options.device_executor();

@@ -14,7 +14,7 @@ namespace fs = std::filesystem;
 EarlierDesign EarlierDesign::in(const fs::path& folder) {
   std::error_code ignored;
   return {.lens = fs::exists(folder / lens_file::kJson, ignored),
-          .checkpoint = fs::exists(folder / design_file::kCheckpoint, ignored)};
+          .checkpoint = fs::exists(folder / lens_file::kCheckpoint, ignored)};
 }
 
 void refuse_to_overwrite(const fs::path& folder, bool resume, bool force) {
@@ -31,7 +31,7 @@ void remove_earlier_design(const fs::path& folder) {
   std::error_code ignored;
   for (const char* name : {lens_file::kJson, lens_file::kSurface, lens_file::kTargetPng,
                            lens_file::kTargetExr, lens_file::kRenderPng, lens_file::kRenderExr,
-                           lens_file::kError, lens_file::kConvergence, design_file::kOverview}) {
+                           lens_file::kError, lens_file::kConvergence, lens_file::kOverview}) {
     fs::remove(folder / name, ignored);
   }
   remove_cut(folder / "cam");

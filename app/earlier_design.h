@@ -5,12 +5,6 @@
 
 namespace lensforge::app {
 
-/// Names that `design` adds to those of core/lens.h.
-namespace design_file {
-inline constexpr const char* kCheckpoint = "checkpoint.bin";
-inline constexpr const char* kOverview = "overview.png";
-}  // namespace design_file
-
 /// What an output folder holds of an earlier design.
 struct EarlierDesign {
   bool lens = false;        ///< A lens.json: of a finished or an interrupted design.

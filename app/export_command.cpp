@@ -14,6 +14,7 @@
 #include "core/image_io.h"
 #include "core/lens.h"
 #include "core/mesh_io.h"
+#include "core/version.h"
 #include "design/render_lens.h"
 #include "export/closed_solid.h"
 #include "export/height_map.h"
@@ -123,7 +124,7 @@ using Report = StepReport;
 
 void write_solid(const Source& source, Format format, const std::string& out, Report& report) {
   const SurfaceMesh solid = closed_solid(source.lens.surface, source.name);
-  const std::string title = "lensforge " + std::string(version()) + " lens, millimetres";
+  const std::string title = program_mark() + " lens, millimetres";
   if (format == Format::kStl) write_stl(solid, title, out);
   if (format == Format::kObj) write_obj(solid, title, out);
   if (format == Format::kPly) write_ply(solid, out);

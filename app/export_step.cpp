@@ -13,6 +13,7 @@
 #include "app/json_output.h"
 #include "app/progress_display.h"
 #include "core/error.h"
+#include "core/version.h"
 #include "design/render_lens.h"
 #include "design/wanted_picture.h"
 #include "export/closed_solid.h"
@@ -42,7 +43,7 @@ StepHeader header_of(const fs::path& source, const std::string& author) {
   return {.name = "lensforge lens",
           .description = "optical surface sha256:" + identify_job(source).sha256,
           .author = author,
-          .program = "lensforge " + std::string(version()),
+          .program = program_mark(),
           .time_stamp = time_of(source)};
 }
 

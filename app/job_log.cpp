@@ -8,6 +8,7 @@
 #include "app/json_output.h"
 #include "app/operator_view.h"
 #include "core/error.h"
+#include "core/version.h"
 
 namespace lensforge::app {
 namespace {
@@ -57,7 +58,7 @@ void JobLog::line(const std::string& text) {
 }
 
 void JobLog::begin(const OptionSet& options, const JobIdentity& job) {
-  line("lensforge " + std::string(version()) + " send " + options.used().dump());
+  line(program_mark() + " send " + options.used().dump());
   line("program " + job.name + ", " + std::to_string(job.bytes) + " bytes, sha256 " + job.sha256);
 }
 

@@ -10,6 +10,7 @@
 #include "core/error.h"
 #include "core/gpu.h"
 #include "core/units.h"
+#include "core/version.h"
 
 namespace lensforge::app {
 namespace {
@@ -86,9 +87,7 @@ class Formatter : public CLI::Formatter {
 
 }  // namespace
 
-std::string_view version() { return LENSFORGE_VERSION; }
-
-std::string version_line() { return "lensforge " + std::string(version()) + "\n"; }
+std::string version_line() { return program_mark() + "\n"; }
 
 struct OptionSet::Parser {
   Parser(const std::string& command, const std::string& description)
@@ -206,7 +205,7 @@ void OptionSet::add_common() {
   app.set_config("--config", "", "read options from this TOML file; the command line wins")
       ->type_name("FILE.toml");
   app.set_help_flag("-h,--help", "print this help and exit");
-  app.set_version_flag("--version", "lensforge " + std::string(version()), "print the version");
+  app.set_version_flag("--version", program_mark(), "print the version");
   for (const char* name :
        {"--json", "--quiet", "--threads", "--device", "--config", "--help", "--version"}) {
     app.get_option(name)->group(kCommonGroup);

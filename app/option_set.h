@@ -21,7 +21,6 @@ struct HelpText {
   std::string text;
 };
 
-std::string_view version();
 /// "lensforge x.y.z" and a line break.
 std::string version_line();
 

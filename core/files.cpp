@@ -2,10 +2,11 @@
 #include "core/files.h"
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
-#include <cstdint>
 #include <cstring>
 #include <random>
 #include <string>
@@ -18,6 +19,8 @@ namespace lensforge {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr std::string_view kPartial = ".partial-";
 
 std::string reason(int error) { return std::generic_category().message(error); }
 
@@ -56,8 +59,8 @@ Beside make_beside(const fs::path& path) {
   std::random_device random;
   for (;;) {
     const std::string number = std::to_string(random());
-    const std::string name = std::string(".").append(path.stem().string()) + ".partial-" + number +
-                             path.extension().string();
+    const std::string name = std::string(".").append(path.stem().string()).append(kPartial) +
+                             number + path.extension().string();
     fs::path beside = path.parent_path() / name;
     const Descriptor file(::open(beside.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0666));
     if (file.number() >= 0) return {std::move(beside), 0};
@@ -88,6 +91,24 @@ void write_all(int descriptor, std::string_view content, const fs::path& named_i
     if (written < 0) fail_to_write(named_in_error, errno);
     content.remove_prefix(static_cast<std::size_t>(written));
   }
+}
+
+/// What kind of thing that is no regular file a path names.
+const char* kind_of(mode_t mode) {
+  if (S_ISDIR(mode)) return "a folder";
+  if (S_ISFIFO(mode)) return "a named pipe";
+  if (S_ISSOCK(mode)) return "a socket";
+  return "a device";
+}
+
+[[noreturn]] void fail_to_read(const fs::path& path, int error) {
+  throw InputError(path.string() + ": cannot be read: " + reason(error));
+}
+
+void require_regular(const struct stat& status, const fs::path& path) {
+  if (S_ISREG(status.st_mode)) return;
+  throw InputError(path.string() + ": is " + kind_of(status.st_mode) +
+                   "; only regular files are read");
 }
 
 }  // namespace
@@ -130,6 +151,44 @@ void write_whole_file(const fs::path& path, std::string_view content) {
     write_all(file.number(), content, path);
     if (const int error = file.close(); error != 0) fail_to_write(path, error);
   });
+}
+
+bool is_partial_name(std::string_view name) {
+  const std::size_t found = name.rfind(kPartial);
+  if (!name.starts_with('.') || found == std::string_view::npos || found < 2) return false;
+  const std::string_view number = name.substr(found + kPartial.size());
+  const std::size_t digits = std::min(number.find_first_not_of("0123456789"), number.size());
+  return digits > 0 && (digits == number.size() || number[digits] == '.');
+}
+
+void require_regular_file(const fs::path& path) {
+  struct stat status {};
+  if (::stat(path.c_str(), &status) != 0) fail_to_read(path, errno);
+  require_regular(status, path);
+  // A missing right is named here, since libraries give no reason.
+  if (::access(path.c_str(), R_OK) != 0) fail_to_read(path, errno);
+}
+
+std::ifstream open_input(const fs::path& path) {
+  require_regular_file(path);
+  std::ifstream file(path, std::ios::binary);
+  if (!file) fail_to_read(path, errno);
+  return file;
+}
+
+std::string read_whole_file(const fs::path& path, std::uintmax_t max_bytes) {
+  std::ifstream file = open_input(path);
+  std::error_code error;
+  const std::uintmax_t size = fs::file_size(path, error);
+  if (error) fail_to_read(path, error.value());
+  if (size > max_bytes) {
+    throw InputError(path.string() + ": has " + std::to_string(size) + " bytes; at most " +
+                     std::to_string(max_bytes) + " are read");
+  }
+  std::string content(size, '\0');
+  file.read(content.data(), static_cast<std::streamsize>(size));
+  content.resize(static_cast<std::size_t>(file.gcount()));
+  return content;
 }
 
 void require_writable_folder(const fs::path& folder) {

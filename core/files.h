@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
+#include <fstream>
 #include <functional>
+#include <string>
 #include <string_view>
 
 namespace lensforge {
@@ -38,6 +41,21 @@ void write_whole_file(const std::filesystem::path& path,
 
 /// write_whole_file() for content that is already in memory.
 void write_whole_file(const std::filesystem::path& path, std::string_view content);
+
+/// Whether `name` is one that PendingFile gives to a file beside: .STEM.partial-NUMBER and an
+/// extension.
+bool is_partial_name(std::string_view name);
+
+/// The check of open_input() alone, for libraries that open files by name themselves.
+void require_regular_file(const std::filesystem::path& path);
+
+/// Opens a regular file to be read; never waits, as a named pipe or a device would make it.
+/// @throw InputError naming the path and why: missing, no permission, a folder, a named pipe, ...
+std::ifstream open_input(const std::filesystem::path& path);
+
+/// All bytes of a regular file. @throw InputError as open_input() does, and if they are more than
+/// `max_bytes`.
+std::string read_whole_file(const std::filesystem::path& path, std::uintmax_t max_bytes);
 
 /// Makes `folder` (and its parents) if need be and proves that files can be made in it.
 /// @throw InputError naming the folder and the system's reason.

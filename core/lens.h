@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
@@ -33,6 +34,17 @@ inline constexpr const char* kRenderPng = "render.png";
 inline constexpr const char* kRenderExr = "render.exr";
 inline constexpr const char* kError = "error.png";
 inline constexpr const char* kConvergence = "convergence.csv";
+inline constexpr const char* kOverview = "overview.png";
+inline constexpr const char* kCheckpoint = "checkpoint.bin";  ///< While a design is unfinished.
+
+/// All of them.
+inline constexpr std::array kAll = {kJson,      kSurface, kTargetPng, kTargetExr,   kRenderPng,
+                                    kRenderExr, kError,   kOverview,  kConvergence, kCheckpoint};
+
+/// The folder inside that `cam` writes into, and what is in it beside the programs.
+inline constexpr const char* kCut = "cam";
+inline constexpr std::array kCutFiles = {"report.html", "report.json", "milled.ply", "milled.png",
+                                         "leakage.png"};
 }  // namespace lens_file
 
 /// Writes every file of the lens folder but convergence.csv; each is written beside and renamed,

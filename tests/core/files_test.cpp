@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <fstream>
 #include <string>
@@ -161,6 +162,41 @@ TEST(Files, RequireWritableFolderRefusesWhereNoFileCanBeMade) {
   // Not even the administrator can make files in /proc.
   EXPECT_THAT(message_of<InputError>([] { require_writable_folder("/proc"); }),
               StartsWith("/proc: files cannot be made in this folder: "));
+}
+
+TEST(Files, OnlyRegularFilesAreRead) {
+  const TempFolder folder;
+  const fs::path pipe = folder / "pipe";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  const auto refusal = [](const fs::path& path) {
+    return message_of<InputError>([&] { open_input(path); });
+  };
+  EXPECT_THAT(refusal(pipe), AllOf(HasSubstr("pipe: is a named pipe"), HasSubstr("regular")));
+  EXPECT_THAT(refusal(folder.path()), HasSubstr("is a folder"));
+  EXPECT_THAT(refusal("/dev/zero"), HasSubstr("is a device"));
+  EXPECT_THAT(refusal(folder / "missing"), HasSubstr("missing: cannot be read: No such file"));
+  write_bytes(folder / "file", "abc");
+  EXPECT_EQ(open_input(folder / "file").get(), 'a');
+}
+
+TEST(Files, AWholeFileIsReadUpToALimit) {
+  const TempFolder folder;
+  const std::string content("a\0b", 3);
+  write_bytes(folder / "file", content);
+  EXPECT_EQ(read_whole_file(folder / "file", 3), content);
+  EXPECT_THAT(message_of<InputError>([&] { read_whole_file(folder / "file", 2); }),
+              HasSubstr("has 3 bytes; at most 2 are read"));
+}
+
+TEST(Files, NamesOfFilesInTheMakingAreKnown) {
+  const TempFolder folder;
+  const PendingFile pending(folder / "picture.exr");
+  EXPECT_TRUE(is_partial_name(pending.beside().filename().string()));
+  EXPECT_TRUE(is_partial_name(".lens.partial-123"));
+  for (const char* name : {"picture.exr", "a.partial-12.exr", ".a.partial-.exr", ".partial-1.exr",
+                           ".a.partial-12x.exr", ".my.partial-notes.txt"}) {
+    EXPECT_FALSE(is_partial_name(name)) << name;
+  }
 }
 
 }  // namespace

@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <string>
+#include <string_view>
+
+namespace lensforge {
+
+/// "x.y.z"
+std::string_view version();
+
+/// "lensforge x.y.z": what every file that the program writes says of itself.
+std::string program_mark();
+
+}  // namespace lensforge
