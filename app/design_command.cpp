@@ -1,5 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
+#include <array>
+#include <cinttypes>
+#include <cstdint>
+#include <cstdio>
 #include <filesystem>
 #include <functional>
 #include <mutex>
@@ -17,10 +21,14 @@
 #include "app/output_folder.h"
 #include "app/overview.h"
 #include "app/progress_display.h"
+#include "cam/cam_job.h"
 #include "core/error.h"
 #include "core/files.h"
+#include "core/folder_lock.h"
 #include "core/image_io.h"
 #include "core/version.h"
+#include "core/work_estimate.h"
+#include "design/design_estimate.h"
 #include "design/design_lens.h"
 
 namespace lensforge::app {
@@ -41,12 +49,15 @@ struct DesignArguments {
 };
 
 void add_lens_options(OptionSet& options, DesignOptions& design) {
-  options.length("--width", design.width, Limits::above(0),
+  options.length("--width", design.width, Limits::between(kMinLensWidth, kMaxLensWidth),
                  "lens width; the height follows the picture");
-  options.length("--focal", design.focal_length, Limits::above(0),
+  options.length("--focal", design.focal_length,
+                 {.low = 0, .high = kMaxFocalLength, .low_excluded = true},
                  "distance from the flat face to the wall");
-  options.number("--ior", design.ior, Limits::above(1), "", "refractive index of the lens");
-  options.length("--thickness", design.thickness, Limits::above(0), "least thickness of the lens");
+  options.number("--ior", design.ior, Limits::between(kMinIor, kMaxIor), "",
+                 "refractive index of the lens");
+  options.length("--thickness", design.thickness, Limits::between(kMinThickness, kMaxThickness),
+                 "least thickness of the lens");
   options.choice("--model", design.model,
                  {{"facet", SurfaceModel::kFacet}, {"smooth", SurfaceModel::kSmooth}},
                  "what bends the light: flat facets, or a surface smooth at every vertex");
@@ -76,7 +87,7 @@ void add_effort_options(OptionSet& options, DesignArguments& arguments) {
 }
 
 void add_weight_options(OptionSet& options, DesignArguments& arguments) {
-  const Limits limits = Limits::at_least(0);
+  const Limits limits = Limits::between(0, kMaxWeight);
   ObjectiveWeights& weights = arguments.design.weights;
   options.number("--smoothness", arguments.smoothness, limits, "", "factor on --weight-smooth");
   options.number("--weight-image", weights.image, limits, "",
@@ -139,6 +150,13 @@ std::vector<std::string> changes_made(const LoadedImage& loaded, const DesignArg
   return changes;
 }
 
+/// 16 hexadecimal digits: JSON's numbers do not hold 64 bits.
+std::string fingerprint_text(std::uint64_t fingerprint) {
+  std::array<char, 17> text{};
+  std::snprintf(text.data(), text.size(), "%016" PRIx64, fingerprint);
+  return text.data();
+}
+
 nlohmann::json provenance(const OptionSet& options, const ChosenDevice& device,
                           const DesignResult& result) {
   const bool done = result.status == DesignResult::Status::kDone;
@@ -148,13 +166,23 @@ nlohmann::json provenance(const OptionSet& options, const ChosenDevice& device,
           {"device", device.word},
           {"threads", device.executor.concurrency()},
           {"status", done ? "done" : "interrupted"},
-          {"message", result.message}};
+          {"message", result.message},
+          {"fingerprint", fingerprint_text(result.fingerprint)}};
 }
 
-void write_folder(const OutputFolder& folder, const DesignResult& result) {
+/// Puts the lens in the place of what was there. The cut of an earlier lens goes with it: milled,
+/// it would not be this one.
+void write_folder(const OutputFolder& folder, const DesignResult& result, const Console& console) {
   write_whole_file(folder.path() / lens_file::kConvergence, convergence_csv(result.convergence));
   write_image(draw_overview(result.lens), folder.path() / lens_file::kOverview);
   write_lens(result.lens, folder.path());
+  const fs::path cut = folder.path() / lens_file::kCut;
+  std::error_code ignored;
+  if (!fs::is_directory(cut, ignored)) return;
+  remove_cut(cut);
+  if (!fs::remove(cut, ignored)) {
+    console.note(cut.string() + ": holds files that lensforge did not write; they stay");
+  }
 }
 
 nlohmann::json summary_json(const fs::path& folder, const DesignResult& result) {
@@ -183,17 +211,22 @@ std::string summary_text(const fs::path& folder, const DesignResult& result) {
          fixed(lens.provenance["seconds"].get<double>(), 1) + " s\n";
 }
 
-/// Stores what came out and says so. @return the exit code.
+/// Stores what came out and says so. An earlier lens of another design stays until this one is
+/// done. @return the exit code.
 int finish(const OptionSet& options, const ChosenDevice& device, const OutputFolder& folder,
            DesignResult& result) {
   if (result.status == DesignResult::Status::kFailed) throw RunError(result.message);
+  const Console console(options.common().json, options.common().quiet);
   const bool done = result.status == DesignResult::Status::kDone;
   result.lens.provenance = provenance(options, device, result);
-  if (result.lens.surface.triangle_count() > 0) write_folder(folder, result);
+  const EarlierDesign earlier = EarlierDesign::in(folder.path());
+  const bool replaces = earlier.lens && !earlier.is_of(fingerprint_text(result.fingerprint));
+  const bool keeps = replaces && !done;
+  if (result.lens.surface.triangle_count() > 0 && !keeps) write_folder(folder, result, console);
   std::error_code ignored;
   if (done) fs::remove(folder.path() / lens_file::kCheckpoint, ignored);
-  const Console console(options.common().json, options.common().quiet);
   console.result(summary_json(folder.path(), result), summary_text(folder.path(), result));
+  if (keeps) console.note(folder.path().string() + " keeps its earlier lens until then");
   if (!done) console.note("interrupted; the same command with --resume goes on");
   return done ? kDone : kInterrupted;
 }
@@ -220,27 +253,54 @@ DesignResult shape(bool quiet, const Executor& executor, const DesignOptions& de
   return result;
 }
 
+/// What the design is about to take. @throw InputError with the size that would fit if disk or
+/// memory do not hold it.
+WorkEstimate required_room(const DesignArguments& arguments, const Image& picture, int threads) {
+  const auto estimate = [&](int pixels) {
+    DesignOptions design = arguments.design;
+    design.pixels = pixels;
+    return estimate_design(picture.columns(), picture.rows(), design, threads);
+  };
+  const double memory = free_memory_bytes();
+  const double disk = free_disk_bytes(arguments.out);
+  int fits = arguments.design.pixels;
+  while (fits > kLeastPixels &&
+         (estimate(fits).memory_bytes > memory || estimate(fits).disk_bytes > disk)) {
+    fits = fits * 9 / 10;
+  }
+  const WorkEstimate expected = estimate(arguments.design.pixels);
+  require_room(expected, arguments.out, "--pixels " + std::to_string(arguments.design.pixels),
+               "--pixels " + std::to_string(fits) + " would fit");
+  return expected;
+}
+
 int run(const OptionSet& options, DesignArguments& arguments) {
   const InterruptWatch interrupt;
   const Console console(options.common().json, options.common().quiet);
-  refuse_to_overwrite(arguments.out, arguments.resume, arguments.force);
-  const LoadedImage loaded = read_image(arguments.target);
   const EarlierDesign earlier = EarlierDesign::in(arguments.out);
-  if (arguments.resume && earlier.lens && !earlier.checkpoint) {
-    return report_finished(arguments, console);
-  }
+  refuse_to_overwrite(arguments.out, earlier, arguments.resume, arguments.force);
+  const LoadedImage loaded = read_image(arguments.target);
   DesignOptions& design = arguments.design;
   design.pixels = working_pixels(options, arguments, loaded.image);
-  const OutputFolder folder(arguments.out);
-  folder.remove_partial_files();
-  design.checkpoint = folder.path() / lens_file::kCheckpoint;
-  // A design that was killed before its first checkpoint starts at the beginning.
-  design.resume = arguments.resume && earlier.checkpoint;
+  if (arguments.resume && earlier.lens && !earlier.checkpoint) {
+    require_finished(arguments.out, earlier,
+                     fingerprint_text(design_identity(loaded.image, design)));
+    return report_finished(arguments, console);
+  }
   const ChosenDevice device = options.device_executor();
+  const WorkEstimate expected =
+      required_room(arguments, loaded.image, device.executor.concurrency());
+  const OutputFolder folder(arguments.out);
+  const FolderLock lock(folder.path(), FolderLock::Kind::kExclusive);
+  design.checkpoint = folder.path() / lens_file::kCheckpoint;
+  design.resume = arguments.resume && earlier.checkpoint;
   const auto begin = [&] {
+    folder.remove_partial_files();
     if (device.executor.device() != Device::kCpu) console.note("computing on " + device.word);
     for (const std::string& change : changes_made(loaded, arguments)) console.note(change);
-    if (arguments.force && !design.resume) remove_earlier_design(folder.path());
+    if (expected.seconds > kWorthTelling) console.note("takes " + estimate_words(expected));
+    // A design that was killed before its first checkpoint starts at the beginning.
+    if (arguments.resume && !design.resume) console.note("nothing to resume: the design begins");
   };
   DesignResult result = shape(options.common().quiet, device.executor, design, loaded.image,
                               interrupt.token(), begin);

@@ -1,41 +1,109 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "app/earlier_design.h"
 
+#include <string_view>
 #include <system_error>
 
-#include "cam/cam_job.h"
 #include "core/error.h"
+#include "core/files.h"
 #include "core/lens.h"
+#include "core/output_guard.h"
+#include "design/design_lens.h"
 
 namespace lensforge::app {
+namespace {
 
 namespace fs = std::filesystem;
 
+/// A lens.json is a few kilobytes; convergence.csv's first line is looked at only.
+constexpr std::uintmax_t kMostJson = 1 << 20;
+
+bool is_own_table(const fs::path& path) {
+  const std::string header = convergence_csv({});
+  std::string start(header.size(), '\0');
+  open_input(path).read(start.data(), static_cast<std::streamsize>(start.size()));
+  return start == header;
+}
+
+/// Whether lensforge wrote this file of a lens folder, by what it says of itself.
+bool is_own(const fs::path& path) {
+  std::error_code ignored;
+  if (fs::file_size(path, ignored) == 0) return true;
+  if (path.filename() == lens_file::kConvergence) return is_own_table(path);
+  return written_by_lensforge(path);
+}
+
+nlohmann::json provenance_of(const fs::path& json) {
+  const nlohmann::json document =
+      nlohmann::json::parse(read_whole_file(json, kMostJson), nullptr, false);
+  return document.is_object() ? document.value("provenance", nlohmann::json()) : nlohmann::json();
+}
+
+[[noreturn]] void refuse(const fs::path& folder, const std::string& holds) {
+  throw InputError("--out " + folder.string() + ": holds " + holds);
+}
+
+/// What no option lets a design replace.
+void require_files(const fs::path& folder) {
+  for (const char* name : lens_file::kAll) {
+    std::error_code ignored;
+    const fs::file_status status = fs::status(folder / name, ignored);
+    if (!fs::exists(status) || fs::is_regular_file(status)) continue;
+    refuse(folder, std::string(name) + ", which is no regular file; choose another folder");
+  }
+}
+
+}  // namespace
+
 EarlierDesign EarlierDesign::in(const fs::path& folder) {
   std::error_code ignored;
-  return {.lens = fs::exists(folder / lens_file::kJson, ignored),
-          .checkpoint = fs::exists(folder / lens_file::kCheckpoint, ignored)};
-}
-
-void refuse_to_overwrite(const fs::path& folder, bool resume, bool force) {
-  const EarlierDesign earlier = EarlierDesign::in(folder);
-  if (resume || force || (!earlier.lens && !earlier.checkpoint)) return;
-  throw InputError("--out " + folder.string() + ": holds " +
-                   (earlier.lens ? "a lens" : "an unfinished design") +
-                   " already; choose another folder, go on with --resume or replace it with "
-                   "--force");
-}
-
-void remove_earlier_design(const fs::path& folder) {
-  // lens.json goes first: without it the folder is no lens any more.
-  std::error_code ignored;
-  for (const char* name : {lens_file::kJson, lens_file::kSurface, lens_file::kTargetPng,
-                           lens_file::kTargetExr, lens_file::kRenderPng, lens_file::kRenderExr,
-                           lens_file::kError, lens_file::kConvergence, lens_file::kOverview}) {
-    fs::remove(folder / name, ignored);
+  EarlierDesign earlier;
+  for (const char* name : lens_file::kAll) {
+    const fs::path path = folder / name;
+    if (!fs::is_regular_file(path, ignored)) continue;
+    if (name == std::string_view(lens_file::kJson)) {
+      earlier.lens = true;
+      earlier.provenance = provenance_of(path);
+    } else if (name == std::string_view(lens_file::kCheckpoint)) {
+      earlier.checkpoint = true;
+    } else if (!is_own(path)) {
+      earlier.foreign.emplace_back(name);
+    }
   }
-  remove_cut(folder / "cam");
-  fs::remove(folder / "cam", ignored);
+  return earlier;
+}
+
+bool EarlierDesign::is_of(const std::string& fingerprint) const {
+  return provenance.is_object() && provenance.value("fingerprint", nlohmann::json()) == fingerprint;
+}
+
+void refuse_to_overwrite(const fs::path& folder, const EarlierDesign& earlier, bool resume,
+                         bool force) {
+  require_files(folder);
+  if (force || (resume && earlier.lens)) return;
+  if (!resume && (earlier.lens || earlier.checkpoint)) {
+    refuse(folder, std::string(earlier.lens ? "a lens" : "an unfinished design") +
+                       " already; choose another folder, go on with --resume or replace it with "
+                       "--force");
+  }
+  if (earlier.foreign.empty()) return;
+  refuse(folder, earlier.foreign.front() +
+                     " already, which lensforge did not write; choose another folder or replace "
+                     "it with --force");
+}
+
+void require_finished(const fs::path& folder, const EarlierDesign& earlier,
+                      const std::string& fingerprint) {
+  if (!earlier.provenance.is_object()) refuse(folder, "a lens.json that cannot be understood");
+  if (earlier.provenance.value("status", nlohmann::json()) == "interrupted") {
+    refuse(folder, std::string("an unfinished design whose ") + lens_file::kCheckpoint +
+                       " is missing: there is nothing to resume; begin again with --force");
+  }
+  if (earlier.provenance.contains("fingerprint") && !earlier.is_of(fingerprint)) {
+    refuse(folder,
+           "the finished lens of another picture or other options: there is nothing to resume; "
+           "choose another folder or replace it with --force");
+  }
 }
 
 }  // namespace lensforge::app

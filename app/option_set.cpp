@@ -8,6 +8,7 @@
 
 #include "app/toml_config.h"
 #include "core/error.h"
+#include "core/files.h"
 #include "core/gpu.h"
 #include "core/units.h"
 #include "core/version.h"
@@ -223,6 +224,11 @@ void OptionSet::parse(const Arguments& arguments) {
     }
   }
   app.config_formatter(std::make_shared<TomlConfig>(names));
+  app.get_option("--config")->check([](const std::string& file) {
+    if (file.empty()) throw InputError("--config: must not be empty");
+    require_regular_file(file);
+    return std::string();
+  });
   try {
     // CLI11 takes its arguments last one first.
     app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));

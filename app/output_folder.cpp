@@ -24,14 +24,10 @@ OutputFolder::~OutputFolder() {
 }
 
 void OutputFolder::remove_partial_files() const {
-  // write_whole_file() names them .NAME.partial-NUMBER.EXTENSION.
   std::error_code ignored;
   std::vector<fs::path> partial;
   for (const auto& entry : fs::directory_iterator(path_, ignored)) {
-    const std::string name = entry.path().filename().string();
-    if (name.front() == '.' && name.find(".partial-") != std::string::npos) {
-      partial.push_back(entry.path());
-    }
+    if (is_partial_name(entry.path().filename().string())) partial.push_back(entry.path());
   }
   for (const fs::path& path : partial) fs::remove_all(path, ignored);
 }

@@ -17,7 +17,8 @@ class OutputFolder {
 
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
 
-  /// Removes what a process that was killed here was about to write.
+  /// Removes what a process that was killed here was about to write. @pre the folder is locked
+  /// (FolderLock): what a live process is writing must not go.
   void remove_partial_files() const;
 
  private:

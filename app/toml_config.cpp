@@ -4,9 +4,11 @@
 #include <toml++/toml.h>
 
 #include <algorithm>
+#include <exception>
 #include <sstream>
 
 #include "core/error.h"
+#include "core/files.h"
 
 namespace lensforge::app {
 namespace {
@@ -52,6 +54,15 @@ std::vector<CLI::ConfigItem> TomlConfig::from_config(std::istream& input) const 
     read.push_back(std::move(item));
   }
   return read;
+}
+
+bool config_asks_for_json(const std::filesystem::path& file) noexcept {
+  try {
+    std::ifstream input = open_input(file);
+    return parsed(input)["json"].value_or(false);
+  } catch (const std::exception&) {
+    return false;  // What is wrong with it is told where its options are read.
+  }
 }
 
 }  // namespace lensforge::app

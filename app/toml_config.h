@@ -2,6 +2,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <filesystem>
 #include <string>
 #include <utility>
 #include <vector>
@@ -26,5 +27,8 @@ class TomlConfig : public CLI::Config {
  private:
   std::vector<std::string> keys_;
 };
+
+/// Whether a --config file has `json = true`; false for one that cannot be read.
+bool config_asks_for_json(const std::filesystem::path& file) noexcept;
 
 }  // namespace lensforge::app

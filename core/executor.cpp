@@ -2,10 +2,12 @@
 #include "core/executor.h"
 
 #include <tbb/blocked_range.h>
+#include <tbb/info.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <chrono>
 #include <utility>
 
@@ -46,7 +48,9 @@ Executor Executor::serial() { return {}; }
 
 Executor Executor::cpu(int threads) {
   Executor executor;
-  executor.arena_ = std::make_shared<Arena>(threads > 0 ? threads : +tbb::task_arena::automatic);
+  // TBB warns on the terminal of more than it has workers for, and would not start them.
+  const int most = tbb::info::default_concurrency();
+  executor.arena_ = std::make_shared<Arena>(threads > 0 ? std::min(threads, most) : most);
   return executor;
 }
 

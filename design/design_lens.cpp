@@ -5,16 +5,19 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <optional>
 #include <sstream>
 
 #include "core/error.h"
 #include "core/image_io.h"
+#include "core/number_text.h"
 #include "design/checkpoint.h"
 #include "design/crease_alignment.h"
 #include "design/face_transport.h"
 #include "design/grid_mesh.h"
 #include "design/guided_optimization.h"
 #include "design/level_plan.h"
+#include "design/reach.h"
 #include "design/render_lens.h"
 #include "design/transport/vertex_spread.h"
 
@@ -44,13 +47,6 @@ constexpr double kMostBlack = 0.3;
 /// 512² logo, 942,080 sites were not done after 11 processor minutes, 235,520 in 80 s at most.
 constexpr double kMostEvenFaces = 250000.0;
 
-/// Times that heights are fitted to a transport; each brings them nearer by the sag over the focal
-/// length, a hundredth or so.
-constexpr int kAimPasses = 3;
-
-/// Shortest side of a working picture: below it there is nothing to shape.
-constexpr int kLeastPixels = 4;
-
 /// Steps in which a mesh that a new level's barriers refuse is drawn back to the even grid.
 constexpr int kRelaxSteps = 10;
 
@@ -74,6 +70,11 @@ void rest_on_thickness(SurfaceMesh& mesh, double thickness) {
   mesh.vertices.row(2).array() += thickness - mesh.vertices.row(2).minCoeff();
 }
 
+Image working_picture(const Image& target, const DesignOptions& options) {
+  const Eigen::Vector2i pixels = working_size(target.columns(), target.rows(), options.pixels);
+  return resample(target, pixels.x(), pixels.y());
+}
+
 /// Share of the pixels that are black (kBlack).
 double black_share(const Image& picture) {
   const auto pixels = static_cast<double>(picture.values().size());
@@ -84,57 +85,14 @@ double black_share(const Image& picture) {
          pixels;
 }
 
-void require(bool rule, const std::string& option, double value, const char* text) {
-  if (rule) return;
-  std::ostringstream message;
-  message << option << " is " << value << ": " << text;
-  throw InputError(message.str());
-}
-
-void validate_weights(const ObjectiveWeights& w) {
-  const auto check = [](const char* name, double value) {
-    require(std::isfinite(value) && value >= 0.0, name, value,
-            "a weight must be a number of at least 0");
-  };
-  check("--weight-image", w.image);
-  check("--weight-gradient", w.gradient);
-  check("--weight-boundary", w.boundary);
-  check("--weight-smooth", w.smooth);
-  check("--weight-barrier", w.barrier);
-  check("--weight-edge", w.edge);
-  check("--weight-laplacian", w.laplacian);
-  check("--weight-align", w.align);
-  check("--weight-flux", w.flux);
-}
-
-void validate_options(const DesignOptions& o) {
-  require(std::isfinite(o.width) && o.width > 0.0, "--width", o.width, "must be above 0 mm");
-  require(std::isfinite(o.ior) && o.ior > 1.0, "--ior", o.ior, "must be above 1");
-  require(std::isfinite(o.thickness) && o.thickness > 0.0, "--thickness", o.thickness,
-          "must be above 0 mm");
-  require(std::isfinite(o.focal_length) && o.focal_length > o.thickness, "--focal", o.focal_length,
-          "must be above the thickness of the lens (mm)");
-  require(o.pixels >= 1 && o.pixels <= kMaxImageSide, "--pixels", o.pixels, "must be 1 to 16384");
-  require(o.mesh_ratio >= 0.25 && o.mesh_ratio <= 8.0, "--mesh-ratio", o.mesh_ratio,
-          "must be 0.25 to 8");
-  require(o.levels >= 1, "--levels", o.levels, "must be at least 1");
-  require(o.rounds >= 1, "--rounds", o.rounds, "must be at least 1");
-  require(o.iterations >= 1, "--iterations", o.iterations, "must be at least 1");
-  require(o.transport_rounds >= 0, "--transport-rounds", o.transport_rounds, "must be at least 0");
-  require(o.update_iterations >= 0, "--update-iterations", o.update_iterations,
-          "must be at least 0");
-  require(o.spread >= 0.0 && o.spread <= 0.95, "--spread", o.spread, "must be 0 to 0.95");
-  validate_weights(o.weights);
-}
-
 /// The coarse-to-fine schedule of one design, level by level and round by round.
 class Schedule {
  public:
   Schedule(const Image& target, const DesignOptions& options, const Executor& executor,
            const RunControl& control)
       : options_(options), executor_(executor), control_(control) {
-    const Eigen::Vector2i pixels = working_size(target.columns(), target.rows(), options.pixels);
-    target_ = resample(target, pixels.x(), pixels.y());
+    target_ = working_picture(target, options);
+    const Eigen::Vector2i pixels(target_.columns(), target_.rows());
     setup_ = make_setup(options, pixels);
     levels_ = plan_levels(pixels, options);
     state_.fingerprint = design_fingerprint(target_, options);
@@ -145,11 +103,22 @@ class Schedule {
 
   DesignResult run() {
     save();
-    while (state_.level < static_cast<int>(levels_.size()) && !ended()) run_level_unless_stopped();
+    try {
+      run_levels();
+    } catch (const InputError&) {
+      // It could only be resumed to fail again, and would be in the way of better options.
+      std::error_code ignored;
+      std::filesystem::remove(options_.checkpoint, ignored);
+      throw;
+    }
     return finish();
   }
 
  private:
+  void run_levels() {
+    while (state_.level < static_cast<int>(levels_.size()) && !ended()) run_level_unless_stopped();
+  }
+
   void resume() {
     Checkpoint saved = read_checkpoint(options_.checkpoint);
     if (saved.fingerprint != state_.fingerprint) {
@@ -213,8 +182,13 @@ class Schedule {
   void run_round(const Problem& problem, GuidedOptimization& stage) {
     const SurfaceMesh before = state_.mesh;
     const bool transports = state_.transporting && state_.round < options_.transport_rounds;
-    if (transports) transport(problem);
+    const std::optional<Correspondence> wanted = transports ? transport(problem) : std::nullopt;
+    const bool first = wanted && state_.level == 0 && state_.round == 0;
+    const SurfaceMesh aimed = first ? state_.mesh : SurfaceMesh();
     relax(stage);
+    if (first && !std::isfinite(stage.value(state_.mesh))) {
+      refuse_unreachable(problem, *wanted, aimed);
+    }
     const bool rescaled = !state_.scales.known();
     if (options_.rendering_guided) follow_picture(stage);
     if (ended()) return;
@@ -234,10 +208,10 @@ class Schedule {
     if (state_.round < options_.rounds) save();
   }
 
-  /// The correspondence-guided half of a round; the mesh stays as it is where transport finds
-  /// nothing. Works on a copy: a mesh that an interruption left between two steps would be of no
-  /// use.
-  void transport(const Problem& problem) {
+  /// The correspondence-guided half of a round: where the light is to land. The mesh stays as it is
+  /// where transport finds nothing. Works on a copy: a mesh that an interruption left between two
+  /// steps would be of no use.
+  std::optional<Correspondence> transport(const Problem& problem) {
     SurfaceMesh mesh = state_.mesh;
     TransportOptions options;
     options.tolerance = kTransportTolerance;
@@ -247,22 +221,34 @@ class Schedule {
     Matching matching = match(problem, even, options);
     if (matching.result.centroids.cols() == 0) {
       state_.transporting = false;
-      return;
+      return std::nullopt;
     }
     if (!matching.result.converged()) {
       remark_ = "; transport of round " + std::to_string(state_.round + 1) + " ended early (" +
                 matching.result.message + ")";
     }
     if (begins) matching = fit_mesh(problem, even, matching, mesh);
-    const Correspondence wanted{std::move(matching.result.centroids),
-                                std::move(matching.light.flux)};
-    // Heights enter the aim themselves, and lifting the surface scales the picture.
-    for (int pass = 0; pass < kAimPasses; ++pass) {
-      aim_faces(wanted, problem.setup, stoppable_, mesh);
-      rest_on_thickness(mesh, options_.thickness);
-    }
+    Correspondence wanted{std::move(matching.result.centroids), std::move(matching.light.flux)};
+    aim_surface(wanted, problem.setup, options_.thickness, stoppable_, mesh);
     if (options_.update_iterations > 0) follow_correspondence(problem, wanted, mesh);
     state_.mesh = std::move(mesh);
+    return wanted;
+  }
+
+  /// @param aimed  the first surface, before its mesh was relaxed.
+  [[noreturn]] void refuse_unreachable(const Problem& problem, const Correspondence& wanted,
+                                       const SurfaceMesh& aimed) const {
+    report("looking for a focal length that would do", 0);
+    const std::optional<double> focal_length = reachable_focal_length(
+        {aimed, wanted, problem.setup, problem.target, problem.objective, options_.thickness},
+        stoppable_);
+    const std::string advice =
+        focal_length ? "--focal " + number_text(*focal_length) + "mm would do"
+                     : "no focal length up to " + number_text(kMaxFocalLength) + " mm would do";
+    throw InputError("--focal " + number_text(options_.focal_length) +
+                     ": no lens of this width and index bends the light so far in so short a "
+                     "distance; " +
+                     advice);
   }
 
   /// An even mesh of the same proportions, fine enough for the transport that shapes the mesh.
@@ -430,6 +416,7 @@ class Schedule {
                                   facet ? &lens.render : nullptr, executor_);
     lens.smooth_metrics = evaluate(lens.surface, setup_, SurfaceModel::kSmooth, target_,
                                    facet ? nullptr : &lens.render, executor_);
+    result.fingerprint = state_.fingerprint;
     result.convergence = std::move(state_.convergence);
     // Rounds that ended early have left a rest.
     if (result.status == Status::kDone) {
@@ -457,16 +444,12 @@ class Schedule {
 
 DesignResult design_lens(const Image& target, const DesignOptions& options,
                          const Executor& executor, const RunControl& control) {
-  validate_options(options);
-  require(std::max(target.columns(), target.rows()) >= options.pixels, "--pixels", options.pixels,
-          "must be at most the picture's longer side");
-  const Eigen::Vector2i pixels = working_size(target.columns(), target.rows(), options.pixels);
-  require(pixels.minCoeff() >= kLeastPixels, "the working picture's shorter side",
-          pixels.minCoeff(), "must be at least 4 pixels");
-  if (!(target.total() > 0.0)) {
-    throw InputError("the picture is all black: there is no light to place");
-  }
+  validate(options, target);
   return Schedule(target, options, executor, control).run();
+}
+
+std::uint64_t design_identity(const Image& target, const DesignOptions& options) {
+  return design_fingerprint(working_picture(target, options), options);
 }
 
 std::string convergence_csv(const std::vector<ConvergenceRow>& rows) {

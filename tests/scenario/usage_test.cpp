@@ -68,7 +68,7 @@ TEST_F(Usage, SecondValueIsRefused) {
 TEST_F(Usage, OptionsThatBreakTheirRuleAreRefused) {
   expect_option_refused({"--focal", "0"}, {"--focal", "0", "above 0"});
   expect_option_refused({"--focal", "-3cm"}, {"--focal", "-3cm", "above 0"});
-  expect_option_refused({"--ior", "0.9"}, {"--ior", "0.9", "above 1"});
+  expect_option_refused({"--ior", "0.9"}, {"--ior", "0.9", "1.01 to 10"});
   expect_option_refused({"--ior", "nan"}, {"--ior", "nan"});
   expect_option_refused({"--width", "10furlongs"}, {"--width", "furlongs"});
   expect_option_refused({"--width", "inf"}, {"--width", "inf"});
@@ -76,7 +76,7 @@ TEST_F(Usage, OptionsThatBreakTheirRuleAreRefused) {
   expect_option_refused({"--rounds", "2.5"}, {"--rounds", "2.5", "whole number"});
   expect_option_refused({"--quality", "best"}, {"--quality", "best", "draft, standard, paper"});
   expect_option_refused({"--mesh-ratio", "9"}, {"--mesh-ratio", "9", "0.25 to 8"});
-  expect_option_refused({"--weight-edge", "-1"}, {"--weight-edge", "-1", "at least 0"});
+  expect_option_refused({"--weight-edge", "-1"}, {"--weight-edge", "-1", "0 to 1e+12"});
   expect_option_refused({"--threads", "-1"}, {"--threads", "-1"});
   expect_option_refused({"--pixels", "193"}, {"--pixels 193", "192"});
   expect_option_refused({"--thickness", "40cm"}, {"--focal", "thickness"});
@@ -95,6 +95,27 @@ TEST_F(Usage, AnErrorWithJsonIsAnObjectAndALine) {
   EXPECT_EQ(outcome.err, "lensforge: " + outcome.json()["error"].get<std::string>() + "\n");
 }
 
+TEST_F(Usage, AConfigFileThatAsksForJsonIsHeededByErrorsToo) {
+  write(at("json.toml"), "json = true\n");
+  for (const Arguments& last : {Arguments{"--config", path("json.toml")},
+                                Arguments{"--config=" + path("json.toml"), "--ior", "0.5"}}) {
+    Arguments arguments = {"design", path("none.png"), "--out", path("lens")};
+    arguments.insert(arguments.end(), last.begin(), last.end());
+    const Outcome outcome = run(arguments);
+    EXPECT_EQ(outcome.exit_code, 2);
+    EXPECT_EQ(outcome.json()["exit_code"], 2);
+  }
+}
+
+TEST_F(Usage, MoreThreadsThanProcessorsAreNoError) {
+  Arguments arguments = small_design(picture("rings.png"), path("lens"));
+  arguments.back() = "1024";
+  arguments.emplace_back("--quiet");
+  const Outcome outcome = run(arguments);
+  EXPECT_EQ(outcome.exit_code, 0);
+  EXPECT_EQ(outcome.err, "");
+}
+
 TEST_F(Usage, ConfigFileSetsOptionsAndTheCommandLineWins) {
   write(at("lens.toml"),
         "pixels = 16\nior = 1.6 # glass\nwidth = \"4cm\"\nrounds = 1\n"
@@ -111,12 +132,14 @@ TEST_F(Usage, BrokenConfigFilesAreRefused) {
   write(at("unknown.toml"), "pixles = 16\n");
   expect_option_refused({"--config", path("unknown.toml")}, {"--config", "pixles"});
   write(at("value.toml"), "ior = 0.5\n");
-  expect_option_refused({"--config", path("value.toml")}, {"--ior 0.5", "above 1"});
+  expect_option_refused({"--config", path("value.toml")}, {"--ior 0.5", "1.01 to 10"});
   write(at("syntax.toml"), "pixels = = 3\n");
   expect_option_refused({"--config", path("syntax.toml")}, {"--config", "line 1"});
   write(at("table.toml"), "[design]\npixels = 3\n");
   expect_option_refused({"--config", path("table.toml")}, {"--config", "design"});
-  expect_option_refused({"--config", path("missing.toml")}, {"missing.toml"});
+  expect_option_refused({"--config", path("missing.toml")}, {"missing.toml", "No such file"});
+  expect_option_refused({"--config", path("")}, {"is a folder"});
+  expect_option_refused({"--config", ""}, {"--config: must not be empty"});
 }
 
 TEST_F(Usage, AResultThatCannotBePrintedFails) {

@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "core/work_estimate.h"
+#include "design/design_options.h"
+
+namespace lensforge {
+
+/// What a design of a picture of `columns` x `rows` pixels is about to take on `threads` threads of
+/// the CPU. Iterations count as if none were spared.
+/// @pre the options are in their ranges.
+WorkEstimate estimate_design(int columns, int rows, const DesignOptions& options, int threads);
+
+}  // namespace lensforge
