@@ -173,9 +173,14 @@ nlohmann::json provenance(const OptionSet& options, const ChosenDevice& device,
 /// Puts the lens in the place of what was there. The cut of an earlier lens goes with it: milled,
 /// it would not be this one.
 void write_folder(const OutputFolder& folder, const DesignResult& result, const Console& console) {
-  write_whole_file(folder.path() / lens_file::kConvergence, convergence_csv(result.convergence));
-  write_image(draw_overview(result.lens), folder.path() / lens_file::kOverview);
-  write_lens(result.lens, folder.path());
+  PendingFile convergence(folder.path() / lens_file::kConvergence);
+  write_whole_file(convergence.beside(), convergence_csv(result.convergence));
+  PendingFile overview(folder.path() / lens_file::kOverview);
+  write_image(draw_overview(result.lens), overview.beside());
+  write_lens(result.lens,
+             folder.path());  // A disk that is full is met before any file is replaced.
+  convergence.publish();
+  overview.publish();
   const fs::path cut = folder.path() / lens_file::kCut;
   std::error_code ignored;
   if (!fs::is_directory(cut, ignored)) return;
@@ -253,6 +258,11 @@ DesignResult shape(bool quiet, const Executor& executor, const DesignOptions& de
   return result;
 }
 
+bool is_of_lens(const std::string& name) {
+  return name == lens_file::kStaging ||
+         std::find(lens_file::kAll.begin(), lens_file::kAll.end(), name) != lens_file::kAll.end();
+}
+
 /// What the design is about to take. @throw InputError with the size that would fit if disk or
 /// memory do not hold it.
 WorkEstimate required_room(const DesignArguments& arguments, const Image& picture, int threads) {
@@ -295,7 +305,7 @@ int run(const OptionSet& options, DesignArguments& arguments) {
   design.checkpoint = folder.path() / lens_file::kCheckpoint;
   design.resume = arguments.resume && earlier.checkpoint;
   const auto begin = [&] {
-    folder.remove_partial_files();
+    folder.remove_partial_files(is_of_lens);
     if (device.executor.device() != Device::kCpu) console.note("computing on " + device.word);
     for (const std::string& change : changes_made(loaded, arguments)) console.note(change);
     if (expected.seconds > kWorthTelling) console.note("takes " + estimate_words(expected));

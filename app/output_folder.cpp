@@ -23,11 +23,13 @@ OutputFolder::~OutputFolder() {
   if (!existed_) fs::remove(path_, ignored);  // Only succeeds on an empty folder.
 }
 
-void OutputFolder::remove_partial_files() const {
+void OutputFolder::remove_partial_files(
+    const std::function<bool(const std::string& name)>& ours) const {
   std::error_code ignored;
   std::vector<fs::path> partial;
   for (const auto& entry : fs::directory_iterator(path_, ignored)) {
-    if (is_partial_name(entry.path().filename().string())) partial.push_back(entry.path());
+    const std::string name = name_of_partial(entry.path().filename().string());
+    if (!name.empty() && ours(name)) partial.push_back(entry.path());
   }
   for (const fs::path& path : partial) fs::remove_all(path, ignored);
 }

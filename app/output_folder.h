@@ -2,6 +2,8 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
+#include <string>
 
 namespace lensforge::app {
 
@@ -17,9 +19,9 @@ class OutputFolder {
 
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
 
-  /// Removes what a process that was killed here was about to write. @pre the folder is locked
-  /// (FolderLock): what a live process is writing must not go.
-  void remove_partial_files() const;
+  /// Removes what a process that was killed here was about to write under names that are `ours`.
+  /// @pre the folder is locked (FolderLock): what a live process is writing must not go.
+  void remove_partial_files(const std::function<bool(const std::string& name)>& ours) const;
 
  private:
   std::filesystem::path path_;

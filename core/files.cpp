@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <climits>
 #include <cstring>
 #include <random>
 #include <string>
@@ -59,8 +60,11 @@ Beside make_beside(const fs::path& path) {
   std::random_device random;
   for (;;) {
     const std::string number = std::to_string(random());
-    const std::string name = std::string(".").append(path.stem().string()).append(kPartial) +
-                             number + path.extension().string();
+    const std::string end = std::string(kPartial) + number + path.extension().string();
+    const std::string stem = path.stem().string();
+    // A name that just fits its folder leaves no room for the words that are added.
+    const std::size_t room = NAME_MAX - std::min<std::size_t>(NAME_MAX - 1, end.size() + 1);
+    const std::string name = std::string(".").append(stem, 0, room).append(end);
     fs::path beside = path.parent_path() / name;
     const Descriptor file(::open(beside.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0666));
     if (file.number() >= 0) return {std::move(beside), 0};
@@ -153,12 +157,13 @@ void write_whole_file(const fs::path& path, std::string_view content) {
   });
 }
 
-bool is_partial_name(std::string_view name) {
+std::string name_of_partial(std::string_view name) {
   const std::size_t found = name.rfind(kPartial);
-  if (!name.starts_with('.') || found == std::string_view::npos || found < 2) return false;
-  const std::string_view number = name.substr(found + kPartial.size());
-  const std::size_t digits = std::min(number.find_first_not_of("0123456789"), number.size());
-  return digits > 0 && (digits == number.size() || number[digits] == '.');
+  if (!name.starts_with('.') || found == std::string_view::npos || found < 2) return {};
+  const std::string_view rest = name.substr(found + kPartial.size());
+  const std::size_t digits = std::min(rest.find_first_not_of("0123456789"), rest.size());
+  if (digits == 0 || (digits < rest.size() && rest[digits] != '.')) return {};
+  return std::string(name.substr(1, found - 1)).append(rest.substr(digits));
 }
 
 void require_regular_file(const fs::path& path) {
@@ -194,7 +199,8 @@ std::string read_whole_file(const fs::path& path, std::uintmax_t max_bytes) {
 void require_writable_folder(const fs::path& folder) {
   std::error_code error;
   fs::create_directories(folder, error);
-  if (!fs::is_directory(folder)) {
+  std::error_code ignored;
+  if (!fs::is_directory(folder, ignored)) {
     const std::string why = error ? error.message() : reason(ENOTDIR);
     throw InputError(folder.string() + ": cannot be made a folder: " + why);
   }

@@ -42,9 +42,9 @@ void write_whole_file(const std::filesystem::path& path,
 /// write_whole_file() for content that is already in memory.
 void write_whole_file(const std::filesystem::path& path, std::string_view content);
 
-/// Whether `name` is one that PendingFile gives to a file beside: .STEM.partial-NUMBER and an
-/// extension.
-bool is_partial_name(std::string_view name);
+/// The name that a file in the making is to have: "lens.stl" of PendingFile's
+/// ".lens.partial-7.stl"; empty for a name of another form.
+std::string name_of_partial(std::string_view name);
 
 /// The check of open_input() alone, for libraries that open files by name themselves.
 void require_regular_file(const std::filesystem::path& path);

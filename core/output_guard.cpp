@@ -83,13 +83,14 @@ void require_replaceable(const std::string& option, const fs::path& path, bool f
   if (belongs_to_lens(path)) {
     throw InputError(what + "is a part of the lens folder; choose another name");
   }
-  std::error_code ignored;
-  const fs::file_status status = fs::status(path, ignored);
-  if (!fs::exists(status)) return;
+  std::error_code error;
+  const fs::file_status status = fs::status(path, error);
+  if (status.type() == fs::file_type::not_found) return;
+  if (status.type() == fs::file_type::none) throw InputError(what + error.message());
   if (!fs::is_regular_file(status)) {
     throw InputError(what + "is no regular file and is not replaced; choose another name");
   }
-  if (force || fs::file_size(path, ignored) == 0 || written_by_lensforge(path)) return;
+  if (force || fs::file_size(path, error) == 0 || written_by_lensforge(path)) return;
   throw InputError(what +
                    "is there already and lensforge did not write it; choose another name or "
                    "replace it with --force");

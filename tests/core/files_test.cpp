@@ -191,11 +191,19 @@ TEST(Files, AWholeFileIsReadUpToALimit) {
 TEST(Files, NamesOfFilesInTheMakingAreKnown) {
   const TempFolder folder;
   const PendingFile pending(folder / "picture.exr");
-  EXPECT_TRUE(is_partial_name(pending.beside().filename().string()));
-  EXPECT_TRUE(is_partial_name(".lens.partial-123"));
+  EXPECT_EQ(name_of_partial(pending.beside().filename().string()), "picture.exr");
+  EXPECT_EQ(name_of_partial(".lens.partial-123"), "lens");
   for (const char* name : {"picture.exr", "a.partial-12.exr", ".a.partial-.exr", ".partial-1.exr",
                            ".a.partial-12x.exr", ".my.partial-notes.txt"}) {
-    EXPECT_FALSE(is_partial_name(name)) << name;
+    EXPECT_EQ(name_of_partial(name), "") << name;
+  }
+}
+
+TEST(Files, ANameThatJustFitsItsFolderIsWritten) {
+  const TempFolder folder;
+  for (const std::string& name : {std::string(251, 'n') + ".stl", std::string(255, 'n')}) {
+    write_whole_file(folder / name, "x");
+    EXPECT_EQ(read_bytes(folder / name), "x");
   }
 }
 

@@ -72,6 +72,13 @@ TEST(OutputGuard, TheSameNamesElsewhereAreFree) {
   require_replaceable("--out", folder / "surface.ply", false);
 }
 
+TEST(OutputGuard, NamesThatNoFileCanHaveAreBadInput) {
+  const TempFolder folder;
+  EXPECT_THAT(refusal(folder / (std::string(300, 'n') + ".stl")), HasSubstr("name too long"));
+  fs::create_symlink(folder / "loop.stl", folder / "loop.stl");
+  EXPECT_THAT(refusal(folder / "loop.stl"), HasSubstr("symbolic links"));
+}
+
 TEST(OutputGuard, DevicesAndFoldersAreNeverReplaced) {
   const TempFolder folder;
   EXPECT_THAT(refusal("/dev/null", true), HasSubstr("no regular file"));

@@ -99,6 +99,13 @@ TEST_F(DesignFolder, ARefusedRunLeavesTheFilesThatOthersAreWriting) {
   EXPECT_EQ(listing(at("lens")), std::vector<std::string>{".surface.partial-7.ply"});
 }
 
+TEST_F(DesignFolder, HiddenFilesOfOthersStay) {
+  fs::create_directory(at("lens"));
+  write(at("lens/.thesis.partial-3.odt"), "the user's own");
+  ASSERT_EQ(run(design()).exit_code, 0);
+  EXPECT_EQ(content(at("lens/.thesis.partial-3.odt")), "the user's own");
+}
+
 TEST_F(DesignFolder, OnlyOneDesignAtATimeWorksInIt) {
   Process first(long_design());
   while (!fs::exists(at("lens/checkpoint.bin"))) ASSERT_TRUE(first.runs_for(milliseconds(5)));
