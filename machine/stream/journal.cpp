@@ -3,6 +3,8 @@
 
 #include <fcntl.h>
 #include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -43,6 +45,21 @@ nlohmann::json json_of(const JobProgress& at, const char* kind) {
   return record;
 }
 
+/// Another file than an empty one or a journal is somebody's work. @throw InputError
+void require_own(int descriptor, const fs::path& path) {
+  struct stat about {};
+  if (::fstat(descriptor, &about) != 0 || !S_ISREG(about.st_mode)) {
+    throw InputError(path.string() + ": a journal has to be a file; name one with --journal");
+  }
+  if (about.st_size == 0) return;
+  std::string text(journal_text::kLongestLine, '\0');
+  const ssize_t count = ::pread(descriptor, text.data(), text.size(), 0);
+  text.resize(static_cast<std::size_t>(std::max<ssize_t>(count, 0)));
+  if (journal_text::begins_journal(text.substr(0, text.find('\n')))) return;
+  throw InputError(path.string() +
+                   ": exists and is no journal of lensforge; name another file with --journal");
+}
+
 }  // namespace
 
 std::unique_ptr<Journal> Journal::create(const fs::path& path, const JobIdentity& job,
@@ -73,12 +90,14 @@ std::unique_ptr<Journal> Journal::resume(const fs::path& path, const JournalReco
 
 Journal::Journal(const fs::path& path, const JournalOptions& options, Opening opening)
     : path_(path), options_(options), ahead_(options.reserve_lines) {
-  const int flags = O_RDWR | O_CLOEXEC | (opening == Opening::kCreate ? O_CREAT : 0);
-  file_ = Descriptor(::open(path.c_str(), flags, 0666));
+  const int flags = O_RDWR | O_NONBLOCK | O_NOCTTY | O_CLOEXEC;
+  file_ =
+      Descriptor(::open(path.c_str(), flags | (opening == Opening::kCreate ? O_CREAT : 0), 0666));
   if (!file_.open()) fail(errno);
   if (::flock(file_.number(), LOCK_EX | LOCK_NB) != 0) {
     throw InputError(path.string() + ": another sender is writing this journal");
   }
+  require_own(file_.number(), path);
   // Emptied only now that it is ours.
   if (opening == Opening::kCreate && ::ftruncate(file_.number(), 0) != 0) fail(errno);
   last_flush_ = seconds_now();

@@ -154,6 +154,30 @@ Findings check_program(const ProgramFacts& facts, const ControllerInfo& info) {
   return found;
 }
 
+void check_spindle_range(const ProgramFacts& facts, const std::vector<RegisterMap>& maps,
+                         Findings& found) {
+  for (const RegisterMap& map : maps) {
+    if (!map.spindle || facts.top_rpm <= 0.0) continue;
+    const double least = map.spindle->rpm_min;
+    const double most = map.spindle->rpm_max;
+    if (facts.least_rpm >= least && facts.top_rpm <= most) continue;
+    const double wrong = facts.top_rpm > most ? facts.top_rpm : facts.least_rpm;
+    found.refusals.push_back("the program asks for S" + number(wrong) + ", but the register map " +
+                             map.name + " turns at " + number(least) + " to " + number(most) +
+                             " rpm");
+  }
+}
+
+std::string lack_of_motion(const ProgramFacts& facts) {
+  if (facts.motions > 0) return {};
+  const std::string advice = "; send a program that moves, such as cam writes";
+  if (facts.lines == 0) return "is empty" + advice;
+  const std::string lines = "its " + std::to_string(facts.lines) + " lines";
+  if (facts.sent_lines == 0) return lines + " hold no command" + advice;
+  return lines + (facts.ends ? " up to its end (M2, M30 or %)" : "") +
+         " move nothing: none has G0, G1, G2 or G3 with X, Y or Z" + advice;
+}
+
 StreamRate stream_rate(const ControllerInfo& info, int baud, double round_trip, double mean_bytes) {
   StreamRate rate;
   if (baud > 0) rate.bytes_per_second = baud / kBitsPerByte;

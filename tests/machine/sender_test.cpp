@@ -384,7 +384,8 @@ TEST_F(SenderTest, WithoutLineNumbersTheBoundOfWhatIsDoneIsThePlanner) {
 
 TEST_F(SenderTest, AFullDiskForTheJournalHolds) {
   const testing::TempFolder folder;
-  const auto kept = Journal::create(folder / "job.journal", {std::string(64, 'a'), 1, "a"}, {});
+  const auto kept =
+      Journal::create(folder / "job.journal", {std::string(64, 'a'), 100000, "a"}, {});
   journal = kept.get();
   controller.per_line = 1.0;
   std::string program = "G21 G90\nS1000 M3\nF100\n";
@@ -398,7 +399,8 @@ TEST_F(SenderTest, AFullDiskForTheJournalHolds) {
 TEST_F(SenderTest, TheJournalKnowsHowItEnded) {
   const testing::TempFolder folder;
   {
-    const auto kept = Journal::create(folder / "job.journal", {std::string(64, 'a'), 1, "a"}, {});
+    const auto kept =
+        Journal::create(folder / "job.journal", {std::string(64, 'a'), 100000, "a"}, {});
     journal = kept.get();
     answer_to("X2F500", "error:22\r\n");
     send(kProgram);
