@@ -334,7 +334,7 @@ int send_command(const Arguments& command_line) {
     return kInterrupted;
   } catch (const StreamFault& fault) {
     if (fault.cause() != StopCause::kInterrupted) throw;
-    console.note(fault.what());
+    console.note(std::string(fault.what()) + "; nothing of the program was sent");
     return kInterrupted;
   }
 }

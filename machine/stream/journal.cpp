@@ -11,6 +11,7 @@
 #include <chrono>
 #include <system_error>
 
+#include "core/printable.h"
 #include "machine/stream/journal_text.h"
 
 namespace lensforge {
@@ -22,6 +23,8 @@ namespace fs = std::filesystem;
 constexpr double kShortReserve = 1.0;
 constexpr double kLongReserve = 4.0;
 constexpr std::int64_t kMostAhead = 1 << 16;
+/// Of a program, bytes: as file systems have it.
+constexpr std::size_t kLongestName = 255;
 
 double seconds_now() {
   const auto since = std::chrono::steady_clock::now().time_since_epoch();
@@ -70,7 +73,7 @@ std::unique_ptr<Journal> Journal::create(const fs::path& path, const JobIdentity
                    {"version", journal_text::kVersion},
                    {"sha256", job.sha256},
                    {"bytes", job.bytes},
-                   {"name", job.name}});
+                   {"name", printable_line(job.name, kLongestName)}});
   journal->append({{"kind", "run"}});
   journal->request_flush(true);
   if (options.flush) flush_folder(path.parent_path());
@@ -150,14 +153,14 @@ void Journal::progress(const JobProgress& progress) {
 }
 
 void Journal::note(std::int64_t line, std::string_view text) {
-  append({{"kind", "note"}, {"line", line}, {"text", text}});
+  append({{"kind", "note"}, {"line", line}, {"text", printable_line(text)}});
   request_flush(false);
 }
 
 void Journal::end(std::string_view status, std::string_view reason, const JobProgress& progress) {
   nlohmann::json record = json_of(progress, "end");
   record["status"] = status;
-  record["reason"] = reason;
+  record["reason"] = printable_line(reason);
   append(record);
   request_flush(true);
 }

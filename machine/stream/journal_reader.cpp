@@ -15,9 +15,8 @@ using nlohmann::json;
 
 /// More lines or bytes than any program has; leaves room for sums.
 constexpr std::int64_t kMostLines = std::int64_t{1} << 48;
-/// No machine is larger, mm, and no spindle faster, rpm.
-constexpr double kFarthest = 1e6;
-constexpr double kFastest = 1e7;
+/// Beyond what controllers and register maps can tell of a place, mm, or a speed, rpm.
+constexpr double kLargest = 1e12;
 
 [[noreturn]] void refuse(const fs::path& path, const std::string& why) {
   throw InputError(path.string() + ": " + why);
@@ -51,14 +50,14 @@ class Fields {
   }
 
   [[nodiscard]] double rpm(const char* key) const {
-    return has(key) ? number(record_[key], key, kFastest) : 0.0;
+    return has(key) ? number(record_[key], key) : 0.0;
   }
 
   [[nodiscard]] Eigen::Vector3d point(const json& value, const char* key) const {
     if (!value.is_array() || value.size() != 3) refuse_field(key, "must be three numbers");
     Eigen::Vector3d at;
     for (std::size_t k = 0; k < 3; ++k) {
-      at[static_cast<Eigen::Index>(k)] = number(value[k], key, kFarthest);
+      at[static_cast<Eigen::Index>(k)] = number(value[k], key);
     }
     return at;
   }
@@ -71,10 +70,10 @@ class Fields {
   }
 
  private:
-  [[nodiscard]] double number(const json& value, const char* key, double most) const {
+  [[nodiscard]] double number(const json& value, const char* key) const {
     if (!value.is_number()) refuse_field(key, "must be a number");
     const auto number = value.get<double>();
-    if (!(std::abs(number) <= most)) refuse_field(key, "is beyond what any machine does");
+    if (!(std::abs(number) <= kLargest)) refuse_field(key, "is beyond what any machine does");
     return number;
   }
 

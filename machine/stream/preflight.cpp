@@ -89,6 +89,10 @@ void check_state(const ControllerInfo& info, Findings& found) {
     found.refusals.push_back("the controller is in state " +
                              std::string(state_name(info.status.state)) + "; it must be Idle");
   }
+  if (homing_on(info) && !travel_box(info)) {
+    found.warnings.emplace_back(
+        "the controller tells no travel ($130-$132): where the program moves is not checked");
+  }
   if (!homing_on(info)) {
     found.warnings.emplace_back(
         "$22=0: homing is off, so travel is not checked and nothing can be resumed after a fault");

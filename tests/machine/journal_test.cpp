@@ -201,6 +201,19 @@ TEST_F(Journals, RefuseRecordsThatNoSenderWrites) {
   EXPECT_EQ(read_journal(path()).last.executed, 5);
 }
 
+TEST_F(Journals, TakeTextsOfAnyBytesAndLength) {
+  for (const char byte : {'\x01', '\x80', '"', '\\', '\n'}) {
+    const std::string text(5000, byte);
+    JobIdentity job = kJob;
+    job.name = text;
+    const auto journal = Journal::create(path(), job, {});
+    journal->note(1, text);
+    journal->end("fault", text, at_line(2));
+    EXPECT_EQ(read_journal(path()).torn, 0);
+    EXPECT_EQ(read_journal(path()).status, "fault");
+  }
+}
+
 TEST_F(Journals, AreRegularFilesOnly) {
   ASSERT_EQ(::mkfifo(path().c_str(), 0600), 0);
   for (const fs::path& other : {path(), fs::path("/dev/zero"), path().parent_path()}) {

@@ -396,6 +396,18 @@ TEST_F(SenderTest, AFullDiskForTheJournalHolds) {
   EXPECT_LT(controller.lines.size(), 2000U);
 }
 
+TEST_F(SenderTest, NonsenseOfAnyBytesHoldsAndIsKept) {
+  const testing::TempFolder folder;
+  const JobIdentity job{std::string(64, 'a'), 100000, "a"};
+  const auto kept = Journal::create(folder / "job.journal", job, {});
+  journal = kept.get();
+  answer_to("X2F500", std::string(1000, '\x1b') + "\r\n");
+  const SendResult result = send(kProgram);
+  expect_held(result, StopCause::kGarbledReply, "not a reply to anything: '???");
+  EXPECT_EQ(result.reason.find('\x1b'), std::string::npos);
+  EXPECT_THAT(read_journal(folder / "job.journal").reason, HasSubstr("anything: '???"));
+}
+
 TEST_F(SenderTest, TheJournalKnowsHowItEnded) {
   const testing::TempFolder folder;
   {
