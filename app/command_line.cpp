@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <csignal>
 #include <exception>
 #include <new>
 #include <string_view>
@@ -11,6 +12,7 @@
 #include "app/console.h"
 #include "app/exit_code.h"
 #include "app/option_set.h"
+#include "app/standard_descriptors.h"
 #include "app/toml_config.h"
 #include "core/error.h"
 #include "core/version.h"
@@ -101,6 +103,18 @@ int run_command_line(const std::vector<std::string>& arguments) noexcept {
   } catch (const std::exception& e) {
     // Only printing can have failed here, so stdout is of no use any more.
     return report_error(e.what(), kFailed, false);
+  }
+}
+
+int run_main(int argc, char** argv) noexcept {
+  hold_standard_descriptors();
+  // A full disk, a file-size limit and a closed pipe are then errors of the write that meets them.
+  std::signal(SIGXFSZ, SIG_IGN);
+  std::signal(SIGPIPE, SIG_IGN);
+  try {
+    return run_command_line(Arguments(argv + std::min(argc, 1), argv + argc));
+  } catch (const std::bad_alloc&) {
+    return report_error("not enough memory", kFailed, false);
   }
 }
 

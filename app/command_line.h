@@ -10,4 +10,8 @@ namespace lensforge::app {
 /// code of interface.md. Every error ends up as one line on stderr; nothing is thrown.
 int run_command_line(const std::vector<std::string>& arguments) noexcept;
 
+/// All that main() does: holds the standard descriptors, ignores the signals that writing raises,
+/// and runs the command line.
+int run_main(int argc, char** argv) noexcept;
+
 }  // namespace lensforge::app

@@ -8,11 +8,26 @@
 #include <string_view>
 
 #include "core/error.h"
+#include "core/files.h"
 
 namespace lensforge::app {
 namespace {
 
 constexpr std::size_t kMostHeaderLines = 12;
+/// Longer than any controller takes by far.
+constexpr std::size_t kLongestLine = 4096;
+
+/// Reads up to the next line end, and of a line that is too long only so much that this shows.
+bool next_line(std::ifstream& file, std::string& line) {
+  line.clear();
+  int c = file.get();
+  const bool any = c != std::ifstream::traits_type::eof();
+  for (; c != std::ifstream::traits_type::eof() && c != '\n'; c = file.get()) {
+    line += static_cast<char>(c);
+    if (line.size() > kLongestLine) break;
+  }
+  return any;
+}
 
 struct SplitLine {
   std::string code;     ///< Upper case, without spaces and comments.
@@ -60,16 +75,16 @@ bool take_words(std::string_view code, Eigen::AlignedBox3d& box) {
 }  // namespace
 
 GcodeSummary summarise_gcode(const std::filesystem::path& path) {
-  std::ifstream file(path);
-  if (!file || std::filesystem::is_directory(path)) {
-    throw InputError(path.string() + ": cannot be read");
-  }
+  std::ifstream file = open_input(path);
   GcodeSummary summary;
   bool in_header = true;
-  for (std::string line; std::getline(file, line); ++summary.lines) {
-    if (line.find('\0') != std::string::npos) {
+  for (std::string line; next_line(file, line); ++summary.lines) {
+    const bool zero = line.find('\0') != std::string::npos;
+    if (zero || line.size() > kLongestLine) {
       throw InputError(path.string() + ": line " + std::to_string(summary.lines + 1) +
-                       ": not G-code, it holds a zero byte");
+                       ": not G-code, it " +
+                       (zero ? "holds a zero byte"
+                             : "is longer than " + std::to_string(kLongestLine) + " characters"));
     }
     const SplitLine parts = split(line);
     in_header = in_header && (parts.code.empty() || parts.code == "%");

@@ -11,6 +11,7 @@
 #include "core/image_io.h"
 #include "core/lens.h"
 #include "core/mesh_io.h"
+#include "core/printable.h"
 #include "machine/gcode/program_seal.h"
 
 namespace lensforge::app {
@@ -24,8 +25,9 @@ struct Description {
   std::string text;
 
   void line(const std::string& name, const std::string& value) {
-    text +=
-        "  " + name + std::string(14 - std::min<std::size_t>(name.size(), 13), ' ') + value + "\n";
+    text += "  " + printable_line(name) +
+            std::string(14 - std::min<std::size_t>(name.size(), 13), ' ') + printable_line(value) +
+            "\n";
   }
 };
 
@@ -96,7 +98,7 @@ Description describe_gcode(const fs::path& path) {
   Description d{{{"kind", "gcode"}}, {}};
   for (const std::string& comment : summary.header) d.line("comment", comment);
   d.line("program", std::to_string(summary.lines) + " lines, " + std::to_string(summary.moves) +
-                        " with a position");
+                        " with a position" + (summary.moves == 0 ? ": moves nothing" : ""));
   const std::optional<bool> seal = check_seal(path);
   d.line("seal", seal_words(seal));
   d.json["seal_holds"] = seal_json(seal);
@@ -152,7 +154,8 @@ int info_command(const Arguments& command_line) {
   d.json["command"] = "info";
   d.json["source"] = source;
   const Console console(options.common().json, options.common().quiet);
-  console.result(d.json, source + ": " + d.json["kind"].get<std::string>() + "\n" + d.text);
+  console.result(d.json,
+                 printable_line(source) + ": " + d.json["kind"].get<std::string>() + "\n" + d.text);
   return kDone;
 }
 

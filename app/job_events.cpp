@@ -53,12 +53,24 @@ nlohmann::json standing_json(const SendEvent& event, const JobView& view, double
   return json;
 }
 
+/// As write() makes them.
+bool begins_events(std::string_view line) {
+  const nlohmann::json first = nlohmann::json::parse(line, nullptr, false);
+  const auto is_text = [&](const char* key) {
+    return first.contains(key) && first[key].is_string();
+  };
+  return first.is_object() && is_text("event") && is_text("file") && is_text("sha256") &&
+         is_text("time") && begins_with_time(first["time"].get<std::string>());
+}
+
+constexpr SinkKind kEvents{"events file", begins_events};
+
 }  // namespace
 
 JobEvents::JobEvents(const SendSettings& settings, Warn warn) : warn_(std::move(warn)) {
   if (settings.events.empty()) return;
   try {
-    file_ = TextSink(settings.events);
+    file_ = TextSink(settings.events, kEvents);
   } catch (const InputError& refused) {
     throw InputError(std::string("--events: ") + refused.what());
   }

@@ -8,6 +8,7 @@
 #include "app/json_output.h"
 #include "app/operator_view.h"
 #include "core/error.h"
+#include "core/printable.h"
 #include "core/version.h"
 
 namespace lensforge::app {
@@ -39,12 +40,24 @@ std::string standing_text(const SendEvent& event) {
   return text + ", " + fixed(event.rpm_measured, 0) + " of " + fixed(event.rpm_asked, 0) + " rpm";
 }
 
+/// Longest line, bytes: that of the options.
+constexpr std::size_t kLongestLine = 1 << 14;
+
+/// "2026-07-30T14:05:09.250Z  lensforge 0.1.0 send …", as begin() writes it.
+bool begins_log(std::string_view line) {
+  constexpr std::string_view kBegin = "  lensforge ";
+  constexpr std::size_t kTime = std::string_view("0000-00-00T00:00:00.000Z").size();
+  return begins_with_time(line) && line.substr(kTime).starts_with(kBegin);
+}
+
+constexpr SinkKind kLog{"log", begins_log};
+
 }  // namespace
 
 JobLog::JobLog(const SendSettings& settings, Warn warn) : warn_(std::move(warn)) {
   if (settings.dry_run && settings.log.empty()) return;
   try {
-    file_ = TextSink(settings.log_path());
+    file_ = TextSink(settings.log_path(), kLog);
   } catch (const InputError& refused) {
     if (!settings.log.empty()) throw InputError(std::string("--log: ") + refused.what());
     warn_(std::string("warning: no log: ") + refused.what());
@@ -53,7 +66,7 @@ JobLog::JobLog(const SendSettings& settings, Warn warn) : warn_(std::move(warn))
 
 void JobLog::line(const std::string& text) {
   if (!file_.open()) return;
-  const std::string failure = file_.write(time_stamp() + "  " + text);
+  const std::string failure = file_.write(time_stamp() + "  " + printable_line(text, kLongestLine));
   if (!failure.empty()) warn_("warning: the log ends here: " + failure);
 }
 

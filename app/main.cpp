@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include <csignal>
-#include <string>
-#include <vector>
-
 #include "app/command_line.h"
+#include "app/standard_descriptors.h"
 
-int main(int argc, char** argv) {
-  // A full disk, a file-size limit and a closed pipe are then errors of the write that meets them.
-  std::signal(SIGXFSZ, SIG_IGN);
-  std::signal(SIGPIPE, SIG_IGN);
-  return lensforge::app::run_command_line(std::vector<std::string>(argv + 1, argv + argc));
-}
+namespace {
+
+/// Before the constructors of any library that is linked in: those may open files.
+__attribute__((section(".preinit_array"),
+               used)) void (*const kFirst)() = lensforge::app::hold_standard_descriptors;
+
+}  // namespace
+
+int main(int argc, char** argv) { return lensforge::app::run_main(argc, argv); }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "app/operator_view.h"
 
+#include <poll.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -10,6 +11,7 @@
 
 #include "app/console.h"
 #include "app/json_output.h"
+#include "core/printable.h"
 
 namespace lensforge::app {
 namespace {
@@ -61,8 +63,15 @@ std::string buffer_text(const SendEvent& event, const JobView& job) {
     text += "  overrides F" + std::to_string(share->x()) + " R" + std::to_string(share->y()) +
             " S" + std::to_string(share->z()) + " %";
   }
-  if (!event.report.pins.empty()) text += "  inputs " + event.report.pins;
+  if (!event.report.pins.empty()) text += "  inputs " + printable_line(event.report.pins);
   return text;
+}
+
+/// A reader of standard error that does not keep up must not keep the sender waiting: a pipe that
+/// is ready takes more than any of these lines at once.
+bool can_show() {
+  pollfd entry{STDERR_FILENO, POLLOUT, 0};
+  return ::poll(&entry, 1, 0) > 0;
 }
 
 }  // namespace
@@ -104,7 +113,7 @@ std::vector<std::string> view_lines(const SendEvent& event, const JobView& job, 
   std::vector<std::string> lines = {
       bar(share_of(event, job)) + "  " + progress_text(event, job, left), machine_text(event),
       buffer_text(event, job)};
-  if (!warning.empty()) lines.back() += "  ! " + warning;
+  if (!warning.empty()) lines.back() += "  ! " + printable_line(warning);
   return lines;
 }
 
@@ -112,11 +121,11 @@ OperatorView::OperatorView(bool quiet, const JobView& job)
     : quiet_(quiet), terminal_(isatty(STDERR_FILENO) != 0), job_(job) {}
 
 OperatorView::~OperatorView() {
-  if (drawn_ > 0) std::fputs("\n", stderr);
+  if (drawn_ > 0 && can_show()) std::fputs("\n", stderr);
 }
 
 void OperatorView::take(const SendEvent& event, double left) {
-  if (quiet_ || event.kind == SendEventKind::kReading) return;
+  if (quiet_ || event.kind == SendEventKind::kReading || !can_show()) return;
   if (!event.message.empty()) {
     note(event.message);
     warning_ = event.message;

@@ -7,6 +7,7 @@
 #include <cstdio>
 
 #include "app/console.h"
+#include "core/printable.h"
 
 namespace lensforge::app {
 namespace {
@@ -33,13 +34,13 @@ std::string bar(double share, int width) {
 }  // namespace
 
 std::string progress_line(const Progress& progress, double seconds, int bar_width) {
-  std::string line = progress.stage + "  ";
+  std::string line = printable_line(progress.stage) + "  ";
   if (progress.total > 0.0) {
     const double share = std::clamp(progress.done / progress.total, 0.0, 1.0);
     if (bar_width > 0) line += bar(share, bar_width);
     line += std::to_string(static_cast<int>(100.0 * share)) + " %  ";
   }
-  if (!progress.detail.empty()) line += progress.detail + "  ";
+  if (!progress.detail.empty()) line += printable_line(progress.detail) + "  ";
   return line + clock_text(seconds);
 }
 

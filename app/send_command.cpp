@@ -1,10 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include <unistd.h>
-
-#include <cstdio>
 #include <filesystem>
-#include <fstream>
-#include <iostream>
 #include <memory>
 
 #include "app/commands.h"
@@ -16,16 +11,20 @@
 #include "app/operator_view.h"
 #include "app/option_set.h"
 #include "app/progress_display.h"
+#include "app/send_confirm.h"
 #include "app/send_output.h"
+#include "app/send_places.h"
 #include "app/send_settings.h"
 #include "app/terminal_keys.h"
 #include "core/error.h"
+#include "core/files.h"
 #include "machine/gcode/program_seal.h"
 #include "machine/guard/background_guard.h"
 #include "machine/link/serial_link.h"
 #include "machine/link/steady_clock.h"
 #include "machine/link/tcp_link.h"
 #include "machine/sim/simulated_machine.h"
+#include "machine/stream/program_file.h"
 #include "machine/stream/session.h"
 
 namespace lensforge::app {
@@ -54,7 +53,7 @@ SimulatedOptions simulated_options(const std::string& name) {
              : simulated_grblhal();
 }
 
-Port open_port(const std::string& text) {
+Port open_port(const std::string& text, const std::stop_token& stop) {
   Port port;
   port.spec = parse_port_spec(text);
   switch (port.spec.kind) {
@@ -67,7 +66,7 @@ Port open_port(const std::string& text) {
       port.link = std::make_unique<SerialLink>(port.spec);
       break;
     case PortSpec::Kind::kTcp:
-      port.link = std::make_unique<TcpLink>(port.spec);
+      port.link = std::make_unique<TcpLink>(port.spec, stop);
       break;
   }
   port.steady = std::make_unique<SteadyClock>();
@@ -82,13 +81,15 @@ class SendRun {
         settings_(settings),
         console_(console),
         warn_([this](const std::string& text) { console_.note(text); }),
+        interrupt_(SecondInterrupt::kRequest),
+        maps_(register_maps(settings)),
+        program_(open_program()),
         log_(settings, warn_),
-        events_(settings, warn_),
-        interrupt_(SecondInterrupt::kRequest) {}
+        events_(settings, warn_) {}
 
   /// @throw what the libraries throw
   int run() {
-    summary_.job = identify_job(settings_.file);
+    summary_.job = program_.identity();
     log_.begin(options_, summary_.job);
     try {
       check_seal_of_program();
@@ -105,9 +106,16 @@ class SendRun {
   }
 
  private:
+  /// Before anything is made or touched.
+  [[nodiscard]] ProgramFile open_program() const {
+    require_apart(settings_, maps_);
+    ProgressDisplay progress(options_.common().quiet);
+    return ProgramFile(settings_.file, RunControl(interrupt_.token(), progress.sink()));
+  }
+
   /// A program that was changed or cut short since cam wrote it is named before anything else.
   void check_seal_of_program() {
-    summary_.seal_holds = check_seal(settings_.file);
+    summary_.seal_holds = check_seal(*program_.open(), RunControl(interrupt_.token(), {}));
     if (summary_.seal_holds.value_or(true)) return;
     const std::string broken =
         settings_.file +
@@ -139,9 +147,8 @@ class SendRun {
   }
 
   void with_controller() {
-    const std::vector<RegisterMap> maps = register_maps(settings_);
     if (!settings_.dry_run) require_journal();
-    Port port = open_port(settings_.port);
+    Port port = open_port(settings_.port, interrupt_.token());
     Wire wire(*port.link);
     SessionOptions session;
     session.resume = settings_.resume;
@@ -153,15 +160,18 @@ class SendRun {
     std::unique_ptr<BackgroundGuard> guard;
     GuardOptions guard_options;
     guard_options.owner = settings_.owner;
-    if (!maps.empty()) guard = guard_devices(maps, guard_options, *port.steady);
+    if (!maps_.empty()) guard = guard_devices(maps_, guard_options, *port.steady);
     send(wire, port, guard.get());
   }
 
-  ProgramFacts examine(const FactsOptions& facts) {
-    std::ifstream program(settings_.file, std::ios::binary);
+  ProgramFacts examine(const FactsOptions& options) {
     ProgressDisplay progress(options_.common().quiet);
+    const RunControl control(interrupt_.token(), progress.sink());
     try {
-      return examine_program(program, facts, RunControl(interrupt_.token(), progress.sink()));
+      ProgramFacts facts = examine_program(*program_.open(), options, control);
+      const std::string lack = lack_of_motion(facts);
+      if (!lack.empty()) throw InputError(settings_.file + ": " + lack);
+      return facts;
     } catch (const GcodeError& refused) {
       throw InputError(settings_.file + ": " + refused.what());
     }
@@ -176,8 +186,9 @@ class SendRun {
       throw InputError(path.string() + ": is the journal of another program (" + record_->job.name +
                        "), not of " + settings_.file);
     }
-    if (settings_.restart || !fs::exists(path) || fs::is_empty(path)) return;
-    if (read_journal(path).finished) return;
+    if (!fs::exists(path)) return;
+    require_regular_file(path);
+    if (settings_.restart || fs::is_empty(path) || read_journal(path).finished) return;
     throw InputError(path.string() +
                      ": an unfinished job; go on with --resume or begin again with --restart");
   }
@@ -201,6 +212,7 @@ class SendRun {
     facts.planner.bytes_per_second = rate.bytes_per_second;
     summary_.facts = examine(facts);
     summary_.findings = check_program(summary_.facts, info);
+    check_spindle_range(summary_.facts, maps_, summary_.findings);
     log_.preflight(summary_.facts, summary_.findings);
     if (summary_.findings.refusals.empty()) return;
     std::string all;
@@ -211,18 +223,18 @@ class SendRun {
   }
 
   void check_mode(Wire& wire, const Port& port) {
-    std::ifstream program(settings_.file, std::ios::binary);
     ProgressDisplay progress(options_.common().quiet);
-    summary_.checked_lines = check_on_controller(wire, port.clock(), program, *summary_.controller,
-                                                 RunControl(interrupt_.token(), progress.sink()));
+    summary_.checked_lines =
+        check_on_controller(wire, port.clock(), *program_.open(), *summary_.controller,
+                            RunControl(interrupt_.token(), progress.sink()));
   }
 
   void send(Wire& wire, const Port& port, Guard* guard) {
     const ControllerInfo& info = *summary_.controller;
-    std::ifstream program(settings_.file, std::ios::binary);
+    const std::unique_ptr<std::istream> program = program_.open();
     FeedOptions feed_options{info.dialect, info.line_numbers, info.start, 1, 0, {}};
     const std::unique_ptr<Journal> journal = begin_journal(feed_options);
-    ProgramFeed feed(program, feed_options);
+    ProgramFeed feed(*program, feed_options);
     Sender sender({wire, port.clock(), guard, journal.get()}, info, settings_.sender,
                   feed_options.first_line);
     summary_.result = run_watched(sender, feed, feed_options.first_offset);
@@ -259,8 +271,8 @@ class SendRun {
     }
     ResumeOptions entry = settings_.entry;
     entry.margin = settings_.margin;
-    std::ifstream program(settings_.file, std::ios::binary);
-    summary_.plan = plan_resume(program, *record_, *summary_.controller, summary_.facts, entry);
+    summary_.plan =
+        plan_resume(*program_.open(), *record_, *summary_.controller, summary_.facts, entry);
     confirm();
     log_.resume(*summary_.plan);
     feed.first_line = summary_.plan->line;
@@ -275,15 +287,7 @@ class SendRun {
                   (record_->reason.empty() ? "no word of it" : record_->reason));
     for (const std::string& step : summary_.plan->steps) console_.note("resume: " + step);
     if (settings_.yes) return;
-    if (isatty(STDIN_FILENO) == 0) {
-      throw InputError("--resume: nobody to ask, standard input is no terminal; --yes goes on");
-    }
-    std::fprintf(stderr, "Go on? [y/N] ");
-    std::string answer;
-    std::getline(std::cin, answer);
-    if (answer != "y" && answer != "Y" && answer != "yes") {
-      throw InputError("--resume: not confirmed; nothing was sent");
-    }
+    require_consent(interrupt_.token());
   }
 
   void finish() const {
@@ -303,9 +307,11 @@ class SendRun {
   const SendSettings& settings_;
   const Console& console_;
   Warn warn_;
+  InterruptWatch interrupt_;
+  std::vector<RegisterMap> maps_;
+  ProgramFile program_;
   JobLog log_;
   JobEvents events_;
-  InterruptWatch interrupt_;
   std::optional<JournalRecord> record_;
   SendSummary summary_;
 };
@@ -324,11 +330,11 @@ int send_command(const Arguments& command_line) {
   try {
     return SendRun(options, settings, console).run();
   } catch (const Interrupted&) {
-    console.note("interrupted before anything moved");
+    console.note("interrupted; nothing was sent");
     return kInterrupted;
   } catch (const StreamFault& fault) {
     if (fault.cause() != StopCause::kInterrupted) throw;
-    console.note("interrupted before anything moved");
+    console.note(std::string(fault.what()) + "; nothing of the program was sent");
     return kInterrupted;
   }
 }

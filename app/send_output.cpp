@@ -3,6 +3,7 @@
 
 #include "app/json_output.h"
 #include "app/operator_view.h"
+#include "core/printable.h"
 
 namespace lensforge::app {
 namespace {
@@ -120,8 +121,9 @@ nlohmann::json send_json(const OptionSet& options, const SendSummary& summary) {
 }
 
 std::string send_text(const SendSettings& settings, const SendSummary& summary) {
-  std::string text = settings.file + ": " + status_word(summary);
-  if (summary.result && !summary.result->done()) text += ": " + summary.result->reason;
+  std::string head = settings.file + ": " + status_word(summary);
+  if (summary.result && !summary.result->done()) head += ": " + summary.result->reason;
+  std::string text = printable_line(head);
   text.append("\n").append(facts_text(summary.facts));
   text.append("  seal         ").append(seal_words(summary.seal_holds)).append("\n");
   if (summary.checked_lines) {

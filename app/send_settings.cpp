@@ -8,6 +8,17 @@
 namespace lensforge::app {
 namespace {
 
+/// Somebody who holds a job comes back within a fortnight, s.
+constexpr double kLongestWait = 1e6;
+/// A spindle is looked at some times a second, and none takes an hour to start, s.
+constexpr double kShortestWait = 0.1;
+constexpr double kLongestSpinUp = 3600.0;
+/// The ramp is written in pieces of 0.1 mm, and the heights with five decimals, mm.
+constexpr double kShortestRamp = 0.1;
+constexpr double kLongestRamp = 1000.0;
+constexpr double kLowestLift = 0.01;
+constexpr double kHighestLift = 100.0;
+
 void add_controller_options(OptionSet& options, SendSettings& send) {
   options.text("--port", send.port, "PORT",
                "controller: /dev/ttyUSB0[:115200], tcp:HOST:PORT or sim:[grbl|grblhal]");
@@ -16,7 +27,7 @@ void add_controller_options(OptionSet& options, SendSettings& send) {
   options.flag("--home", send.home, "home the machine first");
   options.flag("--character-counting", send.sender.character_counting,
                "keep the controller's buffer filled instead of waiting for each ok");
-  options.number("--hold-limit", send.sender.hold_limit, Limits::at_least(0), "s",
+  options.number("--hold-limit", send.sender.hold_limit, Limits::between(0, kLongestWait), "s",
                  "end the job when somebody holds it for longer; 0 waits");
 }
 
@@ -28,26 +39,28 @@ void add_guard_options(OptionSet& options, SendSettings& send) {
                  "who tells the spindle to turn");
   options.text("--interlocks", send.interlocks, "MAP[@PLACE]",
                "watch a device with door, vacuum and the like as well");
-  options.number("--spindle-timeout", send.sender.spindle_timeout, Limits::above(0), "s",
-                 "longest wait for a speed");
-  options.number("--spin-up", send.spin_up, Limits::at_least(0), "s",
+  options.number("--spindle-timeout", send.sender.spindle_timeout,
+                 Limits::between(kShortestWait, kLongestSpinUp), "s", "longest wait for a speed");
+  options.number("--spin-up", send.spin_up, Limits::between(0, kLongestSpinUp), "s",
                  "time of each spindle change in the estimate");
 }
 
 void add_journal_options(OptionSet& options, SendSettings& send) {
   options.text("--journal", send.journal, "FILE", "journal; FILE.ngc.journal without it");
   options.text("--log", send.log, "FILE",
-               "log to hand to somebody else, appended; FILE.ngc.log without it");
+               "log to hand to somebody else, appended to an earlier one; FILE.ngc.log without it");
   options.text("--events", send.events, "FILE",
-               "append what happens as JSON, one object a line; - is standard output");
+               "append what happens as JSON, one object a line: to an earlier events file, a new "
+               "one or a pipe; - is standard output");
   options.flag("--resume", send.resume, "go on after a fault, with homing and a safe way back in");
   options.flag("--restart", send.restart, "begin again in spite of an unfinished journal");
   options.flag("--yes", send.yes, "do not ask before resuming");
   options.integer("--margin", send.margin, Limits::between(1, 100000),
                   "lines before the last one carried out that are cut again at least");
-  options.length("--ramp", send.entry.ramp, Limits::above(0),
+  options.length("--ramp", send.entry.ramp, Limits::between(kShortestRamp, kLongestRamp),
                  "path over which the tool comes down when resuming");
-  options.length("--lift", send.entry.lift, Limits::above(0), "height at which it begins to");
+  options.length("--lift", send.entry.lift, Limits::between(kLowestLift, kHighestLift),
+                 "height at which it begins to");
 }
 
 RegisterMap map_of(const std::string& text) {
@@ -99,6 +112,7 @@ std::vector<RegisterMap> register_maps(const SendSettings& settings) {
   std::vector<RegisterMap> maps;
   if (!settings.spindle.empty()) maps.push_back(map_of(settings.spindle));
   if (!settings.interlocks.empty()) maps.push_back(map_of(settings.interlocks));
+  if (!maps.empty()) (void)only_spindle(maps, settings.owner);
   return maps;
 }
 

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <string>
+#include <string_view>
 
 #include "machine/link/descriptor.h"
 
@@ -11,12 +12,23 @@ namespace lensforge::app {
 /// "2026-07-30T14:05:09.250Z": now, UTC.
 std::string time_stamp();
 
+/// Whether a text begins as time_stamp() does.
+bool begins_with_time(std::string_view text);
+
+/// What a TextSink is filled with, and how it is told from other people's files.
+struct SinkKind {
+  const char* name;                             ///< "log"
+  bool (*begins)(std::string_view first_line);  ///< Whether one of this kind begins with that line.
+};
+
 /// A file, pipe or device that lines are appended to beside a running job, which it never stops: a
 /// reader that does not keep up loses whole lines, and a failure ends the writing and is said once.
 class TextSink {
  public:
-  /// Is open() at once. @param path  "-" for standard output. @throw InputError if it cannot be.
-  explicit TextSink(const std::filesystem::path& path);
+  /// Is open() at once. Nothing is written to a file that holds anything else than what an earlier
+  /// sink of this kind wrote, nor to a disk or to a serial port.
+  /// @param path  "-" for standard output. @throw InputError if it cannot be.
+  TextSink(const std::filesystem::path& path, const SinkKind& kind);
   TextSink() = default;
 
   [[nodiscard]] bool open() const { return file_.open(); }

@@ -7,6 +7,7 @@
 #include "cam/post/post_text.h"
 #include "core/error.h"
 #include "machine/gcode/gcode_interpreter.h"
+#include "machine/gcode/header_line.h"
 
 namespace lensforge {
 namespace {
@@ -79,6 +80,11 @@ class Trial {
       if (key == "spindle" && !effect.motions().empty()) {
         throw GcodeError(1, "these lines must not move the machine");
       }
+      if (key == "head" && !head_.take(line)) {
+        throw GcodeError(1,
+                         "the head stands above the seal: comments and a program number only; "
+                         "what sets or moves anything belongs in start");
+      }
     } catch (const GcodeError& error) {
       const std::string reason = error.what();
       fields_.refuse(key, "'" + line + "': " + reason.substr(reason.find(": ") + 2));
@@ -88,6 +94,7 @@ class Trial {
   const PostDescription& post_;
   const TomlFields& fields_;
   GcodeInterpreter interpreter_;
+  HeaderLines head_;
   PlaceholderTexts texts_;
 };
 

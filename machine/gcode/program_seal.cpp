@@ -2,71 +2,140 @@
 #include "machine/gcode/program_seal.h"
 
 #include <algorithm>
+#include <array>
 #include <fstream>
 #include <vector>
 
 #include "core/error.h"
+#include "core/files.h"
 #include "core/sha256.h"
+#include "machine/gcode/header_line.h"
 
 namespace lensforge {
 namespace {
 
 constexpr std::string_view kPrefix = "sha256 below ";
-constexpr int kLinesOfHeader = 200;
-constexpr std::size_t kLongestLine = 256;  ///< Of a header's line.
+/// Comments that cam writes into every program, and no other software does, in lower case.
+constexpr std::array<std::string_view, 2> kMarks = {
+    "sha256 below", "units: mm; x0 y0: lower left corner of the lens"};
+/// The same with a number behind it: a version.
+constexpr std::string_view kProgram = "lensforge ";
+constexpr std::size_t kLongestLine = 1024;  ///< What a line has beyond it is not looked at.
 constexpr std::size_t kPiece = 1 << 16;
 
 char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
 
+std::string lower_case(std::string_view line) {
+  std::string text(line);
+  std::transform(text.begin(), text.end(), text.begin(), lower);
+  return text;
+}
+
 bool is_hexadecimal(char c) { return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f'); }
 
-std::string hash_of_rest(std::ifstream& file) {
-  Sha256 hash;
-  std::vector<char> piece(kPiece);
-  while (file) {
-    file.read(piece.data(), static_cast<std::streamsize>(piece.size()));
-    hash.update({piece.data(), static_cast<std::size_t>(file.gcount())});
+/// Whether a comment of the line is one that only cam writes.
+bool speaks_of_cam(std::string_view line) {
+  if (line.find_first_of("(;") == std::string_view::npos) return false;
+  const std::string text = lower_case(line);
+  for (const std::string_view mark : kMarks) {
+    if (text.find(mark) != std::string::npos) return true;
   }
-  return hash.finish();
+  const std::size_t program = text.find(kProgram);
+  if (program == std::string::npos || program + kProgram.size() >= text.size()) return false;
+  const char next = text[program + kProgram.size()];
+  return next >= '0' && next <= '9';
 }
 
-/// The next line with its end cut off; nothing at the end of the file or of a line too long for a
-/// header.
-std::optional<std::string> header_line(std::ifstream& file) {
-  std::string line;
-  for (int c = file.get(); c != std::ifstream::traits_type::eof(); c = file.get()) {
-    if (c == '\n') return line;
-    line += static_cast<char>(c);
-    if (line.size() > kLongestLine) return std::nullopt;
+/// Looks for the seal line by line, then hashes what stands below it. Lines end as GcodeReader
+/// ends them: with LF, CR LF or CR.
+class SealScan {
+ public:
+  void take(std::string_view bytes) {
+    while (!bytes.empty() && !hashing_) take_line(bytes);
+    if (hashing_) hash_.update(bytes);
   }
-  return std::nullopt;
-}
+
+  /// Nothing that comes can change the answer any more.
+  [[nodiscard]] bool settled() const { return cams_ && !header_ && !hashing_; }
+
+  std::optional<bool> result() {
+    if (hashing_) return hash_.finish() == stated_;
+    judge();
+    return cams_ ? std::optional(false) : std::nullopt;
+  }
+
+ private:
+  /// Takes bytes up to the end of a line, or all.
+  void take_line(std::string_view& bytes) {
+    if (ends_with_cr_ && bytes.front() != '\n') end_line(false);
+    const std::size_t end = std::min({bytes.find('\n'), bytes.find('\r'), bytes.size()});
+    line_ += bytes.substr(0, std::min(end, kLongestLine + 1 - line_.size()));
+    const bool at_end = end == bytes.size();
+    const char last = at_end ? '\0' : bytes[end];
+    bytes.remove_prefix(at_end ? end : end + 1);
+    if (last == '\r') ends_with_cr_ = true;
+    if (last == '\n') end_line(true);
+  }
+
+  /// cam ends the seal with LF or CR LF: what a single CR ends is no seal.
+  void end_line(bool with_lf) {
+    const std::optional<std::string> hash = stated_hash(line_);
+    const bool header = judge();
+    const bool in_doubt = lines_.semicolon_on_tape() && line_.starts_with('(');
+    if (hash && header && with_lf && !in_doubt) {
+      stated_ = *hash;
+      hashing_ = true;
+    }
+    line_.clear();
+    ends_with_cr_ = false;
+  }
+
+  /// @return whether nothing but a header was seen so far.
+  bool judge() {
+    cams_ = cams_ || speaks_of_cam(line_);
+    header_ = header_ && line_.size() <= kLongestLine && lines_.take(line_);
+    return header_;
+  }
+
+  HeaderLines lines_;
+  bool header_ = true;
+  bool cams_ = false;
+  bool hashing_ = false;
+  bool ends_with_cr_ = false;
+  std::string line_;
+  std::string stated_;
+  Sha256 hash_;
+};
 
 }  // namespace
 
 std::string seal_text(std::string_view sha256) { return std::string(kPrefix).append(sha256); }
 
 std::optional<std::string> stated_hash(std::string_view line) {
-  std::string text(line);
-  std::transform(text.begin(), text.end(), text.begin(), lower);
+  const std::string text = lower_case(line);
   if (text.empty() || (text.front() != '(' && text.front() != ';')) return std::nullopt;
-  if (text.compare(1, kPrefix.size(), kPrefix) != 0) return std::nullopt;
+  const std::string_view close = text.front() == '(' ? ")" : "";
+  if (text.size() != 1 + kPrefix.size() + kSha256Digits + close.size()) return std::nullopt;
+  if (text.compare(1, kPrefix.size(), kPrefix) != 0 || !text.ends_with(close)) return std::nullopt;
   std::string hash = text.substr(1 + kPrefix.size(), kSha256Digits);
-  if (hash.size() != kSha256Digits || !std::all_of(hash.begin(), hash.end(), is_hexadecimal)) {
-    return std::nullopt;
-  }
+  if (!std::all_of(hash.begin(), hash.end(), is_hexadecimal)) return std::nullopt;
   return hash;
 }
 
-std::optional<bool> check_seal(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) throw InputError(path.string() + ": cannot be read");
-  for (int i = 0; i < kLinesOfHeader; ++i) {
-    const auto line = header_line(file);
-    if (!line) return std::nullopt;
-    if (const auto stated = stated_hash(*line)) return hash_of_rest(file) == *stated;
+std::optional<bool> check_seal(std::istream& program, const RunControl& control) {
+  SealScan scan;
+  std::vector<char> piece(kPiece);
+  while (program && !scan.settled()) {
+    if (control.stop_requested()) throw Interrupted();
+    program.read(piece.data(), static_cast<std::streamsize>(piece.size()));
+    scan.take({piece.data(), static_cast<std::size_t>(program.gcount())});
   }
-  return std::nullopt;
+  return scan.result();
+}
+
+std::optional<bool> check_seal(const std::filesystem::path& path) {
+  std::ifstream file = open_input(path);
+  return check_seal(file);
 }
 
 }  // namespace lensforge

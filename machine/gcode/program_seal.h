@@ -3,9 +3,12 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <istream>
 #include <optional>
 #include <string>
 #include <string_view>
+
+#include "core/run_control.h"
 
 namespace lensforge {
 
@@ -16,11 +19,18 @@ constexpr std::size_t kSha256Digits = 64;
 /// it, so that a program that was changed or cut short can be told. This is the comment's text.
 std::string seal_text(std::string_view sha256);
 
-/// The hash that a line of a program states, in lower case; nothing if the line is no seal.
+/// The hash that a line of a program states, in lower case; nothing if the line is anything else
+/// than a seal, alone.
 std::optional<std::string> stated_hash(std::string_view line);
 
-/// Whether a program's bytes below its seal are those that it states; nothing if there is no seal
-/// among its first 200 lines. Constant memory. @throw InputError if the file cannot be read.
+/// Whether a program is as cam wrote it: the bytes below its seal are those that it states, and
+/// nothing but comments, %, a program number and line numbers stand above it. False as well if a
+/// line says that cam wrote it, or speaks of a seal, and there is none that holds. Nothing for a
+/// program of somebody else. Reads all of it in constant memory.
+/// @throw Interrupted; what reading throws
+std::optional<bool> check_seal(std::istream& program, const RunControl& control = {});
+
+/// check_seal() of a file. @throw InputError if it cannot be read.
 std::optional<bool> check_seal(const std::filesystem::path& path);
 
 }  // namespace lensforge

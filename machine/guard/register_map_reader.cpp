@@ -8,6 +8,7 @@
 #include "core/error.h"
 #include "core/toml_fields.h"
 #include "machine/guard/map_folder.h"
+#include "machine/guard/register_map_check.h"
 
 namespace lensforge {
 namespace {
@@ -289,6 +290,7 @@ RegisterMap parse_register_map(std::string_view text, const std::string& file) {
     root.refuse("spindle", "a register map needs a spindle, or interlocks, or both");
   }
   root.finish();
+  check_register_map(map, file);
   return map;
 }
 

@@ -15,17 +15,25 @@ namespace {
 /// Hours of records at one a second, if nobody takes them.
 constexpr std::size_t kMostRecords = 20000;
 
-SpindleMap only_spindle(const std::vector<GuardedDevice>& devices, SpindleOwner owner) {
+std::vector<RegisterMap> maps_of(const std::vector<GuardedDevice>& devices) {
+  std::vector<RegisterMap> maps;
+  for (const GuardedDevice& device : devices) maps.push_back(device.map);
+  return maps;
+}
+
+}  // namespace
+
+SpindleMap only_spindle(const std::vector<RegisterMap>& maps, SpindleOwner owner) {
   const SpindleMap* found = nullptr;
   std::string names;
-  for (const GuardedDevice& device : devices) {
-    names += (names.empty() ? "" : ", ") + device.map.name;
-    if (!device.map.spindle) continue;
+  for (const RegisterMap& map : maps) {
+    names += (names.empty() ? "" : ", ") + map.name;
+    if (!map.spindle) continue;
     if (found != nullptr)
       throw InputError("register maps " + names + ": only one may have a spindle");
-    found = &*device.map.spindle;
+    found = &*map.spindle;
     if (owner == SpindleOwner::kHost && !found->commands) {
-      throw InputError("register map " + device.map.name +
+      throw InputError("register map " + map.name +
                        ": has no spindle.commands, which a host-driven spindle needs; let the "
                        "controller drive it, or add them");
     }
@@ -36,13 +44,11 @@ SpindleMap only_spindle(const std::vector<GuardedDevice>& devices, SpindleOwner 
   return *found;
 }
 
-}  // namespace
-
 SpindleGuard::SpindleGuard(std::vector<GuardedDevice> devices, const GuardOptions& options,
                            Clock& clock)
     : options_(options),
       clock_(clock),
-      spindle_map_(only_spindle(devices, options.owner)),
+      spindle_map_(only_spindle(maps_of(devices), options.owner)),
       watch_(spindle_map_),
       speed_recorded_at_(clock.now()) {
   reported_.spindle = SpindleState::kChanging;

@@ -26,6 +26,10 @@ struct GuardOptions {
   double record_change = 0.01;   ///< Share by which a speed has to move to be recorded at once.
 };
 
+/// The spindle of the devices that are to be guarded. @throw InputError unless exactly one has a
+/// spindle, with commands where the host is to drive it.
+SpindleMap only_spindle(const std::vector<RegisterMap>& maps, SpindleOwner owner);
+
 /// A device and the bus to it.
 struct GuardedDevice {
   RegisterMap map;
@@ -41,8 +45,7 @@ struct GuardedDevice {
 /// were not read yet, or cannot be read, are not ok.
 class SpindleGuard final : public Guard {
  public:
-  /// @throw InputError unless exactly one device has a spindle, with commands where the host is to
-  /// drive it.
+  /// @throw InputError as only_spindle() does.
   SpindleGuard(std::vector<GuardedDevice> devices, const GuardOptions& options, Clock& clock);
 
   void spin(double rpm, bool clockwise) override;

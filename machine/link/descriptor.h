@@ -1,19 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include <unistd.h>
-
 #include <utility>
 
 namespace lensforge {
 
-/// An open file, device or socket that closes itself.
+/// An open file, device or socket that closes itself. It is never standard input, output or error:
+/// what a library prints there must not reach a controller, a journal or a log.
 class Descriptor {
  public:
-  explicit Descriptor(int number = -1) : number_(number) {}
-  ~Descriptor() {
-    if (number_ >= 0) ::close(number_);
-  }
+  /// Takes `number` over; 0 to 2 are moved up first (then open() is false if no number is free).
+  explicit Descriptor(int number = -1) : number_(above_standard(number)) {}
+  ~Descriptor() { close(); }
   Descriptor(Descriptor&& other) noexcept : number_(std::exchange(other.number_, -1)) {}
   Descriptor& operator=(Descriptor&& other) noexcept {
     std::swap(number_, other.number_);
@@ -26,6 +24,9 @@ class Descriptor {
   [[nodiscard]] bool open() const { return number_ >= 0; }
 
  private:
+  static int above_standard(int number);
+  void close() const;
+
   int number_;
 };
 

@@ -39,6 +39,14 @@ Descriptor open_to_lock(const fs::path& file, bool may_create) {
   return Descriptor(made);
 }
 
+/// Before it is opened, which some things answer by doing something.
+void require_device(const PortSpec& spec) {
+  std::error_code error;
+  const fs::file_type type = fs::status(spec.place, error).type();
+  if (type == fs::file_type::not_found || type == fs::file_type::character) return;
+  refuse(spec, error && type == fs::file_type::none ? error.message() : "no serial port");
+}
+
 }  // namespace
 
 fs::path lock_file(const PortSpec& spec) {
@@ -53,6 +61,7 @@ fs::path lock_file(const PortSpec& spec) {
 
 PortLock::PortLock(const PortSpec& spec) {
   if (spec.kind == PortSpec::Kind::kSimulated) return;
+  if (spec.kind == PortSpec::Kind::kSerial) require_device(spec);
   file_ = open_to_lock(lock_file(spec), spec.kind == PortSpec::Kind::kTcp);
   if (!file_.open() && errno == EBUSY) refuse(spec, "another program has it open");
   if (!file_.open()) refuse(spec, "cannot be opened: " + reason(errno));

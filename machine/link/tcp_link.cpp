@@ -7,10 +7,16 @@
 #include <poll.h>
 #include <sys/socket.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
+#include <chrono>
+#include <condition_variable>
 #include <memory>
+#include <mutex>
+#include <optional>
 #include <system_error>
+#include <thread>
 
 #include "core/error.h"
 #include "machine/link/poll_wait.h"
@@ -26,6 +32,8 @@ constexpr int kProbeSeconds = 2;
 constexpr int kProbes = 3;
 /// Bytes that stay unacknowledged for longer mean a dead link, ms.
 constexpr int kUserTimeout = 10'000;
+/// Longest time without a look at the stop token, s.
+constexpr double kStopCheck = 0.1;
 
 std::string reason(int error) { return std::generic_category().message(error); }
 
@@ -34,17 +42,54 @@ struct FreeAddresses {
 };
 using Addresses = std::unique_ptr<addrinfo, FreeAddresses>;
 
-Addresses look_up(const PortSpec& spec) {
+/// What the resolver says of a host; `flags` of getaddrinfo().
+struct Lookup {
+  int error = 0;
+  Addresses list;
+};
+
+Lookup ask_resolver(const PortSpec& spec, int flags) {
   addrinfo wanted{};
   wanted.ai_family = AF_UNSPEC;
   wanted.ai_socktype = SOCK_STREAM;
+  wanted.ai_flags = flags;
   addrinfo* list = nullptr;
   const std::string port = std::to_string(spec.tcp_port);
   const int error = ::getaddrinfo(spec.place.c_str(), port.c_str(), &wanted, &list);
-  if (error != 0) {
-    throw InputError("--port " + port_name(spec) + ": no such host: " + ::gai_strerror(error));
+  return {error, Addresses(error == 0 ? list : nullptr)};
+}
+
+/// The resolver may take half a minute and cannot be interrupted, so it works on a thread that is
+/// left alone if nobody waits for it any more.
+Lookup look_up_name(const PortSpec& spec, const std::stop_token& stop) {
+  struct Shared {
+    std::mutex mutex;
+    std::condition_variable changed;
+    std::optional<Lookup> answer;
+  };
+  const auto shared = std::make_shared<Shared>();
+  std::thread([shared, spec] {
+    Lookup answer = ask_resolver(spec, 0);
+    const std::lock_guard lock(shared->mutex);
+    shared->answer = std::move(answer);
+    shared->changed.notify_all();
+  }).detach();
+  std::unique_lock lock(shared->mutex);
+  while (!shared->answer) {
+    if (stop.stop_requested()) throw Interrupted();
+    shared->changed.wait_for(lock, std::chrono::duration<double>(kStopCheck));
   }
-  return Addresses(list);
+  return std::move(*shared->answer);
+}
+
+Addresses look_up(const PortSpec& spec, const std::stop_token& stop) {
+  Lookup found = ask_resolver(spec, AI_NUMERICHOST);
+  if (found.error != 0) found = look_up_name(spec, stop);
+  if (found.error != 0) {
+    throw InputError("--port " + port_name(spec) +
+                     ": no such host: " + ::gai_strerror(found.error));
+  }
+  return std::move(found.list);
 }
 
 void set(int socket, int level, int option, int value) {
@@ -61,23 +106,27 @@ void set_options(int socket) {
 }
 
 /// Connects to one address. @return 0 or an errno value.
-int connect_to(int socket, const addrinfo& address, double timeout) {
+int connect_to(int socket, const addrinfo& address, const std::stop_token& stop, double timeout) {
   if (::connect(socket, address.ai_addr, address.ai_addrlen) == 0) return 0;
   if (errno != EINPROGRESS) return errno;
-  if (wait_for(socket, POLLOUT, timeout) == 0) return ETIMEDOUT;
+  const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(timeout);
+  while (wait_for(socket, POLLOUT, std::min(kStopCheck, timeout)) == 0) {
+    if (stop.stop_requested()) throw Interrupted();
+    if (std::chrono::steady_clock::now() >= end) return ETIMEDOUT;
+  }
   int error = 0;
   socklen_t size = sizeof error;
   ::getsockopt(socket, SOL_SOCKET, SO_ERROR, &error, &size);
   return error;
 }
 
-Descriptor connect_to_any(const PortSpec& spec, double timeout) {
-  const Addresses addresses = look_up(spec);
+Descriptor connect_to_any(const PortSpec& spec, const std::stop_token& stop, double timeout) {
+  const Addresses addresses = look_up(spec, stop);
   int error = 0;
   for (const addrinfo* at = addresses.get(); at != nullptr; at = at->ai_next) {
     Descriptor socket(
         ::socket(at->ai_family, at->ai_socktype | SOCK_NONBLOCK | SOCK_CLOEXEC, at->ai_protocol));
-    error = socket.open() ? connect_to(socket.number(), *at, timeout) : errno;
+    error = socket.open() ? connect_to(socket.number(), *at, stop, timeout) : errno;
     if (error != 0) continue;
     set_options(socket.number());
     return socket;
@@ -87,8 +136,8 @@ Descriptor connect_to_any(const PortSpec& spec, double timeout) {
 
 }  // namespace
 
-TcpLink::TcpLink(const PortSpec& spec, double timeout)
-    : name_(port_name(spec)), lock_(spec), socket_(connect_to_any(spec, timeout)) {}
+TcpLink::TcpLink(const PortSpec& spec, const std::stop_token& stop, double timeout)
+    : name_(port_name(spec)), lock_(spec), socket_(connect_to_any(spec, stop, timeout)) {}
 
 void TcpLink::lose(const std::string& why) const { throw LinkLost(name_ + " is gone: " + why); }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <stop_token>
 #include <string>
 #include <string_view>
 
@@ -17,8 +18,8 @@ class TcpLink : public Link {
  public:
   /// Connects, waiting at most `timeout` seconds for each address that the name stands for.
   /// @throw InputError if the name stands for nothing, another sender has the address, or nobody
-  ///        answers there.
-  explicit TcpLink(const PortSpec& spec, double timeout = 5.0);
+  ///        answers there; Interrupted soon after `stop` asks for it.
+  explicit TcpLink(const PortSpec& spec, const std::stop_token& stop = {}, double timeout = 5.0);
 
   std::string read(double wait) override;
   std::size_t write(std::string_view bytes) override;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <cmath>
 
 #include "core/error.h"
 
@@ -16,12 +17,15 @@ constexpr std::array<std::string_view, 6> kSystems = {"G54", "G55", "G56", "G57"
 /// Bytes of the receive buffer that stay empty: rings cannot be filled wholly.
 constexpr int kRingGap = 1;
 
+/// No setting, size or position is larger; what is, or is no number, was garbled.
+constexpr double kLargestNumber = 1e9;
+
 std::vector<double> numbers(std::string_view text) {
   std::vector<double> values;
   while (!text.empty()) {
     double value = 0.0;
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    if (error != std::errc()) return values;
+    if (error != std::errc() || !(std::abs(value) <= kLargestNumber)) return values;
     values.push_back(value);
     text.remove_prefix(static_cast<std::size_t>(end - text.data()));
     if (!text.starts_with(',')) return values;
@@ -45,7 +49,7 @@ void take_options(const std::string& value, ControllerInfo& info) {
   info.line_numbers = info.options.find('N') != std::string::npos;
   if (comma == value.size()) return;
   const std::vector<double> sizes = numbers(std::string_view(value).substr(comma + 1));
-  if (sizes.size() < 2) return;
+  if (sizes.size() < 2 || sizes[0] < 1.0 || sizes[1] <= kRingGap) return;
   info.planner_blocks = static_cast<int>(sizes[0]);
   info.rx_bytes = static_cast<int>(sizes[1]) - kRingGap;
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
 
+#include "core/printable.h"
 #include "machine/stream/controller_codes.h"
 #include "machine/stream/controller_info.h"
 #include "machine/stream/realtime.h"
@@ -87,7 +88,8 @@ std::vector<Reply> Dialogue::ask(const std::string& line, double timeout) {
         throw StreamFault(StopCause::kAlarm, line + ": " + explain_alarm(reply.code));
       }
       if (reply.kind == Kind::kUnknown) {
-        throw StreamFault(StopCause::kGarbledReply, line + ": '" + reply.text + "'");
+        throw StreamFault(StopCause::kGarbledReply,
+                          line + ": '" + printable_line(reply.text) + "'");
       }
       answer.push_back(reply);
     }

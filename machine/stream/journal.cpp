@@ -3,12 +3,15 @@
 
 #include <fcntl.h>
 #include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
 #include <system_error>
 
+#include "core/printable.h"
 #include "machine/stream/journal_text.h"
 
 namespace lensforge {
@@ -20,6 +23,8 @@ namespace fs = std::filesystem;
 constexpr double kShortReserve = 1.0;
 constexpr double kLongReserve = 4.0;
 constexpr std::int64_t kMostAhead = 1 << 16;
+/// Of a program, bytes: as file systems have it.
+constexpr std::size_t kLongestName = 255;
 
 double seconds_now() {
   const auto since = std::chrono::steady_clock::now().time_since_epoch();
@@ -43,6 +48,21 @@ nlohmann::json json_of(const JobProgress& at, const char* kind) {
   return record;
 }
 
+/// Another file than an empty one or a journal is somebody's work. @throw InputError
+void require_own(int descriptor, const fs::path& path) {
+  struct stat about {};
+  if (::fstat(descriptor, &about) != 0 || !S_ISREG(about.st_mode)) {
+    throw InputError(path.string() + ": a journal has to be a file; name one with --journal");
+  }
+  if (about.st_size == 0) return;
+  std::string text(journal_text::kLongestLine, '\0');
+  const ssize_t count = ::pread(descriptor, text.data(), text.size(), 0);
+  text.resize(static_cast<std::size_t>(std::max<ssize_t>(count, 0)));
+  if (journal_text::begins_journal(text.substr(0, text.find('\n')))) return;
+  throw InputError(path.string() +
+                   ": exists and is no journal of lensforge; name another file with --journal");
+}
+
 }  // namespace
 
 std::unique_ptr<Journal> Journal::create(const fs::path& path, const JobIdentity& job,
@@ -53,7 +73,7 @@ std::unique_ptr<Journal> Journal::create(const fs::path& path, const JobIdentity
                    {"version", journal_text::kVersion},
                    {"sha256", job.sha256},
                    {"bytes", job.bytes},
-                   {"name", job.name}});
+                   {"name", printable_line(job.name, kLongestName)}});
   journal->append({{"kind", "run"}});
   journal->request_flush(true);
   if (options.flush) flush_folder(path.parent_path());
@@ -73,12 +93,14 @@ std::unique_ptr<Journal> Journal::resume(const fs::path& path, const JournalReco
 
 Journal::Journal(const fs::path& path, const JournalOptions& options, Opening opening)
     : path_(path), options_(options), ahead_(options.reserve_lines) {
-  const int flags = O_RDWR | O_CLOEXEC | (opening == Opening::kCreate ? O_CREAT : 0);
-  file_ = Descriptor(::open(path.c_str(), flags, 0666));
+  const int flags = O_RDWR | O_NONBLOCK | O_NOCTTY | O_CLOEXEC;
+  file_ =
+      Descriptor(::open(path.c_str(), flags | (opening == Opening::kCreate ? O_CREAT : 0), 0666));
   if (!file_.open()) fail(errno);
   if (::flock(file_.number(), LOCK_EX | LOCK_NB) != 0) {
     throw InputError(path.string() + ": another sender is writing this journal");
   }
+  require_own(file_.number(), path);
   // Emptied only now that it is ours.
   if (opening == Opening::kCreate && ::ftruncate(file_.number(), 0) != 0) fail(errno);
   last_flush_ = seconds_now();
@@ -131,14 +153,14 @@ void Journal::progress(const JobProgress& progress) {
 }
 
 void Journal::note(std::int64_t line, std::string_view text) {
-  append({{"kind", "note"}, {"line", line}, {"text", text}});
+  append({{"kind", "note"}, {"line", line}, {"text", printable_line(text)}});
   request_flush(false);
 }
 
 void Journal::end(std::string_view status, std::string_view reason, const JobProgress& progress) {
   nlohmann::json record = json_of(progress, "end");
   record["status"] = status;
-  record["reason"] = reason;
+  record["reason"] = printable_line(reason);
   append(record);
   request_flush(true);
 }

@@ -70,8 +70,8 @@ struct JournalOptions {
 /// last reservation was ever handed to the controller.
 class Journal {
  public:
-  /// Begins a new journal, in the place of any other. @throw JournalFailed; InputError if another
-  /// process has it open.
+  /// Begins a new journal, in the place of any other journal. @throw JournalFailed; InputError if
+  /// another process has it open, or the file is there and is no journal.
   static std::unique_ptr<Journal> create(const std::filesystem::path& path, const JobIdentity& job,
                                          const JournalOptions& options);
   /// Goes on with a journal, a torn record at its end cut off. @throw as create().
@@ -127,8 +127,8 @@ class Journal {
 };
 
 /// Reads a journal back in constant memory.
-/// @throw InputError naming the file if it is missing, no journal, or damaged elsewhere than at its
-///        end.
+/// @throw InputError naming the file if it is missing, no regular file, no journal, or damaged
+///        elsewhere than at its end; naming the record if it holds what no sender writes.
 JournalRecord read_journal(const std::filesystem::path& path);
 
 }  // namespace lensforge

@@ -39,4 +39,9 @@ std::optional<nlohmann::json> record_of(std::string_view line) {
   return record;
 }
 
+bool begins_journal(std::string_view line) {
+  const std::optional<nlohmann::json> record = record_of(line);
+  return record && record->contains("format") && (*record)["format"] == kFormat;
+}
+
 }  // namespace lensforge::journal_text

@@ -20,4 +20,7 @@ std::string line_of(const nlohmann::json& record);
 /// Reads a line without its end; nothing if the check sum or the form is wrong.
 std::optional<nlohmann::json> record_of(std::string_view line);
 
+/// Whether a line is the first one of a journal, of whatever version.
+bool begins_journal(std::string_view line);
+
 }  // namespace lensforge::journal_text

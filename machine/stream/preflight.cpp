@@ -89,6 +89,10 @@ void check_state(const ControllerInfo& info, Findings& found) {
     found.refusals.push_back("the controller is in state " +
                              std::string(state_name(info.status.state)) + "; it must be Idle");
   }
+  if (homing_on(info) && !travel_box(info)) {
+    found.warnings.emplace_back(
+        "the controller tells no travel ($130-$132): where the program moves is not checked");
+  }
   if (!homing_on(info)) {
     found.warnings.emplace_back(
         "$22=0: homing is off, so travel is not checked and nothing can be resumed after a fault");
@@ -152,6 +156,30 @@ Findings check_program(const ProgramFacts& facts, const ControllerInfo& info) {
   check_reports(info, found);
   if (!facts.ends) found.warnings.emplace_back("the program has no end (M2 or M30)");
   return found;
+}
+
+void check_spindle_range(const ProgramFacts& facts, const std::vector<RegisterMap>& maps,
+                         Findings& found) {
+  for (const RegisterMap& map : maps) {
+    if (!map.spindle || facts.top_rpm <= 0.0) continue;
+    const double least = map.spindle->rpm_min;
+    const double most = map.spindle->rpm_max;
+    if (facts.least_rpm >= least && facts.top_rpm <= most) continue;
+    const double wrong = facts.top_rpm > most ? facts.top_rpm : facts.least_rpm;
+    found.refusals.push_back("the program asks for S" + number(wrong) + ", but the register map " +
+                             map.name + " turns at " + number(least) + " to " + number(most) +
+                             " rpm");
+  }
+}
+
+std::string lack_of_motion(const ProgramFacts& facts) {
+  if (facts.motions > 0) return {};
+  const std::string advice = "; send a program that moves, such as cam writes";
+  if (facts.lines == 0) return "is empty" + advice;
+  const std::string lines = "its " + std::to_string(facts.lines) + " lines";
+  if (facts.sent_lines == 0) return lines + " hold no command" + advice;
+  return lines + (facts.ends ? " up to its end (M2, M30 or %)" : "") +
+         " move nothing: none has G0, G1, G2 or G3 with X, Y or Z" + advice;
 }
 
 StreamRate stream_rate(const ControllerInfo& info, int baud, double round_trip, double mean_bytes) {

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "machine/guard/register_map.h"
 #include "machine/stream/controller_info.h"
 #include "machine/stream/program_facts.h"
 
@@ -31,6 +32,13 @@ std::optional<Eigen::AlignedBox3d> travel_box(const ControllerInfo& info);
 /// value and the rule.
 /// @param facts  with the controller's start state.
 Findings check_program(const ProgramFacts& facts, const ControllerInfo& info);
+
+/// Adds the speeds that a program asks for and a spindle under a register map does not have.
+void check_spindle_range(const ProgramFacts& facts, const std::vector<RegisterMap>& maps,
+                         Findings& found);
+
+/// What a program that moves nothing lacks, in a sentence without its name; empty if it moves.
+std::string lack_of_motion(const ProgramFacts& facts);
 
 /// What the stream of a program is limited by: the serial speed (10 bits a byte), the lines that an
 /// 8-bit board digests, and, sent line by line, the way there and back.

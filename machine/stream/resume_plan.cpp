@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "core/error.h"
+#include "core/trimmed_decimal.h"
 #include "machine/stream/entry_lines.h"
 
 namespace lensforge {
@@ -111,6 +112,20 @@ void require_same_place(const JournalRecord& record, const ControllerInfo& info)
   }
 }
 
+/// The way in has to begin below where the tool stands: nothing is known of what is above that.
+void require_below_retract(const Entry& entry) {
+  if (entry.path.empty()) return;
+  const double retract = entry.info.start.position.z();
+  for (const Eigen::Vector3d& at :
+       ramp_points(entry.path, entry.options.ramp, entry.options.lift)) {
+    if (at.z() <= retract) continue;
+    throw InputError("lift " + trimmed_decimal(entry.options.lift, 3) +
+                     " mm: the tool would begin at machine Z" + trimmed_decimal(at.z(), 3) +
+                     ", above the retract height Z" + trimmed_decimal(retract, 3) +
+                     "; a lower lift would do");
+  }
+}
+
 }  // namespace
 
 ResumePlan plan_resume(std::istream& program, const JournalRecord& record,
@@ -133,6 +148,7 @@ ResumePlan plan_resume(std::istream& program, const JournalRecord& record,
     return plan;
   }
   const Entry entry{path, history.state, info, facts, options};
+  require_below_retract(entry);
   plan.before = entry_lines(entry, plan.line - 1, plan.offset);
   plan.steps = entry_steps(entry);
   plan.steps.push_back("run the program from line " + std::to_string(plan.line) + " on; lines " +

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <cmath>
 
+#include "core/printable.h"
 #include "machine/guard/spindle_state_name.h"
 #include "machine/stream/controller_codes.h"
 #include "machine/stream/sender.h"
@@ -57,7 +58,8 @@ void Sender::take(const Reply& reply) {
     default:
       break;
   }
-  throw StreamFault(StopCause::kGarbledReply, "not a reply to anything: '" + reply.text + "'");
+  throw StreamFault(StopCause::kGarbledReply,
+                    "not a reply to anything: '" + printable_line(reply.text) + "'");
 }
 
 void Sender::take_ok() {

@@ -6,6 +6,7 @@
 
 #include "core/error.h"
 #include "machine/stream/program_feed.h"
+#include "machine/stream/realtime.h"
 
 namespace lensforge {
 namespace {
@@ -30,6 +31,21 @@ void require_rest(Dialogue& dialogue, const StatusReport& report, bool resume) {
   dialogue.hold();
 }
 
+/// A machine that homes goes on doing so without its sender: whoever gives up waiting stops it.
+void home_machine(Dialogue& dialogue, Wire& wire, double timeout) {
+  try {
+    dialogue.ask("$H", timeout);
+  } catch (const StreamFault& fault) {
+    const bool stopped_itself =
+        fault.cause() == StopCause::kError || fault.cause() == StopCause::kAlarm;
+    if (stopped_itself) throw;
+    wire.discard();
+    wire.urgent(realtime::kSoftReset);
+    throw StreamFault(fault.cause(), std::string(fault.what()) +
+                                         " while homing: the controller was reset, home it again");
+  }
+}
+
 }  // namespace
 
 ControllerInfo open_session(Wire& wire, Clock& clock, const SessionOptions& options,
@@ -40,7 +56,7 @@ ControllerInfo open_session(Wire& wire, Clock& clock, const SessionOptions& opti
   // After a limit was hit, Grbl answers nothing but a reset; homing then finds the position again.
   if (!report && !options.home) dialogue.silence();
   const std::string banner = dialogue.reset();
-  if (options.home) dialogue.ask("$H", options.home_timeout);
+  if (options.home) home_machine(dialogue, wire, options.home_timeout);
   return learn_controller(dialogue, banner);
 }
 

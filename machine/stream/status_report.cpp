@@ -25,6 +25,9 @@ constexpr std::array<std::pair<std::string_view, ReportedState>, 10> kStates{
      {"Sleep", ReportedState::kSleep},
      {"Tool", ReportedState::kTool}}};
 
+/// Of positions, mm or inches, and speeds: what is more was garbled.
+constexpr int kLargestNumber = 1'000'000'000;
+
 /// A field being read: whether it is as it should be.
 using Parse = bool (*)(std::string_view, StatusReport&);
 
@@ -39,6 +42,9 @@ std::optional<Number> number(std::string_view text) {
   const char* end = text.data() + text.size();
   const auto [stopped, error] = std::from_chars(text.data(), end, value);
   if (!plain_number(text) || error != std::errc() || stopped != end) return std::nullopt;
+  if (std::is_floating_point_v<Number> && !(std::abs(value) <= Number{kLargestNumber})) {
+    return std::nullopt;
+  }
   return value;
 }
 

@@ -89,6 +89,8 @@ TEST(PostDescription, FaultsAreNamedWithFileKeyValueAndRule) {
       {"\"{coolant_off}\", \"M2\"]", "\"{coolant_off}\"]", "program.end: an array: must end"},
       {"head = []", "head = [\"(what?)\"]", "characters must be printable ASCII but"},
       {"head = []", "head = [\"(\\u00e4)\"]", "characters must be printable ASCII but"},
+      {"head = []", "head = [\"G21\"]", "'G21': the head stands above the seal"},
+      {"head = []", "head = [\"(a) M5\"]", "above the seal"},
       {"head = []", "head = [\"(open\"]", "program.head: an array: '(open': comment without"},
   };
   for (const Fault& fault : faults) {

@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 
 #include <chrono>
@@ -11,17 +12,19 @@
 
 #include "core/full_disk.h"
 #include "core/temp_folder.h"
+#include "machine/stream/journal_text.h"
 
 namespace lensforge {
 namespace {
 
+namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 using testing::message_of;
 using testing::read_bytes;
 using testing::TempFolder;
 using testing::write_bytes;
 
-const JobIdentity kJob{std::string(64, 'a'), 12345, "lens.ngc"};
+const JobIdentity kJob{std::string(64, 'a'), 123456, "lens.ngc"};
 
 JobProgress at_line(std::int64_t line) {
   JobProgress at;
@@ -142,6 +145,104 @@ TEST_F(Journals, RefuseWhatIsNone) {
   for (const char* bytes : {"", "G0 X1\n", "00000000 {}\n"}) {
     write_bytes(path(), bytes);
     EXPECT_THROW(read_journal(path()), InputError) << bytes;
+  }
+}
+
+/// A journal of these records behind one that begins it.
+std::string journal_of(const std::vector<std::string>& records) {
+  std::string text = journal_text::line_of({{"kind", "job"},
+                                            {"format", journal_text::kFormat},
+                                            {"version", journal_text::kVersion},
+                                            {"sha256", std::string(64, 'a')},
+                                            {"bytes", 1000},
+                                            {"name", "a.ngc"}});
+  for (const std::string& record : records) {
+    text += journal_text::line_of(nlohmann::json::parse(record));
+  }
+  return text;
+}
+
+TEST_F(Journals, RefuseRecordsThatNoSenderWrites) {
+  const std::string points = "[[0,0,0],[0,0,0],[0,0,0],[0,0,0],[0,0,0]";
+  for (const std::string& record :
+       std::vector<std::string>{R"({"kind":"at","sent":"9"})",
+                                R"({"kind":"at","sent":9.5})",
+                                R"({"kind":"at","sent":1e300})",
+                                R"({"kind":"at","sent":-1})",
+                                R"({"kind":"at","sent":18446744073709551615})",
+                                R"({"kind":"at","sent":null})",
+                                R"({"kind":"at","state":7})",
+                                R"({"kind":"at","rpm":"fast"})",
+                                R"({"kind":"at","rpm":1e300})",
+                                R"({"kind":"at","at":[1,2]})",
+                                R"({"kind":"at","at":[1,2,"3"]})",
+                                R"({"kind":"at","at":{"x":1}})",
+                                R"({"kind":"at","at":[1,2,1e300]})",
+                                R"({"kind":7})",
+                                R"({"kind":["at"]})",
+                                R"({"kind":"reserve","sent":[1]})",
+                                R"({"kind":"end","status":1})",
+                                R"({"kind":"end","reason":{}})",
+                                R"({"kind":"origins"})",
+                                R"({"kind":"origins","origins":[[1,2,3]]})",
+                                R"({"kind":"origins","origins":)" + points + R"(,[0,0,"0"]]})",
+                                R"({"kind":"at","sent":5,"ack":6})",
+                                R"({"kind":"at","sent":6,"ack":5,"done":6})",
+                                R"({"kind":"at","byte":1001})",
+                                R"({"kind":"at","sent":2000,"ack":2000})"}) {
+    write_bytes(path(), journal_of({R"({"kind":"run"})", record}));
+    const std::string message = message_of<InputError>([&] { read_journal(path()); });
+    EXPECT_THAT(message, HasSubstr("job.journal: record 3: '")) << record;
+    EXPECT_THAT(message, HasSubstr("--restart")) << record;
+  }
+  write_bytes(path(), journal_of({R"({"kind":"run"})", R"({"kind":"at","sent":7,"ack":6,"done":5})",
+                                  R"({"kind":"origins","origins":)" + points + ",[0,0,0]]}",
+                                  R"({"kind":"what a later version adds","x":[]})"}));
+  EXPECT_EQ(read_journal(path()).last.executed, 5);
+}
+
+TEST_F(Journals, TakeTextsOfAnyBytesAndLength) {
+  for (const char byte : {'\x01', '\x80', '"', '\\', '\n'}) {
+    const std::string text(5000, byte);
+    JobIdentity job = kJob;
+    job.name = text;
+    const auto journal = Journal::create(path(), job, {});
+    journal->note(1, text);
+    journal->end("fault", text, at_line(2));
+    EXPECT_EQ(read_journal(path()).torn, 0);
+    EXPECT_EQ(read_journal(path()).status, "fault");
+  }
+}
+
+TEST_F(Journals, AreRegularFilesOnly) {
+  ASSERT_EQ(::mkfifo(path().c_str(), 0600), 0);
+  for (const fs::path& other : {path(), fs::path("/dev/zero"), path().parent_path()}) {
+    EXPECT_THROW(read_journal(other), InputError) << other;
+  }
+  for (const fs::path& other : {path(), fs::path("/dev/null")}) {
+    EXPECT_THROW(Journal::create(other, kJob, {}), InputError) << other;
+  }
+}
+
+TEST_F(Journals, AreReadInConstantMemory) {
+  write_bytes(path(), journal_of({}) + std::string(50'000'000, 'x'));
+  EXPECT_EQ(read_journal(path()).torn, 50'000'000);
+}
+
+TEST_F(Journals, TakeThePlaceOfNothingElse) {
+  for (const std::string& bytes :
+       {std::string("G21 G90\nG0 X1\n"), std::string("\n"), std::string("x"),
+        std::string("00000000 {}\n"), journal_text::line_of({{"kind", "job"}}),
+        journal_text::line_of({{"format", 7}}), "x" + journal_of({})}) {
+    write_bytes(path(), bytes);
+    const std::string message = message_of<InputError>([&] { Journal::create(path(), kJob, {}); });
+    EXPECT_THAT(message, HasSubstr("job.journal: exists and is no journal"));
+    EXPECT_EQ(read_bytes(path()), bytes);
+  }
+  for (const std::string& bytes : {std::string(), journal_of({R"({"kind":"run"})"})}) {
+    write_bytes(path(), bytes);
+    Journal::create(path(), kJob, {});
+    EXPECT_TRUE(read_journal(path()).job.same_program(kJob));
   }
 }
 

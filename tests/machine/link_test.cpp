@@ -1,16 +1,21 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <arpa/inet.h>
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
 #include <termios.h>
+#include <unistd.h>
 
 #include <array>
 #include <chrono>
 #include <optional>
+#include <stop_token>
 #include <string>
+#include <thread>
+#include <vector>
 
 #include "core/error.h"
 #include "core/temp_folder.h"
@@ -232,6 +237,43 @@ class Server {
   Descriptor peer_;
   PortSpec spec_;
 };
+
+TEST(Descriptor, IsNeverAStandardOne) {
+  const int kept = ::fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, 10);
+  ::close(STDIN_FILENO);
+  {
+    const Descriptor file(::open("/dev/null", O_RDONLY | O_CLOEXEC));
+    EXPECT_GT(file.number(), STDERR_FILENO);
+    EXPECT_GE(::fcntl(file.number(), F_GETFD), 0);
+    EXPECT_LT(::fcntl(STDIN_FILENO, F_GETFD), 0) << "the number itself is given back";
+  }
+  ::dup2(kept, STDIN_FILENO);
+  ::close(kept);
+}
+
+// Linux lets connections beyond the backlog wait without an answer.
+TEST(TcpLink, AStopEndsTheWaitForAConnection) {
+  const Server server;
+  std::vector<Descriptor> waiting;
+  for (int i = 0; i < 4; ++i) {
+    waiting.emplace_back(::socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    address.sin_port = htons(server.spec().tcp_port);
+    ::connect(waiting.back().number(), reinterpret_cast<sockaddr*>(&address), sizeof address);
+  }
+  std::stop_source stop;
+  std::thread stopper([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    stop.request_stop();
+  });
+  const SteadyClock clock;
+  const double begin = clock.now();
+  EXPECT_THROW(TcpLink(server.spec(), stop.get_token(), 30.0), Interrupted);
+  EXPECT_LT(clock.now() - begin, 1.0);
+  stopper.join();
+}
 
 TEST(TcpLink, CarriesEveryByteBothWays) {
   Server server;

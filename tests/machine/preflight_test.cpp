@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <limits>
 #include <sstream>
 #include <string>
 
@@ -146,6 +147,41 @@ TEST(Preflight, RatesAreTheSlowestOfLinkBoardAndWayThereAndBack) {
   EXPECT_DOUBLE_EQ(stream_rate(info, 0, 0.0, 20.0).lines_per_second, 400.0);
   EXPECT_DOUBLE_EQ(stream_rate(info, 0, 0.01, 20.0).lines_per_second, 100.0);
   EXPECT_DOUBLE_EQ(stream_rate(info, 9600, 0.01, 19.2).lines_per_second, 1.0 / 0.03);
+}
+
+TEST(Preflight, ProgramsWithoutMotionAreTold) {
+  FactsOptions options;
+  options.dialect = grbl_dialect();
+  const auto lack = [&](const std::string& program) {
+    std::istringstream stream(program);
+    return lack_of_motion(examine_program(stream, options, {}));
+  };
+  EXPECT_EQ(lack("G21 G90\nG0 X1\n"), "");
+  EXPECT_THAT(lack(""), HasSubstr("is empty; send a program"));
+  EXPECT_THAT(lack("\n\n(nothing)\n"), HasSubstr("its 3 lines hold no command"));
+  EXPECT_THAT(lack("G21 G90\nM2\nG0 X1\n"),
+              HasSubstr("its 2 lines up to its end (M2, M30 or %) move"));
+  EXPECT_THAT(lack("G21 G90\nS1000 M3\nM5\n"), HasSubstr("its 3 lines move nothing"));
+}
+
+TEST(Preflight, SpeedsBeyondTheRegisterMapAreRefused) {
+  RegisterMap map;
+  map.name = "M";
+  map.spindle.emplace();
+  map.spindle->rpm_min = 6000.0;
+  map.spindle->rpm_max = 24000.0;
+  const auto refusals = [&](double least, double top) {
+    ProgramFacts facts;
+    facts.least_rpm = least;
+    facts.top_rpm = top;
+    Findings found;
+    check_spindle_range(facts, {map}, found);
+    return found.refusals;
+  };
+  EXPECT_TRUE(refusals(6000.0, 24000.0).empty());
+  EXPECT_TRUE(refusals(std::numeric_limits<double>::infinity(), 0.0).empty()) << "never turns";
+  EXPECT_THAT(refusals(6000.0, 24001.0).at(0), HasSubstr("S24001"));
+  EXPECT_THAT(refusals(5999.0, 24000.0).at(0), HasSubstr("S5999"));
 }
 
 }  // namespace

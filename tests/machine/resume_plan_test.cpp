@@ -251,6 +251,13 @@ TEST(ResumePlan, RefusesAPartThatHasMovedAndAFinishedJob) {
   EXPECT_THROW(plan_resume(stream, finished, homed_machine(), {}, {}), InputError);
 }
 
+TEST(ResumePlan, NeverBeginsAboveTheRetractHeight) {
+  ResumeOptions options;
+  options.lift = 1000.0;
+  EXPECT_THAT(message_of<InputError>([&] { (void)plan_for(zig_zag(4), 300, options); }),
+              HasSubstr("above the retract height"));
+}
+
 TEST(ResumePlan, SaysWhatItWillDo) {
   const ResumePlan plan = plan_for(zig_zag(4), 230);
   std::string all;

@@ -384,7 +384,8 @@ TEST_F(SenderTest, WithoutLineNumbersTheBoundOfWhatIsDoneIsThePlanner) {
 
 TEST_F(SenderTest, AFullDiskForTheJournalHolds) {
   const testing::TempFolder folder;
-  const auto kept = Journal::create(folder / "job.journal", {std::string(64, 'a'), 1, "a"}, {});
+  const auto kept =
+      Journal::create(folder / "job.journal", {std::string(64, 'a'), 100000, "a"}, {});
   journal = kept.get();
   controller.per_line = 1.0;
   std::string program = "G21 G90\nS1000 M3\nF100\n";
@@ -395,10 +396,23 @@ TEST_F(SenderTest, AFullDiskForTheJournalHolds) {
   EXPECT_LT(controller.lines.size(), 2000U);
 }
 
+TEST_F(SenderTest, NonsenseOfAnyBytesHoldsAndIsKept) {
+  const testing::TempFolder folder;
+  const JobIdentity job{std::string(64, 'a'), 100000, "a"};
+  const auto kept = Journal::create(folder / "job.journal", job, {});
+  journal = kept.get();
+  answer_to("X2F500", std::string(1000, '\x1b') + "\r\n");
+  const SendResult result = send(kProgram);
+  expect_held(result, StopCause::kGarbledReply, "not a reply to anything: '???");
+  EXPECT_EQ(result.reason.find('\x1b'), std::string::npos);
+  EXPECT_THAT(read_journal(folder / "job.journal").reason, HasSubstr("anything: '???"));
+}
+
 TEST_F(SenderTest, TheJournalKnowsHowItEnded) {
   const testing::TempFolder folder;
   {
-    const auto kept = Journal::create(folder / "job.journal", {std::string(64, 'a'), 1, "a"}, {});
+    const auto kept =
+        Journal::create(folder / "job.journal", {std::string(64, 'a'), 100000, "a"}, {});
     journal = kept.get();
     answer_to("X2F500", "error:22\r\n");
     send(kProgram);

@@ -86,7 +86,7 @@ TEST_F(HostileProgram, MissingUnitsFeedAndSpindleAreRefused) {
 
 TEST_F(HostileProgram, WhatIsNoFileIsRefused) {
   expect_refusal(run({"send", path("none.ngc"), "--dry-run"}), 2, {"none.ngc"});
-  expect_refusal(run({"send", path("."), "--dry-run"}), 2, {"directory"});
+  expect_refusal(run({"send", path("."), "--dry-run"}), 2, {"folder"});
 }
 
 }  // namespace

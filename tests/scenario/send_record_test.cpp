@@ -56,13 +56,13 @@ TEST_F(SendRecord, EventsLeaveStandardOutputToTheResult) {
 }
 
 TEST_F(SendRecord, TheLogTellsTheWholeStory) {
-  write(at("job.ngc.log"), "earlier\n");
+  write(at("job.ngc.log"), "2026-11-22T10:00:00.000Z  lensforge 0.1.0 send earlier\n");
   ASSERT_EQ(run(send({})).exit_code, 0);
   const std::string log = content(at("job.ngc.log"));
   for (const char* part :
-       {"earlier\n", "lensforge 0.", "program job.ngc, ", "sha256 ", "controller grbl, Grbl 1.1",
-        "settings $", " $30=24000", "pre-flight: passed", "line ", " of 0 rpm",
-        "end: done: the program came to its end", "carried out up to line 52"}) {
+       {"send earlier\n", "lensforge 0.", "program job.ngc, ", "sha256 ",
+        "controller grbl, Grbl 1.1", "settings $", " $30=24000", "pre-flight: passed", "line ",
+        " of 0 rpm", "end: done: the program came to its end", "carried out up to line 52"}) {
     EXPECT_THAT(log, HasSubstr(part));
   }
   std::istringstream lines(log);

@@ -50,6 +50,22 @@ TEST_F(SendSeal, AProgramThatWasChangedOrCutShortIsRefused) {
   }
 }
 
+TEST_F(SendSeal, AProgramWithMotionAtOrAboveTheSealIsRefused) {
+  write_program(kBody);
+  const std::string whole = content(at("job.ngc"));
+  const std::size_t body = whole.find(kBody);
+  const std::size_t seal = whole.find("(sha256");
+  std::string cam = whole;
+  cam.insert(0, "(units: mm; X0 Y0: lower left corner of the lens)\n");
+  for (const std::string& program :
+       {"G0 Z-9\n" + whole, whole.substr(0, seal) + "G0 Z-9\n" + whole.substr(seal),
+        whole.substr(0, body - 1) + " G0 Z-9\n" + kBody, "(a)\rG0 Z-9\r" + whole,
+        cam.substr(0, cam.find("(sha256")) + kBody}) {
+    write(at("job.ngc"), program);
+    expect_refusal(send({"--port", "sim:grbl"}), 2, {"job.ngc", "seal", "changed or cut short"});
+  }
+}
+
 TEST_F(SendSeal, IsToldBeforeTheControllerIsTouched) {
   write_program(kBody.substr(0, kBody.size() - 4));  // Without its end.
   expect_refusal(send({"--port", "/dev/no-such-port"}), 2, {"job.ngc", "seal"});
