@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <chrono>
 #include <cmath>
@@ -221,6 +222,19 @@ TEST(MeshIo, AHeaderThatAsksForTooMuchIsRefusedWithoutAllocating) {
               "property float y\nproperty float z\nelement face 4000000000\n"
               "property list uchar int vertex_indices\nend_header\n0 0 0\n");
   refusal(folder / "h.ply");
+}
+
+TEST(MeshIo, APipeAndADeviceAreRefusedWithoutWaiting) {
+  const TempFolder folder;
+  ASSERT_EQ(::mkfifo((folder / "p.ply").c_str(), 0600), 0);
+  refusal(folder / "p.ply");
+  refusal("/dev/zero");
+}
+
+TEST(MeshIo, RefusesAnExtensionOfNoMesh) {
+  const TempFolder folder;
+  write_bytes(folder / "a.om", "OM");
+  EXPECT_THAT(refusal(folder / "a.om"), HasSubstr(".ply, .obj, .stl and .off are read"));
 }
 
 TEST(MeshIo, AFullDiskNamesFileAndReasonAndLeavesNothing) {
