@@ -12,12 +12,14 @@
 #include <fstream>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <system_error>
 
 #include "core/error.h"
 #include "core/files.h"
 #include "core/mesh_readers.h"
 #include "core/number_text.h"
+#include "core/version.h"
 
 namespace lensforge {
 namespace {
@@ -39,8 +41,15 @@ struct Counts {
   std::int64_t triangles = 0;
 };
 
-std::string ply_header(const Counts& counts) {
-  return "ply\nformat binary_little_endian 1.0\nelement vertex " + std::to_string(counts.vertices) +
+constexpr std::string_view kFormatLines = "ply\nformat binary_little_endian 1.0\n";
+/// Before the version of the program that wrote it.
+constexpr std::string_view kMarkBegin = "comment lensforge ";
+/// Bytes of the longest mark line that is looked for.
+constexpr std::size_t kLongestMark = 100;
+
+/// What follows the format and the mark.
+std::string element_lines(const Counts& counts) {
+  return "element vertex " + std::to_string(counts.vertices) +
          "\nproperty double x\nproperty double y\nproperty double z\nelement face " +
          std::to_string(counts.triangles) +
          "\nproperty list uchar int vertex_indices\nend_header\n";
@@ -58,24 +67,37 @@ std::int64_t number_after(const std::string& text, const std::string& words) {
   throw InputError(path.string() + ": " + why);
 }
 
-/// The counts in the header if the file is in the very form that write_ply() makes.
-std::optional<Counts> own_form(std::ifstream& file) {
-  std::string head(ply_header({INT32_MAX, INT32_MAX}).size(), '\0');
+/// The header of a file in our own form.
+struct OwnHeader {
+  Counts counts;
+  std::size_t bytes = 0;
+};
+
+/// The header if the file is in the very form that write_ply() makes, with or without its mark.
+std::optional<OwnHeader> own_form(std::ifstream& file) {
+  const std::size_t longest =
+      kFormatLines.size() + kLongestMark + element_lines({INT32_MAX, INT32_MAX}).size();
+  std::string head(longest, '\0');
   file.read(head.data(), static_cast<std::streamsize>(head.size()));
   head.resize(static_cast<std::size_t>(file.gcount()));
   file.clear();
-  const Counts counts{number_after(head, "element vertex "), number_after(head, "element face ")};
+  if (!head.starts_with(kFormatLines)) return std::nullopt;
+  std::size_t begin = kFormatLines.size();
+  if (head.compare(begin, kMarkBegin.size(), kMarkBegin) == 0) begin = head.find('\n', begin) + 1;
+  const Counts counts{number_after(head, "\nelement vertex "),
+                      number_after(head, "\nelement face ")};
   if (counts.vertices < 0 || counts.vertices > INT32_MAX) return std::nullopt;
   if (counts.triangles < 0 || counts.triangles > INT32_MAX) return std::nullopt;
-  const std::string header = ply_header(counts);
-  if (!head.starts_with(header)) return std::nullopt;
-  file.seekg(static_cast<std::streamoff>(header.size()));
-  return counts;
+  const std::string lines = element_lines(counts);
+  if (head.compare(begin, lines.size(), lines) != 0) return std::nullopt;
+  file.seekg(static_cast<std::streamoff>(begin + lines.size()));
+  return OwnHeader{counts, begin + lines.size()};
 }
 
 /// Our own form is read bit for bit, without rounding to single precision.
-SurfaceMesh read_own_form(std::ifstream& file, const Counts& counts, const fs::path& path) {
-  const std::uintmax_t expected = ply_header(counts).size() +
+SurfaceMesh read_own_form(std::ifstream& file, const OwnHeader& header, const fs::path& path) {
+  const Counts& counts = header.counts;
+  const std::uintmax_t expected = header.bytes +
                                   static_cast<std::uintmax_t>(counts.vertices) * kVertexBytes +
                                   static_cast<std::uintmax_t>(counts.triangles) * kTriangleBytes;
   if (const std::uintmax_t size = fs::file_size(path); size != expected) {
@@ -136,7 +158,8 @@ void check_mesh(const SurfaceMesh& mesh, const fs::path& path) {
 }
 
 void write_blocks(const SurfaceMesh& mesh, std::ofstream& file) {
-  file << ply_header({mesh.vertex_count(), mesh.triangle_count()});
+  file << kFormatLines << "comment " << program_mark() << '\n'
+       << element_lines({mesh.vertex_count(), mesh.triangle_count()});
   file.write(reinterpret_cast<const char*>(mesh.vertices.data()),
              mesh.vertex_count() * std::streamsize{kVertexBytes});
   std::array<char, kTriangleBytes> record{3};
@@ -152,8 +175,8 @@ void write_blocks(const SurfaceMesh& mesh, std::ofstream& file) {
 SurfaceMesh read_mesh(const fs::path& path) {
   std::ifstream file = open_input(path);
   if (file.peek() == std::ifstream::traits_type::eof()) refuse(path, "is empty");
-  const std::optional<Counts> counts = own_form(file);
-  SurfaceMesh mesh = counts ? read_own_form(file, *counts, path) : read_foreign(path);
+  const std::optional<OwnHeader> own = own_form(file);
+  SurfaceMesh mesh = own ? read_own_form(file, *own, path) : read_foreign(path);
   check_mesh(mesh, path);
   return mesh;
 }

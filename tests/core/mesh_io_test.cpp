@@ -15,6 +15,7 @@
 #include "core/full_disk.h"
 #include "core/temp_folder.h"
 #include "core/test_meshes.h"
+#include "core/version.h"
 
 namespace lensforge {
 namespace {
@@ -103,11 +104,23 @@ TEST(MeshIo, OurPlyHasTheFormOfTheInterface) {
   const TempFolder folder;
   write_ply(grid_mesh(2, 2), folder / "m.ply");
   const std::string bytes = read_bytes(folder / "m.ply");
-  EXPECT_THAT(bytes, StartsWith("ply\nformat binary_little_endian 1.0\nelement vertex 4\n"
+  EXPECT_THAT(bytes, StartsWith("ply\nformat binary_little_endian 1.0\ncomment " + program_mark() +
+                                "\nelement vertex 4\n"
                                 "property double x\nproperty double y\nproperty double z\n"
                                 "element face 2\nproperty list uchar int vertex_indices\n"
                                 "end_header\n"));
   EXPECT_EQ(bytes.size(), bytes.find("end_header\n") + 11 + 4 * 24 + 2 * 13);
+}
+
+TEST(MeshIo, OurPlyWithoutAMarkComesBackBitForBit) {
+  const TempFolder folder;
+  const SurfaceMesh mesh = rough_grid(5, 4);
+  write_ply(mesh, folder / "m.ply");
+  std::string bytes = read_bytes(folder / "m.ply");
+  const std::string mark = "comment " + program_mark() + "\n";
+  bytes.erase(bytes.find(mark), mark.size());
+  write_bytes(folder / "m.ply", bytes);
+  EXPECT_EQ(read_mesh(folder / "m.ply").vertices, mesh.vertices);
 }
 
 TEST(MeshIo, ReadsEveryFormat) {
