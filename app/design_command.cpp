@@ -284,12 +284,18 @@ WorkEstimate required_room(const DesignArguments& arguments, const Image& pictur
   return expected;
 }
 
+LoadedImage read_target(const fs::path& path, bool quiet, const std::stop_token& stop) {
+  ProgressDisplay progress(quiet);
+  return read_image(path, {stop, progress.sink()});
+}
+
 int run(const OptionSet& options, DesignArguments& arguments) {
   const InterruptWatch interrupt;
   const Console console(options.common().json, options.common().quiet);
   const EarlierDesign earlier = EarlierDesign::in(arguments.out);
   refuse_to_overwrite(arguments.out, earlier, arguments.resume, arguments.force);
-  const LoadedImage loaded = read_image(arguments.target);
+  const LoadedImage loaded =
+      read_target(arguments.target, options.common().quiet, interrupt.token());
   DesignOptions& design = arguments.design;
   design.pixels = working_pixels(options, arguments, loaded.image);
   if (arguments.resume && earlier.lens && !earlier.checkpoint) {
@@ -330,7 +336,12 @@ int design_command(const Arguments& command_line) {
   }
   weights.smooth *= arguments.smoothness;
   arguments.design.rendering_guided = !arguments.transport_alone;
-  return run(options, arguments);
+  try {
+    return run(options, arguments);
+  } catch (const Interrupted&) {
+    // While the picture was read: later the design ends with what it has.
+    return report_error("interrupted; nothing was written", kInterrupted, options.common().json);
+  }
 }
 
 }  // namespace lensforge::app

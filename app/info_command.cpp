@@ -24,10 +24,11 @@ struct Description {
   nlohmann::json json;
   std::string text;
 
-  void line(const std::string& name, const std::string& value) {
-    text += "  " + printable_line(name) +
-            std::string(14 - std::min<std::size_t>(name.size(), 13), ' ') + printable_line(value) +
-            "\n";
+  /// Names and values may come from the file.
+  void line(const std::string& foreign_name, const std::string& value) {
+    const std::string name = printable_line(foreign_name, 60);
+    text += "  " + name + std::string(14 - std::min<std::size_t>(name.size(), 13), ' ') +
+            printable_line(value) + "\n";
   }
 };
 

@@ -9,9 +9,13 @@
 
 #include "core/error.h"
 #include "core/files.h"
+#include "core/printable.h"
+#include "core/toml_fields.h"
 
 namespace lensforge::app {
 namespace {
+
+constexpr std::size_t kLongestKey = 60;  ///< In a message.
 
 std::string value_text(const std::string& key, const toml::node& value) {
   if (const auto* text = value.as_string()) return text->get();
@@ -27,12 +31,10 @@ std::string value_text(const std::string& key, const toml::node& value) {
 }
 
 toml::table parsed(std::istream& input) {
-  try {
-    return toml::parse(input);
-  } catch (const toml::parse_error& e) {
-    throw InputError("--config: line " + std::to_string(e.source().begin.line) +
-                     ": not TOML: " + std::string(e.description()));
-  }
+  std::string text(kMaxTomlBytes + 1, '\0');  // parse_toml() refuses one byte too many.
+  input.read(text.data(), static_cast<std::streamsize>(text.size()));
+  text.resize(static_cast<std::size_t>(input.gcount()));
+  return parse_toml(text, "--config");
 }
 
 }  // namespace
@@ -48,7 +50,8 @@ std::vector<CLI::ConfigItem> TomlConfig::from_config(std::istream& input) const 
     CLI::ConfigItem item;
     item.name = std::string(key.str());
     if (std::find(keys_.begin(), keys_.end(), item.name) == keys_.end()) {
-      throw InputError("--config: key " + item.name + ": the command has no such option");
+      throw InputError("--config: key " + printable_line(item.name, kLongestKey) +
+                       ": the command has no such option");
     }
     item.inputs = {value_text(item.name, value)};
     read.push_back(std::move(item));

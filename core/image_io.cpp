@@ -14,6 +14,7 @@
 #include "core/error.h"
 #include "core/files.h"
 #include "core/transfer.h"
+#include "core/version.h"
 
 // Reading is in image_reader.cpp. Files are encoded in memory and written by write_whole_file(), so
 // that the system's own reason for a failure (disk full, ...) reaches the message.
@@ -29,9 +30,10 @@ std::string extension_of(const fs::path& path) {
   return extension;
 }
 
-/// @param what  what to name in messages.
-std::vector<unsigned char> encoded(const std::string& what, const OIIO::ImageSpec& spec,
+/// With the program's mark. @param what  what to name in messages.
+std::vector<unsigned char> encoded(const std::string& what, OIIO::ImageSpec spec,
                                    const std::string& extension, const void* pixels) {
+  spec.attribute("Software", program_mark());
   std::vector<unsigned char> bytes;
   OIIO::Filesystem::IOVecOutput memory(bytes);
   const std::string name = "picture" + extension;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/image.h"
+#include "core/run_control.h"
 
 namespace lensforge {
 
@@ -20,15 +21,17 @@ struct LoadedImage {
 /// pixels are touched.
 inline constexpr int kMaxImageSide = 16384;
 
-/// Reads a PNG, JPEG, TIFF, EXR (or whatever else OpenImageIO opens): any channel count and depth,
-/// decoded by the colour space that the file declares, else sRGB for integers, linear for floats.
-/// @throw InputError if the file is missing, unreadable, truncated, no picture, larger than
-///        kMaxImageSide, or holds NaN, infinite or negative values; the message names the file.
-LoadedImage read_image(const std::filesystem::path& path);
+/// Reads a PNG, JPEG, TIFF, EXR or another of the formats in kReadableFormats
+/// (picture_outline.h), whatever its name: any channel count and depth, decoded by the colour space
+/// that the file declares, else sRGB for integers, linear for floats. Reports rows.
+/// @throw InputError if the file is missing, no regular file, truncated, no picture, larger than
+///        kMaxImageSide or than the memory, or holds NaN, infinite or negative values; the message
+///        names the file. Interrupted.
+LoadedImage read_image(const std::filesystem::path& path, const RunControl& run = {});
 
 /// Box-filter (area-weighted) resampling in linear light: the mean value is kept to 1e-6 relative.
-/// @pre columns, rows ≥ 1.
-Image resample(const Image& image, int columns, int rows);
+/// Reports rows of the result. @pre columns, rows ≥ 1. @throw Interrupted.
+Image resample(const Image& image, int columns, int rows, const RunControl& run = {});
 
 /// Writes 16-bit sRGB-encoded grey PNG (clipped to 0 … 1), or, for .exr, 32-bit float linear grey.
 /// The file appears whole or not at all.

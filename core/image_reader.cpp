@@ -1,26 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include <OpenImageIO/filesystem.h>
-#include <OpenImageIO/imageio.h>
-
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <cmath>
 #include <cstdint>
-#include <fstream>
-#include <memory>
 #include <optional>
 #include <sstream>
 #include <string>
-#include <system_error>
 #include <utility>
+#include <vector>
 
 #include "core/color_space.h"
-#include "core/error.h"
 #include "core/image_io.h"
-#include "core/jpeg_outline.h"
-#include "core/png_outline.h"
-#include "core/tiff_outline.h"
+#include "core/picture_source.h"
+#include "core/printable.h"
 
 namespace lensforge {
 namespace {
@@ -30,127 +22,8 @@ namespace fs = std::filesystem;
 /// Rec. 709 (ITU-R BT.709-6, item 3.2): shares of red, green and blue light in luminance.
 constexpr std::array<double, 3> kLuminance{0.2126, 0.7152, 0.0722};
 
-/// Bytes of decoded rows held at once besides the result.
-constexpr std::int64_t kBandBytes = std::int64_t{64} << 20;
-
-[[noreturn]] void refuse(const fs::path& path, const std::string& why) {
-  std::string line = why;
-  std::replace(line.begin(), line.end(), '\n', ' ');
-  throw InputError(path.string() + ": " + line);
-}
-
-void check_size(const fs::path& path, std::int64_t columns, std::int64_t rows) {
-  if (columns <= kMaxImageSide && rows <= kMaxImageSide) return;
-  refuse(path, "is " + std::to_string(columns) + " x " + std::to_string(rows) +
-                   " pixels: at most " + std::to_string(kMaxImageSide) + " a side are read");
-}
-
-void check_jpeg(const fs::path& path, std::istream& file) {
-  const auto jpeg = read_jpeg_outline(file);
-  if (!jpeg) return;
-  check_size(path, jpeg->columns, jpeg->rows);
-  if (!jpeg->complete) refuse(path, "is truncated: the JPEG data end before their end marker");
-}
-
-EssentialPng check_png(const fs::path& path, std::istream& file) {
-  const auto size = read_png_size(file);
-  if (!size) return {};
-  check_size(path, size->columns, size->rows);
-  file.clear();
-  file.seekg(0);
-  EssentialPng png = read_essential_png(file);
-  if (!png.problem.empty()) refuse(path, png.problem);
-  return png;
-}
-
-/// Everything that can be told from the bytes alone, before a decoder is trusted with them. PNG
-/// files come back as they are to be decoded.
-EssentialPng check_file(const fs::path& path) {
-  std::error_code error;
-  const fs::file_status status = fs::status(path, error);
-  if (!fs::exists(status)) refuse(path, "cannot be read: " + error.message());
-  if (fs::is_directory(status)) refuse(path, "is a folder, not a picture");
-  if (!fs::is_regular_file(status)) refuse(path, "is no regular file");
-  std::ifstream file(path, std::ios::binary);
-  if (!file) refuse(path, "cannot be read: " + std::generic_category().message(errno));
-  if (file.peek() == std::ifstream::traits_type::eof()) refuse(path, "is empty");
-  check_jpeg(path, file);
-  file.clear();
-  if (!tiff_pixels_are_inside(file)) refuse(path, "is truncated: it ends before its TIFF data do");
-  file.clear();
-  file.seekg(0);
-  return check_png(path, file);
-}
-
-/// An open picture file and what its header says.
-class Source {
- public:
-  explicit Source(const fs::path& path)
-      : path_(path), png_(check_file(path)), png_reader_(png_.bytes.data(), png_.bytes.size()) {
-    OIIO::ImageSpec hints;
-    // Alpha is applied here, in linear light, and not by OpenImageIO to the encoded values.
-    hints.attribute("oiio:UnassociatedAlpha", 1);
-    OIIO::Filesystem::IOProxy* const memory = png_.bytes.empty() ? nullptr : &png_reader_;
-    if (memory != nullptr) hints.attribute("oiio:ioproxy", OIIO::TypeDesc::PTR, &memory);
-    input_ = OIIO::ImageInput::open(memory != nullptr ? "picture.png" : path.string(), &hints);
-    if (!input_) refuse(path, "is no picture that can be read: " + OIIO::geterror());
-    spec_ = input_->spec();
-    check_size(path, spec_.width, spec_.height);
-    if (spec_.width < 1 || spec_.height < 1 || spec_.depth > 1 || spec_.nchannels < 1) {
-      refuse(path, "holds no flat picture");
-    }
-    if (spec_.deep) refuse(path, "holds deep pixels: only flat pictures are read");
-  }
-
-  [[nodiscard]] const OIIO::ImageSpec& spec() const { return spec_; }
-  [[nodiscard]] const fs::path& path() const { return path_; }
-  [[nodiscard]] bool is(std::string_view format) const { return format == input_->format_name(); }
-
-  /// Name of the embedded ICC profile; empty without one.
-  [[nodiscard]] std::string color_profile() const {
-    const std::string name = spec_.get_string_attribute("ICCProfile:profile_description");
-    return name.empty() ? png_.color_profile : name;
-  }
-  /// To be asked when the first picture is read: the file stands at the next one afterwards.
-  [[nodiscard]] bool has_more_pictures() {
-    const bool more = input_->seek_subimage(1, 0);
-    input_->geterror();
-    return more;
-  }
-
-  /// Rows that are read at once: tiles must be whole.
-  [[nodiscard]] int band_rows() const {
-    const std::int64_t row_bytes = std::int64_t{spec_.width} * spec_.nchannels * 4;
-    const int unit = std::max(1, spec_.tile_height);
-    const auto units = std::max<std::int64_t>(1, kBandBytes / (row_bytes * unit));
-    return static_cast<int>(std::min<std::int64_t>(units * unit, spec_.height + unit - 1));
-  }
-
-  /// Reads rows begin … end − 1, counted from the data's top, all channels side by side.
-  void read_rows(int begin, int end, std::vector<float>& rows) {
-    rows.resize(static_cast<std::size_t>(end - begin) * static_cast<std::size_t>(spec_.width) *
-                static_cast<std::size_t>(spec_.nchannels));
-    const int top = spec_.y + begin;
-    const int bottom = spec_.y + end;
-    const bool read =
-        spec_.tile_width > 0
-            ? input_->read_tiles(0, 0, spec_.x, spec_.x + spec_.width, top, bottom, spec_.z,
-                                 spec_.z + 1, 0, spec_.nchannels, OIIO::TypeFloat, rows.data())
-            : input_->read_scanlines(0, 0, top, bottom, spec_.z, 0, spec_.nchannels,
-                                     OIIO::TypeFloat, rows.data());
-    // Some decoders report a damaged file but call the read a success.
-    if (!read || input_->has_error()) {
-      refuse(path_, "is truncated or corrupt: " + input_->geterror());
-    }
-  }
-
- private:
-  fs::path path_;
-  EssentialPng png_;  ///< Empty for other formats.
-  OIIO::Filesystem::IOMemReader png_reader_;
-  std::unique_ptr<OIIO::ImageInput> input_;
-  OIIO::ImageSpec spec_;
-};
+/// Bytes of a name out of the file in a message.
+constexpr std::size_t kLongestName = 60;
 
 /// Which channels make the picture.
 struct Channels {
@@ -192,8 +65,8 @@ ColorSpace declared_color_space(const OIIO::ImageSpec& spec, std::vector<std::st
   const std::string name = spec.get_string_attribute("oiio:ColorSpace");
   if (name.empty()) return usual;
   if (const auto known = parse_color_space(name)) return *known;
-  changes.push_back("colour space '" + name + "' is not known: read as " +
-                    (is_float ? "linear" : "sRGB"));
+  changes.push_back("colour space '" + printable_line(name, kLongestName) +
+                    "' is not known: read as " + (is_float ? "linear" : "sRGB"));
   return usual;
 }
 
@@ -224,7 +97,7 @@ class Decoder {
 /// Turns stored pixels into grey linear light and remembers what that took.
 class Flattener {
  public:
-  Flattener(const Source& source, Channels channels, Decoder decoder)
+  Flattener(const PictureSource& source, Channels channels, Decoder decoder)
       : path_(source.path()),
         names_(source.spec().channelnames),
         channels_(std::move(channels)),
@@ -262,9 +135,9 @@ class Flattener {
     const auto index = static_cast<std::size_t>(channel);
     std::ostringstream why;
     why << "pixel (column " << column << ", row " << row << ") has the value " << value;
-    if (index < names_.size()) why << " in channel " << names_[index];
+    if (index < names_.size()) why << " in channel " << printable_line(names_[index], kLongestName);
     why << ": values must be finite and not negative";
-    refuse(path_, why.str());
+    refuse_picture(path_, why.str());
   }
 
   /// Light of a stored value in front of black. A file with associated alpha stores the encoded
@@ -294,14 +167,14 @@ struct Window {
 
 /// OpenEXR tells apart what is stored and what is shown. TIFF positions are print layout and do not
 /// count.
-Window shown_window(const Source& source, std::vector<std::string>& changes) {
+Window shown_window(const PictureSource& source, std::vector<std::string>& changes) {
   const OIIO::ImageSpec& spec = source.spec();
   if (!source.is("openexr") || spec.full_width < 1 || spec.full_height < 1) {
     return {spec.width, spec.height, 0, 0};
   }
   const Window window{spec.full_width, spec.full_height, spec.x - spec.full_x,
                       spec.y - spec.full_y};
-  check_size(source.path(), window.columns, window.rows);
+  check_picture_size(source.path(), window.columns, window.rows);
   if (window.left != 0 || window.top != 0 || window.columns != spec.width ||
       window.rows != spec.height) {
     changes.push_back("fitted to the display window of " + std::to_string(window.columns) + " x " +
@@ -310,13 +183,16 @@ Window shown_window(const Source& source, std::vector<std::string>& changes) {
   return window;
 }
 
-Image read_pixels(Source& source, const Window& window, Flattener& flattener) {
+Image read_pixels(PictureSource& source, const Window& window, Flattener& flattener,
+                  const RunControl& run) {
   const OIIO::ImageSpec& spec = source.spec();
   const auto channels = static_cast<std::size_t>(spec.nchannels);
   Image image(window.columns, window.rows);
   std::vector<float> band;
   for (int begin = 0; begin < spec.height; begin += source.band_rows()) {
     const int end = std::min(spec.height, begin + source.band_rows());
+    run.report(
+        {"reading picture", static_cast<double>(begin), static_cast<double>(spec.height), {}});
     source.read_rows(begin, end, band);
     const float* pixel = band.data();
     for (int row = begin + window.top; row < end + window.top; ++row) {
@@ -354,24 +230,29 @@ Image upright(Image image, int orientation) {
   return turned;
 }
 
-void report_header(Source& source, std::vector<std::string>& changes) {
-  if (source.has_more_pictures()) changes.emplace_back("only the first of several pictures read");
+void report_header(PictureSource& source, std::vector<std::string>& changes) {
+  if (source.is_animated()) {
+    changes.emplace_back("animated: only the first frame read");
+  } else if (source.has_more_pictures()) {
+    changes.emplace_back("only the first of several pictures read");
+  }
   const std::string profile = source.color_profile();
   if (!profile.empty() && profile.find("sRGB") == std::string::npos) {
-    changes.push_back("embedded colour profile '" + profile + "' not applied");
+    changes.push_back("embedded colour profile '" + printable_line(profile, kLongestName) +
+                      "' not applied");
   }
 }
 
 }  // namespace
 
-LoadedImage read_image(const fs::path& path) {
-  Source source(path);
+LoadedImage read_image(const fs::path& path, const RunControl& run) {
+  PictureSource source(path, run);
   LoadedImage loaded;
   const ColorSpace space = declared_color_space(source.spec(), loaded.changes);
   Flattener flattener(source, choose_channels(source.spec(), source.is("gif")),
                       Decoder(space, source.spec()));
   const Window window = shown_window(source, loaded.changes);
-  loaded.image = read_pixels(source, window, flattener);
+  loaded.image = read_pixels(source, window, flattener, run);
   flattener.report(loaded.changes);
   report_header(source, loaded.changes);
   if (const int orientation = source.spec().get_int_attribute("Orientation", 1);

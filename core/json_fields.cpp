@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/printable.h"
 
 namespace lensforge {
 namespace {
@@ -16,7 +17,7 @@ using nlohmann::json;
 std::string shown(const json& value) {
   constexpr std::size_t kLongest = 60;
   const std::string text = value.dump(-1, ' ', false, json::error_handler_t::replace);
-  return text.size() <= kLongest ? text : text.substr(0, kLongest) + "...";
+  return printable_line(text, kLongest);
 }
 
 bool is_int(const json& value) {

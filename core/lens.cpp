@@ -1,16 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "core/lens.h"
 
-#include <Eigen/Geometry>
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <fstream>
-#include <iterator>
 #include <limits>
 #include <random>
 #include <string>
-#include <string_view>
 #include <system_error>
 #include <utility>
 
@@ -19,6 +15,8 @@
 #include "core/files.h"
 #include "core/image_io.h"
 #include "core/json_fields.h"
+#include "core/json_text.h"
+#include "core/lens_surface.h"
 #include "core/mesh_io.h"
 
 namespace lensforge {
@@ -30,6 +28,8 @@ using nlohmann::ordered_json;
 
 constexpr const char* kFormat = "lensforge.lens";
 constexpr int kVersion = 1;
+/// Of lens.json, which has some 2 kB.
+constexpr std::uintmax_t kMaxJsonBytes = std::uintmax_t{1} << 20U;
 
 std::string size_text(int columns, int rows) {
   return std::to_string(columns) + " x " + std::to_string(rows);
@@ -137,18 +137,8 @@ void check_sizes(const Lens& lens) {
            size_text(lens.render.columns(), lens.render.rows()));
 }
 
-json parse_json(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) {
-    throw InputError(path.string() + ": cannot be read: " + std::generic_category().message(errno));
-  }
-  const std::string text{std::istreambuf_iterator<char>(file), {}};
-  try {
-    return json::parse(text);
-  } catch (const json::parse_error& error) {
-    throw InputError(path.string() + ": is no JSON: byte " + std::to_string(error.byte) + " of " +
-                     std::to_string(text.size()) + " cannot be understood");
-  }
+json read_json(const fs::path& path) {
+  return parse_json(read_whole_file(path, kMaxJsonBytes), path.string());
 }
 
 /// One of two words as one of two values.
@@ -220,29 +210,9 @@ GridShape read_grid(const JsonFields& fields, const SurfaceMesh& mesh) {
   if (shape.minCoeff() < 1 || vertices != mesh.vertex_count()) {
     fields.refuse("grid", "the surface has " + std::to_string(mesh.vertex_count()) + " vertices");
   }
-  return {shape.x(), shape.y()};
-}
-
-/// Twice the area that a triangle covers seen from +z; negative if it runs clockwise.
-double doubled_area(const SurfaceMesh& mesh, std::int64_t triangle) {
-  const Eigen::Vector3d a = mesh.corner(triangle, 0);
-  return (mesh.corner(triangle, 1) - a).cross(mesh.corner(triangle, 2) - a).z();
-}
-
-void check_surface(const SurfaceMesh& mesh, const OpticalSetup& setup, const fs::path& path) {
-  for (std::int64_t t = 0; t < mesh.triangle_count(); ++t) {
-    if (doubled_area(mesh, t) > 0.0) continue;
-    throw InputError(path.string() + ": triangle " + std::to_string(t) +
-                     " must run counter-clockwise seen from +z, but covers " +
-                     std::to_string(0.5 * doubled_area(mesh, t)) + " mm^2");
-  }
-  const double lowest = mesh.vertices.row(2).minCoeff();
-  const double highest = mesh.vertices.row(2).maxCoeff();
-  if (lowest >= 0.0 && highest < setup.focal_length) return;
-  throw InputError(path.string() + ": z runs from " + std::to_string(lowest) + " to " +
-                   std::to_string(highest) +
-                   " mm: it must lie between the entry face at 0 and the receiving plane at " +
-                   std::to_string(setup.focal_length));
+  const GridShape grid{shape.x(), shape.y()};
+  if (const auto fault = grid_fault(mesh, grid)) fields.refuse("grid", *fault);
+  return grid;
 }
 
 SurfaceMesh read_surface(const JsonFields& fields, const OpticalSetup& setup,
@@ -252,7 +222,9 @@ SurfaceMesh read_surface(const JsonFields& fields, const OpticalSetup& setup,
     fields.refuse("surface", "it must be the name of a file in the lens folder");
   }
   SurfaceMesh mesh = read_mesh(folder / name);
-  check_surface(mesh, setup, folder / name);
+  if (const auto fault = surface_fault(mesh, setup)) {
+    throw InputError((folder / name).string() + ": " + *fault);
+  }
   mesh.grid = read_grid(fields, mesh);
   return mesh;
 }
@@ -282,7 +254,7 @@ void write_lens(const Lens& lens, const fs::path& folder) {
 
 Lens read_lens(const fs::path& folder) {
   const fs::path path = folder / lens_file::kJson;
-  const json document = parse_json(path);
+  const json document = read_json(path);
   const JsonFields fields(document, path.string());
   check_supported(fields);
   Lens lens;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "core/mesh_io.h"
 
-#include <OpenMesh/Core/IO/MeshIO.hh>
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -10,22 +9,17 @@
 #include <charconv>
 #include <cstdint>
 #include <cstring>
-#include <exception>
 #include <fstream>
-#include <ios>
-#include <iterator>
-#include <limits>
-#include <memory>
 #include <optional>
-#include <sstream>
 #include <string>
+#include <string_view>
 #include <system_error>
-#include <vector>
 
 #include "core/error.h"
 #include "core/files.h"
-#include "core/mesh_importer.h"
-#include "core/openmesh_silence.h"
+#include "core/mesh_readers.h"
+#include "core/number_text.h"
+#include "core/version.h"
 
 namespace lensforge {
 namespace {
@@ -35,6 +29,10 @@ namespace fs = std::filesystem;
 // Records are copied as they lie in memory.
 static_assert(std::endian::native == std::endian::little, "write_ply writes little-endian PLY");
 
+/// Largest file of another program that is read: its content is held in memory. A binary STL of
+/// this size has 85 million triangles.
+constexpr std::uintmax_t kMaxMeshBytes = std::uintmax_t{4} << 30U;
+
 constexpr std::size_t kVertexBytes = 3 * sizeof(double);
 constexpr std::size_t kTriangleBytes = 1 + 3 * sizeof(std::int32_t);
 
@@ -43,8 +41,15 @@ struct Counts {
   std::int64_t triangles = 0;
 };
 
-std::string ply_header(const Counts& counts) {
-  return "ply\nformat binary_little_endian 1.0\nelement vertex " + std::to_string(counts.vertices) +
+constexpr std::string_view kFormatLines = "ply\nformat binary_little_endian 1.0\n";
+/// Before the version of the program that wrote it.
+constexpr std::string_view kMarkBegin = "comment lensforge ";
+/// Bytes of the longest mark line that is looked for.
+constexpr std::size_t kLongestMark = 100;
+
+/// What follows the format and the mark.
+std::string element_lines(const Counts& counts) {
+  return "element vertex " + std::to_string(counts.vertices) +
          "\nproperty double x\nproperty double y\nproperty double z\nelement face " +
          std::to_string(counts.triangles) +
          "\nproperty list uchar int vertex_indices\nend_header\n";
@@ -62,24 +67,37 @@ std::int64_t number_after(const std::string& text, const std::string& words) {
   throw InputError(path.string() + ": " + why);
 }
 
-/// The counts in the header if the file is in the very form that write_ply() makes.
-std::optional<Counts> own_form(std::ifstream& file) {
-  std::string head(ply_header({INT32_MAX, INT32_MAX}).size(), '\0');
+/// The header of a file in our own form.
+struct OwnHeader {
+  Counts counts;
+  std::size_t bytes = 0;
+};
+
+/// The header if the file is in the very form that write_ply() makes, with or without its mark.
+std::optional<OwnHeader> own_form(std::ifstream& file) {
+  const std::size_t longest =
+      kFormatLines.size() + kLongestMark + element_lines({INT32_MAX, INT32_MAX}).size();
+  std::string head(longest, '\0');
   file.read(head.data(), static_cast<std::streamsize>(head.size()));
   head.resize(static_cast<std::size_t>(file.gcount()));
   file.clear();
-  const Counts counts{number_after(head, "element vertex "), number_after(head, "element face ")};
+  if (!head.starts_with(kFormatLines)) return std::nullopt;
+  std::size_t begin = kFormatLines.size();
+  if (head.compare(begin, kMarkBegin.size(), kMarkBegin) == 0) begin = head.find('\n', begin) + 1;
+  const Counts counts{number_after(head, "\nelement vertex "),
+                      number_after(head, "\nelement face ")};
   if (counts.vertices < 0 || counts.vertices > INT32_MAX) return std::nullopt;
   if (counts.triangles < 0 || counts.triangles > INT32_MAX) return std::nullopt;
-  const std::string header = ply_header(counts);
-  if (!head.starts_with(header)) return std::nullopt;
-  file.seekg(static_cast<std::streamoff>(header.size()));
-  return counts;
+  const std::string lines = element_lines(counts);
+  if (head.compare(begin, lines.size(), lines) != 0) return std::nullopt;
+  file.seekg(static_cast<std::streamoff>(begin + lines.size()));
+  return OwnHeader{counts, begin + lines.size()};
 }
 
-/// OpenMesh reads PLY coordinates as float; our own form is read here, bit for bit.
-SurfaceMesh read_own_form(std::ifstream& file, const Counts& counts, const fs::path& path) {
-  const std::uintmax_t expected = ply_header(counts).size() +
+/// Our own form is read bit for bit, without rounding to single precision.
+SurfaceMesh read_own_form(std::ifstream& file, const OwnHeader& header, const fs::path& path) {
+  const Counts& counts = header.counts;
+  const std::uintmax_t expected = header.bytes +
                                   static_cast<std::uintmax_t>(counts.vertices) * kVertexBytes +
                                   static_cast<std::uintmax_t>(counts.triangles) * kTriangleBytes;
   if (const std::uintmax_t size = fs::file_size(path); size != expected) {
@@ -101,25 +119,6 @@ SurfaceMesh read_own_form(std::ifstream& file, const Counts& counts, const fs::p
   return mesh;
 }
 
-/// OpenMesh takes a text STL that ends early for a smaller mesh.
-void check_stl_end(std::ifstream& file, const fs::path& path) {
-  constexpr std::streamoff kTail = 1024;  // Room for "endsolid" and the longest name.
-  file.clear();
-  file.seekg(0);
-  std::string head(84, '\0');
-  file.read(head.data(), static_cast<std::streamsize>(head.size()));
-  if (!head.starts_with("solid")) return;
-  std::uint32_t triangles = 0;
-  std::memcpy(&triangles, &head[80], sizeof triangles);
-  const auto size = static_cast<std::streamoff>(fs::file_size(path));
-  if (file && size == 84 + std::streamoff{50} * triangles) return;  // Binary after all.
-  file.clear();
-  file.seekg(std::max(std::streamoff{0}, size - kTail));
-  const std::string tail{std::istreambuf_iterator<char>(file), {}};
-  if (tail.find("endsolid") == std::string::npos)
-    refuse(path, "is truncated: it has no 'endsolid'");
-}
-
 /// The extension without its dot, in small letters.
 std::string format_of(const fs::path& path) {
   std::string format = path.extension().string();
@@ -129,46 +128,25 @@ std::string format_of(const fs::path& path) {
   return format;
 }
 
-/// PLY and OFF say beforehand how much there is to read. Where it is missing OpenMesh's readers
-/// make numbers up or never return, so a read that fails ends them.
-bool read_counted(const fs::path& path, MeshImporter& importer) {
-  std::ifstream file(path, std::ios::binary);
-  file.exceptions(std::ios::failbit | std::ios::badbit);
-  OpenMesh::IO::Options options;
-  return OpenMesh::IO::IOManager().read(file, format_of(path), importer, options);
-}
-
-bool read_uncounted(const fs::path& path, MeshImporter& importer) {
-  OpenMesh::IO::Options options;
-  return OpenMesh::IO::IOManager().read(path.string(), importer, options);
-}
-
-SurfaceMesh read_through_openmesh(const fs::path& path) {
-  const OpenMeshSilence silence;
-  MeshImporter importer;
-  bool read = false;
-  try {
-    const std::string format = format_of(path);
-    read = format == "ply" || format == "off" ? read_counted(path, importer)
-                                              : read_uncounted(path, importer);
-  } catch (const std::ios::failure&) {
-    refuse(path, "is truncated or corrupt");
-  } catch (const std::exception&) {
-    read = false;
-  }
-  if (!read) refuse(path, "is corrupt or no PLY, OBJ, STL or OFF mesh");
-  if (const std::string problem = importer.problem(); !problem.empty()) refuse(path, problem);
-  return importer.mesh();
+SurfaceMesh read_foreign(const fs::path& path) {
+  const std::string format = format_of(path);
+  const std::string name = path.string();
+  const std::string content = read_whole_file(path, kMaxMeshBytes);
+  if (format == "ply") return read_ply(content, name);
+  if (format == "obj") return read_obj(content, name);
+  if (format == "off") return read_off(content, name);
+  if (format == "stl") return read_stl(content, name);
+  refuse(path, "extension '" + path.extension().string() +
+                   "' is not that of a mesh: .ply, .obj, .stl and .off are read");
 }
 
 void check_mesh(const SurfaceMesh& mesh, const fs::path& path) {
   if (mesh.triangle_count() == 0) refuse(path, "holds no triangles");
   for (Eigen::Index v = 0; v < mesh.vertices.cols(); ++v) {
     if (mesh.vertices.col(v).allFinite()) continue;
-    std::ostringstream message;
-    message << "vertex " << v << " is at (" << mesh.vertices(0, v) << ", " << mesh.vertices(1, v)
-            << ", " << mesh.vertices(2, v) << "): coordinates must be finite";
-    refuse(path, message.str());
+    const auto text = [&](int axis) { return number_text(mesh.vertices(axis, v)); };
+    refuse(path, "vertex " + std::to_string(v) + " is at (" + text(0) + ", " + text(1) + ", " +
+                     text(2) + "): coordinates must be finite");
   }
   for (Eigen::Index t = 0; t < mesh.triangles.cols(); ++t) {
     for (const int v : mesh.triangles.col(t)) {
@@ -180,7 +158,8 @@ void check_mesh(const SurfaceMesh& mesh, const fs::path& path) {
 }
 
 void write_blocks(const SurfaceMesh& mesh, std::ofstream& file) {
-  file << ply_header({mesh.vertex_count(), mesh.triangle_count()});
+  file << kFormatLines << "comment " << program_mark() << '\n'
+       << element_lines({mesh.vertex_count(), mesh.triangle_count()});
   file.write(reinterpret_cast<const char*>(mesh.vertices.data()),
              mesh.vertex_count() * std::streamsize{kVertexBytes});
   std::array<char, kTriangleBytes> record{3};
@@ -194,21 +173,10 @@ void write_blocks(const SurfaceMesh& mesh, std::ofstream& file) {
 }  // namespace
 
 SurfaceMesh read_mesh(const fs::path& path) {
-  std::error_code error;
-  const fs::file_status status = fs::status(path, error);
-  if (!fs::exists(status)) refuse(path, "cannot be read: " + error.message());
-  if (fs::is_directory(status)) refuse(path, "is a folder, not a mesh file");
-  std::ifstream file(path, std::ios::binary);
-  if (!file) refuse(path, "cannot be read: " + std::generic_category().message(errno));
+  std::ifstream file = open_input(path);
   if (file.peek() == std::ifstream::traits_type::eof()) refuse(path, "is empty");
-  const std::optional<Counts> counts = own_form(file);
-  SurfaceMesh mesh;
-  if (counts) {
-    mesh = read_own_form(file, *counts, path);
-  } else {
-    check_stl_end(file, path);
-    mesh = read_through_openmesh(path);
-  }
+  const std::optional<OwnHeader> own = own_form(file);
+  SurfaceMesh mesh = own ? read_own_form(file, *own, path) : read_foreign(path);
   check_mesh(mesh, path);
   return mesh;
 }

@@ -95,15 +95,16 @@ std::optional<PngSize> read_png_size(std::istream& file) {
 
 EssentialPng read_essential_png(std::istream& file) {
   EssentialPng png;
-  if (!read_signature(file)) return {{}, "is no PNG file", {}};
+  if (!read_signature(file)) return {{}, "is no PNG file", {}, false};
   png.bytes = kSignature;
   for (;;) {
     const std::optional<Chunk> chunk = read_chunk(file);
-    if (!chunk) return {{}, "is truncated: the PNG data end before their end chunk", {}};
+    if (!chunk) return {{}, "is truncated: the PNG data end before their end chunk", {}, false};
     const std::string_view type = chunk->type();
     if (!chunk->intact()) {
-      return {{}, "is corrupt: a PNG chunk's checksum is wrong", {}};
+      return {{}, "is corrupt: a PNG chunk's checksum is wrong", {}, false};
     }
+    if (type == "acTL") png.animated = true;
     if (type == "iCCP") png.color_profile = chunk->data().substr(0, chunk->data().find('\0'));
     if (std::find(kEssential.begin(), kEssential.end(), type) != kEssential.end()) {
       png.bytes += chunk->bytes;

@@ -21,6 +21,7 @@ struct EssentialPng {
   std::string bytes;
   std::string problem;        ///< "is truncated", ...; empty if every chunk was whole.
   std::string color_profile;  ///< Name of an embedded ICC profile; empty without one.
+  bool animated = false;      ///< An APNG, whose default picture alone is in `bytes`.
 };
 
 /// Reads a PNG stream from its start to the end chunk and checks every chunk's length and CRC.

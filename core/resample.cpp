@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -50,9 +51,16 @@ std::vector<double> resample_row(const Image& image, int row, const std::vector<
   return result;
 }
 
+void report_row(int row, int rows, const RunControl& run) {
+  constexpr int kReports = 100;
+  if (run.stop_requested()) throw Interrupted();
+  if (row % std::max(1, rows / kReports) != 0) return;
+  run.report({"resampling picture", static_cast<double>(row), static_cast<double>(rows), {}});
+}
+
 }  // namespace
 
-Image resample(const Image& image, int columns, int rows) {
+Image resample(const Image& image, int columns, int rows, const RunControl& run) {
   LF_CHECK(columns >= 1 && rows >= 1 && !image.empty(),
            std::to_string(columns) + "x" + std::to_string(rows));
   const std::vector<Coverage> across = coverages(image.columns(), columns);
@@ -62,6 +70,7 @@ Image resample(const Image& image, int columns, int rows) {
   std::vector<double> source;
   int source_row = -1;
   for (int row = 0; row < rows; ++row) {
+    report_row(row, rows, run);
     const Coverage& coverage = down[static_cast<std::size_t>(row)];
     std::fill(sum.begin(), sum.end(), 0.0);
     for (std::size_t k = 0; k < coverage.weights.size(); ++k) {

@@ -3,19 +3,19 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
-#include <iterator>
 #include <sstream>
 #include <system_error>
 
 #include "core/error.h"
+#include "core/files.h"
 #include "core/number_text.h"
+#include "core/printable.h"
+#include "core/toml_nesting.h"
 
 namespace lensforge {
 namespace {
 
 constexpr std::size_t kLongestText = 200;
-constexpr std::uintmax_t kLargestFile = 1U << 20U;
 
 /// The value as the file has it; a table or an array only by its kind.
 std::string shown(const toml::node* value) {
@@ -26,7 +26,7 @@ std::string shown(const toml::node* value) {
   value->visit([&text](const auto& node) {
     if constexpr (!toml::is_table<decltype(node)> && !toml::is_array<decltype(node)>) text << node;
   });
-  return text.str().substr(0, kLongestText);
+  return printable_line(text.str(), kLongestText);
 }
 
 std::string range_text(const NumberRule& rule) {
@@ -42,32 +42,28 @@ bool is_one_line(const std::string& text) {
 
 }  // namespace
 
-std::string one_line(std::string text) {
-  std::replace_if(text.begin(), text.end(), is_control, '?');
-  return text;
-}
-
 toml::table parse_toml(std::string_view text, const std::string& file) {
+  if (text.size() > kMaxTomlBytes) {
+    throw InputError(file + ": has " + std::to_string(text.size()) + " bytes: at most 1 MiB");
+  }
+  if (const auto problem = toml_nesting_problem(text)) throw InputError(file + ": " + *problem);
   try {
     return toml::parse(text);
   } catch (const toml::parse_error& e) {
-    throw InputError(one_line(file + ": line " + std::to_string(e.source().begin.line) +
-                              ": not TOML: " + std::string(e.description())));
+    throw InputError(printable_line(file + ": line " + std::to_string(e.source().begin.line) +
+                                    ": not TOML: " + std::string(e.description())));
   }
 }
 
 std::string read_toml_file(const std::filesystem::path& path, const std::string& kind) {
+  require_regular_file(path);
   std::error_code error;
   const std::uintmax_t size = std::filesystem::file_size(path, error);
-  if (error) throw InputError(path.string() + ": cannot be read: " + error.message());
-  if (size > kLargestFile) {
+  if (!error && size > kMaxTomlBytes) {
     throw InputError(path.string() + ": " + std::to_string(size) + " bytes: " + kind +
                      " has at most 1 MiB");
   }
-  std::ifstream file(path, std::ios::binary);
-  std::string text{std::istreambuf_iterator<char>(file), {}};
-  if (!file) throw InputError(path.string() + ": cannot be read");
-  return text;
+  return read_whole_file(path, kMaxTomlBytes);
 }
 
 std::string TomlFields::name_of(const std::string& key) const {
@@ -75,8 +71,8 @@ std::string TomlFields::name_of(const std::string& key) const {
 }
 
 void TomlFields::refuse(const std::string& key, const std::string& rule) const {
-  throw InputError(
-      one_line(source_.file + ": " + name_of(key) + ": " + shown(table_.get(key)) + ": " + rule));
+  throw InputError(printable_line(source_.file + ": " + name_of(key) + ": " +
+                                  shown(table_.get(key)) + ": " + rule));
 }
 
 const toml::node& TomlFields::required(const std::string& key) {

@@ -19,8 +19,8 @@ struct NumberRule {
   double most;
 };
 
-/// @return `text` with a question mark for each control character.
-std::string one_line(std::string text);
+/// Longest TOML document that is read.
+inline constexpr std::size_t kMaxTomlBytes = std::size_t{1} << 20U;
 
 /// Where a document comes from and what it is, for messages.
 struct TomlSource {
@@ -28,7 +28,8 @@ struct TomlSource {
   std::string kind;  ///< With its article: "a register map".
 };
 
-/// @throw InputError naming file and line if `text` is not TOML.
+/// @throw InputError naming file and line if `text` is not TOML, has more than 1 MiB, a key of more
+/// than 32 parts or brackets more than 32 deep.
 toml::table parse_toml(std::string_view text, const std::string& file);
 
 /// The text of a small file. @throw InputError naming the file and why it cannot be read, or that

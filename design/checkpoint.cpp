@@ -5,15 +5,16 @@
 #include <cmath>
 #include <cstddef>
 #include <cstring>
-#include <fstream>
-#include <iterator>
 #include <nlohmann/json.hpp>
 #include <span>
 #include <string>
 #include <string_view>
+#include <system_error>
 
 #include "core/error.h"
 #include "core/files.h"
+#include "core/json_fields.h"
+#include "core/json_text.h"
 #include "design/grid_mesh.h"
 
 // File: the magic line, then a JSON header on one line, then as little-endian doubles the vertices
@@ -23,6 +24,9 @@ namespace lensforge {
 namespace {
 
 using nlohmann::json;
+
+/// A checkpoint has 48 bytes a vertex: this one would have 178 million of them.
+constexpr std::uintmax_t kMaxBytes = std::uintmax_t{8} << 30U;
 
 constexpr std::string_view kMagic = "lensforge checkpoint 3\n";
 
@@ -84,9 +88,15 @@ ConvergenceRow row_from_json(const json& j) {
 }
 
 std::string read_bytes(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) refuse(path, "cannot be read: there is nothing to resume from");
-  return {std::istreambuf_iterator<char>(file), {}};
+  std::error_code ignored;
+  if (!std::filesystem::exists(path, ignored)) {
+    refuse(path, "cannot be read: there is nothing to resume from");
+  }
+  return read_whole_file(path, kMaxBytes);
+}
+
+std::string header_name(const std::filesystem::path& path) {
+  return "checkpoint '" + path.string() + "' header";
 }
 
 /// The parts of a checkpoint file, hash and magic verified.
@@ -108,7 +118,7 @@ Parts split(const std::string& content, const std::filesystem::path& path) {
   rest.remove_prefix(kMagic.size());
   const std::size_t end = rest.find('\n');
   if (end == std::string_view::npos) refuse(path, "has no header");
-  return {json::parse(rest.substr(0, end), nullptr, false), rest.substr(end + 1)};
+  return {parse_json(rest.substr(0, end), header_name(path)), rest.substr(end + 1)};
 }
 
 }  // namespace
@@ -171,8 +181,11 @@ Checkpoint read_checkpoint(const std::filesystem::path& path) {
   try {
     Checkpoint checkpoint;
     checkpoint.fingerprint = parts.header.at("fingerprint");
-    checkpoint.level = parts.header.at("level");
-    checkpoint.round = parts.header.at("round");
+    const JsonFields fields(parts.header, header_name(path));
+    checkpoint.level = fields.integer("level");
+    checkpoint.round = fields.integer("round");
+    if (checkpoint.level < 0) fields.refuse("level", "it must be 0 or more");
+    if (checkpoint.round < 0) fields.refuse("round", "it must be 0 or more");
     const json& value = parts.header.at("value");
     if (!value.is_null()) checkpoint.value = value;
     checkpoint.transporting = parts.header.at("transporting");
@@ -180,7 +193,7 @@ Checkpoint read_checkpoint(const std::filesystem::path& path) {
     for (const json& row : parts.header.at("convergence")) {
       checkpoint.convergence.push_back(row_from_json(row));
     }
-    const GridShape shape{parts.header.at("columns"), parts.header.at("rows")};
+    const GridShape shape{fields.integer("columns"), fields.integer("rows")};
     const json& scales = parts.header.at("scales");
     const std::size_t bytes = parts.numbers.size() / (scales.is_null() ? 1 : 2);
     const std::size_t count = bytes / (3 * sizeof(double));
@@ -191,6 +204,7 @@ Checkpoint read_checkpoint(const std::filesystem::path& path) {
     }
     checkpoint.mesh = make_grid_mesh(Eigen::Vector2d::Ones(), shape, 0.0);
     std::memcpy(checkpoint.mesh.vertices.data(), parts.numbers.data(), bytes);
+    if (!checkpoint.mesh.vertices.allFinite()) refuse(path, "holds a vertex that is not finite");
     if (!scales.is_null()) {
       checkpoint.scales.xy = scales.at(0);
       checkpoint.scales.z = scales.at(1);
@@ -198,8 +212,8 @@ Checkpoint read_checkpoint(const std::filesystem::path& path) {
       std::memcpy(checkpoint.scales.reach.data(), parts.numbers.data() + bytes, bytes);
     }
     return checkpoint;
-  } catch (const json::exception& error) {
-    refuse(path, std::string("has a bad header: ") + error.what());
+  } catch (const json::exception&) {
+    refuse(path, "has a bad header: a field is missing or of another type");
   }
 }
 

@@ -70,9 +70,9 @@ void rest_on_thickness(SurfaceMesh& mesh, double thickness) {
   mesh.vertices.row(2).array() += thickness - mesh.vertices.row(2).minCoeff();
 }
 
-Image working_picture(const Image& target, const DesignOptions& options) {
+Image working_picture(const Image& target, const DesignOptions& options, const RunControl& run) {
   const Eigen::Vector2i pixels = working_size(target.columns(), target.rows(), options.pixels);
-  return resample(target, pixels.x(), pixels.y());
+  return resample(target, pixels.x(), pixels.y(), run);
 }
 
 /// Share of the pixels that are black (kBlack).
@@ -91,7 +91,8 @@ class Schedule {
   Schedule(const Image& target, const DesignOptions& options, const Executor& executor,
            const RunControl& control)
       : options_(options), executor_(executor), control_(control) {
-    target_ = working_picture(target, options);
+    // Nothing is reported before all input has been accepted.
+    target_ = working_picture(target, options, {control.stop_token(), {}});
     const Eigen::Vector2i pixels(target_.columns(), target_.rows());
     setup_ = make_setup(options, pixels);
     levels_ = plan_levels(pixels, options);
@@ -449,7 +450,7 @@ DesignResult design_lens(const Image& target, const DesignOptions& options,
 }
 
 std::uint64_t design_identity(const Image& target, const DesignOptions& options) {
-  return design_fingerprint(working_picture(target, options), options);
+  return design_fingerprint(working_picture(target, options, {}), options);
 }
 
 std::string convergence_csv(const std::vector<ConvergenceRow>& rows) {

@@ -194,26 +194,6 @@ TEST(ImageIo, APngGammaIsHonoured) {
   EXPECT_NEAR(light_of_pixel(folder / "l.png", spec, {0.5F}), 0.5, 1e-4);
 }
 
-TEST(ImageIo, AnotherDeclaredColourSpaceIsHonoured) {
-  const TempFolder folder;
-  OIIO::ImageSpec spec = pixel_spec(3, TypeDesc::UINT16);
-  spec.attribute("oiio:ColorSpace", "Rec709");
-  EXPECT_NEAR(light_of_pixel(folder / "r.dpx", spec, {0.5F, 0.5F, 0.5F}),
-              std::pow(0.599 / 1.099, 1.0 / 0.45), 1e-4);
-  spec.attribute("oiio:ColorSpace", "linear");
-  EXPECT_NEAR(light_of_pixel(folder / "l.dpx", spec, {0.5F, 0.5F, 0.5F}), 0.5, 1e-4);
-}
-
-TEST(ImageIo, AnUnknownColourSpaceIsReadAsTheUsualOneWithAMessage) {
-  const TempFolder folder;
-  OIIO::ImageSpec spec = pixel_spec(3, TypeDesc::UINT16);
-  spec.attribute("oiio:ColorSpace", "KodakLog");
-  write_raw(folder / "k.dpx", spec, {0.5F, 0.5F, 0.5F});
-  const LoadedImage loaded = read_image(folder / "k.dpx");
-  EXPECT_NEAR(loaded.image.at(0, 0), decode(0.5), 1e-4);
-  EXPECT_THAT(loaded.changes, ElementsAre("colour space 'KodakLog' is not known: read as sRGB"));
-}
-
 TEST(ImageIo, AnEmbeddedProfileIsNamedAndNotPrintedAbout) {
   const TempFolder folder;
   write_bytes(folder / "w.png", view(lensforge::testing::kProfilePng));

@@ -56,7 +56,7 @@ TEST(ImageIo, RefusesAFolder) {
 }
 
 TEST(ImageIo, RefusesADevice) {
-  EXPECT_THAT(refusal("/dev/zero"), HasSubstr("is no regular file"));
+  EXPECT_THAT(refusal("/dev/zero"), HasSubstr("only regular files are read"));
 }
 
 TEST(ImageIo, RefusesAnEmptyFile) {

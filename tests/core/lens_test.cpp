@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <cmath>
 #include <functional>
@@ -12,6 +13,7 @@
 #include "core/full_disk.h"
 #include "core/image_io.h"
 #include "core/mesh_io.h"
+#include "core/output_guard.h"
 #include "core/temp_folder.h"
 #include "core/test_meshes.h"
 
@@ -338,6 +340,74 @@ TEST(Lens, ASurfaceBeyondTheWallOrUnderTheEntryFaceIsRefused) {
   for (const double z : {300.0, -0.1}) {
     EXPECT_THAT(surface_refusal([&](SurfaceMesh& mesh) { mesh.vertices(2, 4) = z; }),
                 HasSubstr("must lie between the entry face at 0 and the receiving plane at 300"));
+  }
+}
+
+TEST(Lens, ASizeOtherThanTheSurfacesIsRefused) {
+  const TempFolder folder;
+  write_lens(sample_lens(), folder.path());
+  json document = read_json(folder / "lens.json");
+  document["lens_size"] = {15000.0, 10000.0};
+  write_bytes(folder / "lens.json", document.dump());
+  EXPECT_THAT(message_of<InputError>([&] { read_lens(folder.path()); }),
+              HasSubstr("surface.ply: x runs from 0 to 15 mm: by lens_size it must run from 0 to "
+                        "15000"));
+  EXPECT_THAT(surface_refusal([](SurfaceMesh& mesh) { mesh.vertices.row(0).array() += 1.0; }),
+              HasSubstr("x runs from 1 to 16 mm"));
+}
+
+TEST(Lens, ATransposedGridIsRefused) {
+  EXPECT_EQ(refusal([](json& document) {
+              document["grid"] = {5, 7};
+            }),
+            "field 'grid' is [5,7]: the surface's triangle 0 is no half of a cell of the grid");
+}
+
+TEST(Lens, ATriangleThatStandsThereTwiceOrIsMissingIsRefused) {
+  const auto repeat = [](SurfaceMesh& mesh) { mesh.triangles.col(7) = mesh.triangles.col(20); };
+  EXPECT_THAT(surface_refusal(repeat), HasSubstr("triangle 20 overlaps another one"));
+  const auto triple = [](SurfaceMesh& mesh) { mesh.triangles.col(30) = mesh.triangles.col(20); };
+  EXPECT_THAT(surface_refusal(triple), HasSubstr("triangle 30 overlaps another one"));
+  const auto drop = [](SurfaceMesh& mesh) {
+    mesh.triangles.conservativeResize(3, mesh.triangles.cols() - 1);
+  };
+  EXPECT_THAT(surface_refusal(drop),
+              HasSubstr("the surface has 47 triangles, the grid calls for 48"));
+}
+
+TEST(Lens, WhatIsNoRegularFileIsRefusedWithoutWaiting) {
+  for (const char* name : {"lens.json", "surface.ply", "target.exr", "render.exr"}) {
+    const TempFolder folder;
+    write_lens(sample_lens(), folder.path());
+    fs::remove(folder / name);
+    ASSERT_EQ(::mkfifo((folder / name).c_str(), 0600), 0);
+    EXPECT_EQ(message_of<InputError>([&] { read_lens(folder.path()); }),
+              (folder / name).string() + ": is a named pipe; only regular files are read");
+    fs::remove(folder / name);
+    fs::create_directory(folder / name);
+    EXPECT_EQ(message_of<InputError>([&] { read_lens(folder.path()); }),
+              (folder / name).string() + ": is a folder; only regular files are read");
+  }
+}
+
+TEST(Lens, ALargeJsonAndANumberBeyondADoubleAreRefused) {
+  const TempFolder folder;
+  write_lens(sample_lens(), folder.path());
+  const std::string text = read_bytes(folder / "lens.json");
+  write_bytes(folder / "lens.json", text + std::string(1U << 20U, ' '));
+  EXPECT_THAT(message_of<InputError>([&] { read_lens(folder.path()); }), HasSubstr("at most"));
+  std::string large = text;
+  large.replace(large.find("1.4912"), 6, "1e400, \"x\": 1.4912");
+  write_bytes(folder / "lens.json", large);
+  EXPECT_THAT(message_of<InputError>([&] { read_lens(folder.path()); }),
+              HasSubstr("lens.json: holds a number that is too large"));
+}
+
+TEST(Lens, EveryFileSaysWhoWroteIt) {
+  const TempFolder folder;
+  write_lens(sample_lens(), folder.path());
+  for (const auto& entry : fs::directory_iterator(folder.path())) {
+    EXPECT_TRUE(written_by_lensforge(entry.path())) << entry.path();
   }
 }
 

@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <chrono>
 #include <cmath>
@@ -14,6 +15,7 @@
 #include "core/full_disk.h"
 #include "core/temp_folder.h"
 #include "core/test_meshes.h"
+#include "core/version.h"
 
 namespace lensforge {
 namespace {
@@ -102,11 +104,23 @@ TEST(MeshIo, OurPlyHasTheFormOfTheInterface) {
   const TempFolder folder;
   write_ply(grid_mesh(2, 2), folder / "m.ply");
   const std::string bytes = read_bytes(folder / "m.ply");
-  EXPECT_THAT(bytes, StartsWith("ply\nformat binary_little_endian 1.0\nelement vertex 4\n"
+  EXPECT_THAT(bytes, StartsWith("ply\nformat binary_little_endian 1.0\ncomment " + program_mark() +
+                                "\nelement vertex 4\n"
                                 "property double x\nproperty double y\nproperty double z\n"
                                 "element face 2\nproperty list uchar int vertex_indices\n"
                                 "end_header\n"));
   EXPECT_EQ(bytes.size(), bytes.find("end_header\n") + 11 + 4 * 24 + 2 * 13);
+}
+
+TEST(MeshIo, OurPlyWithoutAMarkComesBackBitForBit) {
+  const TempFolder folder;
+  const SurfaceMesh mesh = rough_grid(5, 4);
+  write_ply(mesh, folder / "m.ply");
+  std::string bytes = read_bytes(folder / "m.ply");
+  const std::string mark = "comment " + program_mark() + "\n";
+  bytes.erase(bytes.find(mark), mark.size());
+  write_bytes(folder / "m.ply", bytes);
+  EXPECT_EQ(read_mesh(folder / "m.ply").vertices, mesh.vertices);
 }
 
 TEST(MeshIo, ReadsEveryFormat) {
@@ -221,6 +235,19 @@ TEST(MeshIo, AHeaderThatAsksForTooMuchIsRefusedWithoutAllocating) {
               "property float y\nproperty float z\nelement face 4000000000\n"
               "property list uchar int vertex_indices\nend_header\n0 0 0\n");
   refusal(folder / "h.ply");
+}
+
+TEST(MeshIo, APipeAndADeviceAreRefusedWithoutWaiting) {
+  const TempFolder folder;
+  ASSERT_EQ(::mkfifo((folder / "p.ply").c_str(), 0600), 0);
+  refusal(folder / "p.ply");
+  refusal("/dev/zero");
+}
+
+TEST(MeshIo, RefusesAnExtensionOfNoMesh) {
+  const TempFolder folder;
+  write_bytes(folder / "a.om", "OM");
+  EXPECT_THAT(refusal(folder / "a.om"), HasSubstr(".ply, .obj, .stl and .off are read"));
 }
 
 TEST(MeshIo, AFullDiskNamesFileAndReasonAndLeavesNothing) {

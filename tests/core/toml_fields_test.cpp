@@ -65,6 +65,43 @@ TEST(TomlFields, RefusesWhatIsNotToml) {
               StartsWith("f.toml: line 2: not TOML: "));
 }
 
+std::string repeated(const std::string& text, int times) {
+  std::string all;
+  for (int i = 0; i < times; ++i) all += text;
+  return all;
+}
+
+TEST(TomlFields, RefusesAKeyOfManyPartsBeforeItIsParsed) {
+  for (const std::string& text : {"a = 1\na" + repeated(".a", 100'000) + " = 1\n",
+                                  "a = 1\n[a" + repeated(".\"a\"", 100'000) + "]\n",
+                                  "a = 1\nb = {a" + repeated(" . 'a'", 100'000) + " = 1}\n"}) {
+    EXPECT_EQ(message_of<InputError>([&] { (void)parse_toml(text, "f.toml"); }),
+              "f.toml: line 2: a key has more than 32 parts");
+  }
+}
+
+TEST(TomlFields, RefusesDeepBracketsBeforeTheyAreParsed) {
+  for (const char* bracket : {"[", "{a="}) {
+    EXPECT_EQ(message_of<InputError>(
+                  [&] { (void)parse_toml("a = " + repeated(bracket, 100'000), "f.toml"); }),
+              "f.toml: line 1: brackets are nested more than 32 deep");
+  }
+}
+
+TEST(TomlFields, DotsAndBracketsInStringsCommentsAndNumbersDoNotNest) {
+  const std::string dots = repeated(".[{", 50);
+  const std::string text = "# " + dots + "\na = \"\\\"" + dots + "\"\nb = '" + dots +
+                           "'\nc = '''\n" + dots + "'''\nd = [" + repeated("1.5, ", 50) +
+                           "]\ne = \"\"\"" + dots + "\"\"\"\n";
+  EXPECT_EQ(parse_toml(text, "f.toml").size(), 5U);
+}
+
+TEST(TomlFields, RefusesALargeText) {
+  EXPECT_THAT(
+      message_of<InputError>([] { (void)parse_toml(std::string((1U << 20U) + 1, ' '), "f.toml"); }),
+      HasSubstr("at most 1 MiB"));
+}
+
 TEST(TomlFields, RefusesFilesThatAreMissingOrLarge) {
   const TempFolder folder;
   EXPECT_THAT(message_of<InputError>([&] { (void)read_toml_file(folder / "no", "a list"); }),

@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <cstdint>
 #include <cstring>
@@ -164,6 +165,13 @@ TEST(Checkpoint, AMissingFileIsRefused) {
               HasSubstr("absent"));
 }
 
+TEST(Checkpoint, ANamedPipeIsRefusedWithoutWaiting) {
+  const TempFolder folder;
+  ASSERT_EQ(::mkfifo((folder / "pipe").c_str(), 0600), 0);
+  EXPECT_THAT(message_of<InputError>([&] { read_checkpoint(folder / "pipe"); }),
+              HasSubstr("only regular files are read"));
+}
+
 TEST(Checkpoint, AHeaderThatContradictsItselfIsRefused) {
   const TempFolder folder;
   const std::string bytes = sample_bytes(folder);
@@ -172,6 +180,10 @@ TEST(Checkpoint, AHeaderThatContradictsItselfIsRefused) {
   EXPECT_THAT(refusal_of(folder, forged(bytes, "\"columns\":7", "\"columns\":\"7\"")),
               HasSubstr("header"));
   EXPECT_THAT(refusal_of(folder, forged(bytes, "\"round\"", "\"rnd\"")), HasSubstr("header"));
+  EXPECT_THAT(refusal_of(folder, forged(bytes, "\"level\":2", "\"level\":-2")),
+              HasSubstr("field 'level' is -2: it must be 0 or more"));
+  EXPECT_THAT(refusal_of(folder, forged(bytes, "\"seconds\":0", "\"seconds\":1e999")),
+              HasSubstr("header"));
   EXPECT_THAT(refusal_of(folder, forged(bytes, "\"transporting\":false", "\"transporting\":0")),
               HasSubstr("header"));
   EXPECT_THAT(refusal_of(folder, forged(bytes, "\"value\":", "\"worth\":")), HasSubstr("header"));

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <sys/stat.h>
+
 #include "scenario/driver.h"
 
 namespace lensforge::scenario {
@@ -67,6 +69,29 @@ TEST_F(BadLens, FolderWithoutALensIsRefused) {
   fs::remove_all(at("lens"));
   fs::create_directory(at("lens"));
   expect_refused({"lens"});
+}
+
+TEST_F(BadLens, ControlCharactersOfALensStayOffTheTerminal) {
+  json_["provenance"]["no\x1b[31mte"] = "red \x1b]0;title\x07 \xc2\x9b text";
+  write(at("lens/lens.json"), json_.dump());
+  const Outcome outcome = run({"info", path("lens")});
+  EXPECT_EQ(outcome.exit_code, 0);
+  for (const char* control : {"\x1b", "\x07", "\xc2\x9b"}) {
+    EXPECT_EQ(outcome.out.find(control), std::string::npos);
+  }
+}
+
+TEST_F(BadLens, AConfigThatIsDeepOrNoRegularFileIsRefused) {
+  std::string key = "pixels";
+  for (int i = 0; i < 100'000; ++i) key += ".a";
+  write(at("deep.toml"), key + " = 1\n");
+  expect_refusal(run({"info", path("lens"), "--config", path("deep.toml")}), 2,
+                 {"--config", "more than 32 parts"});
+  ASSERT_EQ(::mkfifo(at("pipe.toml").c_str(), 0600), 0);
+  for (const std::string& file : {path("pipe.toml"), std::string("/dev/zero")}) {
+    expect_refusal(run({"info", path("lens"), "--config", file}), 2, {file, "regular files"});
+    expect_refusal(run({"info", path("lens"), "--config=" + file}), 2, {file, "regular files"});
+  }
 }
 
 TEST_F(BadLens, CamOptionsThatBreakTheirRuleAreRefused) {

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace lensforge {
+
+/// A type of numbers in a PLY file.
+struct PlyType {
+  enum class Kind { kSigned, kUnsigned, kFloat };
+  Kind kind = Kind::kFloat;
+  std::size_t bytes = 4;
+};
+
+struct PlyProperty {
+  std::string name;
+  PlyType type;
+  std::optional<PlyType> count_type;  ///< Of a list.
+};
+
+struct PlyElement {
+  std::string name;
+  std::int64_t count = 0;
+  std::vector<PlyProperty> properties;
+
+  /// Place of the first property called one of `names`; nothing without one.
+  [[nodiscard]] std::optional<std::size_t> index_of(
+      const std::vector<std::string_view>& names) const;
+};
+
+struct PlyHeader {
+  enum class Format { kText, kLittleEndian, kBigEndian };
+  Format format = Format::kText;
+  std::vector<PlyElement> elements;
+  std::size_t end = 0;     ///< Where the data begin.
+  std::int64_t lines = 0;  ///< Of the header, the last one included.
+};
+
+/// Reads the header of PLY 1.0 (Turk, "The PLY Polygon File Format").
+/// @throw InputError "name: line N: …" for a line that the format has not, a "vertex" without three
+///        coordinates, a "face" without a list of vertices, or more data announced than `content`
+///        can hold.
+PlyHeader read_ply_header(std::string_view content, const std::string& name);
+
+/// The names that the list of a face's vertices goes by.
+inline const std::vector<std::string_view> kPlyVertexLists{"vertex_indices", "vertex_index"};
+
+}  // namespace lensforge
