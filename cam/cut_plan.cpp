@@ -56,7 +56,9 @@ CutPlan::CutPlan(const Lens& lens, const CamOptions& options, const Executor& ex
       stock_(whole_blank(options_.workshop, field_.box)),
       smooth_(smooth_surface(mesh_, options_.surface)),
       surface_(surface_to_cut(mesh_, smooth_, ball().radius(), executor)),
-      collisions_(profile_, options_.workshop, stock_) {}
+      collisions_(profile_, options_.workshop, stock_),
+      watch_(collisions_, options_.workshop.tools, z_offset_,
+             highest_obstacle(options_.workshop, blank_)) {}
 
 std::optional<CastFrame> CutPlan::mould() const {
   if (options_.part == PartKind::kLens) return std::nullopt;
@@ -71,13 +73,11 @@ double CutPlan::safe_z() const {
          z_offset_;
 }
 
-MoveSink CutPlan::watched(const std::string& operation, const Tool& tool, const MoveSink& sink) {
+MoveSink CutPlan::sketched(const std::string& operation, const MoveSink& sink) {
   sketches_.push_back(std::make_unique<PathSketch>(operation, kSketchSpacing));
   PathSketch* const sketch = sketches_.back().get();
-  collisions_.begin(operation, tool);
-  return [this, sketch, sink](std::span<const PathMove> moves) {
+  return [sketch, sink](std::span<const PathMove> moves) {
     sketch->add(moves);
-    collisions_.check(moves);
     sink(moves);
   };
 }
@@ -90,17 +90,17 @@ std::vector<ReportPath> CutPlan::shown_path() const {
 
 ProgramOperation CutPlan::rough_operation(const RunControl& control) {
   const Tool& tool = options_.workshop.tool(options_.workshop.process.rough.tool);
-  return {"rough", tool, {}, [this, &tool, &control](const MoveSink& sink) {
+  return {"rough", tool, {}, [this, &control](const MoveSink& sink) {
             const RoughSite site{profile_, options_.workshop, stock_};
-            return cut_rough(site, executor_, watched("rough", tool, sink), control).summary;
+            return cut_rough(site, executor_, sketched("rough", sink), control).summary;
           }};
 }
 
 ProgramOperation CutPlan::semi_operation(const RunControl& control) {
   const Tool& tool = options_.workshop.tool(options_.workshop.process.semi.tool);
-  return {"semi", tool, {}, [this, &tool, &control](const MoveSink& sink) {
+  return {"semi", tool, {}, [this, &control](const MoveSink& sink) {
             const RoughSite site{profile_, options_.workshop, stock_};
-            return cut_semi(site, executor_, watched("semi", tool, sink), control).summary;
+            return cut_semi(site, executor_, sketched("semi", sink), control).summary;
           }};
 }
 
@@ -116,7 +116,7 @@ ProgramOperation CutPlan::finish_operation(const std::string& name, const Raster
               paths_.fitted.emplace_back(plan.radius, 0.0);
               run.look = [this](const RasterRow& row) { add_row(row, paths_); };
             }
-            return cut_finish(*surface_, plan, run, executor_, watched(name, ball(), sink),
+            return cut_finish(*surface_, plan, run, executor_, sketched(name, sink),
                               control);
           }};
 }
@@ -131,7 +131,7 @@ OperationSummary CutPlan::run_pencil(double resolution, const MoveSink& sink,
 
 ProgramOperation CutPlan::pencil_operation(const RunControl& control) {
   return {"pencil", ball(), {}, [this, &control](const MoveSink& sink) {
-            return run_pencil(resolution_of(options_), watched("pencil", ball(), sink), control);
+            return run_pencil(resolution_of(options_), sketched("pencil", sink), control);
           }};
 }
 
@@ -151,10 +151,13 @@ ProgramPlan CutPlan::programs(const RunControl& control) {
     plan.operations.push_back(finish_operation("cross", finishing.back(), control));
   }
   if (finish().pencil) plan.operations.push_back(pencil_operation(control));
+  for (const ProgramOperation& operation : plan.operations) {
+    watched_.push_back({operation.name, operation.tool});
+  }
   return plan;
 }
 
-ProgramSettings CutPlan::settings() const {
+ProgramSettings CutPlan::settings() {
   ProgramSettings settings;
   settings.decimals = decimals_;
   settings.blend_tolerance = finish().tolerance;
@@ -163,6 +166,9 @@ ProgramSettings CutPlan::settings() const {
   settings.grouping = options_.grouping;
   settings.largest_file = options_.largest_file;
   settings.planner = planner_settings(options_.workshop.machine);
+  settings.look = [this](std::size_t operation, const ProgramLine& line) {
+    watch_.take(watched_[operation], line);
+  };
   return settings;
 }
 
