@@ -29,6 +29,14 @@ Eigen::Vector2d size_to_cut(const Lens& lens, const CamOptions& options) {
   return lens.setup.lens_size / (1.0 - shrinkage);
 }
 
+/// @throw InputError if the surface is lower than what the blank lies on: no tool can cut there.
+HeightField above_table(const HeightField& field) {
+  if (field.box.min().z() >= 0.0) return field;
+  throw InputError("surface: reaches " + decimal_text(-field.box.min().z(), 4) +
+                   " mm below the blank's underside, z = 0, where the table is: design with a "
+                   "larger --thickness");
+}
+
 double z_offset_of(ZZero zero, double surface_top, double blank_top) {
   switch (zero) {
     case ZZero::kStock:
@@ -48,7 +56,7 @@ CutPlan::CutPlan(const Lens& lens, const CamOptions& options, const Executor& ex
       options_(options),
       executor_(executor),
       mesh_(mesh_to_cut(lens, options)),
-      field_(inspect_height_field(mesh_, size_to_cut(lens, options))),
+      field_(above_table(inspect_height_field(mesh_, size_to_cut(lens, options)))),
       blank_(options_.workshop.stock.box(field_.box)),
       z_offset_(z_offset_of(options.z_zero, field_.box.max().z(), blank_.max().z())),
       decimals_(decimals_of(options_)),
@@ -188,7 +196,7 @@ FinishPaths CutPlan::take_finish_paths(const ProgramFiles& programs, const RunCo
           return programs.summaries[time.operation].tool == ball().number;
         });
     if (finishes) {
-      read_path(file.path, options_.post.reader, ball().number, written, control);
+      read_path(file.beside.empty() ? file.path : file.beside, options_.post.reader, ball().number, written, control);
     }
   }
   paths.written.push_back(std::move(written));
