@@ -179,12 +179,12 @@ TEST(CutExtremes, RefusalsNameTheSmallestToleranceThatDecimalsHold) {
 
 TEST(CutExtremes, RapidsRunHalfAMillimetreAboveTheBlankAtLeast) {
   EXPECT_THAT(message_of<InputError>(
-                  [] { (void)parse_workshop("[process]\nsafe_height = 1e-9\n", "shop.toml"); }),
-              HasSubstr("shop.toml: process.safe_height: 1e-09: must be in 0.5 to 1000"));
+                  [] { (void)parse_workshop("[process]\nsafe_height = 0.25\n", "shop.toml"); }),
+              HasSubstr("shop.toml: process.safe_height: 0.25: must be in 0.5 to 1000"));
   CamOptions options;
-  options.workshop.process.safe_height = 1e-9;
+  options.workshop.process.safe_height = 0.25;
   EXPECT_THAT(message_of<InputError>([&] { validate(options, small_lens().setup); }),
-              HasSubstr("process.safe_height: 1e-09: must be in 0.5 to 1000"));
+              HasSubstr("process.safe_height: 0.25: must be in 0.5 to 1000"));
   EXPECT_EQ(workshop_rule("process.safe_height").least, kLeastSafeHeight);
 }
 
