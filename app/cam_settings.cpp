@@ -38,14 +38,19 @@ Tool& tool_of(Workshop& workshop, int number) {
 void add_tool_options(OptionSet& options, CamSettings& s) {
   Tool& ball = s.finish_tool;
   FinishProcess& finish = s.process.finish;
-  options.length("--tool-diameter", ball.diameter, as_in_workshop("tool.diameter"), "finishing ball-end mill");
-  options.length("--pitch", finish.pitch, as_in_workshop("finish.pitch"), "stepover between rows at most");
+  options.length("--tool-diameter", ball.diameter, as_in_workshop("tool.diameter"),
+                 "finishing ball-end mill");
+  options.length("--pitch", finish.pitch, as_in_workshop("finish.pitch"),
+                 "stepover between rows at most");
   options.length("--scallop", finish.scallop, as_in_workshop("finish.scallop"),
                  "height of scallops; if above 0, the pitch follows from it");
-  options.number("--spindle", ball.spindle_rpm, as_in_workshop("tool.spindle_rpm"), "rpm", "finishing speed");
+  options.number("--spindle", ball.spindle_rpm, as_in_workshop("tool.spindle_rpm"), "rpm",
+                 "finishing speed");
   options.number("--feed", ball.feed, as_in_workshop("tool.feed"), "mm/min", "finishing feed");
-  options.number("--plunge", ball.plunge, as_in_workshop("tool.plunge"), "mm/min", "feed straight down");
-  options.length("--rough-tool", s.rough_tool, as_in_workshop("tool.diameter"), "diameter of the roughing tool");
+  options.number("--plunge", ball.plunge, as_in_workshop("tool.plunge"), "mm/min",
+                 "feed straight down");
+  options.length("--rough-tool", s.rough_tool, as_in_workshop("tool.diameter"),
+                 "diameter of the roughing tool");
   options.text("--workshop", s.workshop, "FILE.toml",
                "machine, blank, clamps, tools and process; options given here win");
   options.flag("--force", s.cam.force,
@@ -67,7 +72,8 @@ void add_raster_options(OptionSet& options, CamSettings& s) {
   options.flag("--pencil", finish.pencil, "a last pass along the creases");
   options.length("--tolerance", finish.tolerance, as_in_workshop("finish.tolerance"),
                  "farthest that the path runs from the exact one");
-  options.number("--slope-tolerance", finish.slope_tolerance, as_in_workshop("finish.slope_tolerance"), "rad",
+  options.number("--slope-tolerance", finish.slope_tolerance,
+                 as_in_workshop("finish.slope_tolerance"), "rad",
                  "farthest that a move's direction is from the exact one");
   options.integer("--decimals", s.cam.decimals, Limits::between(0, 6),
                   "digits after the point, 4 to 6; 0: as the tolerances ask");
@@ -107,7 +113,8 @@ void add_program_options(OptionSet& options, CamSettings& s) {
                  "a file per operation, per tool, or one where the dialect changes tools");
   options.number("--split", s.split_mb, Limits::between(0, 1e5), "MB",
                  "split programs above this size; 0: as the dialect needs");
-  options.number("--spin-up", s.cam.spin_up, Limits::between(0, cam_limit::kSpinUp), "s", "wait after spindle start");
+  options.number("--spin-up", s.cam.spin_up, Limits::between(0, cam_limit::kSpinUp), "s",
+                 "wait after spindle start");
   options.choice("--coolant", s.cam.coolant,
                  {{"off", Coolant::kOff}, {"mist", Coolant::kMist}, {"flood", Coolant::kFlood}},
                  "coolant");
@@ -118,8 +125,8 @@ void add_limit_options(OptionSet& options, CutLimits& limits) {
                  "verdict: share of light that may land where the design puts less");
   options.number("--max-dark", limits.dark_flux, Limits::between(0, cam_limit::kLimit), "",
                  "verdict: share of light that may land in dark parts");
-  options.number("--max-mae-increase", limits.mae_increase, Limits::between(0, cam_limit::kLimit), "",
-                 "verdict: MAE of the part above that of the design");
+  options.number("--max-mae-increase", limits.mae_increase, Limits::between(0, cam_limit::kLimit),
+                 "", "verdict: MAE of the part above that of the design");
   options.length("--max-gouge", limits.gouge, Limits::between(0, cam_limit::kLimit),
                  "verdict: deepest cut below the exact path");
   options.length("--max-excess", limits.excess, Limits::between(0, cam_limit::kLimit),

@@ -118,8 +118,7 @@ class Job {
     const Clock::time_point start = Clock::now();
     const ProgramPlan plan = plan_.programs(control_);
     const ProgramSettings settings = plan_.settings();
-    require_replaceable_cut(folder_,
-                            programs_in_the_way(plan, options_.post, settings, folder_),
+    require_replaceable_cut(folder_, programs_in_the_way(plan, options_.post, settings, folder_),
                             others_of(options_), options_.force);
     PendingPrograms programs(plan, options_.post, settings, folder_, control_);
     std::optional<Prediction> prediction;

@@ -26,7 +26,8 @@ void require_in(const char* option, double value, double low, double high) {
 
 /// A tolerance has to leave room for rounding: a quarter of it.
 void validate_decimals(const CamOptions& options) {
-  if (options.decimals != 0) require_in("--decimals", options.decimals, 4, options.post.most_decimals);
+  if (options.decimals != 0)
+    require_in("--decimals", options.decimals, 4, options.post.most_decimals);
   const double tolerance = options.workshop.process.finish.tolerance;
   const double finest = 4.0 * resolution_of(options);
   if (!(tolerance >= finest * (1.0 - 1e-12))) {
@@ -40,7 +41,8 @@ void validate_polish(const CamOptions& options) {
   require_in("--rim-depth", options.polish.rim_depth, 0.0, cam_limit::kPolish);
   require_in("--rim-length", options.polish.rim_length, cam_limit::kLeastRim, cam_limit::kRim);
   if (options.sample_spacing == 0.0) return;
-  require_in("--sample-spacing", options.sample_spacing, cam_limit::kFinestSample, cam_limit::kCoarsestSample);
+  require_in("--sample-spacing", options.sample_spacing, cam_limit::kFinestSample,
+             cam_limit::kCoarsestSample);
   if (options.polish.sigma > 0.0 && options.sample_spacing > options.polish.sigma) {
     refuse("--sample-spacing", options.sample_spacing,
            "is larger than --polish-sigma, " + shortest_text(options.polish.sigma) +
@@ -49,11 +51,13 @@ void validate_polish(const CamOptions& options) {
 }
 
 void validate_limits(const CutLimits& limits) {
-  const std::pair<const char*, double> all[] = {
-      {"--max-leakage", limits.leakage},           {"--max-dark", limits.dark_flux},
-      {"--max-mae-increase", limits.mae_increase}, {"--max-gouge", limits.gouge},
-      {"--max-excess", limits.excess},             {"--max-slope", limits.slope},
-      {"--max-fillet", limits.fillet_depth}};
+  const std::pair<const char*, double> all[] = {{"--max-leakage", limits.leakage},
+                                                {"--max-dark", limits.dark_flux},
+                                                {"--max-mae-increase", limits.mae_increase},
+                                                {"--max-gouge", limits.gouge},
+                                                {"--max-excess", limits.excess},
+                                                {"--max-slope", limits.slope},
+                                                {"--max-fillet", limits.fillet_depth}};
   for (const auto& [option, limit] : all) require_in(option, limit, 0.0, cam_limit::kLimit);
 }
 

@@ -11,23 +11,28 @@
 namespace lensforge {
 namespace {
 
-// Measured on designed lenses of 25 to 100 mm with the default tools, on one core of 2.5 GHz.
+// Measured on a portrait of 25 mm with the default tools, on one core of 2.5 GHz: with 1e-3, 1.5e-4
+// and 5e-5 rad 0.8, 2.3 and 9.1 moves and 0.12, 0.18 and 3.8 ms a millimetre of row.
 
-/// Moves a millimetre of row that the default tolerances take, and how they grow with finer ones:
-/// from 1e-3 to 1e-4 rad moves become 4.5 times as many (FinishProcess::slope_tolerance), and chords
-/// of arcs shorten with the root of their height.
-constexpr double kMovesPerMm = 8.0;
-constexpr double kSlopePower = 0.65;
+/// Moves a millimetre of row that the default tolerances take; how their number grows with coarser
+/// and with finer slopes, and, as chords of arcs shorten with the root of their height, with
+/// heights.
+constexpr double kMovesPerMm = 2.5;
+constexpr double kCoarserPower = 0.6;
+constexpr double kFinerPower = 1.3;
 constexpr double kTolerancePower = 0.5;
 
 constexpr double kBytesPerMove = 40.0;       ///< "G3 X12.345678 Z-1.234567 I-1.234567 K-12.345678"
 constexpr double kMemoryPerMove = 1000.0;    ///< Bytes: exact, fitted and written way of the ball.
 constexpr double kMemory = 3e8;              ///< Bytes of everything else.
-constexpr double kSecondsPerMm = 1.5e-4;     ///< Of a finishing row: drop curve and fit.
-constexpr double kSecondsPerMove = 6e-5;     ///< Fitted, written, read back, looked over.
-constexpr double kSecondsPerPoint = 1.5e-5;  ///< Of a roughing or semi-finishing pass.
-constexpr double kSecondsPerSample = 4e-6;   ///< Of a surface, milled, polished and rendered.
-constexpr double kSurfaces = 8.0;            ///< That are rendered.
+constexpr double kSecondsPerMm = 1.8e-4;     ///< Of a finishing row: drop curve, fit, reading back.
+constexpr double kLeastSecondsPerMm = 1e-4;  ///< With any tolerance.
+constexpr double kFinerSeconds = 2.75;     ///< Their power of finer slopes: moves are tried often.
+constexpr double kTraced = 3.0;            ///< Times as long where the part is rendered.
+constexpr double kSecondsPerPoint = 1e-5;  ///< Of a roughing or semi-finishing pass.
+constexpr double kMovesPerPoint = 0.1;     ///< Most of them lie on straight ways.
+constexpr double kSecondsPerSample = 2.5e-7;  ///< Of a surface, milled, polished and rendered.
+constexpr double kSurfaces = 8.0;             ///< That are rendered.
 
 /// What the advised value leaves free.
 constexpr double kSpare = 1.5;
@@ -40,11 +45,22 @@ double finish_length(const CamOptions& options, const Eigen::Vector2d& size) {
   return around.prod() / pitch * (finish.cross ? 2.0 : 1.0);
 }
 
-double moves_per_mm(const FinishProcess& finish) {
+/// How many times as fine the directions are as by default; finer heights take moves like slopes.
+double fineness(const FinishProcess& finish) {
   const FinishProcess usual;
-  const double slope = std::pow(usual.slope_tolerance / finish.slope_tolerance, kSlopePower);
   const double height = std::pow(usual.tolerance / finish.tolerance, kTolerancePower);
-  return kMovesPerMm * std::max({slope, height, 0.05});
+  return std::max(usual.slope_tolerance / finish.slope_tolerance, 0.1 * height);
+}
+
+double moves_per_mm(const FinishProcess& finish) {
+  const double fine = fineness(finish);
+  return kMovesPerMm * std::pow(fine, fine > 1.0 ? kFinerPower : kCoarserPower);
+}
+
+double seconds_per_mm(const CamOptions& options) {
+  const double fine = fineness(options.workshop.process.finish);
+  const double seconds = kSecondsPerMm * std::pow(fine, kFinerSeconds);
+  return std::max(seconds, kLeastSecondsPerMm) * (options.render ? kTraced : 1.0);
 }
 
 /// Points of a pass that follows the surface, over one level.
@@ -83,10 +99,10 @@ WorkEstimate estimate_cut(const CamOptions& options, const OpticalSetup& setup, 
   const double moves = length * moves_per_mm(options.workshop.process.finish);
   const double points = rough_points(options, size);
   WorkEstimate estimate;
-  estimate.seconds = (length * kSecondsPerMm + moves * kSecondsPerMove + points * kSecondsPerPoint +
+  estimate.seconds = (length * seconds_per_mm(options) + points * kSecondsPerPoint +
                       samples_of(options, size) * kSecondsPerSample) /
                      threads;
-  estimate.disk_bytes = (moves + points) * kBytesPerMove;
+  estimate.disk_bytes = (moves + kMovesPerPoint * points) * kBytesPerMove;
   estimate.memory_bytes = kMemory + (options.render ? moves * kMemoryPerMove : 0.0);
   return estimate;
 }
@@ -98,7 +114,7 @@ void require_room_for_cut(const CamOptions& options, const OpticalSetup& setup,
   const double share = std::max(estimate.disk_bytes / free_disk_bytes(folder),
                                 estimate.memory_bytes / free_memory_bytes());
   const double moves = finish_length(options, size) * moves_per_mm(finish);
-  if (rough_points(options, size) > moves) {
+  if (kMovesPerPoint * rough_points(options, size) > moves) {
     return require_room(estimate, folder, "the roughing and semi-finishing passes",
                         "larger steps and spacings in the workshop would fit");
   }

@@ -9,9 +9,9 @@
 
 namespace lensforge {
 
-/// What make_cut() is about to take: time, bytes of programs, and memory for the ways of the finishing
-/// ball where the part is rendered. From area, pitch, tolerances, passes and sample spacing alone, so
-/// good to a factor of three or so: surfaces differ in how often they bend.
+/// What make_cut() is about to take: time, bytes of programs, and memory for the ways of the
+/// finishing ball where the part is rendered. From area, pitch, tolerances, passes and sample
+/// spacing alone, so good to a factor of three or so: surfaces differ in how often they bend.
 /// @param threads  that work at the same time, ≥ 1. @pre validate() passed.
 WorkEstimate estimate_cut(const CamOptions& options, const OpticalSetup& setup, int threads);
 

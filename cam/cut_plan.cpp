@@ -124,8 +124,7 @@ ProgramOperation CutPlan::finish_operation(const std::string& name, const Raster
               paths_.fitted.emplace_back(plan.radius, 0.0);
               run.look = [this](const RasterRow& row) { add_row(row, paths_); };
             }
-            return cut_finish(*surface_, plan, run, executor_, sketched(name, sink),
-                              control);
+            return cut_finish(*surface_, plan, run, executor_, sketched(name, sink), control);
           }};
 }
 
@@ -196,7 +195,8 @@ FinishPaths CutPlan::take_finish_paths(const ProgramFiles& programs, const RunCo
           return programs.summaries[time.operation].tool == ball().number;
         });
     if (finishes) {
-      read_path(file.beside.empty() ? file.path : file.beside, options_.post.reader, ball().number, written, control);
+      read_path(file.beside.empty() ? file.path : file.beside, options_.post.reader, ball().number,
+                written, control);
     }
   }
   paths.written.push_back(std::move(written));

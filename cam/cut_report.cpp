@@ -15,8 +15,8 @@ namespace {
 constexpr double kMicrometres = 1e3;
 constexpr double kSecondsPerMinute = 60.0;
 
-/// Of a material's refractive index: makers state acrylic as 1.49 to 1.492, and 0.005 more turn light
-/// by a hundredth more.
+/// Of a material's refractive index: makers state acrylic as 1.49 to 1.492, and 0.005 more turn
+/// light by a hundredth more.
 constexpr double kIndexTolerance = 0.005;
 
 std::string mm(double value, int decimals) { return decimal_text(value, decimals) + " mm"; }
@@ -167,8 +167,8 @@ ReportMap fillet_share_map(const CreaseMap& creases) {
   return map;
 }
 
-/// By how much the index of the workshop's material is off the one that the lens was designed for; 0
-/// where it states none, and for a mould, from whose material no light passes.
+/// By how much the index of the workshop's material is off the one that the lens was designed for;
+/// 0 where it states none, and for a mould, from whose material no light passes.
 double index_error(const CutPlan& plan, const Lens& lens) {
   const double stated = plan.options().workshop.material.ior;
   if (!(stated > 0.0) || plan.options().part == PartKind::kMould) return 0.0;

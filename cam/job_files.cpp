@@ -25,9 +25,9 @@ constexpr std::array<std::string_view, 5> kOperations{"rough", "semi", "finish",
 const std::set<std::string> kProgramExtensions{".ngc",   ".nc", ".tap", ".cnc",
                                                ".gcode", ".gc", ".g",   ".mpf"};
 
-constexpr std::size_t kLinesToJob = 6;      ///< "job:" is the first comment below %, O and such.
-constexpr std::size_t kLongestLine = 256;   ///< Of a program's header.
-constexpr std::size_t kShortestCut = 30;    ///< Of a job's name that a comment cut short.
+constexpr std::size_t kLinesToJob = 6;     ///< "job:" is the first comment below %, O and such.
+constexpr std::size_t kLongestLine = 256;  ///< Of a program's header.
+constexpr std::size_t kShortestCut = 30;   ///< Of a job's name that a comment cut short.
 constexpr std::string_view kJobKey = "job: ";
 
 std::string lower(std::string text) {
@@ -151,9 +151,8 @@ void PendingFiles::add(const std::string& name, std::string_view content) {
 }
 
 bool PendingFiles::has(const std::string& name) const {
-  return std::any_of(files_.begin(), files_.end(), [&](const PendingFile& file) {
-    return file.path().filename() == name;
-  });
+  return std::any_of(files_.begin(), files_.end(),
+                     [&](const PendingFile& file) { return file.path().filename() == name; });
 }
 
 std::vector<fs::path> PendingFiles::publish() {

@@ -11,8 +11,8 @@
 
 namespace lensforge {
 
-/// Whether a file is a program as a cut wrote it: under a name that a cut gives, and unchanged since
-/// (check_seal()).
+/// Whether a file is a program as a cut wrote it: under a name that a cut gives, and unchanged
+/// since (check_seal()).
 bool is_own_program(const std::filesystem::path& path);
 
 /// Programs in a folder that a new cut did not write.

@@ -11,9 +11,9 @@ namespace {
 constexpr double kLift = 1.0;
 
 bool has_word(const GcodeBlock& block, int tenths) {
-  return std::any_of(
-      block.words().begin(), block.words().end(),
-      [&](const GcodeWord& word) { return word.letter == 'G' && word.tenths == tenths; });
+  return std::any_of(block.words().begin(), block.words().end(), [&](const GcodeWord& word) {
+    return word.letter == 'G' && word.tenths == tenths;
+  });
 }
 
 bool names(const GcodeBlock& block, std::size_t axis) {
@@ -155,13 +155,12 @@ std::vector<std::string> ProgramWatch::faults() const {
   std::vector<std::string> sentences;
   for (const std::string& operation : order_) {
     const Fault& fault = faults_.at(operation);
-    sentences.push_back("in '" + operation + "' line " + std::to_string(fault.line) +
-                        " moves the tool low or sideways from or to a place that the program has "
-                        "not stated" +
-                        (fault.lines > 1
-                             ? ", as do " + std::to_string(fault.lines - 1) + " more lines"
-                             : "") +
-                        ": retract in Z first");
+    sentences.push_back(
+        "in '" + operation + "' line " + std::to_string(fault.line) +
+        " moves the tool low or sideways from or to a place that the program has "
+        "not stated" +
+        (fault.lines > 1 ? ", as do " + std::to_string(fault.lines - 1) + " more lines" : "") +
+        ": retract in Z first");
   }
   return sentences;
 }

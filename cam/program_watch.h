@@ -23,10 +23,10 @@ struct WatchedOperation {
 };
 
 /// Follows programs as they were read back, lines of the post's own included, and finds what a
-/// machine must not do: collisions (CollisionCheck), and ways that nobody can know because they begin
-/// or end where the program has not said. Where a tool is when a program begins, and after a tool
-/// change, is not known; G28, G30 and G53 are taken to lift a tool above everything and to leave
-/// their other axes at places that are not known.
+/// machine must not do: collisions (CollisionCheck), and ways that nobody can know because they
+/// begin or end where the program has not said. Where a tool is when a program begins, and after a
+/// tool change, is not known; G28, G30 and G53 are taken to lift a tool above everything and to
+/// leave their other axes at places that are not known.
 class ProgramWatch {
  public:
   /// @param collisions  must outlive this, as must `tools`, the workshop's.
@@ -74,7 +74,7 @@ class ProgramWatch {
   Eigen::Vector3d at_ = Eigen::Vector3d::Zero();  ///< Lens frame, as far as it is known.
   std::vector<std::string> order_;                ///< Of faults' operations.
   std::map<std::string, Fault> faults_;
-  Eigen::AlignedBox2d places_;                 ///< All that are known, seen from above.
+  Eigen::AlignedBox2d places_;                  ///< All that are known, seen from above.
   std::map<int, Eigen::AlignedBox1d> heights_;  ///< Tool → heights of its tip.
 };
 

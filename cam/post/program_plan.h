@@ -45,8 +45,9 @@ enum class Coolant { kOff, kMist, kFlood };
 
 struct ProgramLine;
 
-/// Is shown every line of every program as it was read back, in the order in which they are run, with
-/// the index in the plan of the operation that it belongs to. A program begins with its line 1.
+/// Is shown every line of every program as it was read back, in the order in which they are run,
+/// with the index in the plan of the operation that it belongs to. A program begins with its
+/// line 1.
 using ReadBackSink = std::function<void(std::size_t operation, const ProgramLine& line)>;
 
 /// How a plan is written.

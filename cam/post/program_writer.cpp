@@ -49,7 +49,10 @@ std::string safe_stem(std::string name) {
   name = shortened(std::move(name));
   std::replace_if(
       name.begin(), name.end(),
-      [](char c) { return c == '/' || c == '\\' || static_cast<unsigned char>(c) < ' ' || c == '\x7f'; }, '_');
+      [](char c) {
+        return c == '/' || c == '\\' || static_cast<unsigned char>(c) < ' ' || c == '\x7f';
+      },
+      '_');
   return name.empty() || name.front() == '.' ? "program" + name : name;
 }
 
@@ -223,8 +226,9 @@ void validate(const ProgramSettings& settings, const PostDescription& post) {
           "is not between 0 and 3600 s");
   require(settings.tool_change >= 0.0 && settings.tool_change <= kMostSeconds, "tool change",
           settings.tool_change, "is not between 0 and 3600 s");
-  require(settings.largest_file == 0 || settings.largest_file >= kSmallestProgramLimit, "largest file",
-          static_cast<double>(settings.largest_file), "is neither 0 nor at least 65536 bytes");
+  require(settings.largest_file == 0 || settings.largest_file >= kSmallestProgramLimit,
+          "largest file", static_cast<double>(settings.largest_file),
+          "is neither 0 nor at least 65536 bytes");
   const bool lacks_mist = settings.coolant == Coolant::kMist && post.mist.empty();
   const bool lacks_flood = settings.coolant == Coolant::kFlood && post.flood.empty();
   if (lacks_mist || lacks_flood) {
@@ -255,8 +259,7 @@ void PendingPrograms::publish() {
 }
 
 std::vector<fs::path> programs_in_the_way(const ProgramPlan& plan, const PostDescription& post,
-                                          const ProgramSettings& settings,
-                                          const fs::path& folder) {
+                                          const ProgramSettings& settings, const fs::path& folder) {
   const std::vector<Group> groups = group_operations({plan, post, settings});
   const std::string extension = std::string(".").append(post.extension);
   std::vector<fs::path> found;

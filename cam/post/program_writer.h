@@ -51,11 +51,12 @@ struct ProgramFiles {
 /// in the last tenth; the next file then plunges at the tool's plunge feed to where the cut was
 /// left.
 ///
-/// Every file is read back by our own parser: its motions at feed have to be those that were written,
-/// to the last decimal. None has its name before publish().
+/// Every file is read back by our own parser: its motions at feed have to be those that were
+/// written, to the last decimal. None has its name before publish().
 class PendingPrograms {
  public:
-  /// @throw InputError naming what, value and rule for bad settings, or a description whose programs
+  /// @throw InputError naming what, value and rule for bad settings, or a description whose
+  /// programs
   ///        cannot be read back; Interrupted; RunError if files cannot be written (disk full, …).
   PendingPrograms(const ProgramPlan& plan, const PostDescription& post,
                   const ProgramSettings& settings, const std::filesystem::path& folder,
@@ -69,8 +70,8 @@ class PendingPrograms {
   std::vector<PendingFile> pending_;  ///< One a file.
 };
 
-/// Writes a plan and publishes it; parts of an earlier program of the same name that are as they were
-/// written (check_seal()) are removed. @throw as PendingPrograms
+/// Writes a plan and publishes it; parts of an earlier program of the same name that are as they
+/// were written (check_seal()) are removed. @throw as PendingPrograms
 ProgramFiles write_programs(const ProgramPlan& plan, const PostDescription& post,
                             const ProgramSettings& settings, const std::filesystem::path& folder,
                             const RunControl& control);

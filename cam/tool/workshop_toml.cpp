@@ -17,14 +17,14 @@
 namespace lensforge {
 namespace {
 
-constexpr double kLength = 10000.0;   ///< mm; longer than any mill.
-constexpr double kBlank = 1000.0;     ///< mm that a blank may be larger than its lens, or a tool long.
-constexpr double kLeast = 1e-6;       ///< mm; the last decimal of a program.
+constexpr double kLength = 10000.0;  ///< mm; longer than any mill.
+constexpr double kBlank = 1000.0;  ///< mm that a blank may be larger than its lens, or a tool long.
+constexpr double kLeast = 1e-6;    ///< mm; the last decimal of a program.
 constexpr double kLeastDiameter = 0.01;  ///< mm; a third of the smallest that is sold.
-constexpr double kFinestStep = 1e-3;  ///< mm; of passes that only take material away.
-constexpr double kLeastRate = 0.1;    ///< mm/min, mm/s²; slower than any mill.
-constexpr double kRate = 1e6;         ///< mm/min, mm/s², rpm.
-constexpr double kSpin = 1e6;         ///< rpm
+constexpr double kFinestStep = 1e-3;     ///< mm; of passes that only take material away.
+constexpr double kLeastRate = 0.1;       ///< mm/min, mm/s²; slower than any mill.
+constexpr double kRate = 1e6;            ///< mm/min, mm/s², rpm.
+constexpr double kSpin = 1e6;            ///< rpm
 /// mm; four units of the last decimal that any dialect has, of which rounding takes one.
 constexpr double kFinestTolerance = 4e-6;
 /// rad; rounding to that decimal turns a move of a tenth of a millimetre as much.
@@ -187,8 +187,8 @@ class RangeCheck {
   void text(const std::string& /*key*/, const std::string& /*value*/, const char* /*says*/) {}
   void number(const NumberRule& rule, double value, const char* /*says*/) {
     if (value >= rule.least && value <= rule.most) return;  // NaN is not.
-    throw InputError(file_ + ": " + prefix_ + rule.key + ": " + shortest(value) +
-                     ": must be in " + shortest(rule.least) + " to " + shortest(rule.most));
+    throw InputError(file_ + ": " + prefix_ + rule.key + ": " + shortest(value) + ": must be in " +
+                     shortest(rule.least) + " to " + shortest(rule.most));
   }
   void needed(const NumberRule& rule, double value, const char* says) { number(rule, value, says); }
   void stated(const NumberRule& rule, double value, const char* says) {

@@ -234,8 +234,8 @@ TEST(CamJob, RemoveCutLeavesOtherFiles) {
     lensforge::testing::write_bytes(folder / name, "mine");
   }
   remove_cut(folder.path());
-  EXPECT_THAT(names_in(folder), ::testing::ElementsAre("finish-notes.txt", "finish.bak",
-                                                       "finish.ngc", "milled.png"));
+  EXPECT_THAT(names_in(folder),
+              ::testing::ElementsAre("finish-notes.txt", "finish.bak", "finish.ngc", "milled.png"));
 }
 
 TEST(CamJob, SurfacesWithAHoleAreRefusedBeforeAnythingIsWritten) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Every number of a cut at its extremes: refused with a message, or the job runs and can be stopped.
+// Every number of a cut at its extremes: refused with a message, or the job runs and can be
+// stopped.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -15,6 +16,7 @@
 
 #include "cam/cam_job.h"
 #include "cam/cam_meshes.h"
+#include "cam/cut_estimate.h"
 #include "core/error.h"
 #include "core/temp_folder.h"
 
@@ -28,9 +30,8 @@ using std::chrono::milliseconds;
 using ::testing::HasSubstr;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-const std::vector<double> kExtremes{0.0,  -1.0,   1e-300,    1e-9,
-                                    1e9,  1e308,  -1e308,    std::nan(""),
-                                    kInfinity, -kInfinity};
+const std::vector<double> kExtremes{0.0,   -1.0,   1e-300,       1e-9,      1e9,
+                                    1e308, -1e308, std::nan(""), kInfinity, -kInfinity};
 
 /// How long a job may run before it is stopped, and how long that may take.
 constexpr milliseconds kTime{40};
@@ -75,8 +76,7 @@ TEST(CutExtremes, OptionsAreRefusedOrTheirJobCanBeStopped) {
   using Set = std::function<void(CamOptions&, double)>;
   const std::vector<std::pair<std::string, Set>> options{
       {"spin_up", [](CamOptions& o, double v) { o.spin_up = v; }},
-      {"shrinkage",
-       [](CamOptions& o, double v) { o.part = PartKind::kMould, o.shrinkage = v; }},
+      {"shrinkage", [](CamOptions& o, double v) { o.part = PartKind::kMould, o.shrinkage = v; }},
       {"sigma", [](CamOptions& o, double v) { o.polish.sigma = v; }},
       {"rim_depth", [](CamOptions& o, double v) { o.polish.rim_depth = v; }},
       {"rim_length",
@@ -114,8 +114,7 @@ std::vector<NumberPlace> numbers_of(const std::string& toml) {
     const std::size_t begin = equals + 3;
     const std::size_t end = std::min(line.find_first_not_of("-+.0123456789e", begin), line.size());
     if (end == begin) continue;
-    places.push_back(
-        {toml.substr(0, at + begin), line.substr(0, equals), toml.substr(at + end)});
+    places.push_back({toml.substr(0, at + begin), line.substr(0, equals), toml.substr(at + end)});
   }
   return places;
 }
@@ -169,12 +168,50 @@ TEST(CutExtremes, WhatIsSmallestOrLargestOfAWorkshopCanBeStopped) {
   }
 }
 
+TEST(CutExtremes, ACutThatMemoryDoesNotHoldIsRefusedWithAPitchThatFits) {
+  CamOptions options;
+  OpticalSetup setup = small_lens().setup;
+  setup.lens_size = {100.0, 100.0};
+  const TempFolder folder;
+  const auto require = [&] {
+    require_room_for_cut(options, setup, estimate_cut(options, setup, 2), folder.path());
+  };
+  EXPECT_NO_THROW(require());
+  options.workshop.process.finish.pitch = 1e-6;
+  const std::string message = message_of<InputError>(require);
+  EXPECT_THAT(message, ::testing::AllOf(::testing::StartsWith("--pitch 1e-06mm: "),
+                                        HasSubstr("needs about")));
+  const std::size_t advice = message.rfind("--pitch ");
+  ASSERT_GT(advice, 0U);
+  options.workshop.process.finish.pitch = std::stod(message.substr(advice + 8));
+  EXPECT_NO_THROW(require()) << message;
+}
+
+TEST(CutExtremes, TheEstimateGrowsWithEverythingThatTakesTime) {
+  const CamOptions usual;
+  const OpticalSetup setup = small_lens().setup;
+  const WorkEstimate before = estimate_cut(usual, setup, 1);
+  const auto longer = [&](const std::function<void(CamOptions&)>& set) {
+    CamOptions options = usual;
+    set(options);
+    return estimate_cut(options, setup, 1).seconds > before.seconds;
+  };
+  EXPECT_TRUE(longer([](CamOptions& o) { o.workshop.process.finish.pitch *= 0.5; }));
+  EXPECT_TRUE(longer([](CamOptions& o) { o.workshop.process.finish.cross = true; }));
+  EXPECT_TRUE(longer([](CamOptions& o) { o.workshop.process.finish.slope_tolerance *= 0.5; }));
+  EXPECT_TRUE(longer([](CamOptions& o) { o.workshop.process.finish.tolerance *= 1e-3; }));
+  EXPECT_TRUE(longer([](CamOptions& o) { o.workshop.process.rough.stepdown *= 0.1; }));
+  EXPECT_TRUE(longer([](CamOptions& o) { o.sample_spacing = 1e-3; }));
+  EXPECT_LT(estimate_cut(usual, setup, 8).seconds, before.seconds);
+}
+
 TEST(CutExtremes, RefusalsNameTheSmallestToleranceThatDecimalsHold) {
   CamOptions options;
   options.post = find_post("fanuc", "--post");
   options.workshop.process.finish.tolerance = 1e-4;
-  EXPECT_THAT(message_of<InputError>([&] { validate(options, small_lens().setup); }),
-              HasSubstr("--tolerance: 1e-04 is not at least 4 units of the last decimal, 4e-04 mm"));
+  EXPECT_THAT(
+      message_of<InputError>([&] { validate(options, small_lens().setup); }),
+      HasSubstr("--tolerance: 1e-04 is not at least 4 units of the last decimal, 4e-04 mm"));
 }
 
 TEST(CutExtremes, RapidsRunHalfAMillimetreAboveTheBlankAtLeast) {

@@ -156,7 +156,8 @@ CamOptions random_options(std::mt19937& random) {
   finish.tolerance = 2e-3;
   finish.cross = coin();
   finish.pencil = coin();
-  finish.style = std::array{PassStyle::kZigzag, PassStyle::kClimb, PassStyle::kConventional}[random() % 3];
+  finish.style =
+      std::array{PassStyle::kZigzag, PassStyle::kClimb, PassStyle::kConventional}[random() % 3];
   return options;
 }
 
@@ -168,8 +169,7 @@ TEST(CutSafety, NoToolIsBelowTheTableAndNoRapidInTheBlankUnlessTheReportSaysSo) 
     const Lens lens = random_lens(random);
     const CamOptions options = random_options(random);
     const TempFolder folder;
-    const CamResult result =
-        make_cut(lens, options, folder.path(), Executor::cpu(2), RunControl());
+    const CamResult result = make_cut(lens, options, folder.path(), Executor::cpu(2), RunControl());
     const Deeds deeds = deeds_of(result, options);
     const LimitCheck& table = check_named(result, "table");
     const LimitCheck& collisions = check_named(result, "collisions");
@@ -222,9 +222,8 @@ TEST(CutSafety, ASurfaceBelowTheTableIsRefused) {
   Lens lens = small_lens();
   lens.surface.vertices.row(2).array() -= lens.surface.vertices.row(2).minCoeff() + 0.001;
   const TempFolder folder;
-  EXPECT_THAT(message_of<InputError>([&] {
-                make_cut(lens, programs_only(), folder.path(), Executor::serial(), {});
-              }),
+  EXPECT_THAT(message_of<InputError>(
+                  [&] { make_cut(lens, programs_only(), folder.path(), Executor::serial(), {}); }),
               AllOf(HasSubstr("surface"), HasSubstr("below")));
   EXPECT_EQ(folder.file_count(), 0U);
 }
@@ -276,8 +275,7 @@ TEST(CutSafety, MotionsInThePostsOwnLinesAreLookedOver) {
   for (const auto& [key, lines] : bad) {
     options.post = post_with(key, lines);
     const TempFolder folder;
-    const CamResult result =
-        make_cut(small_lens(), options, folder.path(), Executor::serial(), {});
+    const CamResult result = make_cut(small_lens(), options, folder.path(), Executor::serial(), {});
     EXPECT_FALSE(check_named(result, "collisions").passes()) << key << " " << lines;
   }
   const std::pair<std::string, std::string> good[] = {
@@ -289,8 +287,7 @@ TEST(CutSafety, MotionsInThePostsOwnLinesAreLookedOver) {
   for (const auto& [key, lines] : good) {
     options.post = post_with(key, lines);
     const TempFolder folder;
-    const CamResult result =
-        make_cut(small_lens(), options, folder.path(), Executor::serial(), {});
+    const CamResult result = make_cut(small_lens(), options, folder.path(), Executor::serial(), {});
     EXPECT_TRUE(check_named(result, "collisions").passes())
         << key << " " << lines << ::testing::PrintToString(result.report.warnings);
   }
@@ -299,9 +296,8 @@ TEST(CutSafety, MotionsInThePostsOwnLinesAreLookedOver) {
 /// Whether a cut has missed a limit of this name; no limit, none missed.
 bool misses(const ReportData& report, const std::string& key) {
   const auto& checks = report.verdict.checks;
-  return std::any_of(checks.begin(), checks.end(), [&](const LimitCheck& check) {
-    return check.key == key && !check.passes();
-  });
+  return std::any_of(checks.begin(), checks.end(),
+                     [&](const LimitCheck& check) { return check.key == key && !check.passes(); });
 }
 
 TEST(CutSafety, AMaterialOfAnotherIndexIsAMissedLimit) {

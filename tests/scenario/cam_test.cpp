@@ -17,9 +17,9 @@ class Cam : public Scenario {
 
   /// A coarse cut of the lens in the folder, in seconds; programs only.
   [[nodiscard]] Arguments cam(const Arguments& more) const {
-    Arguments arguments = {"cam",       path("lens"), "--pitch",   "1mm",   "--tool-diameter",
-                           "2mm",       "--no-semi",  "--surface", "facet", "--no-render",
-                           "--slope-tolerance", "5e-3"};
+    Arguments arguments = {
+        "cam",       path("lens"), "--pitch", "1mm",         "--tool-diameter",   "2mm",
+        "--no-semi", "--surface",  "facet",   "--no-render", "--slope-tolerance", "5e-3"};
     arguments.insert(arguments.end(), more.begin(), more.end());
     return arguments;
   }
@@ -27,10 +27,10 @@ class Cam : public Scenario {
 
 TEST_F(Cam, ValuesThatNoWorkshopHasAreRefusedByTheirOption) {
   const std::pair<const char*, const char*> refused[] = {
-      {"--safe-height", "1e9"},  {"--safe-height", "1e-9"},      {"--stock", "1e6"},
-      {"--rough-tool", "500mm"}, {"--slope-tolerance", "1e-6"},  {"--tolerance", "1e-12"},
-      {"--pitch", "1e-9"},       {"--split", "0.01"},            {"--margin", "1e308"},
-      {"--feed", "1e-300"},      {"--rim-length", "1e9"},        {"--max-leakage", "nan"},
+      {"--safe-height", "1e9"},  {"--safe-height", "1e-9"},     {"--stock", "1e6"},
+      {"--rough-tool", "500mm"}, {"--slope-tolerance", "1e-6"}, {"--tolerance", "1e-12"},
+      {"--pitch", "1e-9"},       {"--split", "0.01"},           {"--margin", "1e308"},
+      {"--feed", "1e-300"},      {"--rim-length", "1e9"},       {"--max-leakage", "nan"},
       {"--spin-up", "inf"},      {"--sample-spacing", "1e-300"}};
   for (const auto& [option, value] : refused) {
     expect_refusal(run({"cam", path("lens"), option, value}), 2, {option, value});
