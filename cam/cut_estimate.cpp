@@ -6,6 +6,7 @@
 #include <string>
 
 #include "cam/finish_setup.h"
+#include "cam/prediction.h"
 #include "core/number_text.h"
 
 namespace lensforge {
@@ -24,7 +25,9 @@ constexpr double kTolerancePower = 0.5;
 
 constexpr double kBytesPerMove = 40.0;       ///< "G3 X12.345678 Z-1.234567 I-1.234567 K-12.345678"
 constexpr double kMemoryPerMove = 1000.0;    ///< Bytes: exact, fitted and written way of the ball.
-constexpr double kMemory = 3e8;              ///< Bytes of everything else.
+constexpr double kMemory = 1.5e8;            ///< Bytes of everything else.
+constexpr double kMemoryPerNode = 200.0;     ///< Bytes of milled.ply and of what it is made from.
+constexpr double kDiskPerNode = 50.0;        ///< Bytes of a vertex and two triangles.
 constexpr double kSecondsPerMm = 1.8e-4;     ///< Of a finishing row: drop curve, fit, reading back.
 constexpr double kLeastSecondsPerMm = 1e-4;  ///< With any tolerance.
 constexpr double kFinerSeconds = 2.75;     ///< Their power of finer slopes: moves are tried often.
@@ -80,6 +83,8 @@ double samples_of(const CamOptions& options, const Eigen::Vector2d& size) {
   return options.render ? kSurfaces * size.prod() / (spacing * spacing) : 0.0;
 }
 
+double nodes_of(const Eigen::Vector2d& size) { return size.prod() / (kMeshSpacing * kMeshSpacing); }
+
 Eigen::Vector2d size_of(const CamOptions& options, const OpticalSetup& setup) {
   const double shrinkage = options.part == PartKind::kMould ? options.shrinkage : 0.0;
   return setup.lens_size / (1.0 - shrinkage);
@@ -103,7 +108,11 @@ WorkEstimate estimate_cut(const CamOptions& options, const OpticalSetup& setup, 
                       samples_of(options, size) * kSecondsPerSample) /
                      threads;
   estimate.disk_bytes = (moves + kMovesPerPoint * points) * kBytesPerMove;
-  estimate.memory_bytes = kMemory + (options.render ? moves * kMemoryPerMove : 0.0);
+  estimate.memory_bytes = kMemory;
+  if (options.render) {
+    estimate.memory_bytes += moves * kMemoryPerMove + nodes_of(size) * kMemoryPerNode;
+    estimate.disk_bytes += nodes_of(size) * kDiskPerNode;
+  }
   return estimate;
 }
 
@@ -117,6 +126,10 @@ void require_room_for_cut(const CamOptions& options, const OpticalSetup& setup,
   if (kMovesPerPoint * rough_points(options, size) > moves) {
     return require_room(estimate, folder, "the roughing and semi-finishing passes",
                         "larger steps and spacings in the workshop would fit");
+  }
+  if (options.render && nodes_of(size) * kMemoryPerNode > moves * kMemoryPerMove) {
+    return require_room(estimate, folder, "the milled surface of so large a lens",
+                        "--no-render would need less");
   }
   const double pitch = finish_pitch(finish, finishing_ball(options).radius());
   require_room(estimate, folder, "--pitch " + shortest_text(pitch) + "mm",

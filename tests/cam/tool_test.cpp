@@ -133,6 +133,19 @@ TEST(Workshop, MissingKeysKeepTheirDefaults) {
   EXPECT_EQ(parse_workshop("", "shop.toml"), Workshop{});
 }
 
+TEST(Workshop, TextsAreOneShortLine) {
+  for (const std::string& text :
+       {std::string("a\\u0007b"), std::string("a\\nb"), std::string(201, 'a')}) {
+    EXPECT_NE(refusal("[machine]\nname = \"" + text + "\"\n").find("must be one line"),
+              std::string::npos);
+  }
+}
+
+TEST(Workshop, AMaterialsIndexNeedsNotBeStated) {
+  EXPECT_EQ(parse_workshop(workshop_toml({}), "shop.toml").material.ior, 0.0);
+  EXPECT_EQ(parse_workshop("[material]\nior = 1.586\n", "shop.toml").material.ior, 1.586);
+}
+
 TEST(Workshop, RefusalsNameFileKeyValueAndRule) {
   EXPECT_EQ(refusal("[finish]\npitch = -0.5\n"),
             "shop.toml: finish.pitch: -0.5: must be in 1e-06 to 100");
