@@ -119,18 +119,40 @@ std::string choice_text(const ReportChoice& choice) {
          fixed(choice.hours, 2) + " h\n";
 }
 
+/// All combinations run one after the other; the finest pitch takes most room.
+void announce(const CutChoices& choices, CamOptions cam, const Lens& lens, int threads,
+              const fs::path& folder, const Console& console) {
+  FinishProcess& finish = cam.workshop.process.finish;
+  if (!choices.pitches.empty()) {
+    finish.pitch = *std::min_element(choices.pitches.begin(), choices.pitches.end());
+    finish.scallop = 0.0;
+  }
+  validate(cam.workshop, "--compare");
+  cam.render = true;
+  WorkEstimate estimate = estimate_cut(cam, lens.setup, threads);
+  require_room_for_cut(cam, lens.setup, estimate, folder);
+  const auto count_of = [](const std::vector<double>& values) {
+    return static_cast<double>(std::max<std::size_t>(values.size(), 1));
+  };
+  estimate.seconds *= count_of(choices.pitches) * count_of(choices.tools);
+  if (estimate.seconds > kWorthTelling) {
+    console.note("the comparison takes " + estimate_words(estimate));
+  }
+}
+
 int compare(const OptionSet& options, const CamSettings& settings, const CamOptions& cam,
             const Lens& lens) {
   const CutChoices choices = parse_choices(settings.compare, "--compare");
   const Console console(options.common().json, options.common().quiet);
+  const Executor executor = options.executor();
+  announce(choices, cam, lens, executor.concurrency(), settings.folder(), console);
   const InterruptWatch interrupt;
   const OutputFolder folder(settings.folder());
   const FolderLock lock(settings.folder(), FolderLock::Kind::kExclusive);
   folder.remove_partial_files();
   ProgressDisplay progress(options.common().quiet);
   const RunControl control(interrupt.token(), progress.sink());
-  const CutComparison result =
-      compare_cuts(lens, cam, choices, folder.path(), options.executor(), control);
+  const CutComparison result = compare_cuts(lens, cam, choices, folder.path(), executor, control);
   nlohmann::json json = {{"command", "cam"},
                          {"status", result.complete ? "done" : "interrupted"},
                          {"options", options.used()},

@@ -5,6 +5,7 @@
 #include <array>
 #include <cctype>
 #include <fstream>
+#include <optional>
 #include <set>
 #include <string_view>
 #include <system_error>
@@ -29,6 +30,15 @@ constexpr std::size_t kLinesToJob = 6;     ///< "job:" is the first comment belo
 constexpr std::size_t kLongestLine = 256;  ///< Of a program's header.
 constexpr std::size_t kShortestCut = 30;   ///< Of a job's name that a comment cut short.
 constexpr std::string_view kJobKey = "job: ";
+
+/// check_seal(); what cannot be read bears none.
+std::optional<bool> seal_of(const fs::path& path) {
+  try {
+    return check_seal(path);
+  } catch (const InputError&) {
+    return std::nullopt;
+  }
+}
 
 std::string lower(std::string text) {
   std::transform(text.begin(), text.end(), text.begin(),
@@ -82,7 +92,7 @@ bool is_program(const fs::path& path) {
   const std::string name = path.filename().string();
   if (!fs::is_regular_file(path, error) || is_partial_name(name)) return false;
   return kProgramExtensions.contains(lower(path.extension().string())) ||
-         (names_operations(without_number(path.stem().string())) && check_seal(path).has_value());
+         (names_operations(without_number(path.stem().string())) && seal_of(path).has_value());
 }
 
 std::string listed(const std::vector<fs::path>& paths) {
@@ -97,7 +107,7 @@ bool is_own_program(const fs::path& path) {
   if (!is_program(path)) return false;
   const std::string stem = without_number(path.stem().string());
   if (!names_operations(stem) && !names_job(stem, path)) return false;
-  return check_seal(path) == true;
+  return seal_of(path) == true;
 }
 
 OtherPrograms other_programs(const fs::path& folder, std::span<const fs::path> written) {
@@ -129,7 +139,7 @@ void require_replaceable_cut(const fs::path& folder, std::span<const fs::path> p
     }
   };
   for (const fs::path& path : programs) {
-    judge(path, [](const fs::path& p) { return check_seal(p) == true; });
+    judge(path, [](const fs::path& p) { return seal_of(p) == true; });
   }
   for (const char* const name : others) judge(folder / name, written_by_lensforge);
   if (!odd.empty()) throw InputError(listed(odd) + ": is no regular file and is not replaced");

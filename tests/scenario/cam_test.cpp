@@ -39,6 +39,7 @@ TEST_F(Cam, ValuesThatNoWorkshopHasAreRefusedByTheirOption) {
 TEST_F(Cam, WhatTheDiskDoesNotHoldIsRefusedWithAPitchThatWouldFit) {
   expect_refusal(run({"cam", path("lens"), "--pitch", "1e-6mm"}), 2,
                  {"--pitch 1e-06mm", "needs about", "mm would fit"});
+  expect_refusal(run({"cam", path("lens"), "--compare", "pitch=0.1,1e-6"}), 2, {"mm would fit"});
   EXPECT_FALSE(fs::exists(at("lens/cam")));
 }
 
