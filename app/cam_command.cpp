@@ -2,6 +2,8 @@
 #include <algorithm>
 #include <filesystem>
 #include <map>
+#include <optional>
+#include <sstream>
 #include <string>
 
 #include "app/cam_settings.h"
@@ -15,9 +17,12 @@
 #include "app/progress_display.h"
 #include "cam/cam_job.h"
 #include "cam/cut_compare.h"
+#include "cam/cut_estimate.h"
 #include "cam/report/leak_words.h"
 #include "cam/report/report_json.h"
 #include "core/error.h"
+#include "core/folder_lock.h"
+#include "core/toml_fields.h"
 
 namespace lensforge::app {
 namespace {
@@ -70,12 +75,20 @@ nlohmann::json summary_json(const OptionSet& options, const CamResult& result) {
 
 CamResult run(const OptionSet& options, const CamOptions& cam, const Lens& lens,
               const fs::path& out) {
+  const Executor executor = options.executor();
+  const WorkEstimate estimate = estimate_cut(cam, lens.setup, executor.concurrency());
+  require_room_for_cut(cam, lens.setup, estimate, out);
+  const Console console(options.common().json, options.common().quiet);
+  if (estimate.seconds > kWorthTelling) {
+    console.note("the cut takes " + estimate_words(estimate));
+  }
   const InterruptWatch interrupt;
   const OutputFolder folder(out);
+  const FolderLock lock(out, FolderLock::Kind::kExclusive);
   folder.remove_partial_files();
   ProgressDisplay progress(options.common().quiet);
   const RunControl control(interrupt.token(), progress.sink());
-  return make_cut(lens, cam, out, options.executor(), control);
+  return make_cut(lens, cam, out, executor, control);
 }
 
 /// The option that states a limit; none for what is a matter of safety.
@@ -106,17 +119,40 @@ std::string choice_text(const ReportChoice& choice) {
          fixed(choice.hours, 2) + " h\n";
 }
 
+/// All combinations run one after the other; the finest pitch takes most room.
+void announce(const CutChoices& choices, CamOptions cam, const Lens& lens, int threads,
+              const fs::path& folder, const Console& console) {
+  FinishProcess& finish = cam.workshop.process.finish;
+  if (!choices.pitches.empty()) {
+    finish.pitch = *std::min_element(choices.pitches.begin(), choices.pitches.end());
+    finish.scallop = 0.0;
+  }
+  validate(cam.workshop, "--compare");
+  cam.render = true;
+  WorkEstimate estimate = estimate_cut(cam, lens.setup, threads);
+  require_room_for_cut(cam, lens.setup, estimate, folder);
+  const auto count_of = [](const std::vector<double>& values) {
+    return static_cast<double>(std::max<std::size_t>(values.size(), 1));
+  };
+  estimate.seconds *= count_of(choices.pitches) * count_of(choices.tools);
+  if (estimate.seconds > kWorthTelling) {
+    console.note("the comparison takes " + estimate_words(estimate));
+  }
+}
+
 int compare(const OptionSet& options, const CamSettings& settings, const CamOptions& cam,
             const Lens& lens) {
   const CutChoices choices = parse_choices(settings.compare, "--compare");
   const Console console(options.common().json, options.common().quiet);
+  const Executor executor = options.executor();
+  announce(choices, cam, lens, executor.concurrency(), settings.folder(), console);
   const InterruptWatch interrupt;
   const OutputFolder folder(settings.folder());
+  const FolderLock lock(settings.folder(), FolderLock::Kind::kExclusive);
   folder.remove_partial_files();
   ProgressDisplay progress(options.common().quiet);
   const RunControl control(interrupt.token(), progress.sink());
-  const CutComparison result =
-      compare_cuts(lens, cam, choices, folder.path(), options.executor(), control);
+  const CutComparison result = compare_cuts(lens, cam, choices, folder.path(), executor, control);
   nlohmann::json json = {{"command", "cam"},
                          {"status", result.complete ? "done" : "interrupted"},
                          {"options", options.used()},
@@ -132,6 +168,12 @@ int compare(const OptionSet& options, const CamSettings& settings, const CamOpti
   return result.complete ? kDone : kInterrupted;
 }
 
+nlohmann::json workshop_json(const Workshop& workshop) {
+  std::ostringstream text;
+  text << toml::json_formatter{parse_toml(workshop_toml(workshop), "workshop")};
+  return {{"command", "cam"}, {"workshop", nlohmann::json::parse(text.str())}};
+}
+
 }  // namespace
 
 int cam_command(const Arguments& command_line) {
@@ -140,11 +182,15 @@ int cam_command(const Arguments& command_line) {
   add_cam_options(options, settings);
   options.parse(command_line);
   const Console console(options.common().json, options.common().quiet);
+  std::optional<FolderLock> reading;
+  if (fs::is_directory(settings.source)) {
+    reading.emplace(settings.source, FolderLock::Kind::kShared);
+  }
   const Lens lens = read_lens(settings.source);
   CamOptions cam = cam_options(options, settings);
   cam.surface = settings.surface.value_or(lens.model);
   if (settings.show_workshop) {
-    print_to_stdout(workshop_toml(cam.workshop));
+    console.result(workshop_json(cam.workshop), workshop_toml(cam.workshop));
     return kDone;
   }
   validate(cam, lens.setup);

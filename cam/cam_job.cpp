@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cam/cam_job.h"
 
+#include <array>
 #include <chrono>
 #include <limits>
 #include <memory>
@@ -12,6 +13,7 @@
 #include "cam/cut_plan.h"
 #include "cam/cut_report.h"
 #include "cam/finish_setup.h"
+#include "cam/job_files.h"
 #include "cam/milled/designed_field.h"
 #include "cam/milled/held_field.h"
 #include "cam/part_surfaces.h"
@@ -24,6 +26,7 @@
 #include "core/files.h"
 #include "core/image_io.h"
 #include "core/mesh_io.h"
+#include "core/output_guard.h"
 
 namespace lensforge {
 namespace {
@@ -74,24 +77,29 @@ class MeantSurface {
   std::shared_ptr<const DropCutter> cutter_;
 };
 
+/// What a cut writes beside its programs.
+constexpr std::array kOthers{cam_file::kReport, cam_file::kPage, cam_file::kMilledMesh,
+                             cam_file::kMilledPicture, cam_file::kLeakage};
+
+std::vector<const char*> others_of(const CamOptions& options) {
+  if (options.render) return {kOthers.begin(), kOthers.end()};
+  return {cam_file::kReport, cam_file::kPage};
+}
+
+/// What an earlier run foretold.
 void remove_foretold(const fs::path& folder) {
-  for (const char* file : {cam_file::kReport, cam_file::kPage, cam_file::kMilledMesh,
-                           cam_file::kMilledPicture, cam_file::kLeakage}) {
+  for (const char* name : kOthers) {
     std::error_code ignored;
-    fs::remove(folder / file, ignored);
+    if (written_by_lensforge(folder / name)) fs::remove(folder / name, ignored);
   }
 }
 
-/// finish.ngc, finish_2.nc, finish-cross.ngc
-bool is_program(const fs::path& file) {
-  const std::string stem = file.stem().string();
-  for (const std::string name : {"rough", "semi", "finish", "cross", "pencil"}) {
-    if (!stem.starts_with(name)) continue;
-    if (stem.size() == name.size() || stem[name.size()] == '_' || stem[name.size()] == '-') {
-      return true;
-    }
+std::string names_of(const std::vector<fs::path>& paths) {
+  std::string names;
+  for (const fs::path& path : paths) {
+    names += (names.empty() ? "" : ", ") + path.filename().string();
   }
-  return false;
+  return names;
 }
 
 /// One run of make_cut().
@@ -108,17 +116,23 @@ class Job {
 
   CamResult run() {
     const Clock::time_point start = Clock::now();
-    const ProgramFiles programs = write_programs(plan_.programs(control_), options_.post,
-                                                 plan_.settings(), folder_, control_);
-    remove_foretold(folder_);
-    CamResult result;
-    for (const ProgramFile& file : programs.files) result.files.push_back(file.path);
+    const ProgramPlan plan = plan_.programs(control_);
+    const ProgramSettings settings = plan_.settings();
+    require_replaceable_cut(folder_, programs_in_the_way(plan, options_.post, settings, folder_),
+                            others_of(options_), options_.force);
+    PendingPrograms programs(plan, options_.post, settings, folder_, control_);
     std::optional<Prediction> prediction;
-    if (options_.render) prediction = predict(programs);
-    result.report = make_report(plan_, programs, prediction, lens_);
+    if (options_.render) prediction = predict(programs.programs());
+    CamResult result;
+    result.report = make_report(plan_, programs.programs(), prediction, lens_);
+    const OtherPrograms others = other_programs(folder_, paths_of(programs.programs()));
+    warn_of(others, result.report);
     result.report.seconds = std::chrono::duration<double>(Clock::now() - start).count();
-    if (prediction) write_pictures(*prediction, result);
-    write_report(result);
+    PendingFiles files(folder_);
+    if (prediction) add_pictures(*prediction, files);
+    files.add(cam_file::kPage, report_html(result.report));
+    files.add(cam_file::kReport, report_json(result.report).dump(1) + "\n");
+    publish(programs, others, files, result);
     result.message = result.report.verdict.passes()
                          ? "done, all limits met"
                          : "done, but limits are not met: see the report";
@@ -151,24 +165,47 @@ class Job {
     return {box.min().head<2>(), box.max().head<2>()};
   }
 
-  void write_pictures(const Prediction& prediction, CamResult& result) const {
-    const auto add = [&](const char* name) { return result.files.emplace_back(folder_ / name); };
+  static std::vector<fs::path> paths_of(const ProgramFiles& programs) {
+    std::vector<fs::path> paths;
+    for (const ProgramFile& file : programs.files) paths.push_back(file.path);
+    return paths;
+  }
+
+  static void warn_of(const OtherPrograms& others, ReportData& report) {
+    if (others.kept.empty()) return;
+    report.warnings.push_back("the folder holds programs that are not of this job and were kept: " +
+                              names_of(others.kept) + "; do not run them with it");
+  }
+
+  /// The old job goes and the new one comes, its report first and last, so that no report ever
+  /// stands beside programs that it is not about.
+  void publish(PendingPrograms& programs, const OtherPrograms& others, PendingFiles& files,
+               CamResult& result) const {
+    remove_foretold(folder_);
+    programs.publish();
+    for (const fs::path& path : others.earlier) {
+      std::error_code ignored;
+      fs::remove(path, ignored);
+    }
+    result.files = paths_of(programs.programs());
+    for (const fs::path& path : files.publish()) result.files.push_back(path);
+  }
+
+  void add_pictures(const Prediction& prediction, PendingFiles& files) const {
     const FluxPicture& part = prediction.leakage.part().picture;
-    write_ply(prediction.milled, add(cam_file::kMilledMesh));
-    write_image(part.image(lens_.target.total()), add(cam_file::kMilledPicture));
-    write_image(leakage_picture(prediction.leakage), add(cam_file::kLeakage));
+    files.add(cam_file::kMilledMesh,
+              [&](const fs::path& beside) { write_ply(prediction.milled, beside); });
+    files.add(cam_file::kMilledPicture, [&](const fs::path& beside) {
+      write_image(part.image(lens_.target.total()), beside);
+    });
+    files.add(cam_file::kLeakage, [&](const fs::path& beside) {
+      write_image(leakage_picture(prediction.leakage), beside);
+    });
   }
 
   static ColorImage leakage_picture(const LeakageResult& leakage) {
     const FluxPicture& part = leakage.part().picture;
     return false_color_image(surplus(part, leakage.designed.picture), part.columns, part.rows);
-  }
-
-  void write_report(CamResult& result) const {
-    result.files.push_back(folder_ / cam_file::kPage);
-    write_whole_file(result.files.back(), report_html(result.report));
-    result.files.push_back(folder_ / cam_file::kReport);
-    write_whole_file(result.files.back(), report_json(result.report).dump(1) + "\n");
   }
 
   const Lens& lens_;
@@ -184,11 +221,7 @@ class Job {
 void remove_cut(const fs::path& folder) {
   remove_foretold(folder);
   std::error_code ignored;
-  std::vector<fs::path> programs;
-  for (const auto& entry : fs::directory_iterator(folder, ignored)) {
-    if (is_program(entry.path())) programs.push_back(entry.path());
-  }
-  for (const fs::path& program : programs) fs::remove(program, ignored);
+  for (const fs::path& program : other_programs(folder, {}).earlier) fs::remove(program, ignored);
 }
 
 CamResult make_cut(const Lens& lens, const CamOptions& options, const fs::path& folder,

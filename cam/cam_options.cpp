@@ -4,18 +4,14 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <utility>
 
+#include "cam/finish_setup.h"
 #include "core/error.h"
 #include "core/number_text.h"
 
 namespace lensforge {
 namespace {
-
-constexpr double kMaxSpinUp = 3600.0;    ///< s
-constexpr double kMaxShrinkage = 0.2;    ///< More than any casting resin loses.
-constexpr double kMaxPolish = 1.0;       ///< mm; beyond it no picture is left.
-constexpr double kFinestSample = 1e-3;   ///< mm
-constexpr double kCoarsestSample = 1.0;  ///< mm
 
 [[noreturn]] void refuse(const char* option, double value, const std::string& rule) {
   throw InputError(std::string(option) + ": " + shortest_text(value) + " " + rule);
@@ -28,11 +24,12 @@ void require_in(const char* option, double value, double low, double high) {
   }
 }
 
+/// A tolerance has to leave room for rounding: a quarter of it.
 void validate_decimals(const CamOptions& options) {
-  if (options.decimals == 0) return;
-  require_in("--decimals", options.decimals, 4, options.post.most_decimals);
+  if (options.decimals != 0)
+    require_in("--decimals", options.decimals, 4, options.post.most_decimals);
   const double tolerance = options.workshop.process.finish.tolerance;
-  const double finest = 4.0 * std::pow(10.0, -options.decimals);
+  const double finest = 4.0 * resolution_of(options);
   if (!(tolerance >= finest * (1.0 - 1e-12))) {
     refuse("--tolerance", tolerance,
            "is not at least 4 units of the last decimal, " + shortest_text(finest) + " mm");
@@ -40,15 +37,28 @@ void validate_decimals(const CamOptions& options) {
 }
 
 void validate_polish(const CamOptions& options) {
-  require_in("--polish-sigma", options.polish.sigma, 0.0, kMaxPolish);
-  require_in("--rim-depth", options.polish.rim_depth, 0.0, kMaxPolish);
+  require_in("--polish-sigma", options.polish.sigma, 0.0, cam_limit::kPolish);
+  require_in("--rim-depth", options.polish.rim_depth, 0.0, cam_limit::kPolish);
+  require_in("--rim-length", options.polish.rim_length, cam_limit::kLeastRim, cam_limit::kRim);
   if (options.sample_spacing == 0.0) return;
-  require_in("--sample-spacing", options.sample_spacing, kFinestSample, kCoarsestSample);
+  require_in("--sample-spacing", options.sample_spacing, cam_limit::kFinestSample,
+             cam_limit::kCoarsestSample);
   if (options.polish.sigma > 0.0 && options.sample_spacing > options.polish.sigma) {
     refuse("--sample-spacing", options.sample_spacing,
            "is larger than --polish-sigma, " + shortest_text(options.polish.sigma) +
                " mm, which it could not show");
   }
+}
+
+void validate_limits(const CutLimits& limits) {
+  const std::pair<const char*, double> all[] = {{"--max-leakage", limits.leakage},
+                                                {"--max-dark", limits.dark_flux},
+                                                {"--max-mae-increase", limits.mae_increase},
+                                                {"--max-gouge", limits.gouge},
+                                                {"--max-excess", limits.excess},
+                                                {"--max-slope", limits.slope},
+                                                {"--max-fillet", limits.fillet_depth}};
+  for (const auto& [option, limit] : all) require_in(option, limit, 0.0, cam_limit::kLimit);
 }
 
 }  // namespace
@@ -69,8 +79,8 @@ double sample_spacing(const CamOptions& options) {
   if (options.sample_spacing > 0.0) return options.sample_spacing;
   const FinishProcess& finish = options.workshop.process.finish;
   const double pitch = finish_pitch(finish, options.workshop.tool(finish.tool).radius());
-  return std::clamp(std::max(pitch / 6.0, options.polish.sigma / 3.0), kFinestSample,
-                    kCoarsestSample);
+  return std::clamp(std::max(pitch / 6.0, options.polish.sigma / 3.0), cam_limit::kFinestSample,
+                    cam_limit::kCoarsestSample);
 }
 
 void validate(const CamOptions& options, const OpticalSetup& setup) {
@@ -82,10 +92,12 @@ void validate(const CamOptions& options, const OpticalSetup& setup) {
         "--tool-diameter", ball.diameter,
         "is not smaller than the lens, whose shorter side is " + shortest_text(smallest) + " mm");
   }
-  require_in("--spin-up", options.spin_up, 0.0, kMaxSpinUp);
-  require_in("--shrinkage", options.shrinkage, 0.0, kMaxShrinkage);
+  require_in("--spin-up", options.spin_up, 0.0, cam_limit::kSpinUp);
+  require_in("--shrinkage", options.shrinkage, 0.0, cam_limit::kShrinkage);
   validate_decimals(options);
   validate_polish(options);
+  require_in("--dark-below", options.leakage.dark_below, 0.0, cam_limit::kDark);
+  validate_limits(options.limits);
 }
 
 }  // namespace lensforge

@@ -48,6 +48,8 @@ struct CamOptions {
   /// What is cut: the facets as they are, or the smooth surface over the mesh (SmoothSurface).
   SurfaceModel surface = SurfaceModel::kSmooth;
 
+  bool force = false;  ///< Replace files that no cut wrote as they stand.
+
   bool render = true;    ///< Compute what the part will project; else programs only.
   bool remedies = true;  ///< Try what helps where most light leaks, if it is computed.
   PolishModel polish{0.03, 0.0, 1.0};
@@ -57,6 +59,20 @@ struct CamOptions {
   LeakageOptions leakage;
   CutLimits limits;
 };
+
+/// Most, or least, that the options below may be; those of the workshop keep to workshop_rule().
+namespace cam_limit {
+inline constexpr double kSpinUp = 3600.0;  ///< s
+inline constexpr double kShrinkage = 0.2;  ///< More than any casting resin loses.
+inline constexpr double kPolish =
+    1.0;  ///< σ and depth at the rim, mm; beyond it no picture is left.
+inline constexpr double kLeastRim = 1e-3;  ///< Of PolishModel::rim_length, mm.
+inline constexpr double kRim = 1000.0;     ///< Likewise.
+inline constexpr double kDark = 1e3;  ///< Of LeakageOptions::dark_below: brighter than any picture.
+inline constexpr double kLimit = 1e6;           ///< Of each of CutLimits, in its own unit.
+inline constexpr double kFinestSample = 1e-3;   ///< mm
+inline constexpr double kCoarsestSample = 1.0;  ///< mm
+}  // namespace cam_limit
 
 /// The spacing at which the surface is sampled, mm.
 double sample_spacing(const CamOptions& options);

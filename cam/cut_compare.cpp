@@ -2,12 +2,14 @@
 #include "cam/cut_compare.h"
 
 #include <algorithm>
+#include <array>
 #include <string_view>
 #include <system_error>
 #include <tuple>
 #include <utility>
 
 #include "cam/cam_job.h"
+#include "cam/job_files.h"
 #include "cam/report/report_html.h"
 #include "core/error.h"
 #include "core/files.h"
@@ -136,6 +138,7 @@ CutComparison compare_cuts(const Lens& lens, const CamOptions& options, const Cu
     validate(choice.options.workshop, "workshop");
     validate(choice.options, lens.setup);
   }
+  require_replaceable_cut(folder, {}, std::array{kComparePage}, options.force);
   CutComparison comparison;
   ReportData page;
   for (std::size_t i = 0; i < all.size(); ++i) {

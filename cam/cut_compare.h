@@ -40,7 +40,9 @@ struct CutComparison {
 /// Plans, times and foretells the finishing of every combination as make_cut() does, and ranks
 /// them. Programs are made in a folder of their own below `folder` and removed again. Roughing and
 /// semi-finishing are left out: they are the same for all.
-/// @throw InputError before any work if an option breaks its rule in some combination; RunError.
+/// @throw InputError before any work if an option breaks its rule in some combination, or if there
+/// is
+///        a page already that is not ours, without CamOptions::force; RunError.
 CutComparison compare_cuts(const Lens& lens, const CamOptions& options, const CutChoices& choices,
                            const std::filesystem::path& folder, const Executor& executor,
                            const RunControl& control);

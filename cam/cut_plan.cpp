@@ -29,6 +29,14 @@ Eigen::Vector2d size_to_cut(const Lens& lens, const CamOptions& options) {
   return lens.setup.lens_size / (1.0 - shrinkage);
 }
 
+/// @throw InputError if the surface is lower than what the blank lies on: no tool can cut there.
+HeightField above_table(const HeightField& field) {
+  if (field.box.min().z() >= 0.0) return field;
+  throw InputError("surface: reaches " + decimal_text(-field.box.min().z(), 4) +
+                   " mm below the blank's underside, z = 0, where the table is: design with a "
+                   "larger --thickness");
+}
+
 double z_offset_of(ZZero zero, double surface_top, double blank_top) {
   switch (zero) {
     case ZZero::kStock:
@@ -48,7 +56,7 @@ CutPlan::CutPlan(const Lens& lens, const CamOptions& options, const Executor& ex
       options_(options),
       executor_(executor),
       mesh_(mesh_to_cut(lens, options)),
-      field_(inspect_height_field(mesh_, size_to_cut(lens, options))),
+      field_(above_table(inspect_height_field(mesh_, size_to_cut(lens, options)))),
       blank_(options_.workshop.stock.box(field_.box)),
       z_offset_(z_offset_of(options.z_zero, field_.box.max().z(), blank_.max().z())),
       decimals_(decimals_of(options_)),
@@ -56,7 +64,9 @@ CutPlan::CutPlan(const Lens& lens, const CamOptions& options, const Executor& ex
       stock_(whole_blank(options_.workshop, field_.box)),
       smooth_(smooth_surface(mesh_, options_.surface)),
       surface_(surface_to_cut(mesh_, smooth_, ball().radius(), executor)),
-      collisions_(profile_, options_.workshop, stock_) {}
+      collisions_(profile_, options_.workshop, stock_),
+      watch_(collisions_, options_.workshop.tools, z_offset_,
+             highest_obstacle(options_.workshop, blank_)) {}
 
 std::optional<CastFrame> CutPlan::mould() const {
   if (options_.part == PartKind::kLens) return std::nullopt;
@@ -71,13 +81,11 @@ double CutPlan::safe_z() const {
          z_offset_;
 }
 
-MoveSink CutPlan::watched(const std::string& operation, const Tool& tool, const MoveSink& sink) {
+MoveSink CutPlan::sketched(const std::string& operation, const MoveSink& sink) {
   sketches_.push_back(std::make_unique<PathSketch>(operation, kSketchSpacing));
   PathSketch* const sketch = sketches_.back().get();
-  collisions_.begin(operation, tool);
-  return [this, sketch, sink](std::span<const PathMove> moves) {
+  return [sketch, sink](std::span<const PathMove> moves) {
     sketch->add(moves);
-    collisions_.check(moves);
     sink(moves);
   };
 }
@@ -90,17 +98,17 @@ std::vector<ReportPath> CutPlan::shown_path() const {
 
 ProgramOperation CutPlan::rough_operation(const RunControl& control) {
   const Tool& tool = options_.workshop.tool(options_.workshop.process.rough.tool);
-  return {"rough", tool, {}, [this, &tool, &control](const MoveSink& sink) {
+  return {"rough", tool, {}, [this, &control](const MoveSink& sink) {
             const RoughSite site{profile_, options_.workshop, stock_};
-            return cut_rough(site, executor_, watched("rough", tool, sink), control).summary;
+            return cut_rough(site, executor_, sketched("rough", sink), control).summary;
           }};
 }
 
 ProgramOperation CutPlan::semi_operation(const RunControl& control) {
   const Tool& tool = options_.workshop.tool(options_.workshop.process.semi.tool);
-  return {"semi", tool, {}, [this, &tool, &control](const MoveSink& sink) {
+  return {"semi", tool, {}, [this, &control](const MoveSink& sink) {
             const RoughSite site{profile_, options_.workshop, stock_};
-            return cut_semi(site, executor_, watched("semi", tool, sink), control).summary;
+            return cut_semi(site, executor_, sketched("semi", sink), control).summary;
           }};
 }
 
@@ -116,8 +124,7 @@ ProgramOperation CutPlan::finish_operation(const std::string& name, const Raster
               paths_.fitted.emplace_back(plan.radius, 0.0);
               run.look = [this](const RasterRow& row) { add_row(row, paths_); };
             }
-            return cut_finish(*surface_, plan, run, executor_, watched(name, ball(), sink),
-                              control);
+            return cut_finish(*surface_, plan, run, executor_, sketched(name, sink), control);
           }};
 }
 
@@ -131,7 +138,7 @@ OperationSummary CutPlan::run_pencil(double resolution, const MoveSink& sink,
 
 ProgramOperation CutPlan::pencil_operation(const RunControl& control) {
   return {"pencil", ball(), {}, [this, &control](const MoveSink& sink) {
-            return run_pencil(resolution_of(options_), watched("pencil", ball(), sink), control);
+            return run_pencil(resolution_of(options_), sketched("pencil", sink), control);
           }};
 }
 
@@ -151,10 +158,13 @@ ProgramPlan CutPlan::programs(const RunControl& control) {
     plan.operations.push_back(finish_operation("cross", finishing.back(), control));
   }
   if (finish().pencil) plan.operations.push_back(pencil_operation(control));
+  for (const ProgramOperation& operation : plan.operations) {
+    watched_.push_back({operation.name, operation.tool});
+  }
   return plan;
 }
 
-ProgramSettings CutPlan::settings() const {
+ProgramSettings CutPlan::settings() {
   ProgramSettings settings;
   settings.decimals = decimals_;
   settings.blend_tolerance = finish().tolerance;
@@ -163,6 +173,9 @@ ProgramSettings CutPlan::settings() const {
   settings.grouping = options_.grouping;
   settings.largest_file = options_.largest_file;
   settings.planner = planner_settings(options_.workshop.machine);
+  settings.look = [this](std::size_t operation, const ProgramLine& line) {
+    watch_.take(watched_[operation], line);
+  };
   return settings;
 }
 
@@ -182,7 +195,8 @@ FinishPaths CutPlan::take_finish_paths(const ProgramFiles& programs, const RunCo
           return programs.summaries[time.operation].tool == ball().number;
         });
     if (finishes) {
-      read_path(file.path, options_.post.reader, ball().number, written, control);
+      read_path(file.beside.empty() ? file.path : file.beside, options_.post.reader, ball().number,
+                written, control);
     }
   }
   paths.written.push_back(std::move(written));

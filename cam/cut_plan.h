@@ -22,6 +22,7 @@
 #include "cam/path/rough.h"
 #include "cam/path/stock_map.h"
 #include "cam/post/program_writer.h"
+#include "cam/program_watch.h"
 #include "cam/report/path_sketch.h"
 #include "core/executor.h"
 #include "core/lens.h"
@@ -42,7 +43,8 @@ class CutPlan {
   /// The programs' plan: roughing, semi-finishing, finishing, as far as they are wanted. Its
   /// operations work on this object, one after the other, once.
   [[nodiscard]] ProgramPlan programs(const RunControl& control);
-  [[nodiscard]] ProgramSettings settings() const;
+  /// What is read back of the programs is looked over by this object.
+  [[nodiscard]] ProgramSettings settings();
 
   /// The finishing ball's ways, from the exact drop curves to the written programs; the former are
   /// handed over, so once. @pre programs() was streamed, and CamOptions::render is set.
@@ -72,10 +74,12 @@ class CutPlan {
   /// Between finishing rows, as cut, mm.
   [[nodiscard]] double pitch() const { return finish_rasters(options_, ground()).front().pitch; }
   [[nodiscard]] int decimals() const { return decimals_; }
-  /// What touches something that it must not, as far as programs() were streamed.
+  /// What touches something that it must not, in the programs as they were read back so far.
   [[nodiscard]] const std::vector<Collision>& collisions() const {
     return collisions_.collisions();
   }
+  /// What else was found in them.
+  [[nodiscard]] const ProgramWatch& watch() const { return watch_; }
   /// Every operation's way, thinned out, as far as programs() were streamed.
   [[nodiscard]] std::vector<ReportPath> shown_path() const;
 
@@ -90,8 +94,8 @@ class CutPlan {
   ProgramOperation pencil_operation(const RunControl& control);
   OperationSummary run_pencil(double resolution, const MoveSink& sink,
                               const RunControl& control) const;
-  /// The sink behind a sketch of the operation and a look for collisions.
-  MoveSink watched(const std::string& operation, const Tool& tool, const MoveSink& sink);
+  /// The sink behind a sketch of the operation.
+  MoveSink sketched(const std::string& operation, const MoveSink& sink);
 
   const Lens& lens_;
   CamOptions options_;
@@ -106,6 +110,8 @@ class CutPlan {
   std::shared_ptr<const SmoothSurface> smooth_;
   std::unique_ptr<CutSurface> surface_;
   CollisionCheck collisions_;
+  ProgramWatch watch_;
+  std::vector<WatchedOperation> watched_;
   std::vector<std::unique_ptr<PathSketch>> sketches_;
   FinishPaths paths_;  ///< As far as programs() were streamed.
 };

@@ -2,16 +2,22 @@
 #include "cam/cut_report.h"
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 
 #include "cam/report/html_text.h"
 #include "core/decimal_text.h"
+#include "core/trimmed_decimal.h"
 
 namespace lensforge {
 namespace {
 
 constexpr double kMicrometres = 1e3;
 constexpr double kSecondsPerMinute = 60.0;
+
+/// Of a material's refractive index: makers state acrylic as 1.49 to 1.492, and 0.005 more turn
+/// light by a hundredth more.
+constexpr double kIndexTolerance = 0.005;
 
 std::string mm(double value, int decimals) { return decimal_text(value, decimals) + " mm"; }
 
@@ -161,6 +167,14 @@ ReportMap fillet_share_map(const CreaseMap& creases) {
   return map;
 }
 
+/// By how much the index of the workshop's material is off the one that the lens was designed for;
+/// 0 where it states none, and for a mould, from whose material no light passes.
+double index_error(const CutPlan& plan, const Lens& lens) {
+  const double stated = plan.options().workshop.material.ior;
+  if (!(stated > 0.0) || plan.options().part == PartKind::kMould) return 0.0;
+  return std::abs(stated - lens.setup.ior);
+}
+
 /// Why tools touch the blank where nothing was roughed; empty if the first one's flutes are long
 /// enough. What another program has roughed is not known: the blank counts as whole.
 std::string unroughed_warning(const CutPlan& plan, const ProgramFiles& programs) {
@@ -176,11 +190,38 @@ std::string unroughed_warning(const CutPlan& plan, const ProgramFiles& programs)
                  " mm of flutes; run a roughing program first, or take a tool with longer flutes"});
 }
 
-std::vector<std::string> warnings_of(const CutPlan& plan, const ProgramFiles& programs) {
+/// Why the part would throw another picture than the designed one; empty if it would not.
+std::string index_warning(const CutPlan& plan, const Lens& lens) {
+  const double stated = plan.options().workshop.material.ior;
+  if (!(index_error(plan, lens) > kIndexTolerance)) return "";
+  return joined({"the workshop's material has index ", trimmed_decimal(stated, 4),
+                 ", the lens was designed for ", trimmed_decimal(lens.setup.ior, 4),
+                 ": it would throw another picture"});
+}
+
+/// Which axes have to go farther than they can; empty if none has.
+std::string travel_warning(const CutPlan& plan) {
+  const Eigen::Vector3d extent = plan.watch().extent();
+  const Eigen::Vector3d& travel = plan.options().workshop.machine.travel;
+  std::string axes;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (extent[axis] <= travel[axis]) continue;
+    axes += joined({axes.empty() ? "" : ", ", std::string(1, "XYZ"[axis]), " by ",
+                    decimal_text(extent[axis], 2), " of ", decimal_text(travel[axis], 2), " mm"});
+  }
+  return axes.empty() ? "" : "the programs move farther than the machine's travel: " + axes;
+}
+
+std::vector<std::string> warnings_of(const CutPlan& plan, const ProgramFiles& programs,
+                                     const Lens& lens) {
   std::vector<std::string> warnings;
   const std::string unroughed = unroughed_warning(plan, programs);
   if (!unroughed.empty()) warnings.push_back(unroughed);
   for (const Collision& collision : plan.collisions()) warnings.push_back(collision.sentence());
+  for (const std::string& fault : plan.watch().faults()) warnings.push_back(fault);
+  for (const std::string& sentence : {index_warning(plan, lens), travel_warning(plan)}) {
+    if (!sentence.empty()) warnings.push_back(sentence);
+  }
   const Eigen::Vector3d travel = plan.options().workshop.machine.travel;
   if ((plan.blank().sizes().array() > travel.array()).any()) {
     warnings.push_back("the blank is larger than the machine's travel of " +
@@ -210,6 +251,48 @@ std::vector<std::string> warnings_of(const CutPlan& plan, const ProgramFiles& pr
         decimal_text(programs.total.stream_limited_seconds / kSecondsPerMinute, 0) + " minutes");
   }
   return warnings;
+}
+
+/// How deep tools go below the blank's underside, mm.
+double depth_in_table(const CutPlan& plan) {
+  double deepest = 0.0;
+  for (const Collision& collision : plan.collisions()) {
+    if (collision.obstacle == kTable) deepest = std::max(deepest, collision.worst.value);
+  }
+  return deepest;
+}
+
+/// What the machine must not do, whatever becomes of the light.
+std::vector<LimitCheck> safety_checks(const CutPlan& plan, const Lens& lens) {
+  const auto collisions =
+      static_cast<double>(plan.collisions().size() + plan.watch().faults().size());
+  std::vector<LimitCheck> checks{
+      {"collisions", "collisions", collisions, 0.0, "", 0},
+      {"table", "cut below the blank's underside", depth_in_table(plan), 0.0, "mm", 4}};
+  const Eigen::Vector3d extent = plan.watch().extent();
+  const Eigen::Vector3d& travel = plan.options().workshop.machine.travel;
+  for (int axis = 0; axis < 3; ++axis) {
+    checks.push_back({std::string("travel_") + "xyz"[axis],
+                      std::string("travel of the machine along ") + "XYZ"[axis], extent[axis],
+                      travel[axis], "mm", 2});
+  }
+  if (plan.options().workshop.material.ior > 0.0) {
+    checks.push_back({"material_ior", "material's refractive index off the design's",
+                      index_error(plan, lens), kIndexTolerance, "", 4});
+  }
+  return checks;
+}
+
+/// A controller that takes lines without limit bears any load.
+Verdict whole_verdict(const CutPlan& plan, const ProgramFiles& programs,
+                      const std::optional<Prediction>& prediction, const Lens& lens) {
+  CutLimits limits = plan.options().limits;
+  limits.block_rate = plan.options().workshop.machine.lines_per_second;
+  CutFindings findings = findings_of(programs, prediction);
+  if (!(limits.block_rate > 0.0)) findings.block_rate.reset();
+  Verdict verdict = judge_cut(findings, limits);
+  for (const LimitCheck& check : safety_checks(plan, lens)) verdict.checks.push_back(check);
+  return verdict;
 }
 
 void add_prediction(const Prediction& prediction, const Lens& lens, ReportData& data) {
@@ -245,17 +328,13 @@ ReportData make_report(const CutPlan& plan, const ProgramFiles& programs,
   }
   data.setup = setup_sheet(plan);
   data.z_offset = plan.z_offset();
-  data.warnings = warnings_of(plan, programs);
+  data.warnings = warnings_of(plan, programs, lens);
   data.path = plan.shown_path();
   if (prediction) {
     data.parameters.push_back(polish_parameters(options));
     add_prediction(*prediction, lens, data);
   }
-  CutLimits limits = options.limits;
-  limits.block_rate = options.workshop.machine.lines_per_second;
-  data.verdict = judge_cut(findings_of(programs, prediction), limits);
-  const auto collisions = static_cast<double>(plan.collisions().size());
-  data.verdict.checks.push_back({"collisions", "collisions", collisions, 0.0, "", 0});
+  data.verdict = whole_verdict(plan, programs, prediction, lens);
   return data;
 }
 

@@ -4,12 +4,10 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include "core/height_field_check.h"
 #include "core/surface_mesh.h"
 
 namespace lensforge {
-
-/// How far the rim of a surface may be from the rectangle that it should cover, mm.
-inline constexpr double kRimTolerance = 0.01;
 
 /// Size and steepness of a surface that was found to be a height field.
 struct HeightField {
@@ -20,10 +18,8 @@ struct HeightField {
 
 /// Looks over a surface that is to be cut from above.
 /// @param size  of the rectangle from (0, 0) that it has to cover, mm.
-/// @throw InputError if it has no triangles, has coordinates that are not finite, has a triangle
-/// that
-///        is vertical or turned away from +z, or does not cover the rectangle exactly once (its box
-///        and the sum of its areas seen from above, both to kRimTolerance).
+/// @throw InputError if it has no triangles, has coordinates that are not finite, or does not cover
+///        the rectangle exactly once (height_field_fault()).
 HeightField inspect_height_field(const SurfaceMesh& mesh, const Eigen::Vector2d& size);
 
 }  // namespace lensforge

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "cam/path/row_joints.h"
+#include "core/error.h"
 
 namespace lensforge {
 namespace {
@@ -119,6 +120,7 @@ class RowFit {
     std::size_t stuck = 0;  // The joint from which no move held, and how often it was retried.
     int retries = 0;
     while (at < last) {
+      if (options_.stop.stop_requested()) throw Interrupted();
       const std::size_t settled = error_.size();
       std::optional<Reach> reach = best_reach(at, limit);
       const bool may_retry = at > stuck || retries < kRetries;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <stop_token>
 #include <vector>
 
 #include "cam/path/row_error.h"
@@ -15,7 +16,8 @@ struct RowFitOptions {
   double tolerance = 0.0005;      ///< Farthest from the drop curve, mm.
   double slope_tolerance = 1e-3;  ///< Largest difference of slope over a kSlopeStretch.
   ProgramGrid grid;
-  bool arcs = false;  ///< Whether moves may be arcs of circles.
+  bool arcs = false;          ///< Whether moves may be arcs of circles.
+  std::stop_token stop = {};  ///< Ends the fit.
 };
 
 /// Radius of an arc at most, mm: a controller that reckons in single precision places a point of it

@@ -19,6 +19,9 @@ constexpr double kPiece = 0.1;
 /// beside the cutter's path by what the silhouette rises over a cell, mm.
 constexpr double kRapidMargin = 0.05;
 
+/// A tip this little below the table touches it only in the last bit of a sum, mm.
+constexpr double kTableMargin = 1e-9;
+
 bool only_rises(const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
   return to.z() >= from.z() && from.head<2>() == to.head<2>();
 }
@@ -67,11 +70,28 @@ void CollisionCheck::check(std::span<const PathMove> moves) {
   for (const PathMove& move : moves) {
     if (!placed_) at_ = move.end;
     placed_ = true;
+    check_table(move);
     check_boxes(move);
     check_material(move);
     at_ = move.end;
     ++move_;
   }
+}
+
+void CollisionCheck::place(const Eigen::Vector3d& at) {
+  at_ = at;
+  placed_ = true;
+}
+
+/// No part of a tool is lower than its tip. An arc in an upright plane hangs below its ends.
+void CollisionCheck::check_table(const PathMove& move) {
+  const double table = stock_.blank().min().z() - kTableMargin;
+  const bool hangs = move.arc_axis == 0 || move.arc_axis == 1;
+  if (!hangs && std::min(at_.z(), move.end.z()) >= table) return;
+  split_move(at_, move, kPiece, [&](const MovePiece& piece) {
+    const double lowest = hangs ? piece.lowest : std::min(piece.from.z(), piece.to.z());
+    if (lowest < table) note({parts_.front().name, kTable, piece.to, table - lowest});
+  });
 }
 
 void CollisionCheck::check_boxes(const PathMove& move) {

@@ -15,12 +15,15 @@
 
 namespace lensforge {
 
+/// What the blank lies on, as an obstacle.
+inline constexpr const char* kTable = "the table under the blank";
+
 /// One part of one tool that touches one thing, in one operation.
 struct Collision {
   std::string operation;
   int tool = 1;                 ///< Tool::number
   std::string part;             ///< "cutter", "tool above its flutes", "section of 4 mm"
-  std::string obstacle;         ///< "the lens", "the blank", "the keep-out box 'vice'"
+  std::string obstacle;         ///< "the lens", "the blank", kTable, "the keep-out box 'vice'"
   std::int64_t moves = 0;       ///< How many moves touch it.
   std::int64_t first_move = 0;  ///< The first of them, counted from 0 in its operation.
   Eigen::Vector3d first_place;  ///< Tip, mm, lens frame.
@@ -32,9 +35,10 @@ struct Collision {
 
 /// Follows the moves of all operations, cuts them from a model of the blank, and finds where what
 /// does not cut touches something: the tool above its flutes, its shank and holder against the lens
-/// and what is left of the blank; the whole tool against the keep-out boxes; and the cutter against
-/// material in rapid moves. Moves are looked at in parts of a tenth of a millimetre, each with all
-/// that the tool sweeps in it.
+/// and what is left of the blank; the whole tool against the keep-out boxes and against the table,
+/// which is everywhere at the height of the blank's underside; and the cutter against material in
+/// rapid moves. Moves are looked at in parts of a tenth of a millimetre, each with all that the
+/// tool sweeps in it.
 ///
 /// What is left of the blank is known as an upper bound (StockMap): a touch may be reported where
 /// the tool passes material closer than a cell of it, and none is missed.
@@ -45,6 +49,9 @@ class CollisionCheck {
 
   /// What comes next is an operation of this name, with this tool, from an unknown place.
   void begin(const std::string& operation, const Tool& tool);
+
+  /// Where the tool is when the next move begins.
+  void place(const Eigen::Vector3d& at);
 
   /// The operation's next moves; a MoveSink may hand them on.
   void check(std::span<const PathMove> moves);
@@ -60,6 +67,7 @@ class CollisionCheck {
   };
   struct Touch;
 
+  void check_table(const PathMove& move);
   void check_boxes(const PathMove& move);
   void check_material(const PathMove& move);
   void note(const Touch& touch);

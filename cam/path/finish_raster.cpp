@@ -2,10 +2,12 @@
 #include "cam/path/finish_raster.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstddef>
 #include <numbers>
 #include <string>
+#include <thread>
 
 namespace lensforge {
 namespace {
@@ -20,7 +22,8 @@ RowFitOptions fit_options(const RasterOptions& options) {
   return {options.tolerance,
           options.slope_tolerance,
           {options.resolution, options.z_zero},
-          options.arcs};
+          options.arcs,
+          {}};
 }
 
 void take_larger(const Extreme& one, Extreme& largest) {
@@ -77,7 +80,8 @@ RowFitOptions exact_fit(const RowFitOptions& fit) {
   return {kExactRow * fit.tolerance,
           kExactRow * fit.slope_tolerance,
           {kExactResolution, fit.grid.z_zero},
-          true};
+          true,
+          fit.stop};
 }
 
 std::int64_t rows_at_once(const CutSurface& surface, const RasterPlan& plan) {
@@ -112,6 +116,11 @@ void add_row(const RasterRow& row, Eigen::Vector3d& last, RasterSummary& summary
   take_larger(row.certificate.excess, summary.certificate.excess);
   take_larger(row.certificate.slope, summary.certificate.slope);
   ++summary.rows;
+}
+
+void report(const RunControl& control, std::int64_t rows, std::int64_t of, std::int64_t points) {
+  control.report({"cam finish", static_cast<double>(rows), static_cast<double>(of),
+                  std::to_string(points) + " points"});
 }
 
 }  // namespace
@@ -188,7 +197,8 @@ RasterPlan plan_finish_raster(const Eigen::AlignedBox2d& surface, double radius,
 }
 
 RasterRow cut_row(const RowCurves& curves, const RasterPlan& plan, std::int64_t row) {
-  const RowFitOptions fit = fit_options(plan.options);
+  RowFitOptions fit = fit_options(plan.options);
+  fit.stop = curves.stop();
   RowProfile profile = curves.profile(plan.row_span(row), joint_bow(fit));
   level_ends(fit.grid, profile);
   const FittedRow fitted = fit_row(profile, fit);
@@ -219,9 +229,14 @@ RasterSummary cut_raster(const CutSurface& surface, const RasterPlan& plan,
     if (control.stop_requested()) return summary;
     const RowCurves curves(surface, axis_box(plan, begin, count), executor);
     batch.assign(static_cast<std::size_t>(count), {});
+    const std::thread::id caller = std::this_thread::get_id();
+    std::atomic<std::int64_t> cut_rows{0};
     const auto cut = [&](std::int64_t i) {
       if (control.stop_requested()) return;
       batch[static_cast<std::size_t>(i)] = cut_row(curves, plan, begin + i);
+      const std::int64_t done = summary.rows + ++cut_rows;
+      // Fine rows take seconds; only the caller's thread may report.
+      if (std::this_thread::get_id() == caller) report(control, done, plan.rows, summary.points);
     };
     parallel_for(executor, "finish raster", count, cut, 1);
     if (control.stop_requested()) return summary;
@@ -229,8 +244,7 @@ RasterSummary cut_raster(const CutSurface& surface, const RasterPlan& plan,
       add_row(row, last, summary);
       sink(row);
     }
-    control.report({"cam finish", static_cast<double>(summary.rows), static_cast<double>(plan.rows),
-                    std::to_string(summary.points) + " points"});
+    report(control, summary.rows, plan.rows, summary.points);
   }
   summary.complete = true;
   return summary;

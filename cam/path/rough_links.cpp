@@ -68,10 +68,14 @@ TipPath circle_from(const Eigen::Vector3d& begin, const Eigen::Vector2d& centre,
 
 }  // namespace
 
-double safe_height_of(const Workshop& workshop, const Eigen::AlignedBox3d& blank) {
+double highest_obstacle(const Workshop& workshop, const Eigen::AlignedBox3d& blank) {
   double top = blank.max().z();
   for (const KeepOut& box : workshop.keep_outs) top = std::max(top, box.high.z());
-  return top + workshop.process.safe_height;
+  return top;
+}
+
+double safe_height_of(const Workshop& workshop, const Eigen::AlignedBox3d& blank) {
+  return highest_obstacle(workshop, blank) + workshop.process.safe_height;
 }
 
 RoughLinks::RoughLinks(const LinkSite& site, RoughMoves& moves)

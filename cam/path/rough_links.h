@@ -22,6 +22,9 @@ struct LinkSite {
   double spacing = 0.1;       ///< Of points at which floor and stock are asked for, mm.
 };
 
+/// Nothing of blank and clamps is higher than this, mm.
+double highest_obstacle(const Workshop& workshop, const Eigen::AlignedBox3d& blank);
+
 /// Height of rapid moves in a workshop: Process::safe_height above blank and clamps, mm.
 double safe_height_of(const Workshop& workshop, const Eigen::AlignedBox3d& blank);
 

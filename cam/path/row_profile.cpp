@@ -90,12 +90,13 @@ void require_cover(const std::vector<CurvePiece>& curve, const AxisLine& line, d
 
 /// Appends the drop curve of facets.
 void add_facets(const DropCutter& cutter, const AxisLine& line, double from, double to, double bow,
-                RowProfile& profile) {
+                const std::stop_token& stop, RowProfile& profile) {
   const std::vector<CurvePiece> curve = drop_curve(cutter, line, from, to);
   require_cover(curve, line, from, to);
   profile.u.reserve(profile.u.size() + 4 * curve.size());
   profile.z.reserve(profile.z.size() + 4 * curve.size());
   for (const CurvePiece& piece : curve) {
+    if (stop.stop_requested()) throw Interrupted();
     // A wall may end in a jump.
     add_node(piece.begin, piece.value(piece.begin), profile);
     follow(piece, piece.begin, piece.end, profile);
@@ -132,7 +133,7 @@ RowCurves::RowCurves(const DropCutter& cutter) : given_(&cutter) {}
 
 RowCurves::RowCurves(const CutSurface& surface, const Eigen::AlignedBox2d& axis,
                      const Executor& executor)
-    : surface_(&surface), axis_(axis) {
+    : stop_(executor.stop_token()), surface_(&surface), axis_(axis) {
   if (surface.bed() == nullptr) made_ = surface.cutter(axis, executor);
 }
 
@@ -156,10 +157,11 @@ const DropCutter& RowCurves::facets(int along, std::int64_t number) const {
 void RowCurves::follow_facets(const RowSpan& span, double from, double to, double bow,
                               RowProfile& profile) const {
   for (double at = from; at < to;) {
+    if (stop_.stop_requested()) throw Interrupted();
     const double number = std::floor(at / kFacetStretch);
     const double end = std::min(to, (number + 1.0) * kFacetStretch);
     const DropCutter& cutter = facets(span.line.along, static_cast<std::int64_t>(number));
-    add_facets(cutter, span.line, at, end, bow, profile);
+    add_facets(cutter, span.line, at, end, bow, stop_, profile);
     at = end;
   }
 }
@@ -192,6 +194,7 @@ void RowCurves::roll(const RowSpan& span, double bow, RowProfile& profile) const
   double open = span.held_from;  // From here to `begin` the curve is not known yet.
   double begin = span.held_from;
   while (begin < span.held_to) {
+    if (stop_.stop_requested()) throw Interrupted();
     double end = std::min((std::floor(begin / length + kSameStretch) + 1.0) * length, span.held_to);
     std::optional<CurveNodes> nodes = ball.follow(begin, end, profile.finest);
     while (!nodes && end - begin > least) {
@@ -217,7 +220,7 @@ RowProfile RowCurves::profile(const RowSpan& span, double bow) const {
     roll(span, bow, profile);
   } else {
     const DropCutter& cutter = given_ != nullptr ? *given_ : *made_;
-    add_facets(cutter, span.line, span.held_from, span.held_to, bow, profile);
+    add_facets(cutter, span.line, span.held_from, span.held_to, bow, stop_, profile);
   }
   profile.z.front() = profile.z[1];
   add_node(span.to, profile.z.back(), profile);

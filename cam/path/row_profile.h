@@ -7,6 +7,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <stop_token>
 #include <vector>
 
 #include "cam/contact/curve_piece.h"
@@ -57,7 +58,10 @@ class RowCurves {
   /// @param bow  of chords between joints on arcs at most, about, mm, > 0. The polyline is off by
   ///             kBowShare of it, but by no more than kProfileError.
   /// @throw InputError if there is nothing under the ball somewhere on the row.
+  /// @throw Interrupted when stop() is requested.
   [[nodiscard]] RowProfile profile(const RowSpan& span, double bow) const;
+  /// The executor's.
+  [[nodiscard]] const std::stop_token& stop() const { return stop_; }
 
  private:
   void roll(const RowSpan& span, double bow, RowProfile& profile) const;
@@ -73,6 +77,7 @@ class RowCurves {
     std::shared_ptr<const DropCutter> cutter;
   };
 
+  std::stop_token stop_;
   const CutSurface* surface_ = nullptr;
   Eigen::AlignedBox2d axis_;
   mutable std::mutex mutex_;

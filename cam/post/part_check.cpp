@@ -11,6 +11,7 @@ namespace lensforge {
 namespace {
 
 constexpr double kFeedUnits = 1e6;  ///< As in BlockWriter's digest.
+constexpr std::int64_t kLinesBetweenReports = 4096;
 
 /// Reads a program and rebuilds what BlockWriter noted.
 class PartReading {
@@ -29,6 +30,7 @@ class PartReading {
     }
     collector_.take(line);
     timer_.take(line);
+    if (context_.settings.look) context_.settings.look(starts[next_].operation, line);
     for (const GcodeMotion& motion : line.effect.motions()) {
       if (!motion.rapid) note(motion);
     }
@@ -104,9 +106,17 @@ ProgramFile check_part(const ProgramContext& context, const ProgramPart& part,
                        const RunControl& control) {
   PartReading reading(context, part);
   const std::filesystem::path& beside = part.text().file().beside();
+  const std::string stage = "read back " + part.text().file().path().filename().string();
+  const auto take = [&](const ProgramLine& line) {
+    // What looks on may take long over a line.
+    if (control.stop_requested()) throw Interrupted();
+    reading.take(line);
+    if (line.block.line % kLinesBetweenReports != 0) return;
+    control.report({stage, static_cast<double>(line.block.line),
+                    static_cast<double>(part.text().lines()), ""});
+  };
   try {
-    walk_program(
-        beside, context.post.reader, [&](const ProgramLine& line) { reading.take(line); }, control);
+    walk_program(beside, context.post.reader, take, control);
   } catch (const InputError& error) {
     const std::string reason = std::string(error.what()).substr(beside.string().size() + 2);
     throw InputError("post " + context.post.name + ": its reader refuses the program " +

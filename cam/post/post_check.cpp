@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cam/post/post_check.h"
 
+#include <algorithm>
+#include <set>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "cam/post/post_text.h"
 #include "core/error.h"
@@ -15,6 +18,9 @@ namespace {
 /// Where a reference point is put while lines are tried out, mm.
 constexpr double kReferenceZ = 100.0;
 
+/// The tool length offset that a program before has left in force: no line of a description's own.
+constexpr int kForeignLength = 77;
+
 GcodeText text_of(const std::string& line) {
   GcodeText text;
   text.text = line;
@@ -22,11 +28,16 @@ GcodeText text_of(const std::string& line) {
   return text;
 }
 
+bool only_numbers_program(const GcodeBlock& block) {
+  return std::all_of(block.words().begin(), block.words().end(),
+                     [](const GcodeWord& word) { return word.letter == 'O'; });
+}
+
 /// A small program of the description, run line by line.
 class Trial {
  public:
-  Trial(const PostDescription& post, const TomlFields& fields)
-      : post_(post), fields_(fields), interpreter_(post.reader, start_state()) {
+  Trial(const PostDescription& post, const TomlFields& fields, const GcodeState& start = {})
+      : post_(post), fields_(fields), interpreter_(post.reader, with_references(start)) {
     texts_ = {{"job", "part"},   {"number", std::to_string(post.first_program_number)},
               {"tool", "1"},     {"rpm", "23000"},
               {"dwell", "2500"}, {"tolerance", "0.0005"}};
@@ -50,8 +61,7 @@ class Trial {
   [[nodiscard]] const GcodeInterpreter& interpreter() const { return interpreter_; }
 
  private:
-  static GcodeState start_state() {
-    GcodeState state;
+  static GcodeState with_references(GcodeState state) {
     state.g28 = state.g30 = Eigen::Vector3d(0.0, 0.0, kReferenceZ);
     return state;
   }
@@ -76,7 +86,11 @@ class Trial {
         const bool plain = c >= ' ' && c < '\x7f' && c != '?' && c != '!' && c != '~';
         if (!plain) throw GcodeError(1, "characters must be printable ASCII but ? ! ~");
       }
-      const GcodeEffect effect = interpreter_.run(parse_gcode_block(text_of(line)));
+      const GcodeBlock block = parse_gcode_block(text_of(line));
+      if (key == "head" && !only_numbers_program(block)) {
+        throw GcodeError(1, "only comments and a program number stand above the program's seal");
+      }
+      const GcodeEffect effect = interpreter_.run(block);
       if (key == "spindle" && !effect.motions().empty()) {
         throw GcodeError(1, "these lines must not move the machine");
       }
@@ -100,6 +114,55 @@ class Trial {
 
 bool writes_as_programs_are(const GcodeState& state) {
   return state.inches == false && state.absolute && !state.inverse_time;
+}
+
+/// What a program before may have left in force: the opposite of what ours rely on.
+GcodeState left_behind(int coordinate_system) {
+  GcodeState state;
+  state.motion = MotionMode::kFeed;
+  state.plane = ArcPlane::kYZ;
+  state.inches = true;
+  state.absolute = false;
+  state.inverse_time = true;
+  state.coordinate_system = coordinate_system;
+  state.tool_length = kForeignLength;
+  return state;
+}
+
+/// Whether one of the lines has a G word, times ten.
+bool states(const std::vector<std::string>& lines, int tenths) {
+  return std::any_of(lines.begin(), lines.end(), [&](const std::string& line) {
+    if (line.find('{') != std::string::npos) return false;
+    const GcodeBlock block = parse_gcode_block(text_of(line));
+    return std::any_of(block.words().begin(), block.words().end(), [&](const GcodeWord& word) {
+      return word.letter == 'G' && word.tenths == tenths;
+    });
+  });
+}
+
+/// Holds what `start` leaves in force against what programs rely on, whatever was in force before.
+void check_start(const PostDescription& post, const TomlFields& fields) {
+  std::set<int> systems;
+  for (const int before : {0, 1}) {
+    Trial trial(post, fields, left_behind(before));
+    trial.run("head", post.head);
+    trial.run("start", post.start);
+    const GcodeState& state = trial.interpreter().state();
+    trial.require("start", writes_as_programs_are(state),
+                  "must set millimetres (G21), absolute coordinates (G90) and feed per minute "
+                  "(G94), whatever was in force before");
+    trial.require("start", state.plane == ArcPlane::kXY, "must set the plane of X and Y (G17)");
+    systems.insert(state.coordinate_system);
+    trial.require("start", systems.size() == 1, "must choose a coordinate system (G54 ... G59)");
+    trial.require("start", state.tool_length != kForeignLength,
+                  "must cancel tool length offsets from before (G49)");
+  }
+  Trial trial(post, fields);
+  trial.require("start", states(post.start, 800), "must cancel canned cycles from before (G80)");
+  // The others have no such words.
+  const bool compensates = post.reader.tool_length || post.reader.path_blending;
+  trial.require("start", !compensates || states(post.start, 400),
+                "must cancel cutter compensation from before (G40)");
 }
 
 /// Whether `word` alone on a line makes `holds` true of the state.
@@ -158,8 +221,8 @@ void check_program_lines(const PostDescription& post, const TomlFields& fields) 
   const auto& state = trial.interpreter();
   trial.run("head", post.head);
   trial.run("start", post.start);
-  trial.require("start", writes_as_programs_are(state.state()),
-                "must set millimetres (G21), absolute coordinates (G90) and feed per minute (G94)");
+  check_start(post, fields);
+  const int system = state.state().coordinate_system;
   for (int tool = 0; tool < 2; ++tool) {
     trial.run("tool", post.tool);
     trial.require("tool", !post.changes_tools() || state.state().tool == 1,
@@ -168,8 +231,11 @@ void check_program_lines(const PostDescription& post, const TomlFields& fields) 
     trial.require("spindle",
                   state.state().spindle != SpindleTurn::kOff && state.state().rpm == 23000.0,
                   "must start the spindle at S{rpm}");
-    trial.require("tool", writes_as_programs_are(state.state()),
-                  "must leave millimetres, absolute coordinates and feed per minute in force");
+    trial.require("tool",
+                  writes_as_programs_are(state.state()) && state.state().plane == ArcPlane::kXY &&
+                      state.state().coordinate_system == system,
+                  "must leave millimetres, absolute coordinates, feed per minute, the plane of X "
+                  "and Y and the coordinate system in force");
     trial.run("tool_end", post.tool_end);
     trial.require("tool_end", state.state().spindle == SpindleTurn::kOff, "must stop the spindle");
   }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <string>
@@ -42,6 +43,13 @@ enum class ProgramGrouping {
 
 enum class Coolant { kOff, kMist, kFlood };
 
+struct ProgramLine;
+
+/// Is shown every line of every program as it was read back, in the order in which they are run,
+/// with the index in the plan of the operation that it belongs to. A program begins with its
+/// line 1.
+using ReadBackSink = std::function<void(std::size_t operation, const ProgramLine& line)>;
+
 /// How a plan is written.
 struct ProgramSettings {
   int decimals = 5;  ///< Of coordinates, 0 … the dialect's most.
@@ -55,6 +63,7 @@ struct ProgramSettings {
   std::uintmax_t largest_file = 0;  ///< Bytes, ≥ 65536; 0 for the dialect's own limit, if any.
   PlannerSettings planner;          ///< Of the machine, for the time; see planner_settings().
   double tool_change = 30.0;        ///< Seconds for M6.
+  ReadBackSink look = {};
 };
 
 }  // namespace lensforge

@@ -20,7 +20,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::uintmax_t kSmallestLimit = 1 << 16;  ///< Bytes; head, end and one long arc fit.
 constexpr double kEarlySplit = 0.9;  ///< Share of the limit from which a rapid is a place to split.
 constexpr double kMostSeconds = 3600.0;
 
@@ -34,10 +33,26 @@ struct Group {
   std::vector<std::size_t> operations;
 };
 
+/// Names of files end at 255 bytes, and those beside need some of them.
+constexpr std::size_t kLongestStem = 100;
+
+/// Cut short, but not within a letter of UTF-8.
+std::string shortened(std::string name) {
+  if (name.size() <= kLongestStem) return name;
+  std::size_t end = kLongestStem;
+  while (end > 0 && (static_cast<unsigned char>(name[end]) & 0xC0U) == 0x80U) --end;
+  name.resize(end);
+  return name;
+}
+
 std::string safe_stem(std::string name) {
+  name = shortened(std::move(name));
   std::replace_if(
       name.begin(), name.end(),
-      [](char c) { return c == '/' || c == '\\' || static_cast<unsigned char>(c) < ' '; }, '_');
+      [](char c) {
+        return c == '/' || c == '\\' || static_cast<unsigned char>(c) < ' ' || c == '\x7f';
+      },
+      '_');
   return name.empty() || name.front() == '.' ? "program" + name : name;
 }
 
@@ -157,13 +172,6 @@ class GroupWriter {
   Eigen::Vector3d last_ = Eigen::Vector3d::Zero();
 };
 
-/// A file that an earlier run wrote: it bears our seal.
-void remove_own(const fs::path& path) {
-  std::error_code error;
-  if (!fs::is_regular_file(path, error) || !check_seal(path)) return;
-  fs::remove(path, error);
-}
-
 /// Whether `name` is `stem`_<digits>.
 bool is_part_name(const std::string& name, const std::string& stem) {
   if (!name.starts_with(stem + "_")) return false;
@@ -171,35 +179,13 @@ bool is_part_name(const std::string& name, const std::string& stem) {
   return !digits.empty() && digits.find_first_not_of("0123456789") == std::string::npos;
 }
 
-/// Parts of an earlier program would be run by mistake.
-void remove_earlier(const fs::path& folder, const Group& group, const ProgramContext& context,
-                    const std::vector<fs::path>& written) {
-  const std::string extension = std::string(".").append(context.post.extension);
-  std::vector<fs::path> others{folder / (group.stem + extension)};
-  for (const auto& entry : fs::directory_iterator(folder)) {
-    const fs::path& path = entry.path();
-    const bool part = is_part_name(path.stem().string(), group.stem);
-    if (part && path.extension() == extension) others.push_back(path);
-  }
-  for (const fs::path& path : others) {
-    if (std::find(written.begin(), written.end(), path) == written.end()) remove_own(path);
-  }
-}
-
-void publish(std::vector<ReadPart>& parts, const Group& group, const ProgramContext& context,
-             const fs::path& folder) {
-  std::vector<fs::path> written;
-  for (ReadPart& part : parts) {
-    PendingFile& file = part.part->file();
-    if (parts.size() == 1) {
-      file.publish_as(folder / (group.stem + "." + context.post.extension));
-    } else {
-      file.publish();
-    }
-    part.file.path = file.path();
-    written.push_back(file.path());
-  }
-  remove_earlier(folder, group, context, written);
+/// Names that the parts of a group take once all of them are known.
+std::vector<fs::path> final_names(const std::vector<ReadPart>& parts, const Group& group,
+                                  const ProgramContext& context, const fs::path& folder) {
+  if (parts.size() == 1) return {folder / (group.stem + "." + context.post.extension)};
+  std::vector<fs::path> names;
+  for (const ReadPart& part : parts) names.push_back(part.part->file().path());
+  return names;
 }
 
 void finish_parts(const ProgramContext& context, std::vector<ReadPart>& parts) {
@@ -211,19 +197,18 @@ void finish_parts(const ProgramContext& context, std::vector<ReadPart>& parts) {
   }
 }
 
-ProgramFiles gathered(std::vector<std::vector<ReadPart>>& groups, std::size_t operations) {
-  ProgramFiles result;
-  result.times.resize(operations);
-  for (auto& parts : groups) {
-    for (ReadPart& part : parts) {
-      for (const OperationTime& time : part.file.operations) {
-        result.times[time.operation] += time.time;
-      }
-      result.total += part.file.time;
-      result.files.push_back(std::move(part.file));
-    }
+/// Adds the parts of one group.
+void gather(std::vector<ReadPart>& parts, const std::vector<fs::path>& names,
+            ProgramFiles& programs, std::vector<PendingFile>& pending) {
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    ProgramFile& file = parts[i].file;
+    for (const OperationTime& time : file.operations) programs.times[time.operation] += time.time;
+    programs.total += file.time;
+    file.path = names[i];
+    pending.push_back(std::move(parts[i].part->file()));
+    file.beside = pending.back().beside();
+    programs.files.push_back(std::move(file));
   }
-  return result;
 }
 
 }  // namespace
@@ -241,8 +226,9 @@ void validate(const ProgramSettings& settings, const PostDescription& post) {
           "is not between 0 and 3600 s");
   require(settings.tool_change >= 0.0 && settings.tool_change <= kMostSeconds, "tool change",
           settings.tool_change, "is not between 0 and 3600 s");
-  require(settings.largest_file == 0 || settings.largest_file >= kSmallestLimit, "largest file",
-          static_cast<double>(settings.largest_file), "is neither 0 nor at least 65536 bytes");
+  require(settings.largest_file == 0 || settings.largest_file >= kSmallestProgramLimit,
+          "largest file", static_cast<double>(settings.largest_file),
+          "is neither 0 nor at least 65536 bytes");
   const bool lacks_mist = settings.coolant == Coolant::kMist && post.mist.empty();
   const bool lacks_flood = settings.coolant == Coolant::kFlood && post.flood.empty();
   if (lacks_mist || lacks_flood) {
@@ -250,23 +236,60 @@ void validate(const ProgramSettings& settings, const PostDescription& post) {
   }
 }
 
+PendingPrograms::PendingPrograms(const ProgramPlan& plan, const PostDescription& post,
+                                 const ProgramSettings& settings, const fs::path& folder,
+                                 const RunControl& control) {
+  validate(settings, post);
+  const ProgramContext context{plan, post, settings};
+  std::int64_t number = post.first_program_number;
+  programs_.times.resize(plan.operations.size());
+  for (const Group& group : group_operations(context)) {
+    std::vector<ReadPart> parts =
+        GroupWriter(context, folder, group, control).run(number, programs_.summaries);
+    finish_parts(context, parts);
+    gather(parts, final_names(parts, group, context, folder), programs_, pending_);
+  }
+}
+
+void PendingPrograms::publish() {
+  for (std::size_t i = 0; i < pending_.size(); ++i) {
+    pending_[i].publish_as(programs_.files[i].path);
+    programs_.files[i].beside.clear();
+  }
+}
+
+std::vector<fs::path> programs_in_the_way(const ProgramPlan& plan, const PostDescription& post,
+                                          const ProgramSettings& settings, const fs::path& folder) {
+  const std::vector<Group> groups = group_operations({plan, post, settings});
+  const std::string extension = std::string(".").append(post.extension);
+  std::vector<fs::path> found;
+  std::error_code none;
+  for (const auto& entry : fs::directory_iterator(folder, none)) {
+    const std::string stem = entry.path().stem().string();
+    const bool named = std::any_of(groups.begin(), groups.end(), [&](const Group& group) {
+      return stem == group.stem || is_part_name(stem, group.stem);
+    });
+    if (named && entry.path().extension() == extension) found.push_back(entry.path());
+  }
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
 ProgramFiles write_programs(const ProgramPlan& plan, const PostDescription& post,
                             const ProgramSettings& settings, const fs::path& folder,
                             const RunControl& control) {
-  validate(settings, post);
-  const ProgramContext context{plan, post, settings};
-  const std::vector<Group> groups = group_operations(context);
-  std::int64_t number = post.first_program_number;
-  std::vector<std::vector<ReadPart>> parts;
-  std::vector<OperationSummary> summaries;
-  for (const Group& group : groups) {
-    parts.push_back(GroupWriter(context, folder, group, control).run(number, summaries));
-    finish_parts(context, parts.back());
+  PendingPrograms pending(plan, post, settings, folder, control);
+  const std::vector<fs::path> before = programs_in_the_way(plan, post, settings, folder);
+  pending.publish();
+  for (const fs::path& path : before) {
+    const auto same = [&](const ProgramFile& file) { return file.path == path; };
+    const auto& files = pending.programs().files;
+    std::error_code error;
+    const bool written = std::any_of(files.begin(), files.end(), same);
+    if (written || !fs::is_regular_file(path, error)) continue;
+    if (check_seal(path) == true) fs::remove(path, error);
   }
-  for (std::size_t i = 0; i < groups.size(); ++i) publish(parts[i], groups[i], context, folder);
-  ProgramFiles result = gathered(parts, plan.operations.size());
-  result.summaries = std::move(summaries);
-  return result;
+  return pending.programs();
 }
 
 }  // namespace lensforge

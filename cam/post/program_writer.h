@@ -10,9 +10,13 @@
 #include "cam/post/program_plan.h"
 #include "cam/post/program_reader.h"
 #include "cam/post/program_time.h"
+#include "core/files.h"
 #include "core/run_control.h"
 
 namespace lensforge {
+
+/// ProgramSettings::largest_file at least, bytes: head, end and one long arc fit.
+inline constexpr std::uintmax_t kSmallestProgramLimit = 1 << 16;
 
 /// An operation, or the share of it that one file holds.
 struct OperationTime {
@@ -24,6 +28,7 @@ struct OperationTime {
 /// One program file as it was read back.
 struct ProgramFile {
   std::filesystem::path path;
+  std::filesystem::path beside;  ///< Where it is until it is published; empty afterwards.
   std::uintmax_t bytes = 0;
   std::string sha256;  ///< Of all below the seal line, as its header states.
   ProgramReading reading;
@@ -46,14 +51,36 @@ struct ProgramFiles {
 /// in the last tenth; the next file then plunges at the tool's plunge feed to where the cut was
 /// left.
 ///
-/// Every file is read back by our own parser before any of them gets its name: its motions at feed
-/// have to be those that were written, to the last decimal. All files appear or none; files of
-/// earlier programs of the same names and other parts are removed.
-/// @throw InputError naming what, value and rule for bad settings, or a description whose programs
-///        cannot be read back; Interrupted; RunError if files cannot be written (disk full, …).
+/// Every file is read back by our own parser: its motions at feed have to be those that were
+/// written, to the last decimal. None has its name before publish().
+class PendingPrograms {
+ public:
+  /// @throw InputError naming what, value and rule for bad settings, or a description whose
+  /// programs
+  ///        cannot be read back; Interrupted; RunError if files cannot be written (disk full, …).
+  PendingPrograms(const ProgramPlan& plan, const PostDescription& post,
+                  const ProgramSettings& settings, const std::filesystem::path& folder,
+                  const RunControl& control);
+  [[nodiscard]] const ProgramFiles& programs() const { return programs_; }
+  /// Gives all files their names, one right after the other. @throw RunError
+  void publish();
+
+ private:
+  ProgramFiles programs_;
+  std::vector<PendingFile> pending_;  ///< One a file.
+};
+
+/// Writes a plan and publishes it; parts of an earlier program of the same name that are as they
+/// were written (check_seal()) are removed. @throw as PendingPrograms
 ProgramFiles write_programs(const ProgramPlan& plan, const PostDescription& post,
                             const ProgramSettings& settings, const std::filesystem::path& folder,
                             const RunControl& control);
+
+/// What stands in `folder` under names that a plan's programs, or parts of them, may get.
+std::vector<std::filesystem::path> programs_in_the_way(const ProgramPlan& plan,
+                                                       const PostDescription& post,
+                                                       const ProgramSettings& settings,
+                                                       const std::filesystem::path& folder);
 
 /// @throw InputError naming what, value and rule.
 void validate(const ProgramSettings& settings, const PostDescription& post);

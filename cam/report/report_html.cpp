@@ -7,6 +7,7 @@
 
 #include "cam/report/html_text.h"
 #include "cam/report/sections.h"
+#include "core/version.h"
 #include "report_page.h"
 
 namespace lensforge {
@@ -19,8 +20,9 @@ double ReportData::minutes() const {
 
 std::string report_html(const ReportData& data) {
   namespace section = report_section;
-  const std::array<std::pair<std::string_view, std::string>, 18> values{{
+  const std::array<std::pair<std::string_view, std::string>, 19> values{{
       {"TITLE", escape_html(data.job + " – cutting report")},
+      {"PROGRAM", program_mark()},
       {"STYLE", std::string(report_page::kStyle)},
       {"HEADER", section::header(data)},
       {"PICTURES", section::pictures(data)},
@@ -44,8 +46,9 @@ std::string report_html(const ReportData& data) {
 
 std::string compare_html(const ReportData& data) {
   namespace section = report_section;
-  const std::array<std::pair<std::string_view, std::string>, 18> values{{
+  const std::array<std::pair<std::string_view, std::string>, 19> values{{
       {"TITLE", escape_html(data.job + " – choices compared")},
+      {"PROGRAM", program_mark()},
       {"STYLE", std::string(report_page::kStyle)},
       {"HEADER", section::header(data)},
       {"PICTURES", ""},

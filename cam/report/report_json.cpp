@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "cam/report/leak_words.h"
+#include "core/version.h"
 
 namespace lensforge {
 namespace {
@@ -169,6 +170,7 @@ json choice_json(const ReportChoice& choice) {
 
 json report_json(const ReportData& data) {
   json report{
+      {"_written_by", program_mark()},  // Sorted first: written_by_lensforge() looks there.
       {"format", "lensforge.cam"},
       {"version", 1},
       {"program", data.program},

@@ -184,6 +184,7 @@ double finish_pitch(const FinishProcess& process, double ball_radius) {
 }
 
 void validate(const Workshop& workshop, const std::string& file) {
+  validate_ranges(workshop, file);
   const Rules rules(file);
   rules.hold(workshop.machine.spindle_min_rpm <= workshop.machine.spindle_max_rpm,
              "machine.spindle_min_rpm", workshop.machine.spindle_min_rpm,

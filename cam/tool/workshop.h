@@ -10,6 +10,7 @@
 
 #include "cam/tool/process.h"
 #include "cam/tool/tool.h"
+#include "core/toml_fields.h"
 
 namespace lensforge {
 
@@ -52,7 +53,7 @@ struct KeepOut {
 /// What the blank is made of.
 struct Material {
   std::string name = "cast acrylic (PMMA)";
-  double ior = 1.49;  ///< Against air, > 1.
+  double ior = 0.0;  ///< Refractive index against air, > 1; 0 where it is not stated.
 
   friend bool operator==(const Material&, const Material&) = default;
 };
@@ -75,11 +76,25 @@ struct Workshop {
   friend bool operator==(const Workshop&, const Workshop&) = default;
 };
 
+/// Rapid moves run at least this high above blank and clamps, mm: sheets of cast acrylic are up to
+/// half a millimetre thicker than stated (ISO 7823-1 allows 0.4 mm and a tenth of the thickness),
+/// and a touch-off and a blank that lies askew are off by a tenth or two.
+inline constexpr double kLeastSafeHeight = 0.5;
+
+/// Least and most of one of the workshop's numbers, by its place in the file:
+/// "process.safe_height", "tool.diameter", "finish.pitch". What sets such a number from elsewhere
+/// keeps to the same rule.
+/// @pre there is such a number.
+NumberRule workshop_rule(const std::string& key);
+
 /// @param file  what to name in messages.
-/// @throw InputError naming file, key, value and rule where two entries contradict one another:
-/// tool
-///        numbers, shapes and sections, speeds beyond the machine, steps wider than the tool.
+/// @throw InputError naming file, key, value and rule where a number is out of its range, or where
+///        two entries contradict one another: tool numbers, shapes and sections, speeds beyond the
+///        machine, steps wider than the tool.
 void validate(const Workshop& workshop, const std::string& file);
+
+/// @throw InputError naming file, key, value and rule where a number is out of its range.
+void validate_ranges(const Workshop& workshop, const std::string& file);
 
 /// Reads a workshop from TOML text. What is missing keeps its default; tools and clamps replace the
 /// defaults as a whole.

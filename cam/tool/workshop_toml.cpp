@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <charconv>
 #include <initializer_list>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -17,9 +18,21 @@ namespace lensforge {
 namespace {
 
 constexpr double kLength = 10000.0;  ///< mm; longer than any mill.
-constexpr double kLeast = 1e-6;      ///< Stands for "above 0", mm.
-constexpr double kRate = 1e6;        ///< mm/min, mm/s², rpm.
-constexpr double kSpin = 1e6;        ///< rpm
+constexpr double kBlank = 1000.0;  ///< mm that a blank may be larger than its lens, or a tool long.
+constexpr double kLeast = 1e-6;    ///< mm; the last decimal of a program.
+constexpr double kLeastDiameter = 0.01;  ///< mm; a third of the smallest that is sold.
+constexpr double kFinestStep = 1e-3;     ///< mm; of passes that only take material away.
+constexpr double kLeastRate = 0.1;       ///< mm/min, mm/s²; slower than any mill.
+constexpr double kRate = 1e6;            ///< mm/min, mm/s², rpm.
+constexpr double kSpin = 1e6;            ///< rpm
+/// mm; four units of the last decimal that any dialect has, of which rounding takes one.
+constexpr double kFinestTolerance = 4e-6;
+/// rad; rounding to that decimal turns a move of a tenth of a millimetre as much.
+constexpr double kFinestSlope = 1e-5;
+/// mm; of a circle down which a tool winds: below it the turns are too many to write.
+constexpr double kLeastHelix = 0.01;
+/// mm that a tool is fed through air above material: less than a twist of a chuck's jaws.
+constexpr double kLeastClearance = 0.05;
 
 /// A word for each value of an enumeration, in its order.
 using Words = std::initializer_list<std::string_view>;
@@ -50,6 +63,10 @@ class Reader {
   }
   void needed(const NumberRule& rule, double& value, const char* /*says*/) {
     value = fields_.number(rule);
+  }
+  /// A number that may be left unsaid, which is 0.
+  void stated(const NumberRule& rule, double& value, const char* says) {
+    number(rule, value, says);
   }
   void whole(const NumberRule& rule, int& value, const char* /*says*/) {
     value = fields_.whole_or(rule, value);
@@ -115,6 +132,10 @@ class Writer {
     line(rule.key, shortest(value), says);
   }
   void needed(const NumberRule& rule, double value, const char* says) { number(rule, value, says); }
+  void stated(const NumberRule& rule, double value, const char* says) {
+    if (value > 0.0) return number(rule, value, says);
+    text_ += "# " + rule.key + " =  # " + says + "\n";
+  }
   void whole(const NumberRule& rule, int value, const char* says) {
     line(rule.key, std::to_string(value), says);
   }
@@ -157,6 +178,79 @@ class Writer {
   std::string text_;
 };
 
+/// Holds every number against its rule.
+class RangeCheck {
+ public:
+  RangeCheck(std::string file, std::string prefix)
+      : file_(std::move(file)), prefix_(std::move(prefix)) {}
+
+  void text(const std::string& /*key*/, const std::string& /*value*/, const char* /*says*/) {}
+  void number(const NumberRule& rule, double value, const char* /*says*/) {
+    if (value >= rule.least && value <= rule.most) return;  // NaN is not.
+    throw InputError(file_ + ": " + prefix_ + rule.key + ": " + shortest(value) + ": must be in " +
+                     shortest(rule.least) + " to " + shortest(rule.most));
+  }
+  void needed(const NumberRule& rule, double value, const char* says) { number(rule, value, says); }
+  void stated(const NumberRule& rule, double value, const char* says) {
+    if (value != 0.0) number(rule, value, says);
+  }
+  void whole(const NumberRule& rule, int value, const char* says) { number(rule, value, says); }
+  void flag(const std::string& /*key*/, bool /*value*/, const char* /*says*/) {}
+  template <class Enum>
+  void word(const std::string& /*key*/, Enum /*value*/, const char* /*says*/) {}
+  template <class Item>
+  void list(const std::string& key, std::vector<Item>& list, const char* /*says*/) {
+    for (std::size_t i = 0; i < list.size(); ++i) {
+      RangeCheck inner(file_, prefix_ + key + "[" + std::to_string(i) + "].");
+      describe(inner, list[i]);
+    }
+  }
+  template <class Item>
+  void table(const std::string& key, Item& item, const char* /*says*/) {
+    RangeCheck inner(file_, prefix_ + key + ".");
+    describe(inner, item);
+  }
+
+ private:
+  std::string file_;
+  std::string prefix_;
+};
+
+/// Finds the rule of one number.
+class RuleSearch {
+ public:
+  explicit RuleSearch(std::string key, std::string prefix = {})
+      : key_(std::move(key)), prefix_(std::move(prefix)) {}
+
+  void text(const std::string& /*key*/, const std::string& /*value*/, const char* /*says*/) {}
+  void number(const NumberRule& rule, double /*value*/, const char* /*says*/) {
+    if (prefix_ + rule.key == key_) found_ = rule;
+  }
+  void needed(const NumberRule& rule, double value, const char* says) { number(rule, value, says); }
+  void stated(const NumberRule& rule, double value, const char* says) { number(rule, value, says); }
+  void whole(const NumberRule& rule, int value, const char* says) { number(rule, value, says); }
+  void flag(const std::string& /*key*/, bool /*value*/, const char* /*says*/) {}
+  template <class Enum>
+  void word(const std::string& /*key*/, Enum /*value*/, const char* /*says*/) {}
+  template <class Item>
+  void list(const std::string& key, std::vector<Item>& /*list*/, const char* says) {
+    Item item;
+    table(key, item, says);
+  }
+  template <class Item>
+  void table(const std::string& key, Item& item, const char* /*says*/) {
+    RuleSearch inner(key_, prefix_ + key + ".");
+    describe(inner, item);
+    if (inner.found_) found_ = inner.found_;
+  }
+  [[nodiscard]] const std::optional<NumberRule>& found() const { return found_; }
+
+ private:
+  std::string key_;
+  std::string prefix_;
+  std::optional<NumberRule> found_;
+};
+
 template <class Visitor>
 void describe_axes(Visitor& v, const std::string& key, Eigen::Vector3d& value,
                    const std::pair<double, double>& range, const char* says) {
@@ -171,11 +265,11 @@ void describe(Visitor& v, Machine& machine) {
   v.text("name", machine.name,
          "the paper's mill (Sun et al., Section 5); its limits below are "
          "assumed: put in your own");
-  describe_axes(v, "travel", machine.travel, {kLeast, kLength}, "mm");
+  describe_axes(v, "travel", machine.travel, {kLeastRate, kLength}, "mm");
   v.number({"spindle_min_rpm", 0.0, kSpin}, machine.spindle_min_rpm, "");
   v.number({"spindle_max_rpm", 1.0, kSpin}, machine.spindle_max_rpm, "the paper cuts at 23000");
-  describe_axes(v, "max_rate", machine.max_rate, {kLeast, kRate}, "mm/min, rapids and feeds");
-  describe_axes(v, "acceleration", machine.acceleration, {kLeast, kRate}, "mm/s^2");
+  describe_axes(v, "max_rate", machine.max_rate, {kLeastRate, kRate}, "mm/min, rapids and feeds");
+  describe_axes(v, "acceleration", machine.acceleration, {kLeastRate, kRate}, "mm/s^2");
   v.number({"junction_deviation", 0.0, 1.0}, machine.junction_deviation,
            "mm that a corner may be rounded");
   v.number({"arc_tolerance", kLeast, 1.0}, machine.arc_tolerance,
@@ -189,13 +283,14 @@ void describe(Visitor& v, Machine& machine) {
 template <class Visitor>
 void describe(Visitor& v, Material& material) {
   v.text("name", material.name, "");
-  v.number({"ior", 1.000001, 5.0}, material.ior, "refractive index (Sun et al., Section 5: 1.49)");
+  v.stated({"ior", 1.000001, 5.0}, material.ior,
+           "refractive index, checked against the lens's (Sun et al., Section 5: 1.49)");
 }
 
 template <class Visitor>
 void describe(Visitor& v, Stock& stock) {
-  v.number({"margin", 0.0, kLength}, stock.margin, "mm beyond the lens's rectangle on every side");
-  v.number({"allowance", 0.0, kLength}, stock.allowance, "mm above the surface's highest point");
+  v.number({"margin", 0.0, kBlank}, stock.margin, "mm beyond the lens's rectangle on every side");
+  v.number({"allowance", 0.0, kBlank}, stock.allowance, "mm above the surface's highest point");
 }
 
 template <class Visitor>
@@ -207,9 +302,9 @@ void describe(Visitor& v, KeepOut& box) {
 
 template <class Visitor>
 void describe(Visitor& v, ToolSection& section) {
-  v.needed({"diameter", kLeast, kLength}, section.diameter, "mm");
-  v.needed({"from", 0.0, kLength}, section.from, "mm above the tip");
-  v.needed({"to", kLeast, kLength}, section.to, "mm above the tip");
+  v.needed({"diameter", kLeast, kBlank}, section.diameter, "mm");
+  v.needed({"from", 0.0, kBlank}, section.from, "mm above the tip");
+  v.needed({"to", kLeast, kBlank}, section.to, "mm above the tip");
 }
 
 template <class Visitor>
@@ -217,24 +312,24 @@ void describe(Visitor& v, Tool& tool) {
   v.whole({"number", 1, 9999}, tool.number, "T word");
   v.text("name", tool.name, "");
   v.word("shape", tool.shape, "ball, bull or flat");
-  v.needed({"diameter", kLeast, 100.0}, tool.diameter, "mm");
+  v.needed({"diameter", kLeastDiameter, 100.0}, tool.diameter, "mm");
   v.number({"corner_radius", 0.0, 50.0}, tool.corner_radius, "mm, of a bull");
   v.whole({"teeth", 1, 100}, tool.teeth, "");
-  v.needed({"flute_length", kLeast, kLength}, tool.flute_length,
+  v.needed({"flute_length", kLeast, kBlank}, tool.flute_length,
            "mm above the tip that cut; above it nothing may touch material");
   v.number({"spindle_rpm", 1.0, kSpin}, tool.spindle_rpm, "");
-  v.needed({"feed", kLeast, kRate}, tool.feed, "mm/min");
-  v.needed({"plunge", kLeast, kRate}, tool.plunge, "mm/min into material");
+  v.needed({"feed", kLeastRate, kRate}, tool.feed, "mm/min");
+  v.needed({"plunge", kLeastRate, kRate}, tool.plunge, "mm/min into material");
   v.list("section", tool.sections, "Cylinders above the flutes, from below: neck, shank, holder.");
 }
 
 template <class Visitor, class Level>
 void describe_following(Visitor& v, Level& process) {
-  v.number({"stepover", kLeast, 100.0}, process.stepover, "mm between passes at most");
+  v.number({"stepover", kFinestStep, 100.0}, process.stepover, "mm between passes at most");
   v.number({"allowance", 0.0, 100.0}, process.allowance, "mm left on the surface");
   v.number({"ramp_angle_deg", 0.1, 45.0}, process.ramp_angle_deg, "steepest way into material");
   v.word("entry", process.entry, "ramp along the pass, or helix where one fits");
-  v.number({"helix_radius", kLeast, 50.0}, process.helix_radius,
+  v.number({"helix_radius", kLeastHelix, 50.0}, process.helix_radius,
            "mm, of the tool's axis; half its diameter at most");
   v.number({"spacing", 0.001, 10.0}, process.spacing,
            "mm between points where the surface is asked for");
@@ -246,7 +341,7 @@ template <class Visitor>
 void describe(Visitor& v, RoughProcess& rough) {
   v.flag("enabled", rough.enabled, "");
   v.whole({"tool", 1, 9999}, rough.tool, "number");
-  v.number({"stepdown", kLeast, 100.0}, rough.stepdown, "mm between levels at most");
+  v.number({"stepdown", kFinestStep, 100.0}, rough.stepdown, "mm between levels at most");
   describe_following(v, rough);
 }
 
@@ -263,8 +358,8 @@ void describe(Visitor& v, FinishProcess& finish) {
   v.number({"pitch", kLeast, 100.0}, finish.pitch,
            "mm between passes at most (Sun et al., Section 5: 0.06)");
   v.number({"scallop", 0.0, 10.0}, finish.scallop, "mm; above 0 the pitch follows from it");
-  v.number({"tolerance", kLeast, 1.0}, finish.tolerance, "mm from the exact path");
-  v.number({"slope_tolerance", kLeast, 1.0}, finish.slope_tolerance,
+  v.number({"tolerance", kFinestTolerance, 1.0}, finish.tolerance, "mm from the exact path");
+  v.number({"slope_tolerance", kFinestSlope, 1.0}, finish.slope_tolerance,
            "rad from the exact path's direction");
   v.word("style", finish.style, "zigzag, climb or conventional");
   v.word("along", finish.along, "x or y");
@@ -275,9 +370,9 @@ void describe(Visitor& v, FinishProcess& finish) {
 /// The rest of Process: its own keys.
 template <class Visitor>
 void describe(Visitor& v, Process& process) {
-  v.number({"safe_height", kLeast, 1000.0}, process.safe_height,
+  v.number({"safe_height", kLeastSafeHeight, kBlank}, process.safe_height,
            "mm of rapids above blank and clamps");
-  v.number({"clearance", 0.01, 100.0}, process.clearance,
+  v.number({"clearance", kLeastClearance, 100.0}, process.clearance,
            "mm from clamps, and above material where the feed begins");
 }
 
@@ -301,6 +396,20 @@ void describe(Visitor& v, Workshop& shop) {
 }
 
 }  // namespace
+
+NumberRule workshop_rule(const std::string& key) {
+  Workshop shop;
+  RuleSearch search(key);
+  describe(search, shop);
+  LF_CHECK(search.found().has_value(), key);
+  return *search.found();
+}
+
+void validate_ranges(const Workshop& workshop, const std::string& file) {
+  Workshop shop = workshop;
+  RangeCheck check(file, "");
+  describe(check, shop);
+}
 
 Workshop parse_workshop(std::string_view text, const std::string& file) {
   const toml::table document = parse_toml(text, file);

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <filesystem>
 #include <limits>
+#include <map>
 #include <stop_token>
 #include <string>
 #include <vector>
@@ -110,35 +111,144 @@ TEST(CamJob, ZZeroShiftsThePrograms) {
   }
 }
 
-TEST(CamJob, StoppedWhileProgramsAreMadeLeavesWhatWasThere) {
-  const TempFolder folder;
-  lensforge::testing::write_bytes(folder / "finish.ngc", "old");
-  lensforge::testing::write_bytes(folder / "report.json", "old");
-  std::stop_source source;
-  const RunControl control(source.get_token(), [&](const Progress&) { source.request_stop(); });
-  EXPECT_EQ(run(small_lens(), coarse(), folder, control).status, CamResult::Status::kInterrupted);
-  EXPECT_EQ(folder.file_count(), 2U);
-  EXPECT_EQ(read_bytes(folder / "finish.ngc"), "old");
+/// Everything in a folder, by name.
+std::map<std::string, std::string> contents(const TempFolder& folder) {
+  std::map<std::string, std::string> files;
+  for (const auto& entry : std::filesystem::directory_iterator(folder.path())) {
+    files[entry.path().filename().string()] = read_bytes(entry.path());
+  }
+  return files;
 }
 
-TEST(CamJob, StoppedLaterLeavesNewProgramsWithoutAnOldReport) {
+/// Stops at the first report of a stage that begins so.
+RunControl stop_at(const std::string& stage, std::stop_source& source) {
+  return {source.get_token(), [stage, &source](const Progress& progress) {
+            if (progress.stage.starts_with(stage)) source.request_stop();
+          }};
+}
+
+TEST(CamJob, WhatIsStoppedAnywhereLeavesTheOldJobAsItWas) {
   const TempFolder folder;
-  lensforge::testing::write_bytes(folder / "report.html", "old");
-  std::stop_source source;
-  const RunControl control(source.get_token(), [&](const Progress& progress) {
-    if (progress.stage == "render surfaces") source.request_stop();
-  });
-  EXPECT_EQ(run(small_lens(), coarse(), folder, control).status, CamResult::Status::kInterrupted);
-  EXPECT_EQ(folder.file_count(), 3U);
-  EXPECT_FALSE(std::filesystem::exists(folder / "report.html"));
+  CamOptions options = coarse();
+  run(small_lens(), options, folder);
+  const auto before = contents(folder);
+  options.z_zero = ZZero::kTable;
+  for (const std::string stage : {"", "read back", "render surfaces"}) {
+    std::stop_source source;
+    EXPECT_EQ(run(small_lens(), options, folder, stop_at(stage, source)).status,
+              CamResult::Status::kInterrupted)
+        << stage;
+    EXPECT_EQ(contents(folder), before) << stage;
+  }
+}
+
+std::vector<std::string> names_in(const TempFolder& folder) {
+  std::vector<std::string> names;
+  for (const auto& [name, bytes] : contents(folder)) names.push_back(name);
+  return names;
+}
+
+TEST(CamJob, ProgramsOfAnEarlierRunThatThisOneDoesNotWriteAreRemoved) {
+  const TempFolder folder;
+  CamOptions options = programs_only();
+  options.job = "A lens (1)";
+  run(small_lens(), options, folder);
+  ASSERT_THAT(names_in(folder), ::testing::Contains("rough.ngc"));
+  options.grouping = ProgramGrouping::kAll;
+  run(small_lens(), options, folder);
+  EXPECT_THAT(names_in(folder),
+              ::testing::ElementsAre("A lens (1).ngc", "report.html", "report.json"));
+  options.workshop.process.rough.enabled = false;
+  options.grouping = ProgramGrouping::kOperation;
+  options.largest_file = 65536;
+  run(small_lens(), options, folder);
+  EXPECT_THAT(names_in(folder), ::testing::Not(::testing::Contains("A lens (1).ngc")));
+  EXPECT_THAT(names_in(folder), ::testing::Contains("finish_2.ngc"));
+  options.largest_file = 0;
+  options.post = find_post("fanuc", "--post");
+  run(small_lens(), options, folder);
+  EXPECT_THAT(names_in(folder),
+              ::testing::ElementsAre("finish.nc", "report.html", "report.json", "semi.nc"));
+}
+
+TEST(CamJob, ProgramsThatAreNotTheJobsAreKeptAndNamed) {
+  const TempFolder folder;
+  CamOptions options = programs_only();
+  run(small_lens(), options, folder);
+  lensforge::testing::write_bytes(folder / "rough.ngc", read_bytes(folder / "rough.ngc") + "\n");
+  std::filesystem::copy_file(folder / "semi.ngc", folder / "semi-old.ngc");
+  lensforge::testing::write_bytes(folder / "mine.ngc", "M2\n");
+  options.workshop.process.rough.enabled = false;
+  const ReportData report = run(small_lens(), options, folder).report;
+  EXPECT_THAT(report.warnings,
+              ::testing::Contains(HasSubstr("not of this job and were kept: mine.ngc, rough.ngc, "
+                                            "semi-old.ngc")));
+  EXPECT_THAT(read_bytes(folder / "report.html"), HasSubstr("semi-old.ngc"));
+  for (const char* name : {"rough.ngc", "semi-old.ngc", "mine.ngc"}) {
+    EXPECT_TRUE(std::filesystem::exists(folder / name)) << name;
+  }
+}
+
+TEST(CamJob, WhatOthersWroteIsReplacedOnlyByForce) {
+  for (const std::string name : {"finish.ngc", "finish_2.ngc", "report.html", "report.json"}) {
+    const TempFolder folder;
+    CamOptions options = programs_only();
+    lensforge::testing::write_bytes(folder / name, "mine");
+    EXPECT_THAT(message_of<InputError>([&] { run(small_lens(), options, folder); }),
+                AllOf(HasSubstr(name), HasSubstr("--force")));
+    EXPECT_EQ(names_in(folder), std::vector<std::string>{name});
+    EXPECT_EQ(read_bytes(folder / name), "mine");
+    options.force = true;
+    EXPECT_TRUE(run(small_lens(), options, folder).done());
+  }
+}
+
+TEST(CamJob, AProgramThatWasEditedIsReplacedOnlyByForce) {
+  const TempFolder folder;
+  CamOptions options = programs_only();
+  run(small_lens(), options, folder);
+  run(small_lens(), options, folder);
+  lensforge::testing::write_bytes(folder / "semi.ngc", read_bytes(folder / "semi.ngc") + "\n");
+  const auto before = contents(folder);
+  EXPECT_THAT(message_of<InputError>([&] { run(small_lens(), options, folder); }),
+              HasSubstr("semi.ngc: lensforge did not write it as it stands"));
+  EXPECT_EQ(contents(folder), before);
+  options.force = true;
+  EXPECT_TRUE(run(small_lens(), options, folder).done());
+}
+
+TEST(CamJob, AFolderInPlaceOfAFileIsRefusedWhateverForceSays) {
+  const TempFolder folder;
+  std::filesystem::create_directory(folder / "report.html");
+  CamOptions options = programs_only();
+  options.force = true;
+  EXPECT_THAT(message_of<InputError>([&] { run(small_lens(), options, folder); }),
+              HasSubstr("report.html: is no regular file"));
 }
 
 TEST(CamJob, RemoveCutLeavesOtherFiles) {
   const TempFolder folder;
-  run(small_lens(), coarse(), folder);
-  lensforge::testing::write_bytes(folder / "finishing-notes.txt", "mine");
+  run(small_lens(), programs_only(), folder);
+  lensforge::testing::write_bytes(folder / "finish.ngc", read_bytes(folder / "finish.ngc") + "\n");
+  for (const char* name : {"finish-notes.txt", "finish.bak", "milled.png"}) {
+    lensforge::testing::write_bytes(folder / name, "mine");
+  }
   remove_cut(folder.path());
-  EXPECT_EQ(folder.file_count(), 1U);
+  EXPECT_THAT(names_in(folder),
+              ::testing::ElementsAre("finish-notes.txt", "finish.bak", "finish.ngc", "milled.png"));
+}
+
+TEST(CamJob, SurfacesWithAHoleAreRefusedBeforeAnythingIsWritten) {
+  const TempFolder folder;
+  for (const bool render : {false, true}) {
+    CamOptions options = coarse();
+    options.render = render;
+    Lens lens = small_lens();
+    lens.surface.triangles.col(100) = lens.surface.triangles.col(0);
+    EXPECT_THAT(message_of<InputError>([&] { run(lens, options, folder); }),
+                HasSubstr("hole or an overlap"));
+  }
+  EXPECT_EQ(folder.file_count(), 0U);
 }
 
 TEST(CamJob, FullDiskLeavesNothing) {
@@ -258,7 +368,7 @@ TEST(CamJob, SurfacesThatCannotBeCutAreRefused) {
   lens = small_lens();
   lens.surface.triangles.col(100) = lens.surface.triangles.col(101);
   lens.surface.triangles.col(102) = lens.surface.triangles.col(103);
-  EXPECT_NO_THROW(inspect_height_field(lens.surface, Eigen::Vector2d(3.0, 2.0)));
+  EXPECT_THAT(refusal(lens), HasSubstr("hole or an overlap"));
   lens.surface.triangles.conservativeResize(3, lens.surface.triangle_count() / 2);
   EXPECT_THROW(run(lens, programs_only(), folder), InputError);
   EXPECT_EQ(folder.file_count(), 0U);

@@ -55,6 +55,32 @@ TEST(Collision, FindsNoneAboveTheBlankOrInItsCut) {
                   .empty());
 }
 
+TEST(Collision, FindsTheTableUnderTheBlankAndBesideIt) {
+  Bench bench;
+  bench.tool.flute_length = 40.0;
+  bench.tool.sections.clear();
+  EXPECT_TRUE(bench.check({to(MoveKind::kRapid, -20, 5, 0), to(MoveKind::kCut, 5, 5, 0)}).empty());
+  for (const MoveKind kind : {MoveKind::kRapid, MoveKind::kCut}) {
+    const auto beside = bench.check({to(MoveKind::kRapid, -20, 5, 1), to(kind, -20, 5, -0.37)});
+    ASSERT_EQ(beside.size(), 1u);
+    EXPECT_EQ(beside[0].obstacle, kTable);
+    EXPECT_NEAR(beside[0].worst.value, 0.37, 1e-8);
+  }
+  // An arc that hangs below its ends.
+  PathMove arc = to(MoveKind::kCut, 6, 5, 0.5);
+  arc.arc_axis = 1;
+  arc.centre = {5, 5, 0.5};
+  arc.clockwise = false;
+  const auto hangs = bench.check({to(MoveKind::kCut, 4, 5, 0.5), arc});
+  PathMove cap = arc;
+  cap.clockwise = true;
+  const auto rises = bench.check({to(MoveKind::kCut, 4, 5, 0.5), cap});
+  EXPECT_EQ(hangs.empty(), !rises.empty());
+  const auto& below = hangs.empty() ? rises : hangs;
+  ASSERT_EQ(below.size(), 1u);
+  EXPECT_NEAR(below[0].worst.value, 0.5, 0.01);
+}
+
 TEST(Collision, FindsTheToolAboveItsFlutes) {
   Bench bench;
   // 2.5 mm below the top of the blank with flutes of 2 mm.

@@ -72,6 +72,21 @@ TEST(CutCompare, StoppedLeavesNothing) {
   EXPECT_EQ(folder.file_count(), 0U);
 }
 
+TEST(CutCompare, APageThatOthersWroteIsReplacedOnlyByForce) {
+  const TempFolder folder;
+  lensforge::testing::write_bytes(folder / kComparePage, "mine");
+  CamOptions options = coarse();
+  const auto compare = [&] {
+    compare_cuts(small_lens(), options, parse({"pitch=0.2"}), folder.path(), Executor::cpu(2), {});
+  };
+  EXPECT_THAT(message_of<InputError>(compare), HasSubstr("compare.html"));
+  EXPECT_EQ(read_bytes(folder / kComparePage), "mine");
+  options.force = true;
+  compare();
+  options.force = false;
+  EXPECT_NO_THROW(compare());
+}
+
 TEST(CutCompare, BadChoicesAreNamedWithValueAndRule) {
   const auto refusal = [](const std::vector<std::string>& words) {
     return message_of<InputError>([&] { parse(words); });

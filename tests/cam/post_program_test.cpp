@@ -273,7 +273,7 @@ TEST(ProgramWriter, ADescriptionThatWritesAnotherPathIsFoundOut) {
   const TempFolder folder;
   // G68.2 and the like are refused at once; a word that changes what follows is found by its path.
   const std::string text =
-      post_text_with("\"{coolant}\", \"G4 P{dwell}\"]", "\"{coolant}\", \"G55\"]");
+      post_text_with("\"{coolant}\", \"G4 P{dwell}\"]", "\"{coolant}\", \"G61\"]");
   EXPECT_NO_THROW(
       write_programs(small_plan(), parse_post(text, "f.toml"), four_decimals(), folder.path(), {}));
   const std::string shifting = post_text_with("\"G4 P{dwell}\"]", "\"G80\"]");

@@ -90,7 +90,7 @@ TEST(Workshop, DefaultsAreThePapersMachineToolAndAcrylic) {
   EXPECT_EQ(ball.diameter, 0.4);
   EXPECT_EQ(ball.spindle_rpm, 23000.0);
   EXPECT_EQ(finish_pitch(shop.process.finish, ball.radius()), 0.06);
-  EXPECT_EQ(shop.material.ior, 1.49);
+  EXPECT_EQ(shop.material.ior, 0.0) << "not stated";
   EXPECT_NO_THROW(validate(shop, "defaults"));
 }
 
@@ -131,6 +131,19 @@ TEST(Workshop, MissingKeysKeepTheirDefaults) {
   expected.process.finish.pitch = 0.05;
   EXPECT_EQ(shop, expected);
   EXPECT_EQ(parse_workshop("", "shop.toml"), Workshop{});
+}
+
+TEST(Workshop, TextsAreOneShortLine) {
+  for (const std::string& text :
+       {std::string("a\\u0007b"), std::string("a\\nb"), std::string(201, 'a')}) {
+    EXPECT_NE(refusal("[machine]\nname = \"" + text + "\"\n").find("must be one line"),
+              std::string::npos);
+  }
+}
+
+TEST(Workshop, AMaterialsIndexNeedsNotBeStated) {
+  EXPECT_EQ(parse_workshop(workshop_toml({}), "shop.toml").material.ior, 0.0);
+  EXPECT_EQ(parse_workshop("[material]\nior = 1.586\n", "shop.toml").material.ior, 1.586);
 }
 
 TEST(Workshop, RefusalsNameFileKeyValueAndRule) {

@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cam/cut_estimate.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "cam/finish_setup.h"
+#include "cam/prediction.h"
+#include "core/number_text.h"
+
+namespace lensforge {
+namespace {
+
+// Measured on a portrait of 25 mm with the default tools, on one core of 2.5 GHz: with 1e-3, 1.5e-4
+// and 5e-5 rad 0.8, 2.3 and 9.1 moves and 0.12, 0.18 and 3.8 ms a millimetre of row.
+
+/// Moves a millimetre of row that the default tolerances take; how their number grows with coarser
+/// and with finer slopes, and, as chords of arcs shorten with the root of their height, with
+/// heights.
+constexpr double kMovesPerMm = 2.5;
+constexpr double kCoarserPower = 0.6;
+constexpr double kFinerPower = 1.3;
+constexpr double kTolerancePower = 0.5;
+
+constexpr double kBytesPerMove = 40.0;       ///< "G3 X12.345678 Z-1.234567 I-1.234567 K-12.345678"
+constexpr double kMemoryPerMove = 1000.0;    ///< Bytes: exact, fitted and written way of the ball.
+constexpr double kMemory = 1.5e8;            ///< Bytes of everything else.
+constexpr double kMemoryPerNode = 200.0;     ///< Bytes of milled.ply and of what it is made from.
+constexpr double kDiskPerNode = 50.0;        ///< Bytes of a vertex and two triangles.
+constexpr double kSecondsPerMm = 1.8e-4;     ///< Of a finishing row: drop curve, fit, reading back.
+constexpr double kLeastSecondsPerMm = 1e-4;  ///< With any tolerance.
+constexpr double kFinerSeconds = 2.75;     ///< Their power of finer slopes: moves are tried often.
+constexpr double kTraced = 3.0;            ///< Times as long where the part is rendered.
+constexpr double kSecondsPerPoint = 1e-5;  ///< Of a roughing or semi-finishing pass.
+constexpr double kMovesPerPoint = 0.1;     ///< Most of them lie on straight ways.
+constexpr double kSecondsPerSample = 2.5e-7;  ///< Of a surface, milled, polished and rendered.
+constexpr double kSurfaces = 8.0;             ///< That are rendered.
+
+/// What the advised value leaves free.
+constexpr double kSpare = 1.5;
+
+double finish_length(const CamOptions& options, const Eigen::Vector2d& size) {
+  const FinishProcess& finish = options.workshop.process.finish;
+  const double radius = finishing_ball(options).radius();
+  const double pitch = finish_pitch(finish, radius);
+  const Eigen::Vector2d around = size + Eigen::Vector2d::Constant(2.0 * radius);
+  return around.prod() / pitch * (finish.cross ? 2.0 : 1.0);
+}
+
+/// How many times as fine the directions are as by default; finer heights take moves like slopes.
+double fineness(const FinishProcess& finish) {
+  const FinishProcess usual;
+  const double height = std::pow(usual.tolerance / finish.tolerance, kTolerancePower);
+  return std::max(usual.slope_tolerance / finish.slope_tolerance, 0.1 * height);
+}
+
+double moves_per_mm(const FinishProcess& finish) {
+  const double fine = fineness(finish);
+  return kMovesPerMm * std::pow(fine, fine > 1.0 ? kFinerPower : kCoarserPower);
+}
+
+double seconds_per_mm(const CamOptions& options) {
+  const double fine = fineness(options.workshop.process.finish);
+  const double seconds = kSecondsPerMm * std::pow(fine, kFinerSeconds);
+  return std::max(seconds, kLeastSecondsPerMm) * (options.render ? kTraced : 1.0);
+}
+
+/// Points of a pass that follows the surface, over one level.
+template <class Level>
+double points_of(const Level& level, const Eigen::Vector2d& size) {
+  return level.enabled ? size.prod() / (level.stepover * level.spacing) : 0.0;
+}
+
+double rough_points(const CamOptions& options, const Eigen::Vector2d& size) {
+  const Workshop& shop = options.workshop;
+  const double levels = std::ceil((shop.stock.allowance + 1.0) / shop.process.rough.stepdown);
+  return levels * points_of(shop.process.rough, size) + points_of(shop.process.semi, size);
+}
+
+double samples_of(const CamOptions& options, const Eigen::Vector2d& size) {
+  const double spacing = sample_spacing(options);
+  return options.render ? kSurfaces * size.prod() / (spacing * spacing) : 0.0;
+}
+
+double nodes_of(const Eigen::Vector2d& size) { return size.prod() / (kMeshSpacing * kMeshSpacing); }
+
+Eigen::Vector2d size_of(const CamOptions& options, const OpticalSetup& setup) {
+  const double shrinkage = options.part == PartKind::kMould ? options.shrinkage : 0.0;
+  return setup.lens_size / (1.0 - shrinkage);
+}
+
+/// The next larger number of one digit.
+double rounded_up(double value) {
+  const double unit = std::pow(10.0, std::floor(std::log10(value)));
+  return unit * std::ceil(value / unit);
+}
+
+}  // namespace
+
+WorkEstimate estimate_cut(const CamOptions& options, const OpticalSetup& setup, int threads) {
+  const Eigen::Vector2d size = size_of(options, setup);
+  const double length = finish_length(options, size);
+  const double moves = length * moves_per_mm(options.workshop.process.finish);
+  const double points = rough_points(options, size);
+  WorkEstimate estimate;
+  estimate.seconds = (length * seconds_per_mm(options) + points * kSecondsPerPoint +
+                      samples_of(options, size) * kSecondsPerSample) /
+                     threads;
+  estimate.disk_bytes = (moves + kMovesPerPoint * points) * kBytesPerMove;
+  estimate.memory_bytes = kMemory;
+  if (options.render) {
+    estimate.memory_bytes += moves * kMemoryPerMove + nodes_of(size) * kMemoryPerNode;
+    estimate.disk_bytes += nodes_of(size) * kDiskPerNode;
+  }
+  return estimate;
+}
+
+void require_room_for_cut(const CamOptions& options, const OpticalSetup& setup,
+                          const WorkEstimate& estimate, const std::filesystem::path& folder) {
+  const Eigen::Vector2d size = size_of(options, setup);
+  const FinishProcess& finish = options.workshop.process.finish;
+  const double share = std::max(estimate.disk_bytes / free_disk_bytes(folder),
+                                estimate.memory_bytes / free_memory_bytes());
+  const double moves = finish_length(options, size) * moves_per_mm(finish);
+  if (kMovesPerPoint * rough_points(options, size) > moves) {
+    return require_room(estimate, folder, "the roughing and semi-finishing passes",
+                        "larger steps and spacings in the workshop would fit");
+  }
+  if (options.render && nodes_of(size) * kMemoryPerNode > moves * kMemoryPerMove) {
+    return require_room(estimate, folder, "the milled surface of so large a lens",
+                        "--no-render would need less");
+  }
+  const double pitch = finish_pitch(finish, finishing_ball(options).radius());
+  require_room(estimate, folder, "--pitch " + shortest_text(pitch) + "mm",
+               "--pitch " + shortest_text(rounded_up(pitch * share * kSpare)) + "mm would fit");
+}
+
+}  // namespace lensforge

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/files.h"
+
+namespace lensforge {
+
+/// Whether a file is a program as a cut wrote it: under a name that a cut gives, and unchanged
+/// since (check_seal()).
+bool is_own_program(const std::filesystem::path& path);
+
+/// Programs in a folder that a new cut did not write.
+struct OtherPrograms {
+  std::vector<std::filesystem::path> earlier;  ///< is_own_program()
+  std::vector<std::filesystem::path> kept;     ///< The user's: changed, renamed, from elsewhere.
+};
+
+/// @param written  what the new cut has written or will write.
+OtherPrograms other_programs(const std::filesystem::path& folder,
+                             std::span<const std::filesystem::path> written);
+
+/// Keeps a cut from replacing what it did not write.
+/// @param programs  files in the way of programs. @param others  names of its other files.
+/// @throw InputError naming all files that no cut wrote or that were changed since, unless `force`;
+///        and, whatever `force` says, those that are no regular files.
+void require_replaceable_cut(const std::filesystem::path& folder,
+                             std::span<const std::filesystem::path> programs,
+                             std::span<const char* const> others, bool force);
+
+/// Files of a folder that get their names all at once.
+class PendingFiles {
+ public:
+  explicit PendingFiles(std::filesystem::path folder) : folder_(std::move(folder)) {}
+
+  /// Lets `write` make a file beside its name. @throw RunError
+  void add(const std::string& name,
+           const std::function<void(const std::filesystem::path& beside)>& write);
+  /// The same for content that is in memory.
+  void add(const std::string& name, std::string_view content);
+  [[nodiscard]] bool has(const std::string& name) const;
+  /// @return the files by their names. @throw RunError
+  std::vector<std::filesystem::path> publish();
+
+ private:
+  std::filesystem::path folder_;
+  std::vector<PendingFile> files_;
+};
+
+}  // namespace lensforge

@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <csignal>
+
+#include "core/folder_lock.h"
+#include "scenario/driver.h"
+
+namespace lensforge::scenario {
+namespace {
+
+using ::testing::Contains;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+/// The finishing ball alone runs into the whole blank with its shank, and the report says so.
+constexpr int kUnroughed = 3;
+
+class Cam : public Scenario {
+ protected:
+  Cam() { place_small_lens(at("lens")); }
+
+  /// A coarse finishing of the lens in the folder; the program only.
+  [[nodiscard]] Arguments cam(const Arguments& more) const {
+    Arguments arguments = {
+        "cam",         path("lens"),        "--pitch",   "1.9mm",     "--tool-diameter",
+        "2mm",         "--no-rough",        "--no-semi", "--surface", "facet",
+        "--no-render", "--slope-tolerance", "5e-3"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return arguments;
+  }
+};
+
+TEST_F(Cam, ValuesThatNoWorkshopHasAreRefusedByTheirOption) {
+  const std::pair<const char*, const char*> refused[] = {
+      {"--safe-height", "1e9"},      {"--stock", "1e6"},  {"--rough-tool", "500mm"},
+      {"--slope-tolerance", "1e-6"}, {"--pitch", "1e-9"}, {"--split", "0.01"},
+      {"--max-leakage", "nan"}};
+  for (const auto& [option, value] : refused) {
+    expect_refusal(run({"cam", path("lens"), option, value}), 2, {option, value});
+  }
+  EXPECT_FALSE(fs::exists(at("lens/cam")));
+}
+
+TEST_F(Cam, WhatTheDiskDoesNotHoldIsRefusedWithAPitchThatWouldFit) {
+  expect_refusal(run({"cam", path("lens"), "--pitch", "1e-6mm"}), 2,
+                 {"--pitch 1e-06mm", "needs about", "mm would fit"});
+  expect_refusal(run({"cam", path("lens"), "--compare", "pitch=0.1,1e-6"}), 2, {"mm would fit"});
+  EXPECT_FALSE(fs::exists(at("lens/cam")));
+}
+
+TEST_F(Cam, TheWorkshopIsShownAsJson) {
+  const Outcome outcome = run(cam({"--show-workshop", "--json"}));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_EQ(outcome.json()["workshop"]["finish"]["pitch"], 1.9);
+  EXPECT_EQ(outcome.json()["workshop"]["tool"].size(), 3U);
+}
+
+TEST_F(Cam, AProgramThatWasEditedIsReplacedOnlyByForce) {
+  ASSERT_EQ(run(cam({})).exit_code, kUnroughed);
+  ASSERT_EQ(run(cam({})).exit_code, kUnroughed);
+  const std::string edited = content(at("lens/cam/finish.ngc")) + "(mine)\n";
+  write(at("lens/cam/finish.ngc"), edited);
+  expect_refusal(run(cam({})), 2, {"finish.ngc", "--force"});
+  EXPECT_EQ(content(at("lens/cam/finish.ngc")), edited);
+  EXPECT_EQ(run(cam({"--force"})).exit_code, kUnroughed);
+  EXPECT_NE(content(at("lens/cam/finish.ngc")), edited);
+}
+
+TEST_F(Cam, ProgramsOfAnEarlierJobGoWithTheNewOne) {
+  ASSERT_EQ(run(cam({"--cross"})).exit_code, kUnroughed);
+  ASSERT_THAT(listing(at("lens/cam")), Contains("cross.ngc"));
+  write(at("lens/cam/old.ngc"), "M2\n");
+  const Outcome outcome = run(cam({"--z-zero", "table"}));
+  EXPECT_THAT(listing(at("lens/cam")), Not(Contains("cross.ngc")));
+  EXPECT_THAT(outcome.err, HasSubstr("not of this job and were kept: old.ngc"));
+}
+
+TEST_F(Cam, ATravelTooShortAndAnotherIndexAreMissedLimits) {
+  write(at("shop.toml"), "[machine]\ntravel_x = 90.0\n[material]\nior = 1.586\n");
+  const Outcome outcome = run(cam({"--workshop", path("shop.toml")}));
+  EXPECT_EQ(outcome.exit_code, 3);
+  EXPECT_THAT(outcome.out, HasSubstr("limit not met: travel of the machine along X"));
+  EXPECT_THAT(outcome.err, HasSubstr("the workshop's material has index 1.586, the lens was "
+                                     "designed for 1.49"));
+  EXPECT_THAT(content(at("lens/cam/report.html")), HasSubstr("machine&#39;s travel"));
+}
+
+TEST_F(Cam, AFolderThatAnotherCommandWritesIntoIsLeftAlone) {
+  fs::create_directories(at("lens/cam"));
+  const FolderLock lock(at("lens/cam"), FolderLock::Kind::kExclusive);
+  write(at("lens/cam/.finish.partial-1.ngc"), "its");
+  expect_refusal(run(cam({})), 2, {"lens"});
+  EXPECT_EQ(content(at("lens/cam/.finish.partial-1.ngc")), "its");
+}
+
+TEST_F(Cam, FineTolerancesStopWithinASecond) {
+  Process process({"cam", path("lens"), "--slope-tolerance", "1e-5", "--tolerance", "4e-6",
+                   "--no-rough", "--no-semi", "--no-render"});
+  ASSERT_TRUE(process.runs_for(std::chrono::milliseconds(3000)));
+  const auto asked = std::chrono::steady_clock::now();
+  process.send(SIGINT);
+  const Outcome outcome = process.wait();
+  EXPECT_LT(std::chrono::steady_clock::now() - asked, std::chrono::seconds(2));
+  EXPECT_EQ(outcome.exit_code, 130);
+}
+
+}  // namespace
+}  // namespace lensforge::scenario
