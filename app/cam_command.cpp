@@ -18,6 +18,7 @@
 #include "cam/cam_job.h"
 #include "cam/cut_compare.h"
 #include "cam/cut_estimate.h"
+#include "cam/job_files.h"
 #include "cam/report/leak_words.h"
 #include "cam/report/report_json.h"
 #include "core/error.h"
@@ -85,7 +86,7 @@ CamResult run(const OptionSet& options, const CamOptions& cam, const Lens& lens,
   const InterruptWatch interrupt;
   const OutputFolder folder(out);
   const FolderLock lock(out, FolderLock::Kind::kExclusive);
-  folder.remove_partial_files();
+  folder.remove_partial_files(is_name_of_cut);
   ProgressDisplay progress(options.common().quiet);
   const RunControl control(interrupt.token(), progress.sink());
   return make_cut(lens, cam, out, executor, control);
@@ -149,7 +150,7 @@ int compare(const OptionSet& options, const CamSettings& settings, const CamOpti
   const InterruptWatch interrupt;
   const OutputFolder folder(settings.folder());
   const FolderLock lock(settings.folder(), FolderLock::Kind::kExclusive);
-  folder.remove_partial_files();
+  folder.remove_partial_files(is_name_of_cut);
   ProgressDisplay progress(options.common().quiet);
   const RunControl control(interrupt.token(), progress.sink());
   const CutComparison result = compare_cuts(lens, cam, choices, folder.path(), executor, control);

@@ -11,6 +11,7 @@
 #include <system_error>
 
 #include "core/error.h"
+#include "core/lens.h"
 #include "core/output_guard.h"
 #include "machine/gcode/program_seal.h"
 
@@ -90,7 +91,7 @@ bool names_job(const std::string& stem, const fs::path& path) {
 bool is_program(const fs::path& path) {
   std::error_code error;
   const std::string name = path.filename().string();
-  if (!fs::is_regular_file(path, error) || is_partial_name(name)) return false;
+  if (!fs::is_regular_file(path, error) || !name_of_partial(name).empty()) return false;
   return kProgramExtensions.contains(lower(path.extension().string())) ||
          (names_operations(without_number(path.stem().string())) && seal_of(path).has_value());
 }
@@ -108,6 +109,14 @@ bool is_own_program(const fs::path& path) {
   const std::string stem = without_number(path.stem().string());
   if (!names_operations(stem) && !names_job(stem, path)) return false;
   return seal_of(path) == true;
+}
+
+bool is_name_of_cut(const std::string& name) {
+  const fs::path path(name);
+  return kProgramExtensions.contains(lower(path.extension().string())) ||
+         names_operations(without_number(path.stem().string())) ||
+         std::find(lens_file::kCutFiles.begin(), lens_file::kCutFiles.end(), name) !=
+             lens_file::kCutFiles.end();
 }
 
 OtherPrograms other_programs(const fs::path& folder, std::span<const fs::path> written) {

@@ -15,6 +15,9 @@ namespace lensforge {
 /// since (check_seal()).
 bool is_own_program(const std::filesystem::path& path);
 
+/// Whether a file of this name may be one of a cut: a program, a report, a predicted picture.
+bool is_name_of_cut(const std::string& name);
+
 /// Programs in a folder that a new cut did not write.
 struct OtherPrograms {
   std::vector<std::filesystem::path> earlier;  ///< is_own_program()

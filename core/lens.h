@@ -46,8 +46,8 @@ inline constexpr const char* kStaging = "lens";
 
 /// The folder inside that `cam` writes into, and what is in it beside the programs.
 inline constexpr const char* kCut = "cam";
-inline constexpr std::array kCutFiles = {"report.html", "report.json", "milled.ply", "milled.png",
-                                         "leakage.png"};
+inline constexpr std::array kCutFiles = {"report.html", "report.json", "compare.html",
+                                         "milled.ply",  "milled.png",  "leakage.png"};
 }  // namespace lens_file
 
 /// Writes every file of the lens folder but convergence.csv; each is written beside and renamed,
