@@ -13,6 +13,7 @@
 #include "core/error.h"
 #include "core/error_image.h"
 #include "core/files.h"
+#include "core/height_field_check.h"
 #include "core/image_io.h"
 #include "core/json_fields.h"
 #include "core/json_text.h"
@@ -80,8 +81,10 @@ ordered_json to_json(const Lens& lens) {
 class StagingFolder {
  public:
   explicit StagingFolder(const fs::path& parent)
-      : path_(parent / ("." + std::string(lens_file::kStaging) + ".partial-" +
-                        std::to_string(std::random_device{}()))) {
+      : path_(parent / std::string(".")
+                           .append(lens_file::kStaging)
+                           .append(".partial-")
+                           .append(std::to_string(std::random_device{}()))) {
     std::error_code error;
     fs::create_directories(path_, error);
     if (error) throw RunError(parent.string() + ": cannot be written: " + error.message());
@@ -226,6 +229,9 @@ SurfaceMesh read_surface(const JsonFields& fields, const OpticalSetup& setup,
     throw InputError((folder / name).string() + ": " + *fault);
   }
   mesh.grid = read_grid(fields, mesh);
+  // A grid was checked cell by cell, which is faster.
+  const auto fault = mesh.grid.is_grid() ? std::nullopt : height_field_fault(mesh, setup.lens_size);
+  if (fault) throw InputError((folder / name).string() + ": " + *fault);
   return mesh;
 }
 
