@@ -304,10 +304,10 @@ int run(const OptionSet& options, DesignArguments& arguments) {
     return report_finished(arguments, console);
   }
   const ChosenDevice device = options.device_executor();
-  const WorkEstimate expected =
-      required_room(arguments, loaded.image, device.executor.concurrency());
   const OutputFolder folder(arguments.out);
   const FolderLock lock(folder.path(), FolderLock::Kind::kExclusive);
+  const WorkEstimate expected =
+      required_room(arguments, loaded.image, device.executor.concurrency());
   design.checkpoint = folder.path() / lens_file::kCheckpoint;
   design.resume = arguments.resume && earlier.checkpoint;
   const auto begin = [&] {
