@@ -69,9 +69,8 @@ SolidContent write_iges(const SplineNet& net, const StepHeader& header, const fs
                         const RunControl& control) {
   SolidContent content;
   write_whole_file(path, [&](const fs::path& beside) {
-    content = write_guarded(path, control, [&](const RunControl&) {
-      return write_beside(net, header, beside, path);
-    });
+    content = write_guarded(
+        path, control, [&](const RunControl&) { return write_beside(net, header, beside, path); });
     require_read_back(content, net.volume(), path);
   });
   return content;
@@ -79,8 +78,7 @@ SolidContent write_iges(const SplineNet& net, const StepHeader& header, const fs
 
 SolidContent inspect_iges(const fs::path& path, const RunControl& control) {
   return content_of(read_guarded(
-      path,
-      [&](const RunControl& c) { return bytes_of(inspect_shape(read_iges_shape(path, c))); },
+      path, [&](const RunControl& c) { return bytes_of(inspect_shape(read_iges_shape(path, c))); },
       control));
 }
 

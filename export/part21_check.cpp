@@ -3,7 +3,10 @@
 
 #include <algorithm>
 #include <cctype>
+#include <charconv>
+#include <cmath>
 #include <optional>
+#include <system_error>
 #include <vector>
 
 #include "core/error.h"
@@ -16,8 +19,17 @@ constexpr std::int64_t kMostNumber = 2'147'483'647;
 
 bool is_space(char c) { return std::isspace(static_cast<unsigned char>(c)) != 0; }
 bool is_digit(char c) { return std::isdigit(static_cast<unsigned char>(c)) != 0; }
+/// Of a keyword, a number or an enumeration (.T.).
 bool is_word(char c) {
-  return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_' || c == '-';
+  return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_' || c == '-' || c == '+' ||
+         c == '.';
+}
+
+bool is_number(std::string_view word) {
+  if (word.starts_with('+')) word.remove_prefix(1);
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+  return error == std::errc() && end == word.data() + word.size() && std::isfinite(value);
 }
 
 /// An entity's number and the line where it stands.
@@ -33,8 +45,7 @@ struct Place {
 /// Goes through a file once.
 class Part21Scanner {
  public:
-  Part21Scanner(std::string_view content, const std::string& name)
-      : rest_(content), name_(name) {}
+  Part21Scanner(std::string_view content, const std::string& name) : rest_(content), name_(name) {}
 
   std::int64_t check() {
     constexpr std::string_view kBegin = "ISO-10303-21";
@@ -88,18 +99,24 @@ class Part21Scanner {
     const std::size_t found = rest_.find(end, end.size());
     if (found == std::string_view::npos) refuse_at(first, std::string(what) + " has no end");
     for (std::size_t i = 0; i < found + end.size(); ++i) take();
-    at_start_ = false;
+    if (end != "*/") at_start_ = false;
   }
 
   void take_number() {
     take();
     Place place{0, line_};
-    if (rest_.empty() || !is_digit(rest_.front())) return;  // A name, as edition 3 has it.
+    if (rest_.empty() || !is_digit(rest_.front())) return take_name();
     while (!rest_.empty() && is_digit(rest_.front())) {
       place.number = 10 * place.number + (take() - '0');
       if (place.number > kMostNumber) refuse_at(line_, "an entity's number is above 2147483647");
     }
     (at_start_ ? defined_ : used_).push_back(place);
+    at_start_ = false;
+  }
+
+  /// #NAME and @NAME stand for values in edition 3.
+  void take_name() {
+    while (!rest_.empty() && is_word(rest_.front())) take();
     at_start_ = false;
   }
 
@@ -109,11 +126,24 @@ class Part21Scanner {
     rest_.remove_prefix(word.size());
     if (at_start_ && word == "DATA") in_data_ = has_data_ = true;
     if (at_start_ && word == "ENDSEC") in_data_ = false;
+    if (!at_start_ && in_data_) require_value(word);
     at_start_ = false;
+  }
+
+  /// A number, an enumeration, or a keyword with its parameters.
+  void require_value(std::string_view word) const {
+    const bool letter = std::isalpha(static_cast<unsigned char>(word.front())) != 0;
+    const auto next = std::find_if_not(rest_.begin(), rest_.end(), is_space);
+    const bool opens = next != rest_.end() && *next == '(';
+    const bool listed = word.size() > 2 && word.front() == '.' && word.back() == '.';
+    if (letter ? opens || last_ == '&' : listed || is_number(word)) return;
+    refuse_at(line_, std::string(word) + " is no value");
   }
 
   void take_sign() {
     const char c = take();
+    last_ = c;
+    if (c == '@') return take_name();
     if (c == '(') ++depth_;
     if (c == ')') --depth_;
     if (depth_ < 0 || (c == ';' && depth_ > 0)) refuse_at(line_, "parentheses do not match");
@@ -133,9 +163,8 @@ class Part21Scanner {
   void require_defined() const {
     std::optional<Place> first;
     for (const Place& place : used_) {
-      if (std::binary_search(
-              defined_.begin(), defined_.end(), place,
-              [](const Place& a, const Place& b) { return a.number < b.number; })) {
+      if (std::binary_search(defined_.begin(), defined_.end(), place,
+                             [](const Place& a, const Place& b) { return a.number < b.number; })) {
         continue;
       }
       first = place;
@@ -149,6 +178,7 @@ class Part21Scanner {
   const std::string& name_;
   std::int64_t line_ = 1;
   int depth_ = 0;
+  char last_ = ' ';       ///< Sign.
   bool at_start_ = true;  ///< Of a statement.
   bool has_data_ = false;
   bool in_data_ = false;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "export/solid_check.h"
 
-#include <BRepCheck_Analyzer.hxx>
 #include <BRepBndLib.hxx>
+#include <BRepCheck_Analyzer.hxx>
 #include <BRepGProp.hxx>
 #include <BRep_Tool.hxx>
 #include <Bnd_Box.hxx>
@@ -91,9 +91,7 @@ std::string bytes_of(const SolidContent& content) {
   return bytes.take();
 }
 
-SolidContent content_of(const std::string& bytes) {
-  return ByteReader(bytes).get<SolidContent>();
-}
+SolidContent content_of(const std::string& bytes) { return ByteReader(bytes).get<SolidContent>(); }
 
 SolidContent write_guarded(const std::filesystem::path& path, const RunControl& control,
                            const std::function<SolidContent(const RunControl&)>& write) {

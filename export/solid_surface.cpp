@@ -372,7 +372,10 @@ SolidSurface read_solid_surface(const fs::path& path, double points, const Execu
   check_part21(read_whole_file(path, kMostSolidBytes), path.string());
   const int threads = executor.concurrency();
   const std::string result = read_guarded(
-      path, [&](const RunControl& c) { return surface_bytes({path, points, threads, c}); },
+      path,
+      [&](const RunControl& c) {
+        return surface_bytes({path, points, threads, c});
+      },
       control);
   ByteReader bytes(result);
   SolidSurface surface;

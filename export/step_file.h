@@ -26,9 +26,9 @@ struct StepHeader {
 struct SolidContent {
   int solids = 0;
   int faces = 0;
-  bool valid = false;   ///< BRepCheck_Analyzer finds nothing.
-  bool closed = false;  ///< Every edge has a face on both sides.
-  double volume = 0.0;  ///< mm³
+  bool valid = false;           ///< BRepCheck_Analyzer finds nothing.
+  bool closed = false;          ///< Every edge has a face on both sides.
+  double volume = 0.0;          ///< mm³
   std::array<double, 3> low{};  ///< Corners of the box around it, mm
   std::array<double, 3> high{};
 
