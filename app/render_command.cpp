@@ -7,13 +7,16 @@
 #include "app/commands.h"
 #include "app/console.h"
 #include "app/exit_code.h"
+#include "app/interruptible_job.h"
 #include "app/json_output.h"
+#include "app/lens_note.h"
 #include "app/option_set.h"
 #include "app/render_setup.h"
 #include "core/error.h"
 #include "core/image_io.h"
 #include "core/lens.h"
 #include "core/mesh_io.h"
+#include "core/output_guard.h"
 #include "design/render_lens.h"
 #include "export/solid_surface.h"
 
@@ -26,6 +29,7 @@ struct RenderArguments {
   std::string source;
   std::string out;
   std::string target;
+  bool force = false;
   int pixels = 256;
   double image_width = 100.0;
   SurfaceModel model = SurfaceModel::kFacet;
@@ -46,6 +50,7 @@ void add_render_options(OptionSet& options, RenderArguments& arguments) {
                      "lens folder; mesh: .ply, .obj, .stl, .off; "
                      "solid: .step, .stp");
   options.text("--out", arguments.out, "FILE", "write the picture to this .png or .exr");
+  options.flag("--force", arguments.force, "replace a file that lensforge did not write");
   options.text("--target", arguments.target, "PICTURE", "compare with this; a lens has its own");
   options.choice("--model", arguments.model,
                  {{"facet", SurfaceModel::kFacet}, {"smooth", SurfaceModel::kSmooth}},
@@ -73,19 +78,23 @@ bool is_step(const std::string& source) {
 /// Points at which a solid is sampled, as export does for the picture that it prints.
 constexpr double kSolidPoints = 4e6;
 
-Scene load_solid(const std::string& source, const Executor& executor, const Console& console) {
-  SolidSurface solid = read_solid_surface(source, kSolidPoints, executor);
-  console.note(std::to_string(solid.faces) + (solid.faces == 1 ? " face" : " faces") +
-               (solid.by_name ? " named \"optical surface\"" : " told by shape: look up"));
+Scene load_solid(const std::string& source, const Executor& executor, const RunControl& control,
+                 const Console& console) {
+  SolidSurface solid = read_solid_surface(source, kSolidPoints, executor, control);
+  console.note(
+      std::to_string(solid.faces) + (solid.faces == 1 ? " face" : " faces") +
+      (solid.by_name ? " named \"optical surface\"" : " found by their shape: they look up"));
   SampledSurface& samples = solid.samples;
   const OpticalSetup setup = setup_for_mesh(samples.mesh, RenderArguments{}.pixels);
   return {std::move(samples.mesh), std::move(samples.normals), setup, SurfaceModel::kSmooth, {}};
 }
 
-Scene load(const std::string& source, const Executor& executor, const Console& console) {
-  if (is_step(source)) return load_solid(source, executor, console);
+Scene load(const std::string& source, const Executor& executor, const RunControl& control,
+           const Console& console) {
+  if (is_step(source)) return load_solid(source, executor, control, console);
   if (fs::is_directory(source)) {
     Lens lens = read_lens(source);
+    note_unfinished_design(lens, console);
     return {std::move(lens.surface), {}, lens.setup, lens.model, std::move(lens.target)};
   }
   SurfaceMesh mesh = read_mesh(source);
@@ -166,25 +175,35 @@ void require_picture_name(const std::string& out) {
   }
 }
 
+void write_picture(Rendering& rendering, const Scene& scene, const std::string& out,
+                   InterruptibleJob& job, const Console& console) {
+  const bool scale = !scene.target && fs::path(out).extension() == ".png";
+  const Image image = scale ? scaled_to_white(rendering.image, console) : rendering.image;
+  job.begin_writing();
+  write_image(image, out, job.control());
+  rendering.json["out"] = out;
+}
+
 }  // namespace
 
-int render_command(const Arguments& command_line) {
+int render_command(const Arguments& command_line) try {
   RenderArguments arguments;
   OptionSet options("render", "Renders a lens or any mesh and compares it with its target.");
   add_render_options(options, arguments);
   options.parse(command_line);
   require_picture_name(arguments.out);
+  if (!arguments.out.empty()) require_replaceable("--out", arguments.out, arguments.force);
   const Console console(options.common().json, options.common().quiet);
+  InterruptibleJob job(options.common(), arguments.out);
   const Scene scene =
-      adjusted(load(arguments.source, options.executor(), console), options, arguments);
-  const ChosenDevice device = options.device_executor();
+      adjusted(load(arguments.source, job.stoppable(options.executor()), job.control(), console),
+               options, arguments);
+  ChosenDevice device = options.device_executor();
+  device.executor = job.stoppable(device.executor);
+  job.control().report({"picture", 0.0, 0.0, ""});
   Rendering rendering =
       scene.target ? compare_models(scene, device.executor) : render_alone(scene, device.executor);
-  if (!arguments.out.empty()) {
-    const bool scale = !scene.target && fs::path(arguments.out).extension() == ".png";
-    write_image(scale ? scaled_to_white(rendering.image, console) : rendering.image, arguments.out);
-    rendering.json["out"] = arguments.out;
-  }
+  if (!arguments.out.empty()) write_picture(rendering, scene, arguments.out, job, console);
   rendering.json["command"] = "render";
   rendering.json["device"] = device.word;
   rendering.json["source"] = arguments.source;
@@ -192,6 +211,10 @@ int render_command(const Arguments& command_line) {
   rendering.json["pixels"] = {scene.setup.pixels.x(), scene.setup.pixels.y()};
   console.result(rendering.json, arguments.source + "\n" + rendering.text);
   return kDone;
+} catch (const Interrupted&) {
+  const bool json =
+      std::find(command_line.begin(), command_line.end(), "--json") != command_line.end();
+  return report_interrupted(json);
 }
 
 }  // namespace lensforge::app

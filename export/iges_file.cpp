@@ -44,6 +44,8 @@ void fill_header(const StepHeader& header, const fs::path& path, IGESControl_Wri
   section.SetDate(text(iges_date(header.time_stamp)));
   section.SetLastChangeDate(text(iges_date(header.time_stamp)));
   writer.Model()->SetGlobalSection(section);
+  // There it stands whole; lines of the global section break anywhere.
+  writer.Model()->AddStartLine(header.program.c_str());
 }
 
 /// What happens in the child process.

@@ -89,10 +89,12 @@ SolidContent write_step(const SplineNet& net, const StepHeader& header, StepSche
 }
 
 SolidContent inspect_step(const fs::path& path, const RunControl& control) {
-  check_part21(read_whole_file(path, kMostSolidBytes), path.string());
-  return content_of(read_guarded(
+  const std::int64_t entities = check_part21(read_whole_file(path, kMostSolidBytes), path.string());
+  SolidContent content = content_of(read_guarded(
       path, [&](const RunControl& c) { return bytes_of(inspect_shape(read_step_shape(path, c))); },
       control));
+  content.entities = entities;
+  return content;
 }
 
 }  // namespace lensforge

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "app/interruptible_job.h"
+
+#include <unistd.h>
+
+#include "app/console.h"
+#include "app/exit_code.h"
+
+namespace lensforge::app {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+std::unique_ptr<OutputFolder> folder_of(const fs::path& out) {
+  return out.empty() ? nullptr : std::make_unique<OutputFolder>(fs::absolute(out).parent_path());
+}
+
+}  // namespace
+
+InterruptibleJob::InterruptibleJob(const CommonOptions& common, const fs::path& out)
+    : json_(common.json),
+      folder_(folder_of(out)),
+      progress_(common.quiet),
+      watch_(SecondInterrupt::kExit, [this] { abandon(); }) {}
+
+void InterruptibleJob::begin_writing() {
+  const std::lock_guard lock(mutex_);
+  writing_ = true;
+}
+
+void InterruptibleJob::abandon() {
+  const std::lock_guard lock(mutex_);
+  if (writing_) return;
+  folder_.reset();
+  progress_.wipe();
+  _exit(report_interrupted(json_));
+}
+
+int report_interrupted(bool json) noexcept {
+  return report_error("interrupted; nothing was written", kInterrupted, json);
+}
+
+}  // namespace lensforge::app
