@@ -12,7 +12,6 @@
 
 #include "app/json_output.h"
 #include "core/error.h"
-#include "core/number_text.h"
 #include "core/version.h"
 #include "design/render_lens.h"
 #include "design/wanted_picture.h"
@@ -192,17 +191,6 @@ void require_author(const std::string& author) {
 }
 
 }  // namespace
-
-void announce_work(const std::function<WorkEstimate(double)>& work, const std::string& option,
-                   double value, const fs::path& out, const Console& console) {
-  const fs::path folder = fs::absolute(out).parent_path();
-  const WorkEstimate needed = work(value);
-  const std::int64_t fits = largest_with_room(work, value, folder);
-  require_room(needed, folder, option + " " + number_text(value, 8),
-               fits > 0 ? option + " " + std::to_string(fits) + " would fit"
-                        : std::string("make room for it"));
-  if (needed.seconds > kWorthTelling) console.note("this takes " + estimate_words(needed));
-}
 
 StepReport export_step(const Lens& lens, const fs::path& source, const fs::path& out,
                        const StepArguments& arguments, const Executor& executor,

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <filesystem>
-#include <functional>
 #include <nlohmann/json.hpp>
 #include <string>
 
@@ -10,7 +9,6 @@
 #include "app/interruptible_job.h"
 #include "app/option_set.h"
 #include "core/lens.h"
-#include "core/work_estimate.h"
 #include "export/spline_net.h"
 #include "export/step_file.h"
 
@@ -43,10 +41,5 @@ struct StepReport {
 StepReport export_step(const Lens& lens, const std::filesystem::path& source,
                        const std::filesystem::path& out, const StepArguments& arguments,
                        const Executor& executor, InterruptibleJob& job, const Console& console);
-
-/// Tells about how much a long job takes. @throw InputError if there is no room for it, naming the
-/// option and the value that would fit. @param work  by the value of that option.
-void announce_work(const std::function<WorkEstimate(double)>& work, const std::string& option,
-                   double value, const std::filesystem::path& out, const Console& console);
 
 }  // namespace lensforge::app

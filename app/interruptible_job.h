@@ -2,15 +2,19 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <mutex>
+#include <string>
 
+#include "app/console.h"
 #include "app/interrupt.h"
 #include "app/option_set.h"
 #include "app/output_folder.h"
 #include "app/progress_display.h"
 #include "core/executor.h"
 #include "core/run_control.h"
+#include "core/work_estimate.h"
 
 namespace lensforge::app {
 
@@ -44,5 +48,10 @@ class InterruptibleJob {
 
 /// What a command says that was interrupted before it wrote anything. Returns the exit code.
 int report_interrupted(bool json) noexcept;
+
+/// Tells about how much a long job takes. @throw InputError if there is no room for it, naming the
+/// option and the value that would fit. @param work  by the value of that option.
+void announce_work(const std::function<WorkEstimate(double)>& work, const std::string& option,
+                   double value, const std::filesystem::path& out, const Console& console);
 
 }  // namespace lensforge::app

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
 #include <cctype>
+#include <cmath>
 #include <filesystem>
 #include <optional>
 
@@ -18,6 +19,7 @@
 #include "core/mesh_io.h"
 #include "core/output_guard.h"
 #include "design/render_lens.h"
+#include "export/export_work.h"
 #include "export/solid_surface.h"
 
 namespace lensforge::app {
@@ -45,6 +47,9 @@ struct Scene {
   std::optional<Image> target;
 };
 
+/// Of walls and pictures on them, mm: beyond a kilometre nothing is projected any more.
+constexpr Limits kLengths{.low = 1e-3, .high = 1e6};
+
 void add_render_options(OptionSet& options, RenderArguments& arguments) {
   options.positional("SOURCE", arguments.source,
                      "lens folder; mesh: .ply, .obj, .stl, .off; "
@@ -57,14 +62,14 @@ void add_render_options(OptionSet& options, RenderArguments& arguments) {
                  "surface model of the picture; a lens has its own default, a solid is smooth");
   options.integer("--pixels", arguments.pixels, Limits::between(1, kMaxImageSide),
                   "longer side of the picture; a lens has its own default");
-  options.length("--focal", arguments.setup.focal_length, Limits::above(0),
+  options.length("--focal", arguments.setup.focal_length, kLengths,
                  "z of the wall; a lens has its own default");
-  options.number("--ior", arguments.setup.ior, Limits::above(1), "",
+  options.number("--ior", arguments.setup.ior, {.low = 1.0, .high = 10.0, .low_excluded = true}, "",
                  "refractive index; a lens has its own default");
   options.choice("--view", arguments.setup.view,
                  {{"front", ViewSide::kFront}, {"rear", ViewSide::kRear}},
                  "side from which the picture is seen; a lens has its own default");
-  options.length("--image-width", arguments.image_width, Limits::above(0),
+  options.length("--image-width", arguments.image_width, kLengths,
                  "width of the picture on the wall; a lens has its own default, a mesh its width");
 }
 
@@ -102,8 +107,16 @@ Scene load(const std::string& source, const Executor& executor, const RunControl
   return {std::move(mesh), {}, setup, RenderArguments{}.model, {}};
 }
 
+/// Tells what a large picture takes, or refuses it.
+void announce_picture(const OpticalSetup& setup, const std::string& out, const Console& console) {
+  const double shape = setup.pixels.cast<double>().prod() / std::pow(setup.pixels.maxCoeff(), 2);
+  announce_work([&](double side) { return rendering_work(shape * side * side); }, "--pixels",
+                setup.pixels.maxCoeff(), out.empty() ? "." : out, console);
+}
+
 /// The scene with everything that the options say instead.
-Scene adjusted(Scene scene, const OptionSet& options, const RenderArguments& arguments) {
+Scene adjusted(Scene scene, const OptionSet& options, const RenderArguments& arguments,
+               const Console& console) {
   OpticalSetup& setup = scene.setup;
   if (options.given("--model")) scene.model = arguments.model;
   if (options.given("--focal")) setup.focal_length = arguments.setup.focal_length;
@@ -111,6 +124,7 @@ Scene adjusted(Scene scene, const OptionSet& options, const RenderArguments& arg
   if (options.given("--view")) setup.view = arguments.setup.view;
   if (options.given("--image-width")) setup = with_image_width(setup, arguments.image_width);
   if (options.given("--pixels")) setup = with_longer_side(setup, arguments.pixels);
+  announce_picture(setup, arguments.out, console);
   if (options.given("--target")) scene.target = read_image(arguments.target).image;
   if (scene.target) scene.target = resample(*scene.target, setup.pixels.x(), setup.pixels.y());
   require_wall_above(scene.surface, setup);
@@ -197,7 +211,7 @@ int render_command(const Arguments& command_line) try {
   InterruptibleJob job(options.common(), arguments.out);
   const Scene scene =
       adjusted(load(arguments.source, job.stoppable(options.executor()), job.control(), console),
-               options, arguments);
+               options, arguments, console);
   ChosenDevice device = options.device_executor();
   device.executor = job.stoppable(device.executor);
   job.control().report({"picture", 0.0, 0.0, ""});

@@ -12,6 +12,9 @@ namespace lensforge {
 /// What a height map of so many pixels takes, as grey PNG or as EXR.
 WorkEstimate height_map_work(double pixels, bool grey);
 
+/// What a rendering of so many pixels takes, its comparison with a target and its file.
+WorkEstimate rendering_work(double pixels);
+
 /// What a solid of splines with so many control points takes.
 WorkEstimate spline_solid_work(double control_points);
 

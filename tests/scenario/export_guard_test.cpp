@@ -110,6 +110,14 @@ TEST_F(ExportGuard, LongOrStrangeAuthorsAreRefused) {
   expect_refusal(run_export(path("a.step"), {"--author", "a\nb"}), 2, {"--author"});
 }
 
+TEST_F(ExportGuard, AbsurdSetupsAreRefused) {
+  for (const char* option : {"--focal=1e308", "--focal=1e-300", "--ior=1e308", "--ior=inf",
+                             "--image-width=1e308", "--image-width=1e-300", "--pixels=1e9"}) {
+    expect_refusal(run({"render", path("lens"), "--quiet", option}), 2,
+                   {std::string(option).substr(0, 5)});
+  }
+}
+
 TEST_F(ExportGuard, InterruptEndsALargeHeightMapWithinASecond) {
   Process process({"export", path("lens"), "--out", path("large.png"), "--pixels", "16384"});
   EXPECT_TRUE(process.runs_for(std::chrono::milliseconds(1500)));
