@@ -41,7 +41,7 @@ TEST_F(ExportGuard, ForeignFilesAreOnlyReplacedWithForce) {
 }
 
 TEST_F(ExportGuard, WhatItWroteItselfIsReplaced) {
-  for (const char* name : {"a.stl", "a.obj", "a.3mf", "a.step", "a.igs"}) {
+  for (const char* name : {"a.stl", "a.obj", "a.3mf", "a.step", "a.igs", "a.png", "a.exr"}) {
     const int first = run_export(path(name)).exit_code;
     EXPECT_TRUE(first == 0 || first == 3) << name;
     EXPECT_EQ(run_export(path(name)).exit_code, first) << name;

@@ -134,6 +134,7 @@ TEST_F(Export, EveryFormatTakesTheMilledSurface) {
       arguments.insert(arguments.end(), {"--max-points", "1000"});
     }
     const nlohmann::json designed = run(arguments).json();
+    fs::remove(at(name));
     arguments.insert(arguments.end(), {"--surface", "milled"});
     const nlohmann::json milled = run(arguments).json();
     if (name == "a.png") {
