@@ -104,6 +104,17 @@ TEST_F(ExportGuard, BrokenStepIsRefusedInOneLine) {
   }
 }
 
+TEST_F(ExportGuard, PipesAndFoldersAreNoSolids) {
+  ASSERT_EQ(::mkfifo(path("pipe.step").c_str(), 0600), 0);
+  fs::create_directory(at("folder.step"));
+  fs::create_symlink("/dev/zero", at("zero.igs"));
+  for (const std::string command : {"render", "info"}) {
+    expect_refusal(run({command, path("pipe.step"), "--quiet"}), 2, {"pipe.step"});
+    expect_refusal(run({command, path("folder.step"), "--quiet"}), 2, {"folder.step"});
+  }
+  expect_refusal(run({"info", path("zero.igs"), "--quiet"}), 2, {"zero.igs"});
+}
+
 TEST_F(ExportGuard, LongOrStrangeAuthorsAreRefused) {
   expect_refusal(run_export(path("a.step"), {"--author", std::string(100'000, 'a')}), 2,
                  {"--author", "200"});
