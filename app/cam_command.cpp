@@ -12,6 +12,7 @@
 #include "app/exit_code.h"
 #include "app/interrupt.h"
 #include "app/json_output.h"
+#include "app/lens_note.h"
 #include "app/option_set.h"
 #include "app/output_folder.h"
 #include "app/progress_display.h"
@@ -195,6 +196,7 @@ int cam_command(const Arguments& command_line) {
     return kDone;
   }
   validate(cam, lens.setup);
+  note_unfinished_design(lens, console);
   if (!settings.compare.empty()) return compare(options, settings, cam, lens);
   const CamResult result = run(options, cam, lens, settings.folder());
   for (const std::string& warning : result.report.warnings) console.note("warning: " + warning);

@@ -7,16 +7,19 @@
 #include "app/console.h"
 #include "app/exit_code.h"
 #include "app/export_step.h"
+#include "app/interruptible_job.h"
 #include "app/json_output.h"
+#include "app/lens_note.h"
 #include "app/option_set.h"
-#include "app/output_folder.h"
 #include "core/error.h"
 #include "core/image_io.h"
 #include "core/lens.h"
 #include "core/mesh_io.h"
+#include "core/output_guard.h"
 #include "core/version.h"
 #include "design/render_lens.h"
 #include "export/closed_solid.h"
+#include "export/export_work.h"
 #include "export/height_map.h"
 #include "export/mesh_formats.h"
 
@@ -31,6 +34,7 @@ enum class SurfaceChoice { kDesigned, kMilled };
 struct ExportArguments {
   std::string source;
   std::string out;
+  bool force = false;
   Format format = Format::kByExtension;
   SurfaceChoice surface = SurfaceChoice::kDesigned;
   int pixels = 1024;
@@ -46,6 +50,7 @@ void add_export_options(OptionSet& options, ExportArguments& arguments) {
   options.required_text("--out", arguments.out, "FILE", "where to write; its folder is made");
   OptionSet::Choices<Format> formats{{"extension", Format::kByExtension}};
   formats.insert(formats.end(), kFormats.begin(), kFormats.end());
+  options.flag("--force", arguments.force, "replace a file that lensforge did not write");
   options.choice(
       "--format", arguments.format, formats,
       "solid as step or iges; closed mesh as stl (binary), obj, ply or 3mf; height map as exr "
@@ -122,9 +127,12 @@ Source load(const ExportArguments& arguments) {
 /// What a command says at the end.
 using Report = StepReport;
 
-void write_solid(const Source& source, Format format, const std::string& out, Report& report) {
+void write_solid(const Source& source, Format format, const std::string& out, InterruptibleJob& job,
+                 Report& report) {
+  job.control().report({"closed mesh", 0.0, 0.0, ""});
   const SurfaceMesh solid = closed_solid(source.lens.surface, source.name);
   const std::string title = program_mark() + " lens, millimetres";
+  job.begin_writing();
   if (format == Format::kStl) write_stl(solid, title, out);
   if (format == Format::kObj) write_obj(solid, title, out);
   if (format == Format::kPly) write_ply(solid, out);
@@ -137,23 +145,34 @@ void write_solid(const Source& source, Format format, const std::string& out, Re
 }
 
 void write_height_map(const Source& source, const ExportArguments& arguments, Format format,
-                      const Executor& executor, Report& report) {
+                      const Executor& executor, InterruptibleJob& job, Report& report) {
   const SmoothSurface surface(source.lens.surface);
-  const Image heights = height_map(surface, arguments.pixels, executor);
+  const Image heights = height_map(surface, arguments.pixels, executor, job.control());
   const double pixel = surface.box().sizes().x() / heights.columns();
   report.json["pixels"] = {heights.columns(), heights.rows()};
   report.json["pixel_mm"] = pixel;
   report.text = "  heights   " + size_text(heights.columns(), heights.rows()) + " pixels of " +
                 fixed(pixel, 6) + " mm\n";
+  job.begin_writing();
   if (format == Format::kExr) {
-    write_image(heights, fs::path(arguments.out));
+    write_image(heights, fs::path(arguments.out), job.control());
     return;
   }
-  const GreyScale scale = write_grey_relief(heights, arguments.out);
+  const GreyScale scale = write_grey_relief(heights, arguments.out, executor, job.control());
   report.json["black_mm"] = scale.black;
   report.json["white_mm"] = scale.white;
   report.text += "  grey      black is z = " + fixed(scale.black, 6) +
                  " mm, white is z = " + fixed(scale.white, 6) + " mm\n";
+}
+
+/// Tells what a large height map takes, or refuses it.
+void announce_height_map(const Lens& lens, const ExportArguments& arguments, Format format,
+                         const Console& console) {
+  const auto work = [&](double side) {
+    const GridShape shape = height_map_shape(lens.setup.lens_size, static_cast<int>(side));
+    return height_map_work(double{1} * shape.columns * shape.rows, format == Format::kPng);
+  };
+  announce_work(work, "--pixels", arguments.pixels, arguments.out, console);
 }
 
 /// The picture of the surface as facets and as the smooth part that is made of them.
@@ -168,18 +187,18 @@ void compare_pictures(const Lens& lens, const Executor& executor, Report& report
 }
 
 Report write(const Source& source, const ExportArguments& arguments, Format format,
-             const OptionSet& options) {
+             const Executor& executor, InterruptibleJob& job, const Console& console) {
   if (is_spline_solid(format)) {
     StepArguments step = arguments.step;
     step.iges = format == Format::kIges;
-    return export_step(source.lens, source.name, arguments.out, step, options);
+    return export_step(source.lens, source.name, arguments.out, step, executor, job, console);
   }
   Report report;
   report.within_tolerance = true;
   if (is_height_map(format)) {
-    write_height_map(source, arguments, format, options.executor(), report);
+    write_height_map(source, arguments, format, executor, job, report);
   } else {
-    write_solid(source, format, arguments.out, report);
+    write_solid(source, format, arguments.out, job, report);
   }
   return report;
 }
@@ -194,23 +213,29 @@ int export_command(const Arguments& command_line) try {
   const Format format = chosen_format(arguments);
   require_fitting_options(options, format);
   require_file_target(arguments.out);
+  require_replaceable("--out", arguments.out, arguments.force);
   const Console console(options.common().json, options.common().quiet);
   const Source source = load(arguments);
-  const OutputFolder folder(fs::absolute(arguments.out).parent_path());
-  Report report = write(source, arguments, format, options);
-  compare_pictures(source.lens, options.executor(), report);
+  note_unfinished_design(source.lens, console);
+  InterruptibleJob job(options.common(), arguments.out);
+  const Executor executor = job.stoppable(options.executor());
+  if (is_height_map(format)) announce_height_map(source.lens, arguments, format, console);
+  Report pictures;
+  compare_pictures(source.lens, executor, pictures);
+  Report report = write(source, arguments, format, executor, job, console);
+  report.json["metrics"].update(pictures.json["metrics"]);
   report.json["command"] = "export";
   report.json["out"] = arguments.out;
   report.json["format"] = word_of(format);
   report.json["bytes"] = fs::file_size(arguments.out);
-  console.result(report.json, arguments.out + "\n" + report.text);
+  console.result(report.json, arguments.out + "\n" + report.text + pictures.text);
   if (report.within_tolerance) return kDone;
   console.note("warning: the tolerances do not hold everywhere; --max-points gives more room");
   return kLimitMissed;
 } catch (const Interrupted&) {
   const bool json =
       std::find(command_line.begin(), command_line.end(), "--json") != command_line.end();
-  return report_error("interrupted; nothing was written", kInterrupted, json);
+  return report_interrupted(json);
 }
 
 }  // namespace lensforge::app

@@ -5,18 +5,18 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
 #include <cstdio>
 #include <ctime>
 
-#include "app/interrupt.h"
 #include "app/json_output.h"
-#include "app/progress_display.h"
 #include "core/error.h"
 #include "core/version.h"
 #include "design/render_lens.h"
 #include "design/wanted_picture.h"
 #include "export/closed_solid.h"
+#include "export/export_work.h"
 #include "export/iges_file.h"
 #include "export/normal_bound.h"
 #include "machine/stream/job_identity.h"
@@ -175,28 +175,52 @@ void require_no_step_options(const OptionSet& options, const std::string& format
   }
 }
 
+namespace {
+
+/// It stands in one field of the file's header.
+void require_author(const std::string& author) {
+  constexpr std::size_t kMostBytes = 200;
+  if (author.size() > kMostBytes) {
+    throw InputError("--author: has " + std::to_string(author.size()) + " bytes; at most " +
+                     std::to_string(kMostBytes) + " are possible");
+  }
+  const auto is_control = [](char c) { return std::iscntrl(static_cast<unsigned char>(c)) != 0; };
+  if (std::any_of(author.begin(), author.end(), is_control)) {
+    throw InputError("--author: holds a control character; only printable ones are possible");
+  }
+}
+
+}  // namespace
+
 StepReport export_step(const Lens& lens, const fs::path& source, const fs::path& out,
-                       const StepArguments& arguments, const OptionSet& options) {
+                       const StepArguments& arguments, const Executor& executor,
+                       InterruptibleJob& job, const Console& console) {
   const std::string name = source.string();
+  require_author(arguments.author);
   require_rectangle(lens.surface, height_field_outline(lens.surface, name), name);
-  const InterruptWatch interrupt;
-  ProgressDisplay progress(options.common().quiet);
-  const RunControl control(interrupt.token(), progress.sink());
   FitOptions fit = arguments.fit;
   fit.max_control_points = arguments.max_points;
-  const Executor executor = options.executor();
+  const SmoothSurface surface(lens.surface);
+  announce_work(&spline_solid_work, "--max-points",
+                static_cast<double>(most_control_points(surface, fit)), out, console);
+  job.control().report({"spline knots", 0.0, 0.0, ""});
   const WantedPicture wanted(lens.surface, lens.setup, lens.target, executor);
   fit.picture = goal_of(wanted);
-  const SmoothSurface surface(lens.surface);
-  const SplineNet net = fit_spline_net(surface, fit, executor, control);
+  const SplineNet net = fit_spline_net(surface, fit, executor, job.control());
+  StepReport rest;
+  describe_fit(net, fit, rest);
+  describe_bound(surface, fit, rest);
+  describe_picture(net, lens, executor, rest);
   const StepHeader header = header_of(source, arguments.author);
-  const SolidContent content = arguments.iges ? write_iges(net, header, out)
-                                              : write_step(net, header, arguments.schema, out);
+  job.begin_writing();
+  const SolidContent content = arguments.iges
+                                   ? write_iges(net, header, out, job.control())
+                                   : write_step(net, header, arguments.schema, out, job.control());
   StepReport report;
   describe_solid(content, lens, name, report);
-  describe_fit(net, fit, report);
-  describe_bound(surface, fit, report);
-  describe_picture(net, lens, executor, report);
+  report.json.update(rest.json);
+  report.text += rest.text;
+  report.within_tolerance = rest.within_tolerance;
   return report;
 }
 

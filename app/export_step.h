@@ -5,6 +5,8 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "app/console.h"
+#include "app/interruptible_job.h"
 #include "app/option_set.h"
 #include "core/lens.h"
 #include "export/spline_net.h"
@@ -34,9 +36,10 @@ struct StepReport {
 };
 
 /// Fits and writes `lens.surface`. @param source  the file that it was read from.
-/// @throw InputError if its outline is no rectangle; RunError; Interrupted.
+/// @throw InputError if its outline is no rectangle, or the memory or the disk has no room for so
+///        many control points; RunError; Interrupted.
 StepReport export_step(const Lens& lens, const std::filesystem::path& source,
                        const std::filesystem::path& out, const StepArguments& arguments,
-                       const OptionSet& options);
+                       const Executor& executor, InterruptibleJob& job, const Console& console);
 
 }  // namespace lensforge::app

@@ -6,12 +6,16 @@
 #include "app/console.h"
 #include "app/exit_code.h"
 #include "app/gcode_summary.h"
+#include "app/interruptible_job.h"
 #include "app/json_output.h"
 #include "app/option_set.h"
+#include "core/error.h"
 #include "core/image_io.h"
 #include "core/lens.h"
 #include "core/mesh_io.h"
 #include "core/printable.h"
+#include "export/iges_file.h"
+#include "export/step_file.h"
 #include "machine/gcode/program_seal.h"
 
 namespace lensforge::app {
@@ -110,6 +114,26 @@ Description describe_gcode(const fs::path& path) {
   return d;
 }
 
+/// A solid as STEP or IGES.
+Description describe_solid(const fs::path& path, bool iges, const CommonOptions& common) {
+  InterruptibleJob job(common);
+  const SolidContent content =
+      iges ? inspect_iges(path, job.control()) : inspect_step(path, job.control());
+  Description d{{{"kind", "solid"}}, {}};
+  d.line("solids", std::to_string(content.solids) + " with " + std::to_string(content.faces) +
+                       " faces, " + (content.valid ? "valid" : "not valid") + ", " +
+                       (content.closed ? "closed" : "not closed"));
+  if (content.entities > 0) d.line("entities", std::to_string(content.entities));
+  d.line("volume", fixed(content.volume / 1000.0, 3) + " cm3");
+  d.json["solids"] = content.solids;
+  d.json["faces"] = content.faces;
+  d.json["valid"] = content.valid;
+  d.json["closed"] = content.closed;
+  d.json["volume_mm3"] = content.volume;
+  describe_extent(d, {Eigen::Vector3d(content.low.data()), Eigen::Vector3d(content.high.data())});
+  return d;
+}
+
 Description describe_picture(const fs::path& path) {
   const LoadedImage loaded = read_image(path);
   const auto values = loaded.image.values();
@@ -135,9 +159,11 @@ bool has_extension(const fs::path& path, std::initializer_list<const char*> exte
   return std::find(extensions.begin(), extensions.end(), own) != extensions.end();
 }
 
-Description describe(const fs::path& path) {
+Description describe(const fs::path& path, const CommonOptions& common) {
   if (fs::is_directory(path)) return describe_lens(path);
   if (has_extension(path, {".ngc", ".nc", ".gcode", ".tap"})) return describe_gcode(path);
+  const bool iges = has_extension(path, {".igs", ".iges"});
+  if (iges || has_extension(path, {".step", ".stp"})) return describe_solid(path, iges, common);
   if (!has_extension(path, {".ply", ".obj", ".stl", ".off"})) return describe_picture(path);
   Description d{{{"kind", "mesh"}}, {}};
   describe_mesh(d, read_mesh(path));
@@ -146,18 +172,22 @@ Description describe(const fs::path& path) {
 
 }  // namespace
 
-int info_command(const Arguments& command_line) {
+int info_command(const Arguments& command_line) try {
   std::string source;
-  OptionSet options("info", "Says what a lens folder, mesh, picture or G-code program is.");
-  options.positional("SOURCE", source, "lens folder, mesh, picture or G-code program");
+  OptionSet options("info", "Says what a lens folder, solid, mesh, picture or G-code program is.");
+  options.positional("SOURCE", source, "lens folder, solid, mesh, picture or G-code program");
   options.parse(command_line);
-  Description d = describe(source);
+  Description d = describe(source, options.common());
   d.json["command"] = "info";
   d.json["source"] = source;
   const Console console(options.common().json, options.common().quiet);
   console.result(d.json,
                  printable_line(source) + ": " + d.json["kind"].get<std::string>() + "\n" + d.text);
   return kDone;
+} catch (const Interrupted&) {
+  const bool json =
+      std::find(command_line.begin(), command_line.end(), "--json") != command_line.end();
+  return report_interrupted(json);
 }
 
 }  // namespace lensforge::app

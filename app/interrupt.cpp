@@ -5,7 +5,10 @@
 #include <unistd.h>
 
 #include <array>
+#include <cerrno>
 #include <csignal>
+#include <ctime>
+#include <utility>
 
 #include "app/exit_code.h"
 #include "app/terminal_keys.h"
@@ -26,7 +29,8 @@ void wake_waiter(int /*signal*/) { sem_post(&wake); }
 
 }  // namespace
 
-InterruptWatch::InterruptWatch(SecondInterrupt second) : second_(second) {
+InterruptWatch::InterruptWatch(SecondInterrupt second, std::function<void()> overdue)
+    : second_(second), overdue_(std::move(overdue)) {
   sem_init(&wake, 0, 0);
   struct sigaction action {};
   action.sa_handler = wake_waiter;
@@ -49,9 +53,23 @@ InterruptWatch::~InterruptWatch() {
 
 void InterruptWatch::interrupt() { sem_post(&wake); }
 
+/// Whether a signal came, or the end; the patience with the first request is over otherwise.
+bool InterruptWatch::wait_for_one() {
+  if (!overdue_ || !stop_.stop_requested()) return sem_wait(&wake) == 0;
+  constexpr long kPatience = 700'000'000;  // Nanoseconds.
+  constexpr long kSecond = 1'000'000'000;
+  timespec until{};
+  clock_gettime(CLOCK_MONOTONIC, &until);
+  until.tv_sec += (until.tv_nsec + kPatience) / kSecond;
+  until.tv_nsec = (until.tv_nsec + kPatience) % kSecond;
+  if (sem_clockwait(&wake, CLOCK_MONOTONIC, &until) == 0) return true;
+  if (errno == ETIMEDOUT) std::exchange(overdue_, {})();
+  return false;
+}
+
 void InterruptWatch::wait_for_signals() {
   while (true) {
-    if (sem_wait(&wake) != 0) continue;
+    if (!wait_for_one()) continue;
     if (finished_) return;
     if (stop_.request_stop()) continue;
     if (second_ == SecondInterrupt::kRequest && second_stop_.request_stop()) continue;

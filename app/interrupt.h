@@ -2,6 +2,7 @@
 #pragma once
 
 #include <atomic>
+#include <functional>
 #include <stop_token>
 #include <thread>
 
@@ -18,7 +19,10 @@ enum class SecondInterrupt {
 /// ignored stay ignored. At most one at a time.
 class InterruptWatch {
  public:
-  explicit InterruptWatch(SecondInterrupt second = SecondInterrupt::kExit);
+  /// @param overdue  called by the watch's own thread if this object still lives some 0.7 s after
+  ///                 the first request; not where it is empty.
+  explicit InterruptWatch(SecondInterrupt second = SecondInterrupt::kExit,
+                          std::function<void()> overdue = {});
   ~InterruptWatch();
   InterruptWatch(const InterruptWatch&) = delete;
   InterruptWatch& operator=(const InterruptWatch&) = delete;
@@ -31,8 +35,10 @@ class InterruptWatch {
 
  private:
   void wait_for_signals();
+  bool wait_for_one();
 
   SecondInterrupt second_;
+  std::function<void()> overdue_;
   std::stop_source stop_;
   std::stop_source second_stop_;
   std::atomic<bool> finished_ = false;

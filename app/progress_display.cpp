@@ -45,10 +45,17 @@ std::string progress_line(const Progress& progress, double seconds, int bar_widt
 }
 
 ProgressDisplay::ProgressDisplay(bool quiet)
-    : quiet_(quiet), terminal_(isatty(STDERR_FILENO) != 0), shown_(start_) {}
+    : quiet_(quiet), terminal_(isatty(STDERR_FILENO) != 0), shown_(start_) {
+  if (quiet_) return;
+  redrawer_ = std::jthread([this](const std::stop_token& stop) { redraw_until(stop); });
+}
 
 ProgressDisplay::~ProgressDisplay() {
-  if (bar_drawn_) std::fputs("\r\033[K", stderr);
+  if (redrawer_.joinable()) {
+    redrawer_.request_stop();
+    redrawer_.join();
+  }
+  wipe();
 }
 
 std::function<void(const Progress&)> ProgressDisplay::sink() {
@@ -56,14 +63,34 @@ std::function<void(const Progress&)> ProgressDisplay::sink() {
   return [this](const Progress& progress) { show(progress); };
 }
 
+void ProgressDisplay::wipe() {
+  const std::lock_guard lock(mutex_);
+  if (bar_drawn_) std::fputs("\r\033[K", stderr);
+  bar_drawn_ = false;
+}
+
 void ProgressDisplay::show(const Progress& progress) {
   const std::lock_guard lock(mutex_);
+  last_ = progress;
+  draw();
+}
+
+void ProgressDisplay::redraw_until(const std::stop_token& stop) {
+  constexpr std::chrono::milliseconds kInterval{500};
+  std::unique_lock lock(mutex_);
+  while (!stop.stop_requested()) {
+    ended_.wait_for(lock, stop, kInterval, [] { return false; });
+    if (!last_.stage.empty() && !stop.stop_requested()) draw();
+  }
+}
+
+void ProgressDisplay::draw() {
   const Clock::time_point now = Clock::now();
   const Clock::duration wait = terminal_ ? Clock::duration(kBarInterval) : kLineInterval;
   if (now - shown_ < wait) return;
   shown_ = now;
   const double seconds = std::chrono::duration<double>(now - start_).count();
-  std::string line = progress_line(progress, seconds, terminal_ ? kBarWidth : 0);
+  std::string line = progress_line(last_, seconds, terminal_ ? kBarWidth : 0);
   if (terminal_) {
     line.resize(std::min(line.size(), terminal_width() - 1));
     std::fprintf(stderr, "\r%s\033[K", line.c_str());

@@ -1,20 +1,25 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
 #include <cctype>
+#include <cmath>
 #include <filesystem>
 #include <optional>
 
 #include "app/commands.h"
 #include "app/console.h"
 #include "app/exit_code.h"
+#include "app/interruptible_job.h"
 #include "app/json_output.h"
+#include "app/lens_note.h"
 #include "app/option_set.h"
 #include "app/render_setup.h"
 #include "core/error.h"
 #include "core/image_io.h"
 #include "core/lens.h"
 #include "core/mesh_io.h"
+#include "core/output_guard.h"
 #include "design/render_lens.h"
+#include "export/export_work.h"
 #include "export/solid_surface.h"
 
 namespace lensforge::app {
@@ -26,6 +31,7 @@ struct RenderArguments {
   std::string source;
   std::string out;
   std::string target;
+  bool force = false;
   int pixels = 256;
   double image_width = 100.0;
   SurfaceModel model = SurfaceModel::kFacet;
@@ -41,25 +47,29 @@ struct Scene {
   std::optional<Image> target;
 };
 
+/// Of walls and pictures on them, mm: beyond a kilometre nothing is projected any more.
+constexpr Limits kLengths{.low = 1e-3, .high = 1e6};
+
 void add_render_options(OptionSet& options, RenderArguments& arguments) {
   options.positional("SOURCE", arguments.source,
                      "lens folder; mesh: .ply, .obj, .stl, .off; "
                      "solid: .step, .stp");
   options.text("--out", arguments.out, "FILE", "write the picture to this .png or .exr");
+  options.flag("--force", arguments.force, "replace a file that lensforge did not write");
   options.text("--target", arguments.target, "PICTURE", "compare with this; a lens has its own");
   options.choice("--model", arguments.model,
                  {{"facet", SurfaceModel::kFacet}, {"smooth", SurfaceModel::kSmooth}},
                  "surface model of the picture; a lens has its own default, a solid is smooth");
   options.integer("--pixels", arguments.pixels, Limits::between(1, kMaxImageSide),
                   "longer side of the picture; a lens has its own default");
-  options.length("--focal", arguments.setup.focal_length, Limits::above(0),
+  options.length("--focal", arguments.setup.focal_length, kLengths,
                  "z of the wall; a lens has its own default");
-  options.number("--ior", arguments.setup.ior, Limits::above(1), "",
+  options.number("--ior", arguments.setup.ior, {.low = 1.0, .high = 10.0, .low_excluded = true}, "",
                  "refractive index; a lens has its own default");
   options.choice("--view", arguments.setup.view,
                  {{"front", ViewSide::kFront}, {"rear", ViewSide::kRear}},
                  "side from which the picture is seen; a lens has its own default");
-  options.length("--image-width", arguments.image_width, Limits::above(0),
+  options.length("--image-width", arguments.image_width, kLengths,
                  "width of the picture on the wall; a lens has its own default, a mesh its width");
 }
 
@@ -73,19 +83,23 @@ bool is_step(const std::string& source) {
 /// Points at which a solid is sampled, as export does for the picture that it prints.
 constexpr double kSolidPoints = 4e6;
 
-Scene load_solid(const std::string& source, const Executor& executor, const Console& console) {
-  SolidSurface solid = read_solid_surface(source, kSolidPoints, executor);
-  console.note(std::to_string(solid.faces) + (solid.faces == 1 ? " face" : " faces") +
-               (solid.by_name ? " named \"optical surface\"" : " told by shape: look up"));
+Scene load_solid(const std::string& source, const Executor& executor, const RunControl& control,
+                 const Console& console) {
+  SolidSurface solid = read_solid_surface(source, kSolidPoints, executor, control);
+  console.note(
+      std::to_string(solid.faces) + (solid.faces == 1 ? " face" : " faces") +
+      (solid.by_name ? " named \"optical surface\"" : " found by their shape: they look up"));
   SampledSurface& samples = solid.samples;
   const OpticalSetup setup = setup_for_mesh(samples.mesh, RenderArguments{}.pixels);
   return {std::move(samples.mesh), std::move(samples.normals), setup, SurfaceModel::kSmooth, {}};
 }
 
-Scene load(const std::string& source, const Executor& executor, const Console& console) {
-  if (is_step(source)) return load_solid(source, executor, console);
+Scene load(const std::string& source, const Executor& executor, const RunControl& control,
+           const Console& console) {
+  if (is_step(source)) return load_solid(source, executor, control, console);
   if (fs::is_directory(source)) {
     Lens lens = read_lens(source);
+    note_unfinished_design(lens, console);
     return {std::move(lens.surface), {}, lens.setup, lens.model, std::move(lens.target)};
   }
   SurfaceMesh mesh = read_mesh(source);
@@ -93,8 +107,16 @@ Scene load(const std::string& source, const Executor& executor, const Console& c
   return {std::move(mesh), {}, setup, RenderArguments{}.model, {}};
 }
 
+/// Tells what a large picture takes, or refuses it.
+void announce_picture(const OpticalSetup& setup, const std::string& out, const Console& console) {
+  const double shape = setup.pixels.cast<double>().prod() / std::pow(setup.pixels.maxCoeff(), 2);
+  announce_work([&](double side) { return rendering_work(shape * side * side); }, "--pixels",
+                setup.pixels.maxCoeff(), out.empty() ? "." : out, console);
+}
+
 /// The scene with everything that the options say instead.
-Scene adjusted(Scene scene, const OptionSet& options, const RenderArguments& arguments) {
+Scene adjusted(Scene scene, const OptionSet& options, const RenderArguments& arguments,
+               const Console& console) {
   OpticalSetup& setup = scene.setup;
   if (options.given("--model")) scene.model = arguments.model;
   if (options.given("--focal")) setup.focal_length = arguments.setup.focal_length;
@@ -102,6 +124,7 @@ Scene adjusted(Scene scene, const OptionSet& options, const RenderArguments& arg
   if (options.given("--view")) setup.view = arguments.setup.view;
   if (options.given("--image-width")) setup = with_image_width(setup, arguments.image_width);
   if (options.given("--pixels")) setup = with_longer_side(setup, arguments.pixels);
+  announce_picture(setup, arguments.out, console);
   if (options.given("--target")) scene.target = read_image(arguments.target).image;
   if (scene.target) scene.target = resample(*scene.target, setup.pixels.x(), setup.pixels.y());
   require_wall_above(scene.surface, setup);
@@ -166,25 +189,35 @@ void require_picture_name(const std::string& out) {
   }
 }
 
+void write_picture(Rendering& rendering, const Scene& scene, const std::string& out,
+                   InterruptibleJob& job, const Console& console) {
+  const bool scale = !scene.target && fs::path(out).extension() == ".png";
+  const Image image = scale ? scaled_to_white(rendering.image, console) : rendering.image;
+  job.begin_writing();
+  write_image(image, out, job.control());
+  rendering.json["out"] = out;
+}
+
 }  // namespace
 
-int render_command(const Arguments& command_line) {
+int render_command(const Arguments& command_line) try {
   RenderArguments arguments;
   OptionSet options("render", "Renders a lens or any mesh and compares it with its target.");
   add_render_options(options, arguments);
   options.parse(command_line);
   require_picture_name(arguments.out);
+  if (!arguments.out.empty()) require_replaceable("--out", arguments.out, arguments.force);
   const Console console(options.common().json, options.common().quiet);
+  InterruptibleJob job(options.common(), arguments.out);
   const Scene scene =
-      adjusted(load(arguments.source, options.executor(), console), options, arguments);
-  const ChosenDevice device = options.device_executor();
+      adjusted(load(arguments.source, job.stoppable(options.executor()), job.control(), console),
+               options, arguments, console);
+  ChosenDevice device = options.device_executor();
+  device.executor = job.stoppable(device.executor);
+  job.control().report({"picture", 0.0, 0.0, ""});
   Rendering rendering =
       scene.target ? compare_models(scene, device.executor) : render_alone(scene, device.executor);
-  if (!arguments.out.empty()) {
-    const bool scale = !scene.target && fs::path(arguments.out).extension() == ".png";
-    write_image(scale ? scaled_to_white(rendering.image, console) : rendering.image, arguments.out);
-    rendering.json["out"] = arguments.out;
-  }
+  if (!arguments.out.empty()) write_picture(rendering, scene, arguments.out, job, console);
   rendering.json["command"] = "render";
   rendering.json["device"] = device.word;
   rendering.json["source"] = arguments.source;
@@ -192,6 +225,10 @@ int render_command(const Arguments& command_line) {
   rendering.json["pixels"] = {scene.setup.pixels.x(), scene.setup.pixels.y()};
   console.result(rendering.json, arguments.source + "\n" + rendering.text);
   return kDone;
+} catch (const Interrupted&) {
+  const bool json =
+      std::find(command_line.begin(), command_line.end(), "--json") != command_line.end();
+  return report_interrupted(json);
 }
 
 }  // namespace lensforge::app

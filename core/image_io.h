@@ -35,8 +35,9 @@ Image resample(const Image& image, int columns, int rows, const RunControl& run 
 
 /// Writes 16-bit sRGB-encoded grey PNG (clipped to 0 … 1), or, for .exr, 32-bit float linear grey.
 /// The file appears whole or not at all.
-/// @throw RunError if it cannot be written; InputError for another extension.
-void write_image(const Image& image, const std::filesystem::path& path);
+/// @throw RunError if it cannot be written; InputError for another extension; Interrupted.
+void write_image(const Image& image, const std::filesystem::path& path,
+                 const RunControl& control = {});
 
 /// An 8-bit sRGB colour picture, row by row from the top, three bytes a pixel.
 struct ColorImage {

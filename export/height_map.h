@@ -5,14 +5,20 @@
 
 #include "core/executor.h"
 #include "core/image.h"
+#include "core/run_control.h"
 #include "core/smooth_surface.h"
 
 namespace lensforge {
 
+/// Columns and rows of a height map over a rectangle.
+GridShape height_map_shape(const Eigen::Vector2d& size, int longer_side);
+
 /// Heights in mm on a raster that covers the surface's rectangle, taken at the middles of the
 /// pixels, seen from +z with y upwards (row 0 is the farthest). 0 where there is no surface.
 /// @param longer_side  pixels on the longer side; the other one follows the rectangle.
-Image height_map(const SmoothSurface& surface, int longer_side, const Executor& executor);
+/// @throw Interrupted.
+Image height_map(const SmoothSurface& surface, int longer_side, const Executor& executor,
+                 const RunControl& control = {});
 
 /// Heights that stand for black and white in a grey picture.
 struct GreyScale {
@@ -22,7 +28,9 @@ struct GreyScale {
 
 /// Writes a height map as 16-bit grey PNG, linear between the lowest and the highest value, as
 /// laser and relief programs read it; whole or not at all.
-/// @throw RunError if it cannot be written.
-GreyScale write_grey_relief(const Image& heights, const std::filesystem::path& path);
+/// @throw RunError if it cannot be written; Interrupted.
+GreyScale write_grey_relief(const Image& heights, const std::filesystem::path& path,
+                            const Executor& executor = Executor::serial(),
+                            const RunControl& control = {});
 
 }  // namespace lensforge

@@ -2,7 +2,6 @@
 #include "export/iges_file.h"
 
 #include <IGESControl_Controller.hxx>
-#include <IGESControl_Reader.hxx>
 #include <IGESControl_Writer.hxx>
 #include <IGESData_GlobalSection.hxx>
 #include <IGESData_IGESModel.hxx>
@@ -11,9 +10,9 @@
 #include <cerrno>
 #include <string>
 
-#include "core/error.h"
 #include "core/files.h"
 #include "export/solid_check.h"
+#include "export/solid_reading.h"
 #include "export/spline_solid.h"
 
 namespace lensforge {
@@ -45,23 +44,13 @@ void fill_header(const StepHeader& header, const fs::path& path, IGESControl_Wri
   section.SetDate(text(iges_date(header.time_stamp)));
   section.SetLastChangeDate(text(iges_date(header.time_stamp)));
   writer.Model()->SetGlobalSection(section);
+  // There it stands whole; lines of the global section break anywhere.
+  writer.Model()->AddStartLine(header.program.c_str());
 }
 
-TopoDS_Shape read_iges_shape(const fs::path& path) {
-  silence_opencascade();
-  IGESControl_Controller::Init();
-  IGESControl_Reader reader;
-  if (reader.ReadFile(path.c_str()) != IFSelect_RetDone) {
-    throw InputError(path.string() + ": is missing or no IGES file");
-  }
-  reader.TransferRoots();
-  if (reader.NbShapes() == 0) throw InputError(path.string() + ": holds no shape");
-  return reader.OneShape();
-}
-
-}  // namespace
-
-SolidContent write_iges(const SplineNet& net, const StepHeader& header, const fs::path& path) {
+/// What happens in the child process.
+SolidContent write_beside(const SplineNet& net, const StepHeader& header, const fs::path& beside,
+                          const fs::path& path) {
   silence_opencascade();
   IGESControl_Controller::Init();
   constexpr int kSolids = 1;
@@ -71,16 +60,28 @@ SolidContent write_iges(const SplineNet& net, const StepHeader& header, const fs
   }
   writer.ComputeModel();
   fill_header(header, path, writer);
+  errno = 0;
+  if (!writer.Write(beside.c_str())) fail_to_write(path, last_system_error());
+  return inspect_shape(read_iges_shape(beside, {}), net.volume());
+}
+
+}  // namespace
+
+SolidContent write_iges(const SplineNet& net, const StepHeader& header, const fs::path& path,
+                        const RunControl& control) {
   SolidContent content;
   write_whole_file(path, [&](const fs::path& beside) {
-    errno = 0;
-    if (!writer.Write(beside.c_str())) fail_to_write(path, last_system_error());
-    content = inspect_shape(read_iges_shape(beside), net.volume());
+    content = write_guarded(
+        path, control, [&](const RunControl&) { return write_beside(net, header, beside, path); });
     require_read_back(content, net.volume(), path);
   });
   return content;
 }
 
-SolidContent inspect_iges(const fs::path& path) { return inspect_shape(read_iges_shape(path)); }
+SolidContent inspect_iges(const fs::path& path, const RunControl& control) {
+  return content_of(read_guarded(
+      path, [&](const RunControl& c) { return bytes_of(inspect_shape(read_iges_shape(path, c))); },
+      control));
+}
 
 }  // namespace lensforge

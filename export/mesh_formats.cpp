@@ -141,6 +141,13 @@ class ZipWriter {
     zip_file_set_dostime(zip_.get(), static_cast<zip_uint64_t>(index), 0, kFirstDay, 0);
   }
 
+  /// Text that stands uncompressed at the archive's end.
+  void comment(const std::string& text) {
+    if (zip_set_archive_comment(zip_.get(), text.data(), static_cast<zip_uint16_t>(text.size()))) {
+      fail();
+    }
+  }
+
   void close() {
     if (zip_close(zip_.get()) != 0) fail();
     static_cast<void>(zip_.release());
@@ -198,6 +205,7 @@ void write_3mf(const SurfaceMesh& mesh, const std::string& title, const fs::path
     zip.add("[Content_Types].xml", kContentTypes);
     zip.add("_rels/.rels", kRelations);
     zip.add("3D/3dmodel.model", model);
+    zip.comment(title);
     zip.close();
   });
 }

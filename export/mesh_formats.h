@@ -7,7 +7,8 @@
 #include "core/surface_mesh.h"
 
 /// Meshes in the formats that printers, CAM programs and viewers read; millimetres. Each file
-/// appears whole or not at all. PLY is core/mesh_io.h's.
+/// appears whole or not at all, and shows its title to one who looks at its bytes. PLY is
+/// core/mesh_io.h's.
 namespace lensforge {
 
 /// Binary STL; coordinates are rounded to 32-bit floats (4e-6 mm at 100 mm).
@@ -20,7 +21,8 @@ void write_stl(const SurfaceMesh& mesh, const std::string& title,
 void write_obj(const SurfaceMesh& mesh, const std::string& title,
                const std::filesystem::path& path);
 
-/// 3MF core specification 1.2: one object, unit millimetre, coordinates to 1e-9 mm.
+/// 3MF core specification 1.2: one object, unit millimetre, coordinates to 1e-9 mm; `title` of
+/// 65,535 bytes at most.
 /// @pre the mesh is closed. @throw RunError if it cannot be written.
 void write_3mf(const SurfaceMesh& mesh, const std::string& title,
                const std::filesystem::path& path);

@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "export/solid_check.h"
 
+#include <BRepBndLib.hxx>
 #include <BRepCheck_Analyzer.hxx>
 #include <BRepGProp.hxx>
 #include <BRep_Tool.hxx>
+#include <Bnd_Box.hxx>
 #include <GProp_GProps.hxx>
 #include <Message.hxx>
 #include <Message_Messenger.hxx>
 #include <Message_PrinterOStream.hxx>
-#include <STEPControl_Reader.hxx>
 #include <TopExp_Explorer.hxx>
 #include <array>
 #include <cerrno>
@@ -16,6 +17,9 @@
 #include <system_error>
 
 #include "core/error.h"
+#include "export/byte_record.h"
+#include "export/child_work.h"
+#include "export/solid_reading.h"
 
 namespace lensforge {
 namespace {
@@ -45,6 +49,16 @@ bool shells_are_closed(const TopoDS_Shape& shape) {
   return true;
 }
 
+/// Around the shape itself, not around its control points.
+void measure_extent(const TopoDS_Shape& shape, SolidContent& content) {
+  Bnd_Box box;
+  BRepBndLib::AddOptimal(shape, box, false, false);
+  if (box.IsVoid()) return;
+  auto& [x0, y0, z0] = content.low;
+  auto& [x1, y1, z1] = content.high;
+  box.Get(x0, y0, z0, x1, y1, z1);
+}
+
 }  // namespace
 
 void silence_opencascade() {
@@ -57,17 +71,6 @@ int count_shapes(const TopoDS_Shape& shape, TopAbs_ShapeEnum kind) {
   return number;
 }
 
-TopoDS_Shape read_step_shape(const std::filesystem::path& path) {
-  silence_opencascade();
-  STEPControl_Reader reader;
-  if (reader.ReadFile(path.c_str()) != IFSelect_RetDone) {
-    throw InputError(path.string() + ": is missing or no STEP file");
-  }
-  reader.TransferRoots();
-  if (reader.NbShapes() == 0) throw InputError(path.string() + ": holds no shape");
-  return reader.OneShape();
-}
-
 SolidContent inspect_shape(const TopoDS_Shape& shape, std::optional<double> expected) {
   SolidContent content;
   content.solids = count_shapes(shape, TopAbs_SOLID);
@@ -78,7 +81,29 @@ SolidContent inspect_shape(const TopoDS_Shape& shape, std::optional<double> expe
     content.volume = volume_of(shape, error);
     if (expected && is_same_volume(content.volume, *expected)) break;
   }
+  measure_extent(shape, content);
   return content;
+}
+
+std::string bytes_of(const SolidContent& content) {
+  ByteWriter bytes;
+  bytes.put(content);
+  return bytes.take();
+}
+
+SolidContent content_of(const std::string& bytes) { return ByteReader(bytes).get<SolidContent>(); }
+
+SolidContent write_guarded(const std::filesystem::path& path, const RunControl& control,
+                           const std::function<SolidContent(const RunControl&)>& write) {
+  const auto guarded = [&](const RunControl& inner) {
+    return with_standard_errors([&] { return bytes_of(write(inner)); });
+  };
+  try {
+    return content_of(
+        run_in_child("writing " + path.filename().string(), ChildLimits{}, guarded, control));
+  } catch (const ChildFailure& failure) {
+    fail_to_write(path, std::string("OpenCASCADE ") + failure.what());
+  }
 }
 
 void require_read_back(const SolidContent& content, double volume,

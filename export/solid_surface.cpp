@@ -2,9 +2,6 @@
 #include "export/solid_surface.h"
 
 #include <BRepAdaptor_Curve.hxx>
-#include <BRepAdaptor_Surface.hxx>
-#include <BRepTools.hxx>
-#include <BRepTopAdaptor_FClass2d.hxx>
 #include <BndLib_Add3dCurve.hxx>
 #include <Bnd_Box.hxx>
 #include <STEPControl_Reader.hxx>
@@ -18,6 +15,7 @@
 #include <XSControl_WorkSession.hxx>
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <memory>
 #include <optional>
@@ -25,7 +23,13 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/files.h"
+#include "export/byte_record.h"
+#include "export/child_work.h"
+#include "export/face_sampler.h"
+#include "export/part21_check.h"
 #include "export/solid_check.h"
+#include "export/solid_reading.h"
 
 // Splines that fill the rectangles of their parameters, as export writes them, are sampled evenly
 // over their knot cells, which are small where the lens has much to say. Other faces are sampled on
@@ -39,12 +43,6 @@ namespace fs = std::filesystem;
 constexpr double kLeastExtent = 0.1;    ///< mm
 constexpr double kMostExtent = 10'000;  ///< mm
 
-/// Points of a face each way at which its direction is judged and Newton's method may start.
-constexpr int kProbes = 9;
-
-/// How near Newton's method must come, and what counts as inside at an edge, mm.
-constexpr double kNear = 1e-6;
-
 /// Heights above one point that differ by more than this are two surfaces, mm.
 constexpr double kSameHeight = 1e-3;
 
@@ -55,142 +53,12 @@ constexpr double kOverlapPoints = 1e4;
   throw InputError(path.string() + ": " + why);
 }
 
-struct Parameters {
-  double u = 0.0;
-  double v = 0.0;
-};
-
-/// A point of a face and the normal there, z > 0.
-struct FacePoint {
-  Eigen::Vector3d point;
-  Eigen::Vector3d normal;
-};
-
-/// One face and how it is evaluated. Not for use by two threads at once.
-class FaceSampler {
- public:
-  explicit FaceSampler(const TopoDS_Face& face)
-      : surface_(face),
-        inside_(face, Precision::PConfusion()),
-        reversed_(face.Orientation() == TopAbs_REVERSED) {
-    BRepTools::UVBounds(face, low_.u, high_.u, low_.v, high_.v);
-    for (int i = 0; i < kProbes; ++i) {
-      for (int j = 0; j < kProbes; ++j) {
-        const Parameters at{std::lerp(low_.u, high_.u, (i + 0.5) / kProbes),
-                            std::lerp(low_.v, high_.v, (j + 0.5) / kProbes)};
-        const gp_Pnt point = surface_.Value(at.u, at.v);
-        probes_.push_back({at, {point.X(), point.Y()}});
-      }
-    }
-  }
-
-  [[nodiscard]] bool is_flat() const { return surface_.GetType() == GeomAbs_Plane; }
-
-  /// Least and largest z of the outward normals at the probes that lie on the face.
-  [[nodiscard]] std::pair<double, double> normal_range() const {
-    std::pair<double, double> range{1.0, -1.0};
-    for (const Probe& probe : probes_) {
-      if (!contains(probe.at)) continue;
-      gp_Pnt point;
-      gp_Vec du;
-      gp_Vec dv;
-      surface_.D1(probe.at.u, probe.at.v, point, du, dv);
-      const gp_Vec normal = du.Crossed(dv);
-      const double size = normal.Magnitude();
-      if (!(size > 0.0)) continue;
-      const double z = (reversed_ ? -normal.Z() : normal.Z()) / size;
-      range = {std::min(range.first, z), std::max(range.second, z)};
-    }
-    return range;
-  }
-
-  /// The face above a point, or nothing where it is not.
-  [[nodiscard]] std::optional<FacePoint> above(const Eigen::Vector2d& xy) {
-    if (!last_) last_ = nearest_probe(xy);
-    if (const auto found = newton(*last_, xy)) return found;
-    return newton(nearest_probe(xy), xy);
-  }
-
-  /// Knot cells along u and v; nothing unless the face is a spline over its whole rectangle.
-  [[nodiscard]] std::optional<std::array<int, 2>> knot_cells() const {
-    if (surface_.GetType() != GeomAbs_BSplineSurface) return std::nullopt;
-    constexpr int kBorderPoints = 64;
-    for (int i = 0; i <= kBorderPoints; ++i) {
-      const double t = static_cast<double>(i) / kBorderPoints;
-      const double u = std::lerp(low_.u, high_.u, t);
-      const double v = std::lerp(low_.v, high_.v, t);
-      for (const Parameters& at :
-           {Parameters{u, low_.v}, Parameters{u, high_.v}, Parameters{low_.u, v},
-            Parameters{high_.u, v}, Parameters{u, v}}) {
-        if (!contains(at)) return std::nullopt;
-      }
-    }
-    return std::array<int, 2>{surface_.NbUKnots() - 1, surface_.NbVKnots() - 1};
-  }
-
-  /// The point at these shares of the way along u and v.
-  [[nodiscard]] FacePoint at(double share_u, double share_v) const {
-    return point_at({std::lerp(low_.u, high_.u, share_u), std::lerp(low_.v, high_.v, share_v)});
-  }
-
- private:
-  struct Probe {
-    Parameters at;
-    Eigen::Vector2d xy;
-  };
-
-  [[nodiscard]] bool contains(const Parameters& at) const {
-    return inside_.Perform(gp_Pnt2d(at.u, at.v), false) != TopAbs_OUT;
-  }
-
-  [[nodiscard]] Parameters nearest_probe(const Eigen::Vector2d& xy) const {
-    return std::min_element(probes_.begin(), probes_.end(),
-                            [&](const Probe& a, const Probe& b) {
-                              return (a.xy - xy).squaredNorm() < (b.xy - xy).squaredNorm();
-                            })
-        ->at;
-  }
-
-  [[nodiscard]] FacePoint point_at(const Parameters& at) const {
-    gp_Pnt point;
-    gp_Vec du;
-    gp_Vec dv;
-    surface_.D1(at.u, at.v, point, du, dv);
-    gp_Vec normal = du.Crossed(dv);
-    if (normal.Z() < 0.0) normal.Reverse();
-    return {{point.X(), point.Y(), point.Z()}, {normal.X(), normal.Y(), normal.Z()}};
-  }
-
-  [[nodiscard]] std::optional<FacePoint> newton(Parameters at, const Eigen::Vector2d& xy) {
-    constexpr int kMostSteps = 20;
-    for (int step = 0; step < kMostSteps; ++step) {
-      gp_Pnt point;
-      gp_Vec du;
-      gp_Vec dv;
-      surface_.D1(at.u, at.v, point, du, dv);
-      const Eigen::Vector2d miss = xy - Eigen::Vector2d(point.X(), point.Y());
-      if (miss.norm() < kNear) {
-        if (!contains(at)) return std::nullopt;
-        last_ = at;
-        return point_at(at);
-      }
-      Eigen::Matrix2d derivative;
-      derivative << du.X(), dv.X(), du.Y(), dv.Y();
-      if (!(std::abs(derivative.determinant()) > 0.0)) return std::nullopt;
-      const Eigen::Vector2d change = derivative.inverse() * miss;
-      at.u = std::clamp(at.u + change.x(), low_.u, high_.u);
-      at.v = std::clamp(at.v + change.y(), low_.v, high_.v);
-    }
-    return std::nullopt;
-  }
-
-  BRepAdaptor_Surface surface_;
-  BRepTopAdaptor_FClass2d inside_;
-  bool reversed_;
-  Parameters low_;
-  Parameters high_;
-  std::vector<Probe> probes_;
-  std::optional<Parameters> last_;
+/// What is to be read, and how.
+struct Work {
+  const fs::path& path;
+  double points = 0.0;  ///< To sample, about.
+  int threads = 1;
+  const RunControl& control;
 };
 
 using Faces = std::vector<TopoDS_Face>;
@@ -216,13 +84,9 @@ Faces named_faces(const STEPControl_Reader& reader) {
   return faces;
 }
 
-Solid read_solid(const fs::path& path) {
-  silence_opencascade();
+Solid read_solid(const fs::path& path, const RunControl& control) {
   STEPControl_Reader reader;
-  if (reader.ReadFile(path.c_str()) != IFSelect_RetDone) {
-    refuse(path, "is missing or no STEP file");
-  }
-  reader.TransferRoots();
+  load_step(reader, path, control);
   const TopoDS_Shape shape = reader.NbShapes() > 0 ? reader.OneShape() : TopoDS_Shape();
   const int solids = shape.IsNull() ? 0 : count_shapes(shape, TopAbs_SOLID);
   if (solids == 0) refuse(path, "holds no solid");
@@ -269,7 +133,7 @@ struct OpticalFace {
 OpticalFace with_box(const TopoDS_Face& face) {
   Bnd_Box box;
   for (TopExp_Explorer at(face, TopAbs_EDGE); at.More(); at.Next()) {
-    BndLib_Add3dCurve::AddOptimal(BRepAdaptor_Curve(TopoDS::Edge(at.Current())), kNear, box);
+    BndLib_Add3dCurve::AddOptimal(BRepAdaptor_Curve(TopoDS::Edge(at.Current())), kNearFace, box);
   }
   if (box.IsVoid()) return {face, {}};
   box.SetGap(0.0);
@@ -338,7 +202,7 @@ class RowSampler {
 
  private:
   [[nodiscard]] std::optional<FacePoint> above(std::size_t face, const Eigen::Vector2d& xy) {
-    constexpr double kNearSquared = kNear * kNear;
+    constexpr double kNearSquared = kNearFace * kNearFace;
     if (faces_[face].box.squaredExteriorDistance(xy) > kNearSquared) return std::nullopt;
     if (!samplers_[face]) samplers_[face] = std::make_unique<FaceSampler>(faces_[face].face);
     return samplers_[face]->above(xy);
@@ -352,32 +216,30 @@ class RowSampler {
 
 /// Calls `visit(sampler, column, row)` for every point of a raster, some rows at a time.
 template <class Visit>
-void for_each_point(const std::vector<OpticalFace>& faces, const Raster& raster,
-                    const Executor& executor, const Visit& visit) {
+void for_each_point(const std::vector<OpticalFace>& faces, const Raster& raster, const Work& work,
+                    const Visit& visit) {
   constexpr int kRowsPerBand = 16;
   const int bands = (raster.shape.rows + kRowsPerBand - 1) / kRowsPerBand;
-  parallel_for(
-      executor, "solid surface", bands,
-      [&](std::int64_t band) {
-        RowSampler sampler(faces, raster);
-        const auto first = static_cast<int>(band) * kRowsPerBand;
-        const int end = std::min(first + kRowsPerBand, raster.shape.rows);
-        for (int r = first; r < end; ++r) {
-          for (int c = 0; c < raster.shape.columns; ++c) visit(sampler, c, r);
-        }
-      },
-      1);
+  std::atomic<int> done = 0;
+  for_each_in_threads(work.threads, bands, [&](std::int64_t band) {
+    RowSampler sampler(faces, raster);
+    const auto first = static_cast<int>(band) * kRowsPerBand;
+    const int end = std::min(first + kRowsPerBand, raster.shape.rows);
+    for (int r = first; r < end; ++r) {
+      for (int c = 0; c < raster.shape.columns; ++c) visit(sampler, c, r);
+    }
+    work.control.report({"", double{1} * ++done, double{1} * bands, ""});
+  });
 }
 
-void require_height_field(const std::vector<OpticalFace>& faces, const fs::path& path,
-                          const Executor& executor) {
-  const Raster raster = make_raster(faces, kOverlapPoints, path);
+void require_height_field(const std::vector<OpticalFace>& faces, const Work& work) {
+  const Raster raster = make_raster(faces, kOverlapPoints, work.path);
   std::vector<char> twice(static_cast<std::size_t>(raster.shape.rows), 0);
-  for_each_point(faces, raster, executor, [&](RowSampler& sampler, int c, int r) {
+  for_each_point(faces, raster, work, [&](RowSampler& sampler, int c, int r) {
     if (sampler.is_covered_twice(c, r)) twice[static_cast<std::size_t>(r)] = 1;
   });
   if (std::find(twice.begin(), twice.end(), 1) == twice.end()) return;
-  refuse(path, "its optical surface is no height field: parts of it lie above one another");
+  refuse(work.path, "its optical surface is no height field: parts of it lie above one another");
 }
 
 /// Puts points of grids and the triangles between them together.
@@ -437,13 +299,12 @@ class SurfaceBuilder {
   std::vector<Eigen::Vector3i> triangles_;
 };
 
-SampledSurface on_raster(const std::vector<OpticalFace>& faces, double points, const fs::path& path,
-                         const Executor& executor) {
-  const Raster raster = make_raster(faces, points, path);
+SampledSurface on_raster(const std::vector<OpticalFace>& faces, const Work& work) {
+  const Raster raster = make_raster(faces, work.points, work.path);
   const GridShape& shape = raster.shape;
   std::vector<std::optional<FacePoint>> found(static_cast<std::size_t>(shape.columns) *
                                               static_cast<std::size_t>(shape.rows));
-  for_each_point(faces, raster, executor, [&](RowSampler& sampler, int c, int r) {
+  for_each_point(faces, raster, work, [&](RowSampler& sampler, int c, int r) {
     found[static_cast<std::size_t>(std::int64_t{r} * shape.columns + c)] = sampler.at(c, r);
   });
   SurfaceBuilder builder;
@@ -480,17 +341,50 @@ std::optional<SampledSurface> on_knots(const std::vector<OpticalFace>& faces, do
   return builder.build();
 }
 
+void require_finite(const SampledSurface& samples, const fs::path& path) {
+  if (samples.mesh.triangle_count() == 0) refuse(path, "its optical surface cannot be sampled");
+  if (samples.mesh.vertices.allFinite() && samples.normals.allFinite()) return;
+  refuse(path, "its optical surface has points that are no numbers");
+}
+
+/// What happens in the child process.
+std::string surface_bytes(const Work& work) {
+  const Solid solid = read_solid(work.path, work.control);
+  std::vector<OpticalFace> faces;
+  for (const TopoDS_Face& face : optical_faces(solid, work.path)) faces.push_back(with_box(face));
+  require_height_field(faces, work);
+  std::optional<SampledSurface> samples = on_knots(faces, work.points);
+  if (!samples) samples = on_raster(faces, work);
+  require_finite(*samples, work.path);
+  ByteWriter bytes;
+  bytes.put(static_cast<int>(faces.size()));
+  bytes.put(!solid.named.empty());
+  bytes.put(samples->mesh.vertices);
+  bytes.put(samples->mesh.triangles);
+  bytes.put(samples->normals);
+  return bytes.take();
+}
+
 }  // namespace
 
-SolidSurface read_solid_surface(const fs::path& path, double points, const Executor& executor) {
-  const Solid solid = read_solid(path);
-  std::vector<OpticalFace> faces;
-  for (const TopoDS_Face& face : optical_faces(solid, path)) faces.push_back(with_box(face));
-  require_height_field(faces, path, executor);
-  std::optional<SampledSurface> samples = on_knots(faces, points);
-  if (!samples) samples = on_raster(faces, points, path, executor);
-  if (samples->mesh.triangle_count() == 0) refuse(path, "its optical surface cannot be sampled");
-  return {std::move(*samples), static_cast<int>(faces.size()), !solid.named.empty()};
+SolidSurface read_solid_surface(const fs::path& path, double points, const Executor& executor,
+                                const RunControl& control) {
+  check_part21(read_whole_file(path, kMostSolidBytes), path.string());
+  const int threads = executor.concurrency();
+  const std::string result = read_guarded(
+      path,
+      [&](const RunControl& c) {
+        return surface_bytes({path, points, threads, c});
+      },
+      control);
+  ByteReader bytes(result);
+  SolidSurface surface;
+  surface.faces = bytes.get<int>();
+  surface.by_name = bytes.get<bool>();
+  surface.samples.mesh.vertices = bytes.matrix<double>();
+  surface.samples.mesh.triangles = bytes.matrix<int>();
+  surface.samples.normals = bytes.matrix<double>();
+  return surface;
 }
 
 }  // namespace lensforge

@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "core/executor.h"
+#include "core/run_control.h"
 #include "export/sampled_surface.h"
 
 namespace lensforge {
@@ -23,8 +24,9 @@ struct SolidSurface {
 /// @param points  in all, about.
 /// @throw InputError naming the file if there is no solid or several, if no face looks up, if the
 ///        optical faces overhang or lie above one another, or if their extent is less than 0.1 mm
-///        or above 10 m, as it is with a wrong length unit.
+///        or above 10 m, as it is with a wrong length unit; Interrupted. OpenCASCADE works in a
+///        child process: what makes it crash is an InputError as well.
 SolidSurface read_solid_surface(const std::filesystem::path& path, double points,
-                                const Executor& executor);
+                                const Executor& executor, const RunControl& control = {});
 
 }  // namespace lensforge

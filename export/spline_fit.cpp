@@ -57,6 +57,11 @@ class NetFitter {
     net_.patches.resize(table_index(0, net_.rows, net_.columns));
   }
 
+  [[nodiscard]] std::int64_t most_control_points() const {
+    const std::int64_t across = most_cells() + 3;
+    return across * across * patch_count();
+  }
+
   SplineNet fit() {
     const int most = most_cells();
     for (int cells = std::min(kFewestCells, most);; cells = std::min(2 * cells, most)) {
@@ -254,6 +259,12 @@ class NetFitter {
 SplineNet fit_spline_net(const SmoothSurface& surface, const FitOptions& options,
                          const Executor& executor, const RunControl& control) {
   return NetFitter(surface, options, executor, control).fit();
+}
+
+std::int64_t most_control_points(const SmoothSurface& surface, const FitOptions& options) {
+  const Executor executor = Executor::serial();
+  const RunControl control;
+  return NetFitter(surface, options, executor, control).most_control_points();
 }
 
 }  // namespace lensforge

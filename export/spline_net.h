@@ -135,6 +135,9 @@ FitError difference(const SurfacePoint& a, const SurfacePoint& b);
 SplineNet fit_spline_net(const SmoothSurface& surface, const FitOptions& options,
                          const Executor& executor, const RunControl& control);
 
+/// Control points that fit_spline_net() ends with at most.
+std::int64_t most_control_points(const SmoothSurface& surface, const FitOptions& options);
+
 /// Differences between a patch and the surface on a raster of `density` points a knot cell
 /// each way, borders included.
 FitError measure_patch(const SplinePatch& patch, const SmoothSurface& surface,

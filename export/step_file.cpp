@@ -6,7 +6,6 @@
 #include <STEPConstruct.hxx>
 #include <STEPControl_Controller.hxx>
 #include <STEPControl_Writer.hxx>
-#include <Standard_Failure.hxx>
 #include <StepRepr_RepresentationItem.hxx>
 #include <Transfer_FinderProcess.hxx>
 #include <Transfer_TransientProcess.hxx>
@@ -15,7 +14,9 @@
 #include <cerrno>
 
 #include "core/files.h"
+#include "export/part21_check.h"
 #include "export/solid_check.h"
+#include "export/solid_reading.h"
 #include "export/spline_solid.h"
 
 namespace lensforge {
@@ -56,10 +57,9 @@ void fill_header(const StepHeader& header, STEPControl_Writer& writer) {
   section.SetTimeStamp(text(header.time_stamp));
 }
 
-}  // namespace
-
-SolidContent write_step(const SplineNet& net, const StepHeader& header, StepSchema schema,
-                        const fs::path& path) {
+/// What happens in the child process.
+SolidContent write_beside(const SplineNet& net, const StepHeader& header, StepSchema schema,
+                          const fs::path& beside, const fs::path& path) {
   silence_opencascade();
   const NamedSolid solid = make_spline_solid(net);
   set_up_writing(header, schema);
@@ -69,18 +69,32 @@ SolidContent write_step(const SplineNet& net, const StepHeader& header, StepSche
   }
   name_faces(solid, writer);
   fill_header(header, writer);
+  errno = 0;
+  if (writer.Write(beside.c_str()) != IFSelect_RetDone) fail_to_write(path, last_system_error());
+  return inspect_shape(read_step_shape(beside, {}), net.volume());
+}
+
+}  // namespace
+
+SolidContent write_step(const SplineNet& net, const StepHeader& header, StepSchema schema,
+                        const fs::path& path, const RunControl& control) {
   SolidContent content;
   write_whole_file(path, [&](const fs::path& beside) {
-    errno = 0;
-    if (writer.Write(beside.c_str()) != IFSelect_RetDone) {
-      fail_to_write(path, last_system_error());
-    }
-    content = inspect_shape(read_step_shape(beside), net.volume());
+    content = write_guarded(path, control, [&](const RunControl&) {
+      return write_beside(net, header, schema, beside, path);
+    });
     require_read_back(content, net.volume(), path);
   });
   return content;
 }
 
-SolidContent inspect_step(const fs::path& path) { return inspect_shape(read_step_shape(path)); }
+SolidContent inspect_step(const fs::path& path, const RunControl& control) {
+  const std::int64_t entities = check_part21(read_whole_file(path, kMostSolidBytes), path.string());
+  SolidContent content = content_of(read_guarded(
+      path, [&](const RunControl& c) { return bytes_of(inspect_shape(read_step_shape(path, c))); },
+      control));
+  content.entities = entities;
+  return content;
+}
 
 }  // namespace lensforge

@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <filesystem>
 #include <string>
 
+#include "core/run_control.h"
 #include "export/spline_net.h"
 
 namespace lensforge {
@@ -24,9 +27,12 @@ struct StepHeader {
 struct SolidContent {
   int solids = 0;
   int faces = 0;
-  bool valid = false;   ///< BRepCheck_Analyzer finds nothing.
-  bool closed = false;  ///< Every edge has a face on both sides.
-  double volume = 0.0;  ///< mm³
+  std::int64_t entities = 0;    ///< Of a STEP file that was read by inspect_step().
+  bool valid = false;           ///< BRepCheck_Analyzer finds nothing.
+  bool closed = false;          ///< Every edge has a face on both sides.
+  double volume = 0.0;          ///< mm³
+  std::array<double, 3> low{};  ///< Corners of the box around it, mm
+  std::array<double, 3> high{};
 
   [[nodiscard]] bool is_one_solid() const { return solids == 1 && valid && closed; }
 };
@@ -34,11 +40,13 @@ struct SolidContent {
 /// Writes the solid between a spline net and the plane z = 0 as STEP in millimetres: the patches
 /// are faces named "optical surface", the four walls "side wall", the flat one "back". The file is
 /// read back before it appears under its name: one solid, valid, closed, the net's volume to 1e-6.
-/// @pre the net lies above z = 0. @throw RunError if it cannot be written or does not read back so.
+/// @pre the net lies above z = 0. @throw RunError if it cannot be written or does not read back so;
+///      Interrupted, and then nothing was written.
 SolidContent write_step(const SplineNet& net, const StepHeader& header, StepSchema schema,
-                        const std::filesystem::path& path);
+                        const std::filesystem::path& path, const RunControl& control = {});
 
-/// @throw InputError if the file cannot be read or holds no shape.
-SolidContent inspect_step(const std::filesystem::path& path);
+/// OpenCASCADE works in a child process: what makes it crash is an InputError as well.
+/// @throw InputError if the file cannot be read or holds no shape; Interrupted.
+SolidContent inspect_step(const std::filesystem::path& path, const RunControl& control = {});
 
 }  // namespace lensforge

@@ -3,9 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include "core/error.h"
 #include "core/image_io.h"
 #include "core/temp_folder.h"
 #include "core/transfer.h"
+#include "export/export_work.h"
 #include "export/sample_surfaces.h"
 
 namespace lensforge::testing {
@@ -45,6 +47,36 @@ TEST(HeightMap, GreyValuesAreLinearInHeight) {
       EXPECT_NEAR(scale.black + grey * (scale.white - scale.black), map.at(column, row), 5e-5);
     }
   }
+}
+
+TEST(HeightMap, StopRequestEndsTheMapAndItsFile) {
+  const TempFolder folder;
+  std::stop_source stop;
+  const RunControl at_first_news(stop.get_token(), [&](const Progress&) { stop.request_stop(); });
+  const SmoothSurface surface(surface_of({20.0, 10.0}, {21, 12}, slanted));
+  EXPECT_THROW(height_map(surface, 2048, Executor::serial(), at_first_news), Interrupted);
+  stop = std::stop_source();
+  const RunControl again(stop.get_token(), [&](const Progress&) { stop.request_stop(); });
+  EXPECT_THROW(write_image(slanted_map(256), folder / "map.exr", again), Interrupted);
+  EXPECT_THROW(write_grey_relief(slanted_map(256), folder / "map.png", Executor::serial(), again),
+               Interrupted);
+  EXPECT_EQ(folder.file_count(), 0U);
+}
+
+/// Memory and disk are asked for what the arrays and files have.
+TEST(ExportWork, GrowsWithPixelsAndControlPoints) {
+  EXPECT_GT(height_map_work(1e8, true).memory_bytes, 8e8);
+  EXPECT_EQ(height_map_work(1e8, false).disk_bytes, 4e8);
+  EXPECT_NEAR(spline_solid_work(5e5).seconds, 51.0, 10.0);
+  EXPECT_GT(spline_solid_work(4e6).memory_bytes, 4e9);
+}
+
+TEST(ExportWork, LargestWithRoomHasRoom) {
+  const auto work = [](double count) { return WorkEstimate{.memory_bytes = 1e6 * count}; };
+  const std::int64_t fits = largest_with_room(work, 1e12, "/");
+  EXPECT_GT(fits, 0);
+  EXPECT_LE(1e6 * static_cast<double>(fits), 0.8 * free_memory_bytes());
+  EXPECT_EQ(largest_with_room(work, 1e-9, "/"), 0);
 }
 
 }  // namespace

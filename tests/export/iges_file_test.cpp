@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 
 #include "core/error.h"
+#include "core/output_guard.h"
 #include "core/temp_folder.h"
 #include "export/sample_surfaces.h"
 
@@ -52,6 +53,7 @@ TEST_F(IgesFile, SaysMillimetresAuthorAndSolidWithoutOpenCascade) {
     EXPECT_THAT(header, HasSubstr(part));
   }
   EXPECT_THAT(entries, HasSubstr("     186"));
+  EXPECT_TRUE(written_by_lensforge(folder_ / "lens.igs"));
 }
 
 TEST_F(IgesFile, TargetThatCannotBeWrittenIsNamed) {

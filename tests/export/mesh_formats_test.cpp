@@ -8,6 +8,7 @@
 
 #include "core/error.h"
 #include "core/mesh_io.h"
+#include "core/output_guard.h"
 #include "core/temp_folder.h"
 #include "export/closed_solid.h"
 #include "export/sample_surfaces.h"
@@ -112,6 +113,13 @@ TEST_F(MeshFormats, TheSameSolidGivesTheSameBytes) {
   write_3mf(solid_, "lens", folder_ / "a.3mf");
   write_3mf(solid_, "lens", folder_ / "b.3mf");
   EXPECT_TRUE(read_bytes(folder_ / "a.3mf") == read_bytes(folder_ / "b.3mf"));
+}
+
+TEST_F(MeshFormats, EveryFormatSaysThatLensforgeWroteIt) {
+  for (const auto& write : {write_stl, write_obj, write_3mf}) {
+    write(solid_, "lensforge 1.2.3 lens", folder_ / "lens.x");
+    EXPECT_TRUE(written_by_lensforge(folder_ / "lens.x"));
+  }
 }
 
 TEST_F(MeshFormats, TargetThatCannotBeWrittenIsNamed) {

@@ -18,6 +18,7 @@
 #include "core/error.h"
 #include "core/temp_folder.h"
 #include "export/sample_surfaces.h"
+#include "export/solid_check.h"
 #include "export/step_file.h"
 
 namespace lensforge::testing {
@@ -32,6 +33,7 @@ class SolidSurfaceOf : public ::testing::Test {
   }
 
   void write(const TopoDS_Shape& shape, const char* unit = "MM") {
+    silence_opencascade();
     STEPControl_Controller::Init();
     Interface_Static::SetCVal("write.step.unit", unit);
     STEPControl_Writer writer;

@@ -7,6 +7,7 @@
 #include <cstdio>
 
 #include "core/error.h"
+#include "core/output_guard.h"
 #include "core/temp_folder.h"
 #include "export/closed_solid.h"
 #include "export/part21.h"
@@ -209,6 +210,33 @@ TEST_F(StepFile, WhatIsNoStepFileIsRefused) {
               HasSubstr("none.step"));
   write_bytes(path_, "solid lens\nendsolid\n");
   EXPECT_THAT(message_of<InputError>([&] { inspect_step(path_); }), HasSubstr("lens.step"));
+}
+
+TEST_F(StepFile, InspectionTellsSizeAndEntities) {
+  const SplineNet net = fitted(smooth_lens(31));
+  write(net);
+  const SolidContent content = inspect_step(path_);
+  EXPECT_TRUE(content.is_one_solid());
+  EXPECT_GT(content.entities, 100);
+  EXPECT_NEAR(content.low[0], 0.0, 1e-5);
+  EXPECT_NEAR(content.high[0], 30.0, 1e-5);
+  EXPECT_NEAR(content.high[1], 24.0, 1e-5);
+  EXPECT_NEAR(content.low[2], 0.0, 1e-5);
+}
+
+TEST_F(StepFile, StopRequestLeavesNothingWritten) {
+  const SplineNet net = fitted(smooth_lens(31));
+  std::stop_source stop;
+  const RunControl control(stop.get_token(), [&](const Progress&) { stop.request_stop(); });
+  EXPECT_THROW(
+      write_step(net, {"lens", "", "", "lensforge 9", ""}, StepSchema::kAp214, path_, control),
+      Interrupted);
+  EXPECT_EQ(folder_.file_count(), 0U);
+}
+
+TEST_F(StepFile, SaysThatLensforgeWroteIt) {
+  write(fitted(smooth_lens(31)));
+  EXPECT_TRUE(written_by_lensforge(path_));
 }
 
 }  // namespace

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "app/interruptible_job.h"
+
+#include <unistd.h>
+
+#include "app/exit_code.h"
+#include "core/number_text.h"
+#include "export/export_work.h"
+
+namespace lensforge::app {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+std::unique_ptr<OutputFolder> folder_of(const fs::path& out) {
+  return out.empty() ? nullptr : std::make_unique<OutputFolder>(fs::absolute(out).parent_path());
+}
+
+}  // namespace
+
+InterruptibleJob::InterruptibleJob(const CommonOptions& common, const fs::path& out)
+    : json_(common.json),
+      folder_(folder_of(out)),
+      progress_(common.quiet),
+      watch_(SecondInterrupt::kExit, [this] { abandon(); }) {}
+
+void InterruptibleJob::begin_writing() {
+  const std::lock_guard lock(mutex_);
+  writing_ = true;
+}
+
+void InterruptibleJob::abandon() {
+  const std::lock_guard lock(mutex_);
+  if (writing_) return;
+  folder_.reset();
+  progress_.wipe();
+  _exit(report_interrupted(json_));
+}
+
+int report_interrupted(bool json) noexcept {
+  return report_error("interrupted; nothing was written", kInterrupted, json);
+}
+
+void announce_work(const std::function<WorkEstimate(double)>& work, const std::string& option,
+                   double value, const fs::path& out, const Console& console) {
+  const fs::path folder = fs::absolute(out).parent_path();
+  const WorkEstimate needed = work(value);
+  const std::int64_t fits = largest_with_room(work, value, folder);
+  require_room(needed, folder, option + " " + number_text(value, 8),
+               fits > 0 ? option + " " + std::to_string(fits) + " would fit"
+                        : std::string("make room for it"));
+  if (needed.seconds > kWorthTelling) console.note("this takes " + estimate_words(needed));
+}
+
+}  // namespace lensforge::app

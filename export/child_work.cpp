@@ -1,0 +1,300 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "export/child_work.h"
+
+#include <fcntl.h>
+#include <poll.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cerrno>
+#include <chrono>
+#include <cmath>
+#include <csignal>
+#include <cstring>
+#include <exception>
+#include <fstream>
+#include <mutex>
+#include <new>
+#include <optional>
+#include <string_view>
+#include <system_error>
+#include <thread>
+#include <vector>
+
+#include "core/error.h"
+
+// The child sends frames through a pipe: a letter, the length of the text, the text. Its end
+// without a result or an error is a failure. It is killed together with its parent, and ends
+// without destructors: what is broken in it is not touched again.
+namespace lensforge {
+namespace {
+
+/// How often a stop request is looked for, and how often the child may report.
+constexpr int kPollMilliseconds = 100;
+constexpr std::chrono::milliseconds kReportInterval{50};
+
+enum class Frame : char {
+  kProgress = 'p',
+  kResult = 'r',
+  kInputError = 'i',
+  kRunError = 'e',
+  kFailure = 'f',
+};
+
+/// Bytes before a frame's text: its letter and its length.
+constexpr std::size_t kFrameHead = 1 + sizeof(std::uint64_t);
+
+bool write_all(int descriptor, const char* data, std::size_t size) {
+  while (size > 0) {
+    const ssize_t written = ::write(descriptor, data, size);
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) return false;
+    data += written;
+    size -= static_cast<std::size_t>(written);
+  }
+  return true;
+}
+
+void send(int descriptor, Frame kind, std::string_view text) {
+  std::array<char, kFrameHead> head{static_cast<char>(kind)};
+  const std::uint64_t size = text.size();
+  std::memcpy(head.data() + 1, &size, sizeof size);
+  if (!write_all(descriptor, head.data(), head.size())) _exit(1);
+  if (!write_all(descriptor, text.data(), text.size())) _exit(1);
+}
+
+struct Share {
+  double done = 0.0;
+  double total = 0.0;
+};
+
+/// In the child: its progress, now and then, to the parent.
+class ProgressPipe {
+ public:
+  explicit ProgressPipe(int descriptor) : descriptor_(descriptor) {}
+
+  void report(const Progress& progress) {
+    const std::lock_guard lock(mutex_);
+    const auto now = std::chrono::steady_clock::now();
+    if (now - sent_ < kReportInterval) return;
+    sent_ = now;
+    const Share share{progress.done, progress.total};
+    std::array<char, sizeof share> bytes{};
+    std::memcpy(bytes.data(), &share, sizeof share);
+    send(descriptor_, Frame::kProgress, {bytes.data(), bytes.size()});
+  }
+
+ private:
+  int descriptor_;
+  std::mutex mutex_;
+  std::chrono::steady_clock::time_point sent_;
+};
+
+/// Bytes of address space that this process has, or nothing where the system does not say.
+std::optional<double> address_space() {
+  std::ifstream file("/proc/self/statm");
+  double pages = 0.0;
+  if (!(file >> pages)) return std::nullopt;
+  return pages * static_cast<double>(::sysconf(_SC_PAGESIZE));
+}
+
+void limit(__rlimit_resource resource, double value) {
+  rlimit now{};
+  if (::getrlimit(resource, &now) != 0) return;
+  if (value < static_cast<double>(now.rlim_cur)) now.rlim_cur = static_cast<rlim_t>(value);
+  ::setrlimit(resource, &now);
+}
+
+void apply(const ChildLimits& limits) {
+  limit(RLIMIT_CORE, 0.0);
+  if (limits.cpu_seconds > 0.0) limit(RLIMIT_CPU, std::ceil(limits.cpu_seconds));
+  const std::optional<double> before = address_space();
+  if (limits.memory_bytes > 0.0 && before) limit(RLIMIT_AS, *before + limits.memory_bytes);
+}
+
+void silence_output() {
+  const int nowhere = ::open("/dev/null", O_WRONLY);
+  if (nowhere < 0) return;
+  for (const int descriptor : {STDOUT_FILENO, STDERR_FILENO}) ::dup2(nowhere, descriptor);
+}
+
+/// Signals of the terminal go to the whole group: what to do about them is the parent's to say.
+void leave_signals_to_parent(pid_t parent) {
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) std::signal(signal, SIG_IGN);
+  for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGABRT, SIGILL, SIGXCPU}) {
+    std::signal(signal, SIG_DFL);
+  }
+  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+  if (::getppid() != parent) _exit(1);
+}
+
+/// Runs in the child and never returns. OpenCASCADE's own exceptions are no std::exception.
+[[noreturn]] void live(int descriptor, const std::function<std::string(const RunControl&)>& work) {
+  ProgressPipe progress(descriptor);
+  const RunControl control({}, [&](const Progress& p) { progress.report(p); });
+  try {
+    send(descriptor, Frame::kResult, work(control));
+  } catch (const InputError& e) {
+    send(descriptor, Frame::kInputError, e.what());
+  } catch (const RunError& e) {
+    send(descriptor, Frame::kRunError, e.what());
+  } catch (const std::bad_alloc&) {
+    send(descriptor, Frame::kFailure, "needs more memory than there is for it");
+  } catch (const std::exception& e) {
+    send(descriptor, Frame::kFailure, std::string("failed: ") + e.what());
+  } catch (...) {
+    send(descriptor, Frame::kFailure, "failed");
+  }
+  _exit(0);
+}
+
+/// A running child; killed and waited for when this object goes.
+class Child {
+ public:
+  Child(const ChildLimits& limits, const std::function<std::string(const RunControl&)>& work) {
+    std::array<int, 2> ends{};
+    if (::pipe2(ends.data(), O_CLOEXEC) != 0) fail();
+    const pid_t parent = ::getpid();
+    pid_ = ::fork();
+    if (pid_ == 0) {
+      ::close(ends[0]);
+      leave_signals_to_parent(parent);
+      silence_output();
+      apply(limits);
+      live(ends[1], work);
+    }
+    const int error = errno;
+    ::close(ends[1]);
+    descriptor_ = ends[0];
+    if (pid_ > 0) return;
+    ::close(descriptor_);
+    errno = error;
+    fail();
+  }
+
+  ~Child() {
+    ::close(descriptor_);
+    if (pid_ <= 0) return;
+    ::kill(pid_, SIGKILL);
+    wait();
+  }
+
+  Child(const Child&) = delete;
+  Child& operator=(const Child&) = delete;
+
+  /// Appends what has come; false at the end. Waits a moment at most.
+  bool receive(std::string& bytes) {
+    pollfd ready{descriptor_, POLLIN, 0};
+    if (::poll(&ready, 1, kPollMilliseconds) <= 0) return true;
+    constexpr std::size_t kPiece = std::size_t{1} << 16;
+    const std::size_t before = bytes.size();
+    bytes.resize(before + kPiece);
+    const ssize_t got = ::read(descriptor_, bytes.data() + before, kPiece);
+    bytes.resize(before + static_cast<std::size_t>(std::max<ssize_t>(got, 0)));
+    return got > 0 || (got < 0 && errno == EINTR);
+  }
+
+  /// Waits for its end; the status that waitpid() gives.
+  int wait() {
+    int status = 0;
+    while (::waitpid(pid_, &status, 0) < 0 && errno == EINTR) {
+    }
+    pid_ = -1;
+    return status;
+  }
+
+ private:
+  [[noreturn]] static void fail() {
+    throw RunError("a process for OpenCASCADE cannot be started: " +
+                   std::generic_category().message(errno));
+  }
+
+  pid_t pid_ = -1;
+  int descriptor_ = -1;
+};
+
+/// The first whole frame of `bytes` from `at`, which moves behind it.
+std::optional<std::pair<Frame, std::string_view>> next_frame(const std::string& bytes,
+                                                             std::size_t& at) {
+  if (bytes.size() - at < kFrameHead) return std::nullopt;
+  std::uint64_t size = 0;
+  std::memcpy(&size, bytes.data() + at + 1, sizeof size);
+  if (bytes.size() - at - kFrameHead < size) return std::nullopt;
+  const auto kind = static_cast<Frame>(bytes[at]);
+  const std::string_view text(bytes.data() + at + kFrameHead, static_cast<std::size_t>(size));
+  at += kFrameHead + text.size();
+  return {{kind, text}};
+}
+
+/// What the child sent in the end, if it did.
+struct Answer {
+  std::optional<std::string> result;
+  Share share;
+};
+
+/// Takes whole frames out of `bytes`. @throw what the child's work threw.
+void take_frames(std::string& bytes, Answer& answer) {
+  std::size_t at = 0;
+  while (const auto frame = next_frame(bytes, at)) {
+    const std::string_view text = frame->second;
+    if (frame->first == Frame::kResult) answer.result = text;
+    if (frame->first == Frame::kInputError) throw InputError(std::string(text));
+    if (frame->first == Frame::kRunError) throw RunError(std::string(text));
+    if (frame->first == Frame::kFailure) throw ChildFailure(std::string(text));
+    if (frame->first == Frame::kProgress) std::memcpy(&answer.share, text.data(), sizeof(Share));
+  }
+  bytes.erase(0, at);
+}
+
+std::string why_it_ended(int status) {
+  if (!WIFSIGNALED(status)) return "ended without a result";
+  if (WTERMSIG(status) == SIGXCPU) return "came to no end in the time that it was given";
+  if (WTERMSIG(status) == SIGKILL) return "was killed, perhaps for want of memory";
+  return "crashed";
+}
+
+}  // namespace
+
+std::string run_in_child(const std::string& stage, const ChildLimits& limits,
+                         const std::function<std::string(const RunControl&)>& work,
+                         const RunControl& control) {
+  if (control.stop_requested()) throw Interrupted();
+  Child child(limits, work);
+  Answer answer;
+  for (std::string bytes; child.receive(bytes);) {
+    if (control.stop_requested()) throw Interrupted();
+    take_frames(bytes, answer);
+    control.report({stage, answer.share.done, answer.share.total, ""});
+  }
+  const int status = child.wait();
+  if (!answer.result) throw ChildFailure(why_it_ended(status));
+  return std::move(*answer.result);
+}
+
+void for_each_in_threads(int threads, std::int64_t count,
+                         const std::function<void(std::int64_t)>& functor) {
+  std::atomic<std::int64_t> next = 0;
+  std::mutex mutex;
+  std::exception_ptr failure;
+  const auto run = [&] {
+    try {
+      for (std::int64_t i = next++; i < count; i = next++) functor(i);
+    } catch (...) {
+      const std::lock_guard lock(mutex);
+      if (!failure) failure = std::current_exception();
+      next = count;
+    }
+  };
+  std::vector<std::jthread> others;
+  for (int i = 1; i < threads && i < count; ++i) others.emplace_back(run);
+  run();
+  others.clear();
+  if (failure) std::rethrow_exception(failure);
+}
+
+}  // namespace lensforge

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <STEPControl_Reader.hxx>
+#include <TopoDS_Shape.hxx>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <string>
+
+#include "core/run_control.h"
+
+/// How files of solids are read: OpenCASCADE crashes at some broken files, and takes for ever over
+/// others, so that all of its work on a file that is not our own happens in a child process.
+namespace lensforge {
+
+/// Bytes of a file at most; export's largest has 0.7 GB, and OpenCASCADE takes 15 bytes for one.
+inline constexpr std::uintmax_t kMostSolidBytes = 2'000'000'000;
+
+/// Runs OpenCASCADE's `work` on a file in a child process (run_in_child()) and returns its result.
+/// @throw InputError naming the file: it is missing or no regular file, or the child crashes, fails
+///        or needs more memory or time than a file of this size is given; Interrupted.
+std::string read_guarded(const std::filesystem::path& path,
+                         const std::function<std::string(const RunControl&)>& work,
+                         const RunControl& control);
+
+/// Reads a STEP file and turns it into shapes; lengths become millimetres.
+/// @pre in a child process, or the file is our own.
+/// @throw InputError if OpenCASCADE takes it for no STEP file.
+void load_step(STEPControl_Reader& reader, const std::filesystem::path& path,
+               const RunControl& control);
+
+/// The shape of a STEP or an IGES file. @pre as for load_step().
+/// @throw InputError if the file cannot be read or holds no shape.
+TopoDS_Shape read_step_shape(const std::filesystem::path& path, const RunControl& control);
+TopoDS_Shape read_iges_shape(const std::filesystem::path& path, const RunControl& control);
+
+/// `work` with OpenCASCADE's exceptions turned into standard ones.
+std::string with_standard_errors(const std::function<std::string()>& work);
+
+}  // namespace lensforge
