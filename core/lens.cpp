@@ -80,8 +80,10 @@ ordered_json to_json(const Lens& lens) {
 class StagingFolder {
  public:
   explicit StagingFolder(const fs::path& parent)
-      : path_(parent / ("." + std::string(lens_file::kStaging) + ".partial-" +
-                        std::to_string(std::random_device{}()))) {
+      : path_(parent / std::string(".")
+                           .append(lens_file::kStaging)
+                           .append(".partial-")
+                           .append(std::to_string(std::random_device{}()))) {
     std::error_code error;
     fs::create_directories(path_, error);
     if (error) throw RunError(parent.string() + ": cannot be written: " + error.message());
