@@ -133,7 +133,7 @@ TEST(CamJob, WhatIsStoppedAnywhereLeavesTheOldJobAsItWas) {
   run(small_lens(), options, folder);
   const auto before = contents(folder);
   options.z_zero = ZZero::kTable;
-  for (const std::string stage : {"", "read back", "render surfaces"}) {
+  for (const std::string stage : {"", "cam finish", "render surfaces"}) {
     std::stop_source source;
     EXPECT_EQ(run(small_lens(), options, folder, stop_at(stage, source)).status,
               CamResult::Status::kInterrupted)
