@@ -28,11 +28,6 @@ GcodeText text_of(const std::string& line) {
   return text;
 }
 
-bool only_numbers_program(const GcodeBlock& block) {
-  return std::all_of(block.words().begin(), block.words().end(),
-                     [](const GcodeWord& word) { return word.letter == 'O'; });
-}
-
 /// A small program of the description, run line by line.
 class Trial {
  public:
@@ -87,9 +82,6 @@ class Trial {
         if (!plain) throw GcodeError(1, "characters must be printable ASCII but ? ! ~");
       }
       const GcodeBlock block = parse_gcode_block(text_of(line));
-      if (key == "head" && !only_numbers_program(block)) {
-        throw GcodeError(1, "only comments and a program number stand above the program's seal");
-      }
       const GcodeEffect effect = interpreter_.run(block);
       if (key == "spindle" && !effect.motions().empty()) {
         throw GcodeError(1, "these lines must not move the machine");

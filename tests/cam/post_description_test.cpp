@@ -96,7 +96,6 @@ TEST(PostDescription, FaultsAreNamedWithFileKeyValueAndRule) {
       {"S{rpm} M3", "S{rpm} M3 G0 Z9", "these lines must not move the machine"},
       {"tool_end = [\"M5\", ", "tool_end = [", "program.tool_end: an array: must stop"},
       {"\"{coolant_off}\", \"M2\"]", "\"{coolant_off}\"]", "program.end: an array: must end"},
-      {"head = []", "head = [\"G21\"]", "'G21': only comments and a program number stand above"},
       {"head = []", "head = [\"(what?)\"]", "characters must be printable ASCII but"},
       {"head = []", "head = [\"(\\u00e4)\"]", "characters must be printable ASCII but"},
       {"head = []", "head = [\"G21\"]", "'G21': the head stands above the seal"},

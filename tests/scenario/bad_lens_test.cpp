@@ -96,7 +96,7 @@ TEST_F(BadLens, AConfigThatIsDeepOrNoRegularFileIsRefused) {
 
 TEST_F(BadLens, CamOptionsThatBreakTheirRuleAreRefused) {
   const std::string lens = path("lens");
-  expect_refusal(run({"cam", lens, "--pitch", "0"}), 2, {"--pitch", "0", "above 0"});
+  expect_refusal(run({"cam", lens, "--pitch", "0"}), 2, {"--pitch", "0", "1e-06 to 100"});
   expect_refusal(run({"cam", lens, "--pitch", "2", "--tool-diameter", "1"}), 2, {"pitch", "2"});
   expect_refusal(run({"cam", lens, "--feed", "-5"}), 2, {"--feed", "-5"});
   expect_refusal(run({"cam", lens, "--post", "heidenhain"}), 2, {"--post", "heidenhain"});

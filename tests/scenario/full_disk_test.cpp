@@ -39,13 +39,13 @@ class SmallDisk {
   bool mounted_ = false;
 };
 
-TEST_F(FullDisk, DesignSaysSoAndKeepsNoHalfFile) {
+TEST_F(FullDisk, DesignSaysSoBeforeItBegins) {
   const SmallDisk disk(at("disk"), "64k");
   if (!disk.mounted()) GTEST_SKIP() << "file systems can only be mounted by root";
   Arguments design = small_design(picture("rings.png"), path("disk/lens"));
   design.emplace_back("--quiet");
-  expect_refusal(run(design), 1, {"disk/lens", "No space left on device"});
-  expect_nothing_half_written(at("disk/lens"));
+  expect_refusal(run(design), 2, {"--pixels 32: needs about", "on disk", "would fit"});
+  EXPECT_FALSE(fs::exists(at("disk/lens")));
 }
 
 TEST_F(FullDisk, DesignUnderAFileSizeLimitFailsAndIsResumable) {
