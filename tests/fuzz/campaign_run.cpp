@@ -117,13 +117,25 @@ void check_product(const Plan& plan, const std::vector<Ending>& endings, const f
   }
 }
 
+/// Folders, files and links; what else there was, what.txt tells.
+void copy_readable(const fs::path& from, const fs::path& to) {
+  fs::create_directories(to);
+  for (const auto& at : fs::directory_iterator(from)) {
+    const fs::path copy = to / at.path().filename();
+    if (at.is_symlink()) {
+      fs::copy_symlink(at.path(), copy);
+    } else if (at.is_directory()) {
+      copy_readable(at.path(), copy);
+    } else if (at.is_regular_file()) {
+      fs::copy_file(at.path(), copy);
+    }
+  }
+}
+
 void keep(const Campaign& campaign, const RunResult& result, const fs::path& folder) {
   const fs::path kept = campaign.kept / ("run-" + std::to_string(result.run));
   fs::remove_all(kept);
-  fs::create_directories(campaign.kept);
-  fs::copy(folder, kept,
-           fs::copy_options::recursive | fs::copy_options::copy_symlinks |
-               fs::copy_options::skip_existing);
+  copy_readable(folder, kept);
   std::ofstream note(kept / "what.txt");
   note << result.kind << "\n" << result.command << "\n";
   for (const std::string& wrong : result.wrong) note << wrong << "\n";

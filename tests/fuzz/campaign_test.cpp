@@ -183,6 +183,28 @@ void print_slowest(std::vector<RunResult> results) {
   }
 }
 
+/// What was broken, without its names and numbers.
+std::string cause_of(const RunResult& result, const std::string& wrong) {
+  std::string cause = wrong.substr(0, wrong.find_first_of("\"0123456789"));
+  const std::size_t path = cause.find_last_of('/');
+  if (path != std::string::npos) cause = wrong.substr(0, cause.find(' ') + 1) + "...";
+  return cause + "  [" + result.kind + "]";
+}
+
+void print_causes(const std::vector<RunResult>& results) {
+  std::map<std::string, std::vector<std::uint64_t>> causes;
+  for (const RunResult& result : results) {
+    for (const std::string& wrong : result.wrong) {
+      std::vector<std::uint64_t>& runs = causes[cause_of(result, wrong)];
+      if (runs.empty() || runs.back() != result.run) runs.push_back(result.run);
+    }
+  }
+  for (const auto& [cause, runs] : causes) {
+    std::printf("%5zu times, first run %llu: %s\n", runs.size(),
+                static_cast<unsigned long long>(runs.front()), cause.c_str());
+  }
+}
+
 TEST(FuzzCampaign, NoInputBreaksARule) {
   const Campaign campaign = asked_for();
   const Folder folder;
@@ -191,6 +213,7 @@ TEST(FuzzCampaign, NoInputBreaksARule) {
   const std::vector<RunResult> results = carry_out(campaign, base, folder.path());
   EXPECT_EQ(results.size(), campaign.runs);
   print_table(results);
+  print_causes(results);
   print_slowest(results);
   for (const RunResult& result : results) {
     for (const std::string& wrong : result.wrong) {

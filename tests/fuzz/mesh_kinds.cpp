@@ -57,7 +57,7 @@ void bad_solid(Scene& scene) {
 }  // namespace
 
 std::vector<Kind> mesh_kinds() {
-  return {{"mesh", 6, bad_mesh}, {"drawn mesh", 6, drawn_mesh}, {"STEP", 5, bad_solid}};
+  return {{"mesh", 6, bad_mesh}, {"drawn mesh", 6, drawn_mesh}, {"STEP", 3, bad_solid}};
 }
 
 }  // namespace lensforge::fuzz

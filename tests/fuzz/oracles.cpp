@@ -107,8 +107,10 @@ void check_refusal(const Command& command, const Ending& ending, Texts& wrong) {
   }
   if (command.err != Stream::kUsual) return;
   Texts lines = lines_of(ending.err);
+  // What was said before the refusal was met.
   const auto is_warning = [](const std::string& line) {
-    return line.starts_with("lensforge: warning: ");
+    return line.starts_with("lensforge: warning: ") || line.starts_with("lensforge: resume: ") ||
+           line.starts_with("lensforge: the last run ended: ");
   };
   lines.erase(std::remove_if(lines.begin(), lines.end(), is_warning), lines.end());
   if (lines.size() != 1) {
@@ -215,6 +217,9 @@ std::vector<std::string> wrong_endings(const Plan& plan, const Command& command,
     if (line.size() > kLongestLine) {
       wrong.push_back("a line of " + std::to_string(line.size()) + " bytes: " + shown(line));
     }
+  }
+  if (plan.must_refuse && ending.asked != 0 && plan.interrupt_after <= 0.0) {
+    wrong.emplace_back("still running for what has to be refused");
   }
   if (ended_as_asked(ending)) return wrong;
   if (ending.signal != 0) {

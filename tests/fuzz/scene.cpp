@@ -45,6 +45,7 @@ void Scene::write(const std::string& path, const std::string& bytes) const {
 }
 
 void Scene::copy(const std::string& from, const std::string& to) const {
+  if (!from.ends_with('/')) return write(to, base.bytes(from));
   for (const std::string& path : base.paths(from)) {
     write(to + path.substr(from.size()), base.bytes(path));
   }

@@ -67,7 +67,7 @@ class Scene {
   [[nodiscard]] std::filesystem::path at(const std::string& path) const { return folder_ / path; }
   /// Somebody else's file, or an input: nothing may touch it.
   void write(const std::string& path, const std::string& bytes) const;
-  /// A copy of base files: `from` and all below it, under `to` instead.
+  /// A copy of a base file, or of all below a folder (`from` and `to` end with a slash).
   void copy(const std::string& from, const std::string& to) const;
   /// The same, as files that lensforge wrote here and may replace.
   void copy_ours(const std::string& from, const std::string& to);

@@ -137,6 +137,7 @@ void odd_names(Scene& scene) {
       return;
     case 1:
       scene.copy("lens/", name + " lens/");
+      scene.copy_ours("lens/cam/", name + " lens/cam/");
       scene.run(scene.cam(name + " lens"));
       return;
     case 2:
