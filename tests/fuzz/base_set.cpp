@@ -73,6 +73,11 @@ const std::string kBody =
     "G21 G90 G17 G94\nG54\nG0 Z5\nS12000 M3\nG4 P0.1\nG0 X1 Y1\nG1 Z-0.5 F300\nX20 F600\n"
     "Y2\nX1\nG2 X2 Y3 I0.5 J0.5\nG1 Y4\nG0 Z5\nM5\nM2\n";
 
+/// The same for a mill that was homed, in machine coordinates.
+const std::string kPortBody =
+    "G21 G90 G17 G94\nG54\nG0 Z-20\nS12000 M3\nG4 P0.1\nG0 X-200 Y-150\nG1 Z-22 F300\n"
+    "X-190 F2000\nY-149\nX-200\nG0 Z-20\nM5\nM2\n";
+
 /// How a job went, with the record of its end cut off.
 std::string unfinished(const std::string& journal) {
   std::size_t at = journal.size();
@@ -166,6 +171,7 @@ void BaseSet::take(const fs::path& folder) {
 void BaseSet::add_programs() {
   files_["job.ngc"] = sealed_program(kBody);
   files_["plain.ngc"] = kBody;
+  files_["port.ngc"] = sealed_program(kPortBody);
 }
 
 void BaseSet::add_descriptions() {

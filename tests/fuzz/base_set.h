@@ -20,7 +20,8 @@ struct KnownOption {
 ///   lens/*        a lens 4 mm wide, with lens/cam/* for Grbl
 ///   partial/*     a design that was interrupted after its first round
 ///   solid.*       the lens as step, iges, stl, obj, ply, off, 3mf
-///   workshop.toml, *.post.toml, *.map.toml, config.toml, job.ngc, job.ngc.journal
+///   workshop.toml, *.post.toml, *.map.toml, config.toml
+///   job.ngc, sealed, with job.ngc.journal; plain.ngc, not sealed; port.ngc, for a homed machine
 class BaseSet {
  public:
   /// Makes everything in `folder`. @throw std::runtime_error naming the command that failed.

@@ -43,7 +43,7 @@ void tampered_program(Scene& scene) {
 
 /// Nothing that moves may go to a port when the seal of a program is broken.
 void tampered_program_on_a_port(Scene& scene) {
-  scene.write("job.ngc", tampered(scene.base.bytes("job.ngc"), scene.random));
+  scene.write("job.ngc", tampered(scene.base.bytes("port.ngc"), scene.random));
   scene.plan.serial_port = true;
   scene.plan.must_refuse = true;
   scene.run(scene.send("job.ngc").set("--port", "{PORT}").flag("--home"));
@@ -51,7 +51,7 @@ void tampered_program_on_a_port(Scene& scene) {
 
 /// Whatever is closed: what reaches the port is the program.
 void closed_descriptors_on_a_port(Scene& scene) {
-  scene.copy("job.ngc", "job.ngc");
+  scene.copy("port.ngc", "job.ngc");
   scene.plan.serial_port = true;
   scene.plan.must_work = true;
   Command& command = scene.run(scene.send("job.ngc").set("--port", "{PORT}").flag("--home"));

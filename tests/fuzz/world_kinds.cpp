@@ -86,6 +86,7 @@ void place_something_else(Scene& scene, const std::string& name) {
 
 void special_files(Scene& scene) {
   scene.copy("lens/", "lens/");
+  scene.copy_ours("lens/cam/", "lens/cam/");
   scene.copy("pictures/a.png", "a.png");
   scene.plan.must_refuse = true;
   const auto on = [&](const std::string& file, const CommandLine& line) {
@@ -108,6 +109,7 @@ void special_files(Scene& scene) {
     case 6:
       return on("b.png", scene.design("b.png", "out"));
     case 7:
+      scene.plan.must_refuse = false;  // Without a checkpoint it begins anew.
       scene.plan.ours.insert("out/checkpoint.bin");
       return on("out/checkpoint.bin", scene.design("a.png", "out").flag("--resume"));
     case 8:
