@@ -2,12 +2,14 @@
 // Hostile runs of every command, see README.md for the variables that steer them.
 #include <gtest/gtest.h>
 #include <sys/mman.h>
+#include <sys/prctl.h>
 #include <sys/statvfs.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
@@ -110,6 +112,7 @@ std::vector<RunResult> carry_out(const Campaign& campaign, const BaseSet& base,
   std::fflush(nullptr);
   for (std::size_t i = 0; i < workers; ++i) {
     if (fork() != 0) continue;
+    prctl(PR_SET_PDEATHSIG, SIGKILL);
     try {
       work(campaign, base, folder, folder / ("results-" + std::to_string(i)), *next);
     } catch (const std::exception& e) {

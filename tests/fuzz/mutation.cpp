@@ -353,7 +353,8 @@ std::string mutated_json(const std::string& text, Random& random) {
   if (random.one_in(3)) return mutated_text(text, random);
   nlohmann::json value = nlohmann::json::parse(text);
   for (std::size_t i = 0; i < 1 + random.below(2); ++i) change_value(value, random);
-  const std::string changed = value.dump(2);
+  // Most of what is changed stands on one line.
+  const std::string changed = value.dump(text.find('\n') == std::string::npos ? -1 : 2);
   return random.one_in(4) ? mutated_text(changed, random) : changed;
 }
 
