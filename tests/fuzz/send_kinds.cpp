@@ -59,6 +59,9 @@ void closed_descriptors_on_a_port(Scene& scene) {
   command.in = (which & 1U) != 0 ? Stream::kClosed : Stream::kUsual;
   command.out = (which & 2U) != 0 ? Stream::kClosed : Stream::kUsual;
   command.err = (which & 4U) != 0 ? Stream::kClosed : Stream::kUsual;
+  // The program is carried out; that its result cannot be told is a failure.
+  scene.plan.may_fail = command.out == Stream::kClosed;
+  scene.plan.must_work = !scene.plan.may_fail;
 }
 
 void any_program(Scene& scene) {
