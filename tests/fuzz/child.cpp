@@ -95,9 +95,7 @@ std::vector<char*> pointers(Arguments& words) {
     execv(argv.front(), argv.data());
     _exit(127);
   }
-  std::signal(SIGXFSZ, SIG_IGN);
-  std::signal(SIGPIPE, SIG_IGN);
-  const int code = app::run_command_line(command.arguments);
+  const int code = app::run_main(static_cast<int>(words.size()), argv.data());
   std::cout.flush();
   std::fflush(nullptr);
   // Not exit(): a logging library that comes with the picture reader joins threads there which a
