@@ -23,6 +23,7 @@
 #include "cam/report/leak_words.h"
 #include "cam/report/report_json.h"
 #include "core/error.h"
+#include "core/files.h"
 #include "core/folder_lock.h"
 #include "core/toml_fields.h"
 
@@ -185,7 +186,7 @@ int cam_command(const Arguments& command_line) {
   options.parse(command_line);
   const Console console(options.common().json, options.common().quiet);
   std::optional<FolderLock> reading;
-  if (fs::is_directory(settings.source)) {
+  if (is_folder(settings.source)) {
     reading.emplace(settings.source, FolderLock::Kind::kShared);
   }
   const Lens lens = read_lens(settings.source);

@@ -12,6 +12,7 @@
 #include "app/lens_note.h"
 #include "app/option_set.h"
 #include "core/error.h"
+#include "core/files.h"
 #include "core/image_io.h"
 #include "core/lens.h"
 #include "core/mesh_io.h"
@@ -103,7 +104,7 @@ void require_fitting_options(const OptionSet& options, Format format) {
 }
 
 void require_file_target(const std::string& out) {
-  if (fs::is_directory(out)) throw InputError("--out " + out + ": is a folder, not a file");
+  if (is_folder(out)) throw InputError("--out " + out + ": is a folder, not a file");
 }
 
 /// What is exported and what it is called in messages.

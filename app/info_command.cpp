@@ -10,6 +10,7 @@
 #include "app/json_output.h"
 #include "app/option_set.h"
 #include "core/error.h"
+#include "core/files.h"
 #include "core/image_io.h"
 #include "core/lens.h"
 #include "core/mesh_io.h"
@@ -160,7 +161,7 @@ bool has_extension(const fs::path& path, std::initializer_list<const char*> exte
 }
 
 Description describe(const fs::path& path, const CommonOptions& common) {
-  if (fs::is_directory(path)) return describe_lens(path);
+  if (is_folder(path)) return describe_lens(path);
   if (has_extension(path, {".ngc", ".nc", ".gcode", ".tap"})) return describe_gcode(path);
   const bool iges = has_extension(path, {".igs", ".iges"});
   if (iges || has_extension(path, {".step", ".stp"})) return describe_solid(path, iges, common);

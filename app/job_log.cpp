@@ -71,7 +71,8 @@ void JobLog::line(const std::string& text) {
 }
 
 void JobLog::begin(const OptionSet& options, const JobIdentity& job) {
-  line(program_mark() + " send " + options.used().dump());
+  constexpr auto kReplace = nlohmann::json::error_handler_t::replace;  // Names need not be UTF-8.
+  line(program_mark() + " send " + options.used().dump(-1, ' ', false, kReplace));
   line("program " + job.name + ", " + std::to_string(job.bytes) + " bytes, sha256 " + job.sha256);
 }
 

@@ -14,6 +14,7 @@
 #include "app/option_set.h"
 #include "app/render_setup.h"
 #include "core/error.h"
+#include "core/files.h"
 #include "core/image_io.h"
 #include "core/lens.h"
 #include "core/mesh_io.h"
@@ -97,7 +98,7 @@ Scene load_solid(const std::string& source, const Executor& executor, const RunC
 Scene load(const std::string& source, const Executor& executor, const RunControl& control,
            const Console& console) {
   if (is_step(source)) return load_solid(source, executor, control, console);
-  if (fs::is_directory(source)) {
+  if (is_folder(source)) {
     Lens lens = read_lens(source);
     note_unfinished_design(lens, console);
     return {std::move(lens.surface), {}, lens.setup, lens.model, std::move(lens.target)};

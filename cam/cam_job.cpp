@@ -131,7 +131,9 @@ class Job {
     PendingFiles files(folder_);
     if (prediction) add_pictures(*prediction, files);
     files.add(cam_file::kPage, report_html(result.report));
-    files.add(cam_file::kReport, report_json(result.report).dump(1) + "\n");
+    // The job is called as its folder, whose name need not be UTF-8.
+    constexpr auto kReplace = nlohmann::json::error_handler_t::replace;
+    files.add(cam_file::kReport, report_json(result.report).dump(1, ' ', false, kReplace) + "\n");
     publish(programs, others, files, result);
     result.message = result.report.verdict.passes()
                          ? "done, all limits met"

@@ -196,6 +196,11 @@ std::string read_whole_file(const fs::path& path, std::uintmax_t max_bytes) {
   return content;
 }
 
+bool is_folder(const fs::path& path) {
+  std::error_code ignored;
+  return fs::is_directory(path, ignored);
+}
+
 void require_writable_folder(const fs::path& folder) {
   std::error_code error;
   fs::create_directories(folder, error);

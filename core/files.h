@@ -57,6 +57,9 @@ std::ifstream open_input(const std::filesystem::path& path);
 /// `max_bytes`.
 std::string read_whole_file(const std::filesystem::path& path, std::uintmax_t max_bytes);
 
+/// Whether it is a folder; false for what cannot be looked at, such as a loop of links.
+bool is_folder(const std::filesystem::path& path);
+
 /// Makes `folder` (and its parents) if need be and proves that files can be made in it.
 /// @throw InputError naming the folder and the system's reason.
 void require_writable_folder(const std::filesystem::path& folder);

@@ -86,7 +86,7 @@ nlohmann::json path_json(const ReportPath& path, std::size_t number) {
 /// JSON inside a script element: no "<" may stand in it.
 std::string script_json(const nlohmann::json& value) {
   std::string text;
-  for (const char c : value.dump()) {
+  for (const char c : value.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace)) {
     if (c == '<') {
       text.append("\\u003c");
     } else {

@@ -207,5 +207,13 @@ TEST(Files, ANameThatJustFitsItsFolderIsWritten) {
   }
 }
 
+TEST(Files, ALoopOfLinksIsNoFolder) {
+  const TempFolder folder;
+  std::filesystem::create_symlink("loop", folder / "loop");
+  EXPECT_FALSE(is_folder(folder / "loop"));
+  EXPECT_FALSE(is_folder(folder / "none"));
+  EXPECT_TRUE(is_folder(folder.path()));
+}
+
 }  // namespace
 }  // namespace lensforge

@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Pictures and designs.
+#include <cstdint>
+
+#include "fuzz/pictures.h"
+#include "fuzz/scene.h"
+
+namespace lensforge::fuzz {
+namespace {
+
+/// Puts a bad picture into the sandbox and returns its name.
+std::string place_bad_picture(Scene& scene) {
+  Random& random = scene.random;
+  const std::vector<std::string> pictures = scene.base.paths("pictures/");
+  const std::string& source = random.pick(pictures);
+  std::string extension = source.substr(source.rfind('.') + 1);
+  std::string bytes = mutated_bytes(scene.base.bytes(source), random);
+  if (random.one_in(3)) {
+    static const std::vector<std::string> kDrawn{"png", "png", "pgm", "bmp",
+                                                 "ico", "gif", "tga", "tif"};
+    extension = random.pick(kDrawn);
+    bytes = extension == "png"   ? odd_png(random)
+            : extension == "pgm" ? odd_pnm(random)
+                                 : odd_small_picture(extension, random);
+  }
+  if (random.one_in(10)) {
+    const std::string& other = random.pick(pictures);
+    extension = other.substr(other.rfind('.') + 1);
+  }
+  std::string name = "a." + extension;
+  scene.write(name, bytes);
+  return name;
+}
+
+void bad_picture(Scene& scene) {
+  const std::string name = place_bad_picture(scene);
+  switch (scene.random.below(4)) {
+    case 0:
+      scene.run(scene.info(name));
+      return;
+    case 1:
+      scene.copy("lens/", "lens/");
+      scene.run(scene.render("lens").set("--target", name));
+      return;
+    default:
+      scene.run(scene.design(name, "out"));
+      scene.plan.product = "out";
+  }
+}
+
+void design_options(Scene& scene) {
+  scene.copy("pictures/a.png", "a.png");
+  scene.copy("lens/", "lens/");
+  scene.add_users_files("");
+  CommandLine line = scene.design("a.png", "out");
+  scene.spoil_options(line, 1 + scene.random.below(3));
+  scene.run(line);
+}
+
+const std::vector<std::string>& files_of_a_lens() {
+  static const std::vector<std::string> names{
+      "target.png",  "target.exr",   "render.png",      "render.exr",     "error.png",
+      "surface.ply", "overview.png", "convergence.csv", "checkpoint.bin", "lens.json"};
+  return names;
+}
+
+/// Others' files under the names that a design would write.
+void design_over_others(Scene& scene) {
+  scene.copy("pictures/a.png", "a.png");
+  scene.add_users_files("out");
+  for (std::size_t i = 0; i < 1 + scene.random.below(3); ++i) {
+    const std::string path = "out/" + scene.random.pick(files_of_a_lens());
+    scene.write(path, "mine " + std::to_string(scene.random.next()));
+    scene.plan.forced.insert(path);
+  }
+  CommandLine line = scene.design("a.png", "out");
+  if (scene.random.one_in(3)) {
+    line.flag("--force");
+  } else {
+    scene.plan.forced.clear();
+    scene.plan.must_refuse = true;
+  }
+  scene.run(line);
+}
+
+/// An old lens, cut, with a user's files beside it.
+void design_force(Scene& scene) {
+  scene.copy("pictures/a.png", "a.png");
+  scene.copy_ours("lens/", "out/");
+  scene.add_users_files("out");
+  scene.add_users_files("out/cam");
+  scene.plan.lens = "out";
+  CommandLine line = scene.design("a.png", "out");
+  line.flag("--force");
+  if (scene.random.one_in(2)) line.set("--rounds", "20");
+  if (scene.random.one_in(3)) scene.spoil_options(line, 1);
+  if (scene.random.one_in(2)) scene.interrupt_within(0.5);
+  if (scene.random.one_in(6)) line = line.set("--focal", "0.5mm");
+  Command& command = scene.run(line);
+  if (scene.random.one_in(6)) {
+    command.file_size_limit = 100 + scene.random.below(20'000);
+    scene.plan.may_fail = true;
+  }
+}
+
+/// The sum at the end of a checkpoint: FNV-1a, 64 bit, little-endian.
+std::string checkpoint_sum(const std::string& content) {
+  std::uint64_t value = 0xcbf29ce484222325U;
+  for (const char c : content) value = (value ^ static_cast<unsigned char>(c)) * 0x100000001b3U;
+  std::string bytes;
+  for (unsigned shift = 0; shift < 64; shift += 8) {
+    bytes += static_cast<char>((value >> shift) & 0xFFU);
+  }
+  return bytes;
+}
+
+/// A checkpoint with its header or its numbers changed; mostly its sum is right again.
+std::string bad_checkpoint(const std::string& good, Random& random) {
+  constexpr std::size_t kSum = 8;
+  std::string content = good.substr(0, good.size() - kSum);
+  const std::size_t header = content.find('\n') + 1;
+  const std::size_t numbers = content.find('\n', header);
+  const std::string json = content.substr(header, numbers - header);
+  switch (random.below(3)) {
+    case 0:
+      content = content.substr(0, header) + mutated_json(json, random) + content.substr(numbers);
+      break;
+    case 1:
+      content = content.substr(0, numbers) + mutated_bytes(content.substr(numbers), random);
+      break;
+    default:
+      return mutated_bytes(good, random);
+  }
+  return content + checkpoint_sum(content);
+}
+
+void design_resume(Scene& scene) {
+  scene.copy("pictures/a.png", "a.png");
+  scene.add_users_files("out");
+  CommandLine line = scene.design("a.png", "out");
+  line.set("--rounds", scene.random.one_in(2) ? "1000" : "2").flag("--resume");
+  const std::string& good = scene.base.bytes("partial/checkpoint.bin");
+  if (!scene.random.one_in(8)) {
+    scene.write("out/checkpoint.bin",
+                scene.random.one_in(4) ? good : bad_checkpoint(good, scene.random));
+    scene.plan.ours.insert("out/checkpoint.bin");
+  }
+  if (scene.random.one_in(4)) scene.copy_ours("lens/", "out/");
+  if (scene.random.one_in(3)) scene.spoil_options(line, 1);
+  scene.interrupt_within(1.0);
+  scene.run(line);
+}
+
+void good_design(Scene& scene) {
+  scene.copy("pictures/a.png", "a.png");
+  scene.add_users_files("out");
+  scene.plan.must_work = true;
+  scene.plan.product = "out";
+  scene.run(scene.design("a.png", "out"));
+}
+
+}  // namespace
+
+std::vector<Kind> design_kinds() {
+  return {{"picture", 10, bad_picture},
+          {"design options", 8, design_options},
+          {"design over others' files", 3, design_over_others},
+          {"design --force", 4, design_force},
+          {"design --resume", 4, design_resume},
+          {"good design", 1, good_design}};
+}
+
+}  // namespace lensforge::fuzz

@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fuzz/pictures.h"
+
+#include <zlib.h>
+
+#include <cstdint>
+#include <vector>
+
+#include "fuzz/mutation.h"
+
+namespace lensforge::fuzz {
+namespace {
+
+std::string big_endian(std::uint32_t value) {
+  std::string bytes;
+  for (int shift = 24; shift >= 0; shift -= 8) {
+    bytes += static_cast<char>((value >> static_cast<unsigned>(shift)) & 0xFFU);
+  }
+  return bytes;
+}
+
+std::string little_endian(std::uint32_t value, int bytes) {
+  std::string text;
+  for (int i = 0; i < bytes; ++i) text += static_cast<char>((value >> (8U * unsigned(i))) & 0xFFU);
+  return text;
+}
+
+std::string chunk(const std::string& name, const std::string& data) {
+  const std::string named = name + data;
+  const auto sum =
+      crc32(0, reinterpret_cast<const Bytef*>(named.data()), static_cast<uInt>(named.size()));
+  return big_endian(static_cast<std::uint32_t>(data.size())) + named +
+         big_endian(static_cast<std::uint32_t>(sum));
+}
+
+std::string deflated(const std::string& data) {
+  std::string packed(compressBound(data.size()), '\0');
+  uLongf size = packed.size();
+  compress(reinterpret_cast<Bytef*>(packed.data()), &size,
+           reinterpret_cast<const Bytef*>(data.data()), data.size());
+  packed.resize(size);
+  return packed;
+}
+
+std::uint32_t odd_side(Random& random) {
+  static const std::vector<std::uint32_t> kSides{
+      0, 1, 2, 3, 4, 5, 7, 16385, 65535, 65536, 16384, 100000, 1000000, 2147483647, 4294967295};
+  return random.one_in(2) ? 4 + static_cast<std::uint32_t>(random.below(12)) : random.pick(kSides);
+}
+
+/// A chunk that few pictures have.
+std::string odd_chunk(Random& random) {
+  static const std::vector<std::string> kNames{"gAMA", "cHRM", "iCCP", "tEXt", "zTXt", "tRNS",
+                                               "bKGD", "acTL", "fcTL", "fdAT", "eXIf", "PLTE",
+                                               "sBIT", "pHYs", "IHDR", "IEND", "abcd", "ABCD"};
+  const std::string& name = random.pick(kNames);
+  if (name == "tEXt") return chunk(name, "Comment" + std::string(1, '\0') + hostile_word(random));
+  if (name == "iCCP") return chunk(name, "p" + std::string(2, '\0') + deflated(random.bytes(200)));
+  return chunk(name, random.bytes(random.one_in(4) ? 0 : random.below(30)));
+}
+
+}  // namespace
+
+std::string odd_png(Random& random) {
+  static const std::vector<int> kDepths{1, 2, 4, 8, 8, 8, 16, 16, 3, 0, 32};
+  static const std::vector<int> kTypes{0, 0, 2, 3, 4, 6, 1, 7};
+  const std::uint32_t columns = odd_side(random);
+  const std::uint32_t rows = random.one_in(2) ? 8 : odd_side(random);
+  std::string head = big_endian(columns) + big_endian(rows);
+  head += static_cast<char>(random.pick(kDepths));
+  head += static_cast<char>(random.pick(kTypes));
+  head += std::string(2, '\0');
+  head += static_cast<char>(random.one_in(4) ? random.below(3) : 0);
+  std::string png = "\x89PNG\r\n\x1a\n" + chunk("IHDR", head);
+  if (random.one_in(2)) png += odd_chunk(random);
+  if (random.one_in(3)) png += chunk("PLTE", random.bytes(3 * random.below(20)));
+  const std::size_t size = random.one_in(10) ? 4'000'000 : 8 + random.below(4000);
+  std::string rest = random.one_in(2) ? std::string(size, '\0') : random.bytes(size);
+  png += chunk("IDAT", deflated(rest));
+  if (random.one_in(3)) png += odd_chunk(random);
+  return png + chunk("IEND", "");
+}
+
+std::string odd_pnm(Random& random) {
+  static const std::vector<std::string> kKinds{"P1", "P2", "P2", "P3", "P4", "P5",
+                                               "P5", "P6", "P7", "PF", "Pf"};
+  static const std::vector<std::string> kMost{"255", "255", "0", "1", "65535", "65536", "-1", "15"};
+  std::string text = random.pick(kKinds) + "\n";
+  if (random.one_in(4)) text += "# " + hostile_word(random) + "\n";
+  text += (random.one_in(4) ? hostile_number(random) : "6") + " ";
+  text += (random.one_in(4) ? hostile_number(random) : "5") + "\n" + random.pick(kMost) + "\n";
+  if (random.one_in(2)) return text + random.bytes(random.below(400));
+  for (int i = 0; i < 90; ++i) {
+    text += (random.one_in(60) ? hostile_number(random) : std::to_string(random.below(256))) + " ";
+  }
+  return text;
+}
+
+std::string odd_small_picture(const std::string& extension, Random& random) {
+  const std::uint32_t columns = odd_side(random);
+  const std::uint32_t rows = odd_side(random);
+  const std::string pixels = random.bytes(random.below(1000));
+  const auto two = [](std::uint32_t value) { return little_endian(value, 2); };
+  const auto four = [](std::uint32_t value) { return little_endian(value, 4); };
+  const std::string bitmap = four(40) + four(columns) + four(rows) + two(1) + two(24) + four(0) +
+                             four(odd_side(random)) + std::string(16, '\0') + pixels;
+  if (extension == "bmp") return "BM" + four(54 + 300) + four(0) + four(54) + bitmap;
+  if (extension == "ico") {
+    const std::string data = random.one_in(2) ? odd_png(random) : bitmap;
+    return two(0) + two(1) + two(odd_side(random) & 7U) + random.bytes(4) + two(1) + two(32) +
+           four(static_cast<std::uint32_t>(data.size())) + four(22) + data;
+  }
+  if (extension == "gif") {
+    return "GIF89a" + two(columns) + two(rows) + "\xF0" + std::string(2, '\0') + random.bytes(6) +
+           "," + two(0) + two(0) + two(columns) + two(rows) + std::string(1, '\0') + "\x02\x02" +
+           random.bytes(2) + std::string(1, '\0') + ";";
+  }
+  if (extension == "tga") {
+    return std::string(2, '\0') + "\x02" + std::string(9, '\0') + two(columns) + two(rows) +
+           "\x18" + std::string(1, '\0') + pixels;
+  }
+  std::string tiff = "II*" + std::string(1, '\0') + four(8) + two(8);
+  for (const auto& [tag, value] :
+       std::vector<std::pair<std::uint32_t, std::uint32_t>>{{256, columns},
+                                                            {257, rows},
+                                                            {258, 8},
+                                                            {259, 1},
+                                                            {262, 1},
+                                                            {273, 110},
+                                                            {277, 1},
+                                                            {279, odd_side(random)}}) {
+    tiff += two(tag) + two(4) + four(random.one_in(12) ? odd_side(random) : 1) + four(value);
+  }
+  return tiff + four(random.one_in(8) ? 8 : 0) + pixels;
+}
+
+}  // namespace lensforge::fuzz

@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <string>
+
+#include "fuzz/random.h"
+
+/// Pictures drawn by the campaign itself. Their check sums hold, so that what is wrong with them is
+/// met behind the first look at them.
+namespace lensforge::fuzz {
+
+/// A PNG with an odd size, depth, colour type, palette, chunk, text, order or amount of data.
+std::string odd_png(Random& random);
+/// A PGM or PPM, of text or bytes, with an odd size, maximum or value.
+std::string odd_pnm(Random& random);
+/// BMP, GIF, ICO, TGA or TIFF: little more than a header, with odd numbers in it.
+std::string odd_small_picture(const std::string& extension, Random& random);
+
+}  // namespace lensforge::fuzz
