@@ -51,7 +51,7 @@ void Console::note(const std::string& message) const {
 }
 
 void Console::result(const nlohmann::json& object, const std::string& text) const {
-  print_to_stdout(json_ ? dump(object) : text);
+  print_to_stdout(json_ ? dump(object) : printable_lines(text));
 }
 
 }  // namespace lensforge::app

@@ -186,7 +186,8 @@ class SendRun {
       throw InputError(path.string() + ": is the journal of another program (" + record_->job.name +
                        "), not of " + settings_.file);
     }
-    if (!fs::exists(path)) return;
+    std::error_code none;
+    if (fs::status(path, none).type() == fs::file_type::not_found) return;
     require_regular_file(path);
     if (settings_.restart || fs::is_empty(path) || read_journal(path).finished) return;
     throw InputError(path.string() +

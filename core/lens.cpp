@@ -274,7 +274,9 @@ Lens read_lens(const fs::path& folder) {
   lens.provenance = fields.at("provenance");
   lens.surface = read_surface(fields, lens.setup, folder);
   lens.target = read_picture(folder / lens_file::kTargetExr, lens.setup);
-  if (const fs::path render = folder / lens_file::kRenderExr; fs::exists(render)) {
+  const fs::path render = folder / lens_file::kRenderExr;
+  std::error_code none;
+  if (fs::status(render, none).type() != fs::file_type::not_found) {
     lens.render = read_picture(render, lens.setup);
   }
   return lens;

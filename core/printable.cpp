@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "core/printable.h"
 
+#include <algorithm>
 #include <cstdint>
 
 namespace lensforge {
@@ -87,6 +88,17 @@ std::string printable_line(std::string_view text, std::size_t max_bytes) {
   while (inside_character(line, head)) --head;
   while (inside_character(line, tail)) ++tail;
   return line.substr(0, head).append(kCut).append(line.substr(tail));
+}
+
+std::string printable_lines(std::string_view text) {
+  std::string lines;
+  while (!text.empty()) {
+    const std::size_t end = std::min(text.find('\n'), text.size());
+    lines += harmless(text.substr(0, end));
+    if (end < text.size()) lines += '\n';
+    text.remove_prefix(std::min(end + 1, text.size()));
+  }
+  return lines;
 }
 
 }  // namespace lensforge

@@ -16,4 +16,7 @@ inline constexpr std::size_t kMaxMessageBytes = 1000;
 /// where " ... " stands then. @pre max_bytes ≥ 16
 std::string printable_line(std::string_view text, std::size_t max_bytes = kMaxMessageBytes);
 
+/// Text of several lines, each made harmless as printable_line() does it; none is cut.
+std::string printable_lines(std::string_view text);
+
 }  // namespace lensforge

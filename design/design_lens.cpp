@@ -107,9 +107,9 @@ class Schedule {
     try {
       run_levels();
     } catch (const InputError&) {
-      // It could only be resumed to fail again, and would be in the way of better options.
+      // Resumed, it could only fail again, and it would be in the way of better options.
       std::error_code ignored;
-      std::filesystem::remove(options_.checkpoint, ignored);
+      if (!options_.resume) std::filesystem::remove(options_.checkpoint, ignored);
       throw;
     }
     return finish();

@@ -56,6 +56,14 @@ TEST(PrintableLine, ACutNeverSplitsACharacter) {
   }
 }
 
+TEST(PrintableLines, LinesStayLines) {
+  EXPECT_EQ(printable_lines("a\x1b[2J\n  b\n\nc"), "a?[2J\n  b\n\nc");
+  EXPECT_EQ(printable_lines("a\n"), "a\n");
+  EXPECT_EQ(printable_lines(""), "");
+  const std::string wide(5000, 'x');
+  EXPECT_EQ(printable_lines(wide + "\r\n"), wide + " \n");
+}
+
 TEST(PrintableLine, OfRandomBytesOnlyPrintableOnesAreLeft) {
   std::mt19937 random(1);
   for (int run = 0; run < 2000; ++run) {

@@ -84,7 +84,9 @@ std::vector<char*> pointers(Arguments& words) {
   set_stream(STDIN_FILENO, command.in, "/dev/null");
   set_stream(STDOUT_FILENO, command.out, record.string() + ".out");
   set_stream(STDERR_FILENO, command.err, record.string() + ".err");
+#ifndef __SANITIZE_ADDRESS__  // It maps terabytes that it never touches.
   limit(RLIMIT_AS, kMaxMemory);
+#endif
   limit(RLIMIT_CORE, 0);
   limit(RLIMIT_FSIZE, command.file_size_limit > 0 ? command.file_size_limit : kMaxFile);
   for (const int number : {SIGINT, SIGTERM, SIGHUP}) std::signal(number, SIG_DFL);
