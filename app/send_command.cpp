@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <filesystem>
 #include <memory>
+#include <system_error>
 
 #include "app/commands.h"
 #include "app/console.h"
@@ -186,7 +187,8 @@ class SendRun {
       throw InputError(path.string() + ": is the journal of another program (" + record_->job.name +
                        "), not of " + settings_.file);
     }
-    if (!fs::exists(path)) return;
+    std::error_code ignored;
+    if (fs::status(path, ignored).type() == fs::file_type::not_found) return;
     require_regular_file(path);
     if (settings_.restart || fs::is_empty(path) || read_journal(path).finished) return;
     throw InputError(path.string() +

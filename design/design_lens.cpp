@@ -103,13 +103,14 @@ class Schedule {
   }
 
   DesignResult run() {
-    save();
+    if (!options_.resume) save();
     try {
       run_levels();
     } catch (const InputError&) {
-      // It could only be resumed to fail again, and would be in the way of better options.
+      // It could only be resumed to fail again, and would be in the way of better options. One that
+      // was there before stays: it is not this run's.
       std::error_code ignored;
-      std::filesystem::remove(options_.checkpoint, ignored);
+      if (!options_.resume) std::filesystem::remove(options_.checkpoint, ignored);
       throw;
     }
     return finish();

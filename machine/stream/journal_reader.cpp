@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <system_error>
 
 #include "core/files.h"
 #include "machine/stream/journal.h"
@@ -176,7 +177,10 @@ bool goes_on(std::ifstream& file) {
 }  // namespace
 
 JournalRecord read_journal(const fs::path& path) {
-  if (!fs::exists(path)) refuse(path, "there is no journal to resume from");
+  std::error_code ignored;
+  if (fs::status(path, ignored).type() == fs::file_type::not_found) {
+    refuse(path, "there is no journal to resume from");
+  }
   std::ifstream file = open_input(path);
   JournalRecord journal;
   Bounds bounds;
