@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <filesystem>
 #include <memory>
+#include <system_error>
 
 #include "app/commands.h"
 #include "app/console.h"

@@ -103,7 +103,7 @@ class Schedule {
   }
 
   DesignResult run() {
-    save();
+    if (!options_.resume) save();
     try {
       run_levels();
     } catch (const InputError&) {
