@@ -4,7 +4,6 @@
 #include <sys/ioctl.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
@@ -50,23 +49,6 @@ int report_error(const std::string& message, int exit_code, bool json) noexcept 
 void Console::note(const std::string& message) const {
   if (!quiet_) std::fprintf(stderr, "lensforge: %s\n", printable_line(message).c_str());
 }
-
-namespace {
-
-/// Results quote names of files, which may hold anything: each line becomes one that a terminal
-/// shows and does not obey.
-std::string printable_lines(std::string_view text) {
-  constexpr std::size_t kLongest = 10'000;  // Bytes: a path of the longest kind and some words.
-  std::string printed;
-  while (!text.empty()) {
-    const std::size_t end = std::min(text.find('\n'), text.size());
-    printed.append(printable_line(text.substr(0, end), kLongest)).append("\n");
-    text.remove_prefix(std::min(end + 1, text.size()));
-  }
-  return printed;
-}
-
-}  // namespace
 
 void Console::result(const nlohmann::json& object, const std::string& text) const {
   print_to_stdout(json_ ? dump(object) : printable_lines(text));
