@@ -268,12 +268,12 @@ std::vector<LimitCheck> safety_checks(const CutPlan& plan, const Lens& lens) {
       static_cast<double>(plan.collisions().size() + plan.watch().faults().size());
   std::vector<LimitCheck> checks{
       {"collisions", "collisions", collisions, 0.0, "", 0},
-      {"table", "cut below the blank's underside", depth_in_table(plan), 0.0, "mm", 4}};
+      {"table", "cut below the blank", depth_in_table(plan), 0.0, "mm", 4}};
   const Eigen::Vector3d extent = plan.watch().extent();
   const Eigen::Vector3d& travel = plan.options().workshop.machine.travel;
   for (int axis = 0; axis < 3; ++axis) {
     checks.push_back({std::string("travel_") + "xyz"[axis],
-                      std::string("travel of the machine along ") + "XYZ"[axis], extent[axis],
+                      std::string("machine travel along ") + "XYZ"[axis], extent[axis],
                       travel[axis], "mm", 2});
   }
   if (plan.options().workshop.material.ior > 0.0) {

@@ -78,7 +78,7 @@ TEST_F(Cam, ATravelTooShortAndAnotherIndexAreMissedLimits) {
   write(at("shop.toml"), "[machine]\ntravel_x = 90.0\n[material]\nior = 1.586\n");
   const Outcome outcome = run(cam({"--workshop", path("shop.toml")}));
   EXPECT_EQ(outcome.exit_code, 3);
-  EXPECT_THAT(outcome.out, HasSubstr("limit not met: travel of the machine along X"));
+  EXPECT_THAT(outcome.out, HasSubstr("limit not met: machine travel along X"));
   EXPECT_THAT(outcome.err, HasSubstr("the workshop's material has index 1.586, the lens was "
                                      "designed for 1.49"));
   EXPECT_THAT(content(at("lens/cam/report.html")), HasSubstr("machine&#39;s travel"));
