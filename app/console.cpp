@@ -4,6 +4,7 @@
 #include <sys/ioctl.h>
 #include <unistd.h>
 
+#include <array>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
@@ -14,9 +15,29 @@
 namespace lensforge::app {
 namespace {
 
+/// DEL and C1, which JSON lets stand in its strings and terminals obey, as \u escapes.
+std::string without_controls(const std::string& json) {
+  std::string text;
+  text.reserve(json.size());
+  for (std::size_t i = 0; i < json.size(); ++i) {
+    const auto next = static_cast<unsigned char>(i + 1 < json.size() ? json[i + 1] : '\0');
+    const bool c1 = json[i] == '\xC2' && next >= 0x80 && next < 0xA0;
+    if (!c1 && json[i] != '\x7F') {
+      text += json[i];
+      continue;
+    }
+    std::array<char, 8> escape{};
+    std::snprintf(escape.data(), escape.size(), "\\u%04x", c1 ? next : 0x7FU);
+    text += escape.data();
+    if (c1) ++i;
+  }
+  return text;
+}
+
 /// File names need not be UTF-8, which JSON has to be: other bytes become U+FFFD.
 std::string dump(const nlohmann::json& object) {
-  return object.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+  const auto replace = nlohmann::json::error_handler_t::replace;
+  return without_controls(object.dump(2, ' ', false, replace)) + "\n";
 }
 
 }  // namespace

@@ -24,6 +24,9 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kSide = 12;  ///< Pixels of the pictures.
+/// Of HEIF: OpenImageIO 2.4's writer reads beyond rows that are no multiple of 192 bytes (found by
+/// the address sanitizer).
+constexpr int kHeifSide = 64;
 
 /// Extensions that OpenImageIO may be able to write; those that it cannot are left out.
 constexpr std::array kExtensions{"png", "jpg", "tif",  "exr", "bmp",   "tga", "gif",  "ico",
@@ -34,12 +37,13 @@ void write_picture(const fs::path& path) {
   const auto out = OIIO::ImageOutput::create(path.string());
   if (!out) return;
   const int channels = path.extension() == ".pgm" ? 1 : 3;
+  const int side = path.extension() == ".heic" ? kHeifSide : kSide;
   std::vector<float> values;
-  for (int i = 0; i < kSide * kSide * channels; ++i) {
+  for (int i = 0; i < side * side * channels; ++i) {
     values.push_back(0.2F + 0.06F * static_cast<float>((i / channels * 7) % kSide));
   }
   const bool real = path.extension() == ".exr" || path.extension() == ".hdr";
-  const OIIO::ImageSpec spec(kSide, kSide, channels,
+  const OIIO::ImageSpec spec(side, side, channels,
                              real ? OIIO::TypeDesc::FLOAT : OIIO::TypeDesc::UINT8);
   if (out->open(path.string(), spec)) out->write_image(OIIO::TypeDesc::FLOAT, values.data());
 }

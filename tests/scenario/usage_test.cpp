@@ -107,6 +107,16 @@ TEST_F(Usage, AConfigFileThatAsksForJsonIsHeededByErrorsToo) {
   }
 }
 
+TEST_F(Usage, JsonEscapesWhatTerminalsObey) {
+  const std::string name =
+      "\xc2\x9b"
+      "2J\x7f.png";
+  fs::copy_file(picture("rings.png"), at(name));
+  const Outcome outcome = run({"info", path(name), "--json"});
+  EXPECT_EQ(outcome.json()["source"], path(name));
+  EXPECT_THAT(outcome.out, HasSubstr("\\u009b2J\\u007f.png"));
+}
+
 TEST_F(Usage, MoreThreadsThanProcessorsAreNoError) {
   Arguments arguments = small_design(picture("rings.png"), path("lens"));
   arguments.back() = "1024";
