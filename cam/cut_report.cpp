@@ -8,6 +8,7 @@
 #include "cam/report/html_text.h"
 #include "core/decimal_text.h"
 #include "core/trimmed_decimal.h"
+#include "core/version.h"
 
 namespace lensforge {
 namespace {
@@ -315,7 +316,7 @@ ReportData make_report(const CutPlan& plan, const ProgramFiles& programs,
   const CamOptions& options = plan.options();
   ReportData data;
   data.job = options.job;
-  data.program = "lensforge " LENSFORGE_VERSION;
+  data.program = program_mark();
   data.part = options.part == PartKind::kLens ? "lens" : "mould";
   data.lens_size = lens.setup.lens_size;
   data.leakage_options = options.leakage;
