@@ -23,9 +23,9 @@
 #include "cam/report/leak_words.h"
 #include "cam/report/report_json.h"
 #include "core/error.h"
-#include "core/files.h"
-#include "core/folder_lock.h"
-#include "core/toml_fields.h"
+#include "core/io/files.h"
+#include "core/io/folder_lock.h"
+#include "core/text/toml_fields.h"
 
 namespace lensforge::app {
 namespace {

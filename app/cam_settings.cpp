@@ -8,7 +8,7 @@
 
 #include "cam/post/program_writer.h"
 #include "core/error.h"
-#include "core/number_text.h"
+#include "core/text/number_text.h"
 
 namespace lensforge::app {
 namespace {

@@ -15,7 +15,7 @@
 #include "app/standard_descriptors.h"
 #include "app/toml_config.h"
 #include "core/error.h"
-#include "core/version.h"
+#include "core/text/version.h"
 
 namespace lensforge::app {
 namespace {

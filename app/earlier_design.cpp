@@ -5,9 +5,9 @@
 #include <system_error>
 
 #include "core/error.h"
-#include "core/files.h"
-#include "core/lens.h"
-#include "core/output_guard.h"
+#include "core/io/files.h"
+#include "core/io/output_guard.h"
+#include "core/surface/lens.h"
 #include "design/design_lens.h"
 
 namespace lensforge::app {

@@ -12,7 +12,7 @@
 
 #include "app/json_output.h"
 #include "core/error.h"
-#include "core/version.h"
+#include "core/text/version.h"
 #include "design/render_lens.h"
 #include "design/wanted_picture.h"
 #include "export/closed_solid.h"

@@ -8,7 +8,7 @@
 #include "app/console.h"
 #include "app/interruptible_job.h"
 #include "app/option_set.h"
-#include "core/lens.h"
+#include "core/surface/lens.h"
 #include "export/spline_net.h"
 #include "export/step_file.h"
 

@@ -8,7 +8,7 @@
 #include <string_view>
 
 #include "core/error.h"
-#include "core/files.h"
+#include "core/io/files.h"
 
 namespace lensforge::app {
 namespace {

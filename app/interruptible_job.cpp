@@ -4,7 +4,7 @@
 #include <unistd.h>
 
 #include "app/exit_code.h"
-#include "core/number_text.h"
+#include "core/text/number_text.h"
 #include "export/export_work.h"
 
 namespace lensforge::app {

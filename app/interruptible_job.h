@@ -12,9 +12,9 @@
 #include "app/option_set.h"
 #include "app/output_folder.h"
 #include "app/progress_display.h"
-#include "core/executor.h"
-#include "core/run_control.h"
-#include "core/work_estimate.h"
+#include "core/compute/executor.h"
+#include "core/compute/run_control.h"
+#include "core/compute/work_estimate.h"
 
 namespace lensforge::app {
 

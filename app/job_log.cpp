@@ -8,8 +8,8 @@
 #include "app/json_output.h"
 #include "app/operator_view.h"
 #include "core/error.h"
-#include "core/printable.h"
-#include "core/version.h"
+#include "core/text/printable.h"
+#include "core/text/version.h"
 
 namespace lensforge::app {
 namespace {

@@ -5,8 +5,8 @@
 #include <optional>
 #include <string>
 
-#include "core/metrics.h"
-#include "core/optical_setup.h"
+#include "core/image/metrics.h"
+#include "core/optics/optical_setup.h"
 
 /// The words and numbers that more than one command prints.
 namespace lensforge::app {

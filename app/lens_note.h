@@ -2,7 +2,7 @@
 #pragma once
 
 #include "app/console.h"
-#include "core/lens.h"
+#include "core/surface/lens.h"
 
 namespace lensforge::app {
 

@@ -11,7 +11,7 @@
 
 #include "app/console.h"
 #include "app/json_output.h"
-#include "core/printable.h"
+#include "core/text/printable.h"
 
 namespace lensforge::app {
 namespace {

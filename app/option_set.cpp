@@ -7,11 +7,11 @@
 #include <sstream>
 
 #include "app/toml_config.h"
+#include "core/compute/gpu.h"
 #include "core/error.h"
-#include "core/files.h"
-#include "core/gpu.h"
-#include "core/units.h"
-#include "core/version.h"
+#include "core/io/files.h"
+#include "core/text/units.h"
+#include "core/text/version.h"
 
 namespace lensforge::app {
 namespace {

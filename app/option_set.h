@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "app/commands.h"
-#include "core/executor.h"
+#include "core/compute/executor.h"
 
 namespace lensforge::app {
 

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/files.h"
+#include "core/io/files.h"
 
 namespace lensforge::app {
 

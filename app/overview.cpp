@@ -6,9 +6,9 @@
 #include <cmath>
 #include <vector>
 
-#include "core/image_io.h"
-#include "core/image_plane.h"
-#include "core/transfer.h"
+#include "core/image/image_io.h"
+#include "core/image/transfer.h"
+#include "core/optics/image_plane.h"
 
 namespace lensforge::app {
 namespace {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "core/image.h"
-#include "core/lens.h"
+#include "core/image/image.h"
+#include "core/surface/lens.h"
 
 namespace lensforge::app {
 

@@ -7,7 +7,7 @@
 #include <cstdio>
 
 #include "app/console.h"
-#include "core/printable.h"
+#include "core/text/printable.h"
 
 namespace lensforge::app {
 namespace {

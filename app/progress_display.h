@@ -9,7 +9,7 @@
 #include <string>
 #include <thread>
 
-#include "core/run_control.h"
+#include "core/compute/run_control.h"
 
 namespace lensforge::app {
 

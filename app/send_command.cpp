@@ -18,7 +18,7 @@
 #include "app/send_settings.h"
 #include "app/terminal_keys.h"
 #include "core/error.h"
-#include "core/files.h"
+#include "core/io/files.h"
 #include "machine/gcode/program_seal.h"
 #include "machine/guard/background_guard.h"
 #include "machine/link/serial_link.h"

@@ -3,7 +3,7 @@
 
 #include "app/json_output.h"
 #include "app/operator_view.h"
-#include "core/printable.h"
+#include "core/text/printable.h"
 
 namespace lensforge::app {
 namespace {

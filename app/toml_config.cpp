@@ -8,9 +8,9 @@
 #include <sstream>
 
 #include "core/error.h"
-#include "core/files.h"
-#include "core/printable.h"
-#include "core/toml_fields.h"
+#include "core/io/files.h"
+#include "core/text/printable.h"
+#include "core/text/toml_fields.h"
 
 namespace lensforge::app {
 namespace {

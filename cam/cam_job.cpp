@@ -22,11 +22,11 @@
 #include "cam/report/report_html.h"
 #include "cam/report/report_json.h"
 #include "core/error.h"
-#include "core/error_image.h"
-#include "core/files.h"
-#include "core/image_io.h"
-#include "core/mesh_io.h"
-#include "core/output_guard.h"
+#include "core/image/error_image.h"
+#include "core/image/image_io.h"
+#include "core/io/files.h"
+#include "core/io/output_guard.h"
+#include "core/surface/mesh_io.h"
 
 namespace lensforge {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "cam/finish_setup.h"
 #include "core/error.h"
-#include "core/number_text.h"
+#include "core/text/number_text.h"
 
 namespace lensforge {
 namespace {

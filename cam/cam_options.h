@@ -12,7 +12,7 @@
 #include "cam/post/program_plan.h"
 #include "cam/report/verdict.h"
 #include "cam/tool/workshop.h"
-#include "core/optical_setup.h"
+#include "core/optics/optical_setup.h"
 
 namespace lensforge {
 

@@ -12,9 +12,9 @@
 #include "cam/job_files.h"
 #include "cam/report/report_html.h"
 #include "core/error.h"
-#include "core/files.h"
-#include "core/trimmed_decimal.h"
-#include "core/units.h"
+#include "core/io/files.h"
+#include "core/text/number_text.h"
+#include "core/text/units.h"
 
 namespace lensforge {
 namespace {

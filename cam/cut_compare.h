@@ -8,9 +8,9 @@
 
 #include "cam/cam_options.h"
 #include "cam/report/report_data.h"
-#include "core/executor.h"
-#include "core/lens.h"
-#include "core/run_control.h"
+#include "core/compute/executor.h"
+#include "core/compute/run_control.h"
+#include "core/surface/lens.h"
 
 namespace lensforge {
 

@@ -7,7 +7,7 @@
 
 #include "cam/finish_setup.h"
 #include "cam/prediction.h"
-#include "core/number_text.h"
+#include "core/text/number_text.h"
 
 namespace lensforge {
 namespace {

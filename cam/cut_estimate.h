@@ -4,8 +4,8 @@
 #include <filesystem>
 
 #include "cam/cam_options.h"
-#include "core/optical_setup.h"
-#include "core/work_estimate.h"
+#include "core/compute/work_estimate.h"
+#include "core/optics/optical_setup.h"
 
 namespace lensforge {
 

@@ -7,8 +7,8 @@
 
 #include "cam/contact/mould.h"
 #include "cam/path/rough_links.h"
-#include "core/decimal_text.h"
 #include "core/error.h"
+#include "core/text/number_text.h"
 
 namespace lensforge {
 namespace {

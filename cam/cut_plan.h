@@ -24,10 +24,10 @@
 #include "cam/post/program_writer.h"
 #include "cam/program_watch.h"
 #include "cam/report/path_sketch.h"
-#include "core/executor.h"
-#include "core/lens.h"
-#include "core/run_control.h"
-#include "core/surface_mesh.h"
+#include "core/compute/executor.h"
+#include "core/compute/run_control.h"
+#include "core/surface/lens.h"
+#include "core/surface/surface_mesh.h"
 
 namespace lensforge {
 

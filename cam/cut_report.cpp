@@ -6,9 +6,8 @@
 #include <string>
 
 #include "cam/report/html_text.h"
-#include "core/decimal_text.h"
-#include "core/trimmed_decimal.h"
-#include "core/version.h"
+#include "core/text/number_text.h"
+#include "core/text/version.h"
 
 namespace lensforge {
 namespace {

@@ -9,7 +9,7 @@
 #include "cam/post/program_writer.h"
 #include "cam/prediction.h"
 #include "cam/report/report_data.h"
-#include "core/lens.h"
+#include "core/surface/lens.h"
 
 namespace lensforge {
 

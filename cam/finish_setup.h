@@ -9,9 +9,9 @@
 #include "cam/contact/cut_surface.h"
 #include "cam/path/finish_raster.h"
 #include "cam/path/pencil.h"
-#include "core/executor.h"
-#include "core/smooth_surface.h"
-#include "core/surface_mesh.h"
+#include "core/compute/executor.h"
+#include "core/surface/smooth_surface.h"
+#include "core/surface/surface_mesh.h"
 
 namespace lensforge {
 

@@ -11,8 +11,8 @@
 #include <system_error>
 
 #include "core/error.h"
-#include "core/lens.h"
-#include "core/output_guard.h"
+#include "core/io/output_guard.h"
+#include "core/surface/lens.h"
 #include "machine/gcode/program_seal.h"
 
 namespace lensforge {

@@ -10,10 +10,10 @@
 #include "cam/milled/crease_map.h"
 #include "cam/part_surfaces.h"
 #include "cam/report/report_data.h"
-#include "core/executor.h"
-#include "core/lens.h"
-#include "core/run_control.h"
-#include "core/surface_mesh.h"
+#include "core/compute/executor.h"
+#include "core/compute/run_control.h"
+#include "core/surface/lens.h"
+#include "core/surface/surface_mesh.h"
 
 namespace lensforge {
 

@@ -11,7 +11,7 @@
 #include "cam/report/html_text.h"
 #include "cam/tool/standard_balls.h"
 #include "core/error.h"
-#include "core/trimmed_decimal.h"
+#include "core/text/number_text.h"
 
 namespace lensforge {
 namespace {

@@ -11,9 +11,9 @@
 #include "cam/leakage/leak_map.h"
 #include "cam/leakage/leakage.h"
 #include "cam/milled/surface_field.h"
-#include "core/executor.h"
-#include "core/lens.h"
-#include "core/run_control.h"
+#include "core/compute/executor.h"
+#include "core/compute/run_control.h"
+#include "core/surface/lens.h"
 
 namespace lensforge {
 

@@ -12,9 +12,9 @@
 #include <system_error>
 
 #include "core/error.h"
-#include "core/files.h"
-#include "core/json_fields.h"
-#include "core/json_text.h"
+#include "core/io/files.h"
+#include "core/text/json_fields.h"
+#include "core/text/json_text.h"
 #include "design/grid_mesh.h"
 
 // File: the magic line, then a JSON header on one line, then as little-endian doubles the vertices

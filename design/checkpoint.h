@@ -5,8 +5,8 @@
 #include <filesystem>
 #include <vector>
 
-#include "core/image.h"
-#include "core/surface_mesh.h"
+#include "core/image/image.h"
+#include "core/surface/surface_mesh.h"
 #include "design/design_lens.h"
 #include "design/energy/barrier.h"
 #include "design/guided_optimization.h"

@@ -9,8 +9,8 @@
 #include <tuple>
 #include <vector>
 
-#include "core/image_plane.h"
-#include "core/mesh_topology.h"
+#include "core/optics/image_plane.h"
+#include "core/surface/mesh_topology.h"
 #include "design/optics/image_triangle.h"
 
 namespace lensforge {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "core/work_estimate.h"
+#include "core/compute/work_estimate.h"
 #include "design/design_options.h"
 
 namespace lensforge {

@@ -9,8 +9,8 @@
 #include <sstream>
 
 #include "core/error.h"
-#include "core/image_io.h"
-#include "core/number_text.h"
+#include "core/image/image_io.h"
+#include "core/text/number_text.h"
 #include "design/checkpoint.h"
 #include "design/crease_alignment.h"
 #include "design/face_transport.h"

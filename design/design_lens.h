@@ -5,10 +5,10 @@
 #include <string>
 #include <vector>
 
-#include "core/executor.h"
-#include "core/image.h"
-#include "core/lens.h"
-#include "core/run_control.h"
+#include "core/compute/executor.h"
+#include "core/compute/run_control.h"
+#include "core/image/image.h"
+#include "core/surface/lens.h"
 #include "design/design_options.h"
 #include "design/energy/weights.h"
 

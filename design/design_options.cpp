@@ -5,8 +5,8 @@
 #include <string>
 
 #include "core/error.h"
-#include "core/image_io.h"
-#include "core/number_text.h"
+#include "core/image/image_io.h"
+#include "core/text/number_text.h"
 #include "design/level_plan.h"
 
 namespace lensforge {

@@ -3,8 +3,8 @@
 
 #include <filesystem>
 
-#include "core/image.h"
-#include "core/optical_setup.h"
+#include "core/image/image.h"
+#include "core/optics/optical_setup.h"
 #include "design/energy/weights.h"
 
 namespace lensforge {

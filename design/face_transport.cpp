@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/image_plane.h"
+#include "core/optics/image_plane.h"
 #include "design/optics/inverse_refraction.h"
 #include "design/optics/surface_optics.h"
 #include "design/transport/height_fit.h"

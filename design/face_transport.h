@@ -3,12 +3,12 @@
 
 #include <Eigen/Core>
 
-#include "core/executor.h"
-#include "core/image.h"
-#include "core/lens.h"
-#include "core/optical_setup.h"
-#include "core/run_control.h"
-#include "core/surface_mesh.h"
+#include "core/compute/executor.h"
+#include "core/compute/run_control.h"
+#include "core/image/image.h"
+#include "core/optics/optical_setup.h"
+#include "core/surface/lens.h"
+#include "core/surface/surface_mesh.h"
 #include "design/energy/correspondence_term.h"
 #include "design/transport/brenier_map.h"
 #include "design/transport/semi_discrete.h"

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/cubic.h"
+#include "core/surface/cubic.h"
 
 namespace lensforge {
 

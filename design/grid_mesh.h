@@ -3,8 +3,8 @@
 
 #include <Eigen/Core>
 
-#include "core/grid_layout.h"
-#include "core/surface_mesh.h"
+#include "core/surface/grid_layout.h"
+#include "core/surface/surface_mesh.h"
 
 namespace lensforge {
 

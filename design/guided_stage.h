@@ -5,9 +5,9 @@
 #include <functional>
 #include <memory>
 
-#include "core/executor.h"
-#include "core/optical_setup.h"
-#include "core/surface_mesh.h"
+#include "core/compute/executor.h"
+#include "core/optics/optical_setup.h"
+#include "core/surface/surface_mesh.h"
 #include "design/energy/objective_options.h"
 #include "design/optimize/grid_symbol.h"
 #include "design/optimize/lbfgs.h"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <memory>
 
-#include "core/cuda/launch.cuh"
+#include "core/compute/cuda/launch.cuh"
 #include "design/energy/objective_cuda.h"
 #include "design/guided_stage_on.h"
 #include "design/optimize/cuda/cuda_fourier.h"

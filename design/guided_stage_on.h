@@ -5,9 +5,9 @@
 #include <cstddef>
 #include <span>
 
-#include "core/executor.h"
-#include "core/optical_setup.h"
-#include "core/surface_mesh.h"
+#include "core/compute/executor.h"
+#include "core/optics/optical_setup.h"
+#include "core/surface/surface_mesh.h"
 #include "design/energy/objective_on.h"
 #include "design/guided_stage.h"
 #include "design/optimize/grid_preconditioner_on.h"

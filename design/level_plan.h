@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "core/surface_mesh.h"
+#include "core/surface/surface_mesh.h"
 #include "design/design_lens.h"
 
 namespace lensforge {

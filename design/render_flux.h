@@ -5,9 +5,9 @@
 #include <span>
 #include <vector>
 
-#include "core/executor.h"
-#include "core/optical_setup.h"
-#include "core/surface_mesh.h"
+#include "core/compute/executor.h"
+#include "core/optics/optical_setup.h"
+#include "core/surface/surface_mesh.h"
 #include "design/flux/flux_image.h"
 #include "design/optics/surface_kernels.h"
 #include "design/optics/surface_optics.h"

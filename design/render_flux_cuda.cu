@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <vector>
 
-#include "core/cuda/launch.cuh"
+#include "core/compute/cuda/launch.cuh"
 #include "design/render_flux.h"
 
 namespace lensforge {

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "core/executor.h"
-#include "core/image.h"
-#include "core/metrics.h"
-#include "core/optical_setup.h"
-#include "core/surface_mesh.h"
+#include "core/compute/executor.h"
+#include "core/image/image.h"
+#include "core/image/metrics.h"
+#include "core/optics/optical_setup.h"
+#include "core/surface/surface_mesh.h"
 
 namespace lensforge {
 

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "core/image_sample.h"
+#include "core/image/image_sample.h"
 #include "design/optics/projection.h"
 #include "design/render_lens.h"
 

@@ -3,10 +3,10 @@
 
 #include <Eigen/Core>
 
-#include "core/executor.h"
-#include "core/image.h"
-#include "core/optical_setup.h"
-#include "core/surface_mesh.h"
+#include "core/compute/executor.h"
+#include "core/image/image.h"
+#include "core/optics/optical_setup.h"
+#include "core/surface/surface_mesh.h"
 
 namespace lensforge {
 

@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "core/run_control.h"
+#include "core/compute/run_control.h"
 
 namespace lensforge {
 

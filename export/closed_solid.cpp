@@ -7,7 +7,7 @@
 #include <numbers>
 
 #include "core/error.h"
-#include "core/mesh_topology.h"
+#include "core/surface/mesh_topology.h"
 
 namespace lensforge {
 namespace {

@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <functional>
 
-#include "core/work_estimate.h"
+#include "core/compute/work_estimate.h"
 
 namespace lensforge {
 

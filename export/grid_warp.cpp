@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/grid_layout.h"
+#include "core/surface/grid_layout.h"
 #include "export/cubic_spline.h"
 
 namespace lensforge {

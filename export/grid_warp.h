@@ -6,7 +6,7 @@
 #include <array>
 #include <cstdint>
 
-#include "core/surface_mesh.h"
+#include "core/surface/surface_mesh.h"
 
 namespace lensforge {
 

@@ -3,10 +3,10 @@
 
 #include <filesystem>
 
-#include "core/executor.h"
-#include "core/image.h"
-#include "core/run_control.h"
-#include "core/smooth_surface.h"
+#include "core/compute/executor.h"
+#include "core/compute/run_control.h"
+#include "core/image/image.h"
+#include "core/surface/smooth_surface.h"
 
 namespace lensforge {
 

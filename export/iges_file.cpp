@@ -10,7 +10,7 @@
 #include <cerrno>
 #include <string>
 
-#include "core/files.h"
+#include "core/io/files.h"
 #include "export/solid_check.h"
 #include "export/solid_reading.h"
 #include "export/spline_solid.h"

@@ -3,8 +3,8 @@
 
 #include <Eigen/Core>
 
-#include "core/executor.h"
-#include "core/run_control.h"
+#include "core/compute/executor.h"
+#include "core/compute/run_control.h"
 #include "export/picture_goal.h"
 #include "export/slope_fit.h"
 

@@ -4,11 +4,11 @@
 #include <filesystem>
 #include <string>
 
-#include "core/surface_mesh.h"
+#include "core/surface/surface_mesh.h"
 
 /// Meshes in the formats that printers, CAM programs and viewers read; millimetres. Each file
 /// appears whole or not at all, and shows its title to one who looks at its bytes. PLY is
-/// core/mesh_io.h's.
+/// core/surface/mesh_io.h's.
 namespace lensforge {
 
 /// Binary STL; coordinates are rounded to 32-bit floats (4e-6 mm at 100 mm).

@@ -3,7 +3,7 @@
 
 #include <Eigen/Core>
 
-#include "core/smooth_surface.h"
+#include "core/surface/smooth_surface.h"
 
 namespace lensforge {
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "export/sampled_surface.h"
 
-#include "core/grid_triangles.h"
+#include "core/surface/grid_triangles.h"
 
 namespace lensforge {
 

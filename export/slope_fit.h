@@ -4,9 +4,9 @@
 #include <Eigen/Core>
 #include <array>
 
-#include "core/executor.h"
-#include "core/run_control.h"
-#include "core/smooth_surface.h"
+#include "core/compute/executor.h"
+#include "core/compute/run_control.h"
+#include "core/surface/smooth_surface.h"
 #include "export/grid_warp.h"
 #include "export/spline_grid.h"
 

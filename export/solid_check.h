@@ -6,7 +6,7 @@
 #include <optional>
 #include <string>
 
-#include "core/run_control.h"
+#include "core/compute/run_control.h"
 #include "export/step_file.h"
 
 /// What the files of all solid formats share; OpenCASCADE's types stay inside of this room.

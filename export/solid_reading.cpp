@@ -11,9 +11,9 @@
 #include <new>
 #include <stdexcept>
 
+#include "core/compute/work_estimate.h"
 #include "core/error.h"
-#include "core/files.h"
-#include "core/work_estimate.h"
+#include "core/io/files.h"
 #include "export/child_work.h"
 #include "export/solid_check.h"
 

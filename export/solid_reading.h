@@ -8,7 +8,7 @@
 #include <functional>
 #include <string>
 
-#include "core/run_control.h"
+#include "core/compute/run_control.h"
 
 /// How files of solids are read: OpenCASCADE crashes at some broken files, and takes for ever over
 /// others, so that all of its work on a file that is not our own happens in a child process.

@@ -23,7 +23,7 @@
 #include <vector>
 
 #include "core/error.h"
-#include "core/files.h"
+#include "core/io/files.h"
 #include "export/byte_record.h"
 #include "export/child_work.h"
 #include "export/face_sampler.h"

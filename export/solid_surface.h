@@ -3,8 +3,8 @@
 
 #include <filesystem>
 
-#include "core/executor.h"
-#include "core/run_control.h"
+#include "core/compute/executor.h"
+#include "core/compute/run_control.h"
 #include "export/sampled_surface.h"
 
 namespace lensforge {

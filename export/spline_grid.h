@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/executor.h"
+#include "core/compute/executor.h"
 
 /// A tensor product of cubic splines that is looked at on a tensor grid of samples.
 namespace lensforge {

@@ -9,9 +9,9 @@
 #include <optional>
 #include <vector>
 
-#include "core/executor.h"
-#include "core/run_control.h"
-#include "core/smooth_surface.h"
+#include "core/compute/executor.h"
+#include "core/compute/run_control.h"
+#include "core/surface/smooth_surface.h"
 #include "export/picture_goal.h"
 #include "export/sampled_surface.h"
 

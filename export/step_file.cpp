@@ -13,7 +13,7 @@
 #include <XSControl_WorkSession.hxx>
 #include <cerrno>
 
-#include "core/files.h"
+#include "core/io/files.h"
 #include "export/part21_check.h"
 #include "export/solid_check.h"
 #include "export/solid_reading.h"

@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <string>
 
-#include "core/run_control.h"
+#include "core/compute/run_control.h"
 #include "export/spline_net.h"
 
 namespace lensforge {

@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <limits>
 
-#include "core/host_device.h"
+#include "core/compute/host_device.h"
 
 /// A vertical ball-end mill against points, edges and facets.
 ///

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstddef>
 
-#include "core/float_bounds.h"
+#include "core/compute/float_bounds.h"
 
 namespace lensforge {
 namespace {

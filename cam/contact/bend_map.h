@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "core/smooth_surface.h"
+#include "core/surface/smooth_surface.h"
 
 namespace lensforge {
 

@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/executor.h"
-#include "core/surface_mesh.h"
+#include "core/compute/executor.h"
+#include "core/surface/surface_mesh.h"
 
 namespace lensforge {
 

@@ -11,9 +11,9 @@
 #include "cam/contact/drop_cutter.h"
 #include "cam/contact/facet_grid.h"
 #include "cam/contact/smooth_roll.h"
-#include "core/executor.h"
-#include "core/smooth_surface.h"
-#include "core/surface_mesh.h"
+#include "core/compute/executor.h"
+#include "core/surface/smooth_surface.h"
+#include "core/surface/surface_mesh.h"
 
 namespace lensforge {
 

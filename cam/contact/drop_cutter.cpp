@@ -8,8 +8,8 @@
 #include <string>
 #include <utility>
 
+#include "core/compute/float_bounds.h"
 #include "core/error.h"
-#include "core/float_bounds.h"
 
 namespace lensforge {
 namespace {

@@ -10,8 +10,8 @@
 
 #include "cam/contact/ball_cutter.h"
 #include "cam/contact/contact_features.h"
-#include "core/executor.h"
-#include "core/surface_mesh.h"
+#include "core/compute/executor.h"
+#include "core/surface/surface_mesh.h"
 
 namespace lensforge {
 

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/surface_mesh.h"
+#include "core/surface/surface_mesh.h"
 
 namespace lensforge {
 

@@ -4,8 +4,8 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
-#include "core/height_field_check.h"
-#include "core/surface_mesh.h"
+#include "core/surface/height_field_check.h"
+#include "core/surface/surface_mesh.h"
 
 namespace lensforge {
 

@@ -3,8 +3,8 @@
 
 #include <string>
 
-#include "core/decimal_text.h"
 #include "core/error.h"
+#include "core/text/number_text.h"
 
 namespace lensforge {
 namespace {

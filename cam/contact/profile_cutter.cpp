@@ -8,7 +8,7 @@
 #include <limits>
 
 #include "cam/contact/profile_contact.h"
-#include "core/float_bounds.h"
+#include "core/compute/float_bounds.h"
 
 namespace lensforge {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "cam/contact/drop_cutter.h"
 #include "cam/tool/cutter_profile.h"
-#include "core/surface_mesh.h"
+#include "core/surface/surface_mesh.h"
 
 namespace lensforge {
 

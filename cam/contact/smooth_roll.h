@@ -8,7 +8,7 @@
 
 #include "cam/contact/bend_map.h"
 #include "cam/contact/curve_piece.h"
-#include "core/smooth_surface.h"
+#include "core/surface/smooth_surface.h"
 
 namespace lensforge {
 

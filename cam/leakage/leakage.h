@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "cam/leakage/render_field.h"
-#include "core/image.h"
-#include "core/metrics.h"
+#include "core/image/image.h"
+#include "core/image/metrics.h"
 
 namespace lensforge {
 

@@ -7,10 +7,10 @@
 
 #include "cam/milled/lens_grid.h"
 #include "cam/milled/surface_field.h"
-#include "core/executor.h"
-#include "core/image.h"
-#include "core/optical_setup.h"
-#include "core/run_control.h"
+#include "core/compute/executor.h"
+#include "core/compute/run_control.h"
+#include "core/image/image.h"
+#include "core/optics/optical_setup.h"
 
 namespace lensforge {
 

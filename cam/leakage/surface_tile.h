@@ -9,8 +9,8 @@
 #include "cam/leakage/crease_split.h"
 #include "cam/milled/lens_grid.h"
 #include "cam/milled/surface_field.h"
-#include "core/executor.h"
-#include "core/optical_setup.h"
+#include "core/compute/executor.h"
+#include "core/optics/optical_setup.h"
 #include "design/optics/image_triangle.h"
 #include "design/optics/projection.h"
 

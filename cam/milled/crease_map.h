@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "cam/milled/rounded_field.h"
-#include "core/run_control.h"
+#include "core/compute/run_control.h"
 
 namespace lensforge {
 

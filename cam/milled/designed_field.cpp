@@ -10,8 +10,8 @@
 #include <utility>
 #include <vector>
 
-#include "core/decimal_text.h"
 #include "core/error.h"
+#include "core/text/number_text.h"
 
 namespace lensforge {
 namespace {

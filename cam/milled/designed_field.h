@@ -3,8 +3,8 @@
 
 #include "cam/contact/facet_grid.h"
 #include "cam/milled/surface_field.h"
-#include "core/smooth_surface.h"
-#include "core/surface_mesh.h"
+#include "core/surface/smooth_surface.h"
+#include "core/surface/surface_mesh.h"
 
 namespace lensforge {
 

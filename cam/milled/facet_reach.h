@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "cam/contact/facet_grid.h"
-#include "core/executor.h"
+#include "core/compute/executor.h"
 
 namespace lensforge {
 

@@ -10,8 +10,8 @@
 #include <utility>
 
 #include "cam/milled/ball_sweep.h"
+#include "core/compute/float_bounds.h"
 #include "core/error.h"
-#include "core/float_bounds.h"
 
 namespace lensforge {
 namespace {

@@ -6,8 +6,8 @@
 #include <cstddef>
 #include <string>
 
-#include "core/decimal_text.h"
 #include "core/error.h"
+#include "core/text/number_text.h"
 
 namespace lensforge {
 namespace {

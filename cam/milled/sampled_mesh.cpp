@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "core/grid_triangles.h"
+#include "core/surface/grid_triangles.h"
 
 namespace lensforge {
 

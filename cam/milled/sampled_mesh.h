@@ -2,7 +2,7 @@
 #pragma once
 
 #include "cam/milled/surface_field.h"
-#include "core/surface_mesh.h"
+#include "core/surface/surface_mesh.h"
 
 namespace lensforge {
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "cam/contact/smooth_roll.h"
-#include "core/executor.h"
+#include "core/compute/executor.h"
 
 namespace lensforge {
 

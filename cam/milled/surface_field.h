@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/executor.h"
+#include "core/compute/executor.h"
 
 namespace lensforge {
 

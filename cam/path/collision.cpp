@@ -6,8 +6,8 @@
 
 #include "cam/contact/profile_contact.h"
 #include "cam/path/move_pieces.h"
-#include "core/decimal_text.h"
 #include "core/error.h"
+#include "core/text/number_text.h"
 
 namespace lensforge {
 namespace {

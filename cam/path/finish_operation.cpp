@@ -5,7 +5,7 @@
 #include <cmath>
 #include <vector>
 
-#include "core/decimal_text.h"
+#include "core/text/number_text.h"
 
 namespace lensforge {
 namespace {

@@ -9,8 +9,8 @@
 #include "cam/path/move.h"
 #include "cam/path/operation.h"
 #include "cam/tool/tool.h"
-#include "core/executor.h"
-#include "core/run_control.h"
+#include "core/compute/executor.h"
+#include "core/compute/run_control.h"
 
 namespace lensforge {
 

@@ -13,8 +13,8 @@
 #include "cam/path/operation.h"
 #include "cam/path/row_profile.h"
 #include "cam/tool/process.h"
-#include "core/executor.h"
-#include "core/run_control.h"
+#include "core/compute/executor.h"
+#include "core/compute/run_control.h"
 
 namespace lensforge {
 

@@ -8,9 +8,9 @@
 #include <map>
 #include <string>
 
-#include "core/decimal_text.h"
 #include "core/error.h"
-#include "core/mesh_topology.h"
+#include "core/surface/mesh_topology.h"
+#include "core/text/number_text.h"
 
 namespace lensforge {
 namespace {

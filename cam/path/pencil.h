@@ -8,9 +8,9 @@
 #include "cam/path/finish_operation.h"
 #include "cam/path/move.h"
 #include "cam/path/operation.h"
-#include "core/executor.h"
-#include "core/run_control.h"
-#include "core/surface_mesh.h"
+#include "core/compute/executor.h"
+#include "core/compute/run_control.h"
+#include "core/surface/surface_mesh.h"
 
 namespace lensforge {
 

@@ -10,8 +10,8 @@
 #include "cam/path/rough_moves.h"
 #include "cam/path/rough_passes.h"
 #include "cam/path/tip_floor.h"
-#include "core/decimal_text.h"
 #include "core/error.h"
+#include "core/text/number_text.h"
 
 namespace lensforge {
 namespace {

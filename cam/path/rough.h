@@ -6,8 +6,8 @@
 #include "cam/path/operation.h"
 #include "cam/path/stock_map.h"
 #include "cam/tool/workshop.h"
-#include "core/executor.h"
-#include "core/run_control.h"
+#include "core/compute/executor.h"
+#include "core/compute/run_control.h"
 
 namespace lensforge {
 

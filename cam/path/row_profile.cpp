@@ -6,8 +6,8 @@
 #include <optional>
 
 #include "cam/contact/drop_curve.h"
-#include "core/decimal_text.h"
 #include "core/error.h"
+#include "core/text/number_text.h"
 
 namespace lensforge {
 namespace {

@@ -9,7 +9,7 @@
 #include "cam/contact/profile_cutter.h"
 #include "cam/path/operation.h"
 #include "cam/tool/cutter_profile.h"
-#include "core/executor.h"
+#include "core/compute/executor.h"
 
 namespace lensforge {
 

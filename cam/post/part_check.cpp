@@ -4,8 +4,8 @@
 #include <cmath>
 #include <utility>
 
-#include "core/decimal_text.h"
 #include "core/error.h"
+#include "core/text/number_text.h"
 
 namespace lensforge {
 namespace {

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "cam/post/post_description.h"
-#include "core/toml_fields.h"
+#include "core/text/toml_fields.h"
 
 namespace lensforge {
 

@@ -6,7 +6,7 @@
 #include "cam/post/builtin_posts.h"
 #include "cam/post/post_check.h"
 #include "core/error.h"
-#include "core/toml_fields.h"
+#include "core/text/toml_fields.h"
 
 namespace lensforge {
 namespace {

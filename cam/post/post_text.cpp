@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "core/error.h"
-#include "core/trimmed_decimal.h"
+#include "core/text/number_text.h"
 
 namespace lensforge {
 namespace {

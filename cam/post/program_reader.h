@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "core/run_control.h"
+#include "core/compute/run_control.h"
 #include "machine/gcode/gcode_interpreter.h"
 
 namespace lensforge {

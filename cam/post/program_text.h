@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "cam/post/post_description.h"
-#include "core/files.h"
-#include "core/sha256.h"
+#include "core/io/files.h"
+#include "core/io/sha256.h"
 
 namespace lensforge {
 

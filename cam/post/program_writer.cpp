@@ -11,8 +11,8 @@
 #include "cam/post/part_check.h"
 #include "cam/post/program_part.h"
 #include "core/error.h"
-#include "core/files.h"
-#include "core/number_text.h"
+#include "core/io/files.h"
+#include "core/text/number_text.h"
 #include "machine/gcode/program_seal.h"
 
 namespace lensforge {

@@ -10,8 +10,8 @@
 #include "cam/post/program_plan.h"
 #include "cam/post/program_reader.h"
 #include "cam/post/program_time.h"
-#include "core/files.h"
-#include "core/run_control.h"
+#include "core/compute/run_control.h"
+#include "core/io/files.h"
 
 namespace lensforge {
 

@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "core/image.h"
-#include "core/image_io.h"
+#include "core/image/image.h"
+#include "core/image/image_io.h"
 
 /// Pieces of HTML. Everything that takes `text` escapes it; `html` is put in as it is.
 namespace lensforge {

@@ -5,8 +5,7 @@
 #include <cmath>
 
 #include "cam/report/html_text.h"
-#include "core/decimal_text.h"
-#include "core/trimmed_decimal.h"
+#include "core/text/number_text.h"
 
 namespace lensforge {
 namespace {

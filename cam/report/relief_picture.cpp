@@ -6,7 +6,7 @@
 #include <cmath>
 #include <cstddef>
 
-#include "core/error_image.h"
+#include "core/image/error_image.h"
 
 namespace lensforge {
 namespace {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "cam/report/report_data.h"
-#include "core/image_io.h"
+#include "core/image/image_io.h"
 
 namespace lensforge {
 

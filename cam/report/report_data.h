@@ -13,7 +13,7 @@
 #include "cam/report/path_sketch.h"
 #include "cam/report/verdict.h"
 #include "cam/tool/tool.h"
-#include "core/image.h"
+#include "core/image/image.h"
 
 namespace lensforge {
 

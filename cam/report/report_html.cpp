@@ -7,7 +7,7 @@
 
 #include "cam/report/html_text.h"
 #include "cam/report/sections.h"
-#include "core/version.h"
+#include "core/text/version.h"
 #include "report_page.h"
 
 namespace lensforge {

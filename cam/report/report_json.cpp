@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "cam/report/leak_words.h"
-#include "core/version.h"
+#include "core/text/version.h"
 
 namespace lensforge {
 namespace {

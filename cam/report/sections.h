@@ -5,7 +5,7 @@
 #include <string>
 
 #include "cam/report/report_data.h"
-#include "core/image_io.h"
+#include "core/image/image_io.h"
 
 /// The report's sections as HTML; each is empty where its data is.
 namespace lensforge::report_section {

@@ -4,7 +4,7 @@
 
 #include "cam/report/html_text.h"
 #include "cam/report/sections.h"
-#include "core/decimal_text.h"
+#include "core/text/number_text.h"
 
 namespace lensforge::report_section {
 namespace {

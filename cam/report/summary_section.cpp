@@ -6,7 +6,7 @@
 #include "cam/report/leak_words.h"
 #include "cam/report/relief_picture.h"
 #include "cam/report/sections.h"
-#include "core/decimal_text.h"
+#include "core/text/number_text.h"
 
 // The first screen: verdict, pictures, worst places, minutes and tools.
 namespace lensforge {

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "core/error.h"
-#include "core/number_text.h"
+#include "core/text/number_text.h"
 
 namespace lensforge {
 namespace {

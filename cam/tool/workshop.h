@@ -10,7 +10,7 @@
 
 #include "cam/tool/process.h"
 #include "cam/tool/tool.h"
-#include "core/toml_fields.h"
+#include "core/text/toml_fields.h"
 
 namespace lensforge {
 

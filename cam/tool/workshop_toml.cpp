@@ -10,7 +10,7 @@
 
 #include "cam/tool/workshop.h"
 #include "core/error.h"
-#include "core/toml_fields.h"
+#include "core/text/toml_fields.h"
 
 // Each describe() below lists the keys of one table, once, for the reader and the writer: key,
 // range, where it is kept, and what the writer says about it.

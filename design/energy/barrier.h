@@ -3,7 +3,7 @@
 
 #include <limits>
 
-#include "core/host_device.h"
+#include "core/compute/host_device.h"
 
 namespace lensforge {
 

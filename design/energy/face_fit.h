@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 #include <cmath>
 
-#include "core/host_device.h"
+#include "core/compute/host_device.h"
 #include "design/energy/weingarten.h"
 
 /// Least-squares fit of a face's Weingarten map.

@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <span>
 
-#include "core/executor.h"
-#include "core/host_device.h"
+#include "core/compute/executor.h"
+#include "core/compute/host_device.h"
 #include "design/energy/picture_error.h"
 
 namespace lensforge {

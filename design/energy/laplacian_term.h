@@ -5,9 +5,9 @@
 #include <array>
 #include <cstdint>
 
-#include "core/executor.h"
-#include "core/host_device.h"
-#include "core/mesh_topology.h"
+#include "core/compute/executor.h"
+#include "core/compute/host_device.h"
+#include "core/surface/mesh_topology.h"
 #include "design/energy/mesh_view.h"
 
 namespace lensforge {

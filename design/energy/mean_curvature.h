@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "core/host_device.h"
+#include "core/compute/host_device.h"
 #include "design/energy/weingarten.h"
 
 namespace lensforge {

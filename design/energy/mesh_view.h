@@ -5,10 +5,10 @@
 #include <cstdint>
 #include <span>
 
-#include "core/executor.h"
-#include "core/host_device.h"
-#include "core/mesh_topology.h"
-#include "core/surface_mesh.h"
+#include "core/compute/executor.h"
+#include "core/compute/host_device.h"
+#include "core/surface/mesh_topology.h"
+#include "core/surface/surface_mesh.h"
 #include "design/optics/columns.h"
 
 namespace lensforge {

@@ -3,9 +3,9 @@
 
 #include <Eigen/Core>
 
-#include "core/executor.h"
-#include "core/optical_setup.h"
-#include "core/surface_mesh.h"
+#include "core/compute/executor.h"
+#include "core/optics/optical_setup.h"
+#include "core/surface/surface_mesh.h"
 #include "design/energy/objective_on.h"
 #include "design/energy/objective_options.h"
 

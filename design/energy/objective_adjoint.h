@@ -4,7 +4,7 @@
 #include <array>
 #include <cstdint>
 
-#include "core/host_device.h"
+#include "core/compute/host_device.h"
 #include "design/energy/boundary_term.h"
 #include "design/energy/mean_curvature.h"
 #include "design/energy/objective_view.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/cuda/launch.cuh"
+#include "core/compute/cuda/launch.cuh"
 #include "design/energy/objective_cuda.h"
 
 namespace lensforge {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "core/cuda/cuda_executor.h"
+#include "core/compute/cuda/cuda_executor.h"
 #include "design/energy/objective_on.h"
 
 namespace lensforge {

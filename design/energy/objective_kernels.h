@@ -5,8 +5,8 @@
 #include <cmath>
 #include <cstdint>
 
-#include "core/host_device.h"
-#include "core/transfer.h"
+#include "core/compute/host_device.h"
+#include "core/image/transfer.h"
 #include "design/energy/face_fit.h"
 #include "design/energy/objective_view.h"
 #include "design/energy/reflection_barrier.h"

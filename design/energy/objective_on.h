@@ -10,10 +10,10 @@
 #include <variant>
 #include <vector>
 
-#include "core/executor.h"
-#include "core/image.h"
-#include "core/mesh_topology.h"
-#include "core/surface_mesh.h"
+#include "core/compute/executor.h"
+#include "core/image/image.h"
+#include "core/surface/mesh_topology.h"
+#include "core/surface/surface_mesh.h"
 #include "design/energy/gradient_term.h"
 #include "design/energy/image_term.h"
 #include "design/energy/laplacian_term.h"

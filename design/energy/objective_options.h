@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <variant>
 
-#include "core/image.h"
-#include "core/optical_setup.h"
+#include "core/image/image.h"
+#include "core/optics/optical_setup.h"
 #include "design/energy/area_barrier.h"
 #include "design/energy/correspondence_term.h"
 #include "design/energy/weights.h"

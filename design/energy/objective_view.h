@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "core/host_device.h"
+#include "core/compute/host_device.h"
 #include "design/energy/correspondence_term.h"
 #include "design/energy/face_frame.h"
 #include "design/energy/mesh_view.h"

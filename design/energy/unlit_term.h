@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 
-#include "core/host_device.h"
+#include "core/compute/host_device.h"
 #include "design/energy/boundary_term.h"
 #include "design/optics/image_triangle.h"
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "core/optical_setup.h"
+#include "core/optics/optical_setup.h"
 
 namespace lensforge {
 

@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 #include <cmath>
 
-#include "core/host_device.h"
+#include "core/compute/host_device.h"
 
 /// Walks a straight edge through the pixels it crosses.
 ///

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <span>
 
-#include "core/executor.h"
+#include "core/compute/executor.h"
 #include "design/flux/flux_kernels.h"
 #include "design/flux/flux_triangle.h"
 #include "design/optics/image_triangle.h"

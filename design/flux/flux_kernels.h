@@ -3,12 +3,12 @@
 
 #include <cstdint>
 
-#include "core/host_device.h"
+#include "core/compute/host_device.h"
 #include "design/flux/flux_triangle.h"
 #include "design/optics/image_triangle.h"
 
-/// What is done for one triangle, or one pixel of a row, of a flux picture; see core/executor.h for
-/// who calls it.
+/// What is done for one triangle, or one pixel of a row, of a flux picture; see
+/// core/compute/executor.h for who calls it.
 namespace lensforge {
 
 /// Image triangles in memory as a source of FluxImageOn::render().

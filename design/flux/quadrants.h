@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 #include <cmath>
 
-#include "core/host_device.h"
+#include "core/compute/host_device.h"
 #include "design/optics/image_triangle.h"
 
 /// Triangles that touch at most 2 × 2 pixels, in closed form and without branches that depend on

@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
-#include "core/host_device.h"
+#include "core/compute/host_device.h"
 #include "design/optics/image_triangle.h"
 #include "design/optics/projection.h"
 

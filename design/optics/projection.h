@@ -4,8 +4,8 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
-#include "core/host_device.h"
-#include "core/image_plane.h"
+#include "core/compute/host_device.h"
+#include "core/optics/image_plane.h"
 #include "design/optics/refraction.h"
 
 namespace lensforge {

@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 #include <cmath>
 
-#include "core/host_device.h"
+#include "core/compute/host_device.h"
 
 /// Notation: a incident and n normal unit vectors, c = n·a, η = n_inside / n_outside,
 /// s = 1 + η²(c² − 1) the squared cosine of the refracted angle, b refracted direction,

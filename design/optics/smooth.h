@@ -3,7 +3,7 @@
 
 #include <Eigen/Core>
 
-#include "core/host_device.h"
+#include "core/compute/host_device.h"
 #include "design/optics/facet.h"
 #include "design/optics/image_triangle.h"
 #include "design/optics/projection.h"

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <limits>
 
-#include "core/host_device.h"
+#include "core/compute/host_device.h"
 #include "design/optics/columns.h"
 #include "design/optics/facet.h"
 #include "design/optics/projection.h"

@@ -4,9 +4,9 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "core/executor.h"
-#include "core/optical_setup.h"
-#include "core/surface_mesh.h"
+#include "core/compute/executor.h"
+#include "core/optics/optical_setup.h"
+#include "core/surface/surface_mesh.h"
 #include "design/optics/image_triangle.h"
 
 namespace lensforge {

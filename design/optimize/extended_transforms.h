@@ -4,8 +4,8 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "core/executor.h"
-#include "core/host_device.h"
+#include "core/compute/executor.h"
+#include "core/compute/host_device.h"
 
 namespace lensforge {
 

@@ -3,8 +3,8 @@
 
 #include <Eigen/Core>
 
-#include "core/executor.h"
-#include "core/surface_mesh.h"
+#include "core/compute/executor.h"
+#include "core/surface/surface_mesh.h"
 #include "design/optimize/grid_preconditioner_on.h"
 
 namespace lensforge {

@@ -9,9 +9,9 @@
 #include <span>
 #include <vector>
 
-#include "core/executor.h"
-#include "core/host_device.h"
-#include "core/surface_mesh.h"
+#include "core/compute/executor.h"
+#include "core/compute/host_device.h"
+#include "core/surface/surface_mesh.h"
 #include "design/optimize/grid_symbol.h"
 #include "design/optimize/grid_transforms.h"
 

@@ -4,7 +4,7 @@
 #include <array>
 #include <cstddef>
 
-#include "core/executor.h"
+#include "core/compute/executor.h"
 #include "design/optimize/cosine_transform.h"
 
 namespace lensforge {

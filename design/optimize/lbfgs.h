@@ -5,7 +5,7 @@
 #include <functional>
 #include <string>
 
-#include "core/executor.h"
+#include "core/compute/executor.h"
 
 namespace lensforge {
 

@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/executor.h"
+#include "core/compute/executor.h"
 #include "design/optimize/lbfgs.h"
 #include "design/optimize/vector_kernels.h"
 

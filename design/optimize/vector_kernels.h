@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "core/host_device.h"
+#include "core/compute/host_device.h"
 
 /// One entry of the vector operations of a minimiser.
 namespace lensforge {

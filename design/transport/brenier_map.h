@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "core/image.h"
+#include "core/image/image.h"
 #include "design/transport/semi_discrete.h"
 
 namespace lensforge {

@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/executor.h"
-#include "core/host_device.h"
+#include "core/compute/executor.h"
+#include "core/compute/host_device.h"
 #include "design/transport/power_diagram.h"
 
 namespace lensforge {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "core/host_device.h"
+#include "core/compute/host_device.h"
 #include "design/flux/edge_walk.h"
 #include "design/transport/cell_edges.h"
 #include "design/transport/summed_density.h"

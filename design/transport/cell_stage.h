@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "core/executor.h"
+#include "core/compute/executor.h"
 #include "design/transport/cell_edges.h"
 #include "design/transport/summed_density.h"
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <memory>
 
-#include "core/cuda/launch.cuh"
+#include "core/compute/cuda/launch.cuh"
 #include "design/transport/cell_stage_on.h"
 
 namespace lensforge {

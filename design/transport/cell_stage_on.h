@@ -10,9 +10,9 @@
 #include <utility>
 #include <vector>
 
+#include "core/compute/executor.h"
+#include "core/compute/kernel_input.h"
 #include "core/error.h"
-#include "core/executor.h"
-#include "core/kernel_input.h"
 #include "design/transport/cell_kernels.h"
 #include "design/transport/cell_stage.h"
 #include "design/transport/newton_system.h"

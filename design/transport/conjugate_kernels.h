@@ -4,7 +4,7 @@
 #include <array>
 #include <cstdint>
 
-#include "core/host_device.h"
+#include "core/compute/host_device.h"
 #include "design/transport/cell_kernels.h"
 
 /// Conjugate gradients on the graph of cells, scaled by the diagonal: one cell of each step.

@@ -3,8 +3,8 @@
 
 #include <Eigen/Core>
 
-#include "core/image.h"
-#include "core/run_control.h"
+#include "core/compute/run_control.h"
+#include "core/image/image.h"
 
 namespace lensforge {
 

@@ -3,7 +3,7 @@
 
 #include <Eigen/Core>
 
-#include "core/executor.h"
+#include "core/compute/executor.h"
 #include "design/transport/laplacian_solver.h"
 
 namespace lensforge {

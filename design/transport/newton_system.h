@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "core/executor.h"
+#include "core/compute/executor.h"
 #include "design/transport/cell_kernels.h"
 #include "design/transport/cell_stage.h"
 #include "design/transport/conjugate_kernels.h"

@@ -5,7 +5,7 @@
 #include <stop_token>
 #include <vector>
 
-#include "core/executor.h"
+#include "core/compute/executor.h"
 #include "design/transport/power_newton.h"
 #include "design/transport/site_levels.h"
 #include "design/transport/summed_density.h"

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/executor.h"
+#include "core/compute/executor.h"
 
 namespace lensforge {
 

@@ -6,7 +6,7 @@
 #include <stop_token>
 #include <vector>
 
-#include "core/executor.h"
+#include "core/compute/executor.h"
 #include "design/transport/cell_edges.h"
 #include "design/transport/cell_stage.h"
 #include "design/transport/power_diagram.h"

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "core/executor.h"
-#include "core/image.h"
-#include "core/run_control.h"
+#include "core/compute/executor.h"
+#include "core/compute/run_control.h"
+#include "core/image/image.h"
 
 namespace lensforge {
 

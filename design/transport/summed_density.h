@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
-#include "core/host_device.h"
-#include "core/image.h"
+#include "core/compute/host_device.h"
+#include "core/image/image.h"
 
 namespace lensforge {
 

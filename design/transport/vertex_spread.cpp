@@ -6,7 +6,7 @@
 #include <limits>
 #include <utility>
 
-#include "core/image_plane.h"
+#include "core/optics/image_plane.h"
 #include "design/flux/flux_image.h"
 #include "design/optics/image_triangle.h"
 #include "design/transport/monge_ampere.h"

@@ -6,7 +6,7 @@
 #include <charconv>
 
 #include "core/error.h"
-#include "core/toml_fields.h"
+#include "core/text/toml_fields.h"
 #include "machine/guard/map_folder.h"
 #include "machine/guard/register_map_check.h"
 

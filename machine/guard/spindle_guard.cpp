@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "core/error.h"
-#include "core/number_text.h"
+#include "core/text/number_text.h"
 #include "machine/guard/spindle_state_name.h"
 
 namespace lensforge {

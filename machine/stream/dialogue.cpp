@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
 
-#include "core/printable.h"
+#include "core/text/printable.h"
 #include "machine/stream/controller_codes.h"
 #include "machine/stream/controller_info.h"
 #include "machine/stream/realtime.h"

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/trimmed_decimal.h"
+#include "core/text/number_text.h"
 
 namespace lensforge {
 namespace {

@@ -11,7 +11,7 @@
 #include <chrono>
 #include <system_error>
 
-#include "core/printable.h"
+#include "core/text/printable.h"
 #include "machine/stream/journal_text.h"
 
 namespace lensforge {

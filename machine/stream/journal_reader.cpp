@@ -4,7 +4,7 @@
 #include <fstream>
 #include <system_error>
 
-#include "core/files.h"
+#include "core/io/files.h"
 #include "machine/stream/journal.h"
 #include "machine/stream/journal_text.h"
 

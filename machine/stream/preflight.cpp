@@ -5,7 +5,7 @@
 #include <array>
 #include <cmath>
 
-#include "core/trimmed_decimal.h"
+#include "core/text/number_text.h"
 #include "machine/stream/line_tracker.h"
 
 namespace lensforge {

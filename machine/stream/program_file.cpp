@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "core/error.h"
-#include "core/files.h"
-#include "core/sha256.h"
+#include "core/io/files.h"
+#include "core/io/sha256.h"
 #include "machine/link/descriptor.h"
 
 namespace lensforge {

@@ -5,7 +5,7 @@
 #include <istream>
 #include <memory>
 
-#include "core/run_control.h"
+#include "core/compute/run_control.h"
 #include "machine/stream/job_identity.h"
 
 namespace lensforge {

@@ -8,7 +8,7 @@
 #include <optional>
 
 #include "core/error.h"
-#include "core/trimmed_decimal.h"
+#include "core/text/number_text.h"
 #include "machine/stream/entry_lines.h"
 
 namespace lensforge {

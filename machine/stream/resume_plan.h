@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "core/run_control.h"
+#include "core/compute/run_control.h"
 #include "machine/stream/controller_info.h"
 #include "machine/stream/journal.h"
 #include "machine/stream/program_facts.h"

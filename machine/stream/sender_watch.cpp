@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <cmath>
 
-#include "core/printable.h"
+#include "core/text/printable.h"
 #include "machine/guard/spindle_state_name.h"
 #include "machine/stream/controller_codes.h"
 #include "machine/stream/sender.h"

@@ -4,7 +4,7 @@
 #include <istream>
 #include <stop_token>
 
-#include "core/run_control.h"
+#include "core/compute/run_control.h"
 #include "machine/stream/controller_info.h"
 
 namespace lensforge {

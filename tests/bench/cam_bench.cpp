@@ -13,7 +13,7 @@
 
 #include "bench/process_usage.h"
 #include "cam/cam_job.h"
-#include "core/lens.h"
+#include "core/surface/lens.h"
 
 namespace lensforge {
 namespace {

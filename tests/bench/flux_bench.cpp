@@ -6,7 +6,7 @@
 #include <string>
 
 #include "bench/lens_scene.h"
-#include "core/executor.h"
+#include "core/compute/executor.h"
 #include "design/energy/objective.h"
 #include "design/flux/flux_image.h"
 #include "design/optics/surface_optics.h"

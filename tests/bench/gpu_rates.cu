@@ -6,8 +6,8 @@
 #include <limits>
 
 #include "bench/gpu_rates.h"
-#include "core/cuda/cuda_executor.h"
-#include "core/cuda/device_buffer.h"
+#include "core/compute/cuda/cuda_executor.h"
+#include "core/compute/cuda/device_buffer.h"
 
 namespace lensforge::bench {
 

@@ -4,7 +4,7 @@
 #include <map>
 #include <string>
 
-#include "core/executor.h"
+#include "core/compute/executor.h"
 
 namespace lensforge::bench {
 

@@ -4,9 +4,9 @@
 #include <Eigen/Core>
 #include <cmath>
 
-#include "core/image.h"
-#include "core/optical_setup.h"
-#include "core/surface_mesh.h"
+#include "core/image/image.h"
+#include "core/optics/optical_setup.h"
+#include "core/surface/surface_mesh.h"
 #include "design/grid_mesh.h"
 
 namespace lensforge::bench {

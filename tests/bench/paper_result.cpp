@@ -6,8 +6,8 @@
 #include <sstream>
 
 #include "bench/child_process.h"
-#include "core/files.h"
-#include "core/lens.h"
+#include "core/io/files.h"
+#include "core/surface/lens.h"
 
 namespace lensforge::bench {
 namespace {

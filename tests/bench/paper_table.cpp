@@ -10,7 +10,7 @@
 #include "bench/paper_report.h"
 #include "bench/paper_result.h"
 #include "bench/paper_rows.h"
-#include "core/files.h"
+#include "core/io/files.h"
 
 namespace {
 

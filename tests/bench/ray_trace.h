@@ -3,10 +3,10 @@
 
 #include <cstdint>
 
-#include "core/executor.h"
-#include "core/image.h"
-#include "core/lens.h"
-#include "core/metrics.h"
+#include "core/compute/executor.h"
+#include "core/image/image.h"
+#include "core/image/metrics.h"
+#include "core/surface/lens.h"
 
 /// A forward ray tracer over Embree that judges a designed lens from outside: it shares the lens's
 /// files with the program, but neither its optics nor its rasteriser nor its pixel conventions.

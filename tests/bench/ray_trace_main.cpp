@@ -6,7 +6,7 @@
 #include <string>
 
 #include "bench/ray_trace.h"
-#include "core/image_io.h"
+#include "core/image/image_io.h"
 
 namespace {
 

@@ -13,7 +13,7 @@
 #include <memory>
 #include <vector>
 
-#include "core/image_io.h"
+#include "core/image/image_io.h"
 #include "design/transport/cell_stage.h"
 #include "design/transport/density_blur.h"
 #include "design/transport/semi_discrete.h"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "design/cpu_reference.h"
 
-#include "core/executor.h"
+#include "core/compute/executor.h"
 #include "design/executor_parity.h"
 #include "design/render_flux.h"
 #include "design/stage_on_rough_mesh.h"

@@ -4,7 +4,7 @@
 #include <memory>
 #include <vector>
 
-#include "core/optical_setup.h"
+#include "core/optics/optical_setup.h"
 #include "design/guided_stage.h"
 #include "design/objective_setups.h"
 #include "design/optics/image_triangle.h"

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <utility>
 
-#include "core/image_plane.h"
+#include "core/optics/image_plane.h"
 #include "design/face_transport.h"
 #include "design/grid_mesh.h"
 #include "design/optics/image_triangle.h"

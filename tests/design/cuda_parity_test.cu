@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "core/cuda/launch.cuh"
-#include "core/gpu.h"
+#include "core/compute/cuda/launch.cuh"
+#include "core/compute/gpu.h"
 #include "design/design_lens.h"
 #include "design/executor_parity.h"
 #include "design/render_flux.h"

@@ -18,8 +18,8 @@
 #include <utility>
 #include <vector>
 
+#include "core/compute/executor.h"
 #include "core/error.h"
-#include "core/executor.h"
 #include "design/optimize/extended_transforms.h"
 #include "design/optimize/grid_transforms.h"
 

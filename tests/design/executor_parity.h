@@ -13,8 +13,8 @@
 #include <string>
 #include <vector>
 
+#include "core/compute/executor.h"
 #include "core/error.h"
-#include "core/executor.h"
 #include "design/cpu_reference.h"
 #include "design/flux/flux_image.h"
 #include "design/guided_stage.h"

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <numbers>
 
-#include "core/surface_mesh.h"
+#include "core/surface/surface_mesh.h"
 #include "design/grid_mesh.h"
 #include "design/random_input.h"
 

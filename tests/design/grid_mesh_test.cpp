@@ -8,7 +8,7 @@
 #include <cmath>
 #include <vector>
 
-#include "core/mesh_topology.h"
+#include "core/surface/mesh_topology.h"
 #include "design/random_input.h"
 
 namespace lensforge {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "core/image_plane.h"
+#include "core/optics/image_plane.h"
 #include "design/energy/objective.h"
 #include "design/random_input.h"
 #include "design/test_setups.h"

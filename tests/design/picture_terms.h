@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "core/executor.h"
+#include "core/compute/executor.h"
 #include "design/energy/picture_error.h"
 #include "design/finite_difference.h"
 #include "design/random_input.h"

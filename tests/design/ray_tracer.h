@@ -10,8 +10,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/optical_setup.h"
-#include "core/surface_mesh.h"
+#include "core/optics/optical_setup.h"
+#include "core/surface/surface_mesh.h"
 #include "design/random_input.h"
 #include "design/snell.h"
 

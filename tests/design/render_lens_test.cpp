@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "core/metrics.h"
+#include "core/image/metrics.h"
 #include "design/ray_tracer.h"
 #include "design/test_setups.h"
 

@@ -7,9 +7,9 @@
 #include <cmath>
 #include <string>
 
-#include "core/image.h"
-#include "core/optical_setup.h"
-#include "core/surface_mesh.h"
+#include "core/image/image.h"
+#include "core/optics/optical_setup.h"
+#include "core/surface/surface_mesh.h"
 #include "design/grid_mesh.h"
 #include "design/random_input.h"
 

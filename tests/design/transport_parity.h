@@ -12,8 +12,8 @@
 #include <string>
 #include <vector>
 
+#include "core/compute/executor.h"
 #include "core/error.h"
-#include "core/executor.h"
 #include "design/cpu_transport.h"
 #include "design/transport/cell_stage_on.h"
 

@@ -8,8 +8,8 @@
 #include <numeric>
 #include <vector>
 
-#include "core/image.h"
-#include "core/surface_mesh.h"
+#include "core/image/image.h"
+#include "core/surface/surface_mesh.h"
 #include "design/clip_reference.h"
 #include "design/grid_mesh.h"
 #include "design/random_input.h"

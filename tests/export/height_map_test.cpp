@@ -4,9 +4,9 @@
 #include <gtest/gtest.h>
 
 #include "core/error.h"
-#include "core/image_io.h"
+#include "core/image/image_io.h"
+#include "core/image/transfer.h"
 #include "core/temp_folder.h"
-#include "core/transfer.h"
 #include "export/export_work.h"
 #include "export/sample_surfaces.h"
 

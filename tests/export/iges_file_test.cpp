@@ -4,7 +4,7 @@
 #include <gmock/gmock.h>
 
 #include "core/error.h"
-#include "core/output_guard.h"
+#include "core/io/output_guard.h"
 #include "core/temp_folder.h"
 #include "export/sample_surfaces.h"
 

@@ -7,8 +7,8 @@
 #include <sstream>
 
 #include "core/error.h"
-#include "core/mesh_io.h"
-#include "core/output_guard.h"
+#include "core/io/output_guard.h"
+#include "core/surface/mesh_io.h"
 #include "core/temp_folder.h"
 #include "export/closed_solid.h"
 #include "export/sample_surfaces.h"

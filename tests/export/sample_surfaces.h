@@ -6,7 +6,7 @@
 #include <numbers>
 #include <random>
 
-#include "core/surface_mesh.h"
+#include "core/surface/surface_mesh.h"
 #include "design/grid_mesh.h"
 
 namespace lensforge::testing {

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/smooth_surface.h"
+#include "core/surface/smooth_surface.h"
 
 #include <gtest/gtest.h>
 
 #include <random>
 
-#include "core/slope_heights.h"
+#include "core/surface/slope_heights.h"
 #include "design/optics/surface_optics.h"
 #include "export/sample_surfaces.h"
 

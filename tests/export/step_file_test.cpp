@@ -7,7 +7,7 @@
 #include <cstdio>
 
 #include "core/error.h"
-#include "core/output_guard.h"
+#include "core/io/output_guard.h"
 #include "core/temp_folder.h"
 #include "export/closed_solid.h"
 #include "export/part21.h"

@@ -13,7 +13,7 @@
 #include <stdexcept>
 #include <thread>
 
-#include "core/sha256.h"
+#include "core/io/sha256.h"
 #include "fuzz/child.h"
 #include "fuzz/meshes.h"
 #include "machine/gcode/program_seal.h"

@@ -4,7 +4,7 @@
 #include <limits>
 #include <memory>
 
-#include "core/image_io.h"
+#include "core/image/image_io.h"
 #include "scenario/driver.h"
 
 namespace lensforge::scenario {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <csignal>
 
-#include "core/folder_lock.h"
+#include "core/io/folder_lock.h"
 #include "scenario/driver.h"
 
 namespace lensforge::scenario {

@@ -2,8 +2,8 @@
 #include <cstdlib>
 #include <map>
 
-#include "core/image_io.h"
-#include "core/metrics.h"
+#include "core/image/image_io.h"
+#include "core/image/metrics.h"
 #include "scenario/driver.h"
 
 namespace lensforge::scenario {

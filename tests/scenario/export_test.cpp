@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
 
-#include "core/image_io.h"
-#include "core/mesh_io.h"
+#include "core/image/image_io.h"
+#include "core/surface/mesh_io.h"
 #include "scenario/driver.h"
 
 namespace lensforge::scenario {

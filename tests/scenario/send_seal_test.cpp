@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/sha256.h"
+#include "core/io/sha256.h"
 #include "machine/gcode/program_seal.h"
 #include "scenario/driver.h"
 

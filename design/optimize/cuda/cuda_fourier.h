@@ -3,7 +3,7 @@
 
 #include <cufft.h>
 
-#include "core/cuda/cuda_executor.h"
+#include "core/compute/cuda/cuda_executor.h"
 #include "design/optimize/extended_transforms.h"
 #include "design/optimize/grid_transforms.h"
 

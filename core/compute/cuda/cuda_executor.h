@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cuda_runtime_api.h>
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <stop_token>
+
+#include "core/compute/cuda/cuda_check.h"
+#include "core/compute/cuda/device_buffer.h"
+#include "core/compute/executor.h"
+
+namespace lensforge {
+
+/// Runs kernels on the first GPU, one after the other in a stream of its own. What it has in common
+/// with Executor is told there; the functions that start kernels are in
+/// core/compute/cuda/launch.cuh. Copies share stream and memory. Not for use by several threads at
+/// a time.
+class CudaExecutor {
+ public:
+  template <class T>
+  using Buffer = DeviceBuffer<T>;
+
+  /// Result of pending_sum(): asked for, it waits for the GPU. To be asked for before
+  /// kMostPendingSums more sums are begun.
+  template <std::size_t N>
+  class PendingSum {
+   public:
+    PendingSum() = default;
+    PendingSum(const CudaExecutor& executor, const double* slot)
+        : executor_(&executor), slot_(slot) {}
+    [[nodiscard]] std::array<double, N> get() const {
+      std::array<double, N> values{};
+      if (slot_ == nullptr) return values;
+      executor_->wait();
+      for (std::size_t k = 0; k < N; ++k) values[k] = slot_[k];
+      return values;
+    }
+
+   private:
+    const CudaExecutor* executor_ = nullptr;
+    const double* slot_ = nullptr;
+  };
+
+  static constexpr int kMostPendingSums = 32;
+  static constexpr int kMostTerms = 8;  ///< Of one sum.
+
+  /// Takes over profile and stop token of `options`. @throw RunError without a usable GPU.
+  explicit CudaExecutor(const Executor& options);
+
+  /// Kernels of all "workers" add to shared memory with atomics: there is but one.
+  [[nodiscard]] int concurrency() const { return 1; }
+
+  [[nodiscard]] cudaStream_t stream() const;
+  /// Waits until all that was begun is done. @throw RunError if a kernel has failed.
+  void wait() const;
+
+  /// To be called before and after a kernel is launched. @throw Interrupted, see Executor.
+  void begin_kernel() const;
+  void end_kernel(const char* kernel) const;
+
+  /// Memory for the partial sums of `blocks` blocks; valid until the next call.
+  [[nodiscard]] double* partial_sums(std::size_t blocks) const;
+  /// Where a sum's terms are to be put on the GPU.
+  [[nodiscard]] double* next_result() const;
+  /// Sends that result to the caller's memory and tells where it will be.
+  [[nodiscard]] const double* collect_result(const double* result) const;
+
+  /// Bytes from the caller's memory to the GPU's and back, after all that was begun before.
+  void copy_in(void* to, const void* from, std::size_t bytes) const;
+  void copy_out(void* to, const void* from, std::size_t bytes) const;
+  void clear(void* memory, std::size_t bytes) const;
+
+ private:
+  struct State;
+  std::shared_ptr<State> state_;
+};
+
+template <class T>
+void fill_zero(const CudaExecutor& executor, DeviceBuffer<T>& buffer) {
+  executor.clear(buffer.data(), buffer.size() * sizeof(T));
+}
+
+template <class T>
+void upload(const CudaExecutor& executor, std::span<const T> from, std::span<T> to) {
+  executor.copy_in(to.data(), from.data(), from.size_bytes());
+}
+
+template <class T>
+void download(const CudaExecutor& executor, std::span<const T> from, std::span<T> to) {
+  executor.copy_out(to.data(), from.data(), from.size_bytes());
+}
+
+}  // namespace lensforge

@@ -1,0 +1,205 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <span>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+namespace lensforge {
+
+/// Wall-clock seconds and calls per kernel name; filled by an Executor that was given one.
+class KernelProfile {
+ public:
+  struct Entry {
+    double seconds = 0.0;
+    std::int64_t calls = 0;
+  };
+
+  void add(const char* kernel, double seconds);
+  [[nodiscard]] std::map<std::string, Entry> entries() const;
+  void clear();
+
+ private:
+  mutable std::mutex mutex_;
+  std::map<std::string, Entry> entries_;
+};
+
+/// The processor that renders and optimises.
+enum class Device { kCpu, kCuda };
+
+/// A sum that is asked for later: an executor with memory of its own need not be waited for.
+template <std::size_t N>
+struct FinishedSum {
+  std::array<double, N> value{};
+  [[nodiscard]] const std::array<double, N>& get() const { return value; }
+};
+
+/// Where kernels run. A small value that is passed down; copies share the same thread arena.
+///
+/// Kernels written for any executor (`template <class Exec>`) keep to what this one and the CUDA
+/// one (core/compute/cuda/cuda_executor.h) have in common: Buffer, PendingSum, concurrency(),
+/// parallel_for(), parallel_for_worker(), pending_sum(), scan_rows(), dot(), fill_zero(), upload()
+/// and download().
+class Executor {
+ public:
+  /// Memory that its kernels read and write.
+  template <class T>
+  using Buffer = std::vector<T>;
+  /// Result of pending_sum(); zeros where nothing was summed.
+  template <std::size_t N>
+  using PendingSum = FinishedSum<N>;
+
+  /// Runs everything in the calling thread, in index order.
+  static Executor serial();
+  /// Runs on oneTBB with `threads` threads; 0 takes all that the process may use.
+  static Executor cpu(int threads = 0);
+
+  /// The same executor that also records the time of every kernel into `profile` (not owned).
+  [[nodiscard]] Executor with_profile(KernelProfile* profile) const;
+
+  /// The same executor whose kernels end as soon as `stop` is requested: run() then throws
+  /// Interrupted, and what the kernel was to write is left half done.
+  [[nodiscard]] Executor with_stop(std::stop_token stop) const;
+
+  /// The same executor that asks the stages which can do so to work on `device`. Kernels handed to
+  /// this executor itself run on the CPU all the same.
+  [[nodiscard]] Executor with_device(Device device) const;
+  [[nodiscard]] Device device() const { return device_; }
+
+  [[nodiscard]] KernelProfile* profile() const { return profile_; }
+  [[nodiscard]] const std::stop_token& stop_token() const { return stop_; }
+
+  /// Upper bound of the worker numbers handed to kernels: workers are 0 … concurrency() − 1.
+  [[nodiscard]] int concurrency() const;
+
+  using Chunk = void (*)(const void* body, std::int64_t begin, std::int64_t end, int worker);
+  /// Calls `chunk` on ranges that cover 0 … count − 1, each at least `grain` long but for the last.
+  /// An exception thrown by a chunk reaches the caller. @throw Interrupted, see with_stop().
+  void run(const char* kernel, std::int64_t count, std::int64_t grain, Chunk chunk,
+           const void* body) const;
+
+ private:
+  struct Arena;
+  std::shared_ptr<Arena> arena_;  ///< Null for the serial executor.
+  KernelProfile* profile_ = nullptr;
+  std::stop_token stop_;
+  Device device_ = Device::kCpu;
+};
+
+/// Items that one task handles at least: below this the scheduling costs more than the work.
+inline constexpr std::int64_t kDefaultGrain = 1024;
+
+/// Calls `functor(i)` for i in 0 … count − 1. Calls may run at the same time and in any order, so
+/// they must not write to the same place; then the result does not depend on the thread count.
+template <class Functor>
+void parallel_for(const Executor& executor, const char* kernel, std::int64_t count,
+                  const Functor& functor, std::int64_t grain = kDefaultGrain) {
+  executor.run(
+      kernel, count, grain,
+      [](const void* body, std::int64_t begin, std::int64_t end, int /*worker*/) {
+        const Functor& f = *static_cast<const Functor*>(body);
+        for (std::int64_t i = begin; i < end; ++i) f(i);
+      },
+      &functor);
+}
+
+/// parallel_for() whose functor is also told which worker calls it, `functor(i, worker)`; calls of
+/// one worker do not run at the same time.
+template <class Functor>
+void parallel_for_worker(const Executor& executor, const char* kernel, std::int64_t count,
+                         const Functor& functor, std::int64_t grain = kDefaultGrain) {
+  executor.run(
+      kernel, count, grain,
+      [](const void* body, std::int64_t begin, std::int64_t end, int worker) {
+        const Functor& f = *static_cast<const Functor*>(body);
+        for (std::int64_t i = begin; i < end; ++i) f(i, worker);
+      },
+      &functor);
+}
+
+/// Sums `functor(i)`, an array of N doubles, over i in 0 … count − 1. The sum is taken per block of
+/// fixed length and then over the blocks in order: the same bits for any number of threads.
+template <std::size_t N, class Functor>
+std::array<double, N> parallel_sum(const Executor& executor, const char* kernel, std::int64_t count,
+                                   const Functor& functor, std::int64_t block = kDefaultGrain) {
+  using Sum = std::array<double, N>;
+  const std::int64_t blocks = (count + block - 1) / block;
+  std::vector<Sum> partial(static_cast<std::size_t>(blocks), Sum{});
+  const auto sum_block = [&](std::int64_t b) {
+    Sum sum{};
+    const std::int64_t end = std::min(count, (b + 1) * block);
+    for (std::int64_t i = b * block; i < end; ++i) {
+      const Sum item = functor(i);
+      for (std::size_t k = 0; k < N; ++k) sum[k] += item[k];
+    }
+    partial[static_cast<std::size_t>(b)] = sum;
+  };
+  parallel_for(executor, kernel, blocks, sum_block, 1);
+  Sum total{};
+  for (const Sum& sum : partial) {
+    for (std::size_t k = 0; k < N; ++k) total[k] += sum[k];
+  }
+  return total;
+}
+
+/// parallel_sum() whose result `.get()` gives.
+template <std::size_t N, class Functor>
+FinishedSum<N> pending_sum(const Executor& executor, const char* kernel, std::int64_t count,
+                           const Functor& functor) {
+  return {parallel_sum<N>(executor, kernel, count, functor)};
+}
+
+/// Rows that one task of scan_rows() handles at least.
+inline constexpr std::int64_t kRowGrain = 16;
+
+/// Running sums along rows: in every row r calls `scan.store(r, c, sum)` with the sum of
+/// `scan.item(r, 0 … c)`, of type Scan::Value, for c = 0 … columns − 1.
+template <class Scan>
+void scan_rows(const Executor& executor, const char* kernel, std::int64_t rows, int columns,
+               const Scan& scan) {
+  const auto scan_row = [&](std::int64_t r) {
+    typename Scan::Value running{};
+    for (int c = 0; c < columns; ++c) {
+      running += scan.item(r, c);
+      scan.store(r, c, running);
+    }
+  };
+  parallel_for(executor, kernel, rows, scan_row, kRowGrain);
+}
+
+/// Scalar product, in fixed order.
+double dot(const Executor& executor, std::span<const double> a, std::span<const double> b);
+
+/// Sets every byte to zero.
+template <class T>
+void fill_zero(const Executor& /*executor*/, std::vector<T>& buffer) {
+  std::fill(buffer.begin(), buffer.end(), T{});
+}
+
+/// Copies from the caller's memory to the executor's, and back. @pre both have the same length.
+template <class T>
+void upload(const Executor& /*executor*/, std::span<const T> from, std::span<T> to) {
+  std::copy(from.begin(), from.end(), to.begin());
+}
+template <class T>
+void download(const Executor& /*executor*/, std::span<const T> from, std::span<T> to) {
+  std::copy(from.begin(), from.end(), to.begin());
+}
+
+/// A buffer of the executor that holds a copy of `values`.
+template <class T, class Exec>
+typename Exec::template Buffer<T> buffer_of(const Exec& executor, std::span<const T> values) {
+  typename Exec::template Buffer<T> buffer(values.size());
+  upload(executor, values, std::span<T>(buffer.data(), buffer.size()));
+  return buffer;
+}
+
+}  // namespace lensforge

@@ -1,0 +1,8 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "core/compute/gpu.h"
+
+namespace lensforge {
+
+Gpu find_gpu() { return {false, "", "this build has no CUDA"}; }
+
+}  // namespace lensforge

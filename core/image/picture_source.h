@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <OpenImageIO/imageio.h>
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/compute/run_control.h"
+#include "core/image/picture_file.h"
+#include "core/image/png_outline.h"
+
+namespace lensforge {
+
+/// An open picture file and what its header says. It is opened only after all that can be told from
+/// its bytes alone has been looked at. Every function throws InputError naming the file, or
+/// Interrupted once `run` asks for an end.
+class PictureSource {
+ public:
+  /// @pre `run` outlives this.
+  PictureSource(const std::filesystem::path& path, const RunControl& run);
+
+  [[nodiscard]] const OIIO::ImageSpec& spec() const { return spec_; }
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+  [[nodiscard]] bool is(std::string_view format) const { return format == format_; }
+  [[nodiscard]] bool is_animated() const { return animated_; }
+
+  /// Name of the embedded ICC profile; empty without one.
+  [[nodiscard]] std::string color_profile() const;
+  /// To be asked when the first picture is read: the file stands at the next one afterwards.
+  [[nodiscard]] bool has_more_pictures();
+
+  /// Rows that are read at once: tiles must be whole.
+  [[nodiscard]] int band_rows() const;
+  /// Reads rows begin … end − 1, counted from the data's top, all channels side by side.
+  void read_rows(int begin, int end, std::vector<float>& rows);
+
+ private:
+  void look_over();
+  void open();
+  void check_spec() const;
+  void require_memory(double bytes) const;
+  template <class Call>
+  bool quietly(const Call& call) const;
+  [[noreturn]] void fail(const std::string& why) const;
+
+  std::filesystem::path path_;
+  const RunControl& run_;
+  std::string format_;  ///< OpenImageIO's name of it.
+  bool animated_ = false;
+  EssentialPng png_;  ///< Empty for other formats.
+  std::unique_ptr<PictureFile> file_;
+  std::unique_ptr<OIIO::ImageInput> input_;
+  OIIO::ImageSpec spec_;
+};
+
+/// @throw InputError if a picture of this size is not read.
+void check_picture_size(const std::filesystem::path& path, std::int64_t columns, std::int64_t rows);
+
+/// @throw InputError "path: why", one short printable line.
+[[noreturn]] void refuse_picture(const std::filesystem::path& path, const std::string& why);
+
+}  // namespace lensforge

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cmath>
+
+#include "core/compute/host_device.h"
+
+/// The one display transfer curve of the program: sRGB (IEC 61966-2-1) with its linear toe, which
+/// keeps the slope at black finite. Continued beyond 1 by the same power law, odd below 0.
+namespace lensforge {
+
+inline constexpr double kSrgbToeSlope = 12.92;
+inline constexpr double kSrgbToeEnd = 0.0031308;  ///< Linear value where the toe ends.
+
+/// Linear light → display-encoded value; both 1 at white.
+LF_HD inline double encode(double linear) {
+  if (linear <= kSrgbToeEnd) return kSrgbToeSlope * linear;
+  return 1.055 * std::pow(linear, 1.0 / 2.4) - 0.055;
+}
+
+/// Derivative of encode().
+LF_HD inline double encode_slope(double linear) {
+  if (linear <= kSrgbToeEnd) return kSrgbToeSlope;
+  return 1.055 / 2.4 * std::pow(linear, 1.0 / 2.4 - 1.0);
+}
+
+/// Display-encoded value → linear light; the inverse of encode() to 1e-7 (the standard's rounding).
+LF_HD inline double decode(double encoded) {
+  if (encoded <= kSrgbToeSlope * kSrgbToeEnd) return encoded / kSrgbToeSlope;
+  return std::pow((encoded + 0.055) / 1.055, 2.4);
+}
+
+}  // namespace lensforge

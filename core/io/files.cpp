@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "core/io/files.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <climits>
+#include <cstring>
+#include <random>
+#include <string>
+#include <system_error>
+#include <utility>
+
+#include "core/error.h"
+
+namespace lensforge {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::string_view kPartial = ".partial-";
+
+std::string reason(int error) { return std::generic_category().message(error); }
+
+[[noreturn]] void fail_to_write(const fs::path& path, int error) {
+  throw RunError(path.string() + ": cannot be written: " + reason(error));
+}
+
+/// An open file descriptor that closes itself.
+class Descriptor {
+ public:
+  explicit Descriptor(int number) : number_(number) {}
+  ~Descriptor() { close(); }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+
+  [[nodiscard]] int number() const { return number_; }
+  /// Returns 0 or an errno value; some file systems report a full disk only here.
+  int close() {
+    const int number = std::exchange(number_, -1);
+    return number >= 0 && ::close(number) != 0 ? errno : 0;
+  }
+
+ private:
+  int number_;
+};
+
+/// An empty file of our own, or why there is none (an errno value).
+struct Beside {
+  fs::path path;
+  int error = 0;
+};
+
+/// Makes an empty file with a name of its own in the folder of `path`, with its extension, so that
+/// writers which choose their format by the name work.
+Beside make_beside(const fs::path& path) {
+  std::random_device random;
+  for (;;) {
+    const std::string number = std::to_string(random());
+    const std::string end = std::string(kPartial) + number + path.extension().string();
+    const std::string stem = path.stem().string();
+    // A name that just fits its folder leaves no room for the words that are added.
+    const std::size_t room = NAME_MAX - std::min<std::size_t>(NAME_MAX - 1, end.size() + 1);
+    const std::string name = std::string(".").append(stem, 0, room).append(end);
+    fs::path beside = path.parent_path() / name;
+    const Descriptor file(::open(beside.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0666));
+    if (file.number() >= 0) return {std::move(beside), 0};
+    if (errno != EEXIST) return {{}, errno};
+  }
+}
+
+void remove_quietly(const fs::path& path) {
+  std::error_code ignored;
+  if (!path.empty()) fs::remove(path, ignored);
+}
+
+/// Flushes a file or folder to the disk. EINVAL and ENOTSUP mean that this file system has nothing
+/// to flush, which is no failure.
+void flush_to_disk(const fs::path& file, const fs::path& named_in_error) {
+  Descriptor opened(::open(file.empty() ? "." : file.c_str(), O_RDONLY | O_CLOEXEC));
+  if (opened.number() < 0) fail_to_write(named_in_error, errno);
+  if (::fsync(opened.number()) != 0 && errno != EINVAL && errno != ENOTSUP) {
+    fail_to_write(named_in_error, errno);
+  }
+  if (const int error = opened.close(); error != 0) fail_to_write(named_in_error, error);
+}
+
+void write_all(int descriptor, std::string_view content, const fs::path& named_in_error) {
+  while (!content.empty()) {
+    const ssize_t written = ::write(descriptor, content.data(), content.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) fail_to_write(named_in_error, errno);
+    content.remove_prefix(static_cast<std::size_t>(written));
+  }
+}
+
+/// What kind of thing that is no regular file a path names.
+const char* kind_of(mode_t mode) {
+  if (S_ISDIR(mode)) return "a folder";
+  if (S_ISFIFO(mode)) return "a named pipe";
+  if (S_ISSOCK(mode)) return "a socket";
+  return "a device";
+}
+
+[[noreturn]] void fail_to_read(const fs::path& path, int error) {
+  throw InputError(path.string() + ": cannot be read: " + reason(error));
+}
+
+void require_regular(const struct stat& status, const fs::path& path) {
+  if (S_ISREG(status.st_mode)) return;
+  throw InputError(path.string() + ": is " + kind_of(status.st_mode) +
+                   "; only regular files are read");
+}
+
+}  // namespace
+
+PendingFile::PendingFile(fs::path path) : path_(std::move(path)) {
+  auto [beside, error] = make_beside(path_);
+  if (error != 0) fail_to_write(path_, error);
+  beside_ = std::move(beside);
+}
+
+PendingFile::~PendingFile() { remove_quietly(beside_); }
+
+PendingFile::PendingFile(PendingFile&& other) noexcept
+    : path_(std::move(other.path_)), beside_(std::exchange(other.beside_, {})) {}
+
+void PendingFile::publish() {
+  flush_to_disk(beside_, path_);
+  if (::rename(beside_.c_str(), path_.c_str()) != 0) fail_to_write(path_, errno);
+  beside_.clear();
+  // The new name itself is only safe once the folder is.
+  flush_to_disk(path_.parent_path(), path_);
+}
+
+void PendingFile::publish_as(fs::path path) {
+  path_ = std::move(path);
+  publish();
+}
+
+void write_whole_file(const fs::path& path,
+                      const std::function<void(const fs::path& beside)>& write) {
+  PendingFile file(path);
+  write(file.beside());
+  file.publish();
+}
+
+void write_whole_file(const fs::path& path, std::string_view content) {
+  write_whole_file(path, [&](const fs::path& beside) {
+    Descriptor file(::open(beside.c_str(), O_WRONLY | O_TRUNC | O_CLOEXEC));
+    if (file.number() < 0) fail_to_write(path, errno);
+    write_all(file.number(), content, path);
+    if (const int error = file.close(); error != 0) fail_to_write(path, error);
+  });
+}
+
+std::string name_of_partial(std::string_view name) {
+  const std::size_t found = name.rfind(kPartial);
+  if (!name.starts_with('.') || found == std::string_view::npos || found < 2) return {};
+  const std::string_view rest = name.substr(found + kPartial.size());
+  const std::size_t digits = std::min(rest.find_first_not_of("0123456789"), rest.size());
+  if (digits == 0 || (digits < rest.size() && rest[digits] != '.')) return {};
+  return std::string(name.substr(1, found - 1)).append(rest.substr(digits));
+}
+
+void require_regular_file(const fs::path& path) {
+  struct stat status {};
+  if (::stat(path.c_str(), &status) != 0) fail_to_read(path, errno);
+  require_regular(status, path);
+  // A missing right is named here, since libraries give no reason.
+  if (::access(path.c_str(), R_OK) != 0) fail_to_read(path, errno);
+}
+
+std::ifstream open_input(const fs::path& path) {
+  require_regular_file(path);
+  std::ifstream file(path, std::ios::binary);
+  if (!file) fail_to_read(path, errno);
+  return file;
+}
+
+std::string read_whole_file(const fs::path& path, std::uintmax_t max_bytes) {
+  std::ifstream file = open_input(path);
+  std::error_code error;
+  const std::uintmax_t size = fs::file_size(path, error);
+  if (error) fail_to_read(path, error.value());
+  if (size > max_bytes) {
+    throw InputError(path.string() + ": has " + std::to_string(size) + " bytes; at most " +
+                     std::to_string(max_bytes) + " are read");
+  }
+  std::string content(size, '\0');
+  file.read(content.data(), static_cast<std::streamsize>(size));
+  content.resize(static_cast<std::size_t>(file.gcount()));
+  return content;
+}
+
+bool is_folder(const fs::path& path) {
+  std::error_code ignored;
+  return fs::is_directory(path, ignored);
+}
+
+void require_writable_folder(const fs::path& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  std::error_code ignored;
+  if (!fs::is_directory(folder, ignored)) {
+    const std::string why = error ? error.message() : reason(ENOTDIR);
+    throw InputError(folder.string() + ": cannot be made a folder: " + why);
+  }
+  const Beside probe = make_beside(folder / "probe");
+  remove_quietly(probe.path);
+  if (probe.error != 0) {
+    throw InputError(folder.string() +
+                     ": files cannot be made in this folder: " + reason(probe.error));
+  }
+}
+
+}  // namespace lensforge

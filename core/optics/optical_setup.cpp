@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "core/optics/optical_setup.h"
+
+#include <cmath>
+#include <sstream>
+#include <string>
+
+#include "core/error.h"
+
+namespace lensforge {
+namespace {
+
+template <class Value>
+void require(bool holds, const std::string& field, const Value& value, const std::string& rule) {
+  if (holds) return;
+  std::ostringstream message;
+  message << field << " is " << value << ": it must be " << rule;
+  throw InputError(message.str());
+}
+
+void require_positive(const std::string& field, double value) {
+  require(std::isfinite(value) && value > 0.0, field, value, "a finite number of mm above 0");
+}
+
+}  // namespace
+
+void validate(const OpticalSetup& setup) {
+  require(std::isfinite(setup.ior) && setup.ior > 1.0, "ior", setup.ior, "a finite number above 1");
+  require_positive("focal_length", setup.focal_length);
+  for (int axis = 0; axis < 2; ++axis) {
+    const std::string index = axis == 0 ? "[0]" : "[1]";
+    require_positive("lens_size" + index, setup.lens_size[axis]);
+    require_positive("image_size" + index, setup.image_size[axis]);
+    require(std::isfinite(setup.image_origin[axis]), "image_origin" + index,
+            setup.image_origin[axis], "a finite number of mm");
+    require(setup.pixels[axis] > 0, "pixels" + index, setup.pixels[axis], "1 or more");
+  }
+}
+
+}  // namespace lensforge

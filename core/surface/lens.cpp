@@ -1,0 +1,285 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "core/surface/lens.h"
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <random>
+#include <string>
+#include <system_error>
+#include <utility>
+
+#include "core/error.h"
+#include "core/image/error_image.h"
+#include "core/image/image_io.h"
+#include "core/io/files.h"
+#include "core/surface/height_field_check.h"
+#include "core/surface/lens_surface.h"
+#include "core/surface/mesh_io.h"
+#include "core/text/json_fields.h"
+#include "core/text/json_text.h"
+
+namespace lensforge {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+using nlohmann::ordered_json;
+
+constexpr const char* kFormat = "lensforge.lens";
+constexpr int kVersion = 1;
+/// Of lens.json, which has some 2 kB.
+constexpr std::uintmax_t kMaxJsonBytes = std::uintmax_t{1} << 20U;
+
+std::string size_text(int columns, int rows) {
+  return std::to_string(columns) + " x " + std::to_string(rows);
+}
+
+ordered_json to_json(const ImageMetrics& metrics) {
+  // JSON knows no infinity: the PSNR of equal pictures is stored as null.
+  const ordered_json psnr =
+      std::isfinite(metrics.psnr) ? ordered_json(metrics.psnr) : ordered_json(nullptr);
+  return {{"mae", metrics.mae},
+          {"psnr", psnr},
+          {"ssim", metrics.ssim},
+          {"flux_inside", metrics.flux_inside},
+          {"mae_linear", metrics.mae_linear}};
+}
+
+template <class Vector>
+ordered_json pair_json(const Vector& pair) {
+  return ordered_json::array({pair.x(), pair.y()});
+}
+
+ordered_json to_json(const Lens& lens) {
+  const OpticalSetup& setup = lens.setup;
+  const GridShape& grid = lens.surface.grid;
+  return {
+      {"format", kFormat},
+      {"version", kVersion},
+      {"units", "mm"},
+      {"mode", "refract"},
+      {"source", {{"type", "parallel"}}},
+      {"ior", setup.ior},
+      {"focal_length", setup.focal_length},
+      {"lens_size", pair_json(setup.lens_size)},
+      {"image_size", pair_json(setup.image_size)},
+      {"image_origin", pair_json(setup.image_origin)},
+      {"pixels", pair_json(setup.pixels)},
+      {"view", setup.view == ViewSide::kFront ? "front" : "rear"},
+      {"model", lens.model == SurfaceModel::kFacet ? "facet" : "smooth"},
+      {"surface", lens_file::kSurface},
+      {"grid", grid.is_grid() ? ordered_json::array({grid.columns, grid.rows}) : ordered_json()},
+      {"metrics",
+       {{"facet", to_json(lens.facet_metrics)}, {"smooth", to_json(lens.smooth_metrics)}}},
+      {"provenance", ordered_json(lens.provenance)},
+  };
+}
+
+/// A folder of our own inside `parent` that is removed with all it holds.
+class StagingFolder {
+ public:
+  explicit StagingFolder(const fs::path& parent)
+      : path_(parent / std::string(".")
+                           .append(lens_file::kStaging)
+                           .append(".partial-")
+                           .append(std::to_string(std::random_device{}()))) {
+    std::error_code error;
+    fs::create_directories(path_, error);
+    if (error) throw RunError(parent.string() + ": cannot be written: " + error.message());
+  }
+  ~StagingFolder() {
+    std::error_code ignored;
+    fs::remove_all(path_, ignored);
+  }
+  StagingFolder(const StagingFolder&) = delete;
+  StagingFolder& operator=(const StagingFolder&) = delete;
+
+  [[nodiscard]] fs::path operator/(const char* name) const { return path_ / name; }
+
+ private:
+  fs::path path_;
+};
+
+void write_files(const Lens& lens, const StagingFolder& staging) {
+  write_ply(lens.surface, staging / lens_file::kSurface);
+  write_image(lens.target, staging / lens_file::kTargetPng);
+  write_image(lens.target, staging / lens_file::kTargetExr);
+  if (!lens.render.empty()) {
+    write_image(lens.render, staging / lens_file::kRenderPng);
+    write_image(lens.render, staging / lens_file::kRenderExr);
+    write_image(error_image(lens.render, lens.target), staging / lens_file::kError);
+  }
+  const std::string text = to_json(lens).dump(2, ' ', false, json::error_handler_t::replace);
+  write_whole_file(staging / lens_file::kJson, text + "\n");
+}
+
+/// Puts the staged files in place. A file that this lens has not is removed, so that none of an
+/// older lens stays beside the new one.
+void publish(const StagingFolder& staging, const fs::path& folder) {
+  using namespace lens_file;
+  fs::remove(folder / kJson);
+  for (const char* name :
+       {kSurface, kTargetPng, kTargetExr, kRenderPng, kRenderExr, kError, kJson}) {
+    if (fs::exists(staging / name)) {
+      fs::rename(staging / name, folder / name);
+    } else {
+      fs::remove(folder / name);
+    }
+  }
+}
+
+void check_sizes(const Lens& lens) {
+  const Eigen::Vector2i& pixels = lens.setup.pixels;
+  const auto fits = [&](const Image& image) {
+    return image.columns() == pixels.x() && image.rows() == pixels.y();
+  };
+  LF_CHECK(fits(lens.target), size_text(lens.target.columns(), lens.target.rows()));
+  LF_CHECK(lens.render.empty() || fits(lens.render),
+           size_text(lens.render.columns(), lens.render.rows()));
+}
+
+json read_json(const fs::path& path) {
+  return parse_json(read_whole_file(path, kMaxJsonBytes), path.string());
+}
+
+/// One of two words as one of two values.
+template <class Value>
+Value choice(const JsonFields& fields, const std::string& name,
+             const std::array<std::pair<const char*, Value>, 2>& words) {
+  const std::string text = fields.text(name);
+  for (const auto& [word, value] : words) {
+    if (text == word) return value;
+  }
+  fields.refuse(name,
+                std::string("it must be \"") + words[0].first + "\" or \"" + words[1].first + "\"");
+}
+
+void check_supported(const JsonFields& fields) {
+  if (fields.text("format") != kFormat) {
+    fields.refuse("format", std::string("only \"") + kFormat + "\" can be read");
+  }
+  if (fields.integer("version") != kVersion) {
+    fields.refuse("version",
+                  "only version " + std::to_string(kVersion) + " can be read by this program");
+  }
+  if (fields.text("units") != "mm") fields.refuse("units", "only \"mm\" can be read");
+  if (fields.text("mode") != "refract") {
+    fields.refuse("mode", "not supported yet by this version, only \"refract\" is");
+  }
+  const JsonFields source = fields.object("source");
+  if (source.text("type") != "parallel") {
+    source.refuse("type", "not supported yet by this version, only \"parallel\" is");
+  }
+}
+
+OpticalSetup read_setup(const JsonFields& fields, const std::string& file) {
+  OpticalSetup setup;
+  setup.ior = fields.number("ior");
+  setup.focal_length = fields.number("focal_length");
+  setup.lens_size = fields.number_pair("lens_size");
+  setup.image_size = fields.number_pair("image_size");
+  setup.image_origin = fields.number_pair("image_origin");
+  setup.pixels = fields.integer_pair("pixels");
+  setup.view =
+      choice<ViewSide>(fields, "view", {{{"front", ViewSide::kFront}, {"rear", ViewSide::kRear}}});
+  try {
+    validate(setup);
+  } catch (const InputError& error) {
+    throw InputError(file + ": field " + error.what());
+  }
+  if (setup.pixels.maxCoeff() > kMaxImageSide) {
+    fields.refuse("pixels", "at most " + std::to_string(kMaxImageSide) + " a side");
+  }
+  return setup;
+}
+
+ImageMetrics read_metrics(const JsonFields& fields) {
+  ImageMetrics metrics;
+  metrics.mae = fields.number("mae");
+  metrics.psnr =
+      fields.at("psnr").is_null() ? std::numeric_limits<double>::infinity() : fields.number("psnr");
+  metrics.ssim = fields.number("ssim");
+  metrics.flux_inside = fields.number("flux_inside");
+  if (fields.has("mae_linear")) metrics.mae_linear = fields.number("mae_linear");
+  return metrics;
+}
+
+GridShape read_grid(const JsonFields& fields, const SurfaceMesh& mesh) {
+  if (fields.at("grid").is_null()) return {};
+  const Eigen::Vector2i shape = fields.integer_pair("grid");
+  const std::int64_t vertices = std::int64_t{shape.x()} * shape.y();
+  if (shape.minCoeff() < 1 || vertices != mesh.vertex_count()) {
+    fields.refuse("grid", "the surface has " + std::to_string(mesh.vertex_count()) + " vertices");
+  }
+  const GridShape grid{shape.x(), shape.y()};
+  if (const auto fault = grid_fault(mesh, grid)) fields.refuse("grid", *fault);
+  return grid;
+}
+
+SurfaceMesh read_surface(const JsonFields& fields, const OpticalSetup& setup,
+                         const fs::path& folder) {
+  const fs::path name = fields.text("surface");
+  if (name.empty() || name == ".." || name != name.filename()) {
+    fields.refuse("surface", "it must be the name of a file in the lens folder");
+  }
+  SurfaceMesh mesh = read_mesh(folder / name);
+  if (const auto fault = surface_fault(mesh, setup)) {
+    throw InputError((folder / name).string() + ": " + *fault);
+  }
+  mesh.grid = read_grid(fields, mesh);
+  // A grid was checked cell by cell, which is faster.
+  const auto fault = mesh.grid.is_grid() ? std::nullopt : height_field_fault(mesh, setup.lens_size);
+  if (fault) throw InputError((folder / name).string() + ": " + *fault);
+  return mesh;
+}
+
+Image read_picture(const fs::path& path, const OpticalSetup& setup) {
+  Image image = read_image(path).image;
+  if (image.columns() != setup.pixels.x() || image.rows() != setup.pixels.y()) {
+    throw InputError(path.string() + ": is " + size_text(image.columns(), image.rows()) +
+                     " pixels, field 'pixels' of " + lens_file::kJson + " says " +
+                     size_text(setup.pixels.x(), setup.pixels.y()));
+  }
+  return image;
+}
+
+}  // namespace
+
+void write_lens(const Lens& lens, const fs::path& folder) {
+  check_sizes(lens);
+  const StagingFolder staging(folder);
+  write_files(lens, staging);
+  try {
+    publish(staging, folder);
+  } catch (const fs::filesystem_error& error) {
+    throw RunError(folder.string() + ": cannot be written: " + error.code().message());
+  }
+}
+
+Lens read_lens(const fs::path& folder) {
+  const fs::path path = folder / lens_file::kJson;
+  const json document = read_json(path);
+  const JsonFields fields(document, path.string());
+  check_supported(fields);
+  Lens lens;
+  lens.setup = read_setup(fields, path.string());
+  lens.model = choice<SurfaceModel>(
+      fields, "model", {{{"facet", SurfaceModel::kFacet}, {"smooth", SurfaceModel::kSmooth}}});
+  const JsonFields metrics = fields.object("metrics");
+  lens.facet_metrics = read_metrics(metrics.object("facet"));
+  lens.smooth_metrics = read_metrics(metrics.object("smooth"));
+  if (!fields.at("provenance").is_object()) fields.refuse("provenance", "it must be an object");
+  lens.provenance = fields.at("provenance");
+  lens.surface = read_surface(fields, lens.setup, folder);
+  lens.target = read_picture(folder / lens_file::kTargetExr, lens.setup);
+  const fs::path render = folder / lens_file::kRenderExr;
+  std::error_code none;
+  if (fs::status(render, none).type() != fs::file_type::not_found) {
+    lens.render = read_picture(render, lens.setup);
+  }
+  return lens;
+}
+
+}  // namespace lensforge

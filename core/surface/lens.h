@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "core/image/image.h"
+#include "core/image/metrics.h"
+#include "core/optics/optical_setup.h"
+#include "core/surface/surface_mesh.h"
+
+namespace lensforge {
+
+/// A designed lens: what one command hands to the next.
+struct Lens {
+  SurfaceMesh surface;  ///< The optical surface, z ≥ thickness; mm, lens frame.
+  OpticalSetup setup;
+  SurfaceModel model = SurfaceModel::kFacet;  ///< The model it was designed with.
+  Image target;                               ///< Working picture, linear light.
+  Image render;                               ///< What the lens projects under `model`.
+  ImageMetrics facet_metrics;
+  ImageMetrics smooth_metrics;
+  nlohmann::json provenance = nlohmann::json::object();
+};
+
+/// Names of the files in a lens folder (interface.md, "The lens folder").
+namespace lens_file {
+inline constexpr const char* kJson = "lens.json";
+inline constexpr const char* kSurface = "surface.ply";
+inline constexpr const char* kTargetPng = "target.png";
+inline constexpr const char* kTargetExr = "target.exr";
+inline constexpr const char* kRenderPng = "render.png";
+inline constexpr const char* kRenderExr = "render.exr";
+inline constexpr const char* kError = "error.png";
+inline constexpr const char* kConvergence = "convergence.csv";
+inline constexpr const char* kOverview = "overview.png";
+inline constexpr const char* kCheckpoint = "checkpoint.bin";  ///< While a design is unfinished.
+
+/// All of them.
+inline constexpr std::array kAll = {kJson,      kSurface, kTargetPng, kTargetExr,   kRenderPng,
+                                    kRenderExr, kError,   kOverview,  kConvergence, kCheckpoint};
+
+/// Folder beside the files in which a lens is put together before it takes its place.
+inline constexpr const char* kStaging = "lens";
+
+/// The folder inside that `cam` writes into, and what is in it beside the programs.
+inline constexpr const char* kCut = "cam";
+inline constexpr std::array kCutFiles = {"report.html", "report.json", "compare.html",
+                                         "milled.ply",  "milled.png",  "leakage.png"};
+}  // namespace lens_file
+
+/// Writes every file of the lens folder but convergence.csv; each is written beside and renamed,
+/// and lens.json comes last, so that a folder with a lens.json is always whole.
+/// @throw RunError if something cannot be written.
+void write_lens(const Lens& lens, const std::filesystem::path& folder);
+
+/// Reads a lens folder back.
+/// @throw InputError naming the folder or file and the field if something is missing, of another
+///        version, of another type, or contradicts itself.
+Lens read_lens(const std::filesystem::path& folder);
+
+}  // namespace lensforge

@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "core/surface/mesh_io.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cctype>
+#include <cerrno>
+#include <charconv>
+#include <cstdint>
+#include <cstring>
+#include <fstream>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <system_error>
+
+#include "core/error.h"
+#include "core/io/files.h"
+#include "core/surface/mesh_readers.h"
+#include "core/text/number_text.h"
+#include "core/text/version.h"
+
+namespace lensforge {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Records are copied as they lie in memory.
+static_assert(std::endian::native == std::endian::little, "write_ply writes little-endian PLY");
+
+/// Largest file of another program that is read: its content is held in memory. A binary STL of
+/// this size has 85 million triangles.
+constexpr std::uintmax_t kMaxMeshBytes = std::uintmax_t{4} << 30U;
+
+constexpr std::size_t kVertexBytes = 3 * sizeof(double);
+constexpr std::size_t kTriangleBytes = 1 + 3 * sizeof(std::int32_t);
+
+struct Counts {
+  std::int64_t vertices = 0;
+  std::int64_t triangles = 0;
+};
+
+constexpr std::string_view kFormatLines = "ply\nformat binary_little_endian 1.0\n";
+/// Before the version of the program that wrote it.
+constexpr std::string_view kMarkBegin = "comment lensforge ";
+/// Bytes of the longest mark line that is looked for.
+constexpr std::size_t kLongestMark = 100;
+
+/// What follows the format and the mark.
+std::string element_lines(const Counts& counts) {
+  return "element vertex " + std::to_string(counts.vertices) +
+         "\nproperty double x\nproperty double y\nproperty double z\nelement face " +
+         std::to_string(counts.triangles) +
+         "\nproperty list uchar int vertex_indices\nend_header\n";
+}
+
+std::int64_t number_after(const std::string& text, const std::string& words) {
+  std::int64_t number = -1;
+  if (const auto at = text.find(words); at != std::string::npos) {
+    std::from_chars(text.data() + at + words.size(), text.data() + text.size(), number);
+  }
+  return number;
+}
+
+[[noreturn]] void refuse(const fs::path& path, const std::string& why) {
+  throw InputError(path.string() + ": " + why);
+}
+
+/// The header of a file in our own form.
+struct OwnHeader {
+  Counts counts;
+  std::size_t bytes = 0;
+};
+
+/// The header if the file is in the very form that write_ply() makes, with or without its mark.
+std::optional<OwnHeader> own_form(std::ifstream& file) {
+  const std::size_t longest =
+      kFormatLines.size() + kLongestMark + element_lines({INT32_MAX, INT32_MAX}).size();
+  std::string head(longest, '\0');
+  file.read(head.data(), static_cast<std::streamsize>(head.size()));
+  head.resize(static_cast<std::size_t>(file.gcount()));
+  file.clear();
+  if (!head.starts_with(kFormatLines)) return std::nullopt;
+  std::size_t begin = kFormatLines.size();
+  if (head.compare(begin, kMarkBegin.size(), kMarkBegin) == 0) begin = head.find('\n', begin) + 1;
+  const Counts counts{number_after(head, "\nelement vertex "),
+                      number_after(head, "\nelement face ")};
+  if (counts.vertices < 0 || counts.vertices > INT32_MAX) return std::nullopt;
+  if (counts.triangles < 0 || counts.triangles > INT32_MAX) return std::nullopt;
+  const std::string lines = element_lines(counts);
+  if (head.compare(begin, lines.size(), lines) != 0) return std::nullopt;
+  file.seekg(static_cast<std::streamoff>(begin + lines.size()));
+  return OwnHeader{counts, begin + lines.size()};
+}
+
+/// Our own form is read bit for bit, without rounding to single precision.
+SurfaceMesh read_own_form(std::ifstream& file, const OwnHeader& header, const fs::path& path) {
+  const Counts& counts = header.counts;
+  const std::uintmax_t expected = header.bytes +
+                                  static_cast<std::uintmax_t>(counts.vertices) * kVertexBytes +
+                                  static_cast<std::uintmax_t>(counts.triangles) * kTriangleBytes;
+  if (const std::uintmax_t size = fs::file_size(path); size != expected) {
+    refuse(path, "is " + std::to_string(size) + " bytes long, its header calls for " +
+                     std::to_string(expected) + ": it is truncated or corrupt");
+  }
+  SurfaceMesh mesh;
+  mesh.vertices.resize(3, counts.vertices);
+  mesh.triangles.resize(3, counts.triangles);
+  file.read(reinterpret_cast<char*>(mesh.vertices.data()),
+            static_cast<std::streamsize>(counts.vertices) * std::streamsize{kVertexBytes});
+  std::array<char, kTriangleBytes> record{};
+  for (Eigen::Index t = 0; t < mesh.triangles.cols(); ++t) {
+    file.read(record.data(), kTriangleBytes);
+    if (record[0] != 3) refuse(path, "face " + std::to_string(t) + " is no triangle");
+    std::memcpy(mesh.triangles.col(t).data(), &record[1], kTriangleBytes - 1);
+  }
+  if (!file) refuse(path, "cannot be read to its end");
+  return mesh;
+}
+
+/// The extension without its dot, in small letters.
+std::string format_of(const fs::path& path) {
+  std::string format = path.extension().string();
+  format.erase(0, 1);
+  std::transform(format.begin(), format.end(), format.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return format;
+}
+
+SurfaceMesh read_foreign(const fs::path& path) {
+  const std::string format = format_of(path);
+  const std::string name = path.string();
+  const std::string content = read_whole_file(path, kMaxMeshBytes);
+  if (format == "ply") return read_ply(content, name);
+  if (format == "obj") return read_obj(content, name);
+  if (format == "off") return read_off(content, name);
+  if (format == "stl") return read_stl(content, name);
+  refuse(path, "extension '" + path.extension().string() +
+                   "' is not that of a mesh: .ply, .obj, .stl and .off are read");
+}
+
+void check_mesh(const SurfaceMesh& mesh, const fs::path& path) {
+  if (mesh.triangle_count() == 0) refuse(path, "holds no triangles");
+  for (Eigen::Index v = 0; v < mesh.vertices.cols(); ++v) {
+    if (mesh.vertices.col(v).allFinite()) continue;
+    const auto text = [&](int axis) { return number_text(mesh.vertices(axis, v)); };
+    refuse(path, "vertex " + std::to_string(v) + " is at (" + text(0) + ", " + text(1) + ", " +
+                     text(2) + "): coordinates must be finite");
+  }
+  for (Eigen::Index t = 0; t < mesh.triangles.cols(); ++t) {
+    for (const int v : mesh.triangles.col(t)) {
+      if (v >= 0 && v < mesh.vertices.cols()) continue;
+      refuse(path, "face " + std::to_string(t) + " uses vertex " + std::to_string(v) +
+                       ": there are only 0 ... " + std::to_string(mesh.vertices.cols() - 1));
+    }
+  }
+}
+
+void write_blocks(const SurfaceMesh& mesh, std::ofstream& file) {
+  file << kFormatLines << "comment " << program_mark() << '\n'
+       << element_lines({mesh.vertex_count(), mesh.triangle_count()});
+  file.write(reinterpret_cast<const char*>(mesh.vertices.data()),
+             mesh.vertex_count() * std::streamsize{kVertexBytes});
+  std::array<char, kTriangleBytes> record{3};
+  for (Eigen::Index t = 0; t < mesh.triangles.cols() && file; ++t) {
+    std::memcpy(&record[1], mesh.triangles.col(t).data(), kTriangleBytes - 1);
+    file.write(record.data(), kTriangleBytes);
+  }
+  file.flush();
+}
+
+}  // namespace
+
+SurfaceMesh read_mesh(const fs::path& path) {
+  std::ifstream file = open_input(path);
+  if (file.peek() == std::ifstream::traits_type::eof()) refuse(path, "is empty");
+  const std::optional<OwnHeader> own = own_form(file);
+  SurfaceMesh mesh = own ? read_own_form(file, *own, path) : read_foreign(path);
+  check_mesh(mesh, path);
+  return mesh;
+}
+
+void write_ply(const SurfaceMesh& mesh, const fs::path& path) {
+  static_assert(sizeof(int) == sizeof(std::int32_t));
+  write_whole_file(path, [&](const fs::path& beside) {
+    errno = 0;
+    std::ofstream file(beside, std::ios::binary | std::ios::trunc);
+    write_blocks(mesh, file);
+    if (file) return;
+    throw RunError(path.string() + ": cannot be written: " +
+                   (errno != 0 ? std::generic_category().message(errno) : "unknown reason"));
+  });
+}
+
+}  // namespace lensforge

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+
+#include "core/surface/surface_mesh.h"
+
+namespace lensforge {
+
+/// Reads PLY, OBJ, STL or OFF, chosen by the extension. STL corners that coincide are merged.
+/// @throw InputError naming the file if it is missing, no regular file, corrupt, empty, has a face
+/// that is no
+///        triangle, an index out of range or a coordinate that is not finite.
+SurfaceMesh read_mesh(const std::filesystem::path& path);
+
+/// Writes binary little-endian PLY, `double x y z` and `uchar`/`int` triangle list; whole or not at
+/// all. @throw RunError if it cannot be written.
+void write_ply(const SurfaceMesh& mesh, const std::filesystem::path& path);
+
+}  // namespace lensforge

@@ -1,0 +1,279 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "core/surface/smooth_surface.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+
+#include "core/surface/slope_heights.h"
+
+// Notation: a triangle's corners are 0, 1, 2, its centroid c. Bernstein coefficients of the cubic
+// on the third (i, j, c) are named after their indices: iij lies a third of the way from i to j.
+namespace lensforge {
+namespace {
+
+/// How far outside of its triangle a point may lie (barycentric) before it counts as off the mesh.
+constexpr double kOnMesh = 1e-9;
+
+double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+  return a.x() * b.y() - a.y() * b.x();
+}
+
+Eigen::Matrix2Xd vertex_slopes(const SurfaceMesh& mesh) {
+  Eigen::Matrix3Xd normals = Eigen::Matrix3Xd::Zero(3, mesh.vertex_count());
+  for (Eigen::Index t = 0; t < mesh.triangles.cols(); ++t) {
+    const Eigen::Vector3d normal =
+        (mesh.corner(t, 1) - mesh.corner(t, 0)).cross(mesh.corner(t, 2) - mesh.corner(t, 0));
+    for (int k = 0; k < 3; ++k) normals.col(mesh.triangles(k, t)) += normal;
+  }
+  Eigen::Matrix2Xd slopes = Eigen::Matrix2Xd::Zero(2, mesh.vertex_count());
+  for (Eigen::Index v = 0; v < normals.cols(); ++v) {
+    if (normals(2, v) > 0.0) slopes.col(v) = -normals.col(v).head<2>() / normals(2, v);
+  }
+  return slopes;
+}
+
+/// One triangle's corners, heights and slopes.
+struct Corners {
+  std::array<Eigen::Vector2d, 3> p;
+  std::array<double, 3> z;
+  std::array<Eigen::Vector2d, 3> slope;
+  Eigen::Vector2d centroid;
+
+  /// Coefficient a third of the way from corner i towards `target`.
+  [[nodiscard]] double toward(std::size_t i, const Eigen::Vector2d& target) const {
+    return z[i] + slope[i].dot(target - p[i]) / 3.0;
+  }
+
+  /// Coefficient ijc that makes the slope across edge ij linear along the edge.
+  [[nodiscard]] double across(std::size_t i, std::size_t j) const {
+    const Eigen::Vector2d edge = p[j] - p[i];
+    const double t = (centroid - p[i]).dot(edge) / edge.squaredNorm();
+    const double iij = toward(i, p[j]);
+    const double ijj = toward(j, p[i]);
+    const double at_i = (t - 1.0) * z[i] - t * iij + toward(i, centroid);
+    const double at_j = (t - 1.0) * ijj - t * z[j] + toward(j, centroid);
+    return 0.5 * (at_i + at_j) + (1.0 - t) * iij + t * ijj;
+  }
+
+  /// Coefficient icc: what keeps slopes continuous across the line from corner i to the centroid.
+  [[nodiscard]] double inner(std::size_t i) const {
+    return (toward(i, centroid) + across(i, (i + 1) % 3) + across(i, (i + 2) % 3)) / 3.0;
+  }
+};
+
+/// The cubic on the third (i, j, c).
+struct Third {
+  std::array<Eigen::Vector2d, 3> p;
+  double iii, jjj, ccc, iij, ijj, iic, jjc, ijc, icc, jcc;
+
+  Third(const Corners& corners, std::size_t i, std::size_t j)
+      : p{corners.p[i], corners.p[j], corners.centroid},
+        iii(corners.z[i]),
+        jjj(corners.z[j]),
+        iij(corners.toward(i, corners.p[j])),
+        ijj(corners.toward(j, corners.p[i])),
+        iic(corners.toward(i, corners.centroid)),
+        jjc(corners.toward(j, corners.centroid)),
+        ijc(corners.across(i, j)),
+        icc(corners.inner(i)),
+        jcc(corners.inner(j)) {
+    ccc = (icc + jcc + corners.inner(3 - i - j)) / 3.0;
+  }
+
+  /// de Casteljau's algorithm down to the three coefficients of the tangent plane.
+  [[nodiscard]] Eigen::Vector3d tangent_plane(const Eigen::Vector3d& b) const {
+    const double ii = b[0] * iii + b[1] * iij + b[2] * iic;
+    const double jj = b[0] * ijj + b[1] * jjj + b[2] * jjc;
+    const double cc = b[0] * icc + b[1] * jcc + b[2] * ccc;
+    const double ij = b[0] * iij + b[1] * ijj + b[2] * ijc;
+    const double ic = b[0] * iic + b[1] * ijc + b[2] * icc;
+    const double jc = b[0] * ijc + b[1] * jjc + b[2] * jcc;
+    return {b[0] * ii + b[1] * ij + b[2] * ic, b[0] * ij + b[1] * jj + b[2] * jc,
+            b[0] * ic + b[1] * jc + b[2] * cc};
+  }
+
+  [[nodiscard]] SurfacePoint at(const Eigen::Vector3d& b) const {
+    const Eigen::Vector3d q = tangent_plane(b);
+    const Eigen::Vector2d u = p[1] - p[0];
+    const Eigen::Vector2d v = p[2] - p[0];
+    const double du = 3.0 * (q[1] - q[0]);
+    const double dv = 3.0 * (q[2] - q[0]);
+    const Eigen::Vector2d slope(du * v.y() - dv * u.y(), dv * u.x() - du * v.x());
+    return {q.dot(b), slope / cross(u, v)};
+  }
+
+  [[nodiscard]] SmoothPatch patch() const {
+    return {p, {iii, jjj, ccc, iij, ijj, iic, jjc, ijc, icc, jcc}};
+  }
+
+  /// Second derivatives in any direction at the corners: from the coefficients next to each
+  /// along u and v, the second derivatives along them, and from these those along x and y.
+  [[nodiscard]] BendRange bend_range() const {
+    Eigen::Matrix2d frame;
+    frame << p[1] - p[0], p[2] - p[0];
+    const Eigen::Matrix2d inverse = frame.inverse();
+    BendRange range{HUGE_VAL, -HUGE_VAL};
+    const auto corner = [&](double uu, double uv, double vv) {
+      Eigen::Matrix2d second;
+      second << uu, uv, uv, vv;
+      const Eigen::Matrix2d h = 6.0 * inverse.transpose() * second * inverse;
+      const double mean = 0.5 * (h(0, 0) + h(1, 1));
+      const double skew = 0.5 * (h(0, 0) - h(1, 1));
+      const double half = std::sqrt(skew * skew + h(0, 1) * h(0, 1));
+      range = {std::min(range.least, mean - half), std::max(range.largest, mean + half)};
+    };
+    corner(ijj - 2.0 * iij + iii, ijc - iij - iic + iii, icc - 2.0 * iic + iii);
+    corner(jjj - 2.0 * ijj + iij, jjc - ijj - ijc + iij, jcc - 2.0 * ijc + iij);
+    corner(jjc - 2.0 * ijc + iic, jcc - ijc - icc + iic, ccc - 2.0 * icc + iic);
+    return range;
+  }
+};
+
+Corners make_corners(const SurfaceMesh& mesh, const Eigen::Matrix2Xd& slopes,
+                     std::int64_t triangle) {
+  Corners corners;
+  for (int k = 0; k < 3; ++k) {
+    const int v = mesh.triangles(k, triangle);
+    const auto i = static_cast<std::size_t>(k);
+    corners.p[i] = mesh.vertices.col(v).head<2>();
+    corners.z[i] = mesh.vertices(2, v);
+    corners.slope[i] = slopes.col(v);
+  }
+  corners.centroid = (corners.p[0] + corners.p[1] + corners.p[2]) / 3.0;
+  return corners;
+}
+
+}  // namespace
+
+SmoothSurface::SmoothSurface(const SurfaceMesh& mesh) : mesh_(mesh), slopes_(vertex_slopes(mesh)) {
+  mesh_.vertices.row(2) = fit_heights(mesh, slopes_).transpose();
+  const auto xy = mesh_.vertices.topRows<2>();
+  box_ = {Eigen::Vector2d(xy.rowwise().minCoeff()), Eigen::Vector2d(xy.rowwise().maxCoeff())};
+  const double side = std::sqrt(2.0 * box_.volume() / static_cast<double>(mesh_.triangle_count()));
+  bins_ = (box_.sizes() / side).array().ceil().cast<int>().max(1);
+  fill_bins();
+}
+
+Eigen::Vector2i SmoothSurface::bin_cell(const Eigen::Vector2d& xy) const {
+  const Eigen::Array2d share = (xy - box_.min()).array() / box_.sizes().array();
+  const Eigen::Array2i cell = (share * bins_.array().cast<double>()).floor().cast<int>();
+  return cell.max(0).min(bins_.array() - 1);
+}
+
+std::int64_t SmoothSurface::bin_of(const Eigen::Vector2d& xy) const {
+  const Eigen::Vector2i cell = bin_cell(xy);
+  return std::int64_t{cell.y()} * bins_.x() + cell.x();
+}
+
+void SmoothSurface::fill_bins() {
+  const auto for_each_bin = [&](Eigen::Index t, const auto& action) {
+    Eigen::AlignedBox2d box;
+    for (int k = 0; k < 3; ++k) box.extend(Eigen::Vector2d(mesh_.corner(t, k).head<2>()));
+    const Eigen::Vector2i low = bin_cell(box.min());
+    const Eigen::Vector2i high = bin_cell(box.max());
+    for (int y = low.y(); y <= high.y(); ++y) {
+      for (int x = low.x(); x <= high.x(); ++x) {
+        action(static_cast<std::size_t>(std::int64_t{y} * bins_.x() + x));
+      }
+    }
+  };
+  bin_begin_.assign(static_cast<std::size_t>(bins_.prod()) + 1, 0);
+  for (Eigen::Index t = 0; t < mesh_.triangles.cols(); ++t) {
+    for_each_bin(t, [&](std::size_t bin) { ++bin_begin_[bin + 1]; });
+  }
+  std::partial_sum(bin_begin_.begin(), bin_begin_.end(), bin_begin_.begin());
+  bin_triangles_.resize(static_cast<std::size_t>(bin_begin_.back()));
+  std::vector<std::int64_t> next(bin_begin_.begin(), bin_begin_.end() - 1);
+  for (Eigen::Index t = 0; t < mesh_.triangles.cols(); ++t) {
+    for_each_bin(t, [&](std::size_t bin) {
+      bin_triangles_[static_cast<std::size_t>(next[bin]++)] = static_cast<std::int32_t>(t);
+    });
+  }
+}
+
+SmoothSurface::Place SmoothSurface::locate(const Eigen::Vector2d& xy) const {
+  Place best;
+  double best_least = -kOnMesh;
+  const auto bin = static_cast<std::size_t>(bin_of(xy));
+  for (std::int64_t i = bin_begin_[bin]; i < bin_begin_[bin + 1]; ++i) {
+    const std::int32_t t = bin_triangles_[static_cast<std::size_t>(i)];
+    const Eigen::Vector2d a = mesh_.corner(t, 0).head<2>() - xy;
+    const Eigen::Vector2d b = mesh_.corner(t, 1).head<2>() - xy;
+    const Eigen::Vector2d c = mesh_.corner(t, 2).head<2>() - xy;
+    Eigen::Vector3d weights(cross(b, c), cross(c, a), cross(a, b));
+    weights /= weights.sum();
+    const double least = weights.minCoeff();
+    if (least < best_least) continue;
+    best = {t, weights};
+    best_least = least;
+    if (least > 0.0) break;
+  }
+  return best;
+}
+
+SurfacePoint SmoothSurface::in_triangle(std::int64_t triangle,
+                                        const Eigen::Vector3d& weights) const {
+  int k = 0;
+  const double least = weights.minCoeff(&k);
+  const int i = (k + 1) % 3;
+  const int j = (k + 2) % 3;
+  const Third third(make_corners(mesh_, slopes_, triangle), static_cast<std::size_t>(i),
+                    static_cast<std::size_t>(j));
+  return third.at({weights[i] - least, weights[j] - least, 3.0 * least});
+}
+
+std::optional<SmoothPatch> SmoothSurface::patch_at(const Eigen::Vector2d& xy) const {
+  const Place place = locate(xy);
+  if (place.triangle < 0) return std::nullopt;
+  int k = 0;
+  place.weights.minCoeff(&k);
+  const Corners corners = make_corners(mesh_, slopes_, place.triangle);
+  return Third(corners, static_cast<std::size_t>((k + 1) % 3),
+               static_cast<std::size_t>((k + 2) % 3))
+      .patch();
+}
+
+BendRange SmoothSurface::bend_range(std::int64_t triangle) const {
+  const Corners corners = make_corners(mesh_, slopes_, triangle);
+  BendRange range{HUGE_VAL, -HUGE_VAL};
+  for (std::size_t i = 0; i < 3; ++i) {
+    const BendRange third = Third(corners, i, (i + 1) % 3).bend_range();
+    range = {std::min(range.least, third.least), std::max(range.largest, third.largest)};
+  }
+  return range;
+}
+
+std::optional<SurfacePoint> SmoothSurface::at(const Eigen::Vector2d& xy) const {
+  const Place place = locate(xy);
+  if (place.triangle < 0) return std::nullopt;
+  return in_triangle(place.triangle, place.weights);
+}
+
+std::optional<SurfacePoint> SmoothSurface::model_at(const Eigen::Vector2d& xy) const {
+  const Place place = locate(xy);
+  if (place.triangle < 0) return std::nullopt;
+  SurfacePoint point = in_triangle(place.triangle, place.weights);
+  point.slope.setZero();
+  for (int k = 0; k < 3; ++k) {
+    point.slope += place.weights[k] * slopes_.col(mesh_.triangles(k, place.triangle));
+  }
+  return point;
+}
+
+Eigen::Matrix2d SmoothSurface::model_bend(const Eigen::Vector2d& xy) const {
+  const Place place = locate(xy);
+  if (place.triangle < 0) return Eigen::Matrix2d::Zero();
+  const Eigen::Vector3i corners = mesh_.triangles.col(place.triangle);
+  Eigen::Matrix2d sides;
+  Eigen::Matrix2d changes;
+  for (int k = 0; k < 2; ++k) {
+    const int to = corners[k + 1];
+    sides.col(k) = mesh_.vertices.col(to).head<2>() - mesh_.vertices.col(corners[0]).head<2>();
+    changes.col(k) = slopes_.col(to) - slopes_.col(corners[0]);
+  }
+  return changes * sides.inverse();
+}
+
+}  // namespace lensforge

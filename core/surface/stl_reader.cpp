@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <string>
+#include <string_view>
+#include <unordered_map>
+
+#include "core/error.h"
+#include "core/surface/mesh_builder.h"
+#include "core/surface/mesh_readers.h"
+#include "core/surface/mesh_text.h"
+
+// Binary: 80 bytes of anything, a count, then 50 bytes a triangle (normal, three corners, two bytes
+// of anything). Text: solid { facet normal n { outer loop { vertex v } endloop } endfacet }
+// endsolid. A binary file may begin with "solid" too, so its size decides, and where that is wrong,
+// a zero byte, which no text has.
+namespace lensforge {
+namespace {
+
+constexpr std::size_t kHeadBytes = 84;
+constexpr std::size_t kTriangleBytes = 50;
+
+using Point = std::array<float, 3>;
+
+struct PointHash {
+  std::size_t operator()(const Point& point) const {
+    std::uint64_t hash = 0;
+    for (const float value : point) {
+      // Zero and minus zero are equal, so they hash alike.
+      const auto bits = value == 0.0F ? 0U : std::bit_cast<std::uint32_t>(value);
+      hash = (hash ^ bits) * 0x9E3779B97F4A7C15ULL;
+      hash ^= hash >> 32U;
+    }
+    return hash;
+  }
+};
+
+/// Gives corners that coincide one vertex.
+class CornerMerger {
+ public:
+  void add_corner(const Point& point) {
+    const auto [entry, is_new] =
+        vertices_.try_emplace(point, static_cast<int>(builder_.vertex_count()));
+    if (is_new) {
+      builder_.add_vertex(static_cast<double>(point[0]), static_cast<double>(point[1]),
+                          static_cast<double>(point[2]));
+    }
+    builder_.add_corner(entry->second);
+  }
+  [[nodiscard]] SurfaceMesh mesh() const { return builder_.mesh(); }
+
+ private:
+  MeshBuilder builder_;
+  std::unordered_map<Point, int, PointHash> vertices_;
+};
+
+std::uint32_t triangles_announced(std::string_view content) {
+  std::uint32_t count = 0;
+  std::memcpy(&count, content.data() + kHeadBytes - sizeof count, sizeof count);
+  return count;
+}
+
+std::size_t binary_size(std::string_view content) {
+  return kHeadBytes + kTriangleBytes * std::size_t{triangles_announced(content)};
+}
+
+SurfaceMesh read_binary(std::string_view content) {
+  CornerMerger merger;
+  for (std::size_t at = kHeadBytes; at < content.size(); at += kTriangleBytes) {
+    std::array<Point, 4> normal_and_corners{};
+    std::memcpy(&normal_and_corners, content.data() + at, sizeof normal_and_corners);
+    for (std::size_t k = 1; k < 4; ++k) merger.add_corner(normal_and_corners[k]);
+  }
+  return merger.mesh();
+}
+
+void expect(MeshText& text, std::string_view keyword) {
+  const std::string_view word = text.word_of_any_line(std::string(keyword));
+  if (same_word(word, keyword)) return;
+  text.refuse("has " + quoted_word(word) + " where \"" + std::string(keyword) + "\" must stand");
+}
+
+Point read_point(MeshText& text, const std::string& meaning) {
+  Point point{};
+  for (float& value : point) {
+    const std::string_view word = text.word_of_any_line(meaning);
+    value = static_cast<float>(text.number_from(word, meaning));
+  }
+  return point;
+}
+
+void read_facet(MeshText& text, CornerMerger& merger) {
+  expect(text, "normal");
+  read_point(text, "a number of a normal");
+  expect(text, "outer");
+  expect(text, "loop");
+  for (int k = 0; k < 3; ++k) {
+    expect(text, "vertex");
+    merger.add_corner(read_point(text, "a coordinate of a vertex"));
+  }
+  expect(text, "endloop");
+  expect(text, "endfacet");
+}
+
+SurfaceMesh read_text(std::string_view content, const std::string& name) {
+  MeshText text(content, name, MeshText::Comments::kNone);
+  CornerMerger merger;
+  while (text.next_line()) {
+    // The rest of this line is the solid's name.
+    if (const auto word = text.word(); !same_word(word, "solid")) {
+      text.refuse("has " + quoted_word(word) + " where \"solid\" must stand");
+    }
+    for (;;) {
+      if (!text.next_line()) text.refuse("is truncated: it has no \"endsolid\"");
+      const std::string_view word = text.word();
+      if (same_word(word, "endsolid")) break;
+      if (!same_word(word, "facet")) {
+        text.refuse("has " + quoted_word(word) + " where \"facet\" or \"endsolid\" must stand");
+      }
+      read_facet(text, merger);
+    }
+  }
+  return merger.mesh();
+}
+
+}  // namespace
+
+SurfaceMesh read_stl(std::string_view content, const std::string& name) {
+  const bool has_head = content.size() >= kHeadBytes;
+  if (has_head && content.size() == binary_size(content)) return read_binary(content);
+  const bool is_text = content.substr(0, 2 * kHeadBytes).find('\0') == std::string_view::npos;
+  if (is_text && same_word(content.substr(0, 5), "solid")) return read_text(content, name);
+  if (!has_head) {
+    throw InputError(name + ": is " + std::to_string(content.size()) +
+                     " bytes long: a binary STL mesh has 84 at least, one as text begins with "
+                     "\"solid\"");
+  }
+  throw InputError(name + ": is " + std::to_string(content.size()) + " bytes long, its header of " +
+                   std::to_string(triangles_announced(content)) + " triangles calls for " +
+                   std::to_string(binary_size(content)) + ": it is truncated or corrupt");
+}
+
+}  // namespace lensforge

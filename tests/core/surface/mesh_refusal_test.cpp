@@ -1,0 +1,227 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <random>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "core/error.h"
+#include "core/surface/mesh_readers.h"
+#include "core/text/printable.h"
+
+namespace lensforge {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+using Reader = SurfaceMesh (*)(std::string_view, const std::string&);
+
+std::string refusal(Reader read, std::string_view content) {
+  try {
+    read(content, "m");
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  ADD_FAILURE() << "was read: " << content;
+  return {};
+}
+
+std::string ply(const std::string& header, const std::string& data = "") {
+  return "ply\nformat ascii 1.0\n" + header + "end_header\n" + data;
+}
+
+const std::string kXyz = "property float x\nproperty float y\nproperty float z\n";
+const std::string kFaces = "element face 1\nproperty list uchar int vertex_indices\n";
+
+TEST(PlyReader, APropertyBeforeAnyElementIsRefused) {
+  EXPECT_EQ(refusal(read_ply, ply("property float x\nelement vertex 1\n")),
+            "m: line 3: has a property before any element");
+}
+
+TEST(PlyReader, AHeaderThatBreaksTheFormatNamesItsLine) {
+  const std::vector<std::pair<std::string, std::string>> bad{
+      {"elemnt vertex 3\n", "line 3: begins with 'elemnt': no PLY header has that"},
+      {"element vertex -1\n", "announces -1 of the element 'vertex'"},
+      {"element vertex 99999999999\n", "announces 99999999999"},
+      {"element vertex many\n", "is 'many': it must be a whole number"},
+      {"element vertex 1\nelement vertex 1\n", "has the element 'vertex' twice"},
+      {"element vertex 1\nproperty quad x\n", "type 'quad'"},
+      {"element vertex 1\nproperty float x\nproperty float x\n", "the property 'x' twice"},
+      {"element vertex 1\nproperty float\n", "without a name"},
+      {"element vertex 1\nproperty list float int x\n", "must be of whole numbers"},
+      {"element vertex 0\nproperty float x\nproperty float y\n", "without the properties x, y"},
+      {"element vertex 0\n" + kXyz + "element face 0\n", "without a list vertex_indices"},
+      {"element vertex 0\n" + kXyz + "element face 0\nproperty list uchar float vertex_index\n",
+       "without a list vertex_indices of whole numbers"},
+      {"element vertex 1000000\n" + kXyz, "only 0 bytes follow: it is truncated or corrupt"}};
+  for (const auto& [header, words] : bad) {
+    EXPECT_THAT(refusal(read_ply, ply(header)), AllOf(StartsWith("m: line "), HasSubstr(words)));
+  }
+  EXPECT_THAT(refusal(read_ply, "ply\nelement vertex 0\nend_header\n"), HasSubstr("\"format\""));
+  EXPECT_THAT(refusal(read_ply, "ply\nformat ascii 1.0\nelement vertex 0\n"),
+              HasSubstr("truncated"));
+  EXPECT_THAT(refusal(read_ply, "ply\nformat ascii 1.0"), HasSubstr("truncated"));
+}
+
+TEST(PlyReader, DataThatAreNotWhatTheHeaderSaysAreRefused) {
+  const std::string header = "element vertex 3\n" + kXyz + kFaces;
+  const std::string points = "0 0 0\n1 0 0\n0 1 0\n";
+  EXPECT_EQ(read_ply(ply(header, points + "3 0 1 2\n"), "m").triangle_count(), 1);
+  EXPECT_THAT(refusal(read_ply, ply(header, points + "3 0 1 2\n7 7\n")),
+              HasSubstr("line 14: has '7' after the last element"));
+  EXPECT_THAT(refusal(read_ply, ply(header, points + "3 0 1 1.5\n")), HasSubstr("has 1.5 where"));
+  EXPECT_THAT(refusal(read_ply, ply(header, points + "-3 0 1 2\n")), HasSubstr("a list of -3"));
+  EXPECT_THAT(refusal(read_ply, ply(header, "0 0 0\n1 0 x\n0 1 0\n3 0 1 2\n")),
+              HasSubstr("line 11: a number is 'x'"));
+}
+
+TEST(PlyReader, EitherByteOrderAndEveryOtherElementIsRead) {
+  const std::string header =
+      " 1.0\ncomment made elsewhere\nelement note 1\nproperty list uchar ushort letters\n"
+      "element face 1\nproperty uchar red\nproperty list uchar ushort vertex_index\n"
+      "element vertex 3\nproperty short x\nproperty uchar y\nproperty char z\nend_header\n";
+  const std::string little(
+      "\2\1\0\2\0"
+      "\7\3\0\0\1\0\2\0"
+      "\0\0\0\0"
+      "\0\1\0\0"
+      "\0\0\1\377",
+      25);
+  const std::string big(
+      "\2\0\1\0\2"
+      "\7\3\0\0\0\1\0\2"
+      "\0\0\0\0"
+      "\1\0\0\0"
+      "\0\0\1\377",
+      25);
+  for (const std::string& content : {"ply\nformat binary_little_endian" + header + little,
+                                     "ply\nformat binary_big_endian" + header + big}) {
+    const SurfaceMesh mesh = read_ply(content, "m");
+    EXPECT_EQ(mesh.triangles.col(0), Eigen::Vector3i(0, 1, 2));
+    EXPECT_EQ(mesh.vertices.col(1), Eigen::Vector3d(256, 0, 0));
+    EXPECT_EQ(mesh.vertices.col(2), Eigen::Vector3d(0, 1, -1));
+  }
+}
+
+TEST(ObjReader, AVertexWithoutACoordinateAndACornerThatIsNoNumberAreRefused) {
+  EXPECT_EQ(refusal(read_obj, "# head\nv 1 2\n"), "m: line 2: z of a vertex is missing");
+  EXPECT_EQ(refusal(read_obj, "v 1 2 3,5\n"),
+            "m: line 1: z of a vertex is '3,5': it must be a number");
+  EXPECT_THAT(refusal(read_obj, "v 1 2 3\nf 1 a 2\n"), HasSubstr("line 2: a face's corner is 'a'"));
+  EXPECT_THAT(refusal(read_obj, "v 1 2 3\nf 1 2\n"), HasSubstr("face 0 has 2 corners"));
+}
+
+TEST(ObjReader, NegativeIndicesCountFromTheLastVertexAndNoOtherFileIsOpened) {
+  const SurfaceMesh mesh = read_obj(
+      "mtllib /dev/zero\nusemtl a\nv 0 0 0\nv 1 0 0 # a corner\nv 0 +1 0 1 0 0\ng x\nf -3/1 -2//2 "
+      "-1\r\n",
+      "m");
+  EXPECT_EQ(mesh.triangles.col(0), Eigen::Vector3i(0, 1, 2));
+  EXPECT_EQ(mesh.vertices.col(2), Eigen::Vector3d(0, 1, 0));
+}
+
+TEST(OffReader, MissingAndSurplusNumbersAreNamedByTheirLine) {
+  EXPECT_EQ(refusal(read_off, "OFF\n1 1 0\n0 0\n"), "m: line 3: z of a vertex is missing");
+  EXPECT_THAT(refusal(read_off, "OFF\n3 1 0\n0 0 0\n"), HasSubstr("holds 1 of 3 vertices"));
+  EXPECT_THAT(refusal(read_off, "OFF\n-3 1 0\n"), HasSubstr("number of vertices is -3"));
+  EXPECT_THAT(refusal(read_off, "4OFF\n1 1 0\n"), HasSubstr("begins with '4OFF'"));
+  EXPECT_EQ(
+      read_off("COFF # colours\n\n3 1 0\n0 0 0 255 0 0\n1 0 0 9 9 9\n0 1 0 1 1 1\n3 0 1 2 7", "m")
+          .vertex_count(),
+      3);
+}
+
+std::string text_stl(const std::string& vertex, const std::string& end) {
+  return "solid a b\n facet normal 0 0 1\n  outer loop\n   vertex 0 0 0\n   vertex " + vertex +
+         "\n   vertex 0 1 0\n  endloop\n endfacet\n" + end;
+}
+
+TEST(StlReader, MissingCoordinatesGarbageAndAMissingEndAreNamedByTheirLine) {
+  EXPECT_EQ(read_stl(text_stl("1 0 0", "endsolid a b\n"), "m").triangle_count(), 1);
+  EXPECT_EQ(refusal(read_stl, text_stl("1 0", "endsolid\n")),
+            "m: line 6: a coordinate of a vertex is 'vertex': it must be a number");
+  EXPECT_EQ(refusal(read_stl, text_stl("1 0 0", "garbage\n")),
+            "m: line 9: has 'garbage' where \"facet\" or \"endsolid\" must stand");
+  EXPECT_EQ(refusal(read_stl, text_stl("1 0 0", "")),
+            "m: line 8: is truncated: it has no \"endsolid\"");
+  EXPECT_THAT(refusal(read_stl, text_stl("1 0 0", "endsolid\nmore\n")),
+              HasSubstr("where \"solid\" must stand"));
+}
+
+TEST(StlReader, ATruncatedBinaryFileIsNotTakenForText) {
+  for (const std::string name : {"solid in name only", "anything"}) {
+    std::string bytes = name + std::string(80 - name.size(), ' ') + std::string("\2\0\0\0", 4);
+    bytes += std::string(99, '\0');
+    EXPECT_EQ(refusal(read_stl, bytes),
+              "m: is 183 bytes long, its header of 2 triangles calls for 184: it is truncated or "
+              "corrupt");
+  }
+  EXPECT_THAT(refusal(read_stl, "letter"), HasSubstr("is 6 bytes long"));
+}
+
+TEST(MeshText, ForeignWordsAreShownShortAndPrintable) {
+  const std::string message = refusal(read_obj, "v 1 2 \x1b[31m" + std::string(3'000'000, '7'));
+  EXPECT_LT(message.size(), 200U);
+  EXPECT_EQ(message.find('\x1b'), std::string::npos);
+}
+
+/// One to four random changes: bytes set, removed, doubled, words of the formats put in.
+std::string mutated(std::string content, std::mt19937_64& random) {
+  static const std::vector<std::string> words{
+      "\n",     " ",        "-1",  "4294967295", "nan",   "1e999",   "element vertex 2\n",
+      "vertex", "\xff\xff", "f 1", "property ",  "list ", "endloop", "solid\n"};
+  const auto below = [&](std::size_t n) { return static_cast<std::size_t>(random() % n); };
+  for (std::size_t change = 1 + below(4); change > 0 && !content.empty(); --change) {
+    const std::size_t at = below(content.size());
+    const std::size_t length = below(std::min<std::size_t>(content.size() - at, 12) + 1);
+    switch (below(4)) {
+      case 0:
+        content[at] = static_cast<char>(random());
+        break;
+      case 1:
+        content.erase(at, length);
+        break;
+      case 2:
+        content.insert(at, content.substr(at, length));
+        break;
+      default:
+        content.insert(at, words[below(words.size())]);
+        break;
+    }
+  }
+  return content;
+}
+
+TEST(MeshReaders, EveryMutantIsAMeshOrOnePrintableLine) {
+  const std::string points = "0 0 0.1\n1 0 0\n1 1 0\n0 1 0\n";
+  const std::vector<std::pair<Reader, std::string>> seeds{
+      {read_ply, ply("element vertex 4\n" + kXyz + kFaces, points + "3 0 1 2\n")},
+      {read_ply, "ply\nformat binary_big_endian 1.0\nelement vertex 3\n" + kXyz + kFaces +
+                     "end_header\n" + std::string(49, '\3')},
+      {read_obj, "v 0 0 0\nv 1 0 0\nv 1 1 0\nvn 0 0 1\nf 1//1 2//1 3//1\nf -1 -2 -3\n"},
+      {read_off, "OFF\n4 2 0\n" + points + "3 0 1 2\n3 0 2 3\n"},
+      {read_stl, text_stl("1 0 0", "endsolid\n")},
+      {read_stl, std::string(80, ' ') + std::string("\2\0\0\0", 4) + std::string(100, '\1')}};
+  std::mt19937_64 random(16);
+  for (int run = 0; run < 20'000; ++run) {
+    const auto& [read, seed] = seeds[static_cast<std::size_t>(run) % seeds.size()];
+    const std::string content = mutated(seed, random);
+    try {
+      const SurfaceMesh mesh = read(content, "m");
+      EXPECT_LE(mesh.vertex_count(), std::ssize(content)) << content;
+    } catch (const InputError& error) {
+      EXPECT_EQ(printable_line(error.what()), error.what()) << content;
+      EXPECT_LT(std::string_view(error.what()).size(), 250U) << content;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace lensforge

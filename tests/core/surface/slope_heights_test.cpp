@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "core/surface/slope_heights.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+#include <Eigen/QR>
+#include <random>
+
+#include "core/test_meshes.h"
+
+namespace lensforge::testing {
+namespace {
+
+double volume_below(const SurfaceMesh& mesh) {
+  double volume = 0.0;
+  for (Eigen::Index t = 0; t < mesh.triangles.cols(); ++t) {
+    Eigen::Matrix3d corners;
+    for (int k = 0; k < 3; ++k) corners.col(k) = mesh.corner(t, k);
+    const double height = corners.row(2).mean();
+    corners.row(2).setOnes();
+    volume += 0.5 * corners.determinant() * height;
+  }
+  return volume;
+}
+
+/// A small mesh with uneven cells, heights and slopes that have nothing to do with each other.
+struct Contradiction {
+  SurfaceMesh mesh = grid_mesh(6, 5);
+  Eigen::Matrix2Xd slopes = Eigen::Matrix2Xd(2, mesh.vertex_count());
+
+  Contradiction() {
+    std::mt19937 random(5);
+    std::uniform_real_distribution<double> unit(-1.0, 1.0);
+    for (double& x : mesh.vertices.reshaped()) x += 0.2 * unit(random);
+    for (double& s : slopes.reshaped()) s = unit(random);
+  }
+
+  [[nodiscard]] bool is_on_border(int v) const {
+    const int column = v % mesh.grid.columns;
+    const int row = v / mesh.grid.columns;
+    return column == 0 || row == 0 || column + 1 == mesh.grid.columns || row + 1 == mesh.grid.rows;
+  }
+
+  /// One row per edge, those that end on the border weighted down; one more holds the mean.
+  [[nodiscard]] Eigen::VectorXd dense_solution() const {
+    const Eigen::Index n = mesh.vertex_count();
+    Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(n * n, n);
+    Eigen::VectorXd right = Eigen::VectorXd::Zero(n * n);
+    for (Eigen::Index t = 0; t < mesh.triangles.cols(); ++t) {
+      for (int k = 0; k < 3; ++k) {
+        const int a = std::min(mesh.triangles(k, t), mesh.triangles((k + 1) % 3, t));
+        const int b = std::max(mesh.triangles(k, t), mesh.triangles((k + 1) % 3, t));
+        const Eigen::Vector2d step = (mesh.vertices.col(b) - mesh.vertices.col(a)).head<2>();
+        const double root = is_on_border(a) || is_on_border(b) ? 0.1 : 1.0;  // Of the weight.
+        matrix(a * n + b, a) = -root;
+        matrix(a * n + b, b) = root;
+        right[a * n + b] = root * 0.5 * (slopes.col(a) + slopes.col(b)).dot(step);
+      }
+    }
+    matrix.row(0).setOnes();
+    return matrix.colPivHouseholderQr().solve(right);
+  }
+};
+
+TEST(SlopeHeights, EqualTheDenseLeastSquaresSolution) {
+  const Contradiction c;
+  const Eigen::VectorXd heights = fit_heights(c.mesh, c.slopes);
+  const Eigen::VectorXd dense = c.dense_solution();
+  const double shift = heights[0] - dense[0];
+  for (Eigen::Index v = 0; v < heights.size(); ++v) {
+    EXPECT_NEAR(heights[v], dense[v] + shift, 1e-7) << v;
+  }
+  SurfaceMesh fitted = c.mesh;
+  fitted.vertices.row(2) = heights.transpose();
+  EXPECT_NEAR(volume_below(fitted), volume_below(c.mesh), 1e-12);
+}
+
+TEST(SlopeHeights, AreTheMeshsOwnWhereSlopesAgreeWithThem) {
+  SurfaceMesh mesh = grid_mesh(40, 30, 0.5);
+  Eigen::Matrix2Xd slopes(2, mesh.vertex_count());
+  for (Eigen::Index v = 0; v < mesh.vertex_count(); ++v) {
+    const double x = mesh.vertices(0, v);
+    const double y = mesh.vertices(1, v);
+    mesh.vertices(2, v) = 5.0 + 0.03 * x * x - 0.02 * x * y + 0.1 * y;
+    slopes.col(v) << 0.06 * x - 0.02 * y, -0.02 * x + 0.1;
+  }
+  const Eigen::VectorXd heights = fit_heights(mesh, slopes);
+  EXPECT_LT((heights - mesh.vertices.row(2).transpose()).cwiseAbs().maxCoeff(), 1e-9);
+}
+
+TEST(SlopeHeights, DoNotDependOnWavesOfTheMesh) {
+  Contradiction c;
+  const Eigen::VectorXd before = fit_heights(c.mesh, c.slopes);
+  for (Eigen::Index v = 0; v < c.mesh.vertex_count(); ++v) {
+    c.mesh.vertices(2, v) += v % 2 == 0 ? 0.3 : -0.3;
+  }
+  const Eigen::VectorXd after = fit_heights(c.mesh, c.slopes);
+  const Eigen::ArrayXd change = after - before;
+  EXPECT_LT((change - change[0]).abs().maxCoeff(), 1e-7);
+}
+
+}  // namespace
+}  // namespace lensforge::testing
