@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "core/image/image.h"
+#include "core/optics/barrier.h"
 #include "core/surface/surface_mesh.h"
 #include "design/design_lens.h"
-#include "design/energy/barrier.h"
 #include "design/guided_optimization.h"
 
 namespace lensforge {

@@ -54,17 +54,6 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-OpticalSetup make_setup(const DesignOptions& options, const Eigen::Vector2i& pixels) {
-  OpticalSetup setup;
-  setup.ior = options.ior;
-  setup.focal_length = options.focal_length;
-  setup.lens_size = {options.width, options.width * pixels.y() / pixels.x()};
-  setup.image_size = setup.lens_size;
-  setup.pixels = pixels;
-  setup.view = options.view;
-  return setup;
-}
-
 /// Lowers or lifts the surface so that its thinnest place is `thickness` above the entry face.
 void rest_on_thickness(SurfaceMesh& mesh, double thickness) {
   mesh.vertices.row(2).array() += thickness - mesh.vertices.row(2).minCoeff();
@@ -94,7 +83,7 @@ class Schedule {
     // Nothing is reported before all input has been accepted.
     target_ = working_picture(target, options, {control.stop_token(), {}});
     const Eigen::Vector2i pixels(target_.columns(), target_.rows());
-    setup_ = make_setup(options, pixels);
+    setup_ = optical_setup(options, pixels);
     levels_ = plan_levels(pixels, options);
     state_.fingerprint = design_fingerprint(target_, options);
     state_.mesh = make_grid_mesh(setup_.lens_size, levels_.front().grid, options.thickness);
@@ -298,7 +287,7 @@ class Schedule {
     // creases, which send their light into the black between; there it is that cells own the black.
     const bool facet = options_.model == SurfaceModel::kFacet;
     const Eigen::VectorXd areas =
-        facet ? favour_dark({even_mesh, even.result.lit_areas}) : even.result.areas;
+        facet ? favour_dark({even_mesh, even.result.lit_areas}, problem.setup) : even.result.areas;
     const ServedAreas served{even_mesh, areas};
     if (!spread_vertices(served, options_.spread, problem.setup, stoppable_,
                          RunControl(control_.stop_token(), {}), mesh)) {

@@ -4,7 +4,6 @@
 #include <cstddef>
 
 #include "design/optics/facet.h"
-#include "design/optics/projection.h"
 #include "design/optics/surface_kernels.h"
 
 namespace lensforge {
@@ -16,7 +15,7 @@ Corners corners_of(const SurfaceMesh& mesh, std::int64_t t) {
 }
 
 SurfaceView view_of(const SurfaceMesh& mesh, const OpticalSetup& setup) {
-  return {mesh.triangles.data(), mesh.vertices.data(), Projection(setup), setup.lens_size.prod()};
+  return {mesh.triangles.data(), mesh.vertices.data(), LightPath(setup)};
 }
 
 template <class Project>
