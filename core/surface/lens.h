@@ -41,9 +41,6 @@ inline constexpr const char* kCheckpoint = "checkpoint.bin";  ///< While a desig
 inline constexpr std::array kAll = {kJson,      kSurface, kTargetPng, kTargetExr,   kRenderPng,
                                     kRenderExr, kError,   kOverview,  kConvergence, kCheckpoint};
 
-/// Folder beside the files in which a lens is put together before it takes its place.
-inline constexpr const char* kStaging = "lens";
-
 /// The folder inside that `cam` writes into, and what is in it beside the programs.
 inline constexpr const char* kCut = "cam";
 inline constexpr std::array kCutFiles = {"report.html", "report.json", "compare.html",
