@@ -259,7 +259,8 @@ DesignResult shape(bool quiet, const Executor& executor, const DesignOptions& de
 }
 
 bool is_of_lens(const std::string& name) {
-  return std::find(lens_file::kAll.begin(), lens_file::kAll.end(), name) != lens_file::kAll.end();
+  return name == lens_file::kStaging ||
+         std::find(lens_file::kAll.begin(), lens_file::kAll.end(), name) != lens_file::kAll.end();
 }
 
 /// What the design is about to take. @throw InputError with the size that would fit if disk or

@@ -41,6 +41,9 @@ inline constexpr const char* kCheckpoint = "checkpoint.bin";  ///< While a desig
 inline constexpr std::array kAll = {kJson,      kSurface, kTargetPng, kTargetExr,   kRenderPng,
                                     kRenderExr, kError,   kOverview,  kConvergence, kCheckpoint};
 
+/// Folder in which earlier versions put a lens together; a killed one has left it behind.
+inline constexpr const char* kStaging = "lens";
+
 /// The folder inside that `cam` writes into, and what is in it beside the programs.
 inline constexpr const char* kCut = "cam";
 inline constexpr std::array kCutFiles = {"report.html", "report.json", "compare.html",
