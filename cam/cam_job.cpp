@@ -26,6 +26,7 @@
 #include "core/image/image_io.h"
 #include "core/io/files.h"
 #include "core/io/output_guard.h"
+#include "core/io/pending_files.h"
 #include "core/surface/mesh_io.h"
 
 namespace lensforge {

@@ -212,6 +212,16 @@ std::string travel_warning(const CutPlan& plan) {
   return axes.empty() ? "" : "the programs move farther than the machine's travel: " + axes;
 }
 
+/// A speed that the controller's setting would lower unseen; empty where it has no such setting.
+std::string spindle_warning(const CutPlan& plan, const ProgramFiles& programs) {
+  const int setting = plan.options().post.reader.spindle_limit_setting;
+  if (setting == 0) return {};
+  double fastest = 0.0;
+  for (const Tool& tool : tools_of(plan, programs)) fastest = std::max(fastest, tool.spindle_rpm);
+  return "the controller runs the spindle no faster than its setting $" + std::to_string(setting) +
+         ", silently: set it to at least " + decimal_text(fastest, 0);
+}
+
 std::vector<std::string> warnings_of(const CutPlan& plan, const ProgramFiles& programs,
                                      const Lens& lens) {
   std::vector<std::string> warnings;
@@ -235,14 +245,8 @@ std::vector<std::string> warnings_of(const CutPlan& plan, const ProgramFiles& pr
                        " y " + decimal_text(field.steepest_place.y(), 2) +
                        ": on slopes above 1 a rim may be left uncut");
   }
-  if (plan.options().post.name == "grbl") {
-    double fastest = 0.0;
-    for (const Tool& tool : tools_of(plan, programs)) fastest = std::max(fastest, tool.spindle_rpm);
-    warnings.push_back(
-        "Grbl runs the spindle no faster than its setting $30, silently: it has to "
-        "be at least " +
-        decimal_text(fastest, 0));
-  }
+  const std::string spindle = spindle_warning(plan, programs);
+  if (!spindle.empty()) warnings.push_back(spindle);
   if (programs.total.starved > 0) {
     warnings.push_back(
         "the controller will wait for lines " + std::to_string(programs.total.starved) +

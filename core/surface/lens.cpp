@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <random>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -14,6 +13,7 @@
 #include "core/image/error_image.h"
 #include "core/image/image_io.h"
 #include "core/io/files.h"
+#include "core/io/pending_files.h"
 #include "core/surface/height_field_check.h"
 #include "core/surface/lens_surface.h"
 #include "core/surface/mesh_io.h"
@@ -77,56 +77,29 @@ ordered_json to_json(const Lens& lens) {
   };
 }
 
-/// A folder of our own inside `parent` that is removed with all it holds.
-class StagingFolder {
- public:
-  explicit StagingFolder(const fs::path& parent)
-      : path_(parent / std::string(".")
-                           .append(lens_file::kStaging)
-                           .append(".partial-")
-                           .append(std::to_string(std::random_device{}()))) {
-    std::error_code error;
-    fs::create_directories(path_, error);
-    if (error) throw RunError(parent.string() + ": cannot be written: " + error.message());
-  }
-  ~StagingFolder() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-  }
-  StagingFolder(const StagingFolder&) = delete;
-  StagingFolder& operator=(const StagingFolder&) = delete;
-
-  [[nodiscard]] fs::path operator/(const char* name) const { return path_ / name; }
-
- private:
-  fs::path path_;
-};
-
-void write_files(const Lens& lens, const StagingFolder& staging) {
-  write_ply(lens.surface, staging / lens_file::kSurface);
-  write_image(lens.target, staging / lens_file::kTargetPng);
-  write_image(lens.target, staging / lens_file::kTargetExr);
+void add_files(const Lens& lens, PendingFiles& files) {
+  using namespace lens_file;
+  const auto add = [&files](const char* name, const auto& content) {
+    files.add(name, [&](const fs::path& beside) { write_image(content, beside); });
+  };
+  files.add(kSurface, [&](const fs::path& beside) { write_ply(lens.surface, beside); });
+  add(kTargetPng, lens.target);
+  add(kTargetExr, lens.target);
   if (!lens.render.empty()) {
-    write_image(lens.render, staging / lens_file::kRenderPng);
-    write_image(lens.render, staging / lens_file::kRenderExr);
-    write_image(error_image(lens.render, lens.target), staging / lens_file::kError);
+    add(kRenderPng, lens.render);
+    add(kRenderExr, lens.render);
+    add(kError, error_image(lens.render, lens.target));
   }
-  const std::string text = to_json(lens).dump(2, ' ', false, json::error_handler_t::replace);
-  write_whole_file(staging / lens_file::kJson, text + "\n");
+  files.add(kJson, to_json(lens).dump(2, ' ', false, json::error_handler_t::replace) + "\n");
 }
 
-/// Puts the staged files in place. A file that this lens has not is removed, so that none of an
-/// older lens stays beside the new one.
-void publish(const StagingFolder& staging, const fs::path& folder) {
+/// Removes what makes an older lens in the folder whole, and those of its files that this lens has
+/// not: none of them stays beside the new one.
+void remove_older(const PendingFiles& files, const fs::path& folder) {
   using namespace lens_file;
   fs::remove(folder / kJson);
-  for (const char* name :
-       {kSurface, kTargetPng, kTargetExr, kRenderPng, kRenderExr, kError, kJson}) {
-    if (fs::exists(staging / name)) {
-      fs::rename(staging / name, folder / name);
-    } else {
-      fs::remove(folder / name);
-    }
+  for (const char* name : {kSurface, kTargetPng, kTargetExr, kRenderPng, kRenderExr, kError}) {
+    if (!files.has(name)) fs::remove(folder / name);
   }
 }
 
@@ -249,10 +222,12 @@ Image read_picture(const fs::path& path, const OpticalSetup& setup) {
 
 void write_lens(const Lens& lens, const fs::path& folder) {
   check_sizes(lens);
-  const StagingFolder staging(folder);
-  write_files(lens, staging);
   try {
-    publish(staging, folder);
+    fs::create_directories(folder);
+    PendingFiles files(folder);
+    add_files(lens, files);
+    remove_older(files, folder);
+    files.publish();
   } catch (const fs::filesystem_error& error) {
     throw RunError(folder.string() + ": cannot be written: " + error.code().message());
   }

@@ -41,7 +41,7 @@ inline constexpr const char* kCheckpoint = "checkpoint.bin";  ///< While a desig
 inline constexpr std::array kAll = {kJson,      kSurface, kTargetPng, kTargetExr,   kRenderPng,
                                     kRenderExr, kError,   kOverview,  kConvergence, kCheckpoint};
 
-/// Folder beside the files in which a lens is put together before it takes its place.
+/// Folder in which earlier versions put a lens together; a killed one has left it behind.
 inline constexpr const char* kStaging = "lens";
 
 /// The folder inside that `cam` writes into, and what is in it beside the programs.

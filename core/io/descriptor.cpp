@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "machine/link/descriptor.h"
+#include "core/io/descriptor.h"
 
 #include <fcntl.h>
 #include <unistd.h>
@@ -17,8 +17,9 @@ int Descriptor::above_standard(int number) {
   return moved;
 }
 
-void Descriptor::close() const {
-  if (number_ >= 0) ::close(number_);
+int Descriptor::close() {
+  const int number = std::exchange(number_, -1);
+  return number >= 0 && ::close(number) != 0 ? errno : 0;
 }
 
 }  // namespace lensforge

@@ -6,7 +6,7 @@
 namespace lensforge {
 
 /// An open file, device or socket that closes itself. It is never standard input, output or error:
-/// what a library prints there must not reach a controller, a journal or a log.
+/// what a library prints there must not reach a controller, a journal, a result or a log.
 class Descriptor {
  public:
   /// Takes `number` over; 0 to 2 are moved up first (then open() is false if no number is free).
@@ -22,10 +22,12 @@ class Descriptor {
 
   [[nodiscard]] int number() const { return number_; }
   [[nodiscard]] bool open() const { return number_ >= 0; }
+  /// Closes it now, if it is open. Returns 0 or an errno value; some file systems report a full
+  /// disk only here.
+  int close();
 
  private:
   static int above_standard(int number);
-  void close() const;
 
   int number_;
 };
