@@ -10,15 +10,15 @@
 
 #include "core/error.h"
 #include "core/image/image_io.h"
+#include "core/surface/grid_mesh.h"
 #include "core/text/number_text.h"
-#include "design/checkpoint.h"
-#include "design/crease_alignment.h"
-#include "design/face_transport.h"
-#include "design/grid_mesh.h"
-#include "design/guided_optimization.h"
-#include "design/level_plan.h"
-#include "design/reach.h"
 #include "design/render_lens.h"
+#include "design/schedule/checkpoint.h"
+#include "design/schedule/crease_alignment.h"
+#include "design/schedule/face_transport.h"
+#include "design/schedule/guided_optimization.h"
+#include "design/schedule/level_plan.h"
+#include "design/schedule/reach.h"
 #include "design/transport/vertex_spread.h"
 
 namespace lensforge {

@@ -19,7 +19,7 @@
 #include "core/compute/gpu.h"
 #include "design/design_lens.h"
 #include "design/energy/objective_cuda.h"
-#include "design/guided_optimization.h"
+#include "design/schedule/guided_optimization.h"
 #include "fixtures/scenes.h"
 
 namespace lensforge::bench {

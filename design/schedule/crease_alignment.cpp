@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/crease_alignment.h"
+#include "design/schedule/crease_alignment.h"
 
 #include <algorithm>
 #include <cstddef>
