@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "design/design_lens.h"
+#include "design/design_options.h"
 #include "design/schedule/face_transport.h"
 #include "design/schedule/guided_optimization.h"
 
