@@ -63,6 +63,10 @@ void validate_limits(const CutLimits& limits) {
 
 }  // namespace
 
+const char* words_for(SurfaceModel surface) {
+  return surface == SurfaceModel::kSmooth ? "smooth, over the mesh" : "facets of the mesh";
+}
+
 const char* words_for(ZZero zero) {
   switch (zero) {
     case ZZero::kStock:
