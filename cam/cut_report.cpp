@@ -81,8 +81,7 @@ ParameterGroup finish_parameters(const CutPlan& plan) {
            {"Tolerance", mm(finish.tolerance, 5)},
            {"Slope tolerance", decimal_text(1e3 * finish.slope_tolerance, 2) + " mrad"},
            {"Decimals", std::to_string(plan.decimals())},
-           {"Surface", plan.options().surface == SurfaceModel::kSmooth ? "smooth, over the mesh"
-                                                                       : "facets of the mesh"}}};
+           {"Surface", words_for(plan.options().surface)}}};
 }
 
 template <class Level>

@@ -31,7 +31,7 @@ SurfaceMesh small_relief() {
   });
 }
 
-FacetSurface facets(const SurfaceMesh& mesh) { return {mesh, kRadius, Executor::serial()}; }
+FacetCutSurface facets(const SurfaceMesh& mesh) { return {mesh, kRadius, Executor::serial()}; }
 
 std::vector<RasterRow> all_rows(const CutSurface& surface, const RasterPlan& plan,
                                 const Executor& executor) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/face_transport.h"
+#include "design/schedule/face_transport.h"
 
 #include <cstddef>
 #include <cstdint>

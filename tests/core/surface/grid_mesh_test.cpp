@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/grid_mesh.h"
+#include "core/surface/grid_mesh.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/guided_optimization.h"
+#include "design/schedule/guided_optimization.h"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 #include <string>
 
 #include "core/error.h"
-#include "design/face_transport.h"
+#include "design/schedule/face_transport.h"
 #include "design/test_setups.h"
 
 namespace lensforge {

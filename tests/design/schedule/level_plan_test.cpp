@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/level_plan.h"
+#include "design/schedule/level_plan.h"
 
 #include <gtest/gtest.h>
 

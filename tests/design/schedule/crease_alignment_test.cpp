@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/crease_alignment.h"
+#include "design/schedule/crease_alignment.h"
 
 #include <gtest/gtest.h>
 
@@ -8,9 +8,9 @@
 #include <utility>
 
 #include "core/optics/image_plane.h"
-#include "design/face_transport.h"
-#include "design/grid_mesh.h"
+#include "core/surface/grid_mesh.h"
 #include "design/optics/image_triangle.h"
+#include "design/schedule/face_transport.h"
 #include "design/transport_scenes.h"
 
 namespace lensforge {

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/reach.h"
+#include "design/schedule/reach.h"
 
 #include <cmath>
 
-#include "design/design_lens.h"
-#include "design/face_transport.h"
-#include "design/guided_optimization.h"
+#include "design/design_options.h"
+#include "design/schedule/face_transport.h"
+#include "design/schedule/guided_optimization.h"
 
 namespace lensforge {
 namespace {

@@ -6,8 +6,8 @@
 #include <random>
 #include <utility>
 
+#include "core/surface/mesh_normals.h"
 #include "core/surface/slope_heights.h"
-#include "design/optics/surface_optics.h"
 #include "export/sample_surfaces.h"
 
 namespace lensforge::testing {
@@ -17,7 +17,7 @@ TEST(SmoothSurface, HasTheDesignsNormalsAboveTheVerticesAndHeightsToFit) {
   for (const SurfaceMesh& mesh : {smooth_lens(), creased_lens(), noisy_lens()}) {
     const SmoothSurface surface(mesh);
     const Eigen::Matrix3Xd normals = vertex_area_normals(mesh);
-    const Eigen::VectorXd heights = fit_heights(mesh, surface.slopes());
+    const Eigen::VectorXd heights = heights_from_slopes(mesh, surface.slopes());
     for (Eigen::Index v = 0; v < mesh.vertices.cols(); ++v) {
       const auto point = surface.at(mesh.vertices.col(v).head<2>());
       ASSERT_TRUE(point);

@@ -7,9 +7,10 @@
 
 #include "core/image/image.h"
 #include "core/surface/surface_mesh.h"
-#include "design/design_lens.h"
+#include "design/design_options.h"
 #include "design/energy/barrier.h"
-#include "design/guided_optimization.h"
+#include "design/schedule/convergence.h"
+#include "design/schedule/guided_optimization.h"
 
 namespace lensforge {
 

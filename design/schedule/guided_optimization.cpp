@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/guided_optimization.h"
+#include "design/schedule/guided_optimization.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,9 +8,9 @@
 #include <numbers>
 #include <variant>
 
-#include "design/guided_stage_on.h"
 #include "design/optics/image_triangle.h"
 #include "design/optimize/levelling.h"
+#include "design/schedule/guided_stage_on.h"
 
 namespace lensforge {
 

@@ -9,8 +9,8 @@
 #include "core/optics/optical_setup.h"
 #include "core/surface/surface_mesh.h"
 #include "design/energy/objective.h"
-#include "design/guided_stage.h"
 #include "design/optimize/lbfgs.h"
+#include "design/schedule/guided_stage.h"
 
 namespace lensforge {
 

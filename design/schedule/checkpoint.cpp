@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/checkpoint.h"
+#include "design/schedule/checkpoint.h"
 
 #include <bit>
 #include <cmath>
@@ -13,9 +13,9 @@
 
 #include "core/error.h"
 #include "core/io/files.h"
+#include "core/surface/grid_mesh.h"
 #include "core/text/json_fields.h"
 #include "core/text/json_text.h"
-#include "design/grid_mesh.h"
 
 // File: the magic line, then a JSON header on one line, then as little-endian doubles the vertices
 // and, if the header says so, the reach of their steps, then a FNV-1a hash of all that goes before.

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/level_plan.h"
+#include "design/schedule/level_plan.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "design/grid_mesh.h"
+#include "core/surface/grid_mesh.h"
 
 namespace lensforge {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/crease_alignment.h"
+#include "design/schedule/crease_alignment.h"
 
 #include <algorithm>
 #include <cstddef>
@@ -11,7 +11,6 @@
 
 #include "core/optics/image_plane.h"
 #include "core/surface/mesh_topology.h"
-#include "design/optics/image_triangle.h"
 
 namespace lensforge {
 
@@ -27,7 +26,7 @@ class Alignment {
   Alignment(const BrenierMap& map, const OpticalSetup& setup, SurfaceMesh& mesh)
       : map_(map), plane_(setup), mesh_(mesh), topology_(make_topology(mesh)) {
     for (int t = 0; t < static_cast<int>(mesh.triangle_count()); ++t) {
-      least_area_.push_back(kLeastShrinkage * area(t));
+      least_area_.push_back(kLeastShrinkage * mesh.plan_area(t));
     }
   }
 
@@ -53,12 +52,6 @@ class Alignment {
 
   [[nodiscard]] Eigen::Vector2d place(int vertex) const {
     return mesh_.vertices.col(vertex).head<2>();
-  }
-
-  /// Twice the area over the lens.
-  [[nodiscard]] double area(int triangle) const {
-    const auto t = mesh_.triangles.col(triangle);
-    return doubled_area(place(t[0]), place(t[1]), place(t[2]));
   }
 
   [[nodiscard]] std::optional<Move> move_of(int vertex) const {
@@ -89,7 +82,8 @@ class Alignment {
     const auto first = static_cast<std::size_t>(topology_.vertex_corner_begin[v]);
     const auto last = static_cast<std::size_t>(topology_.vertex_corner_begin[v + 1]);
     for (const int corner : std::span(topology_.vertex_corners).subspan(first, last - first)) {
-      if (area(corner / 3) >= least_area_[static_cast<std::size_t>(corner / 3)]) continue;
+      if (mesh_.plan_area(corner / 3) >= least_area_[static_cast<std::size_t>(corner / 3)])
+        continue;
       mesh_.vertices.col(move.vertex).head<2>() -= move.way;
       return false;
     }

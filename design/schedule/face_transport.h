@@ -9,6 +9,7 @@
 #include "core/optics/optical_setup.h"
 #include "core/surface/lens.h"
 #include "core/surface/surface_mesh.h"
+#include "core/surface/surface_model.h"
 #include "design/energy/correspondence_term.h"
 #include "design/transport/brenier_map.h"
 #include "design/transport/semi_discrete.h"

@@ -3,8 +3,8 @@
 
 #include "core/compute/cuda/launch.cuh"
 #include "design/energy/objective_cuda.h"
-#include "design/guided_stage_on.h"
 #include "design/optimize/cuda/cuda_fourier.h"
+#include "design/schedule/guided_stage_on.h"
 
 namespace lensforge {
 

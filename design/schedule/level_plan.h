@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "core/surface/surface_mesh.h"
-#include "design/design_lens.h"
+#include "design/design_options.h"
 
 namespace lensforge {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/checkpoint.h"
+#include "design/schedule/checkpoint.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -13,8 +13,8 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/surface/grid_mesh.h"
 #include "core/temp_folder.h"
-#include "design/grid_mesh.h"
 #include "design/test_setups.h"
 
 namespace lensforge {
