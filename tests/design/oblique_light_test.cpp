@@ -7,17 +7,18 @@
 #include <cmath>
 #include <cstddef>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "core/optics/light_path.h"
-#include "design/crease_alignment.h"
 #include "design/energy/objective.h"
-#include "design/face_transport.h"
 #include "design/finite_difference.h"
-#include "design/guided_optimization.h"
 #include "design/objective_setups.h"
-#include "design/reach.h"
 #include "design/render_lens.h"
+#include "design/schedule/crease_alignment.h"
+#include "design/schedule/face_transport.h"
+#include "design/schedule/guided_optimization.h"
+#include "design/schedule/reach.h"
 #include "design/snell.h"
 #include "design/transport/vertex_spread.h"
 
