@@ -80,6 +80,10 @@ void validate_tool_numbers(const CamOptions& options) {
 
 }  // namespace
 
+const char* words_for(SurfaceModel surface) {
+  return surface == SurfaceModel::kSmooth ? "smooth, over the mesh" : "facets of the mesh";
+}
+
 const char* words_for(ZZero zero) {
   switch (zero) {
     case ZZero::kStock:

@@ -81,8 +81,7 @@ ParameterGroup finish_parameters(const CutPlan& plan) {
            {"Tolerance", mm(finish.tolerance, 5)},
            {"Slope tolerance", decimal_text(1e3 * finish.slope_tolerance, 2) + " mrad"},
            {"Decimals", std::to_string(plan.decimals())},
-           {"Surface", plan.options().surface == SurfaceModel::kSmooth ? "smooth, over the mesh"
-                                                                       : "facets of the mesh"}}};
+           {"Surface", words_for(plan.options().surface)}}};
 }
 
 template <class Level>
@@ -287,7 +286,7 @@ std::vector<LimitCheck> safety_checks(const CutPlan& plan, const Lens& lens) {
   return checks;
 }
 
-/// A controller that takes lines without limit bears any load.
+/// Safety first. A controller that takes lines without limit bears any load.
 Verdict whole_verdict(const CutPlan& plan, const ProgramFiles& programs,
                       const std::optional<Prediction>& prediction, const Lens& lens) {
   CutLimits limits = plan.options().limits;
@@ -295,7 +294,8 @@ Verdict whole_verdict(const CutPlan& plan, const ProgramFiles& programs,
   CutFindings findings = findings_of(programs, prediction);
   if (!(limits.block_rate > 0.0)) findings.block_rate.reset();
   Verdict verdict = judge_cut(findings, limits);
-  for (const LimitCheck& check : safety_checks(plan, lens)) verdict.checks.push_back(check);
+  const std::vector<LimitCheck> safety = safety_checks(plan, lens);
+  verdict.checks.insert(verdict.checks.begin(), safety.begin(), safety.end());
   return verdict;
 }
 

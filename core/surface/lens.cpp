@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "core/surface/lens.h"
 
-#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
 #include <string>
 #include <system_error>
 #include <utility>
+#include <vector>
 
 #include "core/error.h"
 #include "core/image/error_image.h"
@@ -47,6 +47,12 @@ ordered_json to_json(const ImageMetrics& metrics) {
           {"mae_linear", metrics.mae_linear}};
 }
 
+ordered_json to_json(const ModelMetrics& metrics) {
+  ordered_json by_model;
+  for (const auto& [model, one] : metrics) by_model[model_name(model)] = to_json(one);
+  return by_model;
+}
+
 template <class Vector>
 ordered_json pair_json(const Vector& pair) {
   return ordered_json::array({pair.x(), pair.y()});
@@ -68,11 +74,10 @@ ordered_json to_json(const Lens& lens) {
       {"image_origin", pair_json(setup.image_origin)},
       {"pixels", pair_json(setup.pixels)},
       {"view", setup.view == ViewSide::kFront ? "front" : "rear"},
-      {"model", lens.model == SurfaceModel::kFacet ? "facet" : "smooth"},
+      {"model", model_name(lens.model)},
       {"surface", lens_file::kSurface},
       {"grid", grid.is_grid() ? ordered_json::array({grid.columns, grid.rows}) : ordered_json()},
-      {"metrics",
-       {{"facet", to_json(lens.facet_metrics)}, {"smooth", to_json(lens.smooth_metrics)}}},
+      {"metrics", to_json(lens.metrics)},
       {"provenance", ordered_json(lens.provenance)},
   };
 }
@@ -117,16 +122,17 @@ json read_json(const fs::path& path) {
   return parse_json(read_whole_file(path, kMaxJsonBytes), path.string());
 }
 
-/// One of two words as one of two values.
+/// One of some words as one of some values.
 template <class Value>
 Value choice(const JsonFields& fields, const std::string& name,
-             const std::array<std::pair<const char*, Value>, 2>& words) {
+             const std::vector<std::pair<std::string, Value>>& words) {
   const std::string text = fields.text(name);
+  std::string rule = "it must be";
   for (const auto& [word, value] : words) {
     if (text == word) return value;
+    rule += (word == words.front().first ? " \"" : " or \"") + word + "\"";
   }
-  fields.refuse(name,
-                std::string("it must be \"") + words[0].first + "\" or \"" + words[1].first + "\"");
+  fields.refuse(name, rule);
 }
 
 void check_supported(const JsonFields& fields) {
@@ -156,7 +162,7 @@ OpticalSetup read_setup(const JsonFields& fields, const std::string& file) {
   setup.image_origin = fields.number_pair("image_origin");
   setup.pixels = fields.integer_pair("pixels");
   setup.view =
-      choice<ViewSide>(fields, "view", {{{"front", ViewSide::kFront}, {"rear", ViewSide::kRear}}});
+      choice<ViewSide>(fields, "view", {{"front", ViewSide::kFront}, {"rear", ViewSide::kRear}});
   try {
     validate(setup);
   } catch (const InputError& error) {
@@ -240,11 +246,11 @@ Lens read_lens(const fs::path& folder) {
   check_supported(fields);
   Lens lens;
   lens.setup = read_setup(fields, path.string());
-  lens.model = choice<SurfaceModel>(
-      fields, "model", {{{"facet", SurfaceModel::kFacet}, {"smooth", SurfaceModel::kSmooth}}});
+  lens.model = choice<SurfaceModel>(fields, "model", named_models());
   const JsonFields metrics = fields.object("metrics");
-  lens.facet_metrics = read_metrics(metrics.object("facet"));
-  lens.smooth_metrics = read_metrics(metrics.object("smooth"));
+  for (const auto& [name, model] : named_models()) {
+    lens.metrics[model] = read_metrics(metrics.object(name));
+  }
   if (!fields.at("provenance").is_object()) fields.refuse("provenance", "it must be an object");
   lens.provenance = fields.at("provenance");
   lens.surface = read_surface(fields, lens.setup, folder);
