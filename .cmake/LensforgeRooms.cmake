@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Targets for the rooms of the house: language level, warnings, include roots.
+# Targets for the rooms of the house: language level, warnings, include roots, installation.
 
 set(CMAKE_CXX_STANDARD 20)
 set(CMAKE_CXX_STANDARD_REQUIRED ON)
@@ -20,6 +20,8 @@ if(LENSFORGE_SANITIZE)
   target_link_options(lensforge_options INTERFACE -fsanitize=${LENSFORGE_SANITIZE})
 endif()
 
+include(LensforgePrecompile)
+
 # lensforge_room(NAME FOLDER SOURCES ... PUBLIC ... PRIVATE ...)
 # A static library lensforge_NAME, alias lensforge::NAME, for the sources in FOLDER (relative to the
 # root). Its headers are reached as "FOLDER/header.h" through a link of its own, so that only
@@ -33,5 +35,7 @@ function(lensforge_room name folder)
   file(MAKE_DIRECTORY "${root}/${parent}")
   file(CREATE_LINK "${CMAKE_SOURCE_DIR}/${folder}" "${root}/${folder}" SYMBOLIC)
   target_include_directories(lensforge_${name} PUBLIC "${root}")
-  target_link_libraries(lensforge_${name} PUBLIC ${arg_PUBLIC} PRIVATE lensforge_options ${arg_PRIVATE})
+  target_link_libraries(lensforge_${name}
+    PUBLIC ${arg_PUBLIC} PRIVATE "$<BUILD_INTERFACE:lensforge_options>" ${arg_PRIVATE})
+  lensforge_precompile(lensforge_${name} lensforge_common_headers)
 endfunction()
