@@ -8,6 +8,7 @@
 
 #include "app/option_set.h"
 #include "cam/cam_options.h"
+#include "core/surface/surface_model.h"
 
 namespace lensforge::app {
 

@@ -178,10 +178,10 @@ void announce_height_map(const Lens& lens, const ExportArguments& arguments, For
 
 /// The picture of the surface as facets and as the smooth part that is made of them.
 void compare_pictures(const Lens& lens, const Executor& executor, Report& report) {
-  for (const SurfaceModel model : {SurfaceModel::kFacet, SurfaceModel::kSmooth}) {
+  for (const SurfaceModel model : kSurfaceModels) {
     const ImageMetrics metrics =
         evaluate(lens.surface, lens.setup, model, lens.target, nullptr, executor);
-    const std::string word = model_word(model);
+    const std::string word = model_name(model);
     report.json["metrics"][word] = metrics_json(metrics);
     report.text += "  " + word + std::string(10 - word.size(), ' ') + metrics_text(metrics) + "\n";
   }

@@ -61,7 +61,28 @@ void validate_limits(const CutLimits& limits) {
   for (const auto& [option, limit] : all) require_in(option, limit, 0.0, cam_limit::kLimit);
 }
 
+/// Before hours are spent on programs that the controller could not read.
+void validate_tool_numbers(const CamOptions& options) {
+  if (!options.post.changes_tools()) return;
+  const Process& process = options.workshop.process;
+  const GcodeDialect& reader = options.post.reader;
+  const auto check = [&](int tool) {
+    if (tool <= reader.max_tool) return;
+    refuse("tool number", tool,
+           "is above " + std::to_string(reader.max_tool) + ", the largest that a post read as " +
+               reader.name + " can call; number the tool from 1 to " +
+               std::to_string(reader.max_tool) + " in the workshop");
+  };
+  check(process.finish.tool);
+  if (process.rough.enabled) check(process.rough.tool);
+  if (process.semi.enabled) check(process.semi.tool);
+}
+
 }  // namespace
+
+const char* words_for(SurfaceModel surface) {
+  return surface == SurfaceModel::kSmooth ? "smooth, over the mesh" : "facets of the mesh";
+}
 
 const char* words_for(ZZero zero) {
   switch (zero) {
@@ -94,6 +115,7 @@ void validate(const CamOptions& options, const OpticalSetup& setup) {
   }
   require_in("--spin-up", options.spin_up, 0.0, cam_limit::kSpinUp);
   require_in("--shrinkage", options.shrinkage, 0.0, cam_limit::kShrinkage);
+  validate_tool_numbers(options);
   validate_decimals(options);
   validate_polish(options);
   require_in("--dark-below", options.leakage.dark_below, 0.0, cam_limit::kDark);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "design/design_estimate.h"
 
-#include "design/level_plan.h"
+#include "design/schedule/level_plan.h"
 
 namespace lensforge {
 namespace {

@@ -7,10 +7,11 @@
 
 #include "core/compute/executor.h"
 #include "core/optics/optical_setup.h"
+#include "core/surface/mesh_normals.h"
 #include "core/surface/surface_mesh.h"
+#include "core/surface/surface_model.h"
 #include "design/flux/flux_image.h"
 #include "design/optics/surface_kernels.h"
-#include "design/optics/surface_optics.h"
 
 namespace lensforge {
 

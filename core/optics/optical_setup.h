@@ -5,10 +5,6 @@
 
 namespace lensforge {
 
-/// Which normals send the light: one per triangle (the paper's model), or one per vertex (what a
-/// polished, smooth part does).
-enum class SurfaceModel { kFacet, kSmooth };
-
 /// From where the picture is looked at: from the lens's side on an opaque wall, or from behind a
 /// translucent screen.
 enum class ViewSide { kFront, kRear };

@@ -12,6 +12,7 @@
 #include "cam/contact/cut_surface.h"
 #include "cam/contact/drop_cutter.h"
 #include "cam/path/row_profile.h"
+#include "core/surface/smooth_surface.h"
 
 namespace lensforge {
 namespace {
@@ -42,7 +43,7 @@ double at(const CurveNodes& nodes, double u) {
 }
 
 /// The highest that any of a great many points of the surface around p holds the tip.
-double brute_tip(const SmoothSurface& surface, const Eigen::Vector2d& p, double spacing) {
+double brute_tip(const OpticalSurface& surface, const Eigen::Vector2d& p, double spacing) {
   double best = kNoContact;
   for (double dx = -kRadius; dx <= kRadius; dx += spacing) {
     for (double dy = -kRadius; dy <= kRadius; dy += spacing) {

@@ -11,9 +11,9 @@
 #include "design/energy/unlit_pixels.h"
 #include "design/energy/unlit_term.h"
 #include "design/finite_difference.h"
-#include "design/guided_optimization.h"
 #include "design/objective_setups.h"
 #include "design/random_input.h"
+#include "design/schedule/guided_optimization.h"
 
 namespace lensforge {
 namespace {
