@@ -5,7 +5,6 @@
 
 #include "core/surface/mesh_normals.h"
 #include "design/optics/facet.h"
-#include "design/optics/projection.h"
 #include "design/optics/surface_kernels.h"
 
 namespace lensforge {
@@ -13,7 +12,7 @@ namespace lensforge {
 namespace {
 
 SurfaceView view_of(const SurfaceMesh& mesh, const OpticalSetup& setup) {
-  return {mesh.triangles.data(), mesh.vertices.data(), Projection(setup), setup.lens_size.prod()};
+  return {mesh.triangles.data(), mesh.vertices.data(), LightPath(setup)};
 }
 
 template <class Project>

@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "core/image/image.h"
+#include "core/optics/barrier.h"
 #include "core/surface/surface_mesh.h"
 #include "design/design_options.h"
-#include "design/energy/barrier.h"
 #include "design/schedule/convergence.h"
 #include "design/schedule/guided_optimization.h"
 

@@ -9,7 +9,7 @@
 #include <tuple>
 #include <vector>
 
-#include "core/optics/image_plane.h"
+#include "core/optics/light_path.h"
 #include "core/surface/mesh_topology.h"
 
 namespace lensforge {
@@ -24,7 +24,7 @@ constexpr double kLeastShrinkage = 0.1;
 class Alignment {
  public:
   Alignment(const BrenierMap& map, const OpticalSetup& setup, SurfaceMesh& mesh)
-      : map_(map), plane_(setup), mesh_(mesh), topology_(make_topology(mesh)) {
+      : map_(map), light_(setup), mesh_(mesh), topology_(make_topology(mesh)) {
     for (int t = 0; t < static_cast<int>(mesh.triangle_count()); ++t) {
       least_area_.push_back(kLeastShrinkage * mesh.plan_area(t));
     }
@@ -55,10 +55,11 @@ class Alignment {
   }
 
   [[nodiscard]] std::optional<Move> move_of(int vertex) const {
-    const Eigen::Vector2d pixel = plane_.to_pixels(place(vertex));
+    const Eigen::Vector3d at = mesh_.vertices.col(vertex);
+    const Eigen::Vector2d pixel = light_.land_from_flat(at);
     const std::optional<Eigen::Vector2d> way = map_.way_to_crease(pixel);
     if (!way) return std::nullopt;
-    const Eigen::Vector2d mm = plane_.to_mm(pixel + *way) - place(vertex);
+    const Eigen::Vector2d mm = light_.place_on_flat(pixel + *way, at.z()) - at.head<2>();
     const double share = mm.norm() / shortest_edge(vertex);
     if (!(share < kReach)) return std::nullopt;
     return Move{share, vertex, mm};
@@ -91,7 +92,7 @@ class Alignment {
   }
 
   const BrenierMap& map_;
-  ImagePlane plane_;
+  LightPath light_;
   SurfaceMesh& mesh_;
   MeshTopology topology_;
   std::vector<double> least_area_;

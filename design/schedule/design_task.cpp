@@ -6,21 +6,6 @@
 #include "core/image/image_io.h"
 
 namespace lensforge {
-namespace {
-
-OpticalSetup make_setup(const DesignOptions& options, const Eigen::Vector2i& pixels) {
-  OpticalSetup setup;
-  setup.ior = options.ior;
-  setup.focal_length = options.focal_length;
-  setup.lens_size = {options.width, options.width * pixels.y() / pixels.x()};
-  setup.image_size = setup.lens_size;
-  setup.pixels = pixels;
-  setup.view = options.view;
-  return setup;
-}
-
-}  // namespace
-
 Image working_picture(const Image& target, const DesignOptions& options, const RunControl& run) {
   const Eigen::Vector2i pixels = working_size(target.columns(), target.rows(), options.pixels);
   return resample(target, pixels.x(), pixels.y(), run);
@@ -35,7 +20,7 @@ DesignTask make_task(const Image& target, const DesignOptions& options, const Ex
           control,
           executor.with_stop(control.stop_token()),
           std::move(working),
-          make_setup(options, pixels),
+          optical_setup(options, pixels),
           plan_levels(pixels, options)};
 }
 

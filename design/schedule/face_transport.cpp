@@ -5,8 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/optics/image_plane.h"
-#include "design/optics/inverse_refraction.h"
+#include "core/optics/light_path.h"
 #include "design/optics/surface_optics.h"
 #include "design/transport/height_fit.h"
 
@@ -42,17 +41,15 @@ Eigen::Matrix2Xd map_faces(const FaceLight& light, const BrenierMap& map,
 
 void aim_faces(const Correspondence& correspondence, const OpticalSetup& setup,
                const Executor& executor, SurfaceMesh& mesh) {
-  const ImagePlane plane(setup);
+  const LightPath light(setup);
   Eigen::Matrix2Xd gradients(2, mesh.triangles.cols());
-  parallel_for(executor, "invert refraction", mesh.triangles.cols(), [&](std::int64_t f) {
+  parallel_for(executor, "aim faces", mesh.triangles.cols(), [&](std::int64_t f) {
     const auto t = mesh.triangles.col(f);
     const Eigen::Vector3d c =
         (mesh.vertices.col(t[0]) + mesh.vertices.col(t[1]) + mesh.vertices.col(t[2])) / 3.0;
-    const Eigen::Vector2d landing = plane.to_mm(correspondence.centroids.col(f));
-    const Eigen::Vector2d m = (landing - c.head<2>()) / (setup.focal_length - c.z());
-    gradients.col(f) = refracting_gradient(m, setup.ior);
+    gradients.col(f) = light.gradient_for(c, correspondence.centroids.col(f));
   });
-  fit_heights(gradients, HeightFitOptions{}, executor, mesh);
+  fit_face_gradients(gradients, HeightFitOptions{}, executor, mesh);
 }
 
 }  // namespace lensforge

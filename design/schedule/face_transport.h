@@ -37,7 +37,7 @@ TransportResult transport_faces(const FaceLight& light, const Image& target,
 Eigen::Matrix2Xd map_faces(const FaceLight& light, const BrenierMap& map, const Executor& executor);
 
 /// Gives the mesh the heights that send the light of every face nearest to its wanted centroid, x
-/// and y staying: refraction is inverted for the gradient that each face needs, fit_heights() does
+/// and y staying: the light path tells the gradient that each face needs, fit_face_gradients() does
 /// the rest. It moves light over any distance in one step, which descent on Eq. 20 cannot.
 void aim_faces(const Correspondence& correspondence, const OpticalSetup& setup,
                const Executor& executor, SurfaceMesh& mesh);

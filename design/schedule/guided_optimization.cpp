@@ -8,6 +8,7 @@
 #include <numbers>
 #include <variant>
 
+#include "core/optics/light_path.h"
 #include "design/optics/image_triangle.h"
 #include "design/optimize/levelling.h"
 #include "design/schedule/guided_stage_on.h"
@@ -138,7 +139,7 @@ Eigen::VectorXd GuidedOptimization::squared_curvatures(const Eigen::Matrix3Xd& v
                                                        bool heights, std::uint64_t number) {
   const Eigen::Matrix3Xd direction = probe(heights, number);
   const double rms = std::sqrt(direction.squaredNorm() / static_cast<double>(direction.cols()));
-  const double motion = heights ? rms / cell_ * (setup_.ior - 1.0) * setup_.focal_length : rms;
+  const double motion = heights ? LightPath(setup_).reach(rms / cell_) : rms;
   double step = kProbePixels * setup_.image_size.x() / setup_.pixels.x() / motion;
   Eigen::Matrix3Xd forward;
   Eigen::Matrix3Xd backward;

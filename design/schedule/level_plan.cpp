@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/optics/light_path.h"
 #include "core/surface/grid_mesh.h"
 
 namespace lensforge {
@@ -38,6 +39,17 @@ Level level_at(const Eigen::Vector2i& pixels, const DesignOptions& options, int 
 
 }  // namespace
 
+OpticalSetup optical_setup(const DesignOptions& options, const Eigen::Vector2i& pixels) {
+  OpticalSetup setup;
+  setup.ior = options.ior;
+  setup.focal_length = options.focal_length;
+  setup.lens_size = {options.width, options.width * pixels.y() / pixels.x()};
+  setup.image_size = setup.lens_size;
+  setup.pixels = pixels;
+  setup.view = options.view;
+  return setup;
+}
+
 Eigen::Vector2i working_size(int source_columns, int source_rows, int longer_side) {
   const double scale = static_cast<double>(longer_side) / std::max(source_columns, source_rows);
   return {rounded(scale * source_columns, 1), rounded(scale * source_rows, 1)};
@@ -52,7 +64,7 @@ std::vector<Level> plan_levels(const Eigen::Vector2i& pixels, const DesignOption
     Level level = level_at(pixels, options, halvings, l);
     const double pixel = options.width / level.pixels.x();
     const double cell = options.width / (level.grid.columns - 1);
-    const double typical = pixel / cell / ((options.ior - 1.0) * options.focal_length);
+    const double typical = pixel / cell / LightPath(optical_setup(options, pixels)).reach(1.0);
     const double progress = halvings == 0 ? 1.0 : static_cast<double>(l) / halvings;
     level.nu = typical * kNuStart * std::pow(kNuEnd / kNuStart, progress);
     levels.push_back(level);

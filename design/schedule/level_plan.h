@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "core/optics/optical_setup.h"
 #include "core/surface/surface_mesh.h"
 #include "design/design_options.h"
 
@@ -16,6 +17,9 @@ struct Level {
   double nu = 0.0;               ///< ν of the Welsch function, 1/mm.
 };
 
+/// What the options say of light, lens and screen, for a working picture of so many pixels.
+OpticalSetup optical_setup(const DesignOptions& options, const Eigen::Vector2i& pixels);
+
 /// Size of the working picture: the longer side has options.pixels, the other follows the source's
 /// shape (at least 1).
 Eigen::Vector2i working_size(int source_columns, int source_rows, int longer_side);
@@ -25,7 +29,7 @@ Eigen::Vector2i working_size(int source_columns, int source_rows, int longer_sid
 /// with them, mesh_ratio per pixel.
 ///
 /// ν falls from kNuStart × D_e to kNuEnd × D_e by a fixed ratio. The typical residual D_e is the
-/// curvature that moves light by one pixel over one cell, (pixel / cell) / ((ior − 1) f).
+/// curvature that moves light by one pixel over one cell, (pixel / cell) / LightPath::reach(1).
 std::vector<Level> plan_levels(const Eigen::Vector2i& pixels, const DesignOptions& options);
 
 }  // namespace lensforge

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "design/schedule/reach.h"
 
+#include <algorithm>
 #include <cmath>
 
+#include "core/optics/light_path.h"
 #include "design/design_options.h"
 #include "design/schedule/face_transport.h"
 #include "design/schedule/guided_optimization.h"
@@ -23,7 +25,10 @@ bool feasible(const Demand& demand, double focal_length, const Executor& executo
   SurfaceMesh mesh = demand.mesh;
   mesh.vertices.row(2).setConstant(demand.thickness);
   aim_surface(demand.wanted, setup, demand.thickness, executor, mesh);
-  if (!(mesh.vertices.row(2).maxCoeff() < focal_length)) return false;
+  const LightPath light(setup);
+  const auto before_screen = [&](const auto& p) { return light.before_screen(p); };
+  const auto vertices = mesh.vertices.colwise();
+  if (!std::all_of(vertices.begin(), vertices.end(), before_screen)) return false;
   GuidedOptimization stage(mesh, setup, demand.target, demand.objective, executor);
   return std::isfinite(stage.value(mesh));
 }

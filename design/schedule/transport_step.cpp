@@ -102,7 +102,8 @@ void spread(const Site& site, const SurfaceMesh& even_mesh, const Matching& even
   const DesignTask& task = site.task;
   const bool facet = task.options.model == SurfaceModel::kFacet;
   const Eigen::VectorXd areas =
-      facet ? favour_dark({even_mesh, even.result.lit_areas}) : even.result.areas;
+      facet ? favour_dark({even_mesh, even.result.lit_areas}, site.problem.setup)
+            : even.result.areas;
   const ServedAreas served{even_mesh, areas};
   if (!spread_vertices(served, task.options.spread, site.problem.setup, task.executor,
                        RunControl(task.control.stop_token(), {}), mesh)) {

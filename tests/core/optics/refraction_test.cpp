@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/optics/refraction.h"
+#include "core/optics/refraction.h"
 
 #include <gtest/gtest.h>
 

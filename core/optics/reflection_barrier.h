@@ -2,8 +2,8 @@
 #pragma once
 
 #include "core/compute/host_device.h"
-#include "design/energy/barrier.h"
-#include "design/optics/refraction.h"
+#include "core/optics/barrier.h"
+#include "core/optics/refraction.h"
 
 namespace lensforge {
 

@@ -35,8 +35,8 @@ LF_HD inline Eigen::Vector3d refract_adjoint(const Eigen::Vector3d& a, const Eig
   return k * b_bar + (n.dot(b_bar) * k_by_c) * a;
 }
 
-/// Parallel light along +z after a surface of unit normal n, with what its adjoint needs again.
-/// b = k n + η ẑ with k = √s − η n_z.
+/// A ray after a surface of unit normal n, b = k n + η a with k = √s − ηc, and what its adjoint
+/// needs again. For light along +z, a = ẑ, in fewer operations.
 struct RefractedBeam {
   double root;       ///< √s
   double inverse_z;  ///< 1/b_z
@@ -50,6 +50,16 @@ struct RefractedBeam {
         k(root - eta * n.z()),
         m(k * inverse_z * n.x(), k * inverse_z * n.y()) {}
 
+  /// @pre as of refract(), and b_z > 0.
+  LF_HD RefractedBeam(const Eigen::Vector3d& a, const Eigen::Vector3d& n, double eta)
+      : root(std::sqrt(refracted_cosine_squared(n.dot(a), eta))),
+        inverse_z(0.0),
+        k(root - eta * n.dot(a)) {
+    const Eigen::Vector3d b = k * n + eta * a;
+    inverse_z = 1.0 / b.z();
+    m = inverse_z * b.head<2>();
+  }
+
   /// Adjoint of n ↦ m: n_bar for a given m_bar.
   [[nodiscard]] LF_HD Eigen::Vector3d adjoint(const Eigen::Vector3d& n, double eta,
                                               const Eigen::Vector2d& m_bar) const {
@@ -58,6 +68,11 @@ struct RefractedBeam {
     Eigen::Vector3d n_bar = k * b_bar;
     n_bar.z() += n.dot(b_bar) * k_by_nz;
     return n_bar;
+  }
+  [[nodiscard]] LF_HD Eigen::Vector3d adjoint(const Eigen::Vector3d& a, const Eigen::Vector3d& n,
+                                              double eta, const Eigen::Vector2d& m_bar) const {
+    const Eigen::Vector3d b_bar = inverse_z * Eigen::Vector3d(m_bar.x(), m_bar.y(), -m.dot(m_bar));
+    return refract_adjoint(a, n, eta, b_bar);
   }
 };
 

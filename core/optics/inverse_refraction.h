@@ -16,4 +16,12 @@ LF_HD inline Eigen::Vector2d refracting_gradient(const Eigen::Vector2d& m, doubl
   return b.head<2>() / (eta - b.z());
 }
 
+/// The same for light that travels along the unit vector a inside the lens, refracted by Snell's
+/// law with b − ηa parallel to the normal.
+LF_HD inline Eigen::Vector2d refracting_gradient(const Eigen::Vector2d& m, double eta,
+                                                 const Eigen::Vector3d& a) {
+  const Eigen::Vector3d b = Eigen::Vector3d(m.x(), m.y(), 1.0).normalized();
+  return (b.head<2>() - eta * a.head<2>()) / (eta * a.z() - b.z());
+}
+
 }  // namespace lensforge

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/optics/inverse_refraction.h"
+#include "core/optics/inverse_refraction.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <numbers>
 #include <string>
 
-#include "design/optics/refraction.h"
+#include "core/optics/refraction.h"
 #include "design/random_input.h"
 #include "design/snell.h"
 

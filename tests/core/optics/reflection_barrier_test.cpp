@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/energy/reflection_barrier.h"
+#include "core/optics/reflection_barrier.h"
 
 #include <gtest/gtest.h>
 
