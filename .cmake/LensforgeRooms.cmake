@@ -31,13 +31,13 @@ function(lensforge_install target name)
   install(TARGETS ${target} EXPORT lensforgeTargets ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}")
 endfunction()
 
-# lensforge_room(NAME FOLDER SOURCES ... PUBLIC ... PRIVATE ... [INTERNAL])
+# lensforge_room(NAME FOLDER SOURCES ... PUBLIC ... PRIVATE ... [HEADERS ...] [INTERNAL])
 # A static library lensforge_NAME, alias lensforge::NAME, for the sources in FOLDER (relative to the
 # root). Its headers are reached as "FOLDER/header.h" through a link of its own, so that only
-# targets that link the room can include from it: the arrows between rooms are enforced. INTERNAL
-# rooms are not installed.
+# targets that link the room can include from it: the arrows between rooms are enforced. HEADERS
+# are precompiled beside the common ones. INTERNAL rooms are not installed.
 function(lensforge_room name folder)
-  cmake_parse_arguments(arg "INTERNAL" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
+  cmake_parse_arguments(arg "INTERNAL" "" "SOURCES;PUBLIC;PRIVATE;HEADERS" ${ARGN})
   add_library(lensforge_${name} STATIC ${arg_SOURCES})
   add_library(lensforge::${name} ALIAS lensforge_${name})
   target_compile_features(lensforge_${name} PUBLIC cxx_std_20)
@@ -49,7 +49,11 @@ function(lensforge_room name folder)
     "$<BUILD_INTERFACE:${root}>" "$<INSTALL_INTERFACE:${LENSFORGE_INCLUDE_FOLDER}>")
   target_link_libraries(lensforge_${name}
     PUBLIC ${arg_PUBLIC} PRIVATE "$<BUILD_INTERFACE:lensforge_options>" ${arg_PRIVATE})
-  lensforge_precompile(lensforge_${name} lensforge_common_headers)
+  if(LENSFORGE_PRECOMPILED_HEADERS AND arg_HEADERS)
+    target_precompile_headers(lensforge_${name} PRIVATE ${LENSFORGE_COMMON_HEADERS} ${arg_HEADERS})
+  else()
+    lensforge_precompile(lensforge_${name} lensforge_common_headers)
+  endif()
   if(NOT arg_INTERNAL)
     lensforge_install(lensforge_${name} ${name})
   endif()
