@@ -2,17 +2,17 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <Eigen/Geometry>
 #include <cstdint>
 
+#include "core/surface/corners.h"
 #include "core/surface/surface_mesh.h"
 
 namespace lensforge {
 
 /// A triangle's normal times twice its area, mm².
 inline Eigen::Vector3d area_normal(const SurfaceMesh& mesh, std::int64_t triangle) {
-  const Eigen::Vector3d u = mesh.corner(triangle, 1) - mesh.corner(triangle, 0);
-  return u.cross(mesh.corner(triangle, 2) - mesh.corner(triangle, 0));
+  return area_normal(
+      Corners{mesh.corner(triangle, 0), mesh.corner(triangle, 1), mesh.corner(triangle, 2)});
 }
 
 /// The sum of the area normals around every vertex, 3 × V, mm²: the vertex normals of the smooth
