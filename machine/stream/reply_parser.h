@@ -55,8 +55,4 @@ class ReplyReader {
   bool too_long_ = false;
 };
 
-/// Runs any bytes through ReplyReader, for fuzzers and tests. Aborts (LF_CHECK) where a reply
-/// contradicts what is promised above. @return how many replies came out.
-std::int64_t fuzz_replies(const std::uint8_t* data, std::size_t size);
-
 }  // namespace lensforge
