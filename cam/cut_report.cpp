@@ -81,8 +81,7 @@ ParameterGroup finish_parameters(const CutPlan& plan) {
            {"Tolerance", mm(finish.tolerance, 5)},
            {"Slope tolerance", decimal_text(1e3 * finish.slope_tolerance, 2) + " mrad"},
            {"Decimals", std::to_string(plan.decimals())},
-           {"Surface", plan.options().surface == SurfaceModel::kSmooth ? "smooth, over the mesh"
-                                                                       : "facets of the mesh"}}};
+           {"Surface", plan.smooth() ? "smooth, over the mesh" : "facets of the mesh"}}};
 }
 
 template <class Level>
@@ -308,6 +307,17 @@ void add_prediction(const Prediction& prediction, const Lens& lens, ReportData& 
                fillet_share_map(prediction.creases)};
 }
 
+/// Of the design, as lens.json states it; empty if it does not.
+std::string fingerprint_of(const Lens& lens) {
+  if (!lens.provenance.is_object()) return "";
+  const auto stated = lens.provenance.find("fingerprint");
+  if (stated == lens.provenance.end() || !stated->is_string()) return "";
+  constexpr std::size_t kDigits = 16;
+  const auto& text = stated->get_ref<const std::string&>();
+  const bool hexadecimal = text.find_first_not_of("0123456789abcdef") == std::string::npos;
+  return text.size() == kDigits && hexadecimal ? text : "";
+}
+
 }  // namespace
 
 ReportData make_report(const CutPlan& plan, const ProgramFiles& programs,
@@ -316,6 +326,7 @@ ReportData make_report(const CutPlan& plan, const ProgramFiles& programs,
   ReportData data;
   data.job = options.job;
   data.program = program_mark();
+  data.lens_id = fingerprint_of(lens);
   data.part = options.part == PartKind::kLens ? "lens" : "mould";
   data.lens_size = lens.setup.lens_size;
   data.leakage_options = options.leakage;

@@ -74,7 +74,7 @@ namespace report_section {
 
 std::string header(const ReportData& data) {
   std::string under = data.part;
-  for (const std::string* text : {&data.program, &data.made, &data.lens_id}) {
+  for (const std::string* text : {&data.program, &data.lens_id}) {
     if (!text->empty()) under += " · " + *text;
   }
   const bool compares = data.operations.empty() && !data.choices.empty();
