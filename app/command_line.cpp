@@ -65,20 +65,6 @@ int dispatch(const Arguments& arguments) {
   throw InputError(name + ": no such command; lensforge --help lists them");
 }
 
-/// Whether errors are to be told as JSON too: also where the command line is what is wrong.
-bool wants_json(const Arguments& arguments) {
-  constexpr std::string_view kConfig = "--config=";
-  for (std::size_t i = 0; i < arguments.size(); ++i) {
-    const std::string& word = arguments[i];
-    if (word == "--json") return true;
-    if (word == "--config" && i + 1 < arguments.size() && config_asks_for_json(arguments[i + 1])) {
-      return true;
-    }
-    if (word.starts_with(kConfig) && config_asks_for_json(word.substr(kConfig.size()))) return true;
-  }
-  return false;
-}
-
 int guarded(const Arguments& arguments) {
   const bool json = wants_json(arguments);
   try {
@@ -96,6 +82,19 @@ int guarded(const Arguments& arguments) {
 }
 
 }  // namespace
+
+bool wants_json(const Arguments& arguments) {
+  constexpr std::string_view kConfig = "--config=";
+  for (std::size_t i = 0; i < arguments.size(); ++i) {
+    const std::string& word = arguments[i];
+    if (word == "--json") return true;
+    if (word == "--config" && i + 1 < arguments.size() && config_asks_for_json(arguments[i + 1])) {
+      return true;
+    }
+    if (word.starts_with(kConfig) && config_asks_for_json(word.substr(kConfig.size()))) return true;
+  }
+  return false;
+}
 
 int run_command_line(const std::vector<std::string>& arguments) noexcept {
   try {

@@ -55,7 +55,7 @@ constexpr SinkKind kLog{"log", begins_log};
 }  // namespace
 
 JobLog::JobLog(const SendSettings& settings, Warn warn) : warn_(std::move(warn)) {
-  if (settings.dry_run && settings.log.empty()) return;
+  if (!settings.has_log()) return;
   try {
     file_ = TextSink(settings.log_path(), kLog);
   } catch (const InputError& refused) {

@@ -148,7 +148,8 @@ class Job {
     // A mould's own surface is another than that of the lens that is cast in it.
     std::optional<MeantSurface> lens;
     if (plan_.mould()) {
-      lens.emplace(lens_.surface, smooth_surface(lens_.surface, options_.surface));
+      const SurfaceModel model = options_.surface.value_or(lens_.model);
+      lens.emplace(lens_.surface, smooth_surface(lens_.surface, model));
     }
     const Eigen::AlignedBox2d rectangle(Eigen::Vector2d(0.0, 0.0), lens_.setup.lens_size);
     const PartSurfaces surfaces({lens ? lens->field() : cut.field(), *rounded, rectangle,

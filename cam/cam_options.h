@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -45,8 +46,9 @@ struct CamOptions {
 
   PartKind part = PartKind::kLens;
   double shrinkage = 0.0;  ///< Of what is cast in a mould, share of a length, 0 … 0.2.
-  /// What is cut: the facets as they are, or the smooth surface over the mesh (SmoothSurface).
-  SurfaceModel surface = SurfaceModel::kSmooth;
+  /// What is cut: the facets as they are, or the smooth surface over the mesh (SmoothSurface); none
+  /// takes what the lens was designed as.
+  std::optional<SurfaceModel> surface;
 
   bool force = false;  ///< Replace files that no cut wrote as they stand.
 

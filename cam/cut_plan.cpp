@@ -62,7 +62,7 @@ CutPlan::CutPlan(const Lens& lens, const CamOptions& options, const Executor& ex
       decimals_(decimals_of(options_)),
       profile_(mesh_),
       stock_(whole_blank(options_.workshop, field_.box)),
-      smooth_(smooth_surface(mesh_, options_.surface)),
+      smooth_(smooth_surface(mesh_, options_.surface.value_or(lens.model))),
       surface_(surface_to_cut(mesh_, smooth_, ball().radius(), executor)),
       collisions_(profile_, options_.workshop, stock_),
       watch_(collisions_, options_.workshop.tools, z_offset_,

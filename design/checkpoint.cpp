@@ -15,6 +15,7 @@
 #include "core/io/files.h"
 #include "core/text/json_fields.h"
 #include "core/text/json_text.h"
+#include "design/design_fields.h"
 #include "design/grid_mesh.h"
 
 // File: the magic line, then a JSON header on one line, then as little-endian doubles the vertices
@@ -55,9 +56,12 @@ std::span<const double> entries(const Eigen::Matrix3Xd& matrix) {
   return {matrix.data(), static_cast<std::size_t>(matrix.size())};
 }
 
-json to_json(const ObjectiveWeights& w) {
-  return {w.image, w.gradient,  w.boundary, w.smooth, w.barrier,
-          w.edge,  w.laplacian, w.align,    w.flux};
+/// Appends every option that a table holds.
+template <class Options>
+void append(const OptionTable<Options>& table, const Options& options, json& description) {
+  for (const OptionField<Options>& field : table) {
+    if (field.left_out.empty()) description.push_back(field.stored(options));
+  }
 }
 
 json to_json(const ConvergenceRow& row) {
@@ -124,24 +128,11 @@ Parts split(const std::string& content, const std::filesystem::path& path) {
 }  // namespace
 
 std::uint64_t design_fingerprint(const Image& target, const DesignOptions& options) {
-  const json description = {target.columns(),
-                            target.rows(),
-                            options.width,
-                            options.focal_length,
-                            options.ior,
-                            options.thickness,
-                            options.pixels,
-                            options.mesh_ratio,
-                            options.levels,
-                            options.rounds,
-                            options.iterations,
-                            options.transport_rounds,
-                            options.rendering_guided,
-                            options.spread,
-                            options.update_iterations,
-                            static_cast<int>(options.model),
-                            static_cast<int>(options.view),
-                            to_json(options.weights)};
+  json weights = json::array();
+  append(weight_fields(), with_smoothness_applied(options).weights, weights);
+  json description = {target.columns(), target.rows()};
+  append(design_fields(), options, description);
+  description.push_back(weights);
   Hash hash;
   hash.add(description.dump());
   hash.add(bytes_of(target.values()));

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <filesystem>
+
 #include "core/compute/work_estimate.h"
 #include "design/design_options.h"
 
@@ -10,5 +12,10 @@ namespace lensforge {
 /// the CPU. Iterations count as if none were spared.
 /// @pre the options are in their ranges.
 WorkEstimate estimate_design(int columns, int rows, const DesignOptions& options, int threads);
+
+/// The same. @throw InputError with the --pixels that would fit if the disk of `folder` or the
+///        memory do not hold it.
+WorkEstimate require_room_for_design(int columns, int rows, const DesignOptions& options,
+                                     int threads, const std::filesystem::path& folder);
 
 }  // namespace lensforge

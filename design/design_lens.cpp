@@ -446,7 +446,8 @@ class Schedule {
 DesignResult design_lens(const Image& target, const DesignOptions& options,
                          const Executor& executor, const RunControl& control) {
   validate(options, target);
-  return Schedule(target, options, executor, control).run();
+  const DesignOptions settled = with_smoothness_applied(options);
+  return Schedule(target, settled, executor, control).run();
 }
 
 std::uint64_t design_identity(const Image& target, const DesignOptions& options) {
