@@ -101,18 +101,15 @@ nlohmann::json summary_json(const fs::path& folder, const DesignResult& result) 
           {"pixels", {lens.setup.pixels.x(), lens.setup.pixels.y()}},
           {"grid", {lens.surface.grid.columns, lens.surface.grid.rows}},
           {"lens_size", {lens.setup.lens_size.x(), lens.setup.lens_size.y()}},
-          {"metrics",
-           {{"facet", metrics_json(lens.facet_metrics)},
-            {"smooth", metrics_json(lens.smooth_metrics)}}},
+          {"metrics", metrics_json(lens.metrics)},
           {"iterations", result.convergence.size()},
           {"seconds", lens.provenance["seconds"]}};
 }
 
 std::string summary_text(const fs::path& folder, const DesignResult& result) {
   const Lens& lens = result.lens;
-  return folder.string() + ": " + result.message + "\n" +           //
-         "  facet   " + metrics_text(lens.facet_metrics) + "\n" +   //
-         "  smooth  " + metrics_text(lens.smooth_metrics) + "\n" +  //
+  return folder.string() + ": " + result.message + "\n" +  //
+         metrics_text(lens.metrics) +                      //
          "  " + size_text(lens.setup.pixels.x(), lens.setup.pixels.y()) + " pixels, " +
          std::to_string(lens.surface.vertex_count()) + " vertices, " +
          fixed(lens.provenance["seconds"].get<double>(), 1) + " s\n";

@@ -82,8 +82,7 @@ void describe_solid(const SolidContent& content, double facets, ExportReport& re
                  "), read back valid and closed\n";
 }
 
-void describe_metrics(const char* name, const ImageMetrics& metrics, ExportReport& report) {
-  const std::string word(name);
+void describe_metrics(const std::string& word, const ImageMetrics& metrics, ExportReport& report) {
   report.json["metrics"][word] = metrics_json(metrics);
   report.text += "  " + word + std::string(10 - word.size(), ' ') + metrics_text(metrics) + "\n";
 }
@@ -121,8 +120,9 @@ ExportReport export_report(const ExportResult& result) {
   if (result.splines) describe(*result.splines, report);
   if (result.mesh) describe(*result.mesh, report);
   if (result.heights) describe(*result.heights, report);
-  describe_metrics("facet", result.facet_metrics, report);
-  describe_metrics("smooth", result.smooth_metrics, report);
+  for (const auto& [model, metrics] : result.metrics) {
+    describe_metrics(model_name(model), metrics, report);
+  }
   return report;
 }
 

@@ -85,17 +85,16 @@ void describe_provenance(Description& d, const nlohmann::json& provenance) {
 
 Description describe_lens(const fs::path& folder) {
   const Lens lens = read_lens(folder);
-  Description d{{{"kind", "lens"}, {"model", model_word(lens.model)}}, {}};
+  Description d{{{"kind", "lens"}, {"model", model_name(lens.model)}}, {}};
   describe_setup(d, lens.setup);
-  d.line("model", model_word(lens.model));
+  d.line("model", model_name(lens.model));
   const GridShape grid = lens.surface.grid;
   if (grid.is_grid()) d.line("grid", size_text(grid.columns, grid.rows));
   d.json["grid"] = {grid.columns, grid.rows};
   describe_mesh(d, lens.surface);
-  d.line("facet", metrics_text(lens.facet_metrics));
-  d.line("smooth", metrics_text(lens.smooth_metrics));
-  d.json["metrics"] = {{"facet", metrics_json(lens.facet_metrics)},
-                       {"smooth", metrics_json(lens.smooth_metrics)}};
+  for (const auto& [model, metrics] : lens.metrics)
+    d.line(model_name(model), metrics_text(metrics));
+  d.json["metrics"] = metrics_json(lens.metrics);
   describe_provenance(d, lens.provenance);
   return d;
 }

@@ -143,14 +143,13 @@ ImageMetrics judge(const Scene& scene, SurfaceModel model, Image* image, const E
 
 Rendering compare_models(const Scene& scene, const Executor& executor) {
   Rendering rendering;
-  for (const SurfaceModel model : {SurfaceModel::kFacet, SurfaceModel::kSmooth}) {
+  ModelMetrics metrics;
+  for (const SurfaceModel model : kSurfaceModels) {
     Image* image = model == scene.render.model ? &rendering.image : nullptr;
-    const ImageMetrics metrics = judge(scene, model, image, executor);
-    const std::string word = model_word(model);
-    rendering.json["metrics"][word] = metrics_json(metrics);
-    rendering.text +=
-        "  " + word + std::string(8 - word.size(), ' ') + metrics_text(metrics) + "\n";
+    metrics[model] = judge(scene, model, image, executor);
   }
+  rendering.json["metrics"] = metrics_json(metrics);
+  rendering.text = metrics_text(metrics);
   return rendering;
 }
 
@@ -161,7 +160,7 @@ Rendering render_alone(const Scene& scene, const Executor& executor) {
           : render_surface(scene.surface, scene.render.setup, scene.render.model, executor);
   return {result.image,
           {{"flux_inside", result.flux_inside}},
-          "  " + model_word(scene.render.model) + "  flux inside " +
+          "  " + model_name(scene.render.model) + "  flux inside " +
               fixed(100.0 * result.flux_inside, 1) + " %\n"};
 }
 
@@ -204,7 +203,7 @@ int render_command(const Arguments& command_line) try {
   rendering.json["command"] = "render";
   rendering.json["device"] = device.word;
   rendering.json["source"] = arguments.source;
-  rendering.json["model"] = model_word(scene.render.model);
+  rendering.json["model"] = model_name(scene.render.model);
   rendering.json["pixels"] = {scene.render.setup.pixels.x(), scene.render.setup.pixels.y()};
   console.result(rendering.json, arguments.source + "\n" + rendering.text);
   return kDone;

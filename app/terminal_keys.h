@@ -8,7 +8,7 @@
 #include <string_view>
 #include <thread>
 
-#include "machine/link/descriptor.h"
+#include "core/io/descriptor.h"
 #include "machine/stream/sender.h"
 
 namespace lensforge::app {

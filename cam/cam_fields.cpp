@@ -7,6 +7,7 @@
 
 #include "cam/post/program_writer.h"
 #include "core/error.h"
+#include "core/surface/surface_model.h"
 
 namespace lensforge {
 namespace {
@@ -103,6 +104,13 @@ OptionTable<O> raster_rows() {
               "no semi-finishing program")};
 }
 
+/// What can be cut of a lens.
+R::Choices<std::optional<SurfaceModel>> surfaces() {
+  R::Choices<std::optional<SurfaceModel>> words{{"designed", std::nullopt}};
+  for (const auto& [word, model] : named_models()) words.emplace_back(word, model);
+  return words;
+}
+
 OptionTable<O> blank_rows() {
   using Surface = std::optional<SurfaceModel>;
   return {
@@ -124,10 +132,7 @@ OptionTable<O> blank_rows() {
                         "mill the lens, or the mould to cast it in"),
       R::number("--shrinkage", &O::shrinkage, Limits::between(0, cam_limit::kShrinkage), "",
                 "of what is cast in the mould, share of a length"),
-      R::word<Surface>("--surface", &O::surface,
-                       {{"designed", std::nullopt},
-                        {"smooth", SurfaceModel::kSmooth},
-                        {"facet", SurfaceModel::kFacet}},
+      R::word<Surface>("--surface", &O::surface, surfaces(),
                        "cut what was designed, the smooth surface over the mesh, or its facets")};
 }
 

@@ -38,7 +38,28 @@ void validate_sampling(const CamOptions& options) {
   }
 }
 
+/// Before hours are spent on programs that the controller could not read.
+void validate_tool_numbers(const CamOptions& options) {
+  if (!options.post.changes_tools()) return;
+  const Process& process = options.workshop.process;
+  const GcodeDialect& reader = options.post.reader;
+  const auto check = [&](int tool) {
+    if (tool <= reader.max_tool) return;
+    refuse("tool number", tool,
+           "is above " + std::to_string(reader.max_tool) + ", the largest that a post read as " +
+               reader.name + " can call; number the tool from 1 to " +
+               std::to_string(reader.max_tool) + " in the workshop");
+  };
+  check(process.finish.tool);
+  if (process.rough.enabled) check(process.rough.tool);
+  if (process.semi.enabled) check(process.semi.tool);
+}
+
 }  // namespace
+
+const char* words_for(SurfaceModel surface) {
+  return surface == SurfaceModel::kSmooth ? "smooth, over the mesh" : "facets of the mesh";
+}
 
 const char* words_for(ZZero zero) {
   switch (zero) {
@@ -70,6 +91,7 @@ void validate(const CamOptions& options, const OpticalSetup& setup) {
         "--tool-diameter", ball.diameter,
         "must be smaller than the lens, whose shorter side is " + shortest_text(smallest) + " mm");
   }
+  validate_tool_numbers(options);
   validate_decimals(options);
   validate_sampling(options);
 }

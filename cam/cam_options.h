@@ -14,6 +14,7 @@
 #include "cam/report/verdict.h"
 #include "cam/tool/workshop.h"
 #include "core/optics/optical_setup.h"
+#include "core/surface/surface_model.h"
 
 namespace lensforge {
 
@@ -85,5 +86,6 @@ void validate(const CamOptions& options, const OpticalSetup& setup);
 
 /// The height in plain words: "top of the blank".
 const char* words_for(ZZero zero);
+const char* words_for(SurfaceModel surface);
 
 }  // namespace lensforge

@@ -73,7 +73,7 @@ std::vector<Tool> tools_of(const CutPlan& plan, const ProgramFiles& programs) {
   return tools;
 }
 
-ParameterGroup finish_parameters(const CutPlan& plan) {
+ParameterGroup finish_parameters(const CutPlan& plan, SurfaceModel model) {
   const FinishProcess& finish = plan.options().workshop.process.finish;
   return {"Finishing",
           {{"Stepover", mm(plan.pitch(), 4)},
@@ -81,7 +81,7 @@ ParameterGroup finish_parameters(const CutPlan& plan) {
            {"Tolerance", mm(finish.tolerance, 5)},
            {"Slope tolerance", decimal_text(1e3 * finish.slope_tolerance, 2) + " mrad"},
            {"Decimals", std::to_string(plan.decimals())},
-           {"Surface", plan.smooth() ? "smooth, over the mesh" : "facets of the mesh"}}};
+           {"Surface", words_for(model)}}};
 }
 
 template <class Level>
@@ -211,6 +211,16 @@ std::string travel_warning(const CutPlan& plan) {
   return axes.empty() ? "" : "the programs move farther than the machine's travel: " + axes;
 }
 
+/// A speed that the controller's setting would lower unseen; empty where it has no such setting.
+std::string spindle_warning(const CutPlan& plan, const ProgramFiles& programs) {
+  const int setting = plan.options().post.reader.spindle_limit_setting;
+  if (setting == 0) return {};
+  double fastest = 0.0;
+  for (const Tool& tool : tools_of(plan, programs)) fastest = std::max(fastest, tool.spindle_rpm);
+  return "the controller runs the spindle no faster than its setting $" + std::to_string(setting) +
+         ", silently: set it to at least " + decimal_text(fastest, 0);
+}
+
 std::vector<std::string> warnings_of(const CutPlan& plan, const ProgramFiles& programs,
                                      const Lens& lens) {
   std::vector<std::string> warnings;
@@ -234,14 +244,8 @@ std::vector<std::string> warnings_of(const CutPlan& plan, const ProgramFiles& pr
                        " y " + decimal_text(field.steepest_place.y(), 2) +
                        ": on slopes above 1 a rim may be left uncut");
   }
-  if (plan.options().post.name == "grbl") {
-    double fastest = 0.0;
-    for (const Tool& tool : tools_of(plan, programs)) fastest = std::max(fastest, tool.spindle_rpm);
-    warnings.push_back(
-        "Grbl runs the spindle no faster than its setting $30, silently: it has to "
-        "be at least " +
-        decimal_text(fastest, 0));
-  }
+  const std::string spindle = spindle_warning(plan, programs);
+  if (!spindle.empty()) warnings.push_back(spindle);
   if (programs.total.starved > 0) {
     warnings.push_back(
         "the controller will wait for lines " + std::to_string(programs.total.starved) +
@@ -282,7 +286,7 @@ std::vector<LimitCheck> safety_checks(const CutPlan& plan, const Lens& lens) {
   return checks;
 }
 
-/// A controller that takes lines without limit bears any load.
+/// Safety first. A controller that takes lines without limit bears any load.
 Verdict whole_verdict(const CutPlan& plan, const ProgramFiles& programs,
                       const std::optional<Prediction>& prediction, const Lens& lens) {
   CutLimits limits = plan.options().limits;
@@ -290,7 +294,8 @@ Verdict whole_verdict(const CutPlan& plan, const ProgramFiles& programs,
   CutFindings findings = findings_of(programs, prediction);
   if (!(limits.block_rate > 0.0)) findings.block_rate.reset();
   Verdict verdict = judge_cut(findings, limits);
-  for (const LimitCheck& check : safety_checks(plan, lens)) verdict.checks.push_back(check);
+  const std::vector<LimitCheck> safety = safety_checks(plan, lens);
+  verdict.checks.insert(verdict.checks.begin(), safety.begin(), safety.end());
   return verdict;
 }
 
@@ -332,7 +337,7 @@ ReportData make_report(const CutPlan& plan, const ProgramFiles& programs,
   data.leakage_options = options.leakage;
   data.operations = report_operations(plan, programs);
   data.tools = tools_of(plan, programs);
-  data.parameters = {finish_parameters(plan)};
+  data.parameters = {finish_parameters(plan, options.surface.value_or(lens.model))};
   const Process& process = options.workshop.process;
   if (process.rough.enabled || process.semi.enabled) {
     data.parameters.push_back(entry_parameters(process));

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "design/level_plan.h"
+#include "design/schedule/level_plan.h"
 
 namespace lensforge {
 namespace {

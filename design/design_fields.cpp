@@ -37,8 +37,7 @@ const OptionTable<DesignOptions>& design_fields() {
         R::whole("--update-iterations", &O::update_iterations, Limits::between(0, 10000),
                  "most iterations of the correspondence-guided update (Sun et al., Eq. 20)"),
         R::word<SurfaceModel>(
-            "--model", &O::model,
-            {{"facet", SurfaceModel::kFacet}, {"smooth", SurfaceModel::kSmooth}},
+            "--model", &O::model, named_models(),
             "what bends the light: flat facets, or a surface smooth at every vertex"),
         R::word<ViewSide>(
             "--view", &O::view, {{"front", ViewSide::kFront}, {"rear", ViewSide::kRear}},

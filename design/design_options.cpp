@@ -7,7 +7,7 @@
 #include "core/error.h"
 #include "core/text/number_text.h"
 #include "design/design_fields.h"
-#include "design/level_plan.h"
+#include "design/schedule/level_plan.h"
 
 namespace lensforge {
 namespace {

@@ -5,6 +5,7 @@
 
 #include "core/image/image.h"
 #include "core/optics/optical_setup.h"
+#include "core/surface/surface_model.h"
 #include "design/energy/weights.h"
 
 namespace lensforge {

@@ -55,8 +55,7 @@ Field image_width() {
 const OptionTable<RenderOptions>& render_fields() {
   static const OptionTable<O> table{
       R::word<SurfaceModel>(
-          "--model", &O::model,
-          {{"facet", SurfaceModel::kFacet}, {"smooth", SurfaceModel::kSmooth}},
+          "--model", &O::model, named_models(),
           "surface model of the picture; a lens has its own default, a solid is smooth"),
       R::length(
           "--focal", [](auto& o) -> auto& { return o.setup.focal_length; },

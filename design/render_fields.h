@@ -2,6 +2,7 @@
 #pragma once
 
 #include "core/optics/optical_setup.h"
+#include "core/surface/surface_model.h"
 #include "core/text/option_field.h"
 
 namespace lensforge {

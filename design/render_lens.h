@@ -6,6 +6,7 @@
 #include "core/image/metrics.h"
 #include "core/optics/optical_setup.h"
 #include "core/surface/surface_mesh.h"
+#include "core/surface/surface_model.h"
 
 namespace lensforge {
 

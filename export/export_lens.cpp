@@ -181,13 +181,12 @@ ExportResult export_lens(const ExportSource& source, const fs::path& out,
   const Job job{source, out, options, export_format(options, out), executor, control, hooks};
   if (is_height_map(job.format)) announce_heights(job);
   const Lens& lens = source.lens;
-  const auto metrics = [&](SurfaceModel model) {
-    return evaluate(lens.surface, lens.setup, model, lens.target, nullptr, executor);
-  };
   ExportResult result;
   result.format = job.format;
-  result.facet_metrics = metrics(SurfaceModel::kFacet);
-  result.smooth_metrics = metrics(SurfaceModel::kSmooth);
+  for (const SurfaceModel model : kSurfaceModels) {
+    result.metrics[model] =
+        evaluate(lens.surface, lens.setup, model, lens.target, nullptr, executor);
+  }
   if (is_spline_solid(job.format)) {
     result.splines = write_splines(job);
   } else if (is_height_map(job.format)) {

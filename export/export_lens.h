@@ -53,8 +53,7 @@ struct HeightMap {
 /// What was written; one of the last three.
 struct ExportResult {
   ExportFormat format = ExportFormat::kByExtension;
-  ImageMetrics facet_metrics;   ///< Of the picture of the surface as facets,
-  ImageMetrics smooth_metrics;  ///< and of the smooth part that is made of them.
+  ModelMetrics metrics;  ///< Of the pictures that the mesh projects.
   std::optional<SplineSolid> splines;
   std::optional<MeshSolid> mesh;
   std::optional<HeightMap> heights;

@@ -8,7 +8,6 @@
 #include "design/energy/boundary_term.h"
 #include "design/energy/mean_curvature.h"
 #include "design/energy/objective_view.h"
-#include "design/energy/reflection_barrier.h"
 #include "design/energy/unlit_term.h"
 #include "design/optics/smooth.h"
 
@@ -60,17 +59,17 @@ LF_HD inline GoalValues image_adjoint(const ObjectiveView& o, std::int64_t face,
                                       FaceBar& bar) {
   if (o.facets()) {
     const Eigen::Vector3d& n = o.frames[face].n;
-    const RefractedBeam beam(n, o.optics.eta);
-    const ImageTriangle image = project_facet(t, beam, o.optics, o.lens_area);
+    const FacetBeam beam = o.light.facet_beam(t, n);
+    const ImageTriangle image = project_facet(t, beam, o.light);
     ImageTriangle image_bar;
     const GoalValues values = goal_adjoint(o, face, image, image_bar);
-    bar.frame.n += project_facet_adjoint(t, n, beam, o.optics, image_bar, bar.corners);
-    bar.area_normal.z() += 0.5 * image_bar.flux / o.lens_area;
+    bar.frame.n += project_facet_adjoint(t, n, beam, o.light, image_bar, bar.corners);
+    o.light.flux_adjoint(t, image_bar.flux, bar.corners, bar.area_normal);
     return values;
   }
   const int* v = o.mesh.triangle(face);
   for (int k = 0; k < 3; ++k) bar.area_normal += column3(o.vertex_normal_bar, v[k]);
-  bar.area_normal.z() += 0.5 * o.triangle_bar[face].flux / o.lens_area;
+  o.light.flux_adjoint(t, o.triangle_bar[face].flux, bar.corners, bar.area_normal);
   return {};
 }
 
@@ -79,10 +78,9 @@ LF_HD inline double barrier_adjoint(const ObjectiveView& o, std::int64_t face, c
                                     FaceBar& bar) {
   const double weight = o.options.weights.barrier;
   const ValueSlope area = area_barrier(0.5 * doubled_projected_area(t), o.options.area);
-  const ValueSlope reflection = reflection_barrier(o.frames[face].n.z(), o.optics.eta);
   bar.area_normal.z() += 0.5 * weight * area.slope;
-  bar.frame.n.z() += weight * reflection.slope;
-  return area.value + reflection.value;
+  return area.value +
+         o.light.barrier_adjoint(t, o.frames[face].n, weight, bar.corners, bar.frame.n);
 }
 
 /// Weighted derivatives of E_face and of the linear part of E_edge by one face's frame and area
@@ -171,7 +169,7 @@ struct PullBackVertex {
     const VertexNormal normal(column3(o.vertex_normals, v));
     Eigen::Vector3d p_bar(0.0, 0.0, 0.0);
     const Eigen::Vector3d n_bar =
-        project_vertex_adjoint(column3(o.vertices, v), normal.n, o.optics, u_bar, p_bar);
+        project_vertex_adjoint(column3(o.vertices, v), normal.n, o.light, u_bar, p_bar);
     column3(o.vertex_bar, v) = p_bar;
     column3(o.vertex_normal_bar, v) = normalize_adjoint(normal.n, normal.length, n_bar);
   }

@@ -9,7 +9,6 @@
 #include "core/image/transfer.h"
 #include "design/energy/face_fit.h"
 #include "design/energy/objective_view.h"
-#include "design/energy/reflection_barrier.h"
 #include "design/optics/smooth.h"
 
 /// What the objective does for one face, vertex or pixel on the way to its value: surface → frames,
@@ -25,8 +24,7 @@ struct MeasureFace {
     const FaceFrame frame = face_frame(t);
     o.frames[i] = frame;
     const double area = 0.5 * doubled_projected_area(t);
-    return {area_barrier(area, o.options.area).value +
-            reflection_barrier(frame.n.z(), o.optics.eta).value};
+    return {area_barrier(area, o.options.area).value + o.light.barrier(t, frame.n)};
   }
 };
 
@@ -107,8 +105,9 @@ struct LandVertex {
     }
     column3(o.vertex_normals, v) = sum;
     const Eigen::Vector3d n = VertexNormal(sum).n;
-    if (!o.optics.transmits(n)) return {1.0};
-    column2(o.landing, v) = project_vertex(column3(o.vertices, v), n, o.optics);
+    const Eigen::Vector3d p = column3(o.vertices, v);
+    if (!o.light.transmits(p, n)) return {1.0};
+    column2(o.landing, v) = project_vertex(p, n, o.light);
     return {0.0};
   }
 };

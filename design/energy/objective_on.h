@@ -58,13 +58,12 @@ class DesignObjectiveOn {
   [[nodiscard]] EnergyValues energies(const Sums& sums) const;
   /// mm² → square pixels.
   [[nodiscard]] double pixels_per_area() const {
-    return std::fabs(optics_.plane.pixels_per_mm().prod());
+    return std::fabs(light_.plane().pixels_per_mm().prod());
   }
 
   Exec executor_;
   ObjectiveOptions options_;
-  Projection optics_;
-  double lens_area_;
+  LightPath light_;
   MeshOn<Exec> mesh_;
   Eigen::Matrix3Xd movable_;
   Buffer<double> movable_here_;
@@ -131,8 +130,7 @@ DesignObjectiveOn<Exec>::DesignObjectiveOn(const SurfaceMesh& mesh, const Optica
                                            const Exec& executor)
     : executor_(executor),
       options_(options),
-      optics_(setup),
-      lens_area_(setup.lens_size.prod()),
+      light_(setup),
       mesh_(mesh, make_topology(mesh), executor),
       movable_(objective_detail::movable_coordinates(mesh.vertices, setup.lens_size)),
       movable_here_(buffer_of(executor, objective_detail::entries(movable_))),
@@ -177,8 +175,7 @@ void DesignObjectiveOn<Exec>::take(const Correspondence& wanted) {
 template <class Exec>
 ObjectiveView DesignObjectiveOn<Exec>::view(const double* vertices) {
   return {.options = options_,
-          .lens_area = lens_area_,
-          .optics = optics_,
+          .light = light_,
           .mesh = mesh_.view(),
           .vertices = vertices,
           .columns = static_cast<double>(flux_.columns()),

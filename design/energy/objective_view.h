@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "core/compute/host_device.h"
+#include "core/optics/light_path.h"
 #include "design/energy/correspondence_term.h"
 #include "design/energy/face_frame.h"
 #include "design/energy/mesh_view.h"
@@ -11,7 +12,7 @@
 #include "design/energy/unlit_pixels.h"
 #include "design/energy/weingarten.h"
 #include "design/flux/flux_triangle.h"
-#include "design/optics/projection.h"
+#include "design/optics/facet.h"
 
 namespace lensforge {
 
@@ -19,8 +20,7 @@ namespace lensforge {
 /// executor. Handed to them by value.
 struct ObjectiveView {
   ObjectiveOptions options;
-  double lens_area;  ///< mm²
-  Projection optics;
+  LightPath light;
   MeshView mesh;
   const double* vertices;  ///< 3 × V, mm
 
@@ -53,11 +53,10 @@ struct ObjectiveView {
   [[nodiscard]] LF_HD ImageTriangle image_triangle(std::int64_t face) const {
     const Corners t = corners(face);
     if (facets()) {
-      return project_facet(t, RefractedBeam(frames[face].n, optics.eta), optics, lens_area);
+      return project_facet(t, light.facet_beam(t, frames[face].n), light);
     }
     const int* v = mesh.triangle(face);
-    return {column2(landing, v[0]), column2(landing, v[1]), column2(landing, v[2]),
-            0.5 * doubled_projected_area(t) / lens_area};
+    return {column2(landing, v[0]), column2(landing, v[1]), column2(landing, v[2]), light.flux(t)};
   }
 };
 

@@ -10,8 +10,8 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/io/descriptor.h"
 #include "machine/guard/map_folder.h"
-#include "machine/link/descriptor.h"
 #include "machine/link/port_spec.h"
 
 namespace lensforge {

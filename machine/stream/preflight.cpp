@@ -14,9 +14,6 @@ namespace {
 /// Positions are told with three decimals, mm.
 constexpr double kTravelTolerance = 0.001;
 
-/// Lines of short moves that an 8-bit Grbl board takes in, and a 32-bit one of grblHAL, per second.
-constexpr double kGrblLinesPerSecond = 400.0;
-constexpr double kHalLinesPerSecond = 4000.0;
 constexpr double kBitsPerByte = 10.0;
 
 /// Bits of $22 in grblHAL and the letter of $I in Grbl that put the machine's origin at the switch.
@@ -185,7 +182,7 @@ std::string lack_of_motion(const ProgramFacts& facts) {
 StreamRate stream_rate(const ControllerInfo& info, int baud, double round_trip, double mean_bytes) {
   StreamRate rate;
   if (baud > 0) rate.bytes_per_second = baud / kBitsPerByte;
-  rate.lines_per_second = info.dialect.name == "grbl" ? kGrblLinesPerSecond : kHalLinesPerSecond;
+  rate.lines_per_second = info.dialect.lines_per_second;
   if (round_trip > 0.0) {
     const double transfer = baud > 0 ? mean_bytes / rate.bytes_per_second : 0.0;
     rate.lines_per_second = std::min(rate.lines_per_second, 1.0 / (round_trip + transfer));

@@ -69,7 +69,7 @@ void FinishFacets(benchmark::State& state) {
   const SurfaceMesh& mesh = lens_mesh(state.range(0));
   for (auto _ : state) {
     const double start = bench::cpu_seconds();
-    const FacetSurface surface(mesh, kRadius, executor);
+    const FacetCutSurface surface(mesh, kRadius, executor);
     const RasterSummary summary = cut_strip(surface, state, executor);
     tell(summary, surface.deviation(), bench::cpu_seconds() - start, state);
   }

@@ -42,6 +42,16 @@ CamOptions programs_only() {
   return options;
 }
 
+/// A built-in post as a user copies and renames it.
+PostDescription post_of_a_user(const std::string& copied) {
+  const TempFolder folder;
+  std::string text = read_bytes(std::string(LENSFORGE_POSTS) + "/" + copied + ".toml");
+  const std::string name = "name = \"" + copied + "\"";
+  text.replace(text.find(name), name.size(), "name = \"router in the shed\"");
+  lensforge::testing::write_bytes(folder / "mine.toml", text);
+  return find_post((folder / "mine.toml").string(), "--post");
+}
+
 CamResult run(const Lens& lens, const CamOptions& options, const TempFolder& folder,
               const RunControl& control = {}) {
   return make_cut(lens, options, folder.path(), Executor::cpu(2), control);
@@ -275,8 +285,9 @@ TEST(CamJob, WarnsOfWhatAnOperatorShouldQuestion) {
   Lens plate = small_lens();
   plate.surface.vertices.row(2).setConstant(6.0);
   EXPECT_THAT(run(plate, options, folder).report.warnings, ::testing::IsEmpty());
-  options.post = find_post("grbl", "--post");
-  EXPECT_THAT(run(plate, options, folder).report.warnings, ::testing::Contains(HasSubstr("$30")));
+  options.post = post_of_a_user("grbl");
+  EXPECT_THAT(run(plate, options, folder).report.warnings,
+              ::testing::Contains(HasSubstr("$30, silently: set it to at least 23000")));
   options.workshop.machine.travel.x() = 5.0;
   EXPECT_THAT(run(plate, options, folder).report.warnings,
               ::testing::Contains(HasSubstr("travel")));
@@ -285,6 +296,21 @@ TEST(CamJob, WarnsOfWhatAnOperatorShouldQuestion) {
   }
   EXPECT_THAT(run(plate, options, folder).report.warnings,
               ::testing::Contains(HasSubstr("rises by")));
+}
+
+TEST(CamJob, ToolNumbersThatTheControllerCannotCallAreRefusedFirst) {
+  const TempFolder folder;
+  CamOptions options = programs_only();
+  options.workshop.tools[0].number = options.workshop.process.finish.tool = 1000;
+  options.post = find_post("fanuc", "--post");
+  EXPECT_THAT(message_of<InputError>([&] { run(small_lens(), options, folder); }),
+              HasSubstr("tool number 1000: is above 999, the largest that a post read as fanuc can "
+                        "call; number the tool from 1 to 999"));
+  // Grbl's programs call no tool, LinuxCNC's may call this one.
+  for (const char* post : {"grbl", "linuxcnc"}) {
+    options.post = find_post(post, "--post");
+    EXPECT_NO_THROW(run(small_lens(), options, folder)) << post;
+  }
 }
 
 TEST(CamJob, WarnsWhereFlutesAreTooShortForABlankThatNobodyRoughed) {

@@ -48,7 +48,7 @@ TEST_F(ExportLens, ACallWritesTheSolidAndSaysHowGoodItIs) {
   EXPECT_TRUE(result.splines->content.is_one_solid());
   EXPECT_NEAR(result.splines->content.volume, result.splines->mesh_volume,
               1e-4 * result.splines->mesh_volume);
-  EXPECT_NEAR(result.splines->picture.mae, result.smooth_metrics.mae, 1e-3);
+  EXPECT_NEAR(result.splines->picture.mae, result.metrics.at(SurfaceModel::kSmooth).mae, 1e-3);
   EXPECT_EQ(announced_, 1);
   EXPECT_EQ(begun_, 1);
   const std::string file = testing::read_bytes(folder_ / "lens.step");

@@ -86,7 +86,9 @@ std::string bad_journal(const std::string& good, Random& random) {
   const auto record = journal_text::record_of(good.substr(begin, end - begin));
   if (!record) return mutated_text(good, random);
   const auto changed = nlohmann::json::parse(mutated_json(record->dump(), random), nullptr, false);
-  if (changed.is_discarded()) return mutated_text(good, random);
+  // The writer refuses lines that its reader would not read.
+  const bool fits = changed.dump().size() < journal_text::kLongestLine / 8;
+  if (changed.is_discarded() || !fits) return mutated_text(good, random);
   return good.substr(0, begin) + journal_text::line_of(changed) + good.substr(end + 1);
 }
 

@@ -86,9 +86,9 @@ TEST_F(DesignOnBlackInterrupt, KilledAndResumedGivesTheSameLens) {
 }
 
 TEST_F(DesignInterrupt, WhatAKilledRunWasWritingIsRemoved) {
-  const fs::path half = at("a") / ".lens.partial-7";
-  fs::create_directories(half);
-  std::ofstream(half / "surface.ply") << "ply";
+  fs::create_directories(at("a"));
+  std::ofstream(at("a") / ".surface.partial-7.ply") << "ply";
+  std::ofstream(at("a") / "..surface.partial-7.partial-8.ply") << "ply";
   std::ofstream(at("a") / ".convergence.partial-7.csv") << "stage";
   ASSERT_EQ(run(design("a")).exit_code, 0);
   for (const std::string& name : listing(at("a"))) EXPECT_NE(name.front(), '.') << name;

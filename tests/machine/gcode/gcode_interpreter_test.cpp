@@ -165,7 +165,15 @@ TEST(GcodeInterpreter, RefusesWithLineAndReason) {
   for (const auto& [program, reason] : cases) {
     EXPECT_THAT(run_program(program).refusal, HasSubstr(reason)) << program;
   }
-  EXPECT_THROW(effect_of("T300"), GcodeError);
+}
+
+TEST(GcodeInterpreter, TheDialectSaysWhichToolsThereAre) {
+  EXPECT_EQ(run_program("T300 M6", grblhal_dialect()).refusal,
+            "line 1: T300: grblhal numbers tools from 0 to 255");
+  EXPECT_EQ(run_program("T255 M6", grblhal_dialect()).refusal, "");
+  EXPECT_EQ(run_program("T99999 M6", linuxcnc_dialect()).refusal, "");
+  EXPECT_THAT(run_program("T1.5", linuxcnc_dialect()).refusal, HasSubstr("T1.5: linuxcnc numbers"));
+  EXPECT_THAT(run_program("T1000", fanuc_dialect()).refusal, HasSubstr("from 0 to 999"));
 }
 
 TEST(GcodeInterpreter, LinuxcncLimitsBlending) {
@@ -200,7 +208,7 @@ TEST(GcodeInterpreter, RefusesWhatADialectMisuses) {
       {"O0", "programs are numbered from 1"},
       {"O1.5", "programs are numbered from 1"},
       {"G43", "G43 without H"},
-      {"G43 H1.5", "tool offsets are numbered"},
+      {"G43 H1.5", "H1.5: fanuc numbers tools"},
       {"H1", "H belongs to no word"},
       {"G5.1", "G5.1 without Q"},
       {"Q1", "Q belongs to no word"},
