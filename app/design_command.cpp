@@ -17,6 +17,7 @@
 #include "app/earlier_design.h"
 #include "app/exit_code.h"
 #include "app/interrupt.h"
+#include "app/interruptible_job.h"
 #include "app/json_output.h"
 #include "app/option_set.h"
 #include "app/output_folder.h"
@@ -162,18 +163,21 @@ bool is_of_lens(const std::string& name) {
          std::find(lens_file::kAll.begin(), lens_file::kAll.end(), name) != lens_file::kAll.end();
 }
 
-LoadedImage read_target(const fs::path& path, bool quiet, const std::stop_token& stop) {
-  ProgressDisplay progress(quiet);
-  return read_image(path, {stop, progress.sink()});
+/// Nothing is written yet: a decoder that unpacks a whole picture without a look at the stop token
+/// is left behind with the process.
+LoadedImage read_target(const fs::path& path, const CommonOptions& common) {
+  InterruptibleJob job(common);
+  LoadedImage loaded = read_image(path, job.control());
+  if (job.control().stop_requested()) throw Interrupted();
+  return loaded;
 }
 
 int run(OptionSet& options, DesignSettings& settings) {
-  const InterruptWatch interrupt;
   const Console console(options.common().json, options.common().quiet);
   const EarlierDesign earlier = EarlierDesign::in(settings.out);
   refuse_to_overwrite(settings.out, earlier, settings.resume, settings.force);
-  const LoadedImage loaded =
-      read_target(settings.target, options.common().quiet, interrupt.token());
+  const LoadedImage loaded = read_target(settings.target, options.common());
+  const InterruptWatch interrupt;
   DesignOptions& design = settings.design;
   settle(options, settings, loaded.image);
   if (settings.resume && earlier.lens && !earlier.checkpoint) {
