@@ -166,7 +166,8 @@ class Workshop {
     JournalOptions options;
     options.flush = false;
     if (!resume) {
-      std::unique_ptr<Journal> journal = Journal::create(journal_, ProgramFile(file_).identity(), options);
+      std::unique_ptr<Journal> journal =
+          Journal::create(journal_, ProgramFile(file_).identity(), options);
       journal->origins(info.start.origins);
       return journal;
     }
