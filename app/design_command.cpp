@@ -16,6 +16,7 @@
 #include "app/earlier_design.h"
 #include "app/exit_code.h"
 #include "app/interrupt.h"
+#include "app/interruptible_job.h"
 #include "app/json_output.h"
 #include "app/option_set.h"
 #include "app/output_folder.h"
@@ -281,18 +282,21 @@ WorkEstimate required_room(const DesignArguments& arguments, const Image& pictur
   return expected;
 }
 
-LoadedImage read_target(const fs::path& path, bool quiet, const std::stop_token& stop) {
-  ProgressDisplay progress(quiet);
-  return read_image(path, {stop, progress.sink()});
+/// Nothing is written yet: a decoder that unpacks a whole picture without a look at the stop token
+/// is left behind with the process.
+LoadedImage read_target(const fs::path& path, const CommonOptions& common) {
+  InterruptibleJob job(common);
+  LoadedImage loaded = read_image(path, job.control());
+  if (job.control().stop_requested()) throw Interrupted();
+  return loaded;
 }
 
 int run(const OptionSet& options, DesignArguments& arguments) {
-  const InterruptWatch interrupt;
   const Console console(options.common().json, options.common().quiet);
   const EarlierDesign earlier = EarlierDesign::in(arguments.out);
   refuse_to_overwrite(arguments.out, earlier, arguments.resume, arguments.force);
-  const LoadedImage loaded =
-      read_target(arguments.target, options.common().quiet, interrupt.token());
+  const LoadedImage loaded = read_target(arguments.target, options.common());
+  const InterruptWatch interrupt;
   DesignOptions& design = arguments.design;
   design.pixels = working_pixels(options, arguments, loaded.image);
   if (arguments.resume && earlier.lens && !earlier.checkpoint) {
