@@ -22,7 +22,7 @@ using bench::cpu_seconds;
 using bench::peak_megabytes;
 using Clock = std::chrono::steady_clock;
 
-/// Prints what passed since it was told last, under the name of the stage that was told.
+/// Prints the time since the last report, under the name of the stage that it reported.
 class StageClock {
  public:
   void tell(const std::string& stage) {
