@@ -20,7 +20,7 @@ void add_cam_options(OptionSet& options, CamSettings& settings) {
   options.text("--workshop", settings.workshop, "FILE.toml",
                "machine, blank, clamps, tools and process; options given here win");
   options.flag("--show-workshop", settings.show_workshop,
-               "print the workshop as it would be used as TOML, and end");
+               "print the workshop in use as TOML and exit");
   options.texts("--compare", settings.compare, "KEY=MM,…",
                 "rank choices by leakage and hours instead of making programs: tool=0.3,0.4 "
                 "pitch=0.04,0.06 (finishing only)");

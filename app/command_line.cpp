@@ -47,7 +47,7 @@ std::string overall_help() {
             command.summary + "\n";
   }
   text +=
-      "\n  lensforge COMMAND --help tells a command's options, their units and defaults\n"
+      "\n  lensforge COMMAND --help lists a command's options, their units and defaults\n"
       "  lensforge --version\n\n"
       "Exit codes: 0 done; 1 failed while running; 2 bad usage or input; 3 done, but a stated\n"
       "limit was not met; 130 interrupted, with everything done so far kept.\n";

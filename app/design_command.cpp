@@ -89,7 +89,7 @@ void write_folder(const OutputFolder& folder, const DesignResult& result, const 
   if (!fs::is_directory(cut, ignored)) return;
   remove_cut(cut);
   if (!fs::remove(cut, ignored)) {
-    console.note(cut.string() + ": holds files that lensforge did not write; they stay");
+    console.note(cut.string() + ": holds files that lensforge did not write; they are kept");
   }
 }
 
@@ -132,7 +132,7 @@ int finish(const OptionSet& options, const ChosenDevice& device, const OutputFol
   if (done) fs::remove(folder.path() / lens_file::kCheckpoint, ignored);
   console.result(summary_json(folder.path(), result), summary_text(folder.path(), result));
   if (keeps) console.note(folder.path().string() + " keeps its earlier lens until then");
-  if (!done) console.note("interrupted; the same command with --resume goes on");
+  if (!done) console.note("interrupted; run the same command with --resume to continue");
   return done ? kDone : kInterrupted;
 }
 
@@ -199,7 +199,8 @@ int run(OptionSet& options, DesignSettings& settings) {
     for (const std::string& change : changes_made(loaded, settings)) console.note(change);
     if (expected.seconds > kWorthTelling) console.note("takes " + estimate_words(expected));
     // A design that was killed before its first checkpoint starts at the beginning.
-    if (settings.resume && !design.resume) console.note("nothing to resume: the design begins");
+    if (settings.resume && !design.resume)
+      console.note("nothing to resume: starting the design from the beginning");
   };
   DesignResult result = shape(options.common().quiet, device.executor, design, loaded.image,
                               interrupt.token(), begin);

@@ -15,7 +15,7 @@ void add_design_options(OptionSet& options, DesignSettings& settings) {
   options.fields(design_fields(), settings.design);
   options.fields(weight_fields(), settings.design.weights);
   options.flag("--resume", settings.resume,
-               "go on with the interrupted design in --out, given the same picture and options");
+               "continue the interrupted design in --out, with the same picture and options");
   options.flag("--force", settings.force, "replace the design that --out holds");
 }
 

@@ -103,7 +103,7 @@ void require_finished(const fs::path& folder, const EarlierDesign& earlier,
   if (!earlier.provenance.is_object()) refuse(folder, "a lens.json that cannot be understood");
   if (earlier.provenance.value("status", nlohmann::json()) == "interrupted") {
     refuse(folder, std::string("an unfinished design whose ") + lens_file::kCheckpoint +
-                       " is missing: there is nothing to resume; begin again with --force");
+                       " is missing: nothing to resume; start again with --force");
   }
   if (earlier.provenance.contains("fingerprint") && !earlier.is_of(fingerprint)) {
     refuse(folder,

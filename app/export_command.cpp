@@ -17,7 +17,7 @@ namespace lensforge::app {
 
 void add_export_options(OptionSet& options, ExportSettings& settings) {
   options.positional("DIR", settings.source, "lens folder");
-  options.required_text("--out", settings.out, "FILE", "where to write; its folder is made");
+  options.required_text("--out", settings.out, "FILE", "file to write; its folder is created");
   options.fields(export_fields(), settings.options);
 }
 

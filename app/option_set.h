@@ -23,7 +23,7 @@ struct HelpText {
 /// "lensforge x.y.z" and a line break.
 std::string version_line();
 
-/// Options that every command has (interface.md, "Common to all").
+/// Options that every command has (docs/interface.md, "Common to all").
 struct CommonOptions {
   bool json = false;
   bool quiet = false;

@@ -135,7 +135,7 @@ void report(const OptionSet& options, const SendSettings& settings, const Consol
   console.result(send_json(options, summary), send_text(settings, summary));
   if (!summary.result || summary.result->done()) return;
   console.note(summary.result->reason + "; " + settings.job.journal_of(settings.file).string() +
-               " knows how far it came: --resume goes on");
+               " records how far the job came; continue with --resume");
 }
 
 int exit_code(const SendSummary& summary) {

@@ -10,7 +10,7 @@ void add_send_options(OptionSet& options, SendSettings& settings) {
   options.fields(send_fields(), settings.job);
   options.flag("--yes", settings.yes, "do not ask before resuming");
   options.text("--log", settings.log, "FILE",
-               "log to hand to somebody else, appended to an earlier one; FILE.ngc.log without it");
+               "log file, appended to an earlier one; default FILE.ngc.log");
   options.text("--events", settings.events, "FILE",
                "append what happens as JSON, one object a line: to an earlier events file, a new "
                "one or a pipe; - is standard output");

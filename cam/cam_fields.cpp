@@ -61,7 +61,7 @@ OptionTable<O> tool_rows() {
   return {
       diameter("--tool-diameter", kBall, "finishing ball-end mill"),
       R::length("--pitch", in(kFinish, &FinishProcess::pitch), as_in_workshop("finish.pitch"),
-                "stepover between rows at most"),
+                "maximum stepover between rows"),
       R::length("--scallop", in(kFinish, &FinishProcess::scallop), as_in_workshop("finish.scallop"),
                 "height of scallops; if above 0, the pitch follows from it"),
       R::number("--spindle", in(kBall, &Tool::spindle_rpm), as_in_workshop("tool.spindle_rpm"),
@@ -72,7 +72,7 @@ OptionTable<O> tool_rows() {
                 "feed straight down"),
       diameter("--rough-tool", kRougher, "diameter of the roughing tool"),
       R::flag("--force", &O::force,
-              "replace files in DIR/cam that lensforge did not write as they stand")};
+              "replace files in DIR/cam that lensforge did not write, or that were changed since")};
 }
 
 OptionTable<O> raster_rows() {
@@ -89,10 +89,10 @@ OptionTable<O> raster_rows() {
           R::flag("--pencil", in(kFinish, &FinishProcess::pencil), "a last pass along the creases"),
           R::length("--tolerance", in(kFinish, &FinishProcess::tolerance),
                     as_in_workshop("finish.tolerance"),
-                    "farthest that the path runs from the exact one"),
+                    "largest distance of the path from the exact one"),
           R::number("--slope-tolerance", in(kFinish, &FinishProcess::slope_tolerance),
                     as_in_workshop("finish.slope_tolerance"), "rad",
-                    "farthest that a move's direction is from the exact one"),
+                    "largest error of a move's direction"),
           R::whole("--decimals", &O::decimals, Limits::zero_or(4, 6),
                    "digits after the point; 0: as the tolerances ask"),
           R::without("--no-arcs", &O::arcs, "straight finishing moves only"),
@@ -131,7 +131,7 @@ OptionTable<O> blank_rows() {
                         {{"lens", PartKind::kLens}, {"mould", PartKind::kMould}},
                         "mill the lens, or the mould to cast it in"),
       R::number("--shrinkage", &O::shrinkage, Limits::between(0, cam_limit::kShrinkage), "",
-                "of what is cast in the mould, share of a length"),
+                "shrinkage of the cast part, share of a length"),
       R::word<Surface>("--surface", &O::surface, surfaces(),
                        "cut what was designed, the smooth surface over the mesh, or its facets")};
 }
@@ -142,7 +142,7 @@ Field split() {
       Limits::zero_or(static_cast<double>(kSmallestProgramLimit) / kMegabyte, 1e5);
   Field row{{"--split",
              OptionKind::kNumber,
-             "split programs above this size; 0: as the dialect needs",
+             "split programs above this size; 0: the dialect's own limit",
              limits,
              "MB",
              {}},
@@ -184,25 +184,24 @@ OptionTable<O> program_rows() {
 
 OptionTable<O> prediction_rows() {
   constexpr auto polish = [](auto& o) -> auto& { return o.polish; };
-  return {
-      R::without("--no-render", &O::render, "programs only, without what the part will project"),
-      R::without("--no-remedies", &O::remedies, "do not try what helps where most light leaks"),
-      R::length("--polish-sigma", in(polish, &PolishModel::sigma),
-                Limits::between(0, cam_limit::kPolish),
-                "polishing averages heights with a Gaussian of this σ"),
-      R::length("--rim-depth", in(polish, &PolishModel::rim_depth),
-                Limits::between(0, cam_limit::kPolish),
-                "polishing takes this much more off at the rim"),
-      R::length("--rim-length", in(polish, &PolishModel::rim_length),
-                Limits::between(cam_limit::kLeastRim, cam_limit::kRim),
-                "distance over which that falls to a third"),
-      R::length("--sample-spacing", &O::sample_spacing,
-                Limits::zero_or(cam_limit::kFinestSample, cam_limit::kCoarsestSample),
-                "of the milled surface that is rendered; 0: as pitch and σ ask"),
-      R::number(
-          "--dark-below", [](auto& o) -> auto& { return o.leakage.dark_below; },
-          Limits::between(0, cam_limit::kDark), "",
-          "parts of the picture below this share of its mean are dark")};
+  return {R::without("--no-render", &O::render, "programs only, without the predicted picture"),
+          R::without("--no-remedies", &O::remedies, "do not try what helps where most light leaks"),
+          R::length("--polish-sigma", in(polish, &PolishModel::sigma),
+                    Limits::between(0, cam_limit::kPolish),
+                    "polishing averages heights with a Gaussian of this σ"),
+          R::length("--rim-depth", in(polish, &PolishModel::rim_depth),
+                    Limits::between(0, cam_limit::kPolish),
+                    "extra depth that polishing removes at the rim"),
+          R::length("--rim-length", in(polish, &PolishModel::rim_length),
+                    Limits::between(cam_limit::kLeastRim, cam_limit::kRim),
+                    "distance from the rim over which the extra depth falls to a third"),
+          R::length("--sample-spacing", &O::sample_spacing,
+                    Limits::zero_or(cam_limit::kFinestSample, cam_limit::kCoarsestSample),
+                    "spacing of samples of the milled surface; 0: chosen from pitch and σ"),
+          R::number(
+              "--dark-below", [](auto& o) -> auto& { return o.leakage.dark_below; },
+              Limits::between(0, cam_limit::kDark), "",
+              "parts of the picture below this share of its mean are dark")};
 }
 
 OptionTable<O> limit_rows() {

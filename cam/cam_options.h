@@ -31,7 +31,7 @@ enum class PartKind {
   kMould,  ///< The negative, from which lenses are cast.
 };
 
-/// Everything that shapes the cut of a lens and what is foretold of it, but the lens itself.
+/// Everything that shapes the cut of a lens and what is predicted of it, but the lens itself.
 struct CamOptions {
   Workshop workshop;  ///< Machine, blank, clamps, tools, process.
   PostDescription post = find_post("linuxcnc", "--post");
@@ -63,7 +63,7 @@ struct CamOptions {
   CutLimits limits;
 };
 
-/// Most, or least, that the options below may be; those of the workshop keep to workshop_rule().
+/// Maximum or minimum of the options below; those of the workshop follow workshop_rule().
 namespace cam_limit {
 inline constexpr double kSpinUp = 3600.0;  ///< s
 inline constexpr double kShrinkage = 0.2;  ///< More than any casting resin loses.

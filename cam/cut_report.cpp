@@ -186,16 +186,16 @@ std::string unroughed_warning(const CutPlan& plan, const ProgramFiles& programs)
   return joined({"nothing is roughed: '", first.name, "' cuts ", decimal_text(depth, 1),
                  " mm deep into the whole blank, tool ", std::to_string(tool.number), " has ",
                  decimal_text(tool.flute_length, 1),
-                 " mm of flutes; run a roughing program first, or take a tool with longer flutes"});
+                 " mm of flutes; run a roughing program first, or use a tool with longer flutes"});
 }
 
-/// Why the part would throw another picture than the designed one; empty if it would not.
+/// Why the part would project another picture than the designed one; empty if it would not.
 std::string index_warning(const CutPlan& plan, const Lens& lens) {
   const double stated = plan.options().workshop.material.ior;
   if (!(index_error(plan, lens) > kIndexTolerance)) return "";
   return joined({"the workshop's material has index ", trimmed_decimal(stated, 4),
                  ", the lens was designed for ", trimmed_decimal(lens.setup.ior, 4),
-                 ": it would throw another picture"});
+                 ": it would project another picture"});
 }
 
 /// Which axes have to go farther than they can; empty if none has.
@@ -250,7 +250,7 @@ std::vector<std::string> warnings_of(const CutPlan& plan, const ProgramFiles& pr
     warnings.push_back(
         "the controller will wait for lines " + std::to_string(programs.total.starved) +
         " times at " + decimal_text(plan.options().workshop.machine.lines_per_second, 0) +
-        " lines a second: the cut then takes " +
+        " lines/s: the cut then takes " +
         decimal_text(programs.total.stream_limited_seconds / kSecondsPerMinute, 0) + " minutes");
   }
   return warnings;

@@ -9,7 +9,7 @@
 namespace lensforge {
 
 /// What a design of a picture of `columns` x `rows` pixels is about to take on `threads` threads of
-/// the CPU. Iterations count as if none were spared.
+/// the CPU. Assumes that every round uses all its iterations.
 /// @pre the options are in their ranges.
 WorkEstimate estimate_design(int columns, int rows, const DesignOptions& options, int threads);
 

@@ -38,7 +38,7 @@ void require_author(const std::string& author) {
   }
   const auto is_control = [](char c) { return std::iscntrl(static_cast<unsigned char>(c)) != 0; };
   if (std::any_of(author.begin(), author.end(), is_control)) {
-    throw InputError("--author: holds a control character; only printable ones are possible");
+    throw InputError("--author: holds a control character; use printable ASCII");
   }
 }
 
@@ -60,12 +60,13 @@ const OptionTable<ExportOptions>& export_fields() {
       R::whole("--pixels", &O::pixels, Limits::between(2, kMaxImageSide),
                "longer side of a height map"),
       R::length("--tolerance", &O::tolerance, Limits::between(1e-6, 1.0),
-                "step, iges: farthest of the splines from the smooth surface"),
+                "step, iges: largest distance of the splines from the smooth surface"),
       R::number("--normal-tolerance", &O::normal_tolerance, Limits::between(1e-6, 0.1), "rad",
                 "step, iges: largest angle to the normals of the vertex-normal model"),
-      R::whole("--max-points", &O::max_points, Limits::between(0, 1e7),
-               "step, iges: control points at most, about 72 bytes each; 0 takes four a vertex, "
-               "575000 at most"),
+      R::whole(
+          "--max-points", &O::max_points, Limits::between(0, 1e7),
+          "step, iges: maximum number of control points, about 72 bytes each; 0: four a vertex, "
+          "575000 at most"),
       R::word<StepSchema>("--schema", &O::schema,
                           {{"ap214", StepSchema::kAp214}, {"ap242", StepSchema::kAp242}},
                           "step: application protocol"),

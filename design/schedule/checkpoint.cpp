@@ -191,7 +191,7 @@ Checkpoint read_checkpoint(const std::filesystem::path& path) {
     if (shape.columns < 2 || shape.rows < 2 ||
         static_cast<std::size_t>(shape.columns) * static_cast<std::size_t>(shape.rows) != count ||
         parts.numbers.size() != count * 3 * sizeof(double) * (scales.is_null() ? 1 : 2)) {
-      refuse(path, "does not hold as many vertices as it says");
+      refuse(path, "holds fewer vertices than its header says");
     }
     checkpoint.mesh = make_grid_mesh(Eigen::Vector2d::Ones(), shape, 0.0);
     std::memcpy(checkpoint.mesh.vertices.data(), parts.numbers.data(), bytes);

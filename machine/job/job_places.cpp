@@ -123,7 +123,7 @@ void require_free(const Place& place) {
     taken = name;
   }
   if (taken.empty()) return;
-  throw InputError(place.name + ": is where " + taken + " goes; send that somewhere else");
+  throw InputError(place.name + ": is where " + taken + " goes; choose another file");
 }
 
 void require_own_address(const SendOptions& options, const std::vector<RegisterMap>& maps) {

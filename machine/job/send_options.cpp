@@ -40,17 +40,17 @@ OptionTable<O> controller_rows() {
       R::text("--port", &O::port, "PORT",
               "controller: /dev/ttyUSB0[:115200], tcp:HOST:PORT or sim:[grbl|grblhal]"),
       R::word<std::string>("--dialect", &O::dialect, {{"grbl", "grbl"}, {"grblhal", "grblhal"}},
-                           "what a --dry-run without --port checks for"),
+                           "dialect that a --dry-run without --port checks"),
       R::flag("--home", &O::home, "home the machine first"),
       R::flag("--character-counting", sender(&SenderOptions::character_counting),
               "keep the controller's buffer filled instead of waiting for each ok"),
       R::number("--hold-limit", sender(&SenderOptions::hold_limit), Limits::between(0, kMaxHold),
-                "s", "end the job when somebody holds it for longer; 0 waits"),
+                "s", "end the job after a hold longer than this; 0: no limit"),
       R::flag("--dry-run", &O::dry_run,
               "check only: the program, and with --port the controller, which runs it in its "
               "check mode ($C)"),
       R::flag("--allow-changed", &O::allow_changed,
-              "send a program that is not as cam wrote it: warn instead of refusing")};
+              "send a program that was changed since cam wrote it: warn instead of refusing")};
 }
 
 OptionTable<O> guard_rows() {
@@ -59,26 +59,27 @@ OptionTable<O> guard_rows() {
           R::word<SpindleOwner>(
               "--spindle-driver", &O::owner,
               {{"host", SpindleOwner::kHost}, {"controller", SpindleOwner::kController}},
-              "who tells the spindle to turn"),
+              "who commands the spindle"),
           R::text("--interlocks", &O::interlocks, "MAP[@PLACE]",
-                  "watch a device with door, vacuum and the like as well"),
+                  "also watch a device with interlocks such as door and vacuum"),
           R::number("--spindle-timeout", sender(&SenderOptions::spindle_timeout),
-                    Limits::between(kMinWait, kMaxSpinUp), "s", "longest wait for a speed"),
+                    Limits::between(kMinWait, kMaxSpinUp), "s", "maximum wait for a spindle speed"),
           R::number("--spin-up", &O::spin_up, Limits::between(0, kMaxSpinUp), "s",
                     "time of each spindle change in the estimate")};
 }
 
 OptionTable<O> journal_rows() {
-  return {
-      R::text("--journal", &O::journal, "FILE", "journal; FILE.ngc.journal without it"),
-      R::flag("--resume", &O::resume, "go on after a fault, with homing and a safe way back in"),
-      R::flag("--restart", &O::restart, "begin again in spite of an unfinished journal"),
-      R::whole("--margin", entry(&ResumeOptions::margin), Limits::between(1, kMaxMargin),
-               "lines before the last one carried out that are cut again at least"),
-      R::length("--ramp", entry(&ResumeOptions::ramp), Limits::between(kMinRamp, kMaxRamp),
-                "path over which the tool comes down when resuming"),
-      R::length("--lift", entry(&ResumeOptions::lift), Limits::between(kMinLift, kMaxLift),
-                "height at which it begins to")};
+  return {R::text("--journal", &O::journal, "FILE", "journal file; default FILE.ngc.journal"),
+          R::flag("--resume", &O::resume,
+                  "continue after a fault, with homing and a safe re-entry into the cut"),
+          R::flag("--restart", &O::restart,
+                  "start from the beginning, although a journal is unfinished"),
+          R::whole("--margin", entry(&ResumeOptions::margin), Limits::between(1, kMaxMargin),
+                   "minimum number of lines, before the last one carried out, that are cut again"),
+          R::length("--ramp", entry(&ResumeOptions::ramp), Limits::between(kMinRamp, kMaxRamp),
+                    "length of the path over which the tool descends when resuming"),
+          R::length("--lift", entry(&ResumeOptions::lift), Limits::between(kMinLift, kMaxLift),
+                    "height at which the descent begins")};
 }
 
 RegisterMap map_of(const std::string& text) {
@@ -104,7 +105,9 @@ const OptionTable<SendOptions>& send_fields() {
 void validate(const SendOptions& options) {
   require_limits(send_fields(), options);
   if (options.port.empty() && !options.dry_run) {
-    throw InputError("--port: which controller? Only a --dry-run goes without");
+    throw InputError(
+        "--port: is missing; name the controller, e.g. /dev/ttyUSB0 (only --dry-run works "
+        "without)");
   }
   if (options.resume && options.restart) {
     throw InputError("--resume and --restart exclude each other");
@@ -117,7 +120,7 @@ void validate(const SendOptions& options) {
   }
   if (options.port.starts_with("sim:") && !options.spindle.empty()) {
     throw InputError("--spindle " + options.spindle +
-                     ": the simulated controller runs in a time of its own and has no Modbus");
+                     ": the simulated controller has its own clock and no Modbus; leave it out");
   }
 }
 
