@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "app/command_line.h"
 #include "app/commands.h"
 #include "app/console.h"
 #include "app/exit_code.h"
@@ -185,9 +186,7 @@ int info_command(const Arguments& command_line) try {
                  printable_line(source) + ": " + d.json["kind"].get<std::string>() + "\n" + d.text);
   return kDone;
 } catch (const Interrupted&) {
-  const bool json =
-      std::find(command_line.begin(), command_line.end(), "--json") != command_line.end();
-  return report_interrupted(json);
+  return report_interrupted(wants_json(command_line));
 }
 
 }  // namespace lensforge::app

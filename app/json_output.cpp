@@ -52,7 +52,7 @@ nlohmann::json seal_json(const std::optional<bool>& holds) {
 }
 
 std::string seal_words(const std::optional<bool>& holds) {
-  if (!holds) return "none: nothing tells whether it was changed";
+  if (!holds) return "none: cannot tell whether the program was changed";
   return *holds ? "holds: as cam wrote it" : "broken: changed or cut short since cam wrote it";
 }
 

@@ -41,8 +41,8 @@ std::vector<const char*> others_of(const CamOptions& options) {
   return {cam_file::kReport, cam_file::kPage};
 }
 
-/// What an earlier run foretold.
-void remove_foretold(const fs::path& folder) {
+/// What an earlier run predicted.
+void remove_prediction(const fs::path& folder) {
   for (const char* name : kOthers) {
     std::error_code ignored;
     if (written_by_lensforge(folder / name)) fs::remove(folder / name, ignored);
@@ -92,7 +92,7 @@ class Job {
     publish(programs, others, files, result);
     result.message = result.report.verdict.passes()
                          ? "done, all limits met"
-                         : "done, but limits are not met: see the report";
+                         : "done, but limits were missed: see the report";
     return result;
   }
 
@@ -102,7 +102,9 @@ class Job {
     const auto rounded = cut->rounded(plan_.surface(), cut_rectangle(), executor_);
     // A mould's own surface is another than that of the lens that is cast in it.
     std::unique_ptr<MeantSurface> lens;
-    if (plan_.mould()) lens = meant_surface(optical_surface(lens_.surface, options_.surface));
+    if (plan_.mould()) {
+      lens = meant_surface(optical_surface(lens_.surface, options_.surface.value_or(lens_.model)));
+    }
     const Eigen::AlignedBox2d rectangle(Eigen::Vector2d(0.0, 0.0), lens_.setup.lens_size);
     const PartSurfaces surfaces({lens ? lens->field() : cut->field(), *rounded, rectangle,
                                  plan_.blank().max().z(), plan_.mould()},
@@ -128,7 +130,7 @@ class Job {
 
   static void warn_of(const OtherPrograms& others, ReportData& report) {
     if (others.kept.empty()) return;
-    report.warnings.push_back("the folder holds programs that are not of this job and were kept: " +
+    report.warnings.push_back("the folder holds programs of another job, which were kept: " +
                               names_of(others.kept) + "; do not run them with it");
   }
 
@@ -136,7 +138,7 @@ class Job {
   /// stands beside programs that it is not about.
   void publish(PendingPrograms& programs, const OtherPrograms& others, PendingFiles& files,
                CamResult& result) const {
-    remove_foretold(folder_);
+    remove_prediction(folder_);
     programs.publish();
     for (const fs::path& path : others.earlier) {
       std::error_code ignored;
@@ -174,7 +176,7 @@ class Job {
 }  // namespace
 
 void remove_cut(const fs::path& folder) {
-  remove_foretold(folder);
+  remove_prediction(folder);
   std::error_code ignored;
   for (const fs::path& program : other_programs(folder, {}).earlier) fs::remove(program, ignored);
 }

@@ -141,10 +141,10 @@ void require_room_for_cut(const CamOptions& options, const OpticalSetup& setup,
   };
   if (kMovesPerPoint * rough_points(options, size) > moves) {
     return require("the roughing and semi-finishing passes",
-                   "larger steps and spacings in the workshop would fit");
+                   "use larger steps and spacings in the workshop");
   }
   if (options.render && nodes_of(size) * kMemoryPerNode > moves * kMemoryPerMove) {
-    return require("the milled surface of so large a lens", "--no-render would need less");
+    return require("the milled surface of so large a lens", "--no-render needs less");
   }
   if (samples_of(options, size) * kSecondsPerSample > 0.5 * on_one_core.seconds) {
     return require("--sample-spacing " + shortest_text(sample_spacing(options)) + "mm",

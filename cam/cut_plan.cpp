@@ -63,7 +63,7 @@ CutPlan::CutPlan(const Lens& lens, const CamOptions& options, const Executor& ex
       decimals_(decimals_of(options_)),
       profile_(mesh_),
       stock_(whole_blank(options_.workshop, field_.box)),
-      optical_(optical_surface(mesh_, options_.surface)),
+      optical_(optical_surface(mesh_, options_.surface.value_or(lens.model))),
       surface_(surface_to_cut(optical_, ball().radius(), executor)),
       collisions_(profile_, options_.workshop, stock_),
       watch_(collisions_, options_.workshop.tools, z_offset_,

@@ -61,7 +61,8 @@ Ending run_all(const DesignTask& task, DesignLog& log, Checkpoint& state) try {
 DesignResult design_lens(const Image& target, const DesignOptions& options,
                          const Executor& executor, const RunControl& control) {
   validate(options, target);
-  const DesignTask task = make_task(target, options, executor, control);
+  const DesignOptions settled = with_smoothness_applied(options);
+  const DesignTask task = make_task(target, settled, executor, control);
   Checkpoint state = first_state(task);
   DesignLog log(task, state);
   const Ending ending = run_all(task, log, state);

@@ -145,7 +145,7 @@ void leave_signals_to_parent(pid_t parent) {
   } catch (const RunError& e) {
     send(descriptor, Frame::kRunError, e.what());
   } catch (const std::bad_alloc&) {
-    send(descriptor, Frame::kFailure, "needs more memory than there is for it");
+    send(descriptor, Frame::kFailure, "needs more memory than is available");
   } catch (const std::exception& e) {
     send(descriptor, Frame::kFailure, std::string("failed: ") + e.what());
   } catch (...) {

@@ -116,7 +116,7 @@ constexpr std::string_view kRelations =
     "<Relationship Target=\"/3D/3dmodel.model\" Id=\"rel0\" "
     "Type=\"http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel\"/></Relationships>\n";
 
-/// A zip archive that is being written; thrown away unless close() is reached.
+/// A zip archive that is being written; discarded unless close() is reached.
 class ZipWriter {
  public:
   ZipWriter(const fs::path& beside, const fs::path& path) : path_(path) {

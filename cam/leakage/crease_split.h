@@ -67,7 +67,7 @@ inline double meeting_share(const SurfaceSide& a, const SurfaceSide& b) {
 /// Hands the image triangles of a surface triangle whose corners lie on different cuts to `sink`:
 /// every corner keeps the quadrilateral (corner, x_k, m, x_k−1) of its own side, whose points land
 /// where that side's own slope sends them. Each side's light stays on its side, and the pieces
-/// cover the triangle exactly: nothing is thrown between the two landing places.
+/// cover the triangle exactly: nothing is projected between the two landing places.
 /// @param lens_area  mm², of the grid; fluxes are shares of the light that it takes.
 template <class Sink>
 void split_at_crease(const std::array<SurfaceSide, 3>& sides, const LightPath& light,

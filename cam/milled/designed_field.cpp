@@ -198,7 +198,7 @@ class BlockFiller {
     }
     if (patch_.cut[node(i, j)] >= 0) return;
     throw InputError("surface: nothing at x " + decimal_text(q.x(), 3) + " y " +
-                     decimal_text(q.y(), 3) + " mm; it has to cover the whole lens");
+                     decimal_text(q.y(), 3) + " mm; it must cover the whole lens");
   }
 
   const FacetGrid& grid_;

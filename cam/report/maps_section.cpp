@@ -106,7 +106,7 @@ std::string maps(const ReportData& data) {
       "section", "",
       element("h2", "", "Maps of the " + escape_html(data.part)) +
           element("p", "",
-                  "Seen from above as it lies on the machine: x to the right, y away from the "
+                  "Seen from above as mounted on the machine: x to the right, y away from the "
                   "operator. Rings with numbers are the worst places.") +
           element("div", "class=\"maps\"", figures));
 }

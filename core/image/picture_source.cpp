@@ -113,7 +113,7 @@ void PictureSource::fail(const std::string& why) const {
 
 void PictureSource::require_memory(double bytes) const {
   require_room({0.0, 0.0, bytes}, path_.parent_path(), path_.string(),
-               "a picture of fewer pixels would fit");
+               "use a picture of fewer pixels");
 }
 
 /// Calls the library while it cannot print. @return whether it says that it succeeded.
@@ -123,7 +123,7 @@ bool PictureSource::quietly(const Call& call) const {
     const StderrSilence silence;
     return call();
   } catch (const std::exception&) {
-    fail("is corrupt, or its decoder needs more memory than there is");
+    fail("is corrupt, or its decoder needs more memory than the machine has");
   }
 }
 

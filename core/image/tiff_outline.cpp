@@ -130,7 +130,7 @@ std::string tiff_problem(std::istream& file) {
   if (!tiff.valid()) return "";
   const std::optional<Directory> directory = read_directory(tiff);
   if (!directory || !pixels_are_inside(*directory, tiff.size())) {
-    return "is truncated: it ends before its TIFF data do";
+    return "is truncated: the file ends before its TIFF data";
   }
   const auto& known = kKnownCompressions;
   if (std::find(known.begin(), known.end(), directory->compression) == known.end()) {

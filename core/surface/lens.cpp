@@ -61,6 +61,7 @@ ordered_json pair_json(const Vector& pair) {
 ordered_json to_json(const Lens& lens) {
   const OpticalSetup& setup = lens.setup;
   const GridShape& grid = lens.surface.grid;
+  LF_CHECK(setup.light == Eigen::Vector3d::UnitZ(), "the lens file holds no direction yet");
   return {
       {"format", kFormat},
       {"version", kVersion},
@@ -150,6 +151,9 @@ void check_supported(const JsonFields& fields) {
   const JsonFields source = fields.object("source");
   if (source.text("type") != "parallel") {
     source.refuse("type", "not supported yet by this version, only \"parallel\" is");
+  }
+  if (source.has("direction")) {
+    source.refuse("direction", "not supported yet by this version, only light along +z is");
   }
 }
 

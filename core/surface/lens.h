@@ -29,7 +29,7 @@ struct Lens {
   nlohmann::json provenance = nlohmann::json::object();
 };
 
-/// Names of the files in a lens folder (interface.md, "The lens folder").
+/// Names of the files in a lens folder (docs/interface.md, "The lens folder").
 namespace lens_file {
 inline constexpr const char* kJson = "lens.json";
 inline constexpr const char* kSurface = "surface.ply";

@@ -64,7 +64,7 @@ std::optional<std::string> surface_fault(const SurfaceMesh& mesh, const OpticalS
   const double highest = mesh.vertices.row(2).maxCoeff();
   if (!(lowest >= 0.0 && highest < setup.focal_length)) {
     return "z runs from " + number_text(lowest) + " to " + number_text(highest) +
-           " mm: it must lie between the entry face at 0 and the receiving plane at " +
+           " mm: must be between the entry face at 0 and the receiving plane at " +
            number_text(setup.focal_length);
   }
   return extent_fault(mesh, setup.lens_size);

@@ -11,9 +11,9 @@ namespace lensforge {
 
 /// The smooth surface of the vertex-normal model: above every vertex of a height field it has the
 /// vertex's own normal (the sum of the area normals around it), and its slopes are continuous
-/// everywhere. Since the normals throw the picture, heights follow them (heights_from_slopes()),
+/// everywhere. Since the normals project the picture, heights follow them (heights_from_slopes()),
 /// not the other way round: a surface through the vertices of an optimised lens waves between them,
-/// and throws a 128² portrait at MAE 0.0100 where the normals promise 0.0017; this one at 0.0028,
+/// and projects a 128² portrait at MAE 0.0100 where the normals promise 0.0017; this one at 0.0028,
 /// for heights that move by up to 6 µm. Between the vertices it is the reduced Clough–Tocher
 /// interpolant: three cubics per triangle, the slope across an edge linear along the edge.
 class SmoothSurface final : public OpticalSurface {

@@ -16,6 +16,7 @@
 #include "core/surface/grid_mesh.h"
 #include "core/text/json_fields.h"
 #include "core/text/json_text.h"
+#include "design/design_fields.h"
 
 // File: the magic line, then a JSON header on one line, then as little-endian doubles the vertices
 // and, if the header says so, the reach of their steps, then a FNV-1a hash of all that goes before.
@@ -55,9 +56,12 @@ std::span<const double> entries(const Eigen::Matrix3Xd& matrix) {
   return {matrix.data(), static_cast<std::size_t>(matrix.size())};
 }
 
-json to_json(const ObjectiveWeights& w) {
-  return {w.image, w.gradient,  w.boundary, w.smooth, w.barrier,
-          w.edge,  w.laplacian, w.align,    w.flux};
+/// Appends every option that a table holds.
+template <class Options>
+void append(const OptionTable<Options>& table, const Options& options, json& description) {
+  for (const OptionField<Options>& field : table) {
+    if (field.left_out.empty()) description.push_back(field.stored(options));
+  }
 }
 
 json to_json(const ConvergenceRow& row) {
@@ -124,24 +128,11 @@ Parts split(const std::string& content, const std::filesystem::path& path) {
 }  // namespace
 
 std::uint64_t design_fingerprint(const Image& target, const DesignOptions& options) {
-  const json description = {target.columns(),
-                            target.rows(),
-                            options.width,
-                            options.focal_length,
-                            options.ior,
-                            options.thickness,
-                            options.pixels,
-                            options.mesh_ratio,
-                            options.levels,
-                            options.rounds,
-                            options.iterations,
-                            options.transport_rounds,
-                            options.rendering_guided,
-                            options.spread,
-                            options.update_iterations,
-                            static_cast<int>(options.model),
-                            static_cast<int>(options.view),
-                            to_json(options.weights)};
+  json weights = json::array();
+  append(weight_fields(), with_smoothness_applied(options).weights, weights);
+  json description = {target.columns(), target.rows()};
+  append(design_fields(), options, description);
+  description.push_back(weights);
   Hash hash;
   hash.add(description.dump());
   hash.add(bytes_of(target.values()));
@@ -200,7 +191,7 @@ Checkpoint read_checkpoint(const std::filesystem::path& path) {
     if (shape.columns < 2 || shape.rows < 2 ||
         static_cast<std::size_t>(shape.columns) * static_cast<std::size_t>(shape.rows) != count ||
         parts.numbers.size() != count * 3 * sizeof(double) * (scales.is_null() ? 1 : 2)) {
-      refuse(path, "does not hold as many vertices as it says");
+      refuse(path, "holds fewer vertices than its header says");
     }
     checkpoint.mesh = make_grid_mesh(Eigen::Vector2d::Ones(), shape, 0.0);
     std::memcpy(checkpoint.mesh.vertices.data(), parts.numbers.data(), bytes);

@@ -33,7 +33,7 @@ void relax(const LevelSite& site, SurfaceMesh& mesh) {
 
 /// @param aimed  the first surface, before its mesh was relaxed.
 [[noreturn]] void refuse_unreachable(const LevelSite& site, const AimedMesh& aimed) {
-  site.log.report("looking for a focal length that would do", 0);
+  site.log.report("searching for a focal length that works", 0);
   const DesignOptions& options = site.task.options;
   const LevelProblem& problem = site.problem;
   const std::optional<double> focal_length =

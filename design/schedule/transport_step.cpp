@@ -16,8 +16,8 @@
 namespace lensforge {
 namespace {
 
-/// Mass error that ends a transport, and the Newton steps after which it stops as far as it came:
-/// what is left is below the error of taking a face's light for a point.
+/// Mass error that ends a transport, and the Newton steps after which it stops where it is:
+/// the remaining error is below that of taking a face's light for a point.
 constexpr double kTransportTolerance = 1e-2;
 constexpr int kMaxNewtonSteps = 150;
 

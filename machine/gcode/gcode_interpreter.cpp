@@ -53,7 +53,7 @@ class BlockRun {
   void check_number() const {
     if (block_.number && *block_.number > dialect_.max_line_number) {
       refuse(std::string("N").append(std::to_string(*block_.number)) + ": " + dialect_.name +
-             " knows none above " + std::to_string(dialect_.max_line_number));
+             " has none above " + std::to_string(dialect_.max_line_number));
     }
   }
 
@@ -61,7 +61,7 @@ class BlockRun {
   bool take_program_number() {
     const auto number = use('O');
     if (!number) return false;
-    if (block_.words().size() > 1) refuse("O stands alone on its line");
+    if (block_.words().size() > 1) refuse("O must be alone on its line");
     if (!(*number >= 1.0) || *number != std::floor(*number)) {
       refuse(with_number("O", *number) + ": programs are numbered from 1");
     }
@@ -186,7 +186,7 @@ class BlockRun {
       return false;
     }
     if (special == 280 || special == 300) {
-      if (motion) refuse("G28 and G30 stand without another motion");
+      if (motion) refuse("G28 and G30 must not share a line with another motion");
       return true;
     }
     return find_plain_motion(special == 530, motion.has_value());
@@ -203,7 +203,7 @@ class BlockRun {
       return false;
     }
     if (state_.motion == MotionMode::kNone) refuse("coordinates after G80, without a motion");
-    if (machine_coordinates && is_arc()) refuse("G53 takes G0 and G1 only");
+    if (machine_coordinates && is_arc()) refuse("G53 works with G0 and G1 only");
     return true;
   }
 

@@ -80,7 +80,7 @@ class SimulatedController {
   void set_origin(int index, const Eigen::Vector3d& origin) { gcode_.set_origin(index, origin); }
 
  private:
-  /// A line on its way: what is left to do, and its answer.
+  /// A line in progress: its remaining work and its answer.
   struct Errand {
     std::deque<SimAction> actions;
     int chord = 0;  ///< Of the first action's arc, next to be queued.

@@ -47,7 +47,7 @@ void check_spindle(const ProgramFacts& facts, const ControllerInfo& info, Findin
                              setting_text(30, *most) + " and would clamp it silently");
   }
   if (least && facts.least_rpm < *least) {
-    found.refusals.push_back("the program asks for S" + number(facts.least_rpm) +
+    found.refusals.push_back("the program commands S" + number(facts.least_rpm) +
                              ", but the controller turns at least " + setting_text(31, *least));
   }
   if (info.setting(32).value_or(0.0) == 1.0) {
@@ -88,7 +88,7 @@ void check_state(const ControllerInfo& info, Findings& found) {
   }
   if (homing_on(info) && !travel_box(info)) {
     found.warnings.emplace_back(
-        "the controller tells no travel ($130-$132): where the program moves is not checked");
+        "the controller reports no travel ($130-$132): the program's range is not checked");
   }
   if (!homing_on(info)) {
     found.warnings.emplace_back(
@@ -102,7 +102,8 @@ void check_reports(const ControllerInfo& info, Findings& found) {
   }
   if (!info.line_numbers) {
     found.warnings.push_back(
-        "the controller does not report line numbers (Ln:): what was carried out is only known "
+        "the controller does not report line numbers (Ln:): the last line carried out is only "
+        "known "
         "to " +
         std::to_string(info.planner_blocks + LineTracker::kStepLag + 1) + " motions");
   }
@@ -163,7 +164,7 @@ void check_spindle_range(const ProgramFacts& facts, const std::vector<RegisterMa
     const double most = map.spindle->rpm_max;
     if (facts.least_rpm >= least && facts.top_rpm <= most) continue;
     const double wrong = facts.top_rpm > most ? facts.top_rpm : facts.least_rpm;
-    found.refusals.push_back("the program asks for S" + number(wrong) + ", but the register map " +
+    found.refusals.push_back("the program commands S" + number(wrong) + ", but the register map " +
                              map.name + " turns at " + number(least) + " to " + number(most) +
                              " rpm");
   }
@@ -171,12 +172,12 @@ void check_spindle_range(const ProgramFacts& facts, const std::vector<RegisterMa
 
 std::string lack_of_motion(const ProgramFacts& facts) {
   if (facts.motions > 0) return {};
-  const std::string advice = "; send a program that moves, such as cam writes";
+  const std::string advice = "; send a program with motion, such as one that cam wrote";
   if (facts.lines == 0) return "is empty" + advice;
   const std::string lines = "its " + std::to_string(facts.lines) + " lines";
   if (facts.sent_lines == 0) return lines + " hold no command" + advice;
   return lines + (facts.ends ? " up to its end (M2, M30 or %)" : "") +
-         " move nothing: none has G0, G1, G2 or G3 with X, Y or Z" + advice;
+         " contain no motion: none has G0, G1, G2 or G3 with X, Y or Z" + advice;
 }
 
 StreamRate stream_rate(const ControllerInfo& info, int baud, double round_trip, double mean_bytes) {

@@ -214,7 +214,7 @@ void SendRun::take_guard_records() {
     } else if (!record.text.empty()) {
       note(record.text);
     } else {
-      note(record.event == GuardEvent::kInterlock ? "all interlocks are as they should be"
+      note(record.event == GuardEvent::kInterlock ? "all interlocks are in their required state"
                                                   : "the trouble with the spindle is over");
     }
   }

@@ -258,7 +258,7 @@ SendStep verify_spindle(SendState state, const SendRules& rules, double now) {
   const std::string rpm = std::to_string(std::lround(state.spindle.order.rpm));
   return fault(std::move(state), StopCause::kSpindle,
                as_asked ? "the spindle did not come to " + rpm + " rpm in time"
-                        : "the controller does not tell whether the spindle turns");
+                        : "the controller does not report whether the spindle turns");
 }
 
 SendStep watch_for_stall(SendState state, const LineTracker& tracker, const SenderOptions& options,

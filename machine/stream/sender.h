@@ -80,7 +80,7 @@ struct SendControl {
 };
 
 enum class SendStatus {
-  kDone,         ///< The program came to its end and the machine stands still.
+  kDone,         ///< The program came to its end and the machine has stopped.
   kInterrupted,  ///< Somebody asked for the end: held, then reset.
   kFault,        ///< Held, see the cause.
 };

@@ -27,7 +27,7 @@ void require_rest(Dialogue& dialogue, const StatusReport& report, bool resume) {
   if (free) return;
   if (!resume) {
     throw InputError("the controller is in state " + std::string(state_name(report.state)) +
-                     ": end what it does, or continue a job with --resume");
+                     ": let it finish, or continue a job with --resume");
   }
   dialogue.hold();
 }

@@ -39,7 +39,7 @@ RasterPlan strip_plan(double width, bool arcs) {
   return plan_finish_raster(strip, kRadius, options);
 }
 
-/// Gouge, excess and peak memory are what was reached, not what is allowed.
+/// Gouge, excess and peak memory are measured values, not limits.
 void tell(const RasterSummary& summary, const SurfaceDeviation& deviation, double seconds,
           benchmark::State& state) {
   state.counters["cpu_s"] = seconds;

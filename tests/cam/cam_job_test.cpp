@@ -304,7 +304,7 @@ TEST(CamJob, ToolNumbersThatTheControllerCannotCallAreRefusedFirst) {
   options.workshop.tools[0].number = options.workshop.process.finish.tool = 1000;
   options.post = find_post("fanuc", "--post");
   EXPECT_THAT(message_of<InputError>([&] { run(small_lens(), options, folder); }),
-              HasSubstr("tool number: 1000 is above 999, the largest that a post read as fanuc can "
+              HasSubstr("tool number 1000: is above 999, the largest that a post read as fanuc can "
                         "call; number the tool from 1 to 999"));
   // Grbl's programs call no tool, LinuxCNC's may call this one.
   for (const char* post : {"grbl", "linuxcnc"}) {
@@ -336,6 +336,31 @@ TEST(CamJob, AClampInTheWayIsACollision) {
   EXPECT_THAT(report.warnings, ::testing::Contains(HasSubstr("vice")));
 }
 
+TEST(CamJob, TheReportNamesTheDesignThatWasCut) {
+  const TempFolder folder;
+  Lens lens = small_lens();
+  EXPECT_EQ(run(lens, programs_only(), folder).report.lens_id, "");
+  lens.provenance["fingerprint"] = "0123456789abcdef";
+  EXPECT_EQ(run(lens, programs_only(), folder).report.lens_id, "0123456789abcdef");
+  lens.provenance["fingerprint"] = "<script>";
+  EXPECT_EQ(run(lens, programs_only(), folder).report.lens_id, "");
+}
+
+TEST(CamJob, AFacetedDesignIsCutAsFacetsUnlessToldOtherwise) {
+  const TempFolder folder;
+  Lens lens = small_lens();
+  const auto surface_of = [&](const CamOptions& options) {
+    const CamResult result = run(lens, options, folder);
+    return result.report.parameters.front().parameters.back().value;
+  };
+  EXPECT_EQ(surface_of(programs_only()), "smooth, over the mesh");
+  lens.model = SurfaceModel::kFacet;
+  EXPECT_EQ(surface_of(programs_only()), "facets of the mesh");
+  CamOptions options = programs_only();
+  options.surface = SurfaceModel::kSmooth;
+  EXPECT_EQ(surface_of(options), "smooth, over the mesh");
+}
+
 /// Sets one option to a bad value; the message has to name all of `words`.
 struct BadOption {
   const char* words;
@@ -346,11 +371,13 @@ struct BadOption {
 TEST(CamJob, BadOptionsAreNamedWithValueAndRule) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   const std::vector<BadOption> cases{
-      {"--tool-diameter: 2 is not smaller than the lens", 2.0,
+      {"--tool-diameter 2: must be smaller than the lens", 2.0,
        [](CamOptions& o, double v) { o.workshop.tools.back().diameter = v; }},
       {"pitch", 0.5, [](CamOptions& o, double v) { o.workshop.process.finish.pitch = v; }},
-      {"--decimals: 3", 3, [](CamOptions& o, double v) { o.decimals = static_cast<int>(v); }},
-      {"--decimals: 7", 7, [](CamOptions& o, double v) { o.decimals = static_cast<int>(v); }},
+      {"--decimals 3: must be 0, or 4 to 6", 3,
+       [](CamOptions& o, double v) { o.decimals = static_cast<int>(v); }},
+      {"--decimals 7: must be 0, or 4 to 6", 7,
+       [](CamOptions& o, double v) { o.decimals = static_cast<int>(v); }},
       {"--spin-up", -0.1, [](CamOptions& o, double v) { o.spin_up = v; }},
       {"--spin-up", kNan, [](CamOptions& o, double v) { o.spin_up = v; }},
       {"--shrinkage", 0.3, [](CamOptions& o, double v) { o.shrinkage = v; }},

@@ -246,7 +246,7 @@ TEST(CutExtremes, RefusalsNameTheSmallestToleranceThatDecimalsHold) {
   options.workshop.process.finish.tolerance = 1e-4;
   EXPECT_THAT(
       message_of<InputError>([&] { validate(options, small_lens().setup); }),
-      HasSubstr("--tolerance: 1e-04 is not at least 4 units of the last decimal, 4e-04 mm"));
+      HasSubstr("--tolerance 1e-04: must be at least 4 units of the last decimal, 4e-04 mm"));
 }
 
 TEST(CutExtremes, RapidsRunHalfAMillimetreAboveTheBlankAtLeast) {

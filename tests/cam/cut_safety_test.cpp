@@ -325,7 +325,7 @@ TEST(CutSafety, AMaterialOfAnotherIndexIsAMissedLimit) {
   const ReportData report = cut();
   EXPECT_TRUE(misses(report, "material_ior"));
   EXPECT_THAT(report.warnings, Contains("the workshop's material has index 1.586, the lens was "
-                                        "designed for 1.49: it would throw another picture"));
+                                        "designed for 1.49: it would project another picture"));
   options.part = PartKind::kMould;
   EXPECT_FALSE(misses(cut(), "material_ior")) << "light passes no mould";
 }

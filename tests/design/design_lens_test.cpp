@@ -354,7 +354,7 @@ std::vector<BadOption> bad_options() {
           {"--mesh-ratio", "nan", [=](O& o) { o.mesh_ratio = nan; }},
           {"--levels", "0", [](O& o) { o.levels = 0; }},
           {"--rounds", "0", [](O& o) { o.rounds = 0; }},
-          {"--iterations", "-1", [](O& o) { o.iterations = -1; }},
+          {"iterations", "-1", [](O& o) { o.iterations = -1; }},
           {"--transport-rounds", "-1", [](O& o) { o.transport_rounds = -1; }},
           {"--update-iterations", "-1", [](O& o) { o.update_iterations = -1; }},
           {"--spread", "-0.1", [](O& o) { o.spread = -0.1; }},

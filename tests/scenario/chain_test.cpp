@@ -197,7 +197,7 @@ TEST_F(Chain, TheWorkshopIsShownAndReadBack) {
   expect_refusal(run(cam({"--workshop", path("shop.toml")})), 2, {"shop.toml", "surprise"});
 }
 
-TEST_F(Chain, AMouldIsCutAndItsCastIsForetold) {
+TEST_F(Chain, AMouldIsCutAndItsCastIsPredicted) {
   place_small_lens(at("lens"));
   const Outcome outcome = run(cam({"--part", "mould", "--shrinkage", "0.01", "--json"}));
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;

@@ -260,6 +260,26 @@ TEST(LensGrid, RefusesASizeOrSpacingThatMakesNoGrid) {
   EXPECT_THROW((void)lens_grid({10.0, 10.0}, 0.0), InputError);
 }
 
+/// Light from a side on a plane: one beam, and a share of flux that depends on the slope.
+TEST(RenderField, LightFromTheSideFollowsSnellsLawTwice) {
+  FieldRenderSetup setup = setup_of(0.05);
+  setup.optics.light = Eigen::Vector3d(0.08, 0.0, 1.0).normalized();
+  const double inside = std::asin(0.08 / std::hypot(0.08, 1.0) / 1.49);
+  const Eigen::Vector2d slope(0.09, 0.0);
+  const double lean = std::atan(slope.x());
+  const double angle = std::asin(1.49 * std::sin(lean + inside)) - lean;
+  std::vector<double> traced(20, 0.0);
+  const int rays = 400000;
+  for (int ray = 0; ray < rays; ++ray) {
+    const double x = 4.0 * (ray + 0.5) / rays;
+    const double z = 5.0 + slope.x() * x;
+    const double column = (x + (60.0 - z) * std::tan(angle) + 8.0) / 20.0 * 20.0;
+    traced[static_cast<std::size_t>(column)] += (1.0 - slope.x() * std::tan(inside)) / rays;
+  }
+  const FluxPicture picture = render(AnalyticField(testing::plane(slope)), setup);
+  EXPECT_LT(largest_difference(column_sums(picture), traced), 1e-5);
+}
+
 TEST(CreaseSplit, PiecesTakeExactlyTheTrianglesFlux) {
   const LightPath light(small_setup());
   std::array<SurfaceSide, 3> sides;

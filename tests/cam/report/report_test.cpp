@@ -203,9 +203,10 @@ TEST(LeakWords, SayWhatHelpsAsFarAsItWasTried) {
   place.trials = {{"a 0.3 mm ball", 0.006, 0.0}, {"a 0.2 mm ball", 0.001, 0.0}};
   EXPECT_THAT(leak_words(place), EndsWith(" A 0.3 mm ball would bring it down to 0.600 %."));
   place.trials = {{"a 0.3 mm ball", 0.019, 0.0}, {"a 0.2 mm ball", 0.021, 0.0}};
-  EXPECT_THAT(leak_words(place),
-              EndsWith(" Nothing that was tried helps much: with a 0.3 mm ball 1.90 % would still "
-                       "leak, with a 0.2 mm ball 2.10 %."));
+  EXPECT_THAT(
+      leak_words(place),
+      EndsWith(" No change that was tried helps much: with a 0.3 mm ball 1.90 % would still "
+               "leak, with a 0.2 mm ball 2.10 %."));
   place.trials = {{"half the tolerances", 0.004, 0.0, 1.42, 1.0}};
   EXPECT_THAT(leak_words(place),
               EndsWith(" down to 0.400 % for 1.4 times as many finishing moves."));

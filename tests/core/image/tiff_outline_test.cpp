@@ -54,7 +54,7 @@ TEST(TiffOutline, EveryCutBehindTheHeaderIsNoticed) {
     for (const bool big : {true, false}) {
       const std::string bytes = tiff(little, big);
       for (std::size_t cut = 4; cut < bytes.size(); ++cut) {
-        EXPECT_EQ(problem(bytes.substr(0, cut)), "is truncated: it ends before its TIFF data do")
+        EXPECT_EQ(problem(bytes.substr(0, cut)), "is truncated: the file ends before its TIFF data")
             << cut;
       }
     }

@@ -7,14 +7,15 @@
 
 #include <cstdint>
 #include <cstring>
-#include <functional>
 #include <set>
 #include <string>
 #include <vector>
 
 #include "core/error.h"
+#include "core/member_count.h"
 #include "core/surface/grid_mesh.h"
 #include "core/temp_folder.h"
+#include "design/design_fields.h"
 #include "design/test_setups.h"
 
 namespace lensforge {
@@ -195,39 +196,48 @@ TEST(Checkpoint, AFolderThatDoesNotExistIsARunError) {
   message_of<RunError>([&] { write_checkpoint(sample(), folder / "no" / "such" / "place"); });
 }
 
-TEST(DesignFingerprint, ChangesWithEverythingThatShapesTheResult) {
+/// Another value than the one that a row has, within its limits.
+template <class Options>
+nlohmann::json other_value(const OptionField<Options>& row, const Options& options) {
+  const nlohmann::json value = row.get(options);
+  if (row.kind == OptionKind::kFlag) return !value.template get<bool>();
+  if (row.kind == OptionKind::kWord) {
+    return row.words.front() == value ? row.words.back() : row.words.front();
+  }
+  const double now = value.template get<double>();
+  const double next = row.kind == OptionKind::kWhole ? now + 1.0 : 1.01 * now + 0.001;
+  EXPECT_TRUE(row.limits.hold(next)) << row.name;
+  return row.kind == OptionKind::kWhole ? nlohmann::json(static_cast<int>(next))
+                                        : nlohmann::json(next);
+}
+
+TEST(DesignFingerprint, ChangesWithEveryOption) {
   const Image picture = testing::spot_picture(12, 9);
   std::set<std::uint64_t> seen{design_fingerprint(picture, {})};
-  using Change = std::function<void(DesignOptions&)>;
-  const std::vector<Change> changes{[](DesignOptions& o) { o.width = 99.0; },
-                                    [](DesignOptions& o) { o.focal_length = 301.0; },
-                                    [](DesignOptions& o) { o.ior = 1.5; },
-                                    [](DesignOptions& o) { o.thickness = 6.0; },
-                                    [](DesignOptions& o) { o.pixels = 128; },
-                                    [](DesignOptions& o) { o.mesh_ratio = 1.5; },
-                                    [](DesignOptions& o) { o.levels = 2; },
-                                    [](DesignOptions& o) { o.rounds = 5; },
-                                    [](DesignOptions& o) { o.iterations = 61; },
-                                    [](DesignOptions& o) { o.transport_rounds = 2; },
-                                    [](DesignOptions& o) { o.rendering_guided = false; },
-                                    [](DesignOptions& o) { o.spread = 0.4; },
-                                    [](DesignOptions& o) { o.update_iterations = 7; },
-                                    [](DesignOptions& o) { o.model = SurfaceModel::kFacet; },
-                                    [](DesignOptions& o) { o.view = ViewSide::kRear; },
-                                    [](DesignOptions& o) { o.weights.image = 1.0; },
-                                    [](DesignOptions& o) { o.weights.gradient = 1.0; },
-                                    [](DesignOptions& o) { o.weights.boundary = 1.0; },
-                                    [](DesignOptions& o) { o.weights.smooth = 1.0; },
-                                    [](DesignOptions& o) { o.weights.barrier = 1.0; },
-                                    [](DesignOptions& o) { o.weights.edge = 1.0; },
-                                    [](DesignOptions& o) { o.weights.laplacian = 1.0; },
-                                    [](DesignOptions& o) { o.weights.align = 2.0; },
-                                    [](DesignOptions& o) { o.weights.flux = 1.0; }};
-  for (std::size_t i = 0; i < changes.size(); ++i) {
+  for (const auto& row : design_fields()) {
     DesignOptions options;
-    changes[i](options);
-    EXPECT_TRUE(seen.insert(design_fingerprint(picture, options)).second) << i;
+    row.set(options, other_value(row, options));
+    EXPECT_TRUE(seen.insert(design_fingerprint(picture, options)).second) << row.name;
   }
+  for (const auto& row : weight_fields()) {
+    DesignOptions options;
+    row.set(options.weights, other_value(row, options.weights));
+    EXPECT_TRUE(seen.insert(design_fingerprint(picture, options)).second) << row.name;
+  }
+  DesignOptions options;
+  options.iterations = 61;  // That no word of --quality stands for.
+  EXPECT_TRUE(seen.insert(design_fingerprint(picture, options)).second);
+}
+
+TEST(DesignFingerprint, EveryMemberOfTheOptionsHasARow) {
+  // Weights have a table of their own; checkpoint and resume say where and when, not what.
+  constexpr std::size_t kWithoutRow = 3;
+  EXPECT_EQ(design_fields().size() + kWithoutRow, testing::member_count<DesignOptions>());
+  EXPECT_EQ(weight_fields().size(), testing::member_count<ObjectiveWeights>());
+}
+
+TEST(DesignFingerprint, IsThatOfEarlierVersions) {
+  EXPECT_EQ(design_fingerprint(Image(4, 3, 0.5F), {}), 0x5417e61a44cb5d65ULL);
 }
 
 TEST(DesignFingerprint, ChangesWithThePicture) {

@@ -135,7 +135,7 @@ TEST(GcodeInterpreter, RefusesWithLineAndReason) {
       {"G21\nG0 G4 P1", "G4 beside a motion"},
       {"G21\nG80\nX1", "coordinates after G80"},
       {"G53", "G53 without coordinates"},
-      {"G21 F10\nG53 G2 X1 I1", "G53 takes G0 and G1 only"},
+      {"G21 F10\nG53 G2 X1 I1", "G53 works with G0 and G1 only"},
       {"G21 F10\nG2 I1", "an arc without coordinates"},
       {"G21 F10\nG2 Z1 I1", "without a coordinate in its plane"},
       {"G21 F10\nG2 X1", "without R and without I J K"},

@@ -1,22 +1,22 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "app/render_setup.h"
+#include "design/render_setup.h"
 
 #include <algorithm>
 #include <cmath>
-#include <sstream>
 
 #include "core/error.h"
+#include "core/text/number_text.h"
 
-namespace lensforge::app {
+namespace lensforge {
 
-OpticalSetup setup_for_mesh(const SurfaceMesh& mesh, int pixels) {
+OpticalSetup setup_for_mesh(const SurfaceMesh& mesh) {
   const Eigen::Vector2d low = mesh.vertices.topRows<2>().rowwise().minCoeff();
   const Eigen::Vector2d high = mesh.vertices.topRows<2>().rowwise().maxCoeff();
   OpticalSetup setup;
   setup.lens_size = high - low;
   setup.image_size = setup.lens_size;
   setup.image_origin = low;
-  return with_longer_side(setup, pixels);
+  return with_longer_side(setup, OpticalSetup{}.pixels.maxCoeff());
 }
 
 OpticalSetup with_longer_side(OpticalSetup setup, int pixels) {
@@ -37,10 +37,8 @@ void require_wall_above(const SurfaceMesh& mesh, const OpticalSetup& setup) {
   validate(setup);
   const double top = mesh.vertices.row(2).maxCoeff();
   if (setup.focal_length > top) return;
-  std::ostringstream message;
-  message << "--focal " << setup.focal_length
-          << ": must be above the surface's highest point, z = " << top << " mm";
-  throw InputError(message.str());
+  throw InputError("--focal " + number_text(setup.focal_length) +
+                   ": must be above the surface's highest point, z = " + number_text(top) + " mm");
 }
 
-}  // namespace lensforge::app
+}  // namespace lensforge

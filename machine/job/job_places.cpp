@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "app/send_places.h"
+#include "machine/job/job_places.h"
 
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -12,13 +12,14 @@
 #include "core/error.h"
 #include "core/io/descriptor.h"
 #include "machine/guard/map_folder.h"
+#include "machine/link/port_spec.h"
 
-namespace lensforge::app {
+namespace lensforge {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kMostLinks = 40;  ///< As the system follows.
+constexpr int kMaxLinks = 40;  ///< As the system follows.
 
 enum class Use { kRead, kWritten, kMachine };
 
@@ -33,7 +34,7 @@ struct Place {
 /// Where a file would be made: a link that leads nowhere yet is followed as well.
 fs::path resolved(fs::path path) {
   std::error_code error;
-  for (int i = 0; i < kMostLinks && fs::is_symlink(path, error); ++i) {
+  for (int i = 0; i < kMaxLinks && fs::is_symlink(path, error); ++i) {
     path = path.parent_path() / fs::read_symlink(path, error);
   }
   const fs::path whole = fs::weakly_canonical(path, error);
@@ -63,7 +64,7 @@ bool disturb(const Place& a, const Place& b) {
   return !a.file || S_ISREG(a.file->st_mode);
 }
 
-void add_maps(const SendSettings& settings, const std::vector<RegisterMap>& maps,
+void add_maps(const SendOptions& options, const std::vector<RegisterMap>& maps,
               std::vector<Place>& places) {
   const auto add = [&](const char* option, const std::string& text, const RegisterMap& map) {
     const std::string name = std::string(option) + " " + text;
@@ -71,24 +72,25 @@ void add_maps(const SendSettings& settings, const std::vector<RegisterMap>& maps
     if (!map.transport.is_tcp) places.push_back(place(name, Use::kMachine, map.transport.device));
   };
   std::size_t next = 0;
-  if (!settings.spindle.empty()) add("--spindle", settings.spindle, maps[next++]);
-  if (!settings.interlocks.empty()) add("--interlocks", settings.interlocks, maps[next]);
+  if (!options.spindle.empty()) add("--spindle", options.spindle, maps[next++]);
+  if (!options.interlocks.empty()) add("--interlocks", options.interlocks, maps[next]);
 }
 
-std::vector<Place> places_of(const SendSettings& settings, const std::vector<RegisterMap>& maps) {
-  std::vector<Place> places{place(settings.file, Use::kRead, settings.file)};
+std::vector<Place> places_of(const fs::path& program, const SendOptions& options,
+                             const std::vector<RegisterMap>& maps,
+                             const std::vector<NamedFile>& beside) {
+  std::vector<Place> places{place(program.string(), Use::kRead, program)};
   const auto written = [&](const std::string& option, const fs::path& path) {
     places.push_back(place(option + " " + path.string(), Use::kWritten, path));
   };
-  if (!settings.dry_run) written("--journal", settings.journal_path());
-  if (!settings.dry_run || !settings.log.empty()) written("--log", settings.log_path());
-  if (!settings.events.empty() && settings.events != "-") written("--events", settings.events);
-  if (!settings.port.empty()) {
-    const PortSpec port = parse_port_spec(settings.port);
+  if (!options.dry_run) written("--journal", options.journal_of(program));
+  for (const NamedFile& file : beside) written(file.option, file.path);
+  if (!options.port.empty()) {
+    const PortSpec port = parse_port_spec(options.port);
     const bool serial = port.kind == PortSpec::Kind::kSerial;
-    if (serial) places.push_back(place("--port " + settings.port, Use::kMachine, port.place));
+    if (serial) places.push_back(place("--port " + options.port, Use::kMachine, port.place));
   }
-  add_maps(settings, maps, places);
+  add_maps(options, maps, places);
   return places;
 }
 
@@ -121,26 +123,27 @@ void require_free(const Place& place) {
     taken = name;
   }
   if (taken.empty()) return;
-  throw InputError(place.name + ": is where " + taken + " goes; send that somewhere else");
+  throw InputError(place.name + ": is where " + taken + " goes; choose another file");
 }
 
-void require_own_address(const SendSettings& settings, const std::vector<RegisterMap>& maps) {
-  if (settings.port.empty()) return;
-  const PortSpec port = parse_port_spec(settings.port);
+void require_own_address(const SendOptions& options, const std::vector<RegisterMap>& maps) {
+  if (options.port.empty()) return;
+  const PortSpec port = parse_port_spec(options.port);
   for (const RegisterMap& map : maps) {
     const BusTransport& bus = map.transport;
     const bool same = port.kind == PortSpec::Kind::kTcp && bus.is_tcp && port.place == bus.host &&
                       port.tcp_port == bus.port;
     if (!same) continue;
-    throw InputError("--port " + settings.port + ": is the address of the Modbus device " +
+    throw InputError("--port " + options.port + ": is the address of the Modbus device " +
                      map.name + " too; each needs its own");
   }
 }
 
 }  // namespace
 
-void require_apart(const SendSettings& settings, const std::vector<RegisterMap>& maps) {
-  const std::vector<Place> places = places_of(settings, maps);
+void require_apart(const fs::path& program, const SendOptions& options,
+                   const std::vector<RegisterMap>& maps, const std::vector<NamedFile>& beside) {
+  const std::vector<Place> places = places_of(program, options, maps, beside);
   for (const Place& place : places) require_free(place);
   for (std::size_t i = 0; i < places.size(); ++i) {
     for (std::size_t k = 0; k < i; ++k) {
@@ -150,7 +153,7 @@ void require_apart(const SendSettings& settings, const std::vector<RegisterMap>&
                        "; each needs a file or port of its own");
     }
   }
-  require_own_address(settings, maps);
+  require_own_address(options, maps);
 }
 
-}  // namespace lensforge::app
+}  // namespace lensforge

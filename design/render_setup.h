@@ -4,11 +4,11 @@
 #include "core/optics/optical_setup.h"
 #include "core/surface/surface_mesh.h"
 
-namespace lensforge::app {
+namespace lensforge {
 
 /// A setup for a mesh that comes alone: the image rectangle lies straight above the lens and is as
-/// large, the working picture has `pixels` on its longer side.
-OpticalSetup setup_for_mesh(const SurfaceMesh& mesh, int pixels);
+/// large, the working picture has 256 pixels on its longer side.
+OpticalSetup setup_for_mesh(const SurfaceMesh& mesh);
 
 /// The same setup with `pixels` on the longer side of the picture.
 OpticalSetup with_longer_side(OpticalSetup setup, int pixels);
@@ -19,4 +19,4 @@ OpticalSetup with_image_width(OpticalSetup setup, double width);
 /// @throw InputError unless the wall lies above the whole surface and the setup is valid.
 void require_wall_above(const SurfaceMesh& mesh, const OpticalSetup& setup);
 
-}  // namespace lensforge::app
+}  // namespace lensforge
