@@ -301,7 +301,11 @@ TEST(CamJob, WarnsOfWhatAnOperatorShouldQuestion) {
 TEST(CamJob, ToolNumbersThatTheControllerCannotCallAreRefusedFirst) {
   const TempFolder folder;
   CamOptions options = programs_only();
-  options.workshop.tools[0].number = options.workshop.process.finish.tool = 1000;
+  int& finishing = options.workshop.process.finish.tool;
+  for (Tool& tool : options.workshop.tools) {
+    if (tool.number == finishing) tool.number = 1000;
+  }
+  finishing = 1000;
   options.post = find_post("fanuc", "--post");
   EXPECT_THAT(message_of<InputError>([&] { run(small_lens(), options, folder); }),
               HasSubstr("tool number 1000: is above 999, the largest that a post read as fanuc can "

@@ -142,7 +142,7 @@ TEST_F(DesignInterrupt, CtrlCOnALargeDesignDoesNotWaitForItsIteration) {
 }
 
 /// A grey progressive JPEG of 8192 x 8192 pixels whose many scans say nothing new: libjpeg goes
-/// through all of them on opening, half a minute of work (ITU-T T.81, Annex G).
+/// through all of them on opening, some ten seconds of work (ITU-T T.81, Annex G).
 std::string slow_jpeg() {
   using namespace std::string_literals;
   constexpr int kScans = 1000;
