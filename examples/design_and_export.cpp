@@ -23,7 +23,7 @@ int main(int argc, char** argv) try {
   lensforge::write_lens(design.lens, folder);
   const auto solid = lensforge::closed_solid(design.lens.surface, "the designed surface");
   lensforge::write_stl(solid, "lens", folder / "lens.stl");
-  std::cout << design.message << "; MAE " << design.lens.smooth_metrics.mae << '\n';
+  std::cout << "MAE " << design.lens.metrics.at(design.lens.model).mae << '\n';
 } catch (const std::exception& error) {
   std::cerr << error.what() << '\n';
   return 1;
