@@ -42,7 +42,7 @@ RenderedSurface surface(const std::string& name, double first, double leakage) {
 /// A report in which every text field holds `text`.
 ReportData report_of(const std::string& text) {
   ReportData data;
-  data.job = data.program = data.made = data.lens_id = data.part = text;
+  data.job = data.program = data.lens_id = data.part = text;
   data.target = Image(8, 8, 0.5F);
   data.leakage.designed = surface(text, 0.0, 0.0);
   data.leakage.steps = {surface(text, 0.1, 0.1)};
