@@ -8,9 +8,11 @@
 #include <Interface_Static.hxx>
 #include <cctype>
 #include <cerrno>
+#include <cstdint>
 #include <string>
 
 #include "core/io/files.h"
+#include "export/iges_check.h"
 #include "export/solid_check.h"
 #include "export/solid_reading.h"
 #include "export/spline_solid.h"
@@ -79,9 +81,13 @@ SolidContent write_iges(const SplineNet& net, const StepHeader& header, const fs
 }
 
 SolidContent inspect_iges(const fs::path& path, const RunControl& control) {
-  return content_of(read_guarded(
-      path, [&](const RunControl& c) { return bytes_of(inspect_shape(read_iges_shape(path, c))); },
-      control));
+  const auto inspect = [&](const RunControl& inner) {
+    const std::int64_t entities = check_iges(read_whole_file(path, kMaxSolidBytes), path.string());
+    SolidContent content = inspect_shape(read_iges_shape(path, inner));
+    content.entities = entities;
+    return bytes_of(content);
+  };
+  return content_of(read_guarded(path, inspect, control));
 }
 
 }  // namespace lensforge

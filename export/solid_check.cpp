@@ -103,6 +103,8 @@ SolidContent write_guarded(const std::filesystem::path& path, const RunControl& 
         run_in_child("writing " + path.filename().string(), ChildLimits{}, guarded, control));
   } catch (const ChildFailure& failure) {
     fail_to_write(path, std::string("OpenCASCADE ") + failure.what());
+  } catch (const InputError&) {
+    fail_to_write(path, "it does not read back");
   }
 }
 

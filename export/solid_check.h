@@ -24,8 +24,9 @@ SolidContent inspect_shape(const TopoDS_Shape& shape, std::optional<double> expe
 std::string bytes_of(const SolidContent& content);
 SolidContent content_of(const std::string& bytes);
 
-/// Runs `write`, which writes `path` with OpenCASCADE, in a child process, so that a stop request
-/// ends it at once. @throw RunError if it cannot be written; Interrupted.
+/// Runs `write`, which writes `path` with OpenCASCADE and reads it back, in a child process, so
+/// that a stop request ends it at once. @throw RunError if it cannot be written or read;
+/// Interrupted.
 SolidContent write_guarded(const std::filesystem::path& path, const RunControl& control,
                            const std::function<SolidContent(const RunControl&)>& write);
 

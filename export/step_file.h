@@ -27,7 +27,7 @@ struct StepHeader {
 struct SolidContent {
   int solids = 0;
   int faces = 0;
-  std::int64_t entities = 0;    ///< Of a STEP file that was read by inspect_step().
+  std::int64_t entities = 0;    ///< Of a file that was read by inspect_step() or inspect_iges().
   bool valid = false;           ///< BRepCheck_Analyzer finds nothing.
   bool closed = false;          ///< Every edge has a face on both sides.
   double volume = 0.0;          ///< mm³

@@ -8,6 +8,7 @@
 #include "core/temp_folder.h"
 #include "export/iges_check.h"
 #include "export/sample_surfaces.h"
+#include "export/solid_check.h"
 
 namespace lensforge::testing {
 namespace {
@@ -58,10 +59,26 @@ TEST_F(IgesFile, SaysMillimetresAuthorAndSolidWithoutOpenCascade) {
   EXPECT_TRUE(written_by_lensforge(folder_ / "lens.igs"));
 }
 
+TEST_F(IgesFile, InspectionTellsSizeAndEntities) {
+  write(fitted(), folder_ / "lens.igs");
+  const SolidContent content = inspect_iges(folder_ / "lens.igs");
+  EXPECT_TRUE(content.is_one_solid());
+  EXPECT_EQ(content.entities, check_iges(read_bytes(folder_ / "lens.igs"), "lens.igs"));
+  EXPECT_NEAR(content.low[2], 0.0, 1e-5);
+}
+
 TEST_F(IgesFile, TargetThatCannotBeWrittenIsNamed) {
   const std::filesystem::path path = folder_ / "missing" / "lens.igs";
   const SplineNet net = fitted();
   EXPECT_THAT(message_of<RunError>([&] { write(net, path); }), HasSubstr(path.string()));
+}
+
+TEST_F(IgesFile, AFileThatDoesNotReadBackCannotBeWritten) {
+  const auto broken = [](const RunControl&) -> SolidContent {
+    throw InputError(".lens.partial-7.igs: holds no shape");
+  };
+  EXPECT_EQ(message_of<RunError>([&] { write_guarded("lens.igs", {}, broken); }),
+            "lens.igs: cannot be written: it does not read back");
 }
 
 TEST_F(IgesFile, WhatIsNoIgesFileIsRefused) {
