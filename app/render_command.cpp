@@ -19,10 +19,10 @@
 #include "core/io/output_guard.h"
 #include "core/surface/lens.h"
 #include "core/surface/mesh_io.h"
+#include "design/design_estimate.h"
 #include "design/render_fields.h"
 #include "design/render_lens.h"
 #include "design/render_setup.h"
-#include "export/export_work.h"
 #include "export/solid_surface.h"
 
 namespace lensforge::app {
@@ -94,9 +94,9 @@ Scene load(const std::string& source, const Executor& executor, const RunControl
 void announce_picture(const OpticalSetup& setup, const std::string& out, const Console& console) {
   const double shape = setup.pixels.cast<double>().prod() / std::pow(setup.pixels.maxCoeff(), 2);
   const auto work = [&](double side) { return rendering_work(shape * side * side); };
-  announce_work(
-      require_room_for(work, "--pixels", setup.pixels.maxCoeff(), out.empty() ? "." : out),
-      console);
+  const fs::path folder = fs::absolute(out.empty() ? "." : out).parent_path();
+  announce_work(require_room_for(work, {"--pixels", 1.0 * setup.pixels.maxCoeff()}, folder),
+                console);
 }
 
 /// The scene with everything that the options say instead.

@@ -13,9 +13,12 @@ namespace lensforge {
 /// @pre the options are in their ranges.
 WorkEstimate estimate_design(int columns, int rows, const DesignOptions& options, int threads);
 
-/// The same. @throw InputError with the --pixels that would fit if the disk of `folder` or the
-///        memory do not hold it.
+/// The same. @throw InputError with the --pixels that would fit, if any would, where the disk of
+///        `folder` or the memory do not hold it.
 WorkEstimate require_room_for_design(int columns, int rows, const DesignOptions& options,
                                      int threads, const std::filesystem::path& folder);
+
+/// What a rendering of so many pixels takes, its comparison with a target and its file.
+WorkEstimate rendering_work(double pixels);
 
 }  // namespace lensforge

@@ -42,6 +42,7 @@ struct Job {
   void begin_writing() const {
     if (hooks.begin_writing) hooks.begin_writing();
   }
+  [[nodiscard]] fs::path folder() const { return fs::absolute(out).parent_path(); }
 };
 
 /// When the surface was made: the same lens then gives the same bytes at any time.
@@ -106,9 +107,8 @@ SplineSolid write_splines(const Job& job) {
                .max_control_points = job.options.max_points,
                .picture = {}};
   const SmoothSurface surface(lens.surface);
-  job.announce(require_room_for(&spline_solid_work, "--max-points",
-                                static_cast<double>(most_control_points(surface, solid.fit)),
-                                job.out));
+  const auto points = static_cast<double>(most_control_points(surface, solid.fit));
+  job.announce(require_room_for(&spline_solid_work, {"--max-points", points}, job.folder()));
   job.control.report({"spline knots", 0.0, 0.0, ""});
   const WantedPicture wanted(lens.surface, lens.setup, lens.target, job.executor);
   FitOptions fit = solid.fit;
@@ -145,7 +145,7 @@ void announce_heights(const Job& job) {
     return height_map_work(double{1} * shape.columns * shape.rows,
                            job.format == ExportFormat::kPng);
   };
-  job.announce(require_room_for(work, "--pixels", job.options.pixels, job.out));
+  job.announce(require_room_for(work, {"--pixels", 1.0 * job.options.pixels}, job.folder()));
 }
 
 HeightMap write_heights(const Job& job) {

@@ -96,4 +96,31 @@ void require_room(const WorkEstimate& estimate, const fs::path& folder, const st
   if (!(estimate.disk_bytes <= disk)) refuse(what, estimate.disk_bytes, "on disk", disk, advice);
 }
 
+std::int64_t largest_with_room(const std::function<WorkEstimate(double)>& work, double wanted,
+                               const fs::path& folder) {
+  constexpr double kShare = 0.8;  // Others need some, too.
+  const double memory = kShare * free_memory_bytes();
+  const double disk = kShare * free_disk_bytes(folder);
+  double fits = 0.0;
+  double too_many = wanted;
+  for (int step = 0; step < 64; ++step) {
+    const double middle = 0.5 * (fits + too_many);
+    const WorkEstimate needed = work(middle);
+    const bool room = needed.memory_bytes <= memory && needed.disk_bytes <= disk;
+    (room ? fits : too_many) = middle;
+  }
+  const double digit = std::pow(10.0, std::floor(std::log10(std::max(fits, 1.0))) - 1.0);
+  return static_cast<std::int64_t>(std::floor(fits / digit) * digit);
+}
+
+WorkEstimate require_room_for(const std::function<WorkEstimate(double)>& work,
+                              const SizeOption& option, const fs::path& folder) {
+  const WorkEstimate needed = work(option.value);
+  const std::int64_t fits = largest_with_room(work, option.value, folder);
+  require_room(needed, folder, option.name + " " + number_text(option.value, 8),
+               fits >= option.least ? option.name + " " + std::to_string(fits) + " would fit"
+                                    : std::string("make room for it"));
+  return needed;
+}
+
 }  // namespace lensforge

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <string>
 
 namespace lensforge {
@@ -31,5 +33,23 @@ double free_disk_bytes(const std::filesystem::path& folder);
 /// @throw InputError with these and both numbers if `folder`'s disk or the memory do not hold it.
 void require_room(const WorkEstimate& estimate, const std::filesystem::path& folder,
                   const std::string& what, const std::string& advice);
+
+/// The largest count below `wanted`, to two digits, for which the memory and the disk of `folder`
+/// have room; 0 if there is none. @param work  grows with the count.
+std::int64_t largest_with_room(const std::function<WorkEstimate(double)>& work, double wanted,
+                               const std::filesystem::path& folder);
+
+/// An option that decides how large a job becomes: a whole number.
+struct SizeOption {
+  std::string name;  ///< "--pixels"
+  double value = 0.0;
+  int least = 1;  ///< The smallest value that it takes.
+};
+
+/// What a job takes that writes into `folder`. @param work  by the value of the option.
+/// @throw InputError naming the option and the value that would fit, if one does, where there is no
+///        room for it.
+WorkEstimate require_room_for(const std::function<WorkEstimate(double)>& work,
+                              const SizeOption& option, const std::filesystem::path& folder);
 
 }  // namespace lensforge

@@ -71,13 +71,5 @@ TEST(ExportWork, GrowsWithPixelsAndControlPoints) {
   EXPECT_GT(spline_solid_work(4e6).memory_bytes, 4e9);
 }
 
-TEST(ExportWork, LargestWithRoomHasRoom) {
-  const auto work = [](double count) { return WorkEstimate{.memory_bytes = 1e6 * count}; };
-  const std::int64_t fits = largest_with_room(work, 1e12, "/");
-  EXPECT_GT(fits, 0);
-  EXPECT_LE(1e6 * static_cast<double>(fits), 0.8 * free_memory_bytes());
-  EXPECT_EQ(largest_with_room(work, 1e-9, "/"), 0);
-}
-
 }  // namespace
 }  // namespace lensforge::testing

@@ -41,5 +41,28 @@ TEST(WorkEstimate, WhatDoesNotFitIsRefusedWithTheValueThatWould) {
   EXPECT_THAT(refusal(0.0, std::numeric_limits<double>::quiet_NaN()), HasSubstr("of memory"));
 }
 
+TEST(WorkEstimate, LargestWithRoomHasRoom) {
+  const auto work = [](double count) { return WorkEstimate{.memory_bytes = 1e6 * count}; };
+  const std::int64_t fits = largest_with_room(work, 1e12, "/");
+  EXPECT_GT(fits, 0);
+  EXPECT_LE(1e6 * static_cast<double>(fits), 0.8 * free_memory_bytes());
+  EXPECT_EQ(largest_with_room(work, 1e-9, "/"), 0);
+}
+
+TEST(WorkEstimate, OnlyAValueThatTheOptionTakesIsAdvised) {
+  const auto refusal = [](double memory_for_one, int least) {
+    const auto work = [&](double count) {
+      return WorkEstimate{.memory_bytes = memory_for_one * count};
+    };
+    return message_of<InputError>(
+        [&] { require_room_for(work, {.name = "--pixels", .value = 1e12, .least = least}, "/"); });
+  };
+  EXPECT_THAT(refusal(1e6, 4),
+              AllOf(HasSubstr("--pixels 1e+12: needs about"), HasSubstr(" would fit")));
+  EXPECT_THAT(refusal(0.3 * free_memory_bytes(), 2), HasSubstr("; --pixels 2 would fit"));
+  EXPECT_THAT(refusal(0.3 * free_memory_bytes(), 4), HasSubstr("; make room for it"));
+  EXPECT_THAT(refusal(1e18, 1), HasSubstr("; make room for it"));
+}
+
 }  // namespace
 }  // namespace lensforge
