@@ -67,21 +67,20 @@ void start_from_transport(const LevelSite& site, Checkpoint& state) {
 }
 
 /// The rendering-guided half.
-Ending follow_picture(const LevelSite& site, Checkpoint& state) {
+Ending follow_picture(const LevelSite& site, const GuidedOptimization::Observer& observe,
+                      Checkpoint& state) {
   LbfgsOptions optimizer;
   optimizer.max_iterations = site.task.options.iterations;
-  const LbfgsSummary summary =
-      site.stage.run(optimizer, site.log.observer("render"), state.scales, state.mesh);
+  const LbfgsSummary summary = site.stage.run(optimizer, observe, state.scales, state.mesh);
   using Status = LbfgsSummary::Status;
   return {summary.status == Status::kStopped,
           summary.status == Status::kInfeasibleStart ? summary.message : ""};
 }
 
-}  // namespace
-
-Ending run_round(const LevelSite& site, Checkpoint& state) {
+/// Both halves and what follows from them.
+Ending alternate(const LevelSite& site, const SurfaceMesh& before,
+                 const GuidedOptimization::Observer& observe, Checkpoint& state) {
   const DesignOptions& options = site.task.options;
-  const SurfaceMesh before = state.mesh;
   const bool transports = state.transporting && state.round < options.transport_rounds;
   if (transports) {
     start_from_transport(site, state);
@@ -90,12 +89,36 @@ Ending run_round(const LevelSite& site, Checkpoint& state) {
   }
   const bool rescaled = !state.scales.known();
   if (options.rendering_guided) {
-    Ending ending = follow_picture(site, state);
+    Ending ending = follow_picture(site, observe, state);
     if (ending.ended()) return ending;
   }
   conclude_round({before, site.stage.value(state.mesh), transports, rescaled}, options.rounds,
                  state);
   return {};
+}
+
+}  // namespace
+
+Ending run_round(const LevelSite& site, Checkpoint& state) {
+  const SurfaceMesh before = state.mesh;
+  double reached = kInfinity;  // Objective of the last step.
+  const GuidedOptimization::Observer log = site.log.observer("render");
+  const auto observe = [&](int iteration, const ObjectiveEvaluation& step) {
+    reached = step.energy.total;
+    return log(iteration, step);
+  };
+  // A mesh that transport has aimed anew is often worse than the one before until it is optimised.
+  const auto keep_the_better = [&] {
+    if (!(reached <= state.value)) state.mesh = before;
+  };
+  try {
+    Ending ending = alternate(site, before, observe, state);
+    if (ending.stopped) keep_the_better();
+    return ending;
+  } catch (const Interrupted&) {
+    keep_the_better();
+    throw;
+  }
 }
 
 void conclude_round(const RoundOutcome& outcome, int rounds, Checkpoint& state) {

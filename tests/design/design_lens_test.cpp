@@ -17,6 +17,7 @@
 #include "core/error.h"
 #include "core/temp_folder.h"
 #include "design/render_lens.h"
+#include "design/schedule/checkpoint.h"
 #include "design/test_setups.h"
 #include "design/transport_scenes.h"
 
@@ -128,6 +129,21 @@ TEST(DesignLens, ResumesAgainAndAgain) {
   }
   EXPECT_EQ(part.status, Status::kDone);
   EXPECT_EQ(part.lens.surface.vertices, whole.lens.surface.vertices);
+}
+
+TEST(DesignLens, StoppedSoonAfterTransportItKeepsTheBetterSurfaceBefore) {
+  const TempFolder folder;
+  DesignOptions options = small_options();
+  options.transport_rounds = 2;
+  options.checkpoint = folder / "checkpoint";
+  const DesignResult part = design_stopped_at(options.iterations + 1, options);
+  ASSERT_EQ(part.status, Status::kInterrupted);
+  const Checkpoint first_round = read_checkpoint(options.checkpoint);
+  ASSERT_EQ(part.convergence.back().round, 1);
+  ASSERT_GT(part.convergence.back().energy.total, first_round.value);
+  Eigen::Matrix3Xd expected = first_round.mesh.vertices;
+  expected.row(2).array() += options.thickness - expected.row(2).minCoeff();
+  EXPECT_EQ(part.lens.surface.vertices, expected);
 }
 
 TEST(DesignLens, ResumingAFinishedDesignGivesItBack) {
