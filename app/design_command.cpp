@@ -9,6 +9,7 @@
 #include <mutex>
 #include <stop_token>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "app/commands.h"
@@ -27,7 +28,7 @@
 #include "core/compute/work_estimate.h"
 #include "core/error.h"
 #include "core/image/image_io.h"
-#include "core/io/files.h"
+#include "core/io/pending_files.h"
 #include "core/text/version.h"
 #include "design/design_estimate.h"
 #include "design/design_lens.h"
@@ -75,14 +76,12 @@ nlohmann::json provenance(const OptionSet& options, const ChosenDevice& device,
 /// Puts the lens in the place of what was there. The cut of an earlier lens goes with it: milled,
 /// it would not be this one.
 void write_folder(const OutputFolder& folder, const DesignResult& result, const Console& console) {
-  PendingFile convergence(folder.path() / lens_file::kConvergence);
-  write_whole_file(convergence.beside(), convergence_csv(result.convergence));
-  PendingFile overview(folder.path() / lens_file::kOverview);
-  write_image(draw_overview(result.lens), overview.beside());
-  // A disk that is full is met before any file is replaced.
-  write_lens(result.lens, folder.path());
-  convergence.publish();
-  overview.publish();
+  PendingFiles files(folder.path());
+  files.add(lens_file::kConvergence, convergence_csv(result.convergence));
+  files.add(lens_file::kOverview, [&](const fs::path& beside) {
+    write_image(draw_overview(result.lens), beside);
+  });
+  write_lens(result.lens, std::move(files));
   const fs::path cut = folder.path() / lens_file::kCut;
   std::error_code ignored;
   if (!fs::is_directory(cut, ignored)) return;

@@ -18,6 +18,8 @@ class PendingFiles {
   /// @param folder  is there, or is made before the first add().
   explicit PendingFiles(std::filesystem::path folder) : folder_(std::move(folder)) {}
 
+  [[nodiscard]] const std::filesystem::path& folder() const { return folder_; }
+
   /// Lets `write` make a file beside its name (same extension). @throw RunError
   void add(const std::string& name,
            const std::function<void(const std::filesystem::path& beside)>& write);

@@ -13,7 +13,6 @@
 #include "core/image/error_image.h"
 #include "core/image/image_io.h"
 #include "core/io/files.h"
-#include "core/io/pending_files.h"
 #include "core/surface/height_field_check.h"
 #include "core/surface/lens_surface.h"
 #include "core/surface/mesh_io.h"
@@ -101,11 +100,11 @@ void add_files(const Lens& lens, PendingFiles& files) {
 
 /// Removes what makes an older lens in the folder whole, and those of its files that this lens has
 /// not: none of them stays beside the new one.
-void remove_older(const PendingFiles& files, const fs::path& folder) {
+void remove_older(const PendingFiles& files) {
   using namespace lens_file;
-  fs::remove(folder / kJson);
+  fs::remove(files.folder() / kJson);
   for (const char* name : {kSurface, kTargetPng, kTargetExr, kRenderPng, kRenderExr, kError}) {
-    if (!files.has(name)) fs::remove(folder / name);
+    if (!files.has(name)) fs::remove(files.folder() / name);
   }
 }
 
@@ -230,17 +229,22 @@ Image read_picture(const fs::path& path, const OpticalSetup& setup) {
 
 }  // namespace
 
-void write_lens(const Lens& lens, const fs::path& folder) {
+void write_lens(const Lens& lens, PendingFiles files) {
   check_sizes(lens);
   try {
-    fs::create_directories(folder);
-    PendingFiles files(folder);
     add_files(lens, files);
-    remove_older(files, folder);
+    remove_older(files);
     files.publish();
   } catch (const fs::filesystem_error& error) {
-    throw RunError(folder.string() + ": cannot be written: " + error.code().message());
+    throw RunError(files.folder().string() + ": cannot be written: " + error.code().message());
   }
+}
+
+void write_lens(const Lens& lens, const fs::path& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) throw RunError(folder.string() + ": cannot be written: " + error.message());
+  write_lens(lens, PendingFiles(folder));
 }
 
 Lens read_lens(const fs::path& folder) {

@@ -8,6 +8,7 @@
 
 #include "core/image/image.h"
 #include "core/image/metrics.h"
+#include "core/io/pending_files.h"
 #include "core/optics/optical_setup.h"
 #include "core/surface/surface_mesh.h"
 #include "core/surface/surface_model.h"
@@ -55,9 +56,12 @@ inline constexpr std::array kCutFiles = {"report.html", "report.json", "compare.
                                          "milled.ply",  "milled.png",  "leakage.png"};
 }  // namespace lens_file
 
-/// Writes every file of the lens folder but convergence.csv; each is written beside and renamed,
-/// and lens.json comes last, so that a folder with a lens.json is always whole.
-/// @throw RunError if something cannot be written.
+/// Writes a lens into the folder of `files`, behind what these hold already. All are written beside
+/// before one is renamed, an older lens.json goes first and the new one comes last: a folder with a
+/// lens.json is whole. @throw RunError if something cannot be written.
+void write_lens(const Lens& lens, PendingFiles files);
+
+/// The same for a lens alone, without the convergence.csv and overview.png that `design` adds.
 void write_lens(const Lens& lens, const std::filesystem::path& folder);
 
 /// Reads a lens folder back.

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <utility>
 
 #include "core/error.h"
 #include "core/full_disk.h"
@@ -151,6 +152,25 @@ TEST(Lens, OtherFilesInTheFolderAreLeftAlone) {
   write_bytes(folder / "convergence.csv", "stage\n");
   write_lens(sample_lens(), folder.path());
   EXPECT_EQ(read_bytes(folder / "convergence.csv"), "stage\n");
+}
+
+TEST(Lens, AppearsTogetherWithWhatIsAddedToIt) {
+  const TempFolder folder;
+  PendingFiles files(folder.path());
+  files.add("convergence.csv", "stage\n");
+  write_lens(sample_lens(), std::move(files));
+  EXPECT_EQ(read_bytes(folder / "convergence.csv"), "stage\n");
+  EXPECT_EQ(folder.file_count(), 8U);
+}
+
+TEST(Lens, WhileAFileCannotAppearThereIsNoLensJson) {
+  const TempFolder folder;
+  write_lens(sample_lens(), folder.path());
+  fs::create_directory(folder / "overview.png");
+  PendingFiles files(folder.path());
+  files.add("overview.png", "x");
+  EXPECT_THROW(write_lens(sample_lens(), std::move(files)), RunError);
+  EXPECT_FALSE(fs::exists(folder / "lens.json"));
 }
 
 TEST(Lens, AFullDiskLeavesTheOlderLensWhole) {
