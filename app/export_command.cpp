@@ -15,9 +15,23 @@
 
 namespace lensforge::app {
 
+namespace {
+
+/// What the library is told by the source that it is given.
+const OptionTable<ExportSettings>& source_fields() {
+  static const OptionTable<ExportSettings> table{Row<ExportSettings>::word<ExportSurface>(
+      "--surface", &ExportSettings::surface,
+      {{"designed", ExportSurface::kDesigned}, {"milled", ExportSurface::kMilled}},
+      "the lens's surface, or what the cutter leaves: DIR/cam/milled.ply")};
+  return table;
+}
+
+}  // namespace
+
 void add_export_options(OptionSet& options, ExportSettings& settings) {
   options.positional("DIR", settings.source, "lens folder");
   options.required_text("--out", settings.out, "FILE", "file to write; its folder is created");
+  options.fields(source_fields(), settings);
   options.fields(export_fields(), settings.options);
 }
 
@@ -52,7 +66,7 @@ int export_command(const Arguments& command_line) try {
   require_fitting_options(options, export_format(settings.options, settings.out));
   validate(settings.options, settings.out);
   const Console console(options.common().json, options.common().quiet);
-  const ExportSource source = read_export_source(settings.source, settings.options.surface);
+  const ExportSource source = read_export_source(settings.source, settings.surface);
   note_unfinished_design(source.lens, console);
   InterruptibleJob job(options.common(), settings.out);
   const ExportHooks hooks{[&](const WorkEstimate& needed) { announce_work(needed, console); },

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "app/option_set.h"
-#include "export/export_options.h"
+#include "export/export_lens.h"
 
 namespace lensforge::app {
 
@@ -12,6 +12,7 @@ namespace lensforge::app {
 struct ExportSettings {
   std::string source;
   std::string out;
+  ExportSurface surface = ExportSurface::kDesigned;
   ExportOptions options;
 };
 

@@ -23,6 +23,12 @@ struct ExportSource {
   std::filesystem::path file;  ///< That it was read from.
 };
 
+/// Which surface of a lens folder is exported.
+enum class ExportSurface {
+  kDesigned,
+  kMilled,  ///< What the cutter leaves.
+};
+
 /// Reads a lens folder with the surface that is wanted.
 /// @throw InputError as read_lens() does, or if the surface is no height field.
 ExportSource read_export_source(const std::filesystem::path& folder, ExportSurface surface);

@@ -53,10 +53,6 @@ const OptionTable<ExportOptions>& export_fields() {
           "--format", &O::format, formats(),
           "solid as step or iges; closed mesh as stl (binary), obj, ply or 3mf; height map as exr "
           "(32-bit, mm) or png (16-bit grey)"),
-      R::word<ExportSurface>(
-          "--surface", &O::surface,
-          {{"designed", ExportSurface::kDesigned}, {"milled", ExportSurface::kMilled}},
-          "the lens's surface, or what the cutter leaves: DIR/cam/milled.ply"),
       R::whole("--pixels", &O::pixels, Limits::between(2, kMaxImageSide),
                "longer side of a height map"),
       R::length("--tolerance", &O::tolerance, Limits::between(1e-6, 1.0),

@@ -14,17 +14,10 @@ namespace lensforge {
 /// What a lens can be written as.
 enum class ExportFormat { kByExtension, kStep, kIges, kStl, kObj, kPly, k3mf, kExr, kPng };
 
-/// Which surface of a lens folder is written.
-enum class ExportSurface {
-  kDesigned,
-  kMilled,  ///< What the cutter leaves.
-};
-
 /// How a lens is written as a file for other programs.
 struct ExportOptions {
   bool force = false;  ///< Replace a file that lensforge did not write.
   ExportFormat format = ExportFormat::kByExtension;
-  ExportSurface surface = ExportSurface::kDesigned;
   int pixels = 1024;  ///< Longer side of a height map.
   // Of solids of splines.
   double tolerance = FitOptions{}.tolerance;                ///< mm
