@@ -26,7 +26,9 @@ struct DesignResult {
 /// Shapes a lens that projects `target` (linear light, any size, not all black).
 /// Coarse to fine over picture and mesh (Sun et al., section 3.4 and Appendix E).
 /// @throw InputError if an option breaks its rule, the picture is all black, or a checkpoint to
-///        resume from is missing, corrupt, or belongs to another picture or other options.
+///        resume from is missing, corrupt, or belongs to another picture or other options;
+///        RunError if a checkpoint cannot be written or a GPU's memory does not suffice;
+///        Interrupted if it is stopped before its first surface: later it returns what it has.
 DesignResult design_lens(const Image& target, const DesignOptions& options,
                          const Executor& executor, const RunControl& control);
 
