@@ -50,11 +50,6 @@ class LightPath {
   /// Ties the screen's millimetres to the picture's pixels.
   [[nodiscard]] LF_HD const ImagePlane& plane() const { return plane_; }
 
-  /// Direction of the light before the surface.
-  [[nodiscard]] LF_HD const Eigen::Vector3d& incident(const Eigen::Vector3d& /*p*/) const {
-    return direction_;
-  }
-
   /// True if a surface of this normal lets the light out towards the screen. Rays along +z then do
   /// not meet the height field again (Sun et al., Appendix B).
   [[nodiscard]] LF_HD bool transmits(const Eigen::Vector3d& /*p*/, const Eigen::Vector3d& n) const {
@@ -161,7 +156,7 @@ class LightPath {
   [[nodiscard]] Eigen::Vector2d place_on_flat(const Eigen::Vector2d& pixel, double z) const;
 
   /// How far a change of slope moves the light over the screen, mm, to first order, around a flat
-  /// surface of height z.
+  /// surface of height z: a magnitude, the geometric mean over all directions of the slope.
   [[nodiscard]] double reach(double slope, double z = 0.0) const;
 
  private:
@@ -188,7 +183,7 @@ class LightPath {
   double lens_area_;     ///< mm², plan.
   Kind kind_;
   Eigen::Vector3d direction_;  ///< a
-  double deflection_;          ///< Change of m for a unit of slope, around a flat surface.
+  double deflection_;          ///< |∂m/∂slope|, around a flat surface: √|det|.
 };
 
 }  // namespace lensforge

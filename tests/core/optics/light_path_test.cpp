@@ -39,11 +39,13 @@ class EveryLight : public ::testing::TestWithParam<bool> {
  protected:
   const OpticalSetup setup_ = GetParam() ? oblique_setup() : shifted_setup();
   const LightPath light_{setup_};
+  /// Direction of the light inside the lens, by Snell's law.
+  const Eigen::Vector3d inside_ =
+      testing::refract_by_angles(setup_.light, Eigen::Vector3d::UnitZ(), 1.0 / setup_.ior);
 
   /// A normal up to 0.4 rad away from the light.
   [[nodiscard]] Eigen::Vector3d random_normal(Random& random) const {
-    return (light_.incident(kPlace) + 0.4 * random.between(0.0, 1.0) * random.near_z(3.1))
-        .normalized();
+    return (inside_ + 0.4 * random.between(0.0, 1.0) * random.near_z(3.1)).normalized();
   }
 };
 
@@ -73,19 +75,16 @@ TEST(LightPath, RearViewMirrorsX) {
 
 TEST_P(EveryLight, IsRefractedTwiceBySnellsLaw) {
   Random random(2);
-  const Eigen::Vector3d inside =
-      testing::refract_by_angles(setup_.light, Eigen::Vector3d::UnitZ(), 1.0 / setup_.ior);
-  EXPECT_LT((light_.incident(kPlace) - inside).norm(), 1e-15);
   for (int i = 0; i < 500; ++i) {
     const Eigen::Vector3d n = random_normal(random);
-    const Eigen::Vector3d b = testing::refract_by_angles(inside, n, setup_.ior);
+    const Eigen::Vector3d b = testing::refract_by_angles(inside_, n, setup_.ior);
     EXPECT_LT((light_.beam(kPlace, n).m - b.head<2>() / b.z()).norm(), 1e-13);
   }
 }
 
 TEST_P(EveryLight, IsTransmittedUpToTheCriticalAngle) {
   const double critical = std::asin(1.0 / 1.49);
-  const Eigen::Vector3d a = light_.incident(kPlace);
+  const Eigen::Vector3d& a = inside_;
   const Eigen::Vector3d axis = a.cross(Eigen::Vector3d::UnitX()).normalized();
   const auto tilted = [&](double angle) -> Eigen::Vector3d {
     return Eigen::AngleAxisd(angle, axis) * a;
@@ -163,7 +162,7 @@ TEST(LightPath, LandAdjointAddsToWhatIsThere) {
 
 TEST_P(EveryLight, FluxIsTheAreaThroughWhichTheRaysEnterTheLens) {
   Random random(5);
-  const Eigen::Vector3d a = light_.incident(kPlace);
+  const Eigen::Vector3d& a = inside_;
   for (int i = 0; i < 100; ++i) {
     const Corners t = random_corners(random);
     const auto enters = [&](const Eigen::Vector3d& p) -> Eigen::Vector2d {
