@@ -29,11 +29,11 @@ struct Subcommand {
 
 constexpr std::array kSubcommands{
     Subcommand{"design", design_command, "design TARGET --out DIR", "picture to lens folder"},
-    Subcommand{"render", render_command, "render DIR|MESH",
-               "lens or any mesh to picture and metrics"},
+    Subcommand{"render", render_command, "render DIR|MESH|SOLID",
+               "lens, mesh or STEP solid to picture and metrics"},
     Subcommand{"cam", cam_command, "cam DIR", "lens folder to G-code (into DIR/cam/)"},
     Subcommand{"export", export_command, "export DIR --out FILE",
-               "lens folder to .step, .stl, .obj, .ply, .3mf, height map"},
+               "lens folder to .step, .iges, .stl, .obj, .ply, .3mf, height map"},
     Subcommand{"send", send_command, "send FILE.ngc --port PORT", "G-code to a controller"},
     Subcommand{"info", info_command, "info DIR|FILE", "what it is, in one screen"},
 };

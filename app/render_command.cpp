@@ -184,7 +184,7 @@ void write_picture(Rendering& rendering, const Scene& scene, const std::string& 
 
 int render_command(const Arguments& command_line) try {
   RenderArguments arguments;
-  OptionSet options("render", "Renders a lens or any mesh and compares it with its target.");
+  OptionSet options("render", "Renders a lens, mesh or STEP solid and compares it with its target.");
   add_render_options(options, arguments);
   options.parse(command_line);
   require_picture_name(arguments.out);
