@@ -36,9 +36,10 @@ void require_author(const std::string& author) {
     throw InputError("--author: has " + std::to_string(author.size()) + " bytes; at most " +
                      std::to_string(kMaxBytes) + " are possible");
   }
-  const auto is_control = [](char c) { return std::iscntrl(static_cast<unsigned char>(c)) != 0; };
-  if (std::any_of(author.begin(), author.end(), is_control)) {
-    throw InputError("--author: holds a control character; use printable ASCII");
+  // OpenCASCADE writes other bytes as they are, which neither format allows.
+  const auto is_printable = [](char c) { return c >= ' ' && c <= '~'; };
+  if (!std::all_of(author.begin(), author.end(), is_printable)) {
+    throw InputError("--author: holds a character that is not printable ASCII; write it without");
   }
 }
 
@@ -66,7 +67,7 @@ const OptionTable<ExportOptions>& export_fields() {
       R::word<StepSchema>("--schema", &O::schema,
                           {{"ap214", StepSchema::kAp214}, {"ap242", StepSchema::kAp242}},
                           "step: application protocol"),
-      R::text("--author", &O::author, "NAME", "step, iges: author in the header")};
+      R::text("--author", &O::author, "NAME", "step, iges: author in the header; printable ASCII")};
   return table;
 }
 

@@ -24,7 +24,7 @@ struct ExportOptions {
   double normal_tolerance = FitOptions{}.normal_tolerance;  ///< rad
   std::int64_t max_points = 0;                              ///< FitOptions::max_control_points
   StepSchema schema = StepSchema::kAp214;
-  std::string author;  ///< In the file's header, at most 200 printable bytes.
+  std::string author;  ///< In the file's header, at most 200 bytes of printable ASCII.
 };
 
 /// Every option of an export.

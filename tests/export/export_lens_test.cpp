@@ -70,9 +70,11 @@ TEST_F(ExportLens, MeshesAndHeightMapsComeByTheNameOfTheFile) {
 
 TEST_F(ExportLens, WhatIsWrongIsToldBeforeAnythingIsWritten) {
   ExportOptions options;
-  options.author = "two\nlines";
-  EXPECT_THAT(message_of<InputError>([&] { (void)write("a.step", options); }),
-              HasSubstr("--author"));
+  for (const char* author : {"two\nlines", "M\xc3\xbcller", "\x7f"}) {
+    options.author = author;
+    EXPECT_THAT(message_of<InputError>([&] { (void)write("a.step", options); }),
+                HasSubstr("--author: holds a character that is not printable ASCII"));
+  }
   options = {};
   options.tolerance = 2.0;
   EXPECT_THAT(message_of<InputError>([&] { (void)write("a.step", options); }),
