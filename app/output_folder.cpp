@@ -13,12 +13,12 @@ namespace lensforge::app {
 namespace fs = std::filesystem;
 
 OutputFolder::OutputFolder(fs::path path, FolderLock::Kind kind)
-    : path_(std::move(path)), lock_(FolderLock::make(path_, kind, made_)) {}
+    : path_(std::move(path)), folder_(FolderLock::make(path_, kind)) {}
 
 OutputFolder::~OutputFolder() {
+  if (!folder_.made || !folder_.lock || !folder_.lock->become_exclusive()) return;
   std::error_code ignored;
-  // Only succeeds on an empty folder.
-  if (made_ && lock_.become_exclusive()) fs::remove(path_, ignored);
+  fs::remove(path_, ignored);  // Only succeeds on an empty folder.
 }
 
 void OutputFolder::remove_partial_files(

@@ -30,8 +30,7 @@ class OutputFolder {
 
  private:
   std::filesystem::path path_;
-  bool made_ = false;
-  FolderLock lock_;
+  MadeFolder folder_;
 };
 
 }  // namespace lensforge::app

@@ -10,6 +10,7 @@
 #include <string>
 #include <system_error>
 #include <thread>
+#include <utility>
 
 #include "core/error.h"
 #include "core/io/files.h"
@@ -39,26 +40,26 @@ FolderLock::FolderLock(const fs::path& folder, Kind kind) {
   if (!attempt(kind)) refuse_held(folder);
 }
 
-FolderLock FolderLock::make(const fs::path& folder, Kind kind, bool& made) {
-  FolderLock lock;
-  bool held = false;
-  made = false;
-  for (int i = 0; i < kAttempts && !held; ++i) {
+MadeFolder FolderLock::make(const fs::path& folder, Kind kind) {
+  MadeFolder result;
+  for (int i = 0; i < kAttempts && !result.lock; ++i) {
     if (i > 0) std::this_thread::sleep_for(kBetweenAttempts);
     std::error_code ignored;
-    made = made || !fs::exists(folder, ignored);
+    result.made = result.made || !fs::exists(folder, ignored);
     fs::create_directories(folder, ignored);
+    FolderLock lock;
     lock.open(folder);
     // What was locked may have been taken away just before.
-    held = lock.folder_.open() && lock.attempt(kind) && lock.is_at(folder);
+    const bool held = lock.folder_.open() && lock.attempt(kind) && lock.is_at(folder);
+    if (held) result.lock = std::move(lock);
   }
   require_writable_folder(folder);
-  if (held) return lock;
-  if (kind == Kind::kExclusive) return {folder, kind};  // Tells why.
-  return {};
+  // Says why it cannot be had.
+  if (!result.lock && kind == Kind::kExclusive) result.lock = FolderLock(folder, kind);
+  return result;
 }
 
-bool FolderLock::become_exclusive() { return folder_.open() && attempt(Kind::kExclusive); }
+bool FolderLock::become_exclusive() { return attempt(Kind::kExclusive); }
 
 void FolderLock::open(const fs::path& folder) {
   folder_ = Descriptor(::open(folder.empty() ? "." : folder.c_str(),

@@ -2,10 +2,13 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 
 #include "core/io/descriptor.h"
 
 namespace lensforge {
+
+struct MadeFolder;
 
 /// Keeps other lensforge commands out of a folder while it lives: an advisory lock (flock) on the
 /// folder itself, so that no file stands for it. The system drops it with the process, however that
@@ -21,12 +24,14 @@ class FolderLock {
   FolderLock(const std::filesystem::path& folder, Kind kind);
 
   /// Makes `folder` (and its parents) if need be, and locks it before anybody takes it away again.
-  /// @param made  whether it was not there.
+  /// Waits for a command that comes and goes, 0.1 s at most; one that stays longer, sharing the
+  /// folder or not, makes an exclusive lock fail, and an exclusive one leaves others unlocked.
   /// @throw InputError if the folder cannot be made or files cannot be made in it; if another
-  ///        process holds it, for an exclusive lock. A shared one is then not held.
-  static FolderLock make(const std::filesystem::path& folder, Kind kind, bool& made);
+  ///        process holds it, for an exclusive lock.
+  static MadeFolder make(const std::filesystem::path& folder, Kind kind);
 
-  /// Whether nobody else holds the folder; from here on nobody else can.
+  /// Whether nobody else holds the folder; from here on nobody else can. Where it returns false,
+  /// a shared lock may be lost: the system lets go of it before it tries (flock(2)).
   bool become_exclusive();
 
  private:
@@ -37,6 +42,12 @@ class FolderLock {
   [[nodiscard]] bool is_at(const std::filesystem::path& folder) const;
 
   Descriptor folder_;
+};
+
+/// A folder that FolderLock::make() has made or met.
+struct MadeFolder {
+  std::optional<FolderLock> lock;  ///< None where a shared one could not be had.
+  bool made = false;               ///< It was not there.
 };
 
 }  // namespace lensforge
