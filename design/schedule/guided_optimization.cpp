@@ -9,7 +9,6 @@
 #include <variant>
 
 #include "core/optics/light_path.h"
-#include "design/optics/image_triangle.h"
 #include "design/optimize/levelling.h"
 #include "design/schedule/guided_stage_on.h"
 
@@ -62,11 +61,7 @@ double sign_at(std::uint64_t i) {
 Eigen::VectorXd cell_sizes(const SurfaceMesh& mesh) {
   const Eigen::Index faces = mesh.triangles.cols();
   Eigen::VectorXd areas(faces);
-  for (Eigen::Index f = 0; f < faces; ++f) {
-    const auto t = mesh.triangles.col(f);
-    const auto corner = [&](int k) -> Eigen::Vector2d { return mesh.vertices.col(t[k]).head<2>(); };
-    areas[f] = doubled_area(corner(0), corner(1), corner(2));
-  }
+  for (Eigen::Index f = 0; f < faces; ++f) areas[f] = mesh.plan_area(f);
   const double mean = areas.mean();
   Eigen::VectorXd smallest = Eigen::VectorXd::Constant(mesh.vertices.cols(), mean);
   for (Eigen::Index f = 0; f < faces; ++f) {

@@ -6,7 +6,6 @@
 #include <cstdint>
 #include <vector>
 
-#include "design/optics/image_triangle.h"
 #include "design/optimize/cosine_transform.h"
 
 namespace lensforge {
@@ -23,11 +22,10 @@ Hats hats(const SurfaceMesh& mesh, Eigen::Index face) {
   const auto corner = [&](int k) -> Eigen::Vector2d {
     return mesh.vertices.col(mesh.triangles(k % 3, face)).head<2>();
   };
-  const double doubled = doubled_area(corner(0), corner(1), corner(2));
-  Hats result{.gradient = {}, .area = 0.5 * doubled};
+  Hats result{.gradient = {}, .area = mesh.plan_area(face)};
   for (int k = 0; k < 3; ++k) {
     const Eigen::Vector2d opposite = corner(k + 2) - corner(k + 1);
-    result.gradient.col(k) = Eigen::Vector2d(-opposite.y(), opposite.x()) / doubled;
+    result.gradient.col(k) = Eigen::Vector2d(-opposite.y(), opposite.x()) / (2.0 * result.area);
   }
   return result;
 }

@@ -97,14 +97,8 @@ SurfaceMesh moved_by(const MongeAmpereResult& map, const OpticalSetup& setup, Su
 
 /// True if every triangle has kept its orientation and some of its area.
 bool in_order(const SurfaceMesh& moved, const SurfaceMesh& before) {
-  const auto area = [](const SurfaceMesh& mesh, Eigen::Index f) {
-    const auto corner = [&](int k) -> Eigen::Vector2d {
-      return mesh.vertices.col(mesh.triangles(k, f)).head<2>();
-    };
-    return doubled_area(corner(0), corner(1), corner(2));
-  };
   for (Eigen::Index f = 0; f < moved.triangles.cols(); ++f) {
-    if (area(moved, f) < kMinShrinkage * area(before, f)) return false;
+    if (moved.plan_area(f) < kMinShrinkage * before.plan_area(f)) return false;
   }
   return true;
 }
