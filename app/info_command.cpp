@@ -15,6 +15,7 @@
 #include "core/io/files.h"
 #include "core/surface/lens.h"
 #include "core/surface/mesh_io.h"
+#include "core/text/lower_case.h"
 #include "core/text/printable.h"
 #include "export/iges_file.h"
 #include "export/step_file.h"
@@ -153,9 +154,7 @@ Description describe_picture(const fs::path& path) {
 }
 
 bool has_extension(const fs::path& path, std::initializer_list<const char*> extensions) {
-  std::string own = path.extension().string();
-  std::transform(own.begin(), own.end(), own.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string own = lower_case(path.extension().string());
   return std::find(extensions.begin(), extensions.end(), own) != extensions.end();
 }
 

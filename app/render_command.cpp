@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <filesystem>
 #include <optional>
@@ -19,6 +18,7 @@
 #include "core/io/output_guard.h"
 #include "core/surface/lens.h"
 #include "core/surface/mesh_io.h"
+#include "core/text/lower_case.h"
 #include "design/design_estimate.h"
 #include "design/render_fields.h"
 #include "design/render_lens.h"
@@ -57,9 +57,7 @@ void add_render_options(OptionSet& options, RenderArguments& arguments) {
 }
 
 bool is_step(const std::string& source) {
-  std::string extension = fs::path(source).extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string extension = lower_case(fs::path(source).extension().string());
   return extension == ".step" || extension == ".stp";
 }
 
@@ -184,7 +182,8 @@ void write_picture(Rendering& rendering, const Scene& scene, const std::string& 
 
 int render_command(const Arguments& command_line) try {
   RenderArguments arguments;
-  OptionSet options("render", "Renders a lens, mesh or STEP solid and compares it with its target.");
+  OptionSet options("render",
+                    "Renders a lens, mesh or STEP solid and compares it with its target.");
   add_render_options(options, arguments);
   options.parse(command_line);
   require_picture_name(arguments.out);

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <fstream>
 #include <optional>
 #include <set>
@@ -14,6 +13,7 @@
 #include "core/io/files.h"
 #include "core/io/output_guard.h"
 #include "core/surface/lens.h"
+#include "core/text/lower_case.h"
 #include "machine/gcode/program_seal.h"
 
 namespace lensforge {
@@ -42,12 +42,6 @@ std::optional<bool> seal_of(const fs::path& path) {
   }
 }
 
-std::string lower(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return text;
-}
-
 /// "finish" of "finish_2".
 std::string without_number(const std::string& stem) {
   const std::size_t last = stem.find_last_not_of("0123456789");
@@ -71,7 +65,7 @@ std::string stated_job(const fs::path& path) {
   std::ifstream file(path, std::ios::binary);
   std::string line(kLongestLine, '\0');
   for (std::size_t i = 0; i < kLinesToJob && file.getline(line.data(), kLongestLine); ++i) {
-    const std::string text = lower(line.c_str());
+    const std::string text = lower_case(line.c_str());
     const std::size_t at = text.find(kJobKey);
     if (at != 1) continue;
     return text.substr(at + kJobKey.size(), text.find_last_not_of(")\r") + 1 - at - kJobKey.size());
@@ -82,7 +76,7 @@ std::string stated_job(const fs::path& path) {
 /// A comment has other letters than a name, and both may be cut short.
 bool names_job(const std::string& stem, const fs::path& path) {
   const std::string job = stated_job(path);
-  const std::string name = lower(stem);
+  const std::string name = lower_case(stem);
   const std::size_t shorter = std::min(job.size(), name.size());
   if (shorter == 0 || (job.size() != name.size() && shorter < kShortestCut)) return false;
   return std::equal(job.begin(), job.begin() + static_cast<std::ptrdiff_t>(shorter), name.begin(),
@@ -93,7 +87,7 @@ bool is_program(const fs::path& path) {
   std::error_code error;
   const std::string name = path.filename().string();
   if (!fs::is_regular_file(path, error) || !name_of_partial(name).empty()) return false;
-  return kProgramExtensions.contains(lower(path.extension().string())) ||
+  return kProgramExtensions.contains(lower_case(path.extension().string())) ||
          (names_operations(without_number(path.stem().string())) && seal_of(path).has_value());
 }
 
@@ -114,7 +108,7 @@ bool is_own_program(const fs::path& path) {
 
 bool is_name_of_cut(const std::string& name) {
   const fs::path path(name);
-  return kProgramExtensions.contains(lower(path.extension().string())) ||
+  return kProgramExtensions.contains(lower_case(path.extension().string())) ||
          names_operations(without_number(path.stem().string())) ||
          std::find(lens_file::kCutFiles.begin(), lens_file::kCutFiles.end(), name) !=
              lens_file::kCutFiles.end();

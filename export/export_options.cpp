@@ -2,13 +2,13 @@
 #include "export/export_options.h"
 
 #include <algorithm>
-#include <cctype>
 #include <utility>
 
 #include "core/error.h"
 #include "core/image/image_io.h"
 #include "core/io/files.h"
 #include "core/io/output_guard.h"
+#include "core/text/lower_case.h"
 
 namespace lensforge {
 namespace {
@@ -88,9 +88,7 @@ bool is_spline_solid(ExportFormat format) {
 
 ExportFormat export_format(const ExportOptions& options, const std::filesystem::path& out) {
   if (options.format != ExportFormat::kByExtension) return options.format;
-  std::string extension = out.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string extension = lower_case(out.extension().string());
   if (extension == ".stp") return ExportFormat::kStep;
   if (extension == ".igs") return ExportFormat::kIges;
   std::string known;

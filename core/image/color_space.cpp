@@ -3,12 +3,12 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <string_view>
 
 #include "core/image/transfer.h"
+#include "core/text/lower_case.h"
 
 namespace lensforge {
 namespace {
@@ -31,9 +31,7 @@ std::optional<ColorSpace> parse_gamma(std::string_view digits) {
 }  // namespace
 
 std::optional<ColorSpace> parse_color_space(const std::string& name) {
-  std::string lower = name;
-  std::transform(lower.begin(), lower.end(), lower.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string lower = lower_case(name);
   const auto is_one_of = [&](const auto& names) {
     return std::find(names.begin(), names.end(), lower) != names.end();
   };

@@ -5,7 +5,6 @@
 #include <OpenImageIO/imageio.h>
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <cstdint>
 #include <functional>
@@ -15,6 +14,7 @@
 #include "core/error.h"
 #include "core/image/transfer.h"
 #include "core/io/files.h"
+#include "core/text/lower_case.h"
 #include "core/text/version.h"
 
 // Reading is in image_reader.cpp. Files are encoded in memory and written by write_whole_file(), so
@@ -24,12 +24,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string extension_of(const fs::path& path) {
-  std::string extension = path.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return extension;
-}
+std::string extension_of(const fs::path& path) { return lower_case(path.extension().string()); }
 
 /// Rows that are encoded between two checks for a stop request; EXR packs 16 at a time.
 constexpr int kRowsAtOnce = 64;

@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "core/surface/mesh_io.h"
 
-#include <algorithm>
 #include <array>
 #include <bit>
-#include <cctype>
 #include <cerrno>
 #include <charconv>
 #include <cstdint>
@@ -18,6 +16,7 @@
 #include "core/error.h"
 #include "core/io/files.h"
 #include "core/surface/mesh_readers.h"
+#include "core/text/lower_case.h"
 #include "core/text/number_text.h"
 #include "core/text/version.h"
 
@@ -121,11 +120,7 @@ SurfaceMesh read_own_form(std::ifstream& file, const OwnHeader& header, const fs
 
 /// The extension without its dot, in small letters.
 std::string format_of(const fs::path& path) {
-  std::string format = path.extension().string();
-  format.erase(0, 1);
-  std::transform(format.begin(), format.end(), format.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return format;
+  return lower_case(path.extension().string().erase(0, 1));
 }
 
 SurfaceMesh read_foreign(const fs::path& path) {

@@ -3,10 +3,10 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <string_view>
 
 #include "core/error.h"
+#include "core/text/lower_case.h"
 
 namespace lensforge {
 namespace {
@@ -16,12 +16,6 @@ namespace fs = std::filesystem;
 /// What people call the drives of the old protocol.
 constexpr std::array<std::string_view, 6> kHuanyangNames = {
     "huanyang", "hy", "hy_vfd", "huanyang_hy", "hy-series", "huanyang1"};
-
-std::string lower_case(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return text;
-}
 
 /// The folder beside the program wins, so that an installed program never reads a source tree.
 fs::path map_folder() {
