@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "core/error.h"
+#include "core/surface/corners.h"
 #include "core/surface/mesh_topology.h"
 
 namespace lensforge {
@@ -16,10 +17,6 @@ constexpr int kNone = -1;
 
 [[noreturn]] void refuse(const std::string& name, const std::string& why) {
   throw InputError(name + ": " + why);
-}
-
-double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
-  return a.x() * b.y() - a.y() * b.x();
 }
 
 Eigen::Vector2d flat(const SurfaceMesh& mesh, int vertex) {

@@ -15,6 +15,11 @@ struct Corners {
   Eigen::Vector3d v2{0.0, 0.0, 0.0};
 };
 
+/// z of a × b for vectors of the plan: twice the signed area of the triangle (0, a, b).
+LF_HD inline double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+  return a.x() * b.y() - a.y() * b.x();
+}
+
 /// (v1 − v0) × (v2 − v0): the normal times twice the area (numerator of Sun et al., Eq. 4).
 LF_HD inline Eigen::Vector3d area_normal(const Corners& t) {
   return (t.v1 - t.v0).cross(t.v2 - t.v0);

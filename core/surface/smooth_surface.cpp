@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/surface/corners.h"
 #include "core/surface/mesh_normals.h"
 #include "core/surface/slope_heights.h"
 
@@ -13,10 +14,6 @@
 // on the third (i, j, c) are named after their indices: iij lies a third of the way from i to j.
 namespace lensforge {
 namespace {
-
-double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
-  return a.x() * b.y() - a.y() * b.x();
-}
 
 Eigen::Matrix2Xd vertex_slopes(const SurfaceMesh& mesh) {
   const Eigen::Matrix3Xd normals = vertex_area_normals(mesh);

@@ -5,15 +5,13 @@
 #include <cstddef>
 #include <numeric>
 
+#include "core/surface/corners.h"
+
 namespace lensforge {
 namespace {
 
 /// How far outside of its triangle a point may lie (barycentric) before it counts as off the mesh.
 constexpr double kOnMesh = 1e-9;
-
-double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
-  return a.x() * b.y() - a.y() * b.x();
-}
 
 }  // namespace
 

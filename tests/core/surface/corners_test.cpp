@@ -17,6 +17,11 @@ TEST(Corners, AreaNormalIsTwiceTheAreaLong) {
   EXPECT_EQ(area_normal(t), Eigen::Vector3d(0.0, 0.0, 12.0));
 }
 
+TEST(Corners, CrossIsPositiveCounterClockwise) {
+  EXPECT_EQ(cross({3.0, 0.0}, {1.0, 4.0}), 12.0);
+  EXPECT_EQ(cross({1.0, 4.0}, {3.0, 0.0}), -12.0);
+}
+
 TEST(Corners, AreaNormalAdjointEqualsCentralDifferences) {
   Random random(1);
   for (int i = 0; i < 200; ++i) {
