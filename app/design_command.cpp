@@ -28,6 +28,7 @@
 #include "core/compute/work_estimate.h"
 #include "core/error.h"
 #include "core/image/image_io.h"
+#include "core/io/lens_folder.h"
 #include "core/io/pending_files.h"
 #include "core/text/version.h"
 #include "design/design_estimate.h"
@@ -78,9 +79,8 @@ nlohmann::json provenance(const OptionSet& options, const ChosenDevice& device,
 void write_folder(const OutputFolder& folder, const DesignResult& result, const Console& console) {
   PendingFiles files(folder.path());
   files.add(lens_file::kConvergence, convergence_csv(result.convergence));
-  files.add(lens_file::kOverview, [&](const fs::path& beside) {
-    write_image(draw_overview(result.lens), beside);
-  });
+  files.add(lens_file::kOverview,
+            [&](const fs::path& beside) { write_image(draw_overview(result.lens), beside); });
   write_lens(result.lens, std::move(files));
   const fs::path cut = folder.path() / lens_file::kCut;
   std::error_code ignored;

@@ -6,8 +6,8 @@
 
 #include "core/error.h"
 #include "core/io/files.h"
+#include "core/io/lens_folder.h"
 #include "core/io/output_guard.h"
-#include "core/surface/lens.h"
 #include "core/text/json_text.h"
 #include "design/design_lens.h"
 

@@ -11,8 +11,8 @@
 
 #include "core/error.h"
 #include "core/io/files.h"
+#include "core/io/lens_folder.h"
 #include "core/io/output_guard.h"
-#include "core/surface/lens.h"
 #include "core/text/lower_case.h"
 #include "machine/gcode/program_seal.h"
 

@@ -11,6 +11,7 @@
 
 #include "core/image/image_io.h"
 #include "core/io/files.h"
+#include "core/io/lens_folder.h"
 #include "core/io/sha256.h"
 #include "core/surface/mesh_io.h"
 #include "core/text/version.h"

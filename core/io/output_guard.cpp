@@ -10,7 +10,7 @@
 #include <system_error>
 
 #include "core/error.h"
-#include "core/surface/lens.h"
+#include "core/io/lens_folder.h"
 
 namespace lensforge {
 namespace {

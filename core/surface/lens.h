@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include <array>
 #include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
 
 #include "core/image/image.h"
 #include "core/image/metrics.h"
+#include "core/io/lens_folder.h"
 #include "core/io/pending_files.h"
 #include "core/optics/optical_setup.h"
 #include "core/surface/surface_mesh.h"
@@ -29,32 +29,6 @@ struct Lens {
   ModelMetrics metrics{{SurfaceModel::kFacet, {}}, {SurfaceModel::kSmooth, {}}};
   nlohmann::json provenance = nlohmann::json::object();
 };
-
-/// Names of the files in a lens folder (docs/interface.md, "The lens folder").
-namespace lens_file {
-inline constexpr const char* kJson = "lens.json";
-inline constexpr const char* kSurface = "surface.ply";
-inline constexpr const char* kTargetPng = "target.png";
-inline constexpr const char* kTargetExr = "target.exr";
-inline constexpr const char* kRenderPng = "render.png";
-inline constexpr const char* kRenderExr = "render.exr";
-inline constexpr const char* kError = "error.png";
-inline constexpr const char* kConvergence = "convergence.csv";
-inline constexpr const char* kOverview = "overview.png";
-inline constexpr const char* kCheckpoint = "checkpoint.bin";  ///< While a design is unfinished.
-
-/// All of them.
-inline constexpr std::array kAll = {kJson,      kSurface, kTargetPng, kTargetExr,   kRenderPng,
-                                    kRenderExr, kError,   kOverview,  kConvergence, kCheckpoint};
-
-/// Folder in which earlier versions put a lens together; a killed one has left it behind.
-inline constexpr const char* kStaging = "lens";
-
-/// The folder inside that `cam` writes into, and what is in it beside the programs.
-inline constexpr const char* kCut = "cam";
-inline constexpr std::array kCutFiles = {"report.html", "report.json", "compare.html",
-                                         "milled.ply",  "milled.png",  "leakage.png"};
-}  // namespace lens_file
 
 /// Writes a lens into the folder of `files`, behind what these hold already. All are written beside
 /// before one is renamed, an older lens.json goes first and the new one comes last: a folder with a

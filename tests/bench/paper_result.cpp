@@ -7,7 +7,7 @@
 
 #include "bench/child_process.h"
 #include "core/io/files.h"
-#include "core/surface/lens.h"
+#include "core/io/lens_folder.h"
 
 namespace lensforge::bench {
 namespace {

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <array>
+
+namespace lensforge {
+
+/// Names of the files in a lens folder (docs/interface.md, "The lens folder").
+namespace lens_file {
+inline constexpr const char* kJson = "lens.json";
+inline constexpr const char* kSurface = "surface.ply";
+inline constexpr const char* kTargetPng = "target.png";
+inline constexpr const char* kTargetExr = "target.exr";
+inline constexpr const char* kRenderPng = "render.png";
+inline constexpr const char* kRenderExr = "render.exr";
+inline constexpr const char* kError = "error.png";
+inline constexpr const char* kConvergence = "convergence.csv";
+inline constexpr const char* kOverview = "overview.png";
+inline constexpr const char* kCheckpoint = "checkpoint.bin";  ///< While a design is unfinished.
+
+/// All of them.
+inline constexpr std::array kAll = {kJson,      kSurface, kTargetPng, kTargetExr,   kRenderPng,
+                                    kRenderExr, kError,   kOverview,  kConvergence, kCheckpoint};
+
+/// Folder in which earlier versions put a lens together; a killed one has left it behind.
+inline constexpr const char* kStaging = "lens";
+
+/// The folder inside that `cam` writes into, and what is in it beside the programs.
+inline constexpr const char* kCut = "cam";
+inline constexpr std::array kCutFiles = {"report.html", "report.json", "compare.html",
+                                         "milled.ply",  "milled.png",  "leakage.png"};
+}  // namespace lens_file
+
+}  // namespace lensforge
