@@ -2,8 +2,8 @@
 #pragma once
 
 #include "core/compute/host_device.h"
-#include "core/optics/barrier.h"
 #include "core/optics/refraction.h"
+#include "core/value_slope.h"
 
 namespace lensforge {
 

@@ -6,6 +6,7 @@
 
 #include "core/error.h"
 #include "core/surface/grid_mesh.h"
+#include "core/value_slope.h"
 
 namespace lensforge {
 namespace {

@@ -3,10 +3,10 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <vector>
 
 #include "core/image/image.h"
-#include "core/optics/barrier.h"
 #include "core/surface/surface_mesh.h"
 #include "design/design_options.h"
 #include "design/schedule/convergence.h"
@@ -19,7 +19,8 @@ struct Checkpoint {
   std::uint64_t fingerprint = 0;  ///< Of picture and options, see design_fingerprint().
   int level = 0;                  ///< Level and round to be done next.
   int round = 0;
-  double value = kInfinity;  ///< Objective after the level's last round.
+  double value =
+      std::numeric_limits<double>::infinity();  ///< Objective after the level's last round.
   bool transporting = true;  ///< The level's next round may begin with transport.
   double seconds = 0.0;      ///< Spent so far.
   SurfaceMesh mesh;          ///< A grid mesh.

@@ -9,6 +9,7 @@
 #include <variant>
 
 #include "core/optics/light_path.h"
+#include "core/value_slope.h"
 #include "design/optimize/levelling.h"
 #include "design/schedule/guided_stage_on.h"
 

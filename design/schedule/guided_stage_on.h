@@ -8,6 +8,7 @@
 #include "core/compute/executor.h"
 #include "core/optics/optical_setup.h"
 #include "core/surface/surface_mesh.h"
+#include "core/value_slope.h"
 #include "design/energy/objective_on.h"
 #include "design/optimize/grid_preconditioner_on.h"
 #include "design/optimize/lbfgs_on.h"

@@ -8,6 +8,7 @@
 #include "core/error.h"
 #include "core/surface/grid_mesh.h"
 #include "core/text/number_text.h"
+#include "core/value_slope.h"
 #include "design/schedule/reach.h"
 #include "design/schedule/transport_step.h"
 

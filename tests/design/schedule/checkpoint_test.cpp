@@ -15,6 +15,7 @@
 #include "core/member_count.h"
 #include "core/surface/grid_mesh.h"
 #include "core/temp_folder.h"
+#include "core/value_slope.h"
 #include "design/design_fields.h"
 #include "design/test_setups.h"
 

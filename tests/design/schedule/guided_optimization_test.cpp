@@ -9,6 +9,7 @@
 #include <string>
 
 #include "core/error.h"
+#include "core/value_slope.h"
 #include "design/schedule/face_transport.h"
 #include "design/test_setups.h"
 
