@@ -14,7 +14,7 @@ namespace lensforge {
 class FacetGrid {
  public:
   /// Points up to this far outside of the mesh belong to its nearest triangle, mm: a rim may be
-  /// that far off its rectangle (kRimTolerance).
+  /// that far off its rectangle (kRimDistance).
   static constexpr double kRim = 0.02;
 
   /// @param mesh  must outlive the grid. @pre every triangle faces +z, and there is one.

@@ -70,8 +70,8 @@ std::vector<DirectedEdge> sorted_edges(const SurfaceMesh& mesh) {
 bool on_rim(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vector2d& size) {
   for (int axis = 0; axis < 2; ++axis) {
     for (const double side : {0.0, size[axis]}) {
-      const bool a_is = std::abs(a[axis] - side) <= kRimTolerance;
-      if (a_is && std::abs(b[axis] - side) <= kRimTolerance) return true;
+      const bool a_is = std::abs(a[axis] - side) <= kRimDistance;
+      if (a_is && std::abs(b[axis] - side) <= kRimDistance) return true;
     }
   }
   return false;
@@ -115,8 +115,8 @@ std::optional<std::string> box_fault(const SurfaceMesh& mesh, const Eigen::Vecto
   Eigen::AlignedBox2d box;
   for (const int v : mesh.triangles.reshaped()) box.extend(mesh.vertices.col(v).head<2>());
   for (int axis = 0; axis < 2; ++axis) {
-    if (std::abs(box.min()[axis]) <= kRimTolerance &&
-        std::abs(box.max()[axis] - size[axis]) <= kRimTolerance) {
+    if (std::abs(box.min()[axis]) <= kRimDistance &&
+        std::abs(box.max()[axis] - size[axis]) <= kRimDistance) {
       continue;
     }
     return "spans " + std::string(axis == 0 ? "x " : "y ") + millimetres(box.min()[axis]) + " to " +
@@ -142,7 +142,7 @@ std::optional<std::string> height_field_fault(const SurfaceMesh& mesh,
     return "is no height field over the lens, it has a hole or an overlap at x " +
            decimal_text(place->x(), 2) + " y " + decimal_text(place->y(), 2) + " mm";
   }
-  if (std::abs(sum.area - size.prod()) > 2.0 * kRimTolerance * size.sum()) {
+  if (std::abs(sum.area - size.prod()) > 2.0 * kRimDistance * size.sum()) {
     return "is no height field over the lens, its triangles cover " + millimetres(sum.area) +
            " of " + millimetres(size.prod()) + " mm2";
   }

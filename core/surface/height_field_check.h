@@ -10,7 +10,7 @@
 namespace lensforge {
 
 /// How far the rim of a surface may be from the rectangle that it should cover, mm.
-inline constexpr double kRimTolerance = 0.01;
+inline constexpr double kRimDistance = 0.01;
 
 /// Why a mesh, seen from above, does not cover the rectangle from (0, 0) to `size` exactly once;
 /// nothing if it does. A hole of one triangle, a triangle that is given twice, a rim that is
