@@ -33,9 +33,10 @@ Value parsed(const std::string& name, const std::string& text, const char* kind)
   return value;
 }
 
-std::string joined(const std::vector<std::string>& words, const char* separator) {
+/// "a|b"
+std::string joined(const std::vector<std::string>& words) {
   std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : separator) + word;
+  for (const std::string& word : words) text += (text.empty() ? "" : "|") + word;
   return text;
 }
 
@@ -53,8 +54,8 @@ nlohmann::json value_of(const OptionSpec& spec, const std::string& text) {
     case OptionKind::kLength:
       return checked(parse_length_mm(text, spec.name));
     case OptionKind::kWord:
-      if (std::find(spec.words.begin(), spec.words.end(), text) != spec.words.end()) return text;
-      throw InputError(spec.name + " " + text + ": must be one of " + joined(spec.words, ", "));
+      spec.require_word(text);
+      return text;
     case OptionKind::kText:
       if (text.empty()) throw InputError(spec.name + ": must not be empty");
       return text;
@@ -74,7 +75,7 @@ std::string type_of(const OptionSpec& spec) {
     case OptionKind::kLength:
       return "MM";
     case OptionKind::kWord:
-      return joined(spec.words, "|");
+      return joined(spec.words);
     case OptionKind::kText:
       return spec.unit;
     case OptionKind::kFlag:

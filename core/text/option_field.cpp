@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "core/text/option_field.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/error.h"
@@ -26,6 +27,13 @@ void OptionSpec::require(const std::string& text, double value) const {
   if (limits.hold(value)) return;
   throw InputError(name + " " + text + ": must be " + limits.rule() +
                    (unit.empty() ? "" : " " + unit));
+}
+
+void OptionSpec::require_word(const std::string& text) const {
+  if (std::find(words.begin(), words.end(), text) != words.end()) return;
+  std::string known;
+  for (const std::string& word : words) known += (known.empty() ? "" : ", ") + word;
+  throw InputError(name + " " + text + ": must be one of " + known);
 }
 
 }  // namespace lensforge

@@ -58,6 +58,8 @@ struct OptionSpec {
   }
   /// @param text  the value as somebody wrote it. @throw InputError naming option, value and rule.
   void require(const std::string& text, double value) const;
+  /// @throw InputError naming option, text and words unless it is one of the words.
+  void require_word(const std::string& text) const;
 };
 
 /// One row of the table of an options struct: the option and its value in the struct. Command line,
@@ -65,7 +67,8 @@ struct OptionSpec {
 template <class Options>
 struct OptionField : OptionSpec {
   std::function<nlohmann::json(const Options&)> get;
-  std::function<void(Options&, const nlohmann::json&)> set;
+  std::function<void(Options&, const nlohmann::json&)>
+      set;  ///< @throw InputError as require_word()
   /// What a fingerprint holds of it: get(), but what a word stands for and not the word.
   std::function<nlohmann::json(const Options&)> stored;
   /// Why a fingerprint leaves it out; empty where it does not.
@@ -128,9 +131,11 @@ struct Row {
       }
       return nlohmann::json();
     };
-    field.set = [at, choices](Options& o, const nlohmann::json& v) {
+    field.set = [at, choices, spec = OptionSpec(field)](Options& o, const nlohmann::json& v) {
+      const auto& text = v.get_ref<const std::string&>();
+      spec.require_word(text);
       for (const auto& [word, meaning] : choices) {
-        if (word == v.get_ref<const std::string&>()) std::invoke(at, o) = meaning;
+        if (word == text) std::invoke(at, o) = meaning;
       }
     };
     field.stored = field.get;

@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <limits>
 #include <optional>
 
@@ -74,6 +75,14 @@ TEST(OptionField, ANumberOutsideItsLimitsIsNamedWithValueAndRule) {
   toy.count = 1;
   EXPECT_THAT(message_of<InputError>([&] { require_limits(toy_fields(), toy); }),
               StrEq("--count 1: must be 0, or 2 to 9"));
+}
+
+TEST(OptionField, AnUnknownWordIsNamedWithTheKnownOnes) {
+  Toy toy;
+  const auto side = std::ranges::find(toy_fields(), "--side", &OptionField<Toy>::name);
+  EXPECT_THAT(message_of<InputError>([&] { side->set(toy, "up"); }),
+              StrEq("--side up: must be one of none, left"));
+  EXPECT_EQ(toy.side, std::nullopt);
 }
 
 }  // namespace
