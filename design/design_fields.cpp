@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "design/design_fields.h"
 
+#include <string>
+
 #include "core/image/image_io.h"
+#include "core/text/number_text.h"
 
 namespace lensforge {
 
@@ -53,7 +56,8 @@ const OptionTable<DesignOptions>& design_fields() {
 const OptionTable<ObjectiveWeights>& weight_fields() {
   using W = ObjectiveWeights;
   static const OptionTable<W> table = [] {
-    const auto weight = [](const char* name, double W::*at, const char* help) {
+    constexpr int kDecimals = 9;
+    const auto weight = [](const char* name, double W::*at, const std::string& help) {
       return Row<W>::number(name, at, Limits::between(0, kMaxWeight), "", help);
     };
     return OptionTable<W>{
@@ -61,7 +65,8 @@ const OptionTable<ObjectiveWeights>& weight_fields() {
         weight("--weight-gradient", &W::gradient, "picture gradients (lambda 2)"),
         weight("--weight-boundary", &W::boundary, "light outside the picture (lambda 3)"),
         weight("--weight-smooth", &W::smooth,
-               "all smoothness terms (lambda 4); the default for --model facet is 0.00002"),
+               "all smoothness terms (lambda 4); the default for --model facet is " +
+                   trimmed_decimal(default_smoothness(SurfaceModel::kFacet), kDecimals)),
         weight("--weight-barrier", &W::barrier,
                "barriers against collapsed facets and total reflection (lambda 5)"),
         weight("--weight-edge", &W::edge,

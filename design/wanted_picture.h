@@ -20,9 +20,9 @@ class WantedPicture {
 
   struct Comparison {
     double excess = 0.0;  ///< MAE against the target above that of the wanted picture.
-    Eigen::VectorXd
-        missing;  ///< Per vertex: wanted − projected flux where its light lands, between
-                  ///< the pixels' middles linearly, relative to an evenly lit picture.
+    /// Per vertex: wanted − projected flux where its light lands, between the pixels' middles
+    /// linearly, relative to an evenly lit picture.
+    Eigen::VectorXd missing;
   };
 
   /// Of a smooth surface that is known by its own normals, 3 × V with z > 0.

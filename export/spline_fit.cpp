@@ -16,7 +16,7 @@
 namespace lensforge {
 namespace {
 
-/// Mesh cells that a patch covers each way when it covers no less than kFewestPatches.
+/// Mesh cells that a patch covers each way where the control points suffice for such patches.
 constexpr double kMeshCellsPerPatch = 32.0;
 
 /// Heights are rounded to the first (mm), which keeps files short, and coefficients where patches

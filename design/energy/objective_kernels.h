@@ -30,7 +30,7 @@ struct MeasureFace {
   }
 };
 
-/// What the faces throw onto the screen, as a source of FluxImageOn::render().
+/// What the faces project onto the screen, as a source of FluxImageOn::render().
 /// @pre frames, and what the rays keep of the surface, are up to date.
 template <class Rays>
 struct FaceLightSource {
@@ -39,7 +39,7 @@ struct FaceLightSource {
   LF_HD ImageTriangle operator()(std::int64_t face) const { return rays.image(o, face); }
 };
 
-/// Centroid of what a face throws onto the screen. @pre as of FaceLightSource.
+/// Centroid of what a face projects onto the screen. @pre as of FaceLightSource.
 template <class Rays>
 struct FaceCentroid {
   ObjectiveView o;

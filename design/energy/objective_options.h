@@ -13,7 +13,7 @@
 
 namespace lensforge {
 
-/// The area that a lens's outline keeps for itself: which thresholds its area barrier has.
+/// Thresholds of the area barrier for a mesh of so many triangles over the lens:
 /// ε1 = 0.1 % and ε2 = 0.5 % of the mean projected triangle: dark parts need small facets (a
 /// facet's flux is its projected area), and a thousandth still divides without loss of digits.
 AreaBarrier default_area_barrier(const OpticalSetup& setup, std::int64_t triangles);

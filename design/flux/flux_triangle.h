@@ -189,7 +189,7 @@ LF_HD inline bool is_small_needle(double doubled, double extent) {
 ///
 /// Error: 2⁻⁵² of the total flux per edge piece from the fixed point, plus rounding of about 1e-16
 /// × side²/area of the triangle's own flux; see kNeedleRatio for triangles without area.
-/// Measured by FluxTriangle.* in tests/design/flux_triangle_test.cpp.
+/// Measured by FluxTriangle.* in tests/design/flux/flux_triangle_test.cpp.
 LF_HD inline void deposit(const ImageTriangle& t, const FluxAccumulator& image) {
   namespace detail = flux_detail;
   const detail::PixelBox box(t);
@@ -299,7 +299,7 @@ LF_HD inline void doubled_area_adjoint(const ImageTriangle& t, double scale, Ima
 
 /// Adjoint of deposit(): derivatives of E by the triangle's corners and flux, for ∂E/∂(pixel).
 /// A pure gather. Triangles that deposit() treats as needles have no derivative by their corners.
-/// Checked against central differences in tests/design/flux_triangle_test.cpp.
+/// Checked against central differences in tests/design/flux/flux_triangle_test.cpp.
 LF_HD inline ImageTriangle deposit_adjoint(const ImageTriangle& t, const FluxCotangent& cotangent) {
   namespace detail = flux_detail;
   ImageTriangle bar;

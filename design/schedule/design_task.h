@@ -27,8 +27,9 @@ struct DesignTask {
 /// The picture at the size that the options ask for. @throw Interrupted
 Image working_picture(const Image& target, const DesignOptions& options, const RunControl& run);
 
-/// @param target  linear light, any size. Options and control must outlive the task. @throw
-/// Interrupted @pre validate(options, target) passes.
+/// Options and control must outlive the task.
+/// @param target  linear light, any size.
+/// @pre validate(options, target) passes. @throw Interrupted
 DesignTask make_task(const Image& target, const DesignOptions& options, const Executor& executor,
                      const RunControl& control);
 
