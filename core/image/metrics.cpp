@@ -113,9 +113,4 @@ ImageMetrics compare(const Image& render, const Image& target) {
   return metrics;
 }
 
-double structural_similarity(const Image& a, const Image& b) {
-  check_equal_sizes(a, b);
-  return mean_similarity(encoded_values(a), encoded_values(b), a.columns(), a.rows());
-}
-
 }  // namespace lensforge

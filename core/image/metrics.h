@@ -7,9 +7,12 @@ namespace lensforge {
 
 /// How close a projected picture is to its target (docs/interface.md, "Metrics").
 struct ImageMetrics {
-  double mae = 0.0;          ///< Mean absolute error of the display-encoded values, 0 … 1.
-  double psnr = 0.0;         ///< Peak signal-to-noise ratio of the same, dB; +inf when equal.
-  double ssim = 0.0;         ///< As scikit-image's structural_similarity, data_range = 1.
+  double mae = 0.0;   ///< Mean absolute error of the display-encoded values, 0 … 1.
+  double psnr = 0.0;  ///< Peak signal-to-noise ratio of the same, dB; +inf when equal.
+  /// Mean structural similarity of the same with 7 × 7 uniform windows, K1 = 0.01, K2 = 0.03,
+  /// sample covariance (Wang et al. 2004; scikit-image's structural_similarity, data_range = 1).
+  /// Pictures smaller than a window use the largest odd window that fits.
+  double ssim = 0.0;
   double mae_linear = 0.0;   ///< Mean absolute error of linear flux ÷ largest target flux.
   double flux_inside = 1.0;  ///< Share of the flux that lands on the image rectangle.
 };
@@ -17,10 +20,5 @@ struct ImageMetrics {
 /// Compares `render` with `target`, both linear light relative to the same white. Sets all but
 /// flux_inside. @pre equal sizes.
 ImageMetrics compare(const Image& render, const Image& target);
-
-/// Mean structural similarity with 7 × 7 uniform windows, K1 = 0.01, K2 = 0.03, sample covariance
-/// (Wang et al. 2004, scikit-image's defaults) of the display-encoded pictures. Pictures smaller
-/// than a window use the largest odd window that fits.
-double structural_similarity(const Image& a, const Image& b);
 
 }  // namespace lensforge

@@ -17,8 +17,7 @@ bool belongs_to_lens(const std::filesystem::path& path);
 /// Keeps an output from replacing what must not be lost.
 /// @param option  what named the output, for the message: "--out".
 /// @param force   the user said that any file may be replaced.
-/// @throw InputError if `path` is a folder, a device or a pipe, or a file of a lens folder,
-/// whatever
+/// @throw InputError if `path` is a folder, a device, a pipe or a file of a lens folder, whatever
 ///        `force` says; or a file that lensforge did not write, without `force`.
 void require_replaceable(const std::string& option, const std::filesystem::path& path, bool force);
 

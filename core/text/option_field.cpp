@@ -2,7 +2,6 @@
 #include "core/text/option_field.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "core/error.h"
 
@@ -15,12 +14,8 @@ bool Limits::hold(double value) const {
 
 std::string Limits::rule() const {
   const std::string zero = or_zero ? "0, or " : "";
-  const bool has_high = std::isfinite(high);
-  if (low_excluded) {
-    return zero + "above " + number_text(low) + (has_high ? ", at most " + number_text(high) : "");
-  }
-  if (has_high) return zero + number_text(low) + " to " + number_text(high);
-  return zero + "at least " + number_text(low);
+  return low_excluded ? zero + "above " + number_text(low) + ", at most " + number_text(high)
+                      : zero + number_text(low) + " to " + number_text(high);
 }
 
 void OptionSpec::require(const std::string& text, double value) const {

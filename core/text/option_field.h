@@ -20,7 +20,6 @@ struct Limits {
   bool low_excluded = false;
   bool or_zero = false;  ///< 0 as well, where it stands for something of its own.
 
-  static Limits at_least(double low) { return {.low = low}; }
   static Limits between(double low, double high) { return {.low = low, .high = high}; }
   static Limits above(double low, double high) {
     return {.low = low, .high = high, .low_excluded = true};
@@ -31,7 +30,7 @@ struct Limits {
 
   /// NaN is in no range.
   [[nodiscard]] bool hold(double value) const;
-  /// "0.25 to 8", "above 0, at most 9", "at least 4", "0, or 4 to 6".
+  /// "0.25 to 8", "above 0, at most 9", "0, or 4 to 6". @pre both are finite.
   [[nodiscard]] std::string rule() const;
 };
 

@@ -1,20 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include <Eigen/Core>
 #include <functional>
 #include <string>
 
-#include "core/compute/executor.h"
-
 namespace lensforge {
-
-/// Value and gradient of a function at x. An infinite value means that x is not allowed; the
-/// gradient is then not read.
-using Objective = std::function<double(const Eigen::VectorXd& x, Eigen::VectorXd& gradient)>;
-
-/// A symmetric positive definite guess of the inverse Hessian: r ← P g.
-using Preconditioner = std::function<void(const Eigen::VectorXd& g, Eigen::VectorXd& r)>;
 
 struct LbfgsOptions {
   int max_iterations = 100;
@@ -42,13 +32,5 @@ struct LbfgsSummary {
 
 /// Asked after every accepted step with the step's number; returning false ends the minimisation.
 using LbfgsObserver = std::function<bool(int iteration, double value)>;
-
-/// Limited-memory BFGS (Liu & Nocedal 1989) with `precondition` as initial matrix and a line search
-/// that meets the weak Wolfe conditions by bisection (Lewis & Overton 2013), stepping back where
-/// the value is infinite. `x` moves from the start to the best point found. Sums run in fixed
-/// order: the path does not depend on the thread count.
-LbfgsSummary minimize_lbfgs(const Objective& objective, const Preconditioner& precondition,
-                            const LbfgsOptions& options, const LbfgsObserver& observe,
-                            const Executor& executor, Eigen::VectorXd& x);
 
 }  // namespace lensforge

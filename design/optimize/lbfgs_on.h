@@ -17,11 +17,17 @@
 
 namespace lensforge {
 
-/// Objective and Preconditioner on vectors in an executor's memory.
+/// Value and gradient of a function at x, in an executor's memory. An infinite value means that x
+/// is not allowed; the gradient is then not read.
 using RawObjective = std::function<double(std::span<const double> x, std::span<double> gradient)>;
+
+/// A symmetric positive definite guess of the inverse Hessian, in an executor's memory: r ← P g.
 using RawPreconditioner = std::function<void(std::span<const double> g, std::span<double> r)>;
 
-/// minimize_lbfgs() on any executor: all vectors stay in its memory, only scalar products leave it.
+/// Limited-memory BFGS (Liu & Nocedal 1989) with a preconditioner as initial matrix and a line
+/// search that meets the weak Wolfe conditions by bisection (Lewis & Overton 2013), stepping back
+/// where the value is infinite. All vectors stay in the executor's memory, only scalar products
+/// leave it. Sums run in fixed order: the path does not depend on the thread count.
 template <class Exec>
 class LbfgsOn {
  public:

@@ -70,17 +70,4 @@ bool balance_masses(const SiteLevel& level, const NewtonControl& control, const 
   return true;
 }
 
-double transport_energy(const PowerDiagram& diagram, const std::vector<Moments>& cells,
-                        const Eigen::VectorXd& wanted) {
-  double energy = 0.0;
-  for (Eigen::Index i = 0; i < wanted.size(); ++i) {
-    const Moments& m = cells[static_cast<std::size_t>(i)];
-    const Eigen::Vector2d c = diagram.sites().col(i);
-    const double w = diagram.weights()[i];
-    const double cost = m.second - 2.0 * (c.x() * m.x + c.y() * m.y) + c.squaredNorm() * m.mass;
-    energy += w * (m.mass - wanted[i]) - cost;
-  }
-  return energy;
-}
-
 }  // namespace lensforge

@@ -55,9 +55,4 @@ struct NewtonControl {
 bool balance_masses(const SiteLevel& level, const NewtonControl& control, const Executor& executor,
                     CellStage& stage, PowerState& state);
 
-/// H(w) = Σ (−∫ (|x − c|² − w) ρ dx − wanted·w), convex; its gradient by w is mass − wanted
-/// (Sun et al., 3.4 and Appendix C).
-double transport_energy(const PowerDiagram& diagram, const std::vector<Moments>& cells,
-                        const Eigen::VectorXd& wanted);
-
 }  // namespace lensforge

@@ -95,6 +95,21 @@ inline std::vector<Moments> cell_moments(const PowerDiagram& diagram, const Summ
   return MeasuredDiagram(diagram, density, executor).moments();
 }
 
+/// H(w) = Σ (−∫ (|x − c|² − w) ρ dx − wanted·w), convex; its gradient by w is mass − wanted
+/// (Sun et al., 3.4 and Appendix C).
+inline double transport_energy(const PowerDiagram& diagram, const std::vector<Moments>& cells,
+                               const Eigen::VectorXd& wanted) {
+  double energy = 0.0;
+  for (Eigen::Index i = 0; i < wanted.size(); ++i) {
+    const Moments& m = cells[static_cast<std::size_t>(i)];
+    const Eigen::Vector2d c = diagram.sites().col(i);
+    const double w = diagram.weights()[i];
+    const double cost = m.second - 2.0 * (c.x() * m.x + c.y() * m.y) + c.squaredNorm() * m.mass;
+    energy += w * (m.mass - wanted[i]) - cost;
+  }
+  return energy;
+}
+
 /// The slow way to a power cell: the picture's rectangle cut by every half-plane.
 inline Polygon power_cell(const Eigen::Matrix2Xd& sites, const Eigen::VectorXd& weights,
                           Eigen::Index i, int columns, int rows) {

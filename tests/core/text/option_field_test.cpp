@@ -62,7 +62,6 @@ TEST(OptionField, LimitsHoldWhatTheirRuleSays) {
   EXPECT_TRUE(Limits::between(0, 1).hold(0));
   EXPECT_THAT(Limits::zero_or(2, 9).rule(), StrEq("0, or 2 to 9"));
   EXPECT_THAT(Limits::above(0, 1e7).rule(), StrEq("above 0, at most 1e+07"));
-  EXPECT_THAT(Limits::at_least(4).rule(), StrEq("at least 4"));
 }
 
 TEST(OptionField, ANumberOutsideItsLimitsIsNamedWithValueAndRule) {

@@ -1,17 +1,20 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/optimize/lbfgs.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
 #include <vector>
 
+#include "design/optimize/lbfgs_on.h"
 #include "design/random_input.h"
+#include "design/vector_lbfgs.h"
 
 namespace lensforge {
 namespace {
 
+using testing::minimize_lbfgs;
+using testing::Objective;
+using testing::Preconditioner;
 using Status = LbfgsSummary::Status;
 
 void identity(const Eigen::VectorXd& g, Eigen::VectorXd& r) { r = g; }

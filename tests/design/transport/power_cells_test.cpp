@@ -11,7 +11,6 @@
 #include "core/error.h"
 #include "design/finite_difference.h"
 #include "design/test_setups.h"
-#include "design/transport/power_newton.h"
 #include "design/transport_scenes.h"
 
 namespace lensforge {
@@ -20,6 +19,7 @@ namespace {
 using testing::cell_moments;
 using testing::measure_cells;
 using testing::Random;
+using testing::transport_energy;
 
 PowerDiagram diagram_of(const Eigen::Matrix2Xd& sites, const Eigen::VectorXd& weights) {
   return {sites, weights, spatial_order(sites), std::stop_token()};

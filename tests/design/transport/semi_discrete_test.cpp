@@ -10,11 +10,10 @@
 #include <string>
 
 #include "core/error.h"
-#include "design/optimize/lbfgs.h"
 #include "design/test_setups.h"
 #include "design/transport/density_blur.h"
-#include "design/transport/power_newton.h"
 #include "design/transport_scenes.h"
+#include "design/vector_lbfgs.h"
 #include "fixtures/scenes.h"
 
 namespace lensforge {
@@ -22,7 +21,9 @@ namespace {
 
 using testing::cell_moments;
 using testing::measure_cells;
+using testing::minimize_lbfgs;
 using testing::Random;
+using testing::transport_energy;
 
 TransportResult solve(const Eigen::Matrix2Xd& sites, const Image& density) {
   return solve_semi_discrete(sites, Eigen::VectorXd::Ones(sites.cols()), density, {},
