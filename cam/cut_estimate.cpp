@@ -7,6 +7,7 @@
 
 #include "cam/finish_setup.h"
 #include "cam/prediction.h"
+#include "cam/sampling_grid.h"
 #include "core/text/number_text.h"
 
 namespace lensforge {
@@ -80,7 +81,10 @@ double rough_points(const CamOptions& options, const Eigen::Vector2d& size) {
 
 double samples_of(const CamOptions& options, const Eigen::Vector2d& size) {
   const double spacing = sample_spacing(options);
-  return options.render ? kSurfaces * size.prod() / (spacing * spacing) : 0.0;
+  const double pitch =
+      finish_pitch(options.workshop.process.finish, finishing_ball(options).radius());
+  const double across = pitch / nodes_per_pass(pitch, spacing);
+  return options.render ? kSurfaces * size.prod() / (spacing * across) : 0.0;
 }
 
 double nodes_of(const Eigen::Vector2d& size) { return size.prod() / (kMeshSpacing * kMeshSpacing); }

@@ -102,10 +102,14 @@ ParameterGroup entry_parameters(const Process& process) {
   return group;
 }
 
-ParameterGroup polish_parameters(const CamOptions& options) {
-  ParameterGroup group{"Polishing, as assumed",
-                       {{"Gaussian σ", mm(options.polish.sigma, 3)},
-                        {"Sampled every", mm(sample_spacing(options), 4)}}};
+ParameterGroup polish_parameters(const CamOptions& options, const SamplingCheck& sampling) {
+  ParameterGroup group{
+      "Polishing, as assumed",
+      {{"Gaussian σ", mm(options.polish.sigma, 3)},
+       {"Sampled every",
+        mm(sampling.spacing.x(), 4) + " along x, " + mm(sampling.spacing.y(), 4) + " along y"},
+       {"Error of that sampling", "leakage " + decimal_text(100.0 * sampling.leakage, 3) +
+                                      " %, MAE " + decimal_text(sampling.mae, 5)}}};
   if (options.polish.rim_depth > 0.0) {
     group.parameters.push_back(
         {"Taken off at the rim",
@@ -298,6 +302,7 @@ Verdict whole_verdict(const CutPlan& plan, const ProgramFiles& programs,
 void add_prediction(const Prediction& prediction, const Lens& lens, ReportData& data) {
   data.target = lens.target;
   data.leakage = prediction.leakage;
+  data.sampling = prediction.sampling;
   data.shown = {{surface_name::kDesigned, "what is meant"},
                 {surface_name::kRounded, "the most that the ball can reach"},
                 {surface_name::kMilled, "before polishing: its ridges scatter light"},
@@ -331,7 +336,7 @@ ReportData make_report(const CutPlan& plan, const ProgramFiles& programs,
   data.warnings = warnings_of(plan, programs, lens);
   data.path = plan.shown_path();
   if (prediction) {
-    data.parameters.push_back(polish_parameters(options));
+    data.parameters.push_back(polish_parameters(options, prediction->sampling));
     add_prediction(*prediction, lens, data);
   }
   data.verdict = whole_verdict(plan, programs, prediction, lens);

@@ -7,6 +7,7 @@
 #include "cam/leakage/render_field.h"
 #include "cam/milled/lens_grid.h"
 #include "cam/milled/sampled_mesh.h"
+#include "cam/sampling_grid.h"
 #include "core/error.h"
 
 namespace lensforge {
@@ -26,14 +27,15 @@ constexpr double kMicrometres = 1e3;
 constexpr double kAlongPasses = 3.0;
 
 /// The chain with a grid of its own for the surface as milled, unless passes cross.
-LeakageChain chain_of(const PartSurfaces& surfaces, const Lens& lens, const CamOptions& options) {
+LeakageChain chain_of(const PartSurfaces& surfaces, const CamOptions& options,
+                      const Eigen::Vector2d& lens_size, const GridWindow& grid) {
   LeakageChain chain = surfaces.chain();
   const FinishProcess& finish = options.workshop.process.finish;
   if (finish.cross) return chain;
-  Eigen::Vector2d spacing = Eigen::Vector2d::Constant(sample_spacing(options));
+  Eigen::Vector2d spacing = grid.spacing;
   spacing[finish.along == PassAxis::kX ? 0 : 1] *= kAlongPasses;
   for (NamedSurface& other : chain.others) {
-    if (other.field == &surfaces.milled()) other.grid = lens_grid(lens.setup.lens_size, spacing);
+    if (other.field == &surfaces.milled()) other.grid = lens_grid(lens_size, spacing);
   }
   return chain;
 }
@@ -70,12 +72,15 @@ ReportMap height_map(const LeakMap& map) {
 }  // namespace
 
 Prediction predict_part(const PartSurfaces& surfaces, const Lens& lens, const CamOptions& options,
-                        const Executor& executor, const RunControl& control) {
+                        const FinishGround& ground, const Executor& executor,
+                        const RunControl& control) {
   Prediction result;
-  const GridWindow grid = lens_grid(lens.setup.lens_size, sample_spacing(options));
+  const GridWindow grid = sampling_grid(options, ground, lens.setup.lens_size);
   const FieldRenderSetup setup{lens.setup, grid};
-  const LeakageChain chain = chain_of(surfaces, lens, options);
+  const LeakageChain chain = chain_of(surfaces, options, lens.setup.lens_size, grid);
   result.leakage = measure_leakage(chain, lens.target, setup, options.leakage, executor, control);
+  result.sampling =
+      check_sampling(surfaces.part(), result.leakage, lens.target, setup, executor, control);
   const std::vector<double> weights =
       pixels_with_surplus(result.leakage.part().picture, result.leakage.designed.picture);
   const LeakMap map =

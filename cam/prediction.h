@@ -5,8 +5,10 @@
 #include <vector>
 
 #include "cam/cam_options.h"
+#include "cam/finish_setup.h"
 #include "cam/leakage/leak_map.h"
 #include "cam/leakage/leakage.h"
+#include "cam/leakage/sampling_check.h"
 #include "cam/milled/crease_map.h"
 #include "cam/part_surfaces.h"
 #include "cam/report/report_data.h"
@@ -19,6 +21,7 @@ namespace lensforge {
 
 /// What a part will project, before it is cut.
 struct Prediction {
+  SamplingCheck sampling;
   LeakageResult leakage;
   std::vector<LeakPlace> places;  ///< That leak most, worst first.
   CreaseMap creases;
@@ -33,6 +36,7 @@ inline constexpr double kMeshSpacing = 0.1;
 /// Renders every surface from the design to the polished part and finds where light leaks. Memory
 /// does not grow with the number of samples. @throw Interrupted
 Prediction predict_part(const PartSurfaces& surfaces, const Lens& lens, const CamOptions& options,
-                        const Executor& executor, const RunControl& control);
+                        const FinishGround& ground, const Executor& executor,
+                        const RunControl& control);
 
 }  // namespace lensforge

@@ -11,6 +11,7 @@
 #include "cam/milled/cast_field.h"
 #include "cam/milled/milled_field.h"
 #include "cam/milled/polished_field.h"
+#include "cam/sampling_grid.h"
 #include "core/error.h"
 
 namespace lensforge {
@@ -178,7 +179,7 @@ void TrialCut::add_pencil(const Eigen::AlignedBox2d& box, BallPath& path,
 LeakTrial TrialCut::at(const LeakPlace& place, const RunControl& control) const {
   const RunControl silent(control.stop_token(), {});
   const CamOptions& before = site_.plan.options();
-  const GridWindow grid = lens_grid(site_.lens.setup.lens_size, sample_spacing(before));
+  const GridWindow grid = sampling_grid(before, site_.plan.ground(), site_.lens.setup.lens_size);
   const CellGrid fine = refined(grid, place.cells, sample_spacing(options_));
   const std::optional<CastFrame> mould = site_.plan.mould();
   const double polished = PolishedField::kReach * options_.polish.sigma + grid.spacing.maxCoeff();
