@@ -40,9 +40,10 @@ set(CMAKE_CUDA_EXTENSIONS OFF)
 set(CMAKE_CUDA_RUNTIME_LIBRARY Static)
 message(STATUS "GPU: CUDA ${CUDAToolkit_VERSION}, architectures ${CMAKE_CUDA_ARCHITECTURES}")
 
-# How .cu files are compiled. 20012: Eigen 3.4 marks functions that need no mark. Constexpr functions
+# How .cu files are compiled; all code that is built beside them knows it by LENSFORGE_CUDA. 20012: Eigen 3.4 marks functions that need no mark. Constexpr functions
 # of the standard library (std::array, std::span) may run on the device.
 add_library(lensforge_cuda_options INTERFACE)
+target_compile_definitions(lensforge_cuda_options INTERFACE LENSFORGE_CUDA)
 target_compile_options(lensforge_cuda_options INTERFACE
   --expt-relaxed-constexpr -diag-suppress=20012
   -Xcompiler=-Wall,-Wextra,-Wshadow,-Wnon-virtual-dtor,-ffp-contract=off,-fno-math-errno)
@@ -55,8 +56,9 @@ if(LENSFORGE_WERROR)
 endif()
 
 # lensforge_cuda_sources(ROOM SOURCES ... [LINK ...])
-# Adds files that need CUDA to a room; its code knows by LENSFORGE_CUDA that they are there. They
-# form a library of their own, because .cu files do not take the options of the C++ files.
+# Adds .cu files to a room. They form a library of their own, because they do not take the options of
+# the C++ files. The room's C++ files keep their options too, so that turning the GPU on rebuilds
+# none of them; those that have to know of it are named in lensforge_cuda_callers().
 function(lensforge_cuda_sources room)
   cmake_parse_arguments(arg "" "" "SOURCES;LINK" ${ARGN})
   add_library(lensforge_${room}_cuda OBJECT ${arg_SOURCES})
@@ -66,6 +68,13 @@ function(lensforge_cuda_sources room)
   target_link_libraries(lensforge_${room}_cuda
     PRIVATE ${links} lensforge_cuda_options CUDA::cudart_static ${arg_LINK})
   target_sources(lensforge_${room} PRIVATE $<TARGET_OBJECTS:lensforge_${room}_cuda>)
-  target_link_libraries(lensforge_${room} PUBLIC CUDA::cudart_static PRIVATE ${arg_LINK})
-  target_compile_definitions(lensforge_${room} PUBLIC LENSFORGE_CUDA)
+  target_link_libraries(lensforge_${room} PRIVATE "$<LINK_ONLY:CUDA::cudart_static>" ${arg_LINK})
+endfunction()
+
+# lensforge_cuda_callers(SOURCES ...)
+# C++ files that call what .cu files or CUDA's own library offer.
+function(lensforge_cuda_callers)
+  set_source_files_properties(${ARGN} PROPERTIES
+    COMPILE_DEFINITIONS LENSFORGE_CUDA
+    COMPILE_OPTIONS "-isystem;${CUDAToolkit_INCLUDE_DIRS}")
 endfunction()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Targets for the rooms of the house: language level, warnings, include roots.
+# Targets for the rooms of the house: language level, warnings, include roots, installation.
 
 set(CMAKE_CXX_STANDARD 20)
 set(CMAKE_CXX_STANDARD_REQUIRED ON)
@@ -20,18 +20,41 @@ if(LENSFORGE_SANITIZE)
   target_link_options(lensforge_options INTERFACE -fsanitize=${LENSFORGE_SANITIZE})
 endif()
 
-# lensforge_room(NAME FOLDER SOURCES ... PUBLIC ... PRIVATE ...)
+include(LensforgePrecompile)
+include(GNUInstallDirs)
+set(LENSFORGE_INCLUDE_FOLDER "${CMAKE_INSTALL_INCLUDEDIR}/lensforge")
+
+# lensforge_install(TARGET NAME)
+# Makes a library part of the installed package, as lensforge::NAME.
+function(lensforge_install target name)
+  set_target_properties(${target} PROPERTIES EXPORT_NAME ${name})
+  install(TARGETS ${target} EXPORT lensforgeTargets ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}")
+endfunction()
+
+# lensforge_room(NAME FOLDER SOURCES ... PUBLIC ... PRIVATE ... [HEADERS ...] [INTERNAL])
 # A static library lensforge_NAME, alias lensforge::NAME, for the sources in FOLDER (relative to the
 # root). Its headers are reached as "FOLDER/header.h" through a link of its own, so that only
-# targets that link the room can include from it: the arrows between rooms are enforced.
+# targets that link the room can include from it: the arrows between rooms are enforced. HEADERS
+# are precompiled beside the common ones. INTERNAL rooms are not installed.
 function(lensforge_room name folder)
-  cmake_parse_arguments(arg "" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
+  cmake_parse_arguments(arg "INTERNAL" "" "SOURCES;PUBLIC;PRIVATE;HEADERS" ${ARGN})
   add_library(lensforge_${name} STATIC ${arg_SOURCES})
   add_library(lensforge::${name} ALIAS lensforge_${name})
+  target_compile_features(lensforge_${name} PUBLIC cxx_std_20)
   set(root "${CMAKE_BINARY_DIR}/rooms/${name}")
   cmake_path(GET folder PARENT_PATH parent)
   file(MAKE_DIRECTORY "${root}/${parent}")
   file(CREATE_LINK "${CMAKE_SOURCE_DIR}/${folder}" "${root}/${folder}" SYMBOLIC)
-  target_include_directories(lensforge_${name} PUBLIC "${root}")
-  target_link_libraries(lensforge_${name} PUBLIC ${arg_PUBLIC} PRIVATE lensforge_options ${arg_PRIVATE})
+  target_include_directories(lensforge_${name} PUBLIC
+    "$<BUILD_INTERFACE:${root}>" "$<INSTALL_INTERFACE:${LENSFORGE_INCLUDE_FOLDER}>")
+  target_link_libraries(lensforge_${name}
+    PUBLIC ${arg_PUBLIC} PRIVATE "$<BUILD_INTERFACE:lensforge_options>" ${arg_PRIVATE})
+  if(LENSFORGE_PRECOMPILED_HEADERS AND arg_HEADERS)
+    target_precompile_headers(lensforge_${name} PRIVATE ${LENSFORGE_COMMON_HEADERS} ${arg_HEADERS})
+  else()
+    lensforge_precompile(lensforge_${name} lensforge_common_headers)
+  endif()
+  if(NOT arg_INTERNAL)
+    lensforge_install(lensforge_${name} ${name})
+  endif()
 endfunction()

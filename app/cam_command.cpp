@@ -181,7 +181,8 @@ nlohmann::json workshop_json(const Workshop& workshop) {
 
 int cam_command(const Arguments& command_line) {
   CamSettings settings;
-  OptionSet options("cam", "Makes the programs that mill a lens and foretells what it will throw.");
+  OptionSet options("cam",
+                    "Makes the programs that mill a lens and predicts what it will project.");
   add_cam_options(options, settings);
   options.parse(command_line);
   const Console console(options.common().json, options.common().quiet);
@@ -190,8 +191,8 @@ int cam_command(const Arguments& command_line) {
     reading.emplace(settings.source, FolderLock::Kind::kShared);
   }
   const Lens lens = read_lens(settings.source);
-  CamOptions cam = cam_options(options, settings);
-  cam.surface = settings.surface.value_or(lens.model);
+  settle(options, settings);
+  const CamOptions& cam = settings.cam;
   if (settings.show_workshop) {
     console.result(workshop_json(cam.workshop), workshop_toml(cam.workshop));
     return kDone;

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <filesystem>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,24 +10,12 @@
 
 namespace lensforge::app {
 
-/// What `lensforge cam` was asked for. Numbers that belong to the workshop stand here with its
-/// defaults and overrule it only where the command line or --config gave them.
+/// What `lensforge cam` was asked for.
 struct CamSettings {
   std::string source;
   std::string workshop;  ///< TOML file; empty for the defaults.
   bool show_workshop = false;
-  std::string post;  ///< NAME|FILE.toml
-  double split_mb = 0.0;
-  double rough_tool = 0.0;  ///< Diameter, mm.
-  bool no_rough = false;
-  bool no_semi = false;
-  bool no_arcs = false;
-  bool no_render = false;
-  std::vector<std::string> compare;     ///< What to compare; empty: make programs.
-  std::optional<SurfaceModel> surface;  ///< To cut; none: the model of the design.
-  Tool finish_tool;
-  Process process;
-  Stock stock;
+  std::vector<std::string> compare;  ///< What to compare; empty: make programs.
   CamOptions cam;
 
   /// DIR/cam
@@ -40,8 +27,8 @@ struct CamSettings {
 /// Adds every option of the command.
 void add_cam_options(OptionSet& options, CamSettings& settings);
 
-/// The options of the stage: the workshop file's content under what was given.
-/// @throw InputError naming file or option, value and rule.
-CamOptions cam_options(const OptionSet& options, const CamSettings& settings);
+/// Puts what was given over the workshop file. @throw InputError naming file or option, value and
+/// rule.
+void settle(OptionSet& options, CamSettings& settings);
 
 }  // namespace lensforge::app

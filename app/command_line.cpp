@@ -47,7 +47,7 @@ std::string overall_help() {
             command.summary + "\n";
   }
   text +=
-      "\n  lensforge COMMAND --help tells a command's options, their units and defaults\n"
+      "\n  lensforge COMMAND --help lists a command's options, their units and defaults\n"
       "  lensforge --version\n\n"
       "Exit codes: 0 done; 1 failed while running; 2 bad usage or input; 3 done, but a stated\n"
       "limit was not met; 130 interrupted, with everything done so far kept.\n";
@@ -63,20 +63,6 @@ int dispatch(const Arguments& arguments) {
     if (name == command.name) return command.run({arguments.begin() + 1, arguments.end()});
   }
   throw InputError(name + ": no such command; lensforge --help lists them");
-}
-
-/// Whether errors are to be told as JSON too: also where the command line is what is wrong.
-bool wants_json(const Arguments& arguments) {
-  constexpr std::string_view kConfig = "--config=";
-  for (std::size_t i = 0; i < arguments.size(); ++i) {
-    const std::string& word = arguments[i];
-    if (word == "--json") return true;
-    if (word == "--config" && i + 1 < arguments.size() && config_asks_for_json(arguments[i + 1])) {
-      return true;
-    }
-    if (word.starts_with(kConfig) && config_asks_for_json(word.substr(kConfig.size()))) return true;
-  }
-  return false;
 }
 
 int guarded(const Arguments& arguments) {
@@ -96,6 +82,19 @@ int guarded(const Arguments& arguments) {
 }
 
 }  // namespace
+
+bool wants_json(const Arguments& arguments) {
+  constexpr std::string_view kConfig = "--config=";
+  for (std::size_t i = 0; i < arguments.size(); ++i) {
+    const std::string& word = arguments[i];
+    if (word == "--json") return true;
+    if (word == "--config" && i + 1 < arguments.size() && config_asks_for_json(arguments[i + 1])) {
+      return true;
+    }
+    if (word.starts_with(kConfig) && config_asks_for_json(word.substr(kConfig.size()))) return true;
+  }
+  return false;
+}
 
 int run_command_line(const std::vector<std::string>& arguments) noexcept {
   try {

@@ -8,6 +8,7 @@
 #include "core/io/files.h"
 #include "core/io/output_guard.h"
 #include "core/surface/lens.h"
+#include "core/text/json_text.h"
 #include "design/design_lens.h"
 
 namespace lensforge::app {
@@ -33,10 +34,15 @@ bool is_own(const fs::path& path) {
   return written_by_lensforge(path);
 }
 
+/// Null where the file cannot be understood: whoever needs it says so.
 nlohmann::json provenance_of(const fs::path& json) {
-  const nlohmann::json document =
-      nlohmann::json::parse(read_whole_file(json, kMostJson), nullptr, false);
-  return document.is_object() ? document.value("provenance", nlohmann::json()) : nlohmann::json();
+  const std::string text = read_whole_file(json, kMostJson);
+  try {
+    const nlohmann::json document = parse_json(text, json.string());
+    return document.is_object() ? document.value("provenance", nlohmann::json()) : nlohmann::json();
+  } catch (const InputError&) {
+    return nullptr;
+  }
 }
 
 [[noreturn]] void refuse(const fs::path& folder, const std::string& holds) {
@@ -97,7 +103,7 @@ void require_finished(const fs::path& folder, const EarlierDesign& earlier,
   if (!earlier.provenance.is_object()) refuse(folder, "a lens.json that cannot be understood");
   if (earlier.provenance.value("status", nlohmann::json()) == "interrupted") {
     refuse(folder, std::string("an unfinished design whose ") + lens_file::kCheckpoint +
-                       " is missing: there is nothing to resume; begin again with --force");
+                       " is missing: nothing to resume; start again with --force");
   }
   if (earlier.provenance.contains("fingerprint") && !earlier.is_of(fingerprint)) {
     refuse(folder,

@@ -3,7 +3,7 @@
 
 namespace lensforge::app {
 
-/// What the command returns to the shell (interface.md, "Exit codes").
+/// What the command returns to the shell (docs/interface.md, "Exit codes").
 enum ExitCode : int {
   kDone = 0,
   kFailed = 1,         ///< It failed while running.

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "app/command_line.h"
 #include "app/commands.h"
 #include "app/console.h"
 #include "app/exit_code.h"
@@ -84,17 +85,16 @@ void describe_provenance(Description& d, const nlohmann::json& provenance) {
 
 Description describe_lens(const fs::path& folder) {
   const Lens lens = read_lens(folder);
-  Description d{{{"kind", "lens"}, {"model", model_word(lens.model)}}, {}};
+  Description d{{{"kind", "lens"}, {"model", model_name(lens.model)}}, {}};
   describe_setup(d, lens.setup);
-  d.line("model", model_word(lens.model));
+  d.line("model", model_name(lens.model));
   const GridShape grid = lens.surface.grid;
   if (grid.is_grid()) d.line("grid", size_text(grid.columns, grid.rows));
   d.json["grid"] = {grid.columns, grid.rows};
   describe_mesh(d, lens.surface);
-  d.line("facet", metrics_text(lens.facet_metrics));
-  d.line("smooth", metrics_text(lens.smooth_metrics));
-  d.json["metrics"] = {{"facet", metrics_json(lens.facet_metrics)},
-                       {"smooth", metrics_json(lens.smooth_metrics)}};
+  for (const auto& [model, metrics] : lens.metrics)
+    d.line(model_name(model), metrics_text(metrics));
+  d.json["metrics"] = metrics_json(lens.metrics);
   describe_provenance(d, lens.provenance);
   return d;
 }
@@ -186,9 +186,7 @@ int info_command(const Arguments& command_line) try {
                  printable_line(source) + ": " + d.json["kind"].get<std::string>() + "\n" + d.text);
   return kDone;
 } catch (const Interrupted&) {
-  const bool json =
-      std::find(command_line.begin(), command_line.end(), "--json") != command_line.end();
-  return report_interrupted(json);
+  return report_interrupted(wants_json(command_line));
 }
 
 }  // namespace lensforge::app

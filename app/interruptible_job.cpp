@@ -4,8 +4,6 @@
 #include <unistd.h>
 
 #include "app/exit_code.h"
-#include "core/text/number_text.h"
-#include "export/export_work.h"
 
 namespace lensforge::app {
 
@@ -42,14 +40,7 @@ int report_interrupted(bool json) noexcept {
   return report_error("interrupted; nothing was written", kInterrupted, json);
 }
 
-void announce_work(const std::function<WorkEstimate(double)>& work, const std::string& option,
-                   double value, const fs::path& out, const Console& console) {
-  const fs::path folder = fs::absolute(out).parent_path();
-  const WorkEstimate needed = work(value);
-  const std::int64_t fits = largest_with_room(work, value, folder);
-  require_room(needed, folder, option + " " + number_text(value, 8),
-               fits > 0 ? option + " " + std::to_string(fits) + " would fit"
-                        : std::string("make room for it"));
+void announce_work(const WorkEstimate& needed, const Console& console) {
   if (needed.seconds > kWorthTelling) console.note("this takes " + estimate_words(needed));
 }
 

@@ -2,10 +2,8 @@
 #pragma once
 
 #include <filesystem>
-#include <functional>
 #include <memory>
 #include <mutex>
-#include <string>
 
 #include "app/console.h"
 #include "app/interrupt.h"
@@ -49,9 +47,7 @@ class InterruptibleJob {
 /// What a command says that was interrupted before it wrote anything. Returns the exit code.
 int report_interrupted(bool json) noexcept;
 
-/// Tells about how much a long job takes. @throw InputError if there is no room for it, naming the
-/// option and the value that would fit. @param work  by the value of that option.
-void announce_work(const std::function<WorkEstimate(double)>& work, const std::string& option,
-                   double value, const std::filesystem::path& out, const Console& console);
+/// Tells about how much a long job takes.
+void announce_work(const WorkEstimate& needed, const Console& console);
 
 }  // namespace lensforge::app

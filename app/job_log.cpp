@@ -55,7 +55,7 @@ constexpr SinkKind kLog{"log", begins_log};
 }  // namespace
 
 JobLog::JobLog(const SendSettings& settings, Warn warn) : warn_(std::move(warn)) {
-  if (settings.dry_run && settings.log.empty()) return;
+  if (!settings.has_log()) return;
   try {
     file_ = TextSink(settings.log_path(), kLog);
   } catch (const InputError& refused) {
@@ -67,7 +67,7 @@ JobLog::JobLog(const SendSettings& settings, Warn warn) : warn_(std::move(warn))
 void JobLog::line(const std::string& text) {
   if (!file_.open()) return;
   const std::string failure = file_.write(time_stamp() + "  " + printable_line(text, kLongestLine));
-  if (!failure.empty()) warn_("warning: the log ends here: " + failure);
+  if (!failure.empty()) warn_("warning: the log stops here: " + failure);
 }
 
 void JobLog::begin(const OptionSet& options, const JobIdentity& job) {
@@ -114,7 +114,7 @@ void JobLog::end(const SendResult& result) {
   line("end: sent up to line " + std::to_string(result.sent) + ", taken up to line " +
        std::to_string(result.acknowledged) + ", carried out up to line " +
        std::to_string(result.executed) + ", " +
-       (result.at_rest ? "the machine stands still" : "the machine was not seen to come to rest") +
+       (result.at_rest ? "the machine has stopped" : "the machine was not seen to come to rest") +
        ", took " + duration_text(result.seconds));
 }
 

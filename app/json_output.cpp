@@ -28,6 +28,21 @@ std::string fixed(double value, int digits) {
   return text.data();
 }
 
+nlohmann::json metrics_json(const ModelMetrics& metrics) {
+  nlohmann::json by_model;
+  for (const auto& [model, one] : metrics) by_model[model_name(model)] = metrics_json(one);
+  return by_model;
+}
+
+std::string metrics_text(const ModelMetrics& metrics) {
+  std::string text;
+  for (const auto& [model, one] : metrics) {
+    const std::string name = model_name(model);
+    text += "  " + name + std::string(8 - name.size(), ' ') + metrics_text(one) + "\n";
+  }
+  return text;
+}
+
 std::string size_text(long columns, long rows) {
   return std::to_string(columns) + " x " + std::to_string(rows);
 }
@@ -37,12 +52,8 @@ nlohmann::json seal_json(const std::optional<bool>& holds) {
 }
 
 std::string seal_words(const std::optional<bool>& holds) {
-  if (!holds) return "none: nothing tells whether it was changed";
+  if (!holds) return "none: cannot tell whether the program was changed";
   return *holds ? "holds: as cam wrote it" : "broken: changed or cut short since cam wrote it";
-}
-
-std::string model_word(SurfaceModel model) {
-  return model == SurfaceModel::kFacet ? "facet" : "smooth";
 }
 
 }  // namespace lensforge::app

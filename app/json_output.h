@@ -6,16 +6,20 @@
 #include <string>
 
 #include "core/image/metrics.h"
-#include "core/optics/optical_setup.h"
+#include "core/surface/lens.h"
 
 /// The words and numbers that more than one command prints.
 namespace lensforge::app {
 
 /// {"mae", "psnr", "ssim", "mae_linear", "flux_inside"}; psnr is null where it is infinite.
 nlohmann::json metrics_json(const ImageMetrics& metrics);
+/// An object with those of every model.
+nlohmann::json metrics_json(const ModelMetrics& metrics);
 
 /// One line: "MAE 0.0123  PSNR 31.2 dB  SSIM 0.961  linear MAE 0.0042  flux inside 99.8 %".
 std::string metrics_text(const ImageMetrics& metrics);
+/// A line for every model.
+std::string metrics_text(const ModelMetrics& metrics);
 
 /// A number with `digits` digits after the point.
 std::string fixed(double value, int digits);
@@ -26,7 +30,5 @@ std::string size_text(long columns, long rows);
 /// What check_seal() said of a program: true, false, or null without a seal; and in words.
 nlohmann::json seal_json(const std::optional<bool>& holds);
 std::string seal_words(const std::optional<bool>& holds);
-
-std::string model_word(SurfaceModel model);
 
 }  // namespace lensforge::app

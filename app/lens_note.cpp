@@ -6,7 +6,7 @@ namespace lensforge::app {
 void note_unfinished_design(const Lens& lens, const Console& console) {
   const auto& about = lens.provenance;
   if (!about.is_object() || about.value("status", nlohmann::json()) != "interrupted") return;
-  console.note("note: the lens's design was interrupted; design --resume would finish it");
+  console.note("note: the lens's design was interrupted; finish it with design --resume");
 }
 
 }  // namespace lensforge::app

@@ -4,12 +4,14 @@
 #include <CLI/CLI.hpp>
 #include <charconv>
 #include <cmath>
-#include <sstream>
+#include <cstdint>
+#include <deque>
 
 #include "app/toml_config.h"
 #include "core/compute/gpu.h"
 #include "core/error.h"
 #include "core/io/files.h"
+#include "core/text/number_text.h"
 #include "core/text/units.h"
 #include "core/text/version.h"
 
@@ -17,31 +19,8 @@ namespace lensforge::app {
 namespace {
 
 constexpr const char* kCommonGroup = "Common options";
-constexpr double kMostThreads = 1024;
+constexpr double kMaxThreads = 1024;
 constexpr std::size_t kHelpColumn = 34;
-
-std::string short_text(double value) {
-  std::ostringstream text;
-  text << value;
-  return text.str();
-}
-
-std::string rule_text(const Limits& limits) {
-  const bool has_high = std::isfinite(limits.high);
-  if (limits.low_excluded && has_high) {
-    return "above " + short_text(limits.low) + ", at most " + short_text(limits.high);
-  }
-  if (limits.low_excluded) return "above " + short_text(limits.low);
-  if (has_high) return short_text(limits.low) + " to " + short_text(limits.high);
-  return "at least " + short_text(limits.low);
-}
-
-void require(const std::string& name, const std::string& text, double value, const Limits& limits) {
-  const bool too_low = limits.low_excluded ? !(value > limits.low) : !(value >= limits.low);
-  if (too_low || !(value <= limits.high)) {
-    throw InputError(name + " " + text + ": must be " + rule_text(limits));
-  }
-}
 
 template <class Value>
 Value parsed(const std::string& name, const std::string& text, const char* kind) {
@@ -58,6 +37,68 @@ std::string joined(const std::vector<std::string>& words, const char* separator)
   std::string text;
   for (const std::string& word : words) text += (text.empty() ? "" : separator) + word;
   return text;
+}
+
+/// A value as its option asks for it. @throw InputError naming option, value and rule.
+nlohmann::json value_of(const OptionSpec& spec, const std::string& text) {
+  const auto checked = [&](auto value) {
+    spec.require(text, static_cast<double>(value));
+    return nlohmann::json(value);
+  };
+  switch (spec.kind) {
+    case OptionKind::kWhole:
+      return checked(parsed<int>(spec.name, text, "a whole number"));
+    case OptionKind::kNumber:
+      return checked(parsed<double>(spec.name, text, "a number"));
+    case OptionKind::kLength:
+      return checked(parse_length_mm(text, spec.name));
+    case OptionKind::kWord:
+      if (std::find(spec.words.begin(), spec.words.end(), text) != spec.words.end()) return text;
+      throw InputError(spec.name + " " + text + ": must be one of " + joined(spec.words, ", "));
+    case OptionKind::kText:
+      if (text.empty()) throw InputError(spec.name + ": must not be empty");
+      return text;
+    case OptionKind::kFlag:
+      break;
+  }
+  return text == "true";
+}
+
+/// What stands for a value in the help: "MM", "a|b".
+std::string type_of(const OptionSpec& spec) {
+  switch (spec.kind) {
+    case OptionKind::kWhole:
+      return "N";
+    case OptionKind::kNumber:
+      return "NUMBER";
+    case OptionKind::kLength:
+      return "MM";
+    case OptionKind::kWord:
+      return joined(spec.words, "|");
+    case OptionKind::kText:
+      return spec.unit;
+    case OptionKind::kFlag:
+      break;
+  }
+  return {};
+}
+
+/// The help with unit and limits.
+std::string help_of(const OptionSpec& spec) {
+  if (!spec.is_number()) return spec.help;
+  return spec.help + "; " + (spec.unit.empty() ? "" : spec.unit + ", ") + spec.limits.rule();
+}
+
+std::string default_text(const nlohmann::json& value) {
+  if (value.is_string()) return value.get<std::string>();
+  return value.is_number_float() ? number_text(value.get<double>()) : value.dump();
+}
+
+/// Text for a manual page: no character begins a request or an escape.
+std::string manual_text(const std::string& text) {
+  std::string safe;
+  for (const char c : text) safe += c == '\\' ? std::string("\\e") : std::string(1, c);
+  return safe.starts_with('.') || safe.starts_with('\'') ? "\\&" + safe : safe;
 }
 
 /// --help with one option a line, its default and its limits.
@@ -86,16 +127,40 @@ class Formatter : public CLI::Formatter {
   }
 };
 
+const OptionTable<CommonOptions>& common_fields() {
+  using R = Row<CommonOptions>;
+  static const OptionTable<CommonOptions> table{
+      R::flag("--json", &CommonOptions::json,
+              "print one JSON object with the result, nothing else, on stdout"),
+      R::flag("--quiet", &CommonOptions::quiet,
+              "no progress and no messages on stderr, errors excepted"),
+      R::whole("--threads", &CommonOptions::threads, Limits::between(0, kMaxThreads),
+               "threads to use, 0 for all; never changes a result"),
+      R::word<std::string>("--device", &CommonOptions::device,
+                           {{"auto", "auto"}, {"cpu", "cpu"}, {"cuda", "cuda"}},
+                           "where to optimise and render; auto: a GPU if there is one")};
+  return table;
+}
+
 }  // namespace
 
 std::string version_line() { return program_mark() + "\n"; }
+
+/// An option with its value as it was given, null until then.
+struct BoundOption {
+  OptionSpec spec;
+  std::function<nlohmann::json()> get;
+  std::function<void(const nlohmann::json&)> set;
+  nlohmann::json given = nullptr;
+};
 
 struct OptionSet::Parser {
   Parser(const std::string& command, const std::string& description)
       : app(description, "lensforge " + command) {}
 
   CLI::App app;
-  std::vector<std::pair<std::string, Getter>> getters;
+  std::deque<BoundOption> options;  ///< Those of the command, then the common ones.
+  std::size_t own = 0;              ///< Of the command.
 };
 
 OptionSet::OptionSet(const std::string& command, const std::string& description)
@@ -105,16 +170,27 @@ OptionSet::OptionSet(const std::string& command, const std::string& description)
 
 OptionSet::~OptionSet() = default;
 
-void OptionSet::add(const std::string& name, const std::string& type, const std::string& help,
-                    const Setter& set, const Getter& get) {
-  const nlohmann::json value = get();
-  const std::string shown = value.is_string()         ? value.get<std::string>()
-                            : value.is_number_float() ? short_text(value.get<double>())
-                                                      : value.dump();
-  parser_->app.add_option_function<std::string>(name, set, help)
-      ->type_name(type)
-      ->default_str(shown);
-  parser_->getters.emplace_back(name, get);
+void OptionSet::add(const OptionSpec& spec, Getter get, Setter set) {
+  BoundOption& option =
+      parser_->options.emplace_back(BoundOption{spec, std::move(get), std::move(set)});
+  CLI::App& app = parser_->app;
+  if (spec.kind == OptionKind::kFlag) {
+    app.add_flag_function(
+        spec.name, [&option](std::int64_t count) { option.given = count > 0; }, spec.help);
+    return;
+  }
+  const auto take = [&option](const std::string& text) {
+    option.given = value_of(option.spec, text);
+  };
+  app.add_option_function<std::string>(spec.name, take, help_of(spec))
+      ->type_name(type_of(spec))
+      ->default_str(default_text(option.get()));
+}
+
+void OptionSet::restate() {
+  for (const BoundOption& option : parser_->options) {
+    if (!option.given.is_null()) option.set(option.given);
+  }
 }
 
 void OptionSet::positional(const std::string& name, std::string& value, const std::string& help) {
@@ -130,88 +206,38 @@ void OptionSet::required_text(const std::string& name, std::string& value, const
 
 void OptionSet::text(const std::string& name, std::string& value, const std::string& type,
                      const std::string& help) {
-  const auto set = [&value, name](const std::string& given) {
-    if (given.empty()) throw InputError(name + ": must not be empty");
-    value = given;
-  };
-  add(name, type, help, set, [&value] { return nlohmann::json(value); });
+  add(
+      {name, OptionKind::kText, help, {}, type, {}}, [&value] { return nlohmann::json(value); },
+      [&value](const nlohmann::json& given) { value = given; });
 }
 
 void OptionSet::texts(const std::string& name, std::vector<std::string>& values,
                       const std::string& type, const std::string& help) {
   parser_->app.add_option(name, values, help)->type_name(type);
-  parser_->getters.emplace_back(name, [&values] { return nlohmann::json(values); });
+  parser_->options.push_back({{name, OptionKind::kText, help, {}, type, {}},
+                              [&values] { return nlohmann::json(values); },
+                              [](const nlohmann::json& /*set by the parser*/) {}});
 }
 
 void OptionSet::flag(const std::string& name, bool& value, const std::string& help) {
-  parser_->app.add_flag(name, value, help);
-  parser_->getters.emplace_back(name, [&value] { return nlohmann::json(value); });
-}
-
-void OptionSet::length(const std::string& name, double& mm, const Limits& limits,
-                       const std::string& help) {
-  const auto set = [&mm, name, limits](const std::string& given) {
-    const double value = parse_length_mm(given, name);
-    require(name, given, value, limits);
-    mm = value;
-  };
-  add(name, "MM", help + "; mm, " + rule_text(limits), set, [&mm] { return nlohmann::json(mm); });
-}
-
-void OptionSet::number(const std::string& name, double& value, const Limits& limits,
-                       const std::string& unit, const std::string& help) {
-  const auto set = [&value, name, limits](const std::string& given) {
-    const auto number = parsed<double>(name, given, "a number");
-    require(name, given, number, limits);
-    value = number;
-  };
-  const std::string in_unit = unit.empty() ? "; " : "; " + unit + ", ";
-  add(name, "NUMBER", help + in_unit + rule_text(limits), set,
-      [&value] { return nlohmann::json(value); });
-}
-
-void OptionSet::integer(const std::string& name, int& value, const Limits& limits,
-                        const std::string& help) {
-  const auto set = [&value, name, limits](const std::string& given) {
-    const int number = parsed<int>(name, given, "a whole number");
-    require(name, given, number, limits);
-    value = number;
-  };
-  add(name, "N", help + "; " + rule_text(limits), set, [&value] { return nlohmann::json(value); });
-}
-
-void OptionSet::add_choice(const std::string& name, const std::vector<std::string>& words,
-                           const std::string& help, const std::function<void(std::size_t)>& choose,
-                           const Getter& get) {
-  const auto set = [name, words, choose](const std::string& given) {
-    const auto found = std::find(words.begin(), words.end(), given);
-    if (found == words.end()) {
-      throw InputError(name + " " + given + ": must be one of " + joined(words, ", "));
-    }
-    choose(static_cast<std::size_t>(found - words.begin()));
-  };
-  add(name, joined(words, "|"), help, set, get);
+  add(
+      {name, OptionKind::kFlag, help, {}, {}, {}}, [&value] { return nlohmann::json(value); },
+      [&value](const nlohmann::json& given) { value = given; });
 }
 
 void OptionSet::add_common() {
-  const auto own_getters = parser_->getters;
-  const Choices<std::string> devices{{"auto", "auto"}, {"cpu", "cpu"}, {"cuda", "cuda"}};
-  flag("--json", common_.json, "print one JSON object with the result, nothing else, on stdout");
-  flag("--quiet", common_.quiet, "no progress and no messages on stderr, errors excepted");
-  integer("--threads", common_.threads, Limits::between(0, kMostThreads),
-          "threads to use, 0 for all; never changes a result");
-  choice("--device", common_.device, devices,
-         "where to optimise and render; auto: a GPU if there is one");
+  parser_->own = parser_->options.size();
+  fields(common_fields(), common_);
   CLI::App& app = parser_->app;
   app.set_config("--config", "", "read options from this TOML file; the command line wins")
       ->type_name("FILE.toml");
   app.set_help_flag("-h,--help", "print this help and exit");
+  app.set_help_all_flag("--help-man", "print the options as a part of the manual page")->group("");
   app.set_version_flag("--version", program_mark(), "print the version");
   for (const char* name :
        {"--json", "--quiet", "--threads", "--device", "--config", "--help", "--version"}) {
     app.get_option(name)->group(kCommonGroup);
   }
-  parser_->getters = own_getters;
 }
 
 void OptionSet::parse(const Arguments& arguments) {
@@ -234,11 +260,14 @@ void OptionSet::parse(const Arguments& arguments) {
     app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));
   } catch (const CLI::CallForHelp&) {
     throw HelpText(app.help());
+  } catch (const CLI::CallForAllHelp&) {
+    throw HelpText(manual());
   } catch (const CLI::CallForVersion&) {
     throw HelpText(version_line());
   } catch (const CLI::ParseError& e) {
     throw InputError(std::string(e.what()) + "; " + app.get_name() + " --help lists the options");
   }
+  restate();
   if (common_.device == "cuda") {
     const Gpu gpu = find_gpu();
     if (!gpu.usable) throw InputError("--device cuda: " + gpu.reason);
@@ -249,10 +278,30 @@ bool OptionSet::given(const std::string& name) const { return parser_->app.count
 
 nlohmann::json OptionSet::used() const {
   nlohmann::json object = nlohmann::json::object();
-  for (const auto& [name, get] : parser_->getters) {
-    object[name.substr(std::min(name.find_first_not_of('-'), name.size()))] = get();
+  for (std::size_t i = 0; i < parser_->own; ++i) {
+    const BoundOption& option = parser_->options[i];
+    const std::string& name = option.spec.name;
+    const bool as_given = option.spec.kind == OptionKind::kText && !option.given.is_null();
+    object[name.substr(std::min(name.find_first_not_of('-'), name.size()))] =
+        as_given ? option.given : option.get();
   }
   return object;
+}
+
+std::string OptionSet::manual() const {
+  std::string text;
+  for (std::size_t i = 0; i < parser_->own; ++i) {
+    const BoundOption& option = parser_->options[i];
+    const OptionSpec& spec = option.spec;
+    if (!spec.name.starts_with('-')) continue;
+    const std::string type = type_of(spec);
+    text += ".It Fl " + spec.name.substr(1) + (type.empty() ? "" : " Ar " + type) + "\n";
+    text += manual_text(help_of(spec)) + ".\n";
+    const std::string value = default_text(option.get());
+    const bool shown = spec.kind != OptionKind::kFlag && !value.empty() && value != "[]";
+    if (shown) text += "Default: " + value + ".\n";
+  }
+  return text;
 }
 
 Executor OptionSet::executor() const { return Executor::cpu(common_.threads); }

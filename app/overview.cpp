@@ -9,6 +9,7 @@
 #include "core/image/image_io.h"
 #include "core/image/transfer.h"
 #include "core/optics/image_plane.h"
+#include "core/surface/mesh_normals.h"
 
 namespace lensforge::app {
 namespace {
@@ -130,7 +131,7 @@ Image draw_relief(const SurfaceMesh& mesh, const OpticalSetup& setup, int column
     const Eigen::Vector3d a = mesh.corner(t, 0);
     const Eigen::Vector3d b = mesh.corner(t, 1);
     const Eigen::Vector3d c = mesh.corner(t, 2);
-    const Eigen::Vector3d normal = (b - a).cross(c - a);
+    const Eigen::Vector3d normal = area_normal(mesh, t);
     if (!(normal.z() > 0.0)) continue;
     const PixelTriangle shown{plane.to_pixels(a.head<2>()), plane.to_pixels(b.head<2>()),
                               plane.to_pixels(c.head<2>())};

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <optional>
 
+#include "app/command_line.h"
 #include "app/commands.h"
 #include "app/console.h"
 #include "app/exit_code.h"
@@ -12,14 +13,15 @@
 #include "app/json_output.h"
 #include "app/lens_note.h"
 #include "app/option_set.h"
-#include "app/render_setup.h"
 #include "core/error.h"
 #include "core/image/image_io.h"
 #include "core/io/files.h"
 #include "core/io/output_guard.h"
 #include "core/surface/lens.h"
 #include "core/surface/mesh_io.h"
+#include "design/render_fields.h"
 #include "design/render_lens.h"
+#include "design/render_setup.h"
 #include "export/export_work.h"
 #include "export/solid_surface.h"
 
@@ -33,23 +35,16 @@ struct RenderArguments {
   std::string out;
   std::string target;
   bool force = false;
-  int pixels = 256;
-  double image_width = 100.0;
-  SurfaceModel model = SurfaceModel::kFacet;
-  OpticalSetup setup;  ///< What the options for ior, focal length and view write to.
+  RenderOptions render;
 };
 
 /// What is rendered and, if known, what it should look like.
 struct Scene {
   SurfaceMesh surface;
   std::optional<Eigen::Matrix3Xd> normals;  ///< Of a solid's own surface, for the smooth model.
-  OpticalSetup setup;
-  SurfaceModel model = SurfaceModel::kFacet;
+  RenderOptions render;
   std::optional<Image> target;
 };
-
-/// Of walls and pictures on them, mm: beyond a kilometre nothing is projected any more.
-constexpr Limits kLengths{.low = 1e-3, .high = 1e6};
 
 void add_render_options(OptionSet& options, RenderArguments& arguments) {
   options.positional("SOURCE", arguments.source,
@@ -58,20 +53,7 @@ void add_render_options(OptionSet& options, RenderArguments& arguments) {
   options.text("--out", arguments.out, "FILE", "write the picture to this .png or .exr");
   options.flag("--force", arguments.force, "replace a file that lensforge did not write");
   options.text("--target", arguments.target, "PICTURE", "compare with this; a lens has its own");
-  options.choice("--model", arguments.model,
-                 {{"facet", SurfaceModel::kFacet}, {"smooth", SurfaceModel::kSmooth}},
-                 "surface model of the picture; a lens has its own default, a solid is smooth");
-  options.integer("--pixels", arguments.pixels, Limits::between(1, kMaxImageSide),
-                  "longer side of the picture; a lens has its own default");
-  options.length("--focal", arguments.setup.focal_length, kLengths,
-                 "z of the wall; a lens has its own default");
-  options.number("--ior", arguments.setup.ior, {.low = 1.0, .high = 10.0, .low_excluded = true}, "",
-                 "refractive index; a lens has its own default");
-  options.choice("--view", arguments.setup.view,
-                 {{"front", ViewSide::kFront}, {"rear", ViewSide::kRear}},
-                 "side from which the picture is seen; a lens has its own default");
-  options.length("--image-width", arguments.image_width, kLengths,
-                 "width of the picture on the wall; a lens has its own default, a mesh its width");
+  options.fields(render_fields(), arguments.render);
 }
 
 bool is_step(const std::string& source) {
@@ -91,8 +73,8 @@ Scene load_solid(const std::string& source, const Executor& executor, const RunC
       std::to_string(solid.faces) + (solid.faces == 1 ? " face" : " faces") +
       (solid.by_name ? " named \"optical surface\"" : " found by their shape: they look up"));
   SampledSurface& samples = solid.samples;
-  const OpticalSetup setup = setup_for_mesh(samples.mesh, RenderArguments{}.pixels);
-  return {std::move(samples.mesh), std::move(samples.normals), setup, SurfaceModel::kSmooth, {}};
+  const RenderOptions render{SurfaceModel::kSmooth, setup_for_mesh(samples.mesh)};
+  return {std::move(samples.mesh), std::move(samples.normals), render, {}};
 }
 
 Scene load(const std::string& source, const Executor& executor, const RunControl& control,
@@ -101,30 +83,29 @@ Scene load(const std::string& source, const Executor& executor, const RunControl
   if (is_folder(source)) {
     Lens lens = read_lens(source);
     note_unfinished_design(lens, console);
-    return {std::move(lens.surface), {}, lens.setup, lens.model, std::move(lens.target)};
+    return {std::move(lens.surface), {}, {lens.model, lens.setup}, std::move(lens.target)};
   }
   SurfaceMesh mesh = read_mesh(source);
-  const OpticalSetup setup = setup_for_mesh(mesh, RenderArguments{}.pixels);
-  return {std::move(mesh), {}, setup, RenderArguments{}.model, {}};
+  const RenderOptions render{RenderOptions{}.model, setup_for_mesh(mesh)};
+  return {std::move(mesh), {}, render, {}};
 }
 
 /// Tells what a large picture takes, or refuses it.
 void announce_picture(const OpticalSetup& setup, const std::string& out, const Console& console) {
   const double shape = setup.pixels.cast<double>().prod() / std::pow(setup.pixels.maxCoeff(), 2);
-  announce_work([&](double side) { return rendering_work(shape * side * side); }, "--pixels",
-                setup.pixels.maxCoeff(), out.empty() ? "." : out, console);
+  const auto work = [&](double side) { return rendering_work(shape * side * side); };
+  announce_work(
+      require_room_for(work, "--pixels", setup.pixels.maxCoeff(), out.empty() ? "." : out),
+      console);
 }
 
 /// The scene with everything that the options say instead.
-Scene adjusted(Scene scene, const OptionSet& options, const RenderArguments& arguments,
+Scene adjusted(Scene scene, OptionSet& options, RenderArguments& arguments,
                const Console& console) {
-  OpticalSetup& setup = scene.setup;
-  if (options.given("--model")) scene.model = arguments.model;
-  if (options.given("--focal")) setup.focal_length = arguments.setup.focal_length;
-  if (options.given("--ior")) setup.ior = arguments.setup.ior;
-  if (options.given("--view")) setup.view = arguments.setup.view;
-  if (options.given("--image-width")) setup = with_image_width(setup, arguments.image_width);
-  if (options.given("--pixels")) setup = with_longer_side(setup, arguments.pixels);
+  arguments.render = scene.render;
+  options.restate();
+  scene.render = arguments.render;
+  const OpticalSetup& setup = scene.render.setup;
   announce_picture(setup, arguments.out, console);
   if (options.given("--target")) scene.target = read_image(arguments.target).image;
   if (scene.target) scene.target = resample(*scene.target, setup.pixels.x(), setup.pixels.y());
@@ -154,33 +135,33 @@ bool has_normals_for(SurfaceModel model, const Scene& scene) {
 
 ImageMetrics judge(const Scene& scene, SurfaceModel model, Image* image, const Executor& executor) {
   if (has_normals_for(model, scene)) {
-    return evaluate(scene.surface, *scene.normals, scene.setup, *scene.target, image, executor);
+    return evaluate(scene.surface, *scene.normals, scene.render.setup, *scene.target, image,
+                    executor);
   }
-  return evaluate(scene.surface, scene.setup, model, *scene.target, image, executor);
+  return evaluate(scene.surface, scene.render.setup, model, *scene.target, image, executor);
 }
 
 Rendering compare_models(const Scene& scene, const Executor& executor) {
   Rendering rendering;
-  for (const SurfaceModel model : {SurfaceModel::kFacet, SurfaceModel::kSmooth}) {
-    Image* image = model == scene.model ? &rendering.image : nullptr;
-    const ImageMetrics metrics = judge(scene, model, image, executor);
-    const std::string word = model_word(model);
-    rendering.json["metrics"][word] = metrics_json(metrics);
-    rendering.text +=
-        "  " + word + std::string(8 - word.size(), ' ') + metrics_text(metrics) + "\n";
+  ModelMetrics metrics;
+  for (const SurfaceModel model : kSurfaceModels) {
+    Image* image = model == scene.render.model ? &rendering.image : nullptr;
+    metrics[model] = judge(scene, model, image, executor);
   }
+  rendering.json["metrics"] = metrics_json(metrics);
+  rendering.text = metrics_text(metrics);
   return rendering;
 }
 
 Rendering render_alone(const Scene& scene, const Executor& executor) {
   const RenderResult result =
-      has_normals_for(scene.model, scene)
-          ? render_surface(scene.surface, *scene.normals, scene.setup, executor)
-          : render_surface(scene.surface, scene.setup, scene.model, executor);
+      has_normals_for(scene.render.model, scene)
+          ? render_surface(scene.surface, *scene.normals, scene.render.setup, executor)
+          : render_surface(scene.surface, scene.render.setup, scene.render.model, executor);
   return {result.image,
           {{"flux_inside", result.flux_inside}},
-          "  " + model_word(scene.model) + "  flux inside " + fixed(100.0 * result.flux_inside, 1) +
-              " %\n"};
+          "  " + model_name(scene.render.model) + "  flux inside " +
+              fixed(100.0 * result.flux_inside, 1) + " %\n"};
 }
 
 void require_picture_name(const std::string& out) {
@@ -222,14 +203,12 @@ int render_command(const Arguments& command_line) try {
   rendering.json["command"] = "render";
   rendering.json["device"] = device.word;
   rendering.json["source"] = arguments.source;
-  rendering.json["model"] = model_word(scene.model);
-  rendering.json["pixels"] = {scene.setup.pixels.x(), scene.setup.pixels.y()};
+  rendering.json["model"] = model_name(scene.render.model);
+  rendering.json["pixels"] = {scene.render.setup.pixels.x(), scene.render.setup.pixels.y()};
   console.result(rendering.json, arguments.source + "\n" + rendering.text);
   return kDone;
 } catch (const Interrupted&) {
-  const bool json =
-      std::find(command_line.begin(), command_line.end(), "--json") != command_line.end();
-  return report_interrupted(json);
+  return report_interrupted(wants_json(command_line));
 }
 
 }  // namespace lensforge::app

@@ -31,7 +31,8 @@ std::string read_answer(const std::stop_token& stop) {
 
 void require_consent(const std::stop_token& stop) {
   if (::isatty(STDIN_FILENO) == 0) {
-    throw InputError("--resume: nobody to ask, standard input is no terminal; --yes goes on");
+    throw InputError(
+        "--resume: cannot ask for confirmation, standard input is no terminal; use --yes");
   }
   std::fputs("Go on? [y/N] ", stderr);
   const std::string answer = read_answer(stop);

@@ -8,14 +8,14 @@
 #include <string_view>
 #include <thread>
 
-#include "machine/link/descriptor.h"
+#include "core/io/descriptor.h"
 #include "machine/stream/sender.h"
 
 namespace lensforge::app {
 
 /// What the keys mean, in a line.
 inline constexpr std::string_view kKeyHelp =
-    "space or h holds, r goes on, + - = feed up, down and 100 %, 1 2 3 rapids at 100, 50 and 25 %, "
+    "space or h holds, r resumes, + - = feed up, down and 100 %, 1 2 3 rapids at 100, 50 and 25 %, "
     "> < . spindle up, down and 100 %, Q (capital) ends the job like Ctrl-C";
 
 /// The order behind a key; nothing for other keys and for Q.

@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-#include "machine/link/descriptor.h"
+#include "core/io/descriptor.h"
 
 namespace lensforge::app {
 

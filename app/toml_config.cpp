@@ -51,7 +51,7 @@ std::vector<CLI::ConfigItem> TomlConfig::from_config(std::istream& input) const 
     item.name = std::string(key.str());
     if (std::find(keys_.begin(), keys_.end(), item.name) == keys_.end()) {
       throw InputError("--config: key " + printable_line(item.name, kLongestKey) +
-                       ": the command has no such option");
+                       ": unknown option of this command");
     }
     item.inputs = {value_text(item.name, value)};
     read.push_back(std::move(item));

@@ -3,19 +3,15 @@
 
 #include <array>
 #include <chrono>
-#include <limits>
 #include <memory>
 #include <optional>
 #include <system_error>
 #include <utility>
 
-#include "cam/contact/drop_cutter.h"
 #include "cam/cut_plan.h"
 #include "cam/cut_report.h"
-#include "cam/finish_setup.h"
 #include "cam/job_files.h"
-#include "cam/milled/designed_field.h"
-#include "cam/milled/held_field.h"
+#include "cam/meant_surface.h"
 #include "cam/part_surfaces.h"
 #include "cam/prediction.h"
 #include "cam/remedies.h"
@@ -26,6 +22,7 @@
 #include "core/image/image_io.h"
 #include "core/io/files.h"
 #include "core/io/output_guard.h"
+#include "core/io/pending_files.h"
 #include "core/surface/mesh_io.h"
 
 namespace lensforge {
@@ -34,48 +31,6 @@ namespace {
 namespace fs = std::filesystem;
 
 using Clock = std::chrono::steady_clock;
-
-/// How finely the smooth surface is cut into facets where the ball's reach is judged: only heights
-/// count, since a fillet's slopes are the ball's.
-constexpr SmoothCutOptions kReachCut{1e-4, std::numeric_limits<double>::infinity()};
-
-/// A surface as it is meant: the facets of a mesh, or the smooth surface through its vertices.
-class MeantSurface {
- public:
-  /// @param smooth  smooth_surface() of the mesh.
-  MeantSurface(const SurfaceMesh& mesh, std::shared_ptr<const SmoothSurface> smooth)
-      : smooth_(std::move(smooth)) {
-    if (smooth_) {
-      field_.emplace(*smooth_);
-      held_.emplace(*field_);
-    } else {
-      facets_.emplace(mesh);
-      held_.emplace(*facets_);
-    }
-  }
-
-  [[nodiscard]] const SurfaceField& field() const { return *held_; }
-
-  /// What the ball can reach of it. `cut` is the same surface; both must outlive the result.
-  [[nodiscard]] std::unique_ptr<RoundedField> rounded(const CutSurface& cut,
-                                                      const Eigen::AlignedBox2d& rectangle,
-                                                      const Executor& executor) {
-    if (smooth_) {
-      reach_.emplace(smooth_, cut.radius(), kReachCut, executor);
-      return std::make_unique<RoundedField>(*held_, *reach_, reach_->deviation().height, executor);
-    }
-    cutter_ = cut.cutter(rectangle, executor);
-    return std::make_unique<RoundedField>(*held_, facets_->grid(), *cutter_, executor);
-  }
-
- private:
-  std::optional<FacetField> facets_;
-  std::shared_ptr<const SmoothSurface> smooth_;
-  std::optional<SmoothCutSurface> reach_;
-  std::optional<SmoothField> field_;
-  std::optional<HeldField> held_;
-  std::shared_ptr<const DropCutter> cutter_;
-};
 
 /// What a cut writes beside its programs.
 constexpr std::array kOthers{cam_file::kReport, cam_file::kPage, cam_file::kMilledMesh,
@@ -86,8 +41,8 @@ std::vector<const char*> others_of(const CamOptions& options) {
   return {cam_file::kReport, cam_file::kPage};
 }
 
-/// What an earlier run foretold.
-void remove_foretold(const fs::path& folder) {
+/// What an earlier run predicted.
+void remove_prediction(const fs::path& folder) {
   for (const char* name : kOthers) {
     std::error_code ignored;
     if (written_by_lensforge(folder / name)) fs::remove(folder / name, ignored);
@@ -137,21 +92,21 @@ class Job {
     publish(programs, others, files, result);
     result.message = result.report.verdict.passes()
                          ? "done, all limits met"
-                         : "done, but limits are not met: see the report";
+                         : "done, but limits were missed: see the report";
     return result;
   }
 
  private:
   Prediction predict(const ProgramFiles& programs) {
-    MeantSurface cut(plan_.mesh(), plan_.smooth());
-    const auto rounded = cut.rounded(plan_.surface(), cut_rectangle(), executor_);
+    const std::unique_ptr<MeantSurface> cut = meant_surface(plan_.optical());
+    const auto rounded = cut->rounded(plan_.surface(), cut_rectangle(), executor_);
     // A mould's own surface is another than that of the lens that is cast in it.
-    std::optional<MeantSurface> lens;
+    std::unique_ptr<MeantSurface> lens;
     if (plan_.mould()) {
-      lens.emplace(lens_.surface, smooth_surface(lens_.surface, options_.surface));
+      lens = meant_surface(optical_surface(lens_.surface, options_.surface.value_or(lens_.model)));
     }
     const Eigen::AlignedBox2d rectangle(Eigen::Vector2d(0.0, 0.0), lens_.setup.lens_size);
-    const PartSurfaces surfaces({lens ? lens->field() : cut.field(), *rounded, rectangle,
+    const PartSurfaces surfaces({lens ? lens->field() : cut->field(), *rounded, rectangle,
                                  plan_.blank().max().z(), plan_.mould()},
                                 plan_.take_finish_paths(programs, control_), options_.polish);
     Prediction prediction =
@@ -176,7 +131,7 @@ class Job {
 
   static void warn_of(const OtherPrograms& others, ReportData& report) {
     if (others.kept.empty()) return;
-    report.warnings.push_back("the folder holds programs that are not of this job and were kept: " +
+    report.warnings.push_back("the folder holds programs of another job, which were kept: " +
                               names_of(others.kept) + "; do not run them with it");
   }
 
@@ -184,7 +139,7 @@ class Job {
   /// stands beside programs that it is not about.
   void publish(PendingPrograms& programs, const OtherPrograms& others, PendingFiles& files,
                CamResult& result) const {
-    remove_foretold(folder_);
+    remove_prediction(folder_);
     programs.publish();
     for (const fs::path& path : others.earlier) {
       std::error_code ignored;
@@ -222,7 +177,7 @@ class Job {
 }  // namespace
 
 void remove_cut(const fs::path& folder) {
-  remove_foretold(folder);
+  remove_prediction(folder);
   std::error_code ignored;
   for (const fs::path& program : other_programs(folder, {}).earlier) fs::remove(program, ignored);
 }

@@ -34,11 +34,11 @@ struct CamResult {
 };
 
 /// Makes everything that an operator needs to cut a lens: programs for roughing, semi-finishing and
-/// finishing, the surface that they leave, what light the part will throw, and the report. All
-/// files are made beside their names and get them together in the end: what is interrupted or fails
-/// before leaves the job of an earlier run as it was. Programs of an earlier run that this one does
-/// not write are removed then; programs that were changed since, or are not the cut's, are kept and
-/// named in the report. Same bytes for any number of threads.
+/// finishing, the surface that they leave, the picture that the part will project, and the report.
+/// All files are made beside their names and get them together in the end: what is interrupted or
+/// fails before leaves the job of an earlier run as it was. Programs of an earlier run that this
+/// one does not write are removed then; programs that were changed since, or are not the cut's, are
+/// kept and named in the report. Same bytes for any number of threads.
 /// @throw InputError naming option, value and rule if an option breaks its rule; naming the surface
 ///        if it has no triangles, is no height field over the lens's rectangle or does not cover
 ///        it; naming files that would be replaced though no cut wrote them as they stand, without

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,6 +14,7 @@
 #include "cam/report/verdict.h"
 #include "cam/tool/workshop.h"
 #include "core/optics/optical_setup.h"
+#include "core/surface/surface_model.h"
 
 namespace lensforge {
 
@@ -29,7 +31,7 @@ enum class PartKind {
   kMould,  ///< The negative, from which lenses are cast.
 };
 
-/// Everything that shapes the cut of a lens and what is foretold of it, but the lens itself.
+/// Everything that shapes the cut of a lens and what is predicted of it, but the lens itself.
 struct CamOptions {
   Workshop workshop;  ///< Machine, blank, clamps, tools, process.
   PostDescription post = find_post("linuxcnc", "--post");
@@ -45,8 +47,9 @@ struct CamOptions {
 
   PartKind part = PartKind::kLens;
   double shrinkage = 0.0;  ///< Of what is cast in a mould, share of a length, 0 … 0.2.
-  /// What is cut: the facets as they are, or the smooth surface over the mesh (SmoothSurface).
-  SurfaceModel surface = SurfaceModel::kSmooth;
+  /// What is cut: the facets as they are, or the smooth surface over the mesh (SmoothSurface); none
+  /// takes what the lens was designed as.
+  std::optional<SurfaceModel> surface;
 
   bool force = false;  ///< Replace files that no cut wrote as they stand.
 
@@ -60,7 +63,7 @@ struct CamOptions {
   CutLimits limits;
 };
 
-/// Most, or least, that the options below may be; those of the workshop keep to workshop_rule().
+/// Maximum or minimum of the options below; those of the workshop follow workshop_rule().
 namespace cam_limit {
 inline constexpr double kSpinUp = 3600.0;  ///< s
 inline constexpr double kShrinkage = 0.2;  ///< More than any casting resin loses.
@@ -84,5 +87,6 @@ void validate(const CamOptions& options, const OpticalSetup& setup);
 
 /// The height in plain words: "top of the blank".
 const char* words_for(ZZero zero);
+const char* words_for(SurfaceModel surface);
 
 }  // namespace lensforge

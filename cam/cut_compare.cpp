@@ -58,7 +58,7 @@ std::vector<double> lengths_of(std::string_view list, const std::string& where) 
       throw InputError(where + ": " + std::string(list.substr(0, comma)) + " is not above 0");
     }
     if (std::find(values.begin(), values.end(), value) != values.end()) {
-      throw InputError(where + ": " + std::string(list.substr(0, comma)) + " stands there twice");
+      throw InputError(where + ": " + std::string(list.substr(0, comma)) + " is given twice");
     }
     values.push_back(value);
     if (comma == std::string_view::npos) return values;
@@ -116,7 +116,7 @@ CutChoices parse_choices(std::span<const std::string> words, const std::string& 
       throw InputError(option + ": " + word + " is not tool=MM,MM… or pitch=MM,MM…");
     }
     std::vector<double>& values = key == "tool" ? choices.tools : choices.pitches;
-    if (!values.empty()) throw InputError(option + ": " + key + " stands there twice");
+    if (!values.empty()) throw InputError(option + ": " + key + " is given twice");
     values = lengths_of(std::string_view(word).substr(equals + 1), option + " " + key);
   }
   const auto count_of = [](const std::vector<double>& values) {

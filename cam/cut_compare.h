@@ -37,7 +37,7 @@ struct CutComparison {
   std::filesystem::path page;         ///< What was written; empty unless complete.
 };
 
-/// Plans, times and foretells the finishing of every combination as make_cut() does, and ranks
+/// Plans, times and predicts the finishing of every combination as make_cut() does, and ranks
 /// them. Programs are made in a folder of their own below `folder` and removed again. Roughing and
 /// semi-finishing are left out: they are the same for all.
 /// @throw InputError before any work if an option breaks its rule in some combination, or if there

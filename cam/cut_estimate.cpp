@@ -8,6 +8,7 @@
 #include "cam/finish_setup.h"
 #include "cam/prediction.h"
 #include "cam/sampling_grid.h"
+#include "core/error.h"
 #include "core/text/number_text.h"
 
 namespace lensforge {
@@ -94,6 +95,14 @@ Eigen::Vector2d size_of(const CamOptions& options, const OpticalSetup& setup) {
   return setup.lens_size / (1.0 - shrinkage);
 }
 
+/// Comparisons are written so that a NaN is refused as well.
+void require_bearable(const WorkEstimate& on_one_core, const std::string& what,
+                      const std::string& advice) {
+  if (on_one_core.seconds <= kMaxCutSeconds && on_one_core.disk_bytes <= kMaxCutBytes) return;
+  throw InputError(what + ": takes " + estimate_words(on_one_core) +
+                   " on one core; no more than 1000 h and 100 GB are begun; " + advice);
+}
+
 /// The next larger number of one digit.
 double rounded_up(double value) {
   const double unit = std::pow(10.0, std::floor(std::log10(value)));
@@ -124,20 +133,35 @@ void require_room_for_cut(const CamOptions& options, const OpticalSetup& setup,
                           const WorkEstimate& estimate, const std::filesystem::path& folder) {
   const Eigen::Vector2d size = size_of(options, setup);
   const FinishProcess& finish = options.workshop.process.finish;
-  const double share = std::max(estimate.disk_bytes / free_disk_bytes(folder),
-                                estimate.memory_bytes / free_memory_bytes());
+  WorkEstimate on_one_core = estimate;
+  on_one_core.seconds = estimate_cut(options, setup, 1).seconds;
+  const double share = std::max(
+      {estimate.disk_bytes / free_disk_bytes(folder), estimate.memory_bytes / free_memory_bytes(),
+       estimate.disk_bytes / kMaxCutBytes, on_one_core.seconds / kMaxCutSeconds});
   const double moves = finish_length(options, size) * moves_per_mm(finish);
+  const auto require = [&](const std::string& what, const std::string& advice) {
+    require_room(estimate, folder, what, advice);
+    require_bearable(on_one_core, what, advice);
+  };
   if (kMovesPerPoint * rough_points(options, size) > moves) {
-    return require_room(estimate, folder, "the roughing and semi-finishing passes",
-                        "larger steps and spacings in the workshop would fit");
+    return require("the roughing and semi-finishing passes",
+                   "use larger steps and spacings in the workshop");
   }
   if (options.render && nodes_of(size) * kMemoryPerNode > moves * kMemoryPerMove) {
-    return require_room(estimate, folder, "the milled surface of so large a lens",
-                        "--no-render would need less");
+    return require("the milled surface of so large a lens", "--no-render needs less");
   }
-  const double pitch = finish_pitch(finish, finishing_ball(options).radius());
-  require_room(estimate, folder, "--pitch " + shortest_text(pitch) + "mm",
-               "--pitch " + shortest_text(rounded_up(pitch * share * kSpare)) + "mm would fit");
+  if (samples_of(options, size) * kSecondsPerSample > 0.5 * on_one_core.seconds) {
+    return require("--sample-spacing " + shortest_text(sample_spacing(options)) + "mm",
+                   "a larger --sample-spacing would fit");
+  }
+  const double radius = finishing_ball(options).radius();
+  const double pitch = finish_pitch(finish, radius);
+  const double fitting = rounded_up(pitch * share * kSpare);
+  if (fineness(finish) > 1.0 && fitting > radius) {
+    return require("tolerances this fine", "a larger --slope-tolerance or --tolerance would fit");
+  }
+  require("--pitch " + shortest_text(pitch) + "mm",
+          "--pitch " + shortest_text(fitting) + "mm would fit");
 }
 
 }  // namespace lensforge

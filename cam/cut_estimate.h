@@ -15,8 +15,13 @@ namespace lensforge {
 /// @param threads  that work at the same time, ≥ 1. @pre validate() passed.
 WorkEstimate estimate_cut(const CamOptions& options, const OpticalSetup& setup, int threads);
 
+/// More than anybody waits for or a controller stores: six weeks of one processor core, 100 GB.
+inline constexpr double kMaxCutSeconds = 1000.0 * 3600.0;
+inline constexpr double kMaxCutBytes = 1e11;
+
 /// @throw InputError naming --pitch, --sample-spacing or what else asks for most, and a value that
-///        would fit, if the disk of `folder` or the memory do not hold what the cut takes.
+///        would fit, if the disk of `folder` or the memory do not hold what the cut takes, or if it
+///        takes more than kMaxCutSeconds of one core or kMaxCutBytes of programs.
 void require_room_for_cut(const CamOptions& options, const OpticalSetup& setup,
                           const WorkEstimate& estimate, const std::filesystem::path& folder);
 

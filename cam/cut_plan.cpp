@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "cam/contact/mould.h"
+#include "cam/meant_surface.h"
 #include "cam/path/rough_links.h"
 #include "core/error.h"
 #include "core/text/number_text.h"
@@ -62,8 +63,8 @@ CutPlan::CutPlan(const Lens& lens, const CamOptions& options, const Executor& ex
       decimals_(decimals_of(options_)),
       profile_(mesh_),
       stock_(whole_blank(options_.workshop, field_.box)),
-      smooth_(smooth_surface(mesh_, options_.surface)),
-      surface_(surface_to_cut(mesh_, smooth_, ball().radius(), executor)),
+      optical_(optical_surface(mesh_, options_.surface.value_or(lens.model))),
+      surface_(surface_to_cut(optical_, ball().radius(), executor)),
       collisions_(profile_, options_.workshop, stock_),
       watch_(collisions_, options_.workshop.tools, z_offset_,
              highest_obstacle(options_.workshop, blank_)) {}

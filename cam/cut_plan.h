@@ -27,6 +27,7 @@
 #include "core/compute/executor.h"
 #include "core/compute/run_control.h"
 #include "core/surface/lens.h"
+#include "core/surface/optical_surface.h"
 #include "core/surface/surface_mesh.h"
 
 namespace lensforge {
@@ -55,8 +56,8 @@ class CutPlan {
   [[nodiscard]] const CamOptions& options() const { return options_; }
   /// What is cut: the lens's surface or the mould's; mm, in a lens frame of its own.
   [[nodiscard]] const SurfaceMesh& mesh() const { return mesh_; }
-  /// The smooth surface over it, unless its facets are what is meant.
-  [[nodiscard]] const std::shared_ptr<const SmoothSurface>& smooth() const { return smooth_; }
+  /// The optical surface that it stands for.
+  [[nodiscard]] const std::shared_ptr<const OpticalSurface>& optical() const { return optical_; }
   /// The same for the finishing ball.
   [[nodiscard]] const CutSurface& surface() const { return *surface_; }
   /// Where the lens lies in the mould, if there is one.
@@ -107,7 +108,7 @@ class CutPlan {
   int decimals_ = 5;
   ProfileCutter profile_;
   StockMap stock_;
-  std::shared_ptr<const SmoothSurface> smooth_;
+  std::shared_ptr<const OpticalSurface> optical_;
   std::unique_ptr<CutSurface> surface_;
   CollisionCheck collisions_;
   ProgramWatch watch_;

@@ -73,7 +73,7 @@ std::vector<Tool> tools_of(const CutPlan& plan, const ProgramFiles& programs) {
   return tools;
 }
 
-ParameterGroup finish_parameters(const CutPlan& plan) {
+ParameterGroup finish_parameters(const CutPlan& plan, SurfaceModel model) {
   const FinishProcess& finish = plan.options().workshop.process.finish;
   return {"Finishing",
           {{"Stepover", mm(plan.pitch(), 4)},
@@ -81,8 +81,7 @@ ParameterGroup finish_parameters(const CutPlan& plan) {
            {"Tolerance", mm(finish.tolerance, 5)},
            {"Slope tolerance", decimal_text(1e3 * finish.slope_tolerance, 2) + " mrad"},
            {"Decimals", std::to_string(plan.decimals())},
-           {"Surface", plan.options().surface == SurfaceModel::kSmooth ? "smooth, over the mesh"
-                                                                       : "facets of the mesh"}}};
+           {"Surface", words_for(model)}}};
 }
 
 template <class Level>
@@ -191,16 +190,16 @@ std::string unroughed_warning(const CutPlan& plan, const ProgramFiles& programs)
   return joined({"nothing is roughed: '", first.name, "' cuts ", decimal_text(depth, 1),
                  " mm deep into the whole blank, tool ", std::to_string(tool.number), " has ",
                  decimal_text(tool.flute_length, 1),
-                 " mm of flutes; run a roughing program first, or take a tool with longer flutes"});
+                 " mm of flutes; run a roughing program first, or use a tool with longer flutes"});
 }
 
-/// Why the part would throw another picture than the designed one; empty if it would not.
+/// Why the part would project another picture than the designed one; empty if it would not.
 std::string index_warning(const CutPlan& plan, const Lens& lens) {
   const double stated = plan.options().workshop.material.ior;
   if (!(index_error(plan, lens) > kIndexTolerance)) return "";
   return joined({"the workshop's material has index ", trimmed_decimal(stated, 4),
                  ", the lens was designed for ", trimmed_decimal(lens.setup.ior, 4),
-                 ": it would throw another picture"});
+                 ": it would project another picture"});
 }
 
 /// Which axes have to go farther than they can; empty if none has.
@@ -214,6 +213,16 @@ std::string travel_warning(const CutPlan& plan) {
                     decimal_text(extent[axis], 2), " of ", decimal_text(travel[axis], 2), " mm"});
   }
   return axes.empty() ? "" : "the programs move farther than the machine's travel: " + axes;
+}
+
+/// A speed that the controller's setting would lower unseen; empty where it has no such setting.
+std::string spindle_warning(const CutPlan& plan, const ProgramFiles& programs) {
+  const int setting = plan.options().post.reader.spindle_limit_setting;
+  if (setting == 0) return {};
+  double fastest = 0.0;
+  for (const Tool& tool : tools_of(plan, programs)) fastest = std::max(fastest, tool.spindle_rpm);
+  return "the controller runs the spindle no faster than its setting $" + std::to_string(setting) +
+         ", silently: set it to at least " + decimal_text(fastest, 0);
 }
 
 std::vector<std::string> warnings_of(const CutPlan& plan, const ProgramFiles& programs,
@@ -239,19 +248,13 @@ std::vector<std::string> warnings_of(const CutPlan& plan, const ProgramFiles& pr
                        " y " + decimal_text(field.steepest_place.y(), 2) +
                        ": on slopes above 1 a rim may be left uncut");
   }
-  if (plan.options().post.name == "grbl") {
-    double fastest = 0.0;
-    for (const Tool& tool : tools_of(plan, programs)) fastest = std::max(fastest, tool.spindle_rpm);
-    warnings.push_back(
-        "Grbl runs the spindle no faster than its setting $30, silently: it has to "
-        "be at least " +
-        decimal_text(fastest, 0));
-  }
+  const std::string spindle = spindle_warning(plan, programs);
+  if (!spindle.empty()) warnings.push_back(spindle);
   if (programs.total.starved > 0) {
     warnings.push_back(
         "the controller will wait for lines " + std::to_string(programs.total.starved) +
         " times at " + decimal_text(plan.options().workshop.machine.lines_per_second, 0) +
-        " lines a second: the cut then takes " +
+        " lines/s: the cut then takes " +
         decimal_text(programs.total.stream_limited_seconds / kSecondsPerMinute, 0) + " minutes");
   }
   return warnings;
@@ -287,7 +290,7 @@ std::vector<LimitCheck> safety_checks(const CutPlan& plan, const Lens& lens) {
   return checks;
 }
 
-/// A controller that takes lines without limit bears any load.
+/// Safety first. A controller that takes lines without limit bears any load.
 Verdict whole_verdict(const CutPlan& plan, const ProgramFiles& programs,
                       const std::optional<Prediction>& prediction, const Lens& lens) {
   CutLimits limits = plan.options().limits;
@@ -295,7 +298,8 @@ Verdict whole_verdict(const CutPlan& plan, const ProgramFiles& programs,
   CutFindings findings = findings_of(programs, prediction);
   if (!(limits.block_rate > 0.0)) findings.block_rate.reset();
   Verdict verdict = judge_cut(findings, limits);
-  for (const LimitCheck& check : safety_checks(plan, lens)) verdict.checks.push_back(check);
+  const std::vector<LimitCheck> safety = safety_checks(plan, lens);
+  verdict.checks.insert(verdict.checks.begin(), safety.begin(), safety.end());
   return verdict;
 }
 
@@ -313,6 +317,17 @@ void add_prediction(const Prediction& prediction, const Lens& lens, ReportData& 
                fillet_share_map(prediction.creases)};
 }
 
+/// Of the design, as lens.json states it; empty if it does not.
+std::string fingerprint_of(const Lens& lens) {
+  if (!lens.provenance.is_object()) return "";
+  const auto stated = lens.provenance.find("fingerprint");
+  if (stated == lens.provenance.end() || !stated->is_string()) return "";
+  constexpr std::size_t kDigits = 16;
+  const auto& text = stated->get_ref<const std::string&>();
+  const bool hexadecimal = text.find_first_not_of("0123456789abcdef") == std::string::npos;
+  return text.size() == kDigits && hexadecimal ? text : "";
+}
+
 }  // namespace
 
 ReportData make_report(const CutPlan& plan, const ProgramFiles& programs,
@@ -321,12 +336,13 @@ ReportData make_report(const CutPlan& plan, const ProgramFiles& programs,
   ReportData data;
   data.job = options.job;
   data.program = program_mark();
+  data.lens_id = fingerprint_of(lens);
   data.part = options.part == PartKind::kLens ? "lens" : "mould";
   data.lens_size = lens.setup.lens_size;
   data.leakage_options = options.leakage;
   data.operations = report_operations(plan, programs);
   data.tools = tools_of(plan, programs);
-  data.parameters = {finish_parameters(plan)};
+  data.parameters = {finish_parameters(plan, options.surface.value_or(lens.model))};
   const Process& process = options.workshop.process;
   if (process.rough.enabled || process.semi.enabled) {
     data.parameters.push_back(entry_parameters(process));

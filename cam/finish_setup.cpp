@@ -3,14 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 
 namespace lensforge {
 namespace {
-
-/// How finely the smooth surface is cut into facets, which are followed only in grooves that bend
-/// as sharply as the ball (RowCurves), and by the pencil.
-constexpr SmoothCutOptions kSmoothCut{1e-4, 2e-2};
 
 RasterPlan finish_raster(const CamOptions& options, const FinishGround& ground, PassAxis along) {
   const FinishProcess& finish = options.workshop.process.finish;
@@ -33,18 +28,6 @@ RasterPlan finish_raster(const CamOptions& options, const FinishGround& ground, 
 
 const Tool& finishing_ball(const CamOptions& options) {
   return options.workshop.tool(options.workshop.process.finish.tool);
-}
-
-std::shared_ptr<const SmoothSurface> smooth_surface(const SurfaceMesh& mesh, SurfaceModel model) {
-  if (model == SurfaceModel::kFacet) return nullptr;
-  return std::make_shared<const SmoothSurface>(mesh);
-}
-
-std::unique_ptr<CutSurface> surface_to_cut(const SurfaceMesh& mesh,
-                                           std::shared_ptr<const SmoothSurface> smooth,
-                                           double radius, const Executor& executor) {
-  if (!smooth) return std::make_unique<FacetSurface>(mesh, radius, executor);
-  return std::make_unique<SmoothCutSurface>(std::move(smooth), radius, kSmoothCut, executor);
 }
 
 int decimals_of(const CamOptions& options) {

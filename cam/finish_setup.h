@@ -2,30 +2,16 @@
 #pragma once
 
 #include <Eigen/Geometry>
-#include <memory>
 #include <vector>
 
 #include "cam/cam_options.h"
-#include "cam/contact/cut_surface.h"
 #include "cam/path/finish_raster.h"
 #include "cam/path/pencil.h"
-#include "core/compute/executor.h"
-#include "core/surface/smooth_surface.h"
-#include "core/surface/surface_mesh.h"
 
 namespace lensforge {
 
 /// The finishing ball.
 const Tool& finishing_ball(const CamOptions& options);
-
-/// The smooth surface over a mesh; none if its facets are what is meant.
-std::shared_ptr<const SmoothSurface> smooth_surface(const SurfaceMesh& mesh, SurfaceModel model);
-
-/// The surface that a ball of this radius (mm, > 0) cuts.
-/// @param smooth  smooth_surface() of the mesh.
-std::unique_ptr<CutSurface> surface_to_cut(const SurfaceMesh& mesh,
-                                           std::shared_ptr<const SmoothSurface> smooth,
-                                           double radius, const Executor& executor);
 
 /// Digits after the point in the programs: as chosen, or what the tolerances ask for.
 int decimals_of(const CamOptions& options);

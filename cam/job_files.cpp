@@ -11,6 +11,7 @@
 #include <system_error>
 
 #include "core/error.h"
+#include "core/io/files.h"
 #include "core/io/output_guard.h"
 #include "core/surface/lens.h"
 #include "machine/gcode/program_seal.h"
@@ -156,31 +157,6 @@ void require_replaceable_cut(const fs::path& folder, std::span<const fs::path> p
   throw InputError(listed(foreign) + ": lensforge did not write " +
                    (foreign.size() == 1 ? "it" : "them") +
                    " as it stands; move it away or replace it with --force");
-}
-
-void PendingFiles::add(const std::string& name,
-                       const std::function<void(const fs::path& beside)>& write) {
-  PendingFile file(folder_ / name);
-  write(file.beside());
-  files_.push_back(std::move(file));
-}
-
-void PendingFiles::add(const std::string& name, std::string_view content) {
-  add(name, [&](const fs::path& beside) { write_whole_file(beside, content); });
-}
-
-bool PendingFiles::has(const std::string& name) const {
-  return std::any_of(files_.begin(), files_.end(),
-                     [&](const PendingFile& file) { return file.path().filename() == name; });
-}
-
-std::vector<fs::path> PendingFiles::publish() {
-  std::vector<fs::path> paths;
-  for (PendingFile& file : files_) {
-    file.publish();
-    paths.push_back(file.path());
-  }
-  return paths;
 }
 
 }  // namespace lensforge

@@ -2,12 +2,9 @@
 #pragma once
 
 #include <filesystem>
-#include <functional>
 #include <span>
 #include <string>
 #include <vector>
-
-#include "core/io/files.h"
 
 namespace lensforge {
 
@@ -35,24 +32,5 @@ OtherPrograms other_programs(const std::filesystem::path& folder,
 void require_replaceable_cut(const std::filesystem::path& folder,
                              std::span<const std::filesystem::path> programs,
                              std::span<const char* const> others, bool force);
-
-/// Files of a folder that get their names all at once.
-class PendingFiles {
- public:
-  explicit PendingFiles(std::filesystem::path folder) : folder_(std::move(folder)) {}
-
-  /// Lets `write` make a file beside its name. @throw RunError
-  void add(const std::string& name,
-           const std::function<void(const std::filesystem::path& beside)>& write);
-  /// The same for content that is in memory.
-  void add(const std::string& name, std::string_view content);
-  [[nodiscard]] bool has(const std::string& name) const;
-  /// @return the files by their names. @throw RunError
-  std::vector<std::filesystem::path> publish();
-
- private:
-  std::filesystem::path folder_;
-  std::vector<PendingFile> files_;
-};
 
 }  // namespace lensforge

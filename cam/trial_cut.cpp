@@ -8,6 +8,7 @@
 #include "cam/finish_paths.h"
 #include "cam/finish_setup.h"
 #include "cam/leakage/render_field.h"
+#include "cam/meant_surface.h"
 #include "cam/milled/cast_field.h"
 #include "cam/milled/milled_field.h"
 #include "cam/milled/polished_field.h"
@@ -113,7 +114,7 @@ TrialCut::TrialCut(const TrialSite& site, const CamOptions& changed, const Execu
     : site_(site), options_(changed), executor_(executor), surface_(&site.plan.surface()) {
   const double radius = finishing_ball(changed).radius();
   if (radius == surface_->radius()) return;
-  own_ = surface_to_cut(site.plan.mesh(), site.plan.smooth(), radius, executor);
+  own_ = surface_to_cut(site.plan.optical(), radius, executor);
   surface_ = own_.get();
 }
 

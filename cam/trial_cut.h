@@ -17,20 +17,20 @@
 
 namespace lensforge {
 
-/// A cut that was foretold, of which places are to be tried again.
+/// A predicted cut, of which places are to be tried again.
 struct TrialSite {
   const CutPlan& plan;
   const Lens& lens;
   const SurfaceField& designed;  ///< Of the lens.
-  const SurfaceField& part;      ///< As foretold.
+  const SurfaceField& part;      ///< As predicted.
   const LeakageResult& leakage;
 };
 
-/// Cuts places of a foretold cut again, with other options: the finishing rows and valleys around a
-/// place are planned, fitted and rounded as make_cut() does, and the light of the place is traced
+/// Cuts places of a predicted cut again, with other options: the finishing rows and valleys around
+/// a place are planned, fitted and rounded as make_cut() does, and the light of the place is traced
 /// from the surface that they leave, cast and polished. It replaces the place's light in the
-/// foretold picture; by what that adds to the whole leakage, wherever the light lands, the place's
-/// own changes. What differs from a whole new cut is that the rest of the lens stays as foretold,
+/// predicted picture; by what that adds to the whole leakage, wherever the light lands, the place's
+/// own changes. What differs from a whole new cut is that the rest of the lens stays as predicted,
 /// and that rows begin where the place does, so that their moves join elsewhere.
 class TrialCut {
  public:

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "design/design_estimate.h"
 
-#include "design/level_plan.h"
+#include <string>
+
+#include "design/schedule/level_plan.h"
 
 namespace lensforge {
 namespace {
@@ -40,6 +42,24 @@ WorkEstimate estimate_design(int columns, int rows, const DesignOptions& options
   }
   estimate.seconds = processor / threads;
   return estimate;
+}
+
+WorkEstimate require_room_for_design(int columns, int rows, const DesignOptions& options,
+                                     int threads, const std::filesystem::path& folder) {
+  const double memory = free_memory_bytes();
+  const double disk = free_disk_bytes(folder);
+  const auto fits = [&](int pixels) {
+    DesignOptions smaller = options;
+    smaller.pixels = pixels;
+    const WorkEstimate needed = estimate_design(columns, rows, smaller, threads);
+    return needed.memory_bytes <= memory && needed.disk_bytes <= disk;
+  };
+  int pixels = options.pixels;
+  while (pixels > kMinPixels && !fits(pixels)) pixels = pixels * 9 / 10;
+  const WorkEstimate expected = estimate_design(columns, rows, options, threads);
+  require_room(expected, folder, "--pixels " + std::to_string(options.pixels),
+               "--pixels " + std::to_string(pixels) + " would fit");
+  return expected;
 }
 
 }  // namespace lensforge

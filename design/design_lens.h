@@ -10,24 +10,9 @@
 #include "core/image/image.h"
 #include "core/surface/lens.h"
 #include "design/design_options.h"
-#include "design/energy/weights.h"
+#include "design/schedule/convergence.h"
 
 namespace lensforge {
-
-/// One iteration, a row of convergence.csv.
-struct ConvergenceRow {
-  /// "transport" for a Newton step, "update" for a step of the correspondence-guided update,
-  /// "render" for one of rendering-guided optimisation.
-  std::string stage;
-  int level = 0;
-  int round = 0;
-  int iteration = 0;
-  EnergyValues energy;      ///< Unweighted terms and their weighted total.
-  double mass_error = 0.0;  ///< Of a Newton step: max |mass − wanted| / wanted over the cells.
-  /// Display-encoded, at the level's resolution; 0 where no picture is rendered.
-  double mae = 0.0;
-  double seconds = 0.0;  ///< Since the start of the design, interruptions not counted.
-};
 
 struct DesignResult {
   enum class Status { kDone, kInterrupted, kFailed };
@@ -48,8 +33,5 @@ DesignResult design_lens(const Image& target, const DesignOptions& options,
 /// A number that differs for pictures or options that give another result.
 /// @pre validate(options, target) passes.
 std::uint64_t design_identity(const Image& target, const DesignOptions& options);
-
-/// The text of convergence.csv: a header and one line per row.
-std::string convergence_csv(const std::vector<ConvergenceRow>& rows);
 
 }  // namespace lensforge

@@ -5,6 +5,7 @@
 
 #include "core/image/image.h"
 #include "core/optics/optical_setup.h"
+#include "core/surface/surface_model.h"
 #include "design/energy/weights.h"
 
 namespace lensforge {
@@ -19,6 +20,9 @@ inline constexpr double kMaxThickness = 1e4;
 inline constexpr double kMaxFocalLength = 1e7;
 inline constexpr double kMinIor = 1.01;
 inline constexpr double kMaxIor = 10.0;
+/// Of the working picture, on its longer and on its shorter side: below it there is nothing to
+/// shape.
+inline constexpr int kMinPixels = 4;
 /// Of a term of the objective: beyond it the others are lost to rounding.
 inline constexpr double kMaxWeight = 1e12;
 
@@ -53,11 +57,19 @@ struct DesignOptions {
   SurfaceModel model = SurfaceModel::kSmooth;  ///< What is optimised; smooth makes the better part.
   ViewSide view = ViewSide::kFront;
   ObjectiveWeights weights;
+  double smoothness = 1.0;  ///< Factor on weights.smooth.
   /// File that takes a checkpoint after every round; none is written if empty.
   std::filesystem::path checkpoint;
   /// Go on from `checkpoint`. Same picture and options → same result as without interruption.
   bool resume = false;
 };
+
+/// What a design of `target` is made with where nothing else is asked for: the smoothness that the
+/// model needs, and no more pixels than the picture has.
+DesignOptions default_design_options(SurfaceModel model, const Image& target);
+
+/// The same options with `smoothness` multiplied into its weight, and 1 then.
+DesignOptions with_smoothness_applied(DesignOptions options);
 
 /// @throw InputError naming option, value and rule if an option breaks its rule on its own or
 ///        against the picture, or the picture is all black.

@@ -7,10 +7,11 @@
 
 #include "core/compute/executor.h"
 #include "core/optics/optical_setup.h"
+#include "core/surface/mesh_normals.h"
 #include "core/surface/surface_mesh.h"
+#include "core/surface/surface_model.h"
 #include "design/flux/flux_image.h"
 #include "design/optics/surface_kernels.h"
-#include "design/optics/surface_optics.h"
 
 namespace lensforge {
 
@@ -26,8 +27,7 @@ std::vector<double> render_flux(const SurfaceMesh& mesh, const OpticalSetup& set
   };
   const auto triangles = buffer_of(executor, numbers(mesh.triangles));
   const auto vertices = buffer_of(executor, numbers(mesh.vertices));
-  const SurfaceView surface{triangles.data(), vertices.data(), Projection(setup),
-                            setup.lens_size.prod()};
+  const SurfaceView surface{triangles.data(), vertices.data(), LightPath(setup)};
   FluxImageOn<Exec> image(setup.pixels.x(), setup.pixels.y());
   std::vector<double> flux(static_cast<std::size_t>(setup.pixels.prod()));
   const std::int64_t count = mesh.triangle_count();

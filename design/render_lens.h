@@ -6,6 +6,7 @@
 #include "core/image/metrics.h"
 #include "core/optics/optical_setup.h"
 #include "core/surface/surface_mesh.h"
+#include "core/surface/surface_model.h"
 
 namespace lensforge {
 
@@ -15,7 +16,7 @@ struct RenderResult {
   double flux_inside = 0.0;  ///< Share of the lens's flux that lands on the image rectangle.
 };
 
-/// Renders what a surface throws onto the image rectangle of `setup`, exactly (no sampling).
+/// Renders what a surface projects onto the image rectangle of `setup`, exactly (no sampling).
 RenderResult render_surface(const SurfaceMesh& mesh, const OpticalSetup& setup, SurfaceModel model,
                             const Executor& executor);
 

@@ -4,7 +4,8 @@
 #include <cmath>
 
 #include "core/image/image_sample.h"
-#include "design/optics/projection.h"
+#include "core/optics/light_path.h"
+#include "design/optics/smooth.h"
 #include "design/render_lens.h"
 
 namespace lensforge {
@@ -38,7 +39,7 @@ WantedPicture::WantedPicture(const SurfaceMesh& mesh, const OpticalSetup& setup,
     : setup_(setup),
       target_(target),
       executor_(executor),
-      reach_((setup.ior - 1.0) * (setup.focal_length - mesh.vertices.row(2).mean())) {
+      reach_(LightPath(setup).reach(1.0, mesh.vertices.row(2).mean())) {
   mae_ = evaluate(mesh, setup, SurfaceModel::kSmooth, target, &wanted_, executor).mae;
 }
 
@@ -47,13 +48,13 @@ WantedPicture::Comparison WantedPicture::compare(const SurfaceMesh& mesh,
   Image thrown;
   const double mae = evaluate(mesh, normals, setup_, target_, &thrown, executor_).mae;
   const Image missing = difference(wanted_, thrown, setup_, target_.total());
-  const Projection optics(setup_);
+  const LightPath light(setup_);
   Comparison result{mae - mae_, Eigen::VectorXd::Zero(mesh.vertex_count())};
   parallel_for(executor_, "missing flux", mesh.vertex_count(), [&](std::int64_t v) {
     const Eigen::Vector3d n = normals.col(v).normalized();
-    if (!optics.transmits(n)) return;
-    const Eigen::Vector2d lands = optics.land(mesh.vertices.col(v), RefractedBeam(n, optics.eta).m);
-    result.missing[v] = picture_at(missing, lands);
+    const Eigen::Vector3d p = mesh.vertices.col(v);
+    if (!light.transmits(p, n)) return;
+    result.missing[v] = picture_at(missing, project_vertex(p, n, light));
   });
   return result;
 }

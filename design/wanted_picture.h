@@ -10,8 +10,8 @@
 
 namespace lensforge {
 
-/// The picture that a mesh throws by its vertex normals, and what other surfaces' pictures lack of
-/// it.
+/// The picture that a mesh projects by its vertex normals, and what other surfaces' pictures lack
+/// of it.
 class WantedPicture {
  public:
   /// Keeps references to all but the mesh. @pre target has setup.pixels columns and rows.
@@ -19,9 +19,10 @@ class WantedPicture {
                 const Executor& executor);
 
   struct Comparison {
-    double excess = 0.0;      ///< MAE against the target above that of the wanted picture.
-    Eigen::VectorXd missing;  ///< Per vertex: wanted − thrown flux where its light lands, between
-                              ///< the pixels' middles linearly, relative to an evenly lit picture.
+    double excess = 0.0;  ///< MAE against the target above that of the wanted picture.
+    Eigen::VectorXd
+        missing;  ///< Per vertex: wanted − projected flux where its light lands, between
+                  ///< the pixels' middles linearly, relative to an evenly lit picture.
   };
 
   /// Of a smooth surface that is known by its own normals, 3 × V with z > 0.

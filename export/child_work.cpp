@@ -27,6 +27,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/io/descriptor.h"
 
 // The child sends frames through a pipe: a letter, the length of the text, the text. Its end
 // without a result or an error is a failure. It is killed together with its parent, and ends
@@ -144,7 +145,7 @@ void leave_signals_to_parent(pid_t parent) {
   } catch (const RunError& e) {
     send(descriptor, Frame::kRunError, e.what());
   } catch (const std::bad_alloc&) {
-    send(descriptor, Frame::kFailure, "needs more memory than there is for it");
+    send(descriptor, Frame::kFailure, "needs more memory than is available");
   } catch (const std::exception& e) {
     send(descriptor, Frame::kFailure, std::string("failed: ") + e.what());
   } catch (...) {
@@ -160,25 +161,20 @@ class Child {
     std::array<int, 2> ends{};
     if (::pipe2(ends.data(), O_CLOEXEC) != 0) fail();
     const pid_t parent = ::getpid();
+    reading_ = Descriptor(ends[0]);
+    Descriptor writing(ends[1]);
     pid_ = ::fork();
     if (pid_ == 0) {
-      ::close(ends[0]);
+      reading_.close();
       leave_signals_to_parent(parent);
       silence_output();
       apply(limits);
-      live(ends[1], work);
+      live(writing.number(), work);
     }
-    const int error = errno;
-    ::close(ends[1]);
-    descriptor_ = ends[0];
-    if (pid_ > 0) return;
-    ::close(descriptor_);
-    errno = error;
-    fail();
+    if (pid_ < 0) fail();
   }
 
   ~Child() {
-    ::close(descriptor_);
     if (pid_ <= 0) return;
     ::kill(pid_, SIGKILL);
     wait();
@@ -189,12 +185,12 @@ class Child {
 
   /// Appends what has come; false at the end. Waits a moment at most.
   bool receive(std::string& bytes) {
-    pollfd ready{descriptor_, POLLIN, 0};
+    pollfd ready{reading_.number(), POLLIN, 0};
     if (::poll(&ready, 1, kPollMilliseconds) <= 0) return true;
     constexpr std::size_t kPiece = std::size_t{1} << 16;
     const std::size_t before = bytes.size();
     bytes.resize(before + kPiece);
-    const ssize_t got = ::read(descriptor_, bytes.data() + before, kPiece);
+    const ssize_t got = ::read(reading_.number(), bytes.data() + before, kPiece);
     bytes.resize(before + static_cast<std::size_t>(std::max<ssize_t>(got, 0)));
     return got > 0 || (got < 0 && errno == EINTR);
   }
@@ -215,7 +211,7 @@ class Child {
   }
 
   pid_t pid_ = -1;
-  int descriptor_ = -1;
+  Descriptor reading_;
 };
 
 /// The first whole frame of `bytes` from `at`, which moves behind it.

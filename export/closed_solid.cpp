@@ -44,8 +44,8 @@ void require_faces_up(const SurfaceMesh& surface, const std::string& name) {
 void require_above_back(const SurfaceMesh& surface, const std::string& name) {
   const double lowest = surface.vertices.row(2).minCoeff();
   if (lowest > 0.0) return;
-  refuse(name, "reaches down to z = " + std::to_string(lowest) +
-                   " mm: it must lie above its back, z = 0");
+  refuse(name,
+         "reaches down to z = " + std::to_string(lowest) + " mm: must be above the back, z = 0");
 }
 
 /// For every vertex of the outline the one that follows it, else kNone.
@@ -90,7 +90,8 @@ void require_seen_from_middle(const SurfaceMesh& surface, const std::vector<int>
   for (std::size_t i = 0; i < loop.size(); ++i) {
     const Eigen::Vector2d a = flat(surface, loop[i]) - centre;
     const Eigen::Vector2d b = flat(surface, loop[(i + 1) % loop.size()]) - centre;
-    if (!(cross(a, b) > 0.0)) refuse(name, "has an outline that is not seen whole from its middle");
+    if (!(cross(a, b) > 0.0))
+      refuse(name, "has an outline that is not visible as a whole from its middle (star-shaped)");
     angle += std::atan2(cross(a, b), a.dot(b));
   }
   if (angle > 3.0 * std::numbers::pi) refuse(name, "winds around its middle more than once");

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <string>
 
 #include "core/compute/work_estimate.h"
 
@@ -22,5 +23,12 @@ WorkEstimate spline_solid_work(double control_points);
 /// have room; 0 if there is none. @param work  grows with the count.
 std::int64_t largest_with_room(const std::function<WorkEstimate(double)>& work, double wanted,
                                const std::filesystem::path& folder);
+
+/// What a file takes that is written to `out`.
+/// @param work  by the value of the option that decides its size.
+/// @throw InputError naming the option and the value that would fit if there is no room for it.
+WorkEstimate require_room_for(const std::function<WorkEstimate(double)>& work,
+                              const std::string& option, double value,
+                              const std::filesystem::path& out);
 
 }  // namespace lensforge

@@ -10,7 +10,8 @@
 
 namespace lensforge {
 
-/// Changes the heights of a spline until it throws the picture that the vertex-normal model throws.
+/// Changes the heights of a spline until it projects the picture that the vertex-normal model
+/// projects.
 class LightFit {
  public:
   /// Keeps references.

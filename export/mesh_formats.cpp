@@ -14,6 +14,7 @@
 
 #include "core/error.h"
 #include "core/io/files.h"
+#include "core/surface/mesh_normals.h"
 
 namespace lensforge {
 namespace {
@@ -48,9 +49,7 @@ void append_fixed(std::string& text, double value) {
 }
 
 void append_stl_triangle(std::string& bytes, const SurfaceMesh& mesh, Eigen::Index t) {
-  const Eigen::Vector3d normal =
-      (mesh.corner(t, 1) - mesh.corner(t, 0)).cross(mesh.corner(t, 2) - mesh.corner(t, 0));
-  append_bytes(bytes, Eigen::Vector3f(normal.normalized().cast<float>()));
+  append_bytes(bytes, Eigen::Vector3f(area_normal(mesh, t).normalized().cast<float>()));
   for (int k = 0; k < 3; ++k) append_bytes(bytes, Eigen::Vector3f(mesh.corner(t, k).cast<float>()));
   append_bytes(bytes, std::uint16_t{0});
 }
@@ -117,7 +116,7 @@ constexpr std::string_view kRelations =
     "<Relationship Target=\"/3D/3dmodel.model\" Id=\"rel0\" "
     "Type=\"http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel\"/></Relationships>\n";
 
-/// A zip archive that is being written; thrown away unless close() is reached.
+/// A zip archive that is being written; discarded unless close() is reached.
 class ZipWriter {
  public:
   ZipWriter(const fs::path& beside, const fs::path& path) : path_(path) {

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "export/normal_bound.h"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 
@@ -24,12 +23,6 @@ double bound_in(const SmoothSurface& surface, Eigen::Index triangle) {
   return std::abs(sum) / perimeter / (1.0 + steepest);
 }
 
-double area_of(const SurfaceMesh& mesh, Eigen::Index triangle) {
-  const Eigen::Vector3d a = mesh.corner(triangle, 1) - mesh.corner(triangle, 0);
-  const Eigen::Vector3d b = mesh.corner(triangle, 2) - mesh.corner(triangle, 0);
-  return 0.5 * a.cross(b).z();
-}
-
 }  // namespace
 
 NormalBound normal_bound(const SmoothSurface& surface, double tolerance) {
@@ -39,7 +32,7 @@ NormalBound normal_bound(const SmoothSurface& surface, double tolerance) {
   double above = 0.0;
   for (Eigen::Index t = 0; t < mesh.triangles.cols(); ++t) {
     const double here = bound_in(surface, t);
-    const double area = area_of(mesh, t);
+    const double area = mesh.plan_area(t);
     all += area;
     if (here > tolerance) above += area;
     if (here <= bound.largest) continue;

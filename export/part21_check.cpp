@@ -52,7 +52,7 @@ class Part21Scanner {
     while (!rest_.empty() && is_space(rest_.front())) take();
     if (!rest_.starts_with(kBegin)) refuse("is no STEP file: it does not begin with ISO-10303-21;");
     while (!rest_.empty()) step();
-    if (!has_data_) refuse("is no whole STEP file: it has no DATA section");
+    if (!has_data_) refuse("is an incomplete STEP file: it has no DATA section");
     if (in_data_) refuse("is cut short: its DATA section has no ENDSEC");
     require_single();
     require_defined();

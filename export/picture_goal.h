@@ -8,10 +8,10 @@
 
 namespace lensforge {
 
-/// How far the picture that a surface throws is from the one that it is to throw.
+/// How far the picture that a surface projects is from the one that it should project.
 struct PictureMiss {
   double excess = 0.0;  ///< By how much its MAE is above that of the wanted picture.
-  /// Per point: flux that is missing where the point's light lands, wanted − thrown, relative to
+  /// Per point: flux that is missing where the point's light lands, wanted − projected, relative to
   /// an evenly lit picture.
   Eigen::VectorXd missing;
 };

@@ -11,10 +11,10 @@
 #include "export/spline_net.h"
 
 // The spline's x and y are given first (GridWarp): with knots where vertices are dense, 30,481
-// control points throw the picture of a smooth 128² portrait with MAE 0.0031, where on even knot
+// control points project the picture of a smooth 128² portrait with MAE 0.0031, where on even knot
 // lines 115,600 give 0.0047. What is then minimised over z is the squared difference of the
 // derivatives by the parameters from those that the vertex-normal model's slopes ask for, which are
-// what throws the picture (for parameters that turn and scale but do not shear this is the
+// what projects the picture (for parameters that turn and scale but do not shear this is the
 // difference of the slopes themselves, over the area), plus a little of the heights' own, which
 // pins what slopes leave open. Both are sums over a tensor grid of samples, so that in the basis
 // that diagonalises mass and stiffness of each direction the solution is one division a coefficient

@@ -15,6 +15,7 @@
 #include "core/error.h"
 #include "core/io/files.h"
 #include "export/child_work.h"
+#include "export/iges_check.h"
 #include "export/solid_check.h"
 
 namespace lensforge {
@@ -108,6 +109,7 @@ TopoDS_Shape read_step_shape(const fs::path& path, const RunControl& control) {
 }
 
 TopoDS_Shape read_iges_shape(const fs::path& path, const RunControl& control) {
+  check_iges(read_whole_file(path, kMostSolidBytes), path.string());
   IGESControl_Controller::Init();
   IGESControl_Reader reader;
   load(reader, "IGES", path, control);

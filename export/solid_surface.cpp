@@ -111,7 +111,7 @@ bool looks_up(const TopoDS_Face& face) {
 Faces optical_faces(const Solid& solid, const fs::path& path) {
   if (!solid.named.empty()) {
     if (std::all_of(solid.named.begin(), solid.named.end(), looks_up)) return solid.named;
-    refuse(path, "its optical surface is no height field: it does not look up (+z) everywhere");
+    refuse(path, "its optical surface is no height field: it does not face up (+z) everywhere");
   }
   Faces curved;
   Faces flat;
@@ -239,7 +239,7 @@ void require_height_field(const std::vector<OpticalFace>& faces, const Work& wor
     if (sampler.is_covered_twice(c, r)) twice[static_cast<std::size_t>(r)] = 1;
   });
   if (std::find(twice.begin(), twice.end(), 1) == twice.end()) return;
-  refuse(work.path, "its optical surface is no height field: parts of it lie above one another");
+  refuse(work.path, "its optical surface is no height field: parts of it are above one another");
 }
 
 /// Puts points of grids and the triangles between them together.

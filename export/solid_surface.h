@@ -12,8 +12,9 @@ namespace lensforge {
 /// The optical surface of a solid from any program.
 struct SolidSurface {
   SampledSurface samples;
-  int faces = 0;         ///< Of the solid that make it up.
-  bool by_name = false;  ///< They are called "optical surface"; otherwise they were told by shape.
+  int faces = 0;  ///< Of the solid that make it up.
+  bool by_name =
+      false;  ///< They are called "optical surface"; otherwise they were recognised by shape.
 };
 
 /// Reads a STEP file's one solid and samples its optical surface: the faces named "optical

@@ -130,7 +130,7 @@ FitError difference(const SurfacePoint& a, const SurfacePoint& b);
 /// vertices of a grid that has moved (GridWarp), so that knots are dense where vertices are. Until
 /// both tolerances hold everywhere, or the control points are used up, the knots are doubled;
 /// net.error() says which tolerances hold. Where they do not, heights change until the spline
-/// throws the picture that the model throws (options.picture).
+/// projects the picture that the model projects (options.picture).
 /// @pre the surface covers its whole box. @throw Interrupted.
 SplineNet fit_spline_net(const SmoothSurface& surface, const FitOptions& options,
                          const Executor& executor, const RunControl& control);

@@ -15,7 +15,7 @@ constexpr double kMostCells = 4e6;
 
 }  // namespace
 
-BendMap::BendMap(const SmoothSurface& surface, std::span<const BendRange> bends, double cell)
+BendMap::BendMap(const OpticalSurface& surface, std::span<const BendRange> bends, double cell)
     : box_(surface.box()), cell_(std::max(cell, std::sqrt(box_.volume() / kMostCells))) {
   columns_ = static_cast<std::int64_t>(box_.sizes().x() / cell_) + 1;
   rows_ = static_cast<std::int64_t>(box_.sizes().y() / cell_) + 1;

@@ -7,16 +7,16 @@
 #include <span>
 #include <vector>
 
-#include "core/surface/smooth_surface.h"
+#include "core/surface/optical_surface.h"
 
 namespace lensforge {
 
 /// How sharply a smooth surface bends where, in cells.
 class BendMap {
  public:
-  /// @param bends  SmoothSurface::bend_range() of every triangle.
+  /// @param bends  OpticalSurface::bend_range() of every triangle.
   /// @param cell   side of a cell, mm, > 0; larger where the surface has too many of them.
-  BendMap(const SmoothSurface& surface, std::span<const BendRange> bends, double cell);
+  BendMap(const OpticalSurface& surface, std::span<const BendRange> bends, double cell);
 
   /// Bounds of the second derivatives in any direction, 1/mm, over all of the surface in a box;
   /// zeros where there is none.

@@ -26,7 +26,7 @@ bool same_curve(const CurvePiece& a, const CurvePiece& b, double from, double to
   return true;
 }
 
-/// Whether `fresh` is above `old` by more than a tie anywhere, as far as one look tells.
+/// Whether `fresh` is above `old` by more than a tie anywhere, by one quick test.
 bool may_rise_above(const CurvePiece& fresh, const CurvePiece& old) {
   const double from = std::max(fresh.begin, old.begin);
   const double to = std::min(fresh.end, old.end);

@@ -27,9 +27,7 @@ Interpolation interpolation_of(const SurfaceMesh& mesh, std::int64_t triangle) {
     side[static_cast<std::size_t>(k)] = way.head<2>().norm();
   }
   std::sort(side.begin(), side.end());
-  const Eigen::Vector3d u = mesh.corner(triangle, 1) - mesh.corner(triangle, 0);
-  const Eigen::Vector3d v = mesh.corner(triangle, 2) - mesh.corner(triangle, 0);
-  const double area = 0.5 * std::abs(u.x() * v.y() - u.y() * v.x());
+  const double area = std::abs(mesh.plan_area(triangle));
   const bool obtuse = side[0] * side[0] + side[1] * side[1] <= side[2] * side[2];
   const double around = obtuse ? 0.5 * side[2] : side[0] * side[1] * side[2] / (4.0 * area);
   const double inscribed = 2.0 * area / (side[0] + side[1] + side[2]);
@@ -45,7 +43,7 @@ int splits_for(const Interpolation& shape, double bend, const SmoothCutOptions& 
 /// The parts of one triangle that a window touches.
 class TriangleParts {
  public:
-  TriangleParts(const SmoothSurface& surface, std::int64_t triangle, int n,
+  TriangleParts(const OpticalSurface& surface, std::int64_t triangle, int n,
                 const Eigen::AlignedBox2d& window)
       : surface_(surface), triangle_(triangle), n_(n), window_(window) {
     for (int k = 0; k < 3; ++k) corner_.col(k) = surface.mesh().corner(triangle, k).head<2>();
@@ -99,7 +97,7 @@ class TriangleParts {
     if (window_.intersects(box)) emit(places);
   }
 
-  const SmoothSurface& surface_;
+  const OpticalSurface& surface_;
   std::int64_t triangle_;
   int n_;
   const Eigen::AlignedBox2d& window_;
@@ -114,7 +112,7 @@ Eigen::AlignedBox2d box_of(const SurfaceMesh& mesh, std::int64_t triangle) {
 
 }  // namespace
 
-SmoothCutSurface::SmoothCutSurface(std::shared_ptr<const SmoothSurface> surface, double radius,
+SmoothCutSurface::SmoothCutSurface(std::shared_ptr<const OpticalSurface> surface, double radius,
                                    const SmoothCutOptions& options, const Executor& executor)
     : surface_(std::move(surface)),
       grid_(surface_->mesh()),

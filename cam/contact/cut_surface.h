@@ -12,7 +12,7 @@
 #include "cam/contact/facet_grid.h"
 #include "cam/contact/smooth_roll.h"
 #include "core/compute/executor.h"
-#include "core/surface/smooth_surface.h"
+#include "core/surface/optical_surface.h"
 #include "core/surface/surface_mesh.h"
 
 namespace lensforge {
@@ -46,10 +46,10 @@ class CutSurface {
 };
 
 /// The facets of a mesh as they are.
-class FacetSurface final : public CutSurface {
+class FacetCutSurface final : public CutSurface {
  public:
   /// @param radius  of the ball, mm, > 0.
-  FacetSurface(const SurfaceMesh& mesh, double radius, const Executor& executor)
+  FacetCutSurface(const SurfaceMesh& mesh, double radius, const Executor& executor)
       : cutter_(std::make_shared<const DropCutter>(mesh, radius, executor)) {}
 
   [[nodiscard]] std::shared_ptr<const DropCutter> cutter(
@@ -62,7 +62,7 @@ class FacetSurface final : public CutSurface {
   std::shared_ptr<const DropCutter> cutter_;
 };
 
-/// How finely a smooth surface is cut into facets. Where a triangle would need more than
+/// How finely a surface without creases is cut into facets. Where a triangle would need more than
 /// kMostSplits, as at a crease, it gets no more, and deviation() says so.
 struct SmoothCutOptions {
   double deviation = 2e-5;        ///< Of a facet from the surface, mm, > 0.
@@ -74,8 +74,8 @@ struct SmoothCutOptions {
 /// Parts of a triangle's edges at most.
 inline constexpr int kMostSplits = 48;
 
-/// The smooth surface through a mesh's vertices (SmoothSurface), as facets between points of it:
-/// every triangle in n² equal parts, n from how it bends. Facets are made for a band at a time.
+/// A surface without creases, as facets between points of it: every triangle in n² equal parts, n
+/// from how it bends. Facets are made for a band at a time.
 ///
 /// On a triangle of second derivatives ≤ c an interpolant is off by c r²/2 at most, r being the
 /// radius of the smallest circle around it, and its slopes by c l₁ l₂ (l₃ + 4 r_in) / (4 A), l₁ ≥
@@ -83,13 +83,13 @@ inline constexpr int kMostSplits = 48;
 /// other leave slits no higher than that.
 class SmoothCutSurface final : public CutSurface {
  public:
-  /// @param radius  of the ball, mm, > 0.
-  /// @pre every triangle faces +z.
+  /// @param radius  of the ball, mm, > 0. @pre not surface->has_creases()
+  SmoothCutSurface(std::shared_ptr<const OpticalSurface> surface, double radius,
+                   const SmoothCutOptions& options, const Executor& executor);
+  /// The smooth model's surface over a mesh. @pre every triangle faces +z.
   SmoothCutSurface(const SurfaceMesh& mesh, double radius, const SmoothCutOptions& options,
                    const Executor& executor)
-      : SmoothCutSurface(std::make_shared<const SmoothSurface>(mesh), radius, options, executor) {}
-  SmoothCutSurface(std::shared_ptr<const SmoothSurface> surface, double radius,
-                   const SmoothCutOptions& options, const Executor& executor);
+      : SmoothCutSurface(optical_surface(mesh, SurfaceModel::kSmooth), radius, options, executor) {}
 
   [[nodiscard]] std::shared_ptr<const DropCutter> cutter(const Eigen::AlignedBox2d& axis,
                                                          const Executor& executor) const override;
@@ -101,12 +101,12 @@ class SmoothCutSurface final : public CutSurface {
   /// The facets that lie in a window or touch it, in the order of the mesh's triangles.
   [[nodiscard]] SurfaceMesh facets(const Eigen::AlignedBox2d& window,
                                    const Executor& executor) const;
-  [[nodiscard]] const SmoothSurface& surface() const { return *surface_; }
+  [[nodiscard]] const OpticalSurface& surface() const { return *surface_; }
   /// Facets of the whole surface.
   [[nodiscard]] std::int64_t facet_count() const;
 
  private:
-  std::shared_ptr<const SmoothSurface> surface_;
+  std::shared_ptr<const OpticalSurface> surface_;
   FacetGrid grid_;
   double radius_;
   std::vector<std::uint8_t> splits_;  ///< n of each triangle.

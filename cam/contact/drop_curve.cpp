@@ -29,7 +29,7 @@ constexpr double kShortestStretch = 1e-6;
 /// other within R · 1e-6 of it.
 constexpr double kSteepEdge = 1e-6;
 
-/// How much, mm or mm², quick looks at where an edge or corner is touched leave to rounding.
+/// Rounding allowance, mm or mm², of the quick tests for contact with an edge or corner.
 constexpr double kTouchMargin = 1e-9;
 
 /// A facet's line is trusted from this length on, mm; shorter, its edges stand for it.

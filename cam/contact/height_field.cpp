@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "core/error.h"
+#include "core/surface/mesh_normals.h"
 
 namespace lensforge {
 
@@ -15,7 +16,7 @@ HeightField inspect_height_field(const SurfaceMesh& mesh, const Eigen::Vector2d&
     const Eigen::Vector3d b = mesh.corner(t, 1);
     const Eigen::Vector3d c = mesh.corner(t, 2);
     for (const Eigen::Vector3d& corner : {a, b, c}) field.box.extend(corner);
-    const Eigen::Vector3d normal = (b - a).cross(c - a);
+    const Eigen::Vector3d normal = area_normal(mesh, t);
     if (normal.isZero(0.0)) continue;
     const double slope = normal.head<2>().norm() / normal.z();
     if (slope > field.steepest) {

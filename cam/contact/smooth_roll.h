@@ -8,7 +8,7 @@
 
 #include "cam/contact/bend_map.h"
 #include "cam/contact/curve_piece.h"
-#include "core/surface/smooth_surface.h"
+#include "core/surface/optical_surface.h"
 
 namespace lensforge {
 
@@ -24,18 +24,18 @@ class SmoothBed {
  public:
   /// @param radius   of the ball, mm, > 0.
   /// @param surface  a height field over a rectangle; must outlive the bed.
-  /// @param bends    SmoothSurface::bend_range() of every triangle.
-  SmoothBed(const SmoothSurface& surface, double radius, std::span<const BendRange> bends)
+  /// @param bends    OpticalSurface::bend_range() of every triangle.
+  SmoothBed(const OpticalSurface& surface, double radius, std::span<const BendRange> bends)
       : surface_(surface), radius_(radius), bends_(surface, bends, 0.5 * radius) {}
 
-  [[nodiscard]] const SmoothSurface& surface() const { return surface_; }
+  [[nodiscard]] const OpticalSurface& surface() const { return surface_; }
   [[nodiscard]] double radius() const { return radius_; }
   [[nodiscard]] const BendMap& bends() const { return bends_; }
 
   static constexpr double kMostBend = 0.8;
 
  private:
-  const SmoothSurface& surface_;
+  const OpticalSurface& surface_;
   double radius_;
   BendMap bends_;
 };

@@ -8,8 +8,8 @@
 #include <cstdint>
 #include <limits>
 
+#include "core/optics/light_path.h"
 #include "design/optics/image_triangle.h"
-#include "design/optics/projection.h"
 
 /// Light of a grid triangle that a crease runs through.
 ///
@@ -30,6 +30,9 @@ struct SurfaceSide {
     const Eigen::Vector2d d = p - place;
     return z + d.dot(slope + 0.5 * (bend * d));
   }
+  [[nodiscard]] Eigen::Vector3d at(const Eigen::Vector2d& p) const {
+    return {p.x(), p.y(), height_at(p)};
+  }
   [[nodiscard]] Eigen::Vector2d slope_at(const Eigen::Vector2d& p) const {
     return slope + bend * (p - place);
   }
@@ -37,13 +40,14 @@ struct SurfaceSide {
 
 /// Where the ray of a surface point of height z and the given slope lands, in pixel coordinates;
 /// NaN if the light is reflected totally.
-inline Eigen::Vector2d land_of(const Projection& optics, const Eigen::Vector2d& place, double z,
+inline Eigen::Vector2d land_of(const LightPath& light, const Eigen::Vector2d& place, double z,
                                const Eigen::Vector2d& slope) {
   const Eigen::Vector3d n = Eigen::Vector3d(-slope.x(), -slope.y(), 1.0).normalized();
-  if (!optics.transmits(n)) {
+  const Eigen::Vector3d p(place.x(), place.y(), z);
+  if (!light.transmits(p, n)) {
     return Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
   }
-  return optics.land({place.x(), place.y(), z}, RefractedBeam(n, optics.eta).m);
+  return light.land(p, light.beam(p, n).m);
 }
 
 /// Where two sides meet between their nodes, as a share of the way from a to b.
@@ -63,10 +67,10 @@ inline double meeting_share(const SurfaceSide& a, const SurfaceSide& b) {
 /// Hands the image triangles of a surface triangle whose corners lie on different cuts to `sink`:
 /// every corner keeps the quadrilateral (corner, x_k, m, x_k−1) of its own side, whose points land
 /// where that side's own slope sends them. Each side's light stays on its side, and the pieces
-/// cover the triangle exactly: nothing is thrown between the two landing places.
-/// @param lens_area  mm²; fluxes are shares of it.
+/// cover the triangle exactly: nothing is projected between the two landing places.
+/// @param lens_area  mm², of the grid; fluxes are shares of the light that it takes.
 template <class Sink>
-void split_at_crease(const std::array<SurfaceSide, 3>& sides, const Projection& optics,
+void split_at_crease(const std::array<SurfaceSide, 3>& sides, const LightPath& light,
                      double lens_area, const Sink& sink) {
   std::array<Eigen::Vector2d, 3> meeting;
   Eigen::Vector2d sum(0.0, 0.0);
@@ -86,12 +90,12 @@ void split_at_crease(const std::array<SurfaceSide, 3>& sides, const Projection& 
     const Eigen::Vector2d& next = meeting[k];
     const Eigen::Vector2d& previous = meeting[(k + 2) % 3];
     const auto land = [&](const Eigen::Vector2d& p) {
-      return land_of(optics, p, side.height_at(p), side.slope_at(p));
+      return land_of(light, p, side.height_at(p), side.slope_at(p));
     };
     const auto flux = [&](const Eigen::Vector2d& p, const Eigen::Vector2d& q) {
-      return 0.5 * doubled_area(side.place, p, q) / lens_area;
+      return light.intake({side.at(side.place), side.at(p), side.at(q)}) / lens_area;
     };
-    const Eigen::Vector2d corner = land_of(optics, side.place, side.z, side.slope);
+    const Eigen::Vector2d corner = land_of(light, side.place, side.z, side.slope);
     const Eigen::Vector2d centre = land(middle);
     sink(ImageTriangle{corner, land(next), centre, flux(next, middle)});
     sink(ImageTriangle{corner, centre, land(previous), flux(middle, previous)});

@@ -14,8 +14,8 @@
 
 namespace lensforge {
 
-/// What a surface throws onto the picture: share of the lens's flux per pixel, row by row from the
-/// top.
+/// What a surface projects onto the picture: share of the lens's flux per pixel, row by row from
+/// the top.
 struct FluxPicture {
   int columns = 0;
   int rows = 0;
@@ -48,7 +48,7 @@ std::vector<FluxPicture> render_fields(std::span<const SurfaceField* const> fiel
                                        const FieldRenderSetup& setup, const Executor& executor,
                                        const RunControl& control);
 
-/// What a part of the lens throws, as shares of the whole lens's flux.
+/// What a part of the lens projects, as shares of the whole lens's flux.
 FluxPicture render_cells(const SurfaceField& field, const FieldRenderSetup& setup,
                          const CellRange& cells, const Executor& executor,
                          const RunControl& control);

@@ -18,7 +18,7 @@ double area_of(const GridWindow& grid) {
 }  // namespace
 
 SurfaceTile::SurfaceTile(const OpticalSetup& setup, const GridWindow& grid)
-    : optics_(setup),
+    : light_(setup),
       grid_(grid),
       lens_area_(area_of(grid)),
       triangle_flux_(0.5 * grid.spacing.prod() / lens_area_) {}
@@ -38,7 +38,7 @@ void SurfaceTile::load(const SurfaceField& field, const CellRange& range,
     const auto k = static_cast<std::size_t>(i);
     const Eigen::Vector2d at =
         patch_.window.node(i % patch_.window.columns, i / patch_.window.columns);
-    landing_[k] = land_of(optics_, at, patch_.z[k], {patch_.slope_x[k], patch_.slope_y[k]});
+    landing_[k] = land_of(light_, at, patch_.z[k], {patch_.slope_x[k], patch_.slope_y[k]});
   });
 }
 
@@ -58,6 +58,13 @@ Eigen::Vector2d SurfaceTile::bend_along(std::size_t node, std::int64_t step, boo
   return Eigen::Vector2d(patch_.slope_x[high] - patch_.slope_x[low],
                          patch_.slope_y[high] - patch_.slope_y[low]) /
          distance;
+}
+
+Eigen::Vector3d SurfaceTile::point(std::size_t node) const {
+  const std::int64_t columns = patch_.window.columns;
+  const auto index = static_cast<std::int64_t>(node);
+  const Eigen::Vector2d at = patch_.window.node(index % columns, index / columns);
+  return {at.x(), at.y(), patch_.z[node]};
 }
 
 SurfaceSide SurfaceTile::side_of(std::size_t node) const {

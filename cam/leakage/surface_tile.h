@@ -10,9 +10,9 @@
 #include "cam/milled/lens_grid.h"
 #include "cam/milled/surface_field.h"
 #include "core/compute/executor.h"
+#include "core/optics/light_path.h"
 #include "core/optics/optical_setup.h"
 #include "design/optics/image_triangle.h"
-#include "design/optics/projection.h"
 
 namespace lensforge {
 
@@ -21,7 +21,7 @@ namespace lensforge {
 /// SurfacePatch::cut) is split by split_at_crease(). Keeps its buffers between tiles.
 class SurfaceTile {
  public:
-  /// @param grid  the whole lens; fluxes are shares of its area.
+  /// @param grid  the whole lens; fluxes are shares of the light that it takes.
   SurfaceTile(const OpticalSetup& setup, const GridWindow& grid);
 
   /// Samples the surface over `range` with one more node on every side where the grid has one, so
@@ -61,19 +61,24 @@ class SurfaceTile {
   template <class Sink>
   void visit_triangle(std::size_t a, std::size_t b, std::size_t c, const Sink& sink) const {
     if (is_smooth(a, b, c)) {
-      sink(ImageTriangle{landing_[a], landing_[b], landing_[c], triangle_flux_});
+      sink(ImageTriangle{landing_[a], landing_[b], landing_[c], flux_of(a, b, c)});
     } else {
-      split_at_crease({side_of(a), side_of(b), side_of(c)}, optics_, lens_area_, sink);
+      split_at_crease({side_of(a), side_of(b), side_of(c)}, light_, lens_area_, sink);
     }
   }
+  [[nodiscard]] double flux_of(std::size_t a, std::size_t b, std::size_t c) const {
+    if (light_.intake_is_plan_area()) return triangle_flux_;
+    return light_.intake({point(a), point(b), point(c)}) / lens_area_;
+  }
+  [[nodiscard]] Eigen::Vector3d point(std::size_t node) const;
   [[nodiscard]] SurfaceSide side_of(std::size_t node) const;
   [[nodiscard]] Eigen::Vector2d bend_along(std::size_t node, std::int64_t step, bool has_before,
                                            bool has_after) const;
 
-  Projection optics_;
+  LightPath light_;
   GridWindow grid_;
   double lens_area_;
-  double triangle_flux_;
+  double triangle_flux_;  ///< Of every triangle that takes light by its plan area.
   CellRange range_;
   std::int64_t halo_columns_ = 0;  ///< Nodes of the patch left of the tile.
   std::int64_t halo_rows_ = 0;

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/surface/mesh_normals.h"
 #include "core/text/number_text.h"
 
 namespace lensforge {
@@ -35,7 +36,7 @@ struct Facet {
     const Eigen::Vector3d c = mesh.corner(triangle, 2);
     const Eigen::Vector3d u = b - corner;
     const Eigen::Vector3d v = c - corner;
-    const Eigen::Vector3d normal = u.cross(v);
+    const Eigen::Vector3d normal = area_normal(mesh, triangle);
     slope = -normal.head<2>() / normal.z();
     low = corner.cwiseMin(b).cwiseMin(c).head<2>();
     high = corner.cwiseMax(b).cwiseMax(c).head<2>();
@@ -87,11 +88,11 @@ struct FlatFacet {
   }
 };
 
-/// The smooth surface over a facet: of its three cubics, those that are asked for.
+/// A surface without creases over a facet: of its three cubics, those that are asked for.
 class SmoothFacet {
  public:
-  SmoothFacet(const SmoothSurface& surface, const Facet& facet, std::int32_t triangle)
-      : surface_(surface), facet_(facet) {
+  SmoothFacet(const OpticalSurface& surface, const Facet& facet, std::int32_t triangle)
+      : surface_(surface), facet_(facet), triangle_(triangle) {
     for (int k = 0; k < 3; ++k) corners_.col(k) = surface.mesh().corner(triangle, k).head<2>();
   }
 
@@ -113,14 +114,14 @@ class SmoothFacet {
     if (!patch) {
       Eigen::Vector3d middle = Eigen::Vector3d::Constant(4.0 / 9.0);
       middle[corner] = 1.0 / 9.0;
-      patch = surface_.patch_at(corners_ * middle);
-      LF_CHECK(patch.has_value(), std::to_string(corner));
+      patch = surface_.patch_in(triangle_, middle);
     }
     return *patch;
   }
 
-  const SmoothSurface& surface_;
+  const OpticalSurface& surface_;
   const Facet& facet_;
+  std::int32_t triangle_;
   Eigen::Matrix<double, 2, 3> corners_;
   std::array<std::optional<SmoothPatch>, 3> patches_;
 };
@@ -197,7 +198,7 @@ class BlockFiller {
     }
     if (patch_.cut[node(i, j)] >= 0) return;
     throw InputError("surface: nothing at x " + decimal_text(q.x(), 3) + " y " +
-                     decimal_text(q.y(), 3) + " mm; it has to cover the whole lens");
+                     decimal_text(q.y(), 3) + " mm; it must cover the whole lens");
   }
 
   const FacetGrid& grid_;

@@ -3,7 +3,7 @@
 
 #include "cam/contact/facet_grid.h"
 #include "cam/milled/surface_field.h"
-#include "core/surface/smooth_surface.h"
+#include "core/surface/optical_surface.h"
 #include "core/surface/surface_mesh.h"
 
 namespace lensforge {
@@ -25,19 +25,19 @@ class FacetField final : public SurfaceField {
   FacetGrid grid_;
 };
 
-/// The smooth surface through a mesh's vertices; no pieces. Nodes beside the mesh, up to
+/// A surface without creases; no pieces. Nodes beside the mesh, up to
 /// FacetGrid::kRim, lie on the tangent plane of the rim.
 class SmoothField final : public SurfaceField {
  public:
-  /// @param surface  must outlive the field.
-  explicit SmoothField(const SmoothSurface& surface) : surface_(surface), grid_(surface.mesh()) {}
+  /// @param surface  must outlive the field. @pre not surface.has_creases()
+  explicit SmoothField(const OpticalSurface& surface) : surface_(surface), grid_(surface.mesh()) {}
 
   /// @throw InputError naming a node that is farther than that from the mesh.
   void sample(const GridWindow& window, const Executor& executor,
               SurfacePatch& patch) const override;
 
  private:
-  const SmoothSurface& surface_;
+  const OpticalSurface& surface_;
   FacetGrid grid_;
 };
 

@@ -6,6 +6,8 @@
 #include <cstddef>
 #include <limits>
 
+#include "core/surface/mesh_normals.h"
+
 namespace lensforge {
 namespace {
 
@@ -19,10 +21,8 @@ FacetReach::FacetReach(const FacetGrid& grid, double radius, const Executor& exe
   const std::int64_t count = mesh.triangle_count();
   planes_.resize(index_of(count));
   const auto make_plane = [&](std::int64_t t) {
-    const Eigen::Vector3d a = mesh.corner(t, 0);
-    const Eigen::Vector3d normal =
-        (mesh.corner(t, 1) - a).cross(mesh.corner(t, 2) - a).normalized();
-    planes_[index_of(t)] = {normal, normal.dot(a)};
+    const Eigen::Vector3d normal = area_normal(mesh, t).normalized();
+    planes_[index_of(t)] = {normal, normal.dot(mesh.corner(t, 0))};
   };
   parallel_for(executor, "facet planes", count, make_plane);
   std::vector<std::vector<std::int32_t>> found(index_of(count));

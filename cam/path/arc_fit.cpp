@@ -21,7 +21,7 @@ constexpr int kRetries = 4;
 /// Arcs end this far from vertical: slope 5.
 constexpr double kArcRoom = 0.98;
 
-/// Unit of numbers that are not rounded, mm: what is left is that of doubles.
+/// Unit of numbers that are not rounded, mm: only the rounding of doubles remains.
 constexpr double kUnrounded = 1e-12;
 
 /// Moves that look as if they held are shortened by this part as long as they do not.

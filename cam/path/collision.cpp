@@ -108,7 +108,7 @@ void CollisionCheck::check_boxes(const PathMove& move) {
   }
 }
 
-/// Parts that are above all material take no search; the cutter is asked about in rapid moves.
+/// Parts above all material need no search; the cutter is checked in rapid moves.
 void CollisionCheck::check_material(const PathMove& move) {
   const bool rapid = move.kind == MoveKind::kRapid;
   if (rapid && only_rises(at_, move.end)) return;

@@ -35,7 +35,7 @@ struct Collision {
 
 /// Follows the moves of all operations, cuts them from a model of the blank, and finds where what
 /// does not cut touches something: the tool above its flutes, its shank and holder against the lens
-/// and what is left of the blank; the whole tool against the keep-out boxes and against the table,
+/// and the remaining blank; the whole tool against the keep-out boxes and against the table,
 /// which is everywhere at the height of the blank's underside; and the cutter against material in
 /// rapid moves. Moves are looked at in parts of a tenth of a millimetre, each with all that the
 /// tool sweeps in it.

@@ -170,7 +170,7 @@ RowSpan RasterPlan::row_span(std::int64_t row) const {
           end + rest};
 }
 
-/// Rows are cut in the order of ascending y (or x): what is left lies at +y, on the right of a tool
+/// Rows are cut in the order of ascending y (or x): uncut material is at +y, on the right of a tool
 /// that moves towards −x, or at +x, on the right of one that moves towards +y.
 bool RasterPlan::forward(std::int64_t row) const {
   switch (options.style) {

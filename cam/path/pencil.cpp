@@ -9,6 +9,7 @@
 #include <string>
 
 #include "core/error.h"
+#include "core/surface/mesh_normals.h"
 #include "core/surface/mesh_topology.h"
 #include "core/text/number_text.h"
 
@@ -29,8 +30,7 @@ struct ValleyEdge {
 };
 
 Eigen::Vector3d unit_normal(const SurfaceMesh& mesh, std::int64_t t) {
-  const Eigen::Vector3d u = mesh.corner(t, 1) - mesh.corner(t, 0);
-  return u.cross(mesh.corner(t, 2) - mesh.corner(t, 0)).normalized();
+  return area_normal(mesh, t).normalized();
 }
 
 std::vector<ValleyEdge> valley_edges(const SurfaceMesh& mesh, double radius, double least_angle) {

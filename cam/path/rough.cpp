@@ -188,7 +188,7 @@ void warn_of_flutes(const Tool& tool, const Extreme& deepest, OperationSummary& 
       "tool " + std::to_string(tool.number) + " cuts " + decimal_text(deepest.value, 2) +
       " mm deep at x " + decimal_text(deepest.place.x(), 1) + " y " +
       decimal_text(deepest.place.y(), 1) + ", its flutes are " +
-      decimal_text(tool.flute_length, 2) + " mm long: take smaller steps down or a longer tool");
+      decimal_text(tool.flute_length, 2) + " mm long: use smaller steps down or a longer tool");
 }
 
 /// What a run needs besides its site and raster.

@@ -39,7 +39,7 @@ constexpr double kSameStretch = 1e-6;
 [[noreturn]] void throw_nothing_under(const AxisLine& line, double u) {
   const Eigen::Vector2d p = line.at(u);
   throw InputError("surface: nothing under the tool at x " + decimal_text(p.x(), 3) + " y " +
-                   decimal_text(p.y(), 3) + " mm; it has to cover the whole lens");
+                   decimal_text(p.y(), 3) + " mm; it must cover the whole lens");
 }
 
 void add_node(double u, double z, RowProfile& profile) {

@@ -94,7 +94,7 @@ void BlockWriter::forget() {
 }
 
 BlockWriter::Units BlockWriter::units_of(const Eigen::Vector3d& point) const {
-  LF_CHECK(point.cwiseAbs().maxCoeff() < kFarthest, "a motion that ends nowhere");
+  LF_CHECK(point.cwiseAbs().maxCoeff() < kFarthest, "a motion whose end is not finite");
   return {std::llround(point.x() * scale_), std::llround(point.y() * scale_),
           std::llround(point.z() * scale_)};
 }

@@ -68,7 +68,7 @@ class Trial {
       close = line.find('}', open);
       const bool known = close != std::string::npos &&
                          is_placeholder(std::string_view(line).substr(open + 1, close - open - 1));
-      if (!known) fields_.refuse(key, "'" + line + "': no such placeholder");
+      if (!known) fields_.refuse(key, "'" + line + "': unknown placeholder");
     }
   }
 
@@ -87,9 +87,10 @@ class Trial {
         throw GcodeError(1, "these lines must not move the machine");
       }
       if (key == "head" && !head_.take(line)) {
-        throw GcodeError(1,
-                         "the head stands above the seal: comments and a program number only; "
-                         "what sets or moves anything belongs in start");
+        throw GcodeError(
+            1,
+            "the head is above the seal: only comments and a program number are allowed; "
+            "what sets or moves anything belongs in start");
       }
     } catch (const GcodeError& error) {
       const std::string reason = error.what();

@@ -90,7 +90,7 @@ void read_words(TomlFields fields, PostDescription& post) {
   post.flood = fields.text_or("flood", "");
   post.coolant_off = fields.text_or("coolant_off", "");
   if (post.coolant_off.empty() && !(post.mist.empty() && post.flood.empty())) {
-    fields.refuse("coolant_off", "is needed where mist or flood stands");
+    fields.refuse("coolant_off", "is needed if mist or flood is given");
   }
   fields.finish();
 }

@@ -71,7 +71,7 @@ std::string remedy_words(const LeakPlace& place) {
                        percent_text(std::max(0.0, trial.leakage))});
       if (&trial == &place.trials.front()) tried += " would still leak";
     }
-    return "Nothing that was tried helps much: " + tried + ".";
+    return "No change that was tried helps much: " + tried + ".";
   }
   const bool half = std::abs(share - 0.5) < kNearHalf;
   return sentence(best.change) + " would " + (half ? "halve it, to " : "bring it down to ") +

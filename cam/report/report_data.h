@@ -96,8 +96,7 @@ struct ShownSurface {
 struct ReportData {
   std::string job;      ///< Name of the part.
   std::string program;  ///< "lensforge 0.1.0"
-  std::string made;     ///< Date, as text; left out if empty.
-  std::string lens_id;  ///< Hash of the lens folder or the like; left out if empty.
+  std::string lens_id;  ///< Fingerprint of the design; left out if empty.
   std::string part;     ///< "lens" or "mould"
 
   Image target;                     ///< Linear light.

@@ -38,7 +38,7 @@ std::string surface_figure(const RenderedSurface& surface, const std::string& wo
                            decimal_text(quality.metrics.ssim, 3) + "<br>leaks " +
                            percent_text(quality.leakage);
   return figure(grey_picture(surface.picture.image(target.total())),
-                "What the surface “" + surface.name + "” throws", caption(surface.name, note));
+                "What the surface “" + surface.name + "” projects", caption(surface.name, note));
 }
 
 std::string leakage_figure(const LeakageResult& result) {
@@ -51,7 +51,7 @@ std::string leakage_figure(const LeakageResult& result) {
       "0 <img src=\"" + png_uri(scale_picture()) + "\" alt=\"colour scale\"> " + most;
   const std::string note = "light where the design puts less, in units of the picture’s mean" +
                            element("span", "class=\"scale\"", bar);
-  return figure(picture, "Where light leaks to", caption("Leakage", note));
+  return figure(picture, "Where the leaked light lands", caption("Leakage", note));
 }
 
 std::string check_value(double value, const LimitCheck& check) {
@@ -74,7 +74,7 @@ namespace report_section {
 
 std::string header(const ReportData& data) {
   std::string under = data.part;
-  for (const std::string* text : {&data.program, &data.made, &data.lens_id}) {
+  for (const std::string* text : {&data.program, &data.lens_id}) {
     if (!text->empty()) under += " · " + *text;
   }
   const bool compares = data.operations.empty() && !data.choices.empty();

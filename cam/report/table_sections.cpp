@@ -145,7 +145,7 @@ std::string setup(const ReportData& data) {
       element("div", "class=\"setup\"",
               drawing(true,
                       "<b>From above.</b> Solid: blank; dashed: part; red: program zero; "
-                      "hatched: keep out. The operator stands below the drawing.") +
+                      "hatched: keep-out. The operator is below the drawing.") +
                   drawing(false,
                           "<b>From the front.</b> The table is below; the tool comes from "
                           "above."));
@@ -194,7 +194,7 @@ std::string certificates(const ReportData& data) {
   if (rows.empty()) return "";
   return section("Certificates",
                  element("p", "",
-                         "Known for every move over its whole length, against the exact "
+                         "Error bounds of every move over its whole length, against the exact "
                          "path of the tool; places are the program’s coordinates, mm.") +
                      stacked({{"operation", false},
                               {"deepest gouge", false},

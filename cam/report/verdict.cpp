@@ -39,10 +39,10 @@ Verdict judge_cut(const CutFindings& findings, const CutLimits& limits) {
         {"", 1.0, 4});
   check("gouge", "deepest gouge", findings.gouge, limits.gouge, kMicrometres);
   check("excess", "material left by the path", findings.excess, limits.excess, kMicrometres);
-  check("slope", "error of direction", findings.slope, limits.slope, {"mrad", 1e3, 2});
+  check("slope", "error of the path's direction", findings.slope, limits.slope, {"mrad", 1e3, 2});
   check("fillet_depth", "deepest groove not cleared", findings.fillet_depth, limits.fillet_depth,
         kMicrometres);
-  check("block_rate", "load of the controller", findings.block_rate, limits.block_rate,
+  check("block_rate", "lines per second for the controller", findings.block_rate, limits.block_rate,
         {"lines/s", 1.0, 0});
   return verdict;
 }

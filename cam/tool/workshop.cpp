@@ -33,7 +33,7 @@ void check_sections(const Rules& rules, const Tool& tool, std::size_t index) {
     const ToolSection& section = tool.sections[s];
     const std::string key = key_of("tool", index, "section") + "[" + std::to_string(s) + "].";
     rules.hold(section.from >= top, key + "from", section.from,
-               "must not be below the part before it, which ends at " + shortest_text(top) + " mm");
+               "must not be below the end of the part before it, " + shortest_text(top) + " mm");
     rules.hold(section.to > section.from, key + "to", section.to,
                "must be above from, " + shortest_text(section.from) + " mm");
     top = section.to;

@@ -83,7 +83,7 @@ inline constexpr double kLeastSafeHeight = 0.5;
 
 /// Least and most of one of the workshop's numbers, by its place in the file:
 /// "process.safe_height", "tool.diameter", "finish.pitch". What sets such a number from elsewhere
-/// keeps to the same rule.
+/// follows the same rule.
 /// @pre there is such a number.
 NumberRule workshop_rule(const std::string& key);
 

@@ -276,8 +276,9 @@ void describe(Visitor& v, Machine& machine) {
            "mm, of arcs as the controller splits them");
   describe_axes(v, "steps_per_mm", machine.steps_per_mm, {0.0, kRate}, "0: do not round to steps");
   v.whole({"look_ahead", 2, 100000}, machine.look_ahead, "moves planned ahead");
-  v.number({"lines_per_second", 0.0, kRate}, machine.lines_per_second,
-           "that the controller takes at most; 0 without limit; an 8-bit Grbl board takes 400");
+  v.number(
+      {"lines_per_second", 0.0, kRate}, machine.lines_per_second,
+      "maximum that the controller accepts, lines/s; 0: no limit; an 8-bit Grbl board takes 400");
 }
 
 template <class Visitor>
@@ -332,7 +333,7 @@ void describe_following(Visitor& v, Level& process) {
   v.number({"helix_radius", kLeastHelix, 50.0}, process.helix_radius,
            "mm, of the tool's axis; half its diameter at most");
   v.number({"spacing", 0.001, 10.0}, process.spacing,
-           "mm between points where the surface is asked for");
+           "mm between points at which the surface is evaluated");
   v.word("style", process.style, "zigzag, climb or conventional");
   v.word("along", process.along, "x or y");
 }

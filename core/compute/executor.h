@@ -35,7 +35,7 @@ class KernelProfile {
 /// The processor that renders and optimises.
 enum class Device { kCpu, kCuda };
 
-/// A sum that is asked for later: an executor with memory of its own need not be waited for.
+/// A sum that is read later, so that an executor with its own memory need not be waited for.
 template <std::size_t N>
 struct FinishedSum {
   std::array<double, N> value{};
@@ -44,7 +44,7 @@ struct FinishedSum {
 
 /// Where kernels run. A small value that is passed down; copies share the same thread arena.
 ///
-/// Kernels written for any executor (`template <class Exec>`) keep to what this one and the CUDA
+/// Kernels written for any executor (`template <class Exec>`) use only what this one and the CUDA
 /// one (core/compute/cuda/cuda_executor.h) have in common: Buffer, PendingSum, concurrency(),
 /// parallel_for(), parallel_for_worker(), pending_sum(), scan_rows(), dot(), fill_zero(), upload()
 /// and download().

@@ -6,7 +6,7 @@
 
 namespace lensforge {
 
-/// How the numbers in a picture file stand for light.
+/// How the numbers in a picture file encode light.
 struct ColorSpace {
   enum class Curve { kLinear, kSrgb, kRec709, kGamma };
   Curve curve = Curve::kSrgb;

@@ -31,7 +31,7 @@ std::string extension_of(const fs::path& path) {
   return extension;
 }
 
-/// Rows that are encoded between two looks for a stop request; EXR packs 16 at a time.
+/// Rows that are encoded between two checks for a stop request; EXR packs 16 at a time.
 constexpr int kRowsAtOnce = 64;
 
 /// Gives the pixels of some rows as a file of a format wants them.

@@ -10,8 +10,10 @@
 #include <cstddef>
 #include <mutex>
 #include <system_error>
+#include <utility>
 
 #include "core/error.h"
+#include "core/io/descriptor.h"
 #include "core/io/files.h"
 
 namespace lensforge {
@@ -22,7 +24,7 @@ using OIIO::Filesystem::IOMemReader;
 
 /// What stands behind a FILE of our own.
 struct StoppableBytes {
-  int descriptor;
+  Descriptor descriptor;
   off64_t place;
   const RunControl& run;
 };
@@ -30,7 +32,7 @@ struct StoppableBytes {
 ssize_t read_some(void* cookie, char* buffer, std::size_t size) {
   StoppableBytes& bytes = *static_cast<StoppableBytes*>(cookie);
   if (bytes.run.stop_requested()) return 0;
-  const ssize_t count = ::pread(bytes.descriptor, buffer, size, bytes.place);
+  const ssize_t count = ::pread(bytes.descriptor.number(), buffer, size, bytes.place);
   if (count > 0) bytes.place += count;
   return count;
 }
@@ -39,7 +41,7 @@ int seek_to(void* cookie, off64_t* offset, int whence) {
   StoppableBytes& bytes = *static_cast<StoppableBytes*>(cookie);
   off64_t base = 0;
   if (whence == SEEK_CUR) base = bytes.place;
-  if (whence == SEEK_END) base = ::lseek64(bytes.descriptor, 0, SEEK_END);
+  if (whence == SEEK_END) base = ::lseek64(bytes.descriptor.number(), 0, SEEK_END);
   if (base + *offset < 0) return -1;
   bytes.place = *offset = base + *offset;
   return 0;
@@ -47,17 +49,17 @@ int seek_to(void* cookie, off64_t* offset, int whence) {
 
 int close_bytes(void* cookie) {
   const std::unique_ptr<StoppableBytes> bytes(static_cast<StoppableBytes*>(cookie));
-  return ::close(bytes->descriptor);
+  return bytes->descriptor.close() == 0 ? 0 : -1;
 }
 
 std::FILE* open_stoppable(const std::filesystem::path& path, const RunControl& run) {
   constexpr std::size_t kBuffer = std::size_t{1} << 18U;
   require_regular_file(path);
-  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
-  if (descriptor < 0) {
+  Descriptor descriptor(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+  if (!descriptor.open()) {
     throw InputError(path.string() + ": cannot be read: " + std::generic_category().message(errno));
   }
-  auto bytes = std::make_unique<StoppableBytes>(StoppableBytes{descriptor, 0, run});
+  auto bytes = std::make_unique<StoppableBytes>(StoppableBytes{std::move(descriptor), 0, run});
   std::FILE* const file =
       ::fopencookie(bytes.release(), "r", {read_some, nullptr, seek_to, close_bytes});
   if (file == nullptr) throw InputError(path.string() + ": cannot be read: no memory");

@@ -2,6 +2,7 @@
 #include "core/image/picture_source.h"
 
 #include <algorithm>
+#include <cctype>
 #include <exception>
 #include <fstream>
 #include <istream>
@@ -28,10 +29,30 @@ constexpr std::int64_t kBandBytes = std::int64_t{64} << 20;
 /// Bytes of a decoder's sentence, which may quote the file, in a message.
 constexpr std::size_t kLongestReason = 200;
 
-/// ": " and what the decoder says, if it says anything.
+/// Whether a decoder's sentence is for its programmers: it has the name of a function or a type.
+bool names_code(const std::string& text) {
+  for (const char* mark : {"::", "()", "_", "->", "0x"}) {
+    if (text.find(mark) != std::string::npos) return true;
+  }
+  for (std::size_t i = 1; i < text.size(); ++i) {  // "readPixels"
+    if (std::islower(static_cast<unsigned char>(text[i - 1])) != 0 &&
+        std::isupper(static_cast<unsigned char>(text[i])) != 0) {
+      return true;
+    }
+  }
+  return false;
+}
+
+/// ": " and what the decoder says, if it says anything in words.
 std::string reason(const OIIO::ImageInput& input) {
   const std::string text = input.geterror();
-  return text.empty() ? text : ": " + printable_line(text, kLongestReason);
+  for (const char* lacking : {"not configured", "not implemented"}) {
+    if (text.find(lacking) != std::string::npos) {
+      return ": its compression cannot be read here; save it as PNG";
+    }
+  }
+  if (text.empty() || names_code(text)) return "";
+  return ": " + printable_line(text, kLongestReason);
 }
 
 void check_jpeg(const fs::path& path, std::istream& file) {
@@ -41,6 +62,11 @@ void check_jpeg(const fs::path& path, std::istream& file) {
   if (!jpeg->complete) {
     refuse_picture(path, "is truncated: the JPEG data end before their end marker");
   }
+}
+
+void check_tiff(const fs::path& path, std::istream& file) {
+  const std::string problem = tiff_problem(file);
+  if (!problem.empty()) refuse_picture(path, problem);
 }
 
 EssentialPng check_png(const fs::path& path, std::istream& file) {
@@ -87,7 +113,7 @@ void PictureSource::fail(const std::string& why) const {
 
 void PictureSource::require_memory(double bytes) const {
   require_room({0.0, 0.0, bytes}, path_.parent_path(), path_.string(),
-               "a picture of fewer pixels would fit");
+               "use a picture of fewer pixels");
 }
 
 /// Calls the library while it cannot print. @return whether it says that it succeeded.
@@ -97,7 +123,7 @@ bool PictureSource::quietly(const Call& call) const {
     const StderrSilence silence;
     return call();
   } catch (const std::exception&) {
-    fail("is corrupt, or its decoder needs more memory than there is");
+    fail("is corrupt, or its decoder needs more memory than the machine has");
   }
 }
 
@@ -115,9 +141,7 @@ void PictureSource::look_over() {
   animated_ = outline->animated;
   if (format_ == "jpeg") check_jpeg(path_, file);
   if (format_ == "pnm") check_pnm(path_, file, run_);
-  if (format_ == "tiff" && !tiff_pixels_are_inside(file)) {
-    fail("is truncated: it ends before its TIFF data do");
-  }
+  if (format_ == "tiff") check_tiff(path_, file);
   if (format_ != "png") return;
   png_ = check_png(path_, file);
   animated_ = png_.animated;

@@ -31,7 +31,7 @@ class PictureSource {
 
   /// Name of the embedded ICC profile; empty without one.
   [[nodiscard]] std::string color_profile() const;
-  /// To be asked when the first picture is read: the file stands at the next one afterwards.
+  /// Ask it after the first picture was read; the file is at the next one afterwards.
   [[nodiscard]] bool has_more_pictures();
 
   /// Rows that are read at once: tiles must be whole.

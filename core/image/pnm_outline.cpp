@@ -51,11 +51,12 @@ std::int64_t samples_per_row(const PnmOutline& pnm) {
 
 std::string value_problem(const PnmOutline& pnm, std::int64_t value, std::int64_t row) {
   return "row " + std::to_string(row) + " has the value " + std::to_string(value) +
-         ": at most the header's maximum of " + std::to_string(pnm.max_value) + " may stand there";
+         ": at most the header's maximum of " + std::to_string(pnm.max_value) + " is allowed there";
 }
 
 std::string missing_problem(const PnmOutline& pnm, std::int64_t row) {
-  return "is truncated: it ends in row " + std::to_string(row) + " of " + std::to_string(pnm.rows);
+  return "is truncated: its data end in row " + std::to_string(row) + " of " +
+         std::to_string(pnm.rows);
 }
 
 /// Why a row of numbers as text is not what the header says.

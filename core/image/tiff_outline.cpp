@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,10 +14,16 @@
 namespace lensforge {
 namespace {
 
+constexpr int kCompression = 259;
 constexpr int kStripOffsets = 273;
 constexpr int kStripByteCounts = 279;
 constexpr int kTileOffsets = 324;
 constexpr int kTileByteCounts = 325;
+
+/// The compressions of libtiff 4.5 (tiff.h, COMPRESSION_…) that it can have decoders of.
+constexpr std::array<std::uint64_t, 21> kKnownCompressions{
+    1,     2,     3,     4,     5,     6,     7,     8,     32766, 32771, 32773,
+    32809, 32909, 32946, 34661, 34676, 34677, 34887, 34925, 50000, 50001};
 
 class TiffStream {
  public:
@@ -81,28 +88,56 @@ std::vector<std::uint64_t> read_values(TiffStream& tiff) {
   return values;
 }
 
-}  // namespace
+/// Entries of the first picture's directory.
+struct Directory {
+  std::uint64_t compression = 1;
+  std::vector<std::uint64_t> offsets;
+  std::vector<std::uint64_t> lengths;
+};
 
-bool tiff_pixels_are_inside(std::istream& file) {
-  TiffStream tiff(file);
-  if (!tiff.valid()) return true;
+/// Nothing if the stream ends before its directory does.
+std::optional<Directory> read_directory(TiffStream& tiff) {
+  Directory directory;
   tiff.seek(tiff.number(tiff.offset_bytes()));
   const std::uint64_t entries = tiff.number(tiff.count_bytes());
   const std::uint64_t first = tiff.place();
   const std::uint64_t entry_bytes = tiff.offset_bytes() == 8 ? 20 : 12;
-  std::vector<std::uint64_t> offsets;
-  std::vector<std::uint64_t> lengths;
   for (std::uint64_t entry = 0; entry < entries && tiff.good(); ++entry) {
     tiff.seek(first + entry * entry_bytes);
     const auto tag = static_cast<int>(tiff.number(2));
-    if (tag == kStripOffsets || tag == kTileOffsets) offsets = read_values(tiff);
-    if (tag == kStripByteCounts || tag == kTileByteCounts) lengths = read_values(tiff);
+    if (tag == kStripOffsets || tag == kTileOffsets) directory.offsets = read_values(tiff);
+    if (tag == kStripByteCounts || tag == kTileByteCounts) directory.lengths = read_values(tiff);
+    if (tag != kCompression) continue;
+    const std::vector<std::uint64_t> values = read_values(tiff);
+    if (!values.empty()) directory.compression = values.front();
   }
-  if (!tiff.good()) return false;
+  if (!tiff.good()) return std::nullopt;
+  return directory;
+}
+
+bool pixels_are_inside(const Directory& directory, std::uint64_t size) {
+  const auto& [compression, offsets, lengths] = directory;
   for (std::size_t i = 0; i < std::min(offsets.size(), lengths.size()); ++i) {
-    if (offsets[i] > tiff.size() || lengths[i] > tiff.size() - offsets[i]) return false;
+    if (offsets[i] > size || lengths[i] > size - offsets[i]) return false;
   }
   return true;
+}
+
+}  // namespace
+
+std::string tiff_problem(std::istream& file) {
+  TiffStream tiff(file);
+  if (!tiff.valid()) return "";
+  const std::optional<Directory> directory = read_directory(tiff);
+  if (!directory || !pixels_are_inside(*directory, tiff.size())) {
+    return "is truncated: the file ends before its TIFF data";
+  }
+  const auto& known = kKnownCompressions;
+  if (std::find(known.begin(), known.end(), directory->compression) == known.end()) {
+    return "its TIFF compression " + std::to_string(directory->compression) +
+           " cannot be read: save it as PNG";
+  }
+  return "";
 }
 
 }  // namespace lensforge

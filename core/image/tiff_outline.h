@@ -2,11 +2,13 @@
 #pragma once
 
 #include <istream>
+#include <string>
 
 namespace lensforge {
 
-/// False if the stream is a TIFF whose first picture has pixel data beyond the stream's end: it is
-/// truncated. True for every other stream, also for one that is no TIFF.
-bool tiff_pixels_are_inside(std::istream& file);
+/// Why no decoder should be given the stream: its first picture has pixel data beyond the stream's
+/// end, or a compression that no decoder knows. Empty for every other stream, also for one that is
+/// no TIFF.
+std::string tiff_problem(std::istream& file);
 
 }  // namespace lensforge

@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/io/descriptor.h"
 
 namespace lensforge {
 namespace {
@@ -28,25 +29,6 @@ std::string reason(int error) { return std::generic_category().message(error); }
 [[noreturn]] void fail_to_write(const fs::path& path, int error) {
   throw RunError(path.string() + ": cannot be written: " + reason(error));
 }
-
-/// An open file descriptor that closes itself.
-class Descriptor {
- public:
-  explicit Descriptor(int number) : number_(number) {}
-  ~Descriptor() { close(); }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-
-  [[nodiscard]] int number() const { return number_; }
-  /// Returns 0 or an errno value; some file systems report a full disk only here.
-  int close() {
-    const int number = std::exchange(number_, -1);
-    return number >= 0 && ::close(number) != 0 ? errno : 0;
-  }
-
- private:
-  int number_;
-};
 
 /// An empty file of our own, or why there is none (an errno value).
 struct Beside {
@@ -67,7 +49,7 @@ Beside make_beside(const fs::path& path) {
     const std::string name = std::string(".").append(stem, 0, room).append(end);
     fs::path beside = path.parent_path() / name;
     const Descriptor file(::open(beside.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0666));
-    if (file.number() >= 0) return {std::move(beside), 0};
+    if (file.open()) return {std::move(beside), 0};
     if (errno != EEXIST) return {{}, errno};
   }
 }
@@ -81,7 +63,7 @@ void remove_quietly(const fs::path& path) {
 /// to flush, which is no failure.
 void flush_to_disk(const fs::path& file, const fs::path& named_in_error) {
   Descriptor opened(::open(file.empty() ? "." : file.c_str(), O_RDONLY | O_CLOEXEC));
-  if (opened.number() < 0) fail_to_write(named_in_error, errno);
+  if (!opened.open()) fail_to_write(named_in_error, errno);
   if (::fsync(opened.number()) != 0 && errno != EINVAL && errno != ENOTSUP) {
     fail_to_write(named_in_error, errno);
   }
@@ -151,7 +133,7 @@ void write_whole_file(const fs::path& path,
 void write_whole_file(const fs::path& path, std::string_view content) {
   write_whole_file(path, [&](const fs::path& beside) {
     Descriptor file(::open(beside.c_str(), O_WRONLY | O_TRUNC | O_CLOEXEC));
-    if (file.number() < 0) fail_to_write(path, errno);
+    if (!file.open()) fail_to_write(path, errno);
     write_all(file.number(), content, path);
     if (const int error = file.close(); error != 0) fail_to_write(path, error);
   });
@@ -163,7 +145,10 @@ std::string name_of_partial(std::string_view name) {
   const std::string_view rest = name.substr(found + kPartial.size());
   const std::size_t digits = std::min(rest.find_first_not_of("0123456789"), rest.size());
   if (digits == 0 || (digits < rest.size() && rest[digits] != '.')) return {};
-  return std::string(name.substr(1, found - 1)).append(rest.substr(digits));
+  const std::string named = std::string(name.substr(1, found - 1)).append(rest.substr(digits));
+  // Writers that make whole files themselves do so beside a file that is in the making.
+  const std::string outer = name_of_partial(named);
+  return outer.empty() ? named : outer;
 }
 
 void require_regular_file(const fs::path& path) {

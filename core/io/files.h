@@ -43,7 +43,7 @@ void write_whole_file(const std::filesystem::path& path,
 void write_whole_file(const std::filesystem::path& path, std::string_view content);
 
 /// The name that a file in the making is to have: "lens.stl" of PendingFile's
-/// ".lens.partial-7.stl"; empty for a name of another form.
+/// ".lens.partial-7.stl", and of one made beside that; empty for a name of another form.
 std::string name_of_partial(std::string_view name);
 
 /// The check of open_input() alone, for libraries that open files by name themselves.

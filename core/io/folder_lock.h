@@ -3,6 +3,8 @@
 
 #include <filesystem>
 
+#include "core/io/descriptor.h"
+
 namespace lensforge {
 
 /// Keeps other lensforge commands out of a folder while it lives: an advisory lock (flock) on the
@@ -17,12 +19,9 @@ class FolderLock {
 
   /// @throw InputError if `folder` cannot be opened, or another process holds it.
   FolderLock(const std::filesystem::path& folder, Kind kind);
-  ~FolderLock();
-  FolderLock(FolderLock&& other) noexcept;
-  FolderLock& operator=(FolderLock&&) = delete;
 
  private:
-  int descriptor_;
+  Descriptor folder_;
 };
 
 }  // namespace lensforge

@@ -10,6 +10,9 @@
 namespace lensforge {
 namespace {
 
+/// Of a unit vector's length: a few rounding errors.
+constexpr double kUnitTolerance = 1e-12;
+
 template <class Value>
 void require(bool holds, const std::string& field, const Value& value, const std::string& rule) {
   if (holds) return;
@@ -25,6 +28,8 @@ void require_positive(const std::string& field, double value) {
 }  // namespace
 
 void validate(const OpticalSetup& setup) {
+  require(std::abs(setup.light.norm() - 1.0) < kUnitTolerance && setup.light.z() > 0.0, "light",
+          setup.light.transpose(), "a unit vector towards +z");
   require(std::isfinite(setup.ior) && setup.ior > 1.0, "ior", setup.ior, "a finite number above 1");
   require_positive("focal_length", setup.focal_length);
   for (int axis = 0; axis < 2; ++axis) {

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/surface/mesh_normals.h"
 #include "core/text/number_text.h"
 
 // How often a mesh covers a place can change only where an edge has more triangles on one side than
@@ -102,8 +103,7 @@ struct PlanArea {
 PlanArea plan_area(const SurfaceMesh& mesh) {
   PlanArea sum;
   for (std::int64_t t = 0; t < mesh.triangle_count(); ++t) {
-    const Eigen::Vector3d a = mesh.corner(t, 0);
-    const Eigen::Vector3d normal = (mesh.corner(t, 1) - a).cross(mesh.corner(t, 2) - a);
+    const Eigen::Vector3d normal = area_normal(mesh, t);
     if (normal.isZero(0.0)) continue;
     if (!(normal.z() > 0.0)) return {0.0, t};
     sum.area += 0.5 * normal.z();

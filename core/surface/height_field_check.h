@@ -13,7 +13,7 @@ namespace lensforge {
 inline constexpr double kRimTolerance = 0.01;
 
 /// Why a mesh, seen from above, does not cover the rectangle from (0, 0) to `size` exactly once;
-/// nothing if it does. A hole of one triangle, a triangle that stands there twice, a rim that is
+/// nothing if it does. A hole of one triangle, a triangle that is given twice, a rim that is
 /// not the rectangle's, a vertical triangle or one that is turned over are all found.
 ///
 /// Triangles are joined where their corners have the same coordinates, so that it makes no

@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "core/surface/lens.h"
 
-#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <random>
 #include <string>
 #include <system_error>
 #include <utility>
+#include <vector>
 
 #include "core/error.h"
 #include "core/image/error_image.h"
 #include "core/image/image_io.h"
 #include "core/io/files.h"
+#include "core/io/pending_files.h"
 #include "core/surface/height_field_check.h"
 #include "core/surface/lens_surface.h"
 #include "core/surface/mesh_io.h"
@@ -47,6 +47,12 @@ ordered_json to_json(const ImageMetrics& metrics) {
           {"mae_linear", metrics.mae_linear}};
 }
 
+ordered_json to_json(const ModelMetrics& metrics) {
+  ordered_json by_model;
+  for (const auto& [model, one] : metrics) by_model[model_name(model)] = to_json(one);
+  return by_model;
+}
+
 template <class Vector>
 ordered_json pair_json(const Vector& pair) {
   return ordered_json::array({pair.x(), pair.y()});
@@ -55,6 +61,7 @@ ordered_json pair_json(const Vector& pair) {
 ordered_json to_json(const Lens& lens) {
   const OpticalSetup& setup = lens.setup;
   const GridShape& grid = lens.surface.grid;
+  LF_CHECK(setup.light == Eigen::Vector3d::UnitZ(), "the lens file holds no direction yet");
   return {
       {"format", kFormat},
       {"version", kVersion},
@@ -68,65 +75,37 @@ ordered_json to_json(const Lens& lens) {
       {"image_origin", pair_json(setup.image_origin)},
       {"pixels", pair_json(setup.pixels)},
       {"view", setup.view == ViewSide::kFront ? "front" : "rear"},
-      {"model", lens.model == SurfaceModel::kFacet ? "facet" : "smooth"},
+      {"model", model_name(lens.model)},
       {"surface", lens_file::kSurface},
       {"grid", grid.is_grid() ? ordered_json::array({grid.columns, grid.rows}) : ordered_json()},
-      {"metrics",
-       {{"facet", to_json(lens.facet_metrics)}, {"smooth", to_json(lens.smooth_metrics)}}},
+      {"metrics", to_json(lens.metrics)},
       {"provenance", ordered_json(lens.provenance)},
   };
 }
 
-/// A folder of our own inside `parent` that is removed with all it holds.
-class StagingFolder {
- public:
-  explicit StagingFolder(const fs::path& parent)
-      : path_(parent / std::string(".")
-                           .append(lens_file::kStaging)
-                           .append(".partial-")
-                           .append(std::to_string(std::random_device{}()))) {
-    std::error_code error;
-    fs::create_directories(path_, error);
-    if (error) throw RunError(parent.string() + ": cannot be written: " + error.message());
-  }
-  ~StagingFolder() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-  }
-  StagingFolder(const StagingFolder&) = delete;
-  StagingFolder& operator=(const StagingFolder&) = delete;
-
-  [[nodiscard]] fs::path operator/(const char* name) const { return path_ / name; }
-
- private:
-  fs::path path_;
-};
-
-void write_files(const Lens& lens, const StagingFolder& staging) {
-  write_ply(lens.surface, staging / lens_file::kSurface);
-  write_image(lens.target, staging / lens_file::kTargetPng);
-  write_image(lens.target, staging / lens_file::kTargetExr);
+void add_files(const Lens& lens, PendingFiles& files) {
+  using namespace lens_file;
+  const auto add = [&files](const char* name, const auto& content) {
+    files.add(name, [&](const fs::path& beside) { write_image(content, beside); });
+  };
+  files.add(kSurface, [&](const fs::path& beside) { write_ply(lens.surface, beside); });
+  add(kTargetPng, lens.target);
+  add(kTargetExr, lens.target);
   if (!lens.render.empty()) {
-    write_image(lens.render, staging / lens_file::kRenderPng);
-    write_image(lens.render, staging / lens_file::kRenderExr);
-    write_image(error_image(lens.render, lens.target), staging / lens_file::kError);
+    add(kRenderPng, lens.render);
+    add(kRenderExr, lens.render);
+    add(kError, error_image(lens.render, lens.target));
   }
-  const std::string text = to_json(lens).dump(2, ' ', false, json::error_handler_t::replace);
-  write_whole_file(staging / lens_file::kJson, text + "\n");
+  files.add(kJson, to_json(lens).dump(2, ' ', false, json::error_handler_t::replace) + "\n");
 }
 
-/// Puts the staged files in place. A file that this lens has not is removed, so that none of an
-/// older lens stays beside the new one.
-void publish(const StagingFolder& staging, const fs::path& folder) {
+/// Removes what makes an older lens in the folder whole, and those of its files that this lens has
+/// not: none of them stays beside the new one.
+void remove_older(const PendingFiles& files, const fs::path& folder) {
   using namespace lens_file;
   fs::remove(folder / kJson);
-  for (const char* name :
-       {kSurface, kTargetPng, kTargetExr, kRenderPng, kRenderExr, kError, kJson}) {
-    if (fs::exists(staging / name)) {
-      fs::rename(staging / name, folder / name);
-    } else {
-      fs::remove(folder / name);
-    }
+  for (const char* name : {kSurface, kTargetPng, kTargetExr, kRenderPng, kRenderExr, kError}) {
+    if (!files.has(name)) fs::remove(folder / name);
   }
 }
 
@@ -144,16 +123,17 @@ json read_json(const fs::path& path) {
   return parse_json(read_whole_file(path, kMaxJsonBytes), path.string());
 }
 
-/// One of two words as one of two values.
+/// One of some words as one of some values.
 template <class Value>
 Value choice(const JsonFields& fields, const std::string& name,
-             const std::array<std::pair<const char*, Value>, 2>& words) {
+             const std::vector<std::pair<std::string, Value>>& words) {
   const std::string text = fields.text(name);
+  std::string rule = "it must be";
   for (const auto& [word, value] : words) {
     if (text == word) return value;
+    rule += (word == words.front().first ? " \"" : " or \"") + word + "\"";
   }
-  fields.refuse(name,
-                std::string("it must be \"") + words[0].first + "\" or \"" + words[1].first + "\"");
+  fields.refuse(name, rule);
 }
 
 void check_supported(const JsonFields& fields) {
@@ -172,6 +152,9 @@ void check_supported(const JsonFields& fields) {
   if (source.text("type") != "parallel") {
     source.refuse("type", "not supported yet by this version, only \"parallel\" is");
   }
+  if (source.has("direction")) {
+    source.refuse("direction", "not supported yet by this version, only light along +z is");
+  }
 }
 
 OpticalSetup read_setup(const JsonFields& fields, const std::string& file) {
@@ -183,7 +166,7 @@ OpticalSetup read_setup(const JsonFields& fields, const std::string& file) {
   setup.image_origin = fields.number_pair("image_origin");
   setup.pixels = fields.integer_pair("pixels");
   setup.view =
-      choice<ViewSide>(fields, "view", {{{"front", ViewSide::kFront}, {"rear", ViewSide::kRear}}});
+      choice<ViewSide>(fields, "view", {{"front", ViewSide::kFront}, {"rear", ViewSide::kRear}});
   try {
     validate(setup);
   } catch (const InputError& error) {
@@ -249,10 +232,12 @@ Image read_picture(const fs::path& path, const OpticalSetup& setup) {
 
 void write_lens(const Lens& lens, const fs::path& folder) {
   check_sizes(lens);
-  const StagingFolder staging(folder);
-  write_files(lens, staging);
   try {
-    publish(staging, folder);
+    fs::create_directories(folder);
+    PendingFiles files(folder);
+    add_files(lens, files);
+    remove_older(files, folder);
+    files.publish();
   } catch (const fs::filesystem_error& error) {
     throw RunError(folder.string() + ": cannot be written: " + error.code().message());
   }
@@ -265,11 +250,11 @@ Lens read_lens(const fs::path& folder) {
   check_supported(fields);
   Lens lens;
   lens.setup = read_setup(fields, path.string());
-  lens.model = choice<SurfaceModel>(
-      fields, "model", {{{"facet", SurfaceModel::kFacet}, {"smooth", SurfaceModel::kSmooth}}});
+  lens.model = choice<SurfaceModel>(fields, "model", named_models());
   const JsonFields metrics = fields.object("metrics");
-  lens.facet_metrics = read_metrics(metrics.object("facet"));
-  lens.smooth_metrics = read_metrics(metrics.object("smooth"));
+  for (const auto& [name, model] : named_models()) {
+    lens.metrics[model] = read_metrics(metrics.object(name));
+  }
   if (!fields.at("provenance").is_object()) fields.refuse("provenance", "it must be an object");
   lens.provenance = fields.at("provenance");
   lens.surface = read_surface(fields, lens.setup, folder);

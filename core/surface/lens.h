@@ -3,14 +3,19 @@
 
 #include <array>
 #include <filesystem>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "core/image/image.h"
 #include "core/image/metrics.h"
 #include "core/optics/optical_setup.h"
 #include "core/surface/surface_mesh.h"
+#include "core/surface/surface_model.h"
 
 namespace lensforge {
+
+/// How close the pictures of a surface under each model are to the target.
+using ModelMetrics = std::map<SurfaceModel, ImageMetrics>;
 
 /// A designed lens: what one command hands to the next.
 struct Lens {
@@ -19,12 +24,12 @@ struct Lens {
   SurfaceModel model = SurfaceModel::kFacet;  ///< The model it was designed with.
   Image target;                               ///< Working picture, linear light.
   Image render;                               ///< What the lens projects under `model`.
-  ImageMetrics facet_metrics;
-  ImageMetrics smooth_metrics;
+  /// What it projects under each model.
+  ModelMetrics metrics{{SurfaceModel::kFacet, {}}, {SurfaceModel::kSmooth, {}}};
   nlohmann::json provenance = nlohmann::json::object();
 };
 
-/// Names of the files in a lens folder (interface.md, "The lens folder").
+/// Names of the files in a lens folder (docs/interface.md, "The lens folder").
 namespace lens_file {
 inline constexpr const char* kJson = "lens.json";
 inline constexpr const char* kSurface = "surface.ply";
@@ -41,7 +46,7 @@ inline constexpr const char* kCheckpoint = "checkpoint.bin";  ///< While a desig
 inline constexpr std::array kAll = {kJson,      kSurface, kTargetPng, kTargetExr,   kRenderPng,
                                     kRenderExr, kError,   kOverview,  kConvergence, kCheckpoint};
 
-/// Folder beside the files in which a lens is put together before it takes its place.
+/// Folder in which earlier versions put a lens together; a killed one has left it behind.
 inline constexpr const char* kStaging = "lens";
 
 /// The folder inside that `cam` writes into, and what is in it beside the programs.

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "core/surface/lens_surface.h"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -17,12 +16,6 @@ namespace {
 /// How far the surface's rim may be from the lens's, share of the lens's larger side: a design
 /// keeps its rim to the last bits of a double, other programs to those of a float (6e-8).
 constexpr double kRimTolerance = 1e-4;
-
-/// Twice the area that a triangle covers seen from +z; negative if it runs clockwise.
-double doubled_area(const SurfaceMesh& mesh, std::int64_t triangle) {
-  const Eigen::Vector3d a = mesh.corner(triangle, 0);
-  return (mesh.corner(triangle, 1) - a).cross(mesh.corner(triangle, 2) - a).z();
-}
 
 std::optional<std::string> extent_fault(const SurfaceMesh& mesh, const Eigen::Vector2d& size) {
   const double tolerance = kRimTolerance * size.maxCoeff();
@@ -62,16 +55,16 @@ HalfCell half_cell(const SurfaceMesh& mesh, const GridShape& shape, std::int64_t
 
 std::optional<std::string> surface_fault(const SurfaceMesh& mesh, const OpticalSetup& setup) {
   for (std::int64_t t = 0; t < mesh.triangle_count(); ++t) {
-    if (doubled_area(mesh, t) > 0.0) continue;
+    if (mesh.plan_area(t) > 0.0) continue;
     return "triangle " + std::to_string(t) +
            " must run counter-clockwise seen from +z, but covers " +
-           number_text(0.5 * doubled_area(mesh, t)) + " mm^2";
+           number_text(mesh.plan_area(t)) + " mm^2";
   }
   const double lowest = mesh.vertices.row(2).minCoeff();
   const double highest = mesh.vertices.row(2).maxCoeff();
   if (!(lowest >= 0.0 && highest < setup.focal_length)) {
     return "z runs from " + number_text(lowest) + " to " + number_text(highest) +
-           " mm: it must lie between the entry face at 0 and the receiving plane at " +
+           " mm: must be between the entry face at 0 and the receiving plane at " +
            number_text(setup.focal_length);
   }
   return extent_fault(mesh, setup.lens_size);

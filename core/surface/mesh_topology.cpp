@@ -47,9 +47,10 @@ TriConnectivity make_connectivity(const SurfaceMesh& mesh) {
         connectivity.add_face(OpenMesh::VertexHandle(v.x()), OpenMesh::VertexHandle(v.y()),
                               OpenMesh::VertexHandle(v.z()));
     if (!face.is_valid()) {
-      throw InputError("mesh: " + described(mesh, t) +
-                       " does not fit to those before it: an edge has more than two triangles or "
-                       "the triangle is turned against its neighbour");
+      throw InputError(
+          "mesh: " + described(mesh, t) +
+          " contradicts the triangles before it: an edge has more than two triangles or "
+          "the triangle is turned against its neighbour");
     }
   }
   return connectivity;

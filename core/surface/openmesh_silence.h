@@ -5,7 +5,7 @@
 
 namespace lensforge {
 
-/// Keeps OpenMesh from printing while it lives; what went wrong is told by exceptions instead.
+/// Keeps OpenMesh from printing while it lives; errors are reported by exceptions instead.
 class OpenMeshSilence {
  public:
   OpenMeshSilence() { omerr().disable(), omout().disable(), omlog().disable(); }

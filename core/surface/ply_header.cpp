@@ -71,7 +71,7 @@ PlyProperty read_property(MeshText& text, const PlyElement& element) {
     text = after_list;
     property.count_type = read_type(text);
     if (property.count_type->kind == Kind::kFloat) {
-      text.refuse("counts a list in fractions: its first type must be of whole numbers");
+      text.refuse("has a list whose count is not an integer type; use uchar or int");
     }
   }
   property.type = read_type(text);
@@ -120,7 +120,7 @@ void check_elements(const PlyHeader& header, std::size_t size, const MeshText& t
       text.refuse("has vertices without the properties x, y and z");
     }
     if (element.name == "face" && !has_corners(element)) {
-      text.refuse("has faces without a list vertex_indices of whole numbers");
+      text.refuse("has faces without an integer list vertex_indices");
     }
   }
 }

@@ -29,7 +29,7 @@ double as(const std::array<char, 8>& raw) {
   return static_cast<double>(number);
 }
 
-/// The number that little-endian bytes stand for.
+/// The number that little-endian bytes encode.
 double number_of(const std::array<char, 8>& raw, const PlyType& type) {
   const bool is_signed = type.kind == PlyType::Kind::kSigned;
   if (type.kind == PlyType::Kind::kFloat) return type.bytes == 4 ? as<float>(raw) : as<double>(raw);

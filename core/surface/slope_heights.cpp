@@ -73,9 +73,7 @@ double mean_over_area(const SurfaceMesh& mesh, const Eigen::VectorXd& values) {
   double sum = 0.0;
   for (Eigen::Index t = 0; t < mesh.triangles.cols(); ++t) {
     const Eigen::Vector3i corners = mesh.triangles.col(t);
-    const Eigen::Vector3d a = mesh.corner(t, 1) - mesh.corner(t, 0);
-    const Eigen::Vector3d b = mesh.corner(t, 2) - mesh.corner(t, 0);
-    const double own = a.x() * b.y() - a.y() * b.x();
+    const double own = mesh.plan_area(t);
     area += own;
     sum += own * (values[corners[0]] + values[corners[1]] + values[corners[2]]) / 3.0;
   }
@@ -84,7 +82,7 @@ double mean_over_area(const SurfaceMesh& mesh, const Eigen::VectorXd& values) {
 
 }  // namespace
 
-Eigen::VectorXd fit_heights(const SurfaceMesh& mesh, const Eigen::Matrix2Xd& slopes) {
+Eigen::VectorXd heights_from_slopes(const SurfaceMesh& mesh, const Eigen::Matrix2Xd& slopes) {
   const std::vector<Edge> edges = edges_of(mesh);
   Eigen::VectorXd right = Eigen::VectorXd::Zero(mesh.vertex_count());
   for (const auto& [a, b, weight] : edges) {

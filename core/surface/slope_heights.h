@@ -11,6 +11,6 @@ namespace lensforge {
 /// (Δz − ½ (s + s')·Δxy)² is least, where edges that end on the border weigh a hundredth: half of
 /// what makes a normal is missing there. The volume below the mesh stays.
 /// @pre every triangle faces +z. @param slopes  ∂z/∂x, ∂z/∂y at the vertices, 2 × V.
-Eigen::VectorXd fit_heights(const SurfaceMesh& mesh, const Eigen::Matrix2Xd& slopes);
+Eigen::VectorXd heights_from_slopes(const SurfaceMesh& mesh, const Eigen::Matrix2Xd& slopes);
 
 }  // namespace lensforge

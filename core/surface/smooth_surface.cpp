@@ -4,8 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numeric>
+#include <utility>
 
+#include "core/surface/mesh_normals.h"
 #include "core/surface/slope_heights.h"
 
 // Notation: a triangle's corners are 0, 1, 2, its centroid c. Bernstein coefficients of the cubic
@@ -13,20 +14,12 @@
 namespace lensforge {
 namespace {
 
-/// How far outside of its triangle a point may lie (barycentric) before it counts as off the mesh.
-constexpr double kOnMesh = 1e-9;
-
 double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
   return a.x() * b.y() - a.y() * b.x();
 }
 
 Eigen::Matrix2Xd vertex_slopes(const SurfaceMesh& mesh) {
-  Eigen::Matrix3Xd normals = Eigen::Matrix3Xd::Zero(3, mesh.vertex_count());
-  for (Eigen::Index t = 0; t < mesh.triangles.cols(); ++t) {
-    const Eigen::Vector3d normal =
-        (mesh.corner(t, 1) - mesh.corner(t, 0)).cross(mesh.corner(t, 2) - mesh.corner(t, 0));
-    for (int k = 0; k < 3; ++k) normals.col(mesh.triangles(k, t)) += normal;
-  }
+  const Eigen::Matrix3Xd normals = vertex_area_normals(mesh);
   Eigen::Matrix2Xd slopes = Eigen::Matrix2Xd::Zero(2, mesh.vertex_count());
   for (Eigen::Index v = 0; v < normals.cols(); ++v) {
     if (normals(2, v) > 0.0) slopes.col(v) = -normals.col(v).head<2>() / normals(2, v);
@@ -35,7 +28,7 @@ Eigen::Matrix2Xd vertex_slopes(const SurfaceMesh& mesh) {
 }
 
 /// One triangle's corners, heights and slopes.
-struct Corners {
+struct PatchCorners {
   std::array<Eigen::Vector2d, 3> p;
   std::array<double, 3> z;
   std::array<Eigen::Vector2d, 3> slope;
@@ -68,7 +61,7 @@ struct Third {
   std::array<Eigen::Vector2d, 3> p;
   double iii, jjj, ccc, iij, ijj, iic, jjc, ijc, icc, jcc;
 
-  Third(const Corners& corners, std::size_t i, std::size_t j)
+  Third(const PatchCorners& corners, std::size_t i, std::size_t j)
       : p{corners.p[i], corners.p[j], corners.centroid},
         iii(corners.z[i]),
         jjj(corners.z[j]),
@@ -131,9 +124,15 @@ struct Third {
   }
 };
 
-Corners make_corners(const SurfaceMesh& mesh, const Eigen::Matrix2Xd& slopes,
-                     std::int64_t triangle) {
-  Corners corners;
+SurfaceMesh with_heights_of(const SurfaceMesh& mesh, const Eigen::Matrix2Xd& slopes) {
+  SurfaceMesh fitted = mesh;
+  fitted.vertices.row(2) = heights_from_slopes(mesh, slopes).transpose();
+  return fitted;
+}
+
+PatchCorners make_corners(const SurfaceMesh& mesh, const Eigen::Matrix2Xd& slopes,
+                          std::int64_t triangle) {
+  PatchCorners corners;
   for (int k = 0; k < 3; ++k) {
     const int v = mesh.triangles(k, triangle);
     const auto i = static_cast<std::size_t>(k);
@@ -147,71 +146,10 @@ Corners make_corners(const SurfaceMesh& mesh, const Eigen::Matrix2Xd& slopes,
 
 }  // namespace
 
-SmoothSurface::SmoothSurface(const SurfaceMesh& mesh) : mesh_(mesh), slopes_(vertex_slopes(mesh)) {
-  mesh_.vertices.row(2) = fit_heights(mesh, slopes_).transpose();
-  const auto xy = mesh_.vertices.topRows<2>();
-  box_ = {Eigen::Vector2d(xy.rowwise().minCoeff()), Eigen::Vector2d(xy.rowwise().maxCoeff())};
-  const double side = std::sqrt(2.0 * box_.volume() / static_cast<double>(mesh_.triangle_count()));
-  bins_ = (box_.sizes() / side).array().ceil().cast<int>().max(1);
-  fill_bins();
-}
+SmoothSurface::SmoothSurface(const SurfaceMesh& mesh) : SmoothSurface(mesh, vertex_slopes(mesh)) {}
 
-Eigen::Vector2i SmoothSurface::bin_cell(const Eigen::Vector2d& xy) const {
-  const Eigen::Array2d share = (xy - box_.min()).array() / box_.sizes().array();
-  const Eigen::Array2i cell = (share * bins_.array().cast<double>()).floor().cast<int>();
-  return cell.max(0).min(bins_.array() - 1);
-}
-
-std::int64_t SmoothSurface::bin_of(const Eigen::Vector2d& xy) const {
-  const Eigen::Vector2i cell = bin_cell(xy);
-  return std::int64_t{cell.y()} * bins_.x() + cell.x();
-}
-
-void SmoothSurface::fill_bins() {
-  const auto for_each_bin = [&](Eigen::Index t, const auto& action) {
-    Eigen::AlignedBox2d box;
-    for (int k = 0; k < 3; ++k) box.extend(Eigen::Vector2d(mesh_.corner(t, k).head<2>()));
-    const Eigen::Vector2i low = bin_cell(box.min());
-    const Eigen::Vector2i high = bin_cell(box.max());
-    for (int y = low.y(); y <= high.y(); ++y) {
-      for (int x = low.x(); x <= high.x(); ++x) {
-        action(static_cast<std::size_t>(std::int64_t{y} * bins_.x() + x));
-      }
-    }
-  };
-  bin_begin_.assign(static_cast<std::size_t>(bins_.prod()) + 1, 0);
-  for (Eigen::Index t = 0; t < mesh_.triangles.cols(); ++t) {
-    for_each_bin(t, [&](std::size_t bin) { ++bin_begin_[bin + 1]; });
-  }
-  std::partial_sum(bin_begin_.begin(), bin_begin_.end(), bin_begin_.begin());
-  bin_triangles_.resize(static_cast<std::size_t>(bin_begin_.back()));
-  std::vector<std::int64_t> next(bin_begin_.begin(), bin_begin_.end() - 1);
-  for (Eigen::Index t = 0; t < mesh_.triangles.cols(); ++t) {
-    for_each_bin(t, [&](std::size_t bin) {
-      bin_triangles_[static_cast<std::size_t>(next[bin]++)] = static_cast<std::int32_t>(t);
-    });
-  }
-}
-
-SmoothSurface::Place SmoothSurface::locate(const Eigen::Vector2d& xy) const {
-  Place best;
-  double best_least = -kOnMesh;
-  const auto bin = static_cast<std::size_t>(bin_of(xy));
-  for (std::int64_t i = bin_begin_[bin]; i < bin_begin_[bin + 1]; ++i) {
-    const std::int32_t t = bin_triangles_[static_cast<std::size_t>(i)];
-    const Eigen::Vector2d a = mesh_.corner(t, 0).head<2>() - xy;
-    const Eigen::Vector2d b = mesh_.corner(t, 1).head<2>() - xy;
-    const Eigen::Vector2d c = mesh_.corner(t, 2).head<2>() - xy;
-    Eigen::Vector3d weights(cross(b, c), cross(c, a), cross(a, b));
-    weights /= weights.sum();
-    const double least = weights.minCoeff();
-    if (least < best_least) continue;
-    best = {t, weights};
-    best_least = least;
-    if (least > 0.0) break;
-  }
-  return best;
-}
+SmoothSurface::SmoothSurface(const SurfaceMesh& mesh, Eigen::Matrix2Xd slopes)
+    : OpticalSurface(with_heights_of(mesh, slopes)), slopes_(std::move(slopes)) {}
 
 SurfacePoint SmoothSurface::in_triangle(std::int64_t triangle,
                                         const Eigen::Vector3d& weights) const {
@@ -219,24 +157,22 @@ SurfacePoint SmoothSurface::in_triangle(std::int64_t triangle,
   const double least = weights.minCoeff(&k);
   const int i = (k + 1) % 3;
   const int j = (k + 2) % 3;
-  const Third third(make_corners(mesh_, slopes_, triangle), static_cast<std::size_t>(i),
+  const Third third(make_corners(mesh(), slopes_, triangle), static_cast<std::size_t>(i),
                     static_cast<std::size_t>(j));
   return third.at({weights[i] - least, weights[j] - least, 3.0 * least});
 }
 
-std::optional<SmoothPatch> SmoothSurface::patch_at(const Eigen::Vector2d& xy) const {
-  const Place place = locate(xy);
-  if (place.triangle < 0) return std::nullopt;
+SmoothPatch SmoothSurface::patch_in(std::int64_t triangle, const Eigen::Vector3d& weights) const {
   int k = 0;
-  place.weights.minCoeff(&k);
-  const Corners corners = make_corners(mesh_, slopes_, place.triangle);
+  weights.minCoeff(&k);
+  const PatchCorners corners = make_corners(mesh(), slopes_, triangle);
   return Third(corners, static_cast<std::size_t>((k + 1) % 3),
                static_cast<std::size_t>((k + 2) % 3))
       .patch();
 }
 
 BendRange SmoothSurface::bend_range(std::int64_t triangle) const {
-  const Corners corners = make_corners(mesh_, slopes_, triangle);
+  const PatchCorners corners = make_corners(mesh(), slopes_, triangle);
   BendRange range{HUGE_VAL, -HUGE_VAL};
   for (std::size_t i = 0; i < 3; ++i) {
     const BendRange third = Third(corners, i, (i + 1) % 3).bend_range();
@@ -245,32 +181,26 @@ BendRange SmoothSurface::bend_range(std::int64_t triangle) const {
   return range;
 }
 
-std::optional<SurfacePoint> SmoothSurface::at(const Eigen::Vector2d& xy) const {
-  const Place place = locate(xy);
-  if (place.triangle < 0) return std::nullopt;
-  return in_triangle(place.triangle, place.weights);
-}
-
 std::optional<SurfacePoint> SmoothSurface::model_at(const Eigen::Vector2d& xy) const {
-  const Place place = locate(xy);
+  const PlaceOnMesh place = locate(xy);
   if (place.triangle < 0) return std::nullopt;
   SurfacePoint point = in_triangle(place.triangle, place.weights);
   point.slope.setZero();
   for (int k = 0; k < 3; ++k) {
-    point.slope += place.weights[k] * slopes_.col(mesh_.triangles(k, place.triangle));
+    point.slope += place.weights[k] * slopes_.col(mesh().triangles(k, place.triangle));
   }
   return point;
 }
 
 Eigen::Matrix2d SmoothSurface::model_bend(const Eigen::Vector2d& xy) const {
-  const Place place = locate(xy);
+  const PlaceOnMesh place = locate(xy);
   if (place.triangle < 0) return Eigen::Matrix2d::Zero();
-  const Eigen::Vector3i corners = mesh_.triangles.col(place.triangle);
+  const Eigen::Vector3i corners = mesh().triangles.col(place.triangle);
   Eigen::Matrix2d sides;
   Eigen::Matrix2d changes;
   for (int k = 0; k < 2; ++k) {
     const int to = corners[k + 1];
-    sides.col(k) = mesh_.vertices.col(to).head<2>() - mesh_.vertices.col(corners[0]).head<2>();
+    sides.col(k) = mesh().vertices.col(to).head<2>() - mesh().vertices.col(corners[0]).head<2>();
     changes.col(k) = slopes_.col(to) - slopes_.col(corners[0]);
   }
   return changes * sides.inverse();

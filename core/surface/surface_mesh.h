@@ -27,6 +27,13 @@ struct SurfaceMesh {
   [[nodiscard]] Eigen::Vector3d corner(std::int64_t triangle, int k) const {
     return vertices.col(triangles(k, triangle));
   }
+  /// What a triangle covers seen from +z, mm²; negative if it runs clockwise. Not its light: that
+  /// is the light path's to say.
+  [[nodiscard]] double plan_area(std::int64_t triangle) const {
+    const Eigen::Vector3d u = corner(triangle, 1) - corner(triangle, 0);
+    const Eigen::Vector3d v = corner(triangle, 2) - corner(triangle, 0);
+    return 0.5 * (u.x() * v.y() - u.y() * v.x());
+  }
 };
 
 }  // namespace lensforge

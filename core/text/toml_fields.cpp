@@ -162,10 +162,10 @@ TomlFields TomlFields::table(const std::string& key) {
 
 std::vector<TomlFields> TomlFields::tables(const std::string& key) {
   const auto* value = required(key).as_array();
-  if (value == nullptr || value->empty()) refuse(key, "must be an array of tables, one at least");
+  if (value == nullptr || value->empty()) refuse(key, "must be an array of at least one table");
   std::vector<TomlFields> all;
   for (const toml::node& entry : *value) {
-    if (!entry.is_table()) refuse(key, "must be an array of tables, one at least");
+    if (!entry.is_table()) refuse(key, "must be an array of at least one table");
     all.emplace_back(*entry.as_table(), source_,
                      name_of(key) + "[" + std::to_string(all.size()) + "]");
   }
@@ -180,7 +180,7 @@ std::vector<std::string> TomlFields::keys() const {
 
 void TomlFields::finish() const {
   for (const std::string& key : keys()) {
-    if (!known_.contains(key)) refuse(key, source_.kind + " has no such key here");
+    if (!known_.contains(key)) refuse(key, source_.kind + ": unknown key");
   }
 }
 

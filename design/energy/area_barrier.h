@@ -2,7 +2,7 @@
 #pragma once
 
 #include "core/compute/host_device.h"
-#include "design/energy/barrier.h"
+#include "core/optics/barrier.h"
 
 namespace lensforge {
 

@@ -5,7 +5,7 @@
 #include <Eigen/Geometry>
 
 #include "core/compute/host_device.h"
-#include "design/optics/facet.h"
+#include "core/surface/corners.h"
 
 namespace lensforge {
 

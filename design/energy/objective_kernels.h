@@ -9,11 +9,12 @@
 #include "core/image/transfer.h"
 #include "design/energy/face_fit.h"
 #include "design/energy/objective_view.h"
-#include "design/energy/reflection_barrier.h"
-#include "design/optics/smooth.h"
+#include "design/optics/columns.h"
+#include "design/optics/image_triangle.h"
 
 /// What the objective does for one face, vertex or pixel on the way to its value: surface → frames,
-/// Weingarten maps, landing points, picture error. The way back is in objective_adjoint.h.
+/// Weingarten maps, image triangles, picture error. The way back is in objective_adjoint.h. How a
+/// face sends its light is the surface model's: Rays is FacetRays or SmoothRays.
 namespace lensforge {
 
 /// Frame of a face; its share of E_barr, which is infinite where the surface is not allowed.
@@ -23,20 +24,30 @@ struct MeasureFace {
   LF_HD std::array<double, 1> operator()(std::int64_t i) const {
     const Corners t = o.corners(i);
     const FaceFrame frame = face_frame(t);
-    o.frames[i] = frame;
+    o.scratch.frames[i] = frame;
     const double area = 0.5 * doubled_projected_area(t);
-    return {area_barrier(area, o.options.area).value +
-            reflection_barrier(frame.n.z(), o.optics.eta).value};
+    return {area_barrier(area, o.options.area).value + o.light.barrier(t, frame.n)};
   }
 };
 
-/// Centroid of what a face throws onto the receiving plane. @pre as for image_triangle().
+/// What the faces throw onto the screen, as a source of FluxImageOn::render().
+/// @pre frames, and what the rays keep of the surface, are up to date.
+template <class Rays>
+struct FaceLightSource {
+  ObjectiveView o;
+  Rays rays;
+  LF_HD ImageTriangle operator()(std::int64_t face) const { return rays.image(o, face); }
+};
+
+/// Centroid of what a face throws onto the screen. @pre as of FaceLightSource.
+template <class Rays>
 struct FaceCentroid {
   ObjectiveView o;
+  Rays rays;
   double* centroids;  ///< 2 × F, pixel coordinates.
 
   LF_HD void operator()(std::int64_t i) const {
-    const ImageTriangle t = o.image_triangle(i);
+    const ImageTriangle t = rays.image(o, i);
     column2(centroids, i) = (t.p0 + t.p1 + t.p2) / 3.0;
   }
 };
@@ -50,11 +61,11 @@ struct FitMap {
     for (int k = 0; k < 3; ++k) {
       const int j = o.mesh.neighbour(i, k);
       if (j < 0) continue;
-      fit.add(NeighbourOffset(o.frames[i], o.frames[j]),
-              o.options.weights.edge * o.edge_weights[3 * i + k]);
+      fit.add(NeighbourOffset(o.scratch.frames[i], o.scratch.frames[j]),
+              o.options.weights.edge * o.scratch.edge_weights[3 * i + k]);
     }
     fit.add_mean_curvature(area_normal(o.corners(i)).norm());
-    o.maps[i] = fit.solve();
+    o.scratch.maps[i] = fit.solve();
   }
 };
 
@@ -65,7 +76,7 @@ struct ResetEdgeWeights {
   LF_HD void operator()(std::int64_t i) const {
     const double flat = welsch(0.0, o.options.nu).slope;
     for (int k = 0; k < 3; ++k) {
-      o.edge_weights[3 * i + k] = o.mesh.neighbour(i, k) < 0 ? 0.0 : flat;
+      o.scratch.edge_weights[3 * i + k] = o.mesh.neighbour(i, k) < 0 ? 0.0 : flat;
     }
   }
 };
@@ -77,10 +88,10 @@ struct ReweightEdges {
   /// h of edge k of a face, which is not on the boundary.
   [[nodiscard]] LF_HD double mismatch(std::int64_t face, int k) const {
     const int j = o.mesh.neighbour(face, k);
-    const FaceFrame& frame_i = o.frames[face];
-    const FaceFrame& frame_j = o.frames[j];
-    return NeighbourOffset(frame_i, frame_j).mismatch(o.maps[face]) +
-           NeighbourOffset(frame_j, frame_i).mismatch(o.maps[j]);
+    const FaceFrame& frame_i = o.scratch.frames[face];
+    const FaceFrame& frame_j = o.scratch.frames[j];
+    return NeighbourOffset(frame_i, frame_j).mismatch(o.scratch.maps[face]) +
+           NeighbourOffset(frame_j, frame_i).mismatch(o.scratch.maps[j]);
   }
   LF_HD std::array<double, 1> operator()(std::int64_t i) const {
     double offset = 0.0;
@@ -88,28 +99,10 @@ struct ReweightEdges {
       if (o.mesh.neighbour(i, k) < 0) continue;
       const double h = mismatch(i, k);
       const ValueSlope psi = welsch(h, o.options.nu);
-      o.edge_weights[3 * i + k] = psi.slope;
+      o.scratch.edge_weights[3 * i + k] = psi.slope;
       offset += 0.5 * (psi.value - psi.slope * h);
     }
     return {offset};
-  }
-};
-
-/// Smooth model: normal and landing point of a vertex; 1 where it does not transmit, else 0.
-struct LandVertex {
-  ObjectiveView o;
-
-  LF_HD std::array<double, 1> operator()(std::int64_t v) const {
-    Eigen::Vector3d sum(0.0, 0.0, 0.0);
-    const MeshView& mesh = o.mesh;
-    for (auto c = mesh.vertex_corner_begin[v]; c < mesh.vertex_corner_begin[v + 1]; ++c) {
-      sum += area_normal(o.corners(mesh.vertex_corners[c] / 3));
-    }
-    column3(o.vertex_normals, v) = sum;
-    const Eigen::Vector3d n = VertexNormal(sum).n;
-    if (!o.optics.transmits(n)) return {1.0};
-    column2(o.landing, v) = project_vertex(column3(o.vertices, v), n, o.optics);
-    return {0.0};
   }
 };
 

@@ -2,11 +2,11 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <type_traits>
 #include <variant>
 #include <vector>
 
@@ -14,6 +14,7 @@
 #include "core/image/image.h"
 #include "core/surface/mesh_topology.h"
 #include "core/surface/surface_mesh.h"
+#include "design/energy/facet_rays.h"
 #include "design/energy/gradient_term.h"
 #include "design/energy/image_term.h"
 #include "design/energy/laplacian_term.h"
@@ -21,6 +22,8 @@
 #include "design/energy/objective_adjoint.h"
 #include "design/energy/objective_kernels.h"
 #include "design/energy/objective_options.h"
+#include "design/energy/objective_sums.h"
+#include "design/energy/smooth_rays.h"
 #include "design/energy/unlit_pixels.h"
 #include "design/flux/flux_image.h"
 
@@ -48,23 +51,33 @@ class DesignObjectiveOn {
   void take(const Image& target);
   void take(const Correspondence& wanted);
   [[nodiscard]] ObjectiveView view(const double* vertices);
-  void find_unlit(const ObjectiveView& o);
-  [[nodiscard]] bool allowed(const ObjectiveView& o);
+  [[nodiscard]] GoalView goal_view();
   /// Sums of one evaluation; not asked for before all kernels are on their way.
   struct Sums;
-  void compare_picture(const ObjectiveView& o, Sums& sums);
-  void pull_back(const ObjectiveView& o, double* gradient, Sums& sums);
+
+  // What depends on the surface model; Rays is FacetRaysOn or SmoothRaysOn.
+  template <class Rays>
+  void find_unlit(const ObjectiveView& o, Rays& rays);
+  template <class Rays>
+  [[nodiscard]] bool allowed(const ObjectiveView& o, Rays& rays);
+  template <class Rays>
+  void compare_picture(const ObjectiveView& o, Rays& rays, Sums& sums);
+  template <class Rays>
+  void pull_back(const ObjectiveView& o, Rays& rays, double* gradient, Sums& sums);
+  template <class Rays>
+  [[nodiscard]] ObjectiveEvaluation evaluate_by(Rays& rays, const double* vertices,
+                                                double* gradient);
+
   void add_laplacian(const ObjectiveView& o, double* gradient, Sums& sums);
   [[nodiscard]] EnergyValues energies(const Sums& sums) const;
   /// mm² → square pixels.
   [[nodiscard]] double pixels_per_area() const {
-    return std::fabs(optics_.plane.pixels_per_mm().prod());
+    return std::fabs(light_.plane().pixels_per_mm().prod());
   }
 
   Exec executor_;
   ObjectiveOptions options_;
-  Projection optics_;
-  double lens_area_;
+  LightPath light_;
   MeshOn<Exec> mesh_;
   Eigen::Matrix3Xd movable_;
   Buffer<double> movable_here_;
@@ -87,11 +100,7 @@ class DesignObjectiveOn {
   Buffer<Corners> corner_bar_;
   Buffer<double> laplacian_shares_;
 
-  Buffer<double> vertex_normals_;
-  Buffer<double> landing_;
-  Buffer<ImageTriangle> triangle_bar_;
-  Buffer<double> vertex_bar_;
-  Buffer<double> vertex_normal_bar_;
+  std::variant<FacetRaysOn<Exec>, SmoothRaysOn<Exec>> rays_;
 };
 
 namespace objective_detail {
@@ -117,6 +126,15 @@ inline Eigen::Matrix3Xd movable_coordinates(const Eigen::Matrix3Xd& vertices,
   return movable;
 }
 
+template <class Exec>
+std::variant<FacetRaysOn<Exec>, SmoothRaysOn<Exec>> rays_of(SurfaceModel model,
+                                                            const SurfaceMesh& mesh) {
+  if (model == SurfaceModel::kFacet) {
+    return FacetRaysOn<Exec>(mesh.triangle_count(), mesh.vertex_count());
+  }
+  return SmoothRaysOn<Exec>(mesh.triangle_count(), mesh.vertex_count());
+}
+
 /// A matrix's entries, column by column.
 template <class Matrix>
 std::span<const double> entries(const Matrix& matrix) {
@@ -131,13 +149,13 @@ DesignObjectiveOn<Exec>::DesignObjectiveOn(const SurfaceMesh& mesh, const Optica
                                            const Exec& executor)
     : executor_(executor),
       options_(options),
-      optics_(setup),
-      lens_area_(setup.lens_size.prod()),
+      light_(setup),
       mesh_(mesh, make_topology(mesh), executor),
       movable_(objective_detail::movable_coordinates(mesh.vertices, setup.lens_size)),
       movable_here_(buffer_of(executor, objective_detail::entries(movable_))),
       flux_(setup.pixels.x(), setup.pixels.y()),
-      cotangent_(setup.pixels.x(), setup.pixels.y()) {
+      cotangent_(setup.pixels.x(), setup.pixels.y()),
+      rays_(objective_detail::rays_of<Exec>(options.model, mesh)) {
   const auto faces = static_cast<std::size_t>(mesh.triangle_count());
   const auto vertices = static_cast<std::size_t>(mesh.vertex_count());
   frames_ = Buffer<FaceFrame>(faces);
@@ -148,13 +166,6 @@ DesignObjectiveOn<Exec>::DesignObjectiveOn(const SurfaceMesh& mesh, const Optica
   fill_zero(executor_, maps_);
   fill_zero(executor_, edge_weights_);
   std::visit([this](const auto& wanted) { this->take(wanted); }, goal);
-  if (options.model == SurfaceModel::kSmooth) {
-    landing_ = Buffer<double>(2 * vertices);
-    vertex_normals_ = Buffer<double>(3 * vertices);
-    vertex_bar_ = Buffer<double>(3 * vertices);
-    vertex_normal_bar_ = Buffer<double>(3 * vertices);
-    triangle_bar_ = Buffer<ImageTriangle>(faces);
-  }
   const Buffer<double> start = buffer_of(executor_, objective_detail::entries(mesh.vertices));
   relinearize(start.data());
 }
@@ -177,26 +188,22 @@ void DesignObjectiveOn<Exec>::take(const Correspondence& wanted) {
 template <class Exec>
 ObjectiveView DesignObjectiveOn<Exec>::view(const double* vertices) {
   return {.options = options_,
-          .lens_area = lens_area_,
-          .optics = optics_,
+          .light = light_,
           .mesh = mesh_.view(),
           .vertices = vertices,
-          .columns = static_cast<double>(flux_.columns()),
+          .goal = goal_view(),
+          .scratch = {frames_.data(), maps_.data(), edge_weights_.data(), corner_bar_.data()}};
+}
+
+template <class Exec>
+GoalView DesignObjectiveOn<Exec>::goal_view() {
+  return {.columns = static_cast<double>(flux_.columns()),
           .rows = static_cast<double>(flux_.rows()),
           .cotangent = cotangent_.view(),
-          .wanted_centroids = wanted_centroids_.size() > 0 ? wanted_centroids_.data() : nullptr,
-          .wanted_flux = wanted_flux_.data(),
           .target = target_.data(),
           .led = led_.size() > 0 ? led_.data() : nullptr,
-          .frames = frames_.data(),
-          .maps = maps_.data(),
-          .edge_weights = edge_weights_.data(),
-          .corner_bar = corner_bar_.data(),
-          .vertex_normals = vertex_normals_.data(),
-          .landing = landing_.data(),
-          .triangle_bar = triangle_bar_.data(),
-          .vertex_bar = vertex_bar_.data(),
-          .vertex_normal_bar = vertex_normal_bar_.data()};
+          .wanted_centroids = wanted_centroids_.size() > 0 ? wanted_centroids_.data() : nullptr,
+          .wanted_flux = wanted_flux_.data()};
 }
 
 template <class Exec>
@@ -205,7 +212,12 @@ void DesignObjectiveOn<Exec>::relinearize(const double* vertices) {
   const ObjectiveView o = view(vertices);
   const std::int64_t faces = o.mesh.faces;
   static_cast<void>(pending_sum<1>(executor_, "face frames", faces, MeasureFace{o}));
-  if (!wanted_light_.empty() && o.facets()) find_unlit(o);
+  if (!wanted_light_.empty()) {
+    const auto find = [&](auto& rays) {
+      if constexpr (std::decay_t<decltype(rays)>::kLeadable) this->find_unlit(o, rays);
+    };
+    std::visit(find, rays_);
+  }
   if (options_.weights.smooth == 0.0 || options_.weights.edge == 0.0) return;
   parallel_for(executor_, "welsch reset", faces, ResetEdgeWeights{o});
   for (int sweep = 0; sweep < objective_detail::kReweightingSweeps; ++sweep) {
@@ -216,14 +228,17 @@ void DesignObjectiveOn<Exec>::relinearize(const double* vertices) {
 
 /// Leads facets to the pixels that no facet reaches. @pre frames are up to date.
 template <class Exec>
-void DesignObjectiveOn<Exec>::find_unlit(const ObjectiveView& o) {
+template <class Rays>
+void DesignObjectiveOn<Exec>::find_unlit(const ObjectiveView& o, Rays& rays) {
   Eigen::Matrix2Xd centroids(2, o.mesh.faces);
   const std::span<double> centroids_here(centroids.data(),
                                          static_cast<std::size_t>(centroids.size()));
   Buffer<double> measured(centroids_here.size());
-  parallel_for(executor_, "face centroids", o.mesh.faces, FaceCentroid{o, measured.data()});
+  parallel_for(executor_, "face centroids", o.mesh.faces,
+               FaceCentroid<typename Rays::View>{o, rays.view(), measured.data()});
   download(executor_, std::span<const double>(measured.data(), measured.size()), centroids_here);
-  const auto flux = flux_.render(executor_, o.mesh.faces, FaceLightSource{o});
+  const auto flux =
+      flux_.render(executor_, o.mesh.faces, FaceLightSource<typename Rays::View>{o, rays.view()});
   std::vector<double> light(flux.size());
   download(executor_, flux, std::span<double>(light));
   for (double& value : light) value *= target_total_;
@@ -235,13 +250,12 @@ void DesignObjectiveOn<Exec>::find_unlit(const ObjectiveView& o) {
   }
 }
 
-/// Frames, and in the smooth model landing points; false where a barrier is infinite.
+/// Frames, and what the rays keep of the surface; false where a barrier is infinite.
 template <class Exec>
-bool DesignObjectiveOn<Exec>::allowed(const ObjectiveView& o) {
+template <class Rays>
+bool DesignObjectiveOn<Exec>::allowed(const ObjectiveView& o, Rays& rays) {
   const auto barrier = pending_sum<1>(executor_, "face frames", o.mesh.faces, MeasureFace{o});
-  if (!std::isfinite(barrier.get()[0])) return false;
-  if (o.facets()) return true;
-  return pending_sum<1>(executor_, "land vertices", o.mesh.vertices, LandVertex{o}).get()[0] == 0.0;
+  return std::isfinite(barrier.get()[0]) && rays.land(executor_, o);
 }
 
 template <class Exec>
@@ -252,15 +266,17 @@ struct DesignObjectiveOn<Exec>::Sums {
   Pending<1> absolute_error;
   Pending<1> image;
   Pending<1> gradient;
-  Pending<3> images;  ///< Smooth model: E_bdr, E_align, E_flux.
-  Pending<7> faces;   ///< FaceSums
+  Pending<4> goal;   ///< GoalSums, as far as faces does not hold them.
+  Pending<7> faces;  ///< FaceSums
   Pending<1> laplacian;
 };
 
 /// Renders the picture and makes its cotangent: E_img, E_grad, MAE.
 template <class Exec>
-void DesignObjectiveOn<Exec>::compare_picture(const ObjectiveView& o, Sums& sums) {
-  const auto flux = flux_.render(executor_, o.mesh.faces, FaceLightSource{o});
+template <class Rays>
+void DesignObjectiveOn<Exec>::compare_picture(const ObjectiveView& o, Rays& rays, Sums& sums) {
+  const auto flux =
+      flux_.render(executor_, o.mesh.faces, FaceLightSource<typename Rays::View>{o, rays.view()});
   const std::span<double> bar = cotangent_.pixels();
   const PictureError picture{flux_.columns(), flux_.rows(), error_.data()};
   const ComparePixel compare{flux.data(), target_.data(), target_total_, error_.data(), bar.data()};
@@ -274,14 +290,14 @@ void DesignObjectiveOn<Exec>::compare_picture(const ObjectiveView& o, Sums& sums
 
 /// From the goal, the barriers and the smoothness terms back to the vertices.
 template <class Exec>
-void DesignObjectiveOn<Exec>::pull_back(const ObjectiveView& o, double* gradient, Sums& sums) {
-  const std::int64_t faces = o.mesh.faces;
-  if (!o.facets()) {
-    sums.images = pending_sum<3>(executor_, "flux adjoint", faces, PullBackImage{o});
-    parallel_for(executor_, "pull back vertices", o.mesh.vertices, PullBackVertex{o});
-  }
-  sums.faces = pending_sum<7>(executor_, "face adjoint", faces, PullBackFace{o});
-  parallel_for(executor_, "gather vertices", o.mesh.vertices, GatherVertex{o, gradient});
+template <class Rays>
+void DesignObjectiveOn<Exec>::pull_back(const ObjectiveView& o, Rays& rays, double* gradient,
+                                        Sums& sums) {
+  sums.goal = rays.pull_back(executor_, o);
+  sums.faces = pending_sum<7>(executor_, "face adjoint", o.mesh.faces,
+                              PullBackFace<typename Rays::View>{o, rays.view()});
+  parallel_for(executor_, "gather vertices", o.mesh.vertices,
+               GatherVertex<typename Rays::View>{o, rays.view(), gradient});
 }
 
 template <class Exec>
@@ -295,19 +311,19 @@ void DesignObjectiveOn<Exec>::add_laplacian(const ObjectiveView& o, double* grad
 template <class Exec>
 EnergyValues DesignObjectiveOn<Exec>::energies(const Sums& sums) const {
   const ObjectiveWeights& w = options_.weights;
-  const bool facets = options_.model == SurfaceModel::kFacet;
-  const FaceSums faces = sums.faces.get();
-  const std::array<double, 3> images = sums.images.get();
+  const FaceSums faces = FaceSums::of(sums.faces.get());
+  GoalSums goal = faces.goal;
+  goal += GoalSums::of(sums.goal.get());
   EnergyValues e;
   e.image = sums.image.get()[0];
   e.gradient = sums.gradient.get()[0];
-  e.boundary = facets ? faces[0] : images[0];
-  e.unlit = faces[1];
-  e.align = facets ? faces[2] : images[1];
-  e.flux = facets ? faces[3] : images[2];
-  e.barrier = faces[4];
-  e.face = faces[5];
-  if (w.smooth > 0.0) e.edge = faces[6] + edge_offset_;
+  e.boundary = goal.boundary;
+  e.unlit = goal.unlit;
+  e.align = goal.align;
+  e.flux = goal.flux;
+  e.barrier = faces.barrier;
+  e.face = faces.face;
+  if (w.smooth > 0.0) e.edge = faces.edge + edge_offset_;
   e.laplacian = pixels_per_area() * sums.laplacian.get()[0];
   e.total = w.image * (e.image + e.unlit) + w.gradient * e.gradient + w.boundary * e.boundary +
             w.align * e.align + w.flux * e.flux +
@@ -318,16 +334,22 @@ EnergyValues DesignObjectiveOn<Exec>::energies(const Sums& sums) const {
 
 template <class Exec>
 ObjectiveEvaluation DesignObjectiveOn<Exec>::evaluate(const double* vertices, double* gradient) {
+  return std::visit([&](auto& rays) { return this->evaluate_by(rays, vertices, gradient); }, rays_);
+}
+
+template <class Exec>
+template <class Rays>
+ObjectiveEvaluation DesignObjectiveOn<Exec>::evaluate_by(Rays& rays, const double* vertices,
+                                                         double* gradient) {
   ObjectiveEvaluation result;
   const ObjectiveView o = view(vertices);
-  if (!allowed(o)) return result;
+  if (!allowed(o, rays)) return result;
   Sums sums;
-  const bool follows_picture = o.wanted_centroids == nullptr;
-  if (follows_picture) compare_picture(o, sums);
+  if (o.goal.is_picture()) compare_picture(o, rays, sums);
   if (options_.weights.smooth > 0.0) {
     parallel_for(executor_, "weingarten fit", o.mesh.faces, FitMap{o});
   }
-  pull_back(o, gradient, sums);
+  pull_back(o, rays, gradient, sums);
   if (options_.weights.smooth * options_.weights.laplacian > 0.0) {
     add_laplacian(o, gradient, sums);
   }
@@ -335,7 +357,9 @@ ObjectiveEvaluation DesignObjectiveOn<Exec>::evaluate(const double* vertices, do
                HoldCoordinate{movable_here_.data(), gradient});
   result.feasible = true;
   result.energy = energies(sums);
-  if (follows_picture) result.mae = sums.absolute_error.get()[0] / (o.columns * o.rows);
+  if (o.goal.is_picture()) {
+    result.mae = sums.absolute_error.get()[0] / (o.goal.columns * o.goal.rows);
+  }
   return result;
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "core/optics/optical_setup.h"
+#include "core/surface/surface_model.h"
 
 namespace lensforge {
 

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "core/compute/host_device.h"
-#include "design/energy/barrier.h"
+#include "core/optics/barrier.h"
 #include "design/energy/face_frame.h"
 
 /// The Weingarten map of every face and its consistency across edges.

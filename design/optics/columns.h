@@ -5,7 +5,7 @@
 #include <cstdint>
 
 #include "core/compute/host_device.h"
-#include "design/optics/facet.h"
+#include "core/surface/corners.h"
 
 namespace lensforge {
 

@@ -7,7 +7,7 @@
 
 namespace lensforge {
 
-/// What one surface triangle throws onto the receiving plane: a triangle of uniform irradiance.
+/// What one surface triangle projects onto the receiving plane: a triangle of uniform irradiance.
 /// The same struct holds derivatives of a scalar with respect to these numbers.
 struct ImageTriangle {
   Eigen::Vector2d p0{0.0, 0.0};  ///< Corners in pixel coordinates (core/optics/image_plane.h).

@@ -4,9 +4,9 @@
 #include <Eigen/Core>
 
 #include "core/compute/host_device.h"
+#include "core/optics/light_path.h"
 #include "design/optics/facet.h"
 #include "design/optics/image_triangle.h"
-#include "design/optics/projection.h"
 
 /// Smooth model: one ray per vertex, refracted at the vertex normal; image triangles share corners
 /// and stretch. It is what a milled and polished part does.
@@ -25,20 +25,20 @@ struct VertexNormal {
 
 /// Where the ray of a vertex lands, in pixel coordinates. @pre n transmits.
 LF_HD inline Eigen::Vector2d project_vertex(const Eigen::Vector3d& p, const Eigen::Vector3d& n,
-                                            const Projection& optics) {
-  return optics.land(p, RefractedBeam(n, optics.eta).m);
+                                            const LightPath& light) {
+  return light.land(p, light.beam(p, n).m);
 }
 
 /// Adjoint of project_vertex(): adds to p_bar, returns n_bar.
 LF_HD inline Eigen::Vector3d project_vertex_adjoint(const Eigen::Vector3d& p,
                                                     const Eigen::Vector3d& n,
-                                                    const Projection& optics,
+                                                    const LightPath& light,
                                                     const Eigen::Vector2d& u_bar,
                                                     Eigen::Vector3d& p_bar) {
-  const RefractedBeam beam(n, optics.eta);
+  const RefractedBeam beam = light.beam(p, n);
   Eigen::Vector2d m_bar(0.0, 0.0);
-  optics.land_adjoint(p, beam.m, u_bar, p_bar, m_bar);
-  return beam.adjoint(n, optics.eta, m_bar);
+  light.land_adjoint(p, beam.m, u_bar, p_bar, m_bar);
+  return light.beam_adjoint(p, n, beam, m_bar, p_bar);
 }
 
 }  // namespace lensforge

@@ -5,20 +5,19 @@
 #include <limits>
 
 #include "core/compute/host_device.h"
+#include "core/optics/light_path.h"
 #include "design/optics/columns.h"
 #include "design/optics/facet.h"
-#include "design/optics/projection.h"
 #include "design/optics/smooth.h"
 
 /// What rendering a surface does for one triangle or vertex.
 namespace lensforge {
 
-/// A mesh's arrays in the memory of an executor, and the optics that it is seen through.
+/// A mesh's arrays in the memory of an executor, and the light that falls on it.
 struct SurfaceView {
   const int* triangles;    ///< 3 × T
   const double* vertices;  ///< 3 × V, mm
-  Projection optics;
-  double lens_area;  ///< mm²
+  LightPath light;
 
   [[nodiscard]] LF_HD Corners corners(std::int64_t i) const {
     return corners_at(triangles + 3 * i, vertices);
@@ -32,9 +31,8 @@ struct ProjectFacet {
   LF_HD ImageTriangle operator()(std::int64_t i) const {
     const Corners t = surface.corners(i);
     const Eigen::Vector3d n = area_normal(t).normalized();
-    if (!surface.optics.transmits(n)) return {};
-    return project_facet(t, RefractedBeam(n, surface.optics.eta), surface.optics,
-                         surface.lens_area);
+    if (!surface.light.transmits(t, n)) return {};
+    return project_facet(t, surface.light.facet_beam(t, n), surface.light);
   }
 };
 
@@ -46,8 +44,9 @@ struct LandRay {
 
   LF_HD void operator()(std::int64_t v) const {
     const Eigen::Vector3d n = VertexNormal(column3(normals, v)).n;
-    if (surface.optics.transmits(n)) {
-      column2(landing, v) = project_vertex(column3(surface.vertices, v), n, surface.optics);
+    const Eigen::Vector3d p = column3(surface.vertices, v);
+    if (surface.light.transmits(p, n)) {
+      column2(landing, v) = project_vertex(p, n, surface.light);
     } else {
       column2(landing, v).setConstant(std::numeric_limits<double>::quiet_NaN());
     }
@@ -66,8 +65,7 @@ struct ProjectSmooth {
   LF_HD ImageTriangle operator()(std::int64_t i) const {
     const int* v = surface.triangles + 3 * i;
     const ImageTriangle image{column2(landing, v[0]), column2(landing, v[1]),
-                              column2(landing, v[2]),
-                              0.5 * area_normal(surface.corners(i)).z() / surface.lens_area};
+                              column2(landing, v[2]), surface.light.flux(surface.corners(i))};
     const bool lit = is_finite(image.p0) && is_finite(image.p1) && is_finite(image.p2);
     return lit && !(image.flux < 0.0) ? image : ImageTriangle{};
   }

@@ -3,20 +3,16 @@
 
 #include <cstddef>
 
+#include "core/surface/mesh_normals.h"
 #include "design/optics/facet.h"
-#include "design/optics/projection.h"
 #include "design/optics/surface_kernels.h"
 
 namespace lensforge {
 
 namespace {
 
-Corners corners_of(const SurfaceMesh& mesh, std::int64_t t) {
-  return {mesh.corner(t, 0), mesh.corner(t, 1), mesh.corner(t, 2)};
-}
-
 SurfaceView view_of(const SurfaceMesh& mesh, const OpticalSetup& setup) {
-  return {mesh.triangles.data(), mesh.vertices.data(), Projection(setup), setup.lens_size.prod()};
+  return {mesh.triangles.data(), mesh.vertices.data(), LightPath(setup)};
 }
 
 template <class Project>
@@ -39,15 +35,6 @@ Eigen::Matrix2Xd land_rays(const SurfaceMesh& mesh, const SurfaceView& surface,
 }
 
 }  // namespace
-
-Eigen::Matrix3Xd vertex_area_normals(const SurfaceMesh& mesh) {
-  Eigen::Matrix3Xd normals = Eigen::Matrix3Xd::Zero(3, mesh.vertex_count());
-  for (std::int64_t t = 0; t < mesh.triangle_count(); ++t) {
-    const Eigen::Vector3d normal = area_normal(corners_of(mesh, t));
-    for (int k = 0; k < 3; ++k) normals.col(mesh.triangles(k, t)) += normal;
-  }
-  return normals;
-}
 
 std::vector<ImageTriangle> project_surface(const SurfaceMesh& mesh, const OpticalSetup& setup,
                                            SurfaceModel model, const Executor& executor) {

@@ -87,8 +87,9 @@ class EvenGridPoisson {
 
 }  // namespace
 
-HeightFitSummary fit_heights(const Eigen::Matrix2Xd& gradients, const HeightFitOptions& options,
-                             const Executor& executor, SurfaceMesh& mesh) {
+HeightFitSummary fit_face_gradients(const Eigen::Matrix2Xd& gradients,
+                                    const HeightFitOptions& options, const Executor& executor,
+                                    SurfaceMesh& mesh) {
   const System system = assemble(mesh, gradients);
   const Eigen::Index n = system.right.size();
   EvenGridPoisson preconditioner(mesh.grid);

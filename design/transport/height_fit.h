@@ -29,7 +29,8 @@ struct HeightFitSummary {
 /// @param mesh  a grid mesh of positive projected areas; its mean height is kept, its heights are
 ///        where the iteration starts.
 /// @throw Interrupted if the executor is stopped; the mesh is then unchanged.
-HeightFitSummary fit_heights(const Eigen::Matrix2Xd& gradients, const HeightFitOptions& options,
-                             const Executor& executor, SurfaceMesh& mesh);
+HeightFitSummary fit_face_gradients(const Eigen::Matrix2Xd& gradients,
+                                    const HeightFitOptions& options, const Executor& executor,
+                                    SurfaceMesh& mesh);
 
 }  // namespace lensforge

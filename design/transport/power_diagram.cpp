@@ -34,7 +34,7 @@ using FaceBase =
 using Structure = CGAL::Triangulation_data_structure_2<VertexBase, FaceBase>;
 using Regular = CGAL::Regular_triangulation_2<Kernel, Structure>;
 
-/// Insertions between two looks at the stop token; about 10 ms.
+/// Insertions between two checks of the stop token; about 10 ms.
 constexpr std::size_t kStopInterval = 4096;
 
 Eigen::Vector2d left_of(const Eigen::Vector2d& v) { return {-v.y(), v.x()}; }

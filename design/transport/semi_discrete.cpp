@@ -307,7 +307,7 @@ TransportResult solve_semi_discrete(const Eigen::Matrix2Xd& sites, const Eigen::
     const bool good = state && result.mass_error <= options.tolerance;
     result.status =
         good ? TransportResult::Status::kConverged : TransportResult::Status::kNotConverged;
-    if (good) result.message = "every cell holds its mass";
+    if (good) result.message = "every cell has its mass";
   } catch (const Interrupted&) {
     result.status = TransportResult::Status::kStopped;
     result.message = "stopped on request";

@@ -6,7 +6,7 @@
 #include <limits>
 #include <utility>
 
-#include "core/optics/image_plane.h"
+#include "core/optics/light_path.h"
 #include "design/flux/flux_image.h"
 #include "design/optics/image_triangle.h"
 #include "design/transport/monge_ampere.h"
@@ -111,14 +111,13 @@ bool in_order(const SurfaceMesh& moved, const SurfaceMesh& before) {
 
 }  // namespace
 
-Eigen::VectorXd favour_dark(const ServedAreas& served) {
+Eigen::VectorXd favour_dark(const ServedAreas& served, const OpticalSetup& setup) {
   const Eigen::Index faces = served.areas.size();
+  const LightPath path(setup);
   Eigen::ArrayXd light(faces);
   for (Eigen::Index f = 0; f < faces; ++f) {
-    const auto corner = [&](int k) -> Eigen::Vector2d {
-      return served.mesh.corner(f, k).head<2>();
-    };
-    light[f] = 0.5 * doubled_area(corner(0), corner(1), corner(2));
+    light[f] =
+        path.intake({served.mesh.corner(f, 0), served.mesh.corner(f, 1), served.mesh.corner(f, 2)});
   }
   const double all = served.areas.sum();
   const Eigen::ArrayXd brightness =

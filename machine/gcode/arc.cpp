@@ -56,7 +56,7 @@ std::string place_centre(Arc& arc, const Eigen::Vector2d& start, const Eigen::Ve
 
 std::string take_offset(Arc& arc, const Eigen::Vector2d& start, const Eigen::Vector2d& end,
                         const ArcRequest& request) {
-  if (request.offset[arc.third] != 0.0) return "the arc's centre lies off its plane";
+  if (request.offset[arc.third] != 0.0) return "the arc's centre is not in its plane";
   const Eigen::Vector2d offset(request.offset[arc.first], request.offset[arc.second]);
   const Eigen::Vector2d centre = start + offset;
   arc.centre[arc.first] = centre.x();

@@ -104,7 +104,7 @@ class LineScanner {
     case '$':
       scanner.refuse("'$': a controller's command, not G-code");
     case '%':
-      scanner.refuse("'%' must stand alone on its line");
+      scanner.refuse("'%' must be alone on its line");
     default:
       scanner.refuse(std::string("'") + sign + "' where a letter is expected");
   }
@@ -115,7 +115,7 @@ int tenths_of(const LineScanner& scanner, const GcodeWord& word) {
   const double rounded = std::round(tenths);
   if (word.value < 0.0 || word.value >= 1000.0 || std::abs(tenths - rounded) > 1e-6) {
     scanner.refuse(std::string(1, word.letter) + " with the number " + std::to_string(word.value) +
-                   ": no such word");
+                   ": unknown word");
   }
   return static_cast<int>(rounded);
 }
@@ -123,7 +123,7 @@ int tenths_of(const LineScanner& scanner, const GcodeWord& word) {
 std::int64_t line_number(const LineScanner& scanner, double value) {
   if (value < 0.0 || value != std::floor(value)) {
     scanner.refuse("N with the number " + std::to_string(value) +
-                   ": line numbers are whole and not negative");
+                   ": line numbers are integers, 0 or above");
   }
   return static_cast<std::int64_t>(value);
 }
@@ -134,14 +134,14 @@ void add_word(LineScanner& scanner, GcodeBlock& block) {
   scanner.skip_blanks();
   word.value = scanner.number(word.letter);
   if (word.letter == 'N') {
-    if (block.number) scanner.refuse("N stands twice");
+    if (block.number) scanner.refuse("N is given twice");
     block.number = line_number(scanner, word.value);
     return;
   }
   if (word.letter == 'G' || word.letter == 'M') {
     word.tenths = tenths_of(scanner, word);
   } else if (block.value(word.letter)) {
-    scanner.refuse(std::string(1, word.letter) + " stands twice");
+    scanner.refuse(std::string(1, word.letter) + " is given twice");
   }
   if (block.words().size() == GcodeBlock::kMostWords) {
     scanner.refuse("more than " + std::to_string(GcodeBlock::kMostWords) + " words");

@@ -4,27 +4,39 @@
 #include "core/error.h"
 
 namespace lensforge {
+namespace {
+
+/// What all of the Grbl family have in common.
+GcodeDialect grbl_family() {
+  GcodeDialect dialect;
+  dialect.max_line_number = 9'999'999;
+  dialect.max_tool = 255;
+  dialect.spindle_limit_setting = 30;
+  return dialect;
+}
+
+}  // namespace
 
 GcodeDialect grbl_dialect() {
-  GcodeDialect dialect;
+  GcodeDialect dialect = grbl_family();
   dialect.name = "grbl";
   dialect.max_characters = 79;
-  dialect.max_line_number = 9'999'999;
   dialect.rx_bytes = 128;
   dialect.planner_blocks = 15;
+  dialect.lines_per_second = 400.0;  // An 8-bit board.
   return dialect;
 }
 
 GcodeDialect grblhal_dialect() {
-  GcodeDialect dialect;
+  GcodeDialect dialect = grbl_family();
   dialect.name = "grblhal";
   dialect.max_characters = 255;
-  dialect.max_line_number = 9'999'999;
   dialect.tool_change = true;
   dialect.mist = true;
   dialect.refuses_after_error = true;
   dialect.rx_bytes = 1024;
   dialect.planner_blocks = 35;
+  dialect.lines_per_second = 4000.0;  // A 32-bit board.
   return dialect;
 }
 
@@ -34,6 +46,7 @@ GcodeDialect linuxcnc_dialect() {
   dialect.max_characters = 255;
   dialect.max_line_number = 99'999;
   dialect.tool_change = true;
+  dialect.max_tool = 99'999;
   dialect.mist = true;
   dialect.planner_blocks = 50;
   dialect.path_blending = true;
@@ -47,6 +60,7 @@ GcodeDialect fanuc_dialect() {
   dialect.max_characters = 255;
   dialect.max_line_number = 99'999'999;
   dialect.tool_change = true;
+  dialect.max_tool = 999;  // T has eight digits, but there are at most 999 offsets for H.
   dialect.mist = true;
   dialect.planner_blocks = 40;
   dialect.contour_control = true;

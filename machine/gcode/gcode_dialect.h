@@ -15,15 +15,19 @@ struct GcodeDialect {
   std::size_t max_characters = 0;    ///< Of a line as sent, compacted, without its end.
   std::int64_t max_line_number = 0;  ///< Largest N word.
   bool tool_change = false;          ///< T and M6.
+  int max_tool = 0;                  ///< Largest number of T, and of H where it is known.
   bool mist = false;                 ///< M7; Grbl has it only where built so ([OPT: says M).
   bool refuses_after_error = false;  ///< Until an empty line, every line is answered by the error.
   std::size_t rx_bytes = 0;          ///< Usual size of the receive buffer.
   int planner_blocks = 0;            ///< Usual number of motions it looks ahead.
-  bool path_blending = false;        ///< G64, with P the tolerance in mm, and G61.1.
-  bool contour_control = false;      ///< G5.1 with Q.
-  bool tool_length = false;          ///< G43 with H.
-  bool program_number = false;       ///< An O word alone on the first line.
-  double dwell_unit = 1.0;           ///< Seconds that G4 P1 waits.
+  double lines_per_second = 0.0;     ///< Short moves a usual board takes in; 0 if it reads files.
+  /// The `$` setting above which an S word is run slower without a word of it; 0 for none.
+  int spindle_limit_setting = 0;
+  bool path_blending = false;    ///< G64, with P the tolerance in mm, and G61.1.
+  bool contour_control = false;  ///< G5.1 with Q.
+  bool tool_length = false;      ///< G43 with H.
+  bool program_number = false;   ///< An O word alone on the first line.
+  double dwell_unit = 1.0;       ///< Seconds that G4 P1 waits.
 };
 
 /// Grbl 1.1: a line buffer of 80 with its end, 128 bytes received, 15 motions planned, no T and M6.

@@ -5,13 +5,13 @@
 #include <string>
 #include <string_view>
 
+#include "core/text/number_text.h"
 #include "machine/gcode/modal_words.h"
 
 namespace lensforge {
 namespace {
 
 constexpr double kMillimetresPerInch = 25.4;
-constexpr double kLargestTool = 255.0;
 
 std::string with_number(const std::string& word, double value) {
   return word + " with the number " + std::to_string(value);
@@ -53,7 +53,7 @@ class BlockRun {
   void check_number() const {
     if (block_.number && *block_.number > dialect_.max_line_number) {
       refuse(std::string("N").append(std::to_string(*block_.number)) + ": " + dialect_.name +
-             " knows none above " + std::to_string(dialect_.max_line_number));
+             " has none above " + std::to_string(dialect_.max_line_number));
     }
   }
 
@@ -61,7 +61,7 @@ class BlockRun {
   bool take_program_number() {
     const auto number = use('O');
     if (!number) return false;
-    if (block_.words().size() > 1) refuse("O stands alone on its line");
+    if (block_.words().size() > 1) refuse("O must be alone on its line");
     if (!(*number >= 1.0) || *number != std::floor(*number)) {
       refuse(with_number("O", *number) + ": programs are numbered from 1");
     }
@@ -90,10 +90,7 @@ class BlockRun {
     if (*word == 490) return;
     const auto offset = use('H');
     if (!offset) refuse("G43 without H");
-    if (*offset < 0.0 || *offset > kLargestTool || *offset != std::floor(*offset)) {
-      refuse(with_number("H", *offset) + ": tool offsets are numbered 0 … 255");
-    }
-    state_.tool_length = static_cast<int>(*offset);
+    state_.tool_length = tool_number('H', *offset);
   }
 
   void set_modes() {
@@ -147,7 +144,7 @@ class BlockRun {
   }
 
   void set_machine() {
-    if (const auto tool = use('T')) set_tool(*tool);
+    if (const auto tool = use('T')) state_.tool = tool_number('T', *tool);
     if (words_[ModalGroup::kToolChange]) effect_.tool_change = state_.tool;
     if (const auto rpm = use('S')) {
       if (*rpm < 0.0) refuse(with_number("S", *rpm) + ": a speed is not negative");
@@ -166,11 +163,12 @@ class BlockRun {
     }
   }
 
-  void set_tool(double tool) {
-    if (tool < 0.0 || tool > kLargestTool || tool != std::floor(tool)) {
-      refuse(with_number("T", tool) + ": tools are numbered 0 … 255");
+  [[nodiscard]] int tool_number(char letter, double value) const {
+    if (value < 0.0 || value > dialect_.max_tool || value != std::floor(value)) {
+      refuse(std::string(1, letter) + shortest_text(value) + ": " + dialect_.name +
+             " numbers tools from 0 to " + std::to_string(dialect_.max_tool));
     }
-    state_.tool = static_cast<int>(tool);
+    return static_cast<int>(value);
   }
 
   [[nodiscard]] bool has_axes() const {
@@ -188,7 +186,7 @@ class BlockRun {
       return false;
     }
     if (special == 280 || special == 300) {
-      if (motion) refuse("G28 and G30 stand without another motion");
+      if (motion) refuse("G28 and G30 must not share a line with another motion");
       return true;
     }
     return find_plain_motion(special == 530, motion.has_value());
@@ -205,7 +203,7 @@ class BlockRun {
       return false;
     }
     if (state_.motion == MotionMode::kNone) refuse("coordinates after G80, without a motion");
-    if (machine_coordinates && is_arc()) refuse("G53 takes G0 and G1 only");
+    if (machine_coordinates && is_arc()) refuse("G53 works with G0 and G1 only");
     return true;
   }
 

@@ -20,7 +20,7 @@ std::string hexadecimal(unsigned char byte) {
 /// Why a byte may not stand in a program, or empty.
 std::string reason_against(unsigned char byte) {
   if (byte == '?' || byte == '!' || byte == '~' || byte == 0x18 || byte >= 0x80) {
-    return "the controller acts on this byte as a realtime command wherever it stands";
+    return "the controller treats this byte as a realtime command anywhere in a line";
   }
   if (byte == 0x00) return "NUL in the text";
   if ((byte < 0x20 && byte != '\t') || byte == 0x7F) return "control byte in the text";

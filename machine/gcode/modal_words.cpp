@@ -138,7 +138,8 @@ ModalWords::ModalWords(const GcodeBlock& block, const GcodeDialect& dialect) {
     if (lacks(dialect, word)) refuse_unknown(block, word, dialect);
     std::optional<int>& slot = words_[static_cast<std::size_t>(*group)];
     if (slot) {
-      throw GcodeError(block.line, word_name(word) + " stands beside another word of its group");
+      throw GcodeError(block.line,
+                       word_name(word) + " shares a line with another word of its modal group");
     }
     slot = word.tenths;
   }

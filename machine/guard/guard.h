@@ -47,7 +47,7 @@ class Guard {
   virtual void spin(double rpm, bool clockwise) = 0;
   /// Asks for a stop; returns at once.
   virtual void stop() = 0;
-  /// Reads whatever is due by the poll intervals and tells where things stand. Never throws for
+  /// Reads whatever is due by the poll intervals and reports the state. Never throws for
   /// what the bus or a device does: that is kFailed and a reason. Bounded in time.
   virtual GuardReport poll() = 0;
   /// Hands over what happened since the last call, oldest first.

@@ -65,8 +65,8 @@ fs::path find_register_map(const std::string& name) {
   if (name.find('/') != std::string::npos || name.ends_with(".toml")) return name;
   const std::vector<std::string> names = shipped_register_maps();
   if (std::find(names.begin(), names.end(), lower) == names.end()) {
-    throw InputError("register map '" + name + "': none of that name; there are " + joined(names) +
-                     ", or give a path to a .toml file");
+    throw InputError("register map '" + name + "': unknown register map; shipped ones are " +
+                     joined(names) + ", or give a path to a .toml file");
   }
   return map_folder() / (lower + ".toml");
 }

@@ -104,7 +104,7 @@ struct BusTransport {
   double connect_timeout = 1.0;      ///< s, TCP.
   double request_gap = 0.01;         ///< s of quiet before a request, at least.
   double late_answer_window = 0.3;   ///< s, RTU: after a time-out the line is left alone this long
-                                     ///< and what comes is thrown away: an RTU answer has no number
+                                     ///< and the answer is discarded: an RTU answer has no number
                                      ///< and a late one would pass for the answer to the next.
   double reconnect_pause = 0.2;      ///< s before the first new connection; doubles ...
   double reconnect_pause_max = 3.0;  ///< ... up to this.

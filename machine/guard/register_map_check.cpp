@@ -128,7 +128,7 @@ class MapCheck {
     }
     if (!written) return;
     refuse(signal.key, address_text(signal.at) +
-                           " is written by spindle.commands: it tells what was asked for, not "
+                           " is written by spindle.commands: it holds the requested value, not "
                            "what is; read the device's own");
   }
 
@@ -151,7 +151,7 @@ class MapCheck {
     const Outcome two = outcome_of(other);
     if (!holds_all(one, two) && !holds_all(two, one)) return;
     refuse("spindle.commands." + name, "leaves the registers as " + other_name +
-                                           " does; the two must differ in a value, as in "
+                                           " does; they must differ in a value, for example "
                                            "machine/guard/maps/generic_plc.toml");
   }
 

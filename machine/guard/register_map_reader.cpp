@@ -53,7 +53,7 @@ ReadSignal read_signal(TomlFields& fields) {
   signal.key = fields.path();
   signal.at = read_address(fields);
   signal.mask = word_or(fields, "mask", is_bit(signal.at) ? 1 : 0xFFFF);
-  if (signal.mask == 0) fields.refuse("mask", "must leave one bit at least");
+  if (signal.mask == 0) fields.refuse("mask", "must have at least one bit set");
   signal.interval = fields.number({"interval", 0.01, 60.0});
   signal.retries = fields.whole({"retries", 0, 100});
   return signal;

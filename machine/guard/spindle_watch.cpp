@@ -72,7 +72,7 @@ std::string SpindleWatch::speed_text() const {
     return read + ": at most " + number_text(map_.stopped_rpm) + " rpm is stopped";
   }
   return read + ": " + number_text(asked_rpm_) + " rpm within " +
-         number_text(100.0 * map_.tolerance) + " % was asked for";
+         number_text(100.0 * map_.tolerance) + " % was requested";
 }
 
 void SpindleWatch::see_speed(double rpm, double now) {
@@ -125,7 +125,7 @@ void SpindleWatch::see_at_speed(bool at_speed, double now) {
 
 std::string SpindleWatch::direction_text() const {
   return std::string("does not turn ") + (clockwise_ ? "clockwise" : "counter-clockwise") +
-         ", which was asked for";
+         ", which was requested";
 }
 
 void SpindleWatch::see_direction(std::uint16_t value, double now) {

@@ -3,7 +3,7 @@
 
 #include <filesystem>
 
-#include "machine/link/descriptor.h"
+#include "core/io/descriptor.h"
 #include "machine/link/port_spec.h"
 
 namespace lensforge {

@@ -30,7 +30,7 @@ PortSpec tcp_spec(std::string_view whole, std::string_view rest) {
   if (colon == std::string_view::npos || colon == 0) refuse(whole, "must read tcp:HOST:PORT");
   const auto number = whole_number(rest.substr(colon + 1));
   if (!number || *number < 1 || *number > kLastTcpPort) {
-    refuse(whole, "the TCP port must be a whole number, 1 to 65535");
+    refuse(whole, "the TCP port must be an integer, 1 to 65535");
   }
   std::string_view host = rest.substr(0, colon);
   const bool bracketed = host.size() > 2 && host.front() == '[' && host.back() == ']';

@@ -87,7 +87,7 @@ Addresses look_up(const PortSpec& spec, const std::stop_token& stop) {
   if (found.error != 0) found = look_up_name(spec, stop);
   if (found.error != 0) {
     throw InputError("--port " + port_name(spec) +
-                     ": no such host: " + ::gai_strerror(found.error));
+                     ": unknown host: " + ::gai_strerror(found.error));
   }
   return std::move(found.list);
 }

@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-#include "machine/link/descriptor.h"
+#include "core/io/descriptor.h"
 #include "machine/link/link.h"
 #include "machine/link/port_lock.h"
 #include "machine/link/port_spec.h"

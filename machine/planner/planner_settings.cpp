@@ -12,7 +12,7 @@ double positive(const std::map<int, double>& settings, int number) {
   const auto found = settings.find(number);
   if (found == settings.end()) {
     throw InputError(std::string("$") + std::to_string(number) +
-                     ": the controller has not told it");
+                     ": the controller did not report it");
   }
   if (!(found->second > 0.0)) {
     throw InputError(std::string("$") + std::to_string(number) + "=" +

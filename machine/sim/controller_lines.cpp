@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Lines: from characters to motions and answers.
 #include <algorithm>
+#include <utility>
 
 #include "machine/sim/sim_text.h"
 #include "machine/sim/simulated_controller.h"
@@ -15,7 +16,7 @@ constexpr std::size_t kHalLine = 256;
 
 /// One step of the firmware's main loop. @return whether anything was done.
 bool SimulatedController::step_parser() {
-  if (suspended() || now_ < busy_until_) return false;
+  if (sim_state::suspended(machine_) || now_ < busy_until_) return false;
   if (!errand_.actions.empty()) return run_action();
   if (errand_.answer) {
     errand_.answer = false;
@@ -31,55 +32,29 @@ bool SimulatedController::step_parser() {
 }
 
 bool SimulatedController::read_characters() {
-  while (rx_read_ < rx_.size()) {
-    const char c = rx_[rx_read_++];
-    if (c != '\n' && c != '\r') {
-      last_end_ = 0;
-      take_character(c);
-      continue;
-    }
-    // grblHAL takes CR LF for one end; Grbl takes the second for an empty line.
-    const bool second = is_hal() && last_end_ != 0 && last_end_ != c;
-    last_end_ = second ? '\0' : c;
-    if (second) continue;
+  const SimIntakeRules rules{is_hal() ? kHalLine : kGrblLine, is_hal()};
+  while (!rx_.empty()) {
+    SimTaken next = taken(std::move(intake_), rx_.bytes[rx_.read++], rules);
+    intake_ = std::move(next.intake);
+    if (!next.ended) continue;
     line_waits_ = true;
-    busy_until_ = now_ + (options_.instant || line_.empty() ? 0.0 : options_.line_seconds);
+    const bool free = options_.instant || intake_.line.empty();
+    busy_until_ = now_ + (free ? 0.0 : options_.line_seconds);
     return true;
   }
   return false;
 }
 
-void SimulatedController::take_character(char c) {
-  if (comment_ != 0) {
-    if (comment_ == '(' && c == ')') comment_ = 0;
-    return;
-  }
-  if (c <= ' ' || c == '/') return;
-  if (c == '(' || c == ';') {
-    comment_ = static_cast<unsigned char>(c);
-    return;
-  }
-  if (line_.size() >= (is_hal() ? kHalLine : kGrblLine)) {
-    line_overflows_ = true;
-    return;
-  }
-  line_ += c >= 'a' && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c;
-}
-
 void SimulatedController::run_line() {
-  std::string line;
-  line.swap(line_);
-  const bool overflows = line_overflows_;
-  line_overflows_ = false;
-  comment_ = 0;
+  const SimIntake came = std::exchange(intake_, SimIntake{{}, false, 0, intake_.last_end});
+  const std::string& line = came.line;
   errand_.received = ++received_;
   errand_.chord = 0;
   int error = 0;
-  if (overflows) {
+  if (came.overflows) {
     error = 11;
   } else if (!line.empty() && line[0] == '$') {
     error = run_system(line);
-
   } else if (!line.empty()) {
     error = run_gcode(line);
   }
@@ -89,14 +64,14 @@ void SimulatedController::run_line() {
 }
 
 int SimulatedController::run_gcode(const std::string& line) {
-  if (state_ == MachineState::kAlarm || state_ == MachineState::kJog) return 9;
+  if (machine_.state == MachineState::kAlarm || machine_.state == MachineState::kJog) return 9;
   if (is_hal() && last_error_ != 0) return last_error_;
   if (scripted_error_ != 0) {
     const int error = scripted_error_;
     scripted_error_ = 0;
     return error;
   }
-  if (state_ == MachineState::kTool) return 40;
+  if (machine_.state == MachineState::kTool) return 40;
   std::vector<SimAction> actions;
   if (const int error = gcode_.run(line, actions); error != 0) return error;
   errand_.actions.assign(actions.begin(), actions.end());
@@ -123,7 +98,7 @@ bool SimulatedController::run_action() {
   const bool stands_first =
       action.kind == SimAction::Kind::kSync || action.kind == SimAction::Kind::kStore;
   if (stands_first && !queue_.empty()) {
-    start_motion();
+    begin_motion();
     return false;
   }
   errand_.actions.pop_front();
@@ -133,7 +108,7 @@ bool SimulatedController::run_action() {
 
 /// What takes no place in the queue.
 void SimulatedController::carry_out(const SimAction& action) {
-  const bool checks = state_ == MachineState::kCheck;
+  const bool checks = machine_.state == MachineState::kCheck;
   switch (action.kind) {
     case SimAction::Kind::kDwell:
       if (!checks) wait(action.value);
@@ -141,16 +116,16 @@ void SimulatedController::carry_out(const SimAction& action) {
     case SimAction::Kind::kSpindle: {
       const double rpm = std::clamp(action.value, settings_[31], settings_[30]);
       if (!checks) set_spindle(action.turn, action.turn == 0 ? 0.0 : rpm);
-      override_countdown_ = 0;
+      countdowns_.overrides = 0;
       break;
     }
     case SimAction::Kind::kCoolant:
       if (!checks) coolant_ = action.turn;
-      override_countdown_ = 0;
+      countdowns_.overrides = 0;
       break;
     case SimAction::Kind::kTool:
       event(numbered("tool ", static_cast<int>(action.value)));
-      if (!checks) state_ = MachineState::kTool;
+      if (!checks) machine_.state = MachineState::kTool;
       break;
     case SimAction::Kind::kPause:
       if (!checks) feed_hold();
@@ -166,17 +141,16 @@ void SimulatedController::carry_out(const SimAction& action) {
 }
 
 void SimulatedController::end_program() {
-  if (state_ != MachineState::kCheck) set_spindle(0, 0.0);
+  if (machine_.state != MachineState::kCheck) set_spindle(0, 0.0);
   coolant_ = 0;
-  feed_override_ = rapid_override_ = spindle_override_ = 100.0;
-  queue_.set_overrides(100.0, 100.0);
+  set_overrides({});
   say("[MSG:Pgm End]\r\n");
   event("end");
 }
 
 bool SimulatedController::queue_move(const SimAction& action) {
   if (queue_.room() == 0) {
-    start_motion();
+    begin_motion();
     return false;
   }
   SimMove move = action.move;
@@ -190,8 +164,7 @@ bool SimulatedController::queue_move(const SimAction& action) {
   if (settings_.on(20) && !move.jog && beyond_travel(move.target)) {
     // The motion that runs comes to its stand first; the line is never answered.
     errand_ = Errand();
-    limit_hit_ = true;
-    critical_ = true;
+    machine_.limit_hit = machine_.critical = true;
     if (!queue_.empty()) queue_.hold();
     return true;
   }
@@ -199,10 +172,10 @@ bool SimulatedController::queue_move(const SimAction& action) {
     errand_.actions.pop_front();
     errand_.chord = 0;
   }
-  if (state_ == MachineState::kCheck) return true;
+  if (machine_.state == MachineState::kCheck) return true;
   queue_.now = now_;
   queue_.push(move);
-  if (move.jog && !queue_.empty()) state_ = MachineState::kJog;
+  if (move.jog && !queue_.empty()) machine_.state = MachineState::kJog;
   if (options_.instant) queue_.finish_now();
   return true;
 }

@@ -13,18 +13,14 @@ void SimulatedController::receive(char byte) {
     return;
   }
   if (realtime(static_cast<unsigned char>(byte))) return;
-  if (rx_read_ == rx_.size() || rx_read_ > 4096) {
-    rx_.erase(0, rx_read_);
-    rx_read_ = 0;
-  }
-  if (rx_.size() - rx_read_ >= options_.rx_bytes) {
+  if (rx_.size() >= options_.rx_bytes) {
     ++lost_;
     if (!losing_now_) event("overrun");
     losing_now_ = true;
     return;
   }
   losing_now_ = false;
-  rx_ += byte;
+  rx_.add(byte);
 }
 
 /// Whether the byte was a command, or is none of the line's business.
@@ -43,11 +39,7 @@ bool SimulatedController::realtime(unsigned char byte) {
       soft_reset();
       return true;
     case 0x84:
-      if (!critical_) {
-        // The command opens no switch: the machine stops as if one had opened and closed.
-        move_door(true);
-        door_open_ = false;
-      }
+      open_and_shut_door();
       return true;
     case 0x85:
       cancel_jog();
@@ -56,36 +48,59 @@ bool SimulatedController::realtime(unsigned char byte) {
       break;
   }
   if (byte < 0x80) return false;
-  if (is_hal() && byte == 0x80) report();
-  if (is_hal() && byte == 0x81) cycle_start();
-  if (is_hal() && byte == 0x82) feed_hold();
-  if (is_hal() && byte == 0x87) {
-    offset_countdown_ = 0;
+  if (is_hal()) hal_command(byte);
+  if (const auto changed = overridden(overrides_, byte)) {
+    set_overrides(*changed);
+    countdowns_.overrides = 0;
+  }
+  return true;
+}
+
+/// The command opens no switch: the machine stops as if one had opened and closed.
+void SimulatedController::open_and_shut_door() {
+  if (machine_.critical) return;
+  move_door(true);
+  machine_.door_open = false;
+}
+
+void SimulatedController::hal_command(unsigned char byte) {
+  if (byte == 0x80) report();
+  if (byte == 0x81) cycle_start();
+  if (byte == 0x82) feed_hold();
+  if (byte == 0x87) {
+    countdowns_.offset = 0;
     report();
   }
-  if (is_hal() && byte == 0xA3) acknowledge_tool();
-  override_command(byte);
-  return true;
+  if (byte == 0xA3) acknowledge_tool();
 }
 
-void SimulatedController::change_override(double& value, double by) {
-  value = by == 0.0 ? 100.0 : std::clamp(value + by, 10.0, 200.0);
+void SimulatedController::report() {
+  // Grbl is silent while it homes and once a limit has locked it.
+  if (!is_hal() && (machine_.critical || machine_.state == MachineState::kHome)) return;
+  const SimReport report = report_of(snapshot(), countdowns_);
+  countdowns_ = report.next;
+  say(report.text);
 }
 
-bool SimulatedController::override_command(unsigned char byte) {
-  constexpr double kSteps[] = {0.0, 10.0, -10.0, 1.0, -1.0};
-  if (byte >= 0x90 && byte <= 0x94) {
-    change_override(feed_override_, kSteps[byte - 0x90]);
-  } else if (byte >= 0x95 && byte <= 0x97) {
-    rapid_override_ = byte == 0x95 ? 100.0 : byte == 0x96 ? 50.0 : 25.0;
-  } else if (byte >= 0x99 && byte <= 0x9D) {
-    change_override(spindle_override_, kSteps[byte - 0x99]);
-  } else {
-    return false;
-  }
-  queue_.set_overrides(feed_override_, rapid_override_);
-  override_countdown_ = 0;
-  return true;
+SimSnapshot SimulatedController::snapshot() const {
+  const bool numbers = options_.line_numbers || is_hal();
+  SimSnapshot seen;
+  seen.state = state_text();
+  seen.rests = machine_.state == MachineState::kIdle || machine_.state == MachineState::kAlarm;
+  seen.mask = static_cast<int>(settings_[10]);
+  seen.inches = settings_.on(13);
+  seen.position = queue_.position();
+  seen.offset = gcode_.offset();
+  seen.free_blocks = queue_.room();
+  seen.free_bytes = options_.rx_bytes - rx_.size();
+  seen.number = numbers && machine_.state != MachineState::kJog ? queue_.number() : 0;
+  seen.speed = queue_.speed();
+  seen.rpm = queue_.rpm;
+  seen.door_open = machine_.door_open;
+  seen.overrides = overrides_;
+  seen.spindle = queue_.spindle;
+  seen.coolant = coolant_;
+  return seen;
 }
 
 }  // namespace lensforge

@@ -33,9 +33,8 @@ int SimulatedController::run_system(const std::string& line) {
   if (line == "$C") return toggle_check();
   if (line == "$X") return unlock();
   if (line.rfind("$J", 0) == 0) return jog(line);
-  const bool idle = state_ == MachineState::kIdle || state_ == MachineState::kAlarm;
-  const bool still = idle && queue_.empty();
-  return still || state_ == MachineState::kTool ? idle_system(line) : 8;
+  const bool taken = sim_state::still(machine_, motion()) || machine_.state == MachineState::kTool;
+  return taken ? idle_system(line) : 8;
 }
 
 int SimulatedController::idle_system(const std::string& line) {
@@ -55,38 +54,35 @@ int SimulatedController::idle_system(const std::string& line) {
 }
 
 int SimulatedController::print_settings() {
-  if (state_ == MachineState::kRun || state_ == MachineState::kHold) return 8;
+  if (machine_.state == MachineState::kRun || machine_.state == MachineState::kHold) return 8;
   say(settings_.text());
   return 0;
 }
 
 int SimulatedController::toggle_check() {
-  if (state_ == MachineState::kCheck) {
+  if (machine_.state == MachineState::kCheck) {
     say("[MSG:Disabled]\r\n");
     reset_after_answer_ = true;
     return 0;
   }
-  if (state_ != MachineState::kIdle || !queue_.empty()) return 8;
-  state_ = MachineState::kCheck;
+  if (machine_.state != MachineState::kIdle || !queue_.empty()) return 8;
+  machine_.state = MachineState::kCheck;
   say("[MSG:Enabled]\r\n");
   return 0;
 }
 
 int SimulatedController::unlock() {
-  if (state_ != MachineState::kAlarm) return 0;
-  if (door_open_) return 13;
+  if (machine_.state != MachineState::kAlarm) return 0;
+  if (machine_.door_open) return 13;
   say("[MSG:Caution: Unlocked]\r\n");
-  alarm_ = 0;
-  state_ = MachineState::kIdle;
+  machine_.alarm = 0;
+  machine_.state = MachineState::kIdle;
   event("unlocked");
   return 0;
 }
 
 int SimulatedController::jog(const std::string& line) {
-  const bool may = (state_ == MachineState::kIdle && queue_.empty()) ||
-                   state_ == MachineState::kJog ||
-                   (state_ == MachineState::kTool && tool_acknowledged_);
-  if (!may) return 8;
+  if (!sim_state::takes_jog(machine_, motion())) return 8;
   if (line.size() < 3 || line[2] != '=') return 16;
   std::vector<SimAction> actions;
   SimGcode before = gcode_;
@@ -102,13 +98,13 @@ int SimulatedController::jog(const std::string& line) {
 /// Z first, then X and Y together, at the search rate; then off the switches and on again slowly.
 int SimulatedController::home() {
   if (!settings_.on(22)) return 5;
-  if (door_open_) return 13;
+  if (machine_.door_open) return 13;
   const Eigen::Vector3d travel = settings_.axes(130);
   const Eigen::Vector3d way = true_position().cwiseAbs().cwiseMin(travel);
   const double search = (way.z() + std::max(way.x(), way.y())) / settings_[25];
   const double locate = 2.0 * 3.0 * settings_[27] / settings_[24];
-  state_ = MachineState::kHome;
-  homing_until_ = options_.instant ? now_ : now_ + 60.0 * (search + locate);
+  machine_.state = MachineState::kHome;
+  machine_.homing_until = options_.instant ? now_ : now_ + 60.0 * (search + locate);
   return -1;
 }
 
@@ -116,7 +112,7 @@ int SimulatedController::sleep() {
   say("[MSG:Sleeping]\r\n");
   set_spindle(0, 0.0);
   answer(0);
-  state_ = MachineState::kSleep;
+  machine_.state = MachineState::kSleep;
   return -1;
 }
 

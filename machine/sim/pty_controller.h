@@ -5,7 +5,7 @@
 #include <string>
 #include <thread>
 
-#include "machine/link/descriptor.h"
+#include "core/io/descriptor.h"
 #include "machine/sim/simulated_options.h"
 
 namespace lensforge {

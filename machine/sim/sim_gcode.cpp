@@ -1,45 +1,39 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "machine/sim/sim_gcode.h"
 
-#include "machine/sim/sim_line.h"
 #include "machine/sim/sim_text.h"
 
 namespace lensforge {
 
-SimGcode::SimGcode(const SimSettings& settings, const SimulatedOptions& options)
-    : settings_(settings), options_(options) {
-  stored_.origins.fill(Eigen::Vector3d::Zero());
+SimLine SimGcode::read(const SimWords& words) const {
+  return {words, group_words(words, options_), settings_[12]};
 }
 
 int SimGcode::run(std::string_view line, std::vector<SimAction>& actions) {
   SimWords words;
   if (const int error = split_words(line, words); error != 0) return error;
-  SimLine run(*this, words);
-  if (const int error = run.run(); error != 0) return error;
-  modes_ = run.modes;
-  stored_ = run.stored;
-  for (SimAction& action : run.actions) actions.push_back(action);
+  const SimLineState after = run_sim_line(read(words), state());
+  if (after.error != 0) return after.error;
+  modes_ = after.modes;
+  stored_ = after.stored;
+  actions.insert(actions.end(), after.actions.begin(), after.actions.end());
   return 0;
 }
 
 int SimGcode::jog(std::string_view line, std::vector<SimAction>& actions) {
   SimWords words;
   if (const int error = split_words(line, words); error != 0) return error;
-  SimLine run(*this, words);
-  if (const int error = run.jog(); error != 0) return error;
-  modes_.position = run.modes.position;
-  for (SimAction& action : run.actions) actions.push_back(action);
+  const SimLineState after = jog_sim_line(read(words), state());
+  if (after.error != 0) return after.error;
+  modes_.position = after.modes.position;
+  actions.insert(actions.end(), after.actions.begin(), after.actions.end());
   return 0;
 }
 
 void SimGcode::reset() {
   const Eigen::Vector3d position = modes_.position;
-  modes_ = Modes();
+  modes_ = SimModes();
   modes_.position = position;
-}
-
-Eigen::Vector3d SimGcode::offset() const {
-  return stored_.origins[static_cast<std::size_t>(modes_.origin)] + modes_.shift;
 }
 
 std::string SimGcode::state_text() const {

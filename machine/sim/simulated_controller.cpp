@@ -9,7 +9,6 @@
 namespace lensforge {
 namespace {
 
-constexpr double kNever = -1.0;
 constexpr double kSpindleRestore = 4.0;  ///< s, after a door (Grbl's SAFETY_DOOR_SPINDLE_DELAY).
 /// A mill whose pulses end at once goes on for about this long: steps are lost.
 constexpr double kCoasting = 0.01;  ///< s
@@ -37,8 +36,8 @@ SimulatedController::SimulatedController(const SimulatedOptions& options, const 
 }
 
 void SimulatedController::power_up() {
-  homed_ = false;
-  state_ = settings_.on(22) ? MachineState::kAlarm : MachineState::kIdle;
+  machine_.homed = false;
+  machine_.state = settings_.on(22) ? MachineState::kAlarm : MachineState::kIdle;
   event("power up");
   restart();
 }
@@ -51,7 +50,7 @@ void SimulatedController::power_cycle() {
   queue_.set_position(Eigen::Vector3d::Zero());
   set_spindle(0, 0.0);
   output_.clear();
-  door_open_ = false;
+  machine_.door_open = false;
   power_up();
 }
 
@@ -60,30 +59,19 @@ void SimulatedController::restart() {
   queue_.clear();
   gcode_.reset();
   gcode_.set_position(queue_.position());
-  rx_.clear();
-  rx_read_ = 0;
-  line_.clear();
-  line_overflows_ = line_waits_ = false;
-  comment_ = 0;
+  rx_ = SimBuffer();
+  intake_ = {{}, false, 0, intake_.last_end};
+  line_waits_ = reset_after_answer_ = false;
   errand_ = saved_errand_ = Errand();
-  tool_acknowledged_ = critical_ = limit_hit_ = reset_after_answer_ = false;
-  stopped_ = true;
+  machine_ = sim_state::restarted(machine_);
   last_error_ = 0;
   busy_until_ = now_;
-  homing_until_ = restoring_until_ = kNever;
-  feed_override_ = rapid_override_ = spindle_override_ = 100.0;
-  queue_.set_overrides(100.0, 100.0);
-  offset_countdown_ = 0;
-  override_countdown_ = 1;
+  set_overrides({});
+  countdowns_ = {};
   coolant_ = 0;
   say(is_hal() ? "\r\nGrblHAL 1.1f ['$' or '$HELP' for help]\r\n"
                : "\r\nGrbl 1.1h ['$' for help]\r\n");
-  if (state_ == MachineState::kAlarm || state_ == MachineState::kSleep) {
-    state_ = MachineState::kAlarm;
-    say("[MSG:'$H'|'$X' to unlock]\r\n");
-    return;
-  }
-  state_ = MachineState::kIdle;
+  if (machine_.state == MachineState::kAlarm) return say("[MSG:'$H'|'$X' to unlock]\r\n");
   run_startup_lines();
 }
 
@@ -103,7 +91,7 @@ double SimulatedController::run_until(double time) {
     work();
     if (output_.size() > said || now_ >= time) return now_;
     double step = time - now_;
-    for (const double timer : {busy_until_, homing_until_, restoring_until_}) {
+    for (const double timer : {busy_until_, machine_.homing_until, machine_.restoring_until}) {
       if (timer > now_) step = std::min(step, timer - now_);
     }
     const double target = now_ + step;
@@ -114,141 +102,121 @@ double SimulatedController::run_until(double time) {
   }
 }
 
-bool SimulatedController::moving() const {
-  const bool runs = state_ == MachineState::kRun || state_ == MachineState::kJog;
-  const bool stops = (state_ == MachineState::kHold || state_ == MachineState::kDoor) && !stopped_;
-  return (runs || stops) && !queue_.empty() && !(queue_.holding() && queue_.stands());
-}
-
-bool SimulatedController::suspended() const {
-  return critical_ || state_ == MachineState::kHold || state_ == MachineState::kDoor ||
-         state_ == MachineState::kSleep || state_ == MachineState::kHome ||
-         (state_ == MachineState::kTool && !tool_acknowledged_);
-}
-
 /// Everything that can happen at this moment.
 void SimulatedController::work() {
   while (settle() || step_parser()) {
   }
   // Nothing more to read: what is queued begins to run.
-  if (rx_read_ == rx_.size() && !line_waits_) start_motion();
+  if (rx_.empty() && !line_waits_) begin_motion();
 }
 
+/// @return whether anything was due.
 bool SimulatedController::settle() {
-  if (settle_timer()) return true;
-  const bool stands = queue_.empty() || (queue_.holding() && queue_.stands());
-  if (!stopped_ && stands) {
-    finish_stop();
-    return true;
+  switch (sim_state::due(machine_, motion(), now_)) {
+    case sim_state::Due::kNothing:
+      return false;
+    case sim_state::Due::kHomed:
+      finish_homing();
+      break;
+    case sim_state::Due::kRestored:
+      resume();
+      break;
+    case sim_state::Due::kStopped:
+      finish_stop();
+      break;
+    case sim_state::Due::kRanOut:
+      machine_ = sim_state::ran_out(machine_);
+      break;
+    case sim_state::Due::kLimit:
+      machine_.limit_hit = false;
+      raise_alarm(2);
+      break;
   }
-  const bool runs = state_ == MachineState::kRun || state_ == MachineState::kJog;
-  if (runs && queue_.empty()) {
-    state_ = tool_acknowledged_ ? MachineState::kTool : MachineState::kIdle;
-    return true;
-  }
-  if (limit_hit_ && stands && state_ != MachineState::kAlarm) {
-    limit_hit_ = false;
-    raise_alarm(2);
-    return true;
-  }
-  return false;
+  return true;
 }
 
-bool SimulatedController::settle_timer() {
-  if (homing_until_ != kNever && now_ >= homing_until_) {
-    finish_homing();
-    return true;
-  }
-  if (restoring_until_ != kNever && now_ >= restoring_until_) {
-    restoring_until_ = kNever;
-    queue_.resume();
-    state_ = queue_.empty() ? MachineState::kIdle : MachineState::kRun;
-    event("resume");
-    return true;
-  }
-  return false;
+void SimulatedController::begin_motion() {
+  const bool waits = machine_.state == MachineState::kIdle && !queue_.empty();
+  if (waits) machine_.state = MachineState::kRun;
 }
 
-void SimulatedController::start_motion() {
-  if (state_ == MachineState::kIdle && !queue_.empty()) state_ = MachineState::kRun;
+void SimulatedController::resume() {
+  queue_.resume();
+  machine_ = sim_state::resumed(machine_, motion());
+  event("resume");
 }
 
-/// Slows down to a stand; `state` is what is shown from now on.
 void SimulatedController::stop_for(MachineState state) {
   const bool moves = moving();
-  if (state_ != MachineState::kHold && state_ != MachineState::kDoor) stopped_ = !moves;
+  machine_ = sim_state::stopping(machine_, state, moves);
   if (moves) queue_.hold();
-  state_ = state;
 }
 
 void SimulatedController::finish_stop() {
-  stopped_ = true;
-  if (state_ == MachineState::kDoor) {
-    door_spindle_ = queue_.spindle;
-    door_rpm_ = queue_.rpm;
+  machine_.stopped = true;
+  if (machine_.state == MachineState::kDoor) {
+    machine_.door_spindle = queue_.spindle;
+    machine_.door_rpm = queue_.rpm;
     set_spindle(0, 0.0);
   }
-  if (state_ == MachineState::kJog) {
+  if (machine_.state == MachineState::kJog) {
     queue_.clear();
     errand_.actions.clear();
     gcode_.set_position(queue_.position());
-    state_ = tool_acknowledged_ ? MachineState::kTool : MachineState::kIdle;
+    machine_ = sim_state::ran_out(machine_);
   }
 }
 
 void SimulatedController::feed_hold() {
-  switch (state_) {
-    case MachineState::kJog:
+  switch (sim_state::on_feed_hold(machine_)) {
+    case sim_state::Hold::kNothing:
+      return;
+    case sim_state::Hold::kCancelJog:
       return cancel_jog();
-    case MachineState::kIdle:
-    case MachineState::kRun:
+    case sim_state::Hold::kStop:
       stop_for(MachineState::kHold);
       return event("hold");
-    default:
-      return;
   }
 }
 
 void SimulatedController::cancel_jog() {
-  if (state_ != MachineState::kJog) return;
+  if (machine_.state != MachineState::kJog) return;
   queue_.hold();
-  stopped_ = false;
+  machine_ = sim_state::cancelling(machine_);
 }
 
 void SimulatedController::cycle_start() {
-  if (state_ == MachineState::kTool) return leave_tool();
-  if (state_ == MachineState::kIdle) return start_motion();
-  const bool door = state_ == MachineState::kDoor && !door_open_;
-  if (!stopped_ || (state_ != MachineState::kHold && !door)) return;
-  if (door && restoring_until_ == kNever) {
-    const bool turns = door_spindle_ != 0 && !options_.instant;
-    set_spindle(door_spindle_, door_rpm_);
-    restoring_until_ = now_ + (turns ? kSpindleRestore : 0.0);
-    return;
+  switch (sim_state::on_cycle_start(machine_)) {
+    case sim_state::Start::kNothing:
+      return;
+    case sim_state::Start::kLeaveTool:
+      return leave_tool();
+    case sim_state::Start::kBegin:
+      return begin_motion();
+    case sim_state::Start::kResume:
+      return resume();
+    case sim_state::Start::kRestoreSpindle:
+      const bool turns = machine_.door_spindle != 0 && !options_.instant;
+      set_spindle(machine_.door_spindle, machine_.door_rpm);
+      machine_.restoring_until = now_ + (turns ? kSpindleRestore : 0.0);
   }
-  if (state_ == MachineState::kDoor) return;
-  queue_.resume();
-  state_ = queue_.empty() ? MachineState::kIdle : MachineState::kRun;
-  event("resume");
 }
 
 void SimulatedController::move_door(bool open) {
-  door_open_ = open;
+  machine_.door_open = open;
   if (!open) return;
   event("door");
-  switch (state_) {
-    case MachineState::kHome:
-      return raise_alarm(7);
-    case MachineState::kAlarm:
-    case MachineState::kCheck:
-    case MachineState::kSleep:
+  switch (sim_state::on_door(machine_)) {
+    case sim_state::Door::kNothing:
       return;
-    default:
+    case sim_state::Door::kAlarm:
+      return raise_alarm(7);
+    case sim_state::Door::kStop:
       say("[MSG:Check Door]\r\n");
-      restoring_until_ = kNever;
-      const bool in_door = state_ == MachineState::kDoor;
+      machine_.restoring_until = SimState::kNever;
+      const bool in_door = machine_.state == MachineState::kDoor;
       stop_for(MachineState::kDoor);
-      if (stopped_ && (!in_door || queue_.spindle != 0)) finish_stop();
+      if (machine_.stopped && (!in_door || queue_.spindle != 0)) finish_stop();
   }
 }
 
@@ -262,13 +230,16 @@ void SimulatedController::set_spindle(int turn, double rpm) {
   queue_.rpm = turn == 0 ? 0.0 : rpm;
 }
 
+void SimulatedController::set_overrides(const SimOverrides& overrides) {
+  overrides_ = overrides;
+  queue_.set_overrides(overrides.feed, overrides.rapid);
+}
+
 void SimulatedController::soft_reset() {
-  const bool homing = state_ == MachineState::kHome;
-  const bool motion = state_ == MachineState::kRun || state_ == MachineState::kJog || !stopped_;
+  const int alarm = sim_state::alarm_of_reset(machine_);
   event("reset");
   set_spindle(0, 0.0);
-  if (homing) return raise_alarm(6);
-  if (motion) return raise_alarm(3);
+  if (alarm != 0) return raise_alarm(alarm);
   restart();
 }
 
@@ -282,22 +253,15 @@ void SimulatedController::raise_alarm(int code) {
   set_spindle(0, 0.0);
   gcode_.stop_spindle();
   errand_ = Errand();
-  homing_until_ = restoring_until_ = kNever;
-  stopped_ = true;
-  state_ = MachineState::kAlarm;
-  alarm_ = code;
+  machine_ = sim_state::alarmed(machine_, code);
   event(numbered("alarm ", code));
   say(numbered("ALARM:", code) + "\r\n");
-  critical_ = code == 1 || code == 2;
-  if (critical_) {
-    say("[MSG:Reset to continue]\r\n");
-  } else {
-    restart();
-  }
+  if (machine_.critical) return say("[MSG:Reset to continue]\r\n");
+  restart();
 }
 
 void SimulatedController::finish_homing() {
-  homing_until_ = kNever;
+  machine_.homing_until = SimState::kNever;
   if (scripted_homing_ != 0) {
     const int alarm = scripted_homing_;
     scripted_homing_ = 0;
@@ -312,9 +276,7 @@ void SimulatedController::finish_homing() {
   queue_.set_position(home);
   gcode_.set_position(home);
   slip_.setZero();
-  homed_ = true;
-  alarm_ = 0;
-  state_ = MachineState::kIdle;
+  machine_ = sim_state::homed(machine_);
   event("homed");
   answer(0);
   run_startup_lines();
@@ -322,23 +284,21 @@ void SimulatedController::finish_homing() {
 
 /// Other lines run beside the tool change until the operator goes on.
 void SimulatedController::acknowledge_tool() {
-  if (state_ != MachineState::kTool || tool_acknowledged_) return;
-  tool_acknowledged_ = true;
+  if (machine_.state != MachineState::kTool || machine_.tool_acknowledged) return;
+  machine_.tool_acknowledged = true;
   saved_errand_ = errand_;
   errand_ = Errand();
-  saved_rx_ = rx_.substr(rx_read_);
-  rx_.clear();
-  rx_read_ = 0;
+  saved_rx_ = rx_.rest();
+  rx_ = SimBuffer();
 }
 
 void SimulatedController::leave_tool() {
-  if (tool_acknowledged_) {
-    tool_acknowledged_ = false;
+  if (machine_.tool_acknowledged) {
+    machine_.tool_acknowledged = false;
     errand_ = saved_errand_;
-    rx_ = saved_rx_;
-    rx_read_ = 0;
+    rx_ = {saved_rx_, 0};
   }
-  state_ = MachineState::kIdle;
+  machine_.state = MachineState::kIdle;
   event("resume");
 }
 

@@ -6,18 +6,17 @@
 #include <cstdint>
 #include <deque>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "machine/sim/sim_gcode.h"
+#include "machine/sim/sim_intake.h"
 #include "machine/sim/sim_queue.h"
+#include "machine/sim/sim_report.h"
 #include "machine/sim/sim_settings.h"
+#include "machine/sim/sim_state.h"
 #include "machine/sim/simulated_options.h"
 
 namespace lensforge {
-
-/// States as reports name them.
-enum class MachineState { kIdle, kRun, kHold, kJog, kAlarm, kDoor, kCheck, kHome, kSleep, kTool };
 
 /// Something that the controller said, and when.
 struct Spoken {
@@ -28,6 +27,9 @@ struct Spoken {
 /// A Grbl 1.1 or grblHAL controller and its mill, in virtual time: receive buffer, realtime
 /// commands, line parser, planner, motion, alarms and reports, as the published documentation of
 /// Grbl 1.1 and grblHAL tells. Memory does not grow with what it runs.
+///
+/// What it decides stands in functions of values: sim_state.h (what its machine does), sim_intake.h
+/// (bytes to lines), sim_line.h (lines to actions) and sim_report.h. This class carries it out.
 ///
 /// It remembers where the mill truly stands beside what the controller believes: a reset in motion,
 /// a hard stop or a power cycle makes the two differ until the next homing.
@@ -62,14 +64,15 @@ class SimulatedController {
   void lose_bytes(int count) { losing_ = count; }
 
   // What can be seen of it.
-  [[nodiscard]] MachineState state() const { return state_; }
-  [[nodiscard]] std::string state_text() const;                                 ///< "Run", "Hold:0"
+  [[nodiscard]] MachineState state() const { return machine_.state; }
+  /// "Run", "Hold:0"
+  [[nodiscard]] std::string state_text() const { return sim_state::text(machine_, is_hal(), now_); }
   [[nodiscard]] Eigen::Vector3d position() const { return queue_.position(); }  ///< As it believes.
   [[nodiscard]] Eigen::Vector3d true_position() const { return queue_.position() + slip_; }
-  [[nodiscard]] bool moving() const;
+  [[nodiscard]] bool moving() const { return sim_state::moving(machine_, motion()); }
   [[nodiscard]] int spindle() const { return queue_.spindle; }
   [[nodiscard]] double rpm() const { return queue_.rpm; }
-  [[nodiscard]] bool homed() const { return homed_; }
+  [[nodiscard]] bool homed() const { return machine_.homed; }
   [[nodiscard]] std::int64_t received_lines() const { return received_; }
   [[nodiscard]] std::int64_t lost_bytes() const { return lost_; }
   [[nodiscard]] const SimSettings& settings() const { return settings_; }
@@ -77,7 +80,7 @@ class SimulatedController {
   void set_origin(int index, const Eigen::Vector3d& origin) { gcode_.set_origin(index, origin); }
 
  private:
-  /// A line on its way: what is left to do, and its answer.
+  /// A line in progress: its remaining work and its answer.
   struct Errand {
     std::deque<SimAction> actions;
     int chord = 0;  ///< Of the first action's arc, next to be queued.
@@ -90,28 +93,34 @@ class SimulatedController {
   void restart();
   void work();
   bool settle();
-  bool settle_timer();
-  void start_motion();
+  void begin_motion();
+  void resume();
   void stop_for(MachineState state);
   void finish_stop();
   void finish_homing();
   void lose_steps();
   void set_spindle(int turn, double rpm);
-  bool realtime(unsigned char byte);
-  bool override_command(unsigned char byte);
-  void change_override(double& value, double by);
-  void cancel_jog();
+  void set_overrides(const SimOverrides& overrides);
   void acknowledge_tool();
   void leave_tool();
   [[nodiscard]] bool is_hal() const { return options_.firmware == SimulatedFirmware::kGrblHal; }
-  [[nodiscard]] bool suspended() const;
+  [[nodiscard]] SimMotion motion() const {
+    return {queue_.empty(), queue_.holding(), queue_.stands()};
+  }
   void event(const std::string& what);
   void say(const std::string& text) { output_.push_back({now_, text}); }
+
+  // Bytes: controller_realtime.cpp
+  bool realtime(unsigned char byte);
+  void hal_command(unsigned char byte);
+  void open_and_shut_door();
+  void cancel_jog();
+  void report();
+  [[nodiscard]] SimSnapshot snapshot() const;
 
   // Lines: controller_lines.cpp
   bool step_parser();
   bool read_characters();
-  void take_character(char c);
   void run_line();
   int run_gcode(const std::string& line);
   bool run_action();
@@ -138,11 +147,6 @@ class SimulatedController {
   void store();
   void print_build();
 
-  // Reports: controller_report.cpp
-  void report();
-  void report_extras(std::string& text);
-  [[nodiscard]] std::string coordinates(const Eigen::Vector3d& point) const;
-
   const SimulatedOptions options_;
   const MachineWatch watch_;
   SimSettings settings_;
@@ -151,47 +155,30 @@ class SimulatedController {
   double now_ = 0.0;
   std::vector<Spoken> output_;
 
-  MachineState state_ = MachineState::kIdle;
-  int alarm_ = 0;          ///< Last one, for grblHAL's reports.
-  bool critical_ = false;  ///< Nothing but a reset helps.
-  bool stopped_ = true;    ///< A hold or a door has come to its stand.
-  bool door_open_ = false;
-  bool limit_hit_ = false;  ///< A line asked for more than the travel: stop, then alarm 2.
-  bool reset_after_answer_ = false;
-  double restoring_until_ = -1.0;  ///< Spindle after a door.
-  double homing_until_ = -1.0;
-  int door_spindle_ = 0;
-  double door_rpm_ = 0.0;
-  bool homed_ = false;
+  SimState machine_;
   int coolant_ = 0;
   Eigen::Vector3d slip_ = Eigen::Vector3d::Zero();  ///< True position − believed position.
+  SimOverrides overrides_;
+  SimCountdowns countdowns_;
 
-  std::string rx_;
-  std::size_t rx_read_ = 0;  ///< Bytes of rx_ that are used up.
-  std::string line_;
-  bool line_overflows_ = false;
-  int comment_ = 0;  ///< Of the line in the making: '(' or ';'.
-  char last_end_ = 0;
+  SimBuffer rx_;
+  SimIntake intake_;
   bool line_waits_ = false;  ///< A whole line is being taken in until busy_until_.
   Errand errand_;
   Errand saved_errand_;  ///< The tool change while other lines run.
   std::string saved_rx_;
-  bool tool_acknowledged_ = false;
+  bool reset_after_answer_ = false;
   double busy_until_ = 0.0;
   double deaf_until_ = 0.0;
   int last_error_ = 0;
+  std::int64_t received_ = 0;
+
+  // What happens to it from outside.
   int scripted_error_ = 0;
   int scripted_homing_ = 0;
   int losing_ = 0;
-  std::int64_t received_ = 0;
   std::int64_t lost_ = 0;
   bool losing_now_ = false;
-
-  double feed_override_ = 100.0;
-  double rapid_override_ = 100.0;
-  double spindle_override_ = 100.0;
-  int offset_countdown_ = 0;    ///< Reports until the next WCO.
-  int override_countdown_ = 1;  ///< Likewise Ov.
 };
 
 }  // namespace lensforge

@@ -39,7 +39,7 @@ std::unique_ptr<Link> SimulatedMachine::open() {
 }
 
 void SimulatedMachine::require_open(std::int64_t opened) const {
-  if (opened != opened_) throw LinkLost("simulated controller: the link is gone");
+  if (opened != opened_) throw LinkLost("simulated controller: the link was closed");
 }
 
 double SimulatedMachine::byte_seconds() const {

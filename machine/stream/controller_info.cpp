@@ -122,7 +122,7 @@ ControllerInfo learn_controller(Dialogue& dialogue, const std::string& banner) {
     if (reply.kind == Reply::Kind::kSetting) take_setting(reply, info);
   }
   if (info.settings.empty()) {
-    throw InputError("the controller tells no settings ($$); is it one of the Grbl family?");
+    throw InputError("the controller reports no settings ($$); is it of the Grbl family?");
   }
   take_origins(dialogue.ask("$#", kAnswerTimeout), info);
   take_status(dialogue.status(), info);

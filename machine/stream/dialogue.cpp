@@ -131,7 +131,7 @@ StatusReport Dialogue::hold(double timeout) {
     if (at_rest(report)) return report;
     pause_until_reply(clock_.now() + kStatusPause);
   }
-  throw StreamFault(StopCause::kStall, "the machine does not come to rest in a feed hold");
+  throw StreamFault(StopCause::kStall, "the machine does not stop in a feed hold");
 }
 
 }  // namespace lensforge

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
 #include <string>
 
 namespace lensforge {
@@ -17,8 +16,5 @@ struct JobIdentity {
     return sha256 == other.sha256 && bytes == other.bytes;
   }
 };
-
-/// Reads the file through, in constant memory. @throw InputError if it cannot be read.
-JobIdentity identify_job(const std::filesystem::path& path);
 
 }  // namespace lensforge

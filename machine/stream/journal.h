@@ -15,7 +15,7 @@
 #include <thread>
 
 #include "core/error.h"
-#include "machine/link/descriptor.h"
+#include "core/io/descriptor.h"
 #include "machine/stream/job_identity.h"
 
 namespace lensforge {

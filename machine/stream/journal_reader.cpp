@@ -45,7 +45,7 @@ class Fields {
     const bool negative = value.is_number_integer() && !value.is_number_unsigned();
     if (!value.is_number_integer() || (negative && value.get<std::int64_t>() < 0) ||
         (!negative && value.get<std::uint64_t>() > static_cast<std::uint64_t>(kMostLines))) {
-      refuse_field(key, "must be a whole number, 0 to " + std::to_string(kMostLines));
+      refuse_field(key, "must be an integer, 0 to " + std::to_string(kMostLines));
     }
     return value.get<std::int64_t>();
   }
@@ -74,7 +74,7 @@ class Fields {
   [[nodiscard]] double number(const json& value, const char* key) const {
     if (!value.is_number()) refuse_field(key, "must be a number");
     const auto number = value.get<double>();
-    if (!(std::abs(number) <= kLargest)) refuse_field(key, "is beyond what any machine does");
+    if (!(std::abs(number) <= kLargest)) refuse_field(key, "is beyond any machine's range");
     return number;
   }
 

@@ -14,9 +14,6 @@ namespace {
 /// Positions are told with three decimals, mm.
 constexpr double kTravelTolerance = 0.001;
 
-/// Lines of short moves that an 8-bit Grbl board takes in, and a 32-bit one of grblHAL, per second.
-constexpr double kGrblLinesPerSecond = 400.0;
-constexpr double kHalLinesPerSecond = 4000.0;
 constexpr double kBitsPerByte = 10.0;
 
 /// Bits of $22 in grblHAL and the letter of $I in Grbl that put the machine's origin at the switch.
@@ -50,7 +47,7 @@ void check_spindle(const ProgramFacts& facts, const ControllerInfo& info, Findin
                              setting_text(30, *most) + " and would clamp it silently");
   }
   if (least && facts.least_rpm < *least) {
-    found.refusals.push_back("the program asks for S" + number(facts.least_rpm) +
+    found.refusals.push_back("the program commands S" + number(facts.least_rpm) +
                              ", but the controller turns at least " + setting_text(31, *least));
   }
   if (info.setting(32).value_or(0.0) == 1.0) {
@@ -91,7 +88,7 @@ void check_state(const ControllerInfo& info, Findings& found) {
   }
   if (homing_on(info) && !travel_box(info)) {
     found.warnings.emplace_back(
-        "the controller tells no travel ($130-$132): where the program moves is not checked");
+        "the controller reports no travel ($130-$132): the program's range is not checked");
   }
   if (!homing_on(info)) {
     found.warnings.emplace_back(
@@ -105,7 +102,8 @@ void check_reports(const ControllerInfo& info, Findings& found) {
   }
   if (!info.line_numbers) {
     found.warnings.push_back(
-        "the controller does not report line numbers (Ln:): what was carried out is only known "
+        "the controller does not report line numbers (Ln:): the last line carried out is only "
+        "known "
         "to " +
         std::to_string(info.planner_blocks + LineTracker::kStepLag + 1) + " motions");
   }
@@ -166,7 +164,7 @@ void check_spindle_range(const ProgramFacts& facts, const std::vector<RegisterMa
     const double most = map.spindle->rpm_max;
     if (facts.least_rpm >= least && facts.top_rpm <= most) continue;
     const double wrong = facts.top_rpm > most ? facts.top_rpm : facts.least_rpm;
-    found.refusals.push_back("the program asks for S" + number(wrong) + ", but the register map " +
+    found.refusals.push_back("the program commands S" + number(wrong) + ", but the register map " +
                              map.name + " turns at " + number(least) + " to " + number(most) +
                              " rpm");
   }
@@ -174,18 +172,18 @@ void check_spindle_range(const ProgramFacts& facts, const std::vector<RegisterMa
 
 std::string lack_of_motion(const ProgramFacts& facts) {
   if (facts.motions > 0) return {};
-  const std::string advice = "; send a program that moves, such as cam writes";
+  const std::string advice = "; send a program with motion, such as one that cam wrote";
   if (facts.lines == 0) return "is empty" + advice;
   const std::string lines = "its " + std::to_string(facts.lines) + " lines";
   if (facts.sent_lines == 0) return lines + " hold no command" + advice;
   return lines + (facts.ends ? " up to its end (M2, M30 or %)" : "") +
-         " move nothing: none has G0, G1, G2 or G3 with X, Y or Z" + advice;
+         " contain no motion: none has G0, G1, G2 or G3 with X, Y or Z" + advice;
 }
 
 StreamRate stream_rate(const ControllerInfo& info, int baud, double round_trip, double mean_bytes) {
   StreamRate rate;
   if (baud > 0) rate.bytes_per_second = baud / kBitsPerByte;
-  rate.lines_per_second = info.dialect.name == "grbl" ? kGrblLinesPerSecond : kHalLinesPerSecond;
+  rate.lines_per_second = info.dialect.lines_per_second;
   if (round_trip > 0.0) {
     const double transfer = baud > 0 ? mean_bytes / rate.bytes_per_second : 0.0;
     rate.lines_per_second = std::min(rate.lines_per_second, 1.0 / (round_trip + transfer));

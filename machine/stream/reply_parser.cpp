@@ -120,20 +120,4 @@ void ReplyReader::feed(std::string_view bytes, const std::function<void(const Re
   }
 }
 
-std::int64_t fuzz_replies(const std::uint8_t* data, std::size_t size) {
-  const std::string bytes(data, data + size);
-  ReplyReader reader;
-  std::int64_t count = 0;
-  reader.feed(bytes, [&](const Reply& reply) {
-    ++count;
-    const bool coded = reply.kind == Reply::Kind::kError || reply.kind == Reply::Kind::kAlarm;
-    LF_CHECK(reply.text.size() <= ReplyReader::kLongestLine, reply.text);
-    LF_CHECK(coded == (reply.code != 0), reply.text);
-    LF_CHECK((reply.kind == Reply::Kind::kStatus) == reply.status.has_value(), reply.text);
-    LF_CHECK((reply.kind == Reply::Kind::kOk) == (reply.text == "ok"), reply.text);
-  });
-  LF_CHECK(count == std::count(bytes.begin(), bytes.end(), '\n'), std::to_string(count));
-  return count;
-}
-
 }  // namespace lensforge

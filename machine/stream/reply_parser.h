@@ -45,7 +45,7 @@ class ReplyReader {
   /// Longer lines, which no controller sends, come out as kUnknown, cut here.
   static constexpr std::size_t kLongestLine = 1024;
 
-  /// Hands every line that `bytes` complete to `take`, in order. Keeps what is left.
+  /// Hands every line that `bytes` complete to `take`, in order. Keeps the remaining bytes.
   void feed(std::string_view bytes, const std::function<void(const Reply&)>& take);
   /// Drops the line that has begun.
   void clear() { line_.clear(); }
@@ -54,9 +54,5 @@ class ReplyReader {
   std::string line_;
   bool too_long_ = false;
 };
-
-/// Runs any bytes through ReplyReader, for fuzzers and tests. Aborts (LF_CHECK) where a reply
-/// contradicts what is promised above. @return how many replies came out.
-std::int64_t fuzz_replies(const std::uint8_t* data, std::size_t size);
 
 }  // namespace lensforge

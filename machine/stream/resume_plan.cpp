@@ -108,7 +108,7 @@ void require_same_place(const JournalRecord& record, const ControllerInfo& info)
     if ((was - is).cwiseAbs().maxCoeff() <= kOriginTolerance) continue;
     throw InputError("G" + std::to_string(54 + i) + " began at " + point_text(was) +
                      " when the job was begun and begins at " + point_text(is) +
-                     " now: the part would be cut in another place");
+                     " now: the part would be cut at another place");
   }
 }
 
@@ -120,9 +120,9 @@ void require_below_retract(const Entry& entry) {
        ramp_points(entry.path, entry.options.ramp, entry.options.lift)) {
     if (at.z() <= retract) continue;
     throw InputError("lift " + trimmed_decimal(entry.options.lift, 3) +
-                     " mm: the tool would begin at machine Z" + trimmed_decimal(at.z(), 3) +
+                     " mm: the tool would start at machine Z" + trimmed_decimal(at.z(), 3) +
                      ", above the retract height Z" + trimmed_decimal(retract, 3) +
-                     "; a lower lift would do");
+                     "; use a lower lift");
   }
 }
 
@@ -131,7 +131,7 @@ void require_below_retract(const Entry& entry) {
 ResumePlan plan_resume(std::istream& program, const JournalRecord& record,
                        const ControllerInfo& info, const ProgramFacts& facts,
                        const ResumeOptions& options) {
-  if (record.finished) throw InputError("the job came to its end; there is nothing to resume");
+  if (record.finished) throw InputError("the job was finished; nothing to resume");
   require_same_place(record, info);
   const std::int64_t last = std::max<std::int64_t>(record.last.executed - options.margin, 0);
   History history = read_history(program, last, info);

@@ -11,10 +11,8 @@
 #include "machine/guard/guard.h"
 #include "machine/link/clock.h"
 #include "machine/link/link.h"
-#include "machine/stream/buffer_audit.h"
 #include "machine/stream/controller_info.h"
 #include "machine/stream/journal.h"
-#include "machine/stream/line_tracker.h"
 #include "machine/stream/program_feed.h"
 #include "machine/stream/stream_fault.h"
 #include "machine/stream/wire.h"
@@ -82,7 +80,7 @@ struct SendControl {
 };
 
 enum class SendStatus {
-  kDone,         ///< The program came to its end and the machine stands still.
+  kDone,         ///< The program came to its end and the machine has stopped.
   kInterrupted,  ///< Somebody asked for the end: held, then reset.
   kFault,        ///< Held, see the cause.
 };
@@ -116,92 +114,20 @@ struct SenderParts {
 /// of the program leaves, a feed hold does, the spindle stays as it is, and the journal says why.
 class Sender {
  public:
+  /// @param info  must outlive the sender. @param first_line  every line before it counts as done.
   Sender(const SenderParts& parts, const ControllerInfo& info, const SenderOptions& options,
-         std::int64_t first_line);
+         std::int64_t first_line)
+      : parts_(parts), info_(info), options_(options), first_line_(first_line) {}
 
   /// Streams all that `feed` gives. Never throws for what happens on the link, at the spindle, on
   /// the disk or in the program.
   SendResult run(ProgramFeed& feed, const SendControl& control);
 
  private:
-  enum class Phase {
-    kStreaming,
-    kAnswer,   ///< A barrier line is on its way.
-    kSpindle,  ///< It was taken; the spindle is to be verified.
-    kEnding,   ///< Nothing is left to send.
-    kDone,
-  };
-
-  // sender.cpp: what leaves.
-  void step();
-  void fill();
-  [[nodiscard]] bool room_for(const OutgoingLine& line) const;
-  [[nodiscard]] bool drained() const;
-  void hand_over();
-  void obey_operator();
-  void obey(OperatorKey key);
-  [[nodiscard]] double wait_time() const;
-  void ask_status();
-
-  // sender_watch.cpp: what comes in, and what should.
-  void take(const Reply& reply);
-  void take_ok();
-  void take_status(const StatusReport& report);
-  void judge_state(const StatusReport& report);
-  void take_overrides(const StatusReport& report);
-  void go_on();
-  void pass_barrier();
-  void command_spindle();
-  void watch_guard();
-  void take_guard_records();
-  void verify_spindle();
-  void watch_for_stall();
-  void note(const std::string& text);
-  void tell(SendEventKind kind, const std::string& message);
-  [[nodiscard]] JobProgress progress() const;
-
-  // sender_end.cpp: how it ends.
-  SendResult end(SendStatus status, StopCause cause, std::string reason);
-  SendResult stop_for(StopCause cause, std::string reason);
-  void hold(StopCause cause, const std::string& reason);
-  void wait_for_banner();
-  void take_while_stopping(const Reply& reply);
-
-  Wire& wire_;
-  Clock& clock_;
-  Guard* guard_;
-  Journal* journal_;
+  SenderParts parts_;
   const ControllerInfo& info_;
   SenderOptions options_;
-  LineTracker tracker_;
-  BufferAudit audit_;
-  ProgramFeed* feed_ = nullptr;
-  const SendControl* control_ = nullptr;
-
-  Phase phase_ = Phase::kStreaming;
-  std::optional<OutgoingLine> next_;
-  OutgoingLine barrier_;
-  bool held_ = false;              ///< The controller is in a hold that we do not wait out.
-  bool held_by_operator_ = false;  ///< … because the operator asked for it here.
-  double held_since_ = 0.0;
-
-  SpindleOrder spindle_;  ///< Asked for.
-  bool verified_ = true;  ///< It does what was asked for.
-  double spindle_since_ = 0.0;
-  GuardReport guarded_;
-  double guard_due_ = 0.0;
-  bool guard_ready_ = false;  ///< Every interlock was read and found as it should be.
-
-  StatusReport report_;
-  int idle_reports_ = 0;  ///< In a row, asked for after the last line was sent or taken.
-  double status_due_ = 0.0;
-  std::optional<double> asked_since_;  ///< A ? is unanswered.
-  bool stale_ = false;  ///< The report under way was asked for before a line moved on.
-  double progress_at_ = 0.0;
-  std::optional<Eigen::Vector3d> position_;
-  double started_ = 0.0;
-  bool at_rest_ = false;
-  bool banner_seen_ = false;
+  std::int64_t first_line_;
 };
 
 }  // namespace lensforge

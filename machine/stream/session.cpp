@@ -13,6 +13,7 @@ namespace {
 
 constexpr double kAnswerTimeout = 5.0;
 constexpr double kCheckTimeout = 10.0;
+constexpr double kLeaveTimeout = 5.0;  ///< A reset is repeated in it, see Dialogue::reset().
 constexpr std::int64_t kLinesBetweenReports = 256;
 
 /// What must be so before a reset: nothing moves, and it is ours to take over.
@@ -26,7 +27,7 @@ void require_rest(Dialogue& dialogue, const StatusReport& report, bool resume) {
   if (free) return;
   if (!resume) {
     throw InputError("the controller is in state " + std::string(state_name(report.state)) +
-                     ": end what it does, or continue a job with --resume");
+                     ": let it finish, or continue a job with --resume");
   }
   dialogue.hold();
 }
@@ -44,6 +45,40 @@ void home_machine(Dialogue& dialogue, Wire& wire, double timeout) {
     throw StreamFault(fault.cause(), std::string(fault.what()) +
                                          " while homing: the controller was reset, home it again");
   }
+}
+
+/// In check mode a controller takes every program and moves nothing. A soft reset leaves that mode
+/// at any time, with half a line received or a line under way too; $C would need an idle parser.
+/// An interruption does not cut this short: it takes a reply, or kLeaveTimeout.
+void leave_check_mode(Wire& wire, Clock& clock) {
+  try {
+    Dialogue(wire, clock, {}).reset(kLeaveTimeout);
+  } catch (const StreamFault& fault) {
+    throw StreamFault(fault.cause(), std::string(fault.what()) +
+                                         "; it may still be in check mode ($C), where it moves "
+                                         "nothing: reset it before the next job");
+  }
+}
+
+std::int64_t check_lines(Dialogue& dialogue, std::istream& program, const ControllerInfo& info,
+                         const RunControl& control) {
+  FeedOptions options;
+  options.dialect = info.dialect;
+  options.start = info.start;
+  ProgramFeed feed(program, options);
+  std::int64_t checked = 0;
+  while (const std::optional<OutgoingLine> line = feed.next()) {
+    try {
+      dialogue.ask(line->text, kCheckTimeout);
+    } catch (const StreamFault& fault) {
+      throw StreamFault(fault.cause(), "line " + std::to_string(line->line) + ": " + fault.what());
+    }
+    if (++checked % kLinesBetweenReports == 0) {
+      control.report({"checking on the controller", static_cast<double>(line->next_offset), 0.0,
+                      "line " + std::to_string(line->line)});
+    }
+  }
+  return checked;
 }
 
 }  // namespace
@@ -75,24 +110,17 @@ double measure_round_trip(Wire& wire, Clock& clock, const std::stop_token& stop)
 std::int64_t check_on_controller(Wire& wire, Clock& clock, std::istream& program,
                                  const ControllerInfo& info, const RunControl& control) {
   Dialogue dialogue(wire, clock, control.stop_token());
-  dialogue.ask("$C", kAnswerTimeout);
-  FeedOptions options;
-  options.dialect = info.dialect;
-  options.start = info.start;
-  ProgramFeed feed(program, options);
   std::int64_t checked = 0;
-  while (const std::optional<OutgoingLine> line = feed.next()) {
-    try {
-      dialogue.ask(line->text, kCheckTimeout);
-    } catch (const StreamFault& fault) {
-      throw StreamFault(fault.cause(), "line " + std::to_string(line->line) + ": " + fault.what());
-    }
-    if (++checked % kLinesBetweenReports == 0) {
-      control.report({"checking on the controller", static_cast<double>(line->next_offset), 0.0,
-                      "line " + std::to_string(line->line)});
-    }
+  try {
+    dialogue.ask("$C", kAnswerTimeout);
+    checked = check_lines(dialogue, program, info, control);
+  } catch (const LinkLost&) {
+    throw;
+  } catch (...) {
+    leave_check_mode(wire, clock);
+    throw;
   }
-  dialogue.reset();
+  leave_check_mode(wire, clock);
   return checked;
 }
 

@@ -27,8 +27,10 @@ ControllerInfo open_session(Wire& wire, Clock& clock, const SessionOptions& opti
 /// Seconds from a line to its ok: the middle one of several empty lines. @throw StreamFault
 double measure_round_trip(Wire& wire, Clock& clock, const std::stop_token& stop);
 
-/// Lets the controller check every line without moving ($C). Its state is as after a reset then.
-/// @return lines checked. @throw StreamFault naming the line; GcodeError; Interrupted
+/// Lets the controller check every line without moving ($C). It is out of check mode and as after a
+/// reset then, however the check ends.
+/// @return lines checked. @throw StreamFault naming the line, or what does not answer; GcodeError;
+///         LinkLost, after which it may still be in check mode
 std::int64_t check_on_controller(Wire& wire, Clock& clock, std::istream& program,
                                  const ControllerInfo& info, const RunControl& control);
 

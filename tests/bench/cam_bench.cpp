@@ -22,7 +22,7 @@ using bench::cpu_seconds;
 using bench::peak_megabytes;
 using Clock = std::chrono::steady_clock;
 
-/// Prints what passed since it was told last, under the name of the stage that was told.
+/// Prints the time since the last report, under the name of the stage that it reported.
 class StageClock {
  public:
   void tell(const std::string& stage) {
@@ -58,7 +58,8 @@ int run(const std::vector<std::string>& words) {
   const Executor executor =
       Executor::cpu(words.size() > 2 ? std::stoi(words[2]) : 0).with_profile(&profile);
   CamOptions options;
-  if (words.size() > 3 && words[3] == "facet") options.surface = SurfaceModel::kFacet;
+  const bool facet = words.size() > 3 && words[3] == "facet";
+  options.surface = facet ? SurfaceModel::kFacet : SurfaceModel::kSmooth;
   const RunControl control({}, [&](const Progress& progress) { clock.tell(progress.stage); });
   const CamResult result = make_cut(lens, options, words[1], executor, control);
   clock.tell("all");

@@ -39,7 +39,7 @@ RasterPlan strip_plan(double width, bool arcs) {
   return plan_finish_raster(strip, kRadius, options);
 }
 
-/// Gouge, excess and peak memory are what was reached, not what is allowed.
+/// Gouge, excess and peak memory are measured values, not limits.
 void tell(const RasterSummary& summary, const SurfaceDeviation& deviation, double seconds,
           benchmark::State& state) {
   state.counters["cpu_s"] = seconds;
@@ -69,7 +69,7 @@ void FinishFacets(benchmark::State& state) {
   const SurfaceMesh& mesh = lens_mesh(state.range(0));
   for (auto _ : state) {
     const double start = bench::cpu_seconds();
-    const FacetSurface surface(mesh, kRadius, executor);
+    const FacetCutSurface surface(mesh, kRadius, executor);
     const RasterSummary summary = cut_strip(surface, state, executor);
     tell(summary, surface.deviation(), bench::cpu_seconds() - start, state);
   }

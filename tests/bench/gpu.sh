@@ -2,12 +2,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Everything about the GPU path in one go: builds, checks, times, prints one table. Under 8 minutes.
 #
-#   gpu.sh [run]      on a machine with a GPU. Builds first where the packages for that are there,
-#                     else takes the programs that gpu.sh pack has made.
+#   gpu.sh [run]      on a machine with a GPU. Builds first if the packages for that are installed,
+#                     otherwise runs the programs that gpu.sh pack has made.
 #   gpu.sh pack       builds on any machine with nvcc, and puts the programs with their libraries
-#                     into build/gpu/pack, to be taken along to a machine that has only a GPU.
+#                     into build/gpu/pack, to be copied to a machine that only has a GPU.
 #
-# ARCHITECTURES (default 90, an H100) is what is built for; OUT takes the logs (build/gpu/out).
+# ARCHITECTURES lists the GPUs to build for (default 90, an H100); logs go to OUT (build/gpu/out).
 # Never changes a setting of the GPU. Exit code 0 only if everything ran and passed.
 set -uo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.." || exit 1
@@ -52,8 +52,8 @@ build() {
     ninja -C "$BUILD" "${TARGETS[@]}" >"$BUILD/build.log" 2>&1
 }
 
-# The programs with every library that they need, but for what each machine has its own of: the
-# compiler's, the C library's and CUDA's.
+# The programs with every library that they need, except those that each machine has: the compiler's,
+# the C library's and CUDA's.
 pack() {
   build || { say "cannot build; see $BUILD/configure.log and $BUILD/build.log"; exit 1; }
   rm -rf "$PACK"
@@ -80,7 +80,7 @@ find_programs() {
   fi
 }
 
-# cuFFT may lie in CUDA's folder or in a Python package.
+# cuFFT may be in CUDA's folder or in a Python package.
 find_cufft() {
   ! ldd "$tests" | grep 'libcufft' | grep -q 'not found' && return
   local place
@@ -98,7 +98,7 @@ find_cufft() {
 
 # --- checking ------------------------------------------------------------------------------------
 
-# Parity with the CPU, on a real GPU: a test that skips itself has not passed.
+# Parity with the CPU, on a real GPU: a skipped test counts as failed.
 check_parity() {
   check parity 120 "$tests" --gtest_filter='Cuda*:EmulatedGpu*'
   ! grep -q 'SKIPPED' "$OUT/parity.log" || fail "parity: tests were skipped"

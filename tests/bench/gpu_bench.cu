@@ -19,7 +19,7 @@
 #include "core/compute/gpu.h"
 #include "design/design_lens.h"
 #include "design/energy/objective_cuda.h"
-#include "design/guided_optimization.h"
+#include "design/schedule/guided_optimization.h"
 #include "fixtures/scenes.h"
 
 namespace lensforge::bench {
@@ -165,7 +165,8 @@ void design(const Image& picture, const char* name) {
   std::printf(
       "design %s %d^2: %.1f s, of which %.1f s in %d rendering-guided iterations, "
       "facet MAE %.5f\n",
-      name, picture.columns(), seconds, rendering, iterations, result.lens.facet_metrics.mae);
+      name, picture.columns(), seconds, rendering, iterations,
+      result.lens.metrics.at(SurfaceModel::kFacet).mae);
 }
 
 void run_all() {

@@ -10,7 +10,7 @@
 
 #include "bench/gpu_transport.h"
 #include "bench/lens_scene.h"
-#include "design/face_transport.h"
+#include "design/schedule/face_transport.h"
 #include "design/transport/cell_kernels.h"
 #include "design/transport/cell_stage.h"
 #include "design/transport/density_blur.h"

@@ -6,8 +6,8 @@
 
 #include "core/image/image.h"
 #include "core/optics/optical_setup.h"
+#include "core/surface/grid_mesh.h"
 #include "core/surface/surface_mesh.h"
-#include "design/grid_mesh.h"
 
 namespace lensforge::bench {
 

@@ -13,7 +13,6 @@ using ::testing::Not;
 RowChoice small_choice() {
   RowChoice choice;
   choice.fixtures = "pictures";
-  choice.photographs = "nowhere";
   return choice;
 }
 

@@ -136,7 +136,7 @@ class RowRun {
       return false;
     }
     result_.lens = read_json(folder_ / lens_file::kJson);
-    // The program's own clock goes on where a resumed design was interrupted.
+    // The program's own clock continues from where a resumed design was interrupted.
     result_.wall_seconds =
         std::max(child.wall_seconds, result_.lens["provenance"]["seconds"].get<double>());
     result_.cpu_seconds = child.cpu_seconds;

@@ -52,18 +52,14 @@ std::vector<PaperRow> smooth_rows(const RowChoice& choice) {
     made.name = "smooth-" + name;
     return made;
   };
-  return {row("camera", in(choice.photographs, "camera.png")),
+  return {row("lake", in(choice.fixtures, "lake.png")),
           row("logo", in(choice.fixtures, "logo.png")),
           row("portrait", in(choice.fixtures, "portrait.png"))};
 }
 
+/// A picture with the statistics of a photograph.
 std::vector<PaperRow> photographs(const RowChoice& choice) {
-  std::vector<PaperRow> rows;
-  for (const char* file : {"camera.png", "rocket.jpg", "text.png"}) {
-    const std::string name = std::filesystem::path(file).stem().string();
-    rows.push_back(make_row(RowGroup::kPhotograph, name, in(choice.photographs, file), 256, {}));
-  }
-  return rows;
+  return {make_row(RowGroup::kPhotograph, "lake", in(choice.fixtures, "lake.png"), 256, {})};
 }
 
 struct Variant {
@@ -87,11 +83,8 @@ const std::vector<Variant>& variants() {
 }
 
 std::vector<PaperRow> ablation(const RowChoice& choice) {
-  const std::string photograph = in(choice.photographs, "camera.png");
-  const bool there = std::filesystem::exists(photograph);
   const std::vector<std::pair<std::string, std::string>> pictures = {
-      {"logo", in(choice.fixtures, "logo.png")},
-      {there ? "camera" : "portrait", there ? photograph : in(choice.fixtures, "portrait.png")}};
+      {"logo", in(choice.fixtures, "logo.png")}, {"lake", in(choice.fixtures, "lake.png")}};
   std::vector<PaperRow> rows;
   for (const auto& [title, picture] : pictures) {
     for (const Variant& variant : variants()) {

@@ -36,7 +36,6 @@ struct PaperRow {
 /// Where the pictures lie and how far to shrink the work.
 struct RowChoice {
   std::string fixtures;                   ///< Folder of the generated pictures.
-  std::string photographs;                ///< Folder of camera.png, rocket.jpg and text.png.
   int most_pixels = 0;                    ///< Longer sides are cut to this; 0 leaves them.
   int ablation_pixels = 256;              ///< Longer side of the ablation's pictures.
   std::vector<std::string> only;          ///< Keep rows whose name contains one of these; or all.

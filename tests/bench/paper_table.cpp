@@ -22,7 +22,6 @@ constexpr std::string_view kMark = "--";  ///< After it come options of `lensfor
 struct Arguments {
   RowChoice choice;
   std::string out = LENSFORGE_PAPER_OUT;
-  std::string photographs = "../shared/targets";
   std::int64_t rays = 0;
   bool list = false;
 };
@@ -40,9 +39,6 @@ void add_options(CLI::App& app, Arguments& arguments) {
                  "longer side of the ablation's pictures")
       ->check(CLI::Range(4, 16384))
       ->capture_default_str();
-  app.add_option("--photographs", arguments.photographs,
-                 "folder of camera.png, rocket.jpg and text.png")
-      ->capture_default_str();
   app.add_option("--rays", arguments.rays, "rays of each ray trace; as ray_trace unless given")
       ->check(CLI::PositiveNumber);
   app.add_flag("--list", arguments.list, "print the rows' names and end");
@@ -52,7 +48,6 @@ void add_options(CLI::App& app, Arguments& arguments) {
 
 void run(Arguments& arguments) {
   arguments.choice.fixtures = LENSFORGE_PICTURES;
-  arguments.choice.photographs = arguments.photographs;
   const std::vector<PaperRow> rows = choose_rows(arguments.choice);
   if (arguments.list) {
     for (const PaperRow& row : rows) std::printf("%s\n", row.name.c_str());

@@ -67,8 +67,7 @@ void run(Arguments& arguments) {
   if (arguments.json) {
     print_json(result, lens);
   } else {
-    const bool facet = trace.model == SurfaceModel::kFacet;
-    print(result, facet ? lens.facet_metrics : lens.smooth_metrics);
+    print(result, lens.metrics.at(trace.model));
   }
   if (!arguments.out.empty()) write_image(result.render, arguments.out);
 }

@@ -9,15 +9,14 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <filesystem>
 #include <memory>
 #include <vector>
 
-#include "core/image/image_io.h"
 #include "design/transport/cell_stage.h"
 #include "design/transport/density_blur.h"
 #include "design/transport/semi_discrete.h"
 #include "design/transport_scenes.h"
+#include "fixtures/scenes.h"
 
 namespace lensforge::bench {
 namespace {
@@ -68,14 +67,8 @@ void transport(benchmark::State& state, const Image& picture) {
 
 void transport_even(benchmark::State& state) { transport(state, Image(kPixels, kPixels, 0.5F)); }
 
-void transport_photograph(benchmark::State& state) {
-  const std::filesystem::path file = std::filesystem::path(LENSFORGE_TARGETS) / "camera.png";
-  if (!std::filesystem::exists(file)) {
-    state.SkipWithError("the photograph is not there");
-    return;
-  }
-  transport(state, resample(read_image(file).image, kPixels, kPixels));
-}
+/// A picture with a photograph's statistics.
+void transport_lake(benchmark::State& state) { transport(state, fixtures::draw_lake(kPixels)); }
 
 void transport_logo(benchmark::State& state) { transport(state, testing::logo_picture(kPixels)); }
 
@@ -146,7 +139,7 @@ BENCHMARK(step_masses)->Apply(in_milliseconds);
 BENCHMARK(step_moments)->Apply(in_milliseconds);
 BENCHMARK(step_direction)->Apply(in_milliseconds);
 BENCHMARK(transport_even)->Apply(sizes);
-BENCHMARK(transport_photograph)->Apply(sizes);
+BENCHMARK(transport_lake)->Apply(sizes);
 BENCHMARK(transport_logo)->Apply(sizes);
 
 }  // namespace

@@ -42,6 +42,16 @@ CamOptions programs_only() {
   return options;
 }
 
+/// A built-in post as a user copies and renames it.
+PostDescription post_of_a_user(const std::string& copied) {
+  const TempFolder folder;
+  std::string text = read_bytes(std::string(LENSFORGE_POSTS) + "/" + copied + ".toml");
+  const std::string name = "name = \"" + copied + "\"";
+  text.replace(text.find(name), name.size(), "name = \"router in the shed\"");
+  lensforge::testing::write_bytes(folder / "mine.toml", text);
+  return find_post((folder / "mine.toml").string(), "--post");
+}
+
 CamResult run(const Lens& lens, const CamOptions& options, const TempFolder& folder,
               const RunControl& control = {}) {
   return make_cut(lens, options, folder.path(), Executor::cpu(2), control);
@@ -275,8 +285,9 @@ TEST(CamJob, WarnsOfWhatAnOperatorShouldQuestion) {
   Lens plate = small_lens();
   plate.surface.vertices.row(2).setConstant(6.0);
   EXPECT_THAT(run(plate, options, folder).report.warnings, ::testing::IsEmpty());
-  options.post = find_post("grbl", "--post");
-  EXPECT_THAT(run(plate, options, folder).report.warnings, ::testing::Contains(HasSubstr("$30")));
+  options.post = post_of_a_user("grbl");
+  EXPECT_THAT(run(plate, options, folder).report.warnings,
+              ::testing::Contains(HasSubstr("$30, silently: set it to at least 23000")));
   options.workshop.machine.travel.x() = 5.0;
   EXPECT_THAT(run(plate, options, folder).report.warnings,
               ::testing::Contains(HasSubstr("travel")));
@@ -285,6 +296,25 @@ TEST(CamJob, WarnsOfWhatAnOperatorShouldQuestion) {
   }
   EXPECT_THAT(run(plate, options, folder).report.warnings,
               ::testing::Contains(HasSubstr("rises by")));
+}
+
+TEST(CamJob, ToolNumbersThatTheControllerCannotCallAreRefusedFirst) {
+  const TempFolder folder;
+  CamOptions options = programs_only();
+  int& finishing = options.workshop.process.finish.tool;
+  for (Tool& tool : options.workshop.tools) {
+    if (tool.number == finishing) tool.number = 1000;
+  }
+  finishing = 1000;
+  options.post = find_post("fanuc", "--post");
+  EXPECT_THAT(message_of<InputError>([&] { run(small_lens(), options, folder); }),
+              HasSubstr("tool number 1000: is above 999, the largest that a post read as fanuc can "
+                        "call; number the tool from 1 to 999"));
+  // Grbl's programs call no tool, LinuxCNC's may call this one.
+  for (const char* post : {"grbl", "linuxcnc"}) {
+    options.post = find_post(post, "--post");
+    EXPECT_NO_THROW(run(small_lens(), options, folder)) << post;
+  }
 }
 
 TEST(CamJob, WarnsWhereFlutesAreTooShortForABlankThatNobodyRoughed) {
@@ -310,6 +340,31 @@ TEST(CamJob, AClampInTheWayIsACollision) {
   EXPECT_THAT(report.warnings, ::testing::Contains(HasSubstr("vice")));
 }
 
+TEST(CamJob, TheReportNamesTheDesignThatWasCut) {
+  const TempFolder folder;
+  Lens lens = small_lens();
+  EXPECT_EQ(run(lens, programs_only(), folder).report.lens_id, "");
+  lens.provenance["fingerprint"] = "0123456789abcdef";
+  EXPECT_EQ(run(lens, programs_only(), folder).report.lens_id, "0123456789abcdef");
+  lens.provenance["fingerprint"] = "<script>";
+  EXPECT_EQ(run(lens, programs_only(), folder).report.lens_id, "");
+}
+
+TEST(CamJob, AFacetedDesignIsCutAsFacetsUnlessToldOtherwise) {
+  const TempFolder folder;
+  Lens lens = small_lens();
+  const auto surface_of = [&](const CamOptions& options) {
+    const CamResult result = run(lens, options, folder);
+    return result.report.parameters.front().parameters.back().value;
+  };
+  EXPECT_EQ(surface_of(programs_only()), "smooth, over the mesh");
+  lens.model = SurfaceModel::kFacet;
+  EXPECT_EQ(surface_of(programs_only()), "facets of the mesh");
+  CamOptions options = programs_only();
+  options.surface = SurfaceModel::kSmooth;
+  EXPECT_EQ(surface_of(options), "smooth, over the mesh");
+}
+
 /// Sets one option to a bad value; the message has to name all of `words`.
 struct BadOption {
   const char* words;
@@ -320,11 +375,13 @@ struct BadOption {
 TEST(CamJob, BadOptionsAreNamedWithValueAndRule) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   const std::vector<BadOption> cases{
-      {"--tool-diameter: 2 is not smaller than the lens", 2.0,
+      {"--tool-diameter 2: must be smaller than the lens", 2.0,
        [](CamOptions& o, double v) { o.workshop.tools.back().diameter = v; }},
       {"pitch", 0.5, [](CamOptions& o, double v) { o.workshop.process.finish.pitch = v; }},
-      {"--decimals: 3", 3, [](CamOptions& o, double v) { o.decimals = static_cast<int>(v); }},
-      {"--decimals: 7", 7, [](CamOptions& o, double v) { o.decimals = static_cast<int>(v); }},
+      {"--decimals 3: must be 0, or 4 to 6", 3,
+       [](CamOptions& o, double v) { o.decimals = static_cast<int>(v); }},
+      {"--decimals 7: must be 0, or 4 to 6", 7,
+       [](CamOptions& o, double v) { o.decimals = static_cast<int>(v); }},
       {"--spin-up", -0.1, [](CamOptions& o, double v) { o.spin_up = v; }},
       {"--spin-up", kNan, [](CamOptions& o, double v) { o.spin_up = v; }},
       {"--shrinkage", 0.3, [](CamOptions& o, double v) { o.shrinkage = v; }},

@@ -45,6 +45,7 @@ inline double lens_relief(double x, double y) {
 /// A lens of that relief, its light on a wall of its own size 12 mm away; an even grey is wanted.
 inline Lens small_lens(double width = 3.0, double height = 2.0) {
   Lens lens;
+  lens.model = SurfaceModel::kSmooth;
   lens.setup.lens_size = {width, height};
   lens.setup.image_size = {width, height};
   lens.setup.pixels = {12, 8};

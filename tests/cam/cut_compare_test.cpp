@@ -98,8 +98,8 @@ TEST(CutCompare, BadChoicesAreNamedWithValueAndRule) {
   EXPECT_THAT(refusal({"pitch=0.1,wide"}), HasSubstr("--compare pitch"));
   EXPECT_THAT(refusal({"pitch=0"}), HasSubstr("--compare pitch: 0 is not above 0"));
   EXPECT_THAT(refusal({"pitch=-0.1"}), HasSubstr("--compare pitch"));
-  EXPECT_THAT(refusal({"pitch=0.1,0.1"}), HasSubstr("0.1 stands there twice"));
-  EXPECT_THAT(refusal({"pitch=0.1", "pitch=0.2"}), HasSubstr("pitch stands there twice"));
+  EXPECT_THAT(refusal({"pitch=0.1,0.1"}), HasSubstr("0.1 is given twice"));
+  EXPECT_THAT(refusal({"pitch=0.1", "pitch=0.2"}), HasSubstr("pitch is given twice"));
   EXPECT_THAT(refusal({"tool=1,2,3,4,5,6,7,8,9", "pitch=1,2,3,4,5,6,7,8"}),
               HasSubstr("72 combinations are more than 64"));
 }

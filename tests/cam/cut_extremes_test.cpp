@@ -187,6 +187,41 @@ TEST(CutExtremes, ACutThatMemoryDoesNotHoldIsRefusedWithAPitchThatFits) {
   EXPECT_NO_THROW(require()) << message;
 }
 
+/// The refusal of a cut of the lens of 25 mm, programs alone; empty if it is begun.
+std::string refusal_of(const CamOptions& options, const std::filesystem::path& folder) {
+  OpticalSetup setup = small_lens().setup;
+  setup.lens_size = {25.0, 25.0};
+  try {
+    require_room_for_cut(options, setup, {1.0, 1e3, 1e3}, folder);
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(CutExtremes, WorkOfYearsIsRefusedOnAnyDiskWithAPitchThatFits) {
+  const TempFolder folder;
+  CamOptions options;
+  options.render = false;
+  EXPECT_EQ(refusal_of(options, folder.path()), "");
+  options.workshop.process.finish.pitch = 1e-8;
+  const std::string message = refusal_of(options, folder.path());
+  EXPECT_THAT(message, ::testing::AllOf(::testing::StartsWith("--pitch 1e-08mm: takes about"),
+                                        HasSubstr("on one core"), HasSubstr("1000 h")));
+  options.workshop.process.finish.pitch = std::stod(message.substr(message.rfind("--pitch ") + 8));
+  EXPECT_EQ(refusal_of(options, folder.path()), "");
+}
+
+TEST(CutExtremes, TolerancesThatTakeYearsAreNamed) {
+  const TempFolder folder;
+  CamOptions options;
+  options.render = false;
+  options.workshop.process.finish.slope_tolerance = 1e-7;
+  EXPECT_THAT(refusal_of(options, folder.path()),
+              ::testing::AllOf(::testing::StartsWith("tolerances this fine: "),
+                               HasSubstr("--slope-tolerance")));
+}
+
 TEST(CutExtremes, TheEstimateGrowsWithEverythingThatTakesTime) {
   const CamOptions usual;
   const OpticalSetup setup = small_lens().setup;
@@ -211,7 +246,7 @@ TEST(CutExtremes, RefusalsNameTheSmallestToleranceThatDecimalsHold) {
   options.workshop.process.finish.tolerance = 1e-4;
   EXPECT_THAT(
       message_of<InputError>([&] { validate(options, small_lens().setup); }),
-      HasSubstr("--tolerance: 1e-04 is not at least 4 units of the last decimal, 4e-04 mm"));
+      HasSubstr("--tolerance 1e-04: must be at least 4 units of the last decimal, 4e-04 mm"));
 }
 
 TEST(CutExtremes, RapidsRunHalfAMillimetreAboveTheBlankAtLeast) {

@@ -300,6 +300,18 @@ bool misses(const ReportData& report, const std::string& key) {
                      [&](const LimitCheck& check) { return check.key == key && !check.passes(); });
 }
 
+TEST(CutSafety, LimitsOfSafetyStandFirst) {
+  const TempFolder folder;
+  const CamResult result =
+      make_cut(small_lens(), programs_only(), folder.path(), Executor::serial(), {});
+  std::vector<std::string> keys;
+  for (const LimitCheck& check : result.report.verdict.checks) keys.push_back(check.key);
+  ASSERT_GT(keys.size(), 5U);
+  keys.resize(5);
+  EXPECT_THAT(keys,
+              ::testing::ElementsAre("collisions", "table", "travel_x", "travel_y", "travel_z"));
+}
+
 TEST(CutSafety, AMaterialOfAnotherIndexIsAMissedLimit) {
   CamOptions options = programs_only();
   const TempFolder folder;
@@ -313,7 +325,7 @@ TEST(CutSafety, AMaterialOfAnotherIndexIsAMissedLimit) {
   const ReportData report = cut();
   EXPECT_TRUE(misses(report, "material_ior"));
   EXPECT_THAT(report.warnings, Contains("the workshop's material has index 1.586, the lens was "
-                                        "designed for 1.49: it would throw another picture"));
+                                        "designed for 1.49: it would project another picture"));
   options.part = PartKind::kMould;
   EXPECT_FALSE(misses(cut(), "material_ior")) << "light passes no mould";
 }

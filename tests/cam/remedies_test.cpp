@@ -91,7 +91,7 @@ class Foretold {
   Prediction prediction_;
 };
 
-TEST(TrialCut, WithNothingChangedLeaksWhatWasForetold) {
+TEST(TrialCut, WithNothingChangedLeaksWhatWasPredicted) {
   for (const PartKind part : {PartKind::kLens, PartKind::kMould}) {
     const bool lens = part == PartKind::kLens;
     CamOptions options = facets_polished();

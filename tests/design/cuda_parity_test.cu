@@ -124,11 +124,10 @@ TEST_F(Cuda, ADesignEndsWithTheCpusError) {
   options.iterations = 30;
   for (const SurfaceModel model : kModels) {
     options.model = model;
-    const bool facet = model == SurfaceModel::kFacet;
     const auto error = [&](const Executor& executor) {
       const DesignResult result = design_lens(picture, options, executor, {});
       EXPECT_EQ(result.status, DesignResult::Status::kDone) << result.message;
-      return (facet ? result.lens.facet_metrics : result.lens.smooth_metrics).mae;
+      return result.lens.metrics.at(model).mae;
     };
     const double expected = error(Executor::cpu());
     EXPECT_NEAR(error(Executor::cpu().with_device(Device::kCuda)), expected, 1e-3);

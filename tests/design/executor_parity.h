@@ -17,9 +17,9 @@
 #include "core/error.h"
 #include "design/cpu_reference.h"
 #include "design/flux/flux_image.h"
-#include "design/guided_stage.h"
 #include "design/objective_setups.h"
 #include "design/random_triangles.h"
+#include "design/schedule/guided_stage.h"
 
 /// What another executor computes, beside what the CPU's computes. One suite for the emulated GPU,
 /// which runs in every build, and for a real one, where there is one.

@@ -2,7 +2,11 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
+#include <cstddef>
 #include <functional>
+#include <limits>
+#include <vector>
 
 namespace lensforge::testing {
 
@@ -29,6 +33,24 @@ inline Eigen::VectorXd numeric_gradient(const Scalar& f, const Eigen::VectorXd& 
 /// Largest difference of two gradients, relative to the largest entry.
 inline double gradient_error(const Eigen::VectorXd& computed, const Eigen::VectorXd& expected) {
   return (computed - expected).cwiseAbs().maxCoeff() / expected.cwiseAbs().maxCoeff();
+}
+
+/// Error of `computed` against central differences with `step` and with half of it, the larger of
+/// the two: one step alone may agree by chance, where truncation and rounding cancel.
+inline double plateau_error(const Eigen::VectorXd& computed, const Scalar& f,
+                            const Eigen::VectorXd& x, double step) {
+  return std::max(gradient_error(computed, numeric_gradient(f, x, step)),
+                  gradient_error(computed, numeric_gradient(f, x, 0.5 * step)));
+}
+
+/// Smallest error that two neighbouring steps both keep, of errors in the order of their steps; for
+/// functions with kinks, where the right size of the step is not known beforehand.
+inline double plateau_error(const std::vector<double>& errors) {
+  double best = std::numeric_limits<double>::infinity();
+  for (std::size_t k = 1; k < errors.size(); ++k) {
+    best = std::min(best, std::max(errors[k - 1], errors[k]));
+  }
+  return best;
 }
 
 }  // namespace lensforge::testing

@@ -6,8 +6,8 @@
 #include <cstdint>
 #include <numbers>
 
+#include "core/surface/grid_mesh.h"
 #include "core/surface/surface_mesh.h"
-#include "design/grid_mesh.h"
 #include "design/random_input.h"
 
 namespace lensforge::testing {

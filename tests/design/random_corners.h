@@ -3,7 +3,7 @@
 
 #include <Eigen/Core>
 
-#include "design/optics/facet.h"
+#include "core/surface/corners.h"
 #include "design/random_input.h"
 
 namespace lensforge::testing {

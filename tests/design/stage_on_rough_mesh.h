@@ -3,8 +3,8 @@
 
 #include <memory>
 
-#include "design/guided_stage_on.h"
 #include "design/objective_setups.h"
+#include "design/schedule/guided_stage_on.h"
 
 namespace lensforge::testing {
 

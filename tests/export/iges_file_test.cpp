@@ -6,6 +6,7 @@
 #include "core/error.h"
 #include "core/io/output_guard.h"
 #include "core/temp_folder.h"
+#include "export/iges_check.h"
 #include "export/sample_surfaces.h"
 
 namespace lensforge::testing {
@@ -33,6 +34,7 @@ TEST_F(IgesFile, ReadsBackAsOneClosedSolidOfTheSameVolume) {
   const SplineNet net = fitted();
   const SolidContent content = write(net, folder_ / "lens.igs");
   EXPECT_TRUE(content.is_one_solid());
+  EXPECT_GT(check_iges(read_bytes(folder_ / "lens.igs"), "lens.igs"), 10) << "entities";
   EXPECT_EQ(content.faces, static_cast<int>(net.patches.size()) + 5);
   EXPECT_NEAR(content.volume, net.volume(), 1e-6 * net.volume());
 }
@@ -65,7 +67,7 @@ TEST_F(IgesFile, TargetThatCannotBeWrittenIsNamed) {
 TEST_F(IgesFile, WhatIsNoIgesFileIsRefused) {
   write_bytes(folder_ / "lens.igs", "solid lens\nendsolid\n");
   EXPECT_THAT(message_of<InputError>([&] { inspect_iges(folder_ / "lens.igs"); }),
-              HasSubstr("lens.igs"));
+              HasSubstr("lens.igs: is no IGES file"));
 }
 
 }  // namespace

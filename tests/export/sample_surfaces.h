@@ -6,8 +6,8 @@
 #include <numbers>
 #include <random>
 
+#include "core/surface/grid_mesh.h"
 #include "core/surface/surface_mesh.h"
-#include "design/grid_mesh.h"
 
 namespace lensforge::testing {
 

@@ -25,7 +25,6 @@ SplineNet fitted(const SmoothSurface& surface, std::int64_t points = 0) {
 }
 
 TEST(CubicSpline, BasisSumsToOneAndSlopesAreItsDerivatives) {
-  constexpr double kStep = 1e-6;
   for (const int cells : {1, 2, 3, 9}) {
     for (double t = 0.01; t < cells - 0.01; t += 0.0837) {
       const CubicBasis b = cubic_basis(t, cells);
@@ -40,11 +39,13 @@ TEST(CubicSpline, BasisSumsToOneAndSlopesAreItsDerivatives) {
       EXPECT_NEAR(sum, 1.0, 1e-14);
       EXPECT_NEAR(place, t, 1e-13);
       EXPECT_NEAR(slope, 1.0, 1e-13);
-      const CubicBasis after = cubic_basis(t + kStep, cells);
-      const CubicBasis before = cubic_basis(t - kStep, cells);
-      if (after.first != before.first) continue;
-      for (std::size_t j = 0; j < 4; ++j) {
-        EXPECT_NEAR((after.value[j] - before.value[j]) / (2.0 * kStep), b.slope[j], 1e-8);
+      for (const double step : {1e-6, 5e-7}) {
+        const CubicBasis after = cubic_basis(t + step, cells);
+        const CubicBasis before = cubic_basis(t - step, cells);
+        if (after.first != before.first) continue;
+        for (std::size_t j = 0; j < 4; ++j) {
+          EXPECT_NEAR((after.value[j] - before.value[j]) / (2.0 * step), b.slope[j], 1e-8);
+        }
       }
     }
   }

@@ -22,6 +22,7 @@
 #include "machine/spy_link.h"
 #include "machine/stream/journal.h"
 #include "machine/stream/program_facts.h"
+#include "machine/stream/program_file.h"
 #include "machine/stream/resume_plan.h"
 #include "machine/stream/sender.h"
 #include "machine/stream/session.h"
@@ -165,7 +166,8 @@ class Workshop {
     JournalOptions options;
     options.flush = false;
     if (!resume) {
-      std::unique_ptr<Journal> journal = Journal::create(journal_, identify_job(file_), options);
+      std::unique_ptr<Journal> journal =
+          Journal::create(journal_, ProgramFile(file_).identity(), options);
       journal->origins(info.start.origins);
       return journal;
     }

@@ -12,7 +12,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "machine/link/descriptor.h"
+#include "core/io/descriptor.h"
 
 namespace lensforge::campaign {
 namespace {

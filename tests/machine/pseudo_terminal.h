@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "machine/link/descriptor.h"
+#include "core/io/descriptor.h"
 
 namespace lensforge::testing {
 

@@ -34,7 +34,7 @@ TEST_P(Fixtures, BecomeALens) {
 
 INSTANTIATE_TEST_SUITE_P(All, Fixtures,
                          ::testing::Values("portrait.png", "logo.png", "city.png", "butterfly.png",
-                                           "relief.png", "calligraphy.png", "rings.png",
+                                           "relief.png", "calligraphy.png", "lake.png", "rings.png",
                                            "stripes.png"),
                          [](const auto& test) {
                            const std::string name = test.param;
@@ -54,8 +54,9 @@ class Chain : public Scenario {
 
 TEST_F(Chain, EveryFixtureIsATestCase) {
   EXPECT_EQ(listing(LENSFORGE_PICTURES),
-            (std::vector<std::string>{"butterfly.png", "calligraphy.png", "city.png", "logo.png",
-                                      "portrait.png", "relief.png", "rings.png", "stripes.png"}));
+            (std::vector<std::string>{"butterfly.png", "calligraphy.png", "city.png", "lake.png",
+                                      "logo.png", "portrait.png", "relief.png", "rings.png",
+                                      "stripes.png"}));
 }
 
 TEST_F(Chain, APictureThatIsNotSquareKeepsItsShape) {
@@ -196,7 +197,7 @@ TEST_F(Chain, TheWorkshopIsShownAndReadBack) {
   expect_refusal(run(cam({"--workshop", path("shop.toml")})), 2, {"shop.toml", "surprise"});
 }
 
-TEST_F(Chain, AMouldIsCutAndItsCastIsForetold) {
+TEST_F(Chain, AMouldIsCutAndItsCastIsPredicted) {
   place_small_lens(at("lens"));
   const Outcome outcome = run(cam({"--part", "mould", "--shrinkage", "0.01", "--json"}));
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;

@@ -89,6 +89,8 @@ TEST_F(DesignInterrupt, WhatAKilledRunWasWritingIsRemoved) {
   const fs::path half = at("a") / ".lens.partial-7";
   fs::create_directories(half);
   std::ofstream(half / "surface.ply") << "ply";
+  std::ofstream(at("a") / ".surface.partial-7.ply") << "ply";
+  std::ofstream(at("a") / "..surface.partial-7.partial-8.ply") << "ply";
   std::ofstream(at("a") / ".convergence.partial-7.csv") << "stage";
   ASSERT_EQ(run(design("a")).exit_code, 0);
   for (const std::string& name : listing(at("a"))) EXPECT_NE(name.front(), '.') << name;
@@ -137,6 +139,41 @@ TEST_F(DesignInterrupt, CtrlCOnALargeDesignDoesNotWaitForItsIteration) {
   const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - sent;
   RecordProperty("seconds", std::to_string(taken.count()));
   EXPECT_LT(taken.count(), kStopSeconds);
+}
+
+/// A grey progressive JPEG of 8192 x 8192 pixels whose many scans say nothing new: libjpeg goes
+/// through all of them on opening, some ten seconds of work (ITU-T T.81, Annex G).
+std::string slow_jpeg() {
+  using namespace std::string_literals;
+  constexpr int kScans = 1000;
+  constexpr std::size_t kBlocks = std::size_t{1024} * 1024;
+  const std::string quantization = "\xFF\xDB\0\x43\0"s + std::string(64, '\x01');
+  const std::string frame = "\xFF\xC2\0\x0B\x08\x20\0\x20\0\x01\x01\x11\0"s;
+  const std::string one_code = "\x01"s + std::string(15, '\0');
+  // The only codes are one 0 bit: a difference of nothing, and the end of 16384 blocks.
+  const std::string tables =
+      "\xFF\xC4\0\x14\0"s + one_code + "\0\xFF\xC4\0\x14\x10"s + one_code + "\xE0";
+  const std::string flat = "\xFF\xDA\0\x08\x01\x01\0\0\0\0"s + std::string(kBlocks / 8, '\0');
+  const std::string scan =
+      "\xFF\xDA\0\x08\x01\x01\0\x01\x3F\0"s + std::string(kBlocks / 16384 * 15 / 8, '\0');
+  std::string bytes = "\xFF\xD8"s + quantization + frame + tables + flat;
+  for (int i = 0; i < kScans; ++i) bytes += scan;
+  return bytes + "\xFF\xD9";
+}
+
+TEST_F(DesignInterrupt, CtrlCDoesNotWaitForADecoder) {
+  write(at("slow.jpg"), slow_jpeg());
+  Process process({"design", path("slow.jpg"), "--out", path("lens"), "--json"});
+  ASSERT_TRUE(process.runs_for(std::chrono::seconds(1))) << process.wait().err;
+  process.send(SIGINT);
+  const auto sent = std::chrono::steady_clock::now();
+  const Outcome stopped = process.wait();
+  const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - sent;
+  RecordProperty("seconds", std::to_string(taken.count()));
+  EXPECT_EQ(stopped.exit_code, 130);
+  EXPECT_THAT(stopped.err, ::testing::HasSubstr("interrupted; nothing was written"));
+  EXPECT_LT(taken.count(), kStopSeconds);
+  EXPECT_FALSE(fs::exists(at("lens")));
 }
 
 TEST_F(DesignInterrupt, SecondCtrlCEndsAtOnce) {

@@ -77,6 +77,11 @@ TEST_F(ExportGuard, InterruptedDesignIsSaid) {
   EXPECT_EQ(exported.exit_code, 0);
   EXPECT_THAT(exported.err, HasSubstr("interrupted"));
   EXPECT_THAT(run({"render", path("lens")}).err, HasSubstr("interrupted"));
+  const Outcome cut =
+      run({"cam", path("lens"), "--no-render", "--no-rough", "--no-semi", "--tool-diameter", "2mm",
+           "--pitch", "1.9mm", "--slope-tolerance", "5e-3"});
+  EXPECT_TRUE(fs::exists(at("lens/cam/finish.ngc"))) << cut.err;
+  EXPECT_THAT(cut.err, HasSubstr("design was interrupted; design --resume would finish it"));
 }
 
 TEST_F(ExportGuard, InfoDescribesSolids) {

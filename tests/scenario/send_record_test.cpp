@@ -87,7 +87,7 @@ TEST_F(SendRecord, AFullDiskForLogAndEventsStopsNothing) {
   const Outcome outcome = run(arguments);
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_EQ(outcome.json()["status"], "done");
-  EXPECT_THAT(outcome.err, HasSubstr("warning: the log ends here: /dev/full"));
+  EXPECT_THAT(outcome.err, HasSubstr("warning: the log stops here: /dev/full"));
   EXPECT_THAT(outcome.err, HasSubstr("warning: the events end here: /dev/full"));
 }
 

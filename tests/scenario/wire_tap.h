@@ -6,7 +6,7 @@
 #include <string>
 #include <thread>
 
-#include "machine/link/descriptor.h"
+#include "core/io/descriptor.h"
 #include "machine/pseudo_terminal.h"
 
 namespace lensforge::scenario {

@@ -11,7 +11,7 @@ namespace lensforge {
 /// @throw RunError naming the call and what CUDA says, unless `status` is success.
 void check_cuda(cudaError_t status, const char* call);
 
-/// What to tell when `bytes` of GPU memory are asked for and `free` of `total` are left.
+/// Message for a request of `bytes` of GPU memory when `free` of `total` are free.
 std::string out_of_gpu_memory(std::size_t bytes, std::size_t free, std::size_t total);
 
 }  // namespace lensforge

@@ -25,7 +25,7 @@ SurfaceMesh relief() {
 Eigen::AlignedBox2d square() { return {Eigen::Vector2d(0.0, 0.0), Eigen::Vector2d(kSide, kSide)}; }
 
 /// Largest difference between facets and the smooth surface, at many places of each facet.
-SurfaceDeviation looked_up(const SurfaceMesh& facets, const SmoothSurface& surface) {
+SurfaceDeviation looked_up(const SurfaceMesh& facets, const OpticalSurface& surface) {
   SurfaceDeviation found;
   for (std::int64_t t = 0; t < facets.triangle_count(); ++t) {
     const Eigen::Vector3d a = facets.corner(t, 0);
@@ -124,7 +124,7 @@ TEST(CutSurface, ASmoothSurfaceNeedsFewerMovesThanItsFacets) {
   SmoothCutOptions options;
   options.slope_deviation = 1e-3;
   const SmoothCutSurface smooth(mesh, kRadius, options, Executor::serial());
-  const FacetSurface facets(mesh, kRadius, Executor::serial());
+  const FacetCutSurface facets(mesh, kRadius, Executor::serial());
   const auto moves = [&](const CutSurface& surface) {
     const RowSpan span = plan.row_span(plan.rows / 2);
     const Eigen::AlignedBox2d axis(span.line.at(span.held_from), span.line.at(span.held_to));

@@ -20,6 +20,7 @@ using lensforge::testing::TempFolder;
 /// Waves with a groove, whose light leaves a gap on the wall.
 Lens grooved_lens() {
   Lens lens;
+  lens.model = SurfaceModel::kSmooth;
   lens.setup.lens_size = {1.0, 0.6};
   lens.setup.image_size = {3.0, 1.5};
   lens.setup.image_origin = {-1.0, -0.45};

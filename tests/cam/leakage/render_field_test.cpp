@@ -190,13 +190,13 @@ TEST(RenderField, ThreeFacesThatMeetThrowThreeSpots) {
   const FluxPicture picture = render(field, setup_of(0.05));
   EXPECT_NEAR(picture.inside(), 1.0, 1e-12);
   // Rays 2 µm apart: a pixel's flux is known to one row of them, 1 / (4 · 2000) of the lens.
-  const Projection optics(small_setup());
+  const LightPath light(small_setup());
   std::vector<double> traced(picture.flux.size(), 0.0);
   for (int i = 0; i < 2000; ++i) {
     for (int j = 0; j < 2000; ++j) {
       const Eigen::Vector2d p(0.002 * (i + 0.5), 0.002 * (j + 0.5));
       const SurfacePoint point = field.at(p);
-      const Eigen::Vector2d at = land_of(optics, p, point.z, point.slope);
+      const Eigen::Vector2d at = land_of(light, p, point.z, point.slope);
       traced[static_cast<std::size_t>(20 * static_cast<int>(at.y()) + static_cast<int>(at.x()))] +=
           0.25e-6;
     }
@@ -260,8 +260,28 @@ TEST(LensGrid, RefusesASizeOrSpacingThatMakesNoGrid) {
   EXPECT_THROW((void)lens_grid({10.0, 10.0}, 0.0), InputError);
 }
 
+/// Light from a side on a plane: one beam, and a share of flux that depends on the slope.
+TEST(RenderField, LightFromTheSideFollowsSnellsLawTwice) {
+  FieldRenderSetup setup = setup_of(0.05);
+  setup.optics.light = Eigen::Vector3d(0.08, 0.0, 1.0).normalized();
+  const double inside = std::asin(0.08 / std::hypot(0.08, 1.0) / 1.49);
+  const Eigen::Vector2d slope(0.09, 0.0);
+  const double lean = std::atan(slope.x());
+  const double angle = std::asin(1.49 * std::sin(lean + inside)) - lean;
+  std::vector<double> traced(20, 0.0);
+  const int rays = 400000;
+  for (int ray = 0; ray < rays; ++ray) {
+    const double x = 4.0 * (ray + 0.5) / rays;
+    const double z = 5.0 + slope.x() * x;
+    const double column = (x + (60.0 - z) * std::tan(angle) + 8.0) / 20.0 * 20.0;
+    traced[static_cast<std::size_t>(column)] += (1.0 - slope.x() * std::tan(inside)) / rays;
+  }
+  const FluxPicture picture = render(AnalyticField(testing::plane(slope)), setup);
+  EXPECT_LT(largest_difference(column_sums(picture), traced), 1e-5);
+}
+
 TEST(CreaseSplit, PiecesTakeExactlyTheTrianglesFlux) {
-  const Projection optics(small_setup());
+  const LightPath light(small_setup());
   std::array<SurfaceSide, 3> sides;
   const std::array<Eigen::Vector2d, 3> corners{
       Eigen::Vector2d{1.0, 1.0}, {1.01, 1.0}, {1.01, 1.01}};
@@ -275,7 +295,7 @@ TEST(CreaseSplit, PiecesTakeExactlyTheTrianglesFlux) {
     }
     double flux = 0.0;
     double least = 1.0;
-    split_at_crease(sides, optics, 16.0, [&](const ImageTriangle& t) {
+    split_at_crease(sides, light, 16.0, [&](const ImageTriangle& t) {
       flux += t.flux;
       least = std::min(least, t.flux);
     });

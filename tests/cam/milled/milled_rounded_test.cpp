@@ -9,6 +9,7 @@
 #include "cam/milled/rounded_field.h"
 #include "cam/milled_paths.h"
 #include "cam/milled_tiles.h"
+#include "core/surface/smooth_surface.h"
 
 namespace lensforge {
 namespace {
@@ -187,7 +188,7 @@ TEST(RoundedField, EqualsTheBestOfManyBalls) {
 
 TEST(RoundedField, LeavingOutFacetsThatCannotBeCutChangesNoBit) {
   const Rounded rounded(creased_relief());
-  const FacetSurface facets(rounded.mesh, kRadius, Executor::serial());
+  const FacetCutSurface facets(rounded.mesh, kRadius, Executor::serial());
   const RoundedField plain(rounded.designed, facets, 0.0, Executor::serial());
   const GridWindow window = testing::window_at({0.0, 0.0}, 0.01, 200, 200);
   const SurfacePatch a = testing::sampled(rounded.field, window);

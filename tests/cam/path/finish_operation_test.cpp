@@ -51,7 +51,7 @@ struct Cut {
 };
 
 Cut cut(const SurfaceMesh& mesh, const RasterPlan& plan) {
-  const FacetSurface surface(mesh, kRadius, Executor::serial());
+  const FacetCutSurface surface(mesh, kRadius, Executor::serial());
   Cut result;
   const MoveSink sink = [&](std::span<const PathMove> moves) {
     result.moves.insert(result.moves.end(), moves.begin(), moves.end());
@@ -149,7 +149,7 @@ TEST(FinishOperation, WarnsWhereTheTolerancesAreNotHeld) {
 TEST(FinishOperation, StoppedIsNotComplete) {
   std::stop_source source;
   const RunControl control(source.get_token(), [&](const Progress&) { source.request_stop(); });
-  const FacetSurface surface(relief(), kRadius, Executor::serial());
+  const FacetCutSurface surface(relief(), kRadius, Executor::serial());
   const OperationSummary summary = cut_finish(
       surface, plan_of(PassStyle::kZigzag, 0), finish_run(), Executor::serial(),
       [](std::span<const PathMove>) {}, control);

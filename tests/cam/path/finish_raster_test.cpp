@@ -7,6 +7,7 @@
 #include <cmath>
 #include <optional>
 #include <stop_token>
+#include <thread>
 #include <vector>
 
 #include "cam/cam_meshes.h"
@@ -30,7 +31,7 @@ SurfaceMesh small_relief() {
   });
 }
 
-FacetSurface facets(const SurfaceMesh& mesh) { return {mesh, kRadius, Executor::serial()}; }
+FacetCutSurface facets(const SurfaceMesh& mesh) { return {mesh, kRadius, Executor::serial()}; }
 
 std::vector<RasterRow> all_rows(const CutSurface& surface, const RasterPlan& plan,
                                 const Executor& executor) {
@@ -252,6 +253,27 @@ TEST(FinishRaster, StopsWithinABatch) {
   EXPECT_FALSE(summary.complete);
   EXPECT_EQ(reports, 2);
   EXPECT_LT(summary.rows, plan.rows);
+}
+
+TEST(FinishRaster, EveryRowIsReportedByTheCallersThread) {
+  const SurfaceMesh mesh = small_relief();
+  const RasterPlan plan = plan_finish_raster(square(kSide), kRadius, {});
+  const std::thread::id caller = std::this_thread::get_id();
+  for (const Executor& executor : {Executor::serial(), Executor::cpu(2)}) {
+    std::vector<double> rows;
+    const RunControl control({}, [&](const Progress& progress) {
+      EXPECT_EQ(std::this_thread::get_id(), caller);
+      EXPECT_EQ(progress.stage, "cam finish");
+      rows.push_back(progress.done);
+    });
+    cut_raster(
+        facets(mesh), plan, executor, [](const RasterRow&) {}, control);
+    EXPECT_TRUE(std::is_sorted(rows.begin(), rows.end()));
+    EXPECT_EQ(rows.back(), static_cast<double>(plan.rows));
+    if (executor.concurrency() > 1) continue;
+    rows.erase(std::unique(rows.begin(), rows.end()), rows.end());
+    EXPECT_EQ(static_cast<std::int64_t>(rows.size()), plan.rows);  // No row is passed over.
+  }
 }
 
 TEST(FinishRaster, PitchForAScallopLeavesThatScallopOnSlopes) {

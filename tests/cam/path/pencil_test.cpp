@@ -89,7 +89,7 @@ TEST(Pencil, NeverGouges) {
     PencilOptions options;
     options.least_length = 0.3;
     options.top = mesh.vertices.row(2).maxCoeff();
-    const FacetSurface surface(mesh, kRadius, Executor::serial());
+    const FacetCutSurface surface(mesh, kRadius, Executor::serial());
     const OperationSummary summary =
         cut_pencil(surface, find_valleys(mesh, kRadius, options), options, pencil_run(), sink, {});
     EXPECT_TRUE(summary.complete);

@@ -88,7 +88,7 @@ TEST(PostDescription, FaultsAreNamedWithFileKeyValueAndRule) {
       {"G40 G49 G80", "G49 G80", "program.start: an array: must cancel cutter compensation"},
       {"T{tool} M6", "T{tool} M6 G55", "program.tool: an array: must leave millimetres"},
       {"T{tool} M6", "T{tool} M6 G18", "program.tool: an array: must leave millimetres"},
-      {"T{tool} M6", "T{tol} M6", "program.tool: an array: 'T{tol} M6': no such placeholder"},
+      {"T{tool} M6", "T{tol} M6", "program.tool: an array: 'T{tol} M6': unknown placeholder"},
       {"T{tool} M6", "T2 M6", "program.tool: an array: must name the tool"},
       {"T{tool} M6", "T{tool M6", "no such placeholder"},
       {"S{rpm} M3", "S{rpm}", "program.spindle: an array: must start the spindle"},

@@ -42,7 +42,7 @@ RenderedSurface surface(const std::string& name, double first, double leakage) {
 /// A report in which every text field holds `text`.
 ReportData report_of(const std::string& text) {
   ReportData data;
-  data.job = data.program = data.made = data.lens_id = data.part = text;
+  data.job = data.program = data.lens_id = data.part = text;
   data.target = Image(8, 8, 0.5F);
   data.leakage.designed = surface(text, 0.0, 0.0);
   data.leakage.steps = {surface(text, 0.1, 0.1)};
@@ -110,6 +110,40 @@ TEST(Report, SaysTheVerdictFirst) {
   EXPECT_THAT(report_html(data), HasSubstr("Within all limits"));
 }
 
+/// The value of an attribute of the first such element from `at` on.
+double number_in(const std::string& html, const std::string& element, const char* attribute,
+                 std::size_t at) {
+  const std::string before = joined({" ", attribute, "=\""});
+  return std::stod(html.substr(html.find(before, html.find(element, at)) + before.size()));
+}
+
+TEST(Report, NumbersOfRingsStayOnTheMap) {
+  // Eleven places at corners and sides of a lens of 30 × 20 mm: the map is 100 × 66.7 units.
+  ReportData data = report_of("logo");
+  data.lens_size = {30.0, 20.0};
+  LeakPlace place = data.places.front();
+  data.places.clear();
+  for (int k = 0; k < 12; ++k) {
+    place.place = {10.0 * (k % 4), 10.0 * (k / 4)};
+    place.side = k == 5 ? 4.0 : 0.2;
+    data.places.push_back(place);
+  }
+  const std::string html = report_html(data);
+  std::size_t at = html.find("class=\"map\"");
+  for (std::size_t k = 0; k < data.places.size(); ++k) {
+    at = html.find("<text", at + 1);
+    ASSERT_NE(at, std::string::npos);
+    const double digits = k < 9 ? 1.0 : 2.0;
+    const double half = 0.5 * 0.696 * 7.0 * digits + 0.7;  // DejaVu's bold digits, and the stroke.
+    const double x = number_in(html, "<text", "x", at);
+    const double y = number_in(html, "<text", "y", at);
+    EXPECT_GE(x - half, 0.0) << k;
+    EXPECT_LE(x + half, 100.0) << k;
+    EXPECT_GE(y - 0.716 * 7.0 - 0.7, 0.0) << k;
+    EXPECT_LE(y + 0.7, 200.0 / 3.0 + 0.01) << k;
+  }
+}
+
 TEST(Report, LeavesOutWhatIsNotThere) {
   ReportData data;
   data.job = "bare";
@@ -169,9 +203,10 @@ TEST(LeakWords, SayWhatHelpsAsFarAsItWasTried) {
   place.trials = {{"a 0.3 mm ball", 0.006, 0.0}, {"a 0.2 mm ball", 0.001, 0.0}};
   EXPECT_THAT(leak_words(place), EndsWith(" A 0.3 mm ball would bring it down to 0.600 %."));
   place.trials = {{"a 0.3 mm ball", 0.019, 0.0}, {"a 0.2 mm ball", 0.021, 0.0}};
-  EXPECT_THAT(leak_words(place),
-              EndsWith(" Nothing that was tried helps much: with a 0.3 mm ball 1.90 % would still "
-                       "leak, with a 0.2 mm ball 2.10 %."));
+  EXPECT_THAT(
+      leak_words(place),
+      EndsWith(" No change that was tried helps much: with a 0.3 mm ball 1.90 % would still "
+               "leak, with a 0.2 mm ball 2.10 %."));
   place.trials = {{"half the tolerances", 0.004, 0.0, 1.42, 1.0}};
   EXPECT_THAT(leak_words(place),
               EndsWith(" down to 0.400 % for 1.4 times as many finishing moves."));

@@ -16,6 +16,7 @@
 
 #include "core/error.h"
 #include "core/image/image_io.h"
+#include "core/image/picture_refusal.h"
 #include "core/sample_files.h"
 #include "core/temp_folder.h"
 #include "core/test_images.h"
@@ -24,7 +25,7 @@ namespace lensforge {
 namespace {
 
 namespace fs = std::filesystem;
-using lensforge::testing::message_of;
+using lensforge::testing::picture_refusal;
 using lensforge::testing::pixel_spec;
 using lensforge::testing::ramp;
 using lensforge::testing::random_image;
@@ -36,40 +37,34 @@ using lensforge::testing::write_raw;
 using OIIO::TypeDesc;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
-using ::testing::StartsWith;
-
-std::string refusal(const fs::path& path) {
-  std::string message = message_of<InputError>([&] { read_image(path); });
-  EXPECT_THAT(message, StartsWith(path.string() + ": "));
-  return message;
-}
 
 TEST(ImageIo, RefusesAMissingFile) {
   const TempFolder folder;
-  EXPECT_THAT(refusal(folder / "none.png"), HasSubstr("No such file or directory"));
+  EXPECT_THAT(picture_refusal(folder / "none.png"), HasSubstr("No such file or directory"));
 }
 
 TEST(ImageIo, RefusesAFolder) {
   const TempFolder folder;
   fs::create_directory(folder / "d.png");
-  EXPECT_THAT(refusal(folder / "d.png"), HasSubstr("is a folder"));
+  EXPECT_THAT(picture_refusal(folder / "d.png"), HasSubstr("is a folder"));
 }
 
 TEST(ImageIo, RefusesADevice) {
-  EXPECT_THAT(refusal("/dev/zero"), HasSubstr("only regular files are read"));
+  EXPECT_THAT(picture_refusal("/dev/zero"), HasSubstr("only regular files are read"));
 }
 
 TEST(ImageIo, RefusesAnEmptyFile) {
   const TempFolder folder;
   write_bytes(folder / "e.png", "");
-  EXPECT_THAT(refusal(folder / "e.png"), HasSubstr("is empty"));
+  EXPECT_THAT(picture_refusal(folder / "e.png"), HasSubstr("is empty"));
 }
 
 TEST(ImageIo, RefusesWhatIsNoPictureUnderAnyName) {
   const TempFolder folder;
   for (const char* name : {"t.png", "t.jpg", "t.tif", "t.exr", "t.txt", "t"}) {
     write_bytes(folder / name, "This is a letter and not a picture.\n");
-    EXPECT_THAT(refusal(folder / name), HasSubstr("is no picture that can be read")) << name;
+    EXPECT_THAT(picture_refusal(folder / name), HasSubstr("is no picture that can be read"))
+        << name;
   }
 }
 
@@ -125,7 +120,7 @@ TEST(ImageIo, RefusesAPngWithADamagedChunk) {
   std::string bytes = read_bytes(folder / "a.png");
   bytes[bytes.size() / 2] = static_cast<char>(~bytes[bytes.size() / 2]);
   write_bytes(folder / "a.png", bytes);
-  EXPECT_THAT(refusal(folder / "a.png"), HasSubstr("is corrupt"));
+  EXPECT_THAT(picture_refusal(folder / "a.png"), HasSubstr("is corrupt"));
 }
 
 TEST(ImageIo, RefusesThirtyThousandPixelsASideFastAndWithoutTheirMemory) {
@@ -145,7 +140,8 @@ TEST(ImageIo, RefusesThirtyThousandPixelsASideFastAndWithoutTheirMemory) {
   ::getrusage(RUSAGE_SELF, &before);
   const auto start = std::chrono::steady_clock::now();
   for (const char* name : {"h.png", "h.jpg", "h.tif", "h.exr"}) {
-    EXPECT_THAT(refusal(folder / name), AllOf(HasSubstr("30000"), HasSubstr("at most 16384")));
+    EXPECT_THAT(picture_refusal(folder / name),
+                AllOf(HasSubstr("30000"), HasSubstr("at most 16384")));
   }
   ::getrusage(RUSAGE_SELF, &after);
   EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(2));
@@ -162,7 +158,7 @@ TEST(ImageIo, RefusesValuesThatAreNotFiniteOrNegativeNamingPixelAndValue) {
     std::vector<float> pixels(36, 0.5F);
     pixels[3 * 6 + 1] = value;
     write_raw(folder / "v.exr", spec, pixels);
-    EXPECT_THAT(refusal(folder / "v.exr"),
+    EXPECT_THAT(picture_refusal(folder / "v.exr"),
                 HasSubstr("pixel (column 2, row 1) has the value " + text +
                           " in channel G: values must be finite and not negative"));
   }
@@ -171,7 +167,7 @@ TEST(ImageIo, RefusesValuesThatAreNotFiniteOrNegativeNamingPixelAndValue) {
 TEST(ImageIo, RefusesAnAlphaThatIsNotFinite) {
   const TempFolder folder;
   write_raw(folder / "v.exr", pixel_spec(4, TypeDesc::FLOAT), {0.F, 0.F, 0.F, std::nanf("")});
-  EXPECT_THAT(refusal(folder / "v.exr"), HasSubstr("in channel A"));
+  EXPECT_THAT(picture_refusal(folder / "v.exr"), HasSubstr("in channel A"));
 }
 
 }  // namespace

@@ -9,20 +9,18 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <random>
 #include <stop_token>
 #include <string>
 #include <string_view>
-#include <utility>
 #include <vector>
 
 #include "core/error.h"
 #include "core/image/image_io.h"
+#include "core/image/picture_refusal.h"
 #include "core/io/output_guard.h"
-#include "core/sample_files.h"
 #include "core/temp_folder.h"
 #include "core/test_images.h"
 #include "core/text/printable.h"
@@ -31,7 +29,7 @@ namespace lensforge {
 namespace {
 
 namespace fs = std::filesystem;
-using lensforge::testing::message_of;
+using lensforge::testing::picture_refusal;
 using lensforge::testing::pixel_spec;
 using lensforge::testing::ramp;
 using lensforge::testing::random_image;
@@ -44,14 +42,10 @@ using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-std::string refusal(const fs::path& path) {
-  return message_of<InputError>([&] { read_image(path); });
-}
-
 std::string refusal_of(std::string_view bytes) {
   const TempFolder folder;
   write_bytes(folder / "p", bytes);
-  return refusal(folder / "p");
+  return picture_refusal(folder / "p");
 }
 
 OIIO::ImageSpec small_spec() { return OIIO::ImageSpec(13, 9, 3, TypeDesc::UINT8); }
@@ -75,7 +69,7 @@ TEST(PictureReader, FormatsWhoseDecodersCrashAreRefusedUnopened) {
   const TempFolder folder;
   for (const std::string name : {"a.ico", "a.sgi", "a.dpx", "a.tga"}) {
     write_raw(folder / name, small_spec(), ramp(small_spec()));
-    EXPECT_THAT(refusal(folder / name),
+    EXPECT_THAT(picture_refusal(folder / name),
                 AllOf(HasSubstr("is no picture that can be read"), HasSubstr("PNG, JPEG, TIFF")));
   }
 }
@@ -97,7 +91,7 @@ TEST(PictureReader, AQuestionMarkInANameIsPartOfTheName) {
 TEST(PictureReader, ANamedPipeIsRefusedWithoutWaiting) {
   const TempFolder folder;
   ASSERT_EQ(::mkfifo((folder / "p.png").c_str(), 0600), 0);
-  EXPECT_THAT(refusal(folder / "p.png"), HasSubstr("named pipe"));
+  EXPECT_THAT(picture_refusal(folder / "p.png"), HasSubstr("named pipe"));
 }
 
 TEST(PictureReader, SizesAreRefusedBeforeADecoderTakesMemoryForThem) {
@@ -191,7 +185,7 @@ TEST(PictureReader, WhatDecodersPrintAndWhatFilesNameStaysOffTheTerminal) {
                   png_chunk("IEND", ""));
   ::testing::internal::CaptureStderr();
   for (const char* name : {"b.png", "c.png"}) {
-    EXPECT_LT(refusal(folder / name).size(), 400U);
+    EXPECT_LT(picture_refusal(folder / name).size(), 400U);
   }
   EXPECT_EQ(::testing::internal::GetCapturedStderr(), "");
   std::string profile(300, 'x');
@@ -201,6 +195,38 @@ TEST(PictureReader, WhatDecodersPrintAndWhatFilesNameStaysOffTheTerminal) {
   const LoadedImage loaded = read_image(folder / "d.png");
   ASSERT_EQ(loaded.changes.size(), 1U);
   EXPECT_EQ(printable_line(loaded.changes[0], 130), loaded.changes[0]);
+}
+
+TEST(PictureReader, WhatDecodersSayToProgrammersIsLeftOut) {
+  const TempFolder folder;
+  OIIO::ImageSpec spec = small_spec();
+  spec.attribute("compression", "lzw");
+  write_raw(folder / "a.tif", spec, ramp(spec));
+  std::string bytes = read_bytes(folder / "a.tif");
+  // Tag 273 has the place of the only strip.
+  const std::size_t entry = bytes.find(std::string_view("\x11\x01\x04\0\x01\0\0\0", 8));
+  ASSERT_NE(entry, std::string::npos);
+  const auto strip =
+      static_cast<std::ptrdiff_t>(static_cast<unsigned char>(bytes[entry + 8]) +
+                                  256 * static_cast<unsigned char>(bytes[entry + 9]));
+  std::fill_n(bytes.begin() + strip, 20, '\xff');
+  write_bytes(folder / "a.tif", bytes);
+  const std::string path = (folder / "a.tif").string();
+  EXPECT_EQ(picture_refusal(path), path + ": is truncated or corrupt");
+}
+
+TEST(PictureReader, ATiffOfAnUnknownCompressionIsRefusedByItsNumber) {
+  const TempFolder folder;
+  write_raw(folder / "a.tif", small_spec(), ramp(small_spec()));
+  std::string bytes = read_bytes(folder / "a.tif");
+  const std::string_view entry("\x03\x01\x03\0\x01\0\0\0", 8);  // Tag 259, one SHORT.
+  const std::size_t at = bytes.find(entry);
+  ASSERT_NE(at, std::string::npos);
+  bytes[at + entry.size()] = '\x88';
+  bytes[at + entry.size() + 1] = '\0';
+  write_bytes(folder / "a.tif", bytes);
+  EXPECT_THAT(picture_refusal(folder / "a.tif"),
+              HasSubstr(": its TIFF compression 136 cannot be read: save it as PNG"));
 }
 
 TEST(PictureReader, AStopEndsReadingAndResamplingAtOnceAndProgressIsReported) {

@@ -20,14 +20,17 @@ std::string number(std::uint64_t value, int bytes, bool little) {
 }
 
 /// A TIFF with one strip of 10 bytes that ends with the file.
-std::string tiff(bool little, bool big) {
+std::string tiff(bool little, bool big, int compression = 1) {
   const int offset = big ? 8 : 4;
   const std::uint64_t directory = big ? 16 : 8;
-  const std::uint64_t data = directory + (big ? 8 + 2 * 20 + 8 : 2 + 2 * 12 + 4);
+  const std::uint64_t data = directory + (big ? 8 + 3 * 20 + 8 : 2 + 3 * 12 + 4);
   std::string bytes = little ? "II" : "MM";
   bytes += number(big ? 43 : 42, 2, little);
   if (big) bytes += number(8, 2, little) + number(0, 2, little);
-  bytes += number(directory, offset, little) + number(2, big ? 8 : 2, little);
+  bytes += number(directory, offset, little) + number(3, big ? 8 : 2, little);
+  bytes += number(259, 2, little) + number(3, 2, little) + number(1, offset, little);
+  bytes += number(static_cast<std::uint64_t>(compression), 2, little);
+  bytes += std::string(big ? 6 : 2, '\0');
   bytes += number(273, 2, little) + number(4, 2, little) + number(1, offset, little);
   bytes += number(data, 4, little) + std::string(big ? 4 : 0, '\0');
   bytes += number(279, 2, little) + number(3, 2, little) + number(1, offset, little);
@@ -35,14 +38,14 @@ std::string tiff(bool little, bool big) {
   return bytes + number(0, offset, little) + std::string(10, 'x');
 }
 
-bool inside(const std::string& bytes) {
+std::string problem(const std::string& bytes) {
   std::istringstream file(bytes);
-  return tiff_pixels_are_inside(file);
+  return tiff_problem(file);
 }
 
 TEST(TiffOutline, AWholeFileOfAnyKindIsAccepted) {
   for (const bool little : {true, false}) {
-    for (const bool big : {true, false}) EXPECT_TRUE(inside(tiff(little, big)));
+    for (const bool big : {true, false}) EXPECT_EQ(problem(tiff(little, big)), "");
   }
 }
 
@@ -51,16 +54,21 @@ TEST(TiffOutline, EveryCutBehindTheHeaderIsNoticed) {
     for (const bool big : {true, false}) {
       const std::string bytes = tiff(little, big);
       for (std::size_t cut = 4; cut < bytes.size(); ++cut) {
-        EXPECT_FALSE(inside(bytes.substr(0, cut))) << cut;
+        EXPECT_EQ(problem(bytes.substr(0, cut)), "is truncated: the file ends before its TIFF data")
+            << cut;
       }
     }
   }
 }
 
 TEST(TiffOutline, OtherStreamsAreAccepted) {
-  EXPECT_TRUE(inside(""));
-  EXPECT_TRUE(inside("I"));
-  EXPECT_TRUE(inside("a letter"));
+  for (const char* other : {"", "I", "a letter"}) EXPECT_EQ(problem(other), "") << other;
+}
+
+TEST(TiffOutline, ACompressionThatNoDecoderKnowsIsNamed) {
+  EXPECT_EQ(problem(tiff(true, false, 5)), "");
+  EXPECT_EQ(problem(tiff(false, true, 136)),
+            "its TIFF compression 136 cannot be read: save it as PNG");
 }
 
 }  // namespace

@@ -193,6 +193,8 @@ TEST(Files, NamesOfFilesInTheMakingAreKnown) {
   const PendingFile pending(folder / "picture.exr");
   EXPECT_EQ(name_of_partial(pending.beside().filename().string()), "picture.exr");
   EXPECT_EQ(name_of_partial(".lens.partial-123"), "lens");
+  const PendingFile inner(pending.beside());
+  EXPECT_EQ(name_of_partial(inner.beside().filename().string()), "picture.exr");
   for (const char* name : {"picture.exr", "a.partial-12.exr", ".a.partial-.exr", ".partial-1.exr",
                            ".a.partial-12x.exr", ".my.partial-notes.txt"}) {
     EXPECT_EQ(name_of_partial(name), "") << name;

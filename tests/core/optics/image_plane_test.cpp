@@ -18,7 +18,7 @@ OpticalSetup oblong_setup(ViewSide view) {
 TEST(ImagePlane, FrontViewRunsAgainstXAndY) {
   const OpticalSetup setup = oblong_setup(ViewSide::kFront);
   const ImagePlane plane(setup);
-  // interface.md: pixel (c, r) covers x from origin + size − (c+1)·px to … − c·px, y likewise.
+  // docs/interface.md: pixel (c, r) covers x from origin + size − (c+1)·px to … − c·px, y likewise.
   const Eigen::Vector2d first = plane.to_mm({0.0, 0.0});
   EXPECT_NEAR(first.x(), 110.0, 1e-12);
   EXPECT_NEAR(first.y(), 65.0, 1e-12);

@@ -52,6 +52,16 @@ TEST(OpticalSetup, RefusesAnOriginThatIsNotFinite) {
               ::testing::StartsWith("image_origin[0] is "));
 }
 
+TEST(OpticalSetup, RefusesLightThatIsNoUnitVectorTowardsTheLens) {
+  for (const Eigen::Vector3d& light :
+       {Eigen::Vector3d(0.0, 0.0, 2.0), Eigen::Vector3d(0.0, 0.0, -1.0),
+        Eigen::Vector3d(kNan, 0.0, 1.0)}) {
+    EXPECT_THAT(refusal([&](OpticalSetup& s) { s.light = light; }),
+                ::testing::AllOf(::testing::StartsWith("light is "),
+                                 ::testing::EndsWith("a unit vector towards +z")));
+  }
+}
+
 TEST(OpticalSetup, RefusesAPictureWithoutPixels) {
   EXPECT_EQ(refusal([](OpticalSetup& s) { s.pixels.x() = 0; }),
             "pixels[0] is 0: it must be 1 or more");

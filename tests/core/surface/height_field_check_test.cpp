@@ -39,7 +39,7 @@ TEST(HeightFieldCheck, TakesAGridAndOneWhoseVerticesAreNotShared) {
 }
 
 /// Random heights and places within the lens keep it a height field; any triangle that is missing
-/// or stands there twice does not.
+/// or is given twice does not.
 TEST(HeightFieldCheck, FindsEveryTriangleThatIsMissingOrStandsTwice) {
   std::mt19937 random(7);
   std::uniform_real_distribution<double> shift(-0.2, 0.2);

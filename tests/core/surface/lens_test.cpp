@@ -56,8 +56,9 @@ Lens sample_lens() {
   lens.model = SurfaceModel::kSmooth;
   lens.target = wave(24, 16, 0.0);
   lens.render = wave(24, 16, 0.1);
-  lens.facet_metrics = {0.01, 31.5, 0.97, 0.005, 0.999};
-  lens.smooth_metrics = {0.0, std::numeric_limits<double>::infinity(), 1.0, 0.0, 1.0};
+  lens.metrics[SurfaceModel::kFacet] = {0.01, 31.5, 0.97, 0.005, 0.999};
+  lens.metrics[SurfaceModel::kSmooth] = {0.0, std::numeric_limits<double>::infinity(), 1.0, 0.0,
+                                         1.0};
   lens.provenance = {
       {"program", "lensforge 0.1.0"}, {"options", {{"rounds", 6}}}, {"seconds", 1.5}};
   return lens;
@@ -85,8 +86,9 @@ TEST(Lens, ComesBackAsItWasWritten) {
   EXPECT_EQ(read.model, lens.model);
   EXPECT_EQ(read.target, lens.target);
   EXPECT_EQ(read.render, lens.render);
-  expect_equal(read.facet_metrics, lens.facet_metrics);
-  expect_equal(read.smooth_metrics, lens.smooth_metrics);
+  for (const SurfaceModel model : kSurfaceModels) {
+    expect_equal(read.metrics.at(model), lens.metrics.at(model));
+  }
   EXPECT_EQ(read.provenance, lens.provenance);
 }
 
@@ -279,7 +281,7 @@ TEST(Lens, AnotherToolsLensWithoutLinearErrorIsRead) {
   json document = read_json(folder / "lens.json");
   document["metrics"]["facet"].erase("mae_linear");
   write_bytes(folder / "lens.json", document.dump());
-  EXPECT_EQ(read_lens(folder.path()).facet_metrics.mae_linear, 0.0);
+  EXPECT_EQ(read_lens(folder.path()).metrics.at(SurfaceModel::kFacet).mae_linear, 0.0);
 }
 
 TEST(Lens, AMissingFolderOrFileIsNamed) {

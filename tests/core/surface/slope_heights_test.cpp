@@ -65,7 +65,7 @@ struct Contradiction {
 
 TEST(SlopeHeights, EqualTheDenseLeastSquaresSolution) {
   const Contradiction c;
-  const Eigen::VectorXd heights = fit_heights(c.mesh, c.slopes);
+  const Eigen::VectorXd heights = heights_from_slopes(c.mesh, c.slopes);
   const Eigen::VectorXd dense = c.dense_solution();
   const double shift = heights[0] - dense[0];
   for (Eigen::Index v = 0; v < heights.size(); ++v) {
@@ -85,17 +85,17 @@ TEST(SlopeHeights, AreTheMeshsOwnWhereSlopesAgreeWithThem) {
     mesh.vertices(2, v) = 5.0 + 0.03 * x * x - 0.02 * x * y + 0.1 * y;
     slopes.col(v) << 0.06 * x - 0.02 * y, -0.02 * x + 0.1;
   }
-  const Eigen::VectorXd heights = fit_heights(mesh, slopes);
+  const Eigen::VectorXd heights = heights_from_slopes(mesh, slopes);
   EXPECT_LT((heights - mesh.vertices.row(2).transpose()).cwiseAbs().maxCoeff(), 1e-9);
 }
 
 TEST(SlopeHeights, DoNotDependOnWavesOfTheMesh) {
   Contradiction c;
-  const Eigen::VectorXd before = fit_heights(c.mesh, c.slopes);
+  const Eigen::VectorXd before = heights_from_slopes(c.mesh, c.slopes);
   for (Eigen::Index v = 0; v < c.mesh.vertex_count(); ++v) {
     c.mesh.vertices(2, v) += v % 2 == 0 ? 0.3 : -0.3;
   }
-  const Eigen::VectorXd after = fit_heights(c.mesh, c.slopes);
+  const Eigen::VectorXd after = heights_from_slopes(c.mesh, c.slopes);
   const Eigen::ArrayXd change = after - before;
   EXPECT_LT((change - change[0]).abs().maxCoeff(), 1e-7);
 }

@@ -57,7 +57,7 @@ TEST(TomlFields, RefusesKeysThatNoneAskedFor) {
   const toml::table table = parse_toml("extra = 'x'\n", "f");
   const TomlFields fields(table, kSource);
   EXPECT_EQ(message_of<InputError>([&] { fields.finish(); }),
-            "a.toml: extra: 'x': a list has no such key here");
+            "a.toml: extra: 'x': a list: unknown key");
 }
 
 TEST(TomlFields, RefusesWhatIsNotToml) {

@@ -11,9 +11,9 @@
 #include "design/energy/unlit_pixels.h"
 #include "design/energy/unlit_term.h"
 #include "design/finite_difference.h"
-#include "design/guided_optimization.h"
 #include "design/objective_setups.h"
 #include "design/random_input.h"
+#include "design/schedule/guided_optimization.h"
 
 namespace lensforge {
 namespace {
@@ -50,7 +50,7 @@ TEST(UnlitTerm, AdjointEqualsCentralDifferences) {
     unlit_term({x.segment<2>(0), x.segment<2>(2), x.segment<2>(4), 1.0}, 33, 10, 0.3, 0.7, bar);
     Eigen::VectorXd computed(6);
     computed << bar.p0, bar.p1, bar.p2;
-    EXPECT_LT(testing::gradient_error(computed, testing::numeric_gradient(f, x, 1e-4)), 1e-7);
+    EXPECT_LT(testing::plateau_error(computed, f, x, 1e-4), 1e-7);
   }
 }
 
@@ -146,13 +146,13 @@ TEST(UnlitObjective, GradientEqualsCentralDifferences) {
     return testing::evaluate_at(objective, x.reshaped(3, gradient.cols())).energy.total;
   };
   const double expected = gradient.cwiseProduct(direction).sum();
-  double best = std::numeric_limits<double>::infinity();
+  std::vector<double> errors;
   for (const double step : {1e-5, 1e-6, 1e-7}) {
     const double slope =
         testing::directional_slope(f, mesh.vertices.reshaped(), direction.reshaped(), step);
-    best = std::min(best, std::fabs(slope - expected));
+    errors.push_back(std::fabs(slope - expected));
   }
-  EXPECT_LT(best, 1e-6 * gradient.norm());
+  EXPECT_LT(testing::plateau_error(errors), 1e-6 * gradient.norm());
 }
 
 TEST(UnlitObjective, TheSmoothModelHasNone) {

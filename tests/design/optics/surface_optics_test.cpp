@@ -104,20 +104,6 @@ TEST(SurfaceOptics, AParaboloidFollowsTheExactRayLawAtInnerVertices) {
   EXPECT_GT(checked, 1000);
 }
 
-TEST(SurfaceOptics, VertexNormalsAreTheSumsOfTheirTriangles) {
-  const SurfaceMesh mesh = height_field(kSize, {7, 6}, testing::bumps);
-  const Eigen::Matrix3Xd normals = vertex_area_normals(mesh);
-  for (Eigen::Index v = 0; v < mesh.vertices.cols(); ++v) {
-    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-    for (Eigen::Index t = 0; t < mesh.triangles.cols(); ++t) {
-      if ((mesh.triangles.col(t).array() != static_cast<int>(v)).all()) continue;
-      const Eigen::Vector3d a = mesh.corner(t, 0);
-      sum += (mesh.corner(t, 1) - a).cross(mesh.corner(t, 2) - a);
-    }
-    EXPECT_LT((normals.col(v) - sum).norm(), 1e-14);
-  }
-}
-
 TEST(SurfaceOptics, TransmittedFluxAddsUpToOne) {
   const OpticalSetup setup = setup_of(kSize, {40, 32}, 150.0);
   const SurfaceMesh mesh = height_field(kSize, kShape, testing::bumps);

@@ -59,7 +59,7 @@ class HeightFitMeshes : public ::testing::TestWithParam<MeshKind> {
   double error_of_recovery(const SurfaceMesh& surface) {
     SurfaceMesh mesh = flattened(surface);
     const HeightFitSummary summary =
-        fit_heights(face_gradients(surface), thorough(), Executor::serial(), mesh);
+        fit_face_gradients(face_gradients(surface), thorough(), Executor::serial(), mesh);
     EXPECT_TRUE(summary.converged);
     EXPECT_LE(summary.residual, thorough().tolerance);
     RecordProperty("iterations", summary.iterations);
@@ -100,7 +100,7 @@ TEST_P(HeightFitMeshes, ASurfaceThatIsRightAlreadyStays) {
   for (double& z : mesh_.vertices.row(2)) z += random.between(-0.2, 0.2);
   SurfaceMesh mesh = mesh_;
   const HeightFitSummary summary =
-      fit_heights(face_gradients(mesh_), HeightFitOptions{}, Executor::serial(), mesh);
+      fit_face_gradients(face_gradients(mesh_), HeightFitOptions{}, Executor::serial(), mesh);
   EXPECT_TRUE(summary.converged);
   EXPECT_EQ(summary.iterations, 0);
   EXPECT_LT((mesh.vertices - mesh_.vertices).cwiseAbs().maxCoeff(), 1e-13);
@@ -110,8 +110,9 @@ TEST_P(HeightFitMeshes, NoGradientMakesASurfaceFlat) {
   Random random(5);
   for (double& z : mesh_.vertices.row(2)) z += random.between(-0.2, 0.2);
   const double mean = mesh_.vertices.row(2).mean();
-  const HeightFitSummary summary = fit_heights(Eigen::Matrix2Xd::Zero(2, mesh_.triangle_count()),
-                                               HeightFitOptions{}, Executor::serial(), mesh_);
+  const HeightFitSummary summary =
+      fit_face_gradients(Eigen::Matrix2Xd::Zero(2, mesh_.triangle_count()), HeightFitOptions{},
+                         Executor::serial(), mesh_);
   EXPECT_TRUE(summary.converged);
   EXPECT_LT((mesh_.vertices.row(2).array() - mean).abs().maxCoeff(), 1e-6);
 }
@@ -119,7 +120,7 @@ TEST_P(HeightFitMeshes, NoGradientMakesASurfaceFlat) {
 TEST_P(HeightFitMeshes, AFlatSurfaceStaysFlatUnderGradientsOfRoundingSize) {
   const Eigen::Matrix2Xd gradients = 1e-16 * random_gradients(mesh_, 6);
   const HeightFitSummary summary =
-      fit_heights(gradients, HeightFitOptions{}, Executor::serial(), mesh_);
+      fit_face_gradients(gradients, HeightFitOptions{}, Executor::serial(), mesh_);
   RecordProperty("iterations", summary.iterations);
   EXPECT_TRUE(mesh_.vertices.allFinite());
   EXPECT_LT((mesh_.vertices.row(2).array() - 5.0).abs().maxCoeff(), 1e-12);
@@ -129,14 +130,14 @@ TEST_P(HeightFitMeshes, MeanHeightIsKept) {
   Random random(7);
   for (double& z : mesh_.vertices.row(2)) z += random.between(-0.2, 0.2);
   const double mean = mesh_.vertices.row(2).mean();
-  fit_heights(random_gradients(mesh_, 8), HeightFitOptions{}, Executor::serial(), mesh_);
+  fit_face_gradients(random_gradients(mesh_, 8), HeightFitOptions{}, Executor::serial(), mesh_);
   EXPECT_NEAR(mesh_.vertices.row(2).mean(), mean, 1e-12);
 }
 
 TEST_P(HeightFitMeshes, FewIterationsAreEnough) {
   SurfaceMesh mesh = mesh_;
   const HeightFitSummary summary =
-      fit_heights(random_gradients(mesh_, 9), HeightFitOptions{}, Executor::serial(), mesh);
+      fit_face_gradients(random_gradients(mesh_, 9), HeightFitOptions{}, Executor::serial(), mesh);
   RecordProperty("iterations", summary.iterations);
   EXPECT_TRUE(summary.converged);
   EXPECT_LT(summary.iterations, 60);
@@ -165,7 +166,7 @@ TEST(HeightFit, ContradictoryGradientsGiveTheDenseLeastSquaresSolution) {
     // Of least norm, so of mean zero.
     const Eigen::VectorXd expected = rows.completeOrthogonalDecomposition().solve(wanted);
     ASSERT_NEAR(expected.mean(), 0.0, 1e-12);
-    ASSERT_TRUE(fit_heights(gradients, thorough(), Executor::serial(), mesh).converged);
+    ASSERT_TRUE(fit_face_gradients(gradients, thorough(), Executor::serial(), mesh).converged);
     const Eigen::VectorXd heights = mesh.vertices.row(2).transpose().array() - 5.0;
     EXPECT_LT((heights - expected).cwiseAbs().maxCoeff(), 1e-11);
     EXPECT_LT((rows.transpose() * (rows * heights - wanted)).norm(), 1e-11 * wanted.norm());
@@ -178,7 +179,7 @@ TEST(HeightFit, ReportsThatItHasNotConverged) {
   HeightFitOptions options = thorough();
   options.max_iterations = 2;
   const HeightFitSummary summary =
-      fit_heights(random_gradients(mesh, 13), options, Executor::serial(), mesh);
+      fit_face_gradients(random_gradients(mesh, 13), options, Executor::serial(), mesh);
   EXPECT_FALSE(summary.converged);
   EXPECT_EQ(summary.iterations, 2);
   EXPECT_GT(summary.residual, options.tolerance);
@@ -189,8 +190,8 @@ TEST(HeightFit, LeavesTheMeshAloneWhenAskedToStop) {
   SurfaceMesh mesh = before;
   std::stop_source stop;
   stop.request_stop();
-  EXPECT_THROW(fit_heights(random_gradients(mesh, 15), HeightFitOptions{},
-                           Executor::cpu(2).with_stop(stop.get_token()), mesh),
+  EXPECT_THROW(fit_face_gradients(random_gradients(mesh, 15), HeightFitOptions{},
+                                  Executor::cpu(2).with_stop(stop.get_token()), mesh),
                Interrupted);
   EXPECT_EQ(mesh.vertices, before.vertices);
 }
@@ -200,10 +201,10 @@ TEST(HeightFit, ThreadCountDoesNotChangeABit) {
   SurfaceMesh serial = graded_mesh(kSize, {61, 57}, 0.15, 16);
   const SurfaceMesh start = serial;
   const Eigen::Matrix2Xd gradients = random_gradients(serial, 17);
-  fit_heights(gradients, HeightFitOptions{}, Executor::serial(), serial);
+  fit_face_gradients(gradients, HeightFitOptions{}, Executor::serial(), serial);
   for (const int threads : {1, 2}) {
     SurfaceMesh mesh = start;
-    fit_heights(gradients, HeightFitOptions{}, Executor::cpu(threads), mesh);
+    fit_face_gradients(gradients, HeightFitOptions{}, Executor::cpu(threads), mesh);
     EXPECT_EQ(mesh.vertices, serial.vertices);
   }
 }

@@ -142,10 +142,10 @@ TEST(PowerCells, NewtonMatrixIsTheDerivativeOfTheMasses) {
       return measure_cells(diagram_of(sites, w), density, Executor::serial())
           .mass[static_cast<std::size_t>(i)];
     };
-    worst =
-        std::max(worst, (testing::numeric_gradient(mass, weights, 1e-5) - matrix.row(i).transpose())
-                            .cwiseAbs()
-                            .maxCoeff());
+    for (const double step : {1e-5, 5e-6}) {
+      const Eigen::VectorXd expected = testing::numeric_gradient(mass, weights, step);
+      worst = std::max(worst, (expected - matrix.row(i).transpose()).cwiseAbs().maxCoeff());
+    }
   }
   RecordProperty("worst", std::to_string(worst));
   // Vertices that cross a pixel border within the difference make a kink.
@@ -164,9 +164,7 @@ TEST(PowerCells, EnergyGradientIsTheMassError) {
   };
   const PowerCells cells = measure_cells(diagram_of(sites, weights), density, Executor::serial());
   const Eigen::Map<const Eigen::VectorXd> mass(cells.mass.data(), 20);
-  EXPECT_LT(
-      testing::gradient_error(mass - wanted, testing::numeric_gradient(energy, weights, 1e-3)),
-      1e-6);
+  EXPECT_LT(testing::plateau_error(mass - wanted, energy, weights, 1e-3), 1e-6);
 }
 
 TEST(PowerCells, AreTheSameOnOneAndTwoThreads) {

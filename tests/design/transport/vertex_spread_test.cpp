@@ -55,13 +55,14 @@ double dark_corner(double x, double y) { return x < 0.25 && y < 0.2 ? 10.0 : 1.0
 TEST(FavourDark, EvenBrightnessChangesNothing) {
   const SurfaceMesh mesh = make_grid_mesh(kSize, kShape, 5.0);
   const Eigen::VectorXd areas = image_area(mesh, uniform);
-  EXPECT_LT((favour_dark({mesh, areas}) - areas).cwiseAbs().maxCoeff(), 1e-9 * areas.maxCoeff());
+  EXPECT_LT((favour_dark({mesh, areas}, kSetup) - areas).cwiseAbs().maxCoeff(),
+            1e-9 * areas.maxCoeff());
 }
 
 TEST(FavourDark, WeighsByAPowerOfTheBrightness) {
   const SurfaceMesh mesh = make_grid_mesh(kSize, kShape, 5.0);
   const Eigen::VectorXd areas = image_area(mesh, dark_spot);
-  const Eigen::VectorXd weighed = favour_dark({mesh, areas});
+  const Eigen::VectorXd weighed = favour_dark({mesh, areas}, kSetup);
   // Of two faces of the same size one is as many times darker as it serves more.
   const Eigen::ArrayXd light = projected_areas(mesh).array();
   const Eigen::ArrayXd darkness = areas.array() / light;
@@ -84,18 +85,18 @@ TEST(FavourDark, TakesNoMoreThanATenthFromTheOthers) {
   const Eigen::VectorXd some = image_area(mesh, dark_corner);
   const Eigen::VectorXd half = image_area(mesh, left_half_serves_three_quarters);
   for (const Eigen::VectorXd& areas : {some, half}) {
-    const double cost = favour_dark({mesh, areas}).sum() / areas.sum();
+    const double cost = favour_dark({mesh, areas}, kSetup).sum() / areas.sum();
     EXPECT_GT(cost, 1.001);
     EXPECT_LE(cost, 1.1);
   }
-  EXPECT_NEAR(favour_dark({mesh, some}).sum() / some.sum(), 1.1, 1e-3);
+  EXPECT_NEAR(favour_dark({mesh, some}, kSetup).sum() / some.sum(), 1.1, 1e-3);
 }
 
 TEST(FavourDark, BlackServesNothingStill) {
   const SurfaceMesh mesh = make_grid_mesh(kSize, kShape, 5.0);
   Eigen::VectorXd areas = image_area(mesh, falling_ramp);
   areas.head(areas.size() / 3).setZero();
-  const Eigen::VectorXd weighed = favour_dark({mesh, areas});
+  const Eigen::VectorXd weighed = favour_dark({mesh, areas}, kSetup);
   EXPECT_EQ(weighed.head(areas.size() / 3).cwiseAbs().maxCoeff(), 0.0);
   EXPECT_TRUE(weighed.allFinite());
 }

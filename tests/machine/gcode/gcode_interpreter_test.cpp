@@ -135,7 +135,7 @@ TEST(GcodeInterpreter, RefusesWithLineAndReason) {
       {"G21\nG0 G4 P1", "G4 beside a motion"},
       {"G21\nG80\nX1", "coordinates after G80"},
       {"G53", "G53 without coordinates"},
-      {"G21 F10\nG53 G2 X1 I1", "G53 takes G0 and G1 only"},
+      {"G21 F10\nG53 G2 X1 I1", "G53 works with G0 and G1 only"},
       {"G21 F10\nG2 I1", "an arc without coordinates"},
       {"G21 F10\nG2 Z1 I1", "without a coordinate in its plane"},
       {"G21 F10\nG2 X1", "without R and without I J K"},
@@ -165,7 +165,15 @@ TEST(GcodeInterpreter, RefusesWithLineAndReason) {
   for (const auto& [program, reason] : cases) {
     EXPECT_THAT(run_program(program).refusal, HasSubstr(reason)) << program;
   }
-  EXPECT_THROW(effect_of("T300"), GcodeError);
+}
+
+TEST(GcodeInterpreter, TheDialectSaysWhichToolsThereAre) {
+  EXPECT_EQ(run_program("T300 M6", grblhal_dialect()).refusal,
+            "line 1: T300: grblhal numbers tools from 0 to 255");
+  EXPECT_EQ(run_program("T255 M6", grblhal_dialect()).refusal, "");
+  EXPECT_EQ(run_program("T99999 M6", linuxcnc_dialect()).refusal, "");
+  EXPECT_THAT(run_program("T1.5", linuxcnc_dialect()).refusal, HasSubstr("T1.5: linuxcnc numbers"));
+  EXPECT_THAT(run_program("T1000", fanuc_dialect()).refusal, HasSubstr("from 0 to 999"));
 }
 
 TEST(GcodeInterpreter, LinuxcncLimitsBlending) {
@@ -200,7 +208,7 @@ TEST(GcodeInterpreter, RefusesWhatADialectMisuses) {
       {"O0", "programs are numbered from 1"},
       {"O1.5", "programs are numbered from 1"},
       {"G43", "G43 without H"},
-      {"G43 H1.5", "tool offsets are numbered"},
+      {"G43 H1.5", "H1.5: fanuc numbers tools"},
       {"H1", "H belongs to no word"},
       {"G5.1", "G5.1 without Q"},
       {"Q1", "Q belongs to no word"},

@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/io/descriptor.h"
 #include "core/temp_folder.h"
 #include "machine/link/port_lock.h"
 #include "machine/link/port_spec.h"
@@ -237,19 +238,6 @@ class Server {
   Descriptor peer_;
   PortSpec spec_;
 };
-
-TEST(Descriptor, IsNeverAStandardOne) {
-  const int kept = ::fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, 10);
-  ::close(STDIN_FILENO);
-  {
-    const Descriptor file(::open("/dev/null", O_RDONLY | O_CLOEXEC));
-    EXPECT_GT(file.number(), STDERR_FILENO);
-    EXPECT_GE(::fcntl(file.number(), F_GETFD), 0);
-    EXPECT_LT(::fcntl(STDIN_FILENO, F_GETFD), 0) << "the number itself is given back";
-  }
-  ::dup2(kept, STDIN_FILENO);
-  ::close(kept);
-}
 
 // Linux lets connections beyond the backlog wait without an answer.
 TEST(TcpLink, AStopEndsTheWaitForAConnection) {

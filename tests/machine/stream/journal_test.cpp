@@ -13,6 +13,7 @@
 #include "core/full_disk.h"
 #include "core/temp_folder.h"
 #include "machine/stream/journal_text.h"
+#include "machine/stream/program_file.h"
 
 namespace lensforge {
 namespace {
@@ -277,18 +278,20 @@ TEST_F(Journals, TakeFastLinesWithFewReservations) {
   EXPECT_LT(std::filesystem::file_size(path()), 10'000U);
 }
 
+JobIdentity identity_of(const fs::path& path) { return ProgramFile(path).identity(); }
+
 TEST(JobIdentity, IsTheFileAndNotItsName) {
   const TempFolder folder;
   write_bytes(folder / "a.ngc", "abc");
   write_bytes(folder / "b.ngc", "abc");
   write_bytes(folder / "c.ngc", "abd");
-  const JobIdentity a = identify_job(folder / "a.ngc");
+  const JobIdentity a = identity_of(folder / "a.ngc");
   EXPECT_EQ(a.sha256, "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
   EXPECT_EQ(a.bytes, 3);
-  EXPECT_TRUE(a.same_program(identify_job(folder / "b.ngc")));
-  EXPECT_FALSE(a.same_program(identify_job(folder / "c.ngc")));
-  EXPECT_THROW(identify_job(folder / "d.ngc"), InputError);
-  EXPECT_THROW(identify_job(folder.path()), InputError);
+  EXPECT_TRUE(a.same_program(identity_of(folder / "b.ngc")));
+  EXPECT_FALSE(a.same_program(identity_of(folder / "c.ngc")));
+  EXPECT_THROW(identity_of(folder / "d.ngc"), InputError);
+  EXPECT_THROW(identity_of(folder.path()), InputError);
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <random>
 #include <string>
 #include <vector>
@@ -16,6 +17,21 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using Kind = Reply::Kind;
+
+/// Every reply that any bytes give is as parse_reply() promises.
+void expect_promises_kept(const std::string& bytes) {
+  ReplyReader reader;
+  std::int64_t count = 0;
+  reader.feed(bytes, [&](const Reply& reply) {
+    ++count;
+    const bool coded = reply.kind == Reply::Kind::kError || reply.kind == Reply::Kind::kAlarm;
+    ASSERT_LE(reply.text.size(), ReplyReader::kLongestLine) << reply.text;
+    ASSERT_EQ(coded, reply.code != 0) << reply.text;
+    ASSERT_EQ(reply.kind == Reply::Kind::kStatus, reply.status.has_value()) << reply.text;
+    ASSERT_EQ(reply.kind == Reply::Kind::kOk, reply.text == "ok") << reply.text;
+  });
+  ASSERT_EQ(count, std::count(bytes.begin(), bytes.end(), '\n'));
+}
 
 std::vector<Kind> kinds_of(const std::string& bytes) {
   ReplyReader reader;
@@ -245,7 +261,7 @@ TEST(ReplyReader, HoldsItsPromisesForMutatedBytes) {
       }
       if (bytes.empty()) bytes.push_back('\n');
     }
-    fuzz_replies(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size());
+    expect_promises_kept(bytes);
   }
 }
 

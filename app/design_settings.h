@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <string>
+
+#include "app/option_set.h"
+#include "design/design_options.h"
+
+namespace lensforge::app {
+
+/// What `lensforge design` was asked for.
+struct DesignSettings {
+  std::string target;
+  std::string out;
+  DesignOptions design;
+  bool resume = false;
+  bool force = false;
+};
+
+/// Adds every option of the command.
+void add_design_options(OptionSet& options, DesignSettings& settings);
+
+/// What nobody asked for is as the library has it for this picture.
+/// @throw InputError naming option or picture, value and rule.
+void settle(OptionSet& options, DesignSettings& settings, const Image& picture);
+
+}  // namespace lensforge::app

@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "app/export_output.h"
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+
+#include "app/json_output.h"
+
+namespace lensforge::app {
+namespace {
+
+std::string scientific(double value) {
+  std::array<char, 32> text{};
+  const int length = std::snprintf(text.data(), text.size(), "%.2g", value);
+  return {text.data(), static_cast<std::size_t>(length)};
+}
+
+std::string place_text(const Eigen::Vector2d& xy) {
+  return "x " + fixed(xy.x(), 2) + ", y " + fixed(xy.y(), 2);
+}
+
+nlohmann::json certificate(const SplineNet& net) {
+  nlohmann::json patches = nlohmann::json::array();
+  for (const SplinePatch& patch : net.patches) {
+    const auto range = [&](std::size_t k) {
+      const Eigen::MatrixXd& part = patch.coefficients[k];
+      return nlohmann::json{part.minCoeff(), part.maxCoeff()};
+    };
+    patches.push_back({{"x", range(0)},
+                       {"y", range(1)},
+                       {"cells", patch.cells},
+                       {"height_error_mm", patch.error.height},
+                       {"normal_error_rad", patch.error.normal},
+                       {"share_within_tolerance", patch.error.share_within()}});
+  }
+  return patches;
+}
+
+void describe_fit(const SplineNet& net, const FitOptions& fit, ExportReport& report) {
+  const FitError error = net.error();
+  const auto good =
+      std::count_if(net.patches.begin(), net.patches.end(),
+                    [&](const SplinePatch& patch) { return holds(patch.error, fit); });
+  report.json["height_error_mm"] = error.height;
+  report.json["normal_error_rad"] = error.normal;
+  report.json["height_rms_mm"] = error.height_rms;
+  report.json["normal_rms_rad"] = error.normal_rms;
+  report.json["worst_height_at_mm"] = {error.height_at.x(), error.height_at.y()};
+  report.json["worst_normal_at_mm"] = {error.normal_at.x(), error.normal_at.y()};
+  report.json["share_within_tolerance"] = error.share_within();
+  report.json["within_tolerance"] = holds(error, fit);
+  report.json["patches_within_tolerance"] = good;
+  report.json["control_points"] = net.control_points();
+  report.json["patches"] = certificate(net);
+  report.text += "  fit       " + std::to_string(good) + " of " +
+                 std::to_string(net.patches.size()) + " patches within tolerance, " +
+                 fixed(100.0 * error.share_within(), 1) + " % of the area, " +
+                 std::to_string(net.control_points()) + " control points\n" + "  worst     " +
+                 scientific(error.height) + " mm at " + place_text(error.height_at) + " (limit " +
+                 scientific(fit.tolerance) + "), normal " + scientific(error.normal) + " rad at " +
+                 place_text(error.normal_at) + " (limit " + scientific(fit.normal_tolerance) +
+                 ")\n" + "  rms       " + scientific(error.height_rms) + " mm, normal " +
+                 scientific(error.normal_rms) + " rad\n";
+}
+
+void describe_bound(const NormalBound& bound, ExportReport& report) {
+  report.json["least_possible_normal_error_rad"] = bound.largest;
+  report.json["share_no_surface_can_hold"] = bound.share_above;
+  report.text +=
+      "  possible  normals of the mesh contradict each other: " + scientific(bound.largest) +
+      " rad off at least at " + place_text(bound.at) + "; on " +
+      fixed(100.0 * bound.share_above, 1) + " % of the area no surface holds the limit\n";
+}
+
+void describe_solid(const SolidContent& content, double facets, ExportReport& report) {
+  report.json["faces"] = content.faces;
+  report.json["volume_mm3"] = content.volume;
+  report.json["mesh_volume_mm3"] = facets;
+  report.text += "  solid     " + std::to_string(content.faces) + " faces, " +
+                 fixed(content.volume / 1000.0, 3) + " cm3 (facets: " + fixed(facets / 1000.0, 3) +
+                 "), read back valid and closed\n";
+}
+
+void describe_metrics(const std::string& word, const ImageMetrics& metrics, ExportReport& report) {
+  report.json["metrics"][word] = metrics_json(metrics);
+  report.text += "  " + word + std::string(10 - word.size(), ' ') + metrics_text(metrics) + "\n";
+}
+
+void describe(const SplineSolid& solid, ExportReport& report) {
+  describe_solid(solid.content, solid.mesh_volume, report);
+  describe_fit(solid.net, solid.fit, report);
+  describe_bound(solid.bound, report);
+  describe_metrics("solid", solid.picture, report);
+}
+
+void describe(const MeshSolid& solid, ExportReport& report) {
+  report.json["triangles"] = solid.triangles;
+  report.json["volume_mm3"] = solid.volume;
+  report.text = "  solid     " + std::to_string(solid.triangles) + " triangles, " +
+                fixed(solid.volume / 1000.0, 3) + " cm3\n";
+}
+
+void describe(const HeightMap& map, ExportReport& report) {
+  report.json["pixels"] = {map.pixels.columns, map.pixels.rows};
+  report.json["pixel_mm"] = map.pixel;
+  report.text = "  heights   " + size_text(map.pixels.columns, map.pixels.rows) + " pixels of " +
+                fixed(map.pixel, 6) + " mm\n";
+  if (!map.scale) return;
+  report.json["black_mm"] = map.scale->black;
+  report.json["white_mm"] = map.scale->white;
+  report.text += "  grey      black is z = " + fixed(map.scale->black, 6) +
+                 " mm, white is z = " + fixed(map.scale->white, 6) + " mm\n";
+}
+
+}  // namespace
+
+ExportReport export_report(const ExportResult& result) {
+  ExportReport report;
+  if (result.splines) describe(*result.splines, report);
+  if (result.mesh) describe(*result.mesh, report);
+  if (result.heights) describe(*result.heights, report);
+  for (const auto& [model, metrics] : result.metrics) {
+    describe_metrics(model_name(model), metrics, report);
+  }
+  return report;
+}
+
+}  // namespace lensforge::app

@@ -1,0 +1,240 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cam/cam_fields.h"
+
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include "cam/post/program_writer.h"
+#include "core/error.h"
+#include "core/surface/surface_model.h"
+
+namespace lensforge {
+namespace {
+
+using O = CamOptions;
+using R = Row<O>;
+using Field = OptionField<O>;
+
+constexpr double kMegabyte = 1e6;
+
+/// The limits of one of the workshop's numbers (workshop_rule()).
+Limits as_in_workshop(const char* key) {
+  const NumberRule rule = workshop_rule(key);
+  return Limits::between(rule.least, rule.most);
+}
+
+Tool& tool_of(Workshop& workshop, int number) {
+  for (Tool& tool : workshop.tools) {
+    if (tool.number == number) return tool;
+  }
+  throw InputError("--workshop: there is no tool " + std::to_string(number));
+}
+
+const Tool& tool_of(const Workshop& workshop, int number) { return workshop.tool(number); }
+
+constexpr auto kBall = [](auto& o) -> auto& {
+  return tool_of(o.workshop, o.workshop.process.finish.tool);
+};
+constexpr auto kRougher = [](auto& o) -> auto& {
+  return tool_of(o.workshop, o.workshop.process.rough.tool);
+};
+constexpr auto kFinish = [](auto& o) -> auto& { return o.workshop.process.finish; };
+
+/// A member of something in the options: `at` leads to it.
+template <class At, class Member>
+auto in(At at, Member member) {
+  return [ at, member ](auto& o) -> auto& { return std::invoke(member, at(o)); };
+}
+
+/// The diameter of a tool, whose flutes and neck keep their proportions.
+template <class At>
+Field diameter(const char* name, At tool, const char* help) {
+  Field row = R::length(name, in(tool, &Tool::diameter), as_in_workshop("tool.diameter"), help);
+  row.set = [tool](O& o, const nlohmann::json& value) {
+    tool(o) = resized(tool(o), value.get<double>());
+  };
+  return row;
+}
+
+OptionTable<O> tool_rows() {
+  return {
+      diameter("--tool-diameter", kBall, "finishing ball-end mill"),
+      R::length("--pitch", in(kFinish, &FinishProcess::pitch), as_in_workshop("finish.pitch"),
+                "maximum stepover between rows"),
+      R::length("--scallop", in(kFinish, &FinishProcess::scallop), as_in_workshop("finish.scallop"),
+                "height of scallops; if above 0, the pitch follows from it"),
+      R::number("--spindle", in(kBall, &Tool::spindle_rpm), as_in_workshop("tool.spindle_rpm"),
+                "rpm", "finishing speed"),
+      R::number("--feed", in(kBall, &Tool::feed), as_in_workshop("tool.feed"), "mm/min",
+                "finishing feed"),
+      R::number("--plunge", in(kBall, &Tool::plunge), as_in_workshop("tool.plunge"), "mm/min",
+                "feed straight down"),
+      diameter("--rough-tool", kRougher, "diameter of the roughing tool"),
+      R::flag("--force", &O::force,
+              "replace files in DIR/cam that lensforge did not write, or that were changed since")};
+}
+
+OptionTable<O> raster_rows() {
+  return {R::word<PassAxis>("--along", in(kFinish, &FinishProcess::along),
+                            {{"x", PassAxis::kX}, {"y", PassAxis::kY}},
+                            "axis along which finishing rows run"),
+          R::word<PassStyle>("--order", in(kFinish, &FinishProcess::style),
+                             {{"zigzag", PassStyle::kZigzag},
+                              {"climb", PassStyle::kClimb},
+                              {"conventional", PassStyle::kConventional}},
+                             "finishing rows to and fro, or all one way"),
+          R::flag("--cross", in(kFinish, &FinishProcess::cross),
+                  "finish a second time, along the other axis"),
+          R::flag("--pencil", in(kFinish, &FinishProcess::pencil), "a last pass along the creases"),
+          R::length("--tolerance", in(kFinish, &FinishProcess::tolerance),
+                    as_in_workshop("finish.tolerance"),
+                    "largest distance of the path from the exact one"),
+          R::number("--slope-tolerance", in(kFinish, &FinishProcess::slope_tolerance),
+                    as_in_workshop("finish.slope_tolerance"), "rad",
+                    "largest error of a move's direction"),
+          R::whole("--decimals", &O::decimals, Limits::zero_or(4, 6),
+                   "digits after the point; 0: as the tolerances ask"),
+          R::without("--no-arcs", &O::arcs, "straight finishing moves only"),
+          R::without(
+              "--no-rough", [](auto& o) -> auto& { return o.workshop.process.rough.enabled; },
+              "no roughing program"),
+          R::without(
+              "--no-semi", [](auto& o) -> auto& { return o.workshop.process.semi.enabled; },
+              "no semi-finishing program")};
+}
+
+/// What can be cut of a lens.
+R::Choices<std::optional<SurfaceModel>> surfaces() {
+  R::Choices<std::optional<SurfaceModel>> words{{"designed", std::nullopt}};
+  for (const auto& [word, model] : named_models()) words.emplace_back(word, model);
+  return words;
+}
+
+OptionTable<O> blank_rows() {
+  using Surface = std::optional<SurfaceModel>;
+  return {
+      R::length(
+          "--stock", [](auto& o) -> auto& { return o.workshop.stock.allowance; },
+          as_in_workshop("stock.allowance"), "top of the blank above the surface's highest point"),
+      R::length(
+          "--margin", [](auto& o) -> auto& { return o.workshop.stock.margin; },
+          as_in_workshop("stock.margin"), "blank beyond the lens on every side"),
+      R::length(
+          "--safe-height", [](auto& o) -> auto& { return o.workshop.process.safe_height; },
+          as_in_workshop("process.safe_height"),
+          "height of rapid moves above the top of the blank"),
+      R::word<ZZero>("--z-zero", &O::z_zero,
+                     {{"stock", ZZero::kStock}, {"table", ZZero::kTable}, {"lens", ZZero::kLens}},
+                     "Z0: top of the blank, the table below it, or the lens's highest point"),
+      R::word<PartKind>("--part", &O::part,
+                        {{"lens", PartKind::kLens}, {"mould", PartKind::kMould}},
+                        "mill the lens, or the mould to cast it in"),
+      R::number("--shrinkage", &O::shrinkage, Limits::between(0, cam_limit::kShrinkage), "",
+                "shrinkage of the cast part, share of a length"),
+      R::word<Surface>("--surface", &O::surface, surfaces(),
+                       "cut what was designed, the smooth surface over the mesh, or its facets")};
+}
+
+/// The size of a program, which the options hold in bytes.
+Field split() {
+  const Limits limits =
+      Limits::zero_or(static_cast<double>(kSmallestProgramLimit) / kMegabyte, 1e5);
+  Field row{{"--split",
+             OptionKind::kNumber,
+             "split programs above this size; 0: the dialect's own limit",
+             limits,
+             "MB",
+             {}},
+            [](const O& o) { return static_cast<double>(o.largest_file) / kMegabyte; },
+            [](O& o, const nlohmann::json& value) {
+              o.largest_file =
+                  static_cast<std::uintmax_t>(std::llround(value.get<double>() * kMegabyte));
+            },
+            {},
+            {}};
+  row.stored = row.get;
+  return row;
+}
+
+Field post() {
+  Field row = R::text(
+      "--post", [](auto& o) -> auto& { return o.post.name; }, "NAME|FILE.toml",
+      "dialect: linuxcnc, grbl, fanuc, or a description of one");
+  row.set = [](O& o, const nlohmann::json& value) { o.post = find_post(value, "--post"); };
+  return row;
+}
+
+OptionTable<O> program_rows() {
+  return {post(),
+          R::word<ProgramGrouping>(
+              "--programs", &O::grouping,
+              {{"operation", ProgramGrouping::kOperation},
+               {"tool", ProgramGrouping::kTool},
+               {"one", ProgramGrouping::kAll}},
+              "a file per operation, per tool, or one where the dialect changes tools"),
+          split(),
+          R::number("--spin-up", &O::spin_up, Limits::between(0, cam_limit::kSpinUp), "s",
+                    "wait after spindle start"),
+          R::word<Coolant>(
+              "--coolant", &O::coolant,
+              {{"off", Coolant::kOff}, {"mist", Coolant::kMist}, {"flood", Coolant::kFlood}},
+              "coolant")};
+}
+
+OptionTable<O> prediction_rows() {
+  constexpr auto polish = [](auto& o) -> auto& { return o.polish; };
+  return {R::without("--no-render", &O::render, "programs only, without the predicted picture"),
+          R::without("--no-remedies", &O::remedies, "do not try what helps where most light leaks"),
+          R::length("--polish-sigma", in(polish, &PolishModel::sigma),
+                    Limits::between(0, cam_limit::kPolish),
+                    "polishing averages heights with a Gaussian of this σ"),
+          R::length("--rim-depth", in(polish, &PolishModel::rim_depth),
+                    Limits::between(0, cam_limit::kPolish),
+                    "extra depth that polishing removes at the rim"),
+          R::length("--rim-length", in(polish, &PolishModel::rim_length),
+                    Limits::between(cam_limit::kLeastRim, cam_limit::kRim),
+                    "distance from the rim over which the extra depth falls to a third"),
+          R::length("--sample-spacing", &O::sample_spacing,
+                    Limits::zero_or(cam_limit::kFinestSample, cam_limit::kCoarsestSample),
+                    "spacing of samples of the milled surface; 0: chosen from pitch and σ"),
+          R::number(
+              "--dark-below", [](auto& o) -> auto& { return o.leakage.dark_below; },
+              Limits::between(0, cam_limit::kDark), "",
+              "parts of the picture below this share of its mean are dark")};
+}
+
+OptionTable<O> limit_rows() {
+  constexpr auto limits = [](auto& o) -> auto& { return o.limits; };
+  const Limits any = Limits::between(0, cam_limit::kLimit);
+  return {R::number("--max-leakage", in(limits, &CutLimits::leakage), any, "",
+                    "verdict: share of light that may land where the design puts less"),
+          R::number("--max-dark", in(limits, &CutLimits::dark_flux), any, "",
+                    "verdict: share of light that may land in dark parts"),
+          R::number("--max-mae-increase", in(limits, &CutLimits::mae_increase), any, "",
+                    "verdict: MAE of the part above that of the design"),
+          R::length("--max-gouge", in(limits, &CutLimits::gouge), any,
+                    "verdict: deepest cut below the exact path"),
+          R::length("--max-excess", in(limits, &CutLimits::excess), any,
+                    "verdict: highest path above the exact one"),
+          R::number("--max-slope", in(limits, &CutLimits::slope), any, "rad",
+                    "verdict: error of the path's direction over 5 µm"),
+          R::length("--max-fillet", in(limits, &CutLimits::fillet_depth), any,
+                    "verdict: material that the ball leaves in creases")};
+}
+
+}  // namespace
+
+const OptionTable<CamOptions>& cam_fields() {
+  static const OptionTable<O> table = [] {
+    OptionTable<O> all;
+    for (const OptionTable<O>& rows : {tool_rows(), raster_rows(), blank_rows(), program_rows(),
+                                       prediction_rows(), limit_rows()}) {
+      all.insert(all.end(), rows.begin(), rows.end());
+    }
+    return all;
+  }();
+  return table;
+}
+
+}  // namespace lensforge

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+#include "core/compute/host_device.h"
+
+namespace lensforge {
+
+/// Corners of a surface triangle, or the derivative of a scalar by them. Millimetres.
+struct Corners {
+  Eigen::Vector3d v0{0.0, 0.0, 0.0};
+  Eigen::Vector3d v1{0.0, 0.0, 0.0};
+  Eigen::Vector3d v2{0.0, 0.0, 0.0};
+};
+
+/// (v1 − v0) × (v2 − v0): the normal times twice the area (numerator of Sun et al., Eq. 4).
+LF_HD inline Eigen::Vector3d area_normal(const Corners& t) {
+  return (t.v1 - t.v0).cross(t.v2 - t.v0);
+}
+
+/// Twice the signed plan area, that of a triangle's projection along z: the z of area_normal().
+LF_HD inline double doubled_projected_area(const Corners& t) {
+  return (t.v1.x() - t.v0.x()) * (t.v2.y() - t.v0.y()) -
+         (t.v1.y() - t.v0.y()) * (t.v2.x() - t.v0.x());
+}
+
+/// Adjoint of area_normal(): adds to the corners' derivatives.
+LF_HD inline void area_normal_adjoint(const Corners& t, const Eigen::Vector3d& bar, Corners& grad) {
+  const Eigen::Vector3d d1 = (t.v2 - t.v0).cross(bar);
+  const Eigen::Vector3d d2 = bar.cross(t.v1 - t.v0);
+  grad.v1 += d1;
+  grad.v2 += d2;
+  grad.v0 -= d1 + d2;
+}
+
+/// Adjoint of N ↦ n = N/|N|.
+LF_HD inline Eigen::Vector3d normalize_adjoint(const Eigen::Vector3d& n, double length,
+                                               const Eigen::Vector3d& n_bar) {
+  return (n_bar - n.dot(n_bar) * n) / length;
+}
+
+}  // namespace lensforge

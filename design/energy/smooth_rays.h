@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "core/compute/executor.h"
+#include "core/compute/host_device.h"
+#include "design/energy/objective_adjoint.h"
+#include "design/energy/objective_sums.h"
+#include "design/energy/objective_view.h"
+#include "design/optics/columns.h"
+#include "design/optics/smooth.h"
+
+/// Smooth model in the objective: every vertex sends one ray by its normal, and image triangles
+/// share corners.
+namespace lensforge {
+
+/// What kernels ask, and the arrays that they share. @pre landing is up to date.
+struct SmoothRays {
+  double* normals;  ///< 3 × V, sums of area normals.
+  double* landing;  ///< 2 × V, pixel coordinates.
+  ImageTriangle* image_bar;
+  double* position_bar;  ///< 3 × V, direct derivative by position.
+  double* normal_bar;    ///< 3 × V, derivative by the sum of area normals.
+
+  [[nodiscard]] LF_HD ImageTriangle image(const ObjectiveView& o, std::int64_t face) const {
+    const int* v = o.mesh.triangle(face);
+    return {column2(landing, v[0]), column2(landing, v[1]), column2(landing, v[2]),
+            o.light.flux(o.corners(face))};
+  }
+
+  /// Weighted derivatives of the goal by one face; SmoothImageAdjoint has counted its values.
+  LF_HD GoalSums pull_back(const ObjectiveView& o, std::int64_t face, const Corners& t,
+                           FaceBar& bar) const {
+    const int* v = o.mesh.triangle(face);
+    for (int k = 0; k < 3; ++k) bar.area_normal += column3(normal_bar, v[k]);
+    o.light.flux_adjoint(t, image_bar[face].flux, bar.corners, bar.area_normal);
+    return {};
+  }
+
+  /// Derivative by a vertex that no face carries.
+  [[nodiscard]] LF_HD Eigen::Vector3d vertex_bar(std::int64_t v) const {
+    return column3(position_bar, v);
+  }
+};
+
+/// Normal and landing point of a vertex; 1 where it does not transmit, else 0.
+struct LandVertex {
+  ObjectiveView o;
+  SmoothRays rays;
+
+  LF_HD std::array<double, 1> operator()(std::int64_t v) const {
+    Eigen::Vector3d sum(0.0, 0.0, 0.0);
+    const MeshView& mesh = o.mesh;
+    for (auto c = mesh.vertex_corner_begin[v]; c < mesh.vertex_corner_begin[v + 1]; ++c) {
+      sum += area_normal(o.corners(mesh.vertex_corners[c] / 3));
+    }
+    column3(rays.normals, v) = sum;
+    const Eigen::Vector3d n = VertexNormal(sum).n;
+    const Eigen::Vector3d p = column3(o.vertices, v);
+    if (!o.light.transmits(p, n)) return {1.0};
+    column2(rays.landing, v) = project_vertex(p, n, o.light);
+    return {0.0};
+  }
+};
+
+/// Derivatives of the goal by one image triangle, and the goal's values.
+struct SmoothImageAdjoint {
+  ObjectiveView o;
+  SmoothRays rays;
+
+  LF_HD GoalSums::Packed operator()(std::int64_t i) const {
+    rays.image_bar[i] = {};
+    return goal_adjoint(o, i, rays.image(o, i), rays.image_bar[i]).packed();
+  }
+};
+
+/// Derivatives by a landing point, carried to position and normal sum.
+struct PullBackVertex {
+  ObjectiveView o;
+  SmoothRays rays;
+
+  LF_HD void operator()(std::int64_t v) const {
+    Eigen::Vector2d u_bar(0.0, 0.0);
+    const MeshView& mesh = o.mesh;
+    for (auto c = mesh.vertex_corner_begin[v]; c < mesh.vertex_corner_begin[v + 1]; ++c) {
+      const std::int32_t corner = mesh.vertex_corners[c];
+      const ImageTriangle& bar = rays.image_bar[corner / 3];
+      u_bar += corner % 3 == 0 ? bar.p0 : (corner % 3 == 1 ? bar.p1 : bar.p2);
+    }
+    const VertexNormal normal(column3(rays.normals, v));
+    Eigen::Vector3d p_bar(0.0, 0.0, 0.0);
+    const Eigen::Vector3d n_bar =
+        project_vertex_adjoint(column3(o.vertices, v), normal.n, o.light, u_bar, p_bar);
+    column3(rays.position_bar, v) = p_bar;
+    column3(rays.normal_bar, v) = normalize_adjoint(normal.n, normal.length, n_bar);
+  }
+};
+
+/// What the objective asks; see FacetRaysOn.
+template <class Exec>
+class SmoothRaysOn {
+ public:
+  static constexpr bool kLeadable = false;
+  using View = SmoothRays;
+
+  SmoothRaysOn(std::int64_t faces, std::int64_t vertices)
+      : normals_(3 * static_cast<std::size_t>(vertices)),
+        landing_(2 * static_cast<std::size_t>(vertices)),
+        image_bar_(static_cast<std::size_t>(faces)),
+        position_bar_(3 * static_cast<std::size_t>(vertices)),
+        normal_bar_(3 * static_cast<std::size_t>(vertices)) {}
+
+  [[nodiscard]] SmoothRays view() {
+    return {normals_.data(), landing_.data(), image_bar_.data(), position_bar_.data(),
+            normal_bar_.data()};
+  }
+
+  [[nodiscard]] bool land(const Exec& executor, const ObjectiveView& o) {
+    const LandVertex kernel{o, view()};
+    return pending_sum<1>(executor, "land vertices", o.mesh.vertices, kernel).get()[0] == 0.0;
+  }
+
+  [[nodiscard]] auto pull_back(const Exec& executor, const ObjectiveView& o) {
+    auto sums =
+        pending_sum<4>(executor, "flux adjoint", o.mesh.faces, SmoothImageAdjoint{o, view()});
+    parallel_for(executor, "pull back vertices", o.mesh.vertices, PullBackVertex{o, view()});
+    return sums;
+  }
+
+ private:
+  template <class T>
+  using Buffer = typename Exec::template Buffer<T>;
+
+  Buffer<double> normals_;
+  Buffer<double> landing_;
+  Buffer<ImageTriangle> image_bar_;
+  Buffer<double> position_bar_;
+  Buffer<double> normal_bar_;
+};
+
+}  // namespace lensforge

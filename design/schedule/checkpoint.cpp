@@ -1,0 +1,211 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "design/schedule/checkpoint.h"
+
+#include <bit>
+#include <cmath>
+#include <cstddef>
+#include <cstring>
+#include <nlohmann/json.hpp>
+#include <span>
+#include <string>
+#include <string_view>
+#include <system_error>
+
+#include "core/error.h"
+#include "core/io/files.h"
+#include "core/surface/grid_mesh.h"
+#include "core/text/json_fields.h"
+#include "core/text/json_text.h"
+#include "design/design_fields.h"
+
+// File: the magic line, then a JSON header on one line, then as little-endian doubles the vertices
+// and, if the header says so, the reach of their steps, then a FNV-1a hash of all that goes before.
+namespace lensforge {
+
+namespace {
+
+using nlohmann::json;
+
+/// A checkpoint has 48 bytes a vertex: this one would have 178 million of them.
+constexpr std::uintmax_t kMaxBytes = std::uintmax_t{8} << 30U;
+
+constexpr std::string_view kMagic = "lensforge checkpoint 3\n";
+
+static_assert(std::endian::native == std::endian::little, "checkpoints are little-endian");
+
+/// Fowler–Noll–Vo 1a, 64 bit.
+class Hash {
+ public:
+  void add(std::string_view bytes) {
+    for (const char c : bytes) {
+      value_ = (value_ ^ static_cast<unsigned char>(c)) * 0x100000001b3ULL;
+    }
+  }
+  [[nodiscard]] std::uint64_t value() const { return value_; }
+
+ private:
+  std::uint64_t value_ = 0xcbf29ce484222325ULL;
+};
+
+template <class T>
+std::string_view bytes_of(std::span<const T> values) {
+  return {reinterpret_cast<const char*>(values.data()), values.size_bytes()};
+}
+
+std::span<const double> entries(const Eigen::Matrix3Xd& matrix) {
+  return {matrix.data(), static_cast<std::size_t>(matrix.size())};
+}
+
+/// Appends every option that a table holds.
+template <class Options>
+void append(const OptionTable<Options>& table, const Options& options, json& description) {
+  for (const OptionField<Options>& field : table) {
+    if (field.left_out.empty()) description.push_back(field.stored(options));
+  }
+}
+
+json to_json(const ConvergenceRow& row) {
+  const EnergyValues& e = row.energy;
+  return {row.stage,  row.level,  row.round, row.iteration,  e.image, e.unlit,
+          e.gradient, e.boundary, e.barrier, e.face,         e.edge,  e.laplacian,
+          e.align,    e.flux,     e.total,   row.mass_error, row.mae, row.seconds};
+}
+
+ConvergenceRow row_from_json(const json& j) {
+  ConvergenceRow row;
+  row.stage = j.at(0);
+  row.level = j.at(1);
+  row.round = j.at(2);
+  row.iteration = j.at(3);
+  EnergyValues& e = row.energy;
+  int next = 4;
+  for (double* value :
+       {&e.image, &e.unlit, &e.gradient, &e.boundary, &e.barrier, &e.face, &e.edge, &e.laplacian,
+        &e.align, &e.flux, &e.total, &row.mass_error, &row.mae, &row.seconds}) {
+    *value = j.at(static_cast<std::size_t>(next++));
+  }
+  return row;
+}
+
+[[noreturn]] void refuse(const std::filesystem::path& path, const std::string& why) {
+  throw InputError("checkpoint '" + path.string() + "' " + why);
+}
+
+std::string read_bytes(const std::filesystem::path& path) {
+  std::error_code ignored;
+  if (!std::filesystem::exists(path, ignored)) {
+    refuse(path, "cannot be read: there is nothing to resume from");
+  }
+  return read_whole_file(path, kMaxBytes);
+}
+
+std::string header_name(const std::filesystem::path& path) {
+  return "checkpoint '" + path.string() + "' header";
+}
+
+/// The parts of a checkpoint file, hash and magic verified.
+struct Parts {
+  json header;
+  std::string_view numbers;
+};
+
+Parts split(const std::string& content, const std::filesystem::path& path) {
+  std::string_view rest = content;
+  if (!rest.starts_with(kMagic)) refuse(path, "is not a checkpoint of this version");
+  std::uint64_t stored = 0;
+  if (rest.size() < kMagic.size() + sizeof(stored)) refuse(path, "is truncated");
+  std::memcpy(&stored, rest.data() + rest.size() - sizeof(stored), sizeof(stored));
+  rest.remove_suffix(sizeof(stored));
+  Hash hash;
+  hash.add(rest);
+  if (hash.value() != stored) refuse(path, "is damaged: its check sum does not match");
+  rest.remove_prefix(kMagic.size());
+  const std::size_t end = rest.find('\n');
+  if (end == std::string_view::npos) refuse(path, "has no header");
+  return {parse_json(rest.substr(0, end), header_name(path)), rest.substr(end + 1)};
+}
+
+}  // namespace
+
+std::uint64_t design_fingerprint(const Image& target, const DesignOptions& options) {
+  json weights = json::array();
+  append(weight_fields(), with_smoothness_applied(options).weights, weights);
+  json description = {target.columns(), target.rows()};
+  append(design_fields(), options, description);
+  description.push_back(weights);
+  Hash hash;
+  hash.add(description.dump());
+  hash.add(bytes_of(target.values()));
+  return hash.value();
+}
+
+void write_checkpoint(const Checkpoint& checkpoint, const std::filesystem::path& path) {
+  json rows = json::array();
+  for (const ConvergenceRow& row : checkpoint.convergence) rows.push_back(to_json(row));
+  const StepScales& steps = checkpoint.scales;
+  const json scales = steps.known() ? json{steps.xy, steps.z} : json();
+  const json header = {{"fingerprint", checkpoint.fingerprint},
+                       {"level", checkpoint.level},
+                       {"round", checkpoint.round},
+                       {"value", std::isfinite(checkpoint.value) ? json(checkpoint.value) : json()},
+                       {"transporting", checkpoint.transporting},
+                       {"seconds", checkpoint.seconds},
+                       {"columns", checkpoint.mesh.grid.columns},
+                       {"rows", checkpoint.mesh.grid.rows},
+                       {"scales", scales},
+                       {"convergence", rows}};
+  std::string content(kMagic);
+  content += header.dump();
+  content += '\n';
+  content += bytes_of(entries(checkpoint.mesh.vertices));
+  content += bytes_of(entries(steps.reach));
+  Hash hash;
+  hash.add(content);
+  const std::uint64_t value = hash.value();
+  content += bytes_of(std::span<const std::uint64_t>(&value, 1));
+  write_whole_file(path, content);
+}
+
+Checkpoint read_checkpoint(const std::filesystem::path& path) {
+  const std::string content = read_bytes(path);
+  const Parts parts = split(content, path);
+  try {
+    Checkpoint checkpoint;
+    checkpoint.fingerprint = parts.header.at("fingerprint");
+    const JsonFields fields(parts.header, header_name(path));
+    checkpoint.level = fields.integer("level");
+    checkpoint.round = fields.integer("round");
+    if (checkpoint.level < 0) fields.refuse("level", "it must be 0 or more");
+    if (checkpoint.round < 0) fields.refuse("round", "it must be 0 or more");
+    const json& value = parts.header.at("value");
+    if (!value.is_null()) checkpoint.value = value;
+    checkpoint.transporting = parts.header.at("transporting");
+    checkpoint.seconds = parts.header.at("seconds");
+    for (const json& row : parts.header.at("convergence")) {
+      checkpoint.convergence.push_back(row_from_json(row));
+    }
+    const GridShape shape{fields.integer("columns"), fields.integer("rows")};
+    const json& scales = parts.header.at("scales");
+    const std::size_t bytes = parts.numbers.size() / (scales.is_null() ? 1 : 2);
+    const std::size_t count = bytes / (3 * sizeof(double));
+    if (shape.columns < 2 || shape.rows < 2 ||
+        static_cast<std::size_t>(shape.columns) * static_cast<std::size_t>(shape.rows) != count ||
+        parts.numbers.size() != count * 3 * sizeof(double) * (scales.is_null() ? 1 : 2)) {
+      refuse(path, "holds fewer vertices than its header says");
+    }
+    checkpoint.mesh = make_grid_mesh(Eigen::Vector2d::Ones(), shape, 0.0);
+    std::memcpy(checkpoint.mesh.vertices.data(), parts.numbers.data(), bytes);
+    if (!checkpoint.mesh.vertices.allFinite()) refuse(path, "holds a vertex that is not finite");
+    if (!scales.is_null()) {
+      checkpoint.scales.xy = scales.at(0);
+      checkpoint.scales.z = scales.at(1);
+      checkpoint.scales.reach.resizeLike(checkpoint.mesh.vertices);
+      std::memcpy(checkpoint.scales.reach.data(), parts.numbers.data() + bytes, bytes);
+    }
+    return checkpoint;
+  } catch (const json::exception&) {
+    refuse(path, "has a bad header: a field is missing or of another type");
+  }
+}
+
+}  // namespace lensforge

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "design/schedule/design_task.h"
+
+#include <utility>
+
+#include "core/image/image_io.h"
+
+namespace lensforge {
+Image working_picture(const Image& target, const DesignOptions& options, const RunControl& run) {
+  const Eigen::Vector2i pixels = working_size(target.columns(), target.rows(), options.pixels);
+  return resample(target, pixels.x(), pixels.y(), run);
+}
+
+DesignTask make_task(const Image& target, const DesignOptions& options, const Executor& executor,
+                     const RunControl& control) {
+  // Nothing is reported before all input has been accepted.
+  Image working = working_picture(target, options, {control.stop_token(), {}});
+  const Eigen::Vector2i pixels(working.columns(), working.rows());
+  return {options,
+          control,
+          executor.with_stop(control.stop_token()),
+          std::move(working),
+          optical_setup(options, pixels),
+          plan_levels(pixels, options)};
+}
+
+LevelProblem make_problem(const DesignTask& task, const Level& level, std::int64_t triangles) {
+  LevelProblem problem;
+  problem.setup = task.setup;
+  problem.setup.pixels = level.pixels;
+  problem.target = resample(task.target, level.pixels.x(), level.pixels.y());
+  problem.objective.weights = task.options.weights;
+  problem.objective.model = task.options.model;
+  problem.objective.nu = level.nu;
+  problem.objective.area = default_area_barrier(problem.setup, triangles);
+  return problem;
+}
+
+}  // namespace lensforge

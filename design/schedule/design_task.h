@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/compute/executor.h"
+#include "core/compute/run_control.h"
+#include "core/image/image.h"
+#include "core/optics/optical_setup.h"
+#include "design/design_options.h"
+#include "design/energy/objective_options.h"
+#include "design/schedule/level_plan.h"
+
+namespace lensforge {
+
+/// What a design is to do, at full size; no step changes it.
+struct DesignTask {
+  const DesignOptions& options;
+  const RunControl& control;
+  Executor executor;  ///< Stops when the control does.
+  Image target;       ///< Working picture.
+  OpticalSetup setup;
+  std::vector<Level> levels;
+};
+
+/// The picture at the size that the options ask for. @throw Interrupted
+Image working_picture(const Image& target, const DesignOptions& options, const RunControl& run);
+
+/// @param target  linear light, any size. Options and control must outlive the task. @throw
+/// Interrupted @pre validate(options, target) passes.
+DesignTask make_task(const Image& target, const DesignOptions& options, const Executor& executor,
+                     const RunControl& control);
+
+/// What is to be solved at one resolution.
+struct LevelProblem {
+  OpticalSetup setup;
+  Image target;
+  ObjectiveOptions objective;
+};
+
+/// @param triangles  of the level's mesh.
+LevelProblem make_problem(const DesignTask& task, const Level& level, std::int64_t triangles);
+
+}  // namespace lensforge

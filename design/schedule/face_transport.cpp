@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "design/schedule/face_transport.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "core/optics/light_path.h"
+#include "design/optics/surface_optics.h"
+#include "design/transport/height_fit.h"
+
+namespace lensforge {
+
+FaceLight face_light(const SurfaceMesh& mesh, const OpticalSetup& setup, SurfaceModel model,
+                     const Executor& executor) {
+  const std::vector<ImageTriangle> images = project_surface(mesh, setup, model, executor);
+  FaceLight light;
+  light.landing.resize(2, mesh.triangles.cols());
+  light.flux.resize(mesh.triangles.cols());
+  for (Eigen::Index f = 0; f < light.flux.size(); ++f) {
+    const ImageTriangle& t = images[static_cast<std::size_t>(f)];
+    light.landing.col(f) = (t.p0 + t.p1 + t.p2) / 3.0;
+    light.flux[f] = t.flux;
+  }
+  return light;
+}
+
+TransportResult transport_faces(const FaceLight& light, const Image& target,
+                                const TransportOptions& options, const Executor& executor,
+                                const RunControl& control) {
+  return solve_semi_discrete(light.landing, light.flux, target, options, executor, control);
+}
+
+Eigen::Matrix2Xd map_faces(const FaceLight& light, const BrenierMap& map,
+                           const Executor& executor) {
+  Eigen::Matrix2Xd landing(2, light.landing.cols());
+  parallel_for(executor, "map faces", landing.cols(),
+               [&](std::int64_t f) { landing.col(f) = map(light.landing.col(f)); });
+  return landing;
+}
+
+void aim_faces(const Correspondence& correspondence, const OpticalSetup& setup,
+               const Executor& executor, SurfaceMesh& mesh) {
+  const LightPath light(setup);
+  Eigen::Matrix2Xd gradients(2, mesh.triangles.cols());
+  parallel_for(executor, "aim faces", mesh.triangles.cols(), [&](std::int64_t f) {
+    const auto t = mesh.triangles.col(f);
+    const Eigen::Vector3d c =
+        (mesh.vertices.col(t[0]) + mesh.vertices.col(t[1]) + mesh.vertices.col(t[2])) / 3.0;
+    gradients.col(f) = light.gradient_for(c, correspondence.centroids.col(f));
+  });
+  fit_face_gradients(gradients, HeightFitOptions{}, executor, mesh);
+}
+
+}  // namespace lensforge

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "core/optics/optical_setup.h"
+#include "core/surface/surface_mesh.h"
+#include "design/design_options.h"
+
+namespace lensforge {
+
+/// One resolution of the coarse-to-fine schedule.
+struct Level {
+  Eigen::Vector2i pixels{0, 0};  ///< Working picture, columns and rows.
+  GridShape grid;                ///< Vertices of the mesh.
+  double nu = 0.0;               ///< ν of the Welsch function, 1/mm.
+};
+
+/// What the options say of light, lens and screen, for a working picture of so many pixels.
+OpticalSetup optical_setup(const DesignOptions& options, const Eigen::Vector2i& pixels);
+
+/// Size of the working picture: the longer side has options.pixels, the other follows the source's
+/// shape (at least 1).
+Eigen::Vector2i working_size(int source_columns, int source_rows, int longer_side);
+
+/// The levels for a working picture: at most options.levels, doubling up to full size, the first
+/// not below about 32 pixels on the longer side (Sun et al., Appendix E); the mesh's cells double
+/// with them, mesh_ratio per pixel.
+///
+/// ν falls from kNuStart × D_e to kNuEnd × D_e by a fixed ratio. The typical residual D_e is the
+/// curvature that moves light by one pixel over one cell, (pixel / cell) / LightPath::reach(1).
+std::vector<Level> plan_levels(const Eigen::Vector2i& pixels, const DesignOptions& options);
+
+}  // namespace lensforge

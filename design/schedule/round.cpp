@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "design/schedule/round.h"
+
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include "core/error.h"
+#include "core/surface/grid_mesh.h"
+#include "core/text/number_text.h"
+#include "design/schedule/reach.h"
+#include "design/schedule/transport_step.h"
+
+namespace lensforge {
+namespace {
+
+/// A round that lowers the objective by less than this share has brought nothing.
+constexpr double kIdleRound = 1e-3;
+
+/// Steps in which a mesh that a new level's barriers refuse is drawn back to the even grid.
+constexpr int kRelaxSteps = 10;
+
+/// Draws the mesh's x and y back towards the even grid until no barrier refuses it.
+void relax(const LevelSite& site, SurfaceMesh& mesh) {
+  const SurfaceMesh flat = make_grid_mesh(site.task.setup.lens_size, mesh.grid, 0.0);
+  const SurfaceMesh fine = mesh;
+  for (int step = 1; !std::isfinite(site.stage.value(mesh)) && step <= kRelaxSteps; ++step) {
+    const double share = static_cast<double>(step) / kRelaxSteps;
+    mesh.vertices.topRows<2>() =
+        (1.0 - share) * fine.vertices.topRows<2>() + share * flat.vertices.topRows<2>();
+  }
+}
+
+/// @param aimed  the first surface, before its mesh was relaxed.
+[[noreturn]] void refuse_unreachable(const LevelSite& site, const AimedMesh& aimed) {
+  site.log.report("searching for a focal length that works", 0);
+  const DesignOptions& options = site.task.options;
+  const LevelProblem& problem = site.problem;
+  const std::optional<double> focal_length =
+      reachable_focal_length({aimed.mesh, aimed.wanted, problem.setup, problem.target,
+                              problem.objective, options.thickness},
+                             site.task.executor);
+  const std::string advice =
+      focal_length ? "--focal " + number_text(*focal_length) + "mm would do"
+                   : "no focal length up to " + number_text(kMaxFocalLength) + " mm would do";
+  throw InputError("--focal " + number_text(options.focal_length) +
+                   ": no lens of this width and index bends the light so far in so short a "
+                   "distance; " +
+                   advice);
+}
+
+/// The first half of a round: a mesh that transport aims, and that no barrier refuses.
+void start_from_transport(const LevelSite& site, Checkpoint& state) {
+  const bool first = state.level == 0 && state.round == 0;
+  const bool shapes = first && site.task.options.spread > 0.0;
+  const std::optional<AimedMesh> aimed =
+      transport_step(site.task, site.problem, state.mesh, shapes, site.log);
+  if (aimed) {
+    state.mesh = aimed->mesh;
+  } else {
+    state.transporting = false;
+  }
+  relax(site, state.mesh);
+  if (aimed && first && !std::isfinite(site.stage.value(state.mesh))) {
+    refuse_unreachable(site, *aimed);
+  }
+}
+
+/// The rendering-guided half.
+Ending follow_picture(const LevelSite& site, Checkpoint& state) {
+  LbfgsOptions optimizer;
+  optimizer.max_iterations = site.task.options.iterations;
+  const LbfgsSummary summary =
+      site.stage.run(optimizer, site.log.observer("render"), state.scales, state.mesh);
+  using Status = LbfgsSummary::Status;
+  return {summary.status == Status::kStopped,
+          summary.status == Status::kInfeasibleStart ? summary.message : ""};
+}
+
+}  // namespace
+
+Ending run_round(const LevelSite& site, Checkpoint& state) {
+  const DesignOptions& options = site.task.options;
+  const SurfaceMesh before = state.mesh;
+  const bool transports = state.transporting && state.round < options.transport_rounds;
+  if (transports) {
+    start_from_transport(site, state);
+  } else {
+    relax(site, state.mesh);
+  }
+  const bool rescaled = !state.scales.known();
+  if (options.rendering_guided) {
+    Ending ending = follow_picture(site, state);
+    if (ending.ended()) return ending;
+  }
+  conclude_round({before, site.stage.value(state.mesh), transports, rescaled}, options.rounds,
+                 state);
+  return {};
+}
+
+void conclude_round(const RoundOutcome& outcome, int rounds, Checkpoint& state) {
+  const bool idle = outcome.value >= (1.0 - kIdleRound) * state.value;
+  if (outcome.value <= state.value) {
+    state.value = outcome.value;
+  } else {
+    state.mesh = outcome.before;
+  }
+  if (idle) {
+    state.transporting = false;
+    state.scales = {};
+  }
+  const bool exhausted = idle && outcome.rescaled && !outcome.transported;
+  state.round = exhausted ? rounds : state.round + 1;
+}
+
+}  // namespace lensforge

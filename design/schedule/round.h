@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <string>
+
+#include "core/surface/surface_mesh.h"
+#include "design/schedule/checkpoint.h"
+#include "design/schedule/design_log.h"
+#include "design/schedule/design_task.h"
+#include "design/schedule/guided_optimization.h"
+
+namespace lensforge {
+
+/// Why a design goes on or does not.
+struct Ending {
+  bool stopped = false;  ///< It was asked to.
+  std::string failure;   ///< A start that no step can leave.
+
+  [[nodiscard]] bool ended() const { return stopped || !failure.empty(); }
+};
+
+/// One level at work.
+struct LevelSite {
+  const DesignTask& task;
+  const LevelProblem& problem;
+  GuidedOptimization& stage;  ///< Rendering-guided.
+  DesignLog& log;
+};
+
+/// One alternation of Sun et al., section 3.4: transport_step() where it is due, then
+/// rendering-guided optimisation, then conclude_round(). Where it is stopped on the way, the state
+/// holds the best surface so far and names the same round.
+/// @throw Interrupted; InputError if no surface can send the light so far in so short a distance.
+Ending run_round(const LevelSite& site, Checkpoint& state);
+
+/// What came of a round's two halves.
+struct RoundOutcome {
+  const SurfaceMesh& before;
+  double value = 0.0;        ///< Objective of the state's mesh.
+  bool transported = false;  ///< It began with transport.
+  bool rescaled = false;     ///< Its steps were measured anew.
+};
+
+/// Takes a round's mesh or the one before, whichever is better, and says what is next. A round that
+/// lowers the objective by less than a thousandth has brought nothing: if it began with transport,
+/// the level's further rounds do without; if its steps were scaled for an earlier surface, the next
+/// one measures them anew; if neither, the level ends.
+/// @param rounds  of a level.
+void conclude_round(const RoundOutcome& outcome, int rounds, Checkpoint& state);
+
+}  // namespace lensforge

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <optional>
+
+#include "core/compute/executor.h"
+#include "core/compute/run_control.h"
+#include "core/compute/work_estimate.h"
+#include "core/image/metrics.h"
+#include "core/surface/lens.h"
+#include "export/export_options.h"
+#include "export/height_map.h"
+#include "export/normal_bound.h"
+
+namespace lensforge {
+
+/// What is exported.
+struct ExportSource {
+  Lens lens;                   ///< Its surface is the one to export.
+  std::filesystem::path file;  ///< That it was read from.
+};
+
+/// Reads a lens folder with the surface that is wanted.
+/// @throw InputError as read_lens() does, or if the surface is no height field.
+ExportSource read_export_source(const std::filesystem::path& folder, ExportSurface surface);
+
+/// A solid of splines as it was written.
+struct SplineSolid {
+  SplineNet net;
+  FitOptions fit;
+  NormalBound bound;     ///< What no surface can do better.
+  ImageMetrics picture;  ///< That the splines project.
+  SolidContent content;
+  double mesh_volume = 0.0;  ///< Of the facets, mm³.
+};
+
+/// A closed mesh as it was written.
+struct MeshSolid {
+  std::int64_t triangles = 0;
+  double volume = 0.0;  ///< mm³
+};
+
+/// A height map as it was written.
+struct HeightMap {
+  GridShape pixels;
+  double pixel = 0.0;              ///< Width of one, mm.
+  std::optional<GreyScale> scale;  ///< Of a grey picture.
+};
+
+/// What was written; one of the last three.
+struct ExportResult {
+  ExportFormat format = ExportFormat::kByExtension;
+  ModelMetrics metrics;  ///< Of the pictures that the mesh projects.
+  std::optional<SplineSolid> splines;
+  std::optional<MeshSolid> mesh;
+  std::optional<HeightMap> heights;
+
+  /// Whether a solid of splines holds its tolerances everywhere; true of all else.
+  [[nodiscard]] bool within_tolerance() const {
+    return !splines || holds(splines->net.error(), splines->fit);
+  }
+};
+
+/// Whom an export tells what it is about to do; either may be empty.
+struct ExportHooks {
+  std::function<void(const WorkEstimate&)> announce;  ///< What a large one takes, before it begins.
+  std::function<void()> begin_writing;                ///< The file is being written from here on.
+};
+
+/// Writes the surface of a lens as a solid, a closed mesh or a height map, whole or not at all. A
+/// solid's header has the surface's own time and hash: the same lens gives the same bytes.
+/// @throw InputError if an option breaks its rule, the surface has no outline for the format, or
+///        memory and disk have no room, with the value that would fit; RunError; Interrupted.
+ExportResult export_lens(const ExportSource& source, const std::filesystem::path& out,
+                         const ExportOptions& options, const Executor& executor,
+                         const RunControl& control = {}, const ExportHooks& hooks = {});
+
+}  // namespace lensforge

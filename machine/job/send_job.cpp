@@ -1,0 +1,239 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "machine/job/send_job.h"
+
+#include <memory>
+#include <system_error>
+#include <utility>
+
+#include "core/error.h"
+#include "core/io/files.h"
+#include "machine/gcode/program_seal.h"
+#include "machine/guard/background_guard.h"
+#include "machine/job/machine_port.h"
+#include "machine/stream/program_file.h"
+#include "machine/stream/session.h"
+
+namespace lensforge {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Bytes of a line as cam writes them, for the pace of a serial line.
+constexpr double kUsualLine = 24.0;
+
+/// What a dry run without a controller assumes of it: mm/min and mm/s².
+constexpr double kUsualRate = 5000.0;
+constexpr double kUsualAcceleration = 500.0;
+
+/// A pass over the program that the watcher sees the progress of.
+class Pass {
+ public:
+  Pass(JobWatcher& watcher, const std::stop_token& stop) : watcher_(watcher), stop_(stop) {}
+  ~Pass() { watcher_.passed(); }
+  Pass(const Pass&) = delete;
+  Pass& operator=(const Pass&) = delete;
+
+  [[nodiscard]] RunControl control() const {
+    return {stop_, [&watcher = watcher_](const Progress& p) { watcher.passing(p); }};
+  }
+
+ private:
+  JobWatcher& watcher_;
+  const std::stop_token& stop_;
+};
+
+/// One job, step by step.
+class SendJob {
+ public:
+  SendJob(fs::path file, const SendOptions& options, JobWatcher& watcher,
+          const std::stop_token& stop, const std::stop_token& reset)
+      : file_(std::move(file)),
+        options_(options),
+        watcher_(watcher),
+        stop_(stop),
+        reset_(reset),
+        maps_(register_maps(options)),
+        program_(open_program()) {}
+
+  SendSummary run() {
+    summary_.job = program_.identity();
+    watcher_.opened(summary_.job);
+    check_seal_of_program();
+    if (options_.port.empty()) {
+      examine_alone();
+    } else {
+      with_controller();
+    }
+    return std::move(summary_);
+  }
+
+ private:
+  /// Before anything is made or touched.
+  [[nodiscard]] ProgramFile open_program() const {
+    require_apart(file_, options_, maps_, watcher_.files());
+    const Pass pass(watcher_, stop_);
+    return ProgramFile(file_, pass.control());
+  }
+
+  /// A program that was changed or cut short since cam wrote it is named before anything else.
+  void check_seal_of_program() {
+    summary_.seal_holds = check_seal(*program_.open(), RunControl(stop_, {}));
+    if (summary_.seal_holds.value_or(true)) return;
+    const std::string broken =
+        file_.string() +
+        ": its seal does not hold: it is not as cam wrote it, it was changed or cut short";
+    if (!options_.allow_changed) {
+      throw InputError(broken + "; make it anew, or use --allow-changed if that is meant");
+    }
+    watcher_.warned("warning: " + broken);
+  }
+
+  /// Against nothing but the dialect; positions are the program's own.
+  void examine_alone() {
+    FactsOptions facts;
+    facts.dialect = parse_dialect(options_.dialect, "--dialect");
+    facts.spin_up = options_.spin_up;
+    facts.planner.max_rate.setConstant(kUsualRate);
+    facts.planner.acceleration.setConstant(kUsualAcceleration);
+    summary_.facts = examine(facts);
+  }
+
+  void with_controller() {
+    if (!options_.dry_run) require_journal();
+    const MachinePort port = open_machine_port(options_.port, stop_);
+    Wire wire(*port.link);
+    SessionOptions session;
+    session.resume = options_.resume;
+    session.home = options_.home || options_.resume || port.machine;
+    summary_.controller = open_session(wire, port.clock(), session, stop_);
+    watcher_.connected(*summary_.controller);
+    check(wire, port);
+    if (options_.dry_run) return check_mode(wire, port);
+    std::unique_ptr<BackgroundGuard> guard;
+    GuardOptions guard_options;
+    guard_options.owner = options_.owner;
+    if (!maps_.empty()) guard = guard_devices(maps_, guard_options, *port.steady);
+    send(wire, port, guard.get());
+  }
+
+  [[nodiscard]] ProgramFacts examine(const FactsOptions& options) const {
+    const Pass pass(watcher_, stop_);
+    try {
+      ProgramFacts facts = examine_program(*program_.open(), options, pass.control());
+      const std::string lack = lack_of_motion(facts);
+      if (!lack.empty()) throw InputError(file_.string() + ": " + lack);
+      return facts;
+    } catch (const GcodeError& refused) {
+      throw InputError(file_.string() + ": " + refused.what());
+    }
+  }
+
+  /// What stands in a journal must not be lost, and must be of this program.
+  void require_journal() {
+    const fs::path path = options_.journal_of(file_);
+    if (options_.resume) {
+      record_ = read_journal(path);
+      if (record_->job.same_program(summary_.job)) return;
+      throw InputError(path.string() + ": is the journal of another program (" + record_->job.name +
+                       "), not of " + file_.string());
+    }
+    std::error_code none;
+    if (fs::status(path, none).type() == fs::file_type::not_found) return;
+    require_regular_file(path);
+    if (options_.restart || fs::is_empty(path) || read_journal(path).finished) return;
+    throw InputError(path.string() +
+                     ": an unfinished job; go on with --resume or begin again with --restart");
+  }
+
+  /// What the controller and the way to it make of the program.
+  [[nodiscard]] FactsOptions facts_of(Wire& wire, const MachinePort& port) const {
+    const ControllerInfo& info = *summary_.controller;
+    FactsOptions facts;
+    facts.dialect = info.dialect;
+    facts.start = info.start;
+    facts.spin_up = options_.spin_up;
+    facts.planner = planner_settings(info.settings);
+    facts.planner.blocks = info.planner_blocks;
+    const double round_trip =
+        options_.sender.character_counting ? 0.0 : measure_round_trip(wire, port.clock(), stop_);
+    const int baud = port.spec.kind == PortSpec::Kind::kSerial ? port.spec.baud : 0;
+    const StreamRate rate = stream_rate(info, baud, round_trip, kUsualLine);
+    facts.planner.lines_per_second = rate.lines_per_second;
+    facts.planner.bytes_per_second = rate.bytes_per_second;
+    return facts;
+  }
+
+  /// The program against the controller.
+  void check(Wire& wire, const MachinePort& port) {
+    summary_.facts = examine(facts_of(wire, port));
+    summary_.findings = check_program(summary_.facts, *summary_.controller);
+    check_spindle_range(summary_.facts, maps_, summary_.findings);
+    watcher_.examined(summary_.facts, summary_.findings);
+    if (summary_.findings.refusals.empty()) return;
+    std::string all;
+    for (const std::string& refusal : summary_.findings.refusals) {
+      all += (all.empty() ? "" : "; ") + refusal;
+    }
+    throw InputError(file_.string() + ": " + all);
+  }
+
+  void check_mode(Wire& wire, const MachinePort& port) {
+    const Pass pass(watcher_, stop_);
+    summary_.checked_lines = check_on_controller(wire, port.clock(), *program_.open(),
+                                                 *summary_.controller, pass.control());
+  }
+
+  void send(Wire& wire, const MachinePort& port, Guard* guard) {
+    const ControllerInfo& info = *summary_.controller;
+    const std::unique_ptr<std::istream> program = program_.open();
+    FeedOptions feed_options{info.dialect, info.line_numbers, info.start, 1, 0, {}};
+    const std::unique_ptr<Journal> journal = begin_journal(feed_options);
+    ProgramFeed feed(*program, feed_options);
+    Sender sender({wire, port.clock(), guard, journal.get()}, info, options_.sender,
+                  feed_options.first_line);
+    watcher_.began(summary_, feed_options.first_offset);
+    SendControl control{stop_, reset_, {}, {}};
+    control.keys = [this] { return watcher_.key(); };
+    control.watch = [this](const SendEvent& event) { watcher_.took(event); };
+    summary_.result = sender.run(feed, control);
+    watcher_.ended(*summary_.result);
+  }
+
+  [[nodiscard]] std::unique_ptr<Journal> begin_journal(FeedOptions& feed) {
+    const fs::path path = options_.journal_of(file_);
+    if (!record_) {
+      auto journal = Journal::create(path, summary_.job, {});
+      journal->origins(summary_.controller->start.origins);
+      return journal;
+    }
+    summary_.plan = plan_resume(*program_.open(), *record_, *summary_.controller, summary_.facts,
+                                options_.entry);
+    watcher_.confirm(*record_, *summary_.plan);
+    watcher_.resumed(*summary_.plan);
+    feed.first_line = summary_.plan->line;
+    feed.first_offset = summary_.plan->offset;
+    feed.before = summary_.plan->before;
+    if (summary_.plan->line > 1) feed.start = summary_.plan->state;
+    return Journal::resume(path, *record_, {});
+  }
+
+  const fs::path file_;
+  const SendOptions& options_;
+  JobWatcher& watcher_;
+  const std::stop_token& stop_;
+  const std::stop_token& reset_;
+  std::vector<RegisterMap> maps_;
+  ProgramFile program_;
+  std::optional<JournalRecord> record_;
+  SendSummary summary_;
+};
+
+}  // namespace
+
+SendSummary send_job(const fs::path& program, const SendOptions& options, JobWatcher& watcher,
+                     const std::stop_token& stop, const std::stop_token& reset) {
+  validate(options);
+  return SendJob(program, options, watcher, stop, reset).run();
+}
+
+}  // namespace lensforge

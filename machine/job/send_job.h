@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "core/compute/run_control.h"
+#include "machine/job/job_places.h"
+#include "machine/job/send_options.h"
+#include "machine/stream/controller_info.h"
+#include "machine/stream/job_identity.h"
+#include "machine/stream/preflight.h"
+#include "machine/stream/program_facts.h"
+#include "machine/stream/resume_plan.h"
+#include "machine/stream/sender.h"
+
+namespace lensforge {
+
+/// All that a job found out.
+struct SendSummary {
+  JobIdentity job;
+  std::optional<bool> seal_holds;  ///< machine/gcode/program_seal.h; nothing without a seal.
+  ProgramFacts facts;
+  std::optional<ControllerInfo> controller;
+  Findings findings;
+  std::optional<std::int64_t> checked_lines;  ///< By the controller itself.
+  std::optional<ResumePlan> plan;
+  std::optional<SendResult> result;
+};
+
+/// Whom a job tells what happens, in this order. What nobody cares for does nothing.
+class JobWatcher {
+ public:
+  JobWatcher() = default;
+  virtual ~JobWatcher() = default;
+  JobWatcher(const JobWatcher&) = delete;
+  JobWatcher& operator=(const JobWatcher&) = delete;
+
+  /// What the watcher writes while the job runs: none may be the job's own.
+  [[nodiscard]] virtual std::vector<NamedFile> files() const { return {}; }
+  /// The program can be read; nothing was made or touched yet.
+  virtual void opened(const JobIdentity& /*program*/) {}
+  virtual void warned(const std::string& /*text*/) {}
+  /// How far a pass over the program is, and that it is over.
+  virtual void passing(const Progress& /*progress*/) {}
+  virtual void passed() {}
+  virtual void connected(const ControllerInfo& /*controller*/) {}
+  /// The program against the controller; refusals end the job.
+  virtual void examined(const ProgramFacts& /*facts*/, const Findings& /*findings*/) {}
+  /// Before the machine moves to go on. @throw InputError to refuse
+  virtual void confirm(const JournalRecord& /*before*/, const ResumePlan& /*plan*/) {}
+  virtual void resumed(const ResumePlan& /*plan*/) {}
+  /// The first line is about to leave. @param first_byte  where this run begins in the file.
+  virtual void began(const SendSummary& /*so_far*/, std::int64_t /*first_byte*/) {}
+  virtual void took(const SendEvent& /*event*/) {}
+  virtual std::optional<OperatorKey> key() { return std::nullopt; }
+  virtual void ended(const SendResult& /*result*/) {}
+};
+
+/// Sends a program to a machine: its seal, its limits and the controller's are checked first, its
+/// spindle and interlocks are watched, and a journal says how far it came.
+/// @param stop, reset  SendControl's.
+/// @throw InputError for options, files and programs that will not do; StreamFault; LinkLost;
+///        Interrupted: in all these cases nothing of the program was sent.
+SendSummary send_job(const std::filesystem::path& program, const SendOptions& options,
+                     JobWatcher& watcher, const std::stop_token& stop = {},
+                     const std::stop_token& reset = {});
+
+}  // namespace lensforge

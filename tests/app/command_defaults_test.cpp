@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <gmock/gmock.h>
+
+#include "app/cam_settings.h"
+#include "app/design_settings.h"
+#include "app/export_settings.h"
+#include "app/send_settings.h"
+#include "cam/cam_fields.h"
+#include "core/temp_folder.h"
+#include "design/design_fields.h"
+#include "design/render_fields.h"
+
+namespace lensforge::app {
+namespace {
+
+using testing::TempFolder;
+
+/// Fails for every row of a table that two structs differ in.
+template <class Options>
+void expect_equal(const OptionTable<Options>& table, const Options& command,
+                  const Options& library) {
+  for (const OptionField<Options>& row : table) {
+    EXPECT_EQ(row.get(command), row.get(library)) << row.name;
+    EXPECT_EQ(row.stored(command), row.stored(library)) << row.name;
+  }
+}
+
+/// As the command has them after an empty command line, but for what it cannot do without.
+template <class Settings, class Add>
+Settings parsed(const Add& add, const Arguments& needed, Settings settings = {}) {
+  OptionSet options("command", "");
+  add(options, settings);
+  options.parse(needed);
+  return settings;
+}
+
+TEST(CommandDefaults, OfDesignAreTheLibrarysForEveryModelAndPicture) {
+  for (const auto& [word, model] :
+       {std::pair("facet", SurfaceModel::kFacet), std::pair("smooth", SurfaceModel::kSmooth)}) {
+    for (const int side : {64, 512}) {
+      const Image picture(side, side / 2, 0.5F);
+      DesignSettings settings;
+      OptionSet options("design", "");
+      add_design_options(options, settings);
+      options.parse({"picture.png", "--out", "lens", "--model", word});
+      settle(options, settings, picture);
+      const DesignOptions library = default_design_options(model, picture);
+      expect_equal(design_fields(), settings.design, library);
+      expect_equal(weight_fields(), settings.design.weights, library.weights);
+      EXPECT_EQ(library.weights.smooth, default_smoothness(model));
+    }
+  }
+}
+
+TEST(CommandDefaults, OfDesignForTheDefaultModelAreTheStructs) {
+  const DesignOptions library;
+  expect_equal(design_fields(), default_design_options(library.model, Image(256, 256, 1.0F)),
+               library);
+  expect_equal(weight_fields(),
+               default_design_options(library.model, Image(256, 256, 1.0F)).weights,
+               library.weights);
+}
+
+TEST(CommandDefaults, OfCamAreTheLibrarys) {
+  CamSettings settings;
+  OptionSet options("cam", "");
+  add_cam_options(options, settings);
+  options.parse({"/parts/lens"});
+  settle(options, settings);
+  expect_equal(cam_fields(), settings.cam, CamOptions{});
+  EXPECT_EQ(settings.cam.workshop, Workshop{});
+  EXPECT_EQ(settings.cam.job, "lens");  // The folder's name.
+}
+
+TEST(CommandDefaults, OfExportSendAndRenderAreTheLibrarys) {
+  const auto exported = parsed<ExportSettings>(&add_export_options, {"lens", "--out", "a.step"});
+  expect_equal(export_fields(), exported.options, ExportOptions{});
+  const auto sent = parsed<SendSettings>(&add_send_options, {"a.ngc", "--port", "sim:grbl"});
+  SendOptions library;
+  library.port = "sim:grbl";
+  expect_equal(send_fields(), sent.job, library);
+  RenderOptions rendered;
+  OptionSet options("render", "");
+  options.fields(render_fields(), rendered);
+  options.parse({});
+  expect_equal(render_fields(), rendered, RenderOptions{});
+}
+
+TEST(CommandDefaults, WhatIsGivenWinsOverTheWorkshop) {
+  const TempFolder folder;
+  testing::write_bytes(folder / "shop.toml", "[finish]\npitch = 0.2\nscallop = 0.001\n");
+  CamSettings settings;
+  OptionSet options("cam", "");
+  add_cam_options(options, settings);
+  options.parse({"lens", "--workshop", (folder / "shop.toml").string(), "--pitch", "0.1",
+                 "--tool-diameter", "0.8", "--no-rough"});
+  settle(options, settings);
+  const Process& process = settings.cam.workshop.process;
+  EXPECT_EQ(process.finish.pitch, 0.1);
+  EXPECT_EQ(process.finish.scallop, 0.001);
+  EXPECT_FALSE(process.rough.enabled);
+  EXPECT_EQ(settings.cam.workshop.tool(process.finish.tool),
+            resized(Workshop{}.tool(process.finish.tool), 0.8));
+  EXPECT_EQ(options.used()["pitch"], 0.1);
+  EXPECT_EQ(options.used()["scallop"], 0.001);
+}
+
+TEST(CommandDefaults, FactorsOnTheSmoothnessWorkInTheLibrary) {
+  DesignSettings settings;
+  OptionSet options("design", "");
+  add_design_options(options, settings);
+  options.parse({"picture.png", "--out", "lens", "--model", "facet", "--smoothness", "3"});
+  settle(options, settings, Image(64, 64, 0.5F));
+  EXPECT_EQ(with_smoothness_applied(settings.design).weights.smooth,
+            3.0 * default_smoothness(SurfaceModel::kFacet));
+}
+
+}  // namespace
+}  // namespace lensforge::app

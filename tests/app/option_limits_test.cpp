@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <gmock/gmock.h>
+
+#include <cmath>
+
+#include "app/command_line.h"
+#include "app/exit_code.h"
+#include "app/option_set.h"
+#include "cam/cam_fields.h"
+#include "core/error.h"
+#include "core/text/number_text.h"
+#include "design/design_fields.h"
+#include "design/render_fields.h"
+#include "export/export_options.h"
+#include "machine/job/send_options.h"
+
+namespace lensforge::app {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+/// Values just outside of limits.
+std::vector<double> outside(const OptionSpec& spec) {
+  const Limits& limits = spec.limits;
+  const bool whole = spec.kind == OptionKind::kWhole;
+  std::vector<double> values;
+  if (std::isfinite(limits.low)) {
+    const double below = limits.low > 0.0 ? 0.5 * limits.low : limits.low - 1.0;
+    values.push_back(limits.low_excluded ? limits.low : whole ? std::floor(limits.low) - 1 : below);
+    if (limits.or_zero && values.back() == 0.0) values.back() = -1.0;
+  }
+  if (std::isfinite(limits.high)) values.push_back(2.0 * limits.high);
+  return values;
+}
+
+/// @param line  the command with what it cannot do without.
+template <class Options>
+void expect_limits_enforced(const Arguments& line, const OptionTable<Options>& table) {
+  for (const OptionField<Options>& row : table) {
+    if (!row.is_number()) continue;
+    ASSERT_FALSE(outside(row).empty()) << row.name;
+    for (const double value : outside(row)) {
+      const std::string text =
+          row.kind == OptionKind::kWhole ? decimal_text(value, 0) : shortest_text(value);
+      Arguments arguments = line;
+      arguments.push_back(row.name + "=" + text);
+      ::testing::internal::CaptureStderr();
+      const int code = run_command_line(arguments);
+      const std::string said = ::testing::internal::GetCapturedStderr();
+      EXPECT_EQ(code, kBadInput) << row.name;
+      EXPECT_THAT(said, StartsWith("lensforge: " + row.name + " " + text + ": must be " +
+                                   row.limits.rule()));
+    }
+  }
+}
+
+TEST(OptionLimits, AreEnforcedByEveryCommandForEveryNumber) {
+  expect_limits_enforced({"design", "none.png", "--out", "none"}, design_fields());
+  expect_limits_enforced({"design", "none.png", "--out", "none"}, weight_fields());
+  expect_limits_enforced({"render", "none"}, render_fields());
+  expect_limits_enforced({"cam", "none"}, cam_fields());
+  expect_limits_enforced({"export", "none", "--out", "none.step"}, export_fields());
+  expect_limits_enforced({"send", "none.ngc", "--dry-run"}, send_fields());
+}
+
+/// The library refuses what the command refuses.
+template <class Options>
+void expect_library_refuses(const OptionTable<Options>& table) {
+  for (const OptionField<Options>& row : table) {
+    if (!row.is_number() || row.name == "--tool-diameter" || row.name == "--rough-tool") continue;
+    for (const double value : outside(row)) {
+      Options options;
+      row.set(options, row.kind == OptionKind::kWhole ? nlohmann::json(std::llround(value))
+                                                      : nlohmann::json(value));
+      EXPECT_THROW(require_limits(table, options), InputError) << row.name << " " << value;
+    }
+  }
+}
+
+TEST(OptionLimits, AreThoseOfTheLibraries) {
+  expect_library_refuses(design_fields());
+  expect_library_refuses(weight_fields());
+  expect_library_refuses(export_fields());
+  expect_library_refuses(send_fields());
+  expect_library_refuses(cam_fields());
+}
+
+TEST(OptionLimits, DefaultsKeepThem) {
+  require_limits(design_fields(), DesignOptions{});
+  require_limits(weight_fields(), ObjectiveWeights{});
+  require_limits(render_fields(), RenderOptions{});
+  require_limits(cam_fields(), CamOptions{});
+  require_limits(export_fields(), ExportOptions{});
+  require_limits(send_fields(), SendOptions{});
+}
+
+}  // namespace
+}  // namespace lensforge::app

@@ -1,0 +1,260 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "design/schedule/checkpoint.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include <cstdint>
+#include <cstring>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "core/error.h"
+#include "core/member_count.h"
+#include "core/surface/grid_mesh.h"
+#include "core/temp_folder.h"
+#include "design/design_fields.h"
+#include "design/test_setups.h"
+
+namespace lensforge {
+namespace {
+
+using ::testing::HasSubstr;
+using testing::message_of;
+using testing::TempFolder;
+
+Checkpoint sample() {
+  Checkpoint checkpoint;
+  checkpoint.fingerprint = 0xfedcba9876543210ULL;
+  checkpoint.level = 2;
+  checkpoint.round = 3;
+  checkpoint.value = 1e3 / 7.0;
+  checkpoint.transporting = false;
+  checkpoint.seconds = 0.1 + 0.2;
+  checkpoint.mesh = make_grid_mesh({10.0, 8.0}, {7, 6}, 5.0);
+  testing::Random random(1);
+  for (double& x : checkpoint.mesh.vertices.reshaped()) x += random.magnitude(1e-17, 1.0);
+  checkpoint.scales = {1e-3 * checkpoint.mesh.vertices, 1.0 / 3.0, 1e-9 / 7.0};
+  for (int i = 1; i <= 3; ++i) {
+    ConvergenceRow row;
+    row.stage = "render";
+    row.level = 1;
+    row.round = 2;
+    row.iteration = i;
+    row.energy = {0.1 * i, 0.7, 1e-17,     1e17,       1.0 / 3.0, 0.2,
+                  0.3,     0.4, 1.0 / 9.0, 1e-9 / 3.0, 1e-300};
+    row.mass_error = 1.0 / 11.0;
+    row.mae = 1.0 / 7.0;
+    row.seconds = 0.7 * i;
+    checkpoint.convergence.push_back(row);
+  }
+  return checkpoint;
+}
+
+std::string sample_bytes(const TempFolder& folder) {
+  write_checkpoint(sample(), folder / "good");
+  return testing::read_bytes(folder / "good");
+}
+
+/// What reading these bytes is refused with.
+std::string refusal_of(const TempFolder& folder, const std::string& bytes) {
+  testing::write_bytes(folder / "bad", bytes);
+  return message_of<InputError>([&] { read_checkpoint(folder / "bad"); });
+}
+
+/// `bytes` with one text for another and the check sum (FNV-1a over all but the last 8) made right.
+std::string forged(std::string bytes, const std::string& from, const std::string& to) {
+  bytes.resize(bytes.size() - 8);
+  bytes.replace(bytes.find(from), from.size(), to);
+  std::uint64_t hash = 0xcbf29ce484222325ULL;
+  for (const char c : bytes) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3ULL;
+  char tail[8];
+  std::memcpy(tail, &hash, 8);
+  return bytes.append(tail, 8);
+}
+
+TEST(Checkpoint, ComesBackToTheBit) {
+  const TempFolder folder;
+  const Checkpoint before = sample();
+  write_checkpoint(before, folder / "checkpoint");
+  const Checkpoint after = read_checkpoint(folder / "checkpoint");
+  EXPECT_EQ(after.fingerprint, before.fingerprint);
+  EXPECT_EQ(after.level, before.level);
+  EXPECT_EQ(after.round, before.round);
+  EXPECT_EQ(after.value, before.value);
+  EXPECT_EQ(after.transporting, before.transporting);
+  EXPECT_EQ(after.seconds, before.seconds);
+  EXPECT_EQ(after.mesh.vertices, before.mesh.vertices);
+  EXPECT_EQ(after.mesh.triangles, before.mesh.triangles);
+  EXPECT_EQ(after.mesh.grid, before.mesh.grid);
+  EXPECT_EQ(after.scales.reach, before.scales.reach);
+  EXPECT_EQ(after.scales.xy, before.scales.xy);
+  EXPECT_EQ(after.scales.z, before.scales.z);
+  EXPECT_EQ(convergence_csv(after.convergence), convergence_csv(before.convergence));
+  ASSERT_EQ(after.convergence.size(), 3U);
+  EXPECT_EQ(after.convergence[2].energy.barrier, 1.0 / 3.0);
+  EXPECT_EQ(after.convergence[2].energy.align, 1.0 / 9.0);
+  EXPECT_EQ(after.convergence[2].energy.flux, 1e-9 / 3.0);
+  EXPECT_EQ(after.convergence[2].energy.total, 1e-300);
+  EXPECT_EQ(after.convergence[2].mass_error, 1.0 / 11.0);
+  EXPECT_EQ(after.convergence[2].mae, 1.0 / 7.0);
+}
+
+TEST(Checkpoint, AValueThatIsNotKnownYetStaysInfinite) {
+  const TempFolder folder;
+  for (const bool transporting : {true, false}) {
+    Checkpoint before = sample();
+    before.value = kInfinity;
+    before.transporting = transporting;
+    write_checkpoint(before, folder / "checkpoint");
+    const Checkpoint after = read_checkpoint(folder / "checkpoint");
+    EXPECT_EQ(after.value, kInfinity);
+    EXPECT_EQ(after.transporting, transporting);
+  }
+}
+
+TEST(Checkpoint, ScalesThatAreNotKnownYetStayUnknown) {
+  const TempFolder folder;
+  Checkpoint before = sample();
+  before.scales = {};
+  write_checkpoint(before, folder / "checkpoint");
+  EXPECT_FALSE(read_checkpoint(folder / "checkpoint").scales.known());
+}
+
+TEST(Checkpoint, LeavesNothingBesideIt) {
+  const TempFolder folder;
+  write_checkpoint(sample(), folder / "checkpoint");
+  write_checkpoint(sample(), folder / "checkpoint");
+  EXPECT_EQ(folder.file_count(), 1U);
+}
+
+TEST(Checkpoint, EveryTruncationIsRefused) {
+  const TempFolder folder;
+  const std::string bytes = sample_bytes(folder);
+  for (std::size_t length = 0; length < bytes.size(); length += 1 + length / 40) {
+    EXPECT_THAT(refusal_of(folder, bytes.substr(0, length)), HasSubstr("bad")) << length;
+  }
+  refusal_of(folder, bytes.substr(0, bytes.size() - 1));
+}
+
+TEST(Checkpoint, EveryFlippedByteIsRefused) {
+  const TempFolder folder;
+  const std::string bytes = sample_bytes(folder);
+  for (std::size_t i = 0; i < bytes.size(); i += 7) {
+    std::string flipped = bytes;
+    flipped[i] = static_cast<char>(flipped[i] ^ 0x10);
+    EXPECT_THAT(refusal_of(folder, flipped), HasSubstr("bad")) << i;
+  }
+}
+
+TEST(Checkpoint, ExtraBytesAreRefused) {
+  const TempFolder folder;
+  refusal_of(folder, sample_bytes(folder) + "x");
+}
+
+TEST(Checkpoint, AnotherVersionIsRefused) {
+  const TempFolder folder;
+  const std::string other = forged(sample_bytes(folder), "checkpoint 3", "checkpoint 2");
+  EXPECT_THAT(refusal_of(folder, other), HasSubstr("version"));
+}
+
+TEST(Checkpoint, AMissingFileIsRefused) {
+  const TempFolder folder;
+  EXPECT_THAT(message_of<InputError>([&] { read_checkpoint(folder / "absent"); }),
+              HasSubstr("absent"));
+}
+
+TEST(Checkpoint, ANamedPipeIsRefusedWithoutWaiting) {
+  const TempFolder folder;
+  ASSERT_EQ(::mkfifo((folder / "pipe").c_str(), 0600), 0);
+  EXPECT_THAT(message_of<InputError>([&] { read_checkpoint(folder / "pipe"); }),
+              HasSubstr("only regular files are read"));
+}
+
+TEST(Checkpoint, AHeaderThatContradictsItselfIsRefused) {
+  const TempFolder folder;
+  const std::string bytes = sample_bytes(folder);
+  EXPECT_THAT(refusal_of(folder, forged(bytes, "\"columns\":7", "\"columns\":8")),
+              HasSubstr("vertices"));
+  EXPECT_THAT(refusal_of(folder, forged(bytes, "\"columns\":7", "\"columns\":\"7\"")),
+              HasSubstr("header"));
+  EXPECT_THAT(refusal_of(folder, forged(bytes, "\"round\"", "\"rnd\"")), HasSubstr("header"));
+  EXPECT_THAT(refusal_of(folder, forged(bytes, "\"level\":2", "\"level\":-2")),
+              HasSubstr("field 'level' is -2: it must be 0 or more"));
+  EXPECT_THAT(refusal_of(folder, forged(bytes, "\"seconds\":0", "\"seconds\":1e999")),
+              HasSubstr("header"));
+  EXPECT_THAT(refusal_of(folder, forged(bytes, "\"transporting\":false", "\"transporting\":0")),
+              HasSubstr("header"));
+  EXPECT_THAT(refusal_of(folder, forged(bytes, "\"value\":", "\"worth\":")), HasSubstr("header"));
+  EXPECT_THAT(refusal_of(folder, forged(bytes, "{\"", "[\"")), HasSubstr("header"));
+}
+
+TEST(Checkpoint, AFolderThatDoesNotExistIsARunError) {
+  const TempFolder folder;
+  message_of<RunError>([&] { write_checkpoint(sample(), folder / "no" / "such" / "place"); });
+}
+
+/// Another value than the one that a row has, within its limits.
+template <class Options>
+nlohmann::json other_value(const OptionField<Options>& row, const Options& options) {
+  const nlohmann::json value = row.get(options);
+  if (row.kind == OptionKind::kFlag) return !value.template get<bool>();
+  if (row.kind == OptionKind::kWord) {
+    return row.words.front() == value ? row.words.back() : row.words.front();
+  }
+  const double now = value.template get<double>();
+  const double next = row.kind == OptionKind::kWhole ? now + 1.0 : 1.01 * now + 0.001;
+  EXPECT_TRUE(row.limits.hold(next)) << row.name;
+  return row.kind == OptionKind::kWhole ? nlohmann::json(static_cast<int>(next))
+                                        : nlohmann::json(next);
+}
+
+TEST(DesignFingerprint, ChangesWithEveryOption) {
+  const Image picture = testing::spot_picture(12, 9);
+  std::set<std::uint64_t> seen{design_fingerprint(picture, {})};
+  for (const auto& row : design_fields()) {
+    DesignOptions options;
+    row.set(options, other_value(row, options));
+    EXPECT_TRUE(seen.insert(design_fingerprint(picture, options)).second) << row.name;
+  }
+  for (const auto& row : weight_fields()) {
+    DesignOptions options;
+    row.set(options.weights, other_value(row, options.weights));
+    EXPECT_TRUE(seen.insert(design_fingerprint(picture, options)).second) << row.name;
+  }
+  DesignOptions options;
+  options.iterations = 61;  // That no word of --quality stands for.
+  EXPECT_TRUE(seen.insert(design_fingerprint(picture, options)).second);
+}
+
+TEST(DesignFingerprint, EveryMemberOfTheOptionsHasARow) {
+  // Weights have a table of their own; checkpoint and resume say where and when, not what.
+  constexpr std::size_t kWithoutRow = 3;
+  EXPECT_EQ(design_fields().size() + kWithoutRow, testing::member_count<DesignOptions>());
+  EXPECT_EQ(weight_fields().size(), testing::member_count<ObjectiveWeights>());
+}
+
+TEST(DesignFingerprint, IsThatOfEarlierVersions) {
+  EXPECT_EQ(design_fingerprint(Image(4, 3, 0.5F), {}), 0x5417e61a44cb5d65ULL);
+}
+
+TEST(DesignFingerprint, ChangesWithThePicture) {
+  Image picture = testing::spot_picture(12, 9);
+  const std::uint64_t base = design_fingerprint(picture, {});
+  picture.at(5, 5) += 1e-6F;
+  EXPECT_NE(design_fingerprint(picture, {}), base);
+  EXPECT_NE(design_fingerprint(Image(9, 12, 0.5F), {}), design_fingerprint(Image(12, 9, 0.5F), {}));
+}
+
+TEST(DesignFingerprint, DoesNotDependOnWhereCheckpointsGo) {
+  const Image picture = testing::spot_picture(12, 9);
+  DesignOptions options;
+  options.checkpoint = "elsewhere";
+  options.resume = true;
+  EXPECT_EQ(design_fingerprint(picture, options), design_fingerprint(picture, {}));
+}
+
+}  // namespace
+}  // namespace lensforge

@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "design/schedule/face_transport.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stop_token>
+#include <string>
+
+#include "core/error.h"
+#include "core/optics/image_plane.h"
+#include "design/graded_mesh.h"
+#include "design/render_lens.h"
+#include "design/snell.h"
+#include "design/test_setups.h"
+
+namespace lensforge {
+namespace {
+
+const Eigen::Vector2d kSize(30.0, 24.0);
+constexpr GridShape kShape{31, 29};
+constexpr SurfaceModel kModels[] = {SurfaceModel::kFacet, SurfaceModel::kSmooth};
+
+OpticalSetup setup_for(ViewSide view) {
+  OpticalSetup setup = testing::setup_of(kSize, {60, 48}, 100.0);
+  setup.view = view;
+  return setup;
+}
+
+double paraboloid(double x, double y) {
+  return 5.0 - 1e-3 * std::pow(x - 14.0, 2) - 1.5e-3 * std::pow(y - 13.0, 2);
+}
+
+SurfaceMesh with_heights(SurfaceMesh mesh, double (*height)(double, double)) {
+  for (Eigen::Index v = 0; v < mesh.vertices.cols(); ++v) {
+    mesh.vertices(2, v) = height(mesh.vertices(0, v), mesh.vertices(1, v));
+  }
+  return mesh;
+}
+
+Eigen::Vector3d centre_of(const SurfaceMesh& mesh, std::int64_t face) {
+  return (mesh.corner(face, 0) + mesh.corner(face, 1) + mesh.corner(face, 2)) / 3.0;
+}
+
+/// Of a picture's light, pixel coordinates.
+Eigen::Vector2d centre_of_mass(const Image& picture) {
+  Eigen::Vector2d moment = Eigen::Vector2d::Zero();
+  for (int r = 0; r < picture.rows(); ++r) {
+    for (int c = 0; c < picture.columns(); ++c) {
+      moment += static_cast<double>(picture.at(c, r)) * Eigen::Vector2d(c + 0.5, r + 0.5);
+    }
+  }
+  return moment / picture.total();
+}
+
+TEST(FaceLight, AFlatLensSendsItStraightOn) {
+  const SurfaceMesh mesh = testing::graded_mesh(kSize, kShape, 0.1, 1);
+  for (const ViewSide view : {ViewSide::kFront, ViewSide::kRear}) {
+    for (const SurfaceModel model : kModels) {
+      const FaceLight light = face_light(mesh, setup_for(view), model, Executor::serial());
+      ASSERT_EQ(light.landing.cols(), mesh.triangle_count());
+      for (std::int64_t t = 0; t < mesh.triangle_count(); ++t) {
+        const Eigen::Vector3d c = centre_of(mesh, t);
+        const double u = 2.0 * (view == ViewSide::kFront ? 30.0 - c.x() : c.x());
+        EXPECT_LT((light.landing.col(t) - Eigen::Vector2d(u, 48.0 - 2.0 * c.y())).norm(), 1e-12);
+      }
+      EXPECT_LT((light.flux * kSize.prod() - testing::projected_areas(mesh)).norm(), 1e-12);
+      EXPECT_NEAR(light.flux.sum(), 1.0, 1e-13);
+    }
+  }
+}
+
+TEST(FaceLight, APrismDeflectsItByTheAnglesOfSnellsLaw) {
+  const OpticalSetup setup = setup_for(ViewSide::kRear);
+  const SurfaceMesh mesh = with_heights(make_grid_mesh(kSize, kShape, 5.0), [](double x, double y) {
+    return 5.0 + 0.1 * x + 0.02 * y;
+  });
+  const Eigen::Vector2d m =
+      testing::slope_by_angles(Eigen::Vector3d(-0.1, -0.02, 1.0).normalized(), setup.ior);
+  for (const SurfaceModel model : kModels) {
+    const FaceLight light = face_light(mesh, setup, model, Executor::serial());
+    for (std::int64_t t = 0; t < mesh.triangle_count(); ++t) {
+      const Eigen::Vector3d c = centre_of(mesh, t);
+      const Eigen::Vector2d mm = c.head<2>() + (setup.focal_length - c.z()) * m;
+      EXPECT_LT((light.landing.col(t) - Eigen::Vector2d(2.0 * mm.x(), 48.0 - 2.0 * mm.y())).norm(),
+                1e-11);
+    }
+  }
+}
+
+TEST(FaceLight, CentreOfMassIsThatOfTheRenderedPicture) {
+  // Within a pixel the picture does not tell where its light lies: small ones.
+  OpticalSetup setup = setup_for(ViewSide::kFront);
+  setup.pixels = {600, 480};
+  // A converging lens: all of its light lands inside.
+  const SurfaceMesh mesh = with_heights(testing::graded_mesh(kSize, kShape, 0.1, 2), paraboloid);
+  for (const SurfaceModel model : kModels) {
+    const FaceLight light = face_light(mesh, setup, model, Executor::serial());
+    const RenderResult picture = render_surface(mesh, setup, model, Executor::serial());
+    ASSERT_NEAR(picture.flux_inside, 1.0, 1e-6);
+    const Eigen::Vector2d off = light.landing * light.flux - centre_of_mass(picture.image);
+    RecordProperty("pixels_off", std::to_string(off.norm()));
+    EXPECT_LT(off.norm(), 2e-3);
+  }
+}
+
+/// Faces of a known surface send their light where it is wanted.
+Correspondence correspondence_of(const SurfaceMesh& mesh, const OpticalSetup& setup) {
+  const FaceLight light = face_light(mesh, setup, SurfaceModel::kFacet, Executor::serial());
+  return {light.landing, light.flux};
+}
+
+double height_error(const SurfaceMesh& a, const SurfaceMesh& b) {
+  return (a.vertices.row(2) - b.vertices.row(2)).cwiseAbs().maxCoeff();
+}
+
+SurfaceMesh flattened(SurfaceMesh mesh) {
+  mesh.vertices.row(2).setConstant(mesh.vertices.row(2).mean());
+  return mesh;
+}
+
+TEST(AimFaces, GivesAKnownSurfaceItsHeights) {
+  for (const ViewSide view : {ViewSide::kFront, ViewSide::kRear}) {
+    const OpticalSetup setup = setup_for(view);
+    for (const double jitter : {0.0, 0.1}) {
+      const SurfaceMesh known =
+          with_heights(testing::graded_mesh(kSize, kShape, jitter, 3), paraboloid);
+      const Correspondence wanted = correspondence_of(known, setup);
+      SurfaceMesh mesh = flattened(known);
+      const double sag = height_error(mesh, known);
+      aim_faces(wanted, setup, Executor::serial(), mesh);
+      // The heights that the light starts from are those of before.
+      EXPECT_LT(height_error(mesh, known), 5e-3 * sag);
+      for (int i = 0; i < 3; ++i) aim_faces(wanted, setup, Executor::serial(), mesh);
+      EXPECT_LT(height_error(mesh, known), 1e-7 * sag);
+      EXPECT_EQ(mesh.vertices.topRows<2>(), known.vertices.topRows<2>());
+    }
+  }
+}
+
+TEST(AimFaces, MakesAPrism) {
+  const OpticalSetup setup = setup_for(ViewSide::kFront);
+  const SurfaceMesh known =
+      with_heights(make_grid_mesh(kSize, kShape, 5.0),
+                   [](double x, double y) { return 4.0 + 0.1 * x - 0.05 * y; });
+  SurfaceMesh mesh = flattened(known);
+  const Correspondence wanted = correspondence_of(known, setup);
+  for (int i = 0; i < 5; ++i) aim_faces(wanted, setup, Executor::serial(), mesh);
+  EXPECT_LT(height_error(mesh, known), 1e-7);
+}
+
+TEST(AimFaces, LeavesASurfaceThatSendsItsLightWhereItIsWanted) {
+  const OpticalSetup setup = setup_for(ViewSide::kFront);
+  const SurfaceMesh known = with_heights(testing::graded_mesh(kSize, kShape, 0.1, 4), paraboloid);
+  SurfaceMesh mesh = known;
+  aim_faces(correspondence_of(known, setup), setup, Executor::serial(), mesh);
+  EXPECT_LT(height_error(mesh, known), 1e-12);
+}
+
+TEST(AimFaces, FlattensASurfaceWhoseLightIsToGoStraightOn) {
+  const OpticalSetup setup = setup_for(ViewSide::kFront);
+  SurfaceMesh mesh = with_heights(testing::graded_mesh(kSize, kShape, 0.1, 5), paraboloid);
+  const SurfaceMesh flat = flattened(mesh);
+  aim_faces(correspondence_of(flat, setup), setup, Executor::serial(), mesh);
+  EXPECT_LT(height_error(mesh, flat), 1e-7);
+}
+
+TEST(AimFaces, LeavesTheMeshAloneWhenAskedToStop) {
+  const OpticalSetup setup = setup_for(ViewSide::kFront);
+  const SurfaceMesh known = with_heights(make_grid_mesh(kSize, kShape, 5.0), paraboloid);
+  const SurfaceMesh before = flattened(known);
+  SurfaceMesh mesh = before;
+  std::stop_source stop;
+  stop.request_stop();
+  EXPECT_THROW(aim_faces(correspondence_of(known, setup), setup,
+                         Executor::serial().with_stop(stop.get_token()), mesh),
+               Interrupted);
+  EXPECT_EQ(mesh.vertices, before.vertices);
+}
+
+TEST(FaceTransport, UniformLightStaysInPlace) {
+  const OpticalSetup setup = setup_for(ViewSide::kFront);
+  const SurfaceMesh flat = make_grid_mesh(kSize, kShape, 5.0);
+  const FaceLight light = face_light(flat, setup, SurfaceModel::kFacet, Executor::serial());
+  const TransportResult result = transport_faces(light, Image(60, 48, 0.5F), TransportOptions{},
+                                                 Executor::serial(), RunControl());
+  ASSERT_TRUE(result.converged()) << result.message;
+  const double moved = (result.centroids - light.landing).colwise().norm().maxCoeff();
+  RecordProperty("pixels_moved", std::to_string(moved));
+  // Two pixels to a cell; the centroids of the triangles' power cells are nearly their own.
+  EXPECT_LT(moved, 0.3);
+}
+
+TEST(FaceTransport, CentreOfMassOfTheWantedLightIsThePictures) {
+  const OpticalSetup setup = setup_for(ViewSide::kFront);
+  const Image picture = testing::spot_picture(60, 48);
+  const FaceLight light = face_light(make_grid_mesh(kSize, kShape, 5.0), setup,
+                                     SurfaceModel::kFacet, Executor::serial());
+  const TransportResult result =
+      transport_faces(light, picture, TransportOptions{}, Executor::serial(), RunControl());
+  ASSERT_TRUE(result.converged()) << result.message;
+  EXPECT_LT((result.centroids * light.flux - centre_of_mass(picture)).norm(), 1e-2);
+}
+
+}  // namespace
+}  // namespace lensforge

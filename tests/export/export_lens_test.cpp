@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "export/export_lens.h"
+
+#include <gmock/gmock.h>
+
+#include "core/error.h"
+#include "core/surface/mesh_io.h"
+#include "core/temp_folder.h"
+#include "export/sample_surfaces.h"
+
+namespace lensforge {
+namespace {
+
+using ::testing::HasSubstr;
+using testing::message_of;
+using testing::TempFolder;
+
+class ExportLens : public ::testing::Test {
+ protected:
+  ExportLens() {
+    source_.lens.surface = testing::smooth_lens();
+    source_.lens.setup.lens_size = source_.lens.setup.image_size = {30.0, 24.0};
+    source_.lens.setup.pixels = {15, 12};
+    source_.lens.target = Image(15, 12, 1.0F);
+    source_.file = folder_ / "surface.ply";
+    write_ply(source_.lens.surface, source_.file);
+  }
+
+  [[nodiscard]] ExportResult write(const char* name, const ExportOptions& options = {}) {
+    const ExportHooks hooks{[this](const WorkEstimate& /*work*/) { ++announced_; },
+                            [this] { ++begun_; }};
+    return export_lens(source_, folder_ / name, options, Executor::cpu(1), {}, hooks);
+  }
+
+  TempFolder folder_;
+  ExportSource source_;
+  int announced_ = 0;
+  int begun_ = 0;
+};
+
+TEST_F(ExportLens, ACallWritesTheSolidAndSaysHowGoodItIs) {
+  ExportOptions options;
+  options.tolerance = options.normal_tolerance = 0.01;
+  const ExportResult result = write("lens.step", options);
+  EXPECT_EQ(result.format, ExportFormat::kStep);
+  ASSERT_TRUE(result.splines.has_value());
+  EXPECT_TRUE(result.within_tolerance());
+  EXPECT_TRUE(result.splines->content.is_one_solid());
+  EXPECT_NEAR(result.splines->content.volume, result.splines->mesh_volume,
+              1e-4 * result.splines->mesh_volume);
+  EXPECT_NEAR(result.splines->picture.mae, result.metrics.at(SurfaceModel::kSmooth).mae, 1e-3);
+  EXPECT_EQ(announced_, 1);
+  EXPECT_EQ(begun_, 1);
+  const std::string file = testing::read_bytes(folder_ / "lens.step");
+  EXPECT_NE(file.find("sha256:"), std::string::npos);
+}
+
+TEST_F(ExportLens, MeshesAndHeightMapsComeByTheNameOfTheFile) {
+  const ExportResult mesh = write("lens.stl");
+  ASSERT_TRUE(mesh.mesh.has_value());
+  EXPECT_GT(mesh.mesh->triangles, source_.lens.surface.triangle_count());
+  ExportOptions options;
+  options.pixels = 40;
+  const ExportResult heights = write("lens.png", options);
+  ASSERT_TRUE(heights.heights.has_value());
+  EXPECT_EQ(heights.heights->pixels.columns, 40);
+  EXPECT_NEAR(heights.heights->pixel, 0.75, 1e-12);
+  EXPECT_TRUE(heights.heights->scale.has_value());
+}
+
+TEST_F(ExportLens, WhatIsWrongIsToldBeforeAnythingIsWritten) {
+  ExportOptions options;
+  options.author = "two\nlines";
+  EXPECT_THAT(message_of<InputError>([&] { (void)write("a.step", options); }),
+              HasSubstr("--author"));
+  options = {};
+  options.tolerance = 2.0;
+  EXPECT_THAT(message_of<InputError>([&] { (void)write("a.step", options); }),
+              HasSubstr("--tolerance 2: must be 1e-06 to 1 mm"));
+  EXPECT_THAT(message_of<InputError>([&] { (void)write("a.doc"); }), HasSubstr("must end in"));
+  EXPECT_EQ(folder_.file_count(), 1U);
+  EXPECT_EQ(begun_, 0);
+}
+
+}  // namespace
+}  // namespace lensforge
