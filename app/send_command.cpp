@@ -60,7 +60,8 @@ class JobConsole : public JobWatcher {
 
   void passing(const Progress& progress) override {
     if (!bar_) bar_.emplace(options_.common().quiet);
-    bar_->sink()(progress);
+    // None where progress is not shown.
+    if (const auto show = bar_->sink()) show(progress);
   }
   void passed() override { bar_.reset(); }
 

@@ -188,9 +188,9 @@ void DesignObjectiveOn<Exec>::take(const Correspondence& wanted) {
 template <class Exec>
 ObjectiveView DesignObjectiveOn<Exec>::view(const double* vertices) {
   return {.options = options_,
+          .vertices = vertices,
           .light = light_,
           .mesh = mesh_.view(),
-          .vertices = vertices,
           .goal = goal_view(),
           .scratch = {frames_.data(), maps_.data(), edge_weights_.data(), corner_bar_.data()}};
 }

@@ -37,11 +37,12 @@ struct FaceScratch {
   Corners* corner_bar;   ///< Derivatives by every face's corners.
 };
 
+/// The vectors of a light path begin at multiples of 16 bytes: this order leaves none unset.
 struct ObjectiveView {
   ObjectiveOptions options;
+  const double* vertices;  ///< 3 × V, mm
   LightPath light;
   MeshView mesh;
-  const double* vertices;  ///< 3 × V, mm
   GoalView goal;
   FaceScratch scratch;
 

@@ -191,7 +191,7 @@ TEST(CamJob, ProgramsThatAreNotTheJobsAreKeptAndNamed) {
   options.workshop.process.rough.enabled = false;
   const ReportData report = run(small_lens(), options, folder).report;
   EXPECT_THAT(report.warnings,
-              ::testing::Contains(HasSubstr("not of this job and were kept: mine.ngc, rough.ngc, "
+              ::testing::Contains(HasSubstr("of another job, which were kept: mine.ngc, rough.ngc, "
                                             "semi-old.ngc")));
   EXPECT_THAT(read_bytes(folder / "report.html"), HasSubstr("semi-old.ngc"));
   for (const char* name : {"rough.ngc", "semi-old.ngc", "mine.ngc"}) {

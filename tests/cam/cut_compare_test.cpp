@@ -111,7 +111,7 @@ TEST(CutCompare, ChoicesThatCannotBeCutAreRefusedAtOnce) {
     compare_cuts(small_lens(), coarse(), parse({"tool=0.4,2"}), folder.path(), Executor::serial(),
                  {});
   });
-  EXPECT_THAT(message, HasSubstr("--tool-diameter: 2"));
+  EXPECT_THAT(message, HasSubstr("--tool-diameter 2"));
   EXPECT_EQ(folder.file_count(), 0U);
 }
 

@@ -213,7 +213,7 @@ TEST(CutSafety, ABallThatIsLargerThanTheLensIsThickRunsIntoTheTable) {
     const TempFolder folder;
     const CamResult result = make_cut(lens, options, folder.path(), Executor::serial(), {});
     EXPECT_FALSE(check_named(result, "table").passes()) << words_for(zero);
-    EXPECT_THAT(result.message, HasSubstr("limits are not met"));
+    EXPECT_THAT(result.message, HasSubstr("limits were missed"));
     EXPECT_THAT(read_bytes(folder / "report.html"), HasSubstr("below the blank"));
   }
 }

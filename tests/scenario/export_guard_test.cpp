@@ -81,7 +81,7 @@ TEST_F(ExportGuard, InterruptedDesignIsSaid) {
       run({"cam", path("lens"), "--no-render", "--no-rough", "--no-semi", "--tool-diameter", "2mm",
            "--pitch", "1.9mm", "--slope-tolerance", "5e-3"});
   EXPECT_TRUE(fs::exists(at("lens/cam/finish.ngc"))) << cut.err;
-  EXPECT_THAT(cut.err, HasSubstr("design was interrupted; design --resume would finish it"));
+  EXPECT_THAT(cut.err, HasSubstr("design was interrupted; finish it with design --resume"));
 }
 
 TEST_F(ExportGuard, InfoDescribesSolids) {

@@ -64,7 +64,7 @@ TEST(ProgramReader, LeavesMotionsToTheReferenceOut) {
 
 TEST(ProgramReader, FaultyProgramsAreRefusedWithFileLineAndReason) {
   const std::pair<std::string, const char*> faults[] = {
-      {kHead + "G1 X1.0 X2.0 F9\nM2\n", "line 6: X stands twice"},
+      {kHead + "G1 X1.0 X2.0 F9\nM2\n", "line 6: X is given twice"},
       {kHead + "(open\nM2\n", "line 6: comment without its closing bracket"},
       {kHead + "G1 Y1.0e5 F9\nM2\n", "line 6: 'Y1.0e'"},
       {kHead + "G1 X1\nM2\n", "line 6: a motion before a feed F"},

@@ -177,9 +177,8 @@ TEST(Workshop, RefusesToolsThatCannotBe) {
             "shop.toml: tool[0].corner_radius: 0.3: must not be above half the diameter");
   EXPECT_EQ(refusal(tool + tool + off), "shop.toml: tool[0].number: 1: two tools have this number");
   EXPECT_EQ(refusal(tool + "[[tool.section]]\ndiameter = 4.0\nfrom = 0.5\nto = 9.0\n" + off),
-            "shop.toml: tool[0].section[0].from: 0.5: must not be below the part before it, which "
-            "ends at "
-            "1 mm");
+            "shop.toml: tool[0].section[0].from: 0.5: must not be below the end of the part "
+            "before it, 1 mm");
   EXPECT_EQ(refusal("[[tool]]\nnumber = 1\n" + off),
             "shop.toml: tool[0].diameter: missing: a workshop needs this key");
   EXPECT_EQ(refusal("[[keep_out]]\nname = \"clamp\"\nlow_x = 1.0\n"),

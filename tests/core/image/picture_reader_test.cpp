@@ -137,9 +137,9 @@ TEST(PictureReader, APgmThatBreaksItsMaximumIsRefused) {
   EXPECT_THAT(refusal_of("P5 2 2 70000\n        "), HasSubstr("a maximum of 70000"));
   EXPECT_THAT(refusal_of("P5 2 2 10\n\1\2\3\x0b"), HasSubstr("row 1 has the value 11"));
   EXPECT_THAT(refusal_of("P2 2 2 10\n1 2 3 11\n"), HasSubstr("row 1 has the value 11"));
-  EXPECT_THAT(refusal_of("P2 2 2 10\n1 2 3\n"), HasSubstr("ends in row 1 of 2"));
+  EXPECT_THAT(refusal_of("P2 2 2 10\n1 2 3\n"), HasSubstr("data end in row 1 of 2"));
   EXPECT_THAT(refusal_of("P2 2 2 10\n1 2 x 4\n"), HasSubstr("no number"));
-  EXPECT_THAT(refusal_of("P6 2 2 255\n123"), HasSubstr("ends in row 0 of 2"));
+  EXPECT_THAT(refusal_of("P6 2 2 255\n123"), HasSubstr("data end in row 0 of 2"));
   EXPECT_THAT(refusal_of("P5 -2 2 255\n"), HasSubstr("no size"));
 }
 

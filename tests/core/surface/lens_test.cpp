@@ -341,7 +341,7 @@ TEST(Lens, AClockwiseOrFlatTriangleIsRefused) {
 TEST(Lens, ASurfaceBeyondTheWallOrUnderTheEntryFaceIsRefused) {
   for (const double z : {300.0, -0.1}) {
     EXPECT_THAT(surface_refusal([&](SurfaceMesh& mesh) { mesh.vertices(2, 4) = z; }),
-                HasSubstr("must lie between the entry face at 0 and the receiving plane at 300"));
+                HasSubstr("must be between the entry face at 0 and the receiving plane at 300"));
   }
 }
 

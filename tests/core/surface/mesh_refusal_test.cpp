@@ -55,11 +55,11 @@ TEST(PlyReader, AHeaderThatBreaksTheFormatNamesItsLine) {
       {"element vertex 1\nproperty quad x\n", "type 'quad'"},
       {"element vertex 1\nproperty float x\nproperty float x\n", "the property 'x' twice"},
       {"element vertex 1\nproperty float\n", "without a name"},
-      {"element vertex 1\nproperty list float int x\n", "must be of whole numbers"},
+      {"element vertex 1\nproperty list float int x\n", "not an integer type"},
       {"element vertex 0\nproperty float x\nproperty float y\n", "without the properties x, y"},
-      {"element vertex 0\n" + kXyz + "element face 0\n", "without a list vertex_indices"},
+      {"element vertex 0\n" + kXyz + "element face 0\n", "without an integer list vertex_indices"},
       {"element vertex 0\n" + kXyz + "element face 0\nproperty list uchar float vertex_index\n",
-       "without a list vertex_indices of whole numbers"},
+       "without an integer list vertex_indices"},
       {"element vertex 1000000\n" + kXyz, "only 0 bytes follow: it is truncated or corrupt"}};
   for (const auto& [header, words] : bad) {
     EXPECT_THAT(refusal(read_ply, ply(header)), AllOf(StartsWith("m: line "), HasSubstr(words)));

@@ -51,8 +51,8 @@ TEST(GcodeBlock, KnowsEmptyAndPercentLines) {
   }
   EXPECT_TRUE(parse("%").percent);
   EXPECT_TRUE(parse("\t% ").percent);
-  EXPECT_THAT(refusal_of("% G21"), HasSubstr("must stand alone"));
-  EXPECT_THAT(refusal_of("G21 %"), HasSubstr("must stand alone"));
+  EXPECT_THAT(refusal_of("% G21"), HasSubstr("must be alone"));
+  EXPECT_THAT(refusal_of("G21 %"), HasSubstr("must be alone"));
 }
 
 TEST(GcodeBlock, ReadsNumbersAsTheyAreWritten) {
@@ -72,9 +72,9 @@ TEST(GcodeBlock, DecimalsOfGAndMAreKept) {
   EXPECT_EQ(parse("G91.1").words()[0].tenths, 911);
   EXPECT_EQ(parse("G01").words()[0].tenths, 10);
   EXPECT_EQ(parse("M03").words()[0].tenths, 30);
-  EXPECT_THAT(refusal_of("G1.05"), HasSubstr("no such word"));
-  EXPECT_THAT(refusal_of("G-1"), HasSubstr("no such word"));
-  EXPECT_THAT(refusal_of("G1000"), HasSubstr("no such word"));
+  EXPECT_THAT(refusal_of("G1.05"), HasSubstr("unknown word"));
+  EXPECT_THAT(refusal_of("G-1"), HasSubstr("unknown word"));
+  EXPECT_THAT(refusal_of("G1000"), HasSubstr("unknown word"));
 }
 
 TEST(GcodeBlock, RefusesWithLineAndReason) {
@@ -96,10 +96,10 @@ TEST(GcodeBlock, RefusesWithLineAndReason) {
       {"X1.2.3", "'.' where a letter is expected"},
       {"X123456789", "longer than 8 digits"},
       {"X1.2345678901234567", "16 in all"},
-      {"X1 X2", "X stands twice"},
-      {"N1 N2", "N stands twice"},
-      {"N-1", "line numbers are whole and not negative"},
-      {"N1.5", "line numbers are whole"},
+      {"X1 X2", "X is given twice"},
+      {"N1 N2", "N is given twice"},
+      {"N-1", "line numbers are integers, 0 or above"},
+      {"N1.5", "line numbers are integers"},
       {"#1=3", "'#': parameters and expressions"},
       {"X[1+2]", "a number is missing after X"},
       {"/G1 X1", "block delete is not supported"},

@@ -125,10 +125,10 @@ TEST(GcodeInterpreter, RefusesWithLineAndReason) {
       {"G21 F0", "a feed is above 0"},
       {"G21 F-5", "a feed is above 0"},
       {"S-1", "a speed is not negative"},
-      {"G21\nG0 G1 X1", "another word of its group"},
-      {"G17 G18", "another word of its group"},
-      {"M3 M5", "another word of its group"},
-      {"G20 G21", "another word of its group"},
+      {"G21\nG0 G1 X1", "another word of its modal group"},
+      {"G17 G18", "another word of its modal group"},
+      {"M3 M5", "another word of its modal group"},
+      {"G20 G21", "another word of its modal group"},
       {"G4", "G4 without P"},
       {"G4 P-1", "a time is not negative"},
       {"G4 P1 X1", "G4 beside coordinates"},
@@ -160,7 +160,7 @@ TEST(GcodeInterpreter, RefusesWithLineAndReason) {
       {"%\nG21\n%\nG0 X1", "words after the end"},
       {"G21\n%", "% neither at the begin nor at the end"},
       {"%\n%\n%", "% neither"},
-      {"N10000000 G21", "knows none above 9999999"},
+      {"N10000000 G21", "has none above 9999999"},
   };
   for (const auto& [program, reason] : cases) {
     EXPECT_THAT(run_program(program).refusal, HasSubstr(reason)) << program;
@@ -204,7 +204,7 @@ TEST(GcodeInterpreter, FanucProgramsBeginWithTheirNumber) {
 TEST(GcodeInterpreter, RefusesWhatADialectMisuses) {
   const std::pair<const char*, const char*> cases[] = {
       {"G21\nO1", "O after the program's first line"},
-      {"O1 G21", "O stands alone"},
+      {"O1 G21", "O must be alone"},
       {"O0", "programs are numbered from 1"},
       {"O1.5", "programs are numbered from 1"},
       {"G43", "G43 without H"},
@@ -213,7 +213,7 @@ TEST(GcodeInterpreter, RefusesWhatADialectMisuses) {
       {"G5.1", "G5.1 without Q"},
       {"Q1", "Q belongs to no word"},
       {"G64", "G64 is not supported for fanuc"},
-      {"G43 G49 H1", "another word of its group"},
+      {"G43 G49 H1", "another word of its modal group"},
   };
   for (const auto& [program, reason] : cases) {
     EXPECT_THAT(run_program(program, fanuc_dialect()).refusal, HasSubstr(reason)) << program;

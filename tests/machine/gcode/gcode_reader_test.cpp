@@ -111,7 +111,7 @@ TEST(GcodeReader, RefusesEveryByteThatIsNoText) {
 TEST(GcodeReader, NamesTheRuleThatAByteBreaks) {
   EXPECT_THAT(refusal_of(std::string("G1 \0X1", 6)),
               HasSubstr("line 1: byte 0x00 in column 4: NUL"));
-  EXPECT_THAT(refusal_of("(what?)"), HasSubstr("byte 0x3F in column 6: the controller acts"));
+  EXPECT_THAT(refusal_of("(what?)"), HasSubstr("byte 0x3F in column 6: the controller treats"));
   EXPECT_THAT(refusal_of("\xEF\xBB\xBFG21\n"), HasSubstr("UTF-8 byte order mark"));
   EXPECT_THAT(refusal_of("G21\n(\xC3\xA9)"), HasSubstr("line 2: byte 0xC3 in column 2"));
   EXPECT_THAT(refusal_of("G1\x18"), HasSubstr("byte 0x18"));

@@ -160,8 +160,8 @@ TEST(Preflight, ProgramsWithoutMotionAreTold) {
   EXPECT_THAT(lack(""), HasSubstr("is empty; send a program"));
   EXPECT_THAT(lack("\n\n(nothing)\n"), HasSubstr("its 3 lines hold no command"));
   EXPECT_THAT(lack("G21 G90\nM2\nG0 X1\n"),
-              HasSubstr("its 2 lines up to its end (M2, M30 or %) move"));
-  EXPECT_THAT(lack("G21 G90\nS1000 M3\nM5\n"), HasSubstr("its 3 lines move nothing"));
+              HasSubstr("its 2 lines up to its end (M2, M30 or %) contain no motion"));
+  EXPECT_THAT(lack("G21 G90\nS1000 M3\nM5\n"), HasSubstr("its 3 lines contain no motion"));
 }
 
 TEST(Preflight, SpeedsBeyondTheRegisterMapAreRefused) {
