@@ -71,7 +71,7 @@ TEST_F(Cam, ProgramsOfAnEarlierJobGoWithTheNewOne) {
   write(at("lens/cam/old.ngc"), "M2\n");
   const Outcome outcome = run(cam({"--z-zero", "table"}));
   EXPECT_THAT(listing(at("lens/cam")), Not(Contains("cross.ngc")));
-  EXPECT_THAT(outcome.err, HasSubstr("not of this job and were kept: old.ngc"));
+  EXPECT_THAT(outcome.err, HasSubstr("of another job, which were kept: old.ngc"));
 }
 
 TEST_F(Cam, ATravelTooShortAndAnotherIndexAreMissedLimits) {

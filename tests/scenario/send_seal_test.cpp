@@ -99,7 +99,7 @@ TEST_F(SendSeal, AProgramWithoutOneIsSent) {
   write(at("job.ngc"), kBody);
   const Outcome outcome = send({"--dry-run"});
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
-  EXPECT_THAT(outcome.out, HasSubstr("nothing tells whether it was changed"));
+  EXPECT_THAT(outcome.out, HasSubstr("cannot tell whether the program was changed"));
 }
 
 }  // namespace
