@@ -109,8 +109,7 @@ class Job {
     const PartSurfaces surfaces({lens ? lens->field() : cut->field(), *rounded, rectangle,
                                  plan_.blank().max().z(), plan_.mould()},
                                 plan_.take_finish_paths(programs, control_), options_.polish);
-    Prediction prediction =
-        predict_part(surfaces, lens_, options_, plan_.ground(), executor_, control_);
+    Prediction prediction = predict_part(surfaces, lens_, options_, executor_, control_);
     if (options_.remedies) {
       try_remedies({plan_, lens_, surfaces.designed(), surfaces.part(), prediction.leakage},
                    prediction.places, executor_, control_);

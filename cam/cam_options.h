@@ -56,8 +56,8 @@ struct CamOptions {
   bool render = true;    ///< Compute what the part will project; else programs only.
   bool remedies = true;  ///< Try what helps where most light leaks, if it is computed.
   PolishModel polish{0.03, 0.0, 1.0};
-  /// Of the surface that is rendered at most, mm, 0.001 … 1, see sampling_grid(); 0 takes a sixth
-  /// of the pitch, or a third of the polish's σ if that is more.
+  /// Of the surface that is rendered, mm, 0.001 … 1; 0 takes a sixth of the pitch, or a third of
+  /// the polish's σ if that is more.
   double sample_spacing = 0.0;
   LeakageOptions leakage;
   CutLimits limits;
@@ -77,8 +77,7 @@ inline constexpr double kFinestSample = 1e-3;   ///< mm
 inline constexpr double kCoarsestSample = 1.0;  ///< mm
 }  // namespace cam_limit
 
-/// The spacing at which the surface is sampled at most, mm; the passes make it finer
-/// (sampling_grid()).
+/// The spacing at which the surface is sampled, mm.
 double sample_spacing(const CamOptions& options);
 
 /// @throw InputError naming option, value and rule if an option breaks its rule on its own or

@@ -7,7 +7,6 @@
 
 #include "cam/finish_setup.h"
 #include "cam/prediction.h"
-#include "cam/sampling_grid.h"
 #include "core/error.h"
 #include "core/text/number_text.h"
 
@@ -82,10 +81,7 @@ double rough_points(const CamOptions& options, const Eigen::Vector2d& size) {
 
 double samples_of(const CamOptions& options, const Eigen::Vector2d& size) {
   const double spacing = sample_spacing(options);
-  const double pitch =
-      finish_pitch(options.workshop.process.finish, finishing_ball(options).radius());
-  const double across = pitch / nodes_per_pass(pitch, spacing);
-  return options.render ? kSurfaces * size.prod() / (spacing * across) : 0.0;
+  return options.render ? kSurfaces * size.prod() / (spacing * spacing) : 0.0;
 }
 
 double nodes_of(const Eigen::Vector2d& size) { return size.prod() / (kMeshSpacing * kMeshSpacing); }

@@ -101,14 +101,10 @@ ParameterGroup entry_parameters(const Process& process) {
   return group;
 }
 
-ParameterGroup polish_parameters(const CamOptions& options, const SamplingCheck& sampling) {
-  ParameterGroup group{
-      "Polishing, as assumed",
-      {{"Gaussian σ", mm(options.polish.sigma, 3)},
-       {"Sampled every",
-        mm(sampling.spacing.x(), 4) + " along x, " + mm(sampling.spacing.y(), 4) + " along y"},
-       {"Error of that sampling", "leakage " + decimal_text(100.0 * sampling.leakage, 3) +
-                                      " %, MAE " + decimal_text(sampling.mae, 5)}}};
+ParameterGroup polish_parameters(const CamOptions& options) {
+  ParameterGroup group{"Polishing, as assumed",
+                       {{"Gaussian σ", mm(options.polish.sigma, 3)},
+                        {"Sampled every", mm(sample_spacing(options), 4)}}};
   if (options.polish.rim_depth > 0.0) {
     group.parameters.push_back(
         {"Taken off at the rim",
@@ -352,7 +348,7 @@ ReportData make_report(const CutPlan& plan, const ProgramFiles& programs,
   data.warnings = warnings_of(plan, programs, lens);
   data.path = plan.shown_path();
   if (prediction) {
-    data.parameters.push_back(polish_parameters(options, prediction->sampling));
+    data.parameters.push_back(polish_parameters(options));
     add_prediction(*prediction, lens, data);
   }
   data.verdict = whole_verdict(plan, programs, prediction, lens);

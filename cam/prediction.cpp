@@ -7,7 +7,6 @@
 #include "cam/leakage/render_field.h"
 #include "cam/milled/lens_grid.h"
 #include "cam/milled/sampled_mesh.h"
-#include "cam/sampling_grid.h"
 #include "core/error.h"
 
 namespace lensforge {
@@ -27,15 +26,14 @@ constexpr double kMicrometres = 1e3;
 constexpr double kAlongPasses = 3.0;
 
 /// The chain with a grid of its own for the surface as milled, unless passes cross.
-LeakageChain chain_of(const PartSurfaces& surfaces, const CamOptions& options,
-                      const Eigen::Vector2d& lens_size, const GridWindow& grid) {
+LeakageChain chain_of(const PartSurfaces& surfaces, const Lens& lens, const CamOptions& options) {
   LeakageChain chain = surfaces.chain();
   const FinishProcess& finish = options.workshop.process.finish;
   if (finish.cross) return chain;
-  Eigen::Vector2d spacing = grid.spacing;
+  Eigen::Vector2d spacing = Eigen::Vector2d::Constant(sample_spacing(options));
   spacing[finish.along == PassAxis::kX ? 0 : 1] *= kAlongPasses;
   for (NamedSurface& other : chain.others) {
-    if (other.field == &surfaces.milled()) other.grid = lens_grid(lens_size, spacing);
+    if (other.field == &surfaces.milled()) other.grid = lens_grid(lens.setup.lens_size, spacing);
   }
   return chain;
 }
@@ -72,12 +70,11 @@ ReportMap height_map(const LeakMap& map) {
 }  // namespace
 
 Prediction predict_part(const PartSurfaces& surfaces, const Lens& lens, const CamOptions& options,
-                        const FinishGround& ground, const Executor& executor,
-                        const RunControl& control) {
+                        const Executor& executor, const RunControl& control) {
   Prediction result;
-  const GridWindow grid = sampling_grid(options, ground, lens.setup.lens_size);
+  const GridWindow grid = lens_grid(lens.setup.lens_size, sample_spacing(options));
   const FieldRenderSetup setup{lens.setup, grid};
-  const LeakageChain chain = chain_of(surfaces, options, lens.setup.lens_size, grid);
+  const LeakageChain chain = chain_of(surfaces, lens, options);
   result.leakage = measure_leakage(chain, lens.target, setup, options.leakage, executor, control);
   result.sampling =
       check_sampling(surfaces.part(), result.leakage, lens.target, setup, executor, control);

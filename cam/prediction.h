@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "cam/cam_options.h"
-#include "cam/finish_setup.h"
 #include "cam/leakage/leak_map.h"
 #include "cam/leakage/leakage.h"
 #include "cam/leakage/sampling_check.h"
@@ -21,8 +20,8 @@ namespace lensforge {
 
 /// What a part will project, before it is cut.
 struct Prediction {
-  SamplingCheck sampling;
   LeakageResult leakage;
+  SamplingCheck sampling;         ///< Of the part.
   std::vector<LeakPlace> places;  ///< That leak most, worst first.
   CreaseMap creases;
   ReportMap height;    ///< Part − designed, µm.
@@ -36,7 +35,6 @@ inline constexpr double kMeshSpacing = 0.1;
 /// Renders every surface from the design to the polished part and finds where light leaks. Memory
 /// does not grow with the number of samples. @throw Interrupted
 Prediction predict_part(const PartSurfaces& surfaces, const Lens& lens, const CamOptions& options,
-                        const FinishGround& ground, const Executor& executor,
-                        const RunControl& control);
+                        const Executor& executor, const RunControl& control);
 
 }  // namespace lensforge

@@ -101,7 +101,7 @@ struct ReportData {
 
   Image target;                     ///< Linear light.
   LeakageResult leakage;            ///< designed, chain and the other surfaces.
-  SamplingCheck sampling;           ///< Of its last step.
+  SamplingCheck sampling;           ///< Of the part.
   std::vector<ShownSurface> shown;  ///< Whose pictures stand side by side.
   LeakageOptions leakage_options;
   std::vector<LeakPlace> places;        ///< Worst first.

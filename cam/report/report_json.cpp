@@ -68,9 +68,8 @@ json leakage_json(const ReportData& data) {
 }
 
 json sampling_json(const SamplingCheck& check) {
-  return {{"spacing_mm", {check.spacing.x(), check.spacing.y()}},
-          {"leakage_error", check.leakage},
-          {"mae_error", check.mae}};
+  return {
+      {"spacing_mm", check.spacing}, {"leakage_error", check.leakage}, {"mae_error", check.mae}};
 }
 
 json surfaces_json(const LeakageResult& result) {

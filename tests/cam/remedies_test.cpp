@@ -68,7 +68,7 @@ class Foretold {
     surfaces_.emplace(PartSurfaces::Design{designed_, *rounded_, rectangle, plan_.blank().max().z(),
                                            plan_.mould()},
                       plan_.take_finish_paths(programs, control), options_.polish);
-    prediction_ = predict_part(*surfaces_, lens_, options_, plan_.ground(), executor_, control);
+    prediction_ = predict_part(*surfaces_, lens_, options_, executor_, control);
   }
 
   [[nodiscard]] TrialSite site() const {
