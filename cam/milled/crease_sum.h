@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <cstdint>
+
 #include "cam/milled/surface_field.h"
 #include "core/compute/executor.h"
 
@@ -18,22 +20,26 @@ double meeting_share(double at_first, double at_second);
 /// Changes the heights of a patch beside creases so that sums of them with smooth weights (what
 /// polishing is) tell where the crease runs between its two nodes.
 ///
-/// The sum over nodes h apart of a smooth function is its integral, but for what is exponentially
-/// small; a crease at θh behind a node, where the slope jumps by J, adds to its integral
+/// h times the sum of a smooth function over nodes h apart is its integral, but for what is
+/// exponentially small. A crease at θh behind a node, where the slope jumps by J, makes it too
+/// large by
 ///
 ///     −½ J h² B₂(θ) w + ⅓ J h³ B₃(θ) w′ + O(h⁴)     (Euler–Maclaurin, ends at the crease)
 ///
-/// with the weight w and its derivative there and the Bernoulli polynomials B₂, B₃. The scallops'
-/// crests wander over the nodes as the surface tilts, and the first term is a wave with the length
-/// of that: a slope off by up to ½ h times the curvature. Both terms are taken from the heights of
-/// the two nodes. A crease counts along that axis of the grid along which more of its jump lies:
-/// what is summed along one axis is smooth along the other unless the crease runs along the first.
+/// with the weight w and its derivative there and the Bernoulli polynomials B₂ and B₃. As the
+/// crests of scallops wander over the nodes where a surface bends, θ changes and slopes are off by
+/// up to ½ h times the curvature across the passes. The heights of the two nodes are lowered by
+/// both terms. A crease counts along the axis of the grid along which more of its jump lies: sums
+/// along that axis are smooth along the other. Tests:
+/// PolishedField.ARidgeCountsWhereItRunsBetweenNodes and CrestsThatWanderOverTheNodesMakeNoWave.
 ///
-/// Heights of the two nodes next to a border of the window, but for a border of the lens, lack what
-/// lies beyond. Does nothing to a patch without pieces.
+/// The nodes at either end of a line and creases beside them are left alone: on the lens's rim,
+/// from where heights are turned, nothing is to be corrected, and the slope there is that of any of
+/// the passes that roll over it. Elsewhere the kCreaseHalo nodes next to the window's border lack
+/// what lies beyond. Does nothing to a patch without pieces.
 void correct_crease_sums(const Executor& executor, SurfacePatch& patch);
 
-/// How many nodes next to a window's border these are.
+/// Nodes next to a window's border whose heights come out otherwise than in a larger window.
 inline constexpr std::int64_t kCreaseHalo = 2;
 
 }  // namespace lensforge

@@ -60,8 +60,8 @@ std::string signed_text(double value, int decimals) {
 
 std::string sampling_sentence(const SamplingCheck& check) {
   return element("p", "class=\"soft\"",
-                 "Computed from samples " + decimal_text(check.spacing, 4) +
-                     " mm apart. Half that spacing would change the polished part’s leakage by "
+                 "Computed from samples of the surface " + decimal_text(check.spacing, 4) +
+                     " mm apart; half that spacing would change the polished part’s leakage by "
                      "about " +
                      signed_text(100.0 * check.leakage, 3) +
                      " % of the light and its MAE by about " + signed_text(check.mae, 5) + ".");
