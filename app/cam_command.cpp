@@ -86,8 +86,7 @@ CamResult run(const OptionSet& options, const CamOptions& cam, const Lens& lens,
     console.note("the cut takes " + estimate_words(estimate));
   }
   const InterruptWatch interrupt;
-  const OutputFolder folder(out);
-  const FolderLock lock(out, FolderLock::Kind::kExclusive);
+  const OutputFolder folder(out, FolderLock::Kind::kExclusive);
   folder.remove_partial_files(is_name_of_cut);
   ProgressDisplay progress(options.common().quiet);
   const RunControl control(interrupt.token(), progress.sink());
@@ -150,8 +149,7 @@ int compare(const OptionSet& options, const CamSettings& settings, const CamOpti
   const Executor executor = options.executor();
   announce(choices, cam, lens, executor.concurrency(), settings.folder(), console);
   const InterruptWatch interrupt;
-  const OutputFolder folder(settings.folder());
-  const FolderLock lock(settings.folder(), FolderLock::Kind::kExclusive);
+  const OutputFolder folder(settings.folder(), FolderLock::Kind::kExclusive);
   folder.remove_partial_files(is_name_of_cut);
   ProgressDisplay progress(options.common().quiet);
   const RunControl control(interrupt.token(), progress.sink());

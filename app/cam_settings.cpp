@@ -34,7 +34,8 @@ void settle(OptionSet& options, CamSettings& settings) {
     options.restate();
   }
   settings.cam.job = folder_name(settings.source);
-  validate(settings.cam.workshop, file);
+  // A file's own values have been read and found in order: what is wrong now is an option's doing.
+  validate(settings.cam.workshop, file + " with the options given");
 }
 
 }  // namespace lensforge::app

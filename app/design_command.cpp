@@ -28,7 +28,6 @@
 #include "core/error.h"
 #include "core/image/image_io.h"
 #include "core/io/files.h"
-#include "core/io/folder_lock.h"
 #include "core/text/version.h"
 #include "design/design_estimate.h"
 #include "design/design_lens.h"
@@ -80,8 +79,8 @@ void write_folder(const OutputFolder& folder, const DesignResult& result, const 
   write_whole_file(convergence.beside(), convergence_csv(result.convergence));
   PendingFile overview(folder.path() / lens_file::kOverview);
   write_image(draw_overview(result.lens), overview.beside());
-  write_lens(result.lens,
-             folder.path());  // A disk that is full is met before any file is replaced.
+  // A disk that is full is met before any file is replaced.
+  write_lens(result.lens, folder.path());
   convergence.publish();
   overview.publish();
   const fs::path cut = folder.path() / lens_file::kCut;
@@ -131,7 +130,9 @@ int finish(const OptionSet& options, const ChosenDevice& device, const OutputFol
   std::error_code ignored;
   if (done) fs::remove(folder.path() / lens_file::kCheckpoint, ignored);
   console.result(summary_json(folder.path(), result), summary_text(folder.path(), result));
-  if (keeps) console.note(folder.path().string() + " keeps its earlier lens until then");
+  if (keeps) {
+    console.note(folder.path().string() + " keeps its earlier lens until the new one is done");
+  }
   if (!done) console.note("interrupted; run the same command with --resume to continue");
   return done ? kDone : kInterrupted;
 }
@@ -142,7 +143,8 @@ int report_finished(const DesignSettings& settings, const Console& console) {
   return kDone;
 }
 
-/// Runs the design. `begin` is called once, as soon as the library has accepted all its input.
+/// Runs the design. `begin` is called once, as soon as the library has accepted all its input: what
+/// no lens can do is only known after the first transport, before any share of the work is done.
 DesignResult shape(bool quiet, const Executor& executor, const DesignOptions& design,
                    const Image& target, const std::stop_token& stop,
                    const std::function<void()>& begin) {
@@ -150,7 +152,7 @@ DesignResult shape(bool quiet, const Executor& executor, const DesignOptions& de
   ProgressDisplay progress(quiet);
   const auto show = progress.sink();
   const RunControl control(stop, [&](const Progress& p) {
-    std::call_once(begun, begin);
+    if (p.done > 0.0) std::call_once(begun, begin);
     if (show) show(p);
   });
   DesignResult result = design_lens(target, design, executor, control);
@@ -186,8 +188,7 @@ int run(OptionSet& options, DesignSettings& settings) {
     return report_finished(settings, console);
   }
   const ChosenDevice device = options.device_executor();
-  const OutputFolder folder(settings.out);
-  const FolderLock lock(folder.path(), FolderLock::Kind::kExclusive);
+  const OutputFolder folder(settings.out, FolderLock::Kind::kExclusive);
   const WorkEstimate expected =
       require_room_for_design(loaded.image.columns(), loaded.image.rows(), design,
                               device.executor.concurrency(), settings.out);
@@ -199,8 +200,9 @@ int run(OptionSet& options, DesignSettings& settings) {
     for (const std::string& change : changes_made(loaded, settings)) console.note(change);
     if (expected.seconds > kWorthTelling) console.note("takes " + estimate_words(expected));
     // A design that was killed before its first checkpoint starts at the beginning.
-    if (settings.resume && !design.resume)
-      console.note("nothing to resume: starting the design from the beginning");
+    if (settings.resume && !design.resume) {
+      console.note("nothing to resume: started the design from the beginning");
+    }
   };
   DesignResult result = shape(options.common().quiet, device.executor, design, loaded.image,
                               interrupt.token(), begin);

@@ -17,7 +17,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// A lens.json is a few kilobytes; convergence.csv's first line is looked at only.
-constexpr std::uintmax_t kMostJson = 1 << 20;
+constexpr std::uintmax_t kMaxJson = 1 << 20;
 
 bool is_own_table(const fs::path& path) {
   const std::string header = convergence_csv({});
@@ -36,7 +36,7 @@ bool is_own(const fs::path& path) {
 
 /// Null where the file cannot be understood: whoever needs it says so.
 nlohmann::json provenance_of(const fs::path& json) {
-  const std::string text = read_whole_file(json, kMostJson);
+  const std::string text = read_whole_file(json, kMaxJson);
   try {
     const nlohmann::json document = parse_json(text, json.string());
     return document.is_object() ? document.value("provenance", nlohmann::json()) : nlohmann::json();

@@ -13,7 +13,7 @@
 namespace lensforge::app {
 namespace {
 
-constexpr std::size_t kMostHeaderLines = 12;
+constexpr std::size_t kMaxHeaderLines = 12;
 /// Longer than any controller takes by far.
 constexpr std::size_t kLongestLine = 4096;
 
@@ -88,7 +88,7 @@ GcodeSummary summarise_gcode(const std::filesystem::path& path) {
     }
     const SplitLine parts = split(line);
     in_header = in_header && (parts.code.empty() || parts.code == "%");
-    if (in_header && !parts.comment.empty() && summary.header.size() < kMostHeaderLines) {
+    if (in_header && !parts.comment.empty() && summary.header.size() < kMaxHeaderLines) {
       summary.header.push_back(parts.comment);
     }
     if (take_words(parts.code, summary.extent)) ++summary.moves;

@@ -12,7 +12,8 @@ namespace fs = std::filesystem;
 namespace {
 
 std::unique_ptr<OutputFolder> folder_of(const fs::path& out) {
-  return out.empty() ? nullptr : std::make_unique<OutputFolder>(fs::absolute(out).parent_path());
+  if (out.empty()) return nullptr;
+  return std::make_unique<OutputFolder>(fs::absolute(out).parent_path(), FolderLock::Kind::kShared);
 }
 
 }  // namespace

@@ -12,15 +12,13 @@ namespace lensforge::app {
 
 namespace fs = std::filesystem;
 
-OutputFolder::OutputFolder(fs::path path) : path_(std::move(path)) {
-  std::error_code ignored;
-  existed_ = fs::exists(path_, ignored);
-  require_writable_folder(path_);
-}
+OutputFolder::OutputFolder(fs::path path, FolderLock::Kind kind)
+    : path_(std::move(path)), lock_(FolderLock::make(path_, kind, made_)) {}
 
 OutputFolder::~OutputFolder() {
   std::error_code ignored;
-  if (!existed_) fs::remove(path_, ignored);  // Only succeeds on an empty folder.
+  // Only succeeds on an empty folder.
+  if (made_ && lock_.become_exclusive()) fs::remove(path_, ignored);
 }
 
 void OutputFolder::remove_partial_files(

@@ -193,7 +193,7 @@ OptionTable<O> prediction_rows() {
                     Limits::between(0, cam_limit::kPolish),
                     "extra depth that polishing removes at the rim"),
           R::length("--rim-length", in(polish, &PolishModel::rim_length),
-                    Limits::between(cam_limit::kLeastRim, cam_limit::kRim),
+                    Limits::between(cam_limit::kMinRim, cam_limit::kRim),
                     "distance from the rim over which the extra depth falls to a third"),
           R::length("--sample-spacing", &O::sample_spacing,
                     Limits::zero_or(cam_limit::kFinestSample, cam_limit::kCoarsestSample),

@@ -69,8 +69,8 @@ inline constexpr double kSpinUp = 3600.0;  ///< s
 inline constexpr double kShrinkage = 0.2;  ///< More than any casting resin loses.
 inline constexpr double kPolish =
     1.0;  ///< σ and depth at the rim, mm; beyond it no picture is left.
-inline constexpr double kLeastRim = 1e-3;  ///< Of PolishModel::rim_length, mm.
-inline constexpr double kRim = 1000.0;     ///< Likewise.
+inline constexpr double kMinRim = 1e-3;  ///< Of PolishModel::rim_length, mm.
+inline constexpr double kRim = 1000.0;   ///< Likewise.
 inline constexpr double kDark = 1e3;  ///< Of LeakageOptions::dark_below: brighter than any picture.
 inline constexpr double kLimit = 1e6;           ///< Of each of CutLimits, in its own unit.
 inline constexpr double kFinestSample = 1e-3;   ///< mm

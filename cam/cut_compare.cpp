@@ -123,9 +123,9 @@ CutChoices parse_choices(std::span<const std::string> words, const std::string& 
     return std::max<std::size_t>(values.size(), 1);
   };
   const std::size_t count = count_of(choices.tools) * count_of(choices.pitches);
-  if (count > kMostChoices) {
+  if (count > kMaxChoices) {
     throw InputError(option + ": " + std::to_string(count) + " combinations are more than " +
-                     std::to_string(kMostChoices));
+                     std::to_string(kMaxChoices));
   }
   return choices;
 }

@@ -21,7 +21,7 @@ struct CutChoices {
 };
 
 /// Combinations at most.
-inline constexpr std::size_t kMostChoices = 64;
+inline constexpr std::size_t kMaxChoices = 64;
 
 /// Reads words such as "tool=0.3,0.4mm" and "pitch=0.04".
 /// @param option  where they come from, for messages.

@@ -24,13 +24,13 @@ constexpr double kCoarserPower = 0.6;
 constexpr double kFinerPower = 1.3;
 constexpr double kTolerancePower = 0.5;
 
-constexpr double kBytesPerMove = 40.0;       ///< "G3 X12.345678 Z-1.234567 I-1.234567 K-12.345678"
-constexpr double kMemoryPerMove = 1000.0;    ///< Bytes: exact, fitted and written way of the ball.
-constexpr double kMemory = 1.5e8;            ///< Bytes of everything else.
-constexpr double kMemoryPerNode = 200.0;     ///< Bytes of milled.ply and of what it is made from.
-constexpr double kDiskPerNode = 50.0;        ///< Bytes of a vertex and two triangles.
-constexpr double kSecondsPerMm = 1.8e-4;     ///< Of a finishing row: drop curve, fit, reading back.
-constexpr double kLeastSecondsPerMm = 1e-4;  ///< With any tolerance.
+constexpr double kBytesPerMove = 40.0;     ///< "G3 X12.345678 Z-1.234567 I-1.234567 K-12.345678"
+constexpr double kMemoryPerMove = 1000.0;  ///< Bytes: exact, fitted and written way of the ball.
+constexpr double kMemory = 1.5e8;          ///< Bytes of everything else.
+constexpr double kMemoryPerNode = 200.0;   ///< Bytes of milled.ply and of what it is made from.
+constexpr double kDiskPerNode = 50.0;      ///< Bytes of a vertex and two triangles.
+constexpr double kSecondsPerMm = 1.8e-4;   ///< Of a finishing row: drop curve, fit, reading back.
+constexpr double kMinSecondsPerMm = 1e-4;  ///< With any tolerance.
 constexpr double kFinerSeconds = 2.75;     ///< Their power of finer slopes: moves are tried often.
 constexpr double kTraced = 3.0;            ///< Times as long where the part is rendered.
 constexpr double kSecondsPerPoint = 1e-5;  ///< Of a roughing or semi-finishing pass.
@@ -64,7 +64,7 @@ double moves_per_mm(const FinishProcess& finish) {
 double seconds_per_mm(const CamOptions& options) {
   const double fine = fineness(options.workshop.process.finish);
   const double seconds = kSecondsPerMm * std::pow(fine, kFinerSeconds);
-  return std::max(seconds, kLeastSecondsPerMm) * (options.render ? kTraced : 1.0);
+  return std::max(seconds, kMinSecondsPerMm) * (options.render ? kTraced : 1.0);
 }
 
 /// Points of a pass that follows the surface, over one level.

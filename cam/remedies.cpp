@@ -16,9 +16,9 @@
 namespace lensforge {
 namespace {
 
-constexpr std::size_t kMostBalls = 3;   ///< Sizes tried.
-constexpr std::size_t kMostCauses = 2;  ///< The larger ones of a place.
-constexpr double kLeastPart = 0.1;      ///< Of a leak, for its cause to be tried.
+constexpr std::size_t kMaxBalls = 3;   ///< Sizes tried.
+constexpr std::size_t kMaxCauses = 2;  ///< The larger ones of a place.
+constexpr double kMinPart = 0.1;       ///< Of a leak, for its cause to be tried.
 constexpr double kHalf = 0.5;
 
 /// A change of one thing, and what to call it.
@@ -141,7 +141,7 @@ class Trials {
 std::vector<std::string> causes_of(const LeakPlace& place) {
   std::vector<CausePart> parts = place.parts;
   std::erase_if(parts,
-                [&](const CausePart& part) { return part.leakage < kLeastPart * place.leakage; });
+                [&](const CausePart& part) { return part.leakage < kMinPart * place.leakage; });
   std::stable_sort(parts.begin(), parts.end(),
                    [](const CausePart& a, const CausePart& b) { return a.leakage > b.leakage; });
   std::vector<std::string> causes(parts.size());
@@ -162,7 +162,7 @@ void try_remedies(const TrialSite& site, std::vector<LeakPlace>& places, const E
                   const RunControl& control) {
   Trials trials(site, executor, control);
   const CamOptions& options = site.plan.options();
-  for (std::size_t rank = 0; rank < kMostCauses; ++rank) {
+  for (std::size_t rank = 0; rank < kMaxCauses; ++rank) {
     std::vector<LeakPlace*> creased;
     for (LeakPlace& place : places) {
       const std::vector<std::string> causes = causes_of(place);
@@ -172,7 +172,7 @@ void try_remedies(const TrialSite& site, std::vector<LeakPlace>& places, const E
         if (!is_halved(&place)) trials.run(change, {&place});
       }
     }
-    for (const double diameter : smaller_balls(finishing_ball(options).diameter, kMostBalls)) {
+    for (const double diameter : smaller_balls(finishing_ball(options).diameter, kMaxBalls)) {
       trials.run(with_ball(options, diameter), creased);
       std::erase_if(creased, is_halved);
     }

@@ -94,16 +94,16 @@ struct Exchange {
   double dark_flux = 0.0;
 };
 
-Exchange exchange(const LeakageResult& foretold, const FluxPicture& before,
+Exchange exchange(const LeakageResult& predicted, const FluxPicture& before,
                   const FluxPicture& now) {
-  const std::vector<double>& part = foretold.part().picture.flux;
-  const std::vector<double>& designed = foretold.designed.picture.flux;
+  const std::vector<double>& part = predicted.part().picture.flux;
+  const std::vector<double>& designed = predicted.designed.picture.flux;
   Exchange sum;
   for (std::size_t i = 0; i < part.size(); ++i) {
     const double more = now.flux[i] - before.flux[i];
     sum.leakage +=
         std::max(0.0, part[i] + more - designed[i]) - std::max(0.0, part[i] - designed[i]);
-    sum.dark_flux += foretold.dark[i] * more;
+    sum.dark_flux += predicted.dark[i] * more;
   }
   return sum;
 }
@@ -195,10 +195,10 @@ LeakTrial TrialCut::at(const LeakPlace& place, const RunControl& control) const 
   const Eigen::Vector2d size = site_.lens.setup.lens_size;
   const PolishedField part(raw, {Eigen::Vector2d(0.0, 0.0), size}, options_.polish);
   const OpticalSetup& optics = site_.lens.setup;
-  const FluxPicture foretold =
+  const FluxPicture predicted =
       render_cells(site_.part, {optics, grid}, place.cells, executor_, silent);
   const FluxPicture now = render_cells(part, {optics, fine.grid}, fine.cells, executor_, silent);
-  const Exchange change = exchange(site_.leakage, foretold, now);
+  const Exchange change = exchange(site_.leakage, predicted, now);
   LeakTrial trial;
   trial.leakage = place.leakage + change.leakage;
   trial.dark_flux = place.dark_flux + change.dark_flux;

@@ -18,15 +18,15 @@ double picture_at(const Image& image, const Eigen::Vector2d& at) {
   return bilinear(image, at);
 }
 
-/// wanted − thrown; one is an evenly lit picture of `total` flux as large as the lens.
-Image difference(const Image& wanted, const Image& thrown, const OpticalSetup& setup,
+/// wanted − projected; one is an evenly lit picture of `total` flux as large as the lens.
+Image difference(const Image& wanted, const Image& projected, const OpticalSetup& setup,
                  double total) {
   Image image(wanted.columns(), wanted.rows());
   if (!(total > 0.0)) return image;
   const double unit = total / static_cast<double>(wanted.values().size()) *
                       setup.image_size.prod() / setup.lens_size.prod();
   for (std::size_t i = 0; i < image.values().size(); ++i) {
-    const double missing = double{wanted.values()[i]} - double{thrown.values()[i]};
+    const double missing = double{wanted.values()[i]} - double{projected.values()[i]};
     image.values()[i] = static_cast<float>(missing / unit);
   }
   return image;
@@ -45,9 +45,9 @@ WantedPicture::WantedPicture(const SurfaceMesh& mesh, const OpticalSetup& setup,
 
 WantedPicture::Comparison WantedPicture::compare(const SurfaceMesh& mesh,
                                                  const Eigen::Matrix3Xd& normals) const {
-  Image thrown;
-  const double mae = evaluate(mesh, normals, setup_, target_, &thrown, executor_).mae;
-  const Image missing = difference(wanted_, thrown, setup_, target_.total());
+  Image projected;
+  const double mae = evaluate(mesh, normals, setup_, target_, &projected, executor_).mae;
+  const Image missing = difference(wanted_, projected, setup_, target_.total());
   const LightPath light(setup_);
   Comparison result{mae - mae_, Eigen::VectorXd::Zero(mesh.vertex_count())};
   parallel_for(executor_, "missing flux", mesh.vertex_count(), [&](std::int64_t v) {

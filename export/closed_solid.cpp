@@ -117,7 +117,7 @@ void require_rectangle(const SurfaceMesh& surface, const std::vector<int>& outli
     const Eigen::Array2d p = flat(surface, v);
     if ((p - low).min(high - p).minCoeff() <= kOnBorder) continue;
     refuse(name, "has an outline that is no rectangle: vertex " + std::to_string(v) +
-                     " of it lies inside the surrounding one");
+                     " of its border lies inside the rectangle around it");
   }
 }
 

@@ -95,8 +95,8 @@ FacePoint FaceSampler::point_at(const Parameters& at) const {
 }
 
 std::optional<FacePoint> FaceSampler::newton(Parameters at, const Eigen::Vector2d& xy) {
-  constexpr int kMostSteps = 20;
-  for (int step = 0; step < kMostSteps; ++step) {
+  constexpr int kMaxSteps = 20;
+  for (int step = 0; step < kMaxSteps; ++step) {
     gp_Pnt point;
     gp_Vec du;
     gp_Vec dv;

@@ -26,7 +26,7 @@ namespace {
 /// Stretching of the light, ∂p/∂x, counts from this one to its inverse: where light folds or
 /// gathers into a point the equation says nothing. With 5, 10, 30 and 100 the first solution for a
 /// smooth 128² portrait has MAE 0.00145, 0.00142, 0.00141 and 0.00145.
-constexpr double kMostStretch = 10.0;
+constexpr double kMaxStretch = 10.0;
 
 /// MAE above the mesh's that is small enough.
 constexpr double kSmallExcess = 5e-5;
@@ -34,22 +34,22 @@ constexpr double kSmallExcess = 5e-5;
 /// Rounds at most, fewer where the points of all their pictures would be more than this: it bounds
 /// the time. The tenth round still takes 5e-6 off the MAE of a smooth 128² portrait, the fifth
 /// 2e-5.
-constexpr int kMostRounds = 12;
-constexpr double kMostPoints = 12e6;
+constexpr int kMaxRounds = 12;
+constexpr double kMaxPoints = 12e6;
 
 /// A search whose steps must be shorter than this has come to its end.
-constexpr double kLeastStep = 0.2;
+constexpr double kMinStep = 0.2;
 
 /// Conjugate gradients end when the residual has fallen to this share, or after these steps (a
 /// smooth 128² portrait: 0.11 after ten, 0.026 after twenty). Thirty and a hundred give the same
 /// MAE to 1e-4.
 constexpr double kResidual = 0.02;
-constexpr int kMostSteps = 15;
+constexpr int kMaxSteps = 15;
 
 /// Points at which the picture is sampled, about, and in a knot cell each way.
 constexpr double kPoints = 1e6;
 constexpr double kFewestPerCell = 2.0;
-constexpr double kMostPerCell = 3.0;
+constexpr double kMaxPerCell = 3.0;
 
 AxisSamples make_points(int cells, int per_cell, double length) {
   std::vector<double> at;
@@ -61,7 +61,7 @@ AxisSamples make_points(int cells, int per_cell, double length) {
 SplineGrid make_points(const SplineGrid& grid, const Eigen::Vector2d& size) {
   const double cells = double{1} * grid.u.cells * grid.v.cells;
   const double even = std::ceil(std::sqrt(kPoints / cells));
-  const auto per_cell = static_cast<int>(std::clamp(even, kFewestPerCell, kMostPerCell));
+  const auto per_cell = static_cast<int>(std::clamp(even, kFewestPerCell, kMaxPerCell));
   return {make_points(grid.u.cells, per_cell, size.x()),
           make_points(grid.v.cells, per_cell, size.y())};
 }
@@ -71,7 +71,7 @@ Eigen::Matrix2d weight_of(const Eigen::Matrix2d& stretch) {
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver;
   solver.computeDirect(0.5 * (stretch + stretch.transpose()));
   const Eigen::Vector2d bounded =
-      solver.eigenvalues().cwiseAbs().cwiseMax(1.0 / kMostStretch).cwiseMin(kMostStretch);
+      solver.eigenvalues().cwiseAbs().cwiseMax(1.0 / kMaxStretch).cwiseMin(kMaxStretch);
   return solver.eigenvectors() * bounded.cwiseInverse().asDiagonal() *
          solver.eigenvectors().transpose();
 }
@@ -180,7 +180,7 @@ void LightFit::weigh_points() {
           const double on_rim =
               (at_end(i, columns) ? 0.5 : 1.0) * (at_end(j, load_.rows()) ? 0.5 : 1.0);
           load_(j, i) = static_cast<float>(on_rim * unit * line.derivative(j).determinant() *
-                                           std::min(kMostStretch, std::abs(stretch.determinant())));
+                                           std::min(kMaxStretch, std::abs(stretch.determinant())));
         }
       },
       1);
@@ -246,7 +246,7 @@ Eigen::MatrixXd LightFit::solve(Eigen::MatrixXd residual) const {
   Eigen::MatrixXd direction = slopes_.heights_of(residual);
   double size = scalar_product(residual, direction);
   const double enough = kResidual * kResidual * size;
-  for (int step = 0; step < kMostSteps && size > enough; ++step) {
+  for (int step = 0; step < kMaxSteps && size > enough; ++step) {
     if (control_.stop_requested()) throw Interrupted();
     const Eigen::MatrixXd image = weighted_moments(direction, false);
     const double length = size / scalar_product(direction, image);
@@ -269,9 +269,9 @@ Eigen::MatrixXd LightFit::follow(const Eigen::MatrixXd& start) {
   Mixer mixer;
   Eigen::MatrixXd change = solve(weighted_moments(start, true));
   double step = 1.0;
-  const double affordable = kMostPoints / static_cast<double>(load_.size());
-  const int rounds = std::min(kMostRounds, static_cast<int>(affordable) + 1);
-  for (int round = 0; round < rounds && step > kLeastStep; ++round) {
+  const double affordable = kMaxPoints / static_cast<double>(load_.size());
+  const int rounds = std::min(kMaxRounds, static_cast<int>(affordable) + 1);
+  for (int round = 0; round < rounds && step > kMinStep; ++round) {
     control_.report({"spline picture", double{1} * round, double{1} * rounds, ""});
     Eigen::MatrixXd next = best + step * change;
     PictureMiss miss = goal_.miss(sampled(next));

@@ -15,7 +15,7 @@ namespace lensforge {
 namespace {
 
 /// OpenCASCADE keeps an entity's number in 32 bits.
-constexpr std::int64_t kMostNumber = 2'147'483'647;
+constexpr std::int64_t kMaxNumber = 2'147'483'647;
 
 bool is_space(char c) { return std::isspace(static_cast<unsigned char>(c)) != 0; }
 bool is_digit(char c) { return std::isdigit(static_cast<unsigned char>(c)) != 0; }
@@ -108,7 +108,7 @@ class Part21Scanner {
     if (rest_.empty() || !is_digit(rest_.front())) return take_name();
     while (!rest_.empty() && is_digit(rest_.front())) {
       place.number = 10 * place.number + (take() - '0');
-      if (place.number > kMostNumber) refuse_at(line_, "an entity's number is above 2147483647");
+      if (place.number > kMaxNumber) refuse_at(line_, "an entity's number is above 2147483647");
     }
     (at_start_ ? defined_ : used_).push_back(place);
     at_start_ = false;

@@ -32,7 +32,7 @@ constexpr int kSamples = 4;
 constexpr double kHeightReach = 16.0;
 
 /// Least share of its even area to which the parameters' map may squeeze a place.
-constexpr double kLeastArea = 1e-3;
+constexpr double kMinArea = 1e-3;
 
 AxisSamples make_axis(int cells, double length) {
   std::vector<double> at(static_cast<std::size_t>(kSamples) * static_cast<std::size_t>(cells));
@@ -83,7 +83,7 @@ SlopeFit::SlopeFit(const SmoothSurface& surface, const GridWarp& warp,
 SplinePlan SlopeFit::make_plan(const GridWarp& warp) const {
   for (double share = 1.0; share > 0.0; share -= 0.25) {
     SplinePlan plan = warp.control_points(grid_.u.cells, grid_.v.cells, share);
-    if (least_area(plan) > kLeastArea) return plan;
+    if (least_area(plan) > kMinArea) return plan;
   }
   return warp.control_points(grid_.u.cells, grid_.v.cells, 0.0);
 }

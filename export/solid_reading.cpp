@@ -109,7 +109,7 @@ TopoDS_Shape read_step_shape(const fs::path& path, const RunControl& control) {
 }
 
 TopoDS_Shape read_iges_shape(const fs::path& path, const RunControl& control) {
-  check_iges(read_whole_file(path, kMostSolidBytes), path.string());
+  check_iges(read_whole_file(path, kMaxSolidBytes), path.string());
   IGESControl_Controller::Init();
   IGESControl_Reader reader;
   load(reader, "IGES", path, control);

@@ -15,7 +15,7 @@
 namespace lensforge {
 
 /// Bytes of a file at most; export's largest has 0.7 GB, and OpenCASCADE takes 15 bytes for one.
-inline constexpr std::uintmax_t kMostSolidBytes = 2'000'000'000;
+inline constexpr std::uintmax_t kMaxSolidBytes = 2'000'000'000;
 
 /// Runs OpenCASCADE's `work` on a file in a child process (run_in_child()) and returns its result.
 /// @throw InputError naming the file: it is missing or no regular file, or the child crashes, fails

@@ -40,8 +40,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kLeastExtent = 0.1;    ///< mm
-constexpr double kMostExtent = 10'000;  ///< mm
+constexpr double kMinExtent = 0.1;     ///< mm
+constexpr double kMaxExtent = 10'000;  ///< mm
 
 /// Heights above one point that differ by more than this are two surfaces, mm.
 constexpr double kSameHeight = 1e-3;
@@ -158,7 +158,7 @@ Raster make_raster(const std::vector<OpticalFace>& faces, double points, const f
   Raster raster;
   for (const OpticalFace& face : faces) raster.box.extend(face.box);
   const Eigen::Vector2d size = raster.box.sizes();
-  if (!(size.minCoeff() >= kLeastExtent && size.maxCoeff() <= kMostExtent)) {
+  if (!(size.minCoeff() >= kMinExtent && size.maxCoeff() <= kMaxExtent)) {
     std::ostringstream message;
     message << "its optical surface is " << size.x() << " x " << size.y()
             << " mm; from 0.1 mm to 10 m is possible: is its unit of length right?";
@@ -322,9 +322,9 @@ std::optional<SampledSurface> on_knots(const std::vector<OpticalFace>& faces, do
     cells.push_back(*found);
     all += double{1} * cells.back()[0] * cells.back()[1];
   }
-  constexpr double kMostDensity = 256.0;
+  constexpr double kMaxSampling = 256.0;
   const auto density =
-      static_cast<int>(std::clamp(std::ceil(std::sqrt(points / all)), 2.0, kMostDensity));
+      static_cast<int>(std::clamp(std::ceil(std::sqrt(points / all)), 2.0, kMaxSampling));
   SurfaceBuilder builder;
   for (std::size_t i = 0; i < faces.size(); ++i) {
     const FaceSampler sampler(faces[i].face);
@@ -369,7 +369,7 @@ std::string surface_bytes(const Work& work) {
 
 SolidSurface read_solid_surface(const fs::path& path, double points, const Executor& executor,
                                 const RunControl& control) {
-  check_part21(read_whole_file(path, kMostSolidBytes), path.string());
+  check_part21(read_whole_file(path, kMaxSolidBytes), path.string());
   const int threads = executor.concurrency();
   const std::string result = read_guarded(
       path,

@@ -37,7 +37,7 @@ std::vector<double> lines(double from, double to, int count) {
 std::int64_t control_point_limit(const FitOptions& options, const SurfaceMesh& mesh) {
   if (options.max_control_points > 0) return options.max_control_points;
   constexpr std::int64_t kPerVertex = 4;
-  return std::min(kMostControlPoints, kPerVertex * mesh.vertex_count());
+  return std::min(kMaxControlPoints, kPerVertex * mesh.vertex_count());
 }
 
 class NetFitter {
@@ -90,19 +90,19 @@ class NetFitter {
   /// Patches about `side` wide, or wider where the control points would not do for them.
   void divide(double side) {
     const Eigen::Vector2d size = surface_.box().sizes();
-    constexpr std::int64_t kLeast = (kFewestCells + 3) * (kFewestCells + 3);
+    constexpr std::int64_t kMinControlPoints = (kFewestCells + 3) * (kFewestCells + 3);
     do {
       net_.columns = std::max(1, static_cast<int>(std::lround(size.x() / side)));
       net_.rows = std::max(1, static_cast<int>(std::lround(size.y() / side)));
       side *= 1.25;
-    } while (net_.columns * net_.rows > 1 && kLeast * net_.columns * net_.rows > limit_);
+    } while (net_.columns * net_.rows > 1 && kMinControlPoints * net_.columns * net_.rows > limit_);
   }
 
   /// Cells a patch each way that the control points allow.
   [[nodiscard]] int most_cells() const {
     const double points = static_cast<double>(limit_) / patch_count();
-    const int across = kMostCellsAcross / std::max(net_.columns, net_.rows);
-    const int most = std::min({static_cast<int>(std::sqrt(points)) - 3, kMostCells, across});
+    const int across = kMaxCellsAcross / std::max(net_.columns, net_.rows);
+    const int most = std::min({static_cast<int>(std::sqrt(points)) - 3, kMaxCells, across});
     return std::max(1, most);
   }
 
@@ -189,7 +189,7 @@ class NetFitter {
   void certify() {
     const SplinePatch& first = net_.patches.front();
     const double mesh_cells = first.box.sizes().maxCoeff() / first.cells / mesh_cell_;
-    const double density = std::max<double>(kLeastDensity, kCertificateDensity * mesh_cells);
+    const double density = std::max<double>(kMinDensity, kCertificateDensity * mesh_cells);
     parallel_for(
         executor_, "spline errors", patch_count(),
         [&](std::int64_t i) {

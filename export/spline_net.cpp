@@ -173,12 +173,12 @@ SplinePoint SplineNet::at(const Eigen::Vector2d& uv) const {
 
 std::optional<Eigen::Vector2d> SplineNet::parameters_of(const Eigen::Vector2d& xy,
                                                         const Eigen::Vector2d& start) const {
-  constexpr int kMostSteps = 30;
+  constexpr int kMaxSteps = 30;
   constexpr double kNear = 1e-9;  // mm
   const Eigen::Vector2d low(u.front(), v.front());
   const Eigen::Vector2d high(u.back(), v.back());
   Eigen::Vector2d uv = start.cwiseMax(low).cwiseMin(high);
-  for (int step = 0; step < kMostSteps; ++step) {
+  for (int step = 0; step < kMaxSteps; ++step) {
     const PatchFrame f = patches[static_cast<std::size_t>(patch_at(uv))].frame(uv);
     const Eigen::Vector2d miss = xy - f.point.head<2>();
     if (miss.norm() < kNear) return uv;

@@ -115,7 +115,7 @@ struct FitOptions {
   double tolerance = 1e-4;         ///< mm, > 0; on SplinePatch::error.height
   double normal_tolerance = 1e-4;  ///< rad, > 0; on SplinePatch::error.normal
   /// Control points of all patches together at most; what bounds the file's size (about 72 bytes
-  /// each). 0: four for each vertex of the mesh, kMostControlPoints at most.
+  /// each). 0: four for each vertex of the mesh, kMaxControlPoints at most.
   std::int64_t max_control_points = 0;
   PictureGoal picture;  ///< What a fit that cannot hold the tolerances keeps instead.
 };
@@ -148,16 +148,16 @@ SampledSurface sampled(const SplineNet& net, const GridShape& shape);
 
 /// Knot cells of a patch each way, at least (given enough control points) and at most.
 inline constexpr int kFewestCells = 4;
-inline constexpr int kMostCells = 256;
+inline constexpr int kMaxCells = 256;
 /// Knot cells of a whole net each way at most: time grows with their third power.
-inline constexpr int kMostCellsAcross = 2048;
+inline constexpr int kMaxCellsAcross = 2048;
 
 /// What fits a STEP file of 45 MB.
-inline constexpr std::int64_t kMostControlPoints = 575'000;
+inline constexpr std::int64_t kMaxControlPoints = 575'000;
 
 /// Raster of the certificate: points each way in a cell of the mesh, and in a knot cell at least.
 inline constexpr int kCertificateDensity = 6;
-inline constexpr int kLeastDensity = 3;
+inline constexpr int kMinDensity = 3;
 
 /// The certificate is the largest error on its raster and at the mesh's vertices times this.
 inline constexpr double kCertificateMargin = 1.25;

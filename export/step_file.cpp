@@ -89,7 +89,7 @@ SolidContent write_step(const SplineNet& net, const StepHeader& header, StepSche
 }
 
 SolidContent inspect_step(const fs::path& path, const RunControl& control) {
-  const std::int64_t entities = check_part21(read_whole_file(path, kMostSolidBytes), path.string());
+  const std::int64_t entities = check_part21(read_whole_file(path, kMaxSolidBytes), path.string());
   SolidContent content = content_of(read_guarded(
       path, [&](const RunControl& c) { return bytes_of(inspect_shape(read_step_shape(path, c))); },
       control));

@@ -11,12 +11,12 @@ namespace lensforge {
 namespace {
 
 /// Cells at most: 32 MB.
-constexpr double kMostCells = 4e6;
+constexpr double kMaxCells = 4e6;
 
 }  // namespace
 
 BendMap::BendMap(const OpticalSurface& surface, std::span<const BendRange> bends, double cell)
-    : box_(surface.box()), cell_(std::max(cell, std::sqrt(box_.volume() / kMostCells))) {
+    : box_(surface.box()), cell_(std::max(cell, std::sqrt(box_.volume() / kMaxCells))) {
   columns_ = static_cast<std::int64_t>(box_.sizes().x() / cell_) + 1;
   rows_ = static_cast<std::int64_t>(box_.sizes().y() / cell_) + 1;
   cells_.assign(static_cast<std::size_t>(columns_ * rows_), {});

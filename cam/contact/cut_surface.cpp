@@ -37,7 +37,7 @@ Interpolation interpolation_of(const SurfaceMesh& mesh, std::int64_t triangle) {
 int splits_for(const Interpolation& shape, double bend, const SmoothCutOptions& options) {
   const double needed = std::max(std::sqrt(bend * shape.height / options.deviation),
                                  bend * shape.slope / options.slope_deviation);
-  return static_cast<int>(std::clamp(std::ceil(needed), 1.0, double{kMostSplits}));
+  return static_cast<int>(std::clamp(std::ceil(needed), 1.0, double{kMaxSplits}));
 }
 
 /// The parts of one triangle that a window touches.

@@ -63,7 +63,7 @@ class FacetCutSurface final : public CutSurface {
 };
 
 /// How finely a surface without creases is cut into facets. Where a triangle would need more than
-/// kMostSplits, as at a crease, it gets no more, and deviation() says so.
+/// kMaxSplits, as at a crease, it gets no more, and deviation() says so.
 struct SmoothCutOptions {
   double deviation = 2e-5;        ///< Of a facet from the surface, mm, > 0.
   double slope_deviation = 4e-3;  ///< Of a facet's slopes from the surface's, > 0.
@@ -72,7 +72,7 @@ struct SmoothCutOptions {
 };
 
 /// Parts of a triangle's edges at most.
-inline constexpr int kMostSplits = 48;
+inline constexpr int kMaxSplits = 48;
 
 /// A surface without creases, as facets between points of it: every triangle in n² equal parts, n
 /// from how it bends. Facets are made for a band at a time.

@@ -10,10 +10,10 @@ namespace lensforge {
 namespace {
 
 /// More than any casting resin loses.
-constexpr double kMostShrinkage = 0.2;
+constexpr double kMaxShrinkage = 0.2;
 
 void validate(const MouldOptions& options) {
-  if (!(options.shrinkage >= 0.0 && options.shrinkage <= kMostShrinkage)) {
+  if (!(options.shrinkage >= 0.0 && options.shrinkage <= kMaxShrinkage)) {
     throw InputError("mould shrinkage: " + decimal_text(options.shrinkage, 6) +
                      ": must be in 0 to 0.2, as a share of the size");
   }

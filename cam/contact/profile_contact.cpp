@@ -11,7 +11,7 @@ namespace {
 /// The contact's place is a maximum of f, so an error of 1e-9 rad in it costs 1e-18 of the corner.
 constexpr double kAngleTolerance = 1e-9;
 /// Halving π/2 this often passes kAngleTolerance; Newton's steps need five or so.
-constexpr int kMostSteps = 40;
+constexpr int kMaxSteps = 40;
 
 /// An edge as the tool sees it: places on its line count from the foot of the axis, uphill.
 struct EdgeLine {
@@ -29,7 +29,7 @@ double contact_angle(const CutterProfile& profile, const EdgeLine& line) {
                    : std::asin(std::fmin(1.0, (line.away - profile.flat()) / profile.corner));
   double high = 0.5 * std::numbers::pi;
   double angle = 0.5 * (low + high);
-  for (int step = 0; step < kMostSteps && high - low > kAngleTolerance; ++step) {
+  for (int step = 0; step < kMaxSteps && high - low > kAngleTolerance; ++step) {
     const double sine = std::sin(angle);
     const double cosine = std::cos(angle);
     const double t = out_at(sine);

@@ -15,7 +15,7 @@ namespace {
 constexpr double kFlat = 1e-5;
 
 /// Steps at most; two are usual.
-constexpr int kMostSteps = 40;
+constexpr int kMaxSteps = 40;
 
 /// Contacts are sought no farther from the axis than this, in radii.
 constexpr double kFarthest = 0.98;
@@ -67,7 +67,7 @@ std::optional<SmoothRoll::Rest> SmoothRoll::rest_at(double u, const Eigen::Vecto
   Eigen::Vector2d q = clamped(guess, box);
   Eigen::Vector2d before = clamped(p, box);
   double height = -HUGE_VAL;
-  for (int step = 0; step < kMostSteps; ++step) {
+  for (int step = 0; step < kMaxSteps; ++step) {
     const Eigen::Vector2d d = q - p;
     const double s2 = radius * radius - d.squaredNorm();
     if (!(d.norm() < kFarthest * radius)) {
@@ -134,7 +134,7 @@ std::optional<CurveNodes> SmoothRoll::follow(double from, double to, double erro
   const Eigen::Vector2d around = Eigen::Vector2d::Constant(radius);
   foot = {Eigen::Vector2d(foot.min() - around), Eigen::Vector2d(foot.max() + around)};
   const double bend = bed_.bends().over(foot).largest;
-  if (bend * radius > SmoothBed::kMostBend) return std::nullopt;
+  if (bend * radius > SmoothBed::kMaxBend) return std::nullopt;
   const std::optional<Rest> first = rest_at(from, last_.value_or(line_.at(from)), bend);
   if (!first) return std::nullopt;
   const std::optional<Rest> last = rest_at(to, first->q + (to - from) * first->rate, bend);

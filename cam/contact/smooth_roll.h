@@ -14,7 +14,7 @@ namespace lensforge {
 
 /// A smooth surface that a ball rolls on.
 ///
-/// Where no second derivative of the surface under the ball exceeds kMostBend / R, the height
+/// Where no second derivative of the surface under the ball exceeds kMaxBend / R, the height
 /// f(q) = z(q) + √(R² − |q − p|²) − R at which a point q of it holds the tip over p is strictly
 /// concave in q: there is one contact, and Newton's method finds it. It depends continuously on p,
 /// and the drop surface f(q(p)) has second derivatives between −b⁻ and b⁺ / (1 − b⁺R), the
@@ -32,7 +32,7 @@ class SmoothBed {
   [[nodiscard]] double radius() const { return radius_; }
   [[nodiscard]] const BendMap& bends() const { return bends_; }
 
-  static constexpr double kMostBend = 0.8;
+  static constexpr double kMaxBend = 0.8;
 
  private:
   const OpticalSurface& surface_;

@@ -16,8 +16,8 @@ namespace {
 
 /// Contacts that are kept at most, and how often another is looked for: on creased meshes 3 to 6 is
 /// the rule (RoundedField.EqualsTheBestOfManyBalls).
-constexpr std::size_t kMostPlanes = 8;
-constexpr int kMostDrops = 40;
+constexpr std::size_t kMaxPlanes = 8;
+constexpr int kMaxDrops = 40;
 
 /// The search ends when another step gains less than this, mm.
 constexpr double kGain = 1e-10;
@@ -45,7 +45,7 @@ class Contacts {
     for (std::size_t k = 0; k < size_; ++k) {
       if (triangles_[k] == triangle) return;
     }
-    if (size_ < kMostPlanes) {
+    if (size_ < kMaxPlanes) {
       triangles_[size_++] = triangle;
     } else {
       std::rotate(triangles_.begin(), triangles_.begin() + 1, triangles_.end());
@@ -144,8 +144,8 @@ class Contacts {
   const DropCutter& cutter_;
   Eigen::Vector2d q_;
   double radius_;
-  std::array<std::int32_t, kMostPlanes> triangles_{};
-  std::array<Plane, kMostPlanes> planes_{};
+  std::array<std::int32_t, kMaxPlanes> triangles_{};
+  std::array<Plane, kMaxPlanes> planes_{};
   std::size_t size_ = 0;
 };
 
@@ -172,7 +172,7 @@ LowestBall LowestBallSearch::over(const Eigen::Vector2d& q, const TangentPlane& 
   Contacts contacts(cutter_, q);
   LowestBall best = lifted(tangent, q, radius, near.tip);
   contacts.add(near.triangle);
-  for (int k = 0; k < kMostDrops; ++k) {
+  for (int k = 0; k < kMaxDrops; ++k) {
     contacts.lay_planes(best.centre);
     const std::optional<LowestBall> next = contacts.lowest();
     if (!next) return best;

@@ -25,7 +25,7 @@ constexpr std::size_t kBlockNodes = kBlockSide * kBlockSide;
 constexpr double kCellPerRadius = 0.5;
 
 /// Cells of a grid at most, but for four a move: memory stays in proportion.
-constexpr double kMostCells = 4e6;
+constexpr double kMaxCells = 4e6;
 
 /// Far above the rounding of a height, mm: passing a span over never changes a bit of the result.
 constexpr double kBoundMargin = 1e-9;
@@ -51,7 +51,7 @@ double run_of(const BallPath& path, const BallMove& move) {
 double cell_of(const BallPath& path) {
   Eigen::AlignedBox3d box;
   for (const BallMove& move : path.moves()) box.extend(box_of(path, move, 0.0, 1.0));
-  const double cells = kMostCells + 4.0 * static_cast<double>(path.moves().size());
+  const double cells = kMaxCells + 4.0 * static_cast<double>(path.moves().size());
   Eigen::Vector3d size = Eigen::Vector3d::Zero();
   if (!path.moves().empty()) size = box.sizes();
   return std::max({kCellPerRadius * path.radius(), std::sqrt(size.x() * size.y() / cells),

@@ -12,7 +12,7 @@ namespace {
 constexpr double kCellPerRadius = 0.25;
 
 /// Cells at most: 16 MB.
-constexpr double kMostCells = 1.6e7;
+constexpr double kMaxCells = 1.6e7;
 
 /// Boxes are this much larger than cells, mm: rounding of a centre's cell.
 constexpr double kMargin = 1e-6;
@@ -22,7 +22,7 @@ constexpr double kMargin = 1e-6;
 SmoothReach::SmoothReach(const SmoothBed& bed, const Executor& executor)
     : box_(bed.surface().box()) {
   const double radius = bed.radius();
-  cell_ = std::max(kCellPerRadius * radius, std::sqrt(box_.volume() / kMostCells));
+  cell_ = std::max(kCellPerRadius * radius, std::sqrt(box_.volume() / kMaxCells));
   columns_ = static_cast<std::int64_t>(box_.sizes().x() / cell_) + 1;
   rows_ = static_cast<std::int64_t>(box_.sizes().y() / cell_) + 1;
   free_.resize(static_cast<std::size_t>(columns_ * rows_));

@@ -19,7 +19,7 @@ namespace {
 /// Cells of the stock map: a quarter of the smallest default ball's diameter. On slopes of 0.3 it
 /// overstates the material by 0.03 mm.
 constexpr double kStockCell = 0.1;
-constexpr double kMostCells = 2000.0;  ///< Along the blank's longer side.
+constexpr double kMaxCells = 2000.0;  ///< Along the blank's longer side.
 
 /// One raster, on one level or many.
 struct Raster {
@@ -242,7 +242,7 @@ RoughResult cut(const RoughSite& site, const Raster& raster, const RunPlan& plan
 StockMap whole_blank(const Workshop& workshop, const Eigen::AlignedBox3d& surface) {
   const Eigen::AlignedBox3d blank = workshop.stock.box(surface);
   const double longest = blank.sizes().head<2>().maxCoeff();
-  return {blank, std::max(kStockCell, longest / kMostCells)};
+  return {blank, std::max(kStockCell, longest / kMaxCells)};
 }
 
 RoughResult cut_rough(const RoughSite& site, const Executor& executor, const MoveSink& sink,

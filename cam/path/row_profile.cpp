@@ -28,7 +28,7 @@ constexpr double kGap = 1e-8;
 /// Length of the stretches that a ball rolls along at once, and of those it is given up on, in
 /// radii: on longer ones the bounds of what bends where are coarser.
 constexpr double kStretch = 0.125;
-constexpr double kLeastStretch = 0.005;
+constexpr double kMinStretch = 0.005;
 
 /// Length of the stretches that facets are made for at once, mm.
 constexpr double kFacetStretch = 1.0;
@@ -185,12 +185,12 @@ void RowCurves::bridge(const RowSpan& span, double from, const CurveNodes* next,
   }
 }
 
-/// Stretches end at fixed places. One that cannot be rolled along is halved down to kLeastStretch:
+/// Stretches end at fixed places. One that cannot be rolled along is halved down to kMinStretch:
 /// shorter ones are judged more finely. What is left open at last is cut from facets.
 void RowCurves::roll(const RowSpan& span, double bow, RowProfile& profile) const {
   SmoothRoll ball(*surface_->bed(), span.line);
   const double length = kStretch * surface_->radius();
-  const double least = kLeastStretch * surface_->radius();
+  const double least = kMinStretch * surface_->radius();
   double open = span.held_from;  // From here to `begin` the curve is not known yet.
   double begin = span.held_from;
   while (begin < span.held_to) {

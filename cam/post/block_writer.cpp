@@ -17,11 +17,11 @@ constexpr double kSameStart = 1e-9;  ///< mm; nearer than this an arc ends where
 constexpr double kFarthest = 1e5;    ///< mm; of coordinates and radii that are written.
 /// mm. LinuxCNC refuses arcs of less than 0.00127 mm, rounded centre and ends taken (PostRs274).
 constexpr double kSmallestArc = 0.005;
-constexpr std::int64_t kShortestArc = 3;          ///< Units between the ends of an arc.
-constexpr double kFeedUnits = 1e6;                ///< Of a digest.
-constexpr double kAlmost = 1e-9;                  ///< Of a piece of an arc; takes rounding up.
-constexpr double kMostSweepRadius = kTurn / 3.0;  ///< R is badly conditioned near half a turn.
-constexpr double kMostSweepCentre = kTurn / 2.0;
+constexpr std::int64_t kShortestArc = 3;         ///< Units between the ends of an arc.
+constexpr double kFeedUnits = 1e6;               ///< Of a digest.
+constexpr double kAlmost = 1e-9;                 ///< Of a piece of an arc; takes rounding up.
+constexpr double kMaxSweepRadius = kTurn / 3.0;  ///< R is badly conditioned near half a turn.
+constexpr double kMaxSweepCentre = kTurn / 2.0;
 
 /// The arc from `start` around `centre`. Not make_arc(): that takes the rounded words of a program,
 /// where a very short arc and a full circle look alike.
@@ -84,7 +84,7 @@ BlockWriter::BlockWriter(const PostDescription& post, const BlockOptions& option
       options_(options),
       text_(text),
       scale_(std::pow(10.0, options.decimals)),
-      most_sweep_(post.arcs == ArcForm::kRadius ? kMostSweepRadius : kMostSweepCentre) {}
+      most_sweep_(post.arcs == ArcForm::kRadius ? kMaxSweepRadius : kMaxSweepCentre) {}
 
 void BlockWriter::forget() {
   motion_.reset();

@@ -21,7 +21,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kEarlySplit = 0.9;  ///< Share of the limit from which a rapid is a place to split.
-constexpr double kMostSeconds = 3600.0;
+constexpr double kMaxSeconds = 3600.0;
 
 void require(bool holds, const char* what, double value, const std::string& rule) {
   if (!holds) throw InputError(std::string(what) + ": " + shortest_text(value) + " " + rule);
@@ -222,9 +222,9 @@ void validate(const ProgramSettings& settings, const PostDescription& post) {
           settings.blend_tolerance, "is not between 0 and 1 mm");
   require(settings.chord_tolerance > 0.0 && settings.chord_tolerance <= 1.0, "chord tolerance",
           settings.chord_tolerance, "is not above 0 and at most 1 mm");
-  require(settings.spin_up >= 0.0 && settings.spin_up <= kMostSeconds, "spin-up", settings.spin_up,
+  require(settings.spin_up >= 0.0 && settings.spin_up <= kMaxSeconds, "spin-up", settings.spin_up,
           "is not between 0 and 3600 s");
-  require(settings.tool_change >= 0.0 && settings.tool_change <= kMostSeconds, "tool change",
+  require(settings.tool_change >= 0.0 && settings.tool_change <= kMaxSeconds, "tool change",
           settings.tool_change, "is not between 0 and 3600 s");
   require(settings.largest_file == 0 || settings.largest_file >= kSmallestProgramLimit,
           "largest file", static_cast<double>(settings.largest_file),

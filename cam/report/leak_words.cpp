@@ -20,12 +20,12 @@ std::string fault_words(const LeakPlace& place, const std::string& cause) {
       joined({" at x ", decimal_text(place.place.x(), 1), " y ", decimal_text(place.place.y(), 1)});
   const std::string depth = decimal_text(1e3 * std::abs(place.height.value), 1) + " µm";
   const bool left = place.height.value > 0.0;
-  if (cause == leak_cause::kCrease && left) return "The groove" + at + " keeps " + depth;
+  if (cause == leak_cause::kCrease && left)
+    return "The groove" + at + " is left " + depth + " too high";
   if (cause == leak_cause::kPolish) {
     return "The polished edge" + at + (left ? " is filled by " : " is worn by ") + depth;
   }
-  return "The surface" + at +
-         (left ? " stands " + depth + " too high" : " lies " + depth + " too low");
+  return "The surface" + at + (left ? " is " + depth + " too high" : " is " + depth + " too low");
 }
 
 /// The first that halves the leak, else the one that leaves least.

@@ -199,7 +199,7 @@ std::string certificates(const ReportData& data) {
                      stacked({{"operation", false},
                               {"deepest gouge", false},
                               {"most material left", false},
-                              {"largest error of direction", false}},
+                              {"largest error of the path’s direction", false}},
                              rows));
 }
 

@@ -15,7 +15,7 @@ namespace lensforge::report_section {
 namespace {
 
 /// Vertices along a side at most: 16-bit indices reach 65,536 of them.
-constexpr int kMostNodes = 240;
+constexpr int kMaxNodes = 240;
 
 /// Colours that differ in lightness too, so that they read in grey and to colour-blind eyes.
 constexpr std::array<std::array<double, 3>, 5> kPathColors{{{0.00, 0.30, 0.60},
@@ -45,8 +45,8 @@ int thinned(int count, int most) { return std::min(count, most); }
 nlohmann::json surface_json(const ReportData& data) {
   const LensRaster& surface = data.surface;
   const auto [low, high] = std::minmax_element(surface.values.begin(), surface.values.end());
-  const int columns = thinned(surface.columns, kMostNodes);
-  const int rows = thinned(surface.rows, kMostNodes);
+  const int columns = thinned(surface.columns, kMaxNodes);
+  const int rows = thinned(surface.rows, kMaxNodes);
   const auto source = [](int i, int count, int of) {
     return count > 1 ? static_cast<int>(std::lround(double(i) * (of - 1) / (count - 1))) : 0;
   };

@@ -59,9 +59,7 @@ struct FinishProcess {
   double scallop = 0.0;       ///< If > 0, mm: the pitch follows from it, see finish_pitch().
   double tolerance = 0.0005;  ///< Farthest from the drop curve, mm, > 0.
   /// Largest error of a move's direction, rad, > 0. Polishing does not even out what neighbouring
-  /// rows have in common: of a 128² portrait on 25 mm leak 6.6 % with 1e-3, 2.7 % with 3e-4 for 2.3
-  /// times as many moves, 2.1 % with 1.5e-4 for 3.2 times and 1.9 % with 1e-4 for 4.5 times as
-  /// many.
+  /// rows have in common; docs/tuning.md, "Defaults of cam", has the leak and the moves by value.
   double slope_tolerance = 1.5e-4;
   PassStyle style = PassStyle::kZigzag;
   PassAxis along = PassAxis::kX;

@@ -79,7 +79,7 @@ struct Workshop {
 /// Rapid moves run at least this high above blank and clamps, mm: sheets of cast acrylic are up to
 /// half a millimetre thicker than stated (ISO 7823-1 allows 0.4 mm and a tenth of the thickness),
 /// and a touch-off and a blank that lies askew are off by a tenth or two.
-inline constexpr double kLeastSafeHeight = 0.5;
+inline constexpr double kMinSafeHeight = 0.5;
 
 /// Least and most of one of the workshop's numbers, by its place in the file:
 /// "process.safe_height", "tool.diameter", "finish.pitch". What sets such a number from elsewhere

@@ -19,20 +19,20 @@ namespace {
 
 constexpr double kLength = 10000.0;  ///< mm; longer than any mill.
 constexpr double kBlank = 1000.0;  ///< mm that a blank may be larger than its lens, or a tool long.
-constexpr double kLeast = 1e-6;    ///< mm; the last decimal of a program.
-constexpr double kLeastDiameter = 0.01;  ///< mm; a third of the smallest that is sold.
-constexpr double kFinestStep = 1e-3;     ///< mm; of passes that only take material away.
-constexpr double kLeastRate = 0.1;       ///< mm/min, mm/s²; slower than any mill.
-constexpr double kRate = 1e6;            ///< mm/min, mm/s², rpm.
-constexpr double kSpin = 1e6;            ///< rpm
+constexpr double kMinLength = 1e-6;    ///< mm; the last decimal of a program.
+constexpr double kMinDiameter = 0.01;  ///< mm; a third of the smallest that is sold.
+constexpr double kFinestStep = 1e-3;   ///< mm; of passes that only take material away.
+constexpr double kMinRate = 0.1;       ///< mm/min, mm/s²; slower than any mill.
+constexpr double kRate = 1e6;          ///< mm/min, mm/s², rpm.
+constexpr double kSpin = 1e6;          ///< rpm
 /// mm; four units of the last decimal that any dialect has, of which rounding takes one.
 constexpr double kFinestTolerance = 4e-6;
 /// rad; rounding to that decimal turns a move of a tenth of a millimetre as much.
 constexpr double kFinestSlope = 1e-5;
 /// mm; of a circle down which a tool winds: below it the turns are too many to write.
-constexpr double kLeastHelix = 0.01;
+constexpr double kMinHelix = 0.01;
 /// mm that a tool is fed through air above material: less than a twist of a chuck's jaws.
-constexpr double kLeastClearance = 0.05;
+constexpr double kMinClearance = 0.05;
 
 /// A word for each value of an enumeration, in its order.
 using Words = std::initializer_list<std::string_view>;
@@ -265,14 +265,14 @@ void describe(Visitor& v, Machine& machine) {
   v.text("name", machine.name,
          "the paper's mill (Sun et al., Section 5); its limits below are "
          "assumed: put in your own");
-  describe_axes(v, "travel", machine.travel, {kLeastRate, kLength}, "mm");
+  describe_axes(v, "travel", machine.travel, {kMinRate, kLength}, "mm");
   v.number({"spindle_min_rpm", 0.0, kSpin}, machine.spindle_min_rpm, "");
   v.number({"spindle_max_rpm", 1.0, kSpin}, machine.spindle_max_rpm, "the paper cuts at 23000");
-  describe_axes(v, "max_rate", machine.max_rate, {kLeastRate, kRate}, "mm/min, rapids and feeds");
-  describe_axes(v, "acceleration", machine.acceleration, {kLeastRate, kRate}, "mm/s^2");
+  describe_axes(v, "max_rate", machine.max_rate, {kMinRate, kRate}, "mm/min, rapids and feeds");
+  describe_axes(v, "acceleration", machine.acceleration, {kMinRate, kRate}, "mm/s^2");
   v.number({"junction_deviation", 0.0, 1.0}, machine.junction_deviation,
            "mm that a corner may be rounded");
-  v.number({"arc_tolerance", kLeast, 1.0}, machine.arc_tolerance,
+  v.number({"arc_tolerance", kMinLength, 1.0}, machine.arc_tolerance,
            "mm, of arcs as the controller splits them");
   describe_axes(v, "steps_per_mm", machine.steps_per_mm, {0.0, kRate}, "0: do not round to steps");
   v.whole({"look_ahead", 2, 100000}, machine.look_ahead, "moves planned ahead");
@@ -303,9 +303,9 @@ void describe(Visitor& v, KeepOut& box) {
 
 template <class Visitor>
 void describe(Visitor& v, ToolSection& section) {
-  v.needed({"diameter", kLeast, kBlank}, section.diameter, "mm");
+  v.needed({"diameter", kMinLength, kBlank}, section.diameter, "mm");
   v.needed({"from", 0.0, kBlank}, section.from, "mm above the tip");
-  v.needed({"to", kLeast, kBlank}, section.to, "mm above the tip");
+  v.needed({"to", kMinLength, kBlank}, section.to, "mm above the tip");
 }
 
 template <class Visitor>
@@ -313,14 +313,14 @@ void describe(Visitor& v, Tool& tool) {
   v.whole({"number", 1, 9999}, tool.number, "T word");
   v.text("name", tool.name, "");
   v.word("shape", tool.shape, "ball, bull or flat");
-  v.needed({"diameter", kLeastDiameter, 100.0}, tool.diameter, "mm");
+  v.needed({"diameter", kMinDiameter, 100.0}, tool.diameter, "mm");
   v.number({"corner_radius", 0.0, 50.0}, tool.corner_radius, "mm, of a bull");
   v.whole({"teeth", 1, 100}, tool.teeth, "");
-  v.needed({"flute_length", kLeast, kBlank}, tool.flute_length,
+  v.needed({"flute_length", kMinLength, kBlank}, tool.flute_length,
            "mm above the tip that cut; above it nothing may touch material");
   v.number({"spindle_rpm", 1.0, kSpin}, tool.spindle_rpm, "");
-  v.needed({"feed", kLeastRate, kRate}, tool.feed, "mm/min");
-  v.needed({"plunge", kLeastRate, kRate}, tool.plunge, "mm/min into material");
+  v.needed({"feed", kMinRate, kRate}, tool.feed, "mm/min");
+  v.needed({"plunge", kMinRate, kRate}, tool.plunge, "mm/min into material");
   v.list("section", tool.sections, "Cylinders above the flutes, from below: neck, shank, holder.");
 }
 
@@ -330,7 +330,7 @@ void describe_following(Visitor& v, Level& process) {
   v.number({"allowance", 0.0, 100.0}, process.allowance, "mm left on the surface");
   v.number({"ramp_angle_deg", 0.1, 45.0}, process.ramp_angle_deg, "steepest way into material");
   v.word("entry", process.entry, "ramp along the pass, or helix where one fits");
-  v.number({"helix_radius", kLeastHelix, 50.0}, process.helix_radius,
+  v.number({"helix_radius", kMinHelix, 50.0}, process.helix_radius,
            "mm, of the tool's axis; half its diameter at most");
   v.number({"spacing", 0.001, 10.0}, process.spacing,
            "mm between points at which the surface is evaluated");
@@ -356,7 +356,7 @@ void describe(Visitor& v, SemiProcess& semi) {
 template <class Visitor>
 void describe(Visitor& v, FinishProcess& finish) {
   v.whole({"tool", 1, 9999}, finish.tool, "number, of a ball");
-  v.number({"pitch", kLeast, 100.0}, finish.pitch,
+  v.number({"pitch", kMinLength, 100.0}, finish.pitch,
            "mm between passes at most (Sun et al., Section 5: 0.06)");
   v.number({"scallop", 0.0, 10.0}, finish.scallop, "mm; above 0 the pitch follows from it");
   v.number({"tolerance", kFinestTolerance, 1.0}, finish.tolerance, "mm from the exact path");
@@ -371,9 +371,9 @@ void describe(Visitor& v, FinishProcess& finish) {
 /// The rest of Process: its own keys.
 template <class Visitor>
 void describe(Visitor& v, Process& process) {
-  v.number({"safe_height", kLeastSafeHeight, kBlank}, process.safe_height,
+  v.number({"safe_height", kMinSafeHeight, kBlank}, process.safe_height,
            "mm of rapids above blank and clamps");
-  v.number({"clearance", kLeastClearance, 100.0}, process.clearance,
+  v.number({"clearance", kMinClearance, 100.0}, process.clearance,
            "mm from clamps, and above material where the feed begins");
 }
 

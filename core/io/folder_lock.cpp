@@ -3,33 +3,84 @@
 
 #include <fcntl.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 
 #include <cerrno>
+#include <chrono>
 #include <string>
 #include <system_error>
+#include <thread>
 
 #include "core/error.h"
+#include "core/io/files.h"
 
 namespace lensforge {
+namespace {
 
-FolderLock::FolderLock(const std::filesystem::path& folder, Kind kind)
-    : folder_(::open(folder.empty() ? "." : folder.c_str(),
-                     O_RDONLY | O_DIRECTORY | O_NONBLOCK | O_CLOEXEC)) {
+namespace fs = std::filesystem;
+
+/// How long a command that is about to take an empty folder away is waited for.
+constexpr int kAttempts = 50;
+constexpr std::chrono::milliseconds kBetweenAttempts{2};
+
+[[noreturn]] void refuse_held(const fs::path& folder) {
+  throw InputError(folder.string() + ": another lensforge command is working in this folder; " +
+                   "wait for its end or choose another folder");
+}
+
+}  // namespace
+
+FolderLock::FolderLock(const fs::path& folder, Kind kind) {
+  open(folder);
   if (!folder_.open()) {
     throw InputError(folder.string() +
                      ": cannot be opened: " + std::generic_category().message(errno));
   }
-  const int operation = kind == Kind::kExclusive ? LOCK_EX : LOCK_SH;
-  int error = 0;
-  while (::flock(folder_.number(), operation | LOCK_NB) != 0) {
-    error = errno;
-    if (error != EINTR) break;
-    error = 0;
+  if (!attempt(kind)) refuse_held(folder);
+}
+
+FolderLock FolderLock::make(const fs::path& folder, Kind kind, bool& made) {
+  FolderLock lock;
+  bool held = false;
+  made = false;
+  for (int i = 0; i < kAttempts && !held; ++i) {
+    if (i > 0) std::this_thread::sleep_for(kBetweenAttempts);
+    std::error_code ignored;
+    made = made || !fs::exists(folder, ignored);
+    fs::create_directories(folder, ignored);
+    lock.open(folder);
+    // What was locked may have been taken away just before.
+    held = lock.folder_.open() && lock.attempt(kind) && lock.is_at(folder);
   }
+  require_writable_folder(folder);
+  if (held) return lock;
+  if (kind == Kind::kExclusive) return {folder, kind};  // Tells why.
+  return {};
+}
+
+bool FolderLock::become_exclusive() { return folder_.open() && attempt(Kind::kExclusive); }
+
+void FolderLock::open(const fs::path& folder) {
+  folder_ = Descriptor(::open(folder.empty() ? "." : folder.c_str(),
+                              O_RDONLY | O_DIRECTORY | O_NONBLOCK | O_CLOEXEC));
+}
+
+bool FolderLock::attempt(Kind kind) {
+  const int operation = kind == Kind::kExclusive ? LOCK_EX : LOCK_SH;
+  int result = 0;
+  do {
+    result = ::flock(folder_.number(), operation | LOCK_NB);
+  } while (result != 0 && errno == EINTR);
   // A file system that has no locks is no reason not to work there.
-  if (error != EWOULDBLOCK) return;
-  throw InputError(folder.string() + ": another lensforge command is working in this folder; " +
-                   "wait for its end or choose another folder");
+  return result == 0 || errno != EWOULDBLOCK;
+}
+
+bool FolderLock::is_at(const fs::path& folder) const {
+  struct stat locked {};
+  struct stat there {};
+  return ::fstat(folder_.number(), &locked) == 0 &&
+         ::stat(folder.empty() ? "." : folder.c_str(), &there) == 0 &&
+         locked.st_dev == there.st_dev && locked.st_ino == there.st_ino;
 }
 
 }  // namespace lensforge

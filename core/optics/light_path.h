@@ -131,7 +131,7 @@ class LightPath {
   /// Light that a triangle takes, as the area of evenly lit lens that takes as much, mm²: where its
   /// rays enter the lens. Moving a vertex inside a mesh never changes the sum over its triangles.
   [[nodiscard]] LF_HD double intake(const Corners& t) const {
-    if (kind_ == Kind::kAlongZ) return 0.5 * doubled_projected_area(t);
+    if (kind_ == Kind::kAlongZ) return plan_area(t);
     return 0.5 * area_normal(t).dot(direction_) / direction_.z();
   }
   /// True if intake() is the plan area however a triangle slopes, so that all cells of an even grid

@@ -20,10 +20,10 @@ LF_HD inline Eigen::Vector3d area_normal(const Corners& t) {
   return (t.v1 - t.v0).cross(t.v2 - t.v0);
 }
 
-/// Twice the signed plan area, that of a triangle's projection along z: the z of area_normal().
-LF_HD inline double doubled_projected_area(const Corners& t) {
-  return (t.v1.x() - t.v0.x()) * (t.v2.y() - t.v0.y()) -
-         (t.v1.y() - t.v0.y()) * (t.v2.x() - t.v0.x());
+/// What a triangle covers seen from +z, half the z of area_normal(); negative if it runs clockwise.
+LF_HD inline double plan_area(const Corners& t) {
+  return 0.5 * ((t.v1.x() - t.v0.x()) * (t.v2.y() - t.v0.y()) -
+                (t.v1.y() - t.v0.y()) * (t.v2.x() - t.v0.x()));
 }
 
 /// Adjoint of area_normal(): adds to the corners' derivatives.

@@ -4,15 +4,13 @@
 #include <Eigen/Core>
 #include <cstdint>
 
-#include "core/surface/corners.h"
 #include "core/surface/surface_mesh.h"
 
 namespace lensforge {
 
 /// A triangle's normal times twice its area, mm².
 inline Eigen::Vector3d area_normal(const SurfaceMesh& mesh, std::int64_t triangle) {
-  return area_normal(
-      Corners{mesh.corner(triangle, 0), mesh.corner(triangle, 1), mesh.corner(triangle, 2)});
+  return area_normal(mesh.corners(triangle));
 }
 
 /// The sum of the area normals around every vertex, 3 × V, mm²: the vertex normals of the smooth

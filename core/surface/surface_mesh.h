@@ -4,6 +4,8 @@
 #include <Eigen/Core>
 #include <cstdint>
 
+#include "core/surface/corners.h"
+
 namespace lensforge {
 
 /// Vertices per row and number of rows of a mesh that is laid out as a grid; {0, 0} if it is not.
@@ -27,12 +29,13 @@ struct SurfaceMesh {
   [[nodiscard]] Eigen::Vector3d corner(std::int64_t triangle, int k) const {
     return vertices.col(triangles(k, triangle));
   }
+  [[nodiscard]] Corners corners(std::int64_t triangle) const {
+    return {corner(triangle, 0), corner(triangle, 1), corner(triangle, 2)};
+  }
   /// What a triangle covers seen from +z, mm²; negative if it runs clockwise. Not its light: that
   /// is the light path's to say.
   [[nodiscard]] double plan_area(std::int64_t triangle) const {
-    const Eigen::Vector3d u = corner(triangle, 1) - corner(triangle, 0);
-    const Eigen::Vector3d v = corner(triangle, 2) - corner(triangle, 0);
-    return 0.5 * (u.x() * v.y() - u.y() * v.x());
+    return lensforge::plan_area(corners(triangle));
   }
 };
 

@@ -58,7 +58,7 @@ LF_HD inline GoalSums goal_adjoint(const ObjectiveView& o, std::int64_t face,
 LF_HD inline double barrier_adjoint(const ObjectiveView& o, std::int64_t face, const Corners& t,
                                     FaceBar& bar) {
   const double weight = o.options.weights.barrier;
-  const ValueSlope area = area_barrier(0.5 * doubled_projected_area(t), o.options.area);
+  const ValueSlope area = area_barrier(plan_area(t), o.options.area);
   bar.area_normal.z() += 0.5 * weight * area.slope;
   return area.value +
          o.light.barrier_adjoint(t, o.scratch.frames[face].n, weight, bar.corners, bar.frame.n);

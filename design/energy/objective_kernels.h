@@ -25,7 +25,7 @@ struct MeasureFace {
     const Corners t = o.corners(i);
     const FaceFrame frame = face_frame(t);
     o.scratch.frames[i] = frame;
-    const double area = 0.5 * doubled_projected_area(t);
+    const double area = plan_area(t);
     return {area_barrier(area, o.options.area).value + o.light.barrier(t, frame.n)};
   }
 };

@@ -12,10 +12,10 @@ namespace lensforge {
 namespace {
 
 /// Share of the wanted light below which a pixel counts as unlit.
-constexpr double kLeastLight = 0.3;
+constexpr double kMinLight = 0.3;
 
 /// Linear light, white is one, below which a pixel may stay black.
-constexpr double kLeastWanted = 1e-4;
+constexpr double kMinWanted = 1e-4;
 
 /// Farthest pixel that a facet is taken from, along columns and rows.
 constexpr int kUnlitReach = 3;
@@ -89,7 +89,7 @@ class Guide {
   }
   [[nodiscard]] bool unlit(std::size_t pixel) const {
     const double wanted = picture_.wanted[pixel];
-    return wanted >= kLeastWanted && picture_.light[pixel] < kLeastLight * wanted;
+    return wanted >= kMinWanted && picture_.light[pixel] < kMinLight * wanted;
   }
 
   struct Candidate {

@@ -19,7 +19,7 @@ struct LitPicture {
   std::span<const double> wanted;  ///< The same of the target.
 };
 
-/// Finds the pixels that get less than kLeastLight of the light they want, and for each the facet
+/// Finds the pixels that get less than kMinLight of the light they want, and for each the facet
 /// that is to go there: the nearest within kUnlitReach pixels that is not on its way to another
 /// one, a facet that is alone in its pixel counting as one pixel farther. In the dark, where a
 /// pixel is lit by a facet or two, such pixels are most of a facet picture's error.

@@ -32,7 +32,7 @@ Eigen::ArrayXd levelling_factors(const Eigen::VectorXd& squares, const GridShape
   const Eigen::ArrayXd means =
       box_means(squares, shape).array().max(std::numeric_limits<double>::min());
   const Eigen::ArrayXd wanted = -0.25 * means.log();
-  const double most = std::log(kMostLevelling);
+  const double most = std::log(kMaxLevelling);
   return (wanted - wanted.mean()).max(-most).min(most).exp();
 }
 

@@ -13,7 +13,7 @@ namespace lensforge {
 inline constexpr int kLevellingRadius = 6;
 
 /// Bound of the factors and of their inverses.
-inline constexpr double kMostLevelling = 3.0;
+inline constexpr double kMaxLevelling = 3.0;
 
 /// How far vertices are to reach, beside what they do, for a preconditioned curvature that is about
 /// the same everywhere on a grid. Reach enters that curvature twice.

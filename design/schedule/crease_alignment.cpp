@@ -19,14 +19,14 @@ namespace {
 /// Reach of a crease in shortest edges of a vertex: above a half, so that of every edge across it
 /// one end is in reach; and the share of its area that a triangle keeps.
 constexpr double kReach = 0.6;
-constexpr double kLeastShrinkage = 0.1;
+constexpr double kMinShrinkage = 0.1;
 
 class Alignment {
  public:
   Alignment(const BrenierMap& map, const OpticalSetup& setup, SurfaceMesh& mesh)
       : map_(map), light_(setup), mesh_(mesh), topology_(make_topology(mesh)) {
     for (int t = 0; t < static_cast<int>(mesh.triangle_count()); ++t) {
-      least_area_.push_back(kLeastShrinkage * mesh.plan_area(t));
+      least_area_.push_back(kMinShrinkage * mesh.plan_area(t));
     }
   }
 

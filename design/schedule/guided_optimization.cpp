@@ -21,7 +21,7 @@ namespace {
 constexpr double kProbePixels = 0.02;
 
 /// Times that it is halved where a barrier is in the way.
-constexpr int kMostHalvings = 20;
+constexpr int kMaxHalvings = 20;
 
 /// Share of the grid Laplacian's lowest eigenvalue that bounds the height preconditioner: below
 /// it the lens as a whole tilts and bends.
@@ -144,7 +144,7 @@ Eigen::VectorXd GuidedOptimization::squared_curvatures(const Eigen::Matrix3Xd& v
   Eigen::Matrix3Xd forward;
   Eigen::Matrix3Xd backward;
   for (int halvings = 0;; ++halvings, step *= 0.5) {
-    if (halvings == kMostHalvings) return {};
+    if (halvings == kMaxHalvings) return {};
     if (stage_->evaluate(vertices + step * direction, forward).feasible &&
         stage_->evaluate(vertices - step * direction, backward).feasible) {
       break;

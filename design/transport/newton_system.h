@@ -70,7 +70,7 @@ class NewtonSystem {
   /// and 0.0029 with this; 0.0027 with multigrid, whose 1e-2 is rough. 1e-2 takes 170 iterations.
   static constexpr double kTolerance = 1e-4;
   /// Iterations are given up after this many times √cells; 4.3 is the most that any took.
-  static constexpr double kMostIterations = 20.0;
+  static constexpr double kMaxIterations = 20.0;
 
   [[nodiscard]] static std::span<const double> numbers(const Eigen::VectorXd& v) {
     return {v.data(), static_cast<std::size_t>(v.size())};
@@ -90,7 +90,7 @@ class NewtonSystem {
     double size = sizes[0];
     double scaled_size = sizes[1];
     double turn = 0.0;
-    const double most = kMostIterations * std::sqrt(static_cast<double>(count()));
+    const double most = kMaxIterations * std::sqrt(static_cast<double>(count()));
     for (int i = 0; size > goal && i < most; ++i) {
       each_cell("newton turn",
                 TurnDirection{residual_.data(), inverse_diagonal_.data(), turn, direction_.data()});

@@ -38,13 +38,13 @@ Eigen::Matrix2Xd cell_centroids(const PowerDiagram& diagram, const SummedDensity
 
 Eigen::VectorXd stretched_weights(const Eigen::Matrix2Xd& sites, const SummedDensity& density) {
   // A box without width is taken as wide as this share of the picture.
-  constexpr double kLeastWidth = 1e-3;
+  constexpr double kMinWidth = 1e-3;
   constexpr double kInset = 0.95;
   const Eigen::Vector2d size(density.columns(), density.rows());
   const Eigen::Vector2d low = sites.rowwise().minCoeff();
   const Eigen::Vector2d high = sites.rowwise().maxCoeff();
   const Eigen::Vector2d stretch =
-      (kInset * size).cwiseQuotient((high - low).cwiseMax(kLeastWidth * size));
+      (kInset * size).cwiseQuotient((high - low).cwiseMax(kMinWidth * size));
   const Eigen::Vector2d middle = 0.5 * (low + high);
   Eigen::VectorXd psi(sites.cols());
   for (Eigen::Index i = 0; i < psi.size(); ++i) {
@@ -197,17 +197,17 @@ constexpr int kThoroughRounds = 4;
 constexpr int kMendingRounds = 60;
 /// Rings of neighbours that are asked for room: two, and more only while none of them has any.
 constexpr int kRings = 2;
-constexpr int kMostRings = 12;
+constexpr int kMaxRings = 12;
 /// Neighbours that are asked at most: a site beside a wide black part borders on thousands.
-constexpr std::size_t kMostAsked = 256;
+constexpr std::size_t kMaxAsked = 256;
 /// Share of the cells above which mending is given up: it mends stragglers, a round at a time.
-constexpr double kMostEmpty = 0.15;
+constexpr double kMaxEmpty = 0.15;
 
 /// Takers of one cell in a round, and where along its extent, in standard deviations from the
 /// centroid towards the taker, each one's border is put: nearer sites cut closer, else the farther
 /// one's steeper plane would hide them.
-constexpr std::size_t kMostTakers = 4;
-constexpr std::array<std::array<double, kMostTakers>, kMostTakers> kCuts = {{
+constexpr std::size_t kMaxTakers = 4;
+constexpr std::array<std::array<double, kMaxTakers>, kMaxTakers> kCuts = {{
     {0.0, 0.0, 0.0, 0.0},
     {-0.3, 0.6, 0.0, 0.0},
     {-0.5, 0.2, 0.9, 0.0},
@@ -240,7 +240,7 @@ class Mending {
     for (std::size_t begin = 0; begin < takings.size();) {
       std::size_t end = begin;
       while (end < takings.size() && takings[end].giver == takings[begin].giver) ++end;
-      const std::size_t takers = std::min(end - begin, kMostTakers);
+      const std::size_t takers = std::min(end - begin, kMaxTakers);
       for (std::size_t k = 0; k < takers; ++k) {
         const Taking& t = takings[begin + k];
         const double cut = kCuts[takers - 1][k] * deviation(t.giver) * t.distance;
@@ -277,11 +277,11 @@ class Mending {
     std::vector<int> seen{i};
     std::size_t begin = 0;
     int best = -1;
-    for (int ring = 0; ring < kMostRings && (ring < kRings || best < 0); ++ring) {
+    for (int ring = 0; ring < kMaxRings && (ring < kRings || best < 0); ++ring) {
       const std::size_t end = seen.size();
       for (; begin < end; ++begin) {
         for (const int j : neighbourhood_.of(seen[begin])) {
-          if (seen.size() > kMostAsked) return best;
+          if (seen.size() > kMaxAsked) return best;
           if (std::find(seen.begin(), seen.end(), j) != seen.end()) continue;
           seen.push_back(j);
           if (has_share(j, share) && (best < 0 || tangent(j, i) > tangent(best, i))) best = j;
@@ -316,7 +316,7 @@ bool mend_empty_cells(const SiteLevel& level, const Executor& executor, const st
     const double share = round < kThoroughRounds ? kNearlyEmpty : kEmpty;
     const std::size_t empty = count_below(level, state.cells, share);
     if (empty == 0) return true;
-    const double most = kMostEmpty * static_cast<double>(state.cells.mass.size());
+    const double most = kMaxEmpty * static_cast<double>(state.cells.mass.size());
     if (static_cast<double>(empty) > most || !state.diagram.is_planar()) return false;
     const Mending mending(state, level, stage);
     state = power_state(level, mending.weights(share), executor, stop, stage);

@@ -29,16 +29,16 @@ constexpr int kCoarsest = 500;
 constexpr double kBlurPerCell = 1.0;
 /// The coarsest level starts with this blur, as a share of the picture's longer side.
 constexpr double kFirstBlur = 0.125;
-/// Blur falls by this factor from stage to stage, and to 0 from below kLeastBlur pixels.
+/// Blur falls by this factor from stage to stage, and to 0 from below kMinBlur pixels.
 constexpr double kBlurFactor = 0.5;
-constexpr double kLeastBlur = 0.1;
+constexpr double kMinBlur = 0.1;
 /// Evenly spread share of the light while there is blur, so that no density vanishes; without blur
-/// it falls by kFloorFactor from stage to stage, and to 0 from below kLeastFloor. At once to 0,
+/// it falls by kFloorFactor from stage to stage, and to 0 from below kMinFloor. At once to 0,
 /// cells that lie in black lose all of their mass, and no Newton step helps (logo, mesh spread over
 /// it).
 constexpr double kFloor = 1e-4;
 constexpr double kFloorFactor = 0.1;
-constexpr double kLeastFloor = 1e-9;
+constexpr double kMinFloor = 1e-9;
 /// Mass errors that end a stage, and a level before it is upsampled.
 constexpr double kStageError = 0.5;
 constexpr double kLevelError = 1e-2;
@@ -214,16 +214,16 @@ class TransportSolver {
     const bool coarsest = l + 1 == static_cast<int>(levels_.size());
     double blur =
         coarsest ? kFirstBlur * std::max(picture_.columns(), picture_.rows()) : level_blur(l + 1);
-    while (blur > last || (finest && blur > kLeastBlur)) {
+    while (blur > last || (finest && blur > kMinBlur)) {
       blur = finest ? kBlurFactor * blur : std::max(last, kBlurFactor * blur);
-      if (finest && blur <= kLeastBlur) break;
+      if (finest && blur <= kMinBlur) break;
       const Stage s = stage(blur, kFloor);
       refill(s, state);
       if (!run_stage(l, s, !finest && blur == last ? kLevelError : kStageError, state))
         return false;
     }
     if (!finest) return true;
-    for (double floor = kFloor; floor > kLeastFloor; floor *= kFloorFactor) {
+    for (double floor = kFloor; floor > kMinFloor; floor *= kFloorFactor) {
       const Stage s = stage(0.0, floor);
       refill(s, state);
       if (!run_stage(l, s, kStageError, state)) return false;

@@ -16,15 +16,15 @@ namespace lensforge {
 namespace {
 
 /// Most vertices per mean cell: what lies between black and bright may serve any image area.
-constexpr double kMostDense = 30.0;
+constexpr double kMaxDense = 30.0;
 
-/// Area that a triangle keeps at least, a third of what kMostDense leaves it. The transport map is
+/// Area that a triangle keeps at least, a third of what kMaxDense leaves it. The transport map is
 /// monotone, but its differences over a pixel need not be where the density jumps: a step to the
 /// sixtyfold folded triangles over.
-constexpr double kLeastShrinkage = 0.01;
+constexpr double kMinShrinkage = 0.01;
 
 /// Most passes of smoothing against that; one is enough for that step.
-constexpr int kMostSmoothing = 8;
+constexpr int kMaxSmoothing = 8;
 
 /// See favour_dark().
 constexpr double kDarkPower = 0.3;
@@ -50,7 +50,7 @@ Image vertex_density(const ServedAreas& served, double share, const OpticalSetup
   const auto values = flux.render(executor, served.mesh.triangle_count(), triangle);
   Image density(setup.pixels.x(), setup.pixels.y());
   std::transform(values.begin(), values.end(), density.values().begin(), [&](double v) {
-    return static_cast<float>(std::min(v * lens_pixels, kMostDense));
+    return static_cast<float>(std::min(v * lens_pixels, kMaxDense));
   });
   return density;
 }
@@ -104,7 +104,7 @@ bool in_order(const SurfaceMesh& moved, const SurfaceMesh& before) {
     return doubled_area(corner(0), corner(1), corner(2));
   };
   for (Eigen::Index f = 0; f < moved.triangles.cols(); ++f) {
-    if (area(moved, f) < kLeastShrinkage * area(before, f)) return false;
+    if (area(moved, f) < kMinShrinkage * area(before, f)) return false;
   }
   return true;
 }
@@ -116,8 +116,7 @@ Eigen::VectorXd favour_dark(const ServedAreas& served, const OpticalSetup& setup
   const LightPath path(setup);
   Eigen::ArrayXd light(faces);
   for (Eigen::Index f = 0; f < faces; ++f) {
-    light[f] =
-        path.intake({served.mesh.corner(f, 0), served.mesh.corner(f, 1), served.mesh.corner(f, 2)});
+    light[f] = path.intake(served.mesh.corners(f));
   }
   const double all = served.areas.sum();
   const Eigen::ArrayXd brightness =
@@ -141,7 +140,7 @@ bool spread_vertices(const ServedAreas& served, double share, const OpticalSetup
   Image density = vertex_density(served, share, setup, executor);
   MongeAmpereOptions options;
   options.floor = 0.0;  // The even share is floor enough.
-  for (int pass = 0; pass <= kMostSmoothing; ++pass) {
+  for (int pass = 0; pass <= kMaxSmoothing; ++pass) {
     const MongeAmpereResult map = solve_monge_ampere(density, options, control);
     if (map.stopped) return false;
     SurfaceMesh moved = moved_by(map, setup, mesh);

@@ -9,8 +9,8 @@
 namespace lensforge {
 namespace {
 
-constexpr std::size_t kMostWholeDigits = 8;
-constexpr std::size_t kMostDigits = 16;
+constexpr std::size_t kMaxWholeDigits = 8;
+constexpr std::size_t kMaxDigits = 16;
 
 bool is_blank(char c) { return c == ' ' || c == '\t'; }
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
@@ -76,9 +76,9 @@ class LineScanner {
                          std::size_t digits) const {
     const std::string name = std::string(1, letter).append(written);
     if (digits == 0) refuse("'" + name + "': a number is missing after " + letter);
-    if (whole > kMostWholeDigits || digits > kMostDigits) {
-      refuse("'" + name + "': longer than " + std::to_string(kMostWholeDigits) +
-             " digits before the point or " + std::to_string(kMostDigits) + " in all");
+    if (whole > kMaxWholeDigits || digits > kMaxDigits) {
+      refuse("'" + name + "': longer than " + std::to_string(kMaxWholeDigits) +
+             " digits before the point or " + std::to_string(kMaxDigits) + " in all");
     }
     const bool exponent =
         upper(peek()) == 'E' && at_ + 1 < text_.size() &&
@@ -143,8 +143,8 @@ void add_word(LineScanner& scanner, GcodeBlock& block) {
   } else if (block.value(word.letter)) {
     scanner.refuse(std::string(1, word.letter) + " is given twice");
   }
-  if (block.words().size() == GcodeBlock::kMostWords) {
-    scanner.refuse("more than " + std::to_string(GcodeBlock::kMostWords) + " words");
+  if (block.words().size() == GcodeBlock::kMaxWords) {
+    scanner.refuse("more than " + std::to_string(GcodeBlock::kMaxWords) + " words");
   }
   block.add(word);
 }

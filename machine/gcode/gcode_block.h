@@ -23,7 +23,7 @@ struct GcodeWord {
 /// The words of one line.
 class GcodeBlock {
  public:
-  static constexpr std::size_t kMostWords = 32;
+  static constexpr std::size_t kMaxWords = 32;
 
   std::int64_t line = 0;               ///< In the file, counted from 1.
   std::int64_t offset = 0;             ///< Of the line's first byte.
@@ -36,11 +36,11 @@ class GcodeBlock {
   [[nodiscard]] bool empty() const { return size_ == 0 && !number; }
   /// The value of a letter that stands at most once (any but G and M).
   [[nodiscard]] std::optional<double> value(char letter) const;
-  /// @pre fewer than kMostWords so far.
+  /// @pre fewer than kMaxWords so far.
   void add(const GcodeWord& word) { words_[size_++] = word; }
 
  private:
-  std::array<GcodeWord, kMostWords> words_;
+  std::array<GcodeWord, kMaxWords> words_;
   std::size_t size_ = 0;
 };
 

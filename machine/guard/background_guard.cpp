@@ -18,7 +18,7 @@ using Milliseconds = std::chrono::milliseconds;
 /// Between two polls of the guard; its shortest interval is 10 ms.
 constexpr Milliseconds kPollPause{5};
 /// As SpindleGuard keeps.
-constexpr std::size_t kMostRecords = 20000;
+constexpr std::size_t kMaxRecords = 20000;
 
 double steady_now() { return SteadyClock().now(); }
 
@@ -83,8 +83,8 @@ void BackgroundGuard::publish(const GuardReport& report, bool obeyed) {
   std::vector<GuardRecord> fresh = guard_->take_records();
   records_.insert(records_.end(), std::make_move_iterator(fresh.begin()),
                   std::make_move_iterator(fresh.end()));
-  if (records_.size() > kMostRecords) {
-    records_.erase(records_.begin(), records_.end() - kMostRecords);
+  if (records_.size() > kMaxRecords) {
+    records_.erase(records_.begin(), records_.end() - kMaxRecords);
   }
   newest_ = report;
   published_at_ = steady_now();

@@ -13,7 +13,7 @@ namespace lensforge {
 namespace {
 
 /// Hours of records at one a second, if nobody takes them.
-constexpr std::size_t kMostRecords = 20000;
+constexpr std::size_t kMaxRecords = 20000;
 
 std::vector<RegisterMap> maps_of(const std::vector<GuardedDevice>& devices) {
   std::vector<RegisterMap> maps;
@@ -257,7 +257,7 @@ GuardReport SpindleGuard::poll() {
 }
 
 void SpindleGuard::record(GuardEvent event, const std::string& text) {
-  if (records_.size() == kMostRecords) records_.pop_front();
+  if (records_.size() == kMaxRecords) records_.pop_front();
   records_.push_back({clock_.now(), event, watch_.rpm(), text});
 }
 

@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 // A reservation should last for one to four seconds.
 constexpr double kShortReserve = 1.0;
 constexpr double kLongReserve = 4.0;
-constexpr std::int64_t kMostAhead = 1 << 16;
+constexpr std::int64_t kMaxAhead = 1 << 16;
 /// Of a program, bytes: as file systems have it.
 constexpr std::size_t kLongestName = 255;
 
@@ -135,7 +135,7 @@ void Journal::reserve(std::int64_t line) {
     const double now = seconds_now();
     if (now - last_reserve_ < kShortReserve) ahead_ *= 2;
     if (now - last_reserve_ > kLongReserve) ahead_ = std::max(ahead_ / 2, options_.reserve_lines);
-    ahead_ = std::min(ahead_, kMostAhead);
+    ahead_ = std::min(ahead_, kMaxAhead);
     last_reserve_ = now;
     asked_ = line + ahead_;
     append({{"kind", "reserve"}, {"sent", asked_}});

@@ -15,7 +15,7 @@ namespace fs = std::filesystem;
 using nlohmann::json;
 
 /// More lines or bytes than any program has; leaves room for sums.
-constexpr std::int64_t kMostLines = std::int64_t{1} << 48;
+constexpr std::int64_t kMaxLines = std::int64_t{1} << 48;
 /// Beyond what controllers and register maps can tell of a place, mm, or a speed, rpm.
 constexpr double kLargest = 1e12;
 
@@ -44,8 +44,8 @@ class Fields {
     const json& value = record_[key];
     const bool negative = value.is_number_integer() && !value.is_number_unsigned();
     if (!value.is_number_integer() || (negative && value.get<std::int64_t>() < 0) ||
-        (!negative && value.get<std::uint64_t>() > static_cast<std::uint64_t>(kMostLines))) {
-      refuse_field(key, "must be an integer, 0 to " + std::to_string(kMostLines));
+        (!negative && value.get<std::uint64_t>() > static_cast<std::uint64_t>(kMaxLines))) {
+      refuse_field(key, "must be an integer, 0 to " + std::to_string(kMaxLines));
     }
     return value.get<std::int64_t>();
   }

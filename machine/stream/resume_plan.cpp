@@ -18,7 +18,7 @@ namespace {
 constexpr double kOriginTolerance = 0.0015;
 
 /// A move that goes less than this part of its height across is a plunge or a retract.
-constexpr double kLeastShareAcross = 0.1;
+constexpr double kMinShareAcross = 0.1;
 
 /// Motions kept to choose the entry among.
 constexpr std::size_t kHistory = 4096;
@@ -38,7 +38,7 @@ struct Done {
   [[nodiscard]] bool leads_along() const {
     return cuts() && std::all_of(motions.begin(), motions.end(), [](const GcodeMotion& m) {
              const Eigen::Vector3d step = m.end - m.start;
-             return m.arc || step.head<2>().norm() >= kLeastShareAcross * std::abs(step.z());
+             return m.arc || step.head<2>().norm() >= kMinShareAcross * std::abs(step.z());
            });
   }
 };

@@ -10,7 +10,7 @@
 namespace lensforge {
 namespace {
 
-constexpr std::size_t kMostAxes = 8;
+constexpr std::size_t kMaxAxes = 8;
 constexpr std::size_t kLongestName = 12;
 
 constexpr std::array<std::pair<std::string_view, ReportedState>, 10> kStates{
@@ -55,7 +55,7 @@ std::vector<Number> numbers(std::string_view text) {
   for (std::size_t begin = 0; begin <= text.size();) {
     const std::size_t comma = std::min(text.find(',', begin), text.size());
     const auto value = number<Number>(text.substr(begin, comma - begin));
-    if (!value || values.size() >= kMostAxes) return {};
+    if (!value || values.size() >= kMaxAxes) return {};
     values.push_back(*value);
     begin = comma + 1;
   }

@@ -27,7 +27,7 @@ constexpr int kHalves = 2;            ///< Independent samplings, for the estima
 constexpr std::int64_t kSlices = 64;  ///< Bands of the lens that are handed to threads.
 constexpr double kRaysPerPixel = 16384.0;
 constexpr double kFewestRays = 268435456.0;
-constexpr double kMostRays = 2147483648.0;
+constexpr double kMaxRays = 2147483648.0;
 
 /// A well-mixed 64-bit value of a counter (the finaliser of SplitMix64, Steele et al. 2014).
 std::uint64_t mixed(std::uint64_t x) {
@@ -237,7 +237,7 @@ Image picture_of(const Count& count, const Image& target, std::int64_t rays) {
 
 std::int64_t default_rays(const OpticalSetup& setup) {
   const double pixels = static_cast<double>(setup.pixels.x()) * setup.pixels.y();
-  return static_cast<std::int64_t>(std::clamp(kRaysPerPixel * pixels, kFewestRays, kMostRays));
+  return static_cast<std::int64_t>(std::clamp(kRaysPerPixel * pixels, kFewestRays, kMaxRays));
 }
 
 RayTraceResult trace_rays(const Lens& lens, const RayTraceOptions& options,

@@ -257,7 +257,7 @@ TEST(CutExtremes, RapidsRunHalfAMillimetreAboveTheBlankAtLeast) {
   options.workshop.process.safe_height = 0.25;
   EXPECT_THAT(message_of<InputError>([&] { validate(options, small_lens().setup); }),
               HasSubstr("process.safe_height: 0.25: must be in 0.5 to 1000"));
-  EXPECT_EQ(workshop_rule("process.safe_height").least, kLeastSafeHeight);
+  EXPECT_EQ(workshop_rule("process.safe_height").least, kMinSafeHeight);
 }
 
 }  // namespace

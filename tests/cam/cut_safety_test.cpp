@@ -147,7 +147,7 @@ CamOptions random_options(std::mt19937& random) {
     if (tool.number == shop.process.rough.tool && coin()) tool.shape = CutterShape::kBall;
   }
   shop.stock = {coin() ? 0.0 : pick(0.0, 2.0), pick(0.0, 1.0)};
-  shop.process.safe_height = pick(kLeastSafeHeight, 3.0);
+  shop.process.safe_height = pick(kMinSafeHeight, 3.0);
   shop.process.rough.enabled = coin();
   shop.process.semi.enabled = coin();
   FinishProcess& finish = shop.process.finish;

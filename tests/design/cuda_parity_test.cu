@@ -83,10 +83,10 @@ TEST_F(Cuda, SumsReachEveryItemOnce) {
 TEST_F(Cuda, SumsThatWaitTogetherDoNotMixUp) {
   const CudaExecutor executor(Executor::serial());
   std::vector<CudaExecutor::PendingSum<2>> sums;
-  for (int i = 0; i < CudaExecutor::kMostPendingSums; ++i) {
+  for (int i = 0; i < CudaExecutor::kMaxPendingSums; ++i) {
     sums.push_back(pending_sum<2>(executor, "sum", 1000 + i, OneAndIndex{}));
   }
-  for (int i = 0; i < CudaExecutor::kMostPendingSums; ++i) {
+  for (int i = 0; i < CudaExecutor::kMaxPendingSums; ++i) {
     EXPECT_EQ(sums[static_cast<std::size_t>(i)].get()[0], 1000.0 + i);
   }
 }

@@ -144,7 +144,7 @@ std::vector<double> traced_flux(const SurfaceMesh& mesh, const OpticalSetup& set
     const Eigen::Vector3d origin(random.between(0.0, range.x()) - margin,
                                  random.between(0.0, range.y()) - margin, 0.0);
     for (Eigen::Index f = 0; f < mesh.triangles.cols(); ++f) {
-      const Corners t{mesh.corner(f, 0), mesh.corner(f, 1), mesh.corner(f, 2)};
+      const Corners t = mesh.corners(f);
       const std::optional<Hit> at = hit(t, origin, inside);
       if (!at) continue;
       const Eigen::Vector3d b =

@@ -110,7 +110,7 @@ void expect_certificate_holds(const SmoothSurface& surface, const SplineNet& net
   std::mt19937 random(11);
   std::uniform_real_distribution<double> unit(0.0, 1.0);
   for (const SplinePatch& patch : net.patches) {
-    const FitError denser = measure_patch(patch, surface, FitOptions(), 10 * kLeastDensity);
+    const FitError denser = measure_patch(patch, surface, FitOptions(), 10 * kMinDensity);
     EXPECT_LE(denser.height, patch.error.height);
     EXPECT_LE(denser.normal, patch.error.normal);
     EXPECT_NEAR(denser.normal_rms, patch.error.normal_rms, 0.1 * denser.normal_rms);

@@ -84,11 +84,12 @@ std::string odd_png(Random& random) {
 std::string odd_pnm(Random& random) {
   static const std::vector<std::string> kKinds{"P1", "P2", "P2", "P3", "P4", "P5",
                                                "P5", "P6", "P7", "PF", "Pf"};
-  static const std::vector<std::string> kMost{"255", "255", "0", "1", "65535", "65536", "-1", "15"};
+  static const std::vector<std::string> kMaxima{"255",   "255",   "0",  "1",
+                                                "65535", "65536", "-1", "15"};
   std::string text = random.pick(kKinds) + "\n";
   if (random.one_in(4)) text += "# " + hostile_word(random) + "\n";
   text += (random.one_in(4) ? hostile_number(random) : "6") + " ";
-  text += (random.one_in(4) ? hostile_number(random) : "5") + "\n" + random.pick(kMost) + "\n";
+  text += (random.one_in(4) ? hostile_number(random) : "5") + "\n" + random.pick(kMaxima) + "\n";
   if (random.one_in(2)) return text + random.bytes(random.below(400));
   for (int i = 0; i < 90; ++i) {
     text += (random.one_in(60) ? hostile_number(random) : std::to_string(random.below(256))) + " ";

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
 #include <regex>
 
 #include "scenario/driver.h"
@@ -33,6 +34,14 @@ class DesignReach : public Scenario {
 
 TEST_F(DesignReach, AFocalLengthThatIsTooShortIsToldWithOneThatDoes) {
   for (const char* focal : {"20", "7"}) expect_advice_works({"--focal", focal});
+}
+
+TEST_F(DesignReach, NothingIsSaidOfADesignThatIsRefused) {
+  Arguments arguments = small_design(picture("portrait.png"), path("lens"));
+  arguments.insert(arguments.end(), {"--resume", "--focal", "7"});
+  const Outcome refused = run(arguments);
+  expect_refusal(refused, 2, {"--focal", "would do"});
+  EXPECT_EQ(std::count(refused.err.begin(), refused.err.end(), '\n'), 1) << refused.err;
 }
 
 TEST_F(DesignReach, AWideLensOrAWeakIndexNeedsMoreDistance) {

@@ -73,13 +73,13 @@ struct CudaExecutor::State {
   State& operator=(const State&) = delete;
 
   static constexpr std::size_t kResults =
-      static_cast<std::size_t>(kMostPendingSums) * static_cast<std::size_t>(kMostTerms);
+      static_cast<std::size_t>(kMaxPendingSums) * static_cast<std::size_t>(kMaxTerms);
 
   cudaStream_t stream = nullptr;
   cudaEvent_t begin = nullptr;
   cudaEvent_t end = nullptr;
   double* collected = nullptr;   ///< Page-locked memory of the caller's side.
-  DeviceBuffer<double> results;  ///< A ring of kMostPendingSums × kMostTerms.
+  DeviceBuffer<double> results;  ///< A ring of kMaxPendingSums × kMaxTerms.
   std::size_t next = 0;
   DeviceBuffer<double> partial;
   KernelProfile* profile = nullptr;
@@ -111,7 +111,7 @@ void CudaExecutor::end_kernel(const char* kernel) const {
 }
 
 double* CudaExecutor::partial_sums(std::size_t blocks) const {
-  const std::size_t size = blocks * static_cast<std::size_t>(kMostTerms);
+  const std::size_t size = blocks * static_cast<std::size_t>(kMaxTerms);
   if (state_->partial.size() < size) {
     wait();  // Kernels that are on their way may still use the old ones.
     state_->partial = DeviceBuffer<double>(size);
@@ -121,13 +121,13 @@ double* CudaExecutor::partial_sums(std::size_t blocks) const {
 
 double* CudaExecutor::next_result() const {
   double* result = state_->results.data() + state_->next;
-  state_->next = (state_->next + static_cast<std::size_t>(kMostTerms)) % State::kResults;
+  state_->next = (state_->next + static_cast<std::size_t>(kMaxTerms)) % State::kResults;
   return result;
 }
 
 const double* CudaExecutor::collect_result(const double* result) const {
   double* collected = state_->collected + (result - state_->results.data());
-  LF_CUDA(cudaMemcpyAsync(collected, result, kMostTerms * sizeof(double), cudaMemcpyDeviceToHost,
+  LF_CUDA(cudaMemcpyAsync(collected, result, kMaxTerms * sizeof(double), cudaMemcpyDeviceToHost,
                           state_->stream));
   return collected;
 }

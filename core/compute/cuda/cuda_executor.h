@@ -26,7 +26,7 @@ class CudaExecutor {
   using Buffer = DeviceBuffer<T>;
 
   /// Result of pending_sum(): asked for, it waits for the GPU. To be asked for before
-  /// kMostPendingSums more sums are begun.
+  /// kMaxPendingSums more sums are begun.
   template <std::size_t N>
   class PendingSum {
    public:
@@ -46,8 +46,8 @@ class CudaExecutor {
     const double* slot_ = nullptr;
   };
 
-  static constexpr int kMostPendingSums = 32;
-  static constexpr int kMostTerms = 8;  ///< Of one sum.
+  static constexpr int kMaxPendingSums = 32;
+  static constexpr int kMaxTerms = 8;  ///< Of one sum.
 
   /// Takes over profile and stop token of `options`. @throw RunError without a usable GPU.
   explicit CudaExecutor(const Executor& options);

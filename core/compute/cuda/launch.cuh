@@ -130,7 +130,7 @@ template <std::size_t N, class Functor>
 CudaExecutor::PendingSum<N> pending_sum(const CudaExecutor& executor, const char* kernel,
                                         std::int64_t count, const Functor& functor) {
   namespace detail = cuda_detail;
-  static_assert(N <= CudaExecutor::kMostTerms);
+  static_assert(N <= CudaExecutor::kMaxTerms);
   executor.begin_kernel();
   if (count <= 0) return {};
   const unsigned blocks = detail::blocks_for(count, detail::kThreads);

@@ -4,7 +4,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
+#include <filesystem>
+#include <fstream>
 #include <optional>
+#include <string>
+#include <system_error>
+#include <thread>
 #include <utility>
 
 #include "core/error.h"
@@ -45,6 +51,41 @@ TEST(FolderLock, AMissingFolderIsNamed) {
   const TempFolder folder;
   EXPECT_THAT(message_of<InputError>([&] { FolderLock(folder / "missing", Kind::kShared); }),
               HasSubstr("missing"));
+}
+
+TEST(FolderLock, MakesTheFolderOnce) {
+  const TempFolder parent;
+  bool made = false;
+  const FolderLock first = FolderLock::make(parent / "new", Kind::kShared, made);
+  EXPECT_TRUE(made);
+  const FolderLock second = FolderLock::make(parent / "new", Kind::kShared, made);
+  EXPECT_FALSE(made);
+  EXPECT_THAT(
+      message_of<InputError>([&] { FolderLock::make(parent / "new", Kind::kExclusive, made); }),
+      HasSubstr("another lensforge command"));
+}
+
+/// Commands that come and go, each of which takes the folder away if it may.
+TEST(FolderLock, NobodyTakesTheFolderFromAnother) {
+  const TempFolder parent;
+  const std::filesystem::path folder = parent / "shared";
+  std::atomic<int> lost = 0;
+  const auto come_and_go = [&](int id) {
+    for (int i = 0; i < 300; ++i) {
+      bool made = false;
+      FolderLock lock = FolderLock::make(folder, Kind::kShared, made);
+      const std::filesystem::path file = folder / std::to_string(id);
+      if (!std::ofstream(file).put('x')) ++lost;
+      std::filesystem::remove(file);
+      std::error_code ignored;
+      if (made && lock.become_exclusive()) std::filesystem::remove(folder, ignored);
+    }
+  };
+  {
+    const std::jthread other(come_and_go, 1);
+    come_and_go(2);
+  }
+  EXPECT_EQ(lost, 0);
 }
 
 }  // namespace

@@ -32,7 +32,7 @@ class FreeMaps {
         edge_weight_(edge_weight),
         weights_(Eigen::Matrix3Xd::Constant(3, mesh.triangle_count(), welsch(0.0, nu).slope)) {
     for (std::int64_t t = 0; t < mesh.triangle_count(); ++t) {
-      corners_.push_back({mesh.corner(t, 0), mesh.corner(t, 1), mesh.corner(t, 2)});
+      corners_.push_back(mesh.corners(t));
       frames_.push_back(face_frame(corners_.back()));
     }
     maps_.resize(frames_.size());
@@ -170,7 +170,7 @@ TEST(Objective, ASphereHasItsMeanCurvatureEnergy) {
   DesignObjective objective = objective_of(mesh, options);
   double area = 0.0;
   for (std::int64_t t = 0; t < mesh.triangle_count(); ++t) {
-    area += 0.5 * area_normal({mesh.corner(t, 0), mesh.corner(t, 1), mesh.corner(t, 2)}).norm();
+    area += 0.5 * area_normal(mesh.corners(t)).norm();
   }
   const EnergyValues e = evaluate_at(objective, mesh.vertices).energy;
   EXPECT_NEAR(e.face * radius * radius / area, 1.0, 0.015);

@@ -62,8 +62,8 @@ TEST(Levelling, StaysWithinItsBoundWhereNothingIsFelt) {
   Eigen::VectorXd squares = Eigen::VectorXd::Zero(kVertices);
   squares.head(10 * kShape.columns).setConstant(1e9);
   const Eigen::ArrayXd factors = levelling_factors(squares, kShape);
-  EXPECT_DOUBLE_EQ(factors.maxCoeff(), kMostLevelling);
-  EXPECT_DOUBLE_EQ(factors.minCoeff(), 1.0 / kMostLevelling);
+  EXPECT_DOUBLE_EQ(factors.maxCoeff(), kMaxLevelling);
+  EXPECT_DOUBLE_EQ(factors.minCoeff(), 1.0 / kMaxLevelling);
 }
 
 }  // namespace
