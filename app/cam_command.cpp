@@ -93,7 +93,7 @@ CamResult run(const OptionSet& options, const CamOptions& cam, const Lens& lens,
   return make_cut(lens, cam, out, executor, control);
 }
 
-/// The option that states a limit; none for what is a matter of safety.
+/// The option that states a limit of quality.
 const char* option_of(const std::string& key) {
   static const std::map<std::string, const char*> options{{"leakage", "--max-leakage"},
                                                           {"dark_flux", "--max-dark"},
@@ -101,16 +101,15 @@ const char* option_of(const std::string& key) {
                                                           {"excess", "--max-excess"},
                                                           {"slope", "--max-slope"},
                                                           {"fillet_depth", "--max-fillet"}};
-  const auto found = options.find(key);
-  return found == options.end() ? nullptr : found->second;
+  return options.at(key);
 }
 
 /// Limits of quality count only where they were stated; their defaults are advice.
 int exit_code(const OptionSet& options, const CamResult& result) {
   if (!result.done()) return kInterrupted;
   for (const LimitCheck& check : result.report.verdict.checks) {
-    const char* const option = option_of(check.key);
-    if (!check.passes() && (option == nullptr || options.given(option))) return kLimitMissed;
+    const bool counts = !check.of_quality || options.given(option_of(check.key));
+    if (counts && !check.passes()) return kLimitMissed;
   }
   return kDone;
 }
@@ -121,33 +120,16 @@ std::string choice_text(const ReportChoice& choice) {
          fixed(choice.hours, 2) + " h\n";
 }
 
-/// All combinations run one after the other; the finest pitch takes most room.
-void announce(const CutChoices& choices, CamOptions cam, const Lens& lens, int threads,
-              const fs::path& folder, const Console& console) {
-  FinishProcess& finish = cam.workshop.process.finish;
-  if (!choices.pitches.empty()) {
-    finish.pitch = *std::min_element(choices.pitches.begin(), choices.pitches.end());
-    finish.scallop = 0.0;
-  }
-  validate(cam.workshop, "--compare");
-  cam.render = true;
-  WorkEstimate estimate = estimate_cut(cam, lens.setup, threads);
-  require_room_for_cut(cam, lens.setup, estimate, folder);
-  const auto count_of = [](const std::vector<double>& values) {
-    return static_cast<double>(std::max<std::size_t>(values.size(), 1));
-  };
-  estimate.seconds *= count_of(choices.pitches) * count_of(choices.tools);
-  if (estimate.seconds > kWorthTelling) {
-    console.note("the comparison takes " + estimate_words(estimate));
-  }
-}
-
 int compare(const OptionSet& options, const CamSettings& settings, const CamOptions& cam,
             const Lens& lens) {
   const CutChoices choices = parse_choices(settings.compare, "--compare");
   const Console console(options.common().json, options.common().quiet);
   const Executor executor = options.executor();
-  announce(choices, cam, lens, executor.concurrency(), settings.folder(), console);
+  const WorkEstimate estimate =
+      require_room_for_comparison(lens, cam, choices, settings.folder(), executor.concurrency());
+  if (estimate.seconds > kWorthTelling) {
+    console.note("the comparison takes " + estimate_words(estimate));
+  }
   const InterruptWatch interrupt;
   const OutputFolder folder(settings.folder(), FolderLock::Kind::kExclusive);
   folder.remove_partial_files(is_name_of_cut);

@@ -152,11 +152,16 @@ DesignResult shape(bool quiet, const Executor& executor, const DesignOptions& de
   ProgressDisplay progress(quiet);
   const auto show = progress.sink();
   const RunControl control(stop, [&](const Progress& p) {
-    if (p.done > 0.0) std::call_once(begun, begin);
+    if (p.done > 0.0) {
+      std::call_once(begun, [&] {
+        progress.wipe();
+        begin();
+      });
+    }
     if (show) show(p);
   });
   DesignResult result = design_lens(target, design, executor, control);
-  std::call_once(begun, begin);
+  if (result.status != DesignResult::Status::kInterrupted) std::call_once(begun, begin);
   return result;
 }
 
@@ -189,16 +194,20 @@ int run(OptionSet& options, DesignSettings& settings) {
   }
   const ChosenDevice device = options.device_executor();
   const OutputFolder folder(settings.out, FolderLock::Kind::kExclusive);
+  if (EarlierDesign::in(settings.out) != earlier) {
+    throw InputError("--out " + settings.out +
+                     ": another command has changed what is in it; run the command again");
+  }
   const WorkEstimate expected =
       require_room_for_design(loaded.image.columns(), loaded.image.rows(), design,
                               device.executor.concurrency(), settings.out);
   design.checkpoint = folder.path() / lens_file::kCheckpoint;
   design.resume = settings.resume && earlier.checkpoint;
+  if (expected.seconds > kWorthTelling) console.note("takes " + estimate_words(expected));
   const auto begin = [&] {
     folder.remove_partial_files(is_of_lens);
     if (device.executor.device() != Device::kCpu) console.note("computing on " + device.word);
     for (const std::string& change : changes_made(loaded, settings)) console.note(change);
-    if (expected.seconds > kWorthTelling) console.note("takes " + estimate_words(expected));
     // A design that was killed before its first checkpoint starts at the beginning.
     if (settings.resume && !design.resume) {
       console.note("nothing to resume: started the design from the beginning");

@@ -20,6 +20,8 @@ struct EarlierDesign {
 
   /// Whether the lens is of the design with this fingerprint, finished or not.
   [[nodiscard]] bool is_of(const std::string& fingerprint) const;
+
+  friend bool operator==(const EarlierDesign&, const EarlierDesign&) = default;
 };
 
 /// @throw InputError if `folder` holds something that the design would replace and neither `resume`

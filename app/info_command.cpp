@@ -38,15 +38,12 @@ struct Description {
   }
 };
 
-std::string range_text(double low, double high) {
-  return fixed(low, 4) + " ... " + fixed(high, 4) + " mm";
-}
-
-void describe_extent(Description& d, const Eigen::AlignedBox3d& box) {
+/// @param unit  after a space, or empty.
+void describe_extent(Description& d, const Eigen::AlignedBox3d& box, const std::string& unit) {
   for (int k = 0; k < 3; ++k) {
     if (!(box.min()[k] <= box.max()[k])) continue;
     const std::string axis(1, "xyz"[k]);
-    d.line(axis, range_text(box.min()[k], box.max()[k]));
+    d.line(axis, fixed(box.min()[k], 4) + " ... " + fixed(box.max()[k], 4) + unit);
     d.json[axis] = {box.min()[k], box.max()[k]};
   }
 }
@@ -58,7 +55,7 @@ void describe_mesh(Description& d, const SurfaceMesh& mesh) {
   d.json["triangles"] = mesh.triangle_count();
   const Eigen::Vector3d low = mesh.vertices.rowwise().minCoeff();
   const Eigen::Vector3d high = mesh.vertices.rowwise().maxCoeff();
-  describe_extent(d, {low, high});
+  describe_extent(d, {low, high}, " mm");
 }
 
 void describe_setup(Description& d, const OpticalSetup& setup) {
@@ -111,7 +108,8 @@ Description describe_gcode(const fs::path& path) {
   d.json["header"] = summary.header;
   d.json["lines"] = summary.lines;
   d.json["moves"] = summary.moves;
-  describe_extent(d, summary.extent);
+  // Words as they stand: their unit and their zero are the program's.
+  describe_extent(d, summary.extent, " as written");
   return d;
 }
 
@@ -131,7 +129,8 @@ Description describe_solid(const fs::path& path, bool iges, const CommonOptions&
   d.json["valid"] = content.valid;
   d.json["closed"] = content.closed;
   d.json["volume_mm3"] = content.volume;
-  describe_extent(d, {Eigen::Vector3d(content.low.data()), Eigen::Vector3d(content.high.data())});
+  describe_extent(d, {Eigen::Vector3d(content.low.data()), Eigen::Vector3d(content.high.data())},
+                  " mm");
   return d;
 }
 

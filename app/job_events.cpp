@@ -44,7 +44,7 @@ nlohmann::json standing_json(const SendEvent& event, const JobView& view, double
                          {"position", list_of(event.position)},
                          {"feed", or_null(event.report.feed)},
                          {"rpm_asked", event.rpm_asked},
-                         {"rpm", event.rpm_measured},
+                         {"rpm", event.rpm_seen},
                          {"overrides", list_of(event.report.overrides)},
                          {"inputs", event.report.pins}};
   const auto& room = event.report.room;

@@ -37,7 +37,7 @@ std::string standing_text(const SendEvent& event) {
   std::string text = "carried out up to line " + std::to_string(event.executed) + ", " +
                      std::string(state_name(event.report.state));
   if (event.position) text.append(", ").append(position_text(*event.position));
-  return text + ", " + fixed(event.rpm_measured, 0) + " of " + fixed(event.rpm_asked, 0) + " rpm";
+  return text + ", " + fixed(event.rpm_seen, 0) + " of " + fixed(event.rpm_asked, 0) + " rpm";
 }
 
 /// Longest line, bytes: that of the options.

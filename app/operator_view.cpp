@@ -40,7 +40,8 @@ std::string machine_text(const SendEvent& event) {
   std::string text(state_name(event.report.state));
   if (event.position) text.append("  ").append(position_text(*event.position));
   if (event.report.feed) text += "  F" + rounded(*event.report.feed);
-  text += "  S" + rounded(event.rpm_asked) + " asked, " + rounded(event.rpm_measured) + " measured";
+  text += "  S" + rounded(event.rpm_asked) + " asked, " + rounded(event.rpm_seen) +
+          (event.rpm_is_measured ? " measured" : " reported");
   return text;
 }
 

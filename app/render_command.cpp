@@ -69,9 +69,9 @@ constexpr double kSolidPoints = 4e6;
 Scene load_solid(const std::string& source, const Executor& executor, const RunControl& control,
                  const Console& console) {
   SolidSurface solid = read_solid_surface(source, kSolidPoints, executor, control);
-  console.note(
-      std::to_string(solid.faces) + (solid.faces == 1 ? " face" : " faces") +
-      (solid.by_name ? " named \"optical surface\"" : " found by their shape: they look up"));
+  console.note(std::to_string(solid.faces) + (solid.faces == 1 ? " face" : " faces") +
+               (solid.by_name ? " named \"optical surface\""
+                              : " found by shape: the faces that point towards +z"));
   SampledSurface& samples = solid.samples;
   const RenderOptions render{SurfaceModel::kSmooth, setup_for_mesh(samples.mesh)};
   return {std::move(samples.mesh), std::move(samples.normals), render, {}};

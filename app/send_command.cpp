@@ -48,8 +48,9 @@ class JobConsole : public JobWatcher {
 
   void opened(const JobIdentity& program) override {
     const Warn warn = [this](const std::string& text) { console_.note(text); };
-    log_.emplace(settings_, warn);
+    // A log exists from its first line on: what cannot be watched must not leave an empty one.
     events_.emplace(settings_, warn);
+    log_.emplace(settings_, warn);
     log_->begin(options_, program);
   }
 

@@ -5,6 +5,7 @@
 #include <optional>
 #include <utility>
 
+#include "cam/contact/mould.h"
 #include "cam/post/program_writer.h"
 #include "core/error.h"
 #include "core/surface/surface_model.h"
@@ -47,21 +48,36 @@ auto in(At at, Member member) {
   return [ at, member ](auto& o) -> auto& { return std::invoke(member, at(o)); };
 }
 
-/// The diameter of a tool, whose flutes and neck keep their proportions.
+/// The diameter of a tool, whose flutes and neck keep their proportions; null where the workshop
+/// has no such tool, which a process that is left out may name.
 template <class At>
 Field diameter(const char* name, At tool, const char* help) {
   Field row = R::length(name, in(tool, &Tool::diameter), as_in_workshop("tool.diameter"), help);
+  row.get = [get = row.get](const O& o) {
+    try {
+      return get(o);
+    } catch (const InputError&) {
+      return nlohmann::json();
+    }
+  };
   row.set = [tool](O& o, const nlohmann::json& value) {
     tool(o) = resized(tool(o), value.get<double>());
   };
   return row;
 }
 
+/// A pitch that is given goes before one that would follow from a scallop.
+Field pitch_row() {
+  Field row = R::length("--pitch", in(kFinish, &FinishProcess::pitch),
+                        as_in_workshop("finish.pitch"), "maximum stepover between rows");
+  row.set = [](O& o, const nlohmann::json& value) { kFinish(o).set_pitch(value.get<double>()); };
+  return row;
+}
+
 OptionTable<O> tool_rows() {
   return {
       diameter("--tool-diameter", kBall, "finishing ball-end mill"),
-      R::length("--pitch", in(kFinish, &FinishProcess::pitch), as_in_workshop("finish.pitch"),
-                "maximum stepover between rows"),
+      pitch_row(),
       R::length("--scallop", in(kFinish, &FinishProcess::scallop), as_in_workshop("finish.scallop"),
                 "height of scallops; if above 0, the pitch follows from it"),
       R::number("--spindle", in(kBall, &Tool::spindle_rpm), as_in_workshop("tool.spindle_rpm"),
@@ -130,7 +146,7 @@ OptionTable<O> blank_rows() {
       R::word<PartKind>("--part", &O::part,
                         {{"lens", PartKind::kLens}, {"mould", PartKind::kMould}},
                         "mill the lens, or the mould to cast it in"),
-      R::number("--shrinkage", &O::shrinkage, Limits::between(0, cam_limit::kShrinkage), "",
+      R::number("--shrinkage", &O::shrinkage, Limits::between(0, kMaxShrinkage), "",
                 "shrinkage of the cast part, share of a length"),
       R::word<Surface>("--surface", &O::surface, surfaces(),
                        "cut what was designed, the smooth surface over the mesh, or its facets")};
@@ -174,7 +190,7 @@ OptionTable<O> program_rows() {
                {"one", ProgramGrouping::kAll}},
               "a file per operation, per tool, or one where the dialect changes tools"),
           split(),
-          R::number("--spin-up", &O::spin_up, Limits::between(0, cam_limit::kSpinUp), "s",
+          R::number("--spin-up", &O::spin_up, Limits::between(0, kMaxPause), "s",
                     "wait after spindle start"),
           R::word<Coolant>(
               "--coolant", &O::coolant,

@@ -65,8 +65,6 @@ struct CamOptions {
 
 /// Maximum or minimum of the options below; those of the workshop follow workshop_rule().
 namespace cam_limit {
-inline constexpr double kSpinUp = 3600.0;  ///< s
-inline constexpr double kShrinkage = 0.2;  ///< More than any casting resin loses.
 inline constexpr double kPolish =
     1.0;  ///< σ and depth at the rim, mm; beyond it no picture is left.
 inline constexpr double kMinRim = 1e-3;  ///< Of PolishModel::rim_length, mm.

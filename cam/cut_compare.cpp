@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "cam/cam_job.h"
+#include "cam/cut_estimate.h"
 #include "cam/job_files.h"
 #include "cam/report/report_html.h"
 #include "core/error.h"
@@ -86,9 +87,7 @@ std::vector<Choice> combinations(const CamOptions& options, const CutChoices& ch
       for (Tool& one : choice.options.workshop.tools) {
         if (one.number == finish.tool && one.diameter != tool) one = resized(one, tool);
       }
-      choice.options.workshop.process.finish.pitch = pitch;
-      // A pitch that is given goes before one that follows from a scallop.
-      if (!choices.pitches.empty()) choice.options.workshop.process.finish.scallop = 0.0;
+      if (!choices.pitches.empty()) choice.options.workshop.process.finish.set_pitch(pitch);
       all.push_back(std::move(choice));
     }
   }
@@ -130,14 +129,26 @@ CutChoices parse_choices(std::span<const std::string> words, const std::string& 
   return choices;
 }
 
+WorkEstimate require_room_for_comparison(const Lens& lens, const CamOptions& options,
+                                         const CutChoices& choices, const fs::path& folder,
+                                         int threads) {
+  WorkEstimate all;
+  for (const Choice& choice : combinations(options, choices)) {
+    validate(choice.options.workshop, "--compare");
+    const WorkEstimate one = estimate_cut(choice.options, lens.setup, threads);
+    require_room_for_cut(choice.options, lens.setup, one, folder);
+    all.seconds += one.seconds;
+    all.disk_bytes = std::max(all.disk_bytes, one.disk_bytes);
+    all.memory_bytes = std::max(all.memory_bytes, one.memory_bytes);
+  }
+  return all;
+}
+
 CutComparison compare_cuts(const Lens& lens, const CamOptions& options, const CutChoices& choices,
                            const fs::path& folder, const Executor& executor,
                            const RunControl& control) {
   const std::vector<Choice> all = combinations(options, choices);
-  for (const Choice& choice : all) {
-    validate(choice.options.workshop, "workshop");
-    validate(choice.options, lens.setup);
-  }
+  for (const Choice& choice : all) validate(choice.options, lens.setup);
   require_replaceable_cut(folder, {}, std::array{kComparePage}, options.force);
   CutComparison comparison;
   ReportData page;

@@ -10,6 +10,7 @@
 #include "cam/report/report_data.h"
 #include "core/compute/executor.h"
 #include "core/compute/run_control.h"
+#include "core/compute/work_estimate.h"
 #include "core/surface/lens.h"
 
 namespace lensforge {
@@ -37,12 +38,18 @@ struct CutComparison {
   std::filesystem::path page;         ///< What was written; empty unless complete.
 };
 
+/// What a comparison takes: one combination is worked on after the other.
+/// @throw InputError if an option breaks its rule in some combination, or disk or memory do not
+///        hold it.
+WorkEstimate require_room_for_comparison(const Lens& lens, const CamOptions& options,
+                                         const CutChoices& choices,
+                                         const std::filesystem::path& folder, int threads);
+
 /// Plans, times and predicts the finishing of every combination as make_cut() does, and ranks
 /// them. Programs are made in a folder of their own below `folder` and removed again. Roughing and
 /// semi-finishing are left out: they are the same for all.
 /// @throw InputError before any work if an option breaks its rule in some combination, or if there
-/// is
-///        a page already that is not ours, without CamOptions::force; RunError.
+///        is a page already that is not ours, without CamOptions::force; RunError.
 CutComparison compare_cuts(const Lens& lens, const CamOptions& options, const CutChoices& choices,
                            const std::filesystem::path& folder, const Executor& executor,
                            const RunControl& control);

@@ -156,8 +156,12 @@ void require_room_for_cut(const CamOptions& options, const OpticalSetup& setup,
   if (fineness(finish) > 1.0 && fitting > radius) {
     return require("tolerances this fine", "a larger --slope-tolerance or --tolerance would fit");
   }
-  require("--pitch " + shortest_text(pitch) + "mm",
-          "--pitch " + shortest_text(fitting) + "mm would fit");
+  const std::string stated = "--pitch " + shortest_text(pitch) + "mm";
+  if (fitting > 2.0 * radius) {
+    return require(stated, std::string("a larger tool") +
+                               (options.render ? " or --no-render" : "") + " needs less");
+  }
+  require(stated, "--pitch " + shortest_text(fitting) + "mm would fit");
 }
 
 }  // namespace lensforge

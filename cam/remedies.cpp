@@ -40,8 +40,7 @@ Change with_ball(const CamOptions& options, double diameter) {
 
 Change with_half_the_pitch(const CamOptions& options, double pitch) {
   Change change{joined({"a pitch of ", length_words(kHalf * pitch)}), options};
-  change.options.workshop.process.finish.pitch = kHalf * pitch;
-  change.options.workshop.process.finish.scallop = 0.0;
+  change.options.workshop.process.finish.set_pitch(kHalf * pitch);
   return change;
 }
 

@@ -9,9 +9,6 @@
 namespace lensforge {
 namespace {
 
-/// More than any casting resin loses.
-constexpr double kMaxShrinkage = 0.2;
-
 void validate(const MouldOptions& options) {
   if (!(options.shrinkage >= 0.0 && options.shrinkage <= kMaxShrinkage)) {
     throw InputError("mould shrinkage: " + decimal_text(options.shrinkage, 6) +

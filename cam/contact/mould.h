@@ -5,6 +5,9 @@
 
 namespace lensforge {
 
+/// More than any casting resin loses, share of a length.
+inline constexpr double kMaxShrinkage = 0.2;
+
 /// How a mould differs from the part that is cast from it.
 struct MouldOptions {
   double shrinkage = 0.0;  ///< Share of its size that the cast loses, in 0 … 0.2.

@@ -32,7 +32,7 @@ struct RowWay {
 
 struct FittedRow : RowWay {
   RowWay unrounded;             ///< The same moves before their numbers are rounded.
-  PathCertificate certificate;  ///< certify_row() of the rounded ones.
+  PathCertificate certificate;  ///< RowError::certificate() of the rounded ones.
 };
 
 /// Covers a row's drop curve with straight moves and arcs, greedily: from every end a move that

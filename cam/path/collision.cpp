@@ -143,7 +143,6 @@ void CollisionCheck::note(const Touch& touch) {
     first.tool = tool_->number;
     first.part = touch.part;
     first.obstacle = touch.obstacle;
-    first.first_move = move_;
     first.first_place = touch.place;
     collisions_.push_back(first);
     last_move_.push_back(-1);

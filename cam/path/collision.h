@@ -25,7 +25,6 @@ struct Collision {
   std::string part;             ///< "cutter", "tool above its flutes", "section of 4 mm"
   std::string obstacle;         ///< "the lens", "the blank", kTable, "the keep-out box 'vice'"
   std::int64_t moves = 0;       ///< How many moves touch it.
-  std::int64_t first_move = 0;  ///< The first of them, counted from 0 in its operation.
   Eigen::Vector3d first_place;  ///< Tip, mm, lens frame.
   Extreme worst;                ///< How much too low the tool is at most, mm, and where.
 

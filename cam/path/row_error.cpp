@@ -156,15 +156,4 @@ PathCertificate RowError::certificate() const {
   return certificate;
 }
 
-PathCertificate certify_row(const RowProfile& profile, const Eigen::Vector2d& start,
-                            std::span<const RowMove> moves) {
-  RowError error(profile);
-  Eigen::Vector2d at = start;
-  for (const RowMove& move : moves) {
-    error.add(at, move);
-    at = move.end;
-  }
-  return error.certificate();
-}
-
 }  // namespace lensforge

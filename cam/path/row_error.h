@@ -73,10 +73,6 @@ class RowError {
   std::size_t hint_ = 0;
 };
 
-/// What is known of a row of moves from `start` on, against the drop curve; places in (u, z, 0).
-PathCertificate certify_row(const RowProfile& profile, const Eigen::Vector2d& start,
-                            std::span<const RowMove> moves);
-
 /// The move as a curve u → z between start and end.
 CurvePiece move_curve(const Eigen::Vector2d& start, const RowMove& move);
 

@@ -131,7 +131,6 @@ void ReadingCollector::take(const ProgramLine& line) {
 void ReadingCollector::take_motion(const GcodeMotion& motion) {
   ++reading_.motions;
   if (motion.rapid) {
-    reading_.rapids.extend(motion.end);
     reading_.rapid_length += motion.length();
     return;
   }

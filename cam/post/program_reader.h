@@ -36,7 +36,6 @@ void walk_program(const std::filesystem::path& path, const GcodeDialect& dialect
 /// What a whole program says; program coordinates, mm. Motions by G28 and G30 count nowhere.
 struct ProgramReading {
   Eigen::AlignedBox3d cutting;  ///< Of all motions at feed, arcs over their whole length.
-  Eigen::AlignedBox3d rapids;   ///< Of all ends of rapids.
   double cutting_length = 0.0;
   double rapid_length = 0.0;
   std::int64_t lines = 0;

@@ -21,7 +21,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kEarlySplit = 0.9;  ///< Share of the limit from which a rapid is a place to split.
-constexpr double kMaxSeconds = 3600.0;
 
 void require(bool holds, const char* what, double value, const std::string& rule) {
   if (!holds) throw InputError(std::string(what) + ": " + shortest_text(value) + " " + rule);
@@ -222,9 +221,9 @@ void validate(const ProgramSettings& settings, const PostDescription& post) {
           settings.blend_tolerance, "is not between 0 and 1 mm");
   require(settings.chord_tolerance > 0.0 && settings.chord_tolerance <= 1.0, "chord tolerance",
           settings.chord_tolerance, "is not above 0 and at most 1 mm");
-  require(settings.spin_up >= 0.0 && settings.spin_up <= kMaxSeconds, "spin-up", settings.spin_up,
+  require(settings.spin_up >= 0.0 && settings.spin_up <= kMaxPause, "spin-up", settings.spin_up,
           "is not between 0 and 3600 s");
-  require(settings.tool_change >= 0.0 && settings.tool_change <= kMaxSeconds, "tool change",
+  require(settings.tool_change >= 0.0 && settings.tool_change <= kMaxPause, "tool change",
           settings.tool_change, "is not between 0 and 3600 s");
   require(settings.largest_file == 0 || settings.largest_file >= kSmallestProgramLimit,
           "largest file", static_cast<double>(settings.largest_file),
@@ -273,23 +272,6 @@ std::vector<fs::path> programs_in_the_way(const ProgramPlan& plan, const PostDes
   }
   std::sort(found.begin(), found.end());
   return found;
-}
-
-ProgramFiles write_programs(const ProgramPlan& plan, const PostDescription& post,
-                            const ProgramSettings& settings, const fs::path& folder,
-                            const RunControl& control) {
-  PendingPrograms pending(plan, post, settings, folder, control);
-  const std::vector<fs::path> before = programs_in_the_way(plan, post, settings, folder);
-  pending.publish();
-  for (const fs::path& path : before) {
-    const auto same = [&](const ProgramFile& file) { return file.path == path; };
-    const auto& files = pending.programs().files;
-    std::error_code error;
-    const bool written = std::any_of(files.begin(), files.end(), same);
-    if (written || !fs::is_regular_file(path, error)) continue;
-    if (check_seal(path) == true) fs::remove(path, error);
-  }
-  return pending.programs();
 }
 
 }  // namespace lensforge

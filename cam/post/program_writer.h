@@ -56,8 +56,8 @@ struct ProgramFiles {
 class PendingPrograms {
  public:
   /// @throw InputError naming what, value and rule for bad settings, or a description whose
-  /// programs
-  ///        cannot be read back; Interrupted; RunError if files cannot be written (disk full, …).
+  ///        programs cannot be read back; Interrupted; RunError if files cannot be written (disk
+  ///        full, …).
   PendingPrograms(const ProgramPlan& plan, const PostDescription& post,
                   const ProgramSettings& settings, const std::filesystem::path& folder,
                   const RunControl& control);
@@ -70,17 +70,14 @@ class PendingPrograms {
   std::vector<PendingFile> pending_;  ///< One a file.
 };
 
-/// Writes a plan and publishes it; parts of an earlier program of the same name that are as they
-/// were written (check_seal()) are removed. @throw as PendingPrograms
-ProgramFiles write_programs(const ProgramPlan& plan, const PostDescription& post,
-                            const ProgramSettings& settings, const std::filesystem::path& folder,
-                            const RunControl& control);
-
 /// What stands in `folder` under names that a plan's programs, or parts of them, may get.
 std::vector<std::filesystem::path> programs_in_the_way(const ProgramPlan& plan,
                                                        const PostDescription& post,
                                                        const ProgramSettings& settings,
                                                        const std::filesystem::path& folder);
+
+/// Longest spin-up or tool change, s.
+inline constexpr double kMaxPause = 3600.0;
 
 /// @throw InputError naming what, value and rule.
 void validate(const ProgramSettings& settings, const PostDescription& post);

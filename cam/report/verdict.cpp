@@ -19,6 +19,7 @@ Verdict judge_cut(const CutFindings& findings, const CutLimits& limits) {
     const char* unit;
     double scale;
     int decimals;
+    bool of_quality = true;
   };
   constexpr Shown kPercent{"%", 100.0, 2};
   constexpr Shown kMicrometres{"µm", 1000.0, 2};
@@ -30,20 +31,20 @@ Verdict judge_cut(const CutFindings& findings, const CutLimits& limits) {
                        ": must be at least 0");
     }
     if (!value) return;
-    verdict.checks.push_back(
-        {key, name, shown.scale * *value, shown.scale * limit, shown.unit, shown.decimals});
+    verdict.checks.push_back({key, name, shown.scale * *value, shown.scale * limit, shown.unit,
+                              shown.decimals, shown.of_quality});
   };
   check("leakage", "leakage", findings.leakage, limits.leakage, kPercent);
   check("dark_flux", "light in dark parts", findings.dark_flux, limits.dark_flux, kPercent);
   check("mae_increase", "picture error (MAE) added", findings.mae_increase, limits.mae_increase,
         {"", 1.0, 4});
-  check("gouge", "deepest gouge", findings.gouge, limits.gouge, kMicrometres);
+  check("gouge", "deepest gouge", findings.gouge, limits.gouge, {"µm", 1000.0, 2, false});
   check("excess", "material left by the path", findings.excess, limits.excess, kMicrometres);
   check("slope", "error of the path's direction", findings.slope, limits.slope, {"mrad", 1e3, 2});
   check("fillet_depth", "deepest groove not cleared", findings.fillet_depth, limits.fillet_depth,
         kMicrometres);
   check("block_rate", "lines per second for the controller", findings.block_rate, limits.block_rate,
-        {"lines/s", 1.0, 0});
+        {"lines/s", 1.0, 0, false});
   return verdict;
 }
 

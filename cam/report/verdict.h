@@ -38,9 +38,10 @@ struct LimitCheck {
   std::string key;   ///< As in CutLimits.
   std::string name;  ///< In words.
   double value = 0.0;
-  double limit = 0.0;  ///< The value may be at most this.
-  std::string unit;    ///< "%", "µm", "mrad", "lines/s" or none.
-  int decimals = 0;    ///< That are shown.
+  double limit = 0.0;       ///< The value may be at most this.
+  std::string unit;         ///< "%", "µm", "mrad", "lines/s" or none.
+  int decimals = 0;         ///< That are shown.
+  bool of_quality = false;  ///< Not of safety: a default limit is advice.
 
   /// A value that is no number does not pass.
   [[nodiscard]] bool passes() const { return value <= limit; }

@@ -31,12 +31,6 @@ std::vector<CutterProfile> whole_profile(const Tool& tool) {
   return parts;
 }
 
-double silhouette_height(const Tool& tool, double d) {
-  double lowest = std::numeric_limits<double>::infinity();
-  for (const CutterProfile& part : whole_profile(tool)) lowest = std::min(lowest, part.height(d));
-  return lowest;
-}
-
 double widest_below(const Tool& tool, double height) {
   double widest = 0.0;
   for (const CutterProfile& part : whole_profile(tool)) {

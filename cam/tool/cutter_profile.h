@@ -43,10 +43,6 @@ std::vector<CutterProfile> shank_profiles(const Tool& tool);
 /// cutting_profile() and shank_profiles() together.
 std::vector<CutterProfile> whole_profile(const Tool& tool);
 
-/// Height of the whole tool's lower silhouette above its tip at distance d ≥ 0 from the axis, mm;
-/// infinite beyond its widest part.
-double silhouette_height(const Tool& tool, double d);
-
 /// Distance from the axis that the tool fills somewhere below `height` above its tip, mm.
 double widest_below(const Tool& tool, double height);
 

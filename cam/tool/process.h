@@ -66,6 +66,12 @@ struct FinishProcess {
   bool cross = false;   ///< A second raster along the other axis.
   bool pencil = false;  ///< A pass along concave creases.
 
+  /// Passes `mm` apart, whatever scallops they leave.
+  void set_pitch(double mm) {
+    pitch = mm;
+    scallop = 0.0;
+  }
+
   friend bool operator==(const FinishProcess&, const FinishProcess&) = default;
 };
 

@@ -102,7 +102,8 @@ void check_process(const Rules& rules, const Workshop& workshop) {
     rules.hold(semi.allowance <= rough.allowance, "semi.allowance", semi.allowance,
                "must not be above that of roughing, " + shortest_text(rough.allowance) + " mm");
   }
-  check_step(rules, workshop, {"finish", "pitch", finish.tool, finish.pitch});
+  const double pitch = finish.scallop > 0.0 ? 0.0 : finish.pitch;  // Unused beside a scallop.
+  check_step(rules, workshop, {"finish", "pitch", finish.tool, pitch});
   const Tool& ball = workshop.tool(finish.tool);
   rules.hold(ball.shape == CutterShape::kBall, "finish.tool", finish.tool,
              "the finishing tool has to be a ball");
@@ -195,14 +196,16 @@ void validate(const Workshop& workshop, const std::string& file) {
 }
 
 Tool resized(Tool tool, double diameter) {
-  const double scale = diameter / tool.diameter;
+  const double before = tool.diameter;
+  const double scale = diameter / before;
+  double lift = (scale - 1.0) * tool.flute_length;
   tool.diameter = diameter;
   tool.corner_radius *= scale;
   tool.flute_length *= scale;
   tool.name = "diameter as given";
-  double lift = 0.0;
   for (ToolSection& section : tool.sections) {
-    if (&section == &tool.sections.front()) {
+    const bool neck = &section == &tool.sections.front() && section.diameter <= before;
+    if (neck) {
       lift = (scale - 1.0) * section.to;
       section = {scale * section.diameter, scale * section.from, scale * section.to};
     } else {

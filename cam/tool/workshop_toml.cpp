@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
-#include <charconv>
 #include <initializer_list>
 #include <optional>
 #include <string>
@@ -10,6 +9,7 @@
 
 #include "cam/tool/workshop.h"
 #include "core/error.h"
+#include "core/text/number_text.h"
 #include "core/text/toml_fields.h"
 
 // Each describe() below lists the keys of one table, once, for the reader and the writer: key,
@@ -104,13 +104,6 @@ class Reader {
   TomlFields fields_;
 };
 
-std::string shortest(double value) {
-  char text[32];
-  const auto [end, error] = std::to_chars(text, text + sizeof text, value);
-  LF_CHECK(error == std::errc(), std::to_string(value));
-  return {text, end};
-}
-
 std::string quoted(const std::string& value) {
   std::string text = "\"";
   for (const char c : value) {
@@ -129,7 +122,7 @@ class Writer {
     line(key, quoted(value), says);
   }
   void number(const NumberRule& rule, double value, const char* says) {
-    line(rule.key, shortest(value), says);
+    line(rule.key, shortest_text(value), says);
   }
   void needed(const NumberRule& rule, double value, const char* says) { number(rule, value, says); }
   void stated(const NumberRule& rule, double value, const char* says) {
@@ -187,8 +180,9 @@ class RangeCheck {
   void text(const std::string& /*key*/, const std::string& /*value*/, const char* /*says*/) {}
   void number(const NumberRule& rule, double value, const char* /*says*/) {
     if (value >= rule.least && value <= rule.most) return;  // NaN is not.
-    throw InputError(file_ + ": " + prefix_ + rule.key + ": " + shortest(value) + ": must be in " +
-                     shortest(rule.least) + " to " + shortest(rule.most));
+    throw InputError(file_ + ": " + prefix_ + rule.key + ": " + shortest_text(value) +
+                     ": must be in " + shortest_text(rule.least) + " to " +
+                     shortest_text(rule.most));
   }
   void needed(const NumberRule& rule, double value, const char* says) { number(rule, value, says); }
   void stated(const NumberRule& rule, double value, const char* says) {
@@ -315,7 +309,7 @@ void describe(Visitor& v, Tool& tool) {
   v.word("shape", tool.shape, "ball, bull or flat");
   v.needed({"diameter", kMinDiameter, 100.0}, tool.diameter, "mm");
   v.number({"corner_radius", 0.0, 50.0}, tool.corner_radius, "mm, of a bull");
-  v.whole({"teeth", 1, 100}, tool.teeth, "");
+  v.whole({"teeth", 1, 100}, tool.teeth, "for the report");
   v.needed({"flute_length", kMinLength, kBlank}, tool.flute_length,
            "mm above the tip that cut; above it nothing may touch material");
   v.number({"spindle_rpm", 1.0, kSpin}, tool.spindle_rpm, "");

@@ -158,7 +158,9 @@ template <class Options>
 void require_limits(const OptionTable<Options>& table, const Options& options) {
   for (const OptionField<Options>& field : table) {
     if (!field.is_number()) continue;
-    const auto value = field.get(options).template get<double>();
+    const nlohmann::json stated = field.get(options);
+    if (stated.is_null()) continue;
+    const auto value = stated.template get<double>();
     field.require(number_text(value), value);
   }
 }

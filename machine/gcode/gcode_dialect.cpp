@@ -33,7 +33,6 @@ GcodeDialect grblhal_dialect() {
   dialect.max_characters = 255;
   dialect.tool_change = true;
   dialect.mist = true;
-  dialect.refuses_after_error = true;
   dialect.rx_bytes = 1024;
   dialect.planner_blocks = 35;
   dialect.lines_per_second = 4000.0;  // A 32-bit board.

@@ -17,7 +17,6 @@ struct GcodeDialect {
   bool tool_change = false;          ///< T and M6.
   int max_tool = 0;                  ///< Largest number of T, and of H where it is known.
   bool mist = false;                 ///< M7; Grbl has it only where built so ([OPT: says M).
-  bool refuses_after_error = false;  ///< Until an empty line, every line is answered by the error.
   std::size_t rx_bytes = 0;          ///< Usual size of the receive buffer.
   int planner_blocks = 0;            ///< Usual number of motions it looks ahead.
   double lines_per_second = 0.0;     ///< Short moves a usual board takes in; 0 if it reads files.

@@ -341,7 +341,6 @@ class BlockRun {
     const auto word = words_[ModalGroup::kStop];
     if (!word) return;
     effect_.pauses = *word == 0;
-    effect_.optional_stop = *word == 10;
     effect_.ends = *word == 20 || *word == 300;
     if (effect_.ends) reset_modes();
   }

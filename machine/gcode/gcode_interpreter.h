@@ -20,7 +20,6 @@ class GcodeEffect {
   bool spindle_changed = false;    ///< M3, M4, M5 or S: a word stood, whether or not it changes.
   double dwell = 0.0;              ///< G4, s.
   bool pauses = false;             ///< M0
-  bool optional_stop = false;      ///< M1: Grbl goes on, grblHAL stops where a switch says so.
   bool ends = false;               ///< M2, M30, or the second %.
 
   /// None, one, or two for G28 and G30 by way of a point.

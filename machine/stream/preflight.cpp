@@ -103,8 +103,7 @@ void check_reports(const ControllerInfo& info, Findings& found) {
   if (!info.line_numbers) {
     found.warnings.push_back(
         "the controller does not report line numbers (Ln:): the last line carried out is only "
-        "known "
-        "to " +
+        "known to " +
         std::to_string(info.planner_blocks + LineTracker::kStepLag + 1) + " motions");
   }
 }

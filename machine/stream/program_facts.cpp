@@ -80,9 +80,6 @@ class Examiner {
     ++facts_.motions;
     model_.add(motion);
     const Eigen::AlignedBox3d box = motion.bounds();
-    if (facts_.extent.isEmpty() || box.min().z() < facts_.extent.min().z()) {
-      facts_.lowest_line = motion.line;
-    }
     facts_.extent.extend(box);
     if (motion.rapid) {
       facts_.rapid_z = std::max(facts_.rapid_z, motion.end.z());

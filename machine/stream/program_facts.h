@@ -25,7 +25,6 @@ struct ProgramFacts {
   bool inches = false;             ///< G20 stands somewhere.
   Eigen::AlignedBox3d extent;      ///< Of all motions.
   Eigen::AlignedBox3d cut_extent;  ///< Of those at feed.
-  std::int64_t lowest_line = 0;    ///< Where Z is lowest.
   double top_feed = 0.0;           ///< mm/min
   std::int64_t top_feed_line = 0;
   double top_rpm = 0.0;

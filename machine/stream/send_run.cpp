@@ -245,11 +245,17 @@ void SendRun::tell(SendEventKind kind, const std::string& message) {
   event.byte = tracker_.offset();
   const SpindleOrder& order = state_.spindle.order;
   event.rpm_asked = order.turning() ? order.rpm : 0.0;
-  event.rpm_measured =
-      rules_.guarded ? state_.guard.report.rpm : state_.status.report.spindle_rpm.value_or(0.0);
+  event.rpm_seen = rpm_seen();
+  event.rpm_is_measured = rules_.guarded || state_.status.report.measured_rpm.has_value();
   event.seconds = parts_.clock.now() - state_.started;
   event.message = message;
   control_.watch(event);
+}
+
+double SendRun::rpm_seen() const {
+  if (rules_.guarded) return state_.guard.report.rpm;
+  const StatusReport& report = state_.status.report;
+  return report.measured_rpm.value_or(report.spindle_rpm.value_or(0.0));
 }
 
 JobProgress SendRun::progress() const {
@@ -262,7 +268,7 @@ JobProgress SendRun::progress() const {
   at.state = state_name(state_.status.report.state);
   at.position = state_.status.position;
   at.spindle = rules_.guarded ? spindle_state_name(guard.spindle) : "as reported";
-  at.rpm = rules_.guarded ? guard.rpm : state_.status.report.spindle_rpm.value_or(0.0);
+  at.rpm = rpm_seen();
   return at;
 }
 

@@ -40,6 +40,7 @@ class SendRun {
   void note(const std::string& text);
   void tell(SendEventKind kind, const std::string& message);
   [[nodiscard]] JobProgress progress() const;
+  [[nodiscard]] double rpm_seen() const;
 
   // send_end.cpp
   SendResult end(SendStatus status, StopCause cause, std::string reason);

@@ -23,6 +23,9 @@ constexpr double kAskAgain = 1.0;
 constexpr double kStatusPause = 0.2;
 /// How far the controller's own report of the speed may be off; it rounds to whole rpm.
 constexpr double kSpeedTolerance = 0.01;
+/// Share of the speed asked for that an encoder's reading may be off, and what it shows at rest.
+constexpr double kMeasuredTolerance = 0.05;
+constexpr double kAtRestRpm = 10.0;
 /// A position that differs by more is motion, mm.
 constexpr double kMotion = 1e-4;
 constexpr double kPercent = 0.01;
@@ -38,8 +41,11 @@ std::string line_words(std::int64_t line) {
 /// What a controller without a guard beside it tells of its spindle. Nothing: it tells too little.
 std::optional<bool> reported_spindle(const StatusReport& report, const SpindleOrder& order) {
   const double share = report.overrides ? kPercent * report.overrides->z() : 1.0;
+  const double wanted = order.turning() ? order.rpm * share : 0.0;
+  if (report.measured_rpm) {
+    return std::abs(*report.measured_rpm - wanted) <= kMeasuredTolerance * wanted + kAtRestRpm;
+  }
   if (report.spindle_rpm) {
-    const double wanted = order.turning() ? order.rpm * share : 0.0;
     return std::abs(*report.spindle_rpm - wanted) <= kSpeedTolerance * wanted + 1.0;
   }
   if (report.accessories) {

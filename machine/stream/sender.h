@@ -66,9 +66,10 @@ struct SendEvent {
   std::int64_t executed = 0;
   std::int64_t byte = 0;  ///< Offset behind the acknowledged line.
   double rpm_asked = 0.0;
-  double rpm_measured = 0.0;  ///< Of the guard, or what the controller reports.
-  double seconds = 0.0;       ///< Since the job began.
-  std::string message;        ///< A sentence for the operator, or empty.
+  double rpm_seen = 0.0;         ///< Of the guard, or what the controller reports.
+  bool rpm_is_measured = false;  ///< By the guard or an encoder; else what was commanded.
+  double seconds = 0.0;          ///< Since the job began.
+  std::string message;           ///< A sentence for the operator, or empty.
 };
 
 /// The caller's end of a running job.

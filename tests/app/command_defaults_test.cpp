@@ -97,12 +97,24 @@ TEST(CommandDefaults, WhatIsGivenWinsOverTheWorkshop) {
   settle(options, settings);
   const Process& process = settings.cam.workshop.process;
   EXPECT_EQ(process.finish.pitch, 0.1);
-  EXPECT_EQ(process.finish.scallop, 0.001);
+  EXPECT_EQ(process.finish.scallop, 0.0) << "the pitch that is given would be ignored";
   EXPECT_FALSE(process.rough.enabled);
   EXPECT_EQ(settings.cam.workshop.tool(process.finish.tool),
             resized(Workshop{}.tool(process.finish.tool), 0.8));
   EXPECT_EQ(options.used()["pitch"], 0.1);
-  EXPECT_EQ(options.used()["scallop"], 0.001);
+  EXPECT_EQ(options.used()["scallop"], 0.0);
+}
+
+TEST(CommandDefaults, AWorkshopNeedsNoToolForWhatIsLeftOut) {
+  CamOptions cam;
+  std::erase_if(cam.workshop.tools,
+                [&](const Tool& tool) { return tool.number != cam.workshop.process.finish.tool; });
+  cam.workshop.process.rough.enabled = false;
+  cam.workshop.process.semi.enabled = false;
+  EXPECT_NO_THROW(validate(cam, OpticalSetup{}));
+  for (const OptionField<CamOptions>& row : cam_fields()) {
+    EXPECT_EQ(row.get(cam).is_null(), row.name == "--rough-tool") << row.name;
+  }
 }
 
 TEST(CommandDefaults, FactorsOnTheSmoothnessWorkInTheLibrary) {

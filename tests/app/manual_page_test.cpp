@@ -44,7 +44,7 @@ TEST(ManualPage, HasEveryOptionAsTheTablesHaveIt) {
 TEST(ManualPage, HelpAndManualHaveTheSameOptions) {
   for (const char* command : {"design", "render", "cam", "export", "send"}) {
     const std::string help = printed({command, "--help"});
-    const std::string manual = printed({command, "--help-man"});
+    const std::string manual = "\n" + printed({command, "--help-man"});
     for (std::size_t at = manual.find("\n.It Fl -"); at != std::string::npos;
          at = manual.find("\n.It Fl -", at + 1)) {
       const std::size_t name = at + std::string("\n.It Fl -").size();

@@ -7,6 +7,7 @@
 #include "app/exit_code.h"
 #include "app/option_set.h"
 #include "cam/cam_fields.h"
+#include "cam/cam_options.h"
 #include "core/error.h"
 #include "core/text/number_text.h"
 #include "design/design_fields.h"
@@ -64,26 +65,40 @@ TEST(OptionLimits, AreEnforcedByEveryCommandForEveryNumber) {
   expect_limits_enforced({"send", "none.ngc", "--dry-run"}, send_fields());
 }
 
-/// The library refuses what the command refuses.
-template <class Options>
-void expect_library_refuses(const OptionTable<Options>& table) {
+/// The library's own check refuses what the command refuses.
+/// @param usual  accepted by `check`.
+template <class Options, class Check>
+void expect_library_refuses(const OptionTable<Options>& table, const Options& usual,
+                            const Check& check) {
+  EXPECT_NO_THROW(check(usual));
   for (const OptionField<Options>& row : table) {
     if (!row.is_number() || row.name == "--tool-diameter" || row.name == "--rough-tool") continue;
     for (const double value : outside(row)) {
-      Options options;
+      Options options = usual;
       row.set(options, row.kind == OptionKind::kWhole ? nlohmann::json(std::llround(value))
                                                       : nlohmann::json(value));
-      EXPECT_THROW(require_limits(table, options), InputError) << row.name << " " << value;
+      EXPECT_THROW(check(options), InputError) << row.name << " " << value;
     }
   }
 }
 
 TEST(OptionLimits, AreThoseOfTheLibraries) {
-  expect_library_refuses(design_fields());
-  expect_library_refuses(weight_fields());
-  expect_library_refuses(export_fields());
-  expect_library_refuses(send_fields());
-  expect_library_refuses(cam_fields());
+  const Image picture(256, 8, 0.5F);
+  const auto design = [&](const DesignOptions& options) { validate(options, picture); };
+  expect_library_refuses(design_fields(), DesignOptions{}, design);
+  expect_library_refuses(weight_fields(), ObjectiveWeights{}, [&](const ObjectiveWeights& weights) {
+    DesignOptions options;
+    options.weights = weights;
+    design(options);
+  });
+  expect_library_refuses(export_fields(), ExportOptions{},
+                         [](const ExportOptions& options) { validate(options, "lens.step"); });
+  SendOptions sending;
+  sending.port = "sim:grbl";
+  expect_library_refuses(send_fields(), sending,
+                         [](const SendOptions& options) { validate(options); });
+  expect_library_refuses(cam_fields(), CamOptions{},
+                         [](const CamOptions& options) { validate(options, OpticalSetup{}); });
 }
 
 TEST(OptionLimits, DefaultsKeepThem) {

@@ -8,13 +8,14 @@
 #include <span>
 #include <vector>
 
-#include "cam/post/program_writer.h"
+#include "cam/post_plans.h"
 #include "core/temp_folder.h"
 
 namespace lensforge {
 namespace {
 
 using lensforge::testing::TempFolder;
+using lensforge::testing::write_programs;
 
 constexpr std::int64_t kMovesOfRow = 2000;
 

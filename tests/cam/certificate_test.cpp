@@ -9,10 +9,12 @@
 
 #include "cam/adversarial_meshes.h"
 #include "cam/path/arc_fit.h"
-#include "cam/path/row_error.h"
+#include "cam/row_certificate.h"
 
 namespace lensforge {
 namespace {
+
+using lensforge::testing::certify_row;
 
 constexpr double kRadius = 0.2;
 

@@ -18,6 +18,7 @@
 #include "cam/cam_meshes.h"
 #include "cam/cut_estimate.h"
 #include "core/error.h"
+#include "core/stop_bound.h"
 #include "core/temp_folder.h"
 
 namespace lensforge {
@@ -35,7 +36,6 @@ const std::vector<double> kExtremes{0.0,   -1.0,   1e-300,       1e-9,      1e9,
 
 /// How long a job may run before it is stopped, and how long that may take.
 constexpr milliseconds kTime{40};
-constexpr milliseconds kStop{1500};
 
 CamOptions coarse() {
   CamOptions options;
@@ -68,7 +68,8 @@ bool refused(const CamOptions& options, const std::string& what) {
   } catch (const InputError&) {
     refusal = true;
   }
-  EXPECT_LT(std::chrono::steady_clock::now() - start, kTime + kStop) << what;
+  EXPECT_LT(std::chrono::steady_clock::now() - start, kTime + lensforge::testing::kStopBound)
+      << what;
   return refusal;
 }
 

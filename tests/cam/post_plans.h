@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <filesystem>
 #include <sstream>
 #include <string>
 #include <utility>
@@ -82,6 +83,15 @@ inline std::string post_text_with(const std::string& from, const std::string& to
   const std::size_t at = text.find(from);
   if (at == std::string::npos) throw std::runtime_error("no such text: " + from);
   return text.replace(at, from.size(), to);
+}
+
+/// Writes and publishes.
+inline ProgramFiles write_programs(const ProgramPlan& plan, const PostDescription& post,
+                                   const ProgramSettings& settings,
+                                   const std::filesystem::path& folder, const RunControl& control) {
+  PendingPrograms pending(plan, post, settings, folder, control);
+  pending.publish();
+  return pending.programs();
 }
 
 }  // namespace lensforge::testing

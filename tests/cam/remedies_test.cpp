@@ -13,6 +13,7 @@
 #include "cam/cam_meshes.h"
 #include "cam/finish_setup.h"
 #include "cam/milled/designed_field.h"
+#include "cam/post_plans.h"
 #include "cam/prediction.h"
 #include "cam/report/leak_words.h"
 #include "cam/tool/standard_balls.h"
@@ -22,6 +23,7 @@ namespace lensforge {
 namespace {
 
 using lensforge::testing::TempFolder;
+using lensforge::testing::write_programs;
 using ::testing::ElementsAre;
 
 /// A lens with a groove along y, whose light leaves a gap on the wall.
@@ -49,10 +51,10 @@ CamOptions facets_polished() {
   return options;
 }
 
-/// A cut and what is foretold of it, with all that trials need.
-class Foretold {
+/// A cut and the prediction of it, with all that trials need.
+class Predicted {
  public:
-  Foretold(Lens lens, const CamOptions& options)
+  Predicted(Lens lens, const CamOptions& options)
       : lens_(std::move(lens)),
         options_(options),
         plan_(lens_, options_, Executor::cpu(2)),
@@ -99,7 +101,7 @@ TEST(TrialCut, WithNothingChangedLeaksWhatWasPredicted) {
     options.shrinkage = lens ? 0.0 : 0.004;
     options.workshop.process.finish.cross = lens;
     options.workshop.process.finish.pencil = lens;
-    const Foretold cut(grooved_lens(), options);
+    const Predicted cut(grooved_lens(), options);
     ASSERT_FALSE(cut.prediction().places.empty());
     const LeakPlace& place = cut.prediction().places[0];
     ASSERT_GT(place.leakage, 1e-4);
@@ -113,7 +115,7 @@ TEST(TrialCut, WithNothingChangedLeaksWhatWasPredicted) {
 /// A place in the middle, beside which the lens goes on.
 TEST(TrialCut, OfAPartOfTheLensLeaksAsThatPartDoes) {
   const CamOptions options = facets_polished();
-  const Foretold cut(grooved_lens(), options);
+  const Predicted cut(grooved_lens(), options);
   const FieldRenderSetup setup{cut.site().lens.setup,
                                lens_grid({3.0, 2.0}, sample_spacing(options))};
   LeakPlace place = cut.prediction().places[0];
@@ -173,7 +175,7 @@ TEST(Remedies, SmallerBallsAreTriedUntilTheLeakIsHalved) {
 TEST(Remedies, EveryCauseHasOneOfItsOwn) {
   CamOptions options = facets_polished();
   options.decimals = 5;
-  const Foretold cut(grooved_lens(), options);
+  const Predicted cut(grooved_lens(), options);
   std::vector<LeakPlace> places;
   for (const char* cause :
        {leak_cause::kPolish, leak_cause::kScallop, leak_cause::kChord, leak_cause::kDecimals}) {

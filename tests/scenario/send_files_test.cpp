@@ -43,6 +43,15 @@ TEST_F(SendFiles, AreNeverMadeOfWhatIsSomebodyElses) {
   }
 }
 
+TEST_F(SendFiles, ThatAreRefusedDoNotSpoilTheLog) {
+  write(at("other"), "notes\n");
+  expect_refusal(send({"--port", "sim:", "--events", path("other")}), 2, {"other: exists"});
+  const Outcome outcome = run({"send", path("job.ngc"), "--port", "sim:"});
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_THAT(outcome.err, ::testing::Not(HasSubstr("no log")));
+  EXPECT_THAT(content(at("job.ngc.log")), HasSubstr("end: done"));
+}
+
 TEST_F(SendFiles, BesideAProgramAreLeftAloneWhereTheyAreSomebodyElses) {
   write(at("job.ngc.log"), "my notes\n");
   const Outcome outcome = run({"send", path("job.ngc"), "--port", "sim:"});

@@ -31,7 +31,7 @@ TEST_F(SendOperator, SeesWhatTheMachineDoes) {
   ASSERT_TRUE(mill.cut(100));
   EXPECT_TRUE(process.shows("Run  X-19"));
   EXPECT_EQ(process.wait(), 0);
-  for (const char* part : {" %  line ", " of 178  ", " left", "S12000 asked, 12000 measured",
+  for (const char* part : {" %  line ", " of 178  ", " left", "S12000 asked, 12000 reported",
                            "buffers planner ", "/15, receive ", "/128"}) {
     EXPECT_THAT(process.screen(), HasSubstr(part));
   }

@@ -10,9 +10,12 @@
 
 #include "cam/adversarial_meshes.h"
 #include "cam/contact/cut_surface.h"
+#include "cam/row_certificate.h"
 
 namespace lensforge {
 namespace {
+
+using lensforge::testing::certify_row;
 
 constexpr double kRadius = 0.2;
 

@@ -91,7 +91,6 @@ TEST(Collision, FindsTheToolAboveItsFlutes) {
   EXPECT_EQ(found[0].obstacle, "the blank");
   EXPECT_NEAR(found[0].worst.value, 0.5, 1e-9);
   EXPECT_NEAR(found[0].first_place.x(), -10.5, 0.11);
-  EXPECT_EQ(found[0].first_move, 1);
   EXPECT_EQ(found[0].moves, 1);
   EXPECT_THAT(found[0].sentence(),
               HasSubstr("in 'finish' tool 5 (tool above its flutes) touches the blank in 1 move"));

@@ -27,6 +27,7 @@ using lensforge::testing::small_ball;
 using lensforge::testing::straight;
 using lensforge::testing::TempFolder;
 using lensforge::testing::write_bytes;
+using lensforge::testing::write_programs;
 using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;

@@ -21,6 +21,7 @@ using lensforge::testing::post_text_with;
 using lensforge::testing::RandomPath;
 using lensforge::testing::small_ball;
 using lensforge::testing::TempFolder;
+using lensforge::testing::write_programs;
 
 constexpr double kTurn = 2.0 * std::numbers::pi;
 constexpr double kZOffset = -7.25;
@@ -261,21 +262,6 @@ TEST(PostProperty, PartsCutTheSamePathAsTheWhole) {
     }
     EXPECT_EQ(next, parts.size());
   }
-}
-
-TEST(PostProperty, PartsOfAnEarlierProgramAreRemoved) {
-  const TempFolder folder;
-  const PostDescription post = post_named("grbl");
-  ProgramSettings settings;
-  settings.largest_file = 1 << 16;
-  write_programs(plan_of(RandomPath(1).moves(9000)), post, settings, folder.path(), {});
-  testing::write_bytes(folder / "finish_99.ngc", "G21 (another's)\n");
-  testing::write_bytes(folder / "finish_x.ngc", "G21 (another's)\n");
-  EXPECT_GT(folder.file_count(), 4U);
-  write_programs(plan_of(RandomPath(1).moves(100)), post, settings, folder.path(), {});
-  EXPECT_EQ(folder.file_count(), 3U);
-  EXPECT_TRUE(std::filesystem::exists(folder / "finish.ngc"));
-  EXPECT_TRUE(std::filesystem::exists(folder / "finish_99.ngc"));
 }
 
 }  // namespace

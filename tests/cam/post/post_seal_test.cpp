@@ -19,6 +19,7 @@ using lensforge::testing::read_bytes;
 using lensforge::testing::small_ball;
 using lensforge::testing::straight;
 using lensforge::testing::TempFolder;
+using lensforge::testing::write_programs;
 
 std::string program_of(const std::string& post) {
   const TempFolder folder;

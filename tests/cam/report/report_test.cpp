@@ -195,9 +195,10 @@ TEST(LeakWords, SayWhatIsWrongWhereAndWhatHelps) {
   place.dark_flux = 0.009;
   place.parts = {{leak_cause::kPolish, 0.001, 0.0, 0.0}, {leak_cause::kCrease, 0.012, 0.0, 0.0}};
   EXPECT_EQ(main_cause(place), leak_cause::kCrease);
-  EXPECT_EQ(leak_words(place),
-            "The groove at x 41.2 y 37.5 keeps 4.0 µm; 1.30 % of the light leaks from here, "
-            "0.900 % into dark parts of the picture.");
+  EXPECT_EQ(
+      leak_words(place),
+      "The groove at x 41.2 y 37.5 is left 4.0 µm too high; 1.30 % of the light leaks from here, "
+      "0.900 % into dark parts of the picture.");
 }
 
 TEST(LeakWords, SayWhatHelpsAsFarAsItWasTried) {

@@ -34,6 +34,13 @@ std::string refusal(const std::string& text) {
   return {};
 }
 
+/// Height of the whole tool's lower silhouette above its tip at distance d from the axis, mm.
+double silhouette_height(const Tool& tool, double d) {
+  double lowest = kInfinite;
+  for (const CutterProfile& part : whole_profile(tool)) lowest = std::min(lowest, part.height(d));
+  return lowest;
+}
+
 TEST(CutterProfile, BallIsACircle) {
   const Tool ball = tool_of(CutterShape::kBall, 0.4, 0.0);
   for (const double d : {0.0, 0.05, 0.11, 0.19}) {
@@ -52,6 +59,22 @@ TEST(CutterProfile, BullIsFlatThenRound) {
   const Tool flat = tool_of(CutterShape::kFlat, 3.0, 0.0);
   EXPECT_EQ(silhouette_height(flat, 1.5), 0.0);
   EXPECT_EQ(silhouette_height(flat, 1.51), 8.0);
+}
+
+TEST(Tool, AnotherDiameterKeepsTheShankThatItIsGroundOn) {
+  Tool stub;  // No neck: the shank is the first part above the flutes.
+  stub.diameter = 0.4;
+  stub.flute_length = 1.0;
+  stub.sections = {{4.0, 1.0, 30.0}};
+  const Tool half = resized(stub, 0.2);
+  EXPECT_EQ(half.sections[0].diameter, 4.0);
+  EXPECT_DOUBLE_EQ(half.sections[0].from, half.flute_length);
+  Tool necked = stub;
+  necked.sections = {{0.3, 1.0, 6.0}, {4.0, 6.0, 30.0}};
+  const Tool slim = resized(necked, 0.2);
+  EXPECT_DOUBLE_EQ(slim.sections[0].diameter, 0.15);
+  EXPECT_EQ(slim.sections[1].diameter, 4.0);
+  EXPECT_DOUBLE_EQ(slim.sections[1].from, slim.sections[0].to);
 }
 
 TEST(CutterProfile, GrownIsTheOffsetCurve) {

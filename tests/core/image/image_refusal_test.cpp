@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
-#include <chrono>
 #include <cmath>
 #include <cstddef>
 #include <filesystem>
@@ -123,7 +122,7 @@ TEST(ImageIo, RefusesAPngWithADamagedChunk) {
   EXPECT_THAT(picture_refusal(folder / "a.png"), HasSubstr("is corrupt"));
 }
 
-TEST(ImageIo, RefusesThirtyThousandPixelsASideFastAndWithoutTheirMemory) {
+TEST(ImageIo, RefusesThirtyThousandPixelsASideWithoutTheirMemory) {
   const TempFolder folder;
   write_bytes(folder / "h.png", view(lensforge::testing::kHugePng));
   // A progressive JPEG header: its decoder would allocate the whole picture on opening.
@@ -138,13 +137,11 @@ TEST(ImageIo, RefusesThirtyThousandPixelsASideFastAndWithoutTheirMemory) {
   rusage before{};
   rusage after{};
   ::getrusage(RUSAGE_SELF, &before);
-  const auto start = std::chrono::steady_clock::now();
   for (const char* name : {"h.png", "h.jpg", "h.tif", "h.exr"}) {
     EXPECT_THAT(picture_refusal(folder / name),
                 AllOf(HasSubstr("30000"), HasSubstr("at most 16384")));
   }
   ::getrusage(RUSAGE_SELF, &after);
-  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(2));
   EXPECT_LT(after.ru_maxrss - before.ru_maxrss, 100'000);
 }
 

@@ -103,7 +103,6 @@ TEST(GcodeInterpreter, ArcsInEveryPlane) {
 TEST(GcodeInterpreter, TellsWhatElseALineDoes) {
   EXPECT_EQ(effect_of("G4 P1.5").dwell, 1.5);
   EXPECT_TRUE(effect_of("M0").pauses);
-  EXPECT_TRUE(effect_of("M1").optional_stop);
   EXPECT_FALSE(effect_of("M1").pauses);
   EXPECT_TRUE(effect_of("M2").ends);
   EXPECT_TRUE(effect_of("M30").ends);
