@@ -302,6 +302,7 @@ Verdict whole_verdict(const CutPlan& plan, const ProgramFiles& programs,
 void add_prediction(const Prediction& prediction, const Lens& lens, ReportData& data) {
   data.target = lens.target;
   data.leakage = prediction.leakage;
+  data.sampling = prediction.sampling;
   data.shown = {{surface_name::kDesigned, "what is meant"},
                 {surface_name::kRounded, "the most that the ball can reach"},
                 {surface_name::kMilled, "before polishing: its ridges scatter light"},

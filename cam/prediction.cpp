@@ -76,6 +76,8 @@ Prediction predict_part(const PartSurfaces& surfaces, const Lens& lens, const Ca
   const FieldRenderSetup setup{lens.setup, grid};
   const LeakageChain chain = chain_of(surfaces, lens, options);
   result.leakage = measure_leakage(chain, lens.target, setup, options.leakage, executor, control);
+  result.sampling =
+      check_sampling(surfaces.part(), result.leakage, lens.target, setup, executor, control);
   const std::vector<double> weights =
       pixels_with_surplus(result.leakage.part().picture, result.leakage.designed.picture);
   const LeakMap map =

@@ -7,6 +7,7 @@
 #include "cam/cam_options.h"
 #include "cam/leakage/leak_map.h"
 #include "cam/leakage/leakage.h"
+#include "cam/leakage/sampling_check.h"
 #include "cam/milled/crease_map.h"
 #include "cam/part_surfaces.h"
 #include "cam/report/report_data.h"
@@ -20,6 +21,7 @@ namespace lensforge {
 /// What a part will project, before it is cut.
 struct Prediction {
   LeakageResult leakage;
+  SamplingCheck sampling;         ///< Of the part.
   std::vector<LeakPlace> places;  ///< That leak most, worst first.
   CreaseMap creases;
   ReportMap height;    ///< Part − designed, µm.

@@ -10,6 +10,7 @@
 #include "cam/leakage/render_field.h"
 #include "cam/meant_surface.h"
 #include "cam/milled/cast_field.h"
+#include "cam/milled/crease_sum.h"
 #include "cam/milled/milled_field.h"
 #include "cam/milled/polished_field.h"
 #include "core/error.h"
@@ -182,7 +183,8 @@ LeakTrial TrialCut::at(const LeakPlace& place, const RunControl& control) const 
   const GridWindow grid = lens_grid(site_.lens.setup.lens_size, sample_spacing(before));
   const CellGrid fine = refined(grid, place.cells, sample_spacing(options_));
   const std::optional<CastFrame> mould = site_.plan.mould();
-  const double polished = PolishedField::kReach * options_.polish.sigma + grid.spacing.maxCoeff();
+  const double polished =
+      PolishedField::kReach * options_.polish.sigma + (1.0 + kCreaseHalo) * grid.spacing.maxCoeff();
   const double beyond = (mould ? mould->scale : 1.0) * polished + 2.0 * surface_->radius();
   const Eigen::AlignedBox2d box =
       grown_within(in_mould(box_of(grid, place.cells), mould), beyond, site_.plan.rectangle());

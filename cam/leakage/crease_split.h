@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <limits>
 
+#include "cam/milled/crease_sum.h"
 #include "core/optics/light_path.h"
 #include "design/optics/image_triangle.h"
 
@@ -51,17 +52,8 @@ inline Eigen::Vector2d land_of(const LightPath& light, const Eigen::Vector2d& pl
 }
 
 /// Where two sides meet between their nodes, as a share of the way from a to b.
-///
-/// The difference of their heights is linear along the way for two cuts of one ball, so its zero is
-/// exact there. Without a change of sign the sides touch (a fillet that runs into a face): the
-/// difference is a parabola on its double root, which its square roots find.
 inline double meeting_share(const SurfaceSide& a, const SurfaceSide& b) {
-  const double at_a = b.height_at(a.place) - a.z;
-  const double at_b = b.z - a.height_at(b.place);
-  const bool crosses = (at_a < 0.0) != (at_b < 0.0);
-  const double from = crosses ? std::abs(at_a) : std::sqrt(std::abs(at_a));
-  const double to = crosses ? std::abs(at_b) : std::sqrt(std::abs(at_b));
-  return from + to > 0.0 ? from / (from + to) : 0.5;
+  return meeting_share(b.height_at(a.place) - a.z, b.z - a.height_at(b.place));
 }
 
 /// Hands the image triangles of a surface triangle whose corners lie on different cuts to `sink`:

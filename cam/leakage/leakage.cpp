@@ -42,15 +42,6 @@ struct Judge {
   std::vector<double> dark;
   std::vector<double> bright;
 
-  [[nodiscard]] double leakage(const FluxPicture& picture) const {
-    double excess = 0.0;
-    for (std::size_t i = 0; i < picture.flux.size(); ++i) {
-      excess += std::max(0.0, picture.flux[i] - designed.flux[i]);
-    }
-    const double all = designed.inside();
-    return all > 0.0 ? excess / all : 0.0;
-  }
-
   [[nodiscard]] double dark_ratio(const FluxPicture& picture) const {
     const double bright_mean = weighted(bright, picture.flux) / count_of(bright);
     const double dark_mean = weighted(dark, picture.flux) / std::max(1.0, count_of(dark));
@@ -61,7 +52,7 @@ struct Judge {
     PictureQuality quality;
     quality.metrics = compare(picture.image(target.total()), target);
     quality.metrics.flux_inside = picture.inside();
-    quality.leakage = leakage(picture);
+    quality.leakage = leakage_share(picture, designed);
     quality.dark_flux = weighted(dark, picture.flux);
     quality.dark_ratio = dark_ratio(picture);
     return quality;
@@ -125,6 +116,15 @@ std::vector<CausePart> parts_of(const LeakageResult& result) {
 
 double PictureQuality::contrast() const {
   return dark_ratio > 0.0 ? 1.0 / dark_ratio : std::numeric_limits<double>::infinity();
+}
+
+double leakage_share(const FluxPicture& picture, const FluxPicture& designed) {
+  double excess = 0.0;
+  for (std::size_t i = 0; i < picture.flux.size(); ++i) {
+    excess += std::max(0.0, picture.flux[i] - designed.flux[i]);
+  }
+  const double all = designed.inside();
+  return all > 0.0 ? excess / all : 0.0;
 }
 
 std::vector<double> pixels_with_surplus(const FluxPicture& part, const FluxPicture& designed) {

@@ -96,6 +96,10 @@ LeakageResult measure_leakage(const LeakageChain& chain, const Image& target,
                               const FieldRenderSetup& setup, const LeakageOptions& options,
                               const Executor& executor, const RunControl& control);
 
+/// Σ max(0, picture − designed) over all pixels, as a share of the designed picture's flux; 0 if it
+/// has none. @pre equal sizes.
+double leakage_share(const FluxPicture& picture, const FluxPicture& designed);
+
 /// 1 where `part` has more flux than `designed`, 0 elsewhere. @pre equal sizes.
 std::vector<double> pixels_with_surplus(const FluxPicture& part, const FluxPicture& designed);
 

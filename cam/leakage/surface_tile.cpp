@@ -40,6 +40,31 @@ void SurfaceTile::load(const SurfaceField& field, const CellRange& range,
         patch_.window.node(i % patch_.window.columns, i / patch_.window.columns);
     landing_[k] = land_of(light_, at, patch_.z[k], {patch_.slope_x[k], patch_.slope_y[k]});
   });
+  if (patch_.cut.empty()) sharpen_landing(executor);
+}
+
+void SurfaceTile::sharpen_landing(const Executor& executor) {
+  const std::int64_t columns = patch_.window.columns;
+  const std::int64_t rows = patch_.window.rows;
+  sharpened_.resize(landing_.size());
+  const auto sharpen_row = [&](std::int64_t j) {
+    const bool inner_row = j > 0 && j + 1 < rows;
+    for (std::int64_t i = 0; i < columns; ++i) {
+      const bool inner_column = i > 0 && i + 1 < columns;
+      const auto n = static_cast<std::size_t>(j * columns + i);
+      Eigen::Vector2d bends = Eigen::Vector2d::Zero();
+      const auto add = [&](std::int64_t step) {
+        const auto offset = static_cast<std::size_t>(step);
+        bends += landing_[n - offset] - 2.0 * landing_[n] + landing_[n + offset];
+      };
+      if (inner_column) add(1);
+      if (inner_row) add(columns);
+      if (inner_column && inner_row) add(columns + 1);
+      sharpened_[n] = bends.allFinite() ? landing_[n] - bends / 24.0 : landing_[n];
+    }
+  };
+  parallel_for(executor, "sharpen landing", rows, sharpen_row, 16);
+  landing_.swap(sharpened_);
 }
 
 /// Derivative of the slope along one axis, from the neighbours on the same cut; zero where there

@@ -18,7 +18,8 @@ namespace lensforge {
 
 /// The image triangles of a rectangle of a sampled surface: two a cell, their corners where the
 /// refracted ray of the node's own slope lands; a triangle across a crease (nodes of different
-/// SurfacePatch::cut) is split by split_at_crease(). Keeps its buffers between tiles.
+/// SurfacePatch::cut) is split by split_at_crease(). On a surface without creases corners are moved
+/// a little, see sharpen_landing(). Keeps its buffers between tiles.
 class SurfaceTile {
  public:
   /// @param grid  the whole lens; fluxes are shares of the light that it takes.
@@ -70,6 +71,13 @@ class SurfaceTile {
     if (light_.intake_is_plan_area()) return triangle_flux_;
     return light_.intake({point(a), point(b), point(c)}) / lens_area_;
   }
+  /// Moves the corners so that triangles land in the right place on average.
+  ///
+  /// Between nodes the landing place v is taken as linear, which blurs it by the box spline of the
+  /// triangulation: what a wave of six nodes across scallops moves light by comes out 9 % too
+  /// small. v − Δ/24, with Δ the sum of the second differences of v along the three edges of the
+  /// triangles, cancels that to second order in the spacing: 1 % is left.
+  void sharpen_landing(const Executor& executor);
   [[nodiscard]] Eigen::Vector3d point(std::size_t node) const;
   [[nodiscard]] SurfaceSide side_of(std::size_t node) const;
   [[nodiscard]] Eigen::Vector2d bend_along(std::size_t node, std::int64_t step, bool has_before,
@@ -83,7 +91,8 @@ class SurfaceTile {
   std::int64_t halo_columns_ = 0;  ///< Nodes of the patch left of the tile.
   std::int64_t halo_rows_ = 0;
   SurfacePatch patch_;
-  std::vector<Eigen::Vector2d> landing_;  ///< One per node, pixel coordinates; NaN without light.
+  std::vector<Eigen::Vector2d> landing_;    ///< One per node, pixel coordinates; NaN without light.
+  std::vector<Eigen::Vector2d> sharpened_;  ///< What becomes of it; kept for its memory.
 };
 
 }  // namespace lensforge

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <string>
 
+#include "cam/milled/crease_sum.h"
 #include "core/error.h"
 #include "core/text/number_text.h"
 
@@ -92,8 +93,8 @@ PolishedField::Axis PolishedField::make_axis(int axis, const GridWindow& window)
   result.rim_end = std::max(static_cast<std::int64_t>(high) + 1, result.end);
   result.kernel = make_kernel(model_.sigma, spacing);
   const auto reach = static_cast<std::int64_t>(result.kernel.average.size()) - 1;
-  result.sampled = std::max(result.begin - reach, result.rim);
-  result.sampled_end = std::min(result.end + reach, result.rim_end);
+  result.sampled = std::max(result.begin - reach - kCreaseHalo, result.rim);
+  result.sampled_end = std::min(result.end + reach + kCreaseHalo, result.rim_end);
   return result;
 }
 
@@ -113,15 +114,17 @@ void PolishedField::sample(const GridWindow& window, const Executor& executor,
   around.rows = y.sampled_end - y.sampled;
   SurfacePatch raw;
   surface_.sample(around, executor, raw);
+  correct_crease_sums(executor, raw);
   resize_patch(window, false, patch);
   // Averages and slopes along x of every row that the kernel along y reaches.
   const std::int64_t rows = window.rows + 2 * y.kernel.reach();
   std::vector<double> averages(index_of(rows * window.columns));
   std::vector<double> slopes(averages.size());
   const auto along_x = [&](std::int64_t row) {
+    const std::int64_t to = row + y.sampled - y.begin + y.kernel.reach();
+    if (to < 0 || to >= rows) return;  // Of the halo.
     const std::vector<double> line = turned_line(x, &raw.z[index_of(row * around.columns)]);
     const auto values = [&](std::int64_t k) { return &line[index_of(x.kernel.reach() + k)]; };
-    const std::int64_t to = row + y.sampled - y.begin + y.kernel.reach();
     average(values, x.kernel, window.columns, &averages[index_of(to * window.columns)]);
     differentiate(values, x.kernel, window.columns, &slopes[index_of(to * window.columns)]);
   };

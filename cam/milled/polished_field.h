@@ -30,9 +30,10 @@ struct PolishModel {
 /// form and wears down what is narrower than its contact, σ. Beyond the rim the surface goes on
 /// with its heights turned about the rim, so that a plane stays a plane.
 ///
-/// The slopes that the surface has itself are not used: between the passes of a ball they jump by
-/// 0.3 rad, and sampled a few times a pass their sixth harmonic alone, 0.016 rad, comes back as a
-/// wave of millimetres where heights alias by nanometres.
+/// Creases count where they run, whatever nodes lie beside them (correct_crease_sums()). But for
+/// that the slopes that the surface has itself are not used: between the passes of a ball they jump
+/// by 0.3 rad, and sampled a few times a pass their sixth harmonic alone, 0.016 rad, comes back as
+/// a wave of millimetres where heights alias by nanometres.
 ///
 /// Over-polish (Sun et al., section 4.4 and Fig. 14: altered normals along the boundary send light
 /// inwards and leave the image's border black): from each side of the lens, at the distance d,
@@ -59,7 +60,7 @@ class PolishedField final : public SurfaceField {
     std::int64_t rim, inside;
   };
   /// Nodes of one axis of a window, in the grid: those asked for, and those of the lens that their
-  /// kernels reach.
+  /// kernels reach, with kCreaseHalo more.
   struct Axis {
     std::int64_t begin, end;            ///< Asked for.
     std::int64_t sampled, sampled_end;  ///< Sampled.

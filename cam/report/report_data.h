@@ -9,6 +9,7 @@
 
 #include "cam/leakage/leak_map.h"
 #include "cam/leakage/leakage.h"
+#include "cam/leakage/sampling_check.h"
 #include "cam/path/operation.h"
 #include "cam/report/path_sketch.h"
 #include "cam/report/verdict.h"
@@ -100,6 +101,7 @@ struct ReportData {
 
   Image target;                     ///< Linear light.
   LeakageResult leakage;            ///< designed, chain and the other surfaces.
+  SamplingCheck sampling;           ///< Of the part.
   std::vector<ShownSurface> shown;  ///< Whose pictures stand side by side.
   LeakageOptions leakage_options;
   std::vector<LeakPlace> places;        ///< Worst first.

@@ -67,6 +67,11 @@ json leakage_json(const ReportData& data) {
           {"causes", list(result.parts, cause_json)}};
 }
 
+json sampling_json(const SamplingCheck& check) {
+  return {
+      {"spacing_mm", check.spacing}, {"leakage_error", check.leakage}, {"mae_error", check.mae}};
+}
+
 json surfaces_json(const LeakageResult& result) {
   json surfaces = json::array({quality_json(result.designed)});
   for (const RenderedSurface& surface : result.others) surfaces.push_back(quality_json(surface));
@@ -192,6 +197,7 @@ json report_json(const ReportData& data) {
       {"seconds", data.seconds}};
   if (!data.leakage.steps.empty()) {
     report["leakage"] = leakage_json(data);
+    report["sampling"] = sampling_json(data.sampling);
     report["surfaces"] = surfaces_json(data.leakage);
   }
   return report;

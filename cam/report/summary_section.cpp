@@ -54,6 +54,19 @@ std::string leakage_figure(const LeakageResult& result) {
   return figure(picture, "Where the leaked light lands", caption("Leakage", note));
 }
 
+std::string signed_text(double value, int decimals) {
+  return (value < 0.0 ? "−" : "+") + decimal_text(std::abs(value), decimals);
+}
+
+std::string sampling_sentence(const SamplingCheck& check) {
+  return element("p", "class=\"soft\"",
+                 "Computed from samples of the surface " + decimal_text(check.spacing, 4) +
+                     " mm apart; half that spacing would change the polished part’s leakage by "
+                     "about " +
+                     signed_text(100.0 * check.leakage, 3) +
+                     " % of the light and its MAE by about " + signed_text(check.mae, 5) + ".");
+}
+
 std::string check_value(double value, const LimitCheck& check) {
   return escape_html(decimal_text(value, check.decimals) +
                      (check.unit.empty() ? "" : " " + check.unit));
@@ -99,7 +112,8 @@ std::string pictures(const ReportData& data) {
                                     [&](const auto& one) { return one.name == surface->name; });
     if (shown != data.shown.end()) figures += surface_figure(*surface, shown->words, data.target);
   }
-  return element("div", "class=\"pictures\"", figures + leakage_figure(data.leakage));
+  return element("div", "class=\"pictures\"", figures + leakage_figure(data.leakage)) +
+         sampling_sentence(data.sampling);
 }
 
 std::string verdict(const ReportData& data) {

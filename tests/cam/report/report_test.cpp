@@ -48,6 +48,7 @@ ReportData report_of(const std::string& text) {
   data.leakage.steps = {surface(text, 0.1, 0.1)};
   data.leakage.others = {surface(text, 0.2, 0.2)};
   data.leakage.parts = {{text, 0.1, 0.02, 0.001}};
+  data.sampling = {0.01, -0.00042, 0.00003};
   data.shown = {{text, text}};
   data.lens_size = {10.0, 10.0};
   LeakPlace place;
@@ -87,6 +88,12 @@ TEST(Report, EscapesEveryText) {
   EXPECT_THAT(html, HasSubstr("&lt;script&gt;alert(&#39;x&#39;)&lt;/script&gt;&amp;&quot;"));
   // A text that looks like a placeholder stays what it is.
   EXPECT_THAT(html, HasSubstr("&quot;{{STYLE}}"));
+}
+
+TEST(Report, StatesTheErrorOfItsSamples) {
+  const std::string html = report_html(report_of("logo"));
+  EXPECT_THAT(html, HasSubstr("leakage by about −0.042 %"));
+  EXPECT_THAT(html, HasSubstr("MAE by about +0.00003"));
 }
 
 TEST(Report, NeedsNothingFromOutside) {
@@ -169,6 +176,9 @@ TEST(Report, JsonSaysTheSame) {
   EXPECT_EQ(json["verdict"]["pass"], false);
   EXPECT_EQ(json["minutes"], 90.0);
   EXPECT_EQ(json["leakage"]["share"], 0.1);
+  EXPECT_EQ(json["sampling"]["spacing_mm"], 0.01);
+  EXPECT_EQ(json["sampling"]["leakage_error"], -0.00042);
+  EXPECT_EQ(json["sampling"]["mae_error"], 0.00003);
   EXPECT_EQ(json["surfaces"].size(), 3U);
   EXPECT_TRUE(json["surfaces"][0]["psnr"].is_null());
   EXPECT_TRUE(json["surfaces"][0]["contrast"].is_null());
