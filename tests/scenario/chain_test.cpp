@@ -3,7 +3,6 @@
 #include <map>
 
 #include "core/image/image_io.h"
-#include "core/image/metrics.h"
 #include "scenario/driver.h"
 
 namespace lensforge::scenario {
@@ -15,29 +14,35 @@ const std::vector<std::string> kLensFiles{"convergence.csv", "error.png",  "lens
                                           "overview.png",    "render.exr", "render.png",
                                           "surface.ply",     "target.exr", "target.png"};
 
-class Fixtures : public Scenario, public ::testing::WithParamInterface<const char*> {};
+struct Fixture {
+  const char* picture;
+  double mae;  ///< About twice what 32 pixels of it are designed to.
+};
+
+class Fixtures : public Scenario, public ::testing::WithParamInterface<Fixture> {};
 
 TEST_P(Fixtures, BecomeALens) {
-  Arguments design = small_design(picture(GetParam()), path("lens"));
+  Arguments design = small_design(picture(GetParam().picture), path("lens"));
   design.emplace_back("--json");
   const Outcome outcome = run(design);
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_EQ(listing(at("lens")), kLensFiles);
   const nlohmann::json result = outcome.json();
   EXPECT_EQ(result["status"], "done");
-  const Image target = read_image(at("lens/target.exr")).image;
-  const auto pixels = static_cast<double>(target.values().size());
-  const Image even(target.columns(), target.rows(), static_cast<float>(target.total() / pixels));
-  EXPECT_LT(result["metrics"]["facet"]["mae"], 0.9 * compare(even, target).mae);
+  EXPECT_LT(result["metrics"]["facet"]["mae"], GetParam().mae);
   EXPECT_GT(result["metrics"]["facet"]["flux_inside"], 0.97);
 }
 
 INSTANTIATE_TEST_SUITE_P(All, Fixtures,
-                         ::testing::Values("portrait.png", "logo.png", "city.png", "butterfly.png",
-                                           "relief.png", "calligraphy.png", "lake.png", "rings.png",
-                                           "stripes.png"),
+                         ::testing::Values(Fixture{"portrait.png", 0.02},
+                                           Fixture{"logo.png", 0.005}, Fixture{"city.png", 0.017},
+                                           Fixture{"butterfly.png", 0.0006},
+                                           Fixture{"relief.png", 0.0001},
+                                           Fixture{"calligraphy.png", 0.0007},
+                                           Fixture{"lake.png", 0.014}, Fixture{"rings.png", 0.0007},
+                                           Fixture{"stripes.png", 0.003}),
                          [](const auto& test) {
-                           const std::string name = test.param;
+                           const std::string name = test.param.picture;
                            return name.substr(0, name.find('.'));
                          });
 
