@@ -5,10 +5,10 @@
 #include <cstddef>
 
 #include "core/error.h"
-#include "export/cubic_spline.h"
-#include "export/grid_warp.h"
+#include "core/surface/cubic_spline.h"
+#include "core/surface/grid_warp.h"
 #include "export/light_fit.h"
-#include "export/slope_fit.h"
+#include "core/surface/slope_fit.h"
 #include "export/spline_net.h"
 
 // One spline over the whole rectangle is fitted (SlopeFit, LightFit) and then cut into patches,

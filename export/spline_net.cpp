@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "export/cubic_spline.h"
+#include "core/surface/cubic_spline.h"
 
 namespace lensforge {
 namespace {

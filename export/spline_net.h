@@ -55,11 +55,6 @@ struct PatchFrame {
   Eigen::Vector3d by_v = Eigen::Vector3d::Zero();
 };
 
-/// The point of a box that is nearest: rounding may put points of the rim outside.
-inline Eigen::Vector2d nearest_inside(const Eigen::AlignedBox2d& box, const Eigen::Vector2d& at) {
-  return at.cwiseMax(box.min()).cwiseMin(box.max());
-}
-
 /// A bicubic B-spline surface over a rectangle of parameters: `cells` × `cells` knot cells, twice
 /// continuously differentiable, one height above every (x, y).
 struct SplinePatch {

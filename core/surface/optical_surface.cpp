@@ -27,6 +27,7 @@ std::shared_ptr<const OpticalSurface> optical_surface(const SurfaceMesh& mesh, S
     case SurfaceModel::kFacet:
       return std::make_shared<const FacetSurface>(mesh);
     case SurfaceModel::kSmooth:
+    case SurfaceModel::kSpline:
       break;
   }
   return std::make_shared<const SmoothSurface>(mesh);

@@ -10,7 +10,7 @@ namespace lensforge {
 
 /// Which normals send the light: one per triangle (the paper's model), or one per vertex (what a
 /// polished, smooth part does).
-enum class SurfaceModel { kFacet, kSmooth };
+enum class SurfaceModel { kFacet, kSmooth, kSpline };
 
 /// All of them, in the order in which files and commands list them.
 inline constexpr std::array kSurfaceModels{SurfaceModel::kFacet, SurfaceModel::kSmooth};

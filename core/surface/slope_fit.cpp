@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/slope_fit.h"
+#include "core/surface/slope_fit.h"
 
 #include <cmath>
 #include <optional>
@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "core/error.h"
-#include "export/spline_net.h"
 
 // The spline's x and y are given first (GridWarp): with knots where vertices are dense, 30,481
 // control points project the picture of a smooth 128² portrait with MAE 0.0031, where on even knot

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/cubic_spline.h"
+#include "core/surface/cubic_spline.h"
 
 #include <algorithm>
 #include <cmath>
