@@ -4,11 +4,16 @@
 #include <array>
 #include <filesystem>
 #include <map>
+#include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <vector>
 
 #include "core/image/image.h"
 #include "core/image/metrics.h"
 #include "core/optics/optical_setup.h"
+#include "core/surface/control_net.h"
+#include "core/surface/optical_surface.h"
 #include "core/surface/surface_mesh.h"
 #include "core/surface/surface_model.h"
 
@@ -20,19 +25,28 @@ using ModelMetrics = std::map<SurfaceModel, ImageMetrics>;
 /// A designed lens: what one command hands to the next.
 struct Lens {
   SurfaceMesh surface;  ///< The optical surface, z ≥ thickness; mm, lens frame.
+  /// That surface itself if the model is a spline; `surface` then has its nodes (kMeshSamples).
+  std::optional<ControlNet> spline;
   OpticalSetup setup;
   SurfaceModel model = SurfaceModel::kFacet;  ///< The model it was designed with.
   Image target;                               ///< Working picture, linear light.
   Image render;                               ///< What the lens projects under `model`.
-  /// What it projects under each model.
+  /// What it projects under each model that it has (models_of()).
   ModelMetrics metrics{{SurfaceModel::kFacet, {}}, {SurfaceModel::kSmooth, {}}};
   nlohmann::json provenance = nlohmann::json::object();
 };
+
+/// The models that a lens's surface can be looked at with: a spline's nodes make a mesh, too.
+std::vector<SurfaceModel> models_of(const Lens& lens);
+
+/// The lens's surface under one of them.
+std::shared_ptr<const OpticalSurface> optical_surface(const Lens& lens, SurfaceModel model);
 
 /// Names of the files in a lens folder (docs/interface.md, "The lens folder").
 namespace lens_file {
 inline constexpr const char* kJson = "lens.json";
 inline constexpr const char* kSurface = "surface.ply";
+inline constexpr const char* kSpline = "surface.spline";
 inline constexpr const char* kTargetPng = "target.png";
 inline constexpr const char* kTargetExr = "target.exr";
 inline constexpr const char* kRenderPng = "render.png";
@@ -43,8 +57,9 @@ inline constexpr const char* kOverview = "overview.png";
 inline constexpr const char* kCheckpoint = "checkpoint.bin";  ///< While a design is unfinished.
 
 /// All of them.
-inline constexpr std::array kAll = {kJson,      kSurface, kTargetPng, kTargetExr,   kRenderPng,
-                                    kRenderExr, kError,   kOverview,  kConvergence, kCheckpoint};
+inline constexpr std::array kAll = {kJson,      kSurface,  kSpline,      kTargetPng,
+                                    kTargetExr, kRenderPng, kRenderExr,  kError,
+                                    kOverview,  kConvergence, kCheckpoint};
 
 /// Folder in which earlier versions put a lens together; a killed one has left it behind.
 inline constexpr const char* kStaging = "lens";

@@ -47,11 +47,13 @@ constexpr std::string_view kMarkBegin = "comment lensforge ";
 /// Bytes of the longest mark line that is looked for.
 constexpr std::size_t kLongestMark = 100;
 
+constexpr std::string_view kNormalLines = "property double nx\nproperty double ny\nproperty double nz\n";
+
 /// What follows the format and the mark.
-std::string element_lines(const Counts& counts) {
+std::string element_lines(const Counts& counts, std::string_view normals = "") {
   return "element vertex " + std::to_string(counts.vertices) +
-         "\nproperty double x\nproperty double y\nproperty double z\nelement face " +
-         std::to_string(counts.triangles) +
+         "\nproperty double x\nproperty double y\nproperty double z\n" + std::string(normals) +
+         "element face " + std::to_string(counts.triangles) +
          "\nproperty list uchar int vertex_indices\nend_header\n";
 }
 
@@ -157,17 +159,41 @@ void check_mesh(const SurfaceMesh& mesh, const fs::path& path) {
   }
 }
 
-void write_blocks(const SurfaceMesh& mesh, std::ofstream& file) {
+/// Vertices in turn, each followed by its normal.
+Eigen::MatrixXd with_normals(const SurfaceMesh& mesh, const Eigen::Matrix3Xd& normals) {
+  Eigen::MatrixXd records(6, mesh.vertex_count());
+  records.topRows<3>() = mesh.vertices;
+  records.bottomRows<3>() = normals.colwise().normalized();
+  return records;
+}
+
+/// @param records  what is stored of the vertices, a column each.
+template <class Matrix>
+void write_blocks(const SurfaceMesh& mesh, const Matrix& records, std::ofstream& file) {
+  const std::string_view normals = records.rows() > 3 ? kNormalLines : "";
   file << kFormatLines << "comment " << program_mark() << '\n'
-       << element_lines({mesh.vertex_count(), mesh.triangle_count()});
-  file.write(reinterpret_cast<const char*>(mesh.vertices.data()),
-             mesh.vertex_count() * std::streamsize{kVertexBytes});
+       << element_lines({mesh.vertex_count(), mesh.triangle_count()}, normals);
+  file.write(reinterpret_cast<const char*>(records.data()),
+             records.size() * std::streamsize{sizeof(double)});
   std::array<char, kTriangleBytes> record{3};
   for (Eigen::Index t = 0; t < mesh.triangles.cols() && file; ++t) {
     std::memcpy(&record[1], mesh.triangles.col(t).data(), kTriangleBytes - 1);
     file.write(record.data(), kTriangleBytes);
   }
   file.flush();
+}
+
+template <class Matrix>
+void write_records(const SurfaceMesh& mesh, const Matrix& records, const fs::path& path) {
+  static_assert(sizeof(int) == sizeof(std::int32_t));
+  write_whole_file(path, [&](const fs::path& beside) {
+    errno = 0;
+    std::ofstream file(beside, std::ios::binary | std::ios::trunc);
+    write_blocks(mesh, records, file);
+    if (file) return;
+    throw RunError(path.string() + ": cannot be written: " +
+                   (errno != 0 ? std::generic_category().message(errno) : "unknown reason"));
+  });
 }
 
 }  // namespace
@@ -182,15 +208,11 @@ SurfaceMesh read_mesh(const fs::path& path) {
 }
 
 void write_ply(const SurfaceMesh& mesh, const fs::path& path) {
-  static_assert(sizeof(int) == sizeof(std::int32_t));
-  write_whole_file(path, [&](const fs::path& beside) {
-    errno = 0;
-    std::ofstream file(beside, std::ios::binary | std::ios::trunc);
-    write_blocks(mesh, file);
-    if (file) return;
-    throw RunError(path.string() + ": cannot be written: " +
-                   (errno != 0 ? std::generic_category().message(errno) : "unknown reason"));
-  });
+  write_records(mesh, mesh.vertices, path);
+}
+
+void write_ply(const SurfaceMesh& mesh, const Eigen::Matrix3Xd& normals, const fs::path& path) {
+  write_records(mesh, with_normals(mesh, normals), path);
 }
 
 }  // namespace lensforge

@@ -3,6 +3,7 @@
 
 #include <utility>
 
+#include "core/error.h"
 #include "core/surface/facet_surface.h"
 #include "core/surface/smooth_surface.h"
 
@@ -27,8 +28,9 @@ std::shared_ptr<const OpticalSurface> optical_surface(const SurfaceMesh& mesh, S
     case SurfaceModel::kFacet:
       return std::make_shared<const FacetSurface>(mesh);
     case SurfaceModel::kSmooth:
-    case SurfaceModel::kSpline:
       break;
+    case SurfaceModel::kSpline:
+      LF_CHECK(false, "a mesh is no spline");
   }
   return std::make_shared<const SmoothSurface>(mesh);
 }

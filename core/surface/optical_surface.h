@@ -73,7 +73,8 @@ class OpticalSurface {
   TriangleIndex index_;
 };
 
-/// The surface that a mesh stands for under a model. @pre every triangle faces +z.
+/// The surface that a mesh stands for under a model. @pre every triangle faces +z; a mesh can stand
+/// for the model (kMeshModels).
 std::shared_ptr<const OpticalSurface> optical_surface(const SurfaceMesh& mesh, SurfaceModel model);
 
 }  // namespace lensforge

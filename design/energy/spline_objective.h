@@ -4,25 +4,12 @@
 #include <Eigen/Core>
 #include <cstdint>
 
-#include "core/surface/grid_triangles.h"
+#include "core/surface/control_net.h"
 #include "core/surface/surface_mesh.h"
 #include "design/energy/objective_on.h"
 #include "design/optics/spline_nodes.h"
 
 namespace lensforge {
-
-/// The mesh of the nodes of a net of control points.
-inline SurfaceMesh node_mesh(const SurfaceMesh& net, int samples) {
-  const Executor executor = Executor::serial();
-  SplineNodesOn<Executor> nodes(net.grid, samples, executor);
-  SurfaceMesh mesh;
-  mesh.grid = nodes.shape();
-  mesh.vertices.resize(3, Eigen::Index{mesh.grid.columns} * mesh.grid.rows);
-  mesh.triangles = grid_triangles(mesh.grid);
-  Eigen::Matrix3Xd normals(3, mesh.vertices.cols());
-  nodes.look(net.vertices.data(), mesh.vertices.data(), normals.data());
-  return mesh;
-}
 
 /// DesignObjective of a spline's control points: every node of the spline sends one ray by the
 /// spline's own normal. Barriers and the goal are those of the mesh of the nodes; there are no
@@ -30,12 +17,12 @@ inline SurfaceMesh node_mesh(const SurfaceMesh& net, int samples) {
 template <class Exec>
 class SplineObjectiveOn {
  public:
-  /// @param net  control points, row by row, clamped at all four sides (SplineSurface).
+  /// @param net  a ControlNet as a mesh.
   SplineObjectiveOn(const SurfaceMesh& net, const OpticalSetup& setup, const DesignGoal& goal,
                     const ObjectiveOptions& options, const Exec& executor)
       : executor_(executor),
         nodes_(net.grid, options.samples, executor),
-        core_(node_mesh(net, options.samples), setup, goal, options, executor),
+        core_(spline_nodes({net.grid, net.vertices}, options.samples).mesh, setup, goal, options, executor),
         movable_(objective_detail::movable_coordinates(net.vertices, setup.lens_size)),
         movable_here_(buffer_of(executor, objective_detail::entries(movable_))),
         positions_(3 * static_cast<std::size_t>(nodes_.shape().columns) *

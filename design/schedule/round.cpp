@@ -69,9 +69,9 @@ void start_from_transport(const LevelSite& site, Checkpoint& state) {
 /// The rendering-guided half.
 Ending follow_picture(const LevelSite& site, Checkpoint& state) {
   LbfgsOptions optimizer;
-  optimizer.max_iterations = site.task.options.iterations;
+  optimizer.max_iterations = site.level.iterations;
   const LbfgsSummary summary =
-      site.stage.run(optimizer, site.log.observer("render"), state.scales, state.mesh);
+      site.stage.run(optimizer, site.log.observer(site.level.spline ? "spline" : "render"), state.scales, state.mesh);
   using Status = LbfgsSummary::Status;
   return {summary.status == Status::kStopped,
           summary.status == Status::kInfeasibleStart ? summary.message : ""};
@@ -82,10 +82,11 @@ Ending follow_picture(const LevelSite& site, Checkpoint& state) {
 Ending run_round(const LevelSite& site, Checkpoint& state) {
   const DesignOptions& options = site.task.options;
   const SurfaceMesh before = state.mesh;
-  const bool transports = state.transporting && state.round < options.transport_rounds;
+  const bool transports =
+      !site.level.spline && state.transporting && state.round < options.transport_rounds;
   if (transports) {
     start_from_transport(site, state);
-  } else {
+  } else if (!site.level.spline) {
     relax(site, state.mesh);
   }
   const bool rescaled = !state.scales.known();
@@ -93,8 +94,8 @@ Ending run_round(const LevelSite& site, Checkpoint& state) {
     Ending ending = follow_picture(site, state);
     if (ending.ended()) return ending;
   }
-  conclude_round({before, site.stage.value(state.mesh), transports, rescaled}, options.rounds,
-                 state);
+  conclude_round({before, site.stage.value(state.mesh), transports, rescaled},
+                 site.level.rounds, state);
   return {};
 }
 
