@@ -2,6 +2,7 @@
 #include "core/surface/control_net.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <vector>
 
@@ -95,10 +96,23 @@ SampledSurface spline_nodes(const ControlNet& net, int samples) {
   SampledSurface nodes = make_samples({static_cast<int>(u.size()), static_cast<int>(v.size())});
   Eigen::Index at = 0;
   for (const CubicBasis& across : v) {
+    // The curve v = const as a spline of its own, and its derivative by v.
+    const auto rows = net.points.middleCols(Eigen::Index{across.first} * net.shape.columns,
+                                            Eigen::Index{4} * net.shape.columns);
+    const auto row = [&](Eigen::Index j) {
+      return rows.middleCols(j * net.shape.columns, net.shape.columns);
+    };
+    const std::array<double, 4>& w = across.value;
+    const std::array<double, 4>& s = across.slope;
+    const Eigen::Matrix3Xd curve = w[0] * row(0) + w[1] * row(1) + w[2] * row(2) + w[3] * row(3);
+    const Eigen::Matrix3Xd bent = s[0] * row(0) + s[1] * row(1) + s[2] * row(2) + s[3] * row(3);
     for (const CubicBasis& along : u) {
-      const SplineFrame frame = frame_of(net, along, across);
-      nodes.mesh.vertices.col(at) = frame.point;
-      nodes.normals.col(at++) = frame.normal();
+      const Eigen::Map<const Eigen::Vector4d> value(along.value.data());
+      const Eigen::Map<const Eigen::Vector4d> slope(along.slope.data());
+      const auto taps = curve.middleCols<4>(along.first);
+      nodes.mesh.vertices.col(at) = taps * value;
+      nodes.normals.col(at++) =
+          Eigen::Vector3d(taps * slope).cross(Eigen::Vector3d(bent.middleCols<4>(along.first) * value));
     }
   }
   return nodes;

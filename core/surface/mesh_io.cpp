@@ -33,7 +33,6 @@ static_assert(std::endian::native == std::endian::little, "write_ply writes litt
 /// this size has 85 million triangles.
 constexpr std::uintmax_t kMaxMeshBytes = std::uintmax_t{4} << 30U;
 
-constexpr std::size_t kVertexBytes = 3 * sizeof(double);
 constexpr std::size_t kTriangleBytes = 1 + 3 * sizeof(std::int32_t);
 
 struct Counts {
@@ -47,7 +46,8 @@ constexpr std::string_view kMarkBegin = "comment lensforge ";
 /// Bytes of the longest mark line that is looked for.
 constexpr std::size_t kLongestMark = 100;
 
-constexpr std::string_view kNormalLines = "property double nx\nproperty double ny\nproperty double nz\n";
+constexpr std::string_view kNormalLines =
+    "property double nx\nproperty double ny\nproperty double nz\n";
 
 /// What follows the format and the mark.
 std::string element_lines(const Counts& counts, std::string_view normals = "") {
@@ -72,13 +72,17 @@ std::int64_t number_after(const std::string& text, const std::string& words) {
 /// The header of a file in our own form.
 struct OwnHeader {
   Counts counts;
+  bool normals = false;  ///< Every vertex is followed by its normal.
   std::size_t bytes = 0;
+
+  [[nodiscard]] Eigen::Index numbers_per_vertex() const { return normals ? 6 : 3; }
 };
 
 /// The header if the file is in the very form that write_ply() makes, with or without its mark.
 std::optional<OwnHeader> own_form(std::ifstream& file) {
   const std::size_t longest =
-      kFormatLines.size() + kLongestMark + element_lines({INT32_MAX, INT32_MAX}).size();
+      kFormatLines.size() + kLongestMark +
+      element_lines({INT32_MAX, INT32_MAX}, kNormalLines).size();
   std::string head(longest, '\0');
   file.read(head.data(), static_cast<std::streamsize>(head.size()));
   head.resize(static_cast<std::size_t>(file.gcount()));
@@ -90,27 +94,33 @@ std::optional<OwnHeader> own_form(std::ifstream& file) {
                       number_after(head, "\nelement face ")};
   if (counts.vertices < 0 || counts.vertices > INT32_MAX) return std::nullopt;
   if (counts.triangles < 0 || counts.triangles > INT32_MAX) return std::nullopt;
-  const std::string lines = element_lines(counts);
-  if (head.compare(begin, lines.size(), lines) != 0) return std::nullopt;
-  file.seekg(static_cast<std::streamoff>(begin + lines.size()));
-  return OwnHeader{counts, begin + lines.size()};
+  for (const bool normals : {false, true}) {
+    const std::string lines = element_lines(counts, normals ? kNormalLines : "");
+    if (head.compare(begin, lines.size(), lines) != 0) continue;
+    file.seekg(static_cast<std::streamoff>(begin + lines.size()));
+    return OwnHeader{counts, normals, begin + lines.size()};
+  }
+  return std::nullopt;
 }
 
 /// Our own form is read bit for bit, without rounding to single precision.
 SurfaceMesh read_own_form(std::ifstream& file, const OwnHeader& header, const fs::path& path) {
   const Counts& counts = header.counts;
   const std::uintmax_t expected = header.bytes +
-                                  static_cast<std::uintmax_t>(counts.vertices) * kVertexBytes +
+                                  static_cast<std::uintmax_t>(counts.vertices *
+                                                              header.numbers_per_vertex()) *
+                                      sizeof(double) +
                                   static_cast<std::uintmax_t>(counts.triangles) * kTriangleBytes;
   if (const std::uintmax_t size = fs::file_size(path); size != expected) {
     refuse(path, "is " + std::to_string(size) + " bytes long, its header calls for " +
                      std::to_string(expected) + ": it is truncated or corrupt");
   }
   SurfaceMesh mesh;
-  mesh.vertices.resize(3, counts.vertices);
   mesh.triangles.resize(3, counts.triangles);
-  file.read(reinterpret_cast<char*>(mesh.vertices.data()),
-            static_cast<std::streamsize>(counts.vertices) * std::streamsize{kVertexBytes});
+  Eigen::MatrixXd records(header.numbers_per_vertex(), counts.vertices);
+  file.read(reinterpret_cast<char*>(records.data()),
+            records.size() * std::streamsize{sizeof(double)});
+  mesh.vertices = records.topRows<3>();
   std::array<char, kTriangleBytes> record{};
   for (Eigen::Index t = 0; t < mesh.triangles.cols(); ++t) {
     file.read(record.data(), kTriangleBytes);
