@@ -29,7 +29,8 @@ nlohmann::json certificate(const SplineNet& net) {
     };
     patches.push_back({{"x", range(0)},
                        {"y", range(1)},
-                       {"cells", patch.cells},
+                       {"cells", patch.cells_u},
+                       {"cells_v", patch.cells_v},
                        {"height_error_mm", patch.error.height},
                        {"normal_error_rad", patch.error.normal},
                        {"share_within_tolerance", patch.error.share_within()}});
@@ -89,8 +90,14 @@ void describe_metrics(const std::string& word, const ImageMetrics& metrics, Expo
 
 void describe(const SplineSolid& solid, ExportReport& report) {
   describe_solid(solid.content, solid.mesh_volume, report);
-  describe_fit(solid.net, solid.fit, report);
-  describe_bound(solid.bound, report);
+  if (solid.fit) {
+    describe_fit(solid.net, solid.fit->options, report);
+    describe_bound(solid.fit->bound, report);
+  } else {
+    report.json["control_points"] = solid.net.control_points();
+    report.text += "  spline    the lens's own, " + std::to_string(solid.net.control_points()) +
+                   " control points\n";
+  }
   describe_metrics("solid", solid.picture, report);
 }
 

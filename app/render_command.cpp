@@ -42,6 +42,7 @@ struct RenderArguments {
 struct Scene {
   SurfaceMesh surface;
   std::optional<Eigen::Matrix3Xd> normals;  ///< Of a solid's own surface, for the smooth model.
+  std::optional<SampledSurface> spline;     ///< A lens's own, for the spline model.
   RenderOptions render;
   std::optional<Image> target;
 };
@@ -61,18 +62,15 @@ bool is_step(const std::string& source) {
   return extension == ".step" || extension == ".stp";
 }
 
-/// Points at which a solid is sampled, as export does for the picture that it prints.
-constexpr double kSolidPoints = 4e6;
-
 Scene load_solid(const std::string& source, const Executor& executor, const RunControl& control,
                  const Console& console) {
-  SolidSurface solid = read_solid_surface(source, kSolidPoints, executor, control);
+  SolidSurface solid = read_solid_surface(source, kPictureNodes, executor, control);
   console.note(std::to_string(solid.faces) + (solid.faces == 1 ? " face" : " faces") +
                (solid.by_name ? " named \"optical surface\""
                               : " found by shape: the faces that point towards +z"));
   SampledSurface& samples = solid.samples;
   const RenderOptions render{SurfaceModel::kSmooth, setup_for_mesh(samples.mesh)};
-  return {std::move(samples.mesh), std::move(samples.normals), render, {}};
+  return {std::move(samples.mesh), std::move(samples.normals), {}, render, {}};
 }
 
 Scene load(const std::string& source, const Executor& executor, const RunControl& control,
@@ -81,11 +79,13 @@ Scene load(const std::string& source, const Executor& executor, const RunControl
   if (is_folder(source)) {
     Lens lens = read_lens(source);
     note_unfinished_design(lens, console);
-    return {std::move(lens.surface), {}, {lens.model, lens.setup}, std::move(lens.target)};
+    Scene scene{std::move(lens.surface), {}, {}, {lens.model, lens.setup}, std::move(lens.target)};
+    if (lens.spline) scene.spline = picture_nodes(*lens.spline);
+    return scene;
   }
   SurfaceMesh mesh = read_mesh(source);
   const RenderOptions render{RenderOptions{}.model, setup_for_mesh(mesh)};
-  return {std::move(mesh), {}, render, {}};
+  return {std::move(mesh), {}, {}, render, {}};
 }
 
 /// Tells what a large picture takes, or refuses it.
@@ -103,6 +103,10 @@ Scene adjusted(Scene scene, OptionSet& options, RenderArguments& arguments,
   arguments.render = scene.render;
   options.restate();
   scene.render = arguments.render;
+  if (scene.render.model == SurfaceModel::kSpline && !scene.spline) {
+    throw InputError("--model spline: must be facet or smooth, since " + arguments.source +
+                     " is no lens that was designed as a spline");
+  }
   const OpticalSetup& setup = scene.render.setup;
   announce_picture(setup, arguments.out, console);
   if (options.given("--target")) scene.target = read_image(arguments.target).image;
@@ -131,7 +135,17 @@ bool has_normals_for(SurfaceModel model, const Scene& scene) {
   return model == SurfaceModel::kSmooth && scene.normals.has_value();
 }
 
+std::vector<SurfaceModel> models_of(const Scene& scene) {
+  std::vector<SurfaceModel> models(kMeshModels.begin(), kMeshModels.end());
+  if (scene.spline) models.push_back(SurfaceModel::kSpline);
+  return models;
+}
+
 ImageMetrics judge(const Scene& scene, SurfaceModel model, Image* image, const Executor& executor) {
+  if (model == SurfaceModel::kSpline) {
+    return evaluate(scene.spline->mesh, scene.spline->normals, scene.render.setup, *scene.target,
+                    image, executor);
+  }
   if (has_normals_for(model, scene)) {
     return evaluate(scene.surface, *scene.normals, scene.render.setup, *scene.target, image,
                     executor);
@@ -142,7 +156,7 @@ ImageMetrics judge(const Scene& scene, SurfaceModel model, Image* image, const E
 Rendering compare_models(const Scene& scene, const Executor& executor) {
   Rendering rendering;
   ModelMetrics metrics;
-  for (const SurfaceModel model : kSurfaceModels) {
+  for (const SurfaceModel model : models_of(scene)) {
     Image* image = model == scene.render.model ? &rendering.image : nullptr;
     metrics[model] = judge(scene, model, image, executor);
   }
@@ -151,11 +165,18 @@ Rendering compare_models(const Scene& scene, const Executor& executor) {
   return rendering;
 }
 
+RenderResult project(const Scene& scene, const Executor& executor) {
+  const RenderOptions& render = scene.render;
+  if (render.model == SurfaceModel::kSpline) {
+    return render_surface(scene.spline->mesh, scene.spline->normals, render.setup, executor);
+  }
+  return has_normals_for(render.model, scene)
+             ? render_surface(scene.surface, *scene.normals, render.setup, executor)
+             : render_surface(scene.surface, render.setup, render.model, executor);
+}
+
 Rendering render_alone(const Scene& scene, const Executor& executor) {
-  const RenderResult result =
-      has_normals_for(scene.render.model, scene)
-          ? render_surface(scene.surface, *scene.normals, scene.render.setup, executor)
-          : render_surface(scene.surface, scene.render.setup, scene.render.model, executor);
+  const RenderResult result = project(scene, executor);
   return {result.image,
           {{"flux_inside", result.flux_inside}},
           "  " + model_name(scene.render.model) + "  flux inside " +

@@ -149,7 +149,8 @@ OptionTable<O> blank_rows() {
       R::number("--shrinkage", &O::shrinkage, Limits::between(0, kMaxShrinkage), "",
                 "shrinkage of the cast part, share of a length"),
       R::word<Surface>("--surface", &O::surface, surfaces(),
-                       "cut what was designed, the smooth surface over the mesh, or its facets")};
+                       "cut what was designed, the smooth surface over the mesh, its facets, or a "
+                       "lens's own spline")};
 }
 
 /// The size of a program, which the options hold in bytes.

@@ -103,7 +103,7 @@ class Job {
     // A mould's own surface is another than that of the lens that is cast in it.
     std::unique_ptr<MeantSurface> lens;
     if (plan_.mould()) {
-      lens = meant_surface(optical_surface(lens_.surface, options_.surface.value_or(lens_.model)));
+      lens = meant_surface(optical_surface(lens_, plan_.model()));
     }
     const Eigen::AlignedBox2d rectangle(Eigen::Vector2d(0.0, 0.0), lens_.setup.lens_size);
     const PartSurfaces surfaces({lens ? lens->field() : cut->field(), *rounded, rectangle,

@@ -58,7 +58,15 @@ void validate_tool_numbers(const CamOptions& options) {
 }  // namespace
 
 const char* words_for(SurfaceModel surface) {
-  return surface == SurfaceModel::kSmooth ? "smooth, over the mesh" : "facets of the mesh";
+  switch (surface) {
+    case SurfaceModel::kFacet:
+      return "facets of the mesh";
+    case SurfaceModel::kSmooth:
+      break;
+    case SurfaceModel::kSpline:
+      return "the lens's spline";
+  }
+  return "smooth, over the mesh";
 }
 
 const char* words_for(ZZero zero) {

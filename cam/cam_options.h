@@ -47,8 +47,8 @@ struct CamOptions {
 
   PartKind part = PartKind::kLens;
   double shrinkage = 0.0;  ///< Of what is cast in a mould, share of a length, 0 … 0.2.
-  /// What is cut: the facets as they are, or the smooth surface over the mesh (SmoothSurface); none
-  /// takes what the lens was designed as.
+  /// What is cut: the facets as they are, the smooth surface over the mesh (SmoothSurface), or the
+  /// lens's own spline; none takes what the lens was designed as.
   std::optional<SurfaceModel> surface;
 
   bool force = false;  ///< Replace files that no cut wrote as they stand.

@@ -20,9 +20,17 @@ constexpr double kSketchSpacing = 0.5;
 /// Unit of a program's last decimal where nothing is rounded, mm.
 constexpr double kUnrounded = 1e-9;
 
-SurfaceMesh mesh_to_cut(const Lens& lens, const CamOptions& options) {
-  if (options.part == PartKind::kLens) return lens.surface;
-  return mould_surface(lens.surface, {options.shrinkage});
+/// The lens, or what its mould would be as a lens.
+Lens lens_to_cut(const Lens& lens, const CamOptions& options) {
+  return options.part == PartKind::kLens ? lens : mould_lens(lens, {options.shrinkage});
+}
+
+/// @throw InputError if the lens is no spline and one is to be cut.
+SurfaceModel model_to_cut(const Lens& lens, const CamOptions& options) {
+  const SurfaceModel model = options.surface.value_or(lens.model);
+  if (model != SurfaceModel::kSpline || lens.spline) return model;
+  throw InputError("--surface spline: must be facet or smooth, since this lens was designed as " +
+                   model_name(lens.model));
 }
 
 Eigen::Vector2d size_to_cut(const Lens& lens, const CamOptions& options) {
@@ -56,14 +64,15 @@ CutPlan::CutPlan(const Lens& lens, const CamOptions& options, const Executor& ex
     : lens_(lens),
       options_(options),
       executor_(executor),
-      mesh_(mesh_to_cut(lens, options)),
-      field_(above_table(inspect_height_field(mesh_, size_to_cut(lens, options)))),
+      cut_(lens_to_cut(lens, options)),
+      model_(model_to_cut(lens, options)),
+      field_(above_table(inspect_height_field(mesh(), size_to_cut(lens, options)))),
       blank_(options_.workshop.stock.box(field_.box)),
       z_offset_(z_offset_of(options.z_zero, field_.box.max().z(), blank_.max().z())),
       decimals_(decimals_of(options_)),
-      profile_(mesh_),
+      profile_(mesh()),
       stock_(whole_blank(options_.workshop, field_.box)),
-      optical_(optical_surface(mesh_, options_.surface.value_or(lens.model))),
+      optical_(optical_surface(cut_, model_)),
       surface_(surface_to_cut(optical_, ball().radius(), executor)),
       collisions_(profile_, options_.workshop, stock_),
       watch_(collisions_, options_.workshop.tools, z_offset_,
@@ -133,7 +142,7 @@ OperationSummary CutPlan::run_pencil(double resolution, const MoveSink& sink,
                                      const RunControl& control) const {
   PencilOptions pencil = pencil_options(options_, z_offset_, field_.box.max().z());
   pencil.resolution = resolution;
-  return cut_pencil(*surface_, find_valleys(mesh_, ball().radius(), pencil), pencil,
+  return cut_pencil(*surface_, find_valleys(mesh(), ball().radius(), pencil), pencil,
                     {"pencil", ball(), safe_z()}, sink, control);
 }
 

@@ -55,7 +55,9 @@ class CutPlan {
 
   [[nodiscard]] const CamOptions& options() const { return options_; }
   /// What is cut: the lens's surface or the mould's; mm, in a lens frame of its own.
-  [[nodiscard]] const SurfaceMesh& mesh() const { return mesh_; }
+  [[nodiscard]] const SurfaceMesh& mesh() const { return cut_.surface; }
+  /// Under which model the surface is cut.
+  [[nodiscard]] SurfaceModel model() const { return model_; }
   /// The optical surface that it stands for.
   [[nodiscard]] const std::shared_ptr<const OpticalSurface>& optical() const { return optical_; }
   /// The same for the finishing ball.
@@ -101,7 +103,8 @@ class CutPlan {
   const Lens& lens_;
   CamOptions options_;
   Executor executor_;
-  SurfaceMesh mesh_;
+  Lens cut_;  ///< lens_, or what its mould would be as a lens.
+  SurfaceModel model_;
   HeightField field_;
   Eigen::AlignedBox3d blank_;
   double z_offset_ = 0.0;

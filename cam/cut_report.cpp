@@ -338,7 +338,7 @@ ReportData make_report(const CutPlan& plan, const ProgramFiles& programs,
   data.leakage_options = options.leakage;
   data.operations = report_operations(plan, programs);
   data.tools = tools_of(plan, programs);
-  data.parameters = {finish_parameters(plan, options.surface.value_or(lens.model))};
+  data.parameters = {finish_parameters(plan, plan.model())};
   const Process& process = options.workshop.process;
   if (process.rough.enabled || process.semi.enabled) {
     data.parameters.push_back(entry_parameters(process));

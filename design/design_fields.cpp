@@ -41,7 +41,8 @@ const OptionTable<DesignOptions>& design_fields() {
                  "maximum iterations of the correspondence-guided update (Sun et al., Eq. 20)"),
         R::word<SurfaceModel>(
             "--model", &O::model, named_models(),
-            "surface model: flat facets, or smooth with a normal at every vertex"),
+            "surface model: flat facets, smooth with a normal at every vertex, or one smooth "
+            "spline from design to STEP"),
         R::word<ViewSide>(
             "--view", &O::view, {{"front", ViewSide::kFront}, {"rear", ViewSide::kRear}},
             "picture seen on a wall from the lens's side, or on a screen from behind"),

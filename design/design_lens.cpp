@@ -10,6 +10,7 @@
 #include "design/schedule/checkpoint.h"
 #include "design/schedule/design_log.h"
 #include "design/schedule/design_task.h"
+#include "design/schedule/spline_start.h"
 
 namespace lensforge {
 namespace {
@@ -19,17 +20,29 @@ void rest_on_thickness(SurfaceMesh& mesh, double thickness) {
   mesh.vertices.row(2).array() += thickness - mesh.vertices.row(2).minCoeff();
 }
 
+/// The surface of a design, finished or not: before its last level a spline is a smooth mesh.
+void take_surface(const DesignTask& task, SurfaceMesh mesh, Lens& lens) {
+  const Level& last = task.levels.back();
+  if (last.spline && mesh.grid == last.grid) {
+    lens.model = SurfaceModel::kSpline;
+    lens.spline = settled({mesh.grid, std::move(mesh.vertices)}, task.options.thickness);
+    lens.surface = spline_nodes(*lens.spline, kMeshSamples).mesh;
+    return;
+  }
+  lens.model = last.spline ? SurfaceModel::kSmooth : task.options.model;
+  lens.surface = std::move(mesh);
+  rest_on_thickness(lens.surface, task.options.thickness);
+}
+
 /// @param executor  works on where the task's was stopped.
 Lens make_lens(const DesignTask& task, SurfaceMesh mesh, const Executor& executor) {
   Lens lens;
-  lens.surface = std::move(mesh);
-  rest_on_thickness(lens.surface, task.options.thickness);
+  take_surface(task, std::move(mesh), lens);
   lens.setup = task.setup;
-  lens.model = task.options.model;
   lens.target = task.target;
-  for (const SurfaceModel model : kSurfaceModels) {
+  for (const SurfaceModel model : models_of(lens)) {
     Image* const render = model == lens.model ? &lens.render : nullptr;
-    lens.metrics[model] = evaluate(lens.surface, lens.setup, model, lens.target, render, executor);
+    lens.metrics[model] = evaluate(lens, model, render, executor);
   }
   return lens;
 }

@@ -70,4 +70,13 @@ ImageMetrics evaluate(const SurfaceMesh& mesh, const Eigen::Matrix3Xd& normals,
   return judged(result_of(flux, setup, target.total()), target, rendered);
 }
 
+ImageMetrics evaluate(const Lens& lens, SurfaceModel model, Image* rendered,
+                      const Executor& executor) {
+  if (model != SurfaceModel::kSpline) {
+    return evaluate(lens.surface, lens.setup, model, lens.target, rendered, executor);
+  }
+  const SampledSurface nodes = picture_nodes(*lens.spline);
+  return evaluate(nodes.mesh, nodes.normals, lens.setup, lens.target, rendered, executor);
+}
+
 }  // namespace lensforge

@@ -5,6 +5,7 @@
 #include "core/image/image.h"
 #include "core/image/metrics.h"
 #include "core/optics/optical_setup.h"
+#include "core/surface/lens.h"
 #include "core/surface/surface_mesh.h"
 #include "core/surface/surface_model.h"
 
@@ -25,6 +26,10 @@ RenderResult render_surface(const SurfaceMesh& mesh, const OpticalSetup& setup, 
 /// @pre target has setup.pixels columns and rows.
 ImageMetrics evaluate(const SurfaceMesh& mesh, const OpticalSetup& setup, SurfaceModel model,
                       const Image& target, Image* rendered, const Executor& executor);
+
+/// evaluate() of a lens under one of its models. A spline is looked at in picture_nodes().
+ImageMetrics evaluate(const Lens& lens, SurfaceModel model, Image* rendered,
+                      const Executor& executor);
 
 /// The same for a smooth surface that is known by its own normals at the vertices, 3 × V with
 /// z > 0: what the triangles between them hide does not matter. Computed on the CPU.

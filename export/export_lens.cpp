@@ -21,6 +21,7 @@
 #include "export/export_work.h"
 #include "export/iges_file.h"
 #include "export/mesh_formats.h"
+#include "export/spline_cut.h"
 
 namespace lensforge {
 namespace {
@@ -98,25 +99,46 @@ PictureGoal goal_of(const WantedPicture& wanted) {
           }};
 }
 
+void announce_splines(const Job& job, std::int64_t control_points) {
+  const auto points = static_cast<double>(control_points);
+  job.announce(require_room_for(&spline_solid_work, {"--max-points", points}, job.folder()));
+}
+
+/// Of a mesh: splines that project its picture.
+SplineSolid fitted_splines(const Job& job) {
+  const Lens& lens = job.source.lens;
+  FitOptions options{.tolerance = job.options.tolerance,
+                     .normal_tolerance = job.options.normal_tolerance,
+                     .max_control_points = job.options.max_points,
+                     .picture = {}};
+  SplineSolid solid;
+  const SmoothSurface surface(lens.surface);
+  announce_splines(job, most_control_points(surface, options));
+  job.control.report({"spline knots", 0.0, 0.0, ""});
+  const WantedPicture wanted(lens.surface, lens.setup, lens.target, job.executor);
+  solid.fit = SplineFit{options, {}};
+  options.picture = goal_of(wanted);
+  solid.net = fit_spline_net(surface, options, job.executor, job.control);
+  solid.fit->bound = normal_bound(surface, options.normal_tolerance);
+  solid.picture = picture_of(solid.net, lens, job.executor);
+  return solid;
+}
+
+/// Of a lens that is a spline: that spline.
+SplineSolid own_spline(const Job& job) {
+  const Lens& lens = job.source.lens;
+  announce_splines(job, control_points_of_net(*lens.spline));
+  SplineSolid solid;
+  solid.net = net_of(*lens.spline, job.executor);
+  solid.picture = evaluate(lens, SurfaceModel::kSpline, nullptr, job.executor);
+  return solid;
+}
+
 SplineSolid write_splines(const Job& job) {
   const Lens& lens = job.source.lens;
   const std::string name = job.source.file.string();
   require_rectangle(lens.surface, height_field_outline(lens.surface, name), name);
-  SplineSolid solid;
-  solid.fit = {.tolerance = job.options.tolerance,
-               .normal_tolerance = job.options.normal_tolerance,
-               .max_control_points = job.options.max_points,
-               .picture = {}};
-  const SmoothSurface surface(lens.surface);
-  const auto points = static_cast<double>(most_control_points(surface, solid.fit));
-  job.announce(require_room_for(&spline_solid_work, {"--max-points", points}, job.folder()));
-  job.control.report({"spline knots", 0.0, 0.0, ""});
-  const WantedPicture wanted(lens.surface, lens.setup, lens.target, job.executor);
-  FitOptions fit = solid.fit;
-  fit.picture = goal_of(wanted);
-  solid.net = fit_spline_net(surface, fit, job.executor, job.control);
-  solid.bound = normal_bound(surface, fit.normal_tolerance);
-  solid.picture = picture_of(solid.net, lens, job.executor);
+  SplineSolid solid = lens.spline ? own_spline(job) : fitted_splines(job);
   const StepHeader header = header_of(job);
   job.begin_writing();
   solid.content = job.format == ExportFormat::kIges
@@ -150,10 +172,12 @@ void announce_heights(const Job& job) {
 }
 
 HeightMap write_heights(const Job& job) {
-  const SmoothSurface surface(job.source.lens.surface);
-  const Image heights = height_map(surface, job.options.pixels, job.executor, job.control);
+  const Lens& lens = job.source.lens;
+  const auto surface =
+      optical_surface(lens, lens.spline ? SurfaceModel::kSpline : SurfaceModel::kSmooth);
+  const Image heights = height_map(*surface, job.options.pixels, job.executor, job.control);
   HeightMap map{
-      {heights.columns(), heights.rows()}, surface.box().sizes().x() / heights.columns(), {}};
+      {heights.columns(), heights.rows()}, surface->box().sizes().x() / heights.columns(), {}};
   job.begin_writing();
   if (job.format == ExportFormat::kExr) {
     write_image(heights, job.out, job.control);
@@ -170,6 +194,8 @@ ExportSource read_export_source(const fs::path& folder, ExportSurface surface) {
   if (surface == ExportSurface::kMilled) {
     source.file = folder / lens_file::kCut / "milled.ply";
     source.lens.surface = read_mesh(source.file);
+    source.lens.spline.reset();
+    source.lens.model = SurfaceModel::kSmooth;
   }
   height_field_outline(source.lens.surface, source.file.string());
   return source;
@@ -184,9 +210,8 @@ ExportResult export_lens(const ExportSource& source, const fs::path& out,
   const Lens& lens = source.lens;
   ExportResult result;
   result.format = job.format;
-  for (const SurfaceModel model : kSurfaceModels) {
-    result.metrics[model] =
-        evaluate(lens.surface, lens.setup, model, lens.target, nullptr, executor);
+  for (const SurfaceModel model : models_of(lens)) {
+    result.metrics[model] = evaluate(lens, model, nullptr, executor);
   }
   if (is_spline_solid(job.format)) {
     result.splines = write_splines(job);

@@ -33,12 +33,17 @@ enum class ExportSurface {
 /// @throw InputError as read_lens() does, or if the surface is no height field.
 ExportSource read_export_source(const std::filesystem::path& folder, ExportSurface surface);
 
+/// How a mesh's splines were found.
+struct SplineFit {
+  FitOptions options;
+  NormalBound bound;  ///< What no surface can do better.
+};
+
 /// A solid of splines as it was written.
 struct SplineSolid {
   SplineNet net;
-  FitOptions fit;
-  NormalBound bound;     ///< What no surface can do better.
-  ImageMetrics picture;  ///< That the splines project.
+  std::optional<SplineFit> fit;  ///< Nothing of a lens that is a spline itself.
+  ImageMetrics picture;          ///< That the splines project.
   SolidContent content;
   double mesh_volume = 0.0;  ///< Of the facets, mm³.
 };
@@ -66,7 +71,7 @@ struct ExportResult {
 
   /// Whether a solid of splines holds its tolerances everywhere; true of all else.
   [[nodiscard]] bool within_tolerance() const {
-    return !splines || holds(splines->net.error(), splines->fit);
+    return !splines || !splines->fit || holds(splines->net.error(), splines->fit->options);
   }
 };
 

@@ -16,7 +16,7 @@ GridShape height_map_shape(const Eigen::Vector2d& size, int longer_side) {
           std::max(1, static_cast<int>(std::lround(size.y() / pixel)))};
 }
 
-Image height_map(const SmoothSurface& surface, int longer_side, const Executor& executor,
+Image height_map(const OpticalSurface& surface, int longer_side, const Executor& executor,
                  const RunControl& control) {
   const Eigen::Vector2d size = surface.box().sizes();
   const auto [columns, rows] = height_map_shape(size, longer_side);

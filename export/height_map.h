@@ -6,7 +6,7 @@
 #include "core/compute/executor.h"
 #include "core/compute/run_control.h"
 #include "core/image/image.h"
-#include "core/surface/smooth_surface.h"
+#include "core/surface/optical_surface.h"
 
 namespace lensforge {
 
@@ -17,7 +17,7 @@ GridShape height_map_shape(const Eigen::Vector2d& size, int longer_side);
 /// pixels, seen from +z with y upwards (row 0 is the farthest). 0 where there is no surface.
 /// @param longer_side  pixels on the longer side; the other one follows the rectangle.
 /// @throw Interrupted.
-Image height_map(const SmoothSurface& surface, int longer_side, const Executor& executor,
+Image height_map(const OpticalSurface& surface, int longer_side, const Executor& executor,
                  const RunControl& control = {});
 
 /// Heights that stand for black and white in a grey picture.

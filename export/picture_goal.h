@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 #include <functional>
 
-#include "export/sampled_surface.h"
+#include "core/surface/sampled_surface.h"
 
 namespace lensforge {
 

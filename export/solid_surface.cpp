@@ -24,6 +24,7 @@
 
 #include "core/error.h"
 #include "core/io/files.h"
+#include "core/surface/control_net.h"
 #include "export/byte_record.h"
 #include "export/child_work.h"
 #include "export/face_sampler.h"
@@ -322,9 +323,7 @@ std::optional<SampledSurface> on_knots(const std::vector<OpticalFace>& faces, do
     cells.push_back(*found);
     all += double{1} * cells.back()[0] * cells.back()[1];
   }
-  constexpr double kMaxSampling = 256.0;
-  const auto density =
-      static_cast<int>(std::clamp(std::ceil(std::sqrt(points / all)), 2.0, kMaxSampling));
+  const int density = samples_for(points, all);
   SurfaceBuilder builder;
   for (std::size_t i = 0; i < faces.size(); ++i) {
     const FaceSampler sampler(faces[i].face);

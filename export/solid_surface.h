@@ -5,7 +5,7 @@
 
 #include "core/compute/executor.h"
 #include "core/compute/run_control.h"
-#include "export/sampled_surface.h"
+#include "core/surface/sampled_surface.h"
 
 namespace lensforge {
 

@@ -5,10 +5,10 @@
 #include <cstddef>
 
 #include "core/error.h"
-#include "export/cubic_spline.h"
-#include "export/grid_warp.h"
+#include "core/surface/grid_warp.h"
+#include "core/surface/slope_fit.h"
 #include "export/light_fit.h"
-#include "export/slope_fit.h"
+#include "export/spline_cut.h"
 #include "export/spline_net.h"
 
 // One spline over the whole rectangle is fitted (SlopeFit, LightFit) and then cut into patches,
@@ -26,11 +26,10 @@ constexpr double kHeightStep = 1e-7;
 constexpr double kCutStep = 1e-8;
 
 double rounded_height(double value) { return std::round(value / kHeightStep) * kHeightStep; }
-double rounded_cut(double value) { return std::round(value / kCutStep) * kCutStep; }
 
-std::vector<double> lines(double from, double to, int count) {
-  std::vector<double> result;
-  for (int i = 0; i <= count; ++i) result.push_back(from + (to - from) * i / count);
+std::vector<int> lines(int cells, int count) {
+  std::vector<int> result;
+  for (int i = 0; i <= count; ++i) result.push_back(cells * i);
   return result;
 }
 
@@ -52,9 +51,6 @@ class NetFitter {
         limit_(control_point_limit(options, surface.mesh())) {
     mesh_cell_ = mesh_cell(surface);
     divide(kMeshCellsPerPatch * mesh_cell_);
-    net_.u = lines(surface.box().min().x(), surface.box().max().x(), net_.columns);
-    net_.v = lines(surface.box().min().y(), surface.box().max().y(), net_.rows);
-    net_.patches.resize(table_index(0, net_.rows, net_.columns));
   }
 
   [[nodiscard]] std::int64_t most_control_points() const {
@@ -85,7 +81,7 @@ class NetFitter {
   }
 
  private:
-  [[nodiscard]] int patch_count() const { return static_cast<int>(net_.patches.size()); }
+  [[nodiscard]] int patch_count() const { return net_.columns * net_.rows; }
 
   /// Patches about `side` wide, or wider where the control points would not do for them.
   void divide(double side) {
@@ -107,88 +103,18 @@ class NetFitter {
   }
 
   [[nodiscard]] SlopeFit slope_fit(int cells) const {
-    return {surface_, warp_, {cells * net_.columns, cells * net_.rows}, executor_, control_};
+    return {surface_, warp_, {cells * net_.columns, cells * net_.rows}, 1.0, executor_, control_};
   }
 
   /// Cuts the whole spline into the net's patches and edges.
   void cut(const SplinePlan& plan, const Eigen::MatrixXd& heights, int cells) {
-    const std::array<Eigen::MatrixXd, 3> whole{plan[0], plan[1],
-                                               heights.unaryExpr(&rounded_height)};
-    std::vector<Eigen::MatrixXd> onto_u;
-    std::vector<Eigen::MatrixXd> onto_v;
-    onto_u.reserve(static_cast<std::size_t>(net_.columns));
-    onto_v.reserve(static_cast<std::size_t>(net_.rows));
-    for (int c = 0; c < net_.columns; ++c) {
-      onto_u.push_back(restriction(cells * net_.columns, cells * c, cells * (c + 1)));
-    }
-    for (int r = 0; r < net_.rows; ++r) {
-      onto_v.push_back(restriction(cells * net_.rows, cells * r, cells * (r + 1)));
-    }
-    parallel_for(executor_, "spline patches", patch_count(), [&](std::int64_t i) {
-      const auto column = static_cast<std::size_t>(i % net_.columns);
-      const auto row = static_cast<std::size_t>(i / net_.columns);
-      SplinePatch& patch = net_.patches[static_cast<std::size_t>(i)];
-      patch.box = {Eigen::Vector2d(net_.u[column], net_.v[row]),
-                   Eigen::Vector2d(net_.u[column + 1], net_.v[row + 1])};
-      patch.cells = cells;
-      for (std::size_t k = 0; k < 3; ++k) {
-        const auto block = whole[k].block(cells * (i % net_.columns), cells * (i / net_.columns),
-                                          cells + 3, cells + 3);
-        patch.coefficients[k] =
-            (onto_u[column] * block * onto_v[row].transpose()).unaryExpr(&rounded_cut);
-      }
-    });
-    share_borders(cells);
-    take_edges(cells);
-  }
-
-  /// Rounding may have told two patches apart along their common line.
-  void share_borders(int cells) {
-    for (int i = 0; i < patch_count(); ++i) {
-      const int c = i % net_.columns;
-      const int r = i / net_.columns;
-      for (std::size_t k = 0; k < 3; ++k) {
-        Eigen::MatrixXd& part = net_.patches[static_cast<std::size_t>(i)].coefficients[k];
-        if (c > 0) part.row(0) = neighbour(c - 1, r).coefficients[k].row(cells + 2);
-        if (r > 0) part.col(0) = neighbour(c, r - 1).coefficients[k].col(cells + 2);
-      }
-    }
-  }
-
-  [[nodiscard]] const SplinePatch& neighbour(int column, int row) const {
-    return net_.patches[table_index(column, row, net_.columns)];
-  }
-
-  void take_edges(int cells) {
-    net_.edges_u.clear();
-    net_.edges_v.clear();
-    for (int line = 0; line <= net_.rows; ++line) {
-      for (int c = 0; c < net_.columns; ++c) {
-        SplineEdge edge{cells, Eigen::Matrix3Xd(3, cells + 3)};
-        const SplinePatch& patch = neighbour(c, std::min(line, net_.rows - 1));
-        for (Eigen::Index k = 0; k < 3; ++k) {
-          edge.coefficients.row(k) =
-              patch.coefficients[static_cast<std::size_t>(k)].col(line < net_.rows ? 0 : cells + 2);
-        }
-        net_.edges_u.push_back(std::move(edge));
-      }
-    }
-    for (int r = 0; r < net_.rows; ++r) {
-      for (int line = 0; line <= net_.columns; ++line) {
-        SplineEdge edge{cells, Eigen::Matrix3Xd(3, cells + 3)};
-        const SplinePatch& patch = neighbour(std::min(line, net_.columns - 1), r);
-        for (Eigen::Index k = 0; k < 3; ++k) {
-          edge.coefficients.row(k) = patch.coefficients[static_cast<std::size_t>(k)].row(
-              line < net_.columns ? 0 : cells + 2);
-        }
-        net_.edges_v.push_back(std::move(edge));
-      }
-    }
+    net_ = cut_spline({surface_.box(), {plan[0], plan[1], heights.unaryExpr(&rounded_height)}},
+                      {lines(cells, net_.columns), lines(cells, net_.rows)}, kCutStep, executor_);
   }
 
   void certify() {
     const SplinePatch& first = net_.patches.front();
-    const double mesh_cells = first.box.sizes().maxCoeff() / first.cells / mesh_cell_;
+    const double mesh_cells = first.box.sizes().maxCoeff() / first.cells_u / mesh_cell_;
     const double density = std::max<double>(kMinDensity, kCertificateDensity * mesh_cells);
     parallel_for(
         executor_, "spline errors", patch_count(),

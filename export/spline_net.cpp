@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "export/cubic_spline.h"
+#include "core/surface/cubic_spline.h"
 
 namespace lensforge {
 namespace {
@@ -45,11 +45,11 @@ struct Gauss {
 class PatchTable {
  public:
   PatchTable(const SplinePatch& patch, const std::vector<double>& u, const std::vector<double>& v) {
-    const Eigen::Vector2d cell = patch.box.sizes() / patch.cells;
-    const Eigen::MatrixXd across = basis_matrix(v, patch.cells, false).transpose();
-    const Eigen::MatrixXd bent = basis_matrix(v, patch.cells, true).transpose() / cell.y();
-    const auto along = basis_matrix(u, patch.cells, false);
-    const auto steep = basis_matrix(u, patch.cells, true);
+    const Eigen::Vector2d cell = patch.box.sizes().cwiseQuotient(patch.cells());
+    const Eigen::MatrixXd across = basis_matrix(v, patch.cells_v, false).transpose();
+    const Eigen::MatrixXd bent = basis_matrix(v, patch.cells_v, true).transpose() / cell.y();
+    const auto along = basis_matrix(u, patch.cells_u, false);
+    const auto steep = basis_matrix(u, patch.cells_u, true);
     for (std::size_t k = 0; k < 3; ++k) {
       const Eigen::MatrixXd rows = along * patch.coefficients[k];
       value_[k] = rows * across;
@@ -98,10 +98,10 @@ SplinePoint spline_point(const Eigen::Vector3d& p, const Eigen::Vector3d& du,
 
 PatchFrame SplinePatch::frame(const Eigen::Vector2d& uv) const {
   const Eigen::Array2d share = (uv - box.min()).array() / box.sizes().array();
-  const Eigen::Array2d t = (share * cells).max(0.0).min(cells);
-  const CubicBasis bu = cubic_basis(t.x(), cells);
-  const CubicBasis bv = cubic_basis(t.y(), cells);
-  const Eigen::Vector2d scale = cells / box.sizes().array();
+  const Eigen::Array2d t = (share * cells().array()).max(0.0).min(cells().array());
+  const CubicBasis bu = cubic_basis(t.x(), cells_u);
+  const CubicBasis bv = cubic_basis(t.y(), cells_v);
+  const Eigen::Vector2d scale = cells().cwiseQuotient(box.sizes());
   PatchFrame frame;
   for (std::size_t i = 0; i < 4; ++i) {
     for (std::size_t j = 0; j < 4; ++j) {
@@ -123,8 +123,7 @@ SplinePoint SplinePatch::at(const Eigen::Vector2d& uv) const {
 }
 
 double SplinePatch::volume() const {
-  const std::vector<double> points = Gauss::points(cells);
-  const PatchTable table(*this, points, points);
+  const PatchTable table(*this, Gauss::points(cells_u), Gauss::points(cells_v));
   double sum = 0.0;
   for (Eigen::Index i = 0; i < table.rows(); ++i) {
     for (Eigen::Index j = 0; j < table.columns(); ++j) {
@@ -132,7 +131,7 @@ double SplinePatch::volume() const {
              Gauss::kWeight[static_cast<std::size_t>(j % Gauss::kNodes)] * table.volume(i, j);
     }
   }
-  return sum * box.volume() / (double{1} * cells * cells);
+  return sum * box.volume() / cells().prod();
 }
 
 FitError SplineNet::error() const {
@@ -245,8 +244,8 @@ FitError measure_patch(const SplinePatch& patch, const SmoothSurface& surface,
                        const FitOptions& options, int density) {
   FitError error;
   double points = 0.0;
-  const std::vector<double> across = raster(0, patch.cells, density);
-  for (int cell = 0; cell < patch.cells; ++cell) {
+  const std::vector<double> across = raster(0, patch.cells_v, density);
+  for (int cell = 0; cell < patch.cells_u; ++cell) {
     const PatchTable table(patch, raster(cell, cell + 1, density), across);
     for (Eigen::Index i = 0; i < table.rows(); ++i) {
       for (Eigen::Index j = 0; j < table.columns(); ++j) {

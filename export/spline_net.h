@@ -11,9 +11,9 @@
 
 #include "core/compute/executor.h"
 #include "core/compute/run_control.h"
+#include "core/surface/sampled_surface.h"
 #include "core/surface/smooth_surface.h"
 #include "export/picture_goal.h"
-#include "export/sampled_surface.h"
 
 namespace lensforge {
 
@@ -55,20 +55,17 @@ struct PatchFrame {
   Eigen::Vector3d by_v = Eigen::Vector3d::Zero();
 };
 
-/// The point of a box that is nearest: rounding may put points of the rim outside.
-inline Eigen::Vector2d nearest_inside(const Eigen::AlignedBox2d& box, const Eigen::Vector2d& at) {
-  return at.cwiseMax(box.min()).cwiseMin(box.max());
-}
-
-/// A bicubic B-spline surface over a rectangle of parameters: `cells` × `cells` knot cells, twice
-/// continuously differentiable, one height above every (x, y).
+/// A bicubic B-spline surface over a rectangle of parameters: `cells_u` × `cells_v` knot cells,
+/// twice continuously differentiable, one height above every (x, y).
 struct SplinePatch {
   Eigen::AlignedBox2d box;  ///< Of the parameters (u, v), mm on the lens while its grid is flat.
-  int cells = 0;
-  /// Coefficients of x, y and z in mm, (cells + 3) × (cells + 3) each; row index runs along u.
+  int cells_u = 0;
+  int cells_v = 0;
+  /// Coefficients of x, y and z in mm, (cells_u + 3) × (cells_v + 3) each; row index along u.
   std::array<Eigen::MatrixXd, 3> coefficients;
   FitError error;  ///< Certificate: no point of the patch is farther off.
 
+  [[nodiscard]] Eigen::Vector2d cells() const { return Eigen::Vector2d(cells_u, cells_v); }
   /// @pre uv lies in the box, as for frame().
   [[nodiscard]] PatchFrame frame(const Eigen::Vector2d& uv) const;
   [[nodiscard]] SplinePoint at(const Eigen::Vector2d& uv) const;

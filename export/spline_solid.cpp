@@ -38,18 +38,19 @@ TColStd_Array1OfInteger multiplicities(int cells) {
 }
 
 Handle(Geom_BSplineSurface) surface_of(const SplinePatch& patch) {
-  const int n = patch.cells;
+  const int m = patch.cells_u;
+  const int n = patch.cells_v;
   const Eigen::Vector2d low = patch.box.min();
   const Eigen::Vector2d high = patch.box.max();
-  TColgp_Array2OfPnt poles(1, n + kDegree, 1, n + kDegree);
+  TColgp_Array2OfPnt poles(1, m + kDegree, 1, n + kDegree);
   const auto& [x, y, z] = patch.coefficients;
-  for (int i = 0; i < n + kDegree; ++i) {
+  for (int i = 0; i < m + kDegree; ++i) {
     for (int j = 0; j < n + kDegree; ++j) {
       poles(i + 1, j + 1) = gp_Pnt(x(i, j), y(i, j), z(i, j));
     }
   }
-  return new Geom_BSplineSurface(poles, knots(low.x(), high.x(), n), knots(low.y(), high.y(), n),
-                                 multiplicities(n), multiplicities(n), kDegree, kDegree);
+  return new Geom_BSplineSurface(poles, knots(low.x(), high.x(), m), knots(low.y(), high.y(), n),
+                                 multiplicities(m), multiplicities(n), kDegree, kDegree);
 }
 
 Handle(Geom_BSplineCurve) curve_of(const SplineEdge& edge, double from, double to) {

@@ -27,29 +27,49 @@ std::int64_t turned(const GridShape& grid, std::int64_t vertex) {
   return vertex - column + (grid.columns - 1 - column);
 }
 
+/// Points of a lens on its mould, those of a grid in the grid's new order.
+Eigen::Matrix3Xd turned_over(const Eigen::Matrix3Xd& points, const GridShape& grid,
+                             const Eigen::Vector2d& corner, const MouldOptions& options) {
+  const double scale = 1.0 / (1.0 - options.shrinkage);
+  Eigen::Matrix3Xd result(3, points.cols());
+  for (Eigen::Index v = 0; v < points.cols(); ++v) {
+    const Eigen::Vector3d at = points.col(v);
+    result.col(turned(grid, v)) =
+        scale * Eigen::Vector3d(corner.x() - at.x(), at.y(), corner.y() - at.z()) +
+        Eigen::Vector3d(0.0, 0.0, options.thickness);
+  }
+  return result;
+}
+
+/// Right side and top of a lens, which are left and bottom of its mould.
+Eigen::Vector2d far_corner(const SurfaceMesh& lens) {
+  return {lens.vertices.row(0).maxCoeff(), lens.vertices.row(2).maxCoeff()};
+}
+
 }  // namespace
 
 SurfaceMesh mould_surface(const SurfaceMesh& lens, const MouldOptions& options) {
   validate(options);
   SurfaceMesh mould;
   mould.grid = lens.grid;
-  mould.vertices.resize(3, lens.vertex_count());
   mould.triangles.resize(3, lens.triangle_count());
   if (lens.vertex_count() == 0) return mould;
-  const double scale = 1.0 / (1.0 - options.shrinkage);
-  const double width = lens.vertices.row(0).maxCoeff();
-  const double top = lens.vertices.row(2).maxCoeff();
-  for (std::int64_t v = 0; v < lens.vertex_count(); ++v) {
-    const Eigen::Vector3d at = lens.vertices.col(v);
-    mould.vertices.col(turned(lens.grid, v)) =
-        scale * Eigen::Vector3d(width - at.x(), at.y(), top - at.z()) +
-        Eigen::Vector3d(0.0, 0.0, options.thickness);
-  }
+  mould.vertices = turned_over(lens.vertices, lens.grid, far_corner(lens), options);
   // A rotation keeps the triangles' sense; the mould is the other side of the same surface.
   for (std::int64_t t = 0; t < lens.triangle_count(); ++t) {
     for (int k = 0; k < 3; ++k) {
       mould.triangles(2 - k, t) = static_cast<int>(turned(lens.grid, lens.triangles(k, t)));
     }
+  }
+  return mould;
+}
+
+Lens mould_lens(const Lens& lens, const MouldOptions& options) {
+  Lens mould = lens;
+  mould.surface = mould_surface(lens.surface, options);
+  if (lens.spline) {
+    mould.spline->points =
+        turned_over(lens.spline->points, lens.spline->shape, far_corner(lens.surface), options);
   }
   return mould;
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "core/surface/lens.h"
 #include "core/surface/surface_mesh.h"
 
 namespace lensforge {
@@ -23,5 +24,9 @@ struct MouldOptions {
 /// @pre the lens's rectangle begins at (0, 0).
 /// @throw InputError naming option, value and rule.
 SurfaceMesh mould_surface(const SurfaceMesh& lens, const MouldOptions& options);
+
+/// The same of a lens that is a spline: its spline too, and the mesh of that spline's nodes.
+/// @throw InputError as mould_surface() does.
+Lens mould_lens(const Lens& lens, const MouldOptions& options);
 
 }  // namespace lensforge

@@ -9,6 +9,7 @@ namespace lensforge {
 namespace lens_file {
 inline constexpr const char* kJson = "lens.json";
 inline constexpr const char* kSurface = "surface.ply";
+inline constexpr const char* kSpline = "surface.spline";
 inline constexpr const char* kTargetPng = "target.png";
 inline constexpr const char* kTargetExr = "target.exr";
 inline constexpr const char* kRenderPng = "render.png";
@@ -19,8 +20,9 @@ inline constexpr const char* kOverview = "overview.png";
 inline constexpr const char* kCheckpoint = "checkpoint.bin";  ///< While a design is unfinished.
 
 /// All of them.
-inline constexpr std::array kAll = {kJson,      kSurface, kTargetPng, kTargetExr,   kRenderPng,
-                                    kRenderExr, kError,   kOverview,  kConvergence, kCheckpoint};
+inline constexpr std::array kAll = {kJson,      kSurface,     kSpline,    kTargetPng,
+                                    kTargetExr, kRenderPng,   kRenderExr, kError,
+                                    kOverview,  kConvergence, kCheckpoint};
 
 /// Folder in which earlier versions put a lens together; a killed one has left it behind.
 inline constexpr const char* kStaging = "lens";

@@ -16,6 +16,8 @@
 #include "core/surface/height_field_check.h"
 #include "core/surface/lens_surface.h"
 #include "core/surface/mesh_io.h"
+#include "core/surface/spline_file.h"
+#include "core/surface/spline_surface.h"
 #include "core/text/json_fields.h"
 #include "core/text/json_text.h"
 
@@ -61,7 +63,7 @@ ordered_json to_json(const Lens& lens) {
   const OpticalSetup& setup = lens.setup;
   const GridShape& grid = lens.surface.grid;
   LF_CHECK(setup.light == Eigen::Vector3d::UnitZ(), "the lens file holds no direction yet");
-  return {
+  ordered_json document = {
       {"format", kFormat},
       {"version", kVersion},
       {"units", "mm"},
@@ -80,6 +82,8 @@ ordered_json to_json(const Lens& lens) {
       {"metrics", to_json(lens.metrics)},
       {"provenance", ordered_json(lens.provenance)},
   };
+  if (lens.spline) document["spline"] = lens_file::kSpline;
+  return document;
 }
 
 void add_files(const Lens& lens, PendingFiles& files) {
@@ -87,7 +91,14 @@ void add_files(const Lens& lens, PendingFiles& files) {
   const auto add = [&files](const char* name, const auto& content) {
     files.add(name, [&](const fs::path& beside) { write_image(content, beside); });
   };
-  files.add(kSurface, [&](const fs::path& beside) { write_ply(lens.surface, beside); });
+  if (lens.spline) {
+    const SampledSurface nodes = spline_nodes(*lens.spline, kMeshSamples);
+    files.add(kSurface,
+              [&](const fs::path& beside) { write_ply(nodes.mesh, nodes.normals, beside); });
+    files.add(kSpline, [&](const fs::path& beside) { write_spline(*lens.spline, beside); });
+  } else {
+    files.add(kSurface, [&](const fs::path& beside) { write_ply(lens.surface, beside); });
+  }
   add(kTargetPng, lens.target);
   add(kTargetExr, lens.target);
   if (!lens.render.empty()) {
@@ -103,12 +114,15 @@ void add_files(const Lens& lens, PendingFiles& files) {
 void remove_older(const PendingFiles& files) {
   using namespace lens_file;
   fs::remove(files.folder() / kJson);
-  for (const char* name : {kSurface, kTargetPng, kTargetExr, kRenderPng, kRenderExr, kError}) {
+  for (const char* name :
+       {kSurface, kSpline, kTargetPng, kTargetExr, kRenderPng, kRenderExr, kError}) {
     if (!files.has(name)) fs::remove(files.folder() / name);
   }
 }
 
 void check_sizes(const Lens& lens) {
+  LF_CHECK(lens.spline.has_value() == (lens.model == SurfaceModel::kSpline),
+           model_name(lens.model));
   const Eigen::Vector2i& pixels = lens.setup.pixels;
   const auto fits = [&](const Image& image) {
     return image.columns() == pixels.x() && image.rows() == pixels.y();
@@ -200,20 +214,49 @@ GridShape read_grid(const JsonFields& fields, const SurfaceMesh& mesh) {
   return grid;
 }
 
+/// The file in the lens folder that a field names.
+fs::path named_file(const JsonFields& fields, const std::string& field, const fs::path& folder) {
+  const fs::path name = fields.text(field);
+  if (name.empty() || name == ".." || name != name.filename()) {
+    fields.refuse(field, "it must be the name of a file in the lens folder");
+  }
+  return folder / name;
+}
+
+ControlNet read_own_spline(const JsonFields& fields, const OpticalSetup& setup,
+                           const fs::path& folder) {
+  const fs::path path = named_file(fields, "spline", folder);
+  ControlNet net = read_spline(path);
+  if (const auto fault = spline_fault(net, setup)) throw InputError(path.string() + ": " + *fault);
+  return net;
+}
+
+/// How far the mesh of a spline may be from its nodes, mm.
+constexpr double kNodeTolerance = 1e-6;
+
+/// @throw InputError unless the mesh has the spline's nodes.
+void check_nodes(const SurfaceMesh& mesh, const ControlNet& net, const fs::path& folder) {
+  const SurfaceMesh nodes = spline_nodes(net, kMeshSamples).mesh;
+  if (mesh.vertex_count() == nodes.vertex_count() &&
+      (mesh.vertices - nodes.vertices).cwiseAbs().maxCoeff() <= kNodeTolerance) {
+    return;
+  }
+  throw InputError(folder.string() + ": " + lens_file::kSurface + " and " + lens_file::kSpline +
+                   " hold two surfaces; the mesh must have the spline's nodes, " +
+                   size_text(nodes.grid.columns, nodes.grid.rows));
+}
+
 SurfaceMesh read_surface(const JsonFields& fields, const OpticalSetup& setup,
                          const fs::path& folder) {
-  const fs::path name = fields.text("surface");
-  if (name.empty() || name == ".." || name != name.filename()) {
-    fields.refuse("surface", "it must be the name of a file in the lens folder");
-  }
-  SurfaceMesh mesh = read_mesh(folder / name);
+  const fs::path file = named_file(fields, "surface", folder);
+  SurfaceMesh mesh = read_mesh(file);
   if (const auto fault = surface_fault(mesh, setup)) {
-    throw InputError((folder / name).string() + ": " + *fault);
+    throw InputError(file.string() + ": " + *fault);
   }
   mesh.grid = read_grid(fields, mesh);
   // A grid was checked cell by cell, which is faster.
   const auto fault = mesh.grid.is_grid() ? std::nullopt : height_field_fault(mesh, setup.lens_size);
-  if (fault) throw InputError((folder / name).string() + ": " + *fault);
+  if (fault) throw InputError(file.string() + ": " + *fault);
   return mesh;
 }
 
@@ -228,6 +271,18 @@ Image read_picture(const fs::path& path, const OpticalSetup& setup) {
 }
 
 }  // namespace
+
+std::vector<SurfaceModel> models_of(const Lens& lens) {
+  std::vector<SurfaceModel> models(kMeshModels.begin(), kMeshModels.end());
+  if (lens.spline) models.push_back(SurfaceModel::kSpline);
+  return models;
+}
+
+std::shared_ptr<const OpticalSurface> optical_surface(const Lens& lens, SurfaceModel model) {
+  if (model != SurfaceModel::kSpline) return optical_surface(lens.surface, model);
+  LF_CHECK(lens.spline.has_value(), model_name(lens.model));
+  return std::make_shared<const SplineSurface>(*lens.spline);
+}
 
 void write_lens(const Lens& lens, PendingFiles files) {
   check_sizes(lens);
@@ -255,13 +310,16 @@ Lens read_lens(const fs::path& folder) {
   Lens lens;
   lens.setup = read_setup(fields, path.string());
   lens.model = choice<SurfaceModel>(fields, "model", named_models());
+  if (lens.model == SurfaceModel::kSpline)
+    lens.spline = read_own_spline(fields, lens.setup, folder);
   const JsonFields metrics = fields.object("metrics");
-  for (const auto& [name, model] : named_models()) {
-    lens.metrics[model] = read_metrics(metrics.object(name));
+  for (const SurfaceModel model : models_of(lens)) {
+    lens.metrics[model] = read_metrics(metrics.object(model_name(model)));
   }
   if (!fields.at("provenance").is_object()) fields.refuse("provenance", "it must be an object");
   lens.provenance = fields.at("provenance");
   lens.surface = read_surface(fields, lens.setup, folder);
+  if (lens.spline) check_nodes(lens.surface, *lens.spline, folder);
   lens.target = read_picture(folder / lens_file::kTargetExr, lens.setup);
   const fs::path render = folder / lens_file::kRenderExr;
   std::error_code none;

@@ -3,13 +3,18 @@
 
 #include <filesystem>
 #include <map>
+#include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <vector>
 
 #include "core/image/image.h"
 #include "core/image/metrics.h"
 #include "core/io/lens_folder.h"
 #include "core/io/pending_files.h"
 #include "core/optics/optical_setup.h"
+#include "core/surface/control_net.h"
+#include "core/surface/optical_surface.h"
 #include "core/surface/surface_mesh.h"
 #include "core/surface/surface_model.h"
 
@@ -21,14 +26,22 @@ using ModelMetrics = std::map<SurfaceModel, ImageMetrics>;
 /// A designed lens: what one command hands to the next.
 struct Lens {
   SurfaceMesh surface;  ///< The optical surface, z ≥ thickness; mm, lens frame.
+  /// That surface itself if the model is a spline; `surface` then has its nodes (kMeshSamples).
+  std::optional<ControlNet> spline;
   OpticalSetup setup;
   SurfaceModel model = SurfaceModel::kFacet;  ///< The model it was designed with.
   Image target;                               ///< Working picture, linear light.
   Image render;                               ///< What the lens projects under `model`.
-  /// What it projects under each model.
+  /// What it projects under each model that it has (models_of()).
   ModelMetrics metrics{{SurfaceModel::kFacet, {}}, {SurfaceModel::kSmooth, {}}};
   nlohmann::json provenance = nlohmann::json::object();
 };
+
+/// The models that a lens's surface can be looked at with: a spline's nodes make a mesh, too.
+std::vector<SurfaceModel> models_of(const Lens& lens);
+
+/// The lens's surface under one of them.
+std::shared_ptr<const OpticalSurface> optical_surface(const Lens& lens, SurfaceModel model);
 
 /// Writes a lens into the folder of `files`, behind what these hold already. All are written beside
 /// before one is renamed, an older lens.json goes first and the new one comes last: a folder with a

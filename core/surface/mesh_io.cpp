@@ -32,7 +32,6 @@ static_assert(std::endian::native == std::endian::little, "write_ply writes litt
 /// this size has 85 million triangles.
 constexpr std::uintmax_t kMaxMeshBytes = std::uintmax_t{4} << 30U;
 
-constexpr std::size_t kVertexBytes = 3 * sizeof(double);
 constexpr std::size_t kTriangleBytes = 1 + 3 * sizeof(std::int32_t);
 
 struct Counts {
@@ -46,11 +45,14 @@ constexpr std::string_view kMarkBegin = "comment lensforge ";
 /// Bytes of the longest mark line that is looked for.
 constexpr std::size_t kLongestMark = 100;
 
+constexpr std::string_view kNormalLines =
+    "property double nx\nproperty double ny\nproperty double nz\n";
+
 /// What follows the format and the mark.
-std::string element_lines(const Counts& counts) {
+std::string element_lines(const Counts& counts, std::string_view normals = "") {
   return "element vertex " + std::to_string(counts.vertices) +
-         "\nproperty double x\nproperty double y\nproperty double z\nelement face " +
-         std::to_string(counts.triangles) +
+         "\nproperty double x\nproperty double y\nproperty double z\n" + std::string(normals) +
+         "element face " + std::to_string(counts.triangles) +
          "\nproperty list uchar int vertex_indices\nend_header\n";
 }
 
@@ -69,13 +71,16 @@ std::int64_t number_after(const std::string& text, const std::string& words) {
 /// The header of a file in our own form.
 struct OwnHeader {
   Counts counts;
+  bool normals = false;  ///< Every vertex is followed by its normal.
   std::size_t bytes = 0;
+
+  [[nodiscard]] Eigen::Index numbers_per_vertex() const { return normals ? 6 : 3; }
 };
 
 /// The header if the file is in the very form that write_ply() makes, with or without its mark.
 std::optional<OwnHeader> own_form(std::ifstream& file) {
-  const std::size_t longest =
-      kFormatLines.size() + kLongestMark + element_lines({INT32_MAX, INT32_MAX}).size();
+  const std::size_t longest = kFormatLines.size() + kLongestMark +
+                              element_lines({INT32_MAX, INT32_MAX}, kNormalLines).size();
   std::string head(longest, '\0');
   file.read(head.data(), static_cast<std::streamsize>(head.size()));
   head.resize(static_cast<std::size_t>(file.gcount()));
@@ -87,27 +92,32 @@ std::optional<OwnHeader> own_form(std::ifstream& file) {
                       number_after(head, "\nelement face ")};
   if (counts.vertices < 0 || counts.vertices > INT32_MAX) return std::nullopt;
   if (counts.triangles < 0 || counts.triangles > INT32_MAX) return std::nullopt;
-  const std::string lines = element_lines(counts);
-  if (head.compare(begin, lines.size(), lines) != 0) return std::nullopt;
-  file.seekg(static_cast<std::streamoff>(begin + lines.size()));
-  return OwnHeader{counts, begin + lines.size()};
+  for (const bool normals : {false, true}) {
+    const std::string lines = element_lines(counts, normals ? kNormalLines : "");
+    if (head.compare(begin, lines.size(), lines) != 0) continue;
+    file.seekg(static_cast<std::streamoff>(begin + lines.size()));
+    return OwnHeader{counts, normals, begin + lines.size()};
+  }
+  return std::nullopt;
 }
 
 /// Our own form is read bit for bit, without rounding to single precision.
 SurfaceMesh read_own_form(std::ifstream& file, const OwnHeader& header, const fs::path& path) {
   const Counts& counts = header.counts;
-  const std::uintmax_t expected = header.bytes +
-                                  static_cast<std::uintmax_t>(counts.vertices) * kVertexBytes +
-                                  static_cast<std::uintmax_t>(counts.triangles) * kTriangleBytes;
+  const std::uintmax_t expected =
+      header.bytes +
+      static_cast<std::uintmax_t>(counts.vertices * header.numbers_per_vertex()) * sizeof(double) +
+      static_cast<std::uintmax_t>(counts.triangles) * kTriangleBytes;
   if (const std::uintmax_t size = fs::file_size(path); size != expected) {
     refuse(path, "is " + std::to_string(size) + " bytes long, its header calls for " +
                      std::to_string(expected) + ": it is truncated or corrupt");
   }
   SurfaceMesh mesh;
-  mesh.vertices.resize(3, counts.vertices);
   mesh.triangles.resize(3, counts.triangles);
-  file.read(reinterpret_cast<char*>(mesh.vertices.data()),
-            static_cast<std::streamsize>(counts.vertices) * std::streamsize{kVertexBytes});
+  Eigen::MatrixXd records(header.numbers_per_vertex(), counts.vertices);
+  file.read(reinterpret_cast<char*>(records.data()),
+            records.size() * std::streamsize{sizeof(double)});
+  mesh.vertices = records.topRows<3>();
   std::array<char, kTriangleBytes> record{};
   for (Eigen::Index t = 0; t < mesh.triangles.cols(); ++t) {
     file.read(record.data(), kTriangleBytes);
@@ -152,17 +162,41 @@ void check_mesh(const SurfaceMesh& mesh, const fs::path& path) {
   }
 }
 
-void write_blocks(const SurfaceMesh& mesh, std::ofstream& file) {
+/// Vertices in turn, each followed by its normal.
+Eigen::MatrixXd with_normals(const SurfaceMesh& mesh, const Eigen::Matrix3Xd& normals) {
+  Eigen::MatrixXd records(6, mesh.vertex_count());
+  records.topRows<3>() = mesh.vertices;
+  records.bottomRows<3>() = normals.colwise().normalized();
+  return records;
+}
+
+/// @param records  what is stored of the vertices, a column each.
+template <class Matrix>
+void write_blocks(const SurfaceMesh& mesh, const Matrix& records, std::ofstream& file) {
+  const std::string_view normals = records.rows() > 3 ? kNormalLines : "";
   file << kFormatLines << "comment " << program_mark() << '\n'
-       << element_lines({mesh.vertex_count(), mesh.triangle_count()});
-  file.write(reinterpret_cast<const char*>(mesh.vertices.data()),
-             mesh.vertex_count() * std::streamsize{kVertexBytes});
+       << element_lines({mesh.vertex_count(), mesh.triangle_count()}, normals);
+  file.write(reinterpret_cast<const char*>(records.data()),
+             records.size() * std::streamsize{sizeof(double)});
   std::array<char, kTriangleBytes> record{3};
   for (Eigen::Index t = 0; t < mesh.triangles.cols() && file; ++t) {
     std::memcpy(&record[1], mesh.triangles.col(t).data(), kTriangleBytes - 1);
     file.write(record.data(), kTriangleBytes);
   }
   file.flush();
+}
+
+template <class Matrix>
+void write_records(const SurfaceMesh& mesh, const Matrix& records, const fs::path& path) {
+  static_assert(sizeof(int) == sizeof(std::int32_t));
+  write_whole_file(path, [&](const fs::path& beside) {
+    errno = 0;
+    std::ofstream file(beside, std::ios::binary | std::ios::trunc);
+    write_blocks(mesh, records, file);
+    if (file) return;
+    throw RunError(path.string() + ": cannot be written: " +
+                   (errno != 0 ? std::generic_category().message(errno) : "unknown reason"));
+  });
 }
 
 }  // namespace
@@ -177,15 +211,11 @@ SurfaceMesh read_mesh(const fs::path& path) {
 }
 
 void write_ply(const SurfaceMesh& mesh, const fs::path& path) {
-  static_assert(sizeof(int) == sizeof(std::int32_t));
-  write_whole_file(path, [&](const fs::path& beside) {
-    errno = 0;
-    std::ofstream file(beside, std::ios::binary | std::ios::trunc);
-    write_blocks(mesh, file);
-    if (file) return;
-    throw RunError(path.string() + ": cannot be written: " +
-                   (errno != 0 ? std::generic_category().message(errno) : "unknown reason"));
-  });
+  write_records(mesh, mesh.vertices, path);
+}
+
+void write_ply(const SurfaceMesh& mesh, const Eigen::Matrix3Xd& normals, const fs::path& path) {
+  write_records(mesh, with_normals(mesh, normals), path);
 }
 
 }  // namespace lensforge

@@ -16,4 +16,8 @@ SurfaceMesh read_mesh(const std::filesystem::path& path);
 /// all. @throw RunError if it cannot be written.
 void write_ply(const SurfaceMesh& mesh, const std::filesystem::path& path);
 
+/// The same with unit normals, `double nx ny nz`. @param normals  3 × V, of any length but 0.
+void write_ply(const SurfaceMesh& mesh, const Eigen::Matrix3Xd& normals,
+               const std::filesystem::path& path);
+
 }  // namespace lensforge

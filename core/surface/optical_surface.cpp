@@ -3,6 +3,7 @@
 
 #include <utility>
 
+#include "core/error.h"
 #include "core/surface/facet_surface.h"
 #include "core/surface/smooth_surface.h"
 
@@ -28,6 +29,8 @@ std::shared_ptr<const OpticalSurface> optical_surface(const SurfaceMesh& mesh, S
       return std::make_shared<const FacetSurface>(mesh);
     case SurfaceModel::kSmooth:
       break;
+    case SurfaceModel::kSpline:
+      LF_CHECK(false, "a mesh is no spline");
   }
   return std::make_shared<const SmoothSurface>(mesh);
 }

@@ -20,6 +20,11 @@ struct SurfacePoint {
   Eigen::Vector2d slope = Eigen::Vector2d::Zero();  ///< ∂z/∂x, ∂z/∂y
 };
 
+/// The point of a box that is nearest: rounding may put points of the rim outside.
+inline Eigen::Vector2d nearest_inside(const Eigen::AlignedBox2d& box, const Eigen::Vector2d& at) {
+  return at.cwiseMax(box.min()).cwiseMin(box.max());
+}
+
 /// Least and largest of a surface's second derivatives in any direction, 1/mm.
 struct BendRange {
   double least = 0.0;
@@ -68,7 +73,8 @@ class OpticalSurface {
   TriangleIndex index_;
 };
 
-/// The surface that a mesh stands for under a model. @pre every triangle faces +z.
+/// The surface that a mesh stands for under a model. @pre every triangle faces +z; a mesh can stand
+/// for the model (kMeshModels).
 std::shared_ptr<const OpticalSurface> optical_surface(const SurfaceMesh& mesh, SurfaceModel model);
 
 }  // namespace lensforge

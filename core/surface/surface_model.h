@@ -8,23 +8,40 @@
 
 namespace lensforge {
 
-/// Which normals send the light: one per triangle (the paper's model), or one per vertex (what a
-/// polished, smooth part does).
-enum class SurfaceModel { kFacet, kSmooth };
+/// Which normals send the light: one per triangle (the paper's model), one per vertex (what a
+/// polished, smooth part does), or those of one C² spline, which is then the surface itself.
+enum class SurfaceModel { kFacet, kSmooth, kSpline };
 
 /// All of them, in the order in which files and commands list them.
-inline constexpr std::array kSurfaceModels{SurfaceModel::kFacet, SurfaceModel::kSmooth};
+inline constexpr std::array kSurfaceModels{SurfaceModel::kFacet, SurfaceModel::kSmooth,
+                                           SurfaceModel::kSpline};
+/// Those that a mesh alone can stand for.
+inline constexpr std::array kMeshModels{SurfaceModel::kFacet, SurfaceModel::kSmooth};
 
 /// As files and options call a model.
 inline std::string model_name(SurfaceModel model) {
-  return model == SurfaceModel::kFacet ? "facet" : "smooth";
+  switch (model) {
+    case SurfaceModel::kFacet:
+      return "facet";
+    case SurfaceModel::kSmooth:
+      break;
+    case SurfaceModel::kSpline:
+      return "spline";
+  }
+  return "smooth";
+}
+
+/// Some models with their names.
+template <class Models>
+std::vector<std::pair<std::string, SurfaceModel>> named(const Models& some) {
+  std::vector<std::pair<std::string, SurfaceModel>> models;
+  for (const SurfaceModel model : some) models.emplace_back(model_name(model), model);
+  return models;
 }
 
 /// Every model with its name.
 inline std::vector<std::pair<std::string, SurfaceModel>> named_models() {
-  std::vector<std::pair<std::string, SurfaceModel>> models;
-  for (const SurfaceModel model : kSurfaceModels) models.emplace_back(model_name(model), model);
-  return models;
+  return named(kSurfaceModels);
 }
 
 }  // namespace lensforge

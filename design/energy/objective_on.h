@@ -41,6 +41,10 @@ class DesignObjectiveOn {
   void relinearize(const double* vertices);
   ObjectiveEvaluation evaluate(const double* vertices, double* gradient);
 
+  /// Normals of the surface that the vertices sample and, after evaluate(), the derivatives by
+  /// them, 3 × V in the executor's memory. @pre the model is a spline.
+  [[nodiscard]] SmoothRays sampled_rays() { return std::get<SmoothRaysOn<Exec>>(rays_).view(); }
+
   /// DesignObjective::movable(), in the caller's memory.
   [[nodiscard]] const Eigen::Matrix3Xd& movable() const { return movable_; }
 
@@ -132,7 +136,8 @@ std::variant<FacetRaysOn<Exec>, SmoothRaysOn<Exec>> rays_of(SurfaceModel model,
   if (model == SurfaceModel::kFacet) {
     return FacetRaysOn<Exec>(mesh.triangle_count(), mesh.vertex_count());
   }
-  return SmoothRaysOn<Exec>(mesh.triangle_count(), mesh.vertex_count());
+  return SmoothRaysOn<Exec>(mesh.triangle_count(), mesh.vertex_count(),
+                            model == SurfaceModel::kSpline);
 }
 
 /// A matrix's entries, column by column.

@@ -14,17 +14,18 @@
 #include "design/optics/columns.h"
 #include "design/optics/smooth.h"
 
-/// Smooth model in the objective: every vertex sends one ray by its normal, and image triangles
-/// share corners.
+/// Smooth and spline model in the objective: every vertex sends one ray by its normal, and image
+/// triangles share corners.
 namespace lensforge {
 
 /// What kernels ask, and the arrays that they share. @pre landing is up to date.
 struct SmoothRays {
-  double* normals;  ///< 3 × V, sums of area normals.
-  double* landing;  ///< 2 × V, pixel coordinates.
+  bool normals_given;  ///< The caller's, of a surface that the mesh samples; not the mesh's own.
+  double* normals;     ///< 3 × V, the caller's, or else sums of area normals.
+  double* landing;     ///< 2 × V, pixel coordinates.
   ImageTriangle* image_bar;
   double* position_bar;  ///< 3 × V, direct derivative by position.
-  double* normal_bar;    ///< 3 × V, derivative by the sum of area normals.
+  double* normal_bar;    ///< 3 × V, derivative by the normals.
 
   [[nodiscard]] LF_HD ImageTriangle image(const ObjectiveView& o, std::int64_t face) const {
     const int* v = o.mesh.triangle(face);
@@ -36,7 +37,7 @@ struct SmoothRays {
   LF_HD GoalSums pull_back(const ObjectiveView& o, std::int64_t face, const Corners& t,
                            FaceBar& bar) const {
     const int* v = o.mesh.triangle(face);
-    for (int k = 0; k < 3; ++k) bar.area_normal += column3(normal_bar, v[k]);
+    for (int k = 0; k < 3 && !normals_given; ++k) bar.area_normal += column3(normal_bar, v[k]);
     o.light.flux_adjoint(t, image_bar[face].flux, bar.corners, bar.area_normal);
     return {};
   }
@@ -52,14 +53,17 @@ struct LandVertex {
   ObjectiveView o;
   SmoothRays rays;
 
-  LF_HD std::array<double, 1> operator()(std::int64_t v) const {
+  [[nodiscard]] LF_HD Eigen::Vector3d mesh_normal(std::int64_t v) const {
     Eigen::Vector3d sum(0.0, 0.0, 0.0);
     const MeshView& mesh = o.mesh;
     for (auto c = mesh.vertex_corner_begin[v]; c < mesh.vertex_corner_begin[v + 1]; ++c) {
       sum += area_normal(o.corners(mesh.vertex_corners[c] / 3));
     }
-    column3(rays.normals, v) = sum;
-    const Eigen::Vector3d n = VertexNormal(sum).n;
+    return sum;
+  }
+  LF_HD std::array<double, 1> operator()(std::int64_t v) const {
+    if (!rays.normals_given) column3(rays.normals, v) = mesh_normal(v);
+    const Eigen::Vector3d n = VertexNormal(column3(rays.normals, v)).n;
     const Eigen::Vector3d p = column3(o.vertices, v);
     if (!o.light.transmits(p, n)) return {1.0};
     column2(rays.landing, v) = project_vertex(p, n, o.light);
@@ -78,7 +82,7 @@ struct SmoothImageAdjoint {
   }
 };
 
-/// Derivatives by a landing point, carried to position and normal sum.
+/// Derivatives by a landing point, carried to position and normal.
 struct PullBackVertex {
   ObjectiveView o;
   SmoothRays rays;
@@ -107,16 +111,17 @@ class SmoothRaysOn {
   static constexpr bool kLeadable = false;
   using View = SmoothRays;
 
-  SmoothRaysOn(std::int64_t faces, std::int64_t vertices)
-      : normals_(3 * static_cast<std::size_t>(vertices)),
+  SmoothRaysOn(std::int64_t faces, std::int64_t vertices, bool normals_given)
+      : normals_given_(normals_given),
+        normals_(3 * static_cast<std::size_t>(vertices)),
         landing_(2 * static_cast<std::size_t>(vertices)),
         image_bar_(static_cast<std::size_t>(faces)),
         position_bar_(3 * static_cast<std::size_t>(vertices)),
         normal_bar_(3 * static_cast<std::size_t>(vertices)) {}
 
   [[nodiscard]] SmoothRays view() {
-    return {normals_.data(), landing_.data(), image_bar_.data(), position_bar_.data(),
-            normal_bar_.data()};
+    return {normals_given_,    normals_.data(),      landing_.data(),
+            image_bar_.data(), position_bar_.data(), normal_bar_.data()};
   }
 
   [[nodiscard]] bool land(const Exec& executor, const ObjectiveView& o) {
@@ -135,6 +140,7 @@ class SmoothRaysOn {
   template <class T>
   using Buffer = typename Exec::template Buffer<T>;
 
+  bool normals_given_;
   Buffer<double> normals_;
   Buffer<double> landing_;
   Buffer<ImageTriangle> image_bar_;

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "design/schedule/alternation.h"
 
+#include <cmath>
 #include <cstddef>
 #include <utility>
 
 #include "core/error.h"
 #include "core/surface/grid_mesh.h"
 #include "core/value_slope.h"
+#include "design/schedule/spline_start.h"
 
 namespace lensforge {
 namespace {
@@ -33,18 +35,36 @@ void begin_next_level(Checkpoint& state) {
   ++state.level;
 }
 
+/// The spline that a mesh's surface becomes, as a mesh of its control points. Its knot lines follow
+/// the vertices as far as no barrier refuses it.
+SurfaceMesh spline_start(const DesignTask& task, const Level& level, const SurfaceMesh& mesh) {
+  constexpr double kShareStep = 0.25;
+  const LevelProblem problem = make_problem(task, level, 0);
+  for (double share = 1.0;; share -= kShareStep) {
+    SurfaceMesh net = net_mesh(
+        spline_through(mesh, task.setup.lens_size, level.grid, share, task.executor, task.control));
+    GuidedOptimization stage(net, problem.setup, problem.target, problem.objective, task.executor);
+    if (share <= 0.0 || std::isfinite(stage.value(net))) return net;
+  }
+}
+
+/// What a level begins with: the surface of the one before on its own grid.
+SurfaceMesh level_start(const DesignTask& task, const Level& level, const SurfaceMesh& mesh) {
+  if (mesh.grid == level.grid) return mesh;
+  if (level.spline) return spline_start(task, level, mesh);
+  return regrid(mesh, task.setup.lens_size, level.grid);
+}
+
 Ending run_level(const DesignTask& task, DesignLog& log, Checkpoint& state) {
   const Level& level = task.levels[static_cast<std::size_t>(state.level)];
-  if (state.mesh.grid != level.grid) {
-    state.mesh = regrid(state.mesh, task.setup.lens_size, level.grid);
-  }
+  state.mesh = level_start(task, level, state.mesh);
   const LevelProblem problem = make_problem(task, level, state.mesh.triangle_count());
   GuidedOptimization stage(state.mesh, problem.setup, problem.target, problem.objective,
                            task.executor);
-  while (state.round < task.options.rounds) {
-    Ending ending = run_round({task, problem, stage, log}, state);
+  while (state.round < level.rounds) {
+    Ending ending = run_round({task, level, problem, stage, log}, state);
     if (ending.ended()) return ending;
-    if (state.round < task.options.rounds) save(task, log, state);
+    if (state.round < level.rounds) save(task, log, state);
   }
   begin_next_level(state);
   save(task, log, state);

@@ -11,7 +11,7 @@ namespace lensforge {
 /// One iteration, a row of convergence.csv.
 struct ConvergenceRow {
   /// "transport" for a Newton step, "update" for a step of the correspondence-guided update,
-  /// "render" for one of rendering-guided optimisation.
+  /// "render" for one of rendering-guided optimisation, "spline" for one of a spline's.
   std::string stage;
   int level = 0;
   int round = 0;

@@ -4,13 +4,17 @@
 #include <cstddef>
 #include <cstdio>
 
+#include "core/surface/control_net.h"
+
 namespace lensforge {
 namespace {
 
-/// Iterations weighted by their picture's size.
+/// Iterations weighted by their rays.
 double level_work(const DesignTask& task, std::size_t level) {
-  return static_cast<double>(task.options.rounds) * task.options.iterations *
-         task.levels[level].pixels.cast<double>().prod();
+  const Level& at = task.levels[level];
+  const double vertices = double{1} * at.grid.columns * at.grid.rows;
+  const double rays = at.spline ? kMeshSamples * kMeshSamples * vertices : vertices;
+  return double{1} * at.rounds * at.iterations * rays;
 }
 
 /// Of all levels before this one.
@@ -65,9 +69,9 @@ void DesignLog::report(const std::string& detail, int iteration) const {
   const std::string stage = "design, level " + std::to_string(state_.level + 1) + " of " +
                             std::to_string(task_.levels.size());
   const auto level = static_cast<std::size_t>(state_.level);
-  const double rounds = state_.round + static_cast<double>(iteration) / task_.options.iterations;
-  const double done =
-      work_before(task_, level) + level_work(task_, level) * rounds / task_.options.rounds;
+  const Level& at = task_.levels[level];
+  const double rounds = state_.round + static_cast<double>(iteration) / at.iterations;
+  const double done = work_before(task_, level) + level_work(task_, level) * rounds / at.rounds;
   task_.control.report({stage, done, work_total(task_), detail});
 }
 

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "core/image/image_io.h"
+#include "core/surface/control_net.h"
 
 namespace lensforge {
 Image working_picture(const Image& target, const DesignOptions& options, const RunControl& run) {
@@ -33,6 +34,16 @@ LevelProblem make_problem(const DesignTask& task, const Level& level, std::int64
   problem.objective.model = task.options.model;
   problem.objective.nu = level.nu;
   problem.objective.area = default_area_barrier(problem.setup, triangles);
+  if (level.spline) {
+    // Smoothness is the spline's own; barriers are those of the triangles between its nodes.
+    problem.objective.weights.smooth = 0.0;
+    problem.objective.samples = kMeshSamples;
+    const double cells = (level.grid.columns - 3.0) * (level.grid.rows - 3.0);
+    problem.objective.area = default_area_barrier(
+        problem.setup, static_cast<std::int64_t>(2.0 * kMeshSamples * kMeshSamples * cells));
+  } else if (task.options.model == SurfaceModel::kSpline) {
+    problem.objective.model = SurfaceModel::kSmooth;
+  }
   return problem;
 }
 

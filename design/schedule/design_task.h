@@ -40,7 +40,7 @@ struct LevelProblem {
   ObjectiveOptions objective;
 };
 
-/// @param triangles  of the level's mesh.
+/// @param triangles  of the level's mesh; a spline's follow from its nodes.
 LevelProblem make_problem(const DesignTask& task, const Level& level, std::int64_t triangles);
 
 }  // namespace lensforge

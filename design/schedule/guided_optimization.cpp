@@ -10,6 +10,8 @@
 
 #include "core/optics/light_path.h"
 #include "core/value_slope.h"
+#include "design/energy/spline_objective.h"
+#include "design/optics/image_triangle.h"
 #include "design/optimize/levelling.h"
 #include "design/schedule/guided_stage_on.h"
 
@@ -45,6 +47,10 @@ constexpr double kShiftSizePower = 1.5;
 /// Probes of the curvature that is levelled; more bring nothing.
 constexpr std::uint64_t kLevellingProbes = 4;
 
+/// Share of the mean triangle that a mesh's smallest has at least, by default_area_barrier(); the
+/// control points of a spline may overlap where the spline does not.
+constexpr double kSmallestCell = 1e-3;
+
 double lowest_eigenvalue(const GridShape& shape) {
   const double longest = std::max(shape.columns, shape.rows) - 1.0;
   return std::numbers::pi * std::numbers::pi / (longest * longest);
@@ -68,7 +74,7 @@ Eigen::VectorXd cell_sizes(const SurfaceMesh& mesh) {
   for (Eigen::Index f = 0; f < faces; ++f) {
     for (const int v : mesh.triangles.col(f)) smallest[v] = std::min(smallest[v], areas[f]);
   }
-  return (smallest / mean).cwiseSqrt();
+  return (smallest / mean).cwiseMax(kSmallestCell).cwiseSqrt();
 }
 
 double cell_aspect(const OpticalSetup& setup, const GridShape& shape) {
@@ -84,6 +90,10 @@ std::unique_ptr<GuidedStage> make_stage(const SurfaceMesh& mesh, const OpticalSe
     return make_cuda_stage(mesh, setup, aspect, goal, options, executor);
   }
 #endif
+  if (options.model == SurfaceModel::kSpline) {
+    return std::make_unique<GuidedStageOn<Executor, SplineObjectiveOn<Executor>>>(
+        mesh, setup, aspect, goal, options, executor);
+  }
   return std::make_unique<GuidedStageOn<Executor>>(mesh, setup, aspect, goal, options, executor);
 }
 

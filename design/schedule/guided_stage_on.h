@@ -16,8 +16,8 @@
 
 namespace lensforge {
 
-/// GuidedStage on any executor.
-template <class Exec>
+/// GuidedStage on any executor. Objective is DesignObjectiveOn or SplineObjectiveOn.
+template <class Exec, class Objective = DesignObjectiveOn<Exec>>
 class GuidedStageOn final : public GuidedStage {
  public:
   /// @param aspect  cell height ÷ cell width of the grid.
@@ -96,7 +96,7 @@ class GuidedStageOn final : public GuidedStage {
   }
 
   Exec executor_;
-  DesignObjectiveOn<Exec> objective_;
+  Objective objective_;
   GridPreconditionerOn<Exec> preconditioner_;
   Vector x_;
   Vector y_;

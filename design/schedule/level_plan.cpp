@@ -24,6 +24,28 @@ int rounded(double value, int least) {
   return std::max(least, static_cast<int>(std::lround(value)));
 }
 
+/// Knot cells of a spline across one cell of the mesh, twice a control point for each vertex. With
+/// 1, 1.5 and 2 a 128² portrait of smooth MAE 0.00082 ends at 0.0019, 0.0012 and 0.00074 as a
+/// spline, a 96² logo of 0.0027 at 0.0053, 0.0033 and 0.0026.
+constexpr double kKnotCellsPerCell = 2.0;
+
+/// Share of the rounds that are the smooth mesh's before the spline, and as many again are the
+/// spline's, each with this share of the iterations: one costs six times as much. MAE of that
+/// portrait's and logo's splines after one, two and six rounds of the mesh and then 100 iterations:
+/// 0.00077, 0.00074 and 0.00069, 0.0030, 0.0028 and 0.0026.
+constexpr int kPartsOfRounds = 3;
+constexpr double kSplineIterations = 0.4;
+
+Level spline_level(const Level& mesh, const Eigen::Vector2d& size, const DesignOptions& options) {
+  const double wanted = size.x() / (kKnotCellsPerCell * (mesh.grid.columns - 1));
+  const double cell = std::max(wanted, std::sqrt(size.prod() / kMaxKnotCells));
+  Level level = mesh;
+  level.grid = {rounded(size.x() / cell, 1) + 3, rounded(size.y() / cell, 1) + 3};
+  level.spline = true;
+  level.iterations = rounded(kSplineIterations * options.iterations, 1);
+  return level;
+}
+
 Level level_at(const Eigen::Vector2i& pixels, const DesignOptions& options, int halvings,
                int doublings) {
   const double coarsest = std::ldexp(1.0, -halvings);
@@ -67,7 +89,16 @@ std::vector<Level> plan_levels(const Eigen::Vector2i& pixels, const DesignOption
     const double typical = pixel / cell / LightPath(optical_setup(options, pixels)).reach(1.0);
     const double progress = halvings == 0 ? 1.0 : static_cast<double>(l) / halvings;
     level.nu = typical * kNuStart * std::pow(kNuEnd / kNuStart, progress);
+    level.rounds = options.rounds;
+    level.iterations = options.iterations;
     levels.push_back(level);
+  }
+  if (options.model == SurfaceModel::kSpline) {
+    for (Level& level : levels) {
+      level.rounds = (options.rounds + kPartsOfRounds - 1) / kPartsOfRounds;
+    }
+    levels.push_back(
+        spline_level(levels.back(), optical_setup(options, pixels).lens_size, options));
   }
   return levels;
 }

@@ -15,6 +15,9 @@ struct Level {
   Eigen::Vector2i pixels{0, 0};  ///< Working picture, columns and rows.
   GridShape grid;                ///< Vertices of the mesh.
   double nu = 0.0;               ///< ν of the Welsch function, 1/mm.
+  bool spline = false;           ///< The mesh's vertices are control points of a spline.
+  int rounds = 0;                ///< Alternations.
+  int iterations = 0;            ///< Most of one round.
 };
 
 /// What the options say of light, lens and screen, for a working picture of so many pixels.
@@ -24,12 +27,18 @@ OpticalSetup optical_setup(const DesignOptions& options, const Eigen::Vector2i& 
 /// shape (at least 1).
 Eigen::Vector2i working_size(int source_columns, int source_rows, int longer_side);
 
+/// Knot cells of a spline at most: a STEP file of them has 45 MB.
+inline constexpr double kMaxKnotCells = 500'000.0;
+
 /// The levels for a working picture: at most options.levels, doubling up to full size, the first
 /// not below about 32 pixels on the longer side (Sun et al., Appendix E); the mesh's cells double
 /// with them, mesh_ratio per pixel.
 ///
 /// ν falls from kNuStart × D_e to kNuEnd × D_e by a fixed ratio. The typical residual D_e is the
 /// curvature that moves light by one pixel over one cell, (pixel / cell) / LightPath::reach(1).
+///
+/// A spline is designed as a smooth mesh in fewer rounds, and one more level optimises the spline
+/// that follows from it, with two knot cells for each cell of the mesh.
 std::vector<Level> plan_levels(const Eigen::Vector2i& pixels, const DesignOptions& options);
 
 }  // namespace lensforge

@@ -71,7 +71,7 @@ void start_from_transport(const LevelSite& site, Checkpoint& state) {
 Ending follow_picture(const LevelSite& site, const GuidedOptimization::Observer& observe,
                       Checkpoint& state) {
   LbfgsOptions optimizer;
-  optimizer.max_iterations = site.task.options.iterations;
+  optimizer.max_iterations = site.level.iterations;
   const LbfgsSummary summary = site.stage.run(optimizer, observe, state.scales, state.mesh);
   using Status = LbfgsSummary::Status;
   return {summary.status == Status::kStopped,
@@ -82,10 +82,11 @@ Ending follow_picture(const LevelSite& site, const GuidedOptimization::Observer&
 Ending alternate(const LevelSite& site, const SurfaceMesh& before,
                  const GuidedOptimization::Observer& observe, Checkpoint& state) {
   const DesignOptions& options = site.task.options;
-  const bool transports = state.transporting && state.round < options.transport_rounds;
+  const bool transports =
+      !site.level.spline && state.transporting && state.round < options.transport_rounds;
   if (transports) {
     start_from_transport(site, state);
-  } else {
+  } else if (!site.level.spline) {
     relax(site, state.mesh);
   }
   const bool rescaled = !state.scales.known();
@@ -93,7 +94,7 @@ Ending alternate(const LevelSite& site, const SurfaceMesh& before,
     Ending ending = follow_picture(site, observe, state);
     if (ending.ended()) return ending;
   }
-  conclude_round({before, site.stage.value(state.mesh), transports, rescaled}, options.rounds,
+  conclude_round({before, site.stage.value(state.mesh), transports, rescaled}, site.level.rounds,
                  state);
   return {};
 }
@@ -103,7 +104,8 @@ Ending alternate(const LevelSite& site, const SurfaceMesh& before,
 Ending run_round(const LevelSite& site, Checkpoint& state) {
   const SurfaceMesh before = state.mesh;
   double reached = kInfinity;  // Objective of the last step.
-  const GuidedOptimization::Observer log = site.log.observer("render");
+  const GuidedOptimization::Observer log =
+      site.log.observer(site.level.spline ? "spline" : "render");
   const auto observe = [&](int iteration, const ObjectiveEvaluation& step) {
     reached = step.energy.total;
     return log(iteration, step);

@@ -322,7 +322,7 @@ TEST_P(DesignLensModels, LensAgreesWithItsOwnRendering) {
   EXPECT_EQ(lens.target.columns(), 28);
   EXPECT_NEAR(lens.setup.lens_size.y(), 100.0 * 20.0 / 28.0, 1e-12);
   EXPECT_EQ(lens.surface.vertices.row(2).minCoeff(), options.thickness);
-  for (const SurfaceModel model : kSurfaceModels) {
+  for (const SurfaceModel model : kMeshModels) {
     Image render;
     const ImageMetrics expected =
         evaluate(lens.surface, lens.setup, model, lens.target, &render, Executor::serial());

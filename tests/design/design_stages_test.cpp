@@ -12,8 +12,10 @@
 #include <thread>
 #include <vector>
 
+#include "core/surface/spline_file.h"
 #include "core/temp_folder.h"
 #include "design/design_lens.h"
+#include "design/render_lens.h"
 #include "design/test_setups.h"
 #include "design/transport_scenes.h"
 
@@ -104,9 +106,59 @@ class DesignStages : public ::testing::TestWithParam<SurfaceModel> {
                                                       : testing::spot_picture(56, 40);
 };
 
-INSTANTIATE_TEST_SUITE_P(Models, DesignStages,
-                         ::testing::Values(SurfaceModel::kFacet, SurfaceModel::kSmooth),
+INSTANTIATE_TEST_SUITE_P(Models, DesignStages, ::testing::ValuesIn(kMeshModels),
                          testing::model_name);
+
+/// Its last level is another one than that of the mesh: control points instead of vertices.
+class SplineStage : public DesignStages {};
+
+INSTANTIATE_TEST_SUITE_P(Models, SplineStage, ::testing::Values(SurfaceModel::kSpline),
+                         testing::model_name);
+
+TEST_P(SplineStage, StoppedInTheSplineAndResumedGivesTheSameBits) {
+  KernelProfile profile;
+  options_.pixels = 20;
+  options_.iterations = 10;
+  const DesignResult whole = design(Executor::serial().with_profile(&profile));
+  ASSERT_EQ(whole.status, Status::kDone);
+  EXPECT_EQ(whole.lens.model, SurfaceModel::kSpline);
+  ASSERT_TRUE(whole.lens.spline.has_value());
+  EXPECT_EQ(whole.convergence.back().stage, "spline");
+  const std::int64_t calls = profile.entries()["spline nodes"].calls;
+  ASSERT_GT(calls, 10);
+  expect_resumed_equals(whole, "spline nodes", calls / 2);
+}
+
+/// What there is before the spline begins is the smooth mesh, and says so.
+TEST_P(SplineStage, StoppedBeforeTheSplineIsASmoothLens) {
+  StopAtKernel stop("image term", 1);
+  options_.iterations = 100;
+  const DesignResult part = design(stop.executor(), stop.control());
+  ASSERT_EQ(part.status, Status::kInterrupted);
+  EXPECT_EQ(part.lens.model, SurfaceModel::kSmooth);
+  EXPECT_FALSE(part.lens.spline.has_value());
+  EXPECT_EQ(part.lens.metrics.count(SurfaceModel::kSpline), 0U);
+}
+
+TEST_P(SplineStage, GivesTheSameBitsOnTwoThreads) {
+  options_.pixels = 20;
+  expect_equal(design(Executor::cpu(2)), design(Executor::serial()));
+}
+
+TEST_P(SplineStage, MeshAndPictureAreThoseOfTheSpline) {
+  const DesignResult result = design(Executor::serial());
+  ASSERT_EQ(result.status, Status::kDone);
+  const Lens& lens = result.lens;
+  EXPECT_FALSE(spline_fault(*lens.spline, lens.setup));
+  const SampledSurface mesh = spline_nodes(*lens.spline, kMeshSamples);
+  EXPECT_EQ(lens.surface.vertices, mesh.mesh.vertices);
+  const SampledSurface nodes = picture_nodes(*lens.spline);
+  Image render;
+  const ImageMetrics found =
+      evaluate(nodes.mesh, nodes.normals, lens.setup, lens.target, &render, Executor::serial());
+  EXPECT_EQ(lens.metrics.at(SurfaceModel::kSpline).mae, found.mae);
+  EXPECT_EQ(lens.render, render);
+}
 
 TEST_P(DesignStages, ThreadCountDoesNotChangeABit) {
   const DesignResult serial = design(Executor::serial());

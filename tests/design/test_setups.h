@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Core>
+#include <cctype>
 #include <cmath>
 #include <string>
 
@@ -67,7 +68,9 @@ inline Image spot_picture(int columns, int rows) {
 
 /// Names the parts of a test suite that runs for both models.
 inline std::string model_name(const ::testing::TestParamInfo<SurfaceModel>& info) {
-  return info.param == SurfaceModel::kFacet ? "Facet" : "Smooth";
+  std::string name = lensforge::model_name(info.param);
+  name.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(name.front())));
+  return name;
 }
 
 }  // namespace lensforge::testing

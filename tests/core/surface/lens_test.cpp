@@ -15,6 +15,8 @@
 #include "core/image/image_io.h"
 #include "core/io/output_guard.h"
 #include "core/surface/mesh_io.h"
+#include "core/surface/sample_splines.h"
+#include "core/surface/spline_file.h"
 #include "core/temp_folder.h"
 #include "core/test_meshes.h"
 
@@ -87,10 +89,59 @@ TEST(Lens, ComesBackAsItWasWritten) {
   EXPECT_EQ(read.model, lens.model);
   EXPECT_EQ(read.target, lens.target);
   EXPECT_EQ(read.render, lens.render);
-  for (const SurfaceModel model : kSurfaceModels) {
+  for (const SurfaceModel model : kMeshModels) {
     expect_equal(read.metrics.at(model), lens.metrics.at(model));
   }
   EXPECT_EQ(read.provenance, lens.provenance);
+}
+
+Lens spline_lens() {
+  Lens lens = sample_lens();
+  lens.model = SurfaceModel::kSpline;
+  lens.spline = testing::sample_spline();
+  lens.surface = spline_nodes(*lens.spline, kMeshSamples).mesh;
+  lens.metrics[SurfaceModel::kSpline] = {0.02, 30.0, 0.96, 0.006, 0.998};
+  return lens;
+}
+
+TEST(Lens, ASplineComesBackAsItWasWritten) {
+  const TempFolder folder;
+  const Lens lens = spline_lens();
+  write_lens(lens, folder / "out");
+  const Lens read = read_lens(folder / "out");
+  EXPECT_EQ(read.model, SurfaceModel::kSpline);
+  ASSERT_TRUE(read.spline.has_value());
+  EXPECT_EQ(read.spline->points, lens.spline->points);
+  EXPECT_EQ(read.surface.vertices, lens.surface.vertices);
+  EXPECT_EQ(read.surface.grid, lens.surface.grid);
+  expect_equal(read.metrics.at(SurfaceModel::kSpline), lens.metrics.at(SurfaceModel::kSpline));
+  EXPECT_EQ(read_json(folder / "out" / "lens.json")["spline"], "surface.spline");
+  EXPECT_THAT(read_bytes(folder / "out" / "surface.ply"), HasSubstr("property double nx"));
+}
+
+TEST(Lens, AnotherModelTakesTheSplineAway) {
+  const TempFolder folder;
+  write_lens(spline_lens(), folder.path());
+  EXPECT_TRUE(fs::exists(folder / "surface.spline"));
+  write_lens(sample_lens(), folder.path());
+  EXPECT_FALSE(fs::exists(folder / "surface.spline"));
+}
+
+TEST(Lens, RefusesASplineThatItsMeshDoesNotSample) {
+  const TempFolder folder;
+  Lens lens = spline_lens();
+  write_lens(lens, folder.path());
+  ControlNet other = testing::sample_spline(0.4, 0.0501);
+  write_spline(other, folder / "surface.spline");
+  EXPECT_THAT(message_of<InputError>([&] { read_lens(folder.path()); }),
+              HasSubstr("hold two surfaces"));
+  other.points(0, 0) = 0.5;
+  write_spline(other, folder / "surface.spline");
+  EXPECT_THAT(message_of<InputError>([&] { read_lens(folder.path()); }),
+              AllOf(HasSubstr("surface.spline"), HasSubstr("by lens_size")));
+  fs::remove(folder / "surface.spline");
+  EXPECT_THAT(message_of<InputError>([&] { read_lens(folder.path()); }),
+              HasSubstr("surface.spline"));
 }
 
 TEST(Lens, TheFolderHoldsTheFilesOfTheInterfaceAndNothingElse) {

@@ -36,7 +36,7 @@ TEST(FacetSurface, IsThePlaneOfEachTriangle) {
 }
 
 TEST(OpticalSurface, EveryModelHasPatchesThatEqualIt) {
-  for (const SurfaceModel model : kSurfaceModels) {
+  for (const SurfaceModel model : kMeshModels) {
     const auto surface = optical_surface(noisy_lens(), model);
     for (const double x : {0.31, 7.77, 14.2, 29.9}) {
       const Eigen::Vector2d q(x, 0.7 * x + 0.05);
@@ -52,7 +52,7 @@ TEST(OpticalSurface, EveryModelHasPatchesThatEqualIt) {
 }
 
 TEST(OpticalSurface, OnlyFacetsHaveCreases) {
-  for (const auto& [name, model] : named_models()) {
+  for (const auto& [name, model] : named(kMeshModels)) {
     EXPECT_EQ(optical_surface(smooth_lens(7), model)->has_creases(), name == "facet");
   }
 }

@@ -96,5 +96,31 @@ TEST(LevelPlan, WorkingSizeKeepsTheShapeOfTheSource) {
   EXPECT_EQ(working_size(1, 1, 1), Eigen::Vector2i(1, 1));
 }
 
+TEST(LevelPlan, ASplineFollowsFewerRoundsOfTheMesh) {
+  DesignOptions options = with_levels(1);
+  options.model = SurfaceModel::kSpline;
+  const std::vector<Level> levels = plan_levels({128, 64}, options);
+  ASSERT_EQ(levels.size(), 2U);
+  EXPECT_FALSE(levels[0].spline);
+  EXPECT_EQ(levels[0].rounds, 2);
+  EXPECT_EQ(levels[0].iterations, 100);
+  EXPECT_TRUE(levels[1].spline);
+  EXPECT_EQ(levels[1].rounds, 2);
+  EXPECT_EQ(levels[1].iterations, 40);
+  // Two knot cells each way in a cell of 160 across.
+  EXPECT_EQ(levels[1].grid, (GridShape{323, 163}));
+  options.model = SurfaceModel::kSmooth;
+  EXPECT_EQ(plan_levels({128, 64}, options)[0].rounds, 6);
+}
+
+TEST(LevelPlan, ASplineFitsASolidsFile) {
+  DesignOptions options = with_levels(1);
+  options.model = SurfaceModel::kSpline;
+  for (const Eigen::Vector2i& size : {Eigen::Vector2i(512, 512), Eigen::Vector2i(2048, 300)}) {
+    const GridShape grid = plan_levels(size, options).back().grid;
+    EXPECT_NEAR((grid.columns - 3.0) * (grid.rows - 3.0), kMaxKnotCells, 0.01 * kMaxKnotCells);
+  }
+}
+
 }  // namespace
 }  // namespace lensforge

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/cubic_spline.h"
+#include "core/surface/cubic_spline.h"
 
 #include <algorithm>
 #include <cmath>
@@ -35,6 +35,22 @@ std::array<double, 4> functions(double t, int cell, int cells, int degree) {
   return n;
 }
 
+/// From the functions of one degree less, or their derivatives, to the derivatives of the functions
+/// of this degree: B' = p (B₋ / width₋ − B₊ / width₊).
+std::array<double, 4> differences(const std::array<double, 4>& lower, int cell, int cells,
+                                  int degree) {
+  std::array<double, 4> result{};
+  const int first = cell + kDegree - degree;
+  for (int j = 0; j < degree; ++j) {
+    const double width = knot(first + j + 1 + degree, cells) - knot(first + j + 1, cells);
+    const auto i = static_cast<std::size_t>(j);
+    const double slope = degree * lower[i] / width;
+    result[i] -= slope;
+    result[i + 1] += slope;
+  }
+  return result;
+}
+
 /// Coefficient of a part of the spline: the blossom of the piece over `cell` at three of its knots.
 double blossom(const Eigen::VectorXd& coefficients, int cell, const std::array<double, 3>& at) {
   const auto cells = static_cast<int>(coefficients.size()) - kDegree;
@@ -58,13 +74,9 @@ CubicBasis cubic_basis(double t, int cells) {
   CubicBasis basis;
   basis.first = cell_of(t, cells);
   basis.value = functions(t, basis.first, cells, kDegree);
-  const std::array<double, 4> lower = functions(t, basis.first, cells, kDegree - 1);
-  for (int j = 0; j < kDegree; ++j) {
-    const double width = knot(basis.first + j + 4, cells) - knot(basis.first + j + 1, cells);
-    const double slope = kDegree * lower[static_cast<std::size_t>(j)] / width;
-    basis.slope[static_cast<std::size_t>(j)] -= slope;
-    basis.slope[static_cast<std::size_t>(j) + 1] += slope;
-  }
+  basis.slope = differences(functions(t, basis.first, cells, 2), basis.first, cells, 3);
+  basis.bend = differences(differences(functions(t, basis.first, cells, 1), basis.first, cells, 2),
+                           basis.first, cells, 3);
   return basis;
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/slope_fit.h"
+#include "core/surface/slope_fit.h"
 
 #include <cmath>
 #include <optional>
@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "core/error.h"
-#include "export/spline_net.h"
 
 // The spline's x and y are given first (GridWarp): with knots where vertices are dense, 30,481
 // control points project the picture of a smooth 128² portrait with MAE 0.0031, where on even knot
@@ -68,20 +67,20 @@ SurfacePoint model_near(const SmoothSurface& surface, const Eigen::Vector2d& xy)
 }
 
 SlopeFit::SlopeFit(const SmoothSurface& surface, const GridWarp& warp,
-                   const std::array<int, 2>& cells, const Executor& executor,
+                   const std::array<int, 2>& cells, double most_share, const Executor& executor,
                    const RunControl& control)
     : surface_(surface),
       executor_(executor),
       control_(control),
       grid_(make_grid(cells, surface.box().sizes())),
       modes_(make_modes(grid_, executor)),
-      plan_(make_plan(warp)),
+      plan_(make_plan(warp, most_share)),
       areas_(area_moments()),
       height_weight_(std::pow(kHeightReach * mesh_cell(surface), -2.0)) {}
 
 /// As much of the vertices' movement as can be followed without a fold.
-SplinePlan SlopeFit::make_plan(const GridWarp& warp) const {
-  for (double share = 1.0; share > 0.0; share -= 0.25) {
+SplinePlan SlopeFit::make_plan(const GridWarp& warp, double most_share) const {
+  for (double share = most_share; share > 0.0; share -= 0.25) {
     SplinePlan plan = warp.control_points(grid_.u.cells, grid_.v.cells, share);
     if (least_area(plan) > kMinArea) return plan;
   }

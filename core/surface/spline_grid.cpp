@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/spline_grid.h"
+#include "core/surface/spline_grid.h"
 
 #include <Eigen/Eigenvalues>
 
-#include "export/cubic_spline.h"
+#include "core/surface/cubic_spline.h"
 
 namespace lensforge {
 

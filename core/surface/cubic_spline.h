@@ -15,6 +15,7 @@ struct CubicBasis {
   int first = 0;
   std::array<double, 4> value{};
   std::array<double, 4> slope{};  ///< Derivatives by t.
+  std::array<double, 4> bend{};   ///< Second derivatives.
 };
 
 /// @pre 0 ≤ t ≤ cells, cells ≥ 1.

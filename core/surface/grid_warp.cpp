@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/grid_warp.h"
+#include "core/surface/grid_warp.h"
 
 #include <algorithm>
 #include <cmath>
 
+#include "core/surface/cubic_spline.h"
 #include "core/surface/grid_layout.h"
-#include "export/cubic_spline.h"
 
 namespace lensforge {
 namespace {

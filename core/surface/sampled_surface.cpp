@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/sampled_surface.h"
+#include "core/surface/sampled_surface.h"
 
 #include "core/surface/grid_triangles.h"
 

@@ -6,9 +6,9 @@
 
 #include "core/compute/executor.h"
 #include "core/compute/run_control.h"
+#include "core/surface/grid_warp.h"
 #include "core/surface/smooth_surface.h"
-#include "export/grid_warp.h"
-#include "export/spline_grid.h"
+#include "core/surface/spline_grid.h"
 
 namespace lensforge {
 
@@ -22,8 +22,10 @@ SurfacePoint model_near(const SmoothSurface& surface, const Eigen::Vector2d& xy)
 class SlopeFit {
  public:
   /// Keeps references. @param cells  knot cells along u and v, ≥ 1.
+  /// @param most_share  of the vertices' movement that the knot lines follow, 0 … 1; less where
+  ///                    they would fold.
   SlopeFit(const SmoothSurface& surface, const GridWarp& warp, const std::array<int, 2>& cells,
-           const Executor& executor, const RunControl& control);
+           double most_share, const Executor& executor, const RunControl& control);
 
   /// Coefficients of z, mm, with the surface's volume. @throw Interrupted.
   [[nodiscard]] Eigen::MatrixXd solve() const;
@@ -41,7 +43,7 @@ class SlopeFit {
   [[nodiscard]] double height_weight() const { return height_weight_; }
 
  private:
-  [[nodiscard]] SplinePlan make_plan(const GridWarp& warp) const;
+  [[nodiscard]] SplinePlan make_plan(const GridWarp& warp, double most_share) const;
   [[nodiscard]] double least_area(const SplinePlan& plan) const;
   [[nodiscard]] Eigen::MatrixXd area_moments() const;
 

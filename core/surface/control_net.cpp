@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "core/surface/control_net.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "core/surface/cubic_spline.h"
+
+namespace lensforge {
+namespace {
+
+/// Newton's method ends when a step is shorter than this, knot cells, or after so many.
+constexpr double kShortStep = 1e-13;
+constexpr int kMaxSteps = 30;
+
+std::vector<CubicBasis> bases(int cells, int samples) {
+  std::vector<CubicBasis> result;
+  for (int k = 0; k <= cells * samples; ++k) {
+    result.push_back(cubic_basis(static_cast<double>(k) / samples, cells));
+  }
+  return result;
+}
+
+SplineFrame frame_of(const ControlNet& net, const CubicBasis& u, const CubicBasis& v) {
+  SplineFrame frame;
+  for (std::size_t j = 0; j < 4; ++j) {
+    SplineFrame row;
+    const Eigen::Index first =
+        Eigen::Index{v.first + static_cast<int>(j)} * net.shape.columns + u.first;
+    for (std::size_t i = 0; i < 4; ++i) {
+      const auto c = net.points.col(first + static_cast<Eigen::Index>(i));
+      row.point += u.value[i] * c;
+      row.by_u += u.slope[i] * c;
+      row.by_uu += u.bend[i] * c;
+    }
+    frame.point += v.value[j] * row.point;
+    frame.by_u += v.value[j] * row.by_u;
+    frame.by_uu += v.value[j] * row.by_uu;
+    frame.by_v += v.slope[j] * row.point;
+    frame.by_uv += v.slope[j] * row.by_u;
+    frame.by_vv += v.bend[j] * row.point;
+  }
+  return frame;
+}
+
+}  // namespace
+
+SurfaceShape SplineFrame::shape() const {
+  Eigen::Matrix2d plan;
+  plan << by_u.head<2>(), by_v.head<2>();
+  const Eigen::Matrix2d inverse = plan.inverse();
+  SurfaceShape shape;
+  shape.z = point.z();
+  shape.slope = inverse.transpose() * Eigen::Vector2d(by_u.z(), by_v.z());
+  // z_uu = z_x x_uu + z_y y_uu + (x_u, y_u) H (x_u, y_u)ᵀ, and so on.
+  const Eigen::Vector3d along(-shape.slope.x(), -shape.slope.y(), 1.0);
+  Eigen::Matrix2d second;
+  second << along.dot(by_uu), along.dot(by_uv), along.dot(by_uv), along.dot(by_vv);
+  shape.bend = inverse.transpose() * second * inverse;
+  return shape;
+}
+
+Eigen::MatrixXd ControlNet::table(int coordinate) const {
+  using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic>;
+  return Eigen::Map<const Rows, 0, Eigen::Stride<Eigen::Dynamic, 3>>(
+      points.data() + coordinate, shape.columns, shape.rows,
+      Eigen::Stride<Eigen::Dynamic, 3>(Eigen::Index{3} * shape.columns, 3));
+}
+
+SplineFrame ControlNet::at(const Eigen::Vector2d& uv) const {
+  return frame_of(*this, cubic_basis(uv.x(), shape.columns - 3),
+                  cubic_basis(uv.y(), shape.rows - 3));
+}
+
+Eigen::Vector2d ControlNet::parameters_of(const Eigen::Vector2d& xy,
+                                          const Eigen::Vector2d& start) const {
+  const Eigen::Vector2d high = cells().cast<double>();
+  Eigen::Vector2d uv = start.cwiseMax(0.0).cwiseMin(high);
+  for (int step = 0; step < kMaxSteps; ++step) {
+    const SplineFrame frame = at(uv);
+    Eigen::Matrix2d plan;
+    plan << frame.by_u.head<2>(), frame.by_v.head<2>();
+    const Eigen::Vector2d before = uv;
+    uv += plan.inverse() * (xy - frame.point.head<2>());
+    uv = uv.cwiseMax(0.0).cwiseMin(high);
+    if ((uv - before).cwiseAbs().maxCoeff() < kShortStep * high.maxCoeff()) break;
+  }
+  return uv;
+}
+
+SampledSurface spline_nodes(const ControlNet& net, int samples) {
+  const std::vector<CubicBasis> u = bases(net.cells().x(), samples);
+  const std::vector<CubicBasis> v = bases(net.cells().y(), samples);
+  SampledSurface nodes = make_samples({static_cast<int>(u.size()), static_cast<int>(v.size())});
+  Eigen::Index at = 0;
+  for (const CubicBasis& across : v) {
+    // The curve v = const as a spline of its own, and its derivative by v.
+    const auto rows = net.points.middleCols(Eigen::Index{across.first} * net.shape.columns,
+                                            Eigen::Index{4} * net.shape.columns);
+    const auto row = [&](Eigen::Index j) {
+      return rows.middleCols(j * net.shape.columns, net.shape.columns);
+    };
+    const std::array<double, 4>& w = across.value;
+    const std::array<double, 4>& s = across.slope;
+    const Eigen::Matrix3Xd curve = w[0] * row(0) + w[1] * row(1) + w[2] * row(2) + w[3] * row(3);
+    const Eigen::Matrix3Xd bent = s[0] * row(0) + s[1] * row(1) + s[2] * row(2) + s[3] * row(3);
+    for (const CubicBasis& along : u) {
+      const Eigen::Map<const Eigen::Vector4d> value(along.value.data());
+      const Eigen::Map<const Eigen::Vector4d> slope(along.slope.data());
+      const auto taps = curve.middleCols<4>(along.first);
+      nodes.mesh.vertices.col(at) = taps * value;
+      nodes.normals.col(at++) =
+          Eigen::Vector3d(taps * slope)
+              .cross(Eigen::Vector3d(bent.middleCols<4>(along.first) * value));
+    }
+  }
+  return nodes;
+}
+
+int samples_for(double nodes, double cells) {
+  return static_cast<int>(std::clamp(std::ceil(std::sqrt(nodes / cells)), 2.0, 256.0));
+}
+
+}  // namespace lensforge

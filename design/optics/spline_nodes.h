@@ -1,0 +1,232 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/compute/executor.h"
+#include "core/compute/host_device.h"
+#include "core/surface/cubic_spline.h"
+#include "core/surface/surface_mesh.h"
+#include "design/optics/columns.h"
+
+/// Spline model: a tensor product of cubic B-splines looked at on an even grid of nodes, and the
+/// adjoint of looking. Both are two passes of four taps, first along u, then along v.
+///
+/// Notation: c control point, B basis functions, a = Σ B(u) c, a' = Σ B'(u) c along a row of
+/// control points; p = Σ B(v) a a node, p_u = Σ B(v) a', p_v = Σ B'(v) a, n = p_u × p_v; a bar is
+/// ∂E/∂.
+namespace lensforge {
+
+/// The basis functions of one direction at its nodes.
+struct AxisTaps {
+  const int* first;     ///< Of a node: number of its first of four coefficients.
+  const double* value;  ///< 4 × nodes
+  const double* slope;  ///< 4 × nodes, by the knot cell.
+  const int* begin;     ///< Of a coefficient: its first node, and one after its last.
+  const int* end;
+};
+
+/// AxisTaps in the memory of an executor.
+template <class Exec>
+class AxisTapsOn {
+ public:
+  /// @param samples  nodes a knot cell, ≥ 1.
+  AxisTapsOn(int cells, int samples, const Exec& executor) {
+    const int nodes = cells * samples + 1;
+    std::vector<int> first;
+    std::vector<double> value;
+    std::vector<double> slope;
+    std::vector<int> begin(static_cast<std::size_t>(cells) + 3, nodes);
+    std::vector<int> end(begin.size(), 0);
+    for (int k = 0; k < nodes; ++k) {
+      const CubicBasis basis = cubic_basis(static_cast<double>(k) / samples, cells);
+      first.push_back(basis.first);
+      value.insert(value.end(), basis.value.begin(), basis.value.end());
+      slope.insert(slope.end(), basis.slope.begin(), basis.slope.end());
+      for (int j = 0; j < 4; ++j) {
+        const auto c = static_cast<std::size_t>(basis.first + j);
+        begin[c] = std::min(begin[c], k);
+        end[c] = k + 1;
+      }
+    }
+    first_ = buffer_of(executor, std::span<const int>(first));
+    value_ = buffer_of(executor, std::span<const double>(value));
+    slope_ = buffer_of(executor, std::span<const double>(slope));
+    begin_ = buffer_of(executor, std::span<const int>(begin));
+    end_ = buffer_of(executor, std::span<const int>(end));
+  }
+
+  [[nodiscard]] AxisTaps view() const {
+    return {first_.data(), value_.data(), slope_.data(), begin_.data(), end_.data()};
+  }
+  [[nodiscard]] int nodes() const { return static_cast<int>(first_.size()); }
+  [[nodiscard]] int coefficients() const { return static_cast<int>(begin_.size()); }
+
+ private:
+  template <class T>
+  using Buffer = typename Exec::template Buffer<T>;
+
+  Buffer<int> first_;
+  Buffer<double> value_;
+  Buffer<double> slope_;
+  Buffer<int> begin_;
+  Buffer<int> end_;
+};
+
+/// What the kernels read and write; tables are stored row by row, x y z of each entry in turn.
+struct SplineNodesView {
+  AxisTaps u;
+  AxisTaps v;
+  std::int64_t columns;  ///< Of control points.
+  std::int64_t nodes_u;
+  double* along;  ///< nodes_u × rows of control points: a, and in an adjoint its bar.
+  double* steep;  ///< The same of a'.
+  double* by_u;   ///< 3 × nodes: p_u
+  double* by_v;   ///< 3 × nodes: p_v
+};
+
+/// a and a' of one node column and one row of control points.
+struct LookAlongRow {
+  SplineNodesView s;
+  const double* points;
+
+  LF_HD void operator()(std::int64_t i) const {
+    const std::int64_t node = i % s.nodes_u;
+    const std::int64_t at = i / s.nodes_u * s.columns + s.u.first[node];
+    Eigen::Vector3d a(0.0, 0.0, 0.0);
+    Eigen::Vector3d steep(0.0, 0.0, 0.0);
+    for (int k = 0; k < 4; ++k) {
+      const auto c = column3(points, at + k);
+      a += s.u.value[4 * node + k] * c;
+      steep += s.u.slope[4 * node + k] * c;
+    }
+    column3(s.along, i) = a;
+    column3(s.steep, i) = steep;
+  }
+};
+
+/// One node and its normal.
+struct LookAcrossRows {
+  SplineNodesView s;
+  double* positions;
+  double* normals;
+
+  LF_HD void operator()(std::int64_t i) const {
+    const std::int64_t node = i / s.nodes_u;
+    const std::int64_t at = s.v.first[node] * s.nodes_u + i % s.nodes_u;
+    Eigen::Vector3d p(0.0, 0.0, 0.0);
+    Eigen::Vector3d p_u(0.0, 0.0, 0.0);
+    Eigen::Vector3d p_v(0.0, 0.0, 0.0);
+    for (int k = 0; k < 4; ++k) {
+      const auto a = column3(s.along, at + k * s.nodes_u);
+      p += s.v.value[4 * node + k] * a;
+      p_v += s.v.slope[4 * node + k] * a;
+      p_u += s.v.value[4 * node + k] * column3(s.steep, at + k * s.nodes_u);
+    }
+    column3(positions, i) = p;
+    column3(s.by_u, i) = p_u;
+    column3(s.by_v, i) = p_v;
+    column3(normals, i) = p_u.cross(p_v);
+  }
+};
+
+/// Bars of a and a' of one node column and one row of control points. From
+/// n̄ · dn = dp_u · (p_v × n̄) + dp_v · (n̄ × p_u).
+struct GatherAcrossRows {
+  SplineNodesView s;
+  const double* position_bar;
+  const double* normal_bar;
+
+  LF_HD void operator()(std::int64_t i) const {
+    const std::int64_t row = i / s.nodes_u;
+    Eigen::Vector3d a_bar(0.0, 0.0, 0.0);
+    Eigen::Vector3d steep_bar(0.0, 0.0, 0.0);
+    for (std::int64_t node = s.v.begin[row]; node < s.v.end[row]; ++node) {
+      const std::int64_t tap = 4 * node + row - s.v.first[node];
+      const std::int64_t at = node * s.nodes_u + i % s.nodes_u;
+      const Eigen::Vector3d n_bar = column3(normal_bar, at);
+      const Eigen::Vector3d u_bar = column3(s.by_v, at).cross(n_bar);
+      const Eigen::Vector3d v_bar = n_bar.cross(column3(s.by_u, at));
+      a_bar += s.v.value[tap] * column3(position_bar, at) + s.v.slope[tap] * v_bar;
+      steep_bar += s.v.value[tap] * u_bar;
+    }
+    column3(s.along, i) = a_bar;
+    column3(s.steep, i) = steep_bar;
+  }
+};
+
+/// Bar of one control point.
+struct GatherAlongRow {
+  SplineNodesView s;
+  double* points_bar;
+
+  LF_HD void operator()(std::int64_t i) const {
+    const std::int64_t column = i % s.columns;
+    const std::int64_t row = i / s.columns;
+    Eigen::Vector3d c_bar(0.0, 0.0, 0.0);
+    for (std::int64_t node = s.u.begin[column]; node < s.u.end[column]; ++node) {
+      const std::int64_t tap = 4 * node + column - s.u.first[node];
+      const std::int64_t at = row * s.nodes_u + node;
+      c_bar += s.u.value[tap] * column3(s.along, at) + s.u.slope[tap] * column3(s.steep, at);
+    }
+    column3(points_bar, i) = c_bar;
+  }
+};
+
+/// The nodes of a net of control points.
+template <class Exec>
+class SplineNodesOn {
+ public:
+  /// @param net      control points each way, ≥ 4. @param samples  nodes a knot cell each way, ≥ 1.
+  SplineNodesOn(const GridShape& net, int samples, const Exec& executor)
+      : executor_(executor),
+        u_(net.columns - 3, samples, executor),
+        v_(net.rows - 3, samples, executor),
+        along_(3 * static_cast<std::size_t>(u_.nodes()) * static_cast<std::size_t>(net.rows)),
+        steep_(along_.size()),
+        by_u_(3 * static_cast<std::size_t>(u_.nodes()) * static_cast<std::size_t>(v_.nodes())),
+        by_v_(by_u_.size()) {}
+
+  [[nodiscard]] GridShape shape() const { return {u_.nodes(), v_.nodes()}; }
+
+  /// Points and normals (of any length) of all nodes from the control points.
+  void look(const double* points, double* positions, double* normals) {
+    parallel_for(executor_, "spline rows", table_size(), LookAlongRow{view(), points});
+    parallel_for(executor_, "spline nodes", node_count(),
+                 LookAcrossRows{view(), positions, normals});
+  }
+
+  /// Adjoint of look() at the control points that were looked at last.
+  void look_adjoint(const double* position_bar, const double* normal_bar, double* points_bar) {
+    parallel_for(executor_, "spline nodes adjoint", table_size(),
+                 GatherAcrossRows{view(), position_bar, normal_bar});
+    parallel_for(executor_, "spline rows adjoint",
+                 std::int64_t{u_.coefficients()} * v_.coefficients(),
+                 GatherAlongRow{view(), points_bar});
+  }
+
+ private:
+  [[nodiscard]] std::int64_t table_size() const {
+    return std::int64_t{u_.nodes()} * v_.coefficients();
+  }
+  [[nodiscard]] std::int64_t node_count() const { return std::int64_t{u_.nodes()} * v_.nodes(); }
+  [[nodiscard]] SplineNodesView view() {
+    return {u_.view(),     v_.view(),     u_.coefficients(), u_.nodes(),
+            along_.data(), steep_.data(), by_u_.data(),      by_v_.data()};
+  }
+
+  Exec executor_;
+  AxisTapsOn<Exec> u_;
+  AxisTapsOn<Exec> v_;
+  typename Exec::template Buffer<double> along_;
+  typename Exec::template Buffer<double> steep_;
+  typename Exec::template Buffer<double> by_u_;
+  typename Exec::template Buffer<double> by_v_;
+};
+
+}  // namespace lensforge

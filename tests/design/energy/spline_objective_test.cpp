@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "design/energy/spline_objective.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include "core/surface/sample_splines.h"
+#include "design/finite_difference.h"
+#include "design/random_input.h"
+#include "design/render_lens.h"
+#include "design/schedule/spline_start.h"
+#include "design/test_setups.h"
+
+namespace lensforge {
+namespace {
+
+using testing::Random;
+using testing::sample_spline;
+
+constexpr int kSamples = 2;
+
+class SplineObjective : public ::testing::Test {
+ protected:
+  SplineObjective() {
+    options_.model = SurfaceModel::kSpline;
+    options_.samples = kSamples;
+    options_.weights.smooth = 0.0;
+    options_.area = {0.01 * mean_, 0.9 * mean_};  // So wide that the barrier acts.
+  }
+
+  [[nodiscard]] SplineObjectiveOn<Executor> objective(
+      const Executor& executor = Executor::serial()) const {
+    return {net_mesh(net_), setup_, target_, options_, executor};
+  }
+
+  ControlNet net_ = sample_spline();
+  OpticalSetup setup_ = testing::setup_of({15.0, 10.0}, {24, 16}, 60.0);
+  Image target_ = testing::random_picture(24, 16, 0.1, 2);
+  double mean_ = 150.0 / (2.0 * kSamples * kSamples * 11.0 * 8.0);
+  ObjectiveOptions options_;
+};
+
+TEST_F(SplineObjective, PictureIsThatOfTheSplinesOwnNormals) {
+  SplineObjectiveOn<Executor> function = objective();
+  Eigen::Matrix3Xd gradient(3, net_.points.cols());
+  const ObjectiveEvaluation e = function.evaluate(net_.points.data(), gradient.data());
+  ASSERT_TRUE(e.feasible);
+  const SampledSurface nodes = spline_nodes(net_, kSamples);
+  const ImageMetrics expected =
+      evaluate(nodes.mesh, nodes.normals, setup_, target_, nullptr, Executor::serial());
+  EXPECT_NEAR(e.mae, expected.mae, 1e-6);
+  EXPECT_GT(e.mae, 0.01);
+}
+
+TEST_F(SplineObjective, GradientEqualsCentralDifferences) {
+  SplineObjectiveOn<Executor> function = objective();
+  Eigen::Matrix3Xd gradient(3, net_.points.cols());
+  ASSERT_TRUE(function.evaluate(net_.points.data(), gradient.data()).feasible);
+  const testing::Scalar value = [&](const Eigen::VectorXd& x) {
+    Eigen::Matrix3Xd ignored(3, net_.points.cols());
+    return function.evaluate(x.data(), ignored.data()).energy.total;
+  };
+  Random random(3);
+  // Heights alone, x and y alone, all of them.
+  for (const auto& [first, count] : {std::pair{2, 1}, {0, 2}, {0, 3}}) {
+    Eigen::Matrix3Xd direction = Eigen::Matrix3Xd::Zero(3, gradient.cols());
+    for (double& d : direction.middleRows(first, count).reshaped()) d = random.between(-1.0, 1.0);
+    direction.array() *= function.movable().array();
+    const Eigen::VectorXd products = gradient.cwiseProduct(direction).reshaped();
+    const double scale = std::max(std::fabs(products.sum()), products.norm());
+    ASSERT_GT(scale, 0.0);
+    std::vector<double> errors;
+    for (const double step : {1e-4, 1e-5, 2e-6, 5e-7, 1e-7}) {
+      const double slope =
+          testing::directional_slope(value, net_.points.reshaped(), direction.reshaped(), step);
+      errors.push_back(std::fabs(slope - products.sum()) / scale);
+    }
+    EXPECT_LE(testing::plateau_error(errors), 1e-6) << first << ' ' << count;
+  }
+}
+
+TEST_F(SplineObjective, RimStaysOnTheRectangle) {
+  SplineObjectiveOn<Executor> function = objective();
+  Eigen::Matrix3Xd gradient(3, net_.points.cols());
+  ASSERT_TRUE(function.evaluate(net_.points.data(), gradient.data()).feasible);
+  int held = 0;
+  for (Eigen::Index i = 0; i < gradient.cols(); ++i) {
+    for (int k = 0; k < 2; ++k) {
+      const double at = net_.points(k, i);
+      const bool on_rim = at == 0.0 || at == setup_.lens_size[k];
+      EXPECT_EQ(function.movable()(k, i), on_rim ? 0.0 : 1.0);
+      if (on_rim) EXPECT_EQ(gradient(k, i), 0.0);
+      held += on_rim ? 1 : 0;
+    }
+  }
+  EXPECT_EQ(held, 2 * (14 + 11));
+}
+
+TEST_F(SplineObjective, ThreadCountDoesNotChangeABit) {
+  Eigen::Matrix3Xd serial(3, net_.points.cols());
+  Eigen::Matrix3Xd parallel = serial;
+  SplineObjectiveOn<Executor> one = objective();
+  SplineObjectiveOn<Executor> two = objective(Executor::cpu(2));
+  EXPECT_EQ(one.evaluate(net_.points.data(), serial.data()).energy.total,
+            two.evaluate(net_.points.data(), parallel.data()).energy.total);
+  EXPECT_EQ(serial, parallel);
+}
+
+TEST_F(SplineObjective, FoldedSplinesAreNotAllowed) {
+  SplineObjectiveOn<Executor> function = objective();
+  net_.points(0, 14 * 5 + 6) = 1.0;
+  Eigen::Matrix3Xd gradient(3, net_.points.cols());
+  EXPECT_FALSE(function.evaluate(net_.points.data(), gradient.data()).feasible);
+}
+
+}  // namespace
+}  // namespace lensforge
