@@ -5,8 +5,8 @@
 
 #include "core/compute/executor.h"
 #include "core/compute/run_control.h"
-#include "export/picture_goal.h"
 #include "core/surface/slope_fit.h"
+#include "export/picture_goal.h"
 
 namespace lensforge {
 

@@ -6,8 +6,8 @@
 
 #include "core/error.h"
 #include "core/surface/grid_warp.h"
-#include "export/light_fit.h"
 #include "core/surface/slope_fit.h"
+#include "export/light_fit.h"
 #include "export/spline_cut.h"
 #include "export/spline_net.h"
 

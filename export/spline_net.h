@@ -11,9 +11,9 @@
 
 #include "core/compute/executor.h"
 #include "core/compute/run_control.h"
+#include "core/surface/sampled_surface.h"
 #include "core/surface/smooth_surface.h"
 #include "export/picture_goal.h"
-#include "core/surface/sampled_surface.h"
 
 namespace lensforge {
 

@@ -112,7 +112,8 @@ SampledSurface spline_nodes(const ControlNet& net, int samples) {
       const auto taps = curve.middleCols<4>(along.first);
       nodes.mesh.vertices.col(at) = taps * value;
       nodes.normals.col(at++) =
-          Eigen::Vector3d(taps * slope).cross(Eigen::Vector3d(bent.middleCols<4>(along.first) * value));
+          Eigen::Vector3d(taps * slope)
+              .cross(Eigen::Vector3d(bent.middleCols<4>(along.first) * value));
     }
   }
   return nodes;

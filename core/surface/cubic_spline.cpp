@@ -75,9 +75,8 @@ CubicBasis cubic_basis(double t, int cells) {
   basis.first = cell_of(t, cells);
   basis.value = functions(t, basis.first, cells, kDegree);
   basis.slope = differences(functions(t, basis.first, cells, 2), basis.first, cells, 3);
-  basis.bend = differences(
-      differences(functions(t, basis.first, cells, 1), basis.first, cells, 2), basis.first, cells,
-      3);
+  basis.bend = differences(differences(functions(t, basis.first, cells, 1), basis.first, cells, 2),
+                           basis.first, cells, 3);
   return basis;
 }
 

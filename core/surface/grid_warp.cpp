@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/surface/grid_layout.h"
 #include "core/surface/cubic_spline.h"
+#include "core/surface/grid_layout.h"
 
 namespace lensforge {
 namespace {

@@ -115,13 +115,15 @@ void add_files(const Lens& lens, PendingFiles& files) {
 void remove_older(const PendingFiles& files, const fs::path& folder) {
   using namespace lens_file;
   fs::remove(folder / kJson);
-  for (const char* name : {kSurface, kSpline, kTargetPng, kTargetExr, kRenderPng, kRenderExr, kError}) {
+  for (const char* name :
+       {kSurface, kSpline, kTargetPng, kTargetExr, kRenderPng, kRenderExr, kError}) {
     if (!files.has(name)) fs::remove(folder / name);
   }
 }
 
 void check_sizes(const Lens& lens) {
-  LF_CHECK(lens.spline.has_value() == (lens.model == SurfaceModel::kSpline), model_name(lens.model));
+  LF_CHECK(lens.spline.has_value() == (lens.model == SurfaceModel::kSpline),
+           model_name(lens.model));
   const Eigen::Vector2i& pixels = lens.setup.pixels;
   const auto fits = [&](const Image& image) {
     return image.columns() == pixels.x() && image.rows() == pixels.y();
@@ -304,7 +306,8 @@ Lens read_lens(const fs::path& folder) {
   Lens lens;
   lens.setup = read_setup(fields, path.string());
   lens.model = choice<SurfaceModel>(fields, "model", named_models());
-  if (lens.model == SurfaceModel::kSpline) lens.spline = read_own_spline(fields, lens.setup, folder);
+  if (lens.model == SurfaceModel::kSpline)
+    lens.spline = read_own_spline(fields, lens.setup, folder);
   const JsonFields metrics = fields.object("metrics");
   for (const SurfaceModel model : models_of(lens)) {
     lens.metrics[model] = read_metrics(metrics.object(model_name(model)));

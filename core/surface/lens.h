@@ -57,8 +57,8 @@ inline constexpr const char* kOverview = "overview.png";
 inline constexpr const char* kCheckpoint = "checkpoint.bin";  ///< While a design is unfinished.
 
 /// All of them.
-inline constexpr std::array kAll = {kJson,      kSurface,  kSpline,      kTargetPng,
-                                    kTargetExr, kRenderPng, kRenderExr,  kError,
+inline constexpr std::array kAll = {kJson,      kSurface,     kSpline,    kTargetPng,
+                                    kTargetExr, kRenderPng,   kRenderExr, kError,
                                     kOverview,  kConvergence, kCheckpoint};
 
 /// Folder in which earlier versions put a lens together; a killed one has left it behind.

@@ -80,9 +80,8 @@ struct OwnHeader {
 
 /// The header if the file is in the very form that write_ply() makes, with or without its mark.
 std::optional<OwnHeader> own_form(std::ifstream& file) {
-  const std::size_t longest =
-      kFormatLines.size() + kLongestMark +
-      element_lines({INT32_MAX, INT32_MAX}, kNormalLines).size();
+  const std::size_t longest = kFormatLines.size() + kLongestMark +
+                              element_lines({INT32_MAX, INT32_MAX}, kNormalLines).size();
   std::string head(longest, '\0');
   file.read(head.data(), static_cast<std::streamsize>(head.size()));
   head.resize(static_cast<std::size_t>(file.gcount()));
@@ -106,11 +105,10 @@ std::optional<OwnHeader> own_form(std::ifstream& file) {
 /// Our own form is read bit for bit, without rounding to single precision.
 SurfaceMesh read_own_form(std::ifstream& file, const OwnHeader& header, const fs::path& path) {
   const Counts& counts = header.counts;
-  const std::uintmax_t expected = header.bytes +
-                                  static_cast<std::uintmax_t>(counts.vertices *
-                                                              header.numbers_per_vertex()) *
-                                      sizeof(double) +
-                                  static_cast<std::uintmax_t>(counts.triangles) * kTriangleBytes;
+  const std::uintmax_t expected =
+      header.bytes +
+      static_cast<std::uintmax_t>(counts.vertices * header.numbers_per_vertex()) * sizeof(double) +
+      static_cast<std::uintmax_t>(counts.triangles) * kTriangleBytes;
   if (const std::uintmax_t size = fs::file_size(path); size != expected) {
     refuse(path, "is " + std::to_string(size) + " bytes long, its header calls for " +
                      std::to_string(expected) + ": it is truncated or corrupt");

@@ -6,8 +6,8 @@
 
 #include "core/compute/executor.h"
 #include "core/compute/run_control.h"
-#include "core/surface/smooth_surface.h"
 #include "core/surface/grid_warp.h"
+#include "core/surface/smooth_surface.h"
 #include "core/surface/spline_grid.h"
 
 namespace lensforge {

@@ -55,11 +55,10 @@ struct RimSide {
 std::optional<std::string> spline_fault(const ControlNet& net, const OpticalSetup& setup) {
   const int columns = net.shape.columns;
   const int rows = net.shape.rows;
-  for (const RimSide& side : {RimSide{0, columns, rows, 0, 0.0},
-                              RimSide{columns - 1, columns, rows, 0, setup.lens_size.x()},
-                              RimSide{0, 1, columns, 1, 0.0},
-                              RimSide{Eigen::Index{rows - 1} * columns, 1, columns, 1,
-                                      setup.lens_size.y()}}) {
+  for (const RimSide& side :
+       {RimSide{0, columns, rows, 0, 0.0},
+        RimSide{columns - 1, columns, rows, 0, setup.lens_size.x()}, RimSide{0, 1, columns, 1, 0.0},
+        RimSide{Eigen::Index{rows - 1} * columns, 1, columns, 1, setup.lens_size.y()}}) {
     for (int k = 0; k < side.count; ++k) {
       const Eigen::Index point = side.first + side.step * k;
       const double found = net.points(side.axis, point);
@@ -96,13 +95,12 @@ ControlNet read_spline(const std::filesystem::path& path) {
   ControlNet net;
   net.shape = read_shape(JsonFields(document, name));
   rest.remove_prefix(end + 1);
-  const std::uintmax_t count =
-      std::uintmax_t{static_cast<unsigned>(net.shape.columns)} *
-      static_cast<unsigned>(net.shape.rows);
+  const std::uintmax_t count = std::uintmax_t{static_cast<unsigned>(net.shape.columns)} *
+                               static_cast<unsigned>(net.shape.rows);
   if (rest.size() / (3 * sizeof(double)) != count || rest.size() % (3 * sizeof(double)) != 0) {
     refuse(path, "holds " + std::to_string(rest.size()) + " bytes of control points, its header " +
-                     "calls for " + std::to_string(count) + " points of 24 bytes: it is truncated " +
-                     "or corrupt");
+                     "calls for " + std::to_string(count) +
+                     " points of 24 bytes: it is truncated " + "or corrupt");
   }
   net.points.resize(3, static_cast<Eigen::Index>(count));
   std::memcpy(net.points.data(), rest.data(), rest.size());

@@ -55,8 +55,8 @@ SmoothPatch SplineSurface::patch_in(std::int64_t triangle,
   const auto toward = [&](std::size_t i, std::size_t j) {
     return s[i].z + s[i].slope.dot(p[j] - p[i]) / 3.0;
   };
-  SmoothPatch::Coefficients c{s[0].z,       s[1].z,       s[2].z,       toward(0, 1), toward(1, 0),
-                              toward(0, 2), toward(1, 2), 0.0,          toward(2, 0), toward(2, 1)};
+  SmoothPatch::Coefficients c{s[0].z,       s[1].z,       s[2].z, toward(0, 1), toward(1, 0),
+                              toward(0, 2), toward(1, 2), 0.0,    toward(2, 0), toward(2, 1)};
   // In the middle a corner weighs 1/27, a coefficient on an edge 3/27, the inner one 6/27.
   const double middle = shape_in(triangle, Eigen::Vector3d::Constant(1.0 / 3.0)).z;
   const double corners = c[0] + c[1] + c[2];

@@ -22,7 +22,8 @@ class SplineObjectiveOn {
                     const ObjectiveOptions& options, const Exec& executor)
       : executor_(executor),
         nodes_(net.grid, options.samples, executor),
-        core_(spline_nodes({net.grid, net.vertices}, options.samples).mesh, setup, goal, options, executor),
+        core_(spline_nodes({net.grid, net.vertices}, options.samples).mesh, setup, goal, options,
+              executor),
         movable_(objective_detail::movable_coordinates(net.vertices, setup.lens_size)),
         movable_here_(buffer_of(executor, objective_detail::entries(movable_))),
         positions_(3 * static_cast<std::size_t>(nodes_.shape().columns) *

@@ -17,8 +17,9 @@
 /// Spline model: a tensor product of cubic B-splines looked at on an even grid of nodes, and the
 /// adjoint of looking. Both are two passes of four taps, first along u, then along v.
 ///
-/// Notation: c control point, B basis functions, a = Σ B(u) c, a' = Σ B'(u) c along a row of control
-/// points; p = Σ B(v) a a node, p_u = Σ B(v) a', p_v = Σ B'(v) a, n = p_u × p_v; a bar is ∂E/∂.
+/// Notation: c control point, B basis functions, a = Σ B(u) c, a' = Σ B'(u) c along a row of
+/// control points; p = Σ B(v) a a node, p_u = Σ B(v) a', p_v = Σ B'(v) a, n = p_u × p_v; a bar is
+/// ∂E/∂.
 namespace lensforge {
 
 /// The basis functions of one direction at its nodes.
@@ -83,10 +84,10 @@ struct SplineNodesView {
   AxisTaps v;
   std::int64_t columns;  ///< Of control points.
   std::int64_t nodes_u;
-  double* along;   ///< nodes_u × rows of control points: a, and in an adjoint its bar.
-  double* steep;   ///< The same of a'.
-  double* by_u;    ///< 3 × nodes: p_u
-  double* by_v;    ///< 3 × nodes: p_v
+  double* along;  ///< nodes_u × rows of control points: a, and in an adjoint its bar.
+  double* steep;  ///< The same of a'.
+  double* by_u;   ///< 3 × nodes: p_u
+  double* by_v;   ///< 3 × nodes: p_v
 };
 
 /// a and a' of one node column and one row of control points.
@@ -215,7 +216,7 @@ class SplineNodesOn {
   }
   [[nodiscard]] std::int64_t node_count() const { return std::int64_t{u_.nodes()} * v_.nodes(); }
   [[nodiscard]] SplineNodesView view() {
-    return {u_.view(),       v_.view(),     u_.coefficients(), u_.nodes(),
+    return {u_.view(),     v_.view(),     u_.coefficients(), u_.nodes(),
             along_.data(), steep_.data(), by_u_.data(),      by_v_.data()};
   }
 

@@ -40,8 +40,8 @@ SurfaceMesh spline_start(const DesignTask& task, const Level& level, const Surfa
   constexpr double kShareStep = 0.25;
   const LevelProblem problem = make_problem(task, level, 0);
   for (double share = 1.0;; share -= kShareStep) {
-    SurfaceMesh net = net_mesh(spline_through(mesh, task.setup.lens_size, level.grid, share,
-                                              task.executor, task.control));
+    SurfaceMesh net = net_mesh(
+        spline_through(mesh, task.setup.lens_size, level.grid, share, task.executor, task.control));
     GuidedOptimization stage(net, problem.setup, problem.target, problem.objective, task.executor);
     if (share <= 0.0 || std::isfinite(stage.value(net))) return net;
   }

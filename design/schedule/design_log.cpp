@@ -71,8 +71,7 @@ void DesignLog::report(const std::string& detail, int iteration) const {
   const auto level = static_cast<std::size_t>(state_.level);
   const Level& at = task_.levels[level];
   const double rounds = state_.round + static_cast<double>(iteration) / at.iterations;
-  const double done =
-      work_before(task_, level) + level_work(task_, level) * rounds / at.rounds;
+  const double done = work_before(task_, level) + level_work(task_, level) * rounds / at.rounds;
   task_.control.report({stage, done, work_total(task_), detail});
 }
 

@@ -71,7 +71,8 @@ Ending follow_picture(const LevelSite& site, Checkpoint& state) {
   LbfgsOptions optimizer;
   optimizer.max_iterations = site.level.iterations;
   const LbfgsSummary summary =
-      site.stage.run(optimizer, site.log.observer(site.level.spline ? "spline" : "render"), state.scales, state.mesh);
+      site.stage.run(optimizer, site.log.observer(site.level.spline ? "spline" : "render"),
+                     state.scales, state.mesh);
   using Status = LbfgsSummary::Status;
   return {summary.status == Status::kStopped,
           summary.status == Status::kInfeasibleStart ? summary.message : ""};
@@ -94,8 +95,8 @@ Ending run_round(const LevelSite& site, Checkpoint& state) {
     Ending ending = follow_picture(site, state);
     if (ending.ended()) return ending;
   }
-  conclude_round({before, site.stage.value(state.mesh), transports, rescaled},
-                 site.level.rounds, state);
+  conclude_round({before, site.stage.value(state.mesh), transports, rescaled}, site.level.rounds,
+                 state);
   return {};
 }
 

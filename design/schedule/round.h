@@ -28,9 +28,9 @@ struct LevelSite {
   DesignLog& log;
 };
 
-/// One alternation of Sun et al., section 3.4: transport_step() where it is due (never of a spline),
-/// then rendering-guided optimisation, then conclude_round(). Where it is stopped on the way, the state
-/// holds the best surface so far and names the same round.
+/// One alternation of Sun et al., section 3.4: transport_step() where it is due (never of a
+/// spline), then rendering-guided optimisation, then conclude_round(). Where it is stopped on the
+/// way, the state holds the best surface so far and names the same round.
 /// @throw Interrupted; InputError if no surface can send the light so far in so short a distance.
 Ending run_round(const LevelSite& site, Checkpoint& state);
 

@@ -68,8 +68,7 @@ TEST_F(SplineLens, StepHoldsTheVerySurface) {
   ASSERT_TRUE(result.splines.has_value());
   EXPECT_FALSE(result.splines->fit.has_value());
   EXPECT_TRUE(result.splines->content.is_one_solid());
-  const SolidSurface solid =
-      read_solid_surface(folder_ / "lens.step", 5e4, Executor::serial());
+  const SolidSurface solid = read_solid_surface(folder_ / "lens.step", 5e4, Executor::serial());
   EXPECT_TRUE(solid.by_name);
   const ControlNet& spline = *source_.lens.spline;
   double height = 0.0;
@@ -92,8 +91,7 @@ TEST_F(SplineLens, StepProjectsThePictureOfTheDesign) {
   const SolidSurface solid =
       read_solid_surface(folder_ / "lens.step", kPictureNodes, Executor::serial());
   const Lens& lens = source_.lens;
-  const double designed =
-      evaluate(lens, SurfaceModel::kSpline, nullptr, Executor::serial()).mae;
+  const double designed = evaluate(lens, SurfaceModel::kSpline, nullptr, Executor::serial()).mae;
   const double made = evaluate(solid.samples.mesh, solid.samples.normals, lens.setup, lens.target,
                                nullptr, Executor::serial())
                           .mae;

@@ -5,12 +5,12 @@
 
 #include <random>
 
+#include "core/surface/cubic_spline.h"
+#include "core/surface/grid_warp.h"
 #include "design/design_lens.h"
 #include "design/render_lens.h"
 #include "design/wanted_picture.h"
 #include "export/closed_solid.h"
-#include "core/surface/cubic_spline.h"
-#include "core/surface/grid_warp.h"
 #include "export/normal_bound.h"
 #include "export/sample_surfaces.h"
 #include "fixtures/scenes.h"

@@ -32,7 +32,8 @@ TEST(SplineSurface, SecondDerivativesAreContinuous) {
   const SplineSurface surface(sample_spline());
   for (double x = 0.05; x < 14.9; x += 0.0317) {
     const auto shape_at = [&](double at) {
-      return surface.net().at(surface.net().parameters_of({at, 4.3}, {at / 15.0 * 11.0, 3.4}))
+      return surface.net()
+          .at(surface.net().parameters_of({at, 4.3}, {at / 15.0 * 11.0, 3.4}))
           .shape();
     };
     EXPECT_LT((shape_at(x + 1e-6).bend - shape_at(x).bend).norm(), 1e-5) << x;
@@ -45,8 +46,8 @@ TEST(SplineSurface, PatchesAreTheSurfaceToTheFourthOrder) {
   for (Eigen::Index t = 0; t < surface.mesh().triangle_count(); ++t) {
     const Eigen::Vector3d middle = Eigen::Vector3d::Constant(1.0 / 3.0);
     const SmoothPatch patch = surface.patch_in(t, middle);
-    for (const Eigen::Vector3d& weights : {Eigen::Vector3d(1.0, 0.0, 0.0), middle,
-                                           Eigen::Vector3d(0.2, 0.5, 0.3)}) {
+    for (const Eigen::Vector3d& weights :
+         {Eigen::Vector3d(1.0, 0.0, 0.0), middle, Eigen::Vector3d(0.2, 0.5, 0.3)}) {
       Eigen::Vector2d xy(0.0, 0.0);
       for (int k = 0; k < 3; ++k) xy += weights[k] * surface.mesh().corner(t, k).head<2>();
       const SurfaceShape shape = surface.shape_in(t, weights);
@@ -64,8 +65,7 @@ TEST(SplineSurface, BendRangesHoldInsideTheirTriangles) {
   for (Eigen::Index t = 0; t < surface.mesh().triangle_count(); ++t) {
     Eigen::Vector3d weights(unit(random), unit(random), unit(random));
     weights /= weights.sum();
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver(
-        surface.shape_in(t, weights).bend);
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver(surface.shape_in(t, weights).bend);
     const BendRange range = surface.bend_range(t);
     widest = std::max(widest, range.largest - range.least);
     // What lies between the corners of half a knot cell: a hundredth of the bends of all.
