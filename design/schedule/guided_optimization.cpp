@@ -85,15 +85,16 @@ std::unique_ptr<GuidedStage> make_stage(const SurfaceMesh& mesh, const OpticalSe
                                         const DesignGoal& goal, const ObjectiveOptions& options,
                                         const Executor& executor) {
   const double aspect = cell_aspect(setup, mesh.grid);
+  // A spline's stage works on the processor, whatever the device.
+  if (options.model == SurfaceModel::kSpline) {
+    return std::make_unique<GuidedStageOn<Executor, SplineObjectiveOn<Executor>>>(
+        mesh, setup, aspect, goal, options, executor);
+  }
 #if defined(LENSFORGE_CUDA)
   if (executor.device() == Device::kCuda) {
     return make_cuda_stage(mesh, setup, aspect, goal, options, executor);
   }
 #endif
-  if (options.model == SurfaceModel::kSpline) {
-    return std::make_unique<GuidedStageOn<Executor, SplineObjectiveOn<Executor>>>(
-        mesh, setup, aspect, goal, options, executor);
-  }
   return std::make_unique<GuidedStageOn<Executor>>(mesh, setup, aspect, goal, options, executor);
 }
 
