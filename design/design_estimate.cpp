@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "core/surface/control_net.h"
 #include "design/schedule/level_plan.h"
 
 namespace lensforge {
@@ -39,10 +40,12 @@ WorkEstimate estimate_design(int columns, int rows, const DesignOptions& options
   WorkEstimate estimate;
   double processor = 0.0;
   for (const Level& level : plan_levels(working_size(columns, rows, options.pixels), options)) {
-    const double triangles = 2.0 * (level.grid.columns - 1.0) * (level.grid.rows - 1.0);
+    const double per_cell = level.spline ? 2.0 * kMeshSamples * kMeshSamples : 2.0;
+    const double triangles = per_cell * (level.grid.columns - 1.0) * (level.grid.rows - 1.0);
     const double pixels = level.pixels.cast<double>().prod();
-    const double iterations = static_cast<double>(options.rounds) * options.iterations;
-    processor += triangles * (kTransportSeconds * options.transport_rounds +
+    const double iterations = static_cast<double>(level.rounds) * level.iterations;
+    const int transports = level.spline ? 0 : options.transport_rounds;
+    processor += triangles * (kTransportSeconds * transports +
                               kIterationSeconds * (options.rendering_guided ? iterations : 0.0));
     estimate.memory_bytes = kBaseMemory + kTriangleMemory * triangles + kPixelMemory * pixels;
     estimate.disk_bytes = kTriangleDisk * triangles + kPixelDisk * pixels;
