@@ -22,7 +22,11 @@ LF_HD inline double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
 
 /// (v1 − v0) × (v2 − v0): the normal times twice the area (numerator of Sun et al., Eq. 4).
 LF_HD inline Eigen::Vector3d area_normal(const Corners& t) {
-  return (t.v1 - t.v0).cross(t.v2 - t.v0);
+  const Eigen::Vector3d u = t.v1 - t.v0;
+  const Eigen::Vector3d v = t.v2 - t.v0;
+  // u.cross(v), which GCC 12 leaves as a call: that costs an objective an eighth of its time.
+  return {u.y() * v.z() - u.z() * v.y(), u.z() * v.x() - u.x() * v.z(),
+          u.x() * v.y() - u.y() * v.x()};
 }
 
 /// What a triangle covers seen from +z, half the z of area_normal(); negative if it runs clockwise.
