@@ -34,11 +34,13 @@ Tool& tool_of(Workshop& workshop, int number) {
 
 const Tool& tool_of(const Workshop& workshop, int number) { return workshop.tool(number); }
 
+constexpr auto kBallNumber = [](const Process& process) { return process.finish.tool; };
+constexpr auto kRougherNumber = [](const Process& process) { return process.rough.tool; };
 constexpr auto kBall = [](auto& o) -> auto& {
-  return tool_of(o.workshop, o.workshop.process.finish.tool);
+  return tool_of(o.workshop, kBallNumber(o.workshop.process));
 };
 constexpr auto kRougher = [](auto& o) -> auto& {
-  return tool_of(o.workshop, o.workshop.process.rough.tool);
+  return tool_of(o.workshop, kRougherNumber(o.workshop.process));
 };
 constexpr auto kFinish = [](auto& o) -> auto& { return o.workshop.process.finish; };
 
@@ -50,15 +52,12 @@ auto in(At at, Member member) {
 
 /// The diameter of a tool, whose flutes and neck keep their proportions; null where the workshop
 /// has no such tool, which a process that is left out may name.
-template <class At>
-Field diameter(const char* name, At tool, const char* help) {
+template <class At, class Number>
+Field diameter(const char* name, At tool, Number number, const char* help) {
   Field row = R::length(name, in(tool, &Tool::diameter), as_in_workshop("tool.diameter"), help);
-  row.get = [get = row.get](const O& o) {
-    try {
-      return get(o);
-    } catch (const InputError&) {
-      return nlohmann::json();
-    }
+  row.get = [number](const O& o) {
+    const Tool* const found = o.workshop.find_tool(number(o.workshop.process));
+    return found == nullptr ? nlohmann::json() : nlohmann::json(found->diameter);
   };
   row.set = [tool](O& o, const nlohmann::json& value) {
     tool(o) = resized(tool(o), value.get<double>());
@@ -76,7 +75,7 @@ Field pitch_row() {
 
 OptionTable<O> tool_rows() {
   return {
-      diameter("--tool-diameter", kBall, "finishing ball-end mill"),
+      diameter("--tool-diameter", kBall, kBallNumber, "finishing ball-end mill"),
       pitch_row(),
       R::length("--scallop", in(kFinish, &FinishProcess::scallop), as_in_workshop("finish.scallop"),
                 "height of scallops; if above 0, the pitch follows from it"),
@@ -86,7 +85,7 @@ OptionTable<O> tool_rows() {
                 "finishing feed"),
       R::number("--plunge", in(kBall, &Tool::plunge), as_in_workshop("tool.plunge"), "mm/min",
                 "feed straight down"),
-      diameter("--rough-tool", kRougher, "diameter of the roughing tool"),
+      diameter("--rough-tool", kRougher, kRougherNumber, "diameter of the roughing tool"),
       R::flag("--force", &O::force,
               "replace files in DIR/cam that lensforge did not write, or that were changed since")};
 }

@@ -20,9 +20,9 @@ constexpr double kSketchSpacing = 0.5;
 /// Unit of a program's last decimal where nothing is rounded, mm.
 constexpr double kUnrounded = 1e-9;
 
-/// The lens, or what its mould would be as a lens.
-Lens lens_to_cut(const Lens& lens, const CamOptions& options) {
-  return options.part == PartKind::kLens ? lens : mould_lens(lens, {options.shrinkage});
+std::optional<Lens> mould_to_cut(const Lens& lens, const CamOptions& options) {
+  if (options.part == PartKind::kLens) return std::nullopt;
+  return mould_lens(lens, {options.shrinkage});
 }
 
 /// @throw InputError if the lens is no spline and one is to be cut.
@@ -64,7 +64,7 @@ CutPlan::CutPlan(const Lens& lens, const CamOptions& options, const Executor& ex
     : lens_(lens),
       options_(options),
       executor_(executor),
-      cut_(lens_to_cut(lens, options)),
+      mould_lens_(mould_to_cut(lens, options)),
       model_(model_to_cut(lens, options)),
       field_(above_table(inspect_height_field(mesh(), size_to_cut(lens, options)))),
       blank_(options_.workshop.stock.box(field_.box)),
@@ -72,7 +72,7 @@ CutPlan::CutPlan(const Lens& lens, const CamOptions& options, const Executor& ex
       decimals_(decimals_of(options_)),
       profile_(mesh()),
       stock_(whole_blank(options_.workshop, field_.box)),
-      optical_(optical_surface(cut_, model_)),
+      optical_(optical_surface(cut(), model_)),
       surface_(surface_to_cut(optical_, ball().radius(), executor)),
       collisions_(profile_, options_.workshop, stock_),
       watch_(collisions_, options_.workshop.tools, z_offset_,

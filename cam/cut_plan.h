@@ -55,7 +55,7 @@ class CutPlan {
 
   [[nodiscard]] const CamOptions& options() const { return options_; }
   /// What is cut: the lens's surface or the mould's; mm, in a lens frame of its own.
-  [[nodiscard]] const SurfaceMesh& mesh() const { return cut_.surface; }
+  [[nodiscard]] const SurfaceMesh& mesh() const { return cut().surface; }
   /// Under which model the surface is cut.
   [[nodiscard]] SurfaceModel model() const { return model_; }
   /// The optical surface that it stands for.
@@ -89,6 +89,8 @@ class CutPlan {
  private:
   [[nodiscard]] const FinishProcess& finish() const { return options_.workshop.process.finish; }
   [[nodiscard]] const Tool& ball() const { return finishing_ball(options_); }
+  /// The lens, or what its mould would be as a lens.
+  [[nodiscard]] const Lens& cut() const { return mould_lens_ ? *mould_lens_ : lens_; }
   [[nodiscard]] double safe_z() const;
   ProgramOperation rough_operation(const RunControl& control);
   ProgramOperation semi_operation(const RunControl& control);
@@ -103,7 +105,7 @@ class CutPlan {
   const Lens& lens_;
   CamOptions options_;
   Executor executor_;
-  Lens cut_;  ///< lens_, or what its mould would be as a lens.
+  std::optional<Lens> mould_lens_;  ///< None if the lens itself is cut.
   SurfaceModel model_;
   HeightField field_;
   Eigen::AlignedBox3d blank_;

@@ -71,10 +71,8 @@ struct StepRule {
 };
 
 void check_step(const Rules& rules, const Workshop& workshop, const StepRule& rule) {
-  const auto same = [&](const Tool& tool) { return tool.number == rule.tool; };
-  const auto tool = std::find_if(workshop.tools.begin(), workshop.tools.end(), same);
-  rules.hold(tool != workshop.tools.end(), rule.table + ".tool", rule.tool,
-             "no tool has this number");
+  const Tool* const tool = workshop.find_tool(rule.tool);
+  rules.hold(tool != nullptr, rule.table + ".tool", rule.tool, "no tool has this number");
   rules.hold(rule.step <= tool->diameter, rule.table + "." + rule.key, rule.step,
              "is wider than the tool, " + shortest_text(tool->diameter) + " mm");
 }
@@ -169,14 +167,15 @@ Eigen::AlignedBox3d Stock::box(const Eigen::AlignedBox3d& surface) const {
   return blank;
 }
 
-const Tool& Workshop::tool(int number) const {
+const Tool* Workshop::find_tool(int number) const {
   const auto same = [&](const Tool& tool) { return tool.number == number; };
   const auto found = std::find_if(tools.begin(), tools.end(), same);
-  if (found == tools.end()) {
-    throw InputError("tool " + std::to_string(number) +
-                     ": the workshop has no tool of this number");
-  }
-  return *found;
+  return found == tools.end() ? nullptr : &*found;
+}
+
+const Tool& Workshop::tool(int number) const {
+  if (const Tool* const found = find_tool(number)) return *found;
+  throw InputError("tool " + std::to_string(number) + ": the workshop has no tool of this number");
 }
 
 double finish_pitch(const FinishProcess& process, double ball_radius) {

@@ -71,6 +71,8 @@ struct Workshop {
   std::vector<Tool> tools = default_tools();
   Process process;
 
+  /// Null if no tool has this number.
+  [[nodiscard]] const Tool* find_tool(int number) const;
   /// @throw InputError if no tool has this number.
   [[nodiscard]] const Tool& tool(int number) const;
   friend bool operator==(const Workshop&, const Workshop&) = default;
