@@ -199,25 +199,25 @@ OptionTable<O> program_rows() {
 }
 
 OptionTable<O> prediction_rows() {
-  constexpr auto polish = [](auto& o) -> auto& { return o.polish; };
-  return {R::without("--no-render", &O::render, "programs only, without the predicted picture"),
-          R::without("--no-remedies", &O::remedies, "do not try what helps where most light leaks"),
-          R::length("--polish-sigma", in(polish, &PolishModel::sigma),
-                    Limits::between(0, cam_limit::kPolish),
-                    "polishing averages heights with a Gaussian of this σ"),
-          R::length("--rim-depth", in(polish, &PolishModel::rim_depth),
-                    Limits::between(0, cam_limit::kPolish),
-                    "extra depth that polishing removes at the rim"),
-          R::length("--rim-length", in(polish, &PolishModel::rim_length),
-                    Limits::between(cam_limit::kMinRim, cam_limit::kRim),
-                    "distance from the rim over which the extra depth falls to a third"),
-          R::length("--sample-spacing", &O::sample_spacing,
-                    Limits::zero_or(cam_limit::kFinestSample, cam_limit::kCoarsestSample),
-                    "spacing of samples of the milled surface; 0: chosen from pitch and σ"),
-          R::number(
-              "--dark-below", [](auto& o) -> auto& { return o.leakage.dark_below; },
-              Limits::between(0, cam_limit::kDark), "",
-              "parts of the picture below this share of its mean are dark")};
+  constexpr auto polish = [](auto& o) -> auto& { return o.workshop.polish; };
+  return {
+      R::without("--no-render", &O::render, "programs only, without the predicted picture"),
+      R::without("--no-remedies", &O::remedies, "do not try what helps where most light leaks"),
+      R::length("--polish-sigma", in(polish, &PolishModel::sigma), as_in_workshop("polish.sigma"),
+                "polishing averages heights with a Gaussian of this σ"),
+      R::length("--rim-depth", in(polish, &PolishModel::rim_depth),
+                as_in_workshop("polish.rim_depth"),
+                "extra depth that polishing removes at the rim"),
+      R::length("--rim-length", in(polish, &PolishModel::rim_length),
+                as_in_workshop("polish.rim_length"),
+                "distance from the rim over which the extra depth falls to a third"),
+      R::length("--sample-spacing", &O::sample_spacing,
+                Limits::zero_or(cam_limit::kFinestSample, cam_limit::kCoarsestSample),
+                "spacing of samples of the milled surface; 0: chosen from pitch and σ"),
+      R::number(
+          "--dark-below", [](auto& o) -> auto& { return o.leakage.dark_below; },
+          Limits::between(0, cam_limit::kDark), "",
+          "parts of the picture below this share of its mean are dark")};
 }
 
 OptionTable<O> limit_rows() {

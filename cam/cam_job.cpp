@@ -108,7 +108,8 @@ class Job {
     const Eigen::AlignedBox2d rectangle(Eigen::Vector2d(0.0, 0.0), lens_.setup.lens_size);
     const PartSurfaces surfaces({lens ? lens->field() : cut->field(), *rounded, rectangle,
                                  plan_.blank().max().z(), plan_.mould()},
-                                plan_.take_finish_paths(programs, control_), options_.polish);
+                                plan_.take_finish_paths(programs, control_),
+                                options_.workshop.polish);
     Prediction prediction = predict_part(surfaces, lens_, options_, executor_, control_);
     if (options_.remedies) {
       try_remedies({plan_, lens_, surfaces.designed(), surfaces.part(), prediction.leakage},

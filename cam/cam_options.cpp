@@ -31,9 +31,10 @@ void validate_decimals(const CamOptions& options) {
 }
 
 void validate_sampling(const CamOptions& options) {
-  if (options.polish.sigma > 0.0 && options.sample_spacing > options.polish.sigma) {
+  if (options.workshop.polish.sigma > 0.0 &&
+      options.sample_spacing > options.workshop.polish.sigma) {
     refuse("--sample-spacing", options.sample_spacing,
-           "must be at most --polish-sigma, " + shortest_text(options.polish.sigma) +
+           "must be at most --polish-sigma, " + shortest_text(options.workshop.polish.sigma) +
                " mm, which it could not show");
   }
 }
@@ -85,8 +86,8 @@ double sample_spacing(const CamOptions& options) {
   if (options.sample_spacing > 0.0) return options.sample_spacing;
   const FinishProcess& finish = options.workshop.process.finish;
   const double pitch = finish_pitch(finish, options.workshop.tool(finish.tool).radius());
-  return std::clamp(std::max(pitch / 6.0, options.polish.sigma / 3.0), cam_limit::kFinestSample,
-                    cam_limit::kCoarsestSample);
+  return std::clamp(std::max(pitch / 6.0, options.workshop.polish.sigma / 3.0),
+                    cam_limit::kFinestSample, cam_limit::kCoarsestSample);
 }
 
 void validate(const CamOptions& options, const OpticalSetup& setup) {

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "cam/leakage/leakage.h"
-#include "cam/milled/polished_field.h"
 #include "cam/path/finish_raster.h"
 #include "cam/post/post_description.h"
 #include "cam/post/program_plan.h"
@@ -55,7 +54,6 @@ struct CamOptions {
 
   bool render = true;    ///< Compute what the part will project; else programs only.
   bool remedies = true;  ///< Try what helps where most light leaks, if it is computed.
-  PolishModel polish{0.03, 0.0, 1.0};
   /// Of the surface that is rendered, mm, 0.001 … 1; 0 takes a sixth of the pitch, or a third of
   /// the polish's σ if that is more.
   double sample_spacing = 0.0;
@@ -65,10 +63,6 @@ struct CamOptions {
 
 /// Maximum or minimum of the options below; those of the workshop follow workshop_rule().
 namespace cam_limit {
-inline constexpr double kPolish =
-    1.0;  ///< σ and depth at the rim, mm; beyond it no picture is left.
-inline constexpr double kMinRim = 1e-3;  ///< Of PolishModel::rim_length, mm.
-inline constexpr double kRim = 1000.0;   ///< Likewise.
 inline constexpr double kDark = 1e3;  ///< Of LeakageOptions::dark_below: brighter than any picture.
 inline constexpr double kLimit = 1e6;           ///< Of each of CutLimits, in its own unit.
 inline constexpr double kFinestSample = 1e-3;   ///< mm

@@ -174,7 +174,7 @@ CutComparison compare_cuts(const Lens& lens, const CamOptions& options, const Cu
   page.parameters = {
       {"Compared",
        {{"Operations", "finishing only"},
-        {"Polishing, Gaussian σ", trimmed_decimal(options.polish.sigma, 4) + " mm"}}}};
+        {"Polishing, Gaussian σ", trimmed_decimal(options.workshop.polish.sigma, 4) + " mm"}}}};
   comparison.page = folder / kComparePage;
   write_whole_file(comparison.page, compare_html(page));
   comparison.complete = true;

@@ -103,12 +103,12 @@ ParameterGroup entry_parameters(const Process& process) {
 
 ParameterGroup polish_parameters(const CamOptions& options) {
   ParameterGroup group{"Polishing, as assumed",
-                       {{"Gaussian σ", mm(options.polish.sigma, 3)},
+                       {{"Gaussian σ", mm(options.workshop.polish.sigma, 3)},
                         {"Sampled every", mm(sample_spacing(options), 4)}}};
-  if (options.polish.rim_depth > 0.0) {
+  if (options.workshop.polish.rim_depth > 0.0) {
     group.parameters.push_back(
-        {"Taken off at the rim",
-         mm(options.polish.rim_depth, 4) + ", falling over " + mm(options.polish.rim_length, 2)});
+        {"Taken off at the rim", mm(options.workshop.polish.rim_depth, 4) + ", falling over " +
+                                     mm(options.workshop.polish.rim_length, 2)});
   }
   return group;
 }

@@ -62,8 +62,8 @@ std::optional<Change> with_another_decimal(const CamOptions& options) {
 
 Change with_half_the_polish(const CamOptions& options) {
   Change change{"half as much polishing", options};
-  change.options.polish.sigma *= kHalf;
-  change.options.polish.rim_depth *= kHalf;
+  change.options.workshop.polish.sigma *= kHalf;
+  change.options.workshop.polish.rim_depth *= kHalf;
   return change;
 }
 

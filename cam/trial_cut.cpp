@@ -183,8 +183,8 @@ LeakTrial TrialCut::at(const LeakPlace& place, const RunControl& control) const 
   const GridWindow grid = lens_grid(site_.lens.setup.lens_size, sample_spacing(before));
   const CellGrid fine = refined(grid, place.cells, sample_spacing(options_));
   const std::optional<CastFrame> mould = site_.plan.mould();
-  const double polished =
-      PolishedField::kReach * options_.polish.sigma + (1.0 + kCreaseHalo) * grid.spacing.maxCoeff();
+  const double polished = PolishedField::kReach * options_.workshop.polish.sigma +
+                          (1.0 + kCreaseHalo) * grid.spacing.maxCoeff();
   const double beyond = (mould ? mould->scale : 1.0) * polished + 2.0 * surface_->radius();
   const Eigen::AlignedBox2d box =
       grown_within(in_mould(box_of(grid, place.cells), mould), beyond, site_.plan.rectangle());
@@ -193,7 +193,7 @@ LeakTrial TrialCut::at(const LeakPlace& place, const RunControl& control) const 
   if (mould) cast.emplace(milled, *mould);
   const SurfaceField& raw = cast ? static_cast<const SurfaceField&>(*cast) : milled;
   const Eigen::Vector2d size = site_.lens.setup.lens_size;
-  const PolishedField part(raw, {Eigen::Vector2d(0.0, 0.0), size}, options_.polish);
+  const PolishedField part(raw, {Eigen::Vector2d(0.0, 0.0), size}, options_.workshop.polish);
   const OpticalSetup& optics = site_.lens.setup;
   const FluxPicture predicted =
       render_cells(site_.part, {optics, grid}, place.cells, executor_, silent);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "cam/milled/surface_field.h"
+#include "cam/tool/polish_model.h"
 
 namespace lensforge {
 
@@ -16,13 +17,6 @@ struct PolishKernel {
   std::vector<double> slope;  ///< 1/mm
 
   [[nodiscard]] std::int64_t reach() const { return static_cast<std::int64_t>(average.size()) - 1; }
-};
-
-/// What polishing does to a surface; all lengths in mm.
-struct PolishModel {
-  double sigma = 0.0;  ///< Of the Gaussian that heights are averaged with, ≥ 0; 0: not polished.
-  double rim_depth = 0.0;   ///< Taken off in addition at the rim, ≥ 0.
-  double rim_length = 1.0;  ///< Distance over which that falls to 1/e of itself, > 0.
 };
 
 /// A polished surface: heights averaged with a round Gaussian, and the slopes of the averaged

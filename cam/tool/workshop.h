@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "cam/tool/polish_model.h"
 #include "cam/tool/process.h"
 #include "cam/tool/tool.h"
 #include "core/text/toml_fields.h"
@@ -70,6 +71,7 @@ struct Workshop {
   std::vector<KeepOut> keep_outs;
   std::vector<Tool> tools = default_tools();
   Process process;
+  PolishModel polish{0.03, 0.0, 1.0};  ///< What happens to the surface after the last cut.
 
   /// Null if no tool has this number.
   [[nodiscard]] const Tool* find_tool(int number) const;

@@ -34,6 +34,9 @@ constexpr double kMinHelix = 0.01;
 /// mm that a tool is fed through air above material: less than a twist of a chuck's jaws.
 constexpr double kMinClearance = 0.05;
 
+/// σ and depth at the rim, mm; beyond it no picture is left.
+constexpr double kMaxPolish = 1.0;
+
 /// A word for each value of an enumeration, in its order.
 using Words = std::initializer_list<std::string_view>;
 const Words kShapes = {"ball", "bull", "flat"};
@@ -372,6 +375,15 @@ void describe(Visitor& v, Process& process) {
 }
 
 template <class Visitor>
+void describe(Visitor& v, PolishModel& polish) {
+  v.number({"sigma", 0.0, kMaxPolish}, polish.sigma,
+           "mm, of the Gaussian that heights are averaged with; 0: not polished");
+  v.number({"rim_depth", 0.0, kMaxPolish}, polish.rim_depth, "mm taken off in addition at the rim");
+  v.number({"rim_length", 1e-3, 1000.0}, polish.rim_length,
+           "mm from the rim over which that falls to a third");
+}
+
+template <class Visitor>
 void describe(Visitor& v, Workshop& shop) {
   v.table("machine", shop.machine, "The mill. Sizes are millimetres.");
   v.table("material", shop.material, "What the blank is made of.");
@@ -388,6 +400,8 @@ void describe(Visitor& v, Workshop& shop) {
   v.table("semi", shop.process.semi,
           "Evens out what roughing leaves, so that the finishing ball has little to cut.");
   v.table("finish", shop.process.finish, "The raster that makes the optical surface.");
+  v.table("polish", shop.polish,
+          "What polishing does to it. More σ blurs the picture, less leaves scallops.");
 }
 
 }  // namespace

@@ -78,7 +78,7 @@ TEST(CamJob, WritesProgramsPicturesAndReport) {
 TEST(CamJob, TheSplitAddsUpAndCausesThatAreNotThereCountNothing) {
   const TempFolder folder;
   CamOptions options = coarse();
-  options.polish.sigma = 0.0;
+  options.workshop.polish.sigma = 0.0;
   const LeakageResult leakage = run(small_lens(), options, folder).report.leakage;
   double sum = 0.0;
   for (const CausePart& part : leakage.parts) {
@@ -385,7 +385,7 @@ TEST(CamJob, BadOptionsAreNamedWithValueAndRule) {
       {"--spin-up", -0.1, [](CamOptions& o, double v) { o.spin_up = v; }},
       {"--spin-up", kNan, [](CamOptions& o, double v) { o.spin_up = v; }},
       {"--shrinkage", 0.3, [](CamOptions& o, double v) { o.shrinkage = v; }},
-      {"--polish-sigma", kNan, [](CamOptions& o, double v) { o.polish.sigma = v; }},
+      {"polish.sigma", kNan, [](CamOptions& o, double v) { o.workshop.polish.sigma = v; }},
       {"--sample-spacing", 0.1, [](CamOptions& o, double v) { o.sample_spacing = v; }}};
   const Lens lens = small_lens();
   const TempFolder folder;

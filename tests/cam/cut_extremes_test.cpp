@@ -40,7 +40,7 @@ constexpr milliseconds kTime{40};
 CamOptions coarse() {
   CamOptions options;
   options.sample_spacing = 0.1;
-  options.polish.sigma = 0.1;
+  options.workshop.polish.sigma = 0.1;
   options.remedies = false;
   FinishProcess& finish = options.workshop.process.finish;
   finish.pitch = 0.3;
@@ -78,10 +78,12 @@ TEST(CutExtremes, OptionsAreRefusedOrTheirJobCanBeStopped) {
   const std::vector<std::pair<std::string, Set>> options{
       {"spin_up", [](CamOptions& o, double v) { o.spin_up = v; }},
       {"shrinkage", [](CamOptions& o, double v) { o.part = PartKind::kMould, o.shrinkage = v; }},
-      {"sigma", [](CamOptions& o, double v) { o.polish.sigma = v; }},
-      {"rim_depth", [](CamOptions& o, double v) { o.polish.rim_depth = v; }},
+      {"sigma", [](CamOptions& o, double v) { o.workshop.polish.sigma = v; }},
+      {"rim_depth", [](CamOptions& o, double v) { o.workshop.polish.rim_depth = v; }},
       {"rim_length",
-       [](CamOptions& o, double v) { o.polish.rim_depth = 0.01, o.polish.rim_length = v; }},
+       [](CamOptions& o, double v) {
+         o.workshop.polish.rim_depth = 0.01, o.workshop.polish.rim_length = v;
+       }},
       {"sample_spacing", [](CamOptions& o, double v) { o.sample_spacing = v; }},
       {"dark_below", [](CamOptions& o, double v) { o.leakage.dark_below = v; }},
       {"leakage", [](CamOptions& o, double v) { o.limits.leakage = v; }},

@@ -69,7 +69,7 @@ class Predicted {
     const Eigen::AlignedBox2d rectangle(Eigen::Vector2d(0.0, 0.0), lens_.setup.lens_size);
     surfaces_.emplace(PartSurfaces::Design{designed_, *rounded_, rectangle, plan_.blank().max().z(),
                                            plan_.mould()},
-                      plan_.take_finish_paths(programs, control), options_.polish);
+                      plan_.take_finish_paths(programs, control), options_.workshop.polish);
     prediction_ = predict_part(*surfaces_, lens_, options_, executor_, control);
   }
 
@@ -146,7 +146,7 @@ TEST(Remedies, SmallerBallsAreTriedUntilTheLeakIsHalved) {
   // A ball whose fillet is wider than what polishing rounds.
   options.workshop.tools.back() = resized(options.workshop.tools.back(), 1.0);
   options.workshop.process.finish.pitch = 0.06;
-  options.polish.sigma = 0.03;
+  options.workshop.polish.sigma = 0.03;
   const Lens lens = grooved_lens();
   const ReportData report = make_cut(lens, options, folder.path(), Executor::cpu(2), {}).report;
   ASSERT_EQ(report.places.size(), 1U);

@@ -65,7 +65,7 @@ INSTANTIATE_TEST_SUITE_P(Sampling, Pitches,
 
 TEST(Sampling, TheErrorOfACoarseGridIsEstimated) {
   CamOptions options = with_pitch(0.1);
-  options.polish.sigma = 0.02;
+  options.workshop.polish.sigma = 0.02;
   options.sample_spacing = 0.018;
   const ReportData coarse = cut(options);
   options.sample_spacing = 0.006;

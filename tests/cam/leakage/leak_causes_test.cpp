@@ -40,7 +40,7 @@ CamOptions fine() {
   options.workshop.process.rough.enabled = false;
   options.workshop.process.semi.enabled = false;
   options.workshop.process.finish.pitch = 0.03;
-  options.polish.sigma = 0.0;
+  options.workshop.polish.sigma = 0.0;
   options.sample_spacing = 0.01;
   options.remedies = false;
   return options;
@@ -101,13 +101,13 @@ TEST(LeakCauses, DecimalsVanishWithTheLastDigit) {
   expect_vanishing(leak_cause::kDecimals, {4, 5, 6}, [](CamOptions& o, double decimals) {
     o.decimals = static_cast<int>(decimals);
     o.sample_spacing = 0.005;
-    o.polish.sigma = 0.02;
+    o.workshop.polish.sigma = 0.02;
   });
 }
 
 TEST(LeakCauses, PolishVanishesWithItsGaussian) {
   expect_vanishing(leak_cause::kPolish, {0.08, 0.02},
-                   [](CamOptions& o, double sigma) { o.polish.sigma = sigma; });
+                   [](CamOptions& o, double sigma) { o.workshop.polish.sigma = sigma; });
 }
 
 }  // namespace
