@@ -61,17 +61,31 @@ std::string fingerprint_text(std::uint64_t fingerprint) {
   return text.data();
 }
 
+/// The process that a design is for and what comes out of it.
+nlohmann::json made_json(const MadeBy& process, const DesignResult::Made& made) {
+  return {{"pitch_mm", process.pitch},
+          {"along", process.rows_along_x ? "x" : "y"},
+          {"ball_radius_mm", process.ball_radius},
+          {"polish_sigma_mm", process.polish_sigma},
+          {"rim_depth_mm", process.rim_depth},
+          {"rim_length_mm", process.rim_length},
+          {"metrics", metrics_json(made.metrics)}};
+}
+
 nlohmann::json provenance(const OptionSet& options, const ChosenDevice& device,
-                          const DesignResult& result) {
+                          const DesignOptions& design, const DesignResult& result) {
   const bool done = result.status == DesignResult::Status::kDone;
-  return {{"program", program_mark()},
-          {"options", options.used()},
-          {"seconds", result.convergence.empty() ? 0.0 : result.convergence.back().seconds},
-          {"device", device.word},
-          {"threads", device.executor.concurrency()},
-          {"status", done ? "done" : "interrupted"},
-          {"message", result.message},
-          {"fingerprint", fingerprint_text(result.fingerprint)}};
+  nlohmann::json fields = {
+      {"program", program_mark()},
+      {"options", options.used()},
+      {"seconds", result.convergence.empty() ? 0.0 : result.convergence.back().seconds},
+      {"device", device.word},
+      {"threads", device.executor.concurrency()},
+      {"status", done ? "done" : "interrupted"},
+      {"message", result.message},
+      {"fingerprint", fingerprint_text(result.fingerprint)}};
+  if (result.made) fields["made_by"] = made_json(*design.made_by, *result.made);
+  return fields;
 }
 
 /// Puts the lens in the place of what was there. The cut of an earlier lens goes with it: milled,
@@ -79,8 +93,11 @@ nlohmann::json provenance(const OptionSet& options, const ChosenDevice& device,
 void write_folder(const OutputFolder& folder, const DesignResult& result, const Console& console) {
   PendingFiles files(folder.path());
   files.add(lens_file::kConvergence, convergence_csv(result.convergence));
-  files.add(lens_file::kOverview,
-            [&](const fs::path& beside) { write_image(draw_overview(result.lens), beside); });
+  // What counts is what comes off the machine, where the design knows.
+  const Image& projected = result.made ? result.made->picture : result.lens.render;
+  files.add(lens_file::kOverview, [&](const fs::path& beside) {
+    write_image(draw_overview(result.lens, projected), beside);
+  });
   write_lens(result.lens, std::move(files));
   const fs::path cut = folder.path() / lens_file::kCut;
   std::error_code ignored;
@@ -93,35 +110,38 @@ void write_folder(const OutputFolder& folder, const DesignResult& result, const 
 
 nlohmann::json summary_json(const fs::path& folder, const DesignResult& result) {
   const Lens& lens = result.lens;
-  return {{"command", "design"},
-          {"out", folder.string()},
-          {"status", lens.provenance["status"]},
-          {"message", result.message},
-          {"pixels", {lens.setup.pixels.x(), lens.setup.pixels.y()}},
-          {"grid", {lens.surface.grid.columns, lens.surface.grid.rows}},
-          {"lens_size", {lens.setup.lens_size.x(), lens.setup.lens_size.y()}},
-          {"metrics", metrics_json(lens.metrics)},
-          {"iterations", result.convergence.size()},
-          {"seconds", lens.provenance["seconds"]}};
+  nlohmann::json summary = {{"command", "design"},
+                            {"out", folder.string()},
+                            {"status", lens.provenance["status"]},
+                            {"message", result.message},
+                            {"pixels", {lens.setup.pixels.x(), lens.setup.pixels.y()}},
+                            {"grid", {lens.surface.grid.columns, lens.surface.grid.rows}},
+                            {"lens_size", {lens.setup.lens_size.x(), lens.setup.lens_size.y()}},
+                            {"metrics", metrics_json(lens.metrics)},
+                            {"iterations", result.convergence.size()},
+                            {"seconds", lens.provenance["seconds"]}};
+  if (result.made) summary["made"] = metrics_json(result.made->metrics);
+  return summary;
 }
 
 std::string summary_text(const fs::path& folder, const DesignResult& result) {
   const Lens& lens = result.lens;
   return folder.string() + ": " + result.message + "\n" +  //
          metrics_text(lens.metrics) +                      //
-         "  " + size_text(lens.setup.pixels.x(), lens.setup.pixels.y()) + " pixels, " +
+         (result.made ? "  made    " + metrics_text(result.made->metrics) + "\n" : "") + "  " +
+         size_text(lens.setup.pixels.x(), lens.setup.pixels.y()) + " pixels, " +
          std::to_string(lens.surface.vertex_count()) + " vertices, " +
          fixed(lens.provenance["seconds"].get<double>(), 1) + " s\n";
 }
 
 /// Stores what came out and says so. An earlier lens of another design stays until this one is
 /// done. @return the exit code.
-int finish(const OptionSet& options, const ChosenDevice& device, const OutputFolder& folder,
-           DesignResult& result) {
+int finish(const OptionSet& options, const ChosenDevice& device, const DesignOptions& design,
+           const OutputFolder& folder, DesignResult& result) {
   if (result.status == DesignResult::Status::kFailed) throw RunError(result.message);
   const Console console(options.common().json, options.common().quiet);
   const bool done = result.status == DesignResult::Status::kDone;
-  result.lens.provenance = provenance(options, device, result);
+  result.lens.provenance = provenance(options, device, design, result);
   const EarlierDesign earlier = EarlierDesign::in(folder.path());
   const bool replaces = earlier.lens && !earlier.is_of(fingerprint_text(result.fingerprint));
   const bool keeps = replaces && !done;
@@ -214,7 +234,7 @@ int run(OptionSet& options, DesignSettings& settings) {
   };
   DesignResult result = shape(options.common().quiet, device.executor, design, loaded.image,
                               interrupt.token(), begin);
-  return finish(options, device, folder, result);
+  return finish(options, device, design, folder, result);
 }
 
 }  // namespace

@@ -4,16 +4,30 @@
 #include <algorithm>
 
 #include "app/json_output.h"
+#include "cam/tool/workshop.h"
 #include "core/error.h"
 #include "design/design_fields.h"
 
 namespace lensforge::app {
+
+namespace {
+
+MadeBy process_of(const Workshop& shop) {
+  const FinishProcess& finish = shop.process.finish;
+  const double radius = shop.tool(finish.tool).radius();
+  return {finish_pitch(finish, radius), finish.along == PassAxis::kX, radius, shop.polish.sigma,
+          shop.polish.rim_depth,        shop.polish.rim_length};
+}
+
+}  // namespace
 
 void add_design_options(OptionSet& options, DesignSettings& settings) {
   options.positional("TARGET", settings.target, "picture to project: PNG, JPEG, TIFF, EXR, ...");
   options.required_text("--out", settings.out, "DIR", "lens folder to write");
   options.fields(design_fields(), settings.design);
   options.fields(weight_fields(), settings.design.weights);
+  options.text("--made-by", settings.made_by, "default|FILE.toml",
+               "shape the part that this workshop cuts and polishes, not the surface alone");
   options.flag("--resume", settings.resume,
                "continue the interrupted design in --out, with the same picture and options");
   options.flag("--force", settings.force, "replace the design that --out holds");
@@ -25,8 +39,18 @@ void settle(OptionSet& options, DesignSettings& settings, const Image& picture) 
     throw InputError(settings.target + ": has " + size_text(picture.columns(), picture.rows()) +
                      " pixels; its longer side needs at least " + std::to_string(kMinPixels));
   }
+  Workshop workshop;
+  if (!settings.made_by.empty()) {
+    if (options.given("--model") && settings.design.model != SurfaceModel::kSpline) {
+      throw InputError("--made-by " + settings.made_by + ": needs --model spline, not " +
+                       model_name(settings.design.model));
+    }
+    settings.design.model = SurfaceModel::kSpline;
+    if (settings.made_by != "default") workshop = read_workshop(settings.made_by);
+  }
   settings.design = default_design_options(settings.design.model, picture);
   options.restate();
+  if (!settings.made_by.empty()) settings.design.made_by = process_of(workshop);
   validate(settings.design, picture);
 }
 

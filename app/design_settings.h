@@ -12,6 +12,7 @@ namespace lensforge::app {
 struct DesignSettings {
   std::string target;
   std::string out;
+  std::string made_by;  ///< Workshop file, or "default"; empty: not designed for a process.
   DesignOptions design;
   bool resume = false;
   bool force = false;

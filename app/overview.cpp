@@ -142,13 +142,13 @@ Image draw_relief(const SurfaceMesh& mesh, const OpticalSetup& setup, int column
   return resample(image, columns, rows);
 }
 
-Image draw_overview(const Lens& lens) {
+Image draw_overview(const Lens& lens, const Image& projected) {
   const int longer = std::max(lens.target.columns(), lens.target.rows());
   const int columns = std::max(1, lens.target.columns() * kPanelSide / longer);
   const int rows = std::max(1, lens.target.rows() * kPanelSide / longer);
   Image page(3 * columns + 2 * kGap, rows, 1.0F);
   paste(page, resample(lens.target, columns, rows), 0);
-  paste(page, resample(lens.render, columns, rows), columns + kGap);
+  paste(page, resample(projected, columns, rows), columns + kGap);
   paste(page, draw_relief(lens.surface, lens.setup, columns, rows), 2 * (columns + kGap));
   return page;
 }

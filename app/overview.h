@@ -10,7 +10,8 @@ namespace lensforge::app {
 /// the orientation of the target. The surface is shown as a relief lit from the upper left, its
 /// broad swells flattened and its contrast stretched, so that creases far too shallow to see stand
 /// out.
-Image draw_overview(const Lens& lens);
+/// @param projected  in the pixels of the lens's render.
+Image draw_overview(const Lens& lens, const Image& projected);
 
 /// The relief alone, `columns` × `rows`, linear light.
 Image draw_relief(const SurfaceMesh& mesh, const OpticalSetup& setup, int columns, int rows);

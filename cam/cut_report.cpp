@@ -198,6 +198,28 @@ std::string index_warning(const CutPlan& plan, const Lens& lens) {
                  ": it would project another picture"});
 }
 
+/// How the lens was meant to be made, if that is not how it is; empty if it is, or nothing is
+/// known.
+std::string process_warning(const CutPlan& plan, const Lens& lens) {
+  const nlohmann::json& provenance = lens.provenance;
+  if (!provenance.is_object() || !provenance.contains("made_by")) return "";
+  const nlohmann::json& meant = provenance["made_by"];
+  const Workshop& shop = plan.options().workshop;
+  const auto number = [&](const char* key, double otherwise) {
+    const bool known = meant.is_object() && meant.contains(key) && meant[key].is_number();
+    return known ? meant[key].get<double>() : otherwise;
+  };
+  const FinishProcess& finish = shop.process.finish;
+  const double pitch = finish_pitch(finish, shop.tool(finish.tool).radius());
+  const double meant_pitch = number("pitch_mm", pitch);
+  const double meant_sigma = number("polish_sigma_mm", shop.polish.sigma);
+  if (meant_pitch == pitch && meant_sigma == shop.polish.sigma) return "";
+  return joined({"the lens was designed for a pitch of ", trimmed_decimal(meant_pitch, 4),
+                 " mm and a polish of σ ", trimmed_decimal(meant_sigma, 4), " mm, not ",
+                 trimmed_decimal(pitch, 4), " and ", trimmed_decimal(shop.polish.sigma, 4),
+                 " mm: cut it as it was designed, or design it for this workshop (--made-by)"});
+}
+
 /// Which axes have to go farther than they can; empty if none has.
 std::string travel_warning(const CutPlan& plan) {
   const Eigen::Vector3d extent = plan.watch().extent();
@@ -228,7 +250,8 @@ std::vector<std::string> warnings_of(const CutPlan& plan, const ProgramFiles& pr
   if (!unroughed.empty()) warnings.push_back(unroughed);
   for (const Collision& collision : plan.collisions()) warnings.push_back(collision.sentence());
   for (const std::string& fault : plan.watch().faults()) warnings.push_back(fault);
-  for (const std::string& sentence : {index_warning(plan, lens), travel_warning(plan)}) {
+  for (const std::string& sentence :
+       {index_warning(plan, lens), process_warning(plan, lens), travel_warning(plan)}) {
     if (!sentence.empty()) warnings.push_back(sentence);
   }
   const Eigen::Vector3d travel = plan.options().workshop.machine.travel;

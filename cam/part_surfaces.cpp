@@ -13,7 +13,8 @@ PartSurfaces::PartSurfaces(const Design& design, FinishPaths paths, const Polish
   raw_ = {&design.surface, held(on_lens(design.rounded)), on_lens(ideal_), on_lens(fitted_),
           held(on_lens(written_))};
   for (const SurfaceField* field : raw_) {
-    polished_.push_back(std::make_unique<PolishedField>(*field, design.rectangle, polish));
+    polished_.push_back(
+        std::make_unique<PolishedField>(*field, design.surface, design.rectangle, polish));
   }
 }
 

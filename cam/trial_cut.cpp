@@ -193,7 +193,8 @@ LeakTrial TrialCut::at(const LeakPlace& place, const RunControl& control) const 
   if (mould) cast.emplace(milled, *mould);
   const SurfaceField& raw = cast ? static_cast<const SurfaceField&>(*cast) : milled;
   const Eigen::Vector2d size = site_.lens.setup.lens_size;
-  const PolishedField part(raw, {Eigen::Vector2d(0.0, 0.0), size}, options_.workshop.polish);
+  const PolishedField part(raw, site_.designed, {Eigen::Vector2d(0.0, 0.0), size},
+                           options_.workshop.polish);
   const OpticalSetup& optics = site_.lens.setup;
   const FluxPicture predicted =
       render_cells(site_.part, {optics, grid}, place.cells, executor_, silent);

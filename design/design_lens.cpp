@@ -2,9 +2,11 @@
 #include "design/design_lens.h"
 
 #include <filesystem>
+#include <optional>
 #include <utility>
 
 #include "core/error.h"
+#include "design/optics/made_spline.h"
 #include "design/render_lens.h"
 #include "design/schedule/alternation.h"
 #include "design/schedule/checkpoint.h"
@@ -47,6 +49,18 @@ Lens make_lens(const DesignTask& task, SurfaceMesh mesh, const Executor& executo
   return lens;
 }
 
+/// By the design's own account of cutting and polishing.
+std::optional<DesignResult::Made> made_part(const DesignOptions& options, const Lens& lens,
+                                            const Executor& executor) {
+  if (!options.made_by || !lens.spline) return std::nullopt;
+  const int samples = samples_for(kPictureNodes, static_cast<double>(lens.spline->cell_count()));
+  const SampledSurface part = made_nodes(*lens.spline, *options.made_by, samples, executor);
+  DesignResult::Made made;
+  made.metrics =
+      evaluate(part.mesh, part.normals, lens.setup, lens.target, &made.picture, executor);
+  return made;
+}
+
 /// Status and message.
 DesignResult result_of(const Ending& ending, const DesignLog& log) {
   DesignResult result;
@@ -81,6 +95,7 @@ DesignResult design_lens(const Image& target, const DesignOptions& options,
   const Ending ending = run_all(task, log, state);
   DesignResult result = result_of(ending, log);
   result.lens = make_lens(task, std::move(state.mesh), executor);
+  result.made = made_part(settled, result.lens, executor);
   result.fingerprint = state.fingerprint;
   result.convergence = std::move(state.convergence);
   // Rounds that stopped early leave work over.

@@ -2,12 +2,14 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "core/compute/executor.h"
 #include "core/compute/run_control.h"
 #include "core/image/image.h"
+#include "core/image/metrics.h"
 #include "core/surface/lens.h"
 #include "design/design_options.h"
 #include "design/schedule/convergence.h"
@@ -19,7 +21,13 @@ struct DesignResult {
   Status status = Status::kFailed;
   std::string message;            ///< Why it ended, in one line.
   std::uint64_t fingerprint = 0;  ///< design_identity() of picture and options.
-  Lens lens;                      ///< The best surface so far, at the resolution that was reached.
+  /// What the part will project that DesignOptions::made_by makes of the lens.
+  struct Made {
+    ImageMetrics metrics;
+    Image picture;
+  };
+  std::optional<Made> made;
+  Lens lens;  ///< The best surface so far, at the resolution that was reached.
   std::vector<ConvergenceRow> convergence;
 };
 

@@ -25,6 +25,16 @@ void require_all_in_range(const DesignOptions& o) {
   require(o.iterations >= 1, "--quality, iterations", o.iterations, "must be at least 1");
 }
 
+void require_process(const DesignOptions& o) {
+  if (!o.made_by) return;
+  require(o.made_by->polish_sigma > 0.0, "--made-by, polish.sigma", o.made_by->polish_sigma,
+          "must be above 0: a part that is not polished shows no picture");
+  require(o.made_by->pitch > 0.0, "--made-by, finish.pitch", o.made_by->pitch, "must be above 0");
+  if (o.model != SurfaceModel::kSpline) {
+    throw InputError("--made-by: needs --model spline, not " + model_name(o.model));
+  }
+}
+
 }  // namespace
 
 DesignOptions default_design_options(SurfaceModel model, const Image& target) {
@@ -45,6 +55,7 @@ void validate(const DesignOptions& options, const Image& target) {
   const int longer = std::max(target.columns(), target.rows());
   require(longer >= kMinPixels, "the picture's longer side", longer, "must be at least 4 pixels");
   require_all_in_range(options);
+  require_process(options);
   require(longer >= options.pixels, "--pixels", options.pixels,
           "the picture's longer side has only " + std::to_string(longer) + " pixels");
   const Eigen::Vector2i pixels = working_size(target.columns(), target.rows(), options.pixels);

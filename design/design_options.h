@@ -2,11 +2,13 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 
 #include "core/image/image.h"
 #include "core/optics/optical_setup.h"
 #include "core/surface/surface_model.h"
 #include "design/energy/weights.h"
+#include "design/optics/made_by.h"
 
 namespace lensforge {
 
@@ -57,6 +59,8 @@ struct DesignOptions {
   SurfaceModel model = SurfaceModel::kSmooth;  ///< What is optimised; smooth makes the better part.
   ViewSide view = ViewSide::kFront;
   ObjectiveWeights weights;
+  /// The process that the part is designed for; none: the surface itself. @pre model is kSpline.
+  std::optional<MadeBy> made_by;
   double smoothness = 1.0;  ///< Factor on weights.smooth.
   /// File that takes a checkpoint after every round; none is written if empty.
   std::filesystem::path checkpoint;

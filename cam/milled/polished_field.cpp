@@ -73,9 +73,9 @@ void differentiate(const Values& values, const PolishKernel& kernel, std::int64_
 
 }  // namespace
 
-PolishedField::PolishedField(const SurfaceField& surface, const Eigen::AlignedBox2d& lens,
-                             const PolishModel& model)
-    : surface_(surface), lens_(lens), model_(model) {
+PolishedField::PolishedField(const SurfaceField& surface, const SurfaceField& form,
+                             const Eigen::AlignedBox2d& lens, const PolishModel& model)
+    : surface_(surface), form_(form), lens_(lens), model_(model) {
   check("sigma", model.sigma, model.sigma >= 0.0, "at least 0");
   check("rim_depth", model.rim_depth, model.rim_depth >= 0.0, "at least 0");
   check("rim_length", model.rim_length, model.rim_length > 0.0, "above 0");
@@ -115,22 +115,20 @@ void PolishedField::sample(const GridWindow& window, const Executor& executor,
   SurfacePatch raw;
   surface_.sample(around, executor, raw);
   correct_crease_sums(executor, raw);
+  SurfacePatch marked;
+  const bool marks = &form_ != &surface_ && (x.turns() || y.turns());
+  if (marks) {
+    form_.sample(around, executor, marked);
+    correct_crease_sums(executor, marked);
+  }
+  const SurfacePatch& form = marks ? marked : raw;
   resize_patch(window, false, patch);
-  // Averages and slopes along x of every row that the kernel along y reaches.
-  const std::int64_t rows = window.rows + 2 * y.kernel.reach();
-  std::vector<double> averages(index_of(rows * window.columns));
-  std::vector<double> slopes(averages.size());
-  const auto along_x = [&](std::int64_t row) {
-    const std::int64_t to = row + y.sampled - y.begin + y.kernel.reach();
-    if (to < 0 || to >= rows) return;  // Of the halo.
-    const std::vector<double> line = turned_line(x, &raw.z[index_of(row * around.columns)]);
-    const auto values = [&](std::int64_t k) { return &line[index_of(x.kernel.reach() + k)]; };
-    average(values, x.kernel, window.columns, &averages[index_of(to * window.columns)]);
-    differentiate(values, x.kernel, window.columns, &slopes[index_of(to * window.columns)]);
-  };
-  parallel_for(executor, "polish along x", around.rows, along_x, 4);
-  turn_rows(y, window.columns, averages);
-  turn_rows(y, window.columns, slopes);
+  Lines lines = along_x(x, y, raw, form, executor);
+  if (y.turns()) {
+    const Lines of_form = marks ? along_x(x, y, form, form, executor) : lines;
+    turn_rows(y, window.columns, of_form.averages, lines.averages);
+    turn_rows(y, window.columns, of_form.slopes, lines.slopes);
+  }
   const auto along_y = [&](std::int64_t row) {
     const auto rows_of = [&](const std::vector<double>& from) {
       return [&, row](std::int64_t k) {
@@ -138,9 +136,9 @@ void PolishedField::sample(const GridWindow& window, const Executor& executor,
       };
     };
     const std::size_t n = index_of(row * window.columns);
-    average(rows_of(averages), y.kernel, window.columns, &patch.z[n]);
-    differentiate(rows_of(averages), y.kernel, window.columns, &patch.slope_y[n]);
-    average(rows_of(slopes), y.kernel, window.columns, &patch.slope_x[n]);
+    average(rows_of(lines.averages), y.kernel, window.columns, &patch.z[n]);
+    differentiate(rows_of(lines.averages), y.kernel, window.columns, &patch.slope_y[n]);
+    average(rows_of(lines.slopes), y.kernel, window.columns, &patch.slope_x[n]);
   };
   parallel_for(executor, "polish along y", window.rows, along_y, 4);
   take_off_rim(executor, patch);
@@ -153,9 +151,14 @@ PolishedField::Turned PolishedField::Axis::turned(std::int64_t at) const {
   return {last, std::clamp(2 * last - at, sampled, sampled_end - 1)};
 }
 
-/// A row's heights from `reach` before the nodes asked for to `reach` after them. @param heights of
-/// the nodes that were sampled.
-std::vector<double> PolishedField::turned_line(const Axis& x, const double* heights) {
+bool PolishedField::Axis::turns() const {
+  return begin - kernel.reach() < sampled || end + kernel.reach() > sampled_end;
+}
+
+/// A row's heights from `reach` before the nodes asked for to `reach` after them. @param heights,
+/// form  of the nodes that were sampled.
+std::vector<double> PolishedField::turned_line(const Axis& x, const double* heights,
+                                               const double* form) {
   std::vector<double> line;
   line.reserve(index_of(x.end - x.begin + 2 * x.kernel.reach()));
   for (std::int64_t i = x.begin - x.kernel.reach(); i < x.end + x.kernel.reach(); ++i) {
@@ -164,23 +167,47 @@ std::vector<double> PolishedField::turned_line(const Axis& x, const double* heig
       continue;
     }
     const Turned from = x.turned(i);
-    line.push_back(2.0 * heights[from.rim - x.sampled] - heights[from.inside - x.sampled]);
+    const std::int64_t inside = from.inside - x.sampled;
+    line.push_back(heights[inside] + 2.0 * (form[from.rim - x.sampled] - form[inside]));
   }
   return line;
 }
 
-/// Fills the rows beyond the rim likewise. @param values  row by row from `reach` before the nodes
-/// asked for.
-void PolishedField::turn_rows(const Axis& y, std::int64_t columns, std::vector<double>& values) {
+/// Of every row that the kernel along y reaches.
+PolishedField::Lines PolishedField::along_x(const Axis& x, const Axis& y, const SurfacePatch& raw,
+                                            const SurfacePatch& form, const Executor& executor) {
+  const std::int64_t columns = x.end - x.begin;
+  const std::int64_t sampled = x.sampled_end - x.sampled;
+  const std::int64_t rows = y.end - y.begin + 2 * y.kernel.reach();
+  Lines lines{std::vector<double>(index_of(rows * columns)),
+              std::vector<double>(index_of(rows * columns))};
+  const auto along = [&](std::int64_t row) {
+    const std::int64_t to = row + y.sampled - y.begin + y.kernel.reach();
+    if (to < 0 || to >= rows) return;  // Of the halo.
+    const std::size_t first = index_of(row * sampled);
+    const std::vector<double> line = turned_line(x, &raw.z[first], &form.z[first]);
+    const auto values = [&](std::int64_t k) { return &line[index_of(x.kernel.reach() + k)]; };
+    average(values, x.kernel, columns, &lines.averages[index_of(to * columns)]);
+    differentiate(values, x.kernel, columns, &lines.slopes[index_of(to * columns)]);
+  };
+  parallel_for(executor, "polish along x", y.sampled_end - y.sampled, along, 4);
+  return lines;
+}
+
+/// Fills the rows beyond the rim likewise. @param values, form  row by row from `reach` before the
+/// nodes asked for.
+void PolishedField::turn_rows(const Axis& y, std::int64_t columns, const std::vector<double>& form,
+                              std::vector<double>& values) {
   const std::int64_t first = y.begin - y.kernel.reach();
-  const auto row_of = [&](std::int64_t j) { return &values[index_of((j - first) * columns)]; };
+  const auto start_of = [&](std::int64_t j) { return index_of((j - first) * columns); };
   for (std::int64_t j = first; j < y.end + y.kernel.reach(); ++j) {
     if (j >= y.sampled && j < y.sampled_end) continue;
     const Turned from = y.turned(j);
-    const double* const rim = row_of(from.rim);
-    const double* const inside = row_of(from.inside);
-    double* const to = row_of(j);
-    for (std::int64_t i = 0; i < columns; ++i) to[i] = 2.0 * rim[i] - inside[i];
+    const std::size_t inside = start_of(from.inside);
+    const std::size_t rim = start_of(from.rim);
+    for (std::size_t i = 0; i < index_of(columns); ++i) {
+      values[start_of(j) + i] = values[inside + i] + 2.0 * (form[rim + i] - form[inside + i]);
+    }
   }
 }
 

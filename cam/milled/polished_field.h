@@ -21,8 +21,13 @@ struct PolishKernel {
 
 /// A polished surface: heights averaged with a round Gaussian, and the slopes of the averaged
 /// heights, by the Gaussian's derivative. It is the linear model of a soft wheel that follows the
-/// form and wears down what is narrower than its contact, σ. Beyond the rim the surface goes on
-/// with its heights turned about the rim, so that a plane stays a plane.
+/// form and wears down what is narrower than its contact, σ.
+///
+/// Beyond the rim the surface goes on: what was meant, turned about the rim, so that a plane stays
+/// a plane, with the tool's marks mirrored, z(−t) = z(t) + 2 (form(0) − form(t)). Turned as well,
+/// marks that stand s above the rim on average would lie s below it outside: scallops of 0.4 µm
+/// made the outer 0.1 mm of a 25 mm lens send light two pixels astray (128² portrait, pitch 0.045
+/// mm: MAE 0.0087 for 0.0061).
 ///
 /// Creases count where they run, whatever nodes lie beside them (correct_crease_sums()). But for
 /// that the slopes that the surface has itself are not used: between the passes of a ball they jump
@@ -38,10 +43,14 @@ class PolishedField final : public SurfaceField {
   static constexpr double kReach = 5.0;
 
   /// @param surface  is what is polished; must outlive the field.
+  /// @param form     the same without the tool's marks; likewise.
   /// @param lens     its rectangle.
   /// @throw InputError naming a number of the model that breaks its rule.
+  PolishedField(const SurfaceField& surface, const SurfaceField& form,
+                const Eigen::AlignedBox2d& lens, const PolishModel& model);
   PolishedField(const SurfaceField& surface, const Eigen::AlignedBox2d& lens,
-                const PolishModel& model);
+                const PolishModel& model)
+      : PolishedField(surface, surface, lens, model) {}
 
   /// Windows should be spaced by no more than σ. `cut` is that of the surface if σ is 0, else
   /// empty.
@@ -62,14 +71,25 @@ class PolishedField final : public SurfaceField {
     PolishKernel kernel;
 
     [[nodiscard]] Turned turned(std::int64_t at) const;
+    /// Whether kernels reach over the rim.
+    [[nodiscard]] bool turns() const;
+  };
+  /// Averages and slopes along x, row by row from where the kernel along y begins.
+  struct Lines {
+    std::vector<double> averages;
+    std::vector<double> slopes;
   };
 
   [[nodiscard]] Axis make_axis(int axis, const GridWindow& window) const;
-  static std::vector<double> turned_line(const Axis& x, const double* heights);
-  static void turn_rows(const Axis& y, std::int64_t columns, std::vector<double>& values);
+  static std::vector<double> turned_line(const Axis& x, const double* heights, const double* form);
+  static void turn_rows(const Axis& y, std::int64_t columns, const std::vector<double>& form,
+                        std::vector<double>& values);
+  static Lines along_x(const Axis& x, const Axis& y, const SurfacePatch& raw,
+                       const SurfacePatch& form, const Executor& executor);
   void take_off_rim(const Executor& executor, SurfacePatch& patch) const;
 
   const SurfaceField& surface_;
+  const SurfaceField& form_;
   Eigen::AlignedBox2d lens_;
   PolishModel model_;
 };

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <variant>
 
 #include "core/image/image.h"
@@ -10,6 +11,7 @@
 #include "design/energy/area_barrier.h"
 #include "design/energy/correspondence_term.h"
 #include "design/energy/weights.h"
+#include "design/optics/made_by.h"
 
 namespace lensforge {
 
@@ -21,9 +23,10 @@ AreaBarrier default_area_barrier(const OpticalSetup& setup, std::int64_t triangl
 struct ObjectiveOptions {
   ObjectiveWeights weights;
   SurfaceModel model = SurfaceModel::kFacet;
-  int samples = 1;               ///< Of a spline: rays a knot cell each way, ≥ 1.
-  double nu = 1.0;               ///< ν of the Welsch function, 1/mm, > 0.
-  AreaBarrier area{1e-6, 5e-6};  ///< mm²
+  std::optional<MadeBy> made_by;  ///< Of a spline: what its surface becomes; else it is as it is.
+  int samples = 1;                ///< Of a spline: rays a knot cell each way, ≥ 1.
+  double nu = 1.0;                ///< ν of the Welsch function, 1/mm, > 0.
+  AreaBarrier area{1e-6, 5e-6};   ///< mm²
 };
 
 /// What a surface is shaped after: a picture in linear light (Sun et al., Eq. 18), or where

@@ -3,17 +3,21 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <optional>
+#include <vector>
 
 #include "core/surface/control_net.h"
 #include "core/surface/surface_mesh.h"
+#include "design/energy/ball_term.h"
 #include "design/energy/objective_on.h"
 #include "design/optics/spline_nodes.h"
 
 namespace lensforge {
 
 /// DesignObjective of a spline's control points: every node of the spline sends one ray by the
-/// spline's own normal. Barriers and the goal are those of the mesh of the nodes; there are no
-/// smoothness terms. Same interface as DesignObjectiveOn.
+/// spline's own normal; with ObjectiveOptions::made_by, those are the nodes of what becomes of it,
+/// and control points move in z alone. Barriers and the goal are those of the mesh of the nodes;
+/// there are no smoothness terms. Same interface as DesignObjectiveOn.
 template <class Exec>
 class SplineObjectiveOn {
  public:
@@ -21,14 +25,16 @@ class SplineObjectiveOn {
   SplineObjectiveOn(const SurfaceMesh& net, const OpticalSetup& setup, const DesignGoal& goal,
                     const ObjectiveOptions& options, const Exec& executor)
       : executor_(executor),
-        nodes_(net.grid, options.samples, executor),
+        nodes_(basis_along(0, net, setup, options), basis_along(1, net, setup, options), executor),
         core_(spline_nodes({net.grid, net.vertices}, options.samples).mesh, setup, goal, options,
               executor),
-        movable_(objective_detail::movable_coordinates(net.vertices, setup.lens_size)),
+        movable_(movable_of(net, setup, options)),
         movable_here_(buffer_of(executor, objective_detail::entries(movable_))),
         positions_(3 * static_cast<std::size_t>(nodes_.shape().columns) *
                    static_cast<std::size_t>(nodes_.shape().rows)),
-        positions_bar_(positions_.size()) {}
+        positions_bar_(positions_.size()),
+        ball_(ball_of(net, setup, options)),
+        barrier_weight_(options.weights.barrier) {}
 
   void relinearize(const double* points) {
     look(points);
@@ -37,9 +43,10 @@ class SplineObjectiveOn {
 
   ObjectiveEvaluation evaluate(const double* points, double* gradient) {
     look(points);
-    const ObjectiveEvaluation result = core_.evaluate(positions_.data(), positions_bar_.data());
+    ObjectiveEvaluation result = core_.evaluate(positions_.data(), positions_bar_.data());
     if (!result.feasible) return result;
     nodes_.look_adjoint(positions_bar_.data(), core_.sampled_rays().normal_bar, gradient);
+    if (ball_) keep_valleys_wide(points, gradient, result.energy);
     parallel_for(executor_, "hold borders", static_cast<std::int64_t>(movable_here_.size()),
                  HoldCoordinate{movable_here_.data(), gradient});
     return result;
@@ -48,7 +55,45 @@ class SplineObjectiveOn {
   [[nodiscard]] const Eigen::Matrix3Xd& movable() const { return movable_; }
 
  private:
+  static AxisBasis basis_along(int axis, const SurfaceMesh& net, const OpticalSetup& setup,
+                               const ObjectiveOptions& options) {
+    const int cells = (axis == 0 ? net.grid.columns : net.grid.rows) - 3;
+    const std::vector<double> points = even_points(cells, options.samples);
+    if (!options.made_by) return plain_basis(cells, points);
+    return made_basis({axis, cells, setup.lens_size[axis]}, points, *options.made_by);
+  }
+
+  /// Polish is an average in millimetres: knots stay where they are even.
+  static Eigen::Matrix3Xd movable_of(const SurfaceMesh& net, const OpticalSetup& setup,
+                                     const ObjectiveOptions& options) {
+    Eigen::Matrix3Xd movable = objective_detail::movable_coordinates(net.vertices, setup.lens_size);
+    if (options.made_by) movable.topRows<2>().setZero();
+    return movable;
+  }
+
   using Buffer = typename Exec::template Buffer<double>;
+
+  /// λ of E_ball. With 0.02 and more a 96² logo, whose bright and black parts meet in creases, is
+  /// sharpened less than a 128² portrait, which has hardly a valley that is too sharp.
+  static constexpr double kBallWeight = 0.02;
+
+  static std::optional<BallNet> ball_of(const SurfaceMesh& net, const OpticalSetup& setup,
+                                        const ObjectiveOptions& options) {
+    if (!options.made_by || !(options.weights.barrier > 0.0)) return std::nullopt;
+    return BallNet{nullptr,
+                   net.grid.columns,
+                   net.grid.rows,
+                   setup.lens_size.x() / (net.grid.columns - 3),
+                   setup.lens_size.y() / (net.grid.rows - 3),
+                   options.made_by->sharpest_valley()};
+  }
+
+  void keep_valleys_wide(const double* points, double* gradient, EnergyValues& energy) {
+    ball_->points = points;
+    const double value = kBallWeight * ball_term(executor_, *ball_, kBallWeight, gradient);
+    energy.total += value;
+    energy.barrier += value / barrier_weight_;
+  }
 
   void look(const double* points) {
     nodes_.look(points, positions_.data(), core_.sampled_rays().normals);
@@ -61,6 +106,8 @@ class SplineObjectiveOn {
   Buffer movable_here_;
   Buffer positions_;
   Buffer positions_bar_;
+  std::optional<BallNet> ball_;
+  double barrier_weight_;
 };
 
 }  // namespace lensforge

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -10,23 +11,26 @@
 
 #include "core/compute/executor.h"
 #include "core/compute/host_device.h"
-#include "core/surface/cubic_spline.h"
 #include "core/surface/surface_mesh.h"
+#include "design/optics/axis_basis.h"
 #include "design/optics/columns.h"
 
 /// Spline model: a tensor product of cubic B-splines looked at on an even grid of nodes, and the
-/// adjoint of looking. Both are two passes of four taps, first along u, then along v.
+/// adjoint of looking. Both are two passes of few taps (AxisBasis), first along u, then along v.
 ///
-/// Notation: c control point, B basis functions, a = Σ B(u) c, a' = Σ B'(u) c along a row of
+/// Notation: c control point, B the basis' functions, a = Σ B(u) c, a' = Σ B'(u) c along a row of
 /// control points; p = Σ B(v) a a node, p_u = Σ B(v) a', p_v = Σ B'(v) a, n = p_u × p_v; a bar is
 /// ∂E/∂.
 namespace lensforge {
 
-/// The basis functions of one direction at its nodes.
+/// AxisBasis for kernels.
 struct AxisTaps {
-  const int* first;     ///< Of a node: number of its first of four coefficients.
-  const double* value;  ///< 4 × nodes
-  const double* slope;  ///< 4 × nodes, by the knot cell.
+  int taps;             ///< Coefficients that a node is a sum of.
+  const int* first;     ///< Of a node: number of its first coefficient.
+  const double* value;  ///< taps × nodes
+  const double* slope;  ///< taps × nodes, by the knot cell.
+  const double* lift;   ///< Of a node, mm.
+  const double* tilt;   ///< Likewise, mm by the knot cell.
   const int* begin;     ///< Of a coefficient: its first node, and one after its last.
   const int* end;
 };
@@ -35,34 +39,29 @@ struct AxisTaps {
 template <class Exec>
 class AxisTapsOn {
  public:
-  /// @param samples  nodes a knot cell, ≥ 1.
-  AxisTapsOn(int cells, int samples, const Exec& executor) {
-    const int nodes = cells * samples + 1;
-    std::vector<int> first;
-    std::vector<double> value;
-    std::vector<double> slope;
-    std::vector<int> begin(static_cast<std::size_t>(cells) + 3, nodes);
+  AxisTapsOn(const AxisBasis& basis, const Exec& executor)
+      : taps_(basis.taps),
+        first_(buffer_of(executor, std::span<const int>(basis.first))),
+        value_(buffer_of(executor, std::span<const double>(basis.value))),
+        slope_(buffer_of(executor, std::span<const double>(basis.slope))),
+        lift_(buffer_of(executor, std::span<const double>(basis.lift))),
+        tilt_(buffer_of(executor, std::span<const double>(basis.tilt))) {
+    std::vector<int> begin(static_cast<std::size_t>(basis.coefficients), basis.nodes());
     std::vector<int> end(begin.size(), 0);
-    for (int k = 0; k < nodes; ++k) {
-      const CubicBasis basis = cubic_basis(static_cast<double>(k) / samples, cells);
-      first.push_back(basis.first);
-      value.insert(value.end(), basis.value.begin(), basis.value.end());
-      slope.insert(slope.end(), basis.slope.begin(), basis.slope.end());
-      for (int j = 0; j < 4; ++j) {
-        const auto c = static_cast<std::size_t>(basis.first + j);
+    for (int k = 0; k < basis.nodes(); ++k) {
+      for (int j = 0; j < basis.taps; ++j) {
+        const auto c = static_cast<std::size_t>(basis.first[static_cast<std::size_t>(k)] + j);
         begin[c] = std::min(begin[c], k);
         end[c] = k + 1;
       }
     }
-    first_ = buffer_of(executor, std::span<const int>(first));
-    value_ = buffer_of(executor, std::span<const double>(value));
-    slope_ = buffer_of(executor, std::span<const double>(slope));
     begin_ = buffer_of(executor, std::span<const int>(begin));
     end_ = buffer_of(executor, std::span<const int>(end));
   }
 
   [[nodiscard]] AxisTaps view() const {
-    return {first_.data(), value_.data(), slope_.data(), begin_.data(), end_.data()};
+    return {taps_,        first_.data(), value_.data(), slope_.data(),
+            lift_.data(), tilt_.data(),  begin_.data(), end_.data()};
   }
   [[nodiscard]] int nodes() const { return static_cast<int>(first_.size()); }
   [[nodiscard]] int coefficients() const { return static_cast<int>(begin_.size()); }
@@ -71,9 +70,12 @@ class AxisTapsOn {
   template <class T>
   using Buffer = typename Exec::template Buffer<T>;
 
+  int taps_;
   Buffer<int> first_;
   Buffer<double> value_;
   Buffer<double> slope_;
+  Buffer<double> lift_;
+  Buffer<double> tilt_;
   Buffer<int> begin_;
   Buffer<int> end_;
 };
@@ -100,10 +102,10 @@ struct LookAlongRow {
     const std::int64_t at = i / s.nodes_u * s.columns + s.u.first[node];
     Eigen::Vector3d a(0.0, 0.0, 0.0);
     Eigen::Vector3d steep(0.0, 0.0, 0.0);
-    for (int k = 0; k < 4; ++k) {
+    for (int k = 0; k < s.u.taps; ++k) {
       const auto c = column3(points, at + k);
-      a += s.u.value[4 * node + k] * c;
-      steep += s.u.slope[4 * node + k] * c;
+      a += s.u.value[s.u.taps * node + k] * c;
+      steep += s.u.slope[s.u.taps * node + k] * c;
     }
     column3(s.along, i) = a;
     column3(s.steep, i) = steep;
@@ -122,12 +124,17 @@ struct LookAcrossRows {
     Eigen::Vector3d p(0.0, 0.0, 0.0);
     Eigen::Vector3d p_u(0.0, 0.0, 0.0);
     Eigen::Vector3d p_v(0.0, 0.0, 0.0);
-    for (int k = 0; k < 4; ++k) {
+    for (int k = 0; k < s.v.taps; ++k) {
+      const std::int64_t tap = s.v.taps * node + k;
       const auto a = column3(s.along, at + k * s.nodes_u);
-      p += s.v.value[4 * node + k] * a;
-      p_v += s.v.slope[4 * node + k] * a;
-      p_u += s.v.value[4 * node + k] * column3(s.steep, at + k * s.nodes_u);
+      p += s.v.value[tap] * a;
+      p_v += s.v.slope[tap] * a;
+      p_u += s.v.value[tap] * column3(s.steep, at + k * s.nodes_u);
     }
+    const std::int64_t column = i % s.nodes_u;
+    p.z() += s.u.lift[column] + s.v.lift[node];
+    p_u.z() += s.u.tilt[column];
+    p_v.z() += s.v.tilt[node];
     column3(positions, i) = p;
     column3(s.by_u, i) = p_u;
     column3(s.by_v, i) = p_v;
@@ -147,7 +154,7 @@ struct GatherAcrossRows {
     Eigen::Vector3d a_bar(0.0, 0.0, 0.0);
     Eigen::Vector3d steep_bar(0.0, 0.0, 0.0);
     for (std::int64_t node = s.v.begin[row]; node < s.v.end[row]; ++node) {
-      const std::int64_t tap = 4 * node + row - s.v.first[node];
+      const std::int64_t tap = s.v.taps * node + row - s.v.first[node];
       const std::int64_t at = node * s.nodes_u + i % s.nodes_u;
       const Eigen::Vector3d n_bar = column3(normal_bar, at);
       const Eigen::Vector3d u_bar = column3(s.by_v, at).cross(n_bar);
@@ -170,7 +177,7 @@ struct GatherAlongRow {
     const std::int64_t row = i / s.columns;
     Eigen::Vector3d c_bar(0.0, 0.0, 0.0);
     for (std::int64_t node = s.u.begin[column]; node < s.u.end[column]; ++node) {
-      const std::int64_t tap = 4 * node + column - s.u.first[node];
+      const std::int64_t tap = s.u.taps * node + column - s.u.first[node];
       const std::int64_t at = row * s.nodes_u + node;
       c_bar += s.u.value[tap] * column3(s.along, at) + s.u.slope[tap] * column3(s.steep, at);
     }
@@ -182,12 +189,12 @@ struct GatherAlongRow {
 template <class Exec>
 class SplineNodesOn {
  public:
-  /// @param net      control points each way, ≥ 4. @param samples  nodes a knot cell each way, ≥ 1.
-  SplineNodesOn(const GridShape& net, int samples, const Exec& executor)
+  SplineNodesOn(const AxisBasis& u, const AxisBasis& v, const Exec& executor)
       : executor_(executor),
-        u_(net.columns - 3, samples, executor),
-        v_(net.rows - 3, samples, executor),
-        along_(3 * static_cast<std::size_t>(u_.nodes()) * static_cast<std::size_t>(net.rows)),
+        u_(u, executor),
+        v_(v, executor),
+        along_(3 * static_cast<std::size_t>(u_.nodes()) *
+               static_cast<std::size_t>(v_.coefficients())),
         steep_(along_.size()),
         by_u_(3 * static_cast<std::size_t>(u_.nodes()) * static_cast<std::size_t>(v_.nodes())),
         by_v_(by_u_.size()) {}

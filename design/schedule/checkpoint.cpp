@@ -133,6 +133,11 @@ std::uint64_t design_fingerprint(const Image& target, const DesignOptions& optio
   json description = {target.columns(), target.rows()};
   append(design_fields(), options, description);
   description.push_back(weights);
+  if (options.made_by) {
+    const MadeBy& made = *options.made_by;
+    description.push_back(
+        {made.pitch, made.rows_along_x, made.ball_radius, made.polish_sigma, made.rim_depth, made.rim_length});
+  }
   Hash hash;
   hash.add(description.dump());
   hash.add(bytes_of(target.values()));

@@ -36,9 +36,20 @@ constexpr double kKnotCellsPerCell = 2.0;
 constexpr int kPartsOfRounds = 3;
 constexpr double kSplineIterations = 0.4;
 
+/// Knot cells a σ of the polish, where a design is for a process: cutting undoes beforehand what
+/// polish rounds. The portrait made at a pitch of 0.045 mm, σ 0.03 mm: MAE 0.0038 with knots 0.05
+/// mm apart, 0.0032 with 0.036 mm.
+constexpr double kKnotCellsPerSigma = 0.83;
+
+double wanted_cell(const Level& mesh, const Eigen::Vector2d& size, const DesignOptions& options) {
+  const double cell = size.x() / (kKnotCellsPerCell * (mesh.grid.columns - 1));
+  if (!options.made_by) return cell;
+  return std::min(cell, options.made_by->polish_sigma / kKnotCellsPerSigma);
+}
+
 Level spline_level(const Level& mesh, const Eigen::Vector2d& size, const DesignOptions& options) {
-  const double wanted = size.x() / (kKnotCellsPerCell * (mesh.grid.columns - 1));
-  const double cell = std::max(wanted, std::sqrt(size.prod() / kMaxKnotCells));
+  const double cell =
+      std::max(wanted_cell(mesh, size, options), std::sqrt(size.prod() / kMaxKnotCells));
   Level level = mesh;
   level.grid = {rounded(size.x() / cell, 1) + 3, rounded(size.y() / cell, 1) + 3};
   level.spline = true;

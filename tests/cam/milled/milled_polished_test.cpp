@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <numbers>
@@ -58,6 +59,33 @@ TEST(PolishedField, APlaneStaysAPlaneToTheRim) {
     EXPECT_NEAR(patch.slope_y[i], -0.2, 1e-12);
   }
   EXPECT_TRUE(patch.cut.empty());
+}
+
+/// Largest error of a plane's slope across the rows of a ball, whose marks begin somewhere in a
+/// pass.
+double marks_tilt(double phase, bool form_known) {
+  constexpr double kPitch = 0.045;
+  const Formula form(plane);
+  const Formula cut([&](double x, double y) {
+    const double row = y / kPitch + phase;
+    const double offset = kPitch * (row - std::round(row));
+    const Eigen::Vector3d on = plane(x, y);
+    return Eigen::Vector3d(on[0] + offset * offset / 0.4, on[1], on[2] + offset / 0.2);
+  });
+  const PolishModel polish{0.03, 0.0, 1.0};
+  const PolishedField part(cut, form_known ? form : cut, kLens, polish);
+  double worst = 0.0;
+  for (const double slope : testing::sampled(part, whole_lens()).slope_y) {
+    worst = std::max(worst, std::abs(slope + 0.2));
+  }
+  return worst;
+}
+
+TEST(PolishedField, MarksOnAPlaneTiltItLittleAtTheRim) {
+  for (const double phase : {0.0, 0.3, 0.5}) {
+    EXPECT_LT(marks_tilt(phase, true), 0.0025) << phase;
+  }
+  EXPECT_GT(marks_tilt(0.0, false), 0.01);  // Turned with the plane.
 }
 
 TEST(PolishedField, AWaveFadesAsTheGaussiansTransferFunctionSays) {

@@ -10,8 +10,10 @@
 #include <vector>
 
 #include "core/image/transfer.h"
+#include "core/surface/cubic_spline.h"
 #include "core/surface/sample_splines.h"
 #include "design/finite_difference.h"
+#include "design/optics/made_spline.h"
 #include "design/random_input.h"
 #include "design/render_lens.h"
 #include "design/schedule/spline_start.h"
@@ -39,6 +41,40 @@ class SplineObjective : public ::testing::Test {
     return {net_mesh(net_), setup_, target_, options_, executor};
   }
 
+  /// Of what a surface projects, display-encoded.
+  [[nodiscard]] double mean_absolute_error(const SampledSurface& nodes) const {
+    const Image picture =
+        render_surface(nodes.mesh, nodes.normals, setup_, Executor::serial()).image;
+    const auto pixels = static_cast<double>(picture.values().size());
+    double absolute = 0.0;
+    for (std::size_t i = 0; i < picture.values().size(); ++i) {
+      const double shown =
+          encode(static_cast<double>(picture.values()[i]) / pixels * target_.total());
+      absolute += std::fabs(shown - encode(static_cast<double>(target_.values()[i])));
+    }
+    return absolute / pixels;
+  }
+
+  /// Of a gradient along a direction, against central differences.
+  [[nodiscard]] double slope_error(SplineObjectiveOn<Executor>& function,
+                                   const Eigen::Matrix3Xd& gradient,
+                                   const Eigen::Matrix3Xd& direction) const {
+    const testing::Scalar value = [&](const Eigen::VectorXd& x) {
+      Eigen::Matrix3Xd ignored(3, net_.points.cols());
+      return function.evaluate(x.data(), ignored.data()).energy.total;
+    };
+    const Eigen::VectorXd products = gradient.cwiseProduct(direction).reshaped();
+    const double scale = std::max(std::fabs(products.sum()), products.norm());
+    EXPECT_GT(scale, 0.0);
+    std::vector<double> errors;
+    for (const double step : {1e-4, 1e-5, 2e-6, 5e-7, 1e-7}) {
+      const double slope =
+          testing::directional_slope(value, net_.points.reshaped(), direction.reshaped(), step);
+      errors.push_back(std::fabs(slope - products.sum()) / scale);
+    }
+    return testing::plateau_error(errors);
+  }
+
   ControlNet net_ = sample_spline();
   OpticalSetup setup_ = testing::setup_of({15.0, 10.0}, {24, 16}, 60.0);
   Image target_ = testing::random_picture(24, 16, 0.1, 2);
@@ -52,15 +88,7 @@ TEST_F(SplineObjective, PictureIsThatOfTheSplinesOwnNormals) {
   const ObjectiveEvaluation e = function.evaluate(net_.points.data(), gradient.data());
   ASSERT_TRUE(e.feasible);
   const SampledSurface nodes = spline_nodes(net_, kSamples);
-  const Image picture = render_surface(nodes.mesh, nodes.normals, setup_, Executor::serial()).image;
-  const double pixels = 24.0 * 16.0;
-  double absolute = 0.0;
-  for (std::size_t i = 0; i < picture.values().size(); ++i) {
-    const double shown =
-        encode(static_cast<double>(picture.values()[i]) / pixels * target_.total());
-    absolute += std::fabs(shown - encode(static_cast<double>(target_.values()[i])));
-  }
-  EXPECT_NEAR(e.mae, absolute / pixels, 1e-6);
+  EXPECT_NEAR(e.mae, mean_absolute_error(nodes), 1e-6);
   EXPECT_GT(e.mae, 0.01);
 }
 
@@ -68,27 +96,34 @@ TEST_F(SplineObjective, GradientEqualsCentralDifferences) {
   SplineObjectiveOn<Executor> function = objective();
   Eigen::Matrix3Xd gradient(3, net_.points.cols());
   ASSERT_TRUE(function.evaluate(net_.points.data(), gradient.data()).feasible);
-  const testing::Scalar value = [&](const Eigen::VectorXd& x) {
-    Eigen::Matrix3Xd ignored(3, net_.points.cols());
-    return function.evaluate(x.data(), ignored.data()).energy.total;
-  };
   Random random(3);
   // Heights alone, x and y alone, all of them.
   for (const auto& [first, count] : {std::pair{2, 1}, {0, 2}, {0, 3}}) {
     Eigen::Matrix3Xd direction = Eigen::Matrix3Xd::Zero(3, gradient.cols());
     for (double& d : direction.middleRows(first, count).reshaped()) d = random.between(-1.0, 1.0);
     direction.array() *= function.movable().array();
-    const Eigen::VectorXd products = gradient.cwiseProduct(direction).reshaped();
-    const double scale = std::max(std::fabs(products.sum()), products.norm());
-    ASSERT_GT(scale, 0.0);
-    std::vector<double> errors;
-    for (const double step : {1e-4, 1e-5, 2e-6, 5e-7, 1e-7}) {
-      const double slope =
-          testing::directional_slope(value, net_.points.reshaped(), direction.reshaped(), step);
-      errors.push_back(std::fabs(slope - products.sum()) / scale);
-    }
-    EXPECT_LE(testing::plateau_error(errors), 1e-6) << first << ' ' << count;
+    EXPECT_LE(slope_error(function, gradient, direction), 1e-6) << first << ' ' << count;
   }
+}
+
+TEST_F(SplineObjective, GradientOfTheMadePartEqualsCentralDifferences) {
+  for (Eigen::Index i = 0; i < net_.points.cols(); ++i) {  // Even knots.
+    net_.points(0, i) = greville_point(static_cast<int>(i % 14), 11) * 15.0 / 11;
+    net_.points(1, i) = greville_point(static_cast<int>(i / 14), 8) * 10.0 / 8;
+  }
+  options_.made_by = MadeBy{0.8, false, 0.2, 0.9, 0.05, 3.0};
+  SplineObjectiveOn<Executor> function = objective();
+  EXPECT_EQ(function.movable().topRows<2>().maxCoeff(), 0.0);
+  EXPECT_EQ(function.movable().row(2).minCoeff(), 1.0);
+  Eigen::Matrix3Xd gradient(3, net_.points.cols());
+  const ObjectiveEvaluation made = function.evaluate(net_.points.data(), gradient.data());
+  ASSERT_TRUE(made.feasible);
+  const SampledSurface nodes = made_nodes(net_, *options_.made_by, kSamples, Executor::serial());
+  EXPECT_NEAR(made.mae, mean_absolute_error(nodes), 1e-6);
+  Random random(4);
+  Eigen::Matrix3Xd direction = Eigen::Matrix3Xd::Zero(3, gradient.cols());
+  for (double& d : direction.row(2)) d = random.between(-1.0, 1.0);
+  EXPECT_LE(slope_error(function, gradient, direction), 1e-6);
 }
 
 TEST_F(SplineObjective, RimStaysOnTheRectangle) {

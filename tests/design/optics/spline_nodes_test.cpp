@@ -22,6 +22,12 @@ struct Looked {
   Eigen::Matrix3Xd normals;
 };
 
+SplineNodesOn<Executor> nodes_of(const ControlNet& net, int samples, const Executor& executor) {
+  const Eigen::Vector2i cells = net.cells();
+  return {plain_basis(cells.x(), even_points(cells.x(), samples)),
+          plain_basis(cells.y(), even_points(cells.y(), samples)), executor};
+}
+
 Looked look(SplineNodesOn<Executor>& nodes, const Eigen::Matrix3Xd& points) {
   const Eigen::Index count = Eigen::Index{nodes.shape().columns} * nodes.shape().rows;
   Looked looked{Eigen::Matrix3Xd(3, count), Eigen::Matrix3Xd(3, count)};
@@ -32,7 +38,7 @@ Looked look(SplineNodesOn<Executor>& nodes, const Eigen::Matrix3Xd& points) {
 TEST(SplineNodes, AreThoseOfTheControlNet) {
   const ControlNet net = sample_spline();
   for (const int samples : {1, 2, 3}) {
-    SplineNodesOn<Executor> nodes(net.shape, samples, Executor::cpu(2));
+    SplineNodesOn<Executor> nodes = nodes_of(net, samples, Executor::cpu(2));
     const SampledSurface expected = spline_nodes(net, samples);
     ASSERT_EQ(nodes.shape(), expected.mesh.grid);
     const Looked looked = look(nodes, net.points);
@@ -41,9 +47,8 @@ TEST(SplineNodes, AreThoseOfTheControlNet) {
   }
 }
 
-TEST(SplineNodes, AdjointEqualsCentralDifferences) {
-  const ControlNet net = sample_spline();
-  SplineNodesOn<Executor> nodes(net.shape, kSamples, Executor::serial());
+/// Of a random sum of positions and normals against central differences.
+double adjoint_error(SplineNodesOn<Executor>& nodes, const ControlNet& net) {
   const Looked at = look(nodes, net.points);
   Random random(5);
   Looked weights = at;
@@ -57,8 +62,25 @@ TEST(SplineNodes, AdjointEqualsCentralDifferences) {
   Eigen::Matrix3Xd gradient(3, net.points.cols());
   look(nodes, net.points);
   nodes.look_adjoint(weights.positions.data(), weights.normals.data(), gradient.data());
-  EXPECT_LT(testing::plateau_error(gradient.reshaped(), weighed, net.points.reshaped(), 1e-3),
-            1e-9);
+  return testing::plateau_error(gradient.reshaped(), weighed, net.points.reshaped(), 1e-3);
+}
+
+TEST(SplineNodes, AdjointEqualsCentralDifferences) {
+  const ControlNet net = sample_spline();
+  SplineNodesOn<Executor> nodes = nodes_of(net, kSamples, Executor::serial());
+  EXPECT_LT(adjoint_error(nodes, net), 1e-9);
+}
+
+TEST(SplineNodes, AdjointOfMadeNodesEqualsCentralDifferences) {
+  const ControlNet net = sample_spline();
+  const Eigen::Vector2i cells = net.cells();
+  const MadeBy made{0.6, true, 0.2, 0.9, 0.2, 1.5};
+  const auto basis = [&](int axis) {
+    return made_basis({axis, cells[axis], net.points.row(axis).maxCoeff()},
+                      even_points(cells[axis], kSamples), made);
+  };
+  SplineNodesOn<Executor> nodes(basis(0), basis(1), Executor::serial());
+  EXPECT_LT(adjoint_error(nodes, net), 1e-9);
 }
 
 }  // namespace
