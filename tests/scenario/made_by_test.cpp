@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <fstream>
+
+#include "scenario/driver.h"
+
+namespace lensforge::scenario {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+/// A lens of 3 mm that is cut with passes of 0.045 mm.
+class MadeBy : public Scenario {
+ protected:
+  MadeBy() { std::ofstream(at("shop.toml")) << "[finish]\npitch = 0.045\n"; }
+
+  [[nodiscard]] Outcome design(const Arguments& more) const {
+    Arguments arguments = {"design",    picture("portrait.png"),
+                           "--out",     path("lens"),
+                           "--pixels",  "24",
+                           "--width",   "3mm",
+                           "--focal",   "15mm",
+                           "--rounds",  "1",
+                           "--quality", "draft",
+                           "--force"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return run(arguments);
+  }
+  Outcome cut(const Arguments& more) const {
+    Arguments arguments = {"cam",        path("lens"),      "--no-rough",    "--no-semi",
+                           "--workshop", path("shop.toml"), "--no-remedies", "--force"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return run(arguments);
+  }
+  [[nodiscard]] double part_mae() const {
+    const nlohmann::json report = json_at("lens/cam/report.json");
+    for (const nlohmann::json& surface : report["surfaces"]) {
+      if (surface["name"] == "polished") return surface["mae"];
+    }
+    return 1.0;
+  }
+  [[nodiscard]] std::string warnings() const {
+    return json_at("lens/cam/report.json")["warnings"].dump();
+  }
+  [[nodiscard]] nlohmann::json json_at(const std::string& name) const {
+    return nlohmann::json::parse(content(at(name)));
+  }
+};
+
+TEST_F(MadeBy, APartIsBetterIfItsDesignKnowsHowItIsMade) {
+  ASSERT_EQ(design({"--model", "spline"}).exit_code, 0);
+  cut({});
+  const double unaware = part_mae();
+  const Outcome outcome = design({"--made-by", path("shop.toml"), "--json"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const double promised = outcome.json()["made"]["mae"];
+  EXPECT_EQ(json_at("lens/lens.json")["provenance"]["made_by"]["pitch_mm"], 0.045);
+  EXPECT_EQ(json_at("lens/lens.json")["provenance"]["made_by"]["metrics"]["mae"], promised);
+  cut({});
+  EXPECT_THAT(warnings(), Not(HasSubstr("was designed for")));
+  // What cam finds in its own programs; the design's own account leaves out what is left of the
+  // scallops and what the ball fills.
+  EXPECT_LT(part_mae(), 0.7 * unaware);
+  EXPECT_GT(part_mae(), 0.95 * promised);
+  EXPECT_LT(part_mae(), 1.4 * promised);
+  cut({"--pitch", "0.06mm", "--no-render"});
+  EXPECT_THAT(warnings(), HasSubstr("was designed for a pitch of 0.045 mm"));
+}
+
+TEST_F(MadeBy, WhatCannotBeDesignedForIsRefused) {
+  expect_refusal(design({"--made-by", "default", "--model", "facet"}), 2,
+                 {"--made-by default", "--model spline", "facet"});
+  expect_refusal(design({"--made-by", path("absent.toml")}), 2, {"absent.toml"});
+  std::ofstream(at("raw.toml")) << "[polish]\nsigma = 0\n";
+  expect_refusal(design({"--made-by", path("raw.toml")}), 2, {"polish.sigma 0", "not polished"});
+  EXPECT_FALSE(fs::exists(at("lens")));
+}
+
+}  // namespace
+}  // namespace lensforge::scenario
