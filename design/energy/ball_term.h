@@ -20,23 +20,27 @@ struct BallNet {
   double cell_y;    ///< mm
   double sharpest;  ///< Second derivative that is allowed, 1/mm, > 0.
 
-  /// Steps of the four directions.
-  static constexpr int kStep[4][2] = {{1, 0}, {0, 1}, {1, 1}, {1, -1}};
+  /// Steps of the four directions: (1, 0), (0, 1), (1, 1), (1, −1).
+  LF_HD static int step_x(int direction) { return direction == 1 ? 0 : 1; }
+  LF_HD static int step_y(int direction) {
+    if (direction == 0) return 0;
+    return direction == 3 ? -1 : 1;
+  }
 
   [[nodiscard]] LF_HD double height(std::int64_t i, std::int64_t j) const {
     return points[3 * (j * columns + i) + 2];
   }
   /// Second differences become second derivatives in units of `sharpest`.
   [[nodiscard]] LF_HD double scale(int direction) const {
-    const double x = kStep[direction][0] * cell_x;
-    const double y = kStep[direction][1] * cell_y;
+    const double x = step_x(direction) * cell_x;
+    const double y = step_y(direction) * cell_y;
     return 1.0 / ((x * x + y * y) * sharpest);
   }
   /// By how much a valley is too sharp, ≥ 0; none beside the rim, where knots
   /// are not even.
   [[nodiscard]] LF_HD double excess(std::int64_t i, std::int64_t j, int direction) const {
-    const int di = kStep[direction][0];
-    const int dj = kStep[direction][1];
+    const int di = step_x(direction);
+    const int dj = step_y(direction);
     if (i < 2 || i > columns - 3 || j < 2 || j > rows - 3) return 0.0;
     const double bend = height(i + di, j + dj) - 2.0 * height(i, j) + height(i - di, j - dj);
     const double over = bend * scale(direction) - 1.0;
@@ -69,8 +73,8 @@ struct BallGradient {
     const std::int64_t j = v / net.columns;
     double sum = 0.0;
     for (int d = 0; d < 4; ++d) {
-      const int di = BallNet::kStep[d][0];
-      const int dj = BallNet::kStep[d][1];
+      const int di = BallNet::step_x(d);
+      const int dj = BallNet::step_y(d);
       sum += 2.0 * net.scale(d) *
              (net.excess(i - di, j - dj, d) - 2.0 * net.excess(i, j, d) +
               net.excess(i + di, j + dj, d));

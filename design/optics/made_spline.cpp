@@ -36,8 +36,8 @@ Sparse matrix_of(const AxisBasis& basis) {
 
 /// Least squares along one direction, columns of the table: made heights at the Greville points
 /// against the wanted ones, and the change of coefficients.
-Eigen::MatrixXd unmade_columns(const AxisLength& along, const MadeBy& made,
-                               double least_share, const Eigen::MatrixXd& table) {
+Eigen::MatrixXd unmade_columns(const AxisLength& along, const MadeBy& made, double least_share,
+                               const Eigen::MatrixXd& table) {
   std::vector<double> points;
   for (int i = 0; i < along.cells + 3; ++i) points.push_back(greville_point(i, along.cells));
   MadeBy average = made;
@@ -70,7 +70,8 @@ SampledSurface made_nodes(const ControlNet& net, const MadeBy& made, int samples
 
 ControlNet unmade(ControlNet net, const MadeBy& made, double least_share) {
   Eigen::MatrixXd heights = unmade_columns(axis_of(net, 0), made, least_share, net.table(2));
-  heights = unmade_columns(axis_of(net, 1), made, least_share, heights.transpose()).transpose().eval();
+  heights =
+      unmade_columns(axis_of(net, 1), made, least_share, heights.transpose()).transpose().eval();
   net.points.row(2) = heights.reshaped().transpose();
   return net;
 }
