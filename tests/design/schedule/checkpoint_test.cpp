@@ -230,9 +230,28 @@ TEST(DesignFingerprint, ChangesWithEveryOption) {
   EXPECT_TRUE(seen.insert(design_fingerprint(picture, options)).second);
 }
 
+TEST(DesignFingerprint, ChangesWithEveryNumberOfTheProcess) {
+  const Image picture = testing::spot_picture(12, 9);
+  std::set<std::uint64_t> seen{design_fingerprint(picture, {})};
+  const MadeBy made[] = {{},
+                         {.pitch = 0.05},
+                         {.rows_along_x = false},
+                         {.ball_radius = 0.3},
+                         {.polish_sigma = 0.02},
+                         {.rim_depth = 0.01},
+                         {.rim_length = 2.0}};
+  EXPECT_EQ(std::size(made), testing::member_count<MadeBy>() + 1);
+  for (const MadeBy& process : made) {
+    DesignOptions options;
+    options.made_by = process;
+    EXPECT_TRUE(seen.insert(design_fingerprint(picture, options)).second);
+  }
+}
+
 TEST(DesignFingerprint, EveryMemberOfTheOptionsHasARow) {
-  // Weights have a table of their own; checkpoint and resume say where and when, not what.
-  constexpr std::size_t kWithoutRow = 3;
+  // Weights have a table of their own, the process is a workshop's; checkpoint and resume say where
+  // and when, not what.
+  constexpr std::size_t kWithoutRow = 4;
   EXPECT_EQ(design_fields().size() + kWithoutRow, testing::member_count<DesignOptions>());
   EXPECT_EQ(weight_fields().size(), testing::member_count<ObjectiveWeights>());
 }
