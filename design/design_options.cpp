@@ -2,6 +2,7 @@
 #include "design/design_options.h"
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 
 #include "core/error.h"
@@ -35,6 +36,24 @@ void require_process(const DesignOptions& o) {
   }
 }
 
+/// Knot cells of a process's even spline at most, in σ. Above it the polish costs less than knots
+/// that do not follow the picture; docs/fabrication.md, "Designed for how it is made", has the
+/// figures.
+constexpr double kCoarsestKnotCell = 2.5;
+
+/// @throw InputError naming the widest lens of this shape that its knots do for.
+void require_fine_knots(const DesignOptions& o, const Eigen::Vector2i& pixels) {
+  if (!o.made_by) return;
+  const Eigen::Vector2d size = optical_setup(o, pixels).lens_size;
+  const double cell = std::sqrt(size.prod() / kMaxKnotCells);
+  const double coarsest = kCoarsestKnotCell * o.made_by->polish_sigma;
+  require(cell <= coarsest, "--width", o.width,
+          "is too wide for --made-by: of so large a lens polish rounds less than is lost with even "
+          "knots, which are " +
+              number_text(cell) + " mm apart at best; use --model spline, or at most " +
+              number_text(std::floor(o.width * coarsest / cell)) + " mm");
+}
+
 }  // namespace
 
 DesignOptions default_design_options(SurfaceModel model, const Image& target) {
@@ -61,6 +80,7 @@ void validate(const DesignOptions& options, const Image& target) {
   const Eigen::Vector2i pixels = working_size(target.columns(), target.rows(), options.pixels);
   require(pixels.minCoeff() >= kMinPixels, "the working picture's shorter side", pixels.minCoeff(),
           "must be at least 4 pixels");
+  require_fine_knots(options, pixels);
   if (!(target.total() > 0.0)) {
     throw InputError("the picture is all black: there is no light to place");
   }

@@ -73,6 +73,9 @@ TEST_F(MadeBy, WhatCannotBeDesignedForIsRefused) {
   expect_refusal(design({"--made-by", path("absent.toml")}), 2, {"absent.toml"});
   std::ofstream(at("raw.toml")) << "[polish]\nsigma = 0\n";
   expect_refusal(design({"--made-by", path("raw.toml")}), 2, {"polish.sigma 0", "not polished"});
+  expect_refusal(run({"design", picture("portrait.png"), "--out", path("lens"), "--made-by",
+                      "default", "--width", "200mm", "--focal", "500mm"}),
+                 2, {"--width 200", "--made-by", "at most 53 mm"});
   EXPECT_FALSE(fs::exists(at("lens")));
 }
 
