@@ -25,9 +25,8 @@ struct PolishKernel {
 ///
 /// Beyond the rim the surface goes on: what was meant, turned about the rim, so that a plane stays
 /// a plane, with the tool's marks mirrored, z(−t) = z(t) + 2 (form(0) − form(t)). Turned as well,
-/// marks that stand s above the rim on average would lie s below it outside: scallops of 0.4 µm
-/// made the outer 0.1 mm of a 25 mm lens send light two pixels astray (128² portrait, pitch 0.045
-/// mm: MAE 0.0087 for 0.0061).
+/// marks that stand s above the rim on average would lie s below it outside: scallops of a portrait
+/// on 25 mm, 0.045 mm apart, then seemed to leak 0.44 % of the light for 0.08 %.
 ///
 /// Creases count where they run, whatever nodes lie beside them (correct_crease_sums()). But for
 /// that the slopes that the surface has itself are not used: between the passes of a ball they jump

@@ -73,13 +73,14 @@ class SplineObjectiveOn {
 
   using Buffer = typename Exec::template Buffer<double>;
 
-  /// λ of E_ball. With 0.02 and more a 96² logo, whose bright and black parts meet in creases, is
-  /// sharpened less than a 128² portrait, which has hardly a valley that is too sharp.
-  static constexpr double kBallWeight = 0.02;
+  /// Factor of E_ball within E_barr. With 2e6 and more, at the default λ5, a 96² logo, whose bright
+  /// and black parts meet in creases, is sharpened less than a 128² portrait, which has hardly a
+  /// valley that is too sharp.
+  static constexpr double kBallShare = 2e6;
 
   static std::optional<BallNet> ball_of(const SurfaceMesh& net, const OpticalSetup& setup,
                                         const ObjectiveOptions& options) {
-    if (!options.made_by || !(options.weights.barrier > 0.0)) return std::nullopt;
+    if (!options.made_by) return std::nullopt;
     return BallNet{nullptr,
                    net.grid.columns,
                    net.grid.rows,
@@ -90,9 +91,10 @@ class SplineObjectiveOn {
 
   void keep_valleys_wide(const double* points, double* gradient, EnergyValues& energy) {
     ball_->points = points;
-    const double value = kBallWeight * ball_term(executor_, *ball_, kBallWeight, gradient);
-    energy.total += value;
-    energy.barrier += value / barrier_weight_;
+    const double weight = barrier_weight_ * kBallShare;
+    const double value = ball_term(executor_, *ball_, weight, gradient);
+    energy.total += weight * value;
+    energy.barrier += kBallShare * value;
   }
 
   void look(const double* points) {

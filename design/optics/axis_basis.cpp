@@ -13,8 +13,7 @@ namespace {
 /// The Gaussian ends here, in σ, as in PolishedField.
 constexpr double kReach = 5.0;
 
-/// Points a σ of the sum that stands for its integral: off by 1e-8 of a coefficient over knots half
-/// a σ apart.
+/// Points a σ of the sum that stands for its integral.
 constexpr int kPointsPerSigma = 32;
 
 /// A point of a sum that stands for an integral over a Gaussian: what the surface counts there in

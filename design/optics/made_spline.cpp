@@ -43,7 +43,7 @@ Eigen::MatrixXd unmade_columns(const AxisLength& along, const MadeBy& made, doub
   MadeBy average = made;
   average.rim_depth = 0.0;
   const Sparse a = matrix_of(made_basis(along, points, average));
-  const Sparse b = matrix_of(plain_basis(along.cells, points));
+  const auto b = basis_matrix(points, along.cells, false);
   Sparse normal = a.transpose() * a;
   for (int i = 0; i < normal.rows(); ++i) normal.coeffRef(i, i) += least_share;
   const Eigen::SimplicialLDLT<Sparse> solver(normal);
