@@ -21,9 +21,9 @@ void add_cam_options(OptionSet& options, CamSettings& settings) {
                "machine, blank, clamps, tools and process; options given here win");
   options.flag("--show-workshop", settings.show_workshop,
                "print the workshop in use as TOML and exit");
-  options.texts("--compare", settings.compare, "KEY=MM,…",
+  options.texts("--compare", settings.compare, "KEY=VALUE,…",
                 "rank choices by leakage and hours instead of making programs: tool=0.3,0.4 "
-                "pitch=0.04,0.06 (finishing only)");
+                "pitch=0.04,0.06 large=0,4 (finishing only)");
   options.fields(cam_fields(), settings.cam);
 }
 

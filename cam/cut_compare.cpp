@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <string_view>
 #include <system_error>
 #include <tuple>
@@ -50,16 +51,16 @@ class PassingFolder {
   fs::path path_;
 };
 
-std::vector<double> lengths_of(std::string_view list, const std::string& where) {
-  std::vector<double> values;
+/// Words between commas, each read by `read(word)`.
+template <class Read>
+auto values_of(std::string_view list, const std::string& where, const Read& read) {
+  std::vector<decltype(read(list))> values;
   while (true) {
     const std::size_t comma = list.find(',');
-    const double value = parse_length_mm(list.substr(0, comma), where);
-    if (!(value > 0.0)) {
-      throw InputError(where + ": " + std::string(list.substr(0, comma)) + " is not above 0");
-    }
+    const std::string_view word = list.substr(0, comma);
+    const auto value = read(word);
     if (std::find(values.begin(), values.end(), value) != values.end()) {
-      throw InputError(where + ": " + std::string(list.substr(0, comma)) + " is given twice");
+      throw InputError(where + ": " + std::string(word) + " is given twice");
     }
     values.push_back(value);
     if (comma == std::string_view::npos) return values;
@@ -67,28 +68,55 @@ std::vector<double> lengths_of(std::string_view list, const std::string& where) 
   }
 }
 
+std::vector<double> lengths_of(std::string_view list, const std::string& where) {
+  return values_of(list, where, [&](std::string_view word) {
+    const double value = parse_length_mm(word, where);
+    if (value > 0.0) return value;
+    throw InputError(where + ": " + std::string(word) + " is not above 0");
+  });
+}
+
+std::vector<int> tool_numbers_of(std::string_view list, const std::string& where) {
+  return values_of(list, where, [&](std::string_view word) {
+    int value = 0;
+    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+    if (error == std::errc() && end == word.data() + word.size() && value >= 0) return value;
+    throw InputError(where + ": " + std::string(word) + " is no tool's number, nor 0");
+  });
+}
+
 std::vector<Choice> combinations(const CamOptions& options, const CutChoices& choices) {
   Workshop workshop = options.workshop;
   workshop.process.rough.enabled = false;
   workshop.process.semi.enabled = false;
   const FinishProcess& finish = workshop.process.finish;
-  const auto or_own = [](const std::vector<double>& values, double own) {
-    return values.empty() ? std::vector<double>{own} : values;
+  const auto or_own = [](auto values, auto own) {
+    if (values.empty()) values.push_back(own);
+    return values;
   };
   std::vector<Choice> all;
   for (const double tool : or_own(choices.tools, workshop.tool(finish.tool).diameter)) {
     for (const double pitch : or_own(choices.pitches, finish.pitch)) {
-      Choice choice{
-          "tool " + trimmed_decimal(tool, 4) + " mm, pitch " + trimmed_decimal(pitch, 4) + " mm",
-          options};
-      choice.options.workshop = workshop;
-      choice.options.render = true;
-      choice.options.remedies = false;
-      for (Tool& one : choice.options.workshop.tools) {
-        if (one.number == finish.tool && one.diameter != tool) one = resized(one, tool);
+      for (const int large : or_own(choices.large, finish.large_tool)) {
+        Choice choice{
+            "tool " + trimmed_decimal(tool, 4) + " mm, pitch " + trimmed_decimal(pitch, 4) + " mm",
+            options};
+        choice.options.workshop = workshop;
+        choice.options.render = true;
+        choice.options.remedies = false;
+        for (Tool& one : choice.options.workshop.tools) {
+          if (one.number == finish.tool && one.diameter != tool) one = resized(one, tool);
+        }
+        FinishProcess& changed = choice.options.workshop.process.finish;
+        if (!choices.pitches.empty()) changed.set_pitch(pitch);
+        changed.large_tool = large;
+        if (large == 0) {
+          changed.large_every = 1;
+        } else {
+          choice.name += ", larger ball T" + std::to_string(large);
+        }
+        all.push_back(std::move(choice));
       }
-      if (!choices.pitches.empty()) choice.options.workshop.process.finish.set_pitch(pitch);
-      all.push_back(std::move(choice));
     }
   }
   return all;
@@ -111,17 +139,22 @@ CutChoices parse_choices(std::span<const std::string> words, const std::string& 
   for (const std::string& word : words) {
     const std::size_t equals = word.find('=');
     const std::string key = word.substr(0, equals);
-    if (equals == std::string::npos || (key != "tool" && key != "pitch")) {
-      throw InputError(option + ": " + word + " is not tool=MM,MM… or pitch=MM,MM…");
+    if (equals == std::string::npos || (key != "tool" && key != "pitch" && key != "large")) {
+      throw InputError(option + ": " + word +
+                       " is not tool=MM,MM…, pitch=MM,MM… or large=TOOL,TOOL…");
     }
-    std::vector<double>& values = key == "tool" ? choices.tools : choices.pitches;
-    if (!values.empty()) throw InputError(option + ": " + key + " is given twice");
-    values = lengths_of(std::string_view(word).substr(equals + 1), option + " " + key);
+    const std::string_view list = std::string_view(word).substr(equals + 1);
+    const auto take = [&](auto& values, const auto& read) {
+      if (!values.empty()) throw InputError(option + ": " + key + " is given twice");
+      values = read(list, option + " " + key);
+    };
+    if (key == "tool") take(choices.tools, lengths_of);
+    if (key == "pitch") take(choices.pitches, lengths_of);
+    if (key == "large") take(choices.large, tool_numbers_of);
   }
-  const auto count_of = [](const std::vector<double>& values) {
-    return std::max<std::size_t>(values.size(), 1);
-  };
-  const std::size_t count = count_of(choices.tools) * count_of(choices.pitches);
+  const auto count_of = [](const auto& values) { return std::max<std::size_t>(values.size(), 1); };
+  const std::size_t count =
+      count_of(choices.tools) * count_of(choices.pitches) * count_of(choices.large);
   if (count > kMaxChoices) {
     throw InputError(option + ": " + std::to_string(count) + " combinations are more than " +
                      std::to_string(kMaxChoices));

@@ -15,16 +15,17 @@
 
 namespace lensforge {
 
-/// What is to be compared: every tool with every pitch.
+/// What is to be compared: every tool with every pitch and every larger ball.
 struct CutChoices {
   std::vector<double> tools;    ///< Diameters of the finishing ball, mm; none: the workshop's.
   std::vector<double> pitches;  ///< mm; none: the workshop's.
+  std::vector<int> large;  ///< Numbers of the larger ball, 0 for no such; none: the workshop's.
 };
 
 /// Combinations at most.
 inline constexpr std::size_t kMaxChoices = 64;
 
-/// Reads words such as "tool=0.3,0.4mm" and "pitch=0.04".
+/// Reads words such as "tool=0.3,0.4mm", "pitch=0.04" and "large=0,4".
 /// @param option  where they come from, for messages.
 /// @throw InputError naming option, word and rule.
 CutChoices parse_choices(std::span<const std::string> words, const std::string& option);

@@ -45,8 +45,15 @@ double finish_length(const CamOptions& options, const Eigen::Vector2d& size) {
   const FinishProcess& finish = options.workshop.process.finish;
   const double radius = finishing_ball(options).radius();
   const double pitch = finish_pitch(finish, radius);
-  const Eigen::Vector2d around = size + Eigen::Vector2d::Constant(2.0 * radius);
-  return around.prod() / pitch * (finish.cross ? 2.0 : 1.0);
+  const auto rows_of = [&](const Tool& ball, double apart) {
+    return (size + Eigen::Vector2d::Constant(ball.diameter)).prod() / apart;
+  };
+  double length = rows_of(finishing_ball(options), pitch) * (finish.cross ? 2.0 : 1.0);
+  // How much the larger ball leaves is not known yet: all of it at most.
+  if (const Tool* const large = larger_ball(options)) {
+    length += rows_of(*large, finish.large_every * pitch);
+  }
+  return length;
 }
 
 /// How many times as fine the directions are as by default; finer heights take moves like slopes.

@@ -73,7 +73,7 @@ CutPlan::CutPlan(const Lens& lens, const CamOptions& options, const Executor& ex
       profile_(mesh()),
       stock_(whole_blank(options_.workshop, field_.box)),
       optical_(optical_surface(cut(), model_)),
-      surface_(surface_to_cut(optical_, ball().radius(), executor)),
+      balls_(optical_, options_, executor),
       collisions_(profile_, options_.workshop, stock_),
       watch_(collisions_, options_.workshop.tools, z_offset_,
              highest_obstacle(options_.workshop, blank_)) {}
@@ -122,19 +122,20 @@ ProgramOperation CutPlan::semi_operation(const RunControl& control) {
           }};
 }
 
-ProgramOperation CutPlan::finish_operation(const std::string& name, const RasterPlan& plan,
-                                           const RunControl& control) {
-  const std::string rows = std::to_string(plan.rows) + " rows along " +
-                           (plan.options.along == 0 ? "X" : "Y") + ", stepover " +
-                           decimal_text(plan.pitch, 5) + " mm";
-  return {name, ball(), {rows}, [this, name, plan, &control](const MoveSink& sink) {
-            FinishRun run{name, ball(), safe_z(), {}};
+ProgramOperation CutPlan::finish_operation(const FinishPass& pass, const RunControl& control) {
+  const std::string rows = std::to_string(pass.plan.rows) + " rows along " +
+                           (pass.plan.options.along == 0 ? "X" : "Y") + ", stepover " +
+                           decimal_text(pass.plan.pitch, 5) + " mm";
+  return {pass.name, pass.tool, {rows}, [this, pass, &control](const MoveSink& sink) {
+            const RasterPlan& plan = pass.plan;
+            FinishRun run{pass.name, pass.tool, safe_z(), options_.workshop.process.clearance, {}};
             if (plan.options.traces) {
               paths_.ideal.emplace_back(plan.radius, 0.0);
               paths_.fitted.emplace_back(plan.radius, 0.0);
               run.look = [this](const RasterRow& row) { add_row(row, paths_); };
             }
-            return cut_finish(*surface_, plan, run, executor_, sketched(name, sink), control);
+            return cut_finish(*pass.surface, plan, run, executor_, sketched(pass.name, sink),
+                              control);
           }};
 }
 
@@ -142,8 +143,8 @@ OperationSummary CutPlan::run_pencil(double resolution, const MoveSink& sink,
                                      const RunControl& control) const {
   PencilOptions pencil = pencil_options(options_, z_offset_, field_.box.max().z());
   pencil.resolution = resolution;
-  return cut_pencil(*surface_, find_valleys(mesh(), ball().radius(), pencil), pencil,
-                    {"pencil", ball(), safe_z()}, sink, control);
+  return cut_pencil(surface(), find_valleys(mesh(), ball().radius(), pencil), pencil,
+                    {"pencil", ball(), safe_z(), {}, {}}, sink, control);
 }
 
 ProgramOperation CutPlan::pencil_operation(const RunControl& control) {
@@ -162,10 +163,8 @@ ProgramPlan CutPlan::programs(const RunControl& control) {
                    "top of the blank: Z " + decimal_text(blank_.max().z() + z_offset_, decimals_)};
   if (options_.workshop.process.rough.enabled) plan.operations.push_back(rough_operation(control));
   if (options_.workshop.process.semi.enabled) plan.operations.push_back(semi_operation(control));
-  const std::vector<RasterPlan> finishing = finish_rasters(options_, ground());
-  plan.operations.push_back(finish_operation("finish", finishing.front(), control));
-  if (finishing.size() > 1) {
-    plan.operations.push_back(finish_operation("cross", finishing.back(), control));
+  for (const FinishPass& pass : balls_.passes(options_, ground())) {
+    plan.operations.push_back(finish_operation(pass, control));
   }
   if (finish().pencil) plan.operations.push_back(pencil_operation(control));
   for (const ProgramOperation& operation : plan.operations) {
@@ -198,19 +197,27 @@ FinishPaths CutPlan::take_finish_paths(const ProgramFiles& programs, const RunCo
     paths.ideal.push_back(pencil);
     paths.fitted.push_back(std::move(pencil));
   }
-  BallPath written(ball().radius(), z_offset_);
+  if (const Tool* const large = larger_ball(options_)) {
+    paths.written.push_back(written_path(programs, *large, control));
+  }
+  paths.written.push_back(written_path(programs, ball(), control));
+  return paths;
+}
+
+BallPath CutPlan::written_path(const ProgramFiles& programs, const Tool& tool,
+                               const RunControl& control) const {
+  BallPath written(tool.radius(), z_offset_);
   for (const ProgramFile& file : programs.files) {
     const bool finishes =
         std::any_of(file.operations.begin(), file.operations.end(), [&](const OperationTime& time) {
-          return programs.summaries[time.operation].tool == ball().number;
+          return programs.summaries[time.operation].tool == tool.number;
         });
     if (finishes) {
-      read_path(file.beside.empty() ? file.path : file.beside, options_.post.reader, ball().number,
+      read_path(file.beside.empty() ? file.path : file.beside, options_.post.reader, tool.number,
                 written, control);
     }
   }
-  paths.written.push_back(std::move(written));
-  return paths;
+  return written;
 }
 
 }  // namespace lensforge

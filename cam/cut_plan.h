@@ -12,6 +12,7 @@
 #include "cam/contact/cut_surface.h"
 #include "cam/contact/height_field.h"
 #include "cam/contact/profile_cutter.h"
+#include "cam/finish_balls.h"
 #include "cam/finish_paths.h"
 #include "cam/finish_setup.h"
 #include "cam/milled/cast_field.h"
@@ -61,7 +62,8 @@ class CutPlan {
   /// The optical surface that it stands for.
   [[nodiscard]] const std::shared_ptr<const OpticalSurface>& optical() const { return optical_; }
   /// The same for the finishing ball.
-  [[nodiscard]] const CutSurface& surface() const { return *surface_; }
+  [[nodiscard]] const CutSurface& surface() const { return balls_.surface(); }
+  [[nodiscard]] const FinishBalls& balls() const { return balls_; }
   /// Where the lens lies in the mould, if there is one.
   [[nodiscard]] std::optional<CastFrame> mould() const;
   [[nodiscard]] const Eigen::AlignedBox3d& part_box() const { return field_.box; }
@@ -94,11 +96,12 @@ class CutPlan {
   [[nodiscard]] double safe_z() const;
   ProgramOperation rough_operation(const RunControl& control);
   ProgramOperation semi_operation(const RunControl& control);
-  ProgramOperation finish_operation(const std::string& name, const RasterPlan& plan,
-                                    const RunControl& control);
+  ProgramOperation finish_operation(const FinishPass& pass, const RunControl& control);
   ProgramOperation pencil_operation(const RunControl& control);
   OperationSummary run_pencil(double resolution, const MoveSink& sink,
                               const RunControl& control) const;
+  [[nodiscard]] BallPath written_path(const ProgramFiles& programs, const Tool& tool,
+                                      const RunControl& control) const;
   /// The sink behind a sketch of the operation.
   MoveSink sketched(const std::string& operation, const MoveSink& sink);
 
@@ -114,7 +117,7 @@ class CutPlan {
   ProfileCutter profile_;
   StockMap stock_;
   std::shared_ptr<const OpticalSurface> optical_;
-  std::unique_ptr<CutSurface> surface_;
+  FinishBalls balls_;
   CollisionCheck collisions_;
   ProgramWatch watch_;
   std::vector<WatchedOperation> watched_;

@@ -75,13 +75,23 @@ std::vector<Tool> tools_of(const CutPlan& plan, const ProgramFiles& programs) {
 
 ParameterGroup finish_parameters(const CutPlan& plan, SurfaceModel model) {
   const FinishProcess& finish = plan.options().workshop.process.finish;
-  return {"Finishing",
-          {{"Stepover", mm(plan.pitch(), 4)},
-           {"Rows along", finish.along == PassAxis::kX ? "X" : "Y"},
-           {"Tolerance", mm(finish.tolerance, 5)},
-           {"Slope tolerance", decimal_text(1e3 * finish.slope_tolerance, 2) + " mrad"},
-           {"Decimals", std::to_string(plan.decimals())},
-           {"Surface", words_for(model)}}};
+  ParameterGroup group{
+      "Finishing",
+      {{"Stepover", mm(plan.pitch(), 4)},
+       {"Rows along", finish.along == PassAxis::kX ? "X" : "Y"},
+       {"Tolerance", mm(finish.tolerance, 5)},
+       {"Slope tolerance", decimal_text(1e3 * finish.slope_tolerance, 2) + " mrad"},
+       {"Decimals", std::to_string(plan.decimals())},
+       {"Surface", words_for(model)}}};
+  if (const RestMap* const rest = plan.balls().rest()) {
+    const Tool& large = *larger_ball(plan.options());
+    group.parameters.push_back(
+        {"Larger ball", mm(large.diameter, 2) + ", stepover " +
+                            mm(finish.large_every * plan.pitch(), 4) + ", leaves " +
+                            percent_text(rest->share_within(BallBlend::kWidth)) +
+                            " of the lens to the smaller one, overlap included"});
+  }
+  return group;
 }
 
 template <class Level>

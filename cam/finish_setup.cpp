@@ -7,6 +7,9 @@
 namespace lensforge {
 namespace {
 
+/// Moves are meant to be this many times as long as the controller needs: some are cut in two.
+constexpr double kAboveShortest = 2.0;
+
 RasterPlan finish_raster(const CamOptions& options, const FinishGround& ground, PassAxis along) {
   const FinishProcess& finish = options.workshop.process.finish;
   const double radius = finishing_ball(options).radius();
@@ -20,7 +23,9 @@ RasterPlan finish_raster(const CamOptions& options, const FinishGround& ground, 
   raster.along = along == PassAxis::kX ? 0 : 1;
   raster.style = finish.style;
   raster.arcs = options.arcs && options.post.arcs != ArcForm::kNone;
+  raster.shortest = shortest_move(options, finishing_ball(options));
   raster.traces = options.render;
+  if (larger_ball(options) != nullptr) raster.every = finish.large_every;
   return plan_finish_raster(ground.rectangle, radius, raster);
 }
 
@@ -28,6 +33,11 @@ RasterPlan finish_raster(const CamOptions& options, const FinishGround& ground, 
 
 const Tool& finishing_ball(const CamOptions& options) {
   return options.workshop.tool(options.workshop.process.finish.tool);
+}
+
+const Tool* larger_ball(const CamOptions& options) {
+  const int number = options.workshop.process.finish.large_tool;
+  return number == 0 ? nullptr : &options.workshop.tool(number);
 }
 
 int decimals_of(const CamOptions& options) {
@@ -38,6 +48,11 @@ int decimals_of(const CamOptions& options) {
 }
 
 double resolution_of(const CamOptions& options) { return std::pow(10.0, -decimals_of(options)); }
+
+double shortest_move(const CamOptions& options, const Tool& tool) {
+  const double lines = options.workshop.machine.lines_per_second;
+  return lines > 0.0 ? kAboveShortest * tool.feed / (60.0 * lines) : 0.0;
+}
 
 std::vector<RasterPlan> finish_rasters(const CamOptions& options, const FinishGround& ground) {
   const FinishProcess& finish = options.workshop.process.finish;

@@ -13,11 +13,18 @@ namespace lensforge {
 /// The finishing ball.
 const Tool& finishing_ball(const CamOptions& options);
 
+/// The larger ball that finishes wherever it reaches; none if the finishing ball does it alone.
+const Tool* larger_ball(const CamOptions& options);
+
 /// Digits after the point in the programs: as chosen, or what the tolerances ask for.
 int decimals_of(const CamOptions& options);
 
 /// Unit of the programs' last decimal, mm.
 double resolution_of(const CamOptions& options);
+
+/// Length that moves of a tool should have at least, mm: the controller takes no more lines a
+/// second. 0 where it has no such limit.
+double shortest_move(const CamOptions& options, const Tool& tool);
 
 /// What the finishing is laid out on; mm, lens frame.
 struct FinishGround {

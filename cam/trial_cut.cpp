@@ -8,7 +8,6 @@
 #include "cam/finish_paths.h"
 #include "cam/finish_setup.h"
 #include "cam/leakage/render_field.h"
-#include "cam/meant_surface.h"
 #include "cam/milled/cast_field.h"
 #include "cam/milled/crease_sum.h"
 #include "cam/milled/milled_field.h"
@@ -70,8 +69,10 @@ RasterPlan raster_around(const RasterPlan& whole, const Eigen::AlignedBox2d& box
   part.max()[across] = std::min(begin + last * whole.pitch, whole.surface.max()[across]);
   RasterOptions options = whole.options;
   options.pitch = whole.pitch;
-  options.traces = false;
-  return plan_finish_raster(part, whole.radius, options);
+  options.every = 1;
+  RasterPlan plan = plan_finish_raster(part, whole.radius, options);
+  plan.rest = whole.rest;
+  return plan;
 }
 
 /// The runs of a valley's places that lie in a box.
@@ -111,29 +112,31 @@ Exchange exchange(const LeakageResult& predicted, const FluxPicture& before,
 }  // namespace
 
 TrialCut::TrialCut(const TrialSite& site, const CamOptions& changed, const Executor& executor)
-    : site_(site), options_(changed), executor_(executor), surface_(&site.plan.surface()) {
-  const double radius = finishing_ball(changed).radius();
-  if (radius == surface_->radius()) return;
-  own_ = surface_to_cut(site.plan.optical(), radius, executor);
-  surface_ = own_.get();
+    : site_(site), options_(changed), executor_(executor), balls_(&site.plan.balls()) {
+  if (!same_balls(changed, site.plan.options())) {
+    own_ = std::make_unique<const FinishBalls>(site.plan.optical(), changed, executor);
+    balls_ = own_.get();
+  }
+  passes_ = balls_->passes(changed, site.plan.ground());
+  for (FinishPass& pass : passes_) pass.plan.options.traces = false;
 }
 
 TrialCut::Work TrialCut::work(const RunControl& control) const {
   Work work;
-  for (RasterPlan plan : finish_rasters(options_, site_.plan.ground())) {
-    plan.options.traces = false;
+  for (const FinishPass& pass : passes_) {
+    const RasterPlan& plan = pass.plan;
     std::vector<Work> rows(kWorkRows);
     parallel_for(executor_, "remedies' work", kWorkRows, [&](std::int64_t i) {
       if (control.stop_requested()) return;
       const std::int64_t number = plan.rows * (2 * i + 1) / (2 * kWorkRows);
-      const RowSpan span = plan.row_span(number);
-      Eigen::AlignedBox2d axis(span.line.at(span.from));
-      axis.extend(span.line.at(span.to));
-      const RowCurves curves(*surface_, axis, Executor::serial());
-      const RasterRow row = cut_row(curves, plan, number);
       Work& one = rows[static_cast<std::size_t>(i)];
-      one.moves = static_cast<double>(row.moves.size());
-      one.minutes = (span.to - span.from + plan.pitch) / finishing_ball(options_).feed;
+      for (const RowSpan& span : plan.row_spans(number)) {
+        Eigen::AlignedBox2d axis(span.line.at(span.from));
+        axis.extend(span.line.at(span.to));
+        const RowCurves curves(*pass.surface, axis, Executor::serial());
+        one.moves += static_cast<double>(cut_row(curves, plan, number, span).moves.size());
+        one.minutes += (span.to - span.from + plan.pitch) / pass.tool.feed;
+      }
     });
     if (control.stop_requested()) throw Interrupted();
     for (const Work& one : rows) {
@@ -144,20 +147,24 @@ TrialCut::Work TrialCut::work(const RunControl& control) const {
   return work;
 }
 
-BallPath TrialCut::path_around(const Eigen::AlignedBox2d& box, const RunControl& control) const {
-  BallPath path(surface_->radius(), 0.0);
-  const MoveSink sink = path_sink(path);
-  for (const RasterPlan& whole : finish_rasters(options_, site_.plan.ground())) {
+std::vector<BallPath> TrialCut::paths_around(const Eigen::AlignedBox2d& box,
+                                             const RunControl& control) const {
+  std::vector<BallPath> paths;
+  for (const FinishPass& pass : passes_) {
+    BallPath& path = paths.emplace_back(pass.tool.radius(), 0.0);
+    const MoveSink sink = path_sink(path);
     const auto add = [&](const RasterRow& row) {
       const PathMove start{MoveKind::kRapid, row.start};
       sink({&start, 1});
       sink(row.moves);
     };
-    const RasterPlan plan = raster_around(whole, box);
-    if (!cut_raster(*surface_, plan, executor_, add, control).complete) throw Interrupted();
+    const RasterPlan plan = raster_around(pass.plan, box);
+    if (!cut_raster(*pass.surface, plan, executor_, add, control).complete) throw Interrupted();
   }
-  if (options_.workshop.process.finish.pencil) add_pencil(box, path, control);
-  return path;
+  if (options_.workshop.process.finish.pencil) {
+    add_pencil(box, paths.emplace_back(finishing_ball(options_).radius(), 0.0), control);
+  }
+  return paths;
 }
 
 void TrialCut::add_pencil(const Eigen::AlignedBox2d& box, BallPath& path,
@@ -165,12 +172,13 @@ void TrialCut::add_pencil(const Eigen::AlignedBox2d& box, BallPath& path,
   const PencilOptions pencil =
       pencil_options(options_, site_.plan.z_offset(), site_.plan.part_box().max().z());
   std::vector<Valley> inside;
-  for (const Valley& valley : find_valleys(site_.plan.mesh(), surface_->radius(), pencil)) {
+  for (const Valley& valley :
+       find_valleys(site_.plan.mesh(), finishing_ball(options_).radius(), pencil)) {
     for (Valley& part : parts_in(valley, box)) inside.push_back(std::move(part));
   }
   if (inside.empty()) return;
-  const FinishRun run{"pencil", finishing_ball(options_), site_.plan.blank().max().z()};
-  if (!cut_pencil(*surface_, inside, pencil, run, path_sink(path), control).complete) {
+  const FinishRun run{"pencil", finishing_ball(options_), site_.plan.blank().max().z(), {}, {}};
+  if (!cut_pencil(balls_->surface(), inside, pencil, run, path_sink(path), control).complete) {
     throw Interrupted();
   }
 }
@@ -185,10 +193,10 @@ LeakTrial TrialCut::at(const LeakPlace& place, const RunControl& control) const 
   const std::optional<CastFrame> mould = site_.plan.mould();
   const double polished = PolishedField::kReach * options_.workshop.polish.sigma +
                           (1.0 + kCreaseHalo) * grid.spacing.maxCoeff();
-  const double beyond = (mould ? mould->scale : 1.0) * polished + 2.0 * surface_->radius();
+  const double beyond = (mould ? mould->scale : 1.0) * polished + passes_.front().tool.diameter;
   const Eigen::AlignedBox2d box =
       grown_within(in_mould(box_of(grid, place.cells), mould), beyond, site_.plan.rectangle());
-  const MilledField milled({path_around(box, silent)}, site_.plan.blank().max().z());
+  const MilledField milled(paths_around(box, silent), site_.plan.blank().max().z());
   std::optional<CastField> cast;
   if (mould) cast.emplace(milled, *mould);
   const SurfaceField& raw = cast ? static_cast<const SurfaceField&>(*cast) : milled;

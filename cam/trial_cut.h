@@ -52,15 +52,16 @@ class TrialCut {
   [[nodiscard]] LeakTrial at(const LeakPlace& place, const RunControl& control) const;
 
  private:
-  [[nodiscard]] BallPath path_around(const Eigen::AlignedBox2d& box,
-                                     const RunControl& control) const;
+  [[nodiscard]] std::vector<BallPath> paths_around(const Eigen::AlignedBox2d& box,
+                                                   const RunControl& control) const;
   void add_pencil(const Eigen::AlignedBox2d& box, BallPath& path, const RunControl& control) const;
 
   TrialSite site_;
   const CamOptions& options_;
   const Executor& executor_;
-  std::unique_ptr<CutSurface> own_;  ///< Where the ball is another.
-  const CutSurface* surface_;
+  std::unique_ptr<const FinishBalls> own_;  ///< Where balls or rows are others.
+  const FinishBalls* balls_;
+  std::vector<FinishPass> passes_;
 };
 
 }  // namespace lensforge

@@ -34,6 +34,19 @@ Interpolation interpolation_of(const SurfaceMesh& mesh, std::int64_t triangle) {
   return {0.5 * around * around, side[2] * side[1] * (side[0] + 4.0 * inscribed) / (4.0 * area)};
 }
 
+SurfaceBounds bounds_of(const OpticalSurface& surface, std::int64_t triangle) {
+  SurfaceBounds bounds{surface.bend_range(triangle), HUGE_VAL, -HUGE_VAL};
+  for (int k = 0; k < 3; ++k) {
+    // In the middle of the third that lies at the edge across from corner k.
+    Eigen::Vector3d weights = Eigen::Vector3d::Constant(4.0 / 9.0);
+    weights[k] = 1.0 / 9.0;
+    const SmoothPatch patch = surface.patch_in(triangle, weights);
+    bounds.lowest = std::min(bounds.lowest, patch.lowest());
+    bounds.highest = std::max(bounds.highest, patch.highest());
+  }
+  return bounds;
+}
+
 int splits_for(const Interpolation& shape, double bend, const SmoothCutOptions& options) {
   const double needed = std::max(std::sqrt(bend * shape.height / options.deviation),
                                  bend * shape.slope / options.slope_deviation);
@@ -120,12 +133,13 @@ SmoothCutSurface::SmoothCutSurface(std::shared_ptr<const OpticalSurface> surface
       splits_(static_cast<std::size_t>(surface_->mesh().triangle_count())) {
   const SurfaceMesh& mesh = surface_->mesh();
   std::vector<SurfaceDeviation> off(splits_.size());
-  std::vector<BendRange> bends(splits_.size());
+  std::vector<SurfaceBounds> bounds(splits_.size());
   parallel_for(executor, "smooth surface", mesh.triangle_count(), [&](std::int64_t t) {
     const auto i = static_cast<std::size_t>(t);
     const Interpolation shape = interpolation_of(mesh, t);
-    bends[i] = surface_->bend_range(t);
-    const double bend = std::max(std::abs(bends[i].least), std::abs(bends[i].largest));
+    bounds[i] = bounds_of(*surface_, t);
+    const BendRange& range = bounds[i].bend;
+    const double bend = std::max(std::abs(range.least), std::abs(range.largest));
     const int n = splits_for(shape, bend, options);
     splits_[i] = static_cast<std::uint8_t>(n);
     off[i] = {bend * shape.height / (n * n), bend * shape.slope / n};
@@ -134,7 +148,7 @@ SmoothCutSurface::SmoothCutSurface(std::shared_ptr<const OpticalSurface> surface
     deviation_.height = std::max(deviation_.height, one.height);
     deviation_.slope = std::max(deviation_.slope, one.slope);
   }
-  bed_.emplace(*surface_, radius, bends);
+  bed_.emplace(*surface_, radius, bounds);
   const double area = surface_->box().volume();
   const double longest = surface_->box().sizes().maxCoeff();
   const double per_band = static_cast<double>(facet_count()) / area * longest;

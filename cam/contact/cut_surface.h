@@ -23,6 +23,22 @@ struct SurfaceDeviation {
   double slope = 0.0;   ///< Difference of slopes, no less than the angle in rad.
 };
 
+/// How a ball is held above its drop curve.
+class BallLift {
+ public:
+  BallLift() = default;
+  BallLift(const BallLift&) = delete;
+  BallLift& operator=(const BallLift&) = delete;
+  virtual ~BallLift() = default;
+
+  /// With its axis and its contact, as it rolls, at these places, mm, ≥ 0. Where it follows facets
+  /// the axis stands for both.
+  [[nodiscard]] virtual double at(const Eigen::Vector2d& axis,
+                                  const Eigen::Vector2d& contact) const = 0;
+  /// Whether the ball stays clear of what it cannot roll along, instead of following its facets.
+  [[nodiscard]] virtual bool clears() const = 0;
+};
+
 /// The surface that a strategy cuts, as drop-cutters for parts of it.
 class CutSurface {
  public:
@@ -40,6 +56,8 @@ class CutSurface {
   /// the facets are what is meant.
   [[nodiscard]] virtual const SmoothBed* bed() const { return nullptr; }
   [[nodiscard]] virtual SurfaceDeviation deviation() const { return {}; }
+  /// Where the ball is to be held above its drop curve; none if nowhere.
+  [[nodiscard]] virtual const BallLift* lift() const { return nullptr; }
   /// How far, mm, the axis should move at most across the rows that share a cutter, so that it
   /// fits in memory.
   [[nodiscard]] virtual double band() const { return std::numeric_limits<double>::infinity(); }

@@ -20,6 +20,19 @@ constexpr int kMaxSteps = 40;
 /// Contacts are sought no farther from the axis than this, in radii.
 constexpr double kFarthest = 0.98;
 
+/// Side of the cells in which bends are held, in radii and mm at most: what bends in a cell that a
+/// footprint touches counts.
+constexpr double kCellPerRadius = 0.25;
+constexpr double kLargestCell = 0.1;
+
+/// Footprints are this much larger than they need be, mm: rounding.
+constexpr double kMargin = 1e-6;
+
+/// Steps in which a footprint is narrowed at most, and the share of it that a step has to leave
+/// over to be the last.
+constexpr int kReachSteps = 8;
+constexpr double kReachGain = 0.9;
+
 using Fixed = std::array<bool, 2>;
 
 /// Which coordinates of the contact are held at the rectangle's rim by the gradient.
@@ -43,11 +56,59 @@ Eigen::Vector2d solve_free(const Eigen::Matrix2d& h, const Eigen::Vector2d& b, c
          det;
 }
 
+Eigen::AlignedBox2d grown(const Eigen::AlignedBox2d& box, double by) {
+  const Eigen::Vector2d around = Eigen::Vector2d::Constant(by);
+  return {Eigen::Vector2d(box.min() - around), Eigen::Vector2d(box.max() + around)};
+}
+
 Eigen::Vector2d clamped(const Eigen::Vector2d& q, const Eigen::AlignedBox2d& box) {
   return q.cwiseMax(box.min()).cwiseMin(box.max());
 }
 
 }  // namespace
+
+SmoothBed::SmoothBed(const OpticalSurface& surface, double radius,
+                     std::span<const SurfaceBounds> bounds)
+    : surface_(surface),
+      radius_(radius),
+      bounds_(surface, bounds, std::min(kCellPerRadius * radius, kLargestCell)) {}
+
+/// What lies nearer rises less, and what rises less is nearer.
+double SmoothBed::reach(const Eigen::AlignedBox2d& axis) const {
+  const Eigen::AlignedBox2d over(clamped(axis.min(), surface_.box()),
+                                 clamped(axis.max(), surface_.box()));
+  const double lowest = bounds_.roughly_over(over).lowest;
+  double reach = radius_;
+  for (int i = 0; i < kReachSteps; ++i) {
+    const double rise = bounds_.roughly_over(grown(over, reach)).highest - lowest;
+    const double next = std::sqrt(2.0 * radius_ * std::max(rise, 0.0)) + kMargin;
+    const bool last = next > kReachGain * reach;
+    reach = std::min(next, reach);
+    if (last) break;
+  }
+  return reach;
+}
+
+Eigen::AlignedBox2d SmoothBed::footprint(const Eigen::AlignedBox2d& axis) const {
+  const Eigen::AlignedBox2d over(clamped(axis.min(), surface_.box()),
+                                 clamped(axis.max(), surface_.box()));
+  return grown(over, reach(axis));
+}
+
+Eigen::AlignedBox2d SmoothBed::footprint(const Eigen::AlignedBox2d& axis, double tip) const {
+  const auto holds = [&](const Eigen::AlignedBox2d& cell, const SurfaceBounds& bounds) {
+    return bounds.highest + kMargin - tip >= axis.squaredExteriorDistance(cell) / (2.0 * radius_);
+  };
+  return bounds_.part_where(footprint(axis), holds);
+}
+
+double SmoothBed::tip_over(const Eigen::AlignedBox2d& axis, const Eigen::Vector3d& point) const {
+  const Eigen::Vector2d q = point.head<2>();
+  const Eigen::Vector2d farthest =
+      (axis.min() - q).cwiseAbs().cwiseMax((axis.max() - q).cwiseAbs());
+  const double room = radius_ * radius_ - farthest.squaredNorm();
+  return room < 0.0 ? -HUGE_VAL : point.z() + std::sqrt(room) - radius_;
+}
 
 std::optional<SurfaceShape> SmoothRoll::shape_at(const Eigen::Vector2d& q) {
   if (!patch_ || !patch_->contains(q)) patch_ = bed_.surface().patch_at(q);
@@ -58,11 +119,10 @@ std::optional<SurfaceShape> SmoothRoll::shape_at(const Eigen::Vector2d& q) {
 /// Newton's method with the step halved as long as f falls. Where the gradient points over the rim
 /// a coordinate stays there. By concavity no other point of the surface holds the ball higher than
 /// g²/(2m) above f(q), m = 1/R − bend.
-std::optional<SmoothRoll::Rest> SmoothRoll::rest_at(double u, const Eigen::Vector2d& guess,
-                                                    double steepest_bend) {
+std::optional<SmoothRoll::Rest> SmoothRoll::rest_at(double u, const Eigen::Vector2d& guess) {
   const Eigen::AlignedBox2d& box = bed_.surface().box();
   const double radius = bed_.radius();
-  const double least_bend = 1.0 / radius - steepest_bend;
+  const double least_bend = (1.0 - SmoothBed::kMaxBend) / radius;
   const Eigen::Vector2d p = line_.at(u);
   Eigen::Vector2d q = clamped(guess, box);
   Eigen::Vector2d before = clamped(p, box);
@@ -92,7 +152,7 @@ std::optional<SmoothRoll::Rest> SmoothRoll::rest_at(double u, const Eigen::Vecto
     if (flat) {
       const Eigen::Vector2d along =
           line_.along == 0 ? Eigen::Vector2d(1.0, 0.0) : Eigen::Vector2d(0.0, 1.0);
-      return Rest{q, solve_free(bend, ball * along, fixed), f,
+      return Rest{q, solve_free(bend, ball * along, fixed), shape->z, f,
                   g.squaredNorm() / (2.0 * least_bend)};
     }
     before = q;
@@ -118,7 +178,7 @@ std::optional<double> SmoothRoll::sharpest(double from, const Rest& first, doubl
   box.extend(last.q);
   const Eigen::Vector2d around = Eigen::Vector2d::Constant(rate * half);
   box = {Eigen::Vector2d(box.min() - around), Eigen::Vector2d(box.max() + around)};
-  const BendRange range = bed_.bends().over(box);
+  const BendRange range = bed_.bounds().over(box).bend;
   const double up = range.largest / (1.0 - range.largest * radius);
   const double flank = radius * radius / std::pow(radius * radius - out * out, 1.5);
   const Eigen::AlignedBox2d& whole = bed_.surface().box();
@@ -127,37 +187,43 @@ std::optional<double> SmoothRoll::sharpest(double from, const Rest& first, doubl
   return std::max({up, -range.least, rim ? flank : 0.0});
 }
 
-std::optional<CurveNodes> SmoothRoll::follow(double from, double to, double error) {
-  const double radius = bed_.radius();
-  Eigen::AlignedBox2d foot(line_.at(from));
-  foot.extend(line_.at(to));
-  const Eigen::Vector2d around = Eigen::Vector2d::Constant(radius);
-  foot = {Eigen::Vector2d(foot.min() - around), Eigen::Vector2d(foot.max() + around)};
-  const double bend = bed_.bends().over(foot).largest;
-  if (bend * radius > SmoothBed::kMaxBend) return std::nullopt;
-  const std::optional<Rest> first = rest_at(from, last_.value_or(line_.at(from)), bend);
+std::optional<CurveNodes> SmoothRoll::follow(double from, double to, double error, double apart) {
+  Eigen::AlignedBox2d axis(line_.at(from));
+  axis.extend(line_.at(to));
+  const std::optional<Rest> first = rest_at(from, last_.value_or(line_.at(from)));
   if (!first) return std::nullopt;
-  const std::optional<Rest> last = rest_at(to, first->q + (to - from) * first->rate, bend);
+  const std::optional<Rest> last = rest_at(to, first->q + (to - from) * first->rate);
   if (!last) return std::nullopt;
+  // Over both places a stationary point of f was found. It is the contact if it lies where contacts
+  // can be at all and f is concave there.
+  const double tip =
+      std::max(bed_.tip_over(axis, first->point()), bed_.tip_over(axis, last->point()));
+  const Eigen::AlignedBox2d foot = bed_.footprint(axis, tip);
+  const double bend = bed_.bounds().over(foot).bend.largest;
+  if (bend * bed_.radius() > SmoothBed::kMaxBend) return std::nullopt;
+  if (!foot.contains(first->q) || !foot.contains(last->q)) return std::nullopt;
   const std::optional<double> sharp = sharpest(from, *first, to, *last, bend);
   if (!sharp) return std::nullopt;
   // A chord of length h is off by bend · h²/8.
-  const double steps = std::max(1.0, std::ceil((to - from) * std::sqrt(*sharp / (8.0 * error))));
-  CurveNodes nodes{{from}, {first->tip}, 0.0};
+  const double densest = std::max(std::sqrt(*sharp / (8.0 * error)), 1.0 / apart);
+  const double steps = std::max(1.0, std::ceil((to - from) * densest));
+  CurveNodes nodes{{from}, {first->tip}, {first->q}, 0.0};
   double doubt = std::max(first->doubt, last->doubt);
   const double step = (to - from) / steps;
   Rest at = *first;
   for (double i = 1.0; i < steps; i += 1.0) {
     const double u = from + i * step;
-    const std::optional<Rest> next = rest_at(u, at.q + (u - nodes.u.back()) * at.rate, bend);
-    if (!next) return std::nullopt;
+    const std::optional<Rest> next = rest_at(u, at.q + (u - nodes.u.back()) * at.rate);
+    if (!next || !foot.contains(next->q)) return std::nullopt;
     at = *next;
     doubt = std::max(doubt, at.doubt);
     nodes.u.push_back(u);
     nodes.z.push_back(at.tip);
+    nodes.contact.push_back(at.q);
   }
   nodes.u.push_back(to);
   nodes.z.push_back(last->tip);
+  nodes.contact.push_back(last->q);
   nodes.error = 0.125 * *sharp * step * step + doubt;
   last_ = last->q;
   return nodes;

@@ -2,11 +2,12 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cmath>
 #include <optional>
 #include <span>
 #include <vector>
 
-#include "cam/contact/bend_map.h"
+#include "cam/contact/bounds_map.h"
 #include "cam/contact/curve_piece.h"
 #include "core/surface/optical_surface.h"
 
@@ -14,37 +15,49 @@ namespace lensforge {
 
 /// A smooth surface that a ball rolls on.
 ///
-/// Where no second derivative of the surface under the ball exceeds kMaxBend / R, the height
-/// f(q) = z(q) + √(R² − |q − p|²) − R at which a point q of it holds the tip over p is strictly
-/// concave in q: there is one contact, and Newton's method finds it. It depends continuously on p,
-/// and the drop surface f(q(p)) has second derivatives between −b⁻ and b⁺ / (1 − b⁺R), the
-/// surface's own lying between −b⁻ and b⁺: the Hessians' inverses add. At the rim of the surface's
-/// rectangle, where the contact stays behind, the ball's own flank bounds them.
+/// The height f(q) = z(q) + √(R² − |q − p|²) − R at which a point q of it holds the tip over p is
+/// largest within √(2 R h) of the place p′ of the surface's rectangle that is nearest to p, h being
+/// how far the surface rises above p′ at most: with v = q − p′, |q − p|² ≥ |p′ − p|² + v², the
+/// rectangle being convex, so that f(q) ≥ f(p′) asks for z(q) − z(p′) ≥ v²/(2R). Where no second
+/// derivative of the surface there exceeds kMaxBend / R, f is strictly concave: there is one
+/// contact, and Newton's method finds it. It depends continuously on p, and the drop surface
+/// f(q(p)) has second derivatives between −b⁻ and b⁺ / (1 − b⁺R), the surface's own lying between
+/// −b⁻ and b⁺: the Hessians' inverses add. At the rim of the surface's rectangle, where the contact
+/// stays behind, the ball's own flank bounds them.
 class SmoothBed {
  public:
   /// @param radius   of the ball, mm, > 0.
   /// @param surface  a height field over a rectangle; must outlive the bed.
-  /// @param bends    OpticalSurface::bend_range() of every triangle.
-  SmoothBed(const OpticalSurface& surface, double radius, std::span<const BendRange> bends)
-      : surface_(surface), radius_(radius), bends_(surface, bends, 0.5 * radius) {}
+  /// @param bounds   of every triangle.
+  SmoothBed(const OpticalSurface& surface, double radius, std::span<const SurfaceBounds> bounds);
 
   [[nodiscard]] const OpticalSurface& surface() const { return surface_; }
   [[nodiscard]] double radius() const { return radius_; }
-  [[nodiscard]] const BendMap& bends() const { return bends_; }
+  [[nodiscard]] const BoundsMap& bounds() const { return bounds_; }
+  /// All of the surface that can touch a ball with its axis in a box.
+  [[nodiscard]] Eigen::AlignedBox2d footprint(const Eigen::AlignedBox2d& axis) const;
+  /// The same if the tip is known to be nowhere below `tip`, mm: z(q) − tip ≥ |q − p|²/(2R).
+  [[nodiscard]] Eigen::AlignedBox2d footprint(const Eigen::AlignedBox2d& axis, double tip) const;
+  /// How far a contact can be from p′ at most, mm.
+  [[nodiscard]] double reach(const Eigen::AlignedBox2d& axis) const;
+  /// How low the tip is over a box at least, mm, if a point of the surface is under the ball.
+  [[nodiscard]] double tip_over(const Eigen::AlignedBox2d& axis,
+                                const Eigen::Vector3d& point) const;
 
   static constexpr double kMaxBend = 0.8;
 
  private:
   const OpticalSurface& surface_;
   double radius_;
-  BendMap bends_;
+  BoundsMap bounds_;
 };
 
 /// Places of a curve, joined by straight lines.
 struct CurveNodes {
-  std::vector<double> u;  ///< Ascending, mm.
-  std::vector<double> z;  ///< mm
-  double error = 0.0;     ///< Farthest that the curve is from the polyline, mm.
+  std::vector<double> u;                 ///< Ascending, mm.
+  std::vector<double> z;                 ///< mm
+  std::vector<Eigen::Vector2d> contact;  ///< Where the ball touches, mm.
+  double error = 0.0;                    ///< Farthest that the curve is from the polyline, mm.
 };
 
 /// A ball that rolls along a line over a smooth surface.
@@ -52,10 +65,12 @@ class SmoothRoll {
  public:
   SmoothRoll(const SmoothBed& bed, const AxisLine& line) : bed_(bed), line_(line) {}
 
-  /// The drop curve from `from` to `to`, both included, to `error` mm; nothing if the ball may rest
+  /// The drop curve from `from` to `to`, both included, to `error` mm, with nodes no more than
+  /// `apart` mm apart; nothing if the ball may rest
   /// in more than one place or on a flank steeper than kSteepest somewhere on the way, or leaves
   /// the surface. Short ways are judged more finely.
-  [[nodiscard]] std::optional<CurveNodes> follow(double from, double to, double error);
+  [[nodiscard]] std::optional<CurveNodes> follow(double from, double to, double error,
+                                                 double apart = HUGE_VAL);
 
   /// Distance of contact and axis at most, in radii.
   static constexpr double kSteepest = 0.85;
@@ -65,11 +80,13 @@ class SmoothRoll {
   struct Rest {
     Eigen::Vector2d q{0.0, 0.0};     ///< Contact.
     Eigen::Vector2d rate{0.0, 0.0};  ///< ∂q/∂u
+    double z = 0.0;                  ///< There, mm.
     double tip = 0.0;
     double doubt = 0.0;  ///< Of the tip, mm.
+
+    [[nodiscard]] Eigen::Vector3d point() const { return {q.x(), q.y(), z}; }
   };
-  [[nodiscard]] std::optional<Rest> rest_at(double u, const Eigen::Vector2d& guess,
-                                            double steepest_bend);
+  [[nodiscard]] std::optional<Rest> rest_at(double u, const Eigen::Vector2d& guess);
   [[nodiscard]] std::optional<SurfaceShape> shape_at(const Eigen::Vector2d& q);
   /// How sharply the drop curve bends at most between two rests, 1/mm; nothing if that is open.
   [[nodiscard]] std::optional<double> sharpest(double from, const Rest& first, double to,

@@ -8,7 +8,7 @@
 namespace lensforge {
 namespace {
 
-/// Side of the cells, in radii: a ball looks 2 R wide, a cell adds an eighth to that.
+/// Side of the cells, in radii.
 constexpr double kCellPerRadius = 0.25;
 
 /// Cells at most: 16 MB.
@@ -26,7 +26,7 @@ SmoothReach::SmoothReach(const SmoothBed& bed, const Executor& executor)
   columns_ = static_cast<std::int64_t>(box_.sizes().x() / cell_) + 1;
   rows_ = static_cast<std::int64_t>(box_.sizes().y() / cell_) + 1;
   free_.resize(static_cast<std::size_t>(columns_ * rows_));
-  const Eigen::Vector2d around = Eigen::Vector2d::Constant(radius + kMargin);
+  const Eigen::Vector2d around = Eigen::Vector2d::Constant(kMargin);
   const auto judge = [&](std::int64_t i) {
     const Eigen::Vector2d corner =
         box_.min() + cell_ * Eigen::Vector2d(static_cast<double>(i % columns_),
@@ -34,7 +34,8 @@ SmoothReach::SmoothReach(const SmoothBed& bed, const Executor& executor)
     const Eigen::AlignedBox2d under(
         Eigen::Vector2d(corner - around),
         Eigen::Vector2d(corner + Eigen::Vector2d::Constant(cell_) + around));
-    free_[static_cast<std::size_t>(i)] = bed.bends().over(under).largest * radius < 1.0 ? 1 : 0;
+    const double bend = bed.bounds().over(bed.footprint(under)).bend.largest;
+    free_[static_cast<std::size_t>(i)] = bend * radius < 1.0 ? 1 : 0;
   };
   parallel_for(executor, "reach of the ball", columns_ * rows_, judge);
 }

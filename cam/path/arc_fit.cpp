@@ -27,6 +27,10 @@ constexpr double kUnrounded = 1e-12;
 /// Moves that look as if they held are shortened by this part as long as they do not.
 constexpr std::size_t kShorten = 8;
 
+/// What a move that is long enough may turn off where nothing keeps the tolerances, rad: half of
+/// what the report lets pass (CutLimits).
+constexpr double kBlunt = 1e-3;
+
 /// How near to the tolerances a look at the joints alone goes: what lies between adds to it.
 constexpr double kLookShare = 0.95;
 
@@ -119,6 +123,7 @@ class RowFit {
     std::size_t limit = last;
     std::size_t stuck = 0;  // The joint from which no move held, and how often it was retried.
     int retries = 0;
+    std::size_t shared = 0;  // The last joint from which a move was too short.
     while (at < last) {
       if (options_.stop.stop_requested()) throw Interrupted();
       const std::size_t settled = error_.size();
@@ -132,6 +137,18 @@ class RowFit {
         error_.resize(steps_.back().settled);
         steps_.pop_back();
         continue;
+      }
+      if (reach && at > shared && too_short(at, reach->joint) && !steps_.empty()) {
+        const std::size_t before = steps_.back().from;
+        const std::size_t middle = middle_of(before, reach->joint);
+        if (middle > before && middle < at) {
+          shared = at;
+          limit = middle;
+          at = before;
+          error_.resize(steps_.back().settled);
+          steps_.pop_back();
+          continue;
+        }
       }
       if (!reach) reach = straightest(at, last);
       steps_.push_back({at, settled, *reach});
@@ -151,6 +168,20 @@ class RowFit {
     std::size_t settled = 0;  ///< Nodes of the error before it.
     Reach reach;
   };
+
+  [[nodiscard]] bool too_short(std::size_t from, std::size_t to) const {
+    return joints_.written[to].x() - joints_.written[from].x() < options_.shortest;
+  }
+
+  /// The joint nearest to half the way from one to another.
+  [[nodiscard]] std::size_t middle_of(std::size_t from, std::size_t to) const {
+    const double place = 0.5 * (joints_.written[from].x() + joints_.written[to].x());
+    const auto begin = joints_.written.begin() + static_cast<std::ptrdiff_t>(from);
+    const auto end = joints_.written.begin() + static_cast<std::ptrdiff_t>(to);
+    const auto after = std::lower_bound(
+        begin, end, place, [](const Eigen::Vector2d& joint, double u) { return joint.x() < u; });
+    return from + static_cast<std::size_t>(after - begin);
+  }
 
   [[nodiscard]] std::optional<RowMove> move_to(std::size_t from, std::size_t to, bool arc) const {
     if (arc) return arc_through(joints_.written, from, to, options_, kLargestArc);
@@ -185,7 +216,8 @@ class RowFit {
       const double turn = error_.turn(settled);
       error_.resize(settled);
       if (step > 1 && !close) break;
-      if (turn < least) {
+      // Many moves too short for their decimals are no straighter than one that is long enough.
+      if (turn < least || (turn < kBlunt && too_short(from, best))) {
         least = turn;
         best = from + step;
       }
@@ -210,6 +242,7 @@ class RowFit {
     if (!move) return false;
     const CurvePiece curve = move_curve(joints_.written[from], *move);
     const double slope = kLookShare * options_.slope_tolerance;
+    const auto shapes = [&](double place) { return error_.profile().shapes(place); };
     look_.clear();
     std::size_t back = 0;  // The last joint a kSlopeStretch or more behind.
     for (std::size_t j = from; j <= to; ++j) {
@@ -218,11 +251,13 @@ class RowFit {
       if (std::abs(look_.back()) > kLookShare * options_.tolerance) return false;
       const auto behind = [&](std::size_t i) { return u - joints_.written[from + i].x(); };
       while (from + back + 1 < j && behind(back + 1) >= kSlopeStretch) ++back;
-      if (behind(back) < kSlopeStretch) continue;
+      if (behind(back) < kSlopeStretch || !shapes(u - kSlopeStretch) || !shapes(u)) continue;
       if (std::abs(look_.back() - look_[back]) > slope * behind(back)) return false;
     }
     for (std::size_t i = look_.size() - 1; i-- > 0;) {
-      if (joints_.written[to].x() - joints_.written[from + i].x() > kSlopeStretch) break;
+      const double place = joints_.written[from + i].x();
+      if (joints_.written[to].x() - place > kSlopeStretch) break;
+      if (!shapes(place) || !shapes(place + kSlopeStretch)) continue;
       if (std::abs(look_.back() - look_[i]) > slope * kSlopeStretch) return false;
     }
     return true;

@@ -17,6 +17,7 @@ struct RowFitOptions {
   double slope_tolerance = 1e-3;  ///< Largest difference of slope over a kSlopeStretch.
   ProgramGrid grid;
   bool arcs = false;          ///< Whether moves may be arcs of circles.
+  double shortest = 0.0;      ///< Moves should not be shorter, mm, ≥ 0: controllers fall behind.
   std::stop_token stop = {};  ///< Ends the fit.
 };
 
@@ -39,6 +40,7 @@ struct FittedRow : RowWay {
 /// reaches about the farthest joint within the tolerances. Moves begin and end on the drop curve to
 /// the resolution, and hold the tolerances over their whole length (RowError) unless not even the
 /// way to the next joint does, because rounding turns it: the certificate says what came of it.
+/// Where a move ends up shorter than `shortest`, it shares the way of the one before.
 FittedRow fit_row(const RowProfile& profile, const RowFitOptions& options);
 
 /// How far straight moves between joints may be off.

@@ -35,14 +35,16 @@ double highest_of(const RasterRow& row, int along) {
 /// Makes the moves between rows and adds everything up.
 class FinishMoves {
  public:
-  FinishMoves(const RasterPlan& plan, const FinishRun& run, const MoveSink& sink,
-              OperationSummary& summary)
-      : plan_(plan), run_(run), sink_(sink), summary_(summary) {}
+  FinishMoves(const CutSurface& surface, const RasterPlan& plan, const FinishRun& run,
+              const MoveSink& sink, OperationSummary& summary)
+      : surface_(surface), plan_(plan), run_(run), sink_(sink), summary_(summary) {}
 
   void add(const RasterRow& row) {
     if (summary_.passes == 0) {
       move(MoveKind::kRapid, {row.start.x(), row.start.y(), run_.safe_z});
       move(MoveKind::kPlunge, row.start);
+    } else if (plan_.rest != nullptr) {
+      hop_to(row.start);
     } else if (plan_.options.style == PassStyle::kZigzag) {
       move(MoveKind::kCut, row.start);
     } else {
@@ -64,12 +66,28 @@ class FinishMoves {
   }
 
  private:
+  [[nodiscard]] double on_grid(double z) const {
+    const double zero = plan_.options.z_zero;
+    return zero + to_resolution(z - zero, plan_.options.resolution);
+  }
+
+  void hop_to(const Eigen::Vector3d& start) {
+    Eigen::AlignedBox2d axis(Eigen::Vector2d(at_.head<2>()));
+    axis.extend(Eigen::Vector2d(start.head<2>()));
+    const SmoothBed& bed = *surface_.bed();
+    const double highest = bed.bounds().over(bed.footprint(axis)).highest;
+    const double low = std::max(highest, std::max(at_.z(), start.z()));
+    const double z = on_grid(low + std::max(run_.clearance, kHop));
+    move(MoveKind::kRapid, {at_.x(), at_.y(), z});
+    move(MoveKind::kRapid, {start.x(), start.y(), z});
+    move(MoveKind::kRapid, {start.x(), start.y(), on_grid(start.z() + kHop)});
+    move(MoveKind::kPlunge, start);
+  }
+
   void go_back_to(const Eigen::Vector3d& start) {
     const int along = plan_.options.along;
-    const double zero = plan_.options.z_zero;
-    const double resolution = plan_.options.resolution;
     Eigen::Vector3d place = at_;
-    place.z() = zero + to_resolution(std::max(highest_, start.z()) + kHop - zero, resolution);
+    place.z() = on_grid(std::max(highest_, start.z()) + kHop);
     move(MoveKind::kRapid, place);
     place[along] = start[along];
     move(MoveKind::kRapid, place);
@@ -97,6 +115,7 @@ class FinishMoves {
     at_ = one.end;
   }
 
+  const CutSurface& surface_;
   const RasterPlan& plan_;
   const FinishRun& run_;
   const MoveSink& sink_;
@@ -137,7 +156,7 @@ OperationSummary cut_finish(const CutSurface& surface, const RasterPlan& plan, c
   summary.name = run.name;
   summary.tool = run.tool.number;
   summary.stepover = plan.pitch;
-  FinishMoves moves(plan, run, sink, summary);
+  FinishMoves moves(surface, plan, run, sink, summary);
   const auto add = [&](const RasterRow& row) {
     moves.add(row);
     if (run.look) run.look(row);

@@ -19,6 +19,7 @@ struct FinishRun {
   std::string name = "finish";  ///< OperationSummary::name; "cross" for a raster across.
   Tool tool;                    ///< A ball of the plan's radius.
   double safe_z = 0.0;          ///< Height of rapids, mm, lens frame, on the program's grid.
+  double clearance = 0.0;       ///< Of rapids between parts of rows above the surface, mm, ≥ 0.
   std::function<void(const RasterRow&)> look = {};  ///< Is shown every row as well, in order.
 };
 
@@ -29,7 +30,9 @@ struct FinishRun {
 /// does not touch the part. One way, the tool goes up by what the row's highest point takes and
 /// straight back over the row just cut: a ball that is raised stays within what the tool swept when
 /// it cut, so it meets neither the finished surface nor stock; then it steps over at feed and goes
-/// down at plunge feed, both outside the rim. Memory does not grow with the number of rows.
+/// down at plunge feed, both outside the rim. From one part of a row to the next (RasterPlan::rest)
+/// it goes up by the clearance above all of the surface that it passes, across, and down to where
+/// the larger ball has finished. Memory does not grow with the number of rows.
 /// @return complete is false if `control` asked for an end.
 /// @throw InputError if there is nothing under the ball somewhere on a row.
 OperationSummary cut_finish(const CutSurface& surface, const RasterPlan& plan, const FinishRun& run,

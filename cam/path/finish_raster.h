@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "cam/contact/cut_surface.h"
+#include "cam/contact/rest_map.h"
 #include "cam/path/arc_fit.h"
 #include "cam/path/move.h"
 #include "cam/path/operation.h"
@@ -18,6 +19,9 @@
 
 namespace lensforge {
 
+/// Slope up to which a surface is finished to its rim: rise over run. Lenses stay below 0.5.
+inline constexpr double kSteepestSlope = 1.0;
+
 /// What shapes a finishing raster but the surface and the ball.
 struct RasterOptions {
   double pitch = 0.06;            ///< Stepover between rows at most, mm, > 0.
@@ -27,8 +31,13 @@ struct RasterOptions {
   double z_zero = 0.0;            ///< Height that the program calls 0, mm, lens frame.
   int along = 0;                  ///< 0: rows along x; 1: along y.
   PassStyle style = PassStyle::kZigzag;
-  bool arcs = false;    ///< Arcs in the rows' planes, G18 along x and G19 along y.
-  bool traces = false;  ///< Rows also tell RasterRow::exact and unrounded.
+  bool arcs = false;      ///< Arcs in the rows' planes, G18 along x and G19 along y.
+  double shortest = 0.0;  ///< RowFitOptions::shortest, mm.
+  bool traces = false;    ///< Rows also tell RasterRow::exact and unrounded.
+  /// Slope up to which the surface is finished to its rim, rise over run, > 0.
+  double rim_slope = kSteepestSlope;
+  /// The number of rows between the borders of the surface is a multiple of this, ≥ 1.
+  int every = 1;
 };
 
 /// Stepover of rows that lie `pitch` apart along a surface that rises across them by `steepest`
@@ -39,18 +48,15 @@ double pitch_on_slope(double pitch, double steepest);
 /// of the slope tolerance and moves a point by no more than a quarter of the tolerance.
 int decimals_for(double tolerance, double slope_tolerance);
 
-/// Slope up to which a surface is finished to its rim: rise over run. Lenses stay below 0.5.
-inline constexpr double kSteepestSlope = 1.0;
-
 /// A finishing raster over a rectangle: rows along x (or y), one behind the other along y (x).
 ///
 /// The rim: a surface that falls towards its rim is touched by a ball whose centre is beyond it, so
-/// rows and the raster as a whole run on. Out to reach() = R/√2 the ball rolls over the rim as the
-/// drop curve says, which finishes the surface to the rim for slopes up to kSteepestSlope. From
-/// there the tip keeps its height, and rows turn around a full radius outside, where the ball no
-/// longer touches the part. On a blank as large as the lens all this is in air; on a larger blank
-/// it cuts a channel that is one ball wider than the lens and nowhere deeper below the rim than 0.3
-/// R.
+/// rows and the raster as a whole run on. Out to reach(), R/√2 by default, the ball rolls over the
+/// rim as the drop curve says, which finishes the surface to the rim for slopes up to rim_slope.
+/// From there the tip keeps its height, and rows turn around a full radius outside, where the ball
+/// no longer touches the part. On a blank as large as the lens all this is in air; on a larger
+/// blank it cuts a channel that is one ball wider than the lens and nowhere deeper below the rim
+/// than 0.3 R.
 struct RasterPlan {
   Eigen::AlignedBox2d surface;  ///< Rectangle to finish, mm.
   double radius = 0.0;          ///< Of the ball, mm.
@@ -58,6 +64,8 @@ struct RasterPlan {
   double pitch = 0.0;     ///< Stepover as cut: rows lie on both borders of the surface.
   std::int64_t rows = 0;  ///< Of them rows_outside beyond either border.
   std::int64_t rows_outside = 0;
+  /// If given, rows are cut only where the larger ball leaves something; must outlive the plan.
+  const RestMap* rest = nullptr;
 
   /// How far beyond the rim the tip follows the drop curve, mm.
   [[nodiscard]] double reach() const;
@@ -66,6 +74,9 @@ struct RasterPlan {
   /// The way of a row; beyond reach() the drop curve is taken at the nearest place within it, where
   /// it is no lower, since that place is nearer to all of the surface.
   [[nodiscard]] RowSpan row_span(std::int64_t row) const;
+  /// What is cut of a row, in its direction: all of it without `rest`. Spans are level for
+  /// kLevelEnd beyond the drop curve.
+  [[nodiscard]] std::vector<RowSpan> row_spans(std::int64_t row) const;
   [[nodiscard]] bool forward(std::int64_t row) const;
 };
 
@@ -90,15 +101,21 @@ struct RasterRow : RasterWay {
   }
 };
 
+/// What parts of rows run on level where they end within the surface, mm: the ball is clear of it
+/// there (BallBlend::kRunOut).
+inline constexpr double kLevelEnd = 0.01;
+
 /// What the exact way of a row is off the drop curve at most, as a share of the tolerances.
 inline constexpr double kExactRow = 0.2;
 
 /// Length of a straight move or of an arc of less than half a circle, mm.
 double row_move_length(const Eigen::Vector3d& start, const PathMove& move);
 
-/// Cuts one row (fit_row()).
+/// Cuts one row, or a part of it (fit_row()).
 /// @throw InputError if there is nothing under the ball somewhere on the row.
 RasterRow cut_row(const RowCurves& curves, const RasterPlan& plan, std::int64_t row);
+RasterRow cut_row(const RowCurves& curves, const RasterPlan& plan, std::int64_t row,
+                  const RowSpan& span);
 
 /// What a raster added up to.
 struct RasterSummary {
@@ -112,8 +129,8 @@ struct RasterSummary {
   PathCertificate certificate;
 };
 
-/// Cuts all rows, several at a time, and hands them to `sink` in order: the same rows for any
-/// number of threads. Memory does not grow with the number of rows.
+/// Cuts all rows, several at a time, and hands them, or their parts, to `sink` in order: the same
+/// for any number of threads. Memory does not grow with the number of rows.
 RasterSummary cut_raster(const CutSurface& surface, const RasterPlan& plan,
                          const Executor& executor,
                          const std::function<void(const RasterRow&)>& sink,

@@ -108,6 +108,9 @@ RowError::Turn RowError::most_turn(std::size_t first, double enough, bool goes_o
   if (nodes_.size() < 2) return most;
   const double begin = nodes_.front().u;
   const double end = nodes_.back().u;
+  const auto shapes = [&](std::size_t node, double way) {
+    return profile_.shapes(nodes_[node].u) && profile_.shapes(nodes_[node].u + way);
+  };
   const auto offer = [&](std::size_t node, double other, double slack) {
     const double turn =
         (std::abs(nodes_[node].error - other) + nodes_[node].slack + slack) / kSlopeStretch;
@@ -117,13 +120,14 @@ RowError::Turn RowError::most_turn(std::size_t first, double enough, bool goes_o
   double slack = 0.0;
   for (std::size_t i = first; i < nodes_.size() && most.slope <= enough; ++i) {
     const double u = nodes_[i].u - kSlopeStretch;
-    if (u >= begin) offer(i, error_at(u, back, slack), slack);
+    if (u >= begin && shapes(i, -kSlopeStretch)) offer(i, error_at(u, back, slack), slack);
   }
   std::size_t ahead = first;
   std::size_t i = first;
   while (i > 0 && nodes_[i - 1].u + kSlopeStretch >= nodes_[first].u) --i;
   for (; i < nodes_.size() && most.slope <= enough; ++i) {
     const double u = nodes_[i].u + kSlopeStretch;
+    if (!shapes(i, kSlopeStretch)) continue;
     if (u <= end) {
       offer(i, error_at(u, ahead, slack), slack);
     } else if (goes_on) {

@@ -33,6 +33,8 @@ class RowError {
  public:
   explicit RowError(const RowProfile& profile) : profile_(profile) {}
 
+  [[nodiscard]] const RowProfile& profile() const { return profile_; }
+
   /// Appends a move from `start`, where the last one ended.
   void add(const Eigen::Vector2d& start, const RowMove& move);
   [[nodiscard]] std::size_t size() const { return nodes_.size(); }
@@ -40,7 +42,8 @@ class RowError {
   void resize(std::size_t size) { nodes_.resize(size); }
 
   /// Whether path and drop curve differ nowhere by more than `tolerance` (mm) from node `first` on,
-  /// and in slope over no kSlopeStretch that ends there by more than `slope_tolerance`; beyond the
+  /// and in slope over no kSlopeStretch that ends there by more than `slope_tolerance`, where the
+  /// direction shapes the surface (RowProfile::shapes()); beyond the
   /// last node the difference is taken to stay as it is, which a next move about does.
   [[nodiscard]] bool holds(std::size_t first, double tolerance, double slope_tolerance) const;
 

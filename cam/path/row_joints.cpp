@@ -120,6 +120,8 @@ void level_ends(const ProgramGrid& grid, RowProfile& profile) {
   RowProfile ends;
   ends.error = profile.error;
   ends.finest = profile.finest;
+  ends.shaped_from = profile.shaped_from;
+  ends.shaped_to = profile.shaped_to;
   ends.u = {profile.u.front(), begin};
   ends.z = {z_begin, z_begin};
   ends.joints = {profile.joints.front(), begin};

@@ -30,6 +30,23 @@ constexpr double kGap = 1e-8;
 constexpr double kStretch = 0.125;
 constexpr double kMinStretch = 0.005;
 
+/// Distance of nodes of a ball that is lifted, mm, at most: at each of them the lift is known.
+constexpr double kLiftNodes = 0.02;
+
+/// A ball clears a gap rising this many times as steeply as its drop curve can.
+constexpr double kRoof = 1.1;
+
+/// Length over which that is judged, mm.
+constexpr double kRoofRun = 1.0;
+
+/// How far above what could hold it a ball passes over a gap, and how long the way there is, mm, at
+/// least.
+constexpr double kClear = 0.01;
+
+/// Distance of contact and axis at most, in radii: farther out a ball rests on slopes above 4.9
+/// only, steeper than anything that is finished (RasterOptions::rim_slope).
+constexpr double kFarthestRest = 0.98;
+
 /// Length of the stretches that facets are made for at once, mm.
 constexpr double kFacetStretch = 1.0;
 
@@ -105,9 +122,11 @@ void add_facets(const DropCutter& cutter, const AxisLine& line, double from, dou
 }
 
 /// Appends the nodes of a smooth stretch, every so many of them a joint.
-void add_nodes(const CurveNodes& nodes, double bow, RowProfile& profile) {
+void add_nodes(const CurveNodes& nodes, double bow, bool lifted, RowProfile& profile) {
   const std::size_t last = nodes.u.size() - 1;
-  const double skip = std::max(1.0, std::floor(std::sqrt(bow / std::max(nodes.error, 1e-300))));
+  // A lift may turn at every node.
+  const double skip =
+      lifted ? 1.0 : std::max(1.0, std::floor(std::sqrt(bow / std::max(nodes.error, 1e-300))));
   const double parts = std::ceil(static_cast<double>(last) / skip);
   const auto stride = static_cast<std::size_t>(std::ceil(static_cast<double>(last) / parts));
   const bool repeats = profile.u.back() == nodes.u.front() && profile.z.back() == nodes.z.front();
@@ -116,6 +135,45 @@ void add_nodes(const CurveNodes& nodes, double bow, RowProfile& profile) {
     if (i > 0 && (i % stride == 0 || i == last)) profile.joints.push_back(nodes.u[i]);
   }
   profile.error = std::max(profile.error, nodes.error);
+}
+
+/// Rise over run of the drop curve at most over a part of a row: that of the ball where it touches,
+/// which is no farther from the axis than the axis is outside the rim, and the contact from there.
+double steepest_drop(const SmoothBed& bed, const Eigen::AlignedBox2d& axis) {
+  const Eigen::AlignedBox2d& box = bed.surface().box();
+  const double outside =
+      std::max(box.exteriorDistance(axis.min()), box.exteriorDistance(axis.max()));
+  const double out = std::min((outside + bed.reach(axis)) / bed.radius(), kFarthestRest);
+  return out / std::sqrt(1.0 - out * out);
+}
+
+void extend_shaped(double place, RowProfile& profile) {
+  profile.shaped_from = std::min(profile.shaped_from, place);
+  profile.shaped_to = std::max(profile.shaped_to, place);
+}
+
+/// Takes in the places where the ball touches the surface within its rim across the row.
+void extend_shaped(const CurveNodes& nodes, const Eigen::AlignedBox2d& box, int along,
+                   RowProfile& profile) {
+  for (std::size_t i = 0; i < nodes.u.size(); ++i) {
+    const double contact = nodes.contact[i][along];
+    if (contact > box.min()[along] && contact < box.max()[along]) {
+      extend_shaped(nodes.u[i], profile);
+    }
+  }
+}
+
+/// How long a line from the end of a gap at `u` towards `far`, `rise` mm high, has to be so that
+/// the drop curve stays below it: the bound is closer over a short way, if that is long enough.
+double run_of(const SmoothBed& bed, const AxisLine& line, double u, double far, double rise) {
+  const double end = u + std::clamp(far - u, -kRoofRun, kRoofRun);
+  const auto run_to = [&](double to) {
+    Eigen::AlignedBox2d axis(line.at(u));
+    axis.extend(line.at(to));
+    return rise / (kRoof * steepest_drop(bed, axis));
+  };
+  const double run = run_to(end);
+  return run <= std::abs(end - u) ? run : run_to(far);
 }
 
 }  // namespace
@@ -174,6 +232,12 @@ void RowCurves::bridge(const RowSpan& span, double from, const CurveNodes* next,
   const std::size_t first = profile.u.size();
   const double begins = profile.z.back();
   follow_facets(span, from, to, bow, profile);
+  if (const BallLift* const lift = surface_->lift()) {
+    for (std::size_t i = first; i < profile.u.size(); ++i) {
+      const Eigen::Vector2d place = span.line.at(profile.u[i]);
+      profile.z[i] += lift->at(place, place);
+    }
+  }
   const double at_end = next != nullptr ? next->z.front() - profile.z.back() : 0.0;
   const double at_begin = first > 1 ? begins - profile.z[first] : at_end;
   const double most = surface_->deviation().height;
@@ -185,30 +249,81 @@ void RowCurves::bridge(const RowSpan& span, double from, const CurveNodes* next,
   }
 }
 
+/// Between two places where its height is known the drop curve lies below lines that rise from both
+/// more steeply than it can, and nowhere is it higher than what can hold the ball there.
+void RowCurves::clear(const RowSpan& span, double from, const CurveNodes* next, double to,
+                      RowProfile& profile) const {
+  Eigen::AlignedBox2d axis(span.line.at(from));
+  axis.extend(span.line.at(to));
+  const SmoothBed& bed = *surface_->bed();
+  const double highest = bed.bounds().over(bed.footprint(axis)).highest;
+  const double before = profile.u.size() > 1 ? profile.z.back() : highest;
+  const double after = next != nullptr ? next->z.front() : highest;
+  // Lifted ends may be above. Moves too short for the program's decimals are left out.
+  const double top = std::max({highest, before, after}) + kClear;
+  const double left = run_of(bed, span.line, from, to, top - before);
+  const double right = run_of(bed, span.line, to, from, top - after);
+  const auto add = [&](double u, double z) {
+    add_node(u, z, profile);
+    profile.joints.push_back(u);
+  };
+  if (left + right + kClear < to - from) {
+    add(from + left, top);
+    add(to - right, top);
+  } else {
+    // Both lines meet below the top.
+    const double up = (top - before) / left;
+    const double down = (top - after) / right;
+    const double run = (after - before + down * (to - from)) / (up + down);
+    add(from + run, before + up * run);
+  }
+  add(to, after);
+}
+
 /// Stretches end at fixed places. One that cannot be rolled along is halved down to kMinStretch:
 /// shorter ones are judged more finely. What is left open at last is cut from facets.
 void RowCurves::roll(const RowSpan& span, double bow, RowProfile& profile) const {
   SmoothRoll ball(*surface_->bed(), span.line);
+  const BallLift* const lift = surface_->lift();
+  const double apart = lift != nullptr ? kLiftNodes : HUGE_VAL;
   const double length = kStretch * surface_->radius();
   const double least = kMinStretch * surface_->radius();
+  const Eigen::AlignedBox2d& box = surface_->bed()->surface().box();
+  std::swap(profile.shaped_from, profile.shaped_to);  // Nothing yet.
   double open = span.held_from;  // From here to `begin` the curve is not known yet.
   double begin = span.held_from;
   while (begin < span.held_to) {
     if (stop_.stop_requested()) throw Interrupted();
     double end = std::min((std::floor(begin / length + kSameStretch) + 1.0) * length, span.held_to);
-    std::optional<CurveNodes> nodes = ball.follow(begin, end, profile.finest);
+    std::optional<CurveNodes> nodes = ball.follow(begin, end, profile.finest, apart);
     while (!nodes && end - begin > least) {
       end = 0.5 * (begin + end);
-      nodes = ball.follow(begin, end, profile.finest);
+      nodes = ball.follow(begin, end, profile.finest, apart);
     }
     if (nodes) {
-      if (open < begin) bridge(span, open, &*nodes, begin, bow, profile);
-      add_nodes(*nodes, bow, profile);
+      for (std::size_t i = 0; lift != nullptr && i < nodes->z.size(); ++i) {
+        nodes->z[i] += lift->at(span.line.at(nodes->u[i]), nodes->contact[i]);
+      }
+      if (open < begin) pass_over(span, open, &*nodes, begin, bow, profile);
+      extend_shaped(*nodes, box, span.line.along, profile);
+      add_nodes(*nodes, bow, lift != nullptr, profile);
       open = end;
     }
     begin = end;
   }
-  if (open < begin) bridge(span, open, nullptr, begin, bow, profile);
+  if (open < begin) pass_over(span, open, nullptr, begin, bow, profile);
+}
+
+void RowCurves::pass_over(const RowSpan& span, double from, const CurveNodes* next, double to,
+                          double bow, RowProfile& profile) const {
+  const Eigen::AlignedBox2d& box = surface_->bed()->surface().box();
+  const int along = span.line.along;
+  for (const double end : {from, to}) {
+    extend_shaped(std::clamp(end, box.min()[along], box.max()[along]), profile);
+  }
+  const BallLift* const lift = surface_->lift();
+  if (lift != nullptr && lift->clears()) return clear(span, from, next, to, profile);
+  bridge(span, from, next, to, bow, profile);
 }
 
 RowProfile RowCurves::profile(const RowSpan& span, double bow) const {

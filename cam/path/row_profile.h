@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <map>
@@ -38,6 +39,12 @@ struct RowProfile {
   std::vector<double> joints;
   double error = 0.0;             ///< mm
   double finest = kProfileError;  ///< What chords are meant to be off at most, mm.
+  /// Beyond these places the ball touches but the surface's rim, mm: its direction shapes nothing.
+  double shaped_from = -HUGE_VAL, shaped_to = HUGE_VAL;
+
+  [[nodiscard]] bool shapes(double place) const {
+    return place >= shaped_from && place <= shaped_to;
+  }
 
   /// Height on the polyline. `hint` is where the search begins and the segment it ended in.
   [[nodiscard]] double at(double place, std::size_t& hint) const;
@@ -47,7 +54,8 @@ struct RowProfile {
 ///
 /// On a smooth surface they follow a ball that rolls on the surface itself (SmoothRoll). Where it
 /// cannot, because the surface bends upwards about as sharply as the ball, they follow the facets
-/// of the surface, whose heights are off by CutSurface::deviation().
+/// of the surface, whose heights are off by CutSurface::deviation(). A ball that CutSurface::lift()
+/// holds above its drop curve is lifted at every node; it may stay clear of such places.
 class RowCurves {
  public:
   /// Of facets. `cutter` must outlive this.
@@ -65,8 +73,12 @@ class RowCurves {
 
  private:
   void roll(const RowSpan& span, double bow, RowProfile& profile) const;
+  void pass_over(const RowSpan& span, double from, const CurveNodes* next, double to, double bow,
+                 RowProfile& profile) const;
   void bridge(const RowSpan& span, double from, const CurveNodes* next, double to, double bow,
               RowProfile& profile) const;
+  void clear(const RowSpan& span, double from, const CurveNodes* next, double to,
+             RowProfile& profile) const;
   void follow_facets(const RowSpan& span, double from, double to, double bow,
                      RowProfile& profile) const;
   /// Of a stretch of rows along x or y, made when the first row asks for it.

@@ -70,16 +70,19 @@ Extreme StockMap::cut(const CutterProfile& profile, const Eigen::Vector3d& from,
   return deepest;
 }
 
-/// Lowers the cells that lie wholly under the cutter to its silhouette at their farthest corner.
+/// Lowers the cells that lie wholly under the cutter to its silhouette at their farthest corner. A
+/// ball's rises by more than d²/(2R): material below that is passed over without a root.
 void StockMap::stamp(const CutterProfile& profile, const Eigen::Vector3d& tip, Extreme& deepest) {
   const Window cells = cells_in(tip.head<2>(), profile.radius);
   const double half = 0.5 * cell_;
+  const double rise = profile.flat() == 0.0 ? 0.5 / profile.corner : 0.0;
+  const double lowest = tip.z() + profile.base;
   for (int row = cells.row_begin; row <= cells.row_end; ++row) {
     const double dy = std::fabs(blank_.min().y() + row * cell_ + half - tip.y());
     for (int column = cells.column_begin; column <= cells.column_end; ++column) {
       double& height = heights_[index(column, row)];
-      if (height <= tip.z() + profile.base) continue;
       const double dx = std::fabs(blank_.min().x() + column * cell_ + half - tip.x());
+      if (height <= lowest + rise * (dx * dx + dy * dy)) continue;
       const double centre = std::sqrt(dx * dx + dy * dy);
       const double depth = height - tip.z() - profile.height(centre);
       if (depth > deepest.value) deepest = {depth, tip};

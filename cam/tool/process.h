@@ -65,6 +65,10 @@ struct FinishProcess {
   PassAxis along = PassAxis::kX;
   bool cross = false;   ///< A second raster along the other axis.
   bool pencil = false;  ///< A pass along concave creases.
+  /// Tool::number of a larger ball that finishes wherever it reaches, before `tool` finishes the
+  /// rest; 0: `tool` alone.
+  int large_tool = 0;
+  int large_every = 1;  ///< Rows of `tool`, whose pitch holds, per row of the larger ball, ≥ 1.
 
   /// Passes `mm` apart, whatever scallops they leave.
   void set_pitch(double mm) {

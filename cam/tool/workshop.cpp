@@ -87,6 +87,28 @@ void check_entry(const Rules& rules, const Workshop& workshop, const char* table
              "is above half the tool's diameter, " + shortest_text(radius) + " mm");
 }
 
+/// The larger ball's scallops must not be the higher ones (BallBlend).
+void check_larger_ball(const Rules& rules, const Workshop& workshop, const FinishProcess& finish,
+                       const Tool& ball) {
+  if (finish.large_tool == 0) {
+    return rules.hold(finish.large_every == 1, "finish.large_every", finish.large_every,
+                      "there is no finish.large_tool");
+  }
+  const Tool* const large = workshop.find_tool(finish.large_tool);
+  const auto hold = [&](bool holds, const std::string& rule) {
+    rules.hold(holds, "finish.large_tool", finish.large_tool, rule);
+  };
+  hold(large != nullptr, "no tool has this number");
+  hold(large->shape == CutterShape::kBall, "the larger finishing tool has to be a ball");
+  hold(large->diameter > ball.diameter,
+       "its diameter must be above that of finish.tool, " + shortest_text(ball.diameter) + " mm");
+  hold(!finish.cross, "cannot be used with finish.cross");
+  const double most = std::floor(std::sqrt(large->diameter / ball.diameter));
+  rules.hold(finish.large_every <= most, "finish.large_every", finish.large_every,
+             "the larger ball's scallops would be higher than those of finish.tool; at most " +
+                 shortest_text(most));
+}
+
 void check_process(const Rules& rules, const Workshop& workshop) {
   const Process& process = workshop.process;
   const auto& [rough, semi, finish] = std::tie(process.rough, process.semi, process.finish);
@@ -107,6 +129,7 @@ void check_process(const Rules& rules, const Workshop& workshop) {
              "the finishing tool has to be a ball");
   rules.hold(finish.scallop < ball.radius(), "finish.scallop", finish.scallop,
              "must be below the ball's radius, " + shortest_text(ball.radius()) + " mm");
+  check_larger_ball(rules, workshop, finish, ball);
 }
 
 void check_keep_outs(const Rules& rules, const Workshop& workshop) {
@@ -155,9 +178,23 @@ Tool finish_tool() {
   return tool;
 }
 
+Tool large_finish_tool() {
+  Tool tool;
+  tool.number = 4;
+  tool.name = "6 mm ball-end mill, 2 flutes";
+  tool.diameter = 6.0;
+  tool.flute_length = 12.0;
+  tool.sections = {{6.0, 12.0, 20.0}, {19.0, 20.0, 50.0}};
+  tool.feed = 1840.0;
+  tool.plunge = 400.0;
+  return tool;
+}
+
 }  // namespace
 
-std::vector<Tool> default_tools() { return {rough_tool(), semi_tool(), finish_tool()}; }
+std::vector<Tool> default_tools() {
+  return {rough_tool(), semi_tool(), finish_tool(), large_finish_tool()};
+}
 
 Eigen::AlignedBox3d Stock::box(const Eigen::AlignedBox3d& surface) const {
   const Eigen::Vector3d beyond(margin, margin, 0.0);

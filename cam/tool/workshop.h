@@ -60,7 +60,8 @@ struct Material {
 };
 
 /// The tools of the defaults: 3 a 3 mm flat end mill to rough, 2 a 1 mm ball to semi-finish, 1 the
-/// 0.4 mm ball of the paper (Sun et al., Section 5) to finish.
+/// 0.4 mm ball of the paper (Sun et al., Section 5) to finish; 4 a 6 mm ball for FinishProcess::
+/// large_tool, whose feed takes 0.04 mm a tooth.
 std::vector<Tool> default_tools();
 
 /// Everything about a cut but the lens: machine, blank, clamps, tools and how they are used.

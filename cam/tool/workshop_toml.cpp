@@ -363,6 +363,10 @@ void describe(Visitor& v, FinishProcess& finish) {
   v.word("along", finish.along, "x or y");
   v.flag("cross", finish.cross, "a second raster along the other axis");
   v.flag("pencil", finish.pencil, "a pass along concave creases");
+  v.whole({"large_tool", 0, 9999}, finish.large_tool,
+          "number of a larger ball that finishes wherever it reaches; 0: none");
+  v.whole({"large_every", 1, 100}, finish.large_every,
+          "rows of the finishing tool per row of the larger ball");
 }
 
 /// The rest of Process: its own keys.

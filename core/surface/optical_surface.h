@@ -45,7 +45,7 @@ class OpticalSurface {
   /// The point of a triangle with these barycentric weights, none below 0.
   [[nodiscard]] virtual SurfacePoint in_triangle(std::int64_t triangle,
                                                  const Eigen::Vector3d& weights) const = 0;
-  /// The cubic around such a point.
+  /// The cubic around such a point: one over the triangle, or one over each third of it.
   [[nodiscard]] virtual SmoothPatch patch_in(std::int64_t triangle,
                                              const Eigen::Vector3d& weights) const = 0;
   /// Bounds over a triangle, its border included.

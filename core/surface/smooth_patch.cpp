@@ -2,6 +2,7 @@
 #include "core/surface/smooth_patch.h"
 
 #include <Eigen/LU>
+#include <algorithm>
 
 // Notation: s, t barycentric coordinates of corners 1 and 2; x, y from corner 0 on, mm.
 namespace lensforge {
@@ -29,7 +30,9 @@ std::array<double, 10> in_weights(const SmoothPatch::Coefficients& b) {
 
 SmoothPatch::SmoothPatch(const std::array<Eigen::Vector2d, 3>& corners,
                          const Coefficients& coefficients)
-    : origin_(corners[0]) {
+    : origin_(corners[0]),
+      lowest_(*std::min_element(coefficients.begin(), coefficients.end())),
+      highest_(*std::max_element(coefficients.begin(), coefficients.end())) {
   Eigen::Matrix2d frame;
   frame << corners[1] - corners[0], corners[2] - corners[0];
   to_weights_ = frame.inverse();

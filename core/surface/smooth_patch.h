@@ -32,11 +32,17 @@ class SmoothPatch {
   /// Of the cubic, continued beyond the triangle.
   [[nodiscard]] SurfaceShape at(const Eigen::Vector2d& xy) const;
 
+  /// Bounds of the height over the triangle, mm: a cubic stays in the hull of its coefficients.
+  [[nodiscard]] double lowest() const { return lowest_; }
+  [[nodiscard]] double highest() const { return highest_; }
+
   /// How far outside of its triangle a point counts as on it, barycentric.
   static constexpr double kOnPatch = 1e-9;
 
  private:
-  Eigen::Vector2d origin_;      ///< Corner 0.
+  Eigen::Vector2d origin_;  ///< Corner 0.
+  double lowest_;
+  double highest_;
   Eigen::Matrix2d to_weights_;  ///< From there to the barycentric coordinates of corners 1 and 2.
   /// Of 1, x, y, x², xy, y², x³, x²y, xy², y³ from the origin on.
   std::array<double, 10> power_{};

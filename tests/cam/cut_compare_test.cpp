@@ -59,6 +59,20 @@ TEST(CutCompare, RanksEveryCombinationAsTheCutItselfTells) {
   }
 }
 
+/// Both ways of finishing: the smaller ball alone, and a larger one with it.
+TEST(CutCompare, ALargerBallIsAChoice) {
+  const TempFolder folder;
+  const CutComparison result = compare_cuts(small_lens(8.0, 7.0), coarse(), parse({"large=0,4"}),
+                                            folder.path(), Executor::cpu(2), {});
+  ASSERT_EQ(result.ranking.size(), 2U);
+  const bool first = result.ranking[0].choice.ends_with("larger ball T4");
+  EXPECT_NE(first, result.ranking[1].choice.ends_with("larger ball T4"));
+  const ReportChoice& two = result.ranking[first ? 0 : 1];
+  const ReportChoice& one = result.ranking[first ? 1 : 0];
+  EXPECT_GT(two.hours, 0.0);
+  EXPECT_NE(two.hours, one.hours);
+}
+
 TEST(CutCompare, StoppedLeavesNothing) {
   const TempFolder folder;
   std::stop_source source;
@@ -99,6 +113,8 @@ TEST(CutCompare, BadChoicesAreNamedWithValueAndRule) {
   EXPECT_THAT(refusal({"pitch=0"}), HasSubstr("--compare pitch: 0 is not above 0"));
   EXPECT_THAT(refusal({"pitch=-0.1"}), HasSubstr("--compare pitch"));
   EXPECT_THAT(refusal({"pitch=0.1,0.1"}), HasSubstr("0.1 is given twice"));
+  EXPECT_THAT(refusal({"large=0,-1"}), HasSubstr("--compare large: -1 is no tool's number"));
+  EXPECT_THAT(refusal({"large=4,4"}), HasSubstr("4 is given twice"));
   EXPECT_THAT(refusal({"pitch=0.1", "pitch=0.2"}), HasSubstr("pitch is given twice"));
   EXPECT_THAT(refusal({"tool=1,2,3,4,5,6,7,8,9", "pitch=1,2,3,4,5,6,7,8"}),
               HasSubstr("72 combinations are more than 64"));

@@ -28,11 +28,12 @@ SurfaceMesh relief() {
   });
 }
 
-SmoothCutSurface cut_surface(const SurfaceMesh& mesh, double deviation = 2e-6) {
+SmoothCutSurface cut_surface(const SurfaceMesh& mesh, double deviation = 2e-6,
+                             double radius = kRadius) {
   SmoothCutOptions options;
   options.deviation = deviation;
   options.slope_deviation = 1.0;
-  return {mesh, kRadius, options, Executor::cpu(2)};
+  return {mesh, radius, options, Executor::cpu(2)};
 }
 
 double at(const CurveNodes& nodes, double u) {
@@ -42,20 +43,29 @@ double at(const CurveNodes& nodes, double u) {
   return nodes.z[i - 1] + part * (nodes.z[i] - nodes.z[i - 1]);
 }
 
-/// The highest that any of a great many points of the surface around p holds the tip.
-double brute_tip(const OpticalSurface& surface, const Eigen::Vector2d& p, double spacing) {
-  double best = kNoContact;
-  for (double dx = -kRadius; dx <= kRadius; dx += spacing) {
-    for (double dy = -kRadius; dy <= kRadius; dy += spacing) {
-      const double r2 = kRadius * kRadius - dx * dx - dy * dy;
-      const Eigen::Vector2d q =
-          (p + Eigen::Vector2d(dx, dy)).cwiseMax(surface.box().min()).cwiseMin(surface.box().max());
-      if (r2 < 0.0 || (q - p).norm() > kRadius) continue;
-      const double s = std::sqrt(kRadius * kRadius - (q - p).squaredNorm());
-      best = std::max(best, surface.at(q)->z + s - kRadius);
+/// Where and how high the highest of a great many points of the surface around p holds the tip.
+struct BruteContact {
+  Eigen::Vector2d q{0.0, 0.0};
+  double tip = kNoContact;
+};
+
+BruteContact brute_contact(const OpticalSurface& surface, const Eigen::Vector2d& p, double spacing,
+                           double radius = kRadius) {
+  BruteContact best;
+  for (double dx = -radius; dx <= radius; dx += spacing) {
+    for (double dy = -radius; dy <= radius; dy += spacing) {
+      const Eigen::Vector2d q = nearest_inside(surface.box(), p + Eigen::Vector2d(dx, dy));
+      if (std::hypot(dx, dy) > radius || (q - p).norm() > radius) continue;
+      const double s = std::sqrt(radius * radius - (q - p).squaredNorm());
+      const double tip = surface.at(q)->z + s - radius;
+      if (tip > best.tip) best = {q, tip};
     }
   }
   return best;
+}
+
+double brute_tip(const OpticalSurface& surface, const Eigen::Vector2d& p, double spacing) {
+  return brute_contact(surface, p, spacing).tip;
 }
 
 TEST(SmoothPatch, EqualsTheSurfaceAndItsDifferences) {
@@ -114,6 +124,43 @@ TEST(SmoothRoll, EqualsBruteForceOverTheSmoothSurface) {
       EXPECT_GE(at(*nodes, u), brute - nodes->error);
       EXPECT_LE(at(*nodes, u), brute + nodes->error + 2e-6);
     }
+  }
+}
+
+/// The larger the ball, the more of the surface lies below it, and the less of that it can touch.
+TEST(SmoothBed, FootprintHoldsEveryContact) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> beyond(-0.4, kSide + 0.4);
+  for (const double radius : {0.2, 1.0, 2.5}) {
+    const SmoothCutSurface surface = cut_surface(relief(), 1e-4, radius);
+    for (int i = 0; i < 40; ++i) {
+      const Eigen::Vector2d p(beyond(random), beyond(random));
+      const double out = (p - nearest_inside(surface.surface().box(), p)).norm();
+      if (out > 0.5 * radius) continue;
+      const BruteContact contact = brute_contact(surface.surface(), p, radius / 60.0, radius);
+      const Eigen::AlignedBox2d foot = surface.bed()->footprint(Eigen::AlignedBox2d(p));
+      EXPECT_LT(foot.exteriorDistance(contact.q), radius / 60.0) << radius << " at " << p;
+      EXPECT_GE(surface.bed()->bounds().over(foot).highest, contact.tip);
+    }
+  }
+}
+
+/// A valley that a large ball cannot reach does not keep it from rolling a radius away.
+TEST(SmoothRoll, LargeBallRollsBesideAValley) {
+  constexpr double kLarge = 1.5;
+  const SurfaceMesh mesh = testing::grid_mesh(61, 61, kSide, kSide, [](double x, double y) {
+    return 6.0 + 0.05 * std::abs(x - 1.5) + 0.01 * std::sin(1.3 * y);
+  });
+  const SmoothCutSurface surface = cut_surface(mesh, 1e-5, kLarge);
+  SmoothRoll ball(*surface.bed(), {0, 1.1});
+  EXPECT_FALSE(ball.follow(1.49, 1.51, 1e-7));
+  for (const double from : {0.6, 1.0, 1.95, 2.4}) {
+    const auto nodes = ball.follow(from, from + 0.004, 1e-7);
+    ASSERT_TRUE(nodes) << from;
+    const double u = from + 0.0013;
+    const double brute = brute_contact(surface.surface(), {u, 1.1}, 0.004, kLarge).tip;
+    EXPECT_GE(at(*nodes, u), brute - nodes->error);
+    EXPECT_LE(at(*nodes, u), brute + nodes->error + 1e-5);
   }
 }
 

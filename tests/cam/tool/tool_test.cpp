@@ -143,8 +143,8 @@ TEST(Workshop, WrittenTomlReadsBackEqual) {
   shop.process.semi.along = PassAxis::kY;
   shop.process.semi.entry = EntryStyle::kHelix;
   shop.process.semi.helix_radius = 0.45;
-  shop.process.finish = {1,    0.04, 0.001, 2e-4, 5e-4, PassStyle::kConventional, PassAxis::kY,
-                         true, true};
+  shop.process.finish = {1,     0.04, 0.001, 2e-4, 5e-4, PassStyle::kConventional, PassAxis::kY,
+                         false, true, 4,     2};
   EXPECT_EQ(parse_workshop(workshop_toml(shop), "other"), shop);
 }
 
@@ -185,6 +185,21 @@ TEST(Workshop, RefusalsNameFileKeyValueAndRule) {
             "shop.toml: semi.allowance: 0.3: must not be above that of roughing, 0.2 mm");
   EXPECT_EQ(refusal("[finish]\ntool = 3\n"),
             "shop.toml: finish.tool: 3: the finishing tool has to be a ball");
+  EXPECT_EQ(refusal("[finish]\nlarge_tool = 9\n"),
+            "shop.toml: finish.large_tool: 9: no tool has this number");
+  EXPECT_EQ(refusal("[finish]\nlarge_tool = 3\n"),
+            "shop.toml: finish.large_tool: 3: the larger finishing tool has to be a ball");
+  EXPECT_EQ(
+      refusal("[finish]\nlarge_tool = 1\n"),
+      "shop.toml: finish.large_tool: 1: its diameter must be above that of finish.tool, 0.4 mm");
+  EXPECT_EQ(refusal("[finish]\nlarge_tool = 4\ncross = true\n"),
+            "shop.toml: finish.large_tool: 4: cannot be used with finish.cross");
+  EXPECT_EQ(
+      refusal("[finish]\nlarge_tool = 4\nlarge_every = 4\n"),
+      "shop.toml: finish.large_every: 4: the larger ball's scallops would be higher than those "
+      "of finish.tool; at most 3");
+  EXPECT_EQ(refusal("[finish]\nlarge_every = 2\n"),
+            "shop.toml: finish.large_every: 2: there is no finish.large_tool");
   EXPECT_EQ(refusal("[machine]\nspindle_max_rpm = 20000\n"),
             "shop.toml: tool[0].spindle_rpm: 23000: the machine's spindle turns at 3000 to 20000");
   EXPECT_EQ(refusal("[stock]\nmargin = \"wide\"\n"),
