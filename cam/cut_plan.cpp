@@ -198,7 +198,13 @@ FinishPaths CutPlan::take_finish_paths(const ProgramFiles& programs, const RunCo
     paths.ideal.push_back(pencil);
     paths.fitted.push_back(std::move(pencil));
   }
+  const AxisStretch stretch = AxisStretch::of(finish());
   BallPath written(ball().radius(), z_offset_);
+  BallPath stretched(ball().radius(), z_offset_);
+  const auto take = [&](const GcodeMotion& motion) {
+    written.add(motion);
+    if (stretch.any()) add_stretched(motion, stretch, stretched);
+  };
   for (const ProgramFile& file : programs.files) {
     const bool finishes =
         std::any_of(file.operations.begin(), file.operations.end(), [&](const OperationTime& time) {
@@ -206,10 +212,11 @@ FinishPaths CutPlan::take_finish_paths(const ProgramFiles& programs, const RunCo
         });
     if (finishes) {
       read_path(file.beside.empty() ? file.path : file.beside, options_.post.reader, ball().number,
-                written, control);
+                take, control);
     }
   }
   paths.written.push_back(std::move(written));
+  if (stretch.any()) paths.stretched.push_back(std::move(stretched));
   return paths;
 }
 

@@ -75,13 +75,19 @@ std::vector<Tool> tools_of(const CutPlan& plan, const ProgramFiles& programs) {
 
 ParameterGroup finish_parameters(const CutPlan& plan, SurfaceModel model) {
   const FinishProcess& finish = plan.options().workshop.process.finish;
-  return {"Finishing",
-          {{"Stepover", mm(plan.pitch(), 4)},
-           {"Rows along", finish.along == PassAxis::kX ? "X" : "Y"},
-           {"Tolerance", mm(finish.tolerance, 5)},
-           {"Slope tolerance", decimal_text(1e3 * finish.slope_tolerance, 2) + " mrad"},
-           {"Decimals", std::to_string(plan.decimals())},
-           {"Surface", words_for(model)}}};
+  ParameterGroup group{
+      "Finishing",
+      {{"Stepover", mm(plan.pitch(), 4)},
+       {"Rows along", finish.along == PassAxis::kX ? "X" : "Y"},
+       {"Tolerance", mm(finish.tolerance, 5)},
+       {"Slope tolerance", decimal_text(1e3 * finish.slope_tolerance, 2) + " mrad"},
+       {"Decimals", std::to_string(plan.decimals())},
+       {"Surface", words_for(model)}}};
+  if (finish.pitch_error != 0.0) {
+    group.parameters.push_back(
+        {"Pitch error, as assumed", decimal_text(100.0 * finish.pitch_error, 3) + " %"});
+  }
+  return group;
 }
 
 template <class Level>

@@ -45,22 +45,47 @@ void add_row(const RasterRow& row, FinishPaths& paths) {
   add_way(row.unrounded, paths.fitted.back());
 }
 
-MoveSink path_sink(BallPath& path) {
-  return [&path,
+AxisStretch AxisStretch::of(const FinishProcess& finish) {
+  return {finish.along == PassAxis::kX ? 1 : 0, 1.0 + finish.pitch_error};
+}
+
+void add_stretched(const GcodeMotion& motion, const AxisStretch& stretch, BallPath& path) {
+  const auto made = [&](Eigen::Vector3d point) {
+    point[stretch.axis] *= stretch.factor;
+    return point;
+  };
+  if (!stretch.any()) return path.add(motion);
+  if (motion.arc && motion.arc->third != stretch.axis) {
+    const int chords = chords_of(*motion.arc, BallPath::kHelixError);
+    for (int k = 0; k < chords; ++k) {
+      path.add(straight(made(motion.arc->at(k / double(chords))),
+                        made(motion.arc->at((k + 1) / double(chords)))));
+    }
+    return;
+  }
+  GcodeMotion whole = motion;
+  whole.start = made(motion.start);
+  whole.end = made(motion.end);
+  if (whole.arc) whole.arc->centre = made(whole.arc->centre);
+  path.add(whole);
+}
+
+MoveSink path_sink(BallPath& path, const AxisStretch& stretch) {
+  return [&path, stretch,
           at = Eigen::Vector3d(Eigen::Vector3d::Zero())](std::span<const PathMove> moves) mutable {
     for (const PathMove& move : moves) {
-      if (move.kind != MoveKind::kRapid) path.add(motion_of(at, move));
+      if (move.kind != MoveKind::kRapid) add_stretched(motion_of(at, move), stretch, path);
       at = move.end;
     }
   };
 }
 
 void read_path(const std::filesystem::path& program, const GcodeDialect& dialect, int tool,
-               BallPath& path, const RunControl& control) {
-  const auto take = [&](const GcodeMotion& motion, int used) {
-    if (!motion.rapid && (used == tool || used == 0)) path.add(motion);
+               const std::function<void(const GcodeMotion&)>& take, const RunControl& control) {
+  const auto pass_on = [&](const GcodeMotion& motion, int used) {
+    if (!motion.rapid && (used == tool || used == 0)) take(motion);
   };
-  read_program(program, dialect, take, control);
+  read_program(program, dialect, pass_on, control);
 }
 
 }  // namespace lensforge

@@ -53,6 +53,13 @@ Eigen::AlignedBox2d in_mould(const Eigen::AlignedBox2d& lens,
           Eigen::Vector2d(s * (mould->width - lens.min().x()), s * lens.max().y())};
 }
 
+/// What a program has to say for a rectangle to be cut.
+Eigen::AlignedBox2d as_written(Eigen::AlignedBox2d box, const AxisStretch& stretch) {
+  box.min()[stretch.axis] /= stretch.factor;
+  box.max()[stretch.axis] /= stretch.factor;
+  return box;
+}
+
 Eigen::AlignedBox2d grown_within(const Eigen::AlignedBox2d& box, double beyond,
                                  const Eigen::AlignedBox2d& limits) {
   const Eigen::Vector2d all = Eigen::Vector2d::Constant(beyond);
@@ -146,7 +153,7 @@ TrialCut::Work TrialCut::work(const RunControl& control) const {
 
 BallPath TrialCut::path_around(const Eigen::AlignedBox2d& box, const RunControl& control) const {
   BallPath path(surface_->radius(), 0.0);
-  const MoveSink sink = path_sink(path);
+  const MoveSink sink = path_sink(path, AxisStretch::of(options_.workshop.process.finish));
   for (const RasterPlan& whole : finish_rasters(options_, site_.plan.ground())) {
     const auto add = [&](const RasterRow& row) {
       const PathMove start{MoveKind::kRapid, row.start};
@@ -156,11 +163,11 @@ BallPath TrialCut::path_around(const Eigen::AlignedBox2d& box, const RunControl&
     const RasterPlan plan = raster_around(whole, box);
     if (!cut_raster(*surface_, plan, executor_, add, control).complete) throw Interrupted();
   }
-  if (options_.workshop.process.finish.pencil) add_pencil(box, path, control);
+  if (options_.workshop.process.finish.pencil) add_pencil(box, sink, control);
   return path;
 }
 
-void TrialCut::add_pencil(const Eigen::AlignedBox2d& box, BallPath& path,
+void TrialCut::add_pencil(const Eigen::AlignedBox2d& box, const MoveSink& sink,
                           const RunControl& control) const {
   const PencilOptions pencil =
       pencil_options(options_, site_.plan.z_offset(), site_.plan.part_box().max().z());
@@ -170,7 +177,7 @@ void TrialCut::add_pencil(const Eigen::AlignedBox2d& box, BallPath& path,
   }
   if (inside.empty()) return;
   const FinishRun run{"pencil", finishing_ball(options_), site_.plan.blank().max().z()};
-  if (!cut_pencil(*surface_, inside, pencil, run, path_sink(path), control).complete) {
+  if (!cut_pencil(*surface_, inside, pencil, run, sink, control).complete) {
     throw Interrupted();
   }
 }
@@ -186,8 +193,10 @@ LeakTrial TrialCut::at(const LeakPlace& place, const RunControl& control) const 
   const double polished = PolishedField::kReach * options_.workshop.polish.sigma +
                           (1.0 + kCreaseHalo) * grid.spacing.maxCoeff();
   const double beyond = (mould ? mould->scale : 1.0) * polished + 2.0 * surface_->radius();
+  const AxisStretch stretch = AxisStretch::of(options_.workshop.process.finish);
   const Eigen::AlignedBox2d box =
-      grown_within(in_mould(box_of(grid, place.cells), mould), beyond, site_.plan.rectangle());
+      grown_within(as_written(in_mould(box_of(grid, place.cells), mould), stretch), beyond,
+                   site_.plan.rectangle());
   const MilledField milled({path_around(box, silent)}, site_.plan.blank().max().z());
   std::optional<CastField> cast;
   if (mould) cast.emplace(milled, *mould);
