@@ -20,7 +20,7 @@ struct FittedValue {
 
 /// One reading and the fit.
 struct FittedReading {
-  std::string key;         ///< "groove[2].width_mm"
+  std::string key;         ///< "groove[2].width_mm (G3)"
   double value = 0.0;      ///< In the unit of its key.
   double fitted = 0.0;     ///< What the fit makes of it, likewise.
   double deviation = 0.0;  ///< value − fitted, in standard uncertainties of the reading.

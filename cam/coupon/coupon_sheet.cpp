@@ -22,16 +22,12 @@ const std::array<TableColumn, 6> kColumns{{{"where"},
                                            {"programmed", true},
                                            {"what, and with what"},
                                            {"expected", true},
-                                           {"key in measured.toml"},
+                                           {"key under its name"},
                                            {"read off"}}};
 
 std::string mm(double value) { return trimmed_decimal(value, 4) + " mm"; }
 std::string um(double value) { return number_text(kMicrometres * value, 3) + " µm"; }
 std::string code(const std::string& text) { return element("code", "", escape_html(text)); }
-std::string entry(const char* name, std::size_t i, const char* key) {
-  return code(std::string(name) + " " + std::to_string(i + 1) + ": " + key);
-}
-
 std::string before_table(const CouponSheet& sheet) {
   const CouponReadings& expected = sheet.expected;
   Rows rows;
@@ -39,19 +35,19 @@ std::string before_table(const CouponSheet& sheet) {
     rows.push_back({"A to B", mm(mark.programmed),
                     "distance, centre to centre: calliper's points in the marks, or a measuring "
                     "microscope",
-                    mm(mark.distance->value), code("mark: distance_mm"), ""});
+                    mm(mark.distance->value), code("distance_mm"), ""});
   }
   for (std::size_t i = 0; i < expected.grooves.size(); ++i) {
     const GrooveReadings& groove = expected.grooves[i];
     rows.push_back({feature_name('G', i), mm(groove.depth) + " deep",
                     "width at the top: microscope with a scale", mm(groove.width->value),
-                    entry("groove", i, "width_mm"), ""});
+                    code("width_mm"), ""});
   }
   for (std::size_t i = 0; i < expected.pads.size(); ++i) {
     const PadReadings& pad = expected.pads[i];
     rows.push_back({feature_name('P', i), "pitch " + mm(pad.pitch),
                     "height of the scallops: Rz of a roughness tester across the passes",
-                    um(pad.before->value), entry("pad", i, "before_um"), ""});
+                    um(pad.before->value), code("before_um"), ""});
   }
   return html_table(kColumns, rows);
 }
@@ -63,12 +59,12 @@ std::string after_table(const CouponSheet& sheet) {
     const std::string name = feature_name('P', i);
     rows.push_back({name, "pitch " + mm(pad.pitch),
                     "height of the ripples: the same roughness tester, or an interferometer",
-                    um(pad.after->value), entry("pad", i, "after_um"), ""});
+                    um(pad.after->value), code("after_um"), ""});
     if (!pad.orders) continue;
     rows.push_back(
         {name, "pitch " + mm(pad.pitch),
          "light of a first spot over that of the middle one: laser pointer and light meter",
-         number_text(pad.orders->value, 2), entry("pad", i, "order_ratio"), ""});
+         number_text(pad.orders->value, 2), code("order_ratio"), ""});
   }
   return html_table(kColumns, rows);
 }
@@ -97,7 +93,8 @@ std::string hints(const CouponSheet& sheet) {
                  escape_html(
                      "Roughness tester: across the passes, in the middle of the pad, cut-off 0.8 "
                      "mm, or 0.25 mm on 1.25 mm of the pad. Rz is the height that is asked for: "
-                     "the ripples are all alike.")) +
+                     "the ripples are all alike. Leave out ripples that the tester hardly tells "
+                     "from a polished face.")) +
          element(
              "p", "",
              escape_html(
@@ -136,7 +133,8 @@ std::string coupon_sheet(const CouponSheet& sheet) {
   const std::string blank =
       mm(size.x()) + " x " + mm(size.y()) + ", " + mm(sheet.thickness) + " thick";
   const std::string along = std::string("Passes run along ") + (layout.along == 0 ? "X" : "Y") +
-                            "; the numbers in the pads are their pitches.";
+                            "; the numbers in the pads are their pitches. Pads are " +
+                            mm(layout.pad_depth) + " deep.";
   const std::array<std::pair<std::string_view, std::string>, 14> values{{
       {"PROGRAM", program_mark()},
       {"STYLE", std::string(coupon_page::kStyle)},

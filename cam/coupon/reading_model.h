@@ -12,7 +12,7 @@ namespace lensforge {
 
 /// One reading with what a coupon's state makes of it.
 struct ModelledReading {
-  std::string key;    ///< "groove[2].width_mm"
+  std::string key;    ///< "groove[2].width_mm (G3)"
   double unit = 1.0;  ///< Of the key: 1e-3 mm for a height in µm.
   Reading reading;    ///< mm, or a share.
   std::function<double(const CouponState&)> predicted;
