@@ -63,11 +63,11 @@ struct FinishProcess {
   double slope_tolerance = 1.5e-4;
   PassStyle style = PassStyle::kZigzag;
   PassAxis along = PassAxis::kX;
+  bool cross = false;   ///< A second raster along the other axis.
+  bool pencil = false;  ///< A pass along concave creases.
   /// By how much the machine goes too far across the passes, share of a length, −0.02 … 0.02. The
   /// programs are as without it; the part that cam predicts is longer by it.
   double pitch_error = 0.0;
-  bool cross = false;   ///< A second raster along the other axis.
-  bool pencil = false;  ///< A pass along concave creases.
 
   /// Passes `mm` apart, whatever scallops they leave.
   void set_pitch(double mm) {
