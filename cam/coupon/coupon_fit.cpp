@@ -123,6 +123,18 @@ FittedValue value_of(const char* key, double value, double own, Parameter parame
   return {key, value, unit * quality.uncertainties[at - problem.free.begin()], true};
 }
 
+/// What a ball that is held adds to the uncertainty of ln σ: that it may be off by kRadiusShare.
+double share_of_ball(const LeastSquares& problem, const Eigen::VectorXd& best) {
+  constexpr double kChange = 0.01;
+  const auto is_free = [&](int parameter) {
+    return std::find(problem.free.begin(), problem.free.end(), parameter) != problem.free.end();
+  };
+  if (is_free(kRadius) || !is_free(kSigma)) return 0.0;
+  Eigen::VectorXd other = best;
+  other[kRadius] += kChange;
+  return kRadiusShare / kChange * (minimize(problem, other)[kSigma] - best[kSigma]);
+}
+
 /// @throw InputError naming the reading that is farthest from what the others say, if it is farther
 ///        than kMostDeviation; and any that is as far.
 void require_agreement(const std::vector<ModelledReading>& readings, const FitQuality& quality,
@@ -199,6 +211,12 @@ CouponFit fit_coupon(const CouponReadings& readings, const Workshop& workshop,
     quality = fit_quality(problem, best);
   }
   require_agreement(modelled, quality, file);
+  const double ball = share_of_ball(problem, best);
+  const auto sigma = std::find(problem.free.begin(), problem.free.end(), kSigma);
+  if (sigma != problem.free.end()) {
+    double& known = quality.uncertainties[sigma - problem.free.begin()];
+    known = std::hypot(known, ball);
+  }
   return result_of(modelled, own, problem, best, quality);
 }
 

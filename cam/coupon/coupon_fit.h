@@ -50,7 +50,8 @@ inline constexpr double kMostDeviation = 4.0;
 /// Weighted least squares over ln σ, ln R, pitch error and touch-off, by Levenberg-Marquardt steps
 /// from several σ, since an order's light does not rise with its ripple throughout. Uncertainties
 /// are those of the readings, carried through the linearised model. Values that the readings do not
-/// determine (the limits above; the radius is given up before σ) are held at the workshop's.
+/// determine (the limits above; the radius is given up before σ) are held at the workshop's; a ball
+/// that is held may be off by kRadiusShare, which σ's uncertainty takes in.
 /// @param file  of the readings, for messages.
 /// @throw InputError naming the file and a reading: no readings at all; a value that no coupon of
 ///        such a workshop has (another unit); readings that contradict one another.
