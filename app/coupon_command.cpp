@@ -7,6 +7,7 @@
 #include "app/coupon_settings.h"
 #include "app/exit_code.h"
 #include "app/interrupt.h"
+#include "app/interruptible_job.h"
 #include "app/json_output.h"
 #include "app/option_set.h"
 #include "app/output_folder.h"
@@ -51,8 +52,9 @@ std::string reading_text(const FittedReading& reading) {
 
 int fit(const OptionSet& options, const CouponSettings& settings) {
   const Console console(options.common().json, options.common().quiet);
-  const CouponFit result =
-      fit_workshop({settings.fit, settings.coupon.workshop, settings.out, settings.coupon.force});
+  InterruptibleJob job(options.common(), settings.out);
+  const CouponFit result = fit_workshop({settings.fit, settings.coupon.workshop, settings.out,
+                                         settings.coupon.force, [&] { job.begin_writing(); }});
   nlohmann::json json = {{"command", "coupon"},
                          {"status", "done"},
                          {"options", options.used()},

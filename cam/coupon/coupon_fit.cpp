@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
+#include <optional>
 
 #include "cam/coupon/least_squares.h"
 #include "cam/coupon/reading_model.h"
@@ -104,35 +106,45 @@ std::vector<int> touched(const CouponReadings& readings) {
   return free;
 }
 
+/// A problem with its minimum.
+struct Solution {
+  LeastSquares problem;
+  Eigen::VectorXd best;
+  FitQuality quality;
+
+  /// Place of a parameter among those that are free; none where it is held.
+  [[nodiscard]] std::optional<Eigen::Index> place(int parameter) const {
+    const auto at = std::find(problem.free.begin(), problem.free.end(), parameter);
+    if (at == problem.free.end()) return std::nullopt;
+    return at - problem.free.begin();
+  }
+  void solve(const CouponState& own) {
+    best = best_fit(problem, parameters_of(own));
+    quality = fit_quality(problem, best);
+  }
+};
+
 /// Which parameter has to be held, −1 for none. The radius first: it has a maker, who states it.
-int unknown_among(const LeastSquares& problem, const FitQuality& quality) {
+int unknown_among(const Solution& solution) {
   const std::array limits{std::pair(kRadius, kRadiusShare), std::pair(kSigma, kSigmaShare),
                           std::pair(kPitchError, kPitchErrorMost)};
   for (const auto& [parameter, most] : limits) {
-    const auto at = std::find(problem.free.begin(), problem.free.end(), parameter);
-    if (at == problem.free.end()) continue;
-    if (!(quality.uncertainties[at - problem.free.begin()] <= most)) return parameter;
+    const auto place = solution.place(parameter);
+    if (place && !(solution.quality.uncertainties[*place] <= most)) return parameter;
   }
   return -1;
 }
 
-FittedValue value_of(const char* key, double value, double own, Parameter parameter,
-                     const LeastSquares& problem, const FitQuality& quality, double unit) {
-  const auto at = std::find(problem.free.begin(), problem.free.end(), parameter);
-  if (at == problem.free.end()) return {key, own, 0.0, false};
-  return {key, value, unit * quality.uncertainties[at - problem.free.begin()], true};
-}
-
-/// What a ball that is held adds to the uncertainty of ln σ: that it may be off by kRadiusShare.
-double share_of_ball(const LeastSquares& problem, const Eigen::VectorXd& best) {
+/// A ball that is held may be off by kRadiusShare, which goes into the uncertainty of ln σ.
+void take_in_ball(Solution& solution) {
   constexpr double kChange = 0.01;
-  const auto is_free = [&](int parameter) {
-    return std::find(problem.free.begin(), problem.free.end(), parameter) != problem.free.end();
-  };
-  if (is_free(kRadius) || !is_free(kSigma)) return 0.0;
-  Eigen::VectorXd other = best;
+  const auto sigma = solution.place(kSigma);
+  if (solution.place(kRadius) || !sigma) return;
+  Eigen::VectorXd other = solution.best;
   other[kRadius] += kChange;
-  return kRadiusShare / kChange * (minimize(problem, other)[kSigma] - best[kSigma]);
+  const double change = minimize(solution.problem, other)[kSigma] - solution.best[kSigma];
+  double& known = solution.quality.uncertainties[*sigma];
+  known = std::hypot(known, kRadiusShare / kChange * change);
 }
 
 /// @throw InputError naming the reading that is farthest from what the others say, if it is farther
@@ -142,7 +154,7 @@ void require_agreement(const std::vector<ModelledReading>& readings, const FitQu
   constexpr double kAsFar = 0.95;
   const Eigen::VectorXd far = quality.deletion.cwiseAbs();
   Eigen::Index worst = 0;
-  if (far.size() == 0 || far.maxCoeff(&worst) <= kMostDeviation) return;
+  if (far.maxCoeff(&worst) <= kMostDeviation) return;
   const ModelledReading& one = readings[static_cast<std::size_t>(worst)];
   std::string others;
   for (Eigen::Index i = 0; i < far.size(); ++i) {
@@ -155,27 +167,34 @@ void require_agreement(const std::vector<ModelledReading>& readings, const FitQu
       (others.empty() ? "" : ", as far as " + others) + ": measure it again or take it out");
 }
 
+/// @param unit  of the value for one of the parameter's.
+FittedValue value_of(const Solution& solution, Parameter parameter, double unit,
+                     FittedValue workshops, double fitted) {
+  const auto place = solution.place(parameter);
+  if (!place) return workshops;
+  return {workshops.key, fitted, unit * solution.quality.uncertainties[*place], true};
+}
+
 CouponFit result_of(const std::vector<ModelledReading>& readings, const CouponState& own,
-                    const LeastSquares& problem, const Eigen::VectorXd& best,
-                    const FitQuality& quality) {
+                    const Solution& solution) {
   CouponFit fit;
-  const CouponState state = state_of(best);
-  fit.sigma =
-      value_of("polish.sigma", state.sigma, own.sigma, kSigma, problem, quality, state.sigma);
-  fit.diameter = value_of("tool.diameter", 2.0 * state.radius, 2.0 * own.radius, kRadius, problem,
-                          quality, 2.0 * state.radius);
-  fit.pitch_error = value_of("finish.pitch_error", state.pitch_error, own.pitch_error, kPitchError,
-                             problem, quality, 1.0);
+  const CouponState state = state_of(solution.best);
+  const double diameter = 2.0 * state.radius;
+  fit.sigma = value_of(solution, kSigma, state.sigma, {"polish.sigma", own.sigma}, state.sigma);
+  fit.diameter =
+      value_of(solution, kRadius, diameter, {"tool.diameter", 2.0 * own.radius}, diameter);
+  fit.pitch_error = value_of(solution, kPitchError, 1.0, {"finish.pitch_error", own.pitch_error},
+                             state.pitch_error);
   fit.state = {fit.sigma.value, 0.5 * fit.diameter.value, fit.pitch_error.value,
                state.groove_offset};
-  const Eigen::VectorXd residuals = problem.residuals(best);
+  const Eigen::VectorXd residuals = solution.problem.residuals(solution.best);
   for (std::size_t i = 0; i < readings.size(); ++i) {
     const ModelledReading& one = readings[i];
     fit.readings.push_back({one.key, one.reading.value / one.unit, one.predicted(state) / one.unit,
                             -residuals[static_cast<Eigen::Index>(i)]});
   }
   fit.chi_square = residuals.squaredNorm();
-  fit.freedom = static_cast<int>(readings.size()) - static_cast<int>(problem.free.size());
+  fit.freedom = static_cast<int>(readings.size()) - static_cast<int>(solution.problem.free.size());
   return fit;
 }
 
@@ -200,24 +219,16 @@ CouponFit fit_coupon(const CouponReadings& readings, const Workshop& workshop,
   }
   const CouponState own = CouponState::of(workshop);
   require_plausible(modelled, own, file);
-  LeastSquares problem = problem_of(modelled);
-  problem.free = touched(readings);
-  Eigen::VectorXd best = best_fit(problem, parameters_of(own));
-  FitQuality quality = fit_quality(problem, best);
-  for (int held = unknown_among(problem, quality); held >= 0;
-       held = unknown_among(problem, quality)) {
-    std::erase(problem.free, held);
-    best = best_fit(problem, parameters_of(own));
-    quality = fit_quality(problem, best);
+  Solution solution{problem_of(modelled), {}, {}};
+  solution.problem.free = touched(readings);
+  solution.solve(own);
+  for (int held = unknown_among(solution); held >= 0; held = unknown_among(solution)) {
+    std::erase(solution.problem.free, held);
+    solution.solve(own);
   }
-  require_agreement(modelled, quality, file);
-  const double ball = share_of_ball(problem, best);
-  const auto sigma = std::find(problem.free.begin(), problem.free.end(), kSigma);
-  if (sigma != problem.free.end()) {
-    double& known = quality.uncertainties[sigma - problem.free.begin()];
-    known = std::hypot(known, ball);
-  }
-  return result_of(modelled, own, problem, best, quality);
+  require_agreement(modelled, solution.quality, file);
+  take_in_ball(solution);
+  return result_of(modelled, own, solution);
 }
 
 CouponFit expected_fit(const CouponReadings& expected, const Workshop& workshop) {

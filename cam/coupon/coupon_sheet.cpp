@@ -16,6 +16,9 @@ namespace {
 
 constexpr double kMicrometres = 1e3;
 
+constexpr const char* kHowMarks =
+    "distance, centre to centre: calliper's points in the marks, or a measuring microscope";
+
 using Rows = std::vector<std::vector<std::string>>;
 
 const std::array<TableColumn, 6> kColumns{{{"where"},
@@ -28,14 +31,13 @@ const std::array<TableColumn, 6> kColumns{{{"where"},
 std::string mm(double value) { return trimmed_decimal(value, 4) + " mm"; }
 std::string um(double value) { return number_text(kMicrometres * value, 3) + " µm"; }
 std::string code(const std::string& text) { return element("code", "", escape_html(text)); }
+
 std::string before_table(const CouponSheet& sheet) {
   const CouponReadings& expected = sheet.expected;
   Rows rows;
   for (const MarkReadings& mark : expected.marks) {
-    rows.push_back({"A to B", mm(mark.programmed),
-                    "distance, centre to centre: calliper's points in the marks, or a measuring "
-                    "microscope",
-                    mm(mark.distance->value), code("distance_mm"), ""});
+    rows.push_back({"A to B", mm(mark.programmed), kHowMarks, mm(mark.distance->value),
+                    code("distance_mm"), ""});
   }
   for (std::size_t i = 0; i < expected.grooves.size(); ++i) {
     const GrooveReadings& groove = expected.grooves[i];

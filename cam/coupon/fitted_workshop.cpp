@@ -57,6 +57,7 @@ CouponFit fit_workshop(const WorkshopFit& task) {
   const Workshop fitted = fit.applied_to(task.workshop);
   validate(fitted, name + ", the workshop as fitted");
   require_replaceable("--out", task.out, task.force);
+  task.before_writing();
   write_whole_file(task.out, fitted_text(fit, name) + workshop_toml(fitted));
   return fit;
 }

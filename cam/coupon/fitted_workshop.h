@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 
 #include "cam/coupon/coupon_fit.h"
 #include "cam/tool/workshop.h"
@@ -14,6 +15,8 @@ struct WorkshopFit {
   Workshop workshop;               ///< That cut the coupon.
   std::filesystem::path out;       ///< Workshop file to write.
   bool force = false;              ///< Replace one that lensforge did not write.
+  /// Is called when the work is done and the file is to be written.
+  std::function<void()> before_writing = [] {};
 };
 
 /// Fits the readings and writes the workshop with the values that they determine. Everything else

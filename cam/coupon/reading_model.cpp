@@ -20,9 +20,9 @@ constexpr double kAnyFactor = std::numeric_limits<double>::max();
 
 /// With the feature's name on the coupon: "groove[2].width_mm (G3)".
 std::string key_of(const char* array, std::size_t index, const char* key) {
-  const std::string entry = std::string(array) + "[" + std::to_string(index) + "]." + key;
+  std::string entry = std::string(array) + "[" + std::to_string(index) + "]." + key;
   if (entry.starts_with("mark")) return entry;
-  return entry + " (" + feature_name(entry.starts_with("groove") ? 'G' : 'P', index) + ")";
+  return entry += " (" + feature_name(entry.starts_with("groove") ? 'G' : 'P', index) + ")";
 }
 
 }  // namespace
