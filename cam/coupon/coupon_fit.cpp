@@ -20,6 +20,7 @@ enum Parameter { kSigma, kRadius, kPitchError, kOffset, kParameters };
 // σ from which the search begins: beyond them no ripple is changed, or none is left.
 constexpr double kLeastSigma = 0.002;  ///< mm
 constexpr double kMostSigma = 0.3;     ///< mm
+constexpr double kNoSigma = 1e-6;      ///< mm; in place of 0, which has no logarithm.
 constexpr int kSigmas = 161;           ///< In equal ratios of 1.03.
 constexpr std::size_t kStarts = 4;     ///< Of them, as many are followed to their minimum.
 
@@ -28,7 +29,7 @@ CouponState state_of(const Eigen::VectorXd& p) {
 }
 
 Eigen::VectorXd parameters_of(const CouponState& state) {
-  return Eigen::Vector4d(std::log(std::max(state.sigma, kLeastSigma)), std::log(state.radius),
+  return Eigen::Vector4d(std::log(std::max(state.sigma, kNoSigma)), std::log(state.radius),
                          state.pitch_error, state.groove_offset);
 }
 

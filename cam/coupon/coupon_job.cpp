@@ -54,6 +54,14 @@ CouponSheet sheet_of(const CouponOptions& options, const CouponPlan& plan,
   return sheet;
 }
 
+/// Programs of an earlier coupon in another dialect, which the sheet is not about.
+void remove_earlier(const fs::path& folder, const std::vector<fs::path>& written) {
+  for (const fs::path& path : other_programs(folder, written).earlier) {
+    std::error_code ignored;
+    if (is_name_of_coupon(path.filename().string())) fs::remove(path, ignored);
+  }
+}
+
 CouponResult make(const CouponOptions& options, const fs::path& folder, const Executor& executor,
                   const RunControl& control) {
   CouponPlan plan(options, executor.with_stop(control.stop_token()));
@@ -71,6 +79,7 @@ CouponResult make(const CouponOptions& options, const fs::path& folder, const Ex
   programs.publish();
   CouponResult result;
   for (const ProgramFile& file : programs.programs().files) result.files.push_back(file.path);
+  remove_earlier(folder, result.files);
   for (const fs::path& path : files.publish()) result.files.push_back(path);
   result.layout = sheet.layout;
   result.known = sheet.known;

@@ -173,6 +173,27 @@ TEST(CouponJob, ReadingsAreNotWrittenOver) {
   EXPECT_NE(read_bytes(readings), text);
 }
 
+TEST(CouponJob, ACouponInAnotherDialectTakesTheEarlierOnesPlace) {
+  const TempFolder folder;
+  make(folder);
+  testing::write_bytes(folder / "mine.ngc", "M2\n");
+  CouponOptions options;
+  options.post = find_post("fanuc", "--post");
+  make(folder, options);
+  EXPECT_TRUE(std::filesystem::exists(folder / "coupon.nc"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "coupon.ngc"));
+  EXPECT_TRUE(std::filesystem::exists(folder / "mine.ngc"));
+}
+
+TEST(CouponJob, AWorkshopThatDoesNotPolishHasACouponToo) {
+  const TempFolder folder;
+  CouponOptions options;
+  options.workshop.polish.sigma = 0.0;
+  const CouponResult result = make(folder, options);
+  EXPECT_FALSE(result.known.sigma.determined);
+  EXPECT_NEAR(result.known.diameter.value, 0.4, 1e-6);
+}
+
 TEST(CouponJob, OthersFilesAreKept) {
   const TempFolder folder;
   testing::write_bytes(folder / "coupon.ngc", "G21 (mine)\n");
