@@ -52,6 +52,13 @@ class Drawing {
             attribute("y", y(at.y()) + shift.y()) + " text-anchor=\"" + anchor + "\">" +
             escape_html(text) + "</text>";
   }
+  void words_upwards(const Eigen::Vector2d& at, const std::string& text,
+                     const Eigen::Vector2d& shift) {
+    const std::string place =
+        decimal_text(x(at.x()) + shift.x(), 2) + " " + decimal_text(y(at.y()) + shift.y(), 2);
+    svg_ +=
+        "<text transform=\"translate(" + place + ") rotate(-90)\">" + escape_html(text) + "</text>";
+  }
   /// A dimension between two places with the same x or the same y, `off` beside them.
   void dimension(const Eigen::Vector2d& from, const Eigen::Vector2d& to, double off,
                  const std::string& text) {
@@ -101,9 +108,16 @@ void draw_pads(const CouponLayout& layout, Drawing& drawing) {
     const Eigen::Vector2d low = layout.xy(box.min().x(), box.min().y());
     const Eigen::Vector2d high = layout.xy(box.max().x(), box.max().y());
     drawing.box(low, high, "fill=\"#b9d3ea\" stroke=\"#0b5cad\"");
-    const Eigen::Vector2d middle = 0.5 * (low + high);
-    drawing.words(middle, feature_name('P', i), "middle", {0.0, -4.0});
-    drawing.words(middle, trimmed_decimal(layout.pads[i].pitch, 3), "middle", {0.0, 13.0});
+    const std::string name = feature_name('P', i);
+    const std::string pitch = trimmed_decimal(layout.pads[i].pitch, 3);
+    if (layout.along == 0) {
+      const Eigen::Vector2d middle = 0.5 * (low + high);
+      drawing.words(middle, name, "middle", {0.0, -4.0});
+      drawing.words(middle, pitch, "middle", {0.0, 13.0});
+    } else {
+      drawing.words({high.x(), 0.5 * (low.y() + high.y())}, name + " " + pitch, "start",
+                    {7.0, 4.5});
+    }
   }
 }
 
@@ -112,9 +126,11 @@ void draw_grooves(const CouponLayout& layout, Drawing& drawing) {
     const CouponGroove& groove = layout.grooves[i];
     drawing.cut(groove);
     const Eigen::Vector2d end = layout.xy(groove.along_end + layout.radius, groove.across);
-    const bool beside = layout.along == 0;
-    drawing.words(end, feature_name('G', i), beside ? "start" : "middle",
-                  beside ? Eigen::Vector2d(5.0, 4.5) : Eigen::Vector2d(0.0, -5.0));
+    if (layout.along == 0) {
+      drawing.words(end, feature_name('G', i), "start", {5.0, 4.5});
+    } else {
+      drawing.words_upwards(end, feature_name('G', i), {4.5, -5.0});
+    }
   }
   for (std::size_t i = 0; i < layout.marks.size(); ++i) {
     const CouponGroove& mark = layout.marks[i];
@@ -135,10 +151,6 @@ void draw_dimensions(const CouponLayout& layout, Drawing& drawing) {
   const Eigen::Vector2d a = layout.xy(end, layout.marks[0].across);
   const Eigen::Vector2d b = layout.xy(end, layout.marks[1].across);
   drawing.dimension(a, b, layout.along == 0 ? 34.0 : -24.0, "A–B " + mm(layout.mark_distance()));
-  const Eigen::AlignedBox2d& pad = layout.pads.front().box;
-  const Eigen::Vector2d low = layout.xy(pad.min().x(), pad.max().y());
-  const Eigen::Vector2d high = layout.xy(pad.max().x(), pad.max().y());
-  drawing.dimension(low, high, layout.along == 0 ? -14.0 : 22.0, mm(pad.sizes().x()));
 }
 
 }  // namespace

@@ -23,6 +23,7 @@ constexpr double kWidthUncertainty = 0.003;  ///< mm
 constexpr double kHeightShare = 0.05;
 constexpr double kHeightUncertainty = 5e-5;  ///< mm
 constexpr double kOrderShare = 0.15;
+constexpr double kFaintestRipple = 2.0 * kHeightUncertainty;  ///< mm, worth a tester's reading.
 
 constexpr double kFaintest = 0.002;  ///< Ratio of light that a phone's meter can tell.
 /// Amplitude of the light's delay up to which the ratio rises with the ripples, rad: J₁/J₀ has its
@@ -133,12 +134,11 @@ Reading height_reading(double height) {
 }
 
 PadReadings expected_pad(double pitch, const CouponState& state, const CouponLight& light) {
-  PadReadings pad{pitch,
-                  height_reading(state.scallop_before(pitch)),
-                  height_reading(state.scallop_after(pitch)),
-                  {}};
+  PadReadings pad{pitch, height_reading(state.scallop_before(pitch)), {}, {}};
+  const double ripples = state.scallop_after(pitch);
+  if (ripples > kFaintestRipple) pad.after = height_reading(ripples);
   const double ratio = state.order_ratio(pitch, light);
-  const double delay = 0.5 * light.phase() * pad.after->value;
+  const double delay = 0.5 * light.phase() * ripples;
   if (ratio > kFaintest && delay < kMostDelay) pad.orders = Reading{ratio, kOrderShare * ratio};
   return pad;
 }

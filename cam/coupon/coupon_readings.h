@@ -46,7 +46,8 @@ struct CouponReadings {
 
 /// What a coupon is expected to measure in a workshop that is as its file says, with uncertainties
 /// of common tools: calliper in grooves 0.03 mm, measuring microscope 3 µm, roughness tester 5 %
-/// but at least 0.05 µm, light meter 15 %.
+/// but at least 0.05 µm, light meter 15 %. Ripples and light that are too faint for these tools are
+/// left out, as is light that does not rise with the ripples.
 CouponReadings expected_readings(const CouponLayout& layout, const Workshop& workshop);
 
 /// Readings as a commented TOML file to be filled in: what is expected stands in comments.

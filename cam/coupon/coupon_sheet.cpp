@@ -30,6 +30,7 @@ const std::array<TableColumn, 6> kColumns{{{"where"},
 
 std::string mm(double value) { return trimmed_decimal(value, 4) + " mm"; }
 std::string um(double value) { return number_text(kMicrometres * value, 3) + " µm"; }
+std::string rough_um(double value) { return number_text(kMicrometres * value, 2) + " µm"; }
 std::string code(const std::string& text) { return element("code", "", escape_html(text)); }
 
 std::string before_table(const CouponSheet& sheet) {
@@ -59,12 +60,15 @@ std::string after_table(const CouponSheet& sheet) {
   for (std::size_t i = 0; i < sheet.expected.pads.size(); ++i) {
     const PadReadings& pad = sheet.expected.pads[i];
     const std::string name = feature_name('P', i);
-    rows.push_back({name, "pitch " + mm(pad.pitch),
-                    "height of the ripples: the same roughness tester, or an interferometer",
-                    um(pad.after->value), code("after_um"), ""});
+    const std::string pitch = "pitch " + mm(pad.pitch);
+    if (pad.after) {
+      rows.push_back({name, pitch,
+                      "height of the ripples: the same roughness tester, or an interferometer",
+                      um(pad.after->value), code("after_um"), ""});
+    }
     if (!pad.orders) continue;
     rows.push_back(
-        {name, "pitch " + mm(pad.pitch),
+        {name, pitch,
          "light of a first spot over that of the middle one: laser pointer and light meter",
          number_text(pad.orders->value, 2), code("order_ratio"), ""});
   }
@@ -77,8 +81,9 @@ std::string known(const CouponFit& fit) {
     return std::string(name) + " to " +
            (value.determined ? text : std::string("no useful accuracy"));
   };
-  const std::string sigma = words("the polish's σ", fit.sigma, um(fit.sigma.uncertainty));
-  const std::string ball = words("the ball's diameter", fit.diameter, um(fit.diameter.uncertainty));
+  const std::string sigma = words("the polish's σ", fit.sigma, rough_um(fit.sigma.uncertainty));
+  const std::string ball =
+      words("the ball's diameter", fit.diameter, rough_um(fit.diameter.uncertainty));
   const std::string pitch = words("the pitch error", fit.pitch_error,
                                   number_text(100.0 * fit.pitch_error.uncertainty, 2) + " %");
   return element(
@@ -88,28 +93,11 @@ std::string known(const CouponFit& fit) {
                   sigma + ", " + ball + " and " + pitch + "."));
 }
 
-std::string hints(const CouponSheet& sheet) {
-  const double thinnest = sheet.layout.pads.front().pitch;
-  const double metre = 1000.0 * sheet.expected.light.wavelength / thinnest;
-  return element("p", "",
-                 escape_html(
-                     "Roughness tester: across the passes, in the middle of the pad, cut-off 0.8 "
-                     "mm, or 0.25 mm on 1.25 mm of the pad. Rz is the height that is asked for: "
-                     "the ripples are all alike. Leave out ripples that the tester hardly tells "
-                     "from a polished face.")) +
-         element(
-             "p", "",
-             escape_html(
-                 "Laser pointer: shine through the flat face, at right angles, onto paper a metre "
-                 "or two behind. The ripples spread the light into a row of spots, on P1 " +
-                 trimmed_decimal(metre, 1) +
-                 " mm apart a metre behind the coupon. Hold the light meter behind a hole that "
-                 "lets "
-                 "one spot through; divide the mean of the two spots beside the middle by the "
-                 "middle one. Wavelength and refractive index go under [light].")) +
-         element("p", "",
-                 escape_html("The distance of the spots tells the pitch, too, but a diode's "
-                             "wavelength is known to a per cent only: the marks tell more."));
+/// Distance of the first spot from the middle one on the first pad, a metre behind it.
+std::string spot_distance(const CouponSheet& sheet) {
+  constexpr double kMetre = 1000.0;
+  const double angle = sheet.expected.light.wavelength / sheet.layout.pads.front().pitch;
+  return trimmed_decimal(kMetre * angle, 1) + " mm";
 }
 
 std::string warnings(const CouponSheet& sheet) {
@@ -134,9 +122,11 @@ std::string coupon_sheet(const CouponSheet& sheet) {
   const Eigen::Vector2d size = layout.xy(layout.size.x(), layout.size.y());
   const std::string blank =
       mm(size.x()) + " x " + mm(size.y()) + ", " + mm(sheet.thickness) + " thick";
-  const std::string along = std::string("Passes run along ") + (layout.along == 0 ? "X" : "Y") +
-                            "; the numbers in the pads are their pitches. Pads are " +
-                            mm(layout.pad_depth) + " deep.";
+  const std::string along =
+      std::string("Passes run along ") + (layout.along == 0 ? "X" : "Y") +
+      ". Pads, with their pitches: " + mm(layout.pads.front().box.sizes().x()) +
+      " along the passes, " + mm(layout.pads.front().box.sizes().y()) + " across, " +
+      mm(layout.pad_depth) + " deep.";
   const std::array<std::pair<std::string_view, std::string>, 14> values{{
       {"PROGRAM", program_mark()},
       {"STYLE", std::string(coupon_page::kStyle)},
@@ -151,7 +141,7 @@ std::string coupon_sheet(const CouponSheet& sheet) {
       {"KNOWN", known(sheet.known)},
       {"BEFORE", before_table(sheet)},
       {"AFTER", after_table(sheet)},
-      {"HINTS", hints(sheet)},
+      {"SPOTS", spot_distance(sheet)},
   }};
   return fill_in(coupon_page::kHtml, values);
 }
