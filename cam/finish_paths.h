@@ -34,7 +34,7 @@ struct AxisStretch {
 };
 
 /// Adds a motion as a machine makes it whose axis is stretched. Arcs in a plane that holds this
-/// axis are ellipses then: chords within BallPath::kHelixError of them.
+/// axis are ellipses then: arcs within 1e-6 mm of them.
 void add_stretched(const GcodeMotion& motion, const AxisStretch& stretch, BallPath& path);
 
 /// Adds a row's exact way and that of its moves before rounding to the last of `ideal` and of

@@ -23,12 +23,13 @@ Eigen::Vector3d direction_at(const Arc& arc, double part) {
   return direction;
 }
 
-}  // namespace
-
-int chords_of(const Arc& arc, double error) {
-  const double angle = std::sqrt(8.0 * error / arc.radius);
-  return std::max(1, static_cast<int>(std::ceil(std::abs(arc.sweep) / angle)));
+/// So many chords stay within kHelixError of a helix: a chord of angle φ is off by r φ²/8.
+int chords_of(const Arc& helix) {
+  const double angle = std::sqrt(8.0 * BallPath::kHelixError / helix.radius);
+  return std::max(1, static_cast<int>(std::ceil(std::abs(helix.sweep) / angle)));
 }
+
+}  // namespace
 
 Arc part_of(const Arc& arc, double from, double to) {
   Arc part = arc;
@@ -54,7 +55,7 @@ void BallPath::add(const GcodeMotion& motion) {
     add_arc(arc);
     return;
   }
-  const int chords = chords_of(arc, kHelixError);
+  const int chords = chords_of(arc);
   for (int k = 0; k < chords; ++k)
     add_straight(arc.at(k / double(chords)), arc.at((k + 1) / double(chords)));
 }

@@ -12,10 +12,6 @@ namespace lensforge {
 /// The part of an arc between two shares of its sweep, without its rise.
 Arc part_of(const Arc& arc, double from, double to);
 
-/// So many equal chords stay within `error` (mm, > 0) of an arc or a helix: a chord of angle φ is
-/// off by r φ²/8.
-int chords_of(const Arc& arc, double error);
-
 /// A straight or circular way of the ball's centre; mm, lens frame.
 struct BallMove {
   Eigen::Vector3d start = Eigen::Vector3d::Zero();

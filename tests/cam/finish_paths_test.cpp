@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 
 #include "cam/milled/milled_field.h"
 #include "cam/milled_paths.h"
@@ -55,21 +56,59 @@ TEST(FinishPaths, RowsAndTheirArcsAreMovedAsAWhole) {
               1e-12);
 }
 
-TEST(FinishPaths, ArcsAlongTheAxisBecomeEllipses) {
-  const auto motion = testing::arc_motion(ArcPlane::kYZ, false, {1, 2, 0}, {1, 4, 0}, {0, 1, 1.5});
+/// Every point of the ways stretched back is on the arc, and neighbours meet.
+void expect_ellipse(const GcodeMotion& motion, const AxisStretch& stretch, std::size_t most) {
   BallPath path(kRadius, 0.0);
-  add_stretched(motion, kStretch, path);
+  add_stretched(motion, stretch, path);
+  EXPECT_LE(path.moves().size(), most);
   const Arc& arc = *motion.arc;
-  ASSERT_GT(path.moves().size(), 100U);
   for (const BallMove& move : path.moves()) {
-    EXPECT_EQ(move.arc, -1);
-    for (const double share : {0.0, 0.5, 1.0}) {
-      const Eigen::Vector3d tip =
-          move.start + share * (move.end - move.start) - Eigen::Vector3d(0, 0, kRadius);
-      const Eigen::Vector2d off(tip.y() / kStretch.factor - arc.centre.y(),
-                                tip.z() - arc.centre.z());
-      EXPECT_NEAR(off.norm(), arc.radius, 1.01 * BallPath::kHelixError);
+    ASSERT_GE(move.arc, 0);
+    const Arc& part = path.arcs()[static_cast<std::size_t>(move.arc)];
+    for (int k = 0; k <= 8; ++k) {
+      Eigen::Vector3d tip = part.at(k / 8.0) - Eigen::Vector3d(0, 0, kRadius);
+      tip[stretch.axis] /= stretch.factor;
+      EXPECT_NEAR((tip - arc.centre).norm(), arc.radius, 1.1e-6);
     }
+  }
+  for (std::size_t i = 1; i < path.moves().size(); ++i) {
+    EXPECT_NEAR((path.moves()[i].start - path.moves()[i - 1].end).norm(), 0.0, 1e-9);
+  }
+  Eigen::Vector3d end = motion.end + Eigen::Vector3d(0, 0, kRadius);
+  end[stretch.axis] *= stretch.factor;
+  EXPECT_NEAR((path.moves().back().end - end).norm(), 0.0, 1e-9);
+}
+
+TEST(FinishPaths, ArcsAlongTheAxisBecomeEllipses) {
+  for (const double share : {-0.02, -0.001, 0.0005, 0.02}) {
+    const AxisStretch y{1, 1.0 + share};
+    const AxisStretch x{0, 1.0 + share};
+    for (const bool clockwise : {false, true}) {
+      const auto arc = [&](ArcPlane plane, const Eigen::Vector3d& end, const Eigen::Vector3d& off) {
+        return testing::arc_motion(plane, clockwise, {2, 2, 0}, end, off);
+      };
+      expect_ellipse(arc(ArcPlane::kYZ, {2, 4, 0}, {0, 1, 0}), y, 60);
+      expect_ellipse(arc(ArcPlane::kZX, {4, 2, 0}, {1, 0, 0}), x, 60);
+    }
+    // A move of a finishing row: a millimetre of a radius of 40 mm.
+    const double down = -std::sqrt(40.0 * 40.0 - 0.25);
+    const auto row = testing::arc_motion(ArcPlane::kYZ, true, {1, 2, 0}, {1, 3, 0}, {0, 0.5, down});
+    ASSERT_LT(std::abs(row.arc->sweep), 0.03);
+    expect_ellipse(row, y, 2);
+  }
+}
+
+TEST(FinishPaths, AHelixIsStretchedToo) {
+  auto helix = testing::arc_motion(ArcPlane::kXY, false, {1, 0, 0}, {-1, 0, 0}, {-1, 0, 0});
+  helix.end.z() = -0.5;
+  helix.arc->rise = -0.5;
+  BallPath path(kRadius, 0.0);
+  add_stretched(helix, kStretch, path);
+  for (const BallMove& move : path.moves()) {
+    const Eigen::Vector2d place(move.end.x(), move.end.y() / kStretch.factor);
+    EXPECT_NEAR(place.norm(), 1.0, 3e-6);
+    const double turn = std::atan2(place.y(), place.x()) / std::numbers::pi;
+    EXPECT_NEAR(move.end.z() - kRadius, -0.5 * turn, 1e-3);
   }
 }
 
