@@ -53,8 +53,9 @@ std::string reading_text(const FittedReading& reading) {
 int fit(const OptionSet& options, const CouponSettings& settings) {
   const Console console(options.common().json, options.common().quiet);
   InterruptibleJob job(options.common(), settings.out);
-  const CouponFit result = fit_workshop({settings.fit, settings.coupon.workshop, settings.out,
-                                         settings.coupon.force, [&] { job.begin_writing(); }});
+  const CouponFit result =
+      fit_workshop({settings.fit, settings.coupon.workshop, settings.workshop_text, settings.out,
+                    settings.coupon.force, [&] { job.begin_writing(); }});
   nlohmann::json json = {{"command", "coupon"},
                          {"status", "done"},
                          {"options", options.used()},
@@ -65,6 +66,10 @@ int fit(const OptionSet& options, const CouponSettings& settings) {
                          {"readings", nlohmann::json::array()}};
   std::string text = settings.out + ": the workshop as fitted\n" + value_text(result.sigma) +
                      value_text(result.diameter) + value_text(result.pitch_error);
+  if (result.touch_off.determined) {
+    json["touch_off_mm"] = value_json(result.touch_off);
+    text += value_text(result.touch_off);
+  }
   for (const FittedReading& reading : result.readings) {
     json["readings"].push_back({{"key", reading.key},
                                 {"value", reading.value},

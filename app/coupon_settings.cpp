@@ -20,7 +20,10 @@ void add_coupon_options(OptionSet& options, CouponSettings& settings) {
 }
 
 void settle(const OptionSet& options, CouponSettings& settings) {
-  if (!settings.workshop.empty()) settings.coupon.workshop = read_workshop(settings.workshop);
+  if (!settings.workshop.empty()) {
+    settings.workshop_text = read_toml_file(settings.workshop, "a workshop");
+    settings.coupon.workshop = parse_workshop(settings.workshop_text, settings.workshop);
+  }
   if (settings.fit.empty()) return;
   for (const OptionField<CouponOptions>& row : coupon_fields()) {
     if (row.name != "--force" && options.given(row.name)) {

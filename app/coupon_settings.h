@@ -10,9 +10,10 @@ namespace lensforge::app {
 
 /// What `lensforge coupon` was asked for.
 struct CouponSettings {
-  std::string out;       ///< Folder of the coupon, or the fitted workshop's file.
-  std::string fit;       ///< Readings to fit; empty: make a coupon.
-  std::string workshop;  ///< TOML file; empty for the defaults.
+  std::string out;            ///< Folder of the coupon, or the fitted workshop's file.
+  std::string fit;            ///< Readings to fit; empty: make a coupon.
+  std::string workshop;       ///< TOML file; empty for the defaults.
+  std::string workshop_text;  ///< Of that file.
   CouponOptions coupon;
 };
 

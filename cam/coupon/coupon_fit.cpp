@@ -168,12 +168,19 @@ void require_agreement(const std::vector<ModelledReading>& readings, const FitQu
       (others.empty() ? "" : ", as far as " + others) + ": measure it again or take it out");
 }
 
+/// To between a hundredth and a thousandth of its uncertainty, so that files can be read.
+double to_digits(double value, double uncertainty) {
+  const double digits = std::pow(10.0, 2.0 - std::floor(std::log10(uncertainty)));
+  return std::round(value * digits) / digits;
+}
+
 /// @param unit  of the value for one of the parameter's.
 FittedValue value_of(const Solution& solution, Parameter parameter, double unit,
                      FittedValue workshops, double fitted) {
   const auto place = solution.place(parameter);
   if (!place) return workshops;
-  return {workshops.key, fitted, unit * solution.quality.uncertainties[*place], true};
+  const double uncertainty = unit * solution.quality.uncertainties[*place];
+  return {workshops.key, to_digits(fitted, uncertainty), uncertainty, true};
 }
 
 CouponFit result_of(const std::vector<ModelledReading>& readings, const CouponState& own,
@@ -186,8 +193,8 @@ CouponFit result_of(const std::vector<ModelledReading>& readings, const CouponSt
       value_of(solution, kRadius, diameter, {"tool.diameter", 2.0 * own.radius}, diameter);
   fit.pitch_error = value_of(solution, kPitchError, 1.0, {"finish.pitch_error", own.pitch_error},
                              state.pitch_error);
-  fit.state = {fit.sigma.value, 0.5 * fit.diameter.value, fit.pitch_error.value,
-               state.groove_offset};
+  fit.touch_off =
+      value_of(solution, kOffset, 1.0, {"touch-off (mm)", own.groove_offset}, state.groove_offset);
   const Eigen::VectorXd residuals = solution.problem.residuals(solution.best);
   for (std::size_t i = 0; i < readings.size(); ++i) {
     const ModelledReading& one = readings[i];

@@ -28,8 +28,8 @@ struct FittedReading {
 
 /// What the readings of a coupon say of the workshop that cut it.
 struct CouponFit {
-  CouponState state;  ///< Values that are not determined are the workshop's.
   FittedValue sigma, diameter, pitch_error;
+  FittedValue touch_off;  ///< How much deeper grooves are than programmed, mm; not of a workshop.
   std::vector<FittedReading> readings;
   double chi_square = 0.0;  ///< Σ deviation²
   int freedom = 0;          ///< Readings less values fitted, the grooves' touch-off among them.

@@ -20,6 +20,17 @@ class Coupon : public Scenario {
     arguments.insert(arguments.end(), more.begin(), more.end());
     return run(arguments);
   }
+  /// The tools of the default workshop, as a file has them.
+  [[nodiscard]] static std::string tools() {
+    std::string text;
+    for (const char* tool :
+         {"1\nshape = \"ball\"\ndiameter = 0.4", "2\nshape = \"ball\"\ndiameter = 1",
+          "3\nshape = \"flat\"\ndiameter = 3"}) {
+      text += std::string("\n[[tool]]\nnumber = ") + tool +
+              "\nflute_length = 1\nfeed = 500\nplunge = 150\n";
+    }
+    return text;
+  }
   /// Puts a reading into the file: after the nth line "# key =" of it.
   void take(const std::string& key, std::size_t entry, const std::string& value) const {
     std::string text = content(at("coupon/measured.toml"));
@@ -51,13 +62,14 @@ TEST_F(Coupon, IsMadeSentMeasuredAndUsed) {
   EXPECT_THAT(run({"info", path("coupon/coupon.ngc")}).out, HasSubstr("seal          holds"));
 
   take_readings();
-  write(at("mine.toml"), "[finish]\npitch = 0.08\n\n[stock]\nmargin = 1.0\n");
+  write(at("mine.toml"), "[finish]\npitch = 0.08  # felt\n\n[stock]\nmargin = 1.0\n" + tools());
   const Outcome fitted = fit({"--workshop", path("mine.toml"), "--json"});
   ASSERT_EQ(fitted.exit_code, 0) << fitted.err;
   const nlohmann::json values = fitted.json()["fit"];
   EXPECT_NEAR(values["polish.sigma"]["value"], 0.026, 2e-4);
   EXPECT_NEAR(values["tool.diameter"]["value"], 0.42, 2e-3);
   EXPECT_NEAR(values["finish.pitch_error"]["value"], 7.5e-4, 1e-9);
+  EXPECT_THAT(content(at("fitted.toml")), HasSubstr("pitch = 0.08  # felt\n"));
 
   ASSERT_EQ(run({"design", picture("stripes.png"), "--out", path("lens"), "--pixels", "24",
                  "--width", "3mm", "--focal", "15mm", "--rounds", "1", "--quality", "draft"})

@@ -20,7 +20,6 @@ using ::testing::IsEmpty;
 using testing::message_of;
 using ::testing::Not;
 using testing::read_bytes;
-using ::testing::SizeIs;
 using testing::TempFolder;
 
 CouponResult make(const TempFolder& folder, const CouponOptions& options = {},
@@ -234,6 +233,20 @@ TEST_F(WorkshopFitTest, TheFileDiffersInWhatWasFittedOnly) {
   const std::string text = read_bytes(task_.out);
   EXPECT_THAT(text, HasSubstr("finish.pitch_error = 0.0005 +- 0.00075"));
   EXPECT_THAT(text, HasSubstr("polish.sigma is not determined, left as it was"));
+}
+
+TEST_F(WorkshopFitTest, CommentsOfTheWorkshopStay) {
+  task_.workshop_text = "# Anna's mill\n[finish]\npitch = 0.05  # fine\n";
+  task_.workshop = parse_workshop(task_.workshop_text, "mine");
+  fit_workshop(task_);
+  const std::string once = read_bytes(task_.out);
+  EXPECT_THAT(once,
+              HasSubstr("# Anna's mill\n[finish]\npitch_error = 5e-04\npitch = 0.05  # fine"));
+  // A fit of what was fitted before says only what it did itself.
+  task_.workshop_text = once;
+  task_.workshop = parse_workshop(once, "mine");
+  fit_workshop(task_);
+  EXPECT_EQ(read_bytes(task_.out), once);
 }
 
 TEST_F(WorkshopFitTest, AFileOfTheUsersIsKeptUnlessForced) {

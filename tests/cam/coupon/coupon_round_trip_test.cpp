@@ -44,7 +44,7 @@ TEST(CouponRoundTrip, ExactReadingsGiveTheTrueWorkshop) {
   EXPECT_NEAR(fit.sigma.value, kTrue.sigma, 0.1 * fit.sigma.uncertainty);
   EXPECT_NEAR(fit.diameter.value, 2.0 * kTrue.radius, 0.1 * fit.diameter.uncertainty);
   EXPECT_NEAR(fit.pitch_error.value, kTrue.pitch_error, 0.1 * fit.pitch_error.uncertainty);
-  EXPECT_NEAR(fit.state.groove_offset, kTrue.touch_off, 2e-4);
+  EXPECT_NEAR(fit.touch_off.value, kTrue.touch_off, 2e-4);
   EXPECT_LT(fit.chi_square, 0.05);
   // As exact as it is useful.
   EXPECT_LT(fit.sigma.uncertainty, 0.02 * kTrue.sigma);
