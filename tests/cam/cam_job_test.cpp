@@ -14,6 +14,7 @@
 
 #include "cam/cam_meshes.h"
 #include "cam/contact/height_field.h"
+#include "cam/cut_estimate.h"
 #include "core/error.h"
 #include "core/full_disk.h"
 #include "core/temp_folder.h"
@@ -99,7 +100,9 @@ TEST(CamJob, APitchErrorIsInThePredictionAndNotInThePrograms) {
   const TempFolder stretched;
   CamOptions options = coarse();
   const LeakageResult before = run(small_lens(), options, exact).report.leakage;
+  const double memory = estimate_cut(options, small_lens().setup, 1).memory_bytes;
   options.workshop.process.finish.pitch_error = 0.01;
+  EXPECT_GT(estimate_cut(options, small_lens().setup, 1).memory_bytes, memory);
   const ReportData report = run(small_lens(), options, stretched).report;
   const auto text_below = [](const std::string& program) {
     return program.substr(program.find("G21"));
