@@ -115,7 +115,7 @@ void draw_pads(const CouponLayout& layout, Drawing& drawing) {
       drawing.words(middle, name, "middle", {0.0, -4.0});
       drawing.words(middle, pitch, "middle", {0.0, 13.0});
     } else {
-      drawing.words({high.x(), 0.5 * (low.y() + high.y())}, name + " " + pitch, "start",
+      drawing.words({high.x(), 0.5 * (low.y() + high.y())}, joined({name, " ", pitch}), "start",
                     {7.0, 4.5});
     }
   }

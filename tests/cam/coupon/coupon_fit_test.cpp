@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 
 #include "cam/coupon/coupon_layout.h"
+#include "cam/coupon/coupon_model.h"
 #include "core/error.h"
 #include "core/temp_folder.h"
 
@@ -130,6 +131,21 @@ TEST(CouponFit, SigmaIsFoundFromFarOff) {
     const CouponFit result = fit(expected_readings(layout, truth));
     EXPECT_TRUE(result.sigma.determined) << sigma;
     EXPECT_NEAR(result.sigma.value, sigma, 1e-5 * sigma);
+  }
+}
+
+/// The sheet promises it for half of the shallowest groove.
+TEST(CouponFit, ATouchOffThatIsWrongDoesNoHarm) {
+  for (const double offset : {-0.015, 0.015}) {
+    CouponReadings readings = sound_readings();
+    readings.marks.clear();
+    readings.pads.clear();
+    for (GrooveReadings& groove : readings.grooves) {
+      groove.width->value = groove_width(0.205, groove.depth + offset);
+    }
+    const CouponFit result = fit(readings);
+    EXPECT_NEAR(result.diameter.value, 0.41, 1e-4);
+    EXPECT_NEAR(result.touch_off.value, offset, 1e-4);
   }
 }
 
