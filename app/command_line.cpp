@@ -32,6 +32,8 @@ constexpr std::array kSubcommands{
     Subcommand{"render", render_command, "render DIR|MESH|SOLID",
                "lens, mesh or STEP solid to picture and metrics"},
     Subcommand{"cam", cam_command, "cam DIR", "lens folder to G-code (into DIR/cam/)"},
+    Subcommand{"coupon", coupon_command, "coupon --out DIR",
+               "test piece that calibrates a workshop"},
     Subcommand{"export", export_command, "export DIR --out FILE",
                "lens folder to .step, .iges, .stl, .obj, .ply, .3mf, height map"},
     Subcommand{"send", send_command, "send FILE.ngc --port PORT", "G-code to a controller"},

@@ -197,27 +197,34 @@ FinishPaths CutPlan::take_finish_paths(const ProgramFiles& programs, const RunCo
     paths.ideal.push_back(pencil);
     paths.fitted.push_back(std::move(pencil));
   }
-  if (const Tool* const large = larger_ball(options_)) {
-    paths.written.push_back(written_path(programs, *large, control));
+  const AxisStretch stretch = AxisStretch::of(finish());
+  std::vector<Tool> balls{ball()};
+  if (const Tool* const large = larger_ball(options_)) balls.insert(balls.begin(), *large);
+  for (const Tool& tool : balls) {
+    BallPath written(tool.radius(), z_offset_);
+    BallPath stretched(tool.radius(), z_offset_);
+    const auto take = [&](const GcodeMotion& motion) {
+      written.add(motion);
+      if (stretch.any()) add_stretched(motion, stretch, stretched);
+    };
+    read_motions(programs, tool.number, take, control);
+    paths.written.push_back(std::move(written));
+    if (stretch.any()) paths.stretched.push_back(std::move(stretched));
   }
-  paths.written.push_back(written_path(programs, ball(), control));
   return paths;
 }
 
-BallPath CutPlan::written_path(const ProgramFiles& programs, const Tool& tool,
-                               const RunControl& control) const {
-  BallPath written(tool.radius(), z_offset_);
+void CutPlan::read_motions(const ProgramFiles& programs, int tool,
+                           const std::function<void(const GcodeMotion&)>& take,
+                           const RunControl& control) const {
   for (const ProgramFile& file : programs.files) {
-    const bool finishes =
-        std::any_of(file.operations.begin(), file.operations.end(), [&](const OperationTime& time) {
-          return programs.summaries[time.operation].tool == tool.number;
-        });
-    if (finishes) {
-      read_path(file.beside.empty() ? file.path : file.beside, options_.post.reader, tool.number,
-                written, control);
-    }
+    const bool uses = std::any_of(
+        file.operations.begin(), file.operations.end(),
+        [&](const OperationTime& time) { return programs.summaries[time.operation].tool == tool; });
+    if (!uses) continue;
+    read_path(file.beside.empty() ? file.path : file.beside, options_.post.reader, tool, take,
+              control);
   }
-  return written;
 }
 
 }  // namespace lensforge

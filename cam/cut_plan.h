@@ -3,6 +3,7 @@
 
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -100,8 +101,10 @@ class CutPlan {
   ProgramOperation pencil_operation(const RunControl& control);
   OperationSummary run_pencil(double resolution, const MoveSink& sink,
                               const RunControl& control) const;
-  [[nodiscard]] BallPath written_path(const ProgramFiles& programs, const Tool& tool,
-                                      const RunControl& control) const;
+  /// Hands over all motions at feed with a tool.
+  void read_motions(const ProgramFiles& programs, int tool,
+                    const std::function<void(const GcodeMotion&)>& take,
+                    const RunControl& control) const;
   /// The sink behind a sketch of the operation.
   MoveSink sketched(const std::string& operation, const MoveSink& sink);
 

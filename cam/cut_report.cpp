@@ -91,6 +91,10 @@ ParameterGroup finish_parameters(const CutPlan& plan, SurfaceModel model) {
                             percent_text(rest->share_within(BallBlend::kWidth)) +
                             " of the lens to the smaller one, overlap included"});
   }
+  if (finish.pitch_error != 0.0) {
+    group.parameters.push_back(
+        {"Pitch error, as assumed", decimal_text(100.0 * finish.pitch_error, 3) + " %"});
+  }
   return group;
 }
 

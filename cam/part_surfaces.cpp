@@ -12,6 +12,10 @@ PartSurfaces::PartSurfaces(const Design& design, FinishPaths paths, const Polish
       written_(std::move(paths.written), design.blank_top) {
   raw_ = {&design.surface, held(on_lens(design.rounded)), on_lens(ideal_), on_lens(fitted_),
           held(on_lens(written_))};
+  if (!paths.stretched.empty()) {
+    stretched_.emplace(std::move(paths.stretched), design.blank_top);
+    raw_.push_back(held(on_lens(*stretched_)));
+  }
   for (const SurfaceField* field : raw_) {
     polished_.push_back(
         std::make_unique<PolishedField>(*field, design.surface, design.rectangle, polish));
@@ -32,8 +36,9 @@ const SurfaceField* PartSurfaces::held(const SurfaceField* field) {
 LeakageChain PartSurfaces::chain() const {
   LeakageChain chain;
   chain.designed = {surface_name::kDesigned, &design_.surface};
-  const char* const causes[] = {leak_cause::kPolish, leak_cause::kCrease, leak_cause::kScallop,
-                                leak_cause::kChord, leak_cause::kDecimals};
+  const char* const causes[] = {leak_cause::kPolish,   leak_cause::kCrease,
+                                leak_cause::kScallop,  leak_cause::kChord,
+                                leak_cause::kDecimals, leak_cause::kPitchError};
   for (std::size_t i = 0; i < polished_.size(); ++i) {
     chain.steps.push_back({causes[i], polished_[i].get()});
   }

@@ -48,6 +48,7 @@ class PartSurfaces {
   MilledField ideal_;
   MilledField fitted_;
   MilledField written_;
+  std::optional<MilledField> stretched_;  ///< If the machine makes other ways than are written.
   std::vector<std::unique_ptr<CastField>> cast_;
   std::vector<std::unique_ptr<HeldField>> held_;
   std::vector<const SurfaceField*> raw_;                  ///< In the order of the chain.

@@ -52,6 +52,13 @@ Eigen::AlignedBox2d in_mould(const Eigen::AlignedBox2d& lens,
           Eigen::Vector2d(s * (mould->width - lens.min().x()), s * lens.max().y())};
 }
 
+/// What a program has to say for a rectangle to be cut.
+Eigen::AlignedBox2d as_written(Eigen::AlignedBox2d box, const AxisStretch& stretch) {
+  box.min()[stretch.axis] /= stretch.factor;
+  box.max()[stretch.axis] /= stretch.factor;
+  return box;
+}
+
 Eigen::AlignedBox2d grown_within(const Eigen::AlignedBox2d& box, double beyond,
                                  const Eigen::AlignedBox2d& limits) {
   const Eigen::Vector2d all = Eigen::Vector2d::Constant(beyond);
@@ -149,10 +156,11 @@ TrialCut::Work TrialCut::work(const RunControl& control) const {
 
 std::vector<BallPath> TrialCut::paths_around(const Eigen::AlignedBox2d& box,
                                              const RunControl& control) const {
+  const AxisStretch stretch = AxisStretch::of(options_.workshop.process.finish);
   std::vector<BallPath> paths;
   for (const FinishPass& pass : passes_) {
     BallPath& path = paths.emplace_back(pass.tool.radius(), 0.0);
-    const MoveSink sink = path_sink(path);
+    const MoveSink sink = path_sink(path, stretch);
     const auto add = [&](const RasterRow& row) {
       const PathMove start{MoveKind::kRapid, row.start};
       sink({&start, 1});
@@ -162,12 +170,13 @@ std::vector<BallPath> TrialCut::paths_around(const Eigen::AlignedBox2d& box,
     if (!cut_raster(*pass.surface, plan, executor_, add, control).complete) throw Interrupted();
   }
   if (options_.workshop.process.finish.pencil) {
-    add_pencil(box, paths.emplace_back(finishing_ball(options_).radius(), 0.0), control);
+    BallPath& path = paths.emplace_back(finishing_ball(options_).radius(), 0.0);
+    add_pencil(box, path_sink(path, stretch), control);
   }
   return paths;
 }
 
-void TrialCut::add_pencil(const Eigen::AlignedBox2d& box, BallPath& path,
+void TrialCut::add_pencil(const Eigen::AlignedBox2d& box, const MoveSink& sink,
                           const RunControl& control) const {
   const PencilOptions pencil =
       pencil_options(options_, site_.plan.z_offset(), site_.plan.part_box().max().z());
@@ -178,7 +187,7 @@ void TrialCut::add_pencil(const Eigen::AlignedBox2d& box, BallPath& path,
   }
   if (inside.empty()) return;
   const FinishRun run{"pencil", finishing_ball(options_), site_.plan.blank().max().z(), {}, {}};
-  if (!cut_pencil(balls_->surface(), inside, pencil, run, path_sink(path), control).complete) {
+  if (!cut_pencil(balls_->surface(), inside, pencil, run, sink, control).complete) {
     throw Interrupted();
   }
 }
@@ -194,8 +203,10 @@ LeakTrial TrialCut::at(const LeakPlace& place, const RunControl& control) const 
   const double polished = PolishedField::kReach * options_.workshop.polish.sigma +
                           (1.0 + kCreaseHalo) * grid.spacing.maxCoeff();
   const double beyond = (mould ? mould->scale : 1.0) * polished + passes_.front().tool.diameter;
+  const AxisStretch stretch = AxisStretch::of(options_.workshop.process.finish);
   const Eigen::AlignedBox2d box =
-      grown_within(in_mould(box_of(grid, place.cells), mould), beyond, site_.plan.rectangle());
+      grown_within(as_written(in_mould(box_of(grid, place.cells), mould), stretch), beyond,
+                   site_.plan.rectangle());
   const MilledField milled(paths_around(box, silent), site_.plan.blank().max().z());
   std::optional<CastField> cast;
   if (mould) cast.emplace(milled, *mould);

@@ -11,6 +11,7 @@
 #include "cam/leakage/leak_map.h"
 #include "cam/leakage/leakage.h"
 #include "cam/milled/surface_field.h"
+#include "cam/path/move.h"
 #include "core/compute/executor.h"
 #include "core/compute/run_control.h"
 #include "core/surface/lens.h"
@@ -54,7 +55,8 @@ class TrialCut {
  private:
   [[nodiscard]] std::vector<BallPath> paths_around(const Eigen::AlignedBox2d& box,
                                                    const RunControl& control) const;
-  void add_pencil(const Eigen::AlignedBox2d& box, BallPath& path, const RunControl& control) const;
+  void add_pencil(const Eigen::AlignedBox2d& box, const MoveSink& sink,
+                  const RunControl& control) const;
 
   TrialSite site_;
   const CamOptions& options_;

@@ -29,6 +29,7 @@ inline constexpr const char* kCrease = "crease rounding";
 inline constexpr const char* kScallop = "scallop";
 inline constexpr const char* kChord = "chord";
 inline constexpr const char* kDecimals = "decimals";
+inline constexpr const char* kPitchError = "pitch error";  ///< Where the workshop states one.
 }  // namespace leak_cause
 
 /// Surfaces from the designed one to the part, each with one cause of wrong light more than the one

@@ -69,6 +69,9 @@ struct FinishProcess {
   /// rest; 0: `tool` alone.
   int large_tool = 0;
   int large_every = 1;  ///< Rows of `tool`, whose pitch holds, per row of the larger ball, ≥ 1.
+  /// By how much the machine goes too far across the passes, share of a length, −0.02 … 0.02. The
+  /// programs are as without it; the part that cam predicts is longer by it.
+  double pitch_error = 0.0;
 
   /// Passes `mm` apart, whatever scallops they leave.
   void set_pitch(double mm) {

@@ -34,6 +34,9 @@ constexpr double kMinHelix = 0.01;
 /// mm that a tool is fed through air above material: less than a twist of a chuck's jaws.
 constexpr double kMinClearance = 0.05;
 
+/// Share of a length; a controller with such a wrong number of steps a millimetre shows at once.
+constexpr double kMaxPitchError = 0.02;
+
 /// σ and depth at the rim, mm; beyond it no picture is left.
 constexpr double kMaxPolish = 1.0;
 
@@ -361,6 +364,9 @@ void describe(Visitor& v, FinishProcess& finish) {
            "rad from the exact path's direction");
   v.word("style", finish.style, "zigzag, climb or conventional");
   v.word("along", finish.along, "x or y");
+  v.number({"pitch_error", -kMaxPitchError, kMaxPitchError}, finish.pitch_error,
+           "share of a length that the machine goes too far across the passes; the predicted part "
+           "has it, programs are not changed");
   v.flag("cross", finish.cross, "a second raster along the other axis");
   v.flag("pencil", finish.pencil, "a pass along concave creases");
   v.whole({"large_tool", 0, 9999}, finish.large_tool,

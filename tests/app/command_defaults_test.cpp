@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 
 #include "app/cam_settings.h"
+#include "app/coupon_settings.h"
 #include "app/design_settings.h"
 #include "app/export_settings.h"
 #include "app/send_settings.h"
@@ -72,13 +73,15 @@ TEST(CommandDefaults, OfCamAreTheLibrarys) {
   EXPECT_EQ(settings.cam.job, "lens");  // The folder's name.
 }
 
-TEST(CommandDefaults, OfExportSendAndRenderAreTheLibrarys) {
+TEST(CommandDefaults, OfTheOtherCommandsAreTheLibrarys) {
   const auto exported = parsed<ExportSettings>(&add_export_options, {"lens", "--out", "a.step"});
   expect_equal(export_fields(), exported.options, ExportOptions{});
   const auto sent = parsed<SendSettings>(&add_send_options, {"a.ngc", "--port", "sim:grbl"});
   SendOptions library;
   library.port = "sim:grbl";
   expect_equal(send_fields(), sent.job, library);
+  const auto coupon = parsed<CouponSettings>(&add_coupon_options, {"--out", "coupon"});
+  expect_equal(coupon_fields(), coupon.coupon, CouponOptions{});
   RenderOptions rendered;
   OptionSet options("render", "");
   options.fields(render_fields(), rendered);

@@ -8,6 +8,7 @@
 #include "app/option_set.h"
 #include "cam/cam_fields.h"
 #include "cam/cam_options.h"
+#include "cam/coupon/coupon_options.h"
 #include "core/error.h"
 #include "core/text/number_text.h"
 #include "design/design_fields.h"
@@ -61,6 +62,7 @@ TEST(OptionLimits, AreEnforcedByEveryCommandForEveryNumber) {
   expect_limits_enforced({"design", "none.png", "--out", "none"}, weight_fields());
   expect_limits_enforced({"render", "none"}, render_fields());
   expect_limits_enforced({"cam", "none"}, cam_fields());
+  expect_limits_enforced({"coupon", "--out", "none"}, coupon_fields());
   expect_limits_enforced({"export", "none", "--out", "none.step"}, export_fields());
   expect_limits_enforced({"send", "none.ngc", "--dry-run"}, send_fields());
 }
@@ -93,6 +95,8 @@ TEST(OptionLimits, AreThoseOfTheLibraries) {
   });
   expect_library_refuses(export_fields(), ExportOptions{},
                          [](const ExportOptions& options) { validate(options, "lens.step"); });
+  expect_library_refuses(coupon_fields(), CouponOptions{},
+                         [](const CouponOptions& options) { validate(options); });
   SendOptions sending;
   sending.port = "sim:grbl";
   expect_library_refuses(send_fields(), sending,

@@ -14,6 +14,7 @@
 
 #include "cam/cam_meshes.h"
 #include "cam/contact/height_field.h"
+#include "cam/cut_estimate.h"
 #include "core/error.h"
 #include "core/full_disk.h"
 #include "core/temp_folder.h"
@@ -91,6 +92,32 @@ TEST(CamJob, TheSplitAddsUpAndCausesThatAreNotThereCountNothing) {
     }
   }
   EXPECT_NEAR(sum, leakage.part().quality.leakage, 1e-12);
+}
+
+/// A machine that goes too far makes another part of the same programs.
+TEST(CamJob, APitchErrorIsInThePredictionAndNotInThePrograms) {
+  const TempFolder exact;
+  const TempFolder stretched;
+  CamOptions options = coarse();
+  const LeakageResult before = run(small_lens(), options, exact).report.leakage;
+  const double memory = estimate_cut(options, small_lens().setup, 1).memory_bytes;
+  options.workshop.process.finish.pitch_error = 0.01;
+  EXPECT_GT(estimate_cut(options, small_lens().setup, 1).memory_bytes, memory);
+  const ReportData report = run(small_lens(), options, stretched).report;
+  const auto text_below = [](const std::string& program) {
+    return program.substr(program.find("G21"));
+  };
+  EXPECT_EQ(text_below(read_bytes(exact / "finish.ngc")),
+            text_below(read_bytes(stretched / "finish.ngc")));
+  EXPECT_NE(read_bytes(exact / "milled.ply"), read_bytes(stretched / "milled.ply"));
+  ASSERT_EQ(report.leakage.parts.size(), before.parts.size() + 1);
+  EXPECT_EQ(report.leakage.parts.back().cause, leak_cause::kPitchError);
+  // All before it is as without it.
+  for (std::size_t i = 0; i < before.parts.size(); ++i) {
+    EXPECT_EQ(report.leakage.parts[i].leakage, before.parts[i].leakage);
+  }
+  EXPECT_GT(report.leakage.part().quality.leakage, 1.02 * before.part().quality.leakage);
+  EXPECT_THAT(read_bytes(stretched / "report.html"), HasSubstr("Pitch error, as assumed"));
 }
 
 TEST(CamJob, SameFilesForAnyThreads) {

@@ -112,6 +112,15 @@ TEST(TrialCut, WithNothingChangedLeaksWhatWasPredicted) {
   }
 }
 
+TEST(TrialCut, OfAMachineThatGoesTooFarLeaksWhatWasPredicted) {
+  CamOptions options = facets_polished();
+  options.workshop.process.finish.pitch_error = 0.01;
+  const Predicted cut(grooved_lens(), options);
+  const LeakPlace& place = cut.prediction().places.at(0);
+  const LeakTrial trial = TrialCut(cut.site(), options, cut.executor()).at(place, {});
+  EXPECT_NEAR(trial.leakage, place.leakage, 0.01 * place.leakage);
+}
+
 /// A place in the middle, beside which the lens goes on.
 TEST(TrialCut, OfAPartOfTheLensLeaksAsThatPartDoes) {
   const CamOptions options = facets_polished();

@@ -18,6 +18,7 @@ struct KnownOption {
 /// in memory, as relative paths and bytes:
 ///   pictures/*    one of 12 × 12 pixels in every format that can be written
 ///   lens/*        a lens 4 mm wide, with lens/cam/* for Grbl
+///   coupon/*      a coupon; readings.toml, what is measured on it
 ///   partial/*     a design that was interrupted after its first round
 ///   solid.*       the lens as step, iges, stl, obj, ply, off, 3mf
 ///   workshop.toml, *.post.toml, *.map.toml, config.toml
@@ -35,6 +36,7 @@ class BaseSet {
  private:
   void draw_pictures(const std::filesystem::path& folder) const;
   void make_lens(const std::filesystem::path& folder);
+  void make_coupon(const std::filesystem::path& folder);
   void make_partial(const std::filesystem::path& folder);
   void export_all(const std::filesystem::path& folder);
   void add_programs();

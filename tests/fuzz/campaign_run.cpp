@@ -21,8 +21,8 @@ namespace fs = std::filesystem;
 const Kind& kind_of_run(std::uint64_t index) {
   static const std::vector<Kind> deck = [] {
     std::vector<Kind> cards;
-    for (const auto& kinds :
-         {design_kinds(), lens_kinds(), cam_kinds(), mesh_kinds(), send_kinds(), world_kinds()}) {
+    for (const auto& kinds : {design_kinds(), lens_kinds(), cam_kinds(), coupon_kinds(),
+                              mesh_kinds(), send_kinds(), world_kinds()}) {
       for (const Kind& kind : kinds)
         cards.insert(cards.end(), static_cast<std::size_t>(kind.share), kind);
     }

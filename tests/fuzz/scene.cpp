@@ -104,6 +104,18 @@ CommandLine Scene::cam(const std::string& lens) {
   return line.flag("--no-render");
 }
 
+CommandLine Scene::coupon(const std::string& out) {
+  plan.outputs.push_back(out + "/");
+  CommandLine line("coupon", {});
+  return line.set("--out", out).set("--threads", "1");
+}
+
+CommandLine Scene::fit(const std::string& readings, const std::string& out) {
+  plan.outputs.push_back(out);
+  CommandLine line("coupon", {});
+  return line.set("--fit", readings).set("--out", out);
+}
+
 CommandLine Scene::export_to(const std::string& lens, const std::string& file) {
   plan.outputs.push_back(file);
   CommandLine line("export", {lens});

@@ -81,6 +81,8 @@ class Scene {
   // Cheap commands that work.
   [[nodiscard]] CommandLine design(const std::string& picture, const std::string& out);
   [[nodiscard]] CommandLine cam(const std::string& lens);
+  [[nodiscard]] CommandLine coupon(const std::string& out);
+  [[nodiscard]] CommandLine fit(const std::string& readings, const std::string& out);
   [[nodiscard]] CommandLine export_to(const std::string& lens, const std::string& file);
   [[nodiscard]] CommandLine render(const std::string& source) const;
   [[nodiscard]] CommandLine info(const std::string& source) const;
@@ -106,6 +108,7 @@ struct Kind {
 std::vector<Kind> design_kinds();
 std::vector<Kind> lens_kinds();
 std::vector<Kind> cam_kinds();
+std::vector<Kind> coupon_kinds();
 std::vector<Kind> mesh_kinds();
 std::vector<Kind> send_kinds();
 std::vector<Kind> world_kinds();

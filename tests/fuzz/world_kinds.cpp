@@ -171,6 +171,7 @@ void soup(Scene& scene) {
   CommandLine line = command == "design"   ? scene.design("a.png", "out")
                      : command == "render" ? scene.render("lens")
                      : command == "cam"    ? scene.cam("lens")
+                     : command == "coupon" ? scene.coupon("coupon")
                      : command == "export" ? scene.export_to("lens", "new.stl")
                      : command == "send"   ? scene.send("job.ngc")
                                            : scene.info("lens");

@@ -23,6 +23,7 @@ TEST_F(Usage, HelpOfEveryCommandIsPrintedOnStdout) {
                                                            {"design", "--help"},
                                                            {"render", "-h"},
                                                            {"cam", "--help"},
+                                                           {"coupon", "--help"},
                                                            {"send", "-h"},
                                                            {"info", "-h"}}) {
     const Outcome outcome = run(arguments);

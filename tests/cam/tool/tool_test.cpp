@@ -144,7 +144,7 @@ TEST(Workshop, WrittenTomlReadsBackEqual) {
   shop.process.semi.entry = EntryStyle::kHelix;
   shop.process.semi.helix_radius = 0.45;
   shop.process.finish = {1,     0.04, 0.001, 2e-4, 5e-4, PassStyle::kConventional, PassAxis::kY,
-                         false, true, 4,     2};
+                         false, true, 4,     2,    -0.001};
   EXPECT_EQ(parse_workshop(workshop_toml(shop), "other"), shop);
 }
 

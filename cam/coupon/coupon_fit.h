@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "cam/coupon/coupon_readings.h"
+#include "cam/coupon/coupon_state.h"
+#include "cam/tool/workshop.h"
+
+namespace lensforge {
+
+/// A value of the workshop with what the readings say of it.
+struct FittedValue {
+  std::string key;           ///< In the workshop file.
+  double value = 0.0;        ///< In the unit of the file; the workshop's own if not determined.
+  double uncertainty = 0.0;  ///< Standard, likewise; 0 if not determined.
+  bool determined = false;
+};
+
+/// One reading and the fit.
+struct FittedReading {
+  std::string key;         ///< "groove[2].width_mm (G3)"
+  double value = 0.0;      ///< In the unit of its key.
+  double fitted = 0.0;     ///< What the fit makes of it, likewise.
+  double deviation = 0.0;  ///< value − fitted, in standard uncertainties of the reading.
+};
+
+/// What the readings of a coupon say of the workshop that cut it.
+struct CouponFit {
+  FittedValue sigma, diameter, pitch_error;
+  FittedValue touch_off;  ///< How much deeper grooves are than programmed, mm; not of a workshop.
+  std::vector<FittedReading> readings;
+  double chi_square = 0.0;  ///< Σ deviation²
+  int freedom = 0;          ///< Readings less values fitted, the grooves' touch-off among them.
+
+  /// Polish, finishing ball and pitch error of the workshop replaced as far as they are determined.
+  [[nodiscard]] Workshop applied_to(Workshop workshop) const;
+};
+
+/// A value counts as determined if its standard uncertainty is at most this.
+inline constexpr double kSigmaShare = 0.25;      ///< Of σ; as well as one guesses.
+inline constexpr double kRadiusShare = 0.05;     ///< Of R; makers of small balls keep to 2 to 5 %.
+inline constexpr double kPitchErrorMost = 2e-3;  ///< Of a length; a worse machine shows at once.
+
+/// Standard deviations by which a reading may differ from what the others say of it. Of 20 sound
+/// readings one in 800 sets has one beyond it.
+inline constexpr double kMostDeviation = 4.0;
+
+/// Weighted least squares over ln σ, ln R, pitch error and touch-off, by Levenberg-Marquardt steps
+/// from several σ, since an order's light does not rise with its ripple throughout. Uncertainties
+/// are those of the readings, carried through the linearised model. Values that the readings do not
+/// determine (the limits above; the radius is given up before σ) are held at the workshop's; a ball
+/// that is held may be off by kRadiusShare, which σ's uncertainty takes in.
+/// @param file  of the readings, for messages.
+/// @throw InputError naming the file and a reading: no readings at all; a value that no coupon of
+///        such a workshop has (another unit); readings that contradict one another.
+CouponFit fit_coupon(const CouponReadings& readings, const Workshop& workshop,
+                     const std::string& file);
+
+/// What the fit of readings that are all as expected would know: the same uncertainties.
+CouponFit expected_fit(const CouponReadings& expected, const Workshop& workshop);
+
+}  // namespace lensforge

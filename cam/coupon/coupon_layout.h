@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "cam/coupon/coupon_options.h"
+
+namespace lensforge {
+
+/// A straight cut of the ball along the passes; mm.
+struct CouponGroove {
+  double along_begin = 0.0;  ///< Of the tip's way.
+  double along_end = 0.0;
+  double across = 0.0;
+  double depth = 0.0;  ///< Below the top of the blank.
+};
+
+/// A field that is cut with passes of one pitch; mm.
+struct CouponPad {
+  Eigen::AlignedBox2d box;  ///< (along, across); the first and the last pass run on its borders.
+  double pitch = 0.0;
+};
+
+/// What is cut into a coupon and where; mm from the blank's corner, which is X0 Y0. "Along" is the
+/// axis along which the workshop's finishing passes run, "across" the other.
+///
+/// - Two marks, far apart across the passes: their distance gives the pitch error.
+/// - Grooves of one pass each and several depths: their widths give the ball's radius, whatever the
+///   touch-off was off by.
+/// - Pads: the scallops' heights p²/(8R) before polishing give the radius too; the ripples that
+///   polishing leaves, less by exp(−2π²σ²/p²), give σ.
+struct CouponLayout {
+  int along = 0;        ///< Axis of the passes: 0 for x, 1 for y.
+  double radius = 0.0;  ///< Of the ball as the workshop has it.
+  double pad_depth = 0.0;
+  std::vector<CouponGroove> marks;  ///< Two.
+  std::vector<CouponGroove> grooves;
+  std::vector<CouponPad> pads;
+  Eigen::Vector2d size = Eigen::Vector2d::Zero();  ///< Of the blank, (along, across).
+
+  /// Distance of the marks as programmed.
+  [[nodiscard]] double mark_distance() const { return marks[1].across - marks[0].across; }
+  /// Deepest cut.
+  [[nodiscard]] double deepest() const;
+  /// A place of the coupon as the machine's (x, y).
+  [[nodiscard]] Eigen::Vector2d xy(double u, double v) const {
+    return along == 0 ? Eigen::Vector2d(u, v) : Eigen::Vector2d(v, u);
+  }
+};
+
+/// What drawing, sheet and template call the groove (G) or pad (P) of an index: "G1", "P5".
+std::string feature_name(char letter, std::size_t index);
+
+/// Pitches and depths suit the workshop's ball and polish: pitches are 2.5 to 6 σ, but at most
+/// 1.2 R, depths 0.15 to 0.8 R, but at most 0.2 mm.
+/// @pre the numbers of the options hold their limits.
+/// @throw InputError naming option or key, value and rule, where marks are too near to one another
+///        for what lies between them, pads are not deeper than their scallops, or flutes too short.
+CouponLayout coupon_layout(const CouponOptions& options);
+
+}  // namespace lensforge

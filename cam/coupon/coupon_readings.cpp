@@ -1,0 +1,219 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cam/coupon/coupon_readings.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "cam/coupon/coupon_state.h"
+#include "core/error.h"
+#include "core/text/number_text.h"
+#include "core/text/toml_fields.h"
+#include "core/text/version.h"
+
+namespace lensforge {
+namespace {
+
+constexpr double kMicrometre = 1e-3;  ///< mm
+constexpr double kNanometre = 1e-6;   ///< mm
+
+// Uncertainties that the template states: calliper's points in grooves, measuring microscope,
+// roughness tester (ISO 12179 calibrates to some per cent), light meter of a phone.
+constexpr double kMarkUncertainty = 0.03;    ///< mm
+constexpr double kWidthUncertainty = 0.003;  ///< mm
+constexpr double kHeightShare = 0.05;
+constexpr double kHeightUncertainty = 5e-5;  ///< mm
+constexpr double kOrderShare = 0.15;
+constexpr double kFaintestRipple = 2.0 * kHeightUncertainty;  ///< mm, worth a tester's reading.
+
+constexpr double kFaintest = 0.002;  ///< Ratio of light that a phone's meter can tell.
+/// Amplitude of the light's delay up to which the ratio rises with the ripples, rad: J₁/J₀ has its
+/// first pole at 2.4.
+constexpr double kMostDelay = 1.5;
+
+constexpr std::size_t kMostEntries = 100;  ///< Of one kind: ten coupons.
+
+/// Keys of a reading: its value, and "…_uncertainty" before the unit.
+struct ReadingKeys {
+  std::string value;
+  std::string uncertainty;
+  double unit;   ///< mm, or 1 for a share.
+  double least;  ///< Of the value, in its unit.
+  double most;
+};
+
+const ReadingKeys kDistance{"distance_mm", "distance_uncertainty_mm", 1.0, 1.0, 1000.0};
+const ReadingKeys kWidth{"width_mm", "width_uncertainty_mm", 1.0, 1e-3, 10.0};
+const ReadingKeys kBefore{"before_um", "before_uncertainty_um", kMicrometre, 1e-3, 1000.0};
+const ReadingKeys kAfter{"after_um", "after_uncertainty_um", kMicrometre, 1e-3, 1000.0};
+const ReadingKeys kOrders{"order_ratio", "order_ratio_uncertainty", 1.0, 1e-6, 1e3};
+
+constexpr double kFinestUncertainty = 1e-6;  ///< Of the least value; nothing is known so well.
+
+/// Two significant digits.
+double rounded(double value) {
+  const double unit = std::pow(10.0, std::floor(std::log10(value)) - 1.0);
+  return std::round(value / unit) * unit;
+}
+
+class Template {
+ public:
+  void text(const std::string& lines) { text_ += lines; }
+  void number(const std::string& key, double value) {
+    text_ += key + " = " + number_text(value, 6) + "\n";
+  }
+  void reading(const ReadingKeys& keys, const std::optional<Reading>& expected) {
+    if (!expected) return;
+    text_ += "# " + keys.value + " =   # expected: about " +
+             number_text(expected->value / keys.unit, 3) + "\n";
+    number(keys.uncertainty, rounded(expected->uncertainty / keys.unit));
+  }
+  [[nodiscard]] const std::string& result() const { return text_; }
+
+ private:
+  std::string text_;
+};
+
+constexpr const char* kHead =
+    "#\n"
+    "# Fill in what you measured: take the # away in front of a reading and put its value behind\n"
+    "# the =. What you leave as it is counts as not measured. Uncertainties are standard ones: "
+    "two\n"
+    "# readings in three are closer to the truth. Put in what your tools can do.\n"
+    "# Then: lensforge coupon --fit THIS FILE --workshop WORKSHOP.toml --out FITTED.toml\n";
+
+std::optional<Reading> read(TomlFields& fields, const ReadingKeys& keys) {
+  const NumberRule rule{keys.uncertainty, kFinestUncertainty * keys.least, keys.most};
+  // The template states uncertainties for readings that were not taken, too.
+  const double uncertainty = fields.number_or(rule, 0.0);
+  if (!fields.has(keys.value)) return std::nullopt;
+  const double value = fields.number({keys.value, keys.least, keys.most});
+  if (!(uncertainty > 0.0)) fields.refuse(keys.uncertainty, "a reading needs its uncertainty");
+  return Reading{value * keys.unit, uncertainty * keys.unit};
+}
+
+MarkReadings read_mark(TomlFields& fields) {
+  return {fields.number({"programmed_mm", 1.0, 1000.0}), read(fields, kDistance)};
+}
+
+GrooveReadings read_groove(TomlFields& fields) {
+  return {fields.number({"depth_mm", 1e-4, 10.0}), read(fields, kWidth)};
+}
+
+PadReadings read_pad(TomlFields& fields) {
+  return {fields.number({"pitch_mm", 1e-4, 10.0}), read(fields, kBefore), read(fields, kAfter),
+          read(fields, kOrders)};
+}
+
+template <class Entry, class Read>
+std::vector<Entry> entries(TomlFields& file, const std::string& key, const Read& read_entry) {
+  std::vector<Entry> all;
+  if (!file.has(key)) return all;
+  for (TomlFields& fields : file.tables(key)) {
+    if (all.size() == kMostEntries) {
+      file.refuse(key, "at most " + std::to_string(kMostEntries) + " of them");
+    }
+    all.push_back(read_entry(fields));
+    fields.finish();
+  }
+  return all;
+}
+
+CouponLight read_light(TomlFields& file) {
+  CouponLight light;
+  if (!file.has("light")) return light;
+  TomlFields fields = file.table("light");
+  light.wavelength = kNanometre * fields.number_or({"wavelength_nm", 200.0, 2000.0},
+                                                   light.wavelength / kNanometre);
+  light.ior = fields.number_or({"ior", 1.01, 5.0}, light.ior);
+  fields.finish();
+  return light;
+}
+
+Reading height_reading(double height) {
+  return {height, std::max(kHeightUncertainty, kHeightShare * height)};
+}
+
+PadReadings expected_pad(double pitch, const CouponState& state, const CouponLight& light) {
+  PadReadings pad{pitch, height_reading(state.scallop_before(pitch)), {}, {}};
+  const double ripples = state.scallop_after(pitch);
+  if (ripples > kFaintestRipple) pad.after = height_reading(ripples);
+  const double ratio = state.order_ratio(pitch, light);
+  const double delay = 0.5 * light.phase() * ripples;
+  if (ratio > kFaintest && delay < kMostDelay) pad.orders = Reading{ratio, kOrderShare * ratio};
+  return pad;
+}
+
+}  // namespace
+
+int CouponReadings::count() const {
+  int sum = 0;
+  for (const MarkReadings& mark : marks) sum += mark.distance ? 1 : 0;
+  for (const GrooveReadings& groove : grooves) sum += groove.width ? 1 : 0;
+  for (const PadReadings& pad : pads) {
+    sum += (pad.before ? 1 : 0) + (pad.after ? 1 : 0) + (pad.orders ? 1 : 0);
+  }
+  return sum;
+}
+
+CouponReadings expected_readings(const CouponLayout& layout, const Workshop& workshop) {
+  CouponReadings readings;
+  if (workshop.material.ior > 0.0) readings.light.ior = workshop.material.ior;
+  const CouponState state = CouponState::of(workshop);
+  readings.marks.push_back(
+      {layout.mark_distance(),
+       Reading{state.mark_distance(layout.mark_distance()), kMarkUncertainty}});
+  for (const CouponGroove& groove : layout.grooves) {
+    readings.grooves.push_back(
+        {groove.depth, Reading{state.groove_width(groove.depth), kWidthUncertainty}});
+  }
+  for (const CouponPad& pad : layout.pads) {
+    readings.pads.push_back(expected_pad(pad.pitch, state, readings.light));
+  }
+  return readings;
+}
+
+std::string readings_template(const CouponReadings& expected) {
+  Template file;
+  file.text("# Readings of a coupon, " + program_mark() + "\n" + kHead);
+  file.text(
+      "\n# Light that the orders of diffraction are measured with. A diode's wavelength is\n"
+      "# printed on it; ior is the blank's refractive index.\n[light]\n");
+  file.number("wavelength_nm", expected.light.wavelength / kNanometre);
+  file.number("ior", expected.light.ior);
+  for (const MarkReadings& mark : expected.marks) {
+    file.text("\n# Distance of the marks A and B, centre to centre.\n[[mark]]\n");
+    file.number("programmed_mm", mark.programmed);
+    file.reading(kDistance, mark.distance);
+  }
+  for (std::size_t i = 0; i < expected.grooves.size(); ++i) {
+    file.text("\n# " + feature_name('G', i) +
+              ": width at the top, before polishing.\n[[groove]]\n");
+    file.number("depth_mm", expected.grooves[i].depth);
+    file.reading(kWidth, expected.grooves[i].width);
+  }
+  for (std::size_t i = 0; i < expected.pads.size(); ++i) {
+    file.text("\n# " + feature_name('P', i) +
+              ": height from valley to crest before and after polishing (Rz of a roughness tester\n"
+              "# across the passes), light of a first order over that of the middle after it.\n"
+              "[[pad]]\n");
+    file.number("pitch_mm", expected.pads[i].pitch);
+    file.reading(kBefore, expected.pads[i].before);
+    file.reading(kAfter, expected.pads[i].after);
+    file.reading(kOrders, expected.pads[i].orders);
+  }
+  return file.result();
+}
+
+CouponReadings parse_readings(std::string_view text, const std::string& file) {
+  const toml::table document = parse_toml(text, file);
+  TomlFields fields(document, {file, "a file of readings"});
+  CouponReadings readings;
+  readings.light = read_light(fields);
+  readings.marks = entries<MarkReadings>(fields, "mark", read_mark);
+  readings.grooves = entries<GrooveReadings>(fields, "groove", read_groove);
+  readings.pads = entries<PadReadings>(fields, "pad", read_pad);
+  fields.finish();
+  return readings;
+}
+
+}  // namespace lensforge

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "cam/coupon/coupon_layout.h"
+#include "cam/coupon/coupon_light.h"
+#include "cam/tool/workshop.h"
+
+namespace lensforge {
+
+/// What was measured, with its standard uncertainty (one σ), > 0; both in the same unit.
+struct Reading {
+  double value = 0.0;
+  double uncertainty = 0.0;
+};
+
+/// Lengths are mm; a reading that was not taken is empty.
+struct MarkReadings {
+  double programmed = 0.0;  ///< Distance.
+  std::optional<Reading> distance;
+};
+struct GrooveReadings {
+  double depth = 0.0;  ///< As programmed.
+  std::optional<Reading> width;
+};
+struct PadReadings {
+  double pitch = 0.0;             ///< As programmed.
+  std::optional<Reading> before;  ///< Height of the scallops, not polished.
+  std::optional<Reading> after;   ///< The same, polished.
+  std::optional<Reading> orders;  ///< Light of a first order over the zeroth, polished.
+};
+
+/// Everything that was read off one coupon or several.
+struct CouponReadings {
+  std::vector<MarkReadings> marks;
+  std::vector<GrooveReadings> grooves;
+  std::vector<PadReadings> pads;
+  CouponLight light;
+
+  [[nodiscard]] int count() const;
+};
+
+/// What a coupon is expected to measure in a workshop that is as its file says, with uncertainties
+/// of common tools: calliper in grooves 0.03 mm, measuring microscope 3 µm, roughness tester 5 %
+/// but at least 0.05 µm, light meter 15 %. Ripples and light that are too faint for these tools are
+/// left out, as is light that does not rise with the ripples.
+CouponReadings expected_readings(const CouponLayout& layout, const Workshop& workshop);
+
+/// Readings as a commented TOML file to be filled in: what is expected stands in comments.
+std::string readings_template(const CouponReadings& expected);
+
+/// Reads a filled-in template. Entries without a reading count as not measured.
+/// @param file  its name in messages.
+/// @throw InputError naming file, key, value and rule: what is no number or out of its range,
+///        readings without an uncertainty, unknown keys.
+CouponReadings parse_readings(std::string_view text, const std::string& file);
+
+}  // namespace lensforge

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cam/coupon/coupon_readings.h"
+
+#include <gmock/gmock.h>
+
+#include <string>
+
+#include "cam/coupon/coupon_layout.h"
+#include "core/error.h"
+#include "core/temp_folder.h"
+
+namespace lensforge {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using testing::message_of;
+using ::testing::StartsWith;
+
+CouponReadings expected() { return expected_readings(coupon_layout(CouponOptions{}), Workshop{}); }
+
+/// The template with every reading filled in as it is expected.
+std::string filled_in() {
+  std::string text = readings_template(expected());
+  const std::string comment = "  # expected: about ";
+  for (std::size_t at = text.find(comment); at != std::string::npos; at = text.find(comment)) {
+    const std::size_t line = text.rfind("\n# ", at) + 1;
+    text.erase(at, comment.size());
+    text.erase(line, 2);
+  }
+  return text;
+}
+
+std::string refusal(const std::string& text) {
+  return message_of<InputError>([&] { parse_readings(text, "m.toml"); });
+}
+
+TEST(CouponReadings, TheTemplateIsReadAsHavingNone) {
+  EXPECT_EQ(parse_readings(readings_template(expected()), "m.toml").count(), 0);
+}
+
+TEST(CouponReadings, AFilledInTemplateIsReadAsItStands) {
+  const CouponReadings wanted = expected();
+  const CouponReadings read = parse_readings(filled_in(), "m.toml");
+  ASSERT_EQ(read.count(), wanted.count());
+  EXPECT_EQ(read.marks[0].programmed, wanted.marks[0].programmed);
+  EXPECT_DOUBLE_EQ(read.light.wavelength, wanted.light.wavelength);
+  for (std::size_t i = 0; i < wanted.pads.size(); ++i) {
+    EXPECT_DOUBLE_EQ(read.pads[i].pitch, wanted.pads[i].pitch);
+    // The template shows three digits of what is expected, and two of its uncertainty.
+    EXPECT_NEAR(read.pads[i].after->value, wanted.pads[i].after->value,
+                5e-3 * wanted.pads[i].after->value);
+    EXPECT_NEAR(read.pads[i].after->uncertainty, wanted.pads[i].after->uncertainty,
+                0.05 * wanted.pads[i].after->uncertainty);
+    EXPECT_EQ(read.pads[i].orders.has_value(), wanted.pads[i].orders.has_value());
+  }
+  for (std::size_t i = 0; i < wanted.grooves.size(); ++i) {
+    EXPECT_NEAR(read.grooves[i].width->value, wanted.grooves[i].width->value, 1e-3);
+  }
+}
+
+TEST(CouponReadings, TheTemplateSaysWhatWroteIt) {
+  EXPECT_THAT(readings_template(expected()), StartsWith("# Readings of a coupon, lensforge "));
+}
+
+TEST(CouponReadings, BadValuesAreNamedWithFileKeyAndRule) {
+  const std::string groove = "[[groove]]\ndepth_mm = 0.09\nwidth_uncertainty_mm = 0.003\n";
+  for (const char* value : {"nan", "inf", "-0.3", "0", "1e9", "\"0.3mm\"", "true"}) {
+    EXPECT_THAT(refusal(groove + "width_mm = " + value),
+                AllOf(StartsWith("m.toml: groove[0].width_mm: "), HasSubstr("must be")))
+        << value;
+  }
+  EXPECT_THAT(refusal("[[groove]]\ndepth_mm = 0.09\nwidth_mm = 0.3\n"),
+              HasSubstr("width_uncertainty_mm: missing: a reading needs its uncertainty"));
+  EXPECT_THAT(refusal("[[groove]]\nwidth_mm = 0.3\nwidth_uncertainty_mm = 0.003\n"),
+              HasSubstr("depth_mm"));
+  EXPECT_THAT(refusal("[[mark]]\nprogrammed_mm = 40\ndistance_mm = 40\n"
+                      "distance_uncertainty_mm = 0\n"),
+              HasSubstr("mark[0].distance_uncertainty_mm: 0"));
+  EXPECT_THAT(refusal("[[pad]]\npitch_mm = -0.1\n"), HasSubstr("pad[0].pitch_mm: -0.1"));
+  EXPECT_THAT(refusal("[light]\nwavelength_nm = 0.532\n"), HasSubstr("light.wavelength_nm: 0.532"));
+}
+
+TEST(CouponReadings, WhatItDoesNotKnowIsRefused) {
+  EXPECT_THAT(refusal("[[pad]]\npitch_mm = 0.1\nafter_mm = 0.001\n"),
+              HasSubstr("pad[0].after_mm: 0.001: a file of readings: unknown key"));
+  EXPECT_THAT(refusal("[polish]\nsigma = 0.03\n"), HasSubstr("polish"));
+  EXPECT_THAT(refusal("[[pad]\n"), HasSubstr("not TOML"));
+  EXPECT_THAT(refusal("pad = 3\n"), HasSubstr("pad: 3: must be an array"));
+}
+
+TEST(CouponReadings, AreLimitedInNumber) {
+  std::string text;
+  for (int i = 0; i < 101; ++i) text += "[[groove]]\ndepth_mm = 0.1\n";
+  EXPECT_THAT(refusal(text), HasSubstr("at most 100"));
+}
+
+}  // namespace
+}  // namespace lensforge

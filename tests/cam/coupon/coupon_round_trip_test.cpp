@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <gmock/gmock.h>
+
+#include <cmath>
+
+#include "cam/cam_job.h"
+#include "cam/cam_meshes.h"
+#include "cam/coupon/coupon_fit.h"
+#include "cam/coupon/coupon_job.h"
+#include "cam/coupon/coupon_simulation.h"
+#include "core/temp_folder.h"
+
+namespace lensforge {
+namespace {
+
+using testing::CouponSimulation;
+using testing::TempFolder;
+using testing::TrueWorkshop;
+
+/// A workshop that is not as its file says.
+constexpr TrueWorkshop kTrue{0.036, 0.2075, 8e-4, 0.006};
+
+/// What is measured of the default coupon in that workshop, without noise.
+CouponReadings simulated(const CouponOptions& options, const TrueWorkshop& shop) {
+  const TempFolder folder;
+  const CouponResult coupon = make_coupon(options, folder.path(), Executor::serial(), {});
+  EXPECT_TRUE(coupon.done());
+  const CouponSimulation simulation(coupon.files.front(), options.post, coupon.layout, shop);
+  return simulation.measured(expected_readings(coupon.layout, options.workshop));
+}
+
+Workshop true_workshop(Workshop workshop) {
+  workshop.polish.sigma = kTrue.sigma;
+  workshop.process.finish.pitch_error = kTrue.pitch_error;
+  for (Tool& tool : workshop.tools) {
+    if (tool.number == workshop.process.finish.tool) tool.diameter = 2.0 * kTrue.radius;
+  }
+  return workshop;
+}
+
+TEST(CouponRoundTrip, ExactReadingsGiveTheTrueWorkshop) {
+  const CouponOptions options;
+  const CouponFit fit = fit_coupon(simulated(options, kTrue), options.workshop, "readings");
+  EXPECT_NEAR(fit.sigma.value, kTrue.sigma, 0.1 * fit.sigma.uncertainty);
+  EXPECT_NEAR(fit.diameter.value, 2.0 * kTrue.radius, 0.1 * fit.diameter.uncertainty);
+  EXPECT_NEAR(fit.pitch_error.value, kTrue.pitch_error, 0.1 * fit.pitch_error.uncertainty);
+  EXPECT_NEAR(fit.touch_off.value, kTrue.touch_off, 2e-4);
+  EXPECT_LT(fit.chi_square, 0.05);
+  // As exact as it is useful.
+  EXPECT_LT(fit.sigma.uncertainty, 0.02 * kTrue.sigma);
+  EXPECT_LT(fit.diameter.uncertainty, 0.01 * 2.0 * kTrue.radius);
+  EXPECT_LT(fit.pitch_error.uncertainty, 1e-3);
+}
+
+/// Errors of the fitted values follow the uncertainties that are stated for them.
+TEST(CouponRoundTrip, NoiseIsCarriedThroughAsStated) {
+  constexpr int kSeeds = 40;
+  const CouponOptions options;
+  const CouponReadings exact = simulated(options, kTrue);
+  double values = 0.0;  // Chi square of the values.
+  double readings = 0.0;
+  int freedom = 0;
+  for (std::uint32_t seed = 1; seed <= kSeeds; ++seed) {
+    const CouponFit fit =
+        fit_coupon(testing::with_noise(exact, seed), options.workshop, "readings");
+    const auto take = [&](const FittedValue& value, double truth) {
+      ASSERT_TRUE(value.determined) << value.key;
+      const double off = (value.value - truth) / value.uncertainty;
+      EXPECT_LT(std::abs(off), 4.0) << value.key << " seed " << seed;
+      values += off * off;
+    };
+    take(fit.sigma, kTrue.sigma);
+    take(fit.diameter, 2.0 * kTrue.radius);
+    take(fit.pitch_error, kTrue.pitch_error);
+    readings += fit.chi_square;
+    freedom += fit.freedom;
+  }
+  // Within four standard deviations of a chi square, √(2n), of its mean n.
+  const auto expect_chi_square = [](double sum, int n) {
+    EXPECT_NEAR(sum, n, 4.0 * std::sqrt(2.0 * n));
+  };
+  expect_chi_square(values, 3 * kSeeds);
+  expect_chi_square(readings, freedom);
+}
+
+TEST(CouponRoundTrip, PassesAlongYAndOneWayAreReadAsWell) {
+  CouponOptions options;
+  options.workshop.process.finish.along = PassAxis::kY;
+  options.workshop.process.finish.style = PassStyle::kClimb;
+  const CouponFit fit = fit_coupon(simulated(options, kTrue), options.workshop, "readings");
+  EXPECT_NEAR(fit.sigma.value, kTrue.sigma, 0.1 * fit.sigma.uncertainty);
+  EXPECT_NEAR(fit.diameter.value, 2.0 * kTrue.radius, 0.1 * fit.diameter.uncertainty);
+  EXPECT_NEAR(fit.pitch_error.value, kTrue.pitch_error, 0.1 * fit.pitch_error.uncertainty);
+}
+
+/// Of a lens with creases, and pixels so small that what polish rounds shows.
+PictureQuality forecast(const Workshop& workshop) {
+  Lens lens = testing::small_lens();
+  lens.setup.pixels = {60, 40};
+  lens.target = Image(60, 40, 1.0F);
+  CamOptions options;
+  options.workshop = workshop;
+  options.workshop.process.rough.enabled = false;
+  options.workshop.process.semi.enabled = false;
+  options.remedies = false;
+  const TempFolder folder;
+  return make_cut(lens, options, folder.path(), Executor::cpu(2), {}).report.leakage.part().quality;
+}
+
+TEST(CouponRoundTrip, TheForecastOfTheFittedWorkshopIsThatOfTheTrueOne) {
+  const CouponOptions options;
+  const CouponReadings readings = testing::with_noise(simulated(options, kTrue), 7);
+  const CouponFit fit = fit_coupon(readings, options.workshop, "readings");
+  const PictureQuality believed = forecast(options.workshop);
+  const PictureQuality fitted = forecast(fit.applied_to(options.workshop));
+  const PictureQuality truth = forecast(true_workshop(options.workshop));
+  const double error = std::abs(believed.leakage - truth.leakage);
+  EXPECT_GT(error, 0.05 * truth.leakage) << "the coupon would not be worth it";
+  EXPECT_LT(std::abs(fitted.leakage - truth.leakage), 0.15 * error);
+}
+
+}  // namespace
+}  // namespace lensforge
