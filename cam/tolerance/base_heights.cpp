@@ -11,12 +11,15 @@
 namespace lensforge {
 namespace {
 
-/// Of the nodes, in σ: what is left of waves of three nodes is 4 % and less at 1.2.
+/// Of the nodes, in σ: what polish leaves of waves of three nodes is 4 % and less.
 constexpr double kAcross = 1.2;
-constexpr double kAlong = 4.0 / 3.0;
-/// Where hardly anything is polished, mm: five nodes in the narrowest fillet of a 0.1 mm ball; and
-/// where much is: a quarter of a pixel of the finest pictures that are milled (0.4 mm).
-constexpr double kFinest = 0.02;
+constexpr double kAlong = 5.0 / 3.0;
+/// Nodes along the rows of the piece of lens that lights a pixel. A portrait of 48² on 12 mm, whose
+/// part has an MAE of 0.01526 by cam's own chain, has 0.0165, 0.0158, 0.0155 and 0.0154 with 5, 6,
+/// 8 and 12.
+constexpr double kPerPixel = 8.0;
+/// mm; however little is polished, and however much.
+constexpr double kFinest = 0.01;
 constexpr double kCoarsest = 0.1;
 
 /// Samples of a pitch: its scallops' harmonics up to the fifth vanish from a mean over them.
@@ -41,8 +44,9 @@ BaseAxis across_rows(double size, double pitch, double sigma) {
   return axis_of(size, 0.5 * static_cast<double>(pitches) * pitch, samples, samples);
 }
 
-BaseAxis along_rows(double size, double sigma) {
-  return axis_of(size, std::clamp(kAlong * sigma, kFinest, kCoarsest), 2, 1);
+BaseAxis along_rows(double size, double sigma, double detail) {
+  const double spacing = std::min(kAlong * sigma, detail / kPerPixel);
+  return axis_of(size, std::clamp(spacing, kFinest, kCoarsest), 2, 1);
 }
 
 /// The samples: they lie between the nodes, so that boxes are symmetric and none is on the rim.
@@ -142,14 +146,15 @@ std::vector<CellRange> node_tiles(const std::array<BaseAxis, 2>& axes) {
 
 }  // namespace
 
-std::array<BaseAxis, 2> base_axes(const Eigen::Vector2d& size, const Passes& passes, double sigma) {
+std::array<BaseAxis, 2> base_axes(const Eigen::Vector2d& size, const Passes& passes, double sigma,
+                                  const Eigen::Vector2d& detail) {
   const int along = passes.axis;
   const int across = 1 - along;
   std::array<BaseAxis, 2> axes;
   const auto at = [&axes](int k) -> BaseAxis& { return axes[static_cast<std::size_t>(k)]; };
   at(across) = across_rows(size[across], passes.pitch, sigma);
-  at(along) =
-      passes.cross ? across_rows(size[along], passes.pitch, sigma) : along_rows(size[along], sigma);
+  at(along) = passes.cross ? across_rows(size[along], passes.pitch, sigma)
+                           : along_rows(size[along], sigma, detail[along]);
   return axes;
 }
 

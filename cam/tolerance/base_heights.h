@@ -29,8 +29,11 @@ struct BaseAxis {
 /// Nodes as far apart as what polishing leaves of the surface allows. Across rows a box is a whole
 /// number of pitches wide, so that scallops vanish from the means and only what rows have in common
 /// is left; along them it is as wide as the nodes are apart.
-/// @param size   of the lens, mm. @param sigma  of the polish, mm.
-std::array<BaseAxis, 2> base_axes(const Eigen::Vector2d& size, const Passes& passes, double sigma);
+/// @param size    of the lens, mm. @param sigma  of the polish, mm.
+/// @param detail  side of the piece of lens that lights a pixel, mm: an eighth of it is resolved
+///                along the rows in any case.
+std::array<BaseAxis, 2> base_axes(const Eigen::Vector2d& size, const Passes& passes, double sigma,
+                                  const Eigen::Vector2d& detail);
 
 /// The surface as cut, before it is polished, at the nodes of a grid over the lens and `pad` nodes
 /// beyond its rim: means of its heights over boxes around the nodes (BaseAxis). Beyond the rim it

@@ -7,6 +7,9 @@
 namespace lensforge {
 namespace {
 
+/// Places at which rows are known for every node across them: errors of 2 % of a pitch.
+constexpr std::int64_t kPlacesPerNode = 16;
+
 /// Mean response of a box to a wave, sin(x) / x with half the phase over the box.
 double box_gain(double half_phase) {
   return half_phase < 1e-6 ? 1.0 : std::sin(half_phase) / half_phase;
@@ -32,6 +35,7 @@ ErrorHeights::ErrorHeights(const BaseHeights& base, const PartError& error, cons
                            double sigma)
     : base_(base),
       passes_(passes),
+      contact_(passes.cast ? -passes.ball_radius : passes.ball_radius),
       radius_(passes.cast ? -error.radius : error.radius),
       eccentricity_(passes.cast ? -error.eccentricity : error.eccentricity),
       half_backlash_(passes.zigzag ? 0.5 * error.backlash : 0.0),
@@ -57,22 +61,21 @@ ErrorHeights::Line ErrorHeights::waves_along(int axis, const std::vector<Wave>& 
 void ErrorHeights::lay_rows(const RowHeights& rows) {
   const int across = 1 - passes_.axis;
   const double width = base_.axis(across).box() / passes_.pitch;
-  const auto nodes = static_cast<std::size_t>(padded(across));
+  const auto places = static_cast<std::size_t>(kPlacesPerNode * padded(across));
+  const auto knots = static_cast<std::size_t>(rows.places);
   row_places_ = rows.places;
   row_length_ = rows.length;
-  row_means_.assign(nodes * static_cast<std::size_t>(row_places_), 0.0);
-  alternation_.assign(nodes, 0.0);
-  const std::int64_t count =
-      row_places_ > 0 ? static_cast<std::int64_t>(rows.height.size()) / row_places_ : 0;
-  for (std::size_t n = 0; n < nodes; ++n) {
-    const double middle = place(across, static_cast<std::int64_t>(n)) / passes_.pitch;
+  row_means_.assign(places * knots, 0.0);
+  alternation_.assign(places, 0.0);
+  const auto last = static_cast<std::int64_t>(knots > 0 ? rows.height.size() / knots : 1) - 1;
+  const double step = base_.axis(across).spacing / static_cast<double>(kPlacesPerNode);
+  for (std::size_t n = 0; n < places; ++n) {
+    const double middle = (place(across, 0) + static_cast<double>(n) * step) / passes_.pitch;
     rows_in_box(middle, width, [&](std::int64_t row, double share) {
       alternation_[n] += row % 2 == 0 ? share : -share;
-      const std::int64_t known =
-          std::clamp<std::int64_t>(row, 0, std::max<std::int64_t>(count, 1) - 1);
-      for (std::int64_t k = 0; k < row_places_; ++k) {
-        row_means_[n * static_cast<std::size_t>(row_places_) + static_cast<std::size_t>(k)] +=
-            share * rows.height[static_cast<std::size_t>(known * row_places_ + k)];
+      const auto known = static_cast<std::size_t>(std::clamp<std::int64_t>(row, 0, last));
+      for (std::size_t k = 0; k < knots; ++k) {
+        row_means_[n * knots + k] += share * rows.height[known * knots + k];
       }
     });
   }
@@ -102,34 +105,56 @@ double ErrorHeights::of_row(std::size_t along, std::size_t across) const {
   return mean[0] + (t - static_cast<double>(k)) * (mean[1] - mean[0]);
 }
 
-/// What backlash and the ball change, by the slopes of the surface as it should be cut.
-double ErrorHeights::of_slope(const double* height, std::size_t across) const {
-  const double x = (height[1] - height[-1]) / (2.0 * base_.axis(0).spacing);
-  const double y =
-      (height[base_.stride()] - height[-base_.stride()]) / (2.0 * base_.axis(1).spacing);
-  const double steepness = x * x + y * y;
-  return -half_backlash_ * alternation_[across] * (passes_.axis == 0 ? x : y) -
+Eigen::Vector2d ErrorHeights::slope_at(const double* height) const {
+  const std::int64_t up = base_.stride();
+  return {(height[1] - height[-1]) / (2.0 * base_.axis(0).spacing),
+          (height[up] - height[-up]) / (2.0 * base_.axis(1).spacing)};
+}
+
+/// Under the row whose ball touches the surface at a node.
+std::size_t ErrorHeights::touched_place(std::size_t across, const Eigen::Vector2d& slope) const {
+  const int axis = 1 - passes_.axis;
+  const double aside = contact_ * slope[axis] / std::sqrt(1.0 + slope.squaredNorm());
+  const double places = static_cast<double>(kPlacesPerNode) *
+                        (static_cast<double>(across) - aside / base_.axis(axis).spacing);
+  const auto last = static_cast<std::int64_t>(alternation_.size()) - 1;
+  return static_cast<std::size_t>(std::clamp<std::int64_t>(std::llround(places), 0, last));
+}
+
+/// What rows, backlash and the ball change.
+double ErrorHeights::of_cut(const Eigen::Vector2d& slope, std::size_t along,
+                            std::size_t across) const {
+  const double steepness = slope.squaredNorm();
+  const std::size_t touched = touched_place(across, slope);
+  const double of_rows = row_places_ > 0 ? of_row(along, touched) : 0.0;
+  return of_rows - half_backlash_ * alternation_[touched] * slope[passes_.axis] -
          radius_ * (std::sqrt(1.0 + steepness) - 1.0) - eccentricity_ * std::sqrt(steepness);
 }
 
-double ErrorHeights::of_polish(const double* height, std::size_t column, std::size_t row) const {
+double ErrorHeights::sigma_factor(std::int64_t i, std::int64_t j) const {
+  const auto column = static_cast<std::size_t>(i + base_.pad());
+  const auto row = static_cast<std::size_t>(j + base_.pad());
   const std::size_t waves = cosines_.size() / 2;
   double sum = 0.0;
   for (std::size_t w = 0; w < waves; ++w) {
     sum +=
         cosines_[w][column] * cosines_[waves + w][row] - sines_[w][column] * sines_[waves + w][row];
   }
-  const double factor = 1.0 + within_ * sum;
+  return 1.0 + within_ * sum;
+}
+
+double ErrorHeights::of_polish(const double* height, double factor) const {
   const double hx = base_.axis(0).spacing;
   const double hy = base_.axis(1).spacing;
-  const double bend =
-      (height[1] - 2.0 * height[0] + height[-1]) / (hx * hx) +
-      (height[base_.stride()] - 2.0 * height[0] + height[-base_.stride()]) / (hy * hy);
+  const std::int64_t up = base_.stride();
+  const double bend = (height[1] - 2.0 * height[0] + height[-1]) / (hx * hx) +
+                      (height[up] - 2.0 * height[0] + height[-up]) / (hy * hy);
   return 0.5 * (factor * factor - 1.0) * sigma_ * sigma_ * bend;
 }
 
 void ErrorHeights::fill(const CellRange& nodes, double* heights) const {
-  const bool slopes = half_backlash_ != 0.0 || radius_ != 0.0 || eccentricity_ != 0.0;
+  const bool cut_wrong =
+      row_places_ > 0 || half_backlash_ != 0.0 || radius_ != 0.0 || eccentricity_ != 0.0;
   const bool along_x = passes_.axis == 0;
   for (std::int64_t j = 0; j < nodes.rows; ++j) {
     const double* const height = base_.at(nodes.column, nodes.row + j);
@@ -137,11 +162,13 @@ void ErrorHeights::fill(const CellRange& nodes, double* heights) const {
     double* const out = heights + j * nodes.columns;
     for (std::int64_t i = 0; i < nodes.columns; ++i) {
       const auto column = static_cast<std::size_t>(nodes.column + i + base_.pad());
-      const std::size_t across = along_x ? row : column;
       double z = height[i] + by_column_[column] + by_row_[row];
-      if (row_places_ > 0) z += of_row(along_x ? column : row, across);
-      if (slopes) z += of_slope(height + i, across);
-      if (within_ != 0.0) z += of_polish(height + i, column, row);
+      if (cut_wrong) {
+        z += of_cut(slope_at(height + i), along_x ? column : row, along_x ? row : column);
+      }
+      if (within_ != 0.0) {
+        z += of_polish(height + i, sigma_factor(nodes.column + i, nodes.row + j));
+      }
       out[i] = z;
     }
   }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <Eigen/Core>
 #include <cstdint>
 #include <vector>
 
@@ -15,7 +16,9 @@ namespace lensforge {
 /// BaseHeights and as means over its boxes. To first order in every error:
 ///
 /// - waviness: a height by the place along x and one by the place along y;
-/// - rows: every row's height from half a pitch before it to half a pitch behind;
+/// - rows: every row's height from half a pitch before where its ball touches to half a pitch
+/// behind
+///   (Ripple::slope());
 /// - backlash b of rows to and fro: they are shifted by ±b/2, which changes heights by ∓s b/2 with
 ///   the slope s along them; rows one way are shifted as one, which nobody sees;
 /// - a ball of radius R + δ on the same way of its tip: −δ (√(1 + |s|²) − 1);
@@ -34,6 +37,9 @@ class ErrorHeights {
   /// @pre one node more on every side lies within the base's padding.
   void fill(const CellRange& nodes, double* heights) const;
 
+  /// How many times its mean the polish's σ is at a node.
+  [[nodiscard]] double sigma_factor(std::int64_t i, std::int64_t j) const;
+
  private:
   /// A function of one place for every node of an axis, padding included.
   using Line = std::vector<double>;
@@ -47,12 +53,16 @@ class ErrorHeights {
   [[nodiscard]] std::int64_t padded(int axis) const {
     return base_.axis(axis).nodes + 2 * base_.pad();
   }
+  [[nodiscard]] Eigen::Vector2d slope_at(const double* height) const;
   [[nodiscard]] double of_row(std::size_t along, std::size_t across) const;
-  [[nodiscard]] double of_slope(const double* height, std::size_t across) const;
-  [[nodiscard]] double of_polish(const double* height, std::size_t column, std::size_t row) const;
+  [[nodiscard]] std::size_t touched_place(std::size_t across, const Eigen::Vector2d& slope) const;
+  [[nodiscard]] double of_cut(const Eigen::Vector2d& slope, std::size_t along,
+                              std::size_t across) const;
+  [[nodiscard]] double of_polish(const double* height, double factor) const;
 
   const BaseHeights& base_;
   Passes passes_;
+  double contact_;  ///< Radius of the ball, below 0 in a mould, where it touches from below.
   double radius_;
   double eccentricity_;
   double half_backlash_;
@@ -62,8 +72,9 @@ class ErrorHeights {
   Line by_row_;
   std::int64_t row_places_ = 0;
   double row_length_ = 1.0;
-  Line row_means_;    ///< For every node across the rows its places along them.
-  Line alternation_;  ///< For every node across them: mean of +1 and −1 in turns.
+  /// For every place across the rows, kPlacesPerNode to a node, the places along them.
+  Line row_means_;
+  Line alternation_;                   ///< For every such place: mean of +1 and −1 in turns.
   std::vector<Line> cosines_, sines_;  ///< Of the polish's waves: along x, then along y.
 };
 

@@ -35,7 +35,7 @@ double response(const LinePolish& polish, double theta) {
 
 double weight(double theta) { return (theta <= kBand ? 1.0 : kBeyond) / (kGentle + theta * theta); }
 
-/// Solves for the weights of nodes first … reach: `basis(k, θ)` is what node k adds to the
+/// Solves for the weights of pairs first … reach: `basis(k, θ)` is what pair k adds to the
 /// response, `target(θ)` what it should come to.
 template <class Basis, class Target>
 Eigen::VectorXd fit(std::int64_t first, std::int64_t reach, const Basis& basis,
@@ -57,33 +57,43 @@ Eigen::VectorXd fit(std::int64_t first, std::int64_t reach, const Basis& basis,
 
 std::int64_t line_filter_reach(double sigma, double spacing) {
   constexpr double kSigmas = 4.2;
-  return static_cast<std::int64_t>(std::ceil(kSigmas * std::max(sigma / spacing, 0.5))) + 2;
+  return static_cast<std::int64_t>(std::ceil(kSigmas * std::max(sigma / spacing, 0.5))) + 3;
 }
 
-LineFilter line_filter(const LinePolish& polish, std::int64_t reach) {
+/// The innermost pair that counts takes what makes the sum 1 and the slope of a straight line its
+/// own; the others are free. For a node itself that is pair 0, twice the node, and pair 1.
+LineFilter line_filter(const LinePolish& polish, std::int64_t shift, std::int64_t reach) {
   const auto size = static_cast<std::size_t>(reach + 1);
-  LineFilter filter{std::vector<double>(size), std::vector<double>(size)};
-  // The middle node takes what makes the sum 1.
+  LineFilter filter{shift, std::vector<double>(size), std::vector<double>(size)};
+  const double half = 0.5 * static_cast<double>(shift);
+  const std::int64_t inner = 1 - shift;  // Of slopes.
+  const double away = static_cast<double>(inner) + half;
   const Eigen::VectorXd average = fit(
-      1, reach, [](double k, double theta) { return 2.0 * (std::cos(k * theta) - 1.0); },
-      [&](double theta) { return response(polish, theta) - 1.0; });
-  // The first neighbours take what makes the slope of a straight line its own.
-  const Eigen::VectorXd slope = fit(
-      2, reach,
-      [](double k, double theta) {
-        return 2.0 * (std::sin(k * theta) - k * std::sin(theta)) / theta;
+      1, reach,
+      [&](double k, double theta) {
+        return 2.0 * (std::cos((k + half) * theta) - std::cos(half * theta));
       },
-      [&](double theta) { return response(polish, theta) - std::sin(theta) / theta; });
-  filter.average[0] = 1.0 - 2.0 * average.sum();
-  double first = 0.5;
+      [&](double theta) { return response(polish, theta) - std::cos(half * theta); });
+  const Eigen::VectorXd slope = fit(
+      inner + 1, reach,
+      [&](double k, double theta) {
+        const double straight = (k + half) / away * std::sin(away * theta);
+        return 2.0 * (std::sin((k + half) * theta) - straight) / theta;
+      },
+      [&](double theta) {
+        return response(polish, theta) - std::sin(away * theta) / (away * theta);
+      });
+  filter.average[0] = 0.5 - average.sum();
+  double straight = 0.5;
   for (std::int64_t k = 1; k <= reach; ++k) {
     const auto n = static_cast<std::size_t>(k);
     filter.average[n] = average(k - 1);
-    if (k == 1) continue;
-    filter.slope[n] = slope(k - 2) / polish.spacing;
-    first -= static_cast<double>(k) * slope(k - 2);
+    if (k == inner) continue;
+    const double weight = slope(k - inner - 1);
+    filter.slope[n] = weight / polish.spacing;
+    straight -= (static_cast<double>(k) + half) * weight;
   }
-  filter.slope[1] = first / polish.spacing;
+  filter.slope[static_cast<std::size_t>(inner)] = straight / (away * polish.spacing);
   return filter;
 }
 

@@ -6,11 +6,13 @@
 
 namespace lensforge {
 
-/// Weights of the nodes 0, 1, … away along a line: of the sum of both sides for averages and of
-/// their difference for slopes.
+/// Weights of pairs of nodes around a place on a line: pair k is the nodes k before node n and k
+/// behind node n + shift, of which averages take the sum and slopes the difference. With shift 0
+/// the place is node n itself, with 1 the middle between it and the next.
 struct LineFilter {
+  std::int64_t shift = 0;
   std::vector<double> average;
-  std::vector<double> slope;  ///< 1/mm; the first is 0.
+  std::vector<double> slope;  ///< 1/mm
 
   [[nodiscard]] std::int64_t reach() const { return static_cast<std::int64_t>(average.size()) - 1; }
 };
@@ -26,10 +28,10 @@ struct LinePolish {
 /// The filter that turns means over boxes into the polished heights and their slopes: of all with
 /// `reach` nodes to either side the one that comes nearest to exp(−σ²k²/2) / B(k) over the
 /// frequencies that the nodes can carry, in the least squares, where B(k) is the box's own
-/// response. Straight lines stay as they are. LineFilter.* in its test have the error: 0.1 % for
+/// response. Straight lines stay as they are. LineFilter.* in its test have the error: 0.2 % for
 /// waves of five nodes and more.
-/// @pre reach ≥ 2, and ≥ 4.2 σ / spacing for that error.
-LineFilter line_filter(const LinePolish& polish, std::int64_t reach);
+/// @param shift  0 or 1. @pre reach ≥ 2, and ≥ 4.2 σ / spacing for that error.
+LineFilter line_filter(const LinePolish& polish, std::int64_t shift, std::int64_t reach);
 
 /// The reach that line_filter() needs.
 std::int64_t line_filter_reach(double sigma, double spacing);

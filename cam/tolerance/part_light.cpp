@@ -51,8 +51,11 @@ Eigen::Vector2d PartLight::land(const Eigen::Vector3d& point, const Eigen::Vecto
   return plane.to_pixels(from.head<2>() + length * way.head<2>());
 }
 
-Eigen::Vector2d PartLight::reach(double slope, double z) const {
-  return light_.plane().pixels_per_mm().cwiseAbs() * light_.reach(slope, z);
+Eigen::Vector2d PartLight::moved_by(const Eigen::Vector3d& point, const Eigen::Vector2d& slope,
+                                    int axis) const {
+  constexpr double kStep = 1e-4;  // Third derivatives of refraction are of order 1: 1e-8 of it.
+  const Eigen::Vector2d step = kStep * Eigen::Vector2d::Unit(axis);
+  return (land(point, slope + step) - land(point, slope - step)) / (2.0 * kStep);
 }
 
 double PartLight::source_radius(double angle, double z) const {

@@ -28,10 +28,13 @@ class PartLight {
   [[nodiscard]] double intake(const Corners& triangle) const { return light_.intake(triangle); }
   /// Area of the lens as it has grown, mm².
   [[nodiscard]] double lens_area() const { return lens_area_; }
-  /// How far a small change of slope moves the light over the screen, pixels, along x and y.
-  [[nodiscard]] Eigen::Vector2d reach(double slope, double z) const;
-  /// Radius of the blur by a source of this full angle (rad) as the lens sees it, pixels: to first
-  /// order light from beside the axis lands distance × angle beside.
+  /// How far a change of slope along an axis moves the light over the screen, pixels; NaN where
+  /// none leaves.
+  [[nodiscard]] Eigen::Vector2d moved_by(const Eigen::Vector3d& point, const Eigen::Vector2d& slope,
+                                         int axis) const;
+  /// Radius of the spot that a point of height z lights with a source of this full angle (rad) as
+  /// the lens sees it, pixels: to first order light from beside the axis lands distance × angle
+  /// beside.
   [[nodiscard]] double source_radius(double angle, double z) const;
 
  private:

@@ -9,8 +9,8 @@
 #include "cam/tolerance/line_filter.h"
 #include "cam/tolerance/part_light.h"
 #include "cam/tolerance/part_tile.h"
-#include "cam/tolerance/picture_blur.h"
 #include "cam/tolerance/ripple.h"
+#include "cam/tolerance/source_blur.h"
 #include "design/flux/flux_image.h"
 
 namespace lensforge {
@@ -20,7 +20,9 @@ namespace {
 constexpr std::int64_t kTile = 96;
 
 std::array<BaseAxis, 2> axes_of(const PartPlan& plan) {
-  return base_axes(plan.optics.lens_size, plan.passes, plan.polish.sigma);
+  const Eigen::Vector2d& size = plan.optics.lens_size;
+  const Eigen::Vector2d detail = size.cwiseQuotient(plan.optics.pixels.cast<double>());
+  return base_axes(size, plan.passes, plan.polish.sigma, detail);
 }
 
 /// Nodes that the filters of the strongest polish need beyond the rim, one more for the slopes
@@ -39,39 +41,37 @@ double mean_height(const BaseHeights& base) {
   return sum / static_cast<double>(base.axis(0).nodes * base.axis(1).nodes);
 }
 
-LineFilter filter_of(const BaseAxis& axis, double sigma) {
-  return line_filter({sigma, axis.spacing, axis.box(), 2 * axis.half},
-                     line_filter_reach(sigma, axis.spacing));
+/// Across rows that leave a ripple there are four nodes a pitch.
+SceneAxis scene_axis(const BaseAxis& axis, double sigma, bool ripples) {
+  SceneAxis scene;
+  scene.ripples = ripples;
+  const LinePolish polish{sigma, axis.spacing, axis.box(), 2 * axis.half};
+  const std::int64_t reach = line_filter_reach(sigma, axis.spacing);
+  for (std::int64_t shift = 0; shift <= (ripples ? 1 : 0); ++shift) {
+    scene.filters.push_back(line_filter(polish, shift, reach));
+  }
+  return scene;
 }
 
-/// What blurs a part's picture.
-struct Blurs {
-  std::array<bool, 2> lines{false, false};  ///< Along the picture's x and y.
-  std::array<BlurKernel, 2> line;
-  BlurKernel disc;
+/// Where boxes hold several pitches, these are so much finer than σ that no ripple is left: less
+/// than 1e-5 of a scallop's slope.
+bool ripples(const BaseAxis& axis, const Passes& passes) { return axis.box() < 1.5 * passes.pitch; }
 
-  [[nodiscard]] std::int64_t reach() const {
-    return std::max(line[0].reach, line[1].reach) + disc.reach;
-  }
-};
-
-Blurs blurs_of(const PartPlan& plan, const PartError& error, const PartLight& light, double sigma,
-               double z) {
-  const Passes& passes = plan.passes;
-  Blurs blurs;
-  const std::vector<WeightedValue> slopes = ripple_slopes(
-      passes, passes.ball_radius + error.radius, error.eccentricity, {sigma, error.sigma_within});
-  for (int axis = 0; axis < 2; ++axis) {
-    if (axis == passes.axis && !passes.cross) continue;
-    std::vector<WeightedValue> distances = slopes;
-    for (WeightedValue& d : distances) {
-      d.value = std::copysign(light.reach(std::abs(d.value), z)[axis], d.value);
-    }
-    blurs.lines[static_cast<std::size_t>(axis)] = true;
-    blurs.line[static_cast<std::size_t>(axis)] = line_blur(distances);
-  }
-  if (error.source > 0.0) blurs.disc = disc_blur(light.source_radius(error.source, z));
-  return blurs;
+/// With the scene's margin.
+FluxRaster render_tiles(const PartScene& scene, const Eigen::Vector2i& pixels,
+                        const Executor& executor) {
+  FluxRaster raster{pixels.x() + 2 * scene.margin, pixels.y() + 2 * scene.margin, {}};
+  FluxImage image(static_cast<int>(raster.columns), static_cast<int>(raster.rows));
+  image.begin(executor);
+  const std::vector<CellRange> tiles =
+      tiles_of({0, 0, scene.base.axis(0).nodes - 1, scene.base.axis(1).nodes - 1}, kTile);
+  const auto add_tile = [&](std::int64_t t, const FluxAccumulator& sum) {
+    PartTile(scene, tiles[static_cast<std::size_t>(t)]).deposit(sum);
+  };
+  image.add(executor, static_cast<std::int64_t>(tiles.size()), add_tile, 1);
+  const auto flux = image.resolve(executor);
+  raster.flux.assign(flux.begin(), flux.end());
+  return raster;
 }
 
 FluxPicture cropped(const FluxRaster& raster, std::int64_t margin) {
@@ -85,6 +85,22 @@ FluxPicture cropped(const FluxRaster& raster, std::int64_t margin) {
   return picture;
 }
 
+/// Radii along x and y of the spot that a point of the part lights: that of the source, and, along
+/// a ripple of which the source sees less than there is (PartTile), so much more that the variance
+/// is that of all of it.
+Eigen::Vector2d blur_radii(const PartScene& scene, const Eigen::Vector2d& scale,
+                           const Eigen::Vector3d& middle) {
+  Eigen::Vector2d square = Eigen::Vector2d::Constant(scene.source * scene.source);
+  for (int axis = 0; axis < 2; ++axis) {
+    if (!scene.axes[static_cast<std::size_t>(axis)].ripples) continue;
+    const Eigen::Vector2d moved = scene.light.moved_by(middle, {0.0, 0.0}, axis);
+    const double seen = scene.ripple.seen_by_disc(scene.source / scale[axis]);
+    const double far = scene.ripple.largest() * moved[axis];
+    square[axis] += 2.0 * far * far * (1.0 - seen * seen);
+  }
+  return square.cwiseSqrt();
+}
+
 }  // namespace
 
 PartModel::PartModel(const SurfaceField& cut, const SurfaceField& designed, const PartPlan& plan,
@@ -95,36 +111,32 @@ PartModel::PartModel(const SurfaceField& cut, const SurfaceField& designed, cons
       mean_height_(mean_height(base_)) {}
 
 FluxPicture PartModel::render(const PartError& error, const Executor& executor) const {
+  const Passes& passes = plan_.passes;
   const double sigma = std::min(plan_.polish.sigma * error.sigma_factor, plan_.largest_sigma);
   const PartLight light(plan_.optics, error);
-  const ErrorHeights heights(base_, error, plan_.passes, sigma);
-  const Blurs blurs = blurs_of(plan_, error, light, sigma, mean_height_);
-  const std::int64_t margin = blurs.reach();
-  const PartScene scene{base_,
-                        heights,
-                        light,
-                        plan_.polish,
-                        {filter_of(base_.axis(0), sigma), filter_of(base_.axis(1), sigma)},
-                        plan_.optics.lens_size,
-                        margin};
-  const Eigen::Vector2i pixels = plan_.optics.pixels;
-  FluxRaster raster{pixels.x() + 2 * margin, pixels.y() + 2 * margin, {}};
-  FluxImage image(static_cast<int>(raster.columns), static_cast<int>(raster.rows));
-  image.begin(executor);
-  const std::vector<CellRange> tiles =
-      tiles_of({0, 0, base_.axis(0).nodes - 1, base_.axis(1).nodes - 1}, kTile);
-  const auto add_tile = [&](std::int64_t t, const FluxAccumulator& sum) {
-    PartTile(scene, tiles[static_cast<std::size_t>(t)]).deposit(sum);
+  const ErrorHeights heights(base_, error, passes, sigma);
+  const Ripple ripple(passes, passes.ball_radius + error.radius, sigma);
+  const auto axis = [&](int k) {
+    const bool across = k != passes.axis || passes.cross;
+    return scene_axis(base_.axis(k), sigma, across && ripples(base_.axis(k), passes));
   };
-  image.add(executor, static_cast<std::int64_t>(tiles.size()), add_tile, 1);
-  const auto flux = image.resolve(executor);
-  raster.flux.assign(flux.begin(), flux.end());
-  for (int axis = 0; axis < 2; ++axis) {
-    const auto k = static_cast<std::size_t>(axis);
-    if (blurs.lines[k]) raster = blurred_along(raster, axis, blurs.line[k], executor);
-  }
-  if (error.source > 0.0) raster = blurred(raster, blurs.disc, executor);
-  return cropped(raster, margin);
+  PartScene scene{base_,
+                  heights,
+                  light,
+                  ripple,
+                  plan_.polish,
+                  {axis(0), axis(1)},
+                  plan_.optics.lens_size,
+                  0,
+                  light.source_radius(error.source, mean_height_)};
+  if (scene.source == 0.0) return cropped(render_tiles(scene, plan_.optics.pixels, executor), 0);
+  const Eigen::Vector2d& size = plan_.optics.lens_size;
+  const Eigen::Vector3d middle(0.5 * size.x(), 0.5 * size.y(), mean_height_);
+  const Eigen::Vector2d scale = plan_.optics.pixels.cast<double>().cwiseQuotient(size);
+  const BlurKernel blur = disc_blur(blur_radii(scene, scale, middle));
+  scene.margin = blur.reach;
+  const FluxRaster raster = render_tiles(scene, plan_.optics.pixels, executor);
+  return cropped(blurred(raster, blur, executor), blur.reach);
 }
 
 std::int64_t part_nodes(const PartPlan& plan) {

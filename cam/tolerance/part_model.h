@@ -28,8 +28,8 @@ struct PartPlan {
 ///
 /// Polishing leaves nothing of that surface which is finer than its σ but the scallops' ripple. So
 /// the heights without scallops (BaseHeights), changed by the part's errors (ErrorHeights), are
-/// polished on a grid as coarse as σ allows and rendered as cam renders any surface; the ripple
-/// (ripple_slopes()) and the source blur the picture. PartModel.* in its test hold that against
+/// polished on a grid as coarse as σ allows; the ripple (Ripple) is added where rays land, with
+/// four nodes a pitch, and the source blurs the picture. PartModel.* in its test hold that against
 /// cam's own chain of surfaces.
 class PartModel {
  public:

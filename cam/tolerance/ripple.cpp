@@ -5,7 +5,6 @@
 #include <array>
 #include <cmath>
 #include <numbers>
-#include <utility>
 
 namespace lensforge {
 namespace {
@@ -14,22 +13,14 @@ constexpr double kTwoPi = 2.0 * std::numbers::pi;
 
 constexpr int kProfile = 96;    ///< Places of a period at which the scallop is known.
 constexpr int kHarmonics = 32;  ///< Of it: without polish the last has 0.1 % of the first's height.
-constexpr int kPhases = 64;     ///< Places at which the polished slope is told.
-
-/// Nodes and weights of a normal distribution, exact to the ninth moment (Gauss and Hermite).
-constexpr std::array<std::pair<double, double>, 5> kNormal{
-    {{-2.8569700138728056, 0.01125741132772069},
-     {-1.3556261799742659, 0.22207592200561264},
-     {0.0, 0.53333333333333333},
-     {1.3556261799742659, 0.22207592200561264},
-     {2.8569700138728056, 0.01125741132772069}}};
+/// Parts of a period at which the slope is kept; between them it is linear, to 1e-4 of a sine.
+constexpr std::size_t kPhases = 256;
 
 /// Height of the scallop at the middles of kProfile equal parts of a period, mm.
-std::array<double, kProfile> scallop(double pitch, double radius, double eccentricity) {
+std::array<double, kProfile> scallop(double pitch, double radius) {
   std::array<double, kProfile> height{};
   for (int i = 0; i < kProfile; ++i) {
-    const double t = std::abs((i + 0.5) / kProfile - 0.5) * pitch;
-    const double out = std::clamp(t - eccentricity, 0.0, radius);
+    const double out = std::min(std::abs((i + 0.5) / kProfile - 0.5) * pitch, radius);
     height[static_cast<std::size_t>(i)] = radius - std::sqrt((radius - out) * (radius + out));
   }
   return height;
@@ -60,26 +51,45 @@ std::array<double, kHarmonics> harmonics(const std::array<double, kProfile>& hei
 
 }  // namespace
 
-std::vector<WeightedValue> ripple_slopes(const Passes& passes, double radius, double eccentricity,
-                                         const RipplePolish& polish) {
-  auto height = scallop(passes.pitch, radius, eccentricity);
+Ripple::Ripple(const Passes& passes, double radius, double sigma)
+    : pitch_(passes.pitch), radius_(radius), sigma_(sigma), sign_(passes.cast ? -1.0 : 1.0) {
+  auto height = scallop(passes.pitch, radius);
   if (passes.cross) height = crossed(height);
   const auto coefficients = harmonics(height);
-  std::vector<WeightedValue> slopes;
-  for (const auto& [node, weight] : kNormal) {
-    const double sigma = std::max(0.0, polish.sigma * (1.0 + polish.within * node));
-    for (int i = 0; i < kPhases; ++i) {
-      double slope = 0.0;
-      for (int k = 1; k <= kHarmonics; ++k) {
-        const double wave = kTwoPi * k / passes.pitch;
-        const double kept = std::exp(-0.5 * wave * wave * sigma * sigma);
-        slope -= coefficients[static_cast<std::size_t>(k - 1)] * kept * wave *
-                 std::sin(kTwoPi * k * (i + 0.5) / kPhases);
-      }
-      slopes.push_back({slope, weight / kPhases});
+  for (std::size_t i = 0; i < kPhases; ++i) {
+    double slope = 0.0;
+    for (int k = 1; k <= kHarmonics; ++k) {
+      const double wave = kTwoPi * k / passes.pitch;
+      const double kept = std::exp(-0.5 * wave * wave * sigma * sigma);
+      slope -= coefficients[static_cast<std::size_t>(k - 1)] * kept * wave *
+               std::sin(kTwoPi * k * static_cast<double>(i) / kPhases);
     }
+    slope_.push_back(slope);
+    largest_ = std::max(largest_, std::abs(slope));
   }
-  return slopes;
+  slope_.push_back(slope_.front());
+}
+
+double Ripple::slope(double place, const Eigen::Vector2d& surface, int across) const {
+  const double stretch = std::sqrt(1.0 + surface.squaredNorm());
+  const double lowest = sign_ * radius_ * surface[across] / stretch;
+  const double periods = (place - lowest) / pitch_;
+  const double phase = (periods - std::floor(periods)) * static_cast<double>(kPhases);
+  const std::size_t i = std::min(static_cast<std::size_t>(phase), kPhases - 1);
+  const double t = phase - static_cast<double>(i);
+  const double bend = (1.0 + surface[across] * surface[across]) * stretch;
+  return sign_ * bend * (slope_[i] + t * (slope_[i + 1] - slope_[i]));
+}
+
+double Ripple::seen_by_disc(double radius) const {
+  constexpr double kSmall = 1e-4;  // Below, the series' x²/8 is 1e-9.
+  const double x = kTwoPi * radius / pitch_;
+  return x < kSmall ? 1.0 : 2.0 * std::cyl_bessel_j(1.0, x) / x;
+}
+
+double Ripple::kept(double factor) const {
+  const double t = kTwoPi / pitch_ * sigma_;
+  return std::exp(-0.5 * t * t * (factor * factor - 1.0));
 }
 
 }  // namespace lensforge
