@@ -207,7 +207,7 @@ OptionTable<O> prediction_rows() {
                Limits::zero_or(cam_limit::kFewestParts, cam_limit::kMostParts),
                "how sure the forecast is: predict so many parts with the errors of the workshop's "
                "[tolerances]; 0: none"),
-      R::whole("--tolerance-seed", &O::tolerance_seed, Limits::between(0, 2147483647),
+      R::whole("--tolerance-seed", &O::tolerance_seed, Limits::between(0, cam_limit::kLargestSeed),
                "seed of the random numbers of --tolerances"),
       R::length("--polish-sigma", in(polish, &PolishModel::sigma), as_in_workshop("polish.sigma"),
                 "polishing averages heights with a Gaussian of this σ"),

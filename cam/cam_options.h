@@ -72,6 +72,7 @@ inline constexpr double kCoarsestSample = 1.0;  ///< mm
 /// Parts that are drawn: the tenth of fewer than 10 is none, and 100,000 take a day.
 inline constexpr int kFewestParts = 10;
 inline constexpr int kMostParts = 100000;
+inline constexpr int kLargestSeed = 999999;
 }  // namespace cam_limit
 
 /// The spacing at which the surface is sampled, mm.
