@@ -7,6 +7,8 @@
 
 #include "cam/finish_setup.h"
 #include "cam/prediction.h"
+#include "cam/tolerance/part_model.h"
+#include "cam/tolerance/tolerance_forecast.h"
 #include "core/error.h"
 #include "core/text/number_text.h"
 
@@ -36,6 +38,8 @@ constexpr double kTraced = 3.0;            ///< Times as long where the part is 
 constexpr double kSecondsPerPoint = 1e-5;  ///< Of a roughing or semi-finishing pass.
 constexpr double kMovesPerPoint = 0.1;     ///< Most of them lie on straight ways.
 constexpr double kSecondsPerSample = 2.5e-7;  ///< Of a surface, milled, polished and rendered.
+constexpr double kSecondsPerPartNode = 3e-7;  ///< Of a part with errors (docs/performance.md).
+constexpr double kMemoryPerPartNode = 24.0;   ///< Bytes: three heights while they are sampled.
 constexpr double kSurfaces = 8.0;             ///< That are rendered.
 
 /// What the advised value leaves free.
@@ -86,6 +90,25 @@ double samples_of(const CamOptions& options, const Eigen::Vector2d& size) {
 
 double nodes_of(const Eigen::Vector2d& size) { return size.prod() / (kMeshSpacing * kMeshSpacing); }
 
+/// Parts that are predicted with errors, and nodes of each.
+double drawn_parts(const CamOptions& options) {
+  if (options.tolerances == 0) return 0.0;
+  const auto parts = static_cast<double>(options.tolerances);
+  return 1.0 + parts +
+         static_cast<double>(kErrorCauses) * static_cast<double>(paired_parts(options.tolerances));
+}
+
+double part_nodes(const CamOptions& options, const OpticalSetup& setup) {
+  const FinishProcess& finish = options.workshop.process.finish;
+  PartPlan plan;
+  plan.optics = setup;
+  plan.passes.pitch = finish_pitch(finish, finishing_ball(options).radius());
+  plan.passes.axis = finish.along == PassAxis::kX ? 0 : 1;
+  plan.passes.cross = finish.cross;
+  plan.polish = options.workshop.polish;
+  return options.tolerances > 0 ? static_cast<double>(part_nodes(plan)) : 0.0;
+}
+
 Eigen::Vector2d size_of(const CamOptions& options, const OpticalSetup& setup) {
   const double shrinkage = options.part == PartKind::kMould ? options.shrinkage : 0.0;
   return setup.lens_size / (1.0 - shrinkage);
@@ -114,12 +137,14 @@ WorkEstimate estimate_cut(const CamOptions& options, const OpticalSetup& setup, 
   const double points = rough_points(options, size);
   WorkEstimate estimate;
   estimate.seconds = (length * seconds_per_mm(options) + points * kSecondsPerPoint +
-                      samples_of(options, size) * kSecondsPerSample) /
+                      samples_of(options, size) * kSecondsPerSample +
+                      drawn_parts(options) * part_nodes(options, setup) * kSecondsPerPartNode) /
                      threads;
   estimate.disk_bytes = (moves + kMovesPerPoint * points) * kBytesPerMove;
   estimate.memory_bytes = kMemory;
   if (options.render) {
-    estimate.memory_bytes += moves * kMemoryPerMove + nodes_of(size) * kMemoryPerNode;
+    estimate.memory_bytes += moves * kMemoryPerMove + nodes_of(size) * kMemoryPerNode +
+                             part_nodes(options, setup) * kMemoryPerPartNode;
     estimate.disk_bytes += nodes_of(size) * kDiskPerNode;
   }
   return estimate;
@@ -145,6 +170,11 @@ void require_room_for_cut(const CamOptions& options, const OpticalSetup& setup,
   }
   if (options.render && nodes_of(size) * kMemoryPerNode > moves * kMemoryPerMove) {
     return require("the milled surface of so large a lens", "--no-render needs less");
+  }
+  if (drawn_parts(options) * part_nodes(options, setup) * kSecondsPerPartNode >
+      0.5 * on_one_core.seconds) {
+    return require("--tolerances " + std::to_string(options.tolerances),
+                   "fewer parts, --tolerances 200, would fit");
   }
   if (samples_of(options, size) * kSecondsPerSample > 0.5 * on_one_core.seconds) {
     return require("--sample-spacing " + shortest_text(sample_spacing(options)) + "mm",

@@ -18,24 +18,26 @@ std::string stacked(const std::vector<TableColumn>& columns, const std::vector<R
   return element("div", "class=\"stack\"", html_table(columns, rows));
 }
 
-std::string quantile_table(const ToleranceForecast& forecast) {
+/// What the programs leave without errors stands beside the exact forecast of the same part.
+std::string quantile_table(const ToleranceForecast& forecast, const PictureQuality& part) {
   const auto mae = [](double value) { return decimal_text(value, kMaeDecimals); };
   const PartFigures& nominal = forecast.nominal;
-  std::vector<Row> rows{
-      {"MAE", mae(forecast.mae.p10), mae(forecast.mae.median), mae(forecast.mae.p90),
-       mae(nominal.mae)},
-      {"leakage", percent_text(forecast.leakage.p10), percent_text(forecast.leakage.median),
-       percent_text(forecast.leakage.p90), percent_text(nominal.leakage)}};
+  std::vector<Row> rows{{"MAE", mae(forecast.mae.p10), mae(forecast.mae.median),
+                         mae(forecast.mae.p90), mae(nominal.mae), mae(part.metrics.mae)},
+                        {"leakage", percent_text(forecast.leakage.p10),
+                         percent_text(forecast.leakage.median), percent_text(forecast.leakage.p90),
+                         percent_text(nominal.leakage), percent_text(part.leakage)}};
   if (forecast.has_dark) {
     rows.push_back({"contrast", contrast_text(forecast.contrast.p10),
                     contrast_text(forecast.contrast.median), contrast_text(forecast.contrast.p90),
-                    contrast_text(nominal.contrast())});
+                    contrast_text(nominal.contrast()), contrast_text(part.contrast())});
   }
   return stacked({{"figure", false},
                   {"1 of 10 parts below", true},
                   {"median", true},
                   {"9 of 10 parts below", true},
-                  {"without errors", true}},
+                  {"without errors", true},
+                  {"by the forecast above", true}},
                  rows);
 }
 
@@ -88,13 +90,14 @@ std::string tolerances(const ReportData& data) {
                             " of them were drawn again with half of each cause and all else the "
                             "same; “known to” is the " +
                             "standard error of that mean.";
-  return element(
-      "section", "",
-      element("h2", "", "How sure is the forecast") +
-          element("p", "", element("b", "", escape_html(tolerance_words(forecast)))) +
-          quantile_table(forecast) + element("h3", "style=\"margin-top:1.2rem\"", "What matters") +
-          cause_table(forecast) + element("div", "class=\"maps\"", spread_figure(forecast)) +
-          element("p", "class=\"soft\"", escape_html(words)));
+  return element("section", "",
+                 element("h2", "", "How sure is the forecast") +
+                     element("p", "", element("b", "", escape_html(tolerance_words(forecast)))) +
+                     quantile_table(forecast, data.leakage.part().quality) +
+                     element("h3", "style=\"margin-top:1.2rem\"", "What matters") +
+                     cause_table(forecast) +
+                     element("div", "class=\"maps\"", spread_figure(forecast)) +
+                     element("p", "class=\"soft\"", escape_html(words)));
 }
 
 }  // namespace lensforge::report_section

@@ -19,7 +19,7 @@ constexpr double kAlong = 5.0 / 3.0;
 /// 8 and 12.
 constexpr double kPerPixel = 8.0;
 /// mm; however little is polished, and however much.
-constexpr double kFinest = 0.01;
+constexpr double kFinest = 0.02;
 constexpr double kCoarsest = 0.1;
 
 /// Samples of a pitch: its scallops' harmonics up to the fifth vanish from a mean over them.

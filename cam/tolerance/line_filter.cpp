@@ -13,7 +13,10 @@ namespace {
 /// Up to here (waves of three nodes) the response is that of the polish; above it falls to none,
 /// where a box's own response comes near zero and nothing is left to be restored.
 constexpr double kBand = 2.0;
-constexpr int kPhases = 96;      ///< At which the response is fitted.
+/// At which the response is fitted, at least, and for every weight.
+constexpr std::int64_t kPhases = 96;
+constexpr std::int64_t kPhasesPerWeight = 8;
+
 constexpr double kBeyond = 0.1;  ///< Weight of the phases above kBand.
 constexpr double kGentle = 0.1;  ///< Long waves weigh more: 1 / (kGentle + θ²).
 
@@ -40,10 +43,12 @@ double weight(double theta) { return (theta <= kBand ? 1.0 : kBeyond) / (kGentle
 template <class Basis, class Target>
 Eigen::VectorXd fit(std::int64_t first, std::int64_t reach, const Basis& basis,
                     const Target& target) {
-  Eigen::MatrixXd rows(kPhases, reach - first + 1);
-  Eigen::VectorXd wanted(kPhases);
-  for (int i = 0; i < kPhases; ++i) {
-    const double theta = std::numbers::pi * (i + 0.5) / kPhases;
+  const std::int64_t phases = std::max(kPhases, kPhasesPerWeight * reach);
+  Eigen::MatrixXd rows(phases, reach - first + 1);
+  Eigen::VectorXd wanted(phases);
+  for (std::int64_t i = 0; i < phases; ++i) {
+    const double theta =
+        std::numbers::pi * (static_cast<double>(i) + 0.5) / static_cast<double>(phases);
     const double w = weight(theta);
     for (std::int64_t k = first; k <= reach; ++k) {
       rows(i, k - first) = w * basis(static_cast<double>(k), theta);
