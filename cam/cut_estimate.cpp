@@ -37,10 +37,10 @@ constexpr double kFinerSeconds = 2.75;     ///< Their power of finer slopes: mov
 constexpr double kTraced = 3.0;            ///< Times as long where the part is rendered.
 constexpr double kSecondsPerPoint = 1e-5;  ///< Of a roughing or semi-finishing pass.
 constexpr double kMovesPerPoint = 0.1;     ///< Most of them lie on straight ways.
-constexpr double kSecondsPerSample = 2.5e-7;  ///< Of a surface, milled, polished and rendered.
-constexpr double kSecondsPerPartNode = 3e-7;  ///< Of a part with errors (docs/performance.md).
-constexpr double kMemoryPerPartNode = 24.0;   ///< Bytes: three heights while they are sampled.
-constexpr double kSurfaces = 8.0;             ///< That are rendered.
+constexpr double kSecondsPerSample = 2.5e-7;    ///< Of a surface, milled, polished and rendered.
+constexpr double kSecondsPerPartNode = 1.9e-7;  ///< Of a part with errors (docs/performance.md).
+constexpr double kMemoryPerPartNode = 24.0;     ///< Bytes: three heights while they are sampled.
+constexpr double kSurfaces = 8.0;               ///< That are rendered.
 
 /// What the advised value leaves free.
 constexpr double kSpare = 1.5;

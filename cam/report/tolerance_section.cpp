@@ -69,7 +69,7 @@ std::string spread_figure(const ToleranceForecast& forecast) {
       scaled_picture(forecast.deviation, forecast.columns, forecast.rows, top);
   const std::string bar = "0 <img src=\"" + png_uri(scale_picture()) + "\" alt=\"colour scale\"> " +
                           decimal_text(top, 3);
-  return element("figure", "class=\"map\"",
+  return element("figure", "class=\"map\" style=\"max-width:34rem\"",
                  "<img src=\"" + png_uri(picture) + "\" alt=\"How much pixels differ\">" +
                      element("figcaption", "",
                              "<b>How much parts differ</b><br>Standard deviation of every pixel "

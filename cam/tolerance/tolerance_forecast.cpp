@@ -118,6 +118,21 @@ std::string ratio_words(double contrast) {
   return decimal_text(contrast, contrast < 10.0 ? 1 : 0) + " : 1";
 }
 
+/// What matters most.
+std::string most_words(const ToleranceForecast& forecast) {
+  const CauseEffect& most = forecast.causes.front();
+  if (!(most.mae < 0.0)) return "No single cause matters much.";
+  std::string words = std::string("What matters most is the ") + name_of(most.cause) +
+                      ": with half its error the MAE would be " + decimal_text(-most.mae, 4) +
+                      " lower";
+  const std::string half = ratio_words(contrast_with_half(forecast, most));
+  const std::string whole = ratio_words(forecast.contrast.median);
+  if (forecast.has_dark && half != whole) {
+    words += " and the median contrast " + half + " instead of " + whole;
+  }
+  return words + ".";
+}
+
 /// Linear between two sorted values; the upper one may be infinite.
 double between(double low, double high, double share) {
   if (share == 0.0 || low == high) return low;
@@ -164,15 +179,7 @@ std::string tolerance_words(const ToleranceForecast& forecast) {
   }
   words +=
       "an MAE of " + decimal_text(forecast.mae.p10, 4) + " to " + decimal_text(forecast.mae.p90, 4);
-  const CauseEffect& most = forecast.causes.front();
-  if (!(most.mae < 0.0)) return words + ". No single cause matters much.";
-  words += std::string(". What matters most is the ") + name_of(most.cause) +
-           ": half of it would lower the MAE by " + decimal_text(-most.mae, 4);
-  if (forecast.has_dark) {
-    words += " and make the median contrast " + ratio_words(contrast_with_half(forecast, most)) +
-             " instead of " + ratio_words(forecast.contrast.median);
-  }
-  return words + ".";
+  return words + ". " + most_words(forecast);
 }
 
 }  // namespace lensforge
