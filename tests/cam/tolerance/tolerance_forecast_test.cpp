@@ -166,7 +166,8 @@ TEST(ToleranceWords, SayWhatToExpectAndWhatMatters) {
   EXPECT_EQ(
       tolerance_words(forecast),
       "8 of 10 parts should have a contrast of 20 : 1 to 35 : 1 and an MAE of 0.0102 to 0.0151. "
-      "What matters most is the strength of the polish: with half its error the MAE would be 0.0012 "
+      "What matters most is the strength of the polish: with half its error the MAE would be "
+      "0.0012 "
       "lower and the median contrast 30 : 1 instead of 26 : 1.");
 }
 
