@@ -138,6 +138,17 @@ class BoxTile {
   GridWindow window_;
 };
 
+/// Of a node beyond the rim: the node on it, and the one as far inside. A node of the lens is its
+/// own.
+struct Turned {
+  std::int64_t rim, inside;
+};
+
+Turned turned(std::int64_t at, std::int64_t nodes) {
+  const std::int64_t rim = std::clamp<std::int64_t>(at, 0, nodes - 1);
+  return {rim, std::clamp<std::int64_t>(2 * rim - at, 0, nodes - 1)};
+}
+
 std::vector<CellRange> node_tiles(const std::array<BaseAxis, 2>& axes) {
   const std::int64_t samples = std::max(axes[0].samples, axes[1].samples);
   return tiles_of({0, 0, axes[0].nodes, axes[1].nodes},
@@ -191,26 +202,19 @@ BaseHeights BaseHeights::sample(const SurfaceField& cut, const SurfaceField& des
 void BaseHeights::extend(const std::vector<double>& form, const std::vector<double>& marks) {
   const std::int64_t columns = axes_[0].nodes;
   const std::int64_t rows = axes_[1].nodes;
-  // Of a node beyond the rim: the node on it and the one as far inside.
-  const auto turned = [](std::int64_t at, std::int64_t nodes) {
-    const std::int64_t rim = std::clamp<std::int64_t>(at, 0, nodes - 1);
-    return std::pair(rim, std::clamp<std::int64_t>(2 * rim - at, 0, nodes - 1));
-  };
   heights_.resize(static_cast<std::size_t>(stride() * (rows + 2 * pad_)));
   std::size_t n = 0;
   for (std::int64_t j = -pad_; j < rows + pad_; ++j) {
-    const auto [rim_j, in_j] = turned(j, rows);
+    const Turned y = turned(j, rows);
     for (std::int64_t i = -pad_; i < columns + pad_; ++i) {
-      const auto [rim_i, in_i] = turned(i, columns);
-      const auto form_at = [&](std::int64_t a, std::int64_t b) {
-        return form[static_cast<std::size_t>(b * columns + a)];
-      };
+      const Turned x = turned(i, columns);
       // Turned along x on the rows concerned, then along y.
-      const auto along = [&](std::int64_t b) {
-        return in_i == i ? form_at(i, b) : 2.0 * form_at(rim_i, b) - form_at(in_i, b);
+      const auto along = [&](std::int64_t row) {
+        const double* const line = &form[static_cast<std::size_t>(row * columns)];
+        return x.inside == i ? line[i] : 2.0 * line[x.rim] - line[x.inside];
       };
-      const double turned_form = in_j == j ? along(j) : 2.0 * along(rim_j) - along(in_j);
-      heights_[n++] = turned_form + marks[static_cast<std::size_t>(in_j * columns + in_i)];
+      const double height = y.inside == j ? along(j) : 2.0 * along(y.rim) - along(y.inside);
+      heights_[n++] = height + marks[static_cast<std::size_t>(y.inside * columns + x.inside)];
     }
   }
 }
