@@ -71,7 +71,10 @@ PartTile::Nodes PartTile::nodes_of(int axis) const {
   nodes.first = nodes.parts * from - 1;
   nodes.count = nodes.parts * cells + 3;
   nodes.base = cell_of(nodes.first, nodes.parts) - reach;
-  nodes.bases = cell_of(nodes.first + nodes.count - 1, nodes.parts) + 1 + reach - nodes.base + 1;
+  // Behind the last node's cell there is one more base where filters lie between nodes.
+  const std::int64_t last =
+      cell_of(nodes.first + nodes.count - 1, nodes.parts) + scene.filters.back().shift + reach;
+  nodes.bases = last - nodes.base + 1;
   nodes.spacing = scene_.base.axis(axis).spacing / static_cast<double>(nodes.parts);
   return nodes;
 }
