@@ -3,6 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
+
+#include "core/error.h"
 
 namespace lensforge {
 namespace {
@@ -27,6 +30,16 @@ void rows_in_box(double middle, double width, const Take& take) {
     const double high = std::min(to, static_cast<double>(row) + 0.5);
     if (high > low) take(row, (high - low) / width);
   }
+}
+
+/// One node more on every side is there, too.
+void check_padding(const BaseHeights& base, const CellRange& nodes) {
+  const std::int64_t pad = base.pad();
+  const bool there = nodes.column - 1 >= -pad && nodes.row - 1 >= -pad &&
+                     nodes.column + nodes.columns < base.axis(0).nodes + pad &&
+                     nodes.row + nodes.rows < base.axis(1).nodes + pad;
+  LF_CHECK(there, std::to_string(nodes.column) + " " + std::to_string(nodes.columns) + " " +
+                      std::to_string(nodes.row) + " " + std::to_string(nodes.rows));
 }
 
 }  // namespace
@@ -153,6 +166,7 @@ double ErrorHeights::of_polish(const double* height, double factor) const {
 }
 
 void ErrorHeights::fill(const CellRange& nodes, double* heights) const {
+  check_padding(base_, nodes);
   const bool cut_wrong =
       row_places_ > 0 || half_backlash_ != 0.0 || radius_ != 0.0 || eccentricity_ != 0.0;
   const bool along_x = passes_.axis == 0;
