@@ -59,6 +59,7 @@ std::string summary_text(const fs::path& folder, const CamResult& result) {
     text += surface_text(report.leakage.designed);
     for (const RenderedSurface& surface : report.leakage.others) text += surface_text(surface);
     for (const LeakPlace& place : report.places) text += "  " + leak_words(place) + "\n";
+    if (!report.tolerances.empty()) text += "  " + tolerance_words(report.tolerances) + "\n";
   }
   for (const LimitCheck& check : report.verdict.checks) {
     if (!check.passes()) text += limit_text(check);

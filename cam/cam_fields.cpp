@@ -203,6 +203,12 @@ OptionTable<O> prediction_rows() {
   return {
       R::without("--no-render", &O::render, "programs only, without the predicted picture"),
       R::without("--no-remedies", &O::remedies, "do not try what helps where most light leaks"),
+      R::whole("--tolerances", &O::tolerances,
+               Limits::zero_or(cam_limit::kFewestParts, cam_limit::kMostParts),
+               "how sure the forecast is: predict so many parts with the errors of the workshop's "
+               "[tolerances]; 0: none"),
+      R::whole("--tolerance-seed", &O::tolerance_seed, Limits::between(0, cam_limit::kLargestSeed),
+               "seed of the random numbers of --tolerances"),
       R::length("--polish-sigma", in(polish, &PolishModel::sigma), as_in_workshop("polish.sigma"),
                 "polishing averages heights with a Gaussian of this σ"),
       R::length("--rim-depth", in(polish, &PolishModel::rim_depth),

@@ -17,6 +17,7 @@
 #include "cam/remedies.h"
 #include "cam/report/report_html.h"
 #include "cam/report/report_json.h"
+#include "cam/tolerance_run.h"
 #include "core/error.h"
 #include "core/image/error_image.h"
 #include "core/image/image_io.h"
@@ -114,6 +115,10 @@ class Job {
     if (options_.remedies) {
       try_remedies({plan_, lens_, surfaces.designed(), surfaces.part(), prediction.leakage},
                    prediction.places, executor_, control_);
+    }
+    if (options_.tolerances > 0) {
+      prediction.tolerances = draw_parts(
+          {plan_, lens_, surfaces, prediction.leakage.designed.picture}, executor_, control_);
     }
     return prediction;
   }

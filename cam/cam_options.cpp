@@ -39,6 +39,13 @@ void validate_sampling(const CamOptions& options) {
   }
 }
 
+void validate_tolerances(const CamOptions& options) {
+  if (options.tolerances > 0 && !options.render) {
+    refuse("--tolerances", options.tolerances,
+           "needs the predicted picture: leave out --no-render, or use --tolerances 0");
+  }
+}
+
 /// Before hours are spent on programs that the controller could not read.
 void validate_tool_numbers(const CamOptions& options) {
   if (!options.post.changes_tools()) return;
@@ -103,6 +110,7 @@ void validate(const CamOptions& options, const OpticalSetup& setup) {
   validate_tool_numbers(options);
   validate_decimals(options);
   validate_sampling(options);
+  validate_tolerances(options);
 }
 
 }  // namespace lensforge

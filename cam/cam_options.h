@@ -52,8 +52,10 @@ struct CamOptions {
 
   bool force = false;  ///< Replace files that no cut wrote as they stand.
 
-  bool render = true;    ///< Compute what the part will project; else programs only.
-  bool remedies = true;  ///< Try what helps where most light leaks, if it is computed.
+  bool render = true;      ///< Compute what the part will project; else programs only.
+  bool remedies = true;    ///< Try what helps where most light leaks, if it is computed.
+  int tolerances = 0;      ///< Parts with errors that are drawn (Workshop::tolerances), 0 or 10 up.
+  int tolerance_seed = 1;  ///< Of the random numbers that they are drawn with, ≥ 0.
   /// Of the surface that is rendered, mm, 0.001 … 1; 0 takes a sixth of the pitch, or a third of
   /// the polish's σ if that is more.
   double sample_spacing = 0.0;
@@ -67,6 +69,10 @@ inline constexpr double kDark = 1e3;  ///< Of LeakageOptions::dark_below: bright
 inline constexpr double kLimit = 1e6;           ///< Of each of CutLimits, in its own unit.
 inline constexpr double kFinestSample = 1e-3;   ///< mm
 inline constexpr double kCoarsestSample = 1.0;  ///< mm
+/// Parts that are drawn: the tenth of fewer than 10 is none, and 100,000 take a day.
+inline constexpr int kFewestParts = 10;
+inline constexpr int kMostParts = 100000;
+inline constexpr int kLargestSeed = 999999;
 }  // namespace cam_limit
 
 /// The spacing at which the surface is sampled, mm.

@@ -181,6 +181,10 @@ CutComparison compare_cuts(const Lens& lens, const CamOptions& options, const Cu
                            const fs::path& folder, const Executor& executor,
                            const RunControl& control) {
   const std::vector<Choice> all = combinations(options, choices);
+  if (options.tolerances > 0) {
+    throw InputError("--tolerances " + std::to_string(options.tolerances) +
+                     ": --compare ranks choices without it; leave one of them out");
+  }
   for (const Choice& choice : all) validate(choice.options, lens.setup);
   require_replaceable_cut(folder, {}, std::array{kComparePage}, options.force);
   CutComparison comparison;

@@ -7,19 +7,22 @@
 
 #include "cam/finish_setup.h"
 #include "cam/prediction.h"
+#include "cam/tolerance/part_model.h"
+#include "cam/tolerance/tolerance_forecast.h"
 #include "core/error.h"
 #include "core/text/number_text.h"
 
 namespace lensforge {
 namespace {
 
-// Measured on a portrait of 25 mm with the default tools, on one core of 2.5 GHz: with 1e-3, 1.5e-4
-// and 5e-5 rad 0.8, 2.3 and 9.1 moves and 0.12, 0.18 and 3.8 ms a millimetre of row.
+// Measured on a portrait of 100 mm with the default tools, 6e-5 rad: 2.4 moves and 0.2 ms a
+// millimetre of row. The powers are of one of 25 mm, on one core of 2.5 GHz: with 1e-3, 1.5e-4 and
+// 5e-5 rad 0.8, 2.3 and 9.1 moves and 0.12, 0.18 and 3.8 ms a millimetre of row.
 
 /// Moves a millimetre of row that the default tolerances take; how their number grows with coarser
 /// and with finer slopes, and, as chords of arcs shorten with the root of their height, with
 /// heights.
-constexpr double kMovesPerMm = 2.5;
+constexpr double kMovesPerMm = 2.4;
 constexpr double kCoarserPower = 0.6;
 constexpr double kFinerPower = 1.3;
 constexpr double kTolerancePower = 0.5;
@@ -32,14 +35,16 @@ constexpr double kStretchedMemoryPerMove = 400.0;
 constexpr double kMemory = 1.5e8;          ///< Bytes of everything else.
 constexpr double kMemoryPerNode = 200.0;   ///< Bytes of milled.ply and of what it is made from.
 constexpr double kDiskPerNode = 50.0;      ///< Bytes of a vertex and two triangles.
-constexpr double kSecondsPerMm = 1.8e-4;   ///< Of a finishing row: drop curve, fit, reading back.
+constexpr double kSecondsPerMm = 2e-4;     ///< Of a finishing row: drop curve, fit, reading back.
 constexpr double kMinSecondsPerMm = 1e-4;  ///< With any tolerance.
 constexpr double kFinerSeconds = 2.75;     ///< Their power of finer slopes: moves are tried often.
 constexpr double kTraced = 3.0;            ///< Times as long where the part is rendered.
 constexpr double kSecondsPerPoint = 1e-5;  ///< Of a roughing or semi-finishing pass.
 constexpr double kMovesPerPoint = 0.1;     ///< Most of them lie on straight ways.
-constexpr double kSecondsPerSample = 2.5e-7;  ///< Of a surface, milled, polished and rendered.
-constexpr double kSurfaces = 8.0;             ///< That are rendered.
+constexpr double kSecondsPerSample = 2.5e-7;    ///< Of a surface, milled, polished and rendered.
+constexpr double kSecondsPerPartNode = 1.9e-7;  ///< Of a part with errors (docs/performance.md).
+constexpr double kMemoryPerPartNode = 24.0;     ///< Bytes: three heights while they are sampled.
+constexpr double kSurfaces = 8.0;               ///< That are rendered.
 
 /// What the advised value leaves free.
 constexpr double kSpare = 1.5;
@@ -100,6 +105,25 @@ double memory_per_move(const FinishProcess& finish) {
 
 double nodes_of(const Eigen::Vector2d& size) { return size.prod() / (kMeshSpacing * kMeshSpacing); }
 
+/// Parts that are predicted with errors, and nodes of each.
+double drawn_parts(const CamOptions& options) {
+  if (options.tolerances == 0) return 0.0;
+  const auto parts = static_cast<double>(options.tolerances);
+  return 1.0 + parts +
+         static_cast<double>(kErrorCauses) * static_cast<double>(paired_parts(options.tolerances));
+}
+
+double part_nodes(const CamOptions& options, const OpticalSetup& setup) {
+  const FinishProcess& finish = options.workshop.process.finish;
+  PartPlan plan;
+  plan.optics = setup;
+  plan.passes.pitch = finish_pitch(finish, finishing_ball(options).radius());
+  plan.passes.axis = finish.along == PassAxis::kX ? 0 : 1;
+  plan.passes.cross = finish.cross;
+  plan.polish = options.workshop.polish;
+  return options.tolerances > 0 ? static_cast<double>(part_nodes(plan)) : 0.0;
+}
+
 Eigen::Vector2d size_of(const CamOptions& options, const OpticalSetup& setup) {
   const double shrinkage = options.part == PartKind::kMould ? options.shrinkage : 0.0;
   return setup.lens_size / (1.0 - shrinkage);
@@ -128,13 +152,15 @@ WorkEstimate estimate_cut(const CamOptions& options, const OpticalSetup& setup, 
   const double points = rough_points(options, size);
   WorkEstimate estimate;
   estimate.seconds = (length * seconds_per_mm(options) + points * kSecondsPerPoint +
-                      samples_of(options, size) * kSecondsPerSample) /
+                      samples_of(options, size) * kSecondsPerSample +
+                      drawn_parts(options) * part_nodes(options, setup) * kSecondsPerPartNode) /
                      threads;
   estimate.disk_bytes = (moves + kMovesPerPoint * points) * kBytesPerMove;
   estimate.memory_bytes = kMemory;
   if (options.render) {
-    estimate.memory_bytes +=
-        moves * memory_per_move(options.workshop.process.finish) + nodes_of(size) * kMemoryPerNode;
+    estimate.memory_bytes += moves * memory_per_move(options.workshop.process.finish) +
+                             nodes_of(size) * kMemoryPerNode +
+                             part_nodes(options, setup) * kMemoryPerPartNode;
     estimate.disk_bytes += nodes_of(size) * kDiskPerNode;
   }
   return estimate;
@@ -160,6 +186,11 @@ void require_room_for_cut(const CamOptions& options, const OpticalSetup& setup,
   }
   if (options.render && nodes_of(size) * kMemoryPerNode > moves * memory_per_move(finish)) {
     return require("the milled surface of so large a lens", "--no-render needs less");
+  }
+  if (drawn_parts(options) * part_nodes(options, setup) * kSecondsPerPartNode >
+      0.5 * on_one_core.seconds) {
+    return require("--tolerances " + std::to_string(options.tolerances),
+                   "fewer parts, --tolerances 200, would fit");
   }
   if (samples_of(options, size) * kSecondsPerSample > 0.5 * on_one_core.seconds) {
     return require("--sample-spacing " + shortest_text(sample_spacing(options)) + "mm",

@@ -345,6 +345,7 @@ void add_prediction(const Prediction& prediction, const Lens& lens, ReportData& 
                 {surface_name::kMilled, "before polishing: its ridges scatter light"},
                 {surface_name::kPolished, "the finished part"}};
   data.places = prediction.places;
+  data.tolerances = prediction.tolerances;
   data.surface = prediction.surface;
   data.maps = {prediction.height, fillet_map(prediction.creases),
                fillet_share_map(prediction.creases)};

@@ -11,6 +11,7 @@
 #include "cam/milled/crease_map.h"
 #include "cam/part_surfaces.h"
 #include "cam/report/report_data.h"
+#include "cam/tolerance/tolerance_forecast.h"
 #include "core/compute/executor.h"
 #include "core/compute/run_control.h"
 #include "core/surface/lens.h"
@@ -24,9 +25,10 @@ struct Prediction {
   SamplingCheck sampling;         ///< Of the part.
   std::vector<LeakPlace> places;  ///< That leak most, worst first.
   CreaseMap creases;
-  ReportMap height;    ///< Part − designed, µm.
-  LensRaster surface;  ///< Heights of the part, mm.
-  SurfaceMesh milled;  ///< The surface as milled, at kMeshSpacing.
+  ReportMap height;              ///< Part − designed, µm.
+  LensRaster surface;            ///< Heights of the part, mm.
+  SurfaceMesh milled;            ///< The surface as milled, at kMeshSpacing.
+  ToleranceForecast tolerances;  ///< Empty unless it is asked for.
 };
 
 /// Spacing of the nodes of milled.ply, mm: 100 mm take 1 million.

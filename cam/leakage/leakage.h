@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
+#include "cam/leakage/picture_judge.h"
 #include "cam/leakage/render_field.h"
 #include "core/image/image.h"
-#include "core/image/metrics.h"
 
 namespace lensforge {
 
@@ -40,23 +40,6 @@ struct LeakageChain {
   std::vector<NamedSurface> others;  ///< Only rendered and compared.
 
   [[nodiscard]] const NamedSurface& part() const { return steps.back(); }
-};
-
-/// Which pixels of a target count as dark and as bright, in shares of its mean.
-struct LeakageOptions {
-  double dark_below = 0.1;   ///< Dark: linear target below it, ≥ 0.
-  double bright_from = 1.0;  ///< Bright: linear target from it on, > dark_below.
-};
-
-/// How good a picture is, against the target and against the designed picture.
-struct PictureQuality {
-  ImageMetrics metrics;     ///< Against the target, with all of the lens's flux as its total.
-  double leakage = 0.0;     ///< Σ max(0, g − g_designed) / Σ g_designed over all pixels.
-  double dark_flux = 0.0;   ///< Share of the lens's flux in the target's dark pixels.
-  double dark_ratio = 0.0;  ///< Mean of the dark pixels ÷ mean of the bright ones.
-
-  /// Mean of the bright pixels ÷ mean of the dark ones; infinite where the dark ones get nothing.
-  [[nodiscard]] double contrast() const;
 };
 
 /// A surface's picture.
@@ -96,10 +79,6 @@ struct LeakageResult {
 LeakageResult measure_leakage(const LeakageChain& chain, const Image& target,
                               const FieldRenderSetup& setup, const LeakageOptions& options,
                               const Executor& executor, const RunControl& control);
-
-/// Σ max(0, picture − designed) over all pixels, as a share of the designed picture's flux; 0 if it
-/// has none. @pre equal sizes.
-double leakage_share(const FluxPicture& picture, const FluxPicture& designed);
 
 /// 1 where `part` has more flux than `designed`, 0 elsewhere. @pre equal sizes.
 std::vector<double> pixels_with_surplus(const FluxPicture& part, const FluxPicture& designed);

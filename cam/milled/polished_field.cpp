@@ -7,6 +7,7 @@
 #include <string>
 
 #include "cam/milled/crease_sum.h"
+#include "cam/milled/rim_loss.h"
 #include "core/error.h"
 #include "core/text/number_text.h"
 
@@ -214,9 +215,7 @@ void PolishedField::turn_rows(const Axis& y, std::int64_t columns, const std::ve
 void PolishedField::take_off_rim(const Executor& executor, SurfacePatch& patch) const {
   if (model_.rim_depth == 0.0) return;
   const GridWindow& window = patch.window;
-  const auto removal = [&](double distance) {
-    return model_.rim_depth * std::exp(-std::max(distance, 0.0) / model_.rim_length);
-  };
+  const auto removal = [&](double distance) { return rim_loss(model_, distance); };
   const auto take_row = [&](std::int64_t j) {
     const double low_y = removal(window.y(j) - lens_.min().y());
     const double high_y = removal(lens_.max().y() - window.y(j));

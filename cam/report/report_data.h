@@ -13,6 +13,7 @@
 #include "cam/path/operation.h"
 #include "cam/report/path_sketch.h"
 #include "cam/report/verdict.h"
+#include "cam/tolerance/tolerance_forecast.h"
 #include "cam/tool/tool.h"
 #include "core/image/image.h"
 
@@ -104,6 +105,7 @@ struct ReportData {
   SamplingCheck sampling;           ///< Of the part.
   std::vector<ShownSurface> shown;  ///< Whose pictures stand side by side.
   LeakageOptions leakage_options;
+  ToleranceForecast tolerances;         ///< Empty where it was not asked for.
   std::vector<LeakPlace> places;        ///< Worst first.
   Eigen::Vector2d lens_size{0.0, 0.0};  ///< mm
 

@@ -20,7 +20,7 @@ double ReportData::minutes() const {
 
 std::string report_html(const ReportData& data) {
   namespace section = report_section;
-  const std::array<std::pair<std::string_view, std::string>, 19> values{{
+  const std::array<std::pair<std::string_view, std::string>, 20> values{{
       {"TITLE", escape_html(data.job + " – cutting report")},
       {"PROGRAM", program_mark()},
       {"STYLE", std::string(report_page::kStyle)},
@@ -34,6 +34,7 @@ std::string report_html(const ReportData& data) {
       {"OPERATIONS", section::operations(data)},
       {"CERTIFICATES", section::certificates(data)},
       {"LEAKAGE", section::leakage(data)},
+      {"TOLERANCES", section::tolerances(data)},
       {"MAPS", section::maps(data)},
       {"VIEW", section::view(data)},
       {"CHOICES", section::choices(data)},
@@ -46,7 +47,7 @@ std::string report_html(const ReportData& data) {
 
 std::string compare_html(const ReportData& data) {
   namespace section = report_section;
-  const std::array<std::pair<std::string_view, std::string>, 19> values{{
+  const std::array<std::pair<std::string_view, std::string>, 20> values{{
       {"TITLE", escape_html(data.job + " – choices compared")},
       {"PROGRAM", program_mark()},
       {"STYLE", std::string(report_page::kStyle)},
@@ -60,6 +61,7 @@ std::string compare_html(const ReportData& data) {
       {"OPERATIONS", ""},
       {"CERTIFICATES", ""},
       {"LEAKAGE", ""},
+      {"TOLERANCES", ""},
       {"MAPS", ""},
       {"VIEW", ""},
       {"CHOICES", section::choices(data)},

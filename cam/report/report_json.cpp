@@ -166,6 +166,40 @@ json group_json(const ParameterGroup& group) {
   return {{"title", group.title}, {"parameters", object}};
 }
 
+json quantiles_json(const Quantiles& q) {
+  return {{"p10", number(q.p10)}, {"median", number(q.median)}, {"p90", number(q.p90)}};
+}
+
+json effect_json(const ToleranceForecast& forecast, const CauseEffect& effect) {
+  json object{{"cause", name_of(effect.cause)},
+              {"mae_change_if_halved", effect.mae},
+              {"mae_standard_error", effect.mae_error},
+              {"leakage_change_if_halved", effect.leakage}};
+  if (forecast.has_dark) {
+    object["contrast_if_halved"] = number(contrast_with_half(forecast, effect));
+  }
+  return object;
+}
+
+json tolerances_json(const ToleranceForecast& forecast) {
+  json object{
+      {"words", tolerance_words(forecast)},
+      {"parts", forecast.parts},
+      {"seed", forecast.seed},
+      {"seconds", forecast.seconds},
+      {"parts_per_cause", forecast.paired},
+      {"mae", quantiles_json(forecast.mae)},
+      {"leakage", quantiles_json(forecast.leakage)},
+      {"without_errors", {{"mae", forecast.nominal.mae}, {"leakage", forecast.nominal.leakage}}},
+      {"causes", list(forecast.causes,
+                      [&](const CauseEffect& effect) { return effect_json(forecast, effect); })}};
+  if (forecast.has_dark) {
+    object["contrast"] = quantiles_json(forecast.contrast);
+    object["without_errors"]["contrast"] = number(forecast.nominal.contrast());
+  }
+  return object;
+}
+
 }  // namespace
 
 json choice_json(const ReportChoice& choice) {
@@ -199,6 +233,7 @@ json report_json(const ReportData& data) {
     report["leakage"] = leakage_json(data);
     report["sampling"] = sampling_json(data.sampling);
     report["surfaces"] = surfaces_json(data.leakage);
+    if (!data.tolerances.empty()) report["tolerances"] = tolerances_json(data.tolerances);
   }
   return report;
 }

@@ -60,7 +60,7 @@ struct FinishProcess {
   double tolerance = 0.0005;  ///< Farthest from the drop curve, mm, > 0.
   /// Largest error of a move's direction, rad, > 0. Polishing does not even out what neighbouring
   /// rows have in common; docs/tuning.md, "Defaults of cam", has the leak and the moves by value.
-  double slope_tolerance = 1.5e-4;
+  double slope_tolerance = 6e-5;
   PassStyle style = PassStyle::kZigzag;
   PassAxis along = PassAxis::kX;
   bool cross = false;   ///< A second raster along the other axis.

@@ -193,7 +193,7 @@ Tool large_finish_tool() {
 }  // namespace
 
 std::vector<Tool> default_tools() {
-  return {rough_tool(), semi_tool(), finish_tool(), large_finish_tool()};
+  return {rough_tool(), semi_tool(), large_finish_tool(), finish_tool()};
 }
 
 Eigen::AlignedBox3d Stock::box(const Eigen::AlignedBox3d& surface) const {

@@ -10,6 +10,7 @@
 
 #include "cam/tool/polish_model.h"
 #include "cam/tool/process.h"
+#include "cam/tool/tolerances.h"
 #include "cam/tool/tool.h"
 #include "core/text/toml_fields.h"
 
@@ -73,6 +74,7 @@ struct Workshop {
   std::vector<Tool> tools = default_tools();
   Process process;
   PolishModel polish{0.03, 0.0, 1.0};  ///< What happens to the surface after the last cut.
+  Tolerances tolerances;               ///< How far all this may be off.
 
   /// Null if no tool has this number.
   [[nodiscard]] const Tool* find_tool(int number) const;

@@ -40,6 +40,13 @@ constexpr double kMaxPitchError = 0.02;
 /// σ and depth at the rim, mm; beyond it no picture is left.
 constexpr double kMaxPolish = 1.0;
 
+/// mm; shorter waves are finer than the rows.
+constexpr double kShortestWave = 0.2;
+/// µm; beyond it errors are no longer small against the ball.
+constexpr double kMaxError = 100.0;
+/// Shares of σ; three times as much would leave none of it.
+constexpr double kMaxPolishSpread = 0.3;
+
 /// A word for each value of an enumeration, in its order.
 using Words = std::initializer_list<std::string_view>;
 const Words kShapes = {"ball", "bull", "flat"};
@@ -394,6 +401,36 @@ void describe(Visitor& v, PolishModel& polish) {
 }
 
 template <class Visitor>
+void describe(Visitor& v, WavinessBand& band) {
+  v.needed({"wavelength", kShortestWave, kLength}, band.wavelength, "mm, middle of the band");
+  v.needed({"rms_um", 0.0, kMaxError}, band.rms_um,
+           "µm, root mean square, of the X and Y axes each");
+}
+
+template <class Visitor>
+void describe(Visitor& v, Tolerances& t) {
+  v.number({"row_um", 0.0, kMaxError}, t.row_um, "µm, height of a row against the next, sigma");
+  v.number({"row_length", kShortestWave, kLength}, t.row_length, "mm over which that changes");
+  v.number({"backlash_um", 0.0, kMaxError}, t.backlash_um,
+           "µm, of the axis along the rows, 0 to this");
+  v.number({"radius_um", 0.0, kMaxError}, t.radius_um, "µm, radius of the finishing ball, +- this");
+  v.number({"runout_um", 0.0, kMaxError}, t.runout_um, "µm, total indicated, 0 to this");
+  v.number({"polish_sigma", 0.0, kMaxPolishSpread}, t.polish_sigma,
+           "share of the polish's sigma, from part to part, sigma");
+  v.number({"polish_within", 0.0, kMaxPolishSpread}, t.polish_within, "the same over one part");
+  v.number({"index", 0.0, 0.1}, t.index, "refractive index, +- this");
+  v.number({"distance", 0.0, kBlank}, t.distance, "mm, distance of the screen, +- this");
+  v.number({"tilt_deg", 0.0, 10.0}, t.tilt_deg, "degrees, of the part about x and about y, sigma");
+  v.number({"source_mrad", 0.0, 20.0}, t.source_mrad,
+           "mrad, full angle of the source seen from the lens, 0 to this; the sun has 9.3");
+  v.number({"temperature_k", 0.0, 100.0}, t.temperature_k, "K, of the part, +- this");
+  v.number({"expansion_per_k", 0.0, 1e-3}, t.expansion_per_k, "share of a length");
+  v.number({"index_per_k", -1e-3, 1e-3}, t.index_per_k, "of the refractive index");
+  v.list("waviness", t.waviness,
+         "Waves that the machine's axes leave in the surface; rms_um = 0 for none.");
+}
+
+template <class Visitor>
 void describe(Visitor& v, Workshop& shop) {
   v.table("machine", shop.machine, "The mill. Sizes are millimetres.");
   v.table("material", shop.material, "What the blank is made of.");
@@ -412,6 +449,10 @@ void describe(Visitor& v, Workshop& shop) {
   v.table("finish", shop.process.finish, "The raster that makes the optical surface.");
   v.table("polish", shop.polish,
           "What polishing does to it. More σ blurs the picture, less leaves scallops.");
+  v.table(
+      "tolerances", shop.tolerances,
+      "How far all this may be off, for cam --tolerances. \"sigma\" is a standard deviation, other "
+      "bounds are uniform.");
 }
 
 }  // namespace

@@ -55,10 +55,12 @@ class FluxImageOn {
   /// Calls `item(i, image)` for i = 0 … count − 1, at the same time from several threads; each
   /// deposits as many triangles as it likes into `image`, a FluxAccumulator. CPU only.
   /// @pre begin() was called with an executor of the same concurrency.
+  /// @param grain  items that one task handles at least.
   template <class Item>
-  void add(const Exec& executor, std::int64_t count, const Item& item) {
+  void add(const Exec& executor, std::int64_t count, const Item& item,
+           std::int64_t grain = kDefaultGrain) {
     parallel_for_worker(executor, "flux deposit", count,
-                        DepositItem<Item>{item, {units_.data(), columns_, rows_}, stride()});
+                        DepositItem<Item>{item, {units_.data(), columns_, rows_}, stride()}, grain);
   }
 
   /// The flux of every pixel of all that was added, as render() returns it.

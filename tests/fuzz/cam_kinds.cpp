@@ -20,6 +20,7 @@ void workshop(Scene& scene) {
   scene.write("workshop.toml", mutated_text(scene.base.bytes("workshop.toml"), scene.random));
   CommandLine line = scene.cam("lens").set("--workshop", "workshop.toml");
   if (scene.random.one_in(3)) line.flag("--show-workshop");
+  if (scene.random.one_in(3)) line.set("--tolerances", "10");
   scene.run(line);
 }
 

@@ -143,9 +143,20 @@ TEST(Workshop, WrittenTomlReadsBackEqual) {
   shop.process.semi.along = PassAxis::kY;
   shop.process.semi.entry = EntryStyle::kHelix;
   shop.process.semi.helix_radius = 0.45;
-  shop.process.finish = {1,     0.04, 0.001, 2e-4, 5e-4, PassStyle::kConventional, PassAxis::kY,
+  shop.process.finish = {1,     0.04, 0.001, 2e-4, 5e-4,  PassStyle::kConventional, PassAxis::kY,
                          false, true, 4,     2,    -0.001};
+  shop.tolerances = {{{8.0, 0.5}}, 0.1, 20.0, 2.0,  3.0, 4.0,  0.2,    0.1,
+                     0.002,        2.5, 0.3,  1.25, 8.0, 9e-5, -1.2e-4};
   EXPECT_EQ(parse_workshop(workshop_toml(shop), "other"), shop);
+}
+
+TEST(Workshop, WavesOfAFileReplaceTheDefaults) {
+  const Workshop shop = parse_workshop(
+      "[tolerances]\nbacklash_um = 3\n[[tolerances.waviness]]\nwavelength = 5\nrms_um = 0.2\n",
+      "shop.toml");
+  EXPECT_EQ(shop.tolerances.waviness, (std::vector<WavinessBand>{{5.0, 0.2}}));
+  EXPECT_EQ(shop.tolerances.backlash_um, 3.0);
+  EXPECT_EQ(shop.tolerances.distance, Tolerances{}.distance);
 }
 
 TEST(Workshop, MissingKeysKeepTheirDefaults) {

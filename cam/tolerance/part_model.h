@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "cam/leakage/render_field.h"
+#include "cam/milled/surface_field.h"
+#include "cam/tolerance/base_heights.h"
+#include "cam/tolerance/part_error.h"
+#include "cam/tolerance/passes.h"
+#include "cam/tool/polish_model.h"
+#include "core/compute/executor.h"
+#include "core/compute/run_control.h"
+#include "core/optics/optical_setup.h"
+
+namespace lensforge {
+
+/// What the programs assume.
+struct PartPlan {
+  OpticalSetup optics;
+  Passes passes;
+  PolishModel polish;
+  double largest_sigma = 0.0;  ///< Of the polish that is asked for, mm, ≥ polish.sigma.
+};
+
+/// Predicts what parts with errors project, many of them for one sampling of the surface as cut.
+///
+/// Polishing leaves nothing of that surface which is finer than its σ but the scallops' ripple. So
+/// the heights without scallops (BaseHeights), changed by the part's errors (ErrorHeights), are
+/// polished on a grid as coarse as σ allows; the ripple (Ripple) is added where rays land, with
+/// four nodes a pitch, and the source blurs the picture. PartModel.* in its test hold that against
+/// cam's own chain of surfaces.
+class PartModel {
+ public:
+  /// @param cut, designed  as BaseHeights::sample() takes them; needed only here.
+  /// @throw Interrupted
+  PartModel(const SurfaceField& cut, const SurfaceField& designed, const PartPlan& plan,
+            const Executor& executor, const RunControl& control);
+
+  /// The picture of one part; same bits for any number of threads. @throw Interrupted
+  [[nodiscard]] FluxPicture render(const PartError& error, const Executor& executor) const;
+
+  [[nodiscard]] const PartPlan& plan() const { return plan_; }
+
+ private:
+  PartPlan plan_;
+  BaseHeights base_;
+  double mean_height_;  ///< mm
+};
+
+/// Nodes of the grid on which a part is rendered: what time and memory go by.
+std::int64_t part_nodes(const PartPlan& plan);
+
+}  // namespace lensforge

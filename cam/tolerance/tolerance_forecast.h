@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "cam/leakage/picture_judge.h"
+#include "cam/tolerance/part_error.h"
+#include "cam/tolerance/part_model.h"
+#include "core/compute/executor.h"
+#include "core/compute/run_control.h"
+
+namespace lensforge {
+
+/// What is told of a part's picture (PictureQuality).
+struct PartFigures {
+  double mae = 0.0;
+  double leakage = 0.0;
+  double dark_ratio = 0.0;
+
+  /// Mean of the bright pixels ÷ mean of the dark ones; infinite where the dark ones get nothing.
+  [[nodiscard]] double contrast() const;
+};
+
+/// What one part in ten stays below, one in two, and nine in ten.
+struct Quantiles {
+  double p10 = 0.0;
+  double median = 0.0;
+  double p90 = 0.0;
+};
+
+/// Quantiles of any numbers, linear between the sorted ones (Hyndman and Fan's definition 7).
+/// @pre there is at least one.
+Quantiles quantiles(std::vector<double> values);
+
+/// What it would bring to halve everything that is off by one cause: the mean, over parts that are
+/// drawn with and without that by the same random numbers, of the change.
+struct CauseEffect {
+  ErrorCause cause = ErrorCause::kWaviness;
+  double mae = 0.0;         ///< Change; below 0 is better.
+  double mae_error = 0.0;   ///< Standard error of that mean.
+  double leakage = 0.0;     ///< Change.
+  double dark_ratio = 0.0;  ///< Change.
+};
+
+/// How sure a forecast is.
+struct ToleranceForecast {
+  std::int64_t parts = 0;   ///< That were drawn.
+  std::int64_t paired = 0;  ///< Of them drawn again for every cause.
+  std::uint64_t seed = 0;
+  PartFigures nominal;  ///< Of the part without any error, by the same model.
+  Quantiles mae, leakage, contrast;
+  std::vector<CauseEffect> causes;  ///< Largest gain of MAE first.
+  std::vector<double> deviation;    ///< PictureSpread::deviation()
+  int columns = 0;
+  int rows = 0;
+  bool has_dark = false;  ///< Whether the target has dark parts; without them there is no contrast.
+  double seconds = 0.0;   ///< That it took.
+
+  [[nodiscard]] bool empty() const { return parts == 0; }
+};
+
+/// Parts that are drawn again for every cause, of `parts` in all: a twentieth, 5 to 20.
+std::int64_t paired_parts(std::int64_t parts);
+
+/// Draws parts and predicts them. Same bits for any number of threads.
+/// @param parts  ≥ 1. @throw Interrupted
+ToleranceForecast forecast_parts(const PartModel& model, const ErrorSource& source,
+                                 const PictureJudge& judge, std::int64_t parts,
+                                 const Executor& executor, const RunControl& control);
+
+/// What to expect in a plain sentence or two: "8 of 10 parts should have a contrast of 20 : 1 to
+/// 35 : 1 and an MAE of 0.0102 to 0.0151. …"
+std::string tolerance_words(const ToleranceForecast& forecast);
+
+/// The contrast that halving a cause would bring to the median part.
+double contrast_with_half(const ToleranceForecast& forecast, const CauseEffect& effect);
+
+}  // namespace lensforge

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cam/tolerance/line_filter.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+namespace lensforge {
+namespace {
+
+/// Mean of `samples` points of cos(k t + phase) over a box around `middle`.
+double box_mean(const LinePolish& polish, double k, double phase, double middle) {
+  double sum = 0.0;
+  const auto count = static_cast<double>(polish.samples);
+  for (std::int64_t s = 0; s < polish.samples; ++s) {
+    const double t = middle + polish.box * ((static_cast<double>(s) + 0.5) / count - 0.5);
+    sum += std::cos(k * t + phase) / count;
+  }
+  return sum;
+}
+
+struct Filtered {
+  double average = 0.0;
+  double slope = 0.0;
+};
+
+template <class Heights>
+Filtered apply(const LineFilter& filter, const Heights& height) {
+  Filtered result;
+  for (std::int64_t k = 0; k <= filter.reach(); ++k) {
+    const auto n = static_cast<std::size_t>(k);
+    const double before = height(-static_cast<double>(k));
+    const double after = height(static_cast<double>(k + filter.shift));
+    result.average += filter.average[n] * (before + after);
+    result.slope += filter.slope[n] * (after - before);
+  }
+  return result;
+}
+
+LineFilter filter_of(const LinePolish& polish, std::int64_t shift) {
+  return line_filter(polish, shift, line_filter_reach(polish.sigma, polish.spacing));
+}
+
+TEST(LineFilter, PolishesWavesOfFiveNodesAndMoreAsTheGaussianDoes) {
+  for (const double sigma : {0.02, 0.03, 0.045}) {
+    for (const auto& [box, samples] : {std::pair(0.06, 6), std::pair(0.03, 2)}) {
+      const LinePolish polish{sigma, 0.03, box, samples};
+      for (const std::int64_t shift : {0, 1}) {
+        const LineFilter filter = filter_of(polish, shift);
+        for (const double nodes : {5.0, 8.0, 20.0, 100.0}) {
+          SCOPED_TRACE(::testing::Message() << sigma << " " << box << " " << shift << " " << nodes);
+          const double k = 2.0 * std::numbers::pi / (nodes * polish.spacing);
+          const double kept = std::exp(-0.5 * k * k * sigma * sigma);
+          const double place = 0.5 * static_cast<double>(shift) * polish.spacing;
+          const Filtered wave = apply(
+              filter, [&](double node) { return box_mean(polish, k, 0.7, node * polish.spacing); });
+          EXPECT_NEAR(wave.average, kept * std::cos(k * place + 0.7), 2e-3);
+          EXPECT_NEAR(wave.slope, -k * kept * std::sin(k * place + 0.7), 2e-3 * k);
+        }
+      }
+    }
+  }
+}
+
+TEST(LineFilter, KeepsStraightLines) {
+  for (const std::int64_t shift : {0, 1}) {
+    const LineFilter filter = filter_of({0.03, 0.04, 0.04, 2}, shift);
+    const Filtered line = apply(filter, [](double node) { return 7.0 + 0.25 * node * 0.04; });
+    EXPECT_NEAR(line.average, 7.0 + 0.125 * static_cast<double>(shift) * 0.04, 1e-12);
+    EXPECT_NEAR(line.slope, 0.25, 1e-10);
+  }
+}
+
+TEST(LineFilter, WithoutPolishRestoresWhatTheBoxTook) {
+  const LinePolish polish{0.0, 0.03, 0.06, 6};
+  const LineFilter filter = line_filter(polish, 0, 8);
+  const double k = 2.0 * std::numbers::pi / (6.0 * polish.spacing);
+  const Filtered wave =
+      apply(filter, [&](double node) { return box_mean(polish, k, 0.0, node * polish.spacing); });
+  EXPECT_NEAR(wave.average, 1.0, 0.01);
+}
+
+}  // namespace
+}  // namespace lensforge

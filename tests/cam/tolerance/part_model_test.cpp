@@ -1,0 +1,322 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cam/tolerance/part_model.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <memory>
+#include <numbers>
+#include <stop_token>
+#include <vector>
+
+#include "cam/cam_meshes.h"
+#include "cam/contact/cut_surface.h"
+#include "cam/finish_paths.h"
+#include "cam/leakage/picture_judge.h"
+#include "cam/meant_surface.h"
+#include "cam/milled/lens_grid.h"
+#include "cam/milled/milled_field.h"
+#include "cam/milled/polished_field.h"
+#include "cam/path/finish_raster.h"
+#include "core/error.h"
+
+namespace lensforge {
+namespace {
+
+constexpr double kTwoPi = 2.0 * std::numbers::pi;
+constexpr double kSide = 5.0;
+constexpr double kRadius = 0.2;
+constexpr double kPitch = 0.0625;
+/// The surface goes on beyond the lens, so that rows do not turn on its rim: a ball of another
+/// radius leaves a notch there, of some micrometres, that the model leaves out.
+constexpr double kBeyond = 0.5;
+constexpr std::int64_t kRowsBeyond = 8;
+constexpr double kSigma = 0.03;
+constexpr int kPixels = 18;  ///< 3.6 rows each: rows and pixels have no common period.
+
+double relief(double x, double y) {
+  return 3.0 + 0.03 * std::sin(kTwoPi * x / 4.7 + 0.4) * std::cos(kTwoPi * y / 6.1) +
+         0.006 * std::sin(kTwoPi * (0.6 * x + 0.8 * y) / 2.3);
+}
+
+OpticalSetup setup() {
+  OpticalSetup optics;
+  optics.lens_size = {kSide, kSide};
+  // What the rim lights lies outside.
+  optics.image_size = {kSide - 1.0, kSide - 1.0};
+  optics.image_origin = {0.5, 0.5};
+  optics.pixels = {kPixels, kPixels};
+  optics.focal_length = 18.0;
+  return optics;
+}
+
+/// A way of the ball, moved aside row by row.
+using RowShift = std::function<Eigen::Vector3d(std::int64_t)>;
+
+Eigen::Vector3d unmoved(std::int64_t /*row*/) { return Eigen::Vector3d::Zero(); }
+
+/// A surface and something that is added to it.
+class Changed final : public SurfaceField {
+ public:
+  Changed(const SurfaceField& field, std::function<double(double, double)> by)
+      : field_(field), by_(std::move(by)) {}
+  void sample(const GridWindow& window, const Executor& executor,
+              SurfacePatch& patch) const override {
+    field_.sample(window, executor, patch);
+    for (std::int64_t j = 0; j < window.rows; ++j) {
+      for (std::int64_t i = 0; i < window.columns; ++i) {
+        patch.z[static_cast<std::size_t>(j * window.columns + i)] += by_(window.x(i), window.y(j));
+      }
+    }
+  }
+
+ private:
+  const SurfaceField& field_;
+  std::function<double(double, double)> by_;
+};
+
+/// A small lens, cut by a raster; what cam's chain of surfaces and the model say of its parts.
+class PartModelTest : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    constexpr double kWhole = kSide + 2.0 * kBeyond;
+    SurfaceMesh mesh = testing::grid_mesh(31, 31, kWhole, kWhole, [](double x, double y) {
+      return relief(x - kBeyond, y - kBeyond);
+    });
+    mesh.vertices.topRows<2>().array() -= kBeyond;
+    const auto surface = optical_surface(mesh, SurfaceModel::kSmooth);
+    meant_ = meant_surface(surface);
+    RasterOptions raster;
+    raster.pitch = kPitch;
+    raster.tolerance = 2e-4;
+    raster.slope_tolerance = 5e-5;
+    raster.resolution = 1e-6;
+    plan_ = plan_ = plan_finish_raster(
+        {Eigen::Vector2d::Constant(-kBeyond), Eigen::Vector2d::Constant(kSide + kBeyond)}, kRadius,
+        raster);
+    const auto keep = [](const RasterRow& row) { rows_.push_back(row); };
+    cut_raster(*surface_to_cut(surface, kRadius, executor()), plan_, executor(), keep, {});
+    milled_ = milled(kRadius, unmoved);
+    designed_ = render_field(meant_->field(), fine(setup()), executor(), {});
+    target_ = designed_.image(kPixels * kPixels);
+    model_ = std::make_unique<PartModel>(*milled_, meant_->field(), part_plan(), executor(),
+                                         RunControl());
+    nominal_ = chain(*milled_, kSigma, setup());
+    model_nominal_ = of_model({});
+  }
+  static void TearDownTestSuite() {
+    model_.reset();
+    milled_.reset();
+    rows_.clear();
+    meant_.reset();
+  }
+
+  static Executor executor() { return Executor::cpu(2); }
+
+  static PartPlan part_plan() {
+    Passes passes;
+    passes.pitch = plan_.pitch;
+    passes.ball_radius = kRadius;
+    return {setup(), passes, {kSigma, 0.0, 1.0}, 1.3 * kSigma};
+  }
+
+  static FieldRenderSetup fine(const OpticalSetup& optics) {
+    return {optics, lens_grid(optics.lens_size, kPitch / 6.0)};
+  }
+
+  /// What the raster leaves with a ball of another radius whose tip goes the same way.
+  static std::unique_ptr<MilledField> milled(double radius, const RowShift& shift) {
+    BallPath path(radius, 0.0);
+    std::int64_t number = -plan_.rows_outside - kRowsBeyond;
+    for (const RasterRow& row : rows_) {
+      const MoveSink sink = path_sink(path);
+      const Eigen::Vector3d by = shift(number++);
+      const PathMove start{MoveKind::kRapid, row.start + by};
+      sink({&start, 1});
+      for (PathMove move : row.moves) {
+        move.end += by;
+        move.centre += by;
+        sink({&move, 1});
+      }
+    }
+    std::vector<BallPath> paths{std::move(path)};
+    return std::make_unique<MilledField>(std::move(paths), 6.0);
+  }
+
+  static PictureQuality judged(const FluxPicture& picture) {
+    PictureQuality quality = PictureJudge(target_, designed_, {}).judge(picture);
+    // Part of the light lands beside the picture, as it does of the design.
+    quality.metrics.mae = compare(picture.image(kPixels * kPixels), target_).mae;
+    return quality;
+  }
+
+  /// By the surfaces of cam's chain: polished and rendered as finely as there.
+  static PictureQuality chain(const SurfaceField& cut, double sigma, const OpticalSetup& optics) {
+    const PolishedField part(cut, meant_->field(),
+                             {Eigen::Vector2d(0, 0), Eigen::Vector2d(kSide, kSide)},
+                             {sigma, 0.0, 1.0});
+    return judged(render_field(part, fine(optics), executor(), {}));
+  }
+
+  static PictureQuality of_model(const PartError& error) {
+    return judged(model_->render(error, executor()));
+  }
+
+  /// The change of both figures is the chain's to a fifth, or to 0.0003 of MAE and 0.1 % of light.
+  static void expect_same_change(const PictureQuality& by_chain, const PictureQuality& by_model) {
+    const double mae = by_chain.metrics.mae - nominal_.metrics.mae;
+    const double leakage = by_chain.leakage - nominal_.leakage;
+    EXPECT_NEAR(by_model.metrics.mae - model_nominal_.metrics.mae, mae,
+                std::max(3e-4, 0.2 * std::abs(mae)));
+    EXPECT_NEAR(by_model.leakage - model_nominal_.leakage, leakage,
+                std::max(1e-3, 0.2 * std::abs(leakage)));
+  }
+
+  static std::unique_ptr<MeantSurface> meant_;
+  static RasterPlan plan_;
+  static std::vector<RasterRow> rows_;
+  static std::unique_ptr<MilledField> milled_;
+  static FluxPicture designed_;
+  static Image target_;
+  static std::unique_ptr<PartModel> model_;
+  static PictureQuality nominal_, model_nominal_;
+};
+
+std::unique_ptr<MeantSurface> PartModelTest::meant_;
+RasterPlan PartModelTest::plan_;
+std::vector<RasterRow> PartModelTest::rows_;
+std::unique_ptr<MilledField> PartModelTest::milled_;
+FluxPicture PartModelTest::designed_;
+Image PartModelTest::target_;
+std::unique_ptr<PartModel> PartModelTest::model_;
+PictureQuality PartModelTest::nominal_;
+PictureQuality PartModelTest::model_nominal_;
+
+TEST_F(PartModelTest, APartWithoutErrorsIsThatOfTheChain) {
+  EXPECT_GT(nominal_.metrics.mae, 0.003);
+  EXPECT_NEAR(model_nominal_.metrics.mae, nominal_.metrics.mae,
+              std::max(5e-4, 0.1 * nominal_.metrics.mae));
+  EXPECT_NEAR(model_nominal_.leakage, nominal_.leakage, 0.1 * nominal_.leakage);
+}
+
+TEST_F(PartModelTest, AnotherPolishChangesItAsInTheChain) {
+  for (const double sigma : {0.024, 0.025, 0.036}) {
+    SCOPED_TRACE(sigma);
+    PartError error;
+    error.sigma_factor = sigma / kSigma;
+    expect_same_change(chain(*milled_, sigma, setup()), of_model(error));
+  }
+}
+
+TEST_F(PartModelTest, AnotherIndexAndDistanceChangeItAsInTheChain) {
+  for (const double index : {-0.01, 0.01}) {
+    SCOPED_TRACE(index);
+    PartError error;
+    error.index = index;
+    OpticalSetup optics = setup();
+    optics.ior += index;
+    expect_same_change(chain(*milled_, kSigma, optics), of_model(error));
+  }
+  for (const double farther : {-0.5, 0.5}) {
+    SCOPED_TRACE(farther);
+    PartError error;
+    error.distance = farther;
+    OpticalSetup optics = setup();
+    optics.focal_length += farther;
+    expect_same_change(chain(*milled_, kSigma, optics), of_model(error));
+  }
+}
+
+TEST_F(PartModelTest, AnotherBallOnTheSameWayChangesItAsInTheChain) {
+  for (const double radius : {-0.01, 0.01}) {
+    SCOPED_TRACE(radius);
+    PartError error;
+    error.radius = radius;
+    expect_same_change(chain(*milled(kRadius + radius, unmoved), kSigma, setup()), of_model(error));
+  }
+}
+
+TEST_F(PartModelTest, WavinessChangesItAsInTheChain) {
+  PartError error;
+  error.along_x = {{1e-4, kTwoPi / 1.3, 0.3}};
+  error.along_y = {{5e-5, kTwoPi / 0.8, 1.0}};
+  const Changed wavy(*milled_, [&](double x, double y) {
+    return 1e-4 * std::cos(kTwoPi / 1.3 * x + 0.3) + 5e-5 * std::cos(kTwoPi / 0.8 * y + 1.0);
+  });
+  expect_same_change(chain(wavy, kSigma, setup()), of_model(error));
+}
+
+TEST_F(PartModelTest, RowsAtAnotherHeightChangeItAsInTheChain) {
+  RowHeights rows;
+  rows.length = kSide;
+  rows.places = 2;
+  const auto height = [](std::int64_t row) {
+    return 5e-5 * std::sin(1.7 * static_cast<double>(row * row));
+  };
+  for (std::int64_t row = 0; row < plan_.rows - 2 * (plan_.rows_outside + kRowsBeyond); ++row) {
+    rows.height.insert(rows.height.end(), 2, height(row));
+  }
+  PartError error;
+  error.rows = rows;
+  const auto cut =
+      milled(kRadius, [&](std::int64_t row) { return Eigen::Vector3d(0.0, 0.0, height(row)); });
+  expect_same_change(chain(*cut, kSigma, setup()), of_model(error));
+}
+
+TEST_F(PartModelTest, BacklashChangesItAsInTheChain) {
+  PartError error;
+  error.backlash = 0.006;
+  const auto cut = milled(kRadius, [&](std::int64_t row) {
+    return Eigen::Vector3d(row % 2 == 0 ? 0.003 : -0.003, 0.0, 0.0);
+  });
+  expect_same_change(chain(*cut, kSigma, setup()), of_model(error));
+}
+
+TEST_F(PartModelTest, ASourceBlursThePictureAsManyDirectionsDo) {
+  PartError error;
+  error.source = 0.01;
+  const FluxPicture blurred = model_->render(error, executor());
+  FluxPicture sum = designed_;
+  std::fill(sum.flux.begin(), sum.flux.end(), 0.0);
+  const int rings = 3;
+  const int places = 12;
+  for (int ring = 0; ring < rings; ++ring) {
+    for (int k = 0; k < places; ++k) {
+      const double angle = 0.5 * error.source * std::sqrt((ring + 0.5) / rings);
+      const double heading = kTwoPi * (k + 0.5 * ring) / places;
+      OpticalSetup optics = setup();
+      optics.light = Eigen::Vector3d(angle * std::cos(heading), angle * std::sin(heading), 1.0);
+      optics.light.normalize();
+      const PolishedField part(*milled_, meant_->field(),
+                               {Eigen::Vector2d(0, 0), Eigen::Vector2d(kSide, kSide)},
+                               {kSigma, 0.0, 1.0});
+      FieldRenderSetup coarse{optics, lens_grid(optics.lens_size, kPitch / 4.0)};
+      const FluxPicture one = render_field(part, coarse, executor(), {});
+      for (std::size_t i = 0; i < sum.flux.size(); ++i) {
+        sum.flux[i] += one.flux[i] / (rings * places);
+      }
+    }
+  }
+  expect_same_change(judged(sum), judged(blurred));
+}
+
+TEST_F(PartModelTest, GivesTheSameBitsForAnyNumberOfThreads) {
+  PartError error;
+  error.sigma_within = 0.05;
+  error.sigma_waves = {{{0.7, 0.2}, 0.1}};
+  error.tilt = {0.002, -0.001};
+  error.source = 0.001;
+  error.backlash = 0.001;
+  EXPECT_EQ(model_->render(error, Executor::serial()).flux,
+            model_->render(error, Executor::cpu(3)).flux);
+}
+
+TEST_F(PartModelTest, StopsWhenItIsAskedTo) {
+  std::stop_source stop;
+  stop.request_stop();
+  EXPECT_THROW((void)model_->render({}, executor().with_stop(stop.get_token())), Interrupted);
+}
+
+}  // namespace
+}  // namespace lensforge
