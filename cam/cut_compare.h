@@ -19,7 +19,8 @@ namespace lensforge {
 struct CutChoices {
   std::vector<double> tools;    ///< Diameters of the finishing ball, mm; none: the workshop's.
   std::vector<double> pitches;  ///< mm; none: the workshop's.
-  std::vector<int> large;  ///< Numbers of the larger ball, 0 for no such; none: the workshop's.
+  /// Numbers of the larger ball, 0 for no such; none: the workshop's.
+  std::vector<int> large = {};
 };
 
 /// Combinations at most.
