@@ -44,6 +44,11 @@ void validate_tolerances(const CamOptions& options) {
     refuse("--tolerances", options.tolerances,
            "needs the predicted picture: leave out --no-render, or use --tolerances 0");
   }
+  if (options.tolerances > 0 && larger_ball(options) != nullptr) {
+    refuse("--tolerances", options.tolerances,
+           "draws parts of one finishing ball only: set finish.large_tool = 0, or use "
+           "--tolerances 0");
+  }
 }
 
 /// Before hours are spent on programs that the controller could not read.
@@ -59,6 +64,7 @@ void validate_tool_numbers(const CamOptions& options) {
                std::to_string(reader.max_tool) + " in the workshop");
   };
   check(process.finish.tool);
+  check(process.finish.large_tool);
   if (process.rough.enabled) check(process.rough.tool);
   if (process.semi.enabled) check(process.semi.tool);
 }
@@ -106,6 +112,12 @@ void validate(const CamOptions& options, const OpticalSetup& setup) {
     refuse(
         "--tool-diameter", ball.diameter,
         "must be smaller than the lens, whose shorter side is " + shortest_text(smallest) + " mm");
+  }
+  if (const Tool* const large = larger_ball(options); large && !(large->diameter < smallest)) {
+    refuse("finish.large_tool", large->number,
+           "its diameter, " + shortest_text(large->diameter) +
+               " mm, must be smaller than the lens, whose shorter side is " +
+               shortest_text(smallest) + " mm");
   }
   validate_tool_numbers(options);
   validate_decimals(options);

@@ -27,9 +27,9 @@ constexpr double kUnrounded = 1e-12;
 /// Moves that look as if they held are shortened by this part as long as they do not.
 constexpr std::size_t kShorten = 8;
 
-/// What a move that is long enough may turn off where nothing keeps the tolerances, rad: half of
-/// what the report lets pass (CutLimits).
-constexpr double kBlunt = 1e-3;
+/// What a move that is long enough may turn off where nothing keeps the tolerances, in slope
+/// tolerances: blunter ones keep the moves after them from holding.
+constexpr double kBlunt = 6.0;
 
 /// How near to the tolerances a look at the joints alone goes: what lies between adds to it.
 constexpr double kLookShare = 0.95;
@@ -123,7 +123,6 @@ class RowFit {
     std::size_t limit = last;
     std::size_t stuck = 0;  // The joint from which no move held, and how often it was retried.
     int retries = 0;
-    std::size_t shared = 0;  // The last joint from which a move was too short.
     while (at < last) {
       if (options_.stop.stop_requested()) throw Interrupted();
       const std::size_t settled = error_.size();
@@ -138,20 +137,10 @@ class RowFit {
         steps_.pop_back();
         continue;
       }
-      if (reach && at > shared && too_short(at, reach->joint) && !steps_.empty()) {
-        const std::size_t before = steps_.back().from;
-        const std::size_t middle = middle_of(before, reach->joint);
-        if (middle > before && middle < at) {
-          shared = at;
-          limit = middle;
-          at = before;
-          error_.resize(steps_.back().settled);
-          steps_.pop_back();
-          continue;
-        }
-      }
       if (!reach) reach = straightest(at, last);
-      steps_.push_back({at, settled, *reach});
+      if (steps_.empty() || !too_short(at, reach->joint) || !share_way(*reach)) {
+        steps_.push_back({at, settled, *reach});
+      }
       at = reach->joint;
       limit = last;
     }
@@ -171,6 +160,37 @@ class RowFit {
 
   [[nodiscard]] bool too_short(std::size_t from, std::size_t to) const {
     return joints_.written[to].x() - joints_.written[from].x() < options_.shortest;
+  }
+
+  /// One move between two joints that keeps the tolerances; its nodes are added to the error.
+  std::optional<Reach> one_move(std::size_t from, std::size_t to) {
+    for (const bool arc : {false, true}) {
+      if (arc && (!options_.arcs || to - from < 2)) continue;
+      const std::optional<RowMove> move = move_to(from, to, arc);
+      if (move && holds(from, *move)) return Reach{to, *move};
+    }
+    return std::nullopt;
+  }
+
+  /// Puts two moves of about the same length in place of the last one and of a short one that
+  /// follows, if they keep the tolerances.
+  bool share_way(const Reach& reach) {
+    Step& last = steps_.back();
+    const std::size_t middle = middle_of(last.from, reach.joint);
+    if (middle <= last.from || middle >= last.reach.joint) return false;
+    error_.resize(last.settled);
+    const std::optional<Reach> first = one_move(last.from, middle);
+    const std::size_t settled = error_.size();
+    const std::optional<Reach> second = first ? one_move(middle, reach.joint) : std::nullopt;
+    if (second) {
+      last.reach = *first;
+      steps_.push_back({middle, settled, *second});
+      return true;
+    }
+    error_.resize(last.settled);
+    error_.add(joints_.written[last.from], last.reach.move);
+    error_.add(joints_.written[last.reach.joint], reach.move);
+    return false;
   }
 
   /// The joint nearest to half the way from one to another.
@@ -217,7 +237,7 @@ class RowFit {
       error_.resize(settled);
       if (step > 1 && !close) break;
       // Many moves too short for their decimals are no straighter than one that is long enough.
-      if (turn < least || (turn < kBlunt && too_short(from, best))) {
+      if (turn < least || (turn < kBlunt * options_.slope_tolerance && too_short(from, best))) {
         least = turn;
         best = from + step;
       }

@@ -239,6 +239,7 @@ RasterRow cut_row(const RowCurves& curves, const RasterPlan& plan, std::int64_t 
                   const RowSpan& span) {
   RowFitOptions fit = fit_options(plan.options);
   fit.stop = curves.stop();
+  if (!curves.rolls()) fit.shortest = 0.0;  // Moves end in creases.
   RowProfile profile = curves.profile(span, joint_bow(fit));
   level_ends(fit.grid, profile);
   const FittedRow fitted = fit_row(profile, fit);

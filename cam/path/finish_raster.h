@@ -32,7 +32,7 @@ struct RasterOptions {
   int along = 0;                  ///< 0: rows along x; 1: along y.
   PassStyle style = PassStyle::kZigzag;
   bool arcs = false;      ///< Arcs in the rows' planes, G18 along x and G19 along y.
-  double shortest = 0.0;  ///< RowFitOptions::shortest, mm.
+  double shortest = 0.0;  ///< RowFitOptions::shortest on surfaces without creases, mm.
   bool traces = false;    ///< Rows also tell RasterRow::exact and unrounded.
   /// Slope up to which the surface is finished to its rim, rise over run, > 0.
   double rim_slope = kSteepestSlope;

@@ -331,7 +331,7 @@ RowProfile RowCurves::profile(const RowSpan& span, double bow) const {
   profile.finest = std::min(kProfileError, kBowShare * bow);
   add_node(span.from, 0.0, profile);
   profile.joints = {span.from, span.held_from};
-  if (surface_ != nullptr && surface_->bed() != nullptr) {
+  if (rolls()) {
     roll(span, bow, profile);
   } else {
     const DropCutter& cutter = given_ != nullptr ? *given_ : *made_;

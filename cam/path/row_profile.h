@@ -68,6 +68,8 @@ class RowCurves {
   /// @throw InputError if there is nothing under the ball somewhere on the row.
   /// @throw Interrupted when stop() is requested.
   [[nodiscard]] RowProfile profile(const RowSpan& span, double bow) const;
+  /// Whether a ball rolls on the surface itself, but for some places.
+  [[nodiscard]] bool rolls() const { return surface_ != nullptr && surface_->bed() != nullptr; }
   /// The executor's.
   [[nodiscard]] const std::stop_token& stop() const { return stop_; }
 

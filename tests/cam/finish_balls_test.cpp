@@ -177,7 +177,7 @@ TEST(FinishBalls, NoMoveGouges) {
       };
       std::mt19937 random(9);
       std::uniform_int_distribution<std::size_t> any(1, moves.size() - 1);
-      for (int i = 0; i < 150; ++i) {
+      for (int i = 0; i < 60; ++i) {
         const std::size_t m = any(random);
         const Eigen::Vector3d tip = moves[m].end;
         EXPECT_GE(tip.z(), brute(tip) - 2e-6) << pass.name << " " << tip.transpose();
@@ -279,6 +279,12 @@ TEST(FinishBalls, NothingIsLeftOfAGentleSurface) {
   ASSERT_EQ(passes.size(), 1U);
   EXPECT_EQ(passes.front().name, "large");
   EXPECT_EQ(passes.front().tool.number, 4);
+}
+
+TEST(FinishBalls, ABallAsLargeAsTheLensIsRefused) {
+  const Lens lens = testing::small_lens();
+  EXPECT_THAT(message_of<InputError>([&] { validate(options_with(4), lens.setup); }),
+              AllOf(HasSubstr("finish.large_tool 4: its diameter, 6 mm"), HasSubstr("2 mm")));
 }
 
 TEST(FinishBalls, FacetsAreRefusedForALargerBall) {

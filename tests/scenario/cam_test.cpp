@@ -52,7 +52,7 @@ TEST_F(Cam, TheWorkshopIsShownAsJson) {
   const Outcome outcome = run(cam({"--show-workshop", "--json"}));
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_EQ(outcome.json()["workshop"]["finish"]["pitch"], 1.9);
-  EXPECT_EQ(outcome.json()["workshop"]["tool"].size(), 3U);
+  EXPECT_EQ(outcome.json()["workshop"]["tool"].size(), 4U);
 }
 
 TEST_F(Cam, AProgramThatWasEditedIsReplacedOnlyByForce) {

@@ -83,6 +83,10 @@ TEST(ToleranceJob, RefusesWhatHasNothingToDrawFrom) {
   options.render = false;
   EXPECT_THAT(message_of<InputError>([&] { run(options, folder); }),
               HasSubstr("--tolerances 20: needs the predicted picture"));
+  CamOptions two = drawn(20);
+  two.workshop.process.finish.large_tool = 2;  // A ball of 1 mm.
+  EXPECT_THAT(message_of<InputError>([&] { run(two, folder); }),
+              HasSubstr("--tolerances 20: draws parts of one finishing ball only"));
   EXPECT_THAT(
       message_of<InputError>([&] {
         compare_cuts(small_lens(), drawn(20), {{0.4}, {0.06}}, folder.path(), Executor::cpu(2), {});
