@@ -4,6 +4,9 @@
 #include <algorithm>
 #include <span>
 
+#include "cam/report/html_text.h"
+#include "core/text/number_text.h"
+
 namespace lensforge {
 namespace {
 
@@ -173,6 +176,16 @@ Eigen::Vector3d ProgramWatch::extent() const {
     extent.z() = std::max(extent.z(), heights.sizes().value());
   }
   return extent;
+}
+
+std::string travel_fault(const Eigen::Vector3d& extent, const Eigen::Vector3d& travel) {
+  std::string axes;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (extent[axis] <= travel[axis]) continue;
+    axes += joined({axes.empty() ? "" : ", ", std::string(1, "XYZ"[axis]), " by ",
+                    decimal_text(extent[axis], 2), " of ", decimal_text(travel[axis], 2), " mm"});
+  }
+  return axes.empty() ? "" : "the programs move farther than the machine's travel: " + axes;
 }
 
 }  // namespace lensforge

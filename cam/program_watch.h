@@ -78,4 +78,7 @@ class ProgramWatch {
   std::map<int, Eigen::AlignedBox1d> heights_;  ///< Tool → heights of its tip.
 };
 
+/// Which axes would have to go farther than the machine can, a sentence; empty if none would.
+std::string travel_fault(const Eigen::Vector3d& extent, const Eigen::Vector3d& travel);
+
 }  // namespace lensforge

@@ -66,14 +66,14 @@ BallBlend::BallBlend(const Rows& rows) {
   const double crest = rows.pitch * rows.pitch / (8.0 * rows.small_radius);
   const double large_pitch = rows.every * rows.pitch;
   const double large_crest = large_pitch * large_pitch / (8.0 * rows.large_radius);
-  mean_ = crest / 3.0;
-  const double alone = mean_ - large_crest / 3.0;  // Of the larger ball where it cuts alone.
+  const double mean = crest / 3.0;
+  const double alone = mean - large_crest / 3.0;  // Of the larger ball where it cuts alone.
   clear_ = std::max(alone, 0.0) + large_crest;
   const Profiles profiles(rows);
   for (std::size_t i = 0; i < kTable; ++i) {
     const double t = static_cast<double>(i) / (kTable - 1);
     const double small = clear_ * eased(t);
-    const double lift = lift_for(profiles, small, mean_, alone, crest + large_crest);
+    const double lift = lift_for(profiles, small, mean, alone, crest + large_crest);
     large_lift_.push_back(std::max(i == 0 ? crest : lift, 0.0));
   }
 }

@@ -12,8 +12,8 @@ namespace lensforge {
 /// amounts that depend on how far a place is from what the larger ball leaves (RestMap): the
 /// smaller one cuts on the surface there and rises by a few micrometres on the way out; the larger
 /// one is as high as its scallops allow out there and rises to the smaller one's crests on the way
-/// in. In between their common lower envelope has the same mean everywhere. Rows of the larger ball
-/// lie on every n-th row of the smaller one's, since other pitches would beat.
+/// in. In between their common lower envelope has the same mean everywhere, p²/(24 r). Rows of the
+/// larger ball lie on every n-th row of the smaller one's, since other pitches would beat.
 ///
 /// Notation: p pitch of the smaller ball, n rows of it per row of the larger, R, r radii.
 class BallBlend {
@@ -31,8 +31,6 @@ class BallBlend {
   /// leaves, mm, ≥ 0.
   [[nodiscard]] double small_lift(double distance) const;
   [[nodiscard]] double large_lift(double distance) const;
-  /// Of the surface as cut above the designed one, mm; p²/(24 r).
-  [[nodiscard]] double mean_height() const { return mean_; }
 
   /// Width of the zone where both cut, mm: five cells of the map.
   static constexpr double kWidth = 0.5;
@@ -40,7 +38,6 @@ class BallBlend {
   static constexpr double kRunOut = 0.2;
 
  private:
-  double mean_ = 0.0;
   double clear_ = 0.0;              ///< Of the smaller ball at kWidth, mm.
   std::vector<double> large_lift_;  ///< At even distances 0 … kWidth.
 };

@@ -67,9 +67,7 @@ struct SplinePart {
 }  // namespace
 
 RestMap::RestMap(const SmoothBed& bed, double reach, const Executor& executor)
-    : box_(bed.surface().box()),
-      reach_(reach),
-      cell_(std::max(kCell, std::sqrt(box_.volume() / kMaxCells))) {
+    : box_(bed.surface().box()), cell_(std::max(kCell, std::sqrt(box_.volume() / kMaxCells))) {
   columns_ = static_cast<std::int64_t>(box_.sizes().x() / cell_) + 1;
   rows_ = static_cast<std::int64_t>(box_.sizes().y() / cell_) + 1;
   std::vector<std::uint8_t> left(static_cast<std::size_t>(columns_ * rows_));
@@ -88,8 +86,7 @@ Eigen::AlignedBox2d RestMap::box_of(std::int64_t cell) const {
   return {nearest_inside(box_, corner), nearest_inside(box_, end)};
 }
 
-/// From every cell that is left to those around it; from the inside of a patch none is nearer than
-/// from its border.
+/// From every cell that is left to those around it.
 void RestMap::spread(std::int64_t reach_cells, const std::vector<std::uint8_t>& left) {
   const auto index = [&](std::int64_t column, std::int64_t row) {
     return static_cast<std::size_t>(row * columns_ + column);

@@ -32,7 +32,6 @@ class RestMap {
   void spread(std::int64_t reach_cells, const std::vector<std::uint8_t>& left);
 
   Eigen::AlignedBox2d box_;
-  double reach_;
   double cell_;
   std::int64_t columns_ = 1;
   std::int64_t rows_ = 1;

@@ -61,8 +61,9 @@ Eigen::AlignedBox2d grown(const Eigen::AlignedBox2d& box, double by) {
   return {Eigen::Vector2d(box.min() - around), Eigen::Vector2d(box.max() + around)};
 }
 
-Eigen::Vector2d clamped(const Eigen::Vector2d& q, const Eigen::AlignedBox2d& box) {
-  return q.cwiseMax(box.min()).cwiseMin(box.max());
+/// Of a box, what is nearest to it of another one.
+Eigen::AlignedBox2d clamped(const Eigen::AlignedBox2d& axis, const Eigen::AlignedBox2d& box) {
+  return {nearest_inside(box, axis.min()), nearest_inside(box, axis.max())};
 }
 
 }  // namespace
@@ -75,8 +76,7 @@ SmoothBed::SmoothBed(const OpticalSurface& surface, double radius,
 
 /// What lies nearer rises less, and what rises less is nearer.
 double SmoothBed::reach(const Eigen::AlignedBox2d& axis) const {
-  const Eigen::AlignedBox2d over(clamped(axis.min(), surface_.box()),
-                                 clamped(axis.max(), surface_.box()));
+  const Eigen::AlignedBox2d over = clamped(axis, surface_.box());
   const double lowest = bounds_.roughly_over(over).lowest;
   double reach = radius_;
   for (int i = 0; i < kReachSteps; ++i) {
@@ -90,9 +90,7 @@ double SmoothBed::reach(const Eigen::AlignedBox2d& axis) const {
 }
 
 Eigen::AlignedBox2d SmoothBed::footprint(const Eigen::AlignedBox2d& axis) const {
-  const Eigen::AlignedBox2d over(clamped(axis.min(), surface_.box()),
-                                 clamped(axis.max(), surface_.box()));
-  return grown(over, reach(axis));
+  return grown(clamped(axis, surface_.box()), reach(axis));
 }
 
 Eigen::AlignedBox2d SmoothBed::footprint(const Eigen::AlignedBox2d& axis, double tip) const {
@@ -124,8 +122,8 @@ std::optional<SmoothRoll::Rest> SmoothRoll::rest_at(double u, const Eigen::Vecto
   const double radius = bed_.radius();
   const double least_bend = (1.0 - SmoothBed::kMaxBend) / radius;
   const Eigen::Vector2d p = line_.at(u);
-  Eigen::Vector2d q = clamped(guess, box);
-  Eigen::Vector2d before = clamped(p, box);
+  Eigen::Vector2d q = nearest_inside(box, guess);
+  Eigen::Vector2d before = nearest_inside(box, p);
   double height = -HUGE_VAL;
   for (int step = 0; step < kMaxSteps; ++step) {
     const Eigen::Vector2d d = q - p;
@@ -157,7 +155,7 @@ std::optional<SmoothRoll::Rest> SmoothRoll::rest_at(double u, const Eigen::Vecto
     }
     before = q;
     height = f;
-    q = clamped(q - solve_free(bend, g, fixed), box);
+    q = nearest_inside(box, q - solve_free(bend, g, fixed));
   }
   return std::nullopt;
 }

@@ -173,14 +173,8 @@ std::vector<std::string> CouponPlan::faults() const {
   for (const Collision& collision : collisions_.collisions()) {
     sentences.push_back(collision.sentence());
   }
-  const Eigen::Vector3d extent = watch_.extent();
-  const Eigen::Vector3d& travel = options_.workshop.machine.travel;
-  for (int axis = 0; axis < 3; ++axis) {
-    if (extent[axis] <= travel[axis]) continue;
-    sentences.push_back(std::string("the program moves ") + decimal_text(extent[axis], 2) +
-                        " mm along " + "XYZ"[axis] + ", the machine only " +
-                        decimal_text(travel[axis], 2) + " mm");
-  }
+  const std::string travel = travel_fault(watch_.extent(), options_.workshop.machine.travel);
+  if (!travel.empty()) sentences.push_back(travel);
   return sentences;
 }
 

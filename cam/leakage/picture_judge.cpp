@@ -42,7 +42,7 @@ void validate(const LeakageOptions& options) {
                    ": dark must be at least 0 and below bright");
 }
 
-double PictureQuality::contrast() const {
+double contrast_of(double dark_ratio) {
   return dark_ratio > 0.0 ? 1.0 / dark_ratio : std::numeric_limits<double>::infinity();
 }
 

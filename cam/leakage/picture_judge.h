@@ -19,6 +19,10 @@ struct LeakageOptions {
 /// @throw InputError if dark_below and bright_from break their rules.
 void validate(const LeakageOptions& options);
 
+/// Mean of the bright pixels ÷ mean of the dark ones from its inverse; infinite where the dark ones
+/// get nothing.
+double contrast_of(double dark_ratio);
+
 /// How good a picture is, against the target and against the designed picture.
 struct PictureQuality {
   ImageMetrics metrics;     ///< Against the target, with all of the lens's flux as its total.
@@ -26,8 +30,7 @@ struct PictureQuality {
   double dark_flux = 0.0;   ///< Share of the lens's flux in the target's dark pixels.
   double dark_ratio = 0.0;  ///< Mean of the dark pixels ÷ mean of the bright ones.
 
-  /// Mean of the bright pixels ÷ mean of the dark ones; infinite where the dark ones get nothing.
-  [[nodiscard]] double contrast() const;
+  [[nodiscard]] double contrast() const { return contrast_of(dark_ratio); }
 };
 
 /// Σ max(0, picture − designed) over all pixels, as a share of the designed picture's flux; 0 if it

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <string>
 
+#include "cam/leakage/sharp_landing.h"
 #include "core/error.h"
 
 namespace lensforge {
@@ -52,15 +53,7 @@ void SurfaceTile::sharpen_landing(const Executor& executor) {
     for (std::int64_t i = 0; i < columns; ++i) {
       const bool inner_column = i > 0 && i + 1 < columns;
       const auto n = static_cast<std::size_t>(j * columns + i);
-      Eigen::Vector2d bends = Eigen::Vector2d::Zero();
-      const auto add = [&](std::int64_t step) {
-        const auto offset = static_cast<std::size_t>(step);
-        bends += landing_[n - offset] - 2.0 * landing_[n] + landing_[n + offset];
-      };
-      if (inner_column) add(1);
-      if (inner_row) add(columns);
-      if (inner_column && inner_row) add(columns + 1);
-      sharpened_[n] = bends.allFinite() ? landing_[n] - bends / 24.0 : landing_[n];
+      sharpened_[n] = sharp_landing(landing_, n, columns, {inner_column, inner_row});
     }
   };
   parallel_for(executor, "sharpen landing", rows, sharpen_row, 16);

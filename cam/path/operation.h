@@ -20,7 +20,9 @@ struct Extreme {
 struct PathCertificate {
   Extreme gouge;   ///< Deepest that the path runs below the drop curve, mm, ≥ 0.
   Extreme excess;  ///< Highest that it runs above, mm, ≥ 0.
-  Extreme slope;   ///< Largest difference of mean slope over any 5 µm of a move, rad.
+  /// Largest difference of mean slope over any 5 µm of a move where the ball shapes the surface,
+  /// not only the rim, rad.
+  Extreme slope;
 };
 
 /// What one operation came to; mm, lens frame.

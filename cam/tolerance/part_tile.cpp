@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "cam/leakage/sharp_landing.h"
 #include "cam/milled/rim_loss.h"
 #include "core/surface/corners.h"
 #include "design/optics/image_triangle.h"
@@ -160,17 +161,12 @@ void PartTile::land() {
   }
 }
 
-/// As SurfaceTile::sharpen_landing().
 void PartTile::sharpen() {
   std::vector<Eigen::Vector2d> sharp = landing_;
-  const auto up = static_cast<std::size_t>(x_.count);
   for (std::int64_t j = 1; j + 1 < y_.count; ++j) {
     for (std::int64_t i = 1; i + 1 < x_.count; ++i) {
       const std::size_t n = index(i, j);
-      const Eigen::Vector2d bends = landing_[n - 1] + landing_[n + 1] + landing_[n - up] +
-                                    landing_[n + up] + landing_[n - up - 1] + landing_[n + up + 1] -
-                                    6.0 * landing_[n];
-      if (bends.allFinite()) sharp[n] -= bends / 24.0;
+      sharp[n] = sharp_landing(landing_, n, x_.count);
     }
   }
   landing_.swap(sharp);

@@ -5,7 +5,6 @@
 #include <array>
 #include <chrono>
 #include <cmath>
-#include <limits>
 
 #include "cam/tolerance/picture_spread.h"
 #include "core/error.h"
@@ -141,10 +140,6 @@ double between(double low, double high, double share) {
 
 }  // namespace
 
-double PartFigures::contrast() const {
-  return dark_ratio > 0.0 ? 1.0 / dark_ratio : std::numeric_limits<double>::infinity();
-}
-
 Quantiles quantiles(std::vector<double> values) {
   std::sort(values.begin(), values.end());
   const auto at = [&values](double share) {
@@ -167,8 +162,7 @@ ToleranceForecast forecast_parts(const PartModel& model, const ErrorSource& sour
 }
 
 double contrast_with_half(const ToleranceForecast& forecast, const CauseEffect& effect) {
-  const double ratio = 1.0 / forecast.contrast.median + effect.dark_ratio;
-  return ratio > 0.0 ? 1.0 / ratio : std::numeric_limits<double>::infinity();
+  return contrast_of(1.0 / forecast.contrast.median + effect.dark_ratio);
 }
 
 std::string tolerance_words(const ToleranceForecast& forecast) {

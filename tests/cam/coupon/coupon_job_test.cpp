@@ -152,7 +152,7 @@ TEST(CouponJob, AMachineThatIsTooSmallIsNamed) {
   const TempFolder folder;
   CouponOptions options;
   options.workshop.machine.travel = {300.0, 30.0, 100.0};
-  EXPECT_THAT(make(folder, options).faults, ElementsAre(HasSubstr("along Y")));
+  EXPECT_THAT(make(folder, options).faults, ElementsAre(HasSubstr("travel: Y by")));
 }
 
 TEST(CouponJob, ReadingsAreNotWrittenOver) {
