@@ -65,7 +65,6 @@ std::string fingerprint_text(std::uint64_t fingerprint) {
 nlohmann::json made_json(const MadeBy& process, const DesignResult::Made& made) {
   return {{"pitch_mm", process.pitch},
           {"along", process.rows_along_x ? "x" : "y"},
-          {"ball_radius_mm", process.ball_radius},
           {"polish_sigma_mm", process.polish_sigma},
           {"rim_depth_mm", process.rim_depth},
           {"rim_length_mm", process.rim_length},

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "app/json_output.h"
+#include "cam/cam_fields.h"
 #include "cam/tool/workshop.h"
 #include "core/error.h"
 #include "design/design_fields.h"
@@ -12,11 +13,33 @@ namespace lensforge::app {
 
 namespace {
 
-MadeBy process_of(const Workshop& shop) {
+/// The rows of `cam` that say what is milled.
+const OptionTable<CamOptions>& part_fields() {
+  static const OptionTable<CamOptions> fields = [] {
+    OptionTable<CamOptions> rows;
+    for (const auto& row : cam_fields()) {
+      if (row.name == "--part" || row.name == "--shrinkage") rows.push_back(row);
+    }
+    return rows;
+  }();
+  return fields;
+}
+
+MadeBy process_of(const Workshop& shop, const CamOptions& cut) {
   const FinishProcess& finish = shop.process.finish;
-  const double radius = shop.tool(finish.tool).radius();
-  return {finish_pitch(finish, radius), finish.along == PassAxis::kX, radius, shop.polish.sigma,
-          shop.polish.rim_depth,        shop.polish.rim_length};
+  const MadeBy made{finish_pitch(finish, shop.tool(finish.tool).radius()),
+                    finish.along == PassAxis::kX, shop.polish.sigma, shop.polish.rim_depth,
+                    shop.polish.rim_length};
+  return cut.part == PartKind::kMould ? made.cast(cut.shrinkage) : made;
+}
+
+/// @throw InputError unless nothing is said of how a part is made.
+void refuse_part_options(const OptionSet& options) {
+  for (const auto& row : part_fields()) {
+    if (options.given(row.name)) {
+      throw InputError(row.name + ": needs --made-by, which says how the part is made");
+    }
+  }
 }
 
 }  // namespace
@@ -28,6 +51,7 @@ void add_design_options(OptionSet& options, DesignSettings& settings) {
   options.fields(weight_fields(), settings.design.weights);
   options.text("--made-by", settings.made_by, "default|FILE.toml",
                "shape the part that this workshop cuts and polishes, not the surface alone");
+  options.fields(part_fields(), settings.cut);
   options.flag("--resume", settings.resume,
                "continue the interrupted design in --out, with the same picture and options");
   options.flag("--force", settings.force, "replace the design that --out holds");
@@ -40,7 +64,9 @@ void settle(OptionSet& options, DesignSettings& settings, const Image& picture) 
                      " pixels; its longer side needs at least " + std::to_string(kMinPixels));
   }
   Workshop workshop;
-  if (!settings.made_by.empty()) {
+  if (settings.made_by.empty()) {
+    refuse_part_options(options);
+  } else {
     if (options.given("--model") && settings.design.model != SurfaceModel::kSpline) {
       throw InputError("--made-by " + settings.made_by + ": needs --model spline, not " +
                        model_name(settings.design.model));
@@ -50,7 +76,7 @@ void settle(OptionSet& options, DesignSettings& settings, const Image& picture) 
   }
   settings.design = default_design_options(settings.design.model, picture);
   options.restate();
-  if (!settings.made_by.empty()) settings.design.made_by = process_of(workshop);
+  if (!settings.made_by.empty()) settings.design.made_by = process_of(workshop, settings.cut);
   validate(settings.design, picture);
 }
 

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "app/option_set.h"
+#include "cam/cam_options.h"
 #include "design/design_options.h"
 
 namespace lensforge::app {
@@ -13,6 +14,7 @@ struct DesignSettings {
   std::string target;
   std::string out;
   std::string made_by;  ///< Workshop file, or "default"; empty: not designed for a process.
+  CamOptions cut;       ///< What of it is milled for made_by: the part or a mould, its shrinkage.
   DesignOptions design;
   bool resume = false;
   bool force = false;

@@ -224,27 +224,18 @@ std::string process_warning(const CutPlan& plan, const Lens& lens) {
     return known ? meant[key].get<double>() : otherwise;
   };
   const FinishProcess& finish = shop.process.finish;
-  const double pitch = finish_pitch(finish, shop.tool(finish.tool).radius());
+  // What is cast in a mould is smaller than it, and polished after it was cast.
+  const double scale =
+      plan.options().part == PartKind::kMould ? 1.0 - plan.options().shrinkage : 1.0;
+  const double pitch = scale * finish_pitch(finish, shop.tool(finish.tool).radius());
+  const double sigma = shop.polish.sigma;
   const double meant_pitch = number("pitch_mm", pitch);
-  const double meant_sigma = number("polish_sigma_mm", shop.polish.sigma);
-  if (meant_pitch == pitch && meant_sigma == shop.polish.sigma) return "";
+  const double meant_sigma = number("polish_sigma_mm", sigma);
+  if (meant_pitch == pitch && meant_sigma == sigma) return "";
   return joined({"the lens was designed for a pitch of ", trimmed_decimal(meant_pitch, 4),
                  " mm and a polish of σ ", trimmed_decimal(meant_sigma, 4), " mm, not ",
-                 trimmed_decimal(pitch, 4), " and ", trimmed_decimal(shop.polish.sigma, 4),
+                 trimmed_decimal(pitch, 4), " and ", trimmed_decimal(sigma, 4),
                  " mm: cut it as it was designed, or design it for this workshop (--made-by)"});
-}
-
-/// Which axes have to go farther than they can; empty if none has.
-std::string travel_warning(const CutPlan& plan) {
-  const Eigen::Vector3d extent = plan.watch().extent();
-  const Eigen::Vector3d& travel = plan.options().workshop.machine.travel;
-  std::string axes;
-  for (int axis = 0; axis < 3; ++axis) {
-    if (extent[axis] <= travel[axis]) continue;
-    axes += joined({axes.empty() ? "" : ", ", std::string(1, "XYZ"[axis]), " by ",
-                    decimal_text(extent[axis], 2), " of ", decimal_text(travel[axis], 2), " mm"});
-  }
-  return axes.empty() ? "" : "the programs move farther than the machine's travel: " + axes;
 }
 
 /// A speed that the controller's setting would lower unseen; empty where it has no such setting.
@@ -265,7 +256,8 @@ std::vector<std::string> warnings_of(const CutPlan& plan, const ProgramFiles& pr
   for (const Collision& collision : plan.collisions()) warnings.push_back(collision.sentence());
   for (const std::string& fault : plan.watch().faults()) warnings.push_back(fault);
   for (const std::string& sentence :
-       {index_warning(plan, lens), process_warning(plan, lens), travel_warning(plan)}) {
+       {index_warning(plan, lens), process_warning(plan, lens),
+        travel_fault(plan.watch().extent(), plan.options().workshop.machine.travel)}) {
     if (!sentence.empty()) warnings.push_back(sentence);
   }
   const Eigen::Vector3d travel = plan.options().workshop.machine.travel;

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "core/error.h"
-#include "design/optics/made_spline.h"
+#include "design/optics/made_surface.h"
 #include "design/render_lens.h"
 #include "design/schedule/alternation.h"
 #include "design/schedule/checkpoint.h"

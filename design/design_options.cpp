@@ -8,6 +8,7 @@
 #include "core/error.h"
 #include "core/text/number_text.h"
 #include "design/design_fields.h"
+#include "design/optics/made_surface.h"
 #include "design/schedule/level_plan.h"
 
 namespace lensforge {
@@ -36,22 +37,13 @@ void require_process(const DesignOptions& o) {
   }
 }
 
-/// Knot cells of a process's even spline at most, in σ. Above it the polish costs less than knots
-/// that do not follow the picture; docs/fabrication.md, "Designed for how it is made", has the
-/// figures.
-constexpr double kCoarsestKnotCell = 2.5;
-
-/// @throw InputError naming the widest lens of this shape that its knots do for.
-void require_fine_knots(const DesignOptions& o, const Eigen::Vector2i& pixels) {
+/// @throw InputError naming the finest polish of a lens this large that can be computed.
+void require_coarse_polish(const DesignOptions& o, const Eigen::Vector2i& pixels) {
   if (!o.made_by) return;
-  const Eigen::Vector2d size = optical_setup(o, pixels).lens_size;
-  const double cell = std::sqrt(size.prod() / kMaxKnotCells);
-  const double coarsest = kCoarsestKnotCell * o.made_by->polish_sigma;
-  require(cell <= coarsest, "--width", o.width,
-          "is too wide for --made-by: of so large a lens polish rounds less than is lost with even "
-          "knots, which are " +
-              number_text(cell) + " mm apart at best; use --model spline, or at most " +
-              number_text(std::floor(o.width * coarsest / cell)) + " mm");
+  const double least = MadeSurface::least_sigma(optical_setup(o, pixels).lens_size);
+  require(o.made_by->polish_sigma >= least, "--made-by, polish.sigma", o.made_by->polish_sigma,
+          "is too fine to be computed for a lens of " + number_text(o.width) + " mm; at least " +
+              number_text(std::ceil(1e5 * least) / 1e5) + " mm, or --model spline without it");
 }
 
 }  // namespace
@@ -80,7 +72,7 @@ void validate(const DesignOptions& options, const Image& target) {
   const Eigen::Vector2i pixels = working_size(target.columns(), target.rows(), options.pixels);
   require(pixels.minCoeff() >= kMinPixels, "the working picture's shorter side", pixels.minCoeff(),
           "must be at least 4 pixels");
-  require_fine_knots(options, pixels);
+  require_coarse_polish(options, pixels);
   if (!(target.total() > 0.0)) {
     throw InputError("the picture is all black: there is no light to place");
   }

@@ -2,22 +2,55 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "core/surface/control_net.h"
 #include "core/surface/surface_mesh.h"
-#include "design/energy/ball_term.h"
 #include "design/energy/objective_on.h"
+#include "design/optics/columns.h"
+#include "design/optics/made_surface.h"
 #include "design/optics/spline_nodes.h"
 
 namespace lensforge {
 
+/// Moves nodes of a spline to other heights and slopes.
+struct ShiftNode {
+  const double* shift;  ///< 3 × nodes: added to ∂z/∂x, ∂z/∂y and z.
+  double* positions;
+  double* normals;
+
+  LF_HD void operator()(std::int64_t i) const {
+    const auto add = column3(shift, i);
+    auto n = column3(normals, i);
+    n.x() -= n.z() * add.x();
+    n.y() -= n.z() * add.y();
+    column3(positions, i).z() += add.z();
+  }
+};
+
+/// Its adjoint; the bars of the positions are the same before and after.
+struct ShiftNodeAdjoint {
+  const double* shift;
+  double* normal_bar;
+
+  LF_HD void operator()(std::int64_t i) const {
+    const auto add = column3(shift, i);
+    auto n = column3(normal_bar, i);
+    n.z() -= add.x() * n.x() + add.y() * n.y();
+  }
+};
+
 /// DesignObjective of a spline's control points: every node of the spline sends one ray by the
-/// spline's own normal; with ObjectiveOptions::made_by, those are the nodes of what becomes of it,
-/// and control points move in z alone. Barriers and the goal are those of the mesh of the nodes;
-/// there are no smoothness terms. Same interface as DesignObjectiveOn.
+/// spline's own normal. Barriers and the goal are those of the mesh of the nodes; there are no
+/// smoothness terms. Same interface as DesignObjectiveOn.
+///
+/// With ObjectiveOptions::made_by the nodes are those of what becomes of the spline. made_basis()
+/// has that for even knots; what even knots leave out is measured by relinearize() (MadeSurface)
+/// and stays until the next one.
 template <class Exec>
 class SplineObjectiveOn {
  public:
@@ -28,16 +61,22 @@ class SplineObjectiveOn {
         nodes_(basis_along(0, net, setup, options), basis_along(1, net, setup, options), executor),
         core_(spline_nodes({net.grid, net.vertices}, options.samples).mesh, setup, goal, options,
               executor),
-        movable_(movable_of(net, setup, options)),
+        movable_(objective_detail::movable_coordinates(net.vertices, setup.lens_size)),
         movable_here_(buffer_of(executor, objective_detail::entries(movable_))),
         positions_(3 * static_cast<std::size_t>(nodes_.shape().columns) *
                    static_cast<std::size_t>(nodes_.shape().rows)),
         positions_bar_(positions_.size()),
-        ball_(ball_of(net, setup, options)),
-        barrier_weight_(options.weights.barrier) {}
+        made_by_(options.made_by),
+        grid_(net.grid) {}
 
+  /// @throw Interrupted.
   void relinearize(const double* points) {
+    shift_ = {};
     look(points);
+    if (made_by_) {
+      measure_shift(points);
+      shift_nodes();
+    }
     core_.relinearize(positions_.data());
   }
 
@@ -45,8 +84,12 @@ class SplineObjectiveOn {
     look(points);
     ObjectiveEvaluation result = core_.evaluate(positions_.data(), positions_bar_.data());
     if (!result.feasible) return result;
-    nodes_.look_adjoint(positions_bar_.data(), core_.sampled_rays().normal_bar, gradient);
-    if (ball_) keep_valleys_wide(points, gradient, result.energy);
+    double* const normal_bar = core_.sampled_rays().normal_bar;
+    if (shift_.size() > 0) {
+      parallel_for(executor_, "shift nodes adjoint", node_count(),
+                   ShiftNodeAdjoint{shift_.data(), normal_bar});
+    }
+    nodes_.look_adjoint(positions_bar_.data(), normal_bar, gradient);
     parallel_for(executor_, "hold borders", static_cast<std::int64_t>(movable_here_.size()),
                  HoldCoordinate{movable_here_.data(), gradient});
     return result;
@@ -63,42 +106,37 @@ class SplineObjectiveOn {
     return made_basis({axis, cells, setup.lens_size[axis]}, points, *options.made_by);
   }
 
-  /// Polish is an average in millimetres: knots stay where they are even.
-  static Eigen::Matrix3Xd movable_of(const SurfaceMesh& net, const OpticalSetup& setup,
-                                     const ObjectiveOptions& options) {
-    Eigen::Matrix3Xd movable = objective_detail::movable_coordinates(net.vertices, setup.lens_size);
-    if (options.made_by) movable.topRows<2>().setZero();
-    return movable;
-  }
-
   using Buffer = typename Exec::template Buffer<double>;
 
-  /// Factor of E_ball within E_barr. With 2e6 and more, at the default λ5, a 96² logo, whose bright
-  /// and black parts meet in creases, is sharpened less than a 128² portrait, which has hardly a
-  /// valley that is too sharp.
-  static constexpr double kBallShare = 2e6;
-
-  static std::optional<BallNet> ball_of(const SurfaceMesh& net, const OpticalSetup& setup,
-                                        const ObjectiveOptions& options) {
-    if (!options.made_by) return std::nullopt;
-    return BallNet{nullptr,
-                   net.grid.columns,
-                   net.grid.rows,
-                   setup.lens_size.x() / (net.grid.columns - 3),
-                   setup.lens_size.y() / (net.grid.rows - 3),
-                   options.made_by->sharpest_valley()};
-  }
-
-  void keep_valleys_wide(const double* points, double* gradient, EnergyValues& energy) {
-    ball_->points = points;
-    const double weight = barrier_weight_ * kBallShare;
-    const double value = ball_term(executor_, *ball_, weight, gradient);
-    energy.total += weight * value;
-    energy.barrier += kBallShare * value;
+  [[nodiscard]] std::int64_t node_count() const {
+    return std::int64_t{nodes_.shape().columns} * nodes_.shape().rows;
   }
 
   void look(const double* points) {
     nodes_.look(points, positions_.data(), core_.sampled_rays().normals);
+    if (shift_.size() > 0) shift_nodes();
+  }
+
+  void shift_nodes() {
+    parallel_for(executor_, "shift nodes", node_count(),
+                 ShiftNode{shift_.data(), positions_.data(), core_.sampled_rays().normals});
+  }
+
+  /// From the nodes that were looked at to what is made above them. A spline's stage works on the
+  /// processor, whatever the device.
+  void measure_shift(const double* points) {
+    ControlNet net{grid_, Eigen::Map<const Eigen::Matrix3Xd>(
+                              points, 3, Eigen::Index{grid_.columns} * grid_.rows)};
+    const MadeSurface made(net, *made_by_, executor_);
+    shift_ = Buffer(positions_.size());
+    const auto measure = [&](std::int64_t i) {
+      const auto p = column3(positions_.data(), i);
+      const auto n = column3(core_.sampled_rays().normals, i);
+      const SurfacePoint point = made.at(p.template head<2>());
+      column3(shift_.data(), i) = Eigen::Vector3d(point.slope.x() + n.x() / n.z(),
+                                                  point.slope.y() + n.y() / n.z(), point.z - p.z());
+    };
+    parallel_for(executor_, "measure shift", node_count(), measure);
   }
 
   Exec executor_;
@@ -108,8 +146,9 @@ class SplineObjectiveOn {
   Buffer movable_here_;
   Buffer positions_;
   Buffer positions_bar_;
-  std::optional<BallNet> ball_;
-  double barrier_weight_;
+  std::optional<MadeBy> made_by_;
+  GridShape grid_;
+  Buffer shift_;  ///< Empty where nothing is shifted.
 };
 
 }  // namespace lensforge

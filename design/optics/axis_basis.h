@@ -35,17 +35,10 @@ struct AxisLength {
   double length = 1.0;  ///< mm
 };
 
-/// The spline as it comes off the machine: f replaced by G_σ ∗ (f + p²/24 · f″), less what polish
-/// takes off at the rim. Both are linear in the coefficients, so that the made surface is a sum of
-/// the same coefficients by other functions.
-///
-/// Polish is the average with a Gaussian; beyond the ends f goes on turned about its end, as
-/// PolishedField has it. A ball of radius R whose axis runs over y touches f at y + R f′, so that
-/// contacts are p (1 + R f″) apart. At the distance d of one it leaves (1/R − f″) d²/2 more than f,
-/// on average (1/R − f″) (1 + R f″)² p²/24 = p²/24R + f″ p²/24 + …, of which the first part is the
-/// same everywhere. What the average leaves out are waves of the pitch, of which polishing leaves
-/// exp(−2π²σ²/p²). Along the rows there is no such term. Valleys sharper than the ball, which it
-/// would fill, are for ball_term() to prevent.
+/// An even spline as it comes off the machine (MadeSurface): f replaced by G_σ ∗ (f + p²/24 · f″),
+/// less what polish takes off at the rim. Both are linear in the coefficients, so that the made
+/// surface is a sum of the same coefficients by other functions. Of a spline whose knots are not
+/// even it is about what is made.
 /// @param points  as for plain_basis(). @pre made.polish_sigma > 0.
 AxisBasis made_basis(const AxisLength& along, const std::vector<double>& points,
                      const MadeBy& made);

@@ -8,16 +8,17 @@ namespace lensforge {
 struct MadeBy {
   double pitch = 0.06;         ///< Between neighbouring rows, > 0.
   bool rows_along_x = true;    ///< Else along y.
-  double ball_radius = 0.2;    ///< Of the mill, > 0.
   double polish_sigma = 0.03;  ///< Of the Gaussian, > 0.
   double rim_depth = 0.0;      ///< Taken off in addition at the rim, ≥ 0.
   double rim_length = 1.0;     ///< Distance over which that falls to 1/e of itself, > 0.
 
-  /// Share of the ball's own curvature that a design's valleys have at most: through as sharp ones
-  /// it rolls (SmoothBed::kMaxBend), with a margin for what control points do not tell.
-  static constexpr double kSharpestValley = 0.75;
-  /// Second derivative of a valley at most, 1/mm.
-  [[nodiscard]] double sharpest_valley() const { return kSharpestValley / ball_radius; }
+  /// The same of a part that is cast in a mould which is cut so, and polished then: the mould is
+  /// 1 / (1 − shrinkage) as large.
+  [[nodiscard]] MadeBy cast(double shrinkage) const {
+    MadeBy made = *this;
+    made.pitch *= 1.0 - shrinkage;
+    return made;
+  }
 
   friend bool operator==(const MadeBy&, const MadeBy&) = default;
 };

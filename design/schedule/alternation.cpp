@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "design/schedule/alternation.h"
 
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <optional>
@@ -10,7 +9,6 @@
 #include "core/error.h"
 #include "core/surface/grid_mesh.h"
 #include "core/value_slope.h"
-#include "design/optics/made_spline.h"
 #include "design/schedule/spline_start.h"
 
 namespace lensforge {
@@ -38,27 +36,6 @@ void begin_next_level(Checkpoint& state) {
   ++state.level;
 }
 
-/// How sharply a spline is cut against what rounds it: unmade() with each of these, the objective
-/// chooses. A 128² portrait takes 0.001, a 96² logo, which would have valleys sharper than the
-/// ball, 0.01 to 0.03.
-constexpr std::array kSharpenings{1e-3, 3e-3, 1e-2, 3e-2, 1e-1};
-
-/// What has to be cut so that the net's surface is what comes off the machine.
-SurfaceMesh made_start(const DesignTask& task, const Level& level, const ControlNet& net) {
-  SurfaceMesh best = net_mesh(net);
-  const LevelProblem problem = make_problem(task, level, 0);
-  GuidedOptimization stage(best, problem.setup, problem.target, problem.objective, task.executor);
-  double least = stage.value(best);
-  for (const double least_share : kSharpenings) {
-    SurfaceMesh tried = net_mesh(unmade(net, *task.options.made_by, least_share));
-    const double value = stage.value(tried);
-    if (!(value < least)) continue;
-    least = value;
-    best = std::move(tried);
-  }
-  return best;
-}
-
 /// The spline that a mesh's surface becomes, as a mesh of its control points. Its knot lines follow
 /// the vertices as far as no barrier refuses it.
 SurfaceMesh spline_start(const DesignTask& task, const Level& level, const SurfaceMesh& mesh) {
@@ -67,10 +44,8 @@ SurfaceMesh spline_start(const DesignTask& task, const Level& level, const Surfa
     return spline_through(mesh, task.setup.lens_size, level.grid, share, task.executor,
                           task.control);
   };
-  // What is made of a spline is known where its knots are even.
-  if (task.options.made_by) return made_start(task, level, fitted(0.0));
   const LevelProblem problem = make_problem(task, level, 0);
-  for (double share = 1.0;; share -= kShareStep) {
+  for (double share = level.knot_share;; share -= kShareStep) {
     SurfaceMesh net = net_mesh(fitted(share));
     GuidedOptimization stage(net, problem.setup, problem.target, problem.objective, task.executor);
     if (share <= 0.0 || std::isfinite(stage.value(net))) return net;

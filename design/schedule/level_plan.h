@@ -16,6 +16,7 @@ struct Level {
   GridShape grid;                ///< Vertices of the mesh.
   double nu = 0.0;               ///< ν of the Welsch function, 1/mm.
   bool spline = false;           ///< The mesh's vertices are control points of a spline.
+  double knot_share = 1.0;       ///< Of the vertices' way from an even grid, that its knots go.
   int rounds = 0;                ///< Alternations.
   int iterations = 0;            ///< Most of one round.
 };
@@ -38,7 +39,8 @@ inline constexpr double kMaxKnotCells = 500'000.0;
 /// curvature that moves light by one pixel over one cell, (pixel / cell) / LightPath::reach(1).
 ///
 /// A spline is designed as a smooth mesh in fewer rounds, and one more level optimises the spline
-/// that follows from it, with two knot cells for each cell of the mesh.
+/// that follows from it, with two knot cells for each cell of the mesh; for a process, with as fine
+/// ones as undo its polish, and in more and shorter rounds.
 std::vector<Level> plan_levels(const Eigen::Vector2i& pixels, const DesignOptions& options);
 
 }  // namespace lensforge

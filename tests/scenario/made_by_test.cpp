@@ -20,7 +20,7 @@ class MadeBy : public Scenario {
                            "--pixels",  "24",
                            "--width",   "3mm",
                            "--focal",   "15mm",
-                           "--rounds",  "1",
+                           "--rounds",  "4",
                            "--quality", "draft",
                            "--force"};
     arguments.insert(arguments.end(), more.begin(), more.end());
@@ -67,15 +67,33 @@ TEST_F(MadeBy, APartIsBetterIfItsDesignKnowsHowItIsMade) {
   EXPECT_THAT(warnings(), HasSubstr("was designed for a pitch of 0.045 mm"));
 }
 
+TEST_F(MadeBy, ACastPartIsDesignedForItsMould) {
+  const Arguments mould = {"--part", "mould", "--shrinkage", "0.2"};
+  ASSERT_EQ(
+      design({"--made-by", path("shop.toml"), "--part", "mould", "--shrinkage", "0.2"}).exit_code,
+      0);
+  const nlohmann::json made = json_at("lens/lens.json")["provenance"]["made_by"];
+  EXPECT_NEAR(made["pitch_mm"], 0.036, 1e-12);
+  cut(mould);
+  EXPECT_THAT(warnings(), Not(HasSubstr("was designed for")));
+  const double promised = made["metrics"]["mae"];
+  EXPECT_GT(part_mae(), 0.95 * promised);
+  EXPECT_LT(part_mae(), 1.2 * promised);
+  cut({"--no-render"});
+  EXPECT_THAT(warnings(), HasSubstr("was designed for a pitch of 0.036 mm"));
+}
+
 TEST_F(MadeBy, WhatCannotBeDesignedForIsRefused) {
   expect_refusal(design({"--made-by", "default", "--model", "facet"}), 2,
                  {"--made-by default", "--model spline", "facet"});
   expect_refusal(design({"--made-by", path("absent.toml")}), 2, {"absent.toml"});
   std::ofstream(at("raw.toml")) << "[polish]\nsigma = 0\n";
   expect_refusal(design({"--made-by", path("raw.toml")}), 2, {"polish.sigma 0", "not polished"});
-  expect_refusal(run({"design", picture("portrait.png"), "--out", path("lens"), "--made-by",
-                      "default", "--width", "200mm", "--focal", "500mm"}),
-                 2, {"--width 200", "--made-by", "at most 53 mm"});
+  std::ofstream(at("fine.toml")) << "[polish]\nsigma = 0.0001\n";
+  expect_refusal(design({"--made-by", path("fine.toml")}), 2,
+                 {"polish.sigma 0.0001", "too fine", "at least 0.0004 mm"});
+  expect_refusal(design({"--part", "mould"}), 2, {"--part", "needs --made-by"});
+  expect_refusal(design({"--made-by", "default", "--shrinkage", "0.3"}), 2, {"--shrinkage 0.3"});
   EXPECT_FALSE(fs::exists(at("lens")));
 }
 

@@ -43,7 +43,7 @@ std::vector<double> coefficients_of(const AxisLength& along, const std::function
 TEST(AxisBasis, AStraightLineStaysOneToTheRim) {
   const AxisLength along{1, 20, 2.0};
   const AxisBasis basis =
-      made_basis(along, even_points(along.cells, kSamples), {0.06, true, 0.2, 0.13, 0.0, 1.0});
+      made_basis(along, even_points(along.cells, kSamples), {0.06, true, 0.13, 0.0, 1.0});
   std::vector<double> line;
   for (int i = 0; i < along.cells + 3; ++i) line.push_back(3.0 + greville_point(i, along.cells));
   for (std::size_t k = 0; k < static_cast<std::size_t>(basis.nodes()); ++k) {
@@ -54,7 +54,7 @@ TEST(AxisBasis, AStraightLineStaysOneToTheRim) {
 
 TEST(AxisBasis, SlopesAreThoseOfTheValues) {
   const AxisLength along{1, 12, 1.0};
-  const MadeBy made{0.07, true, 0.2, 0.11, 0.3, 0.4};
+  const MadeBy made{0.07, true, 0.11, 0.3, 0.4};
   std::vector<double> c;
   for (int i = 0; i < along.cells + 3; ++i) c.push_back(std::sin(2.1 * i));
   constexpr double kStep = 1e-4;
@@ -114,11 +114,11 @@ TEST(AxisBasis, RowsAndPolishTakeAWaveDownAsBallsDo) {
     const auto wave = [&](double t) { return std::cos(k * (t - 4.0)); };
     const auto bend = [&](double t) { return -k * k * wave(t); };
     const std::vector<double> c = coefficients_of(along, wave, bend);
-    const AxisBasis across = made_basis(along, {middle}, {kPitch, true, 0.2, kSigma, 0.0, 1.0});
+    const AxisBasis across = made_basis(along, {middle}, {kPitch, true, kSigma, 0.0, 1.0});
     const double left = dot(across, across.value, c, 0);
     EXPECT_NEAR(left, share_left(wavelength, kPitch, kSigma, 0.2), 1.5e-3) << wavelength;
     // Along the rows there is polish alone.
-    const AxisBasis by = made_basis(along, {middle}, {kPitch, false, 0.2, kSigma, 0.0, 1.0});
+    const AxisBasis by = made_basis(along, {middle}, {kPitch, false, kSigma, 0.0, 1.0});
     EXPECT_NEAR(dot(by, by.value, c, 0), std::exp(-0.5 * k * k * kSigma * kSigma), 1e-4);
     EXPECT_LT(left, dot(by, by.value, c, 0) - 0.005);
   }
@@ -126,7 +126,7 @@ TEST(AxisBasis, RowsAndPolishTakeAWaveDownAsBallsDo) {
 
 TEST(AxisBasis, RimIsTakenOffAtBothEnds) {
   const AxisLength along{0, 10, 4.0};
-  const AxisBasis basis = made_basis(along, even_points(10, 1), {0.06, true, 0.2, 0.03, 0.5, 2.0});
+  const AxisBasis basis = made_basis(along, even_points(10, 1), {0.06, true, 0.03, 0.5, 2.0});
   EXPECT_NEAR(basis.lift.front(), -0.5 * (1.0 + std::exp(-2.0)), 1e-12);
   EXPECT_NEAR(basis.lift[5], -0.5 * 2.0 * std::exp(-1.0), 1e-12);
   EXPECT_NEAR(basis.tilt[5], 0.0, 1e-12);

@@ -74,7 +74,7 @@ TEST(SplineNodes, AdjointEqualsCentralDifferences) {
 TEST(SplineNodes, AdjointOfMadeNodesEqualsCentralDifferences) {
   const ControlNet net = sample_spline();
   const Eigen::Vector2i cells = net.cells();
-  const MadeBy made{0.6, true, 0.2, 0.9, 0.2, 1.5};
+  const MadeBy made{0.6, true, 0.9, 0.2, 1.5};
   const auto basis = [&](int axis) {
     return made_basis({axis, cells[axis], net.points.row(axis).maxCoeff()},
                       even_points(cells[axis], kSamples), made);

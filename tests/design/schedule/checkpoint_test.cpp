@@ -236,7 +236,6 @@ TEST(DesignFingerprint, ChangesWithEveryNumberOfTheProcess) {
   const MadeBy made[] = {{},
                          {.pitch = 0.05},
                          {.rows_along_x = false},
-                         {.ball_radius = 0.3},
                          {.polish_sigma = 0.02},
                          {.rim_depth = 0.01},
                          {.rim_length = 2.0}};

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+
+#include "core/compute/executor.h"
+#include "core/surface/control_net.h"
+#include "core/surface/optical_surface.h"
+#include "core/surface/sampled_surface.h"
+#include "design/optics/made_by.h"
+
+namespace lensforge {
+
+/// What comes off the machine where a spline is cut and polished: the average of the spline with a
+/// Gaussian, less what polish takes off at the rim.
+///
+/// Along the rows the Gaussian's variance is the polish's σ²; across them p²/12 is added. A ball of
+/// radius R whose axis runs over y touches f at y + R f′, so that contacts are p (1 + R f″) apart.
+/// At the distance d of one it leaves (1/R − f″) d²/2 more than f, on average
+/// (1/R − f″) (1 + R f″)² p²/24 = p²/24R + f″ p²/24 + …, of which the first part is the same
+/// everywhere. What that leaves out are waves of the pitch, of which polishing leaves
+/// exp(−2π²σ²/p²), and what the ball fills of valleys sharper than itself. In a mould it is the
+/// same, with f turned over. Beyond the rim the surface goes on turned about it, as PolishedField
+/// has it.
+///
+/// Averages are sums over heights on an even grid, 3/4 σ apart: of waves at least 2σ long they are
+/// off by less than 1e-5 of the height, of a spline with bumps of 1 µm by 5e-8 mm and 1e-6 rad
+/// (MadeSurface.IsTheAverageOfTheSpline).
+class MadeSurface {
+ public:
+  /// @pre made.polish_sigma ≥ least_sigma(the lens's size). @throw Interrupted.
+  MadeSurface(const ControlNet& net, const MadeBy& made, const Executor& executor);
+
+  /// @pre xy is on the lens.
+  [[nodiscard]] SurfacePoint at(const Eigen::Vector2d& xy) const;
+
+  /// Of the polish, mm: below it the grid takes more than 0.8 GB.
+  static double least_sigma(const Eigen::Vector2d& size);
+
+ private:
+  /// How an axis's averages weigh the heights around a place.
+  struct Weights;
+
+  void sample_row(const ControlNet& net, int row);
+  void turn_about_rim();
+  [[nodiscard]] int first_sample(double at, int axis) const;
+
+  MadeBy made_;
+  Eigen::Vector2d size_;    ///< Of the lens, mm.
+  Eigen::Vector2d sigma_;   ///< mm
+  Eigen::Vector2i cells_;   ///< Of the grid over the lens.
+  Eigen::Vector2d step_;    ///< mm
+  Eigen::MatrixXd height_;  ///< Columns × rows, with samples beyond the rim.
+};
+
+/// The made surface above the nodes of its spline, spline_nodes().
+SampledSurface made_nodes(const ControlNet& net, const MadeBy& made, int samples,
+                          const Executor& executor);
+
+}  // namespace lensforge
