@@ -98,6 +98,17 @@ void append(const NodeSum& sum, int first, AxisBasis& basis) {
   }
 }
 
+/// Adds the four functions of the spline itself at t to the node that was appended last.
+void append_plan(double t, AxisBasis& basis) {
+  const CubicBasis at = cubic_basis(t, basis.coefficients - 3);
+  basis.plan_value.resize(basis.value.size());
+  basis.plan_slope.resize(basis.slope.size());
+  const auto window = static_cast<std::ptrdiff_t>(basis.value.size()) - basis.taps;
+  const std::ptrdiff_t to = window + at.first - basis.first.back();
+  std::copy(at.value.begin(), at.value.end(), basis.plan_value.begin() + to);
+  std::copy(at.slope.begin(), at.slope.end(), basis.plan_slope.begin() + to);
+}
+
 }  // namespace
 
 std::vector<double> even_points(int cells, int samples) {
@@ -116,6 +127,8 @@ AxisBasis plain_basis(int cells, const std::vector<double>& points) {
     basis.value.insert(basis.value.end(), at.value.begin(), at.value.end());
     basis.slope.insert(basis.slope.end(), at.slope.begin(), at.slope.end());
   }
+  basis.plan_value = basis.value;
+  basis.plan_slope = basis.slope;
   basis.lift.resize(points.size());
   basis.tilt.resize(points.size());
   return basis;
@@ -139,6 +152,7 @@ AxisBasis made_basis(const AxisLength& along, const std::vector<double>& points,
     }
     const int here = std::min(static_cast<int>(t), along.cells - 1);
     append(sum, std::clamp(here - reach, 0, basis.coefficients - basis.taps), basis);
+    append_plan(t, basis);
     const double low = made.rim_depth * std::exp(-t * cell / made.rim_length);
     const double high = made.rim_depth * std::exp((t * cell - along.length) / made.rim_length);
     basis.lift.push_back(-low - high);

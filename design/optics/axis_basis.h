@@ -11,12 +11,14 @@ namespace lensforge {
 /// heights.
 struct AxisBasis {
   int coefficients = 0;
-  int taps = 0;               ///< Coefficients that a node is a sum of.
-  std::vector<int> first;     ///< Of a node: the first of its coefficients; never falls.
-  std::vector<double> value;  ///< taps × nodes
-  std::vector<double> slope;  ///< taps × nodes, derivatives by the knot cell.
-  std::vector<double> lift;   ///< Added to a node's height, mm.
-  std::vector<double> tilt;   ///< Its derivative, mm by the knot cell.
+  int taps = 0;                    ///< Coefficients that a node is a sum of.
+  std::vector<int> first;          ///< Of a node: the first of its coefficients; never falls.
+  std::vector<double> value;       ///< Of heights; taps × nodes.
+  std::vector<double> slope;       ///< taps × nodes, derivatives by the knot cell.
+  std::vector<double> plan_value;  ///< Of x and y, those of the spline itself; taps × nodes.
+  std::vector<double> plan_slope;  ///< taps × nodes, derivatives by the knot cell.
+  std::vector<double> lift;        ///< Added to a node's height, mm.
+  std::vector<double> tilt;        ///< Its derivative, mm by the knot cell.
 
   [[nodiscard]] int nodes() const { return static_cast<int>(first.size()); }
 };

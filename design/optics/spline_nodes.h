@@ -25,14 +25,24 @@ namespace lensforge {
 
 /// AxisBasis for kernels.
 struct AxisTaps {
-  int taps;             ///< Coefficients that a node is a sum of.
-  const int* first;     ///< Of a node: number of its first coefficient.
-  const double* value;  ///< taps × nodes
-  const double* slope;  ///< taps × nodes, by the knot cell.
-  const double* lift;   ///< Of a node, mm.
-  const double* tilt;   ///< Likewise, mm by the knot cell.
-  const int* begin;     ///< Of a coefficient: its first node, and one after its last.
+  int taps;                  ///< Coefficients that a node is a sum of.
+  const int* first;          ///< Of a node: number of its first coefficient.
+  const double* value;       ///< Of heights; taps × nodes.
+  const double* slope;       ///< taps × nodes, by the knot cell.
+  const double* plan_value;  ///< Of x and y.
+  const double* plan_slope;
+  const double* lift;  ///< Of a node, mm.
+  const double* tilt;  ///< Likewise, mm by the knot cell.
+  const int* begin;    ///< Of a coefficient: its first node, and one after its last.
   const int* end;
+
+  /// What a coefficient counts in x, y and z of a node, and in their derivatives.
+  [[nodiscard]] LF_HD Eigen::Vector3d values(std::int64_t tap) const {
+    return {plan_value[tap], plan_value[tap], value[tap]};
+  }
+  [[nodiscard]] LF_HD Eigen::Vector3d slopes(std::int64_t tap) const {
+    return {plan_slope[tap], plan_slope[tap], slope[tap]};
+  }
 };
 
 /// AxisTaps in the memory of an executor.
@@ -44,6 +54,8 @@ class AxisTapsOn {
         first_(buffer_of(executor, std::span<const int>(basis.first))),
         value_(buffer_of(executor, std::span<const double>(basis.value))),
         slope_(buffer_of(executor, std::span<const double>(basis.slope))),
+        plan_value_(buffer_of(executor, std::span<const double>(basis.plan_value))),
+        plan_slope_(buffer_of(executor, std::span<const double>(basis.plan_slope))),
         lift_(buffer_of(executor, std::span<const double>(basis.lift))),
         tilt_(buffer_of(executor, std::span<const double>(basis.tilt))) {
     std::vector<int> begin(static_cast<std::size_t>(basis.coefficients), basis.nodes());
@@ -60,8 +72,10 @@ class AxisTapsOn {
   }
 
   [[nodiscard]] AxisTaps view() const {
-    return {taps_,        first_.data(), value_.data(), slope_.data(),
-            lift_.data(), tilt_.data(),  begin_.data(), end_.data()};
+    return {taps_,         first_.data(),      value_.data(),
+            slope_.data(), plan_value_.data(), plan_slope_.data(),
+            lift_.data(),  tilt_.data(),       begin_.data(),
+            end_.data()};
   }
   [[nodiscard]] int nodes() const { return static_cast<int>(first_.size()); }
   [[nodiscard]] int coefficients() const { return static_cast<int>(begin_.size()); }
@@ -74,6 +88,8 @@ class AxisTapsOn {
   Buffer<int> first_;
   Buffer<double> value_;
   Buffer<double> slope_;
+  Buffer<double> plan_value_;
+  Buffer<double> plan_slope_;
   Buffer<double> lift_;
   Buffer<double> tilt_;
   Buffer<int> begin_;
@@ -104,8 +120,8 @@ struct LookAlongRow {
     Eigen::Vector3d steep(0.0, 0.0, 0.0);
     for (int k = 0; k < s.u.taps; ++k) {
       const auto c = column3(points, at + k);
-      a += s.u.value[s.u.taps * node + k] * c;
-      steep += s.u.slope[s.u.taps * node + k] * c;
+      a += s.u.values(s.u.taps * node + k).cwiseProduct(c);
+      steep += s.u.slopes(s.u.taps * node + k).cwiseProduct(c);
     }
     column3(s.along, i) = a;
     column3(s.steep, i) = steep;
@@ -127,9 +143,9 @@ struct LookAcrossRows {
     for (int k = 0; k < s.v.taps; ++k) {
       const std::int64_t tap = s.v.taps * node + k;
       const auto a = column3(s.along, at + k * s.nodes_u);
-      p += s.v.value[tap] * a;
-      p_v += s.v.slope[tap] * a;
-      p_u += s.v.value[tap] * column3(s.steep, at + k * s.nodes_u);
+      p += s.v.values(tap).cwiseProduct(a);
+      p_v += s.v.slopes(tap).cwiseProduct(a);
+      p_u += s.v.values(tap).cwiseProduct(column3(s.steep, at + k * s.nodes_u));
     }
     const std::int64_t column = i % s.nodes_u;
     p.z() += s.u.lift[column] + s.v.lift[node];
@@ -159,8 +175,9 @@ struct GatherAcrossRows {
       const Eigen::Vector3d n_bar = column3(normal_bar, at);
       const Eigen::Vector3d u_bar = column3(s.by_v, at).cross(n_bar);
       const Eigen::Vector3d v_bar = n_bar.cross(column3(s.by_u, at));
-      a_bar += s.v.value[tap] * column3(position_bar, at) + s.v.slope[tap] * v_bar;
-      steep_bar += s.v.value[tap] * u_bar;
+      a_bar += s.v.values(tap).cwiseProduct(column3(position_bar, at)) +
+               s.v.slopes(tap).cwiseProduct(v_bar);
+      steep_bar += s.v.values(tap).cwiseProduct(u_bar);
     }
     column3(s.along, i) = a_bar;
     column3(s.steep, i) = steep_bar;
@@ -179,7 +196,8 @@ struct GatherAlongRow {
     for (std::int64_t node = s.u.begin[column]; node < s.u.end[column]; ++node) {
       const std::int64_t tap = s.u.taps * node + column - s.u.first[node];
       const std::int64_t at = row * s.nodes_u + node;
-      c_bar += s.u.value[tap] * column3(s.along, at) + s.u.slope[tap] * column3(s.steep, at);
+      c_bar += s.u.values(tap).cwiseProduct(column3(s.along, at)) +
+               s.u.slopes(tap).cwiseProduct(column3(s.steep, at));
     }
     column3(points_bar, i) = c_bar;
   }

@@ -134,5 +134,30 @@ TEST(AxisBasis, RimIsTakenOffAtBothEnds) {
   EXPECT_GT(basis.tilt.front(), 0.0);
 }
 
+TEST(AxisBasis, PlacesInThePlaneAreThoseOfTheSplineItself) {
+  const AxisLength along{0, 12, 1.0};
+  const std::vector<double> points = even_points(along.cells, 2);
+  const AxisBasis made = made_basis(along, points, {0.06, true, 0.13, 0.0, 1.0});
+  const AxisBasis plain = plain_basis(along.cells, points);
+  for (int k = 0; k < made.nodes(); ++k) {
+    std::vector<double> dense(static_cast<std::size_t>(made.coefficients));
+    std::vector<double> steep = dense;
+    const auto spread = [&](const AxisBasis& basis, double sign) {
+      for (int j = 0; j < basis.taps; ++j) {
+        const auto at = static_cast<std::size_t>(k * basis.taps + j);
+        const auto i = static_cast<std::size_t>(basis.first[static_cast<std::size_t>(k)] + j);
+        dense[i] += sign * basis.plan_value[at];
+        steep[i] += sign * basis.plan_slope[at];
+      }
+    };
+    spread(made, 1.0);
+    spread(plain, -1.0);
+    for (std::size_t i = 0; i < dense.size(); ++i) {
+      EXPECT_EQ(dense[i], 0.0) << k;
+      EXPECT_EQ(steep[i], 0.0) << k;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace lensforge
