@@ -147,6 +147,10 @@ int compare(const OptionSet& options, const CamSettings& settings, const CamOpti
     json["choices"].push_back(choice_json(choice));
     text += choice_text(choice);
   }
+  if (!result.advice.empty()) {
+    json["advice"] = result.advice;
+    text += result.advice + "\n";
+  }
   if (result.complete) json["files"].push_back(result.page.string());
   console.result(json, text);
   return result.complete ? kDone : kInterrupted;

@@ -21,9 +21,11 @@ void add_cam_options(OptionSet& options, CamSettings& settings) {
                "machine, blank, clamps, tools and process; options given here win");
   options.flag("--show-workshop", settings.show_workshop,
                "print the workshop in use as TOML and exit");
-  options.texts("--compare", settings.compare, "KEY=VALUE,…",
-                "rank choices by leakage and hours instead of making programs: tool=0.3,0.4 "
-                "pitch=0.04,0.06 large=0,4 (finishing only)");
+  options.texts(
+      "--compare", settings.compare, "KEY=VALUE,…",
+      "rank choices by leakage and hours instead of making programs: tool=0.3,0.4 "
+      "pitch=0.04,0.06 slope=3e-5,6e-5 large=0,4 (finishing only); mae=0.004 recommends the "
+      "quickest that reaches it");
   options.fields(cam_fields(), settings.cam);
 }
 

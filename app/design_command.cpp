@@ -92,10 +92,9 @@ nlohmann::json provenance(const OptionSet& options, const ChosenDevice& device,
 void write_folder(const OutputFolder& folder, const DesignResult& result, const Console& console) {
   PendingFiles files(folder.path());
   files.add(lens_file::kConvergence, convergence_csv(result.convergence));
-  // What counts is what comes off the machine, where the design knows.
-  const Image& projected = result.made ? result.made->picture : result.lens.render;
+  const Image* const made = result.made ? &result.made->picture : nullptr;
   files.add(lens_file::kOverview, [&](const fs::path& beside) {
-    write_image(draw_overview(result.lens, projected), beside);
+    write_image(draw_overview(result.lens, made), beside);
   });
   write_lens(result.lens, std::move(files));
   const fs::path cut = folder.path() / lens_file::kCut;

@@ -142,14 +142,19 @@ Image draw_relief(const SurfaceMesh& mesh, const OpticalSetup& setup, int column
   return resample(image, columns, rows);
 }
 
-Image draw_overview(const Lens& lens, const Image& projected) {
+Image draw_overview(const Lens& lens, const Image* made) {
   const int longer = std::max(lens.target.columns(), lens.target.rows());
   const int columns = std::max(1, lens.target.columns() * kPanelSide / longer);
   const int rows = std::max(1, lens.target.rows() * kPanelSide / longer);
-  Image page(3 * columns + 2 * kGap, rows, 1.0F);
-  paste(page, resample(lens.target, columns, rows), 0);
-  paste(page, resample(projected, columns, rows), columns + kGap);
-  paste(page, draw_relief(lens.surface, lens.setup, columns, rows), 2 * (columns + kGap));
+  std::vector<Image> panels = {resample(lens.target, columns, rows),
+                               resample(lens.render, columns, rows)};
+  if (made != nullptr) panels.push_back(resample(*made, columns, rows));
+  panels.push_back(draw_relief(lens.surface, lens.setup, columns, rows));
+  const int count = static_cast<int>(panels.size());
+  Image page(count * (columns + kGap) - kGap, rows, 1.0F);
+  for (int i = 0; i < count; ++i) {
+    paste(page, panels[static_cast<std::size_t>(i)], i * (columns + kGap));
+  }
   return page;
 }
 

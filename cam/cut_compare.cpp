@@ -76,6 +76,15 @@ std::vector<double> lengths_of(std::string_view list, const std::string& where) 
   });
 }
 
+std::vector<double> numbers_of(std::string_view list, const std::string& where) {
+  return values_of(list, where, [&](std::string_view word) {
+    double value = 0.0;
+    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+    if (error == std::errc() && end == word.data() + word.size() && value > 0.0) return value;
+    throw InputError(where + ": " + std::string(word) + " is not a number above 0");
+  });
+}
+
 std::vector<int> tool_numbers_of(std::string_view list, const std::string& where) {
   return values_of(list, where, [&](std::string_view word) {
     int value = 0;
@@ -85,41 +94,82 @@ std::vector<int> tool_numbers_of(std::string_view list, const std::string& where
   });
 }
 
-std::vector<Choice> combinations(const CamOptions& options, const CutChoices& choices) {
-  Workshop workshop = options.workshop;
-  workshop.process.rough.enabled = false;
-  workshop.process.semi.enabled = false;
+/// What one combination sets; what it does not name stays the workshop's.
+struct Setting {
+  double tool = 0.0;
+  double pitch = 0.0;
+  double slope = 0.0;
+  int large = 0;
+};
+
+std::vector<Setting> settings_of(const Workshop& workshop, const CutChoices& choices) {
   const FinishProcess& finish = workshop.process.finish;
   const auto or_own = [](auto values, auto own) {
     if (values.empty()) values.push_back(own);
     return values;
   };
-  std::vector<Choice> all;
+  std::vector<Setting> all;
   for (const double tool : or_own(choices.tools, workshop.tool(finish.tool).diameter)) {
     for (const double pitch : or_own(choices.pitches, finish.pitch)) {
-      for (const int large : or_own(choices.large, finish.large_tool)) {
-        Choice choice{
-            "tool " + trimmed_decimal(tool, 4) + " mm, pitch " + trimmed_decimal(pitch, 4) + " mm",
-            options};
-        choice.options.workshop = workshop;
-        choice.options.render = true;
-        choice.options.remedies = false;
-        for (Tool& one : choice.options.workshop.tools) {
-          if (one.number == finish.tool && one.diameter != tool) one = resized(one, tool);
+      for (const double slope : or_own(choices.slopes, finish.slope_tolerance)) {
+        for (const int large : or_own(choices.large, finish.large_tool)) {
+          all.push_back({tool, pitch, slope, large});
         }
-        FinishProcess& changed = choice.options.workshop.process.finish;
-        if (!choices.pitches.empty()) changed.set_pitch(pitch);
-        changed.large_tool = large;
-        if (large == 0) {
-          changed.large_every = 1;
-        } else {
-          choice.name += ", larger ball T" + std::to_string(large);
-        }
-        all.push_back(std::move(choice));
       }
     }
   }
   return all;
+}
+
+std::string name_of(const Setting& setting, const CutChoices& choices) {
+  std::string name = "tool " + trimmed_decimal(setting.tool, 4) + " mm, pitch " +
+                     trimmed_decimal(setting.pitch, 4) + " mm";
+  if (!choices.slopes.empty()) name += ", slope tolerance " + number_text(setting.slope);
+  if (setting.large != 0) name += ", larger ball T" + std::to_string(setting.large);
+  return name;
+}
+
+std::vector<Choice> combinations(const CamOptions& options, const CutChoices& choices) {
+  CamOptions base = options;
+  base.workshop.process.rough.enabled = false;
+  base.workshop.process.semi.enabled = false;
+  base.render = true;
+  base.remedies = false;
+  std::vector<Choice> all;
+  for (const Setting& setting : settings_of(base.workshop, choices)) {
+    Choice choice{name_of(setting, choices), base};
+    FinishProcess& finish = choice.options.workshop.process.finish;
+    for (Tool& one : choice.options.workshop.tools) {
+      if (one.number == finish.tool && one.diameter != setting.tool) {
+        one = resized(one, setting.tool);
+      }
+    }
+    if (!choices.pitches.empty()) finish.set_pitch(setting.pitch);
+    finish.slope_tolerance = setting.slope;
+    finish.large_tool = setting.large;
+    if (setting.large == 0) finish.large_every = 1;
+    all.push_back(std::move(choice));
+  }
+  return all;
+}
+
+/// Marks the quickest choice that reaches the goal. @return what to say of it.
+std::string choose(double goal, std::vector<ReportChoice>& ranking) {
+  if (goal <= 0.0) return "";
+  ReportChoice* quickest = nullptr;
+  const ReportChoice* best = &ranking.front();
+  for (ReportChoice& choice : ranking) {
+    if (choice.mae < best->mae) best = &choice;
+    const bool reaches = choice.mae <= goal;
+    if (reaches && (quickest == nullptr || choice.hours < quickest->hours)) quickest = &choice;
+  }
+  if (quickest == nullptr) {
+    return "none reaches MAE " + number_text(goal) + "; " + best->choice + " comes closest, " +
+           trimmed_decimal(best->mae, 4);
+  }
+  quickest->chosen = true;
+  return quickest->choice + " reaches MAE " + number_text(goal) + " in the least time, " +
+         decimal_text(quickest->hours, 2) + " h";
 }
 
 ReportChoice ranked(const Choice& choice, const ReportData& report) {
@@ -134,27 +184,47 @@ ReportChoice ranked(const Choice& choice, const ReportData& report) {
 
 }  // namespace
 
+namespace {
+
+/// The lists that may be asked for.
+void take_list(const std::string& key, std::string_view list, const std::string& where,
+               CutChoices& choices) {
+  const auto take = [&](auto& values, const auto& read) {
+    if (!values.empty()) throw InputError(where + " is given twice");
+    values = read(list, where);
+  };
+  if (key == "tool") take(choices.tools, lengths_of);
+  if (key == "pitch") take(choices.pitches, lengths_of);
+  if (key == "large") take(choices.large, tool_numbers_of);
+  if (key == "slope") take(choices.slopes, numbers_of);
+  if (key == "mae") {
+    std::vector<double> goals;
+    take(goals, numbers_of);
+    if (goals.size() > 1 || choices.goal_mae > 0.0) {
+      throw InputError(where + ": is one number, such as 0.004");
+    }
+    choices.goal_mae = goals.front();
+  }
+}
+
+}  // namespace
+
 CutChoices parse_choices(std::span<const std::string> words, const std::string& option) {
   CutChoices choices;
   for (const std::string& word : words) {
     const std::size_t equals = word.find('=');
     const std::string key = word.substr(0, equals);
-    if (equals == std::string::npos || (key != "tool" && key != "pitch" && key != "large")) {
+    constexpr std::array<std::string_view, 5> kKeys{"tool", "pitch", "large", "slope", "mae"};
+    if (equals == std::string::npos || std::find(kKeys.begin(), kKeys.end(), key) == kKeys.end()) {
       throw InputError(option + ": " + word +
-                       " is not tool=MM,MM…, pitch=MM,MM… or large=TOOL,TOOL…");
+                       " is not tool=MM,MM…, pitch=MM,MM…, slope=RAD,RAD…, large=TOOL,TOOL… or "
+                       "mae=GOAL");
     }
-    const std::string_view list = std::string_view(word).substr(equals + 1);
-    const auto take = [&](auto& values, const auto& read) {
-      if (!values.empty()) throw InputError(option + ": " + key + " is given twice");
-      values = read(list, option + " " + key);
-    };
-    if (key == "tool") take(choices.tools, lengths_of);
-    if (key == "pitch") take(choices.pitches, lengths_of);
-    if (key == "large") take(choices.large, tool_numbers_of);
+    take_list(key, std::string_view(word).substr(equals + 1), option + " " + key, choices);
   }
   const auto count_of = [](const auto& values) { return std::max<std::size_t>(values.size(), 1); };
-  const std::size_t count =
-      count_of(choices.tools) * count_of(choices.pitches) * count_of(choices.large);
+  const std::size_t count = count_of(choices.tools) * count_of(choices.pitches) *
+                            count_of(choices.slopes) * count_of(choices.large);
   if (count > kMaxChoices) {
     throw InputError(option + ": " + std::to_string(count) + " combinations are more than " +
                      std::to_string(kMaxChoices));
@@ -207,11 +277,15 @@ CutComparison compare_cuts(const Lens& lens, const CamOptions& options, const Cu
                    [](const ReportChoice& a, const ReportChoice& b) {
                      return std::tie(a.leakage, a.hours) < std::tie(b.leakage, b.hours);
                    });
+  comparison.advice = choose(choices.goal_mae, comparison.ranking);
   page.choices = comparison.ranking;
   page.parameters = {
       {"Compared",
        {{"Operations", "finishing only"},
         {"Polishing, Gaussian σ", trimmed_decimal(options.workshop.polish.sigma, 4) + " mm"}}}};
+  if (!comparison.advice.empty()) {
+    page.parameters.front().parameters.push_back({"Recommendation", comparison.advice});
+  }
   comparison.page = folder / kComparePage;
   write_whole_file(comparison.page, compare_html(page));
   comparison.complete = true;

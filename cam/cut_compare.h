@@ -15,18 +15,20 @@
 
 namespace lensforge {
 
-/// What is to be compared: every tool with every pitch and every larger ball.
+/// What is to be compared: every tool with every pitch, slope tolerance and larger ball.
 struct CutChoices {
   std::vector<double> tools;    ///< Diameters of the finishing ball, mm; none: the workshop's.
   std::vector<double> pitches;  ///< mm; none: the workshop's.
   /// Numbers of the larger ball, 0 for no such; none: the workshop's.
   std::vector<int> large = {};
+  std::vector<double> slopes = {};  ///< Slope tolerances, rad; none: the workshop's.
+  double goal_mae = 0.0;  ///< Of the part: the quickest that reaches it is chosen; 0: none.
 };
 
 /// Combinations at most.
 inline constexpr std::size_t kMaxChoices = 64;
 
-/// Reads words such as "tool=0.3,0.4mm", "pitch=0.04" and "large=0,4".
+/// Reads words such as "tool=0.3,0.4mm", "pitch=0.04", "large=0,4", "slope=3e-5" and "mae=0.004".
 /// @param option  where they come from, for messages.
 /// @throw InputError naming option, word and rule.
 CutChoices parse_choices(std::span<const std::string> words, const std::string& option);
@@ -37,7 +39,9 @@ inline constexpr const char* kComparePage = "compare.html";
 struct CutComparison {
   bool complete = false;              ///< False if it was stopped.
   std::vector<ReportChoice> ranking;  ///< Least leakage first, then least hours; finishing only.
-  std::filesystem::path page;         ///< What was written; empty unless complete.
+  /// What to take for CutChoices::goal_mae, or how close the best comes; empty without a goal.
+  std::string advice;
+  std::filesystem::path page;  ///< What was written; empty unless complete.
 };
 
 /// What a comparison takes: one combination is worked on after the other.

@@ -84,7 +84,7 @@ struct ReportChoice {
   double dark_flux = 0.0;
   double mae = 0.0;
   double hours = 0.0;
-  bool chosen = false;  ///< What the rest of the report is about.
+  bool chosen = false;  ///< What the rest of the report is about, or what --compare recommends.
 };
 
 /// A surface whose picture is shown.

@@ -222,10 +222,12 @@ std::string leakage(const ReportData& data) {
 
 std::string choices(const ReportData& data) {
   if (data.choices.empty()) return "";
+  const bool alone = data.operations.empty();
+  const char* const mark = alone ? " – recommended" : " – this report";
   std::string body;
   int rank = 0;
   for (const ReportChoice& choice : data.choices) {
-    const std::string name = escape_html(choice.choice) + (choice.chosen ? " – this report" : "");
+    const std::string name = escape_html(choice.choice) + (choice.chosen ? mark : "");
     std::string cells = element("td", "data-label=\"rank\"", std::to_string(++rank));
     const auto cell = [&cells](const char* label, const std::string& html) {
       cells += element("td", "class=\"number\" data-label=\"" + std::string(label) + "\"", html);
@@ -241,7 +243,6 @@ std::string choices(const ReportData& data) {
       "tr", "",
       "<th>rank</th><th>choice</th><th class=\"number\">leakage</th><th class=\"number\">light in "
       "dark parts</th><th class=\"number\">MAE</th><th class=\"number\">finishing time</th>");
-  const bool alone = data.operations.empty();
   const std::string note =
       alone
           ? element("p", "",

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <stop_token>
 #include <string>
 #include <vector>
@@ -71,6 +72,36 @@ TEST(CutCompare, ALargerBallIsAChoice) {
   const ReportChoice& one = result.ranking[first ? 1 : 0];
   EXPECT_GT(two.hours, 0.0);
   EXPECT_NE(two.hours, one.hours);
+}
+
+TEST(CutCompare, TheQuickestThatReachesTheGoalIsRecommended) {
+  const TempFolder folder;
+  const auto compare = [&](const std::string& goal) {
+    return compare_cuts(small_lens(), coarse(), parse({"pitch=0.05,0.1,0.3", goal}), folder.path(),
+                        Executor::cpu(2), {});
+  };
+  const CutComparison all = compare("mae=1");
+  const auto quickest = std::min_element(
+      all.ranking.begin(), all.ranking.end(),
+      [](const ReportChoice& a, const ReportChoice& b) { return a.hours < b.hours; });
+  for (const ReportChoice& choice : all.ranking) {
+    EXPECT_EQ(choice.chosen, choice.choice == quickest->choice) << choice.choice;
+  }
+  EXPECT_THAT(all.advice, HasSubstr(quickest->choice + " reaches MAE 1"));
+  EXPECT_THAT(read_bytes(all.page), HasSubstr("recommended"));
+  const CutComparison none = compare("mae=1e-9");
+  EXPECT_THAT(none.advice, HasSubstr("none reaches MAE 1e-09"));
+  for (const ReportChoice& choice : none.ranking) EXPECT_FALSE(choice.chosen);
+}
+
+TEST(CutCompare, SlopeTolerancesAreChoices) {
+  const TempFolder folder;
+  const CutComparison result = compare_cuts(small_lens(), coarse(), parse({"slope=3e-5,0.001"}),
+                                            folder.path(), Executor::cpu(2), {});
+  ASSERT_EQ(result.ranking.size(), 2U);
+  EXPECT_THAT(result.ranking[0].choice, HasSubstr("slope tolerance 3e-05"));
+  EXPECT_LT(result.ranking[0].leakage, result.ranking[1].leakage);
+  EXPECT_TRUE(result.advice.empty());
 }
 
 TEST(CutCompare, StoppedLeavesNothing) {
