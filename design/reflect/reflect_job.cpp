@@ -48,20 +48,23 @@ void require_replaceable_result(const fs::path& folder, bool force) {
 }
 
 nlohmann::json result_json(const ReflectResult& result, const ReflectOptions& options) {
-  return {{"format", "lensforge.reflect"},
-          {"version", 1},
-          {"program", program_mark()},
-          {"status", result.done() ? "done" : "interrupted"},
-          {"goal", options_json(options).at("goal")},
-          {"before", energies_json(result.before)},
-          {"after", result.done() ? energies_json(result.after) : nlohmann::json()},
-          {"faces", result.mesh.triangle_count()},
-          {"vertices", result.mesh.vertex_count()},
-          {"updates", result.updates.size()},
-          {"mean_displacement", result.mean_displacement},
-          {"max_displacement", result.max_displacement},
-          {"seconds", result.seconds},
-          {"options", options_json(options)}};
+  nlohmann::json json = {{"format", "lensforge.reflect"},
+                         {"version", 1},
+                         {"program", program_mark()},
+                         {"status", result.done() ? "done" : "interrupted"},
+                         {"goal", options_json(options).at("goal")},
+                         {"before", energies_json(result.before)},
+                         {"after", result.done() ? energies_json(result.after) : nlohmann::json()},
+                         {"faces", result.mesh.triangle_count()},
+                         {"vertices", result.mesh.vertex_count()},
+                         {"updates", result.updates.size()},
+                         {"mean_displacement", result.mean_displacement},
+                         {"max_displacement", result.max_displacement},
+                         {"seconds", result.seconds},
+                         {"warnings", result.unmet},
+                         {"options", options_json(options)}};
+  if (result.radar) json["radar"] = radar_json(*result.radar);
+  return json;
 }
 
 std::vector<fs::path> write_result(const ReflectResult& result, const ReflectOptions& options,
@@ -79,6 +82,10 @@ std::vector<fs::path> write_result(const ReflectResult& result, const ReflectOpt
   files.add(reflect_file::kDisplacement, [&](const fs::path& to) {
     write_image(displacement_views({before, after}, executor), to);
   });
+  if (result.radar) {
+    files.add(reflect_file::kRadarTable, radar_csv(*result.radar));
+    files.add(reflect_file::kRadarPlot, radar_svg(*result.radar));
+  }
   files.add(reflect_file::kConvergence, convergence_text(result));
   files.add(reflect_file::kJson, result_json(result, options).dump(2) + "\n");
   return files.publish();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -8,6 +9,8 @@
 #include "core/compute/run_control.h"
 #include "core/surface/surface_mesh.h"
 #include "design/reflect/light/evaluate.h"
+#include "design/reflect/radar/radar_comparison.h"
+#include "design/reflect/reflect_input.h"
 #include "design/reflect/reflect_options.h"
 
 namespace lensforge::reflect {
@@ -15,7 +18,7 @@ namespace lensforge::reflect {
 /// One update of the vertices.
 struct ReflectUpdate {
   int number = 0;
-  std::string stage;               ///< "rim-spoke" or "face".
+  std::string stage;               ///< "rim-spoke", "face" or "split".
   double energy = 0.0;             ///< Of the shape before it, on the update's own directions.
   double mean_displacement = 0.0;  ///< Of all vertices after it, share of the diagonal.
   double max_displacement = 0.0;
@@ -33,6 +36,8 @@ struct ReflectResult {
   double mean_displacement = 0.0;  ///< Of the vertices, share of the diagonal.
   double max_displacement = 0.0;
   double seconds = 0.0;
+  std::optional<RadarComparison> radar;
+  std::vector<std::string> unmet;  ///< Constraints that the shape breaks, in words.
 
   [[nodiscard]] bool done() const { return status == Status::kDone; }
 };
@@ -40,8 +45,8 @@ struct ReflectResult {
 /// Deforms a mesh so that its reflection meets the goal while its shape is kept (Tojo et al.,
 /// Algorithm 1): target normals are optimised for cached light paths, the vertices follow them as
 /// rigidly as possible, and so on. Same bits for any number of threads.
-/// @param mesh  as repair_mesh() returns it. @throw InputError as validate().
-ReflectResult reflect_shape(const SurfaceMesh& mesh, const ReflectOptions& options,
+/// @throw InputError as validate().
+ReflectResult reflect_shape(const ReflectInput& input, const ReflectOptions& options,
                             const Executor& executor, const RunControl& control);
 
 /// The energies of a shape under the light of the options. @throw Interrupted

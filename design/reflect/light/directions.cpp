@@ -49,14 +49,14 @@ DirectionSet band_directions(double elevation, const BandSampling& sampling) {
   return set;
 }
 
-DirectionSet sun_directions(int count) {
-  const Eigen::Vector3d east = Eigen::Vector3d::UnitX();
+Eigen::Vector3d sun_direction(double angle) {
   const Eigen::Vector3d noon = Eigen::Vector3d(0.0, -1.0, 1.0).normalized();
+  return std::cos(angle) * Eigen::Vector3d::UnitX() + std::sin(angle) * noon;
+}
+
+DirectionSet sun_directions(int count) {
   Eigen::Matrix3Xd towards(3, count);
-  for (int i = 0; i < count; ++i) {
-    const double angle = pi * (i + 0.5) / count;
-    towards.col(i) = std::cos(angle) * east + std::sin(angle) * noon;
-  }
+  for (int i = 0; i < count; ++i) towards.col(i) = sun_direction(pi * (i + 0.5) / count);
   return listed_directions(towards);
 }
 

@@ -25,8 +25,10 @@ struct BandSampling {
 /// @param elevation  rad, above 0, at most π/2. @pre rows, columns ≥ 1
 DirectionSet band_directions(double elevation, const BandSampling& sampling);
 
-/// The sun's half circle from east (+x) over noon, (0, −1, 1)/√2, to west: `count` directions at
-/// even angles, none of them on the horizon. @pre count ≥ 1
+/// Towards the sun on its half circle from east (+x, angle 0) over noon, (0, −1, 1)/√2, to west.
+Eigen::Vector3d sun_direction(double angle);
+
+/// `count` directions of the sun at even angles, none of them on the horizon. @pre count ≥ 1
 DirectionSet sun_directions(int count);
 
 /// Directions as given, with equal weights. @pre none has length 0

@@ -42,30 +42,34 @@ struct Goal {
 
 /// What is minimised for a radiance L.
 enum class Loss {
-  kSquare,   ///< L²
-  kInverse,  ///< 1/(L + ε), where L is to be large.
+  kSquare,          ///< L²
+  kNegativeSquare,  ///< −L², where L is to be large.
+  kInverse,         ///< 1/(L + ε), where L is to be large (Tojo et al., 4.1).
 };
 
 [[nodiscard]] LF_HD inline double loss_of(Loss loss, double radiance) {
-  return loss == Loss::kInverse ? 1.0 / (radiance + kLossFloor) : radiance * radiance;
+  if (loss == Loss::kInverse) return 1.0 / (radiance + kLossFloor);
+  return loss == Loss::kSquare ? radiance * radiance : -radiance * radiance;
 }
 
 /// Derivative of loss_of().
 [[nodiscard]] LF_HD inline double loss_slope(Loss loss, double radiance) {
-  if (loss == Loss::kSquare) return 2.0 * radiance;
+  if (loss != Loss::kInverse) return loss == Loss::kSquare ? 2.0 * radiance : -2.0 * radiance;
   const double inverse = 1.0 / (radiance + kLossFloor);
   return -inverse * inverse;
 }
 
-/// Second derivative of loss_of().
+/// Size of the second derivative of loss_of().
 [[nodiscard]] LF_HD inline double loss_curvature(Loss loss, double radiance) {
-  if (loss == Loss::kSquare) return 2.0;
+  if (loss != Loss::kInverse) return 2.0;
   const double inverse = 1.0 / (radiance + kLossFloor);
   return 2.0 * inverse * inverse * inverse;
 }
 
+/// The energy itself, with its sign. 1/(L + ε), averaged over many directions of the light, asks
+/// for a little light from all of them, which a matt surface gives, and not for much light.
 [[nodiscard]] inline Loss loss_for(const Goal& goal) {
-  return goal.maximizes() ? Loss::kInverse : Loss::kSquare;
+  return goal.maximizes() ? Loss::kNegativeSquare : Loss::kSquare;
 }
 
 }  // namespace lensforge::reflect

@@ -92,6 +92,18 @@ DirectionSet LightField::directions(int update) const {
   return band_directions(elevation, {rows, kColumnsPerRow * rows, turn - std::floor(turn)});
 }
 
+Eigen::Vector3d LightField::random_direction(double u, double v) const {
+  if (listed) {
+    return listed->col(static_cast<Eigen::Index>(u * static_cast<double>(listed->cols())))
+        .normalized();
+  }
+  if (goal.has_place()) return sun_direction(std::numbers::pi * u);
+  const double z = (2.0 * u - 1.0) * std::sin(elevation);
+  const double r = std::sqrt(1.0 - z * z);
+  const double azimuth = 2.0 * std::numbers::pi * v;
+  return {r * std::cos(azimuth), r * std::sin(azimuth), z};
+}
+
 DirectionSet LightField::evaluation_directions() const {
   if (listed) return listed_directions(*listed);
   if (goal.has_place()) return sun_directions(kEvaluationSun);

@@ -21,6 +21,9 @@ struct LightField {
   /// Directions of an update; a band is turned by a golden share of its azimuths from one update to
   /// the next, so that a shape cannot hide between directions.
   [[nodiscard]] DirectionSet directions(int update) const;
+  /// A direction drawn from the whole band, the sun's half circle or the list by two numbers in
+  /// 0 … 1.
+  [[nodiscard]] Eigen::Vector3d random_direction(double u, double v) const;
   /// Finer, for energies that are stated: the band average of a face is exact to 0.1 %.
   [[nodiscard]] DirectionSet evaluation_directions() const;
 };

@@ -49,8 +49,9 @@ std::vector<int> first_of_place(const SurfaceMesh& mesh) {
 }
 
 /// Keeps the vertices that faces use, in their order.
-SurfaceMesh compacted(const SurfaceMesh& mesh) {
-  std::vector<int> number(static_cast<std::size_t>(mesh.vertex_count()), -1);
+/// @param number  becomes the new number of every vertex, −1 for those that were dropped.
+SurfaceMesh compacted(const SurfaceMesh& mesh, std::vector<int>& number) {
+  number.assign(static_cast<std::size_t>(mesh.vertex_count()), -1);
   for (const int v : mesh.triangles.reshaped()) number[static_cast<std::size_t>(v)] = 0;
   int used = 0;
   for (int& n : number) {
@@ -66,17 +67,18 @@ SurfaceMesh compacted(const SurfaceMesh& mesh) {
   return result;
 }
 
-SurfaceMesh merged(const SurfaceMesh& mesh, std::vector<std::string>& changes) {
+void merge_vertices(const SurfaceMesh& mesh, RepairedMesh& result) {
   const std::vector<int> first = first_of_place(mesh);
-  SurfaceMesh result = mesh;
-  for (int& v : result.triangles.reshaped()) v = first[static_cast<std::size_t>(v)];
+  SurfaceMesh merged = mesh;
+  for (int& v : merged.triangles.reshaped()) v = first[static_cast<std::size_t>(v)];
   std::int64_t duplicates = 0;
   for (std::size_t v = 0; v < first.size(); ++v) duplicates += first[v] != static_cast<int>(v);
-  if (duplicates > 0) changes.push_back(counted(duplicates, "duplicate vertices merged"));
-  result = compacted(result);
-  const std::int64_t unused = mesh.vertex_count() - duplicates - result.vertex_count();
-  if (unused > 0) changes.push_back(counted(unused, "vertices without a face dropped"));
-  return result;
+  if (duplicates > 0) result.changes.push_back(counted(duplicates, "duplicate vertices merged"));
+  std::vector<int> number;
+  result.mesh = compacted(merged, number);
+  for (const int v : first) result.vertex.push_back(number[static_cast<std::size_t>(v)]);
+  const std::int64_t unused = mesh.vertex_count() - duplicates - result.mesh.vertex_count();
+  if (unused > 0) result.changes.push_back(counted(unused, "vertices without a face dropped"));
 }
 
 void require_size(const SurfaceMesh& mesh, const std::string& name) {
@@ -208,7 +210,7 @@ class Orientation {
 RepairedMesh repair_mesh(const SurfaceMesh& mesh, const std::string& name) {
   RepairedMesh result;
   require_size(mesh, name);
-  result.mesh = merged(mesh, result.changes);
+  merge_vertices(mesh, result);
   require_areas(result.mesh, name);
   const EdgeTable table = make_edges(result.mesh);
   require_manifold(table, name);

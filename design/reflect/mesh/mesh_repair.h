@@ -12,6 +12,7 @@ namespace lensforge::reflect {
 struct RepairedMesh {
   SurfaceMesh mesh;
   std::vector<std::string> changes;  ///< In words: "12 duplicate vertices merged".
+  std::vector<int> vertex;  ///< What became of every vertex: its number, −1 if it was dropped.
   bool closed = false;
 };
 

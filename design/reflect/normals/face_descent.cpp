@@ -36,6 +36,21 @@ State state_at(const NormalObjective& objective, Eigen::Matrix3Xd normal) {
   return state;
 }
 
+/// Takes over the faces whose share is lower.
+void keep_lower(const State& next, State& best) {
+  for (Eigen::Index k = 0; k < best.normal.cols(); ++k) {
+    if (next.by_face[k] >= best.by_face[k]) continue;
+    best.normal.col(k) = next.normal.col(k);
+    best.by_face[k] = next.by_face[k];
+  }
+}
+
+/// The normal with which a face mirrors light d to the sensor.
+Eigen::Vector3d mirror(const LightPaths& paths, Eigen::Index face, Eigen::Index d) {
+  const Eigen::Vector3d half = paths.sensor(face, d) + paths.light(d);
+  return half.norm() > 0.0 ? Eigen::Vector3d(half.normalized()) : paths.sensor(face, d);
+}
+
 }  // namespace
 
 Eigen::Matrix3Xd descended_by_face(const NormalObjective& objective, const Eigen::Matrix3Xd& start,
@@ -65,17 +80,20 @@ Eigen::Matrix3Xd descended_by_face(const NormalObjective& objective, const Eigen
   return best.normal;
 }
 
-Eigen::Matrix3Xd tilted_by_face(const NormalObjective& objective, const Eigen::Matrix3Xd& start) {
+Eigen::Matrix3Xd turned_by_face(const NormalObjective& objective, const LightPaths& paths,
+                                const Goal& goal, const Eigen::Matrix3Xd& start) {
   State best = state_at(objective, start);
-  for (const double angle : kTilts) {
-    Eigen::Matrix3Xd trial(3, start.cols());
-    for (Eigen::Index k = 0; k < start.cols(); ++k) trial.col(k) = tilted(start.col(k), angle);
-    const State next = state_at(objective, std::move(trial));
-    for (Eigen::Index k = 0; k < start.cols(); ++k) {
-      if (next.by_face[k] >= best.by_face[k]) continue;
-      best.normal.col(k) = next.normal.col(k);
-      best.by_face[k] = next.by_face[k];
+  Eigen::Matrix3Xd trial(3, start.cols());
+  if (goal.maximizes()) {
+    for (Eigen::Index d = 0; d < paths.directions().count(); ++d) {
+      for (Eigen::Index k = 0; k < start.cols(); ++k) trial.col(k) = mirror(paths, k, d);
+      keep_lower(state_at(objective, trial), best);
     }
+    return best.normal;
+  }
+  for (const double angle : kTilts) {
+    for (Eigen::Index k = 0; k < start.cols(); ++k) trial.col(k) = tilted(start.col(k), angle);
+    keep_lower(state_at(objective, trial), best);
   }
   return best.normal;
 }

@@ -16,10 +16,12 @@ namespace lensforge::reflect {
 Eigen::Matrix3Xd descended_by_face(const NormalObjective& objective, const Eigen::Matrix3Xd& start,
                                    int steps, const Executor& executor);
 
-/// Tilts faces up or down, whichever way they look already, where that lowers their share of the
-/// objective. A face that looks straight into the band has no slope to follow, since the light that
-/// it sends back stays the same until it has turned by some 12°.
+/// Turns faces to where no slope leads, wherever that lowers their share of the objective. A face
+/// that looks straight into the band sends back the same light until it has turned by some 12°: it
+/// is tilted up or down, whichever way it looks already. A face that is to light a place is turned
+/// so that it mirrors one of the lights there; beyond a lobe's width it would not find it.
 /// @param start  unit normals, 3 × F. @return unit normals. @throw Interrupted
-Eigen::Matrix3Xd tilted_by_face(const NormalObjective& objective, const Eigen::Matrix3Xd& start);
+Eigen::Matrix3Xd turned_by_face(const NormalObjective& objective, const LightPaths& paths,
+                                const Goal& goal, const Eigen::Matrix3Xd& start);
 
 }  // namespace lensforge::reflect

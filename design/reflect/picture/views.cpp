@@ -20,7 +20,7 @@ using Eigen::Vector3d;
 
 constexpr int kViews = 8;
 constexpr int kSide = 240;      ///< Pixels of a view.
-constexpr double kField = 3.1;  ///< Width that a view shows; the shapes' diagonal is 3.
+constexpr double kField = 2.8;  ///< Width that a view shows; the shapes' diagonal is 3.
 constexpr double kElevation = 8.0 * std::numbers::pi / 180.0;
 constexpr std::array<unsigned char, 3> kBackground{24, 26, 32};
 

@@ -36,7 +36,7 @@ TEST(NormalObjective, NormalsOfASphereLeaveTheBand) {
   const NormalAnchor anchor{paths.faces().normal, 0.1};
   const Eigen::VectorXd share = paths.faces().area_share();
   const NormalObjective objective(energy, anchor, share);
-  const Eigen::Matrix3Xd tilted = tilted_by_face(objective, paths.faces().normal);
+  const Eigen::Matrix3Xd tilted = turned_by_face(objective, paths, Goal{}, paths.faces().normal);
   const Eigen::Matrix3Xd near = descended_by_face(objective, tilted, 16, Executor::cpu(2));
   const Eigen::Matrix3Xd optimum = optimized_normals(objective, near, 30, Executor::cpu(2));
   const double first = energy.value(paths.faces().normal);
