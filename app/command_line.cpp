@@ -37,6 +37,8 @@ constexpr std::array kSubcommands{
     Subcommand{"export", export_command, "export DIR --out FILE",
                "lens folder to .step, .iges, .stl, .obj, .ply, .3mf, height map"},
     Subcommand{"send", send_command, "send FILE.ngc --port PORT", "G-code to a controller"},
+    Subcommand{"reflect", reflect_command, "reflect MESH --out DIR",
+               "mesh to a shape that reflects light as wanted"},
     Subcommand{"info", info_command, "info DIR|FILE", "what it is, in one screen"},
 };
 

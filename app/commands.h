@@ -16,6 +16,7 @@ int cam_command(const Arguments& arguments);
 int coupon_command(const Arguments& arguments);
 int export_command(const Arguments& arguments);
 int send_command(const Arguments& arguments);
+int reflect_command(const Arguments& arguments);
 int info_command(const Arguments& arguments);
 
 }  // namespace lensforge::app

@@ -5,6 +5,7 @@
 #include "app/coupon_settings.h"
 #include "app/design_settings.h"
 #include "app/export_settings.h"
+#include "app/reflect_settings.h"
 #include "app/send_settings.h"
 #include "cam/cam_fields.h"
 #include "core/temp_folder.h"
@@ -82,6 +83,8 @@ TEST(CommandDefaults, OfTheOtherCommandsAreTheLibrarys) {
   expect_equal(send_fields(), sent.job, library);
   const auto coupon = parsed<CouponSettings>(&add_coupon_options, {"--out", "coupon"});
   expect_equal(coupon_fields(), coupon.coupon, CouponOptions{});
+  const auto reflected = parsed<ReflectSettings>(&add_reflect_options, {"a.stl", "--out", "a"});
+  expect_equal(reflect::reflect_fields(), reflected.reflect, reflect::ReflectOptions{});
   RenderOptions rendered;
   OptionSet options("render", "");
   options.fields(render_fields(), rendered);

@@ -21,7 +21,7 @@ std::string printed(const std::vector<std::string>& arguments) {
 /// The page's part on the options, as the tables of the commands have it.
 std::string options_part() {
   std::string text = ".Sh OPTIONS\n";
-  for (const char* command : {"design", "render", "cam", "coupon", "export", "send"}) {
+  for (const char* command : {"design", "render", "cam", "coupon", "export", "send", "reflect"}) {
     text += ".Ss Options of " + std::string(command) + "\n.Bl -tag -width Ds\n" +
             printed({command, "--help-man"}) + ".El\n";
   }
@@ -42,7 +42,7 @@ TEST(ManualPage, HasEveryOptionAsTheTablesHaveIt) {
 }
 
 TEST(ManualPage, HelpAndManualHaveTheSameOptions) {
-  for (const char* command : {"design", "render", "cam", "coupon", "export", "send"}) {
+  for (const char* command : {"design", "render", "cam", "coupon", "export", "send", "reflect"}) {
     const std::string help = printed({command, "--help"});
     const std::string manual = "\n" + printed({command, "--help-man"});
     for (std::size_t at = manual.find("\n.It Fl -"); at != std::string::npos;

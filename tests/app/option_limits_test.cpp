@@ -12,6 +12,7 @@
 #include "core/error.h"
 #include "core/text/number_text.h"
 #include "design/design_fields.h"
+#include "design/reflect/reflect_options.h"
 #include "design/render_fields.h"
 #include "export/export_options.h"
 #include "machine/job/send_options.h"
@@ -64,6 +65,7 @@ TEST(OptionLimits, AreEnforcedByEveryCommandForEveryNumber) {
   expect_limits_enforced({"cam", "none"}, cam_fields());
   expect_limits_enforced({"coupon", "--out", "none"}, coupon_fields());
   expect_limits_enforced({"export", "none", "--out", "none.step"}, export_fields());
+  expect_limits_enforced({"reflect", "none.stl", "--out", "none"}, reflect::reflect_fields());
   expect_limits_enforced({"send", "none.ngc", "--dry-run"}, send_fields());
 }
 
@@ -97,6 +99,9 @@ TEST(OptionLimits, AreThoseOfTheLibraries) {
                          [](const ExportOptions& options) { validate(options, "lens.step"); });
   expect_library_refuses(coupon_fields(), CouponOptions{},
                          [](const CouponOptions& options) { validate(options); });
+  expect_library_refuses(
+      reflect::reflect_fields(), reflect::ReflectOptions{},
+      [](const reflect::ReflectOptions& options) { reflect::validate(options); });
   SendOptions sending;
   sending.port = "sim:grbl";
   expect_library_refuses(send_fields(), sending,

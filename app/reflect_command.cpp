@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <filesystem>
+#include <string>
+
+#include "app/command_line.h"
+#include "app/commands.h"
+#include "app/console.h"
+#include "app/exit_code.h"
+#include "app/interrupt.h"
+#include "app/interruptible_job.h"
+#include "app/json_output.h"
+#include "app/option_set.h"
+#include "app/output_folder.h"
+#include "app/progress_display.h"
+#include "app/reflect_settings.h"
+#include "core/error.h"
+#include "core/surface/mesh_io.h"
+#include "core/text/number_text.h"
+#include "design/reflect/reflect_job.h"
+
+namespace lensforge::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+reflect::ReflectInput load(const ReflectSettings& settings, const Console& console) {
+  const reflect::ReflectInput input =
+      reflect::prepared_input(read_mesh(settings.mesh), settings.mesh, settings.reflect);
+  for (const std::string& change : input.changes) console.note(settings.mesh + ": " + change);
+  return input;
+}
+
+nlohmann::json evaluated(const OptionSet& options, const ReflectSettings& settings,
+                         const SurfaceMesh& mesh, const Executor& executor) {
+  const reflect::Energies energies = reflect::evaluate(mesh, settings.reflect, executor);
+  nlohmann::json json = {{"command", "reflect"},
+                         {"mesh", settings.mesh},
+                         {"options", options.used()},
+                         {"energy_direct", energies.direct},
+                         {"energy", energies.total}};
+  const double ghz = settings.reflect.radar_ghz;
+  if (ghz > 0.0) {
+    const reflect::RadarComparison radar = reflect::compare_radar(mesh, mesh, ghz, executor);
+    json["radar"] = {{"ghz", ghz}, {"mean_dbsm", reflect::mean_dbsm(radar.before)}};
+  }
+  return json;
+}
+
+int evaluate(const OptionSet& options, const ReflectSettings& settings) try {
+  const Console console(options.common().json, options.common().quiet);
+  InterruptibleJob job(options.common());
+  const nlohmann::json json =
+      evaluated(options, settings, load(settings, console).mesh, job.stoppable(options.executor()));
+  std::string text = settings.mesh + "\n  energy of one reflection " +
+                     number_text(json["energy_direct"]) + ", of one and two " +
+                     number_text(json["energy"]) + "\n";
+  if (json.contains("radar")) {
+    text += "  radar cross-section around the horizon " + fixed(json["radar"]["mean_dbsm"], 1) +
+            " dBsm on average\n";
+  }
+  console.result(json, text);
+  return kDone;
+} catch (const Interrupted&) {
+  return report_interrupted(options.common().json);
+}
+
+std::string percent(double share, int digits) { return fixed(100.0 * share, digits) + " %"; }
+
+std::string radar_text(const reflect::ReflectResult& result) {
+  if (!result.radar) return "";
+  return "  radar cross-section around the horizon " +
+         fixed(reflect::mean_dbsm(result.radar->before), 1) + " -> " +
+         fixed(reflect::mean_dbsm(result.radar->after), 1) + " dBsm on average\n";
+}
+
+std::string result_text(const ReflectSettings& settings, const reflect::ReflectResult& result) {
+  if (!result.done()) {
+    return settings.out + ": interrupted after " + std::to_string(result.updates.size()) +
+           " updates\n";
+  }
+  return settings.out + ": " + std::to_string(result.updates.size()) + " updates in " +
+         fixed(result.seconds, 1) + " s\n  energy " + number_text(result.before.total, 4) + " -> " +
+         number_text(result.after.total, 4) + " (" +
+         percent(result.after.total / result.before.total, 1) + "), of one reflection " +
+         number_text(result.before.direct, 4) + " -> " + number_text(result.after.direct, 4) +
+         "\n  vertices moved by " + percent(result.mean_displacement, 2) +
+         " of the diagonal on average, by " + percent(result.max_displacement, 2) + " at most\n" +
+         radar_text(result);
+}
+
+int shape(const OptionSet& options, const ReflectSettings& settings) {
+  const Console console(options.common().json, options.common().quiet);
+  const reflect::ReflectInput input = load(settings, console);
+  const InterruptWatch interrupt;
+  const OutputFolder folder(settings.out, FolderLock::Kind::kExclusive);
+  reflect::require_replaceable_result(folder.path(), settings.reflect.force);
+  ProgressDisplay progress(options.common().quiet);
+  const RunControl control(interrupt.token(), progress.sink());
+  const reflect::ReflectResult result =
+      reflect::reflect_shape(input, settings.reflect, options.executor(), control);
+  nlohmann::json json = reflect::result_json(result, settings.reflect);
+  json["command"] = "reflect";
+  json["files"] = nlohmann::json::array();
+  for (const fs::path& file :
+       reflect::write_result(result, settings.reflect, folder.path(), options.executor())) {
+    json["files"].push_back(file.string());
+  }
+  for (const std::string& unmet : result.unmet) console.note("warning: " + unmet);
+  console.result(json, result_text(settings, result));
+  if (!result.done()) return kInterrupted;
+  return result.unmet.empty() ? kDone : kLimitMissed;
+}
+
+}  // namespace
+
+int reflect_command(const Arguments& command_line) {
+  ReflectSettings settings;
+  OptionSet options("reflect", "Deforms a mesh so that it reflects light as wanted.");
+  add_reflect_options(options, settings);
+  options.parse(command_line);
+  reflect::validate(settings.reflect);
+  if (settings.evaluate) return evaluate(options, settings);
+  if (settings.out.empty()) {
+    throw InputError("--out: is missing; --out DIR writes a new shape, --evaluate only energies");
+  }
+  return shape(options, settings);
+}
+
+}  // namespace lensforge::app

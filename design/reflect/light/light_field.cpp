@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "design/reflect/light/light_field.h"
+
+#include <charconv>
+#include <cmath>
+#include <numbers>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/error.h"
+
+namespace lensforge::reflect {
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180.0;
+
+/// Rows and columns of the band for energies that are stated.
+constexpr BandSampling kEvaluationBand{12, 64, 0.0};
+constexpr int kEvaluationSun = 96;
+
+constexpr int kColumnsPerRow = 6;
+constexpr double kGoldenShare = 0.6180339887498949;
+
+std::vector<std::string_view> split_at(std::string_view text, char separator) {
+  std::vector<std::string_view> parts;
+  for (;;) {
+    const std::size_t end = text.find(separator);
+    parts.push_back(text.substr(0, end));
+    if (end == std::string_view::npos) return parts;
+    text.remove_prefix(end + 1);
+  }
+}
+
+std::string example_of(int count) {
+  std::string text = "0";
+  for (int i = 1; i < count; ++i) text.append(",").append(std::to_string(i % 3));
+  return text;
+}
+
+Eigen::Matrix3Xd listed_lights(const std::string& text) {
+  const std::vector<std::string_view> parts = split_at(text, ';');
+  Eigen::Matrix3Xd lights(3, static_cast<Eigen::Index>(parts.size()));
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    const Eigen::VectorXd light = number_list("--light", std::string(parts[i]), 3);
+    if (!(light.norm() > 0.0)) {
+      throw InputError("--light " + text + ": a direction must not be 0,0,0; 0,-1,1 is noon");
+    }
+    lights.col(static_cast<Eigen::Index>(i)) = light;
+  }
+  return lights;
+}
+
+Goal make_goal(const ReflectOptions& options) {
+  Goal goal{options.goal, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
+  if (!goal.has_place()) {
+    if (options.place.empty()) return goal;
+    throw InputError("--place " + options.place +
+                     ": is for --goal point, line and deflect; leave it out");
+  }
+  const bool line = goal.kind == GoalKind::kLine;
+  const Eigen::VectorXd numbers = number_list("--place", options.place, line ? 6 : 3);
+  goal.from = numbers.head<3>();
+  if (!line) return goal;
+  goal.to = numbers.tail<3>();
+  if (goal.from == goal.to) {
+    throw InputError("--place " + options.place + ": a line's ends must differ; -1,0,0,1,0,0 do");
+  }
+  return goal;
+}
+
+}  // namespace
+
+Eigen::VectorXd number_list(const std::string& option, const std::string& text, int count) {
+  const std::vector<std::string_view> parts = split_at(text, ',');
+  Eigen::VectorXd numbers(count);
+  bool good = static_cast<int>(parts.size()) == count;
+  for (int i = 0; good && i < count; ++i) {
+    const std::string_view part = parts[static_cast<std::size_t>(i)];
+    const auto [end, error] = std::from_chars(part.begin(), part.end(), numbers[i]);
+    good = error == std::errc() && end == part.end() && std::isfinite(numbers[i]);
+  }
+  if (good) return numbers;
+  throw InputError(option + " " + text + ": must be " + std::to_string(count) +
+                   " numbers with commas between them, as " + example_of(count));
+}
+
+DirectionSet LightField::directions(int update) const {
+  if (listed) return listed_directions(*listed);
+  if (goal.has_place()) return sun_directions(sun_positions);
+  const double turn = update * kGoldenShare;
+  return band_directions(elevation, {rows, kColumnsPerRow * rows, turn - std::floor(turn)});
+}
+
+Eigen::Vector3d LightField::random_direction(double u, double v) const {
+  if (listed) {
+    return listed->col(static_cast<Eigen::Index>(u * static_cast<double>(listed->cols())))
+        .normalized();
+  }
+  if (goal.has_place()) return sun_direction(std::numbers::pi * u);
+  const double z = (2.0 * u - 1.0) * std::sin(elevation);
+  const double r = std::sqrt(1.0 - z * z);
+  const double azimuth = 2.0 * std::numbers::pi * v;
+  return {r * std::cos(azimuth), r * std::sin(azimuth), z};
+}
+
+DirectionSet LightField::evaluation_directions() const {
+  if (listed) return listed_directions(*listed);
+  if (goal.has_place()) return sun_directions(kEvaluationSun);
+  return band_directions(elevation, kEvaluationBand);
+}
+
+LightField make_light_field(const ReflectOptions& options) {
+  LightField field;
+  field.goal = make_goal(options);
+  if (!options.light.empty()) field.listed = listed_lights(options.light);
+  field.elevation = options.elevation_deg * kDegree;
+  field.rows = options.direction_rows;
+  field.sun_positions = options.sun_positions;
+  return field;
+}
+
+}  // namespace lensforge::reflect

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "design/reflect/normals/normal_objective.h"
+
+#include <algorithm>
+#include <span>
+#include <vector>
+
+#include "core/surface/corners.h"
+#include "design/optimize/lbfgs_on.h"
+
+namespace lensforge::reflect {
+namespace {
+
+/// Least curvature of a face per unit of its share of the area, so that faces without light and
+/// anchor have one: a thousandth of the largest, 200.
+constexpr double kLeastCurvature = 0.2;
+
+Eigen::Map<const Eigen::Matrix3Xd> columns_of(std::span<const double> values) {
+  return {values.data(), 3, static_cast<Eigen::Index>(values.size() / 3)};
+}
+
+Eigen::Map<Eigen::Matrix3Xd> columns_of(std::span<double> values) {
+  return {values.data(), 3, static_cast<Eigen::Index>(values.size() / 3)};
+}
+
+}  // namespace
+
+Eigen::VectorXd NormalObjective::by_face(const Eigen::Matrix3Xd& normals,
+                                         Eigen::Matrix3Xd& gradient) const {
+  Eigen::VectorXd value = energy_.by_face_and_gradient(normals, gradient);
+  for (Eigen::Index k = 0; k < normals.cols(); ++k) {
+    const Eigen::Vector3d t = normals.col(k);
+    const double weight = anchor_.strength * kEnergyScale * share_[k];
+    const Eigen::Vector3d offset = t - anchor_.reference.col(k);
+    value[k] += 0.5 * weight * offset.squaredNorm();
+    gradient.col(k) = normalize_adjoint(t, 1.0, gradient.col(k) + weight * offset);
+  }
+  return value;
+}
+
+double NormalObjective::operator()(const Eigen::Matrix3Xd& x, Eigen::Matrix3Xd& gradient) const {
+  const double value = by_face(x.colwise().normalized(), gradient).sum();
+  gradient.array().rowwise() /= x.colwise().norm().array();
+  return value;
+}
+
+Eigen::VectorXd NormalObjective::curvature(const Eigen::Matrix3Xd& normals) const {
+  return energy_.curvature(normals) + (kEnergyScale * anchor_.strength + kLeastCurvature) * share_;
+}
+
+Eigen::Matrix3Xd optimized_normals(const NormalObjective& objective, const Eigen::Matrix3Xd& start,
+                                   int iterations, const Executor& executor) {
+  Eigen::Matrix3Xd gradient;
+  const auto evaluate = [&](std::span<const double> x, std::span<double> out) {
+    const double value = objective(columns_of(x), gradient);
+    columns_of(out) = gradient;
+    return value;
+  };
+  const Eigen::VectorXd scale = objective.curvature(start).cwiseInverse();
+  const auto precondition = [&](std::span<const double> g, std::span<double> r) {
+    columns_of(r) = columns_of(g) * scale.asDiagonal();
+  };
+  LbfgsOptions options;
+  options.max_iterations = iterations;
+  std::vector<double> x(start.data(), start.data() + start.size());
+  LbfgsOn<Executor>(evaluate, precondition, options, executor)
+      .run([](int, double) { return true; }, x);
+  return columns_of(std::span<const double>(x)).colwise().normalized();
+}
+
+}  // namespace lensforge::reflect

@@ -1,0 +1,259 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "design/reflect/reflect_shape.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include "core/error.h"
+#include "core/text/number_text.h"
+#include "design/reflect/light/light_field.h"
+#include "design/reflect/light/reflection_energy.h"
+#include "design/reflect/mesh/edge_split.h"
+#include "design/reflect/mesh/edges.h"
+#include "design/reflect/mesh/mirror.h"
+#include "design/reflect/mesh/unit_frame.h"
+#include "design/reflect/normals/face_descent.h"
+#include "design/reflect/normals/fixed_steps.h"
+#include "design/reflect/normals/normal_objective.h"
+#include "design/reflect/normals/tv_denoise.h"
+#include "design/reflect/shape/constraints.h"
+#include "design/reflect/shape/shape_update.h"
+
+namespace lensforge::reflect {
+namespace {
+
+/// A face that looks straight back at the light has no gradient by symmetry: before the first
+/// update normals are tilted up above the middle and down below it by this at most, rad. A tenth
+/// of the lobe's width.
+constexpr double kTilt = 0.01;
+
+/// A stage ends when its energy changed by less than this share over so many updates. Directions
+/// turn from update to update, which alone changes an energy by up to 0.5 %.
+constexpr double kStageChange = 0.01;
+constexpr std::size_t kStageWindow = 3;
+
+/// Steps of the normals that one seed may number.
+constexpr std::uint64_t kSeedStride = std::uint64_t{1} << 32U;
+
+struct Stage {
+  const char* name;
+  ElementKind elements;
+  int updates;
+};
+
+class Schedule {
+ public:
+  Schedule(const ReflectInput& input, const ReflectOptions& options, const Executor& executor,
+           const RunControl& control)
+      : options_(options),
+        executor_(executor.with_stop(control.stop_token())),
+        control_(control),
+        frame_(input.mesh),
+        reference_(frame_.to_unit(input.mesh)),
+        mesh_(reference_),
+        field_(frame_.to_unit(make_light_field(options))),
+        keep_(constraint_set(input)) {}
+
+  ReflectResult run() {
+    ReflectResult result;
+    try {
+      result.before = evaluated();
+      run_stage({"rim-spoke", ElementKind::kRimSpoke, options_.rim_updates});
+      run_stage({"face", ElementKind::kFace, options_.face_updates});
+      if (options_.split && options_.face_updates > 0) {
+        split();
+        run_stage({"split", ElementKind::kFace, options_.face_updates});
+      }
+      result.after = evaluated();
+      if (options_.radar_ghz > 0.0) {
+        result.radar = compare_radar(frame_.from_unit(reference_), frame_.from_unit(mesh_),
+                                     options_.radar_ghz, executor_);
+      }
+    } catch (const Interrupted&) {
+      result.status = ReflectResult::Status::kInterrupted;
+    }
+    result.unmet = Constraints(reference_, keep_, Executor::serial()).broken(mesh_.vertices);
+    result.reference = frame_.from_unit(reference_);
+    result.mesh = frame_.from_unit(mesh_);
+    result.updates = updates_;
+    result.mean_displacement = displacements().mean();
+    result.max_displacement = displacements().maxCoeff();
+    result.seconds = seconds();
+    return result;
+  }
+
+ private:
+  [[nodiscard]] ConstraintSet constraint_set(const ReflectInput& input) const {
+    ConstraintSet set;
+    set.fixed = input.fixed;
+    set.partner = input.partner;
+    set.axis = std::max(0, static_cast<int>(options_.symmetry));
+    set.planar = input.planar;
+    set.volume = options_.keep_volume;
+    set.box = options_.keep_box;
+    set.max_displacement = frame_.to_unit(options_.max_displacement);
+    set.min_thickness = frame_.to_unit(options_.min_thickness);
+    return set;
+  }
+
+  [[nodiscard]] Energies evaluated() const {
+    return evaluate(mesh_, field_.goal, field_.evaluation_directions(), executor_);
+  }
+
+  void run_stage(const Stage& stage) {
+    if (stage.updates == 0) return;
+    ShapeUpdateOptions options;
+    options.elements = stage.elements;
+    options.normal_weight = options_.normal_weight;
+    const ShapeUpdate shape(reference_, keep_.fixed, options);
+    const Constraints constraints(reference_, keep_, executor_);
+    std::optional<TvDenoiser> denoiser;
+    if (options_.denoise > 0.0) denoiser.emplace(reference_, options_.denoise);
+    anchor_ = {measure_faces(reference_).normal, options_.anchor};
+    const std::size_t first = updates_.size();
+    for (int i = 0; i < stage.updates && !settled(first); ++i) {
+      const LightPaths paths(mesh_, field_.goal, field_.directions(number()), kGatherDirections,
+                             executor_);
+      ReflectUpdate row;
+      row.stage = stage.name;
+      row.energy = ReflectionEnergy(paths, Loss::kSquare, executor_).value(paths.faces().normal);
+      Eigen::Matrix3Xd targets = targets_for(paths);
+      if (denoiser) targets = denoiser->denoise(targets);
+      mesh_.vertices = constraints.enforced(shape.moved(mesh_.vertices, targets, executor_));
+      record(row);
+    }
+  }
+
+  [[nodiscard]] int number() const { return static_cast<int>(updates_.size()); }
+
+  void record(ReflectUpdate row) {
+    row.number = number() + 1;
+    row.mean_displacement = displacements().mean();
+    row.max_displacement = displacements().maxCoeff();
+    row.seconds = seconds();
+    updates_.push_back(row);
+    const int stages = options_.split ? 2 : 1;
+    control_.report({"reflect, " + row.stage, static_cast<double>(row.number),
+                     static_cast<double>(options_.rim_updates + stages * options_.face_updates),
+                     "energy " + number_text(row.energy, 4)});
+  }
+
+  /// Whether the stage that began with update `first` no longer gains.
+  [[nodiscard]] bool settled(std::size_t first) const {
+    if (options_.method == Method::kPaper) return false;
+    if (updates_.size() < first + kStageWindow + 1) return false;
+    const double now = updates_.back().energy;
+    const double before = updates_[updates_.size() - 1 - kStageWindow].energy;
+    return std::abs(now - before) < kStageChange * before;
+  }
+
+  [[nodiscard]] Eigen::Matrix3Xd targets_for(const LightPaths& paths) const {
+    return options_.method == Method::kPaper ? estimated_targets(paths.faces())
+                                             : exact_targets(paths);
+  }
+
+  [[nodiscard]] Eigen::Matrix3Xd exact_targets(const LightPaths& paths) const {
+    const ReflectionEnergy energy(paths, loss_for(field_.goal), executor_);
+    const Eigen::VectorXd share = paths.faces().area_share();
+    const NormalObjective objective(energy, anchor_, share);
+    const Eigen::Matrix3Xd start = number() == 0 ? tilted(paths.faces()) : paths.faces().normal;
+    const Eigen::Matrix3Xd first = turned_by_face(objective, paths, field_.goal, start);
+    const Eigen::Matrix3Xd near =
+        descended_by_face(objective, first, options_.normal_steps, executor_);
+    return optimized_normals(objective, near, (options_.normal_steps + 1) / 2, executor_);
+  }
+
+  [[nodiscard]] Eigen::Matrix3Xd estimated_targets(const Faces& faces) const {
+    const Loss loss = field_.goal.maximizes() ? Loss::kInverse : Loss::kSquare;
+    const PathEstimator estimator(mesh_, field_, loss, executor_);
+    const std::uint64_t seed =
+        kSeedStride * static_cast<std::uint64_t>(options_.seed) +
+        static_cast<std::uint64_t>(options_.normal_steps) * static_cast<std::uint64_t>(number());
+    return stepped_normals(estimator, anchor_, faces.area_share(), faces.normal,
+                           options_.normal_steps, seed);
+  }
+
+  [[nodiscard]] static Eigen::Matrix3Xd tilted(const Faces& faces) {
+    const double half = faces.centroid.row(2).cwiseAbs().maxCoeff();
+    Eigen::Matrix3Xd normal = faces.normal;
+    if (half > 0.0) normal.row(2) += (kTilt / half) * faces.centroid.row(2);
+    return normal.colwise().normalized();
+  }
+
+  /// Cuts the edges that hamper creases, on both meshes.
+  void split() {
+    const LightPaths paths(mesh_, field_.goal, field_.directions(number()), kGatherDirections,
+                           executor_);
+    const Eigen::VectorXd energy =
+        ReflectionEnergy(paths, Loss::kSquare, executor_).by_face(paths.faces().normal);
+    const Eigen::VectorXd criterion = split_criterion(mesh_, energy);
+    const auto count = static_cast<int>(kSplitShare * static_cast<double>(criterion.size()));
+    const std::vector<int> edges = chosen_edges(mesh_, criterion, count, keep_.partner);
+    const SplitMesh cut = split_at_middles(reference_, edges);
+    extend_constraints(cut, edges);
+    mesh_ = split_at_middles(mesh_, edges).mesh;
+    reference_ = cut.mesh;
+  }
+
+  /// New vertices between fixed ones are fixed; halves of planar faces stay planar.
+  void extend_constraints(const SplitMesh& cut, const std::vector<int>& edges) {
+    const EdgeTable table = make_edges(reference_);
+    for (const int e : edges) {
+      if (keep_.fixed.empty()) break;
+      const Edge& edge = table.edges[static_cast<std::size_t>(e)];
+      keep_.fixed.push_back(keep_.fixed[static_cast<std::size_t>(edge.from)] != 0 &&
+                            keep_.fixed[static_cast<std::size_t>(edge.to)] != 0);
+    }
+    const auto old = static_cast<int>(reference_.triangle_count());
+    for (std::vector<int>& group : keep_.planar) {
+      const std::vector<int> faces = group;
+      for (std::size_t i = 0; i < cut.parent.size(); ++i) {
+        const bool inside = std::find(faces.begin(), faces.end(), cut.parent[i]) != faces.end();
+        if (inside) group.push_back(old + static_cast<int>(i));
+      }
+    }
+    if (!keep_.partner.empty()) keep_.partner = mirror_partners(cut.mesh, keep_.axis);
+  }
+
+  /// Distances from where the vertices were, as shares of the diagonal.
+  [[nodiscard]] Eigen::RowVectorXd displacements() const {
+    return (mesh_.vertices - reference_.vertices).colwise().norm() / kUnitDiagonal;
+  }
+
+  [[nodiscard]] double seconds() const {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+  }
+
+  const ReflectOptions& options_;
+  Executor executor_;
+  const RunControl& control_;
+  UnitFrame frame_;
+  SurfaceMesh reference_;
+  SurfaceMesh mesh_;
+  LightField field_;
+  ConstraintSet keep_;
+  NormalAnchor anchor_;
+  std::vector<ReflectUpdate> updates_;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+}  // namespace
+
+ReflectResult reflect_shape(const ReflectInput& input, const ReflectOptions& options,
+                            const Executor& executor, const RunControl& control) {
+  validate(options);
+  return Schedule(input, options, executor, control).run();
+}
+
+Energies evaluate(const SurfaceMesh& mesh, const ReflectOptions& options,
+                  const Executor& executor) {
+  validate(options);
+  const UnitFrame frame(mesh);
+  const LightField field = frame.to_unit(make_light_field(options));
+  return evaluate(frame.to_unit(mesh), field.goal, field.evaluation_directions(), executor);
+}
+
+}  // namespace lensforge::reflect

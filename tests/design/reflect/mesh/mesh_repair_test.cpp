@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "design/reflect/mesh/mesh_repair.h"
+
+#include <gmock/gmock.h>
+
+#include "core/error.h"
+#include "design/reflect/mesh/edges.h"
+#include "design/reflect/mesh/faces.h"
+#include "fixtures/shapes/shapes.h"
+
+namespace lensforge::reflect {
+namespace {
+
+using ::testing::HasSubstr;
+
+/// Every face with corners of its own, as STL has them.
+SurfaceMesh soup(const SurfaceMesh& mesh) {
+  SurfaceMesh result{Eigen::Matrix3Xd(3, 3 * mesh.triangle_count()), mesh.triangles, {}};
+  for (int i = 0; i < 3 * mesh.triangle_count(); ++i) {
+    result.vertices.col(i) = mesh.corner(i / 3, i % 3);
+    result.triangles(i % 3, i / 3) = i;
+  }
+  return result;
+}
+
+std::string refusal(const SurfaceMesh& mesh) {
+  try {
+    repair_mesh(mesh, "m.stl");
+  } catch (const InputError& e) {
+    return e.what();
+  }
+  return "";
+}
+
+TEST(MeshRepair, MergesVerticesInTheSamePlace) {
+  const RepairedMesh repaired = repair_mesh(soup(shapes::icosphere(2)), "m");
+  EXPECT_EQ(repaired.mesh.vertex_count(), 162);
+  EXPECT_TRUE(repaired.closed);
+  EXPECT_THAT(repaired.changes, ::testing::ElementsAre("798 duplicate vertices merged"));
+}
+
+TEST(MeshRepair, TurnsFacesOutwards) {
+  SurfaceMesh mesh = shapes::icosphere(2);
+  const double volume = signed_volume(mesh);
+  for (int k = 0; k < mesh.triangle_count(); k += 3) {
+    std::swap(mesh.triangles(0, k), mesh.triangles(1, k));
+  }
+  EXPECT_DOUBLE_EQ(signed_volume(repair_mesh(mesh, "m").mesh), volume);
+  mesh.triangles.row(0).swap(mesh.triangles.row(1));
+  EXPECT_DOUBLE_EQ(signed_volume(repair_mesh(mesh, "m").mesh), volume);
+}
+
+TEST(MeshRepair, KeepsAGoodMeshAsItIs) {
+  for (const shapes::NamedShape& shape : shapes::drawn_shapes()) {
+    const SurfaceMesh mesh = shape.draw();
+    const RepairedMesh repaired = repair_mesh(mesh, shape.name);
+    EXPECT_THAT(repaired.changes, ::testing::IsEmpty()) << shape.name;
+    EXPECT_TRUE(repaired.closed) << shape.name;
+    EXPECT_GT(signed_volume(mesh), 0.0) << shape.name;
+    EXPECT_EQ(repaired.mesh.triangles, mesh.triangles) << shape.name;
+  }
+}
+
+TEST(MeshRepair, RefusesAFaceWithoutArea) {
+  SurfaceMesh mesh = shapes::icosphere(1);
+  mesh.triangles(1, 5) = mesh.triangles(0, 5);
+  EXPECT_THAT(refusal(mesh), HasSubstr("m.stl: face 5 has no area"));
+}
+
+TEST(MeshRepair, RefusesAnEdgeWithThreeFaces) {
+  SurfaceMesh mesh;
+  mesh.vertices.resize(3, 5);
+  mesh.vertices << 0, 1, 0, 0, 1, 0, 0, 1, 0, 1, 0, 0, 0, 1, 1;
+  mesh.triangles.resize(3, 3);
+  mesh.triangles << 0, 0, 0, 1, 1, 1, 2, 3, 4;
+  EXPECT_THAT(refusal(mesh), HasSubstr("vertices 0 and 1 has more than two faces"));
+}
+
+TEST(MeshRepair, RefusesAMoebiusStrip) {
+  SurfaceMesh mesh;
+  constexpr int kSteps = 12;
+  mesh.vertices.resize(3, 2 * kSteps);
+  mesh.triangles.resize(3, 2 * kSteps);
+  for (int i = 0; i < kSteps; ++i) {
+    const double angle = 2.0 * 3.141592653589793 * i / kSteps;
+    const Eigen::Vector3d out(std::cos(angle), std::sin(angle), 0.0);
+    const Eigen::Vector3d side =
+        0.3 * (std::cos(angle / 2) * out + std::sin(angle / 2) * Eigen::Vector3d::UnitZ());
+    mesh.vertices.col(2 * i) = out - side;
+    mesh.vertices.col(2 * i + 1) = out + side;
+    const bool last = i == kSteps - 1;
+    const int a = last ? 1 : 2 * i + 2;
+    const int b = last ? 0 : 2 * i + 3;
+    mesh.triangles.col(2 * i) << 2 * i, a, b;
+    mesh.triangles.col(2 * i + 1) << 2 * i, b, 2 * i + 1;
+  }
+  EXPECT_THAT(refusal(mesh), HasSubstr("one side only"));
+}
+
+TEST(Faces, QuarteredMeshIsTheSameSurface) {
+  const SurfaceMesh mesh = shapes::torus(12, 8);
+  const SurfaceMesh fine = quartered(mesh);
+  EXPECT_EQ(fine.triangle_count(), 4 * mesh.triangle_count());
+  EXPECT_NEAR(signed_volume(fine), signed_volume(mesh), 1e-12);
+  EXPECT_NEAR(measure_faces(fine).area.sum(), measure_faces(mesh).area.sum(), 1e-12);
+  EXPECT_TRUE(make_edges(fine).is_closed());
+}
+
+}  // namespace
+}  // namespace lensforge::reflect
