@@ -48,6 +48,7 @@ void add_design_options(OptionSet& options, DesignSettings& settings) {
   options.positional("TARGET", settings.target, "picture to project: PNG, JPEG, TIFF, EXR, ...");
   options.required_text("--out", settings.out, "DIR", "lens folder to write");
   options.fields(design_fields(), settings.design);
+  options.fields(light_fields(), settings.design.light);
   options.fields(weight_fields(), settings.design.weights);
   options.text("--made-by", settings.made_by, "default|FILE.toml",
                "shape the part that this workshop cuts and polishes, not the surface alone");

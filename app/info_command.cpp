@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <filesystem>
 
@@ -15,6 +16,7 @@
 #include "core/io/files.h"
 #include "core/surface/lens.h"
 #include "core/surface/mesh_io.h"
+#include "core/surface/setup_json.h"
 #include "core/text/lower_case.h"
 #include "core/text/printable.h"
 #include "export/iges_file.h"
@@ -59,18 +61,37 @@ void describe_mesh(Description& d, const SurfaceMesh& mesh) {
   describe_extent(d, {low, high}, " mm");
 }
 
+std::string place_text(const Eigen::Vector3d& p) {
+  return fixed(p.x(), 2) + ", " + fixed(p.y(), 2) + ", " + fixed(p.z(), 2);
+}
+
+std::string light_text(const OpticalSetup& setup) {
+  const std::string on = setup.mode == LightMode::kReflect ? " on a mirror" : "";
+  if (!setup.point) return "parallel along " + place_text(setup.light) + on;
+  const bool even = setup.point->emission == Emission::kIsotropic;
+  return std::string(even ? "point" : "flat") + " source at " + place_text(setup.point->position) +
+         " mm" + on;
+}
+
 void describe_setup(Description& d, const OpticalSetup& setup) {
+  d.line("light", light_text(setup));
   d.line("lens", fixed(setup.lens_size.x(), 2) + " x " + fixed(setup.lens_size.y(), 2) +
                      " mm, refractive index " + fixed(setup.ior, 4));
   d.line("wall", "z = " + fixed(setup.focal_length, 2) + " mm, picture " +
                      fixed(setup.image_size.x(), 2) + " x " + fixed(setup.image_size.y(), 2) +
                      " mm, seen from the " + (setup.view == ViewSide::kFront ? "front" : "rear"));
+  if (setup.screen_is_turned()) {
+    d.line("screen", "tilted about its centre " + place_text(setup.screen_centre()) +
+                         " mm, its normal " + place_text(setup.screen_x.cross(setup.screen_y)));
+  }
   d.line("picture", size_text(setup.pixels.x(), setup.pixels.y()) + " pixels");
   d.json["lens_size"] = {setup.lens_size.x(), setup.lens_size.y()};
   d.json["image_size"] = {setup.image_size.x(), setup.image_size.y()};
   d.json["pixels"] = {setup.pixels.x(), setup.pixels.y()};
   d.json["focal_length"] = setup.focal_length;
   d.json["ior"] = setup.ior;
+  const nlohmann::ordered_json all = setup_json(setup);
+  for (const char* key : {"mode", "source", "screen"}) d.json[key] = all.at(key);
 }
 
 void describe_provenance(Description& d, const nlohmann::json& provenance) {

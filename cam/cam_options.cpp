@@ -51,6 +51,15 @@ void validate_tolerances(const CamOptions& options) {
   }
 }
 
+/// Parts turned, displaced and made of another material are known of the usual light only.
+void validate_tolerances(const CamOptions& options, const OpticalSetup& setup) {
+  if (options.tolerances == 0) return;
+  if (!setup.point && setup.mode == LightMode::kRefract && !setup.screen_is_turned()) return;
+  refuse("--tolerances", options.tolerances,
+         "draws parts of lenses for parallel light and a screen parallel to them only; use "
+         "--tolerances 0");
+}
+
 /// Before hours are spent on programs that the controller could not read.
 void validate_tool_numbers(const CamOptions& options) {
   if (!options.post.changes_tools()) return;
@@ -123,6 +132,7 @@ void validate(const CamOptions& options, const OpticalSetup& setup) {
   validate_decimals(options);
   validate_sampling(options);
   validate_tolerances(options);
+  validate_tolerances(options, setup);
 }
 
 }  // namespace lensforge

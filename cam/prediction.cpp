@@ -8,6 +8,8 @@
 #include "cam/milled/lens_grid.h"
 #include "cam/milled/sampled_mesh.h"
 #include "core/error.h"
+#include "core/optics/light_path.h"
+#include "core/surface/lit_surface.h"
 
 namespace lensforge {
 namespace {
@@ -73,7 +75,9 @@ Prediction predict_part(const PartSurfaces& surfaces, const Lens& lens, const Ca
                         const Executor& executor, const RunControl& control) {
   Prediction result;
   const GridWindow grid = lens_grid(lens.setup.lens_size, sample_spacing(options));
-  const FieldRenderSetup setup{lens.setup, grid};
+  FieldRenderSetup setup{lens.setup, grid};
+  const LightPath light(lens.setup);
+  if (!light.intake_is_plan_area()) setup.whole = intake_of(lens.surface, light);
   const LeakageChain chain = chain_of(surfaces, lens, options);
   result.leakage = measure_leakage(chain, lens.target, setup, options.leakage, executor, control);
   result.sampling =

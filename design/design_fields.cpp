@@ -1,12 +1,59 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "design/design_fields.h"
 
+#include <span>
 #include <string>
+#include <vector>
 
 #include "core/image/image_io.h"
+#include "core/text/number_list.h"
 #include "core/text/number_text.h"
 
 namespace lensforge {
+namespace {
+
+using LightField = OptionField<LightOptions>;
+
+/// Two numbers, as "X,Y".
+LightField pair(const char* name, Eigen::Vector2d LightOptions::*at, const char* what,
+                const char* help) {
+  const auto get = [at](const LightOptions& o) {
+    return nlohmann::json(numbers_text(std::span((o.*at).data(), 2)));
+  };
+  const auto set = [at, name](LightOptions& o, const nlohmann::json& value) {
+    const std::vector<double> numbers = parse_numbers(value.get<std::string>(), name, 2);
+    o.*at = {numbers[0], numbers[1]};
+  };
+  return {{name, OptionKind::kText, help, {}, what, {}}, get, set, get, {}};
+}
+
+LightField source_position() {
+  const char* const name = "--source-position";
+  const auto get = [](const LightOptions& o) {
+    if (!o.source_position) return nlohmann::json("");
+    return nlohmann::json(numbers_text(std::span(o.source_position->data(), 3)));
+  };
+  const auto set = [name](LightOptions& o, const nlohmann::json& value) {
+    o.source_position.reset();
+    const auto text = value.get<std::string>();
+    if (text.empty()) return;
+    const std::vector<double> numbers = parse_numbers(text, name, 3);
+    o.source_position = Eigen::Vector3d(numbers[0], numbers[1], numbers[2]);
+  };
+  return {{name,
+           OptionKind::kText,
+           "place of the point source, mm in the lens frame: z below 0 for a lens, above the "
+           "surface for a mirror",
+           {},
+           "X,Y,Z",
+           {}},
+          get,
+          set,
+          get,
+          {}};
+}
+
+}  // namespace
 
 const OptionTable<DesignOptions>& design_fields() {
   using O = DesignOptions;
@@ -16,7 +63,7 @@ const OptionTable<DesignOptions>& design_fields() {
         R::length("--width", &O::width, Limits::between(kMinLensWidth, kMaxLensWidth),
                   "lens width; the height follows the picture"),
         R::length("--focal", &O::focal_length, Limits::above(0, kMaxFocalLength),
-                  "distance from the flat face to the wall"),
+                  "z of the picture's centre: distance from the flat face to the wall"),
         R::number("--ior", &O::ior, Limits::between(kMinIor, kMaxIor), "",
                   "refractive index of the lens"),
         R::length("--thickness", &O::thickness, Limits::between(kMinThickness, kMaxThickness),
@@ -51,6 +98,36 @@ const OptionTable<DesignOptions>& design_fields() {
     rows.back().left_out = "--weight-smooth is stored with it";
     return rows;
   }();
+  return table;
+}
+
+const OptionTable<LightOptions>& light_fields() {
+  using O = LightOptions;
+  using R = Row<O>;
+  static const OptionTable<O> table{
+      R::word<LightMode>("--mode", &O::mode,
+                         {{"refract", LightMode::kRefract}, {"reflect", LightMode::kReflect}},
+                         "a lens, or a mirror that is lit from above"),
+      R::number("--incidence", &O::incidence, Limits::between(0, kMaxTilt), "degrees",
+                "angle between parallel light and a mirror's z axis; it comes from the left, "
+                "seen from above"),
+      R::word<SourceKind>("--source", &O::source,
+                          {{"parallel", SourceKind::kParallel}, {"point", SourceKind::kPoint}},
+                          "parallel light, or light from a point"),
+      source_position(),
+      R::word<Emission>(
+          "--emission", &O::emission,
+          {{"isotropic", Emission::kIsotropic}, {"lambertian", Emission::kLambertian}},
+          "intensity of a point source: the same in all directions, or that of a flat LED which "
+          "points to the middle of the lens"),
+      R::length("--image-width", &O::image_width, Limits::zero_or(kMinImageWidth, kMaxImageWidth),
+                "width of the picture on the screen; 0 takes the lens's"),
+      pair("--image-offset", &O::image_offset, "X,Y",
+           "mm that the picture's centre is moved along x and y, from where the light of a flat "
+           "surface's middle lands"),
+      pair("--screen-tilt", &O::screen_tilt, "AX,AY",
+           "degrees that the screen is turned by the right-hand rule about the picture's right, "
+           "then about its up, as the viewer sees it")};
   return table;
 }
 

@@ -8,6 +8,7 @@
 #include "core/error.h"
 #include "core/text/number_text.h"
 #include "design/design_fields.h"
+#include "design/light_setup.h"
 #include "design/optics/made_surface.h"
 #include "design/schedule/level_plan.h"
 
@@ -21,6 +22,7 @@ void require(bool rule, const std::string& option, double value, const std::stri
 
 void require_all_in_range(const DesignOptions& o) {
   require_limits(design_fields(), o);
+  require_limits(light_fields(), o.light);
   require_limits(weight_fields(), o.weights);
   require(o.focal_length > o.thickness, "--focal", o.focal_length,
           "must be above the thickness of the lens, " + number_text(o.thickness) + " mm");
@@ -72,6 +74,7 @@ void validate(const DesignOptions& options, const Image& target) {
   const Eigen::Vector2i pixels = working_size(target.columns(), target.rows(), options.pixels);
   require(pixels.minCoeff() >= kMinPixels, "the working picture's shorter side", pixels.minCoeff(),
           "must be at least 4 pixels");
+  require_light(options, pixels);
   require_coarse_polish(options, pixels);
   if (!(target.total() > 0.0)) {
     throw InputError("the picture is all black: there is no light to place");

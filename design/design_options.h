@@ -8,6 +8,7 @@
 #include "core/optics/optical_setup.h"
 #include "core/surface/surface_model.h"
 #include "design/energy/weights.h"
+#include "design/light_options.h"
 #include "design/optics/made_by.h"
 
 namespace lensforge {
@@ -34,6 +35,7 @@ struct DesignOptions {
   double focal_length = 300.0;  ///< z of the receiving plane, mm, > thickness.
   double ior = 1.49;            ///< Refractive index, > 1.
   double thickness = 5.0;       ///< Least z of the finished surface, mm, > 0.
+  LightOptions light;           ///< Source, mirror or lens, screen.
   int pixels = 256;             ///< Longer side of the working picture; at most the source's.
   double mesh_ratio = 1.25;     ///< Mesh vertices per pixel side, 0.25 … 8.
   /// Resolutions, coarse to fine, each twice the one before; at most as many as leave the coarsest

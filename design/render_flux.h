@@ -7,6 +7,7 @@
 
 #include "core/compute/executor.h"
 #include "core/optics/optical_setup.h"
+#include "core/surface/lit_surface.h"
 #include "core/surface/mesh_normals.h"
 #include "core/surface/surface_mesh.h"
 #include "core/surface/surface_model.h"
@@ -27,7 +28,7 @@ std::vector<double> render_flux(const SurfaceMesh& mesh, const OpticalSetup& set
   };
   const auto triangles = buffer_of(executor, numbers(mesh.triangles));
   const auto vertices = buffer_of(executor, numbers(mesh.vertices));
-  const SurfaceView surface{triangles.data(), vertices.data(), LightPath(setup)};
+  const SurfaceView surface{triangles.data(), vertices.data(), light_on(mesh, setup)};
   FluxImageOn<Exec> image(setup.pixels.x(), setup.pixels.y());
   std::vector<double> flux(static_cast<std::size_t>(setup.pixels.prod()));
   const std::int64_t count = mesh.triangle_count();

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "design/render_setup.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "core/error.h"
+#include "core/optics/light_path.h"
 #include "core/text/number_text.h"
 
 namespace lensforge {
@@ -35,10 +38,17 @@ OpticalSetup with_image_width(OpticalSetup setup, double width) {
 
 void require_wall_above(const SurfaceMesh& mesh, const OpticalSetup& setup) {
   validate(setup);
-  const double top = mesh.vertices.row(2).maxCoeff();
-  if (setup.focal_length > top) return;
+  const LightPath light(setup);
+  double clearance = std::numeric_limits<double>::infinity();
+  for (const auto& p : mesh.vertices.colwise()) {
+    clearance = std::min(clearance, light.clearance(p));
+  }
+  if (clearance > 0.0) return;
+  // Moved along z, the screen gains its normal's z in distance.
+  const double steepness = setup.screen_x.cross(setup.screen_y).z();
   throw InputError("--focal " + number_text(setup.focal_length) +
-                   ": must be above the surface's highest point, z = " + number_text(top) + " mm");
+                   ": the wall must stand above the whole surface, beyond " +
+                   number_text(setup.focal_length - clearance / steepness) + " mm");
 }
 
 }  // namespace lensforge

@@ -9,6 +9,7 @@
 #include <ctime>
 #include <utility>
 
+#include "core/error.h"
 #include "core/image/image_io.h"
 #include "core/io/files.h"
 #include "core/io/lens_folder.h"
@@ -107,6 +108,11 @@ void announce_splines(const Job& job, std::int64_t control_points) {
 /// Of a mesh: splines that project its picture.
 SplineSolid fitted_splines(const Job& job) {
   const Lens& lens = job.source.lens;
+  if (lens.setup.mode == LightMode::kReflect) {
+    throw InputError(job.out.string() +
+                     ": splines are fitted to a mesh that refracts, not to one that reflects; "
+                     "design the mirror with --model spline, or export .stl or .3mf");
+  }
   FitOptions options{.tolerance = job.options.tolerance,
                      .normal_tolerance = job.options.normal_tolerance,
                      .max_control_points = job.options.max_points,

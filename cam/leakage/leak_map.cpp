@@ -219,8 +219,8 @@ LeakMap map_leakage(const NamedSurface& designed, const NamedSurface& part,
   const PixelWeights pixel_weights(weights, pixels.x(), pixels.y());
   LeakMap map = empty_map(setup.grid, cell);
   const std::int64_t side = map.grid_cells * std::max<std::int64_t>(1, setup.tile / map.grid_cells);
-  SurfaceTile designed_tile(setup.optics, setup.grid);
-  SurfaceTile part_tile(setup.optics, setup.grid);
+  SurfaceTile designed_tile(setup.optics, setup.grid, setup.whole);
+  SurfaceTile part_tile(setup.optics, setup.grid, setup.whole);
   for (const CellRange& range : tiles_of(all_cells(setup.grid), side)) {
     designed_tile.load(*designed.field, range, executor);
     part_tile.load(*part.field, range, executor);

@@ -31,7 +31,7 @@ std::vector<FluxPicture> render_parts(std::span<const SurfaceField* const> field
   for (std::size_t f = 0; f < fields.size(); ++f) {
     images.emplace_back(pixels.x(), pixels.y()).begin(executor);
   }
-  SurfaceTile tile(setup.optics, setup.grid);
+  SurfaceTile tile(setup.optics, setup.grid, setup.whole);
   const std::vector<CellRange> tiles = tiles_of(cells, setup.tile);
   for (std::size_t t = 0; t < tiles.size(); ++t) {
     for (std::size_t f = 0; f < fields.size(); ++f) {

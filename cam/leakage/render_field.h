@@ -32,6 +32,8 @@ struct FieldRenderSetup {
   OpticalSetup optics;
   GridWindow grid;          ///< Over the whole lens, see lens_grid().
   std::int64_t tile = 768;  ///< Side of the tiles that are sampled at once, cells: 30 MB.
+  /// LightPath::intake() of the whole surface, mm²; 0 takes the grid's area, that of light along z.
+  double whole = 0.0;
 };
 
 /// Renders a surface tile by tile: memory does not grow with the grid. Every image triangle is

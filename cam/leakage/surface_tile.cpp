@@ -18,10 +18,10 @@ double area_of(const GridWindow& grid) {
 
 }  // namespace
 
-SurfaceTile::SurfaceTile(const OpticalSetup& setup, const GridWindow& grid)
+SurfaceTile::SurfaceTile(const OpticalSetup& setup, const GridWindow& grid, double whole)
     : light_(setup),
       grid_(grid),
-      lens_area_(area_of(grid)),
+      lens_area_(whole > 0.0 ? whole : area_of(grid)),
       triangle_flux_(0.5 * grid.spacing.prod() / lens_area_) {}
 
 void SurfaceTile::load(const SurfaceField& field, const CellRange& range,

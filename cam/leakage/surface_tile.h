@@ -22,8 +22,9 @@ namespace lensforge {
 /// a little, see sharpen_landing(). Keeps its buffers between tiles.
 class SurfaceTile {
  public:
-  /// @param grid  the whole lens; fluxes are shares of the light that it takes.
-  SurfaceTile(const OpticalSetup& setup, const GridWindow& grid);
+  /// @param grid   the whole lens.
+  /// @param whole  light that it takes, mm², of which fluxes are shares; 0: the grid's area.
+  SurfaceTile(const OpticalSetup& setup, const GridWindow& grid, double whole = 0.0);
 
   /// Samples the surface over `range` with one more node on every side where the grid has one, so
   /// that creases on the tile's rim are split as they are inside.

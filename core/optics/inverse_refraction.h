@@ -24,4 +24,12 @@ LF_HD inline Eigen::Vector2d refracting_gradient(const Eigen::Vector2d& m, doubl
   return (b.head<2>() - eta * a.head<2>()) / (eta * a.z() - b.z());
 }
 
+/// The same for a mirror that light along the unit vector a falls on: b − a is parallel to the
+/// normal.
+LF_HD inline Eigen::Vector2d reflecting_gradient(const Eigen::Vector2d& m,
+                                                 const Eigen::Vector3d& a) {
+  const Eigen::Vector3d b = Eigen::Vector3d(m.x(), m.y(), 1.0).normalized();
+  return (a.head<2>() - b.head<2>()) / (b.z() - a.z());
+}
+
 }  // namespace lensforge

@@ -1,34 +1,55 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "core/optics/light_path.h"
 
+#include <Eigen/LU>
 #include <cmath>
 
 #include "core/optics/inverse_refraction.h"
 
 namespace lensforge {
+namespace {
+
+/// Steps of Newton's method in place_on_flat(), the shift that its derivatives are taken over, mm,
+/// and the change that ends it: vertices are moved by a few hundredths of a millimetre at least.
+constexpr int kMaxPlaceSteps = 8;
+constexpr double kPlaceShift = 1e-4;
+constexpr double kPlaceChange = 1e-9;
+
+/// Cells each way that the flat surface of a point source is summed over: of a flat source the
+/// intake of a cell is right to second order in its size.
+constexpr int kFlatCells = 64;
+
+double flat_intake(const LightSource& source, const Eigen::Vector2d& size) {
+  const auto corner = [&](int i, int j) -> Eigen::Vector3d {
+    return {size.x() * i / kFlatCells, size.y() * j / kFlatCells, 0.0};
+  };
+  double sum = 0.0;
+  for (int j = 0; j < kFlatCells; ++j) {
+    for (int i = 0; i < kFlatCells; ++i) {
+      sum += source.intake({corner(i, j), corner(i + 1, j), corner(i + 1, j + 1)}) +
+             source.intake({corner(i, j), corner(i + 1, j + 1), corner(i, j + 1)});
+    }
+  }
+  return sum;
+}
+
+}  // namespace
 
 LightPath::LightPath(const OpticalSetup& setup)
-    : plane_(setup),
-      focal_length_(setup.focal_length),
+    : screen_(setup),
+      source_(setup),
+      whole_(source_.is_point() ? flat_intake(source_, setup.lens_size) : setup.lens_size.prod()),
       eta_(setup.ior),
-      lens_area_(setup.lens_size.prod()),
-      kind_(setup.light == Eigen::Vector3d::UnitZ() ? Kind::kAlongZ : Kind::kOblique),
-      direction_(Eigen::Vector3d::UnitZ()),
-      deflection_(setup.ior - 1.0) {
-  if (kind_ == Kind::kAlongZ) return;
-  direction_ = refract(setup.light, Eigen::Vector3d::UnitZ(), 1.0 / setup.ior);
-  // A normal's x and y are minus the slope to first order; the geometric mean over all directions.
-  const RefractedBeam flat(direction_, Eigen::Vector3d::UnitZ(), eta_);
-  const Eigen::Vector3d by_x = flat.adjoint(direction_, Eigen::Vector3d::UnitZ(), eta_, {1.0, 0.0});
-  const Eigen::Vector3d by_y = flat.adjoint(direction_, Eigen::Vector3d::UnitZ(), eta_, {0.0, 1.0});
-  deflection_ = std::sqrt(std::abs(by_x.x() * by_y.y() - by_x.y() * by_y.x()));
-}
+      reflects_(setup.mode == LightMode::kReflect ? 1 : 0),
+      middle_(0.5 * setup.lens_size) {}
 
 Eigen::Vector2d LightPath::gradient_for(const Eigen::Vector3d& p,
                                         const Eigen::Vector2d& pixel) const {
-  const Eigen::Vector2d m = (plane_.to_mm(pixel) - p.head<2>()) / (focal_length_ - p.z());
-  if (kind_ == Kind::kAlongZ) return refracting_gradient(m, eta_);
-  return refracting_gradient(m, eta_, direction_);
+  const Eigen::Vector3d to = screen_.at(pixel);
+  const Eigen::Vector2d m = (to.head<2>() - p.head<2>()) / (to.z() - p.z());
+  if (source_.along_z()) return refracting_gradient(m, eta_);
+  if (reflects()) return reflecting_gradient(m, source_.incident(p));
+  return refracting_gradient(m, eta_, source_.incident(p));
 }
 
 Eigen::Vector2d LightPath::land_from_flat(const Eigen::Vector3d& p) const {
@@ -36,13 +57,47 @@ Eigen::Vector2d LightPath::land_from_flat(const Eigen::Vector3d& p) const {
 }
 
 Eigen::Vector2d LightPath::place_on_flat(const Eigen::Vector2d& pixel, double z) const {
-  const Eigen::Vector2d mm = plane_.to_mm(pixel);
-  const Eigen::Vector3d below(mm.x(), mm.y(), z);
-  return mm - (focal_length_ - z) * beam(below, Eigen::Vector3d::UnitZ()).m;
+  const Eigen::Vector3d to = screen_.at(pixel);
+  const auto slope_at = [&](const Eigen::Vector2d& place) -> Eigen::Vector2d {
+    const Eigen::Vector3d p(place.x(), place.y(), z);
+    return beam(p, Eigen::Vector3d::UnitZ()).m;
+  };
+  Eigen::Vector2d place = to.head<2>() - (to.z() - z) * slope_at(to.head<2>());
+  if (!source_.is_point()) return place;
+  // The slope of light from a point changes with the place.
+  for (int step = 0; step < kMaxPlaceSteps; ++step) {
+    const Eigen::Vector2d m = slope_at(place);
+    Eigen::Matrix2d lands = Eigen::Matrix2d::Identity();
+    for (int k = 0; k < 2; ++k) {
+      const Eigen::Vector2d beside = slope_at(place + kPlaceShift * Eigen::Vector2d::Unit(k));
+      lands.col(k) += (to.z() - z) / kPlaceShift * (beside - m);
+    }
+    const Eigen::Vector2d change = lands.inverse() * (to.head<2>() - place - (to.z() - z) * m);
+    place += change;
+    if (change.norm() < kPlaceChange) break;
+  }
+  return place;
+}
+
+Eigen::Vector2d LightPath::chief_slope(double z) const {
+  return beam({middle_.x(), middle_.y(), z}, Eigen::Vector3d::UnitZ()).m;
 }
 
 double LightPath::reach(double slope, double z) const {
-  return slope * deflection_ * (focal_length_ - z);
+  const Eigen::Vector3d n = Eigen::Vector3d::UnitZ();
+  const Eigen::Vector3d p(middle_.x(), middle_.y(), z);
+  if (source_.along_z() && !screen_.turned()) return slope * (eta_ - 1.0) * clearance(p);
+  const RefractedBeam flat = beam(p, n);
+  // A normal's x and y are minus the slope to first order.
+  Eigen::Matrix2d motion;
+  for (int k = 0; k < 2; ++k) {
+    Eigen::Vector3d p_bar = Eigen::Vector3d::Zero();
+    Eigen::Vector2d m_bar = Eigen::Vector2d::Zero();
+    const Eigen::Vector2d mm_bar = Eigen::Vector2d::Unit(k).cwiseQuotient(plane().pixels_per_mm());
+    land_adjoint(p, flat.m, mm_bar, p_bar, m_bar);
+    motion.row(k) = beam_adjoint(p, n, flat, m_bar, p_bar).head<2>();
+  }
+  return slope * std::sqrt(std::abs(motion.determinant()));
 }
 
 }  // namespace lensforge

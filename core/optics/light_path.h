@@ -7,22 +7,29 @@
 
 #include "core/compute/host_device.h"
 #include "core/optics/image_plane.h"
+#include "core/optics/light_source.h"
 #include "core/optics/optical_setup.h"
 #include "core/optics/reflection_barrier.h"
 #include "core/optics/refraction.h"
+#include "core/optics/screen.h"
 #include "core/surface/corners.h"
 
 /// Notation: p surface point and t surface triangle, mm in the lens frame; n unit normal, n_z > 0;
-/// a unit direction of the light before the surface, inside the lens; m slope (dx/dz, dy/dz) of the
-/// ray after it; u landing point in pixel coordinates. A bar (…_bar) is a derivative by that.
+/// a unit direction of the light before the surface, inside a lens; b that of the ray after it, m
+/// its slope (dx/dz, dy/dz); u landing point in pixel coordinates. A bar (…_bar) is a derivative by
+/// that.
 namespace lensforge {
 
-/// Light after a plane facet. Parallel light leaves it as one beam; light from a point will have a
-/// beam for each corner.
+/// Light after a plane facet. Parallel light leaves it as one beam; light from a point has a beam
+/// for each corner.
 struct FacetBeam {
-  RefractedBeam beam;
+  RefractedBeam beam;  ///< Of the first corner.
+  Eigen::Vector2d m1;  ///< Slopes of the others.
+  Eigen::Vector2d m2;
 
-  [[nodiscard]] LF_HD const Eigen::Vector2d& slope(int /*corner*/) const { return beam.m; }
+  [[nodiscard]] LF_HD const Eigen::Vector2d& slope(int corner) const {
+    return corner == 0 ? beam.m : (corner == 1 ? m1 : m2);
+  }
 };
 
 /// Derivatives by the slopes at a facet's three corners.
@@ -36,114 +43,141 @@ struct FacetSlopes {
 /// whether the surface refracts or reflects, and on where the screen stands is asked here; no other
 /// room knows the refractive index, the direction of the light or the distance of the screen.
 ///
-/// A new kind of light (a point source behind a front surface, a mirror) is a value of Kind with
-/// its answers in this file, its fields in OpticalSetup and in the lens file, and its options.
-/// Hence the questions name the point or triangle even where parallel light makes no use of it.
-///
-/// One value with a tag, not a template or a base class: kernels carry it by value to any device,
+/// One value with tags, not a template or a base class: kernels carry it by value to any device,
 /// and the rooms that ask are compiled once. Light along +z, which nearly all lenses are made for,
-/// keeps its own shorter formulas; the branch costs less than 1 % of an objective's time.
+/// keeps its own shorter formulas; the branches cost less than 1 % of an objective's time.
 class LightPath {
  public:
   explicit LightPath(const OpticalSetup& setup);
 
-  /// Ties the screen's millimetres to the picture's pixels.
-  [[nodiscard]] LF_HD const ImagePlane& plane() const { return plane_; }
+  /// The same light, its flux as shares of another whole than a flat surface takes, mm².
+  [[nodiscard]] LightPath sharing(double whole) const {
+    LightPath other = *this;
+    other.whole_ = whole;
+    return other;
+  }
 
-  /// True if a surface of this normal lets the light out towards the screen. Rays along +z then do
-  /// not meet the height field again (Sun et al., Appendix B).
-  [[nodiscard]] LF_HD bool transmits(const Eigen::Vector3d& /*p*/, const Eigen::Vector3d& n) const {
-    if (kind_ == Kind::kAlongZ) {
-      return n.z() > 0.0 && refracted_cosine_squared(n.z(), eta_) > 0.0;
+  /// Ties the screen's millimetres to the picture's pixels.
+  [[nodiscard]] LF_HD const ImagePlane& plane() const { return screen_.plane(); }
+
+  /// True if a surface of this normal sends the light towards the screen. Rays along +z then do not
+  /// meet the height field again (Sun et al., Appendix B).
+  [[nodiscard]] LF_HD bool transmits(const Eigen::Vector3d& p, const Eigen::Vector3d& n) const {
+    if (source_.along_z()) {
+      return n.z() > 0.0 && refracted_cosine_squared(n.z(), eta_) > 0.0 &&
+             (!screen_.turned() || screen_.faces(RefractedBeam(n, eta_).m));
     }
-    return leaves_upwards(n);
+    return leaves(source_.incident(p), n);
   }
   /// The same of a whole facet.
   [[nodiscard]] LF_HD bool transmits(const Corners& t, const Eigen::Vector3d& n) const {
-    return transmits(t.v0, n);
+    if (!source_.is_point()) return transmits(t.v0, n);
+    return transmits(t.v0, n) && transmits(t.v1, n) && transmits(t.v2, n);
   }
 
-  /// Barrier of a facet against what its light must not do, f_tir of Sun et al., Eq. 9; infinite
-  /// where no light leaves.
-  [[nodiscard]] LF_HD double barrier(const Corners& /*t*/, const Eigen::Vector3d& n) const {
-    return barrier_by_cosine(n).value;
+  /// Barrier of a facet against what its light must not do; infinite where no light leaves. Of a
+  /// lens f_tir of Sun et al., Eq. 9, of a mirror 1 / (−n·a b_z); of light from a point the mean
+  /// over the corners.
+  [[nodiscard]] LF_HD double barrier(const Corners& t, const Eigen::Vector3d& n) const {
+    if (source_.along_z()) return barrier_along_z(n).value;
+    if (!source_.is_point()) return barrier_at(source_.direction(), n).value;
+    return (barrier_at(source_.incident(t.v0), n).value +
+            barrier_at(source_.incident(t.v1), n).value +
+            barrier_at(source_.incident(t.v2), n).value) /
+           3.0;
   }
   /// Adjoint of barrier(): adds weight × the derivatives by corners and normal, returns barrier().
-  LF_HD double barrier_adjoint(const Corners& /*t*/, const Eigen::Vector3d& n, double weight,
-                               Corners& /*t_bar*/, Eigen::Vector3d& n_bar) const {
-    const ValueSlope f = barrier_by_cosine(n);
-    if (kind_ == Kind::kAlongZ) {
+  LF_HD double barrier_adjoint(const Corners& t, const Eigen::Vector3d& n, double weight,
+                               Corners& t_bar, Eigen::Vector3d& n_bar) const {
+    if (source_.along_z()) {
+      const ValueSlope f = barrier_along_z(n);
       n_bar.z() += weight * f.slope;
-    } else {
-      n_bar += (weight * f.slope) * direction_;
+      return f.value;
     }
-    return f.value;
+    if (!source_.is_point()) {
+      const BarrierAt f = barrier_at(source_.direction(), n);
+      n_bar += weight * f.by_n;
+      return f.value;
+    }
+    return corner_barrier(t.v0, n, weight / 3.0, t_bar.v0, n_bar) +
+           corner_barrier(t.v1, n, weight / 3.0, t_bar.v1, n_bar) +
+           corner_barrier(t.v2, n, weight / 3.0, t_bar.v2, n_bar);
   }
 
   /// The ray after the surface. @pre transmits(p, n).
-  [[nodiscard]] LF_HD RefractedBeam beam(const Eigen::Vector3d& /*p*/,
-                                         const Eigen::Vector3d& n) const {
-    return kind_ == Kind::kAlongZ ? RefractedBeam(n, eta_) : RefractedBeam(direction_, n, eta_);
+  [[nodiscard]] LF_HD RefractedBeam beam(const Eigen::Vector3d& p, const Eigen::Vector3d& n) const {
+    if (source_.along_z()) return {n, eta_};
+    const Eigen::Vector3d a = source_.incident(p);
+    if (reflects()) return RefractedBeam::reflected(a, n);
+    return {a, n, eta_};
   }
   /// Adjoint of (p, n) ↦ beam.m: adds to p_bar, returns n_bar.
-  [[nodiscard]] LF_HD Eigen::Vector3d beam_adjoint(const Eigen::Vector3d& /*p*/,
+  [[nodiscard]] LF_HD Eigen::Vector3d beam_adjoint(const Eigen::Vector3d& p,
                                                    const Eigen::Vector3d& n,
                                                    const RefractedBeam& beam,
                                                    const Eigen::Vector2d& m_bar,
-                                                   Eigen::Vector3d& /*p_bar*/) const {
-    return kind_ == Kind::kAlongZ ? beam.adjoint(n, eta_, m_bar)
-                                  : beam.adjoint(direction_, n, eta_, m_bar);
+                                                   Eigen::Vector3d& p_bar) const {
+    if (source_.along_z()) return beam.adjoint(n, eta_, m_bar);
+    const Eigen::Vector3d a = source_.incident(p);
+    const Eigen::Vector3d b_bar = beam.direction_bar(m_bar);
+    if (source_.is_point()) {
+      p_bar +=
+          source_.incident_adjoint(p, reflects() ? reflect_adjoint_by_incident(n, b_bar)
+                                                 : refract_adjoint_by_incident(a, n, eta_, b_bar));
+    }
+    return reflects() ? reflect_adjoint(a, n, b_bar) : refract_adjoint(a, n, eta_, b_bar);
   }
   /// The rays after a facet. @pre transmits(t, n).
   [[nodiscard]] LF_HD FacetBeam facet_beam(const Corners& t, const Eigen::Vector3d& n) const {
-    return {beam(t.v0, n)};
+    const RefractedBeam first = beam(t.v0, n);
+    if (!source_.is_point()) return {first, first.m, first.m};
+    return {first, beam(t.v1, n).m, beam(t.v2, n).m};
   }
   /// Adjoint of (t, n) ↦ the slopes at the three corners: adds to t_bar, returns n_bar.
   [[nodiscard]] LF_HD Eigen::Vector3d facet_beam_adjoint(const Corners& t, const Eigen::Vector3d& n,
                                                          const FacetBeam& facet,
                                                          const FacetSlopes& m_bar,
                                                          Corners& t_bar) const {
-    const Eigen::Vector2d sum = m_bar.m0 + m_bar.m1 + m_bar.m2;
-    return beam_adjoint(t.v0, n, facet.beam, sum, t_bar.v0);
+    if (!source_.is_point()) {
+      const Eigen::Vector2d sum = m_bar.m0 + m_bar.m1 + m_bar.m2;
+      return beam_adjoint(t.v0, n, facet.beam, sum, t_bar.v0);
+    }
+    return beam_adjoint(t.v0, n, facet.beam, m_bar.m0, t_bar.v0) +
+           beam_adjoint(t.v1, n, beam(t.v1, n), m_bar.m1, t_bar.v1) +
+           beam_adjoint(t.v2, n, beam(t.v2, n), m_bar.m2, t_bar.v2);
   }
 
   /// Where a ray of slope m that leaves the surface at p meets the screen.
   [[nodiscard]] LF_HD Eigen::Vector2d land(const Eigen::Vector3d& p,
                                            const Eigen::Vector2d& m) const {
-    return plane_.to_pixels(Eigen::Vector2d(p.x(), p.y()) + (focal_length_ - p.z()) * m);
+    return screen_.land(p, m);
   }
   /// Adjoint of land(): adds to p_bar and m_bar for a given u_bar.
   LF_HD void land_adjoint(const Eigen::Vector3d& p, const Eigen::Vector2d& m,
                           const Eigen::Vector2d& u_bar, Eigen::Vector3d& p_bar,
                           Eigen::Vector2d& m_bar) const {
-    const Eigen::Vector2d mm_bar = plane_.pixels_per_mm().cwiseProduct(u_bar);
-    p_bar += Eigen::Vector3d(mm_bar.x(), mm_bar.y(), -m.dot(mm_bar));
-    m_bar += (focal_length_ - p.z()) * mm_bar;
+    screen_.land_adjoint(p, m, u_bar, p_bar, m_bar);
   }
+  /// Distance of a surface point from the screen's plane, mm; negative beyond it.
+  [[nodiscard]] double clearance(const Eigen::Vector3d& p) const { return screen_.clearance(p); }
   /// True if the screen stands beyond a surface point.
-  [[nodiscard]] bool before_screen(const Eigen::Vector3d& p) const { return p.z() < focal_length_; }
+  [[nodiscard]] bool before_screen(const Eigen::Vector3d& p) const { return clearance(p) > 0.0; }
 
   /// Light that a triangle takes, as the area of evenly lit lens that takes as much, mm²: where its
   /// rays enter the lens. Moving a vertex inside a mesh never changes the sum over its triangles.
-  [[nodiscard]] LF_HD double intake(const Corners& t) const {
-    if (kind_ == Kind::kAlongZ) return plan_area(t);
-    return 0.5 * area_normal(t).dot(direction_) / direction_.z();
-  }
+  [[nodiscard]] LF_HD double intake(const Corners& t) const { return source_.intake(t); }
   /// True if intake() is the plan area however a triangle slopes, so that all cells of an even grid
   /// take the same.
-  [[nodiscard]] LF_HD bool intake_is_plan_area() const { return kind_ == Kind::kAlongZ; }
+  [[nodiscard]] LF_HD bool intake_is_plan_area() const { return source_.along_z(); }
 
-  /// intake() as a share of the whole lens's (Sun et al., Eq. 1).
-  [[nodiscard]] LF_HD double flux(const Corners& t) const { return intake(t) / lens_area_; }
+  /// intake() as a share of the whole (Sun et al., Eq. 1): of what a flat surface of the lens's
+  /// size takes, or of what sharing() was given.
+  [[nodiscard]] LF_HD double flux(const Corners& t) const { return intake(t) / whole_; }
   /// Adjoint of flux(): adds to the derivatives by the corners, or by area_normal(t) where flux
   /// depends on that alone.
-  LF_HD void flux_adjoint(const Corners& /*t*/, double flux_bar, Corners& /*t_bar*/,
+  LF_HD void flux_adjoint(const Corners& t, double flux_bar, Corners& t_bar,
                           Eigen::Vector3d& area_normal_bar) const {
-    if (kind_ == Kind::kAlongZ) {
-      area_normal_bar.z() += 0.5 * flux_bar / lens_area_;
-    } else {
-      area_normal_bar += (0.5 * flux_bar / (lens_area_ * direction_.z())) * direction_;
-    }
+    source_.intake_adjoint(t, flux_bar / whole_, t_bar, area_normal_bar);
   }
 
   /// Gradient (∂z/∂x, ∂z/∂y) of the surface at p that sends its light to a point of the picture.
@@ -155,35 +189,68 @@ class LightPath {
   [[nodiscard]] Eigen::Vector2d land_from_flat(const Eigen::Vector3d& p) const;
   [[nodiscard]] Eigen::Vector2d place_on_flat(const Eigen::Vector2d& pixel, double z) const;
 
-  /// How far a change of slope moves the light over the screen, mm, to first order, around a flat
-  /// surface of height z: a magnitude, the geometric mean over all directions of the slope.
+  /// Slope of the ray from the middle of a flat surface of height z.
+  [[nodiscard]] Eigen::Vector2d chief_slope(double z) const;
+
+  /// How far a change of slope moves the light over the screen, mm, to first order, around the
+  /// middle of a flat surface of height z: a magnitude, the geometric mean over all directions of
+  /// the slope.
   [[nodiscard]] double reach(double slope, double z = 0.0) const;
 
  private:
-  /// As wide as a double, so that no bytes of a kernel's argument are left unset.
-  enum class Kind : std::int64_t {
-    kAlongZ,   ///< Parallel light along +z through a flat entry face, refracted.
-    kOblique,  ///< Parallel light from any direction through a flat entry face, refracted.
+  /// Value of a barrier at one point and its derivatives.
+  struct BarrierAt {
+    double value;
+    Eigen::Vector3d by_a;
+    Eigen::Vector3d by_n;
   };
 
-  [[nodiscard]] LF_HD ValueSlope barrier_by_cosine(const Eigen::Vector3d& n) const {
-    if (kind_ == Kind::kAlongZ) return reflection_barrier(n.z(), eta_);
-    if (!leaves_upwards(n)) return {kInfinity, 0.0};
-    return reflection_barrier(n.dot(direction_), eta_);
+  [[nodiscard]] LF_HD bool reflects() const { return reflects_ != 0; }
+  [[nodiscard]] LF_HD ValueSlope barrier_along_z(const Eigen::Vector3d& n) const {
+    if (screen_.turned() && !transmits(Eigen::Vector3d(0.0, 0.0, 0.0), n)) return {kInfinity, 0.0};
+    return reflection_barrier(n.z(), eta_);
   }
-  [[nodiscard]] LF_HD bool leaves_upwards(const Eigen::Vector3d& n) const {
-    const double c = n.dot(direction_);
-    return n.z() > 0.0 && c > 0.0 && refracted_cosine_squared(c, eta_) > 0.0 &&
-           refract(direction_, n, eta_).z() > 0.0;
+  [[nodiscard]] LF_HD BarrierAt barrier_at(const Eigen::Vector3d& a,
+                                           const Eigen::Vector3d& n) const {
+    const double c = n.dot(a);
+    if (!leaves(a, n)) return {kInfinity, {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
+    if (!reflects()) {
+      const ValueSlope f = reflection_barrier(c, eta_);
+      return {f.value, f.slope * n, f.slope * a};
+    }
+    // f = −1 / (c b_z) with b_z = a_z − 2 c n_z.
+    const double b_z = a.z() - 2.0 * c * n.z();
+    const double f = -1.0 / (c * b_z);
+    const double by_bz = -f / b_z;
+    const double by_c = -f / c - 2.0 * n.z() * by_bz;
+    return {f, by_c * n + Eigen::Vector3d(0.0, 0.0, by_bz),
+            by_c * a + Eigen::Vector3d(0.0, 0.0, -2.0 * c * by_bz)};
+  }
+  /// A corner's share of barrier_adjoint().
+  LF_HD double corner_barrier(const Eigen::Vector3d& p, const Eigen::Vector3d& n, double weight,
+                              Eigen::Vector3d& p_bar, Eigen::Vector3d& n_bar) const {
+    const BarrierAt f = barrier_at(source_.incident(p), n);
+    p_bar += source_.incident_adjoint(p, weight * f.by_a);
+    n_bar += weight * f.by_n;
+    return f.value / 3.0;
+  }
+  [[nodiscard]] LF_HD bool leaves(const Eigen::Vector3d& a, const Eigen::Vector3d& n) const {
+    const double c = n.dot(a);
+    if (!(n.z() > 0.0)) return false;
+    if (reflects()) {
+      return c < 0.0 && a.z() - 2.0 * c * n.z() > 0.0 &&
+             screen_.faces(RefractedBeam::reflected(a, n).m);
+    }
+    return c > 0.0 && refracted_cosine_squared(c, eta_) > 0.0 && refract(a, n, eta_).z() > 0.0 &&
+           screen_.faces(RefractedBeam(a, n, eta_).m);
   }
 
-  ImagePlane plane_;
-  double focal_length_;  ///< z of the screen, mm.
-  double eta_;           ///< n_lens / n_air
-  double lens_area_;     ///< mm², plan.
-  Kind kind_;
-  Eigen::Vector3d direction_;  ///< a
-  double deflection_;          ///< |∂m/∂slope|, around a flat surface: √|det|.
+  Screen screen_;
+  LightSource source_;
+  double whole_;            ///< mm²
+  double eta_;              ///< n_lens / n_air
+  std::int64_t reflects_;   ///< Wide, so that no bytes of a kernel's argument are left unset.
+  Eigen::Vector2d middle_;  ///< Of the lens, mm.
 };
 
 }  // namespace lensforge

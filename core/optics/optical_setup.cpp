@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "core/optics/optical_setup.h"
 
+#include <Eigen/Geometry>
 #include <cmath>
 #include <sstream>
 #include <string>
@@ -25,11 +26,35 @@ void require_positive(const std::string& field, double value) {
   require(std::isfinite(value) && value > 0.0, field, value, "a finite number of mm above 0");
 }
 
+bool is_unit(const Eigen::Vector3d& v) { return std::abs(v.norm() - 1.0) < kUnitTolerance; }
+
+void require_light(const OpticalSetup& setup) {
+  const bool lens = setup.mode == LightMode::kRefract;
+  if (!setup.point) {
+    require(is_unit(setup.light) && (lens ? setup.light.z() > 0.0 : setup.light.z() < 0.0), "light",
+            setup.light.transpose(),
+            lens ? "a unit vector towards +z" : "a unit vector towards -z");
+    return;
+  }
+  const Eigen::Vector3d& from = setup.point->position;
+  require(from.allFinite() && (lens ? from.z() < 0.0 : from.z() > 0.0), "source.position",
+          from.transpose(), lens ? "finite, its z below 0" : "finite, its z above 0");
+}
+
+void require_screen(const OpticalSetup& setup) {
+  require(is_unit(setup.screen_x), "screen.right", setup.screen_x.transpose(), "a unit vector");
+  require(is_unit(setup.screen_y) && std::abs(setup.screen_x.dot(setup.screen_y)) < kUnitTolerance,
+          "screen.up", setup.screen_y.transpose(),
+          "a unit vector at a right angle to screen.right");
+  require(setup.screen_x.cross(setup.screen_y).z() > 0.0, "screen.up", setup.screen_y.transpose(),
+          "such that the screen faces the lens");
+}
+
 }  // namespace
 
 void validate(const OpticalSetup& setup) {
-  require(std::abs(setup.light.norm() - 1.0) < kUnitTolerance && setup.light.z() > 0.0, "light",
-          setup.light.transpose(), "a unit vector towards +z");
+  require_light(setup);
+  require_screen(setup);
   require(std::isfinite(setup.ior) && setup.ior > 1.0, "ior", setup.ior, "a finite number above 1");
   require_positive("focal_length", setup.focal_length);
   for (int axis = 0; axis < 2; ++axis) {

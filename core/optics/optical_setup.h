@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 
 namespace lensforge {
 
@@ -9,25 +10,59 @@ namespace lensforge {
 /// translucent screen.
 enum class ViewSide { kFront, kRear };
 
-/// Everything between the lamp and the wall but the surface itself. Millimetres, lens frame: the
-/// flat entry face lies in z = 0, the receiving plane is z = focal_length. What follows from it for
-/// a ray is asked of LightPath.
+/// What the surface does to the light: it lets it out of a lens whose flat entry face lies in
+/// z = 0, or it is a mirror, lit from above.
+enum class LightMode { kRefract, kReflect };
+
+/// How the intensity of a point source depends on the direction: the same in all of them, or by the
+/// cosine to the line from the source to the middle of the lens, as of a flat LED.
+enum class Emission { kIsotropic, kLambertian };
+
+struct PointSource {
+  Eigen::Vector3d position{0.0, 0.0,
+                           0.0};  ///< mm; z < 0 for a lens, above the surface for a mirror.
+  Emission emission = Emission::kIsotropic;
+
+  friend bool operator==(const PointSource&, const PointSource&) = default;
+};
+
+/// Everything between the lamp and the wall but the surface itself. Millimetres, lens frame. What
+/// follows from it for a ray is asked of LightPath.
+///
+/// The picture lies on the screen, a plane through its centre: image_origin + image_size / 2 in x
+/// and y, focal_length in z. screen_x and screen_y say how it is turned about that point; unturned,
+/// the screen is the plane z = focal_length, and image_origin the picture's corner of least x and
+/// y.
 struct OpticalSetup {
-  Eigen::Vector3d light{0.0, 0.0, 1.0};  ///< Unit direction of the parallel light before the lens.
-  double ior = 1.49;                     ///< Refractive index of the lens against air, > 1.
-  double focal_length = 300.0;           ///< z of the receiving plane, mm; above the surface.
+  LightMode mode = LightMode::kRefract;
+  /// Unit direction of parallel light before the surface; up for a lens, down for a mirror.
+  Eigen::Vector3d light{0.0, 0.0, 1.0};
+  std::optional<PointSource> point;          ///< Instead of parallel light.
+  double ior = 1.49;                         ///< Refractive index of the lens against air, > 1.
+  double focal_length = 300.0;               ///< z of the picture's centre, mm; above the surface.
   Eigen::Vector2d lens_size{100.0, 100.0};   ///< mm
-  Eigen::Vector2d image_size{100.0, 100.0};  ///< mm, on the receiving plane
-  Eigen::Vector2d image_origin{0.0, 0.0};    ///< mm, corner of least x and y
+  Eigen::Vector2d image_size{100.0, 100.0};  ///< mm, on the screen
+  Eigen::Vector2d image_origin{0.0, 0.0};    ///< mm
+  Eigen::Vector3d screen_x{1.0, 0.0, 0.0};   ///< Unit vector on the screen, x of an unturned one.
+  Eigen::Vector3d screen_y{0.0, 1.0, 0.0};   ///< The same of y; at a right angle to screen_x.
   Eigen::Vector2i pixels{256, 256};          ///< columns, rows of the working picture
   ViewSide view = ViewSide::kFront;
+
+  [[nodiscard]] bool screen_is_turned() const {
+    return screen_x != Eigen::Vector3d::UnitX() || screen_y != Eigen::Vector3d::UnitY();
+  }
+  [[nodiscard]] Eigen::Vector3d screen_centre() const {
+    return {image_origin.x() + 0.5 * image_size.x(), image_origin.y() + 0.5 * image_size.y(),
+            focal_length};
+  }
 
   friend bool operator==(const OpticalSetup&, const OpticalSetup&) = default;
 };
 
 /// @throw InputError naming the field, its value and the rule, unless ior > 1, all sizes, the focal
-/// length and the pixel counts are positive, the light is a unit vector of z > 0, and everything is
-/// finite.
+/// length and the pixel counts are positive, the light comes from the right side, the screen's
+/// vectors are of length 1, at a right angle and turn it by less than a right angle, and everything
+/// is finite.
 void validate(const OpticalSetup& setup);
 
 }  // namespace lensforge

@@ -35,6 +35,15 @@ LF_HD inline Eigen::Vector3d refract_adjoint(const Eigen::Vector3d& a, const Eig
   return k * b_bar + (n.dot(b_bar) * k_by_c) * a;
 }
 
+/// Adjoint of refract() with respect to the incident direction: a_bar for a given b_bar.
+LF_HD inline Eigen::Vector3d refract_adjoint_by_incident(const Eigen::Vector3d& a,
+                                                         const Eigen::Vector3d& n, double eta,
+                                                         const Eigen::Vector3d& b_bar) {
+  const double c = n.dot(a);
+  const double k_by_c = eta * eta * c / std::sqrt(refracted_cosine_squared(c, eta)) - eta;
+  return eta * b_bar + (n.dot(b_bar) * k_by_c) * n;
+}
+
 /// A ray after a surface of unit normal n, b = k n + η a with k = √s − ηc, and what its adjoint
 /// needs again. For light along +z, a = ẑ, in fewer operations.
 struct RefractedBeam {
@@ -50,6 +59,17 @@ struct RefractedBeam {
         k(root - eta * n.z()),
         m(k * inverse_z * n.x(), k * inverse_z * n.y()) {}
 
+  /// The ray b = a + k n after a mirror, k = −2c (Sun et al., Appendix D). @pre b_z > 0.
+  [[nodiscard]] LF_HD static RefractedBeam reflected(const Eigen::Vector3d& a,
+                                                     const Eigen::Vector3d& n) {
+    RefractedBeam beam;
+    beam.k = -2.0 * n.dot(a);
+    const Eigen::Vector3d b = beam.k * n + a;
+    beam.inverse_z = 1.0 / b.z();
+    beam.m = beam.inverse_z * b.head<2>();
+    return beam;
+  }
+
   /// @pre as of refract(), and b_z > 0.
   LF_HD RefractedBeam(const Eigen::Vector3d& a, const Eigen::Vector3d& n, double eta)
       : root(std::sqrt(refracted_cosine_squared(n.dot(a), eta))),
@@ -60,10 +80,14 @@ struct RefractedBeam {
     m = inverse_z * b.head<2>();
   }
 
+  /// The derivative by b of a scalar whose derivative by m is m_bar.
+  [[nodiscard]] LF_HD Eigen::Vector3d direction_bar(const Eigen::Vector2d& m_bar) const {
+    return inverse_z * Eigen::Vector3d(m_bar.x(), m_bar.y(), -m.dot(m_bar));
+  }
   /// Adjoint of n ↦ m: n_bar for a given m_bar.
   [[nodiscard]] LF_HD Eigen::Vector3d adjoint(const Eigen::Vector3d& n, double eta,
                                               const Eigen::Vector2d& m_bar) const {
-    const Eigen::Vector3d b_bar = inverse_z * Eigen::Vector3d(m_bar.x(), m_bar.y(), -m.dot(m_bar));
+    const Eigen::Vector3d b_bar = direction_bar(m_bar);
     const double k_by_nz = eta * eta * n.z() / root - eta;
     Eigen::Vector3d n_bar = k * b_bar;
     n_bar.z() += n.dot(b_bar) * k_by_nz;
@@ -71,9 +95,22 @@ struct RefractedBeam {
   }
   [[nodiscard]] LF_HD Eigen::Vector3d adjoint(const Eigen::Vector3d& a, const Eigen::Vector3d& n,
                                               double eta, const Eigen::Vector2d& m_bar) const {
-    const Eigen::Vector3d b_bar = inverse_z * Eigen::Vector3d(m_bar.x(), m_bar.y(), -m.dot(m_bar));
+    const Eigen::Vector3d b_bar = direction_bar(m_bar);
     return refract_adjoint(a, n, eta, b_bar);
   }
+
+ private:
+  LF_HD RefractedBeam() : root(0.0), inverse_z(0.0), k(0.0), m(0.0, 0.0) {}
 };
+
+/// Adjoint of the mirror's b = a − 2 (n·a) n by the normal, and by the incident direction.
+LF_HD inline Eigen::Vector3d reflect_adjoint(const Eigen::Vector3d& a, const Eigen::Vector3d& n,
+                                             const Eigen::Vector3d& b_bar) {
+  return -2.0 * (n.dot(b_bar) * a + n.dot(a) * b_bar);
+}
+LF_HD inline Eigen::Vector3d reflect_adjoint_by_incident(const Eigen::Vector3d& n,
+                                                         const Eigen::Vector3d& b_bar) {
+  return b_bar - (2.0 * n.dot(b_bar)) * n;
+}
 
 }  // namespace lensforge

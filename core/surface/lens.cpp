@@ -16,6 +16,7 @@
 #include "core/surface/height_field_check.h"
 #include "core/surface/lens_surface.h"
 #include "core/surface/mesh_io.h"
+#include "core/surface/setup_json.h"
 #include "core/surface/spline_file.h"
 #include "core/surface/spline_surface.h"
 #include "core/text/json_fields.h"
@@ -54,34 +55,17 @@ ordered_json to_json(const ModelMetrics& metrics) {
   return by_model;
 }
 
-template <class Vector>
-ordered_json pair_json(const Vector& pair) {
-  return ordered_json::array({pair.x(), pair.y()});
-}
-
 ordered_json to_json(const Lens& lens) {
-  const OpticalSetup& setup = lens.setup;
   const GridShape& grid = lens.surface.grid;
-  LF_CHECK(setup.light == Eigen::Vector3d::UnitZ(), "the lens file holds no direction yet");
-  ordered_json document = {
-      {"format", kFormat},
-      {"version", kVersion},
-      {"units", "mm"},
-      {"mode", "refract"},
-      {"source", {{"type", "parallel"}}},
-      {"ior", setup.ior},
-      {"focal_length", setup.focal_length},
-      {"lens_size", pair_json(setup.lens_size)},
-      {"image_size", pair_json(setup.image_size)},
-      {"image_origin", pair_json(setup.image_origin)},
-      {"pixels", pair_json(setup.pixels)},
-      {"view", setup.view == ViewSide::kFront ? "front" : "rear"},
+  ordered_json document = {{"format", kFormat}, {"version", kVersion}, {"units", "mm"}};
+  document.update(setup_json(lens.setup));
+  document.update(ordered_json{
       {"model", model_name(lens.model)},
       {"surface", lens_file::kSurface},
       {"grid", grid.is_grid() ? ordered_json::array({grid.columns, grid.rows}) : ordered_json()},
       {"metrics", to_json(lens.metrics)},
       {"provenance", ordered_json(lens.provenance)},
-  };
+  });
   if (lens.spline) document["spline"] = lens_file::kSpline;
   return document;
 }
@@ -158,33 +142,16 @@ void check_supported(const JsonFields& fields) {
                   "only version " + std::to_string(kVersion) + " can be read by this program");
   }
   if (fields.text("units") != "mm") fields.refuse("units", "only \"mm\" can be read");
-  if (fields.text("mode") != "refract") {
-    fields.refuse("mode", "not supported yet by this version, only \"refract\" is");
-  }
-  const JsonFields source = fields.object("source");
-  if (source.text("type") != "parallel") {
-    source.refuse("type", "not supported yet by this version, only \"parallel\" is");
-  }
-  if (source.has("direction")) {
-    source.refuse("direction", "not supported yet by this version, only light along +z is");
-  }
 }
 
 OpticalSetup read_setup(const JsonFields& fields, const std::string& file) {
-  OpticalSetup setup;
-  setup.ior = fields.number("ior");
-  setup.focal_length = fields.number("focal_length");
-  setup.lens_size = fields.number_pair("lens_size");
-  setup.image_size = fields.number_pair("image_size");
-  setup.image_origin = fields.number_pair("image_origin");
-  setup.pixels = fields.integer_pair("pixels");
-  setup.view =
-      choice<ViewSide>(fields, "view", {{"front", ViewSide::kFront}, {"rear", ViewSide::kRear}});
+  OpticalSetup setup = read_setup(fields);
   try {
     validate(setup);
   } catch (const InputError& error) {
     throw InputError(file + ": field " + error.what());
   }
+  require_agreement(fields, setup);
   if (setup.pixels.maxCoeff() > kMaxImageSide) {
     fields.refuse("pixels", "at most " + std::to_string(kMaxImageSide) + " a side");
   }

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/optics/light_path.h"
 #include "core/text/number_text.h"
 
 namespace lensforge {
@@ -62,10 +63,14 @@ std::optional<std::string> surface_fault(const SurfaceMesh& mesh, const OpticalS
   }
   const double lowest = mesh.vertices.row(2).minCoeff();
   const double highest = mesh.vertices.row(2).maxCoeff();
-  if (!(lowest >= 0.0 && highest < setup.focal_length)) {
+  const LightPath light(setup);
+  const auto vertices = mesh.vertices.colwise();
+  const bool before_screen = std::all_of(vertices.begin(), vertices.end(),
+                                         [&](const auto& p) { return light.before_screen(p); });
+  if (!(lowest >= 0.0 && before_screen)) {
     return "z runs from " + number_text(lowest) + " to " + number_text(highest) +
-           " mm: must be between the entry face at 0 and the receiving plane at " +
-           number_text(setup.focal_length);
+           " mm: must be between the entry face at 0 and the receiving plane" +
+           (setup.screen_is_turned() ? "" : " at " + number_text(setup.focal_length));
   }
   return extent_fault(mesh, setup.lens_size);
 }

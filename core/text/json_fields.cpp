@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "core/text/json_fields.h"
 
+#include <algorithm>
 #include <cstdint>
 #include <limits>
 #include <utility>
@@ -73,6 +74,16 @@ Eigen::Vector2d JsonFields::number_pair(const std::string& name) const {
     refuse(name, "it must be two numbers");
   }
   return {value[0].get<double>(), value[1].get<double>()};
+}
+
+Eigen::Vector3d JsonFields::number_triple(const std::string& name) const {
+  const json& value = at(name);
+  const auto is_number = [](const json& entry) { return entry.is_number(); };
+  if (!value.is_array() || value.size() != 3 ||
+      !std::all_of(value.begin(), value.end(), is_number)) {
+    refuse(name, "it must be three numbers");
+  }
+  return {value[0].get<double>(), value[1].get<double>(), value[2].get<double>()};
 }
 
 Eigen::Vector2i JsonFields::integer_pair(const std::string& name) const {

@@ -24,6 +24,7 @@ class JsonFields {
   [[nodiscard]] double number(const std::string& name) const;
   [[nodiscard]] int integer(const std::string& name) const;
   [[nodiscard]] Eigen::Vector2d number_pair(const std::string& name) const;
+  [[nodiscard]] Eigen::Vector3d number_triple(const std::string& name) const;
   [[nodiscard]] Eigen::Vector2i integer_pair(const std::string& name) const;
 
   /// @throw InputError "file: field 'name' is VALUE: rule".

@@ -12,6 +12,7 @@
 
 #include "core/compute/executor.h"
 #include "core/image/image.h"
+#include "core/surface/lit_surface.h"
 #include "core/surface/mesh_topology.h"
 #include "core/surface/surface_mesh.h"
 #include "design/energy/facet_rays.h"
@@ -154,7 +155,7 @@ DesignObjectiveOn<Exec>::DesignObjectiveOn(const SurfaceMesh& mesh, const Optica
                                            const Exec& executor)
     : executor_(executor),
       options_(options),
-      light_(setup),
+      light_(light_on(mesh, setup)),
       mesh_(mesh, make_topology(mesh), executor),
       movable_(objective_detail::movable_coordinates(mesh.vertices, setup.lens_size)),
       movable_here_(buffer_of(executor, objective_detail::entries(movable_))),

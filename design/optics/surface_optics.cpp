@@ -3,6 +3,7 @@
 
 #include <cstddef>
 
+#include "core/surface/lit_surface.h"
 #include "core/surface/mesh_normals.h"
 #include "design/optics/facet.h"
 #include "design/optics/surface_kernels.h"
@@ -12,7 +13,7 @@ namespace lensforge {
 namespace {
 
 SurfaceView view_of(const SurfaceMesh& mesh, const OpticalSetup& setup) {
-  return {mesh.triangles.data(), mesh.vertices.data(), LightPath(setup)};
+  return {mesh.triangles.data(), mesh.vertices.data(), light_on(mesh, setup)};
 }
 
 template <class Project>

@@ -64,6 +64,16 @@ void append(const OptionTable<Options>& table, const Options& options, json& des
   }
 }
 
+/// Appends what of the light is not the default, so that designs for the usual light keep their
+/// fingerprint.
+void append_light(const LightOptions& light, json& description) {
+  const LightOptions usual;
+  for (const OptionField<LightOptions>& field : light_fields()) {
+    const json value = field.stored(light);
+    if (value != field.stored(usual)) description.push_back({field.name, value});
+  }
+}
+
 json to_json(const ConvergenceRow& row) {
   const EnergyValues& e = row.energy;
   return {row.stage,  row.level,  row.round, row.iteration,  e.image, e.unlit,
@@ -132,6 +142,7 @@ std::uint64_t design_fingerprint(const Image& target, const DesignOptions& optio
   append(weight_fields(), with_smoothness_applied(options).weights, weights);
   json description = {target.columns(), target.rows()};
   append(design_fields(), options, description);
+  append_light(options.light, description);
   description.push_back(weights);
   if (options.made_by) {
     const MadeBy& made = *options.made_by;

@@ -11,8 +11,18 @@
 
 namespace lensforge {
 
+namespace {
+
+/// Steps a pixel that landing places are rounded to, where a flat mesh's do not lie on a grid to
+/// the last bit. Rounding errors of 1e-14 pixels leave triangles on the hull that are so thin that
+/// the centres of their circles are noise: a mirror at 30 degrees found no transport at 64² pixels.
+constexpr double kSteps = 16777216.0;
+
+}  // namespace
+
 FaceLight face_light(const SurfaceMesh& mesh, const OpticalSetup& setup, SurfaceModel model,
                      const Executor& executor) {
+  const bool on_grid = LightPath(setup).intake_is_plan_area() && !setup.screen_is_turned();
   const std::vector<ImageTriangle> images = project_surface(mesh, setup, model, executor);
   FaceLight light;
   light.landing.resize(2, mesh.triangles.cols());
@@ -20,6 +30,7 @@ FaceLight face_light(const SurfaceMesh& mesh, const OpticalSetup& setup, Surface
   for (Eigen::Index f = 0; f < light.flux.size(); ++f) {
     const ImageTriangle& t = images[static_cast<std::size_t>(f)];
     light.landing.col(f) = (t.p0 + t.p1 + t.p2) / 3.0;
+    if (!on_grid) light.landing.col(f) = (light.landing.col(f) * kSteps).array().round() / kSteps;
     light.flux[f] = t.flux;
   }
   return light;

@@ -6,6 +6,7 @@
 
 #include "core/optics/light_path.h"
 #include "core/surface/grid_mesh.h"
+#include "design/light_setup.h"
 
 namespace lensforge {
 
@@ -84,17 +85,6 @@ Level level_at(const Eigen::Vector2i& pixels, const DesignOptions& options, int 
 
 }  // namespace
 
-OpticalSetup optical_setup(const DesignOptions& options, const Eigen::Vector2i& pixels) {
-  OpticalSetup setup;
-  setup.ior = options.ior;
-  setup.focal_length = options.focal_length;
-  setup.lens_size = {options.width, options.width * pixels.y() / pixels.x()};
-  setup.image_size = setup.lens_size;
-  setup.pixels = pixels;
-  setup.view = options.view;
-  return setup;
-}
-
 Eigen::Vector2i working_size(int source_columns, int source_rows, int longer_side) {
   const double scale = static_cast<double>(longer_side) / std::max(source_columns, source_rows);
   return {rounded(scale * source_columns, 1), rounded(scale * source_rows, 1)};
@@ -104,12 +94,13 @@ std::vector<Level> plan_levels(const Eigen::Vector2i& pixels, const DesignOption
   const int possible =
       static_cast<int>(std::lround(std::log2(pixels.maxCoeff() / kCoarsestPixels)));
   const int halvings = std::clamp(options.levels - 1, 0, std::max(0, possible));
+  const OpticalSetup setup = optical_setup(options, pixels);
   std::vector<Level> levels;
   for (int l = 0; l <= halvings; ++l) {
     Level level = level_at(pixels, options, halvings, l);
-    const double pixel = options.width / level.pixels.x();
+    const double pixel = setup.image_size.x() / level.pixels.x();
     const double cell = options.width / (level.grid.columns - 1);
-    const double typical = pixel / cell / LightPath(optical_setup(options, pixels)).reach(1.0);
+    const double typical = pixel / cell / LightPath(setup).reach(1.0);
     const double progress = halvings == 0 ? 1.0 : static_cast<double>(l) / halvings;
     level.nu = typical * kNuStart * std::pow(kNuEnd / kNuStart, progress);
     level.rounds = options.rounds;
@@ -120,8 +111,7 @@ std::vector<Level> plan_levels(const Eigen::Vector2i& pixels, const DesignOption
     for (Level& level : levels) {
       level.rounds = (options.rounds + kPartsOfRounds - 1) / kPartsOfRounds;
     }
-    levels.push_back(
-        spline_level(levels.back(), optical_setup(options, pixels).lens_size, options));
+    levels.push_back(spline_level(levels.back(), setup.lens_size, options));
   }
   return levels;
 }

@@ -4,7 +4,6 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "core/optics/optical_setup.h"
 #include "core/surface/surface_mesh.h"
 #include "design/design_options.h"
 
@@ -20,9 +19,6 @@ struct Level {
   int rounds = 0;                ///< Alternations.
   int iterations = 0;            ///< Most of one round.
 };
-
-/// What the options say of light, lens and screen, for a working picture of so many pixels.
-OpticalSetup optical_setup(const DesignOptions& options, const Eigen::Vector2i& pixels);
 
 /// Size of the working picture: the longer side has options.pixels, the other follows the source's
 /// shape (at least 1).

@@ -6,6 +6,7 @@
 
 #include "core/optics/light_path.h"
 #include "design/design_options.h"
+#include "design/light_setup.h"
 #include "design/schedule/face_transport.h"
 #include "design/schedule/guided_optimization.h"
 
@@ -20,8 +21,7 @@ constexpr int kAimPasses = 3;
 constexpr double kNear = 1.05;
 
 bool feasible(const Demand& demand, double focal_length, const Executor& executor) {
-  OpticalSetup setup = demand.setup;
-  setup.focal_length = focal_length;
+  const OpticalSetup setup = at_focal_length(demand.setup, focal_length, demand.thickness);
   SurfaceMesh mesh = demand.mesh;
   mesh.vertices.row(2).setConstant(demand.thickness);
   aim_surface(demand.wanted, setup, demand.thickness, executor, mesh);

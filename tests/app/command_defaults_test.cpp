@@ -48,6 +48,7 @@ TEST(CommandDefaults, OfDesignAreTheLibrarysForEveryModelAndPicture) {
       settle(options, settings, picture);
       const DesignOptions library = default_design_options(model, picture);
       expect_equal(design_fields(), settings.design, library);
+      expect_equal(light_fields(), settings.design.light, library.light);
       expect_equal(weight_fields(), settings.design.weights, library.weights);
       EXPECT_EQ(library.weights.smooth, default_smoothness(model));
     }

@@ -60,6 +60,7 @@ void expect_limits_enforced(const Arguments& line, const OptionTable<Options>& t
 
 TEST(OptionLimits, AreEnforcedByEveryCommandForEveryNumber) {
   expect_limits_enforced({"design", "none.png", "--out", "none"}, design_fields());
+  expect_limits_enforced({"design", "none.png", "--out", "none"}, light_fields());
   expect_limits_enforced({"design", "none.png", "--out", "none"}, weight_fields());
   expect_limits_enforced({"render", "none"}, render_fields());
   expect_limits_enforced({"cam", "none"}, cam_fields());
@@ -90,6 +91,11 @@ TEST(OptionLimits, AreThoseOfTheLibraries) {
   const Image picture(256, 8, 0.5F);
   const auto design = [&](const DesignOptions& options) { validate(options, picture); };
   expect_library_refuses(design_fields(), DesignOptions{}, design);
+  expect_library_refuses(light_fields(), LightOptions{}, [&](const LightOptions& light) {
+    DesignOptions options;
+    options.light = light;
+    design(options);
+  });
   expect_library_refuses(weight_fields(), ObjectiveWeights{}, [&](const ObjectiveWeights& weights) {
     DesignOptions options;
     options.weights = weights;
@@ -112,6 +118,7 @@ TEST(OptionLimits, AreThoseOfTheLibraries) {
 
 TEST(OptionLimits, DefaultsKeepThem) {
   require_limits(design_fields(), DesignOptions{});
+  require_limits(light_fields(), LightOptions{});
   require_limits(weight_fields(), ObjectiveWeights{});
   require_limits(render_fields(), RenderOptions{});
   require_limits(cam_fields(), CamOptions{});

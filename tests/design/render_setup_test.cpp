@@ -69,7 +69,7 @@ TEST(RenderSetup, TheWallLiesAboveTheSurface) {
   OpticalSetup setup = setup_for_mesh(shifted_mesh());
   setup.focal_length = shifted_mesh().vertices.row(2).maxCoeff();
   EXPECT_THAT(message_of<InputError>([&] { require_wall_above(shifted_mesh(), setup); }),
-              HasSubstr("must be above the surface's highest point"));
+              HasSubstr("must stand above the whole surface"));
   setup.focal_length += 0.1;
   require_wall_above(shifted_mesh(), setup);
 }

@@ -162,7 +162,12 @@ TEST(Lens, TheJsonHasTheFieldsOfTheInterface) {
   EXPECT_EQ(document["version"], 1);
   EXPECT_EQ(document["units"], "mm");
   EXPECT_EQ(document["mode"], "refract");
-  EXPECT_EQ(document["source"], json({{"type", "parallel"}}));
+  EXPECT_EQ(document["source"], json({{"type", "parallel"}, {"direction", {0.0, 0.0, 1.0}}}));
+  EXPECT_EQ(document["front"], json({{"type", "flat"}, {"z", 0}}));
+  EXPECT_EQ(document["screen"], json({{"centre", {7.5, 5.0, 300.0}},
+                                      {"right", {1.0, 0.0, 0.0}},
+                                      {"up", {0.0, 1.0, 0.0}},
+                                      {"size", {30.0, 20.0}}}));
   EXPECT_EQ(document["ior"], 1.4912345678901234);
   EXPECT_EQ(document["focal_length"], 300.0);
   EXPECT_EQ(document["lens_size"], json({15.0, 10.0}));
@@ -176,7 +181,7 @@ TEST(Lens, TheJsonHasTheFieldsOfTheInterface) {
   EXPECT_EQ(document["metrics"]["facet"]["flux_inside"], 0.999);
   EXPECT_TRUE(document["metrics"]["smooth"]["psnr"].is_null());
   EXPECT_EQ(document["provenance"]["options"]["rounds"], 6);
-  EXPECT_EQ(document.size(), 17U);
+  EXPECT_EQ(document.size(), 19U);
 }
 
 TEST(Lens, ASurfaceThatIsNoGridComesBackWithoutOne) {
@@ -296,13 +301,13 @@ TEST(Lens, AnotherFormatVersionOrUnitIsRefusedWithItsValue) {
 }
 
 TEST(Lens, WhatThisVersionCannotDoYetIsSaid) {
-  EXPECT_EQ(refusal([](json& document) { document["mode"] = "reflect"; }),
-            "field 'mode' is \"reflect\": not supported yet by this version, only \"refract\" is");
+  EXPECT_EQ(refusal([](json& document) { document["mode"] = "scatter"; }),
+            "field 'mode' is \"scatter\": it must be \"refract\" or \"reflect\"");
+  EXPECT_EQ(refusal([](json& document) { document["source"]["type"] = "sun"; }),
+            "field 'source.type' is \"sun\": it must be \"parallel\" or \"point\"");
   EXPECT_EQ(
-      refusal([](json& document) {
-        document["source"] = {{"type", "point"}};
-      }),
-      "field 'source.type' is \"point\": not supported yet by this version, only \"parallel\" is");
+      refusal([](json& document) { document["front"]["type"] = "sphere"; }),
+      "field 'front.type' is \"sphere\": not supported yet by this version, only \"flat\" is");
 }
 
 TEST(Lens, ValuesOutOfRangeAreRefused) {

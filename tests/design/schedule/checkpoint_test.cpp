@@ -205,6 +205,7 @@ nlohmann::json other_value(const OptionField<Options>& row, const Options& optio
   if (row.kind == OptionKind::kWord) {
     return row.words.front() == value ? row.words.back() : row.words.front();
   }
+  if (row.kind == OptionKind::kText) return row.unit == "X,Y,Z" ? "1,2,-3" : "1,2";
   const double now = value.template get<double>();
   const double next = row.kind == OptionKind::kWhole ? now + 1.0 : 1.01 * now + 0.001;
   EXPECT_TRUE(row.limits.hold(next)) << row.name;
@@ -218,6 +219,11 @@ TEST(DesignFingerprint, ChangesWithEveryOption) {
   for (const auto& row : design_fields()) {
     DesignOptions options;
     row.set(options, other_value(row, options));
+    EXPECT_TRUE(seen.insert(design_fingerprint(picture, options)).second) << row.name;
+  }
+  for (const auto& row : light_fields()) {
+    DesignOptions options;
+    row.set(options.light, other_value(row, options.light));
     EXPECT_TRUE(seen.insert(design_fingerprint(picture, options)).second) << row.name;
   }
   for (const auto& row : weight_fields()) {
@@ -248,9 +254,9 @@ TEST(DesignFingerprint, ChangesWithEveryNumberOfTheProcess) {
 }
 
 TEST(DesignFingerprint, EveryMemberOfTheOptionsHasARow) {
-  // Weights have a table of their own, the process is a workshop's; checkpoint and resume say where
-  // and when, not what.
-  constexpr std::size_t kWithoutRow = 4;
+  // Weights and light have tables of their own, the process is a workshop's; checkpoint and resume
+  // say where and when, not what.
+  constexpr std::size_t kWithoutRow = 5;
   EXPECT_EQ(design_fields().size() + kWithoutRow, testing::member_count<DesignOptions>());
   EXPECT_EQ(weight_fields().size(), testing::member_count<ObjectiveWeights>());
 }

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstdint>
+
+#include "core/compute/host_device.h"
+#include "core/optics/image_plane.h"
+#include "core/optics/optical_setup.h"
+
+namespace lensforge {
+
+/// The plane that catches the light, and the pixels of the picture on it.
+///
+/// Notation: p a point that a ray leaves, m its slope (dx/dz, dy/dz), w = (m, 1) its way; c the
+/// picture's centre, e_x and e_y the unit vectors along which the picture's millimetres count, n
+/// their normal, away from the lens; l = p + s w where the ray meets the plane, s = n·(c − p) /
+/// n·w.
+class Screen {
+ public:
+  explicit Screen(const OpticalSetup& setup)
+      : plane_(setup),
+        centre_(setup.screen_centre()),
+        x_(setup.screen_x),
+        y_(setup.screen_y),
+        normal_(setup.screen_x.cross(setup.screen_y)),
+        focal_length_(setup.focal_length),
+        turned_(setup.screen_is_turned() ? 1 : 0) {}
+
+  [[nodiscard]] LF_HD const ImagePlane& plane() const { return plane_; }
+  [[nodiscard]] LF_HD bool turned() const { return turned_ != 0; }
+
+  /// Distance of a point from the plane, mm; negative beyond it.
+  [[nodiscard]] LF_HD double clearance(const Eigen::Vector3d& p) const {
+    return turned() ? normal_.dot(centre_ - p) : focal_length_ - p.z();
+  }
+  /// True if a ray of this slope runs towards the side that is lit.
+  [[nodiscard]] LF_HD bool faces(const Eigen::Vector2d& m) const {
+    return !turned() || normal_.dot(Eigen::Vector3d(m.x(), m.y(), 1.0)) > 0.0;
+  }
+
+  /// Where a ray meets the plane, in pixel coordinates. @pre faces(m).
+  [[nodiscard]] LF_HD Eigen::Vector2d land(const Eigen::Vector3d& p,
+                                           const Eigen::Vector2d& m) const {
+    if (!turned()) {
+      return plane_.to_pixels(Eigen::Vector2d(p.x(), p.y()) + (focal_length_ - p.z()) * m);
+    }
+    const Eigen::Vector3d w(m.x(), m.y(), 1.0);
+    const Eigen::Vector3d from = p - centre_;
+    const Eigen::Vector3d l = from - (normal_.dot(from) / normal_.dot(w)) * w;
+    return plane_.to_pixels(Eigen::Vector2d(centre_.x() + x_.dot(l), centre_.y() + y_.dot(l)));
+  }
+  /// Adjoint of land(): adds to p_bar and m_bar for a given u_bar.
+  LF_HD void land_adjoint(const Eigen::Vector3d& p, const Eigen::Vector2d& m,
+                          const Eigen::Vector2d& u_bar, Eigen::Vector3d& p_bar,
+                          Eigen::Vector2d& m_bar) const {
+    const Eigen::Vector2d mm_bar = plane_.pixels_per_mm().cwiseProduct(u_bar);
+    if (!turned()) {
+      p_bar += Eigen::Vector3d(mm_bar.x(), mm_bar.y(), -m.dot(mm_bar));
+      m_bar += (focal_length_ - p.z()) * mm_bar;
+      return;
+    }
+    const Eigen::Vector3d w(m.x(), m.y(), 1.0);
+    const Eigen::Vector3d l_bar = mm_bar.x() * x_ + mm_bar.y() * y_;
+    const double nw = normal_.dot(w);
+    const double s = normal_.dot(centre_ - p) / nw;
+    // Along the ray nothing moves: both p and w count by what they are across it.
+    const Eigen::Vector3d across = l_bar - (l_bar.dot(w) / nw) * normal_;
+    p_bar += across;
+    m_bar += s * Eigen::Vector2d(across.x(), across.y());
+  }
+
+  /// The point of space at pixel coordinates, mm.
+  [[nodiscard]] Eigen::Vector3d at(const Eigen::Vector2d& pixel) const {
+    const Eigen::Vector2d mm = plane_.to_mm(pixel);
+    if (!turned()) return {mm.x(), mm.y(), focal_length_};
+    return centre_ + (mm.x() - centre_.x()) * x_ + (mm.y() - centre_.y()) * y_;
+  }
+
+ private:
+  ImagePlane plane_;
+  Eigen::Vector3d centre_;
+  Eigen::Vector3d x_;
+  Eigen::Vector3d y_;
+  Eigen::Vector3d normal_;
+  double focal_length_;  ///< z of the plane that is not turned.
+  std::int64_t turned_;  ///< Wide, so that no bytes of a kernel's argument are left unset.
+};
+
+}  // namespace lensforge

@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "core/surface/setup_json.h"
+
+#include <cmath>
+#include <string>
+
+namespace lensforge {
+namespace {
+
+using nlohmann::ordered_json;
+
+/// How far what two keys say may be apart, mm.
+constexpr double kAgreement = 1e-6;
+
+template <class Vector>
+ordered_json array_of(const Vector& vector) {
+  ordered_json array = ordered_json::array();
+  for (const auto& entry : vector) array.push_back(entry);
+  return array;
+}
+
+/// The picture's right along x, as its viewer sees it.
+double right_along_x(const OpticalSetup& setup) {
+  return setup.view == ViewSide::kFront ? -1.0 : 1.0;
+}
+
+ordered_json source_json(const OpticalSetup& setup) {
+  if (!setup.point) return {{"type", "parallel"}, {"direction", array_of(setup.light)}};
+  const bool even = setup.point->emission == Emission::kIsotropic;
+  return {{"type", "point"},
+          {"position", array_of(setup.point->position)},
+          {"emission", even ? "isotropic" : "lambertian"}};
+}
+
+ordered_json screen_json(const OpticalSetup& setup) {
+  const Eigen::Vector3d right = right_along_x(setup) * setup.screen_x;
+  // Adding 0 turns -0 into 0.
+  return {{"centre", array_of(setup.screen_centre())},
+          {"right", array_of(Eigen::Vector3d(right.array() + 0.0))},
+          {"up", array_of(setup.screen_y)},
+          {"size", array_of(setup.image_size)}};
+}
+
+void read_source(const JsonFields& source, OpticalSetup& setup) {
+  const std::string type = source.text("type");
+  if (type == "parallel") {
+    const Eigen::Vector3d usual(0.0, 0.0, 1.0);
+    setup.light = source.has("direction") ? source.number_triple("direction") : usual;
+  } else if (type == "point") {
+    PointSource point{source.number_triple("position"), Emission::kIsotropic};
+    const std::string emission = source.has("emission") ? source.text("emission") : "isotropic";
+    if (emission == "lambertian") {
+      point.emission = Emission::kLambertian;
+    } else if (emission != "isotropic") {
+      source.refuse("emission", R"(it must be "isotropic" or "lambertian")");
+    }
+    setup.point = point;
+  } else {
+    source.refuse("type", R"(it must be "parallel" or "point")");
+  }
+}
+
+void require_flat_front(const JsonFields& front) {
+  if (front.text("type") != "flat") {
+    front.refuse("type", "not supported yet by this version, only \"flat\" is");
+  }
+  if (front.number("z") != 0.0) front.refuse("z", "it must be 0, where the lens begins");
+}
+
+void read_screen(const JsonFields& screen, OpticalSetup& setup) {
+  setup.screen_x = right_along_x(setup) * screen.number_triple("right");
+  setup.screen_y = screen.number_triple("up");
+  setup.focal_length = screen.number_triple("centre").z();
+}
+
+}  // namespace
+
+void require_agreement(const JsonFields& fields, const OpticalSetup& setup) {
+  if (!fields.has("screen")) return;
+  const JsonFields screen = fields.object("screen");
+  const Eigen::Vector3d centre = screen.number_triple("centre");
+  if (!((setup.screen_centre() - centre).norm() <= kAgreement)) {
+    screen.refuse("centre",
+                  "the picture's centre by focal_length, image_origin and image_size is "
+                  "somewhere else");
+  }
+  if (!((screen.number_pair("size") - setup.image_size).norm() <= kAgreement)) {
+    screen.refuse("size", "it must be image_size");
+  }
+}
+
+ordered_json setup_json(const OpticalSetup& setup) {
+  const bool lens = setup.mode == LightMode::kRefract;
+  ordered_json document = {{"mode", lens ? "refract" : "reflect"}};
+  if (!lens && !setup.point) {
+    constexpr double kDegrees = 180.0 / 3.14159265358979323846;
+    document["incidence_deg"] = kDegrees * std::acos(-setup.light.z());
+  }
+  document["source"] = source_json(setup);
+  if (lens) document["front"] = {{"type", "flat"}, {"z", 0}};
+  document["ior"] = setup.ior;
+  if (!setup.screen_is_turned()) document["focal_length"] = setup.focal_length;
+  document["lens_size"] = array_of(setup.lens_size);
+  document["image_size"] = array_of(setup.image_size);
+  document["image_origin"] = array_of(setup.image_origin);
+  document["screen"] = screen_json(setup);
+  document["pixels"] = array_of(setup.pixels);
+  document["view"] = setup.view == ViewSide::kFront ? "front" : "rear";
+  return document;
+}
+
+OpticalSetup read_setup(const JsonFields& fields) {
+  OpticalSetup setup;
+  const std::string mode = fields.text("mode");
+  if (mode == "reflect") {
+    setup.mode = LightMode::kReflect;
+  } else if (mode != "refract") {
+    fields.refuse("mode", R"(it must be "refract" or "reflect")");
+  }
+  read_source(fields.object("source"), setup);
+  if (fields.has("front")) require_flat_front(fields.object("front"));
+  setup.ior = fields.number("ior");
+  setup.lens_size = fields.number_pair("lens_size");
+  setup.image_size = fields.number_pair("image_size");
+  setup.image_origin = fields.number_pair("image_origin");
+  setup.pixels = fields.integer_pair("pixels");
+  const std::string view = fields.text("view");
+  if (view != "front" && view != "rear") fields.refuse("view", R"(it must be "front" or "rear")");
+  setup.view = view == "front" ? ViewSide::kFront : ViewSide::kRear;
+  if (fields.has("screen")) read_screen(fields.object("screen"), setup);
+  if (!setup.screen_is_turned()) setup.focal_length = fields.number("focal_length");
+  return setup;
+}
+
+}  // namespace lensforge

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "core/text/number_list.h"
+
+#include <charconv>
+#include <cmath>
+#include <cstddef>
+
+#include "core/error.h"
+#include "core/text/number_text.h"
+
+namespace lensforge {
+namespace {
+
+std::string_view trimmed(std::string_view text) {
+  const std::size_t first = text.find_first_not_of(' ');
+  if (first == std::string_view::npos) return {};
+  return text.substr(first, text.find_last_not_of(' ') - first + 1);
+}
+
+}  // namespace
+
+std::vector<double> parse_numbers(std::string_view text, const std::string& name, int count) {
+  const auto refuse = [&] {
+    std::string example = "0";
+    for (int k = 1; k < count; ++k) example += ",0";
+    throw InputError(name + " " + std::string(text) + ": must be " + std::to_string(count) +
+                     " finite numbers with commas between them, such as " + example);
+  };
+  std::vector<double> numbers;
+  for (std::string_view rest = text;;) {
+    const std::size_t comma = rest.find(',');
+    const std::string_view word = trimmed(rest.substr(0, comma));
+    double value = 0.0;
+    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+    if (error != std::errc() || end != word.data() + word.size() || !std::isfinite(value)) refuse();
+    numbers.push_back(value);
+    if (comma == std::string_view::npos) break;
+    rest.remove_prefix(comma + 1);
+  }
+  if (numbers.size() != static_cast<std::size_t>(count)) refuse();
+  return numbers;
+}
+
+std::string numbers_text(std::span<const double> numbers) {
+  std::string text;
+  for (const double number : numbers) {
+    if (!text.empty()) text += ',';
+    text += shortest_text(number);
+  }
+  return text;
+}
+
+}  // namespace lensforge

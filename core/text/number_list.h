@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace lensforge {
+
+/// Reads numbers that are separated by commas, such as "50,50,-600"; spaces around them are
+/// allowed.
+/// @param name  what to call the value in the error, e.g. "--image-offset".
+/// @throw InputError unless there are `count` finite numbers.
+std::vector<double> parse_numbers(std::string_view text, const std::string& name, int count);
+
+/// The shortest text from which parse_numbers() reads the same numbers.
+std::string numbers_text(std::span<const double> numbers);
+
+}  // namespace lensforge

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+
+#include "core/optics/optical_setup.h"
+
+namespace lensforge {
+
+/// Of a screen, degrees from the lens's plane, and of light on a mirror: beyond it light grazes.
+inline constexpr double kMaxTilt = 80.0;
+/// Of a picture on a screen, mm: up to a kilometre.
+inline constexpr double kMinImageWidth = 1e-3;
+inline constexpr double kMaxImageWidth = 1e6;
+
+enum class SourceKind { kParallel, kPoint };
+
+/// What lights the surface, what that does to the light, and where the picture is.
+struct LightOptions {
+  LightMode mode = LightMode::kRefract;
+  double incidence = 0.0;  ///< Of parallel light on a mirror, degrees from its z axis, in x.
+  SourceKind source = SourceKind::kParallel;
+  std::optional<Eigen::Vector3d> source_position;  ///< Of a point source, mm, lens frame.
+  Emission emission = Emission::kIsotropic;        ///< Of a point source.
+  double image_width = 0.0;                        ///< Picture on the screen, mm; 0: the lens's.
+  /// From where a flat surface's chief ray meets the screen to the picture's centre, mm along the
+  /// lens's x and y.
+  Eigen::Vector2d image_offset{0.0, 0.0};
+  /// Turns of the screen by the right-hand rule, degrees: about the picture's right, then its up.
+  Eigen::Vector2d screen_tilt{0.0, 0.0};
+};
+
+}  // namespace lensforge

@@ -1,0 +1,198 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "design/light_setup.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <numbers>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/error.h"
+#include "core/optics/light_path.h"
+#include "core/text/number_list.h"
+#include "core/text/number_text.h"
+
+namespace lensforge {
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180.0;
+
+/// What is proposed for a source that stands wrong: as far away as the paper's pictures.
+constexpr double kUsualDistance = 600.0;
+/// And for a mirror's light (Sun et al., Table 1).
+constexpr double kUsualIncidence = 30.0;
+
+std::string text_of(const Eigen::Vector3d& v) { return numbers_text(std::span(v.data(), 3)); }
+std::string text_of(const Eigen::Vector2d& v) { return numbers_text(std::span(v.data(), 2)); }
+
+[[noreturn]] void refuse(const std::string& what, const std::string& rule) {
+  throw InputError(what + ": " + rule);
+}
+
+bool is_mirror(const DesignOptions& o) { return o.light.mode == LightMode::kReflect; }
+
+/// A source above or below the middle of the lens, beside the light's way back from a mirror.
+std::string usual_position(const DesignOptions& o, const Eigen::Vector2d& size) {
+  if (!is_mirror(o)) return text_of(Eigen::Vector3d(size.x() / 2, size.y() / 2, -kUsualDistance));
+  const double height = std::round(0.5 * o.focal_length);
+  return text_of(Eigen::Vector3d(-std::round(height * std::tan(kUsualIncidence * kDegree)),
+                                 size.y() / 2, height));
+}
+
+Eigen::Vector2d lens_size(const DesignOptions& o, const Eigen::Vector2i& pixels) {
+  return {o.width, o.width * pixels.y() / pixels.x()};
+}
+
+void require_point(const DesignOptions& o, const Eigen::Vector2d& size) {
+  const std::string usual = "--source-position " + usual_position(o, size) + " would do";
+  if (!o.light.source_position) refuse("--source point", "needs a place; " + usual);
+  const std::string given = "--source-position " + text_of(*o.light.source_position);
+  if (!o.light.source_position->allFinite()) refuse(given, "must be finite; " + usual);
+  const double z = o.light.source_position->z();
+  if (!is_mirror(o) && !(z < 0.0)) {
+    refuse(given,
+           "z must be below 0, where the lens begins and beyond which the screen stands; " + usual);
+  }
+  if (is_mirror(o) && !(z > o.thickness)) {
+    refuse(given,
+           "z must be above the mirror's surface, " + number_text(o.thickness) + " mm; " + usual);
+  }
+  if (is_mirror(o) && o.light.incidence != 0.0) {
+    refuse("--incidence " + number_text(o.light.incidence),
+           "is of parallel light; leave it out with --source point");
+  }
+}
+
+void require_source(const DesignOptions& o, const Eigen::Vector2d& size) {
+  if (!is_mirror(o) && o.light.incidence != 0.0) {
+    refuse("--incidence " + number_text(o.light.incidence), "needs --mode reflect, or must be 0");
+  }
+  if (o.light.source == SourceKind::kPoint) return require_point(o, size);
+  if (o.light.source_position) {
+    refuse("--source-position " + text_of(*o.light.source_position), "needs --source point");
+  }
+  if (o.light.emission != Emission::kIsotropic) {
+    refuse("--emission lambertian", "needs --source point");
+  }
+  if (is_mirror(o) && !(o.light.incidence > 0.0)) {
+    refuse("--mode reflect",
+           "needs light from the side, or the screen is in its way; --incidence " +
+               number_text(kUsualIncidence) + " would do");
+  }
+}
+
+/// Turns the screen's vectors.
+void tilt_screen(const Eigen::Vector2d& degrees, OpticalSetup& setup) {
+  if (degrees.isZero()) return;
+  const double side = setup.view == ViewSide::kFront ? -1.0 : 1.0;  // The picture's right along x.
+  Eigen::Vector3d right(side, 0.0, 0.0);
+  const Eigen::Vector3d up =
+      Eigen::AngleAxisd(degrees.x() * kDegree, right) * Eigen::Vector3d::UnitY();
+  right = Eigen::AngleAxisd(degrees.y() * kDegree, up) * right;
+  setup.screen_x = side * right;
+  setup.screen_y = up;
+}
+
+double tilt_of(const Eigen::Vector2d& degrees) {
+  return std::acos(std::cos(degrees.x() * kDegree) * std::cos(degrees.y() * kDegree)) / kDegree;
+}
+
+void require_tilt(const Eigen::Vector2d& tilt) {
+  const double limit = kMaxTilt + 1e-9;
+  if (tilt.allFinite() && tilt.cwiseAbs().maxCoeff() <= limit && tilt_of(tilt) <= limit) return;
+  refuse(
+      "--screen-tilt " + text_of(tilt),
+      "must turn the screen by at most " + number_text(kMaxTilt) + " degrees in all; 0,0 would do");
+}
+
+/// What must be above 0: heights of the picture's corners over the surface, and distances of the
+/// lens's corners before the screen.
+std::vector<double> clearances(const OpticalSetup& setup, double thickness) {
+  std::vector<double> all;
+  const LightPath light(setup);
+  for (const double x : {0.0, 1.0}) {
+    for (const double y : {0.0, 1.0}) {
+      const Eigen::Vector2d offset =
+          setup.image_size.cwiseProduct(Eigen::Vector2d(x - 0.5, y - 0.5));
+      all.push_back(setup.focal_length + offset.x() * setup.screen_x.z() +
+                    offset.y() * setup.screen_y.z() - thickness);
+      all.push_back(light.clearance({x * setup.lens_size.x(), y * setup.lens_size.y(), thickness}));
+    }
+  }
+  if (setup.point && setup.mode == LightMode::kReflect) {
+    all.push_back(light.clearance(setup.point->position));
+  }
+  return all;
+}
+
+/// All of them are linear in the focal length.
+void require_screen_beyond(const DesignOptions& o, const OpticalSetup& setup) {
+  const std::vector<double> here = clearances(setup, o.thickness);
+  if (std::all_of(here.begin(), here.end(), [](double c) { return c > 0.0; })) return;
+  const std::vector<double> farther =
+      clearances(at_focal_length(setup, setup.focal_length + 1.0, o.thickness), o.thickness);
+  double needed = setup.focal_length;
+  for (std::size_t k = 0; k < here.size(); ++k) {
+    const double gain = farther[k] - here[k];
+    if (here[k] <= 0.0 && !(gain > 0.0)) {
+      refuse("--screen-tilt " + text_of(o.light.screen_tilt),
+             "turns the screen away from the light; --screen-tilt 0,0 would do");
+    }
+    if (here[k] <= 0.0) needed = std::max(needed, setup.focal_length - here[k] / gain);
+  }
+  const bool tilted = setup.screen_is_turned();
+  const std::string what = tilted ? "--screen-tilt " + text_of(o.light.screen_tilt)
+                                  : "--focal " + number_text(o.focal_length);
+  refuse(what, std::string("the screen must stand wholly beyond the surface") +
+                   (setup.point && is_mirror(o) ? " and the source" : "") + "; --focal " +
+                   number_text(std::ceil(1.1 * needed)) + "mm would do");
+}
+
+}  // namespace
+
+OpticalSetup optical_setup(const DesignOptions& options, const Eigen::Vector2i& pixels) {
+  OpticalSetup setup;
+  setup.mode = options.light.mode;
+  setup.ior = options.ior;
+  setup.focal_length = options.focal_length;
+  setup.lens_size = lens_size(options, pixels);
+  setup.image_size = setup.lens_size;
+  if (options.light.image_width > 0.0)
+    setup.image_size *= options.light.image_width / options.width;
+  setup.pixels = pixels;
+  setup.view = options.view;
+  if (options.light.source == SourceKind::kPoint) {
+    setup.point = PointSource{options.light.source_position.value(), options.light.emission};
+  } else if (is_mirror(options)) {
+    setup.light = {std::sin(options.light.incidence * kDegree), 0.0,
+                   -std::cos(options.light.incidence * kDegree)};
+  }
+  const Eigen::Vector2d chief =
+      (options.focal_length - options.thickness) * LightPath(setup).chief_slope(options.thickness);
+  setup.image_origin =
+      0.5 * (setup.lens_size - setup.image_size) + chief + options.light.image_offset;
+  tilt_screen(options.light.screen_tilt, setup);
+  return setup;
+}
+
+OpticalSetup at_focal_length(OpticalSetup setup, double focal_length, double thickness) {
+  setup.image_origin +=
+      (focal_length - setup.focal_length) * LightPath(setup).chief_slope(thickness);
+  setup.focal_length = focal_length;
+  return setup;
+}
+
+void require_light(const DesignOptions& options, const Eigen::Vector2i& pixels) {
+  require_source(options, lens_size(options, pixels));
+  require_tilt(options.light.screen_tilt);
+  if (!options.light.image_offset.allFinite()) {
+    refuse("--image-offset " + text_of(options.light.image_offset), "must be finite; 0,0 would do");
+  }
+  const OpticalSetup setup = optical_setup(options, pixels);
+  require_screen_beyond(options, setup);
+}
+
+}  // namespace lensforge

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "core/surface/setup_json.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/error.h"
+#include "core/temp_folder.h"
+
+namespace lensforge {
+namespace {
+
+using nlohmann::json;
+using ::testing::HasSubstr;
+using testing::message_of;
+
+OpticalSetup written_and_read(const OpticalSetup& setup) {
+  const json document = json::parse(setup_json(setup).dump());
+  const JsonFields fields(document, "lens.json");
+  OpticalSetup read = read_setup(fields);
+  validate(read);
+  require_agreement(fields, read);
+  return read;
+}
+
+TEST(SetupJson, EveryLightAndScreenComesBackToTheBit) {
+  OpticalSetup setup;
+  EXPECT_EQ(written_and_read(setup), setup);
+  setup.screen_x = Eigen::Vector3d(0.8, 0.0, 0.6);
+  setup.image_origin = {-12.3, 0.1};
+  EXPECT_EQ(written_and_read(setup), setup);
+  setup.view = ViewSide::kRear;
+  setup.point = PointSource{{1.0, 2.0, -30.1}, Emission::kLambertian};
+  EXPECT_EQ(written_and_read(setup), setup);
+  setup.mode = LightMode::kReflect;
+  setup.point->position.z() = 30.1;
+  EXPECT_EQ(written_and_read(setup), setup);
+  setup.point.reset();
+  setup.light = Eigen::Vector3d(0.6, 0.0, -0.8);
+  EXPECT_EQ(written_and_read(setup), setup);
+}
+
+TEST(SetupJson, ATiltedScreenHasNoFocalLength) {
+  OpticalSetup setup;
+  EXPECT_TRUE(setup_json(setup).contains("focal_length"));
+  setup.screen_y = Eigen::Vector3d(0.0, 0.8, 0.6);
+  EXPECT_FALSE(setup_json(setup).contains("focal_length"));
+}
+
+TEST(SetupJson, AFileWithoutAScreenHasOneParallelToTheLens) {
+  json document = json::parse(setup_json(OpticalSetup{}).dump());
+  document.erase("screen");
+  document.erase("front");
+  document["source"] = {{"type", "parallel"}};
+  EXPECT_EQ(read_setup(JsonFields(document, "lens.json")), OpticalSetup{});
+}
+
+TEST(SetupJson, WhatCannotBeIsRefusedWithItsField) {
+  const auto refusal = [](const char* pointer, const json& value) {
+    json document = json::parse(setup_json(OpticalSetup{}).dump());
+    document[json::json_pointer(pointer)] = value;
+    return message_of<InputError>([&] {
+      const JsonFields fields(document, "lens.json");
+      const OpticalSetup setup = read_setup(fields);
+      validate(setup);
+      require_agreement(fields, setup);
+    });
+  };
+  EXPECT_THAT(refusal("/screen/up", {0.0, 2.0, 0.0}), HasSubstr("screen.up is "));
+  EXPECT_THAT(refusal("/screen/up", {0.0, -1.0, 0.0}), HasSubstr("faces the lens"));
+  EXPECT_THAT(refusal("/screen/centre", {51.0, 50.0, 300.0}), HasSubstr("screen.centre"));
+  EXPECT_THAT(refusal("/screen/size", {1.0, 2.0}), HasSubstr("screen.size"));
+  EXPECT_THAT(refusal("/front/z", 3.0), HasSubstr("front.z"));
+  EXPECT_THAT(refusal("/source/type", "sun"), HasSubstr("source.type"));
+  EXPECT_THAT(refusal("/mode", "reflect"), HasSubstr("light is "));
+}
+
+}  // namespace
+}  // namespace lensforge

@@ -1,0 +1,272 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Light of other kinds than parallel light along +z goes through transport, objective, optimisation
+// and rendering without a word of theirs about it: LightPath answers.
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "core/optics/light_path.h"
+#include "design/energy/objective.h"
+#include "design/finite_difference.h"
+#include "design/objective_setups.h"
+#include "design/render_lens.h"
+#include "design/schedule/crease_alignment.h"
+#include "design/schedule/face_transport.h"
+#include "design/schedule/guided_optimization.h"
+#include "design/schedule/reach.h"
+#include "design/snell.h"
+#include "design/transport/vertex_spread.h"
+
+namespace lensforge {
+namespace {
+
+using testing::Random;
+
+/// A kind of light and a screen for it.
+struct KindOfLight {
+  const char* name;
+  void (*apply)(OpticalSetup&);
+};
+
+void light_from_the_side(OpticalSetup& setup) {
+  setup.light = Eigen::Vector3d(0.25, -0.15, 1.0).normalized();
+}
+void turn_screen(OpticalSetup& setup) {
+  const Eigen::Matrix3d turn = (Eigen::AngleAxisd(0.5, Eigen::Vector3d::UnitX()) *
+                                Eigen::AngleAxisd(-0.2, Eigen::Vector3d::UnitY()))
+                                   .toRotationMatrix();
+  setup.screen_x = turn.col(0);
+  setup.screen_y = turn.col(1);
+}
+void large_turned_screen(OpticalSetup& setup) {
+  turn_screen(setup);
+  setup.image_size *= 1.3;
+}
+void point_source(OpticalSetup& setup) {
+  setup.point = PointSource{{0.5 * setup.lens_size.x() + 5.0, 0.5 * setup.lens_size.y(), -150.0},
+                            Emission::kLambertian};
+}
+void mirror(OpticalSetup& setup) {
+  setup.mode = LightMode::kReflect;
+  setup.light = Eigen::Vector3d(0.5, 0.0, -std::sqrt(0.75));
+}
+void lit_mirror(OpticalSetup& setup) {
+  setup.mode = LightMode::kReflect;
+  setup.point = PointSource{{-90.0, 0.5 * setup.lens_size.y(), 150.0}, Emission::kIsotropic};
+}
+
+/// The same lens in another light, its picture moved to where that goes.
+OpticalSetup lit_by(const KindOfLight& kind, OpticalSetup setup) {
+  kind.apply(setup);
+  const Eigen::Vector2d middle =
+      0.5 * setup.lens_size + (setup.focal_length - 5.0) * LightPath(setup).chief_slope(5.0);
+  setup.image_origin = middle - 0.5 * setup.image_size;
+  return setup;
+}
+
+constexpr KindOfLight kKinds[] = {{"Oblique", light_from_the_side},
+                                  {"TurnedScreen", large_turned_screen},
+                                  {"Point", point_source},
+                                  {"Mirror", mirror},
+                                  {"PointOnMirror", lit_mirror}};
+
+using Case = std::tuple<KindOfLight, SurfaceModel>;
+
+class OtherLight : public ::testing::TestWithParam<Case> {
+ protected:
+  [[nodiscard]] static const KindOfLight& kind() { return std::get<0>(GetParam()); }
+  [[nodiscard]] static SurfaceModel model() { return std::get<1>(GetParam()); }
+};
+
+INSTANTIATE_TEST_SUITE_P(Kinds, OtherLight,
+                         ::testing::Combine(::testing::ValuesIn(kKinds),
+                                            ::testing::ValuesIn(testing::kModels)),
+                         [](const auto& one) {
+                           return std::get<0>(one.param).name + std::string("_") +
+                                  model_name(std::get<1>(one.param));
+                         });
+
+/// Where the light of a flat mesh's faces is to go, after the mesh has been fitted to it.
+Correspondence transport(const OpticalSetup& setup, SurfaceModel model, const Image& target,
+                         SurfaceMesh& mesh) {
+  const Executor executor = Executor::cpu(2);
+  const FaceLight even = face_light(mesh, setup, model, executor);
+  const TransportResult result = transport_faces(even, target, {}, executor, RunControl());
+  const Eigen::VectorXd served = favour_dark({mesh, result.lit_areas}, setup);
+  const SurfaceMesh flat = mesh;
+  EXPECT_TRUE(spread_vertices({flat, served}, 0.7, setup, executor, RunControl(), mesh));
+  const BrenierMap map(even.landing, result, target);
+  align_to_creases(map, setup, mesh);
+  const FaceLight light = face_light(mesh, setup, model, executor);
+  return {map_faces(light, map, executor), light.flux};
+}
+
+/// What a small lens throws that is designed for `setup`.
+ImageMetrics designed(const OpticalSetup& setup, SurfaceModel model) {
+  const Image target = testing::spot_picture(setup.pixels.x(), setup.pixels.y());
+  SurfaceMesh mesh = make_grid_mesh(setup.lens_size, {41, 47}, 5.0);
+  const Executor executor = Executor::cpu(2);
+  const Correspondence wanted = transport(setup, model, target, mesh);
+  aim_surface(wanted, setup, 5.0, executor, mesh);
+  ObjectiveOptions options;
+  options.model = model;
+  options.weights.smooth = default_smoothness(model);
+  options.nu = 3.0 * 40.0 / setup.pixels.x() / LightPath(setup).reach(1.0);
+  options.area = default_area_barrier(setup, mesh.triangle_count());
+  GuidedOptimization stage(mesh, setup, target, options, executor);
+  LbfgsOptions optimizer;
+  optimizer.max_iterations = 100;
+  const LbfgsSummary summary = stage.run(
+      optimizer, [](int, const ObjectiveEvaluation&) { return true; }, mesh);
+  EXPECT_NE(summary.status, LbfgsSummary::Status::kInfeasibleStart) << summary.message;
+  return evaluate(mesh, setup, model, target, nullptr, executor);
+}
+
+TEST_P(OtherLight, DesignsConvergeAsThoseForLightAlongZ) {
+  const OpticalSetup straight = testing::setup_of({25.0, 25.0}, {32, 32}, 100.0);
+  const ImageMetrics other = designed(lit_by(kind(), straight), model());
+  RecordProperty("mae", std::to_string(other.mae));
+  RecordProperty("flux_inside", std::to_string(other.flux_inside));
+  // Light along z: below 0.001 with both models.
+  EXPECT_LT(other.mae, 0.003);
+  EXPECT_GT(other.flux_inside, 0.99);
+}
+
+TEST_P(OtherLight, ObjectiveGradientEqualsCentralDifferences) {
+  const OpticalSetup setup = lit_by(kind(), testing::kSetup);
+  const SurfaceMesh mesh = testing::rough_mesh();
+  DesignObjective objective(mesh, setup, testing::target(), testing::options_of(model(), {}),
+                            Executor::serial());
+  Eigen::Matrix3Xd gradient;
+  ASSERT_TRUE(objective.evaluate(mesh.vertices, gradient).feasible);
+  const auto f = [&](const Eigen::VectorXd& x) {
+    return testing::evaluate_at(objective, x.reshaped(3, gradient.cols())).energy.total;
+  };
+  Random random(3);
+  Eigen::Matrix3Xd direction = objective.movable();
+  for (double& d : direction.reshaped()) d *= random.between(-1.0, 1.0);
+  const Eigen::VectorXd products = gradient.cwiseProduct(direction).reshaped();
+  const double scale = std::max(std::fabs(products.sum()), products.norm());
+  std::vector<double> errors;
+  for (const double step : {1e-4, 1e-5, 2e-6, 5e-7, 1e-7}) {
+    const double slope =
+        testing::directional_slope(f, mesh.vertices.reshaped(), direction.reshaped(), step);
+    errors.push_back(std::fabs(slope - products.sum()) / scale);
+  }
+  EXPECT_LT(testing::plateau_error(errors), 1e-6);
+}
+
+/// Where a ray meets a triangle, on either side of its origin.
+std::optional<double> hit(const Corners& t, const Eigen::Vector3d& origin,
+                          const Eigen::Vector3d& a) {
+  Eigen::Matrix3d sides;
+  sides << t.v1 - t.v0, t.v2 - t.v0, -a;
+  const Eigen::Vector3d s = sides.inverse() * (origin - t.v0);
+  if (s.x() < 0.0 || s.y() < 0.0 || s.x() + s.y() > 1.0) return std::nullopt;
+  return s.z();
+}
+
+/// A ray that reaches z = 0, and the light that it stands for.
+struct SourceRay {
+  Eigen::Vector3d place;
+  Eigen::Vector3d way;
+  double light;
+};
+
+SourceRay source_ray(const OpticalSetup& setup, const Eigen::Vector3d& place) {
+  if (!setup.point) return {place, setup.light, 1.0};
+  const Eigen::Vector3d from = place - setup.point->position;
+  const Eigen::Vector3d way = from.normalized();
+  const Eigen::Vector3d middle(0.5 * setup.lens_size.x(), 0.5 * setup.lens_size.y(), 0.0);
+  const bool even = setup.point->emission == Emission::kIsotropic;
+  const double intensity = even ? 1.0 : way.dot((middle - setup.point->position).normalized());
+  return {place, way, intensity * std::abs(way.z()) / from.squaredNorm()};
+}
+
+struct TracedPicture {
+  std::vector<double> flux;
+  double whole = 0.0;
+  double squares = 0.0;  ///< Sum of the squares of what the rays stand for.
+  int shadowed = 0;      ///< Rays that meet the surface a second time.
+};
+
+/// Flux per pixel by single rays, apart from LightPath: they enter the flat face and are refracted
+/// by angles, or go straight on, meet a facet, and are refracted or reflected there.
+TracedPicture traced(const SurfaceMesh& mesh, const OpticalSetup& setup, int rays) {
+  const bool lens = setup.mode == LightMode::kRefract;
+  const Eigen::Vector3d normal = setup.screen_x.cross(setup.screen_y);
+  const ImagePlane plane(setup);
+  TracedPicture picture;
+  picture.flux.assign(static_cast<std::size_t>(setup.pixels.prod()), 0.0);
+  Random random(9);
+  const double margin = 5.0;  // mm; the surface is lit from beside its own place, too.
+  for (int ray = 0; ray < rays; ++ray) {
+    const Eigen::Vector3d place(random.between(-margin, setup.lens_size.x() + margin),
+                                random.between(-margin, setup.lens_size.y() + margin), 0.0);
+    const SourceRay source = source_ray(setup, place);
+    const Eigen::Vector3d a =
+        lens ? testing::refract_by_angles(source.way, Eigen::Vector3d::UnitZ(), 1.0 / setup.ior)
+             : source.way;
+    for (Eigen::Index f = 0; f < mesh.triangles.cols(); ++f) {
+      const Corners t = mesh.corners(f);
+      const std::optional<double> way = hit(t, place, a);
+      if (!way) continue;
+      picture.whole += source.light;
+      picture.squares += source.light * source.light;
+      const Eigen::Vector3d n = area_normal(t).normalized();
+      const Eigen::Vector3d b = lens ? testing::refract_by_angles(a, n, setup.ior)
+                                     : Eigen::Vector3d(a - 2.0 * n.dot(a) * n);
+      const Eigen::Vector3d p = place + *way * a;
+      for (Eigen::Index g = 0; g < mesh.triangles.cols(); ++g) {
+        if (g != f && hit(mesh.corners(g), p, b).value_or(0.0) > 1e-9) ++picture.shadowed;
+      }
+      const Eigen::Vector3d to_centre = setup.screen_centre() - p;
+      const Eigen::Vector3d l = normal.dot(to_centre) / normal.dot(b) * b - to_centre;
+      const Eigen::Vector2d u =
+          plane.to_pixels(setup.screen_centre().head<2>() +
+                          Eigen::Vector2d(setup.screen_x.dot(l), setup.screen_y.dot(l)));
+      if (u.minCoeff() < 0.0 || u.x() >= plane.columns() || u.y() >= plane.rows()) break;
+      picture.flux[static_cast<std::size_t>(static_cast<int>(u.y()) * plane.columns() +
+                                            static_cast<int>(u.x()))] += source.light;
+      break;
+    }
+  }
+  return picture;
+}
+
+class OtherRays : public ::testing::TestWithParam<KindOfLight> {};
+
+INSTANTIATE_TEST_SUITE_P(Kinds, OtherRays, ::testing::ValuesIn(kKinds),
+                         [](const auto& one) -> std::string { return one.param.name; });
+
+TEST_P(OtherRays, FacetPictureIsThatOfSingleRays) {
+  const OpticalSetup setup = lit_by(GetParam(), testing::setup_of({24.0, 20.0}, {12, 10}, 60.0));
+  const SurfaceMesh mesh = testing::height_field({24.0, 20.0}, {13, 13}, [](double x, double y) {
+    return 5.0 + 0.15 * std::sin(0.4 * x) * std::cos(0.3 * y);
+  });
+  const TracedPicture rays = traced(mesh, setup, 60000);
+  EXPECT_EQ(rays.shadowed, 0);
+  const RenderResult rendered =
+      render_surface(mesh, setup, SurfaceModel::kFacet, Executor::serial());
+  double chi_square = 0.0;
+  for (std::size_t i = 0; i < rays.flux.size(); ++i) {
+    const double expected =
+        static_cast<double>(rendered.image.values()[i]) / static_cast<double>(rays.flux.size());
+    const double difference = rays.flux[i] / rays.whole - expected;
+    const double variance = expected * rays.squares / (rays.whole * rays.whole);
+    chi_square += difference * difference / std::max(variance, 1e-12);
+  }
+  // 120 pixels: mean 120, five standard deviations of 15.5 above it.
+  EXPECT_LT(chi_square, 200.0);
+  EXPECT_GT(chi_square, 60.0);
+}
+
+}  // namespace
+}  // namespace lensforge
