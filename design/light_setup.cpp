@@ -4,7 +4,6 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <numbers>
 #include <span>
 #include <string>
@@ -24,6 +23,10 @@ constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr double kUsualDistance = 600.0;
 /// And for a mirror's light (Sun et al., Table 1).
 constexpr double kUsualIncidence = 30.0;
+
+/// Least width of a picture in lens widths: at a hundredth two thirds of a draft's light are on the
+/// picture (16² portrait; 95 % at a tenth), at a hundred-thousandth none.
+constexpr double kLeastMagnification = 0.01;
 
 std::string text_of(const Eigen::Vector3d& v) { return numbers_text(std::span(v.data(), 3)); }
 std::string text_of(const Eigen::Vector2d& v) { return numbers_text(std::span(v.data(), 2)); }
@@ -50,9 +53,11 @@ void require_point(const DesignOptions& o, const Eigen::Vector2d& size) {
   const std::string usual = "--source-position " + usual_position(o, size) + " would do";
   if (!o.light.source_position) refuse("--source point", "needs a place; " + usual);
   const std::string given = "--source-position " + text_of(*o.light.source_position);
-  if (!o.light.source_position->allFinite()) refuse(given, "must be finite; " + usual);
+  if (!(o.light.source_position->cwiseAbs().maxCoeff() <= kMaxFocalLength)) {
+    refuse(given, "must be at most " + number_text(kMaxFocalLength) + " mm away; " + usual);
+  }
   const double z = o.light.source_position->z();
-  if (!is_mirror(o) && !(z < 0.0)) {
+  if (!is_mirror(o) && !(z <= -kMinThickness)) {
     refuse(given,
            "z must be below 0, where the lens begins and beyond which the screen stands; " + usual);
   }
@@ -106,6 +111,43 @@ void require_tilt(const Eigen::Vector2d& tilt) {
   refuse(
       "--screen-tilt " + text_of(tilt),
       "must turn the screen by at most " + number_text(kMaxTilt) + " degrees in all; 0,0 would do");
+}
+
+void require_picture(const DesignOptions& o) {
+  const Eigen::Vector2d& offset = o.light.image_offset;
+  if (!(offset.cwiseAbs().maxCoeff() <= kMaxImageWidth)) {
+    refuse("--image-offset " + text_of(offset),
+           "must be at most " + number_text(kMaxImageWidth) + " mm; 0,0 would do");
+  }
+  const double least = kLeastMagnification * o.width;
+  if (o.light.image_width > 0.0 && o.light.image_width < least) {
+    refuse(
+        "--image-width " + number_text(o.light.image_width),
+        "must be at least a hundredth of the lens's width; " + number_text(least) + "mm would do");
+  }
+}
+
+/// True if a surface can send the light of its middle to the picture's centre.
+bool reaches_centre(const OpticalSetup& setup, double thickness) {
+  const LightPath light(setup);
+  const Eigen::Vector3d p(0.5 * setup.lens_size.x(), 0.5 * setup.lens_size.y(), thickness);
+  const Eigen::Vector2d centre = 0.5 * setup.pixels.cast<double>();
+  const Eigen::Vector2d gradient = light.gradient_for(p, centre);
+  const Eigen::Vector3d n = Eigen::Vector3d(-gradient.x(), -gradient.y(), 1.0).normalized();
+  return gradient.allFinite() && light.transmits(p, n) &&
+         (light.land(p, light.beam(p, n).m) - centre).norm() < 1.0;
+}
+
+void require_reach(const DesignOptions& o, const OpticalSetup& setup) {
+  if (reaches_centre(setup, o.thickness)) return;
+  for (double focal = 2.0 * setup.focal_length; focal <= kMaxFocalLength; focal *= 2.0) {
+    if (!reaches_centre(at_focal_length(setup, focal, o.thickness), o.thickness)) continue;
+    refuse("--focal " + number_text(o.focal_length),
+           "no surface bends the light so far as to the picture's centre; --focal " +
+               number_text(focal) + "mm would do");
+  }
+  refuse("--image-offset " + text_of(o.light.image_offset),
+         "no surface bends the light so far; 0,0 would do");
 }
 
 /// What must be above 0: heights of the picture's corners over the surface, and distances of the
@@ -188,11 +230,10 @@ OpticalSetup at_focal_length(OpticalSetup setup, double focal_length, double thi
 void require_light(const DesignOptions& options, const Eigen::Vector2i& pixels) {
   require_source(options, lens_size(options, pixels));
   require_tilt(options.light.screen_tilt);
-  if (!options.light.image_offset.allFinite()) {
-    refuse("--image-offset " + text_of(options.light.image_offset), "must be finite; 0,0 would do");
-  }
+  require_picture(options);
   const OpticalSetup setup = optical_setup(options, pixels);
   require_screen_beyond(options, setup);
+  require_reach(options, setup);
 }
 
 }  // namespace lensforge

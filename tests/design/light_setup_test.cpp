@@ -97,6 +97,19 @@ TEST(LightSetup, OptionsOfAnotherLightAreRefused) {
               AllOf(StartsWith("--mode reflect"), HasSubstr("--incidence 30 would do")));
 }
 
+TEST(LightSetup, APictureOutOfReachIsRefused) {
+  EXPECT_THAT(refusal([](DesignOptions& o) {
+                o.light.image_offset = {900.0, 0.0};
+              }),
+              AllOf(StartsWith("--focal 300: "), HasSubstr("would do")));
+  EXPECT_THAT(refusal([](DesignOptions& o) {
+                o.light.image_offset = {1e300, 0.0};
+              }),
+              StartsWith("--image-offset "));
+  EXPECT_THAT(refusal([](DesignOptions& o) { o.light.image_width = 0.5; }),
+              AllOf(StartsWith("--image-width 0.5: "), HasSubstr("1mm would do")));
+}
+
 TEST(LightSetup, AScreenThatNoLightReachesIsRefusedWithOneThatWorks) {
   EXPECT_THAT(refusal([](DesignOptions& o) {
                 o.light.screen_tilt = {0.0, 81.0};
