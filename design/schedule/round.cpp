@@ -60,6 +60,7 @@ void start_from_transport(const LevelSite& site, Checkpoint& state) {
     state.mesh = aimed->mesh;
   } else {
     state.transporting = false;
+    site.log.ended_early("transport", "it found no place for the light");
   }
   relax(site, state.mesh);
   if (aimed && first && !std::isfinite(site.stage.value(state.mesh))) {
