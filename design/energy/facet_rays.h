@@ -15,6 +15,8 @@ namespace lensforge {
 
 /// What kernels ask. @pre frames are up to date.
 struct FacetRays {
+  std::int64_t nothing = 0;  ///< Without it bytes of a kernel's argument would be left unset.
+
   [[nodiscard]] LF_HD ImageTriangle image(const ObjectiveView& o, std::int64_t face) const {
     const Corners t = o.corners(face);
     return project_facet(t, o.light.facet_beam(t, o.scratch.frames[face].n), o.light);

@@ -23,8 +23,8 @@ AreaBarrier default_area_barrier(const OpticalSetup& setup, std::int64_t triangl
 struct ObjectiveOptions {
   ObjectiveWeights weights;
   SurfaceModel model = SurfaceModel::kFacet;
-  std::optional<MadeBy> made_by;  ///< Of a spline: what its surface becomes; else it is as it is.
   int samples = 1;                ///< Of a spline: rays a knot cell each way, ≥ 1.
+  std::optional<MadeBy> made_by;  ///< Of a spline: what its surface becomes; else it is as it is.
   double nu = 1.0;                ///< ν of the Welsch function, 1/mm, > 0.
   AreaBarrier area{1e-6, 5e-6};   ///< mm²
 };
