@@ -146,8 +146,8 @@ std::uint64_t design_fingerprint(const Image& target, const DesignOptions& optio
   description.push_back(weights);
   if (options.made_by) {
     const MadeBy& made = *options.made_by;
-    description.push_back({made.pitch, made.rows_along_x, made.polish_sigma, made.rim_depth,
-                           made.rim_length});
+    description.push_back(
+        {made.pitch, made.rows_along_x, made.polish_sigma, made.rim_depth, made.rim_length});
   }
   Hash hash;
   hash.add(description.dump());
