@@ -93,9 +93,8 @@ void write_folder(const OutputFolder& folder, const DesignResult& result, const 
   PendingFiles files(folder.path());
   files.add(lens_file::kConvergence, convergence_csv(result.convergence));
   const Image* const made = result.made ? &result.made->picture : nullptr;
-  files.add(lens_file::kOverview, [&](const fs::path& beside) {
-    write_image(draw_overview(result.lens, made), beside);
-  });
+  files.add(lens_file::kOverview,
+            [&](const fs::path& beside) { write_image(draw_overview(result.lens, made), beside); });
   write_lens(result.lens, std::move(files));
   const fs::path cut = folder.path() / lens_file::kCut;
   std::error_code ignored;
