@@ -21,10 +21,10 @@ std::string_view trimmed(std::string_view text) {
 
 std::vector<double> parse_numbers(std::string_view text, const std::string& name, int count) {
   const auto refuse = [&] {
-    std::string example = "0";
-    for (int k = 1; k < count; ++k) example += ",0";
+    std::vector<double> example;  // Not all zero: a direction needs a length.
+    for (int k = 0; k < count; ++k) example.push_back(k % 3);
     throw InputError(name + " " + std::string(text) + ": must be " + std::to_string(count) +
-                     " finite numbers with commas between them, such as " + example);
+                     " finite numbers with commas between them, such as " + numbers_text(example));
   };
   std::vector<double> numbers;
   for (std::string_view rest = text;;) {

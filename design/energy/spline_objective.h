@@ -2,10 +2,10 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
-#include <span>
 #include <vector>
 
 #include "core/surface/control_net.h"
@@ -71,12 +71,8 @@ class SplineObjectiveOn {
 
   /// @throw Interrupted.
   void relinearize(const double* points) {
-    shift_ = {};
+    if (made_by_ && !is_measured_at(points)) measure_shift(points);
     look(points);
-    if (made_by_) {
-      measure_shift(points);
-      shift_nodes();
-    }
     core_.relinearize(positions_.data());
   }
 
@@ -114,19 +110,23 @@ class SplineObjectiveOn {
 
   void look(const double* points) {
     nodes_.look(points, positions_.data(), core_.sampled_rays().normals);
-    if (shift_.size() > 0) shift_nodes();
-  }
-
-  void shift_nodes() {
+    if (shift_.size() == 0) return;
     parallel_for(executor_, "shift nodes", node_count(),
                  ShiftNode{shift_.data(), positions_.data(), core_.sampled_rays().normals});
   }
 
-  /// From the nodes that were looked at to what is made above them. A spline's stage works on the
-  /// processor, whatever the device.
+  [[nodiscard]] bool is_measured_at(const double* points) const {
+    return !measured_at_.empty() && std::equal(measured_at_.begin(), measured_at_.end(), points);
+  }
+
+  /// From the nodes to what is made above them. A spline's stage works on the processor, whatever
+  /// the device.
   void measure_shift(const double* points) {
-    ControlNet net{grid_, Eigen::Map<const Eigen::Matrix3Xd>(
-                              points, 3, Eigen::Index{grid_.columns} * grid_.rows)};
+    measured_at_.clear();
+    shift_ = {};
+    look(points);
+    const ControlNet net{grid_, Eigen::Map<const Eigen::Matrix3Xd>(
+                                    points, 3, Eigen::Index{grid_.columns} * grid_.rows)};
     const MadeSurface made(net, *made_by_, executor_);
     shift_ = Buffer(positions_.size());
     const auto measure = [&](std::int64_t i) {
@@ -137,6 +137,7 @@ class SplineObjectiveOn {
                                                   point.slope.y() + n.y() / n.z(), point.z - p.z());
     };
     parallel_for(executor_, "measure shift", node_count(), measure);
+    measured_at_.assign(points, points + net.points.size());
   }
 
   Exec executor_;
@@ -149,6 +150,8 @@ class SplineObjectiveOn {
   std::optional<MadeBy> made_by_;
   GridShape grid_;
   Buffer shift_;  ///< Empty where nothing is shifted.
+  std::vector<double>
+      measured_at_;  ///< Control points of the shift; a round begins where one ended.
 };
 
 }  // namespace lensforge

@@ -10,11 +10,11 @@ namespace {
 using O = ReflectOptions;
 using R = Row<O>;
 
-constexpr int kMostUpdates = 10000;
-constexpr int kMostDirectionRows = 64;
-constexpr int kMostSunPositions = 1000;
-constexpr int kMostSeeds = 1000000000;
-constexpr int kMostFaces = 1000000;
+constexpr int kMaxUpdates = 10000;
+constexpr int kMaxDirectionRows = 64;
+constexpr int kMaxSunPositions = 1000;
+constexpr int kMaxSeeds = 1000000000;
+constexpr int kMaxFaces = 1000000;
 
 }  // namespace
 
@@ -36,12 +36,12 @@ const OptionTable<ReflectOptions>& reflect_fields() {
                       {{"exact", Method::kExact}, {"paper", Method::kPaper}},
                       "exact: cached light paths without noise, until a stage no longer gains; "
                       "paper: random paths, steps of fixed length and all updates"),
-      R::whole("--seed", &O::seed, Limits::between(0, kMostSeeds), "of --method paper"),
+      R::whole("--seed", &O::seed, Limits::between(0, kMaxSeeds), "of --method paper"),
       R::number("--elevation", &O::elevation_deg, Limits::above(0, 90), "degrees",
                 "the band of directions reaches from minus this to this above the horizon"),
-      R::whole("--direction-rows", &O::direction_rows, Limits::between(1, kMostDirectionRows),
+      R::whole("--direction-rows", &O::direction_rows, Limits::between(1, kMaxDirectionRows),
                "heights in the band, each with six times as many azimuths"),
-      R::whole("--sun-positions", &O::sun_positions, Limits::between(1, kMostSunPositions),
+      R::whole("--sun-positions", &O::sun_positions, Limits::between(1, kMaxSunPositions),
                "directions on the sun's half circle"),
       R::number("--anchor", &O::anchor, Limits::between(0, 1e6), "",
                 "beta: how strongly faces are held at their first directions; larger keeps the "
@@ -51,15 +51,15 @@ const OptionTable<ReflectOptions>& reflect_fields() {
                 "smooths, 1000 hardly does, 0 leaves them as they are"),
       R::number("--normal-weight", &O::normal_weight, Limits::above(0, 1e9), "",
                 "lambda: how strongly elements follow their normals instead of their shape"),
-      R::whole("--rim-updates", &O::rim_updates, Limits::between(0, kMostUpdates),
+      R::whole("--rim-updates", &O::rim_updates, Limits::between(0, kMaxUpdates),
                "updates of the vertices that keep whole neighbourhoods rigid"),
-      R::whole("--face-updates", &O::face_updates, Limits::between(0, kMostUpdates),
+      R::whole("--face-updates", &O::face_updates, Limits::between(0, kMaxUpdates),
                "updates of the vertices that keep faces rigid and let creases form"),
       R::whole("--normal-steps", &O::normal_steps, Limits::between(1, 1000),
                "steps of the normals before each update of the vertices"),
       R::without("--no-split", &O::split,
                  "do not split the edges that hamper creases, nor update the faces once more"),
-      R::whole("--faces", &O::faces, Limits::zero_or(20, kMostFaces),
+      R::whole("--faces", &O::faces, Limits::zero_or(20, kMaxFaces),
                "remesh to about so many even triangles first; 0 takes the mesh as it is"),
       R::text("--fix-box", &O::fix_box, "X,Y,Z,X,Y,Z",
               "vertices inside this box do not move; its lowest and highest corner"),

@@ -57,15 +57,13 @@ Level spline_level(const Level& mesh, const Eigen::Vector2d& size, const DesignO
   level.spline = true;
   level.iterations = rounded(kSplineIterations * options.iterations, 1);
   double cell = size.x() / (kKnotCellsPerCell * (mesh.grid.columns - 1));
-  const double finest = std::sqrt(size.prod() / kMaxKnotCells);
+  if (options.made_by) cell = std::min(cell, kWidestKnotCell * options.made_by->polish_sigma);
+  cell = std::max(cell, std::sqrt(size.prod() / kMaxKnotCells));
   if (options.made_by) {
-    const double sigma = options.made_by->polish_sigma;
-    cell = std::max(finest, std::min(cell, kWidestKnotCell * sigma));
-    if (cell < kFineKnotCell * sigma) level.knot_share = kEvenerShare;
+    if (cell < kFineKnotCell * options.made_by->polish_sigma) level.knot_share = kEvenerShare;
     level.rounds = options.rounds;
     level.iterations = rounded(kMadeIterations * options.iterations, 1);
   }
-  cell = std::max(cell, finest);
   level.grid = {rounded(size.x() / cell, 1) + 3, rounded(size.y() / cell, 1) + 3};
   return level;
 }

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "design/reflect/light/light_field.h"
 
-#include <charconv>
 #include <cmath>
 #include <numbers>
 #include <string>
@@ -9,6 +8,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/text/number_list.h"
 
 namespace lensforge::reflect {
 namespace {
@@ -30,12 +30,6 @@ std::vector<std::string_view> split_at(std::string_view text, char separator) {
     if (end == std::string_view::npos) return parts;
     text.remove_prefix(end + 1);
   }
-}
-
-std::string example_of(int count) {
-  std::string text = "0";
-  for (int i = 1; i < count; ++i) text.append(",").append(std::to_string(i % 3));
-  return text;
 }
 
 Eigen::Matrix3Xd listed_lights(const std::string& text) {
@@ -72,17 +66,8 @@ Goal make_goal(const ReflectOptions& options) {
 }  // namespace
 
 Eigen::VectorXd number_list(const std::string& option, const std::string& text, int count) {
-  const std::vector<std::string_view> parts = split_at(text, ',');
-  Eigen::VectorXd numbers(count);
-  bool good = static_cast<int>(parts.size()) == count;
-  for (int i = 0; good && i < count; ++i) {
-    const std::string_view part = parts[static_cast<std::size_t>(i)];
-    const auto [end, error] = std::from_chars(part.begin(), part.end(), numbers[i]);
-    good = error == std::errc() && end == part.end() && std::isfinite(numbers[i]);
-  }
-  if (good) return numbers;
-  throw InputError(option + " " + text + ": must be " + std::to_string(count) +
-                   " numbers with commas between them, as " + example_of(count));
+  const std::vector<double> numbers = parse_numbers(text, option, count);
+  return Eigen::VectorXd::Map(numbers.data(), count);
 }
 
 DirectionSet LightField::directions(int update) const {

@@ -56,7 +56,7 @@ TEST(ReflectInput, RefusesWhatContradictsItself) {
   EXPECT_THAT(refusal(shapes::icosphere(2), options), HasSubstr("hold all 162 vertices"));
   options.fix_box = "1,2";
   EXPECT_THAT(refusal(shapes::icosphere(2), options),
-              StartsWith("--fix-box 1,2: must be 6 numbers"));
+              StartsWith("--fix-box 1,2: must be 6 finite numbers"));
   options = {};
   options.keep_volume = true;
   EXPECT_THAT(refusal(shapes::trihedral(2), options), StartsWith("--keep-volume: m.stl is open"));
