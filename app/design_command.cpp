@@ -68,6 +68,7 @@ nlohmann::json made_json(const MadeBy& process, const DesignResult::Made& made) 
           {"polish_sigma_mm", process.polish_sigma},
           {"rim_depth_mm", process.rim_depth},
           {"rim_length_mm", process.rim_length},
+          {"polish_spread", process.polish_spread},
           {"metrics", metrics_json(made.metrics)}};
 }
 

@@ -25,16 +25,23 @@ const OptionTable<CamOptions>& part_fields() {
   return fields;
 }
 
-MadeBy process_of(const Workshop& shop, const CamOptions& cut) {
+MadeBy process_of(const Workshop& shop, const DesignSettings& settings) {
   const FinishProcess& finish = shop.process.finish;
+  const CamOptions& cut = settings.cut;
   const MadeBy made{finish_pitch(finish, shop.tool(finish.tool).radius()),
-                    finish.along == PassAxis::kX, shop.polish.sigma, shop.polish.rim_depth,
-                    shop.polish.rim_length};
+                    finish.along == PassAxis::kX,
+                    shop.polish.sigma,
+                    shop.polish.rim_depth,
+                    shop.polish.rim_length,
+                    settings.robust ? shop.tolerances.polish_sigma : 0.0};
   return cut.part == PartKind::kMould ? made.cast(cut.shrinkage) : made;
 }
 
 /// @throw InputError unless nothing is said of how a part is made.
 void refuse_part_options(const OptionSet& options) {
+  if (options.given("--robust")) {
+    throw InputError("--robust: needs --made-by, which says how the part is made");
+  }
   for (const auto& row : part_fields()) {
     if (options.given(row.name)) {
       throw InputError(row.name + ": needs --made-by, which says how the part is made");
@@ -52,6 +59,9 @@ void add_design_options(OptionSet& options, DesignSettings& settings) {
   options.fields(weight_fields(), settings.design.weights);
   options.text("--made-by", settings.made_by, "default|FILE.toml",
                "shape the part that this workshop cuts and polishes, not the surface alone");
+  options.flag("--robust", settings.robust,
+               "with --made-by: right on average over parts that are polished less and more by the "
+               "workshop's tolerances.polish_sigma; takes twice as long");
   options.fields(part_fields(), settings.cut);
   options.flag("--resume", settings.resume,
                "continue the interrupted design in --out, with the same picture and options");
@@ -77,7 +87,7 @@ void settle(OptionSet& options, DesignSettings& settings, const Image& picture) 
   }
   settings.design = default_design_options(settings.design.model, picture);
   options.restate();
-  if (!settings.made_by.empty()) settings.design.made_by = process_of(workshop, settings.cut);
+  if (!settings.made_by.empty()) settings.design.made_by = process_of(workshop, settings);
   validate(settings.design, picture);
 }
 

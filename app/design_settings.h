@@ -14,6 +14,7 @@ struct DesignSettings {
   std::string target;
   std::string out;
   std::string made_by;  ///< Workshop file, or "default"; empty: not designed for a process.
+  bool robust = false;  ///< For parts that are polished less and more than made_by says.
   CamOptions cut;       ///< What of it is milled for made_by: the part or a mould, its shrinkage.
   DesignOptions design;
   bool resume = false;

@@ -9,7 +9,7 @@
 #include "core/text/number_text.h"
 #include "design/design_fields.h"
 #include "design/light_setup.h"
-#include "design/optics/made_surface.h"
+#include "design/optics/averaging_grid.h"
 #include "design/schedule/level_plan.h"
 
 namespace lensforge {
@@ -42,7 +42,7 @@ void require_process(const DesignOptions& o) {
 /// @throw InputError naming the finest polish of a lens this large that can be computed.
 void require_coarse_polish(const DesignOptions& o, const Eigen::Vector2i& pixels) {
   if (!o.made_by) return;
-  const double least = MadeSurface::least_sigma(optical_setup(o, pixels).lens_size);
+  const double least = AveragingGrid::least_sigma(optical_setup(o, pixels).lens_size);
   require(o.made_by->polish_sigma >= least, "--made-by, polish.sigma", o.made_by->polish_sigma,
           "is too fine to be computed for a lens of " + number_text(o.width) + " mm; at least " +
               number_text(std::ceil(1e5 * least) / 1e5) + " mm, or --model spline without it");

@@ -68,11 +68,26 @@ double blossom(const Eigen::VectorXd& coefficients, int cell, const std::array<d
   return d[3];
 }
 
+/// Far enough from the ends all knots are single.
+CubicBasis inner_basis(double t, int cell) {
+  const double s = t - cell;
+  const double r = 1.0 - s;
+  CubicBasis basis;
+  basis.first = cell;
+  basis.value = {r * r * r / 6.0, 2.0 / 3.0 - s * s * (1.0 - 0.5 * s),
+                 2.0 / 3.0 - r * r * (1.0 - 0.5 * r), s * s * s / 6.0};
+  basis.slope = {-0.5 * r * r, s * (1.5 * s - 2.0), r * (2.0 - 1.5 * r), 0.5 * s * s};
+  basis.bend = {r, 3.0 * s - 2.0, 3.0 * r - 2.0, s};
+  return basis;
+}
+
 }  // namespace
 
 CubicBasis cubic_basis(double t, int cells) {
+  const int cell = cell_of(t, cells);
+  if (cell >= kDegree - 1 && cell + kDegree <= cells) return inner_basis(t, cell);
   CubicBasis basis;
-  basis.first = cell_of(t, cells);
+  basis.first = cell;
   basis.value = functions(t, basis.first, cells, kDegree);
   basis.slope = differences(functions(t, basis.first, cells, 2), basis.first, cells, 3);
   basis.bend = differences(differences(functions(t, basis.first, cells, 1), basis.first, cells, 2),

@@ -3,9 +3,9 @@
 
 namespace lensforge {
 
-AreaBarrier default_area_barrier(const OpticalSetup& setup, std::int64_t triangles) {
+AreaBarrier default_area_barrier(const OpticalSetup& setup, std::int64_t triangles, double least) {
   const double mean = setup.lens_size.prod() / static_cast<double>(triangles);
-  return {0.001 * mean, 0.005 * mean};
+  return {least * mean, 5.0 * least * mean};
 }
 
 template class DesignObjectiveOn<Executor>;

@@ -15,10 +15,14 @@
 
 namespace lensforge {
 
-/// Thresholds of the area barrier for a mesh of so many triangles over the lens:
-/// ε1 = 0.1 % and ε2 = 0.5 % of the mean projected triangle: dark parts need small facets (a
-/// facet's flux is its projected area), and a thousandth still divides without loss of digits.
-AreaBarrier default_area_barrier(const OpticalSetup& setup, std::int64_t triangles);
+/// Dark parts need small facets (a facet's flux is its projected area), and a thousandth of the
+/// mean still divides without loss of digits.
+inline constexpr double kLeastArea = 0.001;
+
+/// Thresholds of the area barrier for a mesh of so many triangles over the lens.
+/// @param least  ε1 as a share of the mean projected triangle; ε2 is five times that.
+AreaBarrier default_area_barrier(const OpticalSetup& setup, std::int64_t triangles,
+                                 double least = kLeastArea);
 
 struct ObjectiveOptions {
   ObjectiveWeights weights;

@@ -50,6 +50,21 @@ struct EnergyValues {
   double align = 0.0;
   double flux = 0.0;
   double total = 0.0;
+
+  /// Adds a share of other values.
+  void add(const EnergyValues& other, double share) {
+    image += share * other.image;
+    unlit += share * other.unlit;
+    gradient += share * other.gradient;
+    boundary += share * other.boundary;
+    barrier += share * other.barrier;
+    face += share * other.face;
+    edge += share * other.edge;
+    laplacian += share * other.laplacian;
+    align += share * other.align;
+    flux += share * other.flux;
+    total += share * other.total;
+  }
 };
 
 }  // namespace lensforge

@@ -7,6 +7,7 @@
 #include "core/surface/control_net.h"
 #include "core/surface/optical_surface.h"
 #include "core/surface/sampled_surface.h"
+#include "design/optics/averaging_grid.h"
 #include "design/optics/made_by.h"
 
 namespace lensforge {
@@ -23,34 +24,22 @@ namespace lensforge {
 /// same, with f turned over. Beyond the rim the surface goes on turned about it, as PolishedField
 /// has it.
 ///
-/// Averages are sums over heights on an even grid, 3/4 σ apart: of waves at least 2σ long they are
-/// off by less than 1e-5 of the height, of a spline with bumps of 1 µm by 5e-8 mm and 1e-6 rad
+/// Averages are sums over an AveragingGrid: of waves at least 2σ long they are off by less than
+/// 1e-5 of the height, of a spline with bumps of 1 µm by 5e-8 mm and 1e-6 rad
 /// (MadeSurface.IsTheAverageOfTheSpline).
 class MadeSurface {
  public:
-  /// @pre made.polish_sigma ≥ least_sigma(the lens's size). @throw Interrupted.
+  /// @pre made.polish_sigma ≥ AveragingGrid::least_sigma(the lens's size). @throw Interrupted.
   MadeSurface(const ControlNet& net, const MadeBy& made, const Executor& executor);
 
   /// @pre xy is on the lens.
   [[nodiscard]] SurfacePoint at(const Eigen::Vector2d& xy) const;
 
-  /// Of the polish, mm: below it the grid takes more than 0.8 GB.
-  static double least_sigma(const Eigen::Vector2d& size);
-
  private:
-  /// How an axis's averages weigh the heights around a place.
-  struct Weights;
-
   void sample_row(const ControlNet& net, int row);
-  void turn_about_rim();
-  [[nodiscard]] int first_sample(double at, int axis) const;
 
-  MadeBy made_;
-  Eigen::Vector2d size_;    ///< Of the lens, mm.
-  Eigen::Vector2d sigma_;   ///< mm
-  Eigen::Vector2i cells_;   ///< Of the grid over the lens.
-  Eigen::Vector2d step_;    ///< mm
-  Eigen::MatrixXd height_;  ///< Columns × rows, with samples beyond the rim.
+  AveragingGrid grid_;
+  Eigen::MatrixXd heights_;  ///< AveragingGrid::make_heights()
 };
 
 /// The made surface above the nodes of its spline, spline_nodes().

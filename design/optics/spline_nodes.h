@@ -254,4 +254,13 @@ class SplineNodesOn {
   typename Exec::template Buffer<double> by_v_;
 };
 
+/// Nodes of the spline itself. @param samples  nodes a knot cell each way.
+template <class Exec>
+SplineNodesOn<Exec> spline_nodes_on(const GridShape& net, int samples, const Exec& executor) {
+  const auto basis = [&](int coefficients) {
+    return plain_basis(coefficients - 3, even_points(coefficients - 3, samples));
+  };
+  return {basis(net.columns), basis(net.rows), executor};
+}
+
 }  // namespace lensforge

@@ -148,6 +148,7 @@ std::uint64_t design_fingerprint(const Image& target, const DesignOptions& optio
     const MadeBy& made = *options.made_by;
     description.push_back(
         {made.pitch, made.rows_along_x, made.polish_sigma, made.rim_depth, made.rim_length});
+    if (made.polish_spread > 0.0) description.push_back(made.polish_spread);
   }
   Hash hash;
   hash.add(description.dump());

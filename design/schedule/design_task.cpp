@@ -34,18 +34,17 @@ LevelProblem make_problem(const DesignTask& task, const Level& level, std::int64
   problem.objective.weights = task.options.weights;
   problem.objective.model = task.options.model;
   problem.objective.nu = level.nu;
-  problem.objective.area = default_area_barrier(problem.setup, triangles);
   if (level.spline) {
     // Smoothness is the spline's own; barriers are those of the triangles between its nodes.
     problem.objective.weights.smooth = 0.0;
     problem.objective.samples = kMeshSamples;
     problem.objective.made_by = task.options.made_by;
     const double cells = (level.grid.columns - 3.0) * (level.grid.rows - 3.0);
-    problem.objective.area = default_area_barrier(
-        problem.setup, static_cast<std::int64_t>(2.0 * kMeshSamples * kMeshSamples * cells));
+    triangles = static_cast<std::int64_t>(2.0 * kMeshSamples * kMeshSamples * cells);
   } else if (task.options.model == SurfaceModel::kSpline) {
     problem.objective.model = SurfaceModel::kSmooth;
   }
+  problem.objective.area = default_area_barrier(problem.setup, triangles, level.least_area);
   return problem;
 }
 

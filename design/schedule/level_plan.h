@@ -6,18 +6,20 @@
 
 #include "core/surface/surface_mesh.h"
 #include "design/design_options.h"
+#include "design/energy/objective_options.h"
 
 namespace lensforge {
 
 /// One resolution of the coarse-to-fine schedule.
 struct Level {
-  Eigen::Vector2i pixels{0, 0};  ///< Working picture, columns and rows.
-  GridShape grid;                ///< Vertices of the mesh.
-  double nu = 0.0;               ///< ν of the Welsch function, 1/mm.
-  bool spline = false;           ///< The mesh's vertices are control points of a spline.
-  double knot_share = 1.0;       ///< Of the vertices' way from an even grid, that its knots go.
-  int rounds = 0;                ///< Alternations.
-  int iterations = 0;            ///< Most of one round.
+  Eigen::Vector2i pixels{0, 0};    ///< Working picture, columns and rows.
+  GridShape grid;                  ///< Vertices of the mesh.
+  double nu = 0.0;                 ///< ν of the Welsch function, 1/mm.
+  bool spline = false;             ///< The mesh's vertices are control points of a spline.
+  double knot_share = 1.0;         ///< Of the vertices' way from an even grid, that its knots go.
+  double least_area = kLeastArea;  ///< Of a triangle, share of the mean (AreaBarrier).
+  int rounds = 0;                  ///< Alternations.
+  int iterations = 0;              ///< Most of one round.
 };
 
 /// Size of the working picture: the longer side has options.pixels, the other follows the source's
@@ -36,7 +38,7 @@ inline constexpr double kMaxKnotCells = 500'000.0;
 ///
 /// A spline is designed as a smooth mesh in fewer rounds, and one more level optimises the spline
 /// that follows from it, with two knot cells for each cell of the mesh; for a process, with as fine
-/// ones as undo its polish, and in more and shorter rounds.
+/// ones as undo its polish, and for longer.
 std::vector<Level> plan_levels(const Eigen::Vector2i& pixels, const DesignOptions& options);
 
 }  // namespace lensforge

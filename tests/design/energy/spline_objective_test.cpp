@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "core/image/transfer.h"
-#include "core/surface/cubic_spline.h"
 #include "core/surface/sample_splines.h"
 #include "design/finite_difference.h"
 #include "design/optics/made_surface.h"
@@ -106,35 +105,60 @@ TEST_F(SplineObjective, GradientEqualsCentralDifferences) {
   }
 }
 
+/// Knot cells are 1.3 mm wide: fine ones, whose nodes are MadeNodes, and wide ones (ShiftedNodes).
+constexpr MadeBy kMade{0.8, false, 0.8, 0.05, 3.0};
+constexpr MadeBy kLittlePolish{0.5, false, 0.35, 0.05, 3.0};
+
 TEST_F(SplineObjective, PictureOfTheMadePartIsThatOfItsSurface) {
-  for (Eigen::Index i = 0; i < net_.points.cols(); ++i) {  // Even knots.
-    net_.points(0, i) = greville_point(static_cast<int>(i % 14), 11) * 15.0 / 11;
-    net_.points(1, i) = greville_point(static_cast<int>(i / 14), 8) * 10.0 / 8;
+  for (const MadeBy& made_by : {kMade, kLittlePolish}) {
+    options_.made_by = made_by;
+    SplineObjectiveOn<Executor> function = objective();
+    function.relinearize(net_.points.data());
+    Eigen::Matrix3Xd gradient(3, net_.points.cols());
+    const ObjectiveEvaluation made = function.evaluate(net_.points.data(), gradient.data());
+    ASSERT_TRUE(made.feasible);
+    const SampledSurface nodes = made_nodes(net_, made_by, kSamples, Executor::serial());
+    EXPECT_NEAR(made.mae, mean_absolute_error(nodes), 1e-6);
+    EXPECT_GT(std::fabs(made.mae - mean_absolute_error(spline_nodes(net_, kSamples))), 1e-4);
   }
-  options_.made_by = MadeBy{0.8, false, 0.9, 0.05, 3.0};
-  SplineObjectiveOn<Executor> function = objective();
-  function.relinearize(net_.points.data());
-  Eigen::Matrix3Xd gradient(3, net_.points.cols());
-  const ObjectiveEvaluation made = function.evaluate(net_.points.data(), gradient.data());
-  ASSERT_TRUE(made.feasible);
-  const SampledSurface nodes = made_nodes(net_, *options_.made_by, kSamples, Executor::serial());
-  EXPECT_NEAR(made.mae, mean_absolute_error(nodes), 1e-6);
-  EXPECT_GT(std::fabs(made.mae - mean_absolute_error(spline_nodes(net_, kSamples))), 1e-3);
 }
 
 TEST_F(SplineObjective, GradientOfTheMadePartEqualsCentralDifferences) {
-  options_.made_by = MadeBy{0.8, false, 0.9, 0.05, 3.0};
-  SplineObjectiveOn<Executor> function = objective();
-  function.relinearize(net_.points.data());
-  Eigen::Matrix3Xd gradient(3, net_.points.cols());
-  ASSERT_TRUE(function.evaluate(net_.points.data(), gradient.data()).feasible);
-  Random random(4);
-  for (const auto& [first, count] : {std::pair{2, 1}, {0, 2}}) {
-    Eigen::Matrix3Xd direction = Eigen::Matrix3Xd::Zero(3, gradient.cols());
-    for (double& d : direction.middleRows(first, count).reshaped()) d = random.between(-1.0, 1.0);
-    direction.array() *= function.movable().array();
-    EXPECT_LE(slope_error(function, gradient, direction), 1e-6) << first;
+  for (const MadeBy& made_by : {kMade, kLittlePolish}) {
+    options_.made_by = made_by;
+    SplineObjectiveOn<Executor> function = objective();
+    function.relinearize(net_.points.data());
+    Eigen::Matrix3Xd gradient(3, net_.points.cols());
+    ASSERT_TRUE(function.evaluate(net_.points.data(), gradient.data()).feasible);
+    Random random(4);
+    for (const auto& [first, count] : {std::pair{2, 1}, {0, 2}}) {
+      Eigen::Matrix3Xd direction = Eigen::Matrix3Xd::Zero(3, gradient.cols());
+      for (double& d : direction.middleRows(first, count).reshaped()) d = random.between(-1.0, 1.0);
+      direction.array() *= function.movable().array();
+      EXPECT_LE(slope_error(function, gradient, direction), 1e-6)
+          << made_by.polish_sigma << ' ' << first;
+    }
   }
+}
+
+TEST_F(SplineObjective, IsTheMeanOverPartsWherePolishVaries) {
+  MadeBy varied = kMade;
+  varied.polish_spread = 0.2;
+  double total = 0.0;
+  Eigen::Matrix3Xd sum = Eigen::Matrix3Xd::Zero(3, net_.points.cols());
+  Eigen::Matrix3Xd gradient = sum;
+  for (const double sigma : {0.8 * kMade.polish_sigma, 1.2 * kMade.polish_sigma}) {
+    options_.made_by = kMade;
+    options_.made_by->polish_sigma = sigma;
+    SplineObjectiveOn<Executor> part = objective();
+    total += part.evaluate(net_.points.data(), gradient.data()).energy.total;
+    sum += gradient;
+  }
+  options_.made_by = varied;
+  SplineObjectiveOn<Executor> mean = objective();
+  EXPECT_NEAR(mean.evaluate(net_.points.data(), gradient.data()).energy.total, total / 2.0,
+              1e-12 * total);
+  EXPECT_LE((gradient - sum / 2.0).cwiseAbs().maxCoeff(), 1e-12 * sum.cwiseAbs().maxCoeff());
 }
 
 TEST_F(SplineObjective, RimStaysOnTheRectangle) {

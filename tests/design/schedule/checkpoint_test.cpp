@@ -244,7 +244,8 @@ TEST(DesignFingerprint, ChangesWithEveryNumberOfTheProcess) {
                          {.rows_along_x = false},
                          {.polish_sigma = 0.02},
                          {.rim_depth = 0.01},
-                         {.rim_length = 2.0}};
+                         {.rim_length = 2.0},
+                         {.polish_spread = 0.1}};
   EXPECT_EQ(std::size(made), testing::member_count<MadeBy>() + 1);
   for (const MadeBy& process : made) {
     DesignOptions options;
