@@ -17,7 +17,8 @@ struct RenderResult {
   double flux_inside = 0.0;  ///< Share of the lens's flux that lands on the image rectangle.
 };
 
-/// Renders what a surface projects onto the image rectangle of `setup`, exactly (no sampling).
+/// Renders what a surface projects onto the image rectangle of `setup`, exactly (no sampling but of
+/// a source that has an extent, see picture_under()).
 RenderResult render_surface(const SurfaceMesh& mesh, const OpticalSetup& setup, SurfaceModel model,
                             const Executor& executor);
 

@@ -27,6 +27,7 @@
 #include "design/energy/smooth_rays.h"
 #include "design/energy/unlit_pixels.h"
 #include "design/flux/flux_image.h"
+#include "design/flux/source_blur.h"
 
 namespace lensforge {
 
@@ -66,6 +67,11 @@ class DesignObjectiveOn {
   template <class Rays>
   [[nodiscard]] bool allowed(const ObjectiveView& o, Rays& rays);
   template <class Rays>
+  [[nodiscard]] std::span<const double> project(const ObjectiveView& o, Rays& rays) {
+    const FaceLightSource<typename Rays::View> faces{o, rays.view()};
+    return blur_.apply(executor_, flux_.render(executor_, o.mesh.faces, faces));
+  }
+  template <class Rays>
   void compare_picture(const ObjectiveView& o, Rays& rays, Sums& sums);
   template <class Rays>
   void pull_back(const ObjectiveView& o, Rays& rays, double* gradient, Sums& sums);
@@ -100,6 +106,7 @@ class DesignObjectiveOn {
   double edge_offset_ = 0.0;  ///< Σ Ψ(h⁰) − w h⁰ over the edges.
 
   FluxImageOn<Exec> flux_;
+  SourceBlurOn<Exec> blur_;
   FluxCotangentImageOn<Exec> cotangent_;
   Buffer<double> error_;
   Buffer<Corners> corner_bar_;
@@ -160,6 +167,8 @@ DesignObjectiveOn<Exec>::DesignObjectiveOn(const SurfaceMesh& mesh, const Optica
       movable_(objective_detail::movable_coordinates(mesh.vertices, setup.lens_size)),
       movable_here_(buffer_of(executor, objective_detail::entries(movable_))),
       flux_(setup.pixels.x(), setup.pixels.y()),
+      blur_(source_kernel(setup, options.surface_height), setup.pixels.x(), setup.pixels.y(),
+            executor),
       cotangent_(setup.pixels.x(), setup.pixels.y()),
       rays_(objective_detail::rays_of<Exec>(options.model, mesh)) {
   const auto faces = static_cast<std::size_t>(mesh.triangle_count());
@@ -194,8 +203,8 @@ void DesignObjectiveOn<Exec>::take(const Correspondence& wanted) {
 template <class Exec>
 ObjectiveView DesignObjectiveOn<Exec>::view(const double* vertices) {
   return {.options = options_,
-          .vertices = vertices,
           .light = light_,
+          .vertices = vertices,
           .mesh = mesh_.view(),
           .goal = goal_view(),
           .scratch = {frames_.data(), maps_.data(), edge_weights_.data(), corner_bar_.data()}};
@@ -243,8 +252,7 @@ void DesignObjectiveOn<Exec>::find_unlit(const ObjectiveView& o, Rays& rays) {
   parallel_for(executor_, "face centroids", o.mesh.faces,
                FaceCentroid<typename Rays::View>{o, rays.view(), measured.data()});
   download(executor_, std::span<const double>(measured.data(), measured.size()), centroids_here);
-  const auto flux =
-      flux_.render(executor_, o.mesh.faces, FaceLightSource<typename Rays::View>{o, rays.view()});
+  const auto flux = project(o, rays);
   std::vector<double> light(flux.size());
   download(executor_, flux, std::span<double>(light));
   for (double& value : light) value *= target_total_;
@@ -281,8 +289,7 @@ struct DesignObjectiveOn<Exec>::Sums {
 template <class Exec>
 template <class Rays>
 void DesignObjectiveOn<Exec>::compare_picture(const ObjectiveView& o, Rays& rays, Sums& sums) {
-  const auto flux =
-      flux_.render(executor_, o.mesh.faces, FaceLightSource<typename Rays::View>{o, rays.view()});
+  const auto flux = project(o, rays);
   const std::span<double> bar = cotangent_.pixels();
   const PictureError picture{flux_.columns(), flux_.rows(), error_.data()};
   const ComparePixel compare{flux.data(), target_.data(), target_total_, error_.data(), bar.data()};
@@ -291,6 +298,7 @@ void DesignObjectiveOn<Exec>::compare_picture(const ObjectiveView& o, Rays& rays
   sums.gradient = gradient_term(executor_, picture, options_.weights.gradient, bar);
   parallel_for(executor_, "encode adjoint", picture.count(),
                EncodeAdjoint{flux.data(), target_total_, bar.data()});
+  blur_.apply_adjoint(executor_, bar);
   cotangent_.prepare(executor_);
 }
 

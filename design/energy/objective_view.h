@@ -37,11 +37,11 @@ struct FaceScratch {
   Corners* corner_bar;   ///< Derivatives by every face's corners.
 };
 
-/// The vectors of a light path begin at multiples of 16 bytes: this order leaves none unset.
+/// The vectors of a light path begin at multiples of 16 bytes: this order leaves no gap before it.
 struct ObjectiveView {
   ObjectiveOptions options;
-  const double* vertices;  ///< 3 × V, mm
   LightPath light;
+  const double* vertices;  ///< 3 × V, mm
   MeshView mesh;
   GoalView goal;
   FaceScratch scratch;
