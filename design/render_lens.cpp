@@ -88,6 +88,15 @@ ImageMetrics evaluate(const SurfaceMesh& mesh, const Eigen::Matrix3Xd& normals,
                 rendered);
 }
 
+std::vector<double> flux_of_lens(const Lens& lens, const OpticalSetup& setup,
+                                 const Executor& executor) {
+  if (lens.model != SurfaceModel::kSpline) {
+    return flux_of(lens.surface, setup, lens.model, executor);
+  }
+  const SampledSurface nodes = picture_nodes(*lens.spline);
+  return flux_of(nodes.mesh, nodes.normals, setup, executor);
+}
+
 ImageMetrics evaluate(const Lens& lens, SurfaceModel model, Image* rendered,
                       const Executor& executor) {
   if (model != SurfaceModel::kSpline) {

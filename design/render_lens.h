@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <vector>
+
 #include "core/compute/executor.h"
 #include "core/image/image.h"
 #include "core/image/metrics.h"
@@ -27,6 +29,10 @@ RenderResult render_surface(const SurfaceMesh& mesh, const OpticalSetup& setup, 
 /// @pre target has setup.pixels columns and rows.
 ImageMetrics evaluate(const SurfaceMesh& mesh, const OpticalSetup& setup, SurfaceModel model,
                       const Image& target, Image* rendered, const Executor& executor);
+
+/// Flux per pixel, as shares of the lens's, of its surface under its model in another setup.
+std::vector<double> flux_of_lens(const Lens& lens, const OpticalSetup& setup,
+                                 const Executor& executor);
 
 /// evaluate() of a lens under one of its models. A spline is looked at in picture_nodes().
 ImageMetrics evaluate(const Lens& lens, SurfaceModel model, Image* rendered,

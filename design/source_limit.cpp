@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <numeric>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "core/image/transfer.h"
@@ -25,28 +26,34 @@ constexpr int kMaxIterations = 400;
 
 class LimitObjective {
  public:
-  LimitObjective(const Image& target, const BlurKernel& kernel, const Executor& executor)
+  LimitObjective(const Image& target, BlurKernel kernel, const Executor& executor)
       : executor_(executor),
         wanted_(encoded_values(target)),
         total_(target.total()),
-        blur_(kernel, target.columns(), target.rows(), executor),
-        light_(wanted_.size()),
-        bar_(wanted_.size()) {}
+        blur_(std::move(kernel), target.columns(), target.rows(), executor),
+        light_(wanted_.size() * static_cast<std::size_t>(blur_.parts() * blur_.parts())),
+        bar_(light_.size()) {}
+
+  [[nodiscard]] int parts() const { return blur_.parts(); }
 
   double operator()(std::span<const double> q, std::span<double> gradient) {
     set_light(q);
     const std::span<const double> picture = blur_.apply(executor_, light_);
+    const std::span<double> picture_bar = blur_.bar();
     double value = 0.0;
     for (std::size_t i = 0; i < wanted_.size(); ++i) {
       const double error = encode(picture[i]) - wanted_[i];
       value += error * error;
-      bar_[i] = 2.0 * error * encode_slope(picture[i]);
+      picture_bar[i] = 2.0 * error * encode_slope(picture[i]);
     }
     blur_.apply_adjoint(executor_, bar_);
     const double mean = std::inner_product(bar_.begin(), bar_.end(), light_.begin(), 0.0) / total_;
     for (std::size_t i = 0; i < gradient.size(); ++i) gradient[i] = light_[i] * (bar_[i] - mean);
     return value;
   }
+
+  /// k∗μ of the last q.
+  std::span<const double> picture() { return blur_.apply(executor_, light_); }
 
   /// μ of q.
   const std::vector<double>& set_light(std::span<const double> q) {
@@ -66,22 +73,43 @@ class LimitObjective {
   std::vector<double> bar_;
 };
 
-std::vector<double> start_from(const Image& target) {
+Image image_of(std::span<const double> values, int columns, int rows) {
+  Image image(columns, rows);
+  std::transform(values.begin(), values.end(), image.values().begin(),
+                 [](double value) { return static_cast<float>(value); });
+  return image;
+}
+
+/// The target's light, evenly over the parts of a pixel.
+std::vector<double> start_from(const Image& target, int parts) {
   const double least =
       kLeastStart * target.total() / static_cast<double>(target.values().size());
-  std::vector<double> q(target.values().size());
-  std::transform(target.values().begin(), target.values().end(), q.begin(), [least](float value) {
-    return std::log(std::max(least, static_cast<double>(value)));
-  });
+  std::vector<double> q;
+  for (int row = 0; row < parts * target.rows(); ++row) {
+    for (int column = 0; column < parts * target.columns(); ++column) {
+      const double value = target.at(column / parts, row / parts);
+      q.push_back(std::log(std::max(least, value)));
+    }
+  }
   return q;
+}
+
+/// Sums the light of the parts of every pixel.
+Image in_pixels(const std::vector<double>& light, int columns, int rows, int parts) {
+  std::vector<double> sums(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows), 0.0);
+  for (std::size_t i = 0; i < light.size(); ++i) {
+    const auto line = static_cast<std::size_t>(columns) * static_cast<std::size_t>(parts);
+    const auto side = static_cast<std::size_t>(parts);
+    sums[i / line / side * static_cast<std::size_t>(columns) + i % line / side] += light[i];
+  }
+  return image_of(sums, columns, rows);
 }
 
 }  // namespace
 
 SourceLimit source_limit(const Image& target, const OpticalSetup& setup, double z,
                          const Executor& executor) {
-  const BlurKernel kernel = source_kernel(setup, z);
-  LimitObjective objective(target, kernel, executor);
+  LimitObjective objective(target, source_kernel(setup, z), executor);
   const RawObjective function = [&](std::span<const double> q, std::span<double> gradient) {
     return objective(q, gradient);
   };
@@ -91,14 +119,12 @@ SourceLimit source_limit(const Image& target, const OpticalSetup& setup, double 
   LbfgsOptions options;
   options.max_iterations = kMaxIterations;
   options.relative_decrease = 1e-3;
-  std::vector<double> q = start_from(target);
+  std::vector<double> q = start_from(target, objective.parts());
   LbfgsOn<Executor>(function, plain, options, executor).run([](int, double) { return true; }, q);
   SourceLimit limit;
-  limit.light = Image(target.columns(), target.rows());
-  const std::vector<double>& light = objective.set_light(q);
-  std::transform(light.begin(), light.end(), limit.light.values().begin(),
-                 [](double value) { return static_cast<float>(value); });
-  const Image best = blurred(limit.light, kernel, executor);
+  limit.light =
+      in_pixels(objective.set_light(q), target.columns(), target.rows(), objective.parts());
+  const Image best = image_of(objective.picture(), target.columns(), target.rows());
   limit.metrics = compare(best, target);
   limit.metrics.flux_inside = best.total() / target.total();
   return limit;

@@ -21,6 +21,11 @@ int source_point_count(const OpticalSetup& setup, double z);
 /// `count` of its points, by shares. No approximation but the count.
 std::vector<double> picture_under(const OpticalSetup& setup, int count, const PointPicture& picture);
 
+/// The same picture in a convolution, source_kernel()'s.
+/// @param z  of the surface, mm.
+std::vector<double> picture_by_convolution(const OpticalSetup& setup, double z,
+                                           const PointPicture& picture, const Executor& executor);
+
 /// How nearly the picture of a lens under its extended source is known.
 struct SourceCheck {
   double blur = 0.0;  ///< Width of the source's image on the screen, pixels.

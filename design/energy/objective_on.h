@@ -105,8 +105,8 @@ class DesignObjectiveOn {
   Buffer<double> edge_weights_;
   double edge_offset_ = 0.0;  ///< Σ Ψ(h⁰) − w h⁰ over the edges.
 
-  FluxImageOn<Exec> flux_;
   SourceBlurOn<Exec> blur_;
+  FluxImageOn<Exec> flux_;  ///< In the blur's parts of pixels.
   FluxCotangentImageOn<Exec> cotangent_;
   Buffer<double> error_;
   Buffer<Corners> corner_bar_;
@@ -166,10 +166,10 @@ DesignObjectiveOn<Exec>::DesignObjectiveOn(const SurfaceMesh& mesh, const Optica
       mesh_(mesh, make_topology(mesh), executor),
       movable_(objective_detail::movable_coordinates(mesh.vertices, setup.lens_size)),
       movable_here_(buffer_of(executor, objective_detail::entries(movable_))),
-      flux_(setup.pixels.x(), setup.pixels.y()),
       blur_(source_kernel(setup, options.surface_height), setup.pixels.x(), setup.pixels.y(),
             executor),
-      cotangent_(setup.pixels.x(), setup.pixels.y()),
+      flux_(blur_.parts() * setup.pixels.x(), blur_.parts() * setup.pixels.y()),
+      cotangent_(flux_.columns(), flux_.rows()),
       rays_(objective_detail::rays_of<Exec>(options.model, mesh)) {
   const auto faces = static_cast<std::size_t>(mesh.triangle_count());
   const auto vertices = static_cast<std::size_t>(mesh.vertex_count());
@@ -212,8 +212,9 @@ ObjectiveView DesignObjectiveOn<Exec>::view(const double* vertices) {
 
 template <class Exec>
 GoalView DesignObjectiveOn<Exec>::goal_view() {
-  return {.columns = static_cast<double>(flux_.columns()),
-          .rows = static_cast<double>(flux_.rows()),
+  return {.columns = static_cast<double>(light_.plane().columns()),
+          .rows = static_cast<double>(light_.plane().rows()),
+          .parts = static_cast<double>(blur_.parts()),
           .cotangent = cotangent_.view(),
           .target = target_.data(),
           .led = led_.size() > 0 ? led_.data() : nullptr,
@@ -256,7 +257,7 @@ void DesignObjectiveOn<Exec>::find_unlit(const ObjectiveView& o, Rays& rays) {
   std::vector<double> light(flux.size());
   download(executor_, flux, std::span<double>(light));
   for (double& value : light) value *= target_total_;
-  const LitPicture picture{flux_.columns(), flux_.rows(), light, wanted_light_};
+  const LitPicture picture{light_.plane().columns(), light_.plane().rows(), light, wanted_light_};
   const std::vector<std::int32_t> led = lead_to_unlit_pixels(picture, centroids);
   const auto is_led = [](std::int32_t pixel) { return pixel != kNoPixel; };
   if (std::any_of(led.begin(), led.end(), is_led)) {
@@ -290,15 +291,15 @@ template <class Exec>
 template <class Rays>
 void DesignObjectiveOn<Exec>::compare_picture(const ObjectiveView& o, Rays& rays, Sums& sums) {
   const auto flux = project(o, rays);
-  const std::span<double> bar = cotangent_.pixels();
-  const PictureError picture{flux_.columns(), flux_.rows(), error_.data()};
+  const std::span<double> bar = blur_.none() ? cotangent_.pixels() : blur_.bar();
+  const PictureError picture{light_.plane().columns(), light_.plane().rows(), error_.data()};
   const ComparePixel compare{flux.data(), target_.data(), target_total_, error_.data(), bar.data()};
   sums.absolute_error = pending_sum<1>(executor_, "picture error", picture.count(), compare);
   sums.image = image_term(executor_, picture, options_.weights.image, bar);
   sums.gradient = gradient_term(executor_, picture, options_.weights.gradient, bar);
   parallel_for(executor_, "encode adjoint", picture.count(),
                EncodeAdjoint{flux.data(), target_total_, bar.data()});
-  blur_.apply_adjoint(executor_, bar);
+  blur_.apply_adjoint(executor_, cotangent_.pixels());
   cotangent_.prepare(executor_);
 }
 

@@ -20,6 +20,7 @@ namespace lensforge {
 struct GoalView {
   double columns;  ///< Of the picture.
   double rows;
+  double parts;  ///< Of a pixel each way, in which the cotangent counts.
   FluxCotangent cotangent;
   const double* target;            ///< Display-encoded, row by row; of a picture.
   const std::int32_t* led;         ///< F, lead_to_unlit_pixels(); null if no facet is led.

@@ -1,138 +1,184 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "core/compute/executor.h"
 #include "core/compute/host_device.h"
-#include "core/image/image.h"
 #include "core/optics/optical_setup.h"
 
 namespace lensforge {
 
-/// What an extended source makes of one lit pixel: weights around it, row by row from the top, that
-/// sum to 1.
+/// How an extended source spreads light over the picture. Light is told apart in parts of pixels,
+/// `parts` each way: in whole ones an optimiser finds light that only seems to add up.
+///
+/// Notation: q a part and P a pixel, counted in one direction; out(P) = Σ_d w(d) in(parts·P + d − o).
 struct BlurKernel {
-  int reach_x = 0;  ///< Pixels on either side.
-  int reach_y = 0;
-  std::vector<double> weights{1.0};
+  int parts = 1;
+  int columns = 1;   ///< Of the weights.
+  int rows = 1;
+  int offset_x = 0;  ///< o
+  int offset_y = 0;
+  std::vector<double> weights{1.0};  ///< w, row by row from the top.
 
-  [[nodiscard]] int columns() const { return 2 * reach_x + 1; }
   [[nodiscard]] bool none() const { return weights.size() == 1; }
 };
 
 /// The image of the setup's source through the middle of a lens whose surface there is at height z,
-/// mm. Every part of the source shifts the picture; light counts as even within a pixel, so that a
-/// shift divides it between four. The same kernel serves the whole picture, a paraxial
+/// mm. Every point of the source shifts the picture, by quadratic interpolation between the parts:
+/// linear interpolation would add a blur of its own. One kernel serves the whole picture: a paraxial
 /// approximation.
 BlurKernel source_kernel(const OpticalSetup& setup, double z);
 
-/// A picture under the kernel. Light that leaves it is lost, and none comes in.
-Image blurred(const Image& picture, const BlurKernel& kernel, const Executor& executor);
-
-/// Neighbouring pixels of a row that one item sums, so that a compiler takes them side by side.
+/// Neighbours in a row that one item sums, so that a compiler takes them side by side.
 inline constexpr int kBlurStrip = 8;
 
-/// out(p) = Σ_k w(k) in(p − k) for a strip of a row, with sign 1, or in(p + k) with sign −1: the
-/// transpose.
-struct BlurStrip {
-  const double* in;
-  double* out;
+/// A kernel and two pictures of so many pixels: in parts and in whole ones.
+struct BlurView {
   const double* weights;
+  std::int64_t parts;
+  std::int64_t kernel_columns;
+  std::int64_t kernel_rows;
+  std::int64_t offset_x;
+  std::int64_t offset_y;
   std::int64_t columns;
   std::int64_t rows;
-  std::int64_t reach_x;
-  std::int64_t reach_y;
-  std::int64_t sign;
 
   [[nodiscard]] LF_HD std::int64_t strips() const {
     return (columns + kBlurStrip - 1) / kBlurStrip;
   }
+};
+
+/// Adds w times the items begin, begin + step, … of a line to a strip's sums; none beyond its ends.
+LF_HD inline void add_to_strip(double w, const double* line, std::int64_t length,
+                               std::int64_t begin, std::int64_t step, double* sum) {
+  if (begin >= 0 && begin + step * (kBlurStrip - 1) < length) {
+    for (int k = 0; k < kBlurStrip; ++k) sum[k] += w * line[begin + step * k];
+    return;
+  }
+  for (int k = 0; k < kBlurStrip; ++k) {
+    const std::int64_t at = begin + step * k;
+    if (at >= 0 && at < length) sum[k] += w * line[at];
+  }
+}
+
+/// Parts → pixels, a strip of a row of pixels. Light that leaves the picture is lost, none comes in.
+struct BlurStrip {
+  BlurView blur;
+  const double* parts;
+  double* pixels;
+
   LF_HD void operator()(std::int64_t strip) const {
-    const std::int64_t row = strip / strips();
-    const std::int64_t first = strip % strips() * kBlurStrip;
+    const std::int64_t row = strip / blur.strips();
+    const std::int64_t first = strip % blur.strips() * kBlurStrip;
+    const std::int64_t length = blur.parts * blur.columns;
     double sum[kBlurStrip] = {};
-    for (std::int64_t j = -reach_y; j <= reach_y; ++j) {
-      const std::int64_t from = row - sign * j;
-      if (from < 0 || from >= rows) continue;
-      for (std::int64_t i = -reach_x; i <= reach_x; ++i) {
-        const double w = weights[(j + reach_y) * (2 * reach_x + 1) + i + reach_x];
-        if (w != 0.0) add(in + from * columns, first - sign * i, w, sum);
+    for (std::int64_t j = 0; j < blur.kernel_rows; ++j) {
+      const std::int64_t from = blur.parts * row + j - blur.offset_y;
+      if (from < 0 || from >= blur.parts * blur.rows) continue;
+      for (std::int64_t i = 0; i < blur.kernel_columns; ++i) {
+        const double w = blur.weights[j * blur.kernel_columns + i];
+        const std::int64_t begin = blur.parts * first + i - blur.offset_x;
+        if (w != 0.0) add_to_strip(w, parts + from * length, length, begin, blur.parts, sum);
       }
     }
-    for (std::int64_t k = 0; k < kBlurStrip && first + k < columns; ++k) {
-      out[row * columns + first + k] = sum[k];
-    }
-  }
-
- private:
-  /// Adds w times the pixels of a row from `begin` on.
-  LF_HD void add(const double* line, std::int64_t begin, double w, double* sum) const {
-    if (begin >= 0 && begin + kBlurStrip <= columns) {
-      for (int k = 0; k < kBlurStrip; ++k) sum[k] += w * line[begin + k];
-      return;
-    }
-    for (int k = 0; k < kBlurStrip; ++k) {
-      if (begin + k >= 0 && begin + k < columns) sum[k] += w * line[begin + k];
+    for (std::int64_t k = 0; k < kBlurStrip && first + k < blur.columns; ++k) {
+      pixels[row * blur.columns + first + k] = sum[k];
     }
   }
 };
 
-/// The kernel at work on pictures of one size in the memory of an executor. Same bits for any
-/// number of threads: every pixel is summed in one order.
-template <class Exec>
-class SourceBlurOn {
- public:
-  SourceBlurOn(const BlurKernel& kernel, int columns, int rows, const Exec& executor)
-      : columns_(columns),
-        rows_(rows),
-        reach_x_(kernel.reach_x),
-        reach_y_(kernel.reach_y),
-        weights_(buffer_of(executor, std::span<const double>(kernel.weights))),
-        picture_(kernel.none() ? 0 : static_cast<std::size_t>(columns) * rows) {}
+/// Its transpose, pixels → parts: of a row of parts every parts-th one, which all have the same
+/// weights.
+struct BlurStripAdjoint {
+  BlurView blur;
+  const double* pixels_bar;
+  double* parts_bar;
 
-  /// True if there is nothing to do.
-  [[nodiscard]] bool none() const { return picture_.size() == 0; }
-
-  /// The picture blurred, in memory of the blur's own; valid until the next call.
-  std::span<const double> apply(const Exec& executor, std::span<const double> picture) {
-    if (none()) return picture;
-    run(executor, "source blur", picture.data(), picture_.data(), 1);
-    return {picture_.data(), picture_.size()};
+  [[nodiscard]] LF_HD std::int64_t count() const {
+    return blur.parts * blur.rows * blur.parts * blur.strips();
   }
-  /// Transpose of apply(), in place.
-  void apply_adjoint(const Exec& executor, std::span<double> bar) {
-    if (none()) return;
-    run(executor, "source blur adjoint", bar.data(), picture_.data(), -1);
-    parallel_for(executor, "copy", static_cast<std::int64_t>(bar.size()),
-                 CopyPixel{picture_.data(), bar.data()});
+  LF_HD void operator()(std::int64_t item) const {
+    const std::int64_t first = item % blur.strips() * kBlurStrip;
+    const std::int64_t phase = item / blur.strips() % blur.parts;
+    const std::int64_t row = item / blur.strips() / blur.parts;
+    double sum[kBlurStrip] = {};
+    for (std::int64_t j = (row + blur.offset_y) % blur.parts; j < blur.kernel_rows;
+         j += blur.parts) {
+      const std::int64_t to = (row + blur.offset_y - j) / blur.parts;
+      if (row + blur.offset_y < j || to >= blur.rows) continue;
+      add_row(first, phase, j, pixels_bar + to * blur.columns, sum);
+    }
+    for (std::int64_t k = 0; k < kBlurStrip && first + k < blur.columns; ++k) {
+      const std::int64_t column = blur.parts * (first + k) + phase;
+      parts_bar[row * blur.parts * blur.columns + column] = sum[k];
+    }
   }
 
  private:
-  struct CopyPixel {
-    const double* from;
-    double* to;
-    LF_HD void operator()(std::int64_t i) const { to[i] = from[i]; }
-  };
+  LF_HD void add_row(std::int64_t first, std::int64_t phase, std::int64_t j, const double* line,
+                     double* sum) const {
+    for (std::int64_t i = (phase + blur.offset_x) % blur.parts; i < blur.kernel_columns;
+         i += blur.parts) {
+      const double w = blur.weights[j * blur.kernel_columns + i];
+      const std::int64_t begin = first + (phase + blur.offset_x - i) / blur.parts;
+      if (w != 0.0) add_to_strip(w, line, blur.columns, begin, 1, sum);
+    }
+  }
+};
 
+/// A kernel at work on pictures of one size in the memory of an executor. Same bits for any number
+/// of threads: every sum has one order.
+template <class Exec>
+class SourceBlurOn {
+ public:
+  SourceBlurOn(BlurKernel kernel, int columns, int rows, const Exec& executor)
+      : kernel_(std::move(kernel)),
+        columns_(columns),
+        rows_(rows),
+        weights_(buffer_of(executor, std::span<const double>(kernel_.weights))),
+        pixels_(kernel_.none() ? 0 : static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows)),
+        bar_(pixels_.size()) {}
+
+  /// True if there is nothing to do.
+  [[nodiscard]] bool none() const { return kernel_.none(); }
+  [[nodiscard]] int parts() const { return kernel_.parts; }
+
+  /// A picture in parts → the one that is seen, in pixels; valid until the next call.
+  std::span<const double> apply(const Exec& executor, std::span<const double> parts) {
+    if (none()) return parts;
+    const BlurStrip blur{view(), parts.data(), pixels_.data()};
+    parallel_for(executor, "source blur", blur.blur.strips() * rows_, blur, kStripGrain);
+    return {pixels_.data(), pixels_.size()};
+  }
+  /// Derivatives by the pixels, to be filled in before apply_adjoint(). @pre !none().
+  [[nodiscard]] std::span<double> bar() { return {bar_.data(), bar_.size()}; }
+  /// Transpose of apply(), of bar().
+  void apply_adjoint(const Exec& executor, std::span<double> parts_bar) {
+    if (none()) return;
+    const BlurStripAdjoint blur{view(), bar_.data(), parts_bar.data()};
+    parallel_for(executor, "source blur adjoint", blur.count(), blur, kStripGrain);
+  }
+
+ private:
   /// Strips that one task sums at least.
   static constexpr std::int64_t kStripGrain = 16;
 
-  void run(const Exec& executor, const char* name, const double* in, double* out, int sign) {
-    const BlurStrip blur{in, out, weights_.data(), columns_, rows_, reach_x_, reach_y_, sign};
-    parallel_for(executor, name, blur.strips() * rows_, blur, kStripGrain);
+  [[nodiscard]] BlurView view() const {
+    return {weights_.data(),   kernel_.parts,    kernel_.columns, kernel_.rows,
+            kernel_.offset_x,  kernel_.offset_y, columns_,        rows_};
   }
 
+  BlurKernel kernel_;
   int columns_;
   int rows_;
-  int reach_x_;
-  int reach_y_;
   typename Exec::template Buffer<double> weights_;
-  typename Exec::template Buffer<double> picture_;
+  typename Exec::template Buffer<double> pixels_;
+  typename Exec::template Buffer<double> bar_;
 };
 
 }  // namespace lensforge
