@@ -14,8 +14,8 @@ struct DesignSettings {
   std::string target;
   std::string out;
   std::string source_picture;  ///< File with the source's shape; empty: a disc.
-  std::string made_by;  ///< Workshop file, or "default"; empty: not designed for a process.
-  CamOptions cut;       ///< What of it is milled for made_by: the part or a mould, its shrinkage.
+  std::string made_by;         ///< Workshop file, or "default"; empty: not designed for a process.
+  CamOptions cut;  ///< What of it is milled for made_by: the part or a mould, its shrinkage.
   DesignOptions design;
   bool resume = false;
   bool force = false;

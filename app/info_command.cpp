@@ -74,7 +74,8 @@ std::string extent_text(const OpticalSetup& setup) {
 }
 
 std::string light_text(const OpticalSetup& setup) {
-  const std::string on = extent_text(setup) + (setup.mode == LightMode::kReflect ? " on a mirror" : "");
+  const std::string on =
+      extent_text(setup) + (setup.mode == LightMode::kReflect ? " on a mirror" : "");
   if (!setup.point) return "parallel along " + place_text(setup.light) + on;
   const bool even = setup.point->emission == Emission::kIsotropic;
   return std::string(even ? "point" : "flat") + " source at " + place_text(setup.point->position) +

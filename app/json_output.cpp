@@ -52,7 +52,8 @@ nlohmann::json metrics_json(const Lens& lens) {
 std::string metrics_text(const Lens& lens) {
   const std::string models = metrics_text(lens.metrics);
   if (!lens.source_limit) return models;
-  return models + "  limit   " + metrics_text(*lens.source_limit) + "  of any surface, this source\n";
+  return models + "  limit   " + metrics_text(*lens.source_limit) +
+         "  of any surface, this source\n";
 }
 
 std::string size_text(long columns, long rows) {

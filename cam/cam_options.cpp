@@ -56,10 +56,11 @@ void validate_tolerances(const CamOptions& options, const OpticalSetup& setup) {
   if (options.tolerances == 0) return;
   const bool usual = !setup.point && setup.extent.none() && setup.mode == LightMode::kRefract;
   if (usual && !setup.screen_is_turned()) return;
-  refuse("--tolerances", options.tolerances,
-         "draws parts of lenses for parallel light from one direction and a screen parallel to them "
-         "only; use "
-         "--tolerances 0");
+  refuse(
+      "--tolerances", options.tolerances,
+      "draws parts of lenses for parallel light from one direction and a screen parallel to them "
+      "only; use "
+      "--tolerances 0");
 }
 
 /// Before hours are spent on programs that the controller could not read.

@@ -26,7 +26,7 @@ constexpr int kMaxIterations = 400;
 
 class LimitObjective {
  public:
-  LimitObjective(const Image& target, BlurKernel kernel, const Executor& executor)
+  LimitObjective(const Image& target, SourceKernel kernel, const Executor& executor)
       : executor_(executor),
         wanted_(encoded_values(target)),
         total_(target.total()),
@@ -82,8 +82,7 @@ Image image_of(std::span<const double> values, int columns, int rows) {
 
 /// The target's light, evenly over the parts of a pixel.
 std::vector<double> start_from(const Image& target, int parts) {
-  const double least =
-      kLeastStart * target.total() / static_cast<double>(target.values().size());
+  const double least = kLeastStart * target.total() / static_cast<double>(target.values().size());
   std::vector<double> q;
   for (int row = 0; row < parts * target.rows(); ++row) {
     for (int column = 0; column < parts * target.columns(); ++column) {

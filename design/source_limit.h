@@ -9,7 +9,7 @@
 namespace lensforge {
 
 /// The best picture that an extended source lets any surface make, as far as light is even within
-/// each part of a pixel (BlurKernel) and one kernel holds for all of the lens.
+/// each part of a pixel (SourceKernel) and one kernel holds for all of the lens.
 struct SourceLimit {
   Image light;           ///< μ: what such a surface would project in the light of a point.
   ImageMetrics metrics;  ///< Of k∗μ against the target.

@@ -56,7 +56,8 @@ std::vector<double> picture_under(const OpticalSetup& setup, int count,
 
 std::vector<double> picture_by_convolution(const OpticalSetup& setup, double z,
                                            const PointPicture& picture, const Executor& executor) {
-  SourceBlurOn<Executor> blur(source_kernel(setup, z), setup.pixels.x(), setup.pixels.y(), executor);
+  SourceBlurOn<Executor> blur(source_kernel(setup, z), setup.pixels.x(), setup.pixels.y(),
+                              executor);
   OpticalSetup sharp = lit_from(setup, Eigen::Vector2d::Zero());
   sharp.pixels *= blur.parts();
   const std::vector<double> parts = picture(sharp);
@@ -66,7 +67,9 @@ std::vector<double> picture_by_convolution(const OpticalSetup& setup, double z,
 
 SourceCheck check_source(const Lens& lens, const Executor& executor) {
   const double z = surface_height(lens);
-  const auto point = [&](const OpticalSetup& setup) { return point_picture(lens, setup, executor); };
+  const auto point = [&](const OpticalSetup& setup) {
+    return point_picture(lens, setup, executor);
+  };
   SourceCheck check;
   check.blur = source_blur(lens.setup, z);
   check.points = source_point_count(lens.setup, z);

@@ -19,7 +19,8 @@ int source_point_count(const OpticalSetup& setup, double z);
 
 /// Flux per pixel under an extended source: the sum of the pictures in the light of each of about
 /// `count` of its points, by shares. No approximation but the count.
-std::vector<double> picture_under(const OpticalSetup& setup, int count, const PointPicture& picture);
+std::vector<double> picture_under(const OpticalSetup& setup, int count,
+                                  const PointPicture& picture);
 
 /// The same picture in a convolution, source_kernel()'s.
 /// @param z  of the surface, mm.
@@ -30,8 +31,8 @@ std::vector<double> picture_by_convolution(const OpticalSetup& setup, double z,
 struct SourceCheck {
   double blur = 0.0;  ///< Width of the source's image on the screen, pixels.
   int points = 0;     ///< Of the source, whose pictures are summed.
-  /// Mean absolute differences of display-encoded pixels between that picture and the one of half as
-  /// many points, and the one that the optimiser goes by, a convolution.
+  /// Mean absolute differences of display-encoded pixels between that picture and the one of half
+  /// as many points, and the one that the optimiser goes by, a convolution.
   double halving = 0.0;
   double convolution = 0.0;
 };

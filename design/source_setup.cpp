@@ -49,7 +49,8 @@ bool lights_surface(const OpticalSetup& setup, double thickness) {
   for (const SourcePoint& point : source_points({setup.extent.width, {}}, 16)) {
     const OpticalSetup one = lit_from(setup, 1.1 * point.at);
     const bool lens = one.mode == LightMode::kRefract;
-    if (one.point && !(lens ? one.point->position.z() < 0.0 : one.point->position.z() > thickness)) {
+    if (one.point &&
+        !(lens ? one.point->position.z() < 0.0 : one.point->position.z() > thickness)) {
       return false;
     }
     if (!one.point && !(lens ? one.light.z() > 0.0 : one.light.z() < 0.0)) return false;
@@ -69,7 +70,9 @@ bool allows(const OpticalSetup& setup, double thickness) {
 SourceShape shape_of(const Image& picture) {
   const int longer = std::max(picture.columns(), picture.rows());
   const double scale = std::min(1.0, static_cast<double>(kMaxShapeSide) / longer);
-  const auto scaled = [&](int side) { return std::max(1, static_cast<int>(std::lround(scale * side))); };
+  const auto scaled = [&](int side) {
+    return std::max(1, static_cast<int>(std::lround(scale * side)));
+  };
   const Image small = resample(picture, scaled(picture.columns()), scaled(picture.rows()));
   SourceShape shape{small.columns(), small.rows(), {small.values().begin(), small.values().end()}};
   const double most = *std::max_element(shape.weights.begin(), shape.weights.end());
@@ -98,10 +101,10 @@ void require_source_options(const LightOptions& light) {
            "needs --source point; of parallel light --source-angle 9.3 would do");
   }
   if (!light.source_shape.is_disc() && source_extent(light).none()) {
-    refuse("--source-picture", "needs the width of what it shows; --source-" +
-                                   std::string(light.source == SourceKind::kPoint ? "size 3mm"
-                                                                                  : "angle 9.3") +
-                                   " would do");
+    refuse("--source-picture",
+           "needs the width of what it shows; --source-" +
+               std::string(light.source == SourceKind::kPoint ? "size 3mm" : "angle 9.3") +
+               " would do");
   }
 }
 

@@ -47,7 +47,7 @@ class PixelWeights {
 };
 
 /// Weights of light before an extended source blurs it, of those of the pixels.
-std::vector<double> in_parts(std::span<const double> weights, const BlurKernel& kernel,
+std::vector<double> in_parts(std::span<const double> weights, const SourceKernel& kernel,
                              const Eigen::Vector2i& pixels, const Executor& executor) {
   if (kernel.none()) return {weights.begin(), weights.end()};
   SourceBlurOn<Executor> blur(kernel, pixels.x(), pixels.y(), executor);
@@ -227,7 +227,7 @@ LeakMap map_leakage(const NamedSurface& designed, const NamedSurface& part,
   LF_CHECK(static_cast<std::int64_t>(weights.size()) ==
                static_cast<std::int64_t>(pixels.x()) * pixels.y(),
            std::to_string(weights.size()));
-  const BlurKernel kernel = setup.blur();
+  const SourceKernel kernel = setup.blur();
   const OpticalSetup optics = setup.optics_in_parts(kernel);
   const PixelWeights pixel_weights(in_parts(weights, kernel, pixels, executor), optics.pixels.x(),
                                    optics.pixels.y());

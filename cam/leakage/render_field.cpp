@@ -21,7 +21,7 @@ Image FluxPicture::image(double total) const {
   return image;
 }
 
-OpticalSetup FieldRenderSetup::optics_in_parts(const BlurKernel& kernel) const {
+OpticalSetup FieldRenderSetup::optics_in_parts(const SourceKernel& kernel) const {
   OpticalSetup fine = optics;
   fine.pixels *= kernel.parts;
   return fine;
@@ -33,7 +33,7 @@ std::vector<FluxPicture> render_parts(std::span<const SurfaceField* const> field
                                       const FieldRenderSetup& setup, const CellRange& cells,
                                       const Executor& executor, const RunControl& control) {
   const Eigen::Vector2i pixels = setup.optics.pixels;
-  const BlurKernel kernel = setup.blur();
+  const SourceKernel kernel = setup.blur();
   const OpticalSetup optics = setup.optics_in_parts(kernel);
   SourceBlurOn<Executor> blur(kernel, pixels.x(), pixels.y(), executor);
   std::vector<FluxImage> images;

@@ -39,14 +39,14 @@ struct FieldRenderSetup {
   double surface_height = 0.0;
 
   /// What an extended source makes of the light of a point.
-  [[nodiscard]] BlurKernel blur() const { return source_kernel(optics, surface_height); }
+  [[nodiscard]] SourceKernel blur() const { return source_kernel(optics, surface_height); }
   /// The optics with the picture in the parts of pixels that the blur wants.
-  [[nodiscard]] OpticalSetup optics_in_parts(const BlurKernel& kernel) const;
+  [[nodiscard]] OpticalSetup optics_in_parts(const SourceKernel& kernel) const;
 };
 
 /// Renders a surface tile by tile: memory does not grow with the grid. Every image triangle is
-/// deposited exactly (design/flux); what is neglected is how the slope bends inside a triangle. Under an
-/// extended source the picture is blurred as the optimiser does it, see source_kernel().
+/// deposited exactly (design/flux); what is neglected is how the slope bends inside a triangle.
+/// Under an extended source the picture is blurred as the optimiser does it, see source_kernel().
 /// Same bits for any tile and any number of threads.
 /// @throw Interrupted if `control` or the executor asks for an end.
 FluxPicture render_field(const SurfaceField& field, const FieldRenderSetup& setup,

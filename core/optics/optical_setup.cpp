@@ -48,7 +48,8 @@ void require_extent(const SourceExtent& extent) {
           "a finite number of 0 or more");
   const SourceShape& shape = extent.shape;
   if (shape.is_disc()) return;
-  const auto pixels = static_cast<std::size_t>(shape.columns) * static_cast<std::size_t>(shape.rows);
+  const auto pixels =
+      static_cast<std::size_t>(shape.columns) * static_cast<std::size_t>(shape.rows);
   const bool lit = std::any_of(shape.weights.begin(), shape.weights.end(),
                                [](double weight) { return weight > 0.0; });
   const bool allowed = std::all_of(shape.weights.begin(), shape.weights.end(), [](double weight) {

@@ -20,7 +20,8 @@ struct SourceShape {
 /// Most pixels on a shape's longer side: each is a beam of its own in an exact rendering.
 inline constexpr int kMaxShapeSide = 16;
 
-/// How large a source is. One that is a point, or infinitely far away in one direction, has width 0.
+/// How large a source is. One that is a point, or infinitely far away in one direction, has width
+/// 0.
 struct SourceExtent {
   double width = 0.0;  ///< Disc's diameter or shape's width: of parallel light rad, of a point mm.
   SourceShape shape;

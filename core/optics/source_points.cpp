@@ -19,8 +19,9 @@ std::vector<SourcePoint> disc_points(double diameter, int count) {
   std::vector<SourcePoint> points;
   for (int i = 0; i < count; ++i) {
     const double radius = 0.5 * diameter * std::sqrt((i + 0.5) / count);
-    points.push_back({radius * Eigen::Vector2d(std::cos(i * golden_angle), std::sin(i * golden_angle)),
-                      1.0 / count});
+    points.push_back(
+        {radius * Eigen::Vector2d(std::cos(i * golden_angle), std::sin(i * golden_angle)),
+         1.0 / count});
   }
   return points;
 }
@@ -31,7 +32,8 @@ void divide_pixel(const Eigen::Vector2d& corner, int parts, const SourcePoint& w
   for (int j = 0; j < parts; ++j) {
     for (int i = 0; i < parts; ++i) {
       const Eigen::Vector2d at = corner + Eigen::Vector2d(i + 0.5, j + 0.5) / parts;
-      points.push_back({whole.at + Eigen::Vector2d(at.x(), -at.y()), whole.share / (parts * parts)});
+      points.push_back(
+          {whole.at + Eigen::Vector2d(at.x(), -at.y()), whole.share / (parts * parts)});
     }
   }
 }

@@ -49,8 +49,8 @@ LF_HD inline GoalSums goal_adjoint(const ObjectiveView& o, std::int64_t face,
   values.boundary = boundary_term(image, goal.columns, goal.rows, w.boundary, bar);
   if (goal.led != nullptr && goal.led[face] != kNoPixel) {
     const std::int32_t pixel = goal.led[face];
-    values.unlit =
-        unlit_term(image, pixel, static_cast<std::int64_t>(goal.columns), goal.target[pixel], w.image, bar);
+    values.unlit = unlit_term(image, pixel, static_cast<std::int64_t>(goal.columns),
+                              goal.target[pixel], w.image, bar);
   }
   return values;
 }

@@ -48,8 +48,8 @@ PartWeights part_weights(const SourceExtent& extent, const Eigen::Matrix2d& moti
 }
 
 /// Light of part q goes to part p by k(p − q); to pixel P by the sum over its parts.
-BlurKernel sum_over_pixel(const PartWeights& k) {
-  BlurKernel kernel;
+SourceKernel sum_over_pixel(const PartWeights& k) {
+  SourceKernel kernel;
   kernel.parts = kParts;
   kernel.columns = static_cast<int>(k.weights.cols()) + kParts - 1;
   kernel.rows = static_cast<int>(k.weights.rows()) + kParts - 1;
@@ -68,7 +68,7 @@ BlurKernel sum_over_pixel(const PartWeights& k) {
 
 }  // namespace
 
-BlurKernel source_kernel(const OpticalSetup& setup, double z) {
+SourceKernel source_kernel(const OpticalSetup& setup, double z) {
   if (setup.extent.none()) return {};
   return sum_over_pixel(part_weights(setup.extent, kParts * source_motion(setup, z)));
 }

@@ -16,10 +16,11 @@ namespace lensforge {
 /// How an extended source spreads light over the picture. Light is told apart in parts of pixels,
 /// `parts` each way: in whole ones an optimiser finds light that only seems to add up.
 ///
-/// Notation: q a part and P a pixel, counted in one direction; out(P) = Σ_d w(d) in(parts·P + d − o).
-struct BlurKernel {
+/// Notation: q a part and P a pixel, counted in one direction; out(P) = Σ_d w(d) in(parts·P + d −
+/// o).
+struct SourceKernel {
   int parts = 1;
-  int columns = 1;   ///< Of the weights.
+  int columns = 1;  ///< Of the weights.
   int rows = 1;
   int offset_x = 0;  ///< o
   int offset_y = 0;
@@ -30,9 +31,9 @@ struct BlurKernel {
 
 /// The image of the setup's source through the middle of a lens whose surface there is at height z,
 /// mm. Every point of the source shifts the picture, by quadratic interpolation between the parts:
-/// linear interpolation would add a blur of its own. One kernel serves the whole picture: a paraxial
-/// approximation.
-BlurKernel source_kernel(const OpticalSetup& setup, double z);
+/// linear interpolation would add a blur of its own. One kernel serves the whole picture: a
+/// paraxial approximation.
+SourceKernel source_kernel(const OpticalSetup& setup, double z);
 
 /// Neighbours in a row that one item sums, so that a compiler takes them side by side.
 inline constexpr int kBlurStrip = 8;
@@ -66,7 +67,8 @@ LF_HD inline void add_to_strip(double w, const double* line, std::int64_t length
   }
 }
 
-/// Parts → pixels, a strip of a row of pixels. Light that leaves the picture is lost, none comes in.
+/// Parts → pixels, a strip of a row of pixels. Light that leaves the picture is lost, none comes
+/// in.
 struct BlurStrip {
   BlurView blur;
   const double* parts;
@@ -136,12 +138,14 @@ struct BlurStripAdjoint {
 template <class Exec>
 class SourceBlurOn {
  public:
-  SourceBlurOn(BlurKernel kernel, int columns, int rows, const Exec& executor)
+  SourceBlurOn(SourceKernel kernel, int columns, int rows, const Exec& executor)
       : kernel_(std::move(kernel)),
         columns_(columns),
         rows_(rows),
         weights_(buffer_of(executor, std::span<const double>(kernel_.weights))),
-        pixels_(kernel_.none() ? 0 : static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows)),
+        pixels_(kernel_.none()
+                    ? 0
+                    : static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows)),
         bar_(pixels_.size()) {}
 
   /// True if there is nothing to do.
@@ -169,11 +173,11 @@ class SourceBlurOn {
   static constexpr std::int64_t kStripGrain = 16;
 
   [[nodiscard]] BlurView view() const {
-    return {weights_.data(),   kernel_.parts,    kernel_.columns, kernel_.rows,
-            kernel_.offset_x,  kernel_.offset_y, columns_,        rows_};
+    return {weights_.data(),  kernel_.parts,    kernel_.columns, kernel_.rows,
+            kernel_.offset_x, kernel_.offset_y, columns_,        rows_};
   }
 
-  BlurKernel kernel_;
+  SourceKernel kernel_;
   int columns_;
   int rows_;
   typename Exec::template Buffer<double> weights_;

@@ -36,8 +36,8 @@ LevelProblem make_problem(const DesignTask& task, const Level& level, std::int64
   problem.setup = task.setup;
   problem.setup.pixels = level.pixels;
   problem.target = resample(task.target, level.pixels.x(), level.pixels.y());
-  problem.aim = task.limit ? resample(task.limit->light, level.pixels.x(), level.pixels.y())
-                           : problem.target;
+  problem.aim =
+      task.limit ? resample(task.limit->light, level.pixels.x(), level.pixels.y()) : problem.target;
   problem.objective.weights = task.options.weights;
   problem.objective.model = task.options.model;
   problem.objective.nu = level.nu;

@@ -129,8 +129,8 @@ bool wanted(const PaperRow& row, const std::vector<std::string>& only) {
 
 std::vector<PaperRow> choose_rows(const RowChoice& choice) {
   std::vector<PaperRow> rows;
-  for (const auto& group :
-       {paper_kinds(choice), other_lights(choice), photographs(choice), smooth_rows(choice), ablation(choice)}) {
+  for (const auto& group : {paper_kinds(choice), other_lights(choice), photographs(choice),
+                            smooth_rows(choice), ablation(choice)}) {
     for (PaperRow row : group) {
       if (!wanted(row, choice.only)) continue;
       if (choice.most_pixels > 0) row.pixels = std::min(row.pixels, choice.most_pixels);

@@ -92,8 +92,7 @@ TracedPicture traced(const SurfaceMesh& mesh, const OpticalSetup& setup, int cou
   TracedPicture picture{std::vector<double>(static_cast<std::size_t>(setup.pixels.prod()), 0.0), 0};
   Random random(11);
   for (int ray = 0; ray < count; ++ray) {
-    const double angle =
-        0.5 * setup.extent.width * std::sqrt(random.between(0.0, 1.0));
+    const double angle = 0.5 * setup.extent.width * std::sqrt(random.between(0.0, 1.0));
     const double turn = random.between(0.0, 2.0 * std::numbers::pi);
     const Eigen::Vector3d way =
         Eigen::Vector3d(angle * std::cos(turn), angle * std::sin(turn), 1.0).normalized();
@@ -142,7 +141,8 @@ TEST(ExtendedPicture, TheConvolutionIsCloseToTheSumOverTheSource) {
   setup.extent.width = 0.05;
   const SurfaceMesh mesh = testing::height_field({24.0, 20.0}, {49, 41}, testing::bumps);
   const auto flux = [&](const OpticalSetup& one) {
-    const RenderResult result = render_surface(mesh, one, SurfaceModel::kSmooth, Executor::serial());
+    const RenderResult result =
+        render_surface(mesh, one, SurfaceModel::kSmooth, Executor::serial());
     return std::vector<double>(result.image.values().begin(), result.image.values().end());
   };
   const std::vector<double> exact = picture_under(setup, 256, flux);

@@ -40,7 +40,7 @@ double product(std::span<const double> a, std::span<const double> b) {
 }
 
 TEST(SourceBlur, IsTheSumOfItsDefinition) {
-  const BlurKernel kernel = source_kernel(wide_source(), 5.0);
+  const SourceKernel kernel = source_kernel(wide_source(), 5.0);
   const int parts = kernel.parts;
   const std::vector<double> in = random_values(kColumns * kRows * parts * parts, 1);
   SourceBlurOn<Executor> blur(kernel, kColumns, kRows, Executor::serial());
@@ -63,7 +63,7 @@ TEST(SourceBlur, IsTheSumOfItsDefinition) {
 }
 
 TEST(SourceBlur, TheAdjointIsTheTranspose) {
-  const BlurKernel kernel = source_kernel(wide_source(), 5.0);
+  const SourceKernel kernel = source_kernel(wide_source(), 5.0);
   SourceBlurOn<Executor> blur(kernel, kColumns, kRows, Executor::serial());
   const auto fine = static_cast<std::size_t>(kColumns * kRows * kernel.parts * kernel.parts);
   const std::vector<double> in = random_values(fine, 2);
@@ -76,7 +76,7 @@ TEST(SourceBlur, TheAdjointIsTheTranspose) {
 }
 
 TEST(SourceBlur, SameBitsForAnyNumberOfThreads) {
-  const BlurKernel kernel = source_kernel(wide_source(), 5.0);
+  const SourceKernel kernel = source_kernel(wide_source(), 5.0);
   const std::vector<double> in =
       random_values(static_cast<std::size_t>(kColumns * kRows * kernel.parts * kernel.parts), 4);
   SourceBlurOn<Executor> one(kernel, kColumns, kRows, Executor::serial());
@@ -88,7 +88,7 @@ TEST(SourceBlur, SameBitsForAnyNumberOfThreads) {
 
 TEST(SourceBlur, APointOfLightBecomesTheSourcesImageWithItsMoments) {
   const OpticalSetup setup = wide_source();
-  const BlurKernel kernel = source_kernel(setup, 5.0);
+  const SourceKernel kernel = source_kernel(setup, 5.0);
   SourceBlurOn<Executor> blur(kernel, kColumns, kRows, Executor::serial());
   const auto width = static_cast<std::size_t>(kColumns * kernel.parts);
   std::vector<double> in(width * static_cast<std::size_t>(kRows * kernel.parts), 0.0);
