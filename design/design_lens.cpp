@@ -96,12 +96,13 @@ DesignResult design_lens(const Image& target, const DesignOptions& options,
   const Ending ending = run_all(task, log, state);
   DesignResult result = result_of(ending, log);
   result.lens = make_lens(task, std::move(state.mesh), executor);
-  if (task.limit) result.source = check_source(result.lens, executor);
+  const bool done = result.status == DesignResult::Status::kDone;
+  if (task.limit && done) result.source = check_source(result.lens, executor);
   result.made = made_part(settled, result.lens, executor);
   result.fingerprint = state.fingerprint;
   result.convergence = std::move(state.convergence);
   // Rounds that stopped early leave work over.
-  if (result.status == DesignResult::Status::kDone) log.report_done();
+  if (done) log.report_done();
   return result;
 }
 

@@ -8,12 +8,15 @@
 #include "core/image/metrics.h"
 #include "core/optics/source_points.h"
 #include "design/flux/source_blur.h"
+#include "design/picture_values.h"
 #include "design/render_lens.h"
 
 namespace lensforge {
 namespace {
 
-/// Points for every pixel of the source's image, and the least and most of all.
+/// Points for every pixel of the source's image, and the least and most of all: 64² portrait, a
+/// source of 2.2 pixels, half of 123 points change the picture by an MAE of 0.0010; half of 32 by
+/// 0.0043.
 constexpr double kPointsPerPixel = 25.0;
 constexpr int kMinPoints = 64;
 constexpr int kMaxPoints = 256;
@@ -26,13 +29,6 @@ std::vector<double> point_picture(const Lens& lens, const OpticalSetup& setup,
   std::vector<double> picture = flux_of_lens(lens, setup, executor);
   for (double& value : picture) value *= lens.target.total();
   return picture;
-}
-
-Image image_of(const std::vector<double>& flux, const Eigen::Vector2i& pixels) {
-  Image image(pixels.x(), pixels.y());
-  std::transform(flux.begin(), flux.end(), image.values().begin(),
-                 [](double value) { return static_cast<float>(value); });
-  return image;
 }
 
 }  // namespace
@@ -72,13 +68,14 @@ SourceCheck check_source(const Lens& lens, const Executor& executor) {
   };
   SourceCheck check;
   check.blur = source_blur(lens.setup, z);
-  check.points = source_point_count(lens.setup, z);
-  const Image halved =
-      image_of(picture_under(lens.setup, check.points / 2, point), lens.setup.pixels);
-  const Image convolved =
-      image_of(picture_by_convolution(lens.setup, z, point, executor), lens.setup.pixels);
-  check.halving = compare(halved, lens.render).mae;
-  check.convolution = compare(convolved, lens.render).mae;
+  const int count = source_point_count(lens.setup, z);
+  check.points = static_cast<int>(source_points(lens.setup.extent, count).size());
+  const auto difference = [&](const std::vector<double>& other) {
+    const Eigen::Vector2i& pixels = lens.setup.pixels;
+    return compare(image_of(other, pixels.x(), pixels.y()), lens.render).mae;
+  };
+  check.halving = difference(picture_under(lens.setup, count / 2, point));
+  check.convolution = difference(picture_by_convolution(lens.setup, z, point, executor));
   return check;
 }
 

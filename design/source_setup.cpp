@@ -20,6 +20,9 @@ constexpr double kMilliradian = 1e-3;
 /// that can be called a picture.
 constexpr double kMaxBlur = 0.5;
 
+/// Where the search for a narrower source ends: a source of a kilometre becomes one of a micron.
+constexpr double kLeastShare = 1e-9;
+
 [[noreturn]] void refuse(const std::string& what, const std::string& rule) {
   throw InputError(what + ": " + rule);
 }
@@ -44,8 +47,17 @@ std::string narrower_text(const LightOptions& light, double share) {
   return width_text(other);
 }
 
+/// Normal of the surface that sends the light of its middle to the picture's centre.
+Eigen::Vector3d middle_normal(const OpticalSetup& setup, const Eigen::Vector3d& middle) {
+  const LightPath light(lit_from(setup, Eigen::Vector2d::Zero()));
+  const Eigen::Vector2d gradient = light.gradient_for(middle, 0.5 * setup.pixels.cast<double>());
+  return Eigen::Vector3d(-gradient.x(), -gradient.y(), 1.0).normalized();
+}
+
 /// True if light comes from all of the source to the middle of the surface and leaves it.
 bool lights_surface(const OpticalSetup& setup, double thickness) {
+  const Eigen::Vector3d middle(0.5 * setup.lens_size.x(), 0.5 * setup.lens_size.y(), thickness);
+  const Eigen::Vector3d n = middle_normal(setup, middle);
   for (const SourcePoint& point : source_points({setup.extent.width, {}}, 16)) {
     const OpticalSetup one = lit_from(setup, 1.1 * point.at);
     const bool lens = one.mode == LightMode::kRefract;
@@ -54,8 +66,7 @@ bool lights_surface(const OpticalSetup& setup, double thickness) {
       return false;
     }
     if (!one.point && !(lens ? one.light.z() > 0.0 : one.light.z() < 0.0)) return false;
-    const Eigen::Vector3d middle(0.5 * one.lens_size.x(), 0.5 * one.lens_size.y(), thickness);
-    if (!LightPath(one).transmits(middle, Eigen::Vector3d::UnitZ())) return false;
+    if (!LightPath(one).transmits(middle, n)) return false;
   }
   return true;
 }
@@ -115,7 +126,7 @@ void require_source_extent(const DesignOptions& options, const OpticalSetup& set
   do {
     share *= 0.9;
     narrower.extent.width = share * setup.extent.width;
-  } while (!allows(narrower, options.thickness));
+  } while (share > kLeastShare && !allows(narrower, options.thickness));
   refuse(width_text(options.light),
          "the light of each point of the lens must cover at most half of the picture; " +
              narrower_text(options.light, share) + " would do");
