@@ -30,9 +30,12 @@
 #include "core/image/image_io.h"
 #include "core/io/lens_folder.h"
 #include "core/io/pending_files.h"
+#include "core/optics/source_points.h"
 #include "core/text/version.h"
 #include "design/design_estimate.h"
 #include "design/design_lens.h"
+#include "design/light_setup.h"
+#include "design/schedule/level_plan.h"
 
 namespace lensforge::app {
 namespace {
@@ -54,6 +57,15 @@ std::vector<std::string> changes_made(const LoadedImage& loaded, const DesignSet
   return changes;
 }
 
+/// Says so where the source hides the picture's finest detail.
+void note_source(const Image& picture, const DesignOptions& design, const Console& console) {
+  const Eigen::Vector2i pixels = working_size(picture.columns(), picture.rows(), design.pixels);
+  const double blur = source_blur(optical_setup(design, pixels), design.thickness);
+  if (!(blur > 1.0)) return;
+  console.note("the source's image is " + fixed(blur, 1) +
+               " pixels wide: no lens shows finer detail in this light");
+}
+
 /// 16 hexadecimal digits: JSON's numbers do not hold 64 bits.
 std::string fingerprint_text(std::uint64_t fingerprint) {
   std::array<char, 17> text{};
@@ -72,6 +84,13 @@ nlohmann::json made_json(const MadeBy& process, const DesignResult::Made& made) 
           {"metrics", metrics_json(made.metrics)}};
 }
 
+nlohmann::json source_json(const SourceCheck& source) {
+  return {{"blur_pixels", source.blur},
+          {"points", source.points},
+          {"halving_mae", source.halving},
+          {"convolution_mae", source.convolution}};
+}
+
 nlohmann::json provenance(const OptionSet& options, const ChosenDevice& device,
                           const DesignOptions& design, const DesignResult& result) {
   const bool done = result.status == DesignResult::Status::kDone;
@@ -84,6 +103,7 @@ nlohmann::json provenance(const OptionSet& options, const ChosenDevice& device,
       {"status", done ? "done" : "interrupted"},
       {"message", result.message},
       {"fingerprint", fingerprint_text(result.fingerprint)}};
+  if (result.source) fields["source_check"] = source_json(*result.source);
   if (result.made) fields["made_by"] = made_json(*design.made_by, *result.made);
   return fields;
 }
@@ -115,9 +135,10 @@ nlohmann::json summary_json(const fs::path& folder, const DesignResult& result) 
                             {"pixels", {lens.setup.pixels.x(), lens.setup.pixels.y()}},
                             {"grid", {lens.surface.grid.columns, lens.surface.grid.rows}},
                             {"lens_size", {lens.setup.lens_size.x(), lens.setup.lens_size.y()}},
-                            {"metrics", metrics_json(lens.metrics)},
+                            {"metrics", metrics_json(lens)},
                             {"iterations", result.convergence.size()},
                             {"seconds", lens.provenance["seconds"]}};
+  if (result.source) summary["source_check"] = source_json(*result.source);
   if (result.made) summary["made"] = metrics_json(result.made->metrics);
   return summary;
 }
@@ -125,7 +146,7 @@ nlohmann::json summary_json(const fs::path& folder, const DesignResult& result) 
 std::string summary_text(const fs::path& folder, const DesignResult& result) {
   const Lens& lens = result.lens;
   return folder.string() + ": " + result.message + "\n" +  //
-         metrics_text(lens.metrics) +                      //
+         metrics_text(lens) +                              //
          (result.made ? "  made    " + metrics_text(result.made->metrics) + "\n" : "") + "  " +
          size_text(lens.setup.pixels.x(), lens.setup.pixels.y()) + " pixels, " +
          std::to_string(lens.surface.vertex_count()) + " vertices, " +
@@ -225,6 +246,7 @@ int run(OptionSet& options, DesignSettings& settings) {
     folder.remove_partial_files(is_of_lens);
     if (device.executor.device() != Device::kCpu) console.note("computing on " + device.word);
     for (const std::string& change : changes_made(loaded, settings)) console.note(change);
+    note_source(loaded.image, design, console);
     // A design that was killed before its first checkpoint starts at the beginning.
     if (settings.resume && !design.resume) {
       console.note("nothing to resume: started the design from the beginning");

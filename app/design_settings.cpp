@@ -7,7 +7,9 @@
 #include "cam/cam_fields.h"
 #include "cam/tool/workshop.h"
 #include "core/error.h"
+#include "core/image/image_io.h"
 #include "design/design_fields.h"
+#include "design/source_setup.h"
 
 namespace lensforge::app {
 
@@ -56,6 +58,9 @@ void add_design_options(OptionSet& options, DesignSettings& settings) {
   options.required_text("--out", settings.out, "DIR", "lens folder to write");
   options.fields(design_fields(), settings.design);
   options.fields(light_fields(), settings.design.light);
+  options.text("--source-picture", settings.source_picture, "FILE",
+               "picture of the lamp as seen from the lens, as wide as --source-angle or "
+               "--source-size; without it the lamp is an evenly lit disc");
   options.fields(weight_fields(), settings.design.weights);
   options.text("--made-by", settings.made_by, "default|FILE.toml",
                "shape the part that this workshop cuts and polishes, not the surface alone");
@@ -87,6 +92,9 @@ void settle(OptionSet& options, DesignSettings& settings, const Image& picture) 
   }
   settings.design = default_design_options(settings.design.model, picture);
   options.restate();
+  if (!settings.source_picture.empty()) {
+    settings.design.light.source_shape = shape_of(read_image(settings.source_picture).image);
+  }
   if (!settings.made_by.empty()) settings.design.made_by = process_of(workshop, settings);
   validate(settings.design, picture);
 }

@@ -13,9 +13,10 @@ namespace lensforge::app {
 struct DesignSettings {
   std::string target;
   std::string out;
-  std::string made_by;  ///< Workshop file, or "default"; empty: not designed for a process.
-  bool robust = false;  ///< For parts that are polished less and more than made_by says.
-  CamOptions cut;       ///< What of it is milled for made_by: the part or a mould, its shrinkage.
+  std::string source_picture;  ///< File with the source's shape; empty: a disc.
+  std::string made_by;         ///< Workshop file, or "default"; empty: not designed for a process.
+  bool robust = false;         ///< For parts that are polished less and more than made_by says.
+  CamOptions cut;  ///< What of it is milled for made_by: the part or a mould, its shrinkage.
   DesignOptions design;
   bool resume = false;
   bool force = false;

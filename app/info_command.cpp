@@ -65,8 +65,17 @@ std::string place_text(const Eigen::Vector3d& p) {
   return fixed(p.x(), 2) + ", " + fixed(p.y(), 2) + ", " + fixed(p.z(), 2);
 }
 
+/// Of an extended source: ", 3.00 mm wide".
+std::string extent_text(const OpticalSetup& setup) {
+  if (setup.extent.none()) return "";
+  const std::string width = setup.point ? fixed(setup.extent.width, 3) + " mm"
+                                        : fixed(1e3 * setup.extent.width, 3) + " mrad";
+  return ", " + width + " wide" + (setup.extent.shape.is_disc() ? "" : ", its picture given");
+}
+
 std::string light_text(const OpticalSetup& setup) {
-  const std::string on = setup.mode == LightMode::kReflect ? " on a mirror" : "";
+  const std::string on =
+      extent_text(setup) + (setup.mode == LightMode::kReflect ? " on a mirror" : "");
   if (!setup.point) return "parallel along " + place_text(setup.light) + on;
   const bool even = setup.point->emission == Emission::kIsotropic;
   return std::string(even ? "point" : "flat") + " source at " + place_text(setup.point->position) +
@@ -113,7 +122,8 @@ Description describe_lens(const fs::path& folder) {
   describe_mesh(d, lens.surface);
   for (const auto& [model, metrics] : lens.metrics)
     d.line(model_name(model), metrics_text(metrics));
-  d.json["metrics"] = metrics_json(lens.metrics);
+  if (lens.source_limit) d.line("limit", metrics_text(*lens.source_limit) + "  of the source");
+  d.json["metrics"] = metrics_json(lens);
   describe_provenance(d, lens.provenance);
   return d;
 }

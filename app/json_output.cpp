@@ -43,6 +43,19 @@ std::string metrics_text(const ModelMetrics& metrics) {
   return text;
 }
 
+nlohmann::json metrics_json(const Lens& lens) {
+  nlohmann::json by_model = metrics_json(lens.metrics);
+  if (lens.source_limit) by_model["source_limit"] = metrics_json(*lens.source_limit);
+  return by_model;
+}
+
+std::string metrics_text(const Lens& lens) {
+  const std::string models = metrics_text(lens.metrics);
+  if (!lens.source_limit) return models;
+  return models + "  limit   " + metrics_text(*lens.source_limit) +
+         "  of any surface, this source\n";
+}
+
 std::string size_text(long columns, long rows) {
   return std::to_string(columns) + " x " + std::to_string(rows);
 }

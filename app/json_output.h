@@ -15,11 +15,15 @@ namespace lensforge::app {
 nlohmann::json metrics_json(const ImageMetrics& metrics);
 /// An object with those of every model.
 nlohmann::json metrics_json(const ModelMetrics& metrics);
+/// The same with "source_limit", where the lens's source has an extent.
+nlohmann::json metrics_json(const Lens& lens);
 
 /// One line: "MAE 0.0123  PSNR 31.2 dB  SSIM 0.961  linear MAE 0.0042  flux inside 99.8 %".
 std::string metrics_text(const ImageMetrics& metrics);
 /// A line for every model.
 std::string metrics_text(const ModelMetrics& metrics);
+/// And one for the limit of the lens's source, if there is one.
+std::string metrics_text(const Lens& lens);
 
 /// A number with `digits` digits after the point.
 std::string fixed(double value, int digits);

@@ -14,12 +14,15 @@
 #include "app/option_set.h"
 #include "core/error.h"
 #include "core/image/image_io.h"
+#include "core/image/spectral_color.h"
 #include "core/io/files.h"
 #include "core/io/output_guard.h"
 #include "core/surface/lens.h"
 #include "core/surface/mesh_io.h"
+#include "core/surface/mesh_normals.h"
 #include "core/text/lower_case.h"
 #include "design/design_estimate.h"
+#include "design/fringe.h"
 #include "design/render_fields.h"
 #include "design/render_lens.h"
 #include "design/render_setup.h"
@@ -108,6 +111,9 @@ Scene adjusted(Scene scene, OptionSet& options, RenderArguments& arguments,
                      " is no lens that was designed as a spline");
   }
   const OpticalSetup& setup = scene.render.setup;
+  if (!scene.render.wavelengths.empty() && setup.mode == LightMode::kReflect) {
+    throw InputError("--wavelengths: a mirror bends light of all colours alike; leave it out");
+  }
   announce_picture(setup, arguments.out, console);
   if (options.given("--target")) scene.target = read_image(arguments.target).image;
   if (scene.target) scene.target = resample(*scene.target, setup.pixels.x(), setup.pixels.y());
@@ -127,6 +133,7 @@ Image scaled_to_white(Image image, const Console& console) {
 /// What a command says at the end, and what it wrote.
 struct Rendering {
   Image image;
+  std::optional<ColorImage> color;  ///< Instead of it.
   nlohmann::json json;
   std::string text;
 };
@@ -178,9 +185,70 @@ RenderResult project(const Scene& scene, const Executor& executor) {
 Rendering render_alone(const Scene& scene, const Executor& executor) {
   const RenderResult result = project(scene, executor);
   return {result.image,
+          {},
           {{"flux_inside", result.flux_inside}},
           "  " + model_name(scene.render.model) + "  flux inside " +
               fixed(100.0 * result.flux_inside, 1) + " %\n"};
+}
+
+/// Of the surface under its model, as vertex_area_normals() has them.
+Fringe fringe_of(const Scene& scene) {
+  const auto& [model, setup, wavelengths, abbe] = scene.render;
+  if (model == SurfaceModel::kSpline) {
+    return fringe_of(scene.spline->mesh, scene.spline->normals, setup, abbe, wavelengths);
+  }
+  const Eigen::Matrix3Xd normals =
+      scene.normals ? *scene.normals : vertex_area_normals(scene.surface);
+  return fringe_of(scene.surface, normals, setup, abbe, wavelengths);
+}
+
+/// The picture of each wavelength, relative to the target's white, or to even light without one.
+std::vector<Image> pictures_of(const Scene& scene, const Executor& executor) {
+  const Eigen::Vector2i& pixels = scene.render.setup.pixels;
+  const double even = scene.target ? scene.target->total() / pixels.prod() : 1.0;
+  std::vector<Image> pictures;
+  for (const double wavelength : scene.render.wavelengths) {
+    Scene colored = scene;
+    colored.render.setup = in_color(scene.render.setup, scene.render.abbe, wavelength);
+    pictures.push_back(project(colored, executor).image);
+    for (float& value : pictures.back().values()) value *= static_cast<float>(even);
+  }
+  return pictures;
+}
+
+Rendering render_spectrum(const Scene& scene, const Executor& executor) {
+  const std::vector<double>& wavelengths = scene.render.wavelengths;
+  const std::vector<Image> pictures = pictures_of(scene, executor);
+  const Fringe fringe = fringe_of(scene);
+  Rendering rendering;
+  rendering.color = color_picture(pictures, wavelengths);
+  rendering.json = {{"wavelengths_nm", wavelengths},
+                    {"fringe_mm", {{"mean", fringe.mean}, {"max", fringe.max}}}};
+  rendering.text = "  fringe  " + fixed(fringe.mean, 3) + " mm on average, at most " +
+                   fixed(fringe.max, 3) + " mm\n";
+  if (!scene.target) return rendering;
+  const Image seen = mixed(pictures, brightness_shares(wavelengths));
+  ImageMetrics metrics = compare(seen, *scene.target);
+  metrics.flux_inside = seen.total() / scene.target->total();
+  rendering.json["metrics"] = {{model_name(scene.render.model), metrics_json(metrics)}};
+  rendering.text += "  " + model_name(scene.render.model) + "  " + metrics_text(metrics) + "\n";
+  return rendering;
+}
+
+Rendering rendered(const Scene& scene, const Executor& executor) {
+  if (!scene.render.wavelengths.empty()) return render_spectrum(scene, executor);
+  return scene.target ? compare_models(scene, executor) : render_alone(scene, executor);
+}
+
+/// @throw InputError where what is said of colour does not go with the rest.
+void require_spectrum(const RenderArguments& arguments, const OptionSet& options) {
+  const bool given = !arguments.render.wavelengths.empty();
+  if (!given && options.given("--abbe")) {
+    throw InputError("--abbe: needs --wavelengths; --wavelengths 450,550,650 would do");
+  }
+  if (given && fs::path(arguments.out).extension() == ".exr") {
+    throw InputError("--out " + arguments.out + ": must end in .png with --wavelengths");
+  }
 }
 
 void require_picture_name(const std::string& out) {
@@ -192,10 +260,14 @@ void require_picture_name(const std::string& out) {
 
 void write_picture(Rendering& rendering, const Scene& scene, const std::string& out,
                    InterruptibleJob& job, const Console& console) {
-  const bool scale = !scene.target && fs::path(out).extension() == ".png";
+  const bool scale = !rendering.color && !scene.target && fs::path(out).extension() == ".png";
   const Image image = scale ? scaled_to_white(rendering.image, console) : rendering.image;
   job.begin_writing();
-  write_image(image, out, job.control());
+  if (rendering.color) {
+    write_image(*rendering.color, out);
+  } else {
+    write_image(image, out, job.control());
+  }
   rendering.json["out"] = out;
 }
 
@@ -208,6 +280,7 @@ int render_command(const Arguments& command_line) try {
   add_render_options(options, arguments);
   options.parse(command_line);
   require_picture_name(arguments.out);
+  require_spectrum(arguments, options);
   if (!arguments.out.empty()) require_replaceable("--out", arguments.out, arguments.force);
   const Console console(options.common().json, options.common().quiet);
   InterruptibleJob job(options.common(), arguments.out);
@@ -217,8 +290,7 @@ int render_command(const Arguments& command_line) try {
   ChosenDevice device = options.device_executor();
   device.executor = job.stoppable(device.executor);
   job.control().report({"picture", 0.0, 0.0, ""});
-  Rendering rendering =
-      scene.target ? compare_models(scene, device.executor) : render_alone(scene, device.executor);
+  Rendering rendering = rendered(scene, device.executor);
   if (!arguments.out.empty()) write_picture(rendering, scene, arguments.out, job, console);
   rendering.json["command"] = "render";
   rendering.json["device"] = device.word;

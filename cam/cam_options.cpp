@@ -54,10 +54,13 @@ void validate_tolerances(const CamOptions& options) {
 /// Parts turned, displaced and made of another material are known of the usual light only.
 void validate_tolerances(const CamOptions& options, const OpticalSetup& setup) {
   if (options.tolerances == 0) return;
-  if (!setup.point && setup.mode == LightMode::kRefract && !setup.screen_is_turned()) return;
-  refuse("--tolerances", options.tolerances,
-         "draws parts of lenses for parallel light and a screen parallel to them only; use "
-         "--tolerances 0");
+  const bool usual = !setup.point && setup.extent.none() && setup.mode == LightMode::kRefract;
+  if (usual && !setup.screen_is_turned()) return;
+  refuse(
+      "--tolerances", options.tolerances,
+      "draws parts of lenses for parallel light from one direction and a screen parallel to them "
+      "only; use "
+      "--tolerances 0");
 }
 
 /// Before hours are spent on programs that the controller could not read.

@@ -76,6 +76,7 @@ Prediction predict_part(const PartSurfaces& surfaces, const Lens& lens, const Ca
   Prediction result;
   const GridWindow grid = lens_grid(lens.setup.lens_size, sample_spacing(options));
   FieldRenderSetup setup{lens.setup, grid};
+  setup.surface_height = lens.surface.vertices.row(2).mean();
   const LightPath light(lens.setup);
   if (!light.intake_is_plan_area()) setup.whole = intake_of(lens.surface, light);
   const LeakageChain chain = chain_of(surfaces, lens, options);

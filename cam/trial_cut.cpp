@@ -214,10 +214,12 @@ LeakTrial TrialCut::at(const LeakPlace& place, const RunControl& control) const 
   const Eigen::Vector2d size = site_.lens.setup.lens_size;
   const PolishedField part(raw, site_.designed, {Eigen::Vector2d(0.0, 0.0), size},
                            options_.workshop.polish);
-  const OpticalSetup& optics = site_.lens.setup;
-  const FluxPicture predicted =
-      render_cells(site_.part, {optics, grid}, place.cells, executor_, silent);
-  const FluxPicture now = render_cells(part, {optics, fine.grid}, fine.cells, executor_, silent);
+  FieldRenderSetup setup{.optics = site_.lens.setup,
+                         .grid = grid,
+                         .surface_height = site_.lens.surface.vertices.row(2).mean()};
+  const FluxPicture predicted = render_cells(site_.part, setup, place.cells, executor_, silent);
+  setup.grid = fine.grid;
+  const FluxPicture now = render_cells(part, setup, fine.cells, executor_, silent);
   const Exchange change = exchange(site_.leakage, predicted, now);
   LeakTrial trial;
   trial.leakage = place.leakage + change.leakage;

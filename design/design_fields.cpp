@@ -120,6 +120,12 @@ const OptionTable<LightOptions>& light_fields() {
           {{"isotropic", Emission::kIsotropic}, {"lambertian", Emission::kLambertian}},
           "intensity of a point source: the same in all directions, or that of a flat LED which "
           "points to the middle of the lens"),
+      R::number(
+          "--source-angle", &O::source_angle, Limits::zero_or(kMinSourceWidth, kMaxSourceAngle),
+          "mrad",
+          "full angle of a lamp that sends nearly parallel light, as the sun's 9.3; 0 is none"),
+      R::length("--source-size", &O::source_size, Limits::zero_or(kMinSourceWidth, kMaxSourceSize),
+                "diameter of the lamp at --source-position; 0 is a point"),
       R::length("--image-width", &O::image_width, Limits::zero_or(kMinImageWidth, kMaxImageWidth),
                 "width of the picture on the screen; 0 takes the lens's"),
       pair("--image-offset", &O::image_offset, "X,Y",

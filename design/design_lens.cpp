@@ -46,6 +46,7 @@ Lens make_lens(const DesignTask& task, SurfaceMesh mesh, const Executor& executo
     Image* const render = model == lens.model ? &lens.render : nullptr;
     lens.metrics[model] = evaluate(lens, model, render, executor);
   }
+  if (task.limit) lens.source_limit = task.limit->metrics;
   return lens;
 }
 
@@ -95,11 +96,13 @@ DesignResult design_lens(const Image& target, const DesignOptions& options,
   const Ending ending = run_all(task, log, state);
   DesignResult result = result_of(ending, log);
   result.lens = make_lens(task, std::move(state.mesh), executor);
+  const bool done = result.status == DesignResult::Status::kDone;
+  if (task.limit && done) result.source = check_source(result.lens, executor);
   result.made = made_part(settled, result.lens, executor);
   result.fingerprint = state.fingerprint;
   result.convergence = std::move(state.convergence);
   // Rounds that stopped early leave work over.
-  if (result.status == DesignResult::Status::kDone) log.report_done();
+  if (done) log.report_done();
   return result;
 }
 

@@ -13,6 +13,7 @@
 #include "core/surface/lens.h"
 #include "design/design_options.h"
 #include "design/schedule/convergence.h"
+#include "design/source_picture.h"
 
 namespace lensforge {
 
@@ -27,6 +28,7 @@ struct DesignResult {
     Image picture;
   };
   std::optional<Made> made;
+  std::optional<SourceCheck> source;  ///< Of an extended source.
   Lens lens;  ///< The best surface so far, at the resolution that was reached.
   std::vector<ConvergenceRow> convergence;
 };

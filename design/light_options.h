@@ -14,6 +14,11 @@ inline constexpr double kMaxTilt = 80.0;
 inline constexpr double kMinImageWidth = 1e-3;
 inline constexpr double kMaxImageWidth = 1e6;
 
+/// Of a source's angle, mrad, and size, mm: from a laser's to a lamp that fills half of the sky.
+inline constexpr double kMinSourceWidth = 1e-3;
+inline constexpr double kMaxSourceAngle = 1500.0;
+inline constexpr double kMaxSourceSize = 1e6;
+
 enum class SourceKind { kParallel, kPoint };
 
 /// What lights the surface, what that does to the light, and where the picture is.
@@ -23,6 +28,9 @@ struct LightOptions {
   SourceKind source = SourceKind::kParallel;
   std::optional<Eigen::Vector3d> source_position;  ///< Of a point source, mm, lens frame.
   Emission emission = Emission::kIsotropic;        ///< Of a point source.
+  double source_angle = 0.0;                       ///< Full angle of parallel light, mrad.
+  double source_size = 0.0;                        ///< Diameter of a point source, mm.
+  SourceShape source_shape;                        ///< Of a source with an angle or a size.
   double image_width = 0.0;                        ///< Picture on the screen, mm; 0: the lens's.
   /// From where a flat surface's chief ray meets the screen to the picture's centre, mm along the
   /// lens's x and y.

@@ -13,6 +13,7 @@
 #include "core/optics/light_path.h"
 #include "core/text/number_list.h"
 #include "core/text/number_text.h"
+#include "design/source_setup.h"
 
 namespace lensforge {
 namespace {
@@ -214,6 +215,7 @@ OpticalSetup optical_setup(const DesignOptions& options, const Eigen::Vector2i& 
   }
   const Eigen::Vector2d chief =
       (options.focal_length - options.thickness) * LightPath(setup).chief_slope(options.thickness);
+  setup.extent = source_extent(options.light);
   setup.image_origin =
       0.5 * (setup.lens_size - setup.image_size) + chief + options.light.image_offset;
   tilt_screen(options.light.screen_tilt, setup);
@@ -228,12 +230,14 @@ OpticalSetup at_focal_length(OpticalSetup setup, double focal_length, double thi
 }
 
 void require_light(const DesignOptions& options, const Eigen::Vector2i& pixels) {
+  require_source_options(options.light);
   require_source(options, lens_size(options, pixels));
   require_tilt(options.light.screen_tilt);
   require_picture(options);
   const OpticalSetup setup = optical_setup(options, pixels);
   require_screen_beyond(options, setup);
   require_reach(options, setup);
+  require_source_extent(options, setup);
 }
 
 }  // namespace lensforge

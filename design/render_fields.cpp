@@ -2,7 +2,9 @@
 #include "design/render_fields.h"
 
 #include "core/image/image_io.h"
+#include "core/text/number_list.h"
 #include "design/design_options.h"
+#include "design/fringe.h"
 #include "design/render_setup.h"
 
 namespace lensforge {
@@ -50,6 +52,24 @@ Field image_width() {
           {}};
 }
 
+Field wavelengths() {
+  const auto get = [](const O& o) { return nlohmann::json(numbers_text(o.wavelengths)); };
+  const auto set = [](O& o, const nlohmann::json& value) {
+    o.wavelengths = parse_wavelengths(value.get<std::string>(), "--wavelengths");
+  };
+  return {{"--wavelengths",
+           OptionKind::kText,
+           "two to five wavelengths, nm: a picture in colour, of a source with the same power at "
+           "each, and how far dispersion moves their light apart",
+           {},
+           "LIST",
+           {}},
+          get,
+          set,
+          get,
+          {}};
+}
+
 }  // namespace
 
 const OptionTable<RenderOptions>& render_fields() {
@@ -68,7 +88,10 @@ const OptionTable<RenderOptions>& render_fields() {
           {{"front", ViewSide::kFront}, {"rear", ViewSide::kRear}},
           "side from which the picture is seen; a lens has its own default"),
       image_width(),
-      pixels()};
+      pixels(),
+      wavelengths(),
+      R::number("--abbe", &O::abbe, Limits::between(kMinAbbe, kMaxAbbe), "",
+                "Abbe number of the material, for --wavelengths; acrylic has 57")};
   return table;
 }
 

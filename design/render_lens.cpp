@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "design/render_flux.h"
+#include "design/source_picture.h"
 
 namespace lensforge {
 
@@ -19,12 +20,31 @@ Image scaled(std::span<const double> flux, int columns, int rows, double factor)
   return image;
 }
 
-std::vector<double> flux_of(const SurfaceMesh& mesh, const OpticalSetup& setup, SurfaceModel model,
-                            const Executor& executor) {
+std::vector<double> flux_of_point(const SurfaceMesh& mesh, const OpticalSetup& setup,
+                                  SurfaceModel model, const Executor& executor) {
 #if defined(LENSFORGE_CUDA)
   if (executor.device() == Device::kCuda) return render_flux_cuda(mesh, setup, model, executor);
 #endif
   return render_flux(mesh, setup, model, executor);
+}
+
+int points_for(const SurfaceMesh& mesh, const OpticalSetup& setup) {
+  return source_point_count(setup, mesh.vertices.row(2).mean());
+}
+
+std::vector<double> flux_of(const SurfaceMesh& mesh, const OpticalSetup& setup, SurfaceModel model,
+                            const Executor& executor) {
+  return picture_under(setup, points_for(mesh, setup), [&](const OpticalSetup& point) {
+    return flux_of_point(mesh, point, model, executor);
+  });
+}
+
+/// By the normals given.
+std::vector<double> flux_of(const SurfaceMesh& mesh, const Eigen::Matrix3Xd& normals,
+                            const OpticalSetup& setup, const Executor& executor) {
+  return picture_under(setup, points_for(mesh, setup), [&](const OpticalSetup& point) {
+    return render_flux(mesh, point, SurfaceModel::kSmooth, executor, &normals);
+  });
 }
 
 RenderResult result_of(const std::vector<double>& flux, const OpticalSetup& setup, double total) {
@@ -52,8 +72,7 @@ RenderResult render_surface(const SurfaceMesh& mesh, const OpticalSetup& setup, 
 
 RenderResult render_surface(const SurfaceMesh& mesh, const Eigen::Matrix3Xd& normals,
                             const OpticalSetup& setup, const Executor& executor) {
-  return result_of(render_flux(mesh, setup, SurfaceModel::kSmooth, executor, &normals), setup,
-                   pixel_count(setup));
+  return result_of(flux_of(mesh, normals, setup, executor), setup, pixel_count(setup));
 }
 
 ImageMetrics evaluate(const SurfaceMesh& mesh, const OpticalSetup& setup, SurfaceModel model,
@@ -65,9 +84,17 @@ ImageMetrics evaluate(const SurfaceMesh& mesh, const OpticalSetup& setup, Surfac
 ImageMetrics evaluate(const SurfaceMesh& mesh, const Eigen::Matrix3Xd& normals,
                       const OpticalSetup& setup, const Image& target, Image* rendered,
                       const Executor& executor) {
-  const std::vector<double> flux =
-      render_flux(mesh, setup, SurfaceModel::kSmooth, executor, &normals);
-  return judged(result_of(flux, setup, target.total()), target, rendered);
+  return judged(result_of(flux_of(mesh, normals, setup, executor), setup, target.total()), target,
+                rendered);
+}
+
+std::vector<double> flux_of_lens(const Lens& lens, const OpticalSetup& setup,
+                                 const Executor& executor) {
+  if (lens.model != SurfaceModel::kSpline) {
+    return flux_of(lens.surface, setup, lens.model, executor);
+  }
+  const SampledSurface nodes = picture_nodes(*lens.spline);
+  return flux_of(nodes.mesh, nodes.normals, setup, executor);
 }
 
 ImageMetrics evaluate(const Lens& lens, SurfaceModel model, Image* rendered,

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <vector>
+
 #include "core/compute/executor.h"
 #include "core/image/image.h"
 #include "core/image/metrics.h"
@@ -17,7 +19,8 @@ struct RenderResult {
   double flux_inside = 0.0;  ///< Share of the lens's flux that lands on the image rectangle.
 };
 
-/// Renders what a surface projects onto the image rectangle of `setup`, exactly (no sampling).
+/// Renders what a surface projects onto the image rectangle of `setup`, exactly (no sampling but of
+/// a source that has an extent, see picture_under()).
 RenderResult render_surface(const SurfaceMesh& mesh, const OpticalSetup& setup, SurfaceModel model,
                             const Executor& executor);
 
@@ -26,6 +29,10 @@ RenderResult render_surface(const SurfaceMesh& mesh, const OpticalSetup& setup, 
 /// @pre target has setup.pixels columns and rows.
 ImageMetrics evaluate(const SurfaceMesh& mesh, const OpticalSetup& setup, SurfaceModel model,
                       const Image& target, Image* rendered, const Executor& executor);
+
+/// Flux per pixel, as shares of the lens's, of its surface under its model in another setup.
+std::vector<double> flux_of_lens(const Lens& lens, const OpticalSetup& setup,
+                                 const Executor& executor);
 
 /// evaluate() of a lens under one of its models. A spline is looked at in picture_nodes().
 ImageMetrics evaluate(const Lens& lens, SurfaceModel model, Image* rendered,

@@ -5,6 +5,7 @@
 
 #include "core/image/image_sample.h"
 #include "core/optics/light_path.h"
+#include "core/optics/source_points.h"
 #include "design/optics/smooth.h"
 #include "design/render_lens.h"
 
@@ -36,7 +37,7 @@ Image difference(const Image& wanted, const Image& projected, const OpticalSetup
 
 WantedPicture::WantedPicture(const SurfaceMesh& mesh, const OpticalSetup& setup,
                              const Image& target, const Executor& executor)
-    : setup_(setup),
+    : setup_(lit_from(setup, Eigen::Vector2d::Zero())),
       target_(target),
       executor_(executor),
       reach_(LightPath(setup).reach(1.0, mesh.vertices.row(2).mean())) {

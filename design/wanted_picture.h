@@ -14,7 +14,7 @@ namespace lensforge {
 /// of it.
 class WantedPicture {
  public:
-  /// Keeps references to all but the mesh. @pre target has setup.pixels columns and rows.
+  /// Keeps references to target and executor. @pre target has setup.pixels columns and rows.
   WantedPicture(const SurfaceMesh& mesh, const OpticalSetup& setup, const Image& target,
                 const Executor& executor);
 
@@ -32,7 +32,7 @@ class WantedPicture {
   [[nodiscard]] double reach() const { return reach_; }
 
  private:
-  const OpticalSetup& setup_;
+  OpticalSetup setup_;  ///< In the light of the source's middle alone: its picture is the sharpest.
   const Image& target_;
   const Executor& executor_;
   Image wanted_;

@@ -46,6 +46,17 @@ class PixelWeights {
   std::vector<double> suffix_;
 };
 
+/// Weights of light before an extended source blurs it, of those of the pixels.
+std::vector<double> in_parts(std::span<const double> weights, const SourceKernel& kernel,
+                             const Eigen::Vector2i& pixels, const Executor& executor) {
+  if (kernel.none()) return {weights.begin(), weights.end()};
+  SourceBlurOn<Executor> blur(kernel, pixels.x(), pixels.y(), executor);
+  std::copy(weights.begin(), weights.end(), blur.bar().begin());
+  std::vector<double> parts(weights.size() * index_of(kernel.parts * kernel.parts));
+  blur.apply_adjoint(executor, parts);
+  return parts;
+}
+
 /// The two surfaces over one tile, and the map cells that lie in it.
 struct TilePair {
   const SurfaceTile& designed;
@@ -216,11 +227,14 @@ LeakMap map_leakage(const NamedSurface& designed, const NamedSurface& part,
   LF_CHECK(static_cast<std::int64_t>(weights.size()) ==
                static_cast<std::int64_t>(pixels.x()) * pixels.y(),
            std::to_string(weights.size()));
-  const PixelWeights pixel_weights(weights, pixels.x(), pixels.y());
+  const SourceKernel kernel = setup.blur();
+  const OpticalSetup optics = setup.optics_in_parts(kernel);
+  const PixelWeights pixel_weights(in_parts(weights, kernel, pixels, executor), optics.pixels.x(),
+                                   optics.pixels.y());
   LeakMap map = empty_map(setup.grid, cell);
   const std::int64_t side = map.grid_cells * std::max<std::int64_t>(1, setup.tile / map.grid_cells);
-  SurfaceTile designed_tile(setup.optics, setup.grid, setup.whole);
-  SurfaceTile part_tile(setup.optics, setup.grid, setup.whole);
+  SurfaceTile designed_tile(optics, setup.grid, setup.whole);
+  SurfaceTile part_tile(optics, setup.grid, setup.whole);
   for (const CellRange& range : tiles_of(all_cells(setup.grid), side)) {
     designed_tile.load(*designed.field, range, executor);
     part_tile.load(*part.field, range, executor);

@@ -21,17 +21,26 @@ Image FluxPicture::image(double total) const {
   return image;
 }
 
+OpticalSetup FieldRenderSetup::optics_in_parts(const SourceKernel& kernel) const {
+  OpticalSetup fine = optics;
+  fine.pixels *= kernel.parts;
+  return fine;
+}
+
 namespace {
 
 std::vector<FluxPicture> render_parts(std::span<const SurfaceField* const> fields,
                                       const FieldRenderSetup& setup, const CellRange& cells,
                                       const Executor& executor, const RunControl& control) {
   const Eigen::Vector2i pixels = setup.optics.pixels;
+  const SourceKernel kernel = setup.blur();
+  const OpticalSetup optics = setup.optics_in_parts(kernel);
+  SourceBlurOn<Executor> blur(kernel, pixels.x(), pixels.y(), executor);
   std::vector<FluxImage> images;
   for (std::size_t f = 0; f < fields.size(); ++f) {
-    images.emplace_back(pixels.x(), pixels.y()).begin(executor);
+    images.emplace_back(optics.pixels.x(), optics.pixels.y()).begin(executor);
   }
-  SurfaceTile tile(setup.optics, setup.grid, setup.whole);
+  SurfaceTile tile(optics, setup.grid, setup.whole);
   const std::vector<CellRange> tiles = tiles_of(cells, setup.tile);
   for (std::size_t t = 0; t < tiles.size(); ++t) {
     for (std::size_t f = 0; f < fields.size(); ++f) {
@@ -46,7 +55,7 @@ std::vector<FluxPicture> render_parts(std::span<const SurfaceField* const> field
   }
   std::vector<FluxPicture> pictures;
   for (FluxImage& image : images) {
-    const std::span<const double> flux = image.resolve(executor);
+    const std::span<const double> flux = blur.apply(executor, image.resolve(executor));
     pictures.push_back({pixels.x(), pixels.y(), {flux.begin(), flux.end()}});
   }
   return pictures;

@@ -11,6 +11,7 @@
 #include "core/compute/run_control.h"
 #include "core/image/image.h"
 #include "core/optics/optical_setup.h"
+#include "design/flux/source_blur.h"
 
 namespace lensforge {
 
@@ -34,10 +35,18 @@ struct FieldRenderSetup {
   std::int64_t tile = 768;  ///< Side of the tiles that are sampled at once, cells: 30 MB.
   /// LightPath::intake() of the whole surface, mm²; 0 takes the grid's area, that of light along z.
   double whole = 0.0;
+  /// About where the surface is, mm: the image of an extended source is taken from there.
+  double surface_height = 0.0;
+
+  /// What an extended source makes of the light of a point.
+  [[nodiscard]] SourceKernel blur() const { return source_kernel(optics, surface_height); }
+  /// The optics with the picture in the parts of pixels that the blur wants.
+  [[nodiscard]] OpticalSetup optics_in_parts(const SourceKernel& kernel) const;
 };
 
 /// Renders a surface tile by tile: memory does not grow with the grid. Every image triangle is
 /// deposited exactly (design/flux); what is neglected is how the slope bends inside a triangle.
+/// Under an extended source the picture is blurred as the optimiser does it, see source_kernel().
 /// Same bits for any tile and any number of threads.
 /// @throw Interrupted if `control` or the executor asks for an end.
 FluxPicture render_field(const SurfaceField& field, const FieldRenderSetup& setup,

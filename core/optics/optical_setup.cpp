@@ -2,7 +2,9 @@
 #include "core/optics/optical_setup.h"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <sstream>
 #include <string>
 
@@ -41,6 +43,24 @@ void require_light(const OpticalSetup& setup) {
           from.transpose(), lens ? "finite, its z below 0" : "finite, its z above 0");
 }
 
+void require_extent(const SourceExtent& extent) {
+  require(std::isfinite(extent.width) && extent.width >= 0.0, "source width", extent.width,
+          "a finite number of 0 or more");
+  const SourceShape& shape = extent.shape;
+  if (shape.is_disc()) return;
+  const auto pixels =
+      static_cast<std::size_t>(shape.columns) * static_cast<std::size_t>(shape.rows);
+  const bool lit = std::any_of(shape.weights.begin(), shape.weights.end(),
+                               [](double weight) { return weight > 0.0; });
+  const bool allowed = std::all_of(shape.weights.begin(), shape.weights.end(), [](double weight) {
+    return std::isfinite(weight) && weight >= 0.0;
+  });
+  require(pixels == shape.weights.size() && std::max(shape.columns, shape.rows) <= kMaxShapeSide,
+          "source.shape", shape.weights.size(),
+          "rows of equal length, at most " + std::to_string(kMaxShapeSide) + " a side");
+  require(lit && allowed, "source.shape", "dark", "numbers of 0 or more, not all 0");
+}
+
 void require_screen(const OpticalSetup& setup) {
   require(is_unit(setup.screen_x), "screen.right", setup.screen_x.transpose(), "a unit vector");
   require(is_unit(setup.screen_y) && std::abs(setup.screen_x.dot(setup.screen_y)) < kUnitTolerance,
@@ -54,6 +74,7 @@ void require_screen(const OpticalSetup& setup) {
 
 void validate(const OpticalSetup& setup) {
   require_light(setup);
+  require_extent(setup.extent);
   require_screen(setup);
   require(std::isfinite(setup.ior) && setup.ior > 1.0, "ior", setup.ior, "a finite number above 1");
   require_positive("focal_length", setup.focal_length);

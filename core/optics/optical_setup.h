@@ -4,6 +4,8 @@
 #include <Eigen/Core>
 #include <optional>
 
+#include "core/optics/source_extent.h"
+
 namespace lensforge {
 
 /// From where the picture is looked at: from the lens's side on an opaque wall, or from behind a
@@ -38,6 +40,7 @@ struct OpticalSetup {
   /// Unit direction of parallel light before the surface; up for a lens, down for a mirror.
   Eigen::Vector3d light{0.0, 0.0, 1.0};
   std::optional<PointSource> point;          ///< Instead of parallel light.
+  SourceExtent extent;                       ///< Of either; LightPath takes it for a point.
   double ior = 1.49;                         ///< Refractive index of the lens against air, > 1.
   double focal_length = 300.0;               ///< z of the picture's centre, mm; above the surface.
   Eigen::Vector2d lens_size{100.0, 100.0};   ///< mm

@@ -31,6 +31,8 @@ using nlohmann::ordered_json;
 
 constexpr const char* kFormat = "lensforge.lens";
 constexpr int kVersion = 1;
+/// Beside the metrics of the models.
+constexpr const char* kSourceLimit = "source_limit";
 /// Of lens.json, which has some 2 kB.
 constexpr std::uintmax_t kMaxJsonBytes = std::uintmax_t{1} << 20U;
 
@@ -55,6 +57,12 @@ ordered_json to_json(const ModelMetrics& metrics) {
   return by_model;
 }
 
+ordered_json metrics_json(const Lens& lens) {
+  ordered_json by_model = to_json(lens.metrics);
+  if (lens.source_limit) by_model[kSourceLimit] = to_json(*lens.source_limit);
+  return by_model;
+}
+
 ordered_json to_json(const Lens& lens) {
   const GridShape& grid = lens.surface.grid;
   ordered_json document = {{"format", kFormat}, {"version", kVersion}, {"units", "mm"}};
@@ -63,7 +71,7 @@ ordered_json to_json(const Lens& lens) {
       {"model", model_name(lens.model)},
       {"surface", lens_file::kSurface},
       {"grid", grid.is_grid() ? ordered_json::array({grid.columns, grid.rows}) : ordered_json()},
-      {"metrics", to_json(lens.metrics)},
+      {"metrics", metrics_json(lens)},
       {"provenance", ordered_json(lens.provenance)},
   });
   if (lens.spline) document["spline"] = lens_file::kSpline;
@@ -282,6 +290,9 @@ Lens read_lens(const fs::path& folder) {
   const JsonFields metrics = fields.object("metrics");
   for (const SurfaceModel model : models_of(lens)) {
     lens.metrics[model] = read_metrics(metrics.object(model_name(model)));
+  }
+  if (metrics.has(kSourceLimit)) {
+    lens.source_limit = read_metrics(metrics.object(kSourceLimit));
   }
   if (!fields.at("provenance").is_object()) fields.refuse("provenance", "it must be an object");
   lens.provenance = fields.at("provenance");

@@ -34,6 +34,8 @@ struct Lens {
   Image render;                               ///< What the lens projects under `model`.
   /// What it projects under each model that it has (models_of()).
   ModelMetrics metrics{{SurfaceModel::kFacet, {}}, {SurfaceModel::kSmooth, {}}};
+  /// Under an extended source: of the best picture that any surface could make.
+  std::optional<ImageMetrics> source_limit;
   nlohmann::json provenance = nlohmann::json::object();
 };
 

@@ -2,7 +2,9 @@
 #include "core/surface/setup_json.h"
 
 #include <cmath>
+#include <cstddef>
 #include <string>
+#include <vector>
 
 namespace lensforge {
 namespace {
@@ -11,6 +13,11 @@ using nlohmann::ordered_json;
 
 /// How far what two keys say may be apart, mm.
 constexpr double kAgreement = 1e-6;
+
+/// Keys of a source's extent.
+constexpr const char* kAngle = "angle_mrad";
+constexpr const char* kSize = "size_mm";
+constexpr double kMilliradian = 1e-3;
 
 template <class Vector>
 ordered_json array_of(const Vector& vector) {
@@ -24,12 +31,61 @@ double right_along_x(const OpticalSetup& setup) {
   return setup.view == ViewSide::kFront ? -1.0 : 1.0;
 }
 
-ordered_json source_json(const OpticalSetup& setup) {
+ordered_json shape_json(const SourceShape& shape) {
+  ordered_json rows = ordered_json::array();
+  for (int r = 0; r < shape.rows; ++r) {
+    const auto row = shape.weights.begin() + std::ptrdiff_t{r} * shape.columns;
+    rows.push_back(std::vector<double>(row, row + shape.columns));
+  }
+  return rows;
+}
+
+ordered_json bare_source_json(const OpticalSetup& setup) {
   if (!setup.point) return {{"type", "parallel"}, {"direction", array_of(setup.light)}};
   const bool even = setup.point->emission == Emission::kIsotropic;
   return {{"type", "point"},
           {"position", array_of(setup.point->position)},
           {"emission", even ? "isotropic" : "lambertian"}};
+}
+
+ordered_json source_json(const OpticalSetup& setup) {
+  ordered_json source = bare_source_json(setup);
+  const SourceExtent& extent = setup.extent;
+  if (extent.none()) return source;
+  source[setup.point ? kSize : kAngle] = setup.point ? extent.width : extent.width / kMilliradian;
+  if (!extent.shape.is_disc()) source["shape"] = shape_json(extent.shape);
+  return source;
+}
+
+SourceShape read_shape(const JsonFields& source) {
+  SourceShape shape;
+  const nlohmann::json& rows = source.at("shape");
+  const auto refuse = [&] {
+    source.refuse("shape", "it must be rows of numbers, all of the same length, at most " +
+                               std::to_string(kMaxShapeSide) + " a side");
+  };
+  if (!rows.is_array() || rows.empty() || rows.size() > kMaxShapeSide) refuse();
+  for (const nlohmann::json& row : rows) {
+    if (!row.is_array() || row.empty() || row.size() != rows.front().size() ||
+        row.size() > kMaxShapeSide) {
+      refuse();
+    }
+    for (const nlohmann::json& weight : row) {
+      if (!weight.is_number()) refuse();
+      shape.weights.push_back(weight.get<double>());
+    }
+  }
+  shape.rows = static_cast<int>(rows.size());
+  shape.columns = static_cast<int>(rows.front().size());
+  return shape;
+}
+
+void read_extent(const JsonFields& source, OpticalSetup& setup) {
+  const char* const key = setup.point ? kSize : kAngle;
+  if (source.has(key)) {
+    setup.extent.width = source.number(key) * (setup.point ? 1.0 : kMilliradian);
+  }
+  if (source.has("shape")) setup.extent.shape = read_shape(source);
 }
 
 ordered_json screen_json(const OpticalSetup& setup) {
@@ -58,6 +114,7 @@ void read_source(const JsonFields& source, OpticalSetup& setup) {
   } else {
     source.refuse("type", R"(it must be "parallel" or "point")");
   }
+  read_extent(source, setup);
 }
 
 void require_flat_front(const JsonFields& front) {

@@ -44,12 +44,13 @@ LF_HD inline GoalSums goal_adjoint(const ObjectiveView& o, std::int64_t face,
     values.flux = v.flux;
     return values;
   }
-  bar = deposit_adjoint(image, goal.cotangent);
+  bar = deposit_adjoint(magnified(image, goal.parts), goal.cotangent);
+  bar = magnified(bar, goal.parts);
   values.boundary = boundary_term(image, goal.columns, goal.rows, w.boundary, bar);
   if (goal.led != nullptr && goal.led[face] != kNoPixel) {
     const std::int32_t pixel = goal.led[face];
-    values.unlit =
-        unlit_term(image, pixel, goal.cotangent.columns, goal.target[pixel], w.image, bar);
+    values.unlit = unlit_term(image, pixel, static_cast<std::int64_t>(goal.columns),
+                              goal.target[pixel], w.image, bar);
   }
   return values;
 }

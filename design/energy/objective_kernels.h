@@ -36,7 +36,9 @@ template <class Rays>
 struct FaceLightSource {
   ObjectiveView o;
   Rays rays;
-  LF_HD ImageTriangle operator()(std::int64_t face) const { return rays.image(o, face); }
+  LF_HD ImageTriangle operator()(std::int64_t face) const {
+    return magnified(rays.image(o, face), o.goal.parts);
+  }
 };
 
 /// Centroid of what a face projects onto the screen. @pre as of FaceLightSource.

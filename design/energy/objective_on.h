@@ -27,6 +27,7 @@
 #include "design/energy/smooth_rays.h"
 #include "design/energy/unlit_pixels.h"
 #include "design/flux/flux_image.h"
+#include "design/flux/source_blur.h"
 
 namespace lensforge {
 
@@ -66,6 +67,11 @@ class DesignObjectiveOn {
   template <class Rays>
   [[nodiscard]] bool allowed(const ObjectiveView& o, Rays& rays);
   template <class Rays>
+  [[nodiscard]] std::span<const double> project(const ObjectiveView& o, Rays& rays) {
+    const FaceLightSource<typename Rays::View> faces{o, rays.view()};
+    return blur_.apply(executor_, flux_.render(executor_, o.mesh.faces, faces));
+  }
+  template <class Rays>
   void compare_picture(const ObjectiveView& o, Rays& rays, Sums& sums);
   template <class Rays>
   void pull_back(const ObjectiveView& o, Rays& rays, double* gradient, Sums& sums);
@@ -99,7 +105,8 @@ class DesignObjectiveOn {
   Buffer<double> edge_weights_;
   double edge_offset_ = 0.0;  ///< Σ Ψ(h⁰) − w h⁰ over the edges.
 
-  FluxImageOn<Exec> flux_;
+  SourceBlurOn<Exec> blur_;
+  FluxImageOn<Exec> flux_;  ///< In the blur's parts of pixels.
   FluxCotangentImageOn<Exec> cotangent_;
   Buffer<double> error_;
   Buffer<Corners> corner_bar_;
@@ -159,8 +166,10 @@ DesignObjectiveOn<Exec>::DesignObjectiveOn(const SurfaceMesh& mesh, const Optica
       mesh_(mesh, make_topology(mesh), executor),
       movable_(objective_detail::movable_coordinates(mesh.vertices, setup.lens_size)),
       movable_here_(buffer_of(executor, objective_detail::entries(movable_))),
-      flux_(setup.pixels.x(), setup.pixels.y()),
-      cotangent_(setup.pixels.x(), setup.pixels.y()),
+      blur_(source_kernel(setup, options.surface_height), setup.pixels.x(), setup.pixels.y(),
+            executor),
+      flux_(blur_.parts() * setup.pixels.x(), blur_.parts() * setup.pixels.y()),
+      cotangent_(flux_.columns(), flux_.rows()),
       rays_(objective_detail::rays_of<Exec>(options.model, mesh)) {
   const auto faces = static_cast<std::size_t>(mesh.triangle_count());
   const auto vertices = static_cast<std::size_t>(mesh.vertex_count());
@@ -194,8 +203,8 @@ void DesignObjectiveOn<Exec>::take(const Correspondence& wanted) {
 template <class Exec>
 ObjectiveView DesignObjectiveOn<Exec>::view(const double* vertices) {
   return {.options = options_,
-          .vertices = vertices,
           .light = light_,
+          .vertices = vertices,
           .mesh = mesh_.view(),
           .goal = goal_view(),
           .scratch = {frames_.data(), maps_.data(), edge_weights_.data(), corner_bar_.data()}};
@@ -203,8 +212,9 @@ ObjectiveView DesignObjectiveOn<Exec>::view(const double* vertices) {
 
 template <class Exec>
 GoalView DesignObjectiveOn<Exec>::goal_view() {
-  return {.columns = static_cast<double>(flux_.columns()),
-          .rows = static_cast<double>(flux_.rows()),
+  return {.columns = static_cast<double>(light_.plane().columns()),
+          .rows = static_cast<double>(light_.plane().rows()),
+          .parts = static_cast<double>(blur_.parts()),
           .cotangent = cotangent_.view(),
           .target = target_.data(),
           .led = led_.size() > 0 ? led_.data() : nullptr,
@@ -243,12 +253,11 @@ void DesignObjectiveOn<Exec>::find_unlit(const ObjectiveView& o, Rays& rays) {
   parallel_for(executor_, "face centroids", o.mesh.faces,
                FaceCentroid<typename Rays::View>{o, rays.view(), measured.data()});
   download(executor_, std::span<const double>(measured.data(), measured.size()), centroids_here);
-  const auto flux =
-      flux_.render(executor_, o.mesh.faces, FaceLightSource<typename Rays::View>{o, rays.view()});
+  const auto flux = project(o, rays);
   std::vector<double> light(flux.size());
   download(executor_, flux, std::span<double>(light));
   for (double& value : light) value *= target_total_;
-  const LitPicture picture{flux_.columns(), flux_.rows(), light, wanted_light_};
+  const LitPicture picture{light_.plane().columns(), light_.plane().rows(), light, wanted_light_};
   const std::vector<std::int32_t> led = lead_to_unlit_pixels(picture, centroids);
   const auto is_led = [](std::int32_t pixel) { return pixel != kNoPixel; };
   if (std::any_of(led.begin(), led.end(), is_led)) {
@@ -281,16 +290,16 @@ struct DesignObjectiveOn<Exec>::Sums {
 template <class Exec>
 template <class Rays>
 void DesignObjectiveOn<Exec>::compare_picture(const ObjectiveView& o, Rays& rays, Sums& sums) {
-  const auto flux =
-      flux_.render(executor_, o.mesh.faces, FaceLightSource<typename Rays::View>{o, rays.view()});
-  const std::span<double> bar = cotangent_.pixels();
-  const PictureError picture{flux_.columns(), flux_.rows(), error_.data()};
+  const auto flux = project(o, rays);
+  const std::span<double> bar = blur_.none() ? cotangent_.pixels() : blur_.bar();
+  const PictureError picture{light_.plane().columns(), light_.plane().rows(), error_.data()};
   const ComparePixel compare{flux.data(), target_.data(), target_total_, error_.data(), bar.data()};
   sums.absolute_error = pending_sum<1>(executor_, "picture error", picture.count(), compare);
   sums.image = image_term(executor_, picture, options_.weights.image, bar);
   sums.gradient = gradient_term(executor_, picture, options_.weights.gradient, bar);
   parallel_for(executor_, "encode adjoint", picture.count(),
                EncodeAdjoint{flux.data(), target_total_, bar.data()});
+  blur_.apply_adjoint(executor_, cotangent_.pixels());
   cotangent_.prepare(executor_);
 }
 

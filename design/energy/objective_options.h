@@ -31,6 +31,7 @@ struct ObjectiveOptions {
   std::optional<MadeBy> made_by;  ///< Of a spline: what its surface becomes; else it is as it is.
   double nu = 1.0;                ///< ν of the Welsch function, 1/mm, > 0.
   AreaBarrier area{1e-6, 5e-6};   ///< mm²
+  double surface_height = 0.0;  ///< About where the surface is, mm: its source is seen from there.
 };
 
 /// What a surface is shaped after: a picture in linear light (Sun et al., Eq. 18), or where

@@ -20,6 +20,7 @@ namespace lensforge {
 struct GoalView {
   double columns;  ///< Of the picture.
   double rows;
+  double parts;  ///< Of a pixel each way, in which the cotangent counts.
   FluxCotangent cotangent;
   const double* target;            ///< Display-encoded, row by row; of a picture.
   const std::int32_t* led;         ///< F, lead_to_unlit_pixels(); null if no facet is led.
@@ -37,11 +38,11 @@ struct FaceScratch {
   Corners* corner_bar;   ///< Derivatives by every face's corners.
 };
 
-/// The vectors of a light path begin at multiples of 16 bytes: this order leaves none unset.
+/// The vectors of a light path begin at multiples of 16 bytes: this order leaves no gap before it.
 struct ObjectiveView {
   ObjectiveOptions options;
-  const double* vertices;  ///< 3 × V, mm
   LightPath light;
+  const double* vertices;  ///< 3 × V, mm
   MeshView mesh;
   GoalView goal;
   FaceScratch scratch;

@@ -72,6 +72,8 @@ void append_light(const LightOptions& light, json& description) {
     const json value = field.stored(light);
     if (value != field.stored(usual)) description.push_back({field.name, value});
   }
+  const SourceShape& shape = light.source_shape;
+  if (!shape.is_disc()) description.push_back({shape.columns, shape.rows, shape.weights});
 }
 
 json to_json(const ConvergenceRow& row) {

@@ -18,12 +18,17 @@ DesignTask make_task(const Image& target, const DesignOptions& options, const Ex
   // Nothing is reported before all input has been accepted.
   Image working = working_picture(target, options, {control.stop_token(), {}});
   const Eigen::Vector2i pixels(working.columns(), working.rows());
-  return {options,
-          control,
-          executor.with_stop(control.stop_token()),
-          std::move(working),
-          optical_setup(options, pixels),
-          plan_levels(pixels, options)};
+  DesignTask task{options,
+                  control,
+                  executor.with_stop(control.stop_token()),
+                  std::move(working),
+                  optical_setup(options, pixels),
+                  plan_levels(pixels, options),
+                  std::nullopt};
+  if (!task.setup.extent.none()) {
+    task.limit = source_limit(task.target, task.setup, options.thickness, task.executor);
+  }
+  return task;
 }
 
 LevelProblem make_problem(const DesignTask& task, const Level& level, std::int64_t triangles) {
@@ -31,9 +36,12 @@ LevelProblem make_problem(const DesignTask& task, const Level& level, std::int64
   problem.setup = task.setup;
   problem.setup.pixels = level.pixels;
   problem.target = resample(task.target, level.pixels.x(), level.pixels.y());
+  problem.aim =
+      task.limit ? resample(task.limit->light, level.pixels.x(), level.pixels.y()) : problem.target;
   problem.objective.weights = task.options.weights;
   problem.objective.model = task.options.model;
   problem.objective.nu = level.nu;
+  problem.objective.surface_height = task.options.thickness;
   if (level.spline) {
     // Smoothness is the spline's own; barriers are those of the triangles between its nodes.
     problem.objective.weights.smooth = 0.0;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "core/compute/executor.h"
@@ -11,6 +12,7 @@
 #include "design/design_options.h"
 #include "design/energy/objective_options.h"
 #include "design/schedule/level_plan.h"
+#include "design/source_limit.h"
 
 namespace lensforge {
 
@@ -22,6 +24,7 @@ struct DesignTask {
   Image target;       ///< Working picture.
   OpticalSetup setup;
   std::vector<Level> levels;
+  std::optional<SourceLimit> limit;  ///< Of an extended source.
 };
 
 /// The picture at the size that the options ask for. @throw Interrupted
@@ -37,6 +40,7 @@ DesignTask make_task(const Image& target, const DesignOptions& options, const Ex
 struct LevelProblem {
   OpticalSetup setup;
   Image target;
+  Image aim;  ///< What transport makes: under an extended source the light that is best blurred.
   ObjectiveOptions objective;
 };
 

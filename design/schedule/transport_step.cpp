@@ -70,7 +70,7 @@ Matching match(const Site& site, const SurfaceMesh& mesh, const TransportOptions
   const auto pass_on = [&](const Progress& p) { site.log.report(p.detail, 0); };
   Matching matching;
   matching.light = face_light(mesh, site.problem.setup, task.options.model, task.executor);
-  matching.result = transport_faces(matching.light, site.problem.target, options, task.executor,
+  matching.result = transport_faces(matching.light, site.problem.aim, options, task.executor,
                                     RunControl(task.control.stop_token(), pass_on));
   if (matching.result.status == TransportResult::Status::kStopped) throw Interrupted();
   site.log.add(matching.result.steps);
@@ -86,7 +86,7 @@ Matching match_all(const Site& site, const SurfaceMesh& mesh) {
 
 /// Of a mesh that has been spread, if it can be had.
 std::optional<Matching> match_spread(const Site& site, const SurfaceMesh& mesh) {
-  if (black_share(site.problem.target) > kMaxBlack) return std::nullopt;
+  if (black_share(site.problem.aim) > kMaxBlack) return std::nullopt;
   TransportOptions options;
   options.tolerance = kTransportTolerance;
   options.max_stage_steps = kMaxStageSteps;
@@ -117,7 +117,7 @@ void spread(const Site& site, const SurfaceMesh& even_mesh, const Matching& even
 Matching fit_mesh(const Site& site, const SurfaceMesh& even_mesh, const Matching& even,
                   SurfaceMesh& mesh) {
   spread(site, even_mesh, even, mesh);
-  const BrenierMap map(even.light.landing, even.result, site.problem.target);
+  const BrenierMap map(even.light.landing, even.result, site.problem.aim);
   align_to_creases(map, site.problem.setup, mesh);
   if (std::optional<Matching> own = match_spread(site, mesh)) return *std::move(own);
   const DesignTask& task = site.task;

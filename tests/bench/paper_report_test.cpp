@@ -57,6 +57,18 @@ TEST(PaperRows, NamesOfFoldersDiffer) {
   EXPECT_EQ(std::adjacent_find(names.begin(), names.end()), names.end());
 }
 
+TEST(PaperRows, PointSourcesAndMirrorsAreDesignedButNotTraced) {
+  RowChoice choice = small_choice();
+  choice.only = {"butterfly-point", "relief-mirror", "city-point"};
+  const std::vector<PaperRow> rows = choose_rows(choice);
+  ASSERT_EQ(rows.size(), 3U);
+  EXPECT_EQ(rows[0].picture, "pictures/butterfly.png");
+  EXPECT_EQ(rows[0].paper.mae, 1.586);
+  EXPECT_EQ(rows[1].paper.mae, 0.0);
+  EXPECT_EQ(rows[2].paper.traced_ssim, 0.938);
+  for (const PaperRow& row : rows) EXPECT_FALSE(row.is_traced());
+}
+
 TEST(PaperReport, SettingsStandBesideThePapersError) {
   RowChoice choice = small_choice();
   choice.only = {"logo"};

@@ -70,8 +70,8 @@ class RowRun {
     } else if (!reuse() && design()) {
       store();
     }
-    const bool traced = result_.row.group != RowGroup::kAblation;
-    if (traced && result_.done() && result_.trace.is_null() && fs::exists(programs_.ray_trace)) {
+    if (result_.row.is_traced() && result_.done() && result_.trace.is_null() &&
+        fs::exists(programs_.ray_trace)) {
       trace();
       store();
     }

@@ -46,6 +46,27 @@ std::vector<PaperRow> paper_kinds(const RowChoice& choice) {
           row("relief", 256, fine, {"Newton", 0.001, kNotGiven, kNotGiven})};
 }
 
+/// The last rows of both tables. The paper does not print where the point source is, nor how far
+/// the mirror's picture is from its usual place: 600 mm, and the chief ray's.
+std::vector<PaperRow> other_lights(const RowChoice& choice) {
+  const auto row = [&](const std::string& picture, const std::string& light, const Words& options,
+                       PaperFigures paper) {
+    PaperRow made = make_row(RowGroup::kOtherLight, picture + ", " + light,
+                             in(choice.fixtures, picture + ".png"), 256,
+                             {"--mesh-ratio", "2.5", "--focal", "600"});
+    made.name = picture + "-" + light;
+    made.options.insert(made.options.end(), options.begin(), options.end());
+    made.paper = std::move(paper);
+    return made;
+  };
+  const Words point = {"--source",      "point", "--source-position", "50,50,-600",
+                       "--image-width", "200",   "--thickness",       "6"};
+  const Words mirror = {"--mode", "reflect", "--incidence", "30"};
+  return {row("butterfly", "point", point, {"Butterfly", 1.586, kNotGiven, kNotGiven}),
+          row("relief", "mirror", mirror, {"Newton", 0.000, kNotGiven, kNotGiven}),
+          row("city", "point", point, {"Train", kNotGiven, 23.21, 0.938})};
+}
+
 std::vector<PaperRow> smooth_rows(const RowChoice& choice) {
   const auto row = [](const std::string& name, const std::string& picture) {
     PaperRow made = make_row(RowGroup::kSmooth, name, picture, 256, {"--model", "smooth"});
@@ -108,8 +129,8 @@ bool wanted(const PaperRow& row, const std::vector<std::string>& only) {
 
 std::vector<PaperRow> choose_rows(const RowChoice& choice) {
   std::vector<PaperRow> rows;
-  for (const auto& group :
-       {paper_kinds(choice), photographs(choice), smooth_rows(choice), ablation(choice)}) {
+  for (const auto& group : {paper_kinds(choice), other_lights(choice), photographs(choice),
+                            smooth_rows(choice), ablation(choice)}) {
     for (PaperRow row : group) {
       if (!wanted(row, choice.only)) continue;
       if (choice.most_pixels > 0) row.pixels = std::min(row.pixels, choice.most_pixels);

@@ -19,7 +19,7 @@ struct PaperFigures {
   double traced_ssim = kNotGiven;  ///< Same.
 };
 
-enum class RowGroup { kPaper, kSmooth, kPhotograph, kAblation };
+enum class RowGroup { kPaper, kOtherLight, kSmooth, kPhotograph, kAblation };
 
 /// One design.
 struct PaperRow {
@@ -31,6 +31,11 @@ struct PaperRow {
   std::vector<std::string> options;  ///< Of `lensforge design`, besides --pixels and --out.
   PaperFigures paper;
   std::string variant;  ///< Ablation only: what is left out.
+
+  /// The ray trace knows parallel light through a lens only; the ablation does without.
+  [[nodiscard]] bool is_traced() const {
+    return group != RowGroup::kAblation && group != RowGroup::kOtherLight;
+  }
 };
 
 /// Where the pictures lie and how far to shrink the work.

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "bench/ray_trace.h"
+#include "core/error.h"
 #include "core/image/image_io.h"
 
 namespace {
@@ -57,8 +58,22 @@ void print_json(const bench::RayTraceResult& result, const Lens& lens) {
   std::printf("%s\n", object.dump(2).c_str());
 }
 
+/// @throw InputError unless parallel light goes along z through a lens to an unturned screen.
+void require_usual_light(const Lens& lens) {
+  const OpticalSetup& setup = lens.setup;
+  const bool along_z = !setup.point && setup.light == Eigen::Vector3d::UnitZ();
+  if (along_z && setup.extent.none() && setup.mode == LightMode::kRefract &&
+      !setup.screen_is_turned()) {
+    return;
+  }
+  throw InputError(
+      "DIR: its light or screen is not known here; a lens of design without --source, --mode, "
+      "--source-angle and --screen-tilt would do");
+}
+
 void run(Arguments& arguments) {
   const Lens lens = read_lens(arguments.lens);
+  require_usual_light(lens);
   bench::RayTraceOptions& trace = arguments.trace;
   trace.model = lens.model;
   if (arguments.model == "smooth") trace.model = SurfaceModel::kSmooth;

@@ -244,6 +244,22 @@ TEST(LeakMap, SumsToTheSurplusAndLiesWhereTheSurfaceDiffers) {
   EXPECT_EQ(map.leakage, threads.leakage);
 }
 
+TEST(LeakMap, UnderAnExtendedSourceItStillSumsToTheSurplus) {
+  const AnalyticField sharp(sharp_groove());
+  const AnalyticField rounded(testing::rounded_groove(kGroove, kSlope, kRadius));
+  FieldRenderSetup setup = groove_setup();
+  setup.optics.extent.width = 0.05;
+  setup.surface_height = 5.0;
+  const LeakageChain chain{{"designed", &sharp}, {{leak_cause::kCrease, &rounded}}, {}};
+  const LeakageResult result = measure(chain, groove_target(), setup);
+  const std::vector<double> more =
+      pixels_with_surplus(result.part().picture, result.designed.picture);
+  const LeakMap map =
+      map_leakage(chain.designed, chain.part(), setup, more, 0.1, Executor::serial());
+  EXPECT_GT(map.total(), 0.001);
+  EXPECT_NEAR(map.total(), result.part().quality.leakage * result.designed.picture.inside(), 1e-12);
+}
+
 TEST(LeakMap, NamesTheWorstPlacesWithTheirCauses) {
   // Two dents in a plane, the left one larger; they throw their light downwards on the wall.
   const auto dented = [](double small, double large) {

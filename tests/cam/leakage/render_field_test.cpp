@@ -15,6 +15,7 @@
 #include "cam/leakage/crease_split.h"
 #include "core/error.h"
 #include "core/optics/image_plane.h"
+#include "core/optics/source_points.h"
 
 namespace lensforge {
 namespace {
@@ -135,6 +136,28 @@ TEST(RenderField, ACylinderSpreadsTheLightAsRaysDo) {
   const std::vector<double> traced = traced_columns(field, small_setup(), 400000);
   EXPECT_LT(largest_difference(column_sums(render(field, setup_of(0.05))), traced), 1e-4);
   EXPECT_LT(largest_difference(column_sums(render(field, setup_of(0.0125))), traced), 2e-5);
+}
+
+TEST(RenderField, AnExtendedSourceBlursThePictureAsItsPointsTogetherDo) {
+  const AnalyticField field([](const Eigen::Vector2d& p) {
+    const double x = p.x() - 1.7;
+    return SurfacePoint{6.0 - x * x / 18.0, {-x / 9.0, 0.0}, 0};
+  });
+  FieldRenderSetup setup = setup_of(0.05);
+  setup.optics.extent.width = 0.06;
+  setup.surface_height = 6.0;
+  std::vector<double> together(20, 0.0);
+  for (const SourcePoint& point : source_points(setup.optics.extent, 300)) {
+    FieldRenderSetup one = setup;
+    one.optics = lit_from(setup.optics, point.at);
+    one.whole = one.optics.lens_size.prod();
+    const std::vector<double> sums = column_sums(render(field, one));
+    for (std::size_t c = 0; c < sums.size(); ++c) together[c] += point.share * sums[c];
+  }
+  const std::vector<double> sharp = column_sums(render(field, setup_of(0.05)));
+  const std::vector<double> blurred = column_sums(render(field, setup));
+  EXPECT_GT(largest_difference(sharp, together), 0.01);
+  EXPECT_LT(largest_difference(blurred, together), 0.002);
 }
 
 /// A wave of six nodes: its beams, taken as linear between nodes, would bend 9 % too little.

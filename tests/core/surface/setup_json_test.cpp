@@ -23,6 +23,18 @@ OpticalSetup written_and_read(const OpticalSetup& setup) {
   return read;
 }
 
+/// What is said of a document with one value changed.
+std::string refusal(const char* pointer, const json& value) {
+  json document = json::parse(setup_json(OpticalSetup{}).dump());
+  document[json::json_pointer(pointer)] = value;
+  return message_of<InputError>([&] {
+    const JsonFields fields(document, "lens.json");
+    const OpticalSetup setup = read_setup(fields);
+    validate(setup);
+    require_agreement(fields, setup);
+  });
+}
+
 TEST(SetupJson, EveryLightAndScreenComesBackToTheBit) {
   OpticalSetup setup;
   EXPECT_EQ(written_and_read(setup), setup);
@@ -38,6 +50,25 @@ TEST(SetupJson, EveryLightAndScreenComesBackToTheBit) {
   setup.point.reset();
   setup.light = Eigen::Vector3d(0.6, 0.0, -0.8);
   EXPECT_EQ(written_and_read(setup), setup);
+}
+
+TEST(SetupJson, AnExtendedSourceComesBackWithItsShape) {
+  OpticalSetup setup;
+  EXPECT_FALSE(setup_json(setup)["source"].contains("angle_mrad"));
+  setup.extent.width = 0.002;
+  EXPECT_EQ(setup_json(setup)["source"]["angle_mrad"], 2.0);
+  EXPECT_EQ(written_and_read(setup), setup);
+  setup.point = PointSource{{1.0, 2.0, -30.1}, Emission::kIsotropic};
+  setup.extent = {3.5, {3, 2, {0.0, 1.0, 0.25, 0.5, 0.0, 0.0}}};
+  EXPECT_EQ(setup_json(setup)["source"]["size_mm"], 3.5);
+  EXPECT_EQ(written_and_read(setup), setup);
+}
+
+TEST(SetupJson, AnExtentThatCannotBeIsRefusedWithItsField) {
+  EXPECT_THAT(refusal("/source/angle_mrad", -1.0), HasSubstr("source width"));
+  EXPECT_THAT(refusal("/source/angle_mrad", "wide"), HasSubstr("source.angle_mrad"));
+  EXPECT_THAT(refusal("/source/shape", json::parse("[[1, 0], [1]]")), HasSubstr("source.shape"));
+  EXPECT_THAT(refusal("/source/shape", json::parse("[[0, 0]]")), HasSubstr("source.shape"));
 }
 
 TEST(SetupJson, ATiltedScreenHasNoFocalLength) {
@@ -56,16 +87,6 @@ TEST(SetupJson, AFileWithoutAScreenHasOneParallelToTheLens) {
 }
 
 TEST(SetupJson, WhatCannotBeIsRefusedWithItsField) {
-  const auto refusal = [](const char* pointer, const json& value) {
-    json document = json::parse(setup_json(OpticalSetup{}).dump());
-    document[json::json_pointer(pointer)] = value;
-    return message_of<InputError>([&] {
-      const JsonFields fields(document, "lens.json");
-      const OpticalSetup setup = read_setup(fields);
-      validate(setup);
-      require_agreement(fields, setup);
-    });
-  };
   EXPECT_THAT(refusal("/screen/up", {0.0, 2.0, 0.0}), HasSubstr("screen.up is "));
   EXPECT_THAT(refusal("/screen/up", {0.0, -1.0, 0.0}), HasSubstr("faces the lens"));
   EXPECT_THAT(refusal("/screen/centre", {51.0, 50.0, 300.0}), HasSubstr("screen.centre"));

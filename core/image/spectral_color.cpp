@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "core/image/spectral_color.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <numeric>
+
+#include "core/image/transfer.h"
+
+namespace lensforge {
+namespace {
+
+/// A Gaussian with two widths, nm: left and right of its peak.
+double lobe(double wavelength, double peak, double left, double right) {
+  const double t = (wavelength - peak) / (wavelength < peak ? left : right);
+  return std::exp(-0.5 * t * t);
+}
+
+/// CIE XYZ → linear sRGB (IEC 61966-2-1).
+Eigen::Matrix3d rgb_of_xyz() {
+  Eigen::Matrix3d m;
+  m << 3.2406, -1.5372, -0.4986,  //
+      -0.9689, 1.8758, 0.0415,    //
+      0.0557, -0.2040, 1.0570;
+  return m;
+}
+
+/// Linear RGB of every wavelength, so that their sum is white: each channel is scaled.
+std::vector<Eigen::Vector3d> balanced_colors(const std::vector<double>& wavelengths) {
+  std::vector<Eigen::Vector3d> colors;
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const double wavelength : wavelengths) {
+    colors.push_back(rgb_of_xyz() * color_matching(wavelength));
+    sum += colors.back();
+  }
+  // A channel that the wavelengths do not light stays black.
+  const double least = 1e-3 * sum.cwiseAbs().maxCoeff();
+  for (Eigen::Vector3d& color : colors) {
+    for (int k = 0; k < 3; ++k) color[k] = sum[k] > least ? color[k] / sum[k] : 0.0;
+  }
+  return colors;
+}
+
+unsigned char byte_of(double linear) {
+  return static_cast<unsigned char>(std::lround(255.0 * encode(std::clamp(linear, 0.0, 1.0))));
+}
+
+}  // namespace
+
+Eigen::Vector3d color_matching(double wavelength) {
+  const double x = 1.056 * lobe(wavelength, 599.8, 37.9, 31.0) +
+                   0.362 * lobe(wavelength, 442.0, 16.0, 26.7) -
+                   0.065 * lobe(wavelength, 501.1, 20.4, 26.2);
+  const double y =
+      0.821 * lobe(wavelength, 568.8, 46.9, 40.5) + 0.286 * lobe(wavelength, 530.9, 16.3, 31.1);
+  const double z =
+      1.217 * lobe(wavelength, 437.0, 11.8, 36.0) + 0.681 * lobe(wavelength, 459.0, 26.0, 13.8);
+  return {x, y, z};
+}
+
+std::vector<double> brightness_shares(const std::vector<double>& wavelengths) {
+  std::vector<double> shares;
+  for (const double wavelength : wavelengths) shares.push_back(color_matching(wavelength).y());
+  const double sum = std::accumulate(shares.begin(), shares.end(), 0.0);
+  for (double& share : shares) share /= sum;
+  return shares;
+}
+
+Image mixed(const std::vector<Image>& pictures, const std::vector<double>& shares) {
+  Image sum(pictures.front().columns(), pictures.front().rows());
+  for (std::size_t k = 0; k < pictures.size(); ++k) {
+    for (std::size_t i = 0; i < sum.values().size(); ++i) {
+      sum.values()[i] += static_cast<float>(shares[k]) * pictures[k].values()[i];
+    }
+  }
+  return sum;
+}
+
+ColorImage color_picture(const std::vector<Image>& pictures,
+                         const std::vector<double>& wavelengths) {
+  const std::vector<Eigen::Vector3d> colors = balanced_colors(wavelengths);
+  ColorImage result{pictures.front().columns(), pictures.front().rows(), {}};
+  for (std::size_t i = 0; i < pictures.front().values().size(); ++i) {
+    Eigen::Vector3d rgb = Eigen::Vector3d::Zero();
+    for (std::size_t k = 0; k < colors.size(); ++k) {
+      rgb += static_cast<double>(pictures[k].values()[i]) * colors[k];
+    }
+    for (int k = 0; k < 3; ++k) result.rgb.push_back(byte_of(rgb[k]));
+  }
+  return result;
+}
+
+}  // namespace lensforge

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "core/compute/executor.h"
+#include "core/image/image.h"
+#include "core/optics/optical_setup.h"
+#include "core/surface/lens.h"
+
+namespace lensforge {
+
+/// Flux per pixel in the light of a single point or direction.
+using PointPicture = std::function<std::vector<double>(const OpticalSetup&)>;
+
+/// Points that an exact picture is summed over: the more, the wider the source's image.
+int source_point_count(const OpticalSetup& setup, double z);
+
+/// Flux per pixel under an extended source: the sum of the pictures in the light of each of about
+/// `count` of its points, by shares. No approximation but the count.
+std::vector<double> picture_under(const OpticalSetup& setup, int count,
+                                  const PointPicture& picture);
+
+/// The same picture in a convolution, source_kernel()'s.
+/// @param z  of the surface, mm.
+std::vector<double> picture_by_convolution(const OpticalSetup& setup, double z,
+                                           const PointPicture& picture, const Executor& executor);
+
+/// How nearly the picture of a lens under its extended source is known.
+struct SourceCheck {
+  double blur = 0.0;  ///< Width of the source's image on the screen, pixels.
+  int points = 0;     ///< Of the source, whose pictures are summed.
+  /// Mean absolute differences of display-encoded pixels between that picture and the one of half
+  /// as many points, and the one that the optimiser goes by, a convolution.
+  double halving = 0.0;
+  double convolution = 0.0;
+};
+
+/// @pre the lens's source has an extent.
+SourceCheck check_source(const Lens& lens, const Executor& executor);
+
+}  // namespace lensforge

@@ -1,0 +1,212 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "core/optics/source_points.h"
+#include "design/design_lens.h"
+#include "design/finite_difference.h"
+#include "design/objective_setups.h"
+#include "design/render_lens.h"
+#include "design/snell.h"
+#include "design/source_limit.h"
+#include "design/source_picture.h"
+
+namespace lensforge {
+namespace {
+
+using testing::Random;
+
+/// The test lens under a source whose image is some three pixels wide.
+OpticalSetup wide_setup() {
+  OpticalSetup setup = testing::kSetup;
+  setup.extent.width = 0.05;
+  return setup;
+}
+
+class ExtendedSource : public ::testing::TestWithParam<SurfaceModel> {};
+INSTANTIATE_TEST_SUITE_P(Models, ExtendedSource, ::testing::ValuesIn(testing::kModels),
+                         testing::model_name);
+
+TEST_P(ExtendedSource, ObjectiveGradientEqualsCentralDifferences) {
+  const SurfaceMesh mesh = testing::rough_mesh();
+  DesignObjective objective(mesh, wide_setup(), testing::target(),
+                            testing::options_of(GetParam(), {}), Executor::serial());
+  Eigen::Matrix3Xd gradient;
+  ASSERT_TRUE(objective.evaluate(mesh.vertices, gradient).feasible);
+  const auto f = [&](const Eigen::VectorXd& x) {
+    return testing::evaluate_at(objective, x.reshaped(3, gradient.cols())).energy.total;
+  };
+  Random random(3);
+  Eigen::Matrix3Xd direction = objective.movable();
+  for (double& d : direction.reshaped()) d *= random.between(-1.0, 1.0);
+  const Eigen::VectorXd products = gradient.cwiseProduct(direction).reshaped();
+  const double scale = std::max(std::fabs(products.sum()), products.norm());
+  std::vector<double> errors;
+  for (const double step : {1e-4, 1e-5, 2e-6, 5e-7, 1e-7}) {
+    const double slope =
+        testing::directional_slope(f, mesh.vertices.reshaped(), direction.reshaped(), step);
+    errors.push_back(std::fabs(slope - products.sum()) / scale);
+  }
+  EXPECT_LT(testing::plateau_error(errors), 1e-6);
+}
+
+TEST_P(ExtendedSource, ObjectiveHasTheSameBitsForAnyNumberOfThreads) {
+  const SurfaceMesh mesh = testing::rough_mesh();
+  const ObjectiveOptions options = testing::options_of(GetParam(), {});
+  DesignObjective one(mesh, wide_setup(), testing::target(), options, Executor::serial());
+  DesignObjective three(mesh, wide_setup(), testing::target(), options, Executor::cpu(3));
+  Eigen::Matrix3Xd a;
+  Eigen::Matrix3Xd b;
+  EXPECT_EQ(one.evaluate(mesh.vertices, a).energy.total,
+            three.evaluate(mesh.vertices, b).energy.total);
+  EXPECT_EQ(a, b);
+}
+
+/// Flux per pixel by random rays from all over the disc, apart from all optics of the program: they
+/// enter the flat face and meet one facet, and are bent by angles at both.
+struct TracedPicture {
+  std::vector<double> flux;
+  double rays;
+};
+
+/// The facet above a place that a ray through it from below meets.
+Eigen::Vector3d meet(const SurfaceMesh& mesh, const Eigen::Vector3d& from, const Eigen::Vector3d& a,
+                     Eigen::Vector3d& normal) {
+  for (std::int64_t f = 0; f < mesh.triangle_count(); ++f) {
+    Eigen::Matrix3d sides;
+    sides << mesh.corner(f, 1) - mesh.corner(f, 0), mesh.corner(f, 2) - mesh.corner(f, 0), -a;
+    const Eigen::Vector3d s = sides.inverse() * (from - mesh.corner(f, 0));
+    if (s.x() < 0.0 || s.y() < 0.0 || s.x() + s.y() > 1.0) continue;
+    normal = sides.col(0).cross(sides.col(1)).normalized();
+    return from + s.z() * a;
+  }
+  normal.setZero();
+  return from;
+}
+
+TracedPicture traced(const SurfaceMesh& mesh, const OpticalSetup& setup, int count) {
+  TracedPicture picture{std::vector<double>(static_cast<std::size_t>(setup.pixels.prod()), 0.0), 0};
+  Random random(11);
+  for (int ray = 0; ray < count; ++ray) {
+    const double angle = 0.5 * setup.extent.width * std::sqrt(random.between(0.0, 1.0));
+    const double turn = random.between(0.0, 2.0 * std::numbers::pi);
+    const Eigen::Vector3d way =
+        Eigen::Vector3d(angle * std::cos(turn), angle * std::sin(turn), 1.0).normalized();
+    // Wider than the lens by what a slanting ray moves inside it.
+    const Eigen::Vector3d place(random.between(-0.5, setup.lens_size.x() + 0.5),
+                                random.between(-0.5, setup.lens_size.y() + 0.5), 0.0);
+    const Eigen::Vector3d a =
+        testing::refract_by_angles(way, Eigen::Vector3d::UnitZ(), 1.0 / setup.ior);
+    Eigen::Vector3d n;
+    const Eigen::Vector3d p = meet(mesh, place, a, n);
+    if (n.isZero()) continue;
+    picture.rays += 1.0;
+    const Eigen::Vector3d b = testing::refract_by_angles(a, n, setup.ior);
+    const Eigen::Vector3d hit = p + (setup.focal_length - p.z()) / b.z() * b;
+    const double u = (setup.lens_size.x() - hit.x()) / setup.lens_size.x() * setup.pixels.x();
+    const double v = (setup.lens_size.y() - hit.y()) / setup.lens_size.y() * setup.pixels.y();
+    if (u < 0.0 || v < 0.0 || u >= setup.pixels.x() || v >= setup.pixels.y()) continue;
+    picture.flux[static_cast<std::size_t>(static_cast<int>(v) * setup.pixels.x() +
+                                          static_cast<int>(u))] += 1.0;
+  }
+  return picture;
+}
+
+TEST(ExtendedPicture, IsThatOfSingleRaysFromAllOverTheSource) {
+  OpticalSetup setup = testing::setup_of({24.0, 20.0}, {12, 10}, 60.0);
+  setup.extent.width = 0.1;
+  const SurfaceMesh mesh = testing::height_field({24.0, 20.0}, {13, 13}, [](double x, double y) {
+    return 5.0 + 0.15 * std::sin(0.4 * x) * std::cos(0.3 * y);
+  });
+  const TracedPicture rays = traced(mesh, setup, 80000);
+  const RenderResult rendered =
+      render_surface(mesh, setup, SurfaceModel::kFacet, Executor::serial());
+  double chi_square = 0.0;
+  const auto pixels = static_cast<double>(rays.flux.size());
+  for (std::size_t i = 0; i < rays.flux.size(); ++i) {
+    const double expected = static_cast<double>(rendered.image.values()[i]) / pixels * rays.rays;
+    chi_square += (rays.flux[i] - expected) * (rays.flux[i] - expected) / expected;
+  }
+  // 120 pixels: mean 120, standard deviation 15.5.
+  EXPECT_LT(chi_square, 120.0 + 4.0 * 15.5);
+  EXPECT_GT(chi_square, 120.0 - 5.0 * 15.5);
+}
+
+TEST(ExtendedPicture, TheConvolutionIsCloseToTheSumOverTheSource) {
+  OpticalSetup setup = testing::setup_of({24.0, 20.0}, {24, 20}, 60.0);
+  setup.extent.width = 0.05;
+  const SurfaceMesh mesh = testing::height_field({24.0, 20.0}, {49, 41}, testing::bumps);
+  const auto flux = [&](const OpticalSetup& one) {
+    const RenderResult result =
+        render_surface(mesh, one, SurfaceModel::kSmooth, Executor::serial());
+    return std::vector<double>(result.image.values().begin(), result.image.values().end());
+  };
+  const std::vector<double> exact = picture_under(setup, 256, flux);
+  std::vector<double> convolved = picture_by_convolution(setup, 5.0, flux, Executor::serial());
+  double off = 0.0;
+  // The finer picture is relative to four times as many pixels; the rim lacks light from outside.
+  for (int row = 3; row < 17; ++row) {
+    for (int column = 3; column < 21; ++column) {
+      const auto i = static_cast<std::size_t>(row * 24 + column);
+      off = std::max(off, std::fabs(convolved[i] / 4.0 - exact[i]));
+    }
+  }
+  EXPECT_LT(off, 0.02);
+}
+
+TEST(SourceLimit, IsTheTargetWhereTheSourceCouldMakeIt) {
+  OpticalSetup setup = testing::setup_of({32.0, 32.0}, {32, 32}, 100.0);
+  setup.extent.width = 0.02;
+  // A picture that is blurred already, dark at its rim.
+  Image target(32, 32);
+  for (int row = 0; row < 32; ++row) {
+    for (int column = 0; column < 32; ++column) {
+      const double r2 = std::pow(column - 15.5, 2) + std::pow(row - 15.5, 2);
+      target.at(column, row) = static_cast<float>(std::exp(-r2 / 40.0));
+    }
+  }
+  const SourceLimit limit = source_limit(target, setup, 5.0, Executor::serial());
+  EXPECT_LT(limit.metrics.mae, 0.002);
+  EXPECT_NEAR(limit.light.total(), target.total(), 1e-3 * target.total());
+}
+
+TEST(SourceLimit, IsHalfGreyWhereTheSourceHidesAChequer) {
+  OpticalSetup setup = testing::setup_of({32.0, 32.0}, {32, 32}, 100.0);
+  setup.extent.width = 0.12;
+  Image target(32, 32);
+  for (int row = 0; row < 32; ++row) {
+    for (int column = 0; column < 32; ++column) {
+      target.at(column, row) = (row + column) % 2 == 0 ? 1.0F : 0.0F;
+    }
+  }
+  const SourceLimit limit = source_limit(target, setup, 5.0, Executor::serial());
+  EXPECT_GT(limit.metrics.mae, 0.4);
+}
+
+TEST(ExtendedDesign, IsBetterThanOneForAPointAndNoBetterThanItsLimit) {
+  const Image target = testing::spot_picture(32, 32);
+  DesignOptions options = default_design_options(SurfaceModel::kSmooth, target);
+  options.width = 32.0;
+  options.focal_length = 100.0;
+  options.rounds = 1;
+  options.iterations = 60;
+  const DesignResult sharp = design_lens(target, options, Executor::cpu(2), RunControl());
+  options.light.source_angle = 40.0;
+  const DesignResult wide = design_lens(target, options, Executor::cpu(2), RunControl());
+  ASSERT_TRUE(wide.source.has_value());
+  ASSERT_TRUE(wide.lens.source_limit.has_value());
+  EXPECT_NEAR(wide.source->blur, 3.8, 0.1);
+  Lens other = sharp.lens;
+  other.setup = wide.lens.setup;
+  const double unaware = evaluate(other, SurfaceModel::kSmooth, nullptr, Executor::cpu(2)).mae;
+  const double aware = wide.lens.metrics.at(SurfaceModel::kSmooth).mae;
+  EXPECT_LT(aware, 0.8 * unaware);
+  EXPECT_LE(wide.lens.source_limit->mae, aware);
+}
+
+}  // namespace
+}  // namespace lensforge
