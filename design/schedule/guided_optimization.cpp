@@ -8,6 +8,7 @@
 #include <numbers>
 #include <variant>
 
+#include "core/compute/split_mix.h"
 #include "core/optics/light_path.h"
 #include "core/value_slope.h"
 #include "design/energy/spline_objective.h"
@@ -58,10 +59,7 @@ double lowest_eigenvalue(const GridShape& shape) {
 
 /// A fixed sequence of ±1 that has no preferred frequency (SplitMix64).
 double sign_at(std::uint64_t i) {
-  std::uint64_t z = (i + 1) * 0x9e3779b97f4a7c15ULL;
-  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ULL;
-  z = (z ^ (z >> 27)) * 0x94d049bb133111ebULL;
-  return ((z ^ (z >> 31)) & 1U) != 0 ? 1.0 : -1.0;
+  return (mixed_bits((i + 1) * kGoldenGamma) & 1U) != 0 ? 1.0 : -1.0;
 }
 
 /// Size of the smallest triangle around every vertex, √(area ÷ mean area), at most 1.

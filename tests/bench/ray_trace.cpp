@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "bench/light_scene.h"
+#include "core/compute/split_mix.h"
 
 // Notation
 //   u, v   whole cells of the grid of strata across and along the lens
@@ -29,13 +30,8 @@ constexpr double kRaysPerPixel = 16384.0;
 constexpr double kFewestRays = 268435456.0;
 constexpr double kMaxRays = 2147483648.0;
 
-/// A well-mixed 64-bit value of a counter (the finaliser of SplitMix64, Steele et al. 2014).
-std::uint64_t mixed(std::uint64_t x) {
-  x += 0x9e3779b97f4a7c15ULL;
-  x = (x ^ (x >> 30U)) * 0xbf58476d1ce4e5b9ULL;
-  x = (x ^ (x >> 27U)) * 0x94d049bb133111ebULL;
-  return x ^ (x >> 31U);
-}
+/// A well-mixed 64-bit value of a counter.
+std::uint64_t mixed(std::uint64_t x) { return mixed_bits(x + kGoldenGamma); }
 
 /// What one sampling counted.
 struct Count {

@@ -7,6 +7,7 @@
 #include <numbers>
 #include <vector>
 
+#include "core/compute/split_mix.h"
 #include "design/reflect/light/phong.h"
 #include "design/reflect/light/reflection_energy.h"
 
@@ -20,23 +21,18 @@ using std::numbers::pi;
 constexpr std::int64_t kBlocks = 16;
 constexpr double kAnywhere = std::numeric_limits<double>::infinity();
 
-/// A stream of numbers in 0 … 1 (SplitMix64, Steele et al. 2014).
+/// A stream of numbers in 0 … 1 (SplitMix64).
 class Random {
  public:
-  Random(std::uint64_t seed, std::uint64_t stream) : state_(mixed(seed) ^ mixed(~stream)) {}
+  Random(std::uint64_t seed, std::uint64_t stream)
+      : state_(mixed_bits(seed) ^ mixed_bits(~stream)) {}
 
   double next() {
-    state_ += 0x9e3779b97f4a7c15ULL;
-    return static_cast<double>(mixed(state_) >> 11U) * 0x1p-53;
+    state_ += kGoldenGamma;
+    return unit_share(mixed_bits(state_));
   }
 
  private:
-  static std::uint64_t mixed(std::uint64_t x) {
-    x = (x ^ (x >> 30U)) * 0xbf58476d1ce4e5b9ULL;
-    x = (x ^ (x >> 27U)) * 0x94d049bb133111ebULL;
-    return x ^ (x >> 31U);
-  }
-
   std::uint64_t state_;
 };
 

@@ -10,6 +10,7 @@
 #include <numbers>
 #include <string>
 
+#include "core/compute/split_mix.h"
 #include "core/error.h"
 #include "core/text/number_text.h"
 #include "design/reflect/light/ray_scene.h"
@@ -30,13 +31,8 @@ constexpr double kTubesPerWavelength = 10.0;
 constexpr int kBounces = 3;
 constexpr double kAnywhere = std::numeric_limits<double>::infinity();
 
-/// A number in 0 … 1 of a counter (SplitMix64, Steele et al. 2014).
-double jitter(std::uint64_t counter) {
-  std::uint64_t x = counter * 0x9e3779b97f4a7c15ULL;
-  x = (x ^ (x >> 30U)) * 0xbf58476d1ce4e5b9ULL;
-  x = (x ^ (x >> 27U)) * 0x94d049bb133111ebULL;
-  return static_cast<double>((x ^ (x >> 31U)) >> 11U) * 0x1p-53;
-}
+/// A number in 0 … 1 of a counter (SplitMix64).
+double jitter(std::uint64_t counter) { return unit_share(mixed_bits(counter * kGoldenGamma)); }
 
 double tubes_across(const SurfaceMesh& mesh, double wavelength) {
   return std::ceil(bounding_diagonal(mesh) * kTubesPerWavelength / wavelength);

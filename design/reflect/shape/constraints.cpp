@@ -22,6 +22,20 @@ constexpr double kVolumeTolerance = 0.01;
 constexpr double kThicknessTolerance = 0.01;
 constexpr double kPlaneTolerance = 1e-3;
 
+/// Share of the area that may be turned over: what slivers in creases have.
+constexpr double kTurnedTolerance = 0.01;
+
+/// Share of the area of faces whose normals have turned by more than a right angle.
+double turned_share(const SurfaceMesh& reference, const SurfaceMesh& moved) {
+  const Faces before = measure_faces(reference);
+  const Faces after = measure_faces(moved);
+  double turned = 0.0;
+  for (Eigen::Index k = 0; k < before.count(); ++k) {
+    if (before.normal.col(k).dot(after.normal.col(k)) < 0.0) turned += before.area[k];
+  }
+  return turned / before.area.sum();
+}
+
 /// Point and unit normal.
 struct Plane {
   Eigen::Vector3d point;
@@ -162,6 +176,11 @@ Eigen::Matrix3Xd Constraints::enforced(const Eigen::Matrix3Xd& vertices) const {
 
 std::vector<std::string> Constraints::broken(const Eigen::Matrix3Xd& vertices) const {
   std::vector<std::string> words;
+  const double turned = turned_share(reference_, with(vertices));
+  if (turned > kTurnedTolerance) {
+    words.push_back("--anchor: faces with " + number_text(100.0 * turned, 3) +
+                    " % of the area are turned over; a larger value, as 0.1, holds them");
+  }
   const double volume = signed_volume(with(vertices));
   if (set_.volume && std::abs(volume - volume_) > kVolumeTolerance * std::abs(volume_)) {
     words.push_back("--keep-volume: the volume is " + number_text(100.0 * volume / volume_, 4) +

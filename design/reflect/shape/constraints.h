@@ -40,7 +40,7 @@ class Constraints {
   [[nodiscard]] Eigen::Matrix3Xd enforced(const Eigen::Matrix3Xd& vertices) const;
 
   /// What a shape breaks, in words; empty if nothing. Thickness and volume are kept to 1 %, planes
-  /// to 1e-3 of the diagonal.
+  /// to 1e-3 of the diagonal; at most 1 % of the area may be turned over.
   [[nodiscard]] std::vector<std::string> broken(const Eigen::Matrix3Xd& vertices) const;
 
  private:

@@ -61,6 +61,15 @@ TEST(Constraints, KeepMaterialBehindVertices) {
   EXPECT_GT(kept.row(2).maxCoeff() - kept.row(2).minCoeff(), 1.48);
 }
 
+TEST(Constraints, FacesThatAreTurnedOverAreNamedWithoutAnyConstraint) {
+  const SurfaceMesh mesh = shapes::icosphere(2);
+  const Constraints constraints(mesh, {}, Executor::serial());
+  EXPECT_THAT(constraints.broken(mesh.vertices), ::testing::IsEmpty());
+  const Eigen::Matrix3Xd mirrored = Eigen::Vector3d(1.0, 1.0, -1.0).asDiagonal() * mesh.vertices;
+  EXPECT_THAT(constraints.broken(mirrored),
+              ::testing::ElementsAre(::testing::HasSubstr("% of the area are turned over")));
+}
+
 TEST(Constraints, KeepBothHalvesMirrorImages) {
   const SurfaceMesh mesh = shapes::torus(20, 12);
   ConstraintSet set;

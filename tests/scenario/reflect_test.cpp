@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <csignal>
+
+#include "core/surface/mesh_io.h"
+#include "scenario/driver.h"
+
+namespace lensforge::scenario {
+namespace {
+
+using ::testing::HasSubstr;
+
+/// The regular octahedron with a corner up.
+constexpr const char* kOctahedron =
+    "OFF\n6 8 0\n1 0 0\n-1 0 0\n0 1 0\n0 -1 0\n0 0 1\n0 0 -1\n"
+    "3 0 2 4\n3 2 1 4\n3 1 3 4\n3 3 0 4\n3 2 0 5\n3 1 2 5\n3 3 1 5\n3 0 3 5\n";
+
+class Reflect : public Scenario {
+ protected:
+  void SetUp() override { write(at("shape.off"), kOctahedron); }
+
+  /// A run of a second or so.
+  [[nodiscard]] Arguments quick(const Arguments& more = {}) const {
+    Arguments arguments = {
+        "reflect", path("shape.off"), "--out", path("out"),        "--faces", "60", "--rim-updates",
+        "1",       "--face-updates",  "1",     "--direction-rows", "2"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return arguments;
+  }
+
+  /// @param mesh  the text of an OFF file.
+  void expect_refused(const std::string& mesh, const Arguments& more,
+                      const std::vector<std::string>& parts) const {
+    write(at("bad.off"), mesh);
+    Arguments arguments = {"reflect", path("bad.off"), "--out", path("bad")};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    expect_refusal(run(arguments), 2, parts);
+    EXPECT_THAT(listing(at("bad")), ::testing::Not(::testing::Contains("surface.ply")));
+  }
+};
+
+TEST_F(Reflect, WritesTheShapeItsPicturesAndItsFiguresTogether) {
+  const Outcome outcome = run(quick({"--json"}));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const nlohmann::json result = outcome.json();
+  EXPECT_EQ(result["status"], "done");
+  EXPECT_EQ(result["updates"], 3);
+  for (const char* name : {"surface.ply", "reference.ply", "views.png", "displacement.png",
+                           "convergence.csv", "reflect.json"}) {
+    EXPECT_TRUE(fs::exists(at("out") / name)) << name;
+  }
+  EXPECT_EQ(read_mesh(at("out/surface.ply")).triangle_count(), result["faces"]);
+}
+
+TEST_F(Reflect, EvaluatePrintsEnergiesAndWritesNothing) {
+  const Outcome outcome = run({"reflect", path("shape.off"), "--evaluate", "--json"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_NEAR(outcome.json()["energy_direct"], 8.27e-5, 1e-6);
+  EXPECT_EQ(listing(at("")), std::vector<std::string>{"shape.off"});
+}
+
+TEST_F(Reflect, FilesOfOthersAreKeptUnlessForced) {
+  fs::create_directory(at("out"));
+  write(at("out/surface.ply"), "mine");
+  expect_refusal(run(quick({"--quiet"})), 2, {"surface.ply", "--force"});
+  EXPECT_EQ(content(at("out/surface.ply")), "mine");
+  EXPECT_EQ(run(quick({"--force"})).exit_code, 0);
+}
+
+TEST_F(Reflect, MeshesThatCannotBeShapedAreRefused) {
+  const std::string open = "OFF\n3 1 0\n0 0 0\n1 0 0\n0 0 1\n3 0 1 2\n";
+  expect_refused(open, {"--keep-volume"}, {"--keep-volume", "is open", "--keep-box"});
+  expect_refused(open, {"--min-thickness", "0.1"}, {"--min-thickness", "is open"});
+  expect_refused("OFF\n3 1 0\n0 0 0\n1 0 0\n2 0 0\n3 0 1 2\n", {}, {"face 0 has no area"});
+  expect_refused("OFF\n3 1 0\n0 0 0\n1 0 nan\n0 0 1\n3 0 1 2\n", {}, {"bad.off"});
+  expect_refused("OFF\n5 3 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n0 0 -1\n3 0 1 2\n3 0 1 3\n3 0 1 4\n", {},
+                 {"more than two faces"});
+  expect_refused(open, {"--symmetry", "x"}, {"has no mirror image"});
+}
+
+TEST_F(Reflect, OptionsThatContradictEachOtherAreRefused) {
+  expect_refused(kOctahedron, {"--fix-box=-9,-9,-9,9,9,9"}, {"hold all 6 vertices"});
+  expect_refused(kOctahedron, {"--fix-plane", "0,0,0,1"}, {"--fix-plane 0,0,0,1", "0,0,1,0"});
+  expect_refused(kOctahedron, {"--fix-vertices", path("none.txt")}, {"none.txt"});
+  expect_refused(kOctahedron, {"--place", "1,2,3"}, {"--place", "1,2,3"});
+  expect_refused(kOctahedron, {"--goal", "point"}, {"--place"});
+  expect_refused(kOctahedron, {"--light", "0,0,0"}, {"--light", "0,0,0"});
+  write(at("numbers.txt"), "6\n");
+  expect_refused(kOctahedron, {"--planar-faces", path("numbers.txt"), "--faces", "100"},
+                 {"--planar-faces", "--faces makes another mesh"});
+  expect_refusal(run({"reflect", path("shape.off")}), 2, {"--out", "--evaluate"});
+}
+
+TEST_F(Reflect, AnInterruptedRunKeepsItsShapeAndSaysSo) {
+  Process process({"reflect", path("shape.off"), "--out", path("out"), "--method", "paper",
+                   "--rim-updates", "10000"});
+  while (!fs::exists(at("out"))) {
+    ASSERT_TRUE(process.runs_for(std::chrono::milliseconds(5))) << process.wait().err;
+  }
+  process.send(SIGINT);
+  EXPECT_EQ(process.wait().exit_code, 130);
+  const nlohmann::json result = nlohmann::json::parse(content(at("out/reflect.json")));
+  EXPECT_EQ(result["status"], "interrupted");
+  EXPECT_TRUE(result["after"].is_null());
+  EXPECT_EQ(read_mesh(at("out/surface.ply")).triangle_count(), 8);
+}
+
+}  // namespace
+}  // namespace lensforge::scenario
