@@ -24,6 +24,7 @@
 #include "app/output_folder.h"
 #include "app/overview.h"
 #include "app/progress_display.h"
+#include "app/setup_drawing.h"
 #include "cam/cam_job.h"
 #include "core/compute/work_estimate.h"
 #include "core/error.h"
@@ -116,6 +117,8 @@ void write_folder(const OutputFolder& folder, const DesignResult& result, const 
   const Image* const made = result.made ? &result.made->picture : nullptr;
   files.add(lens_file::kOverview,
             [&](const fs::path& beside) { write_image(draw_overview(result.lens, made), beside); });
+  files.add(lens_file::kSetup,
+            setup_drawing(result.lens.setup, result.lens.surface.vertices.row(2).maxCoeff()));
   write_lens(result.lens, std::move(files));
   const fs::path cut = folder.path() / lens_file::kCut;
   std::error_code ignored;

@@ -84,8 +84,10 @@ std::string light_text(const OpticalSetup& setup) {
 
 void describe_setup(Description& d, const OpticalSetup& setup) {
   d.line("light", light_text(setup));
-  d.line("lens", fixed(setup.lens_size.x(), 2) + " x " + fixed(setup.lens_size.y(), 2) +
-                     " mm, refractive index " + fixed(setup.ior, 4));
+  const bool mirror = setup.mode == LightMode::kReflect;
+  d.line(mirror ? "mirror" : "lens",
+         fixed(setup.lens_size.x(), 2) + " x " + fixed(setup.lens_size.y(), 2) + " mm" +
+             (mirror ? "" : ", refractive index " + fixed(setup.ior, 4)));
   d.line("wall", "z = " + fixed(setup.focal_length, 2) + " mm, picture " +
                      fixed(setup.image_size.x(), 2) + " x " + fixed(setup.image_size.y(), 2) +
                      " mm, seen from the " + (setup.view == ViewSide::kFront ? "front" : "rear"));
@@ -100,7 +102,8 @@ void describe_setup(Description& d, const OpticalSetup& setup) {
   d.json["focal_length"] = setup.focal_length;
   d.json["ior"] = setup.ior;
   const nlohmann::ordered_json all = setup_json(setup);
-  for (const char* key : {"mode", "source", "screen"}) d.json[key] = all.at(key);
+  for (const char* key : {"mode", "screen"}) d.json[key] = all.at(key);
+  d.json["light"] = all.at("source");  // "source" is what was asked about.
 }
 
 void describe_provenance(Description& d, const nlohmann::json& provenance) {

@@ -21,7 +21,18 @@ constexpr double kIndexTolerance = 0.005;
 
 std::string mm(double value, int decimals) { return decimal_text(value, decimals) + " mm"; }
 
-SetupSheet setup_sheet(const CutPlan& plan) {
+bool is_mirror(const Lens& lens) { return lens.setup.mode == LightMode::kReflect; }
+
+/// Which face lies down and which is cut. No light passes a mirror: its underside needs no polish.
+std::string up_words(PartKind part, const Lens& lens) {
+  if (part == PartKind::kMould) return "the mould's cavity is cut from above";
+  if (is_mirror(lens)) {
+    return "underside down, which needs no polish; the mirror's surface is cut from above";
+  }
+  return "polished flat face down; the optical surface is cut from above";
+}
+
+SetupSheet setup_sheet(const CutPlan& plan, const Lens& designed) {
   const CamOptions& options = plan.options();
   const bool lens = options.part == PartKind::kLens;
   SetupSheet sheet;
@@ -31,8 +42,7 @@ SetupSheet setup_sheet(const CutPlan& plan) {
   sheet.blank = plan.blank();
   sheet.zero = {0.0, 0.0, -plan.z_offset()};
   sheet.zero_words = std::string("lower left corner of the lens, ") + words_for(options.z_zero);
-  sheet.up_words = lens ? "polished flat face down; the optical surface is cut from above"
-                        : "the mould's cavity is cut from above";
+  sheet.up_words = up_words(options.part, designed);
   for (const KeepOut& clamp : options.workshop.keep_outs) {
     sheet.keep_outs.push_back({clamp.name, {clamp.low, clamp.high}});
   }
@@ -181,10 +191,10 @@ ReportMap fillet_share_map(const CreaseMap& creases) {
 }
 
 /// By how much the index of the workshop's material is off the one that the lens was designed for;
-/// 0 where it states none, and for a mould, from whose material no light passes.
+/// 0 where it states none, and for a mould or a mirror, through whose material no light passes.
 double index_error(const CutPlan& plan, const Lens& lens) {
   const double stated = plan.options().workshop.material.ior;
-  if (!(stated > 0.0) || plan.options().part == PartKind::kMould) return 0.0;
+  if (!(stated > 0.0) || plan.options().part == PartKind::kMould || is_mirror(lens)) return 0.0;
   return std::abs(stated - lens.setup.ior);
 }
 
@@ -373,7 +383,7 @@ ReportData make_report(const CutPlan& plan, const ProgramFiles& programs,
   if (process.rough.enabled || process.semi.enabled) {
     data.parameters.push_back(entry_parameters(process));
   }
-  data.setup = setup_sheet(plan);
+  data.setup = setup_sheet(plan, lens);
   data.z_offset = plan.z_offset();
   data.warnings = warnings_of(plan, programs, lens);
   data.path = plan.shown_path();

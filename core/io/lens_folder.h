@@ -17,12 +17,13 @@ inline constexpr const char* kRenderExr = "render.exr";
 inline constexpr const char* kError = "error.png";
 inline constexpr const char* kConvergence = "convergence.csv";
 inline constexpr const char* kOverview = "overview.png";
+inline constexpr const char* kSetup = "setup.svg";
 inline constexpr const char* kCheckpoint = "checkpoint.bin";  ///< While a design is unfinished.
 
 /// All of them.
-inline constexpr std::array kAll = {kJson,      kSurface,     kSpline,    kTargetPng,
-                                    kTargetExr, kRenderPng,   kRenderExr, kError,
-                                    kOverview,  kConvergence, kCheckpoint};
+inline constexpr std::array kAll = {kJson,      kSurface,   kSpline,      kTargetPng,
+                                    kTargetExr, kRenderPng, kRenderExr,   kError,
+                                    kOverview,  kSetup,     kConvergence, kCheckpoint};
 
 /// Folder in which earlier versions put a lens together; a killed one has left it behind.
 inline constexpr const char* kStaging = "lens";

@@ -50,7 +50,7 @@ std::shared_ptr<const OpticalSurface> optical_surface(const Lens& lens, SurfaceM
 /// lens.json is whole. @throw RunError if something cannot be written.
 void write_lens(const Lens& lens, PendingFiles files);
 
-/// The same for a lens alone, without the convergence.csv and overview.png that `design` adds.
+/// The same for a lens alone, without convergence.csv, overview.png and setup.svg of `design`.
 void write_lens(const Lens& lens, const std::filesystem::path& folder);
 
 /// Reads a lens folder back.

@@ -330,6 +330,18 @@ TEST(CutSafety, AMaterialOfAnotherIndexIsAMissedLimit) {
   EXPECT_FALSE(misses(cut(), "material_ior")) << "light passes no mould";
 }
 
+TEST(CutSafety, AMirrorsMaterialAndUndersideDoNotConcernItsLight) {
+  Lens mirror = small_lens();
+  mirror.setup.mode = LightMode::kReflect;
+  mirror.setup.light = {0.6, 0.0, -0.8};
+  CamOptions options = programs_only();
+  options.workshop.material.ior = 1.586;
+  const TempFolder folder;
+  const ReportData report = make_cut(mirror, options, folder.path(), Executor::serial(), {}).report;
+  EXPECT_FALSE(misses(report, "material_ior"));
+  EXPECT_THAT(report.setup.up_words, ::testing::HasSubstr("underside down, which needs no polish"));
+}
+
 TEST(CutSafety, AControllerWithoutALimitOfLinesBearsAnyLoad) {
   CamOptions options = programs_only();
   const TempFolder folder;

@@ -59,8 +59,8 @@ void design_options(Scene& scene) {
 
 const std::vector<std::string>& files_of_a_lens() {
   static const std::vector<std::string> names{
-      "target.png",  "target.exr",   "render.png",      "render.exr",     "error.png",
-      "surface.ply", "overview.png", "convergence.csv", "checkpoint.bin", "lens.json"};
+      "target.png",   "target.exr", "render.png",      "render.exr",     "error.png", "surface.ply",
+      "overview.png", "setup.svg",  "convergence.csv", "checkpoint.bin", "lens.json"};
   return names;
 }
 

@@ -10,9 +10,9 @@ namespace {
 
 using ::testing::HasSubstr;
 
-const std::vector<std::string> kLensFiles{"convergence.csv", "error.png",  "lens.json",
-                                          "overview.png",    "render.exr", "render.png",
-                                          "surface.ply",     "target.exr", "target.png"};
+const std::vector<std::string> kLensFiles{
+    "convergence.csv", "error.png", "lens.json",   "overview.png", "render.exr",
+    "render.png",      "setup.svg", "surface.ply", "target.exr",   "target.png"};
 
 struct Fixture {
   const char* picture;

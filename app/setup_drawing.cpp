@@ -1,0 +1,295 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "app/setup_drawing.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "core/text/number_text.h"
+#include "core/text/version.h"
+
+namespace lensforge::app {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+constexpr double kWidth = 760.0;    ///< Of the drawing; all its lengths are in its own units.
+constexpr double kMargin = 60.0;    ///< Around a view, for its words.
+constexpr double kTallest = 300.0;  ///< Of a view.
+constexpr double kLine = 18.0;      ///< Of text.
+/// The whole in diagonals of the part, beyond which the part would be a dot.
+constexpr double kLargestToScale = 20.0;
+constexpr double kDegree = std::numbers::pi / 180.0;
+
+constexpr const char* kRay = "stroke=\"#c98a00\" stroke-width=\"1.5\"";
+constexpr const char* kDistance = "stroke=\"#56616b\" stroke-dasharray=\"5 4\"";
+
+bool is_mirror(const OpticalSetup& setup) { return setup.mode == LightMode::kReflect; }
+
+std::string number(double value) { return trimmed_decimal(value, 1); }
+
+std::string place(const Vector3d& p) {
+  return "x " + number(p.x()) + ", y " + number(p.y()) + ", z " + number(p.z()) + " mm";
+}
+
+/// What stands where, mm in the lens frame.
+struct Scene {
+  explicit Scene(const OpticalSetup& setup, double part_height)
+      : high(setup.lens_size.x(), setup.lens_size.y(), part_height),
+        unit(high.norm()),
+        middle(0.5 * setup.lens_size.x(), 0.5 * setup.lens_size.y(), part_height),
+        centre(setup.screen_centre()),
+        across(0.5 * setup.image_size.x() * setup.screen_x),
+        upwards(0.5 * setup.image_size.y() * setup.screen_y),
+        normal(setup.screen_x.cross(setup.screen_y)),
+        lamp(setup.point ? setup.point->position : Vector3d(middle - 1.5 * unit * setup.light)) {
+    const double side = setup.view == ViewSide::kFront ? -1.0 : 1.0;
+    eye = centre + 0.3 * (centre - middle).norm() * side * normal + 1.4 * upwards;
+    double farthest = 0.0;
+    for (const Vector3d& p :
+         {lamp, eye, Vector3d(centre + across + upwards), Vector3d(centre - across - upwards)}) {
+      farthest = std::max(farthest, (p - middle).norm());
+    }
+    to_scale = farthest <= kLargestToScale * unit;
+  }
+
+  /// Where a point is drawn, from the part's middle: its direction is kept, and where the drawing
+  /// is not to scale, its distance d is shown as asinh(d).
+  [[nodiscard]] Vector3d shown(const Vector3d& p) const {
+    const Vector3d from = p - middle;
+    const double d = from.norm() / unit;
+    if (to_scale || d == 0.0) return from;
+    return from * (std::asinh(d) / d);
+  }
+
+  /// As far from a point along x or y as the part's edge is from its middle.
+  [[nodiscard]] Vector3d beside(const Vector3d& p, int axis, double side) const {
+    return p + 0.5 * side * high[axis] * Vector3d::Unit(axis);
+  }
+
+  Vector3d low{0.0, 0.0, 0.0};
+  Vector3d high;
+  double unit;      ///< mm, the part's diagonal.
+  Vector3d middle;  ///< Of the part's upper side.
+  Vector3d centre;
+  Vector3d across;  ///< From the picture's centre to its edges.
+  Vector3d upwards;
+  Vector3d normal;
+  Vector3d lamp;  ///< Of parallel light a place that it comes through.
+  Vector3d eye;
+  bool to_scale = true;
+};
+
+/// One view: z to the right, x or y up.
+class View {
+ public:
+  View(const Scene& scene, int up) : scene_(scene), up_(up) {
+    for (const Vector3d& p : {scene.low, scene.high, scene.lamp, scene.eye}) box_.extend(flat(p));
+    for (const double a : {-1.0, 1.0}) {
+      box_.extend(flat(scene.beside(scene.lamp, up, a)));
+      for (const double b : {-1.0, 1.0}) box_.extend(flat(corner(a, b)));
+    }
+  }
+
+  [[nodiscard]] double largest_scale() const {
+    return std::min((kWidth - 2.0 * kMargin) / box_.sizes().x(), kTallest / box_.sizes().y());
+  }
+  void set(double scale, double top) {
+    scale_ = scale;
+    top_ = top + kMargin;
+  }
+  [[nodiscard]] double bottom() const { return top_ + scale_ * box_.sizes().y() + 0.6 * kMargin; }
+  [[nodiscard]] int up() const { return up_; }
+
+  /// A corner of the picture.
+  [[nodiscard]] Vector3d corner(double a, double b) const {
+    return scene_.centre + a * scene_.across + b * scene_.upwards;
+  }
+  [[nodiscard]] Vector2d at(const Vector3d& p) const {
+    const Vector2d f = flat(p) - box_.min();
+    return {kMargin + scale_ * f.x(), top_ + scale_ * (box_.sizes().y() - f.y())};
+  }
+
+ private:
+  [[nodiscard]] Vector2d flat(const Vector3d& p) const {
+    const Vector3d shown = scene_.shown(p);
+    return {shown.z(), shown[up_]};
+  }
+
+  const Scene& scene_;
+  int up_;  ///< 0: x, 1: y
+  Eigen::AlignedBox2d box_;
+  double scale_ = 1.0;
+  double top_ = 0.0;
+};
+
+std::string pair(const Vector2d& p) {
+  return decimal_text(p.x(), 1) + "," + decimal_text(p.y(), 1);
+}
+
+std::string line(const Vector2d& from, const Vector2d& to, const std::string& style) {
+  return "<path d=\"M" + pair(from) + "L" + pair(to) + "\" fill=\"none\" " + style + "/>\n";
+}
+
+std::string words(const Vector2d& at, const std::string& text, const std::string& style = "") {
+  return "<text x=\"" + decimal_text(at.x(), 1) + "\" y=\"" + decimal_text(at.y(), 1) + "\" " +
+         style + ">" + text + "</text>\n";
+}
+
+std::string polygon(const std::vector<Vector2d>& corners, const std::string& style) {
+  std::string points;
+  for (const Vector2d& p : corners) points += pair(p) + " ";
+  return "<polygon points=\"" + points + "\" " + style + "/>\n";
+}
+
+std::string dot(const Vector2d& at, double radius, const std::string& colour) {
+  return "<circle cx=\"" + decimal_text(at.x(), 1) + "\" cy=\"" + decimal_text(at.y(), 1) +
+         "\" r=\"" + decimal_text(radius, 0) + "\" fill=\"" + colour + "\"/>\n";
+}
+
+/// A dashed line with its true length below it, in the view that shows nearly all of it.
+std::string distance(const View& view, const Vector3d& from, const Vector3d& to) {
+  const Vector2d a = view.at(from);
+  const Vector2d b = view.at(to);
+  const Vector3d way = to - from;
+  const bool foreshortened = std::hypot(way.z(), way[view.up()]) < 0.8 * way.norm();
+  if (foreshortened || (b - a).norm() < 4.0 * kLine) return "";
+  return line(a, b, kDistance) + words(0.6 * a + 0.4 * b + Vector2d(0.0, 15.0),
+                                       number(way.norm()) + " mm", "text-anchor=\"middle\"");
+}
+
+std::string lamp(const OpticalSetup& setup, const Scene& scene, const View& view) {
+  if (!setup.point) {
+    const Vector2d lowest = view.at(scene.beside(scene.lamp, view.up(), -1.0));
+    return words(lowest + Vector2d(0.0, kLine), "parallel light", "text-anchor=\"middle\"");
+  }
+  const Vector2d at = view.at(scene.lamp);
+  return distance(view, scene.lamp, scene.middle) + dot(at, 6.0, "#ffcf4d") +
+         words(at + Vector2d(0.0, -12.0), "lamp", "text-anchor=\"middle\"");
+}
+
+/// Light from the lamp over the part's edges and its middle to the picture's.
+std::string rays(const OpticalSetup& setup, const Scene& scene, const View& view) {
+  std::string svg;
+  for (const double side : {-1.0, 1.0}) {
+    const Vector3d edge = scene.beside(scene.middle, view.up(), side);
+    const Vector3d from = setup.point ? scene.lamp : scene.beside(scene.lamp, view.up(), side);
+    const Vector3d half = view.up() == 0 ? scene.across : scene.upwards;
+    svg += line(view.at(from), view.at(edge), std::string(kRay) + " marker-end=\"url(#tip)\"") +
+           line(view.at(edge), view.at(scene.centre + side * half), kRay);
+  }
+  return svg;
+}
+
+std::string part(const OpticalSetup& setup, const Scene& scene, const View& view) {
+  const Vector2d a = view.at(scene.low);
+  const Vector2d b = view.at(scene.high);
+  const double back = std::min(a.x(), b.x() - 3.0);  // A thin part is drawn thick enough to see.
+  const std::vector<Vector2d> box{{back, a.y()}, {back, b.y()}, b, {b.x(), a.y()}};
+  return polygon(box, "fill=\"#b9d3ea\" stroke=\"#0b5cad\" stroke-width=\"1.5\"") +
+         words({b.x(), std::max(a.y(), b.y()) + kLine}, is_mirror(setup) ? "mirror" : "lens",
+               "text-anchor=\"middle\"");
+}
+
+std::string screen(const Scene& scene, const View& view) {
+  const std::vector<Vector2d> corners{
+      view.at(view.corner(-1.0, -1.0)), view.at(view.corner(1.0, -1.0)),
+      view.at(view.corner(1.0, 1.0)), view.at(view.corner(-1.0, 1.0))};
+  const auto lowest =
+      std::max_element(corners.begin(), corners.end(),
+                       [](const Vector2d& a, const Vector2d& b) { return a.y() < b.y(); });
+  return polygon(corners,
+                 "fill=\"#1a1f24\" fill-opacity=\"0.15\" stroke=\"#1a1f24\" stroke-width=\"3\" "
+                 "stroke-linejoin=\"round\"") +
+         words(*lowest + Vector2d(0.0, kLine), "screen", "text-anchor=\"middle\"") +
+         distance(view, scene.middle, scene.centre);
+}
+
+std::string viewer(const Scene& scene, const View& view) {
+  const Vector2d eye = view.at(scene.eye);
+  const Vector2d way = view.at(scene.centre) - eye;
+  return line(eye, eye + 0.5 * way, "stroke=\"#2b7a3d\" marker-end=\"url(#look)\"") +
+         dot(eye, 5.0, "#2b7a3d") +
+         words(eye + Vector2d(0.0, -10.0), "viewer", "text-anchor=\"middle\" fill=\"#2b7a3d\"");
+}
+
+std::string drawn(const OpticalSetup& setup, const Scene& scene, const View& view) {
+  return rays(setup, scene, view) + part(setup, scene, view) + screen(scene, view) +
+         lamp(setup, scene, view) + viewer(scene, view);
+}
+
+std::string light_words(const OpticalSetup& setup) {
+  if (setup.point) {
+    return std::string(setup.point->emission == Emission::kIsotropic
+                           ? "point source"
+                           : "flat LED, towards the middle of the part,") +
+           " at " + place(setup.point->position);
+  }
+  if (!is_mirror(setup)) return "parallel, straight onto the flat face";
+  return "parallel, " + number(std::acos(std::clamp(-setup.light.z(), -1.0, 1.0)) / kDegree) +
+         "° from the mirror's z axis";
+}
+
+std::vector<std::string> description(const OpticalSetup& setup, const Scene& scene) {
+  const double tilt = std::acos(std::clamp(scene.normal.z(), -1.0, 1.0)) / kDegree;
+  return {(is_mirror(setup) ? "Mirror: " : "Lens: ") + number(setup.lens_size.x()) + " × " +
+              number(setup.lens_size.y()) + " mm, its lower left corner at x 0, y 0, " +
+              (is_mirror(setup) ? "its shaped side towards lamp and screen"
+                                : "its flat face at z 0, towards the lamp"),
+          "Light: " + light_words(setup),
+          "Picture: " + number(setup.image_size.x()) + " × " + number(setup.image_size.y()) +
+              " mm, its centre at " + place(scene.centre),
+          std::string("Screen: ") + (setup.screen_is_turned()
+                                         ? "tilted by " + number(tilt) + "° from the part's plane"
+                                         : "parallel to the part"),
+          std::string("Viewer: ") + (setup.view == ViewSide::kFront
+                                         ? "on the part's side of the screen"
+                                         : "behind the screen, which lets light through"),
+          scene.to_scale ? "Drawn to scale."
+                         : "Not to scale: directions from the part are right, distances are not."};
+}
+
+std::string opened(double height) {
+  const auto tip = [](const char* id, const char* colour) {
+    return std::string("<marker id=\"") + id +
+           "\" viewBox=\"0 -4 8 8\" refX=\"8\" markerWidth=\"8\" markerHeight=\"8\" "
+           "orient=\"auto\"><path d=\"M0-4L8 0L0 4z\" fill=\"" +
+           colour + "\"/></marker>";
+  };
+  const std::string size = decimal_text(height, 0);
+  return "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"" + decimal_text(kWidth, 0) +
+         "\" height=\"" + size + "\" font-family=\"sans-serif\" font-size=\"13\">\n<!-- " +
+         program_mark() + " -->\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n<defs>" +
+         tip("tip", "#c98a00") + tip("look", "#2b7a3d") + "</defs>\n";
+}
+
+}  // namespace
+
+std::string setup_drawing(const OpticalSetup& setup, double part_height) {
+  const Scene scene(setup, part_height);
+  std::array views{View(scene, 1), View(scene, 0)};
+  const double scale = std::min(views[0].largest_scale(), views[1].largest_scale());
+  views[0].set(scale, 0.0);
+  views[1].set(scale, views[0].bottom());
+  std::string svg;
+  double y = kLine;
+  for (const View& view : views) {
+    svg += words({8.0, y},
+                 view.up() == 1 ? "From the side: y up, z to the right"
+                                : "From above: x up, z to the right",
+                 "font-weight=\"bold\"") +
+           drawn(setup, scene, view);
+    y = view.bottom() + kLine;
+  }
+  for (const std::string& sentence : description(setup, scene)) {
+    svg += words({8.0, y}, sentence);
+    y += kLine;
+  }
+  return opened(y) + svg + "</svg>\n";
+}
+
+}  // namespace lensforge::app

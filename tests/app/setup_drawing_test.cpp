@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "app/setup_drawing.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <numbers>
+#include <regex>
+
+namespace lensforge::app {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+constexpr double kHeight = 8.0;
+
+OpticalSetup mirror() {
+  OpticalSetup setup;
+  setup.mode = LightMode::kReflect;
+  setup.light = {0.5, 0.0, -std::sqrt(0.75)};
+  setup.image_origin = {170.0, 0.0};
+  return setup;
+}
+
+OpticalSetup lit_from_a_point() {
+  OpticalSetup setup;
+  setup.point = PointSource{{50.0, 20.0, -600.0}, Emission::kIsotropic};
+  return setup;
+}
+
+OpticalSetup tilted() {
+  OpticalSetup setup;
+  const double angle = 50.0 * std::numbers::pi / 180.0;
+  setup.screen_y = {0.0, std::cos(angle), std::sin(angle)};
+  return setup;
+}
+
+/// Far away and with a large picture.
+OpticalSetup far_away() {
+  OpticalSetup setup;
+  setup.focal_length = 1e5;
+  setup.image_size = {2e4, 2e4};
+  return setup;
+}
+
+TEST(SetupDrawing, NamesLampPartScreenAndViewerForEveryLight) {
+  for (const OpticalSetup& setup :
+       {OpticalSetup(), mirror(), lit_from_a_point(), tilted(), far_away()}) {
+    const std::string svg = setup_drawing(setup, kHeight);
+    for (const char* name : {"screen</text>", "viewer</text>", "From the side", "From above"}) {
+      EXPECT_THAT(svg, HasSubstr(name));
+    }
+    EXPECT_THAT(svg, HasSubstr(setup.point ? ">lamp</text>" : ">parallel light</text>"));
+    EXPECT_THAT(svg,
+                HasSubstr(setup.mode == LightMode::kReflect ? ">mirror</text>" : ">lens</text>"));
+    EXPECT_THAT(svg, Not(HasSubstr("nan")));
+    EXPECT_THAT(svg, Not(HasSubstr("inf")));
+  }
+}
+
+TEST(SetupDrawing, StatesTheLightAndTheScreen) {
+  EXPECT_THAT(setup_drawing({}, kHeight), HasSubstr("parallel, straight onto the flat face"));
+  EXPECT_THAT(setup_drawing(mirror(), kHeight), HasSubstr("30° from the mirror's z axis"));
+  EXPECT_THAT(setup_drawing(lit_from_a_point(), kHeight),
+              HasSubstr("point source at x 50, y 20, z -600 mm"));
+  EXPECT_THAT(setup_drawing({}, kHeight), HasSubstr("parallel to the part"));
+  EXPECT_THAT(setup_drawing(tilted(), kHeight), HasSubstr("tilted by 50°"));
+}
+
+TEST(SetupDrawing, DistancesAreThoseFromTheMiddleOfTheUpperSide) {
+  const std::string svg = setup_drawing(lit_from_a_point(), kHeight);
+  EXPECT_THAT(svg, HasSubstr(">292 mm</text>"));    // 300 − 8 to the screen.
+  EXPECT_THAT(svg, HasSubstr(">608.7 mm</text>"));  // √(608² + 30²) to the lamp.
+}
+
+TEST(SetupDrawing, TheViewerIsOnTheSideFromWhichThePictureReads) {
+  OpticalSetup setup;
+  EXPECT_THAT(setup_drawing(setup, kHeight), HasSubstr("on the part's side of the screen"));
+  setup.view = ViewSide::kRear;
+  EXPECT_THAT(setup_drawing(setup, kHeight), HasSubstr("behind the screen"));
+}
+
+TEST(SetupDrawing, SaysWhereItIsNotToScaleAndStaysInsideItsFrame) {
+  EXPECT_THAT(setup_drawing({}, kHeight), HasSubstr("Drawn to scale"));
+  EXPECT_THAT(setup_drawing(far_away(), kHeight), HasSubstr("Not to scale"));
+  for (const OpticalSetup& setup :
+       {OpticalSetup(), mirror(), lit_from_a_point(), tilted(), far_away()}) {
+    const std::string svg = setup_drawing(setup, kHeight);
+    std::smatch frame;
+    ASSERT_TRUE(std::regex_search(svg, frame, std::regex("width=\"(\\d+)\" height=\"(\\d+)\"")));
+    const double width = std::stod(frame[1]);
+    const double height = std::stod(frame[2]);
+    const std::regex point("[ML\"]([-0-9.]+),([-0-9.]+)");
+    for (std::sregex_iterator it(svg.begin(), svg.end(), point), end; it != end; ++it) {
+      const double x = std::stod((*it)[1]);
+      const double y = std::stod((*it)[2]);
+      EXPECT_TRUE(x >= 0.0 && x <= width && y >= 0.0 && y <= height) << it->str();
+    }
+  }
+}
+
+}  // namespace
+}  // namespace lensforge::app

@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "core/image/image_io.h"
+#include "scenario/driver.h"
+
+namespace lensforge::scenario {
+namespace {
+
+using ::testing::HasSubstr;
+
+/// A light and a screen, and how `info` puts them.
+struct Light {
+  const char* name;
+  Arguments options;
+  const char* words;
+  const char* mode;
+};
+
+const std::vector<Light> kLights{
+    {"PointSource",
+     {"--source", "point", "--source-position", "50,33,-600"},
+     "point source at 50.00, 33.00, -600.00 mm",
+     "refract"},
+    {"FlatLed",
+     {"--source", "point", "--source-position", "50,33,-300", "--emission", "lambertian"},
+     "flat source at 50.00, 33.00, -300.00 mm",
+     "refract"},
+    {"Mirror",
+     {"--mode", "reflect", "--incidence", "30"},
+     "parallel along 0.50, 0.00, -0.87 on a mirror",
+     "reflect"},
+    {"MirrorOfAPointSource",
+     {"--mode", "reflect", "--source", "point", "--source-position", "-87,33,150"},
+     "point source at -87.00, 33.00, 150.00 mm on a mirror",
+     "reflect"},
+    {"LargeTiltedScreen",
+     {"--image-width", "1m", "--focal", "1500mm", "--screen-tilt", "50,0"},
+     "tilted about its centre 50.00, 33.33, 1500.00 mm",
+     "refract"}};
+
+Arguments design(const std::string& out, const Arguments& light) {
+  Arguments arguments{"design",    picture("stripes.png"),
+                      "--out",     out,
+                      "--pixels",  "24",
+                      "--rounds",  "1",
+                      "--quality", "draft",
+                      "--threads", "2",
+                      "--quiet"};
+  arguments.insert(arguments.end(), light.begin(), light.end());
+  return arguments;
+}
+
+class EveryLight : public Scenario, public ::testing::WithParamInterface<Light> {
+ protected:
+  void SetUp() override {
+    const Outcome made = run(design(path("lens"), GetParam().options));
+    ASSERT_EQ(made.exit_code, 0) << made.err;
+  }
+  [[nodiscard]] bool is_mirror() const { return GetParam().mode == std::string("reflect"); }
+  [[nodiscard]] nlohmann::json lens() const {
+    return nlohmann::json::parse(content(at("lens/lens.json")));
+  }
+};
+
+TEST_P(EveryLight, ProjectsThePictureIsRenderedTheSameAndStatedByInfo) {
+  const Outcome again = run({"render", path("lens"), "--json", "--out", path("again.exr")});
+  ASSERT_EQ(again.exit_code, 0) << again.err;
+  const nlohmann::json metrics = again.json()["metrics"];
+  EXPECT_EQ(metrics, lens()["metrics"]);
+  EXPECT_LT(metrics["smooth"]["mae"], 0.011);  // Twice the worst of them.
+  EXPECT_GT(metrics["smooth"]["flux_inside"], 0.95);
+  EXPECT_EQ(read_image(at("again.exr")).image, read_image(at("lens/render.exr")).image);
+
+  EXPECT_THAT(run({"info", path("lens")}).out, HasSubstr(GetParam().words));
+  const nlohmann::json stated = run({"info", path("lens"), "--json"}).json();
+  EXPECT_EQ(stated["mode"], GetParam().mode);
+  EXPECT_EQ(stated["light"], lens()["source"]);
+  EXPECT_EQ(stated["screen"], lens()["screen"]);
+}
+
+TEST_P(EveryLight, IsCutPredictedAndExportedAsAMesh) {
+  // A tool may be too short for a steep lens (exit code 3); its picture is predicted even so.
+  const Outcome cut = run({"cam", path("lens"), "--pitch", "2mm", "--tool-diameter", "4mm",
+                           "--no-rough", "--no-semi", "--no-remedies", "--quiet"});
+  ASSERT_TRUE(cut.exit_code == 0 || cut.exit_code == 3) << cut.err;
+  EXPECT_TRUE(fs::exists(at("lens/cam/finish.ngc")));
+  EXPECT_TRUE(fs::exists(at("lens/cam/milled.png")));
+  const Outcome mesh = run({"export", path("lens"), "--out", path("lens.stl"), "--quiet"});
+  EXPECT_EQ(mesh.exit_code, 0) << mesh.err;
+  if (!is_mirror()) return;
+  expect_refusal(run({"export", path("lens"), "--out", path("lens.step")}), 2,
+                 {"lens.step", "--model spline"});
+  EXPECT_FALSE(fs::exists(at("lens.step")));
+}
+
+INSTANTIATE_TEST_SUITE_P(All, EveryLight, ::testing::ValuesIn(kLights),
+                         [](const auto& test) { return std::string(test.param.name); });
+
+/// What cannot be lit, and what the refusal says of it.
+struct BadLight {
+  const char* name;
+  Arguments options;
+  std::vector<std::string> words;
+};
+
+class BadLights : public Scenario, public ::testing::WithParamInterface<BadLight> {};
+
+TEST_P(BadLights, IsRefusedInOneLineAndNothingIsWritten) {
+  expect_refusal(run(design(path("lens"), GetParam().options)), 2, GetParam().words);
+  EXPECT_FALSE(fs::exists(at("lens")));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    All, BadLights,
+    ::testing::Values(
+        BadLight{"SourceInsideTheLens",
+                 {"--source", "point", "--source-position", "50,33,5"},
+                 {"--source-position 50,33,5: z must be below 0"}},
+        BadLight{"SourceBeyondTheScreen",
+                 {"--source", "point", "--source-position", "50,33,400"},
+                 {"--source-position 50,33,400: z must be below 0"}},
+        BadLight{"SourceInsideTheMirror",
+                 {"--mode", "reflect", "--source", "point", "--source-position", "-87,33,3"},
+                 {"--source-position -87,33,3: z must be above the mirror's surface, 5 mm"}},
+        BadLight{"ScreenBehindAMirrorsSource",
+                 {"--mode", "reflect", "--source", "point", "--source-position", "-87,33,500"},
+                 {"--focal 300", "beyond the surface and the source"}},
+        BadLight{
+            "PointSourceWithoutAPlace", {"--source", "point"}, {"--source point: needs a place"}},
+        BadLight{"PlaceOfParallelLight",
+                 {"--source-position", "50,33,-600"},
+                 {"--source-position 50,33,-600: needs --source point"}},
+        BadLight{"EmissionOfParallelLight",
+                 {"--emission", "lambertian"},
+                 {"--emission lambertian: needs --source point"}},
+        BadLight{"IncidenceWithoutAMirror",
+                 {"--incidence", "30"},
+                 {"--incidence 30: needs --mode reflect"}},
+        BadLight{"MirrorLitFromTheScreen",
+                 {"--mode", "reflect"},
+                 {"--mode reflect: needs light from the side"}},
+        BadLight{"LightThatGrazesAMirror",
+                 {"--mode", "reflect", "--incidence", "85"},
+                 {"--incidence 85: must be 0 to 80 degrees"}},
+        BadLight{"TiltBeyond80Degrees",
+                 {"--screen-tilt", "81,0"},
+                 {"--screen-tilt 81,0: must turn the screen by at most 80 degrees"}},
+        BadLight{"TwoTiltsBeyond80DegreesInAll",
+                 {"--screen-tilt", "60,75"},
+                 {"--screen-tilt 60,75: must turn the screen by at most 80 degrees"}},
+        BadLight{"TiltOfOneNumber",
+                 {"--screen-tilt", "5"},
+                 {"--screen-tilt 5: must be 2 finite numbers"}},
+        BadLight{"TiltedScreenThroughTheLens",
+                 {"--image-width", "1m", "--screen-tilt", "70,0", "--focal", "200"},
+                 {"--screen-tilt 70,0: the screen must stand wholly beyond the surface"}},
+        BadLight{"ScreenInsideTheLens",
+                 {"--focal", "3"},
+                 {"--focal 3: must be above the thickness of the lens, 5 mm"}},
+        BadLight{"PictureTooNarrow",
+                 {"--image-width", "0.5"},
+                 {"--image-width 0.5: must be at least a hundredth of the lens's width"}}),
+    [](const auto& test) { return std::string(test.param.name); });
+
+}  // namespace
+}  // namespace lensforge::scenario
