@@ -23,8 +23,8 @@ class UnmetTurns {
   Eigen::Matrix3Xd sum_;
 };
 
-/// Share of what is missing that the next update asks for on top. An ellipsoid of 400 faces ended at
-/// 5.3e-5 with 0.2, 1.0e-3 with 1 and 3.6e-3 without, moved by 2.5, 1.2 and 0.6 % (β = 0.01, 60
+/// Share of what is missing that the next update asks for on top. An ellipsoid of 400 faces ended
+/// at 5.3e-5 with 0.2, 1.0e-3 with 1 and 3.6e-3 without, moved by 2.5, 1.2 and 0.6 % (β = 0.01, 60
 /// updates, one sum for both stages).
 inline constexpr double kUnmetStep = 0.2;
 /// Longest sum of a face, so that what cannot turn at all does not tear at its neighbours: 27°.
