@@ -12,7 +12,7 @@ namespace lensforge::reflect {
 /// Holds target normals near those of the reference mesh: β/2 Σ A_k ‖t_k − n_k⁰‖² with
 /// A_k = kEnergyScale·a_k (Tojo et al., 4.6).
 struct NormalAnchor {
-  Eigen::Matrix3Xd reference;  ///< n⁰, 3 × F, unit.
+  Eigen::Matrix3Xd reference;  ///< n⁰, 3 × F.
   double strength = 0.1;       ///< β
 };
 
