@@ -33,7 +33,7 @@ struct SmoothnessValues {
 /// Weighted derivatives of what the goal says of one image triangle, and the values.
 LF_HD inline GoalSums goal_adjoint(const ObjectiveView& o, std::int64_t face,
                                    const ImageTriangle& image, ImageTriangle& bar) {
-  const ObjectiveWeights& w = o.options.weights;
+  const ObjectiveWeights& w = o.weights;
   const GoalView& goal = o.goal;
   GoalSums values;
   if (!goal.is_picture()) {
@@ -58,8 +58,8 @@ LF_HD inline GoalSums goal_adjoint(const ObjectiveView& o, std::int64_t face,
 /// Weighted derivatives of a face's barriers; returns its E_barr.
 LF_HD inline double barrier_adjoint(const ObjectiveView& o, std::int64_t face, const Corners& t,
                                     FaceBar& bar) {
-  const double weight = o.options.weights.barrier;
-  const ValueSlope area = area_barrier(plan_area(t), o.options.area);
+  const double weight = o.weights.barrier;
+  const ValueSlope area = area_barrier(plan_area(t), o.area);
   bar.area_normal.z() += 0.5 * weight * area.slope;
   return area.value +
          o.light.barrier_adjoint(t, o.scratch.frames[face].n, weight, bar.corners, bar.frame.n);
@@ -69,7 +69,7 @@ LF_HD inline double barrier_adjoint(const ObjectiveView& o, std::int64_t face, c
 /// normal, and its own share of both values.
 LF_HD inline SmoothnessValues smoothness_adjoint(const ObjectiveView& o, std::int64_t face,
                                                  double doubled_area, FaceBar& bar) {
-  const double weight = o.options.weights.smooth;
+  const double weight = o.weights.smooth;
   const CurvedFace here{o.scratch.frames[face], o.scratch.maps[face]};
   CurvedFace here_bar;   // Its map part vanishes in sum, since the map is the minimiser.
   CurvedFace there_bar;  // The neighbours gather their own part themselves.
@@ -82,7 +82,7 @@ LF_HD inline SmoothnessValues smoothness_adjoint(const ObjectiveView& o, std::in
     if (j < 0) continue;
     const CurvedFace there{o.scratch.frames[j], o.scratch.maps[j]};
     const double w = o.scratch.edge_weights[3 * face + k];
-    const double scaled = weight * o.options.weights.edge * w;
+    const double scaled = weight * o.weights.edge * w;
     values.edge += w * mismatch_adjoint(here, there.frame, scaled, here_bar, there_bar.frame);
     mismatch_adjoint(there, here.frame, scaled, there_bar, here_bar.frame);
   }
@@ -106,7 +106,7 @@ struct PullBackFace {
     FaceSums sums;
     sums.goal = rays.pull_back(o, i, t, bar);
     sums.barrier = barrier_adjoint(o, i, t, bar);
-    if (o.options.weights.smooth > 0.0) {
+    if (o.weights.smooth > 0.0) {
       const SmoothnessValues smoothness = smoothness_adjoint(o, i, doubled_area, bar);
       sums.face = smoothness.face;
       sums.edge = smoothness.edge;

@@ -26,7 +26,7 @@ struct MeasureFace {
     const FaceFrame frame = face_frame(t);
     o.scratch.frames[i] = frame;
     const double area = plan_area(t);
-    return {area_barrier(area, o.options.area).value + o.light.barrier(t, frame.n)};
+    return {area_barrier(area, o.area).value + o.light.barrier(t, frame.n)};
   }
 };
 
@@ -64,7 +64,7 @@ struct FitMap {
       const int j = o.mesh.neighbour(i, k);
       if (j < 0) continue;
       fit.add(NeighbourOffset(o.scratch.frames[i], o.scratch.frames[j]),
-              o.options.weights.edge * o.scratch.edge_weights[3 * i + k]);
+              o.weights.edge * o.scratch.edge_weights[3 * i + k]);
     }
     fit.add_mean_curvature(area_normal(o.corners(i)).norm());
     o.scratch.maps[i] = fit.solve();
@@ -76,7 +76,7 @@ struct ResetEdgeWeights {
   ObjectiveView o;
 
   LF_HD void operator()(std::int64_t i) const {
-    const double flat = welsch(0.0, o.options.nu).slope;
+    const double flat = welsch(0.0, o.nu).slope;
     for (int k = 0; k < 3; ++k) {
       o.scratch.edge_weights[3 * i + k] = o.mesh.neighbour(i, k) < 0 ? 0.0 : flat;
     }
@@ -100,7 +100,7 @@ struct ReweightEdges {
     for (int k = 0; k < 3; ++k) {
       if (o.mesh.neighbour(i, k) < 0) continue;
       const double h = mismatch(i, k);
-      const ValueSlope psi = welsch(h, o.options.nu);
+      const ValueSlope psi = welsch(h, o.nu);
       o.scratch.edge_weights[3 * i + k] = psi.slope;
       offset += 0.5 * (psi.value - psi.slope * h);
     }

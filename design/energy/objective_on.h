@@ -202,7 +202,9 @@ void DesignObjectiveOn<Exec>::take(const Correspondence& wanted) {
 
 template <class Exec>
 ObjectiveView DesignObjectiveOn<Exec>::view(const double* vertices) {
-  return {.options = options_,
+  return {.weights = options_.weights,
+          .nu = options_.nu,
+          .area = options_.area,
           .light = light_,
           .vertices = vertices,
           .mesh = mesh_.view(),

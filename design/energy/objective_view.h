@@ -6,9 +6,10 @@
 #include "core/compute/host_device.h"
 #include "core/optics/light_path.h"
 #include "core/surface/corners.h"
+#include "design/energy/area_barrier.h"
 #include "design/energy/face_frame.h"
 #include "design/energy/mesh_view.h"
-#include "design/energy/objective_options.h"
+#include "design/energy/weights.h"
 #include "design/energy/weingarten.h"
 #include "design/flux/flux_triangle.h"
 
@@ -40,7 +41,9 @@ struct FaceScratch {
 
 /// The vectors of a light path begin at multiples of 16 bytes: this order leaves no gap before it.
 struct ObjectiveView {
-  ObjectiveOptions options;
+  ObjectiveWeights weights;
+  double nu;         ///< ObjectiveOptions::nu.
+  AreaBarrier area;  ///< ObjectiveOptions::area.
   LightPath light;
   const double* vertices;  ///< 3 × V, mm
   MeshView mesh;
