@@ -42,7 +42,7 @@ struct FaceFit {
 
   /// Adds a neighbour's share w |M d̄ − n̄|²/|d̄|².
   LF_HD void add(const NeighbourOffset& offset, double weight) {
-    const double w = weight / offset.d.squaredNorm();
+    const double w = weight * offset.inverse;
     const double wx = w * offset.d.x();
     const double wy = w * offset.d.y();
     xx += wx * offset.d.x();

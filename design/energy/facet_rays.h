@@ -30,7 +30,7 @@ struct FacetRays {
     const ImageTriangle image = project_facet(t, beam, o.light);
     ImageTriangle image_bar;
     const GoalSums values = goal_adjoint(o, face, image, image_bar);
-    bar.frame.n += project_facet_adjoint(t, n, beam, o.light, image_bar, bar.corners);
+    bar.n += project_facet_adjoint(t, n, beam, o.light, image_bar, bar.corners);
     o.light.flux_adjoint(t, image_bar.flux, bar.corners, bar.area_normal);
     return values;
   }

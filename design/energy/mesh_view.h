@@ -29,6 +29,10 @@ struct MeshView {
   [[nodiscard]] LF_HD int neighbour(std::int64_t face, int k) const {
     return neighbours[3 * face + k];
   }
+  /// The edge by which a face borders on another.
+  [[nodiscard]] LF_HD int edge_to(std::int64_t face, std::int64_t other) const {
+    return neighbour(face, 0) == other ? 0 : (neighbour(face, 1) == other ? 1 : 2);
+  }
   /// Corners of a face, given all vertices (3 × V).
   [[nodiscard]] LF_HD Corners corners(const double* positions, std::int64_t face) const {
     return corners_at(triangle(face), positions);

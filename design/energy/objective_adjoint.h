@@ -6,9 +6,9 @@
 #include "core/compute/host_device.h"
 #include "design/energy/boundary_term.h"
 #include "design/energy/correspondence_term.h"
-#include "design/energy/mean_curvature.h"
 #include "design/energy/objective_sums.h"
 #include "design/energy/objective_view.h"
+#include "design/energy/smoothness_term.h"
 #include "design/energy/unlit_pixels.h"
 #include "design/energy/unlit_term.h"
 #include "design/optics/columns.h"
@@ -21,13 +21,8 @@ namespace lensforge {
 /// Derivatives by what a face is made of; summed up and carried to its corners at the end.
 struct FaceBar {
   Corners corners;
-  FaceFrame frame;
+  Eigen::Vector3d n{0.0, 0.0, 0.0};  ///< Its unit normal.
   Eigen::Vector3d area_normal{0.0, 0.0, 0.0};
-};
-
-struct SmoothnessValues {
-  double face = 0.0;
-  double edge = 0.0;
 };
 
 /// Weighted derivatives of what the goal says of one image triangle, and the values.
@@ -37,9 +32,8 @@ LF_HD inline GoalSums goal_adjoint(const ObjectiveView& o, std::int64_t face,
   const GoalView& goal = o.goal;
   GoalSums values;
   if (!goal.is_picture()) {
-    const CorrespondenceValues v =
-        correspondence_term(image, column2(goal.wanted_centroids, face), goal.wanted_flux[face],
-                            goal.columns * goal.rows, w, bar);
+    const CorrespondenceValues v = correspondence_term(
+        image, column2(goal.wanted_centroids, face), goal.wanted_flux[face], goal.pixels(), w, bar);
     values.align = v.align;
     values.flux = v.flux;
     return values;
@@ -49,8 +43,7 @@ LF_HD inline GoalSums goal_adjoint(const ObjectiveView& o, std::int64_t face,
   values.boundary = boundary_term(image, goal.columns, goal.rows, w.boundary, bar);
   if (goal.led != nullptr && goal.led[face] != kNoPixel) {
     const std::int32_t pixel = goal.led[face];
-    values.unlit = unlit_term(image, pixel, static_cast<std::int64_t>(goal.columns),
-                              goal.target[pixel], w.image, bar);
+    values.unlit = unlit_term(image, pixel, goal.columns, goal.target[pixel], w.image, bar);
   }
   return values;
 }
@@ -62,34 +55,7 @@ LF_HD inline double barrier_adjoint(const ObjectiveView& o, std::int64_t face, c
   const ValueSlope area = area_barrier(plan_area(t), o.area);
   bar.area_normal.z() += 0.5 * weight * area.slope;
   return area.value +
-         o.light.barrier_adjoint(t, o.scratch.frames[face].n, weight, bar.corners, bar.frame.n);
-}
-
-/// Weighted derivatives of E_face and of the linear part of E_edge by one face's frame and area
-/// normal, and its own share of both values.
-LF_HD inline SmoothnessValues smoothness_adjoint(const ObjectiveView& o, std::int64_t face,
-                                                 double doubled_area, FaceBar& bar) {
-  const double weight = o.weights.smooth;
-  const CurvedFace here{o.scratch.frames[face], o.scratch.maps[face]};
-  CurvedFace here_bar;   // Its map part vanishes in sum, since the map is the minimiser.
-  CurvedFace there_bar;  // The neighbours gather their own part themselves.
-  double area_bar = 0.0;
-  SmoothnessValues values;
-  values.face = mean_curvature_term(here.map, 0.5 * doubled_area, weight, here_bar.map, area_bar);
-  bar.area_normal += 0.5 * area_bar * here.frame.n;
-  for (int k = 0; k < 3; ++k) {
-    const int j = o.mesh.neighbour(face, k);
-    if (j < 0) continue;
-    const CurvedFace there{o.scratch.frames[j], o.scratch.maps[j]};
-    const double w = o.scratch.edge_weights[3 * face + k];
-    const double scaled = weight * o.weights.edge * w;
-    values.edge += w * mismatch_adjoint(here, there.frame, scaled, here_bar, there_bar.frame);
-    mismatch_adjoint(there, here.frame, scaled, there_bar, here_bar.frame);
-  }
-  bar.frame.n += here_bar.frame.n;
-  bar.frame.e1 += here_bar.frame.e1;
-  bar.frame.c += here_bar.frame.c;
-  return values;
+         o.light.barrier_adjoint(t, o.scratch.frames[face].n, weight, bar.corners, bar.n);
 }
 
 /// Derivatives of everything by one face's corners.
@@ -107,12 +73,16 @@ struct PullBackFace {
     sums.goal = rays.pull_back(o, i, t, bar);
     sums.barrier = barrier_adjoint(o, i, t, bar);
     if (o.weights.smooth > 0.0) {
-      const SmoothnessValues smoothness = smoothness_adjoint(o, i, doubled_area, bar);
-      sums.face = smoothness.face;
-      sums.edge = smoothness.edge;
-      tangent_adjoint(t, frame, bar.frame, bar.corners);
+      double area_bar = 0.0;
+      const FaceFrame bend = bend_adjoint(o, i, area_bar);
+      bar.n += bend.n;
+      bar.area_normal += 0.5 * area_bar * frame.n;
+      const Eigen::Vector3d third = bend.c / 3.0;
+      bar.corners.v0 += third;
+      bar.corners.v1 += third;
+      bar.corners.v2 += third;
     }
-    bar.area_normal += normalize_adjoint(frame.n, doubled_area, bar.frame.n);
+    bar.area_normal += normalize_adjoint(frame.n, doubled_area, bar.n);
     area_normal_adjoint(t, bar.area_normal, bar.corners);
     o.scratch.corner_bar[i] = bar.corners;
     return sums.packed();

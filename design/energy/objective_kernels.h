@@ -7,8 +7,8 @@
 
 #include "core/compute/host_device.h"
 #include "core/image/transfer.h"
-#include "design/energy/face_fit.h"
 #include "design/energy/objective_view.h"
+#include "design/energy/smoothness_term.h"
 #include "design/optics/columns.h"
 #include "design/optics/image_triangle.h"
 
@@ -58,17 +58,7 @@ struct FaceCentroid {
 struct FitMap {
   ObjectiveView o;
 
-  LF_HD void operator()(std::int64_t i) const {
-    FaceFit fit;
-    for (int k = 0; k < 3; ++k) {
-      const int j = o.mesh.neighbour(i, k);
-      if (j < 0) continue;
-      fit.add(NeighbourOffset(o.scratch.frames[i], o.scratch.frames[j]),
-              o.weights.edge * o.scratch.edge_weights[3 * i + k]);
-    }
-    fit.add_mean_curvature(area_normal(o.corners(i)).norm());
-    o.scratch.maps[i] = fit.solve();
-  }
+  LF_HD void operator()(std::int64_t i) const { o.scratch.maps[i] = FittedFace(o, i).map; }
 };
 
 /// Equal weights for all of a face's edges, as on a flat surface.
@@ -92,8 +82,9 @@ struct ReweightEdges {
     const int j = o.mesh.neighbour(face, k);
     const FaceFrame& frame_i = o.scratch.frames[face];
     const FaceFrame& frame_j = o.scratch.frames[j];
-    return NeighbourOffset(frame_i, frame_j).mismatch(o.scratch.maps[face]) +
-           NeighbourOffset(frame_j, frame_i).mismatch(o.scratch.maps[j]);
+    return NeighbourOffset(frame_i, TangentBasis(frame_i.n), frame_j)
+               .mismatch(o.scratch.maps[face]) +
+           NeighbourOffset(frame_j, TangentBasis(frame_j.n), frame_i).mismatch(o.scratch.maps[j]);
   }
   LF_HD std::array<double, 1> operator()(std::int64_t i) const {
     double offset = 0.0;

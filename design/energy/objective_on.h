@@ -102,6 +102,7 @@ class DesignObjectiveOn {
 
   Buffer<FaceFrame> frames_;
   Buffer<WeingartenMap> maps_;
+  Buffer<FaceBend> bends_;
   Buffer<double> edge_weights_;
   double edge_offset_ = 0.0;  ///< Σ Ψ(h⁰) − w h⁰ over the edges.
 
@@ -175,6 +176,7 @@ DesignObjectiveOn<Exec>::DesignObjectiveOn(const SurfaceMesh& mesh, const Optica
   const auto vertices = static_cast<std::size_t>(mesh.vertex_count());
   frames_ = Buffer<FaceFrame>(faces);
   maps_ = Buffer<WeingartenMap>(faces);
+  bends_ = Buffer<FaceBend>(faces);
   edge_weights_ = Buffer<double>(3 * faces);
   corner_bar_ = Buffer<Corners>(faces);
   laplacian_shares_ = Buffer<double>(2 * vertices);
@@ -209,13 +211,14 @@ ObjectiveView DesignObjectiveOn<Exec>::view(const double* vertices) {
           .vertices = vertices,
           .mesh = mesh_.view(),
           .goal = goal_view(),
-          .scratch = {frames_.data(), maps_.data(), edge_weights_.data(), corner_bar_.data()}};
+          .scratch = {frames_.data(), maps_.data(), bends_.data(), edge_weights_.data(),
+                      corner_bar_.data()}};
 }
 
 template <class Exec>
 GoalView DesignObjectiveOn<Exec>::goal_view() {
-  return {.columns = static_cast<double>(light_.plane().columns()),
-          .rows = static_cast<double>(light_.plane().rows()),
+  return {.columns = light_.plane().columns(),
+          .rows = light_.plane().rows(),
           .parts = static_cast<double>(blur_.parts()),
           .cotangent = cotangent_.view(),
           .target = target_.data(),
@@ -284,7 +287,8 @@ struct DesignObjectiveOn<Exec>::Sums {
   Pending<1> image;
   Pending<1> gradient;
   Pending<4> goal;   ///< GoalSums, as far as faces does not hold them.
-  Pending<7> faces;  ///< FaceSums
+  Pending<5> faces;  ///< FaceSums
+  Pending<2> bends;  ///< E_face, and Σ w h of E_edge.
   Pending<1> laplacian;
 };
 
@@ -311,7 +315,7 @@ template <class Rays>
 void DesignObjectiveOn<Exec>::pull_back(const ObjectiveView& o, Rays& rays, double* gradient,
                                         Sums& sums) {
   sums.goal = rays.pull_back(executor_, o);
-  sums.faces = pending_sum<7>(executor_, "face adjoint", o.mesh.faces,
+  sums.faces = pending_sum<5>(executor_, "face adjoint", o.mesh.faces,
                               PullBackFace<typename Rays::View>{o, rays.view()});
   parallel_for(executor_, "gather vertices", o.mesh.vertices,
                GatherVertex<typename Rays::View>{o, rays.view(), gradient});
@@ -339,8 +343,11 @@ EnergyValues DesignObjectiveOn<Exec>::energies(const Sums& sums) const {
   e.align = goal.align;
   e.flux = goal.flux;
   e.barrier = faces.barrier;
-  e.face = faces.face;
-  if (w.smooth > 0.0) e.edge = faces.edge + edge_offset_;
+  if (w.smooth > 0.0) {
+    const auto bends = sums.bends.get();
+    e.face = bends[0];
+    e.edge = bends[1] + edge_offset_;
+  }
   e.laplacian = pixels_per_area() * sums.laplacian.get()[0];
   e.total = w.image * (e.image + e.unlit) + w.gradient * e.gradient + w.boundary * e.boundary +
             w.align * e.align + w.flux * e.flux +
@@ -364,7 +371,7 @@ ObjectiveEvaluation DesignObjectiveOn<Exec>::evaluate_by(Rays& rays, const doubl
   Sums sums;
   if (o.goal.is_picture()) compare_picture(o, rays, sums);
   if (options_.weights.smooth > 0.0) {
-    parallel_for(executor_, "weingarten fit", o.mesh.faces, FitMap{o});
+    sums.bends = pending_sum<2>(executor_, "bend faces", o.mesh.faces, BendFace{o});
   }
   pull_back(o, rays, gradient, sums);
   if (options_.weights.smooth * options_.weights.laplacian > 0.0) {
@@ -375,7 +382,7 @@ ObjectiveEvaluation DesignObjectiveOn<Exec>::evaluate_by(Rays& rays, const doubl
   result.feasible = true;
   result.energy = energies(sums);
   if (o.goal.is_picture()) {
-    result.mae = sums.absolute_error.get()[0] / (o.goal.columns * o.goal.rows);
+    result.mae = sums.absolute_error.get()[0] / o.goal.pixels();
   }
   return result;
 }

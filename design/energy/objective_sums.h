@@ -32,19 +32,15 @@ struct GoalSums {
 
 /// All of it.
 struct FaceSums {
-  using Packed = std::array<double, 7>;
+  using Packed = std::array<double, 5>;
 
   GoalSums goal;
   double barrier = 0.0;
-  double face = 0.0;
-  double edge = 0.0;
 
   [[nodiscard]] LF_HD Packed packed() const {
-    return {goal.boundary, goal.unlit, goal.align, goal.flux, barrier, face, edge};
+    return {goal.boundary, goal.unlit, goal.align, goal.flux, barrier};
   }
-  [[nodiscard]] static FaceSums of(const Packed& p) {
-    return {{p[0], p[1], p[2], p[3]}, p[4], p[5], p[6]};
-  }
+  [[nodiscard]] static FaceSums of(const Packed& p) { return {{p[0], p[1], p[2], p[3]}, p[4]}; }
 };
 
 }  // namespace lensforge

@@ -19,8 +19,8 @@ namespace lensforge {
 
 /// What the surface is shaped after: a picture or a correspondence.
 struct GoalView {
-  double columns;  ///< Of the picture.
-  double rows;
+  int columns;  ///< Of the picture.
+  int rows;
   double parts;  ///< Of a pixel each way, in which the cotangent counts.
   FluxCotangent cotangent;
   const double* target;            ///< Display-encoded, row by row; of a picture.
@@ -28,18 +28,23 @@ struct GoalView {
   const double* wanted_centroids;  ///< 2 × F, Correspondence::centroids; null for a picture.
   const double* wanted_flux;       ///< F, Correspondence::flux.
 
+  [[nodiscard]] LF_HD double pixels() const { return static_cast<double>(columns) * rows; }
   [[nodiscard]] LF_HD bool is_picture() const { return wanted_centroids == nullptr; }
 };
+
+struct FaceBend;
 
 /// What is kept of every face from one kernel to the next.
 struct FaceScratch {
   FaceFrame* frames;
   WeingartenMap* maps;
+  FaceBend* bends;
   double* edge_weights;  ///< 3 × F, Ψ'(h⁰) of a face's three edges; 0 on the boundary.
   Corners* corner_bar;   ///< Derivatives by every face's corners.
 };
 
-/// The vectors of a light path begin at multiples of 16 bytes: this order leaves no gap before it.
+/// The vectors of a light path begin at multiples of 16 bytes: with an even number of words before
+/// and after it there are no gaps.
 struct ObjectiveView {
   ObjectiveWeights weights;
   double nu;         ///< ObjectiveOptions::nu.

@@ -29,13 +29,13 @@ TEST(FaceFit, FindsTheMapThatMadeTheOffsets) {
   const WeingartenMap map{0.7, -0.4, 0.2};
   FaceFit fit;
   for (int k = 0; k < 3; ++k) {
-    FaceFrame here{{0.0, 0.0, 1.0}, {1.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
+    const FaceFrame here{{0.0, 0.0, 1.0}, {0.0, 0.0, 0.0}};
     FaceFrame there = here;
     const Eigen::Vector2d d = random.vector2();
     there.c.head<2>() = d;
     there.n.head<2>() =
         Eigen::Vector2d(map.a * d.x() + map.c * d.y(), map.c * d.x() + map.b * d.y());
-    fit.add(NeighbourOffset(here, there), 1.0);
+    fit.add(NeighbourOffset(here, TangentBasis(here.n), there), 1.0);
   }
   const WeingartenMap found = fit.solve();
   EXPECT_NEAR(found.a, map.a, 1e-7);

@@ -67,12 +67,15 @@ class FreeMaps {
   [[nodiscard]] std::size_t neighbour(std::int64_t t, int k) const {
     return static_cast<std::size_t>(topology_.neighbours(k, t));
   }
+  /// Of face j from face i.
+  [[nodiscard]] NeighbourOffset offset(std::size_t i, std::size_t j) const {
+    return {frames_[i], TangentBasis(frames_[i].n), frames_[j]};
+  }
   /// h of an inner edge.
   [[nodiscard]] double mismatch(std::int64_t t, int k) const {
     const auto i = static_cast<std::size_t>(t);
     const std::size_t j = neighbour(t, k);
-    return NeighbourOffset(frames_[i], frames_[j]).mismatch(maps_[i]) +
-           NeighbourOffset(frames_[j], frames_[i]).mismatch(maps_[j]);
+    return offset(i, j).mismatch(maps_[i]) + offset(j, i).mismatch(maps_[j]);
   }
   void fit(std::int64_t t) {
     const auto i = static_cast<std::size_t>(t);
@@ -80,11 +83,11 @@ class FreeMaps {
     Eigen::Matrix<double, 7, 1> right = Eigen::Matrix<double, 7, 1>::Zero();
     for (int k = 0; k < 3; ++k) {
       if (topology_.neighbours(k, t) < 0) continue;
-      const NeighbourOffset offset(frames_[i], frames_[neighbour(t, k)]);
-      const double scale = std::sqrt(edge_weight_ * weights_(k, t)) / offset.d.norm();
-      rows.row(2 * k) = scale * Eigen::RowVector3d(offset.d.x(), 0.0, offset.d.y());
-      rows.row(2 * k + 1) = scale * Eigen::RowVector3d(0.0, offset.d.y(), offset.d.x());
-      right.segment<2>(2 * k) = scale * offset.n;
+      const NeighbourOffset there = offset(i, neighbour(t, k));
+      const double scale = std::sqrt(edge_weight_ * weights_(k, t)) / there.d.norm();
+      rows.row(2 * k) = scale * Eigen::RowVector3d(there.d.x(), 0.0, there.d.y());
+      rows.row(2 * k + 1) = scale * Eigen::RowVector3d(0.0, there.d.y(), there.d.x());
+      right.segment<2>(2 * k) = scale * there.n;
     }
     const double half_root = 0.5 * std::sqrt(0.5 * area_normal(corners_[i]).norm());
     rows.row(6) = half_root * Eigen::RowVector3d(1.0, 1.0, 0.0);
