@@ -66,11 +66,18 @@ struct ScaleCoefficient {
     const double lambda = p.eigen_x[p.column(v)] + p.eigen_y[p.row(v)];
     for (int k = 0; k < 3; ++k) {
       const GridSymbol& symbol = p.symbols[k];
-      const double power = -symbol.power * p.exponent;
-      const double base = symbol.floor + lambda;
-      const double decay = power == -2.0 ? 1.0 / (base * base) : std::pow(base, power);
-      p.planes[k][v] *= normalize[k] * decay * std::pow(1.0 + symbol.growth * lambda, -p.exponent);
+      const double decay = inverse_power(symbol.floor + lambda, symbol.power * p.exponent);
+      const double growth = inverse_power(1.0 + symbol.growth * lambda, p.exponent);
+      p.planes[k][v] *= normalize[k] * decay * growth;
     }
+  }
+
+ private:
+  /// base^−power; the usual powers without the call, which took a twentieth of an iteration.
+  LF_HD static double inverse_power(double base, double power) {
+    if (base == 1.0) return 1.0;
+    if (power == 1.0) return 1.0 / base;
+    return power == 2.0 ? 1.0 / (base * base) : std::pow(base, -power);
   }
 };
 

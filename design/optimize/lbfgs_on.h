@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <deque>
 #include <functional>
 #include <limits>
 #include <span>
@@ -12,6 +11,7 @@
 #include <vector>
 
 #include "core/compute/executor.h"
+#include "design/optimize/curvature_pairs_on.h"
 #include "design/optimize/lbfgs.h"
 #include "design/optimize/vector_kernels.h"
 
@@ -38,7 +38,8 @@ class LbfgsOn {
       : objective_(std::move(objective)),
         precondition_(std::move(precondition)),
         options_(options),
-        executor_(executor) {}
+        executor_(executor),
+        pairs_(executor, options.history) {}
 
   /// Moves `x` to the best point found, also where an exception ends the run.
   LbfgsSummary run(const LbfgsObserver& observe, Vector& x) {
@@ -67,14 +68,6 @@ class LbfgsOn {
     explicit Point(std::size_t size) : x(size), gradient(size) {}
   };
 
-  /// A step s, the gradient's change y over it, and 1/(s·y).
-  struct Pair {
-    Vector s, y;
-    double inverse_curvature = 0.0;
-  };
-
-  /// Curvature pairs with s·y below this share of |s||y| are dropped: they would spoil the matrix.
-  static constexpr double kCurvatureFloor = 1e-12;
   /// Once the value has fallen, the curvature condition is worth only so many evaluations.
   static constexpr int kEnoughEvaluations = 4;
 
@@ -86,9 +79,8 @@ class LbfgsOn {
   [[nodiscard]] double product(const Vector& a, const Vector& b) const {
     return dot(executor_, {a.data(), a.size()}, {b.data(), b.size()});
   }
-  /// y ← y + a x
-  void add_multiple(double a, const Vector& x, Vector& y) const {
-    each_entry("combine", AddMultiple{a, x.data(), y.data()});
+  void precondition(const Vector& g, Vector& r) {
+    precondition_({g.data(), g.size()}, {r.data(), r.size()});
   }
   void evaluate(Point& point) {
     point.value = objective_({point.x.data(), point.x.size()},
@@ -99,7 +91,6 @@ class LbfgsOn {
   void find_direction();
   int search(double slope, bool& decreased);
   void remember();
-  [[nodiscard]] Pair free_pair();
   [[nodiscard]] bool stalled(const std::vector<double>& values) const;
 
   RawObjective objective_;
@@ -112,60 +103,36 @@ class LbfgsOn {
   Point next_;
   Vector direction_;
   Vector work_;
-  std::deque<Pair> pairs_;   ///< Oldest first.
-  std::vector<Pair> spare_;  ///< Vectors to use again.
-  double scale_ = 1.0;       ///< Of the initial matrix.
+  CurvaturePairsOn<Exec> pairs_;
+  double scale_ = 1.0;  ///< Of the initial matrix.
 };
 
 /// direction ← −H g by the two-loop recursion.
 template <class Exec>
 void LbfgsOn<Exec>::find_direction() {
-  each_entry("copy", CopyEntry{current_.gradient.data(), work_.data()});
-  std::vector<double> alpha(pairs_.size());
-  for (std::size_t i = pairs_.size(); i-- > 0;) {
-    alpha[i] = pairs_[i].inverse_curvature * product(pairs_[i].s, work_);
-    add_multiple(-alpha[i], pairs_[i].y, work_);
-  }
-  precondition_({work_.data(), work_.size()}, {direction_.data(), direction_.size()});
-  if (!pairs_.empty()) each_entry("scale", ScaleEntry{scale_, direction_.data()});
-  for (std::size_t i = 0; i < pairs_.size(); ++i) {
-    const double beta = pairs_[i].inverse_curvature * product(pairs_[i].y, direction_);
-    add_multiple(alpha[i] - beta, pairs_[i].s, direction_);
+  if (pairs_.empty()) {
+    precondition(current_.gradient, direction_);
+  } else {
+    pairs_.first_loop(current_.gradient, work_);
+    precondition(work_, direction_);
+    each_entry("scale", ScaleEntry{scale_, direction_.data()});
+    pairs_.second_loop(direction_);
   }
   each_entry("scale", ScaleEntry{-1.0, direction_.data()});
-}
-
-template <class Exec>
-typename LbfgsOn<Exec>::Pair LbfgsOn<Exec>::free_pair() {
-  if (pairs_.size() == static_cast<std::size_t>(options_.history)) {
-    spare_.push_back(std::move(pairs_.front()));
-    pairs_.pop_front();
-  }
-  if (spare_.empty()) return {Vector(current_.x.size()), Vector(current_.x.size())};
-  Pair pair = std::move(spare_.back());
-  spare_.pop_back();
-  return pair;
 }
 
 /// Adds the pair of the step from current_ to next_.
 template <class Exec>
 void LbfgsOn<Exec>::remember() {
-  Pair pair = free_pair();
-  each_entry("difference", DifferenceEntry{next_.x.data(), current_.x.data(), pair.s.data()});
-  each_entry("difference",
-             DifferenceEntry{next_.gradient.data(), current_.gradient.data(), pair.y.data()});
-  const double curvature = product(pair.s, pair.y);
-  const double floor =
-      kCurvatureFloor * std::sqrt(product(pair.s, pair.s) * product(pair.y, pair.y));
-  if (!(curvature > floor)) {
-    spare_.push_back(std::move(pair));
-    return;
-  }
+  const double curvature = pairs_.add(current_, next_);
+  if (curvature == 0.0) return;
   // γ = s·y / y·Py scales the initial matrix to the newest curvature (Nocedal & Wright, 7.20).
-  precondition_({pair.y.data(), pair.y.size()}, {work_.data(), work_.size()});
-  scale_ = curvature / product(pair.y, work_);
-  pair.inverse_curvature = 1.0 / curvature;
-  pairs_.push_back(std::move(pair));
+  Vector& change = work_;
+  Vector& preconditioned = direction_;
+  each_entry("difference", DifferenceEntry<double>{next_.gradient.data(), current_.gradient.data(),
+                                                   change.data()});
+  precondition(change, preconditioned);
+  scale_ = curvature / product(change, preconditioned);
 }
 
 /// The weak Wolfe line search along direction_ from current_; next_ receives the accepted point.
@@ -231,7 +198,6 @@ LbfgsSummary LbfgsOn<Exec>::minimize(const LbfgsObserver& observe) {
     if (slope < 0.0) summary.evaluations += search(slope, found);
     if (!found) {
       if (pairs_.empty()) return finish(Status::kNoDescent, "no step lowers the value");
-      for (Pair& pair : pairs_) spare_.push_back(std::move(pair));
       pairs_.clear();
       continue;
     }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 
 #include "core/compute/host_device.h"
@@ -10,14 +12,6 @@ namespace lensforge {
 
 /// Entries that one task of a vector operation handles.
 inline constexpr std::int64_t kVectorGrain = 16384;
-
-/// y ← y + a x
-struct AddMultiple {
-  double a;
-  const double* x;
-  double* y;
-  LF_HD void operator()(std::int64_t i) const { y[i] = a * x[i] + y[i]; }
-};
 
 /// y ← x + a d
 struct StepEntry {
@@ -29,11 +23,12 @@ struct StepEntry {
 };
 
 /// y ← a − b
+template <class T>
 struct DifferenceEntry {
   const double* a;
   const double* b;
-  double* y;
-  LF_HD void operator()(std::int64_t i) const { y[i] = a[i] - b[i]; }
+  T* y;
+  LF_HD void operator()(std::int64_t i) const { y[i] = static_cast<T>(a[i] - b[i]); }
 };
 
 /// x ← a x
@@ -43,11 +38,45 @@ struct ScaleEntry {
   LF_HD void operator()(std::int64_t i) const { x[i] *= a; }
 };
 
-/// y ← x
-struct CopyEntry {
+/// Vectors that one pass over memory handles together.
+inline constexpr std::size_t kVectorGroup = 4;
+using VectorGroup = std::array<const float*, kVectorGroup>;
+
+/// Products of each vector of a group with v.
+template <class T>
+struct GroupProducts {
+  VectorGroup group;
+  const T* v;
+  LF_HD std::array<double, kVectorGroup> operator()(std::int64_t i) const {
+    const double factor = v[i];
+    std::array<double, kVectorGroup> items;
+    for (std::size_t k = 0; k < kVectorGroup; ++k) items[k] = factor * group[k][i];
+    return items;
+  }
+};
+
+/// s·y, s·s and y·y.
+struct CurvatureEntry {
+  const float* s;
+  const float* y;
+  LF_HD std::array<double, 3> operator()(std::int64_t i) const {
+    const double step = s[i];
+    const double change = y[i];
+    return {step * change, step * step, change * change};
+  }
+};
+
+/// y ← x + Σ a v over a group.
+struct AddGroup {
+  VectorGroup group;
+  std::array<double, kVectorGroup> a;
   const double* x;
   double* y;
-  LF_HD void operator()(std::int64_t i) const { y[i] = x[i]; }
+  LF_HD void operator()(std::int64_t i) const {
+    double sum = x[i];
+    for (std::size_t k = 0; k < kVectorGroup; ++k) sum += a[k] * group[k][i];
+    y[i] = sum;
+  }
 };
 
 }  // namespace lensforge
