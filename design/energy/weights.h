@@ -20,7 +20,7 @@ struct ObjectiveWeights {
   double image = 1e2;       ///< λ1, E_img
   double gradient = 0.0;    ///< λ2, E_grad
   double boundary = 1e-3;   ///< λ3, E_bdr
-  double smooth = 2e-3;     ///< λ4, E_smooth = E_face + τ1 E_edge + τ2 E_lap
+  double smooth = 1e-3;     ///< λ4, E_smooth = E_face + τ1 E_edge + τ2 E_lap
   double barrier = 1e-8;    ///< λ5, E_barr
   double edge = 3e0;        ///< τ1, E_edge
   double laplacian = 2e-1;  ///< τ2, E_lap
@@ -32,9 +32,10 @@ struct ObjectiveWeights {
 /// 64² relief with 2.5 vertices per pixel side 0.012, 0.006 and 0.001, butterfly so 0.024, 0.012
 /// and 0.005, city so 0.35, 0.21 and 0.18; 128² portrait 2.5, 2.6 and 2.6; 256 × 128 calligraphy
 /// 2.9, 2.8 and 2.8. Smooth, as a surface: 128² portrait 1.75, 1.76 and 1.78, 96² logo 4.7 and,
-/// with 2e-5, 6.0.
+/// with 2e-5, 6.0; 1e-3 ends nearer by the normals than 2e-3 in fewer and longer rounds (see
+/// kMergedRounds) and no farther as a surface (128² portrait 1.78 and 1.82).
 inline double default_smoothness(SurfaceModel model) {
-  return model == SurfaceModel::kFacet ? 2e-5 : 2e-3;
+  return model == SurfaceModel::kFacet ? 2e-5 : 1e-3;
 }
 
 /// Values of the terms before weighting, and the weighted total.

@@ -29,7 +29,7 @@ using nlohmann::json;
 /// A checkpoint has 48 bytes a vertex: this one would have 178 million of them.
 constexpr std::uintmax_t kMaxBytes = std::uintmax_t{8} << 30U;
 
-constexpr std::string_view kMagic = "lensforge checkpoint 3\n";
+constexpr std::string_view kMagic = "lensforge checkpoint 4\n";
 
 static_assert(std::endian::native == std::endian::little, "checkpoints are little-endian");
 

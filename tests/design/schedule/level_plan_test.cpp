@@ -102,15 +102,32 @@ TEST(LevelPlan, ASplineFollowsFewerRoundsOfTheMesh) {
   const std::vector<Level> levels = plan_levels({128, 64}, options);
   ASSERT_EQ(levels.size(), 2U);
   EXPECT_FALSE(levels[0].spline);
-  EXPECT_EQ(levels[0].rounds, 2);
-  EXPECT_EQ(levels[0].iterations, 100);
+  EXPECT_EQ(levels[0].rounds, 1);
+  EXPECT_EQ(levels[0].iterations, 133);
   EXPECT_TRUE(levels[1].spline);
   EXPECT_EQ(levels[1].rounds, 2);
   EXPECT_EQ(levels[1].iterations, 40);
   // Two knot cells each way in a cell of 160 across.
   EXPECT_EQ(levels[1].grid, (GridShape{323, 163}));
+}
+
+TEST(LevelPlan, ASmoothMeshTakesThreeRoundsTogether) {
+  DesignOptions options = with_levels(1);
+  const auto plan = [&](int rounds) {
+    options.rounds = rounds;
+    const Level level = plan_levels({64, 64}, options).front();
+    return Eigen::Vector2i(level.rounds, level.iterations);
+  };
   options.model = SurfaceModel::kSmooth;
-  EXPECT_EQ(plan_levels({128, 64}, options)[0].rounds, 6);
+  EXPECT_EQ(plan(6), Eigen::Vector2i(2, 200));
+  EXPECT_EQ(plan(4), Eigen::Vector2i(2, 133));
+  EXPECT_EQ(plan(3), Eigen::Vector2i(1, 200));
+  EXPECT_EQ(plan(1), Eigen::Vector2i(1, 100));
+  options.transport_rounds = 2;
+  EXPECT_EQ(plan(6), Eigen::Vector2i(6, 100));
+  options.model = SurfaceModel::kFacet;
+  options.transport_rounds = 1;
+  EXPECT_EQ(plan(6), Eigen::Vector2i(6, 100));
 }
 
 TEST(LevelPlan, ASplineFitsASolidsFile) {
