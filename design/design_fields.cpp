@@ -75,8 +75,8 @@ const OptionTable<DesignOptions>& design_fields() {
         R::whole("--levels", &O::levels, Limits::between(1, 16),
                  "resolutions from coarse to fine, each twice the one before"),
         R::whole("--rounds", &O::rounds, Limits::between(1, 1000),
-                 "rounds at each resolution; three make one of twice the iterations but for "
-                 "--model facet"),
+                 "rounds at each resolution; three make one, with four fifths of their iterations, "
+                 "but for --model facet"),
         R::word<int>("--quality", &O::iterations,
                      {{"draft", 20}, {"standard", 100}, {"paper", 300}},
                      "maximum iterations of one round: 20, 100 or 300"),

@@ -60,12 +60,12 @@ constexpr int kLongRounds = 2;
 /// The smooth model takes its rounds together by this many, if only the first begins with
 /// transport, with this share of their iterations: what L-BFGS has learnt is worth more than new
 /// weights of the edges. MAE in thousandths at 128² after 6 × 100 iterations with 8 pairs kept and
-/// λ4 0.002, and after 2 × 200 with 20 and 0.001: portrait 0.82 and 0.74, logo 2.20 and 1.78, city
-/// 7.3 and 6.8, lake 1.96 and 1.81. One round of 600 ends worse than 2 × 300. Facets are led to
+/// λ4 0.002, and after 2 × 240 with 20 and 0.001: portrait 0.82 and 0.72, logo 2.20 and 1.59, city
+/// 7.3 and 6.8, lake 1.96 and 1.61. One round of 600 ends worse than 2 × 300. Facets are led to
 /// unlit pixels at the beginning of each round, and keep theirs: that portrait 2.52, after 2 × 180
 /// 2.90.
 constexpr int kMergedRounds = 3;
-constexpr double kMergedIterations = 2.0 / 3.0;
+constexpr double kMergedIterations = 0.8;
 
 /// Takes rounds together by `merged`, with `share` of their iterations in all.
 void merge_rounds(int merged, double share, Level& level) {

@@ -111,16 +111,23 @@ void spread(const Site& site, const SurfaceMesh& even_mesh, const Matching& even
   }
 }
 
-/// Spreads the mesh, aligns it to the creases of an even mesh's transport, and finds its own
-/// transport. Solved anew, that brings out detail in the dark that the even mesh has no facets
-/// for; where black leaves cells too thin for Newton steps, the even mesh's map has to do.
+/// Spreads the mesh, aligns it to the creases of an even mesh's transport, and finds the places for
+/// its light. Facets have a transport of their own, which brings out detail in the dark that the
+/// even mesh has no facets for. For a smooth surface the even mesh's map does, as it has to where
+/// black leaves cells too thin for Newton steps: more iterations are worth more than the time of
+/// another transport. MAE in thousandths with it and 2 × 200, without it and 2 × 240 iterations:
+/// city 6.8 and 6.8 at 128², 6.5 and 5.9 at 256², portrait 0.74 and 0.72, 0.64 and 0.61, lake at
+/// 128² 1.81 and 1.61, a photograph with dark detail at 112², 128², 144² and 256² 2.19 and 1.77,
+/// 1.63 and 1.98, 2.14 and 1.84, 1.74 and 1.68.
 Matching fit_mesh(const Site& site, const SurfaceMesh& even_mesh, const Matching& even,
                   SurfaceMesh& mesh) {
   spread(site, even_mesh, even, mesh);
   const BrenierMap map(even.light.landing, even.result, site.problem.aim);
   align_to_creases(map, site.problem.setup, mesh);
-  if (std::optional<Matching> own = match_spread(site, mesh)) return *std::move(own);
   const DesignTask& task = site.task;
+  if (task.options.model == SurfaceModel::kFacet) {
+    if (std::optional<Matching> own = match_spread(site, mesh)) return *std::move(own);
+  }
   Matching mapped;
   mapped.light = face_light(mesh, site.problem.setup, task.options.model, task.executor);
   mapped.result.centroids = map_faces(mapped.light, map, task.executor);

@@ -103,7 +103,7 @@ TEST(LevelPlan, ASplineFollowsFewerRoundsOfTheMesh) {
   ASSERT_EQ(levels.size(), 2U);
   EXPECT_FALSE(levels[0].spline);
   EXPECT_EQ(levels[0].rounds, 1);
-  EXPECT_EQ(levels[0].iterations, 133);
+  EXPECT_EQ(levels[0].iterations, 160);
   EXPECT_TRUE(levels[1].spline);
   EXPECT_EQ(levels[1].rounds, 2);
   EXPECT_EQ(levels[1].iterations, 40);
@@ -119,9 +119,9 @@ TEST(LevelPlan, ASmoothMeshTakesThreeRoundsTogether) {
     return Eigen::Vector2i(level.rounds, level.iterations);
   };
   options.model = SurfaceModel::kSmooth;
-  EXPECT_EQ(plan(6), Eigen::Vector2i(2, 200));
-  EXPECT_EQ(plan(4), Eigen::Vector2i(2, 133));
-  EXPECT_EQ(plan(3), Eigen::Vector2i(1, 200));
+  EXPECT_EQ(plan(6), Eigen::Vector2i(2, 240));
+  EXPECT_EQ(plan(4), Eigen::Vector2i(2, 160));
+  EXPECT_EQ(plan(3), Eigen::Vector2i(1, 240));
   EXPECT_EQ(plan(1), Eigen::Vector2i(1, 100));
   options.transport_rounds = 2;
   EXPECT_EQ(plan(6), Eigen::Vector2i(6, 100));
