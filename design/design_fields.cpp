@@ -5,14 +5,18 @@
 #include <string>
 #include <vector>
 
+#include "core/error.h"
 #include "core/image/image_io.h"
 #include "core/text/number_list.h"
 #include "core/text/number_text.h"
+#include "core/text/units.h"
 
 namespace lensforge {
 namespace {
 
 using LightField = OptionField<LightOptions>;
+
+const std::string kSphere = "sphere:";
 
 /// Two numbers, as "X,Y".
 LightField pair(const char* name, Eigen::Vector2d LightOptions::*at, const char* what,
@@ -46,6 +50,35 @@ LightField source_position() {
            "surface for a mirror",
            {},
            "X,Y,Z",
+           {}},
+          get,
+          set,
+          get,
+          {}};
+}
+
+/// "flat" or "sphere:R".
+LightField front() {
+  const char* const name = "--front";
+  const auto get = [](const LightOptions& o) {
+    return nlohmann::json(o.front_radius ? kSphere + shortest_text(*o.front_radius) : "flat");
+  };
+  const auto set = [name](LightOptions& o, const nlohmann::json& value) {
+    o.front_radius.reset();
+    const auto text = value.get<std::string>();
+    if (text == "flat") return;
+    if (!text.starts_with(kSphere)) {
+      throw InputError(name + (" '" + text) + "': must be flat or sphere:R, R a radius in mm; flat "
+                       "would do");
+    }
+    o.front_radius = parse_length_mm(text.substr(kSphere.size()), name);
+  };
+  return {{name,
+           OptionKind::kText,
+           "face of a lens where the light enters: flat, or a sphere of radius R, mm; above 0 it "
+           "bulges towards the light, below 0 it is hollow",
+           {},
+           "flat|sphere:R",
            {}},
           get,
           set,
@@ -128,6 +161,7 @@ const OptionTable<LightOptions>& light_fields() {
           "full angle of a lamp that sends nearly parallel light, as the sun's 9.3; 0 is none"),
       R::length("--source-size", &O::source_size, Limits::zero_or(kMinSourceWidth, kMaxSourceSize),
                 "diameter of the lamp at --source-position; 0 is a point"),
+      front(),
       R::length("--image-width", &O::image_width, Limits::zero_or(kMinImageWidth, kMaxImageWidth),
                 "width of the picture on the screen; 0 takes the lens's"),
       pair("--image-offset", &O::image_offset, "X,Y",

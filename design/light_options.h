@@ -19,6 +19,9 @@ inline constexpr double kMinSourceWidth = 1e-3;
 inline constexpr double kMaxSourceAngle = 1500.0;
 inline constexpr double kMaxSourceSize = 1e6;
 
+/// Of a spherical front's radius, mm: beyond it the front is flat to a nanometre.
+inline constexpr double kMaxFrontRadius = 1e9;
+
 enum class SourceKind { kParallel, kPoint };
 
 /// What lights the surface, what that does to the light, and where the picture is.
@@ -26,6 +29,7 @@ struct LightOptions {
   LightMode mode = LightMode::kRefract;
   double incidence = 0.0;  ///< Of parallel light on a mirror, degrees from its z axis, in x.
   SourceKind source = SourceKind::kParallel;
+  std::optional<double> front_radius;  ///< Of a spherical front, mm, convex above 0; none: flat.
   std::optional<Eigen::Vector3d> source_position;  ///< Of a point source, mm, lens frame.
   Emission emission = Emission::kIsotropic;        ///< Of a point source.
   double source_angle = 0.0;                       ///< Full angle of parallel light, mrad.

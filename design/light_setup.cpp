@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/optics/front_placement.h"
 #include "core/optics/light_path.h"
 #include "core/text/number_list.h"
 #include "core/text/number_text.h"
@@ -87,6 +88,68 @@ void require_source(const DesignOptions& o, const Eigen::Vector2d& size) {
     refuse("--mode reflect",
            "needs light from the side, or the screen is in its way; --incidence " +
                number_text(kUsualIncidence) + " would do");
+  }
+}
+
+std::string front_text(double radius) { return "--front sphere:" + number_text(radius); }
+
+/// True if the front is lit as a whole, and the surface that a design starts from lets its light
+/// out.
+bool front_works(const DesignOptions& o, const Eigen::Vector2i& pixels, double radius) {
+  if (!(std::abs(radius) > 0.5 * lens_size(o, pixels).norm())) return false;
+  DesignOptions other = o;
+  other.light.front_radius = radius;
+  const OpticalSetup setup = optical_setup(other, pixels);
+  const LightPath light(setup);
+  constexpr int kCells = 16;
+  for (int k = 0; k < (kCells + 1) * (kCells + 1); ++k) {
+    const Eigen::Vector2d share(k % (kCells + 1), k / (kCells + 1));
+    const Eigen::Vector2d place = setup.lens_size.cwiseProduct(share) / kCells;
+    const Eigen::Vector3d p(place.x(), place.y(), o.thickness);
+    const Eigen::Vector2d slope = light.gradient_for(p, light.land_from_start(p));
+    const Eigen::Vector3d n = Eigen::Vector3d(-slope.x(), -slope.y(), 1.0).normalized();
+    if (!slope.allFinite() || !light.transmits(p, n) || is_shadowed(setup, place)) return false;
+  }
+  return true;
+}
+
+/// The next radius of two digits that works.
+std::string working_front(const DesignOptions& o, const Eigen::Vector2i& pixels, double radius) {
+  constexpr double kStep = 1.1;
+  const double least = 0.5 * lens_size(o, pixels).norm();
+  for (double r = std::max(std::abs(radius), least); r < kMaxFrontRadius; r *= kStep) {
+    const double digit = std::pow(10.0, std::floor(std::log10(r)) - 1.0);
+    const double rounded = std::copysign(std::ceil(r / digit) * digit, radius);
+    if (front_works(o, pixels, rounded)) return front_text(rounded) + " would do";
+  }
+  return "--front flat would do";
+}
+
+void require_front(const DesignOptions& o, const Eigen::Vector2i& pixels) {
+  if (!o.light.front_radius) return;
+  const double radius = *o.light.front_radius;
+  const std::string given = front_text(radius);
+  if (is_mirror(o)) refuse(given, "is of a lens; --front flat would do with --mode reflect");
+  if (!(std::abs(radius) <= kMaxFrontRadius)) refuse(given, "is flat; --front flat would do");
+  const Eigen::Vector2d size = lens_size(o, pixels);
+  if (!(std::abs(radius) > 0.5 * size.norm())) {
+    refuse(given, "the sphere is too small for the lens, whose half diagonal is " +
+                      number_text(0.5 * size.norm()) + " mm; " + working_front(o, pixels, radius));
+  }
+  if (o.light.source == SourceKind::kPoint) {
+    const FrontSurface front(spherical_front(radius, size));
+    const Eigen::Vector3d& from = *o.light.source_position;
+    const Eigen::AlignedBox2d plan(Eigen::Vector2d(0.0, 0.0), size);
+    if (plan.contains(from.head<2>()) && !(from.z() < front.height(from.head<2>()))) {
+      refuse("--source-position " + text_of(from),
+             "lies inside the part, whose front is at z = " +
+                 number_text(front.height(from.head<2>())) + " there; --source-position " +
+                 usual_position(o, size) + " would do");
+    }
+  }
+  if (!front_works(o, pixels, radius)) {
+    refuse(given, "light passes a part of the front by, or is reflected totally behind it; " +
+                      working_front(o, pixels, radius));
   }
 }
 
@@ -207,6 +270,9 @@ OpticalSetup optical_setup(const DesignOptions& options, const Eigen::Vector2i& 
     setup.image_size *= options.light.image_width / options.width;
   setup.pixels = pixels;
   setup.view = options.view;
+  if (options.light.front_radius) {
+    setup.front = spherical_front(*options.light.front_radius, setup.lens_size);
+  }
   if (options.light.source == SourceKind::kPoint) {
     setup.point = PointSource{options.light.source_position.value(), options.light.emission};
   } else if (is_mirror(options)) {
@@ -233,6 +299,7 @@ void require_light(const DesignOptions& options, const Eigen::Vector2i& pixels) 
   require_source_options(options.light);
   require_source(options, lens_size(options, pixels));
   require_tilt(options.light.screen_tilt);
+  require_front(options, pixels);
   require_picture(options);
   const OpticalSetup setup = optical_setup(options, pixels);
   require_screen_beyond(options, setup);

@@ -9,23 +9,23 @@
 namespace lensforge {
 namespace {
 
-/// Steps of Newton's method in place_on_flat(), the shift that its derivatives are taken over, mm,
+/// Steps of Newton's method in place_on_start(), the shift that its derivatives are taken over, mm,
 /// and the change that ends it: vertices are moved by a few hundredths of a millimetre at least.
 constexpr int kMaxPlaceSteps = 8;
 constexpr double kPlaceShift = 1e-4;
 constexpr double kPlaceChange = 1e-9;
 
-/// Cells each way that the flat surface of a point source is summed over: of a flat source the
+/// Cells each way that the lit face is summed over: of a flat source the
 /// intake of a cell is right to second order in its size.
-constexpr int kFlatCells = 64;
+constexpr int kFrontCells = 64;
 
-double flat_intake(const LightSource& source, const Eigen::Vector2d& size) {
+double front_intake(const LightSource& source, const Eigen::Vector2d& size) {
   const auto corner = [&](int i, int j) -> Eigen::Vector3d {
-    return {size.x() * i / kFlatCells, size.y() * j / kFlatCells, 0.0};
+    return source.front_at({size.x() * i / kFrontCells, size.y() * j / kFrontCells});
   };
   double sum = 0.0;
-  for (int j = 0; j < kFlatCells; ++j) {
-    for (int i = 0; i < kFlatCells; ++i) {
+  for (int j = 0; j < kFrontCells; ++j) {
+    for (int i = 0; i < kFrontCells; ++i) {
       sum += source.intake({corner(i, j), corner(i + 1, j), corner(i + 1, j + 1)}) +
              source.intake({corner(i, j), corner(i + 1, j + 1), corner(i, j + 1)});
     }
@@ -38,7 +38,7 @@ double flat_intake(const LightSource& source, const Eigen::Vector2d& size) {
 LightPath::LightPath(const OpticalSetup& setup)
     : screen_(setup),
       source_(setup),
-      whole_(source_.is_point() ? flat_intake(source_, setup.lens_size) : setup.lens_size.prod()),
+      whole_(source_.varies() ? front_intake(source_, setup.lens_size) : setup.lens_size.prod()),
       eta_(setup.ior),
       reflects_(setup.mode == LightMode::kReflect ? 1 : 0),
       middle_(0.5 * setup.lens_size) {}
@@ -52,19 +52,21 @@ Eigen::Vector2d LightPath::gradient_for(const Eigen::Vector3d& p,
   return refracting_gradient(m, eta_, source_.incident(p));
 }
 
-Eigen::Vector2d LightPath::land_from_flat(const Eigen::Vector3d& p) const {
+Eigen::Vector2d LightPath::land_from_start(const Eigen::Vector3d& p) const {
+  if (!starts_flat()) return land(p, chief_slope(0.0));
   return land(p, beam(p, Eigen::Vector3d::UnitZ()).m);
 }
 
-Eigen::Vector2d LightPath::place_on_flat(const Eigen::Vector2d& pixel, double z) const {
+Eigen::Vector2d LightPath::place_on_start(const Eigen::Vector2d& pixel, double z) const {
   const Eigen::Vector3d to = screen_.at(pixel);
+  if (!starts_flat()) return to.head<2>() - (to.z() - z) * chief_slope(0.0);
   const auto slope_at = [&](const Eigen::Vector2d& place) -> Eigen::Vector2d {
     const Eigen::Vector3d p(place.x(), place.y(), z);
     return beam(p, Eigen::Vector3d::UnitZ()).m;
   };
   Eigen::Vector2d place = to.head<2>() - (to.z() - z) * slope_at(to.head<2>());
-  if (!source_.is_point()) return place;
-  // The slope of light from a point changes with the place.
+  if (!source_.varies()) return place;
+  // This slope changes with the place.
   for (int step = 0; step < kMaxPlaceSteps; ++step) {
     const Eigen::Vector2d m = slope_at(place);
     Eigen::Matrix2d lands = Eigen::Matrix2d::Identity();

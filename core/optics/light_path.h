@@ -71,7 +71,7 @@ class LightPath {
   }
   /// The same of a whole facet.
   [[nodiscard]] LF_HD bool transmits(const Corners& t, const Eigen::Vector3d& n) const {
-    if (!source_.is_point()) return transmits(t.v0, n);
+    if (!source_.varies()) return transmits(t.v0, n);
     return transmits(t.v0, n) && transmits(t.v1, n) && transmits(t.v2, n);
   }
 
@@ -80,7 +80,7 @@ class LightPath {
   /// over the corners.
   [[nodiscard]] LF_HD double barrier(const Corners& t, const Eigen::Vector3d& n) const {
     if (source_.along_z()) return barrier_along_z(n).value;
-    if (!source_.is_point()) return barrier_at(source_.direction(), n).value;
+    if (!source_.varies()) return barrier_at(source_.direction(), n).value;
     return (barrier_at(source_.incident(t.v0), n).value +
             barrier_at(source_.incident(t.v1), n).value +
             barrier_at(source_.incident(t.v2), n).value) /
@@ -94,7 +94,7 @@ class LightPath {
       n_bar.z() += weight * f.slope;
       return f.value;
     }
-    if (!source_.is_point()) {
+    if (!source_.varies()) {
       const BarrierAt f = barrier_at(source_.direction(), n);
       n_bar += weight * f.by_n;
       return f.value;
@@ -120,7 +120,7 @@ class LightPath {
     if (source_.along_z()) return beam.adjoint(n, eta_, m_bar);
     const Eigen::Vector3d a = source_.incident(p);
     const Eigen::Vector3d b_bar = beam.direction_bar(m_bar);
-    if (source_.is_point()) {
+    if (source_.varies()) {
       p_bar +=
           source_.incident_adjoint(p, reflects() ? reflect_adjoint_by_incident(n, b_bar)
                                                  : refract_adjoint_by_incident(a, n, eta_, b_bar));
@@ -130,7 +130,7 @@ class LightPath {
   /// The rays after a facet. @pre transmits(t, n).
   [[nodiscard]] LF_HD FacetBeam facet_beam(const Corners& t, const Eigen::Vector3d& n) const {
     const RefractedBeam first = beam(t.v0, n);
-    if (!source_.is_point()) return {first, first.m, first.m};
+    if (!source_.varies()) return {first, first.m, first.m};
     return {first, beam(t.v1, n).m, beam(t.v2, n).m};
   }
   /// Adjoint of (t, n) ↦ the slopes at the three corners: adds to t_bar, returns n_bar.
@@ -138,7 +138,7 @@ class LightPath {
                                                          const FacetBeam& facet,
                                                          const FacetSlopes& m_bar,
                                                          Corners& t_bar) const {
-    if (!source_.is_point()) {
+    if (!source_.varies()) {
       const Eigen::Vector2d sum = m_bar.m0 + m_bar.m1 + m_bar.m2;
       return beam_adjoint(t.v0, n, facet.beam, sum, t_bar.v0);
     }
@@ -184,10 +184,13 @@ class LightPath {
   [[nodiscard]] Eigen::Vector2d gradient_for(const Eigen::Vector3d& p,
                                              const Eigen::Vector2d& pixel) const;
 
-  /// Where the light of a flat surface through p lands, and the point of the flat surface of height
-  /// z whose light lands at a pixel.
-  [[nodiscard]] Eigen::Vector2d land_from_flat(const Eigen::Vector3d& p) const;
-  [[nodiscard]] Eigen::Vector2d place_on_flat(const Eigen::Vector2d& pixel, double z) const;
+  /// True if the shape that a design starts from is flat. Behind a curved front, which may gather
+  /// the light of a flat surface anywhere, it is the surface that makes the light parallel.
+  [[nodiscard]] bool starts_flat() const { return !source_.is_bent(); }
+  /// Where the light of that shape lands from p, and the point of height z of that shape whose
+  /// light lands at a pixel.
+  [[nodiscard]] Eigen::Vector2d land_from_start(const Eigen::Vector3d& p) const;
+  [[nodiscard]] Eigen::Vector2d place_on_start(const Eigen::Vector2d& pixel, double z) const;
 
   /// Slope of the ray from the middle of a flat surface of height z.
   [[nodiscard]] Eigen::Vector2d chief_slope(double z) const;

@@ -7,6 +7,7 @@
 #include <cstdint>
 
 #include "core/compute/host_device.h"
+#include "core/optics/front_entry.h"
 #include "core/optics/optical_setup.h"
 #include "core/optics/point_light.h"
 #include "core/surface/corners.h"
@@ -23,13 +24,16 @@ class LightSource {
   /// Parallel light along +z; its formulas are the shortest.
   [[nodiscard]] LF_HD bool along_z() const { return kind_ == Kind::kAlongZ; }
   /// A direction for each point, not one for all.
-  [[nodiscard]] LF_HD bool is_point() const { return kind_ >= Kind::kPointBehindFront; }
-  /// The direction of parallel light inside a lens. @pre !is_point().
+  [[nodiscard]] LF_HD bool varies() const { return kind_ >= Kind::kPointBehindFront; }
+  /// True behind a curved front.
+  [[nodiscard]] LF_HD bool is_bent() const { return kind_ >= Kind::kParallelBent; }
+  /// The direction of parallel light inside a lens. @pre !varies().
   [[nodiscard]] LF_HD const Eigen::Vector3d& direction() const { return direction_; }
 
   /// a at p.
   [[nodiscard]] LF_HD Eigen::Vector3d incident(const Eigen::Vector3d& p) const {
-    if (!is_point()) return direction_;
+    if (!varies()) return direction_;
+    if (is_bent()) return entry_to(p).direction();
     if (kind_ == Kind::kPoint) return (p - position_).normalized();
     const Eigen::Vector2d m = ray_to(p).slope();
     return Eigen::Vector3d(m.x(), m.y(), 1.0) / std::sqrt(1.0 + m.squaredNorm());
@@ -37,7 +41,8 @@ class LightSource {
   /// Adjoint of incident(): the derivative by p.
   [[nodiscard]] LF_HD Eigen::Vector3d incident_adjoint(const Eigen::Vector3d& p,
                                                        const Eigen::Vector3d& a_bar) const {
-    if (!is_point()) return {0.0, 0.0, 0.0};
+    if (!varies()) return {0.0, 0.0, 0.0};
+    if (is_bent()) return entry_to(p).direction_adjoint(a_bar);
     if (kind_ == Kind::kPoint) {
       const Eigen::Vector3d way = p - position_;
       const double length = way.norm();
@@ -51,12 +56,20 @@ class LightSource {
     return ray.slope_adjoint({w_bar.x(), w_bar.y()});
   }
 
+  /// Point of the entry face at a place, or of z = 0 under a mirror.
+  [[nodiscard]] Eigen::Vector3d front_at(const Eigen::Vector2d& place) const {
+    return {place.x(), place.y(), front_.height(place)};
+  }
+  /// Where the ray to p enters the lens, or the place of p on a mirror, mm.
+  [[nodiscard]] Eigen::Vector3d entry(const Eigen::Vector3d& p) const;
+
   /// Light that a triangle takes, mm²: where the rays enter, the area of evenly lit lens that takes
   /// as much, of a point source the solid angle on the scale of the middle of the lens.
   [[nodiscard]] LF_HD double intake(const Corners& t) const {
     if (along_z()) return plan_area(t);
-    if (!is_point()) return 0.5 * area_normal(t).dot(direction_) / direction_.z();
+    if (!varies()) return area_across(t);
     const VectorsBar r = vectors_to(t);
+    if (kind_ == Kind::kParallelBent) return area_across({r.a, r.b, r.c});
     const double even = scale_ * SolidAngle(r.a, r.b, r.c).value();
     return lambertian() ? even * cosine(r) : even;
   }
@@ -66,8 +79,10 @@ class LightSource {
                             Eigen::Vector3d& area_normal_bar) const {
     if (along_z()) {
       area_normal_bar.z() += 0.5 * bar;
-    } else if (!is_point()) {
+    } else if (!varies()) {
       area_normal_bar += (0.5 * bar / direction_.z()) * direction_;
+    } else if (kind_ == Kind::kParallelBent) {
+      bent_intake_adjoint(t, bar, t_bar);
     } else {
       point_intake_adjoint(t, bar, t_bar);
     }
@@ -80,18 +95,30 @@ class LightSource {
     kParallel,          ///< Parallel, from any direction.
     kPointBehindFront,  ///< From a point below the flat front z = 0.
     kPoint,             ///< From a point, straight to the surface.
+    kParallelBent,      ///< Parallel, through a curved front.
+    kPointBent,         ///< From a point, through a curved front.
   };
 
   [[nodiscard]] LF_HD bool lambertian() const { return lambertian_ != 0.0; }
+  /// Where the ray to p enters a curved front.
+  [[nodiscard]] LF_HD FrontEntry entry_to(const Eigen::Vector3d& p) const {
+    const bool point = kind_ == Kind::kPointBent;
+    return {front_, {point ? position_ : direction_, point, eta_}, p};
+  }
+  /// Of a triangle across parallel light, on the scale of an evenly lit lens.
+  [[nodiscard]] LF_HD double area_across(const Corners& t) const {
+    return 0.5 * area_normal(t).dot(direction_) / direction_.z();
+  }
   [[nodiscard]] LF_HD Eigen::Vector2d across(const Eigen::Vector3d& p) const {
     return {p.x() - position_.x(), p.y() - position_.y()};
   }
   [[nodiscard]] LF_HD FrontRay ray_to(const Eigen::Vector3d& p) const {
     return {across(p), -position_.z(), p.z(), eta_};
   }
-  /// From the source to where the ray to p leaves the air.
+  /// From the source, or the origin of the lens frame, to where the ray to p leaves the air.
   [[nodiscard]] LF_HD Eigen::Vector3d vector_to(const Eigen::Vector3d& p) const {
     if (kind_ == Kind::kPoint) return p - position_;
+    if (is_bent()) return entry_to(p).entry() - position_;
     const Eigen::Vector2d v = ray_to(p).entry();
     return {v.x(), v.y(), -position_.z()};
   }
@@ -101,11 +128,20 @@ class LightSource {
   [[nodiscard]] LF_HD Eigen::Vector3d vector_adjoint(const Eigen::Vector3d& p,
                                                      const Eigen::Vector3d& bar) const {
     if (kind_ == Kind::kPoint) return bar;
+    if (is_bent()) return entry_to(p).entry_adjoint(bar);
     return ray_to(p).entry_adjoint({bar.x(), bar.y()});
   }
   /// Of the angle between a triangle's middle and the axis of a flat source.
   [[nodiscard]] LF_HD double cosine(const VectorsBar& r) const {
     return axis_.dot((r.a + r.b + r.c).normalized());
+  }
+  LF_HD void bent_intake_adjoint(const Corners& t, double bar, Corners& t_bar) const {
+    const VectorsBar r = vectors_to(t);
+    Corners r_bar;
+    area_normal_adjoint({r.a, r.b, r.c}, (0.5 * bar / direction_.z()) * direction_, r_bar);
+    t_bar.v0 += vector_adjoint(t.v0, r_bar.v0);
+    t_bar.v1 += vector_adjoint(t.v1, r_bar.v1);
+    t_bar.v2 += vector_adjoint(t.v2, r_bar.v2);
   }
   LF_HD void point_intake_adjoint(const Corners& t, double bar, Corners& t_bar) const {
     const VectorsBar r = vectors_to(t);
@@ -125,13 +161,14 @@ class LightSource {
     t_bar.v2 += vector_adjoint(t.v2, r_bar.c);
   }
 
-  Eigen::Vector3d direction_;
+  Eigen::Vector3d direction_;  ///< Behind a flat front, before a curved one.
   Eigen::Vector3d position_;
   Eigen::Vector3d axis_;  ///< Of a flat source, towards the middle of the lens.
   double eta_;            ///< n_lens / n_air
   double scale_;          ///< mm² per steradian; negative where triangles are seen from above.
   double lambertian_;     ///< 1 of a flat source, 0 of an even one.
   Kind kind_;
+  FrontSurface front_;  ///< Of a lens with a curved one.
 };
 
 }  // namespace lensforge

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "core/error.h"
+#include "core/text/number_text.h"
 
 namespace lensforge {
 namespace {
@@ -41,6 +42,20 @@ void require_light(const OpticalSetup& setup) {
   const Eigen::Vector3d& from = setup.point->position;
   require(from.allFinite() && (lens ? from.z() < 0.0 : from.z() > 0.0), "source.position",
           from.transpose(), lens ? "finite, its z below 0" : "finite, its z above 0");
+}
+
+void require_front(const OpticalSetup& setup) {
+  if (!setup.front) return;
+  const SphericalFront& front = *setup.front;
+  require(setup.mode == LightMode::kRefract, "front", "sphere", "left out of a mirror");
+  require(front.apex.allFinite(), "front.apex", front.apex.transpose(), "finite");
+  const Eigen::Vector2d middle = 0.5 * setup.lens_size;
+  const double farthest = ((front.apex.head<2>() - middle).cwiseAbs() + middle).norm();
+  require(std::isfinite(front.radius) && std::abs(front.radius) > farthest, "front.radius",
+          front.radius,
+          "longer than " + number_text(farthest) +
+              " mm, or the sphere is too small "
+              "for the lens");
 }
 
 void require_extent(const SourceExtent& extent) {
@@ -86,6 +101,7 @@ void validate(const OpticalSetup& setup) {
             setup.image_origin[axis], "a finite number of mm");
     require(setup.pixels[axis] > 0, "pixels" + index, setup.pixels[axis], "1 or more");
   }
+  require_front(setup);
 }
 
 }  // namespace lensforge

@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <optional>
 
+#include "core/optics/front_surface.h"
 #include "core/optics/source_extent.h"
 
 namespace lensforge {
@@ -12,8 +13,8 @@ namespace lensforge {
 /// translucent screen.
 enum class ViewSide { kFront, kRear };
 
-/// What the surface does to the light: it lets it out of a lens whose flat entry face lies in
-/// z = 0, or it is a mirror, lit from above.
+/// What the surface does to the light: it lets it out of a lens, whose entry face lies below it, or
+/// it is a mirror, lit from above.
 enum class LightMode { kRefract, kReflect };
 
 /// How the intensity of a point source depends on the direction: the same in all of them, or by the
@@ -39,7 +40,9 @@ struct OpticalSetup {
   LightMode mode = LightMode::kRefract;
   /// Unit direction of parallel light before the surface; up for a lens, down for a mirror.
   Eigen::Vector3d light{0.0, 0.0, 1.0};
-  std::optional<PointSource> point;          ///< Instead of parallel light.
+  std::optional<PointSource> point;  ///< Instead of parallel light.
+  /// Entry face of a lens; none: the plane z = 0.
+  std::optional<SphericalFront> front;
   SourceExtent extent;                       ///< Of either; LightPath takes it for a point.
   double ior = 1.49;                         ///< Refractive index of the lens against air, > 1.
   double focal_length = 300.0;               ///< z of the picture's centre, mm; above the surface.
@@ -64,8 +67,8 @@ struct OpticalSetup {
 
 /// @throw InputError naming the field, its value and the rule, unless ior > 1, all sizes, the focal
 /// length and the pixel counts are positive, the light comes from the right side, the screen's
-/// vectors are of length 1, at a right angle and turn it by less than a right angle, and everything
-/// is finite.
+/// vectors are of length 1, at a right angle and turn it by less than a right angle, a spherical
+/// front's radius is longer than half of the lens's diagonal, and everything is finite.
 void validate(const OpticalSetup& setup);
 
 }  // namespace lensforge

@@ -117,11 +117,22 @@ void read_source(const JsonFields& source, OpticalSetup& setup) {
   read_extent(source, setup);
 }
 
-void require_flat_front(const JsonFields& front) {
-  if (front.text("type") != "flat") {
-    front.refuse("type", "not supported yet by this version, only \"flat\" is");
+void read_front(const JsonFields& front, OpticalSetup& setup) {
+  const std::string type = front.text("type");
+  if (type == "sphere") {
+    setup.front = SphericalFront{front.number("radius"), front.number_triple("apex")};
+  } else if (type != "flat") {
+    front.refuse("type", R"(it must be "flat" or "sphere")");
+  } else if (front.number("z") != 0.0) {
+    front.refuse("z", "it must be 0, where the lens begins");
   }
-  if (front.number("z") != 0.0) front.refuse("z", "it must be 0, where the lens begins");
+}
+
+ordered_json front_json(const OpticalSetup& setup) {
+  if (!setup.front) return {{"type", "flat"}, {"z", 0}};
+  return {{"type", "sphere"},
+          {"radius", setup.front->radius},
+          {"apex", array_of(setup.front->apex)}};
 }
 
 void read_screen(const JsonFields& screen, OpticalSetup& setup) {
@@ -154,7 +165,7 @@ ordered_json setup_json(const OpticalSetup& setup) {
     document["incidence_deg"] = kDegrees * std::acos(-setup.light.z());
   }
   document["source"] = source_json(setup);
-  if (lens) document["front"] = {{"type", "flat"}, {"z", 0}};
+  if (lens) document["front"] = front_json(setup);
   document["ior"] = setup.ior;
   if (!setup.screen_is_turned()) document["focal_length"] = setup.focal_length;
   document["lens_size"] = array_of(setup.lens_size);
@@ -175,7 +186,7 @@ OpticalSetup read_setup(const JsonFields& fields) {
     fields.refuse("mode", R"(it must be "refract" or "reflect")");
   }
   read_source(fields.object("source"), setup);
-  if (fields.has("front")) require_flat_front(fields.object("front"));
+  if (fields.has("front")) read_front(fields.object("front"), setup);
   setup.ior = fields.number("ior");
   setup.lens_size = fields.number_pair("lens_size");
   setup.image_size = fields.number_pair("image_size");

@@ -10,6 +10,7 @@
 #include "core/surface/grid_mesh.h"
 #include "core/value_slope.h"
 #include "design/schedule/spline_start.h"
+#include "design/schedule/start_surface.h"
 
 namespace lensforge {
 namespace {
@@ -82,8 +83,8 @@ Checkpoint first_state(const DesignTask& task) {
   if (task.options.resume) return resumed(task, fingerprint);
   Checkpoint state;
   state.fingerprint = fingerprint;
-  state.mesh =
-      make_grid_mesh(task.setup.lens_size, task.levels.front().grid, task.options.thickness);
+  state.mesh = start_surface(task.setup, task.levels.front().grid, task.options.thickness,
+                             task.executor);
   return state;
 }
 

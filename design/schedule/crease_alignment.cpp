@@ -56,10 +56,10 @@ class Alignment {
 
   [[nodiscard]] std::optional<Move> move_of(int vertex) const {
     const Eigen::Vector3d at = mesh_.vertices.col(vertex);
-    const Eigen::Vector2d pixel = light_.land_from_flat(at);
+    const Eigen::Vector2d pixel = light_.land_from_start(at);
     const std::optional<Eigen::Vector2d> way = map_.way_to_crease(pixel);
     if (!way) return std::nullopt;
-    const Eigen::Vector2d mm = light_.place_on_flat(pixel + *way, at.z()) - at.head<2>();
+    const Eigen::Vector2d mm = light_.place_on_start(pixel + *way, at.z()) - at.head<2>();
     const double share = mm.norm() / shortest_edge(vertex);
     if (!(share < kReach)) return std::nullopt;
     return Move{share, vertex, mm};

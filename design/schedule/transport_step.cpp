@@ -6,11 +6,11 @@
 #include <utility>
 
 #include "core/error.h"
-#include "core/surface/grid_mesh.h"
 #include "design/schedule/crease_alignment.h"
 #include "design/schedule/face_transport.h"
 #include "design/schedule/guided_optimization.h"
 #include "design/schedule/reach.h"
+#include "design/schedule/start_surface.h"
 #include "design/transport/vertex_spread.h"
 
 namespace lensforge {
@@ -49,7 +49,7 @@ SurfaceMesh coarse_mesh(const DesignTask& task, GridShape shape) {
   while (faces() > kMaxEvenFaces) {
     shape = {(shape.columns - 1) / 2 + 1, (shape.rows - 1) / 2 + 1};
   }
-  return make_grid_mesh(task.setup.lens_size, shape, task.options.thickness);
+  return start_surface(task.setup, shape, task.options.thickness, task.executor);
 }
 
 /// A mesh's light and its transport to the picture.
@@ -125,6 +125,7 @@ Matching fit_mesh(const Site& site, const SurfaceMesh& even_mesh, const Matching
   const BrenierMap map(even.light.landing, even.result, site.problem.aim);
   align_to_creases(map, site.problem.setup, mesh);
   const DesignTask& task = site.task;
+  shape_start(task.setup, task.options.thickness, task.executor, mesh);
   if (task.options.model == SurfaceModel::kFacet) {
     if (std::optional<Matching> own = match_spread(site, mesh)) return *std::move(own);
   }

@@ -12,6 +12,7 @@
 #include <tuple>
 #include <vector>
 
+#include "core/optics/front_placement.h"
 #include "core/optics/light_path.h"
 #include "design/energy/objective.h"
 #include "design/finite_difference.h"
@@ -21,6 +22,7 @@
 #include "design/schedule/face_transport.h"
 #include "design/schedule/guided_optimization.h"
 #include "design/schedule/reach.h"
+#include "design/schedule/start_surface.h"
 #include "design/snell.h"
 #include "design/transport/vertex_spread.h"
 
@@ -28,6 +30,8 @@ namespace lensforge {
 namespace {
 
 using testing::Random;
+
+constexpr double kThickness = 5.0;  ///< mm
 
 /// A kind of light and a screen for it.
 struct KindOfLight {
@@ -62,6 +66,12 @@ void lit_mirror(OpticalSetup& setup) {
   setup.point = PointSource{{-90.0, 0.5 * setup.lens_size.y(), 150.0}, Emission::kIsotropic};
 }
 
+void convex_front(OpticalSetup& setup) { setup.front = spherical_front(120.0, setup.lens_size); }
+void point_concave_front(OpticalSetup& setup) {
+  point_source(setup);
+  setup.front = spherical_front(-120.0, setup.lens_size);
+}
+
 /// The same lens in another light, its picture moved to where that goes.
 OpticalSetup lit_by(const KindOfLight& kind, OpticalSetup setup) {
   kind.apply(setup);
@@ -75,7 +85,9 @@ constexpr KindOfLight kKinds[] = {{"Oblique", light_from_the_side},
                                   {"TurnedScreen", large_turned_screen},
                                   {"Point", point_source},
                                   {"Mirror", mirror},
-                                  {"PointOnMirror", lit_mirror}};
+                                  {"PointOnMirror", lit_mirror},
+                                  {"ConvexFront", convex_front},
+                                  {"PointConcaveFront", point_concave_front}};
 
 using Case = std::tuple<KindOfLight, SurfaceModel>;
 
@@ -93,7 +105,7 @@ INSTANTIATE_TEST_SUITE_P(Kinds, OtherLight,
                                   model_name(std::get<1>(one.param));
                          });
 
-/// Where the light of a flat mesh's faces is to go, after the mesh has been fitted to it.
+/// Where the light of the start's faces is to go, after the mesh has been fitted to it.
 Correspondence transport(const OpticalSetup& setup, SurfaceModel model, const Image& target,
                          SurfaceMesh& mesh) {
   const Executor executor = Executor::cpu(2);
@@ -104,6 +116,7 @@ Correspondence transport(const OpticalSetup& setup, SurfaceModel model, const Im
   EXPECT_TRUE(spread_vertices({flat, served}, 0.7, setup, executor, RunControl(), mesh));
   const BrenierMap map(even.landing, result, target);
   align_to_creases(map, setup, mesh);
+  shape_start(setup, kThickness, executor, mesh);
   const FaceLight light = face_light(mesh, setup, model, executor);
   return {map_faces(light, map, executor), light.flux};
 }
@@ -111,10 +124,10 @@ Correspondence transport(const OpticalSetup& setup, SurfaceModel model, const Im
 /// What a small lens throws that is designed for `setup`.
 ImageMetrics designed(const OpticalSetup& setup, SurfaceModel model) {
   const Image target = testing::spot_picture(setup.pixels.x(), setup.pixels.y());
-  SurfaceMesh mesh = make_grid_mesh(setup.lens_size, {41, 47}, 5.0);
   const Executor executor = Executor::cpu(2);
+  SurfaceMesh mesh = start_surface(setup, {41, 47}, kThickness, executor);
   const Correspondence wanted = transport(setup, model, target, mesh);
-  aim_surface(wanted, setup, 5.0, executor, mesh);
+  aim_surface(wanted, setup, kThickness, executor, mesh);
   ObjectiveOptions options;
   options.model = model;
   options.weights.smooth = default_smoothness(model);
@@ -173,21 +186,39 @@ std::optional<double> hit(const Corners& t, const Eigen::Vector3d& origin,
   return s.z();
 }
 
-/// A ray that reaches z = 0, and the light that it stands for.
-struct SourceRay {
+/// A place where rays enter, and the normal there, towards the inside: of a sphere around its
+/// centre, or z = 0.
+struct FrontPlace {
   Eigen::Vector3d place;
+  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();
+};
+
+FrontPlace front_place(const OpticalSetup& setup, double x, double y) {
+  if (!setup.front) return {{x, y, 0.0}};
+  const double radius = setup.front->radius;
+  const Eigen::Vector3d centre = setup.front->apex + radius * Eigen::Vector3d::UnitZ();
+  const double across = (Eigen::Vector2d(x, y) - centre.head<2>()).norm();
+  const double rise = std::copysign(std::sqrt(radius * radius - across * across), radius);
+  const Eigen::Vector3d place(x, y, centre.z() - rise);
+  return {place, (centre - place) / radius};
+}
+
+/// A ray that reaches the front, and the light that it stands for where all have as much of the
+/// plan.
+struct SourceRay {
   Eigen::Vector3d way;
   double light;
 };
 
-SourceRay source_ray(const OpticalSetup& setup, const Eigen::Vector3d& place) {
-  if (!setup.point) return {place, setup.light, 1.0};
-  const Eigen::Vector3d from = place - setup.point->position;
+SourceRay source_ray(const OpticalSetup& setup, const FrontPlace& front) {
+  const Eigen::Vector3d across = front.normal / front.normal.z();
+  if (!setup.point) return {setup.light, across.dot(setup.light) / setup.light.z()};
+  const Eigen::Vector3d from = front.place - setup.point->position;
   const Eigen::Vector3d way = from.normalized();
   const Eigen::Vector3d middle(0.5 * setup.lens_size.x(), 0.5 * setup.lens_size.y(), 0.0);
   const bool even = setup.point->emission == Emission::kIsotropic;
   const double intensity = even ? 1.0 : way.dot((middle - setup.point->position).normalized());
-  return {place, way, intensity * std::abs(way.z()) / from.squaredNorm()};
+  return {way, intensity * std::abs(across.dot(way)) / from.squaredNorm()};
 }
 
 struct TracedPicture {
@@ -197,8 +228,8 @@ struct TracedPicture {
   int shadowed = 0;      ///< Rays that meet the surface a second time.
 };
 
-/// Flux per pixel by single rays, apart from LightPath: they enter the flat face and are refracted
-/// by angles, or go straight on, meet a facet, and are refracted or reflected there.
+/// Flux per pixel by single rays, apart from LightPath: they enter the front and are refracted by
+/// angles, or go straight on, meet a facet, and are refracted or reflected there.
 TracedPicture traced(const SurfaceMesh& mesh, const OpticalSetup& setup, int rays) {
   const bool lens = setup.mode == LightMode::kRefract;
   const Eigen::Vector3d normal = setup.screen_x.cross(setup.screen_y);
@@ -208,12 +239,13 @@ TracedPicture traced(const SurfaceMesh& mesh, const OpticalSetup& setup, int ray
   Random random(9);
   const double margin = 5.0;  // mm; the surface is lit from beside its own place, too.
   for (int ray = 0; ray < rays; ++ray) {
-    const Eigen::Vector3d place(random.between(-margin, setup.lens_size.x() + margin),
-                                random.between(-margin, setup.lens_size.y() + margin), 0.0);
-    const SourceRay source = source_ray(setup, place);
+    const double x = random.between(-margin, setup.lens_size.x() + margin);
+    const double y = random.between(-margin, setup.lens_size.y() + margin);
+    const FrontPlace front = front_place(setup, x, y);
+    const Eigen::Vector3d& place = front.place;
+    const SourceRay source = source_ray(setup, front);
     const Eigen::Vector3d a =
-        lens ? testing::refract_by_angles(source.way, Eigen::Vector3d::UnitZ(), 1.0 / setup.ior)
-             : source.way;
+        lens ? testing::refract_by_angles(source.way, front.normal, 1.0 / setup.ior) : source.way;
     for (Eigen::Index f = 0; f < mesh.triangles.cols(); ++f) {
       const Corners t = mesh.corners(f);
       const std::optional<double> way = hit(t, place, a);

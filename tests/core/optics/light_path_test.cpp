@@ -8,6 +8,7 @@
 #include <numbers>
 #include <string>
 
+#include "core/optics/light_setups.h"
 #include "design/finite_difference.h"
 #include "design/random_corners.h"
 #include "design/random_input.h"
@@ -16,83 +17,7 @@
 namespace lensforge {
 namespace {
 
-using testing::Random;
-using testing::random_corners;
-
-const Eigen::Vector3d kPlace(40.0, 30.0, 5.0);
-
-OpticalSetup shifted_setup() {
-  OpticalSetup setup;
-  setup.lens_size = {100.0, 80.0};
-  setup.pixels = {50, 20};
-  setup.image_size = {200.0, 60.0};
-  setup.image_origin = {-30.0, 12.0};
-  return setup;
-}
-
-OpticalSetup oblique_setup() {
-  OpticalSetup setup = shifted_setup();
-  setup.light = Eigen::Vector3d(0.3, -0.2, 1.0).normalized();
-  return setup;
-}
-
-OpticalSetup turned_setup() {
-  OpticalSetup setup = shifted_setup();
-  const Eigen::Matrix3d turn = (Eigen::AngleAxisd(0.5, Eigen::Vector3d::UnitX()) *
-                                Eigen::AngleAxisd(-0.3, Eigen::Vector3d::UnitY()))
-                                   .toRotationMatrix();
-  setup.screen_x = turn.col(0);
-  setup.screen_y = turn.col(1);
-  return setup;
-}
-
-OpticalSetup point_setup(Emission emission) {
-  OpticalSetup setup = turned_setup();
-  setup.point = PointSource{{70.0, 20.0, -120.0}, emission};
-  return setup;
-}
-
-OpticalSetup mirror_setup() {
-  OpticalSetup setup = turned_setup();
-  setup.mode = LightMode::kReflect;
-  setup.light = Eigen::Vector3d(0.5, 0.1, -1.0).normalized();
-  return setup;
-}
-
-OpticalSetup lit_mirror_setup() {
-  OpticalSetup setup = mirror_setup();
-  setup.light = Eigen::Vector3d::UnitZ();
-  setup.point = PointSource{{-60.0, 30.0, 150.0}, Emission::kLambertian};
-  return setup;
-}
-
-struct KindOfLight {
-  const char* name;
-  OpticalSetup setup;
-};
-
-/// Direction of the light inside the lens at a point, or at a mirror, worked out with angles.
-Eigen::Vector3d reference_incident(const OpticalSetup& setup, const Eigen::Vector3d& p) {
-  const bool lens = setup.mode == LightMode::kRefract;
-  const auto inside = [&](const Eigen::Vector3d& way) {
-    return testing::refract_by_angles(way.normalized(), Eigen::Vector3d::UnitZ(), 1.0 / setup.ior);
-  };
-  if (!setup.point) return lens ? inside(setup.light) : setup.light;
-  const Eigen::Vector3d& from = setup.point->position;
-  if (!lens) return (p - from).normalized();
-  // The place on the front from which a ray goes to p, by bisection of its distance from the
-  // source.
-  const Eigen::Vector2d across = (p - from).head<2>();
-  double low = 0.0;
-  double high = 1.0;
-  for (int k = 0; k < 60; ++k) {
-    const double share = 0.5 * (low + high);
-    const Eigen::Vector3d b = inside({share * across.x(), share * across.y(), -from.z()});
-    const double reached = share * across.norm() + p.z() * b.head<2>().norm() / b.z();
-    (reached < across.norm() ? low : high) = share;
-  }
-  return inside({low * across.x(), low * across.y(), -from.z()});
-}
+using namespace testing;
 
 /// Every kind of light. They are checked at places all over the lens.
 class EveryLight : public ::testing::TestWithParam<KindOfLight> {
@@ -117,16 +42,19 @@ class EveryLight : public ::testing::TestWithParam<KindOfLight> {
   }
 };
 
-INSTANTIATE_TEST_SUITE_P(LightPath, EveryLight,
-                         ::testing::Values(KindOfLight{"AlongZ", shifted_setup()},
-                                           KindOfLight{"Oblique", oblique_setup()},
-                                           KindOfLight{"TurnedScreen", turned_setup()},
-                                           KindOfLight{"Point", point_setup(Emission::kIsotropic)},
-                                           KindOfLight{"FlatPoint",
-                                                       point_setup(Emission::kLambertian)},
-                                           KindOfLight{"Mirror", mirror_setup()},
-                                           KindOfLight{"PointOnMirror", lit_mirror_setup()}),
-                         [](const auto& kind) -> std::string { return kind.param.name; });
+INSTANTIATE_TEST_SUITE_P(
+    LightPath, EveryLight,
+    ::testing::Values(
+        KindOfLight{"AlongZ", shifted_setup()}, KindOfLight{"Oblique", oblique_setup()},
+        KindOfLight{"TurnedScreen", turned_setup()},
+        KindOfLight{"Point", point_setup(Emission::kIsotropic)},
+        KindOfLight{"FlatPoint", point_setup(Emission::kLambertian)},
+        KindOfLight{"Mirror", mirror_setup()}, KindOfLight{"PointOnMirror", lit_mirror_setup()},
+        KindOfLight{"ConvexFront", front_setup(140.0)},
+        KindOfLight{"ConcaveFront", front_setup(-160.0)},
+        KindOfLight{"PointConvexFront", point_front_setup(130.0, Emission::kIsotropic)},
+        KindOfLight{"PointConcaveFront", point_front_setup(-150.0, Emission::kLambertian)}),
+    [](const auto& kind) -> std::string { return kind.param.name; });
 
 TEST(LightPath, FrontViewRunsXAndYAgainstColumnsAndRows) {
   const LightPath light(shifted_setup());
@@ -281,20 +209,50 @@ TEST(LightPath, LandAdjointAddsToWhatIsThere) {
 
 /// Where the ray to a point leaves the air, or passes z = 0.
 Eigen::Vector3d entry_of(const OpticalSetup& setup, const Eigen::Vector3d& p) {
+  if (setup.front) return reference_front_ray(setup, p).place;
   const Eigen::Vector3d a = reference_incident(setup, p);
   return p - p.z() / a.z() * a;
 }
 
+/// Area across z of the parallel light that comes in within the lens's outline, by the outline of
+/// its front along the light, mm².
+double area_of_front(const OpticalSetup& setup) {
+  constexpr int kParts = 1000;
+  const Eigen::Vector2d& size = setup.lens_size;
+  const auto at = [&](int i) -> Eigen::Vector2d {
+    const int side = i / kParts % 4;
+    const double share = (side < 2 ? i % kParts : kParts - i % kParts) / double{kParts};
+    const Eigen::Vector2d place =
+        side % 2 == 0 ? Eigen::Vector2d(share, side == 0 ? 0.0 : 1.0).cwiseProduct(size)
+                      : Eigen::Vector2d(side == 1 ? 1.0 : 0.0, share).cwiseProduct(size);
+    const double z = setup.front ? FrontSurface(*setup.front).height(place) : 0.0;
+    return place - z / setup.light.z() * setup.light.head<2>();
+  };
+  double area = 0.0;
+  for (int i = 0; i < 4 * kParts; ++i) {
+    const Eigen::Vector2d a = at(i);
+    const Eigen::Vector2d b = at(i + 1);
+    area += 0.5 * (a.x() * b.y() - a.y() * b.x());
+  }
+  return area;
+}
+
 TEST_P(EveryLight, FluxOfParallelLightIsTheAreaThroughWhichItEnters) {
   if (setup_.point) return;
+  const double whole = area_of_front(setup_);
   Random random(5);
   for (int i = 0; i < 100; ++i) {
     const Corners t = random_corners(random);
-    const Eigen::Vector2d side = (entry_of(setup_, t.v1) - entry_of(setup_, t.v0)).head<2>();
-    const Eigen::Vector2d other = (entry_of(setup_, t.v2) - entry_of(setup_, t.v0)).head<2>();
+    // Where the ray before a curved front passes z = 0.
+    const auto entry = [&](const Eigen::Vector3d& p) -> Eigen::Vector2d {
+      const Eigen::Vector3d e = entry_of(setup_, p);
+      return (e - e.z() / setup_.light.z() * setup_.light).head<2>();
+    };
+    const Eigen::Vector2d side = entry(t.v1) - entry(t.v0);
+    const Eigen::Vector2d other = entry(t.v2) - entry(t.v0);
     const double area = 0.5 * (side.x() * other.y() - side.y() * other.x());
     EXPECT_NEAR(light_.intake(t), area, 1e-12);
-    EXPECT_NEAR(light_.flux(t), area / 8000.0, 1e-16);
+    EXPECT_NEAR(light_.flux(t), area / whole, 1e-5 * area / whole);
   }
 }
 
@@ -362,7 +320,7 @@ TEST_P(EveryLight, ASurfaceOfTheWantedGradientSendsItsLightThere) {
 }
 
 TEST_P(EveryLight, AFlatLensLetsLightGoOnInItsDirection) {
-  if (setup_.point) return;
+  if (setup_.point || setup_.front) return;
   Eigen::Vector3d way = setup_.light;
   if (mirror_) way.z() = -way.z();
   const Eigen::Vector3d to_centre = setup_.screen_centre() - kPlace;
@@ -370,11 +328,36 @@ TEST_P(EveryLight, AFlatLensLetsLightGoOnInItsDirection) {
   const Eigen::Vector3d l = normal.dot(to_centre) / normal.dot(way) * way - to_centre;
   const Eigen::Vector2d mm = setup_.screen_centre().head<2>() +
                              Eigen::Vector2d(setup_.screen_x.dot(l), setup_.screen_y.dot(l));
-  EXPECT_LT((light_.land_from_flat(kPlace) - light_.plane().to_pixels(mm)).norm(), 1e-11);
+  EXPECT_LT((light_.land_from_start(kPlace) - light_.plane().to_pixels(mm)).norm(), 1e-11);
 }
 
-TEST_P(EveryLight, ThePlaceOfAPixelOnAFlatSurfaceLandsThere) {
-  const Eigen::Vector2d back = light_.place_on_flat(light_.land_from_flat(kPlace), kPlace.z());
+TEST(LightPath, AStartBehindACurvedFrontMakesTheLightParallel) {
+  const LightPath light(front_setup(140.0));
+  const Eigen::Vector2d from = light.plane().to_mm(light.land_from_start(kPlace));
+  for (const Eigen::Vector3d& step : {Eigen::Vector3d(20.0, 0.0, 0.0), {0.0, -15.0, 0.0}}) {
+    const Eigen::Vector2d to = light.plane().to_mm(light.land_from_start(kPlace + step));
+    EXPECT_LT((to - from - step.head<2>()).norm(), 1e-11);
+  }
+}
+
+TEST(LightPath, NoLightComesThroughAFrontThatIsTurnedAway) {
+  OpticalSetup setup = point_front_setup(130.0, Emission::kIsotropic);
+  setup.point->position = {55.0, 38.0, -21.0};
+  const LightPath light(setup);
+  const Eigen::Vector3d n = Eigen::Vector3d::UnitZ();
+  EXPECT_TRUE(light.transmits(Eigen::Vector3d(56.0, 38.0, 5.0), n));
+  EXPECT_FALSE(light.transmits(Eigen::Vector3d(5.0, 5.0, 5.0), n));
+}
+
+TEST(LightPath, LightThatMeetsInsideTheLensIsNotFollowed) {
+  const LightPath light(front_setup(80.0));
+  const Eigen::Vector3d n = Eigen::Vector3d::UnitZ();
+  EXPECT_TRUE(light.transmits(Eigen::Vector3d(55.0, 38.0, 50.0), n));
+  EXPECT_FALSE(light.transmits(Eigen::Vector3d(55.0, 38.0, 300.0), n));
+}
+
+TEST_P(EveryLight, ThePlaceOfAPixelOnTheStartLandsThere) {
+  const Eigen::Vector2d back = light_.place_on_start(light_.land_from_start(kPlace), kPlace.z());
   EXPECT_LT((back - kPlace.head<2>()).norm(), 1e-8);
 }
 

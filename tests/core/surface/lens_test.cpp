@@ -305,9 +305,8 @@ TEST(Lens, WhatThisVersionCannotDoYetIsSaid) {
             "field 'mode' is \"scatter\": it must be \"refract\" or \"reflect\"");
   EXPECT_EQ(refusal([](json& document) { document["source"]["type"] = "sun"; }),
             "field 'source.type' is \"sun\": it must be \"parallel\" or \"point\"");
-  EXPECT_EQ(
-      refusal([](json& document) { document["front"]["type"] = "sphere"; }),
-      "field 'front.type' is \"sphere\": not supported yet by this version, only \"flat\" is");
+  EXPECT_EQ(refusal([](json& document) { document["front"]["type"] = "cone"; }),
+            "field 'front.type' is \"cone\": it must be \"flat\" or \"sphere\"");
 }
 
 TEST(Lens, ValuesOutOfRangeAreRefused) {

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+
+#include "core/optics/optical_setup.h"
+
+namespace lensforge {
+
+/// A front for a lens of this size: its apex is in the middle, and its highest point over the lens
+/// lies in z = 0. @pre |radius| is longer than half of the lens's diagonal.
+SphericalFront spherical_front(double radius, const Eigen::Vector2d& lens_size);
+
+/// True if the part itself stands between the source and a place of its front. Sampled: a shadow
+/// narrower than a hundredth of the way may be missed. @pre the front covers the place.
+bool is_shadowed(const OpticalSetup& setup, const Eigen::Vector2d& place);
+
+/// How far beyond the lens's edges light enters the front that comes to a point of the surface, mm;
+/// 0 where it enters within them.
+double overhang(const OpticalSetup& setup, const Eigen::Vector3d& p);
+
+}  // namespace lensforge

@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cmath>
+#include <numbers>
+
+#include "core/optics/optical_setup.h"
+#include "design/snell.h"
+
+/// Setups with every kind of light, and single rays of theirs worked out apart from LightPath.
+namespace lensforge::testing {
+
+inline const Eigen::Vector3d kPlace(40.0, 30.0, 5.0);
+
+inline OpticalSetup shifted_setup() {
+  OpticalSetup setup;
+  setup.lens_size = {100.0, 80.0};
+  setup.pixels = {50, 20};
+  setup.image_size = {200.0, 60.0};
+  setup.image_origin = {-30.0, 12.0};
+  return setup;
+}
+
+inline OpticalSetup oblique_setup() {
+  OpticalSetup setup = shifted_setup();
+  setup.light = Eigen::Vector3d(0.3, -0.2, 1.0).normalized();
+  return setup;
+}
+
+inline OpticalSetup turned_setup() {
+  OpticalSetup setup = shifted_setup();
+  const Eigen::Matrix3d turn = (Eigen::AngleAxisd(0.5, Eigen::Vector3d::UnitX()) *
+                                Eigen::AngleAxisd(-0.3, Eigen::Vector3d::UnitY()))
+                                   .toRotationMatrix();
+  setup.screen_x = turn.col(0);
+  setup.screen_y = turn.col(1);
+  return setup;
+}
+
+inline OpticalSetup point_setup(Emission emission) {
+  OpticalSetup setup = turned_setup();
+  setup.point = PointSource{{70.0, 20.0, -120.0}, emission};
+  return setup;
+}
+
+inline OpticalSetup mirror_setup() {
+  OpticalSetup setup = turned_setup();
+  setup.mode = LightMode::kReflect;
+  setup.light = Eigen::Vector3d(0.5, 0.1, -1.0).normalized();
+  return setup;
+}
+
+inline OpticalSetup lit_mirror_setup() {
+  OpticalSetup setup = mirror_setup();
+  setup.light = Eigen::Vector3d::UnitZ();
+  setup.point = PointSource{{-60.0, 30.0, 150.0}, Emission::kLambertian};
+  return setup;
+}
+
+inline OpticalSetup front_setup(double radius) {
+  OpticalSetup setup = oblique_setup();
+  setup.front = SphericalFront{radius, {55.0, 38.0, radius > 0.0 ? -20.0 : 0.0}};
+  return setup;
+}
+
+inline OpticalSetup point_front_setup(double radius, Emission emission) {
+  OpticalSetup setup = point_setup(emission);
+  setup.front = front_setup(radius).front;
+  return setup;
+}
+
+struct KindOfLight {
+  const char* name;
+  OpticalSetup setup;
+};
+
+/// Normal of a spherical front at a place, towards the inside, and its point there: on the line to
+/// the sphere's centre.
+inline Eigen::Vector3d front_normal(const SphericalFront& front, const Eigen::Vector3d& e) {
+  const Eigen::Vector3d centre = front.apex + front.radius * Eigen::Vector3d::UnitZ();
+  return (centre - e).normalized() * (front.radius > 0.0 ? 1.0 : -1.0);
+}
+inline Eigen::Vector3d front_point(const SphericalFront& front, const Eigen::Vector2d& xy) {
+  const double across = (xy - front.apex.head<2>()).norm();
+  const double depth = std::abs(front.radius) * std::cos(std::asin(across / front.radius));
+  return {xy.x(), xy.y(), front.apex.z() + front.radius - (front.radius > 0.0 ? depth : -depth)};
+}
+
+/// The ray that comes to a point through a spherical front: its place on the front is moved by what
+/// the ray misses the point by, until it meets it.
+struct FrontRay {
+  Eigen::Vector3d place;
+  Eigen::Vector3d inside;
+};
+inline FrontRay reference_front_ray(const OpticalSetup& setup, const Eigen::Vector3d& p) {
+  Eigen::Vector2d xy = p.head<2>();
+  FrontRay ray;
+  for (int k = 0; k < 100; ++k) {
+    ray.place = front_point(*setup.front, xy);
+    const Eigen::Vector3d way =
+        setup.point ? Eigen::Vector3d(ray.place - setup.point->position).normalized() : setup.light;
+    ray.inside = refract_by_angles(way, front_normal(*setup.front, ray.place), 1.0 / setup.ior);
+    const Eigen::Vector2d m = ray.inside.head<2>() / ray.inside.z();
+    xy -= xy + (p.z() - ray.place.z()) * m - p.head<2>();
+  }
+  return ray;
+}
+
+/// Direction of the light inside the lens at a point, or at a mirror, worked out with angles.
+inline Eigen::Vector3d reference_incident(const OpticalSetup& setup, const Eigen::Vector3d& p) {
+  if (setup.front) return reference_front_ray(setup, p).inside;
+  const bool lens = setup.mode == LightMode::kRefract;
+  const auto inside = [&](const Eigen::Vector3d& way) {
+    return refract_by_angles(way.normalized(), Eigen::Vector3d::UnitZ(), 1.0 / setup.ior);
+  };
+  if (!setup.point) return lens ? inside(setup.light) : setup.light;
+  const Eigen::Vector3d& from = setup.point->position;
+  if (!lens) return (p - from).normalized();
+  // The place on the front from which a ray goes to p, by bisection of its distance from the
+  // source.
+  const Eigen::Vector2d across = (p - from).head<2>();
+  double low = 0.0;
+  double high = 1.0;
+  for (int k = 0; k < 60; ++k) {
+    const double share = 0.5 * (low + high);
+    const Eigen::Vector3d b = inside({share * across.x(), share * across.y(), -from.z()});
+    const double reached = share * across.norm() + p.z() * b.head<2>().norm() / b.z();
+    (reached < across.norm() ? low : high) = share;
+  }
+  return inside({low * across.x(), low * across.y(), -from.z()});
+}
+
+}  // namespace lensforge::testing
