@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 
 #include "app/command_line.h"
@@ -14,6 +15,7 @@
 #include "core/error.h"
 #include "core/image/image_io.h"
 #include "core/io/files.h"
+#include "core/optics/front_placement.h"
 #include "core/surface/lens.h"
 #include "core/surface/mesh_io.h"
 #include "core/surface/setup_json.h"
@@ -82,12 +84,29 @@ std::string light_text(const OpticalSetup& setup) {
          " mm" + on;
 }
 
+std::string front_text(const SphericalFront& front) {
+  return std::string(front.radius > 0.0 ? "bulging" : "hollow") + " sphere of radius " +
+         fixed(std::abs(front.radius), 2) + " mm, its apex at " + place_text(front.apex) + " mm";
+}
+
+/// How much wider than the lens the front has to be, so that all of the surface is lit.
+void describe_overhang(Description& d, const Lens& lens) {
+  if (!lens.setup.front) return;
+  double most = 0.0;
+  for (const Eigen::Vector3d p : lens.surface.vertices.colwise()) {
+    most = std::max(most, overhang(lens.setup, p));
+  }
+  d.line("front lit", "to " + fixed(most, 3) + " mm beyond the lens's edges");
+  d.json["front_overhang"] = most;
+}
+
 void describe_setup(Description& d, const OpticalSetup& setup) {
   d.line("light", light_text(setup));
   const bool mirror = setup.mode == LightMode::kReflect;
   d.line(mirror ? "mirror" : "lens",
          fixed(setup.lens_size.x(), 2) + " x " + fixed(setup.lens_size.y(), 2) + " mm" +
              (mirror ? "" : ", refractive index " + fixed(setup.ior, 4)));
+  if (setup.front) d.line("front", front_text(*setup.front));
   d.line("wall", "z = " + fixed(setup.focal_length, 2) + " mm, picture " +
                      fixed(setup.image_size.x(), 2) + " x " + fixed(setup.image_size.y(), 2) +
                      " mm, seen from the " + (setup.view == ViewSide::kFront ? "front" : "rear"));
@@ -103,6 +122,7 @@ void describe_setup(Description& d, const OpticalSetup& setup) {
   d.json["ior"] = setup.ior;
   const nlohmann::ordered_json all = setup_json(setup);
   for (const char* key : {"mode", "screen"}) d.json[key] = all.at(key);
+  if (!mirror) d.json["front"] = all.at("front");
   d.json["light"] = all.at("source");  // "source" is what was asked about.
 }
 
@@ -118,6 +138,7 @@ Description describe_lens(const fs::path& folder) {
   const Lens lens = read_lens(folder);
   Description d{{{"kind", "lens"}, {"model", model_name(lens.model)}}, {}};
   describe_setup(d, lens.setup);
+  describe_overhang(d, lens);
   d.line("model", model_name(lens.model));
   const GridShape grid = lens.surface.grid;
   if (grid.is_grid()) d.line("grid", size_text(grid.columns, grid.rows));

@@ -229,17 +229,25 @@ std::string light_words(const OpticalSetup& setup) {
                            : "flat LED, towards the middle of the part,") +
            " at " + place(setup.point->position);
   }
-  if (!is_mirror(setup)) return "parallel, straight onto the flat face";
+  if (!is_mirror(setup)) {
+    return std::string("parallel, straight onto the ") + (setup.front ? "front" : "flat face");
+  }
   return "parallel, " + number(std::acos(std::clamp(-setup.light.z(), -1.0, 1.0)) / kDegree) +
          "° from the mirror's z axis";
+}
+
+std::string front_words(const OpticalSetup& setup) {
+  if (!setup.front) return "its flat face at z 0, towards the lamp";
+  const double radius = setup.front->radius;
+  return std::string(radius > 0.0 ? "its bulging" : "its hollow") + " front, of radius " +
+         number(std::abs(radius)) + " mm, towards the lamp";
 }
 
 std::vector<std::string> description(const OpticalSetup& setup, const Scene& scene) {
   const double tilt = std::acos(std::clamp(scene.normal.z(), -1.0, 1.0)) / kDegree;
   return {(is_mirror(setup) ? "Mirror: " : "Lens: ") + number(setup.lens_size.x()) + " × " +
               number(setup.lens_size.y()) + " mm, its lower left corner at x 0, y 0, " +
-              (is_mirror(setup) ? "its shaped side towards lamp and screen"
-                                : "its flat face at z 0, towards the lamp"),
+              (is_mirror(setup) ? "its shaped side towards lamp and screen" : front_words(setup)),
           "Light: " + light_words(setup),
           "Picture: " + number(setup.image_size.x()) + " × " + number(setup.image_size.y()) +
               " mm, its centre at " + place(scene.centre),

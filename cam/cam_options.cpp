@@ -63,6 +63,14 @@ void validate_tolerances(const CamOptions& options, const OpticalSetup& setup) {
       "--tolerances 0");
 }
 
+/// A lens lies on its front while it is cut.
+void validate_front(const CamOptions& options, const OpticalSetup& setup) {
+  if (!setup.front || options.part != PartKind::kLens) return;
+  throw InputError("front: a sphere of radius " + shortest_text(setup.front->radius) +
+                   " mm does not lie on a table; cam cuts lenses that were designed with --front "
+                   "flat, and moulds (--part mould)");
+}
+
 /// Before hours are spent on programs that the controller could not read.
 void validate_tool_numbers(const CamOptions& options) {
   if (!options.post.changes_tools()) return;
@@ -136,6 +144,7 @@ void validate(const CamOptions& options, const OpticalSetup& setup) {
   validate_sampling(options);
   validate_tolerances(options);
   validate_tolerances(options, setup);
+  validate_front(options, setup);
 }
 
 }  // namespace lensforge

@@ -94,6 +94,58 @@ void require_seen_from_middle(const SurfaceMesh& surface, const std::vector<int>
   if (angle > 3.0 * std::numbers::pi) refuse(name, "winds around its middle more than once");
 }
 
+SurfaceMesh solid_on_plane(const SurfaceMesh& surface, const std::vector<int>& loop) {
+  const auto around = static_cast<int>(loop.size());
+  const auto top_vertices = static_cast<int>(surface.vertex_count());
+  const int centre = top_vertices + around;
+  SurfaceMesh solid;
+  solid.vertices.resize(3, Eigen::Index{centre} + 1);
+  solid.vertices.leftCols(top_vertices) = surface.vertices;
+  solid.triangles.resize(3, surface.triangle_count() + Eigen::Index{3} * around);
+  solid.triangles.leftCols(surface.triangle_count()) = surface.triangles;
+  Eigen::Index t = surface.triangle_count();
+  for (int i = 0; i < around; ++i) {
+    const int a = loop[static_cast<std::size_t>(i)];
+    const int b = loop[static_cast<std::size_t>((i + 1) % around)];
+    const int a_back = top_vertices + i;
+    const int b_back = top_vertices + (i + 1) % around;
+    solid.vertices.col(a_back) << flat(surface, a), 0.0;
+    solid.triangles.col(t++) << b, a, a_back;
+    solid.triangles.col(t++) << b, a_back, b_back;
+    solid.triangles.col(t++) << b_back, a_back, centre;
+  }
+  solid.vertices.col(centre) << middle(surface), 0.0;
+  return solid;
+}
+
+SurfaceMesh solid_on_front(const SurfaceMesh& surface, const std::vector<int>& loop,
+                           const SphericalFront& sphere, const std::string& name) {
+  const FrontSurface front(sphere);
+  const auto count = static_cast<int>(surface.vertex_count());
+  const Eigen::Index faces = surface.triangle_count();
+  SurfaceMesh solid;
+  solid.vertices.resize(3, 2 * Eigen::Index{count});
+  solid.vertices.leftCols(count) = surface.vertices;
+  for (int v = 0; v < count; ++v) {
+    const Eigen::Vector2d place = flat(surface, v);
+    if (!front.covers(place) || !(surface.vertices(2, v) > front.height(place))) {
+      refuse(name, "reaches down to its front at vertex " + std::to_string(v));
+    }
+    solid.vertices.col(count + v) << place, front.height(place);
+  }
+  solid.triangles.resize(3, 2 * faces + 2 * static_cast<Eigen::Index>(loop.size()));
+  solid.triangles.leftCols(faces) = surface.triangles;
+  Eigen::Index t = faces;
+  for (std::size_t i = 0; i < loop.size(); ++i) {
+    const int a = loop[i];
+    const int b = loop[(i + 1) % loop.size()];
+    solid.triangles.col(t++) << b, a, count + a;
+    solid.triangles.col(t++) << b, count + a, count + b;
+  }
+  solid.triangles.rightCols(faces) = surface.triangles.colwise().reverse().array() + count;
+  return solid;
+}
+
 }  // namespace
 
 std::vector<int> height_field_outline(const SurfaceMesh& surface, const std::string& name) {
@@ -118,29 +170,10 @@ void require_rectangle(const SurfaceMesh& surface, const std::vector<int>& outli
   }
 }
 
-SurfaceMesh closed_solid(const SurfaceMesh& surface, const std::string& name) {
+SurfaceMesh closed_solid(const SurfaceMesh& surface, const std::string& name,
+                         const std::optional<SphericalFront>& front) {
   const std::vector<int> loop = height_field_outline(surface, name);
-  const auto around = static_cast<int>(loop.size());
-  const auto top_vertices = static_cast<int>(surface.vertex_count());
-  const int centre = top_vertices + around;
-  SurfaceMesh solid;
-  solid.vertices.resize(3, Eigen::Index{centre} + 1);
-  solid.vertices.leftCols(top_vertices) = surface.vertices;
-  solid.triangles.resize(3, surface.triangle_count() + Eigen::Index{3} * around);
-  solid.triangles.leftCols(surface.triangle_count()) = surface.triangles;
-  Eigen::Index t = surface.triangle_count();
-  for (int i = 0; i < around; ++i) {
-    const int a = loop[static_cast<std::size_t>(i)];
-    const int b = loop[static_cast<std::size_t>((i + 1) % around)];
-    const int a_back = top_vertices + i;
-    const int b_back = top_vertices + (i + 1) % around;
-    solid.vertices.col(a_back) << flat(surface, a), 0.0;
-    solid.triangles.col(t++) << b, a, a_back;
-    solid.triangles.col(t++) << b, a_back, b_back;
-    solid.triangles.col(t++) << b_back, a_back, centre;
-  }
-  solid.vertices.col(centre) << middle(surface), 0.0;
-  return solid;
+  return front ? solid_on_front(surface, loop, *front, name) : solid_on_plane(surface, loop);
 }
 
 double enclosed_volume(const SurfaceMesh& solid) {

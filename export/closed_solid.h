@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "core/optics/front_surface.h"
 #include "core/surface/surface_mesh.h"
 
 namespace lensforge {
@@ -18,10 +20,12 @@ std::vector<int> height_field_outline(const SurfaceMesh& surface, const std::str
 void require_rectangle(const SurfaceMesh& surface, const std::vector<int>& outline,
                        const std::string& name);
 
-/// The watertight solid between a surface and the plane z = 0: the surface's own triangles first,
-/// then walls, then the flat back; all of them face outwards.
-/// @throw InputError as height_field_outline().
-SurfaceMesh closed_solid(const SurfaceMesh& surface, const std::string& name);
+/// The watertight solid between a surface and the plane z = 0, or a curved front: the surface's own
+/// triangles first, then walls, then the back; all of them face outwards. A curved back has the
+/// surface's vertices in x and y.
+/// @throw InputError as height_field_outline(), or if the surface reaches down to the front.
+SurfaceMesh closed_solid(const SurfaceMesh& surface, const std::string& name,
+                         const std::optional<SphericalFront>& front = {});
 
 /// Volume enclosed by a closed mesh whose triangles face outwards, mm³.
 double enclosed_volume(const SurfaceMesh& solid);

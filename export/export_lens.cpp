@@ -143,6 +143,11 @@ SplineSolid own_spline(const Job& job) {
 SplineSolid write_splines(const Job& job) {
   const Lens& lens = job.source.lens;
   const std::string name = job.source.file.string();
+  if (lens.setup.front) {
+    throw InputError(job.out.string() +
+                     ": a solid of splines has a flat front, and this lens has a sphere; export "
+                     ".stl or .3mf");
+  }
   require_rectangle(lens.surface, height_field_outline(lens.surface, name), name);
   SplineSolid solid = lens.spline ? own_spline(job) : fitted_splines(job);
   const StepHeader header = header_of(job);
@@ -156,7 +161,8 @@ SplineSolid write_splines(const Job& job) {
 
 MeshSolid write_mesh(const Job& job) {
   job.control.report({"closed mesh", 0.0, 0.0, ""});
-  const SurfaceMesh solid = closed_solid(job.source.lens.surface, job.source.file.string());
+  const Lens& lens = job.source.lens;
+  const SurfaceMesh solid = closed_solid(lens.surface, job.source.file.string(), lens.setup.front);
   const std::string title = program_mark() + " lens, millimetres";
   job.begin_writing();
   if (job.format == ExportFormat::kStl) write_stl(solid, title, job.out);

@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 
+#include <cmath>
 #include <map>
 #include <utility>
 
@@ -49,6 +50,33 @@ TEST(ClosedSolid, IsWatertightAndFacesOutwards) {
     EXPECT_NEAR(enclosed_volume(solid), volume_below(mesh), 1e-9 * volume_below(mesh));
     EXPECT_EQ(solid.triangles.leftCols(mesh.triangle_count()), mesh.triangles);
   }
+}
+
+TEST(ClosedSolid, HasItsCurvedFront) {
+  const SurfaceMesh mesh = smooth_lens(81);
+  const SphericalFront front{60.0, {10.0, 10.0, -2.0}};
+  const SurfaceMesh solid = closed_solid(mesh, "lens", front);
+  expect_watertight(solid);
+  // Below z = 0, by the midpoint rule.
+  constexpr int kCells = 400;
+  double below = 0.0;
+  const Eigen::Vector2d size = mesh.vertices.topRows<2>().rowwise().maxCoeff();
+  for (int i = 0; i < kCells * kCells; ++i) {
+    const Eigen::Vector2d at((i % kCells + 0.5) / kCells * size.x(),
+                             (i / kCells + 0.5) / kCells * size.y());
+    const double across = (at - front.apex.head<2>()).squaredNorm();
+    below -= front.apex.z() + 60.0 - std::sqrt(3600.0 - across);
+  }
+  below *= size.prod() / (kCells * kCells);
+  EXPECT_NEAR(enclosed_volume(solid), volume_below(mesh) + below, 1e-4 * volume_below(mesh));
+}
+
+TEST(ClosedSolid, SurfaceBelowItsFrontIsRefused) {
+  EXPECT_THAT(
+      [] {
+        (void)closed_solid(smooth_lens(), "lens", SphericalFront{60.0, {10.0, 10.0, 9.0}});
+      },
+      ::testing::ThrowsMessage<InputError>(HasSubstr("lens: reaches down to its front")));
 }
 
 TEST(ClosedSolid, VolumeOfABlockIsExact) {
