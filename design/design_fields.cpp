@@ -68,7 +68,8 @@ LightField front() {
     const auto text = value.get<std::string>();
     if (text == "flat") return;
     if (!text.starts_with(kSphere)) {
-      throw InputError(name + (" '" + text) + "': must be flat or sphere:R, R a radius in mm; flat "
+      throw InputError(name + (" '" + text) +
+                       "': must be flat or sphere:R, R a radius in mm; flat "
                        "would do");
     }
     o.front_radius = parse_length_mm(text.substr(kSphere.size()), name);

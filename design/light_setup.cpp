@@ -141,10 +141,10 @@ void require_front(const DesignOptions& o, const Eigen::Vector2i& pixels) {
     const Eigen::Vector3d& from = *o.light.source_position;
     const Eigen::AlignedBox2d plan(Eigen::Vector2d(0.0, 0.0), size);
     if (plan.contains(from.head<2>()) && !(from.z() < front.height(from.head<2>()))) {
-      refuse("--source-position " + text_of(from),
-             "lies inside the part, whose front is at z = " +
-                 number_text(front.height(from.head<2>())) + " there; --source-position " +
-                 usual_position(o, size) + " would do");
+      refuse("--source-position " + text_of(from), "lies inside the part, whose front is at z = " +
+                                                       number_text(front.height(from.head<2>())) +
+                                                       " there; --source-position " +
+                                                       usual_position(o, size) + " would do");
     }
   }
   if (!front_works(o, pixels, radius)) {

@@ -130,9 +130,8 @@ void read_front(const JsonFields& front, OpticalSetup& setup) {
 
 ordered_json front_json(const OpticalSetup& setup) {
   if (!setup.front) return {{"type", "flat"}, {"z", 0}};
-  return {{"type", "sphere"},
-          {"radius", setup.front->radius},
-          {"apex", array_of(setup.front->apex)}};
+  return {
+      {"type", "sphere"}, {"radius", setup.front->radius}, {"apex", array_of(setup.front->apex)}};
 }
 
 void read_screen(const JsonFields& screen, OpticalSetup& setup) {

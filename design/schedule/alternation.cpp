@@ -83,8 +83,8 @@ Checkpoint first_state(const DesignTask& task) {
   if (task.options.resume) return resumed(task, fingerprint);
   Checkpoint state;
   state.fingerprint = fingerprint;
-  state.mesh = start_surface(task.setup, task.levels.front().grid, task.options.thickness,
-                             task.executor);
+  state.mesh =
+      start_surface(task.setup, task.levels.front().grid, task.options.thickness, task.executor);
   return state;
 }
 
