@@ -5,19 +5,26 @@
 
 #include "core/surface/control_net.h"
 #include "design/schedule/level_plan.h"
+#include "design/schedule/transport_step.h"
 
 namespace lensforge {
 namespace {
 
-/// Processor seconds for a triangle, of an iteration of both models at 128² to 512² (1.6e-6 to
-/// 2.1e-6 on 2 GHz cores), and of its transport onto a photograph (9e-5; black takes ten times
-/// that).
-constexpr double kIterationSeconds = 2e-6;
+/// Processor seconds for a triangle, on 2 GHz cores: of an iteration of facets and smooth model at
+/// 128² to 512² (5.2e-7 to 6.3e-7), of one of a spline, a triangle being one between nodes (96² and
+/// 128²), of one designed for a process (64² and 128²), and of its transport (6e-5 to 1.3e-4;
+/// facets have two).
+constexpr double kIterationSeconds = 5.7e-7;
+constexpr double kSplineSeconds = 2.5e-7;
+constexpr double kMadeSeconds = 1e-6;
 constexpr double kTransportSeconds = 1e-4;
 
-/// Bytes for a triangle, at the peak of a 942,080-triangle design (1.8 GB), and of what is written:
-/// surface and checkpoint, each twice while it is replaced.
-constexpr double kTriangleMemory = 2000.0;
+/// Bytes for a triangle: of its transport, of the optimisation of a mesh (512², 1.12 GB) and of a
+/// spline (at most), and of what is written: surface and checkpoint, each twice while it is
+/// replaced.
+constexpr double kTransportMemory = 2000.0;
+constexpr double kMeshMemory = 1000.0;
+constexpr double kSplineMemory = 2000.0;
 constexpr double kTriangleDisk = 120.0;
 
 /// Bytes for a pixel of the working picture: PNG, EXR and double copies.
@@ -25,7 +32,7 @@ constexpr double kPixelMemory = 100.0;
 constexpr double kPixelDisk = 30.0;
 
 /// Of the program itself with its libraries.
-constexpr double kBaseMemory = 1e8;
+constexpr double kBaseMemory = 1.6e8;
 
 /// For a pixel of a rendering, and of the lens that is rendered: 4096 and 8192 pixels a side take
 /// 0.58 and 1.87 GB, and at most 40 s.
@@ -33,6 +40,17 @@ constexpr double kRenderedSeconds = 6e-7;
 constexpr double kRenderedMemory = 45.0;
 constexpr double kRenderedDisk = 4.0;
 constexpr double kRenderedBase = 1.5e8;
+
+double iteration_seconds(const Level& level, const DesignOptions& options) {
+  if (!level.spline) return kIterationSeconds;
+  return options.made_by ? kMadeSeconds : kSplineSeconds;
+}
+
+/// Sites of a level's transports: of the even mesh, and of facets' own.
+double transport_sites(double triangles, const DesignOptions& options) {
+  const double even = std::min(triangles, kMaxEvenFaces);
+  return options.model == SurfaceModel::kFacet ? even + triangles : even;
+}
 
 }  // namespace
 
@@ -44,10 +62,16 @@ WorkEstimate estimate_design(int columns, int rows, const DesignOptions& options
     const double triangles = per_cell * (level.grid.columns - 1.0) * (level.grid.rows - 1.0);
     const double pixels = level.pixels.cast<double>().prod();
     const double iterations = static_cast<double>(level.rounds) * level.iterations;
-    const int transports = level.spline ? 0 : options.transport_rounds;
-    processor += triangles * (kTransportSeconds * transports +
-                              kIterationSeconds * (options.rendering_guided ? iterations : 0.0));
-    estimate.memory_bytes = kBaseMemory + kTriangleMemory * triangles + kPixelMemory * pixels;
+    double memory = kSplineMemory * triangles;
+    if (options.rendering_guided) {
+      processor += triangles * iteration_seconds(level, options) * iterations;
+    }
+    if (!level.spline) {
+      const double sites = transport_sites(triangles, options);
+      processor += kTransportSeconds * sites * options.transport_rounds;
+      memory = std::max(kTransportMemory * std::min(sites, triangles), kMeshMemory * triangles);
+    }
+    estimate.memory_bytes = kBaseMemory + memory + kPixelMemory * pixels;
     estimate.disk_bytes = kTriangleDisk * triangles + kPixelDisk * pixels;
   }
   estimate.seconds = processor / threads;

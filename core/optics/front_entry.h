@@ -25,10 +25,8 @@ struct FrontLight {
 /// before and behind it, b_by_x and b_by_y the derivatives by x, n the unit normal towards the
 /// inside, w = (−∇h, 1) = |w| n, m = (b_x, b_y)/b_z. A bar (…_bar) is a derivative by that.
 struct FrontRefraction {
-  static constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-
-  Eigen::Vector3d e{kNaN, kNaN, kNaN};
-  Eigen::Vector3d b{kNaN, kNaN, kNaN};
+  Eigen::Vector3d e = unknown();
+  Eigen::Vector3d b = unknown();
   Eigen::Vector2d gradient{0.0, 0.0};  ///< ∇h
   Eigen::Vector3d b_by_x{0.0, 0.0, 0.0};
   Eigen::Vector3d b_by_y{0.0, 0.0, 0.0};
@@ -63,6 +61,10 @@ struct FrontRefraction {
     }
   }
 
+  [[nodiscard]] LF_HD static Eigen::Vector3d unknown() {
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    return {nan, nan, nan};
+  }
   [[nodiscard]] LF_HD Eigen::Vector2d slope() const { return {b.x() / b.z(), b.y() / b.z()}; }
   /// To another point of the front, to first order.
   LF_HD void move(const Eigen::Vector2d& step) {

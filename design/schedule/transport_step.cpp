@@ -29,10 +29,6 @@ constexpr int kMaxStageSteps = 25;
 constexpr double kMaxMisplaced = 0.05;
 constexpr double kMaxBlack = 0.3;
 
-/// Faces of the even mesh whose transport shapes the mesh: a finer one is not worth it. On the
-/// 512² logo, 942,080 sites were not done after 11 processor minutes, 235,520 in 80 s at most.
-constexpr double kMaxEvenFaces = 250000.0;
-
 /// Share of the pixels that are black (kBlack).
 double black_share(const Image& picture) {
   const auto pixels = static_cast<double>(picture.values().size());

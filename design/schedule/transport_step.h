@@ -10,6 +10,10 @@
 
 namespace lensforge {
 
+/// Faces at most of the even mesh whose transport shapes the mesh: a finer one is not worth it. On
+/// the 512² logo, 942,080 sites were not done after 11 processor minutes, 235,520 in 80 s at most.
+inline constexpr double kMaxEvenFaces = 250'000.0;
+
 /// A mesh that sends its light to where transport wants it, as nearly as its heights can.
 struct AimedMesh {
   SurfaceMesh mesh;
