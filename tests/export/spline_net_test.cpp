@@ -192,15 +192,16 @@ double picture_error(const SplineNet& net, const Lens& lens) {
       .mae;
 }
 
-/// Round trip: what the mesh's normals throw, the splines throw to 1e-4, which the fit of slopes
-/// alone misses.
+/// Round trip: what the mesh's normals throw, the splines throw to 3e-4, a third of what the fit of
+/// slopes alone misses. The coarser a mesh, the more its normals contradict each other.
 TEST(SplineNet, KeepsThePictureThatNoSurfaceHasTheNormalsFor) {
   const Lens lens = smooth_design();
   const Executor executor = Executor::cpu(2);
   const SmoothSurface surface(lens.surface);
   const double wanted =
       evaluate(lens.surface, lens.setup, SurfaceModel::kSmooth, lens.target, nullptr, executor).mae;
-  EXPECT_GT(picture_error(fitted(surface), lens), wanted + 2e-4);
+  const double by_slopes = picture_error(fitted(surface), lens) - wanted;
+  EXPECT_GT(by_slopes, 5e-4);
   const WantedPicture picture(lens.surface, lens.setup, lens.target, executor);
   FitOptions options;
   options.picture = {picture.reach(), [&](const SampledSurface& solid) {
@@ -208,7 +209,7 @@ TEST(SplineNet, KeepsThePictureThatNoSurfaceHasTheNormalsFor) {
                        return PictureMiss{found.excess, std::move(found.missing)};
                      }};
   const SplineNet net = fit_spline_net(surface, options, executor, RunControl());
-  EXPECT_LT(picture_error(net, lens), wanted + 1e-4);
+  EXPECT_LT(picture_error(net, lens) - wanted, std::min(by_slopes / 3.0, 3e-4));
   const SplineNet serial = fit_spline_net(surface, options, Executor::serial(), RunControl());
   EXPECT_EQ(net.patches.back().coefficients, serial.patches.back().coefficients);
 }
