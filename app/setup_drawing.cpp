@@ -8,6 +8,7 @@
 #include <numbers>
 #include <vector>
 
+#include "core/optics/front_surface.h"
 #include "core/text/number_text.h"
 #include "core/text/version.h"
 
@@ -185,12 +186,28 @@ std::string rays(const OpticalSetup& setup, const Scene& scene, const View& view
   return svg;
 }
 
+/// Section of a curved front through its middle, from below to above.
+std::vector<Vector2d> front_line(const OpticalSetup& setup, const Scene& scene, const View& view) {
+  constexpr int kParts = 40;
+  const FrontSurface front(setup.front.value());
+  std::vector<Vector2d> line;
+  for (int i = 0; i <= kParts; ++i) {
+    Vector3d p = scene.middle;
+    p[view.up()] = scene.high[view.up()] * i / kParts;
+    p.z() = front.height(p.head<2>());
+    line.push_back(view.at(p));
+  }
+  return line;
+}
+
 std::string part(const OpticalSetup& setup, const Scene& scene, const View& view) {
   const Vector2d a = view.at(scene.low);
   const Vector2d b = view.at(scene.high);
   const double back = std::min(a.x(), b.x() - 3.0);  // A thin part is drawn thick enough to see.
-  const std::vector<Vector2d> box{{back, a.y()}, {back, b.y()}, b, {b.x(), a.y()}};
-  return polygon(box, "fill=\"#b9d3ea\" stroke=\"#0b5cad\" stroke-width=\"1.5\"") +
+  std::vector<Vector2d> outline{{back, a.y()}, {back, b.y()}};
+  if (setup.front) outline = front_line(setup, scene, view);
+  outline.insert(outline.end(), {b, {b.x(), a.y()}});
+  return polygon(outline, "fill=\"#b9d3ea\" stroke=\"#0b5cad\" stroke-width=\"1.5\"") +
          words({b.x(), std::max(a.y(), b.y()) + kLine}, is_mirror(setup) ? "mirror" : "lens",
                "text-anchor=\"middle\"");
 }

@@ -93,6 +93,17 @@ void require_source(const DesignOptions& o, const Eigen::Vector2d& size) {
 
 std::string front_text(double radius) { return "--front sphere:" + number_text(radius); }
 
+/// Height of the start surface over its lowest point, in depths of the front, and more: with less,
+/// radii are let through (and advised) behind which no start is found.
+constexpr double kStartRise = 2.0;
+
+/// True if light comes to a point of the start surface, and gets out.
+bool start_works(const OpticalSetup& setup, const LightPath& light, const Eigen::Vector3d& p) {
+  const Eigen::Vector2d slope = light.gradient_for(p, light.land_from_start(p));
+  const Eigen::Vector3d n = Eigen::Vector3d(-slope.x(), -slope.y(), 1.0).normalized();
+  return slope.allFinite() && light.transmits(p, n) && !is_shadowed(setup, p.head<2>());
+}
+
 /// True if the front is lit as a whole, and the surface that a design starts from lets its light
 /// out.
 bool front_works(const DesignOptions& o, const Eigen::Vector2i& pixels, double radius) {
@@ -101,14 +112,15 @@ bool front_works(const DesignOptions& o, const Eigen::Vector2i& pixels, double r
   other.light.front_radius = radius;
   const OpticalSetup setup = optical_setup(other, pixels);
   const LightPath light(setup);
+  const FrontSurface front(*setup.front);
+  const double depth = std::abs(front.height({0.0, 0.0}) - front.height(0.5 * setup.lens_size));
   constexpr int kCells = 16;
   for (int k = 0; k < (kCells + 1) * (kCells + 1); ++k) {
     const Eigen::Vector2d share(k % (kCells + 1), k / (kCells + 1));
     const Eigen::Vector2d place = setup.lens_size.cwiseProduct(share) / kCells;
-    const Eigen::Vector3d p(place.x(), place.y(), o.thickness);
-    const Eigen::Vector2d slope = light.gradient_for(p, light.land_from_start(p));
-    const Eigen::Vector3d n = Eigen::Vector3d(-slope.x(), -slope.y(), 1.0).normalized();
-    if (!slope.allFinite() || !light.transmits(p, n) || is_shadowed(setup, place)) return false;
+    for (const double rise : {0.0, kStartRise * depth}) {
+      if (!start_works(setup, light, {place.x(), place.y(), o.thickness + rise})) return false;
+    }
   }
   return true;
 }
