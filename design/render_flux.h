@@ -36,10 +36,10 @@ std::vector<double> render_flux(const SurfaceMesh& mesh, const OpticalSetup& set
     download(executor, image.render(executor, count, ProjectFacet{surface}), std::span(flux));
     return flux;
   }
-  const Eigen::Matrix3Xd sums =
-      normals_given != nullptr ? *normals_given : vertex_area_normals(mesh);
-  const auto normals = buffer_of(executor, numbers(sums));
-  typename Exec::template Buffer<double> landing(2 * static_cast<std::size_t>(sums.cols()));
+  const auto normals = normals_given != nullptr
+                           ? buffer_of(executor, numbers(*normals_given))
+                           : buffer_of(executor, numbers(vertex_area_normals(mesh)));
+  typename Exec::template Buffer<double> landing(2 * static_cast<std::size_t>(mesh.vertex_count()));
   parallel_for(executor, "project vertices", mesh.vertex_count(),
                LandRay{surface, normals.data(), landing.data()});
   const ProjectSmooth source{surface, landing.data()};

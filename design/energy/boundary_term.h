@@ -2,8 +2,8 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <cmath>
 
+#include "core/compute/clamped.h"
 #include "core/compute/host_device.h"
 #include "design/optics/image_triangle.h"
 
@@ -11,8 +11,7 @@ namespace lensforge {
 
 /// Vector from the nearest point of the picture rectangle [0, columns] × [0, rows] to u, pixels.
 LF_HD inline Eigen::Vector2d excess_outside(const Eigen::Vector2d& u, double columns, double rows) {
-  return u - Eigen::Vector2d(std::fmin(std::fmax(u.x(), 0.0), columns),
-                             std::fmin(std::fmax(u.y(), 0.0), rows));
+  return u - Eigen::Vector2d(clamped(u.x(), 0.0, columns), clamped(u.y(), 0.0, rows));
 }
 
 /// E_bdr of one image triangle, Σ_k ‖u_k − P_I(u_k)‖² over its corners (Sun et al., Eq. 7), in

@@ -175,13 +175,15 @@ DesignObjectiveOn<Exec>::DesignObjectiveOn(const SurfaceMesh& mesh, const Optica
   const auto faces = static_cast<std::size_t>(mesh.triangle_count());
   const auto vertices = static_cast<std::size_t>(mesh.vertex_count());
   frames_ = Buffer<FaceFrame>(faces);
-  maps_ = Buffer<WeingartenMap>(faces);
-  bends_ = Buffer<FaceBend>(faces);
-  edge_weights_ = Buffer<double>(3 * faces);
   corner_bar_ = Buffer<Corners>(faces);
-  laplacian_shares_ = Buffer<double>(2 * vertices);
-  fill_zero(executor_, maps_);
-  fill_zero(executor_, edge_weights_);
+  if (options_.weights.smooth > 0.0) {
+    maps_ = Buffer<WeingartenMap>(faces);
+    bends_ = Buffer<FaceBend>(faces);
+    edge_weights_ = Buffer<double>(3 * faces);
+    laplacian_shares_ = Buffer<double>(2 * vertices);
+    fill_zero(executor_, maps_);
+    fill_zero(executor_, edge_weights_);
+  }
   std::visit([this](const auto& wanted) { this->take(wanted); }, goal);
   const Buffer<double> start = buffer_of(executor_, objective_detail::entries(mesh.vertices));
   relinearize(start.data());

@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <cmath>
 
+#include "core/compute/clamped.h"
 #include "core/compute/host_device.h"
 
 /// Walks a straight edge through the pixels it crosses.
@@ -63,16 +64,16 @@ LF_HD inline void walk_inside(const Eigen::Vector2d& p, const Eigen::Vector2d& d
     piece.row = v.cell;
     const bool cross_row = sv <= su;
     // Rounding may put a crossing outside the remaining part; the order of cells is what counts.
-    const double s = std::fmin(std::fmax(cross_row ? sv : su, piece.s0), part.s1);
+    const double s = clamped(cross_row ? sv : su, piece.s0, part.s1);
     piece.s1 = s;
     piece.x1 = cross_row ? p.x() + s * d.x() : u.next_line();
     piece.y1 = cross_row ? v.next_line() : p.y() + s * d.y();
     // Keep the end inside this row (and column), whatever the rounding.
     if (cross_row) {
-      piece.x1 = std::fmin(std::fmax(piece.x1, u.cell), u.cell + 1.0);
+      piece.x1 = clamped(piece.x1, u.cell, u.cell + 1.0);
       v.cell += v.step;
     } else {
-      piece.y1 = std::fmin(std::fmax(piece.y1, v.cell), v.cell + 1.0);
+      piece.y1 = clamped(piece.y1, v.cell, v.cell + 1.0);
       u.cell += u.step;
     }
     visit(piece);
@@ -110,12 +111,13 @@ LF_HD inline void walk_left(const Eigen::Vector2d& p, const Eigen::Vector2d& d, 
 LF_HD inline EdgePiece cut_at_column(const Eigen::Vector2d& p, const Eigen::Vector2d& d,
                                      double line, EdgePiece& part) {
   EdgePiece before = part;
-  const double s = std::fmin(std::fmax((line - p.x()) / d.x(), part.s0), part.s1);
-  const double low = std::fmin(part.y0, part.y1);
-  const double high = std::fmax(part.y0, part.y1);
+  const double s = clamped((line - p.x()) / d.x(), part.s0, part.s1);
+  const bool falls = part.y1 < part.y0;
+  const double low = falls ? part.y1 : part.y0;
+  const double high = falls ? part.y0 : part.y1;
   before.s1 = part.s0 = s;
   before.x1 = part.x0 = line;
-  before.y1 = part.y0 = std::fmin(std::fmax(p.y() + s * d.y(), low), high);
+  before.y1 = part.y0 = clamped(p.y() + s * d.y(), low, high);
   return before;
 }
 
@@ -138,7 +140,7 @@ LF_HD inline bool clip_rows(const Eigen::Vector2d& p, const Eigen::Vector2d& q, 
   const Eigen::Vector2d d = q - p;
   part = {0, 0, 0.0, 1.0, p.x(), p.y(), q.x(), q.y()};
   const double limit = rows;
-  if (std::fmax(p.y(), q.y()) < 0.0 || std::fmin(p.y(), q.y()) > limit) return false;
+  if ((p.y() < 0.0 && q.y() < 0.0) || (p.y() > limit && q.y() > limit)) return false;
   if (p.y() < 0.0 || p.y() > limit) {
     part.y0 = p.y() < 0.0 ? 0.0 : limit;
     part.s0 = (part.y0 - p.y()) / d.y();

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "core/compute/clamped.h"
 #include "core/compute/host_device.h"
 #include "design/flux/edge_walk.h"
 #include "design/flux/quadrants.h"
@@ -155,7 +156,7 @@ struct Needle {
     }
     const double length_squared = (b - a).squaredNorm();
     if (length_squared > 0.0) peak = (third - a).dot(b - a) / length_squared;
-    peak = std::fmin(std::fmax(peak, 0.0), 1.0);
+    peak = clamped(peak, 0.0, 1.0);
   }
   /// Share of the flux at parameters below s.
   [[nodiscard]] LF_HD double share_below(double s) const {
