@@ -20,11 +20,11 @@ constexpr double kMadeSeconds = 1e-6;
 constexpr double kTransportSeconds = 1e-4;
 
 /// Bytes for a triangle: of its transport, of the optimisation of a mesh (512², 1.12 GB) and of a
-/// spline (at most), and of what is written: surface and checkpoint, each twice while it is
+/// spline (128², 0.57 GB), and of what is written: surface and checkpoint, each twice while it is
 /// replaced.
 constexpr double kTransportMemory = 2000.0;
 constexpr double kMeshMemory = 1000.0;
-constexpr double kSplineMemory = 2000.0;
+constexpr double kSplineMemory = 500.0;
 constexpr double kTriangleDisk = 120.0;
 
 /// Bytes for a pixel of the working picture: PNG, EXR and double copies.

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "design/render_flux.h"
+#include "design/render_spline.h"
 #include "design/source_picture.h"
 
 namespace lensforge {
@@ -93,8 +94,9 @@ std::vector<double> flux_of_lens(const Lens& lens, const OpticalSetup& setup,
   if (lens.model != SurfaceModel::kSpline) {
     return flux_of(lens.surface, setup, lens.model, executor);
   }
-  const SampledSurface nodes = picture_nodes(*lens.spline);
-  return flux_of(nodes.mesh, nodes.normals, setup, executor);
+  return picture_under(setup, points_for(lens.surface, setup), [&](const OpticalSetup& point) {
+    return render_spline(*lens.spline, point, executor);
+  });
 }
 
 ImageMetrics evaluate(const Lens& lens, SurfaceModel model, Image* rendered,
@@ -102,8 +104,9 @@ ImageMetrics evaluate(const Lens& lens, SurfaceModel model, Image* rendered,
   if (model != SurfaceModel::kSpline) {
     return evaluate(lens.surface, lens.setup, model, lens.target, rendered, executor);
   }
-  const SampledSurface nodes = picture_nodes(*lens.spline);
-  return evaluate(nodes.mesh, nodes.normals, lens.setup, lens.target, rendered, executor);
+  return judged(
+      result_of(flux_of_lens(lens, lens.setup, executor), lens.setup, lens.target.total()),
+      lens.target, rendered);
 }
 
 }  // namespace lensforge

@@ -15,9 +15,10 @@ namespace {
 constexpr double kShortStep = 1e-13;
 constexpr int kMaxSteps = 30;
 
-std::vector<CubicBasis> bases(int cells, int samples) {
+/// At nodes first … last.
+std::vector<CubicBasis> bases(int cells, int samples, int first, int last) {
   std::vector<CubicBasis> result;
-  for (int k = 0; k <= cells * samples; ++k) {
+  for (int k = first; k <= last; ++k) {
     result.push_back(cubic_basis(static_cast<double>(k) / samples, cells));
   }
   return result;
@@ -91,8 +92,13 @@ Eigen::Vector2d ControlNet::parameters_of(const Eigen::Vector2d& xy,
 }
 
 SampledSurface spline_nodes(const ControlNet& net, int samples) {
-  const std::vector<CubicBasis> u = bases(net.cells().x(), samples);
-  const std::vector<CubicBasis> v = bases(net.cells().y(), samples);
+  return spline_rows(net, samples, 0, samples * net.cells().y());
+}
+
+SampledSurface spline_rows(const ControlNet& net, int samples, int first, int last) {
+  const Eigen::Vector2i cells = net.cells();
+  const std::vector<CubicBasis> u = bases(cells.x(), samples, 0, samples * cells.x());
+  const std::vector<CubicBasis> v = bases(cells.y(), samples, first, last);
   SampledSurface nodes = make_samples({static_cast<int>(u.size()), static_cast<int>(v.size())});
   Eigen::Index at = 0;
   for (const CubicBasis& across : v) {

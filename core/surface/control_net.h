@@ -52,6 +52,10 @@ struct ControlNet {
 /// @param samples  nodes a knot cell each way, ≥ 1; the nodes include all knots.
 SampledSurface spline_nodes(const ControlNet& net, int samples);
 
+/// Rows first … last of spline_nodes(), a surface of their own.
+/// @pre 0 ≤ first < last ≤ samples × knot cells along v.
+SampledSurface spline_rows(const ControlNet& net, int samples, int first, int last);
+
 /// Nodes a knot cell each way of a mesh that stands for the spline, as surface.ply does.
 inline constexpr int kMeshSamples = 2;
 
@@ -62,9 +66,14 @@ inline constexpr double kPictureNodes = 4e6;
 /// Nodes a knot cell each way, 2 … 256, that make so many of so many cells.
 int samples_for(double nodes, double cells);
 
+/// Nodes a knot cell each way for a spline's picture.
+inline int picture_samples(const ControlNet& net) {
+  return samples_for(kPictureNodes, static_cast<double>(net.cell_count()));
+}
+
 /// spline_nodes() for its picture.
 inline SampledSurface picture_nodes(const ControlNet& net) {
-  return spline_nodes(net, samples_for(kPictureNodes, static_cast<double>(net.cell_count())));
+  return spline_nodes(net, picture_samples(net));
 }
 
 }  // namespace lensforge
