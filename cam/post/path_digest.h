@@ -4,6 +4,8 @@
 #include <array>
 #include <cstdint>
 
+#include "core/compute/split_mix.h"
+
 namespace lensforge {
 
 /// An arc's words in a digest; all zero for a straight motion.
@@ -38,12 +40,9 @@ class PathDigest {
   friend bool operator==(const PathDigest&, const PathDigest&) = default;
 
  private:
-  /// One round of SplitMix64 (Steele, Lea, Flood 2014) over the state and the value.
+  /// One round of SplitMix64 over the state and the value.
   void mix(std::int64_t value) {
-    std::uint64_t z = state_ + static_cast<std::uint64_t>(value) + 0x9E3779B97F4A7C15U;
-    z = (z ^ (z >> 30U)) * 0xBF58476D1CE4E5B9U;
-    z = (z ^ (z >> 27U)) * 0x94D049BB133111EBU;
-    state_ = z ^ (z >> 31U);
+    state_ = mixed_bits(state_ + static_cast<std::uint64_t>(value) + kGoldenGamma);
   }
 
   std::uint64_t state_ = 0;

@@ -4,25 +4,17 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/compute/split_mix.h"
+
 namespace lensforge {
-namespace {
-
-constexpr std::uint64_t kGolden = 0x9E3779B97F4A7C15U;
-
-std::uint64_t mixed(std::uint64_t z) {
-  z = (z ^ (z >> 30U)) * 0xBF58476D1CE4E5B9U;
-  z = (z ^ (z >> 27U)) * 0x94D049BB133111EBU;
-  return z ^ (z >> 31U);
-}
-
-}  // namespace
 
 RandomDraw::RandomDraw(std::uint64_t seed, std::uint64_t part, std::uint64_t cause)
-    : state_(mixed(mixed(mixed(seed + kGolden) + part + kGolden) + cause + kGolden)) {}
+    : state_(mixed_bits(mixed_bits(mixed_bits(seed + kGoldenGamma) + part + kGoldenGamma) + cause +
+                        kGoldenGamma)) {}
 
 std::uint64_t RandomDraw::next() {
-  state_ += kGolden;
-  return mixed(state_);
+  state_ += kGoldenGamma;
+  return mixed_bits(state_);
 }
 
 double RandomDraw::share() {

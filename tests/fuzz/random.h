@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "core/compute/split_mix.h"
+
 namespace lensforge::fuzz {
 
 /// Numbers that are the same everywhere for the same seed; the standard library's distributions are
@@ -36,12 +38,9 @@ class Random {
   std::mt19937_64 engine_;
 };
 
-/// The seed of run `index` of a campaign (splitmix64).
+/// The seed of run `index` of a campaign (SplitMix64).
 inline std::uint64_t seed_of_run(std::uint64_t seed, std::uint64_t index) {
-  std::uint64_t z = seed + (index + 1) * 0x9E3779B97F4A7C15U;
-  z = (z ^ (z >> 30U)) * 0xBF58476D1CE4E5B9U;
-  z = (z ^ (z >> 27U)) * 0x94D049BB133111EBU;
-  return z ^ (z >> 31U);
+  return mixed_bits(seed + (index + 1) * kGoldenGamma);
 }
 
 }  // namespace lensforge::fuzz
