@@ -23,9 +23,23 @@ namespace {
 
 namespace fs = std::filesystem;
 
-reflect::ReflectInput load(const ReflectSettings& settings, const Console& console) {
-  const reflect::ReflectInput input =
-      reflect::prepared_input(read_mesh(settings.mesh), settings.mesh, settings.reflect);
+/// Nothing is written yet: a remeshing, which does not look at the stop token, is left behind with
+/// the process.
+reflect::ReflectInput prepared(const ReflectSettings& settings, const CommonOptions& common) {
+  InterruptibleJob job(common);
+  const RunControl control = job.control();
+  control.report({"reflect, reading the mesh", 0.0, 0.0, ""});
+  const SurfaceMesh mesh = read_mesh(settings.mesh);
+  control.report({settings.reflect.faces > 0 ? "reflect, remeshing" : "reflect, repairing the mesh",
+                  0.0, 0.0, ""});
+  reflect::ReflectInput input = reflect::prepared_input(mesh, settings.mesh, settings.reflect);
+  if (control.stop_requested()) throw Interrupted();
+  return input;
+}
+
+reflect::ReflectInput load(const ReflectSettings& settings, const CommonOptions& common,
+                           const Console& console) {
+  reflect::ReflectInput input = prepared(settings, common);
   for (const std::string& change : input.changes) console.note(settings.mesh + ": " + change);
   return input;
 }
@@ -46,11 +60,13 @@ nlohmann::json evaluated(const OptionSet& options, const ReflectSettings& settin
   return json;
 }
 
-int evaluate(const OptionSet& options, const ReflectSettings& settings) try {
+int evaluate(const OptionSet& options, const ReflectSettings& settings) {
   const Console console(options.common().json, options.common().quiet);
+  const reflect::ReflectInput input = load(settings, options.common(), console);
   InterruptibleJob job(options.common());
+  job.control().report({"reflect, evaluating", 0.0, 0.0, ""});
   const nlohmann::json json =
-      evaluated(options, settings, load(settings, console).mesh, job.stoppable(options.executor()));
+      evaluated(options, settings, input.mesh, job.stoppable(options.executor()));
   std::string text = settings.mesh + "\n  energy of one reflection " +
                      number_text(json["energy_direct"]) + ", of one and two " +
                      number_text(json["energy"]) + "\n";
@@ -60,8 +76,6 @@ int evaluate(const OptionSet& options, const ReflectSettings& settings) try {
   }
   console.result(json, text);
   return kDone;
-} catch (const Interrupted&) {
-  return report_interrupted(options.common().json);
 }
 
 std::string percent(double share, int digits) { return fixed(100.0 * share, digits) + " %"; }
@@ -90,7 +104,7 @@ std::string result_text(const ReflectSettings& settings, const reflect::ReflectR
 
 int shape(const OptionSet& options, const ReflectSettings& settings) {
   const Console console(options.common().json, options.common().quiet);
-  const reflect::ReflectInput input = load(settings, console);
+  const reflect::ReflectInput input = load(settings, options.common(), console);
   const InterruptWatch interrupt;
   const OutputFolder folder(settings.out, FolderLock::Kind::kExclusive);
   reflect::require_replaceable_result(folder.path(), settings.reflect.force);
@@ -119,11 +133,15 @@ int reflect_command(const Arguments& command_line) {
   add_reflect_options(options, settings);
   options.parse(command_line);
   reflect::validate(settings.reflect);
-  if (settings.evaluate) return evaluate(options, settings);
-  if (settings.out.empty()) {
+  if (!settings.evaluate && settings.out.empty()) {
     throw InputError("--out: is missing; --out DIR writes a new shape, --evaluate only energies");
   }
-  return shape(options, settings);
+  try {
+    return settings.evaluate ? evaluate(options, settings) : shape(options, settings);
+  } catch (const Interrupted&) {
+    // Before the first update: later a run ends with what it has.
+    return report_interrupted(options.common().json);
+  }
 }
 
 }  // namespace lensforge::app

@@ -104,5 +104,20 @@ TEST_F(Reflect, AnInterruptedRunKeepsItsShapeAndSaysSo) {
   EXPECT_EQ(read_mesh(at("out/surface.ply")).triangle_count(), 8);
 }
 
+/// CGAL's remeshing, a minute of it, does not look for interrupts.
+TEST_F(Reflect, InterruptedWhileItRemeshesWritesNothing) {
+  for (const Arguments& what : {Arguments{"--out", path("out")}, Arguments{"--evaluate"}}) {
+    Arguments arguments = {"reflect", path("shape.off"), "--faces", "400000"};
+    arguments.insert(arguments.end(), what.begin(), what.end());
+    Process process(arguments);
+    ASSERT_TRUE(process.runs_for(std::chrono::milliseconds(500))) << process.wait().err;
+    process.send(SIGINT);
+    const Outcome outcome = process.wait();
+    EXPECT_EQ(outcome.exit_code, 130);
+    EXPECT_THAT(outcome.err, HasSubstr("nothing was written"));
+    EXPECT_EQ(listing(at("")), std::vector<std::string>{"shape.off"});
+  }
+}
+
 }  // namespace
 }  // namespace lensforge::scenario
