@@ -5,7 +5,7 @@
 #include <cmath>
 #include <string>
 
-#include "cam/report/html_text.h"
+#include "core/page/html_text.h"
 #include "core/text/number_text.h"
 #include "core/text/version.h"
 
@@ -109,7 +109,7 @@ ParameterGroup finish_parameters(const CutPlan& plan, SurfaceModel model) {
 }
 
 template <class Level>
-ReportParameter entry_parameter(const char* name, const Level& level) {
+NamedText entry_parameter(const char* name, const Level& level) {
   const std::string angle = ", at most " + decimal_text(level.ramp_angle_deg, 1) + "°";
   if (level.entry == EntryStyle::kRamp) return {name, "along the pass" + angle};
   return {name, "down a helix of radius " + mm(level.helix_radius, 2) + angle};

@@ -8,9 +8,9 @@
 #include <utility>
 
 #include "cam/finish_setup.h"
-#include "cam/report/html_text.h"
 #include "cam/tool/standard_balls.h"
 #include "core/error.h"
+#include "core/page/html_text.h"
 #include "core/text/number_text.h"
 
 namespace lensforge {

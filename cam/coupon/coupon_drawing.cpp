@@ -2,7 +2,7 @@
 #include <algorithm>
 
 #include "cam/coupon/coupon_sheet.h"
-#include "cam/report/html_text.h"
+#include "core/page/html_text.h"
 #include "core/text/number_text.h"
 
 namespace lensforge {

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "cam/report/html_text.h"
+#include "core/page/html_text.h"
 #include "core/text/number_text.h"
 
 namespace lensforge {

@@ -2,9 +2,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "cam/report/html_text.h"
 #include "cam/report/relief_picture.h"
 #include "cam/report/sections.h"
+#include "core/page/html_text.h"
 #include "core/text/number_text.h"
 
 namespace lensforge::report_section {
@@ -84,11 +84,10 @@ std::string map_figure(const ReportMap& map, const ReportData& data) {
   const int decimals = decimals_for(*high - *low);
   const std::string picture = "<img src=\"" + png_uri(raster_picture(map.raster, *low, *high)) +
                               "\" alt=\"" + escape_html(map.title) + "\">";
-  const std::string scale = decimal_text(*low, decimals) + " <img src=\"" +
-                            png_uri(scale_picture()) + "\" alt=\"colour scale\"> " +
-                            decimal_text(*high, decimals) + " " + escape_html(map.unit);
-  const std::string caption = element("b", "", escape_html(map.title)) + "<br>" +
-                              escape_html(map.note) + element("div", "class=\"scale\"", scale);
+  const std::string scale =
+      html_scale(decimal_text(*low, decimals), decimal_text(*high, decimals) + " " + map.unit);
+  const std::string caption =
+      element("b", "", escape_html(map.title)) + "<br>" + escape_html(map.note) + scale;
   return element("figure", "class=\"map\"",
                  element("div", "class=\"frame\"", picture + place_rings(data)) +
                      element("figcaption", "", caption));

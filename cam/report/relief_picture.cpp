@@ -85,10 +85,4 @@ ColorImage raster_picture(const LensRaster& raster, double low, double high) {
   return image;
 }
 
-ColorImage scale_picture() {
-  ColorImage image{256, 1, {}};
-  for (int i = 0; i < 256; ++i) append(image, false_color(i / 255.0));
-  return image;
-}
-
 }  // namespace lensforge

@@ -23,7 +23,4 @@ ColorImage scaled_picture(const std::vector<double>& values, int columns, int ro
 /// A raster in false colour from `low` to `high`, +y up.
 ColorImage raster_picture(const LensRaster& raster, double low, double high);
 
-/// The colour bar of both, 256 × 1.
-ColorImage scale_picture();
-
 }  // namespace lensforge

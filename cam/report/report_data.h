@@ -16,6 +16,7 @@
 #include "cam/tolerance/tolerance_forecast.h"
 #include "cam/tool/tool.h"
 #include "core/image/image.h"
+#include "core/page/html_text.h"
 
 namespace lensforge {
 
@@ -65,16 +66,10 @@ struct ReportOperation {
   double lines_per_second = 0.0;  ///< That the controller has to take, at most.
 };
 
-/// One line of a table of what was chosen: "Stepover", "0.060 mm".
-struct ReportParameter {
-  std::string name;
-  std::string value;
-};
-
 /// Parameters under one heading.
 struct ParameterGroup {
   std::string title;
-  std::vector<ReportParameter> parameters;
+  std::vector<NamedText> parameters;
 };
 
 /// One line of what --compare ranks.

@@ -160,7 +160,7 @@ json setup_json(const SetupSheet& setup) {
 
 json group_json(const ParameterGroup& group) {
   json object = json::object();
-  for (const ReportParameter& parameter : group.parameters) {
+  for (const NamedText& parameter : group.parameters) {
     object[parameter.name] = parameter.value;
   }
   return {{"title", group.title}, {"parameters", object}};

@@ -2,8 +2,8 @@
 #include <algorithm>
 #include <string_view>
 
-#include "cam/report/html_text.h"
 #include "cam/report/sections.h"
+#include "core/page/html_text.h"
 #include "core/text/number_text.h"
 
 namespace lensforge::report_section {

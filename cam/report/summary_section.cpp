@@ -2,21 +2,15 @@
 #include <algorithm>
 #include <cmath>
 
-#include "cam/report/html_text.h"
 #include "cam/report/leak_words.h"
 #include "cam/report/relief_picture.h"
 #include "cam/report/sections.h"
+#include "core/page/html_text.h"
 #include "core/text/number_text.h"
 
 // The first screen: verdict, pictures, worst places, minutes and tools.
 namespace lensforge {
 namespace {
-
-std::string figure(const ColorImage& picture, const std::string& alt, const std::string& caption) {
-  return element("figure", "",
-                 "<img src=\"" + png_uri(picture) + "\" alt=\"" + escape_html(alt) + "\">" +
-                     element("figcaption", "", caption));
-}
 
 std::string caption(const std::string& title, const std::string& note) {
   return element("b", "", escape_html(title)) + "<br>" + note;
@@ -37,8 +31,9 @@ std::string surface_figure(const RenderedSurface& surface, const std::string& wo
                            decimal_text(quality.metrics.mae, 4) + ", SSIM " +
                            decimal_text(quality.metrics.ssim, 3) + "<br>leaks " +
                            percent_text(quality.leakage);
-  return figure(grey_picture(surface.picture.image(target.total())),
-                "What the surface “" + surface.name + "” projects", caption(surface.name, note));
+  return html_figure(grey_picture(surface.picture.image(target.total())),
+                     "What the surface “" + surface.name + "” projects",
+                     caption(surface.name, note));
 }
 
 std::string leakage_figure(const LeakageResult& result) {
@@ -47,11 +42,9 @@ std::string leakage_figure(const LeakageResult& result) {
   const double top = scale_top(map);
   const ColorImage picture = scaled_picture(map, part.columns, part.rows, top);
   const std::string most = decimal_text(top, top < 0.1 ? 3 : 2);
-  const std::string bar =
-      "0 <img src=\"" + png_uri(scale_picture()) + "\" alt=\"colour scale\"> " + most;
-  const std::string note = "light where the design puts less, in units of the picture’s mean" +
-                           element("span", "class=\"scale\"", bar);
-  return figure(picture, "Where the leaked light lands", caption("Leakage", note));
+  const std::string note =
+      "light where the design puts less, in units of the picture’s mean" + html_scale("0", most);
+  return html_figure(picture, "Where the leaked light lands", caption("Leakage", note));
 }
 
 std::string signed_text(double value, int decimals) {

@@ -2,18 +2,14 @@
 #include <algorithm>
 #include <cmath>
 
-#include "cam/report/html_text.h"
 #include "cam/report/sections.h"
+#include "core/page/html_text.h"
 #include "core/text/number_text.h"
 
 namespace lensforge::report_section {
 namespace {
 
 using Row = std::vector<std::string>;
-
-std::string section(const std::string& title, const std::string& html) {
-  return element("section", "", element("h2", "", escape_html(title)) + html);
-}
 
 /// A table whose rows turn into blocks on a narrow screen.
 std::string stacked(const std::vector<TableColumn>& columns, const std::vector<Row>& rows) {
@@ -30,16 +26,6 @@ std::string box_text(const Eigen::AlignedBox3d& box) {
   const Eigen::Vector3d size = box.sizes();
   return decimal_text(size.x(), 1) + " × " + decimal_text(size.y(), 1) + " × " +
          decimal_text(size.z(), 2) + " mm";
-}
-
-std::string facts(const std::vector<ReportParameter>& parameters) {
-  std::string body;
-  for (const ReportParameter& parameter : parameters) {
-    body += element("tr", "",
-                    element("td", "", escape_html(parameter.name)) +
-                        element("td", "", element("b", "", escape_html(parameter.value))));
-  }
-  return element("table", "", element("tbody", "", body));
 }
 
 std::string certificate_cell(const Extreme& extreme, const std::string& value, double z_offset) {
@@ -123,11 +109,11 @@ std::string warnings(const ReportData& data) {
 std::string setup(const ReportData& data) {
   const SetupSheet& sheet = data.setup;
   if (sheet.blank.isEmpty()) return "";
-  std::vector<ReportParameter> list{{"Machine", sheet.machine},
-                                    {"Blank", box_text(sheet.blank) + ", " + sheet.material},
-                                    {"Part", box_text(sheet.part)},
-                                    {"Program zero", sheet.zero_words},
-                                    {"Which way up", sheet.up_words}};
+  std::vector<NamedText> list{{"Machine", sheet.machine},
+                              {"Blank", box_text(sheet.blank) + ", " + sheet.material},
+                              {"Part", box_text(sheet.part)},
+                              {"Program zero", sheet.zero_words},
+                              {"Which way up", sheet.up_words}};
   for (const NamedBox& clamp : sheet.keep_outs) {
     const Eigen::Vector3d low = clamp.box.min() - sheet.zero;
     const Eigen::Vector3d high = clamp.box.max() - sheet.zero;
@@ -149,7 +135,7 @@ std::string setup(const ReportData& data) {
                   drawing(false,
                           "<b>From the front.</b> The table is below; the tool comes from "
                           "above."));
-  return section("Setup", facts(list) + drawings);
+  return html_section("Setup", html_facts(list) + drawings);
 }
 
 std::string operations(const ReportData& data) {
@@ -166,18 +152,18 @@ std::string operations(const ReportData& data) {
                     decimal_text(1e-3 * s.cutting_length, 1) + " m", count_text(op.lines),
                     decimal_text(op.lines_per_second, 0), duration_text(op.minutes)});
   }
-  return section("Operations, in order", stacked({{"operation", false},
-                                                  {"tool", false},
-                                                  {"program", false},
-                                                  {"rpm", true},
-                                                  {"feed mm/min", true},
-                                                  {"stepover", true},
-                                                  {"leaves", true},
-                                                  {"cutting length", true},
-                                                  {"lines", true},
-                                                  {"lines/s", true},
-                                                  {"time", true}},
-                                                 rows));
+  return html_section("Operations, in order", stacked({{"operation", false},
+                                                       {"tool", false},
+                                                       {"program", false},
+                                                       {"rpm", true},
+                                                       {"feed mm/min", true},
+                                                       {"stepover", true},
+                                                       {"leaves", true},
+                                                       {"cutting length", true},
+                                                       {"lines", true},
+                                                       {"lines/s", true},
+                                                       {"time", true}},
+                                                      rows));
 }
 
 std::string certificates(const ReportData& data) {
@@ -192,15 +178,15 @@ std::string certificates(const ReportData& data) {
          certificate_cell(c.slope, decimal_text(1e3 * c.slope.value, 2) + " mrad", data.z_offset)});
   }
   if (rows.empty()) return "";
-  return section("Certificates",
-                 element("p", "",
-                         "Error bounds of every move over its whole length, against the exact "
-                         "path of the tool; places are the program’s coordinates, mm.") +
-                     stacked({{"operation", false},
-                              {"deepest gouge", false},
-                              {"most material left", false},
-                              {"largest error of the path’s direction", false}},
-                             rows));
+  return html_section("Certificates",
+                      element("p", "",
+                              "Error bounds of every move over its whole length, against the exact "
+                              "path of the tool; places are the program’s coordinates, mm.") +
+                          stacked({{"operation", false},
+                                   {"deepest gouge", false},
+                                   {"most material left", false},
+                                   {"largest error of the path’s direction", false}},
+                                  rows));
 }
 
 std::string leakage(const ReportData& data) {
@@ -214,10 +200,10 @@ std::string leakage(const ReportData& data) {
       count_text(data.leakage.bright_pixels) +
       "). Contrast is the bright pixels’ mean to the dark ones’. Each cause is what it adds to "
       "those above it; polishing is in every line, so the causes sum to the part.";
-  return section("Light and leakage",
-                 quality_table(data.leakage) +
-                     element("h3", "style=\"margin-top:1.2rem\"", "Leakage by cause") +
-                     cause_table(data) + element("p", "class=\"soft\"", escape_html(words)));
+  return html_section("Light and leakage",
+                      quality_table(data.leakage) +
+                          element("h3", "style=\"margin-top:1.2rem\"", "Leakage by cause") +
+                          cause_table(data) + element("p", "class=\"soft\"", escape_html(words)));
 }
 
 std::string choices(const ReportData& data) {
@@ -249,20 +235,21 @@ std::string choices(const ReportData& data) {
                     "Computed, not cut: no program was written. The best is at the top; cut it by "
                     "running cam with its tool and pitch.")
           : "";
-  return section(alone ? "Choices, least leakage first" : "Other choices, least leakage first",
-                 note + element("div", "class=\"stack\"",
-                                element("table", "",
-                                        element("thead", "", head) + element("tbody", "", body))));
+  return html_section(
+      alone ? "Choices, least leakage first" : "Other choices, least leakage first",
+      note +
+          element("div", "class=\"stack\"",
+                  element("table", "", element("thead", "", head) + element("tbody", "", body))));
 }
 
 std::string parameters(const ReportData& data) {
   if (data.parameters.empty()) return "";
   std::string groups;
   for (const ParameterGroup& group : data.parameters) {
-    groups +=
-        element("div", "", element("h3", "", escape_html(group.title)) + facts(group.parameters));
+    groups += element("div", "",
+                      element("h3", "", escape_html(group.title)) + html_facts(group.parameters));
   }
-  return section("Process parameters", element("div", "class=\"columns\"", groups));
+  return html_section("Process parameters", element("div", "class=\"columns\"", groups));
 }
 
 }  // namespace lensforge::report_section

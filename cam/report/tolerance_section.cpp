@@ -2,9 +2,9 @@
 #include <string>
 #include <vector>
 
-#include "cam/report/html_text.h"
 #include "cam/report/relief_picture.h"
 #include "cam/report/sections.h"
+#include "core/page/html_text.h"
 #include "core/text/number_text.h"
 
 namespace lensforge::report_section {
@@ -67,14 +67,12 @@ std::string spread_figure(const ToleranceForecast& forecast) {
   const double top = scale_top(forecast.deviation);
   const ColorImage picture =
       scaled_picture(forecast.deviation, forecast.columns, forecast.rows, top);
-  const std::string bar = "0 <img src=\"" + png_uri(scale_picture()) + "\" alt=\"colour scale\"> " +
-                          decimal_text(top, 3);
-  return element("figure", "class=\"map\" style=\"max-width:34rem\"",
-                 "<img src=\"" + png_uri(picture) + "\" alt=\"How much pixels differ\">" +
-                     element("figcaption", "",
-                             "<b>How much parts differ</b><br>Standard deviation of every pixel "
-                             "from part to part, as displayed (0 black, 1 white)" +
-                                 element("div", "class=\"scale\"", bar)));
+  const std::string caption =
+      "<b>How much parts differ</b><br>Standard deviation of every pixel from part to part, as "
+      "displayed (0 black, 1 white)" +
+      html_scale("0", decimal_text(top, 3));
+  return element("div", "class=\"map\" style=\"max-width:34rem\"",
+                 html_figure(picture, "How much pixels differ", caption));
 }
 
 }  // namespace

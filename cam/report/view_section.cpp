@@ -6,9 +6,9 @@
 #include <nlohmann/json.hpp>
 #include <span>
 
-#include "cam/report/html_text.h"
 #include "cam/report/relief_picture.h"
 #include "cam/report/sections.h"
+#include "core/page/html_text.h"
 #include "core/text/number_text.h"
 
 namespace lensforge::report_section {

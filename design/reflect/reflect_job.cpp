@@ -9,6 +9,7 @@
 #include "core/text/version.h"
 #include "design/reflect/light/light_field.h"
 #include "design/reflect/mesh/unit_frame.h"
+#include "design/reflect/picture/reflect_report.h"
 #include "design/reflect/picture/views.h"
 
 namespace lensforge::reflect {
@@ -76,12 +77,12 @@ std::vector<fs::path> write_result(const ReflectResult& result, const ReflectOpt
   PendingFiles files(folder);
   files.add(reflect_file::kSurface, [&](const fs::path& to) { write_ply(result.mesh, to); });
   files.add(reflect_file::kReference, [&](const fs::path& to) { write_ply(result.reference, to); });
-  files.add(reflect_file::kViews, [&](const fs::path& to) {
-    write_image(retroreflection_views({before, after}, field, executor), to);
-  });
-  files.add(reflect_file::kDisplacement, [&](const fs::path& to) {
-    write_image(displacement_views({before, after}, executor), to);
-  });
+  const ReflectPictures pictures{retroreflection_views({before, after}, field, executor),
+                                 displacement_views({before, after}, executor)};
+  files.add(reflect_file::kViews, [&](const fs::path& to) { write_image(pictures.views, to); });
+  files.add(reflect_file::kDisplacement,
+            [&](const fs::path& to) { write_image(pictures.displacement, to); });
+  files.add(reflect_file::kReport, reflect_report(result, options, pictures));
   if (result.radar) {
     files.add(reflect_file::kRadarTable, radar_csv(*result.radar));
     files.add(reflect_file::kRadarPlot, radar_svg(*result.radar));

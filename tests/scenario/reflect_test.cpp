@@ -45,7 +45,7 @@ TEST_F(Reflect, WritesTheShapeItsPicturesAndItsFiguresTogether) {
   EXPECT_EQ(result["status"], "done");
   EXPECT_EQ(result["updates"], 3);
   for (const char* name : {"surface.ply", "reference.ply", "views.png", "displacement.png",
-                           "convergence.csv", "reflect.json"}) {
+                           "convergence.csv", "report.html", "reflect.json"}) {
     EXPECT_TRUE(fs::exists(at("out") / name)) << name;
   }
   EXPECT_EQ(read_mesh(at("out/surface.ply")).triangle_count(), result["faces"]);

@@ -9,13 +9,13 @@
 #include <utility>
 #include <vector>
 
-#include "cam/report/html_text.h"
 #include "cam/report/leak_words.h"
 #include "cam/report/path_sketch.h"
 #include "cam/report/report_html.h"
 #include "cam/report/report_json.h"
 #include "cam/report/verdict.h"
 #include "core/error.h"
+#include "core/page/html_text.h"
 
 namespace lensforge {
 namespace {
@@ -307,41 +307,6 @@ TEST(Verdict, RefusesALimitBelowZero) {
   CutLimits limits;
   limits.dark_flux = -0.1;
   EXPECT_THROW((void)judge_cut({}, limits), InputError);
-}
-
-TEST(HtmlText, Base64IsThatOfTheStandard) {
-  // RFC 4648, section 10.
-  const std::vector<std::pair<std::string, std::string>> vectors{{"", ""},
-                                                                 {"f", "Zg=="},
-                                                                 {"fo", "Zm8="},
-                                                                 {"foo", "Zm9v"},
-                                                                 {"foob", "Zm9vYg=="},
-                                                                 {"fooba", "Zm9vYmE="},
-                                                                 {"foobar", "Zm9vYmFy"}};
-  for (const auto& [text, encoded] : vectors) {
-    const std::vector<unsigned char> bytes(text.begin(), text.end());
-    EXPECT_EQ(base64(bytes), encoded);
-  }
-}
-
-TEST(HtmlText, NumbersReadAsPeopleWriteThem) {
-  EXPECT_EQ(percent_text(0.013), "1.30 %");
-  EXPECT_EQ(percent_text(0.000412), "0.0412 %");
-  EXPECT_EQ(percent_text(0.5), "50.0 %");
-  EXPECT_EQ(percent_text(1.0), "100 %");
-  EXPECT_EQ(percent_text(0.0), "0 %");
-  EXPECT_EQ(percent_text(1e-12), "below 0.001 %");
-  EXPECT_EQ(percent_text(-3e-6), "above −0.001 %");
-  EXPECT_EQ(percent_text(1.31e-5), "0.0013 %");
-  EXPECT_EQ(micrometre_text(0.00402), "4.02 µm");
-  EXPECT_EQ(duration_text(0.5), "30 s");
-  EXPECT_EQ(duration_text(12.4), "12 min");
-  EXPECT_EQ(duration_text(192.0), "3 h 12 min");
-  EXPECT_EQ(count_text(942080), "942\u202f080");
-  EXPECT_EQ(count_text(-1234567), "-1\u202f234\u202f567");
-  EXPECT_EQ(count_text(999), "999");
-  EXPECT_EQ(contrast_text(85.2), "85 : 1");
-  EXPECT_EQ(contrast_text(std::numeric_limits<double>::infinity()), "no light in the dark");
 }
 
 }  // namespace

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "cam/report/html_text.h"
+#include "core/page/html_text.h"
 
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
 #include "core/error.h"
+#include "core/image/error_image.h"
 #include "core/text/number_text.h"
 
 namespace lensforge {
@@ -71,6 +72,38 @@ std::string html_table(std::span<const TableColumn> columns,
   }
   return element("table", "",
                  element("thead", "", element("tr", "", head)) + element("tbody", "", body));
+}
+
+std::string html_facts(std::span<const NamedText> facts) {
+  std::string body;
+  for (const NamedText& fact : facts) {
+    body += element("tr", "",
+                    element("td", "", escape_html(fact.name)) +
+                        element("td", "", element("b", "", escape_html(fact.value))));
+  }
+  return element("table", "", element("tbody", "", body));
+}
+
+std::string html_section(const std::string& title, const std::string& html) {
+  return element("section", "", element("h2", "", escape_html(title)) + html);
+}
+
+std::string html_figure(const ColorImage& picture, const std::string& alt,
+                        const std::string& caption) {
+  return element("figure", "",
+                 "<img src=\"" + png_uri(picture) + "\" alt=\"" + escape_html(alt) + "\">" +
+                     element("figcaption", "", caption));
+}
+
+std::string html_scale(const std::string& least, const std::string& most) {
+  constexpr int kColors = 256;
+  ColorImage bar{kColors, 1, {}};
+  for (int i = 0; i < kColors; ++i) {
+    for (const unsigned char c : false_color(i / (kColors - 1.0))) bar.rgb.push_back(c);
+  }
+  return element("span", "class=\"scale\"",
+                 escape_html(least) + " <img src=\"" + png_uri(bar) + "\" alt=\"colour scale\"> " +
+                     escape_html(most));
 }
 
 std::string percent_text(double share) {

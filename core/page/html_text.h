@@ -34,6 +34,25 @@ struct TableColumn {
 std::string html_table(std::span<const TableColumn> columns,
                        const std::vector<std::vector<std::string>>& rows);
 
+/// A fact and its value; text.
+struct NamedText {
+  std::string name;
+  std::string value;
+};
+
+/// A table of two columns, values in bold.
+std::string html_facts(std::span<const NamedText> facts);
+
+/// A section with its heading (text).
+std::string html_section(const std::string& title, const std::string& html);
+
+/// A picture with what it shows, for those who cannot see it (text), and its caption (HTML).
+std::string html_figure(const ColorImage& picture, const std::string& alt,
+                        const std::string& caption);
+
+/// The colour bar of false_color() and what its ends stand for (text).
+std::string html_scale(const std::string& least, const std::string& most);
+
 /// A share as percent with three significant digits: "1.30 %", "0.0412 %"; 0 is "0 %".
 std::string percent_text(double share);
 /// Millimetres as micrometres with two decimals: "4.02 µm".

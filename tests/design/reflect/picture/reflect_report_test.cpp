@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "design/reflect/picture/reflect_report.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "design/reflect/picture/energy_plot.h"
+#include "fixtures/shapes/shapes.h"
+
+namespace lensforge::reflect {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+ReflectResult sample_result() {
+  ReflectResult result;
+  result.reference = result.mesh = shapes::octahedron();
+  result.before = {0.4, 0.5};
+  result.after = {0.02, 0.05};
+  result.mean_displacement = 0.01;
+  result.max_displacement = 0.02;
+  result.updates = {{1, "rim-spoke", 0.5, 0.0, 0.0, 1.0},
+                    {2, "rim-spoke", 0.2, 0.0, 0.0, 2.0},
+                    {3, "face", 0.05, 0.0, 0.0, 4.0}};
+  return result;
+}
+
+std::string report(const ReflectResult& result, const ReflectOptions& options = {}) {
+  const ColorImage pixel{1, 1, {0, 0, 0}};
+  return reflect_report(result, options, {pixel, pixel});
+}
+
+TEST(ReflectReport, StatesEnergiesAndDisplacements) {
+  const std::string html = report(sample_result());
+  EXPECT_THAT(html, HasSubstr("verdict good"));
+  EXPECT_THAT(html, HasSubstr("10.0 % of the energy before"));
+  EXPECT_THAT(html, HasSubstr("5.00 %"));
+  // The octahedron's bounding box has the diagonal 2√3.
+  EXPECT_THAT(html, HasSubstr("2.00 % of the diagonal, 0.0693"));
+}
+
+TEST(ReflectReport, JudgesByTheGoal) {
+  ReflectOptions options;
+  options.goal = GoalKind::kPoint;
+  EXPECT_THAT(report(sample_result(), options), HasSubstr("verdict bad"));
+  ReflectResult broken = sample_result();
+  broken.unmet = {"--keep-volume: <9 %>"};
+  EXPECT_THAT(report(broken), HasSubstr("A constraint is broken"));
+  EXPECT_THAT(report(broken), HasSubstr("--keep-volume: &lt;9 %&gt;"));
+}
+
+TEST(ReflectReport, OfAnInterruptedRunHasNoEnergiesAfter) {
+  ReflectResult result = sample_result();
+  result.status = ReflectResult::Status::kInterrupted;
+  const std::string html = report(result);
+  EXPECT_THAT(html, HasSubstr("Interrupted"));
+  EXPECT_THAT(html, Not(HasSubstr("10.0 %")));
+}
+
+TEST(ReflectReport, EscapesWhatTheUserWrote) {
+  ReflectOptions options;
+  options.fix_vertices = "<script>alert('x')</script>";
+  EXPECT_THAT(report(sample_result(), options), Not(HasSubstr("<script>alert")));
+}
+
+/// The numbers of the first polyline.
+std::vector<double> first_line(const std::string& svg) {
+  const std::size_t from = svg.find("points=\"") + 8;
+  std::string text = svg.substr(from, svg.find('"', from) - from);
+  std::replace(text.begin(), text.end(), ',', ' ');
+  std::istringstream words(text);
+  std::vector<double> numbers;
+  for (double number = 0.0; words >> number;) numbers.push_back(number);
+  return numbers;
+}
+
+TEST(EnergyPlot, HasALineForEveryStageOnADecadeScale) {
+  const std::string svg = energy_plot(sample_result().updates);
+  EXPECT_THAT(svg, HasSubstr("1e-2"));
+  EXPECT_THAT(svg, HasSubstr("1e0"));
+  EXPECT_THAT(svg, HasSubstr("4.0 s"));
+  // 0.5 and 0.2 at 1 and 2 of 4 seconds; two decades over 240 units down from 1, 800 units wide.
+  const std::vector<double> line = first_line(svg);
+  ASSERT_EQ(line.size(), 4U);
+  EXPECT_NEAR(line[0], 270.0, 0.1);
+  EXPECT_NEAR(line[1], 30.0 + 120.0 * 0.30103, 0.1);
+  EXPECT_NEAR(line[2], 470.0, 0.1);
+  EXPECT_NEAR(line[3], 30.0 + 120.0 * 0.69897, 0.1);
+}
+
+TEST(EnergyPlot, OneUpdateHasNoLine) {
+  EXPECT_EQ(energy_plot({}), "");
+  EXPECT_EQ(energy_plot({{1, "face", 0.5, 0.0, 0.0, 1.0}}), "");
+}
+
+}  // namespace
+}  // namespace lensforge::reflect
