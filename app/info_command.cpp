@@ -8,6 +8,7 @@
 #include "app/commands.h"
 #include "app/console.h"
 #include "app/exit_code.h"
+#include "app/file_kind.h"
 #include "app/gcode_summary.h"
 #include "app/interruptible_job.h"
 #include "app/json_output.h"
@@ -19,7 +20,6 @@
 #include "core/surface/lens.h"
 #include "core/surface/mesh_io.h"
 #include "core/surface/setup_json.h"
-#include "core/text/lower_case.h"
 #include "core/text/printable.h"
 #include "export/iges_file.h"
 #include "export/step_file.h"
@@ -208,16 +208,11 @@ Description describe_picture(const fs::path& path) {
   return d;
 }
 
-bool has_extension(const fs::path& path, std::initializer_list<const char*> extensions) {
-  const std::string own = lower_case(path.extension().string());
-  return std::find(extensions.begin(), extensions.end(), own) != extensions.end();
-}
-
 Description describe(const fs::path& path, const CommonOptions& common) {
   if (is_folder(path)) return describe_lens(path);
   if (has_extension(path, {".ngc", ".nc", ".gcode", ".tap"})) return describe_gcode(path);
   const bool iges = has_extension(path, {".igs", ".iges"});
-  if (iges || has_extension(path, {".step", ".stp"})) return describe_solid(path, iges, common);
+  if (iges || is_step_file(path)) return describe_solid(path, iges, common);
   if (!has_extension(path, {".ply", ".obj", ".stl", ".off"})) return describe_picture(path);
   Description d{{{"kind", "mesh"}}, {}};
   describe_mesh(d, read_mesh(path));

@@ -6,6 +6,7 @@
 #include "app/commands.h"
 #include "app/console.h"
 #include "app/exit_code.h"
+#include "app/file_kind.h"
 #include "app/interrupt.h"
 #include "app/interruptible_job.h"
 #include "app/json_output.h"
@@ -17,6 +18,7 @@
 #include "core/surface/mesh_io.h"
 #include "core/text/number_text.h"
 #include "design/reflect/reflect_job.h"
+#include "export/solid_mesh.h"
 
 namespace lensforge::app {
 namespace {
@@ -29,7 +31,8 @@ reflect::ReflectInput prepared(const ReflectSettings& settings, const CommonOpti
   InterruptibleJob job(common);
   const RunControl control = job.control();
   control.report({"reflect, reading the mesh", 0.0, 0.0, ""});
-  const SurfaceMesh mesh = read_mesh(settings.mesh);
+  const SurfaceMesh mesh = is_step_file(settings.mesh) ? read_solid_mesh(settings.mesh, control)
+                                                       : read_mesh(settings.mesh);
   control.report({settings.reflect.faces > 0 ? "reflect, remeshing" : "reflect, repairing the mesh",
                   0.0, 0.0, ""});
   reflect::ReflectInput input = reflect::prepared_input(mesh, settings.mesh, settings.reflect);

@@ -4,7 +4,8 @@
 namespace lensforge::app {
 
 void add_reflect_options(OptionSet& options, ReflectSettings& settings) {
-  options.positional("MESH", settings.mesh, "shape: .stl, .obj, .ply, .off; z is up");
+  options.positional("MESH", settings.mesh,
+                     "shape: .stl, .obj, .ply, .off; solid: .step, .stp; z is up");
   options.text("--out", settings.out, "DIR", "folder for the new shape, its pictures and figures");
   options.flag("--evaluate", settings.evaluate,
                "print the reflected energies of the mesh as it is and write nothing");

@@ -8,6 +8,7 @@
 #include "app/commands.h"
 #include "app/console.h"
 #include "app/exit_code.h"
+#include "app/file_kind.h"
 #include "app/interruptible_job.h"
 #include "app/json_output.h"
 #include "app/lens_note.h"
@@ -20,7 +21,6 @@
 #include "core/surface/lens.h"
 #include "core/surface/mesh_io.h"
 #include "core/surface/mesh_normals.h"
-#include "core/text/lower_case.h"
 #include "design/design_estimate.h"
 #include "design/fringe.h"
 #include "design/render_fields.h"
@@ -60,11 +60,6 @@ void add_render_options(OptionSet& options, RenderArguments& arguments) {
   options.fields(render_fields(), arguments.render);
 }
 
-bool is_step(const std::string& source) {
-  const std::string extension = lower_case(fs::path(source).extension().string());
-  return extension == ".step" || extension == ".stp";
-}
-
 Scene load_solid(const std::string& source, const Executor& executor, const RunControl& control,
                  const Console& console) {
   SolidSurface solid = read_solid_surface(source, kPictureNodes, executor, control);
@@ -78,7 +73,7 @@ Scene load_solid(const std::string& source, const Executor& executor, const RunC
 
 Scene load(const std::string& source, const Executor& executor, const RunControl& control,
            const Console& console) {
-  if (is_step(source)) return load_solid(source, executor, control, console);
+  if (is_step_file(source)) return load_solid(source, executor, control, console);
   if (is_folder(source)) {
     Lens lens = read_lens(source);
     note_unfinished_design(lens, console);

@@ -9,14 +9,12 @@
 #include <BRepPrimAPI_MakeCylinder.hxx>
 #include <BRepPrimAPI_MakeSphere.hxx>
 #include <BRep_Builder.hxx>
-#include <Interface_Static.hxx>
-#include <STEPControl_Controller.hxx>
-#include <STEPControl_Writer.hxx>
 #include <TopoDS_Compound.hxx>
 #include <cstdlib>
 
 #include "core/error.h"
 #include "core/temp_folder.h"
+#include "export/foreign_step.h"
 #include "export/sample_surfaces.h"
 #include "export/solid_check.h"
 #include "export/step_file.h"
@@ -33,12 +31,7 @@ class SolidSurfaceOf : public ::testing::Test {
   }
 
   void write(const TopoDS_Shape& shape, const char* unit = "MM") {
-    silence_opencascade();
-    STEPControl_Controller::Init();
-    Interface_Static::SetCVal("write.step.unit", unit);
-    STEPControl_Writer writer;
-    writer.Transfer(shape, STEPControl_AsIs);
-    writer.Write(path_.c_str());
+    write_foreign_step(shape, path_, unit);
   }
 
   void expect_refused(const char* why) {
