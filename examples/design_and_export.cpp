@@ -4,6 +4,7 @@
 #include <stdexcept>
 
 #include "core/image/image_io.h"
+#include "core/surface/mesh_io.h"
 #include "design/design_lens.h"
 #include "export/closed_solid.h"
 #include "export/mesh_formats.h"

@@ -3,35 +3,21 @@
 
 #include <zip.h>
 
-#include <Eigen/Geometry>
 #include <array>
-#include <bit>
 #include <charconv>
 #include <cstdint>
-#include <cstring>
 #include <memory>
 #include <string_view>
 
 #include "core/error.h"
 #include "core/io/files.h"
-#include "core/surface/mesh_normals.h"
 
 namespace lensforge {
 namespace {
 
 namespace fs = std::filesystem;
 
-// Records are copied as they lie in memory.
-static_assert(std::endian::native == std::endian::little, "write_stl writes little-endian STL");
-
-constexpr std::size_t kStlHeader = 80;
-constexpr std::size_t kStlTriangle = 12 * sizeof(float) + sizeof(std::uint16_t);
 constexpr int kDecimals = 9;
-
-template <class Value>
-void append_bytes(std::string& bytes, const Value& value) {
-  bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
-}
 
 /// The shortest text that reads back as the same double.
 void append_exact(std::string& text, double value) {
@@ -46,12 +32,6 @@ void append_fixed(std::string& text, double value) {
                                  std::chars_format::fixed, kDecimals)
                        .ptr;
   text.append(digits.data(), end);
-}
-
-void append_stl_triangle(std::string& bytes, const SurfaceMesh& mesh, Eigen::Index t) {
-  append_bytes(bytes, Eigen::Vector3f(area_normal(mesh, t).normalized().cast<float>()));
-  for (int k = 0; k < 3; ++k) append_bytes(bytes, Eigen::Vector3f(mesh.corner(t, k).cast<float>()));
-  append_bytes(bytes, std::uint16_t{0});
 }
 
 std::string xml_escaped(std::string_view text) {
@@ -168,16 +148,6 @@ class ZipWriter {
 };
 
 }  // namespace
-
-void write_stl(const SurfaceMesh& mesh, const std::string& title, const fs::path& path) {
-  // A header that begins with "solid" is taken for text STL.
-  std::string bytes = std::string(title.starts_with("solid") ? " " : "") + title;
-  bytes.resize(kStlHeader, ' ');
-  bytes.reserve(kStlHeader + 4 + kStlTriangle * static_cast<std::size_t>(mesh.triangle_count()));
-  append_bytes(bytes, static_cast<std::uint32_t>(mesh.triangle_count()));
-  for (Eigen::Index t = 0; t < mesh.triangles.cols(); ++t) append_stl_triangle(bytes, mesh, t);
-  write_whole_file(path, bytes);
-}
 
 void write_obj(const SurfaceMesh& mesh, const std::string& title, const fs::path& path) {
   std::string text = "# " + title + "\n# millimetres\n";

@@ -7,14 +7,9 @@
 #include "core/surface/surface_mesh.h"
 
 /// Meshes in the formats that printers, CAM programs and viewers read; millimetres. Each file
-/// appears whole or not at all, and shows its title to one who looks at its bytes. PLY is
-/// core/surface/mesh_io.h's.
+/// appears whole or not at all, and shows its title to one who looks at its bytes. PLY and
+/// STL are core/surface/mesh_io.h's.
 namespace lensforge {
-
-/// Binary STL; coordinates are rounded to 32-bit floats (4e-6 mm at 100 mm).
-/// @throw RunError if it cannot be written.
-void write_stl(const SurfaceMesh& mesh, const std::string& title,
-               const std::filesystem::path& path);
 
 /// Wavefront OBJ; coordinates read back as the same doubles. `title` becomes a comment.
 /// @throw RunError if it cannot be written.

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 
 #include "core/surface/surface_mesh.h"
 
@@ -18,6 +19,11 @@ void write_ply(const SurfaceMesh& mesh, const std::filesystem::path& path);
 
 /// The same with unit normals, `double nx ny nz`. @param normals  3 × V, of any length but 0.
 void write_ply(const SurfaceMesh& mesh, const Eigen::Matrix3Xd& normals,
+               const std::filesystem::path& path);
+
+/// Writes binary STL; coordinates are rounded to 32-bit floats (4e-6 mm at 100 mm). The file
+/// appears whole or not at all, and begins with its title. @throw RunError if it cannot be written.
+void write_stl(const SurfaceMesh& mesh, const std::string& title,
                const std::filesystem::path& path);
 
 }  // namespace lensforge

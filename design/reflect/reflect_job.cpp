@@ -76,6 +76,8 @@ std::vector<fs::path> write_result(const ReflectResult& result, const ReflectOpt
   const SurfaceMesh after = frame.to_unit(result.mesh);
   PendingFiles files(folder);
   files.add(reflect_file::kSurface, [&](const fs::path& to) { write_ply(result.mesh, to); });
+  files.add(reflect_file::kPrint,
+            [&](const fs::path& to) { write_stl(result.mesh, program_mark(), to); });
   files.add(reflect_file::kReference, [&](const fs::path& to) { write_ply(result.reference, to); });
   const ReflectPictures pictures{retroreflection_views({before, after}, field, executor),
                                  displacement_views({before, after}, executor)};

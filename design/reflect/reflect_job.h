@@ -15,6 +15,7 @@ namespace lensforge::reflect {
 namespace reflect_file {
 inline constexpr const char* kJson = "reflect.json";
 inline constexpr const char* kSurface = "surface.ply";
+inline constexpr const char* kPrint = "surface.stl";
 inline constexpr const char* kReference = "reference.ply";
 inline constexpr const char* kViews = "views.png";
 inline constexpr const char* kDisplacement = "displacement.png";
@@ -22,8 +23,8 @@ inline constexpr const char* kConvergence = "convergence.csv";
 inline constexpr const char* kReport = "report.html";
 inline constexpr const char* kRadarTable = "radar.csv";
 inline constexpr const char* kRadarPlot = "radar.svg";
-inline constexpr std::array kAll{kRadarTable,   kRadarPlot,   kSurface, kReference, kViews,
-                                 kDisplacement, kConvergence, kReport,  kJson};
+inline constexpr std::array kAll{kRadarTable, kRadarPlot,    kSurface,     kPrint,  kReference,
+                                 kViews,      kDisplacement, kConvergence, kReport, kJson};
 }  // namespace reflect_file
 
 /// @throw InputError for a file of these names in `folder` that lensforge did not write, unless

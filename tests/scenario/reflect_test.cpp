@@ -44,11 +44,12 @@ TEST_F(Reflect, WritesTheShapeItsPicturesAndItsFiguresTogether) {
   const nlohmann::json result = outcome.json();
   EXPECT_EQ(result["status"], "done");
   EXPECT_EQ(result["updates"], 3);
-  for (const char* name : {"surface.ply", "reference.ply", "views.png", "displacement.png",
-                           "convergence.csv", "report.html", "reflect.json"}) {
+  for (const char* name : {"surface.ply", "surface.stl", "reference.ply", "views.png",
+                           "displacement.png", "convergence.csv", "report.html", "reflect.json"}) {
     EXPECT_TRUE(fs::exists(at("out") / name)) << name;
   }
   EXPECT_EQ(read_mesh(at("out/surface.ply")).triangle_count(), result["faces"]);
+  EXPECT_EQ(read_mesh(at("out/surface.stl")).triangle_count(), result["faces"]);
 }
 
 TEST_F(Reflect, EvaluatePrintsEnergiesAndWritesNothing) {
