@@ -31,6 +31,11 @@ constexpr std::size_t kShorten = 8;
 /// tolerances: blunter ones keep the moves after them from holding.
 constexpr double kBlunt = 6.0;
 
+/// Moves shorter than this part of RowFitOptions::shortest are what a controller falls behind with:
+/// in their place one that is long enough turns off by up to so many slope tolerances.
+constexpr double kTooShort = 0.5;
+constexpr double kMostTurn = 16.0;
+
 /// How near to the tolerances a look at the joints alone goes: what lies between adds to it.
 constexpr double kLookShare = 0.95;
 
@@ -139,9 +144,9 @@ class RowFit {
       }
       if (!reach) reach = straightest(at, last);
       if (steps_.empty() || !too_short(at, reach->joint) || !share_way(*reach)) {
-        steps_.push_back({at, settled, *reach});
+        steps_.push_back({at, settled, long_enough(at, settled, *reach)});
       }
-      at = reach->joint;
+      at = steps_.back().reach.joint;
       limit = last;
     }
     return result();
@@ -163,11 +168,12 @@ class RowFit {
   }
 
   /// One move between two joints that keeps the tolerances; its nodes are added to the error.
-  std::optional<Reach> one_move(std::size_t from, std::size_t to) {
+  /// @param turn  what it may turn off, in slope tolerances.
+  std::optional<Reach> one_move(std::size_t from, std::size_t to, double turn = 1.0) {
     for (const bool arc : {false, true}) {
       if (arc && (!options_.arcs || to - from < 2)) continue;
       const std::optional<RowMove> move = move_to(from, to, arc);
-      if (move && holds(from, *move)) return Reach{to, *move};
+      if (move && holds(from, *move, turn)) return Reach{to, *move};
     }
     return std::nullopt;
   }
@@ -178,6 +184,7 @@ class RowFit {
     Step& last = steps_.back();
     const std::size_t middle = middle_of(last.from, reach.joint);
     if (middle <= last.from || middle >= last.reach.joint) return false;
+    if (too_short(last.from, reach.joint)) return false;
     error_.resize(last.settled);
     const std::optional<Reach> first = one_move(last.from, middle);
     const std::size_t settled = error_.size();
@@ -191,6 +198,22 @@ class RowFit {
     error_.add(joints_.written[last.from], last.reach.move);
     error_.add(joints_.written[last.reach.joint], reach.move);
     return false;
+  }
+
+  /// A move, or a longer one in its place that turns off no farther than it must. Its nodes are
+  /// added to the error. @param settled  nodes of the error before it.
+  Reach long_enough(std::size_t from, std::size_t settled, const Reach& reach) {
+    const double end = joints_.written[from].x() + kTooShort * options_.shortest;
+    if (joints_.written[reach.joint].x() >= end) return reach;
+    std::size_t to = reach.joint;
+    while (to + 1 < joints_.written.size() && joints_.written[to].x() < end) ++to;
+    if (to == reach.joint) return reach;
+    error_.resize(settled);
+    for (double turn = 2.0; turn <= kMostTurn; turn *= 2.0) {
+      if (const std::optional<Reach> longer = one_move(from, to, turn)) return *longer;
+    }
+    error_.add(joints_.written[from], reach.move);
+    return reach;
   }
 
   /// The joint nearest to half the way from one to another.
@@ -248,10 +271,10 @@ class RowFit {
   }
 
   /// Whether the move keeps the tolerances; its nodes are added to the error if so.
-  bool holds(std::size_t from, const RowMove& move) {
+  bool holds(std::size_t from, const RowMove& move, double turn = 1.0) {
     const std::size_t settled = error_.size();
     error_.add(joints_.written[from], move);
-    if (error_.holds(settled, options_.tolerance, options_.slope_tolerance)) return true;
+    if (error_.holds(settled, options_.tolerance, turn * options_.slope_tolerance)) return true;
     error_.resize(settled);
     return false;
   }

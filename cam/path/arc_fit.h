@@ -40,7 +40,9 @@ struct FittedRow : RowWay {
 /// reaches about the farthest joint within the tolerances. Moves begin and end on the drop curve to
 /// the resolution, and hold the tolerances over their whole length (RowError) unless not even the
 /// way to the next joint does, because rounding turns it: the certificate says what came of it.
-/// Where a move ends up shorter than `shortest`, it shares the way of the one before.
+/// Where a move ends up shorter than `shortest`, it shares the way of the one before; where it
+/// stays shorter than half of that, a longer one that turns off farther takes its place, as the
+/// certificate says.
 FittedRow fit_row(const RowProfile& profile, const RowFitOptions& options);
 
 /// How far straight moves between joints may be off.

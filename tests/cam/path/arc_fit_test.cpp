@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <numbers>
 #include <vector>
 
 #include "cam/adversarial_meshes.h"
@@ -138,6 +139,47 @@ TEST(ArcFit, MovesGrowSlowlyAsDirectionsGetFiner) {
 
 /// A cylinder of fine facets: the drop curve is a circle of radius 5 + R, and one arc an eighth
 /// round says it all.
+double shortest_of(const FittedRow& row) {
+  double least = HUGE_VAL;
+  Eigen::Vector2d from = row.start;
+  for (const RowMove& move : row.moves) {
+    least = std::min(least, move.end.x() - from.x());
+    from = move.end;
+  }
+  return least;
+}
+
+/// A wave between level ends that turns so fast that only moves of 0.01 mm keep the slope's
+/// tolerance.
+RowProfile quick_wave() {
+  RowProfile profile;
+  const auto add = [&](double u, double z) {
+    profile.u.push_back(u);
+    profile.z.push_back(z);
+  };
+  constexpr double kHigh = 0.0013;
+  add(-0.2, kHigh);
+  for (int i = 0; i <= 8000; ++i) add(0.0005 * i, kHigh * std::cos(0.0025 * std::numbers::pi * i));
+  add(4.2, kHigh);
+  profile.joints = profile.u;
+  return profile;
+}
+
+/// A controller that falls behind does more harm than a direction that is off for a moment.
+TEST(ArcFit, MovesAreLongEnoughForTheControllerWhereDirectionsCannotBeKept) {
+  RowFitOptions options = with_arcs(true);
+  options.slope_tolerance = 6e-5;
+  const FittedRow any = fit_row(quick_wave(), options);
+  EXPECT_LE(any.certificate.slope.value, options.slope_tolerance);
+  EXPECT_LT(shortest_of(any), 0.01);
+  options.shortest = 0.04;
+  const FittedRow row = fit_row(quick_wave(), options);
+  EXPECT_GE(shortest_of(row), 0.0195);
+  EXPECT_LT(row.moves.size(), any.moves.size());
+  EXPECT_LE(row.certificate.gouge.value, options.tolerance);
+  EXPECT_LE(row.certificate.slope.value, 16.0 * options.slope_tolerance);
+}
+
 TEST(ArcFit, FindsTheCircleOfACylinder) {
   const SurfaceMesh mesh = testing::grid_mesh(
       4001, 3, 4.0, 4.0, [](double x, double) { return std::sqrt(25.0 - (x - 2.0) * (x - 2.0)); });
