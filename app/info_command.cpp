@@ -105,7 +105,8 @@ void describe_setup(Description& d, const OpticalSetup& setup) {
   const bool mirror = setup.mode == LightMode::kReflect;
   d.line(mirror ? "mirror" : "lens",
          fixed(setup.lens_size.x(), 2) + " x " + fixed(setup.lens_size.y(), 2) + " mm" +
-             (mirror ? "" : ", refractive index " + fixed(setup.ior, 4)));
+             (mirror ? "" : ", refractive index " + fixed(setup.ior, 4)) +
+             (setup.fresnel ? ", what its faces reflect is counted" : ""));
   if (setup.front) d.line("front", front_text(*setup.front));
   d.line("wall", "z = " + fixed(setup.focal_length, 2) + " mm, picture " +
                      fixed(setup.image_size.x(), 2) + " x " + fixed(setup.image_size.y(), 2) +

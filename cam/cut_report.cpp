@@ -5,6 +5,7 @@
 #include <cmath>
 #include <string>
 
+#include "core/optics/fresnel.h"
 #include "core/page/html_text.h"
 #include "core/text/number_text.h"
 #include "core/text/version.h"
@@ -341,6 +342,7 @@ Verdict whole_verdict(const CutPlan& plan, const ProgramFiles& programs,
 void add_prediction(const Prediction& prediction, const Lens& lens, ReportData& data) {
   data.target = lens.target;
   data.leakage = prediction.leakage;
+  if (!is_mirror(lens)) data.ghost = ghost_share(lens.setup.ior);
   data.sampling = prediction.sampling;
   data.shown = {{surface_name::kDesigned, "what is meant"},
                 {surface_name::kRounded, "the most that the ball can reach"},

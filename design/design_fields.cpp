@@ -163,6 +163,9 @@ const OptionTable<LightOptions>& light_fields() {
       R::length("--source-size", &O::source_size, Limits::zero_or(kMinSourceWidth, kMaxSourceSize),
                 "diameter of the lamp at --source-position; 0 is a point"),
       front(),
+      R::flag("--fresnel", &O::fresnel,
+              "count the light that a lens's two faces reflect, without coating: what slopes "
+              "steeply lets less through"),
       R::length("--image-width", &O::image_width, Limits::zero_or(kMinImageWidth, kMaxImageWidth),
                 "width of the picture on the screen; 0 takes the lens's"),
       pair("--image-offset", &O::image_offset, "X,Y",

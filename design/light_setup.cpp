@@ -74,6 +74,9 @@ void require_point(const DesignOptions& o, const Eigen::Vector2d& size) {
 }
 
 void require_source(const DesignOptions& o, const Eigen::Vector2d& size) {
+  if (is_mirror(o) && o.light.fresnel) {
+    refuse("--fresnel", "is of a lens; leave it out with --mode reflect");
+  }
   if (!is_mirror(o) && o.light.incidence != 0.0) {
     refuse("--incidence " + number_text(o.light.incidence), "needs --mode reflect, or must be 0");
   }
@@ -275,6 +278,7 @@ OpticalSetup optical_setup(const DesignOptions& options, const Eigen::Vector2i& 
   OpticalSetup setup;
   setup.mode = options.light.mode;
   setup.ior = options.ior;
+  setup.fresnel = options.light.fresnel;
   setup.focal_length = options.focal_length;
   setup.lens_size = lens_size(options, pixels);
   setup.image_size = setup.lens_size;

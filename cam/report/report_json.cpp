@@ -60,6 +60,7 @@ json leakage_json(const ReportData& data) {
   return {{"share", part.leakage},
           {"dark_flux", part.dark_flux},
           {"contrast", number(part.contrast())},
+          {"ghost_share", data.ghost},
           {"dark_below_mean_share", data.leakage_options.dark_below},
           {"bright_from_mean_share", data.leakage_options.bright_from},
           {"dark_pixels", result.dark_pixels},

@@ -189,6 +189,15 @@ std::string certificates(const ReportData& data) {
                                   rows));
 }
 
+/// What nothing in the forecast counts.
+std::string ghost_words(const ReportData& data) {
+  if (!(data.ghost > 0.0)) return "";
+  const std::string share = percent_text(data.ghost);
+  return " Light that both faces of the lens reflect, " + share +
+         " of all, is left out: spread evenly over the picture, it leaves no part darker than " +
+         share + " of the mean.";
+}
+
 std::string leakage(const ReportData& data) {
   if (data.leakage.steps.empty()) return "";
   const LeakageOptions& o = data.leakage_options;
@@ -199,7 +208,8 @@ std::string leakage(const ReportData& data) {
       " pixels), bright ones those from " + percent_text(o.bright_from) + " on (" +
       count_text(data.leakage.bright_pixels) +
       "). Contrast is the bright pixels’ mean to the dark ones’. Each cause is what it adds to "
-      "those above it; polishing is in every line, so the causes sum to the part.";
+      "those above it; polishing is in every line, so the causes sum to the part." +
+      ghost_words(data);
   return html_section("Light and leakage",
                       quality_table(data.leakage) +
                           element("h3", "style=\"margin-top:1.2rem\"", "Leakage by cause") +

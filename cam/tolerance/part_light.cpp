@@ -17,6 +17,8 @@ Eigen::Matrix3d turn_of(const Eigen::Vector2d& tilt) {
 /// The setup as the part sees it from its own frame. The screen's distance counts in land().
 OpticalSetup seen_by_part(const OpticalSetup& setup, const PartError& error) {
   OpticalSetup seen = setup;
+  // Parts are compared with each other: what their faces reflect differs by less than they do.
+  seen.fresnel = false;
   seen.ior += error.index;
   if (!error.tilt.isZero()) {
     seen.light = (turn_of(error.tilt).transpose() * setup.light).normalized();

@@ -30,6 +30,8 @@ struct FrontRefraction {
   Eigen::Vector2d gradient{0.0, 0.0};  ///< ∇h
   Eigen::Vector3d b_by_x{0.0, 0.0, 0.0};
   Eigen::Vector3d b_by_y{0.0, 0.0, 0.0};
+  double inside = 1.0;  ///< n·b
+  Eigen::Vector2d inside_by_x{0.0, 0.0};
   bool lit = false;  ///< False where the light comes from the other side.
 
   FrontRefraction() = default;
@@ -50,13 +52,16 @@ struct FrontRefraction {
     const double root = std::sqrt(refracted_cosine_squared(c, eta));
     const double k = root - eta * c;
     b = k * n + eta * a;
+    inside = root;
     for (int j = 0; j < 2; ++j) {
       const Eigen::Vector3d dw(-h.bend[j], -h.bend[j + 1], 0.0);
       const Eigen::Vector3d dn = (dw - n.dot(dw) * n) / length;
       const Eigen::Vector3d de(j == 0 ? 1.0 : 0.0, j == 0 ? 0.0 : 1.0, h.gradient[j]);
       Eigen::Vector3d da(0.0, 0.0, 0.0);
       if (light.point) da = (de - a.dot(de) * a) / distance;
-      const double dk = (eta * eta * c / root - eta) * (dn.dot(a) + n.dot(da));
+      const double dc = dn.dot(a) + n.dot(da);
+      inside_by_x[j] = eta * eta * c / root * dc;
+      const double dk = inside_by_x[j] - eta * dc;
       (j == 0 ? b_by_x : b_by_y) = dk * n + k * dn + eta * da;
     }
   }
@@ -70,6 +75,7 @@ struct FrontRefraction {
   LF_HD void move(const Eigen::Vector2d& step) {
     e += Eigen::Vector3d(step.x(), step.y(), gradient.dot(step));
     b += step.x() * b_by_x + step.y() * b_by_y;
+    inside += inside_by_x.dot(step);
   }
 };
 
@@ -115,6 +121,9 @@ class FrontEntry {
   /// Where the ray enters the front; NaN where none comes to p.
   [[nodiscard]] LF_HD const Eigen::Vector3d& entry() const { return ray_.e; }
 
+  /// Cosine of the angle between direction() and the front's normal there.
+  [[nodiscard]] LF_HD double cosine() const { return ray_.inside; }
+
   /// Adjoint of p ↦ direction(): the derivative by p.
   [[nodiscard]] LF_HD Eigen::Vector3d direction_adjoint(const Eigen::Vector3d& b_bar) const {
     return place_adjoint({ray_.b_by_x.dot(b_bar), ray_.b_by_y.dot(b_bar)});
@@ -122,6 +131,11 @@ class FrontEntry {
   /// Adjoint of p ↦ entry(): the derivative by p.
   [[nodiscard]] LF_HD Eigen::Vector3d entry_adjoint(const Eigen::Vector3d& e_bar) const {
     return place_adjoint(Eigen::Vector2d(e_bar.x(), e_bar.y()) + e_bar.z() * ray_.gradient);
+  }
+
+  /// Adjoint of p ↦ cosine(): the derivative by p.
+  [[nodiscard]] LF_HD Eigen::Vector3d cosine_adjoint(double bar) const {
+    return place_adjoint(bar * ray_.inside_by_x);
   }
 
  private:

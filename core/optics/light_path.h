@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "core/compute/host_device.h"
+#include "core/optics/fresnel.h"
 #include "core/optics/image_plane.h"
 #include "core/optics/light_source.h"
 #include "core/optics/optical_setup.h"
@@ -164,11 +165,16 @@ class LightPath {
   [[nodiscard]] bool before_screen(const Eigen::Vector3d& p) const { return clearance(p) > 0.0; }
 
   /// Light that a triangle takes, as the area of evenly lit lens that takes as much, mm²: where its
-  /// rays enter the lens. Moving a vertex inside a mesh never changes the sum over its triangles.
-  [[nodiscard]] LF_HD double intake(const Corners& t) const { return source_.intake(t); }
+  /// rays enter the lens. Moving a vertex inside a mesh never changes the sum over its triangles,
+  /// unless faces reflect: then it is what the triangle lets out, by its own normal and the light
+  /// at its middle, and of a lens that its light meets at right angles the same.
+  [[nodiscard]] LF_HD double intake(const Corners& t) const {
+    const double even = source_.intake(t);
+    return loses() ? even * Passage(*this, t).share() : even;
+  }
   /// True if intake() is the plan area however a triangle slopes, so that all cells of an even grid
   /// take the same.
-  [[nodiscard]] LF_HD bool intake_is_plan_area() const { return source_.along_z(); }
+  [[nodiscard]] LF_HD bool intake_is_plan_area() const { return source_.along_z() && !loses(); }
 
   /// intake() as a share of the whole (Sun et al., Eq. 1): of what a flat surface of the lens's
   /// size takes, or of what sharing() was given.
@@ -177,7 +183,11 @@ class LightPath {
   /// depends on that alone.
   LF_HD void flux_adjoint(const Corners& t, double flux_bar, Corners& t_bar,
                           Eigen::Vector3d& area_normal_bar) const {
-    source_.intake_adjoint(t, flux_bar / whole_, t_bar, area_normal_bar);
+    const double bar = flux_bar / whole_;
+    if (!loses()) return source_.intake_adjoint(t, bar, t_bar, area_normal_bar);
+    const Passage passage(*this, t);
+    source_.intake_adjoint(t, bar * passage.share(), t_bar, area_normal_bar);
+    passage.adjoint(*this, bar * source_.intake(t), t_bar, area_normal_bar);
   }
 
   /// Gradient (∂z/∂x, ∂z/∂y) of the surface at p that sends its light to a point of the picture.
@@ -208,7 +218,47 @@ class LightPath {
     Eigen::Vector3d by_n;
   };
 
+  /// What goes through both faces of a lens to a triangle's middle and out there, as a share of
+  /// what goes through at right angles.
+  class Passage {
+   public:
+    LF_HD Passage(const LightPath& light, const Corners& t)
+        : middle_((t.v0 + t.v1 + t.v2) / 3.0),
+          n_(area_normal(t)),
+          length_(n_.norm()),
+          a_(light.source_.incident(middle_)),
+          straight_(light.straight_) {
+      n_ /= length_;
+      front_ = transmittance(light.source_.front_cosine(middle_), light.eta_);
+      back_ = transmittance(n_.dot(a_), light.eta_);
+    }
+    [[nodiscard]] LF_HD double share() const { return front_.value * back_.value / straight_; }
+    /// Adjoint of share(): adds to the derivatives by the corners and by area_normal(t).
+    LF_HD void adjoint(const LightPath& light, double bar, Corners& t_bar,
+                       Eigen::Vector3d& area_normal_bar) const {
+      const double back_bar = bar * front_.value * back_.slope / straight_;
+      const double front_bar = bar * back_.value * front_.slope / straight_;
+      area_normal_bar += normalize_adjoint(n_, length_, back_bar * a_);
+      const Eigen::Vector3d third = (light.source_.incident_adjoint(middle_, back_bar * n_) +
+                                     light.source_.front_cosine_adjoint(middle_, front_bar)) /
+                                    3.0;
+      t_bar.v0 += third;
+      t_bar.v1 += third;
+      t_bar.v2 += third;
+    }
+
+   private:
+    Eigen::Vector3d middle_;
+    Eigen::Vector3d n_;
+    double length_;
+    Eigen::Vector3d a_;
+    double straight_;
+    ValueSlope front_{};
+    ValueSlope back_{};
+  };
+
   [[nodiscard]] LF_HD bool reflects() const { return reflects_ != 0; }
+  [[nodiscard]] LF_HD bool loses() const { return straight_ != 0.0; }
   [[nodiscard]] LF_HD ValueSlope barrier_along_z(const Eigen::Vector3d& n) const {
     if (screen_.turned() && !transmits(Eigen::Vector3d(0.0, 0.0, 0.0), n)) return {kInfinity, 0.0};
     return reflection_barrier(n.z(), eta_);
@@ -250,8 +300,10 @@ class LightPath {
 
   Screen screen_;
   LightSource source_;
-  double whole_;            ///< mm²
-  double eta_;              ///< n_lens / n_air
+  double whole_;     ///< mm²
+  double eta_;       ///< n_lens / n_air
+  double straight_;  ///< Of OpticalSetup::fresnel: share that goes through both faces at right
+                     ///< angles; 0: not asked.
   std::int64_t reflects_;   ///< Wide, so that no bytes of a kernel's argument are left unset.
   Eigen::Vector2d middle_;  ///< Of the lens, mm.
 };

@@ -63,6 +63,20 @@ class LightSource {
   /// Where the ray to p enters the lens, or the place of p on a mirror, mm.
   [[nodiscard]] Eigen::Vector3d entry(const Eigen::Vector3d& p) const;
 
+  /// Cosine of the angle between a lens's front and the light behind it that comes to p; 1 where it
+  /// is the same for all of the lens.
+  [[nodiscard]] LF_HD double front_cosine(const Eigen::Vector3d& p) const {
+    if (is_bent()) return entry_to(p).cosine();
+    return kind_ == Kind::kPointBehindFront ? incident(p).z() : 1.0;
+  }
+  /// Adjoint of front_cosine(): the derivative by p.
+  [[nodiscard]] LF_HD Eigen::Vector3d front_cosine_adjoint(const Eigen::Vector3d& p,
+                                                           double bar) const {
+    if (is_bent()) return entry_to(p).cosine_adjoint(bar);
+    if (kind_ != Kind::kPointBehindFront) return {0.0, 0.0, 0.0};
+    return incident_adjoint(p, {0.0, 0.0, bar});
+  }
+
   /// Light that a triangle takes, mm²: where the rays enter, the area of evenly lit lens that takes
   /// as much, of a point source the solid angle on the scale of the middle of the lens.
   [[nodiscard]] LF_HD double intake(const Corners& t) const {

@@ -101,6 +101,8 @@ void validate(const OpticalSetup& setup) {
             setup.image_origin[axis], "a finite number of mm");
     require(setup.pixels[axis] > 0, "pixels" + index, setup.pixels[axis], "1 or more");
   }
+  require(!setup.fresnel || setup.mode == LightMode::kRefract, "fresnel", "true",
+          "left out of a mirror");
   require_front(setup);
 }
 

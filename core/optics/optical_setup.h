@@ -43,7 +43,9 @@ struct OpticalSetup {
   std::optional<PointSource> point;  ///< Instead of parallel light.
   /// Entry face of a lens; none: the plane z = 0.
   std::optional<SphericalFront> front;
-  SourceExtent extent;                       ///< Of either; LightPath takes it for a point.
+  SourceExtent extent;  ///< Of either; LightPath takes it for a point.
+  /// Light that a lens's faces reflect is missing behind them, steeper ones let less through.
+  bool fresnel = false;
   double ior = 1.49;                         ///< Refractive index of the lens against air, > 1.
   double focal_length = 300.0;               ///< z of the picture's centre, mm; above the surface.
   Eigen::Vector2d lens_size{100.0, 100.0};   ///< mm

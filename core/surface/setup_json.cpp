@@ -134,6 +134,12 @@ ordered_json front_json(const OpticalSetup& setup) {
       {"type", "sphere"}, {"radius", setup.front->radius}, {"apex", array_of(setup.front->apex)}};
 }
 
+bool read_fresnel(const JsonFields& fields) {
+  const nlohmann::json& value = fields.at("fresnel");
+  if (!value.is_boolean()) fields.refuse("fresnel", "it must be true or false");
+  return value.get<bool>();
+}
+
 void read_screen(const JsonFields& screen, OpticalSetup& setup) {
   setup.screen_x = right_along_x(setup) * screen.number_triple("right");
   setup.screen_y = screen.number_triple("up");
@@ -166,6 +172,7 @@ ordered_json setup_json(const OpticalSetup& setup) {
   document["source"] = source_json(setup);
   if (lens) document["front"] = front_json(setup);
   document["ior"] = setup.ior;
+  if (setup.fresnel) document["fresnel"] = true;
   if (!setup.screen_is_turned()) document["focal_length"] = setup.focal_length;
   document["lens_size"] = array_of(setup.lens_size);
   document["image_size"] = array_of(setup.image_size);
@@ -187,6 +194,7 @@ OpticalSetup read_setup(const JsonFields& fields) {
   read_source(fields.object("source"), setup);
   if (fields.has("front")) read_front(fields.object("front"), setup);
   setup.ior = fields.number("ior");
+  if (fields.has("fresnel")) setup.fresnel = read_fresnel(fields);
   setup.lens_size = fields.number_pair("lens_size");
   setup.image_size = fields.number_pair("image_size");
   setup.image_origin = fields.number_pair("image_origin");

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 #include <optional>
+#include <string>
 #include <utility>
 
 #include "core/error.h"
@@ -134,10 +135,21 @@ class Schedule {
       Eigen::Matrix3Xd targets = targets_for(paths);
       if (denoiser) targets = denoiser->denoise(targets);
       const Eigen::Matrix3Xd asked = pursues() ? unmet.added_to(targets) : targets;
-      mesh_.vertices = constraints.enforced(shape.moved(mesh_.vertices, asked, executor_));
+      const Eigen::Matrix3Xd moved =
+          constraints.enforced(shape.moved(mesh_.vertices, asked, executor_));
+      require_numbers(moved);
+      mesh_.vertices = moved;
       if (pursues()) unmet.record(targets, measure_faces(mesh_).normal);
       record(row);
     }
+  }
+
+  /// Without the denoiser's and the anchor's hold the published steps may lose a shape altogether.
+  void require_numbers(const Eigen::Matrix3Xd& vertices) const {
+    if (vertices.allFinite()) return;
+    throw RunError("update " + std::to_string(number() + 1) +
+                   " moved vertices to places that are no numbers; another --anchor or --seed may "
+                   "help");
   }
 
   /// Whether normals go a part of the way in each update, and further where they did not arrive.

@@ -81,7 +81,10 @@ OpticalSetup lit_by(const KindOfLight& kind, OpticalSetup setup) {
   return setup;
 }
 
-constexpr KindOfLight kKinds[] = {{"Oblique", light_from_the_side},
+void reflecting_faces(OpticalSetup& setup) { setup.fresnel = true; }
+
+constexpr KindOfLight kKinds[] = {{"ReflectingFaces", reflecting_faces},
+                                  {"Oblique", light_from_the_side},
                                   {"TurnedScreen", large_turned_screen},
                                   {"Point", point_source},
                                   {"Mirror", mirror},

@@ -132,7 +132,9 @@ class PathEstimator::Walker {
     const Vector3d n = normals_.col(place.face);
     Bounce bounce;
     bounce.w_i = drawn_direction(n, place.w_o, random);
-    if (n.dot(bounce.w_i) <= 0.0) return bounce;
+    // Said so that a direction which is no number goes nowhere, either: Embree would end the
+    // program.
+    if (!(n.dot(bounce.w_i) > 0.0)) return bounce;
     const RayHit hit = e_.scene_.nearest(place.p, bounce.w_i);
     if (!hit.met() || e_.faces_.normal.col(hit.face).dot(bounce.w_i) >= 0.0) return bounce;
     const Vector3d q =

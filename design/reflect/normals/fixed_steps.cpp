@@ -14,7 +14,9 @@ Eigen::Matrix3Xd stepped_normals(const PathEstimator& estimator, const NormalAnc
                                  const Eigen::VectorXd& area_share, const Eigen::Matrix3Xd& start,
                                  int steps, std::uint64_t seed) {
   Eigen::Matrix3Xd t = start;
-  const Eigen::VectorXd per_area = area_share.cwiseInverse();
+  // A face that has lost its area sends no light.
+  const Eigen::VectorXd per_area =
+      area_share.unaryExpr([](double share) { return share > 0.0 ? 1.0 / share : 0.0; });
   for (int step = 0; step < steps; ++step) {
     const Eigen::Matrix3Xd g = estimator.gradient(t, seed + static_cast<std::uint64_t>(step));
     t -= (kStep / kPaperFaces) * (0.5 * g * per_area.asDiagonal() +

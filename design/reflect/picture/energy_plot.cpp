@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
+#include <limits>
 #include <string_view>
 
 #include "core/page/html_text.h"
@@ -24,14 +26,18 @@ constexpr double kFloor = 1e-12;
 /// From seconds and energies to the drawing.
 class Axes {
  public:
-  explicit Axes(const std::vector<ReflectUpdate>& updates)
-      : seconds_(std::max(updates.back().seconds, 1e-3)) {
-    const auto less = [](const ReflectUpdate& a, const ReflectUpdate& b) {
-      return a.energy < b.energy;
-    };
-    const auto [least, most] = std::minmax_element(updates.begin(), updates.end(), less);
-    low_ = static_cast<int>(std::floor(decade_of(least->energy)));
-    high_ = std::max(low_ + 1, static_cast<int>(std::ceil(decade_of(most->energy))));
+  explicit Axes(const std::vector<EnergyCurve>& curves) {
+    double least = std::numeric_limits<double>::infinity();
+    double most = -least;
+    for (const EnergyCurve& curve : curves) {
+      for (const Eigen::Vector2d& point : curve.points) {
+        seconds_ = std::max(seconds_, point.x());
+        least = std::min(least, decade_of(point.y()));
+        most = std::max(most, decade_of(point.y()));
+      }
+    }
+    low_ = static_cast<int>(std::floor(least));
+    high_ = std::max(low_ + 1, static_cast<int>(std::ceil(most)));
   }
 
   [[nodiscard]] double seconds() const { return seconds_; }
@@ -43,15 +49,14 @@ class Axes {
   [[nodiscard]] double y(double decade) const {
     return kHeight - kMargin - (kHeight - 2.0 * kMargin) * (decade - low_) / (high_ - low_);
   }
-  [[nodiscard]] std::string point(const ReflectUpdate& update) const {
-    return decimal_text(x(update.seconds), 1) + "," + decimal_text(y(decade_of(update.energy)), 1) +
-           " ";
+  [[nodiscard]] std::string drawn(const Eigen::Vector2d& point) const {
+    return decimal_text(x(point.x()), 1) + "," + decimal_text(y(decade_of(point.y())), 1) + " ";
   }
 
  private:
   static double decade_of(double energy) { return std::log10(std::max(std::abs(energy), kFloor)); }
 
-  double seconds_;
+  double seconds_ = 1e-3;
   int low_ = 0;
   int high_ = 1;
 };
@@ -75,38 +80,44 @@ std::string decades(const Axes& axes) {
   return lines;
 }
 
-/// The stages' lines, each with its name.
-std::string curves(const std::vector<ReflectUpdate>& updates, const Axes& axes) {
+/// The curves, each with its name.
+std::string lines_of(const std::vector<EnergyCurve>& curves, const Axes& axes) {
   std::string lines;
-  std::size_t stage = 0;
-  for (auto first = updates.begin(); first != updates.end(); ++stage) {
-    const auto last = std::find_if(first, updates.end(), [&](const ReflectUpdate& update) {
-      return update.stage != first->stage;
-    });
+  for (std::size_t i = 0; i < curves.size(); ++i) {
     std::string points;
-    for (auto update = first; update != last; ++update) points += axes.point(*update);
-    const std::string_view color = kColors[stage % kColors.size()];
+    for (const Eigen::Vector2d& point : curves[i].points) points += axes.drawn(point);
+    const std::string_view color = kColors[i % kColors.size()];
     lines += joined({"<polyline points=\"", points, "\" fill=\"none\" stroke-width=\"2\" stroke=\"",
                      color, "\"/>"});
-    const double row = kMargin - 10.0;
-    lines += words(kLeft + 130.0 * static_cast<double>(stage), row,
-                   joined({"fill=\"", color, "\""}), first->stage);
-    first = last;
+    lines += words(kLeft + 130.0 * static_cast<double>(i), kMargin - 10.0,
+                   joined({"fill=\"", color, "\""}), curves[i].name);
   }
   return lines;
 }
 
 }  // namespace
 
-std::string energy_plot(const std::vector<ReflectUpdate>& updates) {
-  if (updates.size() < 2) return "";
-  const Axes axes(updates);
+std::vector<EnergyCurve> stage_curves(const std::vector<ReflectUpdate>& updates) {
+  std::vector<EnergyCurve> curves;
+  for (const ReflectUpdate& update : updates) {
+    if (curves.empty() || curves.back().name != update.stage) curves.push_back({update.stage, {}});
+    curves.back().points.emplace_back(update.seconds, update.energy);
+  }
+  return curves;
+}
+
+std::string energy_plot(const std::vector<EnergyCurve>& curves) {
+  std::size_t points = 0;
+  for (const EnergyCurve& curve : curves) points += curve.points.size();
+  if (points < 2) return "";
+  const Axes axes(curves);
   const std::string end = decimal_text(axes.seconds(), 1) + " s";
   return element("svg",
-                 joined({"viewBox=\"0 0 ", decimal_text(kWidth, 0), " ", decimal_text(kHeight, 0),
+                 joined({"xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 ",
+                         decimal_text(kWidth, 0), " ", decimal_text(kHeight, 0),
                          "\" role=\"img\" aria-label=\"Energy over time\" font-size=\"13\" "
                          "font-family=\"Arial, sans-serif\" style=\"background:#fff\""}),
-                 decades(axes) + curves(updates, axes) + words(kLeft, kHeight - 8.0, "", "0 s") +
+                 decades(axes) + lines_of(curves, axes) + words(kLeft, kHeight - 8.0, "", "0 s") +
                      words(kWidth - kMargin, kHeight - 8.0, "text-anchor=\"end\"", end));
 }
 

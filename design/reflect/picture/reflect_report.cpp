@@ -111,7 +111,7 @@ std::string picture_sections(const ReflectResult& result, const GoalWords& words
 }
 
 std::string energy_section(const ReflectResult& result) {
-  const std::string plot = energy_plot(result.updates);
+  const std::string plot = energy_plot(stage_curves(result.updates));
   if (plot.empty()) return "";
   return html_section("Energy over time",
                       element("figure", "",

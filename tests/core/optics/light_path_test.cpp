@@ -8,6 +8,7 @@
 #include <numbers>
 #include <string>
 
+#include "core/optics/fresnel.h"
 #include "core/optics/light_setups.h"
 #include "design/finite_difference.h"
 #include "design/random_corners.h"
@@ -293,19 +294,72 @@ TEST_P(EveryLight, FluxOfAPointSourceIsItsIntensityOverTheSolidAngle) {
   }
 }
 
-TEST_P(EveryLight, FluxAdjointEqualsCentralDifferences) {
+void expect_flux_adjoint(const LightPath& light, double step, double tolerance) {
   Random random(6);
   for (int i = 0; i < 100; ++i) {
     const Corners t = random_corners(random);
     const auto f = [&](const Eigen::VectorXd& x) {
-      return 0.7 * light_.flux(testing::unpack_corners(x));
+      return 0.7 * light.flux(testing::unpack_corners(x));
     };
     Corners t_bar;
     Eigen::Vector3d area_normal_bar = Eigen::Vector3d::Zero();
-    light_.flux_adjoint(t, 0.7, t_bar, area_normal_bar);
+    light.flux_adjoint(t, 0.7, t_bar, area_normal_bar);
     area_normal_adjoint(t, area_normal_bar, t_bar);
-    EXPECT_LT(testing::plateau_error(testing::pack(t_bar), f, testing::pack(t), 1e-2), 1e-9);
+    EXPECT_LT(testing::plateau_error(testing::pack(t_bar), f, testing::pack(t), step), tolerance);
   }
+}
+
+TEST_P(EveryLight, FluxAdjointEqualsCentralDifferences) { expect_flux_adjoint(light_, 1e-2, 1e-9); }
+
+TEST_P(EveryLight, FluxAdjointWithReflectingFacesEqualsCentralDifferences) {
+  if (!mirror_) expect_flux_adjoint(LightPath(losing(setup_)), 1e-4, 1e-7);
+}
+
+/// Share of unpolarised light through a face by the angles on both sides (Born and Wolf, 1.5.2).
+double transmitted_by_angles(const Eigen::Vector3d& before, const Eigen::Vector3d& behind,
+                             const Eigen::Vector3d& n) {
+  const double i = std::acos(n.dot(before));
+  const double t = std::acos(n.dot(behind));
+  if (std::abs(i) < 1e-6) return transmittance(1.0, 1.49).value;
+  const double across = std::sin(i - t) / std::sin(i + t);
+  const double along = std::tan(i - t) / std::tan(i + t);
+  return 1.0 - 0.5 * (across * across + along * along);
+}
+
+TEST_P(EveryLight, ReflectingFacesTakeWhatFresnelsFormulasSay) {
+  if (mirror_) return;
+  Random random(9);
+  const LightPath losing_light(losing(setup_));
+  for (int i = 0; i < 200; ++i) {
+    const Corners t = random_corners(random);
+    const Eigen::Vector3d middle = (t.v0 + t.v1 + t.v2) / 3.0;
+    const Eigen::Vector3d n = area_normal(t).normalized();
+    if (!light_.transmits(middle, n)) continue;
+    const Eigen::Vector3d a = incident(middle);
+    double share = transmitted_by_angles(a, testing::refract_by_angles(a, n, setup_.ior), n);
+    if (setup_.point || setup_.front) {
+      const LightSource source(setup_);
+      const Eigen::Vector3d entry = source.entry(middle);
+      const Eigen::Vector3d before =
+          setup_.point ? Eigen::Vector3d((entry - setup_.point->position).normalized())
+                       : setup_.light;
+      const Eigen::Vector3d front =
+          setup_.front ? front_normal(*setup_.front, entry) : Eigen::Vector3d::UnitZ();
+      share *= transmitted_by_angles(before, a, front);
+    } else {
+      share *= transmittance(1.0, 1.49).value;
+    }
+    const double straight = std::pow(transmittance(1.0, 1.49).value, 2);
+    EXPECT_NEAR(losing_light.intake(t) / light_.intake(t), share / straight, 1e-10);
+  }
+}
+
+TEST(LightPath, ReflectingFacesTakeNothingOfALensThatIsFlat) {
+  const LightPath light(losing(shifted_setup()));
+  const Corners t{{0.0, 0.0, 5.0}, {2.0, 0.0, 5.0}, {0.0, 3.0, 5.0}};
+  EXPECT_NEAR(light.intake(t), 3.0, 1e-12);
+  EXPECT_FALSE(light.intake_is_plan_area());
+  EXPECT_TRUE(LightPath(shifted_setup()).intake_is_plan_area());
 }
 
 TEST_P(EveryLight, ASurfaceOfTheWantedGradientSendsItsLightThere) {

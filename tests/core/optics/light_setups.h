@@ -71,6 +71,11 @@ inline OpticalSetup point_front_setup(double radius, Emission emission) {
   return setup;
 }
 
+inline OpticalSetup losing(OpticalSetup setup) {
+  setup.fresnel = true;
+  return setup;
+}
+
 struct KindOfLight {
   const char* name;
   OpticalSetup setup;

@@ -44,6 +44,9 @@ TEST(SetupJson, EveryLightAndScreenComesBackToTheBit) {
   setup.view = ViewSide::kRear;
   setup.point = PointSource{{1.0, 2.0, -30.1}, Emission::kLambertian};
   EXPECT_EQ(written_and_read(setup), setup);
+  setup.fresnel = true;
+  EXPECT_EQ(written_and_read(setup), setup);
+  setup.fresnel = false;
   setup.mode = LightMode::kReflect;
   setup.point->position.z() = 30.1;
   EXPECT_EQ(written_and_read(setup), setup);

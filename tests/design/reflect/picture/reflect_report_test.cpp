@@ -81,7 +81,7 @@ std::vector<double> first_line(const std::string& svg) {
 }
 
 TEST(EnergyPlot, HasALineForEveryStageOnADecadeScale) {
-  const std::string svg = energy_plot(sample_result().updates);
+  const std::string svg = energy_plot(stage_curves(sample_result().updates));
   EXPECT_THAT(svg, HasSubstr("1e-2"));
   EXPECT_THAT(svg, HasSubstr("1e0"));
   EXPECT_THAT(svg, HasSubstr("4.0 s"));
@@ -96,7 +96,7 @@ TEST(EnergyPlot, HasALineForEveryStageOnADecadeScale) {
 
 TEST(EnergyPlot, OneUpdateHasNoLine) {
   EXPECT_EQ(energy_plot({}), "");
-  EXPECT_EQ(energy_plot({{1, "face", 0.5, 0.0, 0.0, 1.0}}), "");
+  EXPECT_EQ(energy_plot(stage_curves({{1, "face", 0.5, 0.0, 0.0, 1.0}})), "");
 }
 
 }  // namespace
