@@ -46,6 +46,10 @@ constexpr std::size_t kStealthWindow = 8;
 /// 0.0075 for the same displacement.
 constexpr double kStay = 0.74;
 
+/// Vertices beyond this many diagonals have lost the shape; Embree ends the program for rays from
+/// far beyond.
+constexpr double kFarthest = 1e6 * kUnitDiagonal;
+
 /// Steps of the normals that one seed may number.
 constexpr std::uint64_t kSeedStride = std::uint64_t{1} << 32U;
 
@@ -137,7 +141,7 @@ class Schedule {
       const Eigen::Matrix3Xd asked = pursues() ? unmet.added_to(targets) : targets;
       const Eigen::Matrix3Xd moved =
           constraints.enforced(shape.moved(mesh_.vertices, asked, executor_));
-      require_numbers(moved);
+      require_near(moved);
       mesh_.vertices = moved;
       if (pursues()) unmet.record(targets, measure_faces(mesh_).normal);
       record(row);
@@ -145,11 +149,10 @@ class Schedule {
   }
 
   /// Without the denoiser's and the anchor's hold the published steps may lose a shape altogether.
-  void require_numbers(const Eigen::Matrix3Xd& vertices) const {
-    if (vertices.allFinite()) return;
+  void require_near(const Eigen::Matrix3Xd& vertices) const {
+    if (vertices.allFinite() && vertices.cwiseAbs().maxCoeff() < kFarthest) return;
     throw RunError("update " + std::to_string(number() + 1) +
-                   " moved vertices to places that are no numbers; another --anchor or --seed may "
-                   "help");
+                   " moved vertices out of all bounds; another --anchor or --seed may help");
   }
 
   /// Whether normals go a part of the way in each update, and further where they did not arrive.

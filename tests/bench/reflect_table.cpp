@@ -1,14 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The reflector stage on the drawn shapes: a Markdown table of the energy that each method reaches
-// and of how far it moves the vertices for that.
+// The reflector stage on the drawn shapes, as Markdown tables: both methods at equal displacement,
+// the figures of Tojo et al., and what silhouettes add to gradients by normals.
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <exception>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "bench/markdown_table.h"
+#include "bench/reflect_figures.h"
 #include "core/text/number_text.h"
 #include "design/reflect/reflect_shape.h"
 #include "fixtures/shapes/shapes.h"
@@ -22,76 +25,133 @@ using reflect::ReflectResult;
 
 /// The paper's usual weight of the denoiser.
 constexpr double kPaperDenoise = 250.0;
+/// Displacements that differ by less than this share are called equal.
+constexpr double kEqual = 0.05;
+/// Runs of the paper's method that look for the displacement of the exact one.
+constexpr int kSearch = 8;
 
 struct Settings {
   std::vector<std::string> shapes;
-  std::vector<double> anchors{0.1, 0.01, 0.001};
-  int faces = 1000;
+  std::vector<double> anchors{0.03};
+  std::vector<std::string> figures = figure_names();
+  int faces = 400;
   int updates = 30;
   int threads = 2;
+  std::string plots;
 };
 
-ReflectOptions options_of(const Settings& settings, Method method, double anchor) {
-  ReflectOptions options;
-  options.method = method;
-  options.anchor = anchor;
-  options.faces = settings.faces;
-  options.rim_updates = settings.updates;
-  options.face_updates = settings.updates;
-  options.split = false;
-  if (method == Method::kPaper) options.denoise = kPaperDenoise;
-  return options;
-}
+class MethodTable {
+ public:
+  explicit MethodTable(const Settings& settings)
+      : settings_(settings), executor_(Executor::cpu(settings.threads)) {}
 
-MarkdownTable::Row row_of(const std::string& shape, const ReflectResult& result,
-                          const ReflectOptions& options) {
-  return {shape + (options.method == Method::kPaper ? ", paper" : ", exact"),
-          number_text(options.anchor, 3),
-          std::to_string(result.mesh.triangle_count()),
-          number_text(result.before.total, 3),
-          number_text(result.after.total, 3),
-          decimals(100.0 * result.mean_displacement, 2),
-          std::to_string(result.updates.size()),
-          decimals(result.seconds, 1)};
-}
-
-void add_shape(const Settings& settings, const shapes::NamedShape& shape, MarkdownTable& table) {
-  const SurfaceMesh mesh = shape.draw();
-  const Executor executor = Executor::cpu(settings.threads);
-  for (const Method method : {Method::kPaper, Method::kExact}) {
-    for (const double anchor : settings.anchors) {
-      const ReflectOptions options = options_of(settings, method, anchor);
-      const auto input = reflect::prepared_input(mesh, shape.name, options);
-      table.add(row_of(shape.name, reflect_shape(input, options, executor, RunControl()), options));
+  std::string text() {
+    for (const shapes::NamedShape& shape : shapes::drawn_shapes()) {
+      const auto wanted = std::find(settings_.shapes.begin(), settings_.shapes.end(), shape.name);
+      if (!settings_.shapes.empty() && wanted == settings_.shapes.end()) continue;
+      for (const double anchor : settings_.anchors) add(shape, anchor);
+      std::fprintf(stderr, "methods: %s: done\n", shape.name.c_str());
     }
+    return table_.text();
   }
-  std::fprintf(stderr, "%s: done\n", shape.name.c_str());
-}
 
-std::string table_text(const Settings& settings) {
-  MarkdownTable table({"shape, method", "anchor", "faces", "energy before", "after",
-                       "mean displacement, %", "updates", "seconds"});
-  for (const shapes::NamedShape& shape : shapes::drawn_shapes()) {
-    const auto wanted = std::find(settings.shapes.begin(), settings.shapes.end(), shape.name);
-    if (!settings.shapes.empty() && wanted == settings.shapes.end()) continue;
-    add_shape(settings, shape, table);
+ private:
+  struct Run {
+    ReflectResult result;
+    double anchor = 0.0;
+  };
+
+  void add(const shapes::NamedShape& shape, double anchor) {
+    const Run exact = run(shape, Method::kExact, anchor);
+    add_row(shape.name + ", exact", exact);
+    add_row(shape.name + ", paper", equal_run(shape, exact));
   }
-  return table.text();
+
+  Run run(const shapes::NamedShape& shape, Method method, double anchor) {
+    ReflectOptions options;
+    options.method = method;
+    options.anchor = anchor;
+    options.faces = settings_.faces;
+    options.rim_updates = settings_.updates;
+    options.face_updates = settings_.updates;
+    options.split = false;
+    if (method == Method::kPaper) options.denoise = kPaperDenoise;
+    const auto input = reflect::prepared_input(shape.draw(), shape.name, options);
+    return {reflect_shape(input, options, executor_, RunControl()), anchor};
+  }
+
+  /// The paper's method with the anchor at which it moves vertices as far as the exact one did: a
+  /// bisection by the anchor's logarithm. Its runs are draws, so that the nearest one is taken.
+  Run equal_run(const shapes::NamedShape& shape, const Run& exact) {
+    const double wanted = exact.result.mean_displacement;
+    Run best = run(shape, Method::kPaper, exact.anchor);
+    double low = exact.anchor / 64.0;
+    double high = exact.anchor * 256.0;
+    (best.result.mean_displacement > wanted ? low : high) = exact.anchor;
+    for (int i = 0; i < kSearch && off(best, wanted) > kEqual; ++i) {
+      Run next = run(shape, Method::kPaper, std::sqrt(low * high));
+      (next.result.mean_displacement > wanted ? low : high) = next.anchor;
+      if (off(next, wanted) < off(best, wanted)) best = std::move(next);
+    }
+    return best;
+  }
+
+  static double off(const Run& run, double wanted) {
+    return std::abs(run.result.mean_displacement / wanted - 1.0);
+  }
+
+  void add_row(const std::string& name, const Run& run) {
+    const ReflectResult& result = run.result;
+    table_.add({name, number_text(run.anchor, 3), std::to_string(result.mesh.triangle_count()),
+                number_text(result.before.total, 3), number_text(result.after.total, 3),
+                decimals(100.0 * result.mean_displacement, 2),
+                std::to_string(result.updates.size()), decimals(result.seconds, 1)});
+  }
+
+  const Settings& settings_;
+  Executor executor_;
+  MarkdownTable table_{{"shape, method", "anchor", "faces", "energy before", "after",
+                        "mean displacement, %", "updates", "seconds"}};
+};
+
+void print(const Settings& settings, const std::vector<std::string>& parts) {
+  const Executor executor = Executor::cpu(settings.threads);
+  for (const std::string& part : parts) {
+    if (part == "methods") std::puts(MethodTable(settings).text().c_str());
+    if (part == "figures") {
+      std::puts(reflect_figures(settings.figures, settings.plots, executor).text().c_str());
+    }
+    if (part == "slopes") std::puts(slope_table(executor).text().c_str());
+    std::fflush(stdout);
+  }
 }
 
 }  // namespace
 }  // namespace lensforge::bench
 
 int main(int argc, char** argv) try {
-  lensforge::bench::Settings settings;
-  CLI::App app("Compares the methods of the reflector stage on the drawn shapes.");
-  app.add_option("--shapes", settings.shapes, "their names; all without it")->delimiter(',');
-  app.add_option("--anchors", settings.anchors, "values of beta")->delimiter(',');
-  app.add_option("--faces", settings.faces, "of every shape, 20 or more");
+  using namespace lensforge::bench;
+  Settings settings;
+  std::vector<std::string> parts{"methods", "figures", "slopes"};
+  CLI::App app("Tables of the reflector stage on the drawn shapes.");
+  app.add_option("--parts", parts,
+                 "methods: both at equal displacement; figures; slopes; all without it")
+      ->delimiter(',')
+      ->check(CLI::IsMember(parts));
+  app.add_option("--shapes", settings.shapes, "of the methods, their names; all without it")
+      ->delimiter(',');
+  app.add_option("--anchors", settings.anchors, "of the exact method, values of beta")
+      ->delimiter(',');
+  app.add_option("--faces", settings.faces, "of every shape of the methods, 20 or more");
   app.add_option("--updates", settings.updates, "at most, of either kind of element");
+  app.add_option("--figures", settings.figures, "of Tojo et al.; all that there are without it")
+      ->delimiter(',')
+      ->check(CLI::IsMember(figure_names()));
+  app.add_option("--plots", settings.plots, "folder for energy_over_time.svg of figure 14")
+      ->check(CLI::ExistingDirectory);
   app.add_option("--threads", settings.threads);
   CLI11_PARSE(app, argc, argv);
-  std::fputs(lensforge::bench::table_text(settings).c_str(), stdout);
+  print(settings, parts);
   return 0;
 } catch (const std::exception& e) {
   std::fprintf(stderr, "reflect_table: %s\n", e.what());

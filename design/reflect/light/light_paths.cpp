@@ -76,6 +76,7 @@ class LightPaths::Caster {
 
   /// Faces met from behind, as on an open mesh, pass no light on.
   void gather(std::int64_t face, const Eigen::Vector3d& n) const {
+    if (n.isZero()) return;  // A face that lost its area looks nowhere.
     const double turn = 2.0 * std::numbers::pi * fraction(kStepFace * static_cast<double>(face));
     const Eigen::Matrix3d frame = frame_of(n);
     const Eigen::Matrix3Xd local = hemisphere_directions(paths_.gather_, turn);

@@ -6,6 +6,7 @@
 #include <CGAL/Polygon_mesh_processing/orient_polygon_soup.h>
 #include <CGAL/Polygon_mesh_processing/polygon_soup_to_polygon_mesh.h>
 #include <CGAL/Polygon_mesh_processing/remesh.h>
+#include <CGAL/Polygon_mesh_processing/repair_degeneracies.h>
 #include <CGAL/Surface_mesh.h>
 
 #include <array>
@@ -79,6 +80,8 @@ CgalMesh with_edges_of(CgalMesh mesh, double length) {
                            pmp::parameters::number_of_iterations(kSmoothings)
                                .protect_constraints(true)
                                .edge_is_constrained_map(crease));
+  // Between creases that are protected faces without area may be left.
+  pmp::remove_degenerate_faces(mesh);
   return mesh;
 }
 

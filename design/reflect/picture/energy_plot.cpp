@@ -19,7 +19,9 @@ constexpr double kWidth = 900.0;
 constexpr double kHeight = 300.0;
 constexpr double kLeft = 70.0;
 constexpr double kMargin = 30.0;
-constexpr std::array<std::string_view, 3> kColors{"#0b5cad", "#a3161a", "#1b6b36"};
+constexpr std::array<std::string_view, 4> kColors{"#0b5cad", "#a3161a", "#1b6b36", "#7a4fa3"};
+/// From one name to the next.
+constexpr double kNameWidth = 190.0;
 /// Where there is none, the energy that is drawn.
 constexpr double kFloor = 1e-12;
 
@@ -89,7 +91,7 @@ std::string lines_of(const std::vector<EnergyCurve>& curves, const Axes& axes) {
     const std::string_view color = kColors[i % kColors.size()];
     lines += joined({"<polyline points=\"", points, "\" fill=\"none\" stroke-width=\"2\" stroke=\"",
                      color, "\"/>"});
-    lines += words(kLeft + 130.0 * static_cast<double>(i), kMargin - 10.0,
+    lines += words(kLeft + kNameWidth * static_cast<double>(i), kMargin - 10.0,
                    joined({"fill=\"", color, "\""}), curves[i].name);
   }
   return lines;

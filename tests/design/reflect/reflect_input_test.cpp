@@ -68,6 +68,14 @@ TEST(ReflectInput, RefusesWhatContradictsItself) {
   EXPECT_THAT(refusal(shapes::dihedral(2.0, 2, 2), options), HasSubstr("has no mirror image"));
 }
 
+TEST(ReflectInput, RemeshingLeavesNoFaceWithoutArea) {
+  ReflectOptions options;
+  options.faces = 400;  // Far fewer than the rocket's creases need.
+  const ReflectInput input = prepared_input(shapes::rocket(), "rocket", options);
+  EXPECT_GT(measure_faces(input.mesh).area.minCoeff(), 0.0);
+  EXPECT_TRUE(input.closed);
+}
+
 TEST(ReflectInput, RefusesNumbersThatTheMeshDoesNotHave) {
   const TempFolder folder;
   ReflectOptions options;
