@@ -342,7 +342,8 @@ Verdict whole_verdict(const CutPlan& plan, const ProgramFiles& programs,
 void add_prediction(const Prediction& prediction, const Lens& lens, ReportData& data) {
   data.target = lens.target;
   data.leakage = prediction.leakage;
-  if (!is_mirror(lens)) data.ghost = ghost_share(lens.setup.ior);
+  data.mirror = is_mirror(lens);
+  if (!data.mirror) data.ghost = ghost_share(lens.setup.ior);
   data.sampling = prediction.sampling;
   data.shown = {{surface_name::kDesigned, "what is meant"},
                 {surface_name::kRounded, "the most that the ball can reach"},

@@ -268,6 +268,7 @@ std::string run_in_child(const std::string& stage, const ChildLimits& limits,
     control.report({stage, answer.share.done, answer.share.total, ""});
   }
   const int status = child.wait();
+  if (control.stop_requested()) throw Interrupted();
   if (!answer.result) throw ChildFailure(why_it_ended(status));
   return std::move(*answer.result);
 }

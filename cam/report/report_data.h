@@ -100,6 +100,7 @@ struct ReportData {
   SamplingCheck sampling;           ///< Of the part.
   std::vector<ShownSurface> shown;  ///< Whose pictures stand side by side.
   LeakageOptions leakage_options;
+  bool mirror = false;
   double ghost = 0.0;                   ///< ghost_share() of a lens; 0 of a mirror.
   ToleranceForecast tolerances;         ///< Empty where it was not asked for.
   std::vector<LeakPlace> places;        ///< Worst first.

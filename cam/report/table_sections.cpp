@@ -189,8 +189,13 @@ std::string certificates(const ReportData& data) {
                                   rows));
 }
 
-/// What nothing in the forecast counts.
-std::string ghost_words(const ReportData& data) {
+/// What is particular to the kind of part: a lens's light parts at grooves, a mirror's at ridges.
+std::string part_words(const ReportData& data) {
+  if (data.mirror) {
+    return " Dark parts come from ridges of the mirror, which a ball cuts sharp: polish alone "
+           "wears "
+           "them.";
+  }
   if (!(data.ghost > 0.0)) return "";
   const std::string share = percent_text(data.ghost);
   return " Light that both faces of the lens reflect, " + share +
@@ -209,7 +214,7 @@ std::string leakage(const ReportData& data) {
       count_text(data.leakage.bright_pixels) +
       "). Contrast is the bright pixels’ mean to the dark ones’. Each cause is what it adds to "
       "those above it; polishing is in every line, so the causes sum to the part." +
-      ghost_words(data);
+      part_words(data);
   return html_section("Light and leakage",
                       quality_table(data.leakage) +
                           element("h3", "style=\"margin-top:1.2rem\"", "Leakage by cause") +

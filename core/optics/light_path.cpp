@@ -40,8 +40,7 @@ LightPath::LightPath(const OpticalSetup& setup)
       source_(setup),
       whole_(source_.varies() ? front_intake(source_, setup.lens_size) : setup.lens_size.prod()),
       eta_(setup.ior),
-      straight_(setup.fresnel ? std::pow(transmittance(1.0, setup.ior).value, 2) : 0.0),
-      reflects_(setup.mode == LightMode::kReflect ? 1 : 0),
+      kind_(setup.mode == LightMode::kReflect ? kMirror : (setup.fresnel ? kLosing : kLens)),
       middle_(0.5 * setup.lens_size) {}
 
 Eigen::Vector2d LightPath::gradient_for(const Eigen::Vector3d& p,

@@ -227,7 +227,8 @@ class LightPath {
           n_(area_normal(t)),
           length_(n_.norm()),
           a_(light.source_.incident(middle_)),
-          straight_(light.straight_) {
+          straight_(transmittance(1.0, light.eta_).value) {
+      straight_ *= straight_;
       n_ /= length_;
       front_ = transmittance(light.source_.front_cosine(middle_), light.eta_);
       back_ = transmittance(n_.dot(a_), light.eta_);
@@ -252,13 +253,18 @@ class LightPath {
     Eigen::Vector3d n_;
     double length_;
     Eigen::Vector3d a_;
-    double straight_;
+    double straight_;  ///< Through both faces at right angles.
     ValueSlope front_{};
     ValueSlope back_{};
   };
 
-  [[nodiscard]] LF_HD bool reflects() const { return reflects_ != 0; }
-  [[nodiscard]] LF_HD bool loses() const { return straight_ != 0.0; }
+  /// Of kind_: a lens, one whose faces reflect (OpticalSetup::fresnel), a mirror.
+  static constexpr std::int64_t kLens = 0;
+  static constexpr std::int64_t kLosing = 1;
+  static constexpr std::int64_t kMirror = 2;
+
+  [[nodiscard]] LF_HD bool reflects() const { return kind_ == kMirror; }
+  [[nodiscard]] LF_HD bool loses() const { return kind_ == kLosing; }
   [[nodiscard]] LF_HD ValueSlope barrier_along_z(const Eigen::Vector3d& n) const {
     if (screen_.turned() && !transmits(Eigen::Vector3d(0.0, 0.0, 0.0), n)) return {kInfinity, 0.0};
     return reflection_barrier(n.z(), eta_);
@@ -300,11 +306,9 @@ class LightPath {
 
   Screen screen_;
   LightSource source_;
-  double whole_;     ///< mm²
-  double eta_;       ///< n_lens / n_air
-  double straight_;  ///< Of OpticalSetup::fresnel: share that goes through both faces at right
-                     ///< angles; 0: not asked.
-  std::int64_t reflects_;   ///< Wide, so that no bytes of a kernel's argument are left unset.
+  double whole_;            ///< mm²
+  double eta_;              ///< n_lens / n_air
+  std::int64_t kind_;       ///< Wide, so that no bytes of a kernel's argument are left unset.
   Eigen::Vector2d middle_;  ///< Of the lens, mm.
 };
 

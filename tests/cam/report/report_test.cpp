@@ -96,6 +96,18 @@ TEST(Report, StatesTheErrorOfItsSamples) {
   EXPECT_THAT(html, HasSubstr("MAE by about +0.00003"));
 }
 
+TEST(Report, SaysWhatLimitsTheDarkOfALensAndOfAMirror) {
+  ReportData data = report_of("logo");
+  EXPECT_THAT(report_html(data), Not(HasSubstr("both faces")));
+  data.ghost = 0.0015;
+  EXPECT_THAT(report_html(data), HasSubstr("both faces of the lens reflect, 0.150 % of all"));
+  EXPECT_EQ(report_json(data)["leakage"]["ghost_share"], 0.0015);
+  data.mirror = true;
+  data.ghost = 0.0;
+  EXPECT_THAT(report_html(data), HasSubstr("ridges of the mirror"));
+  EXPECT_THAT(report_html(data), Not(HasSubstr("both faces")));
+}
+
 TEST(Report, NeedsNothingFromOutside) {
   const std::string html = report_html(report_of("logo"));
   EXPECT_THAT(html, Not(HasSubstr("http:")));
