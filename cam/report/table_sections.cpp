@@ -189,12 +189,12 @@ std::string certificates(const ReportData& data) {
                                   rows));
 }
 
-/// What is particular to the kind of part: a lens's light parts at grooves, a mirror's at ridges.
+/// What bounds the dark of a picture, by the kind of part: a lens's light parts at grooves, a
+/// mirror's at ridges.
 std::string part_words(const ReportData& data) {
   if (data.mirror) {
-    return " Dark parts come from ridges of the mirror, which a ball cuts sharp: polish alone "
-           "wears "
-           "them.";
+    return " Dark parts come from ridges of the mirror, which a ball cuts sharp: only polish "
+           "wears them.";
   }
   if (!(data.ghost > 0.0)) return "";
   const std::string share = percent_text(data.ghost);
