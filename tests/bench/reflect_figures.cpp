@@ -13,10 +13,10 @@
 #include "bench/reflect_baselines.h"
 #include "core/error.h"
 #include "core/io/files.h"
+#include "core/page/decade_plot.h"
 #include "core/text/number_text.h"
 #include "design/reflect/mesh/edges.h"
 #include "design/reflect/mesh/faces.h"
-#include "design/reflect/picture/energy_plot.h"
 #include "fixtures/shapes/shapes.h"
 
 namespace lensforge::bench {
@@ -179,7 +179,7 @@ class Figures {
   }
 
   void over_time() {
-    std::vector<reflect::EnergyCurve> curves;
+    std::vector<PlotCurve> curves;
     const auto add_curve = [&](const std::string& variant, const ReflectOptions& options) {
       curves.push_back({variant, {}});
       for (const reflect::ReflectUpdate& update : run("animal", variant, options).updates) {
@@ -195,7 +195,7 @@ class Figures {
     add_curve("paper, not denoised", paper);
     add_curve("exact", options_for(6000));
     if (!plots_.empty()) {
-      write_whole_file(plots_ / "energy_over_time.svg", reflect::energy_plot(curves));
+      write_whole_file(plots_ / "energy_over_time.svg", decade_plot(curves, "Energy over time"));
     }
   }
 

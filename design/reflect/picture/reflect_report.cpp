@@ -4,10 +4,10 @@
 #include <array>
 #include <vector>
 
+#include "core/page/decade_plot.h"
 #include "core/page/html_page.h"
 #include "core/page/html_text.h"
 #include "core/text/number_text.h"
-#include "design/reflect/picture/energy_plot.h"
 
 namespace lensforge::reflect {
 namespace {
@@ -110,8 +110,18 @@ std::string picture_sections(const ReflectResult& result, const GoalWords& words
                                   "Displacement of the surface" + html_scale("0", most)));
 }
 
+/// The energy of every update over the time in which it was reached, a curve for each stage.
+std::vector<PlotCurve> stage_curves(const std::vector<ReflectUpdate>& updates) {
+  std::vector<PlotCurve> curves;
+  for (const ReflectUpdate& update : updates) {
+    if (curves.empty() || curves.back().name != update.stage) curves.push_back({update.stage, {}});
+    curves.back().points.emplace_back(update.seconds, update.energy);
+  }
+  return curves;
+}
+
 std::string energy_section(const ReflectResult& result) {
-  const std::string plot = energy_plot(stage_curves(result.updates));
+  const std::string plot = decade_plot(stage_curves(result.updates), "Energy over time");
   if (plot.empty()) return "";
   return html_section("Energy over time",
                       element("figure", "",

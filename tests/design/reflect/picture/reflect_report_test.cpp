@@ -4,12 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <sstream>
 #include <string>
-#include <vector>
 
-#include "design/reflect/picture/energy_plot.h"
 #include "fixtures/shapes/shapes.h"
 
 namespace lensforge::reflect {
@@ -69,34 +65,11 @@ TEST(ReflectReport, EscapesWhatTheUserWrote) {
   EXPECT_THAT(report(sample_result(), options), Not(HasSubstr("<script>alert")));
 }
 
-/// The numbers of the first polyline.
-std::vector<double> first_line(const std::string& svg) {
-  const std::size_t from = svg.find("points=\"") + 8;
-  std::string text = svg.substr(from, svg.find('"', from) - from);
-  std::replace(text.begin(), text.end(), ',', ' ');
-  std::istringstream words(text);
-  std::vector<double> numbers;
-  for (double number = 0.0; words >> number;) numbers.push_back(number);
-  return numbers;
-}
-
-TEST(EnergyPlot, HasALineForEveryStageOnADecadeScale) {
-  const std::string svg = energy_plot(stage_curves(sample_result().updates));
-  EXPECT_THAT(svg, HasSubstr("1e-2"));
-  EXPECT_THAT(svg, HasSubstr("1e0"));
-  EXPECT_THAT(svg, HasSubstr("4.0 s"));
-  // 0.5 and 0.2 at 1 and 2 of 4 seconds; two decades over 240 units down from 1, 800 units wide.
-  const std::vector<double> line = first_line(svg);
-  ASSERT_EQ(line.size(), 4U);
-  EXPECT_NEAR(line[0], 270.0, 0.1);
-  EXPECT_NEAR(line[1], 30.0 + 120.0 * 0.30103, 0.1);
-  EXPECT_NEAR(line[2], 470.0, 0.1);
-  EXPECT_NEAR(line[3], 30.0 + 120.0 * 0.69897, 0.1);
-}
-
-TEST(EnergyPlot, OneUpdateHasNoLine) {
-  EXPECT_EQ(energy_plot({}), "");
-  EXPECT_EQ(energy_plot(stage_curves({{1, "face", 0.5, 0.0, 0.0, 1.0}})), "");
+TEST(ReflectReport, DrawsTheEnergyOfEveryStage) {
+  const std::string html = report(sample_result());
+  EXPECT_THAT(html, HasSubstr("aria-label=\"Energy over time\""));
+  EXPECT_THAT(html, HasSubstr(">rim-spoke<"));
+  EXPECT_THAT(html, HasSubstr(">face<"));
 }
 
 }  // namespace

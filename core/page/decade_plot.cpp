@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/reflect/picture/energy_plot.h"
+#include "core/page/decade_plot.h"
 
 #include <algorithm>
 #include <array>
@@ -10,28 +10,30 @@
 
 #include "core/page/html_text.h"
 #include "core/text/number_text.h"
-#include "design/reflect/reflect_shape.h"
 
-namespace lensforge::reflect {
+namespace lensforge {
 namespace {
 
 constexpr double kWidth = 900.0;
 constexpr double kHeight = 300.0;
 constexpr double kLeft = 70.0;
 constexpr double kMargin = 30.0;
-constexpr std::array<std::string_view, 4> kColors{"#0b5cad", "#a3161a", "#1b6b36", "#7a4fa3"};
-/// From one name to the next.
+constexpr std::array<std::string_view, 8> kColors{"#0b5cad", "#a3161a", "#1b6b36", "#7a4fa3",
+                                                  "#a35a00", "#007a7a", "#5c5c5c", "#b0307a"};
+/// Names stand in lines above the plot.
+constexpr std::size_t kNamesPerLine = 4;
 constexpr double kNameWidth = 190.0;
-/// Where there is none, the energy that is drawn.
+constexpr double kNameHeight = 18.0;
+/// Drawn for values below it, 0 among them.
 constexpr double kFloor = 1e-12;
 
-/// From seconds and energies to the drawing.
+/// From seconds and values to the drawing.
 class Axes {
  public:
-  explicit Axes(const std::vector<EnergyCurve>& curves) {
+  explicit Axes(const std::vector<PlotCurve>& curves) {
     double least = std::numeric_limits<double>::infinity();
     double most = -least;
-    for (const EnergyCurve& curve : curves) {
+    for (const PlotCurve& curve : curves) {
       for (const Eigen::Vector2d& point : curve.points) {
         seconds_ = std::max(seconds_, point.x());
         least = std::min(least, decade_of(point.y()));
@@ -40,6 +42,7 @@ class Axes {
     }
     low_ = static_cast<int>(std::floor(least));
     high_ = std::max(low_ + 1, static_cast<int>(std::ceil(most)));
+    top_ += kNameHeight * static_cast<double>((curves.size() - 1) / kNamesPerLine);
   }
 
   [[nodiscard]] double seconds() const { return seconds_; }
@@ -49,15 +52,16 @@ class Axes {
     return kLeft + (kWidth - kLeft - kMargin) * seconds / seconds_;
   }
   [[nodiscard]] double y(double decade) const {
-    return kHeight - kMargin - (kHeight - 2.0 * kMargin) * (decade - low_) / (high_ - low_);
+    return kHeight - kMargin - (kHeight - kMargin - top_) * (decade - low_) / (high_ - low_);
   }
   [[nodiscard]] std::string drawn(const Eigen::Vector2d& point) const {
     return decimal_text(x(point.x()), 1) + "," + decimal_text(y(decade_of(point.y())), 1) + " ";
   }
 
  private:
-  static double decade_of(double energy) { return std::log10(std::max(std::abs(energy), kFloor)); }
+  static double decade_of(double value) { return std::log10(std::max(std::abs(value), kFloor)); }
 
+  double top_ = kMargin;
   double seconds_ = 1e-3;
   int low_ = 0;
   int high_ = 1;
@@ -83,7 +87,7 @@ std::string decades(const Axes& axes) {
 }
 
 /// The curves, each with its name.
-std::string lines_of(const std::vector<EnergyCurve>& curves, const Axes& axes) {
+std::string lines_of(const std::vector<PlotCurve>& curves, const Axes& axes) {
   std::string lines;
   for (std::size_t i = 0; i < curves.size(); ++i) {
     std::string points;
@@ -91,7 +95,8 @@ std::string lines_of(const std::vector<EnergyCurve>& curves, const Axes& axes) {
     const std::string_view color = kColors[i % kColors.size()];
     lines += joined({"<polyline points=\"", points, "\" fill=\"none\" stroke-width=\"2\" stroke=\"",
                      color, "\"/>"});
-    lines += words(kLeft + kNameWidth * static_cast<double>(i), kMargin - 10.0,
+    lines += words(kLeft + kNameWidth * static_cast<double>(i % kNamesPerLine),
+                   kMargin - 10.0 + kNameHeight * static_cast<double>(i / kNamesPerLine),
                    joined({"fill=\"", color, "\""}), curves[i].name);
   }
   return lines;
@@ -99,28 +104,19 @@ std::string lines_of(const std::vector<EnergyCurve>& curves, const Axes& axes) {
 
 }  // namespace
 
-std::vector<EnergyCurve> stage_curves(const std::vector<ReflectUpdate>& updates) {
-  std::vector<EnergyCurve> curves;
-  for (const ReflectUpdate& update : updates) {
-    if (curves.empty() || curves.back().name != update.stage) curves.push_back({update.stage, {}});
-    curves.back().points.emplace_back(update.seconds, update.energy);
-  }
-  return curves;
-}
-
-std::string energy_plot(const std::vector<EnergyCurve>& curves) {
+std::string decade_plot(const std::vector<PlotCurve>& curves, std::string_view label) {
   std::size_t points = 0;
-  for (const EnergyCurve& curve : curves) points += curve.points.size();
+  for (const PlotCurve& curve : curves) points += curve.points.size();
   if (points < 2) return "";
   const Axes axes(curves);
   const std::string end = decimal_text(axes.seconds(), 1) + " s";
-  return element("svg",
-                 joined({"xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 ",
-                         decimal_text(kWidth, 0), " ", decimal_text(kHeight, 0),
-                         "\" role=\"img\" aria-label=\"Energy over time\" font-size=\"13\" "
-                         "font-family=\"Arial, sans-serif\" style=\"background:#fff\""}),
-                 decades(axes) + lines_of(curves, axes) + words(kLeft, kHeight - 8.0, "", "0 s") +
-                     words(kWidth - kMargin, kHeight - 8.0, "text-anchor=\"end\"", end));
+  return element(
+      "svg",
+      joined({"xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 ", decimal_text(kWidth, 0), " ",
+              decimal_text(kHeight, 0), "\" role=\"img\" aria-label=\"", escape_html(label),
+              "\" font-size=\"13\" font-family=\"Arial, sans-serif\" style=\"background:#fff\""}),
+      decades(axes) + lines_of(curves, axes) + words(kLeft, kHeight - 8.0, "", "0 s") +
+          words(kWidth - kMargin, kHeight - 8.0, "text-anchor=\"end\"", end));
 }
 
-}  // namespace lensforge::reflect
+}  // namespace lensforge
