@@ -213,9 +213,9 @@ bool is_of_lens(const std::string& name) {
 
 /// Nothing is written yet: a decoder that unpacks a whole picture without a look at the stop token
 /// is left behind with the process.
-LoadedImage read_target(const fs::path& path, const CommonOptions& common) {
+LoadedImage read_target(const DesignSettings& settings, const CommonOptions& common) {
   InterruptibleJob job(common);
-  LoadedImage loaded = read_image(path, job.control());
+  LoadedImage loaded = read_image(settings.target, job.control(), settings.design.pixels);
   if (job.control().stop_requested()) throw Interrupted();
   return loaded;
 }
@@ -224,7 +224,7 @@ int run(OptionSet& options, DesignSettings& settings) {
   const Console console(options.common().json, options.common().quiet);
   const EarlierDesign earlier = EarlierDesign::in(settings.out);
   refuse_to_overwrite(settings.out, earlier, settings.resume, settings.force);
-  const LoadedImage loaded = read_target(settings.target, options.common());
+  const LoadedImage loaded = read_target(settings, options.common());
   const InterruptWatch interrupt;
   DesignOptions& design = settings.design;
   settle(options, settings, loaded.image);

@@ -54,7 +54,8 @@ void refuse_part_options(const OptionSet& options) {
 }  // namespace
 
 void add_design_options(OptionSet& options, DesignSettings& settings) {
-  options.positional("TARGET", settings.target, "picture to project: PNG, JPEG, TIFF, EXR, ...");
+  options.positional("TARGET", settings.target,
+                     "picture to project: PNG, JPEG, TIFF, EXR, SVG, ...");
   options.required_text("--out", settings.out, "DIR", "lens folder to write");
   options.fields(design_fields(), settings.design);
   options.fields(light_fields(), settings.design.light);

@@ -110,7 +110,9 @@ Scene adjusted(Scene scene, OptionSet& options, RenderArguments& arguments,
     throw InputError("--wavelengths: a mirror bends light of all colours alike; leave it out");
   }
   announce_picture(setup, arguments.out, console);
-  if (options.given("--target")) scene.target = read_image(arguments.target).image;
+  if (options.given("--target")) {
+    scene.target = read_image(arguments.target, {}, setup.pixels.maxCoeff()).image;
+  }
   if (scene.target) scene.target = resample(*scene.target, setup.pixels.x(), setup.pixels.y());
   require_wall_above(scene.surface, setup);
   return scene;

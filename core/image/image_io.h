@@ -21,13 +21,19 @@ struct LoadedImage {
 /// pixels are touched.
 inline constexpr int kMaxImageSide = 16384;
 
+/// Pixels of a drawing's longer side where nothing asks for others; that of a working picture.
+inline constexpr int kDrawnSide = 256;
+
 /// Reads a PNG, JPEG, TIFF, EXR or another of the formats in kReadableFormats
 /// (picture_outline.h), whatever its name: any channel count and depth, decoded by the colour space
 /// that the file declares, else sRGB for integers, linear for floats. Reports rows.
+/// @param drawn_side  pixels of the longer side of an SVG file, which has none of its own
+///        (svg_drawing.h).
 /// @throw InputError if the file is missing, no regular file, truncated, no picture, larger than
 ///        kMaxImageSide or than the memory, or holds NaN, infinite or negative values; the message
 ///        names the file. Interrupted.
-LoadedImage read_image(const std::filesystem::path& path, const RunControl& run = {});
+LoadedImage read_image(const std::filesystem::path& path, const RunControl& run = {},
+                       int drawn_side = kDrawnSide);
 
 /// Box-filter (area-weighted) resampling in linear light: the mean value is kept to 1e-6 relative.
 /// Reports rows of the result. @pre columns, rows ≥ 1. @throw Interrupted.

@@ -12,6 +12,9 @@
 #include "core/image/color_space.h"
 #include "core/image/image_io.h"
 #include "core/image/picture_source.h"
+#include "core/image/rec709.h"
+#include "core/image/svg_drawing.h"
+#include "core/io/files.h"
 #include "core/text/printable.h"
 
 namespace lensforge {
@@ -19,8 +22,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Rec. 709 (ITU-R BT.709-6, item 3.2): shares of red, green and blue light in luminance.
-constexpr std::array<double, 3> kLuminance{0.2126, 0.7152, 0.0722};
+constexpr const char* kColourTurned = "colour turned to luminance (Rec. 709)";
+constexpr const char* kTransparencyFlattened = "transparency flattened onto black";
 
 /// Bytes of a name out of the file in a message.
 constexpr std::size_t kLongestName = 60;
@@ -115,13 +118,12 @@ class Flattener {
     const bool grey = channels_.light.size() == 1 || (light[0] == light[1] && light[1] == light[2]);
     if (grey) return static_cast<float>(light[0]);
     saw_colour_ = true;
-    return static_cast<float>(kLuminance[0] * light[0] + kLuminance[1] * light[1] +
-                              kLuminance[2] * light[2]);
+    return static_cast<float>(luminance_rec709(light));
   }
 
   void report(std::vector<std::string>& changes) const {
-    if (saw_colour_) changes.emplace_back("colour turned to luminance (Rec. 709)");
-    if (saw_transparency_) changes.emplace_back("transparency flattened onto black");
+    if (saw_colour_) changes.emplace_back(kColourTurned);
+    if (saw_transparency_) changes.emplace_back(kTransparencyFlattened);
     if (channels_.left_out > 0) {
       changes.push_back(std::to_string(channels_.left_out) + " further channel" +
                         (channels_.left_out > 1 ? "s" : "") + " left out");
@@ -243,9 +245,33 @@ void report_header(PictureSource& source, std::vector<std::string>& changes) {
   }
 }
 
+LoadedImage read_drawing(const fs::path& path, int longer_side, const RunControl& run) {
+  const SvgDrawing drawing(path, run);
+  const SvgDrawing::Size size = drawing.size(longer_side);
+  SvgDrawing::Picture picture = drawing.draw(size, run);
+  LoadedImage loaded{std::move(picture.light), {}};
+  loaded.changes.push_back("drawn at " + std::to_string(size.columns) + " x " +
+                           std::to_string(size.rows) + " pixels");
+  if (picture.colour) loaded.changes.emplace_back(kColourTurned);
+  const auto coverage = picture.coverage.values();
+  const bool open = std::any_of(coverage.begin(), coverage.end(), [](float c) { return c < 1.0F; });
+  if (open) loaded.changes.emplace_back(kTransparencyFlattened);
+  if (open && loaded.image.total() == 0.0) {
+    refuse_picture(path,
+                   "is black all over, since transparency is flattened onto black: draw a white "
+                   "rectangle behind it");
+  }
+  const std::vector<std::string>& remarks = drawing.remarks();
+  loaded.changes.insert(loaded.changes.end(), remarks.begin(), remarks.end());
+  return loaded;
+}
+
 }  // namespace
 
-LoadedImage read_image(const fs::path& path, const RunControl& run) {
+LoadedImage read_image(const fs::path& path, const RunControl& run, int drawn_side) {
+  if (std::ifstream file = open_input(path); is_svg(file)) {
+    return read_drawing(path, drawn_side, run);
+  }
   PictureSource source(path, run);
   LoadedImage loaded;
   const ColorSpace space = declared_color_space(source.spec(), loaded.changes);

@@ -19,10 +19,10 @@ struct PictureOutline {
 
 /// The formats that are read, as a sentence has them.
 inline constexpr const char* kReadableFormats =
-    "PNG, JPEG, TIFF, OpenEXR, Radiance HDR, PNM, BMP, GIF, WebP and HEIF";
+    "PNG, JPEG, TIFF, OpenEXR, Radiance HDR, PNM, BMP, GIF, WebP, HEIF and SVG";
 
-/// Recognises the formats that are read by their first bytes, and looks up the size of those whose
-/// decoders take memory for a whole picture on opening. Nothing for any other file.
+/// Recognises the formats of pixels that are read by their first bytes, and looks up the size of
+/// those whose decoders take memory for a whole picture on opening. Nothing for any other file.
 std::optional<PictureOutline> read_picture_outline(std::istream& file);
 
 }  // namespace lensforge

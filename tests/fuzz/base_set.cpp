@@ -8,6 +8,7 @@
 #include <array>
 #include <chrono>
 #include <csignal>
+#include <fstream>
 #include <memory>
 #include <sstream>
 #include <stdexcept>
@@ -32,6 +33,13 @@ constexpr int kHeifSide = 64;
 constexpr std::array kExtensions{"png", "jpg", "tif",  "exr", "bmp",   "tga", "gif",  "ico",
                                  "pgm", "ppm", "hdr",  "dpx", "sgi",   "rla", "webp", "jp2",
                                  "iff", "pnm", "fits", "jxl", "zfile", "heic"};
+
+constexpr const char* kDrawing =
+    "<?xml version='1.0'?>\n<svg xmlns='http://www.w3.org/2000/svg' width='12mm' height='12mm' "
+    "viewBox='0 0 12 12'><defs><linearGradient id='g'><stop stop-color='#fff'/><stop offset='1' "
+    "stop-color='#840'/></linearGradient></defs><style>text { font-family: serif; }</style>"
+    "<rect width='12' height='12' fill='url(#g)'/><path d='M1 1C4 9 8 9 11 1z' fill='navy'/>"
+    "<text x='1' y='9' font-size='4' fill='white'>Light</text></svg>\n";
 
 void write_picture(const fs::path& path) {
   const auto out = OIIO::ImageOutput::create(path.string());
@@ -128,6 +136,7 @@ BaseSet::BaseSet(const fs::path& folder) {
 
 void BaseSet::draw_pictures(const fs::path& folder) const {
   fs::create_directories(folder / "pictures");
+  std::ofstream(folder / "pictures/a.svg") << kDrawing;
   in_a_process_of_its_own([&] {
     for (const char* extension : kExtensions) {
       write_picture(folder / "pictures" / (std::string("a.") + extension));

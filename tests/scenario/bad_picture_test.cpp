@@ -66,6 +66,18 @@ TEST_F(BadPicture, TruncatedJpeg) {
   }
 }
 
+TEST_F(BadPicture, SvgThatEndsTooSoon) {
+  write(at("cut.svg"), "<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 3 2'><rect");
+  expect_refused("cut.svg", {"cut.svg", "is no SVG that can be drawn"});
+}
+
+TEST_F(BadPicture, SvgWithoutAFontForItsText) {
+  write(at("text.svg"),
+        "<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 30 20'>"
+        "<text y='9' fill='white'>&#x10FF00;</text></svg>");
+  expect_refused("text.svg", {"text.svg", "U+10FF00", "no installed font has"});
+}
+
 TEST_F(BadPicture, AllBlack) {
   write_image(Image(40, 30), at("black.png"));
   expect_refused("black.png", {"black"});
