@@ -24,7 +24,6 @@
 #include "app/output_folder.h"
 #include "app/overview.h"
 #include "app/progress_display.h"
-#include "app/setup_drawing.h"
 #include "cam/cam_job.h"
 #include "core/compute/work_estimate.h"
 #include "core/error.h"
@@ -32,6 +31,7 @@
 #include "core/io/lens_folder.h"
 #include "core/io/pending_files.h"
 #include "core/optics/source_points.h"
+#include "core/page/light_drawing.h"
 #include "core/text/version.h"
 #include "design/design_estimate.h"
 #include "design/design_lens.h"
@@ -118,7 +118,7 @@ void write_folder(const OutputFolder& folder, const DesignResult& result, const 
   files.add(lens_file::kOverview,
             [&](const fs::path& beside) { write_image(draw_overview(result.lens, made), beside); });
   files.add(lens_file::kSetup,
-            setup_drawing(result.lens.setup, result.lens.surface.vertices.row(2).maxCoeff()));
+            light_drawing_file(result.lens.setup, result.lens.surface.vertices.row(2).maxCoeff()));
   write_lens(result.lens, std::move(files));
   const fs::path cut = folder.path() / lens_file::kCut;
   std::error_code ignored;

@@ -42,7 +42,8 @@ SetupSheet setup_sheet(const CutPlan& plan, const Lens& designed) {
   sheet.part = plan.part_box();
   sheet.blank = plan.blank();
   sheet.zero = {0.0, 0.0, -plan.z_offset()};
-  sheet.zero_words = std::string("lower left corner of the lens, ") + words_for(options.z_zero);
+  sheet.zero_words = joined({"lower left corner of the ", is_mirror(designed) ? "mirror" : "lens",
+                             ", ", words_for(options.z_zero)});
   sheet.up_words = up_words(options.part, designed);
   for (const KeepOut& clamp : options.workshop.keep_outs) {
     sheet.keep_outs.push_back({clamp.name, {clamp.low, clamp.high}});
@@ -342,7 +343,6 @@ Verdict whole_verdict(const CutPlan& plan, const ProgramFiles& programs,
 void add_prediction(const Prediction& prediction, const Lens& lens, ReportData& data) {
   data.target = lens.target;
   data.leakage = prediction.leakage;
-  data.mirror = is_mirror(lens);
   if (!data.mirror) data.ghost = ghost_share(lens.setup.ior);
   data.sampling = prediction.sampling;
   data.shown = {{surface_name::kDesigned, "what is meant"},
@@ -376,7 +376,8 @@ ReportData make_report(const CutPlan& plan, const ProgramFiles& programs,
   data.job = options.job;
   data.program = program_mark();
   data.lens_id = fingerprint_of(lens);
-  data.part = options.part == PartKind::kLens ? "lens" : "mould";
+  data.mirror = is_mirror(lens);
+  data.part = options.part == PartKind::kMould ? "mould" : (data.mirror ? "mirror" : "lens");
   data.lens_size = lens.setup.lens_size;
   data.leakage_options = options.leakage;
   data.operations = report_operations(plan, programs);
@@ -387,6 +388,8 @@ ReportData make_report(const CutPlan& plan, const ProgramFiles& programs,
     data.parameters.push_back(entry_parameters(process));
   }
   data.setup = setup_sheet(plan, lens);
+  data.light = lens.setup;
+  data.light_height = lens.surface.vertices.row(2).maxCoeff();
   data.z_offset = plan.z_offset();
   data.warnings = warnings_of(plan, programs, lens);
   data.path = plan.shown_path();

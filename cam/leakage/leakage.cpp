@@ -45,14 +45,32 @@ class ChainPictures {
   std::map<const SurfaceField*, FluxPicture> pictures_;
 };
 
+PointLight point_light(const NamedSurface& designed, const FluxPicture& blurred,
+                       const FieldRenderSetup& setup, const PictureJudge& judge,
+                       const Executor& executor, const RunControl& control) {
+  FieldRenderSetup sharp = setup;
+  sharp.optics.extent = {};
+  if (designed.grid) sharp.grid = *designed.grid;
+  PointLight point{{designed.name, render_field(*designed.field, sharp, executor, control), {}}};
+  point.designed.quality = judge.judge(point.designed.picture);
+  point.moved = leakage_share(blurred, point.designed.picture);
+  return point;
+}
+
 std::vector<CausePart> parts_of(const LeakageResult& result) {
   std::vector<CausePart> parts;
   const PictureQuality* before = &result.designed.quality;
-  for (const RenderedSurface& step : result.steps) {
-    const PictureQuality& now = step.quality;
-    parts.push_back({step.name, now.leakage - before->leakage, now.dark_flux - before->dark_flux,
-                     now.dark_ratio - before->dark_ratio});
+  const auto add = [&](const std::string& cause, const PictureQuality& now, double leakage) {
+    parts.push_back(
+        {cause, leakage, now.dark_flux - before->dark_flux, now.dark_ratio - before->dark_ratio});
     before = &now;
+  };
+  if (result.point) {
+    before = &result.point->designed.quality;
+    add(leak_cause::kSource, result.designed.quality, 0.0);
+  }
+  for (const RenderedSurface& step : result.steps) {
+    add(step.name, step.quality, step.quality.leakage - before->leakage);
   }
   return parts;
 }
@@ -86,6 +104,10 @@ LeakageResult measure_leakage(const LeakageChain& chain, const Image& target,
   result.designed = {chain.designed.name, pictures.of(chain.designed), {}};
   const PictureJudge judge(target, result.designed.picture, options);
   result.designed.quality = judge.judge(result.designed.picture);
+  if (!setup.optics.extent.none()) {
+    result.point =
+        point_light(chain.designed, result.designed.picture, setup, judge, executor, control);
+  }
   const auto add = [&](const NamedSurface& surface, std::vector<RenderedSurface>& to) {
     to.push_back({surface.name, pictures.of(surface), {}});
     to.back().quality = judge.judge(to.back().picture);

@@ -24,6 +24,7 @@ struct NamedSurface {
 
 /// Names of the causes in the chain that cam measures.
 namespace leak_cause {
+inline constexpr const char* kSource = "source";  ///< That is no point: in front of the chain.
 inline constexpr const char* kPolish = "polish";
 inline constexpr const char* kCrease = "crease rounding";
 inline constexpr const char* kScallop = "scallop";
@@ -59,12 +60,21 @@ struct CausePart {
   double dark_ratio = 0.0;
 };
 
-/// The pictures of a chain and what is wrong with them.
+/// The designed surface in the light of a point, beside the picture in that of an extended source.
+struct PointLight {
+  RenderedSurface designed;
+  /// Share of the light that the source's extent moves to where the light of a point puts less.
+  double moved = 0.0;
+};
+
+/// The pictures of a chain and what is wrong with them. Leakage is that against the designed
+/// surface in the same light: of an extended source it is what the part adds to the blur.
 struct LeakageResult {
   RenderedSurface designed;
+  std::optional<PointLight> point;     ///< Where the source is extended.
   std::vector<RenderedSurface> steps;  ///< As LeakageChain::steps; the last is the part.
   std::vector<RenderedSurface> others;
-  std::vector<CausePart> parts;  ///< One per step.
+  std::vector<CausePart> parts;  ///< The source's, where it is extended; then one per step.
   std::vector<double> dark;      ///< 1 for dark pixels, 0 for others, row by row from the top.
   std::int64_t dark_pixels = 0;  ///< Of the target; without any the dark figures are 0.
   std::int64_t bright_pixels = 0;
@@ -73,7 +83,9 @@ struct LeakageResult {
 };
 
 /// Renders every surface of a chain and splits the leakage by cause. A surface that stands in the
-/// chain more than once (the same object) is rendered once.
+/// chain more than once (the same object) is rendered once. Under an extended source the designed
+/// surface is also rendered in the light of a point: what the dark pixels get more is the source's
+/// part.
 /// @pre the chain has a designed surface and at least one step; target has the setup's pixels.
 /// @throw InputError if dark_below and bright_from break their rules; Interrupted.
 LeakageResult measure_leakage(const LeakageChain& chain, const Image& target,

@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,6 +17,7 @@
 #include "cam/tolerance/tolerance_forecast.h"
 #include "cam/tool/tool.h"
 #include "core/image/image.h"
+#include "core/optics/optical_setup.h"
 #include "core/page/html_text.h"
 
 namespace lensforge {
@@ -93,14 +95,14 @@ struct ReportData {
   std::string job;      ///< Name of the part.
   std::string program;  ///< "lensforge 0.1.0"
   std::string lens_id;  ///< Fingerprint of the design; left out if empty.
-  std::string part;     ///< "lens" or "mould"
+  std::string part;     ///< "lens", "mirror" or "mould"
 
   Image target;                     ///< Linear light.
   LeakageResult leakage;            ///< designed, chain and the other surfaces.
   SamplingCheck sampling;           ///< Of the part.
   std::vector<ShownSurface> shown;  ///< Whose pictures stand side by side.
   LeakageOptions leakage_options;
-  bool mirror = false;
+  bool mirror = false;                  ///< Or a mould of one.
   double ghost = 0.0;                   ///< ghost_share() of a lens; 0 of a mirror.
   ToleranceForecast tolerances;         ///< Empty where it was not asked for.
   std::vector<LeakPlace> places;        ///< Worst first.
@@ -111,8 +113,10 @@ struct ReportData {
   std::vector<ReportOperation> operations;
   std::vector<ParameterGroup> parameters;
   SetupSheet setup;
-  double z_offset = 0.0;  ///< Program Z = lens-frame z + z_offset.
-  double seconds = 0.0;   ///< Spent on making all this.
+  std::optional<OpticalSetup> light;  ///< Where lamp and screen stand.
+  double light_height = 0.0;          ///< Of the part in that light, mm.
+  double z_offset = 0.0;              ///< Program Z = lens-frame z + z_offset.
+  double seconds = 0.0;               ///< Spent on making all this.
   std::vector<std::string> warnings;
 
   LensRaster surface;            ///< Heights of the part, mm, for the view.
@@ -121,6 +125,11 @@ struct ReportData {
   std::vector<ReportChoice> choices;
 
   [[nodiscard]] double minutes() const;
+  /// What light falls on: "lens", or what is cast in the mould.
+  [[nodiscard]] std::string lit_part() const {
+    const std::string kind = mirror ? "mirror" : "lens";
+    return part == "mould" ? kind + " that is cast" : kind;
+  }
 };
 
 }  // namespace lensforge

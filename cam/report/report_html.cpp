@@ -31,8 +31,8 @@ std::string report_html(const ReportData& data) {
   const std::string body =
       joined({summary(data), section::warnings(data), section::setup(data),
               section::operations(data), section::certificates(data), section::leakage(data),
-              section::tolerances(data), section::maps(data), section::view(data),
-              section::choices(data), section::parameters(data)});
+              section::tolerances(data), section::light(data), section::maps(data),
+              section::view(data), section::choices(data), section::parameters(data)});
   return html_page({data.job + " – cutting report", section::header(data), body,
                     section::footer(data), std::string(report_page::kScript)});
 }

@@ -57,15 +57,23 @@ json cause_json(const CausePart& part) {
 json leakage_json(const ReportData& data) {
   const LeakageResult& result = data.leakage;
   const PictureQuality& part = result.part().quality;
-  return {{"share", part.leakage},
-          {"dark_flux", part.dark_flux},
-          {"contrast", number(part.contrast())},
-          {"ghost_share", data.ghost},
-          {"dark_below_mean_share", data.leakage_options.dark_below},
-          {"bright_from_mean_share", data.leakage_options.bright_from},
-          {"dark_pixels", result.dark_pixels},
-          {"bright_pixels", result.bright_pixels},
-          {"causes", list(result.parts, cause_json)}};
+  json object{{"share", part.leakage},
+              {"dark_flux", part.dark_flux},
+              {"contrast", number(part.contrast())},
+              {"ghost_share", data.ghost},
+              {"dark_below_mean_share", data.leakage_options.dark_below},
+              {"bright_from_mean_share", data.leakage_options.bright_from},
+              {"dark_pixels", result.dark_pixels},
+              {"bright_pixels", result.bright_pixels},
+              {"causes", list(result.parts, cause_json)}};
+  if (result.point) {
+    const PictureQuality& sharp = result.point->designed.quality;
+    object["designed_in_point_light"] = {{"mae", sharp.metrics.mae},
+                                         {"dark_flux", sharp.dark_flux},
+                                         {"dark_over_bright", sharp.dark_ratio}};
+    object["moved_by_source"] = result.point->moved;
+  }
+  return object;
 }
 
 json sampling_json(const SamplingCheck& check) {

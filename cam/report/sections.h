@@ -18,6 +18,7 @@ std::string work(const ReportData& data);  ///< Minutes and tools.
 
 std::string warnings(const ReportData& data);
 std::string setup(const ReportData& data);
+std::string light(const ReportData& data);  ///< Lamp, part and screen.
 std::string operations(const ReportData& data);
 std::string certificates(const ReportData& data);
 std::string leakage(const ReportData& data);

@@ -126,13 +126,12 @@ std::string verdict(const ReportData& data) {
 
 std::string places(const ReportData& data) {
   if (data.places.empty()) return "";
-  const std::string lens = data.part == "mould" ? "lens that is cast" : "lens";
   std::string items;
   for (const LeakPlace& place : data.places) {
     items += element("li", "", escape_html(leak_words(place)));
   }
   return element("div", "",
-                 element("h3", "", joined({"Worst places on the ", lens})) +
+                 element("h3", "", joined({"Worst places on the ", data.lit_part()})) +
                      element("ol", "class=\"places\"", items));
 }
 
@@ -158,8 +157,10 @@ std::string work(const ReportData& data) {
 
 std::string footer(const ReportData& data) {
   std::string text =
-      "Lengths in mm, lens frame: origin at the lens's lower left corner seen from "
-      "above, x right, y away, z up from the entry face. Program Z = z " +
+      std::string(
+          "Lengths in mm, lens frame: origin at the part's lower left corner seen from "
+          "above, x right, y away, z up from the ") +
+      (data.mirror ? "underside" : "entry face") + ". Program Z = z " +
       std::string(data.z_offset < 0.0 ? "− " : "+ ") + decimal_text(std::abs(data.z_offset), 4) +
       " mm.";
   if (data.seconds > 0.0) text += " Made in " + decimal_text(data.seconds, 0) + " s.";

@@ -4,6 +4,7 @@
 
 #include "cam/report/sections.h"
 #include "core/page/html_text.h"
+#include "core/page/light_drawing.h"
 #include "core/text/number_text.h"
 
 namespace lensforge::report_section {
@@ -45,16 +46,30 @@ std::string signed_decimal(double value, int decimals) {
   return joined({value > 0.0 ? "+" : "", decimal_text(value, decimals)});
 }
 
+/// Of what is no leakage, but what leakage is told from.
+constexpr const char* kNoLeakage = "–";
+
 Row cause_row(const CausePart& part) {
-  return {escape_html(part.cause), signed_percent(part.leakage), signed_percent(part.dark_flux),
-          signed_decimal(part.dark_ratio, 5)};
+  const bool counts = part.cause != leak_cause::kSource;
+  return {escape_html(part.cause), counts ? signed_percent(part.leakage) : kNoLeakage,
+          signed_percent(part.dark_flux), signed_decimal(part.dark_ratio, 5)};
+}
+
+/// What the causes are added to.
+Row first_row(const LeakageResult& result) {
+  const PictureQuality& designed = result.designed.quality;
+  if (!result.point) {
+    return {"as designed", percent_text(designed.leakage), percent_text(designed.dark_flux),
+            decimal_text(designed.dark_ratio, 5)};
+  }
+  const PictureQuality& sharp = result.point->designed.quality;
+  return {"as designed, in the light of a point", kNoLeakage, percent_text(sharp.dark_flux),
+          decimal_text(sharp.dark_ratio, 5)};
 }
 
 std::string cause_table(const ReportData& data) {
-  const PictureQuality& first = data.leakage.designed.quality;
   const PictureQuality& last = data.leakage.part().quality;
-  std::vector<Row> rows{{"as designed", percent_text(first.leakage), percent_text(first.dark_flux),
-                         decimal_text(first.dark_ratio, 5)}};
+  std::vector<Row> rows{first_row(data.leakage)};
   for (const CausePart& part : data.leakage.parts) rows.push_back(cause_row(part));
   const auto bold = [](const std::string& html) { return element("b", "", html); };
   rows.push_back({bold("the part"), bold(percent_text(last.leakage)),
@@ -114,6 +129,11 @@ std::string setup(const ReportData& data) {
                               {"Part", box_text(sheet.part)},
                               {"Program zero", sheet.zero_words},
                               {"Which way up", sheet.up_words}};
+  if (data.mirror && data.part != "mould") {
+    list.push_back({"To reflect",
+                    "coat the polished surface, unless the blank is of a metal that "
+                    "reflects, such as aluminium"});
+  }
   for (const NamedBox& clamp : sheet.keep_outs) {
     const Eigen::Vector3d low = clamp.box.min() - sheet.zero;
     const Eigen::Vector3d high = clamp.box.max() - sheet.zero;
@@ -136,6 +156,18 @@ std::string setup(const ReportData& data) {
                           "<b>From the front.</b> The table is below; the tool comes from "
                           "above."));
   return html_section("Setup", html_facts(list) + drawings);
+}
+
+std::string light(const ReportData& data) {
+  if (!data.light) return "";
+  const std::string words =
+      (data.part == "mould" ? "This is the " + data.lit_part() + ", not the mould. " : "") +
+      "Distances are from the middle of the shaped surface, places in mm in the lens frame.";
+  return html_section("Lamp, part and screen",
+                      element("div", "class=\"lamp\"",
+                              element("figure", "",
+                                      light_drawing(*data.light, data.light_height) +
+                                          element("figcaption", "", words))));
 }
 
 std::string operations(const ReportData& data) {
@@ -203,6 +235,14 @@ std::string part_words(const ReportData& data) {
          share + " of the mean.";
 }
 
+/// What an extended source does, beside the part.
+std::string source_words(const LeakageResult& result) {
+  if (!result.point) return "";
+  return " The source’s extent is in all of that: it moves " + percent_text(result.point->moved) +
+         " of the light to where the light of a point would put less. Leakage does not count that, "
+         "but what the part adds to it.";
+}
+
 std::string leakage(const ReportData& data) {
   if (data.leakage.steps.empty()) return "";
   const LeakageOptions& o = data.leakage_options;
@@ -214,7 +254,7 @@ std::string leakage(const ReportData& data) {
       count_text(data.leakage.bright_pixels) +
       "). Contrast is the bright pixels’ mean to the dark ones’. Each cause is what it adds to "
       "those above it; polishing is in every line, so the causes sum to the part." +
-      part_words(data);
+      source_words(data.leakage) + part_words(data);
   return html_section("Light and leakage",
                       quality_table(data.leakage) +
                           element("h3", "style=\"margin-top:1.2rem\"", "Leakage by cause") +

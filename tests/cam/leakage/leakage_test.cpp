@@ -221,6 +221,33 @@ TEST(Leakage, RefusesDarkAboveBright) {
                InputError);
 }
 
+/// A plane puts its light evenly on a square of w = 4 of 20 mm. A square source of image b spreads
+/// it: along each axis the mean of |s| / w over |s| ≤ b / 2 goes past its edges, b / 4w.
+TEST(Leakage, TheSourcesPartIsTheLightThatItsExtentPutsIntoTheDark) {
+  const AnalyticField plane(testing::plane({0.0, 0.0}));
+  const AnalyticField rough(testing::scalloped_plane(kRadius, 0.0606));
+  FieldRenderSetup setup = groove_setup();
+  const Image target = render_field(plane, setup, Executor::serial(), RunControl()).image(400.0);
+  setup.surface_height = 5.0;
+  setup.optics.extent = {0.036, {1, 1, {1.0}}};
+  const LeakageResult result =
+      measure({{"designed", &plane}, {{leak_cause::kScallop, &rough}}, {}}, target, setup);
+  ASSERT_EQ(result.parts.size(), 2U);
+  const CausePart& source = result.parts[0];
+  EXPECT_EQ(source.cause, leak_cause::kSource);
+  const double image = 0.036 * (60.0 - 5.0);
+  const double beside = 1.0 - std::pow(1.0 - image / (4.0 * 4.0), 2);
+  EXPECT_NEAR(source.dark_flux, beside, 0.01 * beside);
+  EXPECT_NEAR(result.point->moved, beside, 0.01 * beside);
+  EXPECT_EQ(source.leakage, 0.0);
+  EXPECT_LT(result.point->designed.quality.dark_flux, 1e-12);
+  // With the other causes it is all that the part has.
+  const PictureQuality& part = result.part().quality;
+  EXPECT_NEAR(source.dark_flux + result.parts[1].dark_flux, part.dark_flux, 1e-12);
+  EXPECT_NEAR(source.dark_ratio + result.parts[1].dark_ratio, part.dark_ratio, 1e-12);
+  EXPECT_EQ(result.parts[1].leakage, part.leakage);
+}
+
 TEST(LeakMap, SumsToTheSurplusAndLiesWhereTheSurfaceDiffers) {
   const AnalyticField sharp(sharp_groove());
   const AnalyticField rounded(testing::rounded_groove(kGroove, kSlope, kRadius));

@@ -102,14 +102,48 @@ TEST(Report, SaysWhatLimitsTheDarkOfALensAndOfAMirror) {
   data.ghost = 0.0015;
   EXPECT_THAT(report_html(data), HasSubstr("both faces of the lens reflect, 0.150 % of all"));
   EXPECT_EQ(report_json(data)["leakage"]["ghost_share"], 0.0015);
+  EXPECT_THAT(report_html(data), HasSubstr("z up from the entry face"));
+  EXPECT_THAT(report_html(data), Not(HasSubstr("coat the polished surface")));
   data.mirror = true;
   data.ghost = 0.0;
+  EXPECT_THAT(report_html(data), HasSubstr("Worst places on the mirror"));
+  EXPECT_THAT(report_html(data), HasSubstr("z up from the underside"));
+  EXPECT_THAT(report_html(data), HasSubstr("coat the polished surface"));
   EXPECT_THAT(report_html(data), HasSubstr("ridges of the mirror"));
   EXPECT_THAT(report_html(data), Not(HasSubstr("both faces")));
 }
 
+TEST(Report, TellsWhatTheSourceDoesFromWhatThePartDoes) {
+  ReportData data = report_of("logo");
+  EXPECT_THAT(report_html(data), Not(HasSubstr("light of a point")));
+  EXPECT_FALSE(report_json(data)["leakage"].contains("moved_by_source"));
+  data.leakage.point = PointLight{surface("designed", 0.0, 0.0), 0.04};
+  data.leakage.point->designed.quality.dark_flux = 0.001;
+  data.leakage.parts.insert(data.leakage.parts.begin(), {leak_cause::kSource, 0.0, 0.03, 0.002});
+  const std::string html = report_html(data);
+  EXPECT_THAT(html, HasSubstr("as designed, in the light of a point"));
+  EXPECT_THAT(html, HasSubstr("moves 4.00 % of the light"));
+  const nlohmann::json leakage = report_json(data)["leakage"];
+  EXPECT_EQ(leakage["moved_by_source"], 0.04);
+  EXPECT_EQ(leakage["designed_in_point_light"]["dark_flux"], 0.001);
+  EXPECT_EQ(leakage["causes"][0]["cause"], "source");
+}
+
+TEST(Report, ShowsHowToSetThePartUp) {
+  ReportData data = report_of("logo");
+  data.light = OpticalSetup();
+  data.light_height = 8.0;
+  EXPECT_THAT(report_html(data), HasSubstr(">292 mm</text>"));
+  EXPECT_THAT(report_html(data), Not(HasSubstr("xmlns")));
+  EXPECT_THAT(report_html(data), Not(HasSubstr("lens that is cast, not the mould")));
+  data.part = "mould";
+  EXPECT_THAT(report_html(data), HasSubstr("lens that is cast, not the mould"));
+}
+
 TEST(Report, NeedsNothingFromOutside) {
-  const std::string html = report_html(report_of("logo"));
+  ReportData data = report_of("logo");
+  data.light = OpticalSetup();
+  const std::string html = report_html(data);
   EXPECT_THAT(html, Not(HasSubstr("http:")));
   EXPECT_THAT(html, Not(HasSubstr("https:")));
   EXPECT_THAT(html, Not(HasSubstr("@import")));

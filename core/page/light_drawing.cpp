@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "app/setup_drawing.h"
+#include "core/page/light_drawing.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -12,7 +12,7 @@
 #include "core/text/number_text.h"
 #include "core/text/version.h"
 
-namespace lensforge::app {
+namespace lensforge {
 namespace {
 
 using Eigen::Vector2d;
@@ -239,7 +239,7 @@ std::string drawn(const OpticalSetup& setup, const Scene& scene, const View& vie
          lamp(setup, scene, view) + viewer(scene, view);
 }
 
-std::string light_words(const OpticalSetup& setup) {
+std::string direction_words(const OpticalSetup& setup) {
   if (setup.point) {
     return std::string(setup.point->emission == Emission::kIsotropic
                            ? "point source"
@@ -251,6 +251,18 @@ std::string light_words(const OpticalSetup& setup) {
   }
   return "parallel, " + number(std::acos(std::clamp(-setup.light.z(), -1.0, 1.0)) / kDegree) +
          "° from the mirror's z axis";
+}
+
+/// How wide the source is; empty if it is a point.
+std::string extent_words(const OpticalSetup& setup) {
+  constexpr double kMilliradian = 1e-3;
+  if (setup.extent.none()) return "";
+  const double width = setup.extent.width;
+  const std::string size = setup.point ? trimmed_decimal(width, 2) + " mm"
+                                       : trimmed_decimal(width / kMilliradian, 2) + " mrad (" +
+                                             trimmed_decimal(width / kDegree, 2) + "°)";
+  return setup.extent.shape.is_disc() ? ", a disc " + size + " wide"
+                                      : ", a shape of its own " + size + " wide";
 }
 
 std::string front_words(const OpticalSetup& setup) {
@@ -265,7 +277,7 @@ std::vector<std::string> description(const OpticalSetup& setup, const Scene& sce
   return {(is_mirror(setup) ? "Mirror: " : "Lens: ") + number(setup.lens_size.x()) + " × " +
               number(setup.lens_size.y()) + " mm, its lower left corner at x 0, y 0, " +
               (is_mirror(setup) ? "its shaped side towards lamp and screen" : front_words(setup)),
-          "Light: " + light_words(setup),
+          "Light: " + direction_words(setup) + extent_words(setup),
           "Picture: " + number(setup.image_size.x()) + " × " + number(setup.image_size.y()) +
               " mm, its centre at " + place(scene.centre),
           std::string("Screen: ") + (setup.screen_is_turned()
@@ -278,23 +290,25 @@ std::vector<std::string> description(const OpticalSetup& setup, const Scene& sce
                          : "Not to scale: directions from the part are right, distances are not."};
 }
 
-std::string opened(double height) {
+/// A drawing that is this high, with a name for those who do not see it.
+std::string framed(const std::string& attributes, double height, const std::string& content) {
   const auto tip = [](const char* id, const char* colour) {
     return std::string("<marker id=\"") + id +
            "\" viewBox=\"0 -4 8 8\" refX=\"8\" markerWidth=\"8\" markerHeight=\"8\" "
            "orient=\"auto\"><path d=\"M0-4L8 0L0 4z\" fill=\"" +
            colour + "\"/></marker>";
   };
-  const std::string size = decimal_text(height, 0);
-  return "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"" + decimal_text(kWidth, 0) +
-         "\" height=\"" + size + "\" font-family=\"sans-serif\" font-size=\"13\">\n<!-- " +
+  const std::string size =
+      "width=\"" + decimal_text(kWidth, 0) + "\" height=\"" + decimal_text(height, 0) + "\"";
+  return "<svg " + attributes + size + " viewBox=\"0 0 " + decimal_text(kWidth, 0) + " " +
+         decimal_text(height, 0) +
+         "\" role=\"img\" aria-label=\"Lamp, part, screen and viewer\" "
+         "font-family=\"sans-serif\" font-size=\"13\">\n<!-- " +
          program_mark() + " -->\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n<defs>" +
-         tip("tip", "#c98a00") + tip("look", "#2b7a3d") + "</defs>\n";
+         tip("tip", "#c98a00") + tip("look", "#2b7a3d") + "</defs>\n" + content + "</svg>\n";
 }
 
-}  // namespace
-
-std::string setup_drawing(const OpticalSetup& setup, double part_height) {
+std::string drawing(const std::string& attributes, const OpticalSetup& setup, double part_height) {
   const Scene scene(setup, part_height);
   std::array views{View(scene, 1), View(scene, 0)};
   const double scale = std::min(views[0].largest_scale(), views[1].largest_scale());
@@ -314,7 +328,17 @@ std::string setup_drawing(const OpticalSetup& setup, double part_height) {
     svg += words({8.0, y}, sentence);
     y += kLine;
   }
-  return opened(y) + svg + "</svg>\n";
+  return framed(attributes, y, svg);
 }
 
-}  // namespace lensforge::app
+}  // namespace
+
+std::string light_drawing(const OpticalSetup& setup, double part_height) {
+  return drawing("", setup, part_height);
+}
+
+std::string light_drawing_file(const OpticalSetup& setup, double part_height) {
+  return drawing("xmlns=\"http://www.w3.org/2000/svg\" ", setup, part_height);
+}
+
+}  // namespace lensforge

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "app/setup_drawing.h"
+#include "core/page/light_drawing.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,7 +9,7 @@
 #include <numbers>
 #include <regex>
 
-namespace lensforge::app {
+namespace lensforge {
 namespace {
 
 using ::testing::HasSubstr;
@@ -46,10 +46,10 @@ OpticalSetup far_away() {
   return setup;
 }
 
-TEST(SetupDrawing, NamesLampPartScreenAndViewerForEveryLight) {
+TEST(LightDrawing, NamesLampPartScreenAndViewerForEveryLight) {
   for (const OpticalSetup& setup :
        {OpticalSetup(), mirror(), lit_from_a_point(), tilted(), far_away()}) {
-    const std::string svg = setup_drawing(setup, kHeight);
+    const std::string svg = light_drawing(setup, kHeight);
     for (const char* name : {"screen</text>", "viewer</text>", "From the side", "From above"}) {
       EXPECT_THAT(svg, HasSubstr(name));
     }
@@ -61,34 +61,43 @@ TEST(SetupDrawing, NamesLampPartScreenAndViewerForEveryLight) {
   }
 }
 
-TEST(SetupDrawing, StatesTheLightAndTheScreen) {
-  EXPECT_THAT(setup_drawing({}, kHeight), HasSubstr("parallel, straight onto the flat face"));
-  EXPECT_THAT(setup_drawing(mirror(), kHeight), HasSubstr("30° from the mirror's z axis"));
-  EXPECT_THAT(setup_drawing(lit_from_a_point(), kHeight),
+TEST(LightDrawing, StatesTheLightAndTheScreen) {
+  EXPECT_THAT(light_drawing({}, kHeight), HasSubstr("parallel, straight onto the flat face"));
+  EXPECT_THAT(light_drawing(mirror(), kHeight), HasSubstr("30° from the mirror's z axis"));
+  EXPECT_THAT(light_drawing(lit_from_a_point(), kHeight),
               HasSubstr("point source at x 50, y 20, z -600 mm"));
-  EXPECT_THAT(setup_drawing({}, kHeight), HasSubstr("parallel to the part"));
-  EXPECT_THAT(setup_drawing(tilted(), kHeight), HasSubstr("tilted by 50°"));
+  EXPECT_THAT(light_drawing({}, kHeight), HasSubstr("parallel to the part"));
+  EXPECT_THAT(light_drawing(tilted(), kHeight), HasSubstr("tilted by 50°"));
 }
 
-TEST(SetupDrawing, DistancesAreThoseFromTheMiddleOfTheUpperSide) {
-  const std::string svg = setup_drawing(lit_from_a_point(), kHeight);
+TEST(LightDrawing, StatesHowWideTheSourceIs) {
+  OpticalSetup sun;
+  sun.extent.width = 9.3e-3;
+  EXPECT_THAT(light_drawing(sun, kHeight), HasSubstr("a disc 9.3 mrad (0.53°) wide"));
+  OpticalSetup lamp = lit_from_a_point();
+  lamp.extent = {3.0, {1, 1, {1.0}}};
+  EXPECT_THAT(light_drawing(lamp, kHeight), HasSubstr("a shape of its own 3 mm wide"));
+}
+
+TEST(LightDrawing, DistancesAreThoseFromTheMiddleOfTheUpperSide) {
+  const std::string svg = light_drawing(lit_from_a_point(), kHeight);
   EXPECT_THAT(svg, HasSubstr(">292 mm</text>"));    // 300 − 8 to the screen.
   EXPECT_THAT(svg, HasSubstr(">608.7 mm</text>"));  // √(608² + 30²) to the lamp.
 }
 
-TEST(SetupDrawing, TheViewerIsOnTheSideFromWhichThePictureReads) {
+TEST(LightDrawing, TheViewerIsOnTheSideFromWhichThePictureReads) {
   OpticalSetup setup;
-  EXPECT_THAT(setup_drawing(setup, kHeight), HasSubstr("on the part's side of the screen"));
+  EXPECT_THAT(light_drawing(setup, kHeight), HasSubstr("on the part's side of the screen"));
   setup.view = ViewSide::kRear;
-  EXPECT_THAT(setup_drawing(setup, kHeight), HasSubstr("behind the screen"));
+  EXPECT_THAT(light_drawing(setup, kHeight), HasSubstr("behind the screen"));
 }
 
-TEST(SetupDrawing, SaysWhereItIsNotToScaleAndStaysInsideItsFrame) {
-  EXPECT_THAT(setup_drawing({}, kHeight), HasSubstr("Drawn to scale"));
-  EXPECT_THAT(setup_drawing(far_away(), kHeight), HasSubstr("Not to scale"));
+TEST(LightDrawing, SaysWhereItIsNotToScaleAndStaysInsideItsFrame) {
+  EXPECT_THAT(light_drawing({}, kHeight), HasSubstr("Drawn to scale"));
+  EXPECT_THAT(light_drawing(far_away(), kHeight), HasSubstr("Not to scale"));
   for (const OpticalSetup& setup :
        {OpticalSetup(), mirror(), lit_from_a_point(), tilted(), far_away()}) {
-    const std::string svg = setup_drawing(setup, kHeight);
+    const std::string svg = light_drawing(setup, kHeight);
     std::smatch frame;
     ASSERT_TRUE(std::regex_search(svg, frame, std::regex("width=\"(\\d+)\" height=\"(\\d+)\"")));
     const double width = std::stod(frame[1]);
@@ -103,4 +112,4 @@ TEST(SetupDrawing, SaysWhereItIsNotToScaleAndStaysInsideItsFrame) {
 }
 
 }  // namespace
-}  // namespace lensforge::app
+}  // namespace lensforge
