@@ -51,16 +51,12 @@ void validate_tolerances(const CamOptions& options) {
   }
 }
 
-/// Parts turned, displaced and made of another material are known of the usual light only.
+/// Parts are blurred by the errors of a source that is a point otherwise.
 void validate_tolerances(const CamOptions& options, const OpticalSetup& setup) {
-  if (options.tolerances == 0) return;
-  const bool usual = !setup.point && setup.extent.none() && setup.mode == LightMode::kRefract;
-  if (usual && !setup.screen_is_turned()) return;
-  refuse(
-      "--tolerances", options.tolerances,
-      "draws parts of lenses for parallel light from one direction and a screen parallel to them "
-      "only; use "
-      "--tolerances 0");
+  if (options.tolerances == 0 || setup.extent.none()) return;
+  refuse("--tolerances", options.tolerances,
+         "draws parts for the light of a point or of one direction only, and this one was designed "
+         "for a source with an extent; use --tolerances 0");
 }
 
 /// A lens lies on its front while it is cut.

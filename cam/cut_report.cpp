@@ -40,6 +40,7 @@ SetupSheet setup_sheet(const CutPlan& plan, const Lens& designed) {
   sheet.machine = options.workshop.machine.name;
   sheet.material = lens ? options.workshop.material.name : "mould material";
   sheet.part = plan.part_box();
+  if (lens) sheet.part.min().z() = 0.0;  // The surface's box ends at its lowest point.
   sheet.blank = plan.blank();
   sheet.zero = {0.0, 0.0, -plan.z_offset()};
   sheet.zero_words = joined({"lower left corner of the ", is_mirror(designed) ? "mirror" : "lens",

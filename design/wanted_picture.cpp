@@ -40,7 +40,8 @@ WantedPicture::WantedPicture(const SurfaceMesh& mesh, const OpticalSetup& setup,
     : setup_(lit_from(setup, Eigen::Vector2d::Zero())),
       target_(target),
       executor_(executor),
-      reach_(LightPath(setup).reach(1.0, mesh.vertices.row(2).mean())) {
+      reach_(LightPath(setup).reach(1.0, mesh.vertices.row(2).mean()) *
+             (setup.mode == LightMode::kReflect ? -1.0 : 1.0)) {
   mae_ = evaluate(mesh, setup, SurfaceModel::kSmooth, target, &wanted_, executor).mae;
 }
 

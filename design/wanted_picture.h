@@ -28,7 +28,8 @@ class WantedPicture {
   /// Of a smooth surface that is known by its own normals, 3 × V with z > 0.
   [[nodiscard]] Comparison compare(const SurfaceMesh& mesh, const Eigen::Matrix3Xd& normals) const;
 
-  /// How far light moves on the receiving plane for a unit of slope, mm: to first order.
+  /// How far light moves on the receiving plane for a unit of slope, mm: to first order. Negative
+  /// where it moves against the slope, as a mirror's does.
   [[nodiscard]] double reach() const { return reach_; }
 
  private:

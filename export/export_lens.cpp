@@ -108,11 +108,6 @@ void announce_splines(const Job& job, std::int64_t control_points) {
 /// Of a mesh: splines that project its picture.
 SplineSolid fitted_splines(const Job& job) {
   const Lens& lens = job.source.lens;
-  if (lens.setup.mode == LightMode::kReflect) {
-    throw InputError(job.out.string() +
-                     ": splines are fitted to a mesh that refracts, not to one that reflects; "
-                     "design the mirror with --model spline, or export .stl or .3mf");
-  }
   FitOptions options{.tolerance = job.options.tolerance,
                      .normal_tolerance = job.options.normal_tolerance,
                      .max_control_points = job.options.max_points,

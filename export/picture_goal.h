@@ -18,7 +18,7 @@ struct PictureMiss {
 
 /// The picture that a fit is to keep; optics is known to who asks for it.
 struct PictureGoal {
-  double reach = 0.0;  ///< mm that light moves on the receiving plane for a slope of 1, > 0.
+  double reach = 0.0;  ///< WantedPicture::reach(), not 0 where a picture is to be kept.
   std::function<PictureMiss(const SampledSurface&)> miss;  ///< Empty: no picture is to be kept.
 };
 

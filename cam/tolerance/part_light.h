@@ -2,6 +2,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
+#include <vector>
 
 #include "cam/tolerance/part_error.h"
 #include "core/optics/light_path.h"
@@ -10,9 +12,15 @@
 
 namespace lensforge {
 
-/// The light's way through a part that stands, is made of and is lit as its errors say: turned
-/// about its centre, with another refractive index, grown, before a screen that is farther. Lamp
-/// and screen stay where they are.
+/// Places on a part before it has grown, mm: a grid, row by row.
+struct PartNodes {
+  std::size_t columns = 0;
+  std::vector<Eigen::Vector3d> places;
+};
+
+/// The light's way to the screen by a part that stands, is made of and is lit as its errors say:
+/// turned about its centre, with another refractive index, grown, before a screen that is farther
+/// along its own axis. Lamp and screen stay where they are.
 class PartLight {
  public:
   PartLight(const OpticalSetup& setup, const PartError& error);
@@ -21,30 +29,33 @@ class PartLight {
   [[nodiscard]] Eigen::Vector3d grown(const Eigen::Vector2d& place, double z) const {
     return centre_ + growth_ * (Eigen::Vector3d(place.x(), place.y(), z) - centre_);
   }
-  /// Where the ray of such a point lands, in pixel coordinates; NaN if it is reflected totally.
+  /// Where the ray of such a point lands, in pixel coordinates; NaN where none goes to the screen.
   [[nodiscard]] Eigen::Vector2d land(const Eigen::Vector3d& point,
                                      const Eigen::Vector2d& slope) const;
   /// Light that a triangle of such points takes, mm² (LightPath::intake()).
   [[nodiscard]] double intake(const Corners& triangle) const { return light_.intake(triangle); }
-  /// Area of the lens as it has grown, mm².
-  [[nodiscard]] double lens_area() const { return lens_area_; }
+  /// What the whole part takes, mm²: of light straight onto a lens its area as it has grown, else
+  /// what goes through the triangles between its nodes. That hardly depends on how many there are:
+  /// what light goes through follows from the rim.
+  [[nodiscard]] double whole(const PartNodes& nodes) const;
+  /// Slope that sends the light of the part's middle, at height z, to the picture's; of light that
+  /// comes straight, the flat one's.
+  [[nodiscard]] Eigen::Vector2d slope_of_middle(double z) const;
   /// How far a change of slope along an axis moves the light over the screen, pixels; NaN where
   /// none leaves.
   [[nodiscard]] Eigen::Vector2d moved_by(const Eigen::Vector3d& point, const Eigen::Vector2d& slope,
                                          int axis) const;
-  /// Radius of the spot that a point of height z lights with a source of this full angle (rad) as
-  /// the lens sees it, pixels: to first order light from beside the axis lands distance × angle
-  /// beside.
-  [[nodiscard]] double source_radius(double angle, double z) const;
+  /// How far along the picture's x and y the spot reaches that a point of height z in the middle
+  /// lights with a source of this full angle (rad) as the part sees it, pixels: to first order.
+  [[nodiscard]] Eigen::Vector2d source_radii(double angle, double z) const;
 
  private:
+  OpticalSetup seen_;  ///< From the part's own frame.
   LightPath light_;
   Eigen::Vector3d centre_;
   double growth_;
-  double screen_;  ///< z, mm.
-  double lens_area_;
-  bool turned_;
-  Eigen::Matrix3d turn_;  ///< From the lens frame to that of lamp and screen.
+  bool straight_;
+  double screen_;  ///< z of one that is parallel to the part, mm.
 };
 
 }  // namespace lensforge

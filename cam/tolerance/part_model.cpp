@@ -41,6 +41,29 @@ double mean_height(const BaseHeights& base) {
   return sum / static_cast<double>(base.axis(0).nodes * base.axis(1).nodes);
 }
 
+/// Every so many of the base's nodes along an axis, and the last.
+std::vector<std::int64_t> coarse_nodes(const BaseAxis& axis) {
+  constexpr std::int64_t kCells = 64;
+  std::vector<std::int64_t> nodes;
+  const std::int64_t cells = axis.nodes - 1;
+  const std::int64_t count = std::min(kCells, cells);
+  for (std::int64_t k = 0; k <= count; ++k) nodes.push_back(k * cells / count);
+  return nodes;
+}
+
+/// Through which the light goes that the part takes.
+PartNodes light_nodes(const BaseHeights& base) {
+  const std::vector<std::int64_t> columns = coarse_nodes(base.axis(0));
+  PartNodes nodes{columns.size(), {}};
+  for (const std::int64_t j : coarse_nodes(base.axis(1))) {
+    for (const std::int64_t i : columns) {
+      nodes.places.emplace_back(static_cast<double>(i) * base.axis(0).spacing,
+                                static_cast<double>(j) * base.axis(1).spacing, *base.at(i, j));
+    }
+  }
+  return nodes;
+}
+
 /// Across rows that leave a ripple there are four nodes a pitch.
 SceneAxis scene_axis(const BaseAxis& axis, double sigma, bool ripples) {
   SceneAxis scene;
@@ -90,11 +113,12 @@ FluxPicture cropped(const FluxRaster& raster, std::int64_t margin) {
 /// is that of all of it.
 Eigen::Vector2d blur_radii(const PartScene& scene, const Eigen::Vector2d& scale,
                            const Eigen::Vector3d& middle) {
-  Eigen::Vector2d square = Eigen::Vector2d::Constant(scene.source * scene.source);
+  Eigen::Vector2d square = scene.source.cwiseAbs2();
+  const Eigen::Vector2d slope = scene.light.slope_of_middle(middle.z());
   for (int axis = 0; axis < 2; ++axis) {
     if (!scene.axes[static_cast<std::size_t>(axis)].ripples) continue;
-    const Eigen::Vector2d moved = scene.light.moved_by(middle, {0.0, 0.0}, axis);
-    const double seen = scene.ripple.seen_by_disc(scene.source / scale[axis]);
+    const Eigen::Vector2d moved = scene.light.moved_by(middle, slope, axis);
+    const double seen = scene.ripple.seen_by_disc(scene.source[axis] / scale[axis]);
     const double far = scene.ripple.largest() * moved[axis];
     square[axis] += 2.0 * far * far * (1.0 - seen * seen);
   }
@@ -108,7 +132,8 @@ PartModel::PartModel(const SurfaceField& cut, const SurfaceField& designed, cons
     : plan_(plan),
       base_(BaseHeights::sample(cut, designed, axes_of(plan),
                                 pad_of(axes_of(plan), plan.largest_sigma), executor, control)),
-      mean_height_(mean_height(base_)) {}
+      mean_height_(mean_height(base_)),
+      lit_(light_nodes(base_)) {}
 
 FluxPicture PartModel::render(const PartError& error, const Executor& executor) const {
   const Passes& passes = plan_.passes;
@@ -128,8 +153,9 @@ FluxPicture PartModel::render(const PartError& error, const Executor& executor) 
                   {axis(0), axis(1)},
                   plan_.optics.lens_size,
                   0,
-                  light.source_radius(error.source, mean_height_)};
-  if (scene.source == 0.0) return cropped(render_tiles(scene, plan_.optics.pixels, executor), 0);
+                  light.whole(lit_),
+                  light.source_radii(error.source, mean_height_)};
+  if (scene.source.isZero()) return cropped(render_tiles(scene, plan_.optics.pixels, executor), 0);
   const Eigen::Vector2d& size = plan_.optics.lens_size;
   const Eigen::Vector3d middle(0.5 * size.x(), 0.5 * size.y(), mean_height_);
   const Eigen::Vector2d scale = plan_.optics.pixels.cast<double>().cwiseQuotient(size);

@@ -8,6 +8,7 @@
 #include "cam/milled/surface_field.h"
 #include "cam/tolerance/base_heights.h"
 #include "cam/tolerance/part_error.h"
+#include "cam/tolerance/part_light.h"
 #include "cam/tolerance/passes.h"
 #include "cam/tool/polish_model.h"
 #include "core/compute/executor.h"
@@ -47,6 +48,7 @@ class PartModel {
   PartPlan plan_;
   BaseHeights base_;
   double mean_height_;  ///< mm
+  PartNodes lit_;
 };
 
 /// Nodes of the grid on which a part is rendered: what time and memory go by.

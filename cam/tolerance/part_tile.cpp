@@ -201,11 +201,11 @@ double PartTile::seen_by_source(int axis) const {
   const double length = axis == 0 ? static_cast<double>(x_.count - 1) * x_.spacing
                                   : static_cast<double>(y_.count - 1) * y_.spacing;
   const double pixels_per_mm = std::abs((landing_[high] - landing_[low])[axis]) / length;
-  return scene_.ripple.seen_by_disc(scene_.source / std::max(pixels_per_mm, kLeastScale));
+  return scene_.ripple.seen_by_disc(scene_.source[axis] / std::max(pixels_per_mm, kLeastScale));
 }
 
 double PartTile::flux_of(std::size_t a, std::size_t b, std::size_t c) const {
-  return scene_.light.intake({points_[a], points_[b], points_[c]}) / scene_.light.lens_area();
+  return scene_.light.intake({points_[a], points_[b], points_[c]}) / scene_.whole;
 }
 
 void PartTile::deposit(const FluxAccumulator& image) const {

@@ -37,7 +37,8 @@ struct PartScene {
   std::array<SceneAxis, 2> axes;
   Eigen::Vector2d lens_size;  ///< mm
   std::int64_t margin = 0;    ///< Pixels around the picture.
-  double source = 0.0;        ///< Radius of the spot that a point lights, pixels.
+  double whole = 0.0;         ///< Light that the part takes, mm², of which fluxes are shares.
+  Eigen::Vector2d source{0.0, 0.0};  ///< Half axes of the spot that a point lights, pixels.
 };
 
 /// A rectangle of cells of one part: its heights with errors are polished, its nodes' rays are

@@ -6,7 +6,9 @@
 #include "core/error.h"
 #include "core/surface/mesh_io.h"
 #include "core/temp_folder.h"
+#include "design/render_lens.h"
 #include "export/sample_surfaces.h"
+#include "export/solid_surface.h"
 
 namespace lensforge {
 namespace {
@@ -53,6 +55,30 @@ TEST_F(ExportLens, ACallWritesTheSolidAndSaysHowGoodItIs) {
   EXPECT_EQ(begun_, 1);
   const std::string file = testing::read_bytes(folder_ / "lens.step");
   EXPECT_NE(file.find("sha256:"), std::string::npos);
+}
+
+/// The file's own surface, read as any other solid, reflects the picture that the mirror does.
+TEST_F(ExportLens, AMirrorsMeshBecomesASolidThatReflectsItsPicture) {
+  OpticalSetup& setup = source_.lens.setup;
+  setup.mode = LightMode::kReflect;
+  setup.light = {0.5, 0.0, -std::sqrt(0.75)};
+  setup.focal_length = 30.0;
+  setup.image_size = {44.0, 36.0};  // All of its light.
+  setup.image_origin = {15.0 - 22.0 + 25.0 * std::tan(std::asin(0.5)), 12.0 - 18.0};
+  Lens& mirror = source_.lens;
+  evaluate(mirror.surface, setup, SurfaceModel::kSmooth, mirror.target, &mirror.target,
+           Executor::cpu(1));
+  ExportOptions options;
+  options.tolerance = options.normal_tolerance = 0.001;
+  const ExportResult result = write("mirror.step", options);
+  ASSERT_TRUE(result.splines.has_value());
+  EXPECT_TRUE(result.splines->content.is_one_solid());
+  EXPECT_LT(result.splines->picture.mae, 3e-3);
+  const SolidSurface solid = read_solid_surface(folder_ / "mirror.step", 40000.0, Executor::cpu(1));
+  EXPECT_TRUE(solid.by_name);
+  const ImageMetrics read = evaluate(solid.samples.mesh, solid.samples.normals, setup,
+                                     mirror.target, nullptr, Executor::cpu(1));
+  EXPECT_NEAR(read.mae, result.splines->picture.mae, 2e-4);
 }
 
 TEST_F(ExportLens, MeshesAndHeightMapsComeByTheNameOfTheFile) {

@@ -229,13 +229,13 @@ TEST(Leakage, TheSourcesPartIsTheLightThatItsExtentPutsIntoTheDark) {
   FieldRenderSetup setup = groove_setup();
   const Image target = render_field(plane, setup, Executor::serial(), RunControl()).image(400.0);
   setup.surface_height = 5.0;
-  setup.optics.extent = {0.036, {1, 1, {1.0}}};
+  setup.optics.extent = {0.1, {1, 1, {1.0}}};
   const LeakageResult result =
       measure({{"designed", &plane}, {{leak_cause::kScallop, &rough}}, {}}, target, setup);
   ASSERT_EQ(result.parts.size(), 2U);
   const CausePart& source = result.parts[0];
   EXPECT_EQ(source.cause, leak_cause::kSource);
-  const double image = 0.036 * (60.0 - 5.0);
+  const double image = 0.1 * (60.0 - 5.0);
   const double beside = 1.0 - std::pow(1.0 - image / (4.0 * 4.0), 2);
   EXPECT_NEAR(source.dark_flux, beside, 0.01 * beside);
   EXPECT_NEAR(result.point->moved, beside, 0.01 * beside);

@@ -20,6 +20,8 @@
 #include "cam/milled/polished_field.h"
 #include "cam/path/finish_raster.h"
 #include "core/error.h"
+#include "core/optics/light_path.h"
+#include "core/surface/lit_surface.h"
 
 namespace lensforge {
 namespace {
@@ -198,6 +200,66 @@ TEST_F(PartModelTest, APartWithoutErrorsIsThatOfTheChain) {
   EXPECT_NEAR(model_nominal_.metrics.mae, nominal_.metrics.mae,
               std::max(5e-4, 0.1 * nominal_.metrics.mae));
   EXPECT_NEAR(model_nominal_.leakage, nominal_.leakage, 0.1 * nominal_.leakage);
+}
+
+/// Other kinds of light that a slope moves about as far over the picture.
+OpticalSetup mirror_setup() {
+  OpticalSetup optics = setup();
+  optics.mode = LightMode::kReflect;
+  optics.light = {0.5, 0.0, -std::sqrt(0.75)};
+  optics.focal_length = 6.7;
+  optics.image_origin.x() += (6.7 - 3.0) * std::tan(std::asin(0.5));
+  return optics;
+}
+
+OpticalSetup point_setup() {
+  OpticalSetup optics = setup();
+  optics.point = PointSource{{3.0, 2.2, -60.0}, Emission::kIsotropic};
+  optics.image_size = {5.0, 5.0};
+  optics.image_origin = {-0.12, 0.07};
+  return optics;
+}
+
+OpticalSetup tilted_setup() {
+  OpticalSetup optics = setup();
+  optics.screen_x = {std::cos(0.3), 0.0, std::sin(0.3)};
+  return optics;
+}
+
+/// The figures of a part without errors and of one before a screen that is farther, by a model that
+/// is made for this light, are the chain's.
+TEST_F(PartModelTest, UnderOtherLightAPartIsThatOfTheChain) {
+  const SurfaceMesh mesh = testing::grid_mesh(51, 51, kSide, kSide, relief);
+  for (const OpticalSetup& optics : {mirror_setup(), point_setup(), tilted_setup()}) {
+    SCOPED_TRACE(optics.point ? "point" : (optics.screen_is_turned() ? "tilted" : "mirror"));
+    const auto render = [&](const SurfaceField& field, const OpticalSetup& by) {
+      FieldRenderSetup rendering = fine(by);
+      rendering.whole = intake_of(mesh, LightPath(by));
+      return render_field(field, rendering, executor(), {});
+    };
+    const FluxPicture designed = render(meant_->field(), optics);
+    const Image target = designed.image(kPixels * kPixels);
+    const PictureJudge judge(target, designed, {});
+    PartPlan plan = part_plan();
+    plan.optics = optics;
+    const PartModel model(*milled_, meant_->field(), plan, executor(), RunControl());
+    const PolishedField part(*milled_, meant_->field(),
+                             {Eigen::Vector2d(0, 0), Eigen::Vector2d(kSide, kSide)},
+                             {kSigma, 0.0, 1.0});
+    for (const double farther : {0.0, 0.3}) {
+      OpticalSetup moved = optics;
+      const Eigen::Vector3d by = farther * optics.screen_x.cross(optics.screen_y);
+      moved.image_origin += by.head<2>();
+      moved.focal_length += by.z();
+      PartError error;
+      error.distance = farther;
+      const PictureQuality chain = judge.judge(render(part, moved));
+      const PictureQuality by_model = judge.judge(model.render(error, executor()));
+      EXPECT_GT(chain.leakage, 0.003);
+      EXPECT_NEAR(by_model.metrics.mae, chain.metrics.mae, std::max(5e-4, 0.1 * chain.metrics.mae));
+      EXPECT_NEAR(by_model.leakage, chain.leakage, 0.1 * chain.leakage);
+    }
+  }
 }
 
 TEST_F(PartModelTest, AnotherPolishChangesItAsInTheChain) {
