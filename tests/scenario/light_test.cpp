@@ -99,9 +99,11 @@ TEST_P(EveryLight, IsCutPredictedAndExportedAsAMesh) {
   const Outcome mesh = run({"export", path("lens"), "--out", path("lens.stl"), "--quiet"});
   EXPECT_EQ(mesh.exit_code, 0) << mesh.err;
   if (!is_mirror()) return;
-  expect_refusal(run({"export", path("lens"), "--out", path("lens.step")}), 2,
-                 {"lens.step", "--model spline"});
-  EXPECT_FALSE(fs::exists(at("lens.step")));
+  // The mesh's own tolerances may not be held (exit code 3); the solid is there even so.
+  const Outcome solid = run({"export", path("lens"), "--out", path("lens.step"), "--quiet"});
+  ASSERT_TRUE(solid.exit_code == 0 || solid.exit_code == 3) << solid.err;
+  const Outcome read = run({"render", path("lens.step"), "--quiet"});
+  EXPECT_EQ(read.exit_code, 0) << read.err;
 }
 
 TEST_P(EveryLight, ACurvedFrontIsExportedAsAMeshAndNotCutOnATable) {
