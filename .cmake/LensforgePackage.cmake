@@ -16,3 +16,18 @@ install(EXPORT lensforgeTargets NAMESPACE lensforge:: DESTINATION "${package_fol
 # Headers keep their paths: "design/design_lens.h" lies in include/lensforge/design/.
 install(DIRECTORY core design cam export machine
   DESTINATION "${LENSFORGE_INCLUDE_FOLDER}" FILES_MATCHING PATTERN "*.h")
+
+# cpack makes a Debian package of the command; what it needs is found by dpkg-shlibdeps.
+set(CPACK_GENERATOR DEB)
+set(CPACK_PACKAGE_NAME lensforge)
+set(CPACK_PACKAGE_CONTACT "lensforge developers")
+set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "${PROJECT_DESCRIPTION}")
+set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
+set(CPACK_STRIP_FILES ON)
+set(CPACK_COMPONENTS_ALL command debian)
+set(CPACK_COMPONENTS_GROUPING ALL_COMPONENTS_IN_ONE)
+set(CPACK_DEB_COMPONENT_INSTALL ON)
+set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
+set(CPACK_DEBIAN_PACKAGE_SECTION science)
+set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
+include(CPack)

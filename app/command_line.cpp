@@ -7,8 +7,11 @@
 #include <exception>
 #include <new>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 #include "app/commands.h"
+#include "app/completions.h"
 #include "app/console.h"
 #include "app/exit_code.h"
 #include "app/option_set.h"
@@ -35,10 +38,14 @@ constexpr std::array kSubcommands{
     Subcommand{"coupon", coupon_command, "coupon --out DIR",
                "test piece that calibrates a workshop"},
     Subcommand{"export", export_command, "export DIR --out FILE",
-               "lens folder to .step, .iges, .stl, .obj, .ply, .3mf, height map"},
+               "lens folder to .step, .iges, .stl, .obj, .ply, .3mf, .glb, height map"},
     Subcommand{"send", send_command, "send FILE.ngc --port PORT", "G-code to a controller"},
     Subcommand{"reflect", reflect_command, "reflect MESH --out DIR",
                "mesh to a shape that reflects light as wanted"},
+    Subcommand{"view", view_command, "view DIR --out FILE.html",
+               "lens folder to a page that draws its light"},
+    Subcommand{"batch", batch_command, "batch JOBS.jsonl --out DIR",
+               "many jobs, each in a folder of its own"},
     Subcommand{"info", info_command, "info DIR|FILE", "what it is, in one screen"},
 };
 
@@ -58,11 +65,28 @@ std::string overall_help() {
   return text;
 }
 
+/// What `lensforge completions SHELL` prints.
+std::string completions_for(const Arguments& shells) {
+  if (shells.size() != 1) throw InputError("completions: takes one shell: bash, zsh or fish");
+  std::vector<CompletedCommand> commands;
+  for (const Subcommand& command : kSubcommands) {
+    try {
+      command.run({kListOptions});
+    } catch (ListedOptions& listed) {
+      commands.push_back({command.name, command.summary, std::move(listed.options)});
+    }
+  }
+  return completion_script(shells.front(), commands);
+}
+
 int dispatch(const Arguments& arguments) {
   if (arguments.empty()) throw InputError("no command given; lensforge --help lists them");
   const std::string& name = arguments.front();
   if (name == "--help" || name == "-h" || name == "help") throw HelpText(overall_help());
   if (name == "--version") throw HelpText(version_line());
+  if (name == "completions") {
+    throw HelpText(completions_for({arguments.begin() + 1, arguments.end()}));
+  }
   for (const Subcommand& command : kSubcommands) {
     if (name == command.name) return command.run({arguments.begin() + 1, arguments.end()});
   }

@@ -17,6 +17,8 @@ int coupon_command(const Arguments& arguments);
 int export_command(const Arguments& arguments);
 int send_command(const Arguments& arguments);
 int reflect_command(const Arguments& arguments);
+int view_command(const Arguments& arguments);
+int batch_command(const Arguments& arguments);
 int info_command(const Arguments& arguments);
 
 }  // namespace lensforge::app

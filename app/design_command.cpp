@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
-#include <array>
-#include <cinttypes>
 #include <cstdint>
-#include <cstdio>
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <mutex>
 #include <stop_token>
 #include <string>
@@ -20,6 +18,7 @@
 #include "app/interrupt.h"
 #include "app/interruptible_job.h"
 #include "app/json_output.h"
+#include "app/live_design.h"
 #include "app/option_set.h"
 #include "app/output_folder.h"
 #include "app/overview.h"
@@ -28,6 +27,7 @@
 #include "core/compute/work_estimate.h"
 #include "core/error.h"
 #include "core/image/image_io.h"
+#include "core/io/checkpoint_file.h"
 #include "core/io/lens_folder.h"
 #include "core/io/pending_files.h"
 #include "core/optics/source_points.h"
@@ -36,6 +36,7 @@
 #include "design/design_estimate.h"
 #include "design/design_lens.h"
 #include "design/light_setup.h"
+#include "design/schedule/design_task.h"
 #include "design/schedule/level_plan.h"
 
 namespace lensforge::app {
@@ -65,13 +66,6 @@ void note_source(const Image& picture, const DesignOptions& design, const Consol
   if (!(blur > 1.0)) return;
   console.note("the source's image is " + fixed(blur, 1) +
                " pixels wide: no lens shows finer detail in this light");
-}
-
-/// 16 hexadecimal digits: JSON's numbers do not hold 64 bits.
-std::string fingerprint_text(std::uint64_t fingerprint) {
-  std::array<char, 17> text{};
-  std::snprintf(text.data(), text.size(), "%016" PRIx64, fingerprint);
-  return text.data();
 }
 
 /// The process that a design is for and what comes out of it.
@@ -184,11 +178,32 @@ int report_finished(const DesignSettings& settings, const Console& console) {
   return kDone;
 }
 
-/// Runs the design. `begin` is called once, as soon as the library has accepted all its input: what
-/// no lens can do is only known after the first transport, before any share of the work is done.
+/// The page of the design, if one is asked for.
+std::unique_ptr<LiveDesign> live_page(const DesignSettings& settings, const Image& picture,
+                                      const Console& console) {
+  if (settings.live.empty()) return nullptr;
+  const DesignOptions& design = settings.design;
+  Image target = working_picture(picture, design, {});
+  const OpticalSetup setup = optical_setup(design, {target.columns(), target.rows()});
+  auto page = std::make_unique<LiveDesign>(
+      live_port(settings.live), fs::path(settings.out).filename().string(), design.checkpoint,
+      DesignGoalView{std::move(target), setup, design.model});
+  console.note("the design is shown at " + page->address());
+  return page;
+}
+
+/// Who is told while a design runs.
+struct DesignWatchers {
+  /// Once, as soon as the library has accepted all its input: what no lens can do is only known
+  /// after the first transport, before any share of the work is done.
+  std::function<void()> begin;
+  std::function<void()> look;  ///< Whenever there may be something to see.
+};
+
+/// Runs the design.
 DesignResult shape(bool quiet, const Executor& executor, const DesignOptions& design,
                    const Image& target, const std::stop_token& stop,
-                   const std::function<void()>& begin) {
+                   const DesignWatchers& watchers) {
   std::once_flag begun;
   ProgressDisplay progress(quiet);
   const auto show = progress.sink();
@@ -196,13 +211,14 @@ DesignResult shape(bool quiet, const Executor& executor, const DesignOptions& de
     if (p.done > 0.0) {
       std::call_once(begun, [&] {
         progress.wipe();
-        begin();
+        watchers.begin();
       });
     }
     if (show) show(p);
+    watchers.look();
   });
   DesignResult result = design_lens(target, design, executor, control);
-  if (result.status != DesignResult::Status::kInterrupted) std::call_once(begun, begin);
+  if (result.status != DesignResult::Status::kInterrupted) std::call_once(begun, watchers.begin);
   return result;
 }
 
@@ -223,6 +239,7 @@ LoadedImage read_target(const DesignSettings& settings, const CommonOptions& com
 int run(OptionSet& options, DesignSettings& settings) {
   const Console console(options.common().json, options.common().quiet);
   const EarlierDesign earlier = EarlierDesign::in(settings.out);
+  if (!settings.live.empty()) live_port(settings.live);
   refuse_to_overwrite(settings.out, earlier, settings.resume, settings.force);
   const LoadedImage loaded = read_target(settings, options.common());
   const InterruptWatch interrupt;
@@ -233,6 +250,8 @@ int run(OptionSet& options, DesignSettings& settings) {
                      fingerprint_text(design_identity(loaded.image, design)));
     return report_finished(settings, console);
   }
+  design.checkpoint = fs::path(settings.out) / lens_file::kCheckpoint;
+  const std::unique_ptr<LiveDesign> page = live_page(settings, loaded.image, console);
   const ChosenDevice device = options.device_executor();
   const OutputFolder folder(settings.out, FolderLock::Kind::kExclusive);
   if (EarlierDesign::in(settings.out) != earlier) {
@@ -242,7 +261,6 @@ int run(OptionSet& options, DesignSettings& settings) {
   const WorkEstimate expected =
       require_room_for_design(loaded.image.columns(), loaded.image.rows(), design,
                               device.executor.concurrency(), settings.out);
-  design.checkpoint = folder.path() / lens_file::kCheckpoint;
   design.resume = settings.resume && earlier.checkpoint;
   if (expected.seconds > kWorthTelling) console.note("takes " + estimate_words(expected));
   const auto begin = [&] {
@@ -255,8 +273,11 @@ int run(OptionSet& options, DesignSettings& settings) {
       console.note("nothing to resume: started the design from the beginning");
     }
   };
+  const auto look = [&page] {
+    if (page) page->look();
+  };
   DesignResult result = shape(options.common().quiet, device.executor, design, loaded.image,
-                              interrupt.token(), begin);
+                              interrupt.token(), {begin, look});
   return finish(options, device, design, folder, result);
 }
 

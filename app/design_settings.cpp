@@ -9,6 +9,7 @@
 #include "core/error.h"
 #include "core/image/image_io.h"
 #include "design/design_fields.h"
+#include "design/outline_setup.h"
 #include "design/source_setup.h"
 
 namespace lensforge::app {
@@ -62,6 +63,10 @@ void add_design_options(OptionSet& options, DesignSettings& settings) {
   options.text("--source-picture", settings.source_picture, "FILE",
                "picture of the lamp as seen from the lens, as wide as --source-angle or "
                "--source-size; without it the lamp is an evenly lit disc");
+  options.text(
+      "--outline", settings.outline, "rectangle|circle|rounded:R|FILE",
+      "edge of the lens: the largest circle, corners of radius R, or the shape that is white "
+      "in a picture, seen from the cutter's side");
   options.fields(weight_fields(), settings.design.weights);
   options.text("--made-by", settings.made_by, "default|FILE.toml",
                "shape the part that this workshop cuts and polishes, not the surface alone");
@@ -69,6 +74,9 @@ void add_design_options(OptionSet& options, DesignSettings& settings) {
                "with --made-by: right on average over parts that are polished less and more by the "
                "workshop's tolerances.polish_sigma; takes twice as long");
   options.fields(part_fields(), settings.cut);
+  options.text("--live", settings.live, "PORT",
+               "serve a page that shows the design while it runs, to browsers on this machine; 0 "
+               "takes a free port");
   options.flag("--resume", settings.resume,
                "continue the interrupted design in --out, with the same picture and options");
   options.flag("--force", settings.force, "replace the design that --out holds");
@@ -96,6 +104,7 @@ void settle(OptionSet& options, DesignSettings& settings, const Image& picture) 
   if (!settings.source_picture.empty()) {
     settings.design.light.source_shape = shape_of(read_image(settings.source_picture).image);
   }
+  if (!settings.outline.empty()) settings.design.outline = outline_from(settings.outline, {});
   if (!settings.made_by.empty()) settings.design.made_by = process_of(workshop, settings);
   validate(settings.design, picture);
 }

@@ -14,10 +14,12 @@ struct DesignSettings {
   std::string target;
   std::string out;
   std::string source_picture;  ///< File with the source's shape; empty: a disc.
+  std::string outline;         ///< Edge of the lens; empty: its rectangle.
   std::string made_by;         ///< Workshop file, or "default"; empty: not designed for a process.
   bool robust = false;         ///< For parts that are polished less and more than made_by says.
   CamOptions cut;  ///< What of it is milled for made_by: the part or a mould, its shrinkage.
   DesignOptions design;
+  std::string live;  ///< Port of a page that shows the design while it runs; empty: none.
   bool resume = false;
   bool force = false;
 };

@@ -16,8 +16,8 @@
 #include "core/error.h"
 #include "core/image/image_io.h"
 #include "core/io/files.h"
-#include "core/optics/front_placement.h"
 #include "core/surface/lens.h"
+#include "core/surface/lit_surface.h"
 #include "core/surface/mesh_io.h"
 #include "core/surface/setup_json.h"
 #include "core/text/printable.h"
@@ -92,10 +92,7 @@ std::string front_text(const SphericalFront& front) {
 /// How much wider than the lens the front has to be, so that all of the surface is lit.
 void describe_overhang(Description& d, const Lens& lens) {
   if (!lens.setup.front) return;
-  double most = 0.0;
-  for (const Eigen::Vector3d p : lens.surface.vertices.colwise()) {
-    most = std::max(most, overhang(lens.setup, p));
-  }
+  const double most = overhang(lens.surface, lens.setup);
   d.line("front lit", "to " + fixed(most, 3) + " mm beyond the lens's edges");
   d.json["front_overhang"] = most;
 }
@@ -107,6 +104,7 @@ void describe_setup(Description& d, const OpticalSetup& setup) {
          fixed(setup.lens_size.x(), 2) + " x " + fixed(setup.lens_size.y(), 2) + " mm" +
              (mirror ? "" : ", refractive index " + fixed(setup.ior, 4)) +
              (setup.fresnel ? ", what its faces reflect is counted" : ""));
+  if (setup.outline) d.line("outline", outline_words(*setup.outline));
   if (setup.front) d.line("front", front_text(*setup.front));
   d.line("wall", "z = " + fixed(setup.focal_length, 2) + " mm, picture " +
                      fixed(setup.image_size.x(), 2) + " x " + fixed(setup.image_size.y(), 2) +
@@ -124,6 +122,7 @@ void describe_setup(Description& d, const OpticalSetup& setup) {
   const nlohmann::ordered_json all = setup_json(setup);
   for (const char* key : {"mode", "screen"}) d.json[key] = all.at(key);
   if (!mirror) d.json["front"] = all.at("front");
+  if (setup.outline) d.json["outline"] = all.at("outline");
   d.json["light"] = all.at("source");  // "source" is what was asked about.
 }
 

@@ -243,6 +243,7 @@ void OptionSet::add_common() {
 
 void OptionSet::parse(const Arguments& arguments) {
   add_common();
+  if (arguments == Arguments{kListOptions}) throw ListedOptions{listed()};
   CLI::App& app = parser_->app;
   std::vector<std::string> names;
   for (const CLI::Option* option : app.get_options()) {
@@ -287,6 +288,18 @@ nlohmann::json OptionSet::used() const {
         as_given ? option.given : option.get();
   }
   return object;
+}
+
+std::vector<OptionSpec> OptionSet::listed() const {
+  std::vector<OptionSpec> specs;
+  for (const BoundOption& option : parser_->options) specs.push_back(option.spec);
+  for (const auto& [name, kind] : {std::pair{"--config", OptionKind::kText},
+                                   {"--help", OptionKind::kFlag},
+                                   {"--version", OptionKind::kFlag}}) {
+    const CLI::Option& option = *parser_->app.get_option(name);
+    specs.push_back({name, kind, option.get_description(), {}, option.get_type_name(), {}});
+  }
+  return specs;
 }
 
 std::string OptionSet::manual() const {

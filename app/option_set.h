@@ -20,6 +20,13 @@ struct HelpText {
   std::string text;
 };
 
+/// Thrown for kListOptions, by which the completions of shells ask: the options of the command,
+/// common ones included, and what it takes without a name.
+struct ListedOptions {
+  std::vector<OptionSpec> options;
+};
+inline constexpr const char* kListOptions = "--list-options";
+
 /// "lensforge x.y.z" and a line break.
 std::string version_line();
 
@@ -68,7 +75,7 @@ class OptionSet {
   }
 
   /// To be called once, after all options were added.
-  /// @throw HelpText; InputError naming option, value and rule.
+  /// @throw HelpText; ListedOptions; InputError naming option, value and rule.
   void parse(const Arguments& arguments);
 
   /// Puts all that was given where it goes, again: after what lies beneath has changed.
@@ -91,6 +98,7 @@ class OptionSet {
 
   void add(const OptionSpec& spec, Getter get, Setter set);
   void add_common();
+  [[nodiscard]] std::vector<OptionSpec> listed() const;
   /// The options of the command as items of a list in mdoc.
   [[nodiscard]] std::string manual() const;
 

@@ -149,7 +149,9 @@ Image draw_overview(const Lens& lens, const Image* made) {
   std::vector<Image> panels = {resample(lens.target, columns, rows),
                                resample(lens.render, columns, rows)};
   if (made != nullptr) panels.push_back(resample(*made, columns, rows));
-  panels.push_back(draw_relief(lens.surface, lens.setup, columns, rows));
+  const bool shaped = lens.setup.outline.has_value();
+  panels.push_back(draw_relief(shaped ? lens_part(lens, Executor::serial()).mesh : lens.surface,
+                               lens.setup, columns, rows));
   const int count = static_cast<int>(panels.size());
   Image page(count * (columns + kGap) - kGap, rows, 1.0F);
   for (int i = 0; i < count; ++i) {

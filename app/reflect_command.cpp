@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
 #include <filesystem>
 #include <string>
+#include <system_error>
 
 #include "app/command_line.h"
 #include "app/commands.h"
@@ -17,6 +19,7 @@
 #include "core/error.h"
 #include "core/surface/mesh_io.h"
 #include "core/text/number_text.h"
+#include "design/reflect/reflect_checkpoint.h"
 #include "design/reflect/reflect_job.h"
 #include "export/solid_mesh.h"
 
@@ -105,12 +108,58 @@ std::string result_text(const ReflectSettings& settings, const reflect::ReflectR
          radar_text(result);
 }
 
-int shape(const OptionSet& options, const ReflectSettings& settings) {
+bool is_of_result(const std::string& name) {
+  const auto& all = reflect::reflect_file::kAll;
+  return name == reflect::reflect_file::kCheckpoint ||
+         std::find(all.begin(), all.end(), name) != all.end();
+}
+
+/// @throw InputError if the folder holds an unfinished run, which nobody says may go or go on.
+void require_no_unfinished_run(const ReflectSettings& settings) {
+  std::error_code ignored;
+  if (fs::exists(fs::path(settings.out) / reflect::reflect_file::kCheckpoint, ignored) &&
+      !settings.resume && !settings.reflect.force) {
+    throw InputError("--out " + settings.out +
+                     ": holds an unfinished run already; choose another folder, go on with "
+                     "--resume or replace it with --force");
+  }
+}
+
+/// Sets where checkpoints go and whether the run goes on from one. @return false if the run has
+/// ended before and there is nothing left to do.
+bool settle_checkpoint(ReflectSettings& settings, const reflect::ReflectInput& input,
+                       const OutputFolder& folder, const Console& console) {
+  reflect::ReflectOptions& options = settings.reflect;
+  options.checkpoint = folder.path() / reflect::reflect_file::kCheckpoint;
+  std::error_code ignored;
+  const bool unfinished = fs::exists(options.checkpoint, ignored);
+  options.resume = settings.resume && unfinished;
+  if (unfinished && !options.resume) fs::remove(options.checkpoint, ignored);
+  if (!settings.resume || unfinished) return true;
+  if (reflect::holds_result(folder.path(), reflect::reflect_fingerprint(input, options))) {
+    return false;
+  }
+  console.note("nothing to resume: started from the beginning");
+  return true;
+}
+
+int report_finished(const ReflectSettings& settings, const Console& console) {
+  console.result({{"command", "reflect"}, {"out", settings.out}, {"status", "done"}},
+                 settings.out + ": the run is finished, there is nothing to resume\n");
+  return kDone;
+}
+
+int shape(const OptionSet& options, ReflectSettings& settings) {
   const Console console(options.common().json, options.common().quiet);
+  require_no_unfinished_run(settings);
   const reflect::ReflectInput input = load(settings, options.common(), console);
   const InterruptWatch interrupt;
   const OutputFolder folder(settings.out, FolderLock::Kind::kExclusive);
   reflect::require_replaceable_result(folder.path(), settings.reflect.force);
+  folder.remove_partial_files(is_of_result);
+  if (!settle_checkpoint(settings, input, folder, console)) {
+    return report_finished(settings, console);
+  }
   ProgressDisplay progress(options.common().quiet);
   const RunControl control(interrupt.token(), progress.sink());
   const reflect::ReflectResult result =
@@ -122,9 +171,14 @@ int shape(const OptionSet& options, const ReflectSettings& settings) {
        reflect::write_result(result, settings.reflect, folder.path(), options.executor())) {
     json["files"].push_back(file.string());
   }
+  std::error_code ignored;
+  if (result.done()) fs::remove(settings.reflect.checkpoint, ignored);
   for (const std::string& unmet : result.unmet) console.note("warning: " + unmet);
   console.result(json, result_text(settings, result));
-  if (!result.done()) return kInterrupted;
+  if (!result.done()) {
+    console.note("interrupted; run the same command with --resume to continue");
+    return kInterrupted;
+  }
   return result.unmet.empty() ? kDone : kLimitMissed;
 }
 

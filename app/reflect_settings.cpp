@@ -9,6 +9,8 @@ void add_reflect_options(OptionSet& options, ReflectSettings& settings) {
   options.text("--out", settings.out, "DIR", "folder for the new shape, its pictures and figures");
   options.flag("--evaluate", settings.evaluate,
                "print the reflected energies of the mesh as it is and write nothing");
+  options.flag("--resume", settings.resume,
+               "continue the interrupted run in --out, with the same mesh and options");
   options.fields(reflect::reflect_fields(), settings.reflect);
 }
 

@@ -13,6 +13,7 @@ struct ReflectSettings {
   std::string mesh;  ///< File to read.
   std::string out;   ///< Folder; empty with `evaluate`.
   bool evaluate = false;
+  bool resume = false;
   reflect::ReflectOptions reflect;
 };
 

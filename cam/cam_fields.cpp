@@ -119,6 +119,26 @@ OptionTable<O> raster_rows() {
               "no semi-finishing program")};
 }
 
+OptionTable<O> outline_rows() {
+  constexpr auto tabs = [](auto& o) -> auto& { return o.tabs; };
+  return {R::word<OutlineWish>("--cut-outline", &O::cut_outline,
+                               {{"auto", OutlineWish::kIfShaped},
+                                {"always", OutlineWish::kAlways},
+                                {"never", OutlineWish::kNever}},
+                               "cut the lens out of its blank, last; auto: if it has an outline"),
+          R::whole("--outline-tool", &O::outline_tool, Limits::between(0, 9999),
+                   "number of the flat end mill for it; 0: the roughing tool"),
+          R::whole("--tabs", in(tabs, &TabOptions::count), Limits::between(0, cam_limit::kMostTabs),
+                   "tabs that hold the lens in its frame until they are snapped; fewer where they "
+                   "do not fit"),
+          R::length("--tab-width", in(tabs, &TabOptions::width),
+                    Limits::between(cam_limit::kThinnestTab, cam_limit::kWidestTab),
+                    "of a tab along the outline"),
+          R::length("--tab-height", in(tabs, &TabOptions::height),
+                    Limits::between(cam_limit::kThinnestTab, cam_limit::kHighestTab),
+                    "of a tab above the blank's underside")};
+}
+
 /// What can be cut of a lens.
 R::Choices<std::optional<SurfaceModel>> surfaces() {
   R::Choices<std::optional<SurfaceModel>> words{{"designed", std::nullopt}};
@@ -250,8 +270,8 @@ OptionTable<O> limit_rows() {
 const OptionTable<CamOptions>& cam_fields() {
   static const OptionTable<O> table = [] {
     OptionTable<O> all;
-    for (const OptionTable<O>& rows : {tool_rows(), raster_rows(), blank_rows(), program_rows(),
-                                       prediction_rows(), limit_rows()}) {
+    for (const OptionTable<O>& rows : {tool_rows(), raster_rows(), blank_rows(), outline_rows(),
+                                       program_rows(), prediction_rows(), limit_rows()}) {
       all.insert(all.end(), rows.begin(), rows.end());
     }
     return all;

@@ -12,6 +12,7 @@
 #include "cam/cut_report.h"
 #include "cam/job_files.h"
 #include "cam/meant_surface.h"
+#include "cam/part_layers.h"
 #include "cam/part_surfaces.h"
 #include "cam/prediction.h"
 #include "cam/remedies.h"
@@ -21,6 +22,7 @@
 #include "core/error.h"
 #include "core/image/error_image.h"
 #include "core/image/image_io.h"
+#include "core/io/cut_layers.h"
 #include "core/io/files.h"
 #include "core/io/output_guard.h"
 #include "core/io/pending_files.h"
@@ -34,8 +36,9 @@ namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
 /// What a cut writes beside its programs.
-constexpr std::array kOthers{cam_file::kReport, cam_file::kPage, cam_file::kMilledMesh,
-                             cam_file::kMilledPicture, cam_file::kLeakage};
+constexpr std::array kOthers{cam_file::kReport,        cam_file::kPage,    cam_file::kMilledMesh,
+                             cam_file::kMilledPicture, cam_file::kLeakage, lens_file::kPartSurfaces,
+                             lens_file::kCausePictures};
 
 std::vector<const char*> others_of(const CamOptions& options) {
   if (options.render) return {kOthers.begin(), kOthers.end()};
@@ -163,6 +166,11 @@ class Job {
     });
     files.add(cam_file::kLeakage, [&](const fs::path& beside) {
       write_image(leakage_picture(prediction.leakage), beside);
+    });
+    files.add(lens_file::kPartSurfaces,
+              [&](const fs::path& beside) { write_layers(prediction.surfaces, beside); });
+    files.add(lens_file::kCausePictures, [&](const fs::path& beside) {
+      write_layers(cause_layers(prediction.leakage, lens_.target.total()), beside);
     });
   }
 

@@ -2,6 +2,7 @@
 #include "cam/cam_options.h"
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 
 #include "cam/cam_fields.h"
@@ -53,18 +54,48 @@ void validate_tolerances(const CamOptions& options) {
 
 /// Parts are blurred by the errors of a source that is a point otherwise.
 void validate_tolerances(const CamOptions& options, const OpticalSetup& setup) {
-  if (options.tolerances == 0 || setup.extent.none()) return;
+  if (options.tolerances == 0) return;
+  if (setup.outline) {
+    refuse("--tolerances", options.tolerances,
+           "draws parts of rectangular lenses only; use --tolerances 0");
+  }
+  if (setup.extent.none() && !setup.front) return;
   refuse("--tolerances", options.tolerances,
-         "draws parts for the light of a point or of one direction only, and this one was designed "
-         "for a source with an extent; use --tolerances 0");
+         "draws parts with a flat front, for the light of a point or of one direction only; use "
+         "--tolerances 0");
 }
 
-/// A lens lies on its front while it is cut.
+void validate_outline(const CamOptions& options) {
+  if (options.cut_outline == OutlineWish::kAlways && options.part == PartKind::kMould) {
+    throw InputError("--cut-outline always: a mould keeps its blank; use --cut-outline never");
+  }
+  if (options.outline_tool > 0 && options.workshop.find_tool(options.outline_tool) == nullptr) {
+    refuse("--outline-tool", options.outline_tool,
+           "the workshop has no tool of this number; 0 takes the roughing tool");
+  }
+}
+
+/// A lens with a curved front lies in a nest while it is cut, and its blank has the front already.
 void validate_front(const CamOptions& options, const OpticalSetup& setup) {
   if (!setup.front || options.part != PartKind::kLens) return;
-  throw InputError("front: a sphere of radius " + shortest_text(setup.front->radius) +
-                   " mm does not lie on a table; cam cuts lenses that were designed with --front "
-                   "flat, and moulds (--part mould)");
+  if (options.z_zero == ZZero::kTable) {
+    throw InputError(
+        "--z-zero table: the lens's front is a sphere, which has no plane to lie on; use stock or "
+        "lens");
+  }
+  const double margin = options.workshop.stock.margin;
+  const Eigen::Vector2d middle = 0.5 * setup.lens_size;
+  const Eigen::Vector2d reach = (setup.front->apex.head<2>() - middle).cwiseAbs() + middle;
+  const double radius = std::abs(setup.front->radius);
+  if ((reach.array() + margin).matrix().norm() < radius) return;
+  // (x + m)² + (y + m)² = R², rounded down.
+  const double sum = reach.sum();
+  const double most =
+      0.5 * (std::sqrt(sum * sum - 2.0 * (reach.squaredNorm() - radius * radius)) - sum);
+  refuse("stock.margin", margin,
+         "the lens's front, a sphere of radius " + shortest_text(radius) +
+             " mm, is too small for a blank of that margin; " +
+             decimal_text(std::floor(10.0 * most) / 10.0, 1) + " mm would do");
 }
 
 /// Before hours are spent on programs that the controller could not read.
@@ -83,6 +114,7 @@ void validate_tool_numbers(const CamOptions& options) {
   check(process.finish.large_tool);
   if (process.rough.enabled) check(process.rough.tool);
   if (process.semi.enabled) check(process.semi.tool);
+  if (options.outline_tool > 0) check(options.outline_tool);
 }
 
 }  // namespace
@@ -141,6 +173,13 @@ void validate(const CamOptions& options, const OpticalSetup& setup) {
   validate_tolerances(options);
   validate_tolerances(options, setup);
   validate_front(options, setup);
+  validate_outline(options);
+}
+
+bool cuts_outline(const CamOptions& options, const OpticalSetup& setup) {
+  if (options.part == PartKind::kMould) return false;
+  if (options.cut_outline == OutlineWish::kIfShaped) return setup.outline.has_value();
+  return options.cut_outline == OutlineWish::kAlways;
 }
 
 }  // namespace lensforge

@@ -8,6 +8,7 @@
 
 #include "cam/leakage/leakage.h"
 #include "cam/path/finish_raster.h"
+#include "cam/path/outline_operation.h"
 #include "cam/post/post_description.h"
 #include "cam/post/program_plan.h"
 #include "cam/report/verdict.h"
@@ -20,7 +21,7 @@ namespace lensforge {
 /// Where program Z = 0 lies.
 enum class ZZero {
   kStock,  ///< Top of the blank.
-  kTable,  ///< What the blank lies on: z = 0 of the lens frame.
+  kTable,  ///< What the blank lies on: z = 0 of the lens frame. Of flat fronts only.
   kLens,   ///< Highest point of the finished surface.
 };
 
@@ -28,6 +29,13 @@ enum class ZZero {
 enum class PartKind {
   kLens,
   kMould,  ///< The negative, from which lenses are cast.
+};
+
+/// Whether the part is cut out of its blank, last of all.
+enum class OutlineWish {
+  kIfShaped,  ///< A lens that has an outline.
+  kAlways,    ///< A rectangular one, too.
+  kNever,
 };
 
 /// Everything that shapes the cut of a lens and what is predicted of it, but the lens itself.
@@ -49,6 +57,10 @@ struct CamOptions {
   /// What is cut: the facets as they are, the smooth surface over the mesh (SmoothSurface), or the
   /// lens's own spline; none takes what the lens was designed as.
   std::optional<SurfaceModel> surface;
+
+  OutlineWish cut_outline = OutlineWish::kIfShaped;
+  int outline_tool = 0;  ///< Tool::number, a flat end mill; 0 takes the roughing tool.
+  TabOptions tabs;
 
   bool force = false;  ///< Replace files that no cut wrote as they stand.
 
@@ -73,10 +85,18 @@ inline constexpr double kCoarsestSample = 1.0;  ///< mm
 inline constexpr int kFewestParts = 10;
 inline constexpr int kMostParts = 100000;
 inline constexpr int kLargestSeed = 999999;
+/// Of tabs, mm: below it a tab does not hold, above it nobody snaps it by hand.
+inline constexpr double kThinnestTab = 0.1;
+inline constexpr double kWidestTab = 50.0;
+inline constexpr double kHighestTab = 10.0;
+inline constexpr int kMostTabs = 100;
 }  // namespace cam_limit
 
 /// The spacing at which the surface is sampled, mm.
 double sample_spacing(const CamOptions& options);
+
+/// True if the outline is cut.
+bool cuts_outline(const CamOptions& options, const OpticalSetup& setup);
 
 /// @throw InputError naming option, value and rule if an option breaks its rule on its own or
 ///        against the size of the lens.

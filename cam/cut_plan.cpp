@@ -76,7 +76,9 @@ CutPlan::CutPlan(const Lens& lens, const CamOptions& options, const Executor& ex
       balls_(optical_, options_, executor),
       collisions_(profile_, options_.workshop, stock_),
       watch_(collisions_, options_.workshop.tools, z_offset_,
-             highest_obstacle(options_.workshop, blank_)) {}
+             highest_obstacle(options_.workshop, blank_)) {
+  if (cuts_outline(options_, lens_.setup)) require_outline_cut(outline(), outline_cut(), blank_);
+}
 
 std::optional<CastFrame> CutPlan::mould() const {
   if (options_.part == PartKind::kLens) return std::nullopt;
@@ -153,6 +155,34 @@ ProgramOperation CutPlan::pencil_operation(const RunControl& control) {
           }};
 }
 
+OutlineCut CutPlan::outline_cut() const {
+  const RoughProcess& rough = options_.workshop.process.rough;
+  const int number = options_.outline_tool > 0 ? options_.outline_tool : rough.tool;
+  // The program's last decimal must not round it below the blank.
+  const double unit = resolution_of(options_);
+  const double bottom = std::ceil((blank_.min().z() + z_offset_) / unit) * unit - z_offset_;
+  return with_tabs_that_fit(
+      outline(), {options_.workshop.tool(number), options_.tabs, rough.stepdown,
+                  rough.ramp_angle_deg, safe_z(), bottom, options_.workshop.process.clearance});
+}
+
+/// Of the lens, or its rectangle.
+std::vector<Eigen::Vector2d> CutPlan::outline() const {
+  if (lens_.setup.outline) return lens_.setup.outline->points;
+  const Eigen::Vector2d& size = lens_.setup.lens_size;
+  return {{0.0, 0.0}, {size.x(), 0.0}, size, {0.0, size.y()}};
+}
+
+ProgramOperation CutPlan::outline_operation(const RunControl& control) {
+  const OutlineCut cut = outline_cut();
+  const std::string tabs = std::to_string(cut.tabs.count) + " tabs, " +
+                           trimmed_decimal(cut.tabs.width, 3) + " mm wide and " +
+                           trimmed_decimal(cut.tabs.height, 3) + " mm high";
+  return {"outline", cut.tool, {tabs}, [this, cut, &control](const MoveSink& sink) {
+            return cut_outline(outline(), cut, stock_, sketched("outline", sink), control);
+          }};
+}
+
 ProgramPlan CutPlan::programs(const RunControl& control) {
   ProgramPlan plan;
   plan.job = options_.job;
@@ -167,6 +197,7 @@ ProgramPlan CutPlan::programs(const RunControl& control) {
     plan.operations.push_back(finish_operation(pass, control));
   }
   if (finish().pencil) plan.operations.push_back(pencil_operation(control));
+  if (cuts_outline(options_, lens_.setup)) plan.operations.push_back(outline_operation(control));
   for (const ProgramOperation& operation : plan.operations) {
     watched_.push_back({operation.name, operation.tool});
   }

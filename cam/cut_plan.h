@@ -20,6 +20,7 @@
 #include "cam/path/collision.h"
 #include "cam/path/finish_operation.h"
 #include "cam/path/finish_raster.h"
+#include "cam/path/outline_operation.h"
 #include "cam/path/pencil.h"
 #include "cam/path/rough.h"
 #include "cam/path/stock_map.h"
@@ -86,6 +87,8 @@ class CutPlan {
   }
   /// What else was found in them.
   [[nodiscard]] const ProgramWatch& watch() const { return watch_; }
+  /// How the outline is cut. @pre cuts_outline().
+  [[nodiscard]] OutlineCut outline_cut() const;
   /// Every operation's way, thinned out, as far as programs() were streamed.
   [[nodiscard]] std::vector<ReportPath> shown_path() const;
 
@@ -99,6 +102,8 @@ class CutPlan {
   ProgramOperation semi_operation(const RunControl& control);
   ProgramOperation finish_operation(const FinishPass& pass, const RunControl& control);
   ProgramOperation pencil_operation(const RunControl& control);
+  [[nodiscard]] std::vector<Eigen::Vector2d> outline() const;
+  ProgramOperation outline_operation(const RunControl& control);
   OperationSummary run_pencil(double resolution, const MoveSink& sink,
                               const RunControl& control) const;
   /// Hands over all motions at feed with a tool.

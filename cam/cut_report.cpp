@@ -6,7 +6,9 @@
 #include <string>
 
 #include "core/optics/fresnel.h"
+#include "core/optics/front_placement.h"
 #include "core/page/html_text.h"
+#include "core/surface/lit_surface.h"
 #include "core/text/number_text.h"
 #include "core/text/version.h"
 
@@ -30,7 +32,34 @@ std::string up_words(PartKind part, const Lens& lens) {
   if (is_mirror(lens)) {
     return "underside down, which needs no polish; the mirror's surface is cut from above";
   }
+  if (lens.setup.front) {
+    return "polished spherical face down, in a nest; the optical surface is cut from above";
+  }
   return "polished flat face down; the optical surface is cut from above";
+}
+
+/// Where the front of the blank has to lie, and what comes of it where it does not.
+std::string front_words(const CutPlan& plan, const Lens& lens) {
+  const SphericalFront& front = lens.setup.front.value();
+  const Eigen::Vector2d middle = 0.5 * lens.setup.lens_size;
+  const double top = lens.surface.vertices.row(2).mean();
+  const double shift = shift_by_front(lens.setup, {middle.x(), middle.y(), top});
+  return std::string(front.radius > 0.0 ? "bulging" : "hollow") + " sphere of radius " +
+         mm(std::abs(front.radius), 2) + ", there before the first cut: its apex lies at X " +
+         decimal_text(front.apex.x(), 3) + " Y " + decimal_text(front.apex.y(), 3) + " Z " +
+         decimal_text(front.apex.z() + plan.z_offset(), 3) + " of the program, " +
+         mm(plan.blank().max().z() - front.apex.z(), 3) +
+         " below the top of the blank; 0.1 mm aside moves the picture by " + mm(0.1 * shift, 3) +
+         ". The nest may reach up to Z " + decimal_text(plan.z_offset(), 3) + ", no higher";
+}
+
+/// The blank with what of its front lies below z = 0.
+Eigen::AlignedBox3d whole_box(const CutPlan& plan, const SphericalFront& front) {
+  Eigen::AlignedBox3d blank = plan.blank();
+  blank.min().z() =
+      std::min(blank.min().z(), lowest_of(front, {Eigen::Vector2d(blank.min().head<2>()),
+                                                  Eigen::Vector2d(blank.max().head<2>())}));
+  return blank;
 }
 
 SetupSheet setup_sheet(const CutPlan& plan, const Lens& designed) {
@@ -46,6 +75,11 @@ SetupSheet setup_sheet(const CutPlan& plan, const Lens& designed) {
   sheet.zero_words = joined({"lower left corner of the ", is_mirror(designed) ? "mirror" : "lens",
                              ", ", words_for(options.z_zero)});
   sheet.up_words = up_words(options.part, designed);
+  if (lens && designed.setup.front) {
+    sheet.front = designed.setup.front;
+    sheet.front_words = front_words(plan, designed);
+    sheet.blank = whole_box(plan, *designed.setup.front);
+  }
   for (const KeepOut& clamp : options.workshop.keep_outs) {
     sheet.keep_outs.push_back({clamp.name, {clamp.low, clamp.high}});
   }
@@ -126,6 +160,18 @@ ParameterGroup entry_parameters(const Process& process) {
     group.parameters.push_back(entry_parameter("Semi-finishing", process.semi));
   }
   return group;
+}
+
+/// How the lens is cut out of its blank.
+ParameterGroup outline_parameters(const CutPlan& plan) {
+  const OutlineCut cut = plan.outline_cut();
+  return {
+      "Outline",
+      {{"Tool", "T" + std::to_string(cut.tool.number) + ", " + cut.tool.name},
+       {"Tabs", cut.tabs.count == 0
+                    ? "none: the lens comes free in the last turn"
+                    : std::to_string(cut.tabs.count) + ", " + mm(cut.tabs.width, 2) + " wide, " +
+                          mm(cut.tabs.height, 2) + " high, to be snapped by hand"}}};
 }
 
 ParameterGroup polish_parameters(const CamOptions& options) {
@@ -261,6 +307,17 @@ std::string spindle_warning(const CutPlan& plan, const ProgramFiles& programs) {
          ", silently: set it to at least " + decimal_text(fastest, 0);
 }
 
+/// Light enters a curved front beyond the lens's edges.
+std::string margin_warning(const CutPlan& plan, const Lens& lens) {
+  const double margin = plan.options().workshop.stock.margin;
+  const double needed = overhang(lens.surface, lens.setup);
+  if (plan.options().part != PartKind::kLens || !(needed > margin)) return {};
+  return "light enters the front up to " + mm(needed, 2) +
+         " beyond the lens's edges, but the blank ends at " + mm(margin, 2) +
+         ": the picture's rim stays dark unless stock.margin is at least " +
+         mm(std::ceil(10.0 * needed) / 10.0, 1);
+}
+
 std::vector<std::string> warnings_of(const CutPlan& plan, const ProgramFiles& programs,
                                      const Lens& lens) {
   std::vector<std::string> warnings;
@@ -269,7 +326,7 @@ std::vector<std::string> warnings_of(const CutPlan& plan, const ProgramFiles& pr
   for (const Collision& collision : plan.collisions()) warnings.push_back(collision.sentence());
   for (const std::string& fault : plan.watch().faults()) warnings.push_back(fault);
   for (const std::string& sentence :
-       {index_warning(plan, lens), process_warning(plan, lens),
+       {index_warning(plan, lens), margin_warning(plan, lens), process_warning(plan, lens),
         travel_fault(plan.watch().extent(), plan.options().workshop.machine.travel)}) {
     if (!sentence.empty()) warnings.push_back(sentence);
   }
@@ -388,6 +445,7 @@ ReportData make_report(const CutPlan& plan, const ProgramFiles& programs,
   if (process.rough.enabled || process.semi.enabled) {
     data.parameters.push_back(entry_parameters(process));
   }
+  if (cuts_outline(options, lens.setup)) data.parameters.push_back(outline_parameters(plan));
   data.setup = setup_sheet(plan, lens);
   data.light = lens.setup;
   data.light_height = lens.surface.vertices.row(2).maxCoeff();

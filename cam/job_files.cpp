@@ -10,6 +10,7 @@
 #include <system_error>
 
 #include "core/error.h"
+#include "core/io/cut_layers.h"
 #include "core/io/files.h"
 #include "core/io/lens_folder.h"
 #include "core/io/output_guard.h"
@@ -108,10 +109,12 @@ bool is_own_program(const fs::path& path) {
 
 bool is_name_of_cut(const std::string& name) {
   const fs::path path(name);
+  const auto among = [&name](const auto& names) {
+    return std::find(names.begin(), names.end(), name) != names.end();
+  };
   return kProgramExtensions.contains(lower_case(path.extension().string())) ||
-         names_operations(without_number(path.stem().string())) ||
-         std::find(lens_file::kCutFiles.begin(), lens_file::kCutFiles.end(), name) !=
-             lens_file::kCutFiles.end();
+         names_operations(without_number(path.stem().string())) || among(lens_file::kCutFiles) ||
+         among(lens_file::kCutLayers);
 }
 
 OtherPrograms other_programs(const fs::path& folder, std::span<const fs::path> written) {

@@ -3,13 +3,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "cam/leakage/render_field.h"
 #include "cam/milled/lens_grid.h"
 #include "cam/milled/sampled_mesh.h"
+#include "cam/part_layers.h"
 #include "core/error.h"
 #include "core/optics/light_path.h"
 #include "core/surface/lit_surface.h"
+#include "core/surface/mesh_cut.h"
 
 namespace lensforge {
 namespace {
@@ -48,6 +51,13 @@ SurfacePatch coarse_patch(const SurfaceField& field, const Lens& lens, double sp
   return patch;
 }
 
+/// LightPath::intake() of all of the lens inside of its outline, mm².
+double lit_intake(const Lens& lens, const LightPath& light, const Executor& executor) {
+  const std::optional<Outline>& outline = lens.setup.outline;
+  if (!outline) return intake_of(lens.surface, light);
+  return intake_inside(lens.surface, cut_mesh(lens.surface, *outline, executor), light);
+}
+
 LensRaster raster_of(const SurfacePatch& patch) {
   LensRaster raster;
   raster.columns = static_cast<int>(patch.window.columns);
@@ -78,7 +88,7 @@ Prediction predict_part(const PartSurfaces& surfaces, const Lens& lens, const Ca
   FieldRenderSetup setup{lens.setup, grid};
   setup.surface_height = lens.surface.vertices.row(2).mean();
   const LightPath light(lens.setup);
-  if (!light.intake_is_plan_area()) setup.whole = intake_of(lens.surface, light);
+  if (!light.intake_is_plan_area()) setup.whole = lit_intake(lens, light, executor);
   const LeakageChain chain = chain_of(surfaces, lens, options);
   result.leakage = measure_leakage(chain, lens.target, setup, options.leakage, executor, control);
   result.sampling =
@@ -94,6 +104,9 @@ Prediction predict_part(const PartSurfaces& surfaces, const Lens& lens, const Ca
   const double spacing = lens.setup.lens_size.maxCoeff() / kViewNodes;
   result.surface = raster_of(coarse_patch(surfaces.milled(), lens, spacing, executor));
   result.milled = mesh_of(coarse_patch(surfaces.milled(), lens, kMeshSpacing, executor));
+  result.surfaces = surface_layers(
+      {{part_layer::kPolished, chain.steps.front().field}, {part_layer::kPart, &surfaces.part()}},
+      lens.setup.lens_size, sample_spacing(options), executor, control);
   return result;
 }
 

@@ -14,6 +14,7 @@
 #include "cam/tolerance/tolerance_forecast.h"
 #include "core/compute/executor.h"
 #include "core/compute/run_control.h"
+#include "core/image/layered_image.h"
 #include "core/surface/lens.h"
 #include "core/surface/surface_mesh.h"
 
@@ -28,6 +29,7 @@ struct Prediction {
   ReportMap height;              ///< Part − designed, µm.
   LensRaster surface;            ///< Heights of the part, mm.
   SurfaceMesh milled;            ///< The surface as milled, at kMeshSpacing.
+  LayeredImage surfaces;         ///< Designed but polished, and the part: surface_layers().
   ToleranceForecast tolerances;  ///< Empty unless it is asked for.
 };
 

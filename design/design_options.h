@@ -36,8 +36,11 @@ struct DesignOptions {
   double ior = 1.49;            ///< Refractive index, > 1.
   double thickness = 5.0;       ///< Least z of the finished surface, mm, > 0.
   LightOptions light;           ///< Source, mirror or lens, screen.
-  int pixels = 256;             ///< Longer side of the working picture; at most the source's.
-  double mesh_ratio = 1.25;     ///< Mesh vertices per pixel side, 0.25 … 8.
+  /// Edge of the lens where it is not a rectangle: its kind and its radius, mm, or the corners of a
+  /// polygon in any unit, which optical_setup() fits into the lens's rectangle.
+  std::optional<Outline> outline;
+  int pixels = 256;          ///< Longer side of the working picture; at most the source's.
+  double mesh_ratio = 1.25;  ///< Mesh vertices per pixel side, 0.25 … 8.
   /// Resolutions, coarse to fine, each twice the one before; at most as many as leave the coarsest
   /// picture 32 pixels. One is the default: started from transport at full size, the picture ends
   /// closer than over coarse levels (128² portrait, two rounds, facet MAE: 0.0048 with one level,

@@ -3,10 +3,12 @@
 
 #include <algorithm>
 #include <functional>
+#include <optional>
 
 #include "core/error.h"
 #include "core/image/spectral_color.h"
 #include "core/optics/light_path.h"
+#include "core/surface/outline_index.h"
 #include "core/text/number_list.h"
 
 namespace lensforge {
@@ -34,6 +36,8 @@ OpticalSetup in_color(OpticalSetup setup, double abbe, double wavelength) {
 
 Fringe fringe_of(const SurfaceMesh& mesh, const Eigen::Matrix3Xd& normals,
                  const OpticalSetup& setup, double abbe, const std::vector<double>& wavelengths) {
+  const std::optional<OutlineIndex> outline =
+      setup.outline ? std::optional<OutlineIndex>(*setup.outline) : std::nullopt;
   const LightPath first(in_color(setup, abbe, wavelengths.front()));
   const LightPath last(in_color(setup, abbe, wavelengths.back()));
   Fringe fringe;
@@ -41,6 +45,7 @@ Fringe fringe_of(const SurfaceMesh& mesh, const Eigen::Matrix3Xd& normals,
   for (Eigen::Index v = 0; v < mesh.vertices.cols(); ++v) {
     const Eigen::Vector3d p = mesh.vertices.col(v);
     const Eigen::Vector3d n = normals.col(v).normalized();
+    if (outline && !outline->contains(p.head<2>())) continue;
     if (!first.transmits(p, n) || !last.transmits(p, n)) continue;
     const Eigen::Vector2d apart =
         first.land(p, first.beam(p, n).m) - last.land(p, last.beam(p, n).m);

@@ -14,6 +14,8 @@
 #include "core/optics/light_path.h"
 #include "core/text/number_list.h"
 #include "core/text/number_text.h"
+#include "core/value_slope.h"
+#include "design/outline_setup.h"
 #include "design/source_setup.h"
 
 namespace lensforge {
@@ -272,6 +274,66 @@ void require_screen_beyond(const DesignOptions& o, const OpticalSetup& setup) {
                    number_text(std::ceil(1.1 * needed)) + "mm would do");
 }
 
+/// True if the screen's picture is in the way of the light that comes to a point of a mirror.
+/// @param a  unit direction of that light.
+bool screen_shades(const OpticalSetup& setup, const Eigen::Vector3d& p, const Eigen::Vector3d& a) {
+  const Eigen::Vector3d normal = setup.screen_x.cross(setup.screen_y);
+  const double back = normal.dot(setup.screen_centre() - p) / normal.dot(-a);
+  const double reach = setup.point ? (p - setup.point->position).norm() : kInfinity;
+  if (!(back > 0.0 && back < reach)) return false;
+  const Eigen::Vector3d l = p - back * a - setup.screen_centre();
+  return std::abs(setup.screen_x.dot(l)) < 0.5 * setup.image_size.x() &&
+         std::abs(setup.screen_y.dot(l)) < 0.5 * setup.image_size.y();
+}
+
+/// True if the screen is in the way of the light of a flat mirror.
+bool is_shaded(const OpticalSetup& setup, double thickness) {
+  constexpr int kCells = 16;
+  const LightSource source(setup);
+  for (int k = 0; k < (kCells + 1) * (kCells + 1); ++k) {
+    const Eigen::Vector2d share(k % (kCells + 1), k / (kCells + 1));
+    const Eigen::Vector2d place = setup.lens_size.cwiseProduct(share) / kCells;
+    const Eigen::Vector3d p(place.x(), place.y(), thickness);
+    if (screen_shades(setup, p, source.incident(p))) return true;
+  }
+  return false;
+}
+
+/// Another light of a mirror that its screen leaves free, as an option; empty if none was found.
+std::string free_light(const DesignOptions& o, const Eigen::Vector2i& pixels) {
+  const auto works = [&](const DesignOptions& other) {
+    const OpticalSetup setup = optical_setup(other, pixels);
+    const std::vector<double> clear = clearances(setup, o.thickness);
+    return std::all_of(clear.begin(), clear.end(), [](double c) { return c > 0.0; }) &&
+           reaches_centre(setup, o.thickness) && !is_shaded(setup, o.thickness);
+  };
+  DesignOptions other = o;
+  if (o.light.source == SourceKind::kPoint) {
+    const double height = std::round(0.5 * o.focal_length);
+    for (double x = 0.0; x <= kMaxFocalLength && x < 20.0 * height; x += 0.1 * height) {
+      other.light.source_position = {-std::round(x), 0.5 * lens_size(o, pixels).y(), height};
+      if (works(other)) return "--source-position " + text_of(*other.light.source_position);
+    }
+    return {};
+  }
+  for (double degrees = std::ceil(o.light.incidence); degrees <= kMaxTilt; degrees += 1.0) {
+    other.light.incidence = degrees;
+    if (works(other)) return "--incidence " + number_text(degrees);
+  }
+  return {};
+}
+
+void require_unshaded(const DesignOptions& o, const Eigen::Vector2i& pixels,
+                      const OpticalSetup& setup) {
+  if (!is_mirror(o) || !is_shaded(setup, o.thickness)) return;
+  const std::string given = o.light.source == SourceKind::kPoint
+                                ? "--source-position " + text_of(*o.light.source_position)
+                                : "--incidence " + number_text(o.light.incidence);
+  const std::string free = free_light(o, pixels);
+  refuse(given, "the screen is in the way of the light that comes to the mirror; " +
+                    (free.empty() ? "a smaller --image-width" : free) + " would do");
+}
+
 }  // namespace
 
 OpticalSetup optical_setup(const DesignOptions& options, const Eigen::Vector2i& pixels) {
@@ -281,6 +343,7 @@ OpticalSetup optical_setup(const DesignOptions& options, const Eigen::Vector2i& 
   setup.fresnel = options.light.fresnel;
   setup.focal_length = options.focal_length;
   setup.lens_size = lens_size(options, pixels);
+  if (options.outline) setup.outline = fitted(*options.outline, setup.lens_size);
   setup.image_size = setup.lens_size;
   if (options.light.image_width > 0.0)
     setup.image_size *= options.light.image_width / options.width;
@@ -312,6 +375,7 @@ OpticalSetup at_focal_length(OpticalSetup setup, double focal_length, double thi
 }
 
 void require_light(const DesignOptions& options, const Eigen::Vector2i& pixels) {
+  require_outline(options.outline, lens_size(options, pixels));
   require_source_options(options.light);
   require_source(options, lens_size(options, pixels));
   require_tilt(options.light.screen_tilt);
@@ -320,6 +384,7 @@ void require_light(const DesignOptions& options, const Eigen::Vector2i& pixels) 
   const OpticalSetup setup = optical_setup(options, pixels);
   require_screen_beyond(options, setup);
   require_reach(options, setup);
+  require_unshaded(options, pixels, setup);
   require_source_extent(options, setup);
 }
 

@@ -5,6 +5,8 @@
 #include <span>
 #include <vector>
 
+#include "core/surface/mesh_cut.h"
+#include "core/surface/mesh_normals.h"
 #include "design/render_flux.h"
 #include "design/render_spline.h"
 #include "design/source_picture.h"
@@ -29,23 +31,44 @@ std::vector<double> flux_of_point(const SurfaceMesh& mesh, const OpticalSetup& s
   return render_flux(mesh, setup, model, executor);
 }
 
+/// The part of a surface that the light goes through.
+SampledSurface lit_part(const SurfaceMesh& mesh, const Eigen::Matrix3Xd& normals,
+                        const OpticalSetup& setup, const Executor& executor) {
+  return part_inside(mesh, normals, cut_mesh(mesh, *setup.outline, executor));
+}
+
 int points_for(const SurfaceMesh& mesh, const OpticalSetup& setup) {
   return source_point_count(setup, mesh.vertices.row(2).mean());
 }
 
-std::vector<double> flux_of(const SurfaceMesh& mesh, const OpticalSetup& setup, SurfaceModel model,
-                            const Executor& executor) {
+std::vector<double> flux_through(const SurfaceMesh& mesh, const OpticalSetup& setup,
+                                 SurfaceModel model, const Executor& executor) {
   return picture_under(setup, points_for(mesh, setup), [&](const OpticalSetup& point) {
     return flux_of_point(mesh, point, model, executor);
   });
 }
 
 /// By the normals given.
-std::vector<double> flux_of(const SurfaceMesh& mesh, const Eigen::Matrix3Xd& normals,
-                            const OpticalSetup& setup, const Executor& executor) {
+std::vector<double> flux_through(const SurfaceMesh& mesh, const Eigen::Matrix3Xd& normals,
+                                 const OpticalSetup& setup, const Executor& executor) {
   return picture_under(setup, points_for(mesh, setup), [&](const OpticalSetup& point) {
     return render_flux(mesh, point, SurfaceModel::kSmooth, executor, &normals);
   });
+}
+
+std::vector<double> flux_of(const SurfaceMesh& mesh, const Eigen::Matrix3Xd& normals,
+                            const OpticalSetup& setup, const Executor& executor) {
+  if (!setup.outline) return flux_through(mesh, normals, setup, executor);
+  const SampledSurface part = lit_part(mesh, normals, setup, executor);
+  return flux_through(part.mesh, part.normals, setup, executor);
+}
+
+std::vector<double> flux_of(const SurfaceMesh& mesh, const OpticalSetup& setup, SurfaceModel model,
+                            const Executor& executor) {
+  if (!setup.outline) return flux_through(mesh, setup, model, executor);
+  const SampledSurface part = lit_part(mesh, vertex_area_normals(mesh), setup, executor);
+  if (model == SurfaceModel::kFacet) return flux_through(part.mesh, setup, model, executor);
+  return flux_through(part.mesh, part.normals, setup, executor);
 }
 
 RenderResult result_of(const std::vector<double>& flux, const OpticalSetup& setup, double total) {

@@ -4,8 +4,10 @@
 #include <algorithm>
 #include <cstdint>
 #include <span>
+#include <vector>
 
 #include "core/surface/lit_surface.h"
+#include "core/surface/mesh_cut.h"
 #include "design/flux/flux_image.h"
 #include "design/optics/surface_kernels.h"
 
@@ -17,17 +19,23 @@ constexpr int kStripRows = 32;
 
 class Strips {
  public:
-  explicit Strips(const ControlNet& net)
-      : net_(net), samples_(picture_samples(net)), rows_(samples_ * net.cells().y()) {}
+  Strips(const ControlNet& net, const OpticalSetup& setup)
+      : net_(net),
+        setup_(setup),
+        samples_(picture_samples(net)),
+        rows_(samples_ * net.cells().y()) {}
 
   [[nodiscard]] int count() const { return (rows_ + kStripRows - 1) / kStripRows; }
   [[nodiscard]] SampledSurface strip(int k) const {
     const int first = k * kStripRows;
-    return spline_rows(net_, samples_, first, std::min(first + kStripRows, rows_));
+    SampledSurface rows = spline_rows(net_, samples_, first, std::min(first + kStripRows, rows_));
+    if (!setup_.outline) return rows;
+    return part_inside(rows.mesh, rows.normals,
+                       cut_mesh(rows.mesh, *setup_.outline, Executor::serial()));
   }
   /// light_on() of all.
-  [[nodiscard]] LightPath light(const OpticalSetup& setup) const {
-    const LightPath light(setup);
+  [[nodiscard]] LightPath light() const {
+    const LightPath light(setup_);
     if (light.intake_is_plan_area()) return light;
     double intake = 0.0;
     for (int k = 0; k < count(); ++k) intake += intake_of(strip(k).mesh, light);
@@ -36,13 +44,17 @@ class Strips {
 
  private:
   const ControlNet& net_;
+  const OpticalSetup& setup_;
   int samples_;
   int rows_;
 };
 
 void add(const SampledSurface& strip, const LightPath& light, const FluxAccumulator& picture) {
   const SurfaceMesh& mesh = strip.mesh;
-  const SurfaceView surface{mesh.triangles.data(), mesh.vertices.data(), light};
+  std::vector<FrontEntry> entries;
+  const SurfaceView surface{mesh.triangles.data(), mesh.vertices.data(), light,
+                            enter_vertices(Executor::serial(), light, mesh.vertices.data(),
+                                           mesh.vertex_count(), entries)};
   Eigen::Matrix2Xd landing(2, mesh.vertex_count());
   const LandRay land{surface, strip.normals.data(), landing.data()};
   for (std::int64_t v = 0; v < mesh.vertex_count(); ++v) land(v);
@@ -54,8 +66,8 @@ void add(const SampledSurface& strip, const LightPath& light, const FluxAccumula
 
 std::vector<double> render_spline(const ControlNet& net, const OpticalSetup& setup,
                                   const Executor& executor) {
-  const Strips strips(net);
-  const LightPath light = strips.light(setup);
+  const Strips strips(net, setup);
+  const LightPath light = strips.light();
   FluxImage image(setup.pixels.x(), setup.pixels.y());
   image.begin(executor);
   const auto add_strip = [&](std::int64_t k, const FluxAccumulator& picture) {

@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "core/image/image_sample.h"
-#include "core/optics/light_path.h"
 #include "core/optics/source_points.h"
 #include "design/optics/smooth.h"
 #include "design/render_lens.h"
@@ -38,6 +37,7 @@ Image difference(const Image& wanted, const Image& projected, const OpticalSetup
 WantedPicture::WantedPicture(const SurfaceMesh& mesh, const OpticalSetup& setup,
                              const Image& target, const Executor& executor)
     : setup_(lit_from(setup, Eigen::Vector2d::Zero())),
+      light_(setup_),
       target_(target),
       executor_(executor),
       reach_(LightPath(setup).reach(1.0, mesh.vertices.row(2).mean()) *
@@ -50,15 +50,31 @@ WantedPicture::Comparison WantedPicture::compare(const SurfaceMesh& mesh,
   Image projected;
   const double mae = evaluate(mesh, normals, setup_, target_, &projected, executor_).mae;
   const Image missing = difference(wanted_, projected, setup_, target_.total());
-  const LightPath light(setup_);
   Comparison result{mae - mae_, Eigen::VectorXd::Zero(mesh.vertex_count())};
   parallel_for(executor_, "missing flux", mesh.vertex_count(), [&](std::int64_t v) {
     const Eigen::Vector3d n = normals.col(v).normalized();
     const Eigen::Vector3d p = mesh.vertices.col(v);
-    if (!light.transmits(p, n)) return;
-    result.missing[v] = picture_at(missing, project_vertex(p, n, light));
+    if (!light_.transmits(p, n)) return;
+    result.missing[v] = picture_at(missing, project_vertex(p, n, light_));
   });
   return result;
+}
+
+Eigen::Matrix2d WantedPicture::stretch(const Eigen::Vector3d& p, const Eigen::Vector2d& slope,
+                                       const Eigen::Matrix2d& bend) const {
+  const Eigen::Vector3d w(-slope.x(), -slope.y(), 1.0);
+  const Eigen::Vector3d n = w.normalized();
+  if (!light_.transmits(p, n)) return Eigen::Matrix2d::Identity();
+  Eigen::Matrix2d rows;
+  for (int k = 0; k < 2; ++k) {
+    const Eigen::Vector2d u_bar =
+        Eigen::Vector2d::Unit(k).cwiseQuotient(light_.plane().pixels_per_mm());
+    Eigen::Vector3d p_bar = Eigen::Vector3d::Zero();
+    const Eigen::Vector3d n_bar = project_vertex_adjoint(p, n, light_, u_bar, p_bar);
+    const Eigen::Vector3d w_bar = normalize_adjoint(n, w.norm(), n_bar);
+    rows.row(k) = p_bar.head<2>() + p_bar.z() * slope - bend.transpose() * w_bar.head<2>();
+  }
+  return rows;
 }
 
 }  // namespace lensforge

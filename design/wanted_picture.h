@@ -5,6 +5,7 @@
 
 #include "core/compute/executor.h"
 #include "core/image/image.h"
+#include "core/optics/light_path.h"
 #include "core/optics/optical_setup.h"
 #include "core/surface/surface_mesh.h"
 
@@ -28,12 +29,19 @@ class WantedPicture {
   /// Of a smooth surface that is known by its own normals, 3 × V with z > 0.
   [[nodiscard]] Comparison compare(const SurfaceMesh& mesh, const Eigen::Matrix3Xd& normals) const;
 
+  /// How the place on the screen where the light of a surface point lands, mm, changes with x and y
+  /// (columns), for a surface of this slope and this change of slope with x and y (columns).
+  /// 1 where no light leaves.
+  [[nodiscard]] Eigen::Matrix2d stretch(const Eigen::Vector3d& p, const Eigen::Vector2d& slope,
+                                        const Eigen::Matrix2d& bend) const;
+
   /// How far light moves on the receiving plane for a unit of slope, mm: to first order. Negative
   /// where it moves against the slope, as a mirror's does.
   [[nodiscard]] double reach() const { return reach_; }
 
  private:
   OpticalSetup setup_;  ///< In the light of the source's middle alone: its picture is the sharpest.
+  LightPath light_;
   const Image& target_;
   const Executor& executor_;
   Image wanted_;

@@ -15,11 +15,13 @@
 #include "core/io/lens_folder.h"
 #include "core/io/sha256.h"
 #include "core/surface/mesh_io.h"
+#include "core/surface/mesh_normals.h"
 #include "core/text/version.h"
 #include "design/render_lens.h"
 #include "design/wanted_picture.h"
 #include "export/closed_solid.h"
 #include "export/export_work.h"
+#include "export/gltf_file.h"
 #include "export/iges_file.h"
 #include "export/mesh_formats.h"
 #include "export/spline_cut.h"
@@ -93,11 +95,20 @@ ImageMetrics picture_of(const SplineNet& net, const Lens& lens, const Executor& 
   return evaluate(solid.mesh, solid.normals, lens.setup, lens.target, nullptr, executor);
 }
 
-PictureGoal goal_of(const WantedPicture& wanted) {
-  return {.reach = wanted.reach(), .miss = [&wanted](const SampledSurface& solid) {
-            WantedPicture::Comparison found = wanted.compare(solid.mesh, solid.normals);
-            return PictureMiss{found.excess, std::move(found.missing)};
-          }};
+PictureGoal goal_of(const WantedPicture& wanted, const OpticalSetup& setup) {
+  PictureGoal goal;
+  goal.reach = wanted.reach();
+  goal.miss = [&wanted](const SampledSurface& solid) {
+    WantedPicture::Comparison found = wanted.compare(solid.mesh, solid.normals);
+    return PictureMiss{found.excess, std::move(found.missing)};
+  };
+  if (setup.point || setup.front) {
+    goal.stretch = [&wanted](const Eigen::Vector3d& p, const Eigen::Vector2d& slope,
+                             const Eigen::Matrix2d& bend) {
+      return wanted.stretch(p, slope, bend);
+    };
+  }
+  return goal;
 }
 
 void announce_splines(const Job& job, std::int64_t control_points) {
@@ -118,7 +129,7 @@ SplineSolid fitted_splines(const Job& job) {
   job.control.report({"spline knots", 0.0, 0.0, ""});
   const WantedPicture wanted(lens.surface, lens.setup, lens.target, job.executor);
   solid.fit = SplineFit{options, {}};
-  options.picture = goal_of(wanted);
+  options.picture = goal_of(wanted, lens.setup);
   solid.net = fit_spline_net(surface, options, job.executor, job.control);
   solid.fit->bound = normal_bound(surface, options.normal_tolerance);
   solid.picture = picture_of(solid.net, lens, job.executor);
@@ -138,32 +149,50 @@ SplineSolid own_spline(const Job& job) {
 SplineSolid write_splines(const Job& job) {
   const Lens& lens = job.source.lens;
   const std::string name = job.source.file.string();
-  if (lens.setup.front) {
+  if (lens.setup.outline) {
     throw InputError(job.out.string() +
-                     ": a solid of splines has a flat front, and this lens has a sphere; export "
+                     ": a solid of splines is a rectangle, and this lens has an outline; export "
                      ".stl or .3mf");
   }
   require_rectangle(lens.surface, height_field_outline(lens.surface, name), name);
+  const double mesh_volume = enclosed_volume(closed_solid(lens.surface, name, lens.setup.front));
   SplineSolid solid = lens.spline ? own_spline(job) : fitted_splines(job);
+  solid.net.front = lens.setup.front;
+  solid.mesh_volume = mesh_volume;
   const StepHeader header = header_of(job);
   job.begin_writing();
   solid.content = job.format == ExportFormat::kIges
                       ? write_iges(solid.net, header, job.out, job.control)
                       : write_step(solid.net, header, job.options.schema, job.out, job.control);
-  solid.mesh_volume = enclosed_volume(closed_solid(lens.surface, name));
   return solid;
+}
+
+/// The solid with the normals by which the surface projects its picture.
+void write_scene(const Job& job, const SurfaceMesh& solid) {
+  const Lens& lens = job.source.lens;
+  GltfPart part{.solid = solid,
+                .normals = lens.spline ? spline_nodes(*lens.spline, kMeshSamples).normals
+                                       : vertex_area_normals(lens.surface),
+                .surface_triangles = lens.surface.triangle_count(),
+                .curved_back = lens.setup.front ? lens.surface.triangle_count() : 0,
+                .ior = lens.setup.ior,
+                .mirror = lens.setup.mode == LightMode::kReflect};
+  write_glb(part, part.mirror ? "mirror" : "lens", job.out);
 }
 
 MeshSolid write_mesh(const Job& job) {
   job.control.report({"closed mesh", 0.0, 0.0, ""});
   const Lens& lens = job.source.lens;
-  const SurfaceMesh solid = closed_solid(lens.surface, job.source.file.string(), lens.setup.front);
+  const SurfaceMesh solid =
+      closed_solid(lens.setup.outline ? lens_part(lens, job.executor).mesh : lens.surface,
+                   job.source.file.string(), lens.setup.front);
   const std::string title = program_mark() + " lens, millimetres";
   job.begin_writing();
   if (job.format == ExportFormat::kStl) write_stl(solid, title, job.out);
   if (job.format == ExportFormat::kObj) write_obj(solid, title, job.out);
   if (job.format == ExportFormat::kPly) write_ply(solid, job.out);
   if (job.format == ExportFormat::k3mf) write_3mf(solid, title, job.out);
+  if (job.format == ExportFormat::kGlb) write_scene(job, solid);
   return {static_cast<std::int64_t>(solid.triangle_count()), enclosed_volume(solid)};
 }
 

@@ -24,6 +24,7 @@ const Words& formats() {
                            {"obj", F::kObj},
                            {"ply", F::kPly},
                            {"3mf", F::k3mf},
+                           {"glb", F::kGlb},
                            {"exr", F::kExr},
                            {"png", F::kPng}};
   return words;
@@ -52,8 +53,8 @@ const OptionTable<ExportOptions>& export_fields() {
       R::flag("--force", &O::force, "replace a file that lensforge did not write"),
       R::word<ExportFormat>(
           "--format", &O::format, formats(),
-          "solid as step or iges; closed mesh as stl (binary), obj, ply or 3mf; height map as exr "
-          "(32-bit, mm) or png (16-bit grey)"),
+          "solid as step or iges; closed mesh as stl (binary), obj, ply or 3mf; clear part for "
+          "scenes as glb; height map as exr (32-bit, mm) or png (16-bit grey)"),
       R::whole("--pixels", &O::pixels, Limits::between(2, kMaxImageSide),
                "longer side of a height map"),
       R::length("--tolerance", &O::tolerance, Limits::between(1e-6, 1.0),

@@ -12,7 +12,7 @@
 namespace lensforge {
 
 /// What a lens can be written as.
-enum class ExportFormat { kByExtension, kStep, kIges, kStl, kObj, kPly, k3mf, kExr, kPng };
+enum class ExportFormat { kByExtension, kStep, kIges, kStl, kObj, kPly, k3mf, kGlb, kExr, kPng };
 
 /// How a lens is written as a file for other programs.
 struct ExportOptions {
@@ -30,7 +30,7 @@ struct ExportOptions {
 /// Every option of an export.
 const OptionTable<ExportOptions>& export_fields();
 
-/// "step", "iges", "stl", "obj", "ply", "3mf", "exr" or "png".
+/// "step", "iges", "stl", "obj", "ply", "3mf", "glb", "exr" or "png".
 std::string word_of(ExportFormat format);
 
 bool is_height_map(ExportFormat format);

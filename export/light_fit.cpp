@@ -9,7 +9,8 @@
 #include "export/spline_net.h"
 
 // Notation: s slopes of the vertex-normal model, z the spline's height, p = x + κ s where the light
-// of x lands (κ the goal's reach), J = ∂p/∂x, R the flux that is missing there.
+// of x lands (κ the goal's reach; light that is not parallel lands elsewhere, but a change of slope
+// moves it as far to first order), J = ∂p/∂x, R the flux that is missing there.
 //
 // No surface has the slopes of a designed mesh: those of neighbouring vertices contradict each
 // other (their curl is not zero), and a surface must choose what to keep. Evenly weighed slopes
@@ -132,6 +133,15 @@ LightFit::LightFit(const SlopeFit& slopes, const PictureGoal& goal, const Execut
       control_(control),
       points_(make_points(slopes.grid(), slopes.surface().box().sizes())) {}
 
+/// J at a place in the surface's box.
+Eigen::Matrix2d LightFit::stretch_at(const Eigen::Vector2d& xy) const {
+  const SmoothSurface& surface = slopes_.surface();
+  const Eigen::Matrix2d bend = surface.model_bend(xy);
+  if (!goal_.stretch) return Eigen::Matrix2d::Identity() + goal_.reach * bend;
+  const SurfacePoint p = model_near(surface, xy);
+  return goal_.stretch({xy.x(), xy.y(), p.z}, p.slope, bend);
+}
+
 /// |A| A⁻¹ J⁻¹ A⁻ᵀ with A the derivative of the plan: what J⁻¹ is for derivatives by parameters.
 void LightFit::weigh_samples() {
   const SplineGrid& grid = slopes_.grid();
@@ -145,8 +155,7 @@ void LightFit::weigh_samples() {
         const PlanLine line = grid.plan_line(slopes_.plan(), i);
         for (Eigen::Index j = 0; j < uu_.rows(); ++j) {
           const Eigen::Vector2d xy = nearest_inside(surface.box(), line.xy.col(j));
-          const Eigen::Matrix2d stretch =
-              Eigen::Matrix2d::Identity() + goal_.reach * surface.model_bend(xy);
+          const Eigen::Matrix2d stretch = stretch_at(xy);
           const Eigen::Matrix2d a = line.derivative(j);
           const Eigen::Matrix2d inverse = a.inverse();
           const Eigen::Matrix2d weight =
@@ -175,8 +184,7 @@ void LightFit::weigh_points() {
         const PlanLine line = points_.plan_line(slopes_.plan(), i);
         for (Eigen::Index j = 0; j < load_.rows(); ++j) {
           const Eigen::Vector2d xy = nearest_inside(surface.box(), line.xy.col(j));
-          const Eigen::Matrix2d stretch =
-              Eigen::Matrix2d::Identity() + goal_.reach * surface.model_bend(xy);
+          const Eigen::Matrix2d stretch = stretch_at(xy);
           const double on_rim =
               (at_end(i, columns) ? 0.5 : 1.0) * (at_end(j, load_.rows()) ? 0.5 : 1.0);
           load_(j, i) = static_cast<float>(on_rim * unit * line.derivative(j).determinant() *

@@ -24,6 +24,7 @@ class LightFit {
  private:
   using Weights = Eigen::MatrixXf;  ///< One column per line along u.
 
+  [[nodiscard]] Eigen::Matrix2d stretch_at(const Eigen::Vector2d& xy) const;
   void weigh_samples();
   void weigh_points();
   [[nodiscard]] SampledSurface sampled(const Eigen::MatrixXd& heights) const;

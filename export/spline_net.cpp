@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/surface/cubic_spline.h"
+#include "export/front_solid.h"
 
 namespace lensforge {
 namespace {
@@ -153,7 +154,9 @@ FitError SplineNet::error() const {
 double SplineNet::volume() const {
   double sum = 0.0;
   for (const SplinePatch& patch : patches) sum += patch.volume();
-  return sum;
+  if (!front) return sum;
+  return sum - volume_below(*front, {Eigen::Vector2d(u.front(), v.front()),
+                                     Eigen::Vector2d(u.back(), v.back())});
 }
 
 std::int64_t SplineNet::control_points() const {

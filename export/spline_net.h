@@ -11,6 +11,7 @@
 
 #include "core/compute/executor.h"
 #include "core/compute/run_control.h"
+#include "core/optics/front_surface.h"
 #include "core/surface/sampled_surface.h"
 #include "core/surface/smooth_surface.h"
 #include "export/picture_goal.h"
@@ -84,8 +85,9 @@ inline std::size_t table_index(int column, int row, int columns) {
   return static_cast<std::size_t>(std::int64_t{row} * columns + column);
 }
 
-/// A rectangle tiled with spline patches that join with equal heights, slopes and curvatures. The
-/// parameters' rectangle is the lens's own, corner for corner and side for side.
+/// A rectangle tiled with spline patches that join with equal heights, slopes and curvatures, and
+/// the face below it. The parameters' rectangle is the lens's own, corner for corner and side for
+/// side.
 struct SplineNet {
   int columns = 0;
   int rows = 0;
@@ -94,8 +96,11 @@ struct SplineNet {
   std::vector<SplinePatch> patches;  ///< Patch (column, row) is row·columns + column.
   std::vector<SplineEdge> edges_u;   ///< Along u: (column, line) is line·columns + column.
   std::vector<SplineEdge> edges_v;   ///< Along v: (line, row) is row·(columns + 1) + line.
+  /// The face below; none: the plane z = 0. @pre its radius is longer than half of the diagonal.
+  std::optional<SphericalFront> front;
 
   [[nodiscard]] FitError error() const;
+  /// Volume between the patches and the face below, mm³; exact.
   [[nodiscard]] double volume() const;
   [[nodiscard]] std::int64_t control_points() const;
   /// @pre uv lies in the rectangle.

@@ -7,14 +7,19 @@
 #include <Geom2d_Line.hxx>
 #include <Geom_BSplineCurve.hxx>
 #include <Geom_BSplineSurface.hxx>
+#include <Geom_SphericalSurface.hxx>
 #include <Precision.hxx>
+#include <ShapeFix_Edge.hxx>
+#include <TopoDS.hxx>
 #include <TopoDS_Edge.hxx>
 #include <TopoDS_Shell.hxx>
 #include <TopoDS_Vertex.hxx>
 #include <TopoDS_Wire.hxx>
 #include <array>
 #include <cmath>
+#include <gp_Circ.hxx>
 #include <gp_Pln.hxx>
+#include <gp_Sphere.hxx>
 
 // Edges run along lines of the net's parameters: straight lines in the parameter planes of their
 // faces, with the same parameter as in space.
@@ -61,6 +66,22 @@ Handle(Geom_BSplineCurve) curve_of(const SplineEdge& edge, double from, double t
   }
   return new Geom_BSplineCurve(poles, knots(from, to, edge.cells), multiplicities(edge.cells),
                                kDegree);
+}
+
+/// The sphere of a front. Its poles and its seam lie beside the lens: the axis runs along y, and
+/// angles count from the side of the centre that is away from the apex.
+gp_Sphere sphere_of(const SphericalFront& front) {
+  const gp_Pnt centre(front.apex.x(), front.apex.y(), front.apex.z() + front.radius);
+  const gp_Dir away(0.0, 0.0, front.radius);
+  return {gp_Ax3(centre, gp_Dir(0.0, 1.0, 0.0), away), std::abs(front.radius)};
+}
+
+/// Of a wall.
+gp_Dir outwards_of(int side) {
+  static constexpr std::array<std::array<double, 2>, 4> kOutwards{
+      {{0.0, -1.0}, {1.0, 0.0}, {0.0, 1.0}, {-1.0, 0.0}}};
+  const auto& [x, y] = kOutwards[static_cast<std::size_t>(side)];
+  return {x, y, 0.0};
 }
 
 /// Builds vertices first, then edges, then faces, so that all are shared.
@@ -126,7 +147,8 @@ class SolidBuilder {
   /// Below a corner of the rectangle.
   [[nodiscard]] gp_Pnt foot(int side) const {
     const gp_Pnt top = corner(corner_column(side), corner_row(side));
-    return {top.X(), top.Y(), 0.0};
+    const double z = net_.front ? FrontSurface(*net_.front).height({top.X(), top.Y()}) : 0.0;
+    return {top.X(), top.Y(), z};
   }
 
   /// The rectangle's corners counter-clockwise from (0, 0).
@@ -164,9 +186,25 @@ class SolidBuilder {
       const auto i = static_cast<std::size_t>(side);
       const TopoDS_Vertex& top = vertex(corner_column(side), corner_row(side));
       uprights_[i] = BRepBuilderAPI_MakeEdge(back_vertices_[i], top).Edge();
-      back_edges_[i] =
-          BRepBuilderAPI_MakeEdge(back_vertices_[i], back_vertices_[(i + 1) % 4]).Edge();
+      back_edges_[i] = make_back_edge(side);
     }
+  }
+
+  /// Along the foot of a wall: a line, or where its plane cuts the front's sphere.
+  TopoDS_Edge make_back_edge(int side) {
+    const TopoDS_Vertex& from = back_vertices_[static_cast<std::size_t>(side)];
+    const TopoDS_Vertex& to = back_vertices_[static_cast<std::size_t>((side + 1) % 4)];
+    if (!net_.front) return BRepBuilderAPI_MakeEdge(from, to).Edge();
+    const gp_Pnt start = foot(side);
+    const gp_Pnt end = foot(side + 1);
+    const gp_Dir outwards = outwards_of(side);
+    const gp_Pnt centre = sphere_of(*net_.front).Location();
+    const double off = gp_Vec(centre, start).Dot(outwards);
+    const gp_Pnt middle = centre.Translated(off * gp_Vec(outwards));
+    // The shorter of the two arcs between the corners runs counter-clockwise about this axis.
+    const gp_Dir axis = gp_Vec(middle, start).Crossed(gp_Vec(middle, end));
+    const gp_Circ circle(gp_Ax2(middle, axis, gp_Vec(middle, start)), middle.Distance(start));
+    return BRepBuilderAPI_MakeEdge(circle, from, to).Edge();
   }
 
   void add_pcurve(const TopoDS_Edge& edge, int axis, double line, const TopoDS_Face& face) {
@@ -220,18 +258,32 @@ class SolidBuilder {
     const Edges rim = rim_of(side);
     edges.insert(edges.end(), rim.begin(), rim.end());
     edges.push_back(uprights_[i].Reversed());
-    static constexpr std::array<std::array<double, 2>, 4> kOutwards{
-        {{0.0, -1.0}, {1.0, 0.0}, {0.0, 1.0}, {-1.0, 0.0}}};
-    const gp_Dir outwards(kOutwards[i][0], kOutwards[i][1], 0.0);
-    add_face(BRepBuilderAPI_MakeFace(gp_Pln(foot(side), outwards), make_wire(edges)).Face(),
-             "side wall");
+    const gp_Pln plane(foot(side), outwards_of(side));
+    add_face(BRepBuilderAPI_MakeFace(plane, make_wire(edges)).Face(), "side wall");
   }
 
   void add_back() {
     Edges edges;
     for (std::size_t i = 4; i-- > 0;) edges.push_back(back_edges_[i].Reversed());
+    if (net_.front) return add_sphere(edges);
     const gp_Pln plane(foot(0), gp_Dir(0.0, 0.0, -1.0));
     add_face(BRepBuilderAPI_MakeFace(plane, make_wire(edges)).Face(), "back");
+  }
+
+  void add_sphere(const Edges& edges) {
+    TopoDS_Face face;
+    builder_.MakeFace(face, new Geom_SphericalSurface(sphere_of(*net_.front)),
+                      Precision::Confusion());
+    for (const TopoDS_Shape& edge : edges) {
+      ShapeFix_Edge().FixAddPCurve(TopoDS::Edge(edge), face, false, Precision::Confusion());
+    }
+    // A sphere's own normal points away from its centre, which lies below a hollow front.
+    const bool hollow = net_.front->radius < 0.0;
+    TopoDS_Wire wire = make_wire(edges);
+    if (hollow) wire.Reverse();
+    builder_.Add(face, wire);
+    if (hollow) face.Reverse();
+    add_face(face, "back");
   }
 
   const SplineNet& net_;

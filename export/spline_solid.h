@@ -17,7 +17,7 @@ struct NamedSolid {
   std::vector<std::pair<TopoDS_Face, std::string>> names;
 };
 
-/// The solid between a net and the plane z = 0; neighbouring faces share their edges.
+/// The solid between a net and the face below it; neighbouring faces share their edges.
 NamedSolid make_spline_solid(const SplineNet& net);
 
 }  // namespace lensforge

@@ -37,10 +37,11 @@ struct SolidContent {
   [[nodiscard]] bool is_one_solid() const { return solids == 1 && valid && closed; }
 };
 
-/// Writes the solid between a spline net and the plane z = 0 as STEP in millimetres: the patches
-/// are faces named "optical surface", the four walls "side wall", the flat one "back". The file is
-/// read back before it appears under its name: one solid, valid, closed, the net's volume to 1e-6.
-/// @pre the net lies above z = 0. @throw RunError if it cannot be written or does not read back so;
+/// Writes the solid between a spline net and the face below it as STEP in millimetres: the patches
+/// are faces named "optical surface", the four walls "side wall", the plane or sphere below "back".
+/// The file is read back before it appears under its name: one solid, valid, closed, the net's
+/// volume to 1e-6. @pre the net lies above that face. @throw RunError if it cannot be written or
+/// does not read back so;
 ///      Interrupted, and then nothing was written.
 SolidContent write_step(const SplineNet& net, const StepHeader& header, StepSchema schema,
                         const std::filesystem::path& path, const RunControl& control = {});

@@ -41,14 +41,15 @@ struct SurfaceSide {
 
 /// Where the ray of a surface point of height z and the given slope lands, in pixel coordinates;
 /// NaN if the light is reflected totally.
+/// @param known  LightPath::enter() of the point, if it has been found before.
 inline Eigen::Vector2d land_of(const LightPath& light, const Eigen::Vector2d& place, double z,
-                               const Eigen::Vector2d& slope) {
+                               const Eigen::Vector2d& slope, const FrontEntry* known = nullptr) {
   const Eigen::Vector3d n = Eigen::Vector3d(-slope.x(), -slope.y(), 1.0).normalized();
   const Eigen::Vector3d p(place.x(), place.y(), z);
-  if (!light.transmits(p, n)) {
+  if (!light.transmits(p, n, known)) {
     return Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
   }
-  return light.land(p, light.beam(p, n).m);
+  return light.land(p, light.beam(p, n, known).m);
 }
 
 /// Where two sides meet between their nodes, as a share of the way from a to b.

@@ -68,6 +68,7 @@ struct TilePair {
     for (std::int64_t j = box.row; j < box.row + box.rows; ++j) {
       for (std::int64_t i = box.column; i < box.column + box.columns; ++i) {
         const std::int64_t cell = j * part.range().columns + i;
+        if (!part.is_lit(cell)) continue;
         leakage += weights.gather(part, cell) - weights.gather(designed, cell);
         const double left = part.height(i, j) - designed.height(i, j);
         if (std::abs(left) > std::abs(height.value)) height = {left, part.place(i, j)};

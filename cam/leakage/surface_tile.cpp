@@ -11,7 +11,9 @@ namespace lensforge {
 
 namespace {
 
-double area_of(const GridWindow& grid) {
+/// Seen along z, as far as light passes, mm².
+double area_of(const GridWindow& grid, const std::optional<Outline>& outline) {
+  if (outline) return polygon_area(outline->points);
   return grid.spacing.x() * static_cast<double>(grid.columns - 1) * grid.spacing.y() *
          static_cast<double>(grid.rows - 1);
 }
@@ -20,8 +22,9 @@ double area_of(const GridWindow& grid) {
 
 SurfaceTile::SurfaceTile(const OpticalSetup& setup, const GridWindow& grid, double whole)
     : light_(setup),
+      outline_(setup.outline ? std::optional<OutlineIndex>(*setup.outline) : std::nullopt),
       grid_(grid),
-      lens_area_(whole > 0.0 ? whole : area_of(grid)),
+      lens_area_(whole > 0.0 ? whole : area_of(grid, setup.outline)),
       triangle_flux_(0.5 * grid.spacing.prod() / lens_area_) {}
 
 void SurfaceTile::load(const SurfaceField& field, const CellRange& range,
@@ -35,13 +38,26 @@ void SurfaceTile::load(const SurfaceField& field, const CellRange& range,
   const std::int64_t count = window.size();
   LF_CHECK(static_cast<std::int64_t>(patch_.z.size()) == count, std::to_string(patch_.z.size()));
   landing_.resize(static_cast<std::size_t>(count));
+  if (light_.is_bent()) entries_.resize(static_cast<std::size_t>(count));
   parallel_for(executor, "land nodes", count, [this](std::int64_t i) {
     const auto k = static_cast<std::size_t>(i);
     const Eigen::Vector2d at =
         patch_.window.node(i % patch_.window.columns, i / patch_.window.columns);
-    landing_[k] = land_of(light_, at, patch_.z[k], {patch_.slope_x[k], patch_.slope_y[k]});
+    if (light_.is_bent()) entries_[k] = light_.enter({at.x(), at.y(), patch_.z[k]});
+    landing_[k] =
+        land_of(light_, at, patch_.z[k], {patch_.slope_x[k], patch_.slope_y[k]}, entry(k));
   });
   if (patch_.cut.empty()) sharpen_landing(executor);
+  if (outline_) find_rim(executor);
+}
+
+void SurfaceTile::find_rim(const Executor& executor) {
+  sides_.resize(static_cast<std::size_t>(cells()));
+  parallel_for(executor, "find rim", cells(), [this](std::int64_t cell) {
+    const std::int64_t i = cell % range_.columns;
+    const std::int64_t j = cell / range_.columns;
+    sides_[static_cast<std::size_t>(cell)] = outline_->side_of({place(i, j), place(i + 1, j + 1)});
+  });
 }
 
 void SurfaceTile::sharpen_landing(const Executor& executor) {

@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "cam/leakage/crease_split.h"
@@ -12,6 +13,8 @@
 #include "core/compute/executor.h"
 #include "core/optics/light_path.h"
 #include "core/optics/optical_setup.h"
+#include "core/surface/outline_index.h"
+#include "design/optics/image_piece.h"
 #include "design/optics/image_triangle.h"
 
 namespace lensforge {
@@ -19,11 +22,14 @@ namespace lensforge {
 /// The image triangles of a rectangle of a sampled surface: two a cell, their corners where the
 /// refracted ray of the node's own slope lands; a triangle across a crease (nodes of different
 /// SurfacePatch::cut) is split by split_at_crease(). On a surface without creases corners are moved
-/// a little, see sharpen_landing(). Keeps its buffers between tiles.
+/// a little, see sharpen_landing(). Outside of the lens's outline there is no light; a triangle
+/// across it sends the parts inside, exactly, or, across a crease too, that share of all of its
+/// light. Keeps its buffers between tiles.
 class SurfaceTile {
  public:
   /// @param grid   the whole lens.
-  /// @param whole  light that it takes, mm², of which fluxes are shares; 0: the grid's area.
+  /// @param whole  light that it takes, mm², of which fluxes are shares; 0: its area, as far as
+  ///               light passes.
   SurfaceTile(const OpticalSetup& setup, const GridWindow& grid, double whole = 0.0);
 
   /// Samples the surface over `range` with one more node on every side where the grid has one, so
@@ -42,13 +48,24 @@ class SurfaceTile {
     return grid_.node(range_.column + i, range_.row + j);
   }
 
+  /// True if light leaves some of a cell, counted row by row.
+  [[nodiscard]] bool is_lit(std::int64_t cell) const {
+    return side_of_cell(cell) != OutlineIndex::Side::kOutside;
+  }
+
   /// Hands the image triangles of a cell, counted row by row, to `sink`.
   template <class Sink>
   void visit_cell(std::int64_t cell, const Sink& sink) const {
+    if (!is_lit(cell)) return;
     const std::int64_t i = cell % range_.columns;
     const std::int64_t j = cell / range_.columns;
     const std::size_t a = node_of(i, j);
     const std::size_t d = node_of(i, j + 1);
+    if (side_of_cell(cell) == OutlineIndex::Side::kAcross) {
+      visit_rim(a, a + 1, d + 1, sink);
+      visit_rim(a, d + 1, d, sink);
+      return;
+    }
     visit_triangle(a, a + 1, d + 1, sink);
     visit_triangle(a, d + 1, d, sink);
   }
@@ -68,9 +85,31 @@ class SurfaceTile {
       split_at_crease({side_of(a), side_of(b), side_of(c)}, light_, lens_area_, sink);
     }
   }
+  /// A triangle that the outline may cut.
+  template <class Sink>
+  void visit_rim(std::size_t a, std::size_t b, std::size_t c, const Sink& sink) const {
+    const std::vector<TrianglePiece> pieces =
+        outline_->inside({point(a).head<2>(), point(b).head<2>(), point(c).head<2>()});
+    if (is_smooth(a, b, c)) {
+      const ImageTriangle whole{landing_[a], landing_[b], landing_[c], flux_of(a, b, c)};
+      for (const TrianglePiece& piece : pieces) sink(image_of(whole, piece));
+      return;
+    }
+    double share = 0.0;
+    for (const TrianglePiece& piece : pieces) share += piece.share;
+    visit_triangle(a, b, c, [&](ImageTriangle t) {
+      t.flux *= share;
+      sink(t);
+    });
+  }
+  [[nodiscard]] OutlineIndex::Side side_of_cell(std::int64_t cell) const {
+    return outline_ ? sides_[static_cast<std::size_t>(cell)] : OutlineIndex::Side::kInside;
+  }
+  void find_rim(const Executor& executor);
   [[nodiscard]] double flux_of(std::size_t a, std::size_t b, std::size_t c) const {
     if (light_.intake_is_plan_area()) return triangle_flux_;
-    return light_.intake({point(a), point(b), point(c)}) / lens_area_;
+    const Corners corners{point(a), point(b), point(c)};
+    return light_.intake(corners, {entry(a), entry(b), entry(c)}) / lens_area_;
   }
   /// Moves the corners so that triangles land in the right place on average.
   ///
@@ -80,11 +119,16 @@ class SurfaceTile {
   /// triangles, cancels that to second order in the spacing: 1 % is left.
   void sharpen_landing(const Executor& executor);
   [[nodiscard]] Eigen::Vector3d point(std::size_t node) const;
+  [[nodiscard]] const FrontEntry* entry(std::size_t node) const {
+    return entries_.empty() ? nullptr : &entries_[node];
+  }
   [[nodiscard]] SurfaceSide side_of(std::size_t node) const;
   [[nodiscard]] Eigen::Vector2d bend_along(std::size_t node, std::int64_t step, bool has_before,
                                            bool has_after) const;
 
   LightPath light_;
+  std::optional<OutlineIndex> outline_;
+  std::vector<OutlineIndex::Side> sides_;  ///< Of the tile's cells, if there is an outline.
   GridWindow grid_;
   double lens_area_;
   double triangle_flux_;  ///< Of every triangle that takes light by its plan area.
@@ -92,6 +136,7 @@ class SurfaceTile {
   std::int64_t halo_columns_ = 0;  ///< Nodes of the patch left of the tile.
   std::int64_t halo_rows_ = 0;
   SurfacePatch patch_;
+  std::vector<FrontEntry> entries_;         ///< One per node behind a curved front, else none.
   std::vector<Eigen::Vector2d> landing_;    ///< One per node, pixel coordinates; NaN without light.
   std::vector<Eigen::Vector2d> sharpened_;  ///< What becomes of it; kept for its memory.
 };

@@ -17,6 +17,7 @@
 #include "cam/tolerance/tolerance_forecast.h"
 #include "cam/tool/tool.h"
 #include "core/image/image.h"
+#include "core/optics/front_surface.h"
 #include "core/optics/optical_setup.h"
 #include "core/page/html_text.h"
 
@@ -54,6 +55,8 @@ struct SetupSheet {
   Eigen::Vector3d zero = Eigen::Vector3d::Zero();  ///< Where the program's X0 Y0 Z0 lies.
   std::string zero_words;                          ///< "top of the blank, lower left corner …"
   std::string up_words;                            ///< Which face lies up and which down.
+  std::optional<SphericalFront> front;             ///< Of the blank, there before the first cut.
+  std::string front_words;                         ///< Where it has to lie.
   std::vector<NamedBox> keep_outs;                 ///< Clamps and whatever else no tool may enter.
 };
 

@@ -18,6 +18,15 @@ std::string summary(const ReportData& data) {
                  section::pictures(data) + element("div", "class=\"panels\"", panels));
 }
 
+/// Where the page is that draws the light; `view` writes it into the lens folder.
+std::string view_link(const ReportData& data) {
+  if (data.leakage.steps.empty()) return "";
+  return element("p", "class=\"screen\"",
+                 "<a href=\"../view.html\">The light of this part, to be moved and asked</a>, once "
+                 "<code>lensforge view</code> has written <code>view.html</code> into the lens "
+                 "folder.");
+}
+
 }  // namespace
 
 double ReportData::minutes() const {
@@ -28,14 +37,18 @@ double ReportData::minutes() const {
 
 std::string report_html(const ReportData& data) {
   namespace section = report_section;
-  const std::string body =
-      joined({summary(data), section::warnings(data), section::setup(data),
-              section::operations(data), section::certificates(data), section::leakage(data),
-              section::tolerances(data), section::light(data), section::maps(data),
-              section::view(data), section::choices(data), section::parameters(data)});
+  const std::string body = joined(
+      {summary(data), section::warnings(data), section::setup(data), section::operations(data),
+       section::certificates(data), section::leakage(data), section::tolerances(data),
+       section::light(data), section::maps(data), section::view(data), view_link(data),
+       section::choices(data), section::parameters(data)});
   return html_page({data.job + " – cutting report", section::header(data), body,
-                    section::footer(data), std::string(report_page::kScript)});
+                    section::footer(data), std::string(surface_view_script())});
 }
+
+std::string surface_view_html(const ReportData& data) { return report_section::view(data); }
+
+std::string_view surface_view_script() { return report_page::kScript; }
 
 std::string compare_html(const ReportData& data) {
   namespace section = report_section;

@@ -161,10 +161,15 @@ json setup_json(const SetupSheet& setup) {
   const auto box = [](const NamedBox& item) {
     return json{{"name", item.name}, {"box", box_json(item.box)}};
   };
-  return {{"machine", setup.machine},     {"material", setup.material},
-          {"part", box_json(setup.part)}, {"blank", box_json(setup.blank)},
-          {"zero", triple(setup.zero)},   {"zero_words", setup.zero_words},
-          {"up_words", setup.up_words},   {"keep_outs", list(setup.keep_outs, box)}};
+  json sheet{{"machine", setup.machine},     {"material", setup.material},
+             {"part", box_json(setup.part)}, {"blank", box_json(setup.blank)},
+             {"zero", triple(setup.zero)},   {"zero_words", setup.zero_words},
+             {"up_words", setup.up_words},   {"keep_outs", list(setup.keep_outs, box)}};
+  if (setup.front) {
+    sheet["front"] = {
+        {"type", "sphere"}, {"radius", setup.front->radius}, {"apex", triple(setup.front->apex)}};
+  }
+  return sheet;
 }
 
 json group_json(const ParameterGroup& group) {

@@ -3,6 +3,7 @@
 #include <string_view>
 
 #include "cam/report/sections.h"
+#include "core/optics/front_surface.h"
 #include "core/page/html_text.h"
 #include "core/text/number_text.h"
 
@@ -54,6 +55,29 @@ std::string rectangle(const DrawnView& view, const Eigen::AlignedBox3d& box,
 std::string words(double x, double y, std::string_view style, std::string_view text) {
   return "<text" + attribute("x", x) + attribute("y", y) + " " + std::string(style) + ">" +
          escape_html(text) + "</text>";
+}
+
+/// The blank seen from the front, in section through the apex of its front.
+std::string section(const DrawnView& view, const SetupSheet& setup, std::string_view style) {
+  constexpr int kParts = 40;
+  const FrontSurface front(*setup.front);
+  const Eigen::AlignedBox2d blank = view.flat(setup.blank);
+  const auto point = [&](double x, double z) {
+    return decimal_text(view.x(x), 2) + "," + decimal_text(view.y(z), 2) + " ";
+  };
+  std::string points =
+      point(blank.max().x(), blank.max().y()) + point(blank.min().x(), blank.max().y());
+  for (int i = 0; i <= kParts; ++i) {
+    const double x = blank.min().x() + blank.sizes().x() * i / kParts;
+    points += point(x, front.height({x, setup.front->apex.y()}));
+  }
+  return "<polygon points=\"" + points + "\" " + std::string(style) + "/>";
+}
+
+std::string blank_shape(const DrawnView& view, const SetupSheet& setup) {
+  const std::string_view style = "fill=\"#e3ecf5\" stroke=\"#1a1f24\" stroke-width=\"2\"";
+  if (setup.front && view.up == 2) return section(view, setup, style);
+  return rectangle(view, setup.blank, style);
 }
 
 /// An arrow from the program's zero along an axis of the drawing.
@@ -120,8 +144,7 @@ std::string setup_drawing(const SetupSheet& setup, bool from_above) {
       "<svg viewBox=\"0 0 " + decimal_text(kWidth, 0) + " " + decimal_text(view.height(), 0) +
       "\" role=\"img\" aria-label=\"Blank, part and zero seen from " +
       (from_above ? "above" : "the front") + "\" font-family=\"Arial, sans-serif\">";
-  return open + (from_above ? hatch : "") +
-         rectangle(view, setup.blank, "fill=\"#e3ecf5\" stroke=\"#1a1f24\" stroke-width=\"2\"") +
+  return open + (from_above ? hatch : "") + blank_shape(view, setup) +
          rectangle(view, setup.part,
                    "fill=\"#b9d3ea\" stroke=\"#0b5cad\" stroke-width=\"2\" "
                    "stroke-dasharray=\"6 4\"") +

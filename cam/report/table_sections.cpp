@@ -129,6 +129,7 @@ std::string setup(const ReportData& data) {
                               {"Part", box_text(sheet.part)},
                               {"Program zero", sheet.zero_words},
                               {"Which way up", sheet.up_words}};
+  if (sheet.front) list.push_back({"Front", sheet.front_words});
   if (data.mirror && data.part != "mould") {
     list.push_back({"To reflect",
                     "coat the polished surface, unless the blank is of a metal that "
@@ -147,14 +148,16 @@ std::string setup(const ReportData& data) {
     return element("figure", "",
                    setup_drawing(sheet, from_above) + element("figcaption", "", caption));
   };
-  const std::string drawings =
-      element("div", "class=\"setup\"",
-              drawing(true,
-                      "<b>From above.</b> Solid: blank; dashed: part; red: program zero; "
-                      "hatched: keep-out. The operator is below the drawing.") +
-                  drawing(false,
-                          "<b>From the front.</b> The table is below; the tool comes from "
-                          "above."));
+  const std::string drawings = element(
+      "div", "class=\"setup\"",
+      drawing(true,
+              "<b>From above.</b> Solid: blank; dashed: part; red: program zero; "
+              "hatched: keep-out. The operator is below the drawing.") +
+          drawing(false, std::string("<b>From the front.</b> ") +
+                             (sheet.front ? "Section through the apex; the nest is below, up to "
+                                            "the dashed part"
+                                          : "The table is below") +
+                             "; the tool comes from above."));
   return html_section("Setup", html_facts(list) + drawings);
 }
 

@@ -9,6 +9,7 @@
 #include "cam/report/relief_picture.h"
 #include "cam/report/sections.h"
 #include "core/page/html_text.h"
+#include "core/page/script_data.h"
 #include "core/text/number_text.h"
 
 namespace lensforge::report_section {
@@ -17,28 +18,15 @@ namespace {
 /// Vertices along a side at most: 16-bit indices reach 65,536 of them.
 constexpr int kMaxNodes = 240;
 
+/// Of every packed number; surface_view.js reads 16 bits.
+constexpr int kBytes = 2;
+
 /// Colours that differ in lightness too, so that they read in grey and to colour-blind eyes.
 constexpr std::array<std::array<double, 3>, 5> kPathColors{{{0.00, 0.30, 0.60},
                                                             {0.85, 0.45, 0.00},
                                                             {0.55, 0.05, 0.25},
                                                             {0.10, 0.50, 0.25},
                                                             {0.3, 0.3, 0.3}}};
-
-/// Numbers as base 64 of 16-bit integers, little-endian, 0 … 65535 for low … high.
-class Quantised {
- public:
-  void add(double value, double low, double high) {
-    const double share = high > low ? (value - low) / (high - low) : 0.0;
-    const auto number =
-        static_cast<std::uint16_t>(std::lround(65535.0 * std::clamp(share, 0.0, 1.0)));
-    bytes_.push_back(static_cast<unsigned char>(number & 0xffU));
-    bytes_.push_back(static_cast<unsigned char>(number >> 8U));
-  }
-  [[nodiscard]] std::string text() const { return base64(bytes_); }
-
- private:
-  std::vector<unsigned char> bytes_;
-};
 
 int thinned(int count, int most) { return std::min(count, most); }
 
@@ -50,7 +38,7 @@ nlohmann::json surface_json(const ReportData& data) {
   const auto source = [](int i, int count, int of) {
     return count > 1 ? static_cast<int>(std::lround(double(i) * (of - 1) / (count - 1))) : 0;
   };
-  Quantised heights;
+  PackedNumbers heights(kBytes);
   for (int r = 0; r < rows; ++r) {
     for (int c = 0; c < columns; ++c) {
       const int at =
@@ -68,7 +56,7 @@ nlohmann::json path_json(const ReportPath& path, std::size_t number) {
   for (const auto& strip : path.strips) {
     for (const Eigen::Vector3f& point : strip) box.extend(point);
   }
-  Quantised points;
+  PackedNumbers points(kBytes);
   nlohmann::json lengths = nlohmann::json::array();
   for (const auto& strip : path.strips) {
     lengths.push_back(strip.size());
@@ -81,19 +69,6 @@ nlohmann::json path_json(const ReportPath& path, std::size_t number) {
           {"high", {box.max().x(), box.max().y(), box.max().z()}},
           {"strips", lengths},
           {"points", points.text()}};
-}
-
-/// JSON inside a script element: no "<" may stand in it.
-std::string script_json(const nlohmann::json& value) {
-  std::string text;
-  for (const char c : value.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace)) {
-    if (c == '<') {
-      text.append("\\u003c");
-    } else {
-      text.push_back(c);
-    }
-  }
-  return text;
 }
 
 std::string path_box(const ReportPath& path, std::size_t number, bool shown) {

@@ -1,21 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "core/image/image_io.h"
 
-#include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <functional>
-#include <memory>
 #include <string_view>
 
 #include "core/error.h"
+#include "core/image/image_encoder.h"
 #include "core/image/transfer.h"
 #include "core/io/files.h"
 #include "core/text/lower_case.h"
-#include "core/text/version.h"
 
 // Reading is in image_reader.cpp. Files are encoded in memory and written by write_whole_file(), so
 // that the system's own reason for a failure (disk full, ...) reaches the message.
@@ -25,42 +22,6 @@ namespace {
 namespace fs = std::filesystem;
 
 std::string extension_of(const fs::path& path) { return lower_case(path.extension().string()); }
-
-/// Rows that are encoded between two checks for a stop request; EXR packs 16 at a time.
-constexpr int kRowsAtOnce = 64;
-
-/// Gives the pixels of some rows as a file of a format wants them.
-using Rows = std::function<const void*(int first, int end)>;
-
-void write_rows(OIIO::ImageOutput& output, const OIIO::ImageSpec& spec, const Rows& rows,
-                const std::string& what, const RunControl& control) {
-  for (int first = 0; first < spec.height; first += kRowsAtOnce) {
-    if (control.stop_requested()) throw Interrupted();
-    control.report({"picture file", double{1} * first, double{1} * spec.height, ""});
-    const int end = std::min(first + kRowsAtOnce, spec.height);
-    if (output.write_scanlines(first, end, 0, spec.format, rows(first, end))) continue;
-    throw RunError(what + ": cannot be written: " + output.geterror());
-  }
-}
-
-/// With the program's mark. @param what  what to name in messages.
-std::vector<unsigned char> encoded(const std::string& what, OIIO::ImageSpec spec,
-                                   const std::string& extension, const Rows& rows,
-                                   const RunControl& control) {
-  spec.attribute("Software", program_mark());
-  std::vector<unsigned char> bytes;
-  OIIO::Filesystem::IOVecOutput memory(bytes);
-  const std::string name = "picture" + extension;
-  const auto output = OIIO::ImageOutput::create(name, &memory);
-  if (!output) throw RunError(what + ": cannot be written: " + OIIO::geterror());
-  const auto require = [&](bool done) {
-    if (!done) throw RunError(what + ": cannot be written: " + output->geterror());
-  };
-  require(output->open(name, spec));
-  write_rows(*output, spec, rows, what, control);
-  require(output->close());
-  return bytes;
-}
 
 void write_bytes(const fs::path& path, const std::vector<unsigned char>& bytes) {
   write_whole_file(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
@@ -73,7 +34,7 @@ std::vector<unsigned char> png_of(const std::string& what, const ColorImage& ima
   const auto rows = [&](int first, int) {
     return image.rgb.data() + spec.scanline_bytes() * static_cast<std::size_t>(first);
   };
-  return encoded(what, spec, ".png", rows, {});
+  return encode_rows(what, spec, ".png", rows, {});
 }
 
 const float* row_of(const Image& image, int row) {
@@ -93,7 +54,7 @@ void write_png(const Image& image, const fs::path& path, const RunControl& contr
     }
     return pixels.data();
   };
-  write_bytes(path, encoded(path.string(), spec, ".png", rows, control));
+  write_bytes(path, encode_rows(path.string(), spec, ".png", rows, control));
 }
 
 void write_exr(const Image& image, const fs::path& path, const RunControl& control) {
@@ -104,7 +65,7 @@ void write_exr(const Image& image, const fs::path& path, const RunControl& contr
   // Else OpenImageIO adds the time, and the same picture would give another file every second.
   spec.attribute("DateTime", "");
   const auto rows = [&](int first, int) { return row_of(image, first); };
-  write_bytes(path, encoded(path.string(), spec, ".exr", rows, control));
+  write_bytes(path, encode_rows(path.string(), spec, ".exr", rows, control));
 }
 
 }  // namespace

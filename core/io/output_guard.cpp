@@ -10,6 +10,7 @@
 #include <system_error>
 
 #include "core/error.h"
+#include "core/io/cut_layers.h"
 #include "core/io/lens_folder.h"
 
 namespace lensforge {
@@ -73,7 +74,9 @@ bool written_by_lensforge(const fs::path& path) {
 bool belongs_to_lens(const fs::path& path) {
   const fs::path folder = folder_of(path);
   if (is_one_of(path.filename(), lens_file::kAll) && holds_lens(folder)) return true;
-  return folder.filename() == lens_file::kCut && is_one_of(path.filename(), lens_file::kCutFiles) &&
+  const fs::path name = path.filename();
+  return folder.filename() == lens_file::kCut &&
+         (is_one_of(name, lens_file::kCutFiles) || is_one_of(name, lens_file::kCutLayers)) &&
          holds_lens(folder.parent_path());
 }
 

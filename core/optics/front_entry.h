@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 
 #include "core/compute/host_device.h"
@@ -83,8 +84,8 @@ struct FrontRefraction {
 /// x + (p_z − h(x)) m(x) = p_xy.
 class FrontEntry {
  public:
-  LF_HD FrontEntry(const FrontSurface& front, const FrontLight& light, const Eigen::Vector3d& p)
-      : inverse_(Eigen::Matrix2d::Identity()) {
+  FrontEntry() = default;
+  LF_HD FrontEntry(const FrontSurface& front, const FrontLight& light, const Eigen::Vector3d& p) {
     Eigen::Vector2d x(p.x(), p.y());
     if (!front.covers(x)) return;
     for (int i = 0; i < kMaxSteps; ++i) {
@@ -154,7 +155,27 @@ class FrontEntry {
   }
 
   FrontRefraction ray_;
-  Eigen::Matrix2d inverse_;  ///< L⁻¹
+  Eigen::Matrix2d inverse_ = Eigen::Matrix2d::Identity();  ///< L⁻¹
+};
+
+/// Entries of the rays to a triangle's corners, where they have been found before: null elsewhere.
+struct CornerEntries {
+  const FrontEntry* e0 = nullptr;
+  const FrontEntry* e1 = nullptr;
+  const FrontEntry* e2 = nullptr;
+};
+
+/// Entries of the rays to all vertices of a mesh behind a curved front; none behind a flat one.
+struct VertexEntries {
+  const FrontEntry* of = nullptr;
+  std::int64_t count = 0;
+
+  [[nodiscard]] LF_HD const FrontEntry* at(std::int64_t vertex) const {
+    return count > 0 ? of + vertex : nullptr;
+  }
+  [[nodiscard]] LF_HD CornerEntries at(const int* triangle) const {
+    return {at(triangle[0]), at(triangle[1]), at(triangle[2])};
+  }
 };
 
 }  // namespace lensforge

@@ -4,7 +4,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 
-#include "core/optics/light_source.h"
+#include "core/optics/light_path.h"
 
 namespace lensforge {
 
@@ -37,6 +37,36 @@ double overhang(const OpticalSetup& setup, const Eigen::Vector3d& p) {
   const Eigen::Vector2d beyond =
       (-e.head<2>()).cwiseMax(Eigen::Vector2d(e.head<2>() - setup.lens_size));
   return std::max(0.0, beyond.maxCoeff());
+}
+
+double shift_by_front(const OpticalSetup& setup, const Eigen::Vector3d& p) {
+  constexpr double kAside = 1e-3;  // mm
+  const LightPath light(setup);
+  const Eigen::Vector2d slope = light.gradient_for(p, light.land_from_start(p));
+  const Eigen::Vector3d n = Eigen::Vector3d(-slope.x(), -slope.y(), 1.0).normalized();
+  const auto lands = [&](const Eigen::Vector2d& aside) -> Eigen::Vector2d {
+    OpticalSetup moved = setup;
+    moved.front->apex.head<2>() += aside;
+    const LightPath path(moved);
+    return path.plane().to_mm(path.land(p, path.beam(p, n).m));
+  };
+  const auto shift = [&](int axis) {
+    const Eigen::Vector2d aside = kAside * Eigen::Vector2d::Unit(axis);
+    return (lands(aside) - lands(-aside)).norm() / (2.0 * kAside);
+  };
+  return 0.5 * (shift(0) + shift(1));
+}
+
+double lowest_of(const SphericalFront& front, const Eigen::AlignedBox2d& rectangle) {
+  const FrontSurface surface(front);
+  const Eigen::Vector2d apex = front.apex.head<2>();
+  if (front.radius > 0.0) {
+    return surface.height(apex.cwiseMax(rectangle.min()).cwiseMin(rectangle.max()));
+  }
+  const Eigen::Vector2d middle = rectangle.center();
+  const Eigen::Vector2d far =
+      (apex.array() < middle.array()).select(rectangle.max(), rectangle.min());
+  return surface.height(far);
 }
 
 }  // namespace lensforge

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 
 #include "core/optics/optical_setup.h"
 
@@ -18,5 +19,12 @@ bool is_shadowed(const OpticalSetup& setup, const Eigen::Vector2d& place);
 /// How far beyond the lens's edges light enters the front that comes to a point of the surface, mm;
 /// 0 where it enters within them.
 double overhang(const OpticalSetup& setup, const Eigen::Vector3d& p);
+
+/// How far over the screen the light of a surface point is moved, mm, if the front lies 1 mm aside:
+/// the mean of x and y. @pre setup.front.
+double shift_by_front(const OpticalSetup& setup, const Eigen::Vector3d& p);
+
+/// Lowest point of a front over a rectangle, mm. @pre the front covers it.
+double lowest_of(const SphericalFront& front, const Eigen::AlignedBox2d& rectangle);
 
 }  // namespace lensforge

@@ -19,6 +19,11 @@ constexpr double kPlaceChange = 1e-9;
 /// intake of a cell is right to second order in its size.
 constexpr int kFrontCells = 64;
 
+/// Seen along z, mm².
+double aperture(const OpticalSetup& setup) {
+  return setup.outline ? polygon_area(setup.outline->points) : setup.lens_size.prod();
+}
+
 double front_intake(const LightSource& source, const Eigen::Vector2d& size) {
   const auto corner = [&](int i, int j) -> Eigen::Vector3d {
     return source.front_at({size.x() * i / kFrontCells, size.y() * j / kFrontCells});
@@ -38,7 +43,7 @@ double front_intake(const LightSource& source, const Eigen::Vector2d& size) {
 LightPath::LightPath(const OpticalSetup& setup)
     : screen_(setup),
       source_(setup),
-      whole_(source_.varies() ? front_intake(source_, setup.lens_size) : setup.lens_size.prod()),
+      whole_(source_.varies() ? front_intake(source_, setup.lens_size) : aperture(setup)),
       eta_(setup.ior),
       kind_(setup.mode == LightMode::kReflect ? kMirror : (setup.fresnel ? kLosing : kLens)),
       middle_(0.5 * setup.lens_size) {}

@@ -18,7 +18,8 @@
 /// Notation: p surface point and t surface triangle, mm in the lens frame; n unit normal, n_z > 0;
 /// a unit direction of the light before the surface, inside a lens; b that of the ray after it, m
 /// its slope (dx/dz, dy/dz); u landing point in pixel coordinates. A bar (…_bar) is a derivative by
-/// that.
+/// that. `known` are entries that enter() gave for the same points: a caller that asks several
+/// times behind a curved front finds them once.
 namespace lensforge {
 
 /// Light after a plane facet. Parallel light leaves it as one beam; light from a point has a beam
@@ -27,6 +28,7 @@ struct FacetBeam {
   RefractedBeam beam;  ///< Of the first corner.
   Eigen::Vector2d m1;  ///< Slopes of the others.
   Eigen::Vector2d m2;
+  CornerEntries known;
 
   [[nodiscard]] LF_HD const Eigen::Vector2d& slope(int corner) const {
     return corner == 0 ? beam.m : (corner == 1 ? m1 : m2);
@@ -61,35 +63,45 @@ class LightPath {
   /// Ties the screen's millimetres to the picture's pixels.
   [[nodiscard]] LF_HD const ImagePlane& plane() const { return screen_.plane(); }
 
+  /// True behind a curved front, where the ray to a point has to be solved for.
+  [[nodiscard]] LF_HD bool is_bent() const { return source_.is_bent(); }
+  /// Where the ray to p enters that front. @pre is_bent().
+  [[nodiscard]] LF_HD FrontEntry enter(const Eigen::Vector3d& p) const { return source_.enter(p); }
+
   /// True if a surface of this normal sends the light towards the screen. Rays along +z then do not
   /// meet the height field again (Sun et al., Appendix B).
-  [[nodiscard]] LF_HD bool transmits(const Eigen::Vector3d& p, const Eigen::Vector3d& n) const {
+  [[nodiscard]] LF_HD bool transmits(const Eigen::Vector3d& p, const Eigen::Vector3d& n,
+                                     const FrontEntry* known = nullptr) const {
     if (source_.along_z()) {
       return n.z() > 0.0 && refracted_cosine_squared(n.z(), eta_) > 0.0 &&
              (!screen_.turned() || screen_.faces(RefractedBeam(n, eta_).m));
     }
-    return leaves(source_.incident(p), n);
+    return leaves(source_.incident(p, known), n);
   }
   /// The same of a whole facet.
-  [[nodiscard]] LF_HD bool transmits(const Corners& t, const Eigen::Vector3d& n) const {
+  [[nodiscard]] LF_HD bool transmits(const Corners& t, const Eigen::Vector3d& n,
+                                     const CornerEntries& known = {}) const {
     if (!source_.varies()) return transmits(t.v0, n);
-    return transmits(t.v0, n) && transmits(t.v1, n) && transmits(t.v2, n);
+    return transmits(t.v0, n, known.e0) && transmits(t.v1, n, known.e1) &&
+           transmits(t.v2, n, known.e2);
   }
 
   /// Barrier of a facet against what its light must not do; infinite where no light leaves. Of a
   /// lens f_tir of Sun et al., Eq. 9, of a mirror 1 / (−n·a b_z); of light from a point the mean
   /// over the corners.
-  [[nodiscard]] LF_HD double barrier(const Corners& t, const Eigen::Vector3d& n) const {
+  [[nodiscard]] LF_HD double barrier(const Corners& t, const Eigen::Vector3d& n,
+                                     const CornerEntries& known = {}) const {
     if (source_.along_z()) return barrier_along_z(n).value;
     if (!source_.varies()) return barrier_at(source_.direction(), n).value;
-    return (barrier_at(source_.incident(t.v0), n).value +
-            barrier_at(source_.incident(t.v1), n).value +
-            barrier_at(source_.incident(t.v2), n).value) /
+    return (barrier_at(source_.incident(t.v0, known.e0), n).value +
+            barrier_at(source_.incident(t.v1, known.e1), n).value +
+            barrier_at(source_.incident(t.v2, known.e2), n).value) /
            3.0;
   }
   /// Adjoint of barrier(): adds weight × the derivatives by corners and normal, returns barrier().
   LF_HD double barrier_adjoint(const Corners& t, const Eigen::Vector3d& n, double weight,
-                               Corners& t_bar, Eigen::Vector3d& n_bar) const {
+                               Corners& t_bar, Eigen::Vector3d& n_bar,
+                               const CornerEntries& known = {}) const {
     if (source_.along_z()) {
       const ValueSlope f = barrier_along_z(n);
       n_bar.z() += weight * f.slope;
@@ -100,15 +112,16 @@ class LightPath {
       n_bar += weight * f.by_n;
       return f.value;
     }
-    return corner_barrier(t.v0, n, weight / 3.0, t_bar.v0, n_bar) +
-           corner_barrier(t.v1, n, weight / 3.0, t_bar.v1, n_bar) +
-           corner_barrier(t.v2, n, weight / 3.0, t_bar.v2, n_bar);
+    return corner_barrier(t.v0, n, weight / 3.0, t_bar.v0, n_bar, known.e0) +
+           corner_barrier(t.v1, n, weight / 3.0, t_bar.v1, n_bar, known.e1) +
+           corner_barrier(t.v2, n, weight / 3.0, t_bar.v2, n_bar, known.e2);
   }
 
   /// The ray after the surface. @pre transmits(p, n).
-  [[nodiscard]] LF_HD RefractedBeam beam(const Eigen::Vector3d& p, const Eigen::Vector3d& n) const {
+  [[nodiscard]] LF_HD RefractedBeam beam(const Eigen::Vector3d& p, const Eigen::Vector3d& n,
+                                         const FrontEntry* known = nullptr) const {
     if (source_.along_z()) return {n, eta_};
-    const Eigen::Vector3d a = source_.incident(p);
+    const Eigen::Vector3d a = source_.incident(p, known);
     if (reflects()) return RefractedBeam::reflected(a, n);
     return {a, n, eta_};
   }
@@ -117,22 +130,24 @@ class LightPath {
                                                    const Eigen::Vector3d& n,
                                                    const RefractedBeam& beam,
                                                    const Eigen::Vector2d& m_bar,
-                                                   Eigen::Vector3d& p_bar) const {
+                                                   Eigen::Vector3d& p_bar,
+                                                   const FrontEntry* known = nullptr) const {
     if (source_.along_z()) return beam.adjoint(n, eta_, m_bar);
-    const Eigen::Vector3d a = source_.incident(p);
+    const Eigen::Vector3d a = source_.incident(p, known);
     const Eigen::Vector3d b_bar = beam.direction_bar(m_bar);
     if (source_.varies()) {
-      p_bar +=
-          source_.incident_adjoint(p, reflects() ? reflect_adjoint_by_incident(n, b_bar)
-                                                 : refract_adjoint_by_incident(a, n, eta_, b_bar));
+      const Eigen::Vector3d a_bar = reflects() ? reflect_adjoint_by_incident(n, b_bar)
+                                               : refract_adjoint_by_incident(a, n, eta_, b_bar);
+      p_bar += source_.incident_adjoint(p, a_bar, known);
     }
     return reflects() ? reflect_adjoint(a, n, b_bar) : refract_adjoint(a, n, eta_, b_bar);
   }
   /// The rays after a facet. @pre transmits(t, n).
-  [[nodiscard]] LF_HD FacetBeam facet_beam(const Corners& t, const Eigen::Vector3d& n) const {
-    const RefractedBeam first = beam(t.v0, n);
-    if (!source_.varies()) return {first, first.m, first.m};
-    return {first, beam(t.v1, n).m, beam(t.v2, n).m};
+  [[nodiscard]] LF_HD FacetBeam facet_beam(const Corners& t, const Eigen::Vector3d& n,
+                                           const CornerEntries& known = {}) const {
+    const RefractedBeam first = beam(t.v0, n, known.e0);
+    if (!source_.varies()) return {first, first.m, first.m, known};
+    return {first, beam(t.v1, n, known.e1).m, beam(t.v2, n, known.e2).m, known};
   }
   /// Adjoint of (t, n) ↦ the slopes at the three corners: adds to t_bar, returns n_bar.
   [[nodiscard]] LF_HD Eigen::Vector3d facet_beam_adjoint(const Corners& t, const Eigen::Vector3d& n,
@@ -143,9 +158,10 @@ class LightPath {
       const Eigen::Vector2d sum = m_bar.m0 + m_bar.m1 + m_bar.m2;
       return beam_adjoint(t.v0, n, facet.beam, sum, t_bar.v0);
     }
-    return beam_adjoint(t.v0, n, facet.beam, m_bar.m0, t_bar.v0) +
-           beam_adjoint(t.v1, n, beam(t.v1, n), m_bar.m1, t_bar.v1) +
-           beam_adjoint(t.v2, n, beam(t.v2, n), m_bar.m2, t_bar.v2);
+    const CornerEntries& e = facet.known;
+    return beam_adjoint(t.v0, n, facet.beam, m_bar.m0, t_bar.v0, e.e0) +
+           beam_adjoint(t.v1, n, beam(t.v1, n, e.e1), m_bar.m1, t_bar.v1, e.e1) +
+           beam_adjoint(t.v2, n, beam(t.v2, n, e.e2), m_bar.m2, t_bar.v2, e.e2);
   }
 
   /// Where a ray of slope m that leaves the surface at p meets the screen.
@@ -168,8 +184,8 @@ class LightPath {
   /// rays enter the lens. Moving a vertex inside a mesh never changes the sum over its triangles,
   /// unless faces reflect: then it is what the triangle lets out, by its own normal and the light
   /// at its middle, and of a lens that its light meets at right angles the same.
-  [[nodiscard]] LF_HD double intake(const Corners& t) const {
-    const double even = source_.intake(t);
+  [[nodiscard]] LF_HD double intake(const Corners& t, const CornerEntries& known = {}) const {
+    const double even = source_.intake(t, known);
     return loses() ? even * Passage(*this, t).share() : even;
   }
   /// True if intake() is the plan area however a triangle slopes, so that all cells of an even grid
@@ -177,17 +193,19 @@ class LightPath {
   [[nodiscard]] LF_HD bool intake_is_plan_area() const { return source_.along_z() && !loses(); }
 
   /// intake() as a share of the whole (Sun et al., Eq. 1): of what a flat surface of the lens's
-  /// size takes, or of what sharing() was given.
-  [[nodiscard]] LF_HD double flux(const Corners& t) const { return intake(t) / whole_; }
+  /// size takes, of parallel light inside of its outline, or of what sharing() was given.
+  [[nodiscard]] LF_HD double flux(const Corners& t, const CornerEntries& known = {}) const {
+    return intake(t, known) / whole_;
+  }
   /// Adjoint of flux(): adds to the derivatives by the corners, or by area_normal(t) where flux
   /// depends on that alone.
   LF_HD void flux_adjoint(const Corners& t, double flux_bar, Corners& t_bar,
-                          Eigen::Vector3d& area_normal_bar) const {
+                          Eigen::Vector3d& area_normal_bar, const CornerEntries& known = {}) const {
     const double bar = flux_bar / whole_;
-    if (!loses()) return source_.intake_adjoint(t, bar, t_bar, area_normal_bar);
+    if (!loses()) return source_.intake_adjoint(t, bar, t_bar, area_normal_bar, known);
     const Passage passage(*this, t);
-    source_.intake_adjoint(t, bar * passage.share(), t_bar, area_normal_bar);
-    passage.adjoint(*this, bar * source_.intake(t), t_bar, area_normal_bar);
+    source_.intake_adjoint(t, bar * passage.share(), t_bar, area_normal_bar, known);
+    passage.adjoint(*this, bar * source_.intake(t, known), t_bar, area_normal_bar);
   }
 
   /// Gradient (∂z/∂x, ∂z/∂y) of the surface at p that sends its light to a point of the picture.
@@ -226,11 +244,12 @@ class LightPath {
         : middle_((t.v0 + t.v1 + t.v2) / 3.0),
           n_(area_normal(t)),
           length_(n_.norm()),
-          a_(light.source_.incident(middle_)),
+          entry_(light.is_bent() ? light.enter(middle_) : FrontEntry()),
+          a_(light.source_.incident(middle_, &entry_)),
           straight_(transmittance(1.0, light.eta_).value) {
       straight_ *= straight_;
       n_ /= length_;
-      front_ = transmittance(light.source_.front_cosine(middle_), light.eta_);
+      front_ = transmittance(light.source_.front_cosine(middle_, &entry_), light.eta_);
       back_ = transmittance(n_.dot(a_), light.eta_);
     }
     [[nodiscard]] LF_HD double share() const { return front_.value * back_.value / straight_; }
@@ -240,9 +259,10 @@ class LightPath {
       const double back_bar = bar * front_.value * back_.slope / straight_;
       const double front_bar = bar * back_.value * front_.slope / straight_;
       area_normal_bar += normalize_adjoint(n_, length_, back_bar * a_);
-      const Eigen::Vector3d third = (light.source_.incident_adjoint(middle_, back_bar * n_) +
-                                     light.source_.front_cosine_adjoint(middle_, front_bar)) /
-                                    3.0;
+      const Eigen::Vector3d third =
+          (light.source_.incident_adjoint(middle_, back_bar * n_, &entry_) +
+           light.source_.front_cosine_adjoint(middle_, front_bar, &entry_)) /
+          3.0;
       t_bar.v0 += third;
       t_bar.v1 += third;
       t_bar.v2 += third;
@@ -252,6 +272,7 @@ class LightPath {
     Eigen::Vector3d middle_;
     Eigen::Vector3d n_;
     double length_;
+    FrontEntry entry_;  ///< To the middle, behind a curved front.
     Eigen::Vector3d a_;
     double straight_;  ///< Through both faces at right angles.
     ValueSlope front_{};
@@ -287,9 +308,10 @@ class LightPath {
   }
   /// A corner's share of barrier_adjoint().
   LF_HD double corner_barrier(const Eigen::Vector3d& p, const Eigen::Vector3d& n, double weight,
-                              Eigen::Vector3d& p_bar, Eigen::Vector3d& n_bar) const {
-    const BarrierAt f = barrier_at(source_.incident(p), n);
-    p_bar += source_.incident_adjoint(p, weight * f.by_a);
+                              Eigen::Vector3d& p_bar, Eigen::Vector3d& n_bar,
+                              const FrontEntry* known) const {
+    const BarrierAt f = barrier_at(source_.incident(p, known), n);
+    p_bar += source_.incident_adjoint(p, weight * f.by_a, known);
     n_bar += weight * f.by_n;
     return f.value / 3.0;
   }

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <sstream>
 #include <string>
+#include <vector>
 
 #include "core/error.h"
 #include "core/text/number_text.h"
@@ -58,6 +59,18 @@ void require_front(const OpticalSetup& setup) {
               "for the lens");
 }
 
+void require_outline(const OpticalSetup& setup) {
+  if (!setup.outline) return;
+  const std::vector<Eigen::Vector2d>& points = setup.outline->points;
+  if (const auto fault = polygon_fault(points)) throw InputError("outline: " + *fault);
+  require(polygon_area(points) > 0.0, "outline", "clockwise", "counter-clockwise");
+  const auto lies_inside = [&](const Eigen::Vector2d& p) {
+    return p.minCoeff() >= 0.0 && (p - setup.lens_size).maxCoeff() <= 0.0;
+  };
+  require(std::all_of(points.begin(), points.end(), lies_inside), "outline", "larger",
+          "inside of lens_size");
+}
+
 void require_extent(const SourceExtent& extent) {
   require(std::isfinite(extent.width) && extent.width >= 0.0, "source width", extent.width,
           "a finite number of 0 or more");
@@ -104,6 +117,7 @@ void validate(const OpticalSetup& setup) {
   require(!setup.fresnel || setup.mode == LightMode::kRefract, "fresnel", "true",
           "left out of a mirror");
   require_front(setup);
+  require_outline(setup);
 }
 
 }  // namespace lensforge

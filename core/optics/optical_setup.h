@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "core/optics/front_surface.h"
+#include "core/optics/outline.h"
 #include "core/optics/source_extent.h"
 
 namespace lensforge {
@@ -46,9 +47,11 @@ struct OpticalSetup {
   SourceExtent extent;  ///< Of either; LightPath takes it for a point.
   /// Light that a lens's faces reflect is missing behind them, steeper ones let less through.
   bool fresnel = false;
-  double ior = 1.49;                         ///< Refractive index of the lens against air, > 1.
-  double focal_length = 300.0;               ///< z of the picture's centre, mm; above the surface.
-  Eigen::Vector2d lens_size{100.0, 100.0};   ///< mm
+  double ior = 1.49;                        ///< Refractive index of the lens against air, > 1.
+  double focal_length = 300.0;              ///< z of the picture's centre, mm; above the surface.
+  Eigen::Vector2d lens_size{100.0, 100.0};  ///< mm
+  /// Light passes inside of it only; none: the whole rectangle of lens_size.
+  std::optional<Outline> outline;
   Eigen::Vector2d image_size{100.0, 100.0};  ///< mm, on the screen
   Eigen::Vector2d image_origin{0.0, 0.0};    ///< mm
   Eigen::Vector3d screen_x{1.0, 0.0, 0.0};   ///< Unit vector on the screen, x of an unturned one.
@@ -70,7 +73,8 @@ struct OpticalSetup {
 /// @throw InputError naming the field, its value and the rule, unless ior > 1, all sizes, the focal
 /// length and the pixel counts are positive, the light comes from the right side, the screen's
 /// vectors are of length 1, at a right angle and turn it by less than a right angle, a spherical
-/// front's radius is longer than half of the lens's diagonal, and everything is finite.
+/// front's radius is longer than half of the lens's diagonal, an outline is one closed line inside
+/// of the lens's rectangle, and everything is finite.
 void validate(const OpticalSetup& setup);
 
 }  // namespace lensforge

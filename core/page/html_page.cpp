@@ -12,10 +12,11 @@
 namespace lensforge {
 
 std::string html_page(const PageContent& content) {
-  const std::array<std::pair<std::string_view, std::string>, 7> values{{
+  const std::array<std::pair<std::string_view, std::string>, 8> values{{
       {"PROGRAM", program_mark()},
       {"TITLE", escape_html(content.title)},
       {"STYLE", std::string(page_files::kStyle)},
+      {"HEAD", content.head},
       {"HEADER", content.header},
       {"BODY", content.body},
       {"FOOTER", content.footer},

@@ -12,6 +12,7 @@ struct PageContent {
   std::string body;
   std::string footer;
   std::string script;  ///< JavaScript.
+  std::string head{};  ///< Of the page's head, behind the style of all pages.
 };
 
 /// A page that needs nothing from outside, with the look of all of the program's reports.

@@ -276,6 +276,7 @@ std::vector<std::string> description(const OpticalSetup& setup, const Scene& sce
   const double tilt = std::acos(std::clamp(scene.normal.z(), -1.0, 1.0)) / kDegree;
   return {(is_mirror(setup) ? "Mirror: " : "Lens: ") + number(setup.lens_size.x()) + " × " +
               number(setup.lens_size.y()) + " mm, its lower left corner at x 0, y 0, " +
+              (setup.outline ? outline_words(*setup.outline) + ", " : "") +
               (is_mirror(setup) ? "its shaped side towards lamp and screen" : front_words(setup)),
           "Light: " + direction_words(setup) + extent_words(setup),
           "Picture: " + number(setup.image_size.x()) + " × " + number(setup.image_size.y()) +

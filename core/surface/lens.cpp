@@ -15,7 +15,9 @@
 #include "core/io/files.h"
 #include "core/surface/height_field_check.h"
 #include "core/surface/lens_surface.h"
+#include "core/surface/mesh_cut.h"
 #include "core/surface/mesh_io.h"
+#include "core/surface/mesh_normals.h"
 #include "core/surface/setup_json.h"
 #include "core/surface/spline_file.h"
 #include "core/surface/spline_surface.h"
@@ -75,6 +77,7 @@ ordered_json to_json(const Lens& lens) {
       {"provenance", ordered_json(lens.provenance)},
   });
   if (lens.spline) document["spline"] = lens_file::kSpline;
+  if (lens.setup.outline && !lens.spline) document["sheet"] = lens_file::kSheet;
   return document;
 }
 
@@ -83,13 +86,20 @@ void add_files(const Lens& lens, PendingFiles& files) {
   const auto add = [&files](const char* name, const auto& content) {
     files.add(name, [&](const fs::path& beside) { write_image(content, beside); });
   };
-  if (lens.spline) {
-    const SampledSurface nodes = spline_nodes(*lens.spline, kMeshSamples);
+  if (lens.spline || (lens.setup.outline && lens.model == SurfaceModel::kSmooth)) {
+    const SampledSurface part = lens_part(lens, Executor::serial());
     files.add(kSurface,
-              [&](const fs::path& beside) { write_ply(nodes.mesh, nodes.normals, beside); });
-    files.add(kSpline, [&](const fs::path& beside) { write_spline(*lens.spline, beside); });
+              [&](const fs::path& beside) { write_ply(part.mesh, part.normals, beside); });
+  } else if (lens.setup.outline) {
+    const SurfaceMesh part = lens_part(lens, Executor::serial()).mesh;
+    files.add(kSurface, [&](const fs::path& beside) { write_ply(part, beside); });
   } else {
     files.add(kSurface, [&](const fs::path& beside) { write_ply(lens.surface, beside); });
+  }
+  if (lens.spline) {
+    files.add(kSpline, [&](const fs::path& beside) { write_spline(*lens.spline, beside); });
+  } else if (lens.setup.outline) {
+    files.add(kSheet, [&](const fs::path& beside) { write_ply(lens.surface, beside); });
   }
   add(kTargetPng, lens.target);
   add(kTargetExr, lens.target);
@@ -107,7 +117,7 @@ void remove_older(const PendingFiles& files) {
   using namespace lens_file;
   fs::remove(files.folder() / kJson);
   for (const char* name :
-       {kSurface, kSpline, kTargetPng, kTargetExr, kRenderPng, kRenderExr, kError}) {
+       {kSurface, kSpline, kSheet, kTargetPng, kTargetExr, kRenderPng, kRenderExr, kError}) {
     if (!files.has(name)) fs::remove(files.folder() / name);
   }
 }
@@ -221,9 +231,24 @@ void check_nodes(const SurfaceMesh& mesh, const ControlNet& net, const fs::path&
                    size_text(nodes.grid.columns, nodes.grid.rows));
 }
 
-SurfaceMesh read_surface(const JsonFields& fields, const OpticalSetup& setup,
-                         const fs::path& folder) {
-  const fs::path file = named_file(fields, "surface", folder);
+/// @throw InputError unless the mesh of a lens with an outline is cut out of its sheet or spline.
+void check_part(const SurfaceMesh& mesh, const Lens& lens, const fs::path& folder) {
+  const SurfaceMesh part = lens_part(lens, Executor::serial()).mesh;
+  if (mesh.vertex_count() == part.vertex_count() &&
+      mesh.triangle_count() == part.triangle_count() &&
+      (mesh.vertices - part.vertices).cwiseAbs().maxCoeff() <= kNodeTolerance) {
+    return;
+  }
+  throw InputError(folder.string() + ": " + lens_file::kSurface + " and " +
+                   (lens.spline ? lens_file::kSpline : lens_file::kSheet) +
+                   " hold two surfaces; the mesh must be what the outline leaves of the other, " +
+                   std::to_string(part.vertex_count()) + " vertices");
+}
+
+/// @param field  that names the file.
+SurfaceMesh read_surface(const JsonFields& fields, const std::string& field,
+                         const OpticalSetup& setup, const fs::path& folder) {
+  const fs::path file = named_file(fields, field, folder);
   SurfaceMesh mesh = read_mesh(file);
   if (const auto fault = surface_fault(mesh, setup)) {
     throw InputError(file.string() + ": " + *fault);
@@ -233,6 +258,22 @@ SurfaceMesh read_surface(const JsonFields& fields, const OpticalSetup& setup,
   const auto fault = mesh.grid.is_grid() ? std::nullopt : height_field_fault(mesh, setup.lens_size);
   if (fault) throw InputError(file.string() + ": " + *fault);
   return mesh;
+}
+
+/// Sets the surface; a spline is known already.
+void read_surfaces(const JsonFields& fields, const fs::path& folder, Lens& lens) {
+  if (!lens.setup.outline) {
+    lens.surface = read_surface(fields, "surface", lens.setup, folder);
+    if (lens.spline) check_nodes(lens.surface, *lens.spline, folder);
+    return;
+  }
+  if (lens.spline) {
+    lens.surface = spline_nodes(*lens.spline, kMeshSamples).mesh;
+    lens.surface.grid = read_grid(fields, lens.surface);
+  } else {
+    lens.surface = read_surface(fields, "sheet", lens.setup, folder);
+  }
+  check_part(read_mesh(named_file(fields, "surface", folder)), lens, folder);
 }
 
 Image read_picture(const fs::path& path, const OpticalSetup& setup) {
@@ -257,6 +298,18 @@ std::shared_ptr<const OpticalSurface> optical_surface(const Lens& lens, SurfaceM
   if (model != SurfaceModel::kSpline) return optical_surface(lens.surface, model);
   LF_CHECK(lens.spline.has_value(), model_name(lens.model));
   return std::make_shared<const SplineSurface>(*lens.spline);
+}
+
+SampledSurface lens_part(const Lens& lens, const Executor& executor) {
+  SampledSurface whole;
+  if (lens.spline) {
+    whole = spline_nodes(*lens.spline, kMeshSamples);
+  } else {
+    whole = {lens.surface, vertex_area_normals(lens.surface)};
+  }
+  if (!lens.setup.outline) return whole;
+  return part_inside(whole.mesh, whole.normals,
+                     cut_mesh(whole.mesh, *lens.setup.outline, executor));
 }
 
 void write_lens(const Lens& lens, PendingFiles files) {
@@ -296,8 +349,7 @@ Lens read_lens(const fs::path& folder) {
   }
   if (!fields.at("provenance").is_object()) fields.refuse("provenance", "it must be an object");
   lens.provenance = fields.at("provenance");
-  lens.surface = read_surface(fields, lens.setup, folder);
-  if (lens.spline) check_nodes(lens.surface, *lens.spline, folder);
+  read_surfaces(fields, folder, lens);
   lens.target = read_picture(folder / lens_file::kTargetExr, lens.setup);
   const fs::path render = folder / lens_file::kRenderExr;
   std::error_code none;

@@ -8,6 +8,7 @@
 #include <optional>
 #include <vector>
 
+#include "core/compute/executor.h"
 #include "core/image/image.h"
 #include "core/image/metrics.h"
 #include "core/io/lens_folder.h"
@@ -15,6 +16,7 @@
 #include "core/optics/optical_setup.h"
 #include "core/surface/control_net.h"
 #include "core/surface/optical_surface.h"
+#include "core/surface/sampled_surface.h"
 #include "core/surface/surface_mesh.h"
 #include "core/surface/surface_model.h"
 
@@ -25,7 +27,9 @@ using ModelMetrics = std::map<SurfaceModel, ImageMetrics>;
 
 /// A designed lens: what one command hands to the next.
 struct Lens {
-  SurfaceMesh surface;  ///< The optical surface, z ≥ thickness; mm, lens frame.
+  /// The optical surface, z ≥ thickness; mm, lens frame. It fills the lens's rectangle, also where
+  /// setup.outline leaves less to the light.
+  SurfaceMesh surface;
   /// That surface itself if the model is a spline; `surface` then has its nodes (kMeshSamples).
   std::optional<ControlNet> spline;
   OpticalSetup setup;
@@ -44,6 +48,10 @@ std::vector<SurfaceModel> models_of(const Lens& lens);
 
 /// The lens's surface under one of them.
 std::shared_ptr<const OpticalSurface> optical_surface(const Lens& lens, SurfaceModel model);
+
+/// The optical surface as far as the lens's outline goes, its corners on the outline too, with the
+/// normals of the smooth model or the spline: light everywhere on it gives the lens's picture.
+SampledSurface lens_part(const Lens& lens, const Executor& executor);
 
 /// Writes a lens into the folder of `files`, behind what these hold already. All are written beside
 /// before one is renamed, an older lens.json goes first and the new one comes last: a folder with a

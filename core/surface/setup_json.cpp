@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "core/surface/outline_json.h"
+
 namespace lensforge {
 namespace {
 
@@ -175,6 +177,7 @@ ordered_json setup_json(const OpticalSetup& setup) {
   if (setup.fresnel) document["fresnel"] = true;
   if (!setup.screen_is_turned()) document["focal_length"] = setup.focal_length;
   document["lens_size"] = array_of(setup.lens_size);
+  if (setup.outline) document["outline"] = outline_json(*setup.outline, setup.lens_size);
   document["image_size"] = array_of(setup.image_size);
   document["image_origin"] = array_of(setup.image_origin);
   document["screen"] = screen_json(setup);
@@ -196,6 +199,9 @@ OpticalSetup read_setup(const JsonFields& fields) {
   setup.ior = fields.number("ior");
   if (fields.has("fresnel")) setup.fresnel = read_fresnel(fields);
   setup.lens_size = fields.number_pair("lens_size");
+  if (fields.has("outline")) {
+    setup.outline = read_outline(fields.object("outline"), setup.lens_size);
+  }
   setup.image_size = fields.number_pair("image_size");
   setup.image_origin = fields.number_pair("image_origin");
   setup.pixels = fields.integer_pair("pixels");

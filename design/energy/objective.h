@@ -36,7 +36,8 @@ class DesignObjective {
   void relinearize(const Eigen::Matrix3Xd& vertices) { core_.relinearize(vertices.data()); }
 
   /// Value and gradient (3 × V, per mm; zero for coordinates that are held: x on the lens's left
-  /// and right border, y on the lower and upper one). Same bits for any number of threads.
+  /// and right border, y on the lower and upper one, both where relinearize() found a face on the
+  /// outline). Same bits for any number of threads.
   Evaluation evaluate(const Eigen::Matrix3Xd& vertices, Eigen::Matrix3Xd& gradient) {
     gradient.resize(3, vertices.cols());
     return core_.evaluate(vertices.data(), gradient.data());

@@ -25,22 +25,48 @@ struct FaceBar {
   Eigen::Vector3d area_normal{0.0, 0.0, 0.0};
 };
 
-/// Weighted derivatives of what the goal says of one image triangle, and the values.
+/// Weighted derivatives of what a picture says of an image triangle, and the values.
+LF_HD inline GoalSums picture_adjoint(const ObjectiveView& o, const ImageTriangle& image,
+                                      ImageTriangle& bar) {
+  const GoalView& goal = o.goal;
+  GoalSums values;
+  bar = deposit_adjoint(magnified(image, goal.parts), goal.cotangent);
+  bar = magnified(bar, goal.parts);
+  values.boundary = boundary_term(image, goal.columns, goal.rows, o.weights.boundary, bar);
+  return values;
+}
+
+/// The same of the parts of a face that lie inside of the outline.
+LF_HD inline GoalSums rim_adjoint(const ObjectiveView& o, std::int64_t face,
+                                  const ImageTriangle& image, ImageTriangle& bar) {
+  GoalSums values;
+  for (std::int64_t k = o.aperture.first[face]; o.aperture.pieces[k].face == face; ++k) {
+    const TrianglePiece& piece = o.aperture.pieces[k].piece;
+    ImageTriangle piece_bar;
+    values += picture_adjoint(o, image_of(image, piece), piece_bar);
+    image_of_adjoint(piece, piece_bar, bar);
+  }
+  return values;
+}
+
+/// Weighted derivatives of what the goal says of one face's image triangle, and the values.
 LF_HD inline GoalSums goal_adjoint(const ObjectiveView& o, std::int64_t face,
                                    const ImageTriangle& image, ImageTriangle& bar) {
   const ObjectiveWeights& w = o.weights;
   const GoalView& goal = o.goal;
   GoalSums values;
   if (!goal.is_picture()) {
+    const double share = o.aperture.share(face);
     const CorrespondenceValues v = correspondence_term(
-        image, column2(goal.wanted_centroids, face), goal.wanted_flux[face], goal.pixels(), w, bar);
+        {image.p0, image.p1, image.p2, share * image.flux}, column2(goal.wanted_centroids, face),
+        goal.wanted_flux[face], goal.pixels(), w, bar);
+    bar.flux *= share;
     values.align = v.align;
     values.flux = v.flux;
     return values;
   }
-  bar = deposit_adjoint(magnified(image, goal.parts), goal.cotangent);
-  bar = magnified(bar, goal.parts);
-  values.boundary = boundary_term(image, goal.columns, goal.rows, w.boundary, bar);
+  if (!o.aperture.is_whole(face)) return rim_adjoint(o, face, image, bar);
+  values = picture_adjoint(o, image, bar);
   if (goal.led != nullptr && goal.led[face] != kNoPixel) {
     const std::int32_t pixel = goal.led[face];
     values.unlit = unlit_term(image, pixel, goal.columns, goal.target[pixel], w.image, bar);
@@ -54,8 +80,8 @@ LF_HD inline double barrier_adjoint(const ObjectiveView& o, std::int64_t face, c
   const double weight = o.weights.barrier;
   const ValueSlope area = area_barrier(plan_area(t), o.area);
   bar.area_normal.z() += 0.5 * weight * area.slope;
-  return area.value +
-         o.light.barrier_adjoint(t, o.scratch.frames[face].n, weight, bar.corners, bar.n);
+  return area.value + o.light.barrier_adjoint(t, o.scratch.frames[face].n, weight, bar.corners,
+                                              bar.n, o.entries_at(face));
 }
 
 /// Derivatives of everything by one face's corners.

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 
 #include "core/compute/host_device.h"
 #include "core/image/transfer.h"
@@ -26,31 +27,40 @@ struct MeasureFace {
     const FaceFrame frame = face_frame(t);
     o.scratch.frames[i] = frame;
     const double area = plan_area(t);
-    return {area_barrier(area, o.area).value + o.light.barrier(t, frame.n)};
+    return {area_barrier(area, o.area).value + o.light.barrier(t, frame.n, o.entries_at(i))};
   }
 };
 
-/// What the faces project onto the screen, as a source of FluxImageOn::render().
+/// What the faces project onto the screen, as a source of FluxImageOn::render(): the image of every
+/// face that lies inside of the outline, nothing of the others, then those of their parts.
 /// @pre frames, and what the rays keep of the surface, are up to date.
 template <class Rays>
 struct FaceLightSource {
   ObjectiveView o;
   Rays rays;
-  LF_HD ImageTriangle operator()(std::int64_t face) const {
-    return magnified(rays.image(o, face), o.goal.parts);
+  [[nodiscard]] std::int64_t count() const { return o.mesh.faces + o.aperture.count; }
+  LF_HD ImageTriangle operator()(std::int64_t i) const {
+    if (i >= o.mesh.faces) {
+      const MeshCut::Piece& part = o.aperture.pieces[i - o.mesh.faces];
+      return magnified(image_of(rays.image(o, part.face), part.piece), o.goal.parts);
+    }
+    return o.aperture.is_whole(i) ? magnified(rays.image(o, i), o.goal.parts) : ImageTriangle{};
   }
 };
 
-/// Centroid of what a face projects onto the screen. @pre as of FaceLightSource.
+/// Centroid of what a face projects onto the screen; no number where less than all of its light
+/// does. @pre as of FaceLightSource.
 template <class Rays>
 struct FaceCentroid {
   ObjectiveView o;
   Rays rays;
   double* centroids;  ///< 2 × F, pixel coordinates.
 
+  LF_HD static double nowhere() { return std::numeric_limits<double>::quiet_NaN(); }
   LF_HD void operator()(std::int64_t i) const {
     const ImageTriangle t = rays.image(o, i);
     column2(centroids, i) = (t.p0 + t.p1 + t.p2) / 3.0;
+    if (!o.aperture.is_whole(i)) column2(centroids, i).setConstant(nowhere());
   }
 };
 

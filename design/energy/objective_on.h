@@ -28,6 +28,7 @@
 #include "design/energy/unlit_pixels.h"
 #include "design/flux/flux_image.h"
 #include "design/flux/source_blur.h"
+#include "design/optics/surface_kernels.h"
 
 namespace lensforge {
 
@@ -47,7 +48,7 @@ class DesignObjectiveOn {
   /// them, 3 × V in the executor's memory. @pre the model is a spline.
   [[nodiscard]] SmoothRays sampled_rays() { return std::get<SmoothRaysOn<Exec>>(rays_).view(); }
 
-  /// DesignObjective::movable(), in the caller's memory.
+  /// DesignObjective::movable(), in the caller's memory; with an outline as of relinearize().
   [[nodiscard]] const Eigen::Matrix3Xd& movable() const { return movable_; }
 
  private:
@@ -55,7 +56,9 @@ class DesignObjectiveOn {
   using Buffer = typename Exec::template Buffer<T>;
 
   void take(const Image& target);
+  void take_outline(const double* vertices);
   void take(const Correspondence& wanted);
+  /// @post its entries are those of the vertices.
   [[nodiscard]] ObjectiveView view(const double* vertices);
   [[nodiscard]] GoalView goal_view();
   /// Sums of one evaluation; not asked for before all kernels are on their way.
@@ -69,7 +72,7 @@ class DesignObjectiveOn {
   template <class Rays>
   [[nodiscard]] std::span<const double> project(const ObjectiveView& o, Rays& rays) {
     const FaceLightSource<typename Rays::View> faces{o, rays.view()};
-    return blur_.apply(executor_, flux_.render(executor_, o.mesh.faces, faces));
+    return blur_.apply(executor_, flux_.render(executor_, faces.count(), faces));
   }
   template <class Rays>
   void compare_picture(const ObjectiveView& o, Rays& rays, Sums& sums);
@@ -90,6 +93,10 @@ class DesignObjectiveOn {
   ObjectiveOptions options_;
   LightPath light_;
   MeshOn<Exec> mesh_;
+  SurfaceMesh sheet_;   ///< Where it was linearized last; empty without an outline.
+  OpticalSetup setup_;  ///< Likewise.
+  ApertureOn<Exec> aperture_;
+  Eigen::Matrix3Xd unheld_;  ///< Movable but for the outline's rim.
   Eigen::Matrix3Xd movable_;
   Buffer<double> movable_here_;
 
@@ -100,6 +107,7 @@ class DesignObjectiveOn {
   Buffer<double> wanted_centroids_;
   Buffer<double> wanted_flux_;
 
+  Buffer<FrontEntry> entries_;  ///< Empty behind a flat front.
   Buffer<FaceFrame> frames_;
   Buffer<WeingartenMap> maps_;
   Buffer<FaceBend> bends_;
@@ -163,9 +171,10 @@ DesignObjectiveOn<Exec>::DesignObjectiveOn(const SurfaceMesh& mesh, const Optica
                                            const Exec& executor)
     : executor_(executor),
       options_(options),
-      light_(light_on(mesh, setup)),
+      light_(setup.outline ? LightPath(setup) : light_on(mesh, setup)),
       mesh_(mesh, make_topology(mesh), executor),
-      movable_(objective_detail::movable_coordinates(mesh.vertices, setup.lens_size)),
+      unheld_(objective_detail::movable_coordinates(mesh.vertices, setup.lens_size)),
+      movable_(unheld_),
       movable_here_(buffer_of(executor, objective_detail::entries(movable_))),
       blur_(source_kernel(setup, options.surface_height), setup.pixels.x(), setup.pixels.y(),
             executor),
@@ -183,6 +192,10 @@ DesignObjectiveOn<Exec>::DesignObjectiveOn(const SurfaceMesh& mesh, const Optica
     laplacian_shares_ = Buffer<double>(2 * vertices);
     fill_zero(executor_, maps_);
     fill_zero(executor_, edge_weights_);
+  }
+  if (setup.outline) {
+    sheet_ = mesh;
+    setup_ = setup;
   }
   std::visit([this](const auto& wanted) { this->take(wanted); }, goal);
   const Buffer<double> start = buffer_of(executor_, objective_detail::entries(mesh.vertices));
@@ -211,10 +224,12 @@ ObjectiveView DesignObjectiveOn<Exec>::view(const double* vertices) {
           .area = options_.area,
           .light = light_,
           .vertices = vertices,
+          .entries = enter_vertices(executor_, light_, vertices, mesh_.view().vertices, entries_),
           .mesh = mesh_.view(),
           .goal = goal_view(),
           .scratch = {frames_.data(), maps_.data(), bends_.data(), edge_weights_.data(),
-                      corner_bar_.data()}};
+                      corner_bar_.data()},
+          .aperture = aperture_.view()};
 }
 
 template <class Exec>
@@ -229,9 +244,25 @@ GoalView DesignObjectiveOn<Exec>::goal_view() {
           .wanted_flux = wanted_flux_.data()};
 }
 
+/// Cuts the faces anew where they are now, and holds those on the rim there.
+template <class Exec>
+void DesignObjectiveOn<Exec>::take_outline(const double* vertices) {
+  Eigen::Matrix3Xd& here = sheet_.vertices;
+  const auto count = static_cast<std::size_t>(here.size());
+  download(executor_, std::span<const double>(vertices, count),
+           std::span<double>(here.data(), count));
+  const MeshCut cut = cut_mesh(sheet_, *setup_.outline, Executor::serial());
+  light_ = light_inside(sheet_, cut, setup_);
+  aperture_ = ApertureOn<Exec>(cut, executor_);
+  movable_ = unheld_;
+  hold_rim(sheet_, cut, movable_);
+  movable_here_ = buffer_of(executor_, objective_detail::entries(movable_));
+}
+
 template <class Exec>
 void DesignObjectiveOn<Exec>::relinearize(const double* vertices) {
   led_ = {};
+  if (setup_.outline) take_outline(vertices);
   const ObjectiveView o = view(vertices);
   const std::int64_t faces = o.mesh.faces;
   static_cast<void>(pending_sum<1>(executor_, "face frames", faces, MeasureFace{o}));

@@ -21,7 +21,7 @@ struct GoalSums {
   [[nodiscard]] LF_HD Packed packed() const { return {boundary, unlit, align, flux}; }
   [[nodiscard]] static GoalSums of(const Packed& p) { return {p[0], p[1], p[2], p[3]}; }
 
-  GoalSums& operator+=(const GoalSums& other) {
+  LF_HD GoalSums& operator+=(const GoalSums& other) {
     boundary += other.boundary;
     unlit += other.unlit;
     align += other.align;

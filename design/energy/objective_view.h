@@ -6,6 +6,7 @@
 #include "core/compute/host_device.h"
 #include "core/optics/light_path.h"
 #include "core/surface/corners.h"
+#include "design/energy/aperture.h"
 #include "design/energy/area_barrier.h"
 #include "design/energy/face_frame.h"
 #include "design/energy/mesh_view.h"
@@ -51,12 +52,17 @@ struct ObjectiveView {
   AreaBarrier area;  ///< ObjectiveOptions::area.
   LightPath light;
   const double* vertices;  ///< 3 × V, mm
+  VertexEntries entries;   ///< Of the vertices where they are now.
   MeshView mesh;
   GoalView goal;
   FaceScratch scratch;
+  ApertureView aperture;
 
   [[nodiscard]] LF_HD Corners corners(std::int64_t face) const {
     return mesh.corners(vertices, face);
+  }
+  [[nodiscard]] LF_HD CornerEntries entries_at(std::int64_t face) const {
+    return entries.at(mesh.triangle(face));
   }
 };
 

@@ -5,12 +5,14 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 #include <variant>
 #include <vector>
 
 #include "core/surface/control_net.h"
 #include "core/surface/surface_mesh.h"
 #include "design/energy/objective_on.h"
+#include "design/optics/axis_basis.h"
 #include "design/optics/columns.h"
 #include "design/optics/made_nodes.h"
 #include "design/optics/shifted_nodes.h"
@@ -40,7 +42,7 @@ class SplineObjectiveOn {
       : executor_(executor),
         core_(spline_nodes({net.grid, net.vertices}, options.samples).mesh, setup, goal, options,
               executor),
-        movable_(objective_detail::movable_coordinates(net.vertices, setup.lens_size)),
+        unheld_(objective_detail::movable_coordinates(net.vertices, setup.lens_size)),
         gradient_(static_cast<std::size_t>(net.vertices.size())) {
     if (!options.made_by) {
       parts_.push_back(spline_nodes_on(net.grid, options.samples, executor));
@@ -51,8 +53,13 @@ class SplineObjectiveOn {
     }
     positions_ = Buffer(3 * static_cast<std::size_t>(node_count()));
     positions_bar_ = Buffer(positions_.size());
-    const Eigen::Matrix3Xd share = movable_ / static_cast<double>(parts_.size());
-    share_ = buffer_of(executor, objective_detail::entries(share));
+    if (setup.outline) {
+      for (const int coefficients : {net.grid.columns, net.grid.rows}) {
+        bases_.push_back(
+            plain_basis(coefficients - 3, even_points(coefficients - 3, options.samples)));
+      }
+    }
+    hold(unheld_);
   }
 
   /// @throw Interrupted.
@@ -63,6 +70,7 @@ class SplineObjectiveOn {
     }
     look(points, parts_.front());
     core_.relinearize(positions_.data());
+    if (!bases_.empty()) hold(held_with_nodes());
   }
 
   ObjectiveEvaluation evaluate(const double* points, double* gradient) {
@@ -103,6 +111,36 @@ class SplineObjectiveOn {
     return MadeNodes(net, size, samples, made, executor_);
   }
 
+  /// Takes what may move from now on.
+  void hold(Eigen::Matrix3Xd movable) {
+    movable_ = std::move(movable);
+    const Eigen::Matrix3Xd share = movable_ / static_cast<double>(parts_.size());
+    share_ = buffer_of(executor_, objective_detail::entries(share));
+  }
+
+  /// Control points keep the x and y of nodes on the outline's rim, if these hang on theirs.
+  [[nodiscard]] Eigen::Matrix3Xd held_with_nodes() const {
+    const AxisBasis& u = bases_[0];
+    const AxisBasis& v = bases_[1];
+    Eigen::Matrix3Xd movable = unheld_;
+    const auto hold_point = [&](int node_u, int node_v, int j, int k) {
+      const int i = u.first[static_cast<std::size_t>(node_u)] + j;
+      const int row = v.first[static_cast<std::size_t>(node_v)] + k;
+      const auto tap = [](const AxisBasis& basis, int node, int n) {
+        return basis.plan_value[static_cast<std::size_t>(basis.taps * node + n)];
+      };
+      if (tap(u, node_u, j) * tap(v, node_v, k) == 0.0) return;
+      movable.col(Eigen::Index{row} * u.coefficients + i).template head<2>().setZero();
+    };
+    for (Eigen::Index node = 0; node < core_.movable().cols(); ++node) {
+      if (core_.movable().col(node).template head<2>().any()) continue;
+      const int node_u = static_cast<int>(node % u.nodes());
+      const int node_v = static_cast<int>(node / u.nodes());
+      for (int n = 0; n < u.taps * v.taps; ++n) hold_point(node_u, node_v, n % u.taps, n / u.taps);
+    }
+    return movable;
+  }
+
   [[nodiscard]] std::int64_t node_count() const {
     const GridShape shape =
         std::visit([](const auto& nodes) { return nodes.shape(); }, parts_.front());
@@ -130,7 +168,9 @@ class SplineObjectiveOn {
 
   Exec executor_;
   DesignObjectiveOn<Exec> core_;
+  Eigen::Matrix3Xd unheld_;  ///< Movable but for the outline's rim.
   Eigen::Matrix3Xd movable_;
+  std::vector<AxisBasis> bases_;  ///< Of nodes along u and v; empty without an outline.
   std::vector<Part> parts_;
   Buffer share_;      ///< One over the number of parts where a coordinate may move, else 0.
   Buffer positions_;  ///< Of the part that was looked at last.

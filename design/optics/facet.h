@@ -17,7 +17,7 @@ namespace lensforge {
 LF_HD inline ImageTriangle project_facet(const Corners& t, const FacetBeam& beam,
                                          const LightPath& light) {
   return {light.land(t.v0, beam.slope(0)), light.land(t.v1, beam.slope(1)),
-          light.land(t.v2, beam.slope(2)), light.flux(t)};
+          light.land(t.v2, beam.slope(2)), light.flux(t, beam.known)};
 }
 
 /// Adjoint of project_facet() without the flux: adds to the corners' derivatives directly and

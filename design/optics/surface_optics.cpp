@@ -2,8 +2,12 @@
 #include "design/optics/surface_optics.h"
 
 #include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
 
 #include "core/surface/lit_surface.h"
+#include "core/surface/mesh_cut.h"
 #include "core/surface/mesh_normals.h"
 #include "design/optics/facet.h"
 #include "design/optics/surface_kernels.h"
@@ -12,16 +16,36 @@ namespace lensforge {
 
 namespace {
 
-SurfaceView view_of(const SurfaceMesh& mesh, const OpticalSetup& setup) {
-  return {mesh.triangles.data(), mesh.vertices.data(), light_on(mesh, setup)};
-}
+/// A surface that may be cut by an outline, and the rays that enter it.
+struct Scene {
+  const SurfaceMesh& mesh;
+  const std::optional<MeshCut> cut;
+  std::vector<FrontEntry> entries;
+  SurfaceView view;
+
+  Scene(const SurfaceMesh& surface, const OpticalSetup& setup, const Executor& executor)
+      : mesh(surface),
+        cut(setup.outline ? std::optional(cut_mesh(surface, *setup.outline, executor))
+                          : std::nullopt),
+        view{surface.triangles.data(),
+             surface.vertices.data(),
+             cut ? light_inside(surface, *cut, setup) : light_on(surface, setup),
+             {}} {
+    view.entries =
+        enter_vertices(executor, view.light, view.vertices, mesh.vertex_count(), entries);
+  }
+};
 
 template <class Project>
-std::vector<ImageTriangle> project_all(const char* kernel, const SurfaceMesh& mesh,
+std::vector<ImageTriangle> project_all(const char* kernel, const Scene& scene,
                                        const Project& project, const Executor& executor) {
-  std::vector<ImageTriangle> triangles(static_cast<std::size_t>(mesh.triangle_count()));
-  parallel_for(executor, kernel, mesh.triangle_count(),
-               [&](std::int64_t i) { triangles[static_cast<std::size_t>(i)] = project(i); });
+  const std::int64_t count = scene.mesh.triangle_count();
+  std::vector<ImageTriangle> triangles(static_cast<std::size_t>(count));
+  parallel_for(executor, kernel, count, [&](std::int64_t i) {
+    const auto at = static_cast<std::size_t>(i);
+    triangles[at] = project(i);
+    if (scene.cut) triangles[at].flux *= scene.cut->share[at];
+  });
   return triangles;
 }
 
@@ -39,12 +63,12 @@ Eigen::Matrix2Xd land_rays(const SurfaceMesh& mesh, const SurfaceView& surface,
 
 std::vector<ImageTriangle> project_surface(const SurfaceMesh& mesh, const OpticalSetup& setup,
                                            SurfaceModel model, const Executor& executor) {
-  const SurfaceView surface = view_of(mesh, setup);
+  const Scene scene(mesh, setup, executor);
   if (model == SurfaceModel::kFacet) {
-    return project_all("project facets", mesh, ProjectFacet{surface}, executor);
+    return project_all("project facets", scene, ProjectFacet{scene.view}, executor);
   }
-  const Eigen::Matrix2Xd landing = land_rays(mesh, surface, executor);
-  return project_all("project smooth", mesh, ProjectSmooth{surface, landing.data()}, executor);
+  const Eigen::Matrix2Xd landing = land_rays(mesh, scene.view, executor);
+  return project_all("project smooth", scene, ProjectSmooth{scene.view, landing.data()}, executor);
 }
 
 }  // namespace lensforge

@@ -12,7 +12,8 @@
 namespace lensforge {
 
 /// The image triangles of a whole surface under either model, one per mesh triangle, in pixel
-/// coordinates. Triangles that reflect the light totally have no flux.
+/// coordinates. Triangles that reflect the light totally have no flux; of those across the lens's
+/// outline the flux is that of the part inside.
 /// @pre the mesh's triangle indices are in range.
 std::vector<ImageTriangle> project_surface(const SurfaceMesh& mesh, const OpticalSetup& setup,
                                            SurfaceModel model, const Executor& executor);

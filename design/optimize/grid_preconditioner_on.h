@@ -118,6 +118,12 @@ class GridPreconditionerOn {
            std::span<double>(reach_.data(), reach_.size()));
   }
 
+  /// Which coordinates move, 3 × V of 1 and 0, from the caller's memory.
+  void set_movable(const Eigen::Matrix3Xd& movable) {
+    upload(executor_, std::span<const double>(movable.data(), movable_.size()),
+           std::span<double>(movable_.data(), movable_.size()));
+  }
+
   /// r ← P^exponent g, both 3 V numbers.
   void apply(std::span<const double> g, double exponent, std::span<double> r) {
     const PreconditionerView p = view(exponent);

@@ -2,6 +2,8 @@
 #include "design/reflect/reflect_job.h"
 
 #include "core/image/image_io.h"
+#include "core/io/checkpoint_file.h"
+#include "core/io/files.h"
 #include "core/io/output_guard.h"
 #include "core/io/pending_files.h"
 #include "core/surface/mesh_io.h"
@@ -16,6 +18,9 @@ namespace lensforge::reflect {
 namespace {
 
 namespace fs = std::filesystem;
+
+/// A reflect.json is a few kilobytes.
+constexpr std::uintmax_t kMaxJsonBytes = 1 << 20;
 
 nlohmann::json energies_json(const Energies& energies) {
   return {{"energy_direct", energies.direct}, {"energy", energies.total}};
@@ -48,11 +53,22 @@ void require_replaceable_result(const fs::path& folder, bool force) {
   for (const char* name : reflect_file::kAll) require_replaceable("--out", folder / name, force);
 }
 
+bool holds_result(const fs::path& folder, std::uint64_t fingerprint) {
+  const fs::path path = folder / reflect_file::kJson;
+  std::error_code ignored;
+  if (!fs::is_regular_file(path, ignored)) return false;
+  const nlohmann::json json =
+      nlohmann::json::parse(read_whole_file(path, kMaxJsonBytes), nullptr, false);
+  return json.is_object() && json.value("status", nlohmann::json()) == "done" &&
+         json.value("fingerprint", nlohmann::json()) == fingerprint_text(fingerprint);
+}
+
 nlohmann::json result_json(const ReflectResult& result, const ReflectOptions& options) {
   nlohmann::json json = {{"format", "lensforge.reflect"},
                          {"version", 1},
                          {"program", program_mark()},
                          {"status", result.done() ? "done" : "interrupted"},
+                         {"fingerprint", fingerprint_text(result.fingerprint)},
                          {"goal", options_json(options).at("goal")},
                          {"before", energies_json(result.before)},
                          {"after", result.done() ? energies_json(result.after) : nlohmann::json()},

@@ -23,6 +23,8 @@ inline constexpr const char* kConvergence = "convergence.csv";
 inline constexpr const char* kReport = "report.html";
 inline constexpr const char* kRadarTable = "radar.csv";
 inline constexpr const char* kRadarPlot = "radar.svg";
+/// Of an unfinished run; write_result() leaves it alone.
+inline constexpr const char* kCheckpoint = "reflect.checkpoint";
 inline constexpr std::array kAll{kRadarTable, kRadarPlot,    kSurface,     kPrint,  kReference,
                                  kViews,      kDisplacement, kConvergence, kReport, kJson};
 }  // namespace reflect_file
@@ -30,6 +32,9 @@ inline constexpr std::array kAll{kRadarTable, kRadarPlot,    kSurface,     kPrin
 /// @throw InputError for a file of these names in `folder` that lensforge did not write, unless
 /// `force`.
 void require_replaceable_result(const std::filesystem::path& folder, bool force);
+
+/// Whether the folder holds the finished result of this mesh and these options.
+bool holds_result(const std::filesystem::path& folder, std::uint64_t fingerprint);
 
 /// What a result says of itself: energies before and after, displacements, options.
 nlohmann::json result_json(const ReflectResult& result, const ReflectOptions& options);

@@ -16,6 +16,12 @@ constexpr int kMaxSunPositions = 1000;
 constexpr int kMaxSeeds = 1000000000;
 constexpr int kMaxFaces = 1000000;
 
+OptionField<O> force_row() {
+  OptionField<O> row = R::flag("--force", &O::force, "replace files that lensforge did not write");
+  row.left_out = "it does not change the shape";
+  return row;
+}
+
 }  // namespace
 
 const OptionTable<ReflectOptions>& reflect_fields() {
@@ -85,7 +91,7 @@ const OptionTable<ReflectOptions>& reflect_fields() {
       R::number("--radar", &O::radar_ghz, Limits::zero_or(0.01, 1000), "GHz",
                 "compute radar cross-sections around the horizon too, for a mesh in millimetres; "
                 "0 computes none"),
-      R::flag("--force", &O::force, "replace files that lensforge did not write")};
+      force_row()};
   return table;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <filesystem>
 #include <string>
 
 #include "core/text/option_field.h"
@@ -46,6 +47,10 @@ struct ReflectOptions {
   double min_thickness = 0.0;     ///< Of the material behind a vertex; 0: no limit.
   double radar_ghz = 0.0;         ///< Frequency of radar cross-sections; 0: none.
   bool force = false;             ///< Replace files that lensforge did not write.
+  /// File that takes a checkpoint every second; none is written if empty.
+  std::filesystem::path checkpoint;
+  /// Go on from `checkpoint`. Same mesh and options → same shape as without interruption.
+  bool resume = false;
 };
 
 /// The options as the command has them.

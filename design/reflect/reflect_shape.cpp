@@ -7,8 +7,10 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "core/error.h"
+#include "core/io/checkpoint_file.h"
 #include "core/text/number_text.h"
 #include "design/reflect/light/light_field.h"
 #include "design/reflect/light/reflection_energy.h"
@@ -21,6 +23,7 @@
 #include "design/reflect/normals/normal_objective.h"
 #include "design/reflect/normals/tv_denoise.h"
 #include "design/reflect/normals/unmet_turns.h"
+#include "design/reflect/reflect_checkpoint.h"
 #include "design/reflect/shape/constraints.h"
 #include "design/reflect/shape/shape_update.h"
 
@@ -50,6 +53,9 @@ constexpr double kStay = 0.74;
 /// far beyond.
 constexpr double kFarthest = 1e6 * kUnitDiagonal;
 
+/// Between two checkpoints; what a killed run has to do again.
+constexpr double kSaveSeconds = 1.0;
+
 /// Steps of the normals that one seed may number.
 constexpr std::uint64_t kSeedStride = std::uint64_t{1} << 32U;
 
@@ -70,18 +76,16 @@ class Schedule {
         reference_(frame_.to_unit(input.mesh)),
         mesh_(reference_),
         field_(frame_.to_unit(make_light_field(options))),
-        keep_(constraint_set(input)) {}
+        keep_(constraint_set(input)) {
+    state_.fingerprint = reflect_fingerprint(input, options);
+    if (options.resume) resume();
+  }
 
   ReflectResult run() {
     ReflectResult result;
     try {
-      result.before = evaluated();
-      run_stage({"rim-spoke", ElementKind::kRimSpoke, options_.rim_updates});
-      run_stage({"face", ElementKind::kFace, options_.face_updates});
-      if (options_.split && options_.face_updates > 0) {
-        split();
-        run_stage({"split", ElementKind::kFace, options_.face_updates});
-      }
+      if (state_.updates.empty()) state_.before = evaluated();
+      for (int stage = state_.stage; stage < stages(); ++stage) run_stage(stage);
       result.after = evaluated();
       if (options_.radar_ghz > 0.0) {
         result.radar = compare_radar(frame_.from_unit(reference_), frame_.from_unit(mesh_),
@@ -89,11 +93,14 @@ class Schedule {
       }
     } catch (const Interrupted&) {
       result.status = ReflectResult::Status::kInterrupted;
+      save();
     }
+    result.fingerprint = state_.fingerprint;
+    result.before = state_.before;
     result.unmet = Constraints(reference_, keep_, Executor::serial()).broken(mesh_.vertices);
     result.reference = frame_.from_unit(reference_);
     result.mesh = frame_.from_unit(mesh_);
-    result.updates = updates_;
+    result.updates = state_.updates;
     result.mean_displacement = displacements().mean();
     result.max_displacement = displacements().maxCoeff();
     result.seconds = seconds();
@@ -118,7 +125,55 @@ class Schedule {
     return evaluate(mesh_, field_.goal, field_.evaluation_directions(), executor_);
   }
 
-  void run_stage(const Stage& stage) {
+  [[nodiscard]] int stages() const { return options_.split && options_.face_updates > 0 ? 3 : 2; }
+
+  [[nodiscard]] Stage stage_of(int number) const {
+    if (number == 0) return {"rim-spoke", ElementKind::kRimSpoke, options_.rim_updates};
+    return {number == 1 ? "face" : "split", ElementKind::kFace, options_.face_updates};
+  }
+
+  /// Takes over what a checkpoint holds. @throw InputError
+  void resume() {
+    state_ = read_checkpoint(options_.checkpoint, state_.fingerprint);
+    if (!state_.split.empty()) {
+      const int edges = make_edges(reference_).count();
+      const auto is_edge = [&](int e) { return e >= 0 && e < edges; };
+      if (!std::all_of(state_.split.begin(), state_.split.end(), is_edge)) {
+        refuse_checkpoint(options_.checkpoint, "splits an edge that the mesh does not have");
+      }
+      split(state_.split);
+    }
+    if (state_.vertices.cols() != mesh_.vertex_count() ||
+        state_.unmet.cols() != mesh_.triangle_count()) {
+      refuse_checkpoint(options_.checkpoint, "has other vertices or faces than the mesh");
+    }
+    mesh_.vertices = state_.vertices;
+    spent_ = state_.seconds;
+  }
+
+  void save() {
+    if (options_.checkpoint.empty() || state_.updates.empty()) return;
+    state_.seconds = seconds();
+    state_.vertices = mesh_.vertices;
+    write_checkpoint(state_, options_.checkpoint);
+    saved_ = std::chrono::steady_clock::now();
+    ++saves_;
+  }
+
+  /// Begins a stage, or goes on with that of the checkpoint.
+  void begin_stage(int number) {
+    const bool goes_on = state_.stage == number && state_.unmet.cols() > 0;
+    if (goes_on) return;
+    if (number == 2) split(hampering_edges());
+    state_.stage = number;
+    state_.first = this->number();
+    state_.unmet = Eigen::Matrix3Xd::Zero(3, reference_.triangle_count());
+  }
+
+  void run_stage(int number) {
+    begin_stage(number);
+    UnmetTurns unmet(state_.unmet);
+    const Stage stage = stage_of(number);
     if (stage.updates == 0) return;
     ShapeUpdateOptions options;
     options.elements = stage.elements;
@@ -128,15 +183,14 @@ class Schedule {
     std::optional<TvDenoiser> denoiser;
     if (options_.denoise > 0.0) denoiser.emplace(reference_, options_.denoise);
     anchor_ = {measure_faces(reference_).normal, options_.anchor};
-    UnmetTurns unmet(reference_.triangle_count());
-    const std::size_t first = updates_.size();
-    for (int i = 0; i < stage.updates && !settled(first); ++i) {
-      const LightPaths paths(mesh_, field_.goal, field_.directions(number()), kGatherDirections,
-                             executor_);
+    while (this->number() - state_.first < stage.updates && !settled()) {
+      const LightPaths paths(mesh_, field_.goal, field_.directions(this->number()),
+                             kGatherDirections, executor_);
+      const ReflectionEnergy energy(paths, loss_for(field_.goal), executor_);
       ReflectUpdate row;
       row.stage = stage.name;
-      row.energy = ReflectionEnergy(paths, Loss::kSquare, executor_).value(paths.faces().normal);
-      Eigen::Matrix3Xd targets = targets_for(paths);
+      row.energy = std::abs(energy.value(paths.faces().normal));
+      Eigen::Matrix3Xd targets = targets_for(paths, energy);
       if (denoiser) targets = denoiser->denoise(targets);
       const Eigen::Matrix3Xd asked = pursues() ? unmet.added_to(targets) : targets;
       const Eigen::Matrix3Xd moved =
@@ -144,6 +198,7 @@ class Schedule {
       require_near(moved);
       mesh_.vertices = moved;
       if (pursues()) unmet.record(targets, measure_faces(mesh_).normal);
+      state_.unmet = unmet.sum();
       record(row);
     }
   }
@@ -167,37 +222,41 @@ class Schedule {
     return {(anchor_.strength * anchor_.reference + kStay * faces.normal) / strength, strength};
   }
 
-  [[nodiscard]] int number() const { return static_cast<int>(updates_.size()); }
+  [[nodiscard]] int number() const { return static_cast<int>(state_.updates.size()); }
 
   void record(ReflectUpdate row) {
     row.number = number() + 1;
     row.mean_displacement = displacements().mean();
     row.max_displacement = displacements().maxCoeff();
     row.seconds = seconds();
-    updates_.push_back(row);
-    const int stages = options_.split ? 2 : 1;
-    control_.report({"reflect, " + row.stage, static_cast<double>(row.number),
-                     static_cast<double>(options_.rim_updates + stages * options_.face_updates),
-                     "energy " + number_text(row.energy, 4)});
+    state_.updates.push_back(row);
+    const std::chrono::duration<double> unsaved = std::chrono::steady_clock::now() - saved_;
+    if (saves_ == 0 || unsaved.count() >= kSaveSeconds) save();
+    control_.report(
+        {"reflect, " + row.stage, static_cast<double>(row.number),
+         static_cast<double>(options_.rim_updates + (stages() - 1) * options_.face_updates),
+         "energy " + number_text(row.energy, 4)});
   }
 
-  /// Whether the stage that began with update `first` no longer gains.
-  [[nodiscard]] bool settled(std::size_t first) const {
+  /// Whether the stage no longer gains.
+  [[nodiscard]] bool settled() const {
     if (options_.method == Method::kPaper) return false;
+    const std::vector<ReflectUpdate>& updates = state_.updates;
     const std::size_t window = pursues() ? kStealthWindow : kStageWindow;
-    if (updates_.size() < first + window + 1) return false;
-    const double now = updates_.back().energy;
-    const double before = updates_[updates_.size() - 1 - window].energy;
+    if (updates.size() < static_cast<std::size_t>(state_.first) + window + 1) return false;
+    const double now = updates.back().energy;
+    const double before = updates[updates.size() - 1 - window].energy;
     return std::abs(now - before) < kStageChange * before;
   }
 
-  [[nodiscard]] Eigen::Matrix3Xd targets_for(const LightPaths& paths) const {
+  [[nodiscard]] Eigen::Matrix3Xd targets_for(const LightPaths& paths,
+                                             const ReflectionEnergy& energy) const {
     return options_.method == Method::kPaper ? estimated_targets(paths.faces())
-                                             : exact_targets(paths);
+                                             : exact_targets(paths, energy);
   }
 
-  [[nodiscard]] Eigen::Matrix3Xd exact_targets(const LightPaths& paths) const {
-    const ReflectionEnergy energy(paths, loss_for(field_.goal), executor_);
+  [[nodiscard]] Eigen::Matrix3Xd exact_targets(const LightPaths& paths,
+                                               const ReflectionEnergy& energy) const {
     const Eigen::VectorXd share = paths.faces().area_share();
     const NormalAnchor anchor = held(paths.faces());
     const NormalObjective objective(energy, anchor, share);
@@ -225,19 +284,23 @@ class Schedule {
     return normal.colwise().normalized();
   }
 
-  /// Cuts the edges that hamper creases, on both meshes.
-  void split() {
+  [[nodiscard]] std::vector<int> hampering_edges() const {
     const LightPaths paths(mesh_, field_.goal, field_.directions(number()), kGatherDirections,
                            executor_);
     const Eigen::VectorXd energy =
         ReflectionEnergy(paths, Loss::kSquare, executor_).by_face(paths.faces().normal);
     const Eigen::VectorXd criterion = split_criterion(mesh_, energy);
     const auto count = static_cast<int>(kSplitShare * static_cast<double>(criterion.size()));
-    const std::vector<int> edges = chosen_edges(mesh_, criterion, count, keep_.partner);
+    return chosen_edges(mesh_, criterion, count, keep_.partner);
+  }
+
+  /// Cuts edges on both meshes.
+  void split(const std::vector<int>& edges) {
     const SplitMesh cut = split_at_middles(reference_, edges);
     extend_constraints(cut, edges);
     mesh_ = split_at_middles(mesh_, edges).mesh;
     reference_ = cut.mesh;
+    state_.split = edges;
   }
 
   /// New vertices between fixed ones are fixed; halves of planar faces stay planar.
@@ -266,7 +329,8 @@ class Schedule {
   }
 
   [[nodiscard]] double seconds() const {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+    return spent_ +
+           std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
   }
 
   const ReflectOptions& options_;
@@ -278,8 +342,11 @@ class Schedule {
   LightField field_;
   ConstraintSet keep_;
   NormalAnchor anchor_;
-  std::vector<ReflectUpdate> updates_;
+  ReflectCheckpoint state_;  ///< But for its vertices, which `mesh_` has.
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+  std::chrono::steady_clock::time_point saved_ = start_;
+  int saves_ = 0;
+  double spent_ = 0.0;  ///< Seconds before the run was resumed.
 };
 
 }  // namespace

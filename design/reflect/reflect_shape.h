@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -28,8 +29,9 @@ struct ReflectUpdate {
 struct ReflectResult {
   enum class Status { kDone, kInterrupted };
   Status status = Status::kDone;
-  SurfaceMesh reference;  ///< The mesh as it came, with the same faces as `mesh`.
-  SurfaceMesh mesh;       ///< The new shape.
+  std::uint64_t fingerprint = 0;  ///< Of mesh and options, see reflect_fingerprint().
+  SurfaceMesh reference;          ///< The mesh as it came, with the same faces as `mesh`.
+  SurfaceMesh mesh;               ///< The new shape.
   Energies before;
   Energies after;
   std::vector<ReflectUpdate> updates;
@@ -45,7 +47,7 @@ struct ReflectResult {
 /// Deforms a mesh so that its reflection meets the goal while its shape is kept (Tojo et al.,
 /// Algorithm 1): target normals are optimised for cached light paths, the vertices follow them as
 /// rigidly as possible, and so on. Same bits for any number of threads.
-/// @throw InputError as validate().
+/// @throw InputError as validate(), and for a checkpoint that cannot be resumed.
 ReflectResult reflect_shape(const ReflectInput& input, const ReflectOptions& options,
                             const Executor& executor, const RunControl& control);
 

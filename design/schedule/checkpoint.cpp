@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "design/schedule/checkpoint.h"
 
-#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstring>
@@ -9,48 +8,20 @@
 #include <span>
 #include <string>
 #include <string_view>
-#include <system_error>
 
-#include "core/error.h"
-#include "core/io/files.h"
+#include "core/io/checkpoint_file.h"
 #include "core/surface/grid_mesh.h"
 #include "core/text/json_fields.h"
-#include "core/text/json_text.h"
 #include "design/design_fields.h"
 
-// File: the magic line, then a JSON header on one line, then as little-endian doubles the vertices
-// and, if the header says so, the reach of their steps, then a FNV-1a hash of all that goes before.
+// The numbers are the vertices and, if the header says so, the reach of their steps, as doubles.
 namespace lensforge {
 
 namespace {
 
 using nlohmann::json;
 
-/// A checkpoint has 48 bytes a vertex: this one would have 178 million of them.
-constexpr std::uintmax_t kMaxBytes = std::uintmax_t{8} << 30U;
-
 constexpr std::string_view kMagic = "lensforge checkpoint 4\n";
-
-static_assert(std::endian::native == std::endian::little, "checkpoints are little-endian");
-
-/// Fowler–Noll–Vo 1a, 64 bit.
-class Hash {
- public:
-  void add(std::string_view bytes) {
-    for (const char c : bytes) {
-      value_ = (value_ ^ static_cast<unsigned char>(c)) * 0x100000001b3ULL;
-    }
-  }
-  [[nodiscard]] std::uint64_t value() const { return value_; }
-
- private:
-  std::uint64_t value_ = 0xcbf29ce484222325ULL;
-};
-
-template <class T>
-std::string_view bytes_of(std::span<const T> values) {
-  return {reinterpret_cast<const char*>(values.data()), values.size_bytes()};
-}
 
 std::span<const double> entries(const Eigen::Matrix3Xd& matrix) {
   return {matrix.data(), static_cast<std::size_t>(matrix.size())};
@@ -76,6 +47,12 @@ void append_light(const LightOptions& light, json& description) {
   if (!shape.is_disc()) description.push_back({shape.columns, shape.rows, shape.weights});
 }
 
+void append_outline(const Outline& outline, json& description) {
+  json points = json::array();
+  for (const Eigen::Vector2d& p : outline.points) points.push_back({p.x(), p.y()});
+  description.push_back({static_cast<int>(outline.kind), outline.radius, points});
+}
+
 json to_json(const ConvergenceRow& row) {
   const EnergyValues& e = row.energy;
   return {row.stage,  row.level,  row.round, row.iteration,  e.image, e.unlit,
@@ -99,44 +76,6 @@ ConvergenceRow row_from_json(const json& j) {
   return row;
 }
 
-[[noreturn]] void refuse(const std::filesystem::path& path, const std::string& why) {
-  throw InputError("checkpoint '" + path.string() + "' " + why);
-}
-
-std::string read_bytes(const std::filesystem::path& path) {
-  std::error_code ignored;
-  if (!std::filesystem::exists(path, ignored)) {
-    refuse(path, "cannot be read: there is nothing to resume from");
-  }
-  return read_whole_file(path, kMaxBytes);
-}
-
-std::string header_name(const std::filesystem::path& path) {
-  return "checkpoint '" + path.string() + "' header";
-}
-
-/// The parts of a checkpoint file, hash and magic verified.
-struct Parts {
-  json header;
-  std::string_view numbers;
-};
-
-Parts split(const std::string& content, const std::filesystem::path& path) {
-  std::string_view rest = content;
-  if (!rest.starts_with(kMagic)) refuse(path, "is not a checkpoint of this version");
-  std::uint64_t stored = 0;
-  if (rest.size() < kMagic.size() + sizeof(stored)) refuse(path, "is truncated");
-  std::memcpy(&stored, rest.data() + rest.size() - sizeof(stored), sizeof(stored));
-  rest.remove_suffix(sizeof(stored));
-  Hash hash;
-  hash.add(rest);
-  if (hash.value() != stored) refuse(path, "is damaged: its check sum does not match");
-  rest.remove_prefix(kMagic.size());
-  const std::size_t end = rest.find('\n');
-  if (end == std::string_view::npos) refuse(path, "has no header");
-  return {parse_json(rest.substr(0, end), header_name(path)), rest.substr(end + 1)};
-}
-
 }  // namespace
 
 std::uint64_t design_fingerprint(const Image& target, const DesignOptions& options) {
@@ -145,6 +84,7 @@ std::uint64_t design_fingerprint(const Image& target, const DesignOptions& optio
   json description = {target.columns(), target.rows()};
   append(design_fields(), options, description);
   append_light(options.light, description);
+  if (options.outline) append_outline(*options.outline, description);
   description.push_back(weights);
   if (options.made_by) {
     const MadeBy& made = *options.made_by;
@@ -152,7 +92,7 @@ std::uint64_t design_fingerprint(const Image& target, const DesignOptions& optio
         {made.pitch, made.rows_along_x, made.polish_sigma, made.rim_depth, made.rim_length});
     if (made.polish_spread > 0.0) description.push_back(made.polish_spread);
   }
-  Hash hash;
+  Fnv1a hash;
   hash.add(description.dump());
   hash.add(bytes_of(target.values()));
   return hash.value();
@@ -173,25 +113,17 @@ void write_checkpoint(const Checkpoint& checkpoint, const std::filesystem::path&
                        {"rows", checkpoint.mesh.grid.rows},
                        {"scales", scales},
                        {"convergence", rows}};
-  std::string content(kMagic);
-  content += header.dump();
-  content += '\n';
-  content += bytes_of(entries(checkpoint.mesh.vertices));
-  content += bytes_of(entries(steps.reach));
-  Hash hash;
-  hash.add(content);
-  const std::uint64_t value = hash.value();
-  content += bytes_of(std::span<const std::uint64_t>(&value, 1));
-  write_whole_file(path, content);
+  std::string numbers(bytes_of(entries(checkpoint.mesh.vertices)));
+  numbers += bytes_of(entries(steps.reach));
+  write_checkpoint_file(path, kMagic, {header, numbers});
 }
 
 Checkpoint read_checkpoint(const std::filesystem::path& path) {
-  const std::string content = read_bytes(path);
-  const Parts parts = split(content, path);
+  const CheckpointContent parts = read_checkpoint_file(path, kMagic);
   try {
     Checkpoint checkpoint;
     checkpoint.fingerprint = parts.header.at("fingerprint");
-    const JsonFields fields(parts.header, header_name(path));
+    const JsonFields fields(parts.header, checkpoint_header_name(path));
     checkpoint.level = fields.integer("level");
     checkpoint.round = fields.integer("round");
     if (checkpoint.level < 0) fields.refuse("level", "it must be 0 or more");
@@ -210,11 +142,12 @@ Checkpoint read_checkpoint(const std::filesystem::path& path) {
     if (shape.columns < 2 || shape.rows < 2 ||
         static_cast<std::size_t>(shape.columns) * static_cast<std::size_t>(shape.rows) != count ||
         parts.numbers.size() != count * 3 * sizeof(double) * (scales.is_null() ? 1 : 2)) {
-      refuse(path, "holds fewer vertices than its header says");
+      refuse_checkpoint(path, "holds fewer vertices than its header says");
     }
     checkpoint.mesh = make_grid_mesh(Eigen::Vector2d::Ones(), shape, 0.0);
     std::memcpy(checkpoint.mesh.vertices.data(), parts.numbers.data(), bytes);
-    if (!checkpoint.mesh.vertices.allFinite()) refuse(path, "holds a vertex that is not finite");
+    if (!checkpoint.mesh.vertices.allFinite())
+      refuse_checkpoint(path, "holds a vertex that is not finite");
     if (!scales.is_null()) {
       checkpoint.scales.xy = scales.at(0);
       checkpoint.scales.z = scales.at(1);
@@ -223,7 +156,7 @@ Checkpoint read_checkpoint(const std::filesystem::path& path) {
     }
     return checkpoint;
   } catch (const json::exception&) {
-    refuse(path, "has a bad header: a field is missing or of another type");
+    refuse_checkpoint(path, "has a bad header: a field is missing or of another type");
   }
 }
 

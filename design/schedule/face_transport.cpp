@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/optics/light_path.h"
+#include "core/surface/mesh_cut.h"
 #include "design/optics/surface_optics.h"
 #include "design/transport/height_fit.h"
 
@@ -17,6 +18,19 @@ namespace {
 /// the last bit. Rounding errors of 1e-14 pixels leave triangles on the hull that are so thin that
 /// the centres of their circles are noise: a mirror at 30 degrees found no transport at 64² pixels.
 constexpr double kSteps = 16777216.0;
+
+/// Of a face's light: less than this share inside of the outline counts as none. Cells that hold
+/// next to no light hold up all others.
+constexpr double kLeastShare = 0.05;
+
+/// Flux of faces of which next to nothing lies inside of the outline.
+void drop_slivers(const SurfaceMesh& mesh, const Outline& outline, const Executor& executor,
+                  Eigen::VectorXd& flux) {
+  const MeshCut cut = cut_mesh(mesh, outline, executor);
+  for (Eigen::Index f = 0; f < flux.size(); ++f) {
+    if (cut.share[static_cast<std::size_t>(f)] < kLeastShare) flux[f] = 0.0;
+  }
+}
 
 }  // namespace
 
@@ -33,6 +47,7 @@ FaceLight face_light(const SurfaceMesh& mesh, const OpticalSetup& setup, Surface
     if (!on_grid) light.landing.col(f) = (light.landing.col(f) * kSteps).array().round() / kSteps;
     light.flux[f] = t.flux;
   }
+  if (setup.outline) drop_slivers(mesh, *setup.outline, executor, light.flux);
   return light;
 }
 

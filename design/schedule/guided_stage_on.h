@@ -34,6 +34,7 @@ class GuidedStageOn final : public GuidedStage {
   void relinearize(const Eigen::Matrix3Xd& vertices) override {
     send(vertices, x_);
     objective_.relinearize(x_.data());
+    preconditioner_.set_movable(objective_.movable());
   }
 
   ObjectiveEvaluation evaluate(const Eigen::Matrix3Xd& vertices,

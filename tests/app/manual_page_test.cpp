@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <gmock/gmock.h>
 
+#include <array>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -10,6 +11,10 @@
 
 namespace lensforge::app {
 namespace {
+
+/// Those with options of their own, as the page has them.
+constexpr std::array kCommands{"design", "render",  "cam",  "coupon", "export",
+                               "send",   "reflect", "view", "batch"};
 
 /// What a command prints on standard output.
 std::string printed(const std::vector<std::string>& arguments) {
@@ -21,7 +26,7 @@ std::string printed(const std::vector<std::string>& arguments) {
 /// The page's part on the options, as the tables of the commands have it.
 std::string options_part() {
   std::string text = ".Sh OPTIONS\n";
-  for (const char* command : {"design", "render", "cam", "coupon", "export", "send", "reflect"}) {
+  for (const char* command : kCommands) {
     text += ".Ss Options of " + std::string(command) + "\n.Bl -tag -width Ds\n" +
             printed({command, "--help-man"}) + ".El\n";
   }
@@ -42,7 +47,7 @@ TEST(ManualPage, HasEveryOptionAsTheTablesHaveIt) {
 }
 
 TEST(ManualPage, HelpAndManualHaveTheSameOptions) {
-  for (const char* command : {"design", "render", "cam", "coupon", "export", "send", "reflect"}) {
+  for (const char* command : kCommands) {
     const std::string help = printed({command, "--help"});
     const std::string manual = "\n" + printed({command, "--help-man"});
     for (std::size_t at = manual.find("\n.It Fl -"); at != std::string::npos;

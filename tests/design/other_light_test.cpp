@@ -179,6 +179,27 @@ TEST_P(OtherLight, ObjectiveGradientEqualsCentralDifferences) {
   EXPECT_LT(testing::plateau_error(errors), 1e-6);
 }
 
+/// Not for every corner of every triangle.
+TEST(CurvedFront, EveryVertexsRayIsSolvedForOnceAnEvaluation) {
+  KernelProfile profile;
+  const SurfaceMesh mesh = testing::rough_mesh();
+  OpticalSetup setup = testing::kSetup;
+  for (const SurfaceModel model : testing::kModels) {
+    for (const bool curved : {true, false}) {
+      setup.front.reset();
+      if (curved) convex_front(setup);
+      DesignObjective objective(mesh, setup, testing::target(),
+                                testing::options_of(model, ObjectiveWeights()),
+                                Executor::serial().with_profile(&profile));
+      profile.clear();
+      EXPECT_TRUE(testing::evaluate_at(objective, mesh.vertices).feasible);
+      const auto entries = profile.entries();
+      const auto found = entries.find("front entries");
+      EXPECT_EQ(found == entries.end() ? 0 : found->second.calls, curved ? 1 : 0);
+    }
+  }
+}
+
 /// Where a ray meets a triangle, on either side of its origin.
 std::optional<double> hit(const Corners& t, const Eigen::Vector3d& origin,
                           const Eigen::Vector3d& a) {
@@ -224,6 +245,62 @@ SourceRay source_ray(const OpticalSetup& setup, const FrontPlace& front) {
   return {way, intensity * std::abs(across.dot(way)) / from.squaredNorm()};
 }
 
+/// Where a ray meets a surface.
+struct Meeting {
+  Eigen::Vector3d place;
+  Eigen::Vector3d normal;
+  Eigen::Index face = 0;
+};
+
+/// A mesh whose facets are flat.
+class FlatFacets {
+ public:
+  explicit FlatFacets(const SurfaceMesh& mesh) : mesh_(mesh) {}
+
+  [[nodiscard]] std::optional<Meeting> meet(const Eigen::Vector3d& from,
+                                            const Eigen::Vector3d& way) const {
+    for (Eigen::Index f = 0; f < mesh_.triangles.cols(); ++f) {
+      const Corners t = mesh_.corners(f);
+      const std::optional<double> length = hit(t, from, way);
+      if (length) return Meeting{from + *length * way, area_normal(t).normalized(), f};
+    }
+    return std::nullopt;
+  }
+  [[nodiscard]] bool is_met_again(const Meeting& met, const Eigen::Vector3d& way) const {
+    for (Eigen::Index f = 0; f < mesh_.triangles.cols(); ++f) {
+      if (f != met.face && hit(mesh_.corners(f), met.place, way).value_or(0.0) > 1e-9) return true;
+    }
+    return false;
+  }
+
+ private:
+  const SurfaceMesh& mesh_;
+};
+
+/// The smooth surface z = 5 + 0.15 sin(0.4 x) cos(0.3 y) itself over 24 mm × 20 mm.
+struct Waves {
+  static double height(double x, double y) {
+    return 5.0 + 0.15 * std::sin(0.4 * x) * std::cos(0.3 * y);
+  }
+  [[nodiscard]] static std::optional<Meeting> meet(const Eigen::Vector3d& from,
+                                                   const Eigen::Vector3d& way) {
+    Eigen::Vector3d p = from;
+    for (int k = 0; k < 40; ++k) p += (height(p.x(), p.y()) - p.z()) / way.z() * way;
+    if (p.x() < 0.0 || p.y() < 0.0 || p.x() > 24.0 || p.y() > 20.0) return std::nullopt;
+    const double by_x = 0.06 * std::cos(0.4 * p.x()) * std::cos(0.3 * p.y());
+    const double by_y = -0.045 * std::sin(0.4 * p.x()) * std::sin(0.3 * p.y());
+    return Meeting{p, Eigen::Vector3d(-by_x, -by_y, 1.0).normalized()};
+  }
+  [[nodiscard]] static bool is_met_again(const Meeting& met, const Eigen::Vector3d& way) {
+    for (int k = 1; k <= 100; ++k) {
+      const Eigen::Vector3d p = met.place + 0.01 * k / way.z() * way;
+      const bool above_lens = p.x() > 0.0 && p.y() > 0.0 && p.x() < 24.0 && p.y() < 20.0;
+      if (above_lens && p.z() < height(p.x(), p.y())) return true;
+    }
+    return false;
+  }
+};
+
 struct TracedPicture {
   std::vector<double> flux;
   double whole = 0.0;
@@ -232,8 +309,9 @@ struct TracedPicture {
 };
 
 /// Flux per pixel by single rays, apart from LightPath: they enter the front and are refracted by
-/// angles, or go straight on, meet a facet, and are refracted or reflected there.
-TracedPicture traced(const SurfaceMesh& mesh, const OpticalSetup& setup, int rays) {
+/// angles, or go straight on, meet the surface, and are refracted or reflected there.
+template <class Surface>
+TracedPicture traced(const Surface& surface, const OpticalSetup& setup, int rays) {
   const bool lens = setup.mode == LightMode::kRefract;
   const Eigen::Vector3d normal = setup.screen_x.cross(setup.screen_y);
   const ImagePlane plane(setup);
@@ -249,29 +327,22 @@ TracedPicture traced(const SurfaceMesh& mesh, const OpticalSetup& setup, int ray
     const SourceRay source = source_ray(setup, front);
     const Eigen::Vector3d a =
         lens ? testing::refract_by_angles(source.way, front.normal, 1.0 / setup.ior) : source.way;
-    for (Eigen::Index f = 0; f < mesh.triangles.cols(); ++f) {
-      const Corners t = mesh.corners(f);
-      const std::optional<double> way = hit(t, place, a);
-      if (!way) continue;
-      picture.whole += source.light;
-      picture.squares += source.light * source.light;
-      const Eigen::Vector3d n = area_normal(t).normalized();
-      const Eigen::Vector3d b = lens ? testing::refract_by_angles(a, n, setup.ior)
-                                     : Eigen::Vector3d(a - 2.0 * n.dot(a) * n);
-      const Eigen::Vector3d p = place + *way * a;
-      for (Eigen::Index g = 0; g < mesh.triangles.cols(); ++g) {
-        if (g != f && hit(mesh.corners(g), p, b).value_or(0.0) > 1e-9) ++picture.shadowed;
-      }
-      const Eigen::Vector3d to_centre = setup.screen_centre() - p;
-      const Eigen::Vector3d l = normal.dot(to_centre) / normal.dot(b) * b - to_centre;
-      const Eigen::Vector2d u =
-          plane.to_pixels(setup.screen_centre().head<2>() +
-                          Eigen::Vector2d(setup.screen_x.dot(l), setup.screen_y.dot(l)));
-      if (u.minCoeff() < 0.0 || u.x() >= plane.columns() || u.y() >= plane.rows()) break;
-      picture.flux[static_cast<std::size_t>(static_cast<int>(u.y()) * plane.columns() +
-                                            static_cast<int>(u.x()))] += source.light;
-      break;
-    }
+    const std::optional<Meeting> met = surface.meet(place, a);
+    if (!met) continue;
+    picture.whole += source.light;
+    picture.squares += source.light * source.light;
+    const Eigen::Vector3d& n = met->normal;
+    const Eigen::Vector3d b = lens ? testing::refract_by_angles(a, n, setup.ior)
+                                   : Eigen::Vector3d(a - 2.0 * n.dot(a) * n);
+    if (surface.is_met_again(*met, b)) ++picture.shadowed;
+    const Eigen::Vector3d to_centre = setup.screen_centre() - met->place;
+    const Eigen::Vector3d l = normal.dot(to_centre) / normal.dot(b) * b - to_centre;
+    const Eigen::Vector2d u =
+        plane.to_pixels(setup.screen_centre().head<2>() +
+                        Eigen::Vector2d(setup.screen_x.dot(l), setup.screen_y.dot(l)));
+    if (u.minCoeff() < 0.0 || u.x() >= plane.columns() || u.y() >= plane.rows()) continue;
+    picture.flux[static_cast<std::size_t>(static_cast<int>(u.y()) * plane.columns() +
+                                          static_cast<int>(u.x()))] += source.light;
   }
   return picture;
 }
@@ -281,15 +352,9 @@ class OtherRays : public ::testing::TestWithParam<KindOfLight> {};
 INSTANTIATE_TEST_SUITE_P(Kinds, OtherRays, ::testing::ValuesIn(kKinds),
                          [](const auto& one) -> std::string { return one.param.name; });
 
-TEST_P(OtherRays, FacetPictureIsThatOfSingleRays) {
-  const OpticalSetup setup = lit_by(GetParam(), testing::setup_of({24.0, 20.0}, {12, 10}, 60.0));
-  const SurfaceMesh mesh = testing::height_field({24.0, 20.0}, {13, 13}, [](double x, double y) {
-    return 5.0 + 0.15 * std::sin(0.4 * x) * std::cos(0.3 * y);
-  });
-  const TracedPicture rays = traced(mesh, setup, 60000);
+/// The picture is that of the rays within their error bars.
+void expect_picture_of(const TracedPicture& rays, const RenderResult& rendered) {
   EXPECT_EQ(rays.shadowed, 0);
-  const RenderResult rendered =
-      render_surface(mesh, setup, SurfaceModel::kFacet, Executor::serial());
   double chi_square = 0.0;
   for (std::size_t i = 0; i < rays.flux.size(); ++i) {
     const double expected =
@@ -301,6 +366,21 @@ TEST_P(OtherRays, FacetPictureIsThatOfSingleRays) {
   // 120 pixels: mean 120, five standard deviations of 15.5 above it.
   EXPECT_LT(chi_square, 200.0);
   EXPECT_GT(chi_square, 60.0);
+}
+
+TEST_P(OtherRays, FacetPictureIsThatOfSingleRays) {
+  const OpticalSetup setup = lit_by(GetParam(), testing::setup_of({24.0, 20.0}, {12, 10}, 60.0));
+  const SurfaceMesh mesh = testing::height_field({24.0, 20.0}, {13, 13}, Waves::height);
+  expect_picture_of(traced(FlatFacets(mesh), setup, 60000),
+                    render_surface(mesh, setup, SurfaceModel::kFacet, Executor::serial()));
+}
+
+/// Rays meet the smooth surface that the mesh samples.
+TEST_P(OtherRays, SmoothPictureIsThatOfSingleRays) {
+  const OpticalSetup setup = lit_by(GetParam(), testing::setup_of({24.0, 20.0}, {12, 10}, 60.0));
+  const SurfaceMesh mesh = testing::height_field({24.0, 20.0}, {97, 93}, Waves::height);
+  expect_picture_of(traced(Waves(), setup, 60000),
+                    render_surface(mesh, setup, SurfaceModel::kSmooth, Executor::serial()));
 }
 
 }  // namespace

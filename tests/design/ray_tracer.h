@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "core/optics/optical_setup.h"
@@ -38,8 +39,11 @@ class RayTracer {
     }
   }
 
-  /// Hits of every pixel, row by row from the top, for so many rays.
-  [[nodiscard]] std::vector<std::int64_t> trace(std::int64_t rays, std::uint64_t seed) const {
+  /// Hits of every pixel, row by row from the top, for so many rays over the lens's rectangle, of
+  /// which those go on that `passes` lets through.
+  [[nodiscard]] std::vector<std::int64_t> trace(
+      std::int64_t rays, std::uint64_t seed,
+      const std::function<bool(const Eigen::Vector2d&)>& passes = {}) const {
     Random random(seed);
     const int columns = setup_.pixels.x();
     const int rows = setup_.pixels.y();
@@ -47,6 +51,7 @@ class RayTracer {
     for (std::int64_t i = 0; i < rays; ++i) {
       const Eigen::Vector2d p(random.between(0.0, setup_.lens_size.x()),
                               random.between(0.0, setup_.lens_size.y()));
+      if (passes && !passes(p)) continue;
       // Front view: the picture's right and lower sides are at small x and y.
       const Eigen::Vector2d from_far =
           (setup_.image_origin + setup_.image_size - send(p)).cwiseQuotient(setup_.image_size);

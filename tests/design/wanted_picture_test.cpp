@@ -53,5 +53,41 @@ TEST_F(WantedPictureOfAPlate, LacksMinusThreeWhereLightIsGatheredFourfold) {
   }
 }
 
+/// Where light lands from a surface of slope s₀ + B (x − x₀), by central differences.
+TEST(WantedPicture, StretchIsHowLandingPlacesChange) {
+  OpticalSetup setup;
+  setup.pixels = {40, 40};
+  const SurfaceMesh plate = make_grid_mesh(setup.lens_size, {11, 13}, 8.0);
+  const Image target(40, 40, 1.0F);
+  const Executor executor = Executor::serial();
+  const Eigen::Vector3d p(62.0, 41.0, 8.5);
+  const Eigen::Vector2d slope(0.08, -0.05);
+  Eigen::Matrix2d bend;
+  bend << 3e-3, -4e-4, 7e-4, -2e-3;
+  const auto check = [&] {
+    const LightPath light(setup);
+    const auto land = [&](const Eigen::Vector2d& d) -> Eigen::Vector2d {
+      const Eigen::Vector2d s = slope + bend * d;
+      const double z = p.z() + d.dot(slope + 0.5 * bend * d);
+      const Eigen::Vector3d at(p.x() + d.x(), p.y() + d.y(), z);
+      const Eigen::Vector3d n = Eigen::Vector3d(-s.x(), -s.y(), 1.0).normalized();
+      return light.land(at, light.beam(at, n).m).cwiseQuotient(light.plane().pixels_per_mm());
+    };
+    const Eigen::Matrix2d found =
+        WantedPicture(plate, setup, target, executor).stretch(p, slope, bend);
+    for (int k = 0; k < 2; ++k) {
+      const Eigen::Vector2d d = 1e-3 * Eigen::Vector2d::Unit(k);
+      EXPECT_LT(((land(d) - land(-d)) / 2e-3 - found.col(k)).norm(), 1e-6 * found.norm());
+    }
+  };
+  check();
+  setup.front = SphericalFront{150.0, {50.0, 50.0, -9.0}};
+  check();
+  setup.point = PointSource{{40.0, 60.0, -300.0}, Emission::kIsotropic};
+  check();
+  setup.front.reset();
+  check();
+}
+
 }  // namespace
 }  // namespace lensforge::testing

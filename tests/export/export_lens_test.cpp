@@ -3,7 +3,10 @@
 
 #include <gmock/gmock.h>
 
+#include <utility>
+
 #include "core/error.h"
+#include "core/optics/front_placement.h"
 #include "core/surface/mesh_io.h"
 #include "core/temp_folder.h"
 #include "design/render_lens.h"
@@ -92,6 +95,31 @@ TEST_F(ExportLens, MeshesAndHeightMapsComeByTheNameOfTheFile) {
   EXPECT_EQ(heights.heights->pixels.columns, 40);
   EXPECT_NEAR(heights.heights->pixel, 0.75, 1e-12);
   EXPECT_TRUE(heights.heights->scale.has_value());
+}
+
+/// Light through a curved front, and the splines that are fitted to its picture.
+TEST_F(ExportLens, ALensWithASphericalFrontKeepsItsPictureAndItsVolume) {
+  source_.lens.setup.front = spherical_front(200.0, source_.lens.setup.lens_size);
+  ExportOptions loose;
+  loose.tolerance = loose.normal_tolerance = 0.01;
+  for (const auto& [name, options] :
+       {std::pair("lens.step", ExportOptions()), {"lens.igs", loose}}) {
+    const ExportResult result = write(name, options);
+    ASSERT_TRUE(result.splines.has_value());
+    EXPECT_TRUE(result.splines->content.is_one_solid());
+    EXPECT_NEAR(result.splines->content.volume, result.splines->mesh_volume,
+                2e-4 * result.splines->mesh_volume);
+    EXPECT_LT(result.splines->content.low[2], -0.5);
+    EXPECT_NEAR(result.splines->picture.mae, result.metrics.at(SurfaceModel::kSmooth).mae, 1e-3);
+  }
+}
+
+TEST_F(ExportLens, ASurfaceThatReachesDownToItsFrontIsRefused) {
+  source_.lens.setup.front = spherical_front(200.0, source_.lens.setup.lens_size);
+  source_.lens.setup.front->apex.z() = 5.0;
+  EXPECT_THAT(message_of<InputError>([&] { (void)write("lens.step"); }),
+              HasSubstr("reaches down to its front"));
+  EXPECT_EQ(folder_.file_count(), 1U);
 }
 
 TEST_F(ExportLens, WhatIsWrongIsToldBeforeAnythingIsWritten) {

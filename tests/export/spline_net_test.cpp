@@ -206,10 +206,11 @@ void expect_kept_picture(const Lens& lens, double share, double most) {
   EXPECT_GT(by_slopes, 5e-4);
   const WantedPicture picture(lens.surface, lens.setup, lens.target, executor);
   FitOptions options;
-  options.picture = {picture.reach(), [&](const SampledSurface& solid) {
-                       auto found = picture.compare(solid.mesh, solid.normals);
-                       return PictureMiss{found.excess, std::move(found.missing)};
-                     }};
+  options.picture.reach = picture.reach();
+  options.picture.miss = [&](const SampledSurface& solid) {
+    auto found = picture.compare(solid.mesh, solid.normals);
+    return PictureMiss{found.excess, std::move(found.missing)};
+  };
   const SplineNet net = fit_spline_net(surface, options, executor, RunControl());
   EXPECT_LT(picture_error(net, lens) - wanted, std::min(share * by_slopes, most));
   const SplineNet serial = fit_spline_net(surface, options, Executor::serial(), RunControl());

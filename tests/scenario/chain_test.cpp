@@ -129,8 +129,9 @@ TEST_F(Chain, CamWritesAProgramAndAReport) {
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_EQ(outcome.json()["status"], "done");
   EXPECT_EQ(listing(at("lens/cam")),
-            (std::vector<std::string>{"finish.ngc", "leakage.png", "milled.ply", "milled.png",
-                                      "report.html", "report.json", "rough.ngc"}));
+            (std::vector<std::string>{"causes.exr", "finish.ngc", "leakage.png", "milled.ply",
+                                      "milled.png", "part.exr", "report.html", "report.json",
+                                      "rough.ngc"}));
   const nlohmann::json report = nlohmann::json::parse(content(at("lens/cam/report.json")));
   EXPECT_TRUE(report.contains("z_offset"));
   const nlohmann::json info = run({"info", path("lens/cam/finish.ngc"), "--json"}).json();
@@ -173,7 +174,8 @@ TEST_F(Chain, CamGivesTheSameBytesOnOneAndTwoThreads) {
   place_small_lens(at("lens"));
   std::map<std::string, std::string> files;
   ASSERT_EQ(run(cam({"--threads", "1"})).exit_code, 0);
-  for (const char* file : {"finish.ngc", "rough.ngc", "milled.ply", "milled.png", "leakage.png"}) {
+  for (const char* file : {"finish.ngc", "rough.ngc", "milled.ply", "milled.png", "leakage.png",
+                           "part.exr", "causes.exr"}) {
     files[file] = content(at("lens/cam") / file);
   }
   ASSERT_EQ(run(cam({"--threads", "2"})).exit_code, 0);

@@ -116,6 +116,90 @@ TEST_F(Reflect, AnInterruptedRunKeepsItsShapeAndSaysSo) {
   EXPECT_EQ(read_mesh(at("out/surface.ply")).triangle_count(), 8);
 }
 
+/// A run of a few seconds with all stages.
+class ReflectResume : public Reflect {
+ protected:
+  [[nodiscard]] Arguments run_into(const std::string& out, const Arguments& more = {}) const {
+    Arguments arguments = {"reflect",
+                           path("shape.off"),
+                           "--out",
+                           path(out),
+                           "--faces",
+                           "200",
+                           "--rim-updates",
+                           "8",
+                           "--face-updates",
+                           "8",
+                           "--direction-rows",
+                           "4",
+                           "--anchor",
+                           "0.03"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return arguments;
+  }
+
+  void wait_for_checkpoint(Process& process, const std::string& out) const {
+    while (!fs::exists(at(out) / "reflect.checkpoint")) {
+      ASSERT_TRUE(process.runs_for(std::chrono::milliseconds(2))) << process.wait().err;
+    }
+  }
+
+  void expect_same_shape(const std::string& a, const std::string& b) const {
+    for (const char* file : {"surface.ply", "surface.stl", "reference.ply", "views.png"}) {
+      EXPECT_TRUE(content(at(a) / file) == content(at(b) / file)) << file;
+    }
+    EXPECT_EQ(listing(at(a)), listing(at(b)));
+  }
+};
+
+TEST_F(ReflectResume, KilledAtAnyMomentAndResumedGivesTheSameShape) {
+  const Outcome whole = run(run_into("whole"));
+  ASSERT_EQ(whole.exit_code, 0) << whole.err;
+  for (const double share : {0.1, 0.5, 0.9}) {
+    const std::string out = "killed" + std::to_string(share);
+    Process process(run_into(out));
+    const auto time = std::chrono::milliseconds(static_cast<int>(1000.0 * share * whole.seconds));
+    if (process.runs_for(time)) process.send(SIGKILL);
+    process.wait();
+    const Outcome resumed = run(run_into(out, {"--resume", "--threads", "1"}));
+    ASSERT_EQ(resumed.exit_code, 0) << resumed.err;
+    expect_same_shape("whole", out);
+  }
+}
+
+TEST_F(ReflectResume, CtrlCKeepsACheckpointThatOnlyTheSameRunTakes) {
+  ASSERT_EQ(run(run_into("whole")).exit_code, 0);
+  Process process(run_into("out"));
+  wait_for_checkpoint(process, "out");
+  process.send(SIGINT);
+  const Outcome stopped = process.wait();
+  ASSERT_EQ(stopped.exit_code, 130) << stopped.err;
+  EXPECT_THAT(stopped.err, HasSubstr("--resume"));
+  expect_refusal(run(run_into("out")), 2, {"unfinished run", "--resume", "--force"});
+  expect_refusal(run(run_into("out", {"--resume", "--seed", "2", "--quiet"})), 2,
+                 {"reflect.checkpoint", "other options"});
+  ASSERT_EQ(run(run_into("out", {"--resume"})).exit_code, 0);
+  expect_same_shape("whole", "out");
+}
+
+TEST_F(ReflectResume, AFinishedRunHasNothingToResume) {
+  ASSERT_EQ(run(quick()).exit_code, 0);
+  const auto written = fs::last_write_time(at("out/reflect.json"));
+  const Outcome again = run(quick({"--resume"}));
+  EXPECT_EQ(again.exit_code, 0) << again.err;
+  EXPECT_THAT(again.out, HasSubstr("finished"));
+  EXPECT_EQ(fs::last_write_time(at("out/reflect.json")), written);
+}
+
+TEST_F(ReflectResume, ADamagedCheckpointIsRefusedAndKept) {
+  fs::create_directory(at("out"));
+  write(at("out/reflect.checkpoint"), "no checkpoint");
+  expect_refusal(run(quick({"--resume", "--quiet"})), 2, {"reflect.checkpoint"});
+  EXPECT_EQ(content(at("out/reflect.checkpoint")), "no checkpoint");
+  EXPECT_EQ(run(quick({"--force"})).exit_code, 0);
+  EXPECT_FALSE(fs::exists(at("out/reflect.checkpoint")));
+}
+
 /// CGAL's remeshing, a minute of it, does not look for interrupts.
 TEST_F(Reflect, InterruptedWhileItRemeshesWritesNothing) {
   for (const Arguments& what : {Arguments{"--out", path("out")}, Arguments{"--evaluate"}}) {

@@ -25,6 +25,7 @@ TEST_F(Usage, HelpOfEveryCommandIsPrintedOnStdout) {
                                                            {"cam", "--help"},
                                                            {"coupon", "--help"},
                                                            {"send", "-h"},
+                                                           {"view", "--help"},
                                                            {"info", "-h"}}) {
     const Outcome outcome = run(arguments);
     EXPECT_EQ(outcome.exit_code, 0);
@@ -57,6 +58,7 @@ TEST_F(Usage, MissingArgumentsAreRefused) {
   expect_refusal(run({"design", picture("rings.png")}), 2, {"--out"});
   expect_refusal(run({"render"}), 2, {"SOURCE"});
   expect_refusal(run({"cam"}), 2, {"DIR"});
+  expect_refusal(run({"view"}), 2, {"DIR"});
   expect_refusal(run({"info"}), 2, {"SOURCE"});
 }
 

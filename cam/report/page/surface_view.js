@@ -175,6 +175,8 @@
     }
   }
 
+  const paper = (getComputedStyle(holder).backgroundColor.match(/[\d.]+/g) || [])
+    .slice(0, 3).map((byte) => Number(byte) / 255);
   let asked = false;
   function draw() {
     asked = false;
@@ -182,7 +184,7 @@
     canvas.width = Math.round(canvas.clientWidth * scale);
     canvas.height = Math.round(canvas.clientHeight * scale);
     gl.viewport(0, 0, canvas.width, canvas.height);
-    gl.clearColor(0.933, 0.945, 0.957, 1);
+    gl.clearColor(...paper, 1);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     gl.enable(gl.DEPTH_TEST);
     gl.enable(gl.BLEND);

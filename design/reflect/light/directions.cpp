@@ -66,11 +66,11 @@ DirectionSet listed_directions(const Eigen::Matrix3Xd& towards_light) {
           Eigen::VectorXd::Constant(count, 1.0 / static_cast<double>(count))};
 }
 
-Eigen::Matrix3Xd hemisphere_directions(int count, double turn) {
+Eigen::Matrix3Xd hemisphere_directions(int count) {
   const double golden = pi * (3.0 - std::sqrt(5.0));
   Eigen::Matrix3Xd directions(3, count);
   for (int i = 0; i < count; ++i) {
-    directions.col(i) = on_sphere(1.0 - (i + 0.5) / count, golden * i + turn);
+    directions.col(i) = on_sphere(1.0 - (i + 0.5) / count, golden * i);
   }
   return directions;
 }

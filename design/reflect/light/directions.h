@@ -34,8 +34,8 @@ DirectionSet sun_directions(int count);
 /// Directions as given, with equal weights. @pre none has length 0
 DirectionSet listed_directions(const Eigen::Matrix3Xd& towards_light);
 
-/// Unit directions spread evenly over the half sphere z > 0: a Fibonacci lattice (González 2010),
-/// turned about z by `turn`, rad. 3 × count.
-Eigen::Matrix3Xd hemisphere_directions(int count, double turn);
+/// Unit directions spread evenly over the half sphere z > 0: a Fibonacci lattice (González 2010).
+/// 3 × count.
+Eigen::Matrix3Xd hemisphere_directions(int count);
 
 }  // namespace lensforge::reflect

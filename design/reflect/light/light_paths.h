@@ -12,6 +12,7 @@
 #include "core/surface/surface_mesh.h"
 #include "design/reflect/light/directions.h"
 #include "design/reflect/light/goal.h"
+#include "design/reflect/light/light_lanes.h"
 #include "design/reflect/mesh/faces.h"
 
 namespace lensforge::reflect {
@@ -34,6 +35,9 @@ inline constexpr int kGatherDirections = 128;
 /// the face evenly (the R2 sequence, Roberts 2018).
 class LightPaths {
  public:
+  static constexpr std::uint8_t kLit = 1;
+  static constexpr std::uint8_t kSeen = 2;
+
   /// @param gather  directions per half sphere for light by way of another face; 0: direct only.
   /// @throw Interrupted
   LightPaths(const SurfaceMesh& mesh, const Goal& goal, DirectionSet directions, int gather,
@@ -42,9 +46,16 @@ class LightPaths {
   [[nodiscard]] const Faces& faces() const { return faces_; }
   [[nodiscard]] const DirectionSet& directions() const { return directions_; }
   [[nodiscard]] Eigen::Vector3d light(Eigen::Index d) const { return directions_.light.col(d); }
+  [[nodiscard]] bool has_place() const { return to_place_.cols() > 0; }
   /// Where the sensor stands as seen from the face.
   [[nodiscard]] Eigen::Vector3d sensor(Eigen::Index face, Eigen::Index d) const {
-    return to_place_.cols() > 0 ? Eigen::Vector3d(to_place_.col(face)) : light(d);
+    return has_place() ? Eigen::Vector3d(to_place_.col(face)) : light(d);
+  }
+  /// Directions towards the light, padded().
+  [[nodiscard]] const LaneVectors<double>& light_lanes() const { return light_lanes_; }
+  /// Of a face one byte for every direction, padded(): kLit and kSeen.
+  [[nodiscard]] const std::uint8_t* flags(Eigen::Index face) const {
+    return flags_.data() + slot(face, 0);
   }
   [[nodiscard]] bool lit(Eigen::Index face, Eigen::Index d) const {
     return (flags_[slot(face, d)] & kLit) != 0;
@@ -63,16 +74,14 @@ class LightPaths {
   }
 
  private:
-  static constexpr std::uint8_t kLit = 1;
-  static constexpr std::uint8_t kSeen = 2;
-
   [[nodiscard]] std::size_t slot(Eigen::Index face, Eigen::Index d) const {
-    return static_cast<std::size_t>(face * directions_.count() + d);
+    return static_cast<std::size_t>(face * light_lanes_.rows() + d);
   }
   class Caster;
 
   Faces faces_;
   DirectionSet directions_;
+  LaneVectors<double> light_lanes_;
   Eigen::Matrix3Xd to_place_;  ///< Of a goal that has a place, else empty.
   std::vector<std::uint8_t> flags_;
   int gather_;

@@ -2,6 +2,8 @@
 #include "design/reflect/light/reflection_energy.h"
 
 #include <algorithm>
+#include <span>
+#include <utility>
 #include <vector>
 
 #include "design/reflect/light/phong.h"
@@ -23,86 +25,212 @@ constexpr std::int64_t kBlocks = 16;
 
 constexpr std::int64_t kFaceGrain = 32;
 
+/// Towards the sensor of one face for every direction.
+template <class T>
+class SensorLanes {
+ public:
+  /// @param light  towards the light, where the sensor stands beside it.
+  SensorLanes(const LightPaths& paths, const LaneVectors<T>& light) : paths_(paths), light_(light) {
+    if (paths.has_place()) to_place_.resize(light.rows(), 3);
+  }
+
+  const LaneVectors<T>& of(Eigen::Index face) {
+    if (!paths_.has_place()) return light_;
+    to_place_.rowwise() = paths_.sensor(face, 0).transpose().template cast<T>();
+    return to_place_;
+  }
+
+ private:
+  const LightPaths& paths_;
+  const LaneVectors<T>& light_;
+  LaneVectors<T> to_place_;
+};
+
+/// Calls `of_face(worker_state, face)` for all faces, with a new state for every few of them.
+template <class MakeState, class OfFace>
+void for_faces(const Executor& executor, const char* kernel, Eigen::Index faces,
+               const MakeState& make_state, const OfFace& of_face) {
+  const std::int64_t groups = (faces + kFaceGrain - 1) / kFaceGrain;
+  const auto run = [&](std::int64_t group) {
+    auto state = make_state();
+    const std::int64_t end = std::min<std::int64_t>(faces, (group + 1) * kFaceGrain);
+    for (std::int64_t face = group * kFaceGrain; face < end; ++face) of_face(state, face);
+  };
+  parallel_for(executor, kernel, groups, run, 1);
+}
+
 }  // namespace
+
+/// Tells hits that follow the normals from those that keep their light.
+class ReflectionEnergy::HitSelection {
+ public:
+  HitSelection(const LightPaths& paths, const LaneVectors<float>& light, double floor)
+      : paths_(paths),
+        light_(light),
+        floor_(static_cast<float>(floor / paths.hit_angle())),
+        sensor_(paths, light),
+        value_(light.rows()),
+        at_most_(light.rows()) {}
+
+  /// @param resting  receives the light of the others.
+  void select(Eigen::Index face, std::vector<MovingHit>& moving, float* resting) {
+    const std::span<const PathHit> hits = paths_.hits(face);
+    if (hits.empty()) return;
+    const Eigen::Matrix3Xd& normals = paths_.faces().normal;
+    const LaneVectors<float>& sensor = sensor_.of(face);
+    for (std::size_t i = 0; i < hits.size(); ++i) {
+      const HitGeometry geometry{normals.col(face).cast<float>(),
+                                 normals.col(hits[i].face).cast<float>(), hits[i].w};
+      reflect_twice(geometry, light_, sensor, paths_.flags(hits[i].face), value_, at_most_);
+      add(face, static_cast<std::uint16_t>(i), moving, resting);
+    }
+    const auto angle = static_cast<float>(paths_.hit_angle());
+    for (Eigen::Index d = 0; d < light_.rows(); ++d) resting[d] *= angle;
+  }
+
+ private:
+  void add(Eigen::Index face, std::uint16_t hit, std::vector<MovingHit>& moving, float* resting) {
+    const bool any = at_most_.maxCoeff() >= floor_;
+    for (Eigen::Index d = 0; any && d < paths_.directions().count(); ++d) {
+      if (at_most_[d] < floor_ || !paths_.lit(paths_.hits(face)[hit].face, d)) continue;
+      if (paths_.seen(face, d)) moving.push_back({static_cast<std::uint32_t>(d), hit});
+      value_[d] = 0.0F;
+    }
+    Eigen::Map<Eigen::VectorXf>(resting, value_.size()) += value_;
+  }
+
+  const LightPaths& paths_;
+  const LaneVectors<float>& light_;
+  float floor_;
+  SensorLanes<float> sensor_;
+  Eigen::VectorXf value_;
+  Eigen::VectorXf at_most_;
+};
 
 ReflectionEnergy::ReflectionEnergy(const LightPaths& paths, Loss loss, const Executor& executor,
                                    double floor)
-    : paths_(paths), loss_(loss), executor_(executor), share_(paths.faces().area_share()) {
-  select_hits(floor);
+    : paths_(paths),
+      loss_(loss),
+      executor_(executor),
+      share_(paths.faces().area_share()),
+      weight_lanes_(Eigen::VectorXd::Zero(paths.light_lanes().rows())),
+      one_lanes_(Eigen::VectorXd::Ones(paths.light_lanes().rows())),
+      moving_(static_cast<std::size_t>(paths.faces().count())),
+      resting_(static_cast<std::size_t>(paths.faces().count() * paths.light_lanes().rows())) {
+  weight_lanes_.head(paths.directions().count()) = paths.directions().weight;
+  const LaneVectors<float> light = paths.light_lanes().cast<float>();
+  for_faces(
+      executor_, "moving hits", paths.faces().count(),
+      [&] { return HitSelection(paths_, light, floor); },
+      [&](HitSelection& selection, std::int64_t face) {
+        selection.select(face, moving_[static_cast<std::size_t>(face)],
+                         resting_.data() + face * light.rows());
+      });
 }
 
-/// Adds the moving hits of one face and direction. @return the light of the others.
-double ReflectionEnergy::select_hits(Eigen::Index face, Eigen::Index d, double floor,
-                                     std::vector<std::uint16_t>& moving) const {
-  const Eigen::Matrix3Xd& normals = paths_.faces().normal;
-  const std::span<const PathHit> hits = paths_.hits(face);
-  const double angle = paths_.hit_angle();
-  const Vector3d n = normals.col(face);
-  const Vector3d w_o = paths_.sensor(face, d);
-  const Vector3d w_l = paths_.light(d);
-  double rest = 0.0;
-  for (std::size_t i = 0; i < hits.size(); ++i) {
-    if (!paths_.lit(hits[i].face, d)) continue;
-    const Vector3d w_i = hits[i].w.cast<double>();
-    const Vector3d n_q = normals.col(hits[i].face);
-    if (angle * reflected_at_most(n, w_o, w_i) * reflected_at_most(n_q, -w_i, w_l) >= floor) {
-      moving.push_back(static_cast<std::uint16_t>(i));
-    } else {
-      rest += reflected(n, w_o, w_i) * reflected(n_q, -w_i, w_l);
+/// Light of one face after the other, for all directions.
+class ReflectionEnergy::FaceLight {
+ public:
+  FaceLight(const ReflectionEnergy& energy, const Eigen::Matrix3Xd& normals)
+      : energy_(energy),
+        paths_(energy.paths_),
+        normals_(normals),
+        light_(paths_.light_lanes()),
+        sensor_(paths_, light_),
+        lit_(light_.rows()),
+        weight_(light_.rows()),
+        direct_(light_.rows()),
+        indirect_(light_.rows()),
+        loss_(light_.rows()) {}
+
+  /// @param hits  whether light by way of other faces is wanted, too.
+  void look_at(Eigen::Index face, bool hits) {
+    face_ = face;
+    toward_ = &sensor_.of(face);
+    const std::uint8_t* const flags = paths_.flags(face);
+    select_lanes(flags, LightPaths::kSeen, energy_.weight_lanes_, weight_);
+    select_lanes(flags, LightPaths::kLit, energy_.one_lanes_, lit_);
+    reflect_directly(normals_.col(face), light_, *toward_, lit_, direct_);
+    indirect_.setZero();
+    if (hits) add_hits();
+  }
+
+  [[nodiscard]] LossSums sums() {
+    LossSums sums = sum_losses(energy_.loss_, direct_, indirect_, weight_, light_, *toward_, loss_);
+    const double scale = energy_.scale(face_);
+    sums.value *= scale;
+    sums.gradient *= scale;
+    sums.curvature *= scale;
+    return sums;
+  }
+  [[nodiscard]] FaceRadiance radiance() const {
+    const Eigen::Index count = paths_.directions().count();
+    return {direct_.value.head(count), indirect_.head(count)};
+  }
+
+  /// Adds the derivative by way of hits, at both faces (radiative back-propagation, Nimier-David et
+  /// al. 2020). @pre sums()
+  void scatter(Eigen::Matrix3Xd& gradient) const {
+    const Vector3d n = normals_.col(face_);
+    const double angle = energy_.scale(face_) * paths_.hit_angle();
+    for (const MovingHit& moving : this->moving()) {
+      const PathHit& hit = this->hit(moving);
+      const Vector3d w_i = hit.w.cast<double>();
+      const Vector3d w_l = paths_.light(moving.direction);
+      const Vector3d w_o = paths_.sensor(face_, moving.direction);
+      const PhongTerms<double> k = phong_terms(n, w_o, w_i);
+      const PhongTerms<double> q = phong_terms(normals_.col(hit.face), -w_i, w_l);
+      const double bar = angle * loss_.slope[moving.direction];
+      gradient.col(face_) += bar * q.value * (k.along_i * w_i + k.along_o * w_o);
+      gradient.col(hit.face) += bar * k.value * (q.along_i * w_l - q.along_o * w_i);
     }
   }
-  return angle * rest;
-}
 
-void ReflectionEnergy::select_hits(double floor) {
-  const Eigen::Index faces = paths_.faces().count();
-  const Eigen::Index directions = paths_.directions().count();
-  resting_.assign(static_cast<std::size_t>(faces * directions), 0.0F);
-  moving_begin_.assign(resting_.size() + 1, 0);
-  std::vector<std::vector<std::uint16_t>> by_face(static_cast<std::size_t>(faces));
-  const auto select = [&](std::int64_t face) {
-    std::vector<std::uint16_t>& moving = by_face[static_cast<std::size_t>(face)];
-    for (Eigen::Index d = 0; d < directions; ++d) {
-      if (!paths_.seen(face, d)) continue;
-      const std::size_t before = moving.size();
-      resting_[slot(face, d)] = static_cast<float>(select_hits(face, d, floor, moving));
-      moving_begin_[slot(face, d) + 1] = static_cast<std::uint32_t>(moving.size() - before);
-    }
-  };
-  parallel_for(executor_, "moving hits", faces, select, kFaceGrain);
-  for (std::size_t i = 1; i < moving_begin_.size(); ++i) moving_begin_[i] += moving_begin_[i - 1];
-  moving_.reserve(moving_begin_.back());
-  for (const auto& of_face : by_face) moving_.insert(moving_.end(), of_face.begin(), of_face.end());
-}
-
-FaceRadiance ReflectionEnergy::radiance(Eigen::Index face, Eigen::Index d,
-                                        const Eigen::Matrix3Xd& normals) const {
-  const Vector3d n = normals.col(face);
-  const Vector3d w_o = paths_.sensor(face, d);
-  const Vector3d w_l = paths_.light(d);
-  FaceRadiance sum;
-  if (paths_.lit(face, d)) sum.direct = reflected(n, w_o, w_l);
-  const std::span<const PathHit> hits = paths_.hits(face);
-  for (const std::uint16_t i : moving(face, d)) {
-    const Vector3d w_i = hits[i].w.cast<double>();
-    sum.indirect += reflected(n, w_o, w_i) * reflected(normals.col(hits[i].face), -w_i, w_l);
+ private:
+  [[nodiscard]] const std::vector<MovingHit>& moving() const {
+    return energy_.moving_[static_cast<std::size_t>(face_)];
   }
-  sum.indirect = sum.indirect * paths_.hit_angle() + static_cast<double>(resting_[slot(face, d)]);
-  return sum;
-}
+  [[nodiscard]] const PathHit& hit(const MovingHit& moving) const {
+    return paths_.hits(face_)[moving.hit];
+  }
+
+  void add_hits() {
+    const Vector3d n = normals_.col(face_);
+    for (const MovingHit& moving : this->moving()) {
+      const PathHit& hit = this->hit(moving);
+      const Vector3d w_i = hit.w.cast<double>();
+      indirect_[moving.direction] +=
+          reflected(n, paths_.sensor(face_, moving.direction), w_i) *
+          reflected(normals_.col(hit.face), -w_i, paths_.light(moving.direction));
+    }
+    const float* const resting = energy_.resting(face_);
+    for (Eigen::Index d = 0; d < indirect_.size(); ++d) {
+      indirect_[d] = indirect_[d] * paths_.hit_angle() + static_cast<double>(resting[d]);
+    }
+  }
+
+  const ReflectionEnergy& energy_;
+  const LightPaths& paths_;
+  const Eigen::Matrix3Xd& normals_;
+  const LaneVectors<double>& light_;
+  SensorLanes<double> sensor_;
+  const LaneVectors<double>* toward_ = nullptr;
+  Eigen::Index face_ = 0;
+  Eigen::VectorXd lit_;
+  Eigen::VectorXd weight_;
+  DirectLanes direct_;
+  Eigen::VectorXd indirect_;
+  LossLanes loss_;
+};
 
 Eigen::VectorXd ReflectionEnergy::by_face(const Eigen::Matrix3Xd& normals) const {
   Eigen::VectorXd energy(normals.cols());
-  const auto of_face = [&](std::int64_t face) {
-    double sum = 0.0;
-    for (Eigen::Index d = 0; d < paths_.directions().count(); ++d) {
-      if (!paths_.seen(face, d)) continue;
-      const FaceRadiance l = radiance(face, d, normals);
-      sum += weight(face, d) * loss_of(loss_, l.direct + l.indirect);
-    }
-    energy[face] = sum;
-  };
-  parallel_for(executor_, "reflection energy", normals.cols(), of_face, kFaceGrain);
+  for_faces(
+      executor_, "reflection energy", normals.cols(), [&] { return FaceLight(*this, normals); },
+      [&](FaceLight& light, std::int64_t face) {
+        light.look_at(face, true);
+        energy[face] = light.sums().value;
+      });
   return energy;
 }
 
@@ -110,117 +238,49 @@ double ReflectionEnergy::value(const Eigen::Matrix3Xd& normals) const {
   return by_face(normals).sum();
 }
 
-Eigen::VectorXd ReflectionEnergy::curvature(const Eigen::Matrix3Xd& normals) const {
-  Eigen::VectorXd result(normals.cols());
-  const auto of_face = [&](std::int64_t face) {
-    const Vector3d n = normals.col(face);
-    double sum = 0.0;
-    for (Eigen::Index d = 0; d < paths_.directions().count(); ++d) {
-      if (!paths_.seen(face, d) || !paths_.lit(face, d)) continue;
-      const Vector3d w_o = paths_.sensor(face, d);
-      const Vector3d w_l = paths_.light(d);
-      sum += weight(face, d) * loss_curvature(loss_, reflected(n, w_o, w_l)) *
-             reflected_adjoint(n, w_o, w_l).squaredNorm();
-    }
-    result[face] = sum / 3.0;
-  };
-  parallel_for(executor_, "reflection curvature", normals.cols(), of_face, kFaceGrain);
-  return result;
-}
-
 double ReflectionEnergy::direct_value(const Eigen::Matrix3Xd& normals) const {
-  const auto of_face = [&](std::int64_t face) {
-    const Vector3d n = normals.col(face);
-    double sum = 0.0;
-    for (Eigen::Index d = 0; d < paths_.directions().count(); ++d) {
-      if (!paths_.seen(face, d)) continue;
-      const double l =
-          paths_.lit(face, d) ? reflected(n, paths_.sensor(face, d), paths_.light(d)) : 0.0;
-      sum += weight(face, d) * loss_of(loss_, l);
-    }
-    return std::array{sum};
-  };
-  return parallel_sum<1>(executor_, "direct energy", normals.cols(), of_face, kFaceGrain)[0];
+  Eigen::VectorXd energy(normals.cols());
+  for_faces(
+      executor_, "direct energy", normals.cols(), [&] { return FaceLight(*this, normals); },
+      [&](FaceLight& light, std::int64_t face) {
+        light.look_at(face, false);
+        energy[face] = light.sums().value;
+      });
+  return energy.sum();
 }
 
-/// Value and gradient of the faces of one block.
-class ReflectionEnergy::Backward {
- public:
-  Backward(const ReflectionEnergy& energy, const Eigen::Matrix3Xd& normals)
-      : energy_(energy),
-        paths_(energy.paths_),
-        normals_(normals),
-        gradient_(Eigen::Matrix3Xd::Zero(3, normals.cols())) {}
+FaceRadiance ReflectionEnergy::radiance(Eigen::Index face, const Eigen::Matrix3Xd& normals) const {
+  FaceLight light(*this, normals);
+  light.look_at(face, true);
+  return light.radiance();
+}
 
-  /// @return what the face adds to the value.
-  double add(Eigen::Index face) {
-    value_ = 0.0;
-    for (Eigen::Index d = 0; d < paths_.directions().count(); ++d) {
-      if (paths_.seen(face, d)) add(face, d);
-    }
-    return value_;
-  }
-
-  [[nodiscard]] const Eigen::Matrix3Xd& gradient() const { return gradient_; }
-
- private:
-  void add(Eigen::Index face, Eigen::Index d) {
-    const FaceRadiance sum = energy_.radiance(face, d, normals_);
-    const double l = sum.direct + sum.indirect;
-    const double weight = energy_.weight(face, d);
-    value_ += weight * loss_of(energy_.loss_, l);
-    const double l_bar = weight * loss_slope(energy_.loss_, l);
-    const Vector3d n = normals_.col(face);
-    const Vector3d w_o = paths_.sensor(face, d);
-    if (paths_.lit(face, d)) {
-      gradient_.col(face) += l_bar * reflected_adjoint(n, w_o, paths_.light(d));
-    }
-    const std::span<const PathHit> hits = paths_.hits(face);
-    for (const std::uint16_t i : energy_.moving(face, d)) {
-      add_hit(hits[i], face, d, l_bar * paths_.hit_angle());
-    }
-  }
-
-  /// Both vertices of the path (radiative back-propagation, Nimier-David et al. 2020).
-  void add_hit(const PathHit& hit, Eigen::Index face, Eigen::Index d, double bar) {
-    const Vector3d w_i = hit.w.cast<double>();
-    const Vector3d w_o = paths_.sensor(face, d);
-    const Vector3d w_l = paths_.light(d);
-    const Vector3d n = normals_.col(face);
-    const Vector3d n_q = normals_.col(hit.face);
-    const double f_k = reflected(n, w_o, w_i);
-    const double f_q = reflected(n_q, -w_i, w_l);
-    gradient_.col(face) += bar * f_q * reflected_adjoint(n, w_o, w_i);
-    gradient_.col(hit.face) += bar * f_k * reflected_adjoint(n_q, -w_i, w_l);
-  }
-
-  const ReflectionEnergy& energy_;
-  const LightPaths& paths_;
-  const Eigen::Matrix3Xd& normals_;
-  Eigen::Matrix3Xd gradient_;
-  double value_ = 0.0;
-};
-
-Eigen::VectorXd ReflectionEnergy::by_face_and_gradient(const Eigen::Matrix3Xd& normals,
-                                                       Eigen::Matrix3Xd& gradient) const {
+FaceTerms ReflectionEnergy::terms(const Eigen::Matrix3Xd& normals) const {
   const Eigen::Index count = normals.cols();
-  std::vector<Backward> blocks(kBlocks, Backward(*this, normals));
-  Eigen::VectorXd value(count);
+  FaceTerms terms{Eigen::VectorXd(count), Eigen::Matrix3Xd::Zero(3, count), Eigen::VectorXd(count)};
+  std::vector<Eigen::Matrix3Xd> gradients(kBlocks, terms.gradient);
   const auto run = [&](std::int64_t b) {
-    Backward& block = blocks[static_cast<std::size_t>(b)];
+    Eigen::Matrix3Xd& gradient = gradients[static_cast<std::size_t>(b)];
+    FaceLight light(*this, normals);
     for (Eigen::Index k = b * count / kBlocks; k < (b + 1) * count / kBlocks; ++k) {
-      value[k] = block.add(k);
+      light.look_at(k, true);
+      const LossSums sums = light.sums();
+      terms.value[k] = sums.value;
+      terms.curvature[k] = sums.curvature / 3.0;
+      gradient.col(k) += sums.gradient;
+      light.scatter(gradient);
     }
   };
   parallel_for(executor_, "reflection gradient", kBlocks, run, 1);
-  gradient = Eigen::Matrix3Xd::Zero(3, count);
-  for (const Backward& block : blocks) gradient += block.gradient();
-  return value;
+  for (const Eigen::Matrix3Xd& gradient : gradients) terms.gradient += gradient;
+  return terms;
 }
 
 double ReflectionEnergy::value_and_gradient(const Eigen::Matrix3Xd& normals,
                                             Eigen::Matrix3Xd& gradient) const {
-  return by_face_and_gradient(normals, gradient).sum();
+  FaceTerms terms = this->terms(normals);
+  gradient = std::move(terms.gradient);
+  return terms.value.sum();
 }
 
 }  // namespace lensforge::reflect

@@ -3,7 +3,6 @@
 
 #include <Eigen/Core>
 #include <cstdint>
-#include <span>
 #include <vector>
 
 #include "core/compute/executor.h"
@@ -19,10 +18,20 @@ inline constexpr double kEnergyScale = 5.0;
 /// torus and of a trihedral differ by less than 1 % from those of all hits.
 inline constexpr double kRadianceFloor = 0.02;
 
-/// Radiance of one face towards the sensor, by one reflection and by two.
+/// Radiance of one face towards the sensor for every direction, by one reflection and by two; the
+/// latter only where the sensor sees the face.
 struct FaceRadiance {
-  double direct = 0.0;
-  double indirect = 0.0;
+  Eigen::VectorXd direct;
+  Eigen::VectorXd indirect;
+};
+
+/// What faces add to the energy.
+struct FaceTerms {
+  Eigen::VectorXd value;
+  Eigen::Matrix3Xd gradient;  ///< Of the whole energy by free vectors in place of the normals.
+  /// Gauss–Newton estimate of the curvature by each face's normal: the mean over its three
+  /// components of Σ_d weight·loss″(L) (∂L/∂n)², of the direct light.
+  Eigen::VectorXd curvature;
 };
 
 /// The reflectivity energy (Tojo et al., Eqs. 5–8) over cached paths, as a smooth function of the
@@ -47,50 +56,40 @@ class ReflectionEnergy {
   [[nodiscard]] double value_and_gradient(const Eigen::Matrix3Xd& normals,
                                           Eigen::Matrix3Xd& gradient) const;
 
-  /// What every face adds to the value, and the same derivative of the value.
-  [[nodiscard]] Eigen::VectorXd by_face_and_gradient(const Eigen::Matrix3Xd& normals,
-                                                     Eigen::Matrix3Xd& gradient) const;
+  [[nodiscard]] FaceTerms terms(const Eigen::Matrix3Xd& normals) const;
 
   /// What every face adds to the value.
   [[nodiscard]] Eigen::VectorXd by_face(const Eigen::Matrix3Xd& normals) const;
 
-  /// Gauss–Newton estimate of the value's curvature by each face's normal: the mean over its three
-  /// components of Σ_d weight·loss″(L) (∂L/∂n)², of the direct light.
-  [[nodiscard]] Eigen::VectorXd curvature(const Eigen::Matrix3Xd& normals) const;
-
   /// Without light by way of other faces.
   [[nodiscard]] double direct_value(const Eigen::Matrix3Xd& normals) const;
 
-  [[nodiscard]] FaceRadiance radiance(Eigen::Index face, Eigen::Index d,
-                                      const Eigen::Matrix3Xd& normals) const;
+  [[nodiscard]] FaceRadiance radiance(Eigen::Index face, const Eigen::Matrix3Xd& normals) const;
 
  private:
-  class Backward;
+  class FaceLight;
+  class HitSelection;
 
-  void select_hits(double floor);
-  [[nodiscard]] double select_hits(Eigen::Index face, Eigen::Index d, double floor,
-                                   std::vector<std::uint16_t>& moving) const;
-  /// Hits of a face that follow the normals, by their number among the face's hits.
-  [[nodiscard]] std::span<const std::uint16_t> moving(Eigen::Index face, Eigen::Index d) const {
-    const std::size_t at = slot(face, d);
-    return {moving_.data() + moving_begin_[at], moving_begin_[at + 1] - moving_begin_[at]};
-  }
-  [[nodiscard]] std::size_t slot(Eigen::Index face, Eigen::Index d) const {
-    return static_cast<std::size_t>(face * paths_.directions().count() + d);
-  }
+  /// A hit that follows the normals.
+  struct MovingHit {
+    std::uint32_t direction;
+    std::uint16_t hit;  ///< Its number among the face's hits.
+  };
 
-  [[nodiscard]] double weight(Eigen::Index face, Eigen::Index d) const {
-    return 0.5 * kEnergyScale * share_[face] * paths_.directions().weight[d];
+  [[nodiscard]] double scale(Eigen::Index face) const { return 0.5 * kEnergyScale * share_[face]; }
+  /// Light of the hits of a face that do not follow the normals, padded().
+  [[nodiscard]] const float* resting(Eigen::Index face) const {
+    return resting_.data() + face * paths_.light_lanes().rows();
   }
 
   const LightPaths& paths_;
   Loss loss_;
   Executor executor_;
-  Eigen::VectorXd share_;  ///< a_k
-  /// Of face and direction; the moving hits of all stand one behind the other.
-  std::vector<std::uint32_t> moving_begin_;
-  std::vector<std::uint16_t> moving_;
-  std::vector<float> resting_;  ///< Light of the other hits.
+  Eigen::VectorXd share_;         ///< a_k
+  Eigen::VectorXd weight_lanes_;  ///< Of the directions, padded().
+  Eigen::VectorXd one_lanes_;
+  std::vector<std::vector<MovingHit>> moving_;  ///< Of every face.
+  std::vector<float> resting_;
 };
 
 }  // namespace lensforge::reflect

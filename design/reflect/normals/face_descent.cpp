@@ -23,25 +23,19 @@ Eigen::Vector3d tilted(const Eigen::Vector3d& n, double angle) {
   return (n + std::copysign(std::tan(angle), n.z()) * up.normalized()).normalized();
 }
 
-/// Normals with what they give.
-struct State {
+/// Normals with what every face adds to the objective.
+struct Candidate {
   Eigen::Matrix3Xd normal;
-  Eigen::Matrix3Xd gradient;
-  Eigen::VectorXd by_face;
+  Eigen::VectorXd value;
 };
 
-State state_at(const NormalObjective& objective, Eigen::Matrix3Xd normal) {
-  State state{std::move(normal), {}, {}};
-  state.by_face = objective.by_face(state.normal, state.gradient);
-  return state;
-}
-
 /// Takes over the faces whose share is lower.
-void keep_lower(const State& next, State& best) {
-  for (Eigen::Index k = 0; k < best.normal.cols(); ++k) {
-    if (next.by_face[k] >= best.by_face[k]) continue;
-    best.normal.col(k) = next.normal.col(k);
-    best.by_face[k] = next.by_face[k];
+void keep_lower(const NormalObjective& objective, const Eigen::Matrix3Xd& normal, Candidate& best) {
+  const Eigen::VectorXd value = objective.values(normal);
+  for (Eigen::Index k = 0; k < normal.cols(); ++k) {
+    if (value[k] >= best.value[k]) continue;
+    best.normal.col(k) = normal.col(k);
+    best.value[k] = value[k];
   }
 }
 
@@ -55,45 +49,45 @@ Eigen::Vector3d mirror(const LightPaths& paths, Eigen::Index face, Eigen::Index 
 
 Eigen::Matrix3Xd descended_by_face(const NormalObjective& objective, const Eigen::Matrix3Xd& start,
                                    int steps, const Executor& executor) {
-  State best = state_at(objective, start);
-  Eigen::VectorXd curvature = objective.curvature(start);
+  Eigen::Matrix3Xd normal = start;
+  FaceTerms best = objective.by_face(start);
   Eigen::VectorXd factor = Eigen::VectorXd::Ones(start.cols());
   for (int step = 0; step < steps; ++step) {
     Eigen::Matrix3Xd trial(3, start.cols());
     const auto advance = [&](std::int64_t k) {
-      const Eigen::Vector3d move = -(factor[k] / curvature[k]) * best.gradient.col(k);
+      const Eigen::Vector3d move = -(factor[k] / best.curvature[k]) * best.gradient.col(k);
       const double shortening = std::min(1.0, kLongestStep / std::max(move.norm(), 1e-300));
-      trial.col(k) = (best.normal.col(k) + shortening * move).normalized();
+      trial.col(k) = (normal.col(k) + shortening * move).normalized();
     };
     parallel_for(executor, "face steps", start.cols(), advance);
-    const State next = state_at(objective, std::move(trial));
+    const FaceTerms next = objective.by_face(trial);
     for (Eigen::Index k = 0; k < start.cols(); ++k) {
-      const bool lower = next.by_face[k] <= best.by_face[k];
+      const bool lower = next.value[k] <= best.value[k];
       factor[k] *= lower ? kGrowth : kShrinkage;
       if (!lower) continue;
-      best.normal.col(k) = next.normal.col(k);
+      normal.col(k) = trial.col(k);
+      best.value[k] = next.value[k];
       best.gradient.col(k) = next.gradient.col(k);
-      best.by_face[k] = next.by_face[k];
+      best.curvature[k] = next.curvature[k];
     }
-    curvature = objective.curvature(best.normal);
   }
-  return best.normal;
+  return normal;
 }
 
 Eigen::Matrix3Xd turned_by_face(const NormalObjective& objective, const LightPaths& paths,
                                 const Goal& goal, const Eigen::Matrix3Xd& start) {
-  State best = state_at(objective, start);
+  Candidate best{start, objective.values(start)};
   Eigen::Matrix3Xd trial(3, start.cols());
   if (goal.maximizes()) {
     for (Eigen::Index d = 0; d < paths.directions().count(); ++d) {
       for (Eigen::Index k = 0; k < start.cols(); ++k) trial.col(k) = mirror(paths, k, d);
-      keep_lower(state_at(objective, trial), best);
+      keep_lower(objective, trial, best);
     }
     return best.normal;
   }
   for (const double angle : kTilts) {
     for (Eigen::Index k = 0; k < start.cols(); ++k) trial.col(k) = tilted(start.col(k), angle);
-    keep_lower(state_at(objective, trial), best);
+    keep_lower(objective, trial, best);
   }
   return best.normal;
 }

@@ -25,27 +25,30 @@ Eigen::Map<Eigen::Matrix3Xd> columns_of(std::span<double> values) {
 
 }  // namespace
 
-Eigen::VectorXd NormalObjective::by_face(const Eigen::Matrix3Xd& normals,
-                                         Eigen::Matrix3Xd& gradient) const {
-  Eigen::VectorXd value = energy_.by_face_and_gradient(normals, gradient);
+Eigen::VectorXd NormalObjective::values(const Eigen::Matrix3Xd& normals) const {
+  Eigen::VectorXd value = energy_.by_face(normals);
   for (Eigen::Index k = 0; k < normals.cols(); ++k) {
-    const Eigen::Vector3d t = normals.col(k);
-    const double weight = anchor_.strength * kEnergyScale * share_[k];
-    const Eigen::Vector3d offset = t - anchor_.reference.col(k);
-    value[k] += 0.5 * weight * offset.squaredNorm();
-    gradient.col(k) = normalize_adjoint(t, 1.0, gradient.col(k) + weight * offset);
+    value[k] += 0.5 * weight(k) * (normals.col(k) - anchor_.reference.col(k)).squaredNorm();
   }
   return value;
 }
 
-double NormalObjective::operator()(const Eigen::Matrix3Xd& x, Eigen::Matrix3Xd& gradient) const {
-  const double value = by_face(x.colwise().normalized(), gradient).sum();
-  gradient.array().rowwise() /= x.colwise().norm().array();
-  return value;
+FaceTerms NormalObjective::by_face(const Eigen::Matrix3Xd& normals) const {
+  FaceTerms terms = energy_.terms(normals);
+  for (Eigen::Index k = 0; k < normals.cols(); ++k) {
+    const Eigen::Vector3d t = normals.col(k);
+    const Eigen::Vector3d offset = t - anchor_.reference.col(k);
+    terms.value[k] += 0.5 * weight(k) * offset.squaredNorm();
+    terms.gradient.col(k) = normalize_adjoint(t, 1.0, terms.gradient.col(k) + weight(k) * offset);
+    terms.curvature[k] += weight(k) + kLeastCurvature * share_[k];
+  }
+  return terms;
 }
 
-Eigen::VectorXd NormalObjective::curvature(const Eigen::Matrix3Xd& normals) const {
-  return energy_.curvature(normals) + (kEnergyScale * anchor_.strength + kLeastCurvature) * share_;
+double NormalObjective::operator()(const Eigen::Matrix3Xd& x, Eigen::Matrix3Xd& gradient) const {
+  const FaceTerms terms = by_face(x.colwise().normalized());
+  gradient = terms.gradient.array().rowwise() / x.colwise().norm().array();
+  return terms.value.sum();
 }
 
 Eigen::Matrix3Xd optimized_normals(const NormalObjective& objective, const Eigen::Matrix3Xd& start,
@@ -56,7 +59,7 @@ Eigen::Matrix3Xd optimized_normals(const NormalObjective& objective, const Eigen
     columns_of(out) = gradient;
     return value;
   };
-  const Eigen::VectorXd scale = objective.curvature(start).cwiseInverse();
+  const Eigen::VectorXd scale = objective.by_face(start).curvature.cwiseInverse();
   const auto precondition = [&](std::span<const double> g, std::span<double> r) {
     columns_of(r) = columns_of(g) * scale.asDiagonal();
   };

@@ -28,14 +28,18 @@ class NormalObjective {
   /// @param gradient  by x, 3 × F.
   double operator()(const Eigen::Matrix3Xd& x, Eigen::Matrix3Xd& gradient) const;
 
-  /// What every face adds to the value at unit normals, and the gradient.
-  [[nodiscard]] Eigen::VectorXd by_face(const Eigen::Matrix3Xd& normals,
-                                        Eigen::Matrix3Xd& gradient) const;
+  /// What every face adds to the value at unit normals; the gradient; an estimate of every face's
+  /// curvature, > 0.
+  [[nodiscard]] FaceTerms by_face(const Eigen::Matrix3Xd& normals) const;
 
-  /// Estimate of every face's curvature at unit normals, > 0.
-  [[nodiscard]] Eigen::VectorXd curvature(const Eigen::Matrix3Xd& normals) const;
+  /// What every face adds to the value at unit normals.
+  [[nodiscard]] Eigen::VectorXd values(const Eigen::Matrix3Xd& normals) const;
 
  private:
+  [[nodiscard]] double weight(Eigen::Index face) const {
+    return anchor_.strength * kEnergyScale * share_[face];
+  }
+
   const ReflectionEnergy& energy_;
   const NormalAnchor& anchor_;
   const Eigen::VectorXd& share_;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <utility>
 
 namespace lensforge::reflect {
 
@@ -10,7 +11,10 @@ namespace lensforge::reflect {
 /// kUnmetStep. A face next to others that hold it back is asked for more until it turns.
 class UnmetTurns {
  public:
-  explicit UnmetTurns(Eigen::Index faces) : sum_(Eigen::Matrix3Xd::Zero(3, faces)) {}
+  /// @param sum  what was missing before, 3 × F: zeros, or what sum() returned.
+  explicit UnmetTurns(Eigen::Matrix3Xd sum) : sum_(std::move(sum)) {}
+
+  [[nodiscard]] const Eigen::Matrix3Xd& sum() const { return sum_; }
 
   /// Targets with the sum added, of unit length. @param targets  3 × F.
   [[nodiscard]] Eigen::Matrix3Xd added_to(const Eigen::Matrix3Xd& targets) const;

@@ -101,11 +101,11 @@ Eigen::MatrixXd face_radiances(const SurfaceMesh& mesh, const LightField& field,
   const Eigen::Matrix3Xd& normals = paths.faces().normal;
   Eigen::MatrixXd radiance = Eigen::MatrixXd::Zero(mesh.triangle_count(), stealth ? kViews : 1);
   for (Eigen::Index k = 0; k < radiance.rows(); ++k) {
+    const FaceRadiance l = energy.radiance(k, normals);
     for (Eigen::Index d = 0; d < paths.directions().count(); ++d) {
       if (!paths.seen(k, d)) continue;
-      const FaceRadiance l = energy.radiance(k, d, normals);
       const double weight = stealth ? 1.0 : paths.directions().weight[d];
-      radiance(k, stealth ? d : 0) += weight * (l.direct + l.indirect);
+      radiance(k, stealth ? d : 0) += weight * (l.direct[d] + l.indirect[d]);
     }
   }
   return radiance;

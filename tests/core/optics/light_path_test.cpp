@@ -175,6 +175,36 @@ TEST_P(EveryLight, FacetBeamIsThatOfEachCorner) {
   }
 }
 
+TEST_P(EveryLight, KnownEntriesChangeNoBit) {
+  if (!light_.is_bent()) return;
+  Random random(12);
+  const LightPath losing_light(losing(setup_));
+  for (int i = 0; i < 50; ++i) {
+    const Corners t = random_corners(random);
+    const Eigen::Vector3d n = random_normal(random, t.v0);
+    const FrontEntry entries[3] = {light_.enter(t.v0), light_.enter(t.v1), light_.enter(t.v2)};
+    const int triangle[3] = {0, 1, 2};
+    const CornerEntries known = VertexEntries{entries, 3}.at(triangle);
+    EXPECT_EQ(light_.transmits(t, n, known), light_.transmits(t, n));
+    EXPECT_EQ(light_.barrier(t, n, known), light_.barrier(t, n));
+    EXPECT_EQ(losing_light.flux(t, known), losing_light.flux(t));
+    const auto answers = [&](const CornerEntries& e) {
+      Corners bar;
+      Eigen::Vector3d n_bar = Eigen::Vector3d::Zero();
+      Eigen::Vector3d area_normal_bar = Eigen::Vector3d::Zero();
+      light_.barrier_adjoint(t, n, 0.7, bar, n_bar, e);
+      losing_light.flux_adjoint(t, 0.3, bar, area_normal_bar, e);
+      const FacetBeam facet = light_.facet_beam(t, n, e);
+      n_bar += light_.facet_beam_adjoint(t, n, facet, {{1, 2}, {3, 4}, {5, 6}}, bar);
+      Eigen::VectorXd all(21);
+      all << testing::pack(bar), n_bar, area_normal_bar, facet.slope(0), facet.slope(1),
+          facet.slope(2);
+      return all;
+    };
+    EXPECT_EQ(answers(known), answers({}));
+  }
+}
+
 TEST_P(EveryLight, LandAdjointEqualsCentralDifferences) {
   Random random(1);
   for (const ViewSide view : {ViewSide::kFront, ViewSide::kRear}) {

@@ -80,16 +80,16 @@ FaceRadiance dihedral_radiance(double phi) {
       .squaredNorm()
       .minCoeff(&nearest);
   const ReflectionEnergy energy(paths, Loss::kSquare, Executor::serial());
-  return energy.radiance(nearest, 0, faces.normal);
+  return energy.radiance(nearest, faces.normal);
 }
 
 TEST(Evaluate, RightAngledDihedralSendsLightBackByTwoReflections) {
   const FaceRadiance at_45 = dihedral_radiance(45.0 * kDegree);
-  EXPECT_NEAR(at_45.direct, 0.009566, 1e-6);
-  EXPECT_NEAR(at_45.indirect, 0.868132, 0.01 * 0.868132);
+  EXPECT_NEAR(at_45.direct[0], 0.009566, 1e-6);
+  EXPECT_NEAR(at_45.indirect[0], 0.868132, 0.01 * 0.868132);
   const FaceRadiance at_20 = dihedral_radiance(20.0 * kDegree);
-  EXPECT_NEAR(at_20.direct, 0.014015, 1e-6);
-  EXPECT_NEAR(at_20.indirect, 0.5560, 0.01 * 0.5560);
+  EXPECT_NEAR(at_20.direct[0], 0.014015, 1e-6);
+  EXPECT_NEAR(at_20.indirect[0], 0.5560, 0.01 * 0.5560);
 }
 
 TEST(Evaluate, SameBitsForAnyNumberOfThreads) {

@@ -1,0 +1,287 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "app/batch/job_run.h"
+
+#include <chrono>
+#include <exception>
+#include <fstream>
+#include <iterator>
+#include <optional>
+#include <system_error>
+#include <thread>
+#include <utility>
+
+#include "app/batch/step_process.h"
+#include "app/exit_code.h"
+#include "core/error.h"
+#include "core/io/files.h"
+#include "core/io/folder_lock.h"
+#include "core/io/sha256.h"
+#include "core/text/version.h"
+
+namespace lensforge::app {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+using Status = JobOutcome::Status;
+
+constexpr const char* kWork = ".work";
+constexpr const char* kLens = "out";  ///< In a job's work folder: what gets its name.
+constexpr const char* kOld = "old";   ///< What it replaces.
+constexpr const char* kStepOutput = "step.json";
+constexpr const char* kFormat = "lensforge.job";
+
+/// A command that was interrupted with its batch ends within a second and then lets go of the
+/// folder.
+constexpr int kAttempts = 100;
+constexpr std::chrono::milliseconds kBetweenAttempts{50};
+
+std::string content_of(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+/// The JSON in a file; null if there is none.
+json json_in(const fs::path& file) {
+  json value = json::parse(content_of(file), nullptr, false);
+  return value.is_discarded() ? json() : value;
+}
+
+std::string fingerprint_of(const fs::path& file) {
+  std::ifstream stream = open_input(file);
+  Sha256 sum;
+  std::string block(std::size_t{1} << 20U, '\0');
+  while (stream.read(block.data(), static_cast<std::streamsize>(block.size())) ||
+         stream.gcount() > 0) {
+    sum.update({block.data(), static_cast<std::size_t>(stream.gcount())});
+  }
+  return sum.finish();
+}
+
+/// The job with its target's content: what is the same has the same outcome.
+json identity_of(const BatchJob& job) {
+  json identity = job.json();
+  identity["target_sha256"] = fingerprint_of(job.target);
+  return identity;
+}
+
+bool is_of(const json& record, const json& identity) {
+  return record.is_object() && record.value("format", "") == kFormat &&
+         record.value("job", json()) == identity;
+}
+
+/// The last line that a command wrote, without the program's name.
+std::string last_line(const std::string& text) {
+  const std::size_t end = text.find_last_not_of("\n\r ");
+  if (end == std::string::npos) return "";
+  const std::size_t before = text.find_last_of('\n', end);
+  std::string line = text.substr(before == std::string::npos ? 0 : before + 1, end - before);
+  if (before == std::string::npos) line = text.substr(0, end + 1);
+  constexpr std::string_view kProgram = "lensforge: ";
+  return line.starts_with(kProgram) ? line.substr(kProgram.size()) : line;
+}
+
+/// One job's work folder while a batch holds it.
+class JobWork {
+ public:
+  JobWork(const BatchJob& job, const BatchPlace& place, const std::stop_token& stop)
+      : job_(job),
+        place_(place),
+        stop_(stop),
+        folder_(place.out / kWork / job.name),
+        lens_(folder_ / kLens),
+        lock_(std::move(FolderLock::make(folder_, FolderLock::Kind::kExclusive).lock)) {}
+
+  JobOutcome run() {
+    // Another batch may have done it in the meantime.
+    const json identity = identity_of(job_);
+    if (is_of(finished_job(job_, place_.out), identity)) {
+      clear();
+      return {Status::kDone, "", true, 0.0};
+    }
+    take_up(identity);
+    for (std::size_t i = record_["steps"].size(); i < job_.steps.size(); ++i) {
+      if (stop_.stop_requested()) return {Status::kInterrupted, "", false, 0.0};
+      const std::optional<JobOutcome> end = do_step(job_.steps[i]);
+      if (end) return *end;
+    }
+    return publish();
+  }
+
+ private:
+  [[nodiscard]] double seconds() const {
+    double sum = 0.0;
+    for (const json& step : record_["steps"]) sum += step["seconds"].get<double>();
+    return sum;
+  }
+
+  /// Goes on with what an earlier batch has done of the very same job, or begins.
+  void take_up(const json& identity) {
+    wait_for_lens();
+    record_ = json_in(folder_ / kJobFile);
+    if (is_of(record_, identity)) return;
+    fs::remove_all(lens_);
+    fs::remove(folder_ / kJobLog);
+    record_ = {{"format", kFormat},        {"version", 1},           {"job", identity},
+               {"status", "open"},         {"steps", json::array()}, {"message", ""},
+               {"program", program_mark()}};
+    save();
+  }
+
+  /// A command of a batch that was killed may still be ending.
+  void wait_for_lens() const {
+    if (!is_folder(lens_)) return;
+    for (int i = 0;; ++i) {
+      try {
+        const FolderLock once(lens_, FolderLock::Kind::kExclusive);
+        return;
+      } catch (const InputError&) {
+        if (i == kAttempts) throw;
+        std::this_thread::sleep_for(kBetweenAttempts);
+      }
+    }
+  }
+
+  void save() const { write_whole_file(folder_ / kJobFile, record_.dump(2) + "\n"); }
+
+  [[nodiscard]] Arguments words_of(const BatchStep& step) const {
+    const std::string out = lens_.string();
+    Arguments words{step.command};
+    const bool first = step.command == "design" || step.command == "reflect";
+    if (first) {
+      words.insert(words.end(), {job_.target, "--out", out});
+      words.emplace_back(step.knows("resume") && is_folder(lens_) ? "--resume" : "--force");
+    } else {
+      words.push_back(out);
+    }
+    BatchStep said = step;
+    if (step.command == "export") {
+      const std::string file = step.options.value("out", "lens.step");
+      words.insert(words.end(), {"--out", (lens_ / fs::path(file).filename()).string()});
+      said.options.erase("out");
+    }
+    if (place_.threads > 0 && !step.options.contains("threads")) {
+      words.insert(words.end(), {"--threads", std::to_string(place_.threads)});
+    }
+    words.emplace_back("--json");
+    const Arguments more = said.words();
+    words.insert(words.end(), more.begin(), more.end());
+    return words;
+  }
+
+  /// @return how the job ends, if it ends here.
+  std::optional<JobOutcome> do_step(const BatchStep& step) {
+    const fs::path log = folder_ / kJobLog;
+    std::error_code ignored;
+    const std::uintmax_t before = fs::exists(log, ignored) ? fs::file_size(log, ignored) : 0;
+    const StepEnd end = run_step(words_of(step), folder_ / kStepOutput, log, stop_);
+    if (stop_.stop_requested() && end.exit_code == kInterrupted) {
+      return JobOutcome{Status::kInterrupted, "", false, end.seconds};
+    }
+    const std::string said = last_line(content_of(log).substr(before));
+    if (end.exit_code != kDone && end.exit_code != kLimitMissed) {
+      record_["status"] = "failed";
+      record_["message"] = step.command + ": " +
+                           (said.empty() ? "exit code " + std::to_string(end.exit_code) : said);
+      save();
+      return JobOutcome{Status::kFailed, record_["message"], false, seconds() + end.seconds};
+    }
+    if (end.exit_code == kLimitMissed) record_["message"] = step.command + ": " + said;
+    record_["steps"].push_back({{"command", step.command},
+                                {"exit_code", end.exit_code},
+                                {"seconds", end.seconds},
+                                {"result", json_in(folder_ / kStepOutput)}});
+    save();
+    return std::nullopt;
+  }
+
+  /// The rename is what makes the job done.
+  JobOutcome publish() {
+    bool missed = false;
+    for (const json& step : record_["steps"]) missed = missed || step["exit_code"] == kLimitMissed;
+    record_["status"] = missed ? "limit" : "done";
+    if (!missed) record_["message"] = "";
+    write_whole_file(lens_ / kJobFile, record_.dump(2) + "\n");
+    fs::copy_file(folder_ / kJobLog, lens_ / kJobLog, fs::copy_options::overwrite_existing);
+    const fs::path place = place_.out / job_.name;
+    fs::remove_all(folder_ / kOld);
+    if (fs::exists(place)) fs::rename(place, folder_ / kOld);
+    fs::rename(lens_, place);
+    clear();
+    return {missed ? Status::kLimitMissed : Status::kDone, record_["message"], false, seconds()};
+  }
+
+  void clear() const {
+    std::error_code ignored;
+    fs::remove_all(folder_, ignored);
+  }
+
+  const BatchJob& job_;
+  const BatchPlace& place_;
+  const std::stop_token& stop_;
+  fs::path folder_;
+  fs::path lens_;
+  std::optional<FolderLock> lock_;
+  json record_;
+};
+
+}  // namespace
+
+std::string status_word(JobOutcome::Status status) {
+  switch (status) {
+    case Status::kDone:
+      return "done";
+    case Status::kLimitMissed:
+      return "limit";
+    case Status::kFailed:
+      return "failed";
+    case Status::kBusy:
+      return "busy";
+    case Status::kInterrupted:
+      return "interrupted";
+    case Status::kOpen:
+      break;
+  }
+  return "open";
+}
+
+json finished_job(const BatchJob& job, const fs::path& out) {
+  json record = json_in(out / job.name / kJobFile);
+  return record.is_object() && record.value("format", "") == kFormat ? record : json();
+}
+
+void require_room_for(const BatchJob& job, const BatchPlace& place) {
+  const json identity = identity_of(job);
+  const fs::path folder = place.out / job.name;
+  std::error_code ignored;
+  if (!fs::exists(folder, ignored)) return;
+  const json record = finished_job(job, place.out);
+  if (record.is_null()) {
+    throw InputError(folder.string() + ": is there and is no job's; give job \"" + job.name +
+                     "\" of " + place.jobs_file + " another name");
+  }
+  if (!place.force && !is_of(record, identity)) {
+    throw InputError(folder.string() +
+                     ": was done with other options or another picture than job \"" + job.name +
+                     "\" of " + place.jobs_file +
+                     " has now; --force does it again, another name keeps both");
+  }
+}
+
+JobOutcome run_job(const BatchJob& job, const BatchPlace& place, const std::stop_token& stop) {
+  std::optional<JobWork> work;
+  try {
+    work.emplace(job, place, stop);
+  } catch (const InputError& e) {
+    return {Status::kBusy, e.what(), false, 0.0};
+  } catch (const std::exception& e) {
+    return {Status::kFailed, e.what(), false, 0.0};
+  }
+  try {
+    return work->run();
+  } catch (const std::exception& e) {
+    return {Status::kFailed, e.what(), false, 0.0};
+  }
+}
+
+}  // namespace lensforge::app

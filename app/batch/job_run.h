@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <stop_token>
+#include <string>
+
+#include "app/batch/batch_job.h"
+
+namespace lensforge::app {
+
+/// What every folder of a finished job has: the job, its steps' results, and how it ended.
+inline constexpr const char* kJobFile = "job.json";
+/// What its commands said.
+inline constexpr const char* kJobLog = "job.log";
+
+/// How things stand with a job.
+struct JobOutcome {
+  enum class Status {
+    kOpen,         ///< Not done, and nothing has gone wrong.
+    kDone,         ///< Its folder is there.
+    kLimitMissed,  ///< The same; a command missed a stated limit (exit code 3).
+    kFailed,       ///< A command failed; the next run repeats it.
+    kBusy,         ///< Another batch is at work on it.
+    kInterrupted,
+  };
+  Status status = Status::kOpen;
+  std::string message;   ///< Why it failed, or which limit was missed.
+  bool earlier = false;  ///< It had been done before.
+  double seconds = 0.0;  ///< Of all its commands.
+
+  [[nodiscard]] bool finished() const {
+    return status == Status::kDone || status == Status::kLimitMissed;
+  }
+};
+
+std::string status_word(JobOutcome::Status status);
+
+/// Where a batch does its work.
+struct BatchPlace {
+  std::filesystem::path out;  ///< A folder for each job that is done, and `.work` for the others.
+  std::string jobs_file;      ///< For messages.
+  int threads = 0;            ///< Of every command that does not say so itself; 0 leaves it to it.
+  bool force = false;         ///< Jobs that were done with other options are done again.
+};
+
+/// job.json of a finished job, or null.
+nlohmann::json finished_job(const BatchJob& job, const std::filesystem::path& out);
+
+/// @throw InputError if the job's folder is there and is not of this very job: another job's
+/// without
+///        `place.force`, or somebody else's; or if its target cannot be read.
+void require_room_for(const BatchJob& job, const BatchPlace& place);
+
+/// Does a job in `.work/NAME` and gives it its name in one step when it is done, so that a folder
+/// NAME is always whole. A command that was finished before is not run again, an interrupted design
+/// goes on from its checkpoint. Never throws for what a command or the disk does.
+JobOutcome run_job(const BatchJob& job, const BatchPlace& place, const std::stop_token& stop);
+
+}  // namespace lensforge::app

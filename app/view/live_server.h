@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+
+namespace lensforge {
+
+/// What a running design shows of itself.
+struct LiveState {
+  std::int64_t number = 0;  ///< Of the state: pictures change with it.
+  std::string json;         ///< For the page's script.
+  std::string picture;      ///< Bytes of a PNG each.
+  std::string error;
+};
+
+/// Serves the page of a running design to browsers on this machine: loopback only, and only to
+/// pages of its own.
+class LiveServer {
+ public:
+  /// @param port    0 takes a free one.
+  /// @param name    of what is designed. @param target  bytes of a PNG.
+  /// @param stop    called once, by a thread of the server, when the page's stop button is pressed.
+  /// @throw InputError naming --live and the port if it cannot be had.
+  LiveServer(int port, const std::string& name, std::string target, std::function<void()> stop);
+  ~LiveServer();
+  LiveServer(const LiveServer&) = delete;
+  LiveServer& operator=(const LiveServer&) = delete;
+
+  /// "http://127.0.0.1:8080/"
+  [[nodiscard]] std::string address() const;
+  /// What is served from now on.
+  void publish(LiveState state);
+
+ private:
+  struct Listener;
+  std::unique_ptr<Listener> listener_;
+};
+
+}  // namespace lensforge

@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// From what the controls say to what the shaders are told: the lamp and the screen in the lens's
+// frame (core/optics/optical_setup.h, source_points.cpp).
+
+const kDegree = Math.PI / 180;
+
+const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+const cross = (a, b) =>
+  [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+const sum = (...terms) => [0, 1, 2].map((k) => terms.reduce((s, [f, v]) => s + f * v[k], 0));
+const norm = (a) => Math.hypot(a[0], a[1], a[2]);
+const unit = (a) => a.map((x) => x / norm(a));
+// About a unit axis, by the right-hand rule.
+function rotated(v, axis, angle) {
+  const c = Math.cos(angle), s = Math.sin(angle);
+  return sum([c, v], [s, cross(axis, v)], [(1 - c) * dot(axis, v), axis]);
+}
+
+// Right and up across light of a direction, as seen from where it goes.
+function frameAcross(direction) {
+  const up = unit(sum([1, [0, 1, 0]], [-direction[1], direction]));
+  return { right: cross(up, direction), up };
+}
+
+// Cauchy's two terms through the index at 587.56 nm with an Abbe number (core/optics/dispersion.h).
+function indexAt(index, abbe, wavelength) {
+  const square = (nm) => 1 / (nm * nm);
+  const slope = (index - 1) / abbe / (square(486.13) - square(656.27));
+  return index + slope * (square(wavelength) - square(587.56));
+}
+
+// The lens as it stands in lens.json: where its middle is, how its light comes, where the screen is.
+function readSetup(setup) {
+  const middle = [setup.lens_size[0] / 2, setup.lens_size[1] / 2, 0];
+  const point = setup.source.type === "point" ? setup.source.position : null;
+  const light = point ? unit(sum([1, middle], [-1, point])) : setup.source.direction;
+  const distance = point ? norm(sum([1, middle], [-1, point])) : Infinity;
+  const width = point ? (setup.source.size_mm || 0) / distance : (setup.source.angle_mrad || 0) / 1e3;
+  const screen = setup.screen;
+  const towards = sum([1, screen.centre], [-1, middle]);
+  const away = cross(screen.right, screen.up);
+  return {
+    middle, light, distance, width, shape: setup.source.shape || null,
+    mirror: setup.mode === "reflect",
+    flat: setup.source.emission === "lambertian",
+    loses: setup.fresnel === true,
+    front: setup.front && setup.front.type === "sphere"
+      ? [...setup.front.apex, 1 / setup.front.radius] : [0, 0, 0, 0],
+    index: setup.ior,
+    size: screen.size, right: screen.right, up: screen.up,
+    away: dot(away, towards) < 0 ? sum([-1, away]) : away,
+    screenDistance: norm(towards), towards: unit(towards),
+    lensArea: setup.lens_size[0] * setup.lens_size[1],
+    pixels: setup.pixels,
+  };
+}
+
+// Points of the source with their shares, right and up from its middle in widths, in an order in
+// which any few of them are spread over it: Vogel's spiral, or places in the pixels of a shape.
+function sourcePoints(optics, wide) {
+  if (!wide) return [{ at: [0, 0], share: 1 }];
+  const points = optics.shape ? shapePoints(optics.shape) : discPoints();
+  const stride = [25, 23, 19, 17, 13, 11, 7, 1].find((k) => points.length % k !== 0 || k === 1);
+  return points.map((_, k) => points[(k * stride) % points.length]);
+}
+
+const kSourcePoints = 64;
+
+function discPoints() {
+  const golden = Math.PI * (3 - Math.sqrt(5));
+  return Array.from({ length: kSourcePoints }, (_, i) => {
+    const radius = 0.5 * Math.sqrt((i + 0.5) / kSourcePoints);
+    return { at: [radius * Math.cos(i * golden), radius * Math.sin(i * golden)], share: 1 };
+  });
+}
+
+function shapePoints(shape) {
+  const rows = shape.length, columns = shape[0].length, points = [];
+  const lit = shape.flat().filter((weight) => weight > 0).length;
+  const parts = Math.max(1, Math.floor(Math.sqrt(kSourcePoints / lit)));
+  shape.forEach((row, r) => row.forEach((weight, c) => {
+    for (let k = 0; weight > 0 && k < parts * parts; ++k) {
+      const x = c + (k % parts + 0.5) / parts, y = r + (Math.floor(k / parts) + 0.5) / parts;
+      points.push({ at: [(x - columns / 2) / columns, (rows / 2 - y) / columns], share: weight });
+    }
+  }));
+  return points;
+}
+
+// The lamp and the screen for one point of the source.
+function placedOptics(optics, settings, at) {
+  const frame = frameAcross(optics.light);
+  const place = [Math.tan(settings.lampRight * kDegree) + settings.lampSize / 1e3 * at[0],
+                 Math.tan(settings.lampUp * kDegree) + settings.lampSize / 1e3 * at[1]];
+  // The lens turns in the light: in its own frame lamp and screen turn the other way.
+  const turned = (v) => rotated(rotated(v, [0, 1, 0], -settings.turn * kDegree), [1, 0, 0],
+                                -settings.tip * kDegree);
+  const standing = (v) => sum([1, optics.middle], [1, turned(v)]);
+  const from = sum([-1, optics.light], [place[0], frame.right], [place[1], frame.up]);
+  const parallel = settings.lampDistance === Infinity;
+  const lamp = parallel ? turned(unit(sum([-1, from])))
+                        : standing(sum([settings.lampDistance, from]));
+  const way = parallel ? lamp : sum([1, optics.middle], [-1, lamp]);
+  const tilt = (v) => rotated(rotated(v, optics.right, settings.tiltRight * kDegree), optics.up,
+                              settings.tiltUp * kDegree);
+  const bent = optics.front[3] !== 0;
+  return {
+    mirror: optics.mirror, eta: indexAt(settings.index, settings.abbe, settings.wavelength),
+    lamp: [...lamp, parallel ? 0 : 1], front: optics.front,
+    // A parallel beam through a flat front has one slope; others come to 1e-6 of a millimetre.
+    steps: optics.mirror ? 0 : parallel && !bent ? 1 : 16,
+    source: [...unit(way), optics.flat && !parallel ? 1 : 0],
+    scale: parallel ? 1 : dot(way, way) * norm(way) / way[2],
+    loses: optics.loses, varies: !parallel || bent,
+    straight: parallel && !bent && !optics.mirror && !optics.loses && lamp[2] === 1,
+    centre: standing(sum([settings.screenDistance, optics.towards])),
+    right: turned(tilt(optics.right)), up: turned(tilt(optics.up)), away: turned(tilt(optics.away)),
+  };
+}

@@ -1,0 +1,261 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Draws the light of a surface on the screen: pass after pass, each in the light of one point of the
+// source and moved by a part of a sample, added up in floating point.
+
+// What the browser must be able to do; null, or what it lacks.
+function missingFeature(gl) {
+  if (!gl) return "This browser has no WebGL 2";
+  if (!gl.getExtension("EXT_color_buffer_float")) return "This browser cannot draw into floating-point textures";
+  return null;
+}
+
+class Projector {
+  // pixels: of the picture, columns and rows.
+  constructor(canvas, gl, pixels) {
+    this.canvas = canvas;
+    this.gl = gl;
+    this.pixels = pixels;
+    // Without float blending half floats add the light, with 11 bits.
+    this.exact = gl.getExtension("EXT_float_blend") !== null;
+    const program = (vertex, fragment) => this.program(vertex, fragment);
+    this.landing = program(kFullScreen, kLanding);
+    this.triangle = program(kFullScreen, kTriangle);
+    this.drawing = program(kDraw, kAdd);
+    this.averaging = program(kFullScreen, kPixels);
+    this.showing = program(kFullScreen, kShow);
+    gl.bindVertexArray(gl.createVertexArray());
+    const longest = Math.max(...pixels);
+    this.each = Math.max(2, Math.round(1024 / longest));
+    const samples = this.exact ? gl.R32F : gl.R16F;
+    this.samples = this.target(samples, pixels[0] * this.each, pixels[1] * this.each);
+    this.mean = this.target(gl.RGBA32F, pixels[0], pixels[1]);
+    this.passes = 0;
+  }
+
+  program(vertex, fragment) {
+    const gl = this.gl, made = gl.createProgram();
+    for (const [kind, text] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
+      const shader = gl.createShader(kind);
+      gl.shaderSource(shader, text);
+      gl.compileShader(shader);
+      if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS)) throw new Error(gl.getShaderInfoLog(shader));
+      gl.attachShader(made, shader);
+    }
+    gl.linkProgram(made);
+    if (!gl.getProgramParameter(made, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(made));
+    const places = new Map();
+    const place = (name) => {
+      if (!places.has(name)) places.set(name, gl.getUniformLocation(made, name));
+      return places.get(name);
+    };
+    return { made, place };
+  }
+
+  texture(format, width, height) {
+    const gl = this.gl, made = gl.createTexture();
+    gl.bindTexture(gl.TEXTURE_2D, made);
+    gl.texStorage2D(gl.TEXTURE_2D, 1, format, width, height);
+    for (const name of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) {
+      gl.texParameteri(gl.TEXTURE_2D, name, gl.NEAREST);
+    }
+    return { made, width, height };
+  }
+  target(format, width, height) {
+    const gl = this.gl, texture = this.texture(format, width, height);
+    texture.frame = gl.createFramebuffer();
+    gl.bindFramebuffer(gl.FRAMEBUFFER, texture.frame);
+    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, texture.made, 0);
+    return texture;
+  }
+  // A list of numbers, `width` to an entry, as a texture of rows.
+  list(values, width, [format, layout, type]) {
+    const gl = this.gl, rows = Math.max(1, Math.ceil(values.length / width / kSide));
+    const made = this.texture(format, kSide, rows);
+    const whole = new values.constructor(rows * kSide * width);
+    whole.set(values);
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, kSide, rows, layout, type, whole);
+    return made;
+  }
+  emptyList(format, count) {
+    return this.target(format, kSide, Math.max(1, Math.ceil(count / kSide)));
+  }
+
+  setSurface(surface) {
+    const gl = this.gl;
+    for (const old of Object.values(this.lists || {})) {
+      gl.deleteTexture(old.made);
+      if (old.frame) gl.deleteFramebuffer(old.frame);
+    }
+    this.surface = surface;
+    this.landings = surface.slopes ? surface.vertices : 3 * surface.triangles;
+    this.lists = {
+      places: this.list(surface.places, 4, [gl.RGBA32F, gl.RGBA, gl.FLOAT]),
+      slopes: this.list(surface.slopes || new Float32Array(2), 2, [gl.RG32F, gl.RG, gl.FLOAT]),
+      corners: this.list(surface.corners || new Uint32Array(1), 1,
+                         [gl.R32UI, gl.RED_INTEGER, gl.UNSIGNED_INT]),
+      landings: this.emptyList(gl.RGBA32F, this.landings),
+      densities: this.emptyList(gl.RGBA32F, surface.triangles),
+    };
+  }
+
+  // Puts a program to work: its uniforms, and the textures that it reads by name.
+  use(program, numbers, textures) {
+    const gl = this.gl;
+    gl.useProgram(program.made);
+    Object.entries(textures).forEach(([name, texture], unit) => {
+      gl.activeTexture(gl.TEXTURE0 + unit);
+      gl.bindTexture(gl.TEXTURE_2D, texture.made);
+      gl.uniform1i(program.place(name), unit);
+    });
+    for (const [name, value] of Object.entries(numbers)) {
+      const place = program.place(name);
+      if (!place) continue;
+      if (Number.isInteger(value) && kWhole.has(name)) gl.uniform1i(place, value);
+      else if (typeof value === "boolean") gl.uniform1i(place, value ? 1 : 0);
+      else if (typeof value === "number") gl.uniform1f(place, value);
+      else if (name === "grid") gl.uniform2i(place, ...value);
+      else gl[`uniform${value.length}f`](place, ...value);
+    }
+  }
+  fill(target, rows) {
+    const gl = this.gl;
+    gl.bindFramebuffer(gl.FRAMEBUFFER, target ? target.frame : null);
+    const width = target ? target.width : this.canvas.width;
+    gl.viewport(0, 0, width, rows || (target ? target.height : this.canvas.height));
+    gl.disable(gl.BLEND);
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
+  }
+
+  // Begins a picture. halves: of the screen that is shown, mm. area: of the picture, mm2.
+  begin(halves, area) {
+    const gl = this.gl;
+    gl.bindFramebuffer(gl.FRAMEBUFFER, this.samples.frame);
+    gl.clearColor(0, 0, 0, 0);
+    gl.clear(gl.COLOR_BUFFER_BIT);
+    Object.assign(this, { halves, area, passes: 0, weights: 0, whole: 0, share: 0 });
+  }
+
+  surfaceNumbers() {
+    const { columns, rows, zigzag, corners, slopes } = this.surface;
+    return { grid: [columns, rows], layout_: corners ? 0 : zigzag ? 2 : 1, facets: !slopes };
+  }
+
+  // Where the light of every vertex lands, and how dense that of every triangle is.
+  trace(optics) {
+    const { places, slopes, corners, landings, densities } = this.lists;
+    const numbers = { ...this.surfaceNumbers(), ...optics };
+    const rows = (count) => Math.ceil(count / kSide);
+    this.use(this.landing, { ...numbers, count: this.landings }, { places, slopes, corners });
+    this.fill(landings, rows(this.landings));
+    this.use(this.triangle, { ...numbers, count: this.surface.triangles },
+             { places, slopes, corners, landings });
+    this.fill(densities, rows(this.surface.triangles));
+  }
+
+  read(target, width, height) {
+    const gl = this.gl, values = new Float32Array(4 * width * height);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, target.frame);
+    gl.readPixels(0, 0, width, height, gl.RGBA, gl.FLOAT, values);
+    return values;
+  }
+  // Light that the whole surface takes, mm2.
+  takenLight() {
+    const count = this.surface.triangles;
+    const values = this.read(this.lists.densities, kSide, Math.ceil(count / kSide));
+    let sum = 0;
+    for (let t = 0; t < count; ++t) sum += values[4 * t + 1];
+    return sum;
+  }
+
+  // Adds the light of one point of the source. whole: light that the surface takes, mm2, where that
+  // is known.
+  pass(optics, share, whole) {
+    const gl = this.gl, { places, slopes, corners, landings, densities } = this.lists;
+    this.trace(optics);
+    this.whole = this.whole || whole || this.takenLight();
+    const i = this.passes++;
+    const shift = [(i * 0.7548776662466927 + 0.5) % 1 - 0.5, (i * 0.5698402909980532 + 0.5) % 1 - 0.5];
+    gl.bindFramebuffer(gl.FRAMEBUFFER, this.samples.frame);
+    gl.viewport(0, 0, this.samples.width, this.samples.height);
+    gl.enable(gl.BLEND);
+    gl.blendFunc(gl.ONE, gl.ONE);
+    this.use(this.drawing, {
+      ...this.surfaceNumbers(), halves: this.halves, weight: share * this.area / this.whole,
+      shift: [2 * shift[0] * this.halves[0] / this.samples.width,
+              2 * shift[1] * this.halves[1] / this.samples.height],
+    }, { places, slopes, corners, landings, densities });
+    gl.drawArrays(gl.TRIANGLES, 0, 3 * this.surface.triangles);
+    this.share += share;
+  }
+
+  average() {
+    this.use(this.averaging, { each: this.each, gain: 1 / this.share }, { samples: this.samples });
+    this.fill(this.mean);
+  }
+  show(exposure) {
+    const { canvas } = this;
+    this.average();
+    this.use(this.showing, { exposure, size: [canvas.width, canvas.height] }, { picture: this.mean });
+    this.fill(null);
+  }
+  // Linear light, 1 for an evenly lit picture; row 0 on top.
+  picture() {
+    const [columns, rows] = this.pixels;
+    this.average();
+    const values = this.read(this.mean, columns, rows), picture = new Float32Array(columns * rows);
+    for (let r = 0; r < rows; ++r) {
+      for (let c = 0; c < columns; ++c) {
+        picture[r * columns + c] = values[4 * ((rows - 1 - r) * columns + c)];
+      }
+    }
+    return picture;
+  }
+
+  // Places on the lens from which light comes to a square on the screen, with what they send: the
+  // triangles whose light covers it. at: mm from the screen's centre.
+  sourcesOf(at, half) {
+    const lands = this.read(this.lists.landings, kSide, Math.ceil(this.landings / kSide));
+    const dense = this.read(this.lists.densities, kSide, Math.ceil(this.surface.triangles / kSide));
+    const { places, slopes, triangles } = this.surface, found = [];
+    for (let t = 0; t < triangles; ++t) {
+      if (!(dense[4 * t] > 0)) continue;
+      const v = cornersOf(this.surface, t), l = slopes ? v : [3 * t, 3 * t + 1, 3 * t + 2];
+      const p = [0, 1, 2].map((k) => [lands[4 * l[k]] - at[0], lands[4 * l[k] + 1] - at[1]]);
+      const covered = coveredArea(p, half);
+      if (!(covered > 0)) continue;
+      const middle = (k) => (places[4 * v[0] + k] + places[4 * v[1] + k] + places[4 * v[2] + k]) / 3;
+      found.push({ x: middle(0), y: middle(1), light: covered * dense[4 * t] });
+    }
+    return found;
+  }
+}
+
+// Uniforms that are whole numbers.
+const kWhole = new Set(["layout_", "steps", "count", "each"]);
+
+// Area of a triangle inside the square of half-side `half` about the origin (Sutherland and Hodgman).
+function coveredArea(triangle, half) {
+  for (let k = 0; k < 2; ++k) {
+    if (triangle.every((p) => p[k] > half) || triangle.every((p) => p[k] < -half)) return 0;
+  }
+  let polygon = triangle;
+  for (const [k, sign] of [[0, 1], [0, -1], [1, 1], [1, -1]]) {
+    const outside = (p) => sign * p[k] - half;
+    const kept = [];
+    polygon.forEach((p, i) => {
+      const q = polygon[(i + 1) % polygon.length], a = outside(p), b = outside(q);
+      if (a <= 0) kept.push(p);
+      if ((a < 0 && b > 0) || (a > 0 && b < 0)) {
+        const s = a / (a - b);
+        kept.push([p[0] + s * (q[0] - p[0]), p[1] + s * (q[1] - p[1])]);
+      }
+    });
+    polygon = kept;
+  }
+  let twice = 0;
+  polygon.forEach((p, i) => {
+    const q = polygon[(i + 1) % polygon.length];
+    twice += p[0] * q[1] - p[1] * q[0];
+  });
+  return Math.abs(twice) / 2;
+}

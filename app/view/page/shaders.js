@@ -1,0 +1,213 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The program's model of light on the graphics processor: core/optics/light_path.h for a ray,
+// design/optics/facet.h and smooth.h for a triangle. Millimetres, lens frame.
+
+const kSide = 2048;  // Numbers in a row of the textures that hold lists.
+
+const kHead = `#version 300 es
+precision highp float;
+precision highp int;
+precision highp sampler2D;
+precision highp usampler2D;
+ivec2 at(int i) { return ivec2(i % ${kSide}, i / ${kSide}); }
+`;
+
+// Vertices and triangles of the surface.
+const kSurface = `
+uniform sampler2D places;    // x y z
+uniform sampler2D slopes;    // dz/dx dz/dy
+uniform usampler2D corners;  // Of a mesh that is no grid.
+uniform ivec2 grid;          // Vertices along x and y.
+uniform int layout_;         // 0: corners are given, 1: one diagonal, 2: diagonals turn.
+uniform bool facets;
+vec3 place(int v) { return texelFetch(places, at(v), 0).xyz; }
+ivec3 corners_of(int t) {
+  if (layout_ == 0) {
+    return ivec3(texelFetch(corners, at(3 * t), 0).x, texelFetch(corners, at(3 * t + 1), 0).x,
+                 texelFetch(corners, at(3 * t + 2), 0).x);
+  }
+  int cell = t / 2, row = cell / (grid.x - 1);
+  int a = row * grid.x + cell % (grid.x - 1), d = a + grid.x;
+  if (layout_ == 2 && row % 2 == 0) return t % 2 == 0 ? ivec3(a, a + 1, d) : ivec3(a + 1, d + 1, d);
+  return t % 2 == 0 ? ivec3(a, a + 1, d + 1) : ivec3(a, d + 1, d);
+}
+`;
+
+// The way to the surface and after it.
+const kLight = `
+uniform bool mirror;
+uniform float eta;         // Index of the lens.
+uniform vec4 lamp;         // w 0: direction of parallel light; 1: place of a point.
+uniform vec4 front;        // Apex and curvature of a lens's entry face.
+uniform int steps;         // Towards where a ray enters.
+uniform vec3 centre, right, up, away;  // Of the screen.
+
+struct Ray { vec3 entry; vec3 way; float cosine; };
+
+Ray through_front(vec2 x) {
+  vec2 r = x - front.xy;
+  float root = sqrt(max(0.0, 1.0 - front.w * front.w * dot(r, r)));
+  vec3 e = vec3(x, front.z + front.w * dot(r, r) / (1.0 + root));
+  vec3 n = normalize(vec3(-front.w * r / max(root, 1e-6), 1.0));
+  vec3 a = lamp.w > 0.0 ? normalize(e - lamp.xyz) : lamp.xyz;
+  float c = dot(n, a);
+  float inside = sqrt(max(0.0, 1.0 - (1.0 - c * c) / (eta * eta)));
+  return Ray(e, (inside - c / eta) * n + a / eta, c > 0.0 ? inside : -1.0);
+}
+
+// The ray that comes to p: x moves to where the ray through it would have started. Every step
+// leaves an error of the lens's thickness over the focal length of its front.
+Ray ray_to(vec3 p) {
+  if (mirror) return Ray(p, lamp.w > 0.0 ? normalize(p - lamp.xyz) : lamp.xyz, 1.0);
+  Ray ray = through_front(p.xy);
+  for (int i = 0; i < steps; ++i) {
+    ray = through_front(p.xy - (p.z - ray.entry.z) * ray.way.xy / ray.way.z);
+  }
+  return ray;
+}
+
+// Right and up on the screen, mm from its centre, where light from p lands; z 0 if none does.
+vec3 land(vec3 p, vec3 n) {
+  vec3 a = ray_to(p).way;
+  float c = dot(n, a);
+  vec3 b;
+  if (mirror) {
+    if (c >= 0.0) return vec3(0.0);
+    b = a - 2.0 * c * n;
+  } else {
+    float s = 1.0 + eta * eta * (c * c - 1.0);
+    if (c <= 0.0 || s <= 0.0) return vec3(0.0);
+    b = (sqrt(s) - eta * c) * n + eta * a;
+  }
+  float towards = dot(away, b), distance_ = dot(away, centre - p);
+  if (b.z <= 0.0 || towards <= 0.0 || distance_ <= 0.0) return vec3(0.0);
+  vec3 l = (p - centre) + b * (distance_ / towards);
+  return vec3(dot(l, right), dot(l, up), 1.0);
+}
+`;
+
+const kFullScreen = kHead + `
+void main() { gl_Position = vec4(vec2(gl_VertexID & 1, gl_VertexID >> 1) * 4.0 - 1.0, 0.0, 1.0); }
+`;
+
+// Where the light of every vertex lands, or of every facet's corners.
+const kLanding = kHead + kSurface + kLight + `
+uniform int count;
+out vec4 landing;
+void main() {
+  int i = int(gl_FragCoord.y) * ${kSide} + int(gl_FragCoord.x);
+  if (i >= count) { landing = vec4(0.0); return; }
+  if (facets) {
+    ivec3 v = corners_of(i / 3);
+    vec3 p = place(v[0]), q = place(v[1]), r = place(v[2]);
+    landing = vec4(land(i % 3 == 0 ? p : i % 3 == 1 ? q : r, normalize(cross(q - p, r - p))), 0.0);
+  } else {
+    landing = vec4(land(place(i), normalize(vec3(-texelFetch(slopes, at(i), 0).xy, 1.0))), 0.0);
+  }
+}
+`;
+
+// Density and flux of every triangle: the light that it takes over the area that it lights.
+const kTriangle = kHead + kSurface + kLight + `
+uniform sampler2D landings;
+uniform int count;
+uniform vec4 source;   // Axis of a flat source; w 1: its light falls with the cosine.
+uniform float scale;   // mm2 per steradian.
+uniform bool loses;    // Faces reflect.
+uniform bool varies;   // Rays come to the front under different angles.
+out vec4 result;
+
+float transmittance(float c) {
+  float t = sqrt(max(0.0, 1.0 + eta * eta * (c * c - 1.0)));
+  float across = (eta * c - t) / (eta * c + t), along = (c - eta * t) / (c + eta * t);
+  return 1.0 - 0.5 * (across * across + along * along);
+}
+
+float passage(vec3 p, vec3 q, vec3 r) {
+  Ray ray = ray_to((p + q + r) / 3.0);
+  float both = transmittance(varies ? ray.cosine : 1.0) *
+               transmittance(dot(normalize(cross(q - p, r - p)), ray.way));
+  return both / (transmittance(1.0) * transmittance(1.0));
+}
+
+float intake(vec3 p, vec3 q, vec3 r) {
+  vec3 a = ray_to(p).entry, b = ray_to(q).entry, c = ray_to(r).entry;
+  vec3 area = cross(b - a, c - a);
+  if (lamp.w == 0.0) return 0.5 * dot(area, lamp.xyz) / lamp.z;
+  a -= lamp.xyz; b -= lamp.xyz; c -= lamp.xyz;
+  float la = length(a), lb = length(b), lc = length(c);
+  float d = la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb;
+  float even = scale * 2.0 * atan(dot(a, area), d);
+  return source.w > 0.0 ? even * dot(source.xyz, normalize(a + b + c)) : even;
+}
+
+void main() {
+  int t = int(gl_FragCoord.y) * ${kSide} + int(gl_FragCoord.x);
+  result = vec4(0.0);
+  if (t >= count) return;
+  ivec3 v = corners_of(t), l = facets ? ivec3(3 * t, 3 * t + 1, 3 * t + 2) : v;
+  vec3 p = place(v[0]), q = place(v[1]), r = place(v[2]);
+  float flux = intake(p, q, r);
+  if (loses) flux *= passage(p, q, r);
+  vec3 a = texelFetch(landings, at(l[0]), 0).xyz, b = texelFetch(landings, at(l[1]), 0).xyz,
+       c = texelFetch(landings, at(l[2]), 0).xyz;
+  float area = 0.5 * abs((b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x));
+  bool lit = a.z * b.z * c.z > 0.0 && flux > 0.0;
+  result = vec4(lit && area > 0.0 ? flux / area : 0.0, flux, 0.0, 0.0);
+}
+`;
+
+// The image triangles, their densities added up.
+const kDraw = kHead + kSurface + `
+uniform sampler2D landings;
+uniform sampler2D densities;
+uniform vec2 halves;  // Of the screen that is shown, mm.
+uniform vec2 shift;   // By which this pass is moved, in the same.
+uniform float weight;
+flat out float density;
+void main() {
+  int t = gl_VertexID / 3, k = gl_VertexID % 3;
+  density = weight * texelFetch(densities, at(t), 0).x;
+  vec2 l = texelFetch(landings, at(facets ? gl_VertexID : corners_of(t)[k]), 0).xy;
+  gl_Position = density > 0.0 ? vec4((l + shift) / halves, 0.0, 1.0) : vec4(2.0, 2.0, 2.0, 1.0);
+}
+`;
+const kAdd = kHead + `
+flat in float density;
+out vec4 light;
+void main() { light = vec4(density, 0.0, 0.0, 0.0); }
+`;
+
+// The mean over the samples of every pixel of the picture; row 0 at the bottom.
+const kPixels = kHead + `
+uniform sampler2D samples;
+uniform int each;  // Samples a pixel, each way.
+uniform float gain;
+out vec4 mean;
+void main() {
+  ivec2 first = each * ivec2(gl_FragCoord.xy);
+  float sum = 0.0;
+  for (int y = 0; y < each; ++y) {
+    for (int x = 0; x < each; ++x) sum += texelFetch(samples, first + ivec2(x, y), 0).x;
+  }
+  mean = vec4(gain * sum / float(each * each), 0.0, 0.0, 1.0);
+}
+`;
+
+// What the eye sees: display-encoded, with the colour of the light.
+const kShow = kHead + `
+uniform sampler2D picture;
+uniform vec2 size;       // Of the canvas, pixels.
+uniform float exposure;  // Factor.
+out vec4 color;
+float value(ivec2 p) { return texelFetch(picture, clamp(p, ivec2(0), textureSize(picture, 0) - 1), 0).x; }
+void main() {
+  vec2 p = gl_FragCoord.xy / size * vec2(textureSize(picture, 0)) - 0.5;
+  ivec2 i = ivec2(floor(p));
+  vec2 f = p - floor(p);
+  float light = exposure * mix(mix(value(i), value(i + ivec2(1, 0)), f.x),
+                               mix(value(i + ivec2(0, 1)), value(i + ivec2(1, 1)), f.x), f.y);
+  float shown = light <= 0.0031308 ? 12.92 * light : 1.055 * pow(light, 1.0 / 2.4) - 0.055;
+  color = vec4(vec3(clamp(shown, 0.0, 1.0)), 1.0);
+}
+`;

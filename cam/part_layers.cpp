@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cam/part_layers.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+
+#include "cam/milled/lens_grid.h"
+#include "core/error.h"
+
+namespace lensforge {
+namespace {
+
+/// Side of the tiles that are sampled at once, cells.
+constexpr std::int64_t kTile = 768;
+
+/// Nodes of one tile that are kept.
+void keep_nodes(const SurfacePatch& patch, const PartGrid& grid, const std::string& name,
+                LayeredImage& layers) {
+  const std::array values{&patch.z, &patch.slope_x, &patch.slope_y};
+  const std::array names{".z", ".slope_x", ".slope_y"};
+  const GridWindow& window = patch.window;
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    const auto layer = layers.layer(name + names[k]);
+    for (std::int64_t n = 0; n < window.size(); ++n) {
+      const std::int64_t column = window.first_column + n % window.columns;
+      const std::int64_t row = window.first_row + n / window.columns;
+      if (column % grid.every.x() != 0 || row % grid.every.y() != 0) continue;
+      const std::int64_t from_top = grid.nodes.y() - 1 - row / grid.every.y();
+      const std::int64_t at = from_top * grid.nodes.x() + column / grid.every.x();
+      layer[static_cast<std::size_t>(at)] =
+          static_cast<float>((*values[k])[static_cast<std::size_t>(n)]);
+    }
+  }
+}
+
+}  // namespace
+
+PartGrid part_grid(const Eigen::Vector2d& lens_size, double spacing, double most) {
+  const double coarse = std::sqrt(lens_size.prod() / most);
+  PartGrid grid;
+  for (int axis = 0; axis < 2; ++axis) {
+    const double length = lens_size[axis];
+    const int cells = std::max(1, static_cast<int>(std::floor(length / std::max(coarse, spacing))));
+    grid.nodes[axis] = cells + 1;
+    grid.every[axis] = std::max(1, static_cast<int>(std::ceil(length / cells / spacing)));
+  }
+  return grid;
+}
+
+LayeredImage surface_layers(const std::vector<NamedSurface>& surfaces,
+                            const Eigen::Vector2d& lens_size, double spacing,
+                            const Executor& executor, const RunControl& control) {
+  const PartGrid grid = part_grid(lens_size, spacing, kPartNodes);
+  std::vector<std::string> names;
+  for (const NamedSurface& surface : surfaces) {
+    for (const char* layer : {".z", ".slope_x", ".slope_y"}) names.push_back(surface.name + layer);
+  }
+  LayeredImage layers(grid.nodes.x(), grid.nodes.y(), names);
+  GridWindow fine;
+  const Eigen::Array2i cells = (grid.nodes.array() - 1) * grid.every.array();
+  fine.spacing = lens_size.cwiseQuotient(cells.cast<double>().matrix());
+  fine.columns = cells.x() + 1;
+  fine.rows = cells.y() + 1;
+  const std::vector<CellRange> tiles = tiles_of(all_cells(fine), kTile);
+  SurfacePatch patch;
+  for (std::size_t t = 0; t < tiles.size(); ++t) {
+    for (const NamedSurface& surface : surfaces) {
+      if (control.stop_requested()) throw Interrupted();
+      surface.field->sample(window_of(fine, tiles[t], 0), executor, patch);
+      keep_nodes(patch, grid, surface.name, layers);
+    }
+    control.report({"sample the part", static_cast<double>(t + 1),
+                    static_cast<double>(tiles.size()), "tiles"});
+  }
+  return layers;
+}
+
+LayeredImage cause_layers(const LeakageResult& leakage, double total) {
+  std::vector<const RenderedSurface*> surfaces{&leakage.designed};
+  for (const RenderedSurface& step : leakage.steps) surfaces.push_back(&step);
+  std::vector<std::string> names;
+  for (const RenderedSurface* surface : surfaces) names.push_back(surface->name);
+  const FluxPicture& part = leakage.part().picture;
+  LayeredImage layers(part.columns, part.rows, names);
+  for (const RenderedSurface* surface : surfaces) {
+    const Image image = surface->picture.image(total);
+    std::copy(image.values().begin(), image.values().end(), layers.layer(surface->name).begin());
+  }
+  return layers;
+}
+
+}  // namespace lensforge

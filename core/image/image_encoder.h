@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <OpenImageIO/imageio.h>
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "core/compute/run_control.h"
+
+namespace lensforge {
+
+/// Gives the pixels of some rows as a file of a format wants them.
+using EncodedRows = std::function<const void*(int first, int end)>;
+
+/// The bytes of a picture file that bears the program's mark.
+/// @param what       what to name in messages. @param extension  ".png", ".exr".
+/// @throw RunError if it cannot be encoded; Interrupted.
+std::vector<unsigned char> encode_rows(const std::string& what, OIIO::ImageSpec spec,
+                                       const std::string& extension, const EncodedRows& rows,
+                                       const RunControl& control);
+
+}  // namespace lensforge

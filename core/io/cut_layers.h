@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <array>
+
+namespace lensforge::lens_file {
+
+/// Files that `cam` writes beside kCutFiles, for a page to draw the part from: its surfaces, and
+/// what each cause of wrong light makes of the picture.
+inline constexpr const char* kPartSurfaces = "part.exr";
+inline constexpr const char* kCausePictures = "causes.exr";
+inline constexpr std::array kCutLayers = {kPartSurfaces, kCausePictures};
+
+}  // namespace lensforge::lens_file

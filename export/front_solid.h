@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+#include "core/optics/front_surface.h"
+
+namespace lensforge {
+
+/// Volume between a spherical front and the plane z = 0 over a rectangle, mm³; counted below 0
+/// where the front lies below the plane. Exact but for rounding. @pre the front covers the
+/// rectangle.
+double volume_below(const SphericalFront& front, const Eigen::AlignedBox2d& box);
+
+}  // namespace lensforge

@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The light that a page draws in a real browser is that of the program, for every kind of light.
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <tuple>
+
+#include "app/view/browser.h"
+#include "app/view/lens_view.h"
+#include "app/view/view_page.h"
+#include "core/optics/front_placement.h"
+#include "core/optics/light_path.h"
+#include "core/surface/grid_mesh.h"
+#include "core/temp_folder.h"
+#include "design/render_lens.h"
+
+namespace lensforge {
+namespace {
+
+using testing::PageRun;
+
+const Eigen::Vector2d kSize(24.0, 20.0);
+
+struct KindOfLight {
+  const char* name;
+  void (*apply)(OpticalSetup&);
+};
+
+void along_z(OpticalSetup&) {}
+void seen_from_the_rear(OpticalSetup& setup) { setup.view = ViewSide::kRear; }
+void from_the_side(OpticalSetup& setup) {
+  setup.light = Eigen::Vector3d(0.25, -0.15, 1.0).normalized();
+}
+void turned_screen(OpticalSetup& setup) {
+  const Eigen::Matrix3d turn = (Eigen::AngleAxisd(0.5, Eigen::Vector3d::UnitX()) *
+                                Eigen::AngleAxisd(-0.2, Eigen::Vector3d::UnitY()))
+                                   .toRotationMatrix();
+  setup.screen_x = turn.col(0);
+  setup.screen_y = turn.col(1);
+}
+void point_source(OpticalSetup& setup) {
+  setup.point = PointSource{{0.5 * kSize.x() + 5.0, 0.5 * kSize.y(), -90.0}, Emission::kLambertian};
+}
+void reflecting_faces(OpticalSetup& setup) {
+  point_source(setup);
+  setup.fresnel = true;
+}
+void mirror(OpticalSetup& setup) {
+  setup.mode = LightMode::kReflect;
+  setup.light = Eigen::Vector3d(0.5, 0.0, -std::sqrt(0.75));
+}
+void lit_mirror(OpticalSetup& setup) {
+  setup.mode = LightMode::kReflect;
+  setup.point = PointSource{{-90.0, 0.5 * kSize.y(), 150.0}, Emission::kIsotropic};
+}
+void convex_front(OpticalSetup& setup) { setup.front = spherical_front(120.0, kSize); }
+void point_concave_front(OpticalSetup& setup) {
+  point_source(setup);
+  setup.front = spherical_front(-120.0, kSize);
+}
+void wide_source(OpticalSetup& setup) { setup.extent.width = 0.03; }
+void wide_point(OpticalSetup& setup) {
+  point_source(setup);
+  setup.extent = {4.0, {2, 2, {1.0, 0.0, 0.5, 2.0}}};
+}
+
+constexpr KindOfLight kKinds[] = {{"AlongZ", along_z},
+                                  {"SeenFromTheRear", seen_from_the_rear},
+                                  {"Oblique", from_the_side},
+                                  {"TurnedScreen", turned_screen},
+                                  {"Point", point_source},
+                                  {"ReflectingFaces", reflecting_faces},
+                                  {"Mirror", mirror},
+                                  {"PointOnMirror", lit_mirror},
+                                  {"ConvexFront", convex_front},
+                                  {"PointConcaveFront", point_concave_front},
+                                  {"WideSource", wide_source},
+                                  {"WidePoint", wide_point}};
+
+/// A lens with a picture of its own making, some light of which passes beside it.
+Lens bumpy_lens(const KindOfLight& kind, SurfaceModel model) {
+  Lens lens;
+  lens.model = model;
+  lens.setup.lens_size = kSize;
+  lens.setup.image_size = 1.1 * kSize;
+  lens.setup.focal_length = 120.0;
+  lens.setup.pixels = {48, 40};
+  kind.apply(lens.setup);
+  const Eigen::Vector2d middle =
+      0.5 * kSize + (lens.setup.focal_length - 5.0) * LightPath(lens.setup).chief_slope(5.0);
+  lens.setup.image_origin = middle - 0.5 * lens.setup.image_size;
+  lens.surface = make_grid_mesh(kSize, {61, 59}, 5.0);
+  for (auto p : lens.surface.vertices.colwise()) {
+    p.z() += 0.05 * std::sin(0.5 * p.x() + 0.2) * std::cos(0.4 * p.y());
+  }
+  lens.target = Image(48, 40, 0.4F);
+  const Executor executor = Executor::cpu(2);
+  evaluate(lens.surface, lens.setup, model, lens.target, &lens.render, executor);
+  return lens;
+}
+
+using Case = std::tuple<KindOfLight, SurfaceModel>;
+
+class PageLight : public ::testing::TestWithParam<Case> {};
+
+std::string name_of(const ::testing::TestParamInfo<Case>& one) {
+  return std::get<0>(one.param).name + std::string("_") + model_name(std::get<1>(one.param));
+}
+
+INSTANTIATE_TEST_SUITE_P(Smooth, PageLight,
+                         ::testing::Combine(::testing::ValuesIn(kKinds),
+                                            ::testing::Values(SurfaceModel::kSmooth)),
+                         name_of);
+INSTANTIATE_TEST_SUITE_P(Facets, PageLight,
+                         ::testing::Combine(::testing::Values(KindOfLight{"AlongZ", along_z},
+                                                              KindOfLight{"Point",
+                                                                          reflecting_faces},
+                                                              KindOfLight{"Mirror", lit_mirror}),
+                                            ::testing::Values(SurfaceModel::kFacet)),
+                         name_of);
+
+/// The picture of a page whose script gave it row by row.
+Image picture_of(const nlohmann::json& values, const Image& like) {
+  Image image(like.columns(), like.rows());
+  for (std::size_t i = 0; i < image.values().size(); ++i) {
+    image.values()[i] = values.at(i).get<float>();
+  }
+  return image;
+}
+
+TEST_P(PageLight, IsTheProgramsPicture) {
+  if (!testing::has_browser()) GTEST_SKIP() << "chromium is not installed";
+  const Lens lens = bumpy_lens(std::get<0>(GetParam()), std::get<1>(GetParam()));
+  const testing::TempFolder folder;
+  const LensView view = view_of_lens(lens, "bumps", Executor::cpu(2));
+  testing::write_bytes(folder / "view.html", view_page(view));
+  const PageRun run = testing::run_page(
+      folder / "view.html",
+      "await lensView.finished(); return { picture: Array.from(lensView.picture()), "
+      "said: lensView.error };");
+  EXPECT_EQ(run.error, "");
+  EXPECT_TRUE(run.console.empty()) << run.console.front();
+  EXPECT_TRUE(run.requests.empty());
+  ASSERT_TRUE(run.result.is_object());
+  const double error = compare(picture_of(run.result["picture"], lens.render), lens.render).mae;
+  EXPECT_LT(error, 0.004);
+  EXPECT_NEAR(run.result["said"].get<double>(), error, 1e-4);
+  // Two pixels aside it would not be.
+  Image moved = lens.render;
+  std::rotate(moved.values().begin(), moved.values().begin() + 2, moved.values().end());
+  EXPECT_GT(compare(moved, lens.render).mae, 2.0 * error);
+}
+
+}  // namespace
+}  // namespace lensforge

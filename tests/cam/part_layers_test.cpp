@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cam/part_layers.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "cam/analytic_fields.h"
+
+namespace lensforge {
+namespace {
+
+const Eigen::Vector2d kSize(30.0, 20.0);
+
+TEST(PartLayers, GridIsEvenAndAsFineAsAsked) {
+  const PartGrid grid = part_grid(kSize, 0.01, 6000.0);
+  EXPECT_NEAR(grid.nodes.cast<double>().prod(), 6000.0, 300.0);
+  for (int axis = 0; axis < 2; ++axis) {
+    EXPECT_LE(kSize[axis] / (grid.nodes[axis] - 1) / grid.every[axis], 0.01 * (1.0 + 1e-12));
+  }
+  // No finer than what is sampled.
+  EXPECT_EQ(part_grid(kSize, 1.0, 1e6).nodes, Eigen::Vector2i(31, 21));
+  EXPECT_EQ(part_grid(kSize, 1.0, 1e6).every, Eigen::Vector2i(1, 1));
+}
+
+TEST(PartLayers, EveryNodeHasTheSurfacesHeightAndSlopesTheUppermostFirst) {
+  const testing::AnalyticField wave([](const Eigen::Vector2d& p) {
+    return testing::SurfacePoint{5.0 + std::sin(p.x()) + 0.1 * p.y(), {std::cos(p.x()), 0.1}, 0};
+  });
+  const testing::AnalyticField plane(testing::plane({0.2, -0.3}));
+  const LayeredImage layers =
+      surface_layers({{"a", &wave}, {"b", &plane}}, kSize, 0.04, Executor::cpu(2), RunControl());
+  EXPECT_EQ(layers.names().size(), 6U);
+  const PartGrid grid = part_grid(kSize, 0.04, kPartNodes);
+  ASSERT_EQ(layers.columns(), grid.nodes.x());
+  ASSERT_EQ(layers.rows(), grid.nodes.y());
+  for (int row = 0; row < layers.rows(); row += 7) {
+    for (int column = 0; column < layers.columns(); column += 7) {
+      const double x = kSize.x() * column / (layers.columns() - 1);
+      const double y = kSize.y() * (1.0 - static_cast<double>(row) / (layers.rows() - 1));
+      const auto at = static_cast<std::size_t>(row * layers.columns() + column);
+      EXPECT_NEAR(layers.layer("a.z")[at], 5.0 + std::sin(x) + 0.1 * y, 1e-6);
+      EXPECT_NEAR(layers.layer("a.slope_x")[at], std::cos(x), 1e-6);
+      EXPECT_NEAR(layers.layer("a.slope_y")[at], 0.1, 1e-6);
+      EXPECT_NEAR(layers.layer("b.z")[at], 5.0 + 0.2 * x - 0.3 * y, 1e-6);
+      EXPECT_NEAR(layers.layer("b.slope_y")[at], -0.3, 1e-6);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace lensforge

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "tracer/lens_files.h"
+
+namespace tracer {
+
+/// A ray on its way to a point of the surface.
+struct Ray {
+  Vec3 from;  ///< Where it enters the lens; of a mirror the point itself.
+  Vec3 way;   ///< Unit direction in which it comes to the point.
+};
+
+/// The light of a lens.json, followed ray by ray. Millimetres.
+class TracedLight {
+ public:
+  /// @throw std::runtime_error if the file tells of something that is not followed.
+  explicit TracedLight(const nlohmann::json& lens);
+
+  /// The ray to a point of the surface; none where no light comes to it.
+  [[nodiscard]] std::optional<Ray> ray_to(const Vec3& p) const;
+
+  /// Light through a small triangle, on any scale that is the same for all of them.
+  [[nodiscard]] double light_through(const Ray& a, const Ray& b, const Ray& c) const;
+
+  /// Where a ray that meets a surface of unit normal n at p lands, in columns and rows of the
+  /// picture; none if it does not get to the screen.
+  [[nodiscard]] std::optional<Vec2> landing(const Ray& ray, const Vec3& p, const Vec3& n) const;
+
+ private:
+  /// A point of the front face and its normal, towards the inside.
+  struct Front {
+    Vec3 place;
+    Vec3 normal;
+  };
+  [[nodiscard]] std::optional<Front> front_at(const Vec2& place) const;
+  /// Where the light that enters there passes the height of p, from p.
+  [[nodiscard]] std::optional<Vec2> miss(const Vec2& entry, const Vec3& p, Ray& ray) const;
+  [[nodiscard]] std::optional<Ray> through_front(const Vec3& p) const;
+
+  bool mirror_;
+  double ior_ = 1.0;
+  std::optional<Vec3> source_;  ///< Of light from a point.
+  Vec3 direction_;              ///< Of parallel light.
+  std::optional<Vec3> axis_;    ///< Of a flat source.
+  double radius_ = 0.0;         ///< Of a spherical front; 0 of a flat one.
+  Vec3 apex_;
+  Vec3 centre_;  ///< Of the screen.
+  Vec3 right_;
+  Vec3 up_;
+  Vec2 size_;
+  Vec2 pixels_;
+};
+
+}  // namespace tracer
