@@ -51,10 +51,10 @@ class Strips {
 
 void add(const SampledSurface& strip, const LightPath& light, const FluxAccumulator& picture) {
   const SurfaceMesh& mesh = strip.mesh;
-  std::vector<FrontEntry> entries;
-  const SurfaceView surface{mesh.triangles.data(), mesh.vertices.data(), light,
-                            enter_vertices(Executor::serial(), light, mesh.vertices.data(),
-                                           mesh.vertex_count(), entries)};
+  std::vector<IncidentRay> rays;
+  const SurfaceView surface{
+      mesh.triangles.data(), mesh.vertices.data(), light,
+      find_rays(Executor::serial(), light, mesh.vertices.data(), mesh.vertex_count(), rays)};
   Eigen::Matrix2Xd landing(2, mesh.vertex_count());
   const LandRay land{surface, strip.normals.data(), landing.data()};
   for (std::int64_t v = 0; v < mesh.vertex_count(); ++v) land(v);

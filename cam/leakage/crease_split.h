@@ -43,7 +43,7 @@ struct SurfaceSide {
 /// NaN if the light is reflected totally.
 /// @param known  LightPath::enter() of the point, if it has been found before.
 inline Eigen::Vector2d land_of(const LightPath& light, const Eigen::Vector2d& place, double z,
-                               const Eigen::Vector2d& slope, const FrontEntry* known = nullptr) {
+                               const Eigen::Vector2d& slope, const IncidentRay* known = nullptr) {
   const Eigen::Vector3d n = Eigen::Vector3d(-slope.x(), -slope.y(), 1.0).normalized();
   const Eigen::Vector3d p(place.x(), place.y(), z);
   if (!light.transmits(p, n, known)) {

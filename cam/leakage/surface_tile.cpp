@@ -38,12 +38,12 @@ void SurfaceTile::load(const SurfaceField& field, const CellRange& range,
   const std::int64_t count = window.size();
   LF_CHECK(static_cast<std::int64_t>(patch_.z.size()) == count, std::to_string(patch_.z.size()));
   landing_.resize(static_cast<std::size_t>(count));
-  if (light_.is_bent()) entries_.resize(static_cast<std::size_t>(count));
+  if (light_.varies()) entries_.resize(static_cast<std::size_t>(count));
   parallel_for(executor, "land nodes", count, [this](std::int64_t i) {
     const auto k = static_cast<std::size_t>(i);
     const Eigen::Vector2d at =
         patch_.window.node(i % patch_.window.columns, i / patch_.window.columns);
-    if (light_.is_bent()) entries_[k] = light_.enter({at.x(), at.y(), patch_.z[k]});
+    if (light_.varies()) entries_[k] = light_.ray_to({at.x(), at.y(), patch_.z[k]});
     landing_[k] =
         land_of(light_, at, patch_.z[k], {patch_.slope_x[k], patch_.slope_y[k]}, entry(k));
   });

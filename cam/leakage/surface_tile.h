@@ -119,7 +119,7 @@ class SurfaceTile {
   /// triangles, cancels that to second order in the spacing: 1 % is left.
   void sharpen_landing(const Executor& executor);
   [[nodiscard]] Eigen::Vector3d point(std::size_t node) const;
-  [[nodiscard]] const FrontEntry* entry(std::size_t node) const {
+  [[nodiscard]] const IncidentRay* entry(std::size_t node) const {
     return entries_.empty() ? nullptr : &entries_[node];
   }
   [[nodiscard]] SurfaceSide side_of(std::size_t node) const;
@@ -136,7 +136,7 @@ class SurfaceTile {
   std::int64_t halo_columns_ = 0;  ///< Nodes of the patch left of the tile.
   std::int64_t halo_rows_ = 0;
   SurfacePatch patch_;
-  std::vector<FrontEntry> entries_;         ///< One per node behind a curved front, else none.
+  std::vector<IncidentRay> entries_;        ///< One per node in light that varies, else none.
   std::vector<Eigen::Vector2d> landing_;    ///< One per node, pixel coordinates; NaN without light.
   std::vector<Eigen::Vector2d> sharpened_;  ///< What becomes of it; kept for its memory.
 };

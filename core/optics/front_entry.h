@@ -4,11 +4,11 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <cmath>
-#include <cstdint>
 #include <limits>
 
 #include "core/compute/host_device.h"
 #include "core/optics/front_surface.h"
+#include "core/optics/incident_ray.h"
 #include "core/optics/refraction.h"
 
 namespace lensforge {
@@ -31,8 +31,6 @@ struct FrontRefraction {
   Eigen::Vector2d gradient{0.0, 0.0};  ///< ∇h
   Eigen::Vector3d b_by_x{0.0, 0.0, 0.0};
   Eigen::Vector3d b_by_y{0.0, 0.0, 0.0};
-  double inside = 1.0;  ///< n·b
-  Eigen::Vector2d inside_by_x{0.0, 0.0};
   bool lit = false;  ///< False where the light comes from the other side.
 
   FrontRefraction() = default;
@@ -53,7 +51,6 @@ struct FrontRefraction {
     const double root = std::sqrt(refracted_cosine_squared(c, eta));
     const double k = root - eta * c;
     b = k * n + eta * a;
-    inside = root;
     for (int j = 0; j < 2; ++j) {
       const Eigen::Vector3d dw(-h.bend[j], -h.bend[j + 1], 0.0);
       const Eigen::Vector3d dn = (dw - n.dot(dw) * n) / length;
@@ -61,8 +58,7 @@ struct FrontRefraction {
       Eigen::Vector3d da(0.0, 0.0, 0.0);
       if (light.point) da = (de - a.dot(de) * a) / distance;
       const double dc = dn.dot(a) + n.dot(da);
-      inside_by_x[j] = eta * eta * c / root * dc;
-      const double dk = inside_by_x[j] - eta * dc;
+      const double dk = (eta * eta * c / root - eta) * dc;
       (j == 0 ? b_by_x : b_by_y) = dk * n + k * dn + eta * da;
     }
   }
@@ -72,110 +68,63 @@ struct FrontRefraction {
     return {nan, nan, nan};
   }
   [[nodiscard]] LF_HD Eigen::Vector2d slope() const { return {b.x() / b.z(), b.y() / b.z()}; }
+  /// Derivative of slope() by x.
+  [[nodiscard]] LF_HD Eigen::Matrix2d slope_by_x() const {
+    const Eigen::Vector2d m = slope();
+    Eigen::Matrix2d by_x;
+    for (int j = 0; j < 2; ++j) {
+      const Eigen::Vector3d& db = j == 0 ? b_by_x : b_by_y;
+      by_x.col(j) = (Eigen::Vector2d(db.x(), db.y()) - db.z() * m) / b.z();
+    }
+    return by_x;
+  }
+  /// @param x_by_p  change of x with the point behind the front whose ray this is.
+  [[nodiscard]] LF_HD IncidentRay ray(const Eigen::Matrix2d& x_by_p) const {
+    return {slope(), {e.x(), e.y()}, e.z(), b.z(), gradient, slope_by_x() * x_by_p, x_by_p};
+  }
   /// To another point of the front, to first order.
   LF_HD void move(const Eigen::Vector2d& step) {
     e += Eigen::Vector3d(step.x(), step.y(), gradient.dot(step));
     b += step.x() * b_by_x + step.y() * b_by_y;
-    inside += inside_by_x.dot(step);
   }
 };
+
+/// The last step of Newton's method, as a share of the point's coordinates, and in mm where they
+/// are 0, is taken to first order: what is left is of the order of its square. Lenses need three or
+/// four steps.
+inline constexpr double kNearEntry = 1e-9;
+inline constexpr double kTinyEntry = 1e-12;
+inline constexpr int kMaxEntrySteps = 30;
 
 /// The ray from a source through a curved front to a point p behind it: Newton's method on
-/// x + (p_z − h(x)) m(x) = p_xy.
-class FrontEntry {
- public:
-  FrontEntry() = default;
-  LF_HD FrontEntry(const FrontSurface& front, const FrontLight& light, const Eigen::Vector3d& p) {
-    Eigen::Vector2d x(p.x(), p.y());
-    if (!front.covers(x)) return;
-    for (int i = 0; i < kMaxSteps; ++i) {
-      const FrontRefraction ray(front, light, x);
-      if (!ray.lit || !(ray.b.z() > 0.0)) return;
-      const Eigen::Vector2d m = ray.slope();
-      const double rise = p.z() - ray.e.z();
-      Eigen::Matrix2d lands = Eigen::Matrix2d::Identity();
-      for (int j = 0; j < 2; ++j) {
-        const Eigen::Vector3d& db = j == 0 ? ray.b_by_x : ray.b_by_y;
-        const Eigen::Vector2d dm = (Eigen::Vector2d(db.x(), db.y()) - db.z() * m) / ray.b.z();
-        lands.col(j) += rise * dm - ray.gradient[j] * m;
-      }
-      // Beyond where neighbouring rays meet, the light has folded over.
-      const double det = lands(0, 0) * lands(1, 1) - lands(0, 1) * lands(1, 0);
-      if (!(det > 0.0)) return;
-      Eigen::Matrix2d inverse;
-      inverse << lands(1, 1), -lands(0, 1), -lands(1, 0), lands(0, 0);
-      inverse /= det;
-      Eigen::Vector2d step = inverse * (x + rise * m - Eigen::Vector2d(p.x(), p.y()));
-      if (step.norm() <= kNear * (p.cwiseAbs().sum() + std::fabs(ray.e.z())) + kTiny) {
-        ray_ = ray;
-        ray_.move(-step);
-        inverse_ = inverse;
-        return;
-      }
-      for (int k = 0; k < kMaxSteps && !front.covers(x - step); ++k) step *= 0.5;
-      x -= step;
+/// x + (p_z − h(x)) m(x) = p_xy. All NaN where none comes to p.
+LF_HD inline IncidentRay ray_through_front(const FrontSurface& front, const FrontLight& light,
+                                           const Eigen::Vector3d& p) {
+  IncidentRay found = FrontRefraction().ray(Eigen::Matrix2d::Identity());
+  Eigen::Vector2d x(p.x(), p.y());
+  if (!front.covers(x)) return found;
+  for (int i = 0; i < kMaxEntrySteps; ++i) {
+    FrontRefraction ray(front, light, x);
+    if (!ray.lit || !(ray.b.z() > 0.0)) return found;
+    const Eigen::Vector2d m = ray.slope();
+    const double rise = p.z() - ray.e.z();
+    Eigen::Matrix2d lands = Eigen::Matrix2d::Identity() + rise * ray.slope_by_x();
+    for (int j = 0; j < 2; ++j) lands.col(j) -= ray.gradient[j] * m;
+    // Beyond where neighbouring rays meet, the light has folded over.
+    const double det = lands(0, 0) * lands(1, 1) - lands(0, 1) * lands(1, 0);
+    if (!(det > 0.0)) return found;
+    Eigen::Matrix2d inverse;
+    inverse << lands(1, 1), -lands(0, 1), -lands(1, 0), lands(0, 0);
+    inverse /= det;
+    Eigen::Vector2d step = inverse * (x + rise * m - Eigen::Vector2d(p.x(), p.y()));
+    if (step.norm() <= kNearEntry * (p.cwiseAbs().sum() + std::fabs(ray.e.z())) + kTinyEntry) {
+      ray.move(-step);
+      return ray.ray(inverse);
     }
+    for (int k = 0; k < kMaxEntrySteps && !front.covers(x - step); ++k) step *= 0.5;
+    x -= step;
   }
-
-  /// Direction behind the front; NaN where no ray comes to p.
-  [[nodiscard]] LF_HD const Eigen::Vector3d& direction() const { return ray_.b; }
-  /// Where the ray enters the front; NaN where none comes to p.
-  [[nodiscard]] LF_HD const Eigen::Vector3d& entry() const { return ray_.e; }
-
-  /// Cosine of the angle between direction() and the front's normal there.
-  [[nodiscard]] LF_HD double cosine() const { return ray_.inside; }
-
-  /// Adjoint of p ↦ direction(): the derivative by p.
-  [[nodiscard]] LF_HD Eigen::Vector3d direction_adjoint(const Eigen::Vector3d& b_bar) const {
-    return place_adjoint({ray_.b_by_x.dot(b_bar), ray_.b_by_y.dot(b_bar)});
-  }
-  /// Adjoint of p ↦ entry(): the derivative by p.
-  [[nodiscard]] LF_HD Eigen::Vector3d entry_adjoint(const Eigen::Vector3d& e_bar) const {
-    return place_adjoint(Eigen::Vector2d(e_bar.x(), e_bar.y()) + e_bar.z() * ray_.gradient);
-  }
-
-  /// Adjoint of p ↦ cosine(): the derivative by p.
-  [[nodiscard]] LF_HD Eigen::Vector3d cosine_adjoint(double bar) const {
-    return place_adjoint(bar * ray_.inside_by_x);
-  }
-
- private:
-  /// The last step of Newton's method, as a share of the point's coordinates, and in mm where they
-  /// are 0, is taken to first order: what is left is of the order of its square. Lenses need three
-  /// or four steps.
-  static constexpr double kNear = 1e-9;
-  static constexpr double kTiny = 1e-12;
-  static constexpr int kMaxSteps = 30;
-
-  /// By the rule of implicit functions: ∂x/∂p = L⁻¹ (1, −m), L the derivative of where x's ray
-  /// meets the height of p.
-  [[nodiscard]] LF_HD Eigen::Vector3d place_adjoint(const Eigen::Vector2d& x_bar) const {
-    const Eigen::Vector2d w = inverse_.transpose() * x_bar;
-    return {w.x(), w.y(), -ray_.slope().dot(w)};
-  }
-
-  FrontRefraction ray_;
-  Eigen::Matrix2d inverse_ = Eigen::Matrix2d::Identity();  ///< L⁻¹
-};
-
-/// Entries of the rays to a triangle's corners, where they have been found before: null elsewhere.
-struct CornerEntries {
-  const FrontEntry* e0 = nullptr;
-  const FrontEntry* e1 = nullptr;
-  const FrontEntry* e2 = nullptr;
-};
-
-/// Entries of the rays to all vertices of a mesh behind a curved front; none behind a flat one.
-struct VertexEntries {
-  const FrontEntry* of = nullptr;
-  std::int64_t count = 0;
-
-  [[nodiscard]] LF_HD const FrontEntry* at(std::int64_t vertex) const {
-    return count > 0 ? of + vertex : nullptr;
-  }
-  [[nodiscard]] LF_HD CornerEntries at(const int* triangle) const {
-    return {at(triangle[0]), at(triangle[1]), at(triangle[2])};
-  }
-};
+  return found;
+}
 
 }  // namespace lensforge

@@ -18,20 +18,20 @@
 /// Notation: p surface point and t surface triangle, mm in the lens frame; n unit normal, n_z > 0;
 /// a unit direction of the light before the surface, inside a lens; b that of the ray after it, m
 /// its slope (dx/dz, dy/dz); u landing point in pixel coordinates. A bar (…_bar) is a derivative by
-/// that. `known` are entries that enter() gave for the same points: a caller that asks several
-/// times behind a curved front finds them once.
+/// that. `known` are the rays that ray_to() gave for the same points: a caller that asks several
+/// times finds them once.
 namespace lensforge {
 
 /// Light after a plane facet. Parallel light leaves it as one beam; light from a point has a beam
 /// for each corner.
 struct FacetBeam {
-  RefractedBeam beam;  ///< Of the first corner.
-  Eigen::Vector2d m1;  ///< Slopes of the others.
-  Eigen::Vector2d m2;
-  CornerEntries known;
+  RefractedBeam b0;
+  RefractedBeam b1;
+  RefractedBeam b2;
+  CornerRays known;
 
   [[nodiscard]] LF_HD const Eigen::Vector2d& slope(int corner) const {
-    return corner == 0 ? beam.m : (corner == 1 ? m1 : m2);
+    return corner == 0 ? b0.m : (corner == 1 ? b1.m : b2.m);
   }
 };
 
@@ -63,15 +63,17 @@ class LightPath {
   /// Ties the screen's millimetres to the picture's pixels.
   [[nodiscard]] LF_HD const ImagePlane& plane() const { return screen_.plane(); }
 
-  /// True behind a curved front, where the ray to a point has to be solved for.
-  [[nodiscard]] LF_HD bool is_bent() const { return source_.is_bent(); }
-  /// Where the ray to p enters that front. @pre is_bent().
-  [[nodiscard]] LF_HD FrontEntry enter(const Eigen::Vector3d& p) const { return source_.enter(p); }
+  /// True if light comes to each point from another direction, which has to be solved for.
+  [[nodiscard]] LF_HD bool varies() const { return source_.varies(); }
+  /// The ray that comes to p. @pre varies().
+  [[nodiscard]] LF_HD IncidentRay ray_to(const Eigen::Vector3d& p) const {
+    return source_.ray_to(p);
+  }
 
   /// True if a surface of this normal sends the light towards the screen. Rays along +z then do not
   /// meet the height field again (Sun et al., Appendix B).
   [[nodiscard]] LF_HD bool transmits(const Eigen::Vector3d& p, const Eigen::Vector3d& n,
-                                     const FrontEntry* known = nullptr) const {
+                                     const IncidentRay* known = nullptr) const {
     if (source_.along_z()) {
       return n.z() > 0.0 && refracted_cosine_squared(n.z(), eta_) > 0.0 &&
              (!screen_.turned() || screen_.faces(RefractedBeam(n, eta_).m));
@@ -80,28 +82,26 @@ class LightPath {
   }
   /// The same of a whole facet.
   [[nodiscard]] LF_HD bool transmits(const Corners& t, const Eigen::Vector3d& n,
-                                     const CornerEntries& known = {}) const {
+                                     const CornerRays& known = {}) const {
     if (!source_.varies()) return transmits(t.v0, n);
-    return transmits(t.v0, n, known.e0) && transmits(t.v1, n, known.e1) &&
-           transmits(t.v2, n, known.e2);
+    return transmits(t.v0, n, known.r0) && transmits(t.v1, n, known.r1) &&
+           transmits(t.v2, n, known.r2);
   }
 
   /// Barrier of a facet against what its light must not do; infinite where no light leaves. Of a
   /// lens f_tir of Sun et al., Eq. 9, of a mirror 1 / (−n·a b_z); of light from a point the mean
   /// over the corners.
   [[nodiscard]] LF_HD double barrier(const Corners& t, const Eigen::Vector3d& n,
-                                     const CornerEntries& known = {}) const {
+                                     const CornerRays& known = {}) const {
     if (source_.along_z()) return barrier_along_z(n).value;
-    if (!source_.varies()) return barrier_at(source_.direction(), n).value;
-    return (barrier_at(source_.incident(t.v0, known.e0), n).value +
-            barrier_at(source_.incident(t.v1, known.e1), n).value +
-            barrier_at(source_.incident(t.v2, known.e2), n).value) /
-           3.0;
+    if (!source_.varies()) return barrier_value(source_.direction(), n);
+    return varied_barrier(t, n, known);
   }
   /// Adjoint of barrier(): adds weight × the derivatives by corners and normal, returns barrier().
+  /// @pre barrier() is finite.
   LF_HD double barrier_adjoint(const Corners& t, const Eigen::Vector3d& n, double weight,
                                Corners& t_bar, Eigen::Vector3d& n_bar,
-                               const CornerEntries& known = {}) const {
+                               const CornerRays& known = {}) const {
     if (source_.along_z()) {
       const ValueSlope f = barrier_along_z(n);
       n_bar.z() += weight * f.slope;
@@ -112,14 +112,12 @@ class LightPath {
       n_bar += weight * f.by_n;
       return f.value;
     }
-    return corner_barrier(t.v0, n, weight / 3.0, t_bar.v0, n_bar, known.e0) +
-           corner_barrier(t.v1, n, weight / 3.0, t_bar.v1, n_bar, known.e1) +
-           corner_barrier(t.v2, n, weight / 3.0, t_bar.v2, n_bar, known.e2);
+    return varied_barrier_adjoint(t, n, weight, t_bar, n_bar, known);
   }
 
   /// The ray after the surface. @pre transmits(p, n).
   [[nodiscard]] LF_HD RefractedBeam beam(const Eigen::Vector3d& p, const Eigen::Vector3d& n,
-                                         const FrontEntry* known = nullptr) const {
+                                         const IncidentRay* known = nullptr) const {
     if (source_.along_z()) return {n, eta_};
     const Eigen::Vector3d a = source_.incident(p, known);
     if (reflects()) return RefractedBeam::reflected(a, n);
@@ -131,23 +129,26 @@ class LightPath {
                                                    const RefractedBeam& beam,
                                                    const Eigen::Vector2d& m_bar,
                                                    Eigen::Vector3d& p_bar,
-                                                   const FrontEntry* known = nullptr) const {
+                                                   const IncidentRay* known = nullptr) const {
     if (source_.along_z()) return beam.adjoint(n, eta_, m_bar);
     const Eigen::Vector3d a = source_.incident(p, known);
     const Eigen::Vector3d b_bar = beam.direction_bar(m_bar);
-    if (source_.varies()) {
-      const Eigen::Vector3d a_bar = reflects() ? reflect_adjoint_by_incident(n, b_bar)
-                                               : refract_adjoint_by_incident(a, n, eta_, b_bar);
-      p_bar += source_.incident_adjoint(p, a_bar, known);
+    if (reflects()) {
+      if (source_.varies()) {
+        p_bar += source_.incident_adjoint(p, reflect_adjoint_by_incident(n, b_bar), known);
+      }
+      return reflect_adjoint(a, n, b_bar);
     }
-    return reflects() ? reflect_adjoint(a, n, b_bar) : refract_adjoint(a, n, eta_, b_bar);
+    const double along = n.dot(b_bar) * beam.k_by_cosine(n.dot(a), eta_);
+    if (source_.varies()) p_bar += source_.incident_adjoint(p, eta_ * b_bar + along * n, known);
+    return beam.k * b_bar + along * a;
   }
   /// The rays after a facet. @pre transmits(t, n).
   [[nodiscard]] LF_HD FacetBeam facet_beam(const Corners& t, const Eigen::Vector3d& n,
-                                           const CornerEntries& known = {}) const {
-    const RefractedBeam first = beam(t.v0, n, known.e0);
-    if (!source_.varies()) return {first, first.m, first.m, known};
-    return {first, beam(t.v1, n, known.e1).m, beam(t.v2, n, known.e2).m, known};
+                                           const CornerRays& known = {}) const {
+    const RefractedBeam first = beam(t.v0, n, known.r0);
+    if (!source_.varies()) return {first, first, first, known};
+    return {first, beam(t.v1, n, known.r1), beam(t.v2, n, known.r2), known};
   }
   /// Adjoint of (t, n) ↦ the slopes at the three corners: adds to t_bar, returns n_bar.
   [[nodiscard]] LF_HD Eigen::Vector3d facet_beam_adjoint(const Corners& t, const Eigen::Vector3d& n,
@@ -156,12 +157,12 @@ class LightPath {
                                                          Corners& t_bar) const {
     if (!source_.varies()) {
       const Eigen::Vector2d sum = m_bar.m0 + m_bar.m1 + m_bar.m2;
-      return beam_adjoint(t.v0, n, facet.beam, sum, t_bar.v0);
+      return beam_adjoint(t.v0, n, facet.b0, sum, t_bar.v0);
     }
-    const CornerEntries& e = facet.known;
-    return beam_adjoint(t.v0, n, facet.beam, m_bar.m0, t_bar.v0, e.e0) +
-           beam_adjoint(t.v1, n, beam(t.v1, n, e.e1), m_bar.m1, t_bar.v1, e.e1) +
-           beam_adjoint(t.v2, n, beam(t.v2, n, e.e2), m_bar.m2, t_bar.v2, e.e2);
+    const CornerRays& rays = facet.known;
+    return beam_adjoint(t.v0, n, facet.b0, m_bar.m0, t_bar.v0, rays.r0) +
+           beam_adjoint(t.v1, n, facet.b1, m_bar.m1, t_bar.v1, rays.r1) +
+           beam_adjoint(t.v2, n, facet.b2, m_bar.m2, t_bar.v2, rays.r2);
   }
 
   /// Where a ray of slope m that leaves the surface at p meets the screen.
@@ -184,7 +185,7 @@ class LightPath {
   /// rays enter the lens. Moving a vertex inside a mesh never changes the sum over its triangles,
   /// unless faces reflect: then it is what the triangle lets out, by its own normal and the light
   /// at its middle, and of a lens that its light meets at right angles the same.
-  [[nodiscard]] LF_HD double intake(const Corners& t, const CornerEntries& known = {}) const {
+  [[nodiscard]] LF_HD double intake(const Corners& t, const CornerRays& known = {}) const {
     const double even = source_.intake(t, known);
     return loses() ? even * Passage(*this, t).share() : even;
   }
@@ -194,13 +195,13 @@ class LightPath {
 
   /// intake() as a share of the whole (Sun et al., Eq. 1): of what a flat surface of the lens's
   /// size takes, of parallel light inside of its outline, or of what sharing() was given.
-  [[nodiscard]] LF_HD double flux(const Corners& t, const CornerEntries& known = {}) const {
+  [[nodiscard]] LF_HD double flux(const Corners& t, const CornerRays& known = {}) const {
     return intake(t, known) / whole_;
   }
   /// Adjoint of flux(): adds to the derivatives by the corners, or by area_normal(t) where flux
   /// depends on that alone.
   LF_HD void flux_adjoint(const Corners& t, double flux_bar, Corners& t_bar,
-                          Eigen::Vector3d& area_normal_bar, const CornerEntries& known = {}) const {
+                          Eigen::Vector3d& area_normal_bar, const CornerRays& known = {}) const {
     const double bar = flux_bar / whole_;
     if (!loses()) return source_.intake_adjoint(t, bar, t_bar, area_normal_bar, known);
     const Passage passage(*this, t);
@@ -244,12 +245,12 @@ class LightPath {
         : middle_((t.v0 + t.v1 + t.v2) / 3.0),
           n_(area_normal(t)),
           length_(n_.norm()),
-          entry_(light.is_bent() ? light.enter(middle_) : FrontEntry()),
-          a_(light.source_.incident(middle_, &entry_)),
+          ray_(light.varies() ? light.ray_to(middle_) : IncidentRay()),
+          a_(light.source_.incident(middle_, &ray_)),
           straight_(transmittance(1.0, light.eta_).value) {
       straight_ *= straight_;
       n_ /= length_;
-      front_ = transmittance(light.source_.front_cosine(middle_, &entry_), light.eta_);
+      front_ = transmittance(light.source_.front_cosine(ray_), light.eta_);
       back_ = transmittance(n_.dot(a_), light.eta_);
     }
     [[nodiscard]] LF_HD double share() const { return front_.value * back_.value / straight_; }
@@ -259,10 +260,9 @@ class LightPath {
       const double back_bar = bar * front_.value * back_.slope / straight_;
       const double front_bar = bar * back_.value * front_.slope / straight_;
       area_normal_bar += normalize_adjoint(n_, length_, back_bar * a_);
-      const Eigen::Vector3d third =
-          (light.source_.incident_adjoint(middle_, back_bar * n_, &entry_) +
-           light.source_.front_cosine_adjoint(middle_, front_bar, &entry_)) /
-          3.0;
+      const Eigen::Vector3d third = (light.source_.incident_adjoint(middle_, back_bar * n_, &ray_) +
+                                     light.source_.front_cosine_adjoint(ray_, front_bar)) /
+                                    3.0;
       t_bar.v0 += third;
       t_bar.v1 += third;
       t_bar.v2 += third;
@@ -272,7 +272,7 @@ class LightPath {
     Eigen::Vector3d middle_;
     Eigen::Vector3d n_;
     double length_;
-    FrontEntry entry_;  ///< To the middle, behind a curved front.
+    IncidentRay ray_;  ///< To the middle, in light that varies.
     Eigen::Vector3d a_;
     double straight_;  ///< Through both faces at right angles.
     ValueSlope front_{};
@@ -290,10 +290,17 @@ class LightPath {
     if (screen_.turned() && !transmits(Eigen::Vector3d(0.0, 0.0, 0.0), n)) return {kInfinity, 0.0};
     return reflection_barrier(n.z(), eta_);
   }
-  [[nodiscard]] LF_HD BarrierAt barrier_at(const Eigen::Vector3d& a,
-                                           const Eigen::Vector3d& n) const {
+  [[nodiscard]] LF_HD LF_INLINE double barrier_value(const Eigen::Vector3d& a,
+                                                     const Eigen::Vector3d& n) const {
+    if (!leaves(a, n)) return kInfinity;
     const double c = n.dot(a);
-    if (!leaves(a, n)) return {kInfinity, {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
+    if (!reflects()) return 1.0 / refracted_cosine_squared(c, eta_);
+    return -1.0 / (c * (a.z() - 2.0 * c * n.z()));
+  }
+  /// @pre leaves(a, n).
+  [[nodiscard]] LF_HD LF_INLINE BarrierAt barrier_at(const Eigen::Vector3d& a,
+                                                     const Eigen::Vector3d& n) const {
+    const double c = n.dot(a);
     if (!reflects()) {
       const ValueSlope f = reflection_barrier(c, eta_);
       return {f.value, f.slope * n, f.slope * a};
@@ -307,23 +314,42 @@ class LightPath {
             by_c * a + Eigen::Vector3d(0.0, 0.0, -2.0 * c * by_bz)};
   }
   /// A corner's share of barrier_adjoint().
-  LF_HD double corner_barrier(const Eigen::Vector3d& p, const Eigen::Vector3d& n, double weight,
-                              Eigen::Vector3d& p_bar, Eigen::Vector3d& n_bar,
-                              const FrontEntry* known) const {
+  LF_HD LF_INLINE double corner_barrier(const Eigen::Vector3d& p, const Eigen::Vector3d& n,
+                                        double weight, Eigen::Vector3d& p_bar,
+                                        Eigen::Vector3d& n_bar, const IncidentRay* known) const {
     const BarrierAt f = barrier_at(source_.incident(p, known), n);
     p_bar += source_.incident_adjoint(p, weight * f.by_a, known);
     n_bar += weight * f.by_n;
     return f.value / 3.0;
   }
-  [[nodiscard]] LF_HD bool leaves(const Eigen::Vector3d& a, const Eigen::Vector3d& n) const {
+  [[nodiscard]] LF_HD LF_APART double varied_barrier(const Corners& t, const Eigen::Vector3d& n,
+                                                     const CornerRays& known) const {
+    return (barrier_value(source_.incident(t.v0, known.r0), n) +
+            barrier_value(source_.incident(t.v1, known.r1), n) +
+            barrier_value(source_.incident(t.v2, known.r2), n)) /
+           3.0;
+  }
+  LF_HD LF_APART double varied_barrier_adjoint(const Corners& t, const Eigen::Vector3d& n,
+                                               double weight, Corners& t_bar,
+                                               Eigen::Vector3d& n_bar,
+                                               const CornerRays& known) const {
+    return corner_barrier(t.v0, n, weight / 3.0, t_bar.v0, n_bar, known.r0) +
+           corner_barrier(t.v1, n, weight / 3.0, t_bar.v1, n_bar, known.r1) +
+           corner_barrier(t.v2, n, weight / 3.0, t_bar.v2, n_bar, known.r2);
+  }
+  [[nodiscard]] LF_HD LF_INLINE bool leaves(const Eigen::Vector3d& a,
+                                            const Eigen::Vector3d& n) const {
     const double c = n.dot(a);
     if (!(n.z() > 0.0)) return false;
     if (reflects()) {
       return c < 0.0 && a.z() - 2.0 * c * n.z() > 0.0 &&
-             screen_.faces(RefractedBeam::reflected(a, n).m);
+             (!screen_.turned() || screen_.faces(RefractedBeam::reflected(a, n).m));
     }
-    return c > 0.0 && refracted_cosine_squared(c, eta_) > 0.0 && refract(a, n, eta_).z() > 0.0 &&
-           screen_.faces(RefractedBeam(a, n, eta_).m);
+    // b_z = √s n_z − η (c n_z − a_z), asked without the root.
+    const double s = refracted_cosine_squared(c, eta_);
+    const double back = eta_ * (c * n.z() - a.z());
+    return c > 0.0 && s > 0.0 && (back < 0.0 || s * n.z() * n.z() > back * back) &&
+           (!screen_.turned() || screen_.faces(RefractedBeam(a, n, eta_).m));
   }
 
   Screen screen_;

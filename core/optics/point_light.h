@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "core/compute/host_device.h"
+#include "core/optics/incident_ray.h"
 
 /// Light from a point.
 ///
@@ -15,19 +16,29 @@
 /// is a derivative by that.
 namespace lensforge {
 
+/// a × b; GCC 12 leaves Eigen's as a call.
+LF_HD inline Eigen::Vector3d cross_product(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  return {a.y() * b.z() - a.z() * b.y(), a.z() * b.x() - a.x() * b.z(),
+          a.x() * b.y() - a.y() * b.x()};
+}
+
 /// The two factors of a solid angle, tan(Ω/2) = N/D (Van Oosterom and Strackee 1983, Eq. 8).
 struct SolidAngle {
+  double la;  ///< |a|
+  double lb;
+  double lc;
   double n;  ///< a·(b × c)
   double d;  ///< |a||b||c| + (a·b)|c| + (b·c)|a| + (c·a)|b|
 
-  LF_HD SolidAngle(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c)
-      // Differences first: of a facet far away the products of whole vectors would keep few digits.
-      : n(a.dot((b - a).cross(c - a))) {
-    const double la = a.norm();
-    const double lb = b.norm();
-    const double lc = c.norm();
-    d = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
-  }
+  LF_HD LF_INLINE SolidAngle(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
+                             const Eigen::Vector3d& c)
+      : la(a.norm()),
+        lb(b.norm()),
+        lc(c.norm()),
+        // Differences first: of a facet far away the products of whole vectors would keep few
+        // digits.
+        n(a.dot(cross_product(b - a, c - a))),
+        d(la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb) {}
 
   /// Ω, steradian; positive where a, b, c turn counter-clockwise seen along their sum.
   [[nodiscard]] LF_HD double value() const {
@@ -50,21 +61,18 @@ struct VectorsBar {
 
 /// Derivative of SolidAngle(a, b, c).value() × bar by the three vectors:
 /// dΩ = 2 (D dN − N dD) / (N² + D²).
-LF_HD inline VectorsBar solid_angle_adjoint(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
-                                            const Eigen::Vector3d& c, double bar) {
+LF_HD LF_INLINE VectorsBar solid_angle_adjoint(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
+                                               const Eigen::Vector3d& c, double bar) {
   const SolidAngle angle(a, b, c);
   const double s = 2.0 * bar / (angle.n * angle.n + angle.d * angle.d);
   const double n_bar = s * angle.d;
   const double d_bar = -s * angle.n;
-  const double la = a.norm();
-  const double lb = b.norm();
-  const double lc = c.norm();
-  const double ab = a.dot(b);
-  const double bc = b.dot(c);
-  const double ca = c.dot(a);
-  return {n_bar * b.cross(c) + d_bar * (((lb * lc + bc) / la) * a + lc * b + lb * c),
-          n_bar * c.cross(a) + d_bar * (((lc * la + ca) / lb) * b + lc * a + la * c),
-          n_bar * a.cross(b) + d_bar * (((la * lb + ab) / lc) * c + lb * a + la * b)};
+  const double by_a = (angle.lb * angle.lc + b.dot(c)) / angle.la;
+  const double by_b = (angle.lc * angle.la + c.dot(a)) / angle.lb;
+  const double by_c = (angle.la * angle.lb + a.dot(b)) / angle.lc;
+  return {n_bar * cross_product(b, c) + d_bar * (by_a * a + angle.lc * b + angle.lb * c),
+          n_bar * cross_product(c, a) + d_bar * (by_b * b + angle.lc * a + angle.la * c),
+          n_bar * cross_product(a, b) + d_bar * (by_c * c + angle.lb * a + angle.la * b)};
 }
 
 /// The ray from a point source below a flat front to a point above it, by Snell's law at the front:
@@ -74,7 +82,6 @@ struct FrontRay {
   double height;  ///< T
   double mu;
   double mu_by_r;  ///< ∂μ/∂r
-  double mu_by_t;  ///< ∂μ/∂T
 
   /// @pre depth > 0, height ≥ 0, eta > 1.
   LF_HD FrontRay(const Eigen::Vector2d& across, double depth, double height_above, double eta)
@@ -96,25 +103,22 @@ struct FrontRay {
     const double q = inverse_root(k * r);
     const double steepness = optical * q * q * q + height;
     mu_by_r = -0.5 * optical * k * mu * mu * mu * q * q * q / steepness;
-    mu_by_t = -mu / steepness;
   }
 
-  /// Slope (dx/dz, dy/dz) behind the front.
-  [[nodiscard]] LF_HD Eigen::Vector2d slope() const { return mu * x; }
-  /// Where the ray meets the front, from the source.
-  [[nodiscard]] LF_HD Eigen::Vector2d entry() const { return (1.0 - height * mu) * x; }
-
-  /// Adjoint of slope(): the derivative by (x, T).
-  [[nodiscard]] LF_HD Eigen::Vector3d slope_adjoint(const Eigen::Vector2d& m_bar) const {
-    const double mu_bar = m_bar.dot(x);
-    const Eigen::Vector2d x_bar = mu * m_bar + (2.0 * mu_by_r * mu_bar) * x;
-    return {x_bar.x(), x_bar.y(), mu_by_t * mu_bar};
-  }
-  /// Adjoint of entry() = x − T slope(): the derivative by (x, T).
-  [[nodiscard]] LF_HD Eigen::Vector3d entry_adjoint(const Eigen::Vector2d& v_bar) const {
-    Eigen::Vector3d bar = slope_adjoint(-height * v_bar);
-    bar += Eigen::Vector3d(v_bar.x(), v_bar.y(), -mu * x.dot(v_bar));
-    return bar;
+  /// @param source  the place of the source, mm.
+  [[nodiscard]] LF_HD IncidentRay ray(const Eigen::Vector3d& source) const {
+    const Eigen::Vector2d m = mu * x;
+    Eigen::Matrix2d m_by_p;
+    m_by_p << mu + 2.0 * mu_by_r * x.x() * x.x(), 2.0 * mu_by_r * x.x() * x.y(),
+        2.0 * mu_by_r * x.x() * x.y(), mu + 2.0 * mu_by_r * x.y() * x.y();
+    const double share = 1.0 - height * mu;
+    return {m,
+            {source.x() + share * x.x(), source.y() + share * x.y()},
+            0.0,
+            1.0 / std::sqrt(1.0 + m.squaredNorm()),
+            {0.0, 0.0},
+            m_by_p,
+            Eigen::Matrix2d::Identity() - height * m_by_p};
   }
 
  private:

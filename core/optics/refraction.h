@@ -93,10 +93,9 @@ struct RefractedBeam {
     n_bar.z() += n.dot(b_bar) * k_by_nz;
     return n_bar;
   }
-  [[nodiscard]] LF_HD Eigen::Vector3d adjoint(const Eigen::Vector3d& a, const Eigen::Vector3d& n,
-                                              double eta, const Eigen::Vector2d& m_bar) const {
-    const Eigen::Vector3d b_bar = direction_bar(m_bar);
-    return refract_adjoint(a, n, eta, b_bar);
+  /// Derivative of k by c, of a lens.
+  [[nodiscard]] LF_HD double k_by_cosine(double c, double eta) const {
+    return eta * eta * c / root - eta;
   }
 
  private:

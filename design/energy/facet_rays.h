@@ -20,15 +20,15 @@ struct FacetRays {
   [[nodiscard]] LF_HD ImageTriangle image(const ObjectiveView& o, std::int64_t face) const {
     const Corners t = o.corners(face);
     const Eigen::Vector3d& n = o.scratch.frames[face].n;
-    return project_facet(t, o.light.facet_beam(t, n, o.entries_at(face)), o.light);
+    return land_facet(t, o.light.facet_beam(t, n, o.incident_at(face)), o.light, o.flux(face));
   }
 
   /// Weighted derivatives of the goal by one face, and its values.
   LF_HD GoalSums pull_back(const ObjectiveView& o, std::int64_t face, const Corners& t,
                            FaceBar& bar) const {
     const Eigen::Vector3d& n = o.scratch.frames[face].n;
-    const FacetBeam beam = o.light.facet_beam(t, n, o.entries_at(face));
-    const ImageTriangle image = project_facet(t, beam, o.light);
+    const FacetBeam beam = o.light.facet_beam(t, n, o.incident_at(face));
+    const ImageTriangle image = land_facet(t, beam, o.light, o.flux(face));
     ImageTriangle image_bar;
     const GoalSums values = goal_adjoint(o, face, image, image_bar);
     bar.n += project_facet_adjoint(t, n, beam, o.light, image_bar, bar.corners);

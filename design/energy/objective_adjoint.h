@@ -81,7 +81,7 @@ LF_HD inline double barrier_adjoint(const ObjectiveView& o, std::int64_t face, c
   const ValueSlope area = area_barrier(plan_area(t), o.area);
   bar.area_normal.z() += 0.5 * weight * area.slope;
   return area.value + o.light.barrier_adjoint(t, o.scratch.frames[face].n, weight, bar.corners,
-                                              bar.n, o.entries_at(face));
+                                              bar.n, o.incident_at(face));
 }
 
 /// Derivatives of everything by one face's corners.

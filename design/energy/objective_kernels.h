@@ -18,7 +18,8 @@
 /// face sends its light is the surface model's: Rays is FacetRays or SmoothRays.
 namespace lensforge {
 
-/// Frame of a face; its share of E_barr, which is infinite where the surface is not allowed.
+/// Frame of a face, and its flux where that is costly; its share of E_barr, which is infinite where
+/// the surface is not allowed.
 struct MeasureFace {
   ObjectiveView o;
 
@@ -27,7 +28,9 @@ struct MeasureFace {
     const FaceFrame frame = face_frame(t);
     o.scratch.frames[i] = frame;
     const double area = plan_area(t);
-    return {area_barrier(area, o.area).value + o.light.barrier(t, frame.n, o.entries_at(i))};
+    const CornerRays rays = o.incident_at(i);
+    if (o.scratch.flux != nullptr) o.scratch.flux[i] = o.light.flux(t, rays);
+    return {area_barrier(area, o.area).value + o.light.barrier(t, frame.n, rays)};
   }
 };
 

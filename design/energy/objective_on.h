@@ -58,7 +58,7 @@ class DesignObjectiveOn {
   void take(const Image& target);
   void take_outline(const double* vertices);
   void take(const Correspondence& wanted);
-  /// @post its entries are those of the vertices.
+  /// @post its incident rays are those of the vertices.
   [[nodiscard]] ObjectiveView view(const double* vertices);
   [[nodiscard]] GoalView goal_view();
   /// Sums of one evaluation; not asked for before all kernels are on their way.
@@ -107,7 +107,8 @@ class DesignObjectiveOn {
   Buffer<double> wanted_centroids_;
   Buffer<double> wanted_flux_;
 
-  Buffer<FrontEntry> entries_;  ///< Empty behind a flat front.
+  Buffer<IncidentRay> incident_;  ///< Empty in light of one direction, as face_flux_.
+  Buffer<double> face_flux_;
   Buffer<FaceFrame> frames_;
   Buffer<WeingartenMap> maps_;
   Buffer<FaceBend> bends_;
@@ -185,6 +186,7 @@ DesignObjectiveOn<Exec>::DesignObjectiveOn(const SurfaceMesh& mesh, const Optica
   const auto vertices = static_cast<std::size_t>(mesh.vertex_count());
   frames_ = Buffer<FaceFrame>(faces);
   corner_bar_ = Buffer<Corners>(faces);
+  if (light_.varies()) face_flux_ = Buffer<double>(faces);
   if (options_.weights.smooth > 0.0) {
     maps_ = Buffer<WeingartenMap>(faces);
     bends_ = Buffer<FaceBend>(faces);
@@ -224,11 +226,11 @@ ObjectiveView DesignObjectiveOn<Exec>::view(const double* vertices) {
           .area = options_.area,
           .light = light_,
           .vertices = vertices,
-          .entries = enter_vertices(executor_, light_, vertices, mesh_.view().vertices, entries_),
+          .incident = find_rays(executor_, light_, vertices, mesh_.view().vertices, incident_),
           .mesh = mesh_.view(),
           .goal = goal_view(),
           .scratch = {frames_.data(), maps_.data(), bends_.data(), edge_weights_.data(),
-                      corner_bar_.data()},
+                      corner_bar_.data(), face_flux_.size() > 0 ? face_flux_.data() : nullptr},
           .aperture = aperture_.view()};
 }
 

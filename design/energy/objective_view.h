@@ -42,6 +42,7 @@ struct FaceScratch {
   FaceBend* bends;
   double* edge_weights;  ///< 3 × F, Ψ'(h⁰) of a face's three edges; 0 on the boundary.
   Corners* corner_bar;   ///< Derivatives by every face's corners.
+  double* flux;          ///< F, LightPath::flux(); null in light of one direction.
 };
 
 /// The vectors of a light path begin at multiples of 16 bytes: with an even number of words before
@@ -52,7 +53,7 @@ struct ObjectiveView {
   AreaBarrier area;  ///< ObjectiveOptions::area.
   LightPath light;
   const double* vertices;  ///< 3 × V, mm
-  VertexEntries entries;   ///< Of the vertices where they are now.
+  VertexRays incident;     ///< On the vertices where they are now.
   MeshView mesh;
   GoalView goal;
   FaceScratch scratch;
@@ -61,8 +62,12 @@ struct ObjectiveView {
   [[nodiscard]] LF_HD Corners corners(std::int64_t face) const {
     return mesh.corners(vertices, face);
   }
-  [[nodiscard]] LF_HD CornerEntries entries_at(std::int64_t face) const {
-    return entries.at(mesh.triangle(face));
+  [[nodiscard]] LF_HD CornerRays incident_at(std::int64_t face) const {
+    return incident.at(mesh.triangle(face));
+  }
+  /// LightPath::flux() of a face. @pre frames are up to date.
+  [[nodiscard]] LF_HD double flux(std::int64_t face) const {
+    return scratch.flux != nullptr ? scratch.flux[face] : light.flux(corners(face));
   }
 };
 

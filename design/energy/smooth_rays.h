@@ -29,8 +29,7 @@ struct SmoothRays {
 
   [[nodiscard]] LF_HD ImageTriangle image(const ObjectiveView& o, std::int64_t face) const {
     const int* v = o.mesh.triangle(face);
-    return {column2(landing, v[0]), column2(landing, v[1]), column2(landing, v[2]),
-            o.light.flux(o.corners(face), o.entries_at(face))};
+    return {column2(landing, v[0]), column2(landing, v[1]), column2(landing, v[2]), o.flux(face)};
   }
 
   /// Weighted derivatives of the goal by one face; SmoothImageAdjoint has counted its values.
@@ -38,7 +37,8 @@ struct SmoothRays {
                            FaceBar& bar) const {
     const int* v = o.mesh.triangle(face);
     for (int k = 0; k < 3 && !normals_given; ++k) bar.area_normal += column3(normal_bar, v[k]);
-    o.light.flux_adjoint(t, image_bar[face].flux, bar.corners, bar.area_normal, o.entries_at(face));
+    o.light.flux_adjoint(t, image_bar[face].flux, bar.corners, bar.area_normal,
+                         o.incident_at(face));
     return {};
   }
 
@@ -65,7 +65,7 @@ struct LandVertex {
     if (!rays.normals_given) column3(rays.normals, v) = mesh_normal(v);
     const Eigen::Vector3d n = VertexNormal(column3(rays.normals, v)).n;
     const Eigen::Vector3d p = column3(o.vertices, v);
-    const FrontEntry* const known = o.entries.at(v);
+    const IncidentRay* const known = o.incident.at(v);
     if (!o.light.transmits(p, n, known)) return {1.0};
     column2(rays.landing, v) = project_vertex(p, n, o.light, known);
     return {0.0};
@@ -99,7 +99,7 @@ struct PullBackVertex {
     const VertexNormal normal(column3(rays.normals, v));
     Eigen::Vector3d p_bar(0.0, 0.0, 0.0);
     const Eigen::Vector3d n_bar = project_vertex_adjoint(column3(o.vertices, v), normal.n, o.light,
-                                                         u_bar, p_bar, o.entries.at(v));
+                                                         u_bar, p_bar, o.incident.at(v));
     column3(rays.position_bar, v) = p_bar;
     column3(rays.normal_bar, v) = normalize_adjoint(normal.n, normal.length, n_bar);
   }

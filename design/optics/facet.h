@@ -13,11 +13,15 @@ namespace lensforge {
 /// Facet model: one normal for the whole triangle (Sun et al., section 3.2).
 ///
 /// @param beam  what the facet sends out, LightPath::facet_beam().
-/// @return the image triangle with the share of the light that the facet takes (Eq. 1).
+/// @param flux  the share of the light that it takes (Eq. 1), LightPath::flux().
+LF_HD inline ImageTriangle land_facet(const Corners& t, const FacetBeam& beam,
+                                      const LightPath& light, double flux) {
+  return {light.land(t.v0, beam.slope(0)), light.land(t.v1, beam.slope(1)),
+          light.land(t.v2, beam.slope(2)), flux};
+}
 LF_HD inline ImageTriangle project_facet(const Corners& t, const FacetBeam& beam,
                                          const LightPath& light) {
-  return {light.land(t.v0, beam.slope(0)), light.land(t.v1, beam.slope(1)),
-          light.land(t.v2, beam.slope(2)), light.flux(t, beam.known)};
+  return land_facet(t, beam, light, light.flux(t, beam.known));
 }
 
 /// Adjoint of project_facet() without the flux: adds to the corners' derivatives directly and

@@ -26,14 +26,14 @@ struct VertexNormal {
 /// Where the ray of a vertex lands, in pixel coordinates. @pre n transmits.
 LF_HD inline Eigen::Vector2d project_vertex(const Eigen::Vector3d& p, const Eigen::Vector3d& n,
                                             const LightPath& light,
-                                            const FrontEntry* known = nullptr) {
+                                            const IncidentRay* known = nullptr) {
   return light.land(p, light.beam(p, n, known).m);
 }
 
 /// Adjoint of project_vertex(): adds to p_bar, returns n_bar.
 LF_HD inline Eigen::Vector3d project_vertex_adjoint(
     const Eigen::Vector3d& p, const Eigen::Vector3d& n, const LightPath& light,
-    const Eigen::Vector2d& u_bar, Eigen::Vector3d& p_bar, const FrontEntry* known = nullptr) {
+    const Eigen::Vector2d& u_bar, Eigen::Vector3d& p_bar, const IncidentRay* known = nullptr) {
   const RefractedBeam beam = light.beam(p, n, known);
   Eigen::Vector2d m_bar(0.0, 0.0);
   light.land_adjoint(p, beam.m, u_bar, p_bar, m_bar);

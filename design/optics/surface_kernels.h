@@ -20,33 +20,32 @@ struct SurfaceView {
   const int* triangles;    ///< 3 × T
   const double* vertices;  ///< 3 × V, mm
   LightPath light;
-  VertexEntries entries;  ///< As enter_vertices() gives them, or none.
+  VertexRays incident;  ///< As find_rays() gives them.
 
   [[nodiscard]] LF_HD Corners corners(std::int64_t i) const {
     return corners_at(triangles + 3 * i, vertices);
   }
 };
 
-/// Where the ray to a vertex enters a curved front.
-struct EnterVertex {
+/// The ray that comes to a vertex.
+struct FindRay {
   LightPath light;
   const double* vertices;
-  FrontEntry* entries;
+  IncidentRay* rays;
 
-  LF_HD void operator()(std::int64_t v) const { entries[v] = light.enter(column3(vertices, v)); }
+  LF_HD void operator()(std::int64_t v) const { rays[v] = light.ray_to(column3(vertices, v)); }
 };
 
-/// Finds the rays to all vertices behind a curved front, once for all corners that ask; `entries`
-/// stays empty behind a flat one.
+/// Fills `rays` with those that come to all vertices, and lets it be empty in light of one
+/// direction: each is solved for once, not for every corner that asks.
 template <class Exec>
-VertexEntries enter_vertices(const Exec& executor, const LightPath& light, const double* vertices,
-                             std::int64_t count,
-                             typename Exec::template Buffer<FrontEntry>& entries) {
-  if (!light.is_bent()) return {};
-  using Entries = typename Exec::template Buffer<FrontEntry>;
-  if (entries.size() == 0) entries = Entries(static_cast<std::size_t>(count));
-  parallel_for(executor, "front entries", count, EnterVertex{light, vertices, entries.data()});
-  return {entries.data(), count};
+VertexRays find_rays(const Exec& executor, const LightPath& light, const double* vertices,
+                     std::int64_t count, typename Exec::template Buffer<IncidentRay>& rays) {
+  if (!light.varies()) return {};
+  if (rays.size() == 0)
+    rays = typename Exec::template Buffer<IncidentRay>(static_cast<std::size_t>(count));
+  parallel_for(executor, "incident rays", count, FindRay{light, vertices, rays.data()});
+  return {rays.data()};
 }
 
 /// Facet model: the image triangle of a triangle; without flux where it does not transmit.
@@ -56,7 +55,7 @@ struct ProjectFacet {
   LF_HD ImageTriangle operator()(std::int64_t i) const {
     const Corners t = surface.corners(i);
     const Eigen::Vector3d n = area_normal(t).normalized();
-    const CornerEntries known = surface.entries.at(surface.triangles + 3 * i);
+    const CornerRays known = surface.incident.at(surface.triangles + 3 * i);
     if (!surface.light.transmits(t, n, known)) return {};
     return project_facet(t, surface.light.facet_beam(t, n, known), surface.light);
   }
@@ -71,7 +70,7 @@ struct LandRay {
   LF_HD void operator()(std::int64_t v) const {
     const Eigen::Vector3d n = VertexNormal(column3(normals, v)).n;
     const Eigen::Vector3d p = column3(surface.vertices, v);
-    const FrontEntry* const known = surface.entries.at(v);
+    const IncidentRay* const known = surface.incident.at(v);
     if (surface.light.transmits(p, n, known)) {
       column2(landing, v) = project_vertex(p, n, surface.light, known);
     } else {
@@ -93,7 +92,7 @@ struct ProjectSmooth {
     const int* v = surface.triangles + 3 * i;
     const ImageTriangle image{column2(landing, v[0]), column2(landing, v[1]),
                               column2(landing, v[2]),
-                              surface.light.flux(surface.corners(i), surface.entries.at(v))};
+                              surface.light.flux(surface.corners(i), surface.incident.at(v))};
     const bool lit = is_finite(image.p0) && is_finite(image.p1) && is_finite(image.p2);
     return lit && !(image.flux < 0.0) ? image : ImageTriangle{};
   }

@@ -20,7 +20,7 @@ namespace {
 struct Scene {
   const SurfaceMesh& mesh;
   const std::optional<MeshCut> cut;
-  std::vector<FrontEntry> entries;
+  std::vector<IncidentRay> rays;
   SurfaceView view;
 
   Scene(const SurfaceMesh& surface, const OpticalSetup& setup, const Executor& executor)
@@ -31,8 +31,7 @@ struct Scene {
              surface.vertices.data(),
              cut ? light_inside(surface, *cut, setup) : light_on(surface, setup),
              {}} {
-    view.entries =
-        enter_vertices(executor, view.light, view.vertices, mesh.vertex_count(), entries);
+    view.incident = find_rays(executor, view.light, view.vertices, mesh.vertex_count(), rays);
   }
 };
 

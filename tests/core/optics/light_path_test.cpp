@@ -176,19 +176,19 @@ TEST_P(EveryLight, FacetBeamIsThatOfEachCorner) {
 }
 
 TEST_P(EveryLight, KnownEntriesChangeNoBit) {
-  if (!light_.is_bent()) return;
+  if (!light_.varies()) return;
   Random random(12);
   const LightPath losing_light(losing(setup_));
   for (int i = 0; i < 50; ++i) {
     const Corners t = random_corners(random);
     const Eigen::Vector3d n = random_normal(random, t.v0);
-    const FrontEntry entries[3] = {light_.enter(t.v0), light_.enter(t.v1), light_.enter(t.v2)};
+    const IncidentRay rays[3] = {light_.ray_to(t.v0), light_.ray_to(t.v1), light_.ray_to(t.v2)};
     const int triangle[3] = {0, 1, 2};
-    const CornerEntries known = VertexEntries{entries, 3}.at(triangle);
+    const CornerRays known = VertexRays{rays}.at(triangle);
     EXPECT_EQ(light_.transmits(t, n, known), light_.transmits(t, n));
     EXPECT_EQ(light_.barrier(t, n, known), light_.barrier(t, n));
     EXPECT_EQ(losing_light.flux(t, known), losing_light.flux(t));
-    const auto answers = [&](const CornerEntries& e) {
+    const auto answers = [&](const CornerRays& e) {
       Corners bar;
       Eigen::Vector3d n_bar = Eigen::Vector3d::Zero();
       Eigen::Vector3d area_normal_bar = Eigen::Vector3d::Zero();
