@@ -13,6 +13,9 @@
 namespace lensforge {
 namespace {
 
+/// How much farther apart samples may be along the passes than across them.
+constexpr double kAlongPasses = 3.0;
+
 [[noreturn]] void refuse(const char* option, double value, const std::string& rule) {
   throw InputError(std::string(option) + " " + shortest_text(value) + ": " + rule);
 }
@@ -149,6 +152,18 @@ double sample_spacing(const CamOptions& options) {
   const double pitch = finish_pitch(finish, options.workshop.tool(finish.tool).radius());
   return std::clamp(std::max(pitch / 6.0, options.workshop.polish.sigma / 3.0),
                     cam_limit::kFinestSample, cam_limit::kCoarsestSample);
+}
+
+Eigen::Vector2d sample_spacings(const CamOptions& options) {
+  const FinishProcess& finish = options.workshop.process.finish;
+  const double across = sample_spacing(options);
+  Eigen::Vector2d spacings = Eigen::Vector2d::Constant(across);
+  if (finish.cross) return spacings;
+  // Scallops do not vary along passes. A Gaussian's weights σ apart sum to its integral but for
+  // 5e-9.
+  const double along = std::min(kAlongPasses * across, options.workshop.polish.sigma);
+  spacings[finish.along == PassAxis::kX ? 0 : 1] = std::max(across, along);
+  return spacings;
 }
 
 void validate(const CamOptions& options, const OpticalSetup& setup) {

@@ -92,8 +92,11 @@ inline constexpr double kHighestTab = 10.0;
 inline constexpr int kMostTabs = 100;
 }  // namespace cam_limit
 
-/// The spacing at which the surface is sampled, mm.
+/// The spacing at which the surface is sampled across the passes, mm.
 double sample_spacing(const CamOptions& options);
+/// The same along x and y: up to three times that along passes, which do not cross, as far as the
+/// polish allows.
+Eigen::Vector2d sample_spacings(const CamOptions& options);
 
 /// True if the outline is cut.
 bool cuts_outline(const CamOptions& options, const OpticalSetup& setup);

@@ -95,8 +95,7 @@ double rough_points(const CamOptions& options, const Eigen::Vector2d& size) {
 }
 
 double samples_of(const CamOptions& options, const Eigen::Vector2d& size) {
-  const double spacing = sample_spacing(options);
-  return options.render ? kSurfaces * size.prod() / (spacing * spacing) : 0.0;
+  return options.render ? kSurfaces * size.prod() / sample_spacings(options).prod() : 0.0;
 }
 
 double memory_per_move(const FinishProcess& finish) {

@@ -174,10 +174,16 @@ ParameterGroup outline_parameters(const CutPlan& plan) {
                           mm(cut.tabs.height, 2) + " high, to be snapped by hand"}}};
 }
 
+std::string sampling_words(const CamOptions& options) {
+  const Eigen::Vector2d spacings = sample_spacings(options);
+  if (spacings.x() == spacings.y()) return mm(spacings.x(), 4);
+  return mm(spacings.minCoeff(), 4) + " across the passes, " + mm(spacings.maxCoeff(), 4) + " along";
+}
+
 ParameterGroup polish_parameters(const CamOptions& options) {
   ParameterGroup group{"Polishing, as assumed",
                        {{"Gaussian σ", mm(options.workshop.polish.sigma, 3)},
-                        {"Sampled every", mm(sample_spacing(options), 4)}}};
+                        {"Sampled every", sampling_words(options)}}};
   if (options.workshop.polish.rim_depth > 0.0) {
     group.parameters.push_back(
         {"Taken off at the rim", mm(options.workshop.polish.rim_depth, 4) + ", falling over " +

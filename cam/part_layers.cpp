@@ -38,11 +38,13 @@ void keep_nodes(const SurfacePatch& patch, const PartGrid& grid, const std::stri
 
 }  // namespace
 
-PartGrid part_grid(const Eigen::Vector2d& lens_size, double spacing, double most) {
+PartGrid part_grid(const Eigen::Vector2d& lens_size, const Eigen::Vector2d& spacings,
+                   double most) {
   const double coarse = std::sqrt(lens_size.prod() / most);
   PartGrid grid;
   for (int axis = 0; axis < 2; ++axis) {
     const double length = lens_size[axis];
+    const double spacing = spacings[axis];
     const int cells = std::max(1, static_cast<int>(std::floor(length / std::max(coarse, spacing))));
     grid.nodes[axis] = cells + 1;
     grid.every[axis] = std::max(1, static_cast<int>(std::ceil(length / cells / spacing)));
@@ -51,9 +53,9 @@ PartGrid part_grid(const Eigen::Vector2d& lens_size, double spacing, double most
 }
 
 LayeredImage surface_layers(const std::vector<NamedSurface>& surfaces,
-                            const Eigen::Vector2d& lens_size, double spacing,
+                            const Eigen::Vector2d& lens_size, const Eigen::Vector2d& spacings,
                             const Executor& executor, const RunControl& control) {
-  const PartGrid grid = part_grid(lens_size, spacing, kPartNodes);
+  const PartGrid grid = part_grid(lens_size, spacings, kPartNodes);
   std::vector<std::string> names;
   for (const NamedSurface& surface : surfaces) {
     for (const char* layer : {".z", ".slope_x", ".slope_y"}) names.push_back(surface.name + layer);

@@ -29,14 +29,15 @@ struct PartGrid {
   Eigen::Vector2i every;
 };
 
-/// @param spacing  of the grid that is sampled, at most, mm. @param most  nodes, about.
-PartGrid part_grid(const Eigen::Vector2d& lens_size, double spacing, double most);
+/// @param spacings  of the grid that is sampled, along x and y, at most, mm. @param most  nodes,
+/// about.
+PartGrid part_grid(const Eigen::Vector2d& lens_size, const Eigen::Vector2d& spacings, double most);
 
 /// Heights, mm, and slopes of surfaces as layers "NAME.z", "NAME.slope_x" and "NAME.slope_y", at
 /// nodes evenly over the lens, the upper left one first. Every node has what the surface, sampled
-/// at `spacing`, has there. @throw Interrupted
+/// at `spacings`, has there. @throw Interrupted
 LayeredImage surface_layers(const std::vector<NamedSurface>& surfaces,
-                            const Eigen::Vector2d& lens_size, double spacing,
+                            const Eigen::Vector2d& lens_size, const Eigen::Vector2d& spacings,
                             const Executor& executor, const RunControl& control);
 
 /// The pictures of the designed surface and of a chain's steps, under the names that they have

@@ -26,23 +26,6 @@ constexpr double kViewNodes = 240.0;
 
 constexpr double kMicrometres = 1e3;
 
-/// How much coarser the surface as milled is rendered along the passes: each of its triangles is
-/// spread over many pixels across them, by the scallops.
-constexpr double kAlongPasses = 3.0;
-
-/// The chain with a grid of its own for the surface as milled, unless passes cross.
-LeakageChain chain_of(const PartSurfaces& surfaces, const Lens& lens, const CamOptions& options) {
-  LeakageChain chain = surfaces.chain();
-  const FinishProcess& finish = options.workshop.process.finish;
-  if (finish.cross) return chain;
-  Eigen::Vector2d spacing = Eigen::Vector2d::Constant(sample_spacing(options));
-  spacing[finish.along == PassAxis::kX ? 0 : 1] *= kAlongPasses;
-  for (NamedSurface& other : chain.others) {
-    if (other.field == &surfaces.milled()) other.grid = lens_grid(lens.setup.lens_size, spacing);
-  }
-  return chain;
-}
-
 /// A whole surface, coarsely.
 SurfacePatch coarse_patch(const SurfaceField& field, const Lens& lens, double spacing,
                           const Executor& executor) {
@@ -84,13 +67,14 @@ ReportMap height_map(const LeakMap& map) {
 Prediction predict_part(const PartSurfaces& surfaces, const Lens& lens, const CamOptions& options,
                         const Executor& executor, const RunControl& control) {
   Prediction result;
-  const GridWindow grid = lens_grid(lens.setup.lens_size, sample_spacing(options));
+  const GridWindow grid = lens_grid(lens.setup.lens_size, sample_spacings(options));
   FieldRenderSetup setup{lens.setup, grid};
   setup.surface_height = lens.surface.vertices.row(2).mean();
   const LightPath light(lens.setup);
   if (!light.intake_is_plan_area()) setup.whole = lit_intake(lens, light, executor);
-  const LeakageChain chain = chain_of(surfaces, lens, options);
-  result.leakage = measure_leakage(chain, lens.target, setup, options.leakage, executor, control);
+  const LeakageChain chain = surfaces.chain();
+  result.leakage =
+      measure_leakage(chain, lens.target, setup, options.leakage, executor, control);
   result.sampling =
       check_sampling(surfaces.part(), result.leakage, lens.target, setup, executor, control);
   const std::vector<double> weights =
@@ -106,7 +90,7 @@ Prediction predict_part(const PartSurfaces& surfaces, const Lens& lens, const Ca
   result.milled = mesh_of(coarse_patch(surfaces.milled(), lens, kMeshSpacing, executor));
   result.surfaces = surface_layers(
       {{part_layer::kPolished, chain.steps.front().field}, {part_layer::kPart, &surfaces.part()}},
-      lens.setup.lens_size, sample_spacing(options), executor, control);
+      lens.setup.lens_size, sample_spacings(options), executor, control);
   return result;
 }
 

@@ -23,18 +23,20 @@ struct CellGrid {
   CellRange cells;
 };
 
-/// Every cell cut into the same number of parts a side, so that none is wider than `spacing`.
-CellGrid refined(const GridWindow& grid, const CellRange& cells, double spacing) {
-  const auto parts = std::max<std::int64_t>(
-      1, std::llround(std::ceil(grid.spacing.maxCoeff() / spacing * (1.0 - 1e-9))));
+/// Every cell cut into parts, the same number of all, so that none is wider than `spacings`.
+CellGrid refined(const GridWindow& grid, const CellRange& cells, const Eigen::Vector2d& spacings) {
+  const auto parts = [&](int axis) {
+    const double ratio = grid.spacing[axis] / spacings[axis];
+    return std::max<std::int64_t>(1, std::llround(std::ceil(ratio * (1.0 - 1e-9))));
+  };
+  const std::int64_t across = parts(0);
+  const std::int64_t up = parts(1);
   CellGrid fine{grid, cells};
-  fine.grid.spacing /= static_cast<double>(parts);
-  fine.grid.columns = (grid.columns - 1) * parts + 1;
-  fine.grid.rows = (grid.rows - 1) * parts + 1;
-  for (std::int64_t* count :
-       {&fine.cells.column, &fine.cells.row, &fine.cells.columns, &fine.cells.rows}) {
-    *count *= parts;
-  }
+  fine.grid.spacing.x() /= static_cast<double>(across);
+  fine.grid.spacing.y() /= static_cast<double>(up);
+  fine.grid.columns = (grid.columns - 1) * across + 1;
+  fine.grid.rows = (grid.rows - 1) * up + 1;
+  fine.cells = {cells.column * across, cells.row * up, cells.columns * across, cells.rows * up};
   return fine;
 }
 
@@ -197,8 +199,8 @@ void TrialCut::add_pencil(const Eigen::AlignedBox2d& box, const MoveSink& sink,
 LeakTrial TrialCut::at(const LeakPlace& place, const RunControl& control) const {
   const RunControl silent(control.stop_token(), {});
   const CamOptions& before = site_.plan.options();
-  const GridWindow grid = lens_grid(site_.lens.setup.lens_size, sample_spacing(before));
-  const CellGrid fine = refined(grid, place.cells, sample_spacing(options_));
+  const GridWindow grid = lens_grid(site_.lens.setup.lens_size, sample_spacings(before));
+  const CellGrid fine = refined(grid, place.cells, sample_spacings(options_));
   const std::optional<CastFrame> mould = site_.plan.mould();
   const double polished = PolishedField::kReach * options_.workshop.polish.sigma +
                           (1.0 + kCreaseHalo) * grid.spacing.maxCoeff();

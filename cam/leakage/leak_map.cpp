@@ -79,9 +79,11 @@ struct TilePair {
 
 LeakMap empty_map(const GridWindow& grid, double cell) {
   LeakMap map;
-  map.grid_cells = std::max<std::int64_t>(1, std::llround(cell / grid.spacing.maxCoeff()));
-  map.columns = (grid.columns - 2) / map.grid_cells + 1;
-  map.rows = (grid.rows - 2) / map.grid_cells + 1;
+  for (int axis = 0; axis < 2; ++axis) {
+    map.grid_cells[axis] = std::max<std::int64_t>(1, std::llround(cell / grid.spacing[axis]));
+  }
+  map.columns = (grid.columns - 2) / map.grid_cells.x() + 1;
+  map.rows = (grid.rows - 2) / map.grid_cells.y() + 1;
   map.leakage.assign(index_of(map.columns * map.rows), 0.0);
   map.height.resize(map.leakage.size());
   return map;
@@ -168,10 +170,10 @@ class PlaceStudy {
   /// Sets where the square lies, and the middle and height of its worst cell.
   void find_spot(const LeakMap& map, const CellRange& square, LeakPlace& place) const {
     const GridWindow& grid = setup_.grid;
-    const std::int64_t m = map.grid_cells;
-    place.cells = {square.column * m, square.row * m, 0, 0};
-    place.cells.columns = std::min(square.columns * m, grid.columns - 1 - place.cells.column);
-    place.cells.rows = std::min(square.rows * m, grid.rows - 1 - place.cells.row);
+    const CellCounts& m = map.grid_cells;
+    place.cells = {square.column * m.x(), square.row * m.y(), 0, 0};
+    place.cells.columns = std::min(square.columns * m.x(), grid.columns - 1 - place.cells.column);
+    place.cells.rows = std::min(square.rows * m.y(), grid.rows - 1 - place.cells.row);
     place.side = grid.spacing.x() * static_cast<double>(place.cells.columns);
     double most = 0.0;
     for (std::int64_t k = 0; k < square.columns * square.rows; ++k) {
@@ -182,7 +184,8 @@ class PlaceStudy {
       most = map.leakage[cell];
       place.height = map.height[cell];
       const Eigen::Vector2d middle =
-          grid.node(column * m, row * m) + 0.5 * static_cast<double>(m) * grid.spacing;
+          grid.node(column * m.x(), row * m.y()) +
+          0.5 * m.cast<double>().cwiseProduct(grid.spacing);
       place.place = middle.cwiseMin(grid.node(grid.columns - 1, grid.rows - 1));
     }
   }
@@ -233,10 +236,11 @@ LeakMap map_leakage(const NamedSurface& designed, const NamedSurface& part,
   const PixelWeights pixel_weights(in_parts(weights, kernel, pixels, executor), optics.pixels.x(),
                                    optics.pixels.y());
   LeakMap map = empty_map(setup.grid, cell);
-  const std::int64_t side = map.grid_cells * std::max<std::int64_t>(1, setup.tile / map.grid_cells);
+  const std::int64_t cells =
+      std::max<std::int64_t>(1, setup.tile / map.grid_cells.maxCoeff());  // In a tile, each way.
   SurfaceTile designed_tile(optics, setup.grid, setup.whole);
   SurfaceTile part_tile(optics, setup.grid, setup.whole);
-  for (const CellRange& range : tiles_of(all_cells(setup.grid), side)) {
+  for (const CellRange& range : tiles_of(all_cells(setup.grid), cells * map.grid_cells)) {
     designed_tile.load(*designed.field, range, executor);
     part_tile.load(*part.field, range, executor);
     const TilePair pair{designed_tile, part_tile, pixel_weights};
@@ -247,8 +251,8 @@ LeakMap map_leakage(const NamedSurface& designed, const NamedSurface& part,
         executor, "map leakage", std::ssize(boxes),
         [&](std::int64_t b) {
           const CellRange& box = boxes[index_of(b)];
-          const std::int64_t column = (range.column + box.column) / map.grid_cells;
-          const std::int64_t row = (range.row + box.row) / map.grid_cells;
+          const std::int64_t column = (range.column + box.column) / map.grid_cells.x();
+          const std::int64_t row = (range.row + box.row) / map.grid_cells.y();
           const std::size_t place = index_of(row * map.columns + column);
           pair.measure(box, map.leakage[place], map.height[place]);
         },

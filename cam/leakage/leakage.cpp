@@ -16,13 +16,12 @@ namespace {
 class ChainPictures {
  public:
   ChainPictures(const LeakageChain& chain, const FieldRenderSetup& setup, const Executor& executor,
-                const RunControl& control)
-      : setup_(setup), executor_(executor), control_(control) {
+                const RunControl& control) {
     std::vector<const SurfaceField*> fields;
     const auto take = [&](const NamedSurface& surface) {
       LF_CHECK(surface.field != nullptr, surface.name);
       const bool known = std::find(fields.begin(), fields.end(), surface.field) != fields.end();
-      if (!surface.grid && !known) fields.push_back(surface.field);
+      if (!known) fields.push_back(surface.field);
     };
     for (const NamedSurface& step : chain.steps) take(step);
     take(chain.designed);
@@ -31,17 +30,11 @@ class ChainPictures {
     for (std::size_t f = 0; f < fields.size(); ++f) pictures_[fields[f]] = std::move(rendered[f]);
   }
 
-  [[nodiscard]] FluxPicture of(const NamedSurface& surface) const {
-    if (!surface.grid) return pictures_.at(surface.field);
-    FieldRenderSetup setup = setup_;
-    setup.grid = *surface.grid;
-    return render_field(*surface.field, setup, executor_, control_);
+  [[nodiscard]] const FluxPicture& of(const NamedSurface& surface) const {
+    return pictures_.at(surface.field);
   }
 
  private:
-  const FieldRenderSetup& setup_;
-  const Executor& executor_;
-  const RunControl& control_;
   std::map<const SurfaceField*, FluxPicture> pictures_;
 };
 
@@ -50,7 +43,6 @@ PointLight point_light(const NamedSurface& designed, const FluxPicture& blurred,
                        const Executor& executor, const RunControl& control) {
   FieldRenderSetup sharp = setup;
   sharp.optics.extent = {};
-  if (designed.grid) sharp.grid = *designed.grid;
   PointLight point{{designed.name, render_field(*designed.field, sharp, executor, control), {}}};
   point.designed.quality = judge.judge(point.designed.picture);
   point.moved = leakage_share(blurred, point.designed.picture);

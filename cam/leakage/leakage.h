@@ -16,10 +16,6 @@ namespace lensforge {
 struct NamedSurface {
   std::string name;
   const SurfaceField* field = nullptr;
-  /// Grid to render it on; the setup's where there is none. Surfaces of a chain share one, so that
-  /// equal surfaces have equal pictures; a surface with scallops may have a coarser one along its
-  /// passes, since each of its triangles is spread over many pixels.
-  std::optional<GridWindow> grid = std::nullopt;
 };
 
 /// Names of the causes in the chain that cam measures.

@@ -74,7 +74,7 @@ SamplingCheck check_sampling(const SurfaceField& part, const LeakageResult& resu
   }
   const double scale = area_of(all_cells(setup.grid)) / cells;
   const FluxPicture& designed = result.designed.picture;
-  return {setup.grid.spacing.maxCoeff(),
+  return {setup.grid.spacing.minCoeff(),
           scale * (leakage_share(now, designed) - leakage_share(before, designed)),
           scale * (mae_of(now, target) - mae_of(before, target))};
 }

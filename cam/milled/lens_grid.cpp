@@ -62,16 +62,21 @@ GridWindow window_of(const GridWindow& grid, const CellRange& range, std::int64_
 
 CellRange all_cells(const GridWindow& grid) { return {0, 0, grid.columns - 1, grid.rows - 1}; }
 
-std::vector<CellRange> tiles_of(const CellRange& range, std::int64_t side) {
-  LF_CHECK(side > 0, std::to_string(side));
+std::vector<CellRange> tiles_of(const CellRange& range, const CellCounts& sides) {
+  LF_CHECK(sides.minCoeff() > 0, std::to_string(sides.minCoeff()));
   std::vector<CellRange> tiles;
-  for (std::int64_t row = 0; row < range.rows; row += side) {
-    for (std::int64_t column = 0; column < range.columns; column += side) {
+  for (std::int64_t row = 0; row < range.rows; row += sides.y()) {
+    for (std::int64_t column = 0; column < range.columns; column += sides.x()) {
       tiles.push_back({range.column + column, range.row + row,
-                       std::min(side, range.columns - column), std::min(side, range.rows - row)});
+                       std::min(sides.x(), range.columns - column),
+                       std::min(sides.y(), range.rows - row)});
     }
   }
   return tiles;
+}
+
+std::vector<CellRange> tiles_of(const CellRange& range, std::int64_t side) {
+  return tiles_of(range, CellCounts(side, side));
 }
 
 }  // namespace lensforge

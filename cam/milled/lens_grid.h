@@ -33,7 +33,11 @@ GridWindow window_of(const GridWindow& grid, const CellRange& range, std::int64_
 /// Every cell of a grid.
 CellRange all_cells(const GridWindow& grid);
 
-/// Cuts a range into tiles of at most `side` × `side` cells, row by row. @pre side > 0.
+/// Cells along x and y.
+using CellCounts = Eigen::Matrix<std::int64_t, 2, 1>;
+
+/// Cuts a range into tiles of at most `sides` cells, row by row. @pre sides > 0.
+std::vector<CellRange> tiles_of(const CellRange& range, const CellCounts& sides);
 std::vector<CellRange> tiles_of(const CellRange& range, std::int64_t side);
 
 }  // namespace lensforge

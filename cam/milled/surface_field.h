@@ -15,7 +15,7 @@ namespace lensforge {
 /// window of the grid.
 struct GridWindow {
   Eigen::Vector2d origin{0.0, 0.0};   ///< Of the grid, mm.
-  Eigen::Vector2d spacing{0.0, 0.0};  ///< mm, nearly square
+  Eigen::Vector2d spacing{0.0, 0.0};  ///< mm
   std::int64_t columns = 0;           ///< Nodes along x.
   std::int64_t rows = 0;              ///< Nodes along y.
   std::int64_t first_column = 0;      ///< Of the window, in the grid.

@@ -13,14 +13,14 @@ namespace {
 const Eigen::Vector2d kSize(30.0, 20.0);
 
 TEST(PartLayers, GridIsEvenAndAsFineAsAsked) {
-  const PartGrid grid = part_grid(kSize, 0.01, 6000.0);
+  const PartGrid grid = part_grid(kSize, {0.01, 0.01}, 6000.0);
   EXPECT_NEAR(grid.nodes.cast<double>().prod(), 6000.0, 300.0);
   for (int axis = 0; axis < 2; ++axis) {
     EXPECT_LE(kSize[axis] / (grid.nodes[axis] - 1) / grid.every[axis], 0.01 * (1.0 + 1e-12));
   }
   // No finer than what is sampled.
-  EXPECT_EQ(part_grid(kSize, 1.0, 1e6).nodes, Eigen::Vector2i(31, 21));
-  EXPECT_EQ(part_grid(kSize, 1.0, 1e6).every, Eigen::Vector2i(1, 1));
+  EXPECT_EQ(part_grid(kSize, {1.0, 1.0}, 1e6).nodes, Eigen::Vector2i(31, 21));
+  EXPECT_EQ(part_grid(kSize, {1.0, 1.0}, 1e6).every, Eigen::Vector2i(1, 1));
 }
 
 TEST(PartLayers, EveryNodeHasTheSurfacesHeightAndSlopesTheUppermostFirst) {
@@ -29,9 +29,9 @@ TEST(PartLayers, EveryNodeHasTheSurfacesHeightAndSlopesTheUppermostFirst) {
   });
   const testing::AnalyticField plane(testing::plane({0.2, -0.3}));
   const LayeredImage layers =
-      surface_layers({{"a", &wave}, {"b", &plane}}, kSize, 0.04, Executor::cpu(2), RunControl());
+      surface_layers({{"a", &wave}, {"b", &plane}}, kSize, {0.04, 0.04}, Executor::cpu(2), RunControl());
   EXPECT_EQ(layers.names().size(), 6U);
-  const PartGrid grid = part_grid(kSize, 0.04, kPartNodes);
+  const PartGrid grid = part_grid(kSize, {0.04, 0.04}, kPartNodes);
   ASSERT_EQ(layers.columns(), grid.nodes.x());
   ASSERT_EQ(layers.rows(), grid.nodes.y());
   for (int row = 0; row < layers.rows(); row += 7) {
