@@ -86,6 +86,10 @@ nlohmann::json source_json(const SourceCheck& source) {
           {"convolution_mae", source.convolution}};
 }
 
+nlohmann::json fringe_json(const Fringe& fringe) {
+  return {{"mean", fringe.mean}, {"max", fringe.max}};
+}
+
 nlohmann::json provenance(const OptionSet& options, const ChosenDevice& device,
                           const DesignOptions& design, const DesignResult& result) {
   const bool done = result.status == DesignResult::Status::kDone;
@@ -99,6 +103,7 @@ nlohmann::json provenance(const OptionSet& options, const ChosenDevice& device,
       {"message", result.message},
       {"fingerprint", fingerprint_text(result.fingerprint)}};
   if (result.source) fields["source_check"] = source_json(*result.source);
+  if (result.colors) fields["fringe_mm"] = fringe_json(result.colors->fringe);
   if (result.made) fields["made_by"] = made_json(*design.made_by, *result.made);
   return fields;
 }
@@ -113,9 +118,14 @@ void write_folder(const OutputFolder& folder, const DesignResult& result, const 
             [&](const fs::path& beside) { write_image(draw_overview(result.lens, made), beside); });
   files.add(lens_file::kSetup,
             light_drawing_file(result.lens.setup, result.lens.surface.vertices.row(2).maxCoeff()));
+  if (result.colors) {
+    files.add(lens_file::kRenderColor,
+              [&](const fs::path& beside) { write_image(result.colors->picture, beside); });
+  }
   write_lens(result.lens, std::move(files));
-  const fs::path cut = folder.path() / lens_file::kCut;
   std::error_code ignored;
+  if (!result.colors) fs::remove(folder.path() / lens_file::kRenderColor, ignored);
+  const fs::path cut = folder.path() / lens_file::kCut;
   if (!fs::is_directory(cut, ignored)) return;
   remove_cut(cut);
   if (!fs::remove(cut, ignored)) {
@@ -136,6 +146,7 @@ nlohmann::json summary_json(const fs::path& folder, const DesignResult& result) 
                             {"iterations", result.convergence.size()},
                             {"seconds", lens.provenance["seconds"]}};
   if (result.source) summary["source_check"] = source_json(*result.source);
+  if (result.colors) summary["fringe_mm"] = fringe_json(result.colors->fringe);
   if (result.made) summary["made"] = metrics_json(result.made->metrics);
   return summary;
 }
@@ -144,6 +155,7 @@ std::string summary_text(const fs::path& folder, const DesignResult& result) {
   const Lens& lens = result.lens;
   return folder.string() + ": " + result.message + "\n" +  //
          metrics_text(lens) +                              //
+         (result.colors ? fringe_text(result.colors->fringe) : "") +
          (result.made ? "  made    " + metrics_text(result.made->metrics) + "\n" : "") + "  " +
          size_text(lens.setup.pixels.x(), lens.setup.pixels.y()) + " pixels, " +
          std::to_string(lens.surface.vertex_count()) + " vertices, " +

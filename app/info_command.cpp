@@ -103,6 +103,9 @@ void describe_setup(Description& d, const OpticalSetup& setup) {
   d.line(mirror ? "mirror" : "lens",
          fixed(setup.lens_size.x(), 2) + " x " + fixed(setup.lens_size.y(), 2) + " mm" +
              (mirror ? "" : ", refractive index " + fixed(setup.ior, 4)) +
+             (setup.spectrum.none() ? ""
+                                    : ", Abbe number " + fixed(setup.spectrum.abbe, 1) +
+                                          ", colours " + spectrum_text(setup.spectrum) + " nm") +
              (setup.fresnel ? ", what its faces reflect is counted" : ""));
   if (setup.outline) d.line("outline", outline_words(*setup.outline));
   if (setup.front) d.line("front", front_text(*setup.front));

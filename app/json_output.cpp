@@ -56,6 +56,11 @@ std::string metrics_text(const Lens& lens) {
          "  of any surface, this source\n";
 }
 
+std::string fringe_text(const Fringe& fringe) {
+  return "  fringe  " + fixed(fringe.mean, 3) + " mm on average, at most " + fixed(fringe.max, 3) +
+         " mm\n";
+}
+
 std::string size_text(long columns, long rows) {
   return std::to_string(columns) + " x " + std::to_string(rows);
 }

@@ -7,6 +7,7 @@
 
 #include "core/image/metrics.h"
 #include "core/surface/lens.h"
+#include "design/fringe.h"
 
 /// The words and numbers that more than one command prints.
 namespace lensforge::app {
@@ -27,6 +28,9 @@ std::string metrics_text(const Lens& lens);
 
 /// A number with `digits` digits after the point.
 std::string fixed(double value, int digits);
+
+/// "  fringe  0.123 mm on average, at most 0.200 mm" and a line's end.
+std::string fringe_text(const Fringe& fringe);
 
 /// Joins two counts as "256 x 192".
 std::string size_text(long columns, long rows);

@@ -18,6 +18,7 @@
 #include "core/image/spectral_color.h"
 #include "core/io/files.h"
 #include "core/io/output_guard.h"
+#include "core/optics/light_colors.h"
 #include "core/surface/lens.h"
 #include "core/surface/mesh_io.h"
 #include "core/surface/mesh_normals.h"
@@ -95,6 +96,23 @@ void announce_picture(const OpticalSetup& setup, const std::string& out, const C
                 console);
 }
 
+/// @throw InputError where what is said of colour does not go with the rest.
+void require_spectrum(const Scene& scene, const OptionSet& options,
+                      const RenderArguments& arguments) {
+  const OpticalSetup& setup = scene.render.setup;
+  if (setup.spectrum.none() && options.given("--abbe")) {
+    throw InputError("--abbe: needs --wavelengths; --wavelengths 450,550,650 would do");
+  }
+  if (setup.spectrum.none()) return;
+  if (setup.mode == LightMode::kReflect) {
+    throw InputError("--wavelengths: a mirror bends light of all colours alike; leave it out");
+  }
+  if (fs::path(arguments.out).extension() == ".exr") {
+    throw InputError("--out " + arguments.out +
+                     ": must end in .png, since the picture is in colour");
+  }
+}
+
 /// The scene with everything that the options say instead.
 Scene adjusted(Scene scene, OptionSet& options, RenderArguments& arguments,
                const Console& console) {
@@ -106,9 +124,7 @@ Scene adjusted(Scene scene, OptionSet& options, RenderArguments& arguments,
                      " is no lens that was designed as a spline");
   }
   const OpticalSetup& setup = scene.render.setup;
-  if (!scene.render.wavelengths.empty() && setup.mode == LightMode::kReflect) {
-    throw InputError("--wavelengths: a mirror bends light of all colours alike; leave it out");
-  }
+  require_spectrum(scene, options, arguments);
   announce_picture(setup, arguments.out, console);
   if (options.given("--target")) {
     scene.target = read_image(arguments.target, {}, setup.pixels.maxCoeff()).image;
@@ -190,13 +206,13 @@ Rendering render_alone(const Scene& scene, const Executor& executor) {
 
 /// Of the surface under its model, as vertex_area_normals() has them.
 Fringe fringe_of(const Scene& scene) {
-  const auto& [model, setup, wavelengths, abbe] = scene.render;
-  if (model == SurfaceModel::kSpline) {
-    return fringe_of(scene.spline->mesh, scene.spline->normals, setup, abbe, wavelengths);
+  const OpticalSetup& setup = scene.render.setup;
+  if (scene.render.model == SurfaceModel::kSpline) {
+    return fringe_of(scene.spline->mesh, scene.spline->normals, setup);
   }
   const Eigen::Matrix3Xd normals =
       scene.normals ? *scene.normals : vertex_area_normals(scene.surface);
-  return fringe_of(scene.surface, normals, setup, abbe, wavelengths);
+  return fringe_of(scene.surface, normals, setup);
 }
 
 /// The picture of each wavelength, relative to the target's white, or to even light without one.
@@ -204,9 +220,9 @@ std::vector<Image> pictures_of(const Scene& scene, const Executor& executor) {
   const Eigen::Vector2i& pixels = scene.render.setup.pixels;
   const double even = scene.target ? scene.target->total() / pixels.prod() : 1.0;
   std::vector<Image> pictures;
-  for (const double wavelength : scene.render.wavelengths) {
+  for (const LightColor& color : light_colors(scene.render.setup)) {
     Scene colored = scene;
-    colored.render.setup = in_color(scene.render.setup, scene.render.abbe, wavelength);
+    colored.render.setup = color.setup;
     pictures.push_back(project(colored, executor).image);
     for (float& value : pictures.back().values()) value *= static_cast<float>(even);
   }
@@ -214,17 +230,16 @@ std::vector<Image> pictures_of(const Scene& scene, const Executor& executor) {
 }
 
 Rendering render_spectrum(const Scene& scene, const Executor& executor) {
-  const std::vector<double>& wavelengths = scene.render.wavelengths;
+  const Spectrum& spectrum = scene.render.setup.spectrum;
   const std::vector<Image> pictures = pictures_of(scene, executor);
   const Fringe fringe = fringe_of(scene);
   Rendering rendering;
-  rendering.color = color_picture(pictures, wavelengths);
-  rendering.json = {{"wavelengths_nm", wavelengths},
+  rendering.color = color_picture(pictures, spectrum.wavelengths, spectrum.powers);
+  rendering.json = {{"wavelengths_nm", spectrum.wavelengths},
                     {"fringe_mm", {{"mean", fringe.mean}, {"max", fringe.max}}}};
-  rendering.text = "  fringe  " + fixed(fringe.mean, 3) + " mm on average, at most " +
-                   fixed(fringe.max, 3) + " mm\n";
+  rendering.text = fringe_text(fringe);
   if (!scene.target) return rendering;
-  const Image seen = mixed(pictures, brightness_shares(wavelengths));
+  const Image seen = mixed(pictures, spectrum.shares());
   ImageMetrics metrics = compare(seen, *scene.target);
   metrics.flux_inside = seen.total() / scene.target->total();
   rendering.json["metrics"] = {{model_name(scene.render.model), metrics_json(metrics)}};
@@ -233,19 +248,8 @@ Rendering render_spectrum(const Scene& scene, const Executor& executor) {
 }
 
 Rendering rendered(const Scene& scene, const Executor& executor) {
-  if (!scene.render.wavelengths.empty()) return render_spectrum(scene, executor);
+  if (!scene.render.setup.spectrum.none()) return render_spectrum(scene, executor);
   return scene.target ? compare_models(scene, executor) : render_alone(scene, executor);
-}
-
-/// @throw InputError where what is said of colour does not go with the rest.
-void require_spectrum(const RenderArguments& arguments, const OptionSet& options) {
-  const bool given = !arguments.render.wavelengths.empty();
-  if (!given && options.given("--abbe")) {
-    throw InputError("--abbe: needs --wavelengths; --wavelengths 450,550,650 would do");
-  }
-  if (given && fs::path(arguments.out).extension() == ".exr") {
-    throw InputError("--out " + arguments.out + ": must end in .png with --wavelengths");
-  }
 }
 
 void require_picture_name(const std::string& out) {
@@ -277,7 +281,6 @@ int render_command(const Arguments& command_line) try {
   add_render_options(options, arguments);
   options.parse(command_line);
   require_picture_name(arguments.out);
-  require_spectrum(arguments, options);
   if (!arguments.out.empty()) require_replaceable("--out", arguments.out, arguments.force);
   const Console console(options.common().json, options.common().quiet);
   InterruptibleJob job(options.common(), arguments.out);

@@ -10,6 +10,7 @@
 #include "cam/milled/sampled_mesh.h"
 #include "cam/part_layers.h"
 #include "core/error.h"
+#include "core/optics/light_colors.h"
 #include "core/optics/light_path.h"
 #include "core/surface/lit_surface.h"
 #include "core/surface/mesh_cut.h"
@@ -70,11 +71,12 @@ Prediction predict_part(const PartSurfaces& surfaces, const Lens& lens, const Ca
   const GridWindow grid = lens_grid(lens.setup.lens_size, sample_spacings(options));
   FieldRenderSetup setup{lens.setup, grid};
   setup.surface_height = lens.surface.vertices.row(2).mean();
-  const LightPath light(lens.setup);
-  if (!light.intake_is_plan_area()) setup.whole = lit_intake(lens, light, executor);
+  for (const LightColor& color : light_colors(lens.setup)) {
+    const LightPath light(color.setup);
+    if (!light.intake_is_plan_area()) setup.whole.push_back(lit_intake(lens, light, executor));
+  }
   const LeakageChain chain = surfaces.chain();
-  result.leakage =
-      measure_leakage(chain, lens.target, setup, options.leakage, executor, control);
+  result.leakage = measure_leakage(chain, lens.target, setup, options.leakage, executor, control);
   result.sampling =
       check_sampling(surfaces.part(), result.leakage, lens.target, setup, executor, control);
   const std::vector<double> weights =

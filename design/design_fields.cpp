@@ -7,6 +7,7 @@
 
 #include "core/error.h"
 #include "core/image/image_io.h"
+#include "core/optics/dispersion.h"
 #include "core/text/number_list.h"
 #include "core/text/number_text.h"
 #include "core/text/units.h"
@@ -50,6 +51,27 @@ LightField source_position() {
            "surface for a mirror",
            {},
            "X,Y,Z",
+           {}},
+          get,
+          set,
+          get,
+          {}};
+}
+
+LightField wavelengths() {
+  const auto get = [](const LightOptions& o) { return nlohmann::json(spectrum_text(o.spectrum)); };
+  const auto set = [](LightOptions& o, const nlohmann::json& value) {
+    const auto text = value.get<std::string>();
+    const double abbe = o.spectrum.abbe;
+    o.spectrum = text.empty() ? Spectrum{} : parse_spectrum(text, "--wavelengths");
+    o.spectrum.abbe = abbe;
+  };
+  return {{"--wavelengths",
+           OptionKind::kText,
+           "two to five wavelengths, nm, whose pictures together are to be the target, by "
+           "brightness; with the source's power at each after a colon, or the same at each",
+           {},
+           "LIST",
            {}},
           get,
           set,
@@ -166,6 +188,11 @@ const OptionTable<LightOptions>& light_fields() {
       R::flag("--fresnel", &O::fresnel,
               "count the light that a lens's two faces reflect, without coating: what slopes "
               "steeply lets less through"),
+      wavelengths(),
+      R::number(
+          "--abbe", [](auto& o) -> auto& { return o.spectrum.abbe; },
+          Limits::between(kMinAbbe, kMaxAbbe), "",
+          "Abbe number of the material, for --wavelengths; acrylic has 57"),
       R::length("--image-width", &O::image_width, Limits::zero_or(kMinImageWidth, kMaxImageWidth),
                 "width of the picture on the screen; 0 takes the lens's"),
       pair("--image-offset", &O::image_offset, "X,Y",

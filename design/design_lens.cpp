@@ -4,9 +4,13 @@
 #include <filesystem>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include "core/error.h"
+#include "core/image/spectral_color.h"
+#include "core/optics/light_colors.h"
 #include "design/optics/made_surface.h"
+#include "design/picture_values.h"
 #include "design/render_lens.h"
 #include "design/schedule/alternation.h"
 #include "design/schedule/checkpoint.h"
@@ -62,6 +66,19 @@ std::optional<DesignResult::Made> made_part(const DesignOptions& options, const 
   return made;
 }
 
+std::optional<DesignResult::Colors> colors_of(const Lens& lens, const Executor& executor) {
+  const Spectrum& spectrum = lens.setup.spectrum;
+  if (spectrum.none()) return std::nullopt;
+  std::vector<Image> pictures;
+  for (const LightColor& color : light_colors(lens.setup)) {
+    std::vector<double> flux = flux_of_lens(lens, color.setup, executor);
+    for (double& value : flux) value *= lens.target.total();
+    pictures.push_back(image_of(flux, lens.target.columns(), lens.target.rows()));
+  }
+  return DesignResult::Colors{color_picture(pictures, spectrum.wavelengths, spectrum.powers),
+                              fringe_of(lens)};
+}
+
 /// Status and message.
 DesignResult result_of(const Ending& ending, const DesignLog& log) {
   DesignResult result;
@@ -98,6 +115,7 @@ DesignResult design_lens(const Image& target, const DesignOptions& options,
   result.lens = make_lens(task, std::move(state.mesh), executor);
   const bool done = result.status == DesignResult::Status::kDone;
   if (task.limit && done) result.source = check_source(result.lens, executor);
+  result.colors = colors_of(result.lens, executor);
   result.made = made_part(settled, result.lens, executor);
   result.fingerprint = state.fingerprint;
   result.convergence = std::move(state.convergence);

@@ -9,9 +9,11 @@
 #include "core/compute/executor.h"
 #include "core/compute/run_control.h"
 #include "core/image/image.h"
+#include "core/image/image_io.h"
 #include "core/image/metrics.h"
 #include "core/surface/lens.h"
 #include "design/design_options.h"
+#include "design/fringe.h"
 #include "design/schedule/convergence.h"
 #include "design/source_picture.h"
 
@@ -29,6 +31,12 @@ struct DesignResult {
   };
   std::optional<Made> made;
   std::optional<SourceCheck> source;  ///< Of an extended source.
+  /// Of a spectrum.
+  struct Colors {
+    ColorImage picture;  ///< What the lens projects; white where all wavelengths do the target's.
+    Fringe fringe;
+  };
+  std::optional<Colors> colors;
   Lens lens;  ///< The best surface so far, at the resolution that was reached.
   std::vector<ConvergenceRow> convergence;
 };

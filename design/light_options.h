@@ -36,7 +36,8 @@ struct LightOptions {
   double source_size = 0.0;                        ///< Diameter of a point source, mm.
   SourceShape source_shape;                        ///< Of a source with an angle or a size.
   bool fresnel = false;                            ///< A lens's faces reflect a part of it.
-  double image_width = 0.0;                        ///< Picture on the screen, mm; 0: the lens's.
+  Spectrum spectrum;         ///< Its colours; none: all has DesignOptions::ior.
+  double image_width = 0.0;  ///< Picture on the screen, mm; 0: the lens's.
   /// From where a flat surface's chief ray meets the screen to the picture's centre, mm along the
   /// lens's x and y.
   Eigen::Vector2d image_offset{0.0, 0.0};

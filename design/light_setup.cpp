@@ -208,6 +208,19 @@ void require_picture(const DesignOptions& o) {
   }
 }
 
+/// @throw InputError where colours do not go with the rest.
+void require_spectrum(const DesignOptions& o) {
+  const Spectrum& spectrum = o.light.spectrum;
+  if (spectrum.none() && spectrum.abbe != Spectrum{}.abbe) {
+    refuse("--abbe " + number_text(spectrum.abbe),
+           "needs --wavelengths; --wavelengths 450,550,650 would do");
+  }
+  if (!spectrum.none() && is_mirror(o)) {
+    refuse("--wavelengths " + spectrum_text(spectrum),
+           "a mirror bends light of all colours alike; leave it out");
+  }
+}
+
 /// True if a surface can send the light of its middle to the picture's centre.
 bool reaches_centre(const OpticalSetup& setup, double thickness) {
   const LightPath light(setup);
@@ -341,6 +354,7 @@ OpticalSetup optical_setup(const DesignOptions& options, const Eigen::Vector2i& 
   setup.mode = options.light.mode;
   setup.ior = options.ior;
   setup.fresnel = options.light.fresnel;
+  setup.spectrum = options.light.spectrum;
   setup.focal_length = options.focal_length;
   setup.lens_size = lens_size(options, pixels);
   if (options.outline) setup.outline = fitted(*options.outline, setup.lens_size);
@@ -377,6 +391,7 @@ OpticalSetup at_focal_length(OpticalSetup setup, double focal_length, double thi
 void require_light(const DesignOptions& options, const Eigen::Vector2i& pixels) {
   require_outline(options.outline, lens_size(options, pixels));
   require_source_options(options.light);
+  require_spectrum(options);
   require_source(options, lens_size(options, pixels));
   require_tilt(options.light.screen_tilt);
   require_front(options, pixels);

@@ -2,9 +2,8 @@
 #include "design/render_fields.h"
 
 #include "core/image/image_io.h"
-#include "core/text/number_list.h"
+#include "core/optics/dispersion.h"
 #include "design/design_options.h"
-#include "design/fringe.h"
 #include "design/render_setup.h"
 
 namespace lensforge {
@@ -53,14 +52,17 @@ Field image_width() {
 }
 
 Field wavelengths() {
-  const auto get = [](const O& o) { return nlohmann::json(numbers_text(o.wavelengths)); };
+  const auto get = [](const O& o) { return nlohmann::json(spectrum_text(o.setup.spectrum)); };
   const auto set = [](O& o, const nlohmann::json& value) {
-    o.wavelengths = parse_wavelengths(value.get<std::string>(), "--wavelengths");
+    const double abbe = o.setup.spectrum.abbe;
+    o.setup.spectrum = parse_spectrum(value.get<std::string>(), "--wavelengths");
+    o.setup.spectrum.abbe = abbe;
   };
   return {{"--wavelengths",
            OptionKind::kText,
-           "two to five wavelengths, nm: a picture in colour, of a source with the same power at "
-           "each, and how far dispersion moves their light apart",
+           "two to five wavelengths, nm: a picture in colour, of a source with the power after a "
+           "colon at each, or the same, and how far dispersion moves their light apart; a lens has "
+           "its own default",
            {},
            "LIST",
            {}},
@@ -90,8 +92,10 @@ const OptionTable<RenderOptions>& render_fields() {
       image_width(),
       pixels(),
       wavelengths(),
-      R::number("--abbe", &O::abbe, Limits::between(kMinAbbe, kMaxAbbe), "",
-                "Abbe number of the material, for --wavelengths; acrylic has 57")};
+      R::number(
+          "--abbe", [](auto& o) -> auto& { return o.setup.spectrum.abbe; },
+          Limits::between(kMinAbbe, kMaxAbbe), "",
+          "Abbe number of the material, for --wavelengths; acrylic has 57")};
   return table;
 }
 

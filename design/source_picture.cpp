@@ -6,6 +6,7 @@
 #include <cstddef>
 
 #include "core/image/metrics.h"
+#include "core/optics/light_colors.h"
 #include "core/optics/source_points.h"
 #include "design/flux/source_blur.h"
 #include "design/picture_values.h"
@@ -41,11 +42,15 @@ int source_point_count(const OpticalSetup& setup, double z) {
 
 std::vector<double> picture_under(const OpticalSetup& setup, int count,
                                   const PointPicture& picture) {
-  if (setup.extent.none()) return picture(setup);
+  if (setup.extent.none() && setup.spectrum.none()) return picture(setup);
   std::vector<double> sum(static_cast<std::size_t>(setup.pixels.prod()), 0.0);
-  for (const SourcePoint& point : source_points(setup.extent, count)) {
-    const std::vector<double> one = picture(lit_from(setup, point.at));
-    for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += point.share * one[i];
+  for (const LightColor& color : light_colors(setup)) {
+    for (const SourcePoint& point : source_points(setup.extent, count)) {
+      const OpticalSetup& whole = color.setup;
+      const std::vector<double> one =
+          picture(setup.extent.none() ? whole : lit_from(whole, point.at));
+      for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += color.share * point.share * one[i];
+    }
   }
   return sum;
 }

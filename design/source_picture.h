@@ -17,8 +17,9 @@ using PointPicture = std::function<std::vector<double>(const OpticalSetup&)>;
 /// Points that an exact picture is summed over: the more, the wider the source's image.
 int source_point_count(const OpticalSetup& setup, double z);
 
-/// Flux per pixel under an extended source: the sum of the pictures in the light of each of about
-/// `count` of its points, by shares. No approximation but the count.
+/// Flux per pixel under an extended source and of all colours of a spectrum: the sum of the
+/// pictures in the light of each of about `count` of its points, by shares. No approximation but
+/// the count.
 std::vector<double> picture_under(const OpticalSetup& setup, int count,
                                   const PointPicture& picture);
 

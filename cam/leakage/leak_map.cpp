@@ -3,11 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <numeric>
 #include <utility>
 
 #include "cam/leakage/surface_tile.h"
 #include "core/error.h"
+#include "core/optics/light_colors.h"
 #include "design/flux/flux_triangle.h"
 
 namespace lensforge {
@@ -233,13 +235,15 @@ LeakMap map_leakage(const NamedSurface& designed, const NamedSurface& part,
            std::to_string(weights.size()));
   const SourceKernel kernel = setup.blur();
   const OpticalSetup optics = setup.optics_in_parts(kernel);
+  const std::vector<LightColor> colors = light_colors(optics);
+  const std::size_t middle = colors.size() / 2;
   const PixelWeights pixel_weights(in_parts(weights, kernel, pixels, executor), optics.pixels.x(),
                                    optics.pixels.y());
   LeakMap map = empty_map(setup.grid, cell);
   const std::int64_t cells =
       std::max<std::int64_t>(1, setup.tile / map.grid_cells.maxCoeff());  // In a tile, each way.
-  SurfaceTile designed_tile(optics, setup.grid, setup.whole);
-  SurfaceTile part_tile(optics, setup.grid, setup.whole);
+  SurfaceTile designed_tile(colors[middle].setup, setup.grid, setup.whole_in(middle));
+  SurfaceTile part_tile = designed_tile;
   for (const CellRange& range : tiles_of(all_cells(setup.grid), cells * map.grid_cells)) {
     designed_tile.load(*designed.field, range, executor);
     part_tile.load(*part.field, range, executor);

@@ -33,6 +33,7 @@ struct LeakMap {
 /// part's cell − flux of the designed cell) over all pixels, exact as the pictures are. With
 /// pixels_with_surplus() as weights the map sums to Σ max(0, g − g_designed), and a cell that is
 /// left as designed counts nothing, wherever its light lands. Same bits for any number of threads.
+/// Of a spectrum all light counts as of its middle colour.
 /// @param weights  one per pixel, row by row from the top.
 /// @param cell  wished side of a map cell, mm, > 0.
 /// @throw Interrupted as the executor does.

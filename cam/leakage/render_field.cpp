@@ -2,12 +2,14 @@
 #include "cam/leakage/render_field.h"
 
 #include <algorithm>
+#include <cstddef>
 #include <numeric>
 #include <span>
 #include <utility>
 
 #include "cam/leakage/surface_tile.h"
 #include "core/error.h"
+#include "core/optics/light_colors.h"
 #include "design/flux/flux_image.h"
 
 namespace lensforge {
@@ -29,6 +31,21 @@ OpticalSetup FieldRenderSetup::optics_in_parts(const SourceKernel& kernel) const
 
 namespace {
 
+/// Adds what a loaded tile sends to the screen in light of every colour.
+void add_colors(SurfaceTile& tile, const FieldRenderSetup& setup,
+                const std::vector<LightColor>& colors, const Executor& executor, FluxImage& image) {
+  for (std::size_t color = 0; color < colors.size(); ++color) {
+    const double share = colors[color].share;
+    if (colors.size() > 1) tile.relight(colors[color].setup, setup.whole_in(color), executor);
+    image.add(executor, tile.cells(), [&](std::int64_t cell, const FluxAccumulator& sum) {
+      tile.visit_cell(cell, [&](ImageTriangle piece) {
+        piece.flux *= share;
+        deposit(piece, sum);
+      });
+    });
+  }
+}
+
 std::vector<FluxPicture> render_parts(std::span<const SurfaceField* const> fields,
                                       const FieldRenderSetup& setup, const CellRange& cells,
                                       const Executor& executor, const RunControl& control) {
@@ -40,15 +57,14 @@ std::vector<FluxPicture> render_parts(std::span<const SurfaceField* const> field
   for (std::size_t f = 0; f < fields.size(); ++f) {
     images.emplace_back(optics.pixels.x(), optics.pixels.y()).begin(executor);
   }
-  SurfaceTile tile(optics, setup.grid, setup.whole);
+  const std::vector<LightColor> colors = light_colors(optics);
+  SurfaceTile tile(colors.front().setup, setup.grid, setup.whole_in(0));
   const std::vector<CellRange> tiles = tiles_of(cells, setup.tile);
   for (std::size_t t = 0; t < tiles.size(); ++t) {
     for (std::size_t f = 0; f < fields.size(); ++f) {
       if (control.stop_requested()) throw Interrupted();
       tile.load(*fields[f], tiles[t], executor);
-      images[f].add(executor, tile.cells(), [&tile](std::int64_t cell, const FluxAccumulator& sum) {
-        tile.visit_cell(cell, [&sum](const ImageTriangle& piece) { deposit(piece, sum); });
-      });
+      add_colors(tile, setup, colors, executor, images[f]);
     }
     control.report({"render surfaces", static_cast<double>(t + 1),
                     static_cast<double>(tiles.size()), "tiles"});

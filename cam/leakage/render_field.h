@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -33,10 +34,15 @@ struct FieldRenderSetup {
   OpticalSetup optics;
   GridWindow grid;          ///< Over the whole lens, see lens_grid().
   std::int64_t tile = 768;  ///< Side of the tiles that are sampled at once, cells: 30 MB.
-  /// LightPath::intake() of the whole surface, mm²; 0 takes the grid's area, that of light along z.
-  double whole = 0.0;
+  /// LightPath::intake() of the whole surface, mm², in each of light_colors(); empty takes the
+  /// grid's area, that of light along z.
+  std::vector<double> whole{};
   /// About where the surface is, mm: the image of an extended source is taken from there.
   double surface_height = 0.0;
+
+  [[nodiscard]] double whole_in(std::size_t color) const {
+    return whole.empty() ? 0.0 : whole[color];
+  }
 
   /// What an extended source makes of the light of a point.
   [[nodiscard]] SourceKernel blur() const { return source_kernel(optics, surface_height); }
@@ -46,8 +52,9 @@ struct FieldRenderSetup {
 
 /// Renders a surface tile by tile: memory does not grow with the grid. Every image triangle is
 /// deposited exactly (design/flux); what is neglected is how the slope bends inside a triangle.
-/// Under an extended source the picture is blurred as the optimiser does it, see source_kernel().
-/// Same bits for any tile and any number of threads.
+/// Under an extended source the picture is blurred as the optimiser does it, see source_kernel();
+/// of a spectrum it is the sum of the colours' pictures. Same bits for any tile and any number of
+/// threads.
 /// @throw Interrupted if `control` or the executor asks for an end.
 FluxPicture render_field(const SurfaceField& field, const FieldRenderSetup& setup,
                          const Executor& executor, const RunControl& control);

@@ -23,9 +23,15 @@ double area_of(const GridWindow& grid, const std::optional<Outline>& outline) {
 SurfaceTile::SurfaceTile(const OpticalSetup& setup, const GridWindow& grid, double whole)
     : light_(setup),
       outline_(setup.outline ? std::optional<OutlineIndex>(*setup.outline) : std::nullopt),
-      grid_(grid),
-      lens_area_(whole > 0.0 ? whole : area_of(grid, setup.outline)),
-      triangle_flux_(0.5 * grid.spacing.prod() / lens_area_) {}
+      grid_(grid) {
+  take_light(setup, whole);
+}
+
+void SurfaceTile::take_light(const OpticalSetup& setup, double whole) {
+  light_ = LightPath(setup);
+  lens_area_ = whole > 0.0 ? whole : area_of(grid_, setup.outline);
+  triangle_flux_ = 0.5 * grid_.spacing.prod() / lens_area_;
+}
 
 void SurfaceTile::load(const SurfaceField& field, const CellRange& range,
                        const Executor& executor) {
@@ -37,6 +43,17 @@ void SurfaceTile::load(const SurfaceField& field, const CellRange& range,
   patch_.window = window;
   const std::int64_t count = window.size();
   LF_CHECK(static_cast<std::int64_t>(patch_.z.size()) == count, std::to_string(patch_.z.size()));
+  land(executor);
+  if (outline_) find_rim(executor);
+}
+
+void SurfaceTile::relight(const OpticalSetup& setup, double whole, const Executor& executor) {
+  take_light(setup, whole);
+  land(executor);
+}
+
+void SurfaceTile::land(const Executor& executor) {
+  const std::int64_t count = patch_.window.size();
   landing_.resize(static_cast<std::size_t>(count));
   if (light_.varies()) entries_.resize(static_cast<std::size_t>(count));
   parallel_for(executor, "land nodes", count, [this](std::int64_t i) {
@@ -48,7 +65,6 @@ void SurfaceTile::load(const SurfaceField& field, const CellRange& range,
         land_of(light_, at, patch_.z[k], {patch_.slope_x[k], patch_.slope_y[k]}, entry(k));
   });
   if (patch_.cut.empty()) sharpen_landing(executor);
-  if (outline_) find_rim(executor);
 }
 
 void SurfaceTile::find_rim(const Executor& executor) {

@@ -35,6 +35,9 @@ class SurfaceTile {
   /// Samples the surface over `range` with one more node on every side where the grid has one, so
   /// that creases on the tile's rim are split as they are inside.
   void load(const SurfaceField& field, const CellRange& range, const Executor& executor);
+  /// Puts what was loaded, and what will be, into other light, of another colour say.
+  /// @param whole  as of the constructor.
+  void relight(const OpticalSetup& setup, double whole, const Executor& executor);
 
   [[nodiscard]] const CellRange& range() const { return range_; }
   [[nodiscard]] std::int64_t cells() const { return range_.columns * range_.rows; }
@@ -106,6 +109,8 @@ class SurfaceTile {
     return outline_ ? sides_[static_cast<std::size_t>(cell)] : OutlineIndex::Side::kInside;
   }
   void find_rim(const Executor& executor);
+  void take_light(const OpticalSetup& setup, double whole);
+  void land(const Executor& executor);
   [[nodiscard]] double flux_of(std::size_t a, std::size_t b, std::size_t c) const {
     if (light_.intake_is_plan_area()) return triangle_flux_;
     const Corners corners{point(a), point(b), point(c)};
@@ -130,8 +135,8 @@ class SurfaceTile {
   std::optional<OutlineIndex> outline_;
   std::vector<OutlineIndex::Side> sides_;  ///< Of the tile's cells, if there is an outline.
   GridWindow grid_;
-  double lens_area_;
-  double triangle_flux_;  ///< Of every triangle that takes light by its plan area.
+  double lens_area_ = 0.0;
+  double triangle_flux_ = 0.0;  ///< Of every triangle that takes light by its plan area.
   CellRange range_;
   std::int64_t halo_columns_ = 0;  ///< Nodes of the patch left of the tile.
   std::int64_t halo_rows_ = 0;

@@ -28,11 +28,13 @@ Eigen::Matrix3d rgb_of_xyz() {
 }
 
 /// Linear RGB of every wavelength, so that their sum is white: each channel is scaled.
-std::vector<Eigen::Vector3d> balanced_colors(const std::vector<double>& wavelengths) {
+std::vector<Eigen::Vector3d> balanced_colors(const std::vector<double>& wavelengths,
+                                             const std::vector<double>& powers) {
   std::vector<Eigen::Vector3d> colors;
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  for (const double wavelength : wavelengths) {
-    colors.push_back(rgb_of_xyz() * color_matching(wavelength));
+  for (std::size_t k = 0; k < wavelengths.size(); ++k) {
+    colors.push_back(rgb_of_xyz() * color_matching(wavelengths[k]));
+    if (!powers.empty()) colors.back() *= powers[k];
     sum += colors.back();
   }
   // A channel that the wavelengths do not light stays black.
@@ -60,9 +62,12 @@ Eigen::Vector3d color_matching(double wavelength) {
   return {x, y, z};
 }
 
-std::vector<double> brightness_shares(const std::vector<double>& wavelengths) {
+std::vector<double> brightness_shares(const std::vector<double>& wavelengths,
+                                      const std::vector<double>& powers) {
   std::vector<double> shares;
-  for (const double wavelength : wavelengths) shares.push_back(color_matching(wavelength).y());
+  for (std::size_t k = 0; k < wavelengths.size(); ++k) {
+    shares.push_back(color_matching(wavelengths[k]).y() * (powers.empty() ? 1.0 : powers[k]));
+  }
   const double sum = std::accumulate(shares.begin(), shares.end(), 0.0);
   for (double& share : shares) share /= sum;
   return shares;
@@ -78,9 +83,9 @@ Image mixed(const std::vector<Image>& pictures, const std::vector<double>& share
   return sum;
 }
 
-ColorImage color_picture(const std::vector<Image>& pictures,
-                         const std::vector<double>& wavelengths) {
-  const std::vector<Eigen::Vector3d> colors = balanced_colors(wavelengths);
+ColorImage color_picture(const std::vector<Image>& pictures, const std::vector<double>& wavelengths,
+                         const std::vector<double>& powers) {
+  const std::vector<Eigen::Vector3d> colors = balanced_colors(wavelengths, powers);
   ColorImage result{pictures.front().columns(), pictures.front().rows(), {}};
   for (std::size_t i = 0; i < pictures.front().values().size(); ++i) {
     Eigen::Vector3d rgb = Eigen::Vector3d::Zero();

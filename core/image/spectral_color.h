@@ -18,16 +18,17 @@ inline constexpr double kMaxWavelength = 780.0;
 /// of light.
 Eigen::Vector3d color_matching(double wavelength);
 
-/// Shares of the brightness of an equal-energy source that its wavelengths have, by V(λ); their sum
-/// is 1.
-std::vector<double> brightness_shares(const std::vector<double>& wavelengths);
+/// Shares of the brightness of a source that its wavelengths have, power × V(λ); their sum is 1.
+/// @param powers  one per wavelength, or none where all have the same.
+std::vector<double> brightness_shares(const std::vector<double>& wavelengths,
+                                      const std::vector<double>& powers = {});
 
 /// Their sum by shares. @pre equal sizes, one picture a share.
 Image mixed(const std::vector<Image>& pictures, const std::vector<double>& shares);
 
 /// The colour of pictures of single wavelengths together, sRGB: white where all of them are 1.
 /// Colours that a screen cannot show are clipped. @pre equal sizes, one picture a wavelength.
-ColorImage color_picture(const std::vector<Image>& pictures,
-                         const std::vector<double>& wavelengths);
+ColorImage color_picture(const std::vector<Image>& pictures, const std::vector<double>& wavelengths,
+                         const std::vector<double>& powers = {});
 
 }  // namespace lensforge

@@ -16,6 +16,7 @@ inline constexpr const char* kTargetPng = "target.png";
 inline constexpr const char* kTargetExr = "target.exr";
 inline constexpr const char* kRenderPng = "render.png";
 inline constexpr const char* kRenderExr = "render.exr";
+inline constexpr const char* kRenderColor = "render_color.png";  ///< Of a spectrum.
 inline constexpr const char* kError = "error.png";
 inline constexpr const char* kConvergence = "convergence.csv";
 inline constexpr const char* kOverview = "overview.png";
@@ -23,9 +24,9 @@ inline constexpr const char* kSetup = "setup.svg";
 inline constexpr const char* kCheckpoint = "checkpoint.bin";  ///< While a design is unfinished.
 
 /// All of them.
-inline constexpr std::array kAll = {kJson,      kSurface,     kSpline,    kSheet, kTargetPng,
-                                    kTargetExr, kRenderPng,   kRenderExr, kError, kOverview,
-                                    kSetup,     kConvergence, kCheckpoint};
+inline constexpr std::array kAll = {kJson,      kSurface,   kSpline,      kSheet,       kTargetPng,
+                                    kTargetExr, kRenderPng, kRenderExr,   kRenderColor, kError,
+                                    kOverview,  kSetup,     kConvergence, kCheckpoint};
 
 /// Folder in which earlier versions put a lens together; a killed one has left it behind.
 inline constexpr const char* kStaging = "lens";

@@ -89,6 +89,16 @@ void require_extent(const SourceExtent& extent) {
   require(lit && allowed, "source.shape", "dark", "numbers of 0 or more, not all 0");
 }
 
+void require_spectrum(const OpticalSetup& setup) {
+  const std::string text = spectrum_text(setup.spectrum);
+  require(
+      is_valid(setup.spectrum), "spectrum", text,
+      "2 to 5 rising wavelengths from 380 to 780 nm, with powers above 0 at all or none, and an "
+      "Abbe number from 10 to 200");
+  require(setup.spectrum.none() || setup.mode == LightMode::kRefract, "spectrum", text,
+          "left out of a mirror");
+}
+
 void require_screen(const OpticalSetup& setup) {
   require(is_unit(setup.screen_x), "screen.right", setup.screen_x.transpose(), "a unit vector");
   require(is_unit(setup.screen_y) && std::abs(setup.screen_x.dot(setup.screen_y)) < kUnitTolerance,
@@ -118,6 +128,7 @@ void validate(const OpticalSetup& setup) {
           "left out of a mirror");
   require_front(setup);
   require_outline(setup);
+  require_spectrum(setup);
 }
 
 }  // namespace lensforge

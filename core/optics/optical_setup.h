@@ -7,6 +7,7 @@
 #include "core/optics/front_surface.h"
 #include "core/optics/outline.h"
 #include "core/optics/source_extent.h"
+#include "core/optics/spectrum.h"
 
 namespace lensforge {
 
@@ -45,6 +46,7 @@ struct OpticalSetup {
   /// Entry face of a lens; none: the plane z = 0.
   std::optional<SphericalFront> front;
   SourceExtent extent;  ///< Of either; LightPath takes it for a point.
+  Spectrum spectrum;    ///< Of the light through a lens; LightPath takes all of it for that of ior.
   /// Light that a lens's faces reflect is missing behind them, steeper ones let less through.
   bool fresnel = false;
   double ior = 1.49;                        ///< Refractive index of the lens against air, > 1.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "core/surface/setup_json.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <string>
@@ -136,6 +137,32 @@ ordered_json front_json(const OpticalSetup& setup) {
       {"type", "sphere"}, {"radius", setup.front->radius}, {"apex", array_of(setup.front->apex)}};
 }
 
+ordered_json spectrum_json(const Spectrum& spectrum) {
+  ordered_json document = {{"wavelengths_nm", spectrum.wavelengths}};
+  if (!spectrum.powers.empty()) document["powers"] = spectrum.powers;
+  document["abbe"] = spectrum.abbe;
+  return document;
+}
+
+std::vector<double> read_numbers(const JsonFields& fields, const std::string& name) {
+  std::vector<double> numbers;
+  const nlohmann::json& list = fields.at(name);
+  const auto is_number = [](const nlohmann::json& entry) { return entry.is_number(); };
+  if (!list.is_array() || !std::all_of(list.begin(), list.end(), is_number)) {
+    fields.refuse(name, "it must be a list of numbers");
+  }
+  for (const nlohmann::json& entry : list) numbers.push_back(entry.get<double>());
+  return numbers;
+}
+
+Spectrum read_spectrum(const JsonFields& fields) {
+  Spectrum spectrum;
+  spectrum.wavelengths = read_numbers(fields, "wavelengths_nm");
+  if (fields.has("powers")) spectrum.powers = read_numbers(fields, "powers");
+  spectrum.abbe = fields.number("abbe");
+  return spectrum;
+}
+
 bool read_fresnel(const JsonFields& fields) {
   const nlohmann::json& value = fields.at("fresnel");
   if (!value.is_boolean()) fields.refuse("fresnel", "it must be true or false");
@@ -174,6 +201,7 @@ ordered_json setup_json(const OpticalSetup& setup) {
   document["source"] = source_json(setup);
   if (lens) document["front"] = front_json(setup);
   document["ior"] = setup.ior;
+  if (!setup.spectrum.none()) document["spectrum"] = spectrum_json(setup.spectrum);
   if (setup.fresnel) document["fresnel"] = true;
   if (!setup.screen_is_turned()) document["focal_length"] = setup.focal_length;
   document["lens_size"] = array_of(setup.lens_size);
@@ -197,6 +225,7 @@ OpticalSetup read_setup(const JsonFields& fields) {
   read_source(fields.object("source"), setup);
   if (fields.has("front")) read_front(fields.object("front"), setup);
   setup.ior = fields.number("ior");
+  if (fields.has("spectrum")) setup.spectrum = read_spectrum(fields.object("spectrum"));
   if (fields.has("fresnel")) setup.fresnel = read_fresnel(fields);
   setup.lens_size = fields.number_pair("lens_size");
   if (fields.has("outline")) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <cstdint>
 
 #include "core/compute/host_device.h"
@@ -52,16 +53,23 @@ class FacetRaysOn {
 
   FacetRaysOn(std::int64_t /*faces*/, std::int64_t /*vertices*/) {}
 
-  [[nodiscard]] FacetRays view() { return {}; }
+  [[nodiscard]] FacetRays view(std::size_t /*color*/) { return {}; }
 
   /// Follows the rays to the screen; false where one is not let out.
-  [[nodiscard]] bool land(const Exec& /*executor*/, const ObjectiveView& /*o*/) { return true; }
+  [[nodiscard]] bool land(const Exec& /*executor*/, const ObjectiveView& /*o*/,
+                          std::size_t /*color*/) {
+    return true;
+  }
 
   /// Goes back from the goal to what FacetRays::pull_back() needs; the goal's values as far as that
   /// does not return them.
-  [[nodiscard]] auto pull_back(const Exec& /*executor*/, const ObjectiveView& /*o*/) {
+  [[nodiscard]] auto pull_back(const Exec& /*executor*/, const ObjectiveView& /*o*/,
+                               std::size_t /*color*/) {
     return typename Exec::template PendingSum<4>();
   }
+
+  /// Facets have no normals of their own.
+  void add_normal_bar(const Exec& /*executor*/, double* /*sum*/) {}
 };
 
 }  // namespace lensforge

@@ -112,6 +112,13 @@ struct ReweightEdges {
   }
 };
 
+struct AddEntry {
+  const double* add;
+  double* sum;
+
+  LF_HD void operator()(std::int64_t i) const { sum[i] += add[i]; }
+};
+
 /// |g − g̃| of a pixel; sets its error and clears its cotangent.
 struct ComparePixel {
   const double* flux;

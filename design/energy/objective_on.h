@@ -12,6 +12,7 @@
 
 #include "core/compute/executor.h"
 #include "core/image/image.h"
+#include "core/optics/light_colors.h"
 #include "core/surface/lit_surface.h"
 #include "core/surface/mesh_topology.h"
 #include "core/surface/surface_mesh.h"
@@ -32,6 +33,15 @@
 
 namespace lensforge {
 
+/// The light of one colour, and what is kept of it for every vertex and face.
+template <class Exec>
+struct ColoredLight {
+  LightPath path;  ///< Its flux as shares of all colours' together.
+  double share;    ///< Of the brightness.
+  typename Exec::template Buffer<IncidentRay> incident;  ///< V; empty in light of one direction.
+  typename Exec::template Buffer<double> face_flux;      ///< F; likewise.
+};
+
 /// DesignObjective on any executor: all arrays, the vertices and the gradient too, lie in its
 /// memory, and only sums come back to the caller.
 template <class Exec>
@@ -44,9 +54,14 @@ class DesignObjectiveOn {
   void relinearize(const double* vertices);
   ObjectiveEvaluation evaluate(const double* vertices, double* gradient);
 
-  /// Normals of the surface that the vertices sample and, after evaluate(), the derivatives by
-  /// them, 3 × V in the executor's memory. @pre the model is a spline.
-  [[nodiscard]] SmoothRays sampled_rays() { return std::get<SmoothRaysOn<Exec>>(rays_).view(); }
+  /// Normals of the surface that the vertices sample, 3 × V in the executor's memory, to be filled
+  /// in before evaluate(). @pre the model is a spline.
+  [[nodiscard]] double* normals() { return std::get<SmoothRaysOn<Exec>>(rays_).view(0).normals; }
+  /// Derivatives by them after evaluate().
+  [[nodiscard]] double* normals_bar() {
+    return lights_.size() > 1 ? normals_bar_.data()
+                              : std::get<SmoothRaysOn<Exec>>(rays_).view(0).normal_bar;
+  }
 
   /// DesignObjective::movable(), in the caller's memory; with an outline as of relinearize().
   [[nodiscard]] const Eigen::Matrix3Xd& movable() const { return movable_; }
@@ -58,26 +73,25 @@ class DesignObjectiveOn {
   void take(const Image& target);
   void take_outline(const double* vertices);
   void take(const Correspondence& wanted);
-  /// @post its incident rays are those of the vertices.
-  [[nodiscard]] ObjectiveView view(const double* vertices);
+  /// The surface in the light of every colour, whose incident rays are those of the vertices.
+  [[nodiscard]] std::vector<ObjectiveView> views(const double* vertices);
+  [[nodiscard]] ObjectiveView view(const double* vertices, std::size_t color);
   [[nodiscard]] GoalView goal_view();
   /// Sums of one evaluation; not asked for before all kernels are on their way.
   struct Sums;
 
-  // What depends on the surface model; Rays is FacetRaysOn or SmoothRaysOn.
+  // What depends on the surface model; Rays is FacetRaysOn or SmoothRaysOn, views are views().
   template <class Rays>
-  void find_unlit(const ObjectiveView& o, Rays& rays);
+  void find_unlit(const std::vector<ObjectiveView>& views, Rays& rays);
   template <class Rays>
-  [[nodiscard]] bool allowed(const ObjectiveView& o, Rays& rays);
+  [[nodiscard]] bool allowed(const std::vector<ObjectiveView>& views, Rays& rays);
   template <class Rays>
-  [[nodiscard]] std::span<const double> project(const ObjectiveView& o, Rays& rays) {
-    const FaceLightSource<typename Rays::View> faces{o, rays.view()};
-    return blur_.apply(executor_, flux_.render(executor_, faces.count(), faces));
-  }
+  [[nodiscard]] std::span<const double> project(const std::vector<ObjectiveView>& views,
+                                                Rays& rays);
   template <class Rays>
-  void compare_picture(const ObjectiveView& o, Rays& rays, Sums& sums);
+  void compare_picture(const std::vector<ObjectiveView>& views, Rays& rays, Sums& sums);
   template <class Rays>
-  void pull_back(const ObjectiveView& o, Rays& rays, double* gradient, Sums& sums);
+  void pull_back(const std::vector<ObjectiveView>& views, Rays& rays, double* gradient, Sums& sums);
   template <class Rays>
   [[nodiscard]] ObjectiveEvaluation evaluate_by(Rays& rays, const double* vertices,
                                                 double* gradient);
@@ -85,13 +99,13 @@ class DesignObjectiveOn {
   void add_laplacian(const ObjectiveView& o, double* gradient, Sums& sums);
   [[nodiscard]] EnergyValues energies(const Sums& sums) const;
   /// mm² → square pixels.
-  [[nodiscard]] double pixels_per_area() const {
-    return std::fabs(light_.plane().pixels_per_mm().prod());
-  }
+  [[nodiscard]] double pixels_per_area() const { return std::fabs(plane().pixels_per_mm().prod()); }
+
+  [[nodiscard]] const ImagePlane& plane() const { return lights_.front().path.plane(); }
 
   Exec executor_;
   ObjectiveOptions options_;
-  LightPath light_;
+  std::vector<ColoredLight<Exec>> lights_;  ///< Of a spectrum's picture several, else one.
   MeshOn<Exec> mesh_;
   SurfaceMesh sheet_;   ///< Where it was linearized last; empty without an outline.
   OpticalSetup setup_;  ///< Likewise.
@@ -107,8 +121,6 @@ class DesignObjectiveOn {
   Buffer<double> wanted_centroids_;
   Buffer<double> wanted_flux_;
 
-  Buffer<IncidentRay> incident_;  ///< Empty in light of one direction, as face_flux_.
-  Buffer<double> face_flux_;
   Buffer<FaceFrame> frames_;
   Buffer<WeingartenMap> maps_;
   Buffer<FaceBend> bends_;
@@ -123,6 +135,8 @@ class DesignObjectiveOn {
   Buffer<double> laplacian_shares_;
 
   std::variant<FacetRaysOn<Exec>, SmoothRaysOn<Exec>> rays_;
+  Buffer<double> color_gradient_;  ///< Of one colour of several.
+  Buffer<double> normals_bar_;     ///< Of all of them, of a spline.
 };
 
 namespace objective_detail {
@@ -150,12 +164,45 @@ inline Eigen::Matrix3Xd movable_coordinates(const Eigen::Matrix3Xd& vertices,
 
 template <class Exec>
 std::variant<FacetRaysOn<Exec>, SmoothRaysOn<Exec>> rays_of(SurfaceModel model,
-                                                            const SurfaceMesh& mesh) {
+                                                            const SurfaceMesh& mesh,
+                                                            std::size_t colors) {
   if (model == SurfaceModel::kFacet) {
     return FacetRaysOn<Exec>(mesh.triangle_count(), mesh.vertex_count());
   }
   return SmoothRaysOn<Exec>(mesh.triangle_count(), mesh.vertex_count(),
-                            model == SurfaceModel::kSpline);
+                            model == SurfaceModel::kSpline, colors);
+}
+
+/// Colours in which a goal is looked at: all of a picture, that of the setup's index of a
+/// correspondence.
+inline std::vector<LightColor> colors_of(OpticalSetup setup, const DesignGoal& goal) {
+  if (!std::holds_alternative<Image>(goal)) setup.spectrum = {};
+  return light_colors(setup);
+}
+
+/// @param cut  by the setup's outline; null without one.
+inline LightPath light_of(const LightColor& color, const SurfaceMesh& mesh, const MeshCut* cut) {
+  if (color.share == 1.0) {
+    return cut != nullptr ? light_inside(mesh, *cut, color.setup) : light_on(mesh, color.setup);
+  }
+  const LightPath light(color.setup);
+  const double intake = cut != nullptr ? intake_inside(mesh, *cut, light) : intake_of(mesh, light);
+  return light.sharing(intake / color.share);
+}
+
+template <class Exec>
+std::vector<ColoredLight<Exec>> lights_of(const SurfaceMesh& mesh, const OpticalSetup& setup,
+                                          const DesignGoal& goal) {
+  std::vector<ColoredLight<Exec>> lights;
+  for (const LightColor& color : colors_of(setup, goal)) {
+    // An outline's is found with its cut.
+    const LightPath path = setup.outline ? LightPath(color.setup) : light_of(color, mesh, nullptr);
+    lights.push_back({path, color.share, {}, {}});
+    if (!path.varies()) continue;
+    const auto faces = static_cast<std::size_t>(mesh.triangle_count());
+    lights.back().face_flux = typename Exec::template Buffer<double>(faces);
+  }
+  return lights;
 }
 
 /// A matrix's entries, column by column.
@@ -172,7 +219,7 @@ DesignObjectiveOn<Exec>::DesignObjectiveOn(const SurfaceMesh& mesh, const Optica
                                            const Exec& executor)
     : executor_(executor),
       options_(options),
-      light_(setup.outline ? LightPath(setup) : light_on(mesh, setup)),
+      lights_(objective_detail::lights_of<Exec>(mesh, setup, goal)),
       mesh_(mesh, make_topology(mesh), executor),
       unheld_(objective_detail::movable_coordinates(mesh.vertices, setup.lens_size)),
       movable_(unheld_),
@@ -181,12 +228,15 @@ DesignObjectiveOn<Exec>::DesignObjectiveOn(const SurfaceMesh& mesh, const Optica
             executor),
       flux_(blur_.parts() * setup.pixels.x(), blur_.parts() * setup.pixels.y()),
       cotangent_(flux_.columns(), flux_.rows()),
-      rays_(objective_detail::rays_of<Exec>(options.model, mesh)) {
+      rays_(objective_detail::rays_of<Exec>(options.model, mesh, lights_.size())) {
   const auto faces = static_cast<std::size_t>(mesh.triangle_count());
   const auto vertices = static_cast<std::size_t>(mesh.vertex_count());
+  if (lights_.size() > 1) {
+    color_gradient_ = Buffer<double>(3 * vertices);
+    if (options_.model == SurfaceModel::kSpline) normals_bar_ = Buffer<double>(3 * vertices);
+  }
   frames_ = Buffer<FaceFrame>(faces);
   corner_bar_ = Buffer<Corners>(faces);
-  if (light_.varies()) face_flux_ = Buffer<double>(faces);
   if (options_.weights.smooth > 0.0) {
     maps_ = Buffer<WeingartenMap>(faces);
     bends_ = Buffer<FaceBend>(faces);
@@ -198,6 +248,7 @@ DesignObjectiveOn<Exec>::DesignObjectiveOn(const SurfaceMesh& mesh, const Optica
   if (setup.outline) {
     sheet_ = mesh;
     setup_ = setup;
+    if (lights_.size() == 1) setup_.spectrum = {};
   }
   std::visit([this](const auto& wanted) { this->take(wanted); }, goal);
   const Buffer<double> start = buffer_of(executor_, objective_detail::entries(mesh.vertices));
@@ -219,25 +270,42 @@ void DesignObjectiveOn<Exec>::take(const Correspondence& wanted) {
   wanted_flux_ = buffer_of(executor_, objective_detail::entries(wanted.flux));
 }
 
+/// What does not depend on the colour, barriers too, counts with the first, which is bent most.
 template <class Exec>
-ObjectiveView DesignObjectiveOn<Exec>::view(const double* vertices) {
-  return {.weights = options_.weights,
-          .nu = options_.nu,
-          .area = options_.area,
-          .light = light_,
-          .vertices = vertices,
-          .incident = find_rays(executor_, light_, vertices, mesh_.view().vertices, incident_),
-          .mesh = mesh_.view(),
-          .goal = goal_view(),
-          .scratch = {frames_.data(), maps_.data(), bends_.data(), edge_weights_.data(),
-                      corner_bar_.data(), face_flux_.size() > 0 ? face_flux_.data() : nullptr},
-          .aperture = aperture_.view()};
+ObjectiveView DesignObjectiveOn<Exec>::view(const double* vertices, std::size_t color) {
+  ColoredLight<Exec>& light = lights_[color];
+  ObjectiveWeights weights = options_.weights;
+  weights.image *= light.share;
+  weights.boundary *= light.share;
+  if (color > 0) weights.smooth = weights.barrier = 0.0;
+  return {
+      .weights = weights,
+      .nu = options_.nu,
+      .area = options_.area,
+      .light = light.path,
+      .vertices = vertices,
+      .incident = find_rays(executor_, light.path, vertices, mesh_.view().vertices, light.incident),
+      .mesh = mesh_.view(),
+      .goal = goal_view(),
+      .scratch = {frames_.data(), maps_.data(), bends_.data(), edge_weights_.data(),
+                  corner_bar_.data(),
+                  light.face_flux.size() > 0 ? light.face_flux.data() : nullptr},
+      .aperture = aperture_.view()};
+}
+
+template <class Exec>
+std::vector<ObjectiveView> DesignObjectiveOn<Exec>::views(const double* vertices) {
+  std::vector<ObjectiveView> views;
+  for (std::size_t color = 0; color < lights_.size(); ++color) {
+    views.push_back(view(vertices, color));
+  }
+  return views;
 }
 
 template <class Exec>
 GoalView DesignObjectiveOn<Exec>::goal_view() {
-  return {.columns = light_.plane().columns(),
-          .rows = light_.plane().rows(),
+  return {.columns = plane().columns(),
+          .rows = plane().rows(),
           .parts = static_cast<double>(blur_.parts()),
           .cotangent = cotangent_.view(),
           .target = target_.data(),
@@ -254,7 +322,10 @@ void DesignObjectiveOn<Exec>::take_outline(const double* vertices) {
   download(executor_, std::span<const double>(vertices, count),
            std::span<double>(here.data(), count));
   const MeshCut cut = cut_mesh(sheet_, *setup_.outline, Executor::serial());
-  light_ = light_inside(sheet_, cut, setup_);
+  const std::vector<LightColor> colors = light_colors(setup_);
+  for (std::size_t k = 0; k < colors.size(); ++k) {
+    lights_[k].path = objective_detail::light_of(colors[k], sheet_, &cut);
+  }
   aperture_ = ApertureOn<Exec>(cut, executor_);
   movable_ = unheld_;
   hold_rim(sheet_, cut, movable_);
@@ -265,12 +336,15 @@ template <class Exec>
 void DesignObjectiveOn<Exec>::relinearize(const double* vertices) {
   led_ = {};
   if (setup_.outline) take_outline(vertices);
-  const ObjectiveView o = view(vertices);
+  const std::vector<ObjectiveView> views = this->views(vertices);
+  const ObjectiveView& o = views.front();
   const std::int64_t faces = o.mesh.faces;
-  static_cast<void>(pending_sum<1>(executor_, "face frames", faces, MeasureFace{o}));
+  for (const ObjectiveView& color : views) {
+    static_cast<void>(pending_sum<1>(executor_, "face frames", faces, MeasureFace{color}));
+  }
   if (!wanted_light_.empty()) {
     const auto find = [&](auto& rays) {
-      if constexpr (std::decay_t<decltype(rays)>::kLeadable) this->find_unlit(o, rays);
+      if constexpr (std::decay_t<decltype(rays)>::kLeadable) this->find_unlit(views, rays);
     };
     std::visit(find, rays_);
   }
@@ -285,19 +359,21 @@ void DesignObjectiveOn<Exec>::relinearize(const double* vertices) {
 /// Leads facets to the pixels that no facet reaches. @pre frames are up to date.
 template <class Exec>
 template <class Rays>
-void DesignObjectiveOn<Exec>::find_unlit(const ObjectiveView& o, Rays& rays) {
+void DesignObjectiveOn<Exec>::find_unlit(const std::vector<ObjectiveView>& views, Rays& rays) {
+  const std::size_t middle = views.size() / 2;
+  const ObjectiveView& o = views[middle];
   Eigen::Matrix2Xd centroids(2, o.mesh.faces);
   const std::span<double> centroids_here(centroids.data(),
                                          static_cast<std::size_t>(centroids.size()));
   Buffer<double> measured(centroids_here.size());
   parallel_for(executor_, "face centroids", o.mesh.faces,
-               FaceCentroid<typename Rays::View>{o, rays.view(), measured.data()});
+               FaceCentroid<typename Rays::View>{o, rays.view(middle), measured.data()});
   download(executor_, std::span<const double>(measured.data(), measured.size()), centroids_here);
-  const auto flux = project(o, rays);
+  const auto flux = project(views, rays);
   std::vector<double> light(flux.size());
   download(executor_, flux, std::span<double>(light));
   for (double& value : light) value *= target_total_;
-  const LitPicture picture{light_.plane().columns(), light_.plane().rows(), light, wanted_light_};
+  const LitPicture picture{plane().columns(), plane().rows(), light, wanted_light_};
   const std::vector<std::int32_t> led = lead_to_unlit_pixels(picture, centroids);
   const auto is_led = [](std::int32_t pixel) { return pixel != kNoPixel; };
   if (std::any_of(led.begin(), led.end(), is_led)) {
@@ -305,12 +381,30 @@ void DesignObjectiveOn<Exec>::find_unlit(const ObjectiveView& o, Rays& rays) {
   }
 }
 
-/// Frames, and what the rays keep of the surface; false where a barrier is infinite.
+/// Frames, and what the rays keep of the surface; false where a barrier is infinite or a ray is not
+/// let out.
 template <class Exec>
 template <class Rays>
-bool DesignObjectiveOn<Exec>::allowed(const ObjectiveView& o, Rays& rays) {
-  const auto barrier = pending_sum<1>(executor_, "face frames", o.mesh.faces, MeasureFace{o});
-  return std::isfinite(barrier.get()[0]) && rays.land(executor_, o);
+bool DesignObjectiveOn<Exec>::allowed(const std::vector<ObjectiveView>& views, Rays& rays) {
+  for (std::size_t color = 0; color < views.size(); ++color) {
+    const ObjectiveView& o = views[color];
+    const auto barrier = pending_sum<1>(executor_, "face frames", o.mesh.faces, MeasureFace{o});
+    if (!std::isfinite(barrier.get()[0]) || !rays.land(executor_, o, color)) return false;
+  }
+  return true;
+}
+
+/// The picture in all colours. @pre of smooth surfaces: their rays have landed.
+template <class Exec>
+template <class Rays>
+std::span<const double> DesignObjectiveOn<Exec>::project(const std::vector<ObjectiveView>& views,
+                                                         Rays& rays) {
+  flux_.begin(executor_);
+  for (std::size_t color = 0; color < views.size(); ++color) {
+    const FaceLightSource<typename Rays::View> faces{views[color], rays.view(color)};
+    flux_.deposit(executor_, faces.count(), faces);
+  }
+  return blur_.apply(executor_, flux_.resolve(executor_));
 }
 
 template <class Exec>
@@ -321,19 +415,20 @@ struct DesignObjectiveOn<Exec>::Sums {
   Pending<1> absolute_error;
   Pending<1> image;
   Pending<1> gradient;
-  Pending<4> goal;   ///< GoalSums, as far as faces does not hold them.
-  Pending<5> faces;  ///< FaceSums
-  Pending<2> bends;  ///< E_face, and Σ w h of E_edge.
+  std::vector<Pending<4>> goal;   ///< GoalSums of each colour, as far as faces does not hold them.
+  std::vector<Pending<5>> faces;  ///< FaceSums of each colour.
+  Pending<2> bends;               ///< E_face, and Σ w h of E_edge.
   Pending<1> laplacian;
 };
 
 /// Renders the picture and makes its cotangent: E_img, E_grad, MAE.
 template <class Exec>
 template <class Rays>
-void DesignObjectiveOn<Exec>::compare_picture(const ObjectiveView& o, Rays& rays, Sums& sums) {
-  const auto flux = project(o, rays);
+void DesignObjectiveOn<Exec>::compare_picture(const std::vector<ObjectiveView>& views, Rays& rays,
+                                              Sums& sums) {
+  const auto flux = project(views, rays);
   const std::span<double> bar = blur_.none() ? cotangent_.pixels() : blur_.bar();
-  const PictureError picture{light_.plane().columns(), light_.plane().rows(), error_.data()};
+  const PictureError picture{plane().columns(), plane().rows(), error_.data()};
   const ComparePixel compare{flux.data(), target_.data(), target_total_, error_.data(), bar.data()};
   sums.absolute_error = pending_sum<1>(executor_, "picture error", picture.count(), compare);
   sums.image = image_term(executor_, picture, options_.weights.image, bar);
@@ -347,13 +442,23 @@ void DesignObjectiveOn<Exec>::compare_picture(const ObjectiveView& o, Rays& rays
 /// From the goal, the barriers and the smoothness terms back to the vertices.
 template <class Exec>
 template <class Rays>
-void DesignObjectiveOn<Exec>::pull_back(const ObjectiveView& o, Rays& rays, double* gradient,
-                                        Sums& sums) {
-  sums.goal = rays.pull_back(executor_, o);
-  sums.faces = pending_sum<5>(executor_, "face adjoint", o.mesh.faces,
-                              PullBackFace<typename Rays::View>{o, rays.view()});
-  parallel_for(executor_, "gather vertices", o.mesh.vertices,
-               GatherVertex<typename Rays::View>{o, rays.view(), gradient});
+void DesignObjectiveOn<Exec>::pull_back(const std::vector<ObjectiveView>& views, Rays& rays,
+                                        double* gradient, Sums& sums) {
+  if (normals_bar_.size() > 0) fill_zero(executor_, normals_bar_);
+  for (std::size_t color = 0; color < views.size(); ++color) {
+    const ObjectiveView& o = views[color];
+    const typename Rays::View view = rays.view(color);
+    double* const by_color = color == 0 ? gradient : color_gradient_.data();
+    sums.goal.push_back(rays.pull_back(executor_, o, color));
+    sums.faces.push_back(pending_sum<5>(executor_, "face adjoint", o.mesh.faces,
+                                        PullBackFace<typename Rays::View>{o, view}));
+    parallel_for(executor_, "gather vertices", o.mesh.vertices,
+                 GatherVertex<typename Rays::View>{o, view, by_color});
+    if (color > 0) {
+      parallel_for(executor_, "add a colour", 3 * o.mesh.vertices, AddEntry{by_color, gradient});
+    }
+    if (normals_bar_.size() > 0) rays.add_normal_bar(executor_, normals_bar_.data());
+  }
 }
 
 template <class Exec>
@@ -367,17 +472,20 @@ void DesignObjectiveOn<Exec>::add_laplacian(const ObjectiveView& o, double* grad
 template <class Exec>
 EnergyValues DesignObjectiveOn<Exec>::energies(const Sums& sums) const {
   const ObjectiveWeights& w = options_.weights;
-  const FaceSums faces = FaceSums::of(sums.faces.get());
-  GoalSums goal = faces.goal;
-  goal += GoalSums::of(sums.goal.get());
   EnergyValues e;
   e.image = sums.image.get()[0];
   e.gradient = sums.gradient.get()[0];
-  e.boundary = goal.boundary;
-  e.unlit = goal.unlit;
-  e.align = goal.align;
-  e.flux = goal.flux;
-  e.barrier = faces.barrier;
+  for (std::size_t k = 0; k < lights_.size(); ++k) {
+    const double share = lights_[k].share;
+    const FaceSums faces = FaceSums::of(sums.faces[k].get());
+    GoalSums goal = faces.goal;
+    goal += GoalSums::of(sums.goal[k].get());
+    e.boundary += share * goal.boundary;
+    e.unlit += share * goal.unlit;
+    e.align += share * goal.align;
+    e.flux += share * goal.flux;
+    if (k == 0) e.barrier = faces.barrier;
+  }
   if (w.smooth > 0.0) {
     const auto bends = sums.bends.get();
     e.face = bends[0];
@@ -401,14 +509,15 @@ template <class Rays>
 ObjectiveEvaluation DesignObjectiveOn<Exec>::evaluate_by(Rays& rays, const double* vertices,
                                                          double* gradient) {
   ObjectiveEvaluation result;
-  const ObjectiveView o = view(vertices);
-  if (!allowed(o, rays)) return result;
+  const std::vector<ObjectiveView> views = this->views(vertices);
+  if (!allowed(views, rays)) return result;
+  const ObjectiveView& o = views.front();
   Sums sums;
-  if (o.goal.is_picture()) compare_picture(o, rays, sums);
+  if (o.goal.is_picture()) compare_picture(views, rays, sums);
   if (options_.weights.smooth > 0.0) {
     sums.bends = pending_sum<2>(executor_, "bend faces", o.mesh.faces, BendFace{o});
   }
-  pull_back(o, rays, gradient, sums);
+  pull_back(views, rays, gradient, sums);
   if (options_.weights.smooth * options_.weights.laplacian > 0.0) {
     add_laplacian(o, gradient, sums);
   }

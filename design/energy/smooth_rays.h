@@ -9,6 +9,7 @@
 #include "core/compute/executor.h"
 #include "core/compute/host_device.h"
 #include "design/energy/objective_adjoint.h"
+#include "design/energy/objective_kernels.h"
 #include "design/energy/objective_sums.h"
 #include "design/energy/objective_view.h"
 #include "design/optics/columns.h"
@@ -112,29 +113,37 @@ class SmoothRaysOn {
   static constexpr bool kLeadable = false;
   using View = SmoothRays;
 
-  SmoothRaysOn(std::int64_t faces, std::int64_t vertices, bool normals_given)
+  /// @param colors  of which each lands elsewhere.
+  SmoothRaysOn(std::int64_t faces, std::int64_t vertices, bool normals_given, std::size_t colors)
       : normals_given_(normals_given),
         normals_(3 * static_cast<std::size_t>(vertices)),
-        landing_(2 * static_cast<std::size_t>(vertices)),
+        landing_(2 * static_cast<std::size_t>(vertices) * colors),
         image_bar_(static_cast<std::size_t>(faces)),
         position_bar_(3 * static_cast<std::size_t>(vertices)),
         normal_bar_(3 * static_cast<std::size_t>(vertices)) {}
 
-  [[nodiscard]] SmoothRays view() {
-    return {normals_given_,    normals_.data(),      landing_.data(),
+  [[nodiscard]] SmoothRays view(std::size_t color) {
+    double* const landing = landing_.data() + color * (normals_.size() / 3 * 2);
+    return {normals_given_,    normals_.data(),      landing,
             image_bar_.data(), position_bar_.data(), normal_bar_.data()};
   }
 
-  [[nodiscard]] bool land(const Exec& executor, const ObjectiveView& o) {
-    const LandVertex kernel{o, view()};
+  [[nodiscard]] bool land(const Exec& executor, const ObjectiveView& o, std::size_t color) {
+    const LandVertex kernel{o, view(color)};
     return pending_sum<1>(executor, "land vertices", o.mesh.vertices, kernel).get()[0] == 0.0;
   }
 
-  [[nodiscard]] auto pull_back(const Exec& executor, const ObjectiveView& o) {
-    auto sums =
-        pending_sum<4>(executor, "flux adjoint", o.mesh.faces, SmoothImageAdjoint{o, view()});
-    parallel_for(executor, "pull back vertices", o.mesh.vertices, PullBackVertex{o, view()});
+  [[nodiscard]] auto pull_back(const Exec& executor, const ObjectiveView& o, std::size_t color) {
+    const SmoothRays rays = view(color);
+    auto sums = pending_sum<4>(executor, "flux adjoint", o.mesh.faces, SmoothImageAdjoint{o, rays});
+    parallel_for(executor, "pull back vertices", o.mesh.vertices, PullBackVertex{o, rays});
     return sums;
+  }
+
+  /// Adds the derivatives by the normals that pull_back() has found last.
+  void add_normal_bar(const Exec& executor, double* sum) {
+    parallel_for(executor, "add a colour", static_cast<std::int64_t>(normal_bar_.size()),
+                 AddEntry{normal_bar_.data(), sum});
   }
 
  private:
@@ -143,7 +152,7 @@ class SmoothRaysOn {
 
   bool normals_given_;
   Buffer<double> normals_;
-  Buffer<double> landing_;
+  Buffer<double> landing_;  ///< Of one colour after the other.
   Buffer<ImageTriangle> image_bar_;
   Buffer<double> position_bar_;
   Buffer<double> normal_bar_;

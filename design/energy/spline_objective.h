@@ -20,13 +20,6 @@
 
 namespace lensforge {
 
-struct AddEntry {
-  const double* add;
-  double* sum;
-
-  LF_HD void operator()(std::int64_t i) const { sum[i] += add[i]; }
-};
-
 /// DesignObjective of a spline's control points: every node of the spline sends one ray by the
 /// spline's own normal. Barriers and the goal are those of the mesh of the nodes; there are no
 /// smoothness terms. Same interface as DesignObjectiveOn.
@@ -153,16 +146,14 @@ class SplineObjectiveOn {
     ObjectiveEvaluation result = core_.evaluate(positions_.data(), positions_bar_.data());
     if (!result.feasible) return result;
     const auto pull_back = [&](auto& nodes) {
-      nodes.look_adjoint(positions_bar_.data(), core_.sampled_rays().normal_bar, gradient);
+      nodes.look_adjoint(positions_bar_.data(), core_.normals_bar(), gradient);
     };
     std::visit(pull_back, part);
     return result;
   }
 
   void look(const double* points, Part& part) {
-    const auto look = [&](auto& nodes) {
-      nodes.look(points, positions_.data(), core_.sampled_rays().normals);
-    };
+    const auto look = [&](auto& nodes) { nodes.look(points, positions_.data(), core_.normals()); };
     std::visit(look, part);
   }
 

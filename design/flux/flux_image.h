@@ -32,9 +32,15 @@ class FluxImageOn {
   template <class Source>
   std::span<const double> render(const Exec& executor, std::int64_t count, const Source& source) {
     begin(executor);
+    deposit(executor, count, source);
+    return resolve(executor);
+  }
+
+  /// Adds triangles as of render() between begin() and resolve().
+  template <class Source>
+  void deposit(const Exec& executor, std::int64_t count, const Source& source) {
     parallel_for_worker(executor, "flux deposit", count,
                         DepositFlux<Source>{source, {units_.data(), columns_, rows_}, stride()});
-    return resolve(executor);
   }
 
   /// render() of triangles in the executor's memory.

@@ -11,6 +11,7 @@
 
 #include "core/optics/light_path.h"
 #include "core/surface/mesh_topology.h"
+#include "design/schedule/transport_sites.h"
 
 namespace lensforge {
 
@@ -24,7 +25,7 @@ constexpr double kMinShrinkage = 0.1;
 class Alignment {
  public:
   Alignment(const BrenierMap& map, const OpticalSetup& setup, SurfaceMesh& mesh)
-      : map_(map), light_(setup), mesh_(mesh), topology_(make_topology(mesh)) {
+      : map_(map), light_(setup), sites_(setup), mesh_(mesh), topology_(make_topology(mesh)) {
     for (int t = 0; t < static_cast<int>(mesh.triangle_count()); ++t) {
       least_area_.push_back(kMinShrinkage * mesh.plan_area(t));
     }
@@ -57,9 +58,10 @@ class Alignment {
   [[nodiscard]] std::optional<Move> move_of(int vertex) const {
     const Eigen::Vector3d at = mesh_.vertices.col(vertex);
     const Eigen::Vector2d pixel = light_.land_from_start(at);
-    const std::optional<Eigen::Vector2d> way = map_.way_to_crease(pixel);
+    const std::optional<Eigen::Vector2d> way = map_.way_to_crease(sites_.site(pixel));
     if (!way) return std::nullopt;
-    const Eigen::Vector2d mm = light_.place_on_start(pixel + *way, at.z()) - at.head<2>();
+    const Eigen::Vector2d mm =
+        light_.place_on_start(pixel + sites_.way(*way), at.z()) - at.head<2>();
     const double share = mm.norm() / shortest_edge(vertex);
     if (!(share < kReach)) return std::nullopt;
     return Move{share, vertex, mm};
@@ -93,6 +95,7 @@ class Alignment {
 
   const BrenierMap& map_;
   LightPath light_;
+  TransportSites sites_;
   SurfaceMesh& mesh_;
   MeshTopology topology_;
   std::vector<double> least_area_;

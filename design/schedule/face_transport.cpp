@@ -8,13 +8,14 @@
 #include "core/optics/light_path.h"
 #include "core/surface/mesh_cut.h"
 #include "design/optics/surface_optics.h"
+#include "design/schedule/transport_sites.h"
 #include "design/transport/height_fit.h"
 
 namespace lensforge {
 
 namespace {
 
-/// Steps a pixel that landing places are rounded to, where a flat mesh's do not lie on a grid to
+/// Steps a pixel that sites are rounded to, where a flat mesh's do not lie on a grid to
 /// the last bit. Rounding errors of 1e-14 pixels leave triangles on the hull that are so thin that
 /// the centres of their circles are noise: a mirror at 30 degrees found no transport at 64² pixels.
 constexpr double kSteps = 16777216.0;
@@ -38,14 +39,18 @@ FaceLight face_light(const SurfaceMesh& mesh, const OpticalSetup& setup, Surface
                      const Executor& executor) {
   const bool on_grid = LightPath(setup).intake_is_plan_area() && !setup.screen_is_turned();
   const std::vector<ImageTriangle> images = project_surface(mesh, setup, model, executor);
+  const TransportSites transport(setup);
   FaceLight light;
   light.landing.resize(2, mesh.triangles.cols());
   light.flux.resize(mesh.triangles.cols());
   for (Eigen::Index f = 0; f < light.flux.size(); ++f) {
     const ImageTriangle& t = images[static_cast<std::size_t>(f)];
     light.landing.col(f) = (t.p0 + t.p1 + t.p2) / 3.0;
-    if (!on_grid) light.landing.col(f) = (light.landing.col(f) * kSteps).array().round() / kSteps;
     light.flux[f] = t.flux;
+  }
+  light.sites = light.landing;
+  for (auto site : light.sites.colwise()) {
+    if (!on_grid) site = (transport.site(site) * kSteps).array().round() / kSteps;
   }
   if (setup.outline) drop_slivers(mesh, *setup.outline, executor, light.flux);
   return light;
@@ -54,14 +59,14 @@ FaceLight face_light(const SurfaceMesh& mesh, const OpticalSetup& setup, Surface
 TransportResult transport_faces(const FaceLight& light, const Image& target,
                                 const TransportOptions& options, const Executor& executor,
                                 const RunControl& control) {
-  return solve_semi_discrete(light.landing, light.flux, target, options, executor, control);
+  return solve_semi_discrete(light.sites, light.flux, target, options, executor, control);
 }
 
 Eigen::Matrix2Xd map_faces(const FaceLight& light, const BrenierMap& map,
                            const Executor& executor) {
-  Eigen::Matrix2Xd landing(2, light.landing.cols());
+  Eigen::Matrix2Xd landing(2, light.sites.cols());
   parallel_for(executor, "map faces", landing.cols(),
-               [&](std::int64_t f) { landing.col(f) = map(light.landing.col(f)); });
+               [&](std::int64_t f) { landing.col(f) = map(light.sites.col(f)); });
   return landing;
 }
 

@@ -118,7 +118,7 @@ void spread(const Site& site, const SurfaceMesh& even_mesh, const Matching& even
 Matching fit_mesh(const Site& site, const SurfaceMesh& even_mesh, const Matching& even,
                   SurfaceMesh& mesh) {
   spread(site, even_mesh, even, mesh);
-  const BrenierMap map(even.light.landing, even.result, site.problem.aim);
+  const BrenierMap map(even.light.sites, even.result, site.problem.aim);
   align_to_creases(map, site.problem.setup, mesh);
   const DesignTask& task = site.task;
   shape_start(task.setup, task.options.thickness, task.executor, mesh);

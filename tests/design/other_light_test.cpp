@@ -117,7 +117,7 @@ Correspondence transport(const OpticalSetup& setup, SurfaceModel model, const Im
   const Eigen::VectorXd served = favour_dark({mesh, result.lit_areas}, setup);
   const SurfaceMesh flat = mesh;
   EXPECT_TRUE(spread_vertices({flat, served}, 0.7, setup, executor, RunControl(), mesh));
-  const BrenierMap map(even.landing, result, target);
+  const BrenierMap map(even.sites, result, target);
   align_to_creases(map, setup, mesh);
   shape_start(setup, kThickness, executor, mesh);
   const FaceLight light = face_light(mesh, setup, model, executor);
@@ -194,7 +194,7 @@ TEST(CurvedFront, EveryVertexsRayIsSolvedForOnceAnEvaluation) {
       profile.clear();
       EXPECT_TRUE(testing::evaluate_at(objective, mesh.vertices).feasible);
       const auto entries = profile.entries();
-      const auto found = entries.find("front entries");
+      const auto found = entries.find("incident rays");
       EXPECT_EQ(found == entries.end() ? 0 : found->second.calls, curved ? 1 : 0);
     }
   }

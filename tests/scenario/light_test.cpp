@@ -165,6 +165,37 @@ TEST_P(EveryLight, ACurvedFrontIsInSolidsAndLiesInANest) {
 INSTANTIATE_TEST_SUITE_P(All, EveryLight, ::testing::ValuesIn(kLights),
                          [](const auto& test) { return std::string(test.param.name); });
 
+/// A lens whose picture is the sum of three colours': the picture in colour lies beside it, and
+/// `render` shows it without being told.
+TEST_F(Scenario, ADesignForSeveralColorsIsRenderedInColor) {
+  ASSERT_EQ(
+      run(design(path("lens"), {"--wavelengths", "450:0.5,550:1,650:1", "--abbe", "40"})).exit_code,
+      0);
+  const nlohmann::json lens = nlohmann::json::parse(content(at("lens/lens.json")));
+  EXPECT_EQ(lens["spectrum"]["wavelengths_nm"], (std::vector<double>{450.0, 550.0, 650.0}));
+  EXPECT_EQ(lens["spectrum"]["powers"], (std::vector<double>{0.5, 1.0, 1.0}));
+  EXPECT_EQ(lens["spectrum"]["abbe"], 40.0);
+  const double fringe = lens["provenance"]["fringe_mm"]["mean"];
+  EXPECT_GT(fringe, 0.01);
+  EXPECT_EQ(read_image(at("lens/render_color.png")).image.columns(), 24);
+  const Outcome again = run({"render", path("lens"), "--json", "--out", path("again.png")});
+  ASSERT_EQ(again.exit_code, 0) << again.err;
+  EXPECT_EQ(content(at("again.png")), content(at("lens/render_color.png")));
+  EXPECT_NEAR(again.json()["fringe_mm"]["mean"].get<double>(), fringe, 1e-12);
+  EXPECT_NEAR(again.json()["metrics"]["smooth"]["mae"].get<double>(),
+              lens["metrics"]["smooth"]["mae"].get<double>(), 1e-6);
+  EXPECT_THAT(run({"info", path("lens")}).out, HasSubstr("colours 450:0.5,550:1,650:1 nm"));
+  // What is cut of it is predicted in the same light.
+  const Outcome cut = run({"cam", path("lens"), "--pitch", "2mm", "--tool-diameter", "4mm",
+                           "--no-rough", "--no-semi", "--no-remedies", "--quiet"});
+  ASSERT_TRUE(cut.exit_code == 0 || cut.exit_code == 3) << cut.err;
+  // In the place of another design the picture in colour goes.
+  Arguments replaced = design(path("lens"), {});
+  replaced.push_back("--force");
+  ASSERT_EQ(run(replaced).exit_code, 0);
+  EXPECT_FALSE(fs::exists(at("lens/render_color.png")));
+}
+
 /// What cannot be lit, and what the refusal says of it.
 struct BadLight {
   const char* name;
@@ -225,6 +256,31 @@ INSTANTIATE_TEST_SUITE_P(
         BadLight{"MirrorLitFromTheScreen",
                  {"--mode", "reflect"},
                  {"--mode reflect: needs light from the side"}},
+        BadLight{"ColorsOfAMirror",
+                 {"--mode", "reflect", "--incidence", "30", "--wavelengths", "450,650"},
+                 {"--wavelengths 450,650: a mirror bends light of all colours alike"}},
+        BadLight{"ColorsThatFall",
+                 {"--wavelengths", "650,450"},
+                 {"--wavelengths 650,450: must be 2 to 5 rising numbers"}},
+        BadLight{"ColorsTwiceTheSame",
+                 {"--wavelengths", "550,550"},
+                 {"--wavelengths 550,550: must be 2 to 5 rising numbers"}},
+        BadLight{"OneColor",
+                 {"--wavelengths", "550"},
+                 {"--wavelengths 550: must be 2 to 5 rising numbers"}},
+        BadLight{"ColorBelowTheVisible",
+                 {"--wavelengths", "379,550"},
+                 {"--wavelengths 379,550: must be", "from 380 to 780"}},
+        BadLight{"ColorAboveTheVisible",
+                 {"--wavelengths", "550,781"},
+                 {"--wavelengths 550,781: must be", "from 380 to 780"}},
+        BadLight{"ColorsByName",
+                 {"--wavelengths", "red,blue"},
+                 {"--wavelengths red,blue: must be 2 finite numbers"}},
+        BadLight{"PowerOfOneColorOnly",
+                 {"--wavelengths", "450:1,550"},
+                 {"--wavelengths 450:1,550: must be", "at each or at none"}},
+        BadLight{"AbbeNumberWithoutColors", {"--abbe", "30"}, {"--abbe 30: needs --wavelengths"}},
         BadLight{"LightThatGrazesAMirror",
                  {"--mode", "reflect", "--incidence", "85"},
                  {"--incidence 85: must be 0 to 80 degrees"}},

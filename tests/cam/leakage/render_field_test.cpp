@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <numbers>
 #include <numeric>
 #include <stop_token>
@@ -15,6 +16,7 @@
 #include "cam/leakage/crease_split.h"
 #include "core/error.h"
 #include "core/optics/image_plane.h"
+#include "core/optics/light_colors.h"
 #include "core/optics/source_points.h"
 
 namespace lensforge {
@@ -150,7 +152,7 @@ TEST(RenderField, AnExtendedSourceBlursThePictureAsItsPointsTogetherDo) {
   for (const SourcePoint& point : source_points(setup.optics.extent, 300)) {
     FieldRenderSetup one = setup;
     one.optics = lit_from(setup.optics, point.at);
-    one.whole = one.optics.lens_size.prod();
+    one.whole = {one.optics.lens_size.prod()};
     const std::vector<double> sums = column_sums(render(field, one));
     for (std::size_t c = 0; c < sums.size(); ++c) together[c] += point.share * sums[c];
   }
@@ -158,6 +160,31 @@ TEST(RenderField, AnExtendedSourceBlursThePictureAsItsPointsTogetherDo) {
   const std::vector<double> blurred = column_sums(render(field, setup));
   EXPECT_GT(largest_difference(sharp, together), 0.01);
   EXPECT_LT(largest_difference(blurred, together), 0.002);
+}
+
+/// Of parallel light, and of a lamp, whose light every colour takes in differently.
+TEST(RenderField, ASpectrumSendsTheSumOfItsColors) {
+  const AnalyticField bent([](const Eigen::Vector2d& p) {
+    return SurfacePoint{6.0 - p.squaredNorm() / 30.0, -p / 15.0, p.x() < 2.013 ? 1 : 2};
+  });
+  FieldRenderSetup setup = setup_of(0.05, 19);
+  setup.optics.spectrum = {{460.0, 550.0, 640.0}, {1.0, 2.0, 1.0}, 15.0};
+  for (const bool lamp : {false, true}) {
+    if (lamp) {
+      setup.optics.point = PointSource{{2.0, 2.0, -60.0}, {}};
+      setup.whole = {13.0, 14.0, 15.0};
+    }
+    std::vector<double> sum(400, 0.0);
+    const std::vector<LightColor> colors = light_colors(setup.optics);
+    for (std::size_t k = 0; k < colors.size(); ++k) {
+      FieldRenderSetup one = setup;
+      one.optics = colors[k].setup;
+      if (lamp) one.whole = {setup.whole[k]};
+      const FluxPicture picture = render(bent, one);
+      for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += colors[k].share * picture.flux[i];
+    }
+    EXPECT_LT(largest_difference(render(bent, setup).flux, sum), 1e-12);
+  }
 }
 
 /// A wave of six nodes: its beams, taken as linear between nodes, would bend 9 % too little.

@@ -234,7 +234,7 @@ TEST_F(PartModelTest, UnderOtherLightAPartIsThatOfTheChain) {
     SCOPED_TRACE(optics.point ? "point" : (optics.screen_is_turned() ? "tilted" : "mirror"));
     const auto render = [&](const SurfaceField& field, const OpticalSetup& by) {
       FieldRenderSetup rendering = fine(by);
-      rendering.whole = intake_of(mesh, LightPath(by));
+      rendering.whole = {intake_of(mesh, LightPath(by))};
       return render_field(field, rendering, executor(), {});
     };
     const FluxPicture designed = render(meant_->field(), optics);

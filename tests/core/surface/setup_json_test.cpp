@@ -67,6 +67,31 @@ TEST(SetupJson, AnExtendedSourceComesBackWithItsShape) {
   EXPECT_EQ(written_and_read(setup), setup);
 }
 
+TEST(SetupJson, ASpectrumComesBackToTheBitAndIsLeftOutWhereThereIsNone) {
+  OpticalSetup setup;
+  EXPECT_FALSE(setup_json(setup).contains("spectrum"));
+  setup.spectrum = {{450.1, 550.0, 650.0}, {}, 57.0};
+  EXPECT_FALSE(setup_json(setup)["spectrum"].contains("powers"));
+  EXPECT_EQ(written_and_read(setup), setup);
+  setup.spectrum = {{450.1, 550.0, 650.0}, {0.6, 1.0, 0.1 + 0.2}, 30.5};
+  EXPECT_EQ(written_and_read(setup), setup);
+}
+
+TEST(SetupJson, ASpectrumThatCannotBeIsRefusedWithItsField) {
+  const auto refused = [](const json& wavelengths, const json& powers) {
+    return refusal("/spectrum",
+                   {{"wavelengths_nm", wavelengths}, {"powers", powers}, {"abbe", 57.0}});
+  };
+  EXPECT_THAT(refused({550.0, 450.0}, {1.0, 1.0}), HasSubstr("rising wavelengths"));
+  EXPECT_THAT(refused({550.0, 550.0}, {1.0, 1.0}), HasSubstr("rising wavelengths"));
+  EXPECT_THAT(refused({300.0, 550.0}, {1.0, 1.0}), HasSubstr("from 380 to 780"));
+  EXPECT_THAT(refused({450.0, 550.0}, {1.0, 0.0}), HasSubstr("powers above 0"));
+  EXPECT_THAT(refused({450.0, 550.0}, {1.0}), HasSubstr("powers above 0"));
+  EXPECT_THAT(refused(json::array({550.0}), json::array({1.0})), HasSubstr("2 to 5"));
+  EXPECT_THAT(refused("450,550", {1.0, 1.0}), HasSubstr("wavelengths_nm"));
+  EXPECT_THAT(refusal("/spectrum", {{"wavelengths_nm", {450.0, 550.0}}}), HasSubstr("abbe"));
+}
+
 TEST(SetupJson, AnExtentThatCannotBeIsRefusedWithItsField) {
   EXPECT_THAT(refusal("/source/angle_mrad", -1.0), HasSubstr("source width"));
   EXPECT_THAT(refusal("/source/angle_mrad", "wide"), HasSubstr("source.angle_mrad"));

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -13,6 +14,7 @@
 #include "core/surface/sample_splines.h"
 #include "design/finite_difference.h"
 #include "design/optics/made_surface.h"
+#include "design/outline_setup.h"
 #include "design/random_input.h"
 #include "design/render_lens.h"
 #include "design/schedule/spline_start.h"
@@ -139,6 +141,40 @@ TEST_F(SplineObjective, GradientOfTheMadePartEqualsCentralDifferences) {
           << made_by.polish_sigma << ' ' << first;
     }
   }
+}
+
+/// Of the spline itself and of what is made of it, in both ways.
+TEST_F(SplineObjective, GradientInSeveralColorsEqualsCentralDifferences) {
+  setup_.spectrum = {{480.0, 550.0, 620.0}, {}, 12.0};
+  for (const std::optional<MadeBy>& made_by :
+       {std::optional<MadeBy>(), std::optional(kMade), std::optional(kLittlePolish)}) {
+    options_.made_by = made_by;
+    SplineObjectiveOn<Executor> function = objective();
+    function.relinearize(net_.points.data());
+    Eigen::Matrix3Xd gradient(3, net_.points.cols());
+    const ObjectiveEvaluation e = function.evaluate(net_.points.data(), gradient.data());
+    ASSERT_TRUE(e.feasible);
+    const SampledSurface nodes = made_by ? made_nodes(net_, *made_by, kSamples, Executor::serial())
+                                         : spline_nodes(net_, kSamples);
+    EXPECT_NEAR(e.mae, mean_absolute_error(nodes), 1e-6);
+    Random random(5);
+    Eigen::Matrix3Xd direction = function.movable();
+    for (double& d : direction.reshaped()) d *= random.between(-1.0, 1.0);
+    EXPECT_LE(slope_error(function, gradient, direction), 1e-6);
+  }
+}
+
+TEST_F(SplineObjective, GradientInSeveralColorsOfADiscEqualsCentralDifferences) {
+  setup_.spectrum = {{480.0, 550.0, 620.0}, {}, 12.0};
+  setup_.outline = circle_outline(setup_.lens_size);
+  SplineObjectiveOn<Executor> function = objective();
+  function.relinearize(net_.points.data());
+  Eigen::Matrix3Xd gradient(3, net_.points.cols());
+  ASSERT_TRUE(function.evaluate(net_.points.data(), gradient.data()).feasible);
+  Random random(5);
+  Eigen::Matrix3Xd direction = function.movable();
+  for (double& d : direction.reshaped()) d *= random.between(-1.0, 1.0);
+  EXPECT_LE(slope_error(function, gradient, direction), 1e-6);
 }
 
 TEST_F(SplineObjective, IsTheMeanOverPartsWherePolishVaries) {
