@@ -2,11 +2,13 @@
 #include "export/closed_solid.h"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <numbers>
+#include <utility>
 
 #include "core/error.h"
+#include "core/optics/outline.h"
 #include "core/surface/corners.h"
 #include "core/surface/mesh_topology.h"
 
@@ -78,23 +80,59 @@ std::vector<int> walk(const std::vector<int>& next, const std::string& name) {
   return loop;
 }
 
-/// An outline that turns once around a point from which all of it is seen crosses itself nowhere;
-/// with triangles that all face up the surface then covers every point below it once.
-void require_seen_from_middle(const SurfaceMesh& surface, const std::vector<int>& loop,
-                              const std::string& name) {
+/// All of an outline is seen from the middle, so that triangles from there close its back.
+bool is_seen_from_middle(const SurfaceMesh& surface, const std::vector<int>& loop) {
   const Eigen::Vector2d centre = middle(surface);
-  double angle = 0.0;
   for (std::size_t i = 0; i < loop.size(); ++i) {
     const Eigen::Vector2d a = flat(surface, loop[i]) - centre;
     const Eigen::Vector2d b = flat(surface, loop[(i + 1) % loop.size()]) - centre;
-    if (!(cross(a, b) > 0.0))
-      refuse(name, "has an outline that is not visible as a whole from its middle (star-shaped)");
-    angle += std::atan2(cross(a, b), a.dot(b));
+    if (!(cross(a, b) > 0.0)) return false;
   }
-  if (angle > 3.0 * std::numbers::pi) refuse(name, "winds around its middle more than once");
+  return true;
 }
 
-SurfaceMesh solid_on_plane(const SurfaceMesh& surface, const std::vector<int>& loop) {
+double distance_to_side(const Eigen::Vector2d& p, const Eigen::Vector2d& a,
+                        const Eigen::Vector2d& b) {
+  const Eigen::Vector2d way = b - a;
+  const double squared = way.squaredNorm();
+  const double share = squared > 0.0 ? std::clamp(way.dot(p - a) / squared, 0.0, 1.0) : 0.0;
+  return (p - (a + share * way)).norm();
+}
+
+/// Without corners on a straight way and spikes without width, but for rounding: where a mesh was
+/// cut along its own edges, sides seem to touch.
+std::vector<Eigen::Vector2d> straightened(std::vector<Eigen::Vector2d> points) {
+  constexpr double kRounding = 1e-9;  // mm
+  std::size_t count = 0;
+  while (points.size() != count && points.size() > 3) {
+    count = points.size();
+    std::vector<Eigen::Vector2d> kept;
+    for (std::size_t i = 0; i < count; ++i) {
+      const Eigen::Vector2d& p = points[i];
+      const Eigen::Vector2d& before = kept.empty() ? points.back() : kept.back();
+      const Eigen::Vector2d& next = points[(i + 1) % count];
+      const double off =
+          std::min({distance_to_side(p, before, next), distance_to_side(next, before, p),
+                    distance_to_side(before, p, next)});
+      if (off > kRounding) kept.push_back(p);
+    }
+    points = std::move(kept);
+  }
+  return points;
+}
+
+/// Around an outline that crosses itself nowhere, triangles that all face up cover every point
+/// inside once.
+void require_simple(const SurfaceMesh& surface, const std::vector<int>& loop,
+                    const std::string& name) {
+  std::vector<Eigen::Vector2d> points;
+  for (const int v : loop) points.emplace_back(flat(surface, v));
+  points = straightened(std::move(points));
+  if (const auto fault = polygon_fault(points)) refuse(name, "has a bad outline: " + *fault);
+}
+
+/// With a back of triangles around its middle. @pre is_seen_from_middle().
+SurfaceMesh solid_around_middle(const SurfaceMesh& surface, const std::vector<int>& loop) {
   const auto around = static_cast<int>(loop.size());
   const auto top_vertices = static_cast<int>(surface.vertex_count());
   const int centre = top_vertices + around;
@@ -118,9 +156,9 @@ SurfaceMesh solid_on_plane(const SurfaceMesh& surface, const std::vector<int>& l
   return solid;
 }
 
-SurfaceMesh solid_on_front(const SurfaceMesh& surface, const std::vector<int>& loop,
-                           const SphericalFront& sphere, const std::string& name) {
-  const FrontSurface front(sphere);
+/// With a back that has the surface's triangles, mirrored.
+SurfaceMesh solid_on(const FrontSurface& front, const SurfaceMesh& surface,
+                     const std::vector<int>& loop, const std::string& name) {
   const auto count = static_cast<int>(surface.vertex_count());
   const Eigen::Index faces = surface.triangle_count();
   SurfaceMesh solid;
@@ -152,7 +190,7 @@ std::vector<int> height_field_outline(const SurfaceMesh& surface, const std::str
   require_above_back(surface, name);
   require_faces_up(surface, name);
   std::vector<int> loop = walk(successors(surface, name), name);
-  require_seen_from_middle(surface, loop, name);
+  require_simple(surface, loop, name);
   return loop;
 }
 
@@ -173,7 +211,9 @@ void require_rectangle(const SurfaceMesh& surface, const std::vector<int>& outli
 SurfaceMesh closed_solid(const SurfaceMesh& surface, const std::string& name,
                          const std::optional<SphericalFront>& front) {
   const std::vector<int> loop = height_field_outline(surface, name);
-  return front ? solid_on_front(surface, loop, *front, name) : solid_on_plane(surface, loop);
+  if (front) return solid_on(FrontSurface(*front), surface, loop, name);
+  if (is_seen_from_middle(surface, loop)) return solid_around_middle(surface, loop);
+  return solid_on(FrontSurface(), surface, loop, name);
 }
 
 double enclosed_volume(const SurfaceMesh& solid) {

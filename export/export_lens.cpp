@@ -122,6 +122,7 @@ SplineSolid fitted_splines(const Job& job) {
   FitOptions options{.tolerance = job.options.tolerance,
                      .normal_tolerance = job.options.normal_tolerance,
                      .max_control_points = job.options.max_points,
+                     .one_patch = lens.setup.outline.has_value(),
                      .picture = {}};
   SplineSolid solid;
   const SmoothSurface surface(lens.surface);
@@ -141,23 +142,24 @@ SplineSolid own_spline(const Job& job) {
   const Lens& lens = job.source.lens;
   announce_splines(job, control_points_of_net(*lens.spline));
   SplineSolid solid;
-  solid.net = net_of(*lens.spline, job.executor);
+  solid.net = lens.setup.outline ? patch_of(*lens.spline, job.executor)
+                                 : net_of(*lens.spline, job.executor);
   solid.picture = evaluate(lens, SurfaceModel::kSpline, nullptr, job.executor);
   return solid;
 }
 
+/// What the solid's optical face is, as a mesh with the normals by which it projects its picture.
+SampledSurface part_of(const Job& job) { return lens_part(job.source.lens, job.executor); }
+
 SplineSolid write_splines(const Job& job) {
   const Lens& lens = job.source.lens;
   const std::string name = job.source.file.string();
-  if (lens.setup.outline) {
-    throw InputError(job.out.string() +
-                     ": a solid of splines is a rectangle, and this lens has an outline; export "
-                     ".stl or .3mf");
-  }
   require_rectangle(lens.surface, height_field_outline(lens.surface, name), name);
-  const double mesh_volume = enclosed_volume(closed_solid(lens.surface, name, lens.setup.front));
+  const double mesh_volume =
+      enclosed_volume(closed_solid(part_of(job).mesh, name, lens.setup.front));
   SplineSolid solid = lens.spline ? own_spline(job) : fitted_splines(job);
   solid.net.front = lens.setup.front;
+  solid.net.outline = lens.setup.outline;
   solid.mesh_volume = mesh_volume;
   const StepHeader header = header_of(job);
   job.begin_writing();
@@ -167,14 +169,13 @@ SplineSolid write_splines(const Job& job) {
   return solid;
 }
 
-/// The solid with the normals by which the surface projects its picture.
-void write_scene(const Job& job, const SurfaceMesh& solid) {
+void write_scene(const Job& job, const SampledSurface& surface, const SurfaceMesh& solid) {
   const Lens& lens = job.source.lens;
+  const std::int64_t triangles = surface.mesh.triangle_count();
   GltfPart part{.solid = solid,
-                .normals = lens.spline ? spline_nodes(*lens.spline, kMeshSamples).normals
-                                       : vertex_area_normals(lens.surface),
-                .surface_triangles = lens.surface.triangle_count(),
-                .curved_back = lens.setup.front ? lens.surface.triangle_count() : 0,
+                .normals = surface.normals,
+                .surface_triangles = triangles,
+                .curved_back = lens.setup.front ? triangles : 0,
                 .ior = lens.setup.ior,
                 .mirror = lens.setup.mode == LightMode::kReflect};
   write_glb(part, part.mirror ? "mirror" : "lens", job.out);
@@ -182,17 +183,16 @@ void write_scene(const Job& job, const SurfaceMesh& solid) {
 
 MeshSolid write_mesh(const Job& job) {
   job.control.report({"closed mesh", 0.0, 0.0, ""});
-  const Lens& lens = job.source.lens;
+  const SampledSurface surface = part_of(job);
   const SurfaceMesh solid =
-      closed_solid(lens.setup.outline ? lens_part(lens, job.executor).mesh : lens.surface,
-                   job.source.file.string(), lens.setup.front);
+      closed_solid(surface.mesh, job.source.file.string(), job.source.lens.setup.front);
   const std::string title = program_mark() + " lens, millimetres";
   job.begin_writing();
   if (job.format == ExportFormat::kStl) write_stl(solid, title, job.out);
   if (job.format == ExportFormat::kObj) write_obj(solid, title, job.out);
   if (job.format == ExportFormat::kPly) write_ply(solid, job.out);
   if (job.format == ExportFormat::k3mf) write_3mf(solid, title, job.out);
-  if (job.format == ExportFormat::kGlb) write_scene(job, solid);
+  if (job.format == ExportFormat::kGlb) write_scene(job, surface, solid);
   return {static_cast<std::int64_t>(solid.triangle_count()), enclosed_volume(solid)};
 }
 

@@ -40,6 +40,12 @@ std::vector<int> even_lines(int cells) {
   return lines;
 }
 
+WholeSpline whole_of(const ControlNet& spline) {
+  const Eigen::Vector3d far = spline.points.col(spline.points.cols() - 1);
+  return {{Eigen::Vector2d(0.0, 0.0), Eigen::Vector2d(far.head<2>())},
+          {spline.table(0), spline.table(1), spline.table(2)}};
+}
+
 class SplineCutter {
  public:
   SplineCutter(const WholeSpline& whole, const CutLines& lines, double step)
@@ -141,11 +147,13 @@ SplineNet cut_spline(const WholeSpline& whole, const CutLines& lines, double ste
 }
 
 SplineNet net_of(const ControlNet& spline, const Executor& executor) {
-  const Eigen::Vector3d far = spline.points.col(spline.points.cols() - 1);
-  const WholeSpline whole{{Eigen::Vector2d(0.0, 0.0), Eigen::Vector2d(far.head<2>())},
-                          {spline.table(0), spline.table(1), spline.table(2)}};
   const CutLines lines{even_lines(spline.cells().x()), even_lines(spline.cells().y())};
-  return cut_spline(whole, lines, kOwnStep, executor);
+  return cut_spline(whole_of(spline), lines, kOwnStep, executor);
+}
+
+SplineNet patch_of(const ControlNet& spline, const Executor& executor) {
+  const CutLines lines{{0, spline.cells().x()}, {0, spline.cells().y()}};
+  return cut_spline(whole_of(spline), lines, kOwnStep, executor);
 }
 
 std::int64_t control_points_of_net(const ControlNet& spline) {

@@ -35,6 +35,9 @@ SplineNet cut_spline(const WholeSpline& whole, const CutLines& lines, double ste
 /// control points to 1e-10 mm.
 SplineNet net_of(const ControlNet& spline, const Executor& executor);
 
+/// The same as one patch.
+SplineNet patch_of(const ControlNet& spline, const Executor& executor);
+
 /// Control points of net_of().
 std::int64_t control_points_of_net(const ControlNet& spline);
 

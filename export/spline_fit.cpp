@@ -85,6 +85,8 @@ class NetFitter {
 
   /// Patches about `side` wide, or wider where the control points would not do for them.
   void divide(double side) {
+    net_.columns = net_.rows = 1;
+    if (options_.one_patch) return;
     const Eigen::Vector2d size = surface_.box().sizes();
     constexpr std::int64_t kMinControlPoints = (kFewestCells + 3) * (kFewestCells + 3);
     do {
@@ -98,7 +100,8 @@ class NetFitter {
   [[nodiscard]] int most_cells() const {
     const double points = static_cast<double>(limit_) / patch_count();
     const int across = kMaxCellsAcross / std::max(net_.columns, net_.rows);
-    const int most = std::min({static_cast<int>(std::sqrt(points)) - 3, kMaxCells, across});
+    const int most = std::min(
+        {static_cast<int>(std::sqrt(points)) - 3, options_.one_patch ? across : kMaxCells, across});
     return std::max(1, most);
   }
 

@@ -6,6 +6,7 @@
 
 #include "core/surface/cubic_spline.h"
 #include "export/front_solid.h"
+#include "export/outline_volume.h"
 
 namespace lensforge {
 namespace {
@@ -152,6 +153,7 @@ FitError SplineNet::error() const {
 }
 
 double SplineNet::volume() const {
+  if (outline) return outlined_volume(*this);
   double sum = 0.0;
   for (const SplinePatch& patch : patches) sum += patch.volume();
   if (!front) return sum;

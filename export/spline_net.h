@@ -12,6 +12,7 @@
 #include "core/compute/executor.h"
 #include "core/compute/run_control.h"
 #include "core/optics/front_surface.h"
+#include "core/optics/outline.h"
 #include "core/surface/sampled_surface.h"
 #include "core/surface/smooth_surface.h"
 #include "export/picture_goal.h"
@@ -98,9 +99,11 @@ struct SplineNet {
   std::vector<SplineEdge> edges_v;   ///< Along v: (line, row) is row·(columns + 1) + line.
   /// The face below; none: the plane z = 0. @pre its radius is longer than half of the diagonal.
   std::optional<SphericalFront> front;
+  /// The edge of the solid; none: the rectangle. @pre with an outline there is one patch.
+  std::optional<Outline> outline;
 
   [[nodiscard]] FitError error() const;
-  /// Volume between the patches and the face below, mm³; exact.
+  /// Volume between the patches and the face below, mm³; exact, or as outlined_volume().
   [[nodiscard]] double volume() const;
   [[nodiscard]] std::int64_t control_points() const;
   /// @pre uv lies in the rectangle.
@@ -119,7 +122,8 @@ struct FitOptions {
   /// Control points of all patches together at most; what bounds the file's size (about 72 bytes
   /// each). 0: four for each vertex of the mesh, kMaxControlPoints at most.
   std::int64_t max_control_points = 0;
-  PictureGoal picture;  ///< What a fit that cannot hold the tolerances keeps instead.
+  bool one_patch = false;  ///< The whole spline as one, for an outline to be cut out of.
+  PictureGoal picture;     ///< What a fit that cannot hold the tolerances keeps instead.
 };
 
 /// Height difference and angle between the normals of two surfaces at a point.
@@ -148,7 +152,8 @@ FitError measure_patch(const SplinePatch& patch, const SmoothSurface& surface,
 /// The net's surface and its own normals at columns × rows points, evenly over the parameters.
 SampledSurface sampled(const SplineNet& net, const GridShape& shape);
 
-/// Knot cells of a patch each way, at least (given enough control points) and at most.
+/// Knot cells of a patch each way, at least (given enough control points) and at most, unless one
+/// patch is all.
 inline constexpr int kFewestCells = 4;
 inline constexpr int kMaxCells = 256;
 /// Knot cells of a whole net each way at most: time grows with their third power.

@@ -6,7 +6,6 @@
 #include <BRep_Builder.hxx>
 #include <Geom2d_Line.hxx>
 #include <Geom_BSplineCurve.hxx>
-#include <Geom_BSplineSurface.hxx>
 #include <Geom_SphericalSurface.hxx>
 #include <Precision.hxx>
 #include <ShapeFix_Edge.hxx>
@@ -19,61 +18,23 @@
 #include <cmath>
 #include <gp_Circ.hxx>
 #include <gp_Pln.hxx>
-#include <gp_Sphere.hxx>
+
+#include "export/solid_geometry.h"
+#include "export/trimmed_solid.h"
 
 // Edges run along lines of the net's parameters: straight lines in the parameter planes of their
 // faces, with the same parameter as in space.
 namespace lensforge {
 namespace {
 
-constexpr int kDegree = 3;
-
-TColStd_Array1OfReal knots(double from, double to, int cells) {
-  TColStd_Array1OfReal result(1, cells + 1);
-  for (int i = 0; i <= cells; ++i) result(i + 1) = from + (to - from) * i / cells;
-  return result;
-}
-
-TColStd_Array1OfInteger multiplicities(int cells) {
-  TColStd_Array1OfInteger result(1, cells + 1);
-  result.Init(1);
-  result(1) = kDegree + 1;
-  result(cells + 1) = kDegree + 1;
-  return result;
-}
-
-Handle(Geom_BSplineSurface) surface_of(const SplinePatch& patch) {
-  const int m = patch.cells_u;
-  const int n = patch.cells_v;
-  const Eigen::Vector2d low = patch.box.min();
-  const Eigen::Vector2d high = patch.box.max();
-  TColgp_Array2OfPnt poles(1, m + kDegree, 1, n + kDegree);
-  const auto& [x, y, z] = patch.coefficients;
-  for (int i = 0; i < m + kDegree; ++i) {
-    for (int j = 0; j < n + kDegree; ++j) {
-      poles(i + 1, j + 1) = gp_Pnt(x(i, j), y(i, j), z(i, j));
-    }
-  }
-  return new Geom_BSplineSurface(poles, knots(low.x(), high.x(), m), knots(low.y(), high.y(), n),
-                                 multiplicities(m), multiplicities(n), kDegree, kDegree);
-}
-
 Handle(Geom_BSplineCurve) curve_of(const SplineEdge& edge, double from, double to) {
-  TColgp_Array1OfPnt poles(1, edge.cells + kDegree);
-  for (int i = 0; i < edge.cells + kDegree; ++i) {
+  TColgp_Array1OfPnt poles(1, edge.cells + kSplineDegree);
+  for (int i = 0; i < edge.cells + kSplineDegree; ++i) {
     const Eigen::Vector3d p = edge.coefficients.col(i);
     poles(i + 1) = gp_Pnt(p.x(), p.y(), p.z());
   }
-  return new Geom_BSplineCurve(poles, knots(from, to, edge.cells), multiplicities(edge.cells),
-                               kDegree);
-}
-
-/// The sphere of a front. Its poles and its seam lie beside the lens: the axis runs along y, and
-/// angles count from the side of the centre that is away from the apex.
-gp_Sphere sphere_of(const SphericalFront& front) {
-  const gp_Pnt centre(front.apex.x(), front.apex.y(), front.apex.z() + front.radius);
-  const gp_Dir away(0.0, 0.0, front.radius);
-  return {gp_Ax3(centre, gp_Dir(0.0, 1.0, 0.0), away), std::abs(front.radius)};
+  return new Geom_BSplineCurve(poles, even_knots(from, to, edge.cells),
+                               clamped_multiplicities(edge.cells), kSplineDegree);
 }
 
 /// Of a wall.
@@ -300,6 +261,8 @@ class SolidBuilder {
 
 }  // namespace
 
-NamedSolid make_spline_solid(const SplineNet& net) { return SolidBuilder(net).build(); }
+NamedSolid make_spline_solid(const SplineNet& net) {
+  return net.outline ? make_trimmed_solid(net) : SolidBuilder(net).build();
+}
 
 }  // namespace lensforge

@@ -29,14 +29,15 @@ Handle(TCollection_HAsciiString) text(const std::string& value) {
 }
 
 /// OpenCASCADE keeps what a file is to look like in process-wide settings.
-void set_up_writing(const StepHeader& header, StepSchema schema) {
+void set_up_writing(const StepHeader& header, StepSchema schema, bool outlined) {
   STEPControl_Controller::Init();
   Interface_Static::SetCVal("write.step.schema",
                             schema == StepSchema::kAp214 ? "AP214IS" : "AP242DIS");
   Interface_Static::SetCVal("write.step.unit", "MM");
   Interface_Static::SetCVal("write.step.product.name", header.name.c_str());
-  // Curves in parameter space follow from the ones in space; without them files are smaller.
-  Interface_Static::SetIVal("write.surfacecurve.mode", 0);
+  // Curves in parameter space follow from the ones in space; without them files are smaller. Those
+  // of an outline are no lines of the parameters, and would be found less exactly.
+  Interface_Static::SetIVal("write.surfacecurve.mode", outlined ? 1 : 0);
 }
 
 void name_faces(const NamedSolid& solid, STEPControl_Writer& writer) {
@@ -62,7 +63,7 @@ SolidContent write_beside(const SplineNet& net, const StepHeader& header, StepSc
                           const fs::path& beside, const fs::path& path) {
   silence_opencascade();
   const NamedSolid solid = make_spline_solid(net);
-  set_up_writing(header, schema);
+  set_up_writing(header, schema, net.outline.has_value());
   STEPControl_Writer writer;
   if (writer.Transfer(solid.solid, STEPControl_ManifoldSolidBrep) != IFSelect_RetDone) {
     fail_to_write(path, "OpenCASCADE cannot put the solid into STEP");

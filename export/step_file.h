@@ -38,7 +38,7 @@ struct SolidContent {
 };
 
 /// Writes the solid between a spline net and the face below it as STEP in millimetres: the patches
-/// are faces named "optical surface", the four walls "side wall", the plane or sphere below "back".
+/// are faces named "optical surface", the walls "side wall", the plane or sphere below "back".
 /// The file is read back before it appears under its name: one solid, valid, closed, the net's
 /// volume to 1e-6. @pre the net lies above that face. @throw RunError if it cannot be written or
 /// does not read back so;

@@ -122,15 +122,36 @@ TEST(ClosedSolid, TwoPiecesAreRefused) {
   EXPECT_THAT(message_of<InputError>([&] { closed_solid(two, "m"); }), HasSubstr("pieces"));
 }
 
-TEST(ClosedSolid, OutlineThatHidesFromItsMiddleIsRefused) {
-  SurfaceMesh mesh = grid_mesh(7, 7);
-  std::vector<int> kept;  // An L: only the cells of the first column and the first row.
+/// The cells of a grid that `keep` names by column and row.
+template <class Keep>
+SurfaceMesh cells_of(SurfaceMesh mesh, int columns, const Keep& keep) {
+  std::vector<int> kept;
   for (int t = 0; t < mesh.triangle_count(); ++t) {
-    const int cell = t / 2;
-    if (cell % 6 == 0 || cell / 6 == 0) kept.push_back(t);
+    if (keep(t / 2 % columns, t / 2 / columns)) kept.push_back(t);
   }
   mesh.triangles = Eigen::Matrix3Xi(mesh.triangles(Eigen::all, kept));
-  EXPECT_THAT(message_of<InputError>([&] { closed_solid(mesh, "m"); }), HasSubstr("middle"));
+  return mesh;
+}
+
+TEST(ClosedSolid, OutlineThatHidesFromItsMiddleIsClosed) {
+  const auto in_l = [](int column, int row) { return column == 0 || row == 0; };
+  const SurfaceMesh mesh = cells_of(grid_mesh(7, 7, 2.0, 3.0), 6, in_l);
+  const SurfaceMesh solid = closed_solid(mesh, "m");
+  expect_watertight(solid);
+  EXPECT_NEAR(enclosed_volume(solid), 11.0 * 2.0 * 2.0 * 3.0, 1e-12);
+}
+
+/// A strip that turns by more than one round and comes to lie on itself.
+TEST(ClosedSolid, OutlineThatCrossesItselfIsRefused) {
+  constexpr int kSteps = 20;
+  SurfaceMesh mesh = grid_mesh(2, kSteps + 1);
+  for (int k = 0; k <= kSteps; ++k) {
+    const double angle = -0.4 * k;
+    mesh.vertices.col(2 * k) << 3.0 * std::cos(angle), 3.0 * std::sin(angle), 5.0;
+    mesh.vertices.col(2 * k + 1) << 1.0 * std::cos(angle), 1.0 * std::sin(angle), 5.0;
+  }
+  EXPECT_THAT(message_of<InputError>([&] { closed_solid(mesh, "m"); }),
+              HasSubstr("crosses or touches itself"));
 }
 
 }  // namespace

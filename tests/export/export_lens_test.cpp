@@ -7,6 +7,7 @@
 
 #include "core/error.h"
 #include "core/optics/front_placement.h"
+#include "core/optics/outline.h"
 #include "core/surface/mesh_io.h"
 #include "core/temp_folder.h"
 #include "design/render_lens.h"
@@ -111,6 +112,42 @@ TEST_F(ExportLens, ALensWithASphericalFrontKeepsItsPictureAndItsVolume) {
                 2e-4 * result.splines->mesh_volume);
     EXPECT_LT(result.splines->content.low[2], -0.5);
     EXPECT_NEAR(result.splines->picture.mae, result.metrics.at(SurfaceModel::kSmooth).mae, 1e-3);
+  }
+}
+
+/// What no mesh knew: the file's own face, trimmed, makes the picture that the lens does.
+TEST_F(ExportLens, ALensWithAnOutlineKeepsItsPictureAndItsVolume) {
+  OpticalSetup& setup = source_.lens.setup;
+  const Eigen::Vector2d size = setup.lens_size;
+  setup.image_size = 2.0 * size;  // All of its light.
+  setup.image_origin = -0.5 * size;
+  for (const Outline& outline :
+       {circle_outline(size),
+        polygon_outline(size, {{0, 0}, {5, 0}, {5, 1}, {1, 1}, {1, 4}, {0, 4}})}) {
+    setup.outline = outline;
+    Lens& lens = source_.lens;
+    evaluate(lens.surface, setup, SurfaceModel::kSmooth, lens.target, &lens.target,
+             Executor::cpu(1));
+    ExportOptions options;
+    options.max_points = 3000;
+    for (const char* name : {"lens.step", "lens.igs"}) {
+      const ExportResult result = write(name, options);
+      ASSERT_TRUE(result.splines.has_value());
+      EXPECT_TRUE(result.splines->content.is_one_solid());
+      EXPECT_EQ(result.splines->net.patches.size(), 1U);
+      EXPECT_NEAR(result.splines->content.volume, result.splines->mesh_volume,
+                  2e-4 * result.splines->mesh_volume);
+      EXPECT_LT(result.splines->picture.mae, 1e-3);
+    }
+    const SolidSurface solid = read_solid_surface(folder_ / "lens.step", 2e5, Executor::cpu(1));
+    EXPECT_TRUE(solid.by_name);
+    EXPECT_EQ(solid.faces, 1);
+    const ImageMetrics read = evaluate(solid.samples.mesh, solid.samples.normals, setup,
+                                       lens.target, nullptr, Executor::cpu(1));
+    // Its raster leaves the cells on the rim out.
+    EXPECT_LT(read.mae, 1e-2);
+    EXPECT_TRUE(write("lens.stl").mesh.has_value());
+    EXPECT_TRUE(write("lens.glb").mesh.has_value());
   }
 }
 

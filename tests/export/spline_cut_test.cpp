@@ -7,6 +7,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "core/optics/outline.h"
 #include "core/surface/sample_splines.h"
 #include "core/temp_folder.h"
 #include "design/render_lens.h"
@@ -106,6 +107,31 @@ TEST_F(SplineLens, IgesHoldsTheSameSolid) {
   EXPECT_TRUE(result.splines->content.is_one_solid());
   EXPECT_NEAR(result.splines->content.volume, result.splines->net.volume(),
               1e-6 * result.splines->net.volume());
+}
+
+/// Read back by OpenCASCADE: the very surface, as far as the outline goes.
+TEST_F(SplineLens, WithAnOutlineIsTheVerySurfaceInsideOfIt) {
+  const Outline circle = circle_outline({15.0, 10.0});
+  source_.lens.setup.outline = circle;
+  const ExportResult result = write(folder_ / "lens.step");
+  ASSERT_TRUE(result.splines.has_value());
+  EXPECT_FALSE(result.splines->fit.has_value());
+  EXPECT_TRUE(result.splines->content.is_one_solid());
+  EXPECT_EQ(result.splines->content.faces, 6);
+  const SolidSurface solid = read_solid_surface(folder_ / "lens.step", 5e4, Executor::serial());
+  const ControlNet& spline = *source_.lens.spline;
+  double outside = 0.0;
+  double height = 0.0;
+  for (Eigen::Index v = 0; v < solid.samples.mesh.vertices.cols(); ++v) {
+    const Eigen::Vector3d p = solid.samples.mesh.vertices.col(v);
+    const Eigen::Vector2d start(p.x() / 15.0 * 11.0, p.y() / 10.0 * 8.0);
+    outside = std::max(outside, (p.head<2>() - Eigen::Vector2d(7.5, 5.0)).norm() - 5.0);
+    height = std::max(
+        height, std::abs(p.z() - spline.at(spline.parameters_of(p.head<2>(), start)).point.z()));
+  }
+  EXPECT_GT(solid.samples.mesh.vertex_count(), 10000);
+  EXPECT_LE(outside, 1e-5);
+  EXPECT_LE(height, 1e-9);
 }
 
 TEST_F(SplineLens, HeightsAreThoseOfTheSpline) {

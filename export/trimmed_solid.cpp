@@ -1,0 +1,272 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "export/trimmed_solid.h"
+
+#include <BRepBuilderAPI_MakeEdge.hxx>
+#include <BRepBuilderAPI_MakeFace.hxx>
+#include <BRep_Builder.hxx>
+#include <BRep_Tool.hxx>
+#include <Geom2d_Line.hxx>
+#include <Geom_BSplineSurface.hxx>
+#include <Geom_Circle.hxx>
+#include <Geom_CylindricalSurface.hxx>
+#include <Geom_SphericalSurface.hxx>
+#include <Precision.hxx>
+#include <TopoDS_Edge.hxx>
+#include <TopoDS_Shell.hxx>
+#include <TopoDS_Vertex.hxx>
+#include <TopoDS_Wire.hxx>
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <gp_Pln.hxx>
+#include <numbers>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/error.h"
+#include "export/outline_walls.h"
+#include "export/rim_curve.h"
+#include "export/solid_geometry.h"
+
+// Every edge has the parameter of its wall, in space and on the faces beside it.
+namespace lensforge {
+namespace {
+
+/// The parameter of a quarter cylinder's first upright: its seam lies across from the wall.
+constexpr double kFirstAngle = 0.25 * std::numbers::pi;
+
+/// What an outline's corner has.
+struct Corner {
+  TopoDS_Vertex back;
+  TopoDS_Vertex top;
+  TopoDS_Edge upright;
+};
+
+/// What a wall has.
+struct WallEdges {
+  RimCurve top_curve;
+  TopoDS_Edge top;
+  RimCurve back_curve;  ///< On a sphere only.
+  TopoDS_Edge back;
+};
+
+class TrimmedSolid {
+ public:
+  explicit TrimmedSolid(const SplineNet& net)
+      : net_(net), walls_(walls_of(*net.outline)), uv_(walls_.front().from) {
+    if (net.front) front_ = FrontSurface(*net.front);
+    for (const OutlineWall& wall : walls_) edges_.push_back(curves_of(wall));
+    for (std::size_t k = 0; k < walls_.size(); ++k) corners_.push_back(corner(k));
+    for (std::size_t k = 0; k < walls_.size(); ++k) make_edges(k);
+  }
+
+  NamedSolid build() {
+    builder_.MakeShell(shell_);
+    add_top();
+    for (std::size_t k = 0; k < walls_.size(); ++k) {
+      walls_[k].arc ? add_cylinder(k) : add_plane(k);
+    }
+    net_.front ? add_sphere() : add_back();
+    shell_.Closed(true);
+    builder_.MakeSolid(result_.solid);
+    builder_.Add(result_.solid, shell_);
+    return result_;
+  }
+
+ private:
+  using Edges = std::vector<TopoDS_Shape>;
+
+  [[nodiscard]] std::size_t after(std::size_t k) const { return (k + 1) % walls_.size(); }
+
+  /// The point of the patch above a place; places follow each other closely.
+  RimPoint on_patch(const OutlineWall& wall, double t) {
+    const Eigen::Vector2d xy = wall.at(t);
+    auto uv = net_.parameters_of(xy, uv_);
+    if (!uv) uv = net_.parameters_of(xy, xy);
+    if (!uv) throw RunError("the outline leaves the splines");
+    uv_ = *uv;
+    const PatchFrame f = net_.patches.front().frame(uv_);
+    Eigen::Matrix2d derivative;
+    derivative << f.by_u.head<2>(), f.by_v.head<2>();
+    const Eigen::Vector2d turn = derivative.inverse() * wall.along(t);
+    return {{xy.x(), xy.y(), f.point.z()}, f.by_u * turn.x() + f.by_v * turn.y(), uv_, turn};
+  }
+
+  [[nodiscard]] RimPoint on_sphere(const OutlineWall& wall, double t) const {
+    const Eigen::Vector2d xy = wall.at(t);
+    const FrontPoint front = front_.at(xy);
+    const Eigen::Vector2d along = wall.along(t);
+    const Eigen::Vector3d point(xy.x(), xy.y(), front.z);
+    return point_on_sphere(*net_.front, point, {along.x(), along.y(), front.gradient.dot(along)});
+  }
+
+  WallEdges curves_of(const OutlineWall& wall) {
+    constexpr double kFewest = 4.0;
+    const SplinePatch& patch = net_.patches.front();
+    const double cell = patch.box.sizes().cwiseQuotient(patch.cells()).minCoeff();
+    const auto pieces = static_cast<int>(std::max(kFewest, std::ceil(2.0 * wall.length() / cell)));
+    WallEdges edges;
+    edges.top_curve = rim_curve([&](double t) { return on_patch(wall, t); }, wall.last(), pieces);
+    if (!net_.front) return edges;
+    edges.back_curve = rim_curve([&](double t) { return on_sphere(wall, t); }, wall.last(),
+                                 static_cast<int>(8.0 * kFewest));
+    return edges;
+  }
+
+  TopoDS_Vertex make_vertex(const gp_Pnt& at) {
+    TopoDS_Vertex vertex;
+    builder_.MakeVertex(vertex, at, kRimTolerance);
+    return vertex;
+  }
+
+  Corner corner(std::size_t k) {
+    const gp_Pnt top = edges_[k].top_curve.space->StartPoint();
+    const double z = net_.front ? front_.height({top.X(), top.Y()}) : 0.0;
+    Corner made{make_vertex({top.X(), top.Y(), z}), make_vertex(top), {}};
+    made.upright = BRepBuilderAPI_MakeEdge(made.back, made.top).Edge();
+    return made;
+  }
+
+  TopoDS_Edge make_edge(const RimCurve& curve, const TopoDS_Vertex& from, const TopoDS_Vertex& to) {
+    TopoDS_Edge edge;
+    builder_.MakeEdge(edge, curve.space, kRimTolerance);
+    builder_.Add(edge, from.Oriented(TopAbs_FORWARD));
+    builder_.Add(edge, to.Oriented(TopAbs_REVERSED));
+    builder_.Range(edge, curve.space->FirstParameter(), curve.space->LastParameter());
+    return edge;
+  }
+
+  void make_edges(std::size_t k) {
+    const Corner& from = corners_[k];
+    const Corner& to = corners_[after(k)];
+    WallEdges& edges = edges_[k];
+    edges.top = make_edge(edges.top_curve, from.top, to.top);
+    if (net_.front) {
+      edges.back = make_edge(edges.back_curve, from.back, to.back);
+    } else if (walls_[k].arc) {
+      const Handle(Geom_Circle) circle =
+          new Geom_Circle(axes_of(*walls_[k].arc).Ax2(), walls_[k].arc->radius);
+      edges.back = BRepBuilderAPI_MakeEdge(circle, from.back, to.back, kFirstAngle,
+                                           kFirstAngle + walls_[k].last())
+                       .Edge();
+    } else {
+      edges.back = BRepBuilderAPI_MakeEdge(from.back, to.back).Edge();
+    }
+  }
+
+  /// Of a quarter cylinder.
+  static gp_Ax3 axes_of(const WallArc& arc) {
+    const double angle = arc.start - kFirstAngle;
+    return {gp_Pnt(arc.centre.x(), arc.centre.y(), 0.0), gp_Dir(0.0, 0.0, 1.0),
+            gp_Dir(std::cos(angle), std::sin(angle), 0.0)};
+  }
+
+  TopoDS_Wire make_wire(const Edges& edges) {
+    TopoDS_Wire wire;
+    builder_.MakeWire(wire);
+    for (const TopoDS_Shape& edge : edges) builder_.Add(wire, edge);
+    wire.Closed(true);
+    return wire;
+  }
+
+  void add_face(const TopoDS_Face& face, const char* name) {
+    builder_.Add(shell_, face);
+    result_.names.emplace_back(face, name);
+  }
+
+  void add_top() {
+    TopoDS_Face face;
+    builder_.MakeFace(face, surface_of(net_.patches.front()), Precision::Confusion());
+    Edges rim;
+    for (const WallEdges& edges : edges_) {
+      builder_.UpdateEdge(edges.top, edges.top_curve.plan, face, kRimTolerance);
+      rim.push_back(edges.top);
+    }
+    builder_.Add(face, make_wire(rim));
+    add_face(face, "optical surface");
+  }
+
+  /// Around a wall, seen from outside.
+  Edges around(std::size_t k) const {
+    return {edges_[k].back, corners_[after(k)].upright, edges_[k].top.Reversed(),
+            corners_[k].upright.Reversed()};
+  }
+
+  void add_plane(std::size_t k) {
+    const Eigen::Vector2d along = walls_[k].along(0.0);
+    const gp_Pln plane(edges_[k].top_curve.space->StartPoint(), gp_Dir(along.y(), -along.x(), 0.0));
+    add_face(BRepBuilderAPI_MakeFace(plane, make_wire(around(k))).Face(), "side wall");
+  }
+
+  void add_cylinder(std::size_t k) {
+    const WallArc& arc = *walls_[k].arc;
+    TopoDS_Face face;
+    builder_.MakeFace(face, new Geom_CylindricalSurface(axes_of(arc), arc.radius),
+                      Precision::Confusion());
+    builder_.UpdateEdge(edges_[k].top, unrolled(edges_[k].top_curve, kFirstAngle), face,
+                        kRimTolerance);
+    if (net_.front) {
+      builder_.UpdateEdge(edges_[k].back, unrolled(edges_[k].back_curve, kFirstAngle), face,
+                          kRimTolerance);
+    } else {
+      const gp_Pnt2d start(0.0, 0.0);
+      builder_.UpdateEdge(edges_[k].back, new Geom2d_Line(start, gp_Dir2d(1.0, 0.0)), face,
+                          Precision::Confusion());
+    }
+    add_upright(corners_[k], kFirstAngle, face);
+    add_upright(corners_[after(k)], kFirstAngle + walls_[k].last(), face);
+    builder_.Add(face, make_wire(around(k)));
+    add_face(face, "side wall");
+  }
+
+  void add_upright(const Corner& corner, double angle, const TopoDS_Face& face) {
+    const gp_Pnt2d foot(angle, BRep_Tool::Pnt(corner.back).Z());
+    builder_.UpdateEdge(corner.upright, new Geom2d_Line(foot, gp_Dir2d(0.0, 1.0)), face,
+                        Precision::Confusion());
+  }
+
+  /// Seen from below.
+  [[nodiscard]] Edges back_rim() const {
+    Edges rim;
+    for (std::size_t k = edges_.size(); k-- > 0;) rim.push_back(edges_[k].back.Reversed());
+    return rim;
+  }
+
+  void add_back() {
+    const gp_Pln plane(gp_Pnt(0.0, 0.0, 0.0), gp_Dir(0.0, 0.0, -1.0));
+    add_face(BRepBuilderAPI_MakeFace(plane, make_wire(back_rim())).Face(), "back");
+  }
+
+  void add_sphere() {
+    TopoDS_Face face;
+    builder_.MakeFace(face, new Geom_SphericalSurface(sphere_of(*net_.front)),
+                      Precision::Confusion());
+    for (const WallEdges& edges : edges_) {
+      builder_.UpdateEdge(edges.back, edges.back_curve.plan, face, kRimTolerance);
+    }
+    // A sphere's own normal points away from its centre, which lies below a hollow front.
+    const bool hollow = net_.front->radius < 0.0;
+    TopoDS_Wire wire = make_wire(back_rim());
+    if (hollow) wire.Reverse();
+    builder_.Add(face, wire);
+    if (hollow) face.Reverse();
+    add_face(face, "back");
+  }
+
+  const SplineNet& net_;
+  std::vector<OutlineWall> walls_;
+  FrontSurface front_;
+  Eigen::Vector2d uv_;  ///< Of the patch's last point that was looked up.
+  BRep_Builder builder_;
+  TopoDS_Shell shell_;
+  NamedSolid result_;
+  std::vector<WallEdges> edges_;  ///< Of wall k.
+  std::vector<Corner> corners_;   ///< Corner k begins wall k.
+};
+
+}  // namespace
+
+NamedSolid make_trimmed_solid(const SplineNet& net) { return TrimmedSolid(net).build(); }
+
+}  // namespace lensforge
