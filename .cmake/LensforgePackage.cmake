@@ -17,7 +17,8 @@ install(EXPORT lensforgeTargets NAMESPACE lensforge:: DESTINATION "${package_fol
 install(DIRECTORY core design cam export machine
   DESTINATION "${LENSFORGE_INCLUDE_FOLDER}" FILES_MATCHING PATTERN "*.h")
 
-# cpack makes a Debian package of the command; what it needs is found by dpkg-shlibdeps.
+# cpack makes a Debian package of the command, and of the Python module where it is built; what they
+# need is found by dpkg-shlibdeps. The module is for Debian's own Python, which the command is not.
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME lensforge)
 set(CPACK_PACKAGE_CONTACT "lensforge developers")
@@ -25,6 +26,10 @@ set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "${PROJECT_DESCRIPTION}")
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_STRIP_FILES ON)
 set(CPACK_COMPONENTS_ALL command debian)
+if(LENSFORGE_PYTHON)
+  list(APPEND CPACK_COMPONENTS_ALL python)
+  set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "python3 (>= ${Python3_VERSION_MAJOR}.${Python3_VERSION_MINOR}), python3-numpy")
+endif()
 set(CPACK_COMPONENTS_GROUPING ALL_COMPONENTS_IN_ONE)
 set(CPACK_DEB_COMPONENT_INSTALL ON)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)

@@ -12,6 +12,7 @@
 
 #include "app/commands.h"
 #include "app/console.h"
+#include "app/design_output.h"
 #include "app/design_settings.h"
 #include "app/earlier_design.h"
 #include "app/exit_code.h"
@@ -21,18 +22,13 @@
 #include "app/live_design.h"
 #include "app/option_set.h"
 #include "app/output_folder.h"
-#include "app/overview.h"
 #include "app/progress_display.h"
-#include "cam/cam_job.h"
 #include "core/compute/work_estimate.h"
 #include "core/error.h"
 #include "core/image/image_io.h"
 #include "core/io/checkpoint_file.h"
 #include "core/io/lens_folder.h"
-#include "core/io/pending_files.h"
 #include "core/optics/source_points.h"
-#include "core/page/light_drawing.h"
-#include "core/text/version.h"
 #include "design/design_estimate.h"
 #include "design/design_lens.h"
 #include "design/light_setup.h"
@@ -66,71 +62,6 @@ void note_source(const Image& picture, const DesignOptions& design, const Consol
   if (!(blur > 1.0)) return;
   console.note("the source's image is " + fixed(blur, 1) +
                " pixels wide: no lens shows finer detail in this light");
-}
-
-/// The process that a design is for and what comes out of it.
-nlohmann::json made_json(const MadeBy& process, const DesignResult::Made& made) {
-  return {{"pitch_mm", process.pitch},
-          {"along", process.rows_along_x ? "x" : "y"},
-          {"polish_sigma_mm", process.polish_sigma},
-          {"rim_depth_mm", process.rim_depth},
-          {"rim_length_mm", process.rim_length},
-          {"polish_spread", process.polish_spread},
-          {"metrics", metrics_json(made.metrics)}};
-}
-
-nlohmann::json source_json(const SourceCheck& source) {
-  return {{"blur_pixels", source.blur},
-          {"points", source.points},
-          {"halving_mae", source.halving},
-          {"convolution_mae", source.convolution}};
-}
-
-nlohmann::json fringe_json(const Fringe& fringe) {
-  return {{"mean", fringe.mean}, {"max", fringe.max}};
-}
-
-nlohmann::json provenance(const OptionSet& options, const ChosenDevice& device,
-                          const DesignOptions& design, const DesignResult& result) {
-  const bool done = result.status == DesignResult::Status::kDone;
-  nlohmann::json fields = {
-      {"program", program_mark()},
-      {"options", options.used()},
-      {"seconds", result.convergence.empty() ? 0.0 : result.convergence.back().seconds},
-      {"device", device.word},
-      {"threads", device.executor.concurrency()},
-      {"status", done ? "done" : "interrupted"},
-      {"message", result.message},
-      {"fingerprint", fingerprint_text(result.fingerprint)}};
-  if (result.source) fields["source_check"] = source_json(*result.source);
-  if (result.colors) fields["fringe_mm"] = fringe_json(result.colors->fringe);
-  if (result.made) fields["made_by"] = made_json(*design.made_by, *result.made);
-  return fields;
-}
-
-/// Puts the lens in the place of what was there. The cut of an earlier lens goes with it: milled,
-/// it would not be this one.
-void write_folder(const OutputFolder& folder, const DesignResult& result, const Console& console) {
-  PendingFiles files(folder.path());
-  files.add(lens_file::kConvergence, convergence_csv(result.convergence));
-  const Image* const made = result.made ? &result.made->picture : nullptr;
-  files.add(lens_file::kOverview,
-            [&](const fs::path& beside) { write_image(draw_overview(result.lens, made), beside); });
-  files.add(lens_file::kSetup,
-            light_drawing_file(result.lens.setup, result.lens.surface.vertices.row(2).maxCoeff()));
-  if (result.colors) {
-    files.add(lens_file::kRenderColor,
-              [&](const fs::path& beside) { write_image(result.colors->picture, beside); });
-  }
-  write_lens(result.lens, std::move(files));
-  std::error_code ignored;
-  if (!result.colors) fs::remove(folder.path() / lens_file::kRenderColor, ignored);
-  const fs::path cut = folder.path() / lens_file::kCut;
-  if (!fs::is_directory(cut, ignored)) return;
-  remove_cut(cut);
-  if (!fs::remove(cut, ignored)) {
-    console.note(cut.string() + ": holds files that lensforge did not write; they are kept");
-  }
 }
 
 nlohmann::json summary_json(const fs::path& folder, const DesignResult& result) {
@@ -169,11 +100,13 @@ int finish(const OptionSet& options, const ChosenDevice& device, const DesignOpt
   if (result.status == DesignResult::Status::kFailed) throw RunError(result.message);
   const Console console(options.common().json, options.common().quiet);
   const bool done = result.status == DesignResult::Status::kDone;
-  result.lens.provenance = provenance(options, device, design, result);
+  result.lens.provenance = design_provenance(options, device, design, result);
   const EarlierDesign earlier = EarlierDesign::in(folder.path());
   const bool replaces = earlier.lens && !earlier.is_of(fingerprint_text(result.fingerprint));
   const bool keeps = replaces && !done;
-  if (result.lens.surface.triangle_count() > 0 && !keeps) write_folder(folder, result, console);
+  if (result.lens.surface.triangle_count() > 0 && !keeps) {
+    write_design(folder.path(), result, console);
+  }
   std::error_code ignored;
   if (done) fs::remove(folder.path() / lens_file::kCheckpoint, ignored);
   console.result(summary_json(folder.path(), result), summary_text(folder.path(), result));

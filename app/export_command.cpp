@@ -35,11 +35,6 @@ void add_export_options(OptionSet& options, ExportSettings& settings) {
   options.fields(export_fields(), settings.options);
 }
 
-namespace {
-
-namespace fs = std::filesystem;
-
-/// @throw InputError naming an option that was given though the format has no use for it.
 void require_fitting_options(const OptionSet& options, ExportFormat format) {
   if (options.given("--pixels") && !is_height_map(format)) {
     throw InputError("--pixels: is for height maps (exr, png), not for " + word_of(format));
@@ -55,8 +50,6 @@ void require_fitting_options(const OptionSet& options, ExportFormat format) {
     throw InputError("--schema: is for step, not for iges");
   }
 }
-
-}  // namespace
 
 int export_command(const Arguments& command_line) try {
   ExportSettings settings;
@@ -77,7 +70,7 @@ int export_command(const Arguments& command_line) try {
   report.json["command"] = "export";
   report.json["out"] = settings.out;
   report.json["format"] = word_of(result.format);
-  report.json["bytes"] = fs::file_size(settings.out);
+  report.json["bytes"] = std::filesystem::file_size(settings.out);
   console.result(report.json, settings.out + "\n" + report.text);
   if (result.within_tolerance()) return kDone;
   console.note("warning: the tolerances do not hold everywhere; --max-points gives more room");

@@ -19,4 +19,7 @@ struct ExportSettings {
 /// Adds every option of the command.
 void add_export_options(OptionSet& options, ExportSettings& settings);
 
+/// @throw InputError naming an option that was given though the format has no use for it.
+void require_fitting_options(const OptionSet& options, ExportFormat format);
+
 }  // namespace lensforge::app

@@ -7,6 +7,7 @@
 
 #include "core/surface/mesh_cut.h"
 #include "core/surface/mesh_normals.h"
+#include "design/flux_of_surface.h"
 #include "design/render_flux.h"
 #include "design/render_spline.h"
 #include "design/source_picture.h"
@@ -63,14 +64,6 @@ std::vector<double> flux_of(const SurfaceMesh& mesh, const Eigen::Matrix3Xd& nor
   return flux_through(part.mesh, part.normals, setup, executor);
 }
 
-std::vector<double> flux_of(const SurfaceMesh& mesh, const OpticalSetup& setup, SurfaceModel model,
-                            const Executor& executor) {
-  if (!setup.outline) return flux_through(mesh, setup, model, executor);
-  const SampledSurface part = lit_part(mesh, vertex_area_normals(mesh), setup, executor);
-  if (model == SurfaceModel::kFacet) return flux_through(part.mesh, setup, model, executor);
-  return flux_through(part.mesh, part.normals, setup, executor);
-}
-
 RenderResult result_of(const std::vector<double>& flux, const OpticalSetup& setup, double total) {
   return {scaled(flux, setup.pixels.x(), setup.pixels.y(), total),
           std::accumulate(flux.begin(), flux.end(), 0.0)};
@@ -89,9 +82,17 @@ ImageMetrics judged(RenderResult result, const Image& target, Image* rendered) {
 
 }  // namespace
 
+std::vector<double> flux_of_surface(const SurfaceMesh& mesh, const OpticalSetup& setup,
+                                    SurfaceModel model, const Executor& executor) {
+  if (!setup.outline) return flux_through(mesh, setup, model, executor);
+  const SampledSurface part = lit_part(mesh, vertex_area_normals(mesh), setup, executor);
+  if (model == SurfaceModel::kFacet) return flux_through(part.mesh, setup, model, executor);
+  return flux_through(part.mesh, part.normals, setup, executor);
+}
+
 RenderResult render_surface(const SurfaceMesh& mesh, const OpticalSetup& setup, SurfaceModel model,
                             const Executor& executor) {
-  return result_of(flux_of(mesh, setup, model, executor), setup, pixel_count(setup));
+  return result_of(flux_of_surface(mesh, setup, model, executor), setup, pixel_count(setup));
 }
 
 RenderResult render_surface(const SurfaceMesh& mesh, const Eigen::Matrix3Xd& normals,
@@ -101,8 +102,8 @@ RenderResult render_surface(const SurfaceMesh& mesh, const Eigen::Matrix3Xd& nor
 
 ImageMetrics evaluate(const SurfaceMesh& mesh, const OpticalSetup& setup, SurfaceModel model,
                       const Image& target, Image* rendered, const Executor& executor) {
-  return judged(result_of(flux_of(mesh, setup, model, executor), setup, target.total()), target,
-                rendered);
+  return judged(result_of(flux_of_surface(mesh, setup, model, executor), setup, target.total()),
+                target, rendered);
 }
 
 ImageMetrics evaluate(const SurfaceMesh& mesh, const Eigen::Matrix3Xd& normals,
@@ -115,7 +116,7 @@ ImageMetrics evaluate(const SurfaceMesh& mesh, const Eigen::Matrix3Xd& normals,
 std::vector<double> flux_of_lens(const Lens& lens, const OpticalSetup& setup,
                                  const Executor& executor) {
   if (lens.model != SurfaceModel::kSpline) {
-    return flux_of(lens.surface, setup, lens.model, executor);
+    return flux_of_surface(lens.surface, setup, lens.model, executor);
   }
   return picture_under(setup, points_for(lens.surface, setup), [&](const OpticalSetup& point) {
     return render_spline(*lens.spline, point, executor);

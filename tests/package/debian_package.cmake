@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# cmake -DBUILD=... -P debian_package.cmake
-# Fails unless cpack makes a Debian package whose content, in an empty root, designs a lens.
+# cmake -DBUILD=... -DPYTHON=... -P debian_package.cmake
+# Fails unless cpack makes a Debian package whose content, in an empty root, designs a lens: the command,
+# and where it is built the Python module.
 foreach(tool dpkg dpkg-deb dpkg-shlibdeps file)
   find_program(found_${tool} ${tool})
   if(NOT found_${tool})
@@ -56,4 +57,16 @@ run("${root}/usr/bin/lensforge" --version)
 run("${root}/usr/bin/lensforge" design "${BUILD}/pictures/rings.png" --out "${work}/lens"
   --pixels 16 --rounds 1 --quiet)
 run("${root}/usr/bin/lensforge" info "${work}/lens")
+if(PYTHON)
+  set(modules "${root}/usr/lib/python3/dist-packages")
+  if(NOT EXISTS "${modules}/lensforge/py.typed")
+    message(FATAL_ERROR "the package has no Python module")
+  endif()
+  run("${CMAKE_COMMAND}" -E env "PYTHONPATH=${modules}" "${PYTHON}" -B -c
+    "import lensforge; print(lensforge.__file__, lensforge.Lens('${work}/lens'))")
+  string(FIND "${output}" "${modules}/lensforge/__init__.py" found)
+  if(found EQUAL -1)
+    message(FATAL_ERROR "the module does not come from the package: ${output}")
+  endif()
+endif()
 file(REMOVE_RECURSE "${work}")

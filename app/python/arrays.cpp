@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "app/python/arrays.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <memory>
+#include <utility>
+
+#include "core/error.h"
+#include "core/image/image_io.h"
+#include "core/text/number_text.h"
+
+namespace lensforge::python {
+namespace {
+
+std::string shape_text(const py::array& array) {
+  return py::str(array.attr("shape")).cast<std::string>();
+}
+
+[[noreturn]] void refuse(const std::string& name, const py::array& array, const std::string& rule) {
+  throw InputError(name + ": an array of shape " + shape_text(array) + " and type " +
+                   py::str(array.dtype()).cast<std::string>() + "; " + rule);
+}
+
+/// @throw InputError unless `array` is rows of three numbers.
+void require_triples(const std::string& name, const py::array& array, const std::string& kinds) {
+  const bool known = kinds.find(array.dtype().kind()) != std::string::npos;
+  if (known && array.ndim() == 2 && array.shape(1) == 3 && array.shape(0) > 0) return;
+  refuse(name, array, kinds == "f" ? "must be (n, 3) floats" : "must be (n, 3) integers");
+}
+
+void require_vertex_numbers(const SurfaceMesh& mesh) {
+  const auto out_of_range = [&](int v) { return v < 0 || v >= mesh.vertex_count(); };
+  const auto all = mesh.triangles.reshaped();
+  const auto bad = std::find_if(all.begin(), all.end(), out_of_range);
+  if (bad == all.end()) return;
+  throw InputError("faces: vertex number " + std::to_string(*bad) + ": must be 0 to " +
+                   std::to_string(mesh.vertex_count() - 1));
+}
+
+py::array read_only(py::array array) {
+  array.attr("setflags")(py::arg("write") = false);
+  return array;
+}
+
+/// The (n, 3) array whose rows are a matrix's columns.
+template <class Matrix>
+py::array rows_of(const Matrix& columns, const py::object& owner) {
+  using Value = typename Matrix::Scalar;
+  return py::array_t<Value>({static_cast<py::ssize_t>(columns.cols()), py::ssize_t{3}},
+                            columns.data(), owner);
+}
+
+py::array pixels_of(const Image& image, const py::object& owner) {
+  return py::array_t<float>(
+      {static_cast<py::ssize_t>(image.rows()), static_cast<py::ssize_t>(image.columns())},
+      image.values().data(), owner);
+}
+
+/// A Python object that owns a value, for arrays to keep alive.
+template <class Value>
+py::capsule owner_of(std::unique_ptr<Value> value) {
+  py::capsule owner(value.get(), [](void* held) {
+    const std::unique_ptr<Value> last(static_cast<Value*>(held));
+  });
+  static_cast<void>(value.release());
+  return owner;
+}
+
+}  // namespace
+
+Image image_from(const py::array& array, const std::string& name) {
+  const bool floats = array.dtype().kind() == 'f';
+  if (!floats || array.ndim() != 2 || array.size() == 0) {
+    refuse(name, array, "must be (rows, columns) floats, linear light, 1 is white");
+  }
+  if (std::max(array.shape(0), array.shape(1)) > kMaxImageSide) {
+    refuse(name, array, "sides must be at most " + std::to_string(kMaxImageSide));
+  }
+  const py::array_t<float, py::array::c_style | py::array::forcecast> light(array);
+  Image image(static_cast<int>(light.shape(1)), static_cast<int>(light.shape(0)));
+  const std::span values(light.data(), static_cast<std::size_t>(light.size()));
+  const auto bad = std::find_if(values.begin(), values.end(),
+                                [](float v) { return !(v >= 0.0F) || !std::isfinite(v); });
+  if (bad != values.end()) {
+    throw InputError(name + ": holds " + number_text(*bad) +
+                     ": light must be finite and not negative");
+  }
+  std::copy(values.begin(), values.end(), image.values().begin());
+  return image;
+}
+
+SurfaceMesh mesh_from(const py::array& vertices, const py::array& faces) {
+  require_triples("vertices", vertices, "f");
+  require_triples("faces", faces, "iu");
+  const Numbers points(vertices);
+  const Indices corners(faces);
+  SurfaceMesh mesh;
+  mesh.vertices = Eigen::Map<const Eigen::Matrix3Xd>(points.data(), 3, points.shape(0));
+  mesh.triangles = Eigen::Map<const Eigen::Matrix3Xi>(corners.data(), 3, corners.shape(0));
+  if (!mesh.vertices.allFinite()) throw InputError("vertices: all coordinates must be finite");
+  require_vertex_numbers(mesh);
+  return mesh;
+}
+
+std::vector<double> pixels_from(const py::array& array, const std::string& name,
+                                const Eigen::Vector2i& pixels) {
+  if (array.ndim() != 2 || array.shape(0) != pixels.y() || array.shape(1) != pixels.x()) {
+    refuse(name, array,
+           "must be (" + std::to_string(pixels.y()) + ", " + std::to_string(pixels.x()) +
+               ") as the setup's pixels");
+  }
+  const Numbers values(array);
+  return {values.data(), values.data() + values.size()};
+}
+
+py::array view_of(const Image& image, const py::object& owner) {
+  return read_only(pixels_of(image, owner));
+}
+
+py::array view_of(const Eigen::Matrix3Xd& columns, const py::object& owner) {
+  return read_only(rows_of(columns, owner));
+}
+
+py::array view_of(const Eigen::Matrix3Xi& columns, const py::object& owner) {
+  return read_only(rows_of(columns, owner));
+}
+
+py::array array_of(Image&& image) {
+  auto held = std::make_unique<Image>(std::move(image));
+  const Image& kept = *held;
+  return pixels_of(kept, owner_of(std::move(held)));
+}
+
+py::array array_of(std::vector<double>&& values, const Eigen::Vector2i& pixels) {
+  auto held = std::make_unique<std::vector<double>>(std::move(values));
+  const double* const data = held->data();
+  return py::array_t<double>(
+      {static_cast<py::ssize_t>(pixels.y()), static_cast<py::ssize_t>(pixels.x())}, data,
+      owner_of(std::move(held)));
+}
+
+py::array array_of(Eigen::Matrix3Xd&& columns) {
+  auto held = std::make_unique<Eigen::Matrix3Xd>(std::move(columns));
+  const Eigen::Matrix3Xd& kept = *held;
+  return rows_of(kept, owner_of(std::move(held)));
+}
+
+}  // namespace lensforge::python

@@ -1,0 +1,242 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <pybind11/pybind11.h>
+#include <pybind11/stl/filesystem.h>
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "app/cam_settings.h"
+#include "app/design_output.h"
+#include "app/design_settings.h"
+#include "app/export_output.h"
+#include "app/export_settings.h"
+#include "app/output_folder.h"
+#include "app/python/arrays.h"
+#include "app/python/bindings.h"
+#include "app/python/keywords.h"
+#include "app/python/lens_object.h"
+#include "app/python/released_work.h"
+#include "cam/cam_job.h"
+#include "cam/cut_estimate.h"
+#include "cam/job_files.h"
+#include "cam/report/report_json.h"
+#include "core/error.h"
+#include "core/image/image_io.h"
+#include "core/io/folder_lock.h"
+#include "design/design_estimate.h"
+#include "design/flux_of_surface.h"
+#include "design/render_fields.h"
+#include "design/render_lens.h"
+#include "design/render_setup.h"
+
+/// The commands as functions: the same options, the same library call; what a command prints is
+/// returned.
+namespace lensforge::python {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// What stands on the command line where a function has an argument of its own.
+constexpr const char* kArgument = "picture";
+
+RunControl stopping_at(const std::stop_token& stop) { return {stop, {}}; }
+
+app::Arguments with(app::Arguments words, const app::Arguments& more) {
+  words.insert(words.end(), more.begin(), more.end());
+  return words;
+}
+
+// --- design
+
+bool is_path(const py::object& object) {
+  return py::isinstance<py::str>(object) || py::hasattr(object, "__fspath__");
+}
+
+/// @throw TypeError (Python's) for what numpy makes no array of.
+py::array array_from(const py::object& picture) {
+  py::array array = py::array::ensure(picture);
+  if (!array) throw py::type_error("picture: must be a path or an array");
+  return array;
+}
+
+py::object design(const py::object& picture, const app::Arguments& words) {
+  app::DesignSettings settings;
+  app::OptionSet options("design", "");
+  app::add_design_options(options, settings);
+  options.parse(with({kArgument, "--out=."}, words));
+  const Image given = is_path(picture) ? Image() : image_from(array_from(picture), kArgument);
+  settings.target = is_path(picture) ? picture.cast<fs::path>().string() : kArgument;
+  auto made = std::make_shared<LensObject>();
+  made->design = run_released([&](const std::stop_token& stop) {
+    const RunControl control = stopping_at(stop);
+    const Image target =
+        given.empty() ? read_image(settings.target, control, settings.design.pixels).image : given;
+    app::settle(options, settings, target);
+    const app::ChosenDevice device = options.device_executor();
+    require_room_for_design(target.columns(), target.rows(), settings.design,
+                            device.executor.concurrency(), settings.out);
+    DesignResult result = design_lens(target, settings.design, device.executor, control);
+    if (result.status == DesignResult::Status::kFailed) throw RunError(result.message);
+    result.lens.provenance = app::design_provenance(options, device, settings.design, result);
+    return result;
+  });
+  return py::cast(std::move(made));
+}
+
+// --- render
+
+/// Of a lens in one colour.
+const OptionTable<RenderOptions>& lens_render_fields() {
+  static const OptionTable<RenderOptions> table = [] {
+    OptionTable<RenderOptions> rows = render_fields();
+    std::erase_if(
+        rows, [](const auto& row) { return row.name == "--wavelengths" || row.name == "--abbe"; });
+    return rows;
+  }();
+  return table;
+}
+
+void add_render_options(app::OptionSet& options, RenderOptions& render) {
+  options.fields(lens_render_fields(), render);
+}
+
+/// What a lens projects, in its target's light.
+Image picture_of(const Lens& lens, const RenderOptions& render, const Executor& executor) {
+  const OpticalSetup& setup = render.setup;
+  const std::vector<double> flux =
+      render.model == SurfaceModel::kSpline
+          ? flux_of_lens(lens, setup, executor)
+          : flux_of_surface(lens.surface, setup, render.model, executor);
+  const double light = lens.target.total() / lens.setup.pixels.prod() * setup.pixels.prod();
+  Image image(setup.pixels.x(), setup.pixels.y());
+  for (std::size_t i = 0; i < flux.size(); ++i) {
+    image.values()[i] = static_cast<float>(light * flux[i]);
+  }
+  return image;
+}
+
+py::array render(const py::object& source, const app::Arguments& words) {
+  const py::object kept = lens_from(source);
+  const Lens& lens = kept.cast<const LensObject&>().lens();
+  RenderOptions chosen{.model = lens.model, .setup = lens.setup};
+  app::OptionSet options("render", "");
+  add_render_options(options, chosen);
+  options.parse(words);
+  if (chosen.model == SurfaceModel::kSpline && !lens.spline) {
+    throw InputError("--model spline: must be facet or smooth: the lens is no spline");
+  }
+  Image image = run_released([&](const std::stop_token& stop) {
+    require_wall_above(lens.surface, chosen.setup);
+    return picture_of(lens, chosen, options.device_executor().executor.with_stop(stop));
+  });
+  return array_of(std::move(image));
+}
+
+// --- cam
+
+py::object cam(const py::object& lens, const app::Arguments& words) {
+  app::CamSettings settings;
+  app::OptionSet options("cam", "");
+  app::add_cam_options(options, settings);
+  options.parse(with({kArgument}, words));
+  settings.source = folder_of(lens).string();
+  const CamResult result = run_released([&](const std::stop_token& stop) {
+    const FolderLock reading(settings.source, FolderLock::Kind::kShared);
+    const Lens designed = read_lens(settings.source);
+    app::settle(options, settings);
+    validate(settings.cam, designed.setup);
+    const Executor executor = options.executor();
+    require_room_for_cut(settings.cam, designed.setup,
+                         estimate_cut(settings.cam, designed.setup, executor.concurrency()),
+                         settings.folder());
+    const app::OutputFolder folder(settings.folder(), FolderLock::Kind::kExclusive);
+    folder.remove_partial_files(is_name_of_cut);
+    return make_cut(designed, settings.cam, folder.path(), executor, stopping_at(stop));
+  });
+  nlohmann::json cut = {{"warnings", result.report.warnings},
+                        {"files", nlohmann::json::array()},
+                        {"report", report_json(result.report)}};
+  for (const fs::path& file : result.files) cut["files"].push_back(file.string());
+  return object_from(cut);
+}
+
+// --- export
+
+py::object export_file(const py::object& lens, const fs::path& out, const app::Arguments& words) {
+  app::ExportSettings settings;
+  app::OptionSet options("export", "");
+  app::add_export_options(options, settings);
+  options.parse(with({kArgument, "--out=."}, words));
+  const fs::path folder = folder_of(lens);
+  const ExportResult result = run_released([&](const std::stop_token& stop) {
+    app::require_fitting_options(options, export_format(settings.options, out));
+    validate(settings.options, out);
+    const ExportSource source = read_export_source(folder, settings.surface);
+    const app::OutputFolder into(fs::absolute(out).parent_path(), FolderLock::Kind::kShared);
+    return export_lens(source, out, settings.options, options.executor().with_stop(stop),
+                       stopping_at(stop));
+  });
+  nlohmann::json report = app::export_report(result).json;
+  report["format"] = word_of(result.format);
+  report["within_tolerance"] = result.within_tolerance();
+  return object_from(report);
+}
+
+}  // namespace
+
+void add_commands(py::module_& module) {
+  const Keywords of_design =
+      Keywords::of("design", app::add_design_options, {"--out", "--live", "--resume", "--force"});
+  module.def(
+      "design",
+      [of_design](const py::object& picture, const py::kwargs& options) {
+        return design(picture, of_design.words(options));
+      },
+      py::arg("picture"),
+      ("design(picture, **options) -> Lens: shapes a lens that projects a picture.\n\n"
+       "picture: the path of a file, or an (H, W) array of floats, linear light, 1 is white.\n"
+       "Raises InputError, RunError. The options are those of lensforge design:\n" +
+       of_design.text())
+          .c_str());
+  const Keywords of_render = Keywords::of("render", add_render_options, {});
+  module.def(
+      "render",
+      [of_render](const py::object& lens, const py::kwargs& options) {
+        return render(lens, of_render.words(options));
+      },
+      py::arg("lens"),
+      ("render(lens, **options): what a Lens, or the one in a folder, projects.\n\n"
+       "Returns (H, W) float32, linear light, 1 is the target's white. The options are those of\n"
+       "lensforge render:\n" +
+       of_render.text())
+          .c_str());
+  const Keywords of_cam =
+      Keywords::of("cam", app::add_cam_options, {"--show-workshop", "--compare", "--device"});
+  module.def(
+      "cam",
+      [of_cam](const py::object& lens, const py::kwargs& options) {
+        return cam(lens, of_cam.words(options));
+      },
+      py::arg("lens"),
+      ("cam(lens, **options) -> dict: programs, milled surface and report, in the lens folder's\n"
+       "cam/.\n\nlens: a saved Lens or a lens folder's path. Returns \"files\", \"warnings\" and\n"
+       "\"report\", as report.json has it. The options are those of lensforge cam:\n" +
+       of_cam.text())
+          .c_str());
+  const Keywords of_export = Keywords::of("export", app::add_export_options, {"--out"});
+  module.def(
+      "export",
+      [of_export](const py::object& lens, const fs::path& out, const py::kwargs& options) {
+        return export_file(lens, out, of_export.words(options));
+      },
+      py::arg("lens"), py::arg("out"),
+      ("export(lens, out, **options) -> dict: writes a solid, mesh or height map.\n\n"
+       "lens: a saved Lens or a lens folder's path; out: the file, its ending says the format.\n"
+       "Returns what was written. The options are those of lensforge export:\n" +
+       of_export.text())
+          .c_str());
+}
+
+}  // namespace lensforge::python

@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Types of the module; help(lensforge.design) and its like list the options."""
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Union
+
+import numpy as np
+import numpy.typing as npt
+
+_Path = Union[str, "os.PathLike[str]"]
+_Option = Union[bool, int, float, _Path, Sequence[float]]
+_Linear = npt.NDArray[np.float32]
+
+__version__: str
+
+class InputError(ValueError):
+    """Bad input: names the option, array or file, its value and the rule that it broke."""
+
+class RunError(RuntimeError):
+    """Something outside of the program failed while it ran: a full disk, a lost file."""
+
+class Setup:
+    """Everything between the lamp and the wall but the surface."""
+
+    def __init__(self, columns: int, rows: int, **options: _Option) -> None: ...
+    @property
+    def pixels(self) -> tuple[int, int]: ...
+    @property
+    def lens_size(self) -> tuple[float, float]: ...
+    @property
+    def image_size(self) -> tuple[float, float]: ...
+    @property
+    def focal_length(self) -> float: ...
+    def to_dict(self) -> dict[str, Any]: ...
+
+class Lens:
+    """A designed lens: what design() returns, or what a lens folder holds."""
+
+    def __init__(self, folder: _Path) -> None: ...
+    @property
+    def vertices(self) -> npt.NDArray[np.float64]: ...
+    @property
+    def faces(self) -> npt.NDArray[np.int32]: ...
+    @property
+    def target(self) -> _Linear: ...
+    @property
+    def projected(self) -> _Linear: ...
+    @property
+    def setup(self) -> Setup: ...
+    @property
+    def model(self) -> str: ...
+    @property
+    def metrics(self) -> dict[str, dict[str, float]]: ...
+    @property
+    def provenance(self) -> dict[str, Any]: ...
+    @property
+    def folder(self) -> Path | None: ...
+    def save(self, folder: _Path, force: bool = False) -> None: ...
+    def _repr_png_(self) -> bytes: ...
+
+def design(picture: _Path | npt.NDArray[np.floating[Any]], **options: _Option) -> Lens: ...
+def render(lens: Lens | _Path, **options: _Option) -> _Linear: ...
+def cam(lens: Lens | _Path, **options: _Option) -> dict[str, Any]: ...
+def export(lens: Lens | _Path, out: _Path, **options: _Option) -> dict[str, Any]: ...
+def flux_image(
+    vertices: npt.NDArray[np.floating[Any]],
+    faces: npt.NDArray[np.integer[Any]],
+    setup: Setup,
+    model: str = "smooth",
+    threads: int = 0,
+) -> npt.NDArray[np.float64]: ...
+def flux_image_vjp(
+    vertices: npt.NDArray[np.floating[Any]],
+    faces: npt.NDArray[np.integer[Any]],
+    setup: Setup,
+    cotangent: npt.NDArray[np.floating[Any]],
+    model: str = "smooth",
+    threads: int = 0,
+) -> npt.NDArray[np.float64]: ...

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <pybind11/pybind11.h>
+
+#include <chrono>
+#include <future>
+#include <stop_token>
+#include <utility>
+
+#include "core/error.h"
+
+namespace lensforge::python {
+
+/// How often long work lets Python look for Ctrl-C; the work itself then ends within a second.
+inline constexpr std::chrono::milliseconds kSignalInterval{50};
+
+/// Runs `work(stop_token)` in a thread of its own, without the interpreter's lock, and returns what
+/// it returns. Ctrl-C, or whatever a signal handler raises, stops the work and is raised when it
+/// has ended. @pre `work` touches no Python object. @throw what `work` throws.
+template <class Work>
+auto run_released(Work&& work) {
+  namespace py = pybind11;
+  std::stop_source stop;
+  auto outcome = std::async(std::launch::async, [&] { return work(stop.get_token()); });
+  for (bool done = false; !done;) {
+    {
+      const py::gil_scoped_release released;
+      done = outcome.wait_for(kSignalInterval) == std::future_status::ready;
+    }
+    if (PyErr_CheckSignals() == 0) continue;
+    py::error_already_set raised;
+    stop.request_stop();
+    {
+      const py::gil_scoped_release released;
+      outcome.wait();
+    }
+    throw raised;
+  }
+  return outcome.get();
+}
+
+}  // namespace lensforge::python

@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The commands as functions: what they return, and what they leave in folders."""
+
+import struct
+import tempfile
+import unittest
+from pathlib import Path
+
+import numpy as np
+
+import lensforge
+import small_lens
+
+
+class Design(unittest.TestCase):
+    def test_lens_has_the_arrays_that_its_page_promises(self):
+        lens = small_lens.lens()
+        self.assertEqual(lens.vertices.dtype, np.float64)
+        self.assertEqual(lens.faces.dtype, np.int32)
+        self.assertEqual(lens.vertices.shape[1], 3)
+        self.assertEqual(lens.faces.shape[1], 3)
+        self.assertLess(lens.faces.max(), len(lens.vertices))
+        for picture in (lens.target, lens.projected):
+            self.assertEqual(picture.dtype, np.float32)
+            self.assertEqual(picture.shape, (24, 24))
+        self.assertEqual(lens.setup.pixels, (24, 24))
+        self.assertEqual(lens.setup.lens_size, (12.0, 12.0))
+        self.assertLess(lens.metrics[lens.model]["mae"], 0.05)
+
+    def test_its_arrays_are_the_librarys_own_memory_and_do_not_change(self):
+        lens = small_lens.lens()
+        for array in (lens.vertices, lens.faces, lens.target, lens.projected):
+            self.assertFalse(array.flags.owndata)
+            self.assertFalse(array.flags.writeable)
+        self.assertTrue(np.shares_memory(lens.vertices, lens.vertices))
+        self.assertTrue(np.shares_memory(lens.projected, lens.projected))
+
+    def test_a_view_outlives_its_lens(self):
+        picture = np.ones((8, 8), np.float32)
+        vertices = lensforge.design(picture, rounds=1, quality="draft").vertices
+        self.assertTrue(np.isfinite(vertices).all())
+
+    def test_a_picture_can_be_an_array(self):
+        by_array = lensforge.design(small_lens.lens().target, **small_lens.OPTIONS)
+        np.testing.assert_array_equal(by_array.target, small_lens.lens().target)
+        np.testing.assert_array_equal(by_array.vertices, small_lens.lens().vertices)
+
+    def test_its_provenance_says_what_it_was_made_with(self):
+        provenance = small_lens.lens().provenance
+        self.assertEqual(provenance["status"], "done")
+        self.assertEqual(provenance["options"]["pixels"], 24)
+
+    def test_it_shows_itself_as_a_picture(self):
+        png = small_lens.lens()._repr_png_()
+        self.assertEqual(png[:8], b"\x89PNG\r\n\x1a\n")
+        width, height = struct.unpack(">II", png[16:24])
+        self.assertGreater(width, 2 * height)
+        self.assertIn("24 x 24 pixels", repr(small_lens.lens()))
+
+
+class Folder(unittest.TestCase):
+    def setUp(self):
+        place = tempfile.TemporaryDirectory()
+        self.addCleanup(place.cleanup)
+        self.place = Path(place.name)
+
+    def test_a_saved_lens_reads_back_as_the_same(self):
+        lens = lensforge.design(small_lens.PICTURE, **small_lens.OPTIONS)
+        self.assertIsNone(lens.folder)
+        lens.save(self.place / "lens")
+        self.assertEqual(lens.folder, self.place / "lens")
+        read = lensforge.Lens(self.place / "lens")
+        np.testing.assert_array_equal(read.vertices, lens.vertices)
+        np.testing.assert_array_equal(read.faces, lens.faces)
+        np.testing.assert_array_equal(read.projected, lens.projected)
+        self.assertEqual(read.metrics, lens.metrics)
+        self.assertTrue((self.place / "lens" / "overview.png").exists())
+        with self.assertRaisesRegex(lensforge.InputError, "holds a lens already"):
+            read.save(self.place / "lens")
+        read.save(self.place / "lens", force=True)
+
+    def test_render_gives_the_lenss_picture_and_others(self):
+        lens = small_lens.lens()
+        picture = lensforge.render(lens)
+        self.assertEqual((picture.dtype, picture.shape), (np.float32, (24, 24)))
+        np.testing.assert_allclose(picture, lens.projected, rtol=1e-5, atol=1e-7)
+        large = lensforge.render(lens, pixels=48, model="facet")
+        self.assertEqual(large.shape, (48, 48))
+        self.assertAlmostEqual(float(large.mean() / lens.target.mean()), 1.0, delta=0.05)
+
+    def test_export_writes_the_file(self):
+        lens = lensforge.design(small_lens.PICTURE, **small_lens.OPTIONS)
+        lens.save(self.place / "lens")
+        report = lensforge.export(lens, self.place / "lens.stl")
+        self.assertEqual(report["format"], "stl")
+        self.assertGreater((self.place / "lens.stl").stat().st_size, 1000)
+
+    def test_cam_writes_programs_and_tells_of_them(self):
+        lens = lensforge.design(small_lens.PICTURE, **small_lens.OPTIONS)
+        lens.save(self.place / "lens")
+        cut = lensforge.cam(self.place / "lens", pitch=0.3, sample_spacing=0.03)
+        for file in cut["files"]:
+            self.assertTrue(Path(file).exists(), file)
+        self.assertIn("finish", [operation["name"] for operation in cut["report"]["operations"]])
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Bad input is a ValueError with the command's own line; a wrong keyword a TypeError."""
+
+import os
+import subprocess
+import tempfile
+import unittest
+from pathlib import Path
+
+import numpy as np
+
+import lensforge
+import small_lens
+
+FLAT = np.ones((8, 8), np.float32)
+
+
+class Errors(unittest.TestCase):
+    def assert_refused(self, text, function, *arguments, **options):
+        with self.assertRaises(lensforge.InputError) as caught:
+            function(*arguments, **options)
+        self.assertIsInstance(caught.exception, ValueError)
+        self.assertIn(text, str(caught.exception))
+        self.assertNotIn("\n", str(caught.exception))
+
+    def test_an_option_breaks_its_rule_in_the_commands_words(self):
+        with tempfile.TemporaryDirectory() as place:
+            command = [os.environ["LENSFORGE_COMMAND"], "design", small_lens.PICTURE, "--width=-1",
+                       "--out", Path(place) / "lens"]
+            told = subprocess.run(command, capture_output=True, text=True)
+        self.assertEqual(told.returncode, 2)
+        line = told.stderr.strip().removeprefix("lensforge: ")
+        with self.assertRaises(lensforge.InputError) as caught:
+            lensforge.design(small_lens.PICTURE, width=-1)
+        self.assertEqual(str(caught.exception), line)
+
+    def test_pictures(self):
+        self.assert_refused("nowhere.png", lensforge.design, "nowhere.png")
+        self.assert_refused("all black", lensforge.design, 0 * FLAT)
+        self.assert_refused("nan", lensforge.design, FLAT * np.nan)
+        self.assert_refused("not negative", lensforge.design, -FLAT)
+        self.assert_refused("must be (rows, columns) floats", lensforge.design, FLAT.astype(np.uint8))
+        self.assert_refused("must be (rows, columns) floats", lensforge.design, np.ones((8, 8, 3)))
+
+    def test_keywords(self):
+        with self.assertRaisesRegex(TypeError, "unexpected keyword argument 'wdth'"):
+            lensforge.design(FLAT, wdth=3)
+        with self.assertRaisesRegex(TypeError, "unexpected keyword argument 'out'"):
+            lensforge.design(FLAT, out="somewhere")
+        for options in ({"rounds": 1.5}, {"rounds": True}, {"fresnel": 1}, {"width": None}):
+            with self.assertRaises(TypeError):
+                lensforge.design(FLAT, **options)
+        self.assert_refused("--model", lensforge.design, FLAT, model="bumpy")
+
+    def test_arrays_of_a_mesh(self):
+        setup = lensforge.Setup(8, 8, width=10.0, focal=50.0)
+        points = np.array([[0.0, 0, 5], [1, 0, 5], [0, 1, 5]])
+        face = np.array([[0, 1, 2]])
+        flux = lensforge.flux_image
+        self.assertGreater(flux(points, face, setup).sum(), 0.0)
+        self.assert_refused("must be (n, 3) floats", flux, points[:, :2], face, setup)
+        self.assert_refused("must be (n, 3) integers", flux, points, face.astype(float), setup)
+        self.assert_refused("vertex number 3", flux, points, face + 1, setup)
+        self.assert_refused("vertex number -1", flux, points, face - 1, setup)
+        self.assert_refused("finite", flux, points + np.inf, face, setup)
+        self.assert_refused("model", flux, points, face, setup, "spline")
+        self.assert_refused("--focal", flux, points + 100, face, setup)
+        self.assert_refused("must be (8, 8)", lensforge.flux_image_vjp, points, face, setup,
+                            np.ones((8, 9)))
+
+    def test_setups(self):
+        self.assert_refused("columns 0", lensforge.Setup, 0, 8)
+        self.assert_refused("--focal", lensforge.Setup, 8, 8, focal=1.0)
+
+    def test_folders(self):
+        self.assert_refused("nowhere", lensforge.Lens, "nowhere")
+        self.assert_refused("save() it first", lensforge.cam, small_lens.lens())
+
+
+if __name__ == "__main__":
+    unittest.main()
