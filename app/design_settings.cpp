@@ -9,6 +9,7 @@
 #include "core/error.h"
 #include "core/image/image_io.h"
 #include "design/design_fields.h"
+#include "design/front_setup.h"
 #include "design/outline_setup.h"
 #include "design/source_setup.h"
 
@@ -104,6 +105,8 @@ void settle(OptionSet& options, DesignSettings& settings, const Image& picture) 
   if (!settings.source_picture.empty()) {
     settings.design.light.source_shape = shape_of(read_image(settings.source_picture).image);
   }
+  LightOptions& light = settings.design.light;
+  if (!light.front_file.empty()) light.front_heights = front_from(light.front_file, {});
   if (!settings.outline.empty()) settings.design.outline = outline_from(settings.outline, {});
   if (!settings.made_by.empty()) settings.design.made_by = process_of(workshop, settings);
   validate(settings.design, picture);

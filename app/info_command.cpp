@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <variant>
 
 #include "app/command_line.h"
 #include "app/commands.h"
@@ -89,6 +90,13 @@ std::string front_text(const SphericalFront& front) {
          fixed(std::abs(front.radius), 2) + " mm, its apex at " + place_text(front.apex) + " mm";
 }
 
+std::string front_text(const HeightFront& front) {
+  const HeightSpline& spline = *front.spline;
+  return "height map of " + size_text(spline.grid().columns, spline.grid().rows) + " samples, z " +
+         fixed(static_cast<double>(spline.lowest()), 3) + " to " +
+         fixed(static_cast<double>(spline.highest()), 3) + " mm";
+}
+
 /// How much wider than the lens the front has to be, so that all of the surface is lit.
 void describe_overhang(Description& d, const Lens& lens) {
   if (!lens.setup.front) return;
@@ -108,7 +116,9 @@ void describe_setup(Description& d, const OpticalSetup& setup) {
                                           ", colours " + spectrum_text(setup.spectrum) + " nm") +
              (setup.fresnel ? ", what its faces reflect is counted" : ""));
   if (setup.outline) d.line("outline", outline_words(*setup.outline));
-  if (setup.front) d.line("front", front_text(*setup.front));
+  if (setup.front) {
+    d.line("front", std::visit([](const auto& front) { return front_text(front); }, *setup.front));
+  }
   d.line("wall", "z = " + fixed(setup.focal_length, 2) + " mm, picture " +
                      fixed(setup.image_size.x(), 2) + " x " + fixed(setup.image_size.y(), 2) +
                      " mm, seen from the " + (setup.view == ViewSide::kFront ? "front" : "rear"));

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <variant>
 
 #include "cam/cam_fields.h"
 #include "cam/finish_setup.h"
@@ -83,13 +84,14 @@ void validate_front(const CamOptions& options, const OpticalSetup& setup) {
   if (!setup.front || options.part != PartKind::kLens) return;
   if (options.z_zero == ZZero::kTable) {
     throw InputError(
-        "--z-zero table: the lens's front is a sphere, which has no plane to lie on; use stock or "
-        "lens");
+        "--z-zero table: the lens's front is curved and has no plane to lie on; use stock or lens");
   }
+  const auto* const sphere = std::get_if<SphericalFront>(&*setup.front);
+  if (sphere == nullptr) return;  // A height map goes on straight beyond the lens.
   const double margin = options.workshop.stock.margin;
   const Eigen::Vector2d middle = 0.5 * setup.lens_size;
-  const Eigen::Vector2d reach = (setup.front->apex.head<2>() - middle).cwiseAbs() + middle;
-  const double radius = std::abs(setup.front->radius);
+  const Eigen::Vector2d reach = (sphere->apex.head<2>() - middle).cwiseAbs() + middle;
+  const double radius = std::abs(sphere->radius);
   if ((reach.array() + margin).matrix().norm() < radius) return;
   // (x + m)² + (y + m)² = R², rounded down.
   const double sum = reach.sum();

@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <variant>
 
+#include "core/io/lens_folder.h"
 #include "core/optics/fresnel.h"
 #include "core/optics/front_placement.h"
 #include "core/page/html_text.h"
@@ -33,28 +35,43 @@ std::string up_words(PartKind part, const Lens& lens) {
     return "underside down, which needs no polish; the mirror's surface is cut from above";
   }
   if (lens.setup.front) {
-    return "polished spherical face down, in a nest; the optical surface is cut from above";
+    const bool sphere = std::holds_alternative<SphericalFront>(*lens.setup.front);
+    return std::string("polished ") + (sphere ? "spherical" : "curved") +
+           " face down, in a nest; the optical surface is cut from above";
   }
   return "polished flat face down; the optical surface is cut from above";
 }
 
-/// Where the front of the blank has to lie, and what comes of it where it does not.
-std::string front_words(const CutPlan& plan, const Lens& lens) {
-  const SphericalFront& front = lens.setup.front.value();
-  const Eigen::Vector2d middle = 0.5 * lens.setup.lens_size;
-  const double top = lens.surface.vertices.row(2).mean();
-  const double shift = shift_by_front(lens.setup, {middle.x(), middle.y(), top});
+/// Where a front lies in the program's coordinates.
+std::string place_words(const CutPlan& plan, const SphericalFront& front) {
   return std::string(front.radius > 0.0 ? "bulging" : "hollow") + " sphere of radius " +
          mm(std::abs(front.radius), 2) + ", there before the first cut: its apex lies at X " +
          decimal_text(front.apex.x(), 3) + " Y " + decimal_text(front.apex.y(), 3) + " Z " +
          decimal_text(front.apex.z() + plan.z_offset(), 3) + " of the program, " +
-         mm(plan.blank().max().z() - front.apex.z(), 3) +
-         " below the top of the blank; 0.1 mm aside moves the picture by " + mm(0.1 * shift, 3) +
+         mm(plan.blank().max().z() - front.apex.z(), 3) + " below the top of the blank";
+}
+std::string place_words(const CutPlan& plan, const HeightFront& front) {
+  return joined({"height map, there before the first cut: the corner of ", lens_file::kFront,
+                 " at its lower left lies at X 0.000 Y 0.000, that at its upper right at X ",
+                 decimal_text(front.size.x(), 3), " Y ", decimal_text(front.size.y(), 3),
+                 ", its height 0 at Z ", decimal_text(plan.z_offset(), 3), " of the program, ",
+                 mm(plan.blank().max().z(), 3), " below the top of the blank; beyond the lens it ",
+                 "goes on straight"});
+}
+
+/// Where the front of the blank has to lie, and what comes of it where it does not.
+std::string front_words(const CutPlan& plan, const Lens& lens) {
+  const Eigen::Vector2d middle = 0.5 * lens.setup.lens_size;
+  const double top = lens.surface.vertices.row(2).mean();
+  const double shift = shift_by_front(lens.setup, {middle.x(), middle.y(), top});
+  return std::visit([&plan](const auto& front) { return place_words(plan, front); },
+                    lens.setup.front.value()) +
+         "; 0.1 mm aside moves the picture by " + mm(0.1 * shift, 3) +
          ". The nest may reach up to Z " + decimal_text(plan.z_offset(), 3) + ", no higher";
 }
 
 /// The blank with what of its front lies below z = 0.
-Eigen::AlignedBox3d whole_box(const CutPlan& plan, const SphericalFront& front) {
+Eigen::AlignedBox3d whole_box(const CutPlan& plan, const Front& front) {
   Eigen::AlignedBox3d blank = plan.blank();
   blank.min().z() =
       std::min(blank.min().z(), lowest_of(front, {Eigen::Vector2d(blank.min().head<2>()),
@@ -177,7 +194,8 @@ ParameterGroup outline_parameters(const CutPlan& plan) {
 std::string sampling_words(const CamOptions& options) {
   const Eigen::Vector2d spacings = sample_spacings(options);
   if (spacings.x() == spacings.y()) return mm(spacings.x(), 4);
-  return mm(spacings.minCoeff(), 4) + " across the passes, " + mm(spacings.maxCoeff(), 4) + " along";
+  return mm(spacings.minCoeff(), 4) + " across the passes, " + mm(spacings.maxCoeff(), 4) +
+         " along";
 }
 
 ParameterGroup polish_parameters(const CamOptions& options) {

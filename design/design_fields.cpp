@@ -5,7 +5,6 @@
 #include <string>
 #include <vector>
 
-#include "core/error.h"
 #include "core/image/image_io.h"
 #include "core/optics/dispersion.h"
 #include "core/text/number_list.h"
@@ -79,33 +78,41 @@ LightField wavelengths() {
           {}};
 }
 
-/// "flat" or "sphere:R".
+std::string front_text(const LightOptions& o) {
+  if (!o.front_file.empty()) return o.front_file;
+  return o.front_radius ? kSphere + shortest_text(*o.front_radius) : "flat";
+}
+
+/// "flat", "sphere:R", or the name of a file.
 LightField front() {
   const char* const name = "--front";
-  const auto get = [](const LightOptions& o) {
-    return nlohmann::json(o.front_radius ? kSphere + shortest_text(*o.front_radius) : "flat");
-  };
+  const auto get = [](const LightOptions& o) { return nlohmann::json(front_text(o)); };
   const auto set = [name](LightOptions& o, const nlohmann::json& value) {
     o.front_radius.reset();
+    o.front_file.clear();
     const auto text = value.get<std::string>();
-    if (text == "flat") return;
-    if (!text.starts_with(kSphere)) {
-      throw InputError(name + (" '" + text) +
-                       "': must be flat or sphere:R, R a radius in mm; flat "
-                       "would do");
+    if (text.starts_with(kSphere)) {
+      o.front_radius = parse_length_mm(text.substr(kSphere.size()), name);
+    } else if (text != "flat") {
+      o.front_file = text;
     }
-    o.front_radius = parse_length_mm(text.substr(kSphere.size()), name);
+  };
+  // A fingerprint goes by what a file holds.
+  const auto stored = [](const LightOptions& o) {
+    return nlohmann::json(o.front_file.empty() ? front_text(o) : "heights");
   };
   return {{name,
            OptionKind::kText,
-           "face of a lens where the light enters: flat, or a sphere of radius R, mm; above 0 it "
-           "bulges towards the light, below 0 it is hollow",
+           "face of a lens where the light enters: flat; a sphere of radius R, mm, above 0 "
+           "bulging towards the light, below 0 hollow; or a height map, a picture of floats: z in "
+           "mm, 0 or below, its outermost samples on the lens's edges, its top row at the greatest "
+           "y, its left column at x 0",
            {},
-           "flat|sphere:R",
+           "flat|sphere:R|FILE",
            {}},
           get,
           set,
-          get,
+          stored,
           {}};
 }
 

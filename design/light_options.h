@@ -2,8 +2,11 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <memory>
 #include <optional>
+#include <string>
 
+#include "core/optics/height_spline.h"
 #include "core/optics/optical_setup.h"
 
 namespace lensforge {
@@ -30,12 +33,14 @@ struct LightOptions {
   double incidence = 0.0;  ///< Of parallel light on a mirror, degrees from its z axis, in x.
   SourceKind source = SourceKind::kParallel;
   std::optional<double> front_radius;  ///< Of a spherical front, mm, convex above 0; none: flat.
-  std::optional<Eigen::Vector3d> source_position;  ///< Of a point source, mm, lens frame.
-  Emission emission = Emission::kIsotropic;        ///< Of a point source.
-  double source_angle = 0.0;                       ///< Full angle of parallel light, mrad.
-  double source_size = 0.0;                        ///< Diameter of a point source, mm.
-  SourceShape source_shape;                        ///< Of a source with an angle or a size.
-  bool fresnel = false;                            ///< A lens's faces reflect a part of it.
+  std::string front_file;              ///< Of a front that is a height map, which it names.
+  std::shared_ptr<const HeightSpline> front_heights;  ///< What that holds.
+  std::optional<Eigen::Vector3d> source_position;     ///< Of a point source, mm, lens frame.
+  Emission emission = Emission::kIsotropic;           ///< Of a point source.
+  double source_angle = 0.0;                          ///< Full angle of parallel light, mrad.
+  double source_size = 0.0;                           ///< Diameter of a point source, mm.
+  SourceShape source_shape;                           ///< Of a source with an angle or a size.
+  bool fresnel = false;                               ///< A lens's faces reflect a part of it.
   Spectrum spectrum;         ///< Its colours; none: all has DesignOptions::ior.
   double image_width = 0.0;  ///< Picture on the screen, mm; 0: the lens's.
   /// From where a flat surface's chief ray meets the screen to the picture's centre, mm along the

@@ -15,6 +15,7 @@
 #include "core/text/number_list.h"
 #include "core/text/number_text.h"
 #include "core/value_slope.h"
+#include "design/front_setup.h"
 #include "design/outline_setup.h"
 #include "design/source_setup.h"
 
@@ -98,36 +99,17 @@ void require_source(const DesignOptions& o, const Eigen::Vector2d& size) {
 
 std::string front_text(double radius) { return "--front sphere:" + number_text(radius); }
 
-/// Height of the start surface over its lowest point, in depths of the front, and more: with less,
-/// radii are let through (and advised) behind which no start is found.
-constexpr double kStartRise = 2.0;
-
-/// True if light comes to a point of the start surface, and gets out.
-bool start_works(const OpticalSetup& setup, const LightPath& light, const Eigen::Vector3d& p) {
-  const Eigen::Vector2d slope = light.gradient_for(p, light.land_from_start(p));
-  const Eigen::Vector3d n = Eigen::Vector3d(-slope.x(), -slope.y(), 1.0).normalized();
-  return slope.allFinite() && light.transmits(p, n) && !is_shadowed(setup, p.head<2>());
-}
-
 /// True if the front is lit as a whole, and the surface that a design starts from lets its light
 /// out.
 bool front_works(const DesignOptions& o, const Eigen::Vector2i& pixels, double radius) {
+  constexpr int kCells = 16;
   if (!(std::abs(radius) > 0.5 * lens_size(o, pixels).norm())) return false;
   DesignOptions other = o;
   other.light.front_radius = radius;
   const OpticalSetup setup = optical_setup(other, pixels);
-  const LightPath light(setup);
   const FrontSurface front(*setup.front);
   const double depth = std::abs(front.height({0.0, 0.0}) - front.height(0.5 * setup.lens_size));
-  constexpr int kCells = 16;
-  for (int k = 0; k < (kCells + 1) * (kCells + 1); ++k) {
-    const Eigen::Vector2d share(k % (kCells + 1), k / (kCells + 1));
-    const Eigen::Vector2d place = setup.lens_size.cwiseProduct(share) / kCells;
-    for (const double rise : {0.0, kStartRise * depth}) {
-      if (!start_works(setup, light, {place.x(), place.y(), o.thickness + rise})) return false;
-    }
-  }
-  return true;
+  return start_works(setup, o.thickness, depth, kCells);
 }
 
 /// The next radius of two digits that works.
@@ -142,32 +124,45 @@ std::string working_front(const DesignOptions& o, const Eigen::Vector2i& pixels,
   return "--front flat would do";
 }
 
-void require_front(const DesignOptions& o, const Eigen::Vector2i& pixels) {
-  if (!o.light.front_radius) return;
-  const double radius = *o.light.front_radius;
+/// @throw InputError if the source lies inside the part.
+void require_source_outside(const DesignOptions& o, const OpticalSetup& setup) {
+  if (o.light.source != SourceKind::kPoint) return;
+  const FrontSurface front(*setup.front);
+  const Eigen::Vector3d& from = *o.light.source_position;
+  const Eigen::AlignedBox2d plan(Eigen::Vector2d(0.0, 0.0), setup.lens_size);
+  if (!plan.contains(from.head<2>()) || from.z() < front.height(from.head<2>())) return;
+  refuse(
+      "--source-position " + text_of(from),
+      "lies inside the part, whose front is at z = " + number_text(front.height(from.head<2>())) +
+          " there; --source-position " + usual_position(o, setup.lens_size) + " would do");
+}
+
+void require_sphere(const DesignOptions& o, const Eigen::Vector2i& pixels, double radius) {
   const std::string given = front_text(radius);
-  if (is_mirror(o)) refuse(given, "is of a lens; --front flat would do with --mode reflect");
   if (!(std::abs(radius) <= kMaxFrontRadius)) refuse(given, "is flat; --front flat would do");
   const Eigen::Vector2d size = lens_size(o, pixels);
   if (!(std::abs(radius) > 0.5 * size.norm())) {
     refuse(given, "the sphere is too small for the lens, whose half diagonal is " +
                       number_text(0.5 * size.norm()) + " mm; " + working_front(o, pixels, radius));
   }
-  if (o.light.source == SourceKind::kPoint) {
-    const FrontSurface front(spherical_front(radius, size));
-    const Eigen::Vector3d& from = *o.light.source_position;
-    const Eigen::AlignedBox2d plan(Eigen::Vector2d(0.0, 0.0), size);
-    if (plan.contains(from.head<2>()) && !(from.z() < front.height(from.head<2>()))) {
-      refuse("--source-position " + text_of(from), "lies inside the part, whose front is at z = " +
-                                                       number_text(front.height(from.head<2>())) +
-                                                       " there; --source-position " +
-                                                       usual_position(o, size) + " would do");
-    }
-  }
+  require_source_outside(o, optical_setup(o, pixels));
   if (!front_works(o, pixels, radius)) {
     refuse(given, "light passes a part of the front by, or is reflected totally behind it; " +
                       working_front(o, pixels, radius));
   }
+}
+
+void require_front(const DesignOptions& o, const Eigen::Vector2i& pixels) {
+  const bool map = !o.light.front_file.empty();
+  if (!map && !o.light.front_radius) return;
+  const std::string given =
+      map ? "--front " + o.light.front_file : front_text(*o.light.front_radius);
+  if (is_mirror(o)) refuse(given, "is of a lens; --front flat would do with --mode reflect");
+  if (!map) return require_sphere(o, pixels, *o.light.front_radius);
+  LF_CHECK(o.light.front_heights != nullptr, given);
+  const OpticalSetup setup = optical_setup(o, pixels);
+  require_source_outside(o, setup);
+  require_height_map(setup, o.thickness, given);
 }
 
 /// Turns the screen's vectors.
@@ -365,6 +360,9 @@ OpticalSetup optical_setup(const DesignOptions& options, const Eigen::Vector2i& 
   setup.view = options.view;
   if (options.light.front_radius) {
     setup.front = spherical_front(*options.light.front_radius, setup.lens_size);
+  }
+  if (options.light.front_heights) {
+    setup.front = HeightFront{options.light.front_heights, setup.lens_size};
   }
   if (options.light.source == SourceKind::kPoint) {
     setup.point = PointSource{options.light.source_position.value(), options.light.emission};

@@ -29,7 +29,9 @@ std::vector<double> render_flux(const SurfaceMesh& mesh, const OpticalSetup& set
   const auto triangles = buffer_of(executor, numbers(mesh.triangles));
   const auto vertices = buffer_of(executor, numbers(mesh.vertices));
   // Without rays: those of a spline's four million nodes would take 0.5 GB.
-  const SurfaceView surface{triangles.data(), vertices.data(), light_on(mesh, setup), {}};
+  typename Exec::template Buffer<double> front;
+  const LightPath light = light_for(executor, light_on(mesh, setup), front);
+  const SurfaceView surface{triangles.data(), vertices.data(), light, {}};
   FluxImageOn<Exec> image(setup.pixels.x(), setup.pixels.y());
   std::vector<double> flux(static_cast<std::size_t>(setup.pixels.prod()));
   const std::int64_t count = mesh.triangle_count();

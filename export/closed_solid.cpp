@@ -209,7 +209,7 @@ void require_rectangle(const SurfaceMesh& surface, const std::vector<int>& outli
 }
 
 SurfaceMesh closed_solid(const SurfaceMesh& surface, const std::string& name,
-                         const std::optional<SphericalFront>& front) {
+                         const std::optional<Front>& front) {
   const std::vector<int> loop = height_field_outline(surface, name);
   if (front) return solid_on(FrontSurface(*front), surface, loop, name);
   if (is_seen_from_middle(surface, loop)) return solid_around_middle(surface, loop);

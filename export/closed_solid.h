@@ -25,7 +25,7 @@ void require_rectangle(const SurfaceMesh& surface, const std::vector<int>& outli
 /// of an outline that is not seen from its middle, has the surface's vertices in x and y.
 /// @throw InputError as height_field_outline(), or if the surface reaches down to the front.
 SurfaceMesh closed_solid(const SurfaceMesh& surface, const std::string& name,
-                         const std::optional<SphericalFront>& front = {});
+                         const std::optional<Front>& front = {});
 
 /// Volume enclosed by a closed mesh whose triangles face outwards, mm³.
 double enclosed_volume(const SurfaceMesh& solid);

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <ctime>
 #include <utility>
+#include <variant>
 
 #include "core/error.h"
 #include "core/image/image_io.h"
@@ -111,8 +112,13 @@ PictureGoal goal_of(const WantedPicture& wanted, const OpticalSetup& setup) {
   return goal;
 }
 
+/// @param control_points  of the surface; those of a front that is a height map come on top.
 void announce_splines(const Job& job, std::int64_t control_points) {
-  const auto points = static_cast<double>(control_points);
+  auto points = static_cast<double>(control_points);
+  const std::optional<Front>& front = job.source.lens.setup.front;
+  if (const auto* const map = front ? std::get_if<HeightFront>(&*front) : nullptr) {
+    points += static_cast<double>(map->spline->coefficients().size());
+  }
   job.announce(require_room_for(&spline_solid_work, {"--max-points", points}, job.folder()));
 }
 
@@ -154,6 +160,12 @@ SampledSurface part_of(const Job& job) { return lens_part(job.source.lens, job.e
 SplineSolid write_splines(const Job& job) {
   const Lens& lens = job.source.lens;
   const std::string name = job.source.file.string();
+  if (lens.setup.outline && lens.setup.front &&
+      std::holds_alternative<HeightFront>(*lens.setup.front)) {
+    throw InputError(name +
+                     ": a solid of splines has either an outline or a height map for a front, not "
+                     "both; export a mesh instead, as --out lens.stl");
+  }
   require_rectangle(lens.surface, height_field_outline(lens.surface, name), name);
   const double mesh_volume =
       enclosed_volume(closed_solid(part_of(job).mesh, name, lens.setup.front));

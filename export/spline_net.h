@@ -97,8 +97,9 @@ struct SplineNet {
   std::vector<SplinePatch> patches;  ///< Patch (column, row) is row·columns + column.
   std::vector<SplineEdge> edges_u;   ///< Along u: (column, line) is line·columns + column.
   std::vector<SplineEdge> edges_v;   ///< Along v: (line, row) is row·(columns + 1) + line.
-  /// The face below; none: the plane z = 0. @pre its radius is longer than half of the diagonal.
-  std::optional<SphericalFront> front;
+  /// The face below; none: the plane z = 0. @pre a sphere's radius is longer than half of the
+  /// diagonal, a height map spans the rectangle.
+  std::optional<Front> front;
   /// The edge of the solid; none: the rectangle. @pre with an outline there is one patch.
   std::optional<Outline> outline;
 

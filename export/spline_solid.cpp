@@ -18,7 +18,9 @@
 #include <cmath>
 #include <gp_Circ.hxx>
 #include <gp_Pln.hxx>
+#include <variant>
 
+#include "export/front_solid.h"
 #include "export/solid_geometry.h"
 #include "export/trimmed_solid.h"
 
@@ -49,6 +51,7 @@ gp_Dir outwards_of(int side) {
 class SolidBuilder {
  public:
   explicit SolidBuilder(const SplineNet& net) : net_(net) {
+    if (is_height_map()) back_ = patch_of(std::get<HeightFront>(*net_.front));
     make_vertices();
     make_edges();
   }
@@ -156,16 +159,36 @@ class SolidBuilder {
     const TopoDS_Vertex& from = back_vertices_[static_cast<std::size_t>(side)];
     const TopoDS_Vertex& to = back_vertices_[static_cast<std::size_t>((side + 1) % 4)];
     if (!net_.front) return BRepBuilderAPI_MakeEdge(from, to).Edge();
+    if (is_height_map()) return make_edge(rim_curve(side), from, to);
     const gp_Pnt start = foot(side);
     const gp_Pnt end = foot(side + 1);
     const gp_Dir outwards = outwards_of(side);
-    const gp_Pnt centre = sphere_of(*net_.front).Location();
+    const gp_Pnt centre = sphere_of(std::get<SphericalFront>(*net_.front)).Location();
     const double off = gp_Vec(centre, start).Dot(outwards);
     const gp_Pnt middle = centre.Translated(off * gp_Vec(outwards));
     // The shorter of the two arcs between the corners runs counter-clockwise about this axis.
     const gp_Dir axis = gp_Vec(middle, start).Crossed(gp_Vec(middle, end));
     const gp_Circ circle(gp_Ax2(middle, axis, gp_Vec(middle, start)), middle.Distance(start));
     return BRepBuilderAPI_MakeEdge(circle, from, to).Edge();
+  }
+
+  [[nodiscard]] bool is_height_map() const {
+    return net_.front && std::holds_alternative<HeightFront>(*net_.front);
+  }
+
+  /// The height map's edge along a side, counter-clockwise around the rectangle.
+  [[nodiscard]] Handle(Geom_BSplineCurve) rim_curve(int side) const {
+    const bool along_u = side % 2 == 0;
+    SplineEdge edge{along_u ? back_.cells_u : back_.cells_v, {}};
+    edge.coefficients.resize(3, edge.cells + kDegree);
+    for (Eigen::Index axis = 0; axis < 3; ++axis) {
+      const Eigen::MatrixXd& c = back_.coefficients[static_cast<std::size_t>(axis)];
+      const Eigen::VectorXd line =
+          along_u ? Eigen::VectorXd(c.col(side == 0 ? 0 : c.cols() - 1))
+                  : Eigen::VectorXd(c.row(side == 1 ? c.rows() - 1 : 0).transpose());
+      edge.coefficients.row(axis) = (side < 2 ? line : Eigen::VectorXd(line.reverse())).transpose();
+    }
+    return curve_of(edge, 0.0, back_.box.max()[along_u ? 0 : 1]);
   }
 
   void add_pcurve(const TopoDS_Edge& edge, int axis, double line, const TopoDS_Face& face) {
@@ -226,28 +249,51 @@ class SolidBuilder {
   void add_back() {
     Edges edges;
     for (std::size_t i = 4; i-- > 0;) edges.push_back(back_edges_[i].Reversed());
+    if (is_height_map()) return add_height_map(edges);
     if (net_.front) return add_sphere(edges);
     const gp_Pln plane(foot(0), gp_Dir(0.0, 0.0, -1.0));
     add_face(BRepBuilderAPI_MakeFace(plane, make_wire(edges)).Face(), "back");
   }
 
-  void add_sphere(const Edges& edges) {
+  void add_height_map(const Edges& edges) {
     TopoDS_Face face;
-    builder_.MakeFace(face, new Geom_SphericalSurface(sphere_of(*net_.front)),
-                      Precision::Confusion());
+    builder_.MakeFace(face, surface_of(back_), Precision::Confusion());
+    const Eigen::Vector2d& size = back_.box.max();
+    const std::array starts{gp_Pnt2d(0.0, 0.0), gp_Pnt2d(size.x(), 0.0),
+                            gp_Pnt2d(size.x(), size.y()), gp_Pnt2d(0.0, size.y())};
+    const std::array ways{gp_Dir2d(1.0, 0.0), gp_Dir2d(0.0, 1.0), gp_Dir2d(-1.0, 0.0),
+                          gp_Dir2d(0.0, -1.0)};
+    for (std::size_t side = 0; side < 4; ++side) {
+      const Handle(Geom2d_Line) pcurve = new Geom2d_Line(starts[side], ways[side]);
+      builder_.UpdateEdge(back_edges_[side], pcurve, face, Precision::Confusion());
+    }
+    add_turned(face, edges);
+  }
+
+  /// A back whose own normal points up, into the solid.
+  void add_turned(TopoDS_Face& face, const Edges& edges) {
+    TopoDS_Wire wire = make_wire(edges);
+    wire.Reverse();
+    builder_.Add(face, wire);
+    face.Reverse();
+    add_face(face, "back");
+  }
+
+  void add_sphere(const Edges& edges) {
+    const auto& front = std::get<SphericalFront>(*net_.front);
+    TopoDS_Face face;
+    builder_.MakeFace(face, new Geom_SphericalSurface(sphere_of(front)), Precision::Confusion());
     for (const TopoDS_Shape& edge : edges) {
       ShapeFix_Edge().FixAddPCurve(TopoDS::Edge(edge), face, false, Precision::Confusion());
     }
     // A sphere's own normal points away from its centre, which lies below a hollow front.
-    const bool hollow = net_.front->radius < 0.0;
-    TopoDS_Wire wire = make_wire(edges);
-    if (hollow) wire.Reverse();
-    builder_.Add(face, wire);
-    if (hollow) face.Reverse();
+    if (front.radius < 0.0) return add_turned(face, edges);
+    builder_.Add(face, make_wire(edges));
     add_face(face, "back");
   }
 
   const SplineNet& net_;
+  SplinePatch back_;  ///< Of a front that is a height map.
   BRep_Builder builder_;
   TopoDS_Shell shell_;
   NamedSolid result_;

@@ -22,6 +22,7 @@
 #include <numbers>
 #include <string>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "core/error.h"
@@ -77,6 +78,10 @@ class TrimmedSolid {
  private:
   using Edges = std::vector<TopoDS_Shape>;
 
+  [[nodiscard]] const SphericalFront& sphere() const {
+    return std::get<SphericalFront>(*net_.front);
+  }
+
   [[nodiscard]] std::size_t after(std::size_t k) const { return (k + 1) % walls_.size(); }
 
   /// The point of the patch above a place; places follow each other closely.
@@ -98,7 +103,7 @@ class TrimmedSolid {
     const FrontPoint front = front_.at(xy);
     const Eigen::Vector2d along = wall.along(t);
     const Eigen::Vector3d point(xy.x(), xy.y(), front.z);
-    return point_on_sphere(*net_.front, point, {along.x(), along.y(), front.gradient.dot(along)});
+    return point_on_sphere(sphere(), point, {along.x(), along.y(), front.gradient.dot(along)});
   }
 
   WallEdges curves_of(const OutlineWall& wall) {
@@ -240,13 +245,12 @@ class TrimmedSolid {
 
   void add_sphere() {
     TopoDS_Face face;
-    builder_.MakeFace(face, new Geom_SphericalSurface(sphere_of(*net_.front)),
-                      Precision::Confusion());
+    builder_.MakeFace(face, new Geom_SphericalSurface(sphere_of(sphere())), Precision::Confusion());
     for (const WallEdges& edges : edges_) {
       builder_.UpdateEdge(edges.back, edges.back_curve.plan, face, kRimTolerance);
     }
     // A sphere's own normal points away from its centre, which lies below a hollow front.
-    const bool hollow = net_.front->radius < 0.0;
+    const bool hollow = sphere().radius < 0.0;
     TopoDS_Wire wire = make_wire(back_rim());
     if (hollow) wire.Reverse();
     builder_.Add(face, wire);

@@ -7,7 +7,8 @@ namespace lensforge {
 
 /// The solid of a net of one patch that is cut along the net's outline: one optical face, a plane
 /// for every straight wall, a cylinder for every quarter of a circle, and the face below.
-/// @pre net.outline. @throw RunError if the outline leaves the patch.
+/// @pre net.outline; no front that is a height map. @throw RunError if the outline leaves the
+/// patch.
 NamedSolid make_trimmed_solid(const SplineNet& net);
 
 }  // namespace lensforge

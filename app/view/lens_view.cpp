@@ -3,7 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <string>
 #include <utility>
+#include <variant>
 
 #include "app/view/cut_folder.h"
 #include "core/error.h"
@@ -20,6 +23,8 @@ namespace fs = std::filesystem;
 
 /// Nodes of a spline at most: more would not fit a page of 25 MB.
 constexpr double kMostNodes = 480e3;
+/// Samples of a height map, 4 bytes each in a page.
+constexpr std::size_t kMostHeights = 1'000'000;
 
 /// The surface with the normals that send its light: none of facets.
 SampledSurface surface_of(const Lens& lens) {
@@ -41,6 +46,14 @@ double storage_error(const SampledSurface& stored, const OpticalSetup& setup, co
     evaluate(stored.mesh, setup, SurfaceModel::kFacet, target, &drawn, executor);
   }
   return compare(drawn, picture).mae;
+}
+
+/// @throw InputError if a height map would not fit a page of 25 MB beside the surfaces.
+void require_small_front(const OpticalSetup& setup, const std::string& name) {
+  const auto* const map = setup.front ? std::get_if<HeightFront>(&*setup.front) : nullptr;
+  if (map == nullptr || map->spline->coefficients().size() <= kMostHeights) return;
+  throw InputError(name + ": its front has more than " + std::to_string(kMostHeights) +
+                   " samples, too many for a page; render draws its picture");
 }
 
 /// A surface with the picture that the program has of it.
@@ -95,6 +108,7 @@ LensRaster relief_of(const Lens& lens) {
 }  // namespace
 
 LensView view_of_lens(const Lens& lens, const std::string& name, const Executor& executor) {
+  require_small_front(lens.setup, name);
   LensView view;
   view.name = name;
   view.setup = lens.setup;

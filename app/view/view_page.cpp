@@ -6,6 +6,8 @@
 #include <nlohmann/json.hpp>
 #include <span>
 #include <utility>
+#include <variant>
+#include <vector>
 
 #include "cam/report/relief_picture.h"
 #include "cam/report/report_html.h"
@@ -35,6 +37,9 @@ constexpr const char* kPolicy =
 constexpr int kPasses = 16;
 /// Of a display-encoded value: off by 1e-5 at most.
 constexpr int kPictureBytes = 2;
+/// Of a height map's coefficient: a sixteen-millionth of its depth, or of that of a flat one, mm.
+constexpr int kHeightBytes = 3;
+constexpr double kLeastDepth = 1e-3;
 constexpr int kColors = 256;
 
 /// Puts data into elements of their own and keeps what says where they are.
@@ -64,6 +69,19 @@ class PageData {
     return {{"columns", image.columns()},
             {"rows", image.rows()},
             {"values", channel({"light", kPictureBytes, 0.0, high, numbers.text()})}};
+  }
+  /// Coefficients of a front that is a height map, else null.
+  json front(const OpticalSetup& setup) {
+    const auto* const map = setup.front ? std::get_if<HeightFront>(&*setup.front) : nullptr;
+    if (map == nullptr) return nullptr;
+    const std::vector<double>& values = map->spline->coefficients();
+    const auto [low, high] = std::minmax_element(values.begin(), values.end());
+    const double above = std::max(*high, *low + kLeastDepth);
+    PackedNumbers numbers(kHeightBytes);
+    for (const double value : values) numbers.add(value, *low, above);
+    return {{"columns", map->spline->grid().columns},
+            {"rows", map->spline->grid().rows},
+            {"values", channel({"heights", kHeightBytes, *low, above, numbers.text()})}};
   }
   json surface(const ViewedSurface& viewed) {
     const StoredSurface& stored = viewed.surface;
@@ -97,6 +115,7 @@ std::string data_of(const LensView& view) {
   PageData data;
   const double pixels = static_cast<double>(view.target.columns()) * view.target.rows();
   json all{{"setup", setup_json(view.setup)},
+           {"front", data.front(view.setup)},
            {"abbe", Dispersion{}.abbe},
            {"white", view.target.total() / pixels},
            {"passes", kPasses},

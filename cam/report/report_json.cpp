@@ -2,8 +2,10 @@
 #include "cam/report/report_json.h"
 
 #include <cmath>
+#include <variant>
 
 #include "cam/report/leak_words.h"
+#include "core/io/lens_folder.h"
 #include "core/text/version.h"
 
 namespace lensforge {
@@ -157,6 +159,14 @@ json operation_json(const ReportOperation& operation) {
   return object;
 }
 
+json front_json(const SphericalFront& front) {
+  return {{"type", "sphere"}, {"radius", front.radius}, {"apex", triple(front.apex)}};
+}
+json front_json(const HeightFront& front) {
+  return {
+      {"type", "heights"}, {"file", lens_file::kFront}, {"size", {front.size.x(), front.size.y()}}};
+}
+
 json setup_json(const SetupSheet& setup) {
   const auto box = [](const NamedBox& item) {
     return json{{"name", item.name}, {"box", box_json(item.box)}};
@@ -166,8 +176,7 @@ json setup_json(const SetupSheet& setup) {
              {"zero", triple(setup.zero)},   {"zero_words", setup.zero_words},
              {"up_words", setup.up_words},   {"keep_outs", list(setup.keep_outs, box)}};
   if (setup.front) {
-    sheet["front"] = {
-        {"type", "sphere"}, {"radius", setup.front->radius}, {"apex", triple(setup.front->apex)}};
+    sheet["front"] = std::visit([](const auto& front) { return front_json(front); }, *setup.front);
   }
   return sheet;
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
 #include <string_view>
+#include <variant>
 
 #include "cam/report/sections.h"
 #include "core/optics/front_surface.h"
@@ -57,19 +58,25 @@ std::string words(double x, double y, std::string_view style, std::string_view t
          escape_html(text) + "</text>";
 }
 
+/// y of the section through a front: its apex, or a height map's middle.
+double section_y(const SphericalFront& front) { return front.apex.y(); }
+double section_y(const HeightFront& front) { return front.corner.y() + 0.5 * front.size.y(); }
+
 /// The blank seen from the front, in section through the apex of its front.
 std::string section(const DrawnView& view, const SetupSheet& setup, std::string_view style) {
-  constexpr int kParts = 40;
+  const bool sphere = std::holds_alternative<SphericalFront>(*setup.front);
+  const int parts = sphere ? 40 : 400;
   const FrontSurface front(*setup.front);
+  const double y = std::visit([](const auto& one) { return section_y(one); }, *setup.front);
   const Eigen::AlignedBox2d blank = view.flat(setup.blank);
   const auto point = [&](double x, double z) {
     return decimal_text(view.x(x), 2) + "," + decimal_text(view.y(z), 2) + " ";
   };
   std::string points =
       point(blank.max().x(), blank.max().y()) + point(blank.min().x(), blank.max().y());
-  for (int i = 0; i <= kParts; ++i) {
-    const double x = blank.min().x() + blank.sizes().x() * i / kParts;
-    points += point(x, front.height({x, setup.front->apex.y()}));
+  for (int i = 0; i <= parts; ++i) {
+    const double x = blank.min().x() + blank.sizes().x() * i / parts;
+    points += point(x, front.height({x, y}));
   }
   return "<polygon points=\"" + points + "\" " + std::string(style) + "/>";
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
 #include <cmath>
+#include <variant>
 
 #include "cam/report/sections.h"
 #include "core/page/html_text.h"
@@ -121,6 +122,14 @@ std::string warnings(const ReportData& data) {
                  element("h3", "", "⚠ Before you start") + element("ul", "", items));
 }
 
+/// What the part lies on, as the drawing has it.
+std::string nest_words(const SetupSheet& sheet) {
+  if (!sheet.front) return "The table is below";
+  const bool sphere = std::holds_alternative<SphericalFront>(*sheet.front);
+  return std::string("Section through the ") + (sphere ? "apex" : "middle") +
+         "; the nest is below, up to the dashed part";
+}
+
 std::string setup(const ReportData& data) {
   const SetupSheet& sheet = data.setup;
   if (sheet.blank.isEmpty()) return "";
@@ -148,16 +157,13 @@ std::string setup(const ReportData& data) {
     return element("figure", "",
                    setup_drawing(sheet, from_above) + element("figcaption", "", caption));
   };
-  const std::string drawings = element(
-      "div", "class=\"setup\"",
-      drawing(true,
-              "<b>From above.</b> Solid: blank; dashed: part; red: program zero; "
-              "hatched: keep-out. The operator is below the drawing.") +
-          drawing(false, std::string("<b>From the front.</b> ") +
-                             (sheet.front ? "Section through the apex; the nest is below, up to "
-                                            "the dashed part"
-                                          : "The table is below") +
-                             "; the tool comes from above."));
+  const std::string drawings =
+      element("div", "class=\"setup\"",
+              drawing(true,
+                      "<b>From above.</b> Solid: blank; dashed: part; red: program zero; "
+                      "hatched: keep-out. The operator is below the drawing.") +
+                  drawing(false, std::string("<b>From the front.</b> ") + nest_words(sheet) +
+                                     "; the tool comes from above."));
   return html_section("Setup", html_facts(list) + drawings);
 }
 

@@ -111,9 +111,9 @@ PnmOutline read_pnm_outline(std::istream& file) {
   if (pnm.columns < 1 || pnm.rows < 1) {
     pnm.problem = "is corrupt: its PNM header has no size";
   } else if (has_floats(pnm.kind)) {
-    while (!is_blank(next_character(bytes)) && bytes.sgetc() != kEndOfFile &&
-           !is_blank(bytes.sgetc())) {
-      bytes.sbumpc();  // The scale, which OpenImageIO reads.
+    // The scale, which OpenImageIO reads.
+    for (int c = next_character(bytes); c != kEndOfFile && !is_blank(c); c = bytes.sgetc()) {
+      bytes.sbumpc();
     }
   } else if (!has_bits(pnm.kind)) {
     pnm.max_value = next_number(bytes);

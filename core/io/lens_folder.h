@@ -12,6 +12,8 @@ inline constexpr const char* kSurface = "surface.ply";
 inline constexpr const char* kSpline = "surface.spline";
 /// Of a lens with an outline: the mesh that kSurface is cut out of.
 inline constexpr const char* kSheet = "sheet.ply";
+/// Of a lens whose front is a height map: its heights.
+inline constexpr const char* kFront = "front.exr";
 inline constexpr const char* kTargetPng = "target.png";
 inline constexpr const char* kTargetExr = "target.exr";
 inline constexpr const char* kRenderPng = "render.png";
@@ -24,9 +26,9 @@ inline constexpr const char* kSetup = "setup.svg";
 inline constexpr const char* kCheckpoint = "checkpoint.bin";  ///< While a design is unfinished.
 
 /// All of them.
-inline constexpr std::array kAll = {kJson,      kSurface,   kSpline,      kSheet,       kTargetPng,
-                                    kTargetExr, kRenderPng, kRenderExr,   kRenderColor, kError,
-                                    kOverview,  kSetup,     kConvergence, kCheckpoint};
+inline constexpr std::array kAll = {kJson,      kSurface,   kSpline,    kSheet,       kFront,
+                                    kTargetPng, kTargetExr, kRenderPng, kRenderExr,   kRenderColor,
+                                    kError,     kOverview,  kSetup,     kConvergence, kCheckpoint};
 
 /// Folder in which earlier versions put a lens together; a killed one has left it behind.
 inline constexpr const char* kStaging = "lens";

@@ -78,6 +78,14 @@ struct FrontRefraction {
     }
     return by_x;
   }
+  /// Derivative by x of where the ray passes a height z; folded over where its determinant is not
+  /// above 0.
+  [[nodiscard]] LF_HD Eigen::Matrix2d landing_by_x(double z) const {
+    const Eigen::Vector2d m = slope();
+    Eigen::Matrix2d lands = Eigen::Matrix2d::Identity() + (z - e.z()) * slope_by_x();
+    for (int j = 0; j < 2; ++j) lands.col(j) -= gradient[j] * m;
+    return lands;
+  }
   /// @param x_by_p  change of x with the point behind the front whose ray this is.
   [[nodiscard]] LF_HD IncidentRay ray(const Eigen::Matrix2d& x_by_p) const {
     return {slope(), {e.x(), e.y()}, e.z(), b.z(), gradient, slope_by_x() * x_by_p, x_by_p};
@@ -108,8 +116,7 @@ LF_HD inline IncidentRay ray_through_front(const FrontSurface& front, const Fron
     if (!ray.lit || !(ray.b.z() > 0.0)) return found;
     const Eigen::Vector2d m = ray.slope();
     const double rise = p.z() - ray.e.z();
-    Eigen::Matrix2d lands = Eigen::Matrix2d::Identity() + rise * ray.slope_by_x();
-    for (int j = 0; j < 2; ++j) lands.col(j) -= ray.gradient[j] * m;
+    const Eigen::Matrix2d lands = ray.landing_by_x(p.z());
     // Beyond where neighbouring rays meet, the light has folded over.
     const double det = lands(0, 0) * lands(1, 1) - lands(0, 1) * lands(1, 0);
     if (!(det > 0.0)) return found;

@@ -2,11 +2,55 @@
 #include "core/optics/front_placement.h"
 
 #include <Eigen/Geometry>
+#include <Eigen/LU>
 #include <algorithm>
+#include <variant>
 
+#include "core/optics/front_entry.h"
 #include "core/optics/light_path.h"
+#include "core/value_slope.h"
 
 namespace lensforge {
+namespace {
+
+/// Between samples, mm.
+Eigen::Vector2d step_of(const HeightFront& front) {
+  const HeightGrid& grid = front.spline->grid();
+  return front.size.cwiseQuotient(Eigen::Vector2d(grid.columns - 1, grid.rows - 1));
+}
+
+void move(const Eigen::Vector2d& aside, SphericalFront& front) { front.apex.head<2>() += aside; }
+void move(const Eigen::Vector2d& aside, HeightFront& front) { front.corner += aside; }
+
+double lowest(const SphericalFront& front, const Eigen::AlignedBox2d& rectangle) {
+  const FrontSurface surface(front);
+  const Eigen::Vector2d apex = front.apex.head<2>();
+  if (front.radius > 0.0) {
+    return surface.height(apex.cwiseMax(rectangle.min()).cwiseMin(rectangle.max()));
+  }
+  const Eigen::Vector2d middle = rectangle.center();
+  const Eigen::Vector2d far =
+      (apex.array() < middle.array()).select(rectangle.max(), rectangle.min());
+  return surface.height(far);
+}
+
+double lowest(const HeightFront& front, const Eigen::AlignedBox2d& rectangle) {
+  constexpr double kPlaces = 4.0;  // A sample's distance.
+  const FrontSurface surface(front);
+  const Eigen::Vector2d count =
+      (kPlaces * rectangle.sizes().cwiseQuotient(step_of(front))).array().ceil();
+  double least = kInfinity;
+  for (int j = 0; j <= static_cast<int>(count.y()); ++j) {
+    for (int i = 0; i <= static_cast<int>(count.x()); ++i) {
+      const Eigen::Vector2d share = Eigen::Vector2d(i, j).cwiseQuotient(count);
+      least =
+          std::min(least, surface.height(rectangle.min() + share.cwiseProduct(rectangle.sizes())));
+    }
+  }
+  return least;
+}
+
+}  // namespace
 
 SphericalFront spherical_front(double radius, const Eigen::Vector2d& lens_size) {
   const Eigen::Vector2d middle = 0.5 * lens_size;
@@ -46,7 +90,7 @@ double shift_by_front(const OpticalSetup& setup, const Eigen::Vector3d& p) {
   const Eigen::Vector3d n = Eigen::Vector3d(-slope.x(), -slope.y(), 1.0).normalized();
   const auto lands = [&](const Eigen::Vector2d& aside) -> Eigen::Vector2d {
     OpticalSetup moved = setup;
-    moved.front->apex.head<2>() += aside;
+    std::visit([&aside](auto& front) { move(aside, front); }, *moved.front);
     const LightPath path(moved);
     return path.plane().to_mm(path.land(p, path.beam(p, n).m));
   };
@@ -57,16 +101,25 @@ double shift_by_front(const OpticalSetup& setup, const Eigen::Vector3d& p) {
   return 0.5 * (shift(0) + shift(1));
 }
 
-double lowest_of(const SphericalFront& front, const Eigen::AlignedBox2d& rectangle) {
-  const FrontSurface surface(front);
-  const Eigen::Vector2d apex = front.apex.head<2>();
-  if (front.radius > 0.0) {
-    return surface.height(apex.cwiseMax(rectangle.min()).cwiseMin(rectangle.max()));
+double lowest_of(const Front& front, const Eigen::AlignedBox2d& rectangle) {
+  return std::visit([&](const auto& one) { return lowest(one, rectangle); }, front);
+}
+
+std::optional<FrontFault> height_map_fault(const OpticalSetup& setup, double z) {
+  const auto& map = std::get<HeightFront>(setup.front.value());
+  const FrontSurface front(map);
+  const FrontLight light{setup.point ? setup.point->position : setup.light, setup.point.has_value(),
+                         setup.ior};
+  const HeightGrid& grid = map.spline->grid();
+  const Eigen::Vector2d half = 0.5 * step_of(map);
+  for (int j = 0; j < 2 * grid.rows - 1; ++j) {
+    for (int i = 0; i < 2 * grid.columns - 1; ++i) {
+      const FrontRefraction ray(front, light, half.cwiseProduct(Eigen::Vector2d(i, j)));
+      if (!ray.lit || !(ray.b.z() > 0.0)) return FrontFault::kUnlit;
+      if (!(ray.landing_by_x(z).determinant() > 0.0)) return FrontFault::kFolds;
+    }
   }
-  const Eigen::Vector2d middle = rectangle.center();
-  const Eigen::Vector2d far =
-      (apex.array() < middle.array()).select(rectangle.max(), rectangle.min());
-  return surface.height(far);
+  return std::nullopt;
 }
 
 }  // namespace lensforge

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <optional>
 
 #include "core/optics/optical_setup.h"
 
@@ -24,7 +25,18 @@ double overhang(const OpticalSetup& setup, const Eigen::Vector3d& p);
 /// the mean of x and y. @pre setup.front.
 double shift_by_front(const OpticalSetup& setup, const Eigen::Vector3d& p);
 
-/// Lowest point of a front over a rectangle, mm. @pre the front covers it.
-double lowest_of(const SphericalFront& front, const Eigen::AlignedBox2d& rectangle);
+/// Lowest point of a front over a rectangle, mm; of a height map the lowest one of four places a
+/// sample's distance each way. @pre the front covers it.
+double lowest_of(const Front& front, const Eigen::AlignedBox2d& rectangle);
+
+/// What is wrong with the light behind a front, somewhere over the lens.
+enum class FrontFault {
+  kUnlit,  ///< It comes from the other side, or goes down inside.
+  kFolds,  ///< Neighbouring rays meet below a height.
+};
+
+/// Behind a height map, at every sample and half-way between them; nothing if its light comes to
+/// the height z unfolded. @pre setup.front is one.
+std::optional<FrontFault> height_map_fault(const OpticalSetup& setup, double z);
 
 }  // namespace lensforge

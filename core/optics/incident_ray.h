@@ -6,14 +6,6 @@
 
 #include "core/compute/host_device.h"
 
-/// Keeps a function out of its callers, so that parallel light, which never calls it, does not pay
-/// for its registers: 4 % of an objective.
-#if defined(__CUDACC__)
-#define LF_APART
-#else
-#define LF_APART [[gnu::noinline]]
-#endif
-
 namespace lensforge {
 
 /// The ray that comes to a point of the surface, and how it changes with that point: all that is

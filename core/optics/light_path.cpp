@@ -87,6 +87,10 @@ Eigen::Vector2d LightPath::place_on_start(const Eigen::Vector2d& pixel, double z
 }
 
 Eigen::Vector2d LightPath::chief_slope(double z) const {
+  if (source_.front().is_height_map()) {
+    const Eigen::Vector3d a = source_.mean_direction(2.0 * middle_);
+    return RefractedBeam(a, Eigen::Vector3d::UnitZ(), eta_).m;
+  }
   return beam({middle_.x(), middle_.y(), z}, Eigen::Vector3d::UnitZ()).m;
 }
 

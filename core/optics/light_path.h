@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <span>
 
 #include "core/compute/host_device.h"
 #include "core/optics/fresnel.h"
@@ -47,7 +48,8 @@ struct FacetSlopes {
 /// room knows the refractive index, the direction of the light or the distance of the screen.
 ///
 /// One value with tags, not a template or a base class: kernels carry it by value to any device,
-/// and the rooms that ask are compiled once. Light along +z, which nearly all lenses are made for,
+/// and the rooms that ask are compiled once. It refers to a height map's coefficients in its setup,
+/// which must outlive it. Light along +z, which nearly all lenses are made for,
 /// keeps its own shorter formulas; the branches cost less than 1 % of an objective's time.
 class LightPath {
  public:
@@ -57,6 +59,17 @@ class LightPath {
   [[nodiscard]] LightPath sharing(double whole) const {
     LightPath other = *this;
     other.whole_ = whole;
+    return other;
+  }
+
+  /// Coefficients of a front that is a height map, which live in the setup; else empty.
+  [[nodiscard]] std::span<const double> front_coefficients() const {
+    return source_.front().coefficients();
+  }
+  /// The same light for kernels that read those coefficients elsewhere. @pre there are some.
+  [[nodiscard]] LightPath reading(const double* coefficients) const {
+    LightPath other = *this;
+    other.source_ = source_.reading(coefficients);
     return other;
   }
 
@@ -221,7 +234,8 @@ class LightPath {
   [[nodiscard]] Eigen::Vector2d land_from_start(const Eigen::Vector3d& p) const;
   [[nodiscard]] Eigen::Vector2d place_on_start(const Eigen::Vector2d& pixel, double z) const;
 
-  /// Slope of the ray from the middle of a flat surface of height z.
+  /// Slope of the ray from the middle of a flat surface of height z; behind a height map, which may
+  /// slope anyhow in its middle, that behind its mean gradient.
   [[nodiscard]] Eigen::Vector2d chief_slope(double z) const;
 
   /// How far a change of slope moves the light over the screen, mm, to first order, around the

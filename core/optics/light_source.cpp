@@ -34,6 +34,23 @@ LightSource::LightSource(const OpticalSetup& setup)
   }
 }
 
+Eigen::Vector3d LightSource::mean_direction(const Eigen::Vector2d& size) const {
+  constexpr int kSamples = 64;  // Along an edge.
+  // The mean of a derivative along a line is by the line's ends.
+  Eigen::Vector2d rise = Eigen::Vector2d::Zero();
+  for (int k = 0; k < kSamples; ++k) {
+    const Eigen::Vector2d along = (k + 0.5) / kSamples * size;
+    rise += Eigen::Vector2d(front_.height({size.x(), along.y()}) - front_.height({0.0, along.y()}),
+                            front_.height({along.x(), size.y()}) - front_.height({along.x(), 0.0}));
+  }
+  const Eigen::Vector2d gradient = rise.cwiseQuotient(kSamples * size);
+  const Eigen::Vector3d n = Eigen::Vector3d(-gradient.x(), -gradient.y(), 1.0).normalized();
+  const bool point = kind_ == Kind::kPointBent;
+  const Eigen::Vector3d way =
+      point ? Eigen::Vector3d((front_at(0.5 * size) - position_).normalized()) : direction_;
+  return refract(way, n, 1.0 / eta_);
+}
+
 Eigen::Vector3d LightSource::entry(const Eigen::Vector3d& p) const {
   if (varies()) return position_ + vector_to(p);
   return p;

@@ -57,6 +57,19 @@ class LightSource {
     return known != nullptr ? known->direction_adjoint(a_bar) : ray_to(p).direction_adjoint(a_bar);
   }
 
+  /// The entry face, if it is curved; else z = 0.
+  [[nodiscard]] const FrontSurface& front() const { return front_; }
+  /// The same light behind a height map whose coefficients lie elsewhere. @pre
+  /// front().is_height_map().
+  [[nodiscard]] LightSource reading(const double* coefficients) const {
+    LightSource other = *this;
+    other.front_ = front_.reading(coefficients);
+    return other;
+  }
+  /// The light inside behind the front as a plane of its mean gradient, at the middle of a lens of
+  /// this size: where a height map sends the light as a whole. @pre is_bent().
+  [[nodiscard]] Eigen::Vector3d mean_direction(const Eigen::Vector2d& size) const;
+
   /// Point of the entry face at a place, or of z = 0 under a mirror.
   [[nodiscard]] Eigen::Vector3d front_at(const Eigen::Vector2d& place) const {
     return {place.x(), place.y(), front_.height(place)};

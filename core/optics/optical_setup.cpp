@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <sstream>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "core/error.h"
@@ -17,6 +18,8 @@ namespace {
 
 /// Of a unit vector's length: a few rounding errors.
 constexpr double kUnitTolerance = 1e-12;
+/// Of a height map's size against the lens's, relative: what a file's decimals may lose.
+constexpr double kSameSize = 1e-9;
 
 template <class Value>
 void require(bool holds, const std::string& field, const Value& value, const std::string& rule) {
@@ -45,10 +48,14 @@ void require_light(const OpticalSetup& setup) {
           from.transpose(), lens ? "finite, its z below 0" : "finite, its z above 0");
 }
 
-void require_front(const OpticalSetup& setup) {
-  if (!setup.front) return;
-  const SphericalFront& front = *setup.front;
-  require(setup.mode == LightMode::kRefract, "front", "sphere", "left out of a mirror");
+void require_front(const HeightFront& front, const OpticalSetup& setup) {
+  require(front.spline != nullptr, "front", "heights", "of some samples");
+  require((front.size - setup.lens_size).norm() <= kSameSize * setup.lens_size.norm() &&
+              front.corner.isZero(),
+          "front.size", front.size.transpose(), "lens_size");
+}
+
+void require_front(const SphericalFront& front, const OpticalSetup& setup) {
   require(front.apex.allFinite(), "front.apex", front.apex.transpose(), "finite");
   const Eigen::Vector2d middle = 0.5 * setup.lens_size;
   const double farthest = ((front.apex.head<2>() - middle).cwiseAbs() + middle).norm();
@@ -57,6 +64,14 @@ void require_front(const OpticalSetup& setup) {
           "longer than " + number_text(farthest) +
               " mm, or the sphere is too small "
               "for the lens");
+}
+
+void require_front(const OpticalSetup& setup) {
+  if (!setup.front) return;
+  const bool sphere = std::holds_alternative<SphericalFront>(*setup.front);
+  require(setup.mode == LightMode::kRefract, "front", sphere ? "sphere" : "heights",
+          "left out of a mirror");
+  std::visit([&setup](const auto& front) { require_front(front, setup); }, *setup.front);
 }
 
 void require_outline(const OpticalSetup& setup) {

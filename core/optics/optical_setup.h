@@ -44,7 +44,7 @@ struct OpticalSetup {
   Eigen::Vector3d light{0.0, 0.0, 1.0};
   std::optional<PointSource> point;  ///< Instead of parallel light.
   /// Entry face of a lens; none: the plane z = 0.
-  std::optional<SphericalFront> front;
+  std::optional<Front> front;
   SourceExtent extent;  ///< Of either; LightPath takes it for a point.
   Spectrum spectrum;    ///< Of the light through a lens; LightPath takes all of it for that of ior.
   /// Light that a lens's faces reflect is missing behind them, steeper ones let less through.
@@ -75,8 +75,8 @@ struct OpticalSetup {
 /// @throw InputError naming the field, its value and the rule, unless ior > 1, all sizes, the focal
 /// length and the pixel counts are positive, the light comes from the right side, the screen's
 /// vectors are of length 1, at a right angle and turn it by less than a right angle, a spherical
-/// front's radius is longer than half of the lens's diagonal, an outline is one closed line inside
-/// of the lens's rectangle, and everything is finite.
+/// front's radius is longer than half of the lens's diagonal, a height map spans the lens's
+/// rectangle, an outline is one closed line inside of that rectangle, and everything is finite.
 void validate(const OpticalSetup& setup);
 
 }  // namespace lensforge

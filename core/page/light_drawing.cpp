@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <variant>
 #include <vector>
 
 #include "core/optics/front_surface.h"
@@ -188,12 +189,13 @@ std::string rays(const OpticalSetup& setup, const Scene& scene, const View& view
 
 /// Section of a curved front through its middle, from below to above.
 std::vector<Vector2d> front_line(const OpticalSetup& setup, const Scene& scene, const View& view) {
-  constexpr int kParts = 40;
-  const FrontSurface front(setup.front.value());
+  const Front& shape = setup.front.value();
+  const int parts = std::holds_alternative<HeightFront>(shape) ? 400 : 40;
+  const FrontSurface front(shape);
   std::vector<Vector2d> line;
-  for (int i = 0; i <= kParts; ++i) {
+  for (int i = 0; i <= parts; ++i) {
     Vector3d p = scene.middle;
-    p[view.up()] = scene.high[view.up()] * i / kParts;
+    p[view.up()] = scene.high[view.up()] * i / parts;
     p.z() = front.height(p.head<2>());
     line.push_back(view.at(p));
   }
@@ -267,7 +269,10 @@ std::string extent_words(const OpticalSetup& setup) {
 
 std::string front_words(const OpticalSetup& setup) {
   if (!setup.front) return "its flat face at z 0, towards the lamp";
-  const double radius = setup.front->radius;
+  if (std::holds_alternative<HeightFront>(*setup.front)) {
+    return "its front, a height map, towards the lamp";
+  }
+  const double radius = std::get<SphericalFront>(*setup.front).radius;
   return std::string(radius > 0.0 ? "its bulging" : "its hollow") + " front, of radius " +
          number(std::abs(radius)) + " mm, towards the lamp";
 }

@@ -7,10 +7,12 @@
 #include <string>
 #include <system_error>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "core/error.h"
 #include "core/image/error_image.h"
+#include "core/image/height_grid.h"
 #include "core/image/image_io.h"
 #include "core/io/files.h"
 #include "core/surface/height_field_check.h"
@@ -81,6 +83,12 @@ ordered_json to_json(const Lens& lens) {
   return document;
 }
 
+/// Of a front that is a height map, else nullptr.
+const HeightGrid* front_heights(const OpticalSetup& setup) {
+  const auto* const map = setup.front ? std::get_if<HeightFront>(&*setup.front) : nullptr;
+  return map != nullptr ? &map->spline->grid() : nullptr;
+}
+
 void add_files(const Lens& lens, PendingFiles& files) {
   using namespace lens_file;
   const auto add = [&files](const char* name, const auto& content) {
@@ -101,6 +109,9 @@ void add_files(const Lens& lens, PendingFiles& files) {
   } else if (lens.setup.outline) {
     files.add(kSheet, [&](const fs::path& beside) { write_ply(lens.surface, beside); });
   }
+  if (const HeightGrid* const heights = front_heights(lens.setup)) {
+    files.add(kFront, [heights](const fs::path& beside) { write_heights(*heights, beside); });
+  }
   add(kTargetPng, lens.target);
   add(kTargetExr, lens.target);
   if (!lens.render.empty()) {
@@ -116,8 +127,8 @@ void add_files(const Lens& lens, PendingFiles& files) {
 void remove_older(const PendingFiles& files) {
   using namespace lens_file;
   fs::remove(files.folder() / kJson);
-  for (const char* name :
-       {kSurface, kSpline, kSheet, kTargetPng, kTargetExr, kRenderPng, kRenderExr, kError}) {
+  for (const char* name : {kSurface, kSpline, kSheet, kFront, kTargetPng, kTargetExr, kRenderPng,
+                           kRenderExr, kError}) {
     if (!files.has(name)) fs::remove(files.folder() / name);
   }
 }
@@ -162,8 +173,8 @@ void check_supported(const JsonFields& fields) {
   if (fields.text("units") != "mm") fields.refuse("units", "only \"mm\" can be read");
 }
 
-OpticalSetup read_setup(const JsonFields& fields, const std::string& file) {
-  OpticalSetup setup = read_setup(fields);
+OpticalSetup read_setup(const JsonFields& fields, const fs::path& folder, const std::string& file) {
+  OpticalSetup setup = read_setup(fields, folder);
   try {
     validate(setup);
   } catch (const InputError& error) {
@@ -197,15 +208,6 @@ GridShape read_grid(const JsonFields& fields, const SurfaceMesh& mesh) {
   const GridShape grid{shape.x(), shape.y()};
   if (const auto fault = grid_fault(mesh, grid)) fields.refuse("grid", *fault);
   return grid;
-}
-
-/// The file in the lens folder that a field names.
-fs::path named_file(const JsonFields& fields, const std::string& field, const fs::path& folder) {
-  const fs::path name = fields.text(field);
-  if (name.empty() || name == ".." || name != name.filename()) {
-    fields.refuse(field, "it must be the name of a file in the lens folder");
-  }
-  return folder / name;
 }
 
 ControlNet read_own_spline(const JsonFields& fields, const OpticalSetup& setup,
@@ -336,7 +338,7 @@ Lens read_lens(const fs::path& folder) {
   const JsonFields fields(document, path.string());
   check_supported(fields);
   Lens lens;
-  lens.setup = read_setup(fields, path.string());
+  lens.setup = read_setup(fields, folder, path.string());
   lens.model = choice<SurfaceModel>(fields, "model", named_models());
   if (lens.model == SurfaceModel::kSpline)
     lens.spline = read_own_spline(fields, lens.setup, folder);

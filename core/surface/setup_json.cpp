@@ -4,9 +4,14 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <memory>
 #include <string>
+#include <utility>
+#include <variant>
 #include <vector>
 
+#include "core/image/height_grid.h"
+#include "core/io/lens_folder.h"
 #include "core/surface/outline_json.h"
 
 namespace lensforge {
@@ -120,12 +125,16 @@ void read_source(const JsonFields& source, OpticalSetup& setup) {
   read_extent(source, setup);
 }
 
-void read_front(const JsonFields& front, OpticalSetup& setup) {
+void read_front(const JsonFields& front, const std::filesystem::path& folder, OpticalSetup& setup) {
   const std::string type = front.text("type");
   if (type == "sphere") {
     setup.front = SphericalFront{front.number("radius"), front.number_triple("apex")};
+  } else if (type == "heights") {
+    HeightGrid grid = read_heights(named_file(front, "file", folder));
+    setup.front =
+        HeightFront{std::make_shared<HeightSpline>(std::move(grid)), front.number_pair("size")};
   } else if (type != "flat") {
-    front.refuse("type", R"(it must be "flat" or "sphere")");
+    front.refuse("type", R"(it must be "flat", "sphere" or "heights")");
   } else if (front.number("z") != 0.0) {
     front.refuse("z", "it must be 0, where the lens begins");
   }
@@ -133,8 +142,11 @@ void read_front(const JsonFields& front, OpticalSetup& setup) {
 
 ordered_json front_json(const OpticalSetup& setup) {
   if (!setup.front) return {{"type", "flat"}, {"z", 0}};
-  return {
-      {"type", "sphere"}, {"radius", setup.front->radius}, {"apex", array_of(setup.front->apex)}};
+  if (const auto* const map = std::get_if<HeightFront>(&*setup.front)) {
+    return {{"type", "heights"}, {"file", lens_file::kFront}, {"size", array_of(map->size)}};
+  }
+  const auto& sphere = std::get<SphericalFront>(*setup.front);
+  return {{"type", "sphere"}, {"radius", sphere.radius}, {"apex", array_of(sphere.apex)}};
 }
 
 ordered_json spectrum_json(const Spectrum& spectrum) {
@@ -214,7 +226,16 @@ ordered_json setup_json(const OpticalSetup& setup) {
   return document;
 }
 
-OpticalSetup read_setup(const JsonFields& fields) {
+std::filesystem::path named_file(const JsonFields& fields, const std::string& field,
+                                 const std::filesystem::path& folder) {
+  const std::filesystem::path name = fields.text(field);
+  if (name.empty() || name == ".." || name != name.filename()) {
+    fields.refuse(field, "it must be the name of a file in the lens folder");
+  }
+  return folder / name;
+}
+
+OpticalSetup read_setup(const JsonFields& fields, const std::filesystem::path& folder) {
   OpticalSetup setup;
   const std::string mode = fields.text("mode");
   if (mode == "reflect") {
@@ -223,7 +244,7 @@ OpticalSetup read_setup(const JsonFields& fields) {
     fields.refuse("mode", R"(it must be "refract" or "reflect")");
   }
   read_source(fields.object("source"), setup);
-  if (fields.has("front")) read_front(fields.object("front"), setup);
+  if (fields.has("front")) read_front(fields.object("front"), folder, setup);
   setup.ior = fields.number("ior");
   if (fields.has("spectrum")) setup.spectrum = read_spectrum(fields.object("spectrum"));
   if (fields.has("fresnel")) setup.fresnel = read_fresnel(fields);

@@ -105,6 +105,7 @@ class DesignObjectiveOn {
 
   Exec executor_;
   ObjectiveOptions options_;
+  Buffer<double> front_;                    ///< What lights_ read of a front that is a height map.
   std::vector<ColoredLight<Exec>> lights_;  ///< Of a spectrum's picture several, else one.
   MeshOn<Exec> mesh_;
   SurfaceMesh sheet_;   ///< Where it was linearized last; empty without an outline.
@@ -190,14 +191,16 @@ inline LightPath light_of(const LightColor& color, const SurfaceMesh& mesh, cons
   return light.sharing(intake / color.share);
 }
 
+/// @param front  for light_for().
 template <class Exec>
 std::vector<ColoredLight<Exec>> lights_of(const SurfaceMesh& mesh, const OpticalSetup& setup,
-                                          const DesignGoal& goal) {
+                                          const DesignGoal& goal, const Exec& executor,
+                                          typename Exec::template Buffer<double>& front) {
   std::vector<ColoredLight<Exec>> lights;
   for (const LightColor& color : colors_of(setup, goal)) {
     // An outline's is found with its cut.
     const LightPath path = setup.outline ? LightPath(color.setup) : light_of(color, mesh, nullptr);
-    lights.push_back({path, color.share, {}, {}});
+    lights.push_back({light_for(executor, path, front), color.share, {}, {}});
     if (!path.varies()) continue;
     const auto faces = static_cast<std::size_t>(mesh.triangle_count());
     lights.back().face_flux = typename Exec::template Buffer<double>(faces);
@@ -219,7 +222,7 @@ DesignObjectiveOn<Exec>::DesignObjectiveOn(const SurfaceMesh& mesh, const Optica
                                            const Exec& executor)
     : executor_(executor),
       options_(options),
-      lights_(objective_detail::lights_of<Exec>(mesh, setup, goal)),
+      lights_(objective_detail::lights_of(mesh, setup, goal, executor, front_)),
       mesh_(mesh, make_topology(mesh), executor),
       unheld_(objective_detail::movable_coordinates(mesh.vertices, setup.lens_size)),
       movable_(unheld_),
@@ -324,7 +327,8 @@ void DesignObjectiveOn<Exec>::take_outline(const double* vertices) {
   const MeshCut cut = cut_mesh(sheet_, *setup_.outline, Executor::serial());
   const std::vector<LightColor> colors = light_colors(setup_);
   for (std::size_t k = 0; k < colors.size(); ++k) {
-    lights_[k].path = objective_detail::light_of(colors[k], sheet_, &cut);
+    lights_[k].path =
+        light_for(executor_, objective_detail::light_of(colors[k], sheet_, &cut), front_);
   }
   aperture_ = ApertureOn<Exec>(cut, executor_);
   movable_ = unheld_;

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <span>
 
 #include "core/compute/executor.h"
 #include "core/compute/host_device.h"
@@ -20,12 +21,24 @@ struct SurfaceView {
   const int* triangles;    ///< 3 × T
   const double* vertices;  ///< 3 × V, mm
   LightPath light;
-  VertexRays incident;  ///< As find_rays() gives them.
+  VertexRays incident;       ///< As find_rays() gives them.
+  std::int64_t nothing = 0;  ///< Without it bytes of a kernel's argument would be left unset.
 
   [[nodiscard]] LF_HD Corners corners(std::int64_t i) const {
     return corners_at(triangles + 3 * i, vertices);
   }
 };
+
+/// The same light for an executor's kernels: what it refers to is copied into `front`, a buffer of
+/// that executor, which must outlive it.
+template <class Exec>
+LightPath light_for(const Exec& executor, const LightPath& light,
+                    typename Exec::template Buffer<double>& front) {
+  const std::span<const double> coefficients = light.front_coefficients();
+  if (coefficients.empty()) return light;
+  if (front.size() == 0) front = buffer_of(executor, coefficients);
+  return light.reading(front.data());
+}
 
 /// The ray that comes to a vertex.
 struct FindRay {

@@ -45,6 +45,10 @@ void append_light(const LightOptions& light, json& description) {
   }
   const SourceShape& shape = light.source_shape;
   if (!shape.is_disc()) description.push_back({shape.columns, shape.rows, shape.weights});
+  if (light.front_heights) {
+    const HeightGrid& grid = light.front_heights->grid();
+    description.push_back({grid.columns, grid.rows, grid.heights});
+  }
 }
 
 void append_outline(const Outline& outline, json& description) {

@@ -10,6 +10,7 @@
 #include "cam/cam_meshes.h"
 #include "core/error.h"
 #include "core/optics/front_placement.h"
+#include "core/optics/height_fronts.h"
 #include "core/temp_folder.h"
 #include "core/text/number_text.h"
 #include "design/render_lens.h"
@@ -79,7 +80,7 @@ TEST(CurvedFrontCut, AReportSaysWhereASphericalFrontHasToLie) {
   const TempFolder folder;
   const Lens lens = lens_with_front(20.0);
   const ReportData report = run(lens, programs_only(), folder).report;
-  const SphericalFront& front = *lens.setup.front;
+  const auto& front = std::get<SphericalFront>(*lens.setup.front);
   ASSERT_TRUE(report.setup.front.has_value());
   EXPECT_EQ(report.setup.blank.min().z(), front.apex.z());
   const double top = lens.surface.vertices.row(2).maxCoeff() + Stock().allowance;
@@ -95,6 +96,35 @@ TEST(CurvedFrontCut, AReportSaysWhereASphericalFrontHasToLie) {
   EXPECT_THAT(html, AllOf(HasSubstr("in a nest"), HasSubstr("Section through the apex")));
   const TempFolder flat;
   EXPECT_EQ(run(small_lens(), programs_only(), flat).report.z_offset, report.z_offset);
+}
+
+TEST(CurvedFrontCut, ALensWithAHeightMapForAFrontIsPredictedBehindItAndItsReportSaysWhereItLies) {
+  const TempFolder folder;
+  Lens lens = small_lens();
+  lens.setup.front =
+      testing::height_front(lens.setup.lens_size, {31, 21}, [](const Eigen::Vector2d& at) {
+        return -0.08 + 0.08 * std::sin(2.0 * at.x()) * std::cos(1.5 * at.y());
+      });
+  const ReportData report = run(lens, predicted(), folder).report;
+  const auto picture_of = [](const Lens& any) {
+    Image picture(any.setup.pixels.x(), any.setup.pixels.y());
+    (void)evaluate(any, SurfaceModel::kSmooth, &picture, Executor::serial());
+    return picture;
+  };
+  const double other = difference(report.leakage, picture_of(small_lens()));
+  EXPECT_GT(other, 0.3);
+  EXPECT_LT(difference(report.leakage, picture_of(lens)), 0.3 * other);
+  // Beyond the lens it goes on straight to the blank's edge.
+  const Eigen::AlignedBox3d& blank = report.setup.blank;
+  EXPECT_EQ(blank.min().z(),
+            lowest_of(*lens.setup.front, {Eigen::Vector2d(blank.min().head<2>()),
+                                          Eigen::Vector2d(blank.max().head<2>())}));
+  EXPECT_LT(blank.min().z(), -0.16);
+  EXPECT_THAT(report.setup.front_words, AllOf(HasSubstr("height map"), HasSubstr("X 3.000 Y 2.000"),
+                                              HasSubstr("its height 0")));
+  const auto json = nlohmann::json::parse(read_bytes(folder / "report.json"));
+  EXPECT_EQ(json["setup"]["front"]["file"], "front.exr");
+  EXPECT_THAT(read_bytes(folder / "report.html"), HasSubstr("Section through the middle"));
 }
 
 TEST(CurvedFrontCut, ABlankThatASphericalFrontCannotHaveIsRefused) {

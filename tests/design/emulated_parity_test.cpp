@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "core/optics/height_fronts.h"
 #include "design/emulated_executor.h"
 #include "design/executor_parity.h"
 #include "design/optics/surface_optics.h"
@@ -35,6 +36,28 @@ struct EmulatedSide {
 
 INSTANTIATE_TYPED_TEST_SUITE_P(EmulatedGpu, ExecutorParity, EmulatedSide);
 INSTANTIATE_TYPED_TEST_SUITE_P(EmulatedGpu, TransportParity, EmulatedSide);
+
+/// What a light path refers to is in the executor's memory, too.
+TEST(EmulatedGpu, AFrontThatIsAHeightMapIsReadInItsOwnMemory) {
+  OpticalSetup setup = kSetup;
+  setup.front = height_front(kSize, {25, 21}, [](const Eigen::Vector2d& at) {
+    return -0.2 + 0.2 * std::sin(0.3 * at.x()) * std::cos(0.25 * at.y());
+  });
+  const Eigen::Matrix3Xd vertices = rough_mesh().vertices;
+  for (const SurfaceModel model : kModels) {
+    const auto cpu = stage_on(model, Goal::kPicture, Executor::serial(), setup);
+    const auto there = stage_on(model, Goal::kPicture, EmulatedExecutor(Executor::serial()), setup);
+    Eigen::Matrix3Xd expected;
+    Eigen::Matrix3Xd found;
+    const double value = cpu->evaluate(vertices, expected).energy.total;
+    EXPECT_NEAR(there->evaluate(vertices, found).energy.total, value, 1e-9 * value);
+    EXPECT_LE(relative_difference(found, expected), 1e-9);
+    EXPECT_LE(relative_difference(
+                  render_flux(rough_mesh(), setup, model, EmulatedExecutor(Executor::serial())),
+                  render_flux(rough_mesh(), setup, model, Executor::serial())),
+              1e-9);
+  }
+}
 
 /// Triangles that are made while they are deposited, against triangles in memory.
 TEST(RenderFlux, IsTheSameAsOfProjectedTriangles) {

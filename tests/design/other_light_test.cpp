@@ -10,9 +10,11 @@
 #include <optional>
 #include <string>
 #include <tuple>
+#include <variant>
 #include <vector>
 
 #include "core/optics/front_placement.h"
+#include "core/optics/height_fronts.h"
 #include "core/optics/light_path.h"
 #include "design/energy/objective.h"
 #include "design/finite_difference.h"
@@ -72,6 +74,23 @@ void point_concave_front(OpticalSetup& setup) {
   setup.front = spherical_front(-120.0, setup.lens_size);
 }
 
+/// Waves of a front, 0.25 mm high, and their normal, towards the inside.
+double wave(const Eigen::Vector2d& at) {
+  return -0.25 + 0.25 * std::sin(0.3 * at.x()) * std::cos(0.25 * at.y() + 0.3);
+}
+Eigen::Vector3d wave_normal(const Eigen::Vector2d& at) {
+  const double by_x = 0.075 * std::cos(0.3 * at.x()) * std::cos(0.25 * at.y() + 0.3);
+  const double by_y = -0.0625 * std::sin(0.3 * at.x()) * std::sin(0.25 * at.y() + 0.3);
+  return Eigen::Vector3d(-by_x, -by_y, 1.0).normalized();
+}
+void wavy_front(OpticalSetup& setup) {
+  setup.front = testing::height_front(setup.lens_size, {49, 41}, wave);
+}
+void point_wavy_front(OpticalSetup& setup) {
+  point_source(setup);
+  wavy_front(setup);
+}
+
 /// The same lens in another light, its picture moved to where that goes.
 OpticalSetup lit_by(const KindOfLight& kind, OpticalSetup setup) {
   kind.apply(setup);
@@ -90,7 +109,9 @@ constexpr KindOfLight kKinds[] = {{"ReflectingFaces", reflecting_faces},
                                   {"Mirror", mirror},
                                   {"PointOnMirror", lit_mirror},
                                   {"ConvexFront", convex_front},
-                                  {"PointConcaveFront", point_concave_front}};
+                                  {"PointConcaveFront", point_concave_front},
+                                  {"WavyFront", wavy_front},
+                                  {"PointWavyFront", point_wavy_front}};
 
 using Case = std::tuple<KindOfLight, SurfaceModel>;
 
@@ -211,7 +232,7 @@ std::optional<double> hit(const Corners& t, const Eigen::Vector3d& origin,
 }
 
 /// A place where rays enter, and the normal there, towards the inside: of a sphere around its
-/// centre, or z = 0.
+/// centre, of waves, or z = 0.
 struct FrontPlace {
   Eigen::Vector3d place;
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();
@@ -219,8 +240,12 @@ struct FrontPlace {
 
 FrontPlace front_place(const OpticalSetup& setup, double x, double y) {
   if (!setup.front) return {{x, y, 0.0}};
-  const double radius = setup.front->radius;
-  const Eigen::Vector3d centre = setup.front->apex + radius * Eigen::Vector3d::UnitZ();
+  if (std::holds_alternative<HeightFront>(*setup.front)) {
+    return {{x, y, wave({x, y})}, wave_normal({x, y})};
+  }
+  const auto& sphere = std::get<SphericalFront>(*setup.front);
+  const double radius = sphere.radius;
+  const Eigen::Vector3d centre = sphere.apex + radius * Eigen::Vector3d::UnitZ();
   const double across = (Eigen::Vector2d(x, y) - centre.head<2>()).norm();
   const double rise = std::copysign(std::sqrt(radius * radius - across * across), radius);
   const Eigen::Vector3d place(x, y, centre.z() - rise);

@@ -14,8 +14,9 @@ inline DesignGoal goal_of(Goal goal) {
 
 /// The numerical half of a guided optimisation of the rough mesh.
 template <class Exec>
-std::unique_ptr<GuidedStage> stage_on(SurfaceModel model, Goal goal, const Exec& executor) {
-  return std::make_unique<GuidedStageOn<Exec>>(rough_mesh(), kSetup, 1.0, goal_of(goal),
+std::unique_ptr<GuidedStage> stage_on(SurfaceModel model, Goal goal, const Exec& executor,
+                                      const OpticalSetup& setup = kSetup) {
+  return std::make_unique<GuidedStageOn<Exec>>(rough_mesh(), setup, 1.0, goal_of(goal),
                                                options_of(model, ObjectiveWeights{}), executor);
 }
 

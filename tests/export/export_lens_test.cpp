@@ -7,6 +7,7 @@
 
 #include "core/error.h"
 #include "core/optics/front_placement.h"
+#include "core/optics/height_fronts.h"
 #include "core/optics/outline.h"
 #include "core/surface/mesh_io.h"
 #include "core/temp_folder.h"
@@ -151,9 +152,21 @@ TEST_F(ExportLens, ALensWithAnOutlineKeepsItsPictureAndItsVolume) {
   }
 }
 
+TEST_F(ExportLens, ALensWithAHeightMapForAFrontKeepsItsPictureAndItsVolume) {
+  source_.lens.setup.front = lensforge::testing::height_front(
+      source_.lens.setup.lens_size, {41, 33},
+      [](const Eigen::Vector2d& at) { return -0.3 + 0.3 * std::sin(0.25 * at.x()); });
+  const ExportResult result = write("lens.step");
+  ASSERT_TRUE(result.splines.has_value());
+  EXPECT_TRUE(result.splines->content.is_one_solid());
+  EXPECT_NEAR(result.splines->content.volume, result.splines->mesh_volume,
+              2e-4 * result.splines->mesh_volume);
+  EXPECT_NEAR(result.splines->picture.mae, result.metrics.at(SurfaceModel::kSmooth).mae, 1e-3);
+}
+
 TEST_F(ExportLens, ASurfaceThatReachesDownToItsFrontIsRefused) {
   source_.lens.setup.front = spherical_front(200.0, source_.lens.setup.lens_size);
-  source_.lens.setup.front->apex.z() = 5.0;
+  std::get<SphericalFront>(*source_.lens.setup.front).apex.z() = 5.0;
   EXPECT_THAT(message_of<InputError>([&] { (void)write("lens.step"); }),
               HasSubstr("reaches down to its front"));
   EXPECT_EQ(folder_.file_count(), 1U);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Solids of lenses whose front is a part of a sphere.
+// Solids of lenses whose front is a part of a sphere or a height map.
 #include "export/front_solid.h"
 
 #include <gmock/gmock.h>
@@ -8,6 +8,7 @@
 #include <string>
 
 #include "core/optics/front_placement.h"
+#include "core/optics/height_fronts.h"
 #include "core/temp_folder.h"
 #include "export/closed_solid.h"
 #include "export/iges_file.h"
@@ -33,7 +34,7 @@ const SphericalFront kFronts[] = {front_of(20.0), front_of(-20.0), front_of(150.
                                   front_of(-1e5), aside(60.0),     aside(-60.0)};
 
 /// By the rule of midpoints, which errs by a square of the cells' size.
-double volume_by_midpoints(const SphericalFront& front, const Eigen::AlignedBox2d& box, int cells) {
+double volume_by_midpoints(const Front& front, const Eigen::AlignedBox2d& box, int cells) {
   const FrontSurface surface(front);
   const Eigen::Vector2d cell = box.sizes() / cells;
   double sum = 0.0;
@@ -64,12 +65,12 @@ class FrontSolid : public ::testing::Test {
     }();
     return net;
   }
-  static SplineNet net_on(const SphericalFront& front) {
+  static SplineNet net_on(const Front& front) {
     SplineNet net = flat_net();
     net.front = front;
     return net;
   }
-  [[nodiscard]] SolidContent step_on(const SphericalFront& front) const {
+  [[nodiscard]] SolidContent step_on(const Front& front) const {
     return write_step(net_on(front), {"lens", "", "", "lensforge 9", ""}, StepSchema::kAp214,
                       folder_ / "lens.step");
   }
@@ -101,6 +102,60 @@ TEST_F(FrontSolid, IgesReadsBackAsOneClosedSolidOfTheSameVolume) {
         write_iges(net_on(front), {"lens", "", "", "lensforge 9", ""}, folder_ / "lens.igs");
     expect_solid(content, front, static_cast<int>(flat_net().patches.size()));
     EXPECT_NEAR(content.volume, net_on(front).volume(), 1e-6 * content.volume);
+  }
+}
+
+/// Waves, whose samples are no whole number of patches apart.
+HeightFront wavy() {
+  return height_front(kSize, {34, 21}, [](const Eigen::Vector2d& at) {
+    return -0.6 + 0.5 * std::sin(0.5 * at.x() + 0.3) * std::cos(0.4 * at.y());
+  });
+}
+
+TEST(FrontVolume, VolumeBelowAHeightMapIsItsIntegral) {
+  const HeightFront front = wavy();
+  for (const Eigen::AlignedBox2d& box :
+       {Eigen::AlignedBox2d(Eigen::Vector2d(0.0, 0.0), kSize),
+        Eigen::AlignedBox2d(Eigen::Vector2d(-2.0, 1.3), Eigen::Vector2d(20.1, 27.0))}) {
+    const double coarse = volume_by_midpoints(front, box, 200);
+    const double fine = volume_by_midpoints(front, box, 400);
+    EXPECT_NEAR(volume_below(front, box), fine + (fine - coarse) / 3.0, 1e-6 * box.volume());
+  }
+}
+
+TEST(FrontPatch, AHeightMapAsAPatchIsTheSameSurface) {
+  const HeightFront front = wavy();
+  const FrontSurface surface(front);
+  const SplinePatch patch = patch_of(front);
+  for (int k = 0; k <= 60 * 60; ++k) {
+    const Eigen::Vector2d at =
+        kSize.cwiseProduct(Eigen::Vector2d(k % 61, k / 61) / 60.0).cwiseMin(kSize);
+    const SplinePoint point = patch.at(at);
+    EXPECT_LT((point.xy - at).norm(), 1e-12);
+    EXPECT_NEAR(point.surface.z, surface.height(at), 1e-12);
+  }
+}
+
+/// Without OpenCASCADE, too: the back is a spline surface, turned to face down.
+TEST_F(FrontSolid, AHeightMapIsTheBackOfAClosedSolid) {
+  const HeightFront front = wavy();
+  const double facets = enclosed_volume(closed_solid(smooth_lens(121), "mesh", front));
+  const auto patches = static_cast<int>(flat_net().patches.size());
+  const SolidContent step = step_on(front);
+  const SolidContent iges =
+      write_iges(net_on(front), {"lens", "", "", "lensforge 9", ""}, folder_ / "lens.igs");
+  for (const SolidContent& content : {step, iges}) {
+    EXPECT_TRUE(content.is_one_solid());
+    EXPECT_EQ(content.faces, patches + 5);
+    EXPECT_NEAR(content.volume, facets, 1e-4 * facets);
+    EXPECT_NEAR(content.volume, net_on(front).volume(), 1e-6 * content.volume);
+    EXPECT_NEAR(content.low[2], -1.1, 0.02);
+  }
+  const Part21File file = parse_part21(read_bytes(folder_ / "lens.step"));
+  for (const int face : file.all("ADVANCED_FACE")) {
+    const auto parts = split_parameters(file.records.at(face).parameters);
+    if (parts.at(0) != "'back'") continue;
+    EXPECT_EQ(parts.at(3), ".F.");
   }
 }
 

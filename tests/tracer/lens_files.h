@@ -19,7 +19,7 @@ struct Mesh {
   std::vector<std::array<int, 3>> triangles;
 };
 
-/// target.exr: linear light, row by row from the top.
+/// target.exr: linear light, row by row from the top; or front.exr: heights, mm.
 struct Picture {
   int columns = 0;
   int rows = 0;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // lens_tracer FOLDER MODEL: what a lens projects, judged from its folder alone. It reads lens.json,
-// surface.ply and target.exr as docs/interface.md describes them and shares no code with the
-// program. Facets are divided and traced point by point; of the other models the ray of every
+// surface.ply, target.exr and front.exr as docs/interface.md describes them and shares no code with
+// the program. Facets are divided and traced point by point; of the other models the ray of every
 // vertex is traced, and its landing points are interpolated, as that page says.
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -125,7 +125,7 @@ void print_errors(const Traced& traced, const Picture& target) {
 }
 
 void judge(const std::string& folder, const std::string& model) {
-  const TracedLight light(read_json(folder + "/lens.json"));
+  const TracedLight light(read_json(folder + "/lens.json"), folder);
   const Picture target = read_picture(folder + "/target.exr");
   print_errors(trace(light, read_mesh(folder + "/surface.ply"), model, target), target);
 }

@@ -32,7 +32,7 @@ void refuse_unless(bool known, const std::string& what) {
 
 }  // namespace
 
-TracedLight::TracedLight(const json& lens)
+TracedLight::TracedLight(const json& lens, const std::string& folder)
     : mirror_(lens.at("mode") == "reflect"),
       direction_(Vec3::UnitZ()),
       apex_(Vec3::Zero()),
@@ -59,6 +59,9 @@ TracedLight::TracedLight(const json& lens)
   if (front.at("type") == "sphere") {
     radius_ = front.at("radius");
     apex_ = vec3(front.at("apex"));
+  } else if (front.at("type") == "heights") {
+    const std::string file = folder + "/" + front.at("file").get<std::string>();
+    heights_ = HeightMap(read_picture(file), vec2(front.at("size")));
   } else {
     refuse_unless(front.at("type") == "flat", "this front");
     apex_.z() = front.at("z");
@@ -66,6 +69,10 @@ TracedLight::TracedLight(const json& lens)
 }
 
 std::optional<TracedLight::Front> TracedLight::front_at(const Vec2& place) const {
+  if (heights_) {
+    const HeightMap::Point p = heights_->at(place);
+    return Front{{place.x(), place.y(), p.z}, Vec3(-p.slope.x(), -p.slope.y(), 1.0).normalized()};
+  }
   if (radius_ == 0.0) return Front{{place.x(), place.y(), apex_.z()}, Vec3::UnitZ()};
   const Vec3 middle = apex_ + Vec3(0.0, 0.0, radius_);
   const double rest = radius_ * radius_ - (place - middle.head<2>()).squaredNorm();

@@ -3,7 +3,9 @@
 
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <string>
 
+#include "tracer/height_map.h"
 #include "tracer/lens_files.h"
 
 namespace tracer {
@@ -17,8 +19,9 @@ struct Ray {
 /// The light of a lens.json, followed ray by ray. Millimetres.
 class TracedLight {
  public:
+  /// @param folder  of the lens, where a front's heights lie.
   /// @throw std::runtime_error if the file tells of something that is not followed.
-  explicit TracedLight(const nlohmann::json& lens);
+  TracedLight(const nlohmann::json& lens, const std::string& folder);
 
   /// The ray to a point of the surface; none where no light comes to it.
   [[nodiscard]] std::optional<Ray> ray_to(const Vec3& p) const;
@@ -46,7 +49,8 @@ class TracedLight {
   std::optional<Vec3> source_;  ///< Of light from a point.
   Vec3 direction_;              ///< Of parallel light.
   std::optional<Vec3> axis_;    ///< Of a flat source.
-  double radius_ = 0.0;         ///< Of a spherical front; 0 of a flat one.
+  double radius_ = 0.0;         ///< Of a spherical front; 0 of another.
+  std::optional<HeightMap> heights_;
   Vec3 apex_;
   Vec3 centre_;  ///< Of the screen.
   Vec3 right_;

@@ -30,7 +30,8 @@ function indexAt(index, abbe, wavelength) {
 }
 
 // The lens as it stands in lens.json: where its middle is, how its light comes, where the screen is.
-function readSetup(setup) {
+// map: of a front that is a height map, its samples along x and y; else null.
+function readSetup(setup, map) {
   const middle = [setup.lens_size[0] / 2, setup.lens_size[1] / 2, 0];
   const point = setup.source.type === "point" ? setup.source.position : null;
   const light = point ? unit(sum([1, middle], [-1, point])) : setup.source.direction;
@@ -46,6 +47,8 @@ function readSetup(setup) {
     loses: setup.fresnel === true,
     front: setup.front && setup.front.type === "sphere"
       ? [...setup.front.apex, 1 / setup.front.radius] : [0, 0, 0, 0],
+    samples: map ? [map.columns, map.rows, (map.columns - 1) / setup.lens_size[0],
+                    (map.rows - 1) / setup.lens_size[1]] : [0, 0, 0, 0],
     index: setup.ior,
     size: screen.size, right: screen.right, up: screen.up,
     away: dot(away, towards) < 0 ? sum([-1, away]) : away,
@@ -103,10 +106,11 @@ function placedOptics(optics, settings, at) {
   const way = parallel ? lamp : sum([1, optics.middle], [-1, lamp]);
   const tilt = (v) => rotated(rotated(v, optics.right, settings.tiltRight * kDegree), optics.up,
                               settings.tiltUp * kDegree);
-  const bent = optics.front[3] !== 0;
+  const bent = optics.front[3] !== 0 || optics.samples[0] > 0;
   return {
     mirror: optics.mirror, eta: indexAt(settings.index, settings.abbe, settings.wavelength),
     lamp: [...lamp, parallel ? 0 : 1], front: optics.front,
+    samples_: optics.samples,
     // A parallel beam through a flat front has one slope; others come to 1e-6 of a millimetre.
     steps: optics.mirror ? 0 : parallel && !bent ? 1 : 16,
     source: [...unit(way), optics.flat && !parallel ? 1 : 0],

@@ -3,7 +3,7 @@
 
 const find = (name) => document.querySelector(`[data-${name}]`);
 const data = JSON.parse(document.getElementById("light-data").textContent);
-const optics = readSetup(data.setup);
+const optics = readSetup(data.setup, data.front);
 const [kColumns, kRows] = optics.pixels;
 const target = pictureOf(data.target);
 
@@ -57,7 +57,7 @@ function showPlain(why) {
 }
 
 // ---- The picture as it grows ----
-const projector = lacking ? null : new Projector(find("wall"), gl, optics.pixels);
+const projector = lacking ? null : new Projector(find("wall"), gl, optics.pixels, data.front);
 const decoded = new Map();
 const shownOf = () => data.surfaces.find((surface) => surface.id === settings.surface);
 let points = [], total = 0, each = 1, asked = false, waiting = [], drawn = null, swing = null;

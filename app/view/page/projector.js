@@ -10,8 +10,9 @@ function missingFeature(gl) {
 }
 
 class Projector {
-  // pixels: of the picture, columns and rows.
-  constructor(canvas, gl, pixels) {
+  // pixels: of the picture, columns and rows. front: coefficients of a front that is a height map, or
+  // null.
+  constructor(canvas, gl, pixels, front) {
     this.canvas = canvas;
     this.gl = gl;
     this.pixels = pixels;
@@ -30,6 +31,16 @@ class Projector {
     this.samples = this.target(samples, pixels[0] * this.each, pixels[1] * this.each);
     this.mean = this.target(gl.RGBA32F, pixels[0], pixels[1]);
     this.passes = 0;
+    this.heights = this.heightMap(front);
+  }
+
+  heightMap(front) {
+    const gl = this.gl, width = front ? front.columns + 4 : 1, height = front ? front.rows + 4 : 1;
+    const values = new Float32Array(width * height);
+    if (front) eachNumber(front.values, values.length, (i, value) => { values[i] = value; });
+    const made = this.texture(gl.R32F, width, height);
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, width, height, gl.RED, gl.FLOAT, values);
+    return made;
   }
 
   program(vertex, fragment) {
@@ -145,10 +156,11 @@ class Projector {
     const { places, slopes, corners, landings, densities } = this.lists;
     const numbers = { ...this.surfaceNumbers(), ...optics };
     const rows = (count) => Math.ceil(count / kSide);
-    this.use(this.landing, { ...numbers, count: this.landings }, { places, slopes, corners });
+    this.use(this.landing, { ...numbers, count: this.landings },
+             { places, slopes, corners, heights: this.heights });
     this.fill(landings, rows(this.landings));
     this.use(this.triangle, { ...numbers, count: this.surface.triangles },
-             { places, slopes, corners, landings });
+             { places, slopes, corners, landings, heights: this.heights });
     this.fill(densities, rows(this.surface.triangles));
   }
 

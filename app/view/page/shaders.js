@@ -39,16 +39,51 @@ uniform bool mirror;
 uniform float eta;         // Index of the lens.
 uniform vec4 lamp;         // w 0: direction of parallel light; 1: place of a point.
 uniform vec4 front;        // Apex and curvature of a lens's entry face.
+uniform sampler2D heights; // Coefficients of a front that is a height map, two beyond each edge.
+uniform vec4 samples_;     // Of the map along x and y, 0 if there is none, and their steps a mm.
 uniform int steps;         // Towards where a ray enters.
 uniform vec3 centre, right, up, away;  // Of the screen.
 
 struct Ray { vec3 entry; vec3 way; float cosine; };
 
+// The cubic B-splines around a place, in samples, and their slopes; straight on beyond the ends.
+void splines(float t, float count, out vec4 value, out vec4 slope, out int first) {
+  float inside = clamp(t, -1.0, count), cell = min(floor(inside), count - 1.0);
+  float s = inside - cell, r = 1.0 - s;
+  first = int(cell) + 1;
+  value = vec4(r * r * r / 6.0, 2.0 / 3.0 - s * s * (1.0 - 0.5 * s),
+               2.0 / 3.0 - r * r * (1.0 - 0.5 * r), s * s * s / 6.0);
+  slope = vec4(-0.5 * r * r, s * (1.5 * s - 2.0), r * (2.0 - 1.5 * r), 0.5 * s * s);
+  value += (t - inside) * slope;
+}
+
+// Height and slopes of a map.
+vec3 on_map(vec2 x) {
+  vec4 u, u_slope, v, v_slope;
+  int i, j;
+  splines(x.x * samples_.z, samples_.x, u, u_slope, i);
+  splines(x.y * samples_.w, samples_.y, v, v_slope, j);
+  vec3 sum = vec3(0.0);
+  for (int k = 0; k < 4; ++k) {
+    vec4 c;
+    for (int l = 0; l < 4; ++l) c[l] = texelFetch(heights, ivec2(i + l, j + k), 0).x;
+    sum += vec3(v[k] * dot(u, c), v[k] * dot(u_slope, c), v_slope[k] * dot(u, c));
+  }
+  return vec3(sum.x, sum.yz * samples_.zw);
+}
+
 Ray through_front(vec2 x) {
-  vec2 r = x - front.xy;
-  float root = sqrt(max(0.0, 1.0 - front.w * front.w * dot(r, r)));
-  vec3 e = vec3(x, front.z + front.w * dot(r, r) / (1.0 + root));
-  vec3 n = normalize(vec3(-front.w * r / max(root, 1e-6), 1.0));
+  vec3 e, n;
+  if (samples_.x > 0.0) {
+    vec3 h = on_map(x);
+    e = vec3(x, h.x);
+    n = normalize(vec3(-h.yz, 1.0));
+  } else {
+    vec2 r = x - front.xy;
+    float root = sqrt(max(0.0, 1.0 - front.w * front.w * dot(r, r)));
+    e = vec3(x, front.z + front.w * dot(r, r) / (1.0 + root));
+    n = normalize(vec3(-front.w * r / max(root, 1e-6), 1.0));
+  }
   vec3 a = lamp.w > 0.0 ? normalize(e - lamp.xyz) : lamp.xyz;
   float c = dot(n, a);
   float inside = sqrt(max(0.0, 1.0 - (1.0 - c * c) / (eta * eta)));

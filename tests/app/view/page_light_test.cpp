@@ -12,6 +12,7 @@
 #include "app/view/lens_view.h"
 #include "app/view/view_page.h"
 #include "core/optics/front_placement.h"
+#include "core/optics/height_fronts.h"
 #include "core/optics/light_path.h"
 #include "core/surface/grid_mesh.h"
 #include "core/temp_folder.h"
@@ -61,6 +62,15 @@ void point_concave_front(OpticalSetup& setup) {
   point_source(setup);
   setup.front = spherical_front(-120.0, kSize);
 }
+void wavy_front(OpticalSetup& setup) {
+  setup.front = testing::height_front(kSize, {49, 41}, [](const Eigen::Vector2d& at) {
+    return -0.25 + 0.25 * std::sin(0.3 * at.x()) * std::cos(0.25 * at.y() + 0.3);
+  });
+}
+void point_wavy_front(OpticalSetup& setup) {
+  point_source(setup);
+  wavy_front(setup);
+}
 void wide_source(OpticalSetup& setup) { setup.extent.width = 0.03; }
 void wide_point(OpticalSetup& setup) {
   point_source(setup);
@@ -77,6 +87,8 @@ constexpr KindOfLight kKinds[] = {{"AlongZ", along_z},
                                   {"PointOnMirror", lit_mirror},
                                   {"ConvexFront", convex_front},
                                   {"PointConcaveFront", point_concave_front},
+                                  {"WavyFront", wavy_front},
+                                  {"PointWavyFront", point_wavy_front},
                                   {"WideSource", wide_source},
                                   {"WidePoint", wide_point}};
 

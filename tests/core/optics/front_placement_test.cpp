@@ -13,10 +13,11 @@ namespace {
 TEST(FrontPlacement, AFrontAsideMovesTheLightByItsPower) {
   for (const double radius : {140.0, -160.0}) {
     OpticalSetup setup;
-    setup.front = spherical_front(radius, setup.lens_size);
+    const SphericalFront front = spherical_front(radius, setup.lens_size);
+    setup.front = front;
     const double shift = shift_by_front(setup, {50.0, 50.0, 10.0});
     const double phi = (setup.ior - 1.0) / (setup.ior * radius);
-    const double t = 10.0 - setup.front->apex.z();
+    const double t = 10.0 - front.apex.z();
     const double turn = setup.ior * phi / (1.0 - t * phi);
     EXPECT_NEAR(shift / (std::abs(turn) * (setup.focal_length - 10.0)), 1.0, 1e-6);
   }

@@ -54,7 +54,9 @@ INSTANTIATE_TEST_SUITE_P(
         KindOfLight{"ConvexFront", front_setup(140.0)},
         KindOfLight{"ConcaveFront", front_setup(-160.0)},
         KindOfLight{"PointConvexFront", point_front_setup(130.0, Emission::kIsotropic)},
-        KindOfLight{"PointConcaveFront", point_front_setup(-150.0, Emission::kLambertian)}),
+        KindOfLight{"PointConcaveFront", point_front_setup(-150.0, Emission::kLambertian)},
+        KindOfLight{"HeightMap", map_setup()},
+        KindOfLight{"PointHeightMap", point_map_setup(Emission::kLambertian)}),
     [](const auto& kind) -> std::string { return kind.param.name; });
 
 TEST(LightPath, FrontViewRunsXAndYAgainstColumnsAndRows) {

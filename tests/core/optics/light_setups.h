@@ -5,7 +5,9 @@
 #include <Eigen/Geometry>
 #include <cmath>
 #include <numbers>
+#include <variant>
 
+#include "core/optics/height_fronts.h"
 #include "core/optics/optical_setup.h"
 #include "design/snell.h"
 
@@ -71,6 +73,32 @@ inline OpticalSetup point_front_setup(double radius, Emission emission) {
   return setup;
 }
 
+/// A polynomial of third order, which a map of it is but for rounding: its samples have few bits.
+inline double cubic_height(const Eigen::Vector2d& xy) {
+  const double x = xy.x() - 50.0;
+  const double y = xy.y() - 40.0;
+  return x * x / 256.0 + y * y / 512.0 + x * y / 2048.0 + x * x * x / 131072.0 - 14.0;
+}
+inline Eigen::Vector3d cubic_normal(const Eigen::Vector2d& xy) {
+  const double x = xy.x() - 50.0;
+  const double y = xy.y() - 40.0;
+  return Eigen::Vector3d(-(x / 128.0 + y / 2048.0 + 3.0 * x * x / 131072.0),
+                         -(y / 256.0 + x / 2048.0), 1.0)
+      .normalized();
+}
+
+inline OpticalSetup map_setup() {
+  OpticalSetup setup = oblique_setup();
+  setup.front = height_front(setup.lens_size, {5, 5}, cubic_height);
+  return setup;
+}
+
+inline OpticalSetup point_map_setup(Emission emission) {
+  OpticalSetup setup = point_setup(emission);
+  setup.front = map_setup().front;
+  return setup;
+}
+
 inline OpticalSetup losing(OpticalSetup setup) {
   setup.fresnel = true;
   return setup;
@@ -81,19 +109,23 @@ struct KindOfLight {
   OpticalSetup setup;
 };
 
-/// Normal of a spherical front at a place, towards the inside, and its point there: on the line to
-/// the sphere's centre.
-inline Eigen::Vector3d front_normal(const SphericalFront& front, const Eigen::Vector3d& e) {
+/// Normal of a front at a place, towards the inside, and its point there: of a sphere on the line
+/// to its centre, of a height map those of the polynomial.
+inline Eigen::Vector3d front_normal(const Front& any, const Eigen::Vector3d& e) {
+  if (std::holds_alternative<HeightFront>(any)) return cubic_normal(e.head<2>());
+  const auto& front = std::get<SphericalFront>(any);
   const Eigen::Vector3d centre = front.apex + front.radius * Eigen::Vector3d::UnitZ();
   return (centre - e).normalized() * (front.radius > 0.0 ? 1.0 : -1.0);
 }
-inline Eigen::Vector3d front_point(const SphericalFront& front, const Eigen::Vector2d& xy) {
+inline Eigen::Vector3d front_point(const Front& any, const Eigen::Vector2d& xy) {
+  if (std::holds_alternative<HeightFront>(any)) return {xy.x(), xy.y(), cubic_height(xy)};
+  const auto& front = std::get<SphericalFront>(any);
   const double across = (xy - front.apex.head<2>()).norm();
   const double depth = std::abs(front.radius) * std::cos(std::asin(across / front.radius));
   return {xy.x(), xy.y(), front.apex.z() + front.radius - (front.radius > 0.0 ? depth : -depth)};
 }
 
-/// The ray that comes to a point through a spherical front: its place on the front is moved by what
+/// The ray that comes to a point through a curved front: its place on the front is moved by what
 /// the ray misses the point by, until it meets it.
 struct FrontRay {
   Eigen::Vector3d place;

@@ -306,7 +306,7 @@ TEST(Lens, WhatThisVersionCannotDoYetIsSaid) {
   EXPECT_EQ(refusal([](json& document) { document["source"]["type"] = "sun"; }),
             "field 'source.type' is \"sun\": it must be \"parallel\" or \"point\"");
   EXPECT_EQ(refusal([](json& document) { document["front"]["type"] = "cone"; }),
-            "field 'front.type' is \"cone\": it must be \"flat\" or \"sphere\"");
+            "field 'front.type' is \"cone\": it must be \"flat\", \"sphere\" or \"heights\"");
 }
 
 TEST(Lens, ValuesOutOfRangeAreRefused) {

@@ -4,7 +4,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <variant>
+#include <vector>
+
 #include "core/error.h"
+#include "core/image/height_grid.h"
+#include "core/optics/height_fronts.h"
 #include "core/temp_folder.h"
 
 namespace lensforge {
@@ -53,6 +58,44 @@ TEST(SetupJson, EveryLightAndScreenComesBackToTheBit) {
   setup.point.reset();
   setup.light = Eigen::Vector3d(0.6, 0.0, -0.8);
   EXPECT_EQ(written_and_read(setup), setup);
+}
+
+TEST(SetupJson, AFrontComesBackToTheBit) {
+  OpticalSetup setup;
+  setup.front = SphericalFront{123.4, {50.1, 49.0, -0.3}};
+  EXPECT_EQ(written_and_read(setup), setup);
+  setup.lens_size = {30.1, 24.7};
+  setup.front = testing::height_front(setup.lens_size, {6, 5}, [](const Eigen::Vector2d& at) {
+    return -0.1 - 1e-3 * at.squaredNorm();
+  });
+  const testing::TempFolder folder;
+  write_heights(std::get<HeightFront>(*setup.front).spline->grid(), folder / "front.exr");
+  const json document = json::parse(setup_json(setup).dump());
+  EXPECT_EQ(document["front"], json::parse(R"({"type": "heights", "file": "front.exr",
+                                              "size": [30.1, 24.7]})"));
+  const JsonFields fields(document, "lens.json");
+  const OpticalSetup read = read_setup(fields, folder.path());
+  validate(read);
+  EXPECT_EQ(read, setup);
+}
+
+TEST(SetupJson, AHeightMapThatIsNoFrontOfTheLensIsRefused) {
+  const testing::TempFolder folder;
+  write_heights({4, 4, std::vector<float>(16, -1.0F)}, folder / "front.exr");
+  const auto refusal_of = [&](const json& front) {
+    json document = json::parse(setup_json(OpticalSetup{}).dump());
+    document["front"] = front;
+    return message_of<InputError>(
+        [&] { validate(read_setup(JsonFields(document, "lens.json"), folder.path())); });
+  };
+  const json size{100.0, 90.0};
+  EXPECT_THAT(refusal_of({{"type", "heights"}, {"file", "front.exr"}, {"size", size}}),
+              HasSubstr("front.size is 100  90: it must be lens_size"));
+  EXPECT_THAT(refusal_of({{"type", "heights"}, {"file", "../front.exr"}, {"size", size}}),
+              HasSubstr("the name of a file in the lens folder"));
+  EXPECT_THAT(refusal_of({{"type", "heights"}, {"file", "other.exr"}, {"size", size}}),
+              HasSubstr("other.exr"));
+  EXPECT_THAT(refusal_of({{"type", "cone"}}), HasSubstr(R"("flat", "sphere" or "heights")"));
 }
 
 TEST(SetupJson, AnExtendedSourceComesBackWithItsShape) {
