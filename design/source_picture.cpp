@@ -9,6 +9,7 @@
 #include "core/optics/light_colors.h"
 #include "core/optics/source_points.h"
 #include "design/flux/source_blur.h"
+#include "design/flux_of_surface.h"
 #include "design/picture_values.h"
 #include "design/render_lens.h"
 
@@ -64,6 +65,24 @@ std::vector<double> picture_by_convolution(const OpticalSetup& setup, double z,
   const std::vector<double> parts = picture(sharp);
   const std::span<const double> pixels = blur.apply(executor, parts);
   return {pixels.begin(), pixels.end()};
+}
+
+Image corrected_for_convolution(const Image& target, const SurfaceMesh& mesh,
+                                const OpticalSetup& setup, SurfaceModel model,
+                                const Executor& executor) {
+  const auto picture = [&](const OpticalSetup& light) {
+    return flux_of_surface(mesh, light, model, executor);
+  };
+  const std::vector<double> exact = picture(setup);
+  const std::vector<double> convolved =
+      picture_by_convolution(setup, mesh.vertices.row(2).mean(), picture, executor);
+  Image corrected = target;
+  for (std::size_t i = 0; i < exact.size(); ++i) {
+    const double wrong = target.total() * (exact[i] - convolved[i]);
+    float& value = corrected.values()[i];
+    value = std::max(0.0F, value - static_cast<float>(wrong));
+  }
+  return corrected;
 }
 
 SourceCheck check_source(const Lens& lens, const Executor& executor) {

@@ -28,6 +28,13 @@ std::vector<double> picture_under(const OpticalSetup& setup, int count,
 std::vector<double> picture_by_convolution(const OpticalSetup& setup, double z,
                                            const PointPicture& picture, const Executor& executor);
 
+/// The picture that an optimiser that goes by a convolution has to aim at, so that the surface's
+/// exact one comes out as `target`: the target less what the convolution gets wrong of the surface
+/// as it is, at least 0. @pre the source has an extent; target has setup.pixels.
+Image corrected_for_convolution(const Image& target, const SurfaceMesh& mesh,
+                                const OpticalSetup& setup, SurfaceModel model,
+                                const Executor& executor);
+
 /// How nearly the picture of a lens under its extended source is known.
 struct SourceCheck {
   double blur = 0.0;  ///< Width of the source's image on the screen, pixels.

@@ -11,6 +11,7 @@
 #include "core/value_slope.h"
 #include "design/schedule/spline_start.h"
 #include "design/schedule/start_surface.h"
+#include "design/source_picture.h"
 
 namespace lensforge {
 namespace {
@@ -60,13 +61,29 @@ SurfaceMesh level_start(const DesignTask& task, const Level& level, const Surfac
   return regrid(mesh, task.setup.lens_size, level.grid);
 }
 
+/// True if the last round left something that the light of an extended source shows and its
+/// convolution does not. A spline's part in it is what its mesh's was.
+bool needs_correction(const LevelProblem& problem, const Level& level, const Checkpoint& state) {
+  return !problem.setup.extent.none() && !level.spline && state.round > 0;
+}
+
 Ending run_level(const DesignTask& task, DesignLog& log, Checkpoint& state) {
   const Level& level = task.levels[static_cast<std::size_t>(state.level)];
   state.mesh = level_start(task, level, state.mesh);
-  const LevelProblem problem = make_problem(task, level, state.mesh.triangle_count());
-  GuidedOptimization stage(state.mesh, problem.setup, problem.target, problem.objective,
-                           task.executor);
+  LevelProblem problem = make_problem(task, level, state.mesh.triangle_count());
+  const Image target = problem.target;
+  const auto stage_of = [&] {
+    return GuidedOptimization(state.mesh, problem.setup, problem.target, problem.objective,
+                              task.executor);
+  };
+  GuidedOptimization stage = stage_of();
   while (state.round < level.rounds) {
+    if (needs_correction(problem, level, state)) {
+      problem.target = corrected_for_convolution(target, state.mesh, problem.setup,
+                                                 problem.objective.model, task.executor);
+      stage = stage_of();
+      state.value = stage.value(state.mesh);
+    }
     Ending ending = run_round({task, level, problem, stage, log}, state);
     if (ending.ended()) return ending;
     if (state.round < level.rounds) save(task, log, state);
