@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
 #include <filesystem>
-#include <map>
 #include <optional>
 #include <sstream>
 #include <string>
 
+#include "app/cam_output.h"
 #include "app/cam_settings.h"
 #include "app/commands.h"
 #include "app/console.h"
@@ -44,12 +44,6 @@ std::string surface_text(const RenderedSurface& surface) {
          fixed(100.0 * surface.quality.leakage, 2) + " %\n";
 }
 
-std::string limit_text(const LimitCheck& check) {
-  return "  limit not met: " + check.name + " " + fixed(check.value, check.decimals) +
-         (check.unit.empty() ? "" : " " + check.unit) + ", at most " +
-         fixed(check.limit, check.decimals) + "\n";
-}
-
 std::string summary_text(const fs::path& folder, const CamResult& result) {
   const ReportData& report = result.report;
   std::string text = folder.string() + ": " + result.message + "\n";
@@ -61,10 +55,8 @@ std::string summary_text(const fs::path& folder, const CamResult& result) {
     for (const LeakPlace& place : report.places) text += "  " + leak_words(place) + "\n";
     if (!report.tolerances.empty()) text += "  " + tolerance_words(report.tolerances) + "\n";
   }
-  for (const LimitCheck& check : report.verdict.checks) {
-    if (!check.passes()) text += limit_text(check);
-  }
-  return text + "  Z         program Z = lens z + " + fixed(report.z_offset, 4) + " mm\n";
+  return text + missed_limits_text(report.verdict) + "  Z         program Z = lens z + " +
+         fixed(report.z_offset, 4) + " mm\n";
 }
 
 nlohmann::json summary_json(const OptionSet& options, const CamResult& result) {
@@ -94,25 +86,9 @@ CamResult run(const OptionSet& options, const CamOptions& cam, const Lens& lens,
   return make_cut(lens, cam, out, executor, control);
 }
 
-/// The option that states a limit of quality.
-const char* option_of(const std::string& key) {
-  static const std::map<std::string, const char*> options{{"leakage", "--max-leakage"},
-                                                          {"dark_flux", "--max-dark"},
-                                                          {"mae_increase", "--max-mae-increase"},
-                                                          {"excess", "--max-excess"},
-                                                          {"slope", "--max-slope"},
-                                                          {"fillet_depth", "--max-fillet"}};
-  return options.at(key);
-}
-
-/// Limits of quality count only where they were stated; their defaults are advice.
 int exit_code(const OptionSet& options, const CamResult& result) {
   if (!result.done()) return kInterrupted;
-  for (const LimitCheck& check : result.report.verdict.checks) {
-    const bool counts = !check.of_quality || options.given(option_of(check.key));
-    if (counts && !check.passes()) return kLimitMissed;
-  }
-  return kDone;
+  return stated_limits_hold(options, result.report.verdict) ? kDone : kLimitMissed;
 }
 
 std::string choice_text(const ReportChoice& choice) {

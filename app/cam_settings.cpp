@@ -4,7 +4,6 @@
 #include "cam/cam_fields.h"
 
 namespace lensforge::app {
-namespace {
 
 namespace fs = std::filesystem;
 
@@ -12,8 +11,6 @@ std::string folder_name(const fs::path& folder) {
   const fs::path whole = fs::absolute(folder).lexically_normal();
   return (whole.has_filename() ? whole : whole.parent_path()).filename().string();
 }
-
-}  // namespace
 
 void add_cam_options(OptionSet& options, CamSettings& settings) {
   options.positional("DIR", settings.source, "lens folder");

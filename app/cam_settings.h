@@ -24,6 +24,9 @@ struct CamSettings {
   }
 };
 
+/// What a folder is called, also where it is named as "." or with a slash behind it.
+std::string folder_name(const std::filesystem::path& folder);
+
 /// Adds every option of the command.
 void add_cam_options(OptionSet& options, CamSettings& settings);
 

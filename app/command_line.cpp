@@ -35,6 +35,8 @@ constexpr std::array kSubcommands{
     Subcommand{"render", render_command, "render DIR|MESH|SOLID",
                "lens, mesh or STEP solid to picture and metrics"},
     Subcommand{"cam", cam_command, "cam DIR", "lens folder to G-code (into DIR/cam/)"},
+    Subcommand{"nest", nest_command, "nest DIR DIR... --out DIR",
+               "lens folders on one blank to G-code"},
     Subcommand{"coupon", coupon_command, "coupon --out DIR",
                "test piece that calibrates a workshop"},
     Subcommand{"export", export_command, "export DIR --out FILE",

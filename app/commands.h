@@ -13,6 +13,7 @@ using Arguments = std::vector<std::string>;
 int design_command(const Arguments& arguments);
 int render_command(const Arguments& arguments);
 int cam_command(const Arguments& arguments);
+int nest_command(const Arguments& arguments);
 int coupon_command(const Arguments& arguments);
 int export_command(const Arguments& arguments);
 int send_command(const Arguments& arguments);

@@ -136,6 +136,7 @@ void describe_setup(Description& d, const OpticalSetup& setup) {
   for (const char* key : {"mode", "screen"}) d.json[key] = all.at(key);
   if (!mirror) d.json["front"] = all.at("front");
   if (setup.outline) d.json["outline"] = all.at("outline");
+  if (!setup.spectrum.none()) d.json["spectrum"] = all.at("spectrum");
   d.json["light"] = all.at("source");  // "source" is what was asked about.
 }
 

@@ -87,7 +87,7 @@ OptionTable<O> tool_rows() {
                 "feed straight down"),
       diameter("--rough-tool", kRougher, kRougherNumber, "diameter of the roughing tool"),
       R::flag("--force", &O::force,
-              "replace files in DIR/cam that lensforge did not write, or that were changed since")};
+              "replace files that lensforge did not write, or that were changed since")};
 }
 
 OptionTable<O> raster_rows() {

@@ -46,6 +46,13 @@ HeightField above_table(const HeightField& field) {
                    "larger --thickness");
 }
 
+GcodeMotion moved(GcodeMotion motion, const Eigen::Vector2d& by) {
+  motion.start.head<2>() += by;
+  motion.end.head<2>() += by;
+  if (motion.arc) motion.arc->centre.head<2>() += by;
+  return motion;
+}
+
 double z_offset_of(ZZero zero, double surface_top, double blank_top) {
   switch (zero) {
     case ZZero::kStock:
@@ -60,9 +67,11 @@ double z_offset_of(ZZero zero, double surface_top, double blank_top) {
 
 }  // namespace
 
-CutPlan::CutPlan(const Lens& lens, const CamOptions& options, const Executor& executor)
+CutPlan::CutPlan(const Lens& lens, const CamOptions& options, const Executor& executor,
+                 const CutPlace& place)
     : lens_(lens),
       options_(options),
+      place_(place),
       executor_(executor),
       mould_lens_(mould_to_cut(lens, options)),
       model_(model_to_cut(lens, options)),
@@ -166,7 +175,6 @@ OutlineCut CutPlan::outline_cut() const {
                   rough.ramp_angle_deg, safe_z(), bottom, options_.workshop.process.clearance});
 }
 
-/// Of the lens, or its rectangle.
 std::vector<Eigen::Vector2d> CutPlan::outline() const {
   if (lens_.setup.outline) return lens_.setup.outline->points;
   const Eigen::Vector2d& size = lens_.setup.lens_size;
@@ -249,11 +257,21 @@ void CutPlan::read_motions(const ProgramFiles& programs, int tool,
                            const std::function<void(const GcodeMotion&)>& take,
                            const RunControl& control) const {
   for (const ProgramFile& file : programs.files) {
-    const bool uses = std::any_of(
-        file.operations.begin(), file.operations.end(),
-        [&](const OperationTime& time) { return programs.summaries[time.operation].tool == tool; });
-    if (!uses) continue;
-    read_path(file.beside.empty() ? file.path : file.beside, options_.post.reader, tool, take,
+    const auto any = [&](const auto& holds) {
+      return std::any_of(file.operations.begin(), file.operations.end(), holds);
+    };
+    if (!any([&](const OperationTime& time) {
+          return programs.summaries[time.operation].tool == tool;
+        })) {
+      continue;
+    }
+    const auto take_own = [&](const GcodeMotion& motion) {
+      const bool own = any([&](const OperationTime& time) {
+        return motion.line >= time.line && motion.line < time.end;
+      });
+      if (own) take(moved(motion, -place_.corner));
+    };
+    read_path(file.beside.empty() ? file.path : file.beside, options_.post.reader, tool, take_own,
               control);
   }
 }

@@ -35,12 +35,23 @@
 
 namespace lensforge {
 
+/// Where a lens lies in programs that cut several.
+struct CutPlace {
+  Eigen::Vector2d corner = Eigen::Vector2d::Zero();  ///< X and Y of its lower left corner, mm.
+  /// What looks over the programs of all lenses; both must outlive the plan. None: its own do.
+  const CollisionCheck* collisions = nullptr;
+  const ProgramWatch* watch = nullptr;
+
+  [[nodiscard]] bool shared() const { return watch != nullptr; }
+};
+
 /// What is cut out of which blank, and the operations that do it.
 class CutPlan {
  public:
   /// @param lens  must outlive the plan. @pre validate(options, lens.setup) passed.
   /// @throw InputError naming the surface if it is no height field over the lens's rectangle.
-  CutPlan(const Lens& lens, const CamOptions& options, const Executor& executor);
+  CutPlan(const Lens& lens, const CamOptions& options, const Executor& executor,
+          const CutPlace& place = {});
   CutPlan(const CutPlan&) = delete;
   CutPlan& operator=(const CutPlan&) = delete;
 
@@ -51,12 +62,14 @@ class CutPlan {
   [[nodiscard]] ProgramSettings settings();
 
   /// The finishing ball's ways, from the exact drop curves to the written programs; the former are
-  /// handed over, so once. @pre programs() was streamed, and CamOptions::render is set.
+  /// handed over, so once. @param programs  with this plan's operations alone, in its place.
+  /// @pre programs() was streamed, and CamOptions::render is set.
   /// @throw Interrupted; InputError or RunError if a program cannot be read back.
   [[nodiscard]] FinishPaths take_finish_paths(const ProgramFiles& programs,
                                               const RunControl& control);
 
   [[nodiscard]] const CamOptions& options() const { return options_; }
+  [[nodiscard]] const CutPlace& place() const { return place_; }
   /// What is cut: the lens's surface or the mould's; mm, in a lens frame of its own.
   [[nodiscard]] const SurfaceMesh& mesh() const { return cut().surface; }
   /// Under which model the surface is cut.
@@ -83,12 +96,16 @@ class CutPlan {
   [[nodiscard]] int decimals() const { return decimals_; }
   /// What touches something that it must not, in the programs as they were read back so far.
   [[nodiscard]] const std::vector<Collision>& collisions() const {
-    return collisions_.collisions();
+    return (place_.shared() ? *place_.collisions : collisions_).collisions();
   }
   /// What else was found in them.
-  [[nodiscard]] const ProgramWatch& watch() const { return watch_; }
+  [[nodiscard]] const ProgramWatch& watch() const {
+    return place_.shared() ? *place_.watch : watch_;
+  }
   /// How the outline is cut. @pre cuts_outline().
   [[nodiscard]] OutlineCut outline_cut() const;
+  /// Of the lens, or its rectangle; counter-clockwise, mm.
+  [[nodiscard]] std::vector<Eigen::Vector2d> outline() const;
   /// Every operation's way, thinned out, as far as programs() were streamed.
   [[nodiscard]] std::vector<ReportPath> shown_path() const;
 
@@ -102,11 +119,10 @@ class CutPlan {
   ProgramOperation semi_operation(const RunControl& control);
   ProgramOperation finish_operation(const FinishPass& pass, const RunControl& control);
   ProgramOperation pencil_operation(const RunControl& control);
-  [[nodiscard]] std::vector<Eigen::Vector2d> outline() const;
   ProgramOperation outline_operation(const RunControl& control);
   OperationSummary run_pencil(double resolution, const MoveSink& sink,
                               const RunControl& control) const;
-  /// Hands over all motions at feed with a tool.
+  /// Hands over all motions at feed with a tool in the plan's operations, lens frame's x and y.
   void read_motions(const ProgramFiles& programs, int tool,
                     const std::function<void(const GcodeMotion&)>& take,
                     const RunControl& control) const;
@@ -115,6 +131,7 @@ class CutPlan {
 
   const Lens& lens_;
   CamOptions options_;
+  CutPlace place_;
   Executor executor_;
   std::optional<Lens> mould_lens_;  ///< None if the lens itself is cut.
   SurfaceModel model_;

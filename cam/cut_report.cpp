@@ -88,8 +88,10 @@ SetupSheet setup_sheet(const CutPlan& plan, const Lens& designed) {
   sheet.part = plan.part_box();
   if (lens) sheet.part.min().z() = 0.0;  // The surface's box ends at its lowest point.
   sheet.blank = plan.blank();
-  sheet.zero = {0.0, 0.0, -plan.z_offset()};
-  sheet.zero_words = joined({"lower left corner of the ", is_mirror(designed) ? "mirror" : "lens",
+  const Eigen::Vector2d& corner = plan.place().corner;
+  sheet.zero = {-corner.x(), -corner.y(), -plan.z_offset()};
+  const char* const part = is_mirror(designed) ? "mirror" : "lens";
+  sheet.zero_words = joined({"lower left corner of the ", plan.place().shared() ? "blank" : part,
                              ", ", words_for(options.z_zero)});
   sheet.up_words = up_words(options.part, designed);
   if (lens && designed.setup.front) {

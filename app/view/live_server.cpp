@@ -2,10 +2,11 @@
 #include "app/view/live_server.h"
 
 #include <httplib.h>
+#include <sys/socket.h>
 
-#include <array>
+#include <chrono>
+#include <future>
 #include <mutex>
-#include <thread>
 #include <utility>
 
 #include "core/error.h"
@@ -18,6 +19,16 @@ namespace lensforge {
 namespace {
 
 constexpr const char* kHost = "127.0.0.1";
+
+/// How long an idle connection of a browser is kept, and with it the end of a design at most.
+constexpr std::chrono::seconds kIdle{1};
+
+/// Without SO_REUSEPORT, which httplib sets: a second server would share the port. A port whose
+/// last connections have just been closed is free.
+void take_port_alone(socket_t socket) {
+  const int yes = 1;
+  setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
+}
 
 /// A page's own address counts, whatever name led to this port: no other page may read or stop a
 /// design.
@@ -53,7 +64,7 @@ struct LiveServer::Listener {
   std::mutex mutex;
   LiveState state;
   std::once_flag stopped;
-  std::thread thread;
+  std::future<void> listening;
 
   void answer(const char* path, const char* type, std::string LiveState::*member) {
     server.Get(path, [this, type, member](const httplib::Request&, httplib::Response& response) {
@@ -71,8 +82,8 @@ LiveServer::LiveServer(int port, const std::string& name, std::string target,
                        std::function<void()> stop)
     : listener_(std::make_unique<Listener>()) {
   Listener& l = *listener_;
-  // Without it a second server would share the port.
-  l.server.set_socket_options([](socket_t) {});
+  l.server.set_socket_options(take_port_alone);
+  l.server.set_keep_alive_timeout(kIdle.count());
   l.server.set_default_headers({{"Cache-Control", "no-store"}});
   l.server.set_pre_routing_handler([&l](const auto& request, auto& response) {
     if (is_own(request, l.port)) return httplib::Server::HandlerResponse::Unhandled;
@@ -102,14 +113,17 @@ LiveServer::LiveServer(int port, const std::string& name, std::string target,
     throw InputError("--live " + std::to_string(port) +
                      ": the port is in use or not allowed; --live 0 takes a free one");
   }
-  l.thread = std::thread([&l] { l.server.listen_after_bind(); });
+  l.listening = std::async(std::launch::async, [&l] { l.server.listen_after_bind(); });
 }
 
 LiveServer::~LiveServer() {
-  // stop() is heard by a server that listens; the thread may be just beginning to.
-  while (!listener_->server.is_running()) std::this_thread::yield();
-  listener_->server.stop();
-  listener_->thread.join();
+  // stop() is heard by a server that listens: it may be just beginning to, or have ended by itself.
+  Listener& l = *listener_;
+  constexpr std::chrono::milliseconds kLook{1};
+  while (!l.server.is_running() && l.listening.wait_for(kLook) == std::future_status::timeout) {
+  }
+  l.server.stop();
+  l.listening.wait();
 }
 
 std::string LiveServer::address() const {

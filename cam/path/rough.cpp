@@ -64,11 +64,9 @@ double axis_beyond(const Workshop& workshop) {
 }
 
 /// Width beside the lens that has to be down at the rim's height when later tools come, mm.
-double cleared_width(const RoughSite& site) {
-  const Workshop& workshop = site.workshop;
+double cleared_width(const Workshop& workshop, const Eigen::AlignedBox3d& surface, double top) {
   const Tool& ball = workshop.tool(workshop.process.finish.tool);
-  const double depth =
-      site.stock.blank().max().z() - site.surface.bounds().min().z() + ball.radius();
+  const double depth = top - surface.min().z() + ball.radius();
   double width = axis_beyond(workshop) + widest_below(ball, depth);
   if (workshop.process.semi.enabled) {
     const Tool& semi = workshop.tool(workshop.process.semi.tool);
@@ -245,11 +243,25 @@ StockMap whole_blank(const Workshop& workshop, const Eigen::AlignedBox3d& surfac
   return {blank, std::max(kStockCell, longest / kMaxCells)};
 }
 
+double rough_reach(const Workshop& workshop, const Eigen::AlignedBox3d& surface, double top) {
+  const auto reach = [&](const auto& process, double beyond) {
+    if (!process.enabled) return 0.0;
+    const Tool& tool = workshop.tool(process.tool);
+    return std::max(beyond, TipFloor::hold_of(tool, process.allowance)) + tool.radius();
+  };
+  const Process& process = workshop.process;
+  const double rough_radius = workshop.tool(process.rough.tool).radius();
+  return std::max(reach(process.rough, cleared_width(workshop, surface, top) - rough_radius),
+                  reach(process.semi, axis_beyond(workshop)));
+}
+
 RoughResult cut_rough(const RoughSite& site, const Executor& executor, const MoveSink& sink,
                       const RunControl& control) {
   const RoughProcess& process = site.workshop.process.rough;
   const Raster raster = raster_of("rough", site.workshop, process);
-  const RunPlan plan{cleared_width(site) - raster.tool.radius(), process.stepdown};
+  const double width =
+      cleared_width(site.workshop, site.surface.bounds(), site.stock.blank().max().z());
+  const RunPlan plan{width - raster.tool.radius(), process.stepdown};
   return cut(site, raster, plan, executor, sink, control);
 }
 

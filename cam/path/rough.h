@@ -32,6 +32,10 @@ struct RoughResult {
 /// than 200 mm.
 StockMap whole_blank(const Workshop& workshop, const Eigen::AlignedBox3d& surface);
 
+/// How far beyond a surface's rectangle cut_rough() and cut_semi() take material away in a blank
+/// that is wider than that by a tool's radius more, mm. @param top  of the blank, mm.
+double rough_reach(const Workshop& workshop, const Eigen::AlignedBox3d& surface, double top);
+
 /// Cuts the blank down to the surface plus the allowance, level by level: on each level passes that
 /// run at its height where the surface is below it and follow the surface where it is not, next to
 /// where the level above ended. The cut is as deep as the stepdown, and more only by what passes

@@ -16,7 +16,12 @@ TipFloor::TipFloor(const ProfileCutter& surface, const Tool& tool, double allowa
     parts_.push_back(grown(part, allowance));
     whole_.push_back(widened(part, clearance));
   }
-  hold_ = parts_.front().flat() + parts_.front().corner / std::numbers::sqrt2;
+  hold_ = hold_of(tool, allowance);
+}
+
+double TipFloor::hold_of(const Tool& tool, double allowance) {
+  const CutterProfile cutter = grown(whole_profile(tool).front(), allowance);
+  return cutter.flat() + cutter.corner / std::numbers::sqrt2;
 }
 
 double TipFloor::over(const Eigen::Vector2d& p, double reach, Trace& trace) const {

@@ -30,6 +30,7 @@ class TipFloor {
 
   /// Distance beyond the rim from which the tip keeps its height, mm.
   [[nodiscard]] double hold() const { return hold_; }
+  static double hold_of(const Tool& tool, double allowance);
 
  private:
   const ProfileCutter& surface_;

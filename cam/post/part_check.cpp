@@ -67,7 +67,10 @@ class PartReading {
   void close_operation() {
     const OperationStart& start = part_.starts()[next_];
     const ProgramTime time = timer_.finish();
-    file_.operations.push_back({start.operation, start.line, time});
+    file_.operations.push_back({.operation = start.operation, .line = start.line, .time = time});
+    if (next_ + 1 < part_.starts().size()) {
+      file_.operations.back().end = part_.starts()[next_ + 1].line;
+    }
     file_.time += time;
     timer_ = ProgramTimer(context_.settings.planner, context_.settings.tool_change);
   }

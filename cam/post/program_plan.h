@@ -36,7 +36,7 @@ struct ProgramPlan {
 
 /// Which operations share a file. A dialect without tool change never has two tools in one.
 enum class ProgramGrouping {
-  kOperation,  ///< One file each: rough.ngc, finish.ngc.
+  kOperation,  ///< One file for each name: rough.ngc, finish.ngc.
   kTool,       ///< Operations in a row with one tool, their names joined: finish-pencil.ngc.
   kAll,        ///< One file, named after the job, where the dialect changes tools; else as kTool.
 };

@@ -63,12 +63,14 @@ std::vector<Group> group_operations(const ProgramContext& context) {
   std::vector<Group> groups;
   for (std::size_t i = 0; i < operations.size(); ++i) {
     const bool same_tool = i > 0 && operations[i].tool.number == operations[i - 1].tool.number;
-    const bool joins = i > 0 && !apart && (all || same_tool);
+    // Several lenses on one blank: what is done to one is done to the next.
+    const bool same_name = i > 0 && same_tool && operations[i].name == operations[i - 1].name;
+    const bool joins = i > 0 && (same_name || (!apart && (all || same_tool)));
     if (!joins) groups.emplace_back();
     Group& group = groups.back();
     group.operations.push_back(i);
-    if (joins) group.stem += '-';
-    group.stem += safe_stem(operations[i].name);
+    if (joins && !same_name) group.stem += '-';
+    if (!same_name) group.stem += safe_stem(operations[i].name);
     if (all) group.stem = safe_stem(context.plan.job);
   }
   return groups;

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -22,6 +23,7 @@ inline constexpr std::uintmax_t kSmallestProgramLimit = 1 << 16;
 struct OperationTime {
   std::size_t operation = 0;  ///< Index in the plan.
   std::int64_t line = 0;      ///< Where it begins in the file; 0 for a whole operation.
+  std::int64_t end = std::numeric_limits<std::int64_t>::max();  ///< The next one's first line.
   ProgramTime time;
 };
 

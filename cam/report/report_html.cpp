@@ -18,13 +18,15 @@ std::string summary(const ReportData& data) {
                  section::pictures(data) + element("div", "class=\"panels\"", panels));
 }
 
-/// Where the page is that draws the light; `view` writes it into the lens folder.
+/// The page that draws the light: `view` writes it, so the command comes before the link.
 std::string view_link(const ReportData& data) {
   if (data.leakage.steps.empty()) return "";
-  return element("p", "class=\"screen\"",
-                 "<a href=\"../view.html\">The light of this part, to be moved and asked</a>, once "
-                 "<code>lensforge view</code> has written <code>view.html</code> into the lens "
-                 "folder.");
+  const std::string lens = escape_html(data.job);
+  return element(
+      "p", "class=\"screen\"",
+      joined({"After <code>lensforge view ", lens, " --out ", lens,
+              "/view.html</code>: <a href=\"../view.html\">the light of this part, to be "
+              "moved and asked</a>."}));
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include "app/coupon_settings.h"
 #include "app/design_settings.h"
 #include "app/export_settings.h"
+#include "app/nest_settings.h"
 #include "app/reflect_settings.h"
 #include "app/send_settings.h"
 #include "cam/cam_fields.h"
@@ -73,6 +74,22 @@ TEST(CommandDefaults, OfCamAreTheLibrarys) {
   expect_equal(cam_fields(), settings.cam, CamOptions{});
   EXPECT_EQ(settings.cam.workshop, Workshop{});
   EXPECT_EQ(settings.cam.job, "lens");  // The folder's name.
+}
+
+/// But for rectangles, which come apart as well.
+TEST(CommandDefaults, OfNestAreThoseOfCam) {
+  NestSettings settings;
+  OptionSet options("nest", "");
+  add_nest_options(options, settings);
+  options.parse({"/parts/bee", "/parts/bee/", "--blank", "200,100,8", "--out", "sheet"});
+  settle(options, settings);
+  CamOptions library;
+  library.cut_outline = OutlineWish::kAlways;
+  expect_equal(cam_fields(), settings.nest.cam, library);
+  EXPECT_EQ(settings.nest.blank, Eigen::Vector2d(200.0, 100.0));
+  EXPECT_EQ(settings.nest.thickness, 8.0);
+  EXPECT_EQ(settings.nest.gap, 0.0);
+  EXPECT_EQ(nest_names(settings.sources), (std::vector<std::string>{"bee", "bee_2"}));
 }
 
 TEST(CommandDefaults, OfTheOtherCommandsAreTheLibrarys) {

@@ -64,6 +64,7 @@ TEST(OptionLimits, AreEnforcedByEveryCommandForEveryNumber) {
   expect_limits_enforced({"design", "none.png", "--out", "none"}, weight_fields());
   expect_limits_enforced({"render", "none"}, render_fields());
   expect_limits_enforced({"cam", "none"}, cam_fields());
+  expect_limits_enforced({"nest", "none", "--blank", "100,100", "--out", "none"}, cam_fields());
   expect_limits_enforced({"coupon", "--out", "none"}, coupon_fields());
   expect_limits_enforced({"export", "none", "--out", "none.step"}, export_fields());
   expect_limits_enforced({"reflect", "none.stl", "--out", "none"}, reflect::reflect_fields());

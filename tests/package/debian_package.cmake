@@ -63,7 +63,7 @@ if(PYTHON)
     message(FATAL_ERROR "the package has no Python module")
   endif()
   run("${CMAKE_COMMAND}" -E env "PYTHONPATH=${modules}" "${PYTHON}" -B -c
-    "import lensforge; print(lensforge.__file__, lensforge.Lens('${work}/lens'))")
+    "import lensforge\nprint(lensforge.__file__, lensforge.Lens('${work}/lens'))")
   string(FIND "${output}" "${modules}/lensforge/__init__.py" found)
   if(found EQUAL -1)
     message(FATAL_ERROR "the module does not come from the package: ${output}")

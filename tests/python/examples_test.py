@@ -38,7 +38,7 @@ class Examples(unittest.TestCase):
         self.assertTrue((self.place / "lens.stl").exists())
         self.assertEqual(lensforge.Lens(self.place / "lens").folder, self.place / "lens")
 
-    def test_sharpen_lowers_the_error_by_the_gradient(self):
+    def test_descend_lowers_the_error_by_the_gradient(self):
         example = ROOT / "examples" / "descend.py"
         self.assertLessEqual(len(example.read_text().splitlines()), 30)
         small_lens.lens().save(self.place / "lens")

@@ -79,6 +79,8 @@ bool Process::runs_for(std::chrono::milliseconds time) {
   return !ended_;
 }
 
+std::string Process::said() const { return content(folder_ / "err"); }
+
 Outcome Process::wait(std::chrono::seconds limit) {
   if (runs_for(limit)) {
     ADD_FAILURE() << "still running after " << limit.count() << " s";

@@ -42,6 +42,8 @@ class Process {
   Outcome wait(std::chrono::seconds limit = std::chrono::seconds(120));
   /// Whether it is still running after `time`, or ends earlier.
   bool runs_for(std::chrono::milliseconds time);
+  /// What it has said on stderr so far.
+  [[nodiscard]] std::string said() const;
 
  private:
   bool reap(int options);

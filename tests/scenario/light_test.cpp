@@ -220,6 +220,7 @@ TEST_F(Scenario, ADesignForSeveralColorsIsRenderedInColor) {
   EXPECT_NEAR(again.json()["metrics"]["smooth"]["mae"].get<double>(),
               lens["metrics"]["smooth"]["mae"].get<double>(), 1e-6);
   EXPECT_THAT(run({"info", path("lens")}).out, HasSubstr("colours 450:0.5,550:1,650:1 nm"));
+  EXPECT_EQ(run({"info", path("lens"), "--json"}).json()["spectrum"], lens["spectrum"]);
   // What is cut of it is predicted in the same light.
   const Outcome cut = run({"cam", path("lens"), "--pitch", "2mm", "--tool-diameter", "4mm",
                            "--no-rough", "--no-semi", "--no-remedies", "--quiet"});

@@ -23,6 +23,7 @@ TEST_F(Usage, HelpOfEveryCommandIsPrintedOnStdout) {
                                                            {"design", "--help"},
                                                            {"render", "-h"},
                                                            {"cam", "--help"},
+                                                           {"nest", "--help"},
                                                            {"coupon", "--help"},
                                                            {"send", "-h"},
                                                            {"view", "--help"},

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "cam/cam_options.h"
+#include "cam/report/report_data.h"
+#include "core/compute/work_estimate.h"
+#include "core/surface/lens.h"
+
+namespace lensforge {
+
+/// One of the lenses that share a blank.
+struct NestLens {
+  std::string name;  ///< Of its folder of reports: no two have the same.
+  const Lens* lens = nullptr;
+};
+
+/// How lenses share a blank; mm. Clamps are placed from the blank's lower left corner.
+struct NestOptions {
+  CamOptions cam;  ///< Of all lenses; stock.margin is kept free at the blank's edge.
+  Eigen::Vector2d blank = Eigen::Vector2d::Zero();
+  std::optional<double> thickness;  ///< Of the blank; none: what the highest lens needs.
+  double gap = 0.0;                 ///< Between lenses; 0: the least that the tools need.
+};
+
+/// A lens where it lies on the blank.
+struct NestedLens {
+  std::string name;
+  Eigen::AlignedBox2d box;               ///< Its rectangle from the blank's corner, mm.
+  std::vector<Eigen::Vector2d> outline;  ///< Likewise, counter-clockwise.
+  bool cut_out = false;                  ///< Else it stays joined to the blank.
+  ReportData report;
+};
+
+/// How a nest is laid out.
+struct NestLayout {
+  Eigen::Vector3d blank = Eigen::Vector3d::Zero();  ///< mm
+  double gap = 0.0;
+  double edge = 0.0;
+  double slot = 0.0;  ///< Width of the cut around lenses, mm; 0 if none is cut out.
+  std::vector<NestedLens> lenses;
+  std::vector<KeepOut> keep_outs;
+};
+
+/// The options of each lens's cut in the order of the lenses, and where they lie.
+struct NestPlan {
+  NestLayout layout;
+  std::vector<CamOptions> cuts;
+};
+
+/// @throw InputError as make_nest().
+NestPlan plan_nest(const std::vector<NestLens>& lenses, const NestOptions& options);
+
+/// What make_nest() takes: all that estimate_cut() says of each lens.
+WorkEstimate estimate_nest(const NestPlan& plan, const std::vector<NestLens>& lenses, int threads);
+
+}  // namespace lensforge
