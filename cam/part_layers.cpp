@@ -38,8 +38,7 @@ void keep_nodes(const SurfacePatch& patch, const PartGrid& grid, const std::stri
 
 }  // namespace
 
-PartGrid part_grid(const Eigen::Vector2d& lens_size, const Eigen::Vector2d& spacings,
-                   double most) {
+PartGrid part_grid(const Eigen::Vector2d& lens_size, const Eigen::Vector2d& spacings, double most) {
   const double coarse = std::sqrt(lens_size.prod() / most);
   PartGrid grid;
   for (int axis = 0; axis < 2; ++axis) {

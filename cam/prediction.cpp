@@ -77,8 +77,8 @@ Prediction predict_part(const PartSurfaces& surfaces, const Lens& lens, const Ca
   }
   const LeakageChain chain = surfaces.chain();
   result.leakage = measure_leakage(chain, lens.target, setup, options.leakage, executor, control);
-  result.sampling =
-      check_sampling(surfaces.part(), result.leakage, lens.target, setup, executor, control);
+  result.sampling = check_sampling(surfaces.designed(), surfaces.part(), result.leakage,
+                                   lens.target, setup, executor, control);
   const std::vector<double> weights =
       pixels_with_surplus(result.leakage.part().picture, result.leakage.designed.picture);
   const LeakMap map =

@@ -180,7 +180,7 @@ class SolidBuilder {
   [[nodiscard]] Handle(Geom_BSplineCurve) rim_curve(int side) const {
     const bool along_u = side % 2 == 0;
     SplineEdge edge{along_u ? back_.cells_u : back_.cells_v, {}};
-    edge.coefficients.resize(3, edge.cells + kDegree);
+    edge.coefficients.resize(3, edge.cells + kSplineDegree);
     for (Eigen::Index axis = 0; axis < 3; ++axis) {
       const Eigen::MatrixXd& c = back_.coefficients[static_cast<std::size_t>(axis)];
       const Eigen::VectorXd line =

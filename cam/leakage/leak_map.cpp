@@ -185,9 +185,8 @@ class PlaceStudy {
       if (map.leakage[cell] <= most) continue;
       most = map.leakage[cell];
       place.height = map.height[cell];
-      const Eigen::Vector2d middle =
-          grid.node(column * m.x(), row * m.y()) +
-          0.5 * m.cast<double>().cwiseProduct(grid.spacing);
+      const Eigen::Vector2d middle = grid.node(column * m.x(), row * m.y()) +
+                                     0.5 * m.cast<double>().cwiseProduct(grid.spacing);
       place.place = middle.cwiseMin(grid.node(grid.columns - 1, grid.rows - 1));
     }
   }

@@ -19,8 +19,8 @@ struct HeightDifference {
 
 /// Where on the lens light leaves that lands in chosen pixels and would not by design.
 struct LeakMap {
-  std::int64_t columns = 0;  ///< Cells along x.
-  std::int64_t rows = 0;     ///< Cells along y, from the least.
+  std::int64_t columns = 0;     ///< Cells along x.
+  std::int64_t rows = 0;        ///< Cells along y, from the least.
   CellCounts grid_cells{1, 1};  ///< Cells of the rendered grid in a map cell, which is square.
   /// Share of the lens's flux, signed: a cell that took light away from those pixels is below 0.
   std::vector<double> leakage;

@@ -57,25 +57,33 @@ double mae_of(const FluxPicture& picture, const Image& target) {
 
 }  // namespace
 
-SamplingCheck check_sampling(const SurfaceField& part, const LeakageResult& result,
-                             const Image& target, const FieldRenderSetup& setup,
-                             const Executor& executor, const RunControl& control) {
+SamplingCheck check_sampling(const SurfaceField& designed, const SurfaceField& part,
+                             const LeakageResult& result, const Image& target,
+                             const FieldRenderSetup& setup, const Executor& executor,
+                             const RunControl& control) {
   const RunControl silent(control.stop_token(), {});
   FieldRenderSetup fine_setup = setup;
   fine_setup.grid = with_half_the_spacing(setup.grid);
+  const std::vector<CellRange> windows = windows_of(setup);
+  const auto with_fine_windows = [&](const SurfaceField& field, FluxPicture picture) {
+    for (const CellRange& window : windows) {
+      const FluxPicture coarse = render_cells(field, setup, window, executor, silent);
+      const FluxPicture fine = render_cells(field, fine_setup, halved(window), executor, silent);
+      for (std::size_t i = 0; i < picture.flux.size(); ++i) {
+        picture.flux[i] += fine.flux[i] - coarse.flux[i];
+      }
+    }
+    return picture;
+  };
   const FluxPicture& before = result.part().picture;
-  FluxPicture now = before;
+  const FluxPicture now = with_fine_windows(part, before);
+  const FluxPicture& design_before = result.designed.picture;
+  const FluxPicture design_now = with_fine_windows(designed, design_before);
   double cells = 0.0;
-  for (const CellRange& window : windows_of(setup)) {
-    const FluxPicture coarse = render_cells(part, setup, window, executor, silent);
-    const FluxPicture fine = render_cells(part, fine_setup, halved(window), executor, silent);
-    for (std::size_t i = 0; i < now.flux.size(); ++i) now.flux[i] += fine.flux[i] - coarse.flux[i];
-    cells += area_of(window);
-  }
+  for (const CellRange& window : windows) cells += area_of(window);
   const double scale = area_of(all_cells(setup.grid)) / cells;
-  const FluxPicture& designed = result.designed.picture;
   return {setup.grid.spacing.minCoeff(),
-          scale * (leakage_share(now, designed) - leakage_share(before, designed)),
+          scale * (leakage_share(now, design_now) - leakage_share(before, design_before)),
           scale * (mae_of(now, target) - mae_of(before, target))};
 }
 

@@ -13,14 +13,15 @@ struct SamplingCheck {
 };
 
 /// Renders kSamplingWindows² windows that lie evenly over the lens with half the spacing and
-/// extrapolates what that changes to the whole lens. Costs about a fifth of one surface's picture
-/// for 128² pixels and less for more.
-/// @param part    the last surface of the chain that `result` is of.
+/// extrapolates what that changes to the whole lens. Costs about a fifth of the two surfaces'
+/// pictures for 128² pixels and less for more.
+/// @param designed, part  the first and the last surface of the chain that `result` is of.
 /// @param target  with the setup's pixels.
 /// @throw Interrupted.
-SamplingCheck check_sampling(const SurfaceField& part, const LeakageResult& result,
-                             const Image& target, const FieldRenderSetup& setup,
-                             const Executor& executor, const RunControl& control);
+SamplingCheck check_sampling(const SurfaceField& designed, const SurfaceField& part,
+                             const LeakageResult& result, const Image& target,
+                             const FieldRenderSetup& setup, const Executor& executor,
+                             const RunControl& control);
 
 /// Windows along a side of the lens.
 inline constexpr int kSamplingWindows = 6;

@@ -16,6 +16,7 @@
 #include "core/surface/lit_surface.h"
 #include "core/surface/mesh_topology.h"
 #include "core/surface/surface_mesh.h"
+#include "design/energy/colored_light.h"
 #include "design/energy/facet_rays.h"
 #include "design/energy/gradient_term.h"
 #include "design/energy/image_term.h"
@@ -32,15 +33,6 @@
 #include "design/optics/surface_kernels.h"
 
 namespace lensforge {
-
-/// The light of one colour, and what is kept of it for every vertex and face.
-template <class Exec>
-struct ColoredLight {
-  LightPath path;  ///< Its flux as shares of all colours' together.
-  double share;    ///< Of the brightness.
-  typename Exec::template Buffer<IncidentRay> incident;  ///< V; empty in light of one direction.
-  typename Exec::template Buffer<double> face_flux;      ///< F; likewise.
-};
 
 /// DesignObjective on any executor: all arrays, the vertices and the gradient too, lie in its
 /// memory, and only sums come back to the caller.
@@ -172,40 +164,6 @@ std::variant<FacetRaysOn<Exec>, SmoothRaysOn<Exec>> rays_of(SurfaceModel model,
   }
   return SmoothRaysOn<Exec>(mesh.triangle_count(), mesh.vertex_count(),
                             model == SurfaceModel::kSpline, colors);
-}
-
-/// Colours in which a goal is looked at: all of a picture, that of the setup's index of a
-/// correspondence.
-inline std::vector<LightColor> colors_of(OpticalSetup setup, const DesignGoal& goal) {
-  if (!std::holds_alternative<Image>(goal)) setup.spectrum = {};
-  return light_colors(setup);
-}
-
-/// @param cut  by the setup's outline; null without one.
-inline LightPath light_of(const LightColor& color, const SurfaceMesh& mesh, const MeshCut* cut) {
-  if (color.share == 1.0) {
-    return cut != nullptr ? light_inside(mesh, *cut, color.setup) : light_on(mesh, color.setup);
-  }
-  const LightPath light(color.setup);
-  const double intake = cut != nullptr ? intake_inside(mesh, *cut, light) : intake_of(mesh, light);
-  return light.sharing(intake / color.share);
-}
-
-/// @param front  for light_for().
-template <class Exec>
-std::vector<ColoredLight<Exec>> lights_of(const SurfaceMesh& mesh, const OpticalSetup& setup,
-                                          const DesignGoal& goal, const Exec& executor,
-                                          typename Exec::template Buffer<double>& front) {
-  std::vector<ColoredLight<Exec>> lights;
-  for (const LightColor& color : colors_of(setup, goal)) {
-    // An outline's is found with its cut.
-    const LightPath path = setup.outline ? LightPath(color.setup) : light_of(color, mesh, nullptr);
-    lights.push_back({light_for(executor, path, front), color.share, {}, {}});
-    if (!path.varies()) continue;
-    const auto faces = static_cast<std::size_t>(mesh.triangle_count());
-    lights.back().face_flux = typename Exec::template Buffer<double>(faces);
-  }
-  return lights;
 }
 
 /// A matrix's entries, column by column.

@@ -28,8 +28,8 @@ TEST(PartLayers, EveryNodeHasTheSurfacesHeightAndSlopesTheUppermostFirst) {
     return testing::SurfacePoint{5.0 + std::sin(p.x()) + 0.1 * p.y(), {std::cos(p.x()), 0.1}, 0};
   });
   const testing::AnalyticField plane(testing::plane({0.2, -0.3}));
-  const LayeredImage layers =
-      surface_layers({{"a", &wave}, {"b", &plane}}, kSize, {0.04, 0.04}, Executor::cpu(2), RunControl());
+  const LayeredImage layers = surface_layers({{"a", &wave}, {"b", &plane}}, kSize, {0.04, 0.04},
+                                             Executor::cpu(2), RunControl());
   EXPECT_EQ(layers.names().size(), 6U);
   const PartGrid grid = part_grid(kSize, {0.04, 0.04}, kPartNodes);
   ASSERT_EQ(layers.columns(), grid.nodes.x());

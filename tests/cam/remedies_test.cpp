@@ -126,9 +126,10 @@ TEST(TrialCut, OfAPartOfTheLensLeaksAsThatPartDoes) {
   const CamOptions options = facets_polished();
   const Predicted cut(grooved_lens(), options);
   const FieldRenderSetup setup{cut.site().lens.setup,
-                               lens_grid({3.0, 2.0}, sample_spacing(options))};
+                               lens_grid({3.0, 2.0}, sample_spacings(options))};
   LeakPlace place = cut.prediction().places[0];
-  place.cells = {120, 70, 60, 40};
+  const auto coarser = std::llround(setup.grid.spacing.x() / setup.grid.spacing.y());
+  place.cells = {120 / coarser, 70, 60 / coarser, 40};
   const PartSurfaces& surfaces = cut.surfaces();
   const LeakageResult& leakage = cut.prediction().leakage;
   const auto light = [&](const SurfaceField& field) {

@@ -6,6 +6,7 @@
 #include <numbers>
 #include <vector>
 
+#include "core/image/metrics.h"
 #include "core/optics/source_points.h"
 #include "design/design_lens.h"
 #include "design/finite_difference.h"
@@ -206,6 +207,29 @@ TEST(ExtendedDesign, IsBetterThanOneForAPointAndNoBetterThanItsLimit) {
   const double aware = wide.lens.metrics.at(SurfaceModel::kSmooth).mae;
   EXPECT_LT(aware, 0.8 * unaware);
   EXPECT_LE(wide.lens.source_limit->mae, aware);
+}
+
+TEST(ExtendedDesign, LaterRoundsMendWhatTheConvolutionMisses) {
+  const Image target = testing::spot_picture(32, 32);
+  DesignOptions options = default_design_options(SurfaceModel::kSmooth, target);
+  options.width = 32.0;
+  options.focal_length = 60.0;
+  options.iterations = 40;
+  options.light.source_angle = 60.0;
+  const Executor executor = Executor::cpu(2);
+  const DesignResult result = design_lens(target, options, executor, RunControl());
+  ASSERT_TRUE(result.source.has_value());
+  EXPECT_GT(result.source->convolution, 0.001);
+  const Lens& lens = result.lens;
+  std::vector<double> convolved = picture_by_convolution(
+      lens.setup, lens.surface.vertices.row(2).mean(),
+      [&](const OpticalSetup& light) { return flux_of_lens(lens, light, executor); }, executor);
+  Image picture(32, 32);
+  for (std::size_t i = 0; i < convolved.size(); ++i) {
+    picture.values()[i] = static_cast<float>(convolved[i] * target.total());
+  }
+  // What the optimiser goes by is off on purpose.
+  EXPECT_LT(lens.metrics.at(SurfaceModel::kSmooth).mae, compare(picture, target).mae);
 }
 
 }  // namespace

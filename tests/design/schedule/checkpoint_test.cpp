@@ -206,6 +206,7 @@ nlohmann::json other_value(const OptionField<Options>& row, const Options& optio
     return row.words.front() == value ? row.words.back() : row.words.front();
   }
   if (row.name == "--front") return "sphere:3000";
+  if (row.name == "--wavelengths") return "450,650";
   if (row.kind == OptionKind::kText) return row.unit == "X,Y,Z" ? "1,2,-3" : "1,2";
   const double now = value.template get<double>();
   const double next = row.kind == OptionKind::kWhole ? now + 1.0 : 1.01 * now + 0.001;
