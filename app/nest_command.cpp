@@ -132,6 +132,22 @@ int exit_code(const OptionSet& options, const NestResult& result) {
   return hold ? kDone : kLimitMissed;
 }
 
+/// What stands in every lens's report, as collisions on the common blank do, once.
+void note_warnings(const NestResult& result, const Console& console) {
+  for (const std::string& warning : result.warnings) console.note("warning: " + warning);
+  const std::vector<NestedLens>& lenses = result.layout.lenses;
+  for (const NestedLens& lens : lenses) {
+    for (const std::string& warning : lens.report.warnings) {
+      const bool common = std::all_of(lenses.begin(), lenses.end(), [&](const NestedLens& other) {
+        const std::vector<std::string>& all = other.report.warnings;
+        return std::find(all.begin(), all.end(), warning) != all.end();
+      });
+      if (!common) console.note("warning: " + lens.name + ": " + warning);
+      if (common && &lens == &lenses.front()) console.note("warning: " + warning);
+    }
+  }
+}
+
 }  // namespace
 
 int nest_command(const Arguments& command_line) {
@@ -147,12 +163,7 @@ int nest_command(const Arguments& command_line) {
   const std::vector<NestLens> lenses = sources.lenses();
   sources.note_unfinished(console);
   const NestResult result = run(options, settings, lenses);
-  for (const std::string& warning : result.warnings) console.note("warning: " + warning);
-  for (const NestedLens& lens : result.layout.lenses) {
-    for (const std::string& warning : lens.report.warnings) {
-      console.note("warning: " + lens.name + ": " + warning);
-    }
-  }
+  note_warnings(result, console);
   console.result(summary_json(options, result, sources), summary_text(settings.out, result));
   return exit_code(options, result);
 }

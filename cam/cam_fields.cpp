@@ -239,7 +239,9 @@ OptionTable<O> prediction_rows() {
                 "distance from the rim over which the extra depth falls to a third"),
       R::length("--sample-spacing", &O::sample_spacing,
                 Limits::zero_or(cam_limit::kFinestSample, cam_limit::kCoarsestSample),
-                "spacing of samples of the milled surface; 0: chosen from pitch and σ"),
+                "spacing of samples of the milled surface across its passes, up to three times "
+                "that along "
+                "them; 0: chosen from pitch and σ"),
       R::number(
           "--dark-below", [](auto& o) -> auto& { return o.leakage.dark_below; },
           Limits::between(0, cam_limit::kDark), "",

@@ -193,6 +193,12 @@ void validate(const CamOptions& options, const OpticalSetup& setup) {
   validate_outline(options);
 }
 
+std::vector<Eigen::Vector2d> edge_of(const OpticalSetup& setup) {
+  if (setup.outline) return setup.outline->points;
+  const Eigen::Vector2d& size = setup.lens_size;
+  return {{0.0, 0.0}, {size.x(), 0.0}, size, {0.0, size.y()}};
+}
+
 bool cuts_outline(const CamOptions& options, const OpticalSetup& setup) {
   if (options.part == PartKind::kMould) return false;
   if (options.cut_outline == OutlineWish::kIfShaped) return setup.outline.has_value();

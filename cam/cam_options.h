@@ -98,6 +98,9 @@ double sample_spacing(const CamOptions& options);
 /// polish allows.
 Eigen::Vector2d sample_spacings(const CamOptions& options);
 
+/// The lens's edge: its outline, or its rectangle; counter-clockwise, mm.
+std::vector<Eigen::Vector2d> edge_of(const OpticalSetup& setup);
+
 /// True if the outline is cut.
 bool cuts_outline(const CamOptions& options, const OpticalSetup& setup);
 

@@ -86,7 +86,8 @@ CutPlan::CutPlan(const Lens& lens, const CamOptions& options, const Executor& ex
       collisions_(profile_, options_.workshop, stock_),
       watch_(collisions_, options_.workshop.tools, z_offset_,
              highest_obstacle(options_.workshop, blank_)) {
-  if (cuts_outline(options_, lens_.setup)) require_outline_cut(outline(), outline_cut(), blank_);
+  if (cuts_outline(options_, lens_.setup))
+    require_outline_cut(edge_of(lens_.setup), outline_cut(), blank_);
 }
 
 std::optional<CastFrame> CutPlan::mould() const {
@@ -170,15 +171,9 @@ OutlineCut CutPlan::outline_cut() const {
   // The program's last decimal must not round it below the blank.
   const double unit = resolution_of(options_);
   const double bottom = std::ceil((blank_.min().z() + z_offset_) / unit) * unit - z_offset_;
-  return with_tabs_that_fit(
-      outline(), {options_.workshop.tool(number), options_.tabs, rough.stepdown,
-                  rough.ramp_angle_deg, safe_z(), bottom, options_.workshop.process.clearance});
-}
-
-std::vector<Eigen::Vector2d> CutPlan::outline() const {
-  if (lens_.setup.outline) return lens_.setup.outline->points;
-  const Eigen::Vector2d& size = lens_.setup.lens_size;
-  return {{0.0, 0.0}, {size.x(), 0.0}, size, {0.0, size.y()}};
+  return with_tabs_that_fit(edge_of(lens_.setup), {options_.workshop.tool(number), options_.tabs,
+                                                   rough.stepdown, rough.ramp_angle_deg, safe_z(),
+                                                   bottom, options_.workshop.process.clearance});
 }
 
 ProgramOperation CutPlan::outline_operation(const RunControl& control) {
@@ -187,7 +182,8 @@ ProgramOperation CutPlan::outline_operation(const RunControl& control) {
                            trimmed_decimal(cut.tabs.width, 3) + " mm wide and " +
                            trimmed_decimal(cut.tabs.height, 3) + " mm high";
   return {"outline", cut.tool, {tabs}, [this, cut, &control](const MoveSink& sink) {
-            return cut_outline(outline(), cut, stock_, sketched("outline", sink), control);
+            return cut_outline(edge_of(lens_.setup), cut, stock_, sketched("outline", sink),
+                               control);
           }};
 }
 

@@ -104,8 +104,6 @@ class CutPlan {
   }
   /// How the outline is cut. @pre cuts_outline().
   [[nodiscard]] OutlineCut outline_cut() const;
-  /// Of the lens, or its rectangle; counter-clockwise, mm.
-  [[nodiscard]] std::vector<Eigen::Vector2d> outline() const;
   /// Every operation's way, thinned out, as far as programs() were streamed.
   [[nodiscard]] std::vector<ReportPath> shown_path() const;
 

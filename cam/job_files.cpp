@@ -22,10 +22,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Names of operations, of which those of programs are made.
-constexpr std::array<std::string_view, 8> kOperations{"rough", "semi",  "large",  "finish",
-                                                      "rest",  "cross", "pencil", "outline"};
-
 /// What programs are called that machines read.
 const std::set<std::string> kProgramExtensions{".ngc",   ".nc", ".tap", ".cnc",
                                                ".gcode", ".gc", ".g",   ".mpf"};

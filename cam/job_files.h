@@ -1,12 +1,19 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace lensforge {
+
+/// Names of operations, of which those of programs are made, in the order in which a blank takes
+/// them.
+inline constexpr std::array<std::string_view, 8> kOperations{"rough", "semi",  "large",  "finish",
+                                                             "rest",  "cross", "pencil", "outline"};
 
 /// Whether a file is a program as a cut wrote it: under a name that a cut gives, and unchanged
 /// since (check_seal()).

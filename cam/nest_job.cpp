@@ -39,10 +39,6 @@ namespace fs = std::filesystem;
 
 using Clock = std::chrono::steady_clock;
 
-/// Names of operations in the order in which a blank takes them.
-constexpr std::array<std::string_view, 8> kOrder{"rough", "semi",  "large",  "finish",
-                                                 "rest",  "cross", "pencil", "outline"};
-
 /// Cells of the common blank's model, mm, and along its longer side at most.
 constexpr double kStockCell = 0.1;
 constexpr double kMaxCells = 2000.0;
@@ -156,7 +152,7 @@ class Job {
     whole.comments = programs_.front().comments;
     whole.comments.front() = "units: mm; X0 Y0: lower left corner of the blank";
     for (std::size_t k = 0; k < lenses_.size(); ++k) whole.comments.push_back(place_words(k));
-    for (const std::string_view name : kOrder) {
+    for (const std::string_view name : kOperations) {
       for (std::size_t k = 0; k < lenses_.size(); ++k) add_step(name, k, whole);
     }
     std::size_t count = 0;

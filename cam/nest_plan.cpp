@@ -55,7 +55,7 @@ void require_alike(const std::vector<NestLens>& lenses) {
     }
     if (setup.front) {
       throw InputError(one.name +
-                       ": has a spherical front, which its blank has before the first cut; cut it "
+                       ": has a curved front, which its blank has before the first cut; cut it "
                        "alone with cam");
     }
     if (setup.mode == LightMode::kRefract && !(std::abs(setup.ior - first.ior) <= kSameIndex)) {
@@ -122,14 +122,6 @@ double gap_of(const NestOptions& options, const Room& room) {
                    " mm for the tools, or 0 for that");
 }
 
-std::vector<Eigen::Vector2d> outline_of(const Lens& lens, const Eigen::Vector2d& corner) {
-  const Eigen::Vector2d& size = lens.setup.lens_size;
-  std::vector<Eigen::Vector2d> points{{0.0, 0.0}, {size.x(), 0.0}, size, {0.0, size.y()}};
-  if (lens.setup.outline) points = lens.setup.outline->points;
-  for (Eigen::Vector2d& p : points) p += corner;
-  return points;
-}
-
 /// Of one lens: the shop with clamps where they lie from that lens, and its own blank.
 CamOptions cut_of(const NestLens& one, const NestOptions& options, const NestedLens& placed,
                   const Room& room, double top) {
@@ -165,7 +157,8 @@ NestPlan plan_nest(const std::vector<NestLens>& lenses, const NestOptions& optio
     NestedLens placed;
     placed.name = lenses[k].name;
     placed.box = {corners[k], Eigen::Vector2d(corners[k] + items[k].size)};
-    placed.outline = outline_of(*lenses[k].lens, corners[k]);
+    placed.outline = edge_of(lenses[k].lens->setup);
+    for (Eigen::Vector2d& p : placed.outline) p += corners[k];
     placed.cut_out = cuts_outline(options.cam, lenses[k].lens->setup);
     plan.cuts.push_back(cut_of(lenses[k], options, placed, room, top));
     validate(plan.cuts.back(), lenses[k].lens->setup);

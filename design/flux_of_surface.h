@@ -20,6 +20,11 @@ namespace lensforge {
 std::vector<double> flux_of_surface(const SurfaceMesh& mesh, const OpticalSetup& setup,
                                     SurfaceModel model, const Executor& executor);
 
+/// The same of a smooth surface that is known by its own normals at the vertices, 3 × V with z > 0.
+/// Computed on the CPU.
+std::vector<double> flux_of_surface(const SurfaceMesh& mesh, const Eigen::Matrix3Xd& normals,
+                                    const OpticalSetup& setup, const Executor& executor);
+
 /// Adjoint of flux_of_surface(): Σ ∂(flux of pixel i)/∂(vertices) × cotangent[i], 3 × V, per mm.
 /// Triangles whose light does not leave, and needles of light (deposit_adjoint()), have no
 /// derivative but by what they take in. Same bits for any number of threads.

@@ -57,13 +57,6 @@ std::vector<double> flux_through(const SurfaceMesh& mesh, const Eigen::Matrix3Xd
   });
 }
 
-std::vector<double> flux_of(const SurfaceMesh& mesh, const Eigen::Matrix3Xd& normals,
-                            const OpticalSetup& setup, const Executor& executor) {
-  if (!setup.outline) return flux_through(mesh, normals, setup, executor);
-  const SampledSurface part = lit_part(mesh, normals, setup, executor);
-  return flux_through(part.mesh, part.normals, setup, executor);
-}
-
 RenderResult result_of(const std::vector<double>& flux, const OpticalSetup& setup, double total) {
   return {scaled(flux, setup.pixels.x(), setup.pixels.y(), total),
           std::accumulate(flux.begin(), flux.end(), 0.0)};
@@ -90,6 +83,13 @@ std::vector<double> flux_of_surface(const SurfaceMesh& mesh, const OpticalSetup&
   return flux_through(part.mesh, part.normals, setup, executor);
 }
 
+std::vector<double> flux_of_surface(const SurfaceMesh& mesh, const Eigen::Matrix3Xd& normals,
+                                    const OpticalSetup& setup, const Executor& executor) {
+  if (!setup.outline) return flux_through(mesh, normals, setup, executor);
+  const SampledSurface part = lit_part(mesh, normals, setup, executor);
+  return flux_through(part.mesh, part.normals, setup, executor);
+}
+
 RenderResult render_surface(const SurfaceMesh& mesh, const OpticalSetup& setup, SurfaceModel model,
                             const Executor& executor) {
   return result_of(flux_of_surface(mesh, setup, model, executor), setup, pixel_count(setup));
@@ -97,7 +97,7 @@ RenderResult render_surface(const SurfaceMesh& mesh, const OpticalSetup& setup, 
 
 RenderResult render_surface(const SurfaceMesh& mesh, const Eigen::Matrix3Xd& normals,
                             const OpticalSetup& setup, const Executor& executor) {
-  return result_of(flux_of(mesh, normals, setup, executor), setup, pixel_count(setup));
+  return result_of(flux_of_surface(mesh, normals, setup, executor), setup, pixel_count(setup));
 }
 
 ImageMetrics evaluate(const SurfaceMesh& mesh, const OpticalSetup& setup, SurfaceModel model,
@@ -109,8 +109,8 @@ ImageMetrics evaluate(const SurfaceMesh& mesh, const OpticalSetup& setup, Surfac
 ImageMetrics evaluate(const SurfaceMesh& mesh, const Eigen::Matrix3Xd& normals,
                       const OpticalSetup& setup, const Image& target, Image* rendered,
                       const Executor& executor) {
-  return judged(result_of(flux_of(mesh, normals, setup, executor), setup, target.total()), target,
-                rendered);
+  return judged(result_of(flux_of_surface(mesh, normals, setup, executor), setup, target.total()),
+                target, rendered);
 }
 
 std::vector<double> flux_of_lens(const Lens& lens, const OpticalSetup& setup,

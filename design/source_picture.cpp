@@ -9,7 +9,6 @@
 #include "core/optics/light_colors.h"
 #include "core/optics/source_points.h"
 #include "design/flux/source_blur.h"
-#include "design/flux_of_surface.h"
 #include "design/picture_values.h"
 #include "design/render_lens.h"
 
@@ -67,15 +66,10 @@ std::vector<double> picture_by_convolution(const OpticalSetup& setup, double z,
   return {pixels.begin(), pixels.end()};
 }
 
-Image corrected_for_convolution(const Image& target, const SurfaceMesh& mesh,
-                                const OpticalSetup& setup, SurfaceModel model,
-                                const Executor& executor) {
-  const auto picture = [&](const OpticalSetup& light) {
-    return flux_of_surface(mesh, light, model, executor);
-  };
-  const std::vector<double> exact = picture(setup);
-  const std::vector<double> convolved =
-      picture_by_convolution(setup, mesh.vertices.row(2).mean(), picture, executor);
+Image corrected_for_convolution(const Image& target, const OpticalSetup& setup, double z,
+                                const PointPicture& picture, const Executor& executor) {
+  const std::vector<double> exact = picture_under(setup, source_point_count(setup, z), picture);
+  const std::vector<double> convolved = picture_by_convolution(setup, z, picture, executor);
   Image corrected = target;
   for (std::size_t i = 0; i < exact.size(); ++i) {
     const double wrong = target.total() * (exact[i] - convolved[i]);

@@ -11,7 +11,7 @@
 
 namespace lensforge {
 
-/// Flux per pixel in the light of a single point or direction.
+/// Shares of the light in every pixel, in the light of a single point or direction.
 using PointPicture = std::function<std::vector<double>(const OpticalSetup&)>;
 
 /// Points that an exact picture is summed over: the more, the wider the source's image.
@@ -31,9 +31,9 @@ std::vector<double> picture_by_convolution(const OpticalSetup& setup, double z,
 /// The picture that an optimiser that goes by a convolution has to aim at, so that the surface's
 /// exact one comes out as `target`: the target less what the convolution gets wrong of the surface
 /// as it is, at least 0. @pre the source has an extent; target has setup.pixels.
-Image corrected_for_convolution(const Image& target, const SurfaceMesh& mesh,
-                                const OpticalSetup& setup, SurfaceModel model,
-                                const Executor& executor);
+/// @param z  of the surface, mm. @param picture  what the surface projects.
+Image corrected_for_convolution(const Image& target, const OpticalSetup& setup, double z,
+                                const PointPicture& picture, const Executor& executor);
 
 /// How nearly the picture of a lens under its extended source is known.
 struct SourceCheck {

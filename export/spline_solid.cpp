@@ -11,9 +11,7 @@
 #include <ShapeFix_Edge.hxx>
 #include <TopoDS.hxx>
 #include <TopoDS_Edge.hxx>
-#include <TopoDS_Shell.hxx>
 #include <TopoDS_Vertex.hxx>
-#include <TopoDS_Wire.hxx>
 #include <array>
 #include <cmath>
 #include <gp_Circ.hxx>
@@ -22,6 +20,7 @@
 
 #include "export/front_solid.h"
 #include "export/solid_geometry.h"
+#include "export/solid_shell.h"
 #include "export/trimmed_solid.h"
 
 // Edges run along lines of the net's parameters: straight lines in the parameter planes of their
@@ -57,20 +56,16 @@ class SolidBuilder {
   }
 
   NamedSolid build() {
-    builder_.MakeShell(shell_);
     for (int row = 0; row < net_.rows; ++row) {
       for (int column = 0; column < net_.columns; ++column) add_patch(column, row);
     }
     for (int side = 0; side < 4; ++side) add_wall(side);
     add_back();
-    shell_.Closed(true);
-    builder_.MakeSolid(result_.solid);
-    builder_.Add(result_.solid, shell_);
-    return result_;
+    return shell_.close();
   }
 
  private:
-  using Edges = std::vector<TopoDS_Shape>;
+  using Edges = SolidShell::Edges;
 
   [[nodiscard]] double u(int line) const { return net_.u[static_cast<std::size_t>(line)]; }
   [[nodiscard]] double v(int line) const { return net_.v[static_cast<std::size_t>(line)]; }
@@ -121,14 +116,9 @@ class SolidBuilder {
   }
   [[nodiscard]] int corner_row(int side) const { return side % 4 >= 2 ? net_.rows : 0; }
 
-  TopoDS_Edge make_edge(const Handle(Geom_BSplineCurve) & curve, const TopoDS_Vertex& from,
-                        const TopoDS_Vertex& to) {
-    TopoDS_Edge edge;
-    builder_.MakeEdge(edge, curve, Precision::Confusion());
-    builder_.Add(edge, from.Oriented(TopAbs_FORWARD));
-    builder_.Add(edge, to.Oriented(TopAbs_REVERSED));
-    builder_.Range(edge, curve->FirstParameter(), curve->LastParameter());
-    return edge;
+  static TopoDS_Edge make_edge(const Handle(Geom_BSplineCurve) & curve, const TopoDS_Vertex& from,
+                               const TopoDS_Vertex& to) {
+    return edge_along(curve, from, to, Precision::Confusion());
   }
 
   void make_edges() {
@@ -198,19 +188,6 @@ class SolidBuilder {
     builder_.UpdateEdge(edge, pcurve, face, Precision::Confusion());
   }
 
-  TopoDS_Wire make_wire(const Edges& edges) {
-    TopoDS_Wire wire;
-    builder_.MakeWire(wire);
-    for (const TopoDS_Shape& edge : edges) builder_.Add(wire, edge);
-    wire.Closed(true);
-    return wire;
-  }
-
-  void add_face(const TopoDS_Face& face, const char* name) {
-    builder_.Add(shell_, face);
-    result_.names.emplace_back(face, name);
-  }
-
   void add_patch(int c, int r) {
     TopoDS_Face face;
     const SplinePatch& patch = net_.patches[table_index(c, r, net_.columns)];
@@ -219,9 +196,10 @@ class SolidBuilder {
     add_pcurve(edge_u(c, r + 1), 0, v(r + 1), face);
     add_pcurve(edge_v(c, r), 1, u(c), face);
     add_pcurve(edge_v(c + 1, r), 1, u(c + 1), face);
-    builder_.Add(face, make_wire({edge_u(c, r), edge_v(c + 1, r), edge_u(c, r + 1).Reversed(),
-                                  edge_v(c, r).Reversed()}));
-    add_face(face, "optical surface");
+    shell_.add(
+        face,
+        {edge_u(c, r), edge_v(c + 1, r), edge_u(c, r + 1).Reversed(), edge_v(c, r).Reversed()},
+        "optical surface");
   }
 
   /// The top edges of a side in the order of a walk around the wall, which is against the rim.
@@ -243,7 +221,7 @@ class SolidBuilder {
     edges.insert(edges.end(), rim.begin(), rim.end());
     edges.push_back(uprights_[i].Reversed());
     const gp_Pln plane(foot(side), outwards_of(side));
-    add_face(BRepBuilderAPI_MakeFace(plane, make_wire(edges)).Face(), "side wall");
+    shell_.add(BRepBuilderAPI_MakeFace(plane, SolidShell::wire(edges)).Face(), "side wall");
   }
 
   void add_back() {
@@ -252,7 +230,7 @@ class SolidBuilder {
     if (is_height_map()) return add_height_map(edges);
     if (net_.front) return add_sphere(edges);
     const gp_Pln plane(foot(0), gp_Dir(0.0, 0.0, -1.0));
-    add_face(BRepBuilderAPI_MakeFace(plane, make_wire(edges)).Face(), "back");
+    shell_.add(BRepBuilderAPI_MakeFace(plane, SolidShell::wire(edges)).Face(), "back");
   }
 
   void add_height_map(const Edges& edges) {
@@ -267,16 +245,7 @@ class SolidBuilder {
       const Handle(Geom2d_Line) pcurve = new Geom2d_Line(starts[side], ways[side]);
       builder_.UpdateEdge(back_edges_[side], pcurve, face, Precision::Confusion());
     }
-    add_turned(face, edges);
-  }
-
-  /// A back whose own normal points up, into the solid.
-  void add_turned(TopoDS_Face& face, const Edges& edges) {
-    TopoDS_Wire wire = make_wire(edges);
-    wire.Reverse();
-    builder_.Add(face, wire);
-    face.Reverse();
-    add_face(face, "back");
+    shell_.add_turned(face, edges, "back");
   }
 
   void add_sphere(const Edges& edges) {
@@ -287,16 +256,14 @@ class SolidBuilder {
       ShapeFix_Edge().FixAddPCurve(TopoDS::Edge(edge), face, false, Precision::Confusion());
     }
     // A sphere's own normal points away from its centre, which lies below a hollow front.
-    if (front.radius < 0.0) return add_turned(face, edges);
-    builder_.Add(face, make_wire(edges));
-    add_face(face, "back");
+    if (front.radius < 0.0) return shell_.add_turned(face, edges, "back");
+    shell_.add(face, edges, "back");
   }
 
   const SplineNet& net_;
   SplinePatch back_;  ///< Of a front that is a height map.
   BRep_Builder builder_;
-  TopoDS_Shell shell_;
-  NamedSolid result_;
+  SolidShell shell_;
   std::vector<TopoDS_Vertex> vertices_;
   std::vector<TopoDS_Edge> edges_u_;
   std::vector<TopoDS_Edge> edges_v_;

@@ -12,9 +12,7 @@
 #include <Geom_SphericalSurface.hxx>
 #include <Precision.hxx>
 #include <TopoDS_Edge.hxx>
-#include <TopoDS_Shell.hxx>
 #include <TopoDS_Vertex.hxx>
-#include <TopoDS_Wire.hxx>
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -29,6 +27,7 @@
 #include "export/outline_walls.h"
 #include "export/rim_curve.h"
 #include "export/solid_geometry.h"
+#include "export/solid_shell.h"
 
 // Every edge has the parameter of its wall, in space and on the faces beside it.
 namespace lensforge {
@@ -63,20 +62,16 @@ class TrimmedSolid {
   }
 
   NamedSolid build() {
-    builder_.MakeShell(shell_);
     add_top();
     for (std::size_t k = 0; k < walls_.size(); ++k) {
       walls_[k].arc ? add_cylinder(k) : add_plane(k);
     }
     net_.front ? add_sphere() : add_back();
-    shell_.Closed(true);
-    builder_.MakeSolid(result_.solid);
-    builder_.Add(result_.solid, shell_);
-    return result_;
+    return shell_.close();
   }
 
  private:
-  using Edges = std::vector<TopoDS_Shape>;
+  using Edges = SolidShell::Edges;
 
   [[nodiscard]] const SphericalFront& sphere() const {
     return std::get<SphericalFront>(*net_.front);
@@ -133,13 +128,9 @@ class TrimmedSolid {
     return made;
   }
 
-  TopoDS_Edge make_edge(const RimCurve& curve, const TopoDS_Vertex& from, const TopoDS_Vertex& to) {
-    TopoDS_Edge edge;
-    builder_.MakeEdge(edge, curve.space, kRimTolerance);
-    builder_.Add(edge, from.Oriented(TopAbs_FORWARD));
-    builder_.Add(edge, to.Oriented(TopAbs_REVERSED));
-    builder_.Range(edge, curve.space->FirstParameter(), curve.space->LastParameter());
-    return edge;
+  static TopoDS_Edge make_edge(const RimCurve& curve, const TopoDS_Vertex& from,
+                               const TopoDS_Vertex& to) {
+    return edge_along(curve.space, from, to, kRimTolerance);
   }
 
   void make_edges(std::size_t k) {
@@ -167,19 +158,6 @@ class TrimmedSolid {
             gp_Dir(std::cos(angle), std::sin(angle), 0.0)};
   }
 
-  TopoDS_Wire make_wire(const Edges& edges) {
-    TopoDS_Wire wire;
-    builder_.MakeWire(wire);
-    for (const TopoDS_Shape& edge : edges) builder_.Add(wire, edge);
-    wire.Closed(true);
-    return wire;
-  }
-
-  void add_face(const TopoDS_Face& face, const char* name) {
-    builder_.Add(shell_, face);
-    result_.names.emplace_back(face, name);
-  }
-
   void add_top() {
     TopoDS_Face face;
     builder_.MakeFace(face, surface_of(net_.patches.front()), Precision::Confusion());
@@ -188,8 +166,7 @@ class TrimmedSolid {
       builder_.UpdateEdge(edges.top, edges.top_curve.plan, face, kRimTolerance);
       rim.push_back(edges.top);
     }
-    builder_.Add(face, make_wire(rim));
-    add_face(face, "optical surface");
+    shell_.add(face, rim, "optical surface");
   }
 
   /// Around a wall, seen from outside.
@@ -201,7 +178,7 @@ class TrimmedSolid {
   void add_plane(std::size_t k) {
     const Eigen::Vector2d along = walls_[k].along(0.0);
     const gp_Pln plane(edges_[k].top_curve.space->StartPoint(), gp_Dir(along.y(), -along.x(), 0.0));
-    add_face(BRepBuilderAPI_MakeFace(plane, make_wire(around(k))).Face(), "side wall");
+    shell_.add(BRepBuilderAPI_MakeFace(plane, SolidShell::wire(around(k))).Face(), "side wall");
   }
 
   void add_cylinder(std::size_t k) {
@@ -221,8 +198,7 @@ class TrimmedSolid {
     }
     add_upright(corners_[k], kFirstAngle, face);
     add_upright(corners_[after(k)], kFirstAngle + walls_[k].last(), face);
-    builder_.Add(face, make_wire(around(k)));
-    add_face(face, "side wall");
+    shell_.add(face, around(k), "side wall");
   }
 
   void add_upright(const Corner& corner, double angle, const TopoDS_Face& face) {
@@ -240,7 +216,7 @@ class TrimmedSolid {
 
   void add_back() {
     const gp_Pln plane(gp_Pnt(0.0, 0.0, 0.0), gp_Dir(0.0, 0.0, -1.0));
-    add_face(BRepBuilderAPI_MakeFace(plane, make_wire(back_rim())).Face(), "back");
+    shell_.add(BRepBuilderAPI_MakeFace(plane, SolidShell::wire(back_rim())).Face(), "back");
   }
 
   void add_sphere() {
@@ -250,12 +226,8 @@ class TrimmedSolid {
       builder_.UpdateEdge(edges.back, edges.back_curve.plan, face, kRimTolerance);
     }
     // A sphere's own normal points away from its centre, which lies below a hollow front.
-    const bool hollow = sphere().radius < 0.0;
-    TopoDS_Wire wire = make_wire(back_rim());
-    if (hollow) wire.Reverse();
-    builder_.Add(face, wire);
-    if (hollow) face.Reverse();
-    add_face(face, "back");
+    if (sphere().radius < 0.0) return shell_.add_turned(face, back_rim(), "back");
+    shell_.add(face, back_rim(), "back");
   }
 
   const SplineNet& net_;
@@ -263,8 +235,7 @@ class TrimmedSolid {
   FrontSurface front_;
   Eigen::Vector2d uv_;  ///< Of the patch's last point that was looked up.
   BRep_Builder builder_;
-  TopoDS_Shell shell_;
-  NamedSolid result_;
+  SolidShell shell_;
   std::vector<WallEdges> edges_;  ///< Of wall k.
   std::vector<Corner> corners_;   ///< Corner k begins wall k.
 };

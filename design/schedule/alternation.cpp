@@ -7,8 +7,10 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/surface/control_net.h"
 #include "core/surface/grid_mesh.h"
 #include "core/value_slope.h"
+#include "design/flux_of_surface.h"
 #include "design/schedule/spline_start.h"
 #include "design/schedule/start_surface.h"
 #include "design/source_picture.h"
@@ -61,10 +63,24 @@ SurfaceMesh level_start(const DesignTask& task, const Level& level, const Surfac
   return regrid(mesh, task.setup.lens_size, level.grid);
 }
 
-/// True if the last round left something that the light of an extended source shows and its
-/// convolution does not. A spline's part in it is what its mesh's was.
+/// True if the surface is so near to its picture that what the convolution gets wrong counts. The
+/// part that a process makes is blurred by more than the source, and not corrected.
 bool needs_correction(const LevelProblem& problem, const Level& level, const Checkpoint& state) {
-  return !problem.setup.extent.none() && !level.spline && state.round > 0;
+  return !problem.setup.extent.none() && !problem.objective.made_by &&
+         (level.spline || state.round > 0);
+}
+
+/// The picture that the level's surface has to aim at now.
+Image corrected_target(const DesignTask& task, const LevelProblem& problem, const Level& level,
+                       const SurfaceMesh& mesh, const Image& target) {
+  SampledSurface nodes;
+  if (level.spline) nodes = spline_nodes({mesh.grid, mesh.vertices}, kMeshSamples);
+  const auto picture = [&](const OpticalSetup& light) {
+    if (level.spline) return flux_of_surface(nodes.mesh, nodes.normals, light, task.executor);
+    return flux_of_surface(mesh, light, problem.objective.model, task.executor);
+  };
+  return corrected_for_convolution(target, problem.setup, mesh.vertices.row(2).mean(), picture,
+                                   task.executor);
 }
 
 Ending run_level(const DesignTask& task, DesignLog& log, Checkpoint& state) {
@@ -79,8 +95,7 @@ Ending run_level(const DesignTask& task, DesignLog& log, Checkpoint& state) {
   GuidedOptimization stage = stage_of();
   while (state.round < level.rounds) {
     if (needs_correction(problem, level, state)) {
-      problem.target = corrected_for_convolution(target, state.mesh, problem.setup,
-                                                 problem.objective.model, task.executor);
+      problem.target = corrected_target(task, problem, level, state.mesh, target);
       stage = stage_of();
       state.value = stage.value(state.mesh);
     }

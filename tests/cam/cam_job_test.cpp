@@ -15,6 +15,7 @@
 #include "cam/cam_meshes.h"
 #include "cam/contact/height_field.h"
 #include "cam/cut_estimate.h"
+#include "cam/small_cuts.h"
 #include "core/error.h"
 #include "core/full_disk.h"
 #include "core/temp_folder.h"
@@ -22,26 +23,16 @@
 namespace lensforge {
 namespace {
 
+using lensforge::testing::coarse;
 using lensforge::testing::FullDisk;
 using lensforge::testing::message_of;
+using lensforge::testing::programs_only;
 using lensforge::testing::read_bytes;
+using lensforge::testing::run_cut;
 using lensforge::testing::small_lens;
 using lensforge::testing::TempFolder;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
-
-/// Coarse enough for a test, with everything that a cut has.
-CamOptions coarse() {
-  CamOptions options;
-  options.sample_spacing = 0.03;
-  return options;
-}
-
-CamOptions programs_only() {
-  CamOptions options;
-  options.render = false;
-  return options;
-}
 
 /// A built-in post as a user copies and renames it.
 PostDescription post_of_a_user(const std::string& copied) {
@@ -53,14 +44,9 @@ PostDescription post_of_a_user(const std::string& copied) {
   return find_post((folder / "mine.toml").string(), "--post");
 }
 
-CamResult run(const Lens& lens, const CamOptions& options, const TempFolder& folder,
-              const RunControl& control = {}) {
-  return make_cut(lens, options, folder.path(), Executor::cpu(2), control);
-}
-
 TEST(CamJob, WritesProgramsPicturesAndReport) {
   const TempFolder folder;
-  const CamResult result = run(small_lens(), coarse(), folder);
+  const CamResult result = run_cut(small_lens(), coarse(), folder);
   EXPECT_TRUE(result.done()) << result.message;
   std::vector<std::string> names;
   for (const auto& file : result.files) names.push_back(file.filename().string());
@@ -80,7 +66,7 @@ TEST(CamJob, TheSplitAddsUpAndCausesThatAreNotThereCountNothing) {
   const TempFolder folder;
   CamOptions options = coarse();
   options.workshop.polish.sigma = 0.0;
-  const LeakageResult leakage = run(small_lens(), options, folder).report.leakage;
+  const LeakageResult leakage = run_cut(small_lens(), options, folder).report.leakage;
   double sum = 0.0;
   for (const CausePart& part : leakage.parts) {
     sum += part.leakage;
@@ -99,11 +85,11 @@ TEST(CamJob, APitchErrorIsInThePredictionAndNotInThePrograms) {
   const TempFolder exact;
   const TempFolder stretched;
   CamOptions options = coarse();
-  const LeakageResult before = run(small_lens(), options, exact).report.leakage;
+  const LeakageResult before = run_cut(small_lens(), options, exact).report.leakage;
   const double memory = estimate_cut(options, small_lens().setup, 1).memory_bytes;
   options.workshop.process.finish.pitch_error = 0.01;
   EXPECT_GT(estimate_cut(options, small_lens().setup, 1).memory_bytes, memory);
-  const ReportData report = run(small_lens(), options, stretched).report;
+  const ReportData report = run_cut(small_lens(), options, stretched).report;
   const auto text_below = [](const std::string& program) {
     return program.substr(program.find("G21"));
   };
@@ -141,7 +127,7 @@ TEST(CamJob, ZZeroShiftsThePrograms) {
            {ZZero::kStock, -top - 0.25}, {ZZero::kLens, -top}, {ZZero::kTable, 0.0}}) {
     const TempFolder folder;
     options.z_zero = zero;
-    EXPECT_DOUBLE_EQ(run(lens, options, folder).report.z_offset, offset) << words_for(zero);
+    EXPECT_DOUBLE_EQ(run_cut(lens, options, folder).report.z_offset, offset) << words_for(zero);
     char safe[40];
     std::snprintf(safe, sizeof safe, "G0 Z%.6f\n", top + 0.25 + 5.0 + offset);
     EXPECT_THAT(read_bytes(folder / "finish.ngc"), HasSubstr(safe));
@@ -167,12 +153,12 @@ RunControl stop_at(const std::string& stage, std::stop_source& source) {
 TEST(CamJob, WhatIsStoppedAnywhereLeavesTheOldJobAsItWas) {
   const TempFolder folder;
   CamOptions options = coarse();
-  run(small_lens(), options, folder);
+  run_cut(small_lens(), options, folder);
   const auto before = contents(folder);
   options.z_zero = ZZero::kTable;
   for (const std::string stage : {"", "cam finish", "render surfaces"}) {
     std::stop_source source;
-    EXPECT_EQ(run(small_lens(), options, folder, stop_at(stage, source)).status,
+    EXPECT_EQ(run_cut(small_lens(), options, folder, stop_at(stage, source)).status,
               CamResult::Status::kInterrupted)
         << stage;
     EXPECT_EQ(contents(folder), before) << stage;
@@ -189,21 +175,21 @@ TEST(CamJob, ProgramsOfAnEarlierRunThatThisOneDoesNotWriteAreRemoved) {
   const TempFolder folder;
   CamOptions options = programs_only();
   options.job = "A lens (1)";
-  run(small_lens(), options, folder);
+  run_cut(small_lens(), options, folder);
   ASSERT_THAT(names_in(folder), ::testing::Contains("rough.ngc"));
   options.grouping = ProgramGrouping::kAll;
-  run(small_lens(), options, folder);
+  run_cut(small_lens(), options, folder);
   EXPECT_THAT(names_in(folder),
               ::testing::ElementsAre("A lens (1).ngc", "report.html", "report.json"));
   options.workshop.process.rough.enabled = false;
   options.grouping = ProgramGrouping::kOperation;
   options.largest_file = 65536;
-  run(small_lens(), options, folder);
+  run_cut(small_lens(), options, folder);
   EXPECT_THAT(names_in(folder), ::testing::Not(::testing::Contains("A lens (1).ngc")));
   EXPECT_THAT(names_in(folder), ::testing::Contains("finish_2.ngc"));
   options.largest_file = 0;
   options.post = find_post("fanuc", "--post");
-  run(small_lens(), options, folder);
+  run_cut(small_lens(), options, folder);
   EXPECT_THAT(names_in(folder),
               ::testing::ElementsAre("finish.nc", "report.html", "report.json", "semi.nc"));
 }
@@ -211,12 +197,12 @@ TEST(CamJob, ProgramsOfAnEarlierRunThatThisOneDoesNotWriteAreRemoved) {
 TEST(CamJob, ProgramsThatAreNotTheJobsAreKeptAndNamed) {
   const TempFolder folder;
   CamOptions options = programs_only();
-  run(small_lens(), options, folder);
+  run_cut(small_lens(), options, folder);
   lensforge::testing::write_bytes(folder / "rough.ngc", read_bytes(folder / "rough.ngc") + "\n");
   std::filesystem::copy_file(folder / "semi.ngc", folder / "semi-old.ngc");
   lensforge::testing::write_bytes(folder / "mine.ngc", "M2\n");
   options.workshop.process.rough.enabled = false;
-  const ReportData report = run(small_lens(), options, folder).report;
+  const ReportData report = run_cut(small_lens(), options, folder).report;
   EXPECT_THAT(report.warnings,
               ::testing::Contains(HasSubstr("of another job, which were kept: mine.ngc, rough.ngc, "
                                             "semi-old.ngc")));
@@ -231,27 +217,27 @@ TEST(CamJob, WhatOthersWroteIsReplacedOnlyByForce) {
     const TempFolder folder;
     CamOptions options = programs_only();
     lensforge::testing::write_bytes(folder / name, "mine");
-    EXPECT_THAT(message_of<InputError>([&] { run(small_lens(), options, folder); }),
+    EXPECT_THAT(message_of<InputError>([&] { run_cut(small_lens(), options, folder); }),
                 AllOf(HasSubstr(name), HasSubstr("--force")));
     EXPECT_EQ(names_in(folder), std::vector<std::string>{name});
     EXPECT_EQ(read_bytes(folder / name), "mine");
     options.force = true;
-    EXPECT_TRUE(run(small_lens(), options, folder).done());
+    EXPECT_TRUE(run_cut(small_lens(), options, folder).done());
   }
 }
 
 TEST(CamJob, AProgramThatWasEditedIsReplacedOnlyByForce) {
   const TempFolder folder;
   CamOptions options = programs_only();
-  run(small_lens(), options, folder);
-  run(small_lens(), options, folder);
+  run_cut(small_lens(), options, folder);
+  run_cut(small_lens(), options, folder);
   lensforge::testing::write_bytes(folder / "semi.ngc", read_bytes(folder / "semi.ngc") + "\n");
   const auto before = contents(folder);
-  EXPECT_THAT(message_of<InputError>([&] { run(small_lens(), options, folder); }),
+  EXPECT_THAT(message_of<InputError>([&] { run_cut(small_lens(), options, folder); }),
               HasSubstr("semi.ngc: lensforge did not write it as it stands"));
   EXPECT_EQ(contents(folder), before);
   options.force = true;
-  EXPECT_TRUE(run(small_lens(), options, folder).done());
+  EXPECT_TRUE(run_cut(small_lens(), options, folder).done());
 }
 
 TEST(CamJob, AFolderInPlaceOfAFileIsRefusedWhateverForceSays) {
@@ -259,13 +245,13 @@ TEST(CamJob, AFolderInPlaceOfAFileIsRefusedWhateverForceSays) {
   std::filesystem::create_directory(folder / "report.html");
   CamOptions options = programs_only();
   options.force = true;
-  EXPECT_THAT(message_of<InputError>([&] { run(small_lens(), options, folder); }),
+  EXPECT_THAT(message_of<InputError>([&] { run_cut(small_lens(), options, folder); }),
               HasSubstr("report.html: is no regular file"));
 }
 
 TEST(CamJob, RemoveCutLeavesOtherFiles) {
   const TempFolder folder;
-  run(small_lens(), programs_only(), folder);
+  run_cut(small_lens(), programs_only(), folder);
   lensforge::testing::write_bytes(folder / "finish.ngc", read_bytes(folder / "finish.ngc") + "\n");
   for (const char* name : {"finish-notes.txt", "finish.bak", "milled.png"}) {
     lensforge::testing::write_bytes(folder / name, "mine");
@@ -282,7 +268,7 @@ TEST(CamJob, SurfacesWithAHoleAreRefusedBeforeAnythingIsWritten) {
     options.render = render;
     Lens lens = small_lens();
     lens.surface.triangles.col(100) = lens.surface.triangles.col(0);
-    EXPECT_THAT(message_of<InputError>([&] { run(lens, options, folder); }),
+    EXPECT_THAT(message_of<InputError>([&] { run_cut(lens, options, folder); }),
                 HasSubstr("hole or an overlap"));
   }
   EXPECT_EQ(folder.file_count(), 0U);
@@ -293,7 +279,7 @@ TEST(CamJob, FullDiskLeavesNothing) {
   {
     const FullDisk full(20000);
     const std::string message =
-        message_of<RunError>([&] { run(small_lens(), programs_only(), folder); });
+        message_of<RunError>([&] { run_cut(small_lens(), programs_only(), folder); });
     EXPECT_THAT(message, AllOf(HasSubstr(".ngc"), HasSubstr("File too large")));
   }
   EXPECT_EQ(folder.file_count(), 0U);
@@ -311,17 +297,17 @@ TEST(CamJob, WarnsOfWhatAnOperatorShouldQuestion) {
   CamOptions options = programs_only();
   Lens plate = small_lens();
   plate.surface.vertices.row(2).setConstant(6.0);
-  EXPECT_THAT(run(plate, options, folder).report.warnings, ::testing::IsEmpty());
+  EXPECT_THAT(run_cut(plate, options, folder).report.warnings, ::testing::IsEmpty());
   options.post = post_of_a_user("grbl");
-  EXPECT_THAT(run(plate, options, folder).report.warnings,
+  EXPECT_THAT(run_cut(plate, options, folder).report.warnings,
               ::testing::Contains(HasSubstr("$30, silently: set it to at least 23000")));
   options.workshop.machine.travel.x() = 5.0;
-  EXPECT_THAT(run(plate, options, folder).report.warnings,
+  EXPECT_THAT(run_cut(plate, options, folder).report.warnings,
               ::testing::Contains(HasSubstr("travel")));
   for (std::int64_t v = 0; v < plate.surface.vertex_count(); ++v) {
     plate.surface.vertices(2, v) = 6.0 + 1.2 * plate.surface.vertices(0, v);
   }
-  EXPECT_THAT(run(plate, options, folder).report.warnings,
+  EXPECT_THAT(run_cut(plate, options, folder).report.warnings,
               ::testing::Contains(HasSubstr("rises by")));
 }
 
@@ -334,13 +320,13 @@ TEST(CamJob, ToolNumbersThatTheControllerCannotCallAreRefusedFirst) {
   }
   finishing = 1000;
   options.post = find_post("fanuc", "--post");
-  EXPECT_THAT(message_of<InputError>([&] { run(small_lens(), options, folder); }),
+  EXPECT_THAT(message_of<InputError>([&] { run_cut(small_lens(), options, folder); }),
               HasSubstr("tool number 1000: is above 999, the largest that a post read as fanuc can "
                         "call; number the tool from 1 to 999"));
   // Grbl's programs call no tool, LinuxCNC's may call this one.
   for (const char* post : {"grbl", "linuxcnc"}) {
     options.post = find_post(post, "--post");
-    EXPECT_NO_THROW(run(small_lens(), options, folder)) << post;
+    EXPECT_NO_THROW(run_cut(small_lens(), options, folder)) << post;
   }
 }
 
@@ -349,10 +335,10 @@ TEST(CamJob, WarnsWhereFlutesAreTooShortForABlankThatNobodyRoughed) {
   CamOptions options = programs_only();
   options.workshop.process.rough.enabled = false;
   options.workshop.stock.allowance = 3.0;
-  const std::vector<std::string> warnings = run(small_lens(), options, folder).report.warnings;
+  const std::vector<std::string> warnings = run_cut(small_lens(), options, folder).report.warnings;
   EXPECT_THAT(warnings, ::testing::Contains(HasSubstr("nothing is roughed: 'semi' cuts")));
   options.workshop.process.rough.enabled = true;
-  EXPECT_THAT(run(small_lens(), options, folder).report.warnings,
+  EXPECT_THAT(run_cut(small_lens(), options, folder).report.warnings,
               ::testing::Not(::testing::Contains(HasSubstr("nothing is roughed"))));
 }
 
@@ -362,7 +348,7 @@ TEST(CamJob, AClampInTheWayIsACollision) {
   options.workshop.process.rough.enabled = false;
   options.workshop.process.semi.enabled = false;
   options.workshop.keep_outs.push_back({"vice", {1.0, 0.5, 0.0}, {2.0, 1.5, 20.0}});
-  const ReportData report = run(small_lens(), options, folder).report;
+  const ReportData report = run_cut(small_lens(), options, folder).report;
   EXPECT_FALSE(report.verdict.passes());
   EXPECT_THAT(report.warnings, ::testing::Contains(HasSubstr("vice")));
 }
@@ -370,18 +356,18 @@ TEST(CamJob, AClampInTheWayIsACollision) {
 TEST(CamJob, TheReportNamesTheDesignThatWasCut) {
   const TempFolder folder;
   Lens lens = small_lens();
-  EXPECT_EQ(run(lens, programs_only(), folder).report.lens_id, "");
+  EXPECT_EQ(run_cut(lens, programs_only(), folder).report.lens_id, "");
   lens.provenance["fingerprint"] = "0123456789abcdef";
-  EXPECT_EQ(run(lens, programs_only(), folder).report.lens_id, "0123456789abcdef");
+  EXPECT_EQ(run_cut(lens, programs_only(), folder).report.lens_id, "0123456789abcdef");
   lens.provenance["fingerprint"] = "<script>";
-  EXPECT_EQ(run(lens, programs_only(), folder).report.lens_id, "");
+  EXPECT_EQ(run_cut(lens, programs_only(), folder).report.lens_id, "");
 }
 
 TEST(CamJob, AFacetedDesignIsCutAsFacetsUnlessToldOtherwise) {
   const TempFolder folder;
   Lens lens = small_lens();
   const auto surface_of = [&](const CamOptions& options) {
-    const CamResult result = run(lens, options, folder);
+    const CamResult result = run_cut(lens, options, folder);
     return result.report.parameters.front().parameters.back().value;
   };
   EXPECT_EQ(surface_of(programs_only()), "smooth, over the mesh");
@@ -419,7 +405,8 @@ TEST(CamJob, BadOptionsAreNamedWithValueAndRule) {
   for (const BadOption& bad : cases) {
     CamOptions options;
     bad.set(options, bad.value);
-    EXPECT_THAT(message_of<InputError>([&] { run(lens, options, folder); }), HasSubstr(bad.words));
+    EXPECT_THAT(message_of<InputError>([&] { run_cut(lens, options, folder); }),
+                HasSubstr(bad.words));
   }
   EXPECT_EQ(folder.file_count(), 0U);
 }
@@ -427,7 +414,7 @@ TEST(CamJob, BadOptionsAreNamedWithValueAndRule) {
 TEST(CamJob, SurfacesThatCannotBeCutAreRefused) {
   const TempFolder folder;
   const auto refusal = [&](const Lens& lens) {
-    return message_of<InputError>([&] { run(lens, programs_only(), folder); });
+    return message_of<InputError>([&] { run_cut(lens, programs_only(), folder); });
   };
   Lens lens = small_lens();
   lens.surface.triangles.resize(3, 0);
@@ -454,7 +441,7 @@ TEST(CamJob, SurfacesThatCannotBeCutAreRefused) {
   lens.surface.triangles.col(102) = lens.surface.triangles.col(103);
   EXPECT_THAT(refusal(lens), HasSubstr("hole or an overlap"));
   lens.surface.triangles.conservativeResize(3, lens.surface.triangle_count() / 2);
-  EXPECT_THROW(run(lens, programs_only(), folder), InputError);
+  EXPECT_THROW(run_cut(lens, programs_only(), folder), InputError);
   EXPECT_EQ(folder.file_count(), 0U);
 }
 

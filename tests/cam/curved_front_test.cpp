@@ -8,6 +8,7 @@
 
 #include "cam/cam_job.h"
 #include "cam/cam_meshes.h"
+#include "cam/small_cuts.h"
 #include "core/error.h"
 #include "core/optics/front_placement.h"
 #include "core/optics/height_fronts.h"
@@ -18,34 +19,27 @@
 namespace lensforge {
 namespace {
 
+using lensforge::testing::coarse;
 using lensforge::testing::message_of;
+using lensforge::testing::programs_only;
 using lensforge::testing::read_bytes;
+using lensforge::testing::run_cut;
 using lensforge::testing::small_lens;
 using lensforge::testing::TempFolder;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 
-/// Coarse enough for a test.
-CamOptions predicted() {
-  CamOptions options;
-  options.sample_spacing = 0.03;
-  return options;
-}
-
-CamOptions programs_only() {
-  CamOptions options;
-  options.render = false;
-  return options;
-}
-
-CamResult run(const Lens& lens, const CamOptions& options, const TempFolder& folder) {
-  return make_cut(lens, options, folder.path(), Executor::cpu(2), {});
-}
-
 Lens lens_with_front(double radius) {
   Lens lens = small_lens();
   lens.setup.front = spherical_front(radius, lens.setup.lens_size);
   return lens;
+}
+
+/// What a lens projects by the normals of its vertices.
+Image picture_of(const Lens& lens) {
+  Image picture(lens.setup.pixels.x(), lens.setup.pixels.y());
+  (void)evaluate(lens, SurfaceModel::kSmooth, &picture, Executor::serial());
+  return picture;
 }
 
 /// Largest difference of the designed surface's picture from another one, in pixels of an even one.
@@ -62,12 +56,7 @@ TEST(CurvedFrontCut, ALensWithASphericalFrontIsPredictedBehindIt) {
   for (const double radius : {20.0, -20.0}) {
     const TempFolder folder;
     const Lens lens = lens_with_front(radius);
-    const ReportData report = run(lens, predicted(), folder).report;
-    const auto picture_of = [](const Lens& any) {
-      Image picture(any.setup.pixels.x(), any.setup.pixels.y());
-      (void)evaluate(any, SurfaceModel::kSmooth, &picture, Executor::serial());
-      return picture;
-    };
+    const ReportData report = run_cut(lens, coarse(), folder).report;
     // Between so few vertices the sampled surface is another than their normals tell: behind a flat
     // front 0.09, behind these 0.04 and 0.20; the flat front's picture is 1.5 and 0.85 off.
     const double other = difference(report.leakage, picture_of(small_lens()));
@@ -79,7 +68,7 @@ TEST(CurvedFrontCut, ALensWithASphericalFrontIsPredictedBehindIt) {
 TEST(CurvedFrontCut, AReportSaysWhereASphericalFrontHasToLie) {
   const TempFolder folder;
   const Lens lens = lens_with_front(20.0);
-  const ReportData report = run(lens, programs_only(), folder).report;
+  const ReportData report = run_cut(lens, programs_only(), folder).report;
   const auto& front = std::get<SphericalFront>(*lens.setup.front);
   ASSERT_TRUE(report.setup.front.has_value());
   EXPECT_EQ(report.setup.blank.min().z(), front.apex.z());
@@ -95,7 +84,7 @@ TEST(CurvedFrontCut, AReportSaysWhereASphericalFrontHasToLie) {
   const std::string html = read_bytes(folder / "report.html");
   EXPECT_THAT(html, AllOf(HasSubstr("in a nest"), HasSubstr("Section through the apex")));
   const TempFolder flat;
-  EXPECT_EQ(run(small_lens(), programs_only(), flat).report.z_offset, report.z_offset);
+  EXPECT_EQ(run_cut(small_lens(), programs_only(), flat).report.z_offset, report.z_offset);
 }
 
 TEST(CurvedFrontCut, ALensWithAHeightMapForAFrontIsPredictedBehindItAndItsReportSaysWhereItLies) {
@@ -105,12 +94,7 @@ TEST(CurvedFrontCut, ALensWithAHeightMapForAFrontIsPredictedBehindItAndItsReport
       testing::height_front(lens.setup.lens_size, {31, 21}, [](const Eigen::Vector2d& at) {
         return -0.08 + 0.08 * std::sin(2.0 * at.x()) * std::cos(1.5 * at.y());
       });
-  const ReportData report = run(lens, predicted(), folder).report;
-  const auto picture_of = [](const Lens& any) {
-    Image picture(any.setup.pixels.x(), any.setup.pixels.y());
-    (void)evaluate(any, SurfaceModel::kSmooth, &picture, Executor::serial());
-    return picture;
-  };
+  const ReportData report = run_cut(lens, coarse(), folder).report;
   const double other = difference(report.leakage, picture_of(small_lens()));
   EXPECT_GT(other, 0.3);
   EXPECT_LT(difference(report.leakage, picture_of(lens)), 0.3 * other);
@@ -130,7 +114,7 @@ TEST(CurvedFrontCut, ALensWithAHeightMapForAFrontIsPredictedBehindItAndItsReport
 TEST(CurvedFrontCut, ABlankThatASphericalFrontCannotHaveIsRefused) {
   const TempFolder folder;
   const auto refusal = [&](const CamOptions& options) {
-    return message_of<InputError>([&] { run(lens_with_front(8.0), options, folder); });
+    return message_of<InputError>([&] { run_cut(lens_with_front(8.0), options, folder); });
   };
   CamOptions options = programs_only();
   options.z_zero = ZZero::kTable;
@@ -141,13 +125,15 @@ TEST(CurvedFrontCut, ABlankThatASphericalFrontCannotHaveIsRefused) {
   EXPECT_THAT(refusal(options),
               AllOf(HasSubstr("stock.margin 5"), HasSubstr("radius 8 mm"), HasSubstr("4.4 mm")));
   options.workshop.stock.margin = 4.4;
-  EXPECT_NO_THROW(run(lens_with_front(8.0), options, folder));
+  EXPECT_NO_THROW(run_cut(lens_with_front(8.0), options, folder));
 }
 
 TEST(CurvedFrontCut, ABlankNarrowerThanTheLightBehindACurvedFrontIsWarnedOf) {
   const TempFolder folder;
   CamOptions options = programs_only();
-  const auto warnings = [&] { return run(lens_with_front(8.0), options, folder).report.warnings; };
+  const auto warnings = [&] {
+    return run_cut(lens_with_front(8.0), options, folder).report.warnings;
+  };
   EXPECT_THAT(warnings(), ::testing::Not(::testing::Contains(HasSubstr("rim stays dark"))));
   options.workshop.stock.margin = 0.1;
   EXPECT_THAT(warnings(), ::testing::Contains(HasSubstr("stock.margin is at least")));

@@ -11,23 +11,19 @@
 
 #include "cam/cam_job.h"
 #include "cam/cam_meshes.h"
+#include "cam/small_cuts.h"
 #include "core/error.h"
 #include "core/temp_folder.h"
 
 namespace lensforge {
 namespace {
 
+using lensforge::testing::coarse;
 using lensforge::testing::message_of;
 using lensforge::testing::read_bytes;
 using lensforge::testing::small_lens;
 using lensforge::testing::TempFolder;
 using ::testing::HasSubstr;
-
-CamOptions coarse() {
-  CamOptions options;
-  options.sample_spacing = 0.03;
-  return options;
-}
 
 CutChoices parse(const std::vector<std::string>& words) {
   return parse_choices(words, "--compare");

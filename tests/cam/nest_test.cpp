@@ -264,7 +264,7 @@ TEST_F(NestJob, WhatDoesNotFitOneBlankIsRefusedInOneLine) {
   EXPECT_THAT(refusal(), HasSubstr("disc: was designed for index 1.53, bee for 1.49"));
   disc_.setup.ior = bee_.setup.ior;
   disc_.setup.front = spherical_front(100.0, disc_.setup.lens_size);
-  EXPECT_THAT(refusal(), HasSubstr("disc: has a spherical front"));
+  EXPECT_THAT(refusal(), HasSubstr("disc: has a curved front"));
   disc_.setup.front.reset();
   disc_.setup.mode = LightMode::kReflect;
   EXPECT_THAT(refusal(), HasSubstr("disc: is a mirror, bee is a lens"));

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <functional>
 #include <limits>
@@ -51,6 +52,25 @@ inline double plateau_error(const std::vector<double>& errors) {
     best = std::min(best, std::max(errors[k - 1], errors[k]));
   }
   return best;
+}
+
+/// Steps that suit the objectives: large ones cross corners of pixels, small ones drown in
+/// rounding.
+inline const std::vector<double> kObjectiveSteps{1e-4, 1e-5, 2e-6, 5e-7, 1e-7};
+
+/// Error, by plateau_error(), of a gradient along a direction, relative to the slope or, where its
+/// terms cancel, to their norm.
+inline double slope_error(const Scalar& f, const Eigen::VectorXd& x,
+                          const Eigen::VectorXd& gradient, const Eigen::VectorXd& direction,
+                          const std::vector<double>& steps = kObjectiveSteps) {
+  const Eigen::VectorXd products = gradient.cwiseProduct(direction);
+  const double expected = products.sum();
+  const double scale = std::max(std::fabs(expected), products.norm());
+  std::vector<double> errors;
+  for (const double step : steps) {
+    errors.push_back(std::fabs(directional_slope(f, x, direction, step) - expected) / scale);
+  }
+  return plateau_error(errors);
 }
 
 }  // namespace lensforge::testing

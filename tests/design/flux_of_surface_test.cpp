@@ -86,16 +86,9 @@ double slope_error(const SurfaceMesh& mesh, const OpticalSetup& setup, SurfaceMo
   Random random(6);
   Eigen::Matrix3Xd direction = bar;
   for (double& d : direction.reshaped()) d = random.between(-1.0, 1.0);
-  const Eigen::VectorXd products = bar.cwiseProduct(direction).reshaped();
-  const double scale = std::max(std::fabs(products.sum()), products.norm());
   // Corners of image triangles that cross borders of pixels call for small steps.
-  std::vector<double> errors;
-  for (const double step : {1e-5, 1e-6, 1e-7, 3e-8, 1e-8}) {
-    const double slope =
-        testing::directional_slope(f, mesh.vertices.reshaped(), direction.reshaped(), step);
-    errors.push_back(std::fabs(slope - products.sum()) / scale);
-  }
-  return testing::plateau_error(errors);
+  return testing::slope_error(f, mesh.vertices.reshaped(), bar.reshaped(), direction.reshaped(),
+                              {1e-5, 1e-6, 1e-7, 3e-8, 1e-8});
 }
 
 TEST_P(FluxOfSurfaceUnder, IsThePictureThatIsRendered) {

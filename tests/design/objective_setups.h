@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <Eigen/Core>
 #include <cmath>
 #include <cstdint>
+#include <vector>
 
 #include "core/optics/image_plane.h"
 #include "design/energy/objective.h"
+#include "design/finite_difference.h"
 #include "design/random_input.h"
 #include "design/test_setups.h"
 
@@ -82,6 +86,20 @@ inline DesignObjective::Evaluation evaluate_at(DesignObjective& objective,
                                                const Eigen::Matrix3Xd& vertices) {
   Eigen::Matrix3Xd ignored;
   return objective.evaluate(vertices, ignored);
+}
+
+/// slope_error() of an objective's gradient along a random movable direction.
+inline double gradient_error(DesignObjective& objective, const Eigen::Matrix3Xd& vertices,
+                             const std::vector<double>& steps = kObjectiveSteps) {
+  Eigen::Matrix3Xd gradient;
+  EXPECT_TRUE(objective.evaluate(vertices, gradient).feasible);
+  const auto f = [&](const Eigen::VectorXd& x) {
+    return evaluate_at(objective, x.reshaped(3, gradient.cols())).energy.total;
+  };
+  Random random(3);
+  Eigen::Matrix3Xd direction = objective.movable();
+  for (double& d : direction.reshaped()) d *= random.between(-1.0, 1.0);
+  return slope_error(f, vertices.reshaped(), gradient.reshaped(), direction.reshaped(), steps);
 }
 
 }  // namespace lensforge::testing
