@@ -94,9 +94,9 @@ inline constexpr int kMostTabs = 100;
 
 /// The spacing at which the surface is sampled across the passes, mm.
 double sample_spacing(const CamOptions& options);
-/// The same along x and y: up to three times that along passes, which do not cross, as far as the
-/// polish allows.
-Eigen::Vector2d sample_spacings(const CamOptions& options);
+/// The same along x and y: up to three times that along passes, which do not cross, as far as
+/// polish and pixels allow.
+Eigen::Vector2d sample_spacings(const CamOptions& options, const OpticalSetup& setup);
 
 /// The lens's edge: its outline, or its rectangle; counter-clockwise, mm.
 std::vector<Eigen::Vector2d> edge_of(const OpticalSetup& setup);

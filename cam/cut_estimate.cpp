@@ -94,8 +94,9 @@ double rough_points(const CamOptions& options, const Eigen::Vector2d& size) {
   return levels * points_of(shop.process.rough, size) + points_of(shop.process.semi, size);
 }
 
-double samples_of(const CamOptions& options, const Eigen::Vector2d& size) {
-  return options.render ? kSurfaces * size.prod() / sample_spacings(options).prod() : 0.0;
+double samples_of(const CamOptions& options, const OpticalSetup& setup) {
+  if (!options.render) return 0.0;
+  return kSurfaces * setup.lens_size.prod() / sample_spacings(options, setup).prod();
 }
 
 double memory_per_move(const FinishProcess& finish) {
@@ -151,7 +152,7 @@ WorkEstimate estimate_cut(const CamOptions& options, const OpticalSetup& setup, 
   const double points = rough_points(options, size);
   WorkEstimate estimate;
   estimate.seconds = (length * seconds_per_mm(options) + points * kSecondsPerPoint +
-                      samples_of(options, size) * kSecondsPerSample +
+                      samples_of(options, setup) * kSecondsPerSample +
                       drawn_parts(options) * part_nodes(options, setup) * kSecondsPerPartNode) /
                      threads;
   estimate.disk_bytes = (moves + kMovesPerPoint * points) * kBytesPerMove;
@@ -191,7 +192,7 @@ void require_room_for_cut(const CamOptions& options, const OpticalSetup& setup,
     return require("--tolerances " + std::to_string(options.tolerances),
                    "fewer parts, --tolerances 200, would fit");
   }
-  if (samples_of(options, size) * kSecondsPerSample > 0.5 * on_one_core.seconds) {
+  if (samples_of(options, setup) * kSecondsPerSample > 0.5 * on_one_core.seconds) {
     return require("--sample-spacing " + shortest_text(sample_spacing(options)) + "mm",
                    "a larger --sample-spacing would fit");
   }

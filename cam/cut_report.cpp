@@ -193,17 +193,17 @@ ParameterGroup outline_parameters(const CutPlan& plan) {
                           mm(cut.tabs.height, 2) + " high, to be snapped by hand"}}};
 }
 
-std::string sampling_words(const CamOptions& options) {
-  const Eigen::Vector2d spacings = sample_spacings(options);
+std::string sampling_words(const CamOptions& options, const OpticalSetup& setup) {
+  const Eigen::Vector2d spacings = sample_spacings(options, setup);
   if (spacings.x() == spacings.y()) return mm(spacings.x(), 4);
   return mm(spacings.minCoeff(), 4) + " across the passes, " + mm(spacings.maxCoeff(), 4) +
          " along";
 }
 
-ParameterGroup polish_parameters(const CamOptions& options) {
+ParameterGroup polish_parameters(const CamOptions& options, const OpticalSetup& setup) {
   ParameterGroup group{"Polishing, as assumed",
                        {{"Gaussian σ", mm(options.workshop.polish.sigma, 3)},
-                        {"Sampled every", sampling_words(options)}}};
+                        {"Sampled every", sampling_words(options, setup)}}};
   if (options.workshop.polish.rim_depth > 0.0) {
     group.parameters.push_back(
         {"Taken off at the rim", mm(options.workshop.polish.rim_depth, 4) + ", falling over " +
@@ -479,7 +479,7 @@ ReportData make_report(const CutPlan& plan, const ProgramFiles& programs,
   data.warnings = warnings_of(plan, programs, lens);
   data.path = plan.shown_path();
   if (prediction) {
-    data.parameters.push_back(polish_parameters(options));
+    data.parameters.push_back(polish_parameters(options, lens.setup));
     add_prediction(*prediction, lens, data);
   }
   data.verdict = whole_verdict(plan, programs, prediction, lens);

@@ -68,7 +68,7 @@ ReportMap height_map(const LeakMap& map) {
 Prediction predict_part(const PartSurfaces& surfaces, const Lens& lens, const CamOptions& options,
                         const Executor& executor, const RunControl& control) {
   Prediction result;
-  const GridWindow grid = lens_grid(lens.setup.lens_size, sample_spacings(options));
+  const GridWindow grid = lens_grid(lens.setup.lens_size, sample_spacings(options, lens.setup));
   FieldRenderSetup setup{lens.setup, grid};
   setup.surface_height = lens.surface.vertices.row(2).mean();
   for (const LightColor& color : light_colors(lens.setup)) {
@@ -92,7 +92,7 @@ Prediction predict_part(const PartSurfaces& surfaces, const Lens& lens, const Ca
   result.milled = mesh_of(coarse_patch(surfaces.milled(), lens, kMeshSpacing, executor));
   result.surfaces = surface_layers(
       {{part_layer::kPolished, chain.steps.front().field}, {part_layer::kPart, &surfaces.part()}},
-      lens.setup.lens_size, sample_spacings(options), executor, control);
+      lens.setup.lens_size, sample_spacings(options, lens.setup), executor, control);
   return result;
 }
 

@@ -199,8 +199,9 @@ void TrialCut::add_pencil(const Eigen::AlignedBox2d& box, const MoveSink& sink,
 LeakTrial TrialCut::at(const LeakPlace& place, const RunControl& control) const {
   const RunControl silent(control.stop_token(), {});
   const CamOptions& before = site_.plan.options();
-  const GridWindow grid = lens_grid(site_.lens.setup.lens_size, sample_spacings(before));
-  const CellGrid fine = refined(grid, place.cells, sample_spacings(options_));
+  const GridWindow grid =
+      lens_grid(site_.lens.setup.lens_size, sample_spacings(before, site_.lens.setup));
+  const CellGrid fine = refined(grid, place.cells, sample_spacings(options_, site_.lens.setup));
   const std::optional<CastFrame> mould = site_.plan.mould();
   const double polished = PolishedField::kReach * options_.workshop.polish.sigma +
                           (1.0 + kCreaseHalo) * grid.spacing.maxCoeff();

@@ -125,8 +125,9 @@ TEST(TrialCut, OfAMachineThatGoesTooFarLeaksWhatWasPredicted) {
 TEST(TrialCut, OfAPartOfTheLensLeaksAsThatPartDoes) {
   const CamOptions options = facets_polished();
   const Predicted cut(grooved_lens(), options);
-  const FieldRenderSetup setup{cut.site().lens.setup,
-                               lens_grid({3.0, 2.0}, sample_spacings(options))};
+  const FieldRenderSetup setup{
+      cut.site().lens.setup,
+      lens_grid({3.0, 2.0}, sample_spacings(options, cut.site().lens.setup))};
   LeakPlace place = cut.prediction().places[0];
   const auto coarser = std::llround(setup.grid.spacing.x() / setup.grid.spacing.y());
   place.cells = {120 / coarser, 70, 60 / coarser, 40};
