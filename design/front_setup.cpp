@@ -55,7 +55,8 @@ std::shared_ptr<const HeightSpline> front_from(const std::string& file, const Ru
   std::error_code none;
   if (!std::filesystem::exists(file, none)) {
     refuse("--front '" + file + "'",
-           "must be flat, sphere:R with R a radius in mm, or a picture of heights; flat would do");
+           "is no file here; must be flat, sphere:R with R a radius in mm, or a picture of heights; "
+           "flat would do");
   }
   return std::make_shared<HeightSpline>(read_heights(file, control));
 }

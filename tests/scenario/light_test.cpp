@@ -144,10 +144,9 @@ void expect_traced_metrics(const std::string& folder) {
     const nlohmann::json found = traced(folder, model);
     ASSERT_TRUE(found.is_object()) << model;
     for (const std::string key : {"mae", "mae_linear"}) {
-      // A model that the lens was not designed as may be far off (0.05), and rounds as much more;
-      // of a spline the file has nodes, whose picture is up to 3e-4 off.
+      // A model that the lens was not designed as may be far off (0.05), and rounds as much more.
       const double value = metrics[model][key].get<double>();
-      const double bound = model == "spline" ? 4e-4 : std::max(2e-4, 1e-2 * value);
+      const double bound = std::max(2e-4, 1e-2 * value);
       EXPECT_NEAR(found[key].get<double>(), value, bound) << model << ' ' << key;
     }
   }

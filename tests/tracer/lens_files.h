@@ -12,10 +12,10 @@ namespace tracer {
 using Vec2 = Eigen::Vector2d;
 using Vec3 = Eigen::Vector3d;
 
-/// surface.ply, mm.
+/// surface.ply or surface.spline, mm.
 struct Mesh {
   std::vector<Vec3> points;
-  std::vector<Vec3> normals;  ///< Unit normals of a spline's nodes; none of other lenses.
+  std::vector<Vec3> normals;  ///< Unit normals of a spline's points; none of other lenses.
   std::vector<std::array<int, 3>> triangles;
 };
 

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // lens_tracer FOLDER MODEL: what a lens projects, judged from its folder alone. It reads lens.json,
-// surface.ply, target.exr and front.exr as docs/interface.md describes them and shares no code with
-// the program. Facets are divided and traced point by point; of the other models the ray of every
-// vertex is traced, and its landing points are interpolated, as that page says.
+// surface.ply, surface.spline, target.exr and front.exr as docs/interface.md describes them and shares
+// no code with the program. Facets are divided and traced point by point; of a smooth surface the ray
+// of every vertex is traced and its landing points are interpolated, as that page says, of a spline
+// that of many points in every knot cell.
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -14,6 +15,7 @@
 
 #include "tracer/clipped_picture.h"
 #include "tracer/lens_files.h"
+#include "tracer/spline_surface.h"
 #include "tracer/traced_light.h"
 
 namespace tracer {
@@ -29,8 +31,8 @@ Vec3 doubled_area(const Mesh& mesh, const std::array<int, 3>& t) {
   return (at(1) - at(0)).cross(at(2) - at(0));
 }
 
-std::vector<Vec3> normals_of(const Mesh& mesh, bool given) {
-  if (given) return mesh.normals;
+/// Those of the facets around each vertex, weighted by area.
+std::vector<Vec3> smooth_normals(const Mesh& mesh) {
   std::vector<Vec3> sums(mesh.points.size(), Vec3::Zero());
   for (const auto& t : mesh.triangles) {
     for (const int v : t) sums[static_cast<std::size_t>(v)] += doubled_area(mesh, t);
@@ -86,7 +88,7 @@ Traced trace(const TracedLight& light, const Mesh& mesh, const std::string& mode
     for (const auto& t : mesh.triangles) add_facet(light, mesh, t, traced);
     return traced;
   }
-  const std::vector<Vec3> normals = normals_of(mesh, model == "spline");
+  const std::vector<Vec3> normals = model == "spline" ? mesh.normals : smooth_normals(mesh);
   std::vector<Sample> samples;
   for (std::size_t v = 0; v < mesh.points.size(); ++v) {
     samples.emplace_back(light, mesh.points[v], normals.at(v));
@@ -127,7 +129,9 @@ void print_errors(const Traced& traced, const Picture& target) {
 void judge(const std::string& folder, const std::string& model) {
   const TracedLight light(read_json(folder + "/lens.json"), folder);
   const Picture target = read_picture(folder + "/target.exr");
-  print_errors(trace(light, read_mesh(folder + "/surface.ply"), model, target), target);
+  const Mesh mesh = model == "spline" ? read_spline(folder + "/surface.spline")
+                                      : read_mesh(folder + "/surface.ply");
+  print_errors(trace(light, mesh, model, target), target);
 }
 
 }  // namespace

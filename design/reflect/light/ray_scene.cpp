@@ -2,6 +2,7 @@
 #include "design/reflect/light/ray_scene.h"
 
 #include <embree3/rtcore.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <limits>
@@ -10,9 +11,10 @@
 
 namespace lensforge::reflect {
 
-/// Owns Embree's objects. One thread builds the tree, so that it is the same every time.
+/// Owns Embree's objects. A device that is told how many threads to use keeps the whole process to
+/// as many for as long as it lives, so that this one is told nothing.
 struct RayScene::Handles {
-  Handles() : device(rtcNewDevice("threads=1")), scene(rtcNewScene(device)) {
+  Handles() : device(rtcNewDevice(nullptr)), scene(rtcNewScene(device)) {
     rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
   }
   ~Handles() {
@@ -64,7 +66,8 @@ RayScene::RayScene(const SurfaceMesh& mesh) {
   rtcCommitGeometry(geometry);
   rtcAttachGeometry(handles->scene, geometry);
   rtcReleaseGeometry(geometry);
-  rtcCommitScene(handles->scene);
+  // One thread builds the tree, so that it is the same every time.
+  tbb::task_arena(1).execute([&] { rtcCommitScene(handles->scene); });
   handles_ = handles;
   const Eigen::Vector3d size =
       mesh.vertices.rowwise().maxCoeff() - mesh.vertices.rowwise().minCoeff();
