@@ -234,6 +234,7 @@ class RowFit {
   /// The farthest joint up to `limit` that one move from `from` reaches, as far as looks at the
   /// joints tell; its nodes are added to the error.
   std::optional<Reach> best_reach(std::size_t from, std::size_t limit) {
+    if (error_.is_blunt(joints_.written[from], options_.slope_tolerance)) return std::nullopt;
     std::size_t by_line = farthest(from, limit, false);
     std::size_t by_arc = options_.arcs ? farthest(from, limit, true) : from;
     while (std::max(by_line, by_arc) > from) {
@@ -255,7 +256,7 @@ class RowFit {
     double least = HUGE_VAL;
     for (std::size_t step = 1; from + step <= last; step *= 2) {
       error_.add(joints_.written[from], RowMove{joints_.written[from + step]});
-      const bool close = error_.holds(settled, options_.tolerance, HUGE_VAL);
+      const bool close = error_.is_close(settled, options_.tolerance);
       const double turn = error_.turn(settled);
       error_.resize(settled);
       if (step > 1 && !close) break;
@@ -273,8 +274,8 @@ class RowFit {
   /// Whether the move keeps the tolerances; its nodes are added to the error if so.
   bool holds(std::size_t from, const RowMove& move, double turn = 1.0) {
     const std::size_t settled = error_.size();
-    error_.add(joints_.written[from], move);
-    if (error_.holds(settled, options_.tolerance, turn * options_.slope_tolerance)) return true;
+    const double slope = turn * options_.slope_tolerance;
+    if (error_.add_within(joints_.written[from], move, options_.tolerance, slope)) return true;
     error_.resize(settled);
     return false;
   }

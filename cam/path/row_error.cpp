@@ -44,29 +44,64 @@ CurvePiece move_curve(const Eigen::Vector2d& start, const RowMove& move) {
   return curve;
 }
 
-void RowError::add(const Eigen::Vector2d& start, const RowMove& move) {
+/// The drop curve's first node beyond a place.
+std::size_t RowError::node_after(double u) const {
+  std::size_t next = std::min(hint_ + 1, profile_.u.size());
+  while (next > 0 && profile_.u[next - 1] > u) --next;
+  while (next < profile_.u.size() && profile_.u[next] <= u) ++next;
+  return next;
+}
+
+/// The error where a move starts; where the drop curve jumps there, that beyond the jump: the move
+/// before it ended below.
+double RowError::start_error(const Eigen::Vector2d& start) const {
+  std::size_t hint = std::max<std::size_t>(node_after(start.x()), 1) - 1;
+  return start.y() - profile_.at(start.x(), hint);
+}
+
+/// Appends the nodes of a move, one piece of the drop curve after the other while `go_on()`.
+/// @return whether it did so to the end.
+template <class GoOn>
+bool RowError::append(const Eigen::Vector2d& start, const RowMove& move, const GoOn& go_on) {
   const CurvePiece curve = move_curve(start, move);
   const double misfit = move.arc ? radius_slack(start, move, curve) : 0.0;
   const double slack = profile_.error + misfit + (move.arc ? profile_.finest : 0.0);
-  std::size_t hint = hint_;
-  const double first = profile_.at(start.x(), hint);
-  nodes_.push_back({start.x(), start.y() - first, slack, start.y()});
-  std::size_t next = hint + 1;
-  while (next > 0 && profile_.u[next - 1] > start.x()) --next;
+  std::size_t next = node_after(start.x());
+  nodes_.push_back({start.x(), start_error(start), slack, start.y()});
   const double chord = longest_chord(curve, profile_.finest);
   double from = start.x();
   for (; next < profile_.u.size() && profile_.u[next] < move.end.x(); ++next) {
-    if (profile_.u[next] <= start.x()) continue;
     const Eigen::Vector2d to(profile_.u[next], profile_.z[next]);
     if (to.x() - from <= chord) {
       add_node(curve, to, slack);
     } else {
       follow(curve, from, to, slack);
     }
+    if (!go_on()) return false;
     from = to.x();
   }
   hint_ = next > 0 ? next - 1 : 0;
   follow(curve, from, {move.end.x(), profile_.at(move.end.x(), hint_)}, slack);
+  return go_on();
+}
+
+void RowError::add(const Eigen::Vector2d& start, const RowMove& move) {
+  append(start, move, [] { return true; });
+}
+
+bool RowError::add_within(const Eigen::Vector2d& start, const RowMove& move, double tolerance,
+                          double slope_tolerance) {
+  const std::size_t first = nodes_.size();
+  std::size_t next = first;
+  std::size_t back = first;
+  const auto holds = [&] {
+    for (; next < nodes_.size(); ++next) {
+      if (!is_close_at(next, tolerance) || turn_behind(next, back) > slope_tolerance) return false;
+    }
+    return true;
+  };
+  return append(start, move, holds) &&
+         most_turn_ahead(first, slope_tolerance, true).slope <= slope_tolerance;
 }
 
 void RowError::add_node(const CurvePiece& curve, const Eigen::Vector2d& at, double slack) {
@@ -89,61 +124,85 @@ void RowError::follow(const CurvePiece& curve, double from, const Eigen::Vector2
   add_node(curve, to, slack);
 }
 
-double RowError::error_at(double u, std::size_t& hint, double& slack) const {
+RowError::Error RowError::error_at(double u, std::size_t& hint) const {
   hint = std::min(hint, nodes_.size() - 2);
   while (hint > 0 && nodes_[hint].u > u) --hint;
   while (hint + 2 < nodes_.size() && nodes_[hint + 1].u < u) ++hint;
   const Node& a = nodes_[hint];
   const Node& b = nodes_[hint + 1];
-  slack = std::max(a.slack, b.slack);
   const double width = b.u - a.u;
-  return width > 0.0 ? a.error + (b.error - a.error) * ((u - a.u) / width) : b.error;
+  const double error = width > 0.0 ? a.error + (b.error - a.error) * ((u - a.u) / width) : b.error;
+  return {error, std::max(a.slack, b.slack)};
 }
 
-/// The difference over a stretch is linear between places where one end of it passes a node: it is
-/// largest at one of them. Stops at the first that is more than enough.
+/// Whether the direction shapes the surface at a node and `way` from it.
+bool RowError::shapes(std::size_t node, double way) const {
+  return profile_.shapes(nodes_[node].u) && profile_.shapes(nodes_[node].u + way);
+}
+
+/// The difference of slope over a stretch with these errors at its ends, at most.
+double RowError::turn_between(const Error& a, const Error& b) {
+  return (std::abs(a.value - b.value) + a.slack + b.slack) / kSlopeStretch;
+}
+
+/// The difference of slope over the stretch before a node, at most; 0 where none is looked at.
+double RowError::turn_behind(std::size_t node, std::size_t& hint) const {
+  const double u = nodes_[node].u - kSlopeStretch;
+  if (u < nodes_.front().u || !shapes(node, -kSlopeStretch)) return 0.0;
+  return turn_between(error_of(node), error_at(u, hint));
+}
+
+/// The largest over stretches that begin at nodes and end at node `first` or later; stops at one
+/// that is more than enough.
 /// @param goes_on  whether stretches may reach beyond the end, where the error stays as it is.
-RowError::Turn RowError::most_turn(std::size_t first, double enough, bool goes_on) const {
+RowError::Turn RowError::most_turn_ahead(std::size_t first, double enough, bool goes_on) const {
   Turn most;
-  if (nodes_.size() < 2) return most;
-  const double begin = nodes_.front().u;
   const double end = nodes_.back().u;
-  const auto shapes = [&](std::size_t node, double way) {
-    return profile_.shapes(nodes_[node].u) && profile_.shapes(nodes_[node].u + way);
-  };
-  const auto offer = [&](std::size_t node, double other, double slack) {
-    const double turn =
-        (std::abs(nodes_[node].error - other) + nodes_[node].slack + slack) / kSlopeStretch;
-    if (turn > most.slope) most = {turn, node};
-  };
-  std::size_t back = first;
-  double slack = 0.0;
-  for (std::size_t i = first; i < nodes_.size() && most.slope <= enough; ++i) {
-    const double u = nodes_[i].u - kSlopeStretch;
-    if (u >= begin && shapes(i, -kSlopeStretch)) offer(i, error_at(u, back, slack), slack);
-  }
-  std::size_t ahead = first;
+  std::size_t hint = first;
   std::size_t i = first;
   while (i > 0 && nodes_[i - 1].u + kSlopeStretch >= nodes_[first].u) --i;
   for (; i < nodes_.size() && most.slope <= enough; ++i) {
     const double u = nodes_[i].u + kSlopeStretch;
     if (!shapes(i, kSlopeStretch)) continue;
-    if (u <= end) {
-      offer(i, error_at(u, ahead, slack), slack);
-    } else if (goes_on) {
-      offer(i, nodes_.back().error, nodes_.back().slack);
-    } else {
-      break;
-    }
+    if (u > end && !goes_on) break;
+    const double turn =
+        turn_between(error_of(i), u <= end ? error_at(u, hint) : error_of(nodes_.size() - 1));
+    if (turn > most.slope) most = {turn, i};
   }
   return most;
 }
 
-bool RowError::holds(std::size_t first, double tolerance, double slope_tolerance) const {
+/// The difference over a stretch is linear between places where one end of it passes a node: it is
+/// largest at one of them.
+RowError::Turn RowError::most_turn(std::size_t first, bool goes_on) const {
+  if (nodes_.size() < 2) return {};
+  Turn most;
+  std::size_t hint = first;
   for (std::size_t i = first; i < nodes_.size(); ++i) {
-    if (std::abs(nodes_[i].error) + nodes_[i].slack > tolerance) return false;
+    const double turn = turn_behind(i, hint);
+    if (turn > most.slope) most = {turn, i};
   }
-  return most_turn(first, slope_tolerance, true).slope <= slope_tolerance;
+  const Turn ahead = most_turn_ahead(first, HUGE_VAL, goes_on);
+  return ahead.slope > most.slope ? ahead : most;
+}
+
+double RowError::turn(std::size_t first) const { return most_turn(first, true).slope; }
+
+bool RowError::is_blunt(const Eigen::Vector2d& start, double slope_tolerance) const {
+  const double u = start.x() - kSlopeStretch;
+  if (nodes_.size() < 2 || u < nodes_.front().u) return false;
+  if (!profile_.shapes(u) || !profile_.shapes(start.x())) return false;
+  std::size_t back = nodes_.size() - 2;
+  // A straight move has the least slack.
+  const Error here{start_error(start), profile_.error};
+  return turn_between(here, error_at(u, back)) > slope_tolerance;
+}
+
+bool RowError::is_close(std::size_t first, double tolerance) const {
+  for (std::size_t i = first; i < nodes_.size(); ++i) {
+    if (!is_close_at(i, tolerance)) return false;
+  }
+  return true;
 }
 
 PathCertificate RowError::certificate() const {
@@ -155,7 +214,7 @@ PathCertificate RowError::certificate() const {
     if (gouge > certificate.gouge.value) certificate.gouge = {gouge, place(node)};
     if (excess > certificate.excess.value) certificate.excess = {excess, place(node)};
   }
-  const Turn turn = most_turn(0, HUGE_VAL, false);
+  const Turn turn = most_turn(0, false);
   if (turn.slope > 0.0) certificate.slope = {turn.slope, place(nodes_[turn.node])};
   return certificate;
 }

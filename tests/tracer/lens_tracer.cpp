@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // lens_tracer FOLDER MODEL: what a lens projects, judged from its folder alone. It reads lens.json,
-// surface.ply, surface.spline, target.exr and front.exr as docs/interface.md describes them and shares
-// no code with the program. Facets are divided and traced point by point; of a smooth surface the ray
-// of every vertex is traced and its landing points are interpolated, as that page says, of a spline
-// that of many points in every knot cell.
+// surface.ply, surface.spline, target.exr and front.exr as docs/interface.md describes them and
+// shares no code with the program. Facets are divided and traced point by point; of a smooth
+// surface the ray of every vertex is traced and its landing points are interpolated, as that page
+// says, of a spline that of many points in every knot cell.
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>

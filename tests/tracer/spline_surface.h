@@ -7,7 +7,8 @@
 
 namespace tracer {
 
-/// surface.spline as fine triangles, with the spline's own points and unit normals at their corners.
+/// surface.spline as fine triangles, with the spline's own points and unit normals at their
+/// corners.
 /// @throw std::runtime_error naming the file.
 Mesh read_spline(const std::string& file);
 
