@@ -19,7 +19,7 @@ piece() {
   {
     printf '\n## %s\n\n%s\n\n![%s](gallery/%s.png)\n\n' "$title" "$caption" "$title" "$name"
     printf '    lensforge %s --out %s\n\n' "${*//$BUILD\//}" "$name"
-    sed "s|$OUT/||g; s|$BUILD/||g; s|^|    |" "$OUT/$name.txt"
+    sed "s|$OUT/||g; s|$BUILD/||g; s/,* \(in \)*[0-9.]* s$//; s|^|    |" "$OUT/$name.txt"
   } >>"$OUT/page.md"
 }
 
@@ -32,10 +32,10 @@ Drawn by `./bootstrap gallery` from pictures and shapes that the project draws. 
 picture that is wanted; what the surface as designed projects, sharper than the picture; what the part as cut and
 polished projects, by the design's own account; the surface as relief.
 TEXT
-piece lens 'Lens' overview.png 'Parallel light, a wall at 300 mm.' \
-  design "$BUILD/pictures/portrait.png" --width 50mm --pixels 128 --made-by default
-piece mirror 'Mirror' overview.png 'Parallel light from 20° to the side, a wall at 300 mm.' \
-  design "$BUILD/pictures/lake.png" --width 50mm --pixels 128 --made-by default \
+piece lens 'Lens' overview.png 'Parallel light, a wall at 48 mm.' \
+  design "$BUILD/pictures/portrait.png" --width 16mm --focal 48mm --pixels 80 --made-by default
+piece mirror 'Mirror' overview.png 'Parallel light from 20° to the side, a wall at 48 mm.' \
+  design "$BUILD/pictures/lake.png" --width 16mm --focal 48mm --pixels 80 --made-by default \
   --mode reflect --incidence 20
 piece reflector 'Reflecting shape' views.png \
   'It is to send little light back to the lamp. What an eye beside the lamp sees from eight directions: above of the
