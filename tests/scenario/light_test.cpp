@@ -322,7 +322,8 @@ INSTANTIATE_TEST_SUITE_P(
                  {"--front sphere:200: is of a lens", "--front flat would do"}},
         BadLight{"FrontOfAnotherShape",
                  {"--front", "cone:3"},
-                 {"--front 'cone:3': is no file here; must be flat, sphere:R with R a radius in mm, or a picture"}},
+                 {"--front 'cone:3': is no file here; must be flat, sphere:R with R a radius in "
+                  "mm, or a picture"}},
         BadLight{"FrontWithoutARadius", {"--front", "sphere:"}, {"--front"}},
         BadLight{"FrontWithoutANumber", {"--front", "sphere:nan"}, {"--front"}},
         BadLight{"SourceInsideTheFront",
