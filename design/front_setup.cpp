@@ -54,9 +54,10 @@ void require_heights(const HeightSpline& spline, double thickness, const std::st
 std::shared_ptr<const HeightSpline> front_from(const std::string& file, const RunControl& control) {
   std::error_code none;
   if (!std::filesystem::exists(file, none)) {
-    refuse("--front '" + file + "'",
-           "is no file here; must be flat, sphere:R with R a radius in mm, or a picture of heights; "
-           "flat would do");
+    refuse(
+        "--front '" + file + "'",
+        "is no file here; must be flat, sphere:R with R a radius in mm, or a picture of heights; "
+        "flat would do");
   }
   return std::make_shared<HeightSpline>(read_heights(file, control));
 }
