@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <atomic>
 #include <charconv>
-#include <filesystem>
 #include <mutex>
 #include <string>
 #include <thread>
@@ -25,7 +24,6 @@
 namespace lensforge::app {
 namespace {
 
-namespace fs = std::filesystem;
 using Status = JobOutcome::Status;
 
 struct BatchSettings {
@@ -51,16 +49,18 @@ void add_batch_options(OptionSet& options, BatchSettings& settings) {
   options.positional(
       "JOBS", settings.jobs_file,
       "JSON lines, a job each: {\"name\": \"a\", \"command\": \"design\", \"target\": "
-      "\"a.png\", \"options\": {\"focal\": 250}, \"then\": [\"cam\"]}");
+      "\"a.png\", \"options\": {\"focal\": 250}, \"then\": [\"cam\", {\"command\": \"export\", "
+      "\"options\": {\"out\": \"a.stl\"}}]}; first design or reflect, then cam, export or render");
   options.required_text("--out", settings.out, "DIR", "where every job gets a folder of its name");
-  options.text("--shard", settings.shard, "I/N", "of every N jobs only the I-th");
+  options.text("--shard", settings.shard, "I/N", "of every N jobs only the I-th, I from 1 to N");
   options.texts("--grid", settings.grid, "OPTION=VALUES",
                 "every job with every combination of these: focal=250,300 cam.pitch=0.05,0.06");
   options.fields(batch_fields(), settings);
   options.text("--table", settings.table, "FILE.csv",
                "write all jobs' options and results into a table");
-  options.flag("--force", settings.force,
-               "do jobs again that were done with other options, and replace --table");
+  options.flag(
+      "--force", settings.force,
+      "do jobs again that were done with other options; replace a --table of other origin");
 }
 
 /// I of N.
@@ -146,9 +146,9 @@ std::string table_of(const std::vector<BatchJob>& jobs, const BatchRun& run,
   std::vector<TableJob> rows;
   for (std::size_t i = 0; i < jobs.size(); ++i) {
     const JobOutcome& outcome = run.outcomes()[i];
-    TableJob row{jobs[i].name, status_word(outcome.status), outcome.message,
-                 finished_job(jobs[i], place.out)};
-    if (!row.record.is_null()) {
+    TableJob row{jobs[i].json(), status_word(outcome.status), outcome.message,
+                 job_record(jobs[i], place.out)};
+    if (outcome.status == Status::kOpen && !row.record.is_null()) {
       row.status = row.record["status"];
       row.message = row.record["message"];
     }
@@ -197,12 +197,14 @@ int exit_code_of(const BatchRun& run, const std::stop_token& stop) {
 int run_batch(const OptionSet& options, const BatchSettings& settings) {
   const Console console(options.common().json, options.common().quiet);
   const Shard shard = read_shard(settings.shard);
-  const std::vector<BatchJob> jobs =
-      expanded(read_jobs(settings.jobs_file), read_grid(settings.grid));
+  std::vector<BatchJob> jobs = expanded(read_jobs(settings.jobs_file), read_grid(settings.grid));
+  fingerprint_targets(jobs);
   const int threads = std::max(1, options.executor().concurrency() / settings.parallel);
   const BatchPlace place{settings.out, settings.jobs_file, threads, settings.force};
   for (const BatchJob& job : jobs) require_room_for(job, place);
-  if (!settings.table.empty()) require_replaceable("--table", settings.table, settings.force);
+  if (!settings.table.empty()) {
+    require_replaceable("--table", settings.table, settings.force || is_job_table(settings.table));
+  }
   require_writable_folder(settings.out);
   const InterruptWatch interrupt;
   BatchRun run(jobs, shard, place, console);

@@ -40,31 +40,6 @@ std::string joined(const std::vector<std::string>& words) {
   return text;
 }
 
-/// A value as its option asks for it. @throw InputError naming option, value and rule.
-nlohmann::json value_of(const OptionSpec& spec, const std::string& text) {
-  const auto checked = [&](auto value) {
-    spec.require(text, static_cast<double>(value));
-    return nlohmann::json(value);
-  };
-  switch (spec.kind) {
-    case OptionKind::kWhole:
-      return checked(parsed<int>(spec.name, text, "a whole number"));
-    case OptionKind::kNumber:
-      return checked(parsed<double>(spec.name, text, "a number"));
-    case OptionKind::kLength:
-      return checked(parse_length_mm(text, spec.name));
-    case OptionKind::kWord:
-      spec.require_word(text);
-      return text;
-    case OptionKind::kText:
-      if (text.empty()) throw InputError(spec.name + ": must not be empty");
-      return text;
-    case OptionKind::kFlag:
-      break;
-  }
-  return text == "true";
-}
-
 /// What stands for a value in the help: "MM", "a|b".
 std::string type_of(const OptionSpec& spec) {
   switch (spec.kind) {
@@ -145,6 +120,30 @@ const OptionTable<CommonOptions>& common_fields() {
 
 }  // namespace
 
+nlohmann::json option_value(const OptionSpec& spec, const std::string& text) {
+  const auto checked = [&](auto value) {
+    spec.require(text, static_cast<double>(value));
+    return nlohmann::json(value);
+  };
+  switch (spec.kind) {
+    case OptionKind::kWhole:
+      return checked(parsed<int>(spec.name, text, "a whole number"));
+    case OptionKind::kNumber:
+      return checked(parsed<double>(spec.name, text, "a number"));
+    case OptionKind::kLength:
+      return checked(parse_length_mm(text, spec.name));
+    case OptionKind::kWord:
+      spec.require_word(text);
+      return text;
+    case OptionKind::kText:
+      if (text.empty()) throw InputError(spec.name + ": must not be empty");
+      return text;
+    case OptionKind::kFlag:
+      break;
+  }
+  return text == "true";
+}
+
 std::string version_line() { return program_mark() + "\n"; }
 
 /// An option with its value as it was given, null until then.
@@ -181,7 +180,7 @@ void OptionSet::add(const OptionSpec& spec, Getter get, Setter set) {
     return;
   }
   const auto take = [&option](const std::string& text) {
-    option.given = value_of(option.spec, text);
+    option.given = option_value(option.spec, text);
   };
   app.add_option_function<std::string>(spec.name, take, help_of(spec))
       ->type_name(type_of(spec))

@@ -27,6 +27,9 @@ struct ListedOptions {
 };
 inline constexpr const char* kListOptions = "--list-options";
 
+/// A value as its option asks for it. @throw InputError naming option, value and rule.
+nlohmann::json option_value(const OptionSpec& spec, const std::string& text);
+
 /// "lensforge x.y.z" and a line break.
 std::string version_line();
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <fstream>
 #include <map>
 #include <set>
 #include <sstream>
@@ -11,6 +12,7 @@
 #include "app/option_set.h"
 #include "core/error.h"
 #include "core/io/files.h"
+#include "core/io/sha256.h"
 #include "core/text/json_fields.h"
 #include "core/text/json_text.h"
 #include "core/text/number_text.h"
@@ -48,21 +50,42 @@ bool is_for_batch(const std::string& option) {
   return reserved.contains(option);
 }
 
-/// Its options as the manual page lists them, an item ".It Fl -name" each.
-const std::string& options_of(const JobCommand& command) {
-  static std::map<std::string_view, std::string> texts;
-  std::string& text = texts[command.name];
-  if (!text.empty()) return text;
+using OptionSpecs = std::map<std::string, OptionSpec>;
+
+/// The options of a command by their names without dashes.
+const OptionSpecs& specs_of(const std::string& command) {
+  static std::map<std::string, OptionSpecs> known;
+  OptionSpecs& specs = known[command];
+  if (!specs.empty()) return specs;
   try {
-    command.run({"--help-man"});
-  } catch (const HelpText& manual) {
-    text = "\n" + manual.text;
+    command_named(command)->run({kListOptions});
+  } catch (const ListedOptions& listed) {
+    for (const OptionSpec& spec : listed.options) {
+      if (spec.name.starts_with("--")) specs[spec.name.substr(2)] = spec;
+    }
   }
-  return text;
+  return specs;
 }
 
 std::string word_of(const json& value) {
   return value.is_string() ? value.get<std::string>() : value.dump();
+}
+
+/// @throw InputError unless the option can have this value.
+void require_value(const OptionSpec& spec, const json& value) {
+  const auto is_word = [](const json& v) { return v.is_string() || v.is_number(); };
+  const bool flag = spec.kind == OptionKind::kFlag;
+  const bool list = value.is_array() && spec.kind == OptionKind::kText;
+  const bool fits = flag   ? value.is_boolean()
+                    : list ? std::all_of(value.begin(), value.end(), is_word)
+                           : is_word(value);
+  if (!fits) {
+    throw InputError(spec.name + " " + value.dump() + ": must be " +
+                     (flag ? "true or false"
+                           : "a text or a number, or a list of them where the option takes several "
+                             "words; --grid makes a job of each of several values"));
+  }
+  if (!flag && !list) option_value(spec, word_of(value));
 }
 
 /// Reads one line.
@@ -124,22 +147,16 @@ class JobLine {
       refuse("command " + json(name).dump(),
              first ? "design or reflect" : "cam, export or render after a design");
     }
-    BatchStep step{name, options};
-    for (const auto& [key, value] : options.items()) require_option(step, key, value);
+    BatchStep step{name, json::object()};
+    for (const auto& [key, value] : options.items()) set(step, key, value);
     return step;
   }
 
-  void require_option(const BatchStep& step, const std::string& key, const json& value) const {
-    const std::string option = "option '" + key + "' of " + step.command;
-    if (is_for_batch(key) && !(key == "out" && step.command == "export")) {
-      refuse(option, "is set by batch itself");
-    }
-    if (!step.knows(key)) refuse(option, "no such option; write it without dashes, as in --help");
-    const auto is_word = [](const json& v) { return v.is_string() || v.is_number(); };
-    const bool words = value.is_array() && std::all_of(value.begin(), value.end(), is_word);
-    if (!is_word(value) && !words && value != json(true)) {
-      refuse(option + ": " + value.dump(),
-             "a text, a number, true, or a list of texts and numbers");
+  void set(BatchStep& step, const std::string& key, const json& value) const {
+    try {
+      step.set(key, value);
+    } catch (const InputError& e) {
+      throw InputError(where_ + ": " + e.what());
     }
   }
 
@@ -147,18 +164,45 @@ class JobLine {
   std::string where_;
 };
 
+std::string sha256_of(const std::filesystem::path& file) {
+  std::ifstream stream = open_input(file);
+  Sha256 sum;
+  std::string block(std::size_t{1} << 20U, '\0');
+  while (stream.read(block.data(), static_cast<std::streamsize>(block.size())) ||
+         stream.gcount() > 0) {
+    sum.update({block.data(), static_cast<std::size_t>(stream.gcount())});
+  }
+  return sum.finish();
+}
+
 }  // namespace
 
-bool BatchStep::knows(const std::string& name) const {
-  if (name == "threads" || name == "device") return true;
-  const std::string& list = options_of(*command_named(command));
-  const std::string item = "\n.It Fl -" + name;
-  return list.find(item + " ") != std::string::npos || list.find(item + "\n") != std::string::npos;
+bool BatchStep::has_option(const std::string& name) const {
+  return specs_of(command).contains(name);
+}
+
+void BatchStep::set(const std::string& name, const json& value) {
+  const auto refuse = [&](const std::string& rule) {
+    throw InputError("option '" + name + "' of " + command + ": " + rule);
+  };
+  const bool output = name == "out" && command == "export";
+  if (is_for_batch(name) && !output) refuse("is set by batch itself");
+  if (!has_option(name)) refuse("no such option; write it without dashes, as in --help");
+  try {
+    require_value(specs_of(command).at(name), value);
+  } catch (const InputError& e) {
+    throw InputError(command + " " + e.what());
+  }
+  if (output && !is_job_name(word_of(value))) {
+    refuse("is " + value.dump() + ", must be the name of a file in the job's folder");
+  }
+  options[name] = value;
 }
 
 Arguments BatchStep::words() const {
   Arguments words;
   for (const auto& [key, value] : options.items()) {
+    if (value == json(false)) continue;
     words.push_back("--" + key);
     if (value.is_boolean()) continue;
     if (!value.is_array()) {
@@ -175,7 +219,7 @@ json BatchJob::json() const {
   for (const BatchStep& step : steps) {
     all.push_back({{"command", step.command}, {"options", step.options}});
   }
-  return {{"name", name}, {"target", target}, {"steps", all}};
+  return {{"name", name}, {"target", target}, {"target_sha256", target_sha256}, {"steps", all}};
 }
 
 bool is_job_name(const std::string& name) {
@@ -210,6 +254,19 @@ std::vector<BatchJob> read_jobs(const std::filesystem::path& path) {
   if (jobs.empty()) throw InputError(path.string() + ": holds no job, one JSON object a line");
   require_different_names(jobs, path.string());
   return jobs;
+}
+
+void fingerprint_targets(std::vector<BatchJob>& jobs) {
+  std::map<std::string, std::string> sums;
+  for (BatchJob& job : jobs) {
+    std::string& sum = sums[job.target];
+    try {
+      if (sum.empty()) sum = sha256_of(job.target);
+    } catch (const InputError& e) {
+      throw InputError("target of job \"" + job.name + "\": " + e.what());
+    }
+    job.target_sha256 = sum;
+  }
 }
 
 }  // namespace lensforge::app

@@ -16,8 +16,11 @@ struct BatchStep {
   nlohmann::json options;  ///< An object: option names without dashes, and their values.
 
   /// Whether the command has such an option. @param name  without dashes.
-  [[nodiscard]] bool knows(const std::string& name) const;
-  /// The options as words of a command line: true as a flag, an array as several words.
+  [[nodiscard]] bool has_option(const std::string& name) const;
+  /// @throw InputError naming option, value and rule: no such option of the command, one that batch
+  ///        sets itself, or a value that the command's option table refuses.
+  void set(const std::string& name, const nlohmann::json& value);
+  /// The options as words of a command line: a flag if it is true, an array as several words.
   [[nodiscard]] Arguments words() const;
 };
 
@@ -26,8 +29,10 @@ struct BatchJob {
   std::string name;    ///< Of its folder.
   std::string target;  ///< Picture or mesh; relative to the folder that batch was called from.
   std::vector<BatchStep> steps;
+  std::string target_sha256 = {};  ///< Of its content; empty until fingerprint_targets().
 
-  /// What was asked for, to tell whether a folder is of this very job.
+  /// What was asked for, to tell whether a folder is of this very job: what is the same has the
+  /// same outcome.
   [[nodiscard]] nlohmann::json json() const;
 };
 
@@ -35,9 +40,12 @@ struct BatchJob {
 /// "then":
 /// ["cam", {"command": "export", "options": {…}}]}. Only a design can be followed by others: cam,
 /// export and render. Empty lines are passed over.
-/// @throw InputError naming file, line and rule: no JSON, an unknown key, command or option, a name
-///        twice or that is no file name, a value that is no word.
+/// @throw InputError naming file, line and rule: no JSON, an unknown key or command, a name twice
+///        or that is no file name, options as BatchStep::set() does.
 std::vector<BatchJob> read_jobs(const std::filesystem::path& path);
+
+/// Reads every target once, however many jobs have it. @throw InputError if one cannot be read.
+void fingerprint_targets(std::vector<BatchJob>& jobs);
 
 /// Whether a job's folder can have this name: letters, digits, '.', '_' and '-', not starting with
 /// '.' or '-', at most 200 of them.

@@ -19,14 +19,32 @@ std::string name_part(const GridAxis& axis, const std::string& value) {
   return part;
 }
 
+/// "true" and "false" turn a flag on and off.
+nlohmann::json grid_value(const std::string& text) {
+  return text == "true" || text == "false" ? nlohmann::json(text == "true") : nlohmann::json(text);
+}
+
 BatchStep& step_of(const GridAxis& axis, BatchJob& job) {
   for (BatchStep& step : job.steps) {
     const bool meant = axis.command.empty() || axis.command == step.command;
-    if (meant && step.knows(axis.option)) return step;
+    if (meant && step.has_option(axis.option)) return step;
   }
-  throw InputError("--grid " + axis.option + ": " +
-                   (axis.command.empty() ? "no command" : "no " + axis.command) + " of job \"" +
+  throw InputError((axis.command.empty() ? "no command" : "no " + axis.command) + " of job \"" +
                    job.name + "\" has this option");
+}
+
+BatchJob with(const BatchJob& job, const GridAxis& axis, const std::string& value) {
+  BatchJob made = job;
+  try {
+    step_of(axis, made).set(axis.option, grid_value(value));
+  } catch (const InputError& e) {
+    throw InputError("--grid " + axis.option + "=" + value + ": " + e.what());
+  }
+  made.name += name_part(axis, value);
+  if (!is_job_name(made.name)) {
+    throw InputError("--grid " + axis.option + ": the name " + made.name + " is too long");
+  }
+  return made;
 }
 
 GridAxis read_axis(const std::string& word) {
@@ -67,15 +85,7 @@ std::vector<BatchJob> expanded(const std::vector<BatchJob>& jobs,
   for (const GridAxis& axis : axes) {
     std::vector<BatchJob> next;
     for (const BatchJob& job : all) {
-      for (const std::string& value : axis.values) {
-        BatchJob made = job;
-        step_of(axis, made).options[axis.option] = value;
-        made.name += name_part(axis, value);
-        if (!is_job_name(made.name)) {
-          throw InputError("--grid " + axis.option + ": the name " + made.name + " is too long");
-        }
-        next.push_back(std::move(made));
-      }
+      for (const std::string& value : axis.values) next.push_back(with(job, axis, value));
     }
     all = std::move(next);
   }

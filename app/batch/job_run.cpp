@@ -15,7 +15,6 @@
 #include "core/error.h"
 #include "core/io/files.h"
 #include "core/io/folder_lock.h"
-#include "core/io/sha256.h"
 #include "core/text/version.h"
 
 namespace lensforge::app {
@@ -47,27 +46,20 @@ json json_in(const fs::path& file) {
   return value.is_discarded() ? json() : value;
 }
 
-std::string fingerprint_of(const fs::path& file) {
-  std::ifstream stream = open_input(file);
-  Sha256 sum;
-  std::string block(std::size_t{1} << 20U, '\0');
-  while (stream.read(block.data(), static_cast<std::streamsize>(block.size())) ||
-         stream.gcount() > 0) {
-    sum.update({block.data(), static_cast<std::size_t>(stream.gcount())});
-  }
-  return sum.finish();
+/// job.json in the job's folder or in that of its work; null if there is none.
+json record_in(const fs::path& folder) {
+  json record = json_in(folder / kJobFile);
+  return record.is_object() && record.value("format", "") == kFormat ? record : json();
 }
 
-/// The job with its target's content: what is the same has the same outcome.
-json identity_of(const BatchJob& job) {
-  json identity = job.json();
-  identity["target_sha256"] = fingerprint_of(job.target);
-  return identity;
+bool is_of(const json& record, const BatchJob& job) {
+  return record.is_object() && record.value("job", json()) == job.json();
 }
 
-bool is_of(const json& record, const json& identity) {
-  return record.is_object() && record.value("format", "") == kFormat &&
-         record.value("job", json()) == identity;
+JobOutcome outcome_of(const json& record, bool earlier) {
+  const bool missed = record["status"] == "limit";
+  return {missed ? Status::kLimitMissed : Status::kDone, record["message"], earlier,
+          record["seconds"]};
 }
 
 /// The last line that a command wrote, without the program's name.
@@ -90,16 +82,16 @@ class JobWork {
         stop_(stop),
         folder_(place.out / kWork / job.name),
         lens_(folder_ / kLens),
-        lock_(std::move(FolderLock::make(folder_, FolderLock::Kind::kExclusive).lock)) {}
+        lock_(std::move(*FolderLock::make(folder_, FolderLock::Kind::kExclusive).lock)) {}
 
   JobOutcome run() {
     // Another batch may have done it in the meantime.
-    const json identity = identity_of(job_);
-    if (is_of(finished_job(job_, place_.out), identity)) {
+    const json done = record_in(place_.out / job_.name);
+    if (is_of(done, job_)) {
       clear();
-      return {Status::kDone, "", true, 0.0};
+      return outcome_of(done, true);
     }
-    take_up(identity);
+    take_up();
     for (std::size_t i = record_["steps"].size(); i < job_.steps.size(); ++i) {
       if (stop_.stop_requested()) return {Status::kInterrupted, "", false, 0.0};
       const std::optional<JobOutcome> end = do_step(job_.steps[i]);
@@ -109,22 +101,17 @@ class JobWork {
   }
 
  private:
-  [[nodiscard]] double seconds() const {
-    double sum = 0.0;
-    for (const json& step : record_["steps"]) sum += step["seconds"].get<double>();
-    return sum;
-  }
-
   /// Goes on with what an earlier batch has done of the very same job, or begins.
-  void take_up(const json& identity) {
+  void take_up() {
     wait_for_lens();
-    record_ = json_in(folder_ / kJobFile);
-    if (is_of(record_, identity)) return;
+    record_ = record_in(folder_);
+    if (is_of(record_, job_)) return;
     fs::remove_all(lens_);
     fs::remove(folder_ / kJobLog);
-    record_ = {{"format", kFormat},        {"version", 1},           {"job", identity},
-               {"status", "open"},         {"steps", json::array()}, {"message", ""},
-               {"program", program_mark()}};
+    record_ = {{"format", kFormat},         {"version", 1},
+               {"job", job_.json()},        {"steps", json::array()},
+               {"program", program_mark()}, {"seconds", 0.0}};
+    set_status("open", "");
     save();
   }
 
@@ -135,7 +122,7 @@ class JobWork {
       try {
         const FolderLock once(lens_, FolderLock::Kind::kExclusive);
         return;
-      } catch (const InputError&) {
+      } catch (const FolderHeld&) {
         if (i == kAttempts) throw;
         std::this_thread::sleep_for(kBetweenAttempts);
       }
@@ -150,7 +137,7 @@ class JobWork {
     const bool first = step.command == "design" || step.command == "reflect";
     if (first) {
       words.insert(words.end(), {job_.target, "--out", out});
-      words.emplace_back(step.knows("resume") && is_folder(lens_) ? "--resume" : "--force");
+      words.emplace_back(step.has_option("resume") && is_folder(lens_) ? "--resume" : "--force");
     } else {
       words.push_back(out);
     }
@@ -180,27 +167,37 @@ class JobWork {
     }
     const std::string said = last_line(content_of(log).substr(before));
     if (end.exit_code != kDone && end.exit_code != kLimitMissed) {
-      record_["status"] = "failed";
-      record_["message"] = step.command + ": " +
-                           (said.empty() ? "exit code " + std::to_string(end.exit_code) : said);
+      set_status("failed",
+                 step.command + ": " +
+                     (said.empty() ? "exit code " + std::to_string(end.exit_code) : said));
       save();
-      return JobOutcome{Status::kFailed, record_["message"], false, seconds() + end.seconds};
+      return JobOutcome{Status::kFailed, record_["message"], false,
+                        record_["seconds"].get<double>() + end.seconds};
     }
-    if (end.exit_code == kLimitMissed) record_["message"] = step.command + ": " + said;
     record_["steps"].push_back({{"command", step.command},
                                 {"exit_code", end.exit_code},
+                                {"message", end.exit_code == kLimitMissed ? said : ""},
                                 {"seconds", end.seconds},
                                 {"result", json_in(folder_ / kStepOutput)}});
+    record_["seconds"] = record_["seconds"].get<double>() + end.seconds;
+    set_status("open", "");
     save();
     return std::nullopt;
   }
 
+  void set_status(const std::string& status, const std::string& message) {
+    record_["status"] = status;
+    record_["message"] = message;
+  }
+
   /// The rename is what makes the job done.
   JobOutcome publish() {
-    bool missed = false;
-    for (const json& step : record_["steps"]) missed = missed || step["exit_code"] == kLimitMissed;
-    record_["status"] = missed ? "limit" : "done";
-    if (!missed) record_["message"] = "";
+    set_status("done", "");
+    for (const json& step : record_["steps"]) {
+      if (step["exit_code"] != kLimitMissed) continue;
+      set_status("limit",
+                 step["command"].get<std::string>() + ": " + step["message"].get<std::string>());
+    }
     write_whole_file(lens_ / kJobFile, record_.dump(2) + "\n");
     fs::copy_file(folder_ / kJobLog, lens_ / kJobLog, fs::copy_options::overwrite_existing);
     const fs::path place = place_.out / job_.name;
@@ -208,7 +205,7 @@ class JobWork {
     if (fs::exists(place)) fs::rename(place, folder_ / kOld);
     fs::rename(lens_, place);
     clear();
-    return {missed ? Status::kLimitMissed : Status::kDone, record_["message"], false, seconds()};
+    return outcome_of(record_, false);
   }
 
   void clear() const {
@@ -221,7 +218,7 @@ class JobWork {
   const std::stop_token& stop_;
   fs::path folder_;
   fs::path lens_;
-  std::optional<FolderLock> lock_;
+  FolderLock lock_;
   json record_;
 };
 
@@ -245,22 +242,24 @@ std::string status_word(JobOutcome::Status status) {
   return "open";
 }
 
-json finished_job(const BatchJob& job, const fs::path& out) {
-  json record = json_in(out / job.name / kJobFile);
-  return record.is_object() && record.value("format", "") == kFormat ? record : json();
+json job_record(const BatchJob& job, const fs::path& out) {
+  for (const fs::path& folder : {out / job.name, out / kWork / job.name}) {
+    json record = record_in(folder);
+    if (is_of(record, job)) return record;
+  }
+  return {};
 }
 
 void require_room_for(const BatchJob& job, const BatchPlace& place) {
-  const json identity = identity_of(job);
   const fs::path folder = place.out / job.name;
   std::error_code ignored;
   if (!fs::exists(folder, ignored)) return;
-  const json record = finished_job(job, place.out);
+  const json record = record_in(folder);
   if (record.is_null()) {
     throw InputError(folder.string() + ": is there and is no job's; give job \"" + job.name +
                      "\" of " + place.jobs_file + " another name");
   }
-  if (!place.force && !is_of(record, identity)) {
+  if (!place.force && !is_of(record, job)) {
     throw InputError(folder.string() +
                      ": was done with other options or another picture than job \"" + job.name +
                      "\" of " + place.jobs_file +
@@ -269,16 +268,10 @@ void require_room_for(const BatchJob& job, const BatchPlace& place) {
 }
 
 JobOutcome run_job(const BatchJob& job, const BatchPlace& place, const std::stop_token& stop) {
-  std::optional<JobWork> work;
   try {
-    work.emplace(job, place, stop);
-  } catch (const InputError& e) {
+    return JobWork(job, place, stop).run();
+  } catch (const FolderHeld& e) {
     return {Status::kBusy, e.what(), false, 0.0};
-  } catch (const std::exception& e) {
-    return {Status::kFailed, e.what(), false, 0.0};
-  }
-  try {
-    return work->run();
   } catch (const std::exception& e) {
     return {Status::kFailed, e.what(), false, 0.0};
   }

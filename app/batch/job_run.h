@@ -45,17 +45,18 @@ struct BatchPlace {
   bool force = false;         ///< Jobs that were done with other options are done again.
 };
 
-/// job.json of a finished job, or null.
-nlohmann::json finished_job(const BatchJob& job, const std::filesystem::path& out);
+/// What job.json says of this very job, finished or not: "status", "message", "seconds" of the
+/// commands that were done, "steps" with their results. Null before anybody began with it.
+nlohmann::json job_record(const BatchJob& job, const std::filesystem::path& out);
 
 /// @throw InputError if the job's folder is there and is not of this very job: another job's
-/// without
-///        `place.force`, or somebody else's; or if its target cannot be read.
+///        without `place.force`, or somebody else's.
 void require_room_for(const BatchJob& job, const BatchPlace& place);
 
 /// Does a job in `.work/NAME` and gives it its name in one step when it is done, so that a folder
 /// NAME is always whole. A command that was finished before is not run again, an interrupted design
 /// goes on from its checkpoint. Never throws for what a command or the disk does.
+/// @pre fingerprint_targets()
 JobOutcome run_job(const BatchJob& job, const BatchPlace& place, const std::stop_token& stop);
 
 }  // namespace lensforge::app

@@ -2,14 +2,19 @@
 #include "app/batch/job_table.h"
 
 #include <algorithm>
+#include <fstream>
 #include <map>
+#include <string_view>
 
 namespace lensforge::app {
 namespace {
 
 using nlohmann::json;
 
-/// Columns in the order in which they first came, and a row's cells.
+/// What every table begins with.
+constexpr std::string_view kHead = "name,status,message,seconds";
+
+/// Columns in the order in which they first came after those of kHead, and a row's cells.
 class Table {
  public:
   using Cells = std::map<std::string, std::string>;
@@ -50,7 +55,7 @@ class Table {
     return text + "\r\n";
   }
 
-  std::vector<std::string> columns_;
+  std::vector<std::string> columns_{"name", "status", "message", "seconds"};
   std::vector<Cells> rows_;
 };
 
@@ -63,28 +68,23 @@ void add_values(const std::string& prefix, const json& value, Table& table, Tabl
   if (value.is_object()) {
     for (const auto& [key, inner] : value.items()) {
       const bool repeats = key == "options" || key == "command" || key == "out";
-      if (!repeats) add_values(prefix + "." + key, inner, table, row);
+      if (!repeats) add_values(std::string(prefix).append(".").append(key), inner, table, row);
     }
   } else if (!value.is_array() && !value.is_null()) {
     table.add(row, prefix, cell_of(value));
   }
 }
 
-void add_record(const json& record, Table& table, Table::Cells& row) {
-  for (const json& step : record["job"]["steps"]) {
+void add_options(const json& steps, Table& table, Table::Cells& row) {
+  for (const json& step : steps) {
     for (const auto& [key, value] : step["options"].items()) {
       table.add(row, step["command"].get<std::string>() + "." + key, cell_of(value));
     }
   }
-  for (const json& step : record["steps"]) {
-    add_values(step["command"], step["result"], table, row);
-  }
 }
 
-double seconds_of(const json& record) {
-  double sum = 0.0;
-  for (const json& step : record["steps"]) sum += step["seconds"].get<double>();
-  return sum;
+void add_results(const json& steps, Table& table, Table::Cells& row) {
+  for (const json& step : steps) add_values(step["command"], step["result"], table, row);
 }
 
 }  // namespace
@@ -93,14 +93,23 @@ std::string job_table(const std::vector<TableJob>& jobs) {
   Table table;
   for (const TableJob& job : jobs) {
     Table::Cells row;
-    table.add(row, "name", job.name);
+    table.add(row, "name", job.job["name"]);
     table.add(row, "status", job.status);
     table.add(row, "message", job.message);
-    table.add(row, "seconds", job.record.is_null() ? "" : json(seconds_of(job.record)).dump());
-    if (!job.record.is_null()) add_record(job.record, table, row);
+    add_options(job.job["steps"], table, row);
+    if (!job.record.is_null()) {
+      table.add(row, "seconds", job.record["seconds"].dump());
+      add_results(job.record["steps"], table, row);
+    }
     table.end_row(std::move(row));
   }
   return table.text();
+}
+bool is_job_table(const std::filesystem::path& file) {
+  std::string begin(kHead.size(), '\0');
+  std::ifstream stream(file, std::ios::binary);
+  stream.read(begin.data(), static_cast<std::streamsize>(begin.size()));
+  return begin == kHead;
 }
 
 }  // namespace lensforge::app

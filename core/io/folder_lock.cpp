@@ -12,7 +12,6 @@
 #include <thread>
 #include <utility>
 
-#include "core/error.h"
 #include "core/io/files.h"
 
 namespace lensforge {
@@ -25,7 +24,7 @@ constexpr int kAttempts = 50;
 constexpr std::chrono::milliseconds kBetweenAttempts{2};
 
 [[noreturn]] void refuse_held(const fs::path& folder) {
-  throw InputError(folder.string() + ": another lensforge command is working in this folder; " +
+  throw FolderHeld(folder.string() + ": another lensforge command is working in this folder; " +
                    "wait for its end or choose another folder");
 }
 

@@ -66,6 +66,18 @@ Process::~Process() {
 
 void Process::send(int signal) const { kill(pid_, signal); }
 
+void Process::kill_all() const {
+  std::vector<pid_t> children;
+  const fs::path tasks = "/proc/" + std::to_string(pid_) + "/task";
+  send(SIGSTOP);  // It makes no more of them.
+  for (const auto& task : fs::directory_iterator(tasks)) {
+    std::istringstream numbers(content(task.path() / "children"));
+    for (pid_t child = 0; numbers >> child;) children.push_back(child);
+  }
+  for (const pid_t child : children) kill(child, SIGKILL);
+  send(SIGKILL);
+}
+
 bool Process::reap(int options) {
   if (!ended_) ended_ = waitpid(pid_, &status_, options) == pid_;
   return ended_;

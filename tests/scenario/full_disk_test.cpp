@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include <sys/mount.h>
-
 #include "scenario/driver.h"
+#include "scenario/small_disk.h"
 
 namespace lensforge::scenario {
 namespace {
@@ -17,26 +16,6 @@ class FullDisk : public Scenario {
     }
     EXPECT_FALSE(fs::exists(folder / "lens.json"));
   }
-};
-
-/// A small file system of its own, which only root can have.
-class SmallDisk {
- public:
-  SmallDisk(const fs::path& where, const std::string& size) : where_(where) {
-    fs::create_directories(where);
-    mounted_ = mount("none", where.c_str(), "tmpfs", 0, ("size=" + size).c_str()) == 0;
-  }
-  ~SmallDisk() {
-    if (mounted_) umount2(where_.c_str(), MNT_DETACH);
-  }
-  SmallDisk(const SmallDisk&) = delete;
-  SmallDisk& operator=(const SmallDisk&) = delete;
-
-  [[nodiscard]] bool mounted() const { return mounted_; }
-
- private:
-  fs::path where_;
-  bool mounted_ = false;
 };
 
 TEST_F(FullDisk, DesignSaysSoBeforeItBegins) {

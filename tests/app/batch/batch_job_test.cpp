@@ -51,6 +51,13 @@ TEST_F(BatchJobs, ListsBecomeSeveralWords) {
   EXPECT_THAT(jobs[0].steps[1].words(), ElementsAre("--compare", "tool=0.3,0.4", "pitch=0.05"));
 }
 
+TEST_F(BatchJobs, AFlagCanBeOff) {
+  const auto jobs = read(
+      "{\"name\":\"a\",\"command\":\"design\",\"target\":\"a.png\",\"options\":{\"fresnel\":false,"
+      "\"focal\":250}}");
+  EXPECT_THAT(jobs[0].steps[0].words(), ElementsAre("--focal", "250"));
+}
+
 TEST_F(BatchJobs, SayWhichLineIsWrongAndWhy) {
   const std::string design = "{\"name\":\"a\",\"command\":\"design\",\"target\":\"a.png\"";
   expect_refused("{", "jobs.jsonl line 1: is no JSON");
@@ -60,10 +67,19 @@ TEST_F(BatchJobs, SayWhichLineIsWrongAndWhy) {
                  "option 'focals' of design: no such option");
   expect_refused(design + ",\"options\":{\"foc\":1}}", "no such option");
   expect_refused(design + ",\"options\":{\"out\":\"x\"}}", "is set by batch itself");
-  expect_refused(design + ",\"options\":{\"focal\":null}}", "a text, a number, true, or a list");
-  expect_refused(design + ",\"options\":{\"fresnel\":false}}", "a text, a number, true, or a list");
+  expect_refused(design + ",\"options\":{\"focal\":null}}",
+                 "--focal null: must be a text or a number");
+  expect_refused(design + ",\"options\":{\"focal\":[250,300]}}", "--grid makes a job of each");
+  expect_refused(design + ",\"options\":{\"focal\":\"far\"}}",
+                 "line 1: design --focal: 'far' is no length");
+  expect_refused(design + ",\"options\":{\"focal\":-1}}", "line 1: design --focal -1: must be ");
+  expect_refused(design + ",\"options\":{\"model\":\"round\"}}", "must be one of");
+  expect_refused(design + ",\"options\":{\"fresnel\":1}}", "--fresnel 1: must be true or false");
   expect_refused(design + ",\"options\":[]}", "an object of option names");
   expect_refused(design + ",\"then\":\"cam\"}", "a list of commands");
+  expect_refused(
+      design + ",\"then\":[{\"command\":\"export\",\"options\":{\"out\":\"stl/a.stl\"}}]}",
+      "the name of a file in the job's folder");
   expect_refused(design + ",\"then\":[\"design\"]}", "cam, export or render after a design");
   expect_refused("{\"name\":\"a\",\"command\":\"send\",\"target\":\"x\"}", "design or reflect");
   expect_refused("{\"name\":\"a\",\"command\":\"reflect\",\"target\":\"x\",\"then\":[\"cam\"]}",
@@ -96,6 +112,21 @@ TEST(JobGrid, WithoutACommandGoesToTheFirstThatHasTheOption) {
   EXPECT_THAT(jobs[0].steps[1].words(), ElementsAre("--polish-sigma", "0.03"));
 }
 
+TEST(JobGrid, TurnsFlagsOnAndOff) {
+  const auto jobs = expanded({portrait()}, read_grid({"fresnel=true,false"}));
+  ASSERT_EQ(jobs.size(), 2U);
+  EXPECT_EQ(jobs[0].name, "portrait-fresneltrue");
+  EXPECT_THAT(jobs[0].steps[0].words(), ElementsAre("--fresnel", "--width", "50"));
+  EXPECT_THAT(jobs[1].steps[0].words(), ElementsAre("--width", "50"));
+}
+
+TEST(JobGrid, RefusesValuesAsALineDoes) {
+  EXPECT_THAT([] { expanded({portrait()}, read_grid({"focal=250,far"})); },
+              ThrowsMessage<InputError>(HasSubstr("--grid focal=far: design --focal: 'far'")));
+  EXPECT_THAT([] { expanded({portrait()}, read_grid({"resume=true"})); },
+              ThrowsMessage<InputError>(HasSubstr("is set by batch itself")));
+}
+
 TEST(JobGrid, RefusesWhatNoCommandHasAndNamesThatBecomeTheSame) {
   EXPECT_THAT([] { expanded({portrait()}, read_grid({"focals=1"})); },
               ThrowsMessage<InputError>(HasSubstr("no command of job \"portrait\"")));
@@ -109,19 +140,30 @@ TEST(JobGrid, RefusesWhatNoCommandHasAndNamesThatBecomeTheSame) {
 }
 
 TEST(JobTable, HasAColumnForEveryOptionAndResultAndQuotes) {
+  const auto job = [](const char* name, int focal) {
+    return BatchJob{name, "p.png", {{"design", {{"focal", focal}}}}}.json();
+  };
   const nlohmann::json record = {
-      {"job", {{"steps", {{{"command", "design"}, {"options", {{"focal", 250}}}}}}}},
+      {"seconds", 1.5},
       {"steps",
        {{{"command", "design"},
-         {"seconds", 1.5},
          {"result",
           {{"out", "x"}, {"metrics", {{"smooth", {{"mae", 0.25}}}}}, {"list", {1, 2}}}}}}}};
-  const std::string text =
-      job_table({{"a", "done", "", record}, {"b", "failed", "says \"no\", twice", nullptr}});
+  const std::string text = job_table({{job("a", 250), "done", "", record},
+                                      {job("b", 300), "failed", "says \"no\", twice", nullptr}});
   EXPECT_EQ(text,
             "name,status,message,seconds,design.focal,design.metrics.smooth.mae\r\n"
             "a,done,,1.5,250,0.25\r\n"
-            "b,failed,\"says \"\"no\"\", twice\",,,\r\n");
+            "b,failed,\"says \"\"no\"\", twice\",,300,\r\n");
+}
+
+TEST(JobTable, KnowsItself) {
+  const testing::TempFolder folder;
+  testing::write_bytes(folder / "a.csv", job_table({}));
+  testing::write_bytes(folder / "b.csv", "name,status\r\n");
+  EXPECT_TRUE(is_job_table(folder / "a.csv"));
+  EXPECT_FALSE(is_job_table(folder / "b.csv"));
+  EXPECT_FALSE(is_job_table(folder / "none.csv"));
 }
 
 }  // namespace
