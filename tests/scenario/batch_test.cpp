@@ -31,6 +31,15 @@ class Batch : public Scenario {
            more + "}\n";
   }
   void jobs(const std::string& text) const { write(at("jobs.jsonl"), text); }
+  /// job0, job1, … of three kinds.
+  void several_jobs(int count) const {
+    const std::array<const char*, 3> more{"", ",\"then\":[\"render\"]", kThenStl};
+    std::string text;
+    for (int i = 0; i < count; ++i) {
+      text += job("job" + std::to_string(i), more[static_cast<std::size_t>(i) % more.size()]);
+    }
+    jobs(text);
+  }
   [[nodiscard]] Arguments batch(const Arguments& more = {}) const {
     Arguments arguments{"batch", path("jobs.jsonl"), "--out", path("runs"), "--threads", "2"};
     arguments.insert(arguments.end(), more.begin(), more.end());
@@ -197,9 +206,7 @@ TEST_F(Batch, OnADiskThatIsFullAgainAndAgainNothingIsLostOrHalfDone) {
 }
 
 TEST_F(Batch, TwoInOneFolderShareTheJobs) {
-  std::string text;
-  for (int i = 0; i < 6; ++i) text += job("job" + std::to_string(i));
-  jobs(text);
+  several_jobs(6);
   Process one(batch({"--json"}));
   const nlohmann::json other = run(batch({"--json"})).json();
   const nlohmann::json first = one.wait().json();
@@ -219,13 +226,7 @@ int kills() {
 }
 
 TEST_F(Batch, KilledAtAnyMomentNothingIsLostOrDoneTwice) {
-  const int count = 4 + kills() / 2;
-  std::string text;
-  for (int i = 0; i < count; ++i) {
-    const std::array<const char*, 3> more{"", ",\"then\":[\"render\"]", kThenStl};
-    text += job("job" + std::to_string(i), more[static_cast<std::size_t>(i) % more.size()]);
-  }
-  jobs(text);
+  int count = 6;
   std::map<std::string, fs::file_time_type> done;
   const auto expect_untouched = [&] {
     for (const auto& [name, time] : done) {
@@ -233,16 +234,17 @@ TEST_F(Batch, KilledAtAnyMomentNothingIsLostOrDoneTwice) {
     }
   };
   std::mt19937 random(7);
-  int killed = 0;
-  for (int kill = 0; kill < kills(); ++kill) {
+  for (int killed = 0; killed < kills();) {
+    several_jobs(count);
     Process process(batch({"--parallel", "2", "--quiet"}));
-    // Every second time its commands are killed with it; otherwise they are left to end by
-    // themselves.
-    if (process.runs_for(milliseconds(50 + random() % 2500))) {
-      ++killed;
-      kill % 2 == 0 ? process.send(SIGKILL) : process.kill_all();
+    if (process.runs_for(milliseconds(50 + random() % 1200))) {
+      // Every second time its commands are killed with it; otherwise they end by themselves.
+      ++killed % 2 == 0 ? process.send(SIGKILL) : process.kill_all();
+      process.wait();
+    } else {
+      ASSERT_EQ(process.wait().exit_code, 0);
+      count += 4;  // There was nothing left to be killed in.
     }
-    process.wait();
     expect_untouched();
     expect_whole_jobs(at("runs"));
     for (const std::string& name : listing(at("runs"))) {
@@ -250,7 +252,7 @@ TEST_F(Batch, KilledAtAnyMomentNothingIsLostOrDoneTwice) {
       done.emplace(name, fs::last_write_time(at("runs") / name / "job.json"));
     }
   }
-  RecordProperty("killed_while_it_ran", killed);
+  RecordProperty("jobs", count);
   RecordProperty("done_before_the_last_run", static_cast<int>(done.size()));
   const Outcome last = run(batch({"--parallel", "2"}));
   ASSERT_EQ(last.exit_code, 0) << last.err;
