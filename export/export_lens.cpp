@@ -61,16 +61,6 @@ std::string time_of(const fs::path& file) {
   return {text.data(), std::strftime(text.data(), text.size(), "%Y-%m-%dT%H:%M:%S", &utc)};
 }
 
-std::string sha256_of(const fs::path& file) {
-  std::ifstream input = open_input(file);
-  Sha256 hash;
-  std::array<char, 1 << 16> block{};
-  while (input.read(block.data(), block.size()), input.gcount() > 0) {
-    hash.update({block.data(), static_cast<std::size_t>(input.gcount())});
-  }
-  return hash.finish();
-}
-
 StepHeader header_of(const Job& job) {
   return {.name = "lensforge lens",
           .description = "optical surface sha256:" + sha256_of(job.source.file),

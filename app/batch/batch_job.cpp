@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <fstream>
 #include <map>
 #include <set>
 #include <sstream>
@@ -53,18 +52,26 @@ bool is_for_batch(const std::string& option) {
 using OptionSpecs = std::map<std::string, OptionSpec>;
 
 /// The options of a command by their names without dashes.
-const OptionSpecs& specs_of(const std::string& command) {
-  static std::map<std::string, OptionSpecs> known;
-  OptionSpecs& specs = known[command];
-  if (!specs.empty()) return specs;
+OptionSpecs listed_specs(const JobCommand& command) {
+  OptionSpecs specs;
   try {
-    command_named(command)->run({kListOptions});
+    command.run({kListOptions});
   } catch (const ListedOptions& listed) {
     for (const OptionSpec& spec : listed.options) {
       if (spec.name.starts_with("--")) specs[spec.name.substr(2)] = spec;
     }
   }
   return specs;
+}
+
+/// Those of all commands are listed at once: jobs ask from several threads.
+const OptionSpecs& specs_of(const std::string& command) {
+  static const std::map<std::string_view, OptionSpecs> known = [] {
+    std::map<std::string_view, OptionSpecs> all;
+    for (const JobCommand& each : kCommands) all[each.name] = listed_specs(each);
+    return all;
+  }();
+  return known.at(command);
 }
 
 std::string word_of(const json& value) {
@@ -163,17 +170,6 @@ class JobLine {
   JsonFields fields_;
   std::string where_;
 };
-
-std::string sha256_of(const std::filesystem::path& file) {
-  std::ifstream stream = open_input(file);
-  Sha256 sum;
-  std::string block(std::size_t{1} << 20U, '\0');
-  while (stream.read(block.data(), static_cast<std::streamsize>(block.size())) ||
-         stream.gcount() > 0) {
-    sum.update({block.data(), static_cast<std::size_t>(stream.gcount())});
-  }
-  return sum.finish();
-}
 
 }  // namespace
 

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <fstream>
 #include <map>
-#include <string_view>
 
 namespace lensforge::app {
 namespace {
@@ -12,9 +11,9 @@ namespace {
 using nlohmann::json;
 
 /// What every table begins with.
-constexpr std::string_view kHead = "name,status,message,seconds";
+const std::vector<std::string> kFirstColumns{"name", "status", "message", "seconds"};
 
-/// Columns in the order in which they first came after those of kHead, and a row's cells.
+/// Columns in the order in which they first came after kFirstColumns, and a row's cells.
 class Table {
  public:
   using Cells = std::map<std::string, std::string>;
@@ -27,13 +26,18 @@ class Table {
   }
   void end_row(Cells row) { rows_.push_back(std::move(row)); }
 
+  /// The names of the columns so far, without the line's end.
+  [[nodiscard]] std::string head() const {
+    return line(columns_, [](const std::string& column) { return column; });
+  }
   [[nodiscard]] std::string text() const {
-    std::string text = line(columns_, [](const std::string& column) { return column; });
+    std::string text = head() + "\r\n";
     for (const Cells& row : rows_) {
-      text += line(columns_, [&](const std::string& column) {
+      const auto cell = [&](const std::string& column) {
         const auto found = row.find(column);
         return found == row.end() ? std::string() : found->second;
-      });
+      };
+      text += line(columns_, cell) + "\r\n";
     }
     return text;
   }
@@ -52,10 +56,10 @@ class Table {
       if (!text.empty()) text += ',';
       text += quoted(cell(column));
     }
-    return text + "\r\n";
+    return text;
   }
 
-  std::vector<std::string> columns_{"name", "status", "message", "seconds"};
+  std::vector<std::string> columns_ = kFirstColumns;
   std::vector<Cells> rows_;
 };
 
@@ -105,11 +109,13 @@ std::string job_table(const std::vector<TableJob>& jobs) {
   }
   return table.text();
 }
+
 bool is_job_table(const std::filesystem::path& file) {
-  std::string begin(kHead.size(), '\0');
+  const std::string head = Table().head();
+  std::string begin(head.size(), '\0');
   std::ifstream stream(file, std::ios::binary);
   stream.read(begin.data(), static_cast<std::streamsize>(begin.size()));
-  return begin == kHead;
+  return begin == head;
 }
 
 }  // namespace lensforge::app

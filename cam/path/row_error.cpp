@@ -53,9 +53,9 @@ std::size_t RowError::node_after(double u) const {
 }
 
 /// The error where a move starts; where the drop curve jumps there, that beyond the jump: the move
-/// before it ended below.
-double RowError::start_error(const Eigen::Vector2d& start) const {
-  std::size_t hint = std::max<std::size_t>(node_after(start.x()), 1) - 1;
+/// before it ended below. @param next  node_after()
+double RowError::start_error(const Eigen::Vector2d& start, std::size_t next) const {
+  std::size_t hint = std::max<std::size_t>(next, 1) - 1;
   return start.y() - profile_.at(start.x(), hint);
 }
 
@@ -67,7 +67,7 @@ bool RowError::append(const Eigen::Vector2d& start, const RowMove& move, const G
   const double misfit = move.arc ? radius_slack(start, move, curve) : 0.0;
   const double slack = profile_.error + misfit + (move.arc ? profile_.finest : 0.0);
   std::size_t next = node_after(start.x());
-  nodes_.push_back({start.x(), start_error(start), slack, start.y()});
+  nodes_.push_back({start.x(), start_error(start, next), slack, start.y()});
   const double chord = longest_chord(curve, profile_.finest);
   double from = start.x();
   for (; next < profile_.u.size() && profile_.u[next] < move.end.x(); ++next) {
@@ -194,7 +194,7 @@ bool RowError::is_blunt(const Eigen::Vector2d& start, double slope_tolerance) co
   if (!profile_.shapes(u) || !profile_.shapes(start.x())) return false;
   std::size_t back = nodes_.size() - 2;
   // A straight move has the least slack.
-  const Error here{start_error(start), profile_.error};
+  const Error here{start_error(start, node_after(start.x())), profile_.error};
   return turn_between(here, error_at(u, back)) > slope_tolerance;
 }
 

@@ -73,7 +73,7 @@ class RowError {
     std::size_t node = 0;
   };
   [[nodiscard]] std::size_t node_after(double u) const;
-  [[nodiscard]] double start_error(const Eigen::Vector2d& start) const;
+  [[nodiscard]] double start_error(const Eigen::Vector2d& start, std::size_t next) const;
   template <class GoOn>
   bool append(const Eigen::Vector2d& start, const RowMove& move, const GoOn& go_on);
   void add_node(const CurvePiece& curve, const Eigen::Vector2d& at, double slack);

@@ -4,8 +4,10 @@
 #include <openssl/evp.h>
 
 #include <array>
+#include <fstream>
 
 #include "core/error.h"
+#include "core/io/files.h"
 
 namespace lensforge {
 namespace {
@@ -48,6 +50,16 @@ std::string Sha256::finish() {
   unsigned count = 0;
   LF_CHECK(EVP_DigestFinal_ex(state_->context.get(), digest.data(), &count) == 1, "SHA-256");
   return hexadecimal(digest, count);
+}
+
+std::string sha256_of(const std::filesystem::path& file) {
+  std::ifstream input = open_input(file);
+  Sha256 hash;
+  std::array<char, 1 << 16> block{};
+  while (input.read(block.data(), block.size()), input.gcount() > 0) {
+    hash.update({block.data(), static_cast<std::size_t>(input.gcount())});
+  }
+  return hash.finish();
 }
 
 }  // namespace lensforge

@@ -95,8 +95,9 @@ void add_point(const Net& net, const Basis& u, const Basis& v, Mesh& mesh) {
 std::vector<Basis> bases(int control_points) {
   const int cells = control_points - kDegree;
   std::vector<Basis> all;
-  for (int i = 0; i <= cells * kParts; ++i)
+  for (int i = 0; i <= cells * kParts; ++i) {
     all.push_back(basis_at(static_cast<double>(i) / kParts, cells));
+  }
   return all;
 }
 
