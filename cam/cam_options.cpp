@@ -21,6 +21,13 @@ constexpr double kAlongPasses = 3.0;
 /// the design of a 128² portrait with an MAE of 0.0020, which is 0.0018.
 constexpr double kAlongPixel = 0.1;
 
+/// How much farther apart nodes of a surface with all of its scallops may be along the passes, and
+/// that as a share likewise: its light spreads over so many pixels that a picture of it takes
+/// longer than those of all polished surfaces. As milled a 256² portrait of 100 mm has an MAE of
+/// 0.0947 by both.
+constexpr double kAlongScallops = 3.0;
+constexpr double kScallopPixel = 0.25;
+
 [[noreturn]] void refuse(const char* option, double value, const std::string& rule) {
   throw InputError(std::string(option) + " " + shortest_text(value) + ": " + rule);
 }
@@ -172,6 +179,17 @@ Eigen::Vector2d sample_spacings(const CamOptions& options, const OpticalSetup& s
   const double along =
       std::min({kAlongPasses * across, options.workshop.polish.sigma, kAlongPixel * pixel});
   spacings[axis] = std::max(across, along);
+  return spacings;
+}
+
+Eigen::Vector2d scallop_spacings(const CamOptions& options, const OpticalSetup& setup) {
+  const FinishProcess& finish = options.workshop.process.finish;
+  Eigen::Vector2d spacings = sample_spacings(options, setup);
+  if (finish.cross) return spacings;
+  const int axis = finish.along == PassAxis::kX ? 0 : 1;
+  const double pixel = setup.lens_size[axis] / setup.pixels[axis];
+  spacings[axis] =
+      std::max(spacings[axis], std::min(kAlongScallops * spacings[axis], kScallopPixel * pixel));
   return spacings;
 }
 

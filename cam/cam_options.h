@@ -97,6 +97,8 @@ double sample_spacing(const CamOptions& options);
 /// The same along x and y: up to three times that along passes, which do not cross, as far as
 /// polish and pixels allow.
 Eigen::Vector2d sample_spacings(const CamOptions& options, const OpticalSetup& setup);
+/// The same of a surface that nothing polished: another three times that along passes.
+Eigen::Vector2d scallop_spacings(const CamOptions& options, const OpticalSetup& setup);
 
 /// The lens's edge: its outline, or its rectangle; counter-clockwise, mm.
 std::vector<Eigen::Vector2d> edge_of(const OpticalSetup& setup);

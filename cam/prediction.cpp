@@ -75,7 +75,11 @@ Prediction predict_part(const PartSurfaces& surfaces, const Lens& lens, const Ca
     const LightPath light(color.setup);
     if (!light.intake_is_plan_area()) setup.whole.push_back(lit_intake(lens, light, executor));
   }
-  const LeakageChain chain = surfaces.chain();
+  LeakageChain chain = surfaces.chain();
+  for (NamedSurface& other : chain.others) {
+    if (other.name != surface_name::kMilled) continue;
+    other.grid = lens_grid(lens.setup.lens_size, scallop_spacings(options, lens.setup));
+  }
   result.leakage = measure_leakage(chain, lens.target, setup, options.leakage, executor, control);
   result.sampling = check_sampling(surfaces.designed(), surfaces.part(), result.leakage,
                                    lens.target, setup, executor, control);

@@ -18,6 +18,15 @@ struct AxisLine {
   }
 };
 
+/// A curve's height (mm) and slope at a place of an AxisLine.
+struct CurveTangent {
+  double u = 0.0;
+  double height = 0.0;
+  double slope = 0.0;
+
+  [[nodiscard]] double at(double place) const { return height + slope * (place - u); }
+};
+
 /// A piece of a curve in the vertical plane over an AxisLine, u → height:
 ///     z(u) = height + rise·t + bow·√(ρ² − (offset + rate·t)²),  t = u − u₀,
 /// a straight line (bow 0), an arc of a circle or of an ellipse. What one facet, edge or vertex
@@ -45,47 +54,62 @@ struct CurvePiece {
     const double d = offset + rate * t;
     return linear + bow * std::sqrt(std::max(rho2 - d * d, 0.0));
   }
-  [[nodiscard]] double slope(double u) const {
-    if (straight()) return rise;
-    const double d = offset + rate * (u - u0);
-    return rise - bow * rate * d / std::sqrt(std::max(rho2 - d * d, kSteepest * rho2));
+  [[nodiscard]] double slope(double u) const { return tangent(u).slope; }
+  /// Both at once.
+  [[nodiscard]] CurveTangent tangent(double u) const {
+    const double t = u - u0;
+    const double linear = height + rise * t;
+    if (straight()) return {u, linear, rise};
+    const double d = offset + rate * t;
+    const double below2 = rho2 - d * d;
+    const double root = std::sqrt(std::max(below2, kSteepest * rho2));
+    const double up = below2 >= kSteepest * rho2 ? root : std::sqrt(std::max(below2, 0.0));
+    return {u, linear + bow * up, rise - bow * rate * d / root};
   }
   /// Arcs end where they are 1 : 30,000 from vertical: what holds a ball there is a wall.
   static constexpr double kSteepest = 1e-9;
 };
 
-/// How far a piece can be off its chord between two places of known height, mm: its end tangents
-/// meet no farther away, because it bends one way only. Falls by the square of the distance of the
-/// places.
-inline double bulge(const CurvePiece& piece, double from, double at_from, double to, double at_to) {
-  if (piece.straight()) return 0.0;
-  const double chord = (at_to - at_from) / (to - from);
-  const double left = std::abs(piece.slope(from) - chord);
-  const double right = std::abs(piece.slope(to) - chord);
-  return left + right > 0.0 ? (to - from) * left * right / (left + right) : 0.0;
+/// How far a piece can be off its chord between two places, mm: the tangents at its ends meet no
+/// farther away, because it bends one way only. Falls by the square of the distance of the places.
+inline double bulge(const CurveTangent& from, const CurveTangent& to) {
+  const double width = to.u - from.u;
+  const double chord = (to.height - from.height) / width;
+  const double left = std::abs(from.slope - chord);
+  const double right = std::abs(to.slope - chord);
+  return left + right > 0.0 ? width * left * right / (left + right) : 0.0;
 }
 inline double bulge(const CurvePiece& piece, double from, double to) {
-  return bulge(piece, from, piece.value(from), to, piece.value(to));
+  return piece.straight() ? 0.0 : bulge(piece.tangent(from), piece.tangent(to));
 }
 
-/// Largest and smallest value of a difference.
-struct Range {
-  double low = 0.0;
-  double high = 0.0;
+/// What a − b is between two places where both hold.
+struct PieceDifference {
+  double at_from = 0.0, at_to = 0.0;  ///< At both places.
+  double low = 0.0, high = 0.0;       ///< Bounds in between.
+  bool monotone = false;              ///< Certainly rises or falls all the way.
 };
 
-/// Bounds of a − b between two places where both hold.
-inline Range difference_bounds(const CurvePiece& a, const CurvePiece& b, double from, double to) {
-  const double a_from = a.value(from);
-  const double a_to = a.value(to);
-  const double b_from = b.value(from);
-  const double b_to = b.value(to);
-  const double bulge_a = bulge(a, from, a_from, to, a_to);
-  const double bulge_b = bulge(b, from, b_from, to, b_to);
-  Range range{std::min(a_from - b_from, a_to - b_to), std::max(a_from - b_from, a_to - b_to)};
-  range.high += (a.concave() ? bulge_a : 0.0) + (b.concave() ? 0.0 : bulge_b);
-  range.low -= (a.concave() ? 0.0 : bulge_a) + (b.concave() ? bulge_b : 0.0);
-  return range;
+inline PieceDifference difference(const CurvePiece& a, const CurvePiece& b, double from,
+                                  double to) {
+  const CurveTangent a_from = a.tangent(from);
+  const CurveTangent a_to = a.tangent(to);
+  const CurveTangent b_from = b.tangent(from);
+  const CurveTangent b_to = b.tangent(to);
+  const double bulge_a = a.straight() ? 0.0 : bulge(a_from, a_to);
+  const double bulge_b = b.straight() ? 0.0 : bulge(b_from, b_to);
+  PieceDifference result;
+  result.at_from = a_from.height - b_from.height;
+  result.at_to = a_to.height - b_to.height;
+  result.high = std::max(result.at_from, result.at_to) + (a.concave() ? bulge_a : 0.0) +
+                (b.concave() ? 0.0 : bulge_b);
+  result.low = std::min(result.at_from, result.at_to) - (a.concave() ? 0.0 : bulge_a) -
+               (b.concave() ? bulge_b : 0.0);
+  // Slopes rise or fall all the way.
+  const double least = std::min(a_from.slope, a_to.slope) - std::max(b_from.slope, b_to.slope);
+  const double most = std::max(a_from.slope, a_to.slope) - std::min(b_from.slope, b_to.slope);
+  result.monotone = least > 0.0 || most < 0.0;
+  return result;
 }
 
 }  // namespace lensforge

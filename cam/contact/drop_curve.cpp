@@ -6,6 +6,8 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <utility>
+#include <vector>
 
 #include "cam/contact/ball_cutter.h"
 #include "cam/contact/curve_envelope.h"
@@ -37,6 +39,9 @@ constexpr double kShortestFacet = 1e-10;
 
 /// Pieces shorter than this, mm, are not part of the curve.
 constexpr double kSlit = 1e-9;
+
+/// Pieces of which the curve is the largest.
+using Offers = std::vector<CurvePiece>;
 
 struct Stretch {
   AxisLine line;
@@ -77,7 +82,7 @@ bool clip_to_facet(const PlaneContact& contact, CurvePiece& piece) {
   return piece.end - piece.begin > kShortestFacet;
 }
 
-void offer_facet(const Contender& contender, const Stretch& stretch, CurveEnvelope& envelope) {
+void offer_facet(const Contender& contender, const Stretch& stretch, Offers& offers) {
   const FacetContact& facet = *contender.facet;
   if (facet.shape == FacetShape::kNone) return;
   CurvePiece piece;
@@ -103,7 +108,7 @@ void offer_facet(const Contender& contender, const Stretch& stretch, CurveEnvelo
     piece.rise = (tip(piece.end) - piece.height) / (piece.end - piece.begin);
     if (!std::isfinite(piece.rise) || !std::isfinite(piece.height)) return;
   }
-  envelope.insert(piece);
+  offers.push_back(piece);
 }
 
 /// Narrows begin … end to where the line passes under the ball's flank.
@@ -136,7 +141,7 @@ bool may_rest_on(const Eigen::Vector3d& q, const Eigen::Vector3d& other, const C
 }
 
 void offer_vertex(const Eigen::Matrix3d& corners, int k, std::int64_t feature,
-                  const Stretch& stretch, CurveEnvelope& envelope) {
+                  const Stretch& stretch, Offers& offers) {
   const Eigen::Vector3d q = corners.col(k);
   const double off = stretch.line.across - stretch.v(q.head<2>());
   CurvePiece piece{stretch.from, stretch.to};
@@ -150,7 +155,7 @@ void offer_vertex(const Eigen::Matrix3d& corners, int k, std::int64_t feature,
   if (!clip_arc(piece)) return;
   if (!may_rest_on(q, corners.col((k + 1) % 3), piece, stretch)) return;
   if (!may_rest_on(q, corners.col((k + 2) % 3), piece, stretch)) return;
-  envelope.insert(piece);
+  offers.push_back(piece);
 }
 
 /// An edge as the ball sees it from the line.
@@ -226,7 +231,7 @@ void add_crossings(const Edge& edge, double c, double radius, std::vector<double
 }
 
 void offer_edge(const Eigen::Vector3d& a, const Eigen::Vector3d& b, std::int64_t feature,
-                const Stretch& stretch, CurveEnvelope& envelope) {
+                const Stretch& stretch, Offers& offers) {
   Edge edge = make_edge(a, b, stretch);
   if (edge.run == 0.0) return;
   edge.piece.feature = feature;
@@ -243,7 +248,7 @@ void offer_edge(const Eigen::Vector3d& a, const Eigen::Vector3d& b, std::int64_t
     if (touch < 0.0 || touch > edge.run) continue;
     piece.begin = places[i - 1];
     piece.end = places[i];
-    envelope.insert(piece);
+    offers.push_back(piece);
   }
 }
 
@@ -268,18 +273,38 @@ ContactFeatures boundary_in_play(const Contender& contender, const Stretch& stre
   return inside ? ContactFeatures{0} : features;
 }
 
-void offer_boundary(const Contender& contender, const Stretch& stretch, CurveEnvelope& envelope) {
+void offer_boundary(const Contender& contender, const Stretch& stretch, Offers& offers) {
   const ContactFeatures features = boundary_in_play(contender, stretch);
   const Eigen::Matrix3d& corners = *contender.corners;
   const std::int64_t first = std::int64_t{8} * contender.triangle;
   for (int k = 0; k < 3; ++k) {
     if ((features & edge_bit(k)) == 0) continue;
-    offer_edge(corners.col(k), corners.col((k + 1) % 3), first + 1 + k, stretch, envelope);
+    offer_edge(corners.col(k), corners.col((k + 1) % 3), first + 1 + k, stretch, offers);
   }
   for (int k = 0; k < 3; ++k) {
     if ((features & corner_bit(k)) == 0) continue;
-    offer_vertex(corners, k, first + 4 + k, stretch, envelope);
+    offer_vertex(corners, k, first + 4 + k, stretch, offers);
   }
+}
+
+/// What is put on top first keeps most of the others from ever being merged. Heights count from a
+/// line as steep as the pieces are on average.
+void put_highest_first(Offers& offers) {
+  double slope = 0.0;
+  std::vector<std::pair<double, std::size_t>> order;
+  std::vector<CurveTangent> middles;
+  for (const CurvePiece& piece : offers) {
+    middles.push_back(piece.tangent(0.5 * (piece.begin + piece.end)));
+    slope += middles.back().slope / static_cast<double>(offers.size());
+  }
+  for (std::size_t i = 0; i < offers.size(); ++i) {
+    order.emplace_back(slope * middles[i].u - middles[i].height, i);
+  }
+  std::sort(order.begin(), order.end());
+  Offers sorted;
+  sorted.reserve(offers.size());
+  for (const auto& [below, i] : order) sorted.push_back(offers[i]);
+  offers.swap(sorted);
 }
 
 /// Appends the pieces of a stretch. Slits are left out: what held the ball there was too short on
@@ -311,6 +336,7 @@ std::vector<CurvePiece> drop_curve(const DropCutter& cutter, const AxisLine& lin
                                    double to) {
   std::vector<CurvePiece> curve;
   std::vector<Contender> contenders;
+  Offers offers;
   CurveEnvelope envelope;
   // Stretches end at fixed places, so that a line has the same curve whatever part of it is asked
   // for.
@@ -322,9 +348,12 @@ std::vector<CurvePiece> drop_curve(const DropCutter& cutter, const AxisLine& lin
     if (end - begin < kShortestStretch && end < to) continue;
     const Stretch stretch{line, cutter.radius(), begin, end};
     cutter.find_contenders(line.at(begin), line.at(end), contenders);
+    offers.clear();
+    for (const Contender& one : contenders) offer_facet(one, stretch, offers);
+    for (const Contender& one : contenders) offer_boundary(one, stretch, offers);
+    put_highest_first(offers);
     envelope.clear();
-    for (const Contender& one : contenders) offer_facet(one, stretch, envelope);
-    for (const Contender& one : contenders) offer_boundary(one, stretch, envelope);
+    for (const CurvePiece& one : offers) envelope.insert(one);
     append(envelope.pieces(), curve);
     begin = end;
   }

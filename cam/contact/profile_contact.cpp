@@ -13,6 +13,9 @@ constexpr double kAngleTolerance = 1e-9;
 /// Halving π/2 this often passes kAngleTolerance; Newton's steps need five or so.
 constexpr int kMaxSteps = 40;
 
+/// Rounding of what a facet's plane bounds, mm.
+constexpr double kBoundMargin = 1e-9;
+
 /// An edge as the tool sees it: places on its line count from the foot of the axis, uphill.
 struct EdgeLine {
   double away = 0.0;   ///< Of the line from the axis, seen from above, mm.
@@ -65,7 +68,7 @@ double contact_place(const CutterProfile& profile, const EdgeLine& line) {
 
 /// True if f does not fall uphill of `place` on the line: m − g'(t)·σ/t ≥ 0.
 bool rises_at(const CutterProfile& profile, const EdgeLine& line, double place) {
-  const double t = std::hypot(line.away, place);
+  const double t = std::sqrt(line.away * line.away + place * place);
   const double out = t - profile.flat();
   if (out <= 0.0 || place <= 0.0) return line.slope > 0.0 || place < 0.0;
   const double down = std::sqrt(std::fmax(0.0, (profile.corner - out) * (profile.corner + out)));
@@ -90,15 +93,26 @@ Barycentric coordinates(const Eigen::Matrix3d& corners, const Eigen::Vector2d& a
   return {1.0 - b - c, b, c};
 }
 
+/// Coordinates above this count as outside of an edge: rounding.
+constexpr double kOnEdge = 1e-9;
+
 /// What a facet's tangent contact came to.
 struct FacetTip {
   double tip = kNoContact;
-  bool sure = false;  ///< It is the maximum over the whole triangle.
+  bool sure = false;    ///< The rest says something about the maximum over the triangle.
+  bool inside = false;  ///< `tip` is that maximum, else only no less than it.
+  Barycentric at{};     ///< The contact in the facet's plane.
+
+  /// Whether the maximum may lie on the edge from corner k: from a point of an edge on whose inner
+  /// side the contact lies, f rises, being concave, on the way there, which leads inside.
+  [[nodiscard]] bool may_lie_on_edge(int k) const {
+    return !sure || (k == 0 ? at.c : k == 1 ? at.a : at.b) < kOnEdge;
+  }
 };
 
-/// f at the tangent contact of the facet's plane, if it is inside: the tool touches a plane of
-/// normal n at flat · n_xy/|n_xy| + corner · n_xy before its axis. Evaluated at a point of the
-/// triangle, so never above the true maximum.
+/// f at the tangent contact of the facet's plane: the tool touches a plane of normal n at
+/// flat · n_xy/|n_xy| + corner · n_xy before its axis. Where that is inside, f is evaluated at a
+/// point of the triangle, so never above the true maximum.
 FacetTip facet_contact(const CutterProfile& profile, const Eigen::Vector2d& p,
                        const Eigen::Matrix3d& corners) {
   const Eigen::Vector3d u = corners.col(1) - corners.col(0);
@@ -113,14 +127,17 @@ FacetTip facet_contact(const CutterProfile& profile, const Eigen::Vector2d& p,
   const double level = n.head<2>().norm();
   Eigen::Vector2d contact = p - profile.corner * n.head<2>();
   if (level > 0.0) contact -= (profile.flat() / level) * n.head<2>();
-  const Barycentric at = coordinates(corners, contact);
-  if (!at.inside()) return {};
-  const double b = std::fmin(std::fmax(at.b, 0.0), 1.0);
-  const double c = std::fmin(std::fmax(at.c, 0.0), 1.0 - b);
+  FacetTip facet;
+  facet.at = coordinates(corners, contact);
+  facet.sure = n.z() >= kRegularFacet && area2 >= kRegularFacet * side2;
+  facet.inside = facet.at.inside();
+  if (!facet.inside && !facet.sure) return facet;
+  const double b = facet.inside ? std::fmin(std::fmax(facet.at.b, 0.0), 1.0) : facet.at.b;
+  const double c = facet.inside ? std::fmin(std::fmax(facet.at.c, 0.0), 1.0 - b) : facet.at.c;
   const Eigen::Vector3d q = corners.col(0) + b * u + c * v;
   const double away = std::fmin((q.head<2>() - p).norm(), profile.radius);
-  const bool sure = n.z() >= kRegularFacet && area2 >= kRegularFacet * side2;
-  return {q.z() - profile.height(away), sure};
+  facet.tip = q.z() - profile.height(away);
+  return facet;
 }
 
 }  // namespace
@@ -147,16 +164,17 @@ double profile_edge_tip(const CutterProfile& profile, const Eigen::Vector2d& p,
   if (low > high) return kNoContact;
   const double place = best_place(profile, line, low, high);
   const double part = std::fmin(std::fmax((place - begin) / run, 0.0), 1.0);
-  const double away = std::fmin(std::hypot(line.away, place), profile.radius);
+  const double away = std::fmin(std::sqrt(line.away * line.away + place * place), profile.radius);
   return foot.z() + part * u.z() - profile.height(away);
 }
 
 double profile_triangle_tip(const CutterProfile& profile, const Eigen::Vector2d& p,
-                            const Eigen::Matrix3d& corners) {
+                            const Eigen::Matrix3d& corners, double enough) {
   const FacetTip facet = facet_contact(profile, p, corners);
-  if (facet.sure) return facet.tip;
-  double best = facet.tip;
+  if (facet.sure && (facet.inside || facet.tip < enough - kBoundMargin)) return facet.tip;
+  double best = facet.inside ? facet.tip : kNoContact;
   for (int k = 0; k < 3; ++k) {
+    if (!facet.may_lie_on_edge(k)) continue;
     best = std::fmax(best, profile_edge_tip(profile, p, corners.col(k), corners.col((k + 1) % 3)));
   }
   return best;

@@ -27,8 +27,9 @@ double profile_edge_tip(const CutterProfile& profile, const Eigen::Vector2d& p,
 /// kNoContact if no part of it is under the tool. Error against the exact maximum of f: 1e-12 mm
 /// for triangles of a few millimetres (ProfileContact.AgreesWithTheBall); on ones steeper than 1 :
 /// 1000 it answers for a p within 1e-13 mm.
+/// @param enough  where the maximum is lower, mm, any height below it may be answered: sooner.
 double profile_triangle_tip(const CutterProfile& profile, const Eigen::Vector2d& p,
-                            const Eigen::Matrix3d& corners);
+                            const Eigen::Matrix3d& corners, double enough = kNoContact);
 
 /// Height of the tip of the tool that rests on a level rectangle `low` … `high` (seen from above)
 /// at height z, mm; kNoContact if no part of it is under the tool.

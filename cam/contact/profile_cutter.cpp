@@ -142,6 +142,13 @@ CutterLocation ProfileCutter::drop(const CutterProfile& profile, const Eigen::Ve
   return search.best;
 }
 
+double ProfileCutter::rest_on(const CutterProfile& profile, const Eigen::Vector2d& p,
+                              const CutterLocation& near) const {
+  if (!near.rests()) return kNoContact;
+  const std::int32_t item = item_of_[index_of(near.triangle)];
+  return profile_triangle_tip(profile, p, corners_[index_of(item)]);
+}
+
 void ProfileCutter::search_node(std::size_t level, int column, int row, Search& search) const {
   if (level == 0) {
     search_cell(index_of(row) * index_of(levels_[0].columns) + index_of(column), search);
@@ -182,8 +189,9 @@ void ProfileCutter::search_cell(std::size_t cell, Search& search) const {
 }
 
 void ProfileCutter::try_item(std::int64_t item, Search& search) const {
-  search.offer(profile_triangle_tip(search.profile, search.p, corners_[index_of(item)]),
-               triangle_of_[index_of(item)]);
+  search.offer(
+      profile_triangle_tip(search.profile, search.p, corners_[index_of(item)], search.best.tip),
+      triangle_of_[index_of(item)]);
 }
 
 }  // namespace lensforge

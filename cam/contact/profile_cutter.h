@@ -33,6 +33,11 @@ class ProfileCutter {
   [[nodiscard]] CutterLocation drop(const CutterProfile& profile, const Eigen::Vector2d& p,
                                     const CutterLocation& near = {}) const;
 
+  /// Height of the tip over p on the triangle alone that holds it up at a location close by, mm:
+  /// no more than drop() answers; kNoContact if it is not under the tool.
+  [[nodiscard]] double rest_on(const CutterProfile& profile, const Eigen::Vector2d& p,
+                               const CutterLocation& near) const;
+
   /// Box of the mesh's vertices that belong to triangles; empty without triangles.
   [[nodiscard]] const Eigen::AlignedBox3d& bounds() const { return bounds_; }
 

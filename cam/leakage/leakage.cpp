@@ -18,16 +18,23 @@ class ChainPictures {
   ChainPictures(const LeakageChain& chain, const FieldRenderSetup& setup, const Executor& executor,
                 const RunControl& control) {
     std::vector<const SurfaceField*> fields;
+    std::vector<const NamedSurface*> apart;
     const auto take = [&](const NamedSurface& surface) {
       LF_CHECK(surface.field != nullptr, surface.name);
-      const bool known = std::find(fields.begin(), fields.end(), surface.field) != fields.end();
-      if (!known) fields.push_back(surface.field);
+      if (std::find(fields.begin(), fields.end(), surface.field) != fields.end()) return;
+      if (surface.grid) return apart.push_back(&surface);
+      fields.push_back(surface.field);
     };
     for (const NamedSurface& step : chain.steps) take(step);
     take(chain.designed);
     for (const NamedSurface& other : chain.others) take(other);
     std::vector<FluxPicture> rendered = render_fields(fields, setup, executor, control);
     for (std::size_t f = 0; f < fields.size(); ++f) pictures_[fields[f]] = std::move(rendered[f]);
+    for (const NamedSurface* surface : apart) {
+      FieldRenderSetup own = setup;
+      own.grid = *surface->grid;
+      pictures_[surface->field] = render_field(*surface->field, own, executor, control);
+    }
   }
 
   [[nodiscard]] const FluxPicture& of(const NamedSurface& surface) const {

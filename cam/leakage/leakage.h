@@ -16,6 +16,7 @@ namespace lensforge {
 struct NamedSurface {
   std::string name;
   const SurfaceField* field = nullptr;
+  std::optional<GridWindow> grid = {};  ///< It is rendered on, if not on FieldRenderSetup::grid.
 };
 
 /// Names of the causes in the chain that cam measures.

@@ -58,8 +58,11 @@ void PassGrid::fill(std::int64_t pass, const TipFloor& floor) {
         i + 1 < count_ ? floor.over(place(pass, at + 0.5), 0.5 * spacing_, trace) : kNoContact;
     nodes[i] = std::max(before, after);
     const Eigen::Vector2d p = place(pass, at);
-    const double above = nodes[i] - floor.over(p, 0.0, trace);
-    if (above > excess.value) excess = {above, {p.x(), p.y(), nodes[i]}};
+    // The floor itself is asked for where that can be the most only.
+    if (nodes[i] - floor.at_least(p, trace) > excess.value) {
+      const double above = nodes[i] - floor.over(p, 0.0, trace);
+      if (above > excess.value) excess = {above, {p.x(), p.y(), nodes[i]}};
+    }
     before = after;
   }
 }

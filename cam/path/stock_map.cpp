@@ -63,10 +63,14 @@ Extreme StockMap::cut(const CutterProfile& profile, const Eigen::Vector3d& from,
   Extreme deepest;
   const auto steps = std::max<std::int64_t>(
       1, static_cast<std::int64_t>(std::ceil((to - from).head<2>().norm() / cell_)));
-  for (std::int64_t i = 0; i <= steps; ++i) {
+  // Where the same cutter was last, everything is cut already.
+  const bool goes_on = last_tip_ == from && last_profile_ == profile;
+  for (std::int64_t i = goes_on ? 1 : 0; i <= steps; ++i) {
     const double part = static_cast<double>(i) / static_cast<double>(steps);
     stamp(profile, from + part * (to - from), deepest);
   }
+  last_tip_ = to;
+  last_profile_ = profile;
   return deepest;
 }
 

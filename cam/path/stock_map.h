@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <cmath>
 #include <cstdint>
 #include <vector>
 
@@ -72,6 +73,8 @@ class StockMap {
   int block_columns_;
   std::vector<double> heights_;
   std::vector<Block> blocks_;
+  Eigen::Vector3d last_tip_{HUGE_VAL, HUGE_VAL, HUGE_VAL};  ///< Where the last cut ended.
+  CutterProfile last_profile_;
 };
 
 /// The most material that is left on a surface: height of the stock above it, as an upper bound at

@@ -24,12 +24,26 @@ double TipFloor::hold_of(const Tool& tool, double allowance) {
   return cutter.flat() + cutter.corner / std::numbers::sqrt2;
 }
 
-double TipFloor::over(const Eigen::Vector2d& p, double reach, Trace& trace) const {
-  trace.resize(parts_.size());
+/// Where the tip has the height that it keeps over p.
+Eigen::Vector2d TipFloor::held(const Eigen::Vector2d& p) const {
   const Eigen::Vector2d rim =
       p.cwiseMax(surface_.bounds().min().head<2>()).cwiseMin(surface_.bounds().max().head<2>());
   const double beyond = (p - rim).norm();
-  const Eigen::Vector2d held = beyond > hold_ ? rim + (p - rim) * (hold_ / beyond) : p;
+  return beyond > hold_ ? rim + (p - rim) * (hold_ / beyond) : p;
+}
+
+double TipFloor::at_least(const Eigen::Vector2d& p, const Trace& trace) const {
+  const Eigen::Vector2d held = this->held(p);
+  double floor = kNoContact;
+  for (std::size_t part = 0; part < trace.size(); ++part) {
+    floor = std::max(floor, surface_.rest_on(parts_[part], held, trace[part]));
+  }
+  return floor;
+}
+
+double TipFloor::over(const Eigen::Vector2d& p, double reach, Trace& trace) const {
+  trace.resize(parts_.size());
+  const Eigen::Vector2d held = this->held(p);
   double floor = kNoContact;
   for (std::size_t part = 0; part < parts_.size(); ++part) {
     // A shank is most often so high that not even the surface's highest point could reach it.

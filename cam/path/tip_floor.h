@@ -28,11 +28,16 @@ class TipFloor {
   /// p: a move of a length of 2·reach around p that stays above it cuts into nothing. mm.
   [[nodiscard]] double over(const Eigen::Vector2d& p, double reach, Trace& trace) const;
 
+  /// A height that over(p, 0, …) is nowhere below, found sooner: on what kept the tip up near p.
+  [[nodiscard]] double at_least(const Eigen::Vector2d& p, const Trace& trace) const;
+
   /// Distance beyond the rim from which the tip keeps its height, mm.
   [[nodiscard]] double hold() const { return hold_; }
   static double hold_of(const Tool& tool, double allowance);
 
  private:
+  [[nodiscard]] Eigen::Vector2d held(const Eigen::Vector2d& p) const;
+
   const ProfileCutter& surface_;
   const std::vector<KeepOut>& keep_outs_;
   double clearance_;

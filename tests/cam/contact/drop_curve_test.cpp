@@ -64,21 +64,34 @@ TEST(CurvePiece, DifferencesStayWithinTheirBounds) {
   CurvePiece cup = arc(0.0, 1.0, 0.7, 2.0, 1.5);
   cup.bow = -1.0;
   const CurvePiece line{0.0, 1.0, 0.0, 0.9, 0.3};
+  int monotone = 0;
   for (const auto& [a, b] : {std::pair{cap, cup}, {cup, cap}, {cap, line}, {line, cup}}) {
     for (const double width : {1.0, 0.1, 0.01}) {
-      const Range bounds = difference_bounds(a, b, 0.0, width);
+      const PieceDifference bounds = difference(a, b, 0.0, width);
       double low = HUGE_VAL;
       double high = -HUGE_VAL;
-      for (double u = 0.0; u <= width; u += 0.01 * width) {
-        low = std::min(low, a.value(u) - b.value(u));
-        high = std::max(high, a.value(u) - b.value(u));
+      bool rises = true;
+      bool falls = true;
+      double before = a.value(0.0) - b.value(0.0);
+      for (double u = 0.01 * width; u <= width; u += 0.01 * width) {
+        const double at = a.value(u) - b.value(u);
+        rises = rises && at > before;
+        falls = falls && at < before;
+        before = at;
+        low = std::min(low, at);
+        high = std::max(high, at);
       }
+      EXPECT_EQ(bounds.at_from, a.value(0.0) - b.value(0.0));
+      EXPECT_EQ(bounds.at_to, a.value(width) - b.value(width));
+      EXPECT_TRUE(!bounds.monotone || rises || falls);
+      monotone += bounds.monotone ? 1 : 0;
       EXPECT_LE(bounds.low, low);
       EXPECT_GE(bounds.high, high);
       EXPECT_LE(bounds.high - high, width * width);
       EXPECT_LE(low - bounds.low, width * width);
     }
   }
+  EXPECT_GT(monotone, 0);
 }
 
 void expect_equal_to_drops(const SurfaceMesh& mesh, const AxisLine& line, const std::string& name) {

@@ -204,8 +204,9 @@ void expect_equal_to_brute_force(const SurfaceMesh& mesh, int points, Random& ra
     Eigen::Vector2d p(random.in(-0.9, 3.0), random.in(-0.9, 3.0));
     if (i % 5 == 1) p = mesh.vertices.col(i % mesh.vertex_count()).head<2>();
     const CutterLocation fresh = cutter.drop(profile, p);
-    last = cutter.drop(profile, p, last);
     const double expected = brute_force(mesh, profile, p);
+    EXPECT_LE(cutter.rest_on(profile, p, last), std::fmax(expected + 1e-12, kNoContact)) << i;
+    last = cutter.drop(profile, p, last);
     if (expected == kNoContact) {
       EXPECT_FALSE(fresh.rests());
       EXPECT_FALSE(last.rests());
@@ -213,6 +214,7 @@ void expect_equal_to_brute_force(const SurfaceMesh& mesh, int points, Random& ra
     } else {
       EXPECT_NEAR(fresh.tip, expected, 1e-12) << i;
       EXPECT_NEAR(last.tip, expected, 1e-12) << i;
+      EXPECT_NEAR(cutter.rest_on(profile, p, fresh), expected, 1e-12) << i;
     }
   }
 }
