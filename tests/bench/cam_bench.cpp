@@ -58,8 +58,9 @@ int run(const std::vector<std::string>& words) {
   const Executor executor =
       Executor::cpu(words.size() > 2 ? std::stoi(words[2]) : 0).with_profile(&profile);
   CamOptions options;
-  const bool facet = words.size() > 3 && words[3] == "facet";
-  options.surface = facet ? SurfaceModel::kFacet : SurfaceModel::kSmooth;
+  if (words.size() > 3) {
+    options.surface = words[3] == "facet" ? SurfaceModel::kFacet : SurfaceModel::kSmooth;
+  }
   const RunControl control({}, [&](const Progress& progress) { clock.tell(progress.stage); });
   const CamResult result = make_cut(lens, options, words[1], executor, control);
   clock.tell("all");
