@@ -53,7 +53,11 @@ class MeantSmooth final : public MeantSurface {
   [[nodiscard]] std::unique_ptr<RoundedField> rounded(const CutSurface& cut,
                                                       const Eigen::AlignedBox2d& /*rectangle*/,
                                                       const Executor& executor) override {
-    reach_.emplace(surface_, cut.radius(), kReachCut, executor);
+    if (const auto* const same = dynamic_cast<const SmoothCutSurface*>(&cut)) {
+      reach_.emplace(*same, kReachCut, executor);
+    } else {
+      reach_.emplace(surface_, cut.radius(), kReachCut, executor);
+    }
     return std::make_unique<RoundedField>(held_, *reach_, reach_->deviation().height, executor);
   }
 

@@ -6,15 +6,10 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-
-#include "cam/milled/lens_grid.h"
-#include "core/error.h"
+#include <utility>
 
 namespace lensforge {
 namespace {
-
-/// Side of the tiles that are sampled at once, cells.
-constexpr std::int64_t kTile = 768;
 
 /// Nodes of one tile that are kept.
 void keep_nodes(const SurfacePatch& patch, const PartGrid& grid, const std::string& name,
@@ -36,6 +31,14 @@ void keep_nodes(const SurfacePatch& patch, const PartGrid& grid, const std::stri
   }
 }
 
+std::vector<std::string> layer_names(const std::vector<NamedSurface>& surfaces) {
+  std::vector<std::string> names;
+  for (const NamedSurface& surface : surfaces) {
+    for (const char* layer : {".z", ".slope_x", ".slope_y"}) names.push_back(surface.name + layer);
+  }
+  return names;
+}
+
 }  // namespace
 
 PartGrid part_grid(const Eigen::Vector2d& lens_size, const Eigen::Vector2d& spacings, double most) {
@@ -51,32 +54,26 @@ PartGrid part_grid(const Eigen::Vector2d& lens_size, const Eigen::Vector2d& spac
   return grid;
 }
 
-LayeredImage surface_layers(const std::vector<NamedSurface>& surfaces,
-                            const Eigen::Vector2d& lens_size, const Eigen::Vector2d& spacings,
-                            const Executor& executor, const RunControl& control) {
-  const PartGrid grid = part_grid(lens_size, spacings, kPartNodes);
-  std::vector<std::string> names;
-  for (const NamedSurface& surface : surfaces) {
-    for (const char* layer : {".z", ".slope_x", ".slope_y"}) names.push_back(surface.name + layer);
+GridWindow sampled_grid(const Eigen::Vector2d& lens_size, const Eigen::Vector2d& spacings) {
+  const PartGrid nodes = part_grid(lens_size, spacings, kPartNodes);
+  const Eigen::Array2i cells = (nodes.nodes.array() - 1) * nodes.every.array();
+  GridWindow grid;
+  grid.spacing = lens_size.cwiseQuotient(cells.cast<double>().matrix());
+  grid.columns = cells.x() + 1;
+  grid.rows = cells.y() + 1;
+  return grid;
+}
+
+PartLayers::PartLayers(std::vector<NamedSurface> surfaces, const Eigen::Vector2d& lens_size,
+                       const Eigen::Vector2d& spacings)
+    : surfaces_(std::move(surfaces)),
+      nodes_(part_grid(lens_size, spacings, kPartNodes)),
+      layers_(nodes_.nodes.x(), nodes_.nodes.y(), layer_names(surfaces_)) {}
+
+void PartLayers::take(const SurfaceField& field, const SurfacePatch& tile) {
+  for (const NamedSurface& surface : surfaces_) {
+    if (surface.field == &field) keep_nodes(tile, nodes_, surface.name, layers_);
   }
-  LayeredImage layers(grid.nodes.x(), grid.nodes.y(), names);
-  GridWindow fine;
-  const Eigen::Array2i cells = (grid.nodes.array() - 1) * grid.every.array();
-  fine.spacing = lens_size.cwiseQuotient(cells.cast<double>().matrix());
-  fine.columns = cells.x() + 1;
-  fine.rows = cells.y() + 1;
-  const std::vector<CellRange> tiles = tiles_of(all_cells(fine), kTile);
-  SurfacePatch patch;
-  for (std::size_t t = 0; t < tiles.size(); ++t) {
-    for (const NamedSurface& surface : surfaces) {
-      if (control.stop_requested()) throw Interrupted();
-      surface.field->sample(window_of(fine, tiles[t], 0), executor, patch);
-      keep_nodes(patch, grid, surface.name, layers);
-    }
-    control.report({"sample the part", static_cast<double>(t + 1),
-                    static_cast<double>(tiles.size()), "tiles"});
-  }
-  return layers;
 }
 
 LayeredImage cause_layers(const LeakageResult& leakage, double total) {

@@ -7,8 +7,6 @@
 
 #include "cam/leakage/leakage.h"
 #include "cam/milled/surface_field.h"
-#include "core/compute/executor.h"
-#include "core/compute/run_control.h"
 #include "core/image/layered_image.h"
 
 namespace lensforge {
@@ -33,12 +31,30 @@ struct PartGrid {
 /// about.
 PartGrid part_grid(const Eigen::Vector2d& lens_size, const Eigen::Vector2d& spacings, double most);
 
+/// The grid over the lens that is sampled, at most `spacings` apart: nodes of part_grid() with
+/// kPartNodes are nodes of it.
+GridWindow sampled_grid(const Eigen::Vector2d& lens_size, const Eigen::Vector2d& spacings);
+
 /// Heights, mm, and slopes of surfaces as layers "NAME.z", "NAME.slope_x" and "NAME.slope_y", at
-/// nodes evenly over the lens, the upper left one first. Every node has what the surface, sampled
-/// at `spacings`, has there. @throw Interrupted
-LayeredImage surface_layers(const std::vector<NamedSurface>& surfaces,
-                            const Eigen::Vector2d& lens_size, const Eigen::Vector2d& spacings,
-                            const Executor& executor, const RunControl& control);
+/// nodes evenly over the lens, the upper left one first, kept from the tiles that are sampled for
+/// the surfaces' pictures.
+class PartLayers {
+ public:
+  /// @param spacings  as of sampled_grid(), whose tiles are taken.
+  PartLayers(std::vector<NamedSurface> surfaces, const Eigen::Vector2d& lens_size,
+             const Eigen::Vector2d& spacings);
+
+  /// Keeps what layers need of a surface's tile; of other surfaces that is nothing.
+  void take(const SurfaceField& field, const SurfacePatch& tile);
+
+  /// @pre every tile was taken.
+  [[nodiscard]] const LayeredImage& layers() const { return layers_; }
+
+ private:
+  std::vector<NamedSurface> surfaces_;
+  PartGrid nodes_;
+  LayeredImage layers_;
+};
 
 /// The pictures of the designed surface and of a chain's steps, under the names that they have
 /// there, linear light.

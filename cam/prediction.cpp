@@ -68,19 +68,27 @@ ReportMap height_map(const LeakMap& map) {
 Prediction predict_part(const PartSurfaces& surfaces, const Lens& lens, const CamOptions& options,
                         const Executor& executor, const RunControl& control) {
   Prediction result;
-  const GridWindow grid = lens_grid(lens.setup.lens_size, sample_spacings(options, lens.setup));
+  LeakageChain chain = surfaces.chain();
+  const Eigen::Vector2d spacings = sample_spacings(options, lens.setup);
+  const GridWindow grid = sampled_grid(lens.setup.lens_size, spacings);
+  PartLayers layers(
+      {{part_layer::kPolished, chain.steps.front().field}, {part_layer::kPart, &surfaces.part()}},
+      lens.setup.lens_size, spacings);
   FieldRenderSetup setup{lens.setup, grid};
   setup.surface_height = lens.surface.vertices.row(2).mean();
   for (const LightColor& color : light_colors(lens.setup)) {
     const LightPath light(color.setup);
     if (!light.intake_is_plan_area()) setup.whole.push_back(lit_intake(lens, light, executor));
   }
-  LeakageChain chain = surfaces.chain();
   for (NamedSurface& other : chain.others) {
     if (other.name != surface_name::kMilled) continue;
     other.grid = lens_grid(lens.setup.lens_size, scallop_spacings(options, lens.setup));
   }
-  result.leakage = measure_leakage(chain, lens.target, setup, options.leakage, executor, control);
+  const auto keep = [&](const SurfaceField& field, const SurfacePatch& tile) {
+    layers.take(field, tile);
+  };
+  result.leakage =
+      measure_leakage(chain, lens.target, setup, options.leakage, executor, control, keep);
   result.sampling = check_sampling(surfaces.designed(), surfaces.part(), result.leakage,
                                    lens.target, setup, executor, control);
   const std::vector<double> weights =
@@ -94,9 +102,7 @@ Prediction predict_part(const PartSurfaces& surfaces, const Lens& lens, const Ca
   const double spacing = lens.setup.lens_size.maxCoeff() / kViewNodes;
   result.surface = raster_of(coarse_patch(surfaces.milled(), lens, spacing, executor));
   result.milled = mesh_of(coarse_patch(surfaces.milled(), lens, kMeshSpacing, executor));
-  result.surfaces = surface_layers(
-      {{part_layer::kPolished, chain.steps.front().field}, {part_layer::kPart, &surfaces.part()}},
-      lens.setup.lens_size, sample_spacings(options, lens.setup), executor, control);
+  result.surfaces = layers.layers();
   return result;
 }
 

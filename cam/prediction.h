@@ -29,7 +29,7 @@ struct Prediction {
   ReportMap height;              ///< Part − designed, µm.
   LensRaster surface;            ///< Heights of the part, mm.
   SurfaceMesh milled;            ///< The surface as milled, at kMeshSpacing.
-  LayeredImage surfaces;         ///< Designed but polished, and the part: surface_layers().
+  LayeredImage surfaces;         ///< Designed but polished, and the part: PartLayers.
   ToleranceForecast tolerances;  ///< Empty unless it is asked for.
 };
 

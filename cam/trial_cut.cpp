@@ -12,6 +12,7 @@
 #include "cam/milled/crease_sum.h"
 #include "cam/milled/milled_field.h"
 #include "cam/milled/polished_field.h"
+#include "cam/part_layers.h"
 #include "core/error.h"
 
 namespace lensforge {
@@ -200,7 +201,7 @@ LeakTrial TrialCut::at(const LeakPlace& place, const RunControl& control) const 
   const RunControl silent(control.stop_token(), {});
   const CamOptions& before = site_.plan.options();
   const GridWindow grid =
-      lens_grid(site_.lens.setup.lens_size, sample_spacings(before, site_.lens.setup));
+      sampled_grid(site_.lens.setup.lens_size, sample_spacings(before, site_.lens.setup));
   const CellGrid fine = refined(grid, place.cells, sample_spacings(options_, site_.lens.setup));
   const std::optional<CastFrame> mould = site_.plan.mould();
   const double polished = PolishedField::kReach * options_.workshop.polish.sigma +

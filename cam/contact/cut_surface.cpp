@@ -8,6 +8,8 @@
 #include <numeric>
 #include <utility>
 
+#include "core/compute/float_bounds.h"
+
 namespace lensforge {
 namespace {
 
@@ -125,21 +127,45 @@ Eigen::AlignedBox2d box_of(const SurfaceMesh& mesh, std::int64_t triangle) {
 
 }  // namespace
 
+std::shared_ptr<const SmoothCutSurface::Bent> SmoothCutSurface::bent(const OpticalSurface& surface,
+                                                                     double radius,
+                                                                     const Executor& executor) {
+  const std::int64_t triangles = surface.mesh().triangle_count();
+  std::vector<SurfaceBounds> bounds(static_cast<std::size_t>(triangles));
+  std::vector<float> bends(bounds.size());
+  parallel_for(executor, "smooth surface", triangles, [&](std::int64_t t) {
+    const auto i = static_cast<std::size_t>(t);
+    bounds[i] = bounds_of(surface, t);
+    const BendRange& range = bounds[i].bend;
+    bends[i] = float_above(std::max(std::abs(range.least), std::abs(range.largest)));
+  });
+  return std::make_shared<const Bent>(Bent{std::move(bends), SmoothBed(surface, radius, bounds)});
+}
+
 SmoothCutSurface::SmoothCutSurface(std::shared_ptr<const OpticalSurface> surface, double radius,
                                    const SmoothCutOptions& options, const Executor& executor)
     : surface_(std::move(surface)),
       grid_(surface_->mesh()),
       radius_(radius),
-      splits_(static_cast<std::size_t>(surface_->mesh().triangle_count())) {
+      bent_(bent(*surface_, radius, executor)) {
+  split(options, executor);
+}
+
+SmoothCutSurface::SmoothCutSurface(const SmoothCutSurface& same, const SmoothCutOptions& options,
+                                   const Executor& executor)
+    : surface_(same.surface_), grid_(same.grid_), radius_(same.radius_), bent_(same.bent_) {
+  split(options, executor);
+}
+
+/// Settles how finely every triangle is cut.
+void SmoothCutSurface::split(const SmoothCutOptions& options, const Executor& executor) {
   const SurfaceMesh& mesh = surface_->mesh();
+  splits_.resize(bent_->bends.size());
   std::vector<SurfaceDeviation> off(splits_.size());
-  std::vector<SurfaceBounds> bounds(splits_.size());
-  parallel_for(executor, "smooth surface", mesh.triangle_count(), [&](std::int64_t t) {
+  parallel_for(executor, "split surface", mesh.triangle_count(), [&](std::int64_t t) {
     const auto i = static_cast<std::size_t>(t);
     const Interpolation shape = interpolation_of(mesh, t);
-    bounds[i] = bounds_of(*surface_, t);
-    const BendRange& range = bounds[i].bend;
-    const double bend = std::max(std::abs(range.least), std::abs(range.largest));
+    const double bend = bent_->bends[i];
     const int n = splits_for(shape, bend, options);
     splits_[i] = static_cast<std::uint8_t>(n);
     off[i] = {bend * shape.height / (n * n), bend * shape.slope / n};
@@ -148,7 +174,6 @@ SmoothCutSurface::SmoothCutSurface(std::shared_ptr<const OpticalSurface> surface
     deviation_.height = std::max(deviation_.height, one.height);
     deviation_.slope = std::max(deviation_.slope, one.slope);
   }
-  bed_.emplace(*surface_, radius, bounds);
   const double area = surface_->box().volume();
   const double longest = surface_->box().sizes().maxCoeff();
   const double per_band = static_cast<double>(facet_count()) / area * longest;

@@ -104,6 +104,9 @@ class SmoothCutSurface final : public CutSurface {
   /// @param radius  of the ball, mm, > 0. @pre not surface->has_creases()
   SmoothCutSurface(std::shared_ptr<const OpticalSurface> surface, double radius,
                    const SmoothCutOptions& options, const Executor& executor);
+  /// The same surface and ball, cut into other facets.
+  SmoothCutSurface(const SmoothCutSurface& same, const SmoothCutOptions& options,
+                   const Executor& executor);
   /// The smooth model's surface over a mesh. @pre every triangle faces +z.
   SmoothCutSurface(const SurfaceMesh& mesh, double radius, const SmoothCutOptions& options,
                    const Executor& executor)
@@ -112,7 +115,7 @@ class SmoothCutSurface final : public CutSurface {
   [[nodiscard]] std::shared_ptr<const DropCutter> cutter(const Eigen::AlignedBox2d& axis,
                                                          const Executor& executor) const override;
   [[nodiscard]] double radius() const override { return radius_; }
-  [[nodiscard]] const SmoothBed* bed() const override { return &*bed_; }
+  [[nodiscard]] const SmoothBed* bed() const override { return &bent_->bed; }
   [[nodiscard]] SurfaceDeviation deviation() const override { return deviation_; }
   [[nodiscard]] double band() const override { return band_; }
 
@@ -124,13 +127,23 @@ class SmoothCutSurface final : public CutSurface {
   [[nodiscard]] std::int64_t facet_count() const;
 
  private:
+  /// What does not depend on the facets.
+  struct Bent {
+    std::vector<float> bends;  ///< Of each triangle, the largest second derivative, 1/mm.
+    SmoothBed bed;
+  };
+
+  static std::shared_ptr<const Bent> bent(const OpticalSurface& surface, double radius,
+                                          const Executor& executor);
+  void split(const SmoothCutOptions& options, const Executor& executor);
+
   std::shared_ptr<const OpticalSurface> surface_;
   FacetGrid grid_;
   double radius_;
+  std::shared_ptr<const Bent> bent_;
   std::vector<std::uint8_t> splits_;  ///< n of each triangle.
   SurfaceDeviation deviation_;
   double band_ = 0.0;
-  std::optional<SmoothBed> bed_;
 };
 
 }  // namespace lensforge

@@ -16,7 +16,7 @@ namespace {
 class ChainPictures {
  public:
   ChainPictures(const LeakageChain& chain, const FieldRenderSetup& setup, const Executor& executor,
-                const RunControl& control) {
+                const RunControl& control, const TileObserver& observe) {
     std::vector<const SurfaceField*> fields;
     std::vector<const NamedSurface*> apart;
     const auto take = [&](const NamedSurface& surface) {
@@ -28,7 +28,7 @@ class ChainPictures {
     for (const NamedSurface& step : chain.steps) take(step);
     take(chain.designed);
     for (const NamedSurface& other : chain.others) take(other);
-    std::vector<FluxPicture> rendered = render_fields(fields, setup, executor, control);
+    std::vector<FluxPicture> rendered = render_fields(fields, setup, executor, control, observe);
     for (std::size_t f = 0; f < fields.size(); ++f) pictures_[fields[f]] = std::move(rendered[f]);
     for (const NamedSurface* surface : apart) {
       FieldRenderSetup own = setup;
@@ -93,12 +93,13 @@ std::vector<double> surplus(const FluxPicture& part, const FluxPicture& designed
 
 LeakageResult measure_leakage(const LeakageChain& chain, const Image& target,
                               const FieldRenderSetup& setup, const LeakageOptions& options,
-                              const Executor& executor, const RunControl& control) {
+                              const Executor& executor, const RunControl& control,
+                              const TileObserver& observe) {
   validate(options);
   LF_CHECK(!chain.steps.empty(), chain.designed.name);
   LF_CHECK(target.columns() == setup.optics.pixels.x() && target.rows() == setup.optics.pixels.y(),
            std::to_string(target.columns()) + "x" + std::to_string(target.rows()));
-  const ChainPictures pictures(chain, setup, executor, control);
+  const ChainPictures pictures(chain, setup, executor, control, observe);
   LeakageResult result;
   result.designed = {chain.designed.name, pictures.of(chain.designed), {}};
   const PictureJudge judge(target, result.designed.picture, options);

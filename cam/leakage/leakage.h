@@ -87,7 +87,8 @@ struct LeakageResult {
 /// @throw InputError if dark_below and bright_from break their rules; Interrupted.
 LeakageResult measure_leakage(const LeakageChain& chain, const Image& target,
                               const FieldRenderSetup& setup, const LeakageOptions& options,
-                              const Executor& executor, const RunControl& control);
+                              const Executor& executor, const RunControl& control,
+                              const TileObserver& observe = {});
 
 /// 1 where `part` has more flux than `designed`, 0 elsewhere. @pre equal sizes.
 std::vector<double> pixels_with_surplus(const FluxPicture& part, const FluxPicture& designed);

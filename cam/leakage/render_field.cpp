@@ -48,7 +48,8 @@ void add_colors(SurfaceTile& tile, const FieldRenderSetup& setup,
 
 std::vector<FluxPicture> render_parts(std::span<const SurfaceField* const> fields,
                                       const FieldRenderSetup& setup, const CellRange& cells,
-                                      const Executor& executor, const RunControl& control) {
+                                      const Executor& executor, const RunControl& control,
+                                      const TileObserver& observe = {}) {
   const Eigen::Vector2i pixels = setup.optics.pixels;
   const SourceKernel kernel = setup.blur();
   const OpticalSetup optics = setup.optics_in_parts(kernel);
@@ -64,6 +65,7 @@ std::vector<FluxPicture> render_parts(std::span<const SurfaceField* const> field
     for (std::size_t f = 0; f < fields.size(); ++f) {
       if (control.stop_requested()) throw Interrupted();
       tile.load(*fields[f], tiles[t], executor);
+      if (observe) observe(*fields[f], tile.patch());
       add_colors(tile, setup, colors, executor, images[f]);
     }
     control.report({"render surfaces", static_cast<double>(t + 1),
@@ -81,8 +83,8 @@ std::vector<FluxPicture> render_parts(std::span<const SurfaceField* const> field
 
 std::vector<FluxPicture> render_fields(std::span<const SurfaceField* const> fields,
                                        const FieldRenderSetup& setup, const Executor& executor,
-                                       const RunControl& control) {
-  return render_parts(fields, setup, all_cells(setup.grid), executor, control);
+                                       const RunControl& control, const TileObserver& observe) {
+  return render_parts(fields, setup, all_cells(setup.grid), executor, control, observe);
 }
 
 FluxPicture render_field(const SurfaceField& field, const FieldRenderSetup& setup,

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -59,12 +60,15 @@ struct FieldRenderSetup {
 FluxPicture render_field(const SurfaceField& field, const FieldRenderSetup& setup,
                          const Executor& executor, const RunControl& control);
 
+/// Told of every tile that a surface was sampled in, with a node more around it where there is one.
+using TileObserver = std::function<void(const SurfaceField&, const SurfacePatch&)>;
+
 /// Renders several surfaces, tile by tile each tile of all of them in order, so that surfaces which
 /// are made from one another can share samples (HeldField). One picture per surface, with the bits
 /// that it has alone.
 std::vector<FluxPicture> render_fields(std::span<const SurfaceField* const> fields,
                                        const FieldRenderSetup& setup, const Executor& executor,
-                                       const RunControl& control);
+                                       const RunControl& control, const TileObserver& observe = {});
 
 /// What a part of the lens projects, as shares of the whole lens's flux.
 FluxPicture render_cells(const SurfaceField& field, const FieldRenderSetup& setup,

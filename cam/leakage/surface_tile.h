@@ -40,6 +40,8 @@ class SurfaceTile {
   void relight(const OpticalSetup& setup, double whole, const Executor& executor);
 
   [[nodiscard]] const CellRange& range() const { return range_; }
+  /// What was sampled.
+  [[nodiscard]] const SurfacePatch& patch() const { return patch_; }
   [[nodiscard]] std::int64_t cells() const { return range_.columns * range_.rows; }
 
   /// Height at node (i, j) counted from the tile's least corner, mm.

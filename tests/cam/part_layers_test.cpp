@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "cam/analytic_fields.h"
+#include "cam/milled/lens_grid.h"
 
 namespace lensforge {
 namespace {
@@ -28,8 +29,17 @@ TEST(PartLayers, EveryNodeHasTheSurfacesHeightAndSlopesTheUppermostFirst) {
     return testing::SurfacePoint{5.0 + std::sin(p.x()) + 0.1 * p.y(), {std::cos(p.x()), 0.1}, 0};
   });
   const testing::AnalyticField plane(testing::plane({0.2, -0.3}));
-  const LayeredImage layers = surface_layers({{"a", &wave}, {"b", &plane}}, kSize, {0.04, 0.04},
-                                             Executor::cpu(2), RunControl());
+  PartLayers part({{"a", &wave}, {"b", &plane}}, kSize, {0.04, 0.04});
+  SurfacePatch tile;
+  const GridWindow sampled = sampled_grid(kSize, {0.04, 0.04});
+  EXPECT_LE(sampled.spacing.maxCoeff(), 0.04 * (1.0 + 1e-12));
+  for (const CellRange& cells : tiles_of(all_cells(sampled), 100)) {
+    for (const testing::AnalyticField* field : {&wave, &plane}) {
+      field->sample(window_of(sampled, cells, 1), Executor::cpu(2), tile);
+      part.take(*field, tile);
+    }
+  }
+  const LayeredImage& layers = part.layers();
   EXPECT_EQ(layers.names().size(), 6U);
   const PartGrid grid = part_grid(kSize, {0.04, 0.04}, kPartNodes);
   ASSERT_EQ(layers.columns(), grid.nodes.x());

@@ -13,6 +13,7 @@
 #include "cam/cam_meshes.h"
 #include "cam/finish_setup.h"
 #include "cam/milled/designed_field.h"
+#include "cam/part_layers.h"
 #include "cam/post_plans.h"
 #include "cam/prediction.h"
 #include "cam/report/leak_words.h"
@@ -127,7 +128,7 @@ TEST(TrialCut, OfAPartOfTheLensLeaksAsThatPartDoes) {
   const Predicted cut(grooved_lens(), options);
   const FieldRenderSetup setup{
       cut.site().lens.setup,
-      lens_grid({3.0, 2.0}, sample_spacings(options, cut.site().lens.setup))};
+      sampled_grid({3.0, 2.0}, sample_spacings(options, cut.site().lens.setup))};
   LeakPlace place = cut.prediction().places[0];
   const auto coarser = std::llround(setup.grid.spacing.x() / setup.grid.spacing.y());
   place.cells = {120 / coarser, 70, 60 / coarser, 40};
