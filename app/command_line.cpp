@@ -19,6 +19,7 @@
 #include "app/toml_config.h"
 #include "core/error.h"
 #include "core/text/version.h"
+#include "design/mpi/session.h"
 
 namespace lensforge::app {
 namespace {
@@ -81,6 +82,14 @@ std::string completions_for(const Arguments& shells) {
   return completion_script(shells.front(), commands);
 }
 
+/// @throw InputError where mpirun has started several processes for a command that does not share
+/// its work.
+void require_one_process(const std::string& command) {
+  if (command == "design" || rank_count() == 1) return;
+  throw InputError(command + ": runs in one process, and mpirun has started " +
+                   std::to_string(rank_count()) + "; only design shares its work out");
+}
+
 int dispatch(const Arguments& arguments) {
   if (arguments.empty()) throw InputError("no command given; lensforge --help lists them");
   const std::string& name = arguments.front();
@@ -90,7 +99,9 @@ int dispatch(const Arguments& arguments) {
     throw HelpText(completions_for({arguments.begin() + 1, arguments.end()}));
   }
   for (const Subcommand& command : kSubcommands) {
-    if (name == command.name) return command.run({arguments.begin() + 1, arguments.end()});
+    if (name != command.name) continue;
+    require_one_process(name);
+    return command.run({arguments.begin() + 1, arguments.end()});
   }
   throw InputError(name + ": no such command; lensforge --help lists them");
 }
@@ -141,7 +152,8 @@ int run_main(int argc, char** argv) noexcept {
   std::signal(SIGXFSZ, SIG_IGN);
   std::signal(SIGPIPE, SIG_IGN);
   try {
-    return run_command_line(Arguments(argv + std::min(argc, 1), argv + argc));
+    const Arguments arguments(argv + std::min(argc, 1), argv + argc);
+    return run_on_ranks([&arguments] { return run_command_line(arguments); });
   } catch (const std::bad_alloc&) {
     return report_error("not enough memory", kFailed, false);
   }

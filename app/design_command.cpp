@@ -32,6 +32,7 @@
 #include "design/design_estimate.h"
 #include "design/design_lens.h"
 #include "design/light_setup.h"
+#include "design/mpi/session.h"
 #include "design/schedule/design_task.h"
 #include "design/schedule/level_plan.h"
 
@@ -181,6 +182,14 @@ LoadedImage read_target(const DesignSettings& settings, const CommonOptions& com
   return loaded;
 }
 
+/// @throw InputError where mpirun has started several processes for what one process does alone.
+void refuse_splines_on_ranks(const DesignOptions& design) {
+  if (design.model != SurfaceModel::kSpline || rank_count() == 1) return;
+  throw InputError(
+      "--model spline, --made-by: designed in one process; with mpirun use --model facet or "
+      "smooth");
+}
+
 int run(OptionSet& options, DesignSettings& settings) {
   const Console console(options.common().json, options.common().quiet);
   const EarlierDesign earlier = EarlierDesign::in(settings.out);
@@ -190,6 +199,7 @@ int run(OptionSet& options, DesignSettings& settings) {
   const InterruptWatch interrupt;
   DesignOptions& design = settings.design;
   settle(options, settings, loaded.image);
+  refuse_splines_on_ranks(design);
   if (settings.resume && earlier.lens && !earlier.checkpoint) {
     require_finished(settings.out, earlier,
                      fingerprint_text(design_identity(loaded.image, design)));
@@ -205,7 +215,8 @@ int run(OptionSet& options, DesignSettings& settings) {
   }
   const WorkEstimate expected =
       require_room_for_design(loaded.image.columns(), loaded.image.rows(), design,
-                              device.executor.concurrency(), settings.out);
+                              device.executor.concurrency() * rank_count(), settings.out,
+                              static_cast<double>(ranks_here()) / rank_count());
   design.resume = settings.resume && earlier.checkpoint;
   if (expected.seconds > kWorthTelling) console.note("takes " + estimate_words(expected));
   const auto begin = [&] {

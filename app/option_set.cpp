@@ -14,6 +14,7 @@
 #include "core/text/number_text.h"
 #include "core/text/units.h"
 #include "core/text/version.h"
+#include "design/mpi/session.h"
 
 namespace lensforge::app {
 namespace {
@@ -317,9 +318,18 @@ std::string OptionSet::manual() const {
   return text;
 }
 
-Executor OptionSet::executor() const { return Executor::cpu(common_.threads); }
+Executor OptionSet::executor() const {
+  const bool shared = common_.threads == 0 && rank_count() > 1;  // As many processes as cores.
+  return Executor::cpu(shared ? 1 : common_.threads);
+}
 
 ChosenDevice OptionSet::device_executor() const {
+  if (rank_count() > 1) {
+    if (common_.device == "cuda") {
+      throw InputError("--device cuda: the processes that mpirun starts compute on the processor");
+    }
+    return {executor().with_device(Device::kRanks), std::to_string(rank_count()) + " processes"};
+  }
   if (common_.device == "cpu") return {executor(), "cpu"};
   const Gpu gpu = find_gpu();
   if (!gpu.usable) return {executor(), "cpu"};

@@ -27,6 +27,8 @@ constexpr double kTransportMemory = 2000.0;
 constexpr double kMeshMemory = 1000.0;
 constexpr double kSplineMemory = 500.0;
 constexpr double kTriangleDisk = 120.0;
+/// What rank 0 of several machines has of the whole mesh (docs/scale.md).
+constexpr double kWholeMemory = 200.0;
 
 /// Bytes for a pixel of the working picture: PNG, EXR and double copies.
 constexpr double kPixelMemory = 100.0;
@@ -61,7 +63,8 @@ double transport_sites(double triangles, const DesignOptions& options) {
 
 }  // namespace
 
-WorkEstimate estimate_design(int columns, int rows, const DesignOptions& options, int threads) {
+WorkEstimate estimate_design(int columns, int rows, const DesignOptions& options, int threads,
+                             double share) {
   WorkEstimate estimate;
   double processor = 0.0;
   for (const Level& level : plan_levels(working_size(columns, rows, options.pixels), options)) {
@@ -70,13 +73,15 @@ WorkEstimate estimate_design(int columns, int rows, const DesignOptions& options
     const double pixels = level.pixels.cast<double>().prod();
     const double iterations = static_cast<double>(level.rounds) * level.iterations;
     double memory = kSplineMemory * triangles;
+    const double whole = share < 1.0 ? kWholeMemory : 0.0;
     if (options.rendering_guided) {
       processor += triangles * iteration_seconds(level, options) * iterations;
     }
     if (!level.spline) {
       const double sites = transport_sites(triangles, options);
       processor += kTransportSeconds * sites * options.transport_rounds;
-      memory = std::max(kTransportMemory * std::min(sites, triangles), kMeshMemory * triangles);
+      memory = std::max(kTransportMemory * std::min(sites, triangles),
+                        (share * kMeshMemory + whole) * triangles);
     }
     estimate.memory_bytes = kBaseMemory + memory + kPixelMemory * pixels;
     estimate.disk_bytes = kTriangleDisk * triangles + kPixelDisk * pixels;
@@ -86,11 +91,12 @@ WorkEstimate estimate_design(int columns, int rows, const DesignOptions& options
 }
 
 WorkEstimate require_room_for_design(int columns, int rows, const DesignOptions& options,
-                                     int threads, const std::filesystem::path& folder) {
+                                     int threads, const std::filesystem::path& folder,
+                                     double share) {
   const auto work = [&](double pixels) {
     DesignOptions sized = options;
     sized.pixels = std::max(kMinPixels, static_cast<int>(pixels));
-    return estimate_design(columns, rows, sized, threads);
+    return estimate_design(columns, rows, sized, threads, share);
   };
   return require_room_for(work, {"--pixels", 1.0 * options.pixels, kMinPixels}, folder);
 }

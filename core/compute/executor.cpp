@@ -15,13 +15,6 @@
 
 namespace lensforge {
 
-namespace {
-
-/// Entries that one task of a scalar product handles.
-constexpr std::int64_t kVectorBlock = 16384;
-
-}  // namespace
-
 void KernelProfile::add(const char* kernel, double seconds) {
   const std::scoped_lock lock(mutex_);
   Entry& entry = entries_[kernel];
@@ -100,10 +93,10 @@ double dot(const Executor& executor, std::span<const double> a, std::span<const 
   using Vector = Eigen::Map<const Eigen::VectorXd>;
   const Vector left(a.data(), static_cast<Eigen::Index>(a.size()));
   const Vector right(b.data(), static_cast<Eigen::Index>(b.size()));
-  const std::int64_t blocks = (left.size() + kVectorBlock - 1) / kVectorBlock;
+  const std::int64_t blocks = (left.size() + kDotBlock - 1) / kDotBlock;
   const auto block = [&](std::int64_t i) {
-    const Eigen::Index begin = i * kVectorBlock;
-    const Eigen::Index length = std::min<Eigen::Index>(kVectorBlock, left.size() - begin);
+    const Eigen::Index begin = i * kDotBlock;
+    const Eigen::Index length = std::min<Eigen::Index>(kDotBlock, left.size() - begin);
     return std::array<double, 1>{left.segment(begin, length).dot(right.segment(begin, length))};
   };
   return parallel_sum<1>(executor, "dot", blocks, block, 1)[0];

@@ -32,8 +32,8 @@ class KernelProfile {
   std::map<std::string, Entry> entries_;
 };
 
-/// The processor that renders and optimises.
-enum class Device { kCpu, kCuda };
+/// What renders and optimises: this processor, a GPU, or all processes that mpirun has started.
+enum class Device { kCpu, kCuda, kRanks };
 
 /// A sum that is read later, so that an executor with its own memory need not be waited for.
 template <std::size_t N>
@@ -174,6 +174,9 @@ void scan_rows(const Executor& executor, const char* kernel, std::int64_t rows, 
   };
   parallel_for(executor, kernel, rows, scan_row, kRowGrain);
 }
+
+/// Entries that dot() multiplies as one block; its blocks are added in order.
+inline constexpr std::int64_t kDotBlock = 16384;
 
 /// Scalar product, in fixed order.
 double dot(const Executor& executor, std::span<const double> a, std::span<const double> b);

@@ -24,6 +24,14 @@ struct ColoredLight {
   typename Exec::template Buffer<double> face_flux;      ///< F; likewise.
 };
 
+/// What the whole surface takes of the light, of which an executor holds all faces but for that of
+/// design/mpi/, mm². @param cut  by the setup's outline; null without one.
+template <class Exec>
+double intake_of(const Exec& /*executor*/, const SurfaceMesh& mesh, const MeshCut* cut,
+                 const LightPath& light) {
+  return cut != nullptr ? intake_inside(mesh, *cut, light) : intake_of(mesh, light);
+}
+
 namespace objective_detail {
 
 /// Colours in which a goal is looked at: all of a picture, that of the setup's index of a
@@ -34,13 +42,12 @@ inline std::vector<LightColor> colors_of(OpticalSetup setup, const DesignGoal& g
 }
 
 /// @param cut  by the setup's outline; null without one.
-inline LightPath light_of(const LightColor& color, const SurfaceMesh& mesh, const MeshCut* cut) {
-  if (color.share == 1.0) {
-    return cut != nullptr ? light_inside(mesh, *cut, color.setup) : light_on(mesh, color.setup);
-  }
-  const LightPath light(color.setup);
-  const double intake = cut != nullptr ? intake_inside(mesh, *cut, light) : intake_of(mesh, light);
-  return light.sharing(intake / color.share);
+template <class Exec>
+LightPath light_of(const Exec& executor, const LightColor& color, const SurfaceMesh& mesh,
+                   const MeshCut* cut) {
+  LightPath light(color.setup);
+  if (color.share == 1.0 && light.intake_is_plan_area()) return light;
+  return light.sharing(intake_of(executor, mesh, cut, light) / color.share);
 }
 
 /// @param front  for light_for().
@@ -51,7 +58,8 @@ std::vector<ColoredLight<Exec>> lights_of(const SurfaceMesh& mesh, const Optical
   std::vector<ColoredLight<Exec>> lights;
   for (const LightColor& color : colors_of(setup, goal)) {
     // An outline's is found with its cut.
-    const LightPath path = setup.outline ? LightPath(color.setup) : light_of(color, mesh, nullptr);
+    const LightPath path =
+        setup.outline ? LightPath(color.setup) : light_of(executor, color, mesh, nullptr);
     lights.push_back({light_for(executor, path, front), color.share, {}, {}});
     if (!path.varies()) continue;
     const auto faces = static_cast<std::size_t>(mesh.triangle_count());

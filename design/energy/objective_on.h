@@ -285,8 +285,8 @@ void DesignObjectiveOn<Exec>::take_outline(const double* vertices) {
   const MeshCut cut = cut_mesh(sheet_, *setup_.outline, Executor::serial());
   const std::vector<LightColor> colors = light_colors(setup_);
   for (std::size_t k = 0; k < colors.size(); ++k) {
-    lights_[k].path =
-        light_for(executor_, objective_detail::light_of(colors[k], sheet_, &cut), front_);
+    lights_[k].path = light_for(
+        executor_, objective_detail::light_of(executor_, colors[k], sheet_, &cut), front_);
   }
   aperture_ = ApertureOn<Exec>(cut, executor_);
   movable_ = unheld_;
@@ -336,7 +336,7 @@ void DesignObjectiveOn<Exec>::find_unlit(const std::vector<ObjectiveView>& views
   download(executor_, flux, std::span<double>(light));
   for (double& value : light) value *= target_total_;
   const LitPicture picture{plane().columns(), plane().rows(), light, wanted_light_};
-  const std::vector<std::int32_t> led = lead_to_unlit_pixels(picture, centroids);
+  const std::vector<std::int32_t> led = lead_to_unlit_pixels(executor_, picture, centroids);
   const auto is_led = [](std::int32_t pixel) { return pixel != kNoPixel; };
   if (std::any_of(led.begin(), led.end(), is_led)) {
     led_ = buffer_of(executor_, std::span<const std::int32_t>(led));

@@ -28,4 +28,11 @@ struct LitPicture {
 std::vector<std::int32_t> lead_to_unlit_pixels(const LitPicture& picture,
                                                const Eigen::Matrix2Xd& centroids);
 
+/// The same of the faces that an executor holds: all of them, but for that of design/mpi/.
+template <class Exec>
+std::vector<std::int32_t> lead_to_unlit_pixels(const Exec& /*executor*/, const LitPicture& picture,
+                                               const Eigen::Matrix2Xd& centroids) {
+  return lead_to_unlit_pixels(picture, centroids);
+}
+
 }  // namespace lensforge

@@ -12,6 +12,18 @@
 
 namespace lensforge {
 
+/// Adds what other processes have deposited to a picture of row differences, the first of the
+/// workers' in `units`. Executors of one process have nothing to add; design/mpi/ has the other
+/// one.
+template <class Exec>
+void join_pictures(const Exec& /*executor*/, std::span<std::int64_t> /*units*/,
+                   std::size_t /*per_picture*/) {}
+
+/// Gets the derivatives that other processes have found, of which this one has some rows; nothing
+/// in one process.
+template <class Exec>
+void collect_rows(const Exec& /*executor*/, std::span<double> /*pixels*/) {}
+
 /// Adds up image triangles into a picture of flux, bit-identically for any number of threads and
 /// any order of triangles. Keeps its buffers, in the memory of the executor, between pictures.
 template <class Exec>
@@ -71,6 +83,7 @@ class FluxImageOn {
 
   /// The flux of every pixel of all that was added, as render() returns it.
   std::span<const double> resolve(const Exec& executor) {
+    join_pictures(executor, std::span(units_.data(), units_.size()), units_per_picture());
     scan_rows(executor, "flux resolve", rows_, columns_,
               ResolveFlux{units_.data(), flux_.data(), columns_, stride(), executor.concurrency()});
     return {flux_.data(), flux_.size()};
@@ -110,6 +123,7 @@ class FluxCotangentImageOn {
   [[nodiscard]] std::span<double> pixels() { return {pixel_.data(), pixel_.size()}; }
   /// Sums the rows from the right.
   void prepare(const Exec& executor) {
+    collect_rows(executor, pixels());
     scan_rows(executor, "flux cotangent", rows_, columns_,
               SumFromRight{pixel_.data(), suffix_.data(), columns_});
   }

@@ -73,4 +73,33 @@ double CosineTransform::eigenvalue(int k, int n, double spacing) {
   return (2.0 - 2.0 * std::cos(std::numbers::pi * k / (n - 1))) / (spacing * spacing);
 }
 
+struct CosineRows::Plan {
+  Plan(int length, int rows) {
+    if (rows == 0) return;
+    const std::scoped_lock lock(planner_mutex());
+    const fftw_r2r_kind kind = FFTW_REDFT00;
+    const auto count = static_cast<std::size_t>(length) * static_cast<std::size_t>(rows);
+    double* const any = fftw_alloc_real(count);
+    plan = fftw_plan_many_r2r(1, &length, rows, any, nullptr, 1, length, any, nullptr, 1, length,
+                              &kind, FFTW_ESTIMATE | FFTW_UNALIGNED);
+    fftw_free(any);
+  }
+  ~Plan() {
+    const std::scoped_lock lock(planner_mutex());
+    fftw_destroy_plan(plan);
+  }
+  Plan(const Plan&) = delete;
+  Plan& operator=(const Plan&) = delete;
+
+  fftw_plan plan = nullptr;
+};
+
+CosineRows::CosineRows(int length, int rows) : plan_(std::make_unique<Plan>(length, rows)) {}
+
+CosineRows::~CosineRows() = default;
+
+void CosineRows::run(double* plane) const {
+  if (plan_->plan != nullptr) fftw_execute_r2r(plan_->plan, plane, plane);
+}
+
 }  // namespace lensforge

@@ -39,4 +39,22 @@ class CosineTransform {
   int rows_;
 };
 
+/// The same transform along rows only, each for itself, in place, of planes of one size. Rows, then
+/// columns make the transform of a plane.
+class CosineRows {
+ public:
+  /// @pre length ≥ 2, rows ≥ 0.
+  CosineRows(int length, int rows);
+  ~CosineRows();
+  CosineRows(const CosineRows&) = delete;
+  CosineRows& operator=(const CosineRows&) = delete;
+
+  /// Transforms rows · length values, row by row. May run for several planes at the same time.
+  void run(double* plane) const;
+
+ private:
+  struct Plan;
+  std::unique_ptr<Plan> plan_;
+};
+
 }  // namespace lensforge

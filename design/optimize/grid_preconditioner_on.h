@@ -29,8 +29,11 @@ struct PreconditionerView {
   GridSymbol symbols[3];  ///< Of x, y and z.
   double exponent;        ///< The preconditioner is taken to this power.
   double* planes[3];
+  std::int64_t first_row = 0;  ///< Of what the arrays hold, where that is a part of the grid.
 
-  [[nodiscard]] LF_HD int row(std::int64_t v) const { return static_cast<int>(v) / columns; }
+  [[nodiscard]] LF_HD int row(std::int64_t v) const {
+    return static_cast<int>(first_row) + static_cast<int>(v) / columns;
+  }
   [[nodiscard]] LF_HD int column(std::int64_t v) const { return static_cast<int>(v) % columns; }
 
   /// √ of the end weights ½, 1, …, 1, ½ in which the cosine transform is orthogonal.

@@ -12,6 +12,7 @@
 #include "core/optics/light_path.h"
 #include "core/value_slope.h"
 #include "design/energy/spline_objective.h"
+#include "design/mpi/rank_stage.h"
 #include "design/optics/image_triangle.h"
 #include "design/optimize/levelling.h"
 #include "design/schedule/guided_stage_on.h"
@@ -87,6 +88,10 @@ std::unique_ptr<GuidedStage> make_stage(const SurfaceMesh& mesh, const OpticalSe
   if (options.model == SurfaceModel::kSpline) {
     return std::make_unique<GuidedStageOn<Executor, SplineObjectiveOn<Executor>>>(
         mesh, setup, aspect, goal, options, executor);
+  }
+  if (executor.device() == Device::kRanks) {
+    auto shared = make_stage_on_ranks(mesh, setup, aspect, goal, options, executor);
+    if (shared) return shared;
   }
 #if defined(LENSFORGE_CUDA)
   if (executor.device() == Device::kCuda) {

@@ -1,0 +1,284 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <stop_token>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "core/compute/executor.h"
+#include "core/optics/light_path.h"
+#include "core/surface/mesh_cut.h"
+#include "core/surface/surface_mesh.h"
+#include "design/energy/gradient_term.h"
+#include "design/energy/image_term.h"
+#include "design/energy/laplacian_term.h"
+#include "design/energy/objective_adjoint.h"
+#include "design/energy/objective_kernels.h"
+#include "design/energy/smooth_rays.h"
+#include "design/energy/smoothness_term.h"
+#include "design/energy/unlit_pixels.h"
+#include "design/flux/flux_kernels.h"
+#include "design/mpi/block_share.h"
+#include "design/mpi/ranks.h"
+#include "design/mpi/row_slabs.h"
+#include "design/optimize/vector_kernels.h"
+
+/// An executor of one rank of several. Kernels run on all that the rank holds, its halo too. Sums
+/// count what it owns, and are taken over all ranks in the order in which one process takes them:
+/// all ranks see the bits that it would, and take the decisions that it would.
+namespace lensforge {
+
+/// What the items of a sum are.
+enum class Counted {
+  kFaces,     ///< Of the rank's own mesh: those it owns count.
+  kVertices,  ///< Likewise.
+  kUnknowns,  ///< Entries of a vector over the vertices that the rank owns: all count.
+  kPixels     ///< Of the picture: its rows are shared out, or each rank counts all of them.
+};
+
+/// The picture, of which every rank has memory for all pixels. If its rows are shared out, a rank
+/// looks at its own, and at one more on each side for the differences between them.
+struct SharedPicture {
+  int columns = 0;
+  int rows = 0;  ///< 0: not shared out.
+};
+
+/// Sums are collective: all ranks have to ask for them in the same order.
+class RankExecutor : public Executor {
+ public:
+  /// @param threads  of this rank; the kernels themselves cannot be stopped.
+  /// @param picture  @pre at least as many rows as ranks, or none.
+  /// @param stop     heeded on rank 0: the next sum then throws Interrupted, on all ranks.
+  RankExecutor(const Executor& threads, const Ranks& ranks, const RowSlab& slab,
+               const SharedPicture& picture, std::stop_token stop)
+      : Executor(threads.with_stop({})),
+        ranks_(ranks),
+        slab_(slab),
+        picture_(picture),
+        stop_(std::move(stop)) {}
+
+  [[nodiscard]] const Ranks& ranks() const { return ranks_; }
+  [[nodiscard]] const RowSlab& slab() const { return slab_; }
+
+  /// The items that a rank adds to a sum, in the numbers of the whole, 0 … total − 1.
+  [[nodiscard]] ItemRange own_of(Counted items, int rank) const;
+  [[nodiscard]] ItemRange own(Counted items) const { return own_of(items, ranks_.rank()); }
+  [[nodiscard]] std::int64_t total(Counted items) const {
+    return own_of(items, ranks_.count() - 1).end;
+  }
+  /// The number in the whole of what is item 0 here.
+  [[nodiscard]] std::int64_t origin(Counted items) const;
+
+  [[nodiscard]] bool shares_pixels() const { return picture_.rows > 0; }
+  /// Rows of the picture. @pre shares_pixels().
+  [[nodiscard]] ItemRange own_rows() const { return rows_of(ranks_.rank()); }
+  [[nodiscard]] ItemRange rows_of(int rank) const {
+    return even_share(picture_.rows, ranks_.count(), rank);
+  }
+  [[nodiscard]] ItemRange seen_rows() const {
+    return {std::max<std::int64_t>(0, own_rows().begin - 1),
+            std::min<std::int64_t>(picture_.rows, own_rows().end + 1)};
+  }
+  [[nodiscard]] ItemRange pixels_of(const ItemRange& rows) const {
+    return {rows.begin * picture_.columns, rows.end * picture_.columns};
+  }
+
+  /// All items of the block that ends on this rank after it has begun on others, `per_item` numbers
+  /// each; empty if there is none. @param share  of all items in blocks. Collective.
+  [[nodiscard]] std::vector<double> joined_block(Counted items, std::int64_t block,
+                                                 const BlockShare& share,
+                                                 std::span<const double> head,
+                                                 std::span<const double> tail,
+                                                 std::size_t per_item) const;
+
+  /// The sum over all ranks' blocks, one after the other. @param blocks  of this rank, sum.size()
+  /// numbers each. Collective. @throw Interrupted on every rank if rank 0 is asked to stop.
+  void add_in_order(std::span<const double> blocks, std::span<double> sum) const;
+
+ private:
+  Ranks ranks_;
+  RowSlab slab_;
+  SharedPicture picture_;
+  std::stop_token stop_;
+};
+
+/// What the functor of a sum counts: a new one has to be named here.
+template <class Functor>
+struct CountedBy;
+template <Counted items>
+struct Counts {
+  static constexpr Counted kItems = items;
+};
+template <>
+struct CountedBy<MeasureFace> : Counts<Counted::kFaces> {};
+template <>
+struct CountedBy<ReweightEdges> : Counts<Counted::kFaces> {};
+template <>
+struct CountedBy<BendFace> : Counts<Counted::kFaces> {};
+template <>
+struct CountedBy<SmoothImageAdjoint> : Counts<Counted::kFaces> {};
+template <class Rays>
+struct CountedBy<PullBackFace<Rays>> : Counts<Counted::kFaces> {};
+template <>
+struct CountedBy<LandVertex> : Counts<Counted::kVertices> {};
+template <>
+struct CountedBy<LaplacianDistance> : Counts<Counted::kVertices> {};
+template <>
+struct CountedBy<CurvatureEntry> : Counts<Counted::kUnknowns> {};
+template <class T>
+struct CountedBy<GroupProducts<T>> : Counts<Counted::kUnknowns> {};
+template <>
+struct CountedBy<ComparePixel> : Counts<Counted::kPixels> {};
+template <>
+struct CountedBy<ImageTermPixel> : Counts<Counted::kPixels> {};
+template <>
+struct CountedBy<GradientTermPixel> : Counts<Counted::kPixels> {};
+
+/// The items that a kernel is called for, in the numbers of the whole.
+template <class Functor>
+ItemRange called_items(const RankExecutor& executor, std::int64_t count) {
+  constexpr Counted kItems = CountedBy<Functor>::kItems;
+  if (std::is_same_v<Functor, ComparePixel>) return executor.pixels_of(executor.seen_rows());
+  if (kItems == Counted::kPixels) return executor.own(kItems);
+  return {executor.origin(kItems), executor.origin(kItems) + count};
+}
+
+/// A sum in blocks as parallel_sum() takes it.
+template <std::size_t N, class Functor>
+class RankSum {
+ public:
+  RankSum(const RankExecutor& executor, const char* kernel, std::int64_t count,
+          const Functor& functor)
+      : executor_(executor),
+        kernel_(kernel),
+        functor_(functor),
+        called_(called_items<Functor>(executor, count)),
+        share_(executor.own(kItems), kDefaultGrain, executor.total(kItems)) {}
+
+  [[nodiscard]] std::array<double, N> run() const {
+    call_for({called_.begin, executor_.own(kItems).begin});
+    call_for({executor_.own(kItems).end, called_.end});
+    const std::vector<double> open = executor_.joined_block(
+        kItems, kDefaultGrain, share_, values_of(share_.head), values_of(share_.tail), N);
+    std::vector<double> blocks(open.empty() ? 0 : N);
+    for (std::size_t i = 0; i < open.size(); ++i) blocks[i % N] += open[i];
+    add_whole_blocks(blocks);
+    std::array<double, N> sum{};
+    executor_.add_in_order(blocks, sum);
+    return sum;
+  }
+
+ private:
+  static constexpr Counted kItems = CountedBy<Functor>::kItems;
+
+  [[nodiscard]] std::array<double, N> value(std::int64_t item) const {
+    return functor_(item - executor_.origin(kItems));
+  }
+  /// For what it leaves behind.
+  void call_for(const ItemRange& items) const {
+    parallel_for(threads(), kernel_, items.count(),
+                 [&](std::int64_t i) { static_cast<void>(value(items.begin + i)); });
+  }
+  [[nodiscard]] std::vector<double> values_of(const ItemRange& items) const {
+    std::vector<double> values(static_cast<std::size_t>(items.count()) * N);
+    parallel_for(threads(), kernel_, items.count(), [&](std::int64_t i) {
+      const std::array<double, N> item = value(items.begin + i);
+      std::copy(item.begin(), item.end(), values.begin() + i * static_cast<std::int64_t>(N));
+    });
+    return values;
+  }
+  void add_whole_blocks(std::vector<double>& sums) const {
+    const std::size_t before = sums.size();
+    const std::int64_t blocks = (share_.whole.count() + kDefaultGrain - 1) / kDefaultGrain;
+    sums.resize(before + static_cast<std::size_t>(blocks) * N);
+    const auto sum_block = [&](std::int64_t b) {
+      std::array<double, N> sum{};
+      const std::int64_t begin = share_.whole.begin + b * kDefaultGrain;
+      const std::int64_t end = std::min(share_.whole.end, begin + kDefaultGrain);
+      for (std::int64_t i = begin; i < end; ++i) {
+        const std::array<double, N> item = value(i);
+        for (std::size_t k = 0; k < N; ++k) sum[k] += item[k];
+      }
+      std::copy(
+          sum.begin(), sum.end(),
+          sums.begin() + static_cast<std::ptrdiff_t>(before) + b * static_cast<std::int64_t>(N));
+    };
+    parallel_for(threads(), kernel_, blocks, sum_block, 1);
+  }
+  [[nodiscard]] const Executor& threads() const { return executor_; }
+
+  const RankExecutor& executor_;
+  const char* kernel_;
+  const Functor& functor_;
+  ItemRange called_;
+  BlockShare share_;
+};
+
+template <std::size_t N, class Functor>
+FinishedSum<N> pending_sum(const RankExecutor& executor, const char* kernel, std::int64_t count,
+                           const Functor& functor) {
+  if (CountedBy<Functor>::kItems == Counted::kPixels && !executor.shares_pixels()) {
+    return {parallel_sum<N>(executor, kernel, count, functor)};
+  }
+  return {RankSum<N, Functor>(executor, kernel, count, functor).run()};
+}
+
+/// The rank's own pixels.
+void parallel_for(const RankExecutor& executor, const char* kernel, std::int64_t count,
+                  const EncodeAdjoint& functor);
+
+/// The rows of the picture that the rank looks at.
+void scan_rows(const RankExecutor& executor, const char* kernel, std::int64_t rows, int columns,
+               const ResolveFlux& scan);
+
+/// Scalar product of vectors over the vertices that each rank owns.
+double dot(const RankExecutor& executor, std::span<const double> a, std::span<const double> b);
+
+/// The face that item i of a source of triangles belongs to.
+template <class Rays>
+std::int64_t face_of(const FaceLightSource<Rays>& source, std::int64_t i) {
+  const std::int64_t faces = source.o.mesh.faces;
+  return i < faces ? i : source.o.aperture.pieces[i - faces].face;
+}
+inline std::int64_t face_of(const StoredTriangles& /*source*/, std::int64_t i) { return i; }
+
+/// Deposits the light of the faces that the rank owns.
+template <class Source>
+void parallel_for_worker(const RankExecutor& executor, const char* kernel, std::int64_t count,
+                         const DepositFlux<Source>& deposit) {
+  const ItemRange owned = executor.slab().own_faces_here();
+  const auto deposit_own = [&](std::int64_t i, int worker) {
+    if (owned.contains(face_of(deposit.source, i))) deposit(i, worker);
+  };
+  const Executor& threads = executor;
+  parallel_for_worker(threads, kernel, count, deposit_own);
+}
+
+/// The light of all ranks' faces in the pixels that the rank looks at: in whole units, so that
+/// their order does not count.
+void join_pictures(const RankExecutor& executor, std::span<std::int64_t> units,
+                   std::size_t per_picture);
+
+/// Derivatives by the pixels, from the ranks that have found them.
+void collect_rows(const RankExecutor& executor, std::span<double> pixels);
+
+/// LightPath's intake of the whole mesh, added up face by face as in one process: the same bits.
+double intake_of(const RankExecutor& executor, const SurfaceMesh& mesh, const MeshCut* cut,
+                 const LightPath& light);
+
+/// Which faces of the rank's mesh are led where; rank 0 looks at all of them.
+std::vector<std::int32_t> lead_to_unlit_pixels(const RankExecutor& executor,
+                                               const LitPicture& picture,
+                                               const Eigen::Matrix2Xd& centroids);
+
+/// Fills the halo of 3 numbers per vertex that the rank holds with what its neighbours own.
+void fill_halo(const RankExecutor& executor, std::span<double> vertices);
+
+}  // namespace lensforge

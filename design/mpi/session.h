@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <functional>
+
+namespace lensforge {
+
+/// Processes that mpirun has started together; 1 without it, and in a build without MPI.
+int rank_count();
+
+/// Those of them that share this machine's memory.
+int ranks_here();
+
+/// Runs `first` in one process. Of several that mpirun has started, rank 0 runs it, and the others
+/// do their parts of its stages (Device::kRanks) until it returns; signals are rank 0's to heed.
+/// @return what `first` returns, on the other ranks 0.
+int run_on_ranks(const std::function<int()>& first);
+
+}  // namespace lensforge
