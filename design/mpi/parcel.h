@@ -3,7 +3,9 @@
 
 #include <cstddef>
 #include <cstring>
+#include <string>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "core/error.h"

@@ -201,6 +201,7 @@ std::unique_ptr<GuidedStage> make_stage_on_ranks(const SurfaceMesh& mesh, const 
                                                  double aspect, const DesignGoal& goal,
                                                  const ObjectiveOptions& options,
                                                  const Executor& executor) {
+  if (!MpiSession::lives()) return nullptr;
   const int ranks = Ranks::world().count();
   const bool serves = ranks > 1 && options.model != SurfaceModel::kSpline && has_row_order(mesh) &&
                       RowSlab::suffices(mesh.grid, ranks);

@@ -34,6 +34,11 @@ Traffic& traffic() {
   return sum;
 }
 
+bool& session_lives() {
+  static bool lives = false;
+  return lives;
+}
+
 /// Counts one call of MPI, from here to the end of the scope.
 class CountedCall {
  public:
@@ -78,9 +83,15 @@ MpiSession::MpiSession() {
   int provided = 0;
   MPI_Init_thread(nullptr, nullptr, MPI_THREAD_FUNNELED, &provided);
   if (provided < MPI_THREAD_FUNNELED) Ranks::world().abort("this MPI allows no threads");
+  session_lives() = true;
 }
 
-MpiSession::~MpiSession() { MPI_Finalize(); }
+MpiSession::~MpiSession() {
+  session_lives() = false;
+  MPI_Finalize();
+}
+
+bool MpiSession::lives() { return session_lives(); }
 
 Ranks Ranks::world() {
   Ranks ranks;

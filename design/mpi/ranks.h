@@ -90,6 +90,8 @@ class MpiSession {
   ~MpiSession();
   MpiSession(const MpiSession&) = delete;
   MpiSession& operator=(const MpiSession&) = delete;
+
+  [[nodiscard]] static bool lives();
 };
 
 /// What one rank has sent since it began, for measurements.

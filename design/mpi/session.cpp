@@ -27,23 +27,26 @@ int first_of(std::initializer_list<const char*> variables) {
   return 0;
 }
 
-}  // namespace
-
-int rank_count() {
-  // What starts processes tells them their number, each in its own way: Open MPI, then MPICH's and
-  // Slurm's PMI, then Slurm with PMIx.
+/// What starts processes tells them their number, each in its own way: Open MPI, then MPICH's and
+/// Slurm's PMI, then Slurm with PMIx.
+int started_together() {
   if (const int number = first_of({"OMPI_COMM_WORLD_SIZE", "PMI_SIZE"}); number > 0) return number;
   if (std::getenv("PMIX_RANK") == nullptr) return 1;
   return std::max(1, number_in("SLURM_STEP_NUM_TASKS"));
 }
 
+}  // namespace
+
+int rank_count() { return MpiSession::lives() ? Ranks::world().count() : 1; }
+
 int ranks_here() {
+  if (rank_count() == 1) return 1;
   const int here = first_of({"OMPI_COMM_WORLD_LOCAL_SIZE", "MPI_LOCALNRANKS"});
   return here > 0 ? here : rank_count();
 }
 
 int run_on_ranks(const std::function<int()>& first) {
-  if (rank_count() == 1) return first();
+  if (started_together() == 1) return first();
   const MpiSession session;
   if (!Ranks::world().is_first()) {
     for (const int signal : {SIGINT, SIGTERM, SIGHUP}) std::signal(signal, SIG_IGN);

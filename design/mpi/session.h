@@ -5,7 +5,8 @@
 
 namespace lensforge {
 
-/// Processes that mpirun has started together; 1 without it, and in a build without MPI.
+/// Processes that share the work: those that mpirun has started together, inside of
+/// run_on_ranks(); else 1.
 int rank_count();
 
 /// Those of them that share this machine's memory.
