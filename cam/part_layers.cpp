@@ -11,6 +11,9 @@
 namespace lensforge {
 namespace {
 
+/// Quotients that are whole but for this must not cost a cell.
+constexpr double kRounding = 1e-9;
+
 /// Nodes of one tile that are kept.
 void keep_nodes(const SurfacePatch& patch, const PartGrid& grid, const std::string& name,
                 LayeredImage& layers) {
@@ -45,11 +48,12 @@ PartGrid part_grid(const Eigen::Vector2d& lens_size, const Eigen::Vector2d& spac
   const double coarse = std::sqrt(lens_size.prod() / most);
   PartGrid grid;
   for (int axis = 0; axis < 2; ++axis) {
-    const double length = lens_size[axis];
-    const double spacing = spacings[axis];
-    const int cells = std::max(1, static_cast<int>(std::floor(length / std::max(coarse, spacing))));
-    grid.nodes[axis] = cells + 1;
-    grid.every[axis] = std::max(1, static_cast<int>(std::ceil(length / cells / spacing)));
+    // A spacing that is a part of the pitch should stay one: as many cells as it asks for, if their
+    // number allows that.
+    const double cells = std::ceil(lens_size[axis] / spacings[axis] - kRounding);
+    const double every = std::max(1.0, std::ceil(coarse / spacings[axis] - kRounding));
+    grid.every[axis] = static_cast<int>(every);
+    grid.nodes[axis] = static_cast<int>(std::max(1.0, std::ceil(cells / every))) + 1;
   }
   return grid;
 }
