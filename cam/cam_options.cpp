@@ -24,7 +24,7 @@ constexpr double kAlongPixel = 0.1;
 /// How much farther apart nodes of a surface with all of its scallops may be along the passes, and
 /// that as a share likewise: its light spreads over so many pixels that a picture of it takes
 /// longer than those of all polished surfaces. As milled a 256² portrait of 100 mm has an MAE of
-/// 0.0947 by both.
+/// 0.0949 so, and 0.0947 otherwise.
 constexpr double kAlongScallops = 3.0;
 constexpr double kScallopPixel = 0.25;
 

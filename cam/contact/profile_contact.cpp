@@ -93,7 +93,7 @@ Barycentric coordinates(const Eigen::Matrix3d& corners, const Eigen::Vector2d& a
   return {1.0 - b - c, b, c};
 }
 
-/// Coordinates above this count as outside of an edge: rounding.
+/// From this coordinate on the contact surely lies on the inner side of an edge: rounding.
 constexpr double kOnEdge = 1e-9;
 
 /// What a facet's tangent contact came to.

@@ -4,17 +4,6 @@
 #include <cmath>
 
 namespace lensforge {
-namespace {
-
-std::vector<double> eigenvalues(int n, double spacing) {
-  std::vector<double> values(static_cast<std::size_t>(n));
-  for (int k = 0; k < n; ++k) {
-    values[static_cast<std::size_t>(k)] = CosineTransform::eigenvalue(k, n, spacing);
-  }
-  return values;
-}
-
-}  // namespace
 
 RankPreconditioner::RankPreconditioner(const GridShape& grid, double aspect,
                                        std::span<const double> movable, const Ranks& ranks,
@@ -23,8 +12,8 @@ RankPreconditioner::RankPreconditioner(const GridShape& grid, double aspect,
       threads_(threads),
       movable_(movable.begin(), movable.end()),
       reach_(movable.size(), 1.0),
-      eigen_x_(eigenvalues(grid.columns, 1.0)),
-      eigen_y_(eigenvalues(grid.rows, aspect)),
+      eigen_x_(CosineTransform::eigenvalues(grid.columns, 1.0)),
+      eigen_y_(CosineTransform::eigenvalues(grid.rows, aspect)),
       transforms_(grid, ranks, threads) {}
 
 void RankPreconditioner::set_reach(std::span<const double> reach) {

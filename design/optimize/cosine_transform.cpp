@@ -73,6 +73,12 @@ double CosineTransform::eigenvalue(int k, int n, double spacing) {
   return (2.0 - 2.0 * std::cos(std::numbers::pi * k / (n - 1))) / (spacing * spacing);
 }
 
+std::vector<double> CosineTransform::eigenvalues(int n, double spacing) {
+  std::vector<double> values(static_cast<std::size_t>(n));
+  for (int k = 0; k < n; ++k) values[static_cast<std::size_t>(k)] = eigenvalue(k, n, spacing);
+  return values;
+}
+
 struct CosineRows::Plan {
   Plan(int length, int rows) {
     if (rows == 0) return;

@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <span>
+#include <vector>
 
 namespace lensforge {
 
@@ -31,6 +32,8 @@ class CosineTransform {
 
   /// Eigenvalue of the negative second difference along n nodes: (2 − 2 cos(πk/(n − 1)))/spacing².
   static double eigenvalue(int k, int n, double spacing);
+  /// All n of them.
+  static std::vector<double> eigenvalues(int n, double spacing);
 
  private:
   struct Plan;

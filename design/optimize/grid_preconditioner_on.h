@@ -144,12 +144,8 @@ class GridPreconditionerOn {
  private:
   using Vector = typename Exec::template Buffer<double>;
 
-  /// Eigenvalues of the second difference with mirrored ends.
   static Vector eigenvalues(int n, double spacing, const Exec& executor) {
-    std::vector<double> values(static_cast<std::size_t>(n));
-    for (int k = 0; k < n; ++k) {
-      values[static_cast<std::size_t>(k)] = CosineTransform::eigenvalue(k, n, spacing);
-    }
+    const std::vector<double> values = CosineTransform::eigenvalues(n, spacing);
     return buffer_of(executor, std::span<const double>(values));
   }
   /// Of a transform and its inverse.
