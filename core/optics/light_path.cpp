@@ -43,7 +43,8 @@ double front_intake(const LightSource& source, const Eigen::Vector2d& size) {
 LightPath::LightPath(const OpticalSetup& setup)
     : screen_(setup),
       source_(setup),
-      whole_(source_.varies() ? front_intake(source_, setup.lens_size) : aperture(setup)),
+      per_whole_(1.0 /
+                 (source_.varies() ? front_intake(source_, setup.lens_size) : aperture(setup))),
       eta_(setup.ior),
       kind_(setup.mode == LightMode::kReflect ? kMirror : (setup.fresnel ? kLosing : kLens)),
       middle_(0.5 * setup.lens_size) {}

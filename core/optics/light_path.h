@@ -58,7 +58,7 @@ class LightPath {
   /// The same light, its flux as shares of another whole than a flat surface takes, mm².
   [[nodiscard]] LightPath sharing(double whole) const {
     LightPath other = *this;
-    other.whole_ = whole;
+    other.per_whole_ = 1.0 / whole;
     return other;
   }
 
@@ -209,13 +209,13 @@ class LightPath {
   /// intake() as a share of the whole (Sun et al., Eq. 1): of what a flat surface of the lens's
   /// size takes, of parallel light inside of its outline, or of what sharing() was given.
   [[nodiscard]] LF_HD double flux(const Corners& t, const CornerRays& known = {}) const {
-    return intake(t, known) / whole_;
+    return intake(t, known) * per_whole_;
   }
   /// Adjoint of flux(): adds to the derivatives by the corners, or by area_normal(t) where flux
   /// depends on that alone.
   LF_HD void flux_adjoint(const Corners& t, double flux_bar, Corners& t_bar,
                           Eigen::Vector3d& area_normal_bar, const CornerRays& known = {}) const {
-    const double bar = flux_bar / whole_;
+    const double bar = flux_bar * per_whole_;
     if (!loses()) return source_.intake_adjoint(t, bar, t_bar, area_normal_bar, known);
     const Passage passage(*this, t);
     source_.intake_adjoint(t, bar * passage.share(), t_bar, area_normal_bar, known);
@@ -368,7 +368,7 @@ class LightPath {
 
   Screen screen_;
   LightSource source_;
-  double whole_;            ///< mm²
+  double per_whole_;        ///< 1/mm²
   double eta_;              ///< n_lens / n_air
   std::int64_t kind_;       ///< Wide, so that no bytes of a kernel's argument are left unset.
   Eigen::Vector2d middle_;  ///< Of the lens, mm.

@@ -47,7 +47,7 @@ LF_HD inline void area_normal_adjoint(const Corners& t, const Eigen::Vector3d& b
 /// Adjoint of N ↦ n = N/|N|.
 LF_HD inline Eigen::Vector3d normalize_adjoint(const Eigen::Vector3d& n, double length,
                                                const Eigen::Vector3d& n_bar) {
-  return (n_bar - n.dot(n_bar) * n) / length;
+  return (1.0 / length) * (n_bar - n.dot(n_bar) * n);
 }
 
 }  // namespace lensforge

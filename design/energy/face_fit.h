@@ -13,23 +13,21 @@ namespace lensforge {
 /// Tikhonov share that keeps the fit of a face with one neighbour (a mesh corner) determined.
 inline constexpr double kFitRegularization = 1e-9;
 
-/// Solution of a symmetric positive definite system, m = L D Lᵀ; only the matrix's lower triangle
-/// is read. Written out because Eigen's factorisations do not run on a GPU, and without roots and
-/// with three divisions because every face solves one in every evaluation.
+/// Solution of a symmetric positive definite system; only the matrix's lower triangle is read. By
+/// cofactors because every face solves one in every evaluation: one division, where those of a
+/// factorisation wait for each other.
 LF_HD inline Eigen::Vector3d solve_positive(const Eigen::Matrix3d& m,
                                             const Eigen::Vector3d& right) {
-  const double inverse0 = 1.0 / m(0, 0);
-  const double l10 = m(1, 0) * inverse0;
-  const double l20 = m(2, 0) * inverse0;
-  const double inverse1 = 1.0 / (m(1, 1) - l10 * m(1, 0));
-  const double d21 = m(2, 1) - l20 * m(1, 0);
-  const double l21 = d21 * inverse1;
-  const double d2 = m(2, 2) - l20 * m(2, 0) - l21 * d21;
-  const double y1 = right[1] - l10 * right[0];
-  const double y2 = right[2] - l20 * right[0] - l21 * y1;
-  const double x2 = y2 / d2;
-  const double x1 = y1 * inverse1 - l21 * x2;
-  return {right[0] * inverse0 - l10 * x1 - l20 * x2, x1, x2};
+  const double c00 = m(1, 1) * m(2, 2) - m(2, 1) * m(2, 1);
+  const double c10 = m(2, 0) * m(2, 1) - m(1, 0) * m(2, 2);
+  const double c20 = m(1, 0) * m(2, 1) - m(2, 0) * m(1, 1);
+  const double c11 = m(0, 0) * m(2, 2) - m(2, 0) * m(2, 0);
+  const double c21 = m(1, 0) * m(2, 0) - m(0, 0) * m(2, 1);
+  const double c22 = m(0, 0) * m(1, 1) - m(1, 0) * m(1, 0);
+  const double inverse = 1.0 / (m(0, 0) * c00 + m(1, 0) * c10 + m(2, 0) * c20);
+  return {inverse * (c00 * right[0] + c10 * right[1] + c20 * right[2]),
+          inverse * (c10 * right[0] + c11 * right[1] + c21 * right[2]),
+          inverse * (c20 * right[0] + c21 * right[1] + c22 * right[2])};
 }
 
 /// Normal equations of the map (a, b, c) that minimises H²A + Σ w |M d̄ − n̄|²/|d̄|².

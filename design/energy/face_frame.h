@@ -17,7 +17,8 @@ struct FaceFrame {
 };
 
 LF_HD inline FaceFrame face_frame(const Corners& t) {
-  return {area_normal(t).normalized(), (t.v0 + t.v1 + t.v2) / 3.0};
+  const Eigen::Vector3d normal = area_normal(t);
+  return {(1.0 / normal.norm()) * normal, (1.0 / 3.0) * (t.v0 + t.v1 + t.v2)};
 }
 
 /// Two unit vectors at right angles to each other and to a normal, e2 = n × e1 (Duff et al. 2017,

@@ -103,7 +103,7 @@ struct PullBackFace {
       const FaceFrame bend = bend_adjoint(o, i, area_bar);
       bar.n += bend.n;
       bar.area_normal += 0.5 * area_bar * frame.n;
-      const Eigen::Vector3d third = bend.c / 3.0;
+      const Eigen::Vector3d third = (1.0 / 3.0) * bend.c;
       bar.corners.v0 += third;
       bar.corners.v1 += third;
       bar.corners.v2 += third;

@@ -322,9 +322,9 @@ LF_HD inline ImageTriangle deposit_adjoint(const ImageTriangle& t, const FluxCot
   const double integral = small ? detail::gather_small(t, box, cotangent, bar)
                                 : detail::gather_large(t, cotangent, bar);
   // E = Φ G / A, so dE = (G/A) dΦ + (Φ/A)(dG − (G/A) dA).
-  const double area = 0.5 * doubled;
-  const double mean = integral / area;
-  const double density = t.flux / area;
+  const double inverse_area = 2.0 / doubled;
+  const double mean = integral * inverse_area;
+  const double density = t.flux * inverse_area;
   detail::doubled_area_adjoint(t, -0.5 * mean, bar);
   bar.p0 *= density;
   bar.p1 *= density;

@@ -120,7 +120,8 @@ LF_HD inline Quadrants quadrant_areas(const ImageTriangle& t, const Eigen::Vecto
 /// Parameter at which a coordinate that runs from `from` to `to` changes sign; 1 if it does not.
 LF_HD inline double crossing_parameter(double from, double to) {
   const bool crosses = (from < 0.0) != (to < 0.0);
-  return crosses ? from / (from - to) : 1.0;
+  const double share = from / (crosses ? from - to : 1.0);
+  return crosses ? share : 1.0;
 }
 
 /// ∫ g (1 − s) ds and ∫ g s ds along an edge, g constant in every quadrant.

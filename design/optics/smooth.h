@@ -19,7 +19,7 @@ struct VertexNormal {
 
   LF_HD explicit VertexNormal(const Eigen::Vector3d& area_normal_sum)
       : n(area_normal_sum), length(area_normal_sum.norm()) {
-    n /= length;
+    n *= 1.0 / length;
   }
 };
 
