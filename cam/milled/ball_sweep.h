@@ -29,7 +29,9 @@ inline double ball_below(const Eigen::Vector3d& centre, double radius, double x,
   const double dx = x - centre.x();
   const double dy = y - centre.y();
   const double room = radius * radius - (dx * dx + dy * dy);
-  return room >= 0.0 ? centre.z() - std::sqrt(room) : kUncut;
+  // The root is taken in any case: a branch around it is often mispredicted.
+  const double below = centre.z() - std::sqrt(std::max(room, 0.0));
+  return room >= 0.0 ? below : kUncut;
 }
 
 /// Slopes of a ball's lower side over q. @pre q is under the ball.

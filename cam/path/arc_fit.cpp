@@ -122,7 +122,8 @@ class RowFit {
   RowFit(const RowProfile& profile, const RowFitOptions& options)
       : options_(options), joints_(row_joints(profile, options.grid)), error_(profile) {}
 
-  FittedRow run() {
+  /// Finds the moves; what they are is asked afterwards.
+  void run() {
     const std::size_t last = joints_.written.size() - 1;
     std::size_t at = 0;
     std::size_t limit = last;
@@ -149,8 +150,33 @@ class RowFit {
       at = steps_.back().reach.joint;
       limit = last;
     }
-    return result();
   }
+
+  [[nodiscard]] RowWay way() const {
+    RowWay way{joints_.written.front(), {}};
+    way.moves.reserve(steps_.size());
+    for (const Step& step : steps_) way.moves.push_back(step.reach.move);
+    return way;
+  }
+
+  [[nodiscard]] RowWay unrounded_way() const {
+    RowWay way{joints_.exact.front(), {}};
+    way.moves.reserve(steps_.size());
+    RowFitOptions unrounded = options_;
+    unrounded.grid.resolution = kUnrounded;
+    for (const Step& step : steps_) {
+      const Reach& reach = step.reach;
+      std::optional<RowMove> move;
+      // An arc as flat as may be must stay one without its rounding.
+      if (reach.move.arc) {
+        move = arc_through(joints_.exact, step.from, reach.joint, unrounded, 2.0 * kLargestArc);
+      }
+      way.moves.push_back(move.value_or(RowMove{joints_.exact[reach.joint]}));
+    }
+    return way;
+  }
+
+  [[nodiscard]] PathCertificate certificate() const { return error_.certificate(); }
 
  private:
   struct Reach {
@@ -333,26 +359,6 @@ class RowFit {
     return good;
   }
 
-  [[nodiscard]] FittedRow result() const {
-    FittedRow row;
-    row.start = joints_.written.front();
-    row.unrounded.start = joints_.exact.front();
-    RowFitOptions unrounded = options_;
-    unrounded.grid.resolution = kUnrounded;
-    for (const Step& step : steps_) {
-      const Reach& reach = step.reach;
-      row.moves.push_back(reach.move);
-      std::optional<RowMove> move;
-      // An arc as flat as may be must stay one without its rounding.
-      if (reach.move.arc) {
-        move = arc_through(joints_.exact, step.from, reach.joint, unrounded, 2.0 * kLargestArc);
-      }
-      row.unrounded.moves.push_back(move.value_or(RowMove{joints_.exact[reach.joint]}));
-    }
-    row.certificate = error_.certificate();
-    return row;
-  }
-
   RowFitOptions options_;
   RowJoints joints_;
   RowError error_;
@@ -367,7 +373,15 @@ double joint_bow(const RowFitOptions& options) {
 }
 
 FittedRow fit_row(const RowProfile& profile, const RowFitOptions& options) {
-  return RowFit(profile, options).run();
+  RowFit fit(profile, options);
+  fit.run();
+  return {fit.way(), fit.unrounded_way(), fit.certificate()};
+}
+
+RowWay fit_way(const RowProfile& profile, const RowFitOptions& options) {
+  RowFit fit(profile, options);
+  fit.run();
+  return fit.way();
 }
 
 }  // namespace lensforge

@@ -45,6 +45,9 @@ struct FittedRow : RowWay {
 /// certificate says.
 FittedRow fit_row(const RowProfile& profile, const RowFitOptions& options);
 
+/// The way of fit_row() alone.
+RowWay fit_way(const RowProfile& profile, const RowFitOptions& options);
+
 /// How far straight moves between joints may be off.
 double joint_bow(const RowFitOptions& options);
 

@@ -248,7 +248,7 @@ RasterRow cut_row(const RowCurves& curves, const RasterPlan& plan, std::int64_t 
   const bool forward = plan.forward(row);
   RasterRow result{in_space(fitted, frame, forward), {}, {}, {}, 0};
   if (plan.options.traces) {
-    result.exact = in_space(fit_row(profile, exact_fit(fit)), frame, forward);
+    result.exact = in_space(fit_way(profile, exact_fit(fit)), frame, forward);
     result.unrounded = in_space(fitted.unrounded, frame, forward);
   }
   result.certificate = {frame.placed(certificate.gouge), frame.placed(certificate.excess),
