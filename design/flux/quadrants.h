@@ -117,7 +117,8 @@ LF_HD inline Quadrants quadrant_areas(const ImageTriangle& t, const Eigen::Vecto
   return areas;
 }
 
-/// Parameter at which a coordinate that runs from `from` to `to` changes sign; 1 if it does not.
+/// Parameter at which a coordinate that runs from `from` to `to` changes sign; 1 if it does not. It
+/// divides in any case, since a branch around a division stays one.
 LF_HD inline double crossing_parameter(double from, double to) {
   const bool crosses = (from < 0.0) != (to < 0.0);
   const double share = from / (crosses ? from - to : 1.0);
