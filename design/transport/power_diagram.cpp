@@ -2,12 +2,7 @@
 #include "design/transport/power_diagram.h"
 
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
-#include <CGAL/Regular_triangulation_2.h>
-#include <CGAL/Regular_triangulation_face_base_2.h>
-#include <CGAL/Regular_triangulation_vertex_base_2.h>
 #include <CGAL/Spatial_sort_traits_adapter_2.h>
-#include <CGAL/Triangulation_face_base_with_info_2.h>
-#include <CGAL/Triangulation_vertex_base_with_info_2.h>
 #include <CGAL/property_map.h>
 #include <CGAL/spatial_sort.h>
 
@@ -23,19 +18,6 @@
 namespace lensforge {
 
 namespace {
-
-using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
-using VertexBase =
-    CGAL::Triangulation_vertex_base_with_info_2<int, Kernel,
-                                                CGAL::Regular_triangulation_vertex_base_2<Kernel>>;
-using FaceBase =
-    CGAL::Triangulation_face_base_with_info_2<int, Kernel,
-                                              CGAL::Regular_triangulation_face_base_2<Kernel>>;
-using Structure = CGAL::Triangulation_data_structure_2<VertexBase, FaceBase>;
-using Regular = CGAL::Regular_triangulation_2<Kernel, Structure>;
-
-/// Insertions between two checks of the stop token; about 10 ms.
-constexpr std::size_t kStopInterval = 4096;
 
 Eigen::Vector2d left_of(const Eigen::Vector2d& v) { return {-v.y(), v.x()}; }
 
@@ -66,42 +48,10 @@ struct RadicalAxis {
   }
 };
 
-/// The triangulation as plain numbers: vertex −1 is the one at infinity.
-struct FlatFaces {
-  std::vector<std::array<int, 3>> vertices;
-  std::vector<std::array<int, 3>> neighbours;
-
-  [[nodiscard]] bool infinite(std::size_t f) const {
-    const auto& v = vertices[f];
-    return v[0] < 0 || v[1] < 0 || v[2] < 0;
-  }
-};
-
-FlatFaces flatten(Regular& regular) {
-  const auto& structure = regular.tds();
-  int count = 0;
-  for (auto f = structure.faces_begin(); f != structure.faces_end(); ++f) f->info() = count++;
-  FlatFaces flat;
-  flat.vertices.reserve(static_cast<std::size_t>(count));
-  flat.neighbours.reserve(static_cast<std::size_t>(count));
-  for (auto f = structure.faces_begin(); f != structure.faces_end(); ++f) {
-    const auto number = [&](int k) {
-      return regular.is_infinite(f->vertex(k)) ? -1 : f->vertex(k)->info();
-    };
-    flat.vertices.push_back({number(0), number(1), number(2)});
-    flat.neighbours.push_back(
-        {f->neighbor(0)->info(), f->neighbor(1)->info(), f->neighbor(2)->info()});
-  }
-  return flat;
-}
-
 }  // namespace
 
-struct PowerDiagram::Triangulation {
-  Regular regular;
-};
-
 std::vector<int> spatial_order(const Eigen::Matrix2Xd& sites) {
+  using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
   using Point = Kernel::Point_2;
   std::vector<Point> points;
   points.reserve(static_cast<std::size_t>(sites.cols()));
@@ -117,52 +67,93 @@ std::vector<int> spatial_order(const Eigen::Matrix2Xd& sites) {
 
 PowerDiagram::PowerDiagram(const Eigen::Matrix2Xd& sites, const Eigen::VectorXd& weights,
                            const std::vector<int>& order, const std::stop_token& stop)
-    : triangulation_(std::make_unique<Triangulation>()), sites_(sites), weights_(weights) {
-  LF_CHECK(sites.cols() >= 1 && weights.size() == sites.cols(), std::to_string(sites.cols()));
-  LF_CHECK(sites.allFinite() && weights.allFinite(), "sites and weights");
-  Regular& regular = triangulation_->regular;
-  Regular::Face_handle hint;
-  for (std::size_t k = 0; k < order.size(); ++k) {
-    if (k % kStopInterval == 0 && stop.stop_requested()) throw Interrupted();
-    const int i = order[k];
-    const Regular::Weighted_point point({sites(0, i), sites(1, i)}, weights[i]);
-    const Regular::Vertex_handle vertex = regular.insert(point, hint);
-    vertex->info() = i;
-    hint = vertex->face();
+    : PowerDiagram(std::make_shared<const Eigen::Matrix2Xd>(sites), weights, order, stop) {}
+
+PowerDiagram::PowerDiagram(std::shared_ptr<const Eigen::Matrix2Xd> sites, Eigen::VectorXd weights,
+                           const std::vector<int>& order, const std::stop_token& stop)
+    : sites_(std::move(sites)),
+      weights_(std::move(weights)),
+      triangulation_(*sites_, weights_, order, stop) {}
+
+std::optional<PowerDiagram> PowerDiagram::reweighted(const Eigen::VectorXd& weights,
+                                                     const std::vector<int>& order,
+                                                     const Executor& executor) const {
+  if (!is_planar() || !hidden().empty()) {
+    PowerDiagram rebuilt(sites_, weights, order, executor.stop_token());
+    if (!rebuilt.hidden().empty()) return std::nullopt;
+    return rebuilt;
   }
-  for (auto v = regular.hidden_vertices_begin(); v != regular.hidden_vertices_end(); ++v) {
-    hidden_.push_back(v->info());
-  }
-  std::sort(hidden_.begin(), hidden_.end());
+  PowerDiagram flipped = *this;
+  flipped.weights_ = weights;
+  if (!flipped.triangulation_.reweight(*sites_, weights, executor)) return std::nullopt;
+  return flipped;
 }
 
 int PowerDiagram::owner(const Eigen::Vector2d& point) const {
   Eigen::Index site = 0;
-  ((sites_.colwise() - point).colwise().squaredNorm().transpose() - weights_).minCoeff(&site);
+  ((sites_->colwise() - point).colwise().squaredNorm().transpose() - weights_).minCoeff(&site);
   return static_cast<int>(site);
 }
 
-bool PowerDiagram::is_planar() const { return triangulation_->regular.dimension() == 2; }
+std::vector<PowerDiagram::Side> PowerDiagram::sorted_sides() const {
+  const std::vector<TriangleFace>& faces = triangulation_.faces();
+  // Of the two faces at a side, one sees the lower number first.
+  const auto each_side = [&](const auto& visit) {
+    for (std::size_t f = 0; f < faces.size(); ++f) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        const int first = faces[f].first(k);
+        const int second = faces[f].second(k);
+        if (first >= 0 && first < second) {
+          visit(static_cast<std::size_t>(first),
+                Side{second, static_cast<int>(f), static_cast<int>(k)});
+        }
+      }
+    }
+  };
+  std::vector<std::size_t> begin(static_cast<std::size_t>(sites_->cols()) + 1, 0);
+  each_side([&](std::size_t first, const Side&) { ++begin[first + 1]; });
+  for (std::size_t i = 1; i < begin.size(); ++i) begin[i] += begin[i - 1];
+  std::vector<Side> sides(begin.back());
+  // Afterwards begin[i] is where those of i end.
+  each_side([&](std::size_t first, const Side& side) { sides[begin[first]++] = side; });
+  std::size_t from = 0;
+  for (const std::size_t to : begin) {
+    std::sort(sides.begin() + static_cast<std::ptrdiff_t>(from),
+              sides.begin() + static_cast<std::ptrdiff_t>(to),
+              [](const Side& a, const Side& b) { return a.second < b.second; });
+    from = to;
+  }
+  return sides;
+}
 
 std::vector<std::pair<int, int>> PowerDiagram::neighbours() const {
-  const Regular& regular = triangulation_->regular;
+  if (!is_planar()) return triangulation_.line();
   std::vector<std::pair<int, int>> pairs;
-  for (auto e = regular.finite_edges_begin(); e != regular.finite_edges_end(); ++e) {
-    pairs.emplace_back(e->first->vertex(Regular::ccw(e->second))->info(),
-                       e->first->vertex(Regular::cw(e->second))->info());
+  for (const Side& side : sorted_sides()) {
+    const TriangleFace& face = triangulation_.faces()[static_cast<std::size_t>(side.face)];
+    pairs.emplace_back(face.first(static_cast<std::size_t>(side.corner)), side.second);
   }
   return pairs;
 }
 
-PowerDiagram::~PowerDiagram() = default;
-PowerDiagram::PowerDiagram(PowerDiagram&&) noexcept = default;
-PowerDiagram& PowerDiagram::operator=(PowerDiagram&&) noexcept = default;
+/// Of sites on one line: whole radical axes.
+std::vector<DualEdge> PowerDiagram::parallel_edges(double reach) const {
+  std::vector<DualEdge> edges;
+  for (const auto& [a, b] : triangulation_.line()) {
+    const RadicalAxis axis(sites_->col(a), sites_->col(b), weights_[a] - weights_[b],
+                           sites_->col(0));
+    edges.push_back({a, b, axis.base - reach * axis.direction, axis.base + reach * axis.direction});
+  }
+  return edges;
+}
 
 namespace {
 
 /// Where the power distances to a face's three sites agree; not finite if they lie on one line.
+/// Seen from the lowest site, so that the bits do not depend on which corner comes first.
 Eigen::Vector2d radical_centre(const Eigen::Matrix2Xd& sites, const Eigen::VectorXd& weights,
-                               const std::array<int, 3>& v) {
+                               std::array<int, 3> v) {
+  std::rotate(v.begin(), std::min_element(v.begin(), v.end()), v.end());
   const Eigen::Vector2d origin = sites.col(v[0]);
   const Eigen::Vector2d b = sites.col(v[1]) - origin;
   const Eigen::Vector2d c = sites.col(v[2]) - origin;
@@ -172,61 +163,37 @@ Eigen::Vector2d radical_centre(const Eigen::Matrix2Xd& sites, const Eigen::Vecto
   return origin + Eigen::Vector2d(rb * c.y() - rc * b.y(), rc * b.x() - rb * c.x());
 }
 
-/// Edges of a triangulation whose sites lie on one line: whole radical axes.
-std::vector<DualEdge> parallel_edges(const Regular& regular, const Eigen::Matrix2Xd& sites,
-                                     const Eigen::VectorXd& weights, double reach) {
-  std::vector<DualEdge> edges;
-  for (auto e = regular.finite_edges_begin(); e != regular.finite_edges_end(); ++e) {
-    const int a = e->first->vertex(Regular::ccw(e->second))->info();
-    const int b = e->first->vertex(Regular::cw(e->second))->info();
-    const RadicalAxis axis(sites.col(a), sites.col(b), weights[a] - weights[b], sites.col(0));
-    edges.push_back({a, b, axis.base - reach * axis.direction, axis.base + reach * axis.direction});
-  }
-  return edges;
-}
-
 }  // namespace
 
 std::vector<DualEdge> PowerDiagram::dual_edges(double reach, const Executor& executor) const {
-  Regular& regular = triangulation_->regular;
-  if (regular.dimension() < 1) return {};
-  if (regular.dimension() == 1) return parallel_edges(regular, sites_, weights_, reach);
-  const FlatFaces flat = flatten(regular);
-  const auto count = static_cast<std::int64_t>(flat.vertices.size());
+  if (!is_planar()) return parallel_edges(reach);
+  const std::vector<TriangleFace>& faces = triangulation_.faces();
+  const auto count = static_cast<std::int64_t>(faces.size());
   Eigen::Matrix2Xd centres(2, count);
   parallel_for(executor, "power vertices", count, [&](std::int64_t f) {
-    const auto face = static_cast<std::size_t>(f);
-    if (!flat.infinite(face))
-      centres.col(f) = radical_centre(sites_, weights_, flat.vertices[face]);
+    const TriangleFace& face = faces[static_cast<std::size_t>(f)];
+    if (face.is_finite()) centres.col(f) = radical_centre(*sites_, weights_, face.vertex);
   });
-  std::vector<std::pair<int, int>> sides;  // face and the number of the vertex opposite to the edge
-  sides.reserve(flat.vertices.size() * 3 / 2);
-  for (std::size_t f = 0; f < flat.vertices.size(); ++f) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      const bool first = static_cast<int>(f) < flat.neighbours[f][k];
-      const bool finite = flat.vertices[f][(k + 1) % 3] >= 0 && flat.vertices[f][(k + 2) % 3] >= 0;
-      if (first && finite) sides.emplace_back(static_cast<int>(f), static_cast<int>(k));
-    }
-  }
+  const std::vector<Side> sides = sorted_sides();
   std::vector<DualEdge> edges(sides.size());
-  parallel_for(
-      executor, "power edges", static_cast<std::int64_t>(sides.size()), [&](std::int64_t e) {
-        const auto [face, k] = sides[static_cast<std::size_t>(e)];
-        const auto f = static_cast<std::size_t>(face);
-        const auto corner = static_cast<std::size_t>(k);
-        const int a = flat.vertices[f][(corner + 1) % 3];
-        const int b = flat.vertices[f][(corner + 2) % 3];
-        const auto g = static_cast<std::size_t>(flat.neighbours[f][corner]);
-        const RadicalAxis axis(sites_.col(a), sites_.col(b), weights_[a] - weights_[b],
-                               sites_.col(0));
-        const auto end = [&](std::size_t side, bool forward) -> Eigen::Vector2d {
-          if (flat.infinite(side)) {
-            return axis.base + (forward ? reach : -reach) * axis.direction;
-          }
-          return axis.bounded(centres.col(static_cast<Eigen::Index>(side)), reach, forward);
-        };
-        edges[static_cast<std::size_t>(e)] = {a, b, end(g, false), end(f, true)};
-      });
+  parallel_for(executor, "power edges", static_cast<std::int64_t>(sides.size()),
+               [&](std::int64_t e) {
+                 const Side& side = sides[static_cast<std::size_t>(e)];
+                 const TriangleFace& face = faces[static_cast<std::size_t>(side.face)];
+                 const auto k = static_cast<std::size_t>(side.corner);
+                 const int a = face.first(k);
+                 const int b = side.second;
+                 const RadicalAxis axis(sites_->col(a), sites_->col(b), weights_[a] - weights_[b],
+                                        sites_->col(0));
+                 const auto end = [&](int f, bool forward) -> Eigen::Vector2d {
+                   if (faces[static_cast<std::size_t>(f)].is_finite()) {
+                     return axis.bounded(centres.col(f), reach, forward);
+                   }
+                   return axis.base + (forward ? reach : -reach) * axis.direction;
+                 };
+                 edges[static_cast<std::size_t>(e)] = {a, b, end(face.neighbour[k], false),
+                                                       end(side.face, true)};
+               });
   return edges;
 }
 
@@ -240,14 +207,12 @@ PowerDiagram::Place place_on_segment(const Eigen::Matrix2Xd& sites, int a, int b
   return {{a, b, a}, {1.0 - share, share, 0.0}};
 }
 
-PowerDiagram::Place place_in_face(const Eigen::Matrix2Xd& sites, const Regular::Face_handle& face,
+PowerDiagram::Place place_in_face(const Eigen::Matrix2Xd& sites, const TriangleFace& face,
                                   const Eigen::Vector2d& point) {
   PowerDiagram::Place place;
+  place.sites = face.vertex;
   std::array<Eigen::Vector2d, 3> to;
-  for (std::size_t k = 0; k < 3; ++k) {
-    place.sites[k] = face->vertex(static_cast<int>(k))->info();
-    to[k] = sites.col(place.sites[k]) - point;
-  }
+  for (std::size_t k = 0; k < 3; ++k) to[k] = sites.col(place.sites[k]) - point;
   for (std::size_t k = 0; k < 3; ++k) {
     const Eigen::Vector2d& a = to[(k + 1) % 3];
     const Eigen::Vector2d& b = to[(k + 2) % 3];
@@ -258,46 +223,89 @@ PowerDiagram::Place place_in_face(const Eigen::Matrix2Xd& sites, const Regular::
   return place;
 }
 
+/// Walks through the faces of a triangulation.
+class FaceWalk {
+ public:
+  FaceWalk(const Eigen::Matrix2Xd& sites, const std::vector<TriangleFace>& faces)
+      : sites_(sites), faces_(faces) {
+    while (!face(at_).is_finite()) ++at_;
+  }
+
+  /// @return the face that holds the point, or one beyond a side of the hull that it lies behind.
+  /// Towards a point regular triangulations have no circle of faces, so it comes to an end.
+  int find(const Eigen::Vector2d& point) {
+    int next = at_;
+    while (next >= 0) {
+      at_ = next;
+      if (!face(at_).is_finite()) {
+        const int outside = at_;
+        at_ = face(outside).neighbour[corner_at_infinity(outside)];
+        return outside;
+      }
+      next = towards(point);
+    }
+    return at_;
+  }
+
+  /// Nearest place on the hull, from a face beyond it.
+  [[nodiscard]] PowerDiagram::Place on_hull(int outside, const Eigen::Vector2d& point) const {
+    PowerDiagram::Place best = on_side(outside, point);
+    for (const std::size_t turn : {1U, 2U}) {
+      int walker = outside;
+      for (;;) {
+        walker = face(walker).neighbour[(corner_at_infinity(walker) + turn) % 3];
+        const PowerDiagram::Place next = on_side(walker, point);
+        if (!(distance(next, point) < distance(best, point))) break;
+        best = next;
+      }
+    }
+    return best;
+  }
+
+  [[nodiscard]] const TriangleFace& face(int f) const {
+    return faces_[static_cast<std::size_t>(f)];
+  }
+
+ private:
+  /// The face behind a side of this one that the point lies behind; −1 if there is none.
+  [[nodiscard]] int towards(const Eigen::Vector2d& point) const {
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (side_of_line(sites_.col(face(at_).first(k)), sites_.col(face(at_).second(k)), point) < 0)
+        return face(at_).neighbour[k];
+    }
+    return -1;
+  }
+  [[nodiscard]] std::size_t corner_at_infinity(int f) const {
+    const std::array<int, 3>& v = face(f).vertex;
+    return static_cast<std::size_t>(std::min_element(v.begin(), v.end()) - v.begin());
+  }
+  [[nodiscard]] PowerDiagram::Place on_side(int outside, const Eigen::Vector2d& point) const {
+    const std::size_t k = corner_at_infinity(outside);
+    return place_on_segment(sites_, face(outside).first(k), face(outside).second(k), point);
+  }
+  [[nodiscard]] double distance(const PowerDiagram::Place& p, const Eigen::Vector2d& point) const {
+    return (p.share[0] * sites_.col(p.sites[0]) + p.share[1] * sites_.col(p.sites[1]) - point)
+        .squaredNorm();
+  }
+
+  const Eigen::Matrix2Xd& sites_;
+  const std::vector<TriangleFace>& faces_;
+  int at_ = 0;
+};
+
 }  // namespace
 
 std::vector<PowerDiagram::Place> PowerDiagram::locate(const Eigen::Matrix2Xd& points,
                                                       const std::vector<int>& order) const {
-  const Regular& regular = triangulation_->regular;
-  LF_CHECK(regular.dimension() == 2, std::to_string(regular.dimension()));
-  const auto infinite = regular.infinite_vertex();
+  LF_CHECK(is_planar(), std::to_string(sites_->cols()));
+  FaceWalk walk(*sites_, triangulation_.faces());
   std::vector<Place> places(order.size());
-  Regular::Face_handle hint = regular.finite_faces_begin();
   for (const int i : order) {
     const Eigen::Vector2d point = points.col(i);
-    Regular::Face_handle face =
-        regular.locate(Regular::Weighted_point({point.x(), point.y()}, 0.0), hint);
-    Place& place = places[static_cast<std::size_t>(i)];
-    if (!regular.is_infinite(face)) {
-      place = place_in_face(sites_, face, point);
-      hint = face;
-      continue;
-    }
-    const auto on_hull = [&](const Regular::Face_handle& f) {
-      const int k = f->index(infinite);
-      return place_on_segment(sites_, f->vertex(Regular::ccw(k))->info(),
-                              f->vertex(Regular::cw(k))->info(), point);
-    };
-    const auto distance = [&](const Place& p) {
-      return (p.share[0] * sites_.col(p.sites[0]) + p.share[1] * sites_.col(p.sites[1]) - point)
-          .squaredNorm();
-    };
-    place = on_hull(face);
-    for (const bool forward : {true, false}) {
-      Regular::Face_handle walker = face;
-      for (;;) {
-        const int k = walker->index(infinite);
-        walker = walker->neighbor(forward ? Regular::ccw(k) : Regular::cw(k));
-        const Place next = on_hull(walker);
-        if (!(distance(next) < distance(place))) break;
-        place = next;
-      }
-    }
-    hint = face->neighbor(face->index(infinite));
+    const int f = walk.find(point);
+    places[static_cast<std::size_t>(i)] = walk.face(f).is_finite()
+                                              ? place_in_face(*sites_, walk.face(f), point)
+                                              : walk.on_hull(f, point);
   }
   return places;
 }

@@ -4,11 +4,13 @@
 #include <Eigen/Core>
 #include <array>
 #include <memory>
+#include <optional>
 #include <stop_token>
 #include <utility>
 #include <vector>
 
 #include "core/compute/executor.h"
+#include "design/transport/regular_triangulation.h"
 
 namespace lensforge {
 
@@ -27,7 +29,8 @@ struct DualEdge {
 std::vector<int> spatial_order(const Eigen::Matrix2Xd& sites);
 
 /// The power diagram of sites c with weights w, {x : |x − c_i|² − w_i ≤ |x − c_j|² − w_j for all j}
-/// (Sun et al. 3.4), as the dual of CGAL's regular triangulation with exact predicates.
+/// (Sun et al. 3.4), as the dual of the regular triangulation. Its edges hang on sites and weights
+/// only, to the bit, not on the way to them.
 class PowerDiagram {
  public:
   /// @param sites    2 × n, all different.
@@ -36,28 +39,30 @@ class PowerDiagram {
   /// @pre n ≥ 1. @throw Interrupted within a few thousand insertions after `stop` is requested.
   PowerDiagram(const Eigen::Matrix2Xd& sites, const Eigen::VectorXd& weights,
                const std::vector<int>& order, const std::stop_token& stop);
-  ~PowerDiagram();
-  PowerDiagram(const PowerDiagram&) = delete;
-  PowerDiagram(PowerDiagram&&) noexcept;
-  PowerDiagram& operator=(const PowerDiagram&) = delete;
-  PowerDiagram& operator=(PowerDiagram&&) noexcept;
 
-  [[nodiscard]] const Eigen::Matrix2Xd& sites() const { return sites_; }
+  /// The diagram of the same sites with other weights, for a fraction of the time if weights change
+  /// little: by flips in the triangulation of this one, if no site of it is hidden.
+  /// @return nothing if a site would be hidden. @throw Interrupted
+  [[nodiscard]] std::optional<PowerDiagram> reweighted(const Eigen::VectorXd& weights,
+                                                       const std::vector<int>& order,
+                                                       const Executor& executor) const;
+
+  [[nodiscard]] const Eigen::Matrix2Xd& sites() const { return *sites_; }
   [[nodiscard]] const Eigen::VectorXd& weights() const { return weights_; }
 
   /// The site whose cell holds a point, by looking at all; the first of equals.
   [[nodiscard]] int owner(const Eigen::Vector2d& point) const;
 
   /// Sites whose cell is empty in the whole plane, in rising order.
-  [[nodiscard]] const std::vector<int>& hidden() const { return hidden_; }
+  [[nodiscard]] const std::vector<int>& hidden() const { return triangulation_.hidden(); }
 
   /// False if the visible sites lie on one line.
-  [[nodiscard]] bool is_planar() const;
+  [[nodiscard]] bool is_planar() const { return triangulation_.is_planar(); }
 
   /// All pairs of sites whose cells share a border in the plane, each once.
   [[nodiscard]] std::vector<std::pair<int, int>> neighbours() const;
 
-  /// All borders between cells, in an order that depends on the input only.
+  /// All borders between cells, sorted by their sites; `left` is the lower number.
   /// @param reach  how far from the sites' first point an end may lie before it counts as far,
   ///               pixels; several times the picture's and the sites' extent.
   [[nodiscard]] std::vector<DualEdge> dual_edges(double reach, const Executor& executor) const;
@@ -73,11 +78,21 @@ class PowerDiagram {
                                           const std::vector<int>& order) const;
 
  private:
-  struct Triangulation;
-  std::unique_ptr<Triangulation> triangulation_;
-  Eigen::Matrix2Xd sites_;
+  PowerDiagram(std::shared_ptr<const Eigen::Matrix2Xd> sites, Eigen::VectorXd weights,
+               const std::vector<int>& order, const std::stop_token& stop);
+
+  /// A side of a face whose ends are sites, the first the lower number.
+  struct Side {
+    int second;
+    int face;
+    int corner;  ///< Opposite to it.
+  };
+  [[nodiscard]] std::vector<Side> sorted_sides() const;
+  [[nodiscard]] std::vector<DualEdge> parallel_edges(double reach) const;
+
+  std::shared_ptr<const Eigen::Matrix2Xd> sites_;
   Eigen::VectorXd weights_;
-  std::vector<int> hidden_;
+  RegularTriangulation triangulation_;
 };
 
 }  // namespace lensforge

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 namespace lensforge {
@@ -22,15 +23,19 @@ Eigen::Map<const Eigen::VectorXd> masses_of(const PowerCells& cells) {
   return {cells.mass.data(), static_cast<Eigen::Index>(cells.mass.size())};
 }
 
-}  // namespace
-
-PowerState power_state(const SiteLevel& level, const Eigen::VectorXd& weights,
-                       const Executor& executor, const std::stop_token& stop, CellStage& stage) {
-  PowerDiagram diagram(level.sites, weights, level.order, stop);
+/// Measures the cells of a diagram.
+PowerState measured(PowerDiagram diagram, const Executor& executor, CellStage& stage) {
   const SummedDensity& density = stage.density();
   CellEdges edges = cell_edges(diagram, density.columns(), density.rows(), executor);
   PowerCells cells = stage.measure(edges);
   return {std::move(diagram), std::move(edges), std::move(cells)};
+}
+
+}  // namespace
+
+PowerState power_state(const SiteLevel& level, const Eigen::VectorXd& weights,
+                       const Executor& executor, const std::stop_token& stop, CellStage& stage) {
+  return measured(PowerDiagram(level.sites, weights, level.order, stop), executor, stage);
 }
 
 double mass_error(const SiteLevel& level, const PowerCells& cells) {
@@ -55,8 +60,10 @@ bool balance_masses(const SiteLevel& level, const NewtonControl& control, const 
     int halvings = 0;
     for (; halvings < kMaxHalvings && !accepted; ++halvings) {
       length *= 0.5;
-      PowerState trial = power_state(level, state.diagram.weights() + length * direction, executor,
-                                     control.stop, stage);
+      std::optional<PowerDiagram> diagram = state.diagram.reweighted(
+          state.diagram.weights() + length * direction, level.order, executor);
+      if (!diagram) continue;  // A site without a cell has no mass either.
+      PowerState trial = measured(std::move(*diagram), executor, stage);
       const auto mass = masses_of(trial.cells);
       accepted = mass.minCoeff() >= least &&
                  (level.masses - mass).norm() <= (1.0 - 0.5 * length) * residual.norm();

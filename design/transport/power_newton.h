@@ -38,12 +38,11 @@ struct NewtonStep {
   double mass_error = 0.0;  ///< After the step.
 };
 
-/// When to end, and where steps are told and the work may be interrupted.
+/// When to end, and where steps are told.
 struct NewtonControl {
   double mass_error = 1e-4;  ///< Ends below it.
   /// Asked after every step; false ends.
   std::function<bool(const NewtonStep&)> observe;
-  std::stop_token stop;
 };
 
 /// Moves the weights until the cells hold the wanted masses. A step solves L δ = wanted − mass with
@@ -51,7 +50,8 @@ struct NewtonControl {
 /// half of min(least mass at the start, least wanted mass) (Kitagawa, Mérigot & Thibert 2019,
 /// Algorithm 1).
 /// @pre `state` was the last to be measured, and every cell of it has positive mass.
-/// @return true if the error fell below control.mass_error. @throw Interrupted
+/// @return true if the error fell below control.mass_error.
+/// @throw Interrupted if the executor's stop is requested.
 bool balance_masses(const SiteLevel& level, const NewtonControl& control, const Executor& executor,
                     CellStage& stage, PowerState& state);
 

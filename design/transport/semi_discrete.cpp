@@ -197,7 +197,7 @@ class TransportSolver {
       return number < options_.max_stage_steps &&
              static_cast<int>(result_.steps.size()) < options_.max_newton_steps;
     };
-    const bool done = balance_masses(level(l), {goal, observe, stop()}, executor_, *cells_, state);
+    const bool done = balance_masses(level(l), {goal, observe}, executor_, *cells_, state);
     if (!done) {
       const bool limited = number >= options_.max_stage_steps ||
                            static_cast<int>(result_.steps.size()) >= options_.max_newton_steps;

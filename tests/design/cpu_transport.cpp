@@ -107,7 +107,7 @@ BalancedCells balanced(CellStage& stage) {
                                  executor, {}, stage);
   BalancedCells result;
   const auto count = [&](const NewtonStep&) { return ++result.steps < 100; };
-  balance_masses(level, {kBalancedTo, count, {}}, executor, stage, state);
+  balance_masses(level, {kBalancedTo, count}, executor, stage, state);
   result.mass_error = mass_error(level, state.cells);
   result.weights = state.diagram.weights();
   result.weights.array() -= result.weights.mean();
