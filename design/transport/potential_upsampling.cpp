@@ -310,8 +310,8 @@ std::size_t count_below(const SiteLevel& level, const PowerCells& cells, double 
 
 }  // namespace
 
-bool mend_empty_cells(const SiteLevel& level, const Executor& executor, const std::stop_token& stop,
-                      CellStage& stage, PowerState& state) {
+bool mend_empty_cells(const SiteLevel& level, const Executor& executor, CellStage& stage,
+                      PowerState& state) {
   for (int round = 0; round < kMendingRounds; ++round) {
     const double share = round < kThoroughRounds ? kNearlyEmpty : kEmpty;
     const std::size_t empty = count_below(level, state.cells, share);
@@ -319,7 +319,7 @@ bool mend_empty_cells(const SiteLevel& level, const Executor& executor, const st
     const double most = kMaxEmpty * static_cast<double>(state.cells.mass.size());
     if (static_cast<double>(empty) > most || !state.diagram.is_planar()) return false;
     const Mending mending(state, level, stage);
-    state = power_state(level, mending.weights(share), executor, stop, stage);
+    state = power_state(level, state, mending.weights(share), executor, stage);
   }
   return count_below(level, state.cells, kEmpty) == 0;
 }

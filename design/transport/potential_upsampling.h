@@ -40,7 +40,7 @@ Eigen::VectorXd upsampled_weights(const PowerState& coarse, CellStage& stage,
 /// highest tangent plane ψ_j + g_j·(c − c_j) of the cells around, so that it takes a part of that
 /// cell; a cell gives to a few at a time, so this goes by rounds.
 /// @return false if some are still empty after many rounds.
-bool mend_empty_cells(const SiteLevel& level, const Executor& executor, const std::stop_token& stop,
-                      CellStage& stage, PowerState& state);
+bool mend_empty_cells(const SiteLevel& level, const Executor& executor, CellStage& stage,
+                      PowerState& state);
 
 }  // namespace lensforge

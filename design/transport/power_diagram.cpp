@@ -77,7 +77,8 @@ PowerDiagram::PowerDiagram(std::shared_ptr<const Eigen::Matrix2Xd> sites, Eigen:
 
 std::optional<PowerDiagram> PowerDiagram::reweighted(const Eigen::VectorXd& weights,
                                                      const std::vector<int>& order,
-                                                     const Executor& executor) const {
+                                                     const Executor& executor,
+                                                     int max_raises) const {
   if (!is_planar() || !hidden().empty()) {
     PowerDiagram rebuilt(sites_, weights, order, executor.stop_token());
     if (!rebuilt.hidden().empty()) return std::nullopt;
@@ -85,7 +86,9 @@ std::optional<PowerDiagram> PowerDiagram::reweighted(const Eigen::VectorXd& weig
   }
   PowerDiagram flipped = *this;
   flipped.weights_ = weights;
-  if (!flipped.triangulation_.reweight(*sites_, weights, executor)) return std::nullopt;
+  if (!flipped.triangulation_.reweight(*sites_, weights_, flipped.weights_, max_raises, executor)) {
+    return std::nullopt;
+  }
   return flipped;
 }
 

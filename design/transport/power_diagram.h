@@ -42,10 +42,13 @@ class PowerDiagram {
 
   /// The diagram of the same sites with other weights, for a fraction of the time if weights change
   /// little: by flips in the triangulation of this one, if no site of it is hidden.
-  /// @return nothing if a site would be hidden. @throw Interrupted
+  /// A site that would be hidden gets, up to `max_raises` times, a higher weight: one with which it
+  /// lies below a triangle around it by half as much as in this diagram.
+  /// @return nothing if a site would still be hidden. @throw Interrupted
   [[nodiscard]] std::optional<PowerDiagram> reweighted(const Eigen::VectorXd& weights,
                                                        const std::vector<int>& order,
-                                                       const Executor& executor) const;
+                                                       const Executor& executor,
+                                                       int max_raises = 0) const;
 
   [[nodiscard]] const Eigen::Matrix2Xd& sites() const { return *sites_; }
   [[nodiscard]] const Eigen::VectorXd& weights() const { return weights_; }

@@ -3,7 +3,6 @@
 
 #include <Eigen/Core>
 #include <functional>
-#include <stop_token>
 #include <vector>
 
 #include "core/compute/executor.h"
@@ -22,9 +21,14 @@ struct PowerState {
 };
 
 /// Cuts the plane by `weights` and measures. The triangulation is found on the CPU, by `executor`.
-/// @throw Interrupted
+/// Of a site that these would hide the weight is raised.
+/// @throw Interrupted if the executor's stop is requested.
 PowerState power_state(const SiteLevel& level, const Eigen::VectorXd& weights,
-                       const Executor& executor, const std::stop_token& stop, CellStage& stage);
+                       const Executor& executor, CellStage& stage);
+
+/// The same by way of another state of the level, which is the faster the less they differ.
+PowerState power_state(const SiteLevel& level, const PowerState& from,
+                       const Eigen::VectorXd& weights, const Executor& executor, CellStage& stage);
 
 /// max |mass − wanted| / wanted.
 double mass_error(const SiteLevel& level, const PowerCells& cells);
@@ -48,7 +52,7 @@ struct NewtonControl {
 /// Moves the weights until the cells hold the wanted masses. A step solves L δ = wanted − mass with
 /// the graph Laplacian L = ∂mass/∂w and is halved until the residual falls and every cell keeps
 /// half of min(least mass at the start, least wanted mass) (Kitagawa, Mérigot & Thibert 2019,
-/// Algorithm 1).
+/// Algorithm 1). Where the step would hide a few sites, their weights alone move less far.
 /// @pre `state` was the last to be measured, and every cell of it has positive mass.
 /// @return true if the error fell below control.mass_error.
 /// @throw Interrupted if the executor's stop is requested.

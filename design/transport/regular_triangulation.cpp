@@ -167,7 +167,55 @@ void RegularTriangulation::flip(std::size_t f, std::size_t k) {
   faces_[aq].neighbour[corner_towards(aq, g)] = this_face;
 }
 
-bool RegularTriangulation::reweight(const Eigen::Matrix2Xd& sites, const Eigen::VectorXd& weights,
+RegularTriangulation::HiddenSite RegularTriangulation::hidden_by(const PowerTest& test,
+                                                                 std::size_t f,
+                                                                 std::size_t k) const {
+  const TriangleFace& face = faces_[f];
+  const auto g = static_cast<std::size_t>(face.neighbour[k]);
+  const int opposite = faces_[g].vertex[corner_towards(g, static_cast<int>(f))];
+  const int a = face.first(k);
+  const int b = face.second(k);
+  if (!test.is_counterclockwise(face.vertex[k], a, opposite)) {
+    return {a, {face.vertex[k], opposite, b}};
+  }
+  return {b, {opposite, face.vertex[k], a}};
+}
+
+void RegularTriangulation::append_star(std::size_t f, int site, std::vector<Side>& sides) const {
+  std::size_t at = f;
+  do {
+    for (std::int32_t k = 0; k < 3; ++k) sides.push_back({static_cast<std::int32_t>(at), k});
+    const std::array<int, 3>& v = faces_[at].vertex;
+    const std::size_t corner = v[0] == site ? 0 : (v[1] == site ? 1 : 2);
+    at = static_cast<std::size_t>(faces_[at].neighbour[(corner + 1) % 3]);
+  } while (at != f);
+}
+
+namespace {
+
+double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+  return a.x() * b.y() - a.y() * b.x();
+}
+
+/// How far a site's height lies below the plane through those of the triangle around it.
+double depth(const Eigen::Matrix2Xd& sites, const Eigen::VectorXd& weights, int site,
+             const std::array<int, 3>& around) {
+  std::array<Eigen::Vector2d, 3> to;
+  for (std::size_t k = 0; k < 3; ++k) to[k] = sites.col(around[k]) - sites.col(site);
+  double sum = 0.0;
+  double area = 0.0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const double share = cross(to[(k + 1) % 3], to[(k + 2) % 3]);
+    sum += share * (to[k].squaredNorm() - (weights[around[k]] - weights[site]));
+    area += share;
+  }
+  return sum / area;
+}
+
+}  // namespace
+
+bool RegularTriangulation::reweight(const Eigen::Matrix2Xd& sites, const Eigen::VectorXd& before,
+                                    Eigen::VectorXd& weights, int max_raises,
                                     const Executor& executor) {
   LF_CHECK(is_planar() && hidden_.empty(), std::to_string(hidden_.size()));
   const PowerTest test(sites, weights);
@@ -175,13 +223,21 @@ bool RegularTriangulation::reweight(const Eigen::Matrix2Xd& sites, const Eigen::
   // among the outer sides of that flip.
   std::vector<Side> todo = improper_sides(test, executor);
   std::reverse(todo.begin(), todo.end());
-  for (std::size_t flips = 0; !todo.empty();) {
+  int raises = 0;
+  for (std::size_t steps = 1; !todo.empty(); ++steps) {
+    if (steps % kStopInterval == 0 && executor.stop_token().stop_requested()) throw Interrupted();
     const auto f = static_cast<std::size_t>(todo.back().face);
     const auto k = static_cast<std::size_t>(todo.back().corner);
     todo.pop_back();
     if (is_proper(test, f, k)) continue;
-    if (!can_flip(test, f, k)) return false;
-    if (++flips % kStopInterval == 0 && executor.stop_token().stop_requested()) throw Interrupted();
+    if (!can_flip(test, f, k)) {
+      if (++raises > max_raises) return false;
+      const auto [site, around] = hidden_by(test, f, k);
+      weights[site] +=
+          0.5 * depth(sites, before, site, around) - depth(sites, weights, site, around);
+      append_star(f, site, todo);
+      continue;
+    }
     const int g = faces_[f].neighbour[k];
     flip(f, k);
     for (const int changed : {static_cast<int>(f), g}) {

@@ -38,11 +38,15 @@ class RegularTriangulation {
                        const std::vector<int>& order, const std::stop_token& stop);
 
   /// Goes over to other weights by flips of sides (Lawson), which serve as long as every site has
-  /// a cell: a side that has to go but cannot be flipped proves that one of its ends has none.
+  /// a cell: a side that has to go but cannot be flipped proves that one of its ends has none. Such
+  /// a site's weight is raised until it lies below the triangle around by half as much as before.
+  /// @param before   the weights of this triangulation.
+  /// @param weights  the new ones.
+  /// @param max_raises  how often that may be done.
   /// @pre is_planar(), none hidden. @return false if a site has no cell any more; then this is of
   /// no further use. @throw Interrupted
-  [[nodiscard]] bool reweight(const Eigen::Matrix2Xd& sites, const Eigen::VectorXd& weights,
-                              const Executor& executor);
+  [[nodiscard]] bool reweight(const Eigen::Matrix2Xd& sites, const Eigen::VectorXd& before,
+                              Eigen::VectorXd& weights, int max_raises, const Executor& executor);
 
   /// False if the visible sites lie on one line; then there are no faces.
   [[nodiscard]] bool is_planar() const { return !faces_.empty(); }
@@ -58,12 +62,20 @@ class RegularTriangulation {
     std::int32_t corner;
   };
 
+  /// A site and the triangle it lies in, whose lifted corners are not above it.
+  struct HiddenSite {
+    int site;
+    std::array<int, 3> around;
+  };
+
   [[nodiscard]] std::vector<Side> improper_sides(const PowerTest& test,
                                                  const Executor& executor) const;
   [[nodiscard]] bool is_proper(const PowerTest& test, std::size_t f, std::size_t k) const;
   [[nodiscard]] bool can_flip(const PowerTest& test, std::size_t f, std::size_t k) const;
   [[nodiscard]] std::size_t corner_towards(std::size_t f, int neighbour) const;
   void flip(std::size_t f, std::size_t k);
+  [[nodiscard]] HiddenSite hidden_by(const PowerTest& test, std::size_t f, std::size_t k) const;
+  void append_star(std::size_t f, int site, std::vector<Side>& sides) const;
 
   std::vector<TriangleFace> faces_;
   std::vector<std::pair<int, int>> line_;

@@ -163,7 +163,7 @@ class TransportSolver {
   PowerState measured(int l, const Eigen::VectorXd& weights, const Stage& s) {
     cells_ = make_cell_stage(level(l).sites, executor_);
     cells_->set_density(s.density);
-    return power_state(level(l), weights, executor_, stop(), *cells_);
+    return power_state(level(l), weights, executor_, *cells_);
   }
 
   /// The same diagram under another density.
@@ -247,7 +247,7 @@ class TransportSolver {
     cells_->set_density(s.density);
     PowerState state =
         measured(l, upsampled_weights(coarse, *cells_, level(l).sites, level(l).order, stop()), s);
-    if (!mend_empty_cells(level(l), executor_, stop(), *cells_, state)) return std::nullopt;
+    if (!mend_empty_cells(level(l), executor_, *cells_, state)) return std::nullopt;
     if (!run_stage(l, s, kStageError, state)) return std::nullopt;
     return state;
   }

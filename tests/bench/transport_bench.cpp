@@ -123,10 +123,10 @@ void step_direction(benchmark::State& state) {
   }
 }
 
-/// 3,680, 58,880 and 942,080 faces.
+/// 3,680, 58,880, 235,520 and 942,080 faces.
 void sizes(benchmark::internal::Benchmark* bench) {
   bench->Unit(benchmark::kSecond)->UseRealTime()->MeasureProcessCPUTime()->Iterations(1);
-  for (const int columns : {40, 160, 640}) bench->Arg(columns);
+  for (const int columns : {40, 160, 320, 640}) bench->Arg(columns);
 }
 
 void in_milliseconds(benchmark::internal::Benchmark* bench) {

@@ -104,7 +104,7 @@ BalancedCells balanced(CellStage& stage) {
   const SiteLevel level = spot_level();
   const Executor executor = Executor::serial();
   PowerState state = power_state(level, stretched_weights(level.sites, *spot_scene().density),
-                                 executor, {}, stage);
+                                 executor, stage);
   BalancedCells result;
   const auto count = [&](const NewtonStep&) { return ++result.steps < 100; };
   balance_masses(level, {kBalancedTo, count}, executor, stage, state);

@@ -133,6 +133,45 @@ TEST(RegularTriangulation, GivesNothingExactlyWhereASiteIsHidden) {
   EXPECT_LT(hiding, 350);
 }
 
+TEST(RegularTriangulation, RaisesSitesThatWouldBeHidden) {
+  Random random(38);
+  int raised = 0;
+  for (int round = 0; round < 100; ++round) {
+    const Eigen::Matrix2Xd sites = round % 4 == 0
+                                       ? square_grid(4 + random.below(5), 4 + random.below(5))
+                                       : testing::random_sites(50, {8, 8}, 0.0, random);
+    const auto count = static_cast<int>(sites.cols());
+    const Eigen::VectorXd weights =
+        Eigen::VectorXd::NullaryExpr(count, [&] { return random.between(0.0, 2.0); });
+    const PowerDiagram start = diagram_of(sites, Eigen::VectorXd::Zero(count));
+    const auto shown =
+        start.reweighted(weights, spatial_order(sites), Executor::serial(), 100 * count);
+    ASSERT_TRUE(shown);
+    EXPECT_GE((shown->weights() - weights).minCoeff(), 0.0);
+    const PowerDiagram rebuilt = diagram_of(sites, shown->weights());
+    EXPECT_TRUE(rebuilt.hidden().empty());
+    expect_same_edges(*shown, rebuilt);
+    const PowerDiagram asked = diagram_of(sites, weights);
+    EXPECT_EQ(shown->weights() == weights, asked.hidden().empty());
+    for (const int i : asked.hidden()) EXPECT_GT(shown->weights()[i], weights[i]);
+    raised += static_cast<int>(asked.hidden().size());
+  }
+  EXPECT_GT(raised, 100);
+}
+
+TEST(RegularTriangulation, RaisesNoMoreOftenThanAllowed) {
+  Eigen::Matrix2Xd sites(2, 4);
+  sites << 0, 4, 0, 1, 0, 0, 4, 1;
+  Eigen::VectorXd weights = Eigen::VectorXd::Zero(4);
+  weights[3] = -30.0;
+  const PowerDiagram start = diagram_of(sites, Eigen::VectorXd::Zero(4));
+  EXPECT_FALSE(start.reweighted(weights, spatial_order(sites), Executor::serial(), 0));
+  const auto shown = start.reweighted(weights, spatial_order(sites), Executor::serial(), 1);
+  ASSERT_TRUE(shown);
+  // Among heights 0, 16 and 16 the plane passes the site at 8; the height was 2, so 6 below.
+  EXPECT_NEAR(shown->weights()[3], 2.0 - (8.0 - 0.5 * 6.0), 1e-14);
+}
+
 TEST(RegularTriangulation, ComesBackFromHiddenSitesAndFromALine) {
   Random random(35);
   const Eigen::Matrix2Xd sites = testing::random_sites(60, {8, 8}, 0.0, random);
