@@ -197,20 +197,39 @@ double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
   return a.x() * b.y() - a.y() * b.x();
 }
 
+/// A raised site comes to lie this share of its depth before below the triangle around it, and of
+/// the depth that it has without weights, where that is more: far above rounding, so that sites
+/// that hide each other by turns come to an end.
+constexpr double kDepthKept = 0.5;
+constexpr double kLeastDepth = 1e-6;
+
 /// How far a site's height lies below the plane through those of the triangle around it.
-double depth(const Eigen::Matrix2Xd& sites, const Eigen::VectorXd& weights, int site,
-             const std::array<int, 3>& around) {
-  std::array<Eigen::Vector2d, 3> to;
-  for (std::size_t k = 0; k < 3; ++k) to[k] = sites.col(around[k]) - sites.col(site);
-  double sum = 0.0;
-  double area = 0.0;
-  for (std::size_t k = 0; k < 3; ++k) {
-    const double share = cross(to[(k + 1) % 3], to[(k + 2) % 3]);
-    sum += share * (to[k].squaredNorm() - (weights[around[k]] - weights[site]));
-    area += share;
+class Depth {
+ public:
+  Depth(const Eigen::Matrix2Xd& sites, int site, const std::array<int, 3>& around)
+      : site_(site), around_(around) {
+    std::array<Eigen::Vector2d, 3> to;
+    for (std::size_t k = 0; k < 3; ++k) to[k] = sites.col(around[k]) - sites.col(site);
+    for (std::size_t k = 0; k < 3; ++k) share_[k] = cross(to[(k + 1) % 3], to[(k + 2) % 3]);
+    const double area = share_[0] + share_[1] + share_[2];
+    for (std::size_t k = 0; k < 3; ++k) {
+      share_[k] /= area;
+      without_weights_ += share_[k] * to[k].squaredNorm();
+    }
   }
-  return sum / area;
-}
+  [[nodiscard]] double without_weights() const { return without_weights_; }
+  [[nodiscard]] double under(const Eigen::VectorXd& weights) const {
+    double depth = without_weights_;
+    for (std::size_t k = 0; k < 3; ++k) depth -= share_[k] * (weights[around_[k]] - weights[site_]);
+    return depth;
+  }
+
+ private:
+  int site_;
+  std::array<int, 3> around_;
+  std::array<double, 3> share_{};  ///< The site's barycentric coordinates.
+  double without_weights_ = 0.0;
+};
 
 }  // namespace
 
@@ -233,8 +252,10 @@ bool RegularTriangulation::reweight(const Eigen::Matrix2Xd& sites, const Eigen::
     if (!can_flip(test, f, k)) {
       if (++raises > max_raises) return false;
       const auto [site, around] = hidden_by(test, f, k);
-      weights[site] +=
-          0.5 * depth(sites, before, site, around) - depth(sites, weights, site, around);
+      const Depth depth(sites, site, around);
+      const double wanted =
+          std::max(kDepthKept * depth.under(before), kLeastDepth * depth.without_weights());
+      weights[site] += wanted - depth.under(weights);
       append_star(f, site, todo);
       continue;
     }

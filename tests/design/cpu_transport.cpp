@@ -103,8 +103,8 @@ const CellScene& spot_scene() {
 BalancedCells balanced(CellStage& stage) {
   const SiteLevel level = spot_level();
   const Executor executor = Executor::serial();
-  PowerState state = power_state(level, stretched_weights(level.sites, *spot_scene().density),
-                                 executor, stage);
+  PowerState state =
+      power_state(level, stretched_weights(level.sites, *spot_scene().density), executor, stage);
   BalancedCells result;
   const auto count = [&](const NewtonStep&) { return ++result.steps < 100; };
   balance_masses(level, {kBalancedTo, count}, executor, stage, state);
