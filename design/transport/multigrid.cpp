@@ -15,15 +15,41 @@ namespace {
 
 using Vector = std::vector<double>;
 
-/// A graph's Laplacian by rows: every node's neighbours with weights, and the weights' sum.
+/// A graph's Laplacian by rows: every node's neighbours with weights, and the weights' sum. In a
+/// row, neighbours of lower numbers come before those of higher numbers, which begin at `higher`.
 struct Rows {
   std::vector<std::int32_t> first;
+  std::vector<std::int32_t> higher;
   std::vector<std::int32_t> other;
   Vector weight;
   Vector diagonal;
 
   [[nodiscard]] std::size_t size() const { return diagonal.size(); }
 };
+
+/// Puts lower neighbours first, each part in the order it had.
+void part_rows(Rows& rows) {
+  rows.higher.resize(rows.size());
+  std::vector<std::pair<std::int32_t, double>> later;
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    later.clear();
+    auto to = static_cast<std::size_t>(rows.first[i]);
+    const auto end = static_cast<std::size_t>(rows.first[i + 1]);
+    for (std::size_t k = to; k < end; ++k) {
+      if (rows.other[k] > static_cast<std::int32_t>(i)) {
+        later.emplace_back(rows.other[k], rows.weight[k]);
+      } else {
+        rows.other[to] = rows.other[k];
+        rows.weight[to++] = rows.weight[k];
+      }
+    }
+    rows.higher[i] = static_cast<std::int32_t>(to);
+    for (const auto& [other, weight] : later) {
+      rows.other[to] = other;
+      rows.weight[to++] = weight;
+    }
+  }
+}
 
 Rows rows_of(const WeightedGraph& graph) {
   Rows rows;
@@ -48,6 +74,7 @@ Rows rows_of(const WeightedGraph& graph) {
     add(e.a, e.b, e.weight);
     add(e.b, e.a, e.weight);
   }
+  part_rows(rows);
   return rows;
 }
 
@@ -115,6 +142,7 @@ Rows aggregated(const Rows& rows, const std::vector<std::int32_t>& aggregate, in
     }
     coarse.first.push_back(static_cast<std::int32_t>(coarse.other.size()));
   }
+  part_rows(coarse);
   return coarse;
 }
 
@@ -128,14 +156,22 @@ void add_scaled(Vector& to, double factor, const Vector& what) {
   for (std::size_t i = 0; i < to.size(); ++i) to[i] += factor * what[i];
 }
 
-/// One row's Σ weight · x of the neighbours.
-double neighbour_sum(const Rows& rows, std::size_t i, const Vector& x) {
+/// Σ weight · x of some neighbours.
+double weighted_sum(const Rows& rows, std::int32_t begin, std::int32_t end, const Vector& x) {
   double sum = 0.0;
-  for (auto k = static_cast<std::size_t>(rows.first[i]);
-       k < static_cast<std::size_t>(rows.first[i + 1]); ++k) {
+  for (auto k = static_cast<std::size_t>(begin); k < static_cast<std::size_t>(end); ++k) {
     sum += rows.weight[k] * x[static_cast<std::size_t>(rows.other[k])];
   }
   return sum;
+}
+double lower_sum(const Rows& rows, std::size_t i, const Vector& x) {
+  return weighted_sum(rows, rows.first[i], rows.higher[i], x);
+}
+double higher_sum(const Rows& rows, std::size_t i, const Vector& x) {
+  return weighted_sum(rows, rows.higher[i], rows.first[i + 1], x);
+}
+double neighbour_sum(const Rows& rows, std::size_t i, const Vector& x) {
+  return weighted_sum(rows, rows.first[i], rows.first[i + 1], x);
 }
 
 Vector multiply(const Rows& rows, const Vector& x, const Executor& executor) {
@@ -190,10 +226,8 @@ class Hierarchy {
   [[nodiscard]] Vector precondition(std::size_t l, const Vector& right) const {
     if (l + 1 == levels_.size()) return solve_coarsest(right);
     const Rows& rows = levels_[l].rows;
-    Vector x(right.size(), 0.0);
-    sweep_forward(rows, right, x);
-    Vector residual = multiply(rows, x, executor_);
-    for (std::size_t i = 0; i < x.size(); ++i) residual[i] = right[i] - residual[i];
+    Vector x = swept_forward(rows, right);
+    const Vector residual = residual_after_sweep(rows, right, x);
     const std::vector<std::int32_t>& aggregate = levels_[l].aggregate;
     Vector coarse(levels_[l + 1].rows.size(), 0.0);
     for (std::size_t i = 0; i < x.size(); ++i) {
@@ -253,14 +287,28 @@ class Hierarchy {
     return {x.data(), x.data() + x.size()};
   }
 
-  static void sweep_forward(const Rows& rows, const Vector& right, Vector& x) {
-    for (std::size_t i = 0; i < x.size(); ++i) relax(rows, right, i, x);
+  /// Gauss-Seidel from 0, where higher neighbours add nothing.
+  static Vector swept_forward(const Rows& rows, const Vector& right) {
+    Vector x(right.size());
+    for (std::size_t i = 0; i < x.size(); ++i) {
+      x[i] = rows.diagonal[i] > 0.0 ? (right[i] + lower_sum(rows, i, x)) / rows.diagonal[i] : 0.0;
+    }
+    return x;
+  }
+  /// What such a sweep leaves of a row is what its higher neighbours became after it.
+  [[nodiscard]] Vector residual_after_sweep(const Rows& rows, const Vector& right,
+                                            const Vector& x) const {
+    Vector residual(x.size());
+    parallel_for(executor_, "laplacian", static_cast<std::int64_t>(x.size()), [&](std::int64_t k) {
+      const auto i = static_cast<std::size_t>(k);
+      residual[i] = rows.diagonal[i] > 0.0 ? higher_sum(rows, i, x) : right[i];
+    });
+    return residual;
   }
   static void sweep_backward(const Rows& rows, const Vector& right, Vector& x) {
-    for (std::size_t i = x.size(); i-- > 0;) relax(rows, right, i, x);
-  }
-  static void relax(const Rows& rows, const Vector& right, std::size_t i, Vector& x) {
-    if (rows.diagonal[i] > 0.0) x[i] = (right[i] + neighbour_sum(rows, i, x)) / rows.diagonal[i];
+    for (std::size_t i = x.size(); i-- > 0;) {
+      if (rows.diagonal[i] > 0.0) x[i] = (right[i] + neighbour_sum(rows, i, x)) / rows.diagonal[i];
+    }
   }
 
   const Executor& executor_;
