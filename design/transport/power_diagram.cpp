@@ -10,6 +10,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <numeric>
 #include <utility>
 
@@ -152,15 +153,18 @@ std::vector<DualEdge> PowerDiagram::parallel_edges(double reach) const {
 
 namespace {
 
-/// Where the power distances to a face's three sites agree; not finite if they lie on one line.
-/// Seen from the lowest site, so that the bits do not depend on which corner comes first.
+/// Where the power distances to a face's three sites agree. Seen from the lowest site, so that the
+/// bits do not depend on which corner comes first.
 Eigen::Vector2d radical_centre(const Eigen::Matrix2Xd& sites, const Eigen::VectorXd& weights,
                                std::array<int, 3> v) {
   std::rotate(v.begin(), std::min_element(v.begin(), v.end()), v.end());
   const Eigen::Vector2d origin = sites.col(v[0]);
   const Eigen::Vector2d b = sites.col(v[1]) - origin;
   const Eigen::Vector2d c = sites.col(v[2]) - origin;
-  const double double_area = b.x() * c.y() - b.y() * c.x();
+  // Faces run counterclockwise, by exact arithmetic. On the hull there are some so thin that
+  // rounding can leave any sign: their centres lie far out, not far in.
+  const double least = std::numeric_limits<double>::epsilon() * b.norm() * c.norm();
+  const double double_area = std::max(least, b.x() * c.y() - b.y() * c.x());
   const double rb = 0.5 * (b.squaredNorm() - (weights[v[1]] - weights[v[0]])) / double_area;
   const double rc = 0.5 * (c.squaredNorm() - (weights[v[2]] - weights[v[0]])) / double_area;
   return origin + Eigen::Vector2d(rb * c.y() - rc * b.y(), rc * b.x() - rb * c.x());

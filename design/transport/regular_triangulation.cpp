@@ -9,8 +9,9 @@
 #include <CGAL/Triangulation_vertex_base_with_info_2.h>
 
 #include <algorithm>
-#include <atomic>
+#include <cmath>
 #include <cstddef>
+#include <cstdint>
 
 #include "core/error.h"
 
@@ -255,7 +256,9 @@ bool RegularTriangulation::reweight(const Eigen::Matrix2Xd& sites, const Eigen::
       const Depth depth(sites, site, around);
       const double wanted =
           std::max(kDepthKept * depth.under(before), kLeastDepth * depth.without_weights());
-      weights[site] += wanted - depth.under(weights);
+      const double raise = wanted - depth.under(weights);
+      if (!std::isfinite(raise)) return false;  // The triangle is too thin to tell.
+      weights[site] += raise;
       append_star(f, site, todo);
       continue;
     }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -92,6 +93,23 @@ TEST(PowerCells, OfARegularGridCoverItsCorners) {
   for (int i = 0; i < 36; ++i) sites.col(i) = Eigen::Vector2d(i % 6, i / 6) - half;
   const SummedDensity density(testing::random_picture(4, 4, 0.1, 9), 1.0);
   EXPECT_LT(worst_difference(diagram_of(sites, Eigen::VectorXd::Zero(36)), density), 1e-13);
+}
+
+TEST(PowerCells, OfATurnedGridReachThePicturesBorder) {
+  // Sites of a side lie on a line but for rounding: triangles of the hull have any area around 0.
+  const SummedDensity density(testing::random_picture(8, 8, 0.1, 8), 1.0);
+  double worst = 0.0;
+  for (int turn = 1; turn <= 40; ++turn) {
+    const Eigen::Rotation2Dd rotation(0.07 * turn);
+    Eigen::Matrix2Xd sites(2, 36);
+    for (int i = 0; i < 36; ++i) {
+      sites.col(i) =
+          Eigen::Vector2d(4.0, 4.0) + rotation * Eigen::Vector2d(i % 6 - 2.5, i / 6 - 2.5);
+    }
+    worst =
+        std::max(worst, worst_difference(diagram_of(sites, Eigen::VectorXd::Zero(36)), density));
+  }
+  EXPECT_LT(worst, 1e-13);
 }
 
 TEST(PowerCells, ASingleSiteHoldsEverything) {
