@@ -15,11 +15,6 @@ namespace lensforge {
 
 namespace {
 
-/// Steps a pixel that sites are rounded to, where a flat mesh's do not lie on a grid to
-/// the last bit. Rounding errors of 1e-14 pixels leave triangles on the hull that are so thin that
-/// the centres of their circles are noise: a mirror at 30 degrees found no transport at 64² pixels.
-constexpr double kSteps = 16777216.0;
-
 /// Of a face's light: less than this share inside of the outline counts as none. Cells that hold
 /// next to no light hold up all others.
 constexpr double kLeastShare = 0.05;
@@ -37,7 +32,6 @@ void drop_slivers(const SurfaceMesh& mesh, const Outline& outline, const Executo
 
 FaceLight face_light(const SurfaceMesh& mesh, const OpticalSetup& setup, SurfaceModel model,
                      const Executor& executor) {
-  const bool on_grid = LightPath(setup).intake_is_plan_area() && !setup.screen_is_turned();
   const std::vector<ImageTriangle> images = project_surface(mesh, setup, model, executor);
   const TransportSites transport(setup);
   FaceLight light;
@@ -48,9 +42,9 @@ FaceLight face_light(const SurfaceMesh& mesh, const OpticalSetup& setup, Surface
     light.landing.col(f) = (t.p0 + t.p1 + t.p2) / 3.0;
     light.flux[f] = t.flux;
   }
-  light.sites = light.landing;
-  for (auto site : light.sites.colwise()) {
-    if (!on_grid) site = (transport.site(site) * kSteps).array().round() / kSteps;
+  light.sites.resize(2, light.landing.cols());
+  for (Eigen::Index f = 0; f < light.sites.cols(); ++f) {
+    light.sites.col(f) = transport.site(light.landing.col(f));
   }
   if (setup.outline) drop_slivers(mesh, *setup.outline, executor, light.flux);
   return light;
