@@ -16,21 +16,25 @@ constexpr double kRounding = 1e-9;
 
 /// Nodes of one tile that are kept.
 void keep_nodes(const SurfacePatch& patch, const PartGrid& grid, const std::string& name,
-                LayeredImage& layers) {
+                const Executor& executor, LayeredImage& layers) {
   const std::array values{&patch.z, &patch.slope_x, &patch.slope_y};
   const std::array names{".z", ".slope_x", ".slope_y"};
   const GridWindow& window = patch.window;
   for (std::size_t k = 0; k < values.size(); ++k) {
     const auto layer = layers.layer(name + names[k]);
-    for (std::int64_t n = 0; n < window.size(); ++n) {
-      const std::int64_t column = window.first_column + n % window.columns;
-      const std::int64_t row = window.first_row + n / window.columns;
-      if (column % grid.every.x() != 0 || row % grid.every.y() != 0) continue;
+    const auto keep_row = [&](std::int64_t j) {
+      const std::int64_t row = window.first_row + j;
+      if (row % grid.every.y() != 0) return;
       const std::int64_t from_top = grid.nodes.y() - 1 - row / grid.every.y();
-      const std::int64_t at = from_top * grid.nodes.x() + column / grid.every.x();
-      layer[static_cast<std::size_t>(at)] =
-          static_cast<float>((*values[k])[static_cast<std::size_t>(n)]);
-    }
+      for (std::int64_t i = 0; i < window.columns; ++i) {
+        const std::int64_t column = window.first_column + i;
+        if (column % grid.every.x() != 0) continue;
+        const std::int64_t at = from_top * grid.nodes.x() + column / grid.every.x();
+        layer[static_cast<std::size_t>(at)] =
+            static_cast<float>((*values[k])[static_cast<std::size_t>(j * window.columns + i)]);
+      }
+    };
+    parallel_for(executor, "keep surface", window.rows, keep_row, 16);
   }
 }
 
@@ -74,9 +78,10 @@ PartLayers::PartLayers(std::vector<NamedSurface> surfaces, const Eigen::Vector2d
       nodes_(part_grid(lens_size, spacings, kPartNodes)),
       layers_(nodes_.nodes.x(), nodes_.nodes.y(), layer_names(surfaces_)) {}
 
-void PartLayers::take(const SurfaceField& field, const SurfacePatch& tile) {
+void PartLayers::take(const SurfaceField& field, const SurfacePatch& tile,
+                      const Executor& executor) {
   for (const NamedSurface& surface : surfaces_) {
-    if (surface.field == &field) keep_nodes(tile, nodes_, surface.name, layers_);
+    if (surface.field == &field) keep_nodes(tile, nodes_, surface.name, executor, layers_);
   }
 }
 

@@ -45,7 +45,7 @@ class PartLayers {
              const Eigen::Vector2d& spacings);
 
   /// Keeps what layers need of a surface's tile; of other surfaces that is nothing.
-  void take(const SurfaceField& field, const SurfacePatch& tile);
+  void take(const SurfaceField& field, const SurfacePatch& tile, const Executor& executor);
 
   /// @pre every tile was taken.
   [[nodiscard]] const LayeredImage& layers() const { return layers_; }

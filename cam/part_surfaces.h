@@ -33,7 +33,7 @@ class PartSurfaces {
 
   [[nodiscard]] LeakageChain chain() const;
   [[nodiscard]] const SurfaceField& designed() const { return design_.surface; }
-  [[nodiscard]] const RoundedField& rounded() const { return design_.rounded; }
+  [[nodiscard]] const SurfaceField& rounded() const { return *raw_[1]; }
   [[nodiscard]] const SurfaceField& milled() const { return *raw_.back(); }
   [[nodiscard]] const SurfaceField& part() const { return *polished_.back(); }
 

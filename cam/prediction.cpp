@@ -84,8 +84,11 @@ Prediction predict_part(const PartSurfaces& surfaces, const Lens& lens, const Ca
     if (other.name != surface_name::kMilled) continue;
     other.grid = lens_grid(lens.setup.lens_size, scallop_spacings(options, lens.setup));
   }
-  const auto keep = [&](const SurfaceField& field, const SurfacePatch& tile) {
-    layers.take(field, tile);
+  CreaseMapper creases(grid, {});
+  const auto keep = [&](const SurfaceField& field, const CellRange& tile,
+                        const SurfacePatch& patch) {
+    layers.take(field, patch, executor);
+    if (&field == &surfaces.rounded()) creases.add(tile, patch, executor);
   };
   result.leakage =
       measure_leakage(chain, lens.target, setup, options.leakage, executor, control, keep);
@@ -96,8 +99,7 @@ Prediction predict_part(const PartSurfaces& surfaces, const Lens& lens, const Ca
   const LeakMap map =
       map_leakage(chain.designed, chain.part(), setup, weights, kLeakCell, executor);
   result.places = worst_places(map, chain, result.leakage, setup, {}, executor);
-  result.creases = map_creases(surfaces.rounded(), grid, {}, executor, control);
-  if (!result.creases.complete) throw Interrupted();
+  result.creases = creases.map();
   result.height = height_map(map);
   const double spacing = lens.setup.lens_size.maxCoeff() / kViewNodes;
   result.surface = raster_of(coarse_patch(surfaces.milled(), lens, spacing, executor));

@@ -65,7 +65,7 @@ std::vector<FluxPicture> render_parts(std::span<const SurfaceField* const> field
     for (std::size_t f = 0; f < fields.size(); ++f) {
       if (control.stop_requested()) throw Interrupted();
       tile.load(*fields[f], tiles[t], executor);
-      if (observe) observe(*fields[f], tile.patch());
+      if (observe) observe(*fields[f], tiles[t], tile.patch());
       add_colors(tile, setup, colors, executor, images[f]);
     }
     control.report({"render surfaces", static_cast<double>(t + 1),

@@ -60,8 +60,10 @@ struct FieldRenderSetup {
 FluxPicture render_field(const SurfaceField& field, const FieldRenderSetup& setup,
                          const Executor& executor, const RunControl& control);
 
-/// Told of every tile that a surface was sampled in, with a node more around it where there is one.
-using TileObserver = std::function<void(const SurfaceField&, const SurfacePatch&)>;
+/// Told of every tile that a surface was sampled in; the patch has a node more around it where
+/// there is one.
+using TileObserver =
+    std::function<void(const SurfaceField&, const CellRange&, const SurfacePatch&)>;
 
 /// Renders several surfaces, tile by tile each tile of all of them in order, so that surfaces which
 /// are made from one another can share samples (HeldField). One picture per surface, with the bits

@@ -75,6 +75,19 @@ struct StraightSweep {
   [[nodiscard]] Eigen::Vector3d centre(double s) const {
     return {x + s * ux, y + s * uy, z + s * slope};
   }
+
+  /// What ball_below() gives for that ball over places of a line along x, with the same bits and
+  /// without a branch. @param room  below 0 where the ball does not pass over.
+  template <class Places, class Values>
+  void below(double radius, double qy, const Places& qx, Values& room, Values& height) const {
+    const double squared = radius * radius;
+    const double dy = qy - y;
+    const Values dx = qx - x;
+    const Values reach = (squared - (ux * dy - uy * dx).square()).max(0.0).sqrt();
+    const Values s = (ux * dx + uy * dy - reach * sine).max(0.0).min(run);
+    room = squared - ((qx - (x + s * ux)).square() + (qy - (y + s * uy)).square());
+    height = (z + s * slope) - room.max(0.0).sqrt();
+  }
 };
 
 /// A circular move in a vertical plane along an axis that is a graph over that axis and bends less
@@ -103,6 +116,19 @@ struct GraphArc {
   [[nodiscard]] Eigen::Vector3d centre(double h) const {
     const double top = z + side * std::sqrt(std::max(rho * rho - h * h, 0.0));
     return {along_x ? x + h : x, along_x ? y : y + h, top};
+  }
+
+  /// Likewise over places of a line along the axis.
+  /// @param across  the places' other coordinate. @param out  theirs along the axis.
+  template <class Places, class Values>
+  void below(double radius, double across, const Places& out, Values& room, Values& height) const {
+    const double beside = across - (along_x ? y : x);
+    const double middle = along_x ? x : y;
+    const double squared = radius * radius;
+    const double r = std::sqrt(std::max(squared - beside * beside, 0.0));
+    const Values h = ((out - middle) * (rho / (rho - side * r))).max(low).min(high);
+    room = squared - ((out - (middle + h)).square() + beside * beside);
+    height = (z + side * (rho * rho - h.square()).max(0.0).sqrt()) - room.max(0.0).sqrt();
   }
 };
 

@@ -30,7 +30,8 @@ void CastField::sample(const GridWindow& window, const Executor& executor,
                        SurfacePatch& patch) const {
   mould_.sample(under(window, frame_), executor, patch);
   patch.window = window;
-  for (std::vector<double>* values : {&patch.z, &patch.slope_x, &patch.slope_y}) {
+  for (std::vector<double>* values :
+       {&patch.z, &patch.slope_x, &patch.slope_y, &patch.depth, &patch.width}) {
     mirror_rows(window, *values);
   }
   mirror_rows(window, patch.cut);
@@ -38,6 +39,8 @@ void CastField::sample(const GridWindow& window, const Executor& executor,
   // changes its sign twice.
   for (double& z : patch.z) z = frame_.top - (z - frame_.thickness) / frame_.scale;
   for (double& slope : patch.slope_y) slope = -slope;
+  for (double& depth : patch.depth) depth /= frame_.scale;
+  for (double& width : patch.width) width /= frame_.scale;
 }
 
 }  // namespace lensforge

@@ -5,8 +5,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "cam/milled/rounded_field.h"
-#include "core/compute/run_control.h"
+#include "cam/milled/lens_grid.h"
+#include "cam/milled/surface_field.h"
+#include "core/compute/executor.h"
 
 namespace lensforge {
 
@@ -26,7 +27,6 @@ struct CreaseMapOptions {
 
 /// Where concave creases keep material, over the whole lens.
 struct CreaseMap {
-  bool complete = false;  ///< False if it was stopped.
   std::int64_t columns = 0;
   std::int64_t rows = 0;
   double cell = 0.0;                 ///< mm
@@ -37,9 +37,35 @@ struct CreaseMap {
   std::vector<CreaseSpot> worst;     ///< Deepest first.
 };
 
-/// Samples a grid, tile by tile, for what the ball leaves in creases.
-CreaseMap map_creases(const RoundedField& field, const GridWindow& grid,
-                      const CreaseMapOptions& options, const Executor& executor,
-                      const RunControl& control);
+/// Draws the map of a grid from the tiles that a rounded surface is sampled in.
+class CreaseMapper {
+ public:
+  /// @pre options.cell > 0.
+  CreaseMapper(const GridWindow& grid, const CreaseMapOptions& options);
+
+  /// Takes the nodes of a tile of the grid; tiles must not overlap, but for their rims.
+  /// @param patch  with depth and width; may reach beyond the tile.
+  void add(const CellRange& tile, const SurfacePatch& patch, const Executor& executor);
+
+  [[nodiscard]] CreaseMap map() const;
+
+ private:
+  /// What is known of a cell while tiles come in.
+  struct Cell {
+    CreaseSpot deepest;
+    std::int64_t nodes = 0;
+    std::int64_t fillets = 0;
+  };
+  /// Cell that a coordinate lies in, along an axis.
+  [[nodiscard]] std::int64_t cell_at(double at, int axis) const;
+  void add_row(const SurfacePatch& patch, std::int64_t row, std::int64_t begin, std::int64_t end);
+  [[nodiscard]] std::vector<CreaseSpot> worst() const;
+
+  CreaseMapOptions options_;
+  GridWindow grid_;
+  std::int64_t columns_ = 0;
+  std::int64_t rows_ = 0;
+  std::vector<Cell> cells_;
+};
 
 }  // namespace lensforge

@@ -88,7 +88,7 @@ struct FlatFacet {
   }
 };
 
-/// A surface without creases over a facet: of its three cubics, those that are asked for.
+/// A surface without creases over a facet: of its cubics, those that are asked for.
 class SmoothFacet {
  public:
   SmoothFacet(const OpticalSurface& surface, const Facet& facet, std::int32_t triangle)
@@ -102,7 +102,7 @@ class SmoothFacet {
     weights /= weights.sum();
     const Eigen::Vector2d at = corners_ * weights;
     int third = 0;
-    weights.minCoeff(&third);
+    if (surface_.has_thirds()) weights.minCoeff(&third);
     const SurfaceShape shape = patch(third).at(at);
     return {shape.z + shape.slope.dot(q - at), shape.slope};
   }

@@ -20,14 +20,16 @@ bool contains(const GridWindow& all, const GridWindow& part) {
 /// Copies the part of a patch's values that lies in a window.
 template <class Value>
 void copy_part(const GridWindow& all, const std::vector<Value>& from, const GridWindow& part,
-               std::vector<Value>& to) {
+               const Executor& executor, std::vector<Value>& to) {
+  to.resize(from.empty() ? 0 : static_cast<std::size_t>(part.size()));
   if (to.empty()) return;
   const std::int64_t column = part.first_column - all.first_column;
   const std::int64_t row = part.first_row - all.first_row;
-  for (std::int64_t j = 0; j < part.rows; ++j) {
+  const auto copy_row = [&](std::int64_t j) {
     const auto begin = from.begin() + (row + j) * all.columns + column;
     std::copy(begin, begin + part.columns, to.begin() + j * part.columns);
-  }
+  };
+  parallel_for(executor, "held surface", part.rows, copy_row, 16);
 }
 
 }  // namespace
@@ -40,11 +42,13 @@ void HeldField::sample(const GridWindow& window, const Executor& executor,
     field_.sample(window, executor, held_);
     held_.window = window;
   }
-  resize_patch(window, !held_.cut.empty(), patch);
-  copy_part(all, held_.z, window, patch.z);
-  copy_part(all, held_.slope_x, window, patch.slope_x);
-  copy_part(all, held_.slope_y, window, patch.slope_y);
-  copy_part(all, held_.cut, window, patch.cut);
+  patch.window = window;
+  copy_part(all, held_.z, window, executor, patch.z);
+  copy_part(all, held_.slope_x, window, executor, patch.slope_x);
+  copy_part(all, held_.slope_y, window, executor, patch.slope_y);
+  copy_part(all, held_.cut, window, executor, patch.cut);
+  copy_part(all, held_.depth, window, executor, patch.depth);
+  copy_part(all, held_.width, window, executor, patch.width);
 }
 
 }  // namespace lensforge

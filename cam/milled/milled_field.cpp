@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <optional>
 #include <string>
+#include <tuple>
 #include <utility>
 
 #include "cam/milled/ball_sweep.h"
@@ -155,16 +156,10 @@ struct MilledField::Block {
     return slope.x() * (at_x - x[0]) + slope.y() * (at_y - y[0]);
   }
 
-  /// Of all nodes above the plane. Four at a time: one long chain of comparisons is slow.
+  /// Of all nodes above the plane.
   [[nodiscard]] double highest_node() const {
-    std::array<double, 4> high{-kUncut, -kUncut, -kUncut, -kUncut};
-    for (std::size_t n = 0; n < kBlockNodes; n += 4) {
-      for (std::size_t k = 0; k < 4; ++k) {
-        const double above_plane = z[n + k] - plane[n + k];
-        high[k] = above_plane > high[k] ? above_plane : high[k];
-      }
-    }
-    return std::max(std::max(high[0], high[1]), std::max(high[2], high[3]));
+    using Nodes = Eigen::Map<const Eigen::Array<double, kBlockNodes, 1>>;
+    return (Nodes(z.data()) - Nodes(plane.data())).maxCoeff();
   }
 
   /// True if a ball with its centre in the span can be over a node.
@@ -221,30 +216,40 @@ struct MilledField::Block {
             range(y, rows, span.y_min + touch.y(), span.y_max + touch.y())};
   }
 
-  /// Offers what a move leaves at every node of a range: `below(x, y)`.
+  /// Offers what a move leaves at every node of a range, line by line along x or y:
+  /// `below(across, along, room, height)` gives it for the nodes of a line, as GraphArc does.
   template <class Below>
-  void cut(const NodeRange& range, std::int32_t by, const Below& below) {
-    std::array<double, kBlockSide> height{};
-    const auto [begin, end] = range.columns;
-    for (std::int64_t j = range.rows.first; j < range.rows.second; ++j) {
-      const double qy = y[index_of(j)];
-      for (std::int64_t i = begin; i < end; ++i) height[index_of(i)] = below(x[index_of(i)], qy);
-      for (std::int64_t i = begin; i < end; ++i) {
-        offer(index_of(j * kBlockSide + i), height[index_of(i)], by);
+  void cut_lines(bool along_x, const NodeRange& range, std::int32_t by, const Below& below) {
+    using Line = Eigen::Array<double, Eigen::Dynamic, 1, Eigen::ColMajor, kBlockSide, 1>;
+    const auto& [nodes, lines] =
+        along_x ? std::tie(range.columns, range.rows) : std::tie(range.rows, range.columns);
+    const auto& [at, across] = along_x ? std::tie(x, y) : std::tie(y, x);
+    const std::int64_t step = along_x ? 1 : kBlockSide;
+    const std::int64_t line_step = along_x ? kBlockSide : 1;
+    const Eigen::Map<const Eigen::ArrayXd> along(at.data() + nodes.first,
+                                                 nodes.second - nodes.first);
+    Line room(along.size());
+    Line height(along.size());
+    for (std::int64_t line = lines.first; line < lines.second; ++line) {
+      below(across[index_of(line)], along, room, height);
+      for (std::int64_t k = 0; k < along.size(); ++k) {
+        if (room[k] < 0.0) continue;
+        offer(index_of(line * line_step + (nodes.first + k) * step), height[k], by);
       }
     }
   }
 
   void cut_straight(const StraightSweep& sweep, std::int32_t by, const NodeRange& range) {
-    cut(range, by, [&, r = radius](double qx, double qy) {
-      return ball_below(sweep.centre(sweep.foot(r, qx, qy)), r, qx, qy);
+    cut_lines(true, range, by, [&](double qy, const auto& qx, auto& room, auto& height) {
+      sweep.below(radius, qy, qx, room, height);
     });
   }
 
   void cut_graph(const GraphArc& arc, std::int32_t by, const NodeRange& range) {
-    cut(range, by, [arc, r = radius](double qx, double qy) {
-      return ball_below(arc.centre(arc.foot(r, qx, qy)), r, qx, qy);
-    });
+    const auto below = [&](double across, const auto& along, auto& room, auto& height) {
+      arc.below(radius, across, along, room, height);
+    };
+    cut_lines(arc.along_x, range, by, below);
   }
 
   void cut_arc(const ArcSweep& sweep, std::int32_t by, const NodeRange& range) {
@@ -252,9 +257,14 @@ struct MilledField::Block {
       cut_graph(*graph, by, range);
       return;
     }
-    cut(range, by, [&, r = radius](double qx, double qy) {
-      return ball_below(sweep.centre(r, qx, qy), r, qx, qy);
-    });
+    for (std::int64_t j = range.rows.first; j < range.rows.second; ++j) {
+      for (std::int64_t i = range.columns.first; i < range.columns.second; ++i) {
+        const double qx = x[index_of(i)];
+        const double qy = y[index_of(j)];
+        offer(index_of(j * kBlockSide + i),
+              ball_below(sweep.centre(radius, qx, qy), radius, qx, qy), by);
+      }
+    }
   }
 };
 

@@ -36,23 +36,15 @@ RoundedField::RoundedField(const SurfaceField& designed, const CutSurface& cut, 
 
 void RoundedField::sample(const GridWindow& window, const Executor& executor,
                           SurfacePatch& patch) const {
-  CreasePatch creases;
-  sample(window, executor, patch, creases);
-}
-
-void RoundedField::sample(const GridWindow& window, const Executor& executor, SurfacePatch& patch,
-                          CreasePatch& creases) const {
   designed_.sample(window, executor, patch);
-  creases.depth.assign(patch.z.size(), 0.0);
-  creases.width.assign(patch.z.size(), 0.0);
+  patch.depth.assign(patch.z.size(), 0.0);
+  patch.width.assign(patch.z.size(), 0.0);
   if (cut_ == nullptr) {
-    round(*search_, {{0, window.columns}, {0, window.rows}}, executor, patch, creases);
+    round(*search_, {{0, window.columns}, {0, window.rows}}, executor, patch);
     return;
   }
   const std::vector<Range> squares = squares_of(window);
-  const auto round_square = [&](std::int64_t i) {
-    round_facets_of(squares[index_of(i)], patch, creases);
-  };
+  const auto round_square = [&](std::int64_t i) { round_facets_of(squares[index_of(i)], patch); };
   parallel_for(executor, "rounded squares", std::ssize(squares), round_square, 1);
 }
 
@@ -78,8 +70,7 @@ std::vector<RoundedField::Range> RoundedField::squares_of(const GridWindow& wind
 }
 
 /// Facets are made where nodes may be in a fillet, and for these alone.
-void RoundedField::round_facets_of(const Range& range, SurfacePatch& patch,
-                                   CreasePatch& creases) const {
+void RoundedField::round_facets_of(const Range& range, SurfacePatch& patch) const {
   Eigen::AlignedBox2d doubtful;
   for (std::int64_t row = range.rows.first; row < range.rows.second; ++row) {
     for (std::int64_t i = range.columns.first; i < range.columns.second; ++i) {
@@ -92,7 +83,7 @@ void RoundedField::round_facets_of(const Range& range, SurfacePatch& patch,
   const Eigen::Vector2d around(radius_, radius_);
   const Executor serial = Executor::serial();
   const auto cutter = cut_->cutter({doubtful.min() - around, doubtful.max() + around}, serial);
-  round(LowestBallSearch(*cutter, error_), range, serial, patch, creases);
+  round(LowestBallSearch(*cutter, error_), range, serial, patch);
 }
 
 bool RoundedField::surely_free(std::size_t node, const Eigen::Vector3d& centre,
@@ -108,8 +99,7 @@ Eigen::Vector3d RoundedField::tangent_ball(const Eigen::Vector2d& q,
 }
 
 void RoundedField::round(const LowestBallSearch& search, const Range& range,
-                         const Executor& executor, SurfacePatch& patch,
-                         CreasePatch& creases) const {
+                         const Executor& executor, SurfacePatch& patch) const {
   const std::int64_t columns = range.columns.second - range.columns.first;
   const std::int64_t rows = range.rows.second - range.rows.first;
   const std::int64_t runs = (columns + kRun - 1) / kRun;
@@ -129,8 +119,8 @@ void RoundedField::round(const LowestBallSearch& search, const Range& range,
       patch.slope_x[n] = -up.x() / up.z();
       patch.slope_y[n] = -up.y() / up.z();
       if (!patch.cut.empty()) patch.cut[n] = kFillet;
-      creases.depth[n] = ball.z - plane.z;
-      creases.width[n] = ball.spread;
+      patch.depth[n] = ball.z - plane.z;
+      patch.width[n] = ball.spread;
     }
   };
   parallel_for(executor, "rounded surface", runs * rows, round_run, 1);

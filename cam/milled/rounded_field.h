@@ -17,12 +17,6 @@
 
 namespace lensforge {
 
-/// What a ball cannot reach of a surface, at the nodes of a patch.
-struct CreasePatch {
-  std::vector<double> depth;  ///< Left standing above the designed surface, mm; 0 where reached.
-  std::vector<double> width;  ///< Of the fillet: largest distance of its ball's contacts, mm; or 0.
-};
-
 /// What a ball can reach of a surface when its rows lie infinitely close: the morphological closing
 /// of the surface by the ball. Where the ball that is tangent to the designed surface cuts into
 /// nothing the two surfaces are one; elsewhere it is the lower side of the ball that reaches
@@ -50,12 +44,9 @@ class RoundedField final : public SurfaceField {
 
   static constexpr double kPatch = 2.0;  ///< mm
 
+  /// Tells as well what was left standing: SurfacePatch::depth and width.
   void sample(const GridWindow& window, const Executor& executor,
               SurfacePatch& patch) const override;
-
-  /// sample() that tells as well what was left standing.
-  void sample(const GridWindow& window, const Executor& executor, SurfacePatch& patch,
-              CreasePatch& creases) const;
 
  private:
   /// Nodes of a window: columns and rows [first, second).
@@ -65,9 +56,9 @@ class RoundedField final : public SurfaceField {
   };
 
   static std::vector<Range> squares_of(const GridWindow& window);
-  void round_facets_of(const Range& range, SurfacePatch& patch, CreasePatch& creases) const;
+  void round_facets_of(const Range& range, SurfacePatch& patch) const;
   void round(const LowestBallSearch& search, const Range& range, const Executor& executor,
-             SurfacePatch& patch, CreasePatch& creases) const;
+             SurfacePatch& patch) const;
   /// Centre of the ball that touches the surface from above over q.
   [[nodiscard]] Eigen::Vector3d tangent_ball(const Eigen::Vector2d& q,
                                              const TangentPlane& plane) const;

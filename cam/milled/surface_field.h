@@ -40,6 +40,10 @@ struct SurfacePatch {
   /// Which piece the node lies on: nodes of one smooth piece share it, between nodes of two pieces
   /// the slope may jump. Empty where the whole surface is smooth.
   std::vector<std::int32_t> cut;
+  // What a ball cannot reach, of a surface that it rounds (RoundedField) or one cast in that; else
+  // empty.
+  std::vector<double> depth;  ///< Left standing above the designed surface, mm; 0 where reached.
+  std::vector<double> width;  ///< Of the fillet: largest distance of its ball's contacts, mm; or 0.
 };
 
 /// Makes room for a window's nodes. @param cuts  whether the surface has pieces.
@@ -50,6 +54,8 @@ inline void resize_patch(const GridWindow& window, bool cuts, SurfacePatch& patc
   patch.slope_x.resize(count);
   patch.slope_y.resize(count);
   patch.cut.resize(cuts ? count : 0);
+  patch.depth.clear();
+  patch.width.clear();
 }
 
 /// A surface that is known as finely as one likes, window by window, so that a whole lens never has

@@ -118,7 +118,8 @@ void CollisionCheck::check_material(const PathMove& move) {
       const double margin = i == 0 ? kRapidMargin : 0.0;
       const double lowest = piece.lowest + margin;
       if (lowest + profile.base >= highest_) continue;
-      const double depth = stock_.drop(widened(profile, piece.reach), piece.middle()) - lowest;
+      const double depth =
+          stock_.drop(widened(profile, piece.reach), piece.middle(), lowest) - lowest;
       if (depth <= 0.0) continue;
       note({parts_[i].name, material_at(profile, piece.middle(), piece.lowest), piece.to, depth});
     }

@@ -131,8 +131,8 @@ double StockMap::highest() {
   return highest;
 }
 
-double StockMap::drop(const CutterProfile& profile, const Eigen::Vector2d& p) {
-  double best = kNoContact;
+double StockMap::drop(const CutterProfile& profile, const Eigen::Vector2d& p, double above) {
+  double best = above;
   const Window all = cells_in(p, profile.radius);
   for (int block_row = all.row_begin / kBlock; block_row * kBlock <= all.row_end; ++block_row) {
     for (int block_column = all.column_begin / kBlock; block_column * kBlock <= all.column_end;

@@ -29,8 +29,10 @@ class StockMap {
   Extreme cut(const CutterProfile& profile, const Eigen::Vector3d& from, const Eigen::Vector3d& to);
 
   /// Lowest height of the tip over p at which the profile certainly touches no material, mm;
-  /// kNoContact if there is none under it.
-  [[nodiscard]] double drop(const CutterProfile& profile, const Eigen::Vector2d& p);
+  /// kNoContact if there is none under it. @param above  lower heights are of no interest: it is
+  /// returned instead, the sooner the higher it is.
+  [[nodiscard]] double drop(const CutterProfile& profile, const Eigen::Vector2d& p,
+                            double above = kNoContact);
 
   /// True if the profile over p is above some of the blank, seen from above.
   [[nodiscard]] bool under(const CutterProfile& profile, const Eigen::Vector2d& p) const;

@@ -45,9 +45,11 @@ class OpticalSurface {
   /// The point of a triangle with these barycentric weights, none below 0.
   [[nodiscard]] virtual SurfacePoint in_triangle(std::int64_t triangle,
                                                  const Eigen::Vector3d& weights) const = 0;
-  /// The cubic around such a point: one over the triangle, or one over each third of it.
+  /// The cubic around such a point: one over the triangle, or one over each third of it
+  /// (has_thirds()), the one whose points weigh the same corner least.
   [[nodiscard]] virtual SmoothPatch patch_in(std::int64_t triangle,
                                              const Eigen::Vector3d& weights) const = 0;
+  [[nodiscard]] virtual bool has_thirds() const { return false; }
   /// Bounds over a triangle, its border included.
   [[nodiscard]] virtual BendRange bend_range(std::int64_t triangle) const = 0;
 

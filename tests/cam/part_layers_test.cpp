@@ -36,7 +36,7 @@ TEST(PartLayers, EveryNodeHasTheSurfacesHeightAndSlopesTheUppermostFirst) {
   for (const CellRange& cells : tiles_of(all_cells(sampled), 100)) {
     for (const testing::AnalyticField* field : {&wave, &plane}) {
       field->sample(window_of(sampled, cells, 1), Executor::cpu(2), tile);
-      part.take(*field, tile);
+      part.take(*field, tile, Executor::serial());
     }
   }
   const LayeredImage& layers = part.layers();

@@ -38,12 +38,11 @@ TEST(RoundedField, PlaneAndRoofStayAsDesigned) {
     const GridWindow window = testing::window_at({0.0, 0.0}, 0.02, 101, 101);
     const SurfacePatch designed = testing::sampled(rounded.designed, window);
     SurfacePatch patch;
-    CreasePatch creases;
-    rounded.field.sample(window, Executor::serial(), patch, creases);
+    rounded.field.sample(window, Executor::serial(), patch);
     EXPECT_EQ(patch.z, designed.z);
     EXPECT_EQ(patch.slope_x, designed.slope_x);
     EXPECT_EQ(patch.cut, designed.cut);
-    EXPECT_EQ(*std::max_element(creases.depth.begin(), creases.depth.end()), 0.0);
+    EXPECT_EQ(*std::max_element(patch.depth.begin(), patch.depth.end()), 0.0);
   }
 }
 
@@ -59,8 +58,7 @@ TEST(RoundedField, VGrooveKeepsTheFilletOfTheClosedForm) {
         testing::grid_mesh(9, 7, 2.0, 2.0, [&](double x, double) { return groove.z(x); }));
     const GridWindow window = testing::window_at({0.85, 0.7}, 0.0003, 1001, 3);
     SurfacePatch patch;
-    CreasePatch creases;
-    rounded.field.sample(window, Executor::serial(), patch, creases);
+    rounded.field.sample(window, Executor::serial(), patch);
     const double a = std::atan(groove.left);
     const double b = std::atan(groove.right);
     const double turn = b - a;
@@ -81,9 +79,9 @@ TEST(RoundedField, VGrooveKeepsTheFilletOfTheClosedForm) {
         EXPECT_NEAR(patch.slope_x[i], slope, 1e-9);
       }
       EXPECT_EQ(patch.cut[i] == RoundedField::kFillet, fillet);
-      EXPECT_NEAR(creases.depth[i], fillet ? z0 - root - groove.z(x) : 0.0, 1e-12);
-      EXPECT_NEAR(creases.width[i], fillet ? 2.0 * kRadius * std::sin(0.5 * turn) : 0.0, 1e-12);
-      deepest = std::max(deepest, creases.depth[i]);
+      EXPECT_NEAR(patch.depth[i], fillet ? z0 - root - groove.z(x) : 0.0, 1e-12);
+      EXPECT_NEAR(patch.width[i], fillet ? 2.0 * kRadius * std::sin(0.5 * turn) : 0.0, 1e-12);
+      deepest = std::max(deepest, patch.depth[i]);
       filleted += fillet ? 1 : 0;
     }
     EXPECT_GT(filleted, 10U);
@@ -220,8 +218,7 @@ TEST(RoundedField, SmoothSurfaceKeepsWhatTheBallDoesNotReach) {
   const RoundedField field(designed, cut, 1e-4, Executor::serial());
   const GridWindow window = testing::window_at({0.5, 0.25}, 0.005, 201, 3);
   SurfacePatch patch;
-  CreasePatch creases;
-  field.sample(window, Executor::serial(), patch, creases);
+  field.sample(window, Executor::serial(), patch);
   const SurfacePatch plain = testing::sampled(designed, window);
   const auto cutter =
       cut.cutter({Eigen::Vector2d(0.2, 0.0), Eigen::Vector2d(1.8, 0.5)}, Executor::serial());
@@ -229,14 +226,14 @@ TEST(RoundedField, SmoothSurfaceKeepsWhatTheBallDoesNotReach) {
   for (std::size_t i = 201; i < 402; i += 10) {
     const auto column = static_cast<std::int64_t>(i - 201);
     EXPECT_NEAR(patch.z[i], best_of_many(*cutter, window.node(column, 1)), 1e-4);
-    held += creases.depth[i] > 0.0 ? 1 : 0;
-    if (creases.depth[i] == 0.0) {
+    held += patch.depth[i] > 0.0 ? 1 : 0;
+    if (patch.depth[i] == 0.0) {
       EXPECT_EQ(patch.z[i], plain.z[i]);
     }
   }
   EXPECT_GT(held, 2U);
   EXPECT_LT(held, 15U);
-  EXPECT_GT(creases.depth[301], 1e-3);
+  EXPECT_GT(patch.depth[301], 1e-3);
   EXPECT_NEAR(patch.slope_x[301], 0.0, 5e-2);
 }
 

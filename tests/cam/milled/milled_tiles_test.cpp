@@ -7,10 +7,12 @@
 #include <utility>
 
 #include "cam/cam_meshes.h"
+#include "cam/milled/cast_field.h"
 #include "cam/milled/crease_map.h"
 #include "cam/milled/designed_field.h"
 #include "cam/milled/held_field.h"
 #include "cam/milled/lens_grid.h"
+#include "cam/milled/rounded_field.h"
 #include "cam/milled/sampled_mesh.h"
 #include "cam/milled_paths.h"
 
@@ -93,6 +95,16 @@ TEST(HeldField, GivesPartsOfWhatItHoldsAndSamplesOthers) {
   EXPECT_EQ(counted.count, 3);
 }
 
+/// Drawn from tiles with a node more around them, as pictures are rendered.
+CreaseMap crease_map(const SurfaceField& field, const GridWindow& grid,
+                     const CreaseMapOptions& options, std::int64_t side) {
+  CreaseMapper mapper(grid, options);
+  for (const CellRange& tile : tiles_of(all_cells(grid), side)) {
+    mapper.add(tile, testing::sampled(field, window_of(grid, tile, 1)), Executor::cpu(2));
+  }
+  return mapper.map();
+}
+
 TEST(CreaseMap, FindsTheGroovesDepthWidthAndShare) {
   // Two grooves along y: at x = 1 with a turn of 2·atan(0.3), at x = 3 of 2·atan(0.1).
   const SurfaceMesh mesh = testing::grid_mesh(9, 5, 4.0, 2.0, [](double x, double) {
@@ -102,8 +114,7 @@ TEST(CreaseMap, FindsTheGroovesDepthWidthAndShare) {
   const DropCutter cutter(mesh, kRadius, Executor::serial());
   const RoundedField field(designed, designed.grid(), cutter, Executor::serial());
   const GridWindow grid = testing::window_at({0.0, 0.0}, 0.0025, 1601, 801);
-  const CreaseMap map = map_creases(field, grid, {1.0, 10, 0.9}, Executor::cpu(2), {});
-  ASSERT_TRUE(map.complete);
+  const CreaseMap map = crease_map(field, grid, {1.0, 10, 0.9}, 300);
   EXPECT_EQ(map.columns, 4);
   EXPECT_EQ(map.rows, 2);
   const double half = std::atan(0.3);
@@ -118,6 +129,31 @@ TEST(CreaseMap, FindsTheGroovesDepthWidthAndShare) {
   const double width = 2.0 * kRadius * (std::sin(half) + std::sin(shallow));
   EXPECT_NEAR(map.fillets, width / 4.0, 2.0 * 0.0025 / 4.0);
   EXPECT_NEAR(map.depth[1], kRadius * (1.0 / std::cos(half) - 1.0), 1e-6);
+
+  const CreaseMap in_one = crease_map(field, grid, {1.0, 10, 0.9}, 2000);
+  EXPECT_EQ(in_one.depth, map.depth);
+  EXPECT_EQ(in_one.share, map.share);
+  EXPECT_EQ(in_one.fillets, map.fillets);
+}
+
+TEST(CreaseMap, OfACastLensIsThatOfTheLens) {
+  // The mould's groove along y at X = 1 is the lens's ridge at x = 3, all of it 1/1.02 as large.
+  const double scale = 1.02;
+  const SurfaceMesh mesh =
+      testing::grid_mesh(9, 5, 4.0 * scale, 2.0 * scale,
+                         [&](double x, double) { return 5.0 + 0.3 * std::abs(x - 1.0 * scale); });
+  const FacetField designed(mesh);
+  const DropCutter cutter(mesh, kRadius, Executor::serial());
+  const RoundedField mould(designed, designed.grid(), cutter, Executor::serial());
+  const CastField cast(mould, {.scale = scale, .width = 4.0, .top = 3.0, .thickness = 5.0});
+  const HeldField held(cast);
+  const CreaseMap map =
+      crease_map(held, testing::window_at({0.0, 0.0}, 0.005, 801, 401), {1.0, 1, 0.9}, 300);
+  ASSERT_EQ(map.worst.size(), 1U);
+  const double half = std::atan(0.3);
+  EXPECT_NEAR(map.worst[0].place.x(), 3.0, 1e-9);
+  EXPECT_NEAR(map.worst[0].depth, kRadius * (1.0 / std::cos(half) - 1.0) / scale, 1e-9);
+  EXPECT_NEAR(map.worst[0].width, 2.0 * kRadius * std::sin(half) / scale, 1e-9);
 }
 
 TEST(CreaseMap, ASurfaceWithoutValleysHasNone) {
@@ -126,8 +162,7 @@ TEST(CreaseMap, ASurfaceWithoutValleysHasNone) {
   const FacetField designed(mesh);
   const DropCutter cutter(mesh, kRadius, Executor::serial());
   const RoundedField field(designed, designed.grid(), cutter, Executor::serial());
-  const CreaseMap map = map_creases(field, testing::window_at({0.0, 0.0}, 0.02, 201, 101), {},
-                                    Executor::serial(), {});
+  const CreaseMap map = crease_map(field, testing::window_at({0.0, 0.0}, 0.02, 201, 101), {}, 300);
   EXPECT_TRUE(map.worst.empty());
   EXPECT_EQ(map.fillets, 0.0);
 }
