@@ -9,7 +9,6 @@
 #include "core/surface/mesh_cut.h"
 #include "design/optics/surface_optics.h"
 #include "design/schedule/transport_sites.h"
-#include "design/transport/height_fit.h"
 
 namespace lensforge {
 
@@ -65,7 +64,7 @@ Eigen::Matrix2Xd map_faces(const FaceLight& light, const BrenierMap& map,
 }
 
 void aim_faces(const Correspondence& correspondence, const OpticalSetup& setup,
-               const Executor& executor, SurfaceMesh& mesh) {
+               const Executor& executor, SurfaceMesh& mesh, const HeightFitOptions& fit) {
   const LightPath light(setup);
   Eigen::Matrix2Xd gradients(2, mesh.triangles.cols());
   parallel_for(executor, "aim faces", mesh.triangles.cols(), [&](std::int64_t f) {
@@ -74,7 +73,7 @@ void aim_faces(const Correspondence& correspondence, const OpticalSetup& setup,
         (mesh.vertices.col(t[0]) + mesh.vertices.col(t[1]) + mesh.vertices.col(t[2])) / 3.0;
     gradients.col(f) = light.gradient_for(c, correspondence.centroids.col(f));
   });
-  fit_face_gradients(gradients, HeightFitOptions{}, executor, mesh);
+  fit_face_gradients(gradients, fit, executor, mesh);
 }
 
 }  // namespace lensforge

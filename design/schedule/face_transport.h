@@ -12,6 +12,7 @@
 #include "core/surface/surface_model.h"
 #include "design/energy/correspondence_term.h"
 #include "design/transport/brenier_map.h"
+#include "design/transport/height_fit.h"
 #include "design/transport/semi_discrete.h"
 
 namespace lensforge {
@@ -39,8 +40,9 @@ Eigen::Matrix2Xd map_faces(const FaceLight& light, const BrenierMap& map, const 
 
 /// Gives the mesh the heights that send the light of every face nearest to its wanted centroid, x
 /// and y staying: the light path tells the gradient that each face needs, fit_face_gradients() does
-/// the rest. It moves light over any distance in one step, which descent on Eq. 20 cannot.
+/// the rest, as closely as `fit` asks. It moves light over any distance in one step, which descent
+/// on Eq. 20 cannot.
 void aim_faces(const Correspondence& correspondence, const OpticalSetup& setup,
-               const Executor& executor, SurfaceMesh& mesh);
+               const Executor& executor, SurfaceMesh& mesh, const HeightFitOptions& fit = {});
 
 }  // namespace lensforge
