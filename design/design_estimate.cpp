@@ -12,13 +12,13 @@ namespace lensforge {
 namespace {
 
 /// Processor seconds for a triangle, on 2 GHz cores: of an iteration of facets and smooth model at
-/// 128² to 512² (5.2e-7 to 6.3e-7), of one of a spline, a triangle being one between nodes (96² and
-/// 128²), of one designed for a process (64² and 128²), and of its transport (6e-5 to 1.3e-4;
-/// facets have two).
-constexpr double kIterationSeconds = 5.7e-7;
+/// 256² and 512² (5.0e-7 to 5.5e-7), of one of a spline, a triangle being one between nodes (96² and
+/// 128²), of one designed for a process (64² and 128²), and of its transport with the mesh's start
+/// (5e-5 to 8e-5; facets have two).
+constexpr double kIterationSeconds = 5.1e-7;
 constexpr double kSplineSeconds = 2.5e-7;
 constexpr double kMadeSeconds = 1e-6;
-constexpr double kTransportSeconds = 1e-4;
+constexpr double kTransportSeconds = 6e-5;
 
 /// Bytes for a triangle: of its transport, of the optimisation of a mesh (512², 1.12 GB) and of a
 /// spline (128², 0.57 GB), and of what is written: surface and checkpoint, each twice while it is
