@@ -36,9 +36,9 @@ TEST(DesignEstimate, IsWithinThirtyPercentOfMeasuredDesigns) {
   // 2 GHz cores; docs/performance.md, "Design".
   for (const Measured& m : {Measured{"portrait", SurfaceModel::kSmooth, 128, 18, 2.8e8},
                             Measured{"logo", SurfaceModel::kSmooth, 128, 23, 2.8e8},
-                            Measured{"portrait", SurfaceModel::kSmooth, 256, 81, 6.3e8},
-                            Measured{"logo", SurfaceModel::kSmooth, 256, 105, 6.5e8},
-                            Measured{"photograph", SurfaceModel::kSmooth, 512, 291, 1.12e9},
+                            Measured{"portrait", SurfaceModel::kSmooth, 256, 70, 5.3e8},
+                            Measured{"logo", SurfaceModel::kSmooth, 256, 80, 5.4e8},
+                            Measured{"photograph", SurfaceModel::kSmooth, 512, 268, 1.08e9},
                             Measured{"portrait", SurfaceModel::kFacet, 128, 28, 2.8e8},
                             Measured{"portrait", SurfaceModel::kSpline, 64, 5.8, 2.7e8},
                             Measured{"logo", SurfaceModel::kSpline, 128, 24, 5.7e8},
