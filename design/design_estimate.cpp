@@ -12,9 +12,9 @@ namespace lensforge {
 namespace {
 
 /// Processor seconds for a triangle, on 2 GHz cores: of an iteration of facets and smooth model at
-/// 256² and 512² (5.0e-7 to 5.5e-7), of one of a spline, a triangle being one between nodes (96² and
-/// 128²), of one designed for a process (64² and 128²), and of its transport with the mesh's start
-/// (5e-5 to 8e-5; facets have two).
+/// 256² and 512² (5.0e-7 to 5.5e-7), of one of a spline, a triangle being one between nodes (96²
+/// and 128²), of one designed for a process (64² and 128²), and of its transport with the mesh's
+/// start (5e-5 to 8e-5; facets have two).
 constexpr double kIterationSeconds = 5.1e-7;
 constexpr double kSplineSeconds = 2.5e-7;
 constexpr double kMadeSeconds = 1e-6;
