@@ -26,8 +26,8 @@ class SmoothSurface final : public OpticalSurface {
                                          const Eigen::Vector3d& weights) const override;
   [[nodiscard]] SmoothPatch patch_in(std::int64_t triangle,
                                      const Eigen::Vector3d& weights) const override;
-  /// Second derivatives are linear on each third of a triangle, so that its corners say all.
   [[nodiscard]] bool has_thirds() const override { return true; }
+  /// Second derivatives are linear on each third of a triangle, so that its corners say all.
   [[nodiscard]] BendRange bend_range(std::int64_t triangle) const override;
 
   /// The surface's height, and the slopes of the vertex-normal model itself: linear between the

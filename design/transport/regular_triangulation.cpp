@@ -14,6 +14,7 @@
 #include <cstdint>
 
 #include "core/error.h"
+#include "core/surface/corners.h"
 
 namespace lensforge {
 
@@ -193,10 +194,6 @@ void RegularTriangulation::append_star(std::size_t f, int site, std::vector<Side
 }
 
 namespace {
-
-double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
-  return a.x() * b.y() - a.y() * b.x();
-}
 
 /// A raised site comes to lie this share of its depth before below the triangle around it, and of
 /// the depth that it has without weights, where that is more: far above rounding, so that sites
