@@ -46,7 +46,7 @@ add_library(lensforge_cuda_options INTERFACE)
 target_compile_definitions(lensforge_cuda_options INTERFACE LENSFORGE_CUDA)
 target_compile_options(lensforge_cuda_options INTERFACE
   --expt-relaxed-constexpr -diag-suppress=20012
-  -Xcompiler=-Wall,-Wextra,-Wshadow,-Wnon-virtual-dtor,-ffp-contract=off,-fno-math-errno)
+  -Xcompiler=-fPIC,-Wall,-Wextra,-Wshadow,-Wnon-virtual-dtor,-ffp-contract=off,-fno-math-errno)
 if(NOT LENSFORGE_CUDA_FMA)
   target_compile_options(lensforge_cuda_options INTERFACE -fmad=false)
 endif()
