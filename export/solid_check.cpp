@@ -17,8 +17,8 @@
 #include <system_error>
 
 #include "core/error.h"
-#include "export/byte_record.h"
-#include "export/child_work.h"
+#include "core/sandbox/byte_record.h"
+#include "core/sandbox/child_work.h"
 #include "export/solid_reading.h"
 
 namespace lensforge {

@@ -22,7 +22,7 @@
 
 #include "core/error.h"
 #include "core/io/files.h"
-#include "export/byte_record.h"
+#include "core/sandbox/byte_record.h"
 #include "export/part21_check.h"
 #include "export/solid_reading.h"
 

@@ -14,7 +14,7 @@
 #include "core/compute/work_estimate.h"
 #include "core/error.h"
 #include "core/io/files.h"
-#include "export/child_work.h"
+#include "core/sandbox/child_work.h"
 #include "export/solid_check.h"
 
 namespace lensforge {

@@ -24,9 +24,9 @@
 
 #include "core/error.h"
 #include "core/io/files.h"
+#include "core/sandbox/byte_record.h"
+#include "core/sandbox/child_work.h"
 #include "core/surface/control_net.h"
-#include "export/byte_record.h"
-#include "export/child_work.h"
 #include "export/face_sampler.h"
 #include "export/part21_check.h"
 #include "export/solid_check.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/child_work.h"
+#include "core/sandbox/child_work.h"
 
 #include <gmock/gmock.h>
 #include <unistd.h>
@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/sandbox/byte_record.h"
 #include "core/stop_bound.h"
 #include "core/temp_folder.h"
-#include "export/byte_record.h"
 
 namespace lensforge::testing {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/child_work.h"
+#include "core/sandbox/child_work.h"
 
 #include <fcntl.h>
 #include <poll.h>
