@@ -14,8 +14,14 @@ if(LENSFORGE_NVCC AND NOT CMAKE_CUDA_COMPILER)
   set(CMAKE_CUDA_COMPILER "${LENSFORGE_NVCC}")
 endif()
 if(NOT DEFINED CMAKE_CUDA_ARCHITECTURES)
-  # Turing to Hopper, and PTX for what comes after.
-  set(CMAKE_CUDA_ARCHITECTURES 75-real 80-real 86-real 89-real 90)
+  # A build from source is for the GPU of its machine. Without one, PTX for Turing and later shows that all
+  # GPU code compiles and links; machine code of five generations takes many times as long (ptxas).
+  execute_process(COMMAND nvidia-smi -L RESULT_VARIABLE gpu_missing OUTPUT_QUIET ERROR_QUIET)
+  if(gpu_missing)
+    set(CMAKE_CUDA_ARCHITECTURES 75-virtual)
+  else()
+    set(CMAKE_CUDA_ARCHITECTURES native)
+  endif()
 endif()
 include(CheckLanguage)
 check_language(CUDA)
