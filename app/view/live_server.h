@@ -35,8 +35,8 @@ class LiveServer {
   void publish(LiveState state);
 
  private:
-  struct Listener;
-  std::unique_ptr<Listener> listener_;
+  class Content;
+  std::unique_ptr<Content> content_;
 };
 
 }  // namespace lensforge

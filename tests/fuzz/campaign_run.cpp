@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "fuzz/child.h"
+#include "fuzz/live_clients.h"
 #include "fuzz/oracles.h"
 #include "fuzz/sandbox.h"
 #include "fuzz/scene.h"
@@ -168,6 +169,10 @@ void connect(Plan& plan, const std::string& port) {
 void judge(const Campaign& campaign, Plan plan, const fs::path& folder, RunResult& result) {
   std::optional<ServedPort> port;
   if (plan.serial_port) connect(plan, port.emplace().path());
+  std::optional<LiveClients> clients;
+  if (plan.page_clients) {
+    connect(plan, std::to_string(clients.emplace(*plan.page_clients).port()));
+  }
   const Snapshot before = snapshot(folder / "sandbox");
   const std::vector<Ending> endings = carry_out(plan, campaign.budget, folder);
   result.wrong = wrong_files(plan, endings, before, snapshot(folder / "sandbox"));
@@ -181,6 +186,9 @@ void judge(const Campaign& campaign, Plan plan, const fs::path& folder, RunResul
   }
   check_product(plan, endings, folder, result.wrong);
   if (port) check_machine(plan, endings, *port, result.wrong);
+  if (clients && clients->unanswered()) {
+    result.wrong.emplace_back("the page does not answer a proper request");
+  }
 }
 
 }  // namespace

@@ -2,7 +2,9 @@
 #pragma once
 
 #include <csignal>
+#include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <set>
 #include <string>
 #include <utility>
@@ -32,6 +34,8 @@ struct Plan {
   std::string lens;          ///< A folder whose lens must be whole after all, old or new; or empty.
   std::string product;       ///< What `info` must accept after success; empty: nothing.
   bool serial_port = false;  ///< A simulated controller on a pseudo-terminal serves {PORT}.
+  /// Hostile clients, from this seed, of the page that --live {PORT} serves.
+  std::optional<std::uint64_t> page_clients;
 };
 
 /// A command line that knows its options, so that each is given once.

@@ -231,6 +231,20 @@ void neighbours(Scene& scene) {
   if (way == 2) scene.plan.lens = "lens";
 }
 
+/// A design whose page hostile clients ask: a long one that a signal ends, or one that ends itself.
+void live_page(Scene& scene) {
+  scene.copy("pictures/a.png", "a.png");
+  CommandLine line = scene.design("a.png", "out").set("--live", "{PORT}");
+  if (scene.random.one_in(2)) {
+    line.set("--rounds", "1000").set("--quality", "paper");
+    scene.interrupt_within(1.5);
+  } else {
+    scene.plan.must_work = true;
+  }
+  scene.plan.page_clients = scene.random.next();
+  scene.run(line);
+}
+
 }  // namespace
 
 std::vector<Kind> world_kinds() {
@@ -242,7 +256,8 @@ std::vector<Kind> world_kinds() {
           {"config", 3, config},
           {"descriptors", 4, descriptors},
           {"full disk", 4, full_disk},
-          {"two at once", 3, neighbours}};
+          {"two at once", 3, neighbours},
+          {"live page", 3, live_page}};
 }
 
 }  // namespace lensforge::fuzz

@@ -4,9 +4,13 @@
 
 #include <csignal>
 #include <cstdlib>
+#include <stop_token>
+#include <system_error>
 #include <thread>
+#include <vector>
 
 #include "app/view/browser.h"
+#include "app/view/page_client.h"
 #include "core/stop_bound.h"
 #include "scenario/driver.h"
 
@@ -82,6 +86,31 @@ class PressedPage {
   std::thread thread_;
 };
 
+/// 40 clients that send a header line again and again; who is dropped comes back.
+class SlowClients {
+ public:
+  explicit SlowClients(int port)
+      : thread_([port](const std::stop_token& stop) {
+          std::vector<testing::PageClient> clients;
+          while (!stop.stop_requested()) {
+            try {
+              while (clients.size() < 40) clients.emplace_back(port).send("GET / HTTP/1.1\r\n");
+            } catch (const std::system_error&) {
+              return;  // The design has ended.
+            }
+            std::this_thread::sleep_for(std::chrono::milliseconds(300));
+            std::erase_if(clients, [](testing::PageClient& client) {
+              client.send("X: y\r\n");
+              client.receive(std::chrono::milliseconds(0));
+              return client.closed();
+            });
+          }
+        }) {}
+
+ private:
+  std::jthread thread_;
+};
+
 using Live = Scenario;
 
 TEST_F(Live, ServesPicturesAndErrorOfTheDesignToItsOwnPageAlone) {
@@ -116,6 +145,28 @@ TEST_F(Live, CtrlCEndsItThoughABrowserHoldsAConnectionAndItsPortIsFreeAtOnce) {
   EXPECT_EQ(design.wait(testing::kStopBound).exit_code, 130);
   Process next(live_design(path("other"), std::to_string(port)));
   EXPECT_EQ(port_of(next), port) << next.said();
+}
+
+TEST_F(Live, CtrlCEndsItWhateverItsClientsDo) {
+  Process design(live_design(path("lens"), "0"));
+  const int port = port_of(design);
+  ASSERT_GT(port, 0) << design.said();
+  const SlowClients slow(port);
+  std::vector<testing::PageClient> half_open;
+  for (int i = 0; i < 300; ++i) half_open.emplace_back(port).send("GET / HT");
+  httplib::Client client("127.0.0.1", port);
+  ASSERT_TRUE(first_state(design, client).is_object());
+  design.send(SIGINT);
+  EXPECT_EQ(design.wait(testing::kStopBound).exit_code, 130);
+}
+
+TEST_F(Live, EndsWithTheDesignWhateverItsClientsDo) {
+  Process design({"design", picture("rings.png"), "--out", path("lens"), "--pixels", "32",
+                  "--rounds", "3", "--threads", "1", "--live", "0"});
+  const int port = port_of(design);
+  ASSERT_GT(port, 0) << design.said();
+  const SlowClients slow(port);
+  EXPECT_EQ(design.wait(std::chrono::seconds(60)).exit_code, 0);
 }
 
 TEST_F(Live, ItsStopButtonEndsTheDesignAsCtrlCDoes) {
