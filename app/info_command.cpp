@@ -23,6 +23,7 @@
 #include "core/surface/setup_json.h"
 #include "core/text/printable.h"
 #include "export/iges_file.h"
+#include "export/mesh_content.h"
 #include "export/step_file.h"
 #include "machine/gcode/program_seal.h"
 
@@ -222,11 +223,33 @@ Description describe_picture(const fs::path& path) {
   return d;
 }
 
+/// A mesh in a package for printers or scenes.
+Description describe_package(const MeshContent& content) {
+  Description d{{{"kind", "mesh"}}, {}};
+  d.line("format", content.format);
+  if (!content.title.empty()) d.line("title", content.title);
+  d.line("mesh",
+         std::to_string(content.vertices) + " vertices, " + std::to_string(content.triangles) +
+             " triangles" +
+             (content.meshes > 1 ? " in " + std::to_string(content.meshes) + " parts" : ""));
+  describe_extent(d, content.box, " mm");
+  if (content.moved) d.line("placed", "moved or turned, which x, y and z leave out");
+  d.json.update({{"format", content.format},
+                 {"title", content.title},
+                 {"meshes", content.meshes},
+                 {"vertices", content.vertices},
+                 {"triangles", content.triangles},
+                 {"moved", content.moved}});
+  return d;
+}
+
 Description describe(const fs::path& path, const CommonOptions& common) {
   if (is_folder(path)) return describe_lens(path);
   if (has_extension(path, {".ngc", ".nc", ".gcode", ".tap"})) return describe_gcode(path);
   const bool iges = has_extension(path, {".igs", ".iges"});
   if (iges || is_step_file(path)) return describe_solid(path, iges, common);
+  if (has_extension(path, {".3mf"})) return describe_package(inspect_3mf(path));
+  if (has_extension(path, {".glb"})) return describe_package(inspect_glb(path));
   if (!has_extension(path, {".ply", ".obj", ".stl", ".off"})) return describe_picture(path);
   Description d{{{"kind", "mesh"}}, {}};
   describe_mesh(d, read_mesh(path));

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -10,38 +10,41 @@
 
 namespace lensforge {
 
-/// A mesh in the making, vertex by vertex and triangle by triangle.
+/// A mesh in the making, vertex by vertex and face by face.
 class MeshBuilder {
  public:
   [[nodiscard]] std::int64_t vertex_count() const { return std::ssize(points_) / 3; }
-  [[nodiscard]] std::int64_t triangle_count() const { return std::ssize(corners_) / 3; }
+  [[nodiscard]] std::int64_t face_count() const { return faces_; }
 
   /// Rounds the coordinates to single precision.
-  void add_vertex(double x, double y, double z) {
-    for (const double value : {x, y, z}) {
-      points_.push_back(static_cast<double>(static_cast<float>(value)));
-    }
-  }
-  void add_corner(int vertex) { corners_.push_back(vertex); }
+  void add_vertex(double x, double y, double z);
 
-  [[nodiscard]] SurfaceMesh mesh() const {
-    SurfaceMesh mesh;
-    mesh.vertices = Eigen::Map<const Eigen::Matrix3Xd>(points_.data(), 3,
-                                                       static_cast<Eigen::Index>(vertex_count()));
-    mesh.triangles = Eigen::Map<const Eigen::Matrix3Xi>(
-        corners_.data(), 3, static_cast<Eigen::Index>(triangle_count()));
-    return mesh;
-  }
+  /// A polygon; its vertices may follow later. @pre corners.size() ≥ 3
+  void add_face(std::span<const int> corners);
+
+  /// Polygons are triangles here, see polygon_triangles(). Those with indices that are out of range
+  /// or with vertices that are not finite are fans.
+  [[nodiscard]] SurfaceMesh mesh() const;
 
  private:
+  /// A face with more than three corners, as the fan that stands for it in `triangles_`.
+  struct Polygon {
+    std::int64_t first = 0;  ///< Triangle.
+    std::int64_t corners = 0;
+  };
+
+  void cut(const Polygon& polygon, SurfaceMesh& mesh) const;
+
   std::vector<double> points_;
-  std::vector<int> corners_;
+  std::vector<int> triangles_;
+  std::vector<Polygon> polygons_;
+  std::int64_t faces_ = 0;
 };
 
-/// What to say of a face that is no triangle.
+/// What to say of a face that is no polygon.
 inline std::string corner_problem(std::int64_t face, std::int64_t corners) {
   return "face " + std::to_string(face) + " has " + std::to_string(corners) +
-         " corners: only triangles can be read";
+         " corners: it must have 3 at least";
 }
 
 }  // namespace lensforge

@@ -156,7 +156,7 @@ void check_mesh(const SurfaceMesh& mesh, const fs::path& path) {
   for (Eigen::Index t = 0; t < mesh.triangles.cols(); ++t) {
     for (const int v : mesh.triangles.col(t)) {
       if (v >= 0 && v < mesh.vertices.cols()) continue;
-      refuse(path, "face " + std::to_string(t) + " uses vertex " + std::to_string(v) +
+      refuse(path, "triangle " + std::to_string(t) + " uses vertex " + std::to_string(v) +
                        ": there are only 0 ... " + std::to_string(mesh.vertices.cols() - 1));
     }
   }

@@ -8,9 +8,10 @@
 
 namespace lensforge {
 
-/// Reads PLY, OBJ, STL or OFF, chosen by the extension. STL corners that coincide are merged.
+/// Reads PLY, OBJ, STL or OFF, chosen by the extension. STL corners that coincide are merged, other
+/// polygons cut into triangles.
 /// @throw InputError naming the file if it is missing, no regular file, corrupt, empty, has a face
-///        that is no triangle, an index out of range or a coordinate that is not finite.
+///        of fewer than three corners, an index out of range or a coordinate that is not finite.
 SurfaceMesh read_mesh(const std::filesystem::path& path);
 
 /// Writes binary little-endian PLY, `double x y z` and `uchar`/`int` triangle list; whole or not at

@@ -13,7 +13,8 @@
 namespace lensforge {
 namespace {
 
-constexpr std::string_view kBlanks = " \t\r\v\f";
+constexpr std::string_view kBlanks = " \t\v\f";
+constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
 constexpr std::size_t kLongestShownWord = 40;
 
 char small(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
@@ -26,28 +27,54 @@ std::string_view without_plus(std::string_view word) {
 
 }  // namespace
 
-MeshText::MeshText(std::string_view text, std::string name, Comments comments, std::int64_t before)
-    : text_(text), name_(std::move(name)), comments_(comments), line_(before) {}
+MeshText::MeshText(std::string_view text, std::string name, Form form, std::int64_t before)
+    : text_(text), name_(std::move(name)), form_(form), line_(before) {
+  if (text_.starts_with(kByteOrderMark)) next_ = kByteOrderMark.size();
+}
+
+/// The next line as it stands in the file; false at the end of the text.
+bool MeshText::take_line() {
+  continues_ = false;
+  rest_ = {};
+  if (next_ >= text_.size()) return false;
+  const std::size_t end = std::min(text_.find_first_of("\r\n", next_), text_.size());
+  rest_ = text_.substr(next_, end - next_);
+  next_ = std::min(end + (text_.substr(end).starts_with("\r\n") ? 2 : 1), text_.size());
+  ++line_;
+  if (form_ == Form::kPlain) return true;
+  // A comment ends with its line, whatever its last letter is.
+  rest_ = rest_.substr(0, rest_.find('#'));
+  const std::size_t last = rest_.find_last_not_of(kBlanks);
+  continues_ =
+      form_ == Form::kContinuedLines && last != std::string_view::npos && rest_[last] == '\\';
+  if (continues_) rest_ = rest_.substr(0, last);
+  return true;
+}
+
+/// Goes on to the next word of this line, if it has one.
+bool MeshText::at_word() {
+  for (;;) {
+    const std::size_t begin = rest_.find_first_not_of(kBlanks);
+    if (begin != std::string_view::npos) {
+      rest_.remove_prefix(begin);
+      return true;
+    }
+    if (!continues_ || !take_line()) return false;
+  }
+}
 
 bool MeshText::next_line() {
-  while (next_ < text_.size()) {
-    const std::size_t end = std::min(text_.find('\n', next_), text_.size());
-    rest_ = text_.substr(next_, end - next_);
-    next_ = std::min(end + 1, text_.size());
-    ++line_;
-    if (comments_ == Comments::kHash) rest_ = rest_.substr(0, rest_.find('#'));
-    if (rest_.find_first_not_of(kBlanks) != std::string_view::npos) return true;
+  while (continues_) take_line();
+  while (take_line()) {
+    if (at_word()) return true;
   }
-  rest_ = {};
   return false;
 }
 
 std::string_view MeshText::word() {
-  const std::size_t begin = rest_.find_first_not_of(kBlanks);
-  if (begin == std::string_view::npos) return {};
-  const std::size_t end = std::min(rest_.find_first_of(kBlanks, begin), rest_.size());
-  const std::string_view found = rest_.substr(begin, end - begin);
-  rest_.remove_prefix(end);
+  if (!at_word()) return {};
+  const std::string_view found = rest_.substr(0, rest_.find_first_of(kBlanks));
+  rest_.remove_prefix(found.size());
   return found;
 }
 
@@ -87,6 +114,12 @@ std::int64_t MeshText::whole_from(std::string_view word, const std::string& mean
 
 void MeshText::refuse(const std::string& why) const {
   throw InputError(name_ + ": line " + std::to_string(line_) + ": " + why);
+}
+
+std::string_view without_lead(std::string_view text) {
+  if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
+  text.remove_prefix(std::min(text.find_first_not_of(" \t\v\f\r\n"), text.size()));
+  return text;
 }
 
 bool same_word(std::string_view a, std::string_view small_letters) {

@@ -7,16 +7,20 @@
 
 namespace lensforge {
 
-/// A text file of a mesh, line by line and word by word. '#' begins a comment where the format has
-/// such comments.
+/// A text file of a mesh, line by line and word by word. Lines end with LF, CR LF or CR; a byte
+/// order mark before the first is passed over.
 class MeshText {
  public:
-  enum class Comments { kNone, kHash };
+  enum class Form {
+    kPlain,
+    kHashComments,    ///< '#' begins a comment.
+    kContinuedLines,  ///< The same, and a line that ends with a backslash goes on in the next one.
+  };
 
   /// @param name    what to call the file in messages.
   /// @param before  lines of the file that stand before `text`.
   /// @pre `text` outlives this.
-  MeshText(std::string_view text, std::string name, Comments comments, std::int64_t before = 0);
+  MeshText(std::string_view text, std::string name, Form form, std::int64_t before = 0);
 
   /// Goes to the next line that holds a word; false at the end of the text.
   bool next_line();
@@ -39,13 +43,20 @@ class MeshText {
   [[noreturn]] void refuse(const std::string& why) const;
 
  private:
+  bool take_line();
+  bool at_word();
+
   std::string_view text_;
   std::string name_;
-  Comments comments_;
-  std::string_view rest_;  ///< Of this line.
+  Form form_;
+  std::string_view rest_;   ///< Of this line.
+  bool continues_ = false;  ///< This line goes on in the next one.
   std::size_t next_ = 0;
   std::int64_t line_;
 };
+
+/// `text` without a byte order mark and white space in front.
+std::string_view without_lead(std::string_view text);
 
 /// Whether two words are the same but for capitals (ASCII).
 bool same_word(std::string_view a, std::string_view small_letters);

@@ -10,7 +10,8 @@
 #include "core/surface/mesh_text.h"
 
 // Wavefront, "Object Files (.obj)", version 3.0: indices count from 1, negative ones from the last
-// vertex back. Lines that are no part of the mesh (normals, groups, materials, …) are passed over.
+// vertex back. Lines that are no part of the mesh (normals, groups, materials, …) are passed over,
+// and so is what follows z: a weight, or a colour.
 namespace lensforge {
 namespace {
 
@@ -33,23 +34,24 @@ int corner_of(std::string_view word, const MeshText& text, const MeshBuilder& bu
 }
 
 void read_face(MeshText& text, MeshBuilder& builder) {
-  std::int64_t corners = 0;
+  std::vector<int> corners;
   for (auto word = text.word(); !word.empty(); word = text.word()) {
-    if (++corners <= 3) builder.add_corner(corner_of(word, text, builder));
+    corners.push_back(corner_of(word, text, builder));
   }
-  if (corners == 3) return;
-  text.refuse(corner_problem((builder.triangle_count()) - (corners > 3 ? 1 : 0), corners));
+  if (corners.size() < 3) text.refuse(corner_problem(builder.face_count(), std::ssize(corners)));
+  builder.add_face(corners);
 }
 
 }  // namespace
 
 SurfaceMesh read_obj(std::string_view content, const std::string& name) {
-  MeshText text(content, name, MeshText::Comments::kHash);
+  MeshText text(content, name, MeshText::Form::kContinuedLines);
   MeshBuilder builder;
   while (text.next_line()) {
     const std::string_view keyword = text.word();
-    if (keyword == "v") read_vertex(text, builder);
-    if (keyword == "f") read_face(text, builder);
+    if (same_word(keyword, "v")) read_vertex(text, builder);
+    // "fo" is what faces were called before version 3.0.
+    if (same_word(keyword, "f") || same_word(keyword, "fo")) read_face(text, builder);
   }
   return builder.mesh();
 }

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/surface/mesh_text.h"
+#include "core/text/lower_case.h"
 
 namespace lensforge {
 namespace {
@@ -31,8 +32,11 @@ constexpr std::array<std::pair<std::string_view, PlyType>, 16> kTypes{{
     {"float64", {Kind::kFloat, 8}},
 }};
 
+/// The next word in small letters: some programs write capitals.
+std::string small_word(MeshText& text) { return lower_case(std::string(text.word())); }
+
 PlyType read_type(MeshText& text) {
-  const std::string_view word = text.word();
+  const std::string word = small_word(text);
   for (const auto& [name, type] : kTypes) {
     if (word == name) return type;
   }
@@ -41,7 +45,7 @@ PlyType read_type(MeshText& text) {
 }
 
 PlyHeader::Format read_format(MeshText& text) {
-  const std::string_view word = text.word();
+  const std::string word = small_word(text);
   if (word == "ascii") return PlyHeader::Format::kText;
   if (word == "binary_little_endian") return PlyHeader::Format::kLittleEndian;
   if (word == "binary_big_endian") return PlyHeader::Format::kBigEndian;
@@ -51,7 +55,7 @@ PlyHeader::Format read_format(MeshText& text) {
 
 PlyElement read_element(MeshText& text, const PlyHeader& header) {
   PlyElement element;
-  element.name = text.word();
+  element.name = small_word(text);
   element.count = text.whole_from(text.word(), "the number of an element");
   const bool is_known =
       std::any_of(header.elements.begin(), header.elements.end(),
@@ -67,7 +71,7 @@ PlyElement read_element(MeshText& text, const PlyHeader& header) {
 PlyProperty read_property(MeshText& text, const PlyElement& element) {
   PlyProperty property;
   MeshText after_list = text;
-  if (after_list.word() == "list") {
+  if (small_word(after_list) == "list") {
     text = after_list;
     property.count_type = read_type(text);
     if (property.count_type->kind == Kind::kFloat) {
@@ -75,7 +79,7 @@ PlyProperty read_property(MeshText& text, const PlyElement& element) {
     }
   }
   property.type = read_type(text);
-  property.name = text.word();
+  property.name = small_word(text);
   if (property.name.empty()) text.refuse("has a property without a name");
   if (element.index_of({property.name})) {
     text.refuse("has the property " + quoted_word(property.name) + " twice");
@@ -135,13 +139,14 @@ std::optional<std::size_t> PlyElement::index_of(const std::vector<std::string_vi
 }
 
 PlyHeader read_ply_header(std::string_view content, const std::string& name) {
-  MeshText text(content, name, MeshText::Comments::kNone);
+  MeshText text(content, name, MeshText::Form::kPlain);
   PlyHeader header;
   bool has_format = false;
   bool has_end = false;
-  if (!text.next_line() || text.word() != "ply") text.refuse("is no PLY mesh: \"ply\" is missing");
+  if (!text.next_line() || small_word(text) != "ply")
+    text.refuse("is no PLY mesh: \"ply\" is missing");
   while (text.next_line()) {
-    const std::string_view keyword = text.word();
+    const std::string keyword = small_word(text);
     has_end = keyword == "end_header";
     if (has_end) break;
     if (keyword == "format") {
@@ -158,11 +163,14 @@ PlyHeader read_ply_header(std::string_view content, const std::string& name) {
     }
   }
   // The line's end belongs to the header too.
-  if (!has_end || content[text.end_of_line() - 1] != '\n') {
+  const std::string_view all = content.substr(0, text.end_of_line());
+  if (!has_end || !(all.ends_with('\n') || all.ends_with('\r'))) {
     text.refuse("is truncated: its header has no \"end_header\"");
   }
   if (!has_format) text.refuse("has no \"format\" in its header");
-  header.end = text.end_of_line();
+  header.end = all.size();
+  // Where lines end with CR alone, an LF behind the header is the first byte of the data.
+  if (all.ends_with("\r\n") && std::count(all.begin(), all.end(), '\n') == 1) --header.end;
   header.lines = text.line();
   check_elements(header, content.size(), text);
   return header;

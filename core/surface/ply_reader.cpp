@@ -9,6 +9,7 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "core/error.h"
 #include "core/surface/mesh_builder.h"
@@ -45,7 +46,7 @@ class PlyNumbers {
       : format_(header.format),
         name_(name),
         bytes_(content.substr(header.end)),
-        text_(bytes_, name, MeshText::Comments::kNone, header.lines) {}
+        text_(bytes_, name, MeshText::Form::kPlain, header.lines) {}
 
   double next(const PlyType& type) {
     if (format_ == PlyHeader::Format::kText) {
@@ -120,15 +121,17 @@ void read_vertex(const PlyElement& element, PlyNumbers& numbers, MeshBuilder& bu
 
 void read_corners(const PlyProperty& list, PlyNumbers& numbers, MeshBuilder& builder) {
   const std::int64_t count = numbers.next_count(*list.count_type);
-  if (count != 3) numbers.refuse(corner_problem(builder.triangle_count(), count));
-  for (int k = 0; k < 3; ++k) {
+  if (count < 3) numbers.refuse(corner_problem(builder.face_count(), count));
+  std::vector<int> corners;
+  for (std::int64_t k = 0; k < count; ++k) {
     const std::int64_t vertex = numbers.next_whole(list.type);
     // Whether there is such a vertex is looked up once all are read.
     if (!std::in_range<int>(vertex)) {
       numbers.refuse("a face uses vertex " + std::to_string(vertex) + ": there is none");
     }
-    builder.add_corner(static_cast<int>(vertex));
+    corners.push_back(static_cast<int>(vertex));
   }
+  builder.add_face(corners);
 }
 
 void read_face(const PlyElement& element, std::size_t list, PlyNumbers& numbers,

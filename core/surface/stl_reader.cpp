@@ -15,8 +15,8 @@
 
 // Binary: 80 bytes of anything, a count, then 50 bytes a triangle (normal, three corners, two bytes
 // of anything). Text: solid { facet normal n { outer loop { vertex v } endloop } endfacet }
-// endsolid. A binary file may begin with "solid" too, so its size decides, and where that is wrong,
-// a zero byte, which no text has.
+// endsolid, with any white space between words. A binary file may begin with "solid" too, so its
+// size decides, and where that is wrong, a zero byte, which no text has.
 namespace lensforge {
 namespace {
 
@@ -41,18 +41,22 @@ struct PointHash {
 /// Gives corners that coincide one vertex.
 class CornerMerger {
  public:
-  void add_corner(const Point& point) {
+  void add_triangle(const std::array<Point, 3>& points) {
+    builder_.add_face(std::array{vertex(points[0]), vertex(points[1]), vertex(points[2])});
+  }
+  [[nodiscard]] SurfaceMesh mesh() const { return builder_.mesh(); }
+
+ private:
+  int vertex(const Point& point) {
     const auto [entry, is_new] =
         vertices_.try_emplace(point, static_cast<int>(builder_.vertex_count()));
     if (is_new) {
       builder_.add_vertex(static_cast<double>(point[0]), static_cast<double>(point[1]),
                           static_cast<double>(point[2]));
     }
-    builder_.add_corner(entry->second);
+    return entry->second;
   }
-  [[nodiscard]] SurfaceMesh mesh() const { return builder_.mesh(); }
 
- private:
   MeshBuilder builder_;
   std::unordered_map<Point, int, PointHash> vertices_;
 };
@@ -70,9 +74,9 @@ std::size_t binary_size(std::string_view content) {
 SurfaceMesh read_binary(std::string_view content) {
   CornerMerger merger;
   for (std::size_t at = kHeadBytes; at < content.size(); at += kTriangleBytes) {
-    std::array<Point, 4> normal_and_corners{};
-    std::memcpy(&normal_and_corners, content.data() + at, sizeof normal_and_corners);
-    for (std::size_t k = 1; k < 4; ++k) merger.add_corner(normal_and_corners[k]);
+    std::array<Point, 3> corners{};
+    std::memcpy(&corners, content.data() + at + sizeof(Point), sizeof corners);  // Past the normal.
+    merger.add_triangle(corners);
   }
   return merger.mesh();
 }
@@ -97,31 +101,49 @@ void read_facet(MeshText& text, CornerMerger& merger) {
   read_point(text, "a number of a normal");
   expect(text, "outer");
   expect(text, "loop");
-  for (int k = 0; k < 3; ++k) {
+  std::array<Point, 3> corners{};
+  for (Point& corner : corners) {
     expect(text, "vertex");
-    merger.add_corner(read_point(text, "a coordinate of a vertex"));
+    corner = read_point(text, "a coordinate of a vertex");
   }
+  merger.add_triangle(corners);
   expect(text, "endloop");
   expect(text, "endfacet");
 }
 
+bool at_facet(MeshText text) {
+  return same_word(text.word(), "facet") && same_word(text.word(), "normal");
+}
+
+/// The solid's name, if it has one: the rest of the line, or up to a facet on the same line.
+void pass_name(MeshText& text) {
+  while (!at_facet(text) && !text.word().empty()) {
+  }
+}
+
+void read_solid(MeshText& text, CornerMerger& merger) {
+  pass_name(text);
+  for (;;) {
+    std::string_view word = text.word();
+    if (word.empty() && text.next_line()) word = text.word();
+    if (word.empty()) text.refuse("is truncated: it has no \"endsolid\"");
+    if (same_word(word, "endsolid")) return;
+    if (!same_word(word, "facet")) {
+      text.refuse("has " + quoted_word(word) + " where \"facet\" or \"endsolid\" must stand");
+    }
+    read_facet(text, merger);
+  }
+}
+
 SurfaceMesh read_text(std::string_view content, const std::string& name) {
-  MeshText text(content, name, MeshText::Comments::kNone);
+  MeshText text(content, name, MeshText::Form::kPlain);
   CornerMerger merger;
+  // What is left of the line of "endsolid" is the solid's name once more.
   while (text.next_line()) {
-    // The rest of this line is the solid's name.
     if (const auto word = text.word(); !same_word(word, "solid")) {
       text.refuse("has " + quoted_word(word) + " where \"solid\" must stand");
     }
-    for (;;) {
-      if (!text.next_line()) text.refuse("is truncated: it has no \"endsolid\"");
-      const std::string_view word = text.word();
-      if (same_word(word, "endsolid")) break;
-      if (!same_word(word, "facet")) {
-        text.refuse("has " + quoted_word(word) + " where \"facet\" or \"endsolid\" must stand");
-      }
-      read_facet(text, merger);
-    }
+    read_solid(text, merger);
   }
   return merger.mesh();
 }
@@ -132,7 +154,8 @@ SurfaceMesh read_stl(std::string_view content, const std::string& name) {
   const bool has_head = content.size() >= kHeadBytes;
   if (has_head && content.size() == binary_size(content)) return read_binary(content);
   const bool is_text = content.substr(0, 2 * kHeadBytes).find('\0') == std::string_view::npos;
-  if (is_text && same_word(content.substr(0, 5), "solid")) return read_text(content, name);
+  if (is_text && same_word(without_lead(content).substr(0, 5), "solid"))
+    return read_text(content, name);
   if (!has_head) {
     throw InputError(name + ": is " + std::to_string(content.size()) +
                      " bytes long: a binary STL mesh has 84 at least, one as text begins with "

@@ -118,6 +118,26 @@ void require_no_numbers(const ReflectOptions& options) {
   }
 }
 
+/// The groups of --planar-faces. Faces without area are in none any more, and halves of a face are
+/// in its group.
+std::vector<std::vector<int>> planar_groups(const ReflectOptions& options, std::int64_t faces,
+                                            const RepairedMesh& repaired) {
+  std::vector<std::vector<int>> parts(static_cast<std::size_t>(faces));
+  for (std::size_t f = 0; f < repaired.face.size(); ++f) {
+    parts[static_cast<std::size_t>(repaired.face[f])].push_back(static_cast<int>(f));
+  }
+  std::vector<std::vector<int>> planar;
+  for (const auto& group : number_groups("--planar-faces", options.planar_faces, faces)) {
+    std::vector<int> now;
+    for (const int f : group) {
+      const std::vector<int>& of_face = parts[static_cast<std::size_t>(f)];
+      now.insert(now.end(), of_face.begin(), of_face.end());
+    }
+    if (!now.empty()) planar.push_back(now);
+  }
+  return planar;
+}
+
 }  // namespace
 
 ReflectInput prepared_input(const SurfaceMesh& mesh, const std::string& name,
@@ -136,7 +156,7 @@ ReflectInput prepared_input(const SurfaceMesh& mesh, const std::string& name,
   }
   find_fixed(options, repaired, input);
   if (!options.planar_faces.empty()) {
-    input.planar = number_groups("--planar-faces", options.planar_faces, mesh.triangle_count());
+    input.planar = planar_groups(options, mesh.triangle_count(), repaired);
   }
   if (options.symmetry != Symmetry::kNone) {
     input.partner = mirror_partners(input.mesh, static_cast<int>(options.symmetry));

@@ -59,6 +59,14 @@ constexpr double kSaveSeconds = 1.0;
 /// Steps of the normals that one seed may number.
 constexpr std::uint64_t kSeedStride = std::uint64_t{1} << 32U;
 
+/// What is said of a run that gained too little.
+std::string gain_words(double before, double after) {
+  return "the energy went from " + number_text(before, 4) + " to " + number_text(after, 4) +
+         ": less than a tenth of it was gained; a smaller --anchor, another number of --faces, "
+         "more "
+         "updates or fewer constraints may help";
+}
+
 struct Stage {
   const char* name;
   ElementKind elements;
@@ -98,6 +106,10 @@ class Schedule {
     result.fingerprint = state_.fingerprint;
     result.before = state_.before;
     result.unmet = Constraints(reference_, keep_, Executor::serial()).broken(mesh_.vertices);
+    if (result.done() &&
+        !gained_enough(field_.goal.kind, result.before.total, result.after.total)) {
+      result.unmet.push_back(gain_words(result.before.total, result.after.total));
+    }
     result.reference = frame_.from_unit(reference_);
     result.mesh = frame_.from_unit(mesh_);
     result.updates = state_.updates;
@@ -350,6 +362,11 @@ class Schedule {
 };
 
 }  // namespace
+
+bool gained_enough(GoalKind goal, double before, double after) {
+  if (Goal{.kind = goal}.maximizes()) return after > 0.0 && after >= (1.0 + kLeastGain) * before;
+  return before <= kLittleEnergy ? after <= kLittleEnergy : after <= (1.0 - kLeastGain) * before;
+}
 
 ReflectResult reflect_shape(const ReflectInput& input, const ReflectOptions& options,
                             const Executor& executor, const RunControl& control) {

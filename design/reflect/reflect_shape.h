@@ -39,10 +39,20 @@ struct ReflectResult {
   double max_displacement = 0.0;
   double seconds = 0.0;
   std::optional<RadarComparison> radar;
-  std::vector<std::string> unmet;  ///< Constraints that the shape breaks, in words.
+  std::vector<std::string> unmet;  ///< What the shape does not keep or reach, in words.
 
   [[nodiscard]] bool done() const { return status == Status::kDone; }
 };
+
+/// What a finished run has to gain: a tenth of the energy that there was, as a loss, or as a gain
+/// for goals that ask for light. Where light is unwanted, less than kLittleEnergy needs no gain.
+inline constexpr double kLeastGain = 0.1;
+/// A hundredth of what a sphere sends back (0.0875): shapes that were optimised before have a few
+/// of these, a shape of flat faces that all look past the light less than one.
+inline constexpr double kLittleEnergy = 1e-3;
+
+/// Whether a run from `before` to `after` gained so much. A NaN gained nothing.
+bool gained_enough(GoalKind goal, double before, double after);
 
 /// Deforms a mesh so that its reflection meets the goal while its shape is kept (Tojo et al.,
 /// Algorithm 1): target normals are optimised for cached light paths, the vertices follow them as

@@ -5,18 +5,16 @@
 #include <cmath>
 #include <numeric>
 #include <tuple>
+#include <utility>
 
 #include "core/error.h"
 #include "core/text/number_text.h"
 #include "design/reflect/mesh/edges.h"
 #include "design/reflect/mesh/faces.h"
+#include "design/reflect/mesh/flat_faces.h"
 
 namespace lensforge::reflect {
 namespace {
-
-/// A face is without area below this share of the square of its longest side: 1e-9 is a needle a
-/// thousand million times as long as it is wide, which single precision cannot tell from a line.
-constexpr double kLeastFlatness = 1e-9;
 
 /// Diagonals of the box around a mesh whose squares are still far from the ends of doubles.
 constexpr double kLeastDiagonal = 1e-60;
@@ -67,6 +65,8 @@ SurfaceMesh compacted(const SurfaceMesh& mesh, std::vector<int>& number) {
   return result;
 }
 
+/// Gives vertices in the same place one number and drops those without a face, and faces without
+/// area.
 void merge_vertices(const SurfaceMesh& mesh, RepairedMesh& result) {
   const std::vector<int> first = first_of_place(mesh);
   SurfaceMesh merged = mesh;
@@ -74,8 +74,13 @@ void merge_vertices(const SurfaceMesh& mesh, RepairedMesh& result) {
   std::int64_t duplicates = 0;
   for (std::size_t v = 0; v < first.size(); ++v) duplicates += first[v] != static_cast<int>(v);
   if (duplicates > 0) result.changes.push_back(counted(duplicates, "duplicate vertices merged"));
+  FullFaces full = without_flat_faces(merged);
+  if (full.removed > 0) {
+    result.changes.push_back(counted(full.removed, "faces without area removed"));
+  }
   std::vector<int> number;
-  result.mesh = compacted(merged, number);
+  result.mesh = compacted(full.mesh, number);
+  result.face = std::move(full.origin);
   for (const int v : first) result.vertex.push_back(number[static_cast<std::size_t>(v)]);
   const std::int64_t unused = mesh.vertex_count() - duplicates - result.mesh.vertex_count();
   if (unused > 0) result.changes.push_back(counted(unused, "vertices without a face dropped"));
@@ -88,15 +93,9 @@ void require_size(const SurfaceMesh& mesh, const std::string& name) {
                    ": must be 1e-60 to 1e+60; state it in millimetres");
 }
 
-void require_areas(const SurfaceMesh& mesh, const std::string& name) {
-  for (Eigen::Index k = 0; k < mesh.triangle_count(); ++k) {
-    const Corners c = mesh.corners(k);
-    const double longest = std::max(
-        {(c.v1 - c.v0).squaredNorm(), (c.v2 - c.v1).squaredNorm(), (c.v0 - c.v2).squaredNorm()});
-    if (area_normal(c).norm() > kLeastFlatness * longest) continue;
-    refuse(name, "face " + std::to_string(k) +
-                     " has no area: must be a triangle; remove such faces in a mesh editor");
-  }
+void require_faces(const RepairedMesh& repaired, const std::string& name) {
+  if (repaired.mesh.triangle_count() > 0) return;
+  refuse(name, "no face has an area: one at least must; look at it in a mesh editor");
 }
 
 void require_manifold(const EdgeTable& table, const std::string& name) {
@@ -211,7 +210,7 @@ RepairedMesh repair_mesh(const SurfaceMesh& mesh, const std::string& name) {
   RepairedMesh result;
   require_size(mesh, name);
   merge_vertices(mesh, result);
-  require_areas(result.mesh, name);
+  require_faces(result, name);
   const EdgeTable table = make_edges(result.mesh);
   require_manifold(table, name);
   result.closed = table.is_closed();

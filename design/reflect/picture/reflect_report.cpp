@@ -52,10 +52,9 @@ std::string header(const ReflectResult& result, const ReflectOptions& options,
                                     element("h1", "", escape_html("Reflection: " + words.title)) +
                                         element("div", "class=\"soft\"", escape_html(size)));
   if (!result.done()) return title + badge(false, "Interrupted: not finished");
-  if (!result.unmet.empty()) return title + badge(false, "A constraint is broken");
-  const bool maximizes = Goal{.kind = options.goal}.maximizes();
-  const bool better = (result.after.total > result.before.total) == maximizes;
-  return title + badge(better, percent_text(result.after.total / result.before.total) +
+  const bool gained = gained_enough(options.goal, result.before.total, result.after.total);
+  if (gained && !result.unmet.empty()) return title + badge(false, "A constraint is broken");
+  return title + badge(gained, percent_text(result.after.total / result.before.total) +
                                    " of the energy before");
 }
 
@@ -63,7 +62,7 @@ std::string warnings(const ReflectResult& result) {
   if (result.unmet.empty()) return "";
   std::string list;
   for (const std::string& unmet : result.unmet) list += element("li", "", escape_html(unmet));
-  return element("div", "class=\"warnings\"", "<b>Broken</b>" + element("ul", "", list));
+  return element("div", "class=\"warnings\"", "<b>Not met</b>" + element("ul", "", list));
 }
 
 std::string energy_table(const ReflectResult& result) {

@@ -188,13 +188,43 @@ TEST(MeshIo, RefusesOtherMeshesThatAreCutAnywhere) {
   }
 }
 
-TEST(MeshIo, RefusesFacesThatAreNoTriangles) {
+TEST(MeshIo, ReadsPolygonsAsTriangles) {
   const TempFolder folder;
-  write_bytes(folder / "q.off", "OFF\n4 1 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n");
-  write_bytes(folder / "q.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n");
-  for (const std::string name : {"q.off", "q.obj"}) {
-    EXPECT_THAT(refusal(folder / name), HasSubstr("face 0 has 4 corners"));
+  const std::string points = "0 0 0\n2 0 0\n2 2 0\n1 1 0\n0 2 0\n";  // Hollow at vertex 3.
+  write_bytes(folder / "p.off", "OFF\n5 1 0\n" + points + "5 0 1 2 3 4\n");
+  write_bytes(folder / "p.obj", "f 1 2 3 4 5\nv 0 0 0\nv 2 0 0\nv 2 2 0\nv 1 1 0\nv 0 2 0\n");
+  write_bytes(folder / "p.ply",
+              "ply\nformat ascii 1.0\nelement vertex 5\nproperty float x\nproperty float y\n"
+              "property float z\nelement face 1\nproperty list uchar int vertex_indices\n"
+              "end_header\n" +
+                  points + "5 0 1 2 3 4\n");
+  for (const std::string name : {"p.off", "p.obj", "p.ply"}) {
+    const SurfaceMesh mesh = read_mesh(folder / name);
+    ASSERT_EQ(mesh.triangle_count(), 3) << name;
+    double area = 0.0;
+    for (int t = 0; t < 3; ++t) {
+      const Corners c = mesh.corners(t);
+      const double z = (c.v1 - c.v0).cross(c.v2 - c.v0).z();
+      EXPECT_GT(z, 0.0) << name;
+      area += 0.5 * z;
+    }
+    EXPECT_DOUBLE_EQ(area, 3.0) << name;
   }
+}
+
+TEST(MeshIo, RefusesFacesOfTwoCorners) {
+  const TempFolder folder;
+  write_bytes(folder / "e.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n1 1 0\n2 0 1\n");
+  write_bytes(folder / "e.obj", "v 0 0 0\nv 1 0 0\nf 1 2\n");
+  for (const std::string name : {"e.off", "e.obj"}) {
+    EXPECT_THAT(refusal(folder / name), HasSubstr("face 0 has 2 corners: it must have 3"));
+  }
+}
+
+TEST(MeshIo, RefusesPolygonsWithIndicesOutOfRange) {
+  const TempFolder folder;
+  write_bytes(folder / "p.off", "OFF\n4 1 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 9\n");
+  EXPECT_THAT(refusal(folder / "p.off"), HasSubstr("triangle 1 uses vertex 9"));
 }
 
 TEST(MeshIo, RefusesIndicesOutOfRange) {
@@ -206,7 +236,8 @@ TEST(MeshIo, RefusesIndicesOutOfRange) {
   SurfaceMesh mesh = grid_mesh(2, 2);
   mesh.triangles(1, 1) = 4;
   write_ply(mesh, folder / "i.ply");
-  EXPECT_THAT(refusal(folder / "i.ply"), HasSubstr("face 1 uses vertex 4: there are only 0 ... 3"));
+  EXPECT_THAT(refusal(folder / "i.ply"),
+              HasSubstr("triangle 1 uses vertex 4: there are only 0 ... 3"));
 }
 
 TEST(MeshIo, RefusesCoordinatesThatAreNotFinite) {

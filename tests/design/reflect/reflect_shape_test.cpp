@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 
+#include <limits>
 #include <stop_token>
 
 #include "core/error.h"
@@ -112,6 +113,30 @@ TEST(ReflectShape, FacadesSendSunlightToPlacesAsThePaperDoes) {
     const ReflectResult line = shaped(wall, options);
     EXPECT_GT(line.after.total, 2.8 * line.before.total);
   }
+}
+
+TEST(ReflectShape, ATenthOfTheEnergyHasToBeGained) {
+  EXPECT_TRUE(gained_enough(GoalKind::kStealth, 0.1, 0.05));
+  EXPECT_FALSE(gained_enough(GoalKind::kDeflect, 0.1, 0.095));
+  EXPECT_FALSE(gained_enough(GoalKind::kStealth, 0.1, 0.2));
+  EXPECT_TRUE(gained_enough(GoalKind::kPoint, 0.2, 0.3));
+  EXPECT_FALSE(gained_enough(GoalKind::kLine, 0.2, 0.21));
+  EXPECT_FALSE(gained_enough(GoalKind::kPoint, 0.0, 0.0));
+  // There was nothing to gain.
+  EXPECT_TRUE(gained_enough(GoalKind::kStealth, 8e-5, 8e-5));
+  EXPECT_FALSE(gained_enough(GoalKind::kStealth, 8e-5, 0.02));
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  for (const GoalKind goal : {GoalKind::kStealth, GoalKind::kPoint}) {
+    EXPECT_FALSE(gained_enough(goal, 0.1, nan));
+  }
+}
+
+TEST(ReflectShape, ARunThatGainedTooLittleSaysSo) {
+  ReflectOptions options = quick();
+  options.max_displacement = 1e-6;
+  const ReflectResult result = shaped(shapes::icosphere(2), options);
+  ASSERT_EQ(result.unmet.size(), 1U);
+  EXPECT_THAT(result.unmet.front(), ::testing::HasSubstr("less than a tenth of it was gained"));
 }
 
 TEST(ReflectShape, ContradictingPlacesAreRefused) {

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 
 #include "core/error.h"
+#include "core/surface/mesh_normals.h"
 #include "design/reflect/mesh/edges.h"
 #include "design/reflect/mesh/faces.h"
 #include "fixtures/shapes/shapes.h"
@@ -61,10 +62,82 @@ TEST(MeshRepair, KeepsAGoodMeshAsItIs) {
   }
 }
 
-TEST(MeshRepair, RefusesAFaceWithoutArea) {
+TEST(MeshRepair, DropsAFaceThatHasACornerTwice) {
+  const SurfaceMesh good = shapes::icosphere(1);
+  SurfaceMesh mesh = good;
+  mesh.triangles.conservativeResize(3, good.triangle_count() + 1);
+  mesh.triangles.col(good.triangle_count()) << 1, 2, 2;
+  const RepairedMesh repaired = repair_mesh(mesh, "m.stl");
+  EXPECT_EQ(repaired.mesh.triangles, good.triangles);
+  EXPECT_TRUE(repaired.closed);
+  EXPECT_THAT(repaired.changes, ::testing::ElementsAre("1 faces without area removed"));
+}
+
+/// A mesh with flat faces on some of its edges: the middle of an edge becomes a vertex of the face
+/// on one side, and the other side is closed with a face whose corners stand in a line.
+SurfaceMesh with_flat_faces(const SurfaceMesh& mesh, const std::vector<int>& edges) {
+  const EdgeTable table = make_edges(mesh);
+  std::vector<Eigen::Vector3d> vertices;
+  std::vector<Eigen::Vector3i> faces;
+  for (Eigen::Index v = 0; v < mesh.vertex_count(); ++v) vertices.push_back(mesh.vertices.col(v));
+  for (Eigen::Index f = 0; f < mesh.triangle_count(); ++f) faces.push_back(mesh.triangles.col(f));
+  for (const int e : edges) {
+    const Edge& edge = table.edges[static_cast<std::size_t>(e)];
+    const auto middle = static_cast<int>(vertices.size());
+    vertices.push_back(0.5 * (mesh.vertices.col(edge.from) + mesh.vertices.col(edge.to)));
+    Eigen::Vector3i& face = faces[static_cast<std::size_t>(edge.left)];
+    int k = 0;
+    while (face[k] == edge.from || face[k] == edge.to) ++k;
+    const int from = face[(k + 1) % 3];
+    const int to = face[(k + 2) % 3];
+    const int apex = face[k];
+    face << from, middle, apex;
+    faces.emplace_back(middle, to, apex);
+    faces.emplace_back(from, to, middle);
+  }
+  SurfaceMesh result{
+      Eigen::Matrix3Xd(3, std::ssize(vertices)), Eigen::Matrix3Xi(3, std::ssize(faces)), {}};
+  for (Eigen::Index v = 0; v < result.vertex_count(); ++v) {
+    result.vertices.col(v) = vertices[static_cast<std::size_t>(v)];
+  }
+  for (Eigen::Index f = 0; f < result.triangle_count(); ++f) {
+    result.triangles.col(f) = faces[static_cast<std::size_t>(f)];
+  }
+  return result;
+}
+
+TEST(MeshRepair, FlatFacesLeaveNoCrack) {
+  const SurfaceMesh good = shapes::octahedron();
+  for (const std::vector<int>& edges : {std::vector<int>{0}, {0, 5, 9}, {2, 11}}) {
+    const SurfaceMesh mesh = with_flat_faces(good, edges);
+    ASSERT_TRUE(make_edges(mesh).is_closed());
+    const RepairedMesh repaired = repair_mesh(mesh, "m.stl");
+    EXPECT_TRUE(repaired.closed);
+    EXPECT_EQ(repaired.mesh.triangle_count(), 8 + 2 * std::ssize(edges));
+    EXPECT_GT(measure_faces(repaired.mesh).area.minCoeff(), 0.01);
+    EXPECT_NEAR(signed_volume(repaired.mesh), signed_volume(good), 1e-12);
+    EXPECT_THAT(repaired.changes, ::testing::ElementsAre(std::to_string(edges.size()) +
+                                                         " faces without area removed"));
+  }
+}
+
+TEST(MeshRepair, EveryFaceKnowsTheFaceThatItIsPartOf) {
+  const SurfaceMesh good = shapes::octahedron();
+  const SurfaceMesh mesh = with_flat_faces(good, {0, 5});
+  const RepairedMesh repaired = repair_mesh(mesh, "m.stl");
+  ASSERT_EQ(std::ssize(repaired.face), repaired.mesh.triangle_count());
+  for (Eigen::Index f = 0; f < repaired.mesh.triangle_count(); ++f) {
+    const int part_of = repaired.face[static_cast<std::size_t>(f)];
+    EXPECT_NEAR(
+        area_normal(repaired.mesh, f).normalized().dot(area_normal(mesh, part_of).normalized()),
+        1.0, 1e-12);
+  }
+}
+
+TEST(MeshRepair, RefusesAMeshWithoutAnyArea) {
   SurfaceMesh mesh = shapes::icosphere(1);
-  mesh.triangles(1, 5) = mesh.triangles(0, 5);
-  EXPECT_THAT(refusal(mesh), HasSubstr("m.stl: face 5 has no area"));
+  mesh.vertices.bottomRows<2>().setZero();
+  EXPECT_THAT(refusal(mesh), HasSubstr("m.stl: no face has an area"));
 }
 
 TEST(MeshRepair, RefusesAnEdgeWithThreeFaces) {

@@ -51,6 +51,15 @@ TEST(ReflectReport, JudgesByTheGoal) {
   EXPECT_THAT(report(broken), HasSubstr("--keep-volume: &lt;9 %&gt;"));
 }
 
+TEST(ReflectReport, AGainOfLessThanATenthIsNotGreen) {
+  ReflectResult result = sample_result();
+  result.after.total = 0.48;
+  result.unmet = {"less than a tenth"};
+  EXPECT_THAT(report(result), HasSubstr("verdict bad"));
+  EXPECT_THAT(report(result), HasSubstr("96.0 % of the energy before"));
+  EXPECT_THAT(report(result), HasSubstr("<b>Not met</b>"));
+}
+
 TEST(ReflectReport, OfAnInterruptedRunHasNoEnergiesAfter) {
   ReflectResult result = sample_result();
   result.status = ReflectResult::Status::kInterrupted;
