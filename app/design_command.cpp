@@ -47,6 +47,7 @@ std::vector<std::string> changes_made(const LoadedImage& loaded, const DesignSet
   for (const std::string& change : loaded.changes) {
     changes.push_back(settings.target + ": " + change);
   }
+  changes.insert(changes.end(), settings.changes.begin(), settings.changes.end());
   const Image& picture = loaded.image;
   if (settings.design.pixels < std::max(picture.columns(), picture.rows())) {
     changes.push_back(settings.target + ": " + size_text(picture.columns(), picture.rows()) +
@@ -198,7 +199,7 @@ int run(OptionSet& options, DesignSettings& settings) {
   const LoadedImage loaded = read_target(settings, options.common());
   const InterruptWatch interrupt;
   DesignOptions& design = settings.design;
-  settle(options, settings, loaded.image);
+  settle(options, settings, loaded.image, {interrupt.token(), {}});
   refuse_splines_on_ranks(design);
   if (settings.resume && earlier.lens && !earlier.checkpoint) {
     require_finished(settings.out, earlier,

@@ -2,6 +2,7 @@
 #include "app/design_settings.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "app/json_output.h"
 #include "cam/cam_fields.h"
@@ -53,6 +54,11 @@ void refuse_part_options(const OptionSet& options) {
   }
 }
 
+void note_changes(DesignSettings& settings, const std::string& picture,
+                  const std::vector<std::string>& changes) {
+  for (const std::string& change : changes) settings.changes.push_back(picture + ": " + change);
+}
+
 }  // namespace
 
 void add_design_options(OptionSet& options, DesignSettings& settings) {
@@ -83,7 +89,8 @@ void add_design_options(OptionSet& options, DesignSettings& settings) {
   options.flag("--force", settings.force, "replace the design that --out holds");
 }
 
-void settle(OptionSet& options, DesignSettings& settings, const Image& picture) {
+void settle(OptionSet& options, DesignSettings& settings, const Image& picture,
+            const RunControl& control) {
   const int longer = std::max(picture.columns(), picture.rows());
   if (longer < kMinPixels) {
     throw InputError(settings.target + ": has " + size_text(picture.columns(), picture.rows()) +
@@ -103,11 +110,17 @@ void settle(OptionSet& options, DesignSettings& settings, const Image& picture) 
   settings.design = default_design_options(settings.design.model, picture);
   options.restate();
   if (!settings.source_picture.empty()) {
-    settings.design.light.source_shape = shape_of(read_image(settings.source_picture).image);
+    const LoadedImage source = read_image(settings.source_picture, control);
+    note_changes(settings, "--source-picture " + settings.source_picture, source.changes);
+    settings.design.light.source_shape = shape_of(source.image);
   }
   LightOptions& light = settings.design.light;
-  if (!light.front_file.empty()) light.front_heights = front_from(light.front_file, {});
-  if (!settings.outline.empty()) settings.design.outline = outline_from(settings.outline, {});
+  if (!light.front_file.empty()) light.front_heights = front_from(light.front_file, control);
+  if (!settings.outline.empty()) {
+    OutlineChoice choice = outline_from(settings.outline, control);
+    note_changes(settings, "--outline " + settings.outline, choice.changes);
+    settings.design.outline = std::move(choice.outline);
+  }
   if (!settings.made_by.empty()) settings.design.made_by = process_of(workshop, settings);
   validate(settings.design, picture);
 }

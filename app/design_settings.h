@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "app/option_set.h"
 #include "cam/cam_options.h"
@@ -19,6 +20,7 @@ struct DesignSettings {
   bool robust = false;         ///< For parts that are polished less and more than made_by says.
   CamOptions cut;  ///< What of it is milled for made_by: the part or a mould, its shrinkage.
   DesignOptions design;
+  std::vector<std::string> changes;  ///< What was changed of the pictures above, in words.
   std::string live;  ///< Port of a page that shows the design while it runs; empty: none.
   bool resume = false;
   bool force = false;
@@ -27,8 +29,9 @@ struct DesignSettings {
 /// Adds every option of the command.
 void add_design_options(OptionSet& options, DesignSettings& settings);
 
-/// What nobody asked for is as the library has it for this picture.
-/// @throw InputError naming option or picture, value and rule.
-void settle(OptionSet& options, DesignSettings& settings, const Image& picture);
+/// What nobody asked for is as the library has it for this picture; pictures that options name are
+/// read. @throw InputError naming option or picture, value and rule. Interrupted.
+void settle(OptionSet& options, DesignSettings& settings, const Image& picture,
+            const RunControl& control);
 
 }  // namespace lensforge::app

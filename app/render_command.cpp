@@ -115,7 +115,7 @@ void require_spectrum(const Scene& scene, const OptionSet& options,
 
 /// The scene with everything that the options say instead.
 Scene adjusted(Scene scene, OptionSet& options, RenderArguments& arguments,
-               const Console& console) {
+               const RunControl& control, const Console& console) {
   arguments.render = scene.render;
   options.restate();
   scene.render = arguments.render;
@@ -127,7 +127,11 @@ Scene adjusted(Scene scene, OptionSet& options, RenderArguments& arguments,
   require_spectrum(scene, options, arguments);
   announce_picture(setup, arguments.out, console);
   if (options.given("--target")) {
-    scene.target = read_image(arguments.target, {}, setup.pixels.maxCoeff()).image;
+    LoadedImage target = read_image(arguments.target, control, setup.pixels.maxCoeff());
+    for (const std::string& change : target.changes) {
+      console.note("--target " + arguments.target + ": " + change);
+    }
+    scene.target = std::move(target.image);
   }
   if (scene.target) scene.target = resample(*scene.target, setup.pixels.x(), setup.pixels.y());
   require_wall_above(scene.surface, setup);
@@ -286,7 +290,7 @@ int render_command(const Arguments& command_line) try {
   InterruptibleJob job(options.common(), arguments.out);
   const Scene scene =
       adjusted(load(arguments.source, job.stoppable(options.executor()), job.control(), console),
-               options, arguments, console);
+               options, arguments, job.control(), console);
   ChosenDevice device = options.device_executor();
   device.executor = job.stoppable(device.executor);
   job.control().report({"picture", 0.0, 0.0, ""});

@@ -28,26 +28,28 @@ bool is_svg_file(const std::string& path) {
 
 }  // namespace
 
-std::optional<Outline> outline_from(const std::string& text, const RunControl& control) {
-  if (text == "rectangle") return std::nullopt;
-  if (text == "circle") return Outline{OutlineKind::kCircle, 0.0, {}};
+OutlineChoice outline_from(const std::string& text, const RunControl& control) {
+  if (text == "rectangle") return {};
+  if (text == "circle") return {Outline{OutlineKind::kCircle, 0.0, {}}, {}};
   if (text.starts_with(kRounded)) {
     const double radius = parse_length_mm(text.substr(kRounded.size()), "--outline");
-    return Outline{OutlineKind::kRoundedRectangle, radius, {}};
+    return {Outline{OutlineKind::kRoundedRectangle, radius, {}}, {}};
   }
   std::error_code none;
   if (!std::filesystem::exists(text, none)) {
     refuse("'" + text + "': must be rectangle, circle, rounded:R with R in mm, or a picture" +
            kCircleWouldDo);
   }
-  Image picture = read_image(text, control, kOutlineDrawing).image;
+  LoadedImage loaded = read_image(text, control, kOutlineDrawing);
+  Image& picture = loaded.image;
   if (is_svg_file(text)) {
     // Its pixels are mean light: half of it is where the shape covers half.
     for (float& value : picture.values()) {
       value = static_cast<float>(decode(static_cast<double>(value)));
     }
   }
-  return Outline{OutlineKind::kPolygon, 0.0, contour_of(picture, text)};
+  return {Outline{OutlineKind::kPolygon, 0.0, contour_of(picture, text)},
+          std::move(loaded.changes)};
 }
 
 Outline fitted(const Outline& outline, const Eigen::Vector2d& lens_size) {

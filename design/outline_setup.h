@@ -31,10 +31,16 @@ inline constexpr double kOutlineTolerance = 0.1;
 ///         the light has holes or several pieces.
 std::vector<Eigen::Vector2d> contour_of(const Image& picture, const std::string& what);
 
+/// An outline that was asked for, and in plain words what was changed of its picture.
+struct OutlineChoice {
+  std::optional<Outline> outline;
+  std::vector<std::string> changes;
+};
+
 /// What `--outline` asks for: rectangle (none), circle, rounded:R, or the name of a picture or
 /// an SVG file whose white is lens, as seen against the light, from +z.
-/// @throw InputError naming option, value and rule.
-std::optional<Outline> outline_from(const std::string& text, const RunControl& control);
+/// @throw InputError naming option, value and rule. Interrupted.
+OutlineChoice outline_from(const std::string& text, const RunControl& control);
 
 /// An outline of DesignOptions in a lens of this size. @pre require_outline() passed.
 Outline fitted(const Outline& outline, const Eigen::Vector2d& lens_size);

@@ -73,7 +73,7 @@ py::object design(const py::object& picture, const app::Arguments& words) {
     const RunControl control = stopping_at(stop);
     const Image target =
         given.empty() ? read_image(settings.target, control, settings.design.pixels).image : given;
-    app::settle(options, settings, target);
+    app::settle(options, settings, target, control);
     const app::ChosenDevice device = options.device_executor();
     require_room_for_design(target.columns(), target.rows(), settings.design,
                             device.executor.concurrency(), settings.out);

@@ -245,24 +245,34 @@ void report_header(PictureSource& source, std::vector<std::string>& changes) {
   }
 }
 
+/// The first ones of a list, as many as fit into a message.
+std::string first_of(const std::vector<std::string>& findings) {
+  constexpr std::size_t kMost = 3;
+  std::string text = findings.front();
+  for (std::size_t i = 1; i < std::min(kMost, findings.size()); ++i) text += "; " + findings[i];
+  return text;
+}
+
 LoadedImage read_drawing(const fs::path& path, int longer_side, const RunControl& run) {
-  const SvgDrawing drawing(path, run);
-  const SvgDrawing::Size size = drawing.size(longer_side);
-  SvgDrawing::Picture picture = drawing.draw(size, run);
+  SvgPicture picture = draw_svg(path, longer_side, run);
   LoadedImage loaded{std::move(picture.light), {}};
-  loaded.changes.push_back("drawn at " + std::to_string(size.columns) + " x " +
-                           std::to_string(size.rows) + " pixels");
+  loaded.changes.push_back("drawn at " + std::to_string(loaded.image.columns()) + " x " +
+                           std::to_string(loaded.image.rows()) + " pixels");
   if (picture.colour) loaded.changes.emplace_back(kColourTurned);
   const auto coverage = picture.coverage.values();
   const bool open = std::any_of(coverage.begin(), coverage.end(), [](float c) { return c < 1.0F; });
   if (open) loaded.changes.emplace_back(kTransparencyFlattened);
-  if (open && loaded.image.total() == 0.0) {
+  if (loaded.image.total() == 0.0 && !picture.left_out.empty()) {
+    refuse_picture(path, "is black all over: " + first_of(picture.left_out));
+  }
+  if (loaded.image.total() == 0.0 && open) {
     refuse_picture(path,
                    "is black all over, since transparency is flattened onto black: draw a white "
                    "rectangle behind it");
   }
-  const std::vector<std::string>& remarks = drawing.remarks();
-  loaded.changes.insert(loaded.changes.end(), remarks.begin(), remarks.end());
+  for (const auto* list : {&picture.remarks, &picture.left_out}) {
+    loaded.changes.insert(loaded.changes.end(), list->begin(), list->end());
+  }
   return loaded;
 }
 

@@ -9,9 +9,12 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdlib>
 #include <cstring>
-#include <stop_token>
+#include <memory>
+#include <nlohmann/json.hpp>
 #include <string_view>
+#include <thread>
 #include <tuple>
 #include <utility>
 
@@ -20,13 +23,16 @@
 #include "core/image/image_io.h"
 #include "core/image/picture_source.h"
 #include "core/image/rec709.h"
+#include "core/image/svg_log.h"
 #include "core/image/svg_needs.h"
+#include "core/image/svg_pictures.h"
 #include "core/image/transfer.h"
 #include "core/io/files.h"
-#include "core/io/stderr_silence.h"
+#include "core/sandbox/child_work.h"
 #include "core/text/printable.h"
 
-// librsvg opens nothing that a file refers to where it is not told the file's own address.
+// librsvg opens nothing that a file refers to where it is not told the file's own address. It,
+// libxml2, fontconfig and gdk-pixbuf are called in a child process alone.
 namespace lensforge {
 namespace {
 
@@ -41,6 +47,9 @@ constexpr int kMaxSampledSide = 4096;
 /// Bytes at a file's beginning in which its first element has to begin.
 constexpr std::size_t kHeadBytes = std::size_t{64} << 10U;
 
+/// Threads of librsvg's filters.
+constexpr unsigned kMaxThreads = 4;
+
 /// Bytes of a library's sentence, which may quote the file, in a message.
 constexpr std::size_t kLongestReason = 200;
 
@@ -52,8 +61,8 @@ struct Free {
   }
 };
 
-using Stream = std::unique_ptr<GInputStream, Free<g_object_unref>>;
-using Cancellable = std::unique_ptr<GCancellable, Free<g_object_unref>>;
+template <class T>
+using Object = std::unique_ptr<T, Free<g_object_unref>>;
 using Surface = std::unique_ptr<cairo_surface_t, Free<cairo_surface_destroy>>;
 using Context = std::unique_ptr<cairo_t, Free<cairo_destroy>>;
 
@@ -65,6 +74,7 @@ class Failure {
   Failure(const Failure&) = delete;
   Failure& operator=(const Failure&) = delete;
   [[nodiscard]] GError** out() { return &error_; }
+  explicit operator bool() const { return error_ != nullptr; }
   /// ": " and the reason, without the parser's own numbers of it; empty if there is none.
   [[nodiscard]] std::string reason() const {
     if (error_ == nullptr) return "";
@@ -78,6 +88,45 @@ class Failure {
  private:
   GError* error_ = nullptr;
 };
+
+Object<GInputStream> stream_of(std::string_view bytes) {
+  return Object<GInputStream>(g_memory_input_stream_new_from_data(
+      bytes.data(), static_cast<gssize>(bytes.size()), nullptr));
+}
+
+bool is_packed(std::string_view bytes) { return bytes.starts_with("\x1F\x8B"); }
+
+/// What gzip packed, up to `most` bytes; `failure` says why it ends early.
+std::string unpacked(std::string_view packed, std::size_t most, Failure& failure) {
+  const Object<GInputStream> source = stream_of(packed);
+  const Object<GZlibDecompressor> unpacker(g_zlib_decompressor_new(G_ZLIB_COMPRESSOR_FORMAT_GZIP));
+  const Object<GInputStream> stream(
+      g_converter_input_stream_new(source.get(), G_CONVERTER(unpacker.get())));
+  std::string bytes;
+  constexpr std::size_t kPiece = std::size_t{1} << 16U;
+  for (gssize got = 1; got > 0 && bytes.size() < most;) {
+    const std::size_t before = bytes.size();
+    bytes.resize(before + std::min(kPiece, most - before));
+    got = g_input_stream_read(stream.get(), bytes.data() + before, bytes.size() - before, nullptr,
+                              failure.out());
+    bytes.resize(before + static_cast<std::size_t>(std::max<gssize>(got, 0)));
+  }
+  return bytes;
+}
+
+/// UTF-16 as ASCII, with '?' for what is none; other text as it is.
+std::string narrow(std::string text) {
+  constexpr std::string_view kLittle("<\0", 2);
+  constexpr std::string_view kBig("\0<", 2);
+  const bool little = text.starts_with("\xFF\xFE") || text.starts_with(kLittle);
+  if (!little && !text.starts_with("\xFE\xFF") && !text.starts_with(kBig)) return text;
+  std::string ascii;
+  for (std::size_t i = text[0] == '<' || text[0] == '\0' ? 0 : 2; i + 1 < text.size(); i += 2) {
+    const char low = text[little ? i : i + 1];
+    ascii += text[little ? i + 1 : i] == '\0' ? low : '?';
+  }
+  return ascii;
+}
 
 /// Skips white space, the XML declaration, comments and the document type.
 std::string_view first_element(std::string_view text) {
@@ -105,42 +154,58 @@ bool is_svg(std::istream& file) {
   head.resize(static_cast<std::size_t>(file.gcount()));
   file.clear();
   file.seekg(0);
+  Failure failure;
+  if (is_packed(head)) head = unpacked(head, kHeadBytes, failure);
+  head = narrow(std::move(head));
   std::string_view name = first_element(head);
   if (!name.starts_with('<')) return false;
   name = name.substr(1, name.find_first_of(" \t\r\n/>") - 1);
   return name == "svg" || name.ends_with(":svg");
 }
 
-struct SvgDrawing::Handle {
-  std::unique_ptr<RsvgHandle, Free<g_object_unref>> rsvg;
-};
-
 namespace {
 
-RsvgHandle* parse(const fs::path& path, const std::string& xml, const RunControl& run) {
-  const Stream stream(
-      g_memory_input_stream_new_from_data(xml.data(), static_cast<gssize>(xml.size()), nullptr));
-  const Cancellable cancellable(g_cancellable_new());
-  const std::stop_callback cancel(run.stop_token(),
-                                  [&] { g_cancellable_cancel(cancellable.get()); });
+/// The text of the file, no longer packed.
+std::string svg_text(const fs::path& path) {
+  std::string bytes = read_whole_file(path, kMaxSvgBytes);
+  if (!is_packed(bytes)) return bytes;
   Failure failure;
-  const StderrSilence silence;
-  RsvgHandle* const handle = rsvg_handle_new_from_stream_sync(
-      stream.get(), nullptr, RSVG_HANDLE_FLAGS_NONE, cancellable.get(), failure.out());
-  if (handle != nullptr) return handle;
-  if (run.stop_requested()) throw Interrupted();
-  refuse_picture(path, "is no SVG that can be drawn" + failure.reason());
+  std::string text = unpacked(bytes, kMaxSvgBytes + 1, failure);
+  if (text.size() > kMaxSvgBytes) {
+    refuse_picture(path, "unpacks to more than " + std::to_string(kMaxSvgBytes >> 20U) +
+                             " MB: at most these are drawn");
+  }
+  if (failure) refuse_picture(path, "is truncated or corrupt" + failure.reason());
+  return text;
+}
+
+Object<RsvgHandle> parse(const fs::path& path, const std::string& xml) {
+  const Object<GInputStream> stream = stream_of(xml);
+  Failure failure;
+  Object<RsvgHandle> handle(rsvg_handle_new_from_stream_sync(
+      stream.get(), nullptr, RSVG_HANDLE_FLAGS_NONE, nullptr, failure.out()));
+  if (!handle) refuse_picture(path, "is no SVG that can be drawn" + failure.reason());
+  rsvg_handle_set_dpi(handle.get(), kDotsPerInch);
+  return handle;
 }
 
 /// Width and height in pixels; those of the viewBox where the file has no lengths.
-std::pair<double, double> size_of(RsvgHandle* handle) {
-  std::pair<double, double> size;
-  auto& [width, height] = size;
-  if (rsvg_handle_get_intrinsic_size_in_pixels(handle, &width, &height) != FALSE) return size;
-  gboolean has_box = FALSE;
-  RsvgRectangle box{};
-  rsvg_handle_get_intrinsic_dimensions(handle, nullptr, nullptr, nullptr, nullptr, &has_box, &box);
-  return has_box != FALSE ? std::pair{box.width, box.height} : std::pair{0.0, 0.0};
+std::pair<double, double> size_of(const fs::path& path, RsvgHandle* handle) {
+  double width = 0.0;
+  double height = 0.0;
+  if (rsvg_handle_get_intrinsic_size_in_pixels(handle, &width, &height) == FALSE) {
+    gboolean has_box = FALSE;
+    RsvgRectangle box{};
+    rsvg_handle_get_intrinsic_dimensions(handle, nullptr, nullptr, nullptr, nullptr, &has_box,
+                                         &box);
+    if (has_box != FALSE) std::tie(width, height) = std::pair{box.width, box.height};
+  }
+  if (!(width > 0.0 && height > 0.0 && std::isfinite(width / height))) {
+    refuse_picture(path,
+                   "its svg element has no size: give it a viewBox, such as "
+                   "viewBox=\"0 0 100 100\"");
+  }
+  return {width, height};
 }
 
 /// Adds up what cairo drew, 4 bytes a point: blue, green and red times alpha, alpha.
@@ -187,16 +252,54 @@ class PixelSum {
   bool colour_ = false;
 };
 
-/// @pre samples · (columns, rows) is the surface's size.
-SvgDrawing::Picture averaged(cairo_surface_t* surface, SvgDrawing::Size size, int samples,
-                             const RunControl& run) {
-  SvgDrawing::Picture picture{Image(size.columns, size.rows), Image(size.columns, size.rows)};
+/// Points a side in a pixel of a picture with this longer side.
+int samples_for(int longer_side) {
+  return std::clamp(kMaxSampledSide / longer_side, 1, kSvgSamples);
+}
+
+/// What the drawing fills, in its proportions, at least one pixel a side.
+Surface surface_for(const fs::path& path, std::pair<double, double> size, int longer_side) {
+  const double scale = longer_side / std::max(size.first, size.second);
+  const auto pixels = [&](double side) {
+    return std::max(1, static_cast<int>(std::lround(side * scale)));
+  };
+  const int columns = pixels(size.first);
+  const int rows = pixels(size.second);
+  check_picture_size(path, columns, rows);
+  const int samples = samples_for(longer_side);
+  require_room({0.0, 0.0, (4.0 * samples * samples + 24.0) * columns * rows}, path.parent_path(),
+               path.string(), "draw it in fewer pixels");
+  return Surface(
+      cairo_image_surface_create(CAIRO_FORMAT_ARGB32, samples * columns, samples * rows));
+}
+
+/// Lets librsvg draw into `surface`, which it fills.
+void draw(const fs::path& path, RsvgHandle* handle, std::pair<double, double> size,
+          cairo_surface_t* surface) {
+  const auto [width, height] = size;
+  const Context context(cairo_create(surface));
+  cairo_scale(context.get(), cairo_image_surface_get_width(surface) / width,
+              cairo_image_surface_get_height(surface) / height);
+  const RsvgRectangle viewport{0.0, 0.0, width, height};
+  Failure failure;
+  const bool drawn =
+      rsvg_handle_render_document(handle, context.get(), &viewport, failure.out()) != FALSE;
+  if (!drawn || cairo_status(context.get()) != CAIRO_STATUS_SUCCESS) {
+    refuse_picture(path, "cannot be drawn" + failure.reason());
+  }
+  cairo_surface_flush(surface);
+}
+
+/// Every pixel is the mean over samples² points. @pre samples divides the sides of the surface.
+SvgPicture averaged(cairo_surface_t* surface, int samples) {
+  const int columns = cairo_image_surface_get_width(surface) / samples;
+  const int rows = cairo_image_surface_get_height(surface) / samples;
   const unsigned char* const bytes = cairo_image_surface_get_data(surface);
   const std::ptrdiff_t stride = cairo_image_surface_get_stride(surface);
+  SvgPicture picture{Image(columns, rows), Image(columns, rows), false, {}, {}};
   PixelSum sum;
-  for (int row = 0; row < size.rows; ++row) {
-    if (run.stop_requested()) throw Interrupted();
-    for (int column = 0; column < size.columns; ++column) {
+  for (int row = 0; row < rows; ++row) {
+    for (int column = 0; column < columns; ++column) {
       for (std::ptrdiff_t y = 0; y < samples; ++y) {
         for (std::ptrdiff_t x = 0; x < samples; ++x) {
           std::uint32_t point = 0;
@@ -212,61 +315,82 @@ SvgDrawing::Picture averaged(cairo_surface_t* surface, SvgDrawing::Size size, in
   return picture;
 }
 
+/// In the child.
+SvgPicture drawn(const fs::path& path, int longer_side) {
+  SvgLog log;
+  std::vector<std::string> remarks;
+  const std::string xml = with_fit_pictures(svg_text(path), remarks);
+  const Object<RsvgHandle> handle = parse(path, xml);
+  const std::pair size = size_of(path, handle.get());
+  const SvgNeeds needs = svg_needs(xml);
+  if (!needs.problem.empty()) refuse_picture(path, needs.problem);
+  const Surface surface = surface_for(path, size, longer_side);
+  draw(path, handle.get(), size, surface.get());
+  SvgPicture picture = averaged(surface.get(), samples_for(longer_side));
+  picture.remarks = std::move(remarks);
+  picture.remarks.insert(picture.remarks.end(), needs.remarks.begin(), needs.remarks.end());
+  picture.left_out = needs.left_out;
+  for (std::string& finding : log.take()) picture.left_out.push_back(std::move(finding));
+  return picture;
+}
+
+/// A picture as a line of JSON and its pixels.
+std::string to_bytes(const SvgPicture& picture) {
+  const nlohmann::json head{{"columns", picture.light.columns()},
+                            {"rows", picture.light.rows()},
+                            {"colour", picture.colour},
+                            {"remarks", picture.remarks},
+                            {"left_out", picture.left_out}};
+  std::string bytes = head.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace) + '\n';
+  for (const Image* image : {&picture.light, &picture.coverage}) {
+    bytes.append(reinterpret_cast<const char*>(image->values().data()),
+                 image->values().size_bytes());
+  }
+  return bytes;
+}
+
+SvgPicture from_bytes(std::string_view bytes) {
+  const std::size_t end = bytes.find('\n');
+  const auto head = nlohmann::json::parse(bytes.substr(0, end));
+  bytes.remove_prefix(end + 1);
+  const Image empty(head.at("columns").get<int>(), head.at("rows").get<int>());
+  SvgPicture picture{empty, empty, head.at("colour").get<bool>(),
+                     head.at("remarks").get<std::vector<std::string>>(),
+                     head.at("left_out").get<std::vector<std::string>>()};
+  for (Image* image : {&picture.light, &picture.coverage}) {
+    const auto values = image->values();
+    LF_CHECK(values.size_bytes() <= bytes.size(), std::to_string(bytes.size()));
+    std::memcpy(values.data(), bytes.data(), values.size_bytes());
+    bytes.remove_prefix(values.size_bytes());
+  }
+  return picture;
+}
+
+ChildLimits limits_for(int longer_side) {
+  const double points = 1.0 * samples_for(longer_side) * longer_side;
+  const double surface = 4.0 * points * points;
+  return {.memory_bytes = std::min(kSvgMemory + kSvgSurfaces * surface, free_memory_bytes()),
+          .cpu_seconds = kSvgSeconds};
+}
+
 }  // namespace
 
-SvgDrawing::SvgDrawing(fs::path path, const RunControl& run) : path_(std::move(path)) {
-  const std::string xml = read_whole_file(path_, kMaxSvgBytes);
-  handle_ = std::make_unique<Handle>();
-  handle_->rsvg.reset(parse(path_, xml, run));
-  rsvg_handle_set_dpi(handle_->rsvg.get(), kDotsPerInch);
-  std::tie(width_, height_) = size_of(handle_->rsvg.get());
-  if (!(width_ > 0.0 && height_ > 0.0 && std::isfinite(width_ / height_))) {
-    refuse_picture(path_,
-                   "its svg element has no size: give it a viewBox, such as "
-                   "viewBox=\"0 0 100 100\"");
-  }
-  SvgNeeds needs = svg_needs(xml);
-  if (!needs.problem.empty()) refuse_picture(path_, needs.problem);
-  remarks_ = std::move(needs.remarks);
-}
-
-SvgDrawing::~SvgDrawing() = default;
-SvgDrawing::SvgDrawing(SvgDrawing&&) noexcept = default;
-SvgDrawing& SvgDrawing::operator=(SvgDrawing&&) noexcept = default;
-
-SvgDrawing::Size SvgDrawing::size(int longer_side) const {
-  const double scale = longer_side / std::max(width_, height_);
-  const auto pixels = [&](double side) {
-    return std::max(1, static_cast<int>(std::lround(side * scale)));
+SvgPicture draw_svg(const fs::path& path, int longer_side, const RunControl& run) {
+  const auto work = [&](const RunControl&) {
+    // Each thread of librsvg's filters takes address space, which is limited.
+    if (std::thread::hardware_concurrency() > kMaxThreads) {
+      setenv("RAYON_NUM_THREADS", std::to_string(kMaxThreads).c_str(), 1);
+    }
+    return to_bytes(drawn(path, longer_side));
   };
-  return {pixels(width_), pixels(height_)};
-}
-
-SvgDrawing::Picture SvgDrawing::draw(Size size, const RunControl& run) const {
-  check_picture_size(path_, size.columns, size.rows);
-  const int samples =
-      std::clamp(kMaxSampledSide / std::max(size.columns, size.rows), 1, kSvgSamples);
-  const double pixels = 1.0 * size.columns * size.rows;
-  require_room({0.0, 0.0, (4.0 * samples * samples + 8.0) * pixels}, path_.parent_path(),
-               path_.string(), "draw it in fewer pixels");
-  const Surface surface(
-      cairo_image_surface_create(CAIRO_FORMAT_ARGB32, samples * size.columns, samples * size.rows));
-  const Context context(cairo_create(surface.get()));
-  cairo_scale(context.get(), samples * size.columns / width_, samples * size.rows / height_);
-  const RsvgRectangle viewport{0.0, 0.0, width_, height_};
-  Failure failure;
-  bool drawn = false;
-  {
-    const StderrSilence silence;
-    drawn = rsvg_handle_render_document(handle_->rsvg.get(), context.get(), &viewport,
-                                        failure.out()) != FALSE;
+  try {
+    return from_bytes(
+        run_in_child("drawing " + path.filename().string(), limits_for(longer_side), work, run));
+  } catch (const ChildFailure& failure) {
+    refuse_picture(path, std::string("cannot be drawn: the program that draws SVG ") +
+                             failure.what() +
+                             "; fewer or simpler elements would do, or the picture as PNG");
   }
-  if (run.stop_requested()) throw Interrupted();
-  if (!drawn || cairo_status(context.get()) != CAIRO_STATUS_SUCCESS) {
-    refuse_picture(path_, "cannot be drawn" + failure.reason());
-  }
-  cairo_surface_flush(surface.get());
-  return averaged(surface.get(), size, samples, run);
 }
 
 }  // namespace lensforge

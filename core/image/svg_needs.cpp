@@ -1,17 +1,19 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "core/image/svg_needs.h"
 
-#include <fontconfig/fontconfig.h>
+#include <libxml/parser.h>
 #include <libxml/xmlreader.h>
 
 #include <algorithm>
-#include <array>
-#include <cctype>
 #include <cstddef>
-#include <cstdio>
 #include <memory>
 #include <optional>
+#include <set>
+#include <utility>
 
+#include "core/image/svg_fonts.h"
+#include "core/image/svg_pictures.h"
+#include "core/image/svg_support.h"
 #include "core/text/lower_case.h"
 #include "core/text/printable.h"
 
@@ -21,11 +23,11 @@ namespace {
 /// Bytes of a name out of the file in a message.
 constexpr std::size_t kLongestName = 60;
 
-/// CSS Fonts 4, section 2.1.3, the names that the drawing programs add, and keywords that name no
-/// family.
-constexpr std::array<std::string_view, 14> kGenericFamilies{
-    "serif", "sans-serif", "sans",     "monospace", "mono",    "cursive",      "fantasy",
-    "math",  "system-ui",  "ui-serif", "inherit",   "initial", "ui-monospace", "ui-sans-serif"};
+/// Files that are named.
+constexpr std::size_t kMostLinks = 20;
+
+/// Drawings in drawings that are looked through.
+constexpr int kMostNested = 4;
 
 template <auto kFree>
 struct Free {
@@ -35,9 +37,6 @@ struct Free {
   }
 };
 
-using Pattern = std::unique_ptr<FcPattern, Free<FcPatternDestroy>>;
-using Characters = std::unique_ptr<FcCharSet, Free<FcCharSetDestroy>>;
-using Fonts = std::unique_ptr<FcFontSet, Free<FcFontSetDestroy>>;
 using Reader = std::unique_ptr<xmlTextReader, Free<xmlFreeTextReader>>;
 
 std::string_view trimmed(std::string_view text) {
@@ -47,169 +46,325 @@ std::string_view trimmed(std::string_view text) {
   return text.substr(begin, text.find_last_not_of(kAround) - begin + 1);
 }
 
-std::vector<std::string> families_in(std::string_view list) {
-  std::vector<std::string> families;
-  while (!list.empty()) {
-    const std::size_t comma = std::min(list.find(','), list.size());
-    const std::string_view family = trimmed(list.substr(0, comma));
-    if (!family.empty()) families.emplace_back(family);
-    list.remove_prefix(std::min(comma + 1, list.size()));
+/// A property and its value in CSS.
+struct Declaration {
+  std::string name;
+  std::string value;
+};
+
+std::string without_comments(std::string css) {
+  for (std::size_t at = css.find("/*"); at != std::string::npos; at = css.find("/*", at)) {
+    const std::size_t end = css.find("*/", at + 2);
+    css.erase(at, end == std::string::npos ? end : end + 2 - at);
   }
-  return families;
+  return css;
 }
 
-/// The values of all declarations of font-family in CSS.
-std::vector<std::string_view> font_families_in_css(std::string_view css) {
-  constexpr std::string_view kName = "font-family";
-  std::vector<std::string_view> values;
-  for (std::size_t at = css.find(kName); at != std::string_view::npos; at = css.find(kName, at)) {
-    at += kName.size();
-    const std::size_t colon = css.find_first_not_of(" \t\r\n", at);
-    if (colon == std::string_view::npos || css[colon] != ':') continue;
-    values.push_back(css.substr(colon + 1, css.find_first_of(";}!", colon) - colon - 1));
+/// Where a piece of CSS ends that begins at `at`: at a brace or a semicolon that is in no string
+/// and no brackets.
+std::size_t end_of_piece(std::string_view css, std::size_t at) {
+  char quote = '\0';
+  int depth = 0;
+  for (; at < css.size(); ++at) {
+    const char c = css[at];
+    if (quote != '\0') {
+      if (c == quote) quote = '\0';
+    } else if (c == '"' || c == '\'') {
+      quote = c;
+    } else if (c == '(' || c == ')') {
+      depth += c == '(' ? 1 : -1;
+    } else if (c == '{' || c == '}' || (c == ';' && depth <= 0)) {
+      break;
+    }
   }
-  return values;
+  return at;
 }
 
-bool is_generic(const std::string& family) {
-  const auto& all = kGenericFamilies;
-  return std::find(all.begin(), all.end(), lower_case(family)) != all.end();
-}
-
-Pattern pattern_for(const std::string& family) {
-  Pattern pattern(FcPatternCreate());
-  FcPatternAddString(pattern.get(), FC_FAMILY, reinterpret_cast<const FcChar8*>(family.c_str()));
-  FcConfigSubstitute(nullptr, pattern.get(), FcMatchPattern);
-  FcDefaultSubstitute(pattern.get());
-  return pattern;
-}
-
-/// The family that text in `family` is drawn in: that one if it is installed, under any of its
-/// names.
-std::optional<std::string> drawn_family(const std::string& family) {
-  FcResult result = FcResultNoMatch;
-  const Pattern match(FcFontMatch(nullptr, pattern_for(family).get(), &result));
-  FcChar8* name = nullptr;
-  std::optional<std::string> first;
-  for (int i = 0; match && FcPatternGetString(match.get(), FC_FAMILY, i, &name) == FcResultMatch;
-       ++i) {
-    const std::string one = reinterpret_cast<const char*>(name);
-    if (lower_case(one) == lower_case(family)) return family;
-    if (!first) first = one;
+/// All declarations, of style sheets and of style attributes.
+std::vector<Declaration> declarations_in(const std::string& text) {
+  const std::string css = without_comments(text);
+  std::vector<Declaration> all;
+  for (std::size_t at = 0; at < css.size();) {
+    const std::size_t end = end_of_piece(css, at);
+    const std::string_view piece = std::string_view(css).substr(at, end - at);
+    at = end + 1;
+    const std::size_t colon = piece.find(':');
+    // What stands before a brace is a selector.
+    if (colon == std::string_view::npos || (end < css.size() && css[end] == '{')) continue;
+    const std::string_view value = piece.substr(colon + 1);
+    all.push_back({lower_case(std::string(trimmed(piece.substr(0, colon)))),
+                   std::string(trimmed(value.substr(0, value.find('!'))))});
   }
-  return first;
+  return all;
 }
 
-/// The characters of all installed fonts.
-Characters installed_characters() {
-  FcResult result = FcResultNoMatch;
-  FcCharSet* characters = nullptr;
-  const Fonts fonts(
-      FcFontSort(nullptr, pattern_for("sans-serif").get(), FcTrue, &characters, &result));
-  return Characters(characters);
+/// The numbers of a list, as text.
+std::vector<std::string> entries_of(std::string_view list) {
+  constexpr std::string_view kApart = " \t\r\n,";
+  std::vector<std::string> entries;
+  while (true) {
+    list.remove_prefix(std::min(list.find_first_not_of(kApart), list.size()));
+    if (list.empty()) return entries;
+    const std::size_t end = std::min(list.find_first_of(kApart), list.size());
+    entries.emplace_back(list.substr(0, end));
+    list.remove_prefix(end);
+  }
 }
 
-std::string code_point(FcChar32 character) {
-  std::array<char, 16> text{};
-  std::snprintf(text.data(), text.size(), "U+%04X", character);
-  return text.data();
+/// Whether librsvg passes a child of a switch element over: it knows the features of SVG 1.1 but
+/// for other documents in it.
+bool asks_too_much(const std::string& extensions, const std::string& features) {
+  for (const std::string& feature : entries_of(features)) {
+    if (!feature.starts_with("http://www.w3.org/TR/SVG11/feature#")) return true;
+    if (feature.ends_with("#Extensibility")) return true;
+  }
+  return !entries_of(extensions).empty();
 }
+
+/// Opens nothing.
+xmlParserInput* refuse_entity(const char*, const char*, xmlParserCtxt*) { return nullptr; }
 
 /// Walks through a file once.
 class Survey {
  public:
+  explicit Survey(int depth) : depth_(depth) {}
+
   SvgNeeds of(std::string_view xml) {
-    const Reader reader(xmlReaderForMemory(
-        xml.data(), static_cast<int>(xml.size()), nullptr, nullptr,
-        XML_PARSE_NONET | XML_PARSE_NOERROR | XML_PARSE_NOWARNING | XML_PARSE_RECOVER));
+    xmlSetExternalEntityLoader(refuse_entity);
+    const Reader reader(xmlReaderForMemory(xml.data(), static_cast<int>(xml.size()), nullptr,
+                                           nullptr,
+                                           XML_PARSE_NOENT | XML_PARSE_NONET | XML_PARSE_NOERROR |
+                                               XML_PARSE_NOWARNING | XML_PARSE_RECOVER));
     reader_ = reader.get();
     while (reader_ != nullptr && xmlTextReaderRead(reader_) == 1) look_at_node();
-    if (has_text_) judge_families();
+    if (has_text_) {
+      for (const std::string& remark : fonts_.remarks()) add(needs_.remarks, remark);
+      for (const std::string& finding : of_text_) add(needs_.left_out, finding);
+    }
+    if (has_path_length_ && has_dashes_) {
+      leave_out("dashes by the path's own length (pathLength)", "give them in its units");
+    }
     return needs_;
   }
 
  private:
+  /// What an element passes on to those in it.
+  struct Element {
+    bool is_text = false;
+    bool is_style = false;
+    bool is_switch = false;
+    bool is_chosen = false;  ///< Of a switch: whether a child is drawn for sure.
+    bool is_undrawn = false;
+    std::string families;
+  };
+
   void look_at_node() {
     const int type = xmlTextReaderNodeType(reader_);
     const auto depth = static_cast<std::size_t>(std::max(0, xmlTextReaderDepth(reader_)));
     path_.resize(depth);
     if (type == XML_READER_TYPE_ELEMENT) return enter();
-    const bool is_text = type == XML_READER_TYPE_TEXT || type == XML_READER_TYPE_CDATA;
-    if (!is_text || path_.empty()) return;
     const std::string value = text_of(xmlTextReaderConstValue(reader_));
-    if (path_.back().is_style) look_at_css(value);
+    if (type == XML_READER_TYPE_PROCESSING_INSTRUCTION) return look_at_instruction(value);
+    const bool is_text = type == XML_READER_TYPE_TEXT || type == XML_READER_TYPE_CDATA;
+    if (!is_text || path_.empty() || path_.back().is_undrawn) return;
+    if (path_.back().is_style) look_at_sheet(value);
     if (path_.back().is_text) look_at_text(value);
+  }
+
+  void look_at_instruction(const std::string& value) {
+    const std::string name = text_of(xmlTextReaderConstName(reader_));
+    if (name != "xml-stylesheet" || value.find("\"#") != std::string::npos ||
+        value.find("'#") != std::string::npos) {
+      return;
+    }
+    leave_out("a style sheet that is not in the file (xml-stylesheet)", "put it into the file");
   }
 
   void enter() {
     Element element = path_.empty() ? Element{} : path_.back();
-    const std::string name = text_of(xmlTextReaderConstLocalName(reader_));
-    element.is_style = name == "style";
-    element.is_text = element.is_text || name == "text";
-    if (const auto list = attribute("font-family")) element.families = *list;
-    if (const auto style = attribute("style")) {
-      for (const std::string_view list : font_families_in_css(*style)) element.families = list;
-    }
-    if (name == "image" || name == "use" || name == "feImage") look_at_links();
+    const bool in_switch = std::exchange(element.is_switch, false);
+    element.is_undrawn = element.is_undrawn || (in_switch && element.is_chosen);
+    element.is_chosen = false;
+    if (!element.is_undrawn) look_at_element(element, in_switch);
     path_.push_back(element);
+  }
+
+  void look_at_element(Element& element, bool in_switch) {
+    const std::string name = text_of(xmlTextReaderConstLocalName(reader_));
+    const std::string space = text_of(xmlTextReaderConstNamespaceUri(reader_));
+    if (space == "http://www.w3.org/2001/XInclude") return look_at_links();
+    look_at_conditions(element, in_switch);
+    element.is_undrawn = element.is_undrawn || !is_drawn(name, space);
+    if (element.is_undrawn) return;
+    element.is_style = name == "style";
+    element.is_switch = name == "switch";
+    element.is_text = element.is_text || name == "text";
+    look_at_attributes(element);
+    if (name != "a" && name != "color-profile") look_at_links();
+    if (name == "image" || name == "feImage") look_at_picture();
+  }
+
+  /// Names the element where it is not.
+  bool is_drawn(const std::string& name, const std::string& space) {
+    const bool svg = space.empty() || space == "http://www.w3.org/2000/svg";
+    if (!svg && space != "http://www.w3.org/1999/xhtml") return false;
+    for (const std::string_view silent : {"title", "desc", "metadata"}) {
+      if (name == silent) return false;
+    }
+    const auto drawn = drawn_elements();
+    if (svg && std::find(drawn.begin(), drawn.end(), name) != drawn.end()) return true;
+    if (const UndrawnThing* thing = find_undrawn(undrawn_elements(), name)) {
+      leave_out(*thing);
+    } else {
+      leave_out("an element that SVG does not have ('" + printable_line(name, kLongestName) + "')",
+                "draw it with SVG's shapes and text");
+    }
+    return false;
+  }
+
+  void look_at_conditions(Element& element, bool in_switch) {
+    const std::string extensions = attribute("requiredExtensions").value_or("");
+    const bool by_language = attribute("systemLanguage").has_value();
+    if (!in_switch && (by_language || !extensions.empty())) {
+      leave_out("a condition outside of a switch element (systemLanguage, requiredExtensions)",
+                "take out what is not meant to be seen");
+    }
+    if (!in_switch) return;
+    if (by_language) {
+      add(needs_.remarks,
+          "of parts in several languages (systemLanguage) those for this machine are drawn");
+    }
+    if (asks_too_much(extensions, attribute("requiredFeatures").value_or(""))) {
+      element.is_undrawn = true;
+    } else if (!by_language) {
+      path_.back().is_chosen = true;
+    }
+  }
+
+  void look_at_attributes(Element& element) {
+    const bool is_text = element.is_text;
+    while (xmlTextReaderMoveToNextAttribute(reader_) == 1) {
+      const std::string name = text_of(xmlTextReaderConstName(reader_));
+      const std::string value = text_of(xmlTextReaderConstValue(reader_));
+      if (name == "style") {
+        for (const Declaration& one : declarations_in(value)) look_at_style(one, element.families);
+      } else if (name == "font-family") {
+        element.families = value;
+      } else if (is_text && (name == "x" || name == "y" || name == "dx" || name == "dy")) {
+        look_at_places(value);
+      } else if (const UndrawnThing* thing = find_undrawn(undrawn_text_attributes(), name);
+                 is_text && thing != nullptr) {
+        look_at_letters(*thing, value);
+      } else {
+        look_at_property({name, std::string(trimmed(value))});
+      }
+    }
+    xmlTextReaderMoveToElement(reader_);
+  }
+
+  void look_at_places(const std::string& list) {
+    if (entries_of(list).size() < 2) return;
+    leave_out("places of single letters (lists in x, y, dx, dy)",
+              "turn the text into outlines (in Inkscape: Path > Object to Path)");
+  }
+
+  void look_at_letters(const UndrawnThing& thing, const std::string& list) {
+    for (const std::string& entry : entries_of(list)) {
+      if (!is_harmless(thing, entry)) leave_out(thing);
+    }
+  }
+
+  /// As an attribute.
+  void look_at_property(const Declaration& property) {
+    if (property.name == "pathLength") has_path_length_ = true;
+    if (property.name == "stroke-dasharray" && property.value != "none") has_dashes_ = true;
+    if (const UndrawnThing* thing = find_undrawn(undrawn_properties(), property.name)) {
+      if (!is_harmless(*thing, property.value)) leave_out(*thing);
+    } else if (const UndrawnThing* text = find_undrawn(undrawn_text_properties(), property.name)) {
+      if (!is_harmless(*text, property.value)) add(of_text_, sentence(text->what, text->advice));
+    }
+    look_at_addresses(property.value);
+  }
+
+  /// In CSS. @param families  gets those of the text in it.
+  void look_at_style(const Declaration& property, std::string& families) {
+    if (property.name == "font-family") families = property.value;
+    if (property.name == "src") return;
+    if (const UndrawnThing* thing = find_undrawn(undrawn_style_properties(), property.name)) {
+      if (!is_harmless(*thing, property.value)) leave_out(*thing);
+    }
+    look_at_property(property);
+  }
+
+  /// Those in url() that lead out of the file.
+  void look_at_addresses(std::string_view value) {
+    constexpr std::string_view kBefore = "url(";
+    for (std::size_t at = value.find(kBefore); at != std::string_view::npos;
+         at = value.find(kBefore, at + 1)) {
+      const std::string_view address = value.substr(at + kBefore.size());
+      look_at_link(std::string(trimmed(address.substr(0, address.find(')')))));
+    }
   }
 
   void look_at_links() {
     for (const char* name : {"href", "xlink:href"}) {
-      const auto link = attribute(name);
-      if (!link || link->empty() || link->starts_with('#') || link->starts_with("data:")) continue;
-      remark("left out '" + printable_line(*link, kLongestName) +
-             "', which is not in the file: embed it");
+      if (const auto link = attribute(name)) look_at_link(*link);
     }
   }
 
-  void look_at_css(const std::string& css) {
-    if (css.find("@import") != std::string::npos) {
-      remark("left out a style sheet that is not in the file (@import)");
+  void look_at_link(const std::string& link) {
+    if (link.empty() || link.starts_with('#') || lower_case(link.substr(0, 5)) == "data:") return;
+    if (links_.size() == kMostLinks || !links_.insert(link).second) return;
+    leave_out("'" + printable_line(link, kLongestName) + "', which is not in the file", "embed it");
+  }
+
+  void look_at_picture() {
+    for (const char* name : {"href", "xlink:href"}) {
+      const auto link = attribute(name);
+      if (!link || lower_case(link->substr(0, 5)) != "data:") continue;
+      if (const std::string finding = undrawn_of_picture(*link); !finding.empty()) {
+        add(needs_.left_out, finding);
+      }
+      const std::string inner = depth_ < kMostNested ? drawing_at(*link) : "";
+      if (!inner.empty()) take_over(Survey(depth_ + 1).of(inner));
     }
-    for (const std::string_view list : font_families_in_css(css)) families_.emplace_back(list);
+  }
+
+  void take_over(const SvgNeeds& inner) {
+    for (const std::string& remark : inner.remarks) add(needs_.remarks, remark);
+    for (const std::string& finding : inner.left_out) add(needs_.left_out, finding);
+    if (needs_.problem.empty()) needs_.problem = inner.problem;
+  }
+
+  void look_at_sheet(const std::string& css) {
+    if (css.find("@import") != std::string::npos) {
+      leave_out("a style sheet that is not in the file (@import)", "put it into the file");
+    }
+    for (const Declaration& one : declarations_in(css)) {
+      std::string families;
+      look_at_style(one, families);
+      fonts_.add(families);
+    }
   }
 
   void look_at_text(const std::string& text) {
     if (trimmed(text).empty()) return;
     has_text_ = true;
-    families_.push_back(path_.back().families);
-    if (!installed_) installed_ = installed_characters();
-    const auto* at = reinterpret_cast<const FcChar8*>(text.c_str());
-    int left = static_cast<int>(text.size());
-    FcChar32 character = 0;
-    for (int used = 0; left > 0 && needs_.problem.empty(); at += used, left -= used) {
-      used = FcUtf8ToUcs4(at, &character, left);
-      if (used <= 0) return;
-      if (character <= ' ' || FcCharSetHasChar(installed_.get(), character) != FcFalse) continue;
-      needs_.problem = "its text has the character " +
-                       printable_line({reinterpret_cast<const char*>(at), std::size_t(used)}) +
-                       " (" + code_point(character) +
-                       "), which no installed font has: install one, or convert the text to paths";
-    }
+    fonts_.add(path_.back().families);
+    if (needs_.problem.empty()) needs_.problem = fonts_.problem_of(text);
   }
 
-  void judge_families() {
-    std::sort(families_.begin(), families_.end());
-    families_.erase(std::unique(families_.begin(), families_.end()), families_.end());
-    for (const std::string& list : families_) judge(families_in(list));
+  void leave_out(const UndrawnThing& thing) {
+    add(needs_.left_out, sentence(thing.what, thing.advice));
+  }
+  void leave_out(std::string_view what, std::string_view advice) {
+    add(needs_.left_out, sentence(what, advice));
+  }
+  static std::string sentence(std::string_view what, std::string_view advice) {
+    return "left out " + std::string(what) + ": " + std::string(advice);
   }
 
-  void judge(const std::vector<std::string>& families) {
-    std::optional<std::string> drawn;
-    for (const std::string& family : families) {
-      const std::optional<std::string> found = drawn_family(family);
-      if (is_generic(family) || found == family) return;
-      if (!drawn) drawn = found;
-    }
-    if (families.empty()) return;
-    remark("text is drawn in the font '" + printable_line(drawn.value_or("none"), kLongestName) +
-           "' because '" + printable_line(families.front(), kLongestName) +
-           "' is not installed: install it, or convert the text to paths");
-  }
-
-  void remark(const std::string& text) {
-    auto& all = needs_.remarks;
+  static void add(std::vector<std::string>& all, const std::string& text) {
     if (std::find(all.begin(), all.end(), text) == all.end()) all.push_back(text);
   }
 
@@ -225,23 +380,20 @@ class Survey {
     return text_of(value.get());
   }
 
-  /// What an element passes on to those in it.
-  struct Element {
-    bool is_text = false;
-    bool is_style = false;
-    std::string families;
-  };
-
+  int depth_;  ///< Of drawings in drawings.
   xmlTextReader* reader_ = nullptr;
   std::vector<Element> path_;  ///< From the outermost element to the one at hand.
-  std::vector<std::string> families_;
+  SvgFonts fonts_;
+  std::set<std::string> links_;
   bool has_text_ = false;
-  Characters installed_;
+  bool has_path_length_ = false;
+  bool has_dashes_ = false;
+  std::vector<std::string> of_text_;  ///< Left out if there is text.
   SvgNeeds needs_;
 };
 
 }  // namespace
 
-SvgNeeds svg_needs(std::string_view xml) { return Survey().of(xml); }
+SvgNeeds svg_needs(std::string_view xml) { return Survey(0).of(xml); }
 
 }  // namespace lensforge

@@ -7,16 +7,17 @@
 
 namespace lensforge {
 
-/// What an SVG file needs beyond itself.
+/// What an SVG file needs beyond itself and beyond what librsvg does.
 struct SvgNeeds {
-  /// In plain words: fonts that are not installed and what is taken instead, files that it refers
-  /// to. Each once.
+  /// In plain words: fonts that are not installed and what is taken instead. Each once.
   std::vector<std::string> remarks;
+  /// In plain words: what is not drawn (svg_support.h), files that it refers to. Each kind once.
+  std::vector<std::string> left_out;
   std::string problem;  ///< Why its text cannot be drawn at all; empty if it can.
 };
 
-/// Looks the text of a file up in the installed fonts (fontconfig). A font counts as there if one
-/// of the families that the text names is there, or a generic one. @param xml  well formed or not.
+/// Walks through the text of a file, of which nothing that it refers to is opened. @param xml  well
+/// formed or not. @pre In a process of its own: libxml2 opens no file there any more.
 SvgNeeds svg_needs(std::string_view xml);
 
 }  // namespace lensforge

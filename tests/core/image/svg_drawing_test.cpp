@@ -3,18 +3,22 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <zlib.h>
 
+#include <chrono>
 #include <cmath>
 #include <numbers>
 #include <sstream>
 #include <stop_token>
 #include <string>
 #include <string_view>
+#include <thread>
 
 #include "core/error.h"
 #include "core/image/image_io.h"
 #include "core/image/picture_refusal.h"
 #include "core/image/transfer.h"
+#include "core/stop_bound.h"
 #include "core/temp_folder.h"
 
 namespace lensforge {
@@ -103,7 +107,7 @@ TEST(SvgDrawing, ColourBecomesLuminanceAndTransparencyBlack) {
 TEST(SvgDrawing, CoverageIsOneWhereItHidesWhatIsBehind) {
   const TempFolder folder;
   write_bytes(folder / "a.svg", svg("<rect width='3.5' height='4'/>"));
-  const SvgDrawing::Picture picture = SvgDrawing(folder / "a.svg").draw({8, 4});
+  const SvgPicture picture = draw_svg(folder / "a.svg", 8);
   EXPECT_EQ(picture.coverage.at(2, 1), 1.0F);
   EXPECT_NEAR(picture.coverage.at(3, 1), 0.5, kLevel);
   EXPECT_EQ(picture.coverage.at(4, 1), 0.0F);
@@ -111,7 +115,7 @@ TEST(SvgDrawing, CoverageIsOneWhereItHidesWhatIsBehind) {
   EXPECT_FALSE(picture.colour);
 }
 
-TEST(SvgDrawing, KeepsItsProportionsUnlessItIsStretched) {
+TEST(SvgDrawing, KeepsItsProportions) {
   const TempFolder folder;
   const std::string area = "<rect width='30' height='20' fill='white'/>";
   write_bytes(folder / "a.svg",
@@ -122,11 +126,11 @@ TEST(SvgDrawing, KeepsItsProportionsUnlessItIsStretched) {
   write_bytes(folder / "c.svg",
               "<svg xmlns='http://www.w3.org/2000/svg' width='30' height='20'>" + area + "</svg>");
   for (const char* name : {"a.svg", "b.svg", "c.svg"}) {
-    const SvgDrawing drawing(folder / name);
-    EXPECT_EQ(drawing.size(300).columns, 300) << name;
-    EXPECT_EQ(drawing.size(300).rows, 200) << name;
-    EXPECT_EQ(drawing.size(1).rows, 1) << name;
-    EXPECT_NEAR(drawing.draw({17, 90}).light.total(), 17.0 * 90.0, 0.01) << name;
+    const Image drawing = draw_svg(folder / name, 300).light;
+    EXPECT_EQ(drawing.columns(), 300) << name;
+    EXPECT_EQ(drawing.rows(), 200) << name;
+    EXPECT_NEAR(drawing.total(), 300.0 * 200.0, 0.01) << name;
+    EXPECT_EQ(draw_svg(folder / name, 1).light.rows(), 1) << name;
   }
 }
 
@@ -226,6 +230,93 @@ TEST(SvgDrawing, RefusesEntitiesThatGrowWithoutEnd) {
     text += "'>";
   }
   EXPECT_NE(refusal_of(text + "]>" + svg("<text fill='white'>&a11;</text>")), "");
+}
+
+/// What gzip makes of it.
+std::string packed(const std::string& text) {
+  z_stream stream{};
+  deflateInit2(&stream, 9, Z_DEFLATED, 16 + MAX_WBITS, 9, Z_DEFAULT_STRATEGY);
+  std::string bytes(deflateBound(&stream, text.size()), '\0');
+  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(text.data()));
+  stream.avail_in = static_cast<uInt>(text.size());
+  stream.next_out = reinterpret_cast<Bytef*>(bytes.data());
+  stream.avail_out = static_cast<uInt>(bytes.size());
+  deflate(&stream, Z_FINISH);
+  bytes.resize(stream.total_out);
+  deflateEnd(&stream);
+  return bytes;
+}
+
+std::string utf16(const std::string& text, bool little) {
+  std::string bytes = little ? "\xFF\xFE" : "\xFE\xFF";
+  for (const char c : text) {
+    bytes += little ? std::string{c, '\0'} : std::string{'\0', c};
+  }
+  return bytes;
+}
+
+TEST(SvgDrawing, PackedAndOtherwiseEncodedTextIsDrawnTheSame) {
+  const std::string body = svg(kBlack + "<circle cx='3' cy='2' r='1.5' fill='white'/>");
+  const Image plain = drawn(body).image;
+  EXPECT_EQ(drawn(packed(body)).image, plain);
+  for (const bool little : {true, false}) {
+    EXPECT_EQ(drawn(utf16(body, little)).image, plain);
+    EXPECT_EQ(drawn(utf16("<?xml version='1.0' encoding='UTF-16'?>" + body, little)).image, plain);
+    EXPECT_EQ(drawn(packed(utf16(body, little))).image, plain);
+  }
+  for (const char* encoding : {"ISO-8859-1", "windows-1252", "Shift_JIS", "KOI8-R"}) {
+    const std::string head = std::string("<?xml version='1.0' encoding='") + encoding + "'?>";
+    EXPECT_EQ(drawn(head + body).image, plain) << encoding;
+  }
+  // An a with two dots.
+  EXPECT_EQ(
+      drawn("<?xml version='1.0' encoding='ISO-8859-1'?>" + text_in("DejaVu Sans", "\xE4")).image,
+      drawn(text_in("DejaVu Sans", "\xC3\xA4")).image);
+}
+
+TEST(SvgDrawing, RefusesPackedTextThatIsTruncatedOrTooLong) {
+  const std::string body = svg(kBlack + "<circle r='4' fill='white'/>");
+  const std::string bytes = packed(body + std::string(2000, ' '));
+  EXPECT_THAT(refusal_of(bytes.substr(0, bytes.size() - 9)), HasSubstr("truncated or corrupt"));
+  EXPECT_THAT(refusal_of(packed(body + std::string(kMaxSvgBytes, ' '))),
+              HasSubstr("unpacks to more than 32 MB"));
+  EXPECT_THAT(refusal_of(packed("no drawing")), HasSubstr("is no picture"));
+}
+
+/// Files that crash the libraries or keep them busy for longer than anybody waits.
+std::string million_numbers() {
+  std::string numbers;
+  for (int i = 0; i < 1'000'000; ++i) numbers += "1 ";
+  return svg("<filter id='f'><feConvolveMatrix order='1000' kernelMatrix='" + numbers +
+             "'/></filter><rect width='8' height='4' fill='white' filter='url(#f)'/>");
+}
+
+std::string endless_noise() {
+  return svg(
+      "<filter id='f'><feTurbulence baseFrequency='.1' numOctaves='1000000000'/></filter>"
+      "<rect width='8' height='4' fill='white' filter='url(#f)'/>");
+}
+
+TEST(SvgDrawing, ACrashOfTheLibrariesIsARefusalInOneLine) {
+  const std::string letters = text_in("DejaVu Sans", std::string(2'000'000, 'x'));
+  for (const std::string& text : {million_numbers(), letters}) {
+    EXPECT_THAT(refusal_of(text), AllOf(HasSubstr("cannot be drawn: the program that draws SVG"),
+                                        HasSubstr("would do")));
+  }
+}
+
+TEST(SvgDrawing, StopsAtOnceInTheMiddleOfAnything) {
+  const TempFolder folder;
+  write_bytes(folder / "a.svg", endless_noise());
+  std::stop_source stop;
+  std::jthread interrupt([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(300));
+    stop.request_stop();
+  });
+  const auto start = std::chrono::steady_clock::now();
+  EXPECT_THROW(read_image(folder / "a.svg", {stop.get_token(), {}}), Interrupted);
+  EXPECT_LT(std::chrono::steady_clock::now() - start,
+            std::chrono::milliseconds(300) + lensforge::testing::kStopBound);
 }
 
 TEST(SvgDrawing, StopsWhenAskedTo) {
