@@ -44,6 +44,7 @@ bool answers(int port) {
     std::this_thread::sleep_for(kBetween);
     try {
       clients.emplace_back(port).send(testing::hostile_request(port, random), kBetween);
+      random.pick(clients).send("X: y\r\n", milliseconds(0));
       if (clients.size() == kMostClients) {
         std::swap(clients[random.below(kMostClients)], clients.back());
         clients.pop_back();
