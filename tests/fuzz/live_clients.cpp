@@ -63,7 +63,7 @@ bool answers(int port) {
 
 LiveClients::LiveClients(std::uint64_t seed)
     : socket_(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
-  // A port that is bound and not listened at is nobody's but who says so, too.
+  // While this socket holds the port, only sockets with the same option may take it, as the page's.
   const int yes = 1;
   sockaddr_in address{};
   address.sin_family = AF_INET;
