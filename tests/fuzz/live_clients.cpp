@@ -44,6 +44,7 @@ bool answers(int port) {
     std::this_thread::sleep_for(kBetween);
     try {
       clients.emplace_back(port).send(testing::hostile_request(port, random), kBetween);
+      random.pick(clients).send("X: y\r\n", milliseconds(0));
       if (clients.size() == kMostClients) {
         std::swap(clients[random.below(kMostClients)], clients.back());
         clients.pop_back();
@@ -62,7 +63,7 @@ bool answers(int port) {
 
 LiveClients::LiveClients(std::uint64_t seed)
     : socket_(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
-  // A port that is bound and not listened at is nobody's but who says so, too.
+  // While this socket holds the port, only sockets with the same option may take it, as the page's.
   const int yes = 1;
   sockaddr_in address{};
   address.sin_family = AF_INET;

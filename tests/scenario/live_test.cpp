@@ -46,6 +46,16 @@ nlohmann::json first_state(Process& design, httplib::Client& client) {
   return nullptr;
 }
 
+/// Opens what is served at a port in a browser and writes what became of the page to a file, when
+/// the page's clock, which waits for answers, says 3 s.
+void open_in_browser(int port, const std::string& file) {
+  const std::string command =
+      "timeout 60 chromium --headless --no-sandbox --virtual-time-budget=3000 --dump-dom "
+      "http://127.0.0.1:" +
+      std::to_string(port) + "/ >" + file + " 2>/dev/null";
+  ASSERT_EQ(std::system(command.c_str()), 0);
+}
+
 /// The page of a design with its stop button pressed at once, at an address of its own.
 class PressedPage {
  public:
@@ -72,13 +82,7 @@ class PressedPage {
   PressedPage(const PressedPage&) = delete;
   PressedPage& operator=(const PressedPage&) = delete;
 
-  void open() const {
-    const std::string command =
-        "timeout 60 chromium --headless --no-sandbox --timeout=5000 "
-        "--dump-dom http://127.0.0.1:" +
-        std::to_string(port_) + "/ >/dev/null 2>&1";
-    ASSERT_EQ(std::system(command.c_str()), 0);
-  }
+  [[nodiscard]] int port() const { return port_; }
 
  private:
   httplib::Server server_;
@@ -169,6 +173,19 @@ TEST_F(Live, EndsWithTheDesignWhateverItsClientsDo) {
   EXPECT_EQ(design.wait(std::chrono::seconds(60)).exit_code, 0);
 }
 
+TEST_F(Live, ItsPageShowsTheDesignInABrowser) {
+  if (!testing::has_browser()) GTEST_SKIP() << "chromium is not installed";
+  Process design(live_design(path("lens"), "0"));
+  const int port = port_of(design);
+  ASSERT_GT(port, 0) << design.said();
+  httplib::Client client("127.0.0.1", port);
+  ASSERT_TRUE(first_state(design, client).is_object());
+  open_in_browser(port, path("page.html"));
+  const std::string page = content(at("page.html"));
+  EXPECT_NE(page.find(" at work, "), std::string::npos);
+  EXPECT_NE(page.find("src=\"/picture.png?"), std::string::npos);
+}
+
 TEST_F(Live, ItsStopButtonEndsTheDesignAsCtrlCDoes) {
   if (!testing::has_browser()) GTEST_SKIP() << "chromium is not installed";
   Process design(live_design(path("lens"), "0"));
@@ -176,7 +193,7 @@ TEST_F(Live, ItsStopButtonEndsTheDesignAsCtrlCDoes) {
   ASSERT_GT(port, 0) << design.said();
   httplib::Client client("127.0.0.1", port);
   ASSERT_TRUE(first_state(design, client).is_object());
-  PressedPage(client).open();
+  open_in_browser(PressedPage(client).port(), "/dev/null");
   const Outcome outcome = design.wait();
   EXPECT_EQ(outcome.exit_code, 130);
   EXPECT_THAT(outcome.err, HasSubstr("--resume"));
