@@ -23,6 +23,7 @@ namespace {
 
 using lensforge::testing::TempFolder;
 using lensforge::testing::write_bytes;
+using ::testing::AllOf;
 using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -266,7 +267,10 @@ TEST(SvgLeftOut, IsWhyADrawingIsBlack) {
   write_bytes(folder / "a.svg",
               svg("<rect width='100' height='100'/><rect width='9' height='9' fill='var(--c)'/>"));
   EXPECT_THAT(lensforge::testing::picture_refusal(folder / "a.svg"),
-              HasSubstr("is black all over: left out 'fill: var(--c)': write the value itself"));
+              HasSubstr("is black all over; left out 'fill: var(--c)': write the value itself"));
+  write_bytes(folder / "a.svg", svg("<foreignObject/>"));
+  EXPECT_THAT(lensforge::testing::picture_refusal(folder / "a.svg"),
+              AllOf(HasSubstr("draw a white rectangle behind it"), HasSubstr("foreignObject")));
 }
 
 TEST(SvgLeftOut, SoManyKindsAreKeptAsAReaderCanRead) {
