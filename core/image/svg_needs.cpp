@@ -23,8 +23,8 @@ namespace {
 /// Bytes of a name out of the file in a message.
 constexpr std::size_t kLongestName = 60;
 
-/// Files that are named.
-constexpr std::size_t kMostLinks = 20;
+/// Names out of the file that findings are made of: it may have a thousand.
+constexpr std::size_t kMostNames = 30;
 
 /// Drawings in drawings that are looked through.
 constexpr int kMostNested = 4;
@@ -52,12 +52,15 @@ struct Declaration {
   std::string value;
 };
 
-std::string without_comments(std::string css) {
-  for (std::size_t at = css.find("/*"); at != std::string::npos; at = css.find("/*", at)) {
-    const std::size_t end = css.find("*/", at + 2);
-    css.erase(at, end == std::string::npos ? end : end + 2 - at);
+std::string without_comments(std::string_view css) {
+  std::string rest;
+  while (true) {
+    const std::size_t begin = css.find("/*");
+    rest += css.substr(0, begin);
+    const std::size_t end = begin == std::string_view::npos ? begin : css.find("*/", begin + 2);
+    if (end == std::string_view::npos) return rest;
+    css.remove_prefix(end + 2);
   }
-  return css;
 }
 
 /// Where a piece of CSS ends that begins at `at`: at a brace or a semicolon that is in no string
@@ -197,6 +200,7 @@ class Survey {
     element.is_undrawn = element.is_undrawn || !is_drawn(name, space);
     if (element.is_undrawn) return;
     element.is_style = name == "style";
+    if (element.is_style) look_at_medium(trimmed(attribute("media").value_or("")));
     element.is_switch = name == "switch";
     element.is_text = element.is_text || name == "text";
     look_at_attributes(element);
@@ -215,7 +219,7 @@ class Survey {
     if (svg && std::find(drawn.begin(), drawn.end(), name) != drawn.end()) return true;
     if (const UndrawnThing* thing = find_undrawn(undrawn_elements(), name)) {
       leave_out(*thing);
-    } else {
+    } else if (is_new(name)) {
       leave_out("an element that SVG does not have ('" + printable_line(name, kLongestName) + "')",
                 "draw it with SVG's shapes and text");
     }
@@ -239,6 +243,11 @@ class Survey {
     } else if (!by_language) {
       path_.back().is_chosen = true;
     }
+  }
+
+  void look_at_medium(std::string_view medium) {
+    if (medium.empty() || medium == "all" || medium == "screen") return;
+    leave_out("the medium that a style sheet is for (media)", "take out what is not for a screen");
   }
 
   void look_at_attributes(Element& element) {
@@ -314,7 +323,7 @@ class Survey {
 
   void look_at_link(const std::string& link) {
     if (link.empty() || link.starts_with('#') || lower_case(link.substr(0, 5)) == "data:") return;
-    if (links_.size() == kMostLinks || !links_.insert(link).second) return;
+    if (!is_new(link)) return;
     leave_out("'" + printable_line(link, kLongestName) + "', which is not in the file", "embed it");
   }
 
@@ -322,9 +331,8 @@ class Survey {
     for (const char* name : {"href", "xlink:href"}) {
       const auto link = attribute(name);
       if (!link || lower_case(link->substr(0, 5)) != "data:") continue;
-      if (const std::string finding = undrawn_of_picture(*link); !finding.empty()) {
-        add(needs_.left_out, finding);
-      }
+      const std::string finding = undrawn_of_picture(*link);
+      if (!finding.empty() && is_new(finding)) add(needs_.left_out, finding);
       const std::string inner = depth_ < kMostNested ? drawing_at(*link) : "";
       if (!inner.empty()) take_over(Survey(depth_ + 1).of(inner));
     }
@@ -352,6 +360,11 @@ class Survey {
     has_text_ = true;
     fonts_.add(path_.back().families);
     if (needs_.problem.empty()) needs_.problem = fonts_.problem_of(text);
+  }
+
+  /// Whether a name out of the file is met for the first time, and not one of too many.
+  bool is_new(const std::string& name) {
+    return names_.size() < kMostNames && names_.insert(name).second;
   }
 
   void leave_out(const UndrawnThing& thing) {
@@ -384,7 +397,7 @@ class Survey {
   xmlTextReader* reader_ = nullptr;
   std::vector<Element> path_;  ///< From the outermost element to the one at hand.
   SvgFonts fonts_;
-  std::set<std::string> links_;
+  std::set<std::string> names_;
   bool has_text_ = false;
   bool has_path_length_ = false;
   bool has_dashes_ = false;

@@ -154,6 +154,7 @@ std::vector<Row> value_rows() {
       {"<style>svg{.a{fill:white}}</style>" + plain, plain, "nested rule '.a{fill:white}'"},
       {"<style>@font-face{font-family:x;src:url(y)}</style>", "", "@font-face"},
       {"<style>@keyframes a{from{fill:red}}</style>", "", "@keyframes"},
+      {"<style media='print'>.a{fill:white}</style>" + plain, kArea, "(media)"},
       {"<style>@import 'a.css';</style>", "", "@import"},
       {"<rect width='50' height='50' fill='url(#nowhere)'/>", "", "the paint '#nowhere'"},
       {"<polygon points='1,2 3' fill='white' x='1'/><use width='calc(1px)' href='#p'/>", "",
