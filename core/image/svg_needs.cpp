@@ -5,6 +5,7 @@
 #include <libxml/xmlreader.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cstddef>
 #include <memory>
 #include <optional>
@@ -112,6 +113,18 @@ std::vector<std::string> entries_of(std::string_view list) {
     entries.emplace_back(list.substr(0, end));
     list.remove_prefix(end);
   }
+}
+
+/// The families in a value of the property font: they stand behind the size, "bold 12px/1.5 Serif".
+std::string families_of_font(std::string_view font) {
+  for (const std::string& entry : entries_of(font)) {
+    const std::string_view size = std::string_view(entry).substr(0, entry.find('/'));
+    const char last = size.empty() ? '0' : size.back();
+    const bool has_unit = last == '%' || std::isalpha(static_cast<unsigned char>(last)) != 0;
+    if (!has_unit || size.find_first_of("0123456789") == std::string_view::npos) continue;
+    return std::string(font.substr(font.find(entry) + entry.size()));
+  }
+  return {};
 }
 
 /// Whether librsvg passes a child of a switch element over: it knows the features of SVG 1.1 but
@@ -255,9 +268,7 @@ class Survey {
     while (xmlTextReaderMoveToNextAttribute(reader_) == 1) {
       const std::string name = text_of(xmlTextReaderConstName(reader_));
       const std::string value = text_of(xmlTextReaderConstValue(reader_));
-      if (name == "style") {
-        for (const Declaration& one : declarations_in(value)) look_at_style(one, element.families);
-      } else if (name == "font-family") {
+      if (name == "font-family") {
         element.families = value;
       } else if (is_text && (name == "x" || name == "y" || name == "dx" || name == "dy")) {
         look_at_places(value);
@@ -269,6 +280,10 @@ class Survey {
       }
     }
     xmlTextReaderMoveToElement(reader_);
+    // A style counts for more than attributes.
+    for (const Declaration& one : declarations_in(attribute("style").value_or(""))) {
+      look_at_style(one, element.families);
+    }
   }
 
   void look_at_places(const std::string& list) {
@@ -298,6 +313,7 @@ class Survey {
   /// In CSS. @param families  gets those of the text in it.
   void look_at_style(const Declaration& property, std::string& families) {
     if (property.name == "font-family") families = property.value;
+    if (property.name == "font") families = families_of_font(property.value);
     if (property.name == "src") return;
     if (const UndrawnThing* thing = find_undrawn(undrawn_style_properties(), property.name)) {
       if (!is_harmless(*thing, property.value)) leave_out(*thing);
