@@ -245,12 +245,16 @@ void report_header(PictureSource& source, std::vector<std::string>& changes) {
   }
 }
 
-/// The first ones of a list, as many as fit into a message.
-std::string first_of(const std::vector<std::string>& findings) {
+/// Why a drawing shows nothing, with the first things that are left out.
+[[noreturn]] void refuse_black(const fs::path& path, bool open,
+                               const std::vector<std::string>& left_out) {
   constexpr std::size_t kMost = 3;
-  std::string text = findings.front();
-  for (std::size_t i = 1; i < std::min(kMost, findings.size()); ++i) text += "; " + findings[i];
-  return text;
+  std::string why = "is black all over";
+  if (open) {
+    why += ", since transparency is flattened onto black: draw a white rectangle behind it";
+  }
+  for (std::size_t i = 0; i < std::min(kMost, left_out.size()); ++i) why += "; " + left_out[i];
+  refuse_picture(path, why);
 }
 
 LoadedImage read_drawing(const fs::path& path, int longer_side, const RunControl& run) {
@@ -262,14 +266,8 @@ LoadedImage read_drawing(const fs::path& path, int longer_side, const RunControl
   const auto coverage = picture.coverage.values();
   const bool open = std::any_of(coverage.begin(), coverage.end(), [](float c) { return c < 1.0F; });
   if (open) loaded.changes.emplace_back(kTransparencyFlattened);
-  if (loaded.image.total() == 0.0 && !picture.left_out.empty()) {
-    refuse_picture(path, "is black all over: " + first_of(picture.left_out));
-  }
-  if (loaded.image.total() == 0.0 && open) {
-    refuse_picture(path,
-                   "is black all over, since transparency is flattened onto black: draw a white "
-                   "rectangle behind it");
-  }
+  const bool may_be_black = !open && picture.left_out.empty();
+  if (!may_be_black && loaded.image.total() == 0.0) refuse_black(path, open, picture.left_out);
   for (const auto* list : {&picture.remarks, &picture.left_out}) {
     loaded.changes.insert(loaded.changes.end(), list->begin(), list->end());
   }

@@ -3,6 +3,7 @@
 
 #include <fontconfig/fontconfig.h>
 
+#include <cstddef>
 #include <memory>
 #include <set>
 #include <string>
@@ -15,7 +16,9 @@ namespace lensforge {
 class SvgFonts {
  public:
   /// @param families  as font-family lists them.
-  void add(const std::string& families) { families_.insert(families); }
+  void add(const std::string& families) {
+    if (families_.size() < kMostLists) families_.insert(families);
+  }
 
   /// The first character that no installed font has, as a problem; empty if there is none.
   [[nodiscard]] std::string problem_of(const std::string& text);
@@ -24,6 +27,9 @@ class SvgFonts {
   [[nodiscard]] std::vector<std::string> remarks() const;
 
  private:
+  /// Each takes a millisecond to look up, and a file may have a million.
+  static constexpr std::size_t kMostLists = 100;
+
   struct DestroyCharacters {
     void operator()(FcCharSet* characters) const { FcCharSetDestroy(characters); }
   };

@@ -5,6 +5,7 @@
 #include <libxml/xmlreader.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cstddef>
 #include <memory>
 #include <optional>
@@ -23,8 +24,8 @@ namespace {
 /// Bytes of a name out of the file in a message.
 constexpr std::size_t kLongestName = 60;
 
-/// Files that are named.
-constexpr std::size_t kMostLinks = 20;
+/// Names out of the file that findings are made of: it may have a thousand.
+constexpr std::size_t kMostNames = 30;
 
 /// Drawings in drawings that are looked through.
 constexpr int kMostNested = 4;
@@ -52,12 +53,15 @@ struct Declaration {
   std::string value;
 };
 
-std::string without_comments(std::string css) {
-  for (std::size_t at = css.find("/*"); at != std::string::npos; at = css.find("/*", at)) {
-    const std::size_t end = css.find("*/", at + 2);
-    css.erase(at, end == std::string::npos ? end : end + 2 - at);
+std::string without_comments(std::string_view css) {
+  std::string rest;
+  while (true) {
+    const std::size_t begin = css.find("/*");
+    rest += css.substr(0, begin);
+    const std::size_t end = begin == std::string_view::npos ? begin : css.find("*/", begin + 2);
+    if (end == std::string_view::npos) return rest;
+    css.remove_prefix(end + 2);
   }
-  return css;
 }
 
 /// Where a piece of CSS ends that begins at `at`: at a brace or a semicolon that is in no string
@@ -109,6 +113,18 @@ std::vector<std::string> entries_of(std::string_view list) {
     entries.emplace_back(list.substr(0, end));
     list.remove_prefix(end);
   }
+}
+
+/// The families in a value of the property font: they stand behind the size, "bold 12px/1.5 Serif".
+std::string families_of_font(std::string_view font) {
+  for (const std::string& entry : entries_of(font)) {
+    const std::string_view size = std::string_view(entry).substr(0, entry.find('/'));
+    const char last = size.empty() ? '0' : size.back();
+    const bool has_unit = last == '%' || std::isalpha(static_cast<unsigned char>(last)) != 0;
+    if (!has_unit || size.find_first_of("0123456789") == std::string_view::npos) continue;
+    return std::string(font.substr(font.find(entry) + entry.size()));
+  }
+  return {};
 }
 
 /// Whether librsvg passes a child of a switch element over: it knows the features of SVG 1.1 but
@@ -197,6 +213,7 @@ class Survey {
     element.is_undrawn = element.is_undrawn || !is_drawn(name, space);
     if (element.is_undrawn) return;
     element.is_style = name == "style";
+    if (element.is_style) look_at_medium(trimmed(attribute("media").value_or("")));
     element.is_switch = name == "switch";
     element.is_text = element.is_text || name == "text";
     look_at_attributes(element);
@@ -215,7 +232,7 @@ class Survey {
     if (svg && std::find(drawn.begin(), drawn.end(), name) != drawn.end()) return true;
     if (const UndrawnThing* thing = find_undrawn(undrawn_elements(), name)) {
       leave_out(*thing);
-    } else {
+    } else if (is_new(name)) {
       leave_out("an element that SVG does not have ('" + printable_line(name, kLongestName) + "')",
                 "draw it with SVG's shapes and text");
     }
@@ -241,14 +258,17 @@ class Survey {
     }
   }
 
+  void look_at_medium(std::string_view medium) {
+    if (medium.empty() || medium == "all" || medium == "screen") return;
+    leave_out("the medium that a style sheet is for (media)", "take out what is not for a screen");
+  }
+
   void look_at_attributes(Element& element) {
     const bool is_text = element.is_text;
     while (xmlTextReaderMoveToNextAttribute(reader_) == 1) {
       const std::string name = text_of(xmlTextReaderConstName(reader_));
       const std::string value = text_of(xmlTextReaderConstValue(reader_));
-      if (name == "style") {
-        for (const Declaration& one : declarations_in(value)) look_at_style(one, element.families);
-      } else if (name == "font-family") {
+      if (name == "font-family") {
         element.families = value;
       } else if (is_text && (name == "x" || name == "y" || name == "dx" || name == "dy")) {
         look_at_places(value);
@@ -260,6 +280,10 @@ class Survey {
       }
     }
     xmlTextReaderMoveToElement(reader_);
+    // A style counts for more than attributes.
+    for (const Declaration& one : declarations_in(attribute("style").value_or(""))) {
+      look_at_style(one, element.families);
+    }
   }
 
   void look_at_places(const std::string& list) {
@@ -289,6 +313,7 @@ class Survey {
   /// In CSS. @param families  gets those of the text in it.
   void look_at_style(const Declaration& property, std::string& families) {
     if (property.name == "font-family") families = property.value;
+    if (property.name == "font") families = families_of_font(property.value);
     if (property.name == "src") return;
     if (const UndrawnThing* thing = find_undrawn(undrawn_style_properties(), property.name)) {
       if (!is_harmless(*thing, property.value)) leave_out(*thing);
@@ -314,7 +339,7 @@ class Survey {
 
   void look_at_link(const std::string& link) {
     if (link.empty() || link.starts_with('#') || lower_case(link.substr(0, 5)) == "data:") return;
-    if (links_.size() == kMostLinks || !links_.insert(link).second) return;
+    if (!is_new(link)) return;
     leave_out("'" + printable_line(link, kLongestName) + "', which is not in the file", "embed it");
   }
 
@@ -322,9 +347,8 @@ class Survey {
     for (const char* name : {"href", "xlink:href"}) {
       const auto link = attribute(name);
       if (!link || lower_case(link->substr(0, 5)) != "data:") continue;
-      if (const std::string finding = undrawn_of_picture(*link); !finding.empty()) {
-        add(needs_.left_out, finding);
-      }
+      const std::string finding = undrawn_of_picture(*link);
+      if (!finding.empty() && is_new(finding)) add(needs_.left_out, finding);
       const std::string inner = depth_ < kMostNested ? drawing_at(*link) : "";
       if (!inner.empty()) take_over(Survey(depth_ + 1).of(inner));
     }
@@ -352,6 +376,11 @@ class Survey {
     has_text_ = true;
     fonts_.add(path_.back().families);
     if (needs_.problem.empty()) needs_.problem = fonts_.problem_of(text);
+  }
+
+  /// Whether a name out of the file is met for the first time, and not one of too many.
+  bool is_new(const std::string& name) {
+    return names_.size() < kMostNames && names_.insert(name).second;
   }
 
   void leave_out(const UndrawnThing& thing) {
@@ -384,7 +413,7 @@ class Survey {
   xmlTextReader* reader_ = nullptr;
   std::vector<Element> path_;  ///< From the outermost element to the one at hand.
   SvgFonts fonts_;
-  std::set<std::string> links_;
+  std::set<std::string> names_;
   bool has_text_ = false;
   bool has_path_length_ = false;
   bool has_dashes_ = false;

@@ -126,8 +126,11 @@ std::string fit_address(std::string_view address, std::vector<std::string>& rema
   if (!pixbuf) return {};
   const int orientation = orientation_of(pixbuf.get());
   if (orientation > 1) {
-    remarks.push_back("turned a picture in it upright (EXIF orientation " +
-                      std::to_string(orientation) + ")");
+    const std::string remark =
+        "turned a picture in it upright (EXIF orientation " + std::to_string(orientation) + ")";
+    if (std::find(remarks.begin(), remarks.end(), remark) == remarks.end()) {
+      remarks.push_back(remark);
+    }
     return upright_address(pixbuf.get());
   }
   if (!wrong_type) return {};

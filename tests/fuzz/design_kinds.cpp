@@ -2,6 +2,7 @@
 // Pictures and designs.
 #include <cstdint>
 
+#include "fuzz/drawings.h"
 #include "fuzz/pictures.h"
 #include "fuzz/scene.h"
 
@@ -46,6 +47,32 @@ void bad_picture(Scene& scene) {
       scene.run(scene.design(name, "out"));
       scene.plan.product = "out";
   }
+}
+
+/// As every option takes it that takes a picture.
+void bad_drawing(Scene& scene) {
+  const std::string name = scene.random.one_in(3) ? "a.svgz" : "a.svg";
+  scene.write(name, odd_svg(scene.random));
+  scene.copy("pictures/a.png", "a.png");
+  switch (scene.random.below(6)) {
+    case 0:
+      scene.run(scene.info(name));
+      return;
+    case 1:
+      scene.copy("lens/", "lens/");
+      scene.run(scene.render("lens").set("--target", name));
+      return;
+    case 2:
+      scene.run(scene.design("a.png", "out").set("--outline", name));
+      break;
+    case 3:
+      scene.run(
+          scene.design("a.png", "out").set("--source-picture", name).set("--source-angle", "0.5"));
+      break;
+    default:
+      scene.run(scene.design(name, "out").set("--pixels", "16"));
+  }
+  scene.plan.product = "out";
 }
 
 void design_options(Scene& scene) {
@@ -162,12 +189,11 @@ void good_design(Scene& scene) {
 }  // namespace
 
 std::vector<Kind> design_kinds() {
-  return {{"picture", 10, bad_picture},
-          {"design options", 8, design_options},
-          {"design over others' files", 3, design_over_others},
-          {"design --force", 4, design_force},
-          {"design --resume", 4, design_resume},
-          {"good design", 1, good_design}};
+  return {
+      {"picture", 10, bad_picture},          {"drawing", 5, bad_drawing},
+      {"design options", 8, design_options}, {"design over others' files", 3, design_over_others},
+      {"design --force", 4, design_force},   {"design --resume", 4, design_resume},
+      {"good design", 1, good_design}};
 }
 
 }  // namespace lensforge::fuzz

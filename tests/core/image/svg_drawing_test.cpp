@@ -178,7 +178,10 @@ TEST(SvgDrawing, SaysWhichFontIsMissing) {
        {text_in("NoSuchFontAnywhere"),
         svg("<style>text { fill: white; font-family: 'NoSuchFontAnywhere'; }</style>"
             "<text y='4'>W</text>"),
-        svg("<text y='4' fill='white' style='x:y;font-family:NoSuchFontAnywhere'>W</text>")}) {
+        svg("<text y='4' fill='white' style='x:y;font-family:NoSuchFontAnywhere'>W</text>"),
+        svg("<text y='4' fill='white' style='font:bold 3px/1.5 NoSuchFontAnywhere'>W</text>"),
+        svg("<text y='4' style='font-family:NoSuchFontAnywhere' font-family='serif' "
+            "fill='white'>W</text>")}) {
     EXPECT_THAT(drawn(text).changes,
                 Contains(AllOf(HasSubstr("'NoSuchFontAnywhere' is not installed"),
                                HasSubstr("convert the text to paths"))))
@@ -189,6 +192,7 @@ TEST(SvgDrawing, SaysWhichFontIsMissing) {
 TEST(SvgDrawing, AFontThatIsThereOrNotUsedIsNotMissed) {
   for (const std::string& text :
        {text_in("NoSuchFontAnywhere, sans-serif"), text_in("DejaVu Sans"),
+        svg("<text y='4' fill='white' style='font:700 3px \"NoSuchFontAnywhere\", serif'>W</text>"),
         svg("<path style='font-family:NoSuchFontAnywhere' fill='white' d='M0 0h4v4z'/>")}) {
     EXPECT_THAT(drawn(text).changes, Not(Contains(HasSubstr("installed")))) << text;
   }

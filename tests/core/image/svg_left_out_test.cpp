@@ -23,6 +23,7 @@ namespace {
 
 using lensforge::testing::TempFolder;
 using lensforge::testing::write_bytes;
+using ::testing::AllOf;
 using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -153,6 +154,7 @@ std::vector<Row> value_rows() {
       {"<style>svg{.a{fill:white}}</style>" + plain, plain, "nested rule '.a{fill:white}'"},
       {"<style>@font-face{font-family:x;src:url(y)}</style>", "", "@font-face"},
       {"<style>@keyframes a{from{fill:red}}</style>", "", "@keyframes"},
+      {"<style media='print'>.a{fill:white}</style>" + plain, kArea, "(media)"},
       {"<style>@import 'a.css';</style>", "", "@import"},
       {"<rect width='50' height='50' fill='url(#nowhere)'/>", "", "the paint '#nowhere'"},
       {"<polygon points='1,2 3' fill='white' x='1'/><use width='calc(1px)' href='#p'/>", "",
@@ -266,7 +268,10 @@ TEST(SvgLeftOut, IsWhyADrawingIsBlack) {
   write_bytes(folder / "a.svg",
               svg("<rect width='100' height='100'/><rect width='9' height='9' fill='var(--c)'/>"));
   EXPECT_THAT(lensforge::testing::picture_refusal(folder / "a.svg"),
-              HasSubstr("is black all over: left out 'fill: var(--c)': write the value itself"));
+              HasSubstr("is black all over; left out 'fill: var(--c)': write the value itself"));
+  write_bytes(folder / "a.svg", svg("<foreignObject/>"));
+  EXPECT_THAT(lensforge::testing::picture_refusal(folder / "a.svg"),
+              AllOf(HasSubstr("draw a white rectangle behind it"), HasSubstr("foreignObject")));
 }
 
 TEST(SvgLeftOut, SoManyKindsAreKeptAsAReaderCanRead) {
