@@ -54,6 +54,12 @@ SplitLine split(const std::string& line) {
   return parts;
 }
 
+/// Whether a controller computes what the line says: #1, #<name>, [1+2], O<name> CALL. Its numbers
+/// and letters then mean something else than words.
+bool computes(std::string_view code) {
+  return code.find_first_of("#[]<>=") != std::string_view::npos;
+}
+
 /// Takes the line's X, Y and Z words into `box`. @return whether there was one.
 bool take_words(std::string_view code, Eigen::AlignedBox3d& box) {
   bool any = false;
@@ -91,7 +97,11 @@ GcodeSummary summarise_gcode(const std::filesystem::path& path) {
     if (in_header && !parts.comment.empty() && summary.header.size() < kMaxHeaderLines) {
       summary.header.push_back(parts.comment);
     }
-    if (take_words(parts.code, summary.extent)) ++summary.moves;
+    if (computes(parts.code)) {
+      if (summary.passed_over++ == 0) summary.first_passed = summary.lines + 1;
+    } else if (take_words(parts.code, summary.extent)) {
+      ++summary.moves;
+    }
   }
   return summary;
 }

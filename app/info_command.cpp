@@ -171,14 +171,22 @@ Description describe_gcode(const fs::path& path) {
   const GcodeSummary summary = summarise_gcode(path);
   Description d{{{"kind", "gcode"}}, {}};
   for (const std::string& comment : summary.header) d.line("comment", comment);
+  const bool idle = summary.moves == 0 && summary.passed_over == 0;
   d.line("program", std::to_string(summary.lines) + " lines, " + std::to_string(summary.moves) +
-                        " with a position" + (summary.moves == 0 ? ": moves nothing" : ""));
+                        " with a position" + (idle ? ": moves nothing" : ""));
+  if (summary.passed_over > 0) {
+    d.line("passed over",
+           std::to_string(summary.passed_over) +
+               " lines with parameters or expressions (# or [ ]), the first is line " +
+               std::to_string(summary.first_passed) + ": where they lead is not counted");
+  }
   const std::optional<bool> seal = check_seal(path);
   d.line("seal", seal_words(seal));
   d.json["seal_holds"] = seal_json(seal);
   d.json["header"] = summary.header;
   d.json["lines"] = summary.lines;
   d.json["moves"] = summary.moves;
+  d.json["passed_over"] = summary.passed_over;
   // Words as they stand: their unit and their zero are the program's.
   describe_extent(d, summary.extent, " as written");
   return d;

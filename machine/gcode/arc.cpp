@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/text/number_text.h"
+
 namespace lensforge {
 namespace {
 
@@ -66,7 +68,7 @@ std::string take_offset(Arc& arc, const Eigen::Vector2d& start, const Eigen::Vec
   if (arc.radius == 0.0) return "the arc has no radius";
   const bool off = error > kRadiusLimit || error > kRadiusShare * arc.radius;
   if (error > kRadiusTolerance && off) {
-    return "the arc's end is " + std::to_string(error) + " mm off the circle through its start";
+    return "the arc's end is " + number_text(error) + " mm off the circle through its start";
   }
   return {};
 }

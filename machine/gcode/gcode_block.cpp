@@ -6,6 +6,8 @@
 #include <cmath>
 #include <system_error>
 
+#include "core/text/number_text.h"
+
 namespace lensforge {
 namespace {
 
@@ -114,16 +116,14 @@ int tenths_of(const LineScanner& scanner, const GcodeWord& word) {
   const double tenths = word.value * 10.0;
   const double rounded = std::round(tenths);
   if (word.value < 0.0 || word.value >= 1000.0 || std::abs(tenths - rounded) > 1e-6) {
-    scanner.refuse(std::string(1, word.letter) + " with the number " + std::to_string(word.value) +
-                   ": unknown word");
+    scanner.refuse(std::string(1, word.letter) + shortest_text(word.value) + ": unknown word");
   }
   return static_cast<int>(rounded);
 }
 
 std::int64_t line_number(const LineScanner& scanner, double value) {
   if (value < 0.0 || value != std::floor(value)) {
-    scanner.refuse("N with the number " + std::to_string(value) +
-                   ": line numbers are integers, 0 or above");
+    scanner.refuse("N" + shortest_text(value) + ": line numbers are integers, 0 or above");
   }
   return static_cast<std::int64_t>(value);
 }

@@ -12,6 +12,7 @@ GcodeDialect grbl_family() {
   dialect.max_line_number = 9'999'999;
   dialect.max_tool = 255;
   dialect.spindle_limit_setting = 30;
+  dialect.stated_length = true;
   return dialect;
 }
 
@@ -49,7 +50,7 @@ GcodeDialect linuxcnc_dialect() {
   dialect.mist = true;
   dialect.planner_blocks = 50;
   dialect.path_blending = true;
-  dialect.tool_length = true;
+  dialect.tool_length = dialect.loaded_length = true;
   return dialect;
 }
 
@@ -69,9 +70,21 @@ GcodeDialect fanuc_dialect() {
   return dialect;
 }
 
+GcodeDialect weihong_dialect() {
+  GcodeDialect dialect;
+  dialect.name = "weihong";
+  dialect.max_characters = 255;
+  dialect.max_line_number = 99'999;
+  dialect.max_tool = 99;
+  dialect.planner_blocks = 40;
+  dialect.inches = dialect.radius_arcs = dialect.rapid_word = false;
+  dialect.feed_on_every_line = true;
+  return dialect;
+}
+
 std::optional<GcodeDialect> find_dialect(std::string_view name) {
-  for (const GcodeDialect& dialect :
-       {grbl_dialect(), grblhal_dialect(), linuxcnc_dialect(), fanuc_dialect()}) {
+  for (const GcodeDialect& dialect : {grbl_dialect(), grblhal_dialect(), linuxcnc_dialect(),
+                                      fanuc_dialect(), weihong_dialect()}) {
     if (dialect.name == name) return dialect;
   }
   return std::nullopt;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -14,7 +15,7 @@ struct GcodeDialect {
   std::string name;
   std::size_t max_characters = 0;    ///< Of a line as sent, compacted, without its end.
   std::int64_t max_line_number = 0;  ///< Largest N word.
-  bool tool_change = false;          ///< T and M6.
+  bool tool_change = false;          ///< M6. T is taken everywhere.
   int max_tool = 0;                  ///< Largest number of T, and of H where it is known.
   bool mist = false;                 ///< M7; Grbl has it only where built so ([OPT: says M).
   std::size_t rx_bytes = 0;          ///< Usual size of the receive buffer.
@@ -25,24 +26,41 @@ struct GcodeDialect {
   bool path_blending = false;    ///< G64, with P the tolerance in mm, and G61.1.
   bool contour_control = false;  ///< G5.1 with Q.
   bool tool_length = false;      ///< G43 with H.
-  bool program_number = false;   ///< An O word alone on the first line.
-  double dwell_unit = 1.0;       ///< Seconds that G4 P1 waits.
+  bool loaded_length = false;    ///< G43 without H: that of the tool in the spindle.
+  /// G43.1 with Z. It and G49 then stand on lines without a motion: Grbl would refuse the line, or
+  /// pass over its coordinates.
+  bool stated_length = false;
+  bool program_number = false;      ///< An O word alone on the first line.
+  double dwell_unit = 1.0;          ///< Seconds that G4 P1 waits.
+  bool inches = true;               ///< G20
+  bool radius_arcs = true;          ///< R
+  bool rapid_word = true;           ///< G0
+  bool feed_on_every_line = false;  ///< Of those that move.
+  /// Where there is no G0: straight motions at exactly one of these feeds are rapids, mm/min.
+  std::array<double, 2> rapid_feeds{};
+  /// Nobody but the operator switches the spindle: cuts need no M3. Of the machine, not of the
+  /// firmware.
+  bool spindle_by_hand = false;
 };
 
-/// Grbl 1.1: a line buffer of 80 with its end, 128 bytes received, 15 motions planned, no T and M6.
+/// Grbl 1.1: a line buffer of 80 with its end, 128 bytes received, 15 motions planned, no M6.
 GcodeDialect grbl_dialect();
 
 /// grblHAL: a line buffer of 257 with its end, 1024 bytes received, 35 to 100 motions planned.
 GcodeDialect grblhal_dialect();
 
-/// LinuxCNC 2.9: lines of 255, T and M6, G64 with a tolerance. No byte limits apply: it reads
-/// files.
+/// LinuxCNC 2.9: lines of 255, M6, G43 with and without H, G64 with a tolerance. No byte limits
+/// apply: it reads files.
 GcodeDialect linuxcnc_dialect();
 
 /// Fanuc-family mill (Series 0i and 30i): O number, T and M6, G43 with H, G5.1 with Q, dwell in ms.
 GcodeDialect fanuc_dialect();
 
-/// A controller that programs can be read for: grbl, grblhal, linuxcnc or fanuc; else nothing.
+/// Weihong's NK105: no G0, no G20, no R, F on every line that moves.
+GcodeDialect weihong_dialect();
+
+/// A controller that programs can be read for: grbl, grblhal, linuxcnc, fanuc or weihong; else
+/// nothing.
 std::optional<GcodeDialect> find_dialect(std::string_view name);
 
 /// A controller that can be sent to: "grbl" or "grblhal" → dialect. @throw InputError naming

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "machine/gcode/gcode_interpreter.h"
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <string_view>
@@ -14,7 +15,7 @@ namespace {
 constexpr double kMillimetresPerInch = 25.4;
 
 std::string with_number(const std::string& word, double value) {
-  return word + " with the number " + std::to_string(value);
+  return word + shortest_text(value);
 }
 
 /// One line on its way through a copy of the state.
@@ -29,6 +30,7 @@ class BlockRun {
     if (take_program_number()) return;
     set_modes();
     set_path_control();
+    set_tool();
     set_tool_length();
     set_feed();
     set_machine();
@@ -86,11 +88,30 @@ class BlockRun {
   void set_tool_length() {
     const auto word = words_[ModalGroup::kToolLength];
     if (!word) return;
+    if (dialect_.stated_length) refuse_beside_motion(*word);
     state_.tool_length = 0;
-    if (*word == 490) return;
+    state_.stated_length = 0.0;
+    if (*word == 430) state_.tool_length = length_number();
+    if (*word == 431) state_.stated_length = length(block_.value('Z').value_or(0.0));
+  }
+
+  int length_number() {
     const auto offset = use('H');
-    if (!offset) refuse("G43 without H");
-    state_.tool_length = tool_number('H', *offset);
+    if (offset) return tool_number('H', *offset);
+    if (!dialect_.loaded_length) refuse("G43 without H");
+    return state_.loaded_tool;
+  }
+
+  void refuse_beside_motion(int word) const {
+    const std::string name = word == 431 ? "G43.1" : "G49";
+    const auto motion = words_[ModalGroup::kMotion];
+    const bool moves = (motion && *motion != 800) || words_[ModalGroup::kNonModal] ||
+                       block_.value('X') || block_.value('Y');
+    if (moves || (word == 490 && has_axes())) refuse(name + " beside a motion");
+    if (word == 431 && !has_axes()) refuse("G43.1 without Z");
+    if (word == 431 && !state_.inches) {
+      refuse("G43.1 before G20 or G21: its unit is not known");
+    }
   }
 
   void set_modes() {
@@ -143,9 +164,13 @@ class BlockRun {
     }
   }
 
-  void set_machine() {
+  void set_tool() {
     if (const auto tool = use('T')) state_.tool = tool_number('T', *tool);
-    if (words_[ModalGroup::kToolChange]) effect_.tool_change = state_.tool;
+    if (!words_[ModalGroup::kToolChange]) return;
+    effect_.tool_change = state_.loaded_tool = state_.tool;
+  }
+
+  void set_machine() {
     if (const auto rpm = use('S')) {
       if (*rpm < 0.0) refuse(with_number("S", *rpm) + ": a speed is not negative");
       state_.rpm = *rpm;
@@ -179,6 +204,7 @@ class BlockRun {
   bool find_motion() {
     const auto special = words_[ModalGroup::kNonModal];
     const auto motion = words_[ModalGroup::kMotion];
+    if (words_.has(ModalGroup::kToolLength, 431)) return false;
     if (special == 40) {
       if (motion && *motion != 800) refuse("G4 beside a motion");
       if (has_axes()) refuse("G4 beside coordinates");
@@ -193,7 +219,8 @@ class BlockRun {
   }
 
   bool find_plain_motion(bool machine_coordinates, bool stated) {
-    if (!has_axes()) {
+    const bool circle = stated && is_arc() && has_offsets();
+    if (!has_axes() && !circle) {
       if (machine_coordinates) refuse("G53 without coordinates");
       if (stated && is_arc()) refuse("an arc without coordinates");
       const bool feeds = stated && state_.motion == MotionMode::kFeed;
@@ -210,6 +237,10 @@ class BlockRun {
   [[nodiscard]] bool is_arc() const {
     return state_.motion == MotionMode::kArcClockwise ||
            state_.motion == MotionMode::kArcCounterClockwise;
+  }
+
+  [[nodiscard]] bool has_offsets() const {
+    return block_.value('I') || block_.value('J') || block_.value('K');
   }
 
   void take_dwell() {
@@ -240,8 +271,24 @@ class BlockRun {
     GcodeMotion motion = new_motion(target());
     if (is_arc()) motion.arc = arc_to(motion.end);
     motion.rapid = state_.motion == MotionMode::kRapid;
-    if (!motion.rapid) motion.feed = feed_over(motion.length());
+    if (!motion.rapid) {
+      if (dialect_.feed_on_every_line && !block_.value('F')) {
+        refuse("a motion without F on its line");
+      }
+      motion.feed = feed_over(motion.length());
+      if (!motion.arc && is_rapid_feed(motion.feed)) make_rapid(motion);
+    }
     add(motion);
+  }
+
+  [[nodiscard]] bool is_rapid_feed(double feed) const {
+    const auto& feeds = dialect_.rapid_feeds;
+    return std::find(feeds.begin(), feeds.end(), feed) != feeds.end();
+  }
+
+  static void make_rapid(GcodeMotion& motion) {
+    motion.rapid = true;
+    motion.feed = 0.0;
   }
 
   [[nodiscard]] Eigen::Vector3d target() const {
@@ -271,21 +318,19 @@ class BlockRun {
     return motion;
   }
 
-  [[nodiscard]] Arc arc_to(const Eigen::Vector3d& end) const {
+  [[nodiscard]] Arc arc_to(const Eigen::Vector3d& end) {
     ArcRequest request;
     request.plane = state_.plane;
     request.clockwise = state_.motion == MotionMode::kArcClockwise;
-    bool offset = false;
     for (int axis = 0; axis < 3; ++axis) {
-      const auto value = block_.value("IJK"[axis]);
-      offset = offset || value.has_value();
-      request.offset[axis] = length(value.value_or(0.0));
+      request.offset[axis] = length(block_.value("IJK"[axis]).value_or(0.0));
     }
     const auto radius = block_.value('R');
-    if (radius && offset) refuse("an arc with both R and I J K");
-    if (!radius && !offset) refuse("an arc without R and without I J K");
+    if (radius && has_offsets()) refuse("an arc with both R and I J K");
+    if (!radius && !has_offsets()) refuse("an arc without R and without I J K");
     if (radius) request.radius = length(*radius);
-    if (!has_axis_in_plane()) refuse("an arc without a coordinate in its plane");
+    effect_.bare_circle = !has_axis_in_plane();
+    if (radius && effect_.bare_circle) refuse("an arc with R without a coordinate in its plane");
     const ArcResult result = make_arc(state_.position, end, request);
     if (!result.reason.empty()) refuse(result.reason);
     return result.arc;

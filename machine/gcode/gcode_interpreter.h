@@ -21,6 +21,9 @@ class GcodeEffect {
   double dwell = 0.0;              ///< G4, s.
   bool pauses = false;             ///< M0
   bool ends = false;               ///< M2, M30, or the second %.
+  /// An arc whose line states no coordinate in its plane: a full circle around I J K. The Grbl
+  /// family wants the end stated.
+  bool bare_circle = false;
 
   /// None, one, or two for G28 and G30 by way of a point.
   [[nodiscard]] std::span<const GcodeMotion> motions() const { return {motions_.data(), size_}; }
@@ -34,8 +37,9 @@ class GcodeEffect {
 /// Follows a program as a Grbl-family controller would, more strictly.
 ///
 /// Known: G0 G1 G2 G3 G80, G4, G17 G18 G19, G20 G21, G28 G30, G40 G49 G61, G53, G54 … G59, G90 G91,
-/// G91.1, G93 G94, M0 M1 M2 M30, M3 M4 M5, M7 M8 M9, F, S; where the dialect has them M6 and T, G43
-/// with H (coordinates stay those of the tip), G64 with P, G61.1, G5.1 with Q and a leading O word.
+/// G91.1, G93 G94, M0 M1 M2 M30, M3 M4 M5, M7 M8 M9, F, S, T; where the dialect has them M6, G43
+/// with H (coordinates stay those of the tip), G43.1 with Z (which moves where coordinates begin),
+/// G64 with P, G61.1, G5.1 with Q and a leading O word.
 /// Refused beside unknown words: two words of one group, a motion before G20 or G21, before a feed
 /// or without its coordinates, words that nothing uses, words after the end of the program, what
 /// changes the controller's stored offsets (G10, G28.1, G30.1, G92), lines too long for the
@@ -49,7 +53,7 @@ class GcodeInterpreter {
   GcodeEffect run(const GcodeBlock& block);
 
   /// Refuses a line that, as sent, is longer than the dialect's buffer.
-  /// @param added  characters that the sender puts before it, its own N word.
+  /// @param added  characters that the sender adds, in place of the line's own N word.
   /// @throw GcodeError
   void check_length(const GcodeText& text, std::size_t added) const;
 

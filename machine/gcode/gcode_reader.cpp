@@ -45,6 +45,8 @@ GcodeReader::GcodeReader(std::istream& in, std::size_t longest_line)
 std::optional<GcodeText> GcodeReader::next() {
   if (peek() == kEnd) return std::nullopt;
   text_.clear();
+  comment_ = Comment::kNone;
+  unsafe_comment_ = false;
   ++line_;
   GcodeText read;
   read.line = line_;
@@ -60,6 +62,7 @@ std::optional<GcodeText> GcodeReader::next() {
   }
   read.text = text_;
   read.next_offset = offset_;
+  read.unsafe_comment = unsafe_comment_;
   return read;
 }
 
@@ -93,9 +96,18 @@ void GcodeReader::take(unsigned char byte) {
   const bool plain = byte >= ' ' && byte < 0x7F && byte != '?' && byte != '!' && byte != '~';
   if (!plain) {
     const std::string reason = reason_against(byte);
-    if (!reason.empty()) refuse_byte(line_, column, byte, reason);
+    const bool refused = !reason.empty();
+    if (refused && comment_ == Comment::kNone) refuse_byte(line_, column, byte, reason);
+    unsafe_comment_ = unsafe_comment_ || refused;
   }
+  follow_comment(byte);
   text_ += static_cast<char>(byte);
+}
+
+void GcodeReader::follow_comment(unsigned char byte) {
+  if (comment_ == Comment::kNone && byte == '(') comment_ = Comment::kInBrackets;
+  if (comment_ == Comment::kNone && byte == ';') comment_ = Comment::kToEnd;
+  if (comment_ == Comment::kInBrackets && byte == ')') comment_ = Comment::kNone;
 }
 
 void GcodeReader::skip_line_end(unsigned char end) {

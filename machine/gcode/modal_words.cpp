@@ -36,6 +36,7 @@ std::optional<ModalGroup> g_group(int tenths) {
     case 400:
       return ModalGroup::kCutterCompensation;
     case 430:
+    case 431:
     case 490:
       return ModalGroup::kToolLength;
     case 540:
@@ -91,10 +92,16 @@ bool lacks(const GcodeDialect& dialect, const GcodeWord& word) {
     return (word.tenths == 60 && !dialect.tool_change) || (word.tenths == 70 && !dialect.mist);
   }
   switch (word.tenths) {
+    case 0:
+      return !dialect.rapid_word;
     case 51:
       return !dialect.contour_control;
+    case 200:
+      return !dialect.inches;
     case 430:
       return !dialect.tool_length;
+    case 431:
+      return !dialect.stated_length;
     case 611:
     case 640:
       return !dialect.path_blending;
@@ -103,24 +110,33 @@ bool lacks(const GcodeDialect& dialect, const GcodeWord& word) {
   }
 }
 
+/// What does instead of a word that a controller lacks; empty where nothing is known of it.
+std::string way_out(const GcodeWord& word, const GcodeDialect& dialect) {
+  const bool tool_change = word.letter == 'M' && word.tenths == 60;
+  if (tool_change) return "; send one program for each tool";
+  const bool table = word.letter == 'G' && word.tenths == 430;
+  if (table && dialect.stated_length) {
+    return ", which has no tool table; state the length with G43.1 Z, or touch off every tool";
+  }
+  return {};
+}
+
 [[noreturn]] void refuse_unknown(const GcodeBlock& block, const GcodeWord& word,
                                  const GcodeDialect& dialect) {
   const int tenths = word.tenths;
   const bool stores = word.letter == 'G' && (tenths == 100 || tenths == 281 || tenths == 301 ||
                                              (tenths >= 920 && tenths < 930));
   const std::string why = stores ? " changes the controller's stored offsets, which a job may not"
-                                 : " is not supported for " + dialect.name;
+                                 : " is not supported for " + dialect.name + way_out(word, dialect);
   throw GcodeError(block.line, word_name(word) + why);
 }
 
 void refuse_letter(const GcodeBlock& block, char letter, const GcodeDialect& dialect) {
-  constexpr std::string_view kLetters = "FGIJKMPRSTXYZ";
-  if (letter == 'T' && !dialect.tool_change) {
-    throw GcodeError(block.line, "T: " + dialect.name + " knows no tool change");
-  }
+  constexpr std::string_view kLetters = "FGIJKMPSTXYZ";
   const bool known =
       kLetters.find(letter) != std::string_view::npos || (letter == 'H' && dialect.tool_length) ||
-      (letter == 'Q' && dialect.contour_control) || (letter == 'O' && dialect.program_number);
+      (letter == 'R' && dialect.radius_arcs) || (letter == 'Q' && dialect.contour_control) ||
+      (letter == 'O' && dialect.program_number);
   if (!known) {
     throw GcodeError(block.line,
                      std::string(1, letter) + " is no word that " + dialect.name + " knows");

@@ -92,10 +92,13 @@ class SendJob {
   void examine_alone() {
     FactsOptions facts;
     facts.dialect = parse_dialect(options_.dialect, "--dialect");
+    facts.dialect.spindle_by_hand = options_.spindle_by_hand;
     facts.spin_up = options_.spin_up;
     facts.planner.max_rate.setConstant(kUsualRate);
     facts.planner.acceleration.setConstant(kUsualAcceleration);
     summary_.facts = examine(facts);
+    summary_.findings.warnings = program_warnings(summary_.facts);
+    watcher_.examined(summary_.facts, summary_.findings);
   }
 
   void with_controller() {
@@ -106,6 +109,7 @@ class SendJob {
     session.resume = options_.resume;
     session.home = options_.home || options_.resume || port.machine;
     summary_.controller = open_session(wire, port.clock(), session, stop_);
+    summary_.controller->dialect.spindle_by_hand = options_.spindle_by_hand;
     watcher_.connected(*summary_.controller);
     check(wire, port);
     if (options_.dry_run) return check_mode(wire, port);
@@ -203,7 +207,7 @@ class SendJob {
     const fs::path path = options_.journal_of(file_);
     if (!record_) {
       auto journal = Journal::create(path, summary_.job, {});
-      journal->origins(summary_.controller->start.origins);
+      journal->origins(summary_.controller->start.tool_origins());
       return journal;
     }
     summary_.plan = plan_resume(*program_.open(), *record_, *summary_.controller, summary_.facts,

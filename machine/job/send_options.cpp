@@ -60,6 +60,8 @@ OptionTable<O> guard_rows() {
               "--spindle-driver", &O::owner,
               {{"host", SpindleOwner::kHost}, {"controller", SpindleOwner::kController}},
               "who commands the spindle"),
+          R::flag("--spindle-by-hand", &O::spindle_by_hand,
+                  "the spindle is switched by hand, as that of a router: cuts need no M3"),
           R::text("--interlocks", &O::interlocks, "MAP[@PLACE]",
                   "also watch a device with interlocks such as door and vacuum"),
           R::number("--spindle-timeout", sender(&SenderOptions::spindle_timeout),
@@ -114,6 +116,9 @@ void validate(const SendOptions& options) {
   }
   if (options.resume && options.dry_run) {
     throw InputError("--resume and --dry-run exclude each other");
+  }
+  if (options.spindle_by_hand && !options.spindle.empty()) {
+    throw InputError("--spindle-by-hand and --spindle exclude each other");
   }
   if (options.spindle.empty() && !options.interlocks.empty()) {
     throw InputError("--interlocks " + options.interlocks + ": needs --spindle as well");

@@ -23,10 +23,12 @@ struct SendOptions {
   std::string spindle;           ///< MAP[@PLACE]; empty for none.
   SpindleOwner owner = SpindleOwner::kHost;
   std::string interlocks;  ///< MAP[@PLACE] of a device without a spindle; empty for none.
-  double spin_up = 5.0;    ///< Of every spindle change, for the estimate of the time, s.
-  std::string journal;     ///< File; the program's with ".journal" if empty.
-  bool resume = false;     ///< Go on after a fault.
-  bool restart = false;    ///< Begin again in spite of an unfinished journal.
+  /// Nothing but the operator switches the spindle: cuts need no M3.
+  bool spindle_by_hand = false;
+  double spin_up = 5.0;  ///< Of every spindle change, for the estimate of the time, s.
+  std::string journal;   ///< File; the program's with ".journal" if empty.
+  bool resume = false;   ///< Go on after a fault.
+  bool restart = false;  ///< Begin again in spite of an unfinished journal.
   ResumeOptions entry;
   SenderOptions sender;
 

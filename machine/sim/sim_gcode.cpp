@@ -63,7 +63,8 @@ std::string SimGcode::parameters_text() const {
   line("G28", stored_.g28);
   line("G30", stored_.g30);
   line("G92", modes_.shift);
-  text.append("[TLO:0.000]\r\n[PRB:0.000,0.000,0.000:0]\r\n");
+  text.append("[TLO:").append(fixed_text(modes_.tool_length, 3));
+  text.append("]\r\n[PRB:0.000,0.000,0.000:0]\r\n");
   return text;
 }
 

@@ -43,6 +43,9 @@ Slot group_of_g(int code) {
     case 930:
     case 940:
       return &SimGroups::feed_mode;
+    case 431:
+    case 490:
+      return &SimGroups::tool_length;
     case 540:
     case 550:
     case 560:
@@ -81,7 +84,7 @@ Slot group_of_m(int code, const SimulatedOptions& options) {
 
 /// The place of a G word that is taken and changes nothing, each a group of its own.
 std::optional<int>* quiet_slot(int code, SimGroups& groups) {
-  constexpr std::array kQuiet = {911, 400, 490, 610};
+  constexpr std::array kQuiet = {911, 400, 610};
   const auto found = std::find(kQuiet.begin(), kQuiet.end(), code);
   if (found == kQuiet.end()) return nullptr;
   return &groups.quiet[static_cast<std::size_t>(found - kQuiet.begin())];

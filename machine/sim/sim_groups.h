@@ -18,7 +18,8 @@ struct SimGroups {
   std::optional<int> distance;
   std::optional<int> feed_mode;
   std::optional<int> frame;
-  std::array<std::optional<int>, 4> quiet;  ///< What is taken and changes nothing: G40, G49 …
+  std::optional<int> tool_length;           ///< G43.1, G49
+  std::array<std::optional<int>, 3> quiet;  ///< What is taken and changes nothing: G40, G61 …
   std::optional<int> stop;
   std::optional<int> spindle;
   std::optional<int> coolant;

@@ -50,7 +50,8 @@ SimLineState store_origin(const SimLine& line, SimLineState state) {
     const auto value = line.words["XYZ"[axis]];
     if (!value) continue;
     const double length = *value * modes.scale();
-    origin[axis] = l == 2.0 ? length : modes.position[axis] - modes.shift[axis] - length;
+    const double other = modes.shift[axis] + (axis == 2 ? modes.tool_length : 0.0);
+    origin[axis] = l == 2.0 ? length : modes.position[axis] - other - length;
   }
   state.used += "LPXYZ";
   add(state, Kind::kStore);
@@ -90,6 +91,17 @@ SimLineState shift_origin(const SimLine& line, SimLineState state) {
   if (!line.has_axes()) return refused(std::move(state), 26);
   state.used += "XYZ";
   state.modes.shift += state.modes.position - target_of(line, state, false);
+  return state;
+}
+
+/// G43.1 and G49
+SimLineState set_tool_length(const SimLine& line, SimLineState state) {
+  const bool states = line.groups.tool_length == 431;
+  const bool z_alone = line.words['Z'] && !line.words['X'] && !line.words['Y'];
+  if (states && !z_alone) return refused(std::move(state), 37);
+  state.used += "XYZ";
+  SimModes& modes = state.modes;
+  modes.tool_length = states ? *line.words['Z'] * modes.scale() : 0.0;
   return state;
 }
 
@@ -183,7 +195,8 @@ SimModes at_program_end(SimModes modes) {
 bool beyond_jog(const SimLine& line) {
   const SimGroups& g = line.groups;
   return g.motion || g.plane || g.feed_mode || g.frame || g.stop || g.spindle || g.coolant ||
-         g.tool || g.any_quiet() || (g.special && *g.special != 530) || line.words.any("IJKLPRST");
+         g.tool || g.tool_length || g.any_quiet() || (g.special && *g.special != 530) ||
+         line.words.any("IJKLPRST");
 }
 
 }  // namespace
@@ -279,6 +292,11 @@ SimLineState axes(const SimLine& line, SimLineState state) {
   const int special = line.groups.special.value_or(-1);
   const bool takes_axes = special == 100 || special == 280 || special == 300 || special == 920;
   if (takes_axes && line.groups.motion) return refused(std::move(state), 24);
+  if (line.groups.tool_length) {
+    const bool moves = line.groups.motion.value_or(800) != 800;
+    if (takes_axes || moves) return refused(std::move(state), 24);
+    return set_tool_length(line, std::move(state));
+  }
   switch (special) {
     case 40:
       return state;

@@ -26,6 +26,7 @@ struct SimModes {
   double rpm = 0.0;
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
   Eigen::Vector3d shift = Eigen::Vector3d::Zero();  ///< G92
+  double tool_length = 0.0;                         ///< G43.1, along Z
 
   /// Millimetres in one unit of the line's lengths.
   [[nodiscard]] double scale() const { return inches ? 25.4 : 1.0; }
@@ -47,7 +48,8 @@ struct SimStored {
 
 /// Sum of the offsets in force: machine − work.
 inline Eigen::Vector3d offset_of(const SimModes& modes, const SimStored& stored) {
-  return stored.origins[static_cast<std::size_t>(modes.origin)] + modes.shift;
+  return stored.origins[static_cast<std::size_t>(modes.origin)] + modes.shift +
+         modes.tool_length * Eigen::Vector3d::UnitZ();
 }
 
 /// One thing that a line makes the controller do; those of a line are done one after another.

@@ -68,18 +68,18 @@ void take_build(const std::vector<Reply>& replies, ControllerInfo& info) {
   }
 }
 
-/// [G54:…] … [G59:…], and what shifts all of them: G92 and the tool length.
+/// [G54:…] … [G59:…], what shifts all of them (G92), and the tool's length, which G49 takes away.
 void take_origins(const std::vector<Reply>& replies, ControllerInfo& info) {
   Eigen::Vector3d shift = Eigen::Vector3d::Zero();
   for (const Reply& reply : replies) {
     const std::vector<double> values = numbers(reply.value);
-    if (reply.name == "TLO" && values.size() == 1) {
-      shift.z() += info.report_unit() * values[0];
+    if (reply.name == "TLO" && !values.empty()) {
+      info.start.stated_length = info.report_unit() * (values.size() < 3 ? values[0] : values[2]);
     }
     if (values.size() < 3) continue;
     const Eigen::Vector3d at =
         info.report_unit() * Eigen::Vector3d(values[0], values[1], values[2]);
-    if (reply.name == "G92" || reply.name == "TLO") shift += at;
+    if (reply.name == "G92") shift += at;
     if (reply.name == "G28") info.start.g28 = at;
     if (reply.name == "G30") info.start.g30 = at;
     const auto* const system = std::find(kSystems.begin(), kSystems.end(), reply.name);

@@ -39,14 +39,14 @@ struct ControllerInfo {
   [[nodiscard]] std::optional<Eigen::Vector3d> machine_position(const StatusReport& report) const;
 };
 
-/// Questions and answers while no job runs.
+/// Questions and answers while no job runs. Firmware before Grbl 1.1, which reports in another
+/// form, is refused by all with an InputError that names it.
 class Dialogue {
  public:
   Dialogue(Wire& wire, Clock& clock, std::stop_token stop)
       : wire_(wire), clock_(clock), stop_(std::move(stop)) {}
 
-  /// Asks until a report comes or the time is over; boards that start when the port is opened take
-  /// two seconds. @throw StreamFault for a request to stop.
+  /// Asks until a report comes or the time is over. @throw StreamFault for a request to stop.
   std::optional<StatusReport> ask_status(double timeout);
   /// What to say if there is none. @throw StreamFault kStall
   [[noreturn]] static void silence();
@@ -57,11 +57,14 @@ class Dialogue {
   StatusReport status(double timeout = 3.0);
   /// Soft reset, and what the controller says of itself. @pre nothing moves. @throw StreamFault
   std::string reset(double timeout = 10.0);
+  /// reset(), empty where no answer comes.
+  std::string try_reset(double timeout);
   /// Feed hold, until nothing moves any more. @throw StreamFault
   StatusReport hold(double timeout = 20.0);
 
  private:
   void pause_until_reply(double until);
+  void take(const Reply& reply);
 
   Wire& wire_;
   Clock& clock_;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
 
+#include "core/error.h"
 #include "core/text/printable.h"
 #include "machine/stream/controller_codes.h"
 #include "machine/stream/controller_info.h"
@@ -19,6 +20,13 @@ using Kind = Reply::Kind;
 
 [[noreturn]] void no_answer_to(const std::string& what) {
   throw StreamFault(StopCause::kStall, "the controller does not answer " + what);
+}
+
+/// "Grbl 0.9j ['$' for help]", or a report with commas: "<Idle,MPos:0.000,…,WPos:…>".
+bool is_too_old(const Reply& reply) {
+  if (reply.kind == Kind::kBanner) return reply.text.starts_with("Grbl 0.");
+  return reply.kind == Kind::kUnknown && reply.text.starts_with('<') &&
+         reply.text.find(",MPos:") != std::string::npos;
 }
 
 }  // namespace
@@ -44,7 +52,16 @@ void Dialogue::pause_until_reply(double until) {
   if (stop_.stop_requested()) throw StreamFault(StopCause::kInterrupted, "interrupted");
   wire_.flush();
   const double wait = std::clamp(until - clock_.now(), 0.0, kStopCheck);
-  wire_.receive(wait, [this](const Reply& reply) { replies_.push_back(reply); });
+  wire_.receive(wait, [this](const Reply& reply) { take(reply); });
+}
+
+void Dialogue::take(const Reply& reply) {
+  if (is_too_old(reply)) {
+    throw InputError("the controller runs firmware older than Grbl 1.1 ('" +
+                     printable_line(reply.text) +
+                     "'), whose reports tell too little; load Grbl 1.1 or grblHAL onto its board");
+  }
+  replies_.push_back(reply);
 }
 
 std::optional<StatusReport> Dialogue::ask_status(double timeout) {
@@ -99,6 +116,12 @@ std::vector<Reply> Dialogue::ask(const std::string& line, double timeout) {
 }
 
 std::string Dialogue::reset(double timeout) {
+  std::string banner = try_reset(timeout);
+  if (banner.empty()) no_answer_to("a reset");
+  return banner;
+}
+
+std::string Dialogue::try_reset(double timeout) {
   replies_.clear();
   wire_.discard();
   const double end = clock_.now() + timeout;
@@ -118,7 +141,6 @@ std::string Dialogue::reset(double timeout) {
     }
     replies_.clear();
   }
-  if (banner.empty()) no_answer_to("a reset");
   return banner;
 }
 

@@ -62,7 +62,7 @@ class EntryWriter {
   }
 
  private:
-  [[nodiscard]] const Eigen::Vector3d& origin() const { return entry_.state.origin(); }
+  [[nodiscard]] Eigen::Vector3d origin() const { return entry_.state.origin(); }
 
   [[nodiscard]] std::string word(char letter, double value) const {
     std::string text(1, letter);
@@ -81,6 +81,12 @@ class EntryWriter {
   void modes() {
     add(std::string(inches_ ? "G20" : "G21") + "G90G94G17");
     add(std::string("G").append(std::to_string(54 + entry_.state.coordinate_system))).alone = true;
+    const double length = entry_.state.stated_length;
+    if (length != 0.0) {
+      add("G43.1" + word('Z', length));
+    } else if (entry_.info.start.stated_length != 0.0) {
+      add("G49");
+    }
   }
 
   void up() { add("G53G0" + word('Z', retract_z())).travel = retract_z(); }
@@ -187,6 +193,10 @@ std::vector<std::string> entry_steps(const Entry& entry) {
   steps.push_back("go up to machine Z" + trimmed_decimal(writer.retract_z(), 3));
   if (entry.state.tool > 0) {
     steps.push_back("tool " + std::to_string(entry.state.tool) + " must be in the spindle");
+  }
+  if (entry.info.dialect.spindle_by_hand && !order.turning()) {
+    steps.emplace_back(
+        "switch the spindle on by hand, now: it must turn before the tool comes down");
   }
   if (order.turning()) {
     steps.push_back("start the spindle at " + trimmed_decimal(order.rpm, 0) + " rpm and verify it");

@@ -38,6 +38,13 @@ bool origin_at_switch(const ControllerInfo& info) {
   return info.options.find(kForceOrigin) != std::string::npos || (mask & kOriginAtSwitch) != 0;
 }
 
+/// "line 5 has", "line 5 and 2 more have"
+std::string where_text(const MarkedLines& lines) {
+  const std::string first = "line " + std::to_string(lines.first);
+  if (lines.count == 1) return first + " has";
+  return first + " and " + std::to_string(lines.count - 1) + " more have";
+}
+
 void check_spindle(const ProgramFacts& facts, const ControllerInfo& info, Findings& found) {
   const std::optional<double> most = info.setting(30);
   const std::optional<double> least = info.setting(31);
@@ -53,9 +60,6 @@ void check_spindle(const ProgramFacts& facts, const ControllerInfo& info, Findin
   if (info.setting(32).value_or(0.0) == 1.0) {
     found.refusals.emplace_back(
         "$32=1: the controller is in laser mode, where a spindle is not waited for; set $32=0");
-  }
-  if (facts.leaves_spindle_on) {
-    found.warnings.emplace_back("the program ends with the spindle on");
   }
 }
 
@@ -144,6 +148,25 @@ std::optional<Eigen::AlignedBox3d> travel_box(const ControllerInfo& info) {
   return box;
 }
 
+std::vector<std::string> program_warnings(const ProgramFacts& facts) {
+  std::vector<std::string> warnings;
+  if (facts.leaves_spindle_on) {
+    warnings.emplace_back("the program ends with the spindle on: it has no M5 after its last cut");
+  }
+  if (!facts.ends) warnings.emplace_back("the program has no end (M2 or M30)");
+  if (facts.unsafe_comments.count > 0) {
+    warnings.push_back(where_text(facts.unsafe_comments) +
+                       " a comment with bytes on which a controller acts, or that are no text; "
+                       "comments are never sent");
+  }
+  if (facts.bare_circles.count > 0) {
+    warnings.push_back(where_text(facts.bare_circles) +
+                       " a circle without an end, which the Grbl family refuses; it is sent with "
+                       "the coordinates of where the tool stands");
+  }
+  return warnings;
+}
+
 Findings check_program(const ProgramFacts& facts, const ControllerInfo& info) {
   Findings found;
   check_state(info, found);
@@ -151,7 +174,13 @@ Findings check_program(const ProgramFacts& facts, const ControllerInfo& info) {
   check_travel(facts, info, found);
   check_feeds(facts, info, found);
   check_reports(info, found);
-  if (!facts.ends) found.warnings.emplace_back("the program has no end (M2 or M30)");
+  for (std::string& warning : program_warnings(facts)) {
+    found.warnings.push_back(std::move(warning));
+  }
+  if (info.dialect.spindle_by_hand) {
+    found.warnings.emplace_back(
+        "the spindle is switched by hand: nothing verifies that it turns before a cut");
+  }
   return found;
 }
 

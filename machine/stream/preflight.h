@@ -28,6 +28,9 @@ struct Findings {
 /// travel is not set.
 std::optional<Eigen::AlignedBox3d> travel_box(const ControllerInfo& info);
 
+/// What the operator should know of a program, whatever it is sent to.
+std::vector<std::string> program_warnings(const ProgramFacts& facts);
+
 /// Sets a program's facts against a controller's settings and state. Every refusal names what, the
 /// value and the rule.
 /// @param facts  with the controller's start state.

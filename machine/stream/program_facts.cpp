@@ -44,8 +44,9 @@ class Examiner {
     const GcodeBlock block = parse_gcode_block(text);
     const SpindleOrder before = spindle_order(interpreter_.state());
     const GcodeEffect effect = interpreter_.run(block);
-    interpreter_.check_length(text, 0);
-    const std::size_t bytes = compact_gcode(text.text, false).size();
+    const std::size_t added = added_words(effect, interpreter_.state()).size();
+    interpreter_.check_length(text, added);
+    const std::size_t bytes = compact_gcode(text.text, false).size() + added;
     if (bytes > 0) {
       ++facts_.sent_lines;
       facts_.sent_bytes += static_cast<std::int64_t>(bytes) + 1;
@@ -54,6 +55,8 @@ class Examiner {
     facts_.inches = facts_.inches || interpreter_.state().inches.value_or(false);
     facts_.tool_changes += effect.tool_change ? 1 : 0;
     facts_.pauses += effect.pauses ? 1 : 0;
+    if (text.unsafe_comment) facts_.unsafe_comments.add(text.line);
+    if (effect.bare_circle) facts_.bare_circles.add(text.line);
     const SpindleOrder now = spindle_order(interpreter_.state());
     if (!(now == before)) take_spindle(now, text.line, effect);
     if (effect.dwell > 0.0) model_.wait(effect.dwell);
@@ -85,8 +88,10 @@ class Examiner {
       facts_.rapid_z = std::max(facts_.rapid_z, motion.end.z());
       return;
     }
-    if (!order.turning()) {
-      throw GcodeError(motion.line, "moves at feed while the spindle is off");
+    if (!order.turning() && !options_.dialect.spindle_by_hand) {
+      throw GcodeError(motion.line,
+                       "moves at feed while the spindle is off; use --spindle-by-hand if nothing "
+                       "but its switch turns it");
     }
     facts_.cut_extent.extend(box);
     take_feed(motion);

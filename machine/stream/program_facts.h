@@ -15,6 +15,16 @@
 
 namespace lensforge {
 
+/// Lines that have something in common.
+struct MarkedLines {
+  std::int64_t count = 0;
+  std::int64_t first = 0;  ///< Counted from 1; 0 for none.
+
+  void add(std::int64_t line) {
+    if (count++ == 0) first = line;
+  }
+};
+
 /// What a whole program asks for. Machine coordinates, mm, where the start state has the origins of
 /// the coordinate systems, else the program's own.
 struct ProgramFacts {
@@ -34,6 +44,8 @@ struct ProgramFacts {
   double rapid_z = -std::numeric_limits<double>::infinity();   ///< Highest end of a rapid.
   std::int64_t tool_changes = 0;
   std::int64_t pauses = 0;
+  MarkedLines unsafe_comments;     ///< GcodeText::unsafe_comment
+  MarkedLines bare_circles;        ///< GcodeEffect::bare_circle
   bool ends = false;               ///< M2, M30 or the second %.
   bool leaves_spindle_on = false;  ///< At its end.
   PlanTime time;

@@ -4,15 +4,22 @@
 #include <algorithm>
 #include <array>
 
+#include "core/text/number_text.h"
+
 namespace lensforge {
 namespace {
+
+constexpr double kMillimetresPerInch = 25.4;
+/// As programs have at most, so that what is added reads as what led there: the end of a circle that
+/// rounding moves makes a tiny arc of it.
+constexpr int kDecimals = 8;
 
 /// G words, times ten, for which Grbl reads or writes its EEPROM.
 constexpr std::array kStoredWords = {100, 280, 281, 300, 301, 540, 550, 560,
                                      570, 580, 590, 920, 921, 922, 923};
 
 /// G words, times ten, that use the axis words of their line.
-constexpr std::array kMotionWords = {0, 10, 20, 30, 100, 280, 281, 300, 301, 800, 920};
+constexpr std::array kMotionWords = {0, 10, 20, 30, 100, 280, 281, 300, 301, 431, 800, 920};
 
 bool touches_settings(const GcodeBlock& block) {
   const auto words = block.words();
@@ -56,6 +63,19 @@ const char* motion_word(MotionMode mode) {
 
 }  // namespace
 
+std::string added_words(const GcodeEffect& effect, const GcodeState& after) {
+  std::string words;
+  if (!effect.bare_circle) return words;
+  const int normal = after.plane == ArcPlane::kXY ? 2 : after.plane == ArcPlane::kZX ? 1 : 0;
+  const double unit = after.inches.value_or(false) ? kMillimetresPerInch : 1.0;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (axis == normal) continue;
+    const double at = after.absolute ? (after.position - after.origin())[axis] / unit : 0.0;
+    words.append(1, "XYZ"[axis]).append(trimmed_decimal(at, kDecimals));
+  }
+  return words;
+}
+
 SpindleOrder spindle_order(const GcodeState& state) {
   if (state.spindle == SpindleTurn::kOff) return {};
   return {state.spindle, state.rpm};
@@ -88,13 +108,16 @@ std::optional<OutgoingLine> ProgramFeed::made_ready(const GcodeText& text) {
   OutgoingLine line;
   line.text = compact_gcode(text.text, false);
   if (line.text.empty()) return std::nullopt;
-  interpreter_.check_length(text, 0);
+  const std::string added = added_words(effect, interpreter_.state());
+  line.text += added;
+  interpreter_.check_length(text, added.size());
   line.line = text.line;
   line.next_offset = text.next_offset;
   line.alone = touches_settings(block);
   note_effect(effect, before, line);
   // Picked up in the middle, the first line cannot lean on a motion word that was never sent.
-  if (first_ && options_.first_line > 1 && has_axis_word(block) && !has_motion_word(block)) {
+  const bool moves = has_axis_word(block) || effect.bare_circle;
+  if (first_ && options_.first_line > 1 && moves && !has_motion_word(block)) {
     line.text = std::string(motion_word(before.motion)).append(line.text);
   }
   first_ = false;

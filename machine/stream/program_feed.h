@@ -52,8 +52,8 @@ struct FeedOptions {
   std::deque<OutgoingLine> before;  ///< The sender's own lines, ahead of the first.
 };
 
-/// Turns a program into the lines that a controller gets: compacted, numbered, nothing sent for
-/// blank lines and comments. Constant memory.
+/// Turns a program into the lines that a controller gets: compacted, numbered, with what it needs
+/// beyond that (added_words()), nothing sent for blank lines and comments. Constant memory.
 class ProgramFeed {
  public:
   /// @param in  must outlive the feed; seekable if it does not begin with the first line.
@@ -77,6 +77,10 @@ class ProgramFeed {
   GcodeInterpreter interpreter_;
   bool first_ = true;
 };
+
+/// What the sender puts behind a line that the Grbl family would refuse as it stands: of a circle
+/// without coordinates those of its end, where the tool stands. @param after  the line.
+std::string added_words(const GcodeEffect& effect, const GcodeState& after);
 
 /// What is asked of the spindle in a state.
 SpindleOrder spindle_order(const GcodeState& state);

@@ -149,7 +149,7 @@ void SendRun::fill() {
 /// watches knows what is to come.
 void SendRun::hand_over() {
   const OutgoingLine line = *std::exchange(next_, std::nullopt);
-  if (const auto fault = send_step::cut_fault(state_, line)) throw StreamFault(*fault);
+  if (const auto fault = send_step::cut_fault(state_, line, rules_)) throw StreamFault(*fault);
   if (parts_.journal != nullptr) parts_.journal->before_sending(line.line);
   const double now = parts_.clock.now();
   state_ = send_step::handed_over(std::move(state_), line, tracker_.empty(), now);

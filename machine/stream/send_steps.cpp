@@ -147,8 +147,11 @@ bool has_room(const OutgoingLine& line, const LineTracker& tracker, const SendRu
   return bytes <= static_cast<std::size_t>(rules.info.rx_bytes);
 }
 
-std::optional<StreamFault> cut_fault(const SendState& state, const OutgoingLine& line) {
-  if (!line.cuts || (state.spindle.order.turning() && state.spindle.verified)) return std::nullopt;
+std::optional<StreamFault> cut_fault(const SendState& state, const OutgoingLine& line,
+                                     const SendRules& rules) {
+  const SpindleCheck& spindle = state.spindle;
+  const bool by_hand = rules.info.dialect.spindle_by_hand && !spindle.order.turning();
+  if (!line.cuts || by_hand || (spindle.order.turning() && spindle.verified)) return std::nullopt;
   return StreamFault(StopCause::kSpindle,
                      "line " + std::to_string(line.line) +
                          " moves at feed, but the spindle is not verified to turn");

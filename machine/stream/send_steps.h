@@ -41,7 +41,8 @@ bool drained(const SendState& state, const LineTracker& tracker);
 bool has_room(const OutgoingLine& line, const LineTracker& tracker, const SendRules& rules,
               bool waiting);
 /// Why a line must not leave: it cuts, and the spindle is not verified.
-std::optional<StreamFault> cut_fault(const SendState& state, const OutgoingLine& line);
+std::optional<StreamFault> cut_fault(const SendState& state, const OutgoingLine& line,
+                                     const SendRules& rules);
 /// A line leaves. @param first  nothing else is on its way.
 SendState handed_over(SendState state, const OutgoingLine& line, bool first, double now);
 

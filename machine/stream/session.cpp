@@ -13,6 +13,7 @@ namespace {
 
 constexpr double kAnswerTimeout = 5.0;
 constexpr double kCheckTimeout = 10.0;
+constexpr double kLastTry = 0.5;       ///< A reset is answered at once.
 constexpr double kLeaveTimeout = 5.0;  ///< A reset is repeated in it, see Dialogue::reset().
 constexpr std::int64_t kLinesBetweenReports = 256;
 
@@ -30,6 +31,13 @@ void require_rest(Dialogue& dialogue, const StatusReport& report, bool resume) {
                      ": let it finish, or continue a job with --resume");
   }
   dialogue.hold();
+}
+
+/// Resets a controller that has not answered yet. @return its banner
+std::string wake(Dialogue& dialogue) {
+  const std::string banner = dialogue.try_reset(kLastTry);
+  if (banner.empty()) Dialogue::silence();
+  return banner;
 }
 
 /// A machine that homes goes on doing so without its sender: whoever gives up waiting stops it.
@@ -90,7 +98,7 @@ ControllerInfo open_session(Wire& wire, Clock& clock, const SessionOptions& opti
   if (report) require_rest(dialogue, *report, options.resume);
   // After a limit was hit, Grbl answers nothing but a reset; homing then finds the position again.
   if (!report && !options.home) dialogue.silence();
-  const std::string banner = dialogue.reset();
+  const std::string banner = report ? dialogue.reset() : wake(dialogue);
   if (options.home) home_machine(dialogue, wire, options.home_timeout);
   return learn_controller(dialogue, banner);
 }

@@ -13,8 +13,10 @@ namespace lensforge {
 struct SessionOptions {
   /// After a fault: a machine that moves or stands in a hold is held and reset.
   bool resume = false;
-  bool home = false;          ///< Run the homing cycle.
-  double wake_timeout = 8.0;  ///< s
+  bool home = false;  ///< Run the homing cycle.
+  /// For the first answer, s: boards that start when the port is opened take two seconds. One that
+  /// stays silent is noticed within 3 s, homing or not.
+  double wake_timeout = 2.4;
   double home_timeout = 300.0;
 };
 

@@ -168,7 +168,7 @@ class Workshop {
     if (!resume) {
       std::unique_ptr<Journal> journal =
           Journal::create(journal_, ProgramFile(file_).identity(), options);
-      journal->origins(info.start.origins);
+      journal->origins(info.start.tool_origins());
       return journal;
     }
     const JournalRecord record = read_journal(journal_);

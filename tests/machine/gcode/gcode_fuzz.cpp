@@ -15,8 +15,12 @@ void check_text(const GcodeText& text, std::int64_t previous_end) {
   LF_CHECK(text.next_offset >= text.offset + static_cast<std::int64_t>(text.text.size()),
            std::to_string(text.next_offset));
   LF_CHECK(text.text.size() <= GcodeReader::kLongestLine, std::to_string(text.text.size()));
+  bool in_brackets = false;
   for (const char c : text.text) {
     const auto byte = static_cast<unsigned char>(c);
+    if (!in_brackets && c == ';') return;
+    if (c == '(' || c == ')') in_brackets = c == '(';
+    if (in_brackets) continue;
     LF_CHECK(byte == '\t' || (byte >= ' ' && byte < 0x7F), std::to_string(byte));
     LF_CHECK(c != '?' && c != '!' && c != '~', std::string(1, c));
   }
@@ -32,6 +36,8 @@ void check_motion(const GcodeMotion& motion, const Eigen::Vector3d& from) {
 /// What is sent instead of a line must mean the same.
 void check_compact(const GcodeText& text, const GcodeBlock& block) {
   const std::string compact = compact_gcode(text.text, true);
+  for (const char c : compact) LF_CHECK(c > ' ' && c < 0x7F, compact);
+  LF_CHECK(compact.find_first_of("?!~") == std::string::npos, compact);
   GcodeText again = text;
   again.text = compact;
   const GcodeBlock read = parse_gcode_block(again);
@@ -74,8 +80,8 @@ std::int64_t run_program(const std::string& program, const GcodeDialect& dialect
 std::int64_t fuzz_gcode(const std::uint8_t* data, std::size_t size) {
   const std::string program(data, data + size);
   std::int64_t lines = 0;
-  for (const GcodeDialect& dialect :
-       {grbl_dialect(), grblhal_dialect(), linuxcnc_dialect(), fanuc_dialect()}) {
+  for (const GcodeDialect& dialect : {grbl_dialect(), grblhal_dialect(), linuxcnc_dialect(),
+                                      fanuc_dialect(), weihong_dialect()}) {
     lines += run_program(program, dialect);
   }
   return lines;

@@ -54,6 +54,8 @@ const char* const kPieces[] = {"(",
                                "O1",
                                "H2",
                                "G43",
+                               "G43.1Z",
+                               "G49",
                                "G64",
                                "G61.1",
                                "G5.1Q1"};
@@ -107,8 +109,8 @@ TEST(GcodeFuzz, RandomBytesBreakNoPromise) {
 }
 
 TEST(GcodeFuzz, SeedsPassWhole) {
-  EXPECT_EQ(fuzz(kSeeds[0]), 4 * 12);  // every dialect
-  EXPECT_EQ(fuzz(kSeeds[3]), 3 * 8);   // not Grbl: T
+  EXPECT_EQ(fuzz(kSeeds[0]), 4 * 12 + 3);  // not Weihong: G0
+  EXPECT_EQ(fuzz(kSeeds[3]), 3 * 8);       // neither Grbl nor Weihong: M6
 }
 
 }  // namespace

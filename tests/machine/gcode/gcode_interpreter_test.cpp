@@ -4,6 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <numbers>
+
 #include "core/error.h"
 #include "machine/gcode_text.h"
 
@@ -135,8 +137,9 @@ TEST(GcodeInterpreter, RefusesWithLineAndReason) {
       {"G21\nG80\nX1", "coordinates after G80"},
       {"G53", "G53 without coordinates"},
       {"G21 F10\nG53 G2 X1 I1", "G53 works with G0 and G1 only"},
-      {"G21 F10\nG2 I1", "an arc without coordinates"},
-      {"G21 F10\nG2 Z1 I1", "without a coordinate in its plane"},
+      {"G21 F10\nG2", "an arc without coordinates"},
+      {"G21 F10\nG2 R1", "an arc without coordinates"},
+      {"G21 F10\nG2 Z1 R1", "without a coordinate in its plane"},
       {"G21 F10\nG2 X1", "without R and without I J K"},
       {"G21 F10\nG2 X1 I1 R1", "both R and I J K"},
       {"G21 F10\nG2 X5 R1", "too small to reach"},
@@ -151,9 +154,17 @@ TEST(GcodeInterpreter, RefusesWithLineAndReason) {
       {"G41", "G41 is not supported"},
       {"G38.2 Z-1", "G38.2 is not supported"},
       {"M98 P1", "M98 is not supported"},
-      {"M6", "M6 is not supported for grbl"},
+      {"M6", "M6 is not supported for grbl; send one program for each tool"},
       {"M7", "M7 is not supported for grbl"},
-      {"T1", "T: grbl knows no tool change"},
+      {"T256", "T256: grbl numbers tools from 0 to 255"},
+      {"G43 H2", "G43 is not supported for grbl, which has no tool table; state the length with"},
+      {"H2", "H is no word that grbl knows"},
+      {"G21 G43.1", "G43.1 without Z"},
+      {"G43.1 Z1", "G43.1 before G20 or G21"},
+      {"G21 G43.1 X1 Z1", "G43.1 beside a motion"},
+      {"G21 G0 G43.1 Z1", "G43.1 beside a motion"},
+      {"G21 G49 Z1", "G49 beside a motion"},
+      {"G21 G0 G49", "G49 beside a motion"},
       {"A1", "A is no word that grbl knows"},
       {"G21\nM2\nG0 X1", "line 3: words after the end"},
       {"%\nG21\n%\nG0 X1", "words after the end"},
@@ -173,6 +184,83 @@ TEST(GcodeInterpreter, TheDialectSaysWhichToolsThereAre) {
   EXPECT_EQ(run_program("T99999 M6", linuxcnc_dialect()).refusal, "");
   EXPECT_THAT(run_program("T1.5", linuxcnc_dialect()).refusal, HasSubstr("T1.5: linuxcnc numbers"));
   EXPECT_THAT(run_program("T1000", fanuc_dialect()).refusal, HasSubstr("from 0 to 999"));
+}
+
+TEST(GcodeInterpreter, GrblTakesAToolsNumberAlone) {
+  EXPECT_EQ(run_program("T1\nG21\n").state.tool, 1);
+  EXPECT_FALSE(effect_of("T1").tool_change);
+}
+
+TEST(GcodeInterpreter, AStatedLengthMovesWhereCoordinatesBegin) {
+  for (const GcodeDialect& dialect : {grbl_dialect(), grblhal_dialect()}) {
+    const ProgramRun run =
+        run_program("G21\nG43.1 Z2.5\nG0 Z1\nG53 Z1\nG49\nG0 Z1\nG20\nG43.1 Z1\n", dialect);
+    ASSERT_EQ(run.refusal, "");
+    ASSERT_EQ(run.motions.size(), 3U);
+    EXPECT_EQ(run.motions[0].end.z(), 3.5);
+    EXPECT_EQ(run.motions[1].end.z(), 1.0);
+    EXPECT_EQ(run.motions[2].end.z(), 1.0);
+    EXPECT_EQ(run.state.stated_length, 25.4);
+    EXPECT_EQ(run.state.tool_origins()[5].z(), 25.4);
+    EXPECT_EQ(run_program("G40 G49 G80\n", dialect).refusal, "");
+  }
+  EXPECT_THAT(run_program("G21 G43.1 Z1", linuxcnc_dialect()).refusal, HasSubstr("not supported"));
+}
+
+TEST(GcodeInterpreter, LinuxcncTakesTheLengthOfTheToolInTheSpindle) {
+  const auto length = [](const std::string& program) {
+    const ProgramRun run = run_program(program, linuxcnc_dialect());
+    EXPECT_EQ(run.refusal, "") << program;
+    return run.state.tool_length;
+  };
+  EXPECT_EQ(length("T2 M6\nG43\n"), 2);
+  EXPECT_EQ(length("T2 M6 G43\n"), 2);
+  EXPECT_EQ(length("T2 M6\nT3\nG43\n"), 2);
+  EXPECT_EQ(length("T2 M6\nG43 H3\n"), 3);
+  EXPECT_EQ(length("T2 M6\nG43\nG49\n"), 0);
+}
+
+TEST(GcodeInterpreter, AnArcWithoutCoordinatesInItsPlaneIsAFullCircle) {
+  for (const char* program :
+       {"G21 F10\nG2 I5 J0\n", "G21 F10\nG2 Z-1 I5 J0\n", "G21 F10\nG2 X0 Y0 Z0 I5\nZ-1 I5 J0\n"}) {
+    const ProgramRun run = run_program(program, linuxcnc_dialect());
+    ASSERT_EQ(run.refusal, "") << program;
+    const GcodeMotion& circle = run.motions.back();
+    ASSERT_TRUE(circle.arc) << program;
+    EXPECT_NEAR(circle.arc->sweep, -2.0 * std::numbers::pi, 1e-12) << program;
+    EXPECT_EQ(circle.arc->centre.x(), 5.0) << program;
+  }
+  GcodeInterpreter interpreter(grblhal_dialect());
+  const auto bare = [&](const char* line) {
+    GcodeText text;
+    text.text = line;
+    return interpreter.run(parse_gcode_block(text)).bare_circle;
+  };
+  EXPECT_FALSE(bare("G21 F10 G1 X1"));
+  EXPECT_TRUE(bare("G2 I5"));
+  EXPECT_FALSE(bare("G2 Y0 I5"));
+}
+
+TEST(GcodeInterpreter, WeihongMovesWithoutG0AndWithF) {
+  GcodeDialect dialect = weihong_dialect();
+  const std::pair<const char*, const char*> cases[] = {
+      {"G21\nG0 X1", "G0 is not supported for weihong"},
+      {"G20", "G20 is not supported for weihong"},
+      {"G21\nG1 X1 F100\nX2", "line 3: a motion without F on its line"},
+      {"G21\nG2 X1 R1 F100", "R is no word that weihong knows"},
+      {"M6", "M6 is not supported for weihong"},
+  };
+  for (const auto& [program, reason] : cases) {
+    EXPECT_THAT(run_program(program, dialect).refusal, HasSubstr(reason)) << program;
+  }
+  dialect.rapid_feeds = {1000.0, 3000.0};
+  const ProgramRun run =
+      run_program("G21\nG1 Z5 F1000\nG1 X1 F3000\nG1 X2 F500\nG2 X4 I1 F3000\n", dialect);
+  ASSERT_EQ(run.refusal, "");
+  ASSERT_EQ(run.motions.size(), 4U);
+  const auto rapid = [&run](std::size_t i) { return run.motions[i].rapid; };
+  EXPECT_TRUE(rapid(0) && rapid(1));
+  EXPECT_FALSE(rapid(2) || rapid(3));  // Arcs are cuts at any feed.
 }
 
 TEST(GcodeInterpreter, LinuxcncLimitsBlending) {

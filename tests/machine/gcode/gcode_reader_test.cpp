@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "machine/gcode/gcode_block.h"
 
 namespace lensforge {
 namespace {
@@ -98,8 +99,8 @@ TEST(GcodeReader, RefusesEveryByteThatIsNoText) {
     if (c == '\n' || c == '\r') continue;
     const bool text =
         c == '\t' || (byte >= 0x20 && byte < 0x7F && c != '?' && c != '!' && c != '~');
-    for (const std::string& before : {std::string("G21\nG1 X"), std::string("G21\n(x")}) {
-      const std::string refusal = refusal_of(before + c + "1)\n");
+    for (const std::string& before : {std::string("G21\nG1 X"), std::string("G21\n(x)")}) {
+      const std::string refusal = refusal_of(before + c + "1\n");
       EXPECT_EQ(refusal.empty(), text) << byte;
       if (!text) {
         EXPECT_THAT(refusal, HasSubstr("line 2: byte 0x")) << byte;
@@ -108,12 +109,32 @@ TEST(GcodeReader, RefusesEveryByteThatIsNoText) {
   }
 }
 
+TEST(GcodeReader, TakesAnyByteInAComment) {
+  for (int byte = 0; byte < 256; ++byte) {
+    const char c = static_cast<char>(byte);
+    if (c == '\n' || c == '\r' || c == '(' || c == ')') continue;
+    const bool text =
+        c == '\t' || (byte >= 0x20 && byte < 0x7F && c != '?' && c != '!' && c != '~');
+    for (const std::string& comment :
+         {std::string("(x") + c + ") X1", std::string("X1 ; (") + c, std::string("X1 ;)") + c}) {
+      std::istringstream in("G21\n" + comment + "\nX2\n");
+      GcodeReader reader(in);
+      EXPECT_FALSE(reader.next()->unsafe_comment);
+      const auto read = reader.next();
+      EXPECT_EQ(read->text, comment);
+      EXPECT_EQ(read->unsafe_comment, !text) << byte;
+      EXPECT_EQ(compact_gcode(read->text, false), "X1") << byte;
+      EXPECT_FALSE(reader.next()->unsafe_comment);
+    }
+  }
+}
+
 TEST(GcodeReader, NamesTheRuleThatAByteBreaks) {
   EXPECT_THAT(refusal_of(std::string("G1 \0X1", 6)),
               HasSubstr("line 1: byte 0x00 in column 4: NUL"));
-  EXPECT_THAT(refusal_of("(what?)"), HasSubstr("byte 0x3F in column 6: the controller treats"));
+  EXPECT_THAT(refusal_of("(what)?"), HasSubstr("byte 0x3F in column 7: the controller treats"));
   EXPECT_THAT(refusal_of("\xEF\xBB\xBFG21\n"), HasSubstr("UTF-8 byte order mark"));
-  EXPECT_THAT(refusal_of("G21\n(\xC3\xA9)"), HasSubstr("line 2: byte 0xC3 in column 2"));
+  EXPECT_THAT(refusal_of("G21\n()\xC3\xA9"), HasSubstr("line 2: byte 0xC3 in column 3"));
   EXPECT_THAT(refusal_of("G1\x18"), HasSubstr("byte 0x18"));
   EXPECT_THAT(refusal_of("G1\x7F"), HasSubstr("control byte"));
 }

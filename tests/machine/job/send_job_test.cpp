@@ -9,8 +9,10 @@
 namespace lensforge {
 namespace {
 
+using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 using testing::message_of;
 using testing::TempFolder;
 
@@ -77,6 +79,74 @@ TEST_F(SendJob, ADryRunWithoutAPortTouchesNothing) {
   EXPECT_EQ(folder_.file_count(), 1U);
 }
 
+/// What is said of a program without a controller.
+std::vector<std::string> warnings_of(const std::filesystem::path& file, const std::string& program,
+                                     SendOptions options = {}) {
+  testing::write_bytes(file, program);
+  options.dry_run = true;
+  JobWatcher nobody;
+  return send_job(file, options, nobody).findings.warnings;
+}
+
+constexpr const char* kCut = "G21 G90\nS12000 M3\nG0 X10 Y10 Z5\nG1 Z-1 F300\n";
+
+TEST_F(SendJob, ADryRunAloneWarnsOfHowAProgramEnds) {
+  const std::string cut = kCut;
+  EXPECT_THAT(warnings_of(program_, cut + "M5\nM2\n"), IsEmpty());
+  EXPECT_THAT(warnings_of(program_, cut + "M5\n"), ElementsAre(HasSubstr("no end")));
+  EXPECT_THAT(warnings_of(program_, cut),
+              ElementsAre(HasSubstr("ends with the spindle on"), HasSubstr("no end")));
+  EXPECT_THAT(warnings_of(program_, "%\n" + cut + "%\n"),
+              ElementsAre(HasSubstr("ends with the spindle on")));
+}
+
+TEST_F(SendJob, CommentsThatAControllerWouldActOnAreLeftOutAndSaid) {
+  const std::string program = "(Fr\xC3\xA4ser!)\n" + std::string(kCut) + "M5 ;~\x18\nM2\n";
+  EXPECT_THAT(warnings_of(program_, program),
+              ElementsAre(HasSubstr("line 1 and 1 more have a comment with bytes on which")));
+  JobWatcher nobody;
+  const SendSummary summary = send_job(program_, simulated(), nobody);
+  EXPECT_TRUE(summary.result->done()) << summary.result->reason;
+  EXPECT_EQ(summary.result->executed, 7);
+}
+
+TEST_F(SendJob, AToolsNumberAloneIsSentToGrbl) {
+  EXPECT_THAT(warnings_of(program_, "T1\n" + std::string(kCut) + "M5\nM2\n"), IsEmpty());
+  JobWatcher nobody;
+  EXPECT_TRUE(send_job(program_, simulated(), nobody).result->done());
+}
+
+TEST_F(SendJob, ACircleWithoutAnEndIsSentWithIt) {
+  const std::string program = std::string(kCut) + "G2 I5 J0\nM5\nM2\n";
+  for (const char* dialect : {"grbl", "grblhal"}) {
+    SendOptions options;
+    options.dialect = dialect;
+    EXPECT_THAT(warnings_of(program_, program, options),
+                ElementsAre(HasSubstr("line 5 has a circle without an end")));
+    SendOptions send = simulated();
+    send.port = std::string("sim:") + dialect;
+    send.restart = true;
+    JobWatcher nobody;
+    const SendSummary summary = send_job(program_, send, nobody);
+    EXPECT_TRUE(summary.result->done()) << summary.result->reason;
+  }
+}
+
+TEST_F(SendJob, ASpindleThatIsSwitchedByHandNeedsNoM3) {
+  const std::string program = "G21 G90\nG0 X10 Y10 Z5\nG1 Z-1 F300\nX50\nM2\n";
+  EXPECT_THAT(message_of<InputError>([&] { warnings_of(program_, program); }),
+              HasSubstr("line 3: moves at feed while the spindle is off; use --spindle-by-hand"));
+  SendOptions by_hand;
+  by_hand.spindle_by_hand = true;
+  EXPECT_THAT(warnings_of(program_, program, by_hand), IsEmpty());
+  SendOptions send = simulated();
+  send.spindle_by_hand = true;
+  JobWatcher nobody;
+  const SendSummary summary = send_job(program_, send, nobody);
+  EXPECT_TRUE(summary.result->done()) << summary.result->reason;
+  EXPECT_THAT(summary.findings.warnings, Contains(HasSubstr("switched by hand")));
+}
+
 TEST_F(SendJob, WhatTheMachineCannotDoIsRefusedBeforeTheJournal) {
   testing::write_bytes(program_, "G21 G90\nS90000 M3\nG0 X900\nM5\nM2\n");
   JobWatcher nobody;
@@ -100,6 +170,12 @@ TEST_F(SendJob, OptionsThatExcludeEachOtherAreRefused) {
   options.resume = options.restart = true;
   EXPECT_THAT(message_of<InputError>([&] { send_job(program_, options, nobody); }),
               HasSubstr("--restart"));
+  options = {};
+  options.port = "/dev/ttyUSB0";
+  options.spindle = "h100";
+  options.spindle_by_hand = true;
+  EXPECT_THAT(message_of<InputError>([&] { send_job(program_, options, nobody); }),
+              HasSubstr("--spindle-by-hand and --spindle"));
 }
 
 }  // namespace

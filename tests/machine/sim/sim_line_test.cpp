@@ -34,7 +34,7 @@ std::vector<Kind> kinds(const SimLineState& state) {
 }
 
 TEST(SimGroups, SortWordsAndRefuseTwoOfAGroup) {
-  const SimGroups groups = line_of("G1G20G91G54G49M3M8").groups;
+  const SimGroups groups = line_of("G1G20G91G54G49G40M3M8").groups;
   EXPECT_EQ(groups.error, 0);
   EXPECT_EQ(groups.motion, 10);
   EXPECT_EQ(groups.units, 200);
@@ -42,6 +42,7 @@ TEST(SimGroups, SortWordsAndRefuseTwoOfAGroup) {
   EXPECT_EQ(groups.frame, 540);
   EXPECT_EQ(groups.spindle, 30);
   EXPECT_EQ(groups.coolant, 80);
+  EXPECT_EQ(groups.tool_length, 490);
   EXPECT_TRUE(groups.any_quiet());
   EXPECT_FALSE(line_of("G1").groups.any_quiet());
   EXPECT_EQ(line_of("G0G1").groups.error, 21);
@@ -49,6 +50,18 @@ TEST(SimGroups, SortWordsAndRefuseTwoOfAGroup) {
   EXPECT_EQ(line_of("G5").groups.error, 20);
   EXPECT_EQ(line_of("F-1").groups.error, 4);
   EXPECT_EQ(line_of("N1.5").groups.error, 27);
+}
+
+TEST(SimLine, AToolsLengthMovesTheOriginAndStandsAlone) {
+  const SimLineState longer = run_sim_line(line_of("G43.1Z2"), {});
+  EXPECT_EQ(longer.error, 0);
+  EXPECT_EQ(offset_of(longer.modes, longer.stored), Eigen::Vector3d(0, 0, 2));
+  EXPECT_EQ(run_sim_line(line_of("G0Z1"), longer).modes.position.z(), 3.0);
+  EXPECT_EQ(run_sim_line(line_of("G40G49G80"), longer).modes.tool_length, 0.0);
+  EXPECT_EQ(run_sim_line(line_of("G43.1"), {}).error, 37);
+  EXPECT_EQ(run_sim_line(line_of("G43.1X1Z1"), {}).error, 37);
+  EXPECT_EQ(run_sim_line(line_of("G43.1G0Z1"), {}).error, 24);
+  EXPECT_EQ(run_sim_line(line_of("G49G28"), {}).error, 24);
 }
 
 TEST(SimGroups, KnowWhatAFirmwareIsBuiltWith) {

@@ -9,6 +9,7 @@
 
 #include "machine/gcode_text.h"
 #include "machine/sim_talk.h"
+#include "machine/stream/program_feed.h"
 
 namespace lensforge {
 namespace {
@@ -36,7 +37,7 @@ class RandomProgram {
       case 5:
         return pick({"G93 G1", "G94 G1 F100", "G93", "G94", "F50", "G1 F20", "G1"});
       case 6:
-        return pick({"G28", "G30", "G28", "G30"}) + (engine_() % 2 == 0 ? axes() : "");
+        return pick({"G28", "G30", "G43.1", "G49"}) + (engine_() % 2 == 0 ? axes() : "");
       case 7:
         return std::string("N").append(std::to_string(engine_() % 1000)) + " G1" + axes() + feed();
       default:
@@ -103,6 +104,7 @@ void compare(std::uint64_t seed, Compared& compared) {
       continue;  // refused before anything is sent; the controller never sees it
     }
     talk.pieces.clear();
+    line += added_words(effect, interpreter.state());
     ASSERT_EQ(talk.command(line), "ok\r\n") << line << ", seed " << seed;
     ++compared.accepted;
     const Vector3d stands = talk.machine.controller().position();

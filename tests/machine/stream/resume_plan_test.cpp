@@ -16,6 +16,7 @@
 namespace lensforge {
 namespace {
 
+using ::testing::Contains;
 using ::testing::HasSubstr;
 using testing::message_of;
 
@@ -105,6 +106,28 @@ TEST(ResumePlan, GoesNoFurtherThanTheMarginAllows) {
       EXPECT_EQ(plan.overlap_end, executed + 12);
     }
   }
+}
+
+TEST(ResumePlan, StatesTheToolsLengthAgain) {
+  std::string program = zig_zag(4);
+  program.insert(program.find("G54\n"), "G43.1 Z2.5\n");
+  const auto before = [&](const ControllerInfo& info) {
+    std::vector<std::string> texts;
+    for (const OutgoingLine& line : plan_for(program, 230, {}, info).before) {
+      texts.push_back(line.text);
+    }
+    return texts;
+  };
+  EXPECT_THAT(before(homed_machine()), Contains("G43.1Z2.5"));
+  const ResumePlan plan = plan_for(program, 230);
+  const std::vector<GcodeMotion> motions = motions_of(plan, homed_machine());
+  EXPECT_LT((motions.back().end - plan.state.position).norm(), 1e-4);
+  program = zig_zag(4);
+  program.insert(program.find("G54\n"), "G49\n");
+  ControllerInfo touched_off = homed_machine();
+  touched_off.start.stated_length = 3.0;
+  for (Eigen::Vector3d& origin : touched_off.start.origins) origin.z() -= 3.0;
+  EXPECT_THAT(before(touched_off), Contains("G49"));
 }
 
 TEST(ResumePlan, EntersWhereTheProgramGoesOn) {

@@ -72,13 +72,24 @@ TEST_F(SendSteps, ACutNeedsAVerifiedSpindle) {
   OutgoingLine cut = line("G1X1F100", 7);
   cut.cuts = true;
   SendState state;
-  EXPECT_THAT(send_step::cut_fault(state, cut)->what(), HasSubstr("line 7 moves at feed"));
+  EXPECT_THAT(send_step::cut_fault(state, cut, rules)->what(), HasSubstr("line 7 moves at feed"));
   state.spindle.order = {SpindleTurn::kClockwise, 1000.0};
-  EXPECT_FALSE(send_step::cut_fault(state, cut));
+  EXPECT_FALSE(send_step::cut_fault(state, cut, rules));
   state.spindle.verified = false;
-  EXPECT_TRUE(send_step::cut_fault(state, cut));
+  EXPECT_TRUE(send_step::cut_fault(state, cut, rules));
   cut.cuts = false;
-  EXPECT_FALSE(send_step::cut_fault(state, cut));
+  EXPECT_FALSE(send_step::cut_fault(state, cut, rules));
+}
+
+TEST_F(SendSteps, ACutNeedsNoSpindleThatIsSwitchedByHand) {
+  OutgoingLine cut = line("G1X1F100", 7);
+  cut.cuts = true;
+  info.dialect.spindle_by_hand = true;
+  SendState state;
+  EXPECT_FALSE(send_step::cut_fault(state, cut, rules));
+  state.spindle.order = {SpindleTurn::kClockwise, 1000.0};
+  state.spindle.verified = false;
+  EXPECT_TRUE(send_step::cut_fault(state, cut, rules)) << "the program starts it all the same";
 }
 
 TEST_F(SendSteps, ASpindleOrderIsABarrierThatWaitsForItsAnswerAndTheSpeed) {

@@ -4,10 +4,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <sstream>
 #include <stop_token>
 #include <string>
+#include <utility>
 
+#include "core/error.h"
 #include "core/temp_folder.h"
 #include "machine/gcode/gcode_error.h"
 #include "machine/sim_talk.h"
@@ -92,6 +95,56 @@ TEST_P(CheckMode, WhatStaysInItIsSaid) {
   });
   EXPECT_THAT(message_of<StreamFault>([&] { check(program_of(1000), control); }),
               HasSubstr("may still be in check mode ($C)"));
+}
+
+/// Something at the end of the line that says the same to every ?, and otherwise nothing.
+class Answering : public Link, public Clock {
+ public:
+  explicit Answering(std::string answer) : answer_(std::move(answer)) {}
+
+  [[nodiscard]] double now() const override { return now_; }
+  void wait(double seconds) override { now_ += seconds; }
+  std::string read(double wait) override {
+    now_ += std::max(wait, 1e-3);
+    return std::exchange(waiting_, {});
+  }
+  std::size_t write(std::string_view bytes) override {
+    for (const char c : bytes) waiting_ += c == '?' ? answer_ : std::string();
+    return bytes.size();
+  }
+
+ private:
+  std::string answer_;
+  std::string waiting_;
+  double now_ = 0.0;
+};
+
+TEST(Session, ASilentControllerIsNoticedWithinThreeSeconds) {
+  for (const bool homes : {false, true}) {
+    Answering nobody("");
+    Wire wire(nobody);
+    SessionOptions options;
+    options.home = homes;
+    EXPECT_THAT(message_of<StreamFault>([&] { open_session(wire, nobody, options, {}); }),
+                HasSubstr("does not answer ?; is it switched on"))
+        << homes;
+    EXPECT_LE(nobody.now(), 3.0) << homes;
+    EXPECT_GT(nobody.now(), 2.0) << "a board that restarts needs two seconds";
+  }
+}
+
+TEST(Session, GrblBeforeOneOneIsCalledTooOld) {
+  for (const std::string answer :
+       {"<Idle,MPos:0.000,0.000,0.000,WPos:0.000,0.000,0.000>\r\n",
+        "<Alarm,MPos:5.529,0.560,7.000>\r\n", "\r\nGrbl 0.9j ['$' for help]\r\n",
+        "Grbl 0.8c ['$' for help]\r\n"}) {
+    Answering old(answer);
+    Wire wire(old);
+    EXPECT_THAT(message_of<InputError>([&] { open_session(wire, old, {}, {}); }),
+                HasSubstr("older than Grbl 1.1"))
+        << answer;
+    EXPECT_LE(old.now(), 1.0);
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Firmware, CheckMode,
