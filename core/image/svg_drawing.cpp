@@ -12,6 +12,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <memory>
+#include <new>
 #include <nlohmann/json.hpp>
 #include <string_view>
 #include <thread>
@@ -284,8 +285,10 @@ void draw(const fs::path& path, RsvgHandle* handle, std::pair<double, double> si
   Failure failure;
   const bool drawn =
       rsvg_handle_render_document(handle, context.get(), &viewport, failure.out()) != FALSE;
+  const std::string reason = failure.reason();
+  if (reason.ends_with("NoMemory")) throw std::bad_alloc();
   if (!drawn || cairo_status(context.get()) != CAIRO_STATUS_SUCCESS) {
-    refuse_picture(path, "cannot be drawn" + failure.reason());
+    refuse_picture(path, "cannot be drawn" + reason);
   }
   cairo_surface_flush(surface);
 }

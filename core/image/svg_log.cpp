@@ -145,7 +145,7 @@ std::string mark_of(std::string_view value) {
   for (std::size_t i = 0; i < value.size();) {
     std::size_t end = i;
     while (end < value.size() && in_name(value[end])) ++end;
-    const std::string name = lower_case(std::string(value.substr(i, end - i)));
+    std::string name = lower_case(std::string(value.substr(i, end - i)));
     const bool function = end < value.size() && value[end] == '(';
     const bool unit = i > 0 && std::isdigit(static_cast<unsigned char>(value[i - 1])) != 0;
     if (!name.empty() && (function || unit)) {

@@ -219,6 +219,9 @@ class Survey {
     look_at_attributes(element);
     if (name != "a" && name != "color-profile") look_at_links();
     if (name == "image" || name == "feImage") look_at_picture();
+    if (name == "image" && has_length("width") != has_length("height")) {
+      leave_out("the other side of a picture that has a width or a height alone", "give both");
+    }
   }
 
   /// Names the element where it is not.
@@ -352,6 +355,14 @@ class Survey {
       const std::string inner = depth_ < kMostNested ? drawing_at(*link) : "";
       if (!inner.empty()) take_over(Survey(depth_ + 1).of(inner));
     }
+  }
+
+  /// As an attribute or in its style.
+  [[nodiscard]] bool has_length(const char* name) const {
+    if (attribute(name)) return true;
+    const auto style = declarations_in(attribute("style").value_or(""));
+    return std::any_of(style.begin(), style.end(),
+                       [&](const Declaration& one) { return one.name == name; });
   }
 
   void take_over(const SvgNeeds& inner) {

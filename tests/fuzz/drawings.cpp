@@ -116,18 +116,20 @@ std::string in_quotes(const std::string& word) {
   return text + "'";
 }
 
+/// A PNG.
+const std::string kWhitePixel =
+    "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAAAAAA6fptVAAAACklEQVR4nGP4DwABAQEAsTj2FAAAAABJRU5ErkJggg==";
+
 std::string odd_picture(Random& random) {
   static const std::vector<std::string> kTypes{
       "image/png", "image/jpeg", "image/jpg", "image/gif", "image/svg+xml", "", "text/css"};
-  static const std::vector<std::string> kData{
-      "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAAAAAA6fptVAAAACklEQVR4nGP4DwABAQEAsTj2FAAAAABJRU5ErkJggg="
-      "=",
-      "iVBORw0KGgoAAAANSUhEUv////////8IAAAAAA==",
-      "/9j/4AAQSkZJRg==",
-      "R0lGODlh",
-      "PHN2Zz4=",
-      "=",
-      ""};
+  static const std::vector<std::string> kData{kWhitePixel,
+                                              "iVBORw0KGgoAAAANSUhEUv////////8IAAAAAA==",
+                                              "/9j/4AAQSkZJRg==",
+                                              "R0lGODlh",
+                                              "PHN2Zz4=",
+                                              "=",
+                                              ""};
   return "<image width='50' height='50' xlink:href='data:" + random.pick(kTypes) +
          (random.one_in(4) ? "," : ";base64,") + random.pick(kData) + "'/>";
 }

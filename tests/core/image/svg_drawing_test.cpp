@@ -309,6 +309,18 @@ TEST(SvgDrawing, ACrashOfTheLibrariesIsARefusalInOneLine) {
   }
 }
 
+TEST(SvgDrawing, MemoryHasALimit) {
+  // Each of these holds two pictures of 64 MB.
+  std::string masks = "<mask id='m'><rect width='8' height='4' fill='white'/></mask>";
+  for (int i = 0; i < 180; ++i) masks += "<g mask='url(#m)' opacity='0.9'>";
+  masks += "<rect width='8' height='8' fill='white'/>";
+  for (int i = 0; i < 180; ++i) masks += "</g>";
+  const TempFolder folder;
+  write_bytes(folder / "a.svg", svg(masks, "0 0 8 8"));
+  EXPECT_THAT(testing::message_of<InputError>([&] { read_image(folder / "a.svg", {}, 1024); }),
+              HasSubstr("needs more memory than is available"));
+}
+
 TEST(SvgDrawing, StopsAtOnceInTheMiddleOfAnything) {
   const TempFolder folder;
   write_bytes(folder / "a.svg", endless_noise());

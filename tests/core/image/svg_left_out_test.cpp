@@ -107,6 +107,11 @@ std::vector<Row> element_rows() {
   };
 }
 
+/// One white pixel as PNG.
+const std::string kPixel =
+    "data:image/png;base64,iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAAAAAA6fptVAAAACklEQVR4nGP4DwABAQEAsTj2"
+    "FAAAAABJRU5ErkJggg==";
+
 std::vector<Row> attribute_rows() {
   return {
       {text("textLength='90'"), text(""), "textLength"},
@@ -133,6 +138,8 @@ std::vector<Row> attribute_rows() {
       {area("style='zoom:.5'"), area(""), "zoom"},
       {"<path style='d:path(\"M0 0H50V50z\");fill:white'/>", "", "a path in a style (d)"},
       {"<g style='background:white'/>", "", "background"},
+      {"<image width='50' href='" + kPixel + "'/>",
+       "<image width='50' height='1' href='" + kPixel + "'/>", "the other side of a picture"},
       {"<g systemLanguage='xx'>" + kArea + "</g>", kArea, "a condition outside of a switch"},
   };
 }
@@ -156,7 +163,7 @@ std::vector<Row> value_rows() {
       {"<style>@keyframes a{from{fill:red}}</style>", "", "@keyframes"},
       {"<style media='print'>.a{fill:white}</style>" + plain, kArea, "(media)"},
       {"<style>@import 'a.css';</style>", "", "@import"},
-      {"<rect width='50' height='50' fill='url(#nowhere)'/>", "", "the paint '#nowhere'"},
+      {"<rect width='50' height='50' fill='url(#nowhere)'/>", "", "left out the paint '#"},
       {"<polygon points='1,2 3' fill='white' x='1'/><use width='calc(1px)' href='#p'/>", "",
        "an element 'use'"},
   };
