@@ -207,6 +207,7 @@ int run_batch(const OptionSet& options, const BatchSettings& settings) {
   }
   require_writable_folder(settings.out);
   const InterruptWatch interrupt;
+  console.begin();
   BatchRun run(jobs, shard, place, console);
   run.run(settings.parallel, interrupt.token());
   if (!settings.table.empty()) write_whole_file(settings.table, table_of(jobs, run, place));

@@ -11,6 +11,7 @@
 #include "app/console.h"
 #include "app/exit_code.h"
 #include "app/interrupt.h"
+#include "app/interruptible_job.h"
 #include "app/json_output.h"
 #include "app/lens_note.h"
 #include "app/option_set.h"
@@ -70,17 +71,14 @@ nlohmann::json summary_json(const OptionSet& options, const CamResult& result) {
 }
 
 CamResult run(const OptionSet& options, const CamOptions& cam, const Lens& lens,
-              const fs::path& out) {
+              const fs::path& out, const Console& console) {
   const Executor executor = options.executor();
   const WorkEstimate estimate = estimate_cut(cam, lens.setup, executor.concurrency());
   require_room_for_cut(cam, lens.setup, estimate, out);
-  const Console console(options.common().json, options.common().quiet);
-  if (estimate.seconds > kWorthTelling) {
-    console.note("the cut takes " + estimate_words(estimate));
-  }
   const InterruptWatch interrupt;
   const OutputFolder folder(out, FolderLock::Kind::kExclusive);
   folder.remove_partial_files(is_name_of_cut);
+  announce_work(estimate, console, "the cut takes");
   ProgressDisplay progress(options.common().quiet);
   const RunControl control(interrupt.token(), progress.sink());
   return make_cut(lens, cam, out, executor, control);
@@ -98,18 +96,15 @@ std::string choice_text(const ReportChoice& choice) {
 }
 
 int compare(const OptionSet& options, const CamSettings& settings, const CamOptions& cam,
-            const Lens& lens) {
+            const Lens& lens, const Console& console) {
   const CutChoices choices = parse_choices(settings.compare, "--compare");
-  const Console console(options.common().json, options.common().quiet);
   const Executor executor = options.executor();
   const WorkEstimate estimate =
       require_room_for_comparison(lens, cam, choices, settings.folder(), executor.concurrency());
-  if (estimate.seconds > kWorthTelling) {
-    console.note("the comparison takes " + estimate_words(estimate));
-  }
   const InterruptWatch interrupt;
   const OutputFolder folder(settings.folder(), FolderLock::Kind::kExclusive);
   folder.remove_partial_files(is_name_of_cut);
+  announce_work(estimate, console, "the comparison takes");
   ProgressDisplay progress(options.common().quiet);
   const RunControl control(interrupt.token(), progress.sink());
   const CutComparison result = compare_cuts(lens, cam, choices, folder.path(), executor, control);
@@ -160,8 +155,8 @@ int cam_command(const Arguments& command_line) {
   }
   validate(cam, lens.setup);
   note_unfinished_design(lens, console);
-  if (!settings.compare.empty()) return compare(options, settings, cam, lens);
-  const CamResult result = run(options, cam, lens, settings.folder());
+  if (!settings.compare.empty()) return compare(options, settings, cam, lens, console);
+  const CamResult result = run(options, cam, lens, settings.folder(), console);
   for (const std::string& warning : result.report.warnings) console.note("warning: " + warning);
   console.result(summary_json(options, result),
                  result.done() ? summary_text(settings.folder(), result) : result.message + "\n");

@@ -14,6 +14,7 @@
 #include "app/completions.h"
 #include "app/console.h"
 #include "app/exit_code.h"
+#include "app/interrupt.h"
 #include "app/option_set.h"
 #include "app/standard_descriptors.h"
 #include "app/toml_config.h"
@@ -108,6 +109,7 @@ int dispatch(const Arguments& arguments) {
 
 int guarded(const Arguments& arguments) {
   const bool json = wants_json(arguments);
+  print_json_at_signals(json);
   try {
     return dispatch(arguments);
   } catch (const HelpText& help) {
@@ -148,12 +150,15 @@ int run_command_line(const std::vector<std::string>& arguments) noexcept {
 
 int run_main(int argc, char** argv) noexcept {
   hold_standard_descriptors();
+  exit_at_signals();
   // A full disk, a file-size limit and a closed pipe are then errors of the write that meets them.
   std::signal(SIGXFSZ, SIG_IGN);
   std::signal(SIGPIPE, SIG_IGN);
   try {
     const Arguments arguments(argv + std::min(argc, 1), argv + argc);
-    return run_on_ranks([&arguments] { return run_command_line(arguments); });
+    const int outcome = run_on_ranks([&arguments] { return run_command_line(arguments); });
+    ignore_signals();
+    return outcome;
   } catch (const std::bad_alloc&) {
     return report_error("not enough memory", kFailed, false);
   }

@@ -4,10 +4,12 @@
 #include <sys/ioctl.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <utility>
 
 #include "core/error.h"
 #include "core/text/printable.h"
@@ -40,6 +42,23 @@ std::string dump(const nlohmann::json& object) {
   return without_controls(object.dump(2, ' ', false, replace)) + "\n";
 }
 
+/// Longest value that is shown whole: a list of numbers, say. Paths may be longer.
+constexpr std::size_t kLongestValue = 200;
+
+/// A message with long values cut, so that what is wrong with them is still to be seen.
+std::string message_line(const std::string& message) {
+  std::string line;
+  for (std::size_t at = 0; at < message.size();) {
+    const std::size_t end = std::min(message.find(' ', at), message.size());
+    const std::string word = message.substr(at, end - at);
+    const bool cut = word.size() > kLongestValue && word.find('/') == std::string::npos;
+    line += cut ? printable_line(word, kLongestValue) : word;
+    if (end < message.size()) line += ' ';
+    at = end + 1;
+  }
+  return printable_line(line);
+}
+
 }  // namespace
 
 std::size_t terminal_width() {
@@ -58,7 +77,7 @@ void print_to_stdout(std::string_view text) {
 
 int report_error(const std::string& message, int exit_code, bool json) noexcept {
   try {
-    const std::string line = printable_line(message);
+    const std::string line = message_line(message);
     std::fprintf(stderr, "lensforge: %s\n", line.c_str());
     if (json) print_to_stdout(dump({{"error", line}, {"exit_code", exit_code}}));
   } catch (const std::exception&) {
@@ -68,10 +87,20 @@ int report_error(const std::string& message, int exit_code, bool json) noexcept 
 }
 
 void Console::note(const std::string& message) const {
-  if (!quiet_) std::fprintf(stderr, "lensforge: %s\n", printable_line(message).c_str());
+  if (!begun_) {
+    held_.push_back(message);
+  } else if (!quiet_) {
+    std::fprintf(stderr, "lensforge: %s\n", message_line(message).c_str());
+  }
+}
+
+void Console::begin() const {
+  begun_ = true;
+  for (const std::string& message : std::exchange(held_, {})) note(message);
 }
 
 void Console::result(const nlohmann::json& object, const std::string& text) const {
+  begin();
   print_to_stdout(json_ ? dump(object) : printable_lines(text));
 }
 

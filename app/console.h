@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace lensforge::app {
 
@@ -24,15 +25,21 @@ class Console {
  public:
   Console(bool json, bool quiet) : json_(json), quiet_(quiet) {}
 
-  /// A sentence for the reader, on stderr; nothing with --quiet.
+  /// A sentence for the reader, on stderr; nothing with --quiet. It is held back until begin(), so
+  /// that a refusal, after which nothing else matters, is the only line.
   void note(const std::string& message) const;
 
-  /// The result: `object` with --json, else `text`.
+  /// Says that nothing is refused any more: notes so far are printed, later ones at once.
+  void begin() const;
+
+  /// The result: `object` with --json, else `text`. Notes so far are printed before it.
   void result(const nlohmann::json& object, const std::string& text) const;
 
  private:
   bool json_;
   bool quiet_;
+  mutable bool begun_ = false;
+  mutable std::vector<std::string> held_;
 };
 
 }  // namespace lensforge::app

@@ -221,6 +221,7 @@ int run(OptionSet& options, DesignSettings& settings) {
   design.resume = settings.resume && earlier.checkpoint;
   if (expected.seconds > kWorthTelling) console.note("takes " + estimate_words(expected));
   const auto begin = [&] {
+    console.begin();
     folder.remove_partial_files(is_of_lens);
     if (device.executor.device() != Device::kCpu) console.note("computing on " + device.word);
     for (const std::string& change : changes_made(loaded, settings)) console.note(change);

@@ -8,6 +8,7 @@
 #include <cerrno>
 #include <csignal>
 #include <ctime>
+#include <string_view>
 #include <utility>
 
 #include "app/exit_code.h"
@@ -21,25 +22,55 @@ namespace {
 
 constexpr std::array kSignals = {SIGINT, SIGTERM, SIGHUP};
 
-/// A handler reaches nothing but globals.
+// A handler reaches nothing but globals.
+volatile std::sig_atomic_t json_at_signals = 0;        // NOLINT: see above
 sem_t wake;                                            // NOLINT: see above
 std::array<struct sigaction, kSignals.size()> before;  // NOLINT: see above
 
 void wake_waiter(int /*signal*/) { sem_post(&wake); }
 
+void write_whole(int descriptor, std::string_view text) {
+  while (!text.empty()) {
+    const ssize_t written = ::write(descriptor, text.data(), text.size());
+    if (written <= 0) return;
+    text.remove_prefix(static_cast<std::size_t>(written));
+  }
+}
+
+void exit_interrupted(int /*signal*/) {
+  write_whole(STDERR_FILENO, "lensforge: interrupted\n");
+  if (json_at_signals != 0) {
+    write_whole(STDOUT_FILENO, "{\n  \"error\": \"interrupted\",\n  \"exit_code\": 130\n}\n");
+  }
+  _exit(kInterrupted);
+}
+
+/// Signals that are ignored stay so. @return what was there before.
+std::array<struct sigaction, kSignals.size()> handle_with(void (*handler)(int)) {
+  std::array<struct sigaction, kSignals.size()> old{};
+  struct sigaction action {};
+  action.sa_handler = handler;
+  action.sa_flags = SA_RESTART;
+  sigemptyset(&action.sa_mask);
+  for (std::size_t i = 0; i < kSignals.size(); ++i) {
+    sigaction(kSignals[i], nullptr, &old[i]);
+    if (old[i].sa_handler != SIG_IGN) sigaction(kSignals[i], &action, nullptr);
+  }
+  return old;
+}
+
 }  // namespace
+
+void exit_at_signals() noexcept { handle_with(exit_interrupted); }
+
+void print_json_at_signals(bool json) noexcept { json_at_signals = json ? 1 : 0; }
+
+void ignore_signals() noexcept { handle_with(SIG_IGN); }
 
 InterruptWatch::InterruptWatch(SecondInterrupt second, std::function<void()> overdue)
     : second_(second), overdue_(std::move(overdue)) {
   sem_init(&wake, 0, 0);
-  struct sigaction action {};
-  action.sa_handler = wake_waiter;
-  action.sa_flags = SA_RESTART;
-  sigemptyset(&action.sa_mask);
-  for (std::size_t i = 0; i < kSignals.size(); ++i) {
-    sigaction(kSignals[i], nullptr, &before[i]);
-    if (before[i].sa_handler != SIG_IGN) sigaction(kSignals[i], &action, nullptr);
-  }
+  before = handle_with(wake_waiter);
   waiter_ = std::thread([this] { wait_for_signals(); });
 }
 

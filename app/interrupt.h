@@ -8,6 +8,17 @@
 
 namespace lensforge::app {
 
+/// Until a watch is there, Ctrl-C (SIGINT), SIGTERM and SIGHUP end the process at once with exit
+/// code 130; signals that the caller had ignored stay ignored. For the beginning of main(): while
+/// the libraries of the program are being loaded, the system ends it by that signal.
+void exit_at_signals() noexcept;
+
+/// Whether a process that ends so prints an object on stdout, as --json asks for.
+void print_json_at_signals(bool json) noexcept;
+
+/// For the end of main(): the command is done and says so by its exit code.
+void ignore_signals() noexcept;
+
 /// What the second interrupt does.
 enum class SecondInterrupt {
   kExit,     ///< Ends the process at once with exit code 130.

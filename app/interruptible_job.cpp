@@ -41,8 +41,10 @@ int report_interrupted(bool json) noexcept {
   return report_error("interrupted; nothing was written", kInterrupted, json);
 }
 
-void announce_work(const WorkEstimate& needed, const Console& console) {
-  if (needed.seconds > kWorthTelling) console.note("this takes " + estimate_words(needed));
+void announce_work(const WorkEstimate& needed, const Console& console, const std::string& what) {
+  if (!(needed.seconds > kWorthTelling)) return;
+  console.note(what + " " + estimate_words(needed));
+  console.begin();
 }
 
 }  // namespace lensforge::app

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <memory>
 #include <mutex>
+#include <string>
 
 #include "app/console.h"
 #include "app/interrupt.h"
@@ -47,7 +48,9 @@ class InterruptibleJob {
 /// What a command says that was interrupted before it wrote anything. Returns the exit code.
 int report_interrupted(bool json) noexcept;
 
-/// Tells about how much a long job takes.
-void announce_work(const WorkEstimate& needed, const Console& console);
+/// Tells about how much a long job takes, at once.
+/// @param what  as the subject of a sentence.
+void announce_work(const WorkEstimate& needed, const Console& console,
+                   const std::string& what = "this takes");
 
 }  // namespace lensforge::app

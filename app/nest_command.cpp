@@ -10,6 +10,7 @@
 #include "app/console.h"
 #include "app/exit_code.h"
 #include "app/interrupt.h"
+#include "app/interruptible_job.h"
 #include "app/json_output.h"
 #include "app/lens_note.h"
 #include "app/nest_settings.h"
@@ -106,18 +107,15 @@ nlohmann::json summary_json(const OptionSet& options, const NestResult& result,
 }
 
 NestResult run(const OptionSet& options, const NestSettings& settings,
-               const std::vector<NestLens>& lenses) {
+               const std::vector<NestLens>& lenses, const Console& console) {
   const Executor executor = options.executor();
   const NestPlan plan = plan_nest(lenses, settings.nest);
   const WorkEstimate estimate = estimate_nest(plan, lenses, executor.concurrency());
   require_room_for_cut(plan.cuts.front(), lenses.front().lens->setup, estimate, settings.out);
-  const Console console(options.common().json, options.common().quiet);
-  if (estimate.seconds > kWorthTelling) {
-    console.note("the cuts take " + estimate_words(estimate));
-  }
   const InterruptWatch interrupt;
   const OutputFolder folder(settings.out, FolderLock::Kind::kExclusive);
   folder.remove_partial_files(is_name_of_nest);
+  announce_work(estimate, console, "the cuts take");
   ProgressDisplay progress(options.common().quiet);
   const RunControl control(interrupt.token(), progress.sink());
   return make_nest(lenses, settings.nest, folder.path(), executor, control);
@@ -162,7 +160,7 @@ int nest_command(const Arguments& command_line) {
   const Sources sources(settings);
   const std::vector<NestLens> lenses = sources.lenses();
   sources.note_unfinished(console);
-  const NestResult result = run(options, settings, lenses);
+  const NestResult result = run(options, settings, lenses, console);
   note_warnings(result, console);
   console.result(summary_json(options, result, sources), summary_text(settings.out, result));
   return exit_code(options, result);

@@ -147,7 +147,9 @@ void OperatorView::take(const SendEvent& event, double left) {
 
 void OperatorView::note(const std::string& text) {
   wipe();
-  Console(false, false).note(text);
+  const Console console(false, false);
+  console.begin();
+  console.note(text);
 }
 
 void OperatorView::show(const std::vector<std::string>& lines) {

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
 #include <filesystem>
+#include <stop_token>
 #include <string>
 #include <system_error>
+#include <utility>
 
 #include "app/command_line.h"
 #include "app/commands.h"
@@ -125,6 +127,13 @@ void require_no_unfinished_run(const ReflectSettings& settings) {
   }
 }
 
+/// A damaged checkpoint is refused before the mesh is remeshed, which may take minutes.
+void require_readable_checkpoint(const ReflectSettings& settings) {
+  const fs::path checkpoint = fs::path(settings.out) / reflect::reflect_file::kCheckpoint;
+  std::error_code ignored;
+  if (settings.resume && fs::exists(checkpoint, ignored)) reflect::read_checkpoint(checkpoint);
+}
+
 /// Sets where checkpoints go and whether the run goes on from one. @return false if the run has
 /// ended before and there is nothing left to do.
 bool settle_checkpoint(ReflectSettings& settings, const reflect::ReflectInput& input,
@@ -149,9 +158,26 @@ int report_finished(const ReflectSettings& settings, const Console& console) {
   return kDone;
 }
 
+/// Runs the shape. What speaks against it is known before its first update.
+reflect::ReflectResult reflected(const reflect::ReflectInput& input,
+                                 const ReflectSettings& settings, const OptionSet& options,
+                                 const std::stop_token& stop, const Console& console) {
+  ProgressDisplay progress(options.common().quiet);
+  const auto show = progress.sink();
+  const RunControl control(stop, [&, begun = false](const Progress& p) mutable {
+    if (!std::exchange(begun, true)) {
+      progress.wipe();
+      console.begin();
+    }
+    if (show) show(p);
+  });
+  return reflect::reflect_shape(input, settings.reflect, options.executor(), control);
+}
+
 int shape(const OptionSet& options, ReflectSettings& settings) {
   const Console console(options.common().json, options.common().quiet);
   require_no_unfinished_run(settings);
+  require_readable_checkpoint(settings);
   const reflect::ReflectInput input = load(settings, options.common(), console);
   const InterruptWatch interrupt;
   const OutputFolder folder(settings.out, FolderLock::Kind::kExclusive);
@@ -160,10 +186,8 @@ int shape(const OptionSet& options, ReflectSettings& settings) {
   if (!settle_checkpoint(settings, input, folder, console)) {
     return report_finished(settings, console);
   }
-  ProgressDisplay progress(options.common().quiet);
-  const RunControl control(interrupt.token(), progress.sink());
   const reflect::ReflectResult result =
-      reflect::reflect_shape(input, settings.reflect, options.executor(), control);
+      reflected(input, settings, options, interrupt.token(), console);
   nlohmann::json json = reflect::result_json(result, settings.reflect);
   json["command"] = "reflect";
   json["files"] = nlohmann::json::array();

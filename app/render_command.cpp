@@ -87,13 +87,12 @@ Scene load(const std::string& source, const Executor& executor, const RunControl
   return {std::move(mesh), {}, {}, render, {}};
 }
 
-/// Tells what a large picture takes, or refuses it.
-void announce_picture(const OpticalSetup& setup, const std::string& out, const Console& console) {
+/// What a picture takes. @throw InputError where there is no room for it.
+WorkEstimate require_room_for_picture(const OpticalSetup& setup, const std::string& out) {
   const double shape = setup.pixels.cast<double>().prod() / std::pow(setup.pixels.maxCoeff(), 2);
   const auto work = [&](double side) { return rendering_work(shape * side * side); };
   const fs::path folder = fs::absolute(out.empty() ? "." : out).parent_path();
-  announce_work(require_room_for(work, {"--pixels", 1.0 * setup.pixels.maxCoeff()}, folder),
-                console);
+  return require_room_for(work, {"--pixels", 1.0 * setup.pixels.maxCoeff()}, folder);
 }
 
 /// @throw InputError where what is said of colour does not go with the rest.
@@ -125,7 +124,7 @@ Scene adjusted(Scene scene, OptionSet& options, RenderArguments& arguments,
   }
   const OpticalSetup& setup = scene.render.setup;
   require_spectrum(scene, options, arguments);
-  announce_picture(setup, arguments.out, console);
+  const WorkEstimate work = require_room_for_picture(setup, arguments.out);
   if (options.given("--target")) {
     LoadedImage target = read_image(arguments.target, control, setup.pixels.maxCoeff());
     for (const std::string& change : target.changes) {
@@ -135,16 +134,17 @@ Scene adjusted(Scene scene, OptionSet& options, RenderArguments& arguments,
   }
   if (scene.target) scene.target = resample(*scene.target, setup.pixels.x(), setup.pixels.y());
   require_wall_above(scene.surface, setup);
+  announce_work(work, console);
   return scene;
 }
 
 /// Without a target there is no white to relate to: a PNG shows the brightest pixel as white.
-Image scaled_to_white(Image image, const Console& console) {
+/// @return the brightest pixel, or 0 where nothing was scaled.
+float scale_to_white(Image& image) {
   const float white = *std::max_element(image.values().begin(), image.values().end());
-  if (!(white > 0.0F)) return image;
-  console.note("no target: white is the brightest pixel, " + fixed(white, 2) + " times even light");
+  if (!(white > 0.0F)) return 0.0F;
   for (float& value : image.values()) value /= white;
-  return image;
+  return white;
 }
 
 /// What a command says at the end, and what it wrote.
@@ -266,12 +266,17 @@ void require_picture_name(const std::string& out) {
 void write_picture(Rendering& rendering, const Scene& scene, const std::string& out,
                    InterruptibleJob& job, const Console& console) {
   const bool scale = !rendering.color && !scene.target && fs::path(out).extension() == ".png";
-  const Image image = scale ? scaled_to_white(rendering.image, console) : rendering.image;
+  Image image = rendering.image;
+  const float white = scale ? scale_to_white(image) : 0.0F;
   job.begin_writing();
   if (rendering.color) {
     write_image(*rendering.color, out);
   } else {
     write_image(image, out, job.control());
+  }
+  if (white > 0.0F) {
+    console.note("no target: white is the brightest pixel, " + fixed(white, 2) +
+                 " times even light");
   }
   rendering.json["out"] = out;
 }

@@ -157,6 +157,7 @@ int send_command(const Arguments& command_line) {
   options.parse(command_line);
   require_consistent(settings, options.common().json);
   const Console console(options.common().json, options.common().quiet);
+  console.begin();  // The operator is asked and warned before the machine accepts the job.
   try {
     const SendSummary summary = watched_job(options, settings, console);
     report(options, settings, console, summary);

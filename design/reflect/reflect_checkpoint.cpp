@@ -104,12 +104,13 @@ void write_checkpoint(const ReflectCheckpoint& checkpoint, const std::filesystem
   write_checkpoint_file(path, kMagic, {header, numbers});
 }
 
-ReflectCheckpoint read_checkpoint(const std::filesystem::path& path, std::uint64_t fingerprint) {
+ReflectCheckpoint read_checkpoint(const std::filesystem::path& path,
+                                  std::optional<std::uint64_t> fingerprint) {
   const CheckpointContent content = read_checkpoint_file(path, kMagic);
   try {
     const JsonFields fields(content.header, checkpoint_header_name(path));
     ReflectCheckpoint checkpoint = from_header(content.header, fields);
-    if (checkpoint.fingerprint != fingerprint) {
+    if (fingerprint && checkpoint.fingerprint != *fingerprint) {
       refuse_checkpoint(path,
                         "is of another mesh or other options: run the command that began it, or "
                         "start anew with --force");

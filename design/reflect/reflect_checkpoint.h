@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <vector>
 
 #include "design/reflect/reflect_input.h"
@@ -31,9 +32,10 @@ std::uint64_t reflect_fingerprint(const ReflectInput& input, const ReflectOption
 /// Writes a checkpoint, whole or not at all. @throw RunError if it cannot be written.
 void write_checkpoint(const ReflectCheckpoint& checkpoint, const std::filesystem::path& path);
 
-/// Reads a checkpoint back, to the bit.
+/// Reads a checkpoint back, to the bit. @param fingerprint  of its run, where that is known.
 /// @throw InputError if the file is missing, truncated, corrupt, of another version or of another
 ///        mesh or options than `fingerprint`.
-ReflectCheckpoint read_checkpoint(const std::filesystem::path& path, std::uint64_t fingerprint);
+ReflectCheckpoint read_checkpoint(const std::filesystem::path& path,
+                                  std::optional<std::uint64_t> fingerprint = {});
 
 }  // namespace lensforge::reflect

@@ -66,6 +66,15 @@ Process::~Process() {
 
 void Process::send(int signal) const { kill(pid_, signal); }
 
+bool Process::catches(int signal) const {
+  const std::string status = content("/proc/" + std::to_string(pid_) + "/status");
+  const std::string field = "SigCgt:\t";
+  const std::size_t at = status.find(field);
+  if (at == std::string::npos) return false;
+  const unsigned long long caught = std::stoull(status.substr(at + field.size(), 16), nullptr, 16);
+  return (caught >> static_cast<unsigned>(signal - 1) & 1U) != 0;
+}
+
 void Process::kill_all() const {
   std::vector<pid_t> children;
   const fs::path tasks = "/proc/" + std::to_string(pid_) + "/task";

@@ -38,6 +38,8 @@ class Process {
   Process& operator=(const Process&) = delete;
 
   void send(int signal) const;
+  /// Whether it has a handler for this signal by now (Linux's /proc).
+  [[nodiscard]] bool catches(int signal) const;
   /// Kills it and the processes that it has made, as the system does when memory runs out.
   void kill_all() const;
   /// Waits for the end; a process that takes longer than `limit` is killed and fails the test.

@@ -52,6 +52,33 @@ TEST_F(Reflect, WritesTheShapeItsPicturesAndItsFiguresTogether) {
   EXPECT_EQ(read_mesh(at("out/surface.stl")).triangle_count(), result["faces"]);
 }
 
+/// The box around a shape, which sends light straight back.
+constexpr const char* kCube =
+    "OFF\n8 6 0\n0 0 0\n0 0 9\n0 9 0\n0 9 9\n9 0 0\n9 0 9\n9 9 0\n9 9 9\n"
+    "4 0 1 3 2\n4 4 6 7 5\n4 0 4 5 1\n4 2 3 7 6\n4 0 2 6 4\n4 1 5 7 3\n";
+
+TEST_F(Reflect, ARunThatGainsNextToNothingIsNoSuccess) {
+  write(at("shape.off"), kCube);
+  const Outcome outcome = run(quick({"--max-displacement", "0.0001", "--json"}));
+  EXPECT_EQ(outcome.exit_code, 3) << outcome.err;
+  EXPECT_THAT(outcome.err, HasSubstr("warning: the energy went from 0.1"));
+  EXPECT_THAT(outcome.err, HasSubstr("less than a tenth"));
+  const nlohmann::json result = outcome.json();
+  ASSERT_EQ(result["warnings"].size(), 1);
+  EXPECT_THAT(result["warnings"][0].get<std::string>(), HasSubstr("less than a tenth"));
+  EXPECT_EQ(content(at("out/report.html")).find("verdict good"), std::string::npos);
+}
+
+TEST_F(Reflect, ReadsPolygonsAndDropsFacesWithoutArea) {
+  write(at("cube.obj"),
+        "v 0 0 0\nv 0 0 9\nv 0 9 0\nv 0 9 9\nv 9 0 0\nv 9 0 9\nv 9 9 0\nv 9 9 9\n"
+        "f 1 2 4 3\nf 5 7 8 6\nf 1 5 6 2\nf 3 4 8 7\nf 1 3 7 5\nf 2 6 8 4\nf 1 2 2\n");
+  const Outcome outcome = run({"reflect", path("cube.obj"), "--evaluate", "--json"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_NEAR(outcome.json()["energy_direct"], 0.17045, 0.002);
+  EXPECT_THAT(outcome.err, HasSubstr("cube.obj: 1 face without area removed"));
+}
+
 TEST_F(Reflect, EvaluatePrintsEnergiesAndWritesNothing) {
   const Outcome outcome = run({"reflect", path("shape.off"), "--evaluate", "--json"});
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
@@ -62,7 +89,7 @@ TEST_F(Reflect, EvaluatePrintsEnergiesAndWritesNothing) {
 TEST_F(Reflect, FilesOfOthersAreKeptUnlessForced) {
   fs::create_directory(at("out"));
   write(at("out/surface.ply"), "mine");
-  expect_refusal(run(quick({"--quiet"})), 2, {"surface.ply", "--force"});
+  expect_refusal(run(quick()), 2, {"surface.ply", "--force"});
   EXPECT_EQ(content(at("out/surface.ply")), "mine");
   EXPECT_EQ(run(quick({"--force"})).exit_code, 0);
 }
@@ -71,7 +98,7 @@ TEST_F(Reflect, MeshesThatCannotBeShapedAreRefused) {
   const std::string open = "OFF\n3 1 0\n0 0 0\n1 0 0\n0 0 1\n3 0 1 2\n";
   expect_refused(open, {"--keep-volume"}, {"--keep-volume", "is open", "--keep-box"});
   expect_refused(open, {"--min-thickness", "0.1"}, {"--min-thickness", "is open"});
-  expect_refused("OFF\n3 1 0\n0 0 0\n1 0 0\n2 0 0\n3 0 1 2\n", {}, {"face 0 has no area"});
+  expect_refused("OFF\n3 1 0\n0 0 0\n1 0 0\n2 0 0\n3 0 1 2\n", {}, {"no face has an area"});
   expect_refused("OFF\n3 1 0\n0 0 0\n1 0 nan\n0 0 1\n3 0 1 2\n", {}, {"bad.off"});
   expect_refused("OFF\n5 3 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n0 0 -1\n3 0 1 2\n3 0 1 3\n3 0 1 4\n", {},
                  {"more than two faces"});
@@ -176,7 +203,7 @@ TEST_F(ReflectResume, CtrlCKeepsACheckpointThatOnlyTheSameRunTakes) {
   ASSERT_EQ(stopped.exit_code, 130) << stopped.err;
   EXPECT_THAT(stopped.err, HasSubstr("--resume"));
   expect_refusal(run(run_into("out")), 2, {"unfinished run", "--resume", "--force"});
-  expect_refusal(run(run_into("out", {"--resume", "--seed", "2", "--quiet"})), 2,
+  expect_refusal(run(run_into("out", {"--resume", "--seed", "2"})), 2,
                  {"reflect.checkpoint", "other options"});
   ASSERT_EQ(run(run_into("out", {"--resume"})).exit_code, 0);
   expect_same_shape("whole", "out");
@@ -194,10 +221,19 @@ TEST_F(ReflectResume, AFinishedRunHasNothingToResume) {
 TEST_F(ReflectResume, ADamagedCheckpointIsRefusedAndKept) {
   fs::create_directory(at("out"));
   write(at("out/reflect.checkpoint"), "no checkpoint");
-  expect_refusal(run(quick({"--resume", "--quiet"})), 2, {"reflect.checkpoint"});
+  expect_refusal(run(quick({"--resume"})), 2, {"reflect.checkpoint"});
   EXPECT_EQ(content(at("out/reflect.checkpoint")), "no checkpoint");
   EXPECT_EQ(run(quick({"--force"})).exit_code, 0);
   EXPECT_FALSE(fs::exists(at("out/reflect.checkpoint")));
+}
+
+TEST_F(ReflectResume, ADamagedCheckpointIsRefusedBeforeAMinuteOfRemeshing) {
+  fs::create_directory(at("out"));
+  write(at("out/reflect.checkpoint"), "no checkpoint");
+  const Outcome outcome =
+      run({"reflect", path("shape.off"), "--out", path("out"), "--faces", "400000", "--resume"});
+  expect_refusal(outcome, 2, {"reflect.checkpoint"});
+  EXPECT_LT(outcome.seconds, 10.0);
 }
 
 /// CGAL's remeshing, a minute of it, does not look for interrupts.

@@ -86,6 +86,24 @@ TEST_F(Usage, OptionsThatBreakTheirRuleAreRefused) {
   expect_option_refused({"--thickness", "40cm"}, {"--focal", "thickness"});
 }
 
+TEST_F(Usage, ALongValueIsCutAndItsRuleStillStands) {
+  std::string wavelengths = "380";
+  for (int i = 1; i < 5000; ++i) wavelengths += "," + std::to_string(380 + i);
+  for (const Arguments& extra : {Arguments{"--wavelengths", wavelengths},
+                                 Arguments{"--ior", "1." + std::string(3000, '4') + "x"}}) {
+    Arguments arguments = {"design", picture("rings.png"), "--out", path("lens")};
+    arguments.insert(arguments.end(), extra.begin(), extra.end());
+    const Outcome outcome = run(arguments);
+    expect_refusal(outcome, 2, {extra.front() + " ", " ... ", "must be"});
+    EXPECT_LT(outcome.err.size(), 420U);
+  }
+}
+
+TEST_F(Usage, ALongPathIsNotCut) {
+  const std::string name = path(std::string(120, 'a') + "/" + std::string(200, 'b') + ".png");
+  expect_refusal(run({"info", name}), 2, {name});
+}
+
 TEST_F(Usage, CudaIsRefusedWhereThereIsNoGpu) {
   if (fs::exists("/dev/nvidiactl")) GTEST_SKIP() << "there is a GPU";
   expect_option_refused({"--device", "cuda"}, {"--device cuda: "});

@@ -24,8 +24,8 @@ constexpr double kGreatestDiagonal = 1e60;
   throw InputError(name + ": " + why);
 }
 
-std::string counted(std::int64_t count, const std::string& what) {
-  return std::to_string(count) + " " + what;
+std::string counted(std::int64_t count, const std::string& one, const std::string& more) {
+  return std::to_string(count) + " " + (count == 1 ? one : more);
 }
 
 /// For every vertex the first one in the same place.
@@ -73,17 +73,22 @@ void merge_vertices(const SurfaceMesh& mesh, RepairedMesh& result) {
   for (int& v : merged.triangles.reshaped()) v = first[static_cast<std::size_t>(v)];
   std::int64_t duplicates = 0;
   for (std::size_t v = 0; v < first.size(); ++v) duplicates += first[v] != static_cast<int>(v);
-  if (duplicates > 0) result.changes.push_back(counted(duplicates, "duplicate vertices merged"));
+  if (duplicates > 0)
+    result.changes.push_back(
+        counted(duplicates, "duplicate vertex merged", "duplicate vertices merged"));
   FullFaces full = without_flat_faces(merged);
   if (full.removed > 0) {
-    result.changes.push_back(counted(full.removed, "faces without area removed"));
+    result.changes.push_back(
+        counted(full.removed, "face without area removed", "faces without area removed"));
   }
   std::vector<int> number;
   result.mesh = compacted(full.mesh, number);
   result.face = std::move(full.origin);
   for (const int v : first) result.vertex.push_back(number[static_cast<std::size_t>(v)]);
   const std::int64_t unused = mesh.vertex_count() - duplicates - result.mesh.vertex_count();
-  if (unused > 0) result.changes.push_back(counted(unused, "vertices without a face dropped"));
+  if (unused > 0)
+    result.changes.push_back(
+        counted(unused, "vertex without a face dropped", "vertices without a face dropped"));
 }
 
 void require_size(const SurfaceMesh& mesh, const std::string& name) {
@@ -215,7 +220,7 @@ RepairedMesh repair_mesh(const SurfaceMesh& mesh, const std::string& name) {
   require_manifold(table, name);
   result.closed = table.is_closed();
   const std::int64_t turned = Orientation(result.mesh, table, name).settle();
-  if (turned > 0) result.changes.push_back(counted(turned, "faces turned"));
+  if (turned > 0) result.changes.push_back(counted(turned, "face turned", "faces turned"));
   return result;
 }
 
