@@ -203,7 +203,8 @@ ProgramPlan CutPlan::programs(const RunControl& control) {
   if (finish().pencil) plan.operations.push_back(pencil_operation(control));
   if (cuts_outline(options_, lens_.setup)) plan.operations.push_back(outline_operation(control));
   for (const ProgramOperation& operation : plan.operations) {
-    watched_.push_back({operation.name, operation.tool});
+    watched_.push_back(
+        {operation.name, operation.tool, descent_rule(options_.workshop.process, operation.name)});
   }
   return plan;
 }

@@ -98,6 +98,10 @@ class CutPlan {
   [[nodiscard]] const std::vector<Collision>& collisions() const {
     return (place_.shared() ? *place_.collisions : collisions_).collisions();
   }
+  /// What goes down too steeply for its feed in them.
+  [[nodiscard]] const std::vector<SteepDescent>& descents() const {
+    return (place_.shared() ? *place_.collisions : collisions_).descents();
+  }
   /// What else was found in them.
   [[nodiscard]] const ProgramWatch& watch() const {
     return place_.shared() ? *place_.watch : watch_;

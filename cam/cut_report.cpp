@@ -6,6 +6,7 @@
 #include <string>
 #include <variant>
 
+#include "cam/cut_safety.h"
 #include "core/io/lens_folder.h"
 #include "core/optics/fresnel.h"
 #include "core/optics/front_placement.h"
@@ -349,11 +350,10 @@ std::vector<std::string> warnings_of(const CutPlan& plan, const ProgramFiles& pr
   std::vector<std::string> warnings;
   const std::string unroughed = unroughed_warning(plan, programs);
   if (!unroughed.empty()) warnings.push_back(unroughed);
-  for (const Collision& collision : plan.collisions()) warnings.push_back(collision.sentence());
-  for (const std::string& fault : plan.watch().faults()) warnings.push_back(fault);
+  const std::vector<std::string> safety = safety_warnings(plan, programs, lens);
+  warnings.insert(warnings.end(), safety.begin(), safety.end());
   for (const std::string& sentence :
-       {index_warning(plan, lens), margin_warning(plan, lens), process_warning(plan, lens),
-        travel_fault(plan.watch().extent(), plan.options().workshop.machine.travel)}) {
+       {index_warning(plan, lens), margin_warning(plan, lens), process_warning(plan, lens)}) {
     if (!sentence.empty()) warnings.push_back(sentence);
   }
   const Eigen::Vector3d travel = plan.options().workshop.machine.travel;
@@ -381,29 +381,9 @@ std::vector<std::string> warnings_of(const CutPlan& plan, const ProgramFiles& pr
   return warnings;
 }
 
-/// How deep tools go below the blank's underside, mm.
-double depth_in_table(const CutPlan& plan) {
-  double deepest = 0.0;
-  for (const Collision& collision : plan.collisions()) {
-    if (collision.obstacle == kTable) deepest = std::max(deepest, collision.worst.value);
-  }
-  return deepest;
-}
-
-/// What the machine must not do, whatever becomes of the light.
-std::vector<LimitCheck> safety_checks(const CutPlan& plan, const Lens& lens) {
-  const auto collisions =
-      static_cast<double>(plan.collisions().size() + plan.watch().faults().size());
-  std::vector<LimitCheck> checks{
-      {"collisions", "collisions", collisions, 0.0, "", 0},
-      {"table", "cut below the blank", depth_in_table(plan), 0.0, "mm", 4}};
-  const Eigen::Vector3d extent = plan.watch().extent();
-  const Eigen::Vector3d& travel = plan.options().workshop.machine.travel;
-  for (int axis = 0; axis < 3; ++axis) {
-    checks.push_back({std::string("travel_") + "xyz"[axis],
-                      std::string("machine travel along ") + "XYZ"[axis], extent[axis],
-                      travel[axis], "mm", 2});
-  }
+/// What the machine must not do, and what must not go into it.
+std::vector<LimitCheck> all_safety_checks(const CutPlan& plan, const Lens& lens) {
+  std::vector<LimitCheck> checks = safety_checks(plan);
   if (plan.options().workshop.material.ior > 0.0) {
     checks.push_back({"material_ior", "material's refractive index off the design's",
                       index_error(plan, lens), kIndexTolerance, "", 4});
@@ -419,7 +399,7 @@ Verdict whole_verdict(const CutPlan& plan, const ProgramFiles& programs,
   CutFindings findings = findings_of(programs, prediction);
   if (!(limits.block_rate > 0.0)) findings.block_rate.reset();
   Verdict verdict = judge_cut(findings, limits);
-  const std::vector<LimitCheck> safety = safety_checks(plan, lens);
+  const std::vector<LimitCheck> safety = all_safety_checks(plan, lens);
   verdict.checks.insert(verdict.checks.begin(), safety.begin(), safety.end());
   return verdict;
 }

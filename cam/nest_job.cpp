@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <cmath>
 #include <cstddef>
 #include <memory>
 #include <string_view>
@@ -15,6 +16,7 @@
 #include "cam/cut_plan.h"
 #include "cam/cut_prediction.h"
 #include "cam/cut_report.h"
+#include "cam/cut_safety.h"
 #include "cam/job_files.h"
 #include "cam/nest_drawing.h"
 #include "cam/path/rough_links.h"
@@ -25,6 +27,7 @@
 #include "core/io/lens_folder.h"
 #include "core/io/output_guard.h"
 #include "core/io/pending_files.h"
+#include "core/page/html_text.h"
 #include "core/text/number_text.h"
 #include "core/text/version.h"
 
@@ -177,7 +180,9 @@ class Job {
                           corner = Eigen::Vector2d(layout_.lenses[k].box.min())](
                              const MoveSink& sink) { return stream(shifted(sink, corner)); };
       steps_.push_back({k, i});
-      watched_.push_back({operation.name + " of " + lenses_[k].name, operation.tool});
+      DescentRule rule = descent_rule(options_.cam.workshop.process, operation.name);
+      rule.rim = layout_.lenses[k].box;
+      watched_.push_back({operation.name + " of " + lenses_[k].name, operation.tool, rule});
       whole.operations.push_back(std::move(operation));
     }
   }
@@ -213,6 +218,7 @@ class Job {
   /// The programs as if they held this lens alone.
   [[nodiscard]] ProgramFiles programs_of(std::size_t k, const ProgramFiles& all) const {
     ProgramFiles own;
+    own.names = all.names;
     std::vector<std::optional<std::size_t>> numbers(steps_.size());
     for (std::size_t i = 0; i < steps_.size(); ++i) {
       if (steps_[i].lens != k) continue;
@@ -269,12 +275,27 @@ class Job {
                                 ": stays joined to the blank and has to be sawn out; --cut-outline "
                                 "always cuts it out");
     }
+    const std::string advice = outline_advice();
+    if (!advice.empty()) result.warnings.push_back(advice);
     const Eigen::Vector3d travel = options_.cam.workshop.machine.travel;
     if ((layout_.blank.array() > travel.array()).any()) {
       result.warnings.push_back("the blank is larger than the machine's travel of " +
                                 decimal_text(travel.x(), 0) + " x " + decimal_text(travel.y(), 0) +
                                 " x " + decimal_text(travel.z(), 0) + " mm");
     }
+  }
+
+  /// Empty if the outlines' tool is long enough, or none is cut.
+  [[nodiscard]] std::string outline_advice() const {
+    const auto cut_out = [](const NestedLens& lens) { return lens.cut_out; };
+    const auto first = std::find_if(layout_.lenses.begin(), layout_.lenses.end(), cut_out);
+    if (first == layout_.lenses.end()) return "";
+    const CutPlan& plan = *plans_[static_cast<std::size_t>(first - layout_.lenses.begin())];
+    const double least = std::ceil(1e3 * least_thickness(lenses_, options_)) / 1e3;
+    const std::string thinner =
+        joined({"--blank ", trimmed_decimal(layout_.blank.x(), 3), ",",
+                trimmed_decimal(layout_.blank.y(), 3), ",", trimmed_decimal(least, 3)});
+    return outline_tool_advice(plan, layout_.blank.z(), {thinner, least});
   }
 
   /// The old job goes and the new one comes, its reports first and last.

@@ -66,23 +66,23 @@ void require_alike(const std::vector<NestLens>& lenses) {
   }
 }
 
+double top_of(const NestLens& lens) { return box_of(lens.lens->surface).max().z(); }
+
+const NestLens& highest_of(const std::vector<NestLens>& lenses) {
+  return *std::max_element(lenses.begin(), lenses.end(), [](const NestLens& a, const NestLens& b) {
+    return top_of(a) < top_of(b);
+  });
+}
+
 /// Of the common blank: as given, or what the highest lens needs. @throw InputError
 double thickness_of(const std::vector<NestLens>& lenses, const NestOptions& options) {
-  double needed = 0.0;
-  std::string highest;
-  for (const NestLens& one : lenses) {
-    const double top = box_of(one.lens->surface).max().z() + options.cam.workshop.stock.allowance;
-    if (top > needed) {
-      needed = top;
-      highest = one.name;
-    }
-  }
+  const double needed = least_thickness(lenses, options);
   const double thickness = options.thickness.value_or(needed);
   if (thickness >= needed) return thickness;
-  throw InputError("--blank: a thickness of " + mm(thickness) + " is too little for " + highest +
-                   ": must be at least " + trimmed_decimal(std::ceil(1e3 * needed) / 1e3, 3) +
-                   " mm, --stock " + trimmed_decimal(options.cam.workshop.stock.allowance, 3) +
-                   " included");
+  throw InputError("--blank: a thickness of " + mm(thickness) + " is too little for " +
+                   highest_of(lenses).name + ": must be at least " +
+                   trimmed_decimal(std::ceil(1e3 * needed) / 1e3, 3) + " mm, --stock " +
+                   trimmed_decimal(options.cam.workshop.stock.allowance, 3) + " included");
 }
 
 /// What tools need around every lens, mm.
@@ -137,6 +137,10 @@ CamOptions cut_of(const NestLens& one, const NestOptions& options, const NestedL
 }
 
 }  // namespace
+
+double least_thickness(const std::vector<NestLens>& lenses, const NestOptions& options) {
+  return top_of(highest_of(lenses)) + options.cam.workshop.stock.allowance;
+}
 
 NestPlan plan_nest(const std::vector<NestLens>& lenses, const NestOptions& options) {
   require_options(options);

@@ -53,6 +53,9 @@ struct NestPlan {
   std::vector<CamOptions> cuts;
 };
 
+/// Of the common blank, at least: the highest lens with the stock above it, mm.
+double least_thickness(const std::vector<NestLens>& lenses, const NestOptions& options);
+
 /// @throw InputError as make_nest().
 NestPlan plan_nest(const std::vector<NestLens>& lenses, const NestOptions& options);
 

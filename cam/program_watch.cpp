@@ -45,6 +45,7 @@ ProgramWatch::ProgramWatch(CollisionCheck& collisions, const std::vector<Tool>& 
 void ProgramWatch::take(const WatchedOperation& operation, const ProgramLine& line) {
   if (line.block.line == 1) {
     forget();
+    ++programs_;
     changed_ = 0;
     operation_.clear();
   }
@@ -72,7 +73,8 @@ void ProgramWatch::begin(const WatchedOperation& operation) {
   tool_ = changed_ != 0 ? changed_ : operation.tool.number;
   const auto same = [&](const Tool& tool) { return tool.number == tool_; };
   const auto found = std::find_if(tools_.begin(), tools_.end(), same);
-  collisions_.begin(operation.name, found != tools_.end() ? *found : operation.tool);
+  collisions_.begin(operation.name, found != tools_.end() ? *found : operation.tool,
+                    operation.rule);
   if (known_ == Known{true, true, true}) collisions_.place(at_);
 }
 
@@ -116,7 +118,7 @@ void ProgramWatch::step(const GcodeMotion& motion, const GcodeBlock& block, bool
 
 void ProgramWatch::follow(const GcodeMotion& motion) {
   const PathMove move = path_move(motion, z_offset_);
-  collisions_.check(std::span(&move, 1));
+  collisions_.check(std::span(&move, 1), {programs_ - 1, motion.line});
   Eigen::AlignedBox3d box(at_);
   if (motion.arc) {
     box = motion.bounds();

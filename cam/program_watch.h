@@ -20,10 +20,12 @@ namespace lensforge {
 struct WatchedOperation {
   std::string name;
   Tool tool;  ///< That it is meant for.
+  DescentRule rule;
 };
 
 /// Follows programs as they were read back, lines of the post's own included, and finds what a
-/// machine must not do: collisions (CollisionCheck), and ways that nobody can know because they
+/// machine must not do: collisions and ways down into material that are too steep for their feed
+/// (CollisionCheck), and ways that nobody can know because they
 /// begin or end where the program has not said. Where a tool is when a program begins, and after a
 /// tool change, is not known; G28, G30 and G53 are taken to lift a tool above everything and to
 /// leave their other axes at places that are not known.
@@ -67,8 +69,9 @@ class ProgramWatch {
   double z_offset_;
   double top_;
   std::string operation_;
-  int tool_ = 0;     ///< In the spindle.
-  int changed_ = 0;  ///< The last that was changed to in this program; 0 for none.
+  std::size_t programs_ = 0;  ///< That have begun.
+  int tool_ = 0;              ///< In the spindle.
+  int changed_ = 0;           ///< The last that was changed to in this program; 0 for none.
   Known known_{false, false, false};
   bool lifted_ = false;                           ///< By G28, G30 or G53: above everything.
   Eigen::Vector3d at_ = Eigen::Vector3d::Zero();  ///< Lens frame, as far as it is known.

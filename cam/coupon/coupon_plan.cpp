@@ -98,7 +98,7 @@ ProgramSettings CouponPlan::settings() {
   settings.coolant = options_.coolant;
   settings.planner = planner_settings(options_.workshop.machine);
   settings.look = [this](std::size_t /*operation*/, const ProgramLine& line) {
-    watch_.take({kOperation, ball()}, line);
+    watch_.take({kOperation, ball(), {}}, line);
   };
   return settings;
 }
@@ -172,6 +172,9 @@ std::vector<std::string> CouponPlan::faults() const {
   std::vector<std::string> sentences = watch_.faults();
   for (const Collision& collision : collisions_.collisions()) {
     sentences.push_back(collision.sentence());
+  }
+  for (const SteepDescent& descent : collisions_.descents()) {
+    sentences.push_back(descent.sentence(std::string(kOperation) + "." + options_.post.extension));
   }
   const std::string travel = travel_fault(watch_.extent(), options_.workshop.machine.travel);
   if (!travel.empty()) sentences.push_back(travel);

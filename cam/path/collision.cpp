@@ -47,9 +47,10 @@ std::string Collision::sentence() const {
 
 CollisionCheck::CollisionCheck(const ProfileCutter& surface, const Workshop& workshop,
                                StockMap stock)
-    : surface_(surface), workshop_(workshop), stock_(std::move(stock)) {}
+    : surface_(surface), workshop_(workshop), stock_(std::move(stock)), descents_(surface) {}
 
-void CollisionCheck::begin(const std::string& operation, const Tool& tool) {
+void CollisionCheck::begin(const std::string& operation, const Tool& tool,
+                           const DescentRule& rule) {
   operation_ = operation;
   tool_ = &tool;
   placed_ = false;
@@ -63,10 +64,12 @@ void CollisionCheck::begin(const std::string& operation, const Tool& tool) {
                          : "section of " + decimal_text(2.0 * profile.radius, 1) + " mm"});
   }
   last_move_.assign(collisions_.size(), -1);
+  descents_.begin(operation, tool, rule);
 }
 
-void CollisionCheck::check(std::span<const PathMove> moves) {
+void CollisionCheck::check(std::span<const PathMove> moves, const ProgramPlace& place) {
   LF_CHECK(tool_ != nullptr, "begin() first");
+  place_ = place;
   for (const PathMove& move : moves) {
     if (!placed_) at_ = move.end;
     placed_ = true;
@@ -81,6 +84,7 @@ void CollisionCheck::check(std::span<const PathMove> moves) {
 void CollisionCheck::place(const Eigen::Vector3d& at) {
   at_ = at;
   placed_ = true;
+  descents_.rest();
 }
 
 /// No part of a tool is lower than its tip. An arc in an upright plane hangs below its ends.
@@ -111,6 +115,7 @@ void CollisionCheck::check_boxes(const PathMove& move) {
 /// Parts above all material need no search; the cutter is checked in rapid moves.
 void CollisionCheck::check_material(const PathMove& move) {
   const bool rapid = move.kind == MoveKind::kRapid;
+  if (rapid) descents_.rest();
   if (rapid && only_rises(at_, move.end)) return;
   split_move(at_, move, kPiece, [&](const MovePiece& piece) {
     for (std::size_t i = rapid ? 0 : 1; i < parts_.size(); ++i) {
@@ -123,7 +128,9 @@ void CollisionCheck::check_material(const PathMove& move) {
       if (depth <= 0.0) continue;
       note({parts_[i].name, material_at(profile, piece.middle(), piece.lowest), piece.to, depth});
     }
-    if (!rapid) (void)stock_.cut(parts_[0].profile, piece.from, piece.to);
+    if (rapid) return;
+    const double taken = stock_.cut(parts_[0].profile, piece.from, piece.to).taken;
+    descents_.take(move, piece, taken, place_);
   });
 }
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "cam/contact/profile_cutter.h"
+#include "cam/path/descent.h"
 #include "cam/path/move.h"
 #include "cam/path/operation.h"
 #include "cam/path/stock_map.h"
@@ -36,8 +37,8 @@ struct Collision {
 /// does not cut touches something: the tool above its flutes, its shank and holder against the lens
 /// and the remaining blank; the whole tool against the keep-out boxes and against the table,
 /// which is everywhere at the height of the blank's underside; and the cutter against material in
-/// rapid moves. Moves are looked at in parts of a tenth of a millimetre, each with all that the
-/// tool sweeps in it.
+/// rapid moves. Ways down into material are looked over as well (DescentCheck). Moves are looked at
+/// in parts of a tenth of a millimetre, each with all that the tool sweeps in it.
 ///
 /// What is left of the blank is known as an upper bound (StockMap): a touch may be reported where
 /// the tool passes material closer than a cell of it, and none is missed.
@@ -47,16 +48,18 @@ class CollisionCheck {
   CollisionCheck(const ProfileCutter& surface, const Workshop& workshop, StockMap stock);
 
   /// What comes next is an operation of this name, with this tool, from an unknown place.
-  void begin(const std::string& operation, const Tool& tool);
+  void begin(const std::string& operation, const Tool& tool, const DescentRule& rule = {});
 
   /// Where the tool is when the next move begins.
   void place(const Eigen::Vector3d& at);
 
-  /// The operation's next moves; a MoveSink may hand them on.
-  void check(std::span<const PathMove> moves);
+  /// The operation's next moves; a MoveSink may hand them on. @param place  where they stand.
+  void check(std::span<const PathMove> moves, const ProgramPlace& place = {});
 
   /// All collisions so far, in the order in which they were first met.
   [[nodiscard]] const std::vector<Collision>& collisions() const { return collisions_; }
+  /// All ways down into material that are too steep for their feed, likewise.
+  [[nodiscard]] const std::vector<SteepDescent>& descents() const { return descents_.descents(); }
   [[nodiscard]] const StockMap& stock() const { return stock_; }
 
  private:
@@ -85,6 +88,8 @@ class CollisionCheck {
   std::int64_t move_ = 0;
   std::vector<Collision> collisions_;
   std::vector<std::int64_t> last_move_;  ///< One a collision: the last move that was counted.
+  ProgramPlace place_;                   ///< Of the moves that are checked.
+  DescentCheck descents_;
 };
 
 }  // namespace lensforge

@@ -10,6 +10,12 @@
 namespace lensforge {
 namespace {
 
+/// Ways from row to row go down at feed where they are no steeper than lenses' rims, rise over run,
+/// or end so little lower, mm. Where a larger ball is lifted off a row's end, the next row may
+/// begin far below it.
+constexpr double kRimSlope = 0.5;
+constexpr double kLow = 0.05;
+
 /// Height over the row's highest point on the way back, mm: above rounding and what a servo lags.
 constexpr double kHop = 0.05;
 
@@ -46,7 +52,7 @@ class FinishMoves {
     } else if (plan_.rest != nullptr) {
       hop_to(row.start);
     } else if (plan_.options.style == PassStyle::kZigzag) {
-      move(MoveKind::kCut, row.start);
+      step_to(row.start);
     } else {
       go_back_to(row.start);
     }
@@ -69,6 +75,14 @@ class FinishMoves {
   [[nodiscard]] double on_grid(double z) const {
     const double zero = plan_.options.z_zero;
     return zero + to_resolution(z - zero, plan_.options.resolution);
+  }
+
+  void step_to(const Eigen::Vector3d& start) {
+    const double down = at_.z() - start.z();
+    const double run = (start - at_).head<2>().norm();
+    if (down <= std::max(kLow, kRimSlope * run)) return move(MoveKind::kCut, start);
+    move(MoveKind::kCut, {start.x(), start.y(), at_.z()});
+    move(MoveKind::kPlunge, start);
   }
 
   void hop_to(const Eigen::Vector3d& start) {

@@ -145,21 +145,43 @@ class OutlineRun {
 
   /// One turn from height `from` to `to`, from the way's first point to it. @param sense  1 or −1.
   void turn(double from, double to, double sense) {
-    std::vector<double> stops = loop_.corners();
-    for (const double edge : tabs_.edges(sense)) stops.push_back(edge);
-    std::sort(stops.begin(), stops.end());
+    std::vector<double> stops = stops_of(sense);
     if (sense < 0.0) std::reverse(stops.begin(), stops.end());
     const double start = stops.front();
     for (std::size_t k = 1; k < stops.size(); ++k) {
       if (stops[k] == stops[k - 1]) continue;
       const double share = std::abs(stops[k] - start) / loop_.length();
-      const double z = std::max(from + share * (to - from), tabs_.floor(stops[k], sense));
-      const Eigen::Vector2d p = loop_.place(stops[k]);
-      moves_.feed(MoveKind::kCut, {p.x(), p.y(), z});
+      cut_to(stops[k], std::max(from + share * (to - from), tabs_.floor(stops[k], sense)));
     }
   }
 
+  /// To the way's first point at the bottom, where the tool may still be behind a tab: on along the
+  /// ramp to its end, and back.
+  void settle(double bottom) {
+    const std::vector<double> stops = stops_of(1.0);
+    std::size_t k = 0;
+    for (; k + 1 < stops.size() && tabs_.floor(stops[k], 1.0) > bottom + kLevel; ++k) {
+      cut_to(stops[k + 1], std::max(bottom, tabs_.floor(stops[k + 1], 1.0)));
+    }
+    while (k > 0) cut_to(stops[--k], bottom);
+  }
+
  private:
+  static constexpr double kLevel = 1e-6;  ///< Of heights that are the same but for rounding, mm.
+
+  /// All places where the height may change, on the first turn.
+  [[nodiscard]] std::vector<double> stops_of(double sense) const {
+    std::vector<double> stops = loop_.corners();
+    for (const double edge : tabs_.edges(sense)) stops.push_back(edge);
+    std::sort(stops.begin(), stops.end());
+    return stops;
+  }
+
+  void cut_to(double s, double z) {
+    const Eigen::Vector2d p = loop_.place(s);
+    moves_.feed(MoveKind::kCut, {p.x(), p.y(), z});
+  }
+
   const Loop& loop_;
   const Tabs& tabs_;
   RoughMoves& moves_;
@@ -233,6 +255,7 @@ OperationSummary cut_outline(const std::vector<Eigen::Vector2d>& outline, const 
     z = next;
   }
   run.turn(bottom, bottom, 1.0);
+  run.settle(bottom);
   run.turn(bottom, bottom, -1.0);
   moves.rapid({start.x(), start.y(), cut.safe_z});
   moves.flush();

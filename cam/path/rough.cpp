@@ -128,10 +128,10 @@ class RasterRun {
     std::int64_t cut = 0;
     for (std::int64_t pass = 0; pass < grid_.passes(); ++pass) {
       if (control.stop_requested()) throw Interrupted();
-      std::vector<TipPath> parts = grid_.parts(pass, height, previous);
+      std::vector<PassPart> parts = grid_.parts(pass, height, previous);
       if (parts.empty()) continue;
       if (backwards_) turn(parts);
-      for (const TipPath& part : parts) follow(part, height);
+      for (const PassPart& part : parts) follow(part, height);
       cut += static_cast<std::int64_t>(parts.size());
       if (raster_.style == PassStyle::kZigzag) backwards_ = !backwards_;
       control.report({"cam " + raster_.name, static_cast<double>(pass + 1),
@@ -143,18 +143,20 @@ class RasterRun {
   }
 
  private:
-  static void turn(std::vector<TipPath>& parts) {
+  static void turn(std::vector<PassPart>& parts) {
     std::reverse(parts.begin(), parts.end());
-    for (TipPath& part : parts) std::reverse(part.begin(), part.end());
+    for (PassPart& part : parts) std::reverse(part.path.begin(), part.path.end());
   }
 
-  void follow(const TipPath& part, double height) {
+  void follow(const PassPart& part, double height) {
+    const TipPath& path = part.path;
     const double near = 1.5 * grid_.stepover() + 2.0 * raster_.spacing;
     const bool beside = moves_.placed() && raster_.style == PassStyle::kZigzag &&
-                        (part.front() - moves_.at()).head<2>().norm() <= near;
-    if (!beside || !cutting_ || !links_.cross(part.front(), height)) links_.enter(part);
-    for (std::size_t i = 1; i < part.size(); ++i) moves_.feed(MoveKind::kCut, part[i]);
-    cutting_ = true;
+                        (path.front() - moves_.at()).head<2>().norm() <= near;
+    if (!beside || !cutting_ || !links_.cross(path.front(), height)) links_.enter(path);
+    for (std::size_t i = 1; i < path.size(); ++i) moves_.feed(MoveKind::kCut, path[i]);
+    // What a clamp has lifted must not come down at the cutting feed.
+    cutting_ = !part.lifted;
   }
 
   const Raster& raster_;
@@ -162,7 +164,7 @@ class RasterRun {
   RoughMoves& moves_;
   RoughLinks links_;
   bool backwards_;
-  bool cutting_ = false;  ///< The tool is where a pass ended.
+  bool cutting_ = false;  ///< The tool is where a pass ended that no clamp has lifted.
 };
 
 void warn_of_clamps(const RoughSite& site, const Raster& raster, OperationSummary& summary) {

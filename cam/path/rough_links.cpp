@@ -178,8 +178,10 @@ bool RoughLinks::cross(const Eigen::Vector3d& end, double level) {
   for (std::int64_t i = 0; i < steps; ++i) {
     const double part = (static_cast<double>(i) + 0.5) / static_cast<double>(steps);
     const Eigen::Vector2d p = (begin + part * (end - begin)).head<2>();
-    floors.push_back(site_.floor.over(p, 0.5 * length / static_cast<double>(steps), trace));
+    const double reach = 0.5 * length / static_cast<double>(steps);
+    floors.push_back(site_.floor.over_surface(p, reach, trace));
     if (floors.back() >= site_.stock.blank().max().z()) return false;
+    if (site_.floor.over_clamps(p, reach) > std::max(level, floors.back())) return false;
   }
   if (std::max(level, floors.back()) > end.z() + kThinMaterial) return false;
   for (std::int64_t i = 0; i <= steps; ++i) {

@@ -40,8 +40,8 @@ class RoughLinks {
   void enter(const TipPath& path);
 
   /// Straight to `end` at feed, no lower than `level` and the floor, which may cut.
-  /// @return false, and does nothing, if the floor on the way is above the blank, or if the end is
-  ///         so far below the way that the tool would have to plunge to it.
+  /// @return false, and does nothing, if the floor on the way is above the blank, if a clamp lifts
+  ///         it, or if the end is so far below the way that the tool would have to plunge to it.
   bool cross(const Eigen::Vector3d& end, double level);
 
   /// Up to the safe height.

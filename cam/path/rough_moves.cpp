@@ -20,7 +20,7 @@ void RoughMoves::rapid(const Eigen::Vector3d& end) {
 void RoughMoves::feed(MoveKind kind, const Eigen::Vector3d& end) {
   PathMove move{kind, end};
   move.feed = kind == MoveKind::kPlunge ? tool_.plunge : tool_.feed;
-  const Extreme depth = stock_.cut(profile_, at_, end);
+  const Extreme depth = stock_.cut(profile_, at_, end).deepest;
   if (depth.value > deepest_.value) deepest_ = depth;
   summary_.cutting_length += (end - at_).norm();
   summary_.tip.extend(at_);

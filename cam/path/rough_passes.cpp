@@ -32,6 +32,7 @@ PassGrid::PassGrid(const TipFloor& floor, const PassLayout& layout, const Execut
   stepover_ = size[1 - along] / static_cast<double>(passes_ - 1);
   spacing_ = size[along] / static_cast<double>(count_ - 1);
   nodes_.resize(static_cast<std::size_t>(passes_ * count_));
+  if (floor.has_clamps()) ground_.resize(nodes_.size());
   excess_.resize(static_cast<std::size_t>(passes_));
   const auto fill_pass = [&](std::int64_t pass) {
     if (!control.stop_requested()) fill(pass, floor);
@@ -48,15 +49,26 @@ Eigen::Vector2d PassGrid::place(std::int64_t pass, double node) const {
 }
 
 void PassGrid::fill(std::int64_t pass, const TipFloor& floor) {
-  double* const nodes = &nodes_[static_cast<std::size_t>(pass * count_)];
+  const auto first = static_cast<std::size_t>(pass * count_);
+  double* const nodes = &nodes_[first];
   Extreme& excess = excess_[static_cast<std::size_t>(pass)];
   TipFloor::Trace trace;
   double before = kNoContact;
+  double ground_before = kNoContact;
   for (std::int64_t i = 0; i < count_; ++i) {
     const auto at = static_cast<double>(i);
-    const double after =
-        i + 1 < count_ ? floor.over(place(pass, at + 0.5), 0.5 * spacing_, trace) : kNoContact;
+    double ground = kNoContact;
+    double after = kNoContact;
+    if (i + 1 < count_) {
+      const Eigen::Vector2d middle = place(pass, at + 0.5);
+      ground = floor.over_surface(middle, 0.5 * spacing_, trace);
+      after = std::max(ground, floor.over_clamps(middle, 0.5 * spacing_));
+    }
     nodes[i] = std::max(before, after);
+    if (!ground_.empty()) {
+      ground_[first + static_cast<std::size_t>(i)] = std::max(ground_before, ground);
+      ground_before = ground;
+    }
     const Eigen::Vector2d p = place(pass, at);
     // The floor itself is asked for where that can be the most only.
     if (nodes[i] - floor.at_least(p, trace) > excess.value) {
@@ -74,22 +86,56 @@ Extreme PassGrid::excess() const {
   return *std::max_element(excess_.begin(), excess_.end(), less);
 }
 
-std::vector<TipPath> PassGrid::parts(std::int64_t pass, double level, double previous) const {
+std::vector<PassPart> PassGrid::parts(std::int64_t pass, double level, double previous) const {
   const auto cuts = [&](std::int64_t i) {
     return node(pass, i) < previous - kNothing &&
            layout_.material.contains(place(pass, static_cast<double>(i)));
   };
-  std::vector<TipPath> all;
+  std::vector<PassPart> all;
   for (std::int64_t i = 0; i < count_; ++i) {
     if (!cuts(i)) continue;
     std::int64_t end = i;
     while (end + 1 < count_ && cuts(end + 1)) ++end;
     const std::int64_t first = std::max<std::int64_t>(0, i - 1);
     const std::int64_t last = std::min(count_ - 1, end + 1);
-    if (last > first) all.push_back(chords(pass, first, last, level));
+    divide(pass, first, last, level, previous, all);
     i = end;
   }
   return all;
+}
+
+/// Whether a clamp keeps the tip above where level and surface let it go.
+bool PassGrid::lifted(std::int64_t pass, std::int64_t i, double level) const {
+  if (ground_.empty()) return false;
+  const double ground = ground_[static_cast<std::size_t>(pass * count_ + i)];
+  return node(pass, i) > std::max(level, ground) + kNothing;
+}
+
+void PassGrid::divide(std::int64_t pass, std::int64_t begin, std::int64_t end, double level,
+                      double previous, std::vector<PassPart>& parts) const {
+  for (std::int64_t i = begin; i <= end;) {
+    const bool high = lifted(pass, i, level);
+    std::int64_t last = i;
+    while (last < end && lifted(pass, last + 1, level) == high) ++last;
+    if (last > i) {
+      PassPart part{high ? level_part(pass, i, last, level) : chords(pass, i, last, level), high};
+      if (!high || part.path.front().z() < previous - kNothing) parts.push_back(std::move(part));
+    }
+    i = last + 1;
+  }
+}
+
+/// At the height of the highest node.
+TipPath PassGrid::level_part(std::int64_t pass, std::int64_t begin, std::int64_t end,
+                             double level) const {
+  double z = level;
+  for (std::int64_t i = begin; i <= end; ++i) z = std::max(z, node(pass, i));
+  TipPath path;
+  for (const std::int64_t i : {begin, end}) {
+    const Eigen::Vector2d p = place(pass, static_cast<double>(i));
+    path.emplace_back(p.x(), p.y(), z);
+  }
+  return path;
 }
 
 /// Greedy: every chord leaves on the nodes' height or above, with the least slope that clears all

@@ -26,6 +26,12 @@ struct PassLayout {
 /// Tips of the tool in the order of travel, mm, lens frame; two at least.
 using TipPath = std::vector<Eigen::Vector3d>;
 
+/// A part of a pass. Where a clamp lifts the tip off the surface, the part runs level.
+struct PassPart {
+  TipPath path;
+  bool lifted = false;  ///< By a clamp.
+};
+
 /// The lowest that the tip may run along parallel passes. Heights belong to nodes, evenly spaced;
 /// a straight move between neighbouring nodes that is nowhere below them stays above the floor over
 /// its whole length, because each node is as high as the floor over the intervals beside it
@@ -48,8 +54,9 @@ class PassGrid {
   /// The parts of a pass that have something to cut between the heights `previous` and `level`:
   /// where its nodes are over the material and below `previous`, with one node beyond at either
   /// end. The tip follows the nodes but never goes below `level`; chords are nowhere below the
-  /// nodes and at most a tenth of the spacing above them.
-  [[nodiscard]] std::vector<TipPath> parts(std::int64_t pass, double level, double previous) const;
+  /// nodes and at most a tenth of the spacing above them. A pass is divided beside every clamp, and
+  /// no part goes up or down along one: how the tool gets from part to part is for links.
+  [[nodiscard]] std::vector<PassPart> parts(std::int64_t pass, double level, double previous) const;
 
  private:
   [[nodiscard]] Eigen::Vector2d place(std::int64_t pass, double node) const;
@@ -57,6 +64,11 @@ class PassGrid {
     return nodes_[static_cast<std::size_t>(pass * count_ + i)];
   }
   void fill(std::int64_t pass, const TipFloor& floor);
+  [[nodiscard]] bool lifted(std::int64_t pass, std::int64_t i, double level) const;
+  void divide(std::int64_t pass, std::int64_t begin, std::int64_t end, double level,
+              double previous, std::vector<PassPart>& parts) const;
+  [[nodiscard]] TipPath level_part(std::int64_t pass, std::int64_t begin, std::int64_t end,
+                                   double level) const;
   [[nodiscard]] TipPath chords(std::int64_t pass, std::int64_t begin, std::int64_t end,
                                double level) const;
 
@@ -66,6 +78,7 @@ class PassGrid {
   double stepover_;
   double spacing_;
   std::vector<double> nodes_;
+  std::vector<double> ground_;   ///< Nodes as they were without clamps; empty where there are none.
   std::vector<Extreme> excess_;  ///< One a pass.
 };
 

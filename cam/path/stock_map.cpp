@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <string>
 
 #include "core/error.h"
@@ -58,25 +59,27 @@ bool StockMap::under(const CutterProfile& profile, const Eigen::Vector2d& p) con
   return distance(p, {0, columns_ - 1, 0, rows_ - 1}) <= profile.radius;
 }
 
-Extreme StockMap::cut(const CutterProfile& profile, const Eigen::Vector3d& from,
-                      const Eigen::Vector3d& to) {
-  Extreme deepest;
+StockCut StockMap::cut(const CutterProfile& profile, const Eigen::Vector3d& from,
+                       const Eigen::Vector3d& to) {
+  StockCut cut;
   const auto steps = std::max<std::int64_t>(
       1, static_cast<std::int64_t>(std::ceil((to - from).head<2>().norm() / cell_)));
   // Where the same cutter was last, everything is cut already.
   const bool goes_on = last_tip_ == from && last_profile_ == profile;
   for (std::int64_t i = goes_on ? 1 : 0; i <= steps; ++i) {
     const double part = static_cast<double>(i) / static_cast<double>(steps);
-    stamp(profile, from + part * (to - from), deepest);
+    stamp(profile, from + part * (to - from), cut);
   }
   last_tip_ = to;
   last_profile_ = profile;
-  return deepest;
+  // A disc that is sure to hold a whole cell.
+  if (profile.radius < std::numbers::sqrt2 * cell_) cut.taken = cut.deepest.value;
+  return cut;
 }
 
 /// Lowers the cells that lie wholly under the cutter to its silhouette at their farthest corner. A
 /// ball's rises by more than d²/(2R): material below that is passed over without a root.
-void StockMap::stamp(const CutterProfile& profile, const Eigen::Vector3d& tip, Extreme& deepest) {
+void StockMap::stamp(const CutterProfile& profile, const Eigen::Vector3d& tip, StockCut& cut) {
   const Window cells = cells_in(tip.head<2>(), profile.radius);
   const double half = 0.5 * cell_;
   const double rise = profile.flat() == 0.0 ? 0.5 / profile.corner : 0.0;
@@ -89,10 +92,11 @@ void StockMap::stamp(const CutterProfile& profile, const Eigen::Vector3d& tip, E
       if (height <= lowest + rise * (dx * dx + dy * dy)) continue;
       const double centre = std::sqrt(dx * dx + dy * dy);
       const double depth = height - tip.z() - profile.height(centre);
-      if (depth > deepest.value) deepest = {depth, tip};
+      if (depth > cut.deepest.value) cut.deepest = {depth, tip};
       const double far = std::sqrt((dx + half) * (dx + half) + (dy + half) * (dy + half));
       const double lowered = tip.z() + profile.height(far);
       if (!(lowered < height)) continue;
+      cut.taken = std::max(cut.taken, height - lowered);
       height = lowered;
       blocks_[static_cast<std::size_t>(row / kBlock) * static_cast<std::size_t>(block_columns_) +
               static_cast<std::size_t>(column / kBlock)]

@@ -14,6 +14,16 @@
 
 namespace lensforge {
 
+/// What a cut took from a StockMap.
+struct StockCut {
+  /// How far the material stood above the cutter's silhouette at most, mm, and the tip there: the
+  /// depth of cut, as seen at the centres of cells; 0 in air.
+  Extreme deepest;
+  /// By how much a cell was lowered at most, mm: 0 where the cutter was before. The depth of a
+  /// cutter so narrow that it may pass without lowering any.
+  double taken = 0.0;
+};
+
 /// What is left of the blank while it is cut: for each cell of a grid a height that no material in
 /// it exceeds. Always an upper bound: a cell is lowered only to where the cutter has swept all of
 /// it. Above the true material by at most what the cutter's silhouette and path rise over a cell.
@@ -24,9 +34,8 @@ class StockMap {
   StockMap(const Eigen::AlignedBox3d& blank, double cell);
 
   /// Takes away what the cutter sweeps on a straight way of its tip. mm.
-  /// @return how far the material stood above the cutter's silhouette at most, and the tip there:
-  ///         the depth of cut, as seen at the centres of cells; 0 in air.
-  Extreme cut(const CutterProfile& profile, const Eigen::Vector3d& from, const Eigen::Vector3d& to);
+  StockCut cut(const CutterProfile& profile, const Eigen::Vector3d& from,
+               const Eigen::Vector3d& to);
 
   /// Lowest height of the tip over p at which the profile certainly touches no material, mm;
   /// kNoContact if there is none under it. @param above  lower heights are of no interest: it is
@@ -64,7 +73,7 @@ class StockMap {
   }
   [[nodiscard]] Window cells_in(const Eigen::Vector2d& p, double radius) const;
   [[nodiscard]] double distance(const Eigen::Vector2d& p, const Window& cells) const;
-  void stamp(const CutterProfile& profile, const Eigen::Vector3d& tip, Extreme& deepest);
+  void stamp(const CutterProfile& profile, const Eigen::Vector3d& tip, StockCut& cut);
   [[nodiscard]] Window cells_of(int block_column, int block_row) const;
   double block_height(int block_column, int block_row);
 

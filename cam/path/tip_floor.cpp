@@ -10,13 +10,22 @@
 namespace lensforge {
 
 TipFloor::TipFloor(const ProfileCutter& surface, const Tool& tool, double allowance,
-                   const std::vector<KeepOut>& keep_outs, double clearance)
-    : surface_(surface), keep_outs_(keep_outs), clearance_(clearance) {
+                   std::span<const KeepOut> keep_outs, double clearance)
+    : surface_(surface),
+      rim_(surface.bounds().min().head<2>(), surface.bounds().max().head<2>()),
+      keep_outs_(keep_outs),
+      clearance_(clearance),
+      hold_(hold_of(tool, allowance)) {
   for (const CutterProfile& part : whole_profile(tool)) {
     parts_.push_back(grown(part, allowance));
     whole_.push_back(widened(part, clearance));
   }
-  hold_ = hold_of(tool, allowance);
+}
+
+TipFloor::TipFloor(const ProfileCutter& surface, const Tool& tool, double allowance,
+                   const Eigen::AlignedBox2d& rim)
+    : TipFloor(surface, tool, allowance, {}, 0.0) {
+  rim_ = rim;
 }
 
 double TipFloor::hold_of(const Tool& tool, double allowance) {
@@ -26,8 +35,7 @@ double TipFloor::hold_of(const Tool& tool, double allowance) {
 
 /// Where the tip has the height that it keeps over p.
 Eigen::Vector2d TipFloor::held(const Eigen::Vector2d& p) const {
-  const Eigen::Vector2d rim =
-      p.cwiseMax(surface_.bounds().min().head<2>()).cwiseMin(surface_.bounds().max().head<2>());
+  const Eigen::Vector2d rim = p.cwiseMax(rim_.min()).cwiseMin(rim_.max());
   const double beyond = (p - rim).norm();
   return beyond > hold_ ? rim + (p - rim) * (hold_ / beyond) : p;
 }
@@ -42,6 +50,10 @@ double TipFloor::at_least(const Eigen::Vector2d& p, const Trace& trace) const {
 }
 
 double TipFloor::over(const Eigen::Vector2d& p, double reach, Trace& trace) const {
+  return std::max(over_surface(p, reach, trace), over_clamps(p, reach));
+}
+
+double TipFloor::over_surface(const Eigen::Vector2d& p, double reach, Trace& trace) const {
   trace.resize(parts_.size());
   const Eigen::Vector2d held = this->held(p);
   double floor = kNoContact;
@@ -51,6 +63,11 @@ double TipFloor::over(const Eigen::Vector2d& p, double reach, Trace& trace) cons
     trace[part] = surface_.drop(widened(parts_[part], reach), held, trace[part]);
     floor = std::max(floor, trace[part].tip);
   }
+  return floor;
+}
+
+double TipFloor::over_clamps(const Eigen::Vector2d& p, double reach) const {
+  double floor = kNoContact;
   for (const KeepOut& box : keep_outs_) {
     for (const CutterProfile& part : whole_) {
       const double tip =

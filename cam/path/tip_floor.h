@@ -2,6 +2,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <span>
 #include <vector>
 
 #include "cam/contact/profile_cutter.h"
@@ -22,11 +24,18 @@ class TipFloor {
 
   /// @param surface  must outlive this. @param keep_outs  likewise.
   TipFloor(const ProfileCutter& surface, const Tool& tool, double allowance,
-           const std::vector<KeepOut>& keep_outs, double clearance);
+           std::span<const KeepOut> keep_outs, double clearance);
+  /// Without clamps. @param rim  of the part at hand, where the surface holds several.
+  TipFloor(const ProfileCutter& surface, const Tool& tool, double allowance,
+           const Eigen::AlignedBox2d& rim);
 
   /// Largest of the lowest heights of the tip over all places that are no farther than `reach` from
   /// p: a move of a length of 2·reach around p that stays above it cuts into nothing. mm.
   [[nodiscard]] double over(const Eigen::Vector2d& p, double reach, Trace& trace) const;
+  /// The same where there are no clamps, and where there is nothing but clamps.
+  [[nodiscard]] double over_surface(const Eigen::Vector2d& p, double reach, Trace& trace) const;
+  [[nodiscard]] double over_clamps(const Eigen::Vector2d& p, double reach) const;
+  [[nodiscard]] bool has_clamps() const { return !keep_outs_.empty(); }
 
   /// A height that over(p, 0, …) is nowhere below, found sooner: on what kept the tip up near p.
   [[nodiscard]] double at_least(const Eigen::Vector2d& p, const Trace& trace) const;
@@ -39,7 +48,8 @@ class TipFloor {
   [[nodiscard]] Eigen::Vector2d held(const Eigen::Vector2d& p) const;
 
   const ProfileCutter& surface_;
-  const std::vector<KeepOut>& keep_outs_;
+  Eigen::AlignedBox2d rim_;
+  std::span<const KeepOut> keep_outs_;
   double clearance_;
   std::vector<CutterProfile> parts_;  ///< Of the tool with its skin.
   std::vector<CutterProfile> whole_;  ///< Of the tool with its distance to clamps.

@@ -208,6 +208,7 @@ void gather(std::vector<ReadPart>& parts, const std::vector<fs::path>& names,
     file.path = names[i];
     pending.push_back(std::move(parts[i].part->file()));
     file.beside = pending.back().beside();
+    programs.names.push_back(file.path.filename().string());
     programs.files.push_back(std::move(file));
   }
 }

@@ -43,6 +43,7 @@ struct ProgramFiles {
   std::vector<ProgramFile> files;           ///< In the order in which they are to be run.
   std::vector<OperationSummary> summaries;  ///< Of the plan's operations.
   std::vector<ProgramTime> times;           ///< Likewise, over all files.
+  std::vector<std::string> names;           ///< Of all files that were read back, in that order.
   ProgramTime total;
 };
 

@@ -7,10 +7,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <fstream>
 #include <optional>
 #include <random>
-#include <sstream>
 #include <string>
 #include <vector>
 
@@ -18,6 +16,7 @@
 #include "cam/cam_meshes.h"
 #include "cam/dexel_stock.h"
 #include "cam/path/collision.h"
+#include "cam/program_ways.h"
 #include "core/error.h"
 #include "core/temp_folder.h"
 
@@ -29,6 +28,8 @@ using lensforge::testing::message_of;
 using lensforge::testing::read_bytes;
 using lensforge::testing::small_lens;
 using lensforge::testing::TempFolder;
+using lensforge::testing::Way;
+using lensforge::testing::ways_of;
 using lensforge::testing::write_bytes;
 using ::testing::AllOf;
 using ::testing::Contains;
@@ -39,42 +40,6 @@ constexpr double kRounding = 1e-4;
 
 /// What a rapid may seem to touch: the lattice's and the stock map's cells, on slopes up to 1.
 constexpr double kLattice = 0.15;
-
-/// A straight way of a program; unknown coordinates are no numbers.
-struct Way {
-  bool rapid = false;
-  int tool = 0;
-  Eigen::Vector3d from;
-  Eigen::Vector3d to;
-};
-
-/// Absolute millimetres and straight motions, one word after the other.
-std::vector<Way> ways_of(const std::filesystem::path& program) {
-  std::vector<Way> ways;
-  std::ifstream file(program);
-  Eigen::Vector3d at = Eigen::Vector3d::Constant(std::nan(""));
-  bool rapid = true;
-  int tool = 0;
-  for (std::string line; std::getline(file, line);) {
-    if (line.empty() || line.front() == '(') continue;
-    std::istringstream words(line);
-    Eigen::Vector3d to = at;
-    bool moves = false;
-    for (std::string word; words >> word;) {
-      const double value = std::stod(word.substr(1));
-      if (word == "G0") rapid = true;
-      if (word == "G1") rapid = false;
-      if (word.front() == 'T') tool = static_cast<int>(value);
-      const std::size_t axis = std::string("XYZ").find(word.front());
-      if (axis == std::string::npos) continue;
-      to[static_cast<Eigen::Index>(axis)] = value;
-      moves = true;
-    }
-    if (moves) ways.push_back({rapid, tool, at, to});
-    at = to;
-  }
-  return ways;
-}
 
 /// What the programs of a cut do.
 struct Deeds {

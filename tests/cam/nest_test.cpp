@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <random>
@@ -17,6 +18,7 @@
 #include "core/io/lens_folder.h"
 #include "core/optics/front_placement.h"
 #include "core/temp_folder.h"
+#include "core/text/number_text.h"
 #include "machine/gcode/program_seal.h"
 
 namespace lensforge {
@@ -89,6 +91,8 @@ class NestJob : public ::testing::Test {
   std::string refusal() {
     return message_of<InputError>([&] { plan_nest(lenses_, options_); });
   }
+
+  [[nodiscard]] double needed_thickness() const { return least_thickness(lenses_, options_); }
 
   Lens bee_ = small_lens(4.0, 3.0);
   Lens disc_ = small_lens(6.0, 5.0);
@@ -270,6 +274,39 @@ TEST_F(NestJob, WhatDoesNotFitOneBlankIsRefusedInOneLine) {
   EXPECT_THAT(refusal(), HasSubstr("disc: is a mirror, bee is a lens"));
   lenses_.clear();
   EXPECT_THAT(refusal(), HasSubstr("no lens folder is named"));
+}
+
+/// Nothing above its flutes may be in the blank, so what is named is as long as the blank is thick.
+TEST_F(NestJob, AnOutlineToolThatIsTooShortIsNamedWithOneThatWouldDo) {
+  Workshop& shop = options_.cam.workshop;
+  const auto advice = [&] {
+    const std::vector<std::string> all = run().warnings;
+    const auto found = std::find_if(all.begin(), all.end(), [](const std::string& one) {
+      return one.starts_with("--outline-tool");
+    });
+    return found == all.end() ? "" : *found;
+  };
+  const auto add_mill = [&](int number, double flutes) {
+    Tool mill = shop.tool(3);
+    mill.number = number;
+    mill.flute_length = flutes;
+    mill.sections = {{6.0, flutes, 40.0}};
+    shop.tools.push_back(mill);
+    options_.cam.outline_tool = number;
+  };
+  EXPECT_EQ(advice(), "");
+  add_mill(7, 4.0);
+  EXPECT_EQ(advice(), "--outline-tool 7: goes 4 mm deep at most, too short for a blank of " +
+                          trimmed_decimal(needed_thickness(), 3) +
+                          " mm; --outline-tool 3 would do");
+  shop.tools.front().flute_length = 3.0;
+  EXPECT_THAT(advice(), HasSubstr("a flat end mill with flutes of"));
+  options_.thickness = 14.0;
+  add_mill(8, 8.5);
+  EXPECT_THAT(advice(), AllOf(HasSubstr("too short for a blank of 14 mm; --blank 60,30,"),
+                              HasSubstr(" would do")));
+  options_.thickness.reset();
+  EXPECT_EQ(advice(), "");
 }
 
 TEST_F(NestJob, ALensFolderIsNotWrittenInto) {

@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Options, workshops and posts of cam, and what stands in its folder.
+#include <sstream>
+#include <utility>
+
 #include "fuzz/scene.h"
 
 namespace lensforge::fuzz {
@@ -77,6 +80,39 @@ void cam_again(Scene& scene) {
   scene.run(line);
 }
 
+/// A box somewhere over the lens of 4 mm and its margin.
+std::string some_clamp(Random& random, int number) {
+  const auto range = [&](double from, double to, double widest) {
+    const double low = from + (to - from) * random.unit();
+    return std::pair(low, low + 0.01 + widest * random.unit());
+  };
+  const auto [x, to_x] = range(-9.0, 10.0, 8.0);
+  const auto [y, to_y] = range(-9.0, 10.0, random.one_in(3) ? 20.0 : 3.0);
+  const auto [z, to_z] = range(-1.0, 1.0, random.one_in(3) ? 20.0 : 5.0);
+  std::ostringstream text;
+  text << "[[keep_out]]\nname = \"clamp " << number << "\"\nlow_x = " << x << "\nlow_y = " << y
+       << "\nlow_z = " << z << "\nhigh_x = " << to_x << "\nhigh_y = " << to_y
+       << "\nhigh_z = " << to_z << "\n";
+  return text.str();
+}
+
+/// Clamps anywhere, a part of the lens under them or not: roughing goes around them, and comes down
+/// behind them as its tool may plunge.
+void cam_beside_clamps(Scene& scene) {
+  scene.copy("lens/", "lens/");
+  scene.copy_ours("lens/cam/", "lens/cam/");
+  std::string shop;
+  for (std::size_t k = scene.random.below(3) + 1; k > 0; --k) {
+    shop += some_clamp(scene.random, static_cast<int>(k));
+  }
+  scene.write("shop.toml", shop);
+  CommandLine line = scene.cam("lens").set("--workshop", "shop.toml");
+  line.set("--margin", std::to_string(scene.random.below(9)) + "mm");
+  scene.plan.must_work = true;
+  scene.plan.must_not_say = {"goes down into material", "in 'rough' tool"};
+  scene.run(line);
+}
+
 void compare(Scene& scene) {
   scene.copy("lens/", "lens/");
   scene.copy_ours("lens/cam/", "lens/cam/");
@@ -105,6 +141,7 @@ std::vector<Kind> cam_kinds() {
           {"post", 7, post},
           {"cam over others' files", 3, cam_over_others},
           {"cam again", 3, cam_again},
+          {"cam beside clamps", 3, cam_beside_clamps},
           {"cam --compare", 1, compare},
           {"good cam", 1, good_cam}};
 }

@@ -217,6 +217,9 @@ std::vector<std::string> wrong_endings(const Plan& plan, const Command& command,
   }
   check_text("standard error", ending.err, wrong);
   check_text("standard output", ending.out, wrong);
+  for (const std::string& finding : plan.must_not_say) {
+    if (ending.err.find(finding) != std::string::npos) wrong.push_back("says \"" + finding + "\"");
+  }
   for (const std::string& line : lines_of(ending.err)) {
     if (line.size() > kLongestLine) {
       wrong.push_back("a line of " + std::to_string(line.size()) + " bytes: " + shown(line));

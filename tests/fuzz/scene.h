@@ -27,6 +27,7 @@ struct Plan {
   bool may_fail = false;     ///< The world around the command is broken: exit code 1 is right.
   bool must_refuse = false;  ///< Nothing but exit code 2 is right.
   bool must_work = false;    ///< Nothing but exit codes 0 and 3 is right.
+  std::vector<std::string> must_not_say;  ///< Findings that would be the command's own fault.
   std::vector<std::string> outputs;  ///< Where files may appear, and those of `ours` be replaced.
   std::vector<std::string> logs;     ///< Records that are kept even of a refusal.
   std::set<std::string> ours;        ///< Files that lensforge wrote, as it wrote them.

@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <cmath>
 #include <csignal>
+#include <sstream>
 
 #include "core/io/folder_lock.h"
 #include "core/stop_bound.h"
@@ -73,6 +76,61 @@ TEST_F(Cam, ProgramsOfAnEarlierJobGoWithTheNewOne) {
   const Outcome outcome = run(cam({"--z-zero", "table"}));
   EXPECT_THAT(listing(at("lens/cam")), Not(Contains("cross.ngc")));
   EXPECT_THAT(outcome.err, HasSubstr("of another job, which were kept: old.ngc"));
+}
+
+/// Ways down of a program that are steeper than 1 : 1 at a feed above `plunge`.
+int fast_dives(const std::string& program, double plunge) {
+  std::istringstream lines(program);
+  double x = 0.0;
+  double y = 0.0;
+  double z = 0.0;
+  double feed = 0.0;
+  bool rapid = true;
+  int dives = 0;
+  for (std::string line; std::getline(lines, line);) {
+    if (line.empty() || line.front() == '(') continue;
+    double to_x = x;
+    double to_y = y;
+    double to_z = z;
+    std::istringstream words(line);
+    for (std::string word; words >> word;) {
+      const double value = std::stod(word.substr(1));
+      if (word.front() == 'G' && value < 2.0) rapid = value == 0.0;
+      if (word.front() == 'X') to_x = value;
+      if (word.front() == 'Y') to_y = value;
+      if (word.front() == 'Z') to_z = value;
+      if (word.front() == 'F') feed = value;
+    }
+    const double run = std::hypot(to_x - x, to_y - y);
+    if (!rapid && feed > plunge && z - to_z > run + 0.05) ++dives;
+    x = to_x;
+    y = to_y;
+    z = to_z;
+  }
+  return dives;
+}
+
+/// A clamp over a corner of the blank, and a bar that is lower than the blank right across its rim.
+TEST_F(Cam, BesideClampsToolsComeDownAtTheirPlungeFeed) {
+  write(at("shop.toml"),
+        "[[keep_out]]\nname = \"corner\"\nlow_x = -6.0\nlow_y = -6.0\nlow_z = 0.0\n"
+        "high_x = 0.5\nhigh_y = 0.5\nhigh_z = 9.0\n"
+        "[[keep_out]]\nname = \"bar\"\nlow_x = 5.0\nlow_y = -9.0\nlow_z = 0.0\n"
+        "high_x = 7.0\nhigh_y = -1.0\nhigh_z = 4.8\n");
+  Arguments design = small_design(picture("stripes.png"), path("small"));
+  design.insert(design.end(), {"--width", "12mm"});
+  ASSERT_EQ(run(design).exit_code, 0);
+  const Outcome outcome =
+      run({"cam", path("small"), "--workshop", path("shop.toml"), "--margin", "6", "--no-render",
+           "--slope-tolerance", "1e-3", "--pitch", "0.2", "--json"});
+  ASSERT_TRUE(outcome.exit_code == 0 || outcome.exit_code == 3) << outcome.err;
+  EXPECT_EQ(fast_dives(content(at("small/cam/rough.ngc")), 400.0), 0);
+  EXPECT_EQ(fast_dives(content(at("small/cam/semi.ngc")), 300.0), 0);
+  EXPECT_THAT(outcome.err, Not(HasSubstr("goes down into material")));
+  const nlohmann::json checks = outcome.json()["report"]["verdict"]["checks"];
+  EXPECT_TRUE(std::any_of(checks.begin(), checks.end(), [](const nlohmann::json& check) {
+    return check["name"] == "descents" && check["pass"] == true;
+  })) << checks;
 }
 
 TEST_F(Cam, ATravelTooShortAndAnotherIndexAreMissedLimits) {

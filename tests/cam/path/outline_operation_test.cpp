@@ -167,17 +167,25 @@ TEST(OutlineOperation, GoesNoDeeperThanItsBottom) {
   EXPECT_NEAR(cut.summary.tip.min().z(), 4e-7, 1e-15);
 }
 
+/// Wherever tabs stand, at the way's first point too, where the tool turns round.
 TEST(OutlineOperation, GetsDownNoSteeperThanItsRamp) {
+  const double steepest = std::tan(3.0 * std::numbers::pi / 180.0);
   for (const Points& part : shapes()) {
-    const Cut cut = cut_out(part, usual_cut());
-    const double steepest = std::tan(3.0 * std::numbers::pi / 180.0);
-    Eigen::Vector3d at = cut.moves.front().end;
-    for (const PathMove& move : cut.moves) {
-      const Eigen::Vector3d way = move.end - at;
-      if (move.kind == MoveKind::kCut && way.z() < -1e-6) {
-        EXPECT_LE(-way.z(), way.head<2>().norm() * steepest * (1.0 + 1e-6) + 1e-6);
+    for (const int tabs : {1, 2, 3, 4}) {
+      for (const double width : {1.0, 3.0, 8.0}) {
+        OutlineCut options = usual_cut();
+        options.tabs = {tabs, width, 0.6};
+        const Cut cut = cut_out(part, options);
+        Eigen::Vector3d at = cut.moves.front().end;
+        for (const PathMove& move : cut.moves) {
+          const Eigen::Vector3d way = move.end - at;
+          if (move.kind == MoveKind::kCut && way.z() < -1e-6) {
+            EXPECT_LE(-way.z(), way.head<2>().norm() * steepest * (1.0 + 1e-6) + 1e-6)
+                << tabs << " tabs of " << width;
+          }
+          at = move.end;
+        }
       }
-      at = move.end;
     }
   }
 }
