@@ -99,7 +99,6 @@ std::string summary_text(const fs::path& folder, const DesignResult& result) {
 /// done. @return the exit code.
 int finish(const OptionSet& options, const ChosenDevice& device, const DesignOptions& design,
            const OutputFolder& folder, DesignResult& result) {
-  if (result.status == DesignResult::Status::kFailed) throw RunError(result.message);
   const Console console(options.common().json, options.common().quiet);
   const bool done = result.status == DesignResult::Status::kDone;
   result.lens.provenance = design_provenance(options, device, design, result);

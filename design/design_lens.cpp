@@ -79,20 +79,7 @@ std::optional<DesignResult::Colors> colors_of(const Lens& lens, const Executor& 
                               fringe_of(lens)};
 }
 
-/// Status and message.
-DesignResult result_of(const Ending& ending, const DesignLog& log) {
-  DesignResult result;
-  using Status = DesignResult::Status;
-  result.status = ending.stopped ? Status::kInterrupted : Status::kDone;
-  result.message = ending.stopped ? "interrupted" : "all levels done" + log.remark();
-  if (!ending.failure.empty()) {
-    result.status = Status::kFailed;
-    result.message = ending.failure;
-  }
-  return result;
-}
-
-Ending run_all(const DesignTask& task, DesignLog& log, Checkpoint& state) try {
+bool run_all(const DesignTask& task, DesignLog& log, Checkpoint& state) try {
   return run_levels(task, log, state);
 } catch (const InputError&) {
   // Resumed, it could only fail again, and it would be in the way of better options.
@@ -110,10 +97,11 @@ DesignResult design_lens(const Image& target, const DesignOptions& options,
   const DesignTask task = make_task(target, settled, executor, control);
   Checkpoint state = first_state(task);
   DesignLog log(task, state);
-  const Ending ending = run_all(task, log, state);
-  DesignResult result = result_of(ending, log);
+  const bool done = run_all(task, log, state);
+  DesignResult result;
+  result.status = done ? DesignResult::Status::kDone : DesignResult::Status::kInterrupted;
+  result.message = done ? "all levels done" + log.remark() : "interrupted";
   result.lens = make_lens(task, std::move(state.mesh), executor);
-  const bool done = result.status == DesignResult::Status::kDone;
   if (task.limit && done) result.source = check_source(result.lens, executor);
   result.colors = colors_of(result.lens, executor);
   result.made = made_part(settled, result.lens, executor);

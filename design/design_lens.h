@@ -20,8 +20,8 @@
 namespace lensforge {
 
 struct DesignResult {
-  enum class Status { kDone, kInterrupted, kFailed };
-  Status status = Status::kFailed;
+  enum class Status { kDone, kInterrupted };
+  Status status = Status::kInterrupted;
   std::string message;            ///< Why it ended, in one line.
   std::uint64_t fingerprint = 0;  ///< design_identity() of picture and options.
   /// What the part will project that DesignOptions::made_by makes of the lens.

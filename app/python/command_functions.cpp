@@ -78,7 +78,6 @@ py::object design(const py::object& picture, const app::Arguments& words) {
     require_room_for_design(target.columns(), target.rows(), settings.design,
                             device.executor.concurrency(), settings.out);
     DesignResult result = design_lens(target, settings.design, device.executor, control);
-    if (result.status == DesignResult::Status::kFailed) throw RunError(result.message);
     result.lens.provenance = app::design_provenance(options, device, settings.design, result);
     return result;
   });

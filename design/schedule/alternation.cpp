@@ -1,17 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "design/schedule/alternation.h"
 
-#include <cmath>
 #include <cstddef>
 #include <optional>
 #include <utility>
 
 #include "core/error.h"
 #include "core/surface/control_net.h"
-#include "core/surface/grid_mesh.h"
 #include "core/value_slope.h"
 #include "design/flux_of_surface.h"
-#include "design/schedule/spline_start.h"
+#include "design/schedule/level_start.h"
 #include "design/schedule/start_surface.h"
 #include "design/source_picture.h"
 
@@ -40,29 +38,6 @@ void begin_next_level(Checkpoint& state) {
   ++state.level;
 }
 
-/// The spline that a mesh's surface becomes, as a mesh of its control points. Its knot lines follow
-/// the vertices as far as no barrier refuses it.
-SurfaceMesh spline_start(const DesignTask& task, const Level& level, const SurfaceMesh& mesh) {
-  constexpr double kShareStep = 0.25;
-  const auto fitted = [&](double share) {
-    return spline_through(mesh, task.setup.lens_size, level.grid, share, task.executor,
-                          task.control);
-  };
-  const LevelProblem problem = make_problem(task, level, 0);
-  for (double share = level.knot_share;; share -= kShareStep) {
-    SurfaceMesh net = net_mesh(fitted(share));
-    GuidedOptimization stage(net, problem.setup, problem.target, problem.objective, task.executor);
-    if (share <= 0.0 || std::isfinite(stage.value(net))) return net;
-  }
-}
-
-/// What a level begins with: the surface of the one before on its own grid.
-SurfaceMesh level_start(const DesignTask& task, const Level& level, const SurfaceMesh& mesh) {
-  if (mesh.grid == level.grid) return mesh;
-  if (level.spline) return spline_start(task, level, mesh);
-  return regrid(mesh, task.setup.lens_size, level.grid);
-}
-
 /// True if the surface is so near to its picture that what the convolution gets wrong counts. The
 /// part that a process makes is blurred by more than the source, and not corrected.
 bool needs_correction(const LevelProblem& problem, const Level& level, const Checkpoint& state) {
@@ -83,7 +58,8 @@ Image corrected_target(const DesignTask& task, const LevelProblem& problem, cons
                                    task.executor);
 }
 
-Ending run_level(const DesignTask& task, DesignLog& log, Checkpoint& state) {
+/// @return false if it was asked to stop.
+bool run_level(const DesignTask& task, DesignLog& log, Checkpoint& state) {
   const Level& level = task.levels[static_cast<std::size_t>(state.level)];
   state.mesh = level_start(task, level, state.mesh);
   LevelProblem problem = make_problem(task, level, state.mesh.triangle_count());
@@ -99,13 +75,12 @@ Ending run_level(const DesignTask& task, DesignLog& log, Checkpoint& state) {
       stage = stage_of();
       state.value = stage.value(state.mesh);
     }
-    Ending ending = run_round({task, level, problem, stage, log}, state);
-    if (ending.ended()) return ending;
+    if (!run_round({task, level, problem, stage, log}, state)) return false;
     if (state.round < level.rounds) save(task, log, state);
   }
   begin_next_level(state);
   save(task, log, state);
-  return {};
+  return true;
 }
 
 }  // namespace
@@ -120,15 +95,14 @@ Checkpoint first_state(const DesignTask& task) {
   return state;
 }
 
-Ending run_levels(const DesignTask& task, DesignLog& log, Checkpoint& state) try {
+bool run_levels(const DesignTask& task, DesignLog& log, Checkpoint& state) try {
   if (!task.options.resume) save(task, log, state);
   while (state.level < static_cast<int>(task.levels.size())) {
-    Ending ending = run_level(task, log, state);
-    if (ending.ended()) return ending;
+    if (!run_level(task, log, state)) return false;
   }
-  return {};
+  return true;
 } catch (const Interrupted&) {
-  return {true, ""};
+  return false;
 }
 
 }  // namespace lensforge

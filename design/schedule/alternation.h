@@ -14,7 +14,8 @@ namespace lensforge {
 Checkpoint first_state(const DesignTask& task);
 
 /// Does all levels that are left, coarse to fine, round by round (Sun et al., section 3.4 and
-/// Appendix E), and writes the state after each. @throw InputError as run_round() does.
-Ending run_levels(const DesignTask& task, DesignLog& log, Checkpoint& state);
+/// Appendix E), and writes the state after each. @return false if it was asked to stop.
+/// @throw InputError as run_round() does.
+bool run_levels(const DesignTask& task, DesignLog& log, Checkpoint& state);
 
 }  // namespace lensforge

@@ -3,13 +3,15 @@
 
 #include <cmath>
 #include <optional>
+#include <string>
 #include <utility>
 
 #include "core/error.h"
-#include "core/surface/grid_mesh.h"
 #include "core/text/number_text.h"
 #include "core/value_slope.h"
+#include "design/schedule/level_start.h"
 #include "design/schedule/reach.h"
+#include "design/schedule/start_surface.h"
 #include "design/schedule/transport_step.h"
 
 namespace lensforge {
@@ -23,18 +25,14 @@ constexpr double kIdleRound = 1e-3;
 /// better, 3 are worse.
 constexpr int kHistory = 20;
 
-/// Steps in which a mesh that a new level's barriers refuse is drawn back to the even grid.
-constexpr int kRelaxSteps = 10;
-
-/// Draws the mesh's x and y back towards the even grid until no barrier refuses it.
-void relax(const LevelSite& site, SurfaceMesh& mesh) {
-  const SurfaceMesh flat = make_grid_mesh(site.task.setup.lens_size, mesh.grid, 0.0);
-  const SurfaceMesh fine = mesh;
-  for (int step = 1; !std::isfinite(site.stage.value(mesh)) && step <= kRelaxSteps; ++step) {
-    const double share = static_cast<double>(step) / kRelaxSteps;
-    mesh.vertices.topRows<2>() =
-        (1.0 - share) * fine.vertices.topRows<2>() + share * flat.vertices.topRows<2>();
-  }
+/// Draws the first `coordinates` of x, y and z back towards the surface that designs start from
+/// until no barrier refuses the mesh. @return false if one still does.
+bool relax(const LevelSite& site, int coordinates, SurfaceMesh& mesh) {
+  if (std::isfinite(site.stage.value(mesh))) return true;
+  const DesignTask& task = site.task;
+  const SurfaceMesh start =
+      start_surface(task.setup, mesh.grid, task.options.thickness, task.executor);
+  return draw_towards(start, coordinates, site.stage, mesh);
 }
 
 /// @param aimed  the first surface, before its mesh was relaxed.
@@ -55,60 +53,73 @@ void relax(const LevelSite& site, SurfaceMesh& mesh) {
                    advice);
 }
 
-/// The first half of a round: a mesh that transport aims, and that no barrier refuses.
-void start_from_transport(const LevelSite& site, Checkpoint& state) {
-  const bool first = state.level == 0 && state.round == 0;
-  const bool shapes = first && site.task.options.spread > 0.0;
-  const std::optional<AimedMesh> aimed =
-      transport_step(site.task, site.problem, state.mesh, shapes, site.log);
-  if (aimed) {
-    state.mesh = aimed->mesh;
-  } else {
-    state.transporting = false;
-    site.log.ended_early("transport", "it found no place for the light");
-  }
-  relax(site, state.mesh);
-  if (aimed && first && !std::isfinite(site.stage.value(state.mesh))) {
-    refuse_unreachable(site, *aimed);
-  }
+/// Not even the surface that designs start from is allowed. A screen that is not tilted meets the
+/// light of any source behind a flat front.
+[[noreturn]] void refuse_start(const DesignTask& task) {
+  const Eigen::Vector2d& tilt = task.options.light.screen_tilt;
+  const bool front = task.setup.front.has_value();
+  const std::string given =
+      front ? "--front" : "--screen-tilt " + number_text(tilt.x()) + "," + number_text(tilt.y());
+  throw InputError(given +
+                   ": light of the surface that designs start from is reflected totally or passes "
+                   "the screen by; " +
+                   (front ? "--front flat" : "--screen-tilt 0,0") + " would do");
 }
 
-/// The rendering-guided half.
-Ending follow_picture(const LevelSite& site, const GuidedOptimization::Observer& observe,
-                      Checkpoint& state) {
+/// What transport does to the mesh's x and y. Later rounds keep what optimisation has made of them.
+MeshShaping shaping_of(const DesignOptions& options, const Checkpoint& state) {
+  if (options.spread == 0.0 || state.round > 0) return MeshShaping::kNone;
+  return state.level == 0 ? MeshShaping::kSpread : MeshShaping::kCreases;
+}
+
+/// The first half of a round: a mesh that transport aims, or the one before where transport finds
+/// none that the barriers allow.
+void start_from_transport(const LevelSite& site, Checkpoint& state) {
+  const std::optional<AimedMesh> aimed = transport_step(
+      site.task, site.problem, state.mesh, shaping_of(site.task.options, state), site.log);
+  if (aimed) {
+    SurfaceMesh mesh = aimed->mesh;
+    if (relax(site, 2, mesh)) {
+      state.mesh = std::move(mesh);
+      return;
+    }
+    if (state.level == 0 && state.round == 0) refuse_unreachable(site, *aimed);
+  }
+  state.transporting = false;
+  site.log.ended_early("transport", aimed ? "no surface sends the light as far as it asks for"
+                                          : "it found no place for the light");
+}
+
+/// The rendering-guided half. @return false if it was asked to stop.
+bool follow_picture(const LevelSite& site, const GuidedOptimization::Observer& observe,
+                    Checkpoint& state) {
   LbfgsOptions optimizer;
   optimizer.max_iterations = site.level.iterations;
   optimizer.history = kHistory;
   const LbfgsSummary summary = site.stage.run(optimizer, observe, state.scales, state.mesh);
   using Status = LbfgsSummary::Status;
-  return {summary.status == Status::kStopped,
-          summary.status == Status::kInfeasibleStart ? summary.message : ""};
+  if (summary.status == Status::kInfeasibleStart) refuse_start(site.task);
+  return summary.status != Status::kStopped;
 }
 
-/// Both halves and what follows from them.
-Ending alternate(const LevelSite& site, const SurfaceMesh& before,
-                 const GuidedOptimization::Observer& observe, Checkpoint& state) {
+/// Both halves and what follows from them. @return false if it was asked to stop.
+bool alternate(const LevelSite& site, const SurfaceMesh& before,
+               const GuidedOptimization::Observer& observe, Checkpoint& state) {
   const DesignOptions& options = site.task.options;
   const bool transports =
       !site.level.spline && state.transporting && state.round < options.transport_rounds;
-  if (transports) {
-    start_from_transport(site, state);
-  } else if (!site.level.spline) {
-    relax(site, state.mesh);
-  }
+  if (transports) start_from_transport(site, state);
+  if (!site.level.spline && !relax(site, 2, state.mesh)) relax(site, 3, state.mesh);
   const bool rescaled = !state.scales.known();
-  if (options.rendering_guided) {
-    Ending ending = follow_picture(site, observe, state);
-    if (ending.ended()) return ending;
-  }
+  if (options.rendering_guided && !follow_picture(site, observe, state)) return false;
   conclude_round({before, site.stage.value(state.mesh), transports, rescaled}, site.level.rounds,
                  state);
-  return {};
+  return true;
 }
 
 }  // namespace
 
-Ending run_round(const LevelSite& site, Checkpoint& state) {
+bool run_round(const LevelSite& site, Checkpoint& state) {
   const SurfaceMesh before = state.mesh;
   double reached = kInfinity;  // Objective of the last step.
   const GuidedOptimization::Observer log =
@@ -122,9 +133,9 @@ Ending run_round(const LevelSite& site, Checkpoint& state) {
     if (!(reached <= state.value)) state.mesh = before;
   };
   try {
-    Ending ending = alternate(site, before, observe, state);
-    if (ending.stopped) keep_the_better();
-    return ending;
+    const bool finished = alternate(site, before, observe, state);
+    if (!finished) keep_the_better();
+    return finished;
   } catch (const Interrupted&) {
     keep_the_better();
     throw;

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include <string>
-
 #include "core/surface/surface_mesh.h"
 #include "design/schedule/checkpoint.h"
 #include "design/schedule/design_log.h"
@@ -10,14 +8,6 @@
 #include "design/schedule/guided_optimization.h"
 
 namespace lensforge {
-
-/// Why a design goes on or does not.
-struct Ending {
-  bool stopped = false;  ///< It was asked to.
-  std::string failure;   ///< A start that no step can leave.
-
-  [[nodiscard]] bool ended() const { return stopped || !failure.empty(); }
-};
 
 /// One level at work.
 struct LevelSite {
@@ -31,8 +21,10 @@ struct LevelSite {
 /// One alternation of Sun et al., section 3.4: transport_step() where it is due (never of a
 /// spline), then rendering-guided optimisation, then conclude_round(). Where it is stopped on the
 /// way, the state holds the best surface so far and names the same round.
-/// @throw Interrupted; InputError if no surface can send the light so far in so short a distance.
-Ending run_round(const LevelSite& site, Checkpoint& state);
+/// @return false if it was asked to stop.
+/// @throw Interrupted; InputError if no surface can send the light so far in so short a distance,
+///        or none can be begun with.
+bool run_round(const LevelSite& site, Checkpoint& state);
 
 /// What came of a round's two halves.
 struct RoundOutcome {

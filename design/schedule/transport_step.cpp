@@ -107,20 +107,24 @@ void spread(const Site& site, const SurfaceMesh& even_mesh, const Matching& even
   }
 }
 
-/// Spreads the mesh, aligns it to the creases of an even mesh's transport, and finds the places for
-/// its light. Facets have a transport of their own, which brings out detail in the dark that the
-/// even mesh has no facets for. For a smooth surface the even mesh's map does, as it has to where
-/// black leaves cells too thin for Newton steps: more iterations are worth more than the time of
-/// another transport. MAE in thousandths with it and 2 × 200, without it and 2 × 240 iterations:
-/// city 6.8 and 6.8 at 128², 6.5 and 5.9 at 256², portrait 0.74 and 0.72, 0.64 and 0.61, lake at
-/// 128² 1.81 and 1.61, a photograph with dark detail at 112², 128², 144² and 256² 2.19 and 1.77,
-/// 1.63 and 1.98, 2.14 and 1.84, 1.74 and 1.68.
-Matching fit_mesh(const Site& site, const SurfaceMesh& even_mesh, const Matching& even,
-                  SurfaceMesh& mesh) {
-  spread(site, even_mesh, even, mesh);
+/// Shapes the mesh by an even mesh's transport and finds the places for the light of the flat
+/// surface through it. Facets have a transport of their own, which brings out detail in the dark
+/// that the even mesh has no facets for. For a smooth surface the even mesh's map does, as it has
+/// to where black leaves cells too thin for Newton steps: more iterations are worth more than the
+/// time of another transport. MAE in thousandths with it and 2 × 200, without it and 2 × 240
+/// iterations: city 6.8 and 6.8 at 128², 6.5 and 5.9 at 256², portrait 0.74 and 0.72, 0.64 and
+/// 0.61, lake at 128² 1.81 and 1.61, a photograph with dark detail at 112², 128², 144² and
+/// 256² 2.19 and 1.77, 1.63 and 1.98, 2.14 and 1.84, 1.74 and 1.68.
+Matching fit_mesh(const Site& site, MeshShaping shaping, const SurfaceMesh& even_mesh,
+                  const Matching& even, SurfaceMesh& mesh) {
+  const DesignTask& task = site.task;
+  if (shaping == MeshShaping::kSpread) {
+    spread(site, even_mesh, even, mesh);
+  } else {
+    mesh.vertices.row(2).setConstant(task.options.thickness);
+  }
   const BrenierMap map(even.light.sites, even.result, site.problem.aim);
   align_to_creases(map, site.problem.setup, mesh);
-  const DesignTask& task = site.task;
   shape_start(task.setup, task.options.thickness, task.executor, mesh);
   if (task.options.model == SurfaceModel::kFacet) {
     if (std::optional<Matching> own = match_spread(site, mesh)) return *std::move(own);
@@ -145,14 +149,16 @@ void follow_correspondence(const Site& site, const Correspondence& wanted, Surfa
 }  // namespace
 
 std::optional<AimedMesh> transport_step(const DesignTask& task, const LevelProblem& problem,
-                                        const SurfaceMesh& mesh, bool shapes, DesignLog& log) {
+                                        const SurfaceMesh& mesh, MeshShaping shaping,
+                                        DesignLog& log) {
   const Site site{task, problem, log};
+  const bool shapes = shaping != MeshShaping::kNone;
   const SurfaceMesh even = shapes ? coarse_mesh(task, mesh.grid) : mesh;
   Matching matching = match_all(site, even);
   if (matching.result.centroids.cols() == 0) return std::nullopt;
   if (!matching.result.converged()) log.ended_early("transport", matching.result.message);
   AimedMesh aimed{mesh, {}};
-  if (shapes) matching = fit_mesh(site, even, matching, aimed.mesh);
+  if (shapes) matching = fit_mesh(site, shaping, even, matching, aimed.mesh);
   aimed.wanted = {std::move(matching.result.centroids), std::move(matching.light.flux)};
   aim_surface(aimed.wanted, problem.setup, task.options.thickness, task.executor, aimed.mesh);
   if (task.options.update_iterations > 0) follow_correspondence(site, aimed.wanted, aimed.mesh);

@@ -20,11 +20,17 @@ struct AimedMesh {
   Correspondence wanted;
 };
 
+/// What becomes of a mesh's x and y before its light is given places.
+enum class MeshShaping {
+  kNone,     ///< They stay, and the light is where the surface sends it.
+  kCreases,  ///< Of a mesh that follows the picture already: align_to_creases() of a flat surface.
+  kSpread    ///< Of an even mesh: spread_vertices() first.
+};
+
 /// The correspondence-guided half of a round (Sun et al., section 3.4).
-/// @param shapes  whether the mesh's x and y are to follow the picture first (spread_vertices(),
-///                align_to_creases()); the mesh then is an even one.
 /// @return nothing where transport finds nothing. @throw Interrupted
 std::optional<AimedMesh> transport_step(const DesignTask& task, const LevelProblem& problem,
-                                        const SurfaceMesh& mesh, bool shapes, DesignLog& log);
+                                        const SurfaceMesh& mesh, MeshShaping shaping,
+                                        DesignLog& log);
 
 }  // namespace lensforge
