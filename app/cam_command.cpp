@@ -20,6 +20,7 @@
 #include "cam/cam_job.h"
 #include "cam/cut_compare.h"
 #include "cam/cut_estimate.h"
+#include "cam/finish_setup.h"
 #include "cam/job_files.h"
 #include "cam/report/leak_words.h"
 #include "cam/report/report_json.h"
@@ -56,7 +57,7 @@ std::string summary_text(const fs::path& folder, const CamResult& result) {
     for (const LeakPlace& place : report.places) text += "  " + leak_words(place) + "\n";
     if (!report.tolerances.empty()) text += "  " + tolerance_words(report.tolerances) + "\n";
   }
-  return text + missed_limits_text(report.verdict) + "  Z         program Z = lens z + " +
+  return text + verdict_text(report.verdict) + "  Z         program Z = lens z + " +
          fixed(report.z_offset, 4) + " mm\n";
 }
 
@@ -79,14 +80,16 @@ CamResult run(const OptionSet& options, const CamOptions& cam, const Lens& lens,
   const OutputFolder folder(out, FolderLock::Kind::kExclusive);
   folder.remove_partial_files(is_name_of_cut);
   announce_work(estimate, console, "the cut takes");
+  const std::string few = decimals_warning(cam);
+  if (!few.empty()) console.note(few);
   ProgressDisplay progress(options.common().quiet);
   const RunControl control(interrupt.token(), progress.sink());
   return make_cut(lens, cam, out, executor, control);
 }
 
-int exit_code(const OptionSet& options, const CamResult& result) {
+int exit_code(const CamResult& result) {
   if (!result.done()) return kInterrupted;
-  return stated_limits_hold(options, result.report.verdict) ? kDone : kLimitMissed;
+  return result.report.verdict.missed() == 0 ? kDone : kLimitMissed;
 }
 
 std::string choice_text(const ReportChoice& choice) {
@@ -142,17 +145,21 @@ int cam_command(const Arguments& command_line) {
   add_cam_options(options, settings);
   options.parse(command_line);
   const Console console(options.common().json, options.common().quiet);
+  const CamOptions& cam = settings.cam;
+  if (settings.show_workshop) {
+    settle(options, settings);
+    console.result(workshop_json(cam.workshop), workshop_toml(cam.workshop));
+    return kDone;
+  }
+  if (settings.source.empty()) {
+    throw InputError("DIR: is missing; name the lens folder, as in lensforge cam portrait");
+  }
   std::optional<FolderLock> reading;
   if (is_folder(settings.source)) {
     reading.emplace(settings.source, FolderLock::Kind::kShared);
   }
   const Lens lens = read_lens(settings.source);
   settle(options, settings);
-  const CamOptions& cam = settings.cam;
-  if (settings.show_workshop) {
-    console.result(workshop_json(cam.workshop), workshop_toml(cam.workshop));
-    return kDone;
-  }
   validate(cam, lens.setup);
   note_unfinished_design(lens, console);
   if (!settings.compare.empty()) return compare(options, settings, cam, lens, console);
@@ -160,7 +167,7 @@ int cam_command(const Arguments& command_line) {
   for (const std::string& warning : result.report.warnings) console.note("warning: " + warning);
   console.result(summary_json(options, result),
                  result.done() ? summary_text(settings.folder(), result) : result.message + "\n");
-  return exit_code(options, result);
+  return exit_code(result);
 }
 
 }  // namespace lensforge::app

@@ -3,16 +3,11 @@
 
 #include <string>
 
-#include "app/option_set.h"
 #include "cam/report/verdict.h"
 
 namespace lensforge::app {
 
-/// A line for every limit that a cut misses.
-std::string missed_limits_text(const Verdict& verdict);
-
-/// Whether a cut holds the limits that count for the exit code: those of safety, and those of
-/// quality that an option states; the defaults of the latter are advice.
-bool stated_limits_hold(const OptionSet& options, const Verdict& verdict);
+/// A line for every limit that a cut misses, and for what is advice.
+std::string verdict_text(const Verdict& verdict);
 
 }  // namespace lensforge::app

@@ -13,7 +13,7 @@ std::string folder_name(const fs::path& folder) {
 }
 
 void add_cam_options(OptionSet& options, CamSettings& settings) {
-  options.positional("DIR", settings.source, "lens folder");
+  options.text("DIR", settings.source, "", "lens folder; --show-workshop needs none");
   options.text("--workshop", settings.workshop, "FILE.toml",
                "machine, blank, clamps, tools and process; options given here win");
   options.flag("--show-workshop", settings.show_workshop,
@@ -32,7 +32,7 @@ void settle(OptionSet& options, CamSettings& settings) {
     settings.cam.workshop = read_workshop(settings.workshop);
     options.restate();
   }
-  settings.cam.job = folder_name(settings.source);
+  if (!settings.source.empty()) settings.cam.job = folder_name(settings.source);
   // A file's own values have been read and found in order: what is wrong now is an option's doing.
   validate(settings.cam.workshop, file + " with the options given");
 }

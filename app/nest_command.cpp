@@ -80,7 +80,7 @@ std::string summary_text(const fs::path& folder, const NestResult& result) {
                      " mm, X0 Y0 in its lower left corner; lenses at least " +
                      trimmed_decimal(layout.gap, 2) + " mm apart\n";
   for (const NestedLens& lens : layout.lenses) {
-    text += place_text(lens) + missed_limits_text(lens.report.verdict);
+    text += place_text(lens) + verdict_text(lens.report.verdict);
   }
   for (const NestProgram& program : result.programs) {
     text += "  " + program.file + ", " + std::to_string(program.lines) + " moves, " +
@@ -121,13 +121,9 @@ NestResult run(const OptionSet& options, const NestSettings& settings,
   return make_nest(lenses, settings.nest, folder.path(), executor, control);
 }
 
-int exit_code(const OptionSet& options, const NestResult& result) {
+int exit_code(const NestResult& result) {
   if (!result.done()) return kInterrupted;
-  const std::vector<NestedLens>& lenses = result.layout.lenses;
-  const bool hold = std::all_of(lenses.begin(), lenses.end(), [&](const NestedLens& lens) {
-    return stated_limits_hold(options, lens.report.verdict);
-  });
-  return hold ? kDone : kLimitMissed;
+  return result.missed() == 0 ? kDone : kLimitMissed;
 }
 
 /// What stands in every lens's report, as collisions on the common blank do, once.
@@ -163,7 +159,7 @@ int nest_command(const Arguments& command_line) {
   const NestResult result = run(options, settings, lenses, console);
   note_warnings(result, console);
   console.result(summary_json(options, result, sources), summary_text(settings.out, result));
-  return exit_code(options, result);
+  return exit_code(result);
 }
 
 }  // namespace lensforge::app

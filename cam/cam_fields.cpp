@@ -196,7 +196,7 @@ Field split() {
 Field post() {
   Field row = R::text(
       "--post", [](auto& o) -> auto& { return o.post.name; }, "NAME|FILE.toml",
-      "dialect: linuxcnc, grbl, fanuc, or a description of one");
+      "dialect: linuxcnc, grbl, grblhal, fanuc, weihong, or a description of one");
   row.set = [](O& o, const nlohmann::json& value) { o.post = find_post(value, "--post"); };
   return row;
 }
@@ -248,23 +248,38 @@ OptionTable<O> prediction_rows() {
           "parts of the picture below this share of its mean are dark")};
 }
 
+/// A limit of quality, which is advice until an option states it.
+Field stated(const char* key, Field row) {
+  row.set = [key, set = row.set](O& o, const nlohmann::json& value) {
+    set(o, value);
+    o.stated_limits.insert(key);
+  };
+  return row;
+}
+
 OptionTable<O> limit_rows() {
   constexpr auto limits = [](auto& o) -> auto& { return o.limits; };
   const Limits any = Limits::between(0, cam_limit::kLimit);
-  return {R::number("--max-leakage", in(limits, &CutLimits::leakage), any, "",
-                    "verdict: share of light that may land where the design puts less"),
-          R::number("--max-dark", in(limits, &CutLimits::dark_flux), any, "",
-                    "verdict: share of light that may land in dark parts"),
-          R::number("--max-mae-increase", in(limits, &CutLimits::mae_increase), any, "",
-                    "verdict: MAE of the part above that of the design"),
-          R::length("--max-gouge", in(limits, &CutLimits::gouge), any,
-                    "verdict: deepest cut below the exact path"),
-          R::length("--max-excess", in(limits, &CutLimits::excess), any,
-                    "verdict: highest path above the exact one"),
-          R::number("--max-slope", in(limits, &CutLimits::slope), any, "rad",
-                    "verdict: error of the path's direction over 5 µm"),
-          R::length("--max-fillet", in(limits, &CutLimits::fillet_depth), any,
-                    "verdict: material that the ball leaves in creases")};
+  const auto number = [&](const char* name, auto member, const char* unit, const char* help) {
+    return R::number(name, in(limits, member), any, unit, help);
+  };
+  const auto length = [&](const char* name, auto member, const char* help) {
+    return R::length(name, in(limits, member), any, help);
+  };
+  return {stated("leakage", number("--max-leakage", &CutLimits::leakage, "",
+                                   "verdict: share of light that may land where the design puts "
+                                   "less")),
+          stated("dark_flux", number("--max-dark", &CutLimits::dark_flux, "",
+                                     "verdict: share of light that may land in dark parts")),
+          stated("mae_increase", number("--max-mae-increase", &CutLimits::mae_increase, "",
+                                        "verdict: MAE of the part above that of the design")),
+          length("--max-gouge", &CutLimits::gouge, "verdict: deepest cut below the exact path"),
+          stated("excess", length("--max-excess", &CutLimits::excess,
+                                  "verdict: highest path above the exact one")),
+          stated("slope", number("--max-slope", &CutLimits::slope, "rad",
+                                 "verdict: error of the path's direction over 5 µm")),
+          stated("fillet_depth", length("--max-fillet", &CutLimits::fillet_depth,
+                                        "verdict: material that the ball leaves in creases"))};
 }
 
 }  // namespace

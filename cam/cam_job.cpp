@@ -61,9 +61,8 @@ class Job {
     if (prediction) add_prediction_files(*prediction, lens_, files);
     add_report_files(result.report, files);
     publish(programs, others, files, result);
-    result.message = result.report.verdict.passes()
-                         ? "done, all limits met"
-                         : "done, but limits were missed: see the report";
+    const Verdict& verdict = result.report.verdict;
+    result.message = verdict_words(verdict.missed(), verdict.advice());
     return result;
   }
 

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -73,6 +74,7 @@ struct CamOptions {
   double sample_spacing = 0.0;
   LeakageOptions leakage;
   CutLimits limits;
+  std::set<std::string> stated_limits;  ///< Keys of CutLimits that count as limits, not as advice.
 };
 
 /// Maximum or minimum of the options below; those of the workshop follow workshop_rule().

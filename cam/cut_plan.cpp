@@ -214,6 +214,7 @@ ProgramSettings CutPlan::settings() {
   settings.decimals = decimals_;
   settings.blend_tolerance = finish().tolerance;
   settings.spin_up = options_.spin_up;
+  settings.spindle_by_hand = options_.workshop.machine.spindle_by_hand;
   settings.coolant = options_.coolant;
   settings.grouping = options_.grouping;
   settings.largest_file = options_.largest_file;
@@ -268,7 +269,7 @@ void CutPlan::read_motions(const ProgramFiles& programs, int tool,
       });
       if (own) take(moved(motion, -place_.corner));
     };
-    read_path(file.beside.empty() ? file.path : file.beside, options_.post.reader, tool, take_own,
+    read_path(file.beside.empty() ? file.path : file.beside, programs.reader, tool, take_own,
               control);
   }
 }

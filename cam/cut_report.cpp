@@ -7,6 +7,8 @@
 #include <variant>
 
 #include "cam/cut_safety.h"
+#include "cam/finish_setup.h"
+#include "cam/post/program_part.h"
 #include "core/io/lens_folder.h"
 #include "core/optics/fresnel.h"
 #include "core/optics/front_placement.h"
@@ -80,7 +82,14 @@ Eigen::AlignedBox3d whole_box(const CutPlan& plan, const Front& front) {
   return blank;
 }
 
-SetupSheet setup_sheet(const CutPlan& plan, const Lens& designed) {
+/// How Z gets right in the programs with the most tools.
+std::string length_words_of(const PostDescription& post, const ProgramFiles& programs) {
+  std::size_t most = 1;
+  for (const ProgramFile& file : programs.files) most = std::max(most, file.reading.tools.size());
+  return length_words(post, most, "the tool of each program");
+}
+
+SetupSheet setup_sheet(const CutPlan& plan, const ProgramFiles& programs, const Lens& designed) {
   const CamOptions& options = plan.options();
   const bool lens = options.part == PartKind::kLens;
   SetupSheet sheet;
@@ -95,6 +104,7 @@ SetupSheet setup_sheet(const CutPlan& plan, const Lens& designed) {
   sheet.zero_words = joined({"lower left corner of the ", plan.place().shared() ? "blank" : part,
                              ", ", words_for(options.z_zero)});
   sheet.up_words = up_words(options.part, designed);
+  sheet.length_words = length_words_of(options.post, programs);
   if (lens && designed.setup.front) {
     sheet.front = designed.setup.front;
     sheet.front_words = front_words(plan, designed);
@@ -147,7 +157,7 @@ ParameterGroup finish_parameters(const CutPlan& plan, SurfaceModel model) {
       {{"Stepover", mm(plan.pitch(), 4)},
        {"Rows along", finish.along == PassAxis::kX ? "X" : "Y"},
        {"Tolerance", mm(finish.tolerance, 5)},
-       {"Slope tolerance", decimal_text(1e3 * finish.slope_tolerance, 2) + " mrad"},
+       {"Slope tolerance", decimal_text(1e3 * aimed_slope(plan.options()), 2) + " mrad"},
        {"Decimals", std::to_string(plan.decimals())},
        {"Surface", words_for(model)}}};
   if (const RestMap* const rest = plan.balls().rest()) {
@@ -353,7 +363,8 @@ std::vector<std::string> warnings_of(const CutPlan& plan, const ProgramFiles& pr
   const std::vector<std::string> safety = safety_warnings(plan, programs, lens);
   warnings.insert(warnings.end(), safety.begin(), safety.end());
   for (const std::string& sentence :
-       {index_warning(plan, lens), margin_warning(plan, lens), process_warning(plan, lens)}) {
+       {index_warning(plan, lens), margin_warning(plan, lens), process_warning(plan, lens),
+        decimals_warning(plan.options())}) {
     if (!sentence.empty()) warnings.push_back(sentence);
   }
   const Eigen::Vector3d travel = plan.options().workshop.machine.travel;
@@ -398,7 +409,7 @@ Verdict whole_verdict(const CutPlan& plan, const ProgramFiles& programs,
   limits.block_rate = plan.options().workshop.machine.lines_per_second;
   CutFindings findings = findings_of(programs, prediction);
   if (!(limits.block_rate > 0.0)) findings.block_rate.reset();
-  Verdict verdict = judge_cut(findings, limits);
+  Verdict verdict = judge_cut(findings, limits, plan.options().stated_limits);
   const std::vector<LimitCheck> safety = all_safety_checks(plan, lens);
   verdict.checks.insert(verdict.checks.begin(), safety.begin(), safety.end());
   return verdict;
@@ -452,7 +463,7 @@ ReportData make_report(const CutPlan& plan, const ProgramFiles& programs,
     data.parameters.push_back(entry_parameters(process));
   }
   if (cuts_outline(options, lens.setup)) data.parameters.push_back(outline_parameters(plan));
-  data.setup = setup_sheet(plan, lens);
+  data.setup = setup_sheet(plan, programs, lens);
   data.light = lens.setup;
   data.light_height = lens.surface.vertices.row(2).maxCoeff();
   data.z_offset = plan.z_offset();

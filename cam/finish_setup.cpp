@@ -4,11 +4,17 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/text/number_text.h"
+
 namespace lensforge {
 namespace {
 
 /// Moves are meant to be this many times as long as the controller needs: some are cut in two.
 constexpr double kAboveShortest = 2.0;
+
+/// What the path's direction is aimed at, at least, for each millimetre of the last decimal: finer
+/// aims than the decimals can hold leave nothing but moves of a few micrometres, which turn more.
+constexpr double kGridSlope = 10.0;
 
 RasterPlan finish_raster(const CamOptions& options, const FinishGround& ground, PassAxis along) {
   const FinishProcess& finish = options.workshop.process.finish;
@@ -17,7 +23,7 @@ RasterPlan finish_raster(const CamOptions& options, const FinishGround& ground, 
   raster.pitch = finish_pitch(finish, radius);
   if (finish.scallop > 0.0) raster.pitch = pitch_on_slope(raster.pitch, ground.steepest);
   raster.tolerance = finish.tolerance;
-  raster.slope_tolerance = finish.slope_tolerance;
+  raster.slope_tolerance = aimed_slope(options);
   raster.resolution = resolution_of(options);
   raster.z_zero = -ground.z_offset;
   raster.along = along == PassAxis::kX ? 0 : 1;
@@ -48,6 +54,23 @@ int decimals_of(const CamOptions& options) {
 }
 
 double resolution_of(const CamOptions& options) { return std::pow(10.0, -decimals_of(options)); }
+
+double aimed_slope(const CamOptions& options) {
+  return std::max(options.workshop.process.finish.slope_tolerance,
+                  kGridSlope * resolution_of(options));
+}
+
+std::string decimals_warning(const CamOptions& options) {
+  const double stated = options.workshop.process.finish.slope_tolerance;
+  const double aimed = aimed_slope(options);
+  if (aimed <= stated) return {};
+  const double rounding = resolution_of(options) / kSlopeStretch;
+  return "with " + std::to_string(decimals_of(options)) +
+         " decimals rounding turns the path by up to " + number_text(1e3 * rounding) +
+         " mrad over 5 µm, so that its direction is aimed at " + number_text(1e3 * aimed) +
+         " mrad instead of " + number_text(1e3 * stated) +
+         " (--slope-tolerance); take a post with 6 decimals where its limit has to hold";
+}
 
 double shortest_move(const CamOptions& options, const Tool& tool) {
   const double lines = options.workshop.machine.lines_per_second;

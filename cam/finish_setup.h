@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <string>
 #include <vector>
 
 #include "cam/cam_options.h"
@@ -21,6 +22,13 @@ int decimals_of(const CamOptions& options);
 
 /// Unit of the programs' last decimal, mm.
 double resolution_of(const CamOptions& options);
+
+/// What the path's direction is aimed at, rad: the workshop's slope tolerance, or what the
+/// programs' decimals can hold if that is more.
+double aimed_slope(const CamOptions& options);
+
+/// That the decimals are too few for the slope tolerance, in a sentence; empty if they are not.
+std::string decimals_warning(const CamOptions& options);
 
 /// Length that moves of a tool should have at least, mm: the controller takes no more lines a
 /// second. 0 where it has no such limit.

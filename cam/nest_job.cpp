@@ -139,8 +139,7 @@ class Job {
     result.z_offset = plans_.front()->z_offset();
     describe(programs.programs(), result);
     result.layout = layout_;
-    result.message =
-        result.passes() ? "done, all limits met" : "done, but limits were missed: see the reports";
+    result.message = verdict_words(result.missed(), result.passes() ? 0 : 1);
     publish(programs, files, result);
     return result;
   }
@@ -369,6 +368,12 @@ nlohmann::json lens_json(const NestedLens& lens, bool whole) {
 bool NestResult::passes() const {
   return std::all_of(layout.lenses.begin(), layout.lenses.end(),
                      [](const NestedLens& lens) { return lens.report.verdict.passes(); });
+}
+
+int NestResult::missed() const {
+  int count = 0;
+  for (const NestedLens& lens : layout.lenses) count += lens.report.verdict.missed();
+  return count;
 }
 
 double NestResult::minutes() const {

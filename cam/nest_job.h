@@ -40,6 +40,8 @@ struct NestResult {
 
   [[nodiscard]] bool done() const { return status == Status::kDone; }
   [[nodiscard]] bool passes() const;
+  /// Limits that are missed, over all lenses.
+  [[nodiscard]] int missed() const;
   [[nodiscard]] double minutes() const;
 };
 

@@ -91,8 +91,9 @@ std::vector<CausePicture> causes_of(const JsonFields& report, const fs::path& fo
 /// not shown.
 std::optional<ReportPath> sketch_of(const fs::path& program, const std::string& operation,
                                     double z_offset, const RunControl& control) {
-  for (const GcodeDialect& dialect :
-       {linuxcnc_dialect(), fanuc_dialect(), grblhal_dialect(), grbl_dialect()}) {
+  for (GcodeDialect dialect : {linuxcnc_dialect(), fanuc_dialect(), grblhal_dialect(),
+                               grbl_dialect(), weihong_dialect()}) {
+    dialect.spindle_by_hand = true;  // How it is switched does not matter for a picture.
     PathSketch sketch(operation, kPathSpacing);
     const auto take = [&](const GcodeMotion& motion, int) {
       PathMove move;

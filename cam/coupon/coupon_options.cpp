@@ -19,7 +19,7 @@ constexpr double kThickest = 100.0;   ///< mm
 OptionField<O> post() {
   OptionField<O> row = R::text(
       "--post", [](auto& o) -> auto& { return o.post.name; }, "NAME|FILE.toml",
-      "dialect: linuxcnc, grbl, fanuc, or a description of one");
+      "dialect: linuxcnc, grbl, grblhal, fanuc, weihong, or a description of one");
   row.set = [](O& o, const nlohmann::json& value) { o.post = find_post(value, "--post"); };
   return row;
 }

@@ -95,6 +95,7 @@ ProgramSettings CouponPlan::settings() {
   settings.decimals = decimals_;
   settings.blend_tolerance = options_.workshop.process.finish.tolerance;
   settings.spin_up = options_.spin_up;
+  settings.spindle_by_hand = options_.workshop.machine.spindle_by_hand;
   settings.coolant = options_.coolant;
   settings.planner = planner_settings(options_.workshop.machine);
   settings.look = [this](std::size_t /*operation*/, const ProgramLine& line) {

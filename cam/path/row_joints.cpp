@@ -16,7 +16,8 @@ constexpr double kJointRoom = 0.45;
 constexpr int kGridTries = 8;
 constexpr double kOnGrid = 0.05;
 
-/// How far a joint between straight pieces may be cut off by being moved, in RowProfile::finest.
+/// How far a joint between straight pieces may be cut off by being moved, in RowProfile::finest; of
+/// a coarse grid as much as heights are left off it: otherwise joints could not be moved by a step.
 constexpr double kCutOff = 4.0;
 
 /// Steps of the grid by which a level end is lengthened at most.
@@ -56,8 +57,8 @@ double place_on_grid(const RowProfile& profile, std::size_t joint, const Program
   const double z = profile.at(u, hint);
   const double after = profile.at(u + right, hint);
   const double corner = std::abs((after - z) / right - (z - before) / left);
-  const double room =
-      std::min(kJointRoom * std::min(left, right), kCutOff * profile.finest / corner);
+  const double cut_off = std::max(kCutOff * profile.finest, kOnGrid * grid.resolution);
+  const double room = std::min(kJointRoom * std::min(left, right), cut_off / corner);
   const double slope = (after - before) / (left + right);
   const double shift = (grid.height(z) - z) / slope;
   const double moved = std::abs(shift) <= room ? shift : 0.0;

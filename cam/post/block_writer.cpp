@@ -111,7 +111,7 @@ void BlockWriter::rapid_to_height(double z) {
   begin_line(0);
   add_number('Z', units);
   position_[2] = units;
-  end_line();
+  end_rapid(0);
 }
 
 void BlockWriter::rapid(const Eigen::Vector3d& end) {
@@ -122,7 +122,7 @@ void BlockWriter::rapid(const Eigen::Vector3d& end) {
   if (position_[0] != units[0] || position_[1] != units[1]) {
     begin_line(0);
     add_coordinates({units[0], units[1], *position_[2]});
-    end_line();
+    end_rapid(1);
   }
   rapid_to_height(end.z());
 }
@@ -209,9 +209,9 @@ void BlockWriter::write_arc_line(const Arc& arc, const Units& end) {
 }
 
 void BlockWriter::begin_line(int motion) {
-  if (motion_ != motion || post_.repeat_motion) {
-    add(post_.motions[static_cast<std::size_t>(motion)]);
-  }
+  const std::string& word = post_.motions[static_cast<std::size_t>(motion)];
+  const bool stands = motion_ && post_.motions[static_cast<std::size_t>(*motion_)] == word;
+  if (!stands || post_.repeat_motion) add(word);
   motion_ = motion;
 }
 
@@ -237,7 +237,9 @@ void BlockWriter::add_coordinates(const Units& end) {
 void BlockWriter::set_feed(double feed) {
   if (asked_feed_ == feed) return;
   const double scale = std::pow(10.0, post_.feed_decimals);
-  const double rounded = std::max(std::round(feed * scale), 1.0) / scale;
+  double rounded = std::max(std::round(feed * scale), 1.0) / scale;
+  // By their feed cuts are told from rapids that have no word of their own.
+  while (post_.rapids_are_feeds() && is_rapid_feed(rounded)) rounded += 1.0 / scale;
   LF_CHECK(feed > 0.0 && rounded < kFarthest, std::to_string(feed));
   asked_feed_ = feed;
   feed_units_ = std::llround(rounded * kFeedUnits);
@@ -245,13 +247,21 @@ void BlockWriter::set_feed(double feed) {
   feed_stands_ = false;
 }
 
+bool BlockWriter::is_rapid_feed(double feed) const {
+  const RapidFeeds& rapids = options_.rapid_feeds;
+  return std::find(rapids.begin(), rapids.end(), feed) != rapids.end();
+}
+
+void BlockWriter::end_rapid(std::size_t feed) {
+  if (post_.rapids_are_feeds()) add("F" + feed_text(post_, options_.rapid_feeds[feed]));
+  feed_stands_ = false;
+  text_.line(line_);
+  line_.clear();
+}
+
 void BlockWriter::end_line() {
-  if (motion_ == 0) {
-    feed_stands_ = false;
-  } else if (!feed_stands_) {
-    add(feed_word_);
-    feed_stands_ = true;
-  }
+  if (!feed_stands_ || post_.feed_on_every_line) add(feed_word_);
+  feed_stands_ = true;
   text_.line(line_);
   line_.clear();
 }

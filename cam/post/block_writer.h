@@ -14,10 +14,14 @@
 
 namespace lensforge {
 
-/// How finely a path is written.
+/// Feeds of rapids where the dialect has no word for them, mm/min: straight up or down, and across.
+using RapidFeeds = std::array<double, 2>;
+
+/// How a path is written.
 struct BlockOptions {
   int decimals = 5;               ///< Of coordinates, 0 … 6.
   double chord_tolerance = 5e-4;  ///< Of chords where the dialect has no such arc, mm, > 0.
+  RapidFeeds rapid_feeds = {};    ///< Of a dialect without a word for rapids, each > 0.
 };
 
 /// A circular arc, or a helix, from where the tool is; program coordinates, mm.
@@ -31,7 +35,8 @@ struct ArcMotion {
 
 /// Writes motions as the blocks of a dialect: program coordinates, mm. Words that a controller
 /// keeps in force are written when they change and not again, but for the feed, which is stated
-/// again after every rapid so that a program can be picked up there. A motion to where the tool is
+/// again after every rapid so that a program can be picked up there, or on every line if the
+/// dialect wants it. A motion to where the tool is
 /// already, to the decimals, leaves no line.
 ///
 /// Ends and centres are rounded to the decimals. A rapid along XY and Z becomes two, the upper
@@ -75,6 +80,9 @@ class BlockWriter {
   void add_number(char letter, std::int64_t units);
   void add_coordinates(const Units& end);
   void set_feed(double feed);
+  [[nodiscard]] bool is_rapid_feed(double feed) const;
+  /// @param feed  index in RapidFeeds.
+  void end_rapid(std::size_t feed);
   void end_line();
   void note(const Units& end, const DigestArc& arc);
 

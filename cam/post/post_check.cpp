@@ -181,14 +181,14 @@ void check_plane(const PostDescription& post, const TomlFields& fields, const st
 
 void check_motions(const PostDescription& post, const TomlFields& fields) {
   const std::pair<const char*, MotionMode> motions[] = {
-      {"rapid", MotionMode::kRapid},
+      {"rapid", post.rapids_are_feeds() ? MotionMode::kFeed : MotionMode::kRapid},
       {"feed", MotionMode::kFeed},
       {"clockwise", MotionMode::kArcClockwise},
       {"counter_clockwise", MotionMode::kArcCounterClockwise}};
   for (std::size_t i = 0; i < std::size(motions); ++i) {
-    const std::string line = i < 2 ? post.motions[i] + " X1" : post.motions[i] + " X1 I0.5";
+    const std::string line = post.motions[i] + (i < 2 ? " X1 F100" : " X1 I0.5 F100");
     Trial trial(post, fields);
-    trial.run(motions[i].first, {"G21 G17 F100", line});
+    trial.run(motions[i].first, {"G21 G17", line});
     trial.require(motions[i].first, trial.interpreter().state().motion == motions[i].second,
                   "is not the word of this motion for reader " + post.reader.name);
   }
@@ -209,15 +209,17 @@ void check_words(const PostDescription& post, const TomlFields& fields) {
   if (!post.coolant_off.empty()) check_word(post, fields, "coolant_off", post.coolant_off, off);
 }
 
-void check_program_lines(const PostDescription& post, const TomlFields& fields) {
+bool check_program_lines(const PostDescription& post, const TomlFields& fields) {
   Trial trial(post, fields);
   const auto& state = trial.interpreter();
   trial.run("head", post.head);
   trial.run("start", post.start);
   check_start(post, fields);
   const int system = state.state().coordinate_system;
+  bool applies_length = false;
   for (int tool = 0; tool < 2; ++tool) {
     trial.run("tool", post.tool);
+    applies_length = state.state().tool_length != 0;
     trial.require("tool", !post.changes_tools() || state.state().tool == 1,
                   "must name the tool: T{tool}");
     trial.run("spindle", post.spindle);
@@ -234,6 +236,7 @@ void check_program_lines(const PostDescription& post, const TomlFields& fields) 
   }
   trial.run("end", post.end);
   trial.require("end", state.ended(), "must end the program (M2 or M30)");
+  return applies_length;
 }
 
 }  // namespace lensforge

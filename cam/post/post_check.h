@@ -11,8 +11,9 @@ namespace lensforge {
 void check_words(const PostDescription& post, const TomlFields& fields);
 
 /// Tries out the lines of a program with the description's own reader.
+/// @return whether those before a tool's first operation put its length into force.
 /// @throw InputError naming the key in `fields` and the line with what the reader says, or which
 ///        rule the lines break.
-void check_program_lines(const PostDescription& post, const TomlFields& fields);
+bool check_program_lines(const PostDescription& post, const TomlFields& fields);
 
 }  // namespace lensforge

@@ -61,6 +61,10 @@ void read_lines(TomlFields fields, PostDescription& post) {
   post.percent = fields.flag("percent");
   post.spaces = fields.flag("spaces");
   post.repeat_motion = fields.flag("repeat_motion");
+  post.feed_on_every_line = fields.flag_or("feed_on_every_line", false);
+  if (post.reader.feed_on_every_line && !post.feed_on_every_line) {
+    fields.refuse("feed_on_every_line", "must be true for reader " + post.reader.name);
+  }
   read_line_numbers(fields, post);
   const double bytes = fields.number({"largest_file", 0, 1e15});
   if (bytes > 0 && bytes < kSmallestFile) {
@@ -100,6 +104,9 @@ void read_arcs(TomlFields fields, PostDescription& post) {
   post.arcs = form == "centre"   ? ArcForm::kCentre
               : form == "radius" ? ArcForm::kRadius
                                  : ArcForm::kNone;
+  if (post.arcs == ArcForm::kRadius && !post.reader.radius_arcs) {
+    fields.refuse("form", "must be centre or none for reader " + post.reader.name);
+  }
   post.helix = fields.flag("helix");
   fields.finish();
 }
@@ -113,11 +120,12 @@ void read_program(TomlFields fields, PostDescription& post) {
   post.tool_end = fields.texts("tool_end");
   post.end = fields.texts("end");
   fields.finish();
-  check_program_lines(post, fields);
+  post.applies_length = check_program_lines(post, fields);
 }
 
 GcodeDialect read_reader(TomlFields& root) {
-  const std::string name = root.one_of("reader", {"grbl", "grblhal", "linuxcnc", "fanuc"});
+  const std::string name =
+      root.one_of("reader", {"grbl", "grblhal", "linuxcnc", "fanuc", "weihong"});
   return *find_dialect(name);
 }
 

@@ -42,6 +42,7 @@ struct PostDescription {
   bool percent = false;
   bool spaces = true;
   bool repeat_motion = false;
+  bool feed_on_every_line = false;  ///< Of those that move at feed.
   LineNumbers numbers = LineNumbers::kNone;
   std::int64_t first_number = 10;
   std::int64_t number_step = 10;
@@ -52,6 +53,7 @@ struct PostDescription {
   std::string comment_close = ")";
   bool upper_case_comments = false;
 
+  /// The first two are one where there is no word for rapids (rapids_are_feeds()).
   std::array<std::string, 4> motions{"G0", "G1", "G2", "G3"};
   /// By the number of the axis that the plane is normal to: YZ, ZX, XY.
   std::array<std::string, 3> planes{"G19", "G18", "G17"};
@@ -70,11 +72,13 @@ struct PostDescription {
   std::vector<std::string> spindle;
   std::vector<std::string> tool_end;
   std::vector<std::string> end;
+  bool applies_length = false;  ///< `tool` puts the tool's length into force (G43).
 
   [[nodiscard]] bool changes_tools() const { return !tool.empty(); }
+  [[nodiscard]] bool rapids_are_feeds() const { return motions[0] == motions[1]; }
 };
 
-/// Names of the descriptions that are built in: linuxcnc, grbl, fanuc.
+/// Names of the descriptions that are built in: linuxcnc, grbl, grblhal, fanuc, weihong.
 std::vector<std::string> builtin_posts();
 
 /// Reads a description. Its lines are tried out: what they make of a small program has to be read

@@ -72,12 +72,23 @@ std::string tool_text(const Tool& tool) {
   return text;
 }
 
+std::string length_words(const PostDescription& post, std::size_t tools, const std::string& tool) {
+  if (tools > 1) {
+    return post.applies_length ? "G43 takes the length of every tool from the tool table"
+                               : "touch off Z with every tool after its change, M6";
+  }
+  return "touch off Z with " + tool +
+         (post.applies_length ? ", unless the tool table has its length, G43" : "");
+}
+
 ProgramPart::ProgramPart(const ProgramContext& context, const std::filesystem::path& path,
                          std::vector<std::size_t> operations, std::int64_t number)
     : context_(context),
       operations_(std::move(operations)),
       text_(context.post, path),
-      blocks_(context.post, {context.settings.decimals, context.settings.chord_tolerance}, text_),
+      blocks_(context.post,
+              {context.settings.decimals, context.settings.chord_tolerance, context.rapid_feeds},
+              text_),
       texts_(texts_of(context, number)),
       tail_bytes_(tail_bytes()) {
   write_header();
@@ -97,6 +108,8 @@ void ProgramPart::write_header() {
     const Tool& tool = context_.plan.operations[index].tool;
     if (listed.insert(tool.number).second) comment(tool_text(tool));
   }
+  comment("Z: " + length_words(context_.post, listed.size(),
+                               "this tool, T" + std::to_string(*listed.begin())));
   text_.reserve(kLateComments + static_cast<int>(operations_.size()));
 }
 
@@ -128,6 +141,16 @@ void ProgramPart::change_tool(const Tool& tool) {
   texts_["rpm"] = trimmed_decimal(tool.spindle_rpm, 3);
   write_lines(context_.post.tool);
   blocks_.rapid_to_height(context_.plan.safe_z);
+  start_spindle(tool);
+}
+
+void ProgramPart::start_spindle(const Tool& tool) {
+  if (context_.settings.spindle_by_hand) {
+    text_.plain_line(comment_line(
+        context_.post, "switch the spindle on: " + trimmed_decimal(tool.spindle_rpm, 0) + " rpm"));
+    text_.line("M0");
+    return;
+  }
   for (const std::string& line : context_.post.spindle) {
     if (const auto filled = fill_line(line, texts_)) text_.line(*filled);
   }

@@ -20,7 +20,12 @@ struct ProgramContext {
   const ProgramPlan& plan;
   const PostDescription& post;
   const ProgramSettings& settings;
+  RapidFeeds rapid_feeds = {};  ///< Where the dialect has no word for rapids.
 };
+
+/// How the tool's length gets into Z: by the control's table, or by touching off, in a sentence
+/// without its end. @param tools  that a program uses. @param tool  the one, in words.
+std::string length_words(const PostDescription& post, std::size_t tools, const std::string& tool);
 
 /// Where an operation begins in a file.
 struct OperationStart {
@@ -62,6 +67,7 @@ class ProgramPart {
   void write_header();
   void write_lines(const std::vector<std::string>& lines);
   void change_tool(const Tool& tool);
+  void start_spindle(const Tool& tool);
   [[nodiscard]] Eigen::Vector3d placed(const Eigen::Vector3d& point) const;
   [[nodiscard]] std::size_t tail_bytes() const;
 

@@ -58,6 +58,8 @@ struct ProgramSettings {
   double blend_tolerance = 0.0;
   double chord_tolerance = 5e-4;  ///< Of chords where the dialect has no such arc, mm, > 0.
   double spin_up = 3.0;           ///< Dwell after the spindle was switched on, s, ≥ 0.
+  /// The operator switches the spindle, not the program, which pauses (M0) for it instead.
+  bool spindle_by_hand = false;
   Coolant coolant = Coolant::kOff;
   ProgramGrouping grouping = ProgramGrouping::kOperation;
   std::uintmax_t largest_file = 0;  ///< Bytes, ≥ 65536; 0 for the dialect's own limit, if any.

@@ -43,6 +43,10 @@ bool goes_to_reference(const GcodeBlock& block) {
 /// What a part is cut with has to stand in the program, not in the controller's memory.
 class Checks {
  public:
+  explicit Checks(const GcodeDialect& dialect)
+      : tells_rapids_(dialect.rapid_word || dialect.rapid_feeds[0] > 0.0),
+        spindle_by_hand_(dialect.spindle_by_hand) {}
+
   void take(const ProgramLine& line) {
     for (const GcodeMotion& motion : line.effect.motions()) {
       if (!motion.rapid) check_cut(motion, line.state);
@@ -54,15 +58,18 @@ class Checks {
 
  private:
   void check_cut(const GcodeMotion& motion, const GcodeState& state) const {
-    if (state.spindle == SpindleTurn::kOff || !(state.rpm > 0.0)) {
+    const bool off = state.spindle == SpindleTurn::kOff || !(state.rpm > 0.0);
+    if (off && !spindle_by_hand_ && tells_rapids_) {
       throw GcodeError(motion.line, "moves at feed while the spindle is off");
     }
-    if (!(known_[0] && known_[1] && known_[2])) {
+    if (tells_rapids_ && !(known_[0] && known_[1] && known_[2])) {
       throw GcodeError(motion.line, "moves at feed from a place that the program has not stated");
     }
     if (state.inches.value_or(true)) throw GcodeError(motion.line, "is not in millimetres");
   }
 
+  bool tells_rapids_;  ///< Else any motion may be one.
+  bool spindle_by_hand_;
   bool known_[3] = {false, false, false};
 };
 
@@ -70,7 +77,10 @@ class Checks {
 class Walk {
  public:
   Walk(std::istream& in, const GcodeDialect& dialect)
-      : reader_(in), interpreter_(dialect, start_state()), longest_(dialect.max_characters) {}
+      : reader_(in),
+        interpreter_(dialect, start_state()),
+        checks_(dialect),
+        longest_(dialect.max_characters) {}
 
   void run(const LineSink& sink, const RunControl& control) {
     while (const auto text = reader_.next()) {

@@ -213,6 +213,15 @@ void gather(std::vector<ReadPart>& parts, const std::vector<fs::path>& names,
   }
 }
 
+/// As fast as the axes go, to the dialect's decimals.
+RapidFeeds rapid_feeds(const PostDescription& post, const Eigen::Vector3d& rate) {
+  const double scale = std::pow(10.0, post.feed_decimals);
+  const auto rounded = [scale](double feed) {
+    return std::max(std::round(feed * scale), 1.0) / scale;
+  };
+  return {rounded(rate.z()), rounded(rate.head<2>().minCoeff())};
+}
+
 }  // namespace
 
 void validate(const ProgramSettings& settings, const PostDescription& post) {
@@ -242,7 +251,12 @@ PendingPrograms::PendingPrograms(const ProgramPlan& plan, const PostDescription&
                                  const ProgramSettings& settings, const fs::path& folder,
                                  const RunControl& control) {
   validate(settings, post);
-  const ProgramContext context{plan, post, settings};
+  PostDescription own = post;
+  const RapidFeeds rapids = rapid_feeds(post, settings.planner.max_rate);
+  if (own.rapids_are_feeds()) own.reader.rapid_feeds = rapids;
+  own.reader.spindle_by_hand = settings.spindle_by_hand;
+  programs_.reader = own.reader;
+  const ProgramContext context{plan, own, settings, rapids};
   std::int64_t number = post.first_program_number;
   programs_.times.resize(plan.operations.size());
   for (const Group& group : group_operations(context)) {

@@ -41,6 +41,7 @@ struct ProgramFile {
 /// What a plan came to.
 struct ProgramFiles {
   std::vector<ProgramFile> files;           ///< In the order in which they are to be run.
+  GcodeDialect reader;                      ///< By which they were read back.
   std::vector<OperationSummary> summaries;  ///< Of the plan's operations.
   std::vector<ProgramTime> times;           ///< Likewise, over all files.
   std::vector<std::string> names;           ///< Of all files that were read back, in that order.

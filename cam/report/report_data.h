@@ -55,6 +55,7 @@ struct SetupSheet {
   Eigen::Vector3d zero = Eigen::Vector3d::Zero();  ///< Where the program's X0 Y0 Z0 lies.
   std::string zero_words;                          ///< "top of the blank, lower left corner …"
   std::string up_words;                            ///< Which face lies up and which down.
+  std::string length_words;                        ///< How the tools' lengths get into Z.
   std::optional<Front> front;                      ///< Of the blank, there before the first cut.
   std::string front_words;                         ///< Where it has to lie.
   std::vector<NamedBox> keep_outs;                 ///< Clamps and whatever else no tool may enter.

@@ -31,8 +31,9 @@ json list(const Items& items, const Make& make) {
 }
 
 json check_json(const LimitCheck& check) {
-  return {{"name", check.key},    {"words", check.name}, {"value", number(check.value)},
-          {"limit", check.limit}, {"unit", check.unit},  {"pass", check.passes()}};
+  return {{"name", check.key},      {"words", check.name}, {"value", number(check.value)},
+          {"limit", check.limit},   {"unit", check.unit},  {"pass", check.passes()},
+          {"advice", check.advises}};
 }
 
 json quality_json(const RenderedSurface& surface) {
@@ -171,10 +172,15 @@ json setup_json(const SetupSheet& setup) {
   const auto box = [](const NamedBox& item) {
     return json{{"name", item.name}, {"box", box_json(item.box)}};
   };
-  json sheet{{"machine", setup.machine},     {"material", setup.material},
-             {"part", box_json(setup.part)}, {"blank", box_json(setup.blank)},
-             {"zero", triple(setup.zero)},   {"zero_words", setup.zero_words},
-             {"up_words", setup.up_words},   {"keep_outs", list(setup.keep_outs, box)}};
+  json sheet{{"machine", setup.machine},
+             {"material", setup.material},
+             {"part", box_json(setup.part)},
+             {"blank", box_json(setup.blank)},
+             {"zero", triple(setup.zero)},
+             {"zero_words", setup.zero_words},
+             {"up_words", setup.up_words},
+             {"length_words", setup.length_words},
+             {"keep_outs", list(setup.keep_outs, box)}};
   if (setup.front) {
     sheet["front"] = std::visit([](const auto& front) { return front_json(front); }, *setup.front);
   }
@@ -231,27 +237,28 @@ json choice_json(const ReportChoice& choice) {
 }
 
 json report_json(const ReportData& data) {
-  json report{
-      {"_written_by", program_mark()},  // Sorted first: written_by_lensforge() looks there.
-      {"format", "lensforge.cam"},
-      {"version", 1},
-      {"program", data.program},
-      {"units", "mm"},
-      {"job", data.job},
-      {"part", data.part},
-      {"lens_id", data.lens_id},
-      {"z_offset", data.z_offset},
-      {"minutes", data.minutes()},
-      {"tools", list(data.tools, tool_json)},
-      {"operations", list(data.operations, operation_json)},
-      {"setup", setup_json(data.setup)},
-      {"parameters", list(data.parameters, group_json)},
-      {"verdict",
-       {{"pass", data.verdict.passes()}, {"checks", list(data.verdict.checks, check_json)}}},
-      {"places", list(data.places, place_json)},
-      {"choices", list(data.choices, choice_json)},
-      {"warnings", data.warnings},
-      {"seconds", data.seconds}};
+  json report{{"_written_by", program_mark()},  // Sorted first: written_by_lensforge() looks there.
+              {"format", "lensforge.cam"},
+              {"version", 1},
+              {"program", data.program},
+              {"units", "mm"},
+              {"job", data.job},
+              {"part", data.part},
+              {"lens_id", data.lens_id},
+              {"z_offset", data.z_offset},
+              {"minutes", data.minutes()},
+              {"tools", list(data.tools, tool_json)},
+              {"operations", list(data.operations, operation_json)},
+              {"setup", setup_json(data.setup)},
+              {"parameters", list(data.parameters, group_json)},
+              {"verdict",
+               {{"pass", data.verdict.passes()},
+                {"limits_missed", data.verdict.missed()},
+                {"checks", list(data.verdict.checks, check_json)}}},
+              {"places", list(data.places, place_json)},
+              {"choices", list(data.choices, choice_json)},
+              {"warnings", data.warnings},
+              {"seconds", data.seconds}};
   if (!data.leakage.steps.empty()) {
     report["leakage"] = leakage_json(data);
     report["sampling"] = sampling_json(data.sampling);

@@ -65,6 +65,23 @@ std::string check_value(double value, const LimitCheck& check) {
                      (check.unit.empty() ? "" : " " + check.unit));
 }
 
+std::string check_state(const LimitCheck& check) {
+  if (check.missed()) return element("span", "class=\"state bad\"", "✘ missed");
+  if (!check.passes()) return element("span", "class=\"state\"", "advice: above it");
+  return element("span", "class=\"state good\"", "✔ met");
+}
+
+/// "2 limits"
+std::string counted(int count, const std::string& what) {
+  return std::to_string(count) + " " + what + (count == 1 ? "" : "s");
+}
+
+std::string headline(const Verdict& verdict) {
+  if (verdict.missed() > 0) return "✘ " + counted(verdict.missed(), "limit") + " missed";
+  if (verdict.passes()) return "✔ Within all limits";
+  return "✔ No limit missed; advice on " + counted(verdict.advice(), "value");
+}
+
 std::string tool_words(const Tool& tool) {
   const std::string shape = tool.shape == CutterShape::kBall   ? "ball"
                             : tool.shape == CutterShape::kBull ? "bull-nose"
@@ -88,13 +105,10 @@ std::string header(const ReportData& data) {
   const std::string title = element("h1", "", escape_html(heading + data.job)) +
                             element("div", "class=\"soft\"", escape_html(under));
   if (data.verdict.checks.empty()) return element("div", "", title);
-  const int failures = data.verdict.failures();
-  const std::string words = failures == 0
-                                ? "✔ Within all limits"
-                                : "✘ " + std::to_string(failures) +
-                                      (failures == 1 ? " limit not met" : " limits not met");
+  const bool good = data.verdict.missed() == 0;
   return element("div", "", title) +
-         element("div", failures == 0 ? "class=\"verdict good\"" : "class=\"verdict bad\"", words);
+         element("div", good ? "class=\"verdict good\"" : "class=\"verdict bad\"",
+                 headline(data.verdict));
 }
 
 std::string pictures(const ReportData& data) {
@@ -113,11 +127,8 @@ std::string verdict(const ReportData& data) {
   if (data.verdict.checks.empty()) return "";
   std::vector<std::vector<std::string>> rows;
   for (const LimitCheck& check : data.verdict.checks) {
-    const bool good = check.passes();
     rows.push_back({escape_html(check.name), check_value(check.value, check),
-                    check_value(check.limit, check),
-                    element("span", good ? "class=\"state good\"" : "class=\"state bad\"",
-                            good ? "✔ met" : "✘ not met")});
+                    check_value(check.limit, check), check_state(check)});
   }
   const std::vector<TableColumn> columns{
       {"what", false}, {"found", true}, {"at most", true}, {"limit", false}};

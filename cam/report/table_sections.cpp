@@ -133,11 +133,10 @@ std::string nest_words(const SetupSheet& sheet) {
 std::string setup(const ReportData& data) {
   const SetupSheet& sheet = data.setup;
   if (sheet.blank.isEmpty()) return "";
-  std::vector<NamedText> list{{"Machine", sheet.machine},
-                              {"Blank", box_text(sheet.blank) + ", " + sheet.material},
-                              {"Part", box_text(sheet.part)},
-                              {"Program zero", sheet.zero_words},
-                              {"Which way up", sheet.up_words}};
+  std::vector<NamedText> list{
+      {"Machine", sheet.machine},       {"Blank", box_text(sheet.blank) + ", " + sheet.material},
+      {"Part", box_text(sheet.part)},   {"Program zero", sheet.zero_words},
+      {"Which way up", sheet.up_words}, {"Tool length", sheet.length_words}};
   if (sheet.front) list.push_back({"Front", sheet.front_words});
   if (data.mirror && data.part != "mould") {
     list.push_back({"To reflect",

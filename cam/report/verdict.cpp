@@ -4,17 +4,31 @@
 #include <algorithm>
 
 #include "core/error.h"
+#include "core/text/number_text.h"
 
 namespace lensforge {
 
-bool Verdict::passes() const { return failures() == 0; }
+bool Verdict::passes() const { return missed() + advice() == 0; }
 
-int Verdict::failures() const {
+int Verdict::missed() const {
   return static_cast<int>(std::count_if(checks.begin(), checks.end(),
-                                        [](const LimitCheck& check) { return !check.passes(); }));
+                                        [](const LimitCheck& check) { return check.missed(); }));
 }
 
-Verdict judge_cut(const CutFindings& findings, const CutLimits& limits) {
+int Verdict::advice() const {
+  return static_cast<int>(std::count_if(checks.begin(), checks.end(), [](const LimitCheck& check) {
+    return !check.passes() && !check.missed();
+  }));
+}
+
+std::string verdict_words(int missed, int advice) {
+  if (missed > 0) return "done, but limits were missed: see the report";
+  if (advice > 0) return "done, no limit was missed; the report has advice";
+  return "done, all limits met";
+}
+
+Verdict judge_cut(const CutFindings& findings, const CutLimits& limits,
+                  const std::set<std::string>& stated) {
   struct Shown {
     const char* unit;
     double scale;
@@ -27,12 +41,12 @@ Verdict judge_cut(const CutFindings& findings, const CutLimits& limits) {
   const auto check = [&](const char* key, const char* name, std::optional<double> value,
                          double limit, const Shown& shown) {
     if (!(limit >= 0.0)) {
-      throw InputError("limit " + std::string(key) + " is " + std::to_string(limit) +
+      throw InputError("limit " + std::string(key) + " is " + shortest_text(limit) +
                        ": must be at least 0");
     }
     if (!value) return;
     verdict.checks.push_back({key, name, shown.scale * *value, shown.scale * limit, shown.unit,
-                              shown.decimals, shown.of_quality});
+                              shown.decimals, shown.of_quality && !stated.contains(key)});
   };
   check("leakage", "leakage", findings.leakage, limits.leakage, kPercent);
   check("dark_flux", "light in dark parts", findings.dark_flux, limits.dark_flux, kPercent);

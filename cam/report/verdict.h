@@ -2,12 +2,14 @@
 #pragma once
 
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
 namespace lensforge {
 
-/// Most that a part may have of each fault before the report advises against cutting it.
+/// Most that a part may have of each fault. Those of quality (all but gouge and block_rate) are
+/// limits where they were stated, and advice otherwise.
 struct CutLimits {
   double leakage = 0.05;       ///< Share of the light that lands where the design puts less.
   double dark_flux = 0.02;     ///< Share of the light in the target's dark parts.
@@ -38,13 +40,15 @@ struct LimitCheck {
   std::string key;   ///< As in CutLimits.
   std::string name;  ///< In words.
   double value = 0.0;
-  double limit = 0.0;       ///< The value may be at most this.
-  std::string unit;         ///< "%", "µm", "mrad", "lines/s" or none.
-  int decimals = 0;         ///< That are shown.
-  bool of_quality = false;  ///< Not of safety: a default limit is advice.
+  double limit = 0.0;    ///< The value may be at most this.
+  std::string unit;      ///< "%", "µm", "mrad", "lines/s" or none.
+  int decimals = 0;      ///< That are shown.
+  bool advises = false;  ///< A limit of quality that nobody stated.
 
   /// A value that is no number does not pass.
   [[nodiscard]] bool passes() const { return value <= limit; }
+  /// It does not pass, and that is no mere advice.
+  [[nodiscard]] bool missed() const { return !passes() && !advises; }
 };
 
 /// All findings against their limits.
@@ -52,10 +56,18 @@ struct Verdict {
   std::vector<LimitCheck> checks;
 
   [[nodiscard]] bool passes() const;
-  [[nodiscard]] int failures() const;
+  /// How many limits are missed: these give exit code 3.
+  [[nodiscard]] int missed() const;
+  /// How many checks do not pass and are advice.
+  [[nodiscard]] int advice() const;
 };
 
+/// What came of a cut, or of several, in a sentence.
+std::string verdict_words(int missed, int advice);
+
+/// @param stated  keys of the limits of quality that count as limits.
 /// @throw InputError naming the limit and its value if one is negative or no number.
-Verdict judge_cut(const CutFindings& findings, const CutLimits& limits);
+Verdict judge_cut(const CutFindings& findings, const CutLimits& limits,
+                  const std::set<std::string>& stated = {});
 
 }  // namespace lensforge

@@ -275,6 +275,8 @@ void describe(Visitor& v, Machine& machine) {
   describe_axes(v, "travel", machine.travel, {kMinRate, kLength}, "mm");
   v.number({"spindle_min_rpm", 0.0, kSpin}, machine.spindle_min_rpm, "");
   v.number({"spindle_max_rpm", 1.0, kSpin}, machine.spindle_max_rpm, "the paper cuts at 23000");
+  v.flag("spindle_by_hand", machine.spindle_by_hand,
+         "a router that the operator switches: programs pause for it, without M3");
   describe_axes(v, "max_rate", machine.max_rate, {kMinRate, kRate}, "mm/min, rapids and feeds");
   describe_axes(v, "acceleration", machine.acceleration, {kMinRate, kRate}, "mm/s^2");
   v.number({"junction_deviation", 0.0, 1.0}, machine.junction_deviation,

@@ -3,8 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <sstream>
 #include <system_error>
+#include <utility>
 
 #include "core/error.h"
 #include "core/io/files.h"
@@ -16,12 +18,14 @@ namespace lensforge {
 namespace {
 
 constexpr std::size_t kLongestText = 200;
+constexpr std::size_t kMostEdits = 2;  ///< Of a key that was mistyped: two letters swapped.
 
 /// The value as the file has it; a table or an array only by its kind.
 std::string shown(const toml::node* value) {
   if (value == nullptr) return "missing";
   if (value->is_table()) return "a table";
   if (value->is_array()) return "an array";
+  if (const auto* number = value->as_floating_point()) return shortest_text(number->get());
   std::ostringstream text;
   value->visit([&text](const auto& node) {
     if constexpr (!toml::is_table<decltype(node)> && !toml::is_array<decltype(node)>) text << node;
@@ -31,6 +35,33 @@ std::string shown(const toml::node* value) {
 
 std::string range_text(const NumberRule& rule) {
   return number_text(rule.least) + " to " + number_text(rule.most);
+}
+
+/// Letters to put in, take out or replace to make one text of another (Levenshtein).
+std::size_t edits_between(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), std::size_t{0});
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    std::size_t before = std::exchange(row[0], i);
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      const std::size_t replaced = before + (a[i - 1] == b[j - 1] ? 0 : 1);
+      before = std::exchange(row[j], std::min({row[j] + 1, row[j - 1] + 1, replaced}));
+    }
+  }
+  return row.back();
+}
+
+/// The known key that was most likely meant; empty if none is near.
+std::string likely_key(const std::string& key, const std::set<std::string>& known) {
+  std::string likely;
+  std::size_t least = kMostEdits + 1;
+  for (const std::string& candidate : known) {
+    if (key.size() > candidate.size() + kMostEdits) continue;
+    const std::size_t edits = edits_between(key, candidate);
+    if (edits < least && edits < candidate.size()) likely = candidate;
+    least = std::min(least, edits);
+  }
+  return likely;
 }
 
 bool is_control(char c) { return static_cast<unsigned char>(c) < ' ' || c == '\x7F'; }
@@ -180,7 +211,9 @@ std::vector<std::string> TomlFields::keys() const {
 
 void TomlFields::finish() const {
   for (const std::string& key : keys()) {
-    if (!known_.contains(key)) refuse(key, source_.kind + ": unknown key");
+    if (known_.contains(key)) continue;
+    const std::string meant = likely_key(key, known_);
+    refuse(key, source_.kind + ": unknown key" + (meant.empty() ? "" : "; use " + meant));
   }
 }
 

@@ -40,6 +40,8 @@ struct Rs274Motion {
   Eigen::Vector3d to = Eigen::Vector3d::Zero();
   double feed_rate = 0.0;  ///< mm/min in force.
   std::optional<Rs274Arc> arc;
+  int tool = 0;              ///< In the spindle.
+  double tool_offset = 0.0;  ///< By which the spindle is above `to`, mm.
 };
 
 /// What the interpreter made of a program.
@@ -77,17 +79,20 @@ class Rs274Parser {
     if (line.find("CANON_PLANE_XZ") != std::string::npos) normal_ = 1;
     if (line.find("CANON_PLANE_YZ") != std::string::npos) normal_ = 0;
     if (const auto n = numbers(line, "SET_FEED_RATE"); !n.empty()) feed_rate_ = n[0];
+    if (const auto n = numbers(line, "CHANGE_TOOL"); !n.empty()) tool_ = static_cast<int>(n[0]);
+    if (const auto n = numbers(line, "USE_TOOL_LENGTH_OFFSET"); !n.empty()) tool_offset_ = n[2];
     if (const auto n = numbers(line, "STRAIGHT_TRAVERSE"); !n.empty()) add_straight(n, false);
     if (const auto n = numbers(line, "STRAIGHT_FEED"); !n.empty()) add_straight(n, true);
     if (const auto n = numbers(line, "ARC_FEED"); !n.empty()) add_arc(n);
   }
 
   void add_straight(const std::vector<double>& n, bool feed) {
-    motions_.push_back({feed, {n[0], n[1], n[2]}, feed_rate_, std::nullopt});
+    motions_.push_back({feed, {n[0], n[1], n[2]}, feed_rate_, std::nullopt, tool_, tool_offset_});
   }
 
   void add_arc(const std::vector<double>& n) {
-    Rs274Motion motion{true, Eigen::Vector3d::Zero(), feed_rate_, std::nullopt};
+    Rs274Motion motion{true,        Eigen::Vector3d::Zero(), feed_rate_, std::nullopt, tool_,
+                       tool_offset_};
     motion.to[(normal_ + 1) % 3] = n[0];
     motion.to[(normal_ + 2) % 3] = n[1];
     motion.to[normal_] = n[5];
@@ -97,15 +102,21 @@ class Rs274Parser {
 
   int normal_ = 2;
   double feed_rate_ = 0.0;
+  int tool_ = 0;
+  double tool_offset_ = 0.0;
   std::vector<Rs274Motion> motions_;
 };
+
+/// Tools without lengths.
+inline constexpr const char* kShortTools = "T1 P1 Z0 D0.4\nT2 P2 Z0 D1\nT3 P3 Z0 D3\n";
 
 /// Runs the interpreter. Without a tool table it stops without a word, and it rewrites its variable
 /// file: both are made afresh.
 inline Rs274Reading read_with_rs274(const std::filesystem::path& rs274,
-                                    const std::filesystem::path& program) {
+                                    const std::filesystem::path& program,
+                                    const std::string& tools = kShortTools) {
   const TempFolder scratch;
-  write_bytes(scratch / "tool.tbl", "T1 P1 Z0 D0.4\nT2 P2 Z0 D1\nT3 P3 Z0 D3\n");
+  write_bytes(scratch / "tool.tbl", tools);
   write_bytes(scratch / "scratch.var", "");
   const std::filesystem::path out = scratch / "out.canon";
   const std::string command = "HOME='" + scratch.path().string() + "' '" + rs274.string() +

@@ -58,6 +58,28 @@ TEST_F(Cam, TheWorkshopIsShownAsJson) {
   EXPECT_EQ(outcome.json()["workshop"]["tool"].size(), 4U);
 }
 
+TEST_F(Cam, TheWorkshopIsShownWithoutAFolder) {
+  const Outcome outcome = run({"cam", "--show-workshop", "--pitch", "0.05"});
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("\npitch = 0.05 "));
+  expect_refusal(run({"cam", "--pitch", "0.05"}), 2, {"DIR: is missing", "lensforge cam portrait"});
+}
+
+TEST_F(Cam, AMistypedKeyIsNamedWithItsNumberAsWrittenAndTheKeyThatIsNear) {
+  write(at("shop.toml"), "[finish]\npicth = 0.05\n");
+  expect_refusal(run({"cam", "--show-workshop", "--workshop", path("shop.toml")}), 2,
+                 {"finish.picth: 0.05: ", "unknown key; use pitch"});
+}
+
+TEST_F(Cam, ALimitThatNobodyStatedIsAdvice) {
+  const Outcome advised = run(cam({}));
+  EXPECT_THAT(advised.out, HasSubstr("  advice: error of the path's direction"));
+  EXPECT_THAT(advised.out, Not(HasSubstr("limit missed: error of the path's direction")));
+  const Outcome stated = run(cam({"--max-slope", "0.002"}));
+  EXPECT_EQ(stated.exit_code, 3);
+  EXPECT_THAT(stated.out, HasSubstr("  limit missed: error of the path's direction"));
+}
+
 TEST_F(Cam, AProgramThatWasEditedIsReplacedOnlyByForce) {
   ASSERT_EQ(run(cam({})).exit_code, kUnroughed);
   ASSERT_EQ(run(cam({})).exit_code, kUnroughed);
@@ -137,7 +159,7 @@ TEST_F(Cam, ATravelTooShortAndAnotherIndexAreMissedLimits) {
   write(at("shop.toml"), "[machine]\ntravel_x = 90.0\n[material]\nior = 1.586\n");
   const Outcome outcome = run(cam({"--workshop", path("shop.toml")}));
   EXPECT_EQ(outcome.exit_code, 3);
-  EXPECT_THAT(outcome.out, HasSubstr("limit not met: machine travel along X"));
+  EXPECT_THAT(outcome.out, HasSubstr("limit missed: machine travel along X"));
   EXPECT_THAT(outcome.err, HasSubstr("the workshop's material has index 1.586, the lens was "
                                      "designed for 1.49"));
   EXPECT_THAT(content(at("lens/cam/report.html")), HasSubstr("machine&#39;s travel"));

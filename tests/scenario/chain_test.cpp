@@ -184,11 +184,24 @@ TEST_F(Chain, CamGivesTheSameBytesOnOneAndTwoThreads) {
   }
 }
 
+TEST_F(Chain, InfoSaysWhatItPassesOverInAProgram) {
+  write(at("job.nc"), "#<x> = -1\nG0 X0 Y0 Z[5]\nG1 Z#<x> F100\nX[10*2]\nM2\n");
+  const Outcome text = run({"info", path("job.nc")});
+  EXPECT_THAT(text.out, HasSubstr("4 lines with parameters or expressions (# or [ ]), the first is "
+                                  "line 1: where they lead is not counted"));
+  EXPECT_THAT(text.out, ::testing::Not(HasSubstr("moves nothing")));
+  EXPECT_THAT(text.out, ::testing::Not(HasSubstr("0.0000")));
+  const nlohmann::json json = run({"info", path("job.nc"), "--json"}).json();
+  EXPECT_EQ(json["passed_over"], 4);
+  EXPECT_EQ(json["moves"], 0);
+  EXPECT_FALSE(json.contains("x"));
+}
+
 TEST_F(Chain, CamTellsALimitThatWasStatedAndIsNotMet) {
   place_small_lens(at("lens"));
   const Outcome outcome = run(cam({"--max-leakage", "0.0001"}));
   EXPECT_EQ(outcome.exit_code, 3);
-  EXPECT_THAT(outcome.out, HasSubstr("limit not met: leakage"));
+  EXPECT_THAT(outcome.out, HasSubstr("limit missed: leakage"));
 }
 
 TEST_F(Chain, TheWorkshopIsShownAndReadBack) {

@@ -48,6 +48,20 @@ TEST_F(Send, LetsTheControllerCheckEveryLine) {
   EXPECT_FALSE(fs::exists(at("job.ngc.journal")));
 }
 
+TEST_F(Send, ADryRunSaysWhatIsAmissInAProgram) {
+  write(at("job.ngc"), "(\xC3\xBC)\nT1\nG21 G90\nS12000 M3\nG0 X10 Y10\nG1 X50 F600\nG2 I5\n");
+  const std::vector<std::string> words = {"ends with the spindle on", "no end",
+                                          "line 1 has a comment", "line 7 has a circle"};
+  const Outcome text = run({"send", path("job.ngc"), "--dry-run"});
+  EXPECT_EQ(text.exit_code, 0) << text.err;
+  const Outcome json = run(send({"--dry-run", "--json"}));
+  for (const std::string& word : words) {
+    EXPECT_THAT(text.err, HasSubstr("warning: "));
+    EXPECT_THAT(text.err, HasSubstr(word));
+    EXPECT_THAT(json.json()["warnings"].dump(), HasSubstr(word));
+  }
+}
+
 TEST_F(Send, RefusesWhatTheMachineCannotDo) {
   write(at("job.ngc"), "G21 G90\nS90000 M3\nG0 X900\nM5\nM2\n");
   expect_refusal(run(send({"--port", "sim:grbl"})), 2, {"S90000", "$30=24000", "moves X", "$130"});

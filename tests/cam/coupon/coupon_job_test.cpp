@@ -54,8 +54,11 @@ TEST(CouponJob, EveryDialectHasASealedProgramOfTheSameCut) {
     CouponOptions options;
     options.post = find_post(post, "--post");
     const CouponResult result = make(folder, options);
+    GcodeDialect reader = options.post.reader;
+    const Eigen::Vector3d& rate = options.workshop.machine.max_rate;
+    if (!reader.rapid_word) reader.rapid_feeds = {rate.z(), rate.head<2>().minCoeff()};
     const ProgramReading reading =
-        read_program(result.files.front(), options.post.reader, [](const auto&, int) {}, {});
+        read_program(result.files.front(), reader, [](const auto&, int) {}, {});
     EXPECT_EQ(reading.seal_holds, true) << post;
     EXPECT_NEAR(reading.cutting.min().z(), -0.16, 1e-9);
     EXPECT_NEAR(reading.cutting.max().y() - reading.cutting.min().y(), 40.0, 1e-9) << post;

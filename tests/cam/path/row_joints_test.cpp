@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <utility>
 
 namespace lensforge {
 namespace {
@@ -27,7 +28,8 @@ RowProfile wave_profile(double spacing) {
 
 TEST(RowJoints, LieOnTheCurveAndOnTheGrid) {
   const RowProfile profile = wave_profile(0.002);
-  for (const double resolution : {1e-6, 1e-5}) {
+  for (const auto& [resolution, share] :
+       {std::pair(1e-6, 0.95), std::pair(1e-5, 0.95), std::pair(1e-4, 0.6)}) {
     const ProgramGrid grid{resolution, 1.2345678};
     const RowJoints joints = row_joints(profile, grid);
     ASSERT_EQ(joints.written.size(), joints.exact.size());
@@ -46,7 +48,8 @@ TEST(RowJoints, LieOnTheCurveAndOnTheGrid) {
       if (std::abs(written.y() - joints.height[i]) <= 0.1 * resolution) ++near;
     }
     // All but those near the wave's crests, where heights hardly change, and the corners.
-    EXPECT_GE(static_cast<double>(near), 0.95 * static_cast<double>(joints.written.size()));
+    EXPECT_GE(static_cast<double>(near), share * static_cast<double>(joints.written.size()))
+        << resolution;
   }
 }
 

@@ -19,8 +19,8 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
-TEST(PostDescription, ThreeAreBuiltIn) {
-  EXPECT_THAT(builtin_posts(), ElementsAre("linuxcnc", "grbl", "fanuc"));
+TEST(PostDescription, FiveAreBuiltIn) {
+  EXPECT_THAT(builtin_posts(), ElementsAre("linuxcnc", "grbl", "grblhal", "fanuc", "weihong"));
   for (const std::string& name : builtin_posts()) {
     const PostDescription post = find_post(name, "--post");
     EXPECT_EQ(post.name, name);
@@ -31,12 +31,20 @@ TEST(PostDescription, ThreeAreBuiltIn) {
   EXPECT_TRUE(find_post("fanuc", "--post").percent);
 }
 
+TEST(PostDescription, ItsToolLinesTellWhetherTheyApplyTheLength) {
+  const auto applies = [](const char* name) { return find_post(name, "--post").applies_length; };
+  EXPECT_TRUE(applies("linuxcnc") && applies("fanuc"));
+  EXPECT_FALSE(applies("grbl") || applies("grblhal") || applies("weihong"));
+  EXPECT_FALSE(parse_post(post_text_with(", \"G43\"]", "]"), "f.toml").applies_length);
+  EXPECT_TRUE(parse_post(post_text_with("\"G43\"]", "\"G43 H{tool}\"]"), "f.toml").applies_length);
+}
+
 TEST(PostDescription, AUsersFileIsReadByItsPath) {
   const TempFolder folder;
   write_bytes(folder / "mine.toml", post_text_with("name = \"linuxcnc\"", "name = \"mine\""));
   EXPECT_EQ(find_post((folder / "mine.toml").string(), "--post").name, "mine");
   EXPECT_THAT(message_of<InputError>([] { (void)find_post("haas", "--post"); }),
-              AllOf(StartsWith("--post: 'haas' is none of linuxcnc, grbl, fanuc"),
+              AllOf(StartsWith("--post: 'haas' is none of linuxcnc, grbl, grblhal, fanuc, "),
                     HasSubstr(".toml file")));
   EXPECT_THAT(message_of<InputError>([] { (void)find_post("no/such.toml", "--post"); }),
               HasSubstr("no/such.toml: cannot be read"));
@@ -65,7 +73,9 @@ TEST(PostDescription, FaultsAreNamedWithFileKeyValueAndRule) {
        "lines.largest_number: 5: must not be below"},
       {"open = \"(\"", "open = \"<\"", "comments.open: '<': must be one of"},
       {"close = \")\"", "", "comments.close: missing: must be )"},
-      {"rapid = \"G0\"", "rapid = \"G1\"", "words.rapid: 'G1': is not the word of this motion"},
+      {"rapid = \"G0\"", "rapid = \"G2\"", "words.rapid: 'G2': 'G2 X1 F100': an arc without R"},
+      {"reader = \"linuxcnc\"", "reader = \"weihong\"",
+       "lines.feed_on_every_line: false: must be true for reader weihong"},
       {"clockwise = \"G2\"", "clockwise = \"G3\"",
        "words.clockwise: 'G3': is not the word of this"},
       {"plane_zx = \"G18\"", "plane_zx = \"G19\"",
@@ -95,7 +105,7 @@ TEST(PostDescription, FaultsAreNamedWithFileKeyValueAndRule) {
       {"S{rpm} M3", "S900 M3", "program.spindle: an array: must start the spindle at S{rpm}"},
       {"S{rpm} M3", "S{rpm} M3 G0 Z9", "these lines must not move the machine"},
       {"tool_end = [\"M5\", ", "tool_end = [", "program.tool_end: an array: must stop"},
-      {"\"{coolant_off}\", \"M2\"]", "\"{coolant_off}\"]", "program.end: an array: must end"},
+      {"\"G49\", \"M2\"]", "\"G49\"]", "program.end: an array: must end"},
       {"head = []", "head = [\"(what?)\"]", "characters must be printable ASCII but"},
       {"head = []", "head = [\"(\\u00e4)\"]", "characters must be printable ASCII but"},
       {"head = []", "head = [\"G21\"]", "'G21': the head is above the seal"},

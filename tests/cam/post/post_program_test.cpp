@@ -73,9 +73,9 @@ TEST(ProgramWriter, LinuxcncBeginsAndEndsSafely) {
   EXPECT_THAT(
       body_of(folder / "finish.ngc"),
       ElementsAre("G21 G90 G17 G94", "G40 G49 G80", "G54", "G64 P0.00004", "(operation: finish)",
-                  "T1 M6", "G0 Z5.0000", "S23000 M3", "M7", "G4 P2.5", "X1.0000 Y2.0000",
+                  "T1 M6", "G43", "G0 Z5.0000", "S23000 M3", "M7", "G4 P2.5", "X1.0000 Y2.0000",
                   "G1 Z-0.5000 F150", "X2.0000 F500", "G0 Z2.0000", "X3.0000", "G1 Z-0.6000 F150",
-                  "G18 G2 X5.0000 I1.0000 K0.0000 F500", "G0 Z5.0000", "M5", "M9", "M2"));
+                  "G18 G2 X5.0000 I1.0000 K0.0000 F500", "G0 Z5.0000", "M5", "M9", "G49", "M2"));
 }
 
 TEST(ProgramWriter, GrblHasNoToolChangeAndNoBlending) {
@@ -94,7 +94,7 @@ TEST(ProgramWriter, FanucHasNumbersPointsAndItsOwnEnd) {
   write(small_plan(), "fanuc", folder);
   const std::string text = read_bytes(folder / "finish.nc");
   EXPECT_TRUE(text.starts_with("%\r\nO1001 (TEST)\r\n(JOB: TEST)\r\n"));
-  EXPECT_TRUE(text.ends_with("G0 Z5.0000\r\nM5\r\nG91 G28 Z0.\r\nG90\r\nM30\r\n%\r\n"));
+  EXPECT_TRUE(text.ends_with("G0 Z5.0000\r\nM5\r\nG91 G28 Z0.\r\nG90 G49\r\nM30\r\n%\r\n"));
   EXPECT_THAT(text, HasSubstr("(OPERATION: FINISH)\r\nN10 G91 G28 Z0.\r\nG90\r\nT1 M6\r\n"
                               "G0 G43 H1 Z5.0000\r\nG0 Z5.0000\r\nS23000 M3\r\nG4 P2500\r\n"));
   EXPECT_THAT(text, HasSubstr(" F500.\r\n"));
@@ -112,12 +112,14 @@ TEST(ProgramWriter, TheHeaderTellsJobToolExtentTimeAndSeal) {
   EXPECT_EQ(lines[1], "(Z0: top of the blank)");
   EXPECT_EQ(lines[2], std::string("(").append(78, 'y').append(")"));
   EXPECT_EQ(lines[3], "(T1: ball-end mill 0.4 mm, 23000 rpm, F 500, plunge 150)");
-  EXPECT_THAT(lines[4], ::testing::StartsWith("(cutting X 1.0000 to 5.0000, Y 2.0000 to 2.0000 "));
-  EXPECT_THAT(lines[5], ::testing::StartsWith("(cutting Z -1.6000 to 5.0000 "));
-  EXPECT_THAT(lines[6], HasSubstr(std::to_string(lines.size()) + " lines, cutting length"));
-  EXPECT_THAT(lines[7], HasSubstr("part 1 of 1"));
-  EXPECT_THAT(lines[8], ::testing::StartsWith("(finish: "));
-  EXPECT_EQ(lines[9], std::string("(").append(seal_text(files.files[0].sha256)).append(")"));
+  EXPECT_EQ(lines[4],
+            "(Z: touch off Z with this tool, T1, unless the tool table has its length, G43)");
+  EXPECT_THAT(lines[5], ::testing::StartsWith("(cutting X 1.0000 to 5.0000, Y 2.0000 to 2.0000 "));
+  EXPECT_THAT(lines[6], ::testing::StartsWith("(cutting Z -1.6000 to 5.0000 "));
+  EXPECT_THAT(lines[7], HasSubstr(std::to_string(lines.size()) + " lines, cutting length"));
+  EXPECT_THAT(lines[8], HasSubstr("part 1 of 1"));
+  EXPECT_THAT(lines[9], ::testing::StartsWith("(finish: "));
+  EXPECT_EQ(lines[10], std::string("(").append(seal_text(files.files[0].sha256)).append(")"));
   EXPECT_EQ(check_seal(folder / "finish.ngc"), true);
   for (const std::string& line : lines) EXPECT_LE(line.size(), 80U);
   EXPECT_EQ(files.files[0].bytes, std::filesystem::file_size(folder / "finish.ngc"));
@@ -195,13 +197,72 @@ TEST(ProgramWriter, ToolsAreChangedWithTheSpindleOffAndTheToolUp) {
   const auto second = std::find(body.begin(), body.end(), "(operation: finish)");
   ASSERT_NE(second, body.end());
   EXPECT_EQ(*(second - 1), "G0 Z5.0000");
-  EXPECT_THAT(std::vector<std::string>(second + 1, second + 7),
-              ElementsAre("M5", "T2 M6", "G0 Z5.0000", "S23000 M3", "G4 P2.5", "X1.0000 Y2.0000"));
+  EXPECT_THAT(
+      std::vector<std::string>(second + 1, second + 8),
+      ElementsAre("M5", "T2 M6", "G43", "G0 Z5.0000", "S23000 M3", "G4 P2.5", "X1.0000 Y2.0000"));
   EXPECT_THAT(files.files[0].reading.tools, ElementsAre(7, 2));
   ASSERT_EQ(files.times.size(), 2U);
   EXPECT_EQ(files.files[0].operations.size(), 2U);
   EXPECT_NEAR(files.times[0].seconds + files.times[1].seconds, files.total.seconds, 1e-9);
   EXPECT_EQ(files.summaries[1].name, "finish");
+}
+
+TEST(ProgramWriter, TheHeaderSaysHowZIsSet) {
+  ProgramPlan plan = small_plan();
+  plan.operations.insert(plan.operations.begin(),
+                         operation_of("rough", small_ball(3), small_moves()));
+  const auto said = [&](const char* post, ProgramGrouping grouping, const char* file) {
+    const TempFolder folder;
+    ProgramSettings settings = four_decimals();
+    settings.grouping = grouping;
+    write(plan, post, folder, settings);
+    std::vector<std::string> found;
+    for (const std::string& line : lines_of(read_bytes(folder / file))) {
+      if (line.starts_with("(Z: ")) found.push_back(line);
+    }
+    return found;
+  };
+  const auto apart = ProgramGrouping::kOperation;
+  const auto one = ProgramGrouping::kAll;
+  EXPECT_THAT(said("grbl", apart, "rough.ngc"), ElementsAre("(Z: touch off Z with this tool, T3)"));
+  EXPECT_THAT(said("weihong", apart, "finish.nc"),
+              ElementsAre("(Z: touch off Z with this tool, T1)\r"));
+  EXPECT_THAT(said("grblhal", one, "test.ngc"),
+              ElementsAre("(Z: touch off Z with every tool after its change, M6)"));
+  EXPECT_THAT(said("linuxcnc", one, "test.ngc"),
+              ElementsAre("(Z: G43 takes the length of every tool from the tool table)"));
+}
+
+TEST(ProgramWriter, WeihongHasRapidsByFeedAndFOnEveryLine) {
+  const TempFolder folder;
+  ProgramSettings settings = four_decimals();
+  settings.planner.max_rate = {3000.0, 2000.0, 500.0};
+  const ProgramFiles files = write(small_plan(), "weihong", folder, settings);
+  EXPECT_THAT(body_of(folder / "finish.nc"),
+              ElementsAre("G21 G90 G17 G94\r", "G40 G49 G80\r", "G54\r", "(operation: finish)\r",
+                          "G1 Z5.0000 F500\r", "S23000 M3\r", "G1 X1.0000 Y2.0000 F2000\r",
+                          "G1 Z-0.5000 F150\r", "G1 X2.0000 F500.001\r", "G1 Z2.0000 F500\r",
+                          "G1 X3.0000 F2000\r", "G1 Z-0.6000 F150\r",
+                          "G18 G2 X5.0000 I1.0000 K0.0000 F500.001\r", "G1 Z5.0000 F500\r", "M5\r",
+                          "M30\r"));
+  const ProgramReading& reading = files.files[0].reading;
+  EXPECT_EQ(reading.motions, 9);
+  EXPECT_EQ(reading.cutting.max().z(), 5.0);  // From where it plunges.
+  EXPECT_NEAR(reading.rapid_length, 5.0 + std::sqrt(5.0) + 2.5 + 1.0 + 5.6, 1e-9);
+}
+
+TEST(ProgramWriter, PausesForASpindleThatIsSwitchedByHand) {
+  for (const std::string& post : builtin_posts()) {
+    const TempFolder folder;
+    ProgramSettings settings = four_decimals();
+    settings.spindle_by_hand = true;
+    const ProgramFiles files = write(small_plan(), post, folder, settings);
+    const std::string text = read_bytes(files.files[0].path);
+    EXPECT_THAT(text, ::testing::ContainsRegex("[Ss][Ww][Ii][Tt][Cc][Hh] .*23000 .*\nM0")) << post;
+    EXPECT_THAT(text, ::testing::Not(::testing::ContainsRegex("M3[^0]"))) << post;
+    EXPECT_THAT(text, ::testing::Not(HasSubstr("S23000"))) << post;
+    EXPECT_TRUE(files.reader.spindle_by_hand);
+  }
 }
 
 TEST(ProgramWriter, DoesNotDependOnTheLocale) {

@@ -28,12 +28,12 @@ constexpr double kZOffset = -7.25;
 constexpr double kPlunge = 77.0;  ///< Of the tool: no move of a path has it.
 
 /// Programs read back, whole or in parts.
-std::vector<GcodeMotion> motions_of(const ProgramFiles& files, const PostDescription& post) {
+std::vector<GcodeMotion> motions_of(const ProgramFiles& files) {
   std::vector<GcodeMotion> motions;
   for (const ProgramFile& file : files.files) {
     EXPECT_EQ(check_seal(file.path), true);
     const auto sink = [&](const GcodeMotion& motion, int) { motions.push_back(motion); };
-    const ProgramReading reading = read_program(file.path, post.reader, sink, {});
+    const ProgramReading reading = read_program(file.path, files.reader, sink, {});
     EXPECT_EQ(reading.seal_holds, true);
   }
   return motions;
@@ -207,7 +207,7 @@ TEST(PostProperty, WhatIsReadBackIsWhatWasToBeCut) {
       ProgramSettings settings;
       settings.decimals = std::min(post.most_decimals, 3 + static_cast<int>(seed % 4));
       const ProgramFiles files = write_programs(plan_of(moves), post, settings, folder.path(), {});
-      const auto motions = motions_of(files, post);
+      const auto motions = motions_of(files);
       Comparison(settings, motions).run(moves);
       if (::testing::Test::HasFailure()) {
         FAIL() << post.name << ", arcs " << static_cast<int>(post.arcs) << ", seed " << seed
@@ -224,7 +224,7 @@ TEST(PostProperty, PartsCutTheSamePathAsTheWhole) {
     settings.decimals = 4;
     const TempFolder whole_folder;
     const auto whole =
-        motions_of(write_programs(plan_of(moves), post, settings, whole_folder.path(), {}), post);
+        motions_of(write_programs(plan_of(moves), post, settings, whole_folder.path(), {}));
     settings.largest_file = 1 << 16;
     const TempFolder folder;
     const ProgramFiles files = write_programs(plan_of(moves), post, settings, folder.path(), {});
@@ -237,7 +237,7 @@ TEST(PostProperty, PartsCutTheSamePathAsTheWhole) {
       EXPECT_EQ(check_seal(file.path), true);
       bool first = true;
       GcodeMotion last;
-      read_program(file.path, post.reader,
+      read_program(file.path, files.reader,
                    [&](const GcodeMotion& motion, int) {
                      EXPECT_TRUE(!first || (motion.rapid && motion.end.z() == 60.0));
                      first = false;

@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <map>
+#include <set>
 
 #include "cam/post/program_writer.h"
 #include "cam/post_plans.h"
@@ -84,6 +86,53 @@ TEST_F(PostRs274, ReadsTheSameMotionsOfEveryPart) {
 TEST_F(PostRs274, ReadsArcsWithRadiusAndChordsAlike) {
   for (const char* form : {"form = \"radius\"", "form = \"none\""}) {
     expect_equal_readings(parse_post(post_text_with("form = \"centre\"", form), "p"), 9, 0);
+  }
+}
+
+/// A machine with a tool table holds the spindle higher by a tool's length, so that its tip is
+/// where the program wants it.
+TEST_F(PostRs274, TheTipOfEveryToolIsWhereTheProgramSaysIt) {
+  // The interpreter alone takes the lengths of its table for inches.
+  const std::map<int, double> inches{{1, 1.25}, {2, 1.5}, {3, 2.0}};
+  std::string table;
+  for (const auto& [tool, length] : inches) {
+    table += "T" + std::to_string(tool) + " P" + std::to_string(tool) + " Z" +
+             std::to_string(length) + " D1\n";
+  }
+  const std::string numbered = post_text_with("\"G43\"]", "\"G43 H{tool}\"]");
+  for (const PostDescription& post : {post_named("linuxcnc"), parse_post(numbered, "numbered")}) {
+    for (const ProgramGrouping grouping : {ProgramGrouping::kAll, ProgramGrouping::kOperation}) {
+      const TempFolder folder;
+      ProgramPlan plan;
+      plan.safe_z = 60.0;
+      for (const int tool : {3, 2, 1}) {
+        plan.operations.push_back(operation_of("tool" + std::to_string(tool), small_ball(tool),
+                                               RandomPath(40U + unsigned(tool)).moves(60)));
+      }
+      ProgramSettings settings;
+      settings.decimals = 4;
+      settings.grouping = grouping;
+      const ProgramFiles files = write_programs(plan, post, settings, folder.path(), {});
+      std::set<int> cut;
+      for (const ProgramFile& file : files.files) {
+        const Rs274Reading theirs = read_with_rs274(rs274_, file.path, table);
+        ASSERT_TRUE(theirs.accepted) << file.path << theirs.errors;
+        std::vector<GcodeMotion> ours;
+        read_program(file.path, files.reader,
+                     [&](const GcodeMotion& motion, int) { ours.push_back(motion); }, {});
+        ASSERT_EQ(theirs.motions.size(), ours.size());
+        for (std::size_t i = 0; i < ours.size(); ++i) {
+          const Rs274Motion& motion = theirs.motions[i];
+          const double tip = motion.to.z() + motion.tool_offset - 25.4 * inches.at(motion.tool);
+          ASSERT_NEAR(tip, ours[i].end.z(), kPrint) << "line " << ours[i].line;
+          if (motion.feed) cut.insert(motion.tool);
+        }
+        EXPECT_GT(theirs.text.rfind("USE_TOOL_LENGTH_OFFSET(0.0000, 0.0000, 0.0000"),
+                  theirs.text.rfind("STRAIGHT_"))
+            << "no length stays in force";
+      }
+      EXPECT_EQ(cut.size(), inches.size());
+    }
   }
 }
 

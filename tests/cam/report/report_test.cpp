@@ -20,6 +20,7 @@
 namespace lensforge {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using ::testing::Not;
@@ -157,8 +158,13 @@ TEST(Report, NeedsNothingFromOutside) {
 TEST(Report, SaysTheVerdictFirst) {
   ReportData data = report_of("logo");
   const std::string bad = report_html(data);
-  EXPECT_THAT(bad, HasSubstr("1 limit not met"));
-  EXPECT_LT(bad.find("1 limit not met"), bad.find("class=\"pictures\""));
+  EXPECT_THAT(bad, HasSubstr("✘ 1 limit missed"));
+  EXPECT_LT(bad.find("1 limit missed"), bad.find("class=\"pictures\""));
+  data.verdict.checks[0].advises = true;
+  EXPECT_THAT(report_html(data), AllOf(HasSubstr("✔ No limit missed; advice on 1 value"),
+                                       HasSubstr("advice: above it"), Not(HasSubstr("✘"))));
+  EXPECT_EQ(report_json(data)["verdict"]["limits_missed"], 0);
+  EXPECT_EQ(report_json(data)["verdict"]["pass"], false);
   data.verdict.checks[0].value = 0.5;
   EXPECT_THAT(report_html(data), HasSubstr("Within all limits"));
 }
@@ -339,8 +345,31 @@ TEST(Verdict, ComparesWithTheLimitsInShownUnits) {
   EXPECT_NEAR(verdict.checks[0].value, 3.1, 1e-12);
   EXPECT_EQ(verdict.checks[1].unit, "µm");
   EXPECT_FALSE(verdict.checks[1].passes());
-  EXPECT_EQ(verdict.failures(), 1);
+  EXPECT_EQ(verdict.missed(), 1);
   EXPECT_FALSE(verdict.passes());
+}
+
+TEST(Verdict, LimitsOfQualityAreAdviceUntilTheyAreStated) {
+  const double too_much = 1.0;
+  const CutFindings findings{too_much, too_much, too_much, {}, too_much, too_much, too_much, {}};
+  const Verdict advice = judge_cut(findings, {});
+  EXPECT_EQ(advice.advice(), 6);
+  EXPECT_EQ(advice.missed(), 0);
+  EXPECT_FALSE(advice.passes());
+  EXPECT_EQ(verdict_words(advice.missed(), advice.advice()),
+            "done, no limit was missed; the report has advice");
+  for (const char* key :
+       {"leakage", "dark_flux", "mae_increase", "excess", "slope", "fillet_depth"}) {
+    const Verdict verdict = judge_cut(findings, {}, {key});
+    EXPECT_EQ(verdict.missed(), 1) << key;
+    EXPECT_EQ(verdict.advice(), 5) << key;
+    EXPECT_EQ(verdict_words(verdict.missed(), verdict.advice()),
+              "done, but limits were missed: see the report");
+  }
+  CutFindings unsafe;
+  unsafe.gouge = unsafe.block_rate = 1e6;
+  EXPECT_EQ(judge_cut(unsafe, {}).missed(), 2) << "limits of safety are no advice";
+  EXPECT_EQ(verdict_words(0, 0), "done, all limits met");
 }
 
 TEST(Verdict, ANumberThatIsNoneDoesNotPass) {
