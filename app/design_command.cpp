@@ -186,8 +186,8 @@ LoadedImage read_target(const DesignSettings& settings, const CommonOptions& com
 void refuse_splines_on_ranks(const DesignOptions& design) {
   if (design.model != SurfaceModel::kSpline || rank_count() == 1) return;
   throw InputError(
-      "--model spline, --made-by: designed in one process; with mpirun use --model facet or "
-      "smooth");
+      "--model spline (the default) and --made-by: designed in one process; with mpirun give "
+      "--model smooth or facet");
 }
 
 int run(OptionSet& options, DesignSettings& settings) {
@@ -222,7 +222,11 @@ int run(OptionSet& options, DesignSettings& settings) {
   const auto begin = [&] {
     console.begin();
     folder.remove_partial_files(is_of_lens);
-    if (device.executor.device() != Device::kCpu) console.note("computing on " + device.word);
+    if (device.executor.device() != Device::kCpu) {
+      const bool spline = design.model == SurfaceModel::kSpline;
+      console.note("computing on " + device.word +
+                   (spline ? "; the spline on the processor, unlike --model smooth or facet" : ""));
+    }
     for (const std::string& change : changes_made(loaded, settings)) console.note(change);
     note_source(loaded.image, design, console);
     // A design that was killed before its first checkpoint starts at the beginning.

@@ -12,6 +12,7 @@
 #include "design/design_fields.h"
 #include "design/front_setup.h"
 #include "design/outline_setup.h"
+#include "design/schedule/level_plan.h"
 #include "design/source_setup.h"
 
 namespace lensforge::app {
@@ -99,6 +100,11 @@ void settle(OptionSet& options, DesignSettings& settings, const Image& picture,
   Workshop workshop;
   if (settings.made_by.empty()) {
     refuse_part_options(options);
+    if (!options.given("--model")) {
+      const int pixels = std::min(settings.design.pixels, longer);
+      settings.design.model =
+          default_model(working_size(picture.columns(), picture.rows(), pixels), settings.design);
+    }
   } else {
     if (options.given("--model") && settings.design.model != SurfaceModel::kSpline) {
       throw InputError("--made-by " + settings.made_by + ": needs --model spline, not " +

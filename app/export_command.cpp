@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <array>
 #include <filesystem>
+#include <string>
 
 #include "app/command_line.h"
 #include "app/commands.h"
@@ -24,6 +25,18 @@ const OptionTable<ExportSettings>& source_fields() {
       {{"designed", ExportSurface::kDesigned}, {"milled", ExportSurface::kMilled}},
       "the lens's surface, or what the cutter leaves: DIR/cam/milled.ply")};
   return table;
+}
+
+/// What helps where the splines of a mesh miss its tolerances. More control points do not where no
+/// surface has all of its normals.
+std::string remedy_for(const SplineSolid& solid, ExportSurface surface) {
+  std::string remedy = solid.fit->bound.share_above > 0.0
+                           ? ": the normals of the mesh contradict each other"
+                           : "; --max-points gives more room";
+  if (surface == ExportSurface::kDesigned) {
+    remedy += "; a lens of design --model spline is written exactly as it is";
+  }
+  return remedy;
 }
 
 }  // namespace
@@ -73,7 +86,8 @@ int export_command(const Arguments& command_line) try {
   report.json["bytes"] = std::filesystem::file_size(settings.out);
   console.result(report.json, settings.out + "\n" + report.text);
   if (result.within_tolerance()) return kDone;
-  console.note("warning: the tolerances do not hold everywhere; --max-points gives more room");
+  console.note("warning: the tolerances do not hold everywhere" +
+               remedy_for(*result.splines, settings.surface));
   return kLimitMissed;
 } catch (const Interrupted&) {
   return report_interrupted(wants_json(command_line));

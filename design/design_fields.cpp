@@ -154,7 +154,7 @@ const OptionTable<DesignOptions>& design_fields() {
         R::word<SurfaceModel>(
             "--model", &O::model, named_models(),
             "surface model: flat facets, smooth with a normal at every vertex, or one smooth "
-            "spline from design to STEP"),
+            "spline from design to STEP; beyond 527 x 527 pixels smooth unless it is given"),
         R::word<ViewSide>(
             "--view", &O::view, {{"front", ViewSide::kFront}, {"rear", ViewSide::kRear}},
             "picture seen on a wall from the lens's side, or on a screen from behind"),

@@ -60,8 +60,10 @@ struct DesignOptions {
   /// the heights is nearer than they lead (128² portrait, two rounds, facet MAE: 0.0048 with none,
   /// 0.0059 with 50).
   int update_iterations = 0;
-  int iterations = 100;                        ///< Most L-BFGS iterations of one round, ≥ 1.
-  SurfaceModel model = SurfaceModel::kSmooth;  ///< What is optimised; smooth makes the better part.
+  int iterations = 100;  ///< Most L-BFGS iterations of one round, ≥ 1.
+  /// What is optimised. One spline is the surface from design to part and to STEP; the normals of a
+  /// smooth mesh are no surface's (docs/accuracy.md, "One surface").
+  SurfaceModel model = SurfaceModel::kSpline;
   ViewSide view = ViewSide::kFront;
   ObjectiveWeights weights;
   /// The process that the part is designed for; none: the surface itself. @pre model is kSpline.

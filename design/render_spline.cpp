@@ -19,11 +19,8 @@ constexpr int kStripRows = 32;
 
 class Strips {
  public:
-  Strips(const ControlNet& net, const OpticalSetup& setup)
-      : net_(net),
-        setup_(setup),
-        samples_(picture_samples(net)),
-        rows_(samples_ * net.cells().y()) {}
+  Strips(const ControlNet& net, int samples, const OpticalSetup& setup)
+      : net_(net), setup_(setup), samples_(samples), rows_(samples_ * net.cells().y()) {}
 
   [[nodiscard]] int count() const { return (rows_ + kStripRows - 1) / kStripRows; }
   [[nodiscard]] SampledSurface strip(int k) const {
@@ -66,7 +63,12 @@ void add(const SampledSurface& strip, const LightPath& light, const FluxAccumula
 
 std::vector<double> render_spline(const ControlNet& net, const OpticalSetup& setup,
                                   const Executor& executor) {
-  const Strips strips(net, setup);
+  return render_spline(net, picture_samples(net), setup, executor);
+}
+
+std::vector<double> render_spline(const ControlNet& net, int samples, const OpticalSetup& setup,
+                                  const Executor& executor) {
+  const Strips strips(net, samples, setup);
   const LightPath light = strips.light();
   FluxImage image(setup.pixels.x(), setup.pixels.y());
   image.begin(executor);

@@ -15,4 +15,8 @@ namespace lensforge {
 std::vector<double> render_spline(const ControlNet& net, const OpticalSetup& setup,
                                   const Executor& executor);
 
+/// The same with so many nodes a knot cell each way.
+std::vector<double> render_spline(const ControlNet& net, int samples, const OpticalSetup& setup,
+                                  const Executor& executor);
+
 }  // namespace lensforge

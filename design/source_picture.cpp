@@ -66,17 +66,21 @@ std::vector<double> picture_by_convolution(const OpticalSetup& setup, double z,
   return {pixels.begin(), pixels.end()};
 }
 
+Image corrected(const Image& target, const std::vector<double>& exact,
+                const std::vector<double>& seen) {
+  Image aim = target;
+  const double total = target.total();
+  for (std::size_t i = 0; i < exact.size(); ++i) {
+    float& value = aim.values()[i];
+    value = std::max(0.0F, value - static_cast<float>(total * (exact[i] - seen[i])));
+  }
+  return aim;
+}
+
 Image corrected_for_convolution(const Image& target, const OpticalSetup& setup, double z,
                                 const PointPicture& picture, const Executor& executor) {
-  const std::vector<double> exact = picture_under(setup, source_point_count(setup, z), picture);
-  const std::vector<double> convolved = picture_by_convolution(setup, z, picture, executor);
-  Image corrected = target;
-  for (std::size_t i = 0; i < exact.size(); ++i) {
-    const double wrong = target.total() * (exact[i] - convolved[i]);
-    float& value = corrected.values()[i];
-    value = std::max(0.0F, value - static_cast<float>(wrong));
-  }
-  return corrected;
+  return corrected(target, picture_under(setup, source_point_count(setup, z), picture),
+                   picture_by_convolution(setup, z, picture, executor));
 }
 
 SourceCheck check_source(const Lens& lens, const Executor& executor) {

@@ -28,9 +28,14 @@ std::vector<double> picture_under(const OpticalSetup& setup, int count,
 std::vector<double> picture_by_convolution(const OpticalSetup& setup, double z,
                                            const PointPicture& picture, const Executor& executor);
 
-/// The picture that an optimiser that goes by a convolution has to aim at, so that the surface's
-/// exact one comes out as `target`: the target less what the convolution gets wrong of the surface
-/// as it is, at least 0. @pre the source has an extent; target has setup.pixels.
+/// The picture that an optimiser has to aim at, so that the surface's exact one comes out as
+/// `target`: the target less what its own account of the surface as it is gets wrong, at least 0.
+/// @param exact, seen  shares of the light in every pixel of the target, exact and by that account.
+Image corrected(const Image& target, const std::vector<double>& exact,
+                const std::vector<double>& seen);
+
+/// corrected() for an optimiser that goes by a convolution. @pre the source has an extent; target
+/// has setup.pixels.
 /// @param z  of the surface, mm. @param picture  what the surface projects.
 Image corrected_for_convolution(const Image& target, const OpticalSetup& setup, double z,
                                 const PointPicture& picture, const Executor& executor);

@@ -31,11 +31,13 @@ int rounded(double value, int least) {
 constexpr double kKnotCellsPerCell = 2.0;
 
 /// Share of the rounds that are the smooth mesh's before the spline, and as many again are the
-/// spline's, each with this share of the iterations: one costs six times as much. MAE of that
-/// portrait's and logo's splines after one, two and six rounds of the mesh and then 100 iterations:
-/// 0.00077, 0.00074 and 0.00069, 0.0030, 0.0028 and 0.0026.
+/// spline's, each with these shares of the iterations: one of the spline costs three to six times
+/// as much. The longer the mesh's, the more its normals contradict its heights and the worse the
+/// spline begins: a 64² logo ends at 0.0069 after 160 and 2 × 40, at 0.0043 after 60 and 2 × 32,
+/// calligraphy at 0.0022 and 0.0011 (docs/tuning.md). Designs for a process keep the mesh's rounds.
 constexpr int kPartsOfRounds = 3;
-constexpr double kSplineIterations = 0.4;
+constexpr double kStartIterations = 0.375;
+constexpr double kSplineIterations = 0.36;
 
 /// Of a design for a process. Mean width of its knot cells at most, in σ of the polish: cutting
 /// undoes beforehand what polish rounds. A 96² logo on 25 mm, σ 0.03 mm, by the design's own
@@ -115,6 +117,12 @@ Eigen::Vector2i working_size(int source_columns, int source_rows, int longer_sid
   return {rounded(scale * source_columns, 1), rounded(scale * source_rows, 1)};
 }
 
+SurfaceModel default_model(const Eigen::Vector2i& pixels, const DesignOptions& options) {
+  const GridShape grid = level_at(pixels, options, 0, 0).grid;
+  const double cells = (grid.columns - 1.0) * (grid.rows - 1.0);
+  return cells <= kMaxKnotCells ? SurfaceModel::kSpline : SurfaceModel::kSmooth;
+}
+
 std::vector<Level> plan_levels(const Eigen::Vector2i& pixels, const DesignOptions& options) {
   const int possible =
       static_cast<int>(std::lround(std::log2(pixels.maxCoeff() / kCoarsestPixels)));
@@ -135,6 +143,7 @@ std::vector<Level> plan_levels(const Eigen::Vector2i& pixels, const DesignOption
   if (options.model == SurfaceModel::kSpline) {
     for (Level& level : levels) {
       level.rounds = (options.rounds + kPartsOfRounds - 1) / kPartsOfRounds;
+      if (!options.made_by) level.iterations = rounded(kStartIterations * options.iterations, 1);
     }
     levels.push_back(spline_level(levels.back(), setup.lens_size, options));
   }

@@ -21,7 +21,7 @@ constexpr int kDrawingSteps = 10;
 
 /// The spline that a mesh's surface becomes, as a mesh of its control points.
 SurfaceMesh spline_start(const DesignTask& task, const Level& level, const SurfaceMesh& mesh) {
-  constexpr double kShareStep = 0.25;
+  constexpr double kShareStep = 0.125;
   const auto fitted = [&](const SurfaceMesh& surface, double share) {
     return net_mesh(spline_through(surface, task.setup.lens_size, level.grid, share, task.executor,
                                    task.control));

@@ -38,8 +38,7 @@ Settings parsed(const Add& add, const Arguments& needed, Settings settings = {})
 }
 
 TEST(CommandDefaults, OfDesignAreTheLibrarysForEveryModelAndPicture) {
-  for (const auto& [word, model] :
-       {std::pair("facet", SurfaceModel::kFacet), std::pair("smooth", SurfaceModel::kSmooth)}) {
+  for (const auto& [word, model] : named_models()) {
     for (const int side : {64, 512}) {
       const Image picture(side, side / 2, 0.5F);
       DesignSettings settings;
@@ -54,6 +53,24 @@ TEST(CommandDefaults, OfDesignAreTheLibrarysForEveryModelAndPicture) {
       EXPECT_EQ(library.weights.smooth, default_smoothness(model));
     }
   }
+}
+
+TEST(CommandDefaults, TheModelOfADesignFollowsFromItsSizeUnlessItIsGiven) {
+  const auto model = [](int side, const Arguments& more) {
+    DesignSettings settings;
+    OptionSet options("design", "");
+    add_design_options(options, settings);
+    Arguments arguments{"picture.png", "--out", "lens"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    options.parse(arguments);
+    settle(options, settings, Image(side, side, 0.5F));
+    EXPECT_EQ(options.used()["model"], model_name(settings.design.model));
+    return settings.design.model;
+  };
+  EXPECT_EQ(model(1024, {}), SurfaceModel::kSpline);  // Of 256 pixels.
+  EXPECT_EQ(model(1024, {"--pixels", "1024"}), SurfaceModel::kSmooth);
+  EXPECT_EQ(model(1024, {"--pixels", "1024", "--model", "spline"}), SurfaceModel::kSpline);
+  EXPECT_EQ(model(64, {"--model", "smooth"}), SurfaceModel::kSmooth);
 }
 
 TEST(CommandDefaults, OfDesignForTheDefaultModelAreTheStructs) {

@@ -175,6 +175,21 @@ TEST(DesignLens, ResumeRefusesAnotherPictureOtherOptionsAndNoCheckpoint) {
               HasSubstr("another picture or other options"));
 }
 
+/// As after a change of the default.
+TEST(DesignLens, ResumeNamesTheModelWhereThatAloneIsAnother) {
+  const TempFolder folder;
+  DesignOptions options = small_options();
+  options.checkpoint = folder / "checkpoint";
+  design(options);
+  options.resume = true;
+  options.model = SurfaceModel::kSpline;
+  EXPECT_THAT(message_of<InputError>([&] { design(options); }),
+              HasSubstr("belongs to a design of --model facet: give that option"));
+  options.ior = 1.5;
+  EXPECT_THAT(message_of<InputError>([&] { design(options); }),
+              HasSubstr("another picture or other options"));
+}
+
 TEST(DesignLens, ACheckpointThatCannotBeWrittenIsARunError) {
   const TempFolder folder;
   DesignOptions options = small_options();

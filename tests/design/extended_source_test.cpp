@@ -121,6 +121,17 @@ TEST(ExtendedPicture, IsThatOfSingleRaysFromAllOverTheSource) {
   EXPECT_GT(chi_square, 120.0 - 5.0 * 15.5);
 }
 
+TEST(ExtendedPicture, AnAimGoesPastTheTargetByWhatIsSeenWrong) {
+  Image target(2, 1);
+  target.at(0, 0) = 1.0F;
+  target.at(1, 0) = 3.0F;
+  // A tenth of the light is seen in the wrong pixel.
+  const Image aim = corrected(target, {0.35, 0.65}, {0.25, 0.75});
+  EXPECT_NEAR(aim.at(0, 0), 0.6, 1e-6);
+  EXPECT_NEAR(aim.at(1, 0), 3.4, 1e-6);
+  EXPECT_EQ(corrected(target, {0.75, 0.25}, {0.25, 0.75}).at(0, 0), 0.0F);
+}
+
 TEST(ExtendedPicture, TheConvolutionIsCloseToTheSumOverTheSource) {
   OpticalSetup setup = testing::setup_of({24.0, 20.0}, {24, 20}, 60.0);
   setup.extent.width = 0.05;

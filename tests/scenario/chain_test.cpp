@@ -139,15 +139,19 @@ TEST_F(Chain, CamWritesAProgramAndAReport) {
   EXPECT_GT(info["moves"], 100);
 }
 
-TEST_F(Chain, WhatIsDesignedSmoothIsTheDefaultAndIsCutSmooth) {
+TEST_F(Chain, ALensIsOneSplineUnlessAnotherModelIsGivenAndIsCutAsItWasDesigned) {
   place_small_lens(at("facets"));
-  ASSERT_EQ(run({"design", picture("stripes.png"), "--out", path("smooth"), "--pixels", "32",
-                 "--rounds", "1", "--quality", "draft"})
-                .exit_code,
-            0);
-  EXPECT_EQ(nlohmann::json::parse(content(at("smooth/lens.json")))["model"], "smooth");
-  for (const auto& [name, surface] :
-       {std::pair("smooth", "smooth, over the mesh"), {"facets", "facets of the mesh"}}) {
+  const Arguments design = {
+      "design", picture("stripes.png"), "--pixels", "32", "--rounds", "1", "--quality", "draft"};
+  for (const Arguments& more : {Arguments{"--out", path("spline")},
+                                Arguments{"--out", path("smooth"), "--model", "smooth"}}) {
+    Arguments arguments = design;
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    ASSERT_EQ(run(arguments).exit_code, 0);
+  }
+  for (const auto& [name, surface] : {std::pair("spline", "the lens's spline"),
+                                      {"smooth", "smooth, over the mesh"},
+                                      {"facets", "facets of the mesh"}}) {
     ASSERT_EQ(run({"cam", path(name), "--pitch", "2mm", "--tool-diameter", "4mm", "--no-semi",
                    "--no-render"})
                   .exit_code,

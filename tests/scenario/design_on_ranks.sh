@@ -151,6 +151,7 @@ stopped_first_rank
 short_of_memory
 refused 'only design shares its work out' render one-smooth
 refused '--model spline' design "$PICTURE" --out spline --model spline
+refused 'give --model smooth or facet' design "$PICTURE" --out default
 refused '--made-by' design "$PICTURE" --out made --made-by default
 refused '--device cuda' design "$PICTURE" --out gpu --device cuda
 refused 'no-such-picture' design no-such-picture.png --out none

@@ -9,6 +9,7 @@ namespace lensforge::scenario {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 class Export : public Scenario {
  protected:
@@ -60,6 +61,22 @@ TEST_F(Export, StepIsOneSolidWithACertificateForEveryPatch) {
   EXPECT_THAT(step, HasSubstr("A. Turner"));
   EXPECT_THAT(step, HasSubstr("AP242"));
   EXPECT_THAT(step, HasSubstr("sha256:"));
+}
+
+/// More control points do not help where no surface has all of a mesh's normals; another model
+/// does.
+TEST_F(Export, MissedTolerancesNameAModelThatHasNone) {
+  const Outcome meshed = run({"export", path("lens"), "--out", path("lens.step")});
+  ASSERT_EQ(meshed.exit_code, 3);
+  EXPECT_THAT(meshed.err, HasSubstr("normals of the mesh contradict each other"));
+  EXPECT_THAT(meshed.err, HasSubstr("design --model spline"));
+  EXPECT_THAT(meshed.err, Not(HasSubstr("--max-points")));
+  Arguments design = small_design(picture("stripes.png"), path("spline"));
+  *std::find(design.begin(), design.end(), "facet") = "spline";
+  ASSERT_EQ(run(design).exit_code, 0);
+  const Outcome exact = run({"export", path("spline"), "--out", path("spline.step")});
+  EXPECT_EQ(exact.exit_code, 0) << exact.err;
+  EXPECT_THAT(exact.err, Not(HasSubstr("tolerances")));
 }
 
 /// Written, read back and rendered, the solid throws what export said that its splines throw.

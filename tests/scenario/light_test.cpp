@@ -114,8 +114,8 @@ TEST_P(EveryLight, ProjectsThePictureIsRenderedTheSameAndStatedByInfo) {
   ASSERT_EQ(again.exit_code, 0) << again.err;
   const nlohmann::json metrics = again.json()["metrics"];
   EXPECT_EQ(metrics, lens()["metrics"]);
-  EXPECT_LT(metrics["smooth"]["mae"], 0.011);  // Twice the worst of them.
-  EXPECT_GT(metrics["smooth"]["flux_inside"], 0.95);
+  EXPECT_LT(metrics["spline"]["mae"], 0.011);  // Twice the worst of them.
+  EXPECT_GT(metrics["spline"]["flux_inside"], 0.95);
   EXPECT_EQ(read_image(at("again.exr")).image, read_image(at("lens/render.exr")).image);
 
   EXPECT_THAT(run({"info", path("lens")}).out, HasSubstr(GetParam().words));

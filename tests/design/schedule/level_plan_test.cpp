@@ -12,6 +12,7 @@ namespace {
 
 DesignOptions with_levels(int levels, double ratio = 1.25) {
   DesignOptions options;
+  options.model = SurfaceModel::kSmooth;
   options.levels = levels;
   options.mesh_ratio = ratio;
   return options;
@@ -103,12 +104,24 @@ TEST(LevelPlan, ASplineFollowsFewerRoundsOfTheMesh) {
   ASSERT_EQ(levels.size(), 2U);
   EXPECT_FALSE(levels[0].spline);
   EXPECT_EQ(levels[0].rounds, 1);
-  EXPECT_EQ(levels[0].iterations, 160);
+  EXPECT_EQ(levels[0].iterations, 61);
   EXPECT_TRUE(levels[1].spline);
   EXPECT_EQ(levels[1].rounds, 2);
-  EXPECT_EQ(levels[1].iterations, 40);
+  EXPECT_EQ(levels[1].iterations, 36);
   // Two knot cells each way in a cell of 160 across.
   EXPECT_EQ(levels[1].grid, (GridShape{323, 163}));
+}
+
+TEST(LevelPlan, TheDefaultIsASplineWhereEachCellOfTheMeshHasAKnotCell) {
+  const DesignOptions options;
+  for (const int side : {4, 256, 527}) {
+    EXPECT_EQ(default_model({side, side}, options), SurfaceModel::kSpline) << side;
+  }
+  EXPECT_EQ(default_model({528, 528}, options), SurfaceModel::kSmooth);
+  EXPECT_EQ(default_model({16384, 16}, options), SurfaceModel::kSpline);
+  EXPECT_EQ(default_model({16384, 16384}, options), SurfaceModel::kSmooth);
+  EXPECT_EQ(default_model({300, 300}, with_levels(1, 2.5)), SurfaceModel::kSmooth);
+  EXPECT_EQ(default_model({256, 256}, with_levels(1, 2.5)), SurfaceModel::kSpline);
 }
 
 TEST(LevelPlan, ASmoothMeshTakesThreeRoundsTogether) {
