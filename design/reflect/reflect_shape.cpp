@@ -159,6 +159,9 @@ class Schedule {
         state_.unmet.cols() != mesh_.triangle_count()) {
       refuse_checkpoint(options_.checkpoint, "has other vertices or faces than the mesh");
     }
+    if (!is_near(state_.vertices)) {
+      refuse_checkpoint(options_.checkpoint, "has a vertex out of all bounds");
+    }
     mesh_.vertices = state_.vertices;
     spent_ = state_.seconds;
   }
@@ -215,9 +218,13 @@ class Schedule {
     }
   }
 
+  static bool is_near(const Eigen::Matrix3Xd& vertices) {
+    return vertices.allFinite() && vertices.cwiseAbs().maxCoeff() < kFarthest;
+  }
+
   /// Without the denoiser's and the anchor's hold the published steps may lose a shape altogether.
   void require_near(const Eigen::Matrix3Xd& vertices) const {
-    if (vertices.allFinite() && vertices.cwiseAbs().maxCoeff() < kFarthest) return;
+    if (is_near(vertices)) return;
     throw RunError("update " + std::to_string(number() + 1) +
                    " moved vertices out of all bounds; another --anchor or --seed may help");
   }

@@ -105,6 +105,24 @@ ReflectResult in_pieces(const ReflectInput& input, ReflectOptions options) {
   }
 }
 
+TEST(ReflectCheckpoint, AVertexOutOfAllBoundsIsRefused) {
+  const TempFolder folder;
+  ReflectOptions options;
+  options.rim_updates = 2;
+  options.direction_rows = 2;
+  options.checkpoint = folder / "checkpoint";
+  const ReflectInput input = prepared_input(shapes::icosphere(1), "mesh", options);
+  std::stop_source stop;
+  const RunControl control(stop.get_token(), [&](const Progress&) { stop.request_stop(); });
+  ASSERT_FALSE(reflect_shape(input, options, Executor::serial(), control).done());
+  ReflectCheckpoint checkpoint = read_checkpoint(options.checkpoint);
+  checkpoint.vertices(1, 2) = 1e30;
+  write_checkpoint(checkpoint, options.checkpoint);
+  options.resume = true;
+  const auto resume = [&] { reflect_shape(input, options, Executor::serial(), RunControl()); };
+  EXPECT_THAT(message_of<InputError>(resume), HasSubstr("has a vertex out of all bounds"));
+}
+
 TEST(ReflectCheckpoint, ARunInPiecesEndsWithTheSameBits) {
   const TempFolder folder;
   ReflectOptions options;
