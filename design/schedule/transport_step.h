@@ -23,8 +23,8 @@ struct AimedMesh {
 /// What becomes of a mesh's x and y before its light is given places.
 enum class MeshShaping {
   kNone,     ///< They stay, and the light is where the surface sends it.
-  kCreases,  ///< Of a mesh that follows the picture already: align_to_creases() of a flat surface.
-  kSpread    ///< Of an even mesh: spread_vertices() first.
+  kCreases,  ///< The mesh follows the picture already; align_to_creases(), and heights begin flat.
+  kSpread    ///< The mesh is even; spread_vertices() first, then as kCreases.
 };
 
 /// The correspondence-guided half of a round (Sun et al., section 3.4).
