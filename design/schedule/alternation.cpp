@@ -13,7 +13,6 @@
 #include "design/flux_of_surface.h"
 #include "design/render_spline.h"
 #include "design/schedule/level_start.h"
-#include "design/schedule/spline_start.h"
 #include "design/schedule/start_surface.h"
 #include "design/source_picture.h"
 
