@@ -149,7 +149,7 @@ TEST_F(Chain, ALensIsOneSplineUnlessAnotherModelIsGivenAndIsCutAsItWasDesigned) 
     arguments.insert(arguments.end(), more.begin(), more.end());
     ASSERT_EQ(run(arguments).exit_code, 0);
   }
-  for (const auto& [name, surface] : {std::pair("spline", "the lens's spline"),
+  for (const auto& [name, surface] : {std::pair("spline", "lens&#39;s spline"),
                                       {"smooth", "smooth, over the mesh"},
                                       {"facets", "facets of the mesh"}}) {
     ASSERT_EQ(run({"cam", path(name), "--pitch", "2mm", "--tool-diameter", "4mm", "--no-semi",
