@@ -58,8 +58,9 @@ std::string likely_key(const std::string& key, const std::set<std::string>& know
   for (const std::string& candidate : known) {
     if (key.size() > candidate.size() + kMostEdits) continue;
     const std::size_t edits = edits_between(key, candidate);
-    if (edits < least && edits < candidate.size()) likely = candidate;
-    least = std::min(least, edits);
+    if (edits >= least || edits >= candidate.size()) continue;
+    likely = candidate;
+    least = edits;
   }
   return likely;
 }

@@ -10,8 +10,8 @@ namespace lensforge {
 namespace {
 
 constexpr double kMillimetresPerInch = 25.4;
-/// As programs have at most, so that what is added reads as what led there: the end of a circle that
-/// rounding moves makes a tiny arc of it.
+/// As programs have at most, so that what is added reads as what led there: the end of a circle
+/// that rounding moves makes a tiny arc of it.
 constexpr int kDecimals = 8;
 
 /// G words, times ten, for which Grbl reads or writes its EEPROM.

@@ -17,6 +17,7 @@
 #include "cam/cam_job.h"
 #include "cam/cam_meshes.h"
 #include "cam/cut_estimate.h"
+#include "cam/finish_setup.h"
 #include "core/error.h"
 #include "core/stop_bound.h"
 #include "core/temp_folder.h"
@@ -250,6 +251,25 @@ TEST(CutExtremes, RefusalsNameTheSmallestToleranceThatDecimalsHold) {
   EXPECT_THAT(
       message_of<InputError>([&] { validate(options, small_lens().setup); }),
       HasSubstr("--tolerance 1e-04: must be at least 4 units of the last decimal, 4e-04 mm"));
+}
+
+/// What four decimals cannot hold is not aimed at: moves of a few micrometres would come of it,
+/// more than a controller takes.
+TEST(CutExtremes, FewDecimalsAreSaidAndNotAskedForMoreThanTheyHold) {
+  const TempFolder folder;
+  CamOptions options;
+  options.render = false;
+  options.workshop.process.rough.enabled = options.workshop.process.semi.enabled = false;
+  options.workshop.process.finish.pitch = 0.4;
+  EXPECT_EQ(decimals_warning(options), "");
+  EXPECT_EQ(aimed_slope(options), options.workshop.process.finish.slope_tolerance);
+  options.post = find_post("fanuc", "--post");
+  EXPECT_EQ(aimed_slope(options), 1e-3);
+  EXPECT_THAT(decimals_warning(options), HasSubstr("aimed at 1 mrad instead of 0.06"));
+  const ReportData report =
+      make_cut(small_lens(12.0, 4.0), options, folder.path(), Executor::cpu(2), {}).report;
+  EXPECT_THAT(report.warnings, ::testing::Contains(decimals_warning(options)));
+  EXPECT_LT(report.operations[0].lines_per_second, 1000.0);
 }
 
 TEST(CutExtremes, RapidsRunHalfAMillimetreAboveTheBlankAtLeast) {

@@ -4,6 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <utility>
+
 #include "core/error.h"
 #include "core/temp_folder.h"
 
@@ -58,6 +60,29 @@ TEST(TomlFields, RefusesKeysThatNoneAskedFor) {
   const TomlFields fields(table, kSource);
   EXPECT_EQ(message_of<InputError>([&] { fields.finish(); }),
             "a.toml: extra: 'x': a list: unknown key");
+}
+
+TEST(TomlFields, NamesTheKeyThatWasLikelyMeant) {
+  for (const auto& [written, meant] :
+       {std::pair("picth", "; use pitch"), std::pair("pitchh", "; use pitch"),
+        std::pair("ptch", "; use pitch"), std::pair("on", ""), std::pair("pitch_error", ""),
+        std::pair("aa", "")}) {
+    const toml::table table = parse_toml(std::string(written) + " = 1\n", "f");
+    TomlFields fields(table, kSource);
+    (void)fields.number_or({"pitch", 0.0, 1.0}, 0.5);
+    (void)fields.number_or({"a", 0.0, 1.0}, 0.5);
+    EXPECT_EQ(message_of<InputError>([&] { fields.finish(); }),
+              std::string("a.toml: ") + written + ": 1: a list: unknown key" + meant);
+  }
+}
+
+TEST(TomlFields, ShowsNumbersAsTheyWereWritten) {
+  for (const char* number : {"0.05", "0.1", "1e-07", "123.456", "-2.5"}) {
+    const toml::table table = parse_toml("x = " + std::string(number) + "\n", "f");
+    const TomlFields fields(table, kSource);
+    EXPECT_THAT(message_of<InputError>([&] { fields.finish(); }),
+                StartsWith("a.toml: x: " + std::string(number) + ": "));
+  }
 }
 
 TEST(TomlFields, RefusesWhatIsNotToml) {
