@@ -15,8 +15,8 @@ constexpr double kDegree = std::numbers::pi / 180.0;
 /// What cells of the stock map may show of material where there is none, mm.
 constexpr double kThinMaterial = 0.01;
 
-/// What a way may sink below surface and ramp, mm: allowances are left along the normal, and paths
-/// are certified between points to a tenth of this.
+/// What a way may sink below surface and ramp, mm: passes are above the floor by its slope times
+/// their spacing at most (PassGrid), which is less on slopes up to 0.9 with the default spacing.
 constexpr double kSlack = 0.1;
 
 /// F words are rounded.

@@ -10,11 +10,12 @@
 namespace lensforge {
 namespace {
 
-/// Ways from row to row go down at feed where they are no steeper than lenses' rims, rise over run,
-/// or end so little lower, mm. Where a larger ball is lifted off a row's end, the next row may
-/// begin far below it.
-constexpr double kRimSlope = 0.5;
+/// Straight moves that go down by more than this, mm, and more steeply than surfaces that are
+/// finished to their rim are made at plunge feed: where a larger ball comes down from a lift.
 constexpr double kLow = 0.05;
+
+/// The same of ways from row to row where rows may end lifted, rise over run.
+constexpr double kLiftedSlope = 0.3;
 
 /// Height over the row's highest point on the way back, mm: above rounding and what a servo lags.
 constexpr double kHop = 0.05;
@@ -52,12 +53,14 @@ class FinishMoves {
     } else if (plan_.rest != nullptr) {
       hop_to(row.start);
     } else if (plan_.options.style == PassStyle::kZigzag) {
-      step_to(row.start);
+      const double steepest = surface_.lift() != nullptr ? kLiftedSlope : kSteepestSlope;
+      const bool down = dives({MoveKind::kCut, row.start}, steepest);
+      move(down ? MoveKind::kPlunge : MoveKind::kCut, row.start);
     } else {
       go_back_to(row.start);
     }
     for (PathMove one : row.moves) {
-      one.feed = run_.tool.feed;
+      one.feed = dives(one, kSteepestSlope) ? run_.tool.plunge : run_.tool.feed;
       push(one);
     }
     highest_ = highest_of(row, plan_.options.along);
@@ -77,12 +80,9 @@ class FinishMoves {
     return zero + to_resolution(z - zero, plan_.options.resolution);
   }
 
-  void step_to(const Eigen::Vector3d& start) {
-    const double down = at_.z() - start.z();
-    const double run = (start - at_).head<2>().norm();
-    if (down <= std::max(kLow, kRimSlope * run)) return move(MoveKind::kCut, start);
-    move(MoveKind::kCut, {start.x(), start.y(), at_.z()});
-    move(MoveKind::kPlunge, start);
+  [[nodiscard]] bool dives(const PathMove& move, double steepest) const {
+    const Eigen::Vector3d way = move.end - at_;
+    return move.arc_axis < 0 && -way.z() > std::max(kLow, steepest * way.head<2>().norm());
   }
 
   void hop_to(const Eigen::Vector3d& start) {

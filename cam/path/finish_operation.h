@@ -27,13 +27,14 @@ struct FinishRun {
 ///
 /// In: a rapid over the first row's start, a full radius outside the rim, and down at plunge feed.
 /// To and fro, the way from row to row is a straight one at feed outside the rim, where the ball
-/// does not touch the part, or a level one and down at plunge feed where that would be steep. One
-/// way, the tool goes up by what the row's highest point takes and straight back over the row just
-/// cut: a ball that is raised stays within what the tool swept when it cut, so it meets neither the
-/// finished surface nor stock; then it steps over at feed and goes down at plunge feed, both
-/// outside the rim. From one part of a row to the next (RasterPlan::rest) it goes up by the
-/// clearance above all of the surface that it passes, across, and down to where the larger ball has
-/// finished. Memory does not grow with the number of rows.
+/// does not touch the part; it is made at plunge feed where it goes down steeply, as are moves of
+/// rows with which a larger ball comes down from a lift. One way, the tool goes up by what the
+/// row's highest point takes and straight back over the row just cut: a ball that is raised stays
+/// within what the tool swept when it cut, so it meets neither the finished surface nor stock; then
+/// it steps over at feed and goes down at plunge feed, both outside the rim. From one part of a row
+/// to the next (RasterPlan::rest) it goes up by the clearance above all of the surface that it
+/// passes, across, and down to where the larger ball has finished. Memory does not grow with the
+/// number of rows.
 /// @return complete is false if `control` asked for an end.
 /// @throw InputError if there is nothing under the ball somewhere on a row.
 OperationSummary cut_finish(const CutSurface& surface, const RasterPlan& plan, const FinishRun& run,

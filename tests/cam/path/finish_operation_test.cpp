@@ -81,6 +81,28 @@ TEST(FinishOperation, ToAndFroStaysAtFeedThroughout) {
   }
 }
 
+/// Down a wall of 0.6 mm, across the rows and along them.
+TEST(FinishOperation, StraightMovesThatDiveAreMadeAtPlungeFeed) {
+  const SurfaceMesh wall = testing::grid_mesh(15, 16, kSide, kSide, [](double x, double y) {
+    return 5.0 - 0.6 * std::clamp(5.0 * (x + y - 2.0), 0.0, 1.0);
+  });
+  for (const int along : {0, 1}) {
+    const Cut result = cut(wall, plan_of(PassStyle::kZigzag, along));
+    int dives = 0;
+    Eigen::Vector3d at = result.moves.front().end;
+    for (const PathMove& move : result.moves) {
+      const Eigen::Vector3d way = move.end - at;
+      const double run = way.head<2>().norm();
+      if (move.kind != MoveKind::kRapid && move.arc_axis < 0 && -way.z() > std::max(0.05, run)) {
+        EXPECT_EQ(move.feed, 150.0);
+        ++dives;
+      }
+      at = move.end;
+    }
+    EXPECT_GT(dives, 2);
+  }
+}
+
 /// Nothing but cuts comes near the part, and ways back run over the row that was just cut.
 TEST(FinishOperation, LinksNeverTouchThePart) {
   const SurfaceMesh mesh = relief();
