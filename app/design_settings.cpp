@@ -2,12 +2,16 @@
 #include "app/design_settings.h"
 
 #include <algorithm>
+#include <cmath>
+#include <fstream>
 
 #include "app/json_output.h"
 #include "cam/cam_fields.h"
 #include "cam/tool/workshop.h"
 #include "core/error.h"
 #include "core/image/image_io.h"
+#include "core/image/svg_drawing.h"
+#include "core/io/files.h"
 #include "design/design_fields.h"
 #include "design/front_setup.h"
 #include "design/outline_setup.h"
@@ -53,6 +57,22 @@ void refuse_part_options(const OptionSet& options) {
   }
 }
 
+/// A drawing has as many pixels as are asked for. @throw InputError naming a --pixels that would
+/// do.
+void require_wide_drawing(const Image& drawing, const DesignSettings& settings) {
+  const int shorter = std::min(drawing.columns(), drawing.rows());
+  if (shorter >= kMinPixels) return;
+  // The shorter side was rounded, up by a half at most, and will be rounded again.
+  const double least = (kMinPixels - 0.5) * settings.design.pixels / (shorter - 0.5);
+  const bool possible = least <= kMaxImageSide;
+  throw InputError(
+      settings.target + ": is " + size_text(drawing.columns(), drawing.rows()) +
+      " pixels with --pixels " + std::to_string(settings.design.pixels) +
+      "; its shorter side needs at least " + std::to_string(kMinPixels) +
+      (possible ? "; --pixels " + std::to_string(static_cast<int>(std::ceil(least))) + " would do"
+                : ": draw it less narrow"));
+}
+
 }  // namespace
 
 void add_design_options(OptionSet& options, DesignSettings& settings) {
@@ -68,6 +88,7 @@ void add_design_options(OptionSet& options, DesignSettings& settings) {
       "--outline", settings.outline, "rectangle|circle|rounded:R|FILE",
       "edge of the lens: the largest circle, corners of radius R, or the shape that is white "
       "in a picture, seen from the cutter's side");
+  options.fields(background_fields(), settings.background);
   options.fields(weight_fields(), settings.design.weights);
   options.text("--made-by", settings.made_by, "default|FILE.toml",
                "shape the part that this workshop cuts and polishes, not the surface alone");
@@ -83,7 +104,17 @@ void add_design_options(OptionSet& options, DesignSettings& settings) {
   options.flag("--force", settings.force, "replace the design that --out holds");
 }
 
-void settle(OptionSet& options, DesignSettings& settings, const Image& picture) {
+LoadedImage read_target(const DesignSettings& settings, const RunControl& control) {
+  LoadedImage loaded =
+      read_image(settings.target, control, settings.design.pixels, settings.background);
+  if (control.stop_requested()) throw Interrupted();
+  std::ifstream file = open_input(settings.target);
+  if (is_svg(file)) require_wide_drawing(loaded.image, settings);
+  return loaded;
+}
+
+void settle(OptionSet& options, DesignSettings& settings, const Image& picture,
+            const RunControl& control) {
   const int longer = std::max(picture.columns(), picture.rows());
   if (longer < kMinPixels) {
     throw InputError(settings.target + ": has " + size_text(picture.columns(), picture.rows()) +
@@ -103,11 +134,15 @@ void settle(OptionSet& options, DesignSettings& settings, const Image& picture) 
   settings.design = default_design_options(settings.design.model, picture);
   options.restate();
   if (!settings.source_picture.empty()) {
-    settings.design.light.source_shape = shape_of(read_image(settings.source_picture).image);
+    const LoadedImage shape =
+        read_image(settings.source_picture, control, kDrawnSide, settings.background);
+    settings.design.light.source_shape = shape_of(shape.image);
   }
   LightOptions& light = settings.design.light;
-  if (!light.front_file.empty()) light.front_heights = front_from(light.front_file, {});
-  if (!settings.outline.empty()) settings.design.outline = outline_from(settings.outline, {});
+  if (!light.front_file.empty()) light.front_heights = front_from(light.front_file, control);
+  if (!settings.outline.empty()) {
+    settings.design.outline = outline_from(settings.outline, settings.background, control);
+  }
   if (!settings.made_by.empty()) settings.design.made_by = process_of(workshop, settings);
   validate(settings.design, picture);
 }

@@ -28,7 +28,8 @@ bool is_svg_file(const std::string& path) {
 
 }  // namespace
 
-std::optional<Outline> outline_from(const std::string& text, const RunControl& control) {
+std::optional<Outline> outline_from(const std::string& text, const Background& background,
+                                    const RunControl& control) {
   if (text == "rectangle") return std::nullopt;
   if (text == "circle") return Outline{OutlineKind::kCircle, 0.0, {}};
   if (text.starts_with(kRounded)) {
@@ -40,7 +41,7 @@ std::optional<Outline> outline_from(const std::string& text, const RunControl& c
     refuse("'" + text + "': must be rectangle, circle, rounded:R with R in mm, or a picture" +
            kCircleWouldDo);
   }
-  Image picture = read_image(text, control, kOutlineDrawing).image;
+  Image picture = read_image(text, control, kOutlineDrawing, background).image;
   if (is_svg_file(text)) {
     // Its pixels are mean light: half of it is where the shape covers half.
     for (float& value : picture.values()) {
