@@ -126,6 +126,10 @@ void settle(OptionSet& options, DesignSettings& settings, const Image& picture,
     throw InputError(settings.target + ": has " + size_text(picture.columns(), picture.rows()) +
                      " pixels; its longer side needs at least " + std::to_string(kMinPixels));
   }
+  if (!(picture.total() > 0.0)) {
+    throw InputError(settings.target +
+                     ": is black all over: there is no light to place; use a picture with some");
+  }
   Workshop workshop;
   if (settings.made_by.empty()) {
     refuse_part_options(options);

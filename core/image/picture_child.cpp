@@ -23,13 +23,13 @@ namespace {
 /// threads of HEIF's decoders make.
 constexpr double kMemory = 1e9;
 
-/// For each pixel, bytes. Measured at 4000²: progressive JPEG 9, WebP without loss 12, HEIC 14.
+/// For each pixel, bytes. At 4000² no decoder has more than 15 resident (HEIC).
 constexpr double kMemoryPerPixel = 24.0;
 
 /// For each byte of the file: some are held whole, and grow while they are read.
 constexpr double kMemoryPerByte = 4.0;
 
-/// Computing time, s: the slowest measured, HEIC with a colour profile, takes 0.4 µs a pixel.
+/// Computing time, s. At 4000² every format takes less than 0.1 µs a pixel.
 constexpr double kSeconds = 20.0;
 constexpr double kSecondsPerPixel = 2e-6;
 
