@@ -173,12 +173,11 @@ bool is_of_lens(const std::string& name) {
          std::find(lens_file::kAll.begin(), lens_file::kAll.end(), name) != lens_file::kAll.end();
 }
 
-/// Nothing is written yet: a decoder that unpacks a whole picture without a look at the stop token
-/// is left behind with the process.
-LoadedImage read_target(const DesignSettings& settings, const CommonOptions& common) {
-  InterruptibleJob job(common);
-  LoadedImage loaded = read_image(settings.target, job.control(), settings.design.pixels);
-  if (job.control().stop_requested()) throw Interrupted();
+/// Reads target, source's shape, front and outline. Nothing is written yet.
+LoadedImage read_pictures(OptionSet& options, DesignSettings& settings) {
+  InterruptibleJob job(options.common());
+  LoadedImage loaded = read_target(settings, job.control());
+  settle(options, settings, loaded.image, job.control());
   return loaded;
 }
 
@@ -195,10 +194,9 @@ int run(OptionSet& options, DesignSettings& settings) {
   const EarlierDesign earlier = EarlierDesign::in(settings.out);
   if (!settings.live.empty()) live_port(settings.live);
   refuse_to_overwrite(settings.out, earlier, settings.resume, settings.force);
-  const LoadedImage loaded = read_target(settings, options.common());
+  const LoadedImage loaded = read_pictures(options, settings);
   const InterruptWatch interrupt;
   DesignOptions& design = settings.design;
-  settle(options, settings, loaded.image, {interrupt.token(), {}});
   refuse_splines_on_ranks(design);
   if (settings.resume && earlier.lens && !earlier.checkpoint) {
     require_finished(settings.out, earlier,

@@ -2,6 +2,8 @@
 #include "app/design_settings.h"
 
 #include <algorithm>
+#include <cmath>
+#include <fstream>
 #include <utility>
 
 #include "app/json_output.h"
@@ -9,6 +11,8 @@
 #include "cam/tool/workshop.h"
 #include "core/error.h"
 #include "core/image/image_io.h"
+#include "core/image/svg_drawing.h"
+#include "core/io/files.h"
 #include "design/design_fields.h"
 #include "design/front_setup.h"
 #include "design/outline_setup.h"
@@ -60,6 +64,22 @@ void note_changes(DesignSettings& settings, const std::string& picture,
   for (const std::string& change : changes) settings.changes.push_back(picture + ": " + change);
 }
 
+/// A drawing has as many pixels as are asked for. @throw InputError naming a --pixels that would
+/// do.
+void require_wide_drawing(const Image& drawing, const DesignSettings& settings) {
+  const int shorter = std::min(drawing.columns(), drawing.rows());
+  if (shorter >= kMinPixels) return;
+  // The shorter side was rounded, up by a half at most, and will be rounded again.
+  const double least = (kMinPixels - 0.5) * settings.design.pixels / (shorter - 0.5);
+  const bool possible = least <= kMaxImageSide;
+  throw InputError(
+      settings.target + ": is " + size_text(drawing.columns(), drawing.rows()) +
+      " pixels with --pixels " + std::to_string(settings.design.pixels) +
+      "; its shorter side needs at least " + std::to_string(kMinPixels) +
+      (possible ? "; --pixels " + std::to_string(static_cast<int>(std::ceil(least))) + " would do"
+                : ": draw it less narrow"));
+}
+
 }  // namespace
 
 void add_design_options(OptionSet& options, DesignSettings& settings) {
@@ -75,6 +95,7 @@ void add_design_options(OptionSet& options, DesignSettings& settings) {
       "--outline", settings.outline, "rectangle|circle|rounded:R|FILE",
       "edge of the lens: the largest circle, corners of radius R, or the shape that is white "
       "in a picture, seen from the cutter's side");
+  options.fields(background_fields(), settings.background);
   options.fields(weight_fields(), settings.design.weights);
   options.text("--made-by", settings.made_by, "default|FILE.toml",
                "shape the part that this workshop cuts and polishes, not the surface alone");
@@ -90,12 +111,25 @@ void add_design_options(OptionSet& options, DesignSettings& settings) {
   options.flag("--force", settings.force, "replace the design that --out holds");
 }
 
+LoadedImage read_target(const DesignSettings& settings, const RunControl& control) {
+  LoadedImage loaded =
+      read_image(settings.target, control, settings.design.pixels, settings.background);
+  if (control.stop_requested()) throw Interrupted();
+  std::ifstream file = open_input(settings.target);
+  if (is_svg(file)) require_wide_drawing(loaded.image, settings);
+  return loaded;
+}
+
 void settle(OptionSet& options, DesignSettings& settings, const Image& picture,
             const RunControl& control) {
   const int longer = std::max(picture.columns(), picture.rows());
   if (longer < kMinPixels) {
     throw InputError(settings.target + ": has " + size_text(picture.columns(), picture.rows()) +
                      " pixels; its longer side needs at least " + std::to_string(kMinPixels));
+  }
+  if (!(picture.total() > 0.0)) {
+    throw InputError(settings.target +
+                     ": is black all over: there is no light to place; use a picture with some");
   }
   Workshop workshop;
   if (settings.made_by.empty()) {
@@ -116,14 +150,15 @@ void settle(OptionSet& options, DesignSettings& settings, const Image& picture,
   settings.design = default_design_options(settings.design.model, picture);
   options.restate();
   if (!settings.source_picture.empty()) {
-    const LoadedImage source = read_image(settings.source_picture, control);
-    note_changes(settings, "--source-picture " + settings.source_picture, source.changes);
-    settings.design.light.source_shape = shape_of(source.image);
+    const LoadedImage shape =
+        read_image(settings.source_picture, control, kDrawnSide, settings.background);
+    note_changes(settings, "--source-picture " + settings.source_picture, shape.changes);
+    settings.design.light.source_shape = shape_of(shape.image);
   }
   LightOptions& light = settings.design.light;
   if (!light.front_file.empty()) light.front_heights = front_from(light.front_file, control);
   if (!settings.outline.empty()) {
-    OutlineChoice choice = outline_from(settings.outline, control);
+    OutlineChoice choice = outline_from(settings.outline, settings.background, control);
     note_changes(settings, "--outline " + settings.outline, choice.changes);
     settings.design.outline = std::move(choice.outline);
   }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <optional>
 #include <variant>
 
 #include "app/command_line.h"
@@ -213,8 +214,10 @@ Description describe_solid(const fs::path& path, bool iges, const CommonOptions&
   return d;
 }
 
-Description describe_picture(const fs::path& path) {
-  const LoadedImage loaded = read_image(path);
+Description describe_picture(const fs::path& path, const Background& background,
+                             const CommonOptions& common) {
+  InterruptibleJob job(common);
+  const LoadedImage loaded = read_image(path, job.control(), kDrawnSide, background);
   const auto values = loaded.image.values();
   const double count = static_cast<double>(values.size());
   const double mean = loaded.image.total() / count;
@@ -251,14 +254,15 @@ Description describe_package(const MeshContent& content) {
   return d;
 }
 
-Description describe(const fs::path& path, const CommonOptions& common) {
+/// What is no picture by its name; nothing for a picture.
+std::optional<Description> describe(const fs::path& path, const CommonOptions& common) {
   if (is_folder(path)) return describe_lens(path);
   if (has_extension(path, {".ngc", ".nc", ".gcode", ".tap"})) return describe_gcode(path);
   const bool iges = has_extension(path, {".igs", ".iges"});
   if (iges || is_step_file(path)) return describe_solid(path, iges, common);
   if (has_extension(path, {".3mf"})) return describe_package(inspect_3mf(path));
   if (has_extension(path, {".glb"})) return describe_package(inspect_glb(path));
-  if (!has_extension(path, {".ply", ".obj", ".stl", ".off"})) return describe_picture(path);
+  if (!has_extension(path, {".ply", ".obj", ".stl", ".off"})) return std::nullopt;
   Description d{{{"kind", "mesh"}}, {}};
   describe_mesh(d, read_mesh(path));
   return d;
@@ -270,8 +274,15 @@ int info_command(const Arguments& command_line) try {
   std::string source;
   OptionSet options("info", "Says what a lens folder, solid, mesh, picture or G-code program is.");
   options.positional("SOURCE", source, "lens folder, solid, mesh, picture or G-code program");
+  Background background;
+  options.fields(background_fields(), background);
   options.parse(command_line);
-  Description d = describe(source, options.common());
+  std::optional<Description> described = describe(source, options.common());
+  if (described && options.given("--background")) {
+    throw InputError("--background: is for pictures, and " + source + " is none");
+  }
+  if (!described) described = describe_picture(source, background, options.common());
+  Description& d = *described;
   d.json["command"] = "info";
   d.json["source"] = source;
   const Console console(options.common().json, options.common().quiet);

@@ -38,6 +38,7 @@ struct RenderArguments {
   std::string source;
   std::string out;
   std::string target;
+  Background background;  ///< Of the target.
   bool force = false;
   RenderOptions render;
 };
@@ -58,6 +59,7 @@ void add_render_options(OptionSet& options, RenderArguments& arguments) {
   options.text("--out", arguments.out, "FILE", "write the picture to this .png or .exr");
   options.flag("--force", arguments.force, "replace a file that lensforge did not write");
   options.text("--target", arguments.target, "PICTURE", "compare with this; a lens has its own");
+  options.fields(background_fields(), arguments.background);
   options.fields(render_fields(), arguments.render);
 }
 
@@ -126,11 +128,14 @@ Scene adjusted(Scene scene, OptionSet& options, RenderArguments& arguments,
   require_spectrum(scene, options, arguments);
   const WorkEstimate work = require_room_for_picture(setup, arguments.out);
   if (options.given("--target")) {
-    LoadedImage target = read_image(arguments.target, control, setup.pixels.maxCoeff());
+    LoadedImage target =
+        read_image(arguments.target, control, setup.pixels.maxCoeff(), arguments.background);
     for (const std::string& change : target.changes) {
       console.note("--target " + arguments.target + ": " + change);
     }
     scene.target = std::move(target.image);
+  } else if (options.given("--background")) {
+    throw InputError("--background: is for the picture of --target, which is not given");
   }
   if (scene.target) scene.target = resample(*scene.target, setup.pixels.x(), setup.pixels.y());
   require_wall_above(scene.surface, setup);

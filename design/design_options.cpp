@@ -48,6 +48,28 @@ void require_coarse_polish(const DesignOptions& o, const Eigen::Vector2i& pixels
               number_text(std::ceil(1e5 * least) / 1e5) + " mm, or --model spline without it");
 }
 
+/// The smallest longer side at which a picture's shorter one has enough pixels.
+int least_pixels(const Image& picture) {
+  int longer = kMinPixels;
+  while (working_size(picture.columns(), picture.rows(), longer).minCoeff() < kMinPixels) ++longer;
+  return longer;
+}
+
+/// @throw InputError naming the longer side that would do, if its shorter one has too few pixels.
+void require_wide_enough(const Eigen::Vector2i& pixels, const Image& picture, int longer_side) {
+  if (pixels.minCoeff() >= kMinPixels) return;
+  const std::string least = std::to_string(kMinPixels);
+  const int shorter = std::min(picture.columns(), picture.rows());
+  if (shorter < kMinPixels) {
+    throw InputError("the picture's shorter side " + std::to_string(shorter) +
+                     ": must have at least " + least +
+                     " pixels; crop the longer one and enlarge it");
+  }
+  throw InputError("--pixels " + std::to_string(longer_side) + ": leaves the shorter side " +
+                   std::to_string(pixels.minCoeff()) + " pixels, must be at least " + least +
+                   "; --pixels " + std::to_string(least_pixels(picture)) + " would do");
+}
+
 }  // namespace
 
 DesignOptions default_design_options(SurfaceModel model, const Image& target) {
@@ -72,8 +94,7 @@ void validate(const DesignOptions& options, const Image& target) {
   require(longer >= options.pixels, "--pixels", options.pixels,
           "the picture's longer side has only " + std::to_string(longer) + " pixels");
   const Eigen::Vector2i pixels = working_size(target.columns(), target.rows(), options.pixels);
-  require(pixels.minCoeff() >= kMinPixels, "the working picture's shorter side", pixels.minCoeff(),
-          "must be at least 4 pixels");
+  require_wide_enough(pixels, target, options.pixels);
   require_light(options, pixels);
   require_coarse_polish(options, pixels);
   if (!(target.total() > 0.0)) {

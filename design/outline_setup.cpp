@@ -28,7 +28,8 @@ bool is_svg_file(const std::string& path) {
 
 }  // namespace
 
-OutlineChoice outline_from(const std::string& text, const RunControl& control) {
+OutlineChoice outline_from(const std::string& text, const Background& background,
+                           const RunControl& control) {
   if (text == "rectangle") return {};
   if (text == "circle") return {Outline{OutlineKind::kCircle, 0.0, {}}, {}};
   if (text.starts_with(kRounded)) {
@@ -40,7 +41,7 @@ OutlineChoice outline_from(const std::string& text, const RunControl& control) {
     refuse("'" + text + "': must be rectangle, circle, rounded:R with R in mm, or a picture" +
            kCircleWouldDo);
   }
-  LoadedImage loaded = read_image(text, control, kOutlineDrawing);
+  LoadedImage loaded = read_image(text, control, kOutlineDrawing, background);
   Image& picture = loaded.image;
   if (is_svg_file(text)) {
     // Its pixels are mean light: half of it is where the shape covers half.

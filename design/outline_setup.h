@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/compute/run_control.h"
+#include "core/image/background.h"
 #include "core/image/image.h"
 #include "core/optics/outline.h"
 #include "design/design_options.h"
@@ -39,8 +40,10 @@ struct OutlineChoice {
 
 /// What `--outline` asks for: rectangle (none), circle, rounded:R, or the name of a picture or
 /// an SVG file whose white is lens, as seen against the light, from +z.
-/// @throw InputError naming option, value and rule. Interrupted.
-OutlineChoice outline_from(const std::string& text, const RunControl& control);
+/// @param background  what shows through where the picture is transparent.
+/// @throw InputError naming option, value and rule; Interrupted.
+OutlineChoice outline_from(const std::string& text, const Background& background,
+                           const RunControl& control);
 
 /// An outline of DesignOptions in a lens of this size. @pre require_outline() passed.
 Outline fitted(const Outline& outline, const Eigen::Vector2d& lens_size);

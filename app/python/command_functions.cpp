@@ -23,7 +23,6 @@
 #include "cam/job_files.h"
 #include "cam/report/report_json.h"
 #include "core/error.h"
-#include "core/image/image_io.h"
 #include "core/io/folder_lock.h"
 #include "design/design_estimate.h"
 #include "design/flux_of_surface.h"
@@ -71,8 +70,7 @@ py::object design(const py::object& picture, const app::Arguments& words) {
   auto made = std::make_shared<LensObject>();
   made->design = run_released([&](const std::stop_token& stop) {
     const RunControl control = stopping_at(stop);
-    const Image target =
-        given.empty() ? read_image(settings.target, control, settings.design.pixels).image : given;
+    const Image target = given.empty() ? app::read_target(settings, control).image : given;
     app::settle(options, settings, target, control);
     const app::ChosenDevice device = options.device_executor();
     require_room_for_design(target.columns(), target.rows(), settings.design,

@@ -5,8 +5,10 @@
 #include <cmath>
 #include <cstddef>
 #include <string>
+#include <vector>
 
 #include "core/image/layered_image.h"
+#include "core/image/picture_child.h"
 #include "core/image/picture_source.h"
 
 namespace lensforge {
@@ -38,6 +40,19 @@ void require_heights(const fs::path& path, const OIIO::ImageSpec& spec) {
   }
 }
 
+void send_first_channel(PictureSource& source, RowSender& sender) {
+  const OIIO::ImageSpec& spec = source.spec();
+  const auto channels = static_cast<std::size_t>(spec.nchannels);
+  sender.begin(spec.width, spec.height, 0.0F);
+  std::vector<float> band;
+  for (int begin = 0; begin < spec.height; begin += source.band_rows()) {
+    source.read_rows(begin, std::min(spec.height, begin + source.band_rows()), band);
+    std::vector<float> heights;
+    for (std::size_t i = 0; i < band.size(); i += channels) heights.push_back(band[i]);
+    sender.send(begin, heights);
+  }
+}
+
 void require_finite(const fs::path& path, const HeightGrid& grid) {
   const auto bad = std::find_if_not(grid.heights.begin(), grid.heights.end(),
                                     [](float z) { return std::isfinite(z); });
@@ -50,16 +65,15 @@ void require_finite(const fs::path& path, const HeightGrid& grid) {
 }  // namespace
 
 HeightGrid read_heights(const fs::path& path, const RunControl& run) {
-  PictureSource source(path, run);
-  const OIIO::ImageSpec& spec = source.spec();
-  require_heights(path, spec);
-  HeightGrid grid{spec.width, spec.height, {}};
-  const auto channels = static_cast<std::size_t>(spec.nchannels);
-  std::vector<float> band;
-  for (int begin = 0; begin < grid.rows; begin += source.band_rows()) {
-    source.read_rows(begin, std::min(grid.rows, begin + source.band_rows()), band);
-    for (std::size_t i = 0; i < band.size(); i += channels) grid.heights.push_back(band[i]);
-  }
+  const auto decode = [&](RowSender& sender, const RunControl&) {
+    PictureSource source(path);
+    require_heights(path, source.spec());
+    send_first_channel(source, sender);
+    return std::string();
+  };
+  const Image heights = decode_in_child(path, decode, run).image;
+  HeightGrid grid{
+      heights.columns(), heights.rows(), {heights.values().begin(), heights.values().end()}};
   require_finite(path, grid);
   return grid;
 }

@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "core/error.h"
+#include "core/image/openimageio_use.h"
 #include "core/text/version.h"
 
 namespace lensforge {
@@ -21,9 +22,20 @@ void write_rows(OIIO::ImageOutput& output, const OIIO::ImageSpec& spec, const En
     if (control.stop_requested()) throw Interrupted();
     control.report({"picture file", double{1} * first, double{1} * spec.height, ""});
     const int end = std::min(first + kRowsAtOnce, spec.height);
-    if (output.write_scanlines(first, end, 0, spec.format, rows(first, end))) continue;
+    const auto* const values = rows(first, end);
+    const OpenImageIoUse use;
+    if (output.write_scanlines(first, end, 0, spec.format, values)) continue;
     throw RunError(what + ": cannot be written: " + output.geterror());
   }
+}
+
+std::unique_ptr<OIIO::ImageOutput> create_output(const std::string& name,
+                                                 OIIO::Filesystem::IOVecOutput& memory,
+                                                 const std::string& what) {
+  const OpenImageIoUse use;
+  auto output = OIIO::ImageOutput::create(name, &memory);
+  if (!output) throw RunError(what + ": cannot be written: " + OIIO::geterror());
+  return output;
 }
 
 }  // namespace
@@ -35,14 +47,14 @@ std::vector<unsigned char> encode_rows(const std::string& what, OIIO::ImageSpec 
   std::vector<unsigned char> bytes;
   OIIO::Filesystem::IOVecOutput memory(bytes);
   const std::string name = "picture" + extension;
-  const auto output = OIIO::ImageOutput::create(name, &memory);
-  if (!output) throw RunError(what + ": cannot be written: " + OIIO::geterror());
-  const auto require = [&](bool done) {
-    if (!done) throw RunError(what + ": cannot be written: " + output->geterror());
+  const std::unique_ptr<OIIO::ImageOutput> output = create_output(name, memory, what);
+  const auto require = [&](const auto& call) {
+    const OpenImageIoUse use;
+    if (!call()) throw RunError(what + ": cannot be written: " + output->geterror());
   };
-  require(output->open(name, spec));
+  require([&] { return output->open(name, spec); });
   write_rows(*output, spec, rows, what, control);
-  require(output->close());
+  require([&] { return output->close(); });
   return bytes;
 }
 

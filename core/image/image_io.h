@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/compute/run_control.h"
+#include "core/image/background.h"
 #include "core/image/image.h"
 
 namespace lensforge {
@@ -25,15 +26,18 @@ inline constexpr int kMaxImageSide = 16384;
 inline constexpr int kDrawnSide = 256;
 
 /// Reads a PNG, JPEG, TIFF, EXR or another of the formats in kReadableFormats
-/// (picture_outline.h), whatever its name: any channel count and depth, decoded by the colour space
-/// that the file declares, else sRGB for integers, linear for floats. Reports rows.
+/// (picture_outline.h), whatever its name: any channel count and depth, decoded by the colour
+/// profile or space that the file declares, else sRGB for integers, linear for floats. Decoders run
+/// in a child process (picture_child.h).
 /// @param drawn_side  pixels of the longer side of an SVG file, which has none of its own
 ///        (svg_drawing.h).
+/// @param background  what shows through where the picture is transparent.
 /// @throw InputError if the file is missing, no regular file, truncated, no picture, larger than
-///        kMaxImageSide or than the memory, or holds NaN, infinite or negative values; the message
-///        names the file. Interrupted.
+///        kMaxImageSide or than the memory, holds NaN, infinite or negative values (but for what
+///        kRingingShare allows), cannot be told from the background, or crashes its decoder; the
+///        message names the file. Interrupted, at most 0.1 s after the stop request.
 LoadedImage read_image(const std::filesystem::path& path, const RunControl& run = {},
-                       int drawn_side = kDrawnSide);
+                       int drawn_side = kDrawnSide, const Background& background = {});
 
 /// Box-filter (area-weighted) resampling in linear light: the mean value is kept to 1e-6 relative.
 /// Reports rows of the result. @pre columns, rows ≥ 1. @throw Interrupted.

@@ -6,14 +6,14 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <memory>
+#include <sstream>
 #include <utility>
 
 #include "core/error.h"
 #include "core/image/image_encoder.h"
 #include "core/image/image_io.h"
+#include "core/image/picture_child.h"
 #include "core/io/files.h"
-#include "core/io/stderr_silence.h"
 
 namespace lensforge {
 namespace {
@@ -37,6 +37,36 @@ std::vector<float> interleaved(const LayeredImage& image) {
     for (std::size_t i = 0; i < layer.size(); ++i) values[count * i + k] = layer[i];
   }
   return values;
+}
+
+[[noreturn]] void refuse(const std::filesystem::path& path, const std::string& rule) {
+  throw InputError(path.string() + ": " + rule);
+}
+
+/// In the decoding process: sends the layers one below the other. @return their names, each with a
+/// zero behind it.
+std::string send_layers(const std::filesystem::path& path, RowSender& sender) {
+  const auto input = OIIO::ImageInput::open(path.string());
+  if (!input) refuse(path, "cannot be read as an EXR file");
+  const OIIO::ImageSpec& spec = input->spec();
+  if (std::max(spec.width, spec.height) > kMaxImageSide || spec.nchannels > kMostLayers) {
+    refuse(path, "is larger than " + std::to_string(kMaxImageSide) + " a side with " +
+                     std::to_string(kMostLayers) + " layers");
+  }
+  sender.begin(spec.width, spec.height * spec.nchannels, 0.0F);
+  std::vector<float> layer(spec.image_pixels());
+  std::string names;
+  for (int k = 0; k < spec.nchannels; ++k) {
+    if (!input->read_image(0, 0, k, k + 1, OIIO::TypeDesc::FLOAT, layer.data())) {
+      refuse(path, "ends early or is damaged");
+    }
+    const bool finite =
+        std::all_of(layer.begin(), layer.end(), [](float v) { return std::isfinite(v); });
+    if (!finite) refuse(path, "holds a value that is not finite");
+    sender.send(k * spec.height, layer);
+    names += spec.channelnames[static_cast<std::size_t>(k)] + '\0';
+  }
+  return names;
 }
 
 }  // namespace
@@ -81,31 +111,19 @@ void write_layers(const LayeredImage& image, const std::filesystem::path& path) 
 }
 
 LayeredImage read_layers(const std::filesystem::path& path) {
-  require_regular_file(path);
-  const StderrSilence silence;
-  const auto refuse = [&](const std::string& rule) -> void {
-    throw InputError(path.string() + ": " + rule);
+  const auto decode = [&](RowSender& sender, const RunControl&) {
+    return send_layers(path, sender);
   };
-  const auto input = OIIO::ImageInput::open(path.string());
-  if (!input) {
-    OIIO::geterror();
-    refuse("cannot be read as an EXR file");
-  }
-  const OIIO::ImageSpec& spec = input->spec();
-  if (std::max(spec.width, spec.height) > kMaxImageSide || spec.nchannels > kMostLayers) {
-    refuse("is larger than " + std::to_string(kMaxImageSide) + " a side with " +
-           std::to_string(kMostLayers) + " layers");
-  }
-  LayeredImage image(spec.width, spec.height, spec.channelnames);
-  for (int k = 0; k < spec.nchannels; ++k) {
-    const auto layer = image.layer(spec.channelnames[static_cast<std::size_t>(k)]);
-    if (!input->read_image(0, 0, k, k + 1, OIIO::TypeDesc::FLOAT, layer.data())) {
-      input->geterror();
-      refuse("ends early or is damaged");
-    }
-    const bool finite =
-        std::all_of(layer.begin(), layer.end(), [](float v) { return std::isfinite(v); });
-    if (!finite) refuse("holds a value that is not finite");
+  const DecodedPicture decoded = decode_in_child(path, decode, {});
+  std::vector<std::string> names;
+  std::istringstream lines(decoded.text);
+  for (std::string name; std::getline(lines, name, '\0');) names.push_back(name);
+  const int rows = decoded.image.rows() / static_cast<int>(names.size());
+  LayeredImage image(decoded.image.columns(), rows, names);
+  const auto values = decoded.image.values();
+  const std::size_t size = values.size() / names.size();
+  for (std::size_t k = 0; k < names.size(); ++k) {
+    std::ranges::copy(values.subspan(k * size, size), image.layer(names[k]).begin());
   }
   return image;
 }

@@ -60,11 +60,7 @@ PictureOutline bmp_outline(const Head& head) {
     bmp.columns = head.little_signed(18);
     bmp.rows = std::abs(head.little_signed(22));  // Negative: from the top down.
   }
-  constexpr std::array<std::int64_t, 6> kDepths{1, 4, 8, 16, 24, 32};
-  const std::int64_t depth = head.little(is_core ? 24 : 28, 2);
-  if (std::find(kDepths.begin(), kDepths.end(), depth) == kDepths.end()) {
-    bmp.problem = "is corrupt: a BMP picture has no " + std::to_string(depth) + " bits a pixel";
-  } else if (bmp.columns < 1 || bmp.rows < 1) {
+  if (bmp.columns < 1 || bmp.rows < 1) {
     bmp.problem = "is corrupt: its BMP header has no size";
   }
   return bmp;

@@ -9,13 +9,16 @@
 
 #include "core/compute/work_estimate.h"
 #include "core/error.h"
+#include "core/image/bmp_input.h"
 #include "core/image/image_io.h"
 #include "core/image/jpeg_outline.h"
+#include "core/image/picture_child.h"
+#include "core/image/picture_metadata.h"
 #include "core/image/picture_outline.h"
 #include "core/image/pnm_outline.h"
 #include "core/image/tiff_outline.h"
 #include "core/io/files.h"
-#include "core/io/stderr_silence.h"
+#include "core/sandbox/child_work.h"
 #include "core/text/printable.h"
 
 namespace lensforge {
@@ -55,36 +58,49 @@ std::string reason(const OIIO::ImageInput& input) {
   return ": " + printable_line(text, kLongestReason);
 }
 
-void check_jpeg(const fs::path& path, std::istream& file) {
-  const auto jpeg = read_jpeg_outline(file);
+/// What of a look at the bytes a format's own check adds to.
+struct Checked {
+  const fs::path& path;
+  std::istream& file;
+  PictureOutline& outline;
+};
+
+void set_size(const Checked& checked, std::int64_t columns, std::int64_t rows) {
+  checked.outline.columns = columns;
+  checked.outline.rows = rows;
+  check_picture_size(checked.path, columns, rows);
+}
+
+void check_jpeg(const Checked& checked) {
+  const auto jpeg = read_jpeg_outline(checked.file);
   if (!jpeg) return;
-  check_picture_size(path, jpeg->columns, jpeg->rows);
+  set_size(checked, jpeg->columns, jpeg->rows);
   if (!jpeg->complete) {
-    refuse_picture(path, "is truncated: the JPEG data end before their end marker");
+    refuse_picture(checked.path, "is truncated: the JPEG data end before their end marker");
   }
 }
 
-void check_tiff(const fs::path& path, std::istream& file) {
-  const std::string problem = tiff_problem(file);
-  if (!problem.empty()) refuse_picture(path, problem);
+void check_tiff(const Checked& checked) {
+  const std::string problem = tiff_problem(checked.file);
+  if (!problem.empty()) refuse_picture(checked.path, problem);
 }
 
-EssentialPng check_png(const fs::path& path, std::istream& file) {
-  const auto size = read_png_size(file);
-  if (size) check_picture_size(path, size->columns, size->rows);
-  file.clear();
-  file.seekg(0);
-  EssentialPng png = read_essential_png(file);
-  if (!png.problem.empty()) refuse_picture(path, png.problem);
+EssentialPng check_png(const Checked& checked) {
+  const auto size = read_png_size(checked.file);
+  if (size) set_size(checked, size->columns, size->rows);
+  checked.file.clear();
+  checked.file.seekg(0);
+  EssentialPng png = read_essential_png(checked.file);
+  if (!png.problem.empty()) refuse_picture(checked.path, png.problem);
   return png;
 }
 
-void check_pnm(const fs::path& path, std::istream& file, const RunControl& run) {
-  const PnmOutline pnm = read_pnm_outline(file);
-  if (!pnm.problem.empty()) refuse_picture(path, pnm.problem);
-  check_picture_size(path, pnm.columns, pnm.rows);
-  const std::string problem = pnm_pixel_problem(file, pnm, run);
-  if (!problem.empty()) refuse_picture(path, problem);
+void check_pnm(const Checked& checked) {
+  const PnmOutline pnm = read_pnm_outline(checked.file);
+  if (!pnm.problem.empty()) refuse_picture(checked.path, pnm.problem);
+  set_size(checked, pnm.columns, pnm.rows);
+  const std::string problem = pnm_pixel_problem(checked.file, pnm);
+  if (!problem.empty()) refuse_picture(checked.path, problem);
 }
 
 }  // namespace
@@ -100,27 +116,28 @@ void check_picture_size(const fs::path& path, std::int64_t columns, std::int64_t
                            " a side are read");
 }
 
-PictureSource::PictureSource(const fs::path& path, const RunControl& run) : path_(path), run_(run) {
+PictureSource::PictureSource(const fs::path& path) : path_(path) {
   look_over();
   open();
   check_spec();
 }
 
-void PictureSource::fail(const std::string& why) const {
-  if (run_.stop_requested()) throw Interrupted();
-  refuse_picture(path_, why);
-}
+void PictureSource::fail(const std::string& why) const { refuse_picture(path_, why); }
 
 void PictureSource::require_memory(double bytes) const {
   require_room({0.0, 0.0, bytes}, path_.parent_path(), path_.string(),
                "use a picture of fewer pixels");
 }
 
-/// Calls the library while it cannot print. @return whether it says that it succeeded.
+void PictureSource::limit_decoder(std::int64_t columns, std::int64_t rows) const {
+  const double pixels = static_cast<double>(columns) * static_cast<double>(rows);
+  if (pixels > 0.0) limit_this_process(decoder_limits(path_, pixels));
+}
+
+/// @return whether the library says that it succeeded.
 template <class Call>
-bool PictureSource::quietly(const Call& call) const {
+bool PictureSource::succeeds(const Call& call) const {
   try {
-    const StderrSilence silence;
     return call();
   } catch (const std::exception&) {
     fail("is corrupt, or its decoder needs more memory than the machine has");
@@ -131,20 +148,20 @@ bool PictureSource::quietly(const Call& call) const {
 void PictureSource::look_over() {
   std::ifstream file = open_input(path_);
   if (file.peek() == std::ifstream::traits_type::eof()) fail("is empty");
-  const auto outline = read_picture_outline(file);
+  auto outline = read_picture_outline(file);
   if (!outline) fail(std::string("is no picture that can be read: ") + kReadableFormats + " are");
   if (!outline->problem.empty()) fail(outline->problem);
   check_picture_size(path_, outline->columns, outline->rows);
   // Decoders of these formats unpack whole pictures on opening, four bytes a pixel.
   require_memory(4.0 * static_cast<double>(outline->columns) * static_cast<double>(outline->rows));
   format_ = outline->format;
-  animated_ = outline->animated;
-  if (format_ == "jpeg") check_jpeg(path_, file);
-  if (format_ == "pnm") check_pnm(path_, file, run_);
-  if (format_ == "tiff") check_tiff(path_, file);
-  if (format_ != "png") return;
-  png_ = check_png(path_, file);
-  animated_ = png_.animated;
+  const Checked checked{path_, file, *outline};
+  if (format_ == "jpeg") check_jpeg(checked);
+  if (format_ == "pnm") check_pnm(checked);
+  if (format_ == "tiff") check_tiff(checked);
+  if (format_ == "png") png_ = check_png(checked);
+  animated_ = outline->animated || png_.animated;
+  limit_decoder(outline->columns, outline->rows);
 }
 
 void PictureSource::open() {
@@ -152,20 +169,22 @@ void PictureSource::open() {
   // Alpha is applied here, in linear light, and not by OpenImageIO to the encoded values.
   hints.attribute("oiio:UnassociatedAlpha", 1);
   // By the format's name: as a file's name it would take what follows a '?' for settings.
-  input_ = OIIO::ImageInput::create(format_);
+  input_ = is("bmp") ? make_bmp_input() : OIIO::ImageInput::create(format_);
   if (!input_) {
     OIIO::geterror();
     fail("is no picture that can be read: OpenImageIO was built without " + format_);
   }
-  if (input_->supports("ioproxy")) {
-    file_ = is("png") ? std::make_unique<PictureFile>(png_.bytes, run_)
-                      : std::make_unique<PictureFile>(path_, run_);
-    OIIO::Filesystem::IOProxy* const proxy = file_->proxy();
+  if (is("png")) {
+    png_reader_ =
+        std::make_unique<OIIO::Filesystem::IOMemReader>(png_.bytes.data(), png_.bytes.size());
+    OIIO::Filesystem::IOProxy* const proxy = png_reader_.get();
     hints.attribute("oiio:ioproxy", OIIO::TypeDesc::PTR, &proxy);
   }
-  if (!quietly([&] { return input_->open(path_.string(), spec_, hints); })) {
+  if (!succeeds([&] { return input_->open(path_.string(), spec_, hints); })) {
     fail("is no picture that can be read" + reason(*input_));
   }
+  if (is("webp")) add_webp_metadata(path_, spec_);
+  if (is("heif")) add_heif_metadata(path_, spec_);
 }
 
 void PictureSource::check_spec() const {
@@ -177,15 +196,18 @@ void PictureSource::check_spec() const {
   const auto pixels = static_cast<double>(spec_.image_pixels());
   const double row = 4.0 * spec_.width * spec_.nchannels;  // All as float.
   require_memory(4.0 * pixels + row * band_rows());
+  limit_decoder(spec_.width, spec_.height);
 }
 
 std::string PictureSource::color_profile() const {
-  const std::string name = spec_.get_string_attribute("ICCProfile:profile_description");
-  return name.empty() ? png_.color_profile : name;
+  const OIIO::ParamValue* const profile = spec_.find_attribute("ICCProfile");
+  // Of a PNG file libpng leaves a broken one out.
+  if (profile == nullptr) return png_.color_profile;
+  return {static_cast<const char*>(profile->data()), profile->type().size()};
 }
 
 bool PictureSource::has_more_pictures() {
-  const bool more = quietly([&] { return input_->seek_subimage(1, 0); });
+  const bool more = succeeds([&] { return input_->seek_subimage(1, 0); });
   input_->geterror();
   return more;
 }
@@ -199,12 +221,11 @@ int PictureSource::band_rows() const {
 }
 
 void PictureSource::read_rows(int begin, int end, std::vector<float>& rows) {
-  if (run_.stop_requested()) throw Interrupted();
   rows.resize(static_cast<std::size_t>(end - begin) * static_cast<std::size_t>(spec_.width) *
               static_cast<std::size_t>(spec_.nchannels));
   const int top = spec_.y + begin;
   const int bottom = spec_.y + end;
-  const bool read = quietly([&] {
+  const bool read = succeeds([&] {
     return spec_.tile_width > 0
                ? input_->read_tiles(0, 0, spec_.x, spec_.x + spec_.width, top, bottom, spec_.z,
                                     spec_.z + 1, 0, spec_.nchannels, OIIO::TypeFloat, rows.data())

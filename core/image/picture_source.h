@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 
 #include <cstdint>
@@ -10,26 +11,24 @@
 #include <string_view>
 #include <vector>
 
-#include "core/compute/run_control.h"
-#include "core/image/picture_file.h"
 #include "core/image/png_outline.h"
 
 namespace lensforge {
 
 /// An open picture file and what its header says. It is opened only after all that can be told from
-/// its bytes alone has been looked at. Every function throws InputError naming the file, or
-/// Interrupted once `run` asks for an end.
+/// its bytes alone has been looked at. Every function throws InputError naming the file.
 class PictureSource {
  public:
-  /// @pre `run` outlives this.
-  PictureSource(const std::filesystem::path& path, const RunControl& run);
+  /// Lowers the limits of the process to what a picture of this size needs.
+  /// @pre the process is decode_in_child()'s.
+  explicit PictureSource(const std::filesystem::path& path);
 
   [[nodiscard]] const OIIO::ImageSpec& spec() const { return spec_; }
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
   [[nodiscard]] bool is(std::string_view format) const { return format == format_; }
   [[nodiscard]] bool is_animated() const { return animated_; }
 
-  /// Name of the embedded ICC profile; empty without one.
+  /// The embedded ICC profile, perhaps a broken one; empty without one.
   [[nodiscard]] std::string color_profile() const;
   /// Ask it after the first picture was read; the file is at the next one afterwards.
   [[nodiscard]] bool has_more_pictures();
@@ -44,16 +43,16 @@ class PictureSource {
   void open();
   void check_spec() const;
   void require_memory(double bytes) const;
+  void limit_decoder(std::int64_t columns, std::int64_t rows) const;
   template <class Call>
-  bool quietly(const Call& call) const;
+  bool succeeds(const Call& call) const;
   [[noreturn]] void fail(const std::string& why) const;
 
   std::filesystem::path path_;
-  const RunControl& run_;
   std::string format_;  ///< OpenImageIO's name of it.
   bool animated_ = false;
   EssentialPng png_;  ///< Empty for other formats.
-  std::unique_ptr<PictureFile> file_;
+  std::unique_ptr<OIIO::Filesystem::IOProxy> png_reader_;
   std::unique_ptr<OIIO::ImageInput> input_;
   OIIO::ImageSpec spec_;
 };

@@ -7,16 +7,16 @@
 #include <cstdint>
 #include <string_view>
 
-// libpng, as OpenImageIO sets it up, prints to stderr: errors about truncated files and warnings
-// about chunks that do not matter here (old colour profiles above all). It is only given whole
-// files without such chunks. Layout and CRC: W3C PNG specification, 5.3 and 5.5.
+// libpng takes a truncated file for a picture, as OpenImageIO sets it up. It is only given whole
+// files, without chunks that do not matter here. Layout and CRC: W3C PNG specification, 5.3
+// and 5.5.
 namespace lensforge {
 namespace {
 
 constexpr std::string_view kSignature("\x89PNG\r\n\x1a\n", 8);
 constexpr std::uint32_t kLongestChunk = 0x7fffffff;
-constexpr std::array<std::string_view, 9> kEssential{"IHDR", "PLTE", "IDAT", "IEND", "tRNS",
-                                                     "gAMA", "cHRM", "sRGB", "eXIf"};
+constexpr std::array<std::string_view, 10> kEssential{"IHDR", "PLTE", "IDAT", "IEND", "tRNS",
+                                                      "gAMA", "cHRM", "sRGB", "iCCP", "eXIf"};
 
 constexpr std::array<std::uint32_t, 256> make_crc_table() {
   std::array<std::uint32_t, 256> table{};

@@ -126,11 +126,11 @@ PnmOutline read_pnm_outline(std::istream& file) {
   return pnm;
 }
 
-std::string pnm_pixel_problem(std::istream& file, const PnmOutline& pnm, const RunControl& run) {
+std::string pnm_pixel_problem(std::istream& file, const PnmOutline& pnm) {
   std::streambuf& bytes = *file.rdbuf();
   const bool is_text = pnm.kind < '4';
   std::vector<char> buffer(is_text ? 0 : static_cast<std::size_t>(bytes_per_row(pnm)));
-  for (std::int64_t row = 0; row < pnm.rows && !run.stop_requested(); ++row) {
+  for (std::int64_t row = 0; row < pnm.rows; ++row) {
     std::string problem =
         is_text ? text_row_problem(bytes, pnm, row) : binary_row_problem(bytes, pnm, row, buffer);
     if (!problem.empty()) return problem;

@@ -5,8 +5,6 @@
 #include <istream>
 #include <string>
 
-#include "core/compute/run_control.h"
-
 namespace lensforge {
 
 /// What the header of a PNM stream (PBM, PGM, PPM, PFM) tells.
@@ -21,8 +19,8 @@ struct PnmOutline {
 /// Reads the header from the stream's start; the stream stands before the pixels afterwards.
 PnmOutline read_pnm_outline(std::istream& file);
 
-/// Reads all pixels behind the header. @return why they are not what it says; empty if they are, or
-/// if a stop was requested. @pre read_pnm_outline() found no problem.
-std::string pnm_pixel_problem(std::istream& file, const PnmOutline& outline, const RunControl& run);
+/// Reads all pixels behind the header. @return why they are not what it says; empty if they are.
+/// @pre read_pnm_outline() found no problem.
+std::string pnm_pixel_problem(std::istream& file, const PnmOutline& outline);
 
 }  // namespace lensforge

@@ -41,6 +41,7 @@ constexpr std::chrono::milliseconds kReportInterval{50};
 
 enum class Frame : char {
   kProgress = 'p',
+  kPiece = 'd',
   kResult = 'r',
   kInputError = 'i',
   kRunError = 'e',
@@ -74,10 +75,15 @@ struct Share {
   double total = 0.0;
 };
 
-/// In the child: its progress, now and then, to the parent.
-class ProgressPipe {
+/// In the child: its pieces, and its progress now and then, to the parent.
+class WorkPipe {
  public:
-  explicit ProgressPipe(int descriptor) : descriptor_(descriptor) {}
+  explicit WorkPipe(int descriptor) : descriptor_(descriptor) {}
+
+  void send_piece(std::string_view piece) {
+    const std::lock_guard lock(mutex_);
+    send(descriptor_, Frame::kPiece, piece);
+  }
 
   void report(const Progress& progress) {
     const std::lock_guard lock(mutex_);
@@ -111,13 +117,6 @@ void limit(__rlimit_resource resource, double value) {
   ::setrlimit(resource, &now);
 }
 
-void apply(const ChildLimits& limits) {
-  limit(RLIMIT_CORE, 0.0);
-  if (limits.cpu_seconds > 0.0) limit(RLIMIT_CPU, std::ceil(limits.cpu_seconds));
-  const std::optional<double> before = address_space();
-  if (limits.memory_bytes > 0.0 && before) limit(RLIMIT_AS, *before + limits.memory_bytes);
-}
-
 void silence_output() {
   const int nowhere = ::open("/dev/null", O_WRONLY);
   if (nowhere < 0) return;
@@ -135,11 +134,13 @@ void leave_signals_to_parent(pid_t parent) {
 }
 
 /// Runs in the child and never returns. OpenCASCADE's own exceptions are no std::exception.
-[[noreturn]] void live(int descriptor, const std::function<std::string(const RunControl&)>& work) {
-  ProgressPipe progress(descriptor);
-  const RunControl control({}, [&](const Progress& p) { progress.report(p); });
+[[noreturn]] void live(int descriptor, const PiecewiseWork& work) {
+  WorkPipe pipe(descriptor);
+  const RunControl control({}, [&](const Progress& p) { pipe.report(p); });
   try {
-    send(descriptor, Frame::kResult, work(control));
+    const std::string result =
+        work(control, [&](std::string_view piece) { pipe.send_piece(piece); });
+    send(descriptor, Frame::kResult, result);
   } catch (const InputError& e) {
     send(descriptor, Frame::kInputError, e.what());
   } catch (const RunError& e) {
@@ -157,7 +158,7 @@ void leave_signals_to_parent(pid_t parent) {
 /// A running child; killed and waited for when this object goes.
 class Child {
  public:
-  Child(const ChildLimits& limits, const std::function<std::string(const RunControl&)>& work) {
+  Child(const ChildLimits& limits, const PiecewiseWork& work) {
     std::array<int, 2> ends{};
     if (::pipe2(ends.data(), O_CLOEXEC) != 0) fail();
     const pid_t parent = ::getpid();
@@ -168,7 +169,8 @@ class Child {
       reading_.close();
       leave_signals_to_parent(parent);
       silence_output();
-      apply(limits);
+      limit(RLIMIT_CORE, 0.0);
+      limit_this_process(limits);
       live(writing.number(), work);
     }
     if (pid_ < 0) fail();
@@ -206,7 +208,7 @@ class Child {
 
  private:
   [[noreturn]] static void fail() {
-    throw RunError("a process for OpenCASCADE cannot be started: " +
+    throw RunError("a process that reads files cannot be started: " +
                    std::generic_category().message(errno));
   }
 
@@ -233,11 +235,12 @@ struct Answer {
   Share share;
 };
 
-/// Takes whole frames out of `bytes`. @throw what the child's work threw.
-void take_frames(std::string& bytes, Answer& answer) {
+/// Takes whole frames out of `bytes`. @throw what the child's work threw, and what `take` throws.
+void take_frames(std::string& bytes, const PieceSink& take, Answer& answer) {
   std::size_t at = 0;
   while (const auto frame = next_frame(bytes, at)) {
     const std::string_view text = frame->second;
+    if (frame->first == Frame::kPiece) take(text);
     if (frame->first == Frame::kResult) answer.result = text;
     if (frame->first == Frame::kInputError) throw InputError(std::string(text));
     if (frame->first == Frame::kRunError) throw RunError(std::string(text));
@@ -256,15 +259,30 @@ std::string why_it_ended(int status) {
 
 }  // namespace
 
+void limit_this_process(const ChildLimits& limits) {
+  if (limits.cpu_seconds > 0.0) limit(RLIMIT_CPU, std::ceil(limits.cpu_seconds));
+  const std::optional<double> before = address_space();
+  if (limits.memory_bytes > 0.0 && before) limit(RLIMIT_AS, *before + limits.memory_bytes);
+}
+
 std::string run_in_child(const std::string& stage, const ChildLimits& limits,
                          const std::function<std::string(const RunControl&)>& work,
+                         const RunControl& control) {
+  const auto whole = [&](const RunControl& inner, const PieceSink&) { return work(inner); };
+  return run_in_child(
+      stage, limits, whole, [](std::string_view) {}, control);
+}
+
+std::string run_in_child(const std::string& stage, const ChildLimits& limits,
+                         const PiecewiseWork& work, const PieceSink& take,
                          const RunControl& control) {
   if (control.stop_requested()) throw Interrupted();
   Child child(limits, work);
   Answer answer;
-  for (std::string bytes; child.receive(bytes);) {
+  // Another child, forked meanwhile, may have this one's end of the pipe: its end may come late.
+  for (std::string bytes; !answer.result && child.receive(bytes);) {
     if (control.stop_requested()) throw Interrupted();
-    take_frames(bytes, answer);
+    take_frames(bytes, take, answer);
     control.report({stage, answer.share.done, answer.share.total, ""});
   }
   const int status = child.wait();

@@ -5,6 +5,7 @@
 #include <functional>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 
 #include "core/compute/run_control.h"
 
@@ -32,6 +33,22 @@ class ChildFailure : public std::runtime_error {
 std::string run_in_child(const std::string& stage, const ChildLimits& limits,
                          const std::function<std::string(const RunControl&)>& work,
                          const RunControl& control);
+
+/// Takes the pieces of a large result, one after another.
+using PieceSink = std::function<void(std::string_view)>;
+
+/// Work that sends pieces before it returns the rest of its result.
+using PiecewiseWork = std::function<std::string(const RunControl&, const PieceSink& send)>;
+
+/// The same for a result that is too large to be kept twice: `take` gets every piece that the work
+/// sends, in this process and in their order. @throw what `take` throws, with the child killed.
+std::string run_in_child(const std::string& stage, const ChildLimits& limits,
+                         const PiecewiseWork& work, const PieceSink& take,
+                         const RunControl& control);
+
+/// Lowers the limits of a process from within: for work that knows better than its caller how much
+/// it may take. Memory counts beside what the process has now.
+void limit_this_process(const ChildLimits& limits);
 
 /// Calls `functor(i)` for i in 0 … count − 1 on `threads` threads of its own, which a child process
 /// may do. The first exception reaches the caller.

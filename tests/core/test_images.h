@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <random>
 #include <string>
@@ -52,6 +53,21 @@ inline Image random_image(int columns, int rows) {
   Image image(columns, rows);
   for (float& value : image.values()) value = uniform(random);
   return image;
+}
+
+/// A chunk of PNG with its checksum.
+inline std::string png_chunk(const std::string& type, const std::string& data) {
+  const auto big = [](std::uint32_t n) {
+    std::string bytes;
+    for (const unsigned shift : {24U, 16U, 8U, 0U}) bytes += static_cast<char>(n >> shift & 0xFFU);
+    return bytes;
+  };
+  std::uint32_t crc = 0xFFFFFFFFU;
+  for (const char byte : type + data) {
+    crc ^= static_cast<unsigned char>(byte);
+    for (int bit = 0; bit < 8; ++bit) crc = (crc & 1U) != 0 ? 0xEDB88320U ^ crc >> 1U : crc >> 1U;
+  }
+  return big(static_cast<std::uint32_t>(data.size())) + type + data + big(crc ^ 0xFFFFFFFFU);
 }
 
 }  // namespace lensforge::testing

@@ -306,7 +306,8 @@ TEST(OutlineContour, FollowsAnSvgFile) {
   testing::write_bytes(folder / "disc.svg",
                        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 100 100\">"
                        "<circle cx=\"50\" cy=\"50\" r=\"40\" fill=\"white\"/></svg>");
-  const Outline outline = fitted(*outline_from((folder / "disc.svg").string(), {}).outline, kSize);
+  const Outline outline =
+      fitted(*outline_from((folder / "disc.svg").string(), {}, {}).outline, kSize);
   for (const Eigen::Vector2d& p : outline.points) {
     // Within the tolerance and as much again by scaling, of 2048 pixels of which 20 mm are 80 %.
     EXPECT_NEAR((p - 0.5 * kSize).norm(), 10.0, 0.006);
@@ -316,11 +317,11 @@ TEST(OutlineContour, FollowsAnSvgFile) {
 
 TEST(OutlineOption, IsReadAndRefusedInOneLine) {
   const auto said = [](const std::string& text) {
-    return message_of<InputError>([&] { outline_from(text, {}); });
+    return message_of<InputError>([&] { outline_from(text, {}, {}); });
   };
-  EXPECT_FALSE(outline_from("rectangle", {}).outline);
-  EXPECT_EQ(outline_from("circle", {}).outline->kind, OutlineKind::kCircle);
-  EXPECT_EQ(outline_from("rounded:1cm", {}).outline->radius, 10.0);
+  EXPECT_FALSE(outline_from("rectangle", {}, {}).outline);
+  EXPECT_EQ(outline_from("circle", {}, {}).outline->kind, OutlineKind::kCircle);
+  EXPECT_EQ(outline_from("rounded:1cm", {}, {}).outline->radius, 10.0);
   EXPECT_THAT(said("oval"), HasSubstr("--outline: 'oval'"));
   EXPECT_THAT(message_of<InputError>([] {
                 require_outline(Outline{OutlineKind::kRoundedRectangle, 11.0, {}}, kSize);

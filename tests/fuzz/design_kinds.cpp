@@ -17,12 +17,16 @@ std::string place_bad_picture(Scene& scene) {
   std::string extension = source.substr(source.rfind('.') + 1);
   std::string bytes = mutated_bytes(scene.base.bytes(source), random);
   if (random.one_in(3)) {
-    static const std::vector<std::string> kDrawn{"png", "png", "pgm", "bmp",
+    static const std::vector<std::string> kDrawn{"png", "png", "pgm", "bmp", "bmp",
                                                  "ico", "gif", "tga", "tif"};
     extension = random.pick(kDrawn);
-    bytes = extension == "png"   ? odd_png(random)
-            : extension == "pgm" ? odd_pnm(random)
-                                 : odd_small_picture(extension, random);
+    bytes = extension == "png"                       ? odd_png(random)
+            : extension == "pgm"                     ? odd_pnm(random)
+            : extension == "bmp" && random.one_in(2) ? odd_bmp(random)
+                                                     : odd_small_picture(extension, random);
+  }
+  if (extension == "webp" && random.one_in(2)) {
+    bytes = with_odd_metadata(scene.base.bytes(source), random);
   }
   if (random.one_in(10)) {
     const std::string& other = random.pick(pictures);
@@ -43,9 +47,14 @@ void bad_picture(Scene& scene) {
       scene.copy("lens/", "lens/");
       scene.run(scene.render("lens").set("--target", name));
       return;
-    default:
-      scene.run(scene.design(name, "out"));
+    default: {
+      static const std::vector<std::string> kBackgrounds{"white", "black", "#8090a0", "#80",
+                                                         "grey"};
+      CommandLine line = scene.design(name, "out");
+      if (scene.random.one_in(2)) line.set("--background", scene.random.pick(kBackgrounds));
+      scene.run(line);
       scene.plan.product = "out";
+    }
   }
 }
 

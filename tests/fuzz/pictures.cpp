@@ -3,6 +3,7 @@
 
 #include <zlib.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
@@ -95,6 +96,66 @@ std::string odd_pnm(Random& random) {
     text += (random.one_in(60) ? hostile_number(random) : std::to_string(random.below(256))) + " ";
   }
   return text;
+}
+
+std::string odd_bmp(Random& random) {
+  static const std::vector<std::uint32_t> kHeaders{12, 40, 40, 52, 56, 64, 108, 124, 16, 39, 0};
+  static const std::vector<std::uint32_t> kDepths{1, 4, 8, 16, 24, 32, 2, 0};
+  static const std::vector<std::uint32_t> kMasks{0xFF,       0xFF00,     0xFF0000, 0xFF000000,
+                                                 0x3FF00000, 0xFFFFFFFF, 0xF0F0,   0};
+  const auto two = [](std::uint32_t value) { return little_endian(value, 2); };
+  const auto four = [](std::uint32_t value) { return little_endian(value, 4); };
+  const auto columns = random.one_in(4) ? odd_side(random) : 7;
+  const auto rows = random.one_in(4) ? odd_side(random) : random.one_in(4) ? 0U - 5U : 5U;
+  const std::uint32_t header = random.pick(kHeaders);
+  const std::uint32_t depth = random.pick(kDepths);
+  const auto packing = static_cast<std::uint32_t>(random.below(8));
+  std::string head = four(header) + four(columns) + four(rows) + two(1) + two(depth) +
+                     four(random.one_in(3) ? packing
+                          : depth == 8     ? 1U
+                          : depth == 4     ? 2U
+                                           : 0U) +
+                     four(0) + random.bytes(8) + four(random.one_in(3) ? odd_side(random) : 0) +
+                     four(0);
+  if (header == 12) head = four(12) + two(columns) + two(rows) + two(1) + two(depth);
+  for (int i = 0; i < 4; ++i) head += four(random.pick(kMasks));
+  head.resize(std::max<std::size_t>(head.size(), header), '\0');
+  if (header == 124 && random.one_in(2)) {
+    head.replace(56, 4, "DEBM");
+    head.replace(112, 8, four(random.one_in(2) ? 124 : odd_side(random)) + four(200));
+  }
+  if (depth <= 8) head += random.bytes(4U << depth);
+  const auto at = static_cast<std::uint32_t>(14 + head.size());
+  // Short counts: runs that stay inside mostly.
+  std::string pixels;
+  for (std::size_t i = random.below(400); i > 0; --i) {
+    pixels += random.one_in(6) ? random.byte() : static_cast<char>(random.below(8));
+  }
+  return "BM" + four(at) + four(0) + four(random.one_in(8) ? odd_side(random) : at) + head + pixels;
+}
+
+std::string with_odd_metadata(const std::string& webp, Random& random) {
+  const auto named = [](const std::string& name, const std::string& data) {
+    return name + little_endian(static_cast<std::uint32_t>(data.size()), 4) + data +
+           std::string(data.size() % 2, '\0');
+  };
+  // A header of a profile, of RGB for a display, with tags that are not.
+  std::string profile = random.bytes(128 + random.below(300));
+  profile.replace(0, 40,
+                  big_endian(static_cast<std::uint32_t>(profile.size())) + "lcms" +
+                      big_endian(0x04300000) + "mntrRGB XYZ " + random.bytes(12) + "acsp");
+  profile.replace(128, 16,
+                  big_endian(random.one_in(4) ? odd_side(random) : 2) + "rTRC" + big_endian(140) +
+                      big_endian(40));
+  std::string exif = "II*" + std::string(1, '\0') + little_endian(8, 4) + little_endian(1, 2) +
+                     little_endian(0x112, 2) + little_endian(3, 2) + little_endian(1, 4) +
+                     little_endian(static_cast<std::uint32_t>(random.below(10)), 4);
+  if (random.one_in(2)) exif = mutated_bytes(exif, random);
+  const std::string head = little_endian(0x28, 4) + little_endian(11, 3) + little_endian(11, 3);
+  const std::string body = "WEBP" + named("VP8X", head) + named("ICCP", profile) +
+                           webp.substr(std::min<std::size_t>(webp.size(), 12)) +
+                           named("EXIF", exif);
+  return "RIFF" + little_endian(static_cast<std::uint32_t>(body.size()), 4) + body;
 }
 
 std::string odd_small_picture(const std::string& extension, Random& random) {

@@ -13,6 +13,10 @@ namespace lensforge::fuzz {
 std::string odd_png(Random& random);
 /// A PGM or PPM, of text or bytes, with an odd size, maximum or value.
 std::string odd_pnm(Random& random);
+/// A BMP with one of its headers, odd masks, palette, runs or order of rows.
+std::string odd_bmp(Random& random);
+/// A WebP file with an odd profile and odd Exif around the pixels of a good one.
+std::string with_odd_metadata(const std::string& webp, Random& random);
 /// BMP, GIF, ICO, TGA or TIFF: little more than a header, with odd numbers in it.
 std::string odd_small_picture(const std::string& extension, Random& random);
 

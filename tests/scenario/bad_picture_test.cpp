@@ -83,6 +83,29 @@ TEST_F(BadPicture, AllBlack) {
   expect_refused("black.png", {"black"});
 }
 
+TEST_F(BadPicture, BlackOnNothingNamesTheBackgroundThatShowsIt) {
+  const OIIO::ImageSpec spec(40, 30, 2, OIIO::TypeDesc::UINT8);
+  std::vector<unsigned char> pixels(spec.image_bytes(), 0);
+  for (std::size_t i = 1; i < pixels.size() / 2; i += 2) pixels[i] = 255;
+  const auto output = OIIO::ImageOutput::create(path("logo.png"));
+  ASSERT_TRUE(output && output->open(path("logo.png"), spec));
+  ASSERT_TRUE(output->write_image(OIIO::TypeDesc::UINT8, pixels.data()) && output->close());
+  expect_refused("logo.png", {"logo.png", "black all over", "use --background white"});
+  const Outcome info = run({"info", path("logo.png"), "--background", "white", "--json"});
+  ASSERT_EQ(info.exit_code, 0) << info.err;
+  EXPECT_DOUBLE_EQ(info.json()["mean"].get<double>(), 0.5);
+  expect_refusal(run({"info", path("logo.png"), "--background", "grey"}), 2, {"#ffffff would do"});
+}
+
+TEST_F(BadPicture, AThinOneNamesThePixelsThatWouldDo) {
+  write_image(Image(1000, 8, 0.5F), at("thin.png"));
+  expect_refused("thin.png", {"--pixels 256", "2 pixels", "--pixels 438 would do"});
+  write(at("thin.svg"),
+        "<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 100 1'>"
+        "<rect width='60' height='1' fill='white'/></svg>");
+  expect_refused("thin.svg", {"thin.svg", "256 x 3", "--pixels 359 would do"});
+}
+
 TEST_F(BadPicture, OnePixel) {
   write_image(Image(1, 1, 0.5F), at("dot.png"));
   expect_refused("dot.png", {"1"});

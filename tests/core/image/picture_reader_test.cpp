@@ -31,6 +31,7 @@ namespace {
 namespace fs = std::filesystem;
 using lensforge::testing::picture_refusal;
 using lensforge::testing::pixel_spec;
+using lensforge::testing::png_chunk;
 using lensforge::testing::ramp;
 using lensforge::testing::random_image;
 using lensforge::testing::read_bytes;
@@ -49,21 +50,6 @@ std::string refusal_of(std::string_view bytes) {
 }
 
 OIIO::ImageSpec small_spec() { return OIIO::ImageSpec(13, 9, 3, TypeDesc::UINT8); }
-
-/// A chunk of PNG with its checksum.
-std::string png_chunk(const std::string& type, const std::string& data) {
-  const auto big = [](std::uint32_t n) {
-    std::string bytes;
-    for (const unsigned shift : {24U, 16U, 8U, 0U}) bytes += static_cast<char>(n >> shift & 0xFFU);
-    return bytes;
-  };
-  std::uint32_t crc = 0xFFFFFFFFU;
-  for (const char byte : type + data) {
-    crc ^= static_cast<unsigned char>(byte);
-    for (int bit = 0; bit < 8; ++bit) crc = (crc & 1U) != 0 ? 0xEDB88320U ^ crc >> 1U : crc >> 1U;
-  }
-  return big(static_cast<std::uint32_t>(data.size())) + type + data + big(crc ^ 0xFFFFFFFFU);
-}
 
 TEST(PictureReader, FormatsWhoseDecodersCrashAreRefusedUnopened) {
   const TempFolder folder;

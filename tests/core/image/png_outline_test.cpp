@@ -34,11 +34,11 @@ TEST(PngOutline, ChunksThatThePictureDependsOnAreKept) {
   EXPECT_EQ(read_essential_png(file).bytes, bytes);
 }
 
-TEST(PngOutline, AColourProfileIsNamedAndDropped) {
+TEST(PngOutline, AColourProfileIsNamedAndKept) {
   auto file = stream(testing::view(testing::kProfilePng));
   const EssentialPng png = read_essential_png(file);
   EXPECT_EQ(png.color_profile, "Wide");
-  EXPECT_EQ(png.bytes.find("iCCP"), std::string::npos);
+  EXPECT_NE(png.bytes.find("iCCP"), std::string::npos);
   EXPECT_EQ(png.problem, "");
 }
 

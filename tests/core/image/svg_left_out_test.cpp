@@ -23,7 +23,6 @@ namespace {
 
 using lensforge::testing::TempFolder;
 using lensforge::testing::write_bytes;
-using ::testing::AllOf;
 using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -278,7 +277,7 @@ TEST(SvgLeftOut, IsWhyADrawingIsBlack) {
               HasSubstr("is black all over; left out 'fill: var(--c)': write the value itself"));
   write_bytes(folder / "a.svg", svg("<foreignObject/>"));
   EXPECT_THAT(lensforge::testing::picture_refusal(folder / "a.svg"),
-              AllOf(HasSubstr("draw a white rectangle behind it"), HasSubstr("foreignObject")));
+              HasSubstr("; left out a part that is not SVG (foreignObject)"));
 }
 
 TEST(SvgLeftOut, SoManyKindsAreKeptAsAReaderCanRead) {

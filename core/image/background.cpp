@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "core/image/background.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cstddef>
+
+#include "core/error.h"
+#include "core/image/rec709.h"
+#include "core/image/transfer.h"
+
+namespace lensforge {
+namespace {
+
+constexpr const char* kName = "--background";
+constexpr std::array<int, 3> kWhite{255, 255, 255};
+
+bool is_hex_colour(const std::string& text) {
+  return text.size() == 7 && text[0] == '#' &&
+         std::all_of(text.begin() + 1, text.end(),
+                     [](unsigned char c) { return std::isxdigit(c) != 0; });
+}
+
+OptionField<Background> background() {
+  const auto get = [](const Background& b) { return nlohmann::json(b.text()); };
+  const auto set = [](Background& b, const nlohmann::json& value) {
+    b = Background::parse(value.get<std::string>());
+  };
+  return {{kName,
+           OptionKind::kText,
+           "what shows through where a picture or drawing is transparent; a dark logo needs white",
+           {},
+           "black|white|#RRGGBB",
+           {}},
+          get,
+          set,
+          get,
+          "the picture is stored as it was flattened"};
+}
+
+}  // namespace
+
+Background Background::parse(const std::string& text) {
+  if (text == "black") return {};
+  if (text == "white") return {kWhite};
+  if (!is_hex_colour(text)) {
+    throw InputError(std::string(kName) + " '" + text +
+                     "': must be black, white or #RRGGBB; #ffffff would do");
+  }
+  Background result;
+  for (std::size_t i = 0; i < 3; ++i)
+    result.rgb[i] = std::stoi(text.substr(1 + 2 * i, 2), nullptr, 16);
+  return result;
+}
+
+std::string Background::text() const {
+  constexpr const char* kDigits = "0123456789abcdef";
+  if (*this == Background{}) return "black";
+  if (rgb == kWhite) return "white";
+  std::string text = "#";
+  for (const int value : rgb) {
+    text += kDigits[value / 16];
+    text += kDigits[value % 16];
+  }
+  return text;
+}
+
+double Background::light() const {
+  std::array<double, 3> light{};
+  std::transform(rgb.begin(), rgb.end(), light.begin(), [](int v) { return decode(v / 255.0); });
+  return light[0] == light[1] && light[1] == light[2] ? light[0] : luminance_rec709(light);
+}
+
+const OptionTable<Background>& background_fields() {
+  static const OptionTable<Background> table{background()};
+  return table;
+}
+
+}  // namespace lensforge

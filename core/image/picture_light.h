@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/image/color_profile.h"
+#include "core/image/color_space.h"
+#include "core/image/picture_source.h"
+
+namespace lensforge {
+
+/// What is said of a picture whose colours were turned to grey.
+inline constexpr const char* kColourTurned = "colour turned to luminance (Rec. 709)";
+
+/// Values below 0 that are taken for 0, as a share of the largest value. Filters that resample
+/// leave them beside what is bright: the weights below 0 of Lanczos' filter with three lobes sum up
+/// to 0.27, those of cubics to 0.25. It leaves 0.11 of an edge's height, 0.18 of fine bars', and up
+/// to 0.24 of random black and white's.
+inline constexpr double kRingingShare = 0.3;
+
+/// Light from which on a colour is not dark: middle grey as it is shown.
+inline constexpr double kBright = 0.2;
+
+/// What a picture hides of what is behind it.
+struct Cover {
+  bool open = false;    ///< Somewhere less than all.
+  bool drawn = false;   ///< Somewhere something.
+  bool bright = false;  ///< Somewhere something of at least kBright.
+
+  /// Adds a pixel. @param light  of what is drawn, times alpha.
+  void add(double light, double alpha) {
+    open = open || alpha != 1.0;
+    drawn = drawn || alpha != 0.0;
+    bright = bright || (alpha > 0.0 && light >= kBright * alpha);
+  }
+};
+
+/// Turns stored pixels into grey linear light and remembers what that took.
+class PictureLight {
+ public:
+  /// @param background  the light that shows through, linear. Says in `changes` what of the
+  ///        file's colours it goes by.
+  PictureLight(const PictureSource& source, double background, std::vector<std::string>& changes);
+
+  /// @throw InputError naming the file, pixel and channel for a value that is not finite.
+  [[nodiscard]] float grey(const float* pixel, int column, int row);
+
+  /// To be called after the last pixel. @throw InputError naming the lowest value if it is too low.
+  void report(std::vector<std::string>& changes) const;
+
+  [[nodiscard]] const Cover& cover() const { return cover_; }
+
+ private:
+  struct Channels {
+    std::vector<int> light;  ///< One (grey) or three (red, green, blue).
+    int alpha = -1;
+    int left_out = 0;
+  };
+  struct Value {
+    float value = 0.0F;
+    int channel = 0;
+    int column = 0;
+    int row = 0;
+  };
+
+  static Channels choose(const OIIO::ImageSpec& spec, bool is_gif);
+  void choose_colors(const PictureSource& source, std::vector<std::string>& changes);
+  float covering(double light, double alpha);
+  double checked(const float* pixel, int channel, int column, int row);
+  std::array<double, 3> stored_of(const float* pixel, int column, int row);
+  /// Of an opaque colour, times alpha.
+  double light_of(const std::array<double, 3>& stored, double alpha);
+  [[nodiscard]] double decoded(double stored) const;
+  [[noreturn]] void refuse(const Value& value, const std::string& rule) const;
+
+  std::filesystem::path path_;
+  std::vector<std::string> names_;
+  Channels channels_;
+  bool unassociated_;
+  double background_;
+  ColorSpace space_;
+  std::vector<double> table_;            ///< Light of 16-bit values; empty: to be computed.
+  std::optional<ColorProfile> profile_;  ///< Instead of the space.
+  bool saw_colour_ = false;
+  Cover cover_;
+  float most_ = 0.0F;
+  Value lowest_;
+  std::int64_t below_ = 0;  ///< Pixels with a value below 0.
+};
+
+}  // namespace lensforge
