@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <cstring>
 #include <string_view>
+#include <thread>
 #include <utility>
 
 #include "core/compute/work_estimate.h"
@@ -19,9 +20,10 @@
 namespace lensforge {
 namespace {
 
-/// Memory that decoders may take whatever the picture's size, bytes: tables, and the reserves that
-/// threads of HEIF's decoders make.
+/// Memory that decoders may take whatever the picture's size, bytes, and for each thread that one
+/// of HEIF may start: a stack of 8 MB and a reserve of malloc's, 64 MB.
 constexpr double kMemory = 1e9;
+constexpr double kMemoryPerThread = 8e7;
 
 /// For each pixel, bytes. At 4000² no decoder has more than 15 resident (HEIC).
 constexpr double kMemoryPerPixel = 24.0;
@@ -70,7 +72,8 @@ class RowTaker {
 
 ChildLimits decoder_limits(const std::filesystem::path& path, double pixels) {
   const auto bytes = static_cast<double>(std::filesystem::file_size(path));
-  const double memory = kMemory + kMemoryPerPixel * pixels + kMemoryPerByte * bytes;
+  const double memory = kMemory + kMemoryPerThread * std::thread::hardware_concurrency() +
+                        kMemoryPerPixel * pixels + kMemoryPerByte * bytes;
   return {.memory_bytes = std::min(memory, free_memory_bytes()),
           .cpu_seconds = kSeconds + kSecondsPerPixel * pixels};
 }

@@ -97,7 +97,6 @@ TEST_F(PictureChild, ADecoderThatHoardsMemoryIsEnded) {
 TEST_F(PictureChild, LimitsGrowWithThePictureAndItsFile) {
   const ChildLimits small = decoder_limits(path_, 1.0);
   const ChildLimits large = decoder_limits(path_, 16384.0 * 16384.0);
-  EXPECT_LT(small.memory_bytes, 2e9);
   EXPECT_LT(small.cpu_seconds, 60.0);
   EXPECT_GE(large.memory_bytes, small.memory_bytes);
   EXPECT_GT(large.cpu_seconds, small.cpu_seconds);
