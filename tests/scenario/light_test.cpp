@@ -216,8 +216,8 @@ TEST_F(Scenario, ADesignForSeveralColorsIsRenderedInColor) {
   ASSERT_EQ(again.exit_code, 0) << again.err;
   EXPECT_EQ(content(at("again.png")), content(at("lens/render_color.png")));
   EXPECT_NEAR(again.json()["fringe_mm"]["mean"].get<double>(), fringe, 1e-12);
-  EXPECT_NEAR(again.json()["metrics"]["smooth"]["mae"].get<double>(),
-              lens["metrics"]["smooth"]["mae"].get<double>(), 1e-6);
+  EXPECT_NEAR(again.json()["metrics"]["spline"]["mae"].get<double>(),
+              lens["metrics"]["spline"]["mae"].get<double>(), 1e-6);
   EXPECT_THAT(run({"info", path("lens")}).out, HasSubstr("colours 450:0.5,550:1,650:1 nm"));
   EXPECT_EQ(run({"info", path("lens"), "--json"}).json()["spectrum"], lens["spectrum"]);
   // What is cut of it is predicted in the same light.
