@@ -218,6 +218,7 @@ class Job {
   [[nodiscard]] ProgramFiles programs_of(std::size_t k, const ProgramFiles& all) const {
     ProgramFiles own;
     own.names = all.names;
+    own.reader = all.reader;
     std::vector<std::optional<std::size_t>> numbers(steps_.size());
     for (std::size_t i = 0; i < steps_.size(); ++i) {
       if (steps_[i].lens != k) continue;

@@ -45,7 +45,7 @@ TEST(CommandDefaults, OfDesignAreTheLibrarysForEveryModelAndPicture) {
       OptionSet options("design", "");
       add_design_options(options, settings);
       options.parse({"picture.png", "--out", "lens", "--model", word});
-      settle(options, settings, picture);
+      settle(options, settings, picture, {});
       const DesignOptions library = default_design_options(model, picture);
       expect_equal(design_fields(), settings.design, library);
       expect_equal(light_fields(), settings.design.light, library.light);
@@ -63,7 +63,7 @@ TEST(CommandDefaults, TheModelOfADesignFollowsFromItsSizeUnlessItIsGiven) {
     Arguments arguments{"picture.png", "--out", "lens"};
     arguments.insert(arguments.end(), more.begin(), more.end());
     options.parse(arguments);
-    settle(options, settings, Image(side, side, 0.5F));
+    settle(options, settings, Image(side, side, 0.5F), {});
     EXPECT_EQ(options.used()["model"], model_name(settings.design.model));
     return settings.design.model;
   };
@@ -163,7 +163,7 @@ TEST(CommandDefaults, FactorsOnTheSmoothnessWorkInTheLibrary) {
   OptionSet options("design", "");
   add_design_options(options, settings);
   options.parse({"picture.png", "--out", "lens", "--model", "facet", "--smoothness", "3"});
-  settle(options, settings, Image(64, 64, 0.5F));
+  settle(options, settings, Image(64, 64, 0.5F), {});
   EXPECT_EQ(with_smoothness_applied(settings.design).weights.smooth,
             3.0 * default_smoothness(SurfaceModel::kFacet));
 }
