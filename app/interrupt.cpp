@@ -24,10 +24,14 @@ constexpr std::array kSignals = {SIGINT, SIGTERM, SIGHUP};
 
 // A handler reaches nothing but globals.
 volatile std::sig_atomic_t json_at_signals = 0;        // NOLINT: see above
+volatile std::sig_atomic_t interrupted = 0;            // NOLINT: see above
 sem_t wake;                                            // NOLINT: see above
 std::array<struct sigaction, kSignals.size()> before;  // NOLINT: see above
 
-void wake_waiter(int /*signal*/) { sem_post(&wake); }
+void wake_waiter(int /*signal*/) {
+  interrupted = 1;
+  sem_post(&wake);
+}
 
 void write_whole(int descriptor, std::string_view text) {
   while (!text.empty()) {
@@ -71,6 +75,8 @@ InterruptWatch::InterruptWatch(SecondInterrupt second, std::function<void()> ove
     : second_(second), overdue_(std::move(overdue)) {
   sem_init(&wake, 0, 0);
   before = handle_with(wake_waiter);
+  // One that came when an earlier watch was about to go, and nobody looked at its token any more.
+  if (interrupted != 0) stop_.request_stop();
   waiter_ = std::thread([this] { wait_for_signals(); });
 }
 

@@ -27,7 +27,8 @@ enum class SecondInterrupt {
 
 /// Turns the first Ctrl-C (SIGINT), SIGTERM or SIGHUP into a stop request; the second ends the
 /// process at once with exit code 130, or is a request of its own. Signals that the caller had
-/// ignored stay ignored. At most one at a time.
+/// ignored stay ignored. At most one at a time; a signal that came while an earlier one lived is a
+/// request to this one, too.
 class InterruptWatch {
  public:
   /// @param overdue  called by the watch's own thread if this object still lives some 0.7 s after

@@ -41,6 +41,19 @@ constexpr const char* kDrawing =
     "<rect width='12' height='12' fill='url(#g)'/><path d='M1 1C4 9 8 9 11 1z' fill='navy'/>"
     "<text x='1' y='9' font-size='4' fill='white'>Light</text></svg>\n";
 
+constexpr const char* kCube =
+    "OFF\n8 6 0\n0 0 0\n0 0 9\n0 9 0\n0 9 9\n9 0 0\n9 0 9\n9 9 0\n9 9 9\n"
+    "4 0 1 3 2\n4 4 6 7 5\n4 0 4 5 1\n4 2 3 7 6\n4 0 2 6 4\n4 1 5 7 3\n";
+
+constexpr const char* kJobs =
+    R"({"name":"a","command":"design","target":"a.png","options":{"quality":"draft","rounds":1,)"
+    R"("width":"4mm","focal":20},"then":["render",{"command":"export","options":{"out":"a.stl"}}]})"
+    "\n"
+    R"({"name":"b","command":"design","target":"a.png","options":{"fresnel":true,"quality":"draft","rounds":1,"pixels":8}})"
+    "\n"
+    R"({"name":"c","command":"reflect","target":"cube.off","options":{"rim-updates":1}})"
+    "\n";
+
 void write_picture(const fs::path& path) {
   const auto out = OIIO::ImageOutput::create(path.string());
   if (!out) return;
@@ -54,6 +67,19 @@ void write_picture(const fs::path& path) {
   const OIIO::ImageSpec spec(side, side, channels,
                              real ? OIIO::TypeDesc::FLOAT : OIIO::TypeDesc::UINT8);
   if (out->open(path.string(), spec)) out->write_image(OIIO::TypeDesc::FLOAT, values.data());
+}
+
+/// Heights of a front, mm.
+void write_front(const fs::path& path) {
+  const auto out = OIIO::ImageOutput::create(path.string());
+  if (!out) return;
+  std::vector<float> heights;
+  for (int i = 0; i < kSide * kSide; ++i) {
+    const double x = i % kSide - 0.5 * kSide;
+    heights.push_back(static_cast<float>(-0.001 * x * x));
+  }
+  const OIIO::ImageSpec spec(kSide, kSide, 1, OIIO::TypeDesc::FLOAT);
+  if (out->open(path.string(), spec)) out->write_image(OIIO::TypeDesc::FLOAT, heights.data());
 }
 
 /// The picture library starts threads, which the campaign, a program that forks, must not have.
@@ -74,6 +100,16 @@ void require_done(const Command& command, const fs::path& folder) {
   for (const std::string& word : command.arguments) words += word + " ";
   throw std::runtime_error("the base set: " + words + "ended with " +
                            std::to_string(ending.exit_code) + ": " + ending.err);
+}
+
+/// Keeps the first checkpoint that a command writes, below `folder`.
+void take_checkpoint(const Command& command, const fs::path& folder, const fs::path& checkpoint) {
+  Child child(command, folder, folder / ".record");
+  for (int i = 0; i < 10'000 && !fs::exists(folder / checkpoint); ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  fs::create_directories(folder / "partial");
+  fs::copy_file(folder / checkpoint, folder / "partial" / checkpoint.filename());
 }
 
 Arguments small_design(const std::string& out, const std::string& rounds) {
@@ -109,8 +145,9 @@ KnownOption known_option(const std::string& line) {
 }  // namespace
 
 const std::vector<std::string>& command_names() {
-  static const std::vector<std::string> names{"design", "render", "cam", "coupon",
-                                              "export", "send",   "info"};
+  static const std::vector<std::string> names{"design", "render", "cam",  "coupon",
+                                              "export", "send",   "info", "reflect",
+                                              "nest",   "view",   "batch"};
   return names;
 }
 
@@ -125,6 +162,8 @@ BaseSet::BaseSet(const fs::path& folder) {
   make_lens(folder);
   make_coupon(folder);
   make_partial(folder);
+  make_spline(folder);
+  make_reflection(folder);
   export_all(folder);
   take(folder);
   files_["solid.off"] = off_of_sheet();
@@ -140,6 +179,10 @@ void BaseSet::draw_pictures(const fs::path& folder) const {
   in_a_process_of_its_own([&] {
     for (const char* extension : kExtensions) {
       write_picture(folder / "pictures" / (std::string("a.") + extension));
+    }
+    fs::create_directories(folder / "fronts");
+    for (const char* extension : {"exr", "tif"}) {
+      write_front(folder / "fronts" / (std::string("front.") + extension));
     }
   });
 }
@@ -166,19 +209,25 @@ void BaseSet::make_coupon(const fs::path& folder) {
 }
 
 void BaseSet::make_partial(const fs::path& folder) {
-  // The checkpoint after the first round is taken as soon as it is there.
-  const Command command{.arguments = small_design("working", "1000")};
-  Child child(command, folder, folder / ".record");
-  const fs::path checkpoint = folder / "working" / "checkpoint.bin";
-  for (int i = 0; i < 10'000 && !fs::exists(checkpoint); ++i) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(1));
-  }
-  fs::create_directories(folder / "partial");
-  fs::copy_file(checkpoint, folder / "partial" / "checkpoint.bin");
+  take_checkpoint({.arguments = small_design("working", "1000")}, folder, "working/checkpoint.bin");
+}
+
+void BaseSet::make_spline(const fs::path& folder) {
+  Arguments design = small_design("spline", "2");
+  design.insert(design.end(), {"--model", "spline"});
+  require_done({.arguments = design}, folder);
+}
+
+void BaseSet::make_reflection(const fs::path& folder) {
+  std::ofstream(folder / "cube.off") << kCube;
+  std::ofstream(folder / "jobs.jsonl") << kJobs;
+  Arguments reflect{"reflect", "cube.off", "--out", "working-shape", "--threads", "1"};
+  reflect.insert(reflect.end(), kReflectOptions.begin(), kReflectOptions.end());
+  take_checkpoint({.arguments = reflect}, folder, "working-shape/reflect.checkpoint");
 }
 
 void BaseSet::export_all(const fs::path& folder) {
-  for (const char* extension : {"step", "iges", "stl", "obj", "ply", "3mf"}) {
+  for (const char* extension : {"step", "iges", "stl", "obj", "ply", "3mf", "glb"}) {
     require_done({.arguments = {"export", "lens", "--out", std::string("solid.") + extension,
                                 "--threads", "1"}},
                  folder);

@@ -5,6 +5,7 @@
 #include <fstream>
 #include <memory>
 #include <optional>
+#include <stdexcept>
 
 #include "fuzz/child.h"
 #include "fuzz/live_clients.h"
@@ -18,17 +19,25 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Every kind as often as its share, well mixed: a stride that shares no divisor with their number.
-const Kind& kind_of_run(std::uint64_t index) {
-  static const std::vector<Kind> deck = [] {
-    std::vector<Kind> cards;
-    for (const auto& kinds : {design_kinds(), lens_kinds(), cam_kinds(), coupon_kinds(),
-                              mesh_kinds(), send_kinds(), world_kinds()}) {
-      for (const Kind& kind : kinds)
-        cards.insert(cards.end(), static_cast<std::size_t>(kind.share), kind);
+/// Every kind as often as its share, or only the one that is asked for.
+std::vector<Kind> deck_of(const Campaign& campaign) {
+  std::vector<Kind> cards;
+  std::string names;
+  for (const auto& kinds : {design_kinds(), lens_kinds(), cam_kinds(), coupon_kinds(), mesh_kinds(),
+                            send_kinds(), reflect_kinds(), batch_kinds(), world_kinds()}) {
+    for (const Kind& kind : kinds) {
+      names += std::string("\n  ") + kind.name;
+      const bool wanted = campaign.kind.empty() || campaign.kind == kind.name;
+      if (wanted) cards.insert(cards.end(), static_cast<std::size_t>(kind.share), kind);
     }
-    return cards;
-  }();
+  }
+  if (cards.empty()) throw std::runtime_error("no kind '" + campaign.kind + "' among" + names);
+  return cards;
+}
+
+/// Well mixed: a stride that shares no divisor with the number of cards.
+Kind kind_of_run(const Campaign& campaign, std::uint64_t index) {
+  const std::vector<Kind> deck = deck_of(campaign);
   constexpr std::uint64_t kStride = 10'007;  // A prime far above the number of cards.
   return deck[(index * kStride) % deck.size()];
 }
@@ -150,7 +159,7 @@ void keep(const Campaign& campaign, const RunResult& result, const fs::path& fol
 Plan planned(const Campaign& campaign, const BaseSet& base, std::uint64_t index,
              const fs::path& folder) {
   Random random(seed_of_run(campaign.seed, index));
-  const Kind& kind = kind_of_run(index);
+  const Kind kind = kind_of_run(campaign, index);
   fs::create_directories(folder / "sandbox");
   Scene scene(base, folder / "sandbox", random);
   kind.make(scene);
@@ -206,7 +215,9 @@ RunResult result_of(const nlohmann::json& json) {
 }
 
 std::string repeat_line(const Campaign& campaign, std::uint64_t index) {
-  return "LENSFORGE_CAMPAIGN_SEED=" + std::to_string(campaign.seed) +
+  const std::string kind =
+      campaign.kind.empty() ? "" : "LENSFORGE_CAMPAIGN_KIND='" + campaign.kind + "' ";
+  return kind + "LENSFORGE_CAMPAIGN_SEED=" + std::to_string(campaign.seed) +
          " LENSFORGE_CAMPAIGN_ONLY=" + std::to_string(index) + " build/release/tests/fuzz_tests";
 }
 

@@ -18,6 +18,7 @@ struct Campaign {
   std::uint64_t runs = 0;
   double budget = 3.0;         ///< Seconds that a run may take before a signal asks it to stop.
   bool exec = false;           ///< Every run starts the built command.
+  std::string kind;            ///< The only kind that is run; empty: all.
   std::filesystem::path kept;  ///< Where the folders of failed runs stay.
 };
 

@@ -76,6 +76,7 @@ Campaign asked_for() {
   }
   campaign.budget = static_cast<double>(from_environment("LENSFORGE_CAMPAIGN_BUDGET", 3));
   campaign.exec = from_environment("LENSFORGE_CAMPAIGN_EXEC", 0) != 0;
+  if (const char* kind = std::getenv("LENSFORGE_CAMPAIGN_KIND")) campaign.kind = kind;
   const char* kept = std::getenv("LENSFORGE_CAMPAIGN_KEEP");
   campaign.kept =
       kept != nullptr ? fs::path(kept) : fs::temp_directory_path() / "lensforge-fuzz-kept";

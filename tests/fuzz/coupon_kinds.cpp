@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Options of coupon, what stands in its folder, and the files of readings that --fit takes.
+#include <sstream>
+
 #include "fuzz/scene.h"
 
 namespace lensforge::fuzz {
@@ -42,6 +44,23 @@ void fit(Scene& scene) {
   scene.run(scene.fit("measured.toml", "fitted.toml").set("--workshop", "workshop.toml"));
 }
 
+/// The file of readings in a coupon's folder: some are left out, and some are nonsense.
+void coupon_readings(Scene& scene) {
+  scene.copy("coupon/", "coupon/");
+  std::istringstream lines(scene.base.bytes("readings.toml"));
+  std::string text;
+  for (std::string line; std::getline(lines, line); text += line + "\n") {
+    const std::size_t value = line.find('=') + 1;
+    if (value == 0 || line.starts_with('#')) continue;
+    if (scene.random.one_in(60)) line.replace(value, line.size(), hostile_number(scene.random));
+    const bool is_reading = line.find("_uncertainty") == std::string::npos;
+    if (is_reading && scene.random.one_in(6)) line.insert(0, "# ");
+  }
+  if (scene.random.one_in(3)) text = mutated_text(text, scene.random);
+  scene.write("coupon/measured.toml", text);
+  scene.run(scene.fit("coupon/measured.toml", "fitted.toml"));
+}
+
 void good_coupon(Scene& scene) {
   scene.add_users_files("coupon");
   scene.plan.must_work = true;
@@ -61,6 +80,7 @@ std::vector<Kind> coupon_kinds() {
   return {{"coupon options", 3, coupon_options},
           {"coupon over others' files", 2, coupon_over_others},
           {"coupon --fit", 6, fit},
+          {"measured.toml", 3, coupon_readings},
           {"good coupon", 1, good_coupon},
           {"good fit", 1, good_fit}};
 }

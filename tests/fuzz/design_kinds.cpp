@@ -139,37 +139,6 @@ void design_force(Scene& scene) {
   }
 }
 
-/// The sum at the end of a checkpoint: FNV-1a, 64 bit, little-endian.
-std::string checkpoint_sum(const std::string& content) {
-  std::uint64_t value = 0xcbf29ce484222325U;
-  for (const char c : content) value = (value ^ static_cast<unsigned char>(c)) * 0x100000001b3U;
-  std::string bytes;
-  for (unsigned shift = 0; shift < 64; shift += 8) {
-    bytes += static_cast<char>((value >> shift) & 0xFFU);
-  }
-  return bytes;
-}
-
-/// A checkpoint with its header or its numbers changed; mostly its sum is right again.
-std::string bad_checkpoint(const std::string& good, Random& random) {
-  constexpr std::size_t kSum = 8;
-  std::string content = good.substr(0, good.size() - kSum);
-  const std::size_t header = content.find('\n') + 1;
-  const std::size_t numbers = content.find('\n', header);
-  const std::string json = content.substr(header, numbers - header);
-  switch (random.below(3)) {
-    case 0:
-      content = content.substr(0, header) + mutated_json(json, random) + content.substr(numbers);
-      break;
-    case 1:
-      content = content.substr(0, numbers) + mutated_bytes(content.substr(numbers), random);
-      break;
-    default:
-      return mutated_bytes(good, random);
-  }
-  return content + checkpoint_sum(content);
-}
-
 void design_resume(Scene& scene) {
   scene.copy("pictures/a.png", "a.png");
   scene.add_users_files("out");
@@ -178,12 +147,35 @@ void design_resume(Scene& scene) {
   const std::string& good = scene.base.bytes("partial/checkpoint.bin");
   if (!scene.random.one_in(8)) {
     scene.write("out/checkpoint.bin",
-                scene.random.one_in(4) ? good : bad_checkpoint(good, scene.random));
+                scene.random.one_in(4) ? good : mutated_checkpoint(good, scene.random));
     scene.plan.ours.insert("out/checkpoint.bin");
   }
   if (scene.random.one_in(4)) scene.copy_ours("lens/", "out/");
   if (scene.random.one_in(3)) scene.spoil_options(line, 1);
   scene.interrupt_within(1.0);
+  scene.run(line);
+}
+
+/// A front as floats: a file that was changed, or a PFM with some heights that no front has.
+void design_front(Scene& scene) {
+  scene.copy("pictures/a.png", "a.png");
+  const std::vector<std::string> fronts = scene.base.paths("fronts/");
+  const std::string& good = scene.random.pick(fronts);
+  std::string name = "front" + good.substr(good.rfind('.'));
+  if (scene.random.one_in(3)) {
+    name = "front.pfm";
+    scene.write(name, odd_heights(scene.random));
+  } else {
+    const std::string& bytes = scene.base.bytes(good);
+    scene.write(name, scene.random.one_in(8) ? bytes : mutated_bytes(bytes, scene.random));
+  }
+  CommandLine line = scene.design("a.png", "out");
+  line.set("--front", name);
+  if (scene.random.one_in(4)) {
+    scene.spoil_options(line, 1);
+  } else {
+    scene.plan.product = "out";
+  }
   scene.run(line);
 }
 
@@ -198,11 +190,14 @@ void good_design(Scene& scene) {
 }  // namespace
 
 std::vector<Kind> design_kinds() {
-  return {
-      {"picture", 10, bad_picture},          {"drawing", 5, bad_drawing},
-      {"design options", 8, design_options}, {"design over others' files", 3, design_over_others},
-      {"design --force", 4, design_force},   {"design --resume", 4, design_resume},
-      {"good design", 1, good_design}};
+  return {{"picture", 10, bad_picture},
+          {"drawing", 5, bad_drawing},
+          {"design options", 8, design_options},
+          {"design over others' files", 3, design_over_others},
+          {"design --force", 4, design_force},
+          {"design --resume", 4, design_resume},
+          {"design --front", 3, design_front},
+          {"good design", 1, good_design}};
 }
 
 }  // namespace lensforge::fuzz

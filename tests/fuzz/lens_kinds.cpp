@@ -6,7 +6,7 @@ namespace lensforge::fuzz {
 namespace {
 
 const std::vector<std::string>& export_extensions() {
-  static const std::vector<std::string> extensions{"stl", "obj", "ply",  "3mf",
+  static const std::vector<std::string> extensions{"stl", "obj", "ply",  "3mf", "glb",
                                                    "exr", "png", "iges", "step"};
   return extensions;
 }
@@ -74,6 +74,24 @@ void bad_surface_file(Scene& scene) {
   scene.run(scene.export_to("lens", out).set("--surface", "milled"));
 }
 
+/// The line of JSON, or the control points.
+void bad_spline(Scene& scene) {
+  scene.copy("spline/", "lens/");
+  const std::string& good = scene.base.bytes("spline/surface.spline");
+  const std::size_t header = good.find('\n') + 1;
+  const std::size_t points = good.find('\n', header);
+  std::string bytes = mutated_bytes(good, scene.random);
+  if (scene.random.one_in(3)) {
+    const std::string json = good.substr(header, points - header);
+    bytes = good.substr(0, header) + mutated_json(json, scene.random) + good.substr(points);
+  } else if (scene.random.one_in(2)) {
+    bytes = good.substr(0, points + 1) + mutated_bytes(good.substr(points + 1), scene.random);
+  }
+  scene.write("lens/surface.spline", bytes);
+  if (!scene.random.one_in(4)) return run_on_lens(scene);
+  scene.run(scene.view("lens", "new.html"));
+}
+
 void bad_lens_picture(Scene& scene) {
   scene.copy("lens/", "lens/");
   scene.copy_ours("lens/cam/", "lens/cam/");
@@ -124,7 +142,7 @@ void good_export(Scene& scene) {
   scene.add_users_files("");
   const std::string extension = scene.random.pick(export_extensions());
   scene.plan.must_work = true;
-  const bool readable = extension != "3mf" && extension != "iges" && extension != "step";
+  const bool readable = extension != "iges" && extension != "step";
   if (readable) scene.plan.product = "new/new." + extension;
   scene.run(scene.export_to("lens", "new/new." + extension));
 }
@@ -134,6 +152,7 @@ void good_export(Scene& scene) {
 std::vector<Kind> lens_kinds() {
   return {{"lens.json", 8, bad_lens_json},
           {"surface.ply", 8, bad_surface_file},
+          {"spline", 3, bad_spline},
           {"lens pictures", 3, bad_lens_picture},
           {"export options", 4, export_options},
           {"outputs that exist", 4, outputs_that_exist},

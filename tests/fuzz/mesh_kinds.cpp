@@ -6,6 +6,23 @@
 namespace lensforge::fuzz {
 namespace {
 
+/// Packages for printers and scenes, which `info` alone reads.
+void bad_package(Scene& scene) {
+  const std::string name = scene.random.one_in(2) ? "part.3mf" : "part.glb";
+  const std::string& good = scene.base.bytes("solid" + name.substr(4));
+  std::string bytes = mutated_bytes(good, scene.random);
+  if (name == "part.glb" && scene.random.one_in(2)) {
+    // What it says of itself is text between its header and its numbers, and keeps its length.
+    const std::size_t text = 20;
+    const std::size_t size = good.find("BIN") - 4 - text;
+    std::string json = mutated_json(good.substr(text, size), scene.random);
+    json.resize(size, ' ');
+    bytes = good.substr(0, text) + json + good.substr(text + size);
+  }
+  scene.write(name, bytes);
+  scene.run(scene.info(name));
+}
+
 void run_on_mesh(Scene& scene, const std::string& name) {
   scene.run(scene.random.one_in(3) ? scene.info(name) : scene.render(name));
 }
@@ -57,7 +74,10 @@ void bad_solid(Scene& scene) {
 }  // namespace
 
 std::vector<Kind> mesh_kinds() {
-  return {{"mesh", 6, bad_mesh}, {"drawn mesh", 6, drawn_mesh}, {"STEP", 3, bad_solid}};
+  return {{"mesh", 6, bad_mesh},
+          {"drawn mesh", 6, drawn_mesh},
+          {"STEP", 3, bad_solid},
+          {"package", 2, bad_package}};
 }
 
 }  // namespace lensforge::fuzz

@@ -231,6 +231,17 @@ void change_value(nlohmann::json& value, Random& random) {
   *at = hostile_value(random);
 }
 
+/// The sum at the end of a checkpoint: FNV-1a, 64 bit, little-endian.
+std::string checkpoint_sum(const std::string& content) {
+  std::uint64_t value = 0xcbf29ce484222325U;
+  for (const char c : content) value = (value ^ static_cast<unsigned char>(c)) * 0x100000001b3U;
+  std::string bytes;
+  for (unsigned shift = 0; shift < 64; shift += 8) {
+    bytes += static_cast<char>((value >> shift) & 0xFFU);
+  }
+  return bytes;
+}
+
 }  // namespace
 
 std::string hostile_number(Random& random) {
@@ -356,6 +367,25 @@ std::string mutated_json(const std::string& text, Random& random) {
   // Most of what is changed stands on one line.
   const std::string changed = value.dump(text.find('\n') == std::string::npos ? -1 : 2);
   return random.one_in(4) ? mutated_text(changed, random) : changed;
+}
+
+std::string mutated_checkpoint(const std::string& good, Random& random) {
+  constexpr std::size_t kSum = 8;
+  std::string content = good.substr(0, good.size() - kSum);
+  const std::size_t header = content.find('\n') + 1;
+  const std::size_t numbers = content.find('\n', header);
+  const std::string json = content.substr(header, numbers - header);
+  switch (random.below(3)) {
+    case 0:
+      content = content.substr(0, header) + mutated_json(json, random) + content.substr(numbers);
+      break;
+    case 1:
+      content = content.substr(0, numbers) + mutated_bytes(content.substr(numbers), random);
+      break;
+    default:
+      return mutated_bytes(good, random);
+  }
+  return content + checkpoint_sum(content);
 }
 
 }  // namespace lensforge::fuzz

@@ -20,5 +20,7 @@ std::string mutated_bytes(std::string data, Random& random);
 std::string mutated_text(std::string text, Random& random);
 /// One value of a JSON document replaced, removed or renamed, sometimes with mutated_text() on top.
 std::string mutated_json(const std::string& text, Random& random);
+/// A checkpoint with its header or its numbers changed; mostly its sum is right again.
+std::string mutated_checkpoint(const std::string& good, Random& random);
 
 }  // namespace lensforge::fuzz

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "fuzz/mutation.h"
@@ -194,6 +195,29 @@ std::string odd_small_picture(const std::string& extension, Random& random) {
     tiff += two(tag) + two(4) + four(random.one_in(12) ? odd_side(random) : 1) + four(value);
   }
   return tiff + four(random.one_in(8) ? 8 : 0) + pixels;
+}
+
+std::string odd_heights(Random& random) {
+  static const std::vector<float> kOdd{0.0F,
+                                       1.0F,
+                                       -1e30F,
+                                       1e-40F,
+                                       -0.0F,
+                                       std::numeric_limits<float>::infinity(),
+                                       std::numeric_limits<float>::quiet_NaN(),
+                                       -std::numeric_limits<float>::max()};
+  static const std::vector<std::string> kSizes{"3 3",    "4 4", "8 8", "64 4",
+                                               "4097 4", "0 0", "-1 8"};
+  const std::string size = random.one_in(3) ? random.pick(kSizes) : "8 8";
+  const std::string scale =
+      random.one_in(4) ? random.pick(std::vector<std::string>{"1.0", "0", "nan", "-1e39"}) : "-1.0";
+  std::vector<float> heights(random.one_in(4) ? 16 : 64);
+  for (float& height : heights) height = -0.01F * static_cast<float>(random.unit());
+  for (std::size_t i = random.below(3); i > 0; --i) {
+    heights[random.below(heights.size())] = random.pick(kOdd);
+  }
+  return "Pf\n" + size + "\n" + scale + "\n" +
+         std::string(reinterpret_cast<const char*>(heights.data()), heights.size() * sizeof(float));
 }
 
 }  // namespace lensforge::fuzz

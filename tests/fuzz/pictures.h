@@ -20,4 +20,7 @@ std::string with_odd_metadata(const std::string& webp, Random& random);
 /// BMP, GIF, ICO, TGA or TIFF: little more than a header, with odd numbers in it.
 std::string odd_small_picture(const std::string& extension, Random& random);
 
+/// A PFM of heights below 0 with an odd size, byte order or value among them.
+std::string odd_heights(Random& random);
+
 }  // namespace lensforge::fuzz

@@ -86,6 +86,12 @@ void Scene::interrupt_within(double longest) {
   plan.signal = random.pick(std::vector<int>{SIGINT, SIGTERM, SIGHUP});
 }
 
+void Scene::kill_within(double longest) {
+  const double share = random.unit();
+  plan.interrupt_after = 0.001 + share * share * longest;
+  plan.signal = random.pick(std::vector<int>{SIGINT, SIGTERM, SIGKILL});
+}
+
 CommandLine Scene::design(const std::string& picture, const std::string& out) {
   plan.outputs.push_back(out + "/");
   CommandLine line("design", {picture});
@@ -135,6 +141,35 @@ CommandLine Scene::send(const std::string& program) {
   plan.logs.push_back(program + ".log");
   CommandLine line("send", {program});
   return line.set("--port", "sim:" + std::string(random.one_in(2) ? "grbl" : "grblhal"));
+}
+
+CommandLine Scene::reflect(const std::string& mesh, const std::string& out) {
+  plan.outputs.push_back(out + "/");
+  CommandLine line("reflect", {mesh});
+  for (std::size_t i = 1; i < std::size(kReflectOptions); i += 2) {
+    line.set(kReflectOptions.at(i - 1), kReflectOptions.at(i));
+  }
+  return line.set("--out", out).set("--threads", "1");
+}
+
+CommandLine Scene::batch(const std::string& jobs, const std::string& out) {
+  plan.outputs.push_back(out + "/");
+  CommandLine line("batch", {jobs});
+  return line.set("--out", out).set("--threads", "1");
+}
+
+CommandLine Scene::nest(const std::string& lens, const std::string& out) {
+  plan.outputs.push_back(out + "/");
+  CommandLine line("nest", {lens});
+  line.set("--out", out).set("--blank", "60,60").set("--tool-diameter", "1mm").flag("--no-render");
+  line.set("--tabs", "0").set("--slope-tolerance", "0.2");
+  return line.set("--pitch", "0.5mm").set("--tolerance", "0.02").set("--threads", "1");
+}
+
+CommandLine Scene::view(const std::string& lens, const std::string& file) {
+  plan.outputs.push_back(file);
+  CommandLine line("view", {lens});
+  return line.set("--out", file).set("--threads", "1");
 }
 
 std::string Scene::some_path() {

@@ -82,6 +82,8 @@ class Scene {
   Command& run(const CommandLine& line);
   /// Ends the run with SIGINT, SIGTERM or SIGHUP within `longest` seconds.
   void interrupt_within(double longest);
+  /// Ends it with SIGINT, SIGTERM or SIGKILL, as soon as not.
+  void kill_within(double longest);
 
   // Cheap commands that work.
   [[nodiscard]] CommandLine design(const std::string& picture, const std::string& out);
@@ -92,6 +94,10 @@ class Scene {
   [[nodiscard]] CommandLine render(const std::string& source) const;
   [[nodiscard]] CommandLine info(const std::string& source) const;
   [[nodiscard]] CommandLine send(const std::string& program);
+  [[nodiscard]] CommandLine reflect(const std::string& mesh, const std::string& out);
+  [[nodiscard]] CommandLine batch(const std::string& jobs, const std::string& out);
+  [[nodiscard]] CommandLine nest(const std::string& lens, const std::string& out);
+  [[nodiscard]] CommandLine view(const std::string& lens, const std::string& file);
 
   /// Gives `count` options of the command hostile values.
   void spoil_options(CommandLine& line, std::size_t count);
@@ -116,6 +122,8 @@ std::vector<Kind> cam_kinds();
 std::vector<Kind> coupon_kinds();
 std::vector<Kind> mesh_kinds();
 std::vector<Kind> send_kinds();
+std::vector<Kind> reflect_kinds();
+std::vector<Kind> batch_kinds();
 std::vector<Kind> world_kinds();
 
 }  // namespace lensforge::fuzz

@@ -57,6 +57,35 @@ void interrupted(Scene& scene) {
   scene.run(line);
 }
 
+/// Any command that works, ended at any moment.
+void killed(Scene& scene) {
+  scene.copy("lens/", "lens/");
+  scene.copy_ours("lens/cam/", "lens/cam/");
+  scene.copy("pictures/a.png", "a.png");
+  scene.plan.lens = "lens";
+  scene.plan.outputs.emplace_back("new.png");
+  scene.kill_within(1.0);
+  const auto line = [&]() -> CommandLine {
+    switch (scene.random.below(5)) {
+      case 0:
+        scene.copy("cube.off", "cube.off");
+        return scene.reflect("cube.off", "out");
+      case 1:
+        scene.copy("jobs.jsonl", "jobs.jsonl");
+        scene.copy("cube.off", "cube.off");
+        return scene.batch("jobs.jsonl", "jobs");
+      case 2:
+        return scene.random.one_in(2) ? scene.nest("lens", "sheet") : scene.coupon("coupon");
+      case 3:
+        return scene.random.one_in(2) ? scene.view("lens", "new.html") : long_command(scene);
+      default:
+        return good_command(scene);
+    }
+  }();
+  Command& command = scene.run(line);
+  command.exec = command.exec || line.command() == "batch" || scene.random.one_in(4);
+}
+
 /// A pipe, device, socket's place, folder, loop or nothing under the name of an input.
 /// @return whether it is a file after all, an empty one.
 bool place_something_else(Scene& scene, const std::string& name) {
@@ -249,6 +278,7 @@ void live_page(Scene& scene) {
 
 std::vector<Kind> world_kinds() {
   return {{"interrupted", 6, interrupted},
+          {"killed", 4, killed},
           {"special files", 6, special_files},
           {"names", 4, odd_names},
           {"options of all kinds", 8, soup},

@@ -16,8 +16,8 @@ struct FullFaces {
 };
 
 /// Takes faces without area out so that the surface stays closed where it was. A face that has a
-/// corner twice is dropped. Where a face's corners stand in a line, the face across its longest side
-/// is divided at the corner in the middle, and its halves take the place of both.
+/// corner twice is dropped. Where a face's corners stand in a line, the face across its longest
+/// side is divided at the corner in the middle, and its halves take the place of both.
 FullFaces without_flat_faces(const SurfaceMesh& mesh);
 
 }  // namespace lensforge::reflect
