@@ -190,14 +190,11 @@ void good_design(Scene& scene) {
 }  // namespace
 
 std::vector<Kind> design_kinds() {
-  return {{"picture", 10, bad_picture},
-          {"drawing", 5, bad_drawing},
-          {"design options", 8, design_options},
-          {"design over others' files", 3, design_over_others},
-          {"design --force", 4, design_force},
-          {"design --resume", 4, design_resume},
-          {"design --front", 3, design_front},
-          {"good design", 1, good_design}};
+  return {
+      {"picture", 10, bad_picture},          {"drawing", 5, bad_drawing},
+      {"design options", 8, design_options}, {"design over others' files", 3, design_over_others},
+      {"design --force", 4, design_force},   {"design --resume", 4, design_resume},
+      {"design --front", 3, design_front},   {"good design", 1, good_design}};
 }
 
 }  // namespace lensforge::fuzz

@@ -36,7 +36,7 @@ class Errors(unittest.TestCase):
 
     def test_pictures(self):
         self.assert_refused("nowhere.png", lensforge.design, "nowhere.png")
-        self.assert_refused("all black", lensforge.design, 0 * FLAT)
+        self.assert_refused("black all over", lensforge.design, 0 * FLAT)
         self.assert_refused("nan", lensforge.design, FLAT * np.nan)
         self.assert_refused("not negative", lensforge.design, -FLAT)
         self.assert_refused("must be (rows, columns) floats", lensforge.design, FLAT.astype(np.uint8))

@@ -124,8 +124,8 @@ TEST_F(Batch, ATableTellsOfOtherShardsAndIsReplacedByTheNext) {
 }
 
 TEST_F(Batch, AMissedLimitIsToldByEveryRun) {
-  // Its STEP file holds the default tolerances not everywhere.
-  jobs(job("a", ",\"then\":[\"export\"]"));
+  // The STEP file of a mesh does not hold the default tolerances everywhere.
+  jobs(job("a", ",\"then\":[\"export\"]", ",\"model\":\"smooth\""));
   EXPECT_EQ(run(batch()).exit_code, 3);
   EXPECT_EQ(record("a")["status"], "limit");
   const Outcome second = run(batch());

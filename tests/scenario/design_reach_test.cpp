@@ -50,9 +50,9 @@ TEST_F(DesignReach, AWideLensOrAWeakIndexNeedsMoreDistance) {
 }
 
 TEST_F(DesignReach, AFinerLevelStartsFromAMeshWithoutFolds) {
-  const Outcome made =
-      run({"design", picture("rings.png"), "--out", path("lens"), "--pixels", "48", "--levels", "2",
-           "--rounds", "2", "--quality", "draft", "--width", "12mm", "--focal", "36mm", "--json"});
+  const Outcome made = run({"design", picture("rings.png"), "--out", path("lens"), "--pixels", "48",
+                            "--levels", "2", "--rounds", "2", "--quality", "draft", "--width",
+                            "12mm", "--focal", "36mm", "--model", "smooth", "--json"});
   ASSERT_EQ(made.exit_code, 0) << made.err;
   // It ends at 0.0020, over one level alone at 0.0013.
   EXPECT_LT(made.json()["metrics"]["smooth"]["mae"].get<double>(), 0.003);

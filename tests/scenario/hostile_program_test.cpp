@@ -47,7 +47,15 @@ TEST_F(HostileProgram, ALineOfAGigabyteTakesNoMemory) {
 TEST_F(HostileProgram, BytesThatTheControllerActsOnAreRefused) {
   for (const char byte : {'?', '!', '\x18', '\x84'}) {
     expect_refused(kHead + "G1 X1" + byte + "\n", {"line 4", "realtime"});
-    expect_refused(kHead + "(a comment " + byte + ")\n", {"line 4", "realtime"});
+  }
+}
+
+TEST_F(HostileProgram, CommentsAreNotSentWhateverBytesTheyHold) {
+  for (const char byte : {'?', '!', '\x18', '\x84'}) {
+    write(at("job.ngc"), kHead + "(a comment " + byte + ")\nG1 X1\nM5\nM2\n");
+    const Outcome outcome = run({"send", path("job.ngc"), "--dry-run"});
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    EXPECT_THAT(outcome.err, ::testing::HasSubstr("comment"));
   }
 }
 

@@ -109,11 +109,20 @@ class EveryLight : public Scenario, public ::testing::WithParamInterface<Light> 
   }
 };
 
+/// The share of a spline's light from the side or from a point is off by 1e-13 once it was read.
+void expect_equal_to_rounding(const nlohmann::json& a, const nlohmann::json& b) {
+  ASSERT_EQ(a.size(), b.size());
+  for (const auto& [key, value] : a.items()) {
+    ASSERT_TRUE(b.contains(key)) << key;
+    EXPECT_NEAR(value.get<double>(), b[key].get<double>(), 1e-12) << key;
+  }
+}
+
 TEST_P(EveryLight, ProjectsThePictureIsRenderedTheSameAndStatedByInfo) {
   const Outcome again = run({"render", path("lens"), "--json", "--out", path("again.exr")});
   ASSERT_EQ(again.exit_code, 0) << again.err;
   const nlohmann::json metrics = again.json()["metrics"];
-  EXPECT_EQ(metrics, lens()["metrics"]);
+  expect_equal_to_rounding(metrics.flatten(), lens()["metrics"].flatten());
   EXPECT_LT(metrics["spline"]["mae"], 0.011);  // Twice the worst of them.
   EXPECT_GT(metrics["spline"]["flux_inside"], 0.95);
   EXPECT_EQ(read_image(at("again.exr")).image, read_image(at("lens/render.exr")).image);

@@ -184,7 +184,7 @@ TEST(Workshop, RefusalsNameFileKeyValueAndRule) {
   EXPECT_EQ(refusal("[finish]\npitch = -0.5\n"),
             "shop.toml: finish.pitch: -0.5: must be in 1e-06 to 100");
   EXPECT_EQ(refusal("[finish]\npitsch = 0.5\n"),
-            "shop.toml: finish.pitsch: 0.5: a workshop: unknown key");
+            "shop.toml: finish.pitsch: 0.5: a workshop: unknown key; use pitch");
   EXPECT_EQ(refusal("[rough]\nstyle = \"spiral\"\n"),
             "shop.toml: rough.style: 'spiral': must be one of: zigzag, climb, conventional");
   EXPECT_EQ(refusal("[rough]\ntool = 9\n"), "shop.toml: rough.tool: 9: no tool has this number");

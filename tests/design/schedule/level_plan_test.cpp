@@ -104,7 +104,7 @@ TEST(LevelPlan, ASplineFollowsFewerRoundsOfTheMesh) {
   ASSERT_EQ(levels.size(), 2U);
   EXPECT_FALSE(levels[0].spline);
   EXPECT_EQ(levels[0].rounds, 1);
-  EXPECT_EQ(levels[0].iterations, 61);
+  EXPECT_EQ(levels[0].iterations, 120);  // Twice what 64 pixels take.
   EXPECT_TRUE(levels[1].spline);
   EXPECT_EQ(levels[1].rounds, 2);
   EXPECT_EQ(levels[1].iterations, 36);
