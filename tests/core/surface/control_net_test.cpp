@@ -101,6 +101,9 @@ TEST(ControlNet, SamplesAreAboutAsManyAsWanted) {
   EXPECT_EQ(samples_for(1001.0, 10.0), 11);
   EXPECT_EQ(samples_for(5.0, 10.0), 2);
   EXPECT_EQ(samples_for(1e9, 1.0), 256);
+  EXPECT_EQ(samples_for(4e6, 1000.0), 16);  // 250,000 nodes are enough of few cells,
+  EXPECT_EQ(samples_for(4e6, 30e3), 8);     // and 8 a cell of many.
+  EXPECT_EQ(samples_for(4e6, 102400.0), 7);
 }
 
 }  // namespace
