@@ -113,7 +113,7 @@ void check_refusal(const Command& command, const Ending& ending, Texts& wrong) {
     return line.starts_with("lensforge: warning: ") || line.starts_with("lensforge: resume: ") ||
            line.starts_with("lensforge: the last run ended: ");
   };
-  if (command.arguments.front() == "send") {
+  if (!command.arguments.empty() && command.arguments.front() == "send") {
     lines.erase(std::remove_if(lines.begin(), lines.end(), is_told), lines.end());
   }
   if (lines.size() != 1) {
