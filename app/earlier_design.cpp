@@ -8,6 +8,7 @@
 #include "core/io/files.h"
 #include "core/io/lens_folder.h"
 #include "core/io/output_guard.h"
+#include "core/surface/spline_file.h"
 #include "core/text/json_text.h"
 #include "design/design_lens.h"
 
@@ -16,21 +17,17 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A lens.json is a few kilobytes; convergence.csv's first line is looked at only.
+/// A lens.json is a few kilobytes.
 constexpr std::uintmax_t kMaxJson = 1 << 20;
-
-bool is_own_table(const fs::path& path) {
-  const std::string header = convergence_csv({});
-  std::string start(header.size(), '\0');
-  open_input(path).read(start.data(), static_cast<std::streamsize>(start.size()));
-  return start == header;
-}
 
 /// Whether lensforge wrote this file of a lens folder, by what it says of itself.
 bool is_own(const fs::path& path) {
   std::error_code ignored;
   if (fs::file_size(path, ignored) == 0) return true;
-  if (path.filename() == lens_file::kConvergence) return is_own_table(path);
+  if (path.filename() == lens_file::kConvergence) {
+    return file_starts_with(path, convergence_csv({}));
+  }
+  if (path.filename() == lens_file::kSpline) return is_spline_file(path);
   return written_by_lensforge(path);
 }
 

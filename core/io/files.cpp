@@ -181,6 +181,12 @@ std::string read_whole_file(const fs::path& path, std::uintmax_t max_bytes) {
   return content;
 }
 
+bool file_starts_with(const fs::path& path, std::string_view start) {
+  std::string found(start.size(), '\0');
+  open_input(path).read(found.data(), static_cast<std::streamsize>(found.size()));
+  return found == start;
+}
+
 bool is_folder(const fs::path& path) {
   std::error_code ignored;
   return fs::is_directory(path, ignored);

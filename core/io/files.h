@@ -57,6 +57,9 @@ std::ifstream open_input(const std::filesystem::path& path);
 /// `max_bytes`.
 std::string read_whole_file(const std::filesystem::path& path, std::uintmax_t max_bytes);
 
+/// Whether the regular file begins with these bytes. @throw InputError as open_input() does.
+bool file_starts_with(const std::filesystem::path& path, std::string_view start);
+
 /// Whether it is a folder; false for what cannot be looked at, such as a loop of links.
 bool is_folder(const std::filesystem::path& path);
 

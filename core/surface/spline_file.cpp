@@ -112,4 +112,6 @@ ControlNet read_spline(const std::filesystem::path& path) {
   return net;
 }
 
+bool is_spline_file(const std::filesystem::path& path) { return file_starts_with(path, kMagic); }
+
 }  // namespace lensforge

@@ -23,4 +23,7 @@ void write_spline(const ControlNet& net, const std::filesystem::path& path);
 ///        of another version, truncated, or holds a number that is not finite.
 ControlNet read_spline(const std::filesystem::path& path);
 
+/// Whether this file begins as write_spline() does: no other program's files do.
+bool is_spline_file(const std::filesystem::path& path);
+
 }  // namespace lensforge

@@ -63,6 +63,25 @@ TEST_F(DesignFolder, AUsersFileOfTheSameNameNeedsForce) {
   EXPECT_EQ(run(design({"--force", "--quiet"})).exit_code, 0);
 }
 
+TEST_F(DesignFolder, WhatAKilledDesignHadPublishedIsItsOwn) {
+  // Its files get their names one after the other, lens.json last.
+  const auto spline = [&](const std::string& folder) {
+    return Arguments{"design", picture("rings.png"), "--out", path(folder), "--pixels",
+                     "32",     "--rounds",           "1",     "--quality",  "draft",
+                     "--quiet"};
+  };
+  ASSERT_EQ(run(spline("whole")).exit_code, 0);
+  ASSERT_TRUE(fs::exists(at("whole/surface.spline")));
+  for (const std::string& name : listing(at("whole"))) {
+    if (name == "lens.json") continue;
+    fs::remove_all(at("lens"));
+    fs::create_directory(at("lens"));
+    fs::copy(at("whole") / name, at("lens") / name);
+    const Outcome again = run(spline("lens"));
+    EXPECT_EQ(again.exit_code, 0) << name << ": " << again.err;
+  }
+}
+
 TEST_F(DesignFolder, AFolderInThePlaceOfAFileIsRefusedWhateverIsSaid) {
   fs::create_directories(at("lens/target.png/mine"));
   expect_refusal(run(design({"--force"})), 2, {"target.png", "no regular file"});
