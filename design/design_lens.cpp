@@ -40,15 +40,15 @@ void take_surface(const DesignTask& task, SurfaceMesh mesh, Lens& lens) {
   rest_on_thickness(lens.surface, task.options.thickness);
 }
 
-/// @param executor  works on where the task's was stopped.
-Lens make_lens(const DesignTask& task, SurfaceMesh mesh, const Executor& executor) {
+/// @param look  at its pictures.
+Lens make_lens(const DesignTask& task, SurfaceMesh mesh, Look look, const Executor& executor) {
   Lens lens;
   take_surface(task, std::move(mesh), lens);
   lens.setup = task.setup;
   lens.target = task.target;
   for (const SurfaceModel model : models_of(lens)) {
     Image* const render = model == lens.model ? &lens.render : nullptr;
-    lens.metrics[model] = evaluate(lens, model, render, executor);
+    lens.metrics[model] = evaluate(lens, model, render, executor, look);
   }
   if (task.limit) lens.source_limit = task.limit->metrics;
   return lens;
@@ -88,6 +88,38 @@ bool run_all(const DesignTask& task, DesignLog& log, Checkpoint& state) try {
   throw;
 }
 
+/// The lens after the last level and all that is said of it. @throw Interrupted
+DesignResult finished(const DesignTask& task, const DesignLog& log, const SurfaceMesh& mesh) {
+  log.report_rendering();
+  DesignResult result;
+  result.status = DesignResult::Status::kDone;
+  result.lens = make_lens(task, mesh, Look::kThorough, task.executor);
+  if (task.limit) result.source = check_source(result.lens, task.executor);
+  result.colors = colors_of(result.lens, task.executor);
+  result.made = made_part(task.options, result.lens, task.executor);
+  return result;
+}
+
+/// The lens that there is when the design is interrupted: nobody wants to wait for it.
+DesignResult unfinished(const DesignTask& task, SurfaceMesh mesh, const Executor& executor) {
+  DesignResult result;
+  result.message = "interrupted";
+  result.lens = make_lens(task, std::move(mesh), Look::kBrief, executor);
+  return result;
+}
+
+DesignResult run_to_end(const DesignTask& task, DesignLog& log, Checkpoint& state,
+                        const Executor& executor) {
+  if (run_all(task, log, state)) {
+    try {
+      return finished(task, log, state.mesh);
+    } catch (const Interrupted&) {
+      // Resumed, it goes on from the last level's end.
+    }
+  }
+  return unfinished(task, std::move(state.mesh), executor);
+}
+
 }  // namespace
 
 DesignResult design_lens(const Image& target, const DesignOptions& options,
@@ -97,14 +129,9 @@ DesignResult design_lens(const Image& target, const DesignOptions& options,
   const DesignTask task = make_task(target, settled, executor, control);
   Checkpoint state = first_state(task);
   DesignLog log(task, state);
-  const bool done = run_all(task, log, state);
-  DesignResult result;
-  result.status = done ? DesignResult::Status::kDone : DesignResult::Status::kInterrupted;
-  result.message = done ? "all levels done" + log.remark() : "interrupted";
-  result.lens = make_lens(task, std::move(state.mesh), executor);
-  if (task.limit && done) result.source = check_source(result.lens, executor);
-  result.colors = colors_of(result.lens, executor);
-  result.made = made_part(settled, result.lens, executor);
+  DesignResult result = run_to_end(task, log, state, executor);
+  const bool done = result.status == DesignResult::Status::kDone;
+  if (done) result.message = "all levels done" + log.remark();
   result.fingerprint = state.fingerprint;
   result.convergence = std::move(state.convergence);
   // Rounds that stopped early leave work over.

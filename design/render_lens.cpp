@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "design/render_lens.h"
 
+#include <algorithm>
 #include <numeric>
 #include <span>
 #include <vector>
@@ -60,6 +61,24 @@ std::vector<double> flux_through(const SurfaceMesh& mesh, const Eigen::Matrix3Xd
 RenderResult result_of(const std::vector<double>& flux, const OpticalSetup& setup, double total) {
   return {scaled(flux, setup.pixels.x(), setup.pixels.y(), total),
           std::accumulate(flux.begin(), flux.end(), 0.0)};
+}
+
+/// Nodes whose light is followed for a brief look, over all points of a source: about 0.5 s of one
+/// thread.
+constexpr double kBriefNodes = 4e6;
+
+/// flux_of_lens() under one of its models at Look::kBrief.
+std::vector<double> brief_flux(const Lens& lens, SurfaceModel model, const Executor& executor) {
+  const bool spline = model == SurfaceModel::kSpline;
+  const int samples = spline ? std::min(4, picture_samples(*lens.spline)) : 1;
+  const double nodes = spline ? static_cast<double>(lens.spline->cell_count()) * samples * samples
+                              : static_cast<double>(lens.surface.vertex_count());
+  const int points = std::min(points_for(lens.surface, lens.setup),
+                              std::max(4, static_cast<int>(kBriefNodes / nodes)));
+  return picture_under(lens.setup, points, [&](const OpticalSetup& point) {
+    if (spline) return render_spline(*lens.spline, samples, point, executor);
+    return flux_of_surface(lens.surface, point, model, executor);
+  });
 }
 
 double pixel_count(const OpticalSetup& setup) {
@@ -124,7 +143,11 @@ std::vector<double> flux_of_lens(const Lens& lens, const OpticalSetup& setup,
 }
 
 ImageMetrics evaluate(const Lens& lens, SurfaceModel model, Image* rendered,
-                      const Executor& executor) {
+                      const Executor& executor, Look look) {
+  if (look == Look::kBrief) {
+    return judged(result_of(brief_flux(lens, model, executor), lens.setup, lens.target.total()),
+                  lens.target, rendered);
+  }
   if (model != SurfaceModel::kSpline) {
     return evaluate(lens.surface, lens.setup, model, lens.target, rendered, executor);
   }

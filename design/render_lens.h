@@ -34,9 +34,17 @@ ImageMetrics evaluate(const SurfaceMesh& mesh, const OpticalSetup& setup, Surfac
 std::vector<double> flux_of_lens(const Lens& lens, const OpticalSetup& setup,
                                  const Executor& executor);
 
-/// evaluate() of a lens under one of its models. A spline is looked at in picture_nodes().
+/// How long a lens is looked at.
+enum class Look {
+  kThorough,  ///< A spline at the nodes of picture_nodes(), an extended source at all its points.
+  kBrief,     ///< Some seconds of one thread less: a spline at 4 nodes a knot cell each way, and
+              ///< fewer points of the source, at least 4. A 64² photograph, a source of 2 mrad:
+              ///< MAE 0.0022 for 0.0020.
+};
+
+/// evaluate() of a lens under one of its models.
 ImageMetrics evaluate(const Lens& lens, SurfaceModel model, Image* rendered,
-                      const Executor& executor);
+                      const Executor& executor, Look look = Look::kThorough);
 
 /// The same for a smooth surface that is known by its own normals at the vertices, 3 × V with
 /// z > 0: what the triangles between them hide does not matter. Computed on the CPU.

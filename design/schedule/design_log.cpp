@@ -80,6 +80,10 @@ void DesignLog::ended_early(const std::string& step, const std::string& why) {
       "; " + step + " of round " + std::to_string(state_.round + 1) + " ended early (" + why + ")";
 }
 
+void DesignLog::report_rendering() const {
+  task_.control.report({"design", work_total(task_), work_total(task_), "rendering the lens"});
+}
+
 void DesignLog::report_done() const {
   task_.control.report({"design", work_total(task_), work_total(task_), "done"});
 }

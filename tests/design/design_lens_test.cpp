@@ -131,6 +131,29 @@ TEST(DesignLens, ResumesAgainAndAgain) {
   EXPECT_EQ(part.lens.surface.vertices, whole.lens.surface.vertices);
 }
 
+TEST(DesignLens, StoppedWhileTheFinishedLensIsRenderedItResumes) {
+  const TempFolder folder;
+  DesignOptions options = two_level_options();
+  options.light.source_angle = 2.0;
+  const DesignResult whole = design(options);
+  options.checkpoint = folder / "checkpoint";
+  std::stop_source stop;
+  const DesignResult part =
+      design(options, Executor::serial(), RunControl(stop.get_token(), [&](const Progress& p) {
+               if (p.detail == "rendering the lens") stop.request_stop();
+             }));
+  EXPECT_EQ(part.status, Status::kInterrupted);
+  EXPECT_EQ(part.lens.surface.vertices, whole.lens.surface.vertices);
+  // Of fewer points of the source.
+  const double mae = whole.lens.metrics.at(SurfaceModel::kSmooth).mae;
+  EXPECT_NEAR(part.lens.metrics.at(SurfaceModel::kSmooth).mae, mae, 0.5 * mae);
+  options.resume = true;
+  const DesignResult resumed = design(options);
+  EXPECT_EQ(resumed.status, Status::kDone);
+  EXPECT_EQ(resumed.lens.render, whole.lens.render);
+  EXPECT_EQ(timeless_csv(resumed.convergence), timeless_csv(whole.convergence));
+}
+
 TEST(DesignLens, StoppedSoonAfterTransportItKeepsTheBetterSurfaceBefore) {
   const TempFolder folder;
   DesignOptions options = small_options();
