@@ -12,7 +12,7 @@
 #include "app/interruptible_job.h"
 #include "app/lens_note.h"
 #include "core/error.h"
-#include "export/export_lens.h"
+#include "export/export.h"
 
 namespace lensforge::app {
 

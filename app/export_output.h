@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "export/export_lens.h"
+#include "export/export.h"
 
 namespace lensforge::app {
 

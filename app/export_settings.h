@@ -4,7 +4,7 @@
 #include <string>
 
 #include "app/option_set.h"
-#include "export/export_lens.h"
+#include "export/export.h"
 
 namespace lensforge::app {
 

@@ -23,9 +23,9 @@
 #include "core/surface/mesh_io.h"
 #include "core/surface/setup_json.h"
 #include "core/text/printable.h"
-#include "export/iges_file.h"
-#include "export/mesh_content.h"
-#include "export/step_file.h"
+#include "export/files/mesh_formats.h"
+#include "export/solid/iges_file.h"
+#include "export/solid/step_file.h"
 #include "machine/gcode/program_seal.h"
 
 namespace lensforge::app {

@@ -23,7 +23,7 @@
 #include "core/text/number_text.h"
 #include "design/reflect/reflect_checkpoint.h"
 #include "design/reflect/reflect_job.h"
-#include "export/solid_mesh.h"
+#include "export/solid/solid_mesh.h"
 
 namespace lensforge::app {
 namespace {

@@ -27,7 +27,7 @@
 #include "design/render_fields.h"
 #include "design/render_lens.h"
 #include "design/render_setup.h"
-#include "export/solid_surface.h"
+#include "export/solid/solid_surface.h"
 
 namespace lensforge::app {
 namespace {

@@ -14,7 +14,7 @@
 #include "design/design_fields.h"
 #include "design/reflect/reflect_options.h"
 #include "design/render_fields.h"
-#include "export/export_options.h"
+#include "export/export.h"
 #include "machine/job/send_options.h"
 
 namespace lensforge::app {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/solid_mesh.h"
+#include "export/solid/solid_mesh.h"
 
 #include <gmock/gmock.h>
 

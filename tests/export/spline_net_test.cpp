@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/spline_net.h"
+#include "export/spline/spline_net.h"
 
 #include <gtest/gtest.h>
 
@@ -10,9 +10,9 @@
 #include "design/design_lens.h"
 #include "design/render_lens.h"
 #include "design/wanted_picture.h"
-#include "export/closed_solid.h"
-#include "export/normal_bound.h"
+#include "export/files/closed_solid.h"
 #include "export/sample_surfaces.h"
+#include "export/spline/spline_fit.h"
 #include "fixtures/scenes.h"
 
 namespace lensforge::testing {
