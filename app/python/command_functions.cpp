@@ -7,17 +7,14 @@
 #include <string>
 #include <utility>
 
-#include "app/cam_settings.h"
-#include "app/design_output.h"
-#include "app/design_settings.h"
-#include "app/export_output.h"
-#include "app/export_settings.h"
-#include "app/output_folder.h"
+#include "app/commands/cam_command.h"
+#include "app/commands/design_command.h"
+#include "app/commands/export_command.h"
+#include "app/frame/command_run.h"
 #include "app/python/arrays.h"
 #include "app/python/bindings.h"
 #include "app/python/keywords.h"
 #include "app/python/lens_object.h"
-#include "app/python/released_work.h"
 #include "cam/cam_job.h"
 #include "cam/cut_estimate.h"
 #include "cam/job_files.h"

@@ -9,14 +9,12 @@
 #include <string>
 #include <vector>
 
-#include "app/design_output.h"
-#include "app/earlier_design.h"
-#include "app/json_output.h"
-#include "app/output_folder.h"
-#include "app/overview.h"
+#include "app/commands/design_command.h"
+#include "app/commands/overview.h"
+#include "app/frame/command_run.h"
+#include "app/frame/common_output.h"
 #include "app/python/arrays.h"
 #include "app/python/bindings.h"
-#include "app/python/released_work.h"
 #include "core/error.h"
 #include "core/image/image_io.h"
 

@@ -3,9 +3,8 @@
 
 #include <cmath>
 
-#include "app/command_line.h"
-#include "app/exit_code.h"
-#include "app/option_set.h"
+#include "app/frame/command_line.h"
+#include "app/frame/option_set.h"
 #include "cam/cam_fields.h"
 #include "cam/cam_options.h"
 #include "cam/coupon/coupon_options.h"
