@@ -13,7 +13,7 @@
 #include "export/files/closed_solid.h"
 #include "export/sample_surfaces.h"
 #include "export/spline/spline_fit.h"
-#include "fixtures/scenes.h"
+#include "fixtures/scenes/scenes.h"
 
 namespace lensforge::testing {
 namespace {
