@@ -19,7 +19,7 @@
 #include "core/text/number_text.h"
 #include "design/reflect/reflect_checkpoint.h"
 #include "design/reflect/reflect_job.h"
-#include "export/solid/solid_mesh.h"
+#include "export/solid/solid_reading.h"
 
 namespace lensforge::app {
 

@@ -23,7 +23,7 @@
 #include "design/render_fields.h"
 #include "design/render_lens.h"
 #include "design/render_setup.h"
-#include "export/solid/solid_surface.h"
+#include "export/solid/solid_reading.h"
 
 namespace lensforge::app {
 namespace {

@@ -12,7 +12,7 @@
 #include "design/render_lens.h"
 #include "export/export.h"
 #include "export/sample_surfaces.h"
-#include "export/solid/solid_surface.h"
+#include "export/solid/solid_reading.h"
 
 namespace lensforge {
 namespace {

@@ -10,7 +10,7 @@
 #include "core/temp_folder.h"
 #include "export/sample_surfaces.h"
 #include "export/solid/iges_file.h"
-#include "export/solid/solid_surface.h"
+#include "export/solid/solid_reading.h"
 #include "export/solid/step_file.h"
 #include "export/spline/spline_fit.h"
 

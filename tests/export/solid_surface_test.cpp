@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/solid/solid_surface.h"
-
 #include <gmock/gmock.h>
 
 #include <BRepAlgoAPI_Common.hxx>
@@ -17,6 +15,7 @@
 #include "export/foreign_step.h"
 #include "export/sample_surfaces.h"
 #include "export/solid/opencascade_io.h"
+#include "export/solid/solid_reading.h"
 #include "export/solid/step_file.h"
 #include "export/spline/spline_fit.h"
 

@@ -10,7 +10,7 @@
 #include "core/temp_folder.h"
 #include "design/render_lens.h"
 #include "export/export.h"
-#include "export/solid/solid_surface.h"
+#include "export/solid/solid_reading.h"
 #include "export/spline/spline_net.h"
 
 namespace lensforge::testing {

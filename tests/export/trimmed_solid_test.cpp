@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Solids of lenses that have an outline.
-#include "export/solid/trimmed_solid.h"
 
 #include <gmock/gmock.h>
 
