@@ -25,6 +25,17 @@ using nlohmann::json;
 constexpr std::uintmax_t kMaxBytes = std::uintmax_t{64} << 20U;
 constexpr std::size_t kMaxName = 200;
 
+/// Whether a job's folder can have this name: letters, digits, '.', '_' and '-', not starting with
+/// '.' or '-', at most 200 of them.
+bool is_job_name(const std::string& name) {
+  const auto allowed = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' ||
+           c == '_' || c == '-';
+  };
+  return !name.empty() && name.size() <= kMaxName && name[0] != '.' && name[0] != '-' &&
+         std::all_of(name.begin(), name.end(), allowed);
+}
+
 /// A command of a job, and what reads its options.
 struct JobCommand {
   std::string_view name;
@@ -219,15 +230,9 @@ json BatchJob::json() const {
   return {{"name", name}, {"target", target}, {"target_sha256", target_sha256}, {"steps", all}};
 }
 
-bool is_job_name(const std::string& name) {
-  const auto allowed = [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' ||
-           c == '_' || c == '-';
-  };
-  return !name.empty() && name.size() <= kMaxName && name[0] != '.' && name[0] != '-' &&
-         std::all_of(name.begin(), name.end(), allowed);
-}
+namespace {
 
+/// @throw InputError if the names of two jobs are the same. @param file  for the message.
 void require_different_names(const std::vector<BatchJob>& jobs, const std::string& file) {
   std::set<std::string> names;
   for (const BatchJob& job : jobs) {
@@ -236,6 +241,8 @@ void require_different_names(const std::vector<BatchJob>& jobs, const std::strin
     }
   }
 }
+
+}  // namespace
 
 std::vector<BatchJob> read_jobs(const std::filesystem::path& path) {
   std::istringstream lines(read_whole_file(path, kMaxBytes));

@@ -46,13 +46,6 @@ std::vector<BatchJob> read_jobs(const std::filesystem::path& path);
 /// Reads every target once, however many jobs have it. @throw InputError if one cannot be read.
 void fingerprint_targets(std::vector<BatchJob>& jobs);
 
-/// Whether a job's folder can have this name: letters, digits, '.', '_' and '-', not starting with
-/// '.' or '-', at most 200 of them.
-bool is_job_name(const std::string& name);
-
-/// @throw InputError if the names of two jobs are the same. @param file  for the message.
-void require_different_names(const std::vector<BatchJob>& jobs, const std::string& file);
-
 /// An option and the values that it takes in turn.
 struct GridAxis {
   std::string command;  ///< Empty: the job's first command that has the option.

@@ -290,6 +290,11 @@ void refuse_to_overwrite(const fs::path& folder, const EarlierDesign& earlier, b
                      "it with --force");
 }
 
+namespace {
+
+/// @throw InputError if the finished lens that --resume meets is not what the same picture and
+///        options give, or its design was never finished and its checkpoint is gone.
+/// @pre earlier.lens && !earlier.checkpoint
 void require_finished(const fs::path& folder, const EarlierDesign& earlier,
                       const std::string& fingerprint) {
   if (!earlier.provenance.is_object()) refuse(folder, "a lens.json that cannot be understood");
@@ -303,8 +308,6 @@ void require_finished(const fs::path& folder, const EarlierDesign& earlier,
            "choose another folder or replace it with --force");
   }
 }
-
-namespace {
 
 std::string picture_bytes(const Image& image) {
   const std::vector<unsigned char> png = encode_png(grey_picture(image));
@@ -390,6 +393,19 @@ void LiveDesign::watch(const std::stop_token& stop) {
   }
 }
 
+/// How nearly the picture under an extended source is known.
+nlohmann::json source_json(const SourceCheck& source) {
+  return {{"blur_pixels", source.blur},
+          {"points", source.points},
+          {"halving_mae", source.halving},
+          {"convolution_mae", source.convolution}};
+}
+
+/// How far the colours of the light land apart, mm.
+nlohmann::json fringe_json(const Fringe& fringe) {
+  return {{"mean", fringe.mean}, {"max", fringe.max}};
+}
+
 /// The process that a design is for and what comes out of it.
 nlohmann::json made_json(const MadeBy& process, const DesignResult::Made& made) {
   return {{"pitch_mm", process.pitch},
@@ -402,17 +418,6 @@ nlohmann::json made_json(const MadeBy& process, const DesignResult::Made& made) 
 }
 
 }  // namespace
-
-nlohmann::json source_json(const SourceCheck& source) {
-  return {{"blur_pixels", source.blur},
-          {"points", source.points},
-          {"halving_mae", source.halving},
-          {"convolution_mae", source.convolution}};
-}
-
-nlohmann::json fringe_json(const Fringe& fringe) {
-  return {{"mean", fringe.mean}, {"max", fringe.max}};
-}
 
 nlohmann::json design_provenance(const OptionSet& options, const ChosenDevice& device,
                                  const DesignOptions& design, const DesignResult& result) {

@@ -67,21 +67,9 @@ struct EarlierDesign {
 void refuse_to_overwrite(const std::filesystem::path& folder, const EarlierDesign& earlier,
                          bool resume, bool force);
 
-/// @throw InputError if the finished lens that --resume meets is not what the same picture and
-///        options give, or its design was never finished and its checkpoint is gone.
-/// @pre earlier.lens && !earlier.checkpoint
-void require_finished(const std::filesystem::path& folder, const EarlierDesign& earlier,
-                      const std::string& fingerprint);
-
 /// Where a lens comes from: program, options, time, outcome.
 nlohmann::json design_provenance(const OptionSet& options, const ChosenDevice& device,
                                  const DesignOptions& design, const DesignResult& result);
-
-/// How nearly the picture under an extended source is known.
-nlohmann::json source_json(const SourceCheck& source);
-
-/// How far the colours of the light land apart, mm.
-nlohmann::json fringe_json(const Fringe& fringe);
 
 /// Writes all that a design leaves in its folder, and puts it in the place of what was there. The
 /// cut of an earlier lens goes with it: milled, it would not be this one.

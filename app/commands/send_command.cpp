@@ -36,6 +36,9 @@ void add_send_options(OptionSet& options, SendSettings& settings) {
                "one or a pipe; - is standard output");
 }
 
+namespace {
+
+/// @throw InputError for options that exclude each other or are missing.
 void require_consistent(const SendSettings& settings, bool json) {
   if (json && settings.events == "-") {
     throw InputError("--events -: standard output belongs to the result with --json");
@@ -43,8 +46,6 @@ void require_consistent(const SendSettings& settings, bool json) {
   if (settings.log == "-") throw InputError("--log -: has to be a file");
   validate(settings.job);
 }
-
-namespace {
 
 nlohmann::json box_json(const Eigen::AlignedBox3d& box) {
   if (box.isEmpty()) return nullptr;
@@ -115,10 +116,6 @@ std::string facts_text(const ProgramFacts& facts) {
          "\n";
 }
 
-std::string status_word(const SendSummary& summary) {
-  return summary.result ? status_word(summary.result->status) : "checked";
-}
-
 std::string status_word(SendStatus status) {
   switch (status) {
     case SendStatus::kDone:
@@ -131,9 +128,16 @@ std::string status_word(SendStatus status) {
   return "fault";
 }
 
+namespace {
+
+/// "done", "interrupted", "fault", or "checked" of a dry run.
+std::string outcome_word(const SendSummary& summary) {
+  return summary.result ? status_word(summary.result->status) : "checked";
+}
+
 nlohmann::json send_json(const OptionSet& options, const SendSummary& summary) {
   nlohmann::json json = {{"command", "send"},
-                         {"status", status_word(summary)},
+                         {"status", outcome_word(summary)},
                          {"options", options.used()},
                          {"sha256", summary.job.sha256},
                          {"bytes", summary.job.bytes},
@@ -159,7 +163,7 @@ nlohmann::json send_json(const OptionSet& options, const SendSummary& summary) {
 }
 
 std::string send_text(const SendSettings& settings, const SendSummary& summary) {
-  std::string head = settings.file + ": " + status_word(summary);
+  std::string head = settings.file + ": " + outcome_word(summary);
   if (summary.result && !summary.result->done()) head += ": " + summary.result->reason;
   std::string text = printable_line(head);
   text.append("\n").append(facts_text(summary.facts));
@@ -170,8 +174,6 @@ std::string send_text(const SendSettings& settings, const SendSummary& summary) 
   if (summary.result) text += result_text(*summary.result);
   return text;
 }
-
-namespace {
 
 constexpr double kStopCheck = 0.1;  ///< Longest time without a look at the stop token, s.
 

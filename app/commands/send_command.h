@@ -2,7 +2,6 @@
 #pragma once
 
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <string>
 
 #include "app/frame/option_set.h"
@@ -28,19 +27,10 @@ struct SendSettings {
 /// Adds every option of the command.
 void add_send_options(OptionSet& options, SendSettings& settings);
 
-/// @throw InputError for options that exclude each other or are missing.
-void require_consistent(const SendSettings& settings, bool json);
-
-/// "done", "interrupted", "fault", or "checked" of a dry run.
-std::string status_word(const SendSummary& summary);
-
 /// "done", "interrupted" or "fault".
 std::string status_word(SendStatus status);
 
 /// Size, extent and time of a program, a line each.
 std::string facts_text(const ProgramFacts& facts);
-
-nlohmann::json send_json(const OptionSet& options, const SendSummary& summary);
-std::string send_text(const SendSettings& settings, const SendSummary& summary);
 
 }  // namespace lensforge::app

@@ -34,6 +34,20 @@ constexpr int kBarWidth = 24;
 constexpr double kPaceShare = 0.01;
 constexpr double kPaceSeconds = 20.0;
 
+/// "X1.00 Y2.00 Z-0.500"
+std::string position_text(const Eigen::Vector3d& at) {
+  std::string text("X");
+  text.append(fixed(at.x(), 2)).append(" Y").append(fixed(at.y(), 2));
+  return text.append(" Z").append(fixed(at.z(), 3));
+}
+
+/// Share of the file that was taken, 0 … 1.
+double share_of(const SendEvent& event, const JobView& job) {
+  if (job.bytes <= 0) return 0.0;
+  const double share = static_cast<double>(event.byte) / static_cast<double>(job.bytes);
+  return std::clamp(share, 0.0, 1.0);
+}
+
 std::string bar(double share) {
   const auto filled = static_cast<std::size_t>(share * kBarWidth);
   return std::string(filled, '#').append(kBarWidth - filled, '.');
@@ -88,24 +102,12 @@ bool can_show() {
 
 }  // namespace
 
-std::string position_text(const Eigen::Vector3d& at) {
-  std::string text("X");
-  text.append(fixed(at.x(), 2)).append(" Y").append(fixed(at.y(), 2));
-  return text.append(" Z").append(fixed(at.z(), 3));
-}
-
 std::string duration_text(double seconds) {
   const long whole = std::lround(seconds);
   std::array<char, 64> text{};
   std::snprintf(text.data(), text.size(), "%ld:%02ld:%02ld", whole / 3600, whole / 60 % 60,
                 whole % 60);
   return text.data();
-}
-
-double share_of(const SendEvent& event, const JobView& job) {
-  if (job.bytes <= 0) return 0.0;
-  const double share = static_cast<double>(event.byte) / static_cast<double>(job.bytes);
-  return std::clamp(share, 0.0, 1.0);
 }
 
 void TimeLeft::take(const SendEvent& event) {
@@ -120,6 +122,9 @@ void TimeLeft::take(const SendEvent& event) {
   if (cut > kPaceShare && spent > kPaceSeconds) left_ = spent / cut * (1.0 - share);
 }
 
+namespace {
+
+/// A running job in three lines: how far; what the machine does; buffers and what is wrong.
 std::vector<std::string> view_lines(const SendEvent& event, const JobView& job, double left,
                                     const std::string& warning) {
   std::vector<std::string> lines = {
@@ -128,6 +133,8 @@ std::vector<std::string> view_lines(const SendEvent& event, const JobView& job, 
   if (!warning.empty()) lines.back() += "  ! " + printable_line(warning);
   return lines;
 }
+
+}  // namespace
 
 OperatorView::OperatorView(bool quiet, const JobView& job)
     : quiet_(quiet), terminal_(isatty(STDERR_FILENO) != 0), job_(job) {}
@@ -231,8 +238,7 @@ void require_own(const std::filesystem::path& path, int descriptor, const SinkKi
   refuse(path, std::string("exists and is no ") + kind.name + " of lensforge; name another file");
 }
 
-}  // namespace
-
+/// "2026-07-30T14:05:09.250Z": now, UTC.
 std::string time_stamp() {
   using std::chrono::milliseconds;
   const auto since = std::chrono::system_clock::now().time_since_epoch();
@@ -247,6 +253,7 @@ std::string time_stamp() {
   return text.data();
 }
 
+/// Whether a text begins as time_stamp() does.
 bool begins_with_time(std::string_view text) {
   constexpr std::string_view kForm = "0000-00-00T00:00:00.000Z";
   if (text.size() < kForm.size()) return false;
@@ -254,6 +261,8 @@ bool begins_with_time(std::string_view text) {
     return form == '0' ? c >= '0' && c <= '9' : c == form;
   });
 }
+
+}  // namespace
 
 // A named pipe that nobody reads would block here for ever without O_NONBLOCK.
 TextSink::TextSink(const std::filesystem::path& path, const SinkKind& kind)

@@ -27,14 +27,8 @@ struct JobView {
   int rx_bytes = 0;             ///< Likewise.
 };
 
-/// "X1.00 Y2.00 Z-0.500"
-std::string position_text(const Eigen::Vector3d& at);
-
 /// "1:02:03"
 std::string duration_text(double seconds);
-
-/// Share of the file that was taken, 0 … 1.
-double share_of(const SendEvent& event, const JobView& job);
 
 /// How long a job still takes: what the estimate leaves, at the pace so far. Times of hold do not
 /// count.
@@ -51,10 +45,6 @@ class TimeLeft {
   double held_ = 0.0;
   double last_ = 0.0;
 };
-
-/// A running job in three lines: how far; what the machine does; buffers and what is wrong.
-std::vector<std::string> view_lines(const SendEvent& event, const JobView& job, double left,
-                                    const std::string& warning);
 
 /// Shows a running job on stderr: three lines that redraw themselves on a terminal, one line every
 /// few seconds otherwise, nothing if `quiet`. The lines stay on the terminal in the end.
@@ -81,12 +71,6 @@ class OperatorView {
   std::size_t drawn_ = 0;  ///< Lines that stand on the terminal.
   std::string warning_;    ///< The last one.
 };
-
-/// "2026-07-30T14:05:09.250Z": now, UTC.
-std::string time_stamp();
-
-/// Whether a text begins as time_stamp() does.
-bool begins_with_time(std::string_view text);
 
 /// What a TextSink is filled with, and how it is told from other people's files.
 struct SinkKind {

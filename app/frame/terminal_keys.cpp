@@ -129,6 +129,9 @@ void restore_terminal() noexcept {
   if (taken && in_foreground()) ::tcsetattr(STDIN_FILENO, TCSANOW, &before);
 }
 
+namespace {
+
+/// The order behind a key; nothing for other keys and for Q.
 std::optional<OperatorKey> order_of(char key) {
   static constexpr std::pair<char, OperatorKey> kOrders[] = {
       {' ', OperatorKey::kHold},         {'h', OperatorKey::kHold},
@@ -143,6 +146,8 @@ std::optional<OperatorKey> order_of(char key) {
   }
   return std::nullopt;
 }
+
+}  // namespace
 
 TerminalKeys::TerminalKeys(std::function<void()> abort) : abort_(std::move(abort)) {
   std::array<int, 2> wake{};

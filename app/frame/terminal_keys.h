@@ -18,9 +18,6 @@ inline constexpr std::string_view kKeyHelp =
     "space or h holds, r resumes, + - = feed up, down and 100 %, 1 2 3 rapids at 100, 50 and 25 %, "
     "> < . spindle up, down and 100 %, Q (capital) ends the job like Ctrl-C";
 
-/// The order behind a key; nothing for other keys and for Q.
-std::optional<OperatorKey> order_of(char key);
-
 /// Keys typed on the terminal that is standard input, without Enter and without echo; no keys where
 /// standard input is no terminal, and none while the process is in the background. Ctrl-Z does
 /// nothing meanwhile: a sender that sleeps watches no spindle. The terminal is as before after

@@ -508,7 +508,7 @@ void append(std::string& bytes, std::uint64_t number) {
 
 }  // namespace
 
-void write_glb(const GltfPart& part, const std::string& title, const std::filesystem::path& path) {
+void write_glb(const GltfPart& part, const std::string& title, const fs::path& path) {
   const Vertices all = vertices_of(part);
   const std::vector<Block> blocks{block_of(all.positions, kArrayBuffer),
                                   block_of(all.normals, kArrayBuffer),

@@ -83,8 +83,7 @@ TopoDS_Shape only_shape(const Reader& reader, const fs::path& path) {
   return shape;
 }
 
-}  // namespace
-
+/// `work` with OpenCASCADE's exceptions turned into standard ones.
 std::string with_standard_errors(const std::function<std::string()>& work) {
   try {
     return work();
@@ -94,6 +93,8 @@ std::string with_standard_errors(const std::function<std::string()>& work) {
     throw std::runtime_error(std::string("OpenCASCADE: ") + failure.GetMessageString());
   }
 }
+
+}  // namespace
 
 std::string read_guarded(const fs::path& path,
                          const std::function<std::string(const RunControl&)>& work,

@@ -38,9 +38,6 @@ void load_step(STEPControl_Reader& reader, const std::filesystem::path& path,
 TopoDS_Shape read_step_shape(const std::filesystem::path& path, const RunControl& control);
 TopoDS_Shape read_iges_shape(const std::filesystem::path& path, const RunControl& control);
 
-/// `work` with OpenCASCADE's exceptions turned into standard ones.
-std::string with_standard_errors(const std::function<std::string()>& work);
-
 /// OpenCASCADE reports on stdout, which belongs to the command.
 void silence_opencascade();
 
