@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "app/command_line.h"
-#include "app/standard_descriptors.h"
+#include "app/frame/command_line.h"
 
 namespace {
 

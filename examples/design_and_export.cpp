@@ -6,8 +6,8 @@
 #include "core/image/image_io.h"
 #include "core/surface/mesh_io.h"
 #include "design/design_lens.h"
-#include "export/closed_solid.h"
-#include "export/mesh_formats.h"
+#include "export/files/closed_solid.h"
+#include "export/files/mesh_formats.h"
 
 int main(int argc, char** argv) try {
   if (argc != 3) throw std::invalid_argument("usage: design_and_export PICTURE FOLDER");

@@ -3,12 +3,13 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <map>
 #include <set>
 #include <sstream>
 #include <string_view>
 
-#include "app/option_set.h"
+#include "app/frame/option_set.h"
 #include "core/error.h"
 #include "core/io/files.h"
 #include "core/io/sha256.h"
@@ -23,6 +24,17 @@ using nlohmann::json;
 
 constexpr std::uintmax_t kMaxBytes = std::uintmax_t{64} << 20U;
 constexpr std::size_t kMaxName = 200;
+
+/// Whether a job's folder can have this name: letters, digits, '.', '_' and '-', not starting with
+/// '.' or '-', at most 200 of them.
+bool is_job_name(const std::string& name) {
+  const auto allowed = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' ||
+           c == '_' || c == '-';
+  };
+  return !name.empty() && name.size() <= kMaxName && name[0] != '.' && name[0] != '-' &&
+         std::all_of(name.begin(), name.end(), allowed);
+}
 
 /// A command of a job, and what reads its options.
 struct JobCommand {
@@ -218,15 +230,9 @@ json BatchJob::json() const {
   return {{"name", name}, {"target", target}, {"target_sha256", target_sha256}, {"steps", all}};
 }
 
-bool is_job_name(const std::string& name) {
-  const auto allowed = [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' ||
-           c == '_' || c == '-';
-  };
-  return !name.empty() && name.size() <= kMaxName && name[0] != '.' && name[0] != '-' &&
-         std::all_of(name.begin(), name.end(), allowed);
-}
+namespace {
 
+/// @throw InputError if the names of two jobs are the same. @param file  for the message.
 void require_different_names(const std::vector<BatchJob>& jobs, const std::string& file) {
   std::set<std::string> names;
   for (const BatchJob& job : jobs) {
@@ -235,6 +241,8 @@ void require_different_names(const std::vector<BatchJob>& jobs, const std::strin
     }
   }
 }
+
+}  // namespace
 
 std::vector<BatchJob> read_jobs(const std::filesystem::path& path) {
   std::istringstream lines(read_whole_file(path, kMaxBytes));
@@ -263,6 +271,91 @@ void fingerprint_targets(std::vector<BatchJob>& jobs) {
     }
     job.target_sha256 = sum;
   }
+}
+
+namespace {
+
+/// As in a file name.
+std::string name_part(const GridAxis& axis, const std::string& value) {
+  std::string part = "-" + axis.option + value;
+  for (char& c : part) {
+    if (std::isalnum(static_cast<unsigned char>(c)) == 0 && c != '.' && c != '-') c = '_';
+  }
+  return part;
+}
+
+/// "true" and "false" turn a flag on and off.
+nlohmann::json grid_value(const std::string& text) {
+  return text == "true" || text == "false" ? nlohmann::json(text == "true") : nlohmann::json(text);
+}
+
+BatchStep& step_of(const GridAxis& axis, BatchJob& job) {
+  for (BatchStep& step : job.steps) {
+    const bool meant = axis.command.empty() || axis.command == step.command;
+    if (meant && step.has_option(axis.option)) return step;
+  }
+  throw InputError((axis.command.empty() ? "no command" : "no " + axis.command) + " of job \"" +
+                   job.name + "\" has this option");
+}
+
+BatchJob with(const BatchJob& job, const GridAxis& axis, const std::string& value) {
+  BatchJob made = job;
+  try {
+    step_of(axis, made).set(axis.option, grid_value(value));
+  } catch (const InputError& e) {
+    throw InputError("--grid " + axis.option + "=" + value + ": " + e.what());
+  }
+  made.name += name_part(axis, value);
+  if (!is_job_name(made.name)) {
+    throw InputError("--grid " + axis.option + ": the name " + made.name + " is too long");
+  }
+  return made;
+}
+
+GridAxis read_axis(const std::string& word) {
+  const auto refuse = [&](const std::string& rule) {
+    throw InputError("--grid " + word + ": " + rule +
+                     ", such as focal=250,300 or cam.pitch=0.05,0.06");
+  };
+  const std::size_t equals = word.find('=');
+  if (equals == std::string::npos) refuse("an option, '=' and its values");
+  GridAxis axis;
+  axis.option = word.substr(0, equals);
+  const std::size_t dot = axis.option.find('.');
+  if (dot != std::string::npos) {
+    axis.command = axis.option.substr(0, dot);
+    axis.option = axis.option.substr(dot + 1);
+  }
+  std::istringstream values(word.substr(equals + 1));
+  for (std::string value; std::getline(values, value, ',');) axis.values.push_back(value);
+  const bool gap = std::any_of(axis.values.begin(), axis.values.end(),
+                               [](const std::string& value) { return value.empty(); });
+  if (axis.option.empty() || axis.values.empty() || gap)
+    refuse("needs a name and values without gaps");
+  return axis;
+}
+
+}  // namespace
+
+std::vector<GridAxis> read_grid(const std::vector<std::string>& words) {
+  std::vector<GridAxis> axes;
+  axes.reserve(words.size());
+  for (const std::string& word : words) axes.push_back(read_axis(word));
+  return axes;
+}
+
+std::vector<BatchJob> expanded(const std::vector<BatchJob>& jobs,
+                               const std::vector<GridAxis>& axes) {
+  std::vector<BatchJob> all = jobs;
+  for (const GridAxis& axis : axes) {
+    std::vector<BatchJob> next;
+    for (const BatchJob& job : all) {
+      for (const std::string& value : axis.values) next.push_back(with(job, axis, value));
+    }
+    all = std::move(next);
+  }
+  require_different_names(all, "--grid");
+  return all;
 }
 
 }  // namespace lensforge::app

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "app/commands.h"
+#include "app/frame/command_line.h"
 
 namespace lensforge::app {
 
@@ -37,9 +37,8 @@ struct BatchJob {
 };
 
 /// Reads JSON lines: {"name": …, "command": "design"|"reflect", "target": …, "options": {…},
-/// "then":
-/// ["cam", {"command": "export", "options": {…}}]}. Only a design can be followed by others: cam,
-/// export and render. Empty lines are passed over.
+/// "then": ["cam", {"command": "export", "options": {…}}]}. Only a design can be followed by
+/// others: cam, export and render. Empty lines are passed over.
 /// @throw InputError naming file, line and rule: no JSON, an unknown key or command, a name twice
 ///        or that is no file name, options as BatchStep::set() does.
 std::vector<BatchJob> read_jobs(const std::filesystem::path& path);
@@ -47,11 +46,20 @@ std::vector<BatchJob> read_jobs(const std::filesystem::path& path);
 /// Reads every target once, however many jobs have it. @throw InputError if one cannot be read.
 void fingerprint_targets(std::vector<BatchJob>& jobs);
 
-/// Whether a job's folder can have this name: letters, digits, '.', '_' and '-', not starting with
-/// '.' or '-', at most 200 of them.
-bool is_job_name(const std::string& name);
+/// An option and the values that it takes in turn.
+struct GridAxis {
+  std::string command;  ///< Empty: the job's first command that has the option.
+  std::string option;
+  std::vector<std::string> values;
+};
 
-/// @throw InputError if the names of two jobs are the same. @param file  for the message.
-void require_different_names(const std::vector<BatchJob>& jobs, const std::string& file);
+/// Reads "focal=250,300" and "cam.pitch=0.05,0.06". @throw InputError naming word and rule.
+std::vector<GridAxis> read_grid(const std::vector<std::string>& words);
+
+/// Every job with every combination of values, the last axis fastest. A job's name takes what it is
+/// given: "portrait-focal250-pitch0.05".
+/// @throw InputError if none of a job's commands has an option, or two names become the same.
+std::vector<BatchJob> expanded(const std::vector<BatchJob>& jobs,
+                               const std::vector<GridAxis>& axes);
 
 }  // namespace lensforge::app

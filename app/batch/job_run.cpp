@@ -1,18 +1,31 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "app/batch/job_run.h"
 
+#include <fcntl.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
 #include <chrono>
+#include <csignal>
 #include <exception>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <map>
 #include <optional>
+#include <stop_token>
+#include <string>
 #include <system_error>
 #include <thread>
 #include <utility>
+#include <vector>
 
-#include "app/batch/step_process.h"
-#include "app/exit_code.h"
+#include "app/frame/command_line.h"
 #include "core/error.h"
+#include "core/io/descriptor.h"
 #include "core/io/files.h"
 #include "core/io/folder_lock.h"
 #include "core/text/version.h"
@@ -21,6 +34,94 @@ namespace lensforge::app {
 namespace {
 
 namespace fs = std::filesystem;
+
+/// How a command ended that was run as a process of its own.
+struct StepEnd {
+  int exit_code = 0;  ///< 128 + the signal's number if a signal ended it.
+  double seconds = 0.0;
+};
+
+constexpr int kSignalBase = 128;
+constexpr int kCannotStart = 127;
+
+[[noreturn]] void fail(const std::string& what) {
+  throw RunError(what + ": " + std::generic_category().message(errno));
+}
+
+Descriptor open_output(const fs::path& path, int how) {
+  Descriptor file(::open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | how, 0644));
+  if (!file.open()) fail(path.string());
+  return file;
+}
+
+/// What execv() takes.
+struct CommandLine {
+  explicit CommandLine(const Arguments& words) : words_(words) {
+    for (std::string& word : words_) pointers_.push_back(word.data());
+    pointers_.push_back(nullptr);
+  }
+  [[nodiscard]] char* const* pointers() const { return pointers_.data(); }
+
+ private:
+  Arguments words_;
+  std::vector<char*> pointers_;
+};
+
+/// The child's way to its program: only what may be called between fork() and execv(). It has a
+/// process group of its own, so that Ctrl-C on the terminal reaches it once, through the parent.
+[[noreturn]] void become(const char* program, const CommandLine& command, int in, int out, int err,
+                         pid_t parent) {
+  ::setpgid(0, 0);
+  ::prctl(PR_SET_PDEATHSIG, SIGINT);
+  if (::getppid() != parent) ::_exit(kCannotStart);
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGPIPE, SIGXFSZ}) {
+    std::signal(signal, signal == SIGXFSZ || signal == SIGPIPE ? SIG_IGN : SIG_DFL);
+  }
+  ::dup2(in, STDIN_FILENO);
+  ::dup2(out, STDOUT_FILENO);
+  ::dup2(err, STDERR_FILENO);
+  ::execv(program, command.pointers());
+  ::_exit(kCannotStart);
+}
+
+int wait_for(pid_t child, const std::stop_token& stop) {
+  {
+    // Not reaped before nobody signals it any more: its number could be another process's then.
+    const std::stop_callback interrupt(stop, [child] { ::kill(child, SIGINT); });
+    siginfo_t ended{};
+    while (::waitid(P_PID, static_cast<id_t>(child), &ended, WEXITED | WNOWAIT) != 0) {
+      if (errno != EINTR) fail("waitid");
+    }
+  }
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  return WIFEXITED(status) ? WEXITSTATUS(status) : kSignalBase + WTERMSIG(status);
+}
+
+/// Runs this very program with `words`, its output going to two files: `out` is replaced, `log` is
+/// added to. When `stop` is requested, or the calling thread ends, it is interrupted as by Ctrl-C.
+/// @throw RunError with the system's reason if no process can be made or a file not be written.
+StepEnd run_step(const Arguments& words, const fs::path& out, const fs::path& log,
+                 const std::stop_token& stop) {
+  const auto start = std::chrono::steady_clock::now();
+  const std::string program = fs::read_symlink("/proc/self/exe").string();
+  Arguments all{program};
+  all.insert(all.end(), words.begin(), words.end());
+  const CommandLine command(all);
+  const Descriptor result = open_output(out, O_TRUNC);
+  const Descriptor messages = open_output(log, O_APPEND);
+  const Descriptor nothing(::open("/dev/null", O_RDONLY | O_CLOEXEC));
+  const pid_t parent = ::getpid();
+  const pid_t child = ::fork();
+  if (child < 0) fail("fork");
+  if (child == 0) {
+    become(program.c_str(), command, nothing.number(), result.number(), messages.number(), parent);
+  }
+  const int code = wait_for(child, stop);
+  const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start;
+  return {code, spent.count()};
+}
+
 using nlohmann::json;
 using Status = JobOutcome::Status;
 
@@ -275,6 +376,116 @@ JobOutcome run_job(const BatchJob& job, const BatchPlace& place, const std::stop
   } catch (const std::exception& e) {
     return {Status::kFailed, e.what(), false, 0.0};
   }
+}
+
+namespace {
+
+/// What every table begins with.
+const std::vector<std::string> kFirstColumns{"name", "status", "message", "seconds"};
+
+/// Columns in the order in which they first came after kFirstColumns, and a row's cells.
+class Table {
+ public:
+  using Cells = std::map<std::string, std::string>;
+
+  void add(Cells& row, const std::string& column, const std::string& value) {
+    if (std::find(columns_.begin(), columns_.end(), column) == columns_.end()) {
+      columns_.push_back(column);
+    }
+    row[column] = value;
+  }
+  void end_row(Cells row) { rows_.push_back(std::move(row)); }
+
+  /// The names of the columns so far, without the line's end.
+  [[nodiscard]] std::string head() const {
+    return line(columns_, [](const std::string& column) { return column; });
+  }
+  [[nodiscard]] std::string text() const {
+    std::string text = head() + "\r\n";
+    for (const Cells& row : rows_) {
+      const auto cell = [&](const std::string& column) {
+        const auto found = row.find(column);
+        return found == row.end() ? std::string() : found->second;
+      };
+      text += line(columns_, cell) + "\r\n";
+    }
+    return text;
+  }
+
+ private:
+  static std::string quoted(const std::string& cell) {
+    if (cell.find_first_of(",\"\r\n") == std::string::npos) return cell;
+    std::string text = "\"";
+    for (const char c : cell) text.append(c == '"' ? 2 : 1, c);
+    return text + "\"";
+  }
+  template <class CellOf>
+  static std::string line(const std::vector<std::string>& columns, const CellOf& cell) {
+    std::string text;
+    for (const std::string& column : columns) {
+      if (!text.empty()) text += ',';
+      text += quoted(cell(column));
+    }
+    return text;
+  }
+
+  std::vector<std::string> columns_ = kFirstColumns;
+  std::vector<Cells> rows_;
+};
+
+std::string cell_of(const json& value) {
+  return value.is_string() ? value.get<std::string>() : value.dump();
+}
+
+/// Every value within objects; lists are no single values and are left out.
+void add_values(const std::string& prefix, const json& value, Table& table, Table::Cells& row) {
+  if (value.is_object()) {
+    for (const auto& [key, inner] : value.items()) {
+      const bool repeats = key == "options" || key == "command" || key == "out";
+      if (!repeats) add_values(std::string(prefix).append(".").append(key), inner, table, row);
+    }
+  } else if (!value.is_array() && !value.is_null()) {
+    table.add(row, prefix, cell_of(value));
+  }
+}
+
+void add_options(const json& steps, Table& table, Table::Cells& row) {
+  for (const json& step : steps) {
+    for (const auto& [key, value] : step["options"].items()) {
+      table.add(row, step["command"].get<std::string>() + "." + key, cell_of(value));
+    }
+  }
+}
+
+void add_results(const json& steps, Table& table, Table::Cells& row) {
+  for (const json& step : steps) add_values(step["command"], step["result"], table, row);
+}
+
+}  // namespace
+
+std::string job_table(const std::vector<TableJob>& jobs) {
+  Table table;
+  for (const TableJob& job : jobs) {
+    Table::Cells row;
+    table.add(row, "name", job.job["name"]);
+    table.add(row, "status", job.status);
+    table.add(row, "message", job.message);
+    add_options(job.job["steps"], table, row);
+    if (!job.record.is_null()) {
+      table.add(row, "seconds", job.record["seconds"].dump());
+      add_results(job.record["steps"], table, row);
+    }
+    table.end_row(std::move(row));
+  }
+  return table.text();
+}
+
+bool is_job_table(const std::filesystem::path& file) {
+  const std::string head = Table().head();
+  std::string begin(head.size(), '\0');
+  std::ifstream stream(file, std::ios::binary);
+  stream.read(begin.data(), static_cast<std::streamsize>(begin.size()));
+  return begin == head;
 }
 
 }  // namespace lensforge::app

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "app/option_set.h"
+#include "app/frame/option_set.h"
 
 namespace lensforge::python {
 

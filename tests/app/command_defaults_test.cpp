@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <gmock/gmock.h>
 
-#include "app/cam_settings.h"
-#include "app/coupon_settings.h"
-#include "app/design_settings.h"
-#include "app/export_settings.h"
-#include "app/nest_settings.h"
-#include "app/reflect_settings.h"
-#include "app/send_settings.h"
+#include "app/commands/cam_command.h"
+#include "app/commands/coupon_command.h"
+#include "app/commands/design_command.h"
+#include "app/commands/export_command.h"
+#include "app/commands/nest_command.h"
+#include "app/commands/reflect_command.h"
+#include "app/commands/send_command.h"
 #include "cam/cam_fields.h"
 #include "core/temp_folder.h"
 #include "design/design_fields.h"

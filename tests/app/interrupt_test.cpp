@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "app/interrupt.h"
+#include "app/frame/interrupt.h"
 
 #include <gtest/gtest.h>
 #include <unistd.h>

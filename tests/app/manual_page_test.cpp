@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "app/command_line.h"
+#include "app/frame/command_line.h"
 #include "core/temp_folder.h"
 
 namespace lensforge::app {

@@ -3,9 +3,8 @@
 
 #include <cmath>
 
-#include "app/command_line.h"
-#include "app/exit_code.h"
-#include "app/option_set.h"
+#include "app/frame/command_line.h"
+#include "app/frame/option_set.h"
 #include "cam/cam_fields.h"
 #include "cam/cam_options.h"
 #include "cam/coupon/coupon_options.h"
@@ -14,7 +13,7 @@
 #include "design/design_fields.h"
 #include "design/reflect/reflect_options.h"
 #include "design/render_fields.h"
-#include "export/export_options.h"
+#include "export/export.h"
 #include "machine/job/send_options.h"
 
 namespace lensforge::app {

@@ -9,8 +9,8 @@
 #include "bench/process_usage.h"
 #include "cam/cam_meshes.h"
 #include "core/temp_folder.h"
-#include "export/spline_net.h"
-#include "export/step_file.h"
+#include "export/solid/step_file.h"
+#include "export/spline/spline_fit.h"
 
 namespace lensforge {
 namespace {

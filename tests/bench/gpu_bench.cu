@@ -20,7 +20,7 @@
 #include "design/design_lens.h"
 #include "design/energy/objective_cuda.h"
 #include "design/schedule/guided_optimization.h"
-#include "fixtures/scenes.h"
+#include "fixtures/scenes/scenes.h"
 
 namespace lensforge::bench {
 namespace {

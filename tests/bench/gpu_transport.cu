@@ -14,7 +14,7 @@
 #include "design/transport/cell_kernels.h"
 #include "design/transport/cell_stage.h"
 #include "design/transport/density_blur.h"
-#include "fixtures/scenes.h"
+#include "fixtures/scenes/scenes.h"
 
 namespace lensforge::bench {
 namespace {

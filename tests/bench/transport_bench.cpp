@@ -16,7 +16,7 @@
 #include "design/transport/density_blur.h"
 #include "design/transport/semi_discrete.h"
 #include "design/transport_scenes.h"
-#include "fixtures/scenes.h"
+#include "fixtures/scenes/scenes.h"
 
 namespace lensforge::bench {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/closed_solid.h"
+#include "export/files/closed_solid.h"
 
 #include <gmock/gmock.h>
 

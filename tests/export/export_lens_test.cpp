@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/export_lens.h"
-
 #include <gmock/gmock.h>
 
 #include <utility>
@@ -12,8 +10,9 @@
 #include "core/surface/mesh_io.h"
 #include "core/temp_folder.h"
 #include "design/render_lens.h"
+#include "export/export.h"
 #include "export/sample_surfaces.h"
-#include "export/solid_surface.h"
+#include "export/solid/solid_reading.h"
 
 namespace lensforge {
 namespace {

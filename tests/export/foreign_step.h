@@ -7,7 +7,7 @@
 #include <TopoDS_Shape.hxx>
 #include <filesystem>
 
-#include "export/solid_check.h"
+#include "export/solid/opencascade_io.h"
 
 namespace lensforge::testing {
 

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Solids of lenses whose front is a part of a sphere or a height map.
-#include "export/front_solid.h"
-
 #include <gmock/gmock.h>
 
 #include <cmath>
@@ -10,11 +8,13 @@
 #include "core/optics/front_placement.h"
 #include "core/optics/height_fronts.h"
 #include "core/temp_folder.h"
-#include "export/closed_solid.h"
-#include "export/iges_file.h"
+#include "export/files/closed_solid.h"
 #include "export/part21.h"
 #include "export/sample_surfaces.h"
-#include "export/step_file.h"
+#include "export/solid/iges_file.h"
+#include "export/solid/step_file.h"
+#include "export/spline/spline_fit.h"
+#include "export/spline/spline_net.h"
 
 namespace lensforge::testing {
 namespace {

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/gltf_file.h"
-
 #include <gmock/gmock.h>
 
 #include <array>
@@ -13,7 +11,8 @@
 #include "core/io/output_guard.h"
 #include "core/surface/mesh_normals.h"
 #include "core/temp_folder.h"
-#include "export/closed_solid.h"
+#include "export/files/closed_solid.h"
+#include "export/files/mesh_formats.h"
 #include "export/sample_surfaces.h"
 
 namespace lensforge::testing {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/height_map.h"
+#include "export/files/height_map.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include "core/image/transfer.h"
 #include "core/surface/smooth_surface.h"
 #include "core/temp_folder.h"
-#include "export/export_work.h"
+#include "export/export.h"
 #include "export/sample_surfaces.h"
 
 namespace lensforge::testing {

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/iges_check.h"
-
 #include <gmock/gmock.h>
 
 #include <cstdio>
@@ -8,6 +6,7 @@
 
 #include "core/error.h"
 #include "core/temp_folder.h"
+#include "export/solid/iges_file.h"
 
 namespace lensforge::testing {
 namespace {

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/iges_file.h"
+#include "export/solid/iges_file.h"
 
 #include <gmock/gmock.h>
 
 #include "core/error.h"
 #include "core/io/output_guard.h"
 #include "core/temp_folder.h"
-#include "export/iges_check.h"
 #include "export/sample_surfaces.h"
-#include "export/solid_check.h"
+#include "export/solid/opencascade_io.h"
+#include "export/spline/spline_fit.h"
 
 namespace lensforge::testing {
 namespace {

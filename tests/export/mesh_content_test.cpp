@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/mesh_content.h"
-
 #include <gmock/gmock.h>
 #include <sys/stat.h>
 #include <zip.h>
@@ -13,9 +11,8 @@
 #include "core/surface/mesh_normals.h"
 #include "core/temp_folder.h"
 #include "core/text/printable.h"
-#include "export/closed_solid.h"
-#include "export/gltf_file.h"
-#include "export/mesh_formats.h"
+#include "export/files/closed_solid.h"
+#include "export/files/mesh_formats.h"
 #include "export/sample_surfaces.h"
 
 namespace lensforge::testing {

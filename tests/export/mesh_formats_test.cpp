@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/mesh_formats.h"
+#include "export/files/mesh_formats.h"
 
 #include <gmock/gmock.h>
 #include <zip.h>
@@ -10,7 +10,7 @@
 #include "core/io/output_guard.h"
 #include "core/surface/mesh_io.h"
 #include "core/temp_folder.h"
-#include "export/closed_solid.h"
+#include "export/files/closed_solid.h"
 #include "export/sample_surfaces.h"
 
 namespace lensforge::testing {

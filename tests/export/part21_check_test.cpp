@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/part21_check.h"
-
 #include <gmock/gmock.h>
 
 #include "core/error.h"
 #include "core/temp_folder.h"
+#include "export/solid/step_file.h"
 
 namespace lensforge::testing {
 namespace {

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/solid_mesh.h"
-
 #include <gmock/gmock.h>
 
 #include <BRepAlgoAPI_Cut.hxx>
@@ -19,6 +17,7 @@
 #include "core/error.h"
 #include "core/temp_folder.h"
 #include "export/foreign_step.h"
+#include "export/solid/solid_reading.h"
 
 namespace lensforge::testing {
 namespace {

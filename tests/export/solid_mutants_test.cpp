@@ -8,10 +8,11 @@
 
 #include "core/error.h"
 #include "core/temp_folder.h"
-#include "export/iges_file.h"
 #include "export/sample_surfaces.h"
-#include "export/solid_surface.h"
-#include "export/step_file.h"
+#include "export/solid/iges_file.h"
+#include "export/solid/solid_reading.h"
+#include "export/solid/step_file.h"
+#include "export/spline/spline_fit.h"
 
 // Files of solids that are broken in one place, each read in this process: OpenCASCADE crashes at
 // every fourth of them, which must be an InputError here. LENSFORGE_CAMPAIGN says how many of each

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/solid_surface.h"
-
 #include <gmock/gmock.h>
 
 #include <BRepAlgoAPI_Common.hxx>
@@ -16,8 +14,10 @@
 #include "core/temp_folder.h"
 #include "export/foreign_step.h"
 #include "export/sample_surfaces.h"
-#include "export/solid_check.h"
-#include "export/step_file.h"
+#include "export/solid/opencascade_io.h"
+#include "export/solid/solid_reading.h"
+#include "export/solid/step_file.h"
+#include "export/spline/spline_fit.h"
 
 namespace lensforge::testing {
 namespace {

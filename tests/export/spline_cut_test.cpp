@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/spline_cut.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -11,8 +9,9 @@
 #include "core/surface/sample_splines.h"
 #include "core/temp_folder.h"
 #include "design/render_lens.h"
-#include "export/export_lens.h"
-#include "export/solid_surface.h"
+#include "export/export.h"
+#include "export/solid/solid_reading.h"
+#include "export/spline/spline_net.h"
 
 namespace lensforge::testing {
 namespace {

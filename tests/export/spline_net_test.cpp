@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/spline_net.h"
+#include "export/spline/spline_net.h"
 
 #include <gtest/gtest.h>
 
@@ -10,10 +10,10 @@
 #include "design/design_lens.h"
 #include "design/render_lens.h"
 #include "design/wanted_picture.h"
-#include "export/closed_solid.h"
-#include "export/normal_bound.h"
+#include "export/files/closed_solid.h"
 #include "export/sample_surfaces.h"
-#include "fixtures/scenes.h"
+#include "export/spline/spline_fit.h"
+#include "fixtures/scenes/scenes.h"
 
 namespace lensforge::testing {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/step_file.h"
+#include "export/solid/step_file.h"
 
 #include <gmock/gmock.h>
 
@@ -9,9 +9,10 @@
 #include "core/error.h"
 #include "core/io/output_guard.h"
 #include "core/temp_folder.h"
-#include "export/closed_solid.h"
+#include "export/files/closed_solid.h"
 #include "export/part21.h"
 #include "export/sample_surfaces.h"
+#include "export/spline/spline_fit.h"
 
 namespace lensforge::testing {
 namespace {

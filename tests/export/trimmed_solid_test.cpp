@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Solids of lenses that have an outline.
-#include "export/trimmed_solid.h"
 
 #include <gmock/gmock.h>
 
@@ -13,12 +12,13 @@
 #include "core/surface/mesh_normals.h"
 #include "core/surface/outline_index.h"
 #include "core/temp_folder.h"
-#include "export/closed_solid.h"
-#include "export/iges_file.h"
-#include "export/outline_walls.h"
+#include "export/files/closed_solid.h"
 #include "export/part21.h"
 #include "export/sample_surfaces.h"
-#include "export/step_file.h"
+#include "export/solid/iges_file.h"
+#include "export/solid/step_file.h"
+#include "export/spline/net_outline.h"
+#include "export/spline/spline_fit.h"
 
 namespace lensforge::testing {
 namespace {

@@ -18,7 +18,7 @@
 #include <thread>
 #include <utility>
 
-#include "app/command_line.h"
+#include "app/frame/command_line.h"
 
 namespace lensforge::fuzz {
 namespace {

@@ -3,8 +3,7 @@
 
 #include <gmock/gmock.h>
 
-#include "app/batch/job_grid.h"
-#include "app/batch/job_table.h"
+#include "app/batch/job_run.h"
 #include "core/error.h"
 #include "core/temp_folder.h"
 

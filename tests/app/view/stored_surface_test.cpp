@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "app/view/stored_surface.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 
+#include "app/view/lens_view.h"
 #include "core/surface/grid_mesh.h"
 #include "core/surface/grid_triangles.h"
 #include "core/surface/mesh_normals.h"

@@ -14,7 +14,7 @@
 #include "design/transport/density_blur.h"
 #include "design/transport_scenes.h"
 #include "design/vector_lbfgs.h"
-#include "fixtures/scenes.h"
+#include "fixtures/scenes/scenes.h"
 
 namespace lensforge {
 namespace {

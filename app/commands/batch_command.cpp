@@ -1,0 +1,225 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <atomic>
+#include <charconv>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "app/batch/batch_job.h"
+#include "app/batch/job_run.h"
+#include "app/frame/command_line.h"
+#include "app/frame/common_output.h"
+#include "app/frame/console.h"
+#include "app/frame/interrupt.h"
+#include "app/frame/option_set.h"
+#include "core/error.h"
+#include "core/io/files.h"
+#include "core/io/output_guard.h"
+
+namespace lensforge::app {
+namespace {
+
+using Status = JobOutcome::Status;
+
+struct BatchSettings {
+  std::string jobs_file;
+  std::string out;
+  std::string shard = "1/1";
+  std::string table;
+  std::vector<std::string> grid;
+  int parallel = 1;
+  bool force = false;
+};
+
+constexpr int kMaxParallel = 1024;
+
+const OptionTable<BatchSettings>& batch_fields() {
+  static const OptionTable<BatchSettings> fields{Row<BatchSettings>::whole(
+      "--parallel", &BatchSettings::parallel, Limits::between(1, kMaxParallel),
+      "jobs at the same time; they share --threads")};
+  return fields;
+}
+
+void add_batch_options(OptionSet& options, BatchSettings& settings) {
+  options.positional(
+      "JOBS", settings.jobs_file,
+      "JSON lines, a job each: {\"name\": \"a\", \"command\": \"design\", \"target\": "
+      "\"a.png\", \"options\": {\"focal\": 250}, \"then\": [\"cam\", {\"command\": \"export\", "
+      "\"options\": {\"out\": \"a.stl\"}}]}; first design or reflect, then cam, export or render");
+  options.required_text("--out", settings.out, "DIR", "where every job gets a folder of its name");
+  options.text("--shard", settings.shard, "I/N", "of every N jobs only the I-th, I from 1 to N");
+  options.texts("--grid", settings.grid, "OPTION=VALUES",
+                "every job with every combination of these: focal=250,300 cam.pitch=0.05,0.06");
+  options.fields(batch_fields(), settings);
+  options.text("--table", settings.table, "FILE.csv",
+               "write all jobs' options and results into a table");
+  options.flag(
+      "--force", settings.force,
+      "do jobs again that were done with other options; replace a --table of other origin");
+}
+
+/// I of N.
+struct Shard {
+  int number = 1;
+  int count = 1;
+
+  [[nodiscard]] bool has(std::size_t job) const {
+    return job % static_cast<std::size_t>(count) == static_cast<std::size_t>(number - 1);
+  }
+};
+
+Shard read_shard(const std::string& text) {
+  Shard shard;
+  const char* const end = text.data() + text.size();
+  const auto number = std::from_chars(text.data(), end, shard.number);
+  const bool slash = number.ec == std::errc() && number.ptr != end && *number.ptr == '/';
+  const auto count = slash ? std::from_chars(number.ptr + 1, end, shard.count) : number;
+  if (!slash || count.ec != std::errc() || count.ptr != end || shard.number < 1 ||
+      shard.number > shard.count) {
+    throw InputError("--shard " + text + ": I/N with I from 1 to N, such as 2/4");
+  }
+  return shard;
+}
+
+/// The jobs of this shard, several at a time.
+class BatchRun {
+ public:
+  BatchRun(const std::vector<BatchJob>& jobs, const Shard& shard, const BatchPlace& place,
+           const Console& console)
+      : jobs_(jobs), place_(place), console_(console), outcomes_(jobs.size()) {
+    for (std::size_t i = 0; i < jobs.size(); ++i) {
+      if (shard.has(i)) mine_.push_back(i);
+    }
+  }
+
+  void run(int parallel, const std::stop_token& stop) {
+    std::vector<std::jthread> workers;
+    const auto most = std::min<std::size_t>(static_cast<std::size_t>(parallel), mine_.size());
+    for (std::size_t i = 0; i < most; ++i) {
+      workers.emplace_back([this, &stop] { work(stop); });
+    }
+  }
+
+  [[nodiscard]] const std::vector<std::size_t>& mine() const { return mine_; }
+  [[nodiscard]] const std::vector<JobOutcome>& outcomes() const { return outcomes_; }
+  [[nodiscard]] std::size_t count(Status status) const {
+    return static_cast<std::size_t>(std::count_if(
+        mine_.begin(), mine_.end(), [&](std::size_t i) { return outcomes_[i].status == status; }));
+  }
+
+ private:
+  void work(const std::stop_token& stop) {
+    for (std::size_t k = next_++; k < mine_.size() && !stop.stop_requested(); k = next_++) {
+      JobOutcome& outcome = outcomes_[mine_[k]];
+      outcome = run_job(jobs_[mine_[k]], place_, stop);
+      tell(jobs_[mine_[k]], outcome);
+    }
+  }
+
+  void tell(const BatchJob& job, const JobOutcome& outcome) {
+    const std::scoped_lock lock(telling_);
+    ++told_;
+    console_.note(std::to_string(told_) + "/" + std::to_string(mine_.size()) + " " + job.name +
+                  ": " + (outcome.earlier ? "was done before" : status_word(outcome.status)) +
+                  (outcome.message.empty() ? "" : ", " + outcome.message) +
+                  (outcome.earlier ? "" : ", " + fixed(outcome.seconds, 1) + " s"));
+  }
+
+  const std::vector<BatchJob>& jobs_;
+  const BatchPlace& place_;
+  const Console& console_;
+  std::vector<std::size_t> mine_;
+  std::vector<JobOutcome> outcomes_;
+  std::atomic<std::size_t> next_ = 0;
+  std::mutex telling_;
+  std::size_t told_ = 0;
+};
+
+/// All jobs of the file, those of other shards too.
+std::string table_of(const std::vector<BatchJob>& jobs, const BatchRun& run,
+                     const BatchPlace& place) {
+  std::vector<TableJob> rows;
+  for (std::size_t i = 0; i < jobs.size(); ++i) {
+    const JobOutcome& outcome = run.outcomes()[i];
+    TableJob row{jobs[i].json(), status_word(outcome.status), outcome.message,
+                 job_record(jobs[i], place.out)};
+    if (outcome.status == Status::kOpen && !row.record.is_null()) {
+      row.status = row.record["status"];
+      row.message = row.record["message"];
+    }
+    rows.push_back(std::move(row));
+  }
+  return job_table(rows);
+}
+
+nlohmann::json result_json(const BatchSettings& settings, const std::vector<BatchJob>& jobs,
+                           const BatchRun& run) {
+  nlohmann::json list = nlohmann::json::array();
+  for (const std::size_t i : run.mine()) {
+    const JobOutcome& outcome = run.outcomes()[i];
+    list.push_back({{"name", jobs[i].name},
+                    {"status", status_word(outcome.status)},
+                    {"message", outcome.message},
+                    {"earlier", outcome.earlier},
+                    {"seconds", outcome.seconds}});
+  }
+  return {{"command", "batch"}, {"out", settings.out}, {"jobs", list}};
+}
+
+std::string result_text(const BatchSettings& settings, const std::vector<BatchJob>& jobs,
+                        const BatchRun& run) {
+  std::string text = settings.out + ":";
+  for (const Status status : {Status::kDone, Status::kLimitMissed, Status::kFailed, Status::kBusy,
+                              Status::kInterrupted, Status::kOpen}) {
+    const std::size_t count = run.count(status);
+    if (count > 0) text.append(" ").append(std::to_string(count) + " " + status_word(status) + ",");
+  }
+  text.back() = '\n';
+  for (const std::size_t i : run.mine()) {
+    const JobOutcome& outcome = run.outcomes()[i];
+    if (outcome.status == Status::kFailed)
+      text.append("  ").append(jobs[i].name + ": " + outcome.message + "\n");
+  }
+  return text;
+}
+
+int exit_code_of(const BatchRun& run, const std::stop_token& stop) {
+  if (stop.stop_requested()) return kInterrupted;
+  if (run.count(Status::kFailed) + run.count(Status::kBusy) > 0) return kFailed;
+  return run.count(Status::kLimitMissed) > 0 ? kLimitMissed : kDone;
+}
+
+int run_batch(const OptionSet& options, const BatchSettings& settings) {
+  const Console console(options.common().json, options.common().quiet);
+  const Shard shard = read_shard(settings.shard);
+  std::vector<BatchJob> jobs = expanded(read_jobs(settings.jobs_file), read_grid(settings.grid));
+  fingerprint_targets(jobs);
+  const int threads = std::max(1, options.executor().concurrency() / settings.parallel);
+  const BatchPlace place{settings.out, settings.jobs_file, threads, settings.force};
+  for (const BatchJob& job : jobs) require_room_for(job, place);
+  if (!settings.table.empty()) {
+    require_replaceable("--table", settings.table, settings.force || is_job_table(settings.table));
+  }
+  require_writable_folder(settings.out);
+  const InterruptWatch interrupt;
+  console.begin();
+  BatchRun run(jobs, shard, place, console);
+  run.run(settings.parallel, interrupt.token());
+  if (!settings.table.empty()) write_whole_file(settings.table, table_of(jobs, run, place));
+  console.result(result_json(settings, jobs, run), result_text(settings, jobs, run));
+  return exit_code_of(run, interrupt.token());
+}
+
+}  // namespace
+
+int batch_command(const Arguments& command_line) {
+  BatchSettings settings;
+  OptionSet options("batch", "Does the jobs of a file, each in a folder of its own.");
+  add_batch_options(options, settings);
+  options.parse(command_line);
+  return run_batch(options, settings);
+}
+
+}  // namespace lensforge::app

@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "app/commands/cam_command.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <optional>
+#include <sstream>
+#include <string>
+
+#include "app/frame/command_line.h"
+#include "app/frame/command_run.h"
+#include "app/frame/common_output.h"
+#include "app/frame/console.h"
+#include "app/frame/interrupt.h"
+#include "app/frame/option_set.h"
+#include "cam/cam_fields.h"
+#include "cam/cam_job.h"
+#include "cam/cut_compare.h"
+#include "cam/cut_estimate.h"
+#include "cam/finish_setup.h"
+#include "cam/job_files.h"
+#include "cam/report/leak_words.h"
+#include "cam/report/report_json.h"
+#include "core/error.h"
+#include "core/io/files.h"
+#include "core/io/folder_lock.h"
+#include "core/text/toml_fields.h"
+
+namespace lensforge::app {
+
+namespace fs = std::filesystem;
+
+std::string folder_name(const fs::path& folder) {
+  const fs::path whole = fs::absolute(folder).lexically_normal();
+  return (whole.has_filename() ? whole : whole.parent_path()).filename().string();
+}
+
+void add_cam_options(OptionSet& options, CamSettings& settings) {
+  options.text("DIR", settings.source, "", "lens folder; --show-workshop needs none");
+  options.text("--workshop", settings.workshop, "FILE.toml",
+               "machine, blank, clamps, tools and process; options given here win");
+  options.flag("--show-workshop", settings.show_workshop,
+               "print the workshop in use as TOML and exit");
+  options.texts(
+      "--compare", settings.compare, "KEY=VALUE,…",
+      "rank choices by leakage and hours instead of making programs: tool=0.3,0.4 "
+      "pitch=0.04,0.06 slope=3e-5,6e-5 large=0,4 (finishing only); mae=0.004 recommends the "
+      "quickest that reaches it");
+  options.fields(cam_fields(), settings.cam);
+}
+
+void settle(OptionSet& options, CamSettings& settings) {
+  const std::string file = settings.workshop.empty() ? "workshop" : settings.workshop;
+  if (!settings.workshop.empty()) {
+    settings.cam.workshop = read_workshop(settings.workshop);
+    options.restate();
+  }
+  if (!settings.source.empty()) settings.cam.job = folder_name(settings.source);
+  // A file's own values have been read and found in order: what is wrong now is an option's doing.
+  validate(settings.cam.workshop, file + " with the options given");
+}
+
+namespace {
+
+std::string check_text(const LimitCheck& check) {
+  const std::string unit = check.unit.empty() ? "" : " " + check.unit;
+  return (check.missed() ? "  limit missed: " : "  advice: ") + check.name + " " +
+         fixed(check.value, check.decimals) + unit + ", at most " +
+         fixed(check.limit, check.decimals) + unit + "\n";
+}
+
+}  // namespace
+
+std::string verdict_text(const Verdict& verdict) {
+  std::string text;
+  for (const LimitCheck& check : verdict.checks) {
+    if (!check.passes()) text += check_text(check);
+  }
+  return text;
+}
+
+namespace {
+
+std::string operation_text(const ReportOperation& operation) {
+  return "  " + operation.summary.name +
+         std::string(10 - std::min<std::size_t>(9, operation.summary.name.size()), ' ') +
+         operation.file + ", " + std::to_string(operation.lines) + " moves, " +
+         fixed(operation.minutes, 1) + " min\n";
+}
+
+std::string surface_text(const RenderedSurface& surface) {
+  return "  " + surface.name + "   " + metrics_text(surface.quality.metrics) + ", leaks " +
+         fixed(100.0 * surface.quality.leakage, 2) + " %\n";
+}
+
+std::string summary_text(const fs::path& folder, const CamResult& result) {
+  const ReportData& report = result.report;
+  std::string text = folder.string() + ": " + result.message + "\n";
+  for (const ReportOperation& operation : report.operations) text += operation_text(operation);
+  text += "  in all    " + fixed(report.minutes(), 1) + " min\n";
+  if (!report.leakage.steps.empty()) {
+    text += surface_text(report.leakage.designed);
+    for (const RenderedSurface& surface : report.leakage.others) text += surface_text(surface);
+    for (const LeakPlace& place : report.places) text += "  " + leak_words(place) + "\n";
+    if (!report.tolerances.empty()) text += "  " + tolerance_words(report.tolerances) + "\n";
+  }
+  return text + verdict_text(report.verdict) + "  Z         program Z = lens z + " +
+         fixed(report.z_offset, 4) + " mm\n";
+}
+
+nlohmann::json summary_json(const OptionSet& options, const CamResult& result) {
+  nlohmann::json json = {
+      {"command", "cam"},          {"status", result.done() ? "done" : "interrupted"},
+      {"message", result.message}, {"warnings", result.report.warnings},
+      {"options", options.used()}, {"files", nlohmann::json::array()}};
+  for (const fs::path& file : result.files) json["files"].push_back(file.string());
+  if (result.done()) json["report"] = report_json(result.report);
+  return json;
+}
+
+CamResult run(const OptionSet& options, const CamOptions& cam, const Lens& lens,
+              const fs::path& out, const Console& console) {
+  const Executor executor = options.executor();
+  const WorkEstimate estimate = estimate_cut(cam, lens.setup, executor.concurrency());
+  require_room_for_cut(cam, lens.setup, estimate, out);
+  const InterruptWatch interrupt;
+  const OutputFolder folder(out, FolderLock::Kind::kExclusive);
+  folder.remove_partial_files(is_name_of_cut);
+  announce_work(estimate, console, "the cut takes");
+  const std::string few = decimals_warning(cam);
+  if (!few.empty()) console.note(few);
+  ProgressDisplay progress(options.common().quiet);
+  const RunControl control(interrupt.token(), progress.sink());
+  return make_cut(lens, cam, out, executor, control);
+}
+
+int exit_code(const CamResult& result) {
+  if (!result.done()) return kInterrupted;
+  return result.report.verdict.missed() == 0 ? kDone : kLimitMissed;
+}
+
+std::string choice_text(const ReportChoice& choice) {
+  return "  " + choice.choice + "   leaks " + fixed(100.0 * choice.leakage, 2) + " %, dark " +
+         fixed(100.0 * choice.dark_flux, 2) + " %, MAE " + fixed(choice.mae, 4) + ", " +
+         fixed(choice.hours, 2) + " h\n";
+}
+
+int compare(const OptionSet& options, const CamSettings& settings, const CamOptions& cam,
+            const Lens& lens, const Console& console) {
+  const CutChoices choices = parse_choices(settings.compare, "--compare");
+  const Executor executor = options.executor();
+  const WorkEstimate estimate =
+      require_room_for_comparison(lens, cam, choices, settings.folder(), executor.concurrency());
+  const InterruptWatch interrupt;
+  const OutputFolder folder(settings.folder(), FolderLock::Kind::kExclusive);
+  folder.remove_partial_files(is_name_of_cut);
+  announce_work(estimate, console, "the comparison takes");
+  ProgressDisplay progress(options.common().quiet);
+  const RunControl control(interrupt.token(), progress.sink());
+  const CutComparison result = compare_cuts(lens, cam, choices, folder.path(), executor, control);
+  nlohmann::json json = {{"command", "cam"},
+                         {"status", result.complete ? "done" : "interrupted"},
+                         {"options", options.used()},
+                         {"choices", nlohmann::json::array()},
+                         {"files", nlohmann::json::array()}};
+  std::string text = result.complete ? "finishing, least leakage first:\n" : "interrupted\n";
+  for (const ReportChoice& choice : result.ranking) {
+    json["choices"].push_back(choice_json(choice));
+    text += choice_text(choice);
+  }
+  if (!result.advice.empty()) {
+    json["advice"] = result.advice;
+    text += result.advice + "\n";
+  }
+  if (result.complete) json["files"].push_back(result.page.string());
+  console.result(json, text);
+  return result.complete ? kDone : kInterrupted;
+}
+
+nlohmann::json workshop_json(const Workshop& workshop) {
+  std::ostringstream text;
+  text << toml::json_formatter{parse_toml(workshop_toml(workshop), "workshop")};
+  return {{"command", "cam"}, {"workshop", nlohmann::json::parse(text.str())}};
+}
+
+}  // namespace
+
+int cam_command(const Arguments& command_line) {
+  CamSettings settings;
+  OptionSet options("cam",
+                    "Makes the programs that mill a lens and predicts what it will project.");
+  add_cam_options(options, settings);
+  options.parse(command_line);
+  const Console console(options.common().json, options.common().quiet);
+  const CamOptions& cam = settings.cam;
+  if (settings.show_workshop) {
+    settle(options, settings);
+    console.result(workshop_json(cam.workshop), workshop_toml(cam.workshop));
+    return kDone;
+  }
+  if (settings.source.empty()) {
+    throw InputError("DIR: is missing; name the lens folder, as in lensforge cam portrait");
+  }
+  std::optional<FolderLock> reading;
+  if (is_folder(settings.source)) {
+    reading.emplace(settings.source, FolderLock::Kind::kShared);
+  }
+  const Lens lens = read_lens(settings.source);
+  settle(options, settings);
+  validate(cam, lens.setup);
+  note_unfinished_design(lens, console);
+  if (!settings.compare.empty()) return compare(options, settings, cam, lens, console);
+  const CamResult result = run(options, cam, lens, settings.folder(), console);
+  for (const std::string& warning : result.report.warnings) console.note("warning: " + warning);
+  console.result(summary_json(options, result),
+                 result.done() ? summary_text(settings.folder(), result) : result.message + "\n");
+  return exit_code(result);
+}
+
+}  // namespace lensforge::app

@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "app/commands/coupon_command.h"
+
+#include <filesystem>
+#include <string>
+
+#include "app/frame/command_line.h"
+#include "app/frame/command_run.h"
+#include "app/frame/common_output.h"
+#include "app/frame/console.h"
+#include "app/frame/interrupt.h"
+#include "app/frame/option_set.h"
+#include "cam/coupon/coupon_job.h"
+#include "cam/coupon/fitted_workshop.h"
+#include "core/error.h"
+#include "core/text/number_text.h"
+
+namespace lensforge::app {
+
+void add_coupon_options(OptionSet& options, CouponSettings& settings) {
+  options.required_text("--out", settings.out, "DIR|FILE",
+                        "folder for program, sheet and file of readings; with --fit the workshop "
+                        "file to write");
+  options.text(
+      "--fit", settings.fit, "FILE.toml",
+      "fit the workshop to these readings of a coupon instead of making one: polish.sigma, "
+      "the finishing ball's diameter and finish.pitch_error");
+  options.text("--workshop", settings.workshop, "FILE.toml",
+               "the workshop that cuts the coupon; the fitted one differs from it in these values "
+               "only");
+  options.fields(coupon_fields(), settings.coupon);
+}
+
+void settle(const OptionSet& options, CouponSettings& settings) {
+  if (!settings.workshop.empty()) {
+    settings.workshop_text = read_toml_file(settings.workshop, "a workshop");
+    settings.coupon.workshop = parse_workshop(settings.workshop_text, settings.workshop);
+  }
+  if (settings.fit.empty()) return;
+  for (const OptionField<CouponOptions>& row : coupon_fields()) {
+    if (row.name != "--force" && options.given(row.name)) {
+      throw InputError(row.name + ": is for making a coupon, not for --fit");
+    }
+  }
+}
+
+namespace {
+
+namespace fs = std::filesystem;
+
+nlohmann::json value_json(const FittedValue& value) {
+  nlohmann::json json = {{"value", value.value}, {"determined", value.determined}};
+  if (value.determined) json["uncertainty"] = value.uncertainty;
+  return json;
+}
+
+nlohmann::json values_json(const CouponFit& fit) {
+  nlohmann::json json;
+  for (const FittedValue* value : {&fit.sigma, &fit.diameter, &fit.pitch_error}) {
+    json[value->key] = value_json(*value);
+  }
+  return json;
+}
+
+std::string value_text(const FittedValue& value) {
+  const std::string number = number_text(value.value, 5);
+  return "  " + value.key + std::string(20 - value.key.size(), ' ') +
+         (value.determined ? number + " ± " + number_text(value.uncertainty, 2)
+                           : number + ", not determined by these readings, as it was") +
+         "\n";
+}
+
+std::string reading_text(const FittedReading& reading) {
+  const std::string key =
+      reading.key + std::string(reading.key.size() < 24 ? 24 - reading.key.size() : 1, ' ');
+  return "  " + key + number_text(reading.value, 5) + ", fitted " + number_text(reading.fitted, 5) +
+         ", " + fixed(reading.deviation, 1) + " standard deviations off\n";
+}
+
+int fit(const OptionSet& options, const CouponSettings& settings) {
+  const Console console(options.common().json, options.common().quiet);
+  InterruptibleJob job(options.common(), settings.out);
+  const CouponFit result =
+      fit_workshop({settings.fit, settings.coupon.workshop, settings.workshop_text, settings.out,
+                    settings.coupon.force, [&] { job.begin_writing(); }});
+  nlohmann::json json = {{"command", "coupon"},
+                         {"status", "done"},
+                         {"options", options.used()},
+                         {"files", {settings.out}},
+                         {"fit", values_json(result)},
+                         {"chi_square", result.chi_square},
+                         {"degrees_of_freedom", result.freedom},
+                         {"readings", nlohmann::json::array()}};
+  std::string text = settings.out + ": the workshop as fitted\n" + value_text(result.sigma) +
+                     value_text(result.diameter) + value_text(result.pitch_error);
+  if (result.touch_off.determined) {
+    json["touch_off_mm"] = value_json(result.touch_off);
+    text += value_text(result.touch_off);
+  }
+  for (const FittedReading& reading : result.readings) {
+    json["readings"].push_back({{"key", reading.key},
+                                {"value", reading.value},
+                                {"fitted", reading.fitted},
+                                {"deviation", reading.deviation}});
+    text += reading_text(reading);
+  }
+  console.result(json, text + "  chi square " + fixed(result.chi_square, 1) + " for " +
+                           std::to_string(result.freedom) + " degrees of freedom\n");
+  return kDone;
+}
+
+std::string coupon_text(const CouponSettings& settings, const CouponResult& result) {
+  std::string text = settings.out + ": a coupon, " + fixed(result.minutes, 1) + " min\n";
+  for (const fs::path& file : result.files) text += "  " + file.filename().string() + "\n";
+  return text + "  what all its readings will tell:\n" + value_text(result.known.sigma) +
+         value_text(result.known.diameter) + value_text(result.known.pitch_error);
+}
+
+nlohmann::json coupon_json(const OptionSet& options, const CouponResult& result) {
+  nlohmann::json json = {{"command", "coupon"},
+                         {"status", result.done() ? "done" : "interrupted"},
+                         {"options", options.used()},
+                         {"files", nlohmann::json::array()},
+                         {"warnings", result.faults}};
+  for (const fs::path& file : result.files) json["files"].push_back(file.string());
+  if (!result.done()) return json;
+  json["minutes"] = result.minutes;
+  json["expected"] = values_json(result.known);
+  return json;
+}
+
+int make(const OptionSet& options, const CouponSettings& settings) {
+  const Console console(options.common().json, options.common().quiet);
+  validate(settings.coupon);
+  const InterruptWatch interrupt;
+  const OutputFolder folder(settings.out, FolderLock::Kind::kExclusive);
+  folder.remove_partial_files(is_name_of_coupon);
+  ProgressDisplay progress(options.common().quiet);
+  const RunControl control(interrupt.token(), progress.sink());
+  const CouponResult result =
+      make_coupon(settings.coupon, folder.path(), options.executor(), control);
+  for (const std::string& fault : result.faults) console.note("warning: " + fault);
+  console.result(coupon_json(options, result),
+                 result.done() ? coupon_text(settings, result) : "interrupted\n");
+  if (!result.done()) return kInterrupted;
+  return result.faults.empty() ? kDone : kLimitMissed;
+}
+
+}  // namespace
+
+int coupon_command(const Arguments& command_line) {
+  CouponSettings settings;
+  OptionSet options("coupon",
+                    "Makes a test piece that calibrates a workshop, or fits the workshop to it.");
+  add_coupon_options(options, settings);
+  options.parse(command_line);
+  settle(options, settings);
+  return settings.fit.empty() ? make(options, settings) : fit(options, settings);
+}
+
+}  // namespace lensforge::app

@@ -1,0 +1,676 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "app/commands/design_command.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <condition_variable>
+#include <cstdint>
+#include <exception>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <stop_token>
+#include <string>
+#include <string_view>
+#include <system_error>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "app/commands/overview.h"
+#include "app/frame/command_line.h"
+#include "app/frame/command_run.h"
+#include "app/frame/common_output.h"
+#include "app/frame/console.h"
+#include "app/frame/interrupt.h"
+#include "app/frame/option_set.h"
+#include "app/view/live_server.h"
+#include "cam/cam_fields.h"
+#include "cam/cam_job.h"
+#include "cam/tool/workshop.h"
+#include "core/compute/executor.h"
+#include "core/compute/work_estimate.h"
+#include "core/error.h"
+#include "core/image/image_io.h"
+#include "core/image/svg_drawing.h"
+#include "core/io/checkpoint_file.h"
+#include "core/io/files.h"
+#include "core/io/lens_folder.h"
+#include "core/io/output_guard.h"
+#include "core/io/pending_files.h"
+#include "core/optics/source_points.h"
+#include "core/page/html_text.h"
+#include "core/page/light_drawing.h"
+#include "core/surface/spline_file.h"
+#include "core/text/json_text.h"
+#include "core/text/printable.h"
+#include "core/text/version.h"
+#include "design/design_estimate.h"
+#include "design/design_fields.h"
+#include "design/design_lens.h"
+#include "design/front_setup.h"
+#include "design/light_setup.h"
+#include "design/mpi/session.h"
+#include "design/outline_setup.h"
+#include "design/schedule/design_task.h"
+#include "design/schedule/level_plan.h"
+#include "design/source_setup.h"
+
+namespace lensforge::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The rows of `cam` that say what is milled.
+const OptionTable<CamOptions>& part_fields() {
+  static const OptionTable<CamOptions> fields = [] {
+    OptionTable<CamOptions> rows;
+    for (const auto& row : cam_fields()) {
+      if (row.name == "--part" || row.name == "--shrinkage") rows.push_back(row);
+    }
+    return rows;
+  }();
+  return fields;
+}
+
+MadeBy process_of(const Workshop& shop, const DesignSettings& settings) {
+  const FinishProcess& finish = shop.process.finish;
+  const CamOptions& cut = settings.cut;
+  const MadeBy made{finish_pitch(finish, shop.tool(finish.tool).radius()),
+                    finish.along == PassAxis::kX,
+                    shop.polish.sigma,
+                    shop.polish.rim_depth,
+                    shop.polish.rim_length,
+                    settings.robust ? shop.tolerances.polish_sigma : 0.0};
+  return cut.part == PartKind::kMould ? made.cast(cut.shrinkage) : made;
+}
+
+/// @throw InputError unless nothing is said of how a part is made.
+void refuse_part_options(const OptionSet& options) {
+  if (options.given("--robust")) {
+    throw InputError("--robust: needs --made-by, which says how the part is made");
+  }
+  for (const auto& row : part_fields()) {
+    if (options.given(row.name)) {
+      throw InputError(row.name + ": needs --made-by, which says how the part is made");
+    }
+  }
+}
+
+void note_changes(DesignSettings& settings, const std::string& picture,
+                  const std::vector<std::string>& changes) {
+  for (const std::string& change : changes) settings.changes.push_back(picture + ": " + change);
+}
+
+/// A drawing has as many pixels as are asked for. @throw InputError naming a --pixels that would
+/// do.
+void require_wide_drawing(const Image& drawing, const DesignSettings& settings) {
+  const int shorter = std::min(drawing.columns(), drawing.rows());
+  if (shorter >= kMinPixels) return;
+  // The shorter side was rounded, up by a half at most, and will be rounded again.
+  const double least = (kMinPixels - 0.5) * settings.design.pixels / (shorter - 0.5);
+  const bool possible = least <= kMaxImageSide;
+  throw InputError(
+      settings.target + ": is " + size_text(drawing.columns(), drawing.rows()) +
+      " pixels with --pixels " + std::to_string(settings.design.pixels) +
+      "; its shorter side needs at least " + std::to_string(kMinPixels) +
+      (possible ? "; --pixels " + std::to_string(static_cast<int>(std::ceil(least))) + " would do"
+                : ": draw it less narrow"));
+}
+
+}  // namespace
+
+void add_design_options(OptionSet& options, DesignSettings& settings) {
+  options.positional("TARGET", settings.target,
+                     "picture to project: PNG, JPEG, TIFF, EXR, SVG, ...");
+  options.required_text("--out", settings.out, "DIR", "lens folder to write");
+  options.fields(design_fields(), settings.design);
+  options.fields(light_fields(), settings.design.light);
+  options.text("--source-picture", settings.source_picture, "FILE",
+               "picture of the lamp as seen from the lens, as wide as --source-angle or "
+               "--source-size; without it the lamp is an evenly lit disc");
+  options.text(
+      "--outline", settings.outline, "rectangle|circle|rounded:R|FILE",
+      "edge of the lens: the largest circle, corners of radius R, or the shape that is white "
+      "in a picture, seen from the cutter's side");
+  options.fields(background_fields(), settings.background);
+  options.fields(weight_fields(), settings.design.weights);
+  options.text("--made-by", settings.made_by, "default|FILE.toml",
+               "shape the part that this workshop cuts and polishes, not the surface alone");
+  options.flag("--robust", settings.robust,
+               "with --made-by: right on average over parts that are polished less and more by the "
+               "workshop's tolerances.polish_sigma; takes twice as long");
+  options.fields(part_fields(), settings.cut);
+  options.text("--live", settings.live, "PORT",
+               "serve a page that shows the design while it runs, to browsers on this machine; 0 "
+               "takes a free port");
+  options.flag("--resume", settings.resume,
+               "continue the interrupted design in --out, with the same picture and options");
+  options.flag("--force", settings.force, "replace the design that --out holds");
+}
+
+LoadedImage read_target(const DesignSettings& settings, const RunControl& control) {
+  LoadedImage loaded =
+      read_image(settings.target, control, settings.design.pixels, settings.background);
+  if (control.stop_requested()) throw Interrupted();
+  std::ifstream file = open_input(settings.target);
+  if (is_svg(file)) require_wide_drawing(loaded.image, settings);
+  return loaded;
+}
+
+void settle(OptionSet& options, DesignSettings& settings, const Image& picture,
+            const RunControl& control) {
+  const int longer = std::max(picture.columns(), picture.rows());
+  if (longer < kMinPixels) {
+    throw InputError(settings.target + ": has " + size_text(picture.columns(), picture.rows()) +
+                     " pixels; its longer side needs at least " + std::to_string(kMinPixels));
+  }
+  if (!(picture.total() > 0.0)) {
+    throw InputError(settings.target +
+                     ": is black all over: there is no light to place; use a picture with some");
+  }
+  Workshop workshop;
+  if (settings.made_by.empty()) {
+    refuse_part_options(options);
+    if (!options.given("--model")) {
+      const int pixels = std::min(settings.design.pixels, longer);
+      settings.design.model =
+          default_model(working_size(picture.columns(), picture.rows(), pixels), settings.design);
+    }
+  } else {
+    if (options.given("--model") && settings.design.model != SurfaceModel::kSpline) {
+      throw InputError("--made-by " + settings.made_by + ": needs --model spline, not " +
+                       model_name(settings.design.model));
+    }
+    settings.design.model = SurfaceModel::kSpline;
+    if (settings.made_by != "default") workshop = read_workshop(settings.made_by);
+  }
+  settings.design = default_design_options(settings.design.model, picture);
+  options.restate();
+  if (!settings.source_picture.empty()) {
+    const LoadedImage shape =
+        read_image(settings.source_picture, control, kDrawnSide, settings.background);
+    note_changes(settings, "--source-picture " + settings.source_picture, shape.changes);
+    settings.design.light.source_shape = shape_of(shape.image);
+  }
+  LightOptions& light = settings.design.light;
+  if (!light.front_file.empty()) light.front_heights = front_from(light.front_file, control);
+  if (!settings.outline.empty()) {
+    OutlineChoice choice = outline_from(settings.outline, settings.background, control);
+    note_changes(settings, "--outline " + settings.outline, choice.changes);
+    settings.design.outline = std::move(choice.outline);
+  }
+  if (!settings.made_by.empty()) settings.design.made_by = process_of(workshop, settings);
+  validate(settings.design, picture);
+}
+
+namespace {
+
+/// A lens.json is a few kilobytes.
+constexpr std::uintmax_t kMaxJson = 1 << 20;
+
+/// Whether lensforge wrote this file of a lens folder, by what it says of itself.
+bool is_own(const fs::path& path) {
+  std::error_code ignored;
+  if (fs::file_size(path, ignored) == 0) return true;
+  if (path.filename() == lens_file::kConvergence) {
+    return file_starts_with(path, convergence_csv({}));
+  }
+  if (path.filename() == lens_file::kSpline) return is_spline_file(path);
+  return written_by_lensforge(path);
+}
+
+/// Null where the file cannot be understood: whoever needs it says so.
+nlohmann::json provenance_of(const fs::path& json) {
+  const std::string text = read_whole_file(json, kMaxJson);
+  try {
+    const nlohmann::json document = parse_json(text, json.string());
+    return document.is_object() ? document.value("provenance", nlohmann::json()) : nlohmann::json();
+  } catch (const InputError&) {
+    return nullptr;
+  }
+}
+
+[[noreturn]] void refuse(const fs::path& folder, const std::string& holds) {
+  throw InputError("--out " + folder.string() + ": holds " + holds);
+}
+
+/// What no option lets a design replace.
+void require_files(const fs::path& folder) {
+  for (const char* name : lens_file::kAll) {
+    std::error_code ignored;
+    const fs::file_status status = fs::status(folder / name, ignored);
+    if (!fs::exists(status) || fs::is_regular_file(status)) continue;
+    refuse(folder, std::string(name) + ", which is no regular file; choose another folder");
+  }
+}
+
+}  // namespace
+
+EarlierDesign EarlierDesign::in(const fs::path& folder) {
+  std::error_code ignored;
+  EarlierDesign earlier;
+  for (const char* name : lens_file::kAll) {
+    const fs::path path = folder / name;
+    if (!fs::is_regular_file(path, ignored)) continue;
+    if (name == std::string_view(lens_file::kJson)) {
+      earlier.lens = true;
+      earlier.provenance = provenance_of(path);
+    } else if (name == std::string_view(lens_file::kCheckpoint)) {
+      earlier.checkpoint = true;
+    } else if (!is_own(path)) {
+      earlier.foreign.emplace_back(name);
+    }
+  }
+  return earlier;
+}
+
+bool EarlierDesign::is_of(const std::string& fingerprint) const {
+  return provenance.is_object() && provenance.value("fingerprint", nlohmann::json()) == fingerprint;
+}
+
+void refuse_to_overwrite(const fs::path& folder, const EarlierDesign& earlier, bool resume,
+                         bool force) {
+  require_files(folder);
+  if (force || (resume && earlier.lens)) return;
+  if (!resume && (earlier.lens || earlier.checkpoint)) {
+    refuse(folder, std::string(earlier.lens ? "a lens" : "an unfinished design") +
+                       " already; choose another folder, go on with --resume or replace it with "
+                       "--force");
+  }
+  if (earlier.foreign.empty()) return;
+  refuse(folder, earlier.foreign.front() +
+                     " already, which lensforge did not write; choose another folder or replace "
+                     "it with --force");
+}
+
+namespace {
+
+/// @throw InputError if the finished lens that --resume meets is not what the same picture and
+///        options give, or its design was never finished and its checkpoint is gone.
+/// @pre earlier.lens && !earlier.checkpoint
+void require_finished(const fs::path& folder, const EarlierDesign& earlier,
+                      const std::string& fingerprint) {
+  if (!earlier.provenance.is_object()) refuse(folder, "a lens.json that cannot be understood");
+  if (earlier.provenance.value("status", nlohmann::json()) == "interrupted") {
+    refuse(folder, std::string("an unfinished design whose ") + lens_file::kCheckpoint +
+                       " is missing: nothing to resume; start again with --force");
+  }
+  if (earlier.provenance.contains("fingerprint") && !earlier.is_of(fingerprint)) {
+    refuse(folder,
+           "the finished lens of another picture or other options: there is nothing to resume; "
+           "choose another folder or replace it with --force");
+  }
+}
+
+std::string picture_bytes(const Image& image) {
+  const std::vector<unsigned char> png = encode_png(grey_picture(image));
+  return {png.begin(), png.end()};
+}
+
+/// The port that --live names. @throw InputError unless it is a whole number from 0 to 65535.
+int live_port(const std::string& text) {
+  constexpr int kLargest = 65535;
+  int port = -1;
+  const char* const end = text.data() + text.size();
+  const auto [stop, error] = std::from_chars(text.data(), end, port);
+  if (error == std::errc() && stop == end && port >= 0 && port <= kLargest) return port;
+  throw InputError("--live " + printable_line(text) +
+                   ": must be a port, 1 to 65535, or 0 for a free one; 8080 would do");
+}
+
+/// Shows a running design to browsers on this machine. A thread of its own looks at what the design
+/// has saved after every round.
+class LiveDesign {
+ public:
+  /// @param port  0 takes a free one. @throw InputError if it cannot be had.
+  LiveDesign(int port, const std::string& name, std::filesystem::path checkpoint,
+             DesignGoalView goal);
+  ~LiveDesign();
+  LiveDesign(const LiveDesign&) = delete;
+  LiveDesign& operator=(const LiveDesign&) = delete;
+
+  [[nodiscard]] std::string address() const { return server_.address(); }
+  /// Something may have been saved. Returns at once.
+  void look();
+
+ private:
+  void watch(const std::stop_token& stop);
+
+  std::filesystem::path checkpoint_;
+  DesignGoalView goal_;
+  LiveServer server_;
+  std::mutex mutex_;
+  std::condition_variable_any wake_;
+  bool asked_ = false;
+  std::jthread watcher_;  ///< Last, so that it ends first.
+};
+
+LiveDesign::LiveDesign(int port, const std::string& name, fs::path checkpoint, DesignGoalView goal)
+    : checkpoint_(std::move(checkpoint)),
+      goal_(std::move(goal)),
+      server_(port, name, picture_bytes(goal_.target), [] { InterruptWatch::interrupt(); }),
+      watcher_([this](const std::stop_token& stop) { watch(stop); }) {}
+
+LiveDesign::~LiveDesign() {
+  watcher_.request_stop();
+  watcher_.join();
+}
+
+void LiveDesign::look() {
+  {
+    const std::lock_guard lock(mutex_);
+    asked_ = true;
+  }
+  wake_.notify_one();
+}
+
+void LiveDesign::watch(const std::stop_token& stop) {
+  fs::file_time_type seen = fs::file_time_type::min();
+  const Executor executor = Executor::cpu(1).with_stop(stop);
+  for (std::int64_t number = 1; !stop.stop_requested();) {
+    {
+      std::unique_lock lock(mutex_);
+      if (!wake_.wait(lock, stop, [this] { return asked_; })) return;
+      asked_ = false;
+    }
+    std::error_code none;
+    const fs::file_time_type saved = fs::last_write_time(checkpoint_, none);
+    if (none || saved == seen) continue;
+    seen = saved;
+    try {
+      server_.publish(state_of_design(checkpoint_, goal_, number, executor));
+      ++number;
+    } catch (const std::exception&) {
+      // The design itself says what is wrong with its checkpoint, and ends where it cannot go on.
+    }
+  }
+}
+
+/// How nearly the picture under an extended source is known.
+nlohmann::json source_json(const SourceCheck& source) {
+  return {{"blur_pixels", source.blur},
+          {"points", source.points},
+          {"halving_mae", source.halving},
+          {"convolution_mae", source.convolution}};
+}
+
+/// How far the colours of the light land apart, mm.
+nlohmann::json fringe_json(const Fringe& fringe) {
+  return {{"mean", fringe.mean}, {"max", fringe.max}};
+}
+
+/// The process that a design is for and what comes out of it.
+nlohmann::json made_json(const MadeBy& process, const DesignResult::Made& made) {
+  return {{"pitch_mm", process.pitch},
+          {"along", process.rows_along_x ? "x" : "y"},
+          {"polish_sigma_mm", process.polish_sigma},
+          {"rim_depth_mm", process.rim_depth},
+          {"rim_length_mm", process.rim_length},
+          {"polish_spread", process.polish_spread},
+          {"metrics", metrics_json(made.metrics)}};
+}
+
+}  // namespace
+
+nlohmann::json design_provenance(const OptionSet& options, const ChosenDevice& device,
+                                 const DesignOptions& design, const DesignResult& result) {
+  const bool done = result.status == DesignResult::Status::kDone;
+  nlohmann::json fields = {
+      {"program", program_mark()},
+      {"options", options.used()},
+      {"seconds", result.convergence.empty() ? 0.0 : result.convergence.back().seconds},
+      {"device", device.word},
+      {"threads", device.executor.concurrency()},
+      {"status", done ? "done" : "interrupted"},
+      {"message", result.message},
+      {"fingerprint", fingerprint_text(result.fingerprint)}};
+  if (result.source) fields["source_check"] = source_json(*result.source);
+  if (result.colors) fields["fringe_mm"] = fringe_json(result.colors->fringe);
+  if (result.made) fields["made_by"] = made_json(*design.made_by, *result.made);
+  return fields;
+}
+
+void write_design(const fs::path& folder, const DesignResult& result, const Console& console) {
+  PendingFiles files(folder);
+  files.add(lens_file::kConvergence, convergence_csv(result.convergence));
+  const Image* const made = result.made ? &result.made->picture : nullptr;
+  files.add(lens_file::kOverview,
+            [&](const fs::path& beside) { write_image(draw_overview(result.lens, made), beside); });
+  files.add(lens_file::kSetup,
+            light_drawing_file(result.lens.setup, result.lens.surface.vertices.row(2).maxCoeff()));
+  if (result.colors) {
+    files.add(lens_file::kRenderColor,
+              [&](const fs::path& beside) { write_image(result.colors->picture, beside); });
+  }
+  write_lens(result.lens, std::move(files));
+  std::error_code ignored;
+  if (!result.colors) fs::remove(folder / lens_file::kRenderColor, ignored);
+  const fs::path cut = folder / lens_file::kCut;
+  if (!fs::is_directory(cut, ignored)) return;
+  remove_cut(cut);
+  if (!fs::remove(cut, ignored)) {
+    console.note(cut.string() + ": holds files that lensforge did not write; they are kept");
+  }
+}
+
+namespace {
+
+/// Everything that was changed about the picture, in words.
+std::vector<std::string> changes_made(const LoadedImage& loaded, const DesignSettings& settings) {
+  std::vector<std::string> changes;
+  for (const std::string& change : loaded.changes) {
+    changes.push_back(settings.target + ": " + change);
+  }
+  changes.insert(changes.end(), settings.changes.begin(), settings.changes.end());
+  const Image& picture = loaded.image;
+  if (settings.design.pixels < std::max(picture.columns(), picture.rows())) {
+    changes.push_back(settings.target + ": " + size_text(picture.columns(), picture.rows()) +
+                      " pixels resampled to " + std::to_string(settings.design.pixels) +
+                      " on the longer side");
+  }
+  return changes;
+}
+
+/// Says so where the source hides the picture's finest detail.
+void note_source(const Image& picture, const DesignOptions& design, const Console& console) {
+  const Eigen::Vector2i pixels = working_size(picture.columns(), picture.rows(), design.pixels);
+  const double blur = source_blur(optical_setup(design, pixels), design.thickness);
+  if (!(blur > 1.0)) return;
+  console.note("the source's image is " + fixed(blur, 1) +
+               " pixels wide: no lens shows finer detail in this light");
+}
+
+nlohmann::json summary_json(const fs::path& folder, const DesignResult& result) {
+  const Lens& lens = result.lens;
+  nlohmann::json summary = {{"command", "design"},
+                            {"out", folder.string()},
+                            {"status", lens.provenance["status"]},
+                            {"message", result.message},
+                            {"pixels", {lens.setup.pixels.x(), lens.setup.pixels.y()}},
+                            {"grid", {lens.surface.grid.columns, lens.surface.grid.rows}},
+                            {"lens_size", {lens.setup.lens_size.x(), lens.setup.lens_size.y()}},
+                            {"metrics", metrics_json(lens)},
+                            {"iterations", result.convergence.size()},
+                            {"seconds", lens.provenance["seconds"]}};
+  if (result.source) summary["source_check"] = source_json(*result.source);
+  if (result.colors) summary["fringe_mm"] = fringe_json(result.colors->fringe);
+  if (result.made) summary["made"] = metrics_json(result.made->metrics);
+  return summary;
+}
+
+std::string summary_text(const fs::path& folder, const DesignResult& result) {
+  const Lens& lens = result.lens;
+  return folder.string() + ": " + result.message + "\n" +  //
+         metrics_text(lens) +                              //
+         (result.colors ? fringe_text(result.colors->fringe) : "") +
+         (result.made ? "  made    " + metrics_text(result.made->metrics) + "\n" : "") + "  " +
+         size_text(lens.setup.pixels.x(), lens.setup.pixels.y()) + " pixels, " +
+         std::to_string(lens.surface.vertex_count()) + " vertices, " +
+         fixed(lens.provenance["seconds"].get<double>(), 1) + " s\n";
+}
+
+/// Stores what came out and says so. An earlier lens of another design stays until this one is
+/// done. @return the exit code.
+int finish(const OptionSet& options, const ChosenDevice& device, const DesignOptions& design,
+           const OutputFolder& folder, DesignResult& result) {
+  const Console console(options.common().json, options.common().quiet);
+  const bool done = result.status == DesignResult::Status::kDone;
+  result.lens.provenance = design_provenance(options, device, design, result);
+  const EarlierDesign earlier = EarlierDesign::in(folder.path());
+  const bool replaces = earlier.lens && !earlier.is_of(fingerprint_text(result.fingerprint));
+  const bool keeps = replaces && !done;
+  if (result.lens.surface.triangle_count() > 0 && !keeps) {
+    write_design(folder.path(), result, console);
+  }
+  std::error_code ignored;
+  if (done) fs::remove(folder.path() / lens_file::kCheckpoint, ignored);
+  console.result(summary_json(folder.path(), result), summary_text(folder.path(), result));
+  if (keeps) {
+    console.note(folder.path().string() + " keeps its earlier lens until the new one is done");
+  }
+  if (!done) console.note("interrupted; run the same command with --resume to continue");
+  return done ? kDone : kInterrupted;
+}
+
+int report_finished(const DesignSettings& settings, const Console& console) {
+  console.result({{"command", "design"}, {"out", settings.out}, {"status", "done"}},
+                 settings.out + ": the design is finished, there is nothing to resume\n");
+  return kDone;
+}
+
+/// The page of the design, if one is asked for.
+std::unique_ptr<LiveDesign> live_page(const DesignSettings& settings, const Image& picture,
+                                      const Console& console) {
+  if (settings.live.empty()) return nullptr;
+  const DesignOptions& design = settings.design;
+  Image target = working_picture(picture, design, {});
+  const OpticalSetup setup = optical_setup(design, {target.columns(), target.rows()});
+  auto page = std::make_unique<LiveDesign>(
+      live_port(settings.live), fs::path(settings.out).filename().string(), design.checkpoint,
+      DesignGoalView{std::move(target), setup, design.model});
+  console.note("the design is shown at " + page->address());
+  return page;
+}
+
+/// Who is told while a design runs.
+struct DesignWatchers {
+  /// Once, as soon as the library has accepted all its input: what no lens can do is only known
+  /// after the first transport, before any share of the work is done.
+  std::function<void()> begin;
+  std::function<void()> look;  ///< Whenever there may be something to see.
+};
+
+/// Runs the design.
+DesignResult shape(bool quiet, const Executor& executor, const DesignOptions& design,
+                   const Image& target, const std::stop_token& stop,
+                   const DesignWatchers& watchers) {
+  std::once_flag begun;
+  ProgressDisplay progress(quiet);
+  const auto show = progress.sink();
+  const RunControl control(stop, [&](const Progress& p) {
+    if (p.done > 0.0) {
+      std::call_once(begun, [&] {
+        progress.wipe();
+        watchers.begin();
+      });
+    }
+    if (show) show(p);
+    watchers.look();
+  });
+  DesignResult result = design_lens(target, design, executor, control);
+  if (result.status != DesignResult::Status::kInterrupted) std::call_once(begun, watchers.begin);
+  return result;
+}
+
+bool is_of_lens(const std::string& name) {
+  return name == lens_file::kStaging ||
+         std::find(lens_file::kAll.begin(), lens_file::kAll.end(), name) != lens_file::kAll.end();
+}
+
+/// Reads target, source's shape, front and outline. Nothing is written yet.
+LoadedImage read_pictures(OptionSet& options, DesignSettings& settings) {
+  InterruptibleJob job(options.common());
+  LoadedImage loaded = read_target(settings, job.control());
+  settle(options, settings, loaded.image, job.control());
+  return loaded;
+}
+
+/// @throw InputError where mpirun has started several processes for what one process does alone.
+void refuse_splines_on_ranks(const DesignOptions& design) {
+  if (design.model != SurfaceModel::kSpline || rank_count() == 1) return;
+  throw InputError(
+      "--model spline (the default) and --made-by: designed in one process; with mpirun give "
+      "--model smooth or facet");
+}
+
+int run(OptionSet& options, DesignSettings& settings) {
+  const Console console(options.common().json, options.common().quiet);
+  const EarlierDesign earlier = EarlierDesign::in(settings.out);
+  if (!settings.live.empty()) live_port(settings.live);
+  refuse_to_overwrite(settings.out, earlier, settings.resume, settings.force);
+  const LoadedImage loaded = read_pictures(options, settings);
+  const InterruptWatch interrupt;
+  DesignOptions& design = settings.design;
+  refuse_splines_on_ranks(design);
+  if (settings.resume && earlier.lens && !earlier.checkpoint) {
+    require_finished(settings.out, earlier,
+                     fingerprint_text(design_identity(loaded.image, design)));
+    return report_finished(settings, console);
+  }
+  design.checkpoint = fs::path(settings.out) / lens_file::kCheckpoint;
+  const std::unique_ptr<LiveDesign> page = live_page(settings, loaded.image, console);
+  const ChosenDevice device = options.device_executor();
+  const OutputFolder folder(settings.out, FolderLock::Kind::kExclusive);
+  if (EarlierDesign::in(settings.out) != earlier) {
+    throw InputError("--out " + settings.out +
+                     ": another command has changed what is in it; run the command again");
+  }
+  const WorkEstimate expected =
+      require_room_for_design(loaded.image.columns(), loaded.image.rows(), design,
+                              device.executor.concurrency() * rank_count(), settings.out,
+                              static_cast<double>(ranks_here()) / rank_count());
+  design.resume = settings.resume && earlier.checkpoint;
+  if (expected.seconds > kWorthTelling) console.note("takes " + estimate_words(expected));
+  const auto begin = [&] {
+    console.begin();
+    folder.remove_partial_files(is_of_lens);
+    if (device.executor.device() != Device::kCpu) {
+      const bool spline = design.model == SurfaceModel::kSpline;
+      console.note("computing on " + device.word +
+                   (spline ? "; the spline on the processor, unlike --model smooth or facet" : ""));
+    }
+    for (const std::string& change : changes_made(loaded, settings)) console.note(change);
+    note_source(loaded.image, design, console);
+    // A design that was killed before its first checkpoint starts at the beginning.
+    if (settings.resume && !design.resume) {
+      console.note("nothing to resume: started the design from the beginning");
+    }
+  };
+  const auto look = [&page] {
+    if (page) page->look();
+  };
+  DesignResult result = shape(options.common().quiet, device.executor, design, loaded.image,
+                              interrupt.token(), {begin, look});
+  return finish(options, device, design, folder, result);
+}
+
+}  // namespace
+
+int design_command(const Arguments& command_line) {
+  DesignSettings settings;
+  OptionSet options("design", "Shapes a lens that projects a picture.");
+  add_design_options(options, settings);
+  options.parse(command_line);
+  try {
+    return run(options, settings);
+  } catch (const Interrupted&) {
+    // While the picture was read: later the design ends with what it has.
+    return report_error("interrupted; nothing was written", kInterrupted, options.common().json);
+  }
+}
+
+}  // namespace lensforge::app

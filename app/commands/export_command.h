@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "app/frame/option_set.h"
+#include "export/export.h"
+
+namespace lensforge::app {
+
+/// What `lensforge export` was asked for.
+struct ExportSettings {
+  std::string source;
+  std::string out;
+  ExportSurface surface = ExportSurface::kDesigned;
+  ExportOptions options;
+};
+
+/// Adds every option of the command.
+void add_export_options(OptionSet& options, ExportSettings& settings);
+
+/// @throw InputError naming an option that was given though the format has no use for it.
+void require_fitting_options(const OptionSet& options, ExportFormat format);
+
+/// What an export says of what it wrote, for programs and for people.
+struct ExportReport {
+  nlohmann::json json;
+  std::string text;
+};
+
+ExportReport export_report(const ExportResult& result);
+
+}  // namespace lensforge::app

@@ -1,0 +1,236 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "app/commands/reflect_command.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <stop_token>
+#include <string>
+#include <system_error>
+#include <utility>
+
+#include "app/frame/command_line.h"
+#include "app/frame/command_run.h"
+#include "app/frame/common_output.h"
+#include "app/frame/console.h"
+#include "app/frame/interrupt.h"
+#include "app/frame/option_set.h"
+#include "core/error.h"
+#include "core/surface/mesh_io.h"
+#include "core/text/number_text.h"
+#include "design/reflect/reflect_checkpoint.h"
+#include "design/reflect/reflect_job.h"
+#include "export/solid/solid_reading.h"
+
+namespace lensforge::app {
+
+void add_reflect_options(OptionSet& options, ReflectSettings& settings) {
+  options.positional("MESH", settings.mesh,
+                     "shape: .stl, .obj, .ply, .off; solid: .step, .stp; z is up");
+  options.text("--out", settings.out, "DIR", "folder for the new shape, its pictures and figures");
+  options.flag("--evaluate", settings.evaluate,
+               "print the reflected energies of the mesh as it is and write nothing");
+  options.flag("--resume", settings.resume,
+               "continue the interrupted run in --out, with the same mesh and options");
+  options.fields(reflect::reflect_fields(), settings.reflect);
+}
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Nothing is written yet: a remeshing, which does not look at the stop token, is left behind with
+/// the process.
+reflect::ReflectInput prepared(const ReflectSettings& settings, const CommonOptions& common) {
+  InterruptibleJob job(common);
+  const RunControl control = job.control();
+  control.report({"reflect, reading the mesh", 0.0, 0.0, ""});
+  const SurfaceMesh mesh = is_step_file(settings.mesh) ? read_solid_mesh(settings.mesh, control)
+                                                       : read_mesh(settings.mesh);
+  control.report({settings.reflect.faces > 0 ? "reflect, remeshing" : "reflect, repairing the mesh",
+                  0.0, 0.0, ""});
+  reflect::ReflectInput input = reflect::prepared_input(mesh, settings.mesh, settings.reflect);
+  if (control.stop_requested()) throw Interrupted();
+  return input;
+}
+
+reflect::ReflectInput load(const ReflectSettings& settings, const CommonOptions& common,
+                           const Console& console) {
+  reflect::ReflectInput input = prepared(settings, common);
+  for (const std::string& change : input.changes) console.note(settings.mesh + ": " + change);
+  return input;
+}
+
+nlohmann::json evaluated(const OptionSet& options, const ReflectSettings& settings,
+                         const SurfaceMesh& mesh, const Executor& executor) {
+  const reflect::Energies energies = reflect::evaluate(mesh, settings.reflect, executor);
+  nlohmann::json json = {{"command", "reflect"},
+                         {"mesh", settings.mesh},
+                         {"options", options.used()},
+                         {"energy_direct", energies.direct},
+                         {"energy", energies.total}};
+  const double ghz = settings.reflect.radar_ghz;
+  if (ghz > 0.0) {
+    const reflect::RadarComparison radar = reflect::compare_radar(mesh, mesh, ghz, executor);
+    json["radar"] = {{"ghz", ghz}, {"mean_dbsm", reflect::mean_dbsm(radar.before)}};
+  }
+  return json;
+}
+
+int evaluate(const OptionSet& options, const ReflectSettings& settings) {
+  const Console console(options.common().json, options.common().quiet);
+  const reflect::ReflectInput input = load(settings, options.common(), console);
+  InterruptibleJob job(options.common());
+  job.control().report({"reflect, evaluating", 0.0, 0.0, ""});
+  const nlohmann::json json =
+      evaluated(options, settings, input.mesh, job.stoppable(options.executor()));
+  std::string text = settings.mesh + "\n  energy of one reflection " +
+                     number_text(json["energy_direct"]) + ", of one and two " +
+                     number_text(json["energy"]) + "\n";
+  if (json.contains("radar")) {
+    text += "  radar cross-section around the horizon " + fixed(json["radar"]["mean_dbsm"], 1) +
+            " dBsm on average\n";
+  }
+  console.result(json, text);
+  return kDone;
+}
+
+std::string percent(double share, int digits) { return fixed(100.0 * share, digits) + " %"; }
+
+std::string radar_text(const reflect::ReflectResult& result) {
+  if (!result.radar) return "";
+  return "  radar cross-section around the horizon " +
+         fixed(reflect::mean_dbsm(result.radar->before), 1) + " -> " +
+         fixed(reflect::mean_dbsm(result.radar->after), 1) + " dBsm on average\n";
+}
+
+std::string result_text(const ReflectSettings& settings, const reflect::ReflectResult& result) {
+  if (!result.done()) {
+    return settings.out + ": interrupted after " + std::to_string(result.updates.size()) +
+           " updates\n";
+  }
+  return settings.out + ": " + std::to_string(result.updates.size()) + " updates in " +
+         fixed(result.seconds, 1) + " s\n  energy " + number_text(result.before.total, 4) + " -> " +
+         number_text(result.after.total, 4) + " (" +
+         percent(result.after.total / result.before.total, 1) + "), of one reflection " +
+         number_text(result.before.direct, 4) + " -> " + number_text(result.after.direct, 4) +
+         "\n  vertices moved by " + percent(result.mean_displacement, 2) +
+         " of the diagonal on average, by " + percent(result.max_displacement, 2) + " at most\n" +
+         radar_text(result);
+}
+
+bool is_of_result(const std::string& name) {
+  const auto& all = reflect::reflect_file::kAll;
+  return name == reflect::reflect_file::kCheckpoint ||
+         std::find(all.begin(), all.end(), name) != all.end();
+}
+
+/// @throw InputError if the folder holds an unfinished run, which nobody says may go or go on.
+void require_no_unfinished_run(const ReflectSettings& settings) {
+  std::error_code ignored;
+  if (fs::exists(fs::path(settings.out) / reflect::reflect_file::kCheckpoint, ignored) &&
+      !settings.resume && !settings.reflect.force) {
+    throw InputError("--out " + settings.out +
+                     ": holds an unfinished run already; choose another folder, go on with "
+                     "--resume or replace it with --force");
+  }
+}
+
+/// A damaged checkpoint is refused before the mesh is remeshed, which may take minutes.
+void require_readable_checkpoint(const ReflectSettings& settings) {
+  const fs::path checkpoint = fs::path(settings.out) / reflect::reflect_file::kCheckpoint;
+  std::error_code ignored;
+  if (settings.resume && fs::exists(checkpoint, ignored)) reflect::read_checkpoint(checkpoint);
+}
+
+/// Sets where checkpoints go and whether the run goes on from one. @return false if the run has
+/// ended before and there is nothing left to do.
+bool settle_checkpoint(ReflectSettings& settings, const reflect::ReflectInput& input,
+                       const OutputFolder& folder, const Console& console) {
+  reflect::ReflectOptions& options = settings.reflect;
+  options.checkpoint = folder.path() / reflect::reflect_file::kCheckpoint;
+  std::error_code ignored;
+  const bool unfinished = fs::exists(options.checkpoint, ignored);
+  options.resume = settings.resume && unfinished;
+  if (unfinished && !options.resume) fs::remove(options.checkpoint, ignored);
+  if (!settings.resume || unfinished) return true;
+  if (reflect::holds_result(folder.path(), reflect::reflect_fingerprint(input, options))) {
+    return false;
+  }
+  console.note("nothing to resume: started from the beginning");
+  return true;
+}
+
+int report_finished(const ReflectSettings& settings, const Console& console) {
+  console.result({{"command", "reflect"}, {"out", settings.out}, {"status", "done"}},
+                 settings.out + ": the run is finished, there is nothing to resume\n");
+  return kDone;
+}
+
+/// Runs the shape. What speaks against it is known before its first update.
+reflect::ReflectResult reflected(const reflect::ReflectInput& input,
+                                 const ReflectSettings& settings, const OptionSet& options,
+                                 const std::stop_token& stop, const Console& console) {
+  ProgressDisplay progress(options.common().quiet);
+  const auto show = progress.sink();
+  const RunControl control(stop, [&, begun = false](const Progress& p) mutable {
+    if (!std::exchange(begun, true)) {
+      progress.wipe();
+      console.begin();
+    }
+    if (show) show(p);
+  });
+  return reflect::reflect_shape(input, settings.reflect, options.executor(), control);
+}
+
+int shape(const OptionSet& options, ReflectSettings& settings) {
+  const Console console(options.common().json, options.common().quiet);
+  require_no_unfinished_run(settings);
+  require_readable_checkpoint(settings);
+  const reflect::ReflectInput input = load(settings, options.common(), console);
+  const InterruptWatch interrupt;
+  const OutputFolder folder(settings.out, FolderLock::Kind::kExclusive);
+  reflect::require_replaceable_result(folder.path(), settings.reflect.force);
+  folder.remove_partial_files(is_of_result);
+  if (!settle_checkpoint(settings, input, folder, console)) {
+    return report_finished(settings, console);
+  }
+  const reflect::ReflectResult result =
+      reflected(input, settings, options, interrupt.token(), console);
+  nlohmann::json json = reflect::result_json(result, settings.reflect);
+  json["command"] = "reflect";
+  json["files"] = nlohmann::json::array();
+  for (const fs::path& file :
+       reflect::write_result(result, settings.reflect, folder.path(), options.executor())) {
+    json["files"].push_back(file.string());
+  }
+  std::error_code ignored;
+  if (result.done()) fs::remove(settings.reflect.checkpoint, ignored);
+  for (const std::string& unmet : result.unmet) console.note("warning: " + unmet);
+  console.result(json, result_text(settings, result));
+  if (!result.done()) {
+    console.note("interrupted; run the same command with --resume to continue");
+    return kInterrupted;
+  }
+  return result.unmet.empty() ? kDone : kLimitMissed;
+}
+
+}  // namespace
+
+int reflect_command(const Arguments& command_line) {
+  ReflectSettings settings;
+  OptionSet options("reflect", "Deforms a mesh so that it reflects light as wanted.");
+  add_reflect_options(options, settings);
+  options.parse(command_line);
+  reflect::validate(settings.reflect);
+  if (!settings.evaluate && settings.out.empty()) {
+    throw InputError("--out: is missing; --out DIR writes a new shape, --evaluate only energies");
+  }
+  try {
+    return settings.evaluate ? evaluate(options, settings) : shape(options, settings);
+  } catch (const Interrupted&) {
+    // Before the first update: later a run ends with what it has.
+    return report_interrupted(options.common().json);
+  }
+}
+
+}  // namespace lensforge::app

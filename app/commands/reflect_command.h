@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <string>
+
+#include "app/frame/option_set.h"
+#include "design/reflect/reflect_options.h"
+
+namespace lensforge::app {
+
+/// What `lensforge reflect` was asked for.
+struct ReflectSettings {
+  std::string mesh;  ///< File to read.
+  std::string out;   ///< Folder; empty with `evaluate`.
+  bool evaluate = false;
+  bool resume = false;
+  reflect::ReflectOptions reflect;
+};
+
+/// Adds every option of the command.
+void add_reflect_options(OptionSet& options, ReflectSettings& settings);
+
+}  // namespace lensforge::app

@@ -1,0 +1,316 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <optional>
+
+#include "app/frame/command_line.h"
+#include "app/frame/command_run.h"
+#include "app/frame/common_output.h"
+#include "app/frame/console.h"
+#include "app/frame/option_set.h"
+#include "core/error.h"
+#include "core/image/image_io.h"
+#include "core/image/spectral_color.h"
+#include "core/io/files.h"
+#include "core/io/output_guard.h"
+#include "core/optics/light_colors.h"
+#include "core/surface/lens.h"
+#include "core/surface/mesh_io.h"
+#include "core/surface/mesh_normals.h"
+#include "design/design_estimate.h"
+#include "design/fringe.h"
+#include "design/render_fields.h"
+#include "design/render_lens.h"
+#include "design/render_setup.h"
+#include "export/solid/solid_reading.h"
+
+namespace lensforge::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct RenderArguments {
+  std::string source;
+  std::string out;
+  std::string target;
+  Background background;  ///< Of the target.
+  bool force = false;
+  RenderOptions render;
+};
+
+/// What is rendered and, if known, what it should look like.
+struct Scene {
+  SurfaceMesh surface;
+  std::optional<Eigen::Matrix3Xd> normals;  ///< Of a solid's own surface, for the smooth model.
+  std::optional<SampledSurface> spline;     ///< A lens's own, for the spline model.
+  RenderOptions render;
+  std::optional<Image> target;
+};
+
+void add_render_options(OptionSet& options, RenderArguments& arguments) {
+  options.positional("SOURCE", arguments.source,
+                     "lens folder; mesh: .ply, .obj, .stl, .off; "
+                     "solid: .step, .stp");
+  options.text("--out", arguments.out, "FILE", "write the picture to this .png or .exr");
+  options.flag("--force", arguments.force, "replace a file that lensforge did not write");
+  options.text("--target", arguments.target, "PICTURE", "compare with this; a lens has its own");
+  options.fields(background_fields(), arguments.background);
+  options.fields(render_fields(), arguments.render);
+}
+
+Scene load_solid(const std::string& source, const Executor& executor, const RunControl& control,
+                 const Console& console) {
+  SolidSurface solid = read_solid_surface(source, kPictureNodes, executor, control);
+  console.note(std::to_string(solid.faces) + (solid.faces == 1 ? " face" : " faces") +
+               (solid.by_name ? " named \"optical surface\""
+                              : " found by shape: the faces that point towards +z"));
+  SampledSurface& samples = solid.samples;
+  const RenderOptions render{SurfaceModel::kSmooth, setup_for_mesh(samples.mesh)};
+  return {std::move(samples.mesh), std::move(samples.normals), {}, render, {}};
+}
+
+Scene load(const std::string& source, const Executor& executor, const RunControl& control,
+           const Console& console) {
+  if (is_step_file(source)) return load_solid(source, executor, control, console);
+  if (is_folder(source)) {
+    Lens lens = read_lens(source);
+    note_unfinished_design(lens, console);
+    Scene scene{std::move(lens.surface), {}, {}, {lens.model, lens.setup}, std::move(lens.target)};
+    if (lens.spline) scene.spline = picture_nodes(*lens.spline);
+    return scene;
+  }
+  SurfaceMesh mesh = read_mesh(source);
+  const RenderOptions render{RenderOptions{}.model, setup_for_mesh(mesh)};
+  return {std::move(mesh), {}, {}, render, {}};
+}
+
+/// What a picture takes. @throw InputError where there is no room for it.
+WorkEstimate require_room_for_picture(const OpticalSetup& setup, const std::string& out) {
+  const double shape = setup.pixels.cast<double>().prod() / std::pow(setup.pixels.maxCoeff(), 2);
+  const auto work = [&](double side) { return rendering_work(shape * side * side); };
+  const fs::path folder = fs::absolute(out.empty() ? "." : out).parent_path();
+  return require_room_for(work, {"--pixels", 1.0 * setup.pixels.maxCoeff()}, folder);
+}
+
+/// @throw InputError where what is said of colour does not go with the rest.
+void require_spectrum(const Scene& scene, const OptionSet& options,
+                      const RenderArguments& arguments) {
+  const OpticalSetup& setup = scene.render.setup;
+  if (setup.spectrum.none() && options.given("--abbe")) {
+    throw InputError("--abbe: needs --wavelengths; --wavelengths 450,550,650 would do");
+  }
+  if (setup.spectrum.none()) return;
+  if (setup.mode == LightMode::kReflect) {
+    throw InputError("--wavelengths: a mirror bends light of all colours alike; leave it out");
+  }
+  if (fs::path(arguments.out).extension() == ".exr") {
+    throw InputError("--out " + arguments.out +
+                     ": must end in .png, since the picture is in colour");
+  }
+}
+
+/// The scene with everything that the options say instead.
+Scene adjusted(Scene scene, OptionSet& options, RenderArguments& arguments,
+               const RunControl& control, const Console& console) {
+  arguments.render = scene.render;
+  options.restate();
+  scene.render = arguments.render;
+  if (scene.render.model == SurfaceModel::kSpline && !scene.spline) {
+    throw InputError("--model spline: must be facet or smooth, since " + arguments.source +
+                     " is no lens that was designed as a spline");
+  }
+  const OpticalSetup& setup = scene.render.setup;
+  require_spectrum(scene, options, arguments);
+  const WorkEstimate work = require_room_for_picture(setup, arguments.out);
+  if (options.given("--target")) {
+    LoadedImage target =
+        read_image(arguments.target, control, setup.pixels.maxCoeff(), arguments.background);
+    for (const std::string& change : target.changes) {
+      console.note("--target " + arguments.target + ": " + change);
+    }
+    scene.target = std::move(target.image);
+  } else if (options.given("--background")) {
+    throw InputError("--background: is for the picture of --target, which is not given");
+  }
+  if (scene.target) scene.target = resample(*scene.target, setup.pixels.x(), setup.pixels.y());
+  require_wall_above(scene.surface, setup);
+  announce_work(work, console);
+  return scene;
+}
+
+/// Without a target there is no white to relate to: a PNG shows the brightest pixel as white.
+/// @return the brightest pixel, or 0 where nothing was scaled.
+float scale_to_white(Image& image) {
+  const float white = *std::max_element(image.values().begin(), image.values().end());
+  if (!(white > 0.0F)) return 0.0F;
+  for (float& value : image.values()) value /= white;
+  return white;
+}
+
+/// What a command says at the end, and what it wrote.
+struct Rendering {
+  Image image;
+  std::optional<ColorImage> color;  ///< Instead of it.
+  nlohmann::json json;
+  std::string text;
+};
+
+bool has_normals_for(SurfaceModel model, const Scene& scene) {
+  return model == SurfaceModel::kSmooth && scene.normals.has_value();
+}
+
+std::vector<SurfaceModel> models_of(const Scene& scene) {
+  std::vector<SurfaceModel> models(kMeshModels.begin(), kMeshModels.end());
+  if (scene.spline) models.push_back(SurfaceModel::kSpline);
+  return models;
+}
+
+ImageMetrics judge(const Scene& scene, SurfaceModel model, Image* image, const Executor& executor) {
+  if (model == SurfaceModel::kSpline) {
+    return evaluate(scene.spline->mesh, scene.spline->normals, scene.render.setup, *scene.target,
+                    image, executor);
+  }
+  if (has_normals_for(model, scene)) {
+    return evaluate(scene.surface, *scene.normals, scene.render.setup, *scene.target, image,
+                    executor);
+  }
+  return evaluate(scene.surface, scene.render.setup, model, *scene.target, image, executor);
+}
+
+Rendering compare_models(const Scene& scene, const Executor& executor) {
+  Rendering rendering;
+  ModelMetrics metrics;
+  for (const SurfaceModel model : models_of(scene)) {
+    Image* image = model == scene.render.model ? &rendering.image : nullptr;
+    metrics[model] = judge(scene, model, image, executor);
+  }
+  rendering.json["metrics"] = metrics_json(metrics);
+  rendering.text = metrics_text(metrics);
+  return rendering;
+}
+
+RenderResult project(const Scene& scene, const Executor& executor) {
+  const RenderOptions& render = scene.render;
+  if (render.model == SurfaceModel::kSpline) {
+    return render_surface(scene.spline->mesh, scene.spline->normals, render.setup, executor);
+  }
+  return has_normals_for(render.model, scene)
+             ? render_surface(scene.surface, *scene.normals, render.setup, executor)
+             : render_surface(scene.surface, render.setup, render.model, executor);
+}
+
+Rendering render_alone(const Scene& scene, const Executor& executor) {
+  const RenderResult result = project(scene, executor);
+  return {result.image,
+          {},
+          {{"flux_inside", result.flux_inside}},
+          "  " + model_name(scene.render.model) + "  flux inside " +
+              fixed(100.0 * result.flux_inside, 1) + " %\n"};
+}
+
+/// Of the surface under its model, as vertex_area_normals() has them.
+Fringe fringe_of(const Scene& scene) {
+  const OpticalSetup& setup = scene.render.setup;
+  if (scene.render.model == SurfaceModel::kSpline) {
+    return fringe_of(scene.spline->mesh, scene.spline->normals, setup);
+  }
+  const Eigen::Matrix3Xd normals =
+      scene.normals ? *scene.normals : vertex_area_normals(scene.surface);
+  return fringe_of(scene.surface, normals, setup);
+}
+
+/// The picture of each wavelength, relative to the target's white, or to even light without one.
+std::vector<Image> pictures_of(const Scene& scene, const Executor& executor) {
+  const Eigen::Vector2i& pixels = scene.render.setup.pixels;
+  const double even = scene.target ? scene.target->total() / pixels.prod() : 1.0;
+  std::vector<Image> pictures;
+  for (const LightColor& color : light_colors(scene.render.setup)) {
+    Scene colored = scene;
+    colored.render.setup = color.setup;
+    pictures.push_back(project(colored, executor).image);
+    for (float& value : pictures.back().values()) value *= static_cast<float>(even);
+  }
+  return pictures;
+}
+
+Rendering render_spectrum(const Scene& scene, const Executor& executor) {
+  const Spectrum& spectrum = scene.render.setup.spectrum;
+  const std::vector<Image> pictures = pictures_of(scene, executor);
+  const Fringe fringe = fringe_of(scene);
+  Rendering rendering;
+  rendering.color = color_picture(pictures, spectrum.wavelengths, spectrum.powers);
+  rendering.json = {{"wavelengths_nm", spectrum.wavelengths},
+                    {"fringe_mm", {{"mean", fringe.mean}, {"max", fringe.max}}}};
+  rendering.text = fringe_text(fringe);
+  if (!scene.target) return rendering;
+  const Image seen = mixed(pictures, spectrum.shares());
+  ImageMetrics metrics = compare(seen, *scene.target);
+  metrics.flux_inside = seen.total() / scene.target->total();
+  rendering.json["metrics"] = {{model_name(scene.render.model), metrics_json(metrics)}};
+  rendering.text += "  " + model_name(scene.render.model) + "  " + metrics_text(metrics) + "\n";
+  return rendering;
+}
+
+Rendering rendered(const Scene& scene, const Executor& executor) {
+  if (!scene.render.setup.spectrum.none()) return render_spectrum(scene, executor);
+  return scene.target ? compare_models(scene, executor) : render_alone(scene, executor);
+}
+
+void require_picture_name(const std::string& out) {
+  const std::string extension = fs::path(out).extension().string();
+  if (!out.empty() && extension != ".png" && extension != ".exr") {
+    throw InputError("--out " + out + ": must end in .png or .exr");
+  }
+}
+
+void write_picture(Rendering& rendering, const Scene& scene, const std::string& out,
+                   InterruptibleJob& job, const Console& console) {
+  const bool scale = !rendering.color && !scene.target && fs::path(out).extension() == ".png";
+  Image image = rendering.image;
+  const float white = scale ? scale_to_white(image) : 0.0F;
+  job.begin_writing();
+  if (rendering.color) {
+    write_image(*rendering.color, out);
+  } else {
+    write_image(image, out, job.control());
+  }
+  if (white > 0.0F) {
+    console.note("no target: white is the brightest pixel, " + fixed(white, 2) +
+                 " times even light");
+  }
+  rendering.json["out"] = out;
+}
+
+}  // namespace
+
+int render_command(const Arguments& command_line) try {
+  RenderArguments arguments;
+  OptionSet options("render",
+                    "Renders a lens, mesh or STEP solid and compares it with its target.");
+  add_render_options(options, arguments);
+  options.parse(command_line);
+  require_picture_name(arguments.out);
+  if (!arguments.out.empty()) require_replaceable("--out", arguments.out, arguments.force);
+  const Console console(options.common().json, options.common().quiet);
+  InterruptibleJob job(options.common(), arguments.out);
+  const Scene scene =
+      adjusted(load(arguments.source, job.stoppable(options.executor()), job.control(), console),
+               options, arguments, job.control(), console);
+  ChosenDevice device = options.device_executor();
+  device.executor = job.stoppable(device.executor);
+  job.control().report({"picture", 0.0, 0.0, ""});
+  Rendering rendering = rendered(scene, device.executor);
+  if (!arguments.out.empty()) write_picture(rendering, scene, arguments.out, job, console);
+  rendering.json["command"] = "render";
+  rendering.json["device"] = device.word;
+  rendering.json["source"] = arguments.source;
+  rendering.json["model"] = model_name(scene.render.model);
+  rendering.json["pixels"] = {scene.render.setup.pixels.x(), scene.render.setup.pixels.y()};
+  console.result(rendering.json, arguments.source + "\n" + rendering.text);
+  return kDone;
+} catch (const Interrupted&) {
+  return report_interrupted(wants_json(command_line));
+}
+
+}  // namespace lensforge::app

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "app/frame/option_set.h"
+#include "machine/job/send_job.h"
+#include "machine/job/send_options.h"
+
+namespace lensforge::app {
+
+/// What `lensforge send` was asked for.
+struct SendSettings {
+  std::string file;
+  std::string log;     ///< FILE.log if empty.
+  std::string events;  ///< JSON lines go here; none if empty.
+  bool yes = false;    ///< Do not ask before resuming.
+  SendOptions job;
+
+  [[nodiscard]] bool has_log() const { return !job.dry_run || !log.empty(); }
+  [[nodiscard]] std::filesystem::path log_path() const {
+    return log.empty() ? std::filesystem::path(file + ".log") : std::filesystem::path(log);
+  }
+};
+
+/// Adds every option of the command.
+void add_send_options(OptionSet& options, SendSettings& settings);
+
+/// "done", "interrupted" or "fault".
+std::string status_word(SendStatus status);
+
+/// Size, extent and time of a program, a line each.
+std::string facts_text(const ProgramFacts& facts);
+
+}  // namespace lensforge::app

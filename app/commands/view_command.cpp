@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <filesystem>
+#include <string>
+
+#include "app/frame/command_line.h"
+#include "app/frame/command_run.h"
+#include "app/frame/common_output.h"
+#include "app/frame/console.h"
+#include "app/frame/option_set.h"
+#include "app/view/lens_view.h"
+#include "app/view/view_page.h"
+#include "core/error.h"
+#include "core/io/files.h"
+#include "core/io/output_guard.h"
+#include "core/text/lower_case.h"
+#include "core/text/printable.h"
+
+namespace lensforge::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// What `lensforge view` was asked for.
+struct ViewSettings {
+  std::string source;
+  std::string out;
+  bool force = false;
+};
+
+/// Adds every option of the command.
+void add_view_options(OptionSet& options, ViewSettings& settings) {
+  options.positional("DIR", settings.source, "lens folder");
+  options.required_text("--out", settings.out, "FILE", "the page to write, .html");
+  options.flag("--force", settings.force, "replace a file that lensforge did not write");
+}
+
+void require_page_name(const std::string& out) {
+  const std::string extension = lower_case(fs::path(out).extension().string());
+  if (extension != ".html" && extension != ".htm") {
+    throw InputError("--out " + out + ": must end in .html");
+  }
+}
+
+nlohmann::json surfaces_json(const LensView& view) {
+  nlohmann::json surfaces = nlohmann::json::object();
+  for (const ViewedSurface& viewed : view.surfaces) {
+    surfaces[viewed.id] = {{"vertices", viewed.surface.vertices},
+                           {"triangles", viewed.surface.triangles},
+                           {"storage_mae", viewed.storage_error}};
+  }
+  return surfaces;
+}
+
+std::string summary_text(const LensView& view, const std::string& out, std::uintmax_t bytes) {
+  std::string text =
+      printable_line(out) + ": " + fixed(static_cast<double>(bytes) * 1e-6, 1) + " MB\n";
+  for (const ViewedSurface& viewed : view.surfaces) {
+    text += "  " + viewed.words + ": " + std::to_string(viewed.surface.vertices) +
+            " vertices, stored with an error of MAE " + fixed(viewed.storage_error, 6) + "\n";
+  }
+  return text;
+}
+
+}  // namespace
+
+int view_command(const Arguments& command_line) try {
+  ViewSettings settings;
+  OptionSet options("view", "Writes a page that draws a lens's light and lets one change it.");
+  add_view_options(options, settings);
+  options.parse(command_line);
+  require_page_name(settings.out);
+  require_replaceable("--out", settings.out, settings.force);
+  const Console console(options.common().json, options.common().quiet);
+  InterruptibleJob job(options.common(), settings.out);
+  const LensView view =
+      read_view(settings.source, job.stoppable(options.executor()), job.control());
+  for (const std::string& note : view.notes) console.note(note);
+  const std::string page = view_page(view);
+  job.begin_writing();
+  write_whole_file(settings.out, page);
+  console.result({{"command", "view"},
+                  {"source", settings.source},
+                  {"out", settings.out},
+                  {"bytes", page.size()},
+                  {"surfaces", surfaces_json(view)}},
+                 summary_text(view, settings.out, page.size()));
+  return kDone;
+} catch (const Interrupted&) {
+  return report_interrupted(wants_json(command_line));
+}
+
+}  // namespace lensforge::app

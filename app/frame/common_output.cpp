@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "app/frame/common_output.h"
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+
+#include "app/frame/console.h"
+
+namespace lensforge::app {
+
+nlohmann::json metrics_json(const ImageMetrics& metrics) {
+  const bool finite = std::isfinite(metrics.psnr);
+  return {{"mae", metrics.mae},
+          {"psnr", finite ? nlohmann::json(metrics.psnr) : nlohmann::json(nullptr)},
+          {"ssim", metrics.ssim},
+          {"mae_linear", metrics.mae_linear},
+          {"flux_inside", metrics.flux_inside}};
+}
+
+std::string metrics_text(const ImageMetrics& metrics) {
+  return "MAE " + fixed(metrics.mae, 4) + "  PSNR " + fixed(metrics.psnr, 1) + " dB  SSIM " +
+         fixed(metrics.ssim, 3) + "  linear MAE " + fixed(metrics.mae_linear, 4) +
+         "  flux inside " + fixed(100.0 * metrics.flux_inside, 1) + " %";
+}
+
+std::string fixed(double value, int digits) {
+  std::array<char, 64> text{};
+  std::snprintf(text.data(), text.size(), "%.*f", digits, value);
+  return text.data();
+}
+
+nlohmann::json metrics_json(const ModelMetrics& metrics) {
+  nlohmann::json by_model;
+  for (const auto& [model, one] : metrics) by_model[model_name(model)] = metrics_json(one);
+  return by_model;
+}
+
+std::string metrics_text(const ModelMetrics& metrics) {
+  std::string text;
+  for (const auto& [model, one] : metrics) {
+    const std::string name = model_name(model);
+    text += "  " + name + std::string(8 - name.size(), ' ') + metrics_text(one) + "\n";
+  }
+  return text;
+}
+
+nlohmann::json metrics_json(const Lens& lens) {
+  nlohmann::json by_model = metrics_json(lens.metrics);
+  if (lens.source_limit) by_model["source_limit"] = metrics_json(*lens.source_limit);
+  return by_model;
+}
+
+std::string metrics_text(const Lens& lens) {
+  const std::string models = metrics_text(lens.metrics);
+  if (!lens.source_limit) return models;
+  return models + "  limit   " + metrics_text(*lens.source_limit) +
+         "  of any surface, this source\n";
+}
+
+std::string fringe_text(const Fringe& fringe) {
+  return "  fringe  " + fixed(fringe.mean, 3) + " mm on average, at most " + fixed(fringe.max, 3) +
+         " mm\n";
+}
+
+std::string size_text(long columns, long rows) {
+  return std::to_string(columns) + " x " + std::to_string(rows);
+}
+
+nlohmann::json seal_json(const std::optional<bool>& holds) {
+  return holds ? nlohmann::json(*holds) : nlohmann::json(nullptr);
+}
+
+std::string seal_words(const std::optional<bool>& holds) {
+  if (!holds) return "none: cannot tell whether the program was changed";
+  return *holds ? "holds: as cam wrote it" : "broken: changed or cut short since cam wrote it";
+}
+
+void note_unfinished_design(const Lens& lens, const Console& console) {
+  const auto& about = lens.provenance;
+  if (!about.is_object() || about.value("status", nlohmann::json()) != "interrupted") return;
+  console.note("note: the lens's design was interrupted; finish it with design --resume");
+}
+
+}  // namespace lensforge::app

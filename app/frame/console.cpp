@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "app/frame/console.h"
+
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <utility>
+
+#include "core/error.h"
+#include "core/text/printable.h"
+
+namespace lensforge::app {
+namespace {
+
+/// DEL and C1, which JSON lets stand in its strings and terminals obey, as \u escapes.
+std::string without_controls(const std::string& json) {
+  std::string text;
+  text.reserve(json.size());
+  for (std::size_t i = 0; i < json.size(); ++i) {
+    const auto next = static_cast<unsigned char>(i + 1 < json.size() ? json[i + 1] : '\0');
+    const bool c1 = json[i] == '\xC2' && next >= 0x80 && next < 0xA0;
+    if (!c1 && json[i] != '\x7F') {
+      text += json[i];
+      continue;
+    }
+    std::array<char, 8> escape{};
+    std::snprintf(escape.data(), escape.size(), "\\u%04x", c1 ? next : 0x7FU);
+    text += escape.data();
+    if (c1) ++i;
+  }
+  return text;
+}
+
+/// File names need not be UTF-8, which JSON has to be: other bytes become U+FFFD.
+std::string dump(const nlohmann::json& object) {
+  const auto replace = nlohmann::json::error_handler_t::replace;
+  return without_controls(object.dump(2, ' ', false, replace)) + "\n";
+}
+
+/// Longest value that is shown whole: a list of numbers, say. Paths may be longer.
+constexpr std::size_t kLongestValue = 200;
+
+/// A message with long values cut, so that what is wrong with them is still to be seen.
+std::string message_line(const std::string& message) {
+  std::string line;
+  for (std::size_t at = 0; at < message.size();) {
+    const std::size_t end = std::min(message.find(' ', at), message.size());
+    const std::string word = message.substr(at, end - at);
+    const bool cut = word.size() > kLongestValue && word.find('/') == std::string::npos;
+    line += cut ? printable_line(word, kLongestValue) : word;
+    if (end < message.size()) line += ' ';
+    at = end + 1;
+  }
+  return printable_line(line);
+}
+
+}  // namespace
+
+std::size_t terminal_width() {
+  constexpr std::size_t kUsual = 80;
+  winsize size{};
+  const bool known = ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0;
+  return known ? size.ws_col : kUsual;
+}
+
+void print_to_stdout(std::string_view text) {
+  const bool written = std::fwrite(text.data(), 1, text.size(), stdout) == text.size();
+  if (!written || std::fflush(stdout) != 0) {
+    throw RunError(std::string("standard output: ") + std::strerror(errno));
+  }
+}
+
+int report_error(const std::string& message, int exit_code, bool json) noexcept {
+  try {
+    const std::string line = message_line(message);
+    std::fprintf(stderr, "lensforge: %s\n", line.c_str());
+    if (json) print_to_stdout(dump({{"error", line}, {"exit_code", exit_code}}));
+  } catch (const std::exception&) {
+    // The reason was printed; a stdout that is gone as well changes nothing.
+  }
+  return exit_code;
+}
+
+void Console::note(const std::string& message) const {
+  if (!begun_) {
+    held_.push_back(message);
+  } else if (!quiet_) {
+    std::fprintf(stderr, "lensforge: %s\n", message_line(message).c_str());
+  }
+}
+
+void Console::begin() const {
+  begun_ = true;
+  for (const std::string& message : std::exchange(held_, {})) note(message);
+}
+
+void Console::result(const nlohmann::json& object, const std::string& text) const {
+  begin();
+  print_to_stdout(json_ ? dump(object) : printable_lines(text));
+}
+
+namespace {
+
+constexpr std::chrono::milliseconds kBarInterval{100};
+constexpr std::chrono::seconds kLineInterval{5};
+constexpr int kBarWidth = 24;
+
+std::string clock_text(double seconds) {
+  const int whole = static_cast<int>(seconds);
+  char text[32];
+  std::snprintf(text, sizeof text, "%d:%02d", whole / 60, whole % 60);
+  return text;
+}
+
+std::string bar(double share, int width) {
+  const auto all = static_cast<std::size_t>(width);
+  const auto filled = static_cast<std::size_t>(share * width);
+  std::string text = "[";
+  text.append(filled, '#').append(all - filled, '.').append("] ");
+  return text;
+}
+
+}  // namespace
+
+std::string progress_line(const Progress& progress, double seconds, int bar_width) {
+  std::string line = printable_line(progress.stage) + "  ";
+  if (progress.total > 0.0) {
+    const double share = std::clamp(progress.done / progress.total, 0.0, 1.0);
+    if (bar_width > 0) line += bar(share, bar_width);
+    line += std::to_string(static_cast<int>(100.0 * share)) + " %  ";
+  }
+  if (!progress.detail.empty()) line += printable_line(progress.detail) + "  ";
+  return line + clock_text(seconds);
+}
+
+ProgressDisplay::ProgressDisplay(bool quiet)
+    : quiet_(quiet), terminal_(isatty(STDERR_FILENO) != 0), shown_(start_) {
+  if (quiet_) return;
+  redrawer_ = std::jthread([this](const std::stop_token& stop) { redraw_until(stop); });
+}
+
+ProgressDisplay::~ProgressDisplay() {
+  if (redrawer_.joinable()) {
+    redrawer_.request_stop();
+    redrawer_.join();
+  }
+  wipe();
+}
+
+std::function<void(const Progress&)> ProgressDisplay::sink() {
+  if (quiet_) return {};
+  return [this](const Progress& progress) { show(progress); };
+}
+
+void ProgressDisplay::wipe() {
+  const std::lock_guard lock(mutex_);
+  if (bar_drawn_) std::fputs("\r\033[K", stderr);
+  bar_drawn_ = false;
+}
+
+void ProgressDisplay::show(const Progress& progress) {
+  const std::lock_guard lock(mutex_);
+  last_ = progress;
+  draw();
+}
+
+void ProgressDisplay::redraw_until(const std::stop_token& stop) {
+  constexpr std::chrono::milliseconds kInterval{500};
+  std::unique_lock lock(mutex_);
+  while (!stop.stop_requested()) {
+    ended_.wait_for(lock, stop, kInterval, [] { return false; });
+    if (!last_.stage.empty() && !stop.stop_requested()) draw();
+  }
+}
+
+void ProgressDisplay::draw() {
+  const Clock::time_point now = Clock::now();
+  const Clock::duration wait = terminal_ ? Clock::duration(kBarInterval) : kLineInterval;
+  if (now - shown_ < wait) return;
+  shown_ = now;
+  const double seconds = std::chrono::duration<double>(now - start_).count();
+  std::string line = progress_line(last_, seconds, terminal_ ? kBarWidth : 0);
+  if (terminal_) {
+    line.resize(std::min(line.size(), terminal_width() - 1));
+    std::fprintf(stderr, "\r%s\033[K", line.c_str());
+    bar_drawn_ = true;
+  } else {
+    std::fprintf(stderr, "%s\n", line.c_str());
+  }
+}
+
+}  // namespace lensforge::app

@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <cstddef>
+#include <functional>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <stop_token>
+#include <string>
+#include <string_view>
+#include <thread>
+#include <vector>
+
+#include "core/compute/run_control.h"
+
+namespace lensforge::app {
+
+/// Writes `text` to stdout as it is and flushes it.
+/// @throw RunError if stdout does not take it (closed pipe, full disk).
+void print_to_stdout(std::string_view text);
+
+/// Prints "lensforge: message" as one line on stderr and, with `json`, {"error", "exit_code"} on
+/// stdout. Returns `exit_code`; never throws.
+int report_error(const std::string& message, int exit_code, bool json) noexcept;
+
+/// Characters in a line of the terminal on stderr; 80 where that cannot be told.
+std::size_t terminal_width();
+
+/// Where a command's words go: messages to stderr, the result to stdout.
+class Console {
+ public:
+  Console(bool json, bool quiet) : json_(json), quiet_(quiet) {}
+
+  /// A sentence for the reader, on stderr; nothing with --quiet. It is held back until begin(), so
+  /// that a refusal, after which nothing else matters, is the only line.
+  void note(const std::string& message) const;
+
+  /// Says that nothing is refused any more: notes so far are printed, later ones at once.
+  void begin() const;
+
+  /// The result: `object` with --json, else `text`. Notes so far are printed before it.
+  void result(const nlohmann::json& object, const std::string& text) const;
+
+ private:
+  bool json_;
+  bool quiet_;
+  mutable bool begun_ = false;
+  mutable std::vector<std::string> held_;
+};
+
+/// Shows progress on stderr: a bar that redraws itself on a terminal, a line every few seconds
+/// otherwise, nothing if `quiet`; what was reported last also while no news comes. The bar is wiped
+/// on destruction.
+class ProgressDisplay {
+ public:
+  explicit ProgressDisplay(bool quiet);
+  ~ProgressDisplay();
+  ProgressDisplay(const ProgressDisplay&) = delete;
+  ProgressDisplay& operator=(const ProgressDisplay&) = delete;
+
+  /// The sink for a RunControl; may be called from any thread while this object lives.
+  [[nodiscard]] std::function<void(const Progress&)> sink();
+
+  /// Takes the bar off the terminal.
+  void wipe();
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  void show(const Progress& progress);
+  void draw();
+  void redraw_until(const std::stop_token& stop);
+
+  const bool quiet_;
+  const bool terminal_;
+  const Clock::time_point start_ = Clock::now();
+  std::mutex mutex_;
+  std::condition_variable_any ended_;
+  Progress last_;
+  Clock::time_point shown_;
+  bool bar_drawn_ = false;
+  std::jthread redrawer_;
+};
+
+/// "stage  57 %  detail  0:34", with a bar of `bar_width` characters if that is above 0.
+std::string progress_line(const Progress& progress, double seconds, int bar_width);
+
+}  // namespace lensforge::app

@@ -1,0 +1,423 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "app/frame/option_set.h"
+
+#include <toml++/toml.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstdint>
+#include <deque>
+#include <exception>
+#include <filesystem>
+#include <sstream>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/compute/gpu.h"
+#include "core/error.h"
+#include "core/io/files.h"
+#include "core/text/number_text.h"
+#include "core/text/printable.h"
+#include "core/text/toml_fields.h"
+#include "core/text/units.h"
+#include "core/text/version.h"
+#include "design/mpi/session.h"
+
+namespace lensforge::app {
+namespace {
+
+/// Reads --config files as TOML: top-level keys named like the long options, with a string, number
+/// or boolean each.
+class TomlConfig : public CLI::Config {
+ public:
+  /// `keys` are the names that may occur.
+  explicit TomlConfig(std::vector<std::string> keys) : keys_(std::move(keys)) {}
+
+  /// Options are never written back as TOML: the result is always empty.
+  std::string to_config(const CLI::App* app, bool default_also, bool write_description,
+                        std::string prefix) const override;
+
+  /// @throw InputError naming the line or key, for a syntax error, an unknown key, a table, an
+  ///        array or a date.
+  std::vector<CLI::ConfigItem> from_config(std::istream& input) const override;
+
+ private:
+  std::vector<std::string> keys_;
+};
+
+constexpr std::size_t kLongestKey = 60;  ///< In a message.
+
+std::string value_text(const std::string& key, const toml::node& value) {
+  if (const auto* text = value.as_string()) return text->get();
+  if (const auto* flag = value.as_boolean()) return flag->get() ? "true" : "false";
+  if (!value.is_number()) {
+    throw InputError("--config: key " + key + ": must be a string, a number or a boolean");
+  }
+  std::ostringstream text;
+  text.precision(17);
+  if (const auto* whole = value.as_integer()) text << whole->get();
+  if (const auto* real = value.as_floating_point()) text << real->get();
+  return text.str();
+}
+
+toml::table parsed(std::istream& input) {
+  std::string text(kMaxTomlBytes + 1, '\0');  // parse_toml() refuses one byte too many.
+  input.read(text.data(), static_cast<std::streamsize>(text.size()));
+  text.resize(static_cast<std::size_t>(input.gcount()));
+  return parse_toml(text, "--config");
+}
+
+std::string TomlConfig::to_config(const CLI::App* /*app*/, bool /*default_also*/,
+                                  bool /*write_description*/, std::string /*prefix*/) const {
+  return {};
+}
+
+std::vector<CLI::ConfigItem> TomlConfig::from_config(std::istream& input) const {
+  std::vector<CLI::ConfigItem> read;
+  for (const auto& [key, value] : parsed(input)) {
+    CLI::ConfigItem item;
+    item.name = std::string(key.str());
+    if (std::find(keys_.begin(), keys_.end(), item.name) == keys_.end()) {
+      throw InputError("--config: key " + printable_line(item.name, kLongestKey) +
+                       ": unknown option of this command");
+    }
+    item.inputs = {value_text(item.name, value)};
+    read.push_back(std::move(item));
+  }
+  return read;
+}
+
+}  // namespace
+
+bool config_asks_for_json(const std::filesystem::path& file) noexcept {
+  try {
+    std::ifstream input = open_input(file);
+    return parsed(input)["json"].value_or(false);
+  } catch (const std::exception&) {
+    return false;  // What is wrong with it is told where its options are read.
+  }
+}
+
+namespace {
+
+constexpr const char* kCommonGroup = "Common options";
+constexpr double kMaxThreads = 1024;
+constexpr std::size_t kHelpColumn = 34;
+
+template <class Value>
+Value parsed(const std::string& name, const std::string& text, const char* kind) {
+  Value value{};
+  const char* end = text.data() + text.size();
+  const auto [stopped, error] = std::from_chars(text.data(), end, value);
+  if (error != std::errc() || stopped != end) {
+    throw InputError(name + " " + text + ": must be " + kind);
+  }
+  return value;
+}
+
+/// "a|b"
+std::string joined(const std::vector<std::string>& words) {
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "" : "|") + word;
+  return text;
+}
+
+/// What stands for a value in the help: "MM", "a|b".
+std::string type_of(const OptionSpec& spec) {
+  switch (spec.kind) {
+    case OptionKind::kWhole:
+      return "N";
+    case OptionKind::kNumber:
+      return "NUMBER";
+    case OptionKind::kLength:
+      return "MM";
+    case OptionKind::kWord:
+      return joined(spec.words);
+    case OptionKind::kText:
+      return spec.unit;
+    case OptionKind::kFlag:
+      break;
+  }
+  return {};
+}
+
+/// The help with unit and limits.
+std::string help_of(const OptionSpec& spec) {
+  if (!spec.is_number()) return spec.help;
+  return spec.help + "; " + (spec.unit.empty() ? "" : spec.unit + ", ") + spec.limits.rule();
+}
+
+std::string default_text(const nlohmann::json& value) {
+  if (value.is_string()) return value.get<std::string>();
+  return value.is_number_float() ? number_text(value.get<double>()) : value.dump();
+}
+
+/// Text for a manual page: no character begins a request or an escape.
+std::string manual_text(const std::string& text) {
+  std::string safe;
+  for (const char c : text) safe += c == '\\' ? std::string("\\e") : std::string(1, c);
+  return safe.starts_with('.') || safe.starts_with('\'') ? "\\&" + safe : safe;
+}
+
+/// --help with one option a line, its default and its limits.
+class Formatter : public CLI::Formatter {
+ public:
+  Formatter() { column_width(kHelpColumn); }
+
+  std::string make_option_opts(const CLI::Option* option) const override {
+    std::string text;
+    if (!option->get_type_name().empty()) text += " " + option->get_type_name();
+    if (!option->get_default_str().empty()) text += " = " + option->get_default_str();
+    if (option->get_required() && !option->get_positional()) text += "  (required)";
+    return text;
+  }
+
+  std::string make_usage(const CLI::App* app, std::string name) const override {
+    std::string text = "\nUsage: " + name;
+    for (const CLI::Option* option : app->get_options()) {
+      if (option->get_positional()) text += " " + option->get_name(true);
+    }
+    for (const CLI::Option* option : app->get_options()) {
+      const bool named = option->get_required() && !option->get_positional();
+      if (named) text += " " + option->get_name() + " " + option->get_type_name();
+    }
+    return text + " [OPTIONS]\n";
+  }
+};
+
+const OptionTable<CommonOptions>& common_fields() {
+  using R = Row<CommonOptions>;
+  static const OptionTable<CommonOptions> table{
+      R::flag("--json", &CommonOptions::json,
+              "print one JSON object with the result, nothing else, on stdout"),
+      R::flag("--quiet", &CommonOptions::quiet,
+              "no progress and no messages on stderr, errors excepted"),
+      R::whole("--threads", &CommonOptions::threads, Limits::between(0, kMaxThreads),
+               "threads to use, 0 for all; never changes a result"),
+      R::word<std::string>("--device", &CommonOptions::device,
+                           {{"auto", "auto"}, {"cpu", "cpu"}, {"cuda", "cuda"}},
+                           "where to optimise and render; auto: a GPU if there is one")};
+  return table;
+}
+
+}  // namespace
+
+nlohmann::json option_value(const OptionSpec& spec, const std::string& text) {
+  const auto checked = [&](auto value) {
+    spec.require(text, static_cast<double>(value));
+    return nlohmann::json(value);
+  };
+  switch (spec.kind) {
+    case OptionKind::kWhole:
+      return checked(parsed<int>(spec.name, text, "a whole number"));
+    case OptionKind::kNumber:
+      return checked(parsed<double>(spec.name, text, "a number"));
+    case OptionKind::kLength:
+      return checked(parse_length_mm(text, spec.name));
+    case OptionKind::kWord:
+      spec.require_word(text);
+      return text;
+    case OptionKind::kText:
+      if (text.empty()) throw InputError(spec.name + ": must not be empty");
+      return text;
+    case OptionKind::kFlag:
+      break;
+  }
+  return text == "true";
+}
+
+std::string version_line() { return program_mark() + "\n"; }
+
+/// An option with its value as it was given, null until then.
+struct BoundOption {
+  OptionSpec spec;
+  std::function<nlohmann::json()> get;
+  std::function<void(const nlohmann::json&)> set;
+  nlohmann::json given = nullptr;
+};
+
+struct OptionSet::Parser {
+  Parser(const std::string& command, const std::string& description)
+      : app(description, "lensforge " + command) {}
+
+  CLI::App app;
+  std::deque<BoundOption> options;  ///< Those of the command, then the common ones.
+  std::size_t own = 0;              ///< Of the command.
+};
+
+OptionSet::OptionSet(const std::string& command, const std::string& description)
+    : parser_(std::make_unique<Parser>(command, description)) {
+  parser_->app.formatter(std::make_shared<Formatter>());
+}
+
+OptionSet::~OptionSet() = default;
+
+void OptionSet::add(const OptionSpec& spec, Getter get, Setter set) {
+  BoundOption& option =
+      parser_->options.emplace_back(BoundOption{spec, std::move(get), std::move(set)});
+  CLI::App& app = parser_->app;
+  if (spec.kind == OptionKind::kFlag) {
+    app.add_flag_function(
+        spec.name, [&option](std::int64_t count) { option.given = count > 0; }, spec.help);
+    return;
+  }
+  const auto take = [&option](const std::string& text) {
+    option.given = option_value(option.spec, text);
+  };
+  app.add_option_function<std::string>(spec.name, take, help_of(spec))
+      ->type_name(type_of(spec))
+      ->default_str(default_text(option.get()));
+}
+
+void OptionSet::restate() {
+  for (const BoundOption& option : parser_->options) {
+    if (!option.given.is_null()) option.set(option.given);
+  }
+}
+
+void OptionSet::positional(const std::string& name, std::string& value, const std::string& help) {
+  text(name, value, "", help);
+  parser_->app.get_option(name)->required();
+}
+
+void OptionSet::required_text(const std::string& name, std::string& value, const std::string& type,
+                              const std::string& help) {
+  text(name, value, type, help);
+  parser_->app.get_option(name)->required();
+}
+
+void OptionSet::text(const std::string& name, std::string& value, const std::string& type,
+                     const std::string& help) {
+  add(
+      {name, OptionKind::kText, help, {}, type, {}}, [&value] { return nlohmann::json(value); },
+      [&value](const nlohmann::json& given) { value = given; });
+}
+
+void OptionSet::texts(const std::string& name, std::vector<std::string>& values,
+                      const std::string& type, const std::string& help) {
+  parser_->app.add_option(name, values, help)->type_name(type);
+  parser_->options.push_back({{name, OptionKind::kText, help, {}, type, {}},
+                              [&values] { return nlohmann::json(values); },
+                              [](const nlohmann::json& /*set by the parser*/) {}});
+}
+
+void OptionSet::flag(const std::string& name, bool& value, const std::string& help) {
+  add(
+      {name, OptionKind::kFlag, help, {}, {}, {}}, [&value] { return nlohmann::json(value); },
+      [&value](const nlohmann::json& given) { value = given; });
+}
+
+void OptionSet::add_common() {
+  parser_->own = parser_->options.size();
+  fields(common_fields(), common_);
+  CLI::App& app = parser_->app;
+  app.set_config("--config", "", "read options from this TOML file; the command line wins")
+      ->type_name("FILE.toml");
+  app.set_help_flag("-h,--help", "print this help and exit");
+  app.set_help_all_flag("--help-man", "print the options as a part of the manual page")->group("");
+  app.set_version_flag("--version", program_mark(), "print the version");
+  for (const char* name :
+       {"--json", "--quiet", "--threads", "--device", "--config", "--help", "--version"}) {
+    app.get_option(name)->group(kCommonGroup);
+  }
+}
+
+void OptionSet::parse(const Arguments& arguments) {
+  add_common();
+  if (arguments == Arguments{kListOptions}) throw ListedOptions{listed()};
+  CLI::App& app = parser_->app;
+  std::vector<std::string> names;
+  for (const CLI::Option* option : app.get_options()) {
+    if (option->get_configurable() && !option->get_positional()) {
+      names.push_back(option->get_lnames().front());
+    }
+  }
+  app.config_formatter(std::make_shared<TomlConfig>(names));
+  app.get_option("--config")->check([](const std::string& file) {
+    if (file.empty()) throw InputError("--config: must not be empty");
+    require_regular_file(file);
+    return std::string();
+  });
+  try {
+    // CLI11 takes its arguments last one first.
+    app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));
+  } catch (const CLI::CallForHelp&) {
+    throw HelpText(app.help());
+  } catch (const CLI::CallForAllHelp&) {
+    throw HelpText(manual());
+  } catch (const CLI::CallForVersion&) {
+    throw HelpText(version_line());
+  } catch (const CLI::ParseError& e) {
+    throw InputError(std::string(e.what()) + "; " + app.get_name() + " --help lists the options");
+  }
+  restate();
+  if (common_.device == "cuda") {
+    const Gpu gpu = find_gpu();
+    if (!gpu.usable) throw InputError("--device cuda: " + gpu.reason);
+  }
+}
+
+bool OptionSet::given(const std::string& name) const { return parser_->app.count(name) > 0; }
+
+nlohmann::json OptionSet::used() const {
+  nlohmann::json object = nlohmann::json::object();
+  for (std::size_t i = 0; i < parser_->own; ++i) {
+    const BoundOption& option = parser_->options[i];
+    const std::string& name = option.spec.name;
+    const bool as_given = option.spec.kind == OptionKind::kText && !option.given.is_null();
+    object[name.substr(std::min(name.find_first_not_of('-'), name.size()))] =
+        as_given ? option.given : option.get();
+  }
+  return object;
+}
+
+std::vector<OptionSpec> OptionSet::listed() const {
+  std::vector<OptionSpec> specs;
+  for (const BoundOption& option : parser_->options) specs.push_back(option.spec);
+  for (const auto& [name, kind] : {std::pair{"--config", OptionKind::kText},
+                                   {"--help", OptionKind::kFlag},
+                                   {"--version", OptionKind::kFlag}}) {
+    const CLI::Option& option = *parser_->app.get_option(name);
+    specs.push_back({name, kind, option.get_description(), {}, option.get_type_name(), {}});
+  }
+  return specs;
+}
+
+std::string OptionSet::manual() const {
+  std::string text;
+  for (std::size_t i = 0; i < parser_->own; ++i) {
+    const BoundOption& option = parser_->options[i];
+    const OptionSpec& spec = option.spec;
+    if (!spec.name.starts_with('-')) continue;
+    const std::string type = type_of(spec);
+    text += ".It Fl " + spec.name.substr(1) + (type.empty() ? "" : " Ar " + type) + "\n";
+    text += manual_text(help_of(spec)) + ".\n";
+    const std::string value = default_text(option.get());
+    const bool shown = spec.kind != OptionKind::kFlag && !value.empty() && value != "[]";
+    if (shown) text += "Default: " + value + ".\n";
+  }
+  return text;
+}
+
+Executor OptionSet::executor() const {
+  const bool shared = common_.threads == 0 && rank_count() > 1;  // As many processes as cores.
+  return Executor::cpu(shared ? 1 : common_.threads);
+}
+
+ChosenDevice OptionSet::device_executor() const {
+  if (rank_count() > 1) {
+    if (common_.device == "cuda") {
+      throw InputError("--device cuda: the processes that mpirun starts compute on the processor");
+    }
+    return {executor().with_device(Device::kRanks), std::to_string(rank_count()) + " processes"};
+  }
+  if (common_.device == "cpu") return {executor(), "cpu"};
+  const Gpu gpu = find_gpu();
+  if (!gpu.usable) return {executor(), "cpu"};
+  return {executor().with_device(Device::kCuda), "cuda: " + gpu.name};
+}
+
+}  // namespace lensforge::app

@@ -1,0 +1,397 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "export/export.h"
+
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <ctime>
+#include <utility>
+#include <variant>
+
+#include "core/error.h"
+#include "core/image/image_io.h"
+#include "core/io/files.h"
+#include "core/io/lens_folder.h"
+#include "core/io/output_guard.h"
+#include "core/io/sha256.h"
+#include "core/surface/mesh_io.h"
+#include "core/surface/mesh_normals.h"
+#include "core/text/lower_case.h"
+#include "core/text/version.h"
+#include "design/render_lens.h"
+#include "design/wanted_picture.h"
+#include "export/files/closed_solid.h"
+#include "export/files/mesh_formats.h"
+#include "export/solid/iges_file.h"
+
+namespace lensforge {
+namespace {
+
+namespace fs = std::filesystem;
+
+using Words = Row<ExportOptions>::Choices<ExportFormat>;
+
+const Words& formats() {
+  using F = ExportFormat;
+  static const Words words{{"extension", F::kByExtension},
+                           {"step", F::kStep},
+                           {"iges", F::kIges},
+                           {"stl", F::kStl},
+                           {"obj", F::kObj},
+                           {"ply", F::kPly},
+                           {"3mf", F::k3mf},
+                           {"glb", F::kGlb},
+                           {"exr", F::kExr},
+                           {"png", F::kPng}};
+  return words;
+}
+
+/// It stands in one field of the file's header.
+void require_author(const std::string& author) {
+  constexpr std::size_t kMaxBytes = 200;
+  if (author.size() > kMaxBytes) {
+    throw InputError("--author: has " + std::to_string(author.size()) + " bytes; at most " +
+                     std::to_string(kMaxBytes) + " are possible");
+  }
+  // OpenCASCADE writes other bytes as they are, which neither format allows.
+  const auto is_printable = [](char c) { return c >= ' ' && c <= '~'; };
+  if (!std::all_of(author.begin(), author.end(), is_printable)) {
+    throw InputError("--author: holds a character that is not printable ASCII; write it without");
+  }
+}
+
+}  // namespace
+
+const OptionTable<ExportOptions>& export_fields() {
+  using O = ExportOptions;
+  using R = Row<O>;
+  static const OptionTable<O> table{
+      R::flag("--force", &O::force, "replace a file that lensforge did not write"),
+      R::word<ExportFormat>(
+          "--format", &O::format, formats(),
+          "solid as step or iges; closed mesh as stl (binary), obj, ply or 3mf; clear part for "
+          "scenes as glb; height map as exr (32-bit, mm) or png (16-bit grey)"),
+      R::whole("--pixels", &O::pixels, Limits::between(2, kMaxImageSide),
+               "longer side of a height map"),
+      R::length("--tolerance", &O::tolerance, Limits::between(1e-6, 1.0),
+                "step, iges: largest distance of the splines from the smooth surface"),
+      R::number("--normal-tolerance", &O::normal_tolerance, Limits::between(1e-6, 0.1), "rad",
+                "step, iges: largest angle to the normals of the vertex-normal model"),
+      R::whole(
+          "--max-points", &O::max_points, Limits::between(0, 1e7),
+          "step, iges: maximum number of control points, about 72 bytes each; 0: four a vertex, "
+          "575000 at most"),
+      R::word<StepSchema>("--schema", &O::schema,
+                          {{"ap214", StepSchema::kAp214}, {"ap242", StepSchema::kAp242}},
+                          "step: application protocol"),
+      R::text("--author", &O::author, "NAME", "step, iges: author in the header; printable ASCII")};
+  return table;
+}
+
+std::string word_of(ExportFormat format) {
+  for (const auto& [word, meaning] : formats()) {
+    if (meaning == format) return word;
+  }
+  return {};
+}
+
+bool is_height_map(ExportFormat format) {
+  return format == ExportFormat::kExr || format == ExportFormat::kPng;
+}
+
+bool is_spline_solid(ExportFormat format) {
+  return format == ExportFormat::kStep || format == ExportFormat::kIges;
+}
+
+ExportFormat export_format(const ExportOptions& options, const fs::path& out) {
+  if (options.format != ExportFormat::kByExtension) return options.format;
+  const std::string extension = lower_case(out.extension().string());
+  if (extension == ".stp") return ExportFormat::kStep;
+  if (extension == ".igs") return ExportFormat::kIges;
+  std::string known;
+  for (const auto& [word, meaning] : formats()) {
+    if (meaning == ExportFormat::kByExtension) continue;
+    if (extension == "." + word) return meaning;
+    known += (known.empty() ? "." : ", .") + word;
+  }
+  throw InputError("--out " + out.string() + ": must end in one of " + known +
+                   ", or --format must say what to write");
+}
+
+void validate(const ExportOptions& options, const fs::path& out) {
+  require_limits(export_fields(), options);
+  require_author(options.author);
+  export_format(options, out);
+  if (is_folder(out)) throw InputError("--out " + out.string() + ": is a folder, not a file");
+  require_replaceable("--out", out, options.force);
+}
+
+namespace {
+
+// What an export takes was measured on two cores at 2.6 GHz, with a lens of 96 x 71 pixels'
+// vertices.
+
+/// The program itself, the lens and its pictures.
+constexpr double kProgramBytes = 1.5e8;
+
+/// 8192 x 5982 pixels take 27 s as EXR and 30 s as PNG; the files have 3.1 and 0.3 bytes a pixel,
+/// 4 and 2 at most.
+constexpr double kSecondsPerPixel = 6e-7;
+
+/// 500,000 control points take 51 s and 0.68 GB, 1,073,000 take 163 s and 1.25 GB.
+constexpr double kSecondsPerPoint = 1.4e-4;
+constexpr double kFastPoints = 1e6;
+constexpr double kMemoryPerPoint = 1100.0;
+constexpr double kFilePerPoint = 72.0;
+
+}  // namespace
+
+WorkEstimate height_map_work(double pixels, bool grey) {
+  const double file = grey ? 2.0 : 4.0;
+  const double images = grey ? 8.0 : 4.0;
+  // The file's bytes stand in memory, twice while they grow.
+  return {.seconds = kSecondsPerPixel * pixels,
+          .disk_bytes = file * pixels,
+          .memory_bytes = kProgramBytes + (images + 2.0 * file) * pixels};
+}
+
+WorkEstimate spline_solid_work(double control_points) {
+  return {.seconds = kSecondsPerPoint * control_points * std::sqrt(control_points / kFastPoints),
+          .disk_bytes = kFilePerPoint * control_points,
+          .memory_bytes = kProgramBytes + kMemoryPerPoint * control_points};
+}
+
+namespace {
+
+/// An export with all that it works with.
+struct Job {
+  const ExportSource& source;
+  const fs::path& out;
+  const ExportOptions& options;
+  ExportFormat format;
+  const Executor& executor;
+  const RunControl& control;
+  const ExportHooks& hooks;
+
+  void announce(const WorkEstimate& work) const {
+    if (hooks.announce) hooks.announce(work);
+  }
+  void begin_writing() const {
+    if (hooks.begin_writing) hooks.begin_writing();
+  }
+  [[nodiscard]] fs::path folder() const { return fs::absolute(out).parent_path(); }
+};
+
+/// When the surface was made: the same lens then gives the same bytes at any time.
+std::string time_of(const fs::path& file) {
+  struct stat about {};
+  if (::stat(file.c_str(), &about) != 0) return {};
+  std::tm utc{};
+  ::gmtime_r(&about.st_mtime, &utc);
+  std::array<char, 32> text{};
+  return {text.data(), std::strftime(text.data(), text.size(), "%Y-%m-%dT%H:%M:%S", &utc)};
+}
+
+StepHeader header_of(const Job& job) {
+  return {.name = "lensforge lens",
+          .description = "optical surface sha256:" + sha256_of(job.source.file),
+          .author = job.options.author,
+          .program = program_mark(),
+          .time_stamp = time_of(job.source.file)};
+}
+
+/// Points at which the splines are sampled for their picture, at least; with six a cell of the mesh
+/// each way the MAE no longer falls by more than 0.0001.
+constexpr double kPicturePoints = 1e6;
+constexpr double kPictureDensity = 6.0;
+constexpr double kMaxPicturePoints = 4e6;
+
+ImageMetrics picture_of(const SplineNet& net, const Lens& lens, const Executor& executor) {
+  const Eigen::Vector2d size(net.u.back() - net.u.front(), net.v.back() - net.v.front());
+  const double cells = 0.5 * static_cast<double>(lens.surface.triangle_count());
+  const double points =
+      std::clamp(kPictureDensity * kPictureDensity * cells, kPicturePoints, kMaxPicturePoints);
+  const Eigen::Vector2d count = size / std::sqrt(size.prod() / points);
+  const SampledSurface solid =
+      sampled(net, {static_cast<int>(count.x()) + 2, static_cast<int>(count.y()) + 2});
+  return evaluate(solid.mesh, solid.normals, lens.setup, lens.target, nullptr, executor);
+}
+
+PictureGoal goal_of(const WantedPicture& wanted, const OpticalSetup& setup) {
+  PictureGoal goal;
+  goal.reach = wanted.reach();
+  goal.miss = [&wanted](const SampledSurface& solid) {
+    WantedPicture::Comparison found = wanted.compare(solid.mesh, solid.normals);
+    return PictureMiss{found.excess, std::move(found.missing)};
+  };
+  if (setup.point || setup.front) {
+    goal.stretch = [&wanted](const Eigen::Vector3d& p, const Eigen::Vector2d& slope,
+                             const Eigen::Matrix2d& bend) {
+      return wanted.stretch(p, slope, bend);
+    };
+  }
+  return goal;
+}
+
+/// @param control_points  of the surface; those of a front that is a height map come on top.
+void announce_splines(const Job& job, std::int64_t control_points) {
+  auto points = static_cast<double>(control_points);
+  const std::optional<Front>& front = job.source.lens.setup.front;
+  if (const auto* const map = front ? std::get_if<HeightFront>(&*front) : nullptr) {
+    points += static_cast<double>(map->spline->coefficients().size());
+  }
+  job.announce(require_room_for(&spline_solid_work, {"--max-points", points}, job.folder()));
+}
+
+/// Of a mesh: splines that project its picture.
+SplineSolid fitted_splines(const Job& job) {
+  const Lens& lens = job.source.lens;
+  FitOptions options{.tolerance = job.options.tolerance,
+                     .normal_tolerance = job.options.normal_tolerance,
+                     .max_control_points = job.options.max_points,
+                     .one_patch = lens.setup.outline.has_value(),
+                     .picture = {}};
+  SplineSolid solid;
+  const SmoothSurface surface(lens.surface);
+  announce_splines(job, most_control_points(surface, options));
+  job.control.report({"spline knots", 0.0, 0.0, ""});
+  const WantedPicture wanted(lens.surface, lens.setup, lens.target, job.executor);
+  solid.fit = SplineFit{options, {}};
+  options.picture = goal_of(wanted, lens.setup);
+  solid.net = fit_spline_net(surface, options, job.executor, job.control);
+  solid.fit->bound = normal_bound(surface, options.normal_tolerance);
+  solid.picture = picture_of(solid.net, lens, job.executor);
+  return solid;
+}
+
+/// Of a lens that is a spline: that spline.
+SplineSolid own_spline(const Job& job) {
+  const Lens& lens = job.source.lens;
+  announce_splines(job, control_points_of_net(*lens.spline));
+  SplineSolid solid;
+  solid.net = lens.setup.outline ? patch_of(*lens.spline, job.executor)
+                                 : net_of(*lens.spline, job.executor);
+  solid.picture = evaluate(lens, SurfaceModel::kSpline, nullptr, job.executor);
+  return solid;
+}
+
+/// What the solid's optical face is, as a mesh with the normals by which it projects its picture.
+SampledSurface part_of(const Job& job) { return lens_part(job.source.lens, job.executor); }
+
+SplineSolid write_splines(const Job& job) {
+  const Lens& lens = job.source.lens;
+  const std::string name = job.source.file.string();
+  if (lens.setup.outline && lens.setup.front &&
+      std::holds_alternative<HeightFront>(*lens.setup.front)) {
+    throw InputError(name +
+                     ": a solid of splines has either an outline or a height map for a front, not "
+                     "both; export a mesh instead, as --out lens.stl");
+  }
+  require_rectangle(lens.surface, height_field_outline(lens.surface, name), name);
+  const double mesh_volume =
+      enclosed_volume(closed_solid(part_of(job).mesh, name, lens.setup.front));
+  SplineSolid solid = lens.spline ? own_spline(job) : fitted_splines(job);
+  solid.net.front = lens.setup.front;
+  solid.net.outline = lens.setup.outline;
+  solid.mesh_volume = mesh_volume;
+  const StepHeader header = header_of(job);
+  job.begin_writing();
+  solid.content = job.format == ExportFormat::kIges
+                      ? write_iges(solid.net, header, job.out, job.control)
+                      : write_step(solid.net, header, job.options.schema, job.out, job.control);
+  return solid;
+}
+
+void write_scene(const Job& job, const SampledSurface& surface, const SurfaceMesh& solid) {
+  const Lens& lens = job.source.lens;
+  const std::int64_t triangles = surface.mesh.triangle_count();
+  GltfPart part{.solid = solid,
+                .normals = surface.normals,
+                .surface_triangles = triangles,
+                .curved_back = lens.setup.front ? triangles : 0,
+                .ior = lens.setup.ior,
+                .mirror = lens.setup.mode == LightMode::kReflect};
+  write_glb(part, part.mirror ? "mirror" : "lens", job.out);
+}
+
+MeshSolid write_mesh(const Job& job) {
+  job.control.report({"closed mesh", 0.0, 0.0, ""});
+  const SampledSurface surface = part_of(job);
+  const SurfaceMesh solid =
+      closed_solid(surface.mesh, job.source.file.string(), job.source.lens.setup.front);
+  const std::string title = program_mark() + " lens, millimetres";
+  job.begin_writing();
+  if (job.format == ExportFormat::kStl) write_stl(solid, title, job.out);
+  if (job.format == ExportFormat::kObj) write_obj(solid, title, job.out);
+  if (job.format == ExportFormat::kPly) write_ply(solid, job.out);
+  if (job.format == ExportFormat::k3mf) write_3mf(solid, title, job.out);
+  if (job.format == ExportFormat::kGlb) write_scene(job, surface, solid);
+  return {static_cast<std::int64_t>(solid.triangle_count()), enclosed_volume(solid)};
+}
+
+/// Tells what a height map takes. @throw InputError if there is no room for it.
+void announce_heights(const Job& job) {
+  const auto work = [&](double side) {
+    const GridShape shape =
+        height_map_shape(job.source.lens.setup.lens_size, static_cast<int>(side));
+    return height_map_work(double{1} * shape.columns * shape.rows,
+                           job.format == ExportFormat::kPng);
+  };
+  job.announce(require_room_for(work, {"--pixels", 1.0 * job.options.pixels}, job.folder()));
+}
+
+HeightMap write_heights(const Job& job) {
+  const Lens& lens = job.source.lens;
+  const auto surface =
+      optical_surface(lens, lens.spline ? SurfaceModel::kSpline : SurfaceModel::kSmooth);
+  const Image heights = height_map(*surface, job.options.pixels, job.executor, job.control);
+  HeightMap map{
+      {heights.columns(), heights.rows()}, surface->box().sizes().x() / heights.columns(), {}};
+  job.begin_writing();
+  if (job.format == ExportFormat::kExr) {
+    write_image(heights, job.out, job.control);
+  } else {
+    map.scale = write_grey_relief(heights, job.out, job.executor, job.control);
+  }
+  return map;
+}
+
+}  // namespace
+
+ExportSource read_export_source(const fs::path& folder, ExportSurface surface) {
+  ExportSource source{read_lens(folder), folder / lens_file::kSurface};
+  if (surface == ExportSurface::kMilled) {
+    source.file = folder / lens_file::kCut / "milled.ply";
+    source.lens.surface = read_mesh(source.file);
+    source.lens.spline.reset();
+    source.lens.model = SurfaceModel::kSmooth;
+  }
+  height_field_outline(source.lens.surface, source.file.string());
+  return source;
+}
+
+ExportResult export_lens(const ExportSource& source, const fs::path& out,
+                         const ExportOptions& options, const Executor& executor,
+                         const RunControl& control, const ExportHooks& hooks) {
+  validate(options, out);
+  const Job job{source, out, options, export_format(options, out), executor, control, hooks};
+  if (is_height_map(job.format)) announce_heights(job);
+  const Lens& lens = source.lens;
+  ExportResult result;
+  result.format = job.format;
+  for (const SurfaceModel model : models_of(lens)) {
+    result.metrics[model] = evaluate(lens, model, nullptr, executor);
+  }
+  if (is_spline_solid(job.format)) {
+    result.splines = write_splines(job);
+  } else if (is_height_map(job.format)) {
+    result.heights = write_heights(job);
+  } else {
+    result.mesh = write_mesh(job);
+  }
+  return result;
+}
+
+}  // namespace lensforge

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+
+#include "core/surface/surface_mesh.h"
+
+/// Meshes in the formats that printers, CAM programs and viewers read; millimetres. Each file
+/// appears whole or not at all, and shows its title to one who looks at its bytes. PLY and
+/// STL are core/surface/mesh_io.h's.
+namespace lensforge {
+
+/// Wavefront OBJ; coordinates read back as the same doubles. `title` becomes a comment.
+/// @throw RunError if it cannot be written.
+void write_obj(const SurfaceMesh& mesh, const std::string& title,
+               const std::filesystem::path& path);
+
+/// 3MF core specification 1.2: one object, unit millimetre, coordinates to 1e-9 mm; `title` of
+/// 65,535 bytes at most.
+/// @pre the mesh is closed. @throw RunError if it cannot be written.
+void write_3mf(const SurfaceMesh& mesh, const std::string& title,
+               const std::filesystem::path& path);
+
+/// A solid for scenes of other programs.
+struct GltfPart {
+  SurfaceMesh solid;  ///< Closed, mm; the optical surface's triangles first (closed_solid()).
+  Eigen::Matrix3Xd normals;  ///< Of the optical surface at its vertices, the solid's first ones.
+  std::int64_t surface_triangles = 0;
+  /// How many triangles at the solid's end are a curved face, which is shaded smoothly.
+  std::int64_t curved_back = 0;
+  double ior = 1.49;    ///< Of a lens.
+  bool mirror = false;  ///< Polished metal instead of clear glass.
+};
+
+/// Writes binary glTF 2.0 in metres: x, y and z are the lens frame's, so that the picture's up is
+/// glTF's. A lens is clear by KHR_materials_transmission, KHR_materials_volume and
+/// KHR_materials_ior. Walls and a flat back have normals of their own. The file appears whole or
+/// not at all. @throw RunError if it cannot be written, or would be longer than 4 GiB.
+void write_glb(const GltfPart& part, const std::string& title, const std::filesystem::path& path);
+
+/// What a file of meshes says of itself: enough to know it again.
+struct MeshContent {
+  std::string format;  ///< "3MF" or "glTF 2.0".
+  std::string title;   ///< As it is given; may be empty.
+  std::int64_t meshes = 0;
+  std::int64_t vertices = 0;
+  std::int64_t triangles = 0;
+  Eigen::AlignedBox3d box;  ///< Of the meshes as they are stored, mm.
+  bool moved = false;       ///< The file moves or turns meshes, which `box` leaves out.
+};
+
+/// Reads a 3MF package ("3D Manufacturing Format", core specification 1.3) but for what only
+/// printers need. @throw InputError if it is no such package, or holds no mesh.
+MeshContent inspect_3mf(const std::filesystem::path& path);
+
+/// Reads the description in a binary glTF file (glTF 2.0); the numbers of its vertices are taken on
+/// trust. @throw InputError if it is no such file, or holds no mesh.
+MeshContent inspect_glb(const std::filesystem::path& path);
+
+}  // namespace lensforge
