@@ -2,6 +2,7 @@
 #include "app/coupon_settings.h"
 
 #include "core/error.h"
+#include "core/text/toml_fields.h"
 
 namespace lensforge::app {
 

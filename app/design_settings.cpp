@@ -8,7 +8,7 @@
 
 #include "app/json_output.h"
 #include "cam/cam_fields.h"
-#include "cam/tool/workshop.h"
+#include "cam/workshop/workshop.h"
 #include "core/error.h"
 #include "core/image/image_io.h"
 #include "core/image/svg_drawing.h"

@@ -9,6 +9,7 @@
 #include "cam/post/program_writer.h"
 #include "core/error.h"
 #include "core/surface/surface_model.h"
+#include "core/text/toml_fields.h"
 
 namespace lensforge {
 namespace {

@@ -13,7 +13,7 @@
 #include "cam/post/post_description.h"
 #include "cam/post/program_plan.h"
 #include "cam/report/verdict.h"
-#include "cam/tool/workshop.h"
+#include "cam/workshop/workshop.h"
 #include "core/optics/optical_setup.h"
 #include "core/surface/surface_model.h"
 

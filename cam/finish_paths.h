@@ -8,7 +8,7 @@
 #include "cam/milled/ball_path.h"
 #include "cam/path/finish_raster.h"
 #include "cam/path/move.h"
-#include "cam/tool/process.h"
+#include "cam/workshop/workshop.h"
 #include "core/compute/run_control.h"
 #include "machine/gcode/gcode_dialect.h"
 

@@ -12,7 +12,7 @@
 
 #include "cam/path/collision.h"
 #include "cam/post/program_reader.h"
-#include "cam/tool/tool.h"
+#include "cam/workshop/tool.h"
 
 namespace lensforge {
 

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "cam/finish_setup.h"
-#include "cam/tool/standard_balls.h"
+#include "cam/workshop/tool.h"
 #include "core/error.h"
 #include "core/page/html_text.h"
 #include "core/text/number_text.h"

@@ -12,7 +12,7 @@
 #include "cam/path/move.h"
 #include "cam/path/operation.h"
 #include "cam/path/stock_map.h"
-#include "cam/tool/workshop.h"
+#include "cam/workshop/workshop.h"
 
 namespace lensforge {
 

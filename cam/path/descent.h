@@ -13,8 +13,8 @@
 #include "cam/path/move.h"
 #include "cam/path/move_pieces.h"
 #include "cam/path/tip_floor.h"
-#include "cam/tool/process.h"
-#include "cam/tool/tool.h"
+#include "cam/workshop/tool.h"
+#include "cam/workshop/workshop.h"
 
 namespace lensforge {
 

@@ -8,7 +8,7 @@
 #include "cam/path/finish_raster.h"
 #include "cam/path/move.h"
 #include "cam/path/operation.h"
-#include "cam/tool/tool.h"
+#include "cam/workshop/tool.h"
 #include "core/compute/executor.h"
 #include "core/compute/run_control.h"
 

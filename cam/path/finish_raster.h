@@ -13,7 +13,7 @@
 #include "cam/path/move.h"
 #include "cam/path/operation.h"
 #include "cam/path/row_profile.h"
-#include "cam/tool/process.h"
+#include "cam/workshop/workshop.h"
 #include "core/compute/executor.h"
 #include "core/compute/run_control.h"
 

@@ -10,7 +10,7 @@
 
 #include "cam/path/outline_offset.h"
 #include "cam/path/rough_moves.h"
-#include "cam/tool/cutter_profile.h"
+#include "cam/workshop/tool.h"
 #include "core/error.h"
 #include "core/text/number_text.h"
 

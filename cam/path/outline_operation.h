@@ -7,7 +7,7 @@
 #include "cam/path/move.h"
 #include "cam/path/operation.h"
 #include "cam/path/stock_map.h"
-#include "cam/tool/tool.h"
+#include "cam/workshop/tool.h"
 #include "core/compute/run_control.h"
 
 namespace lensforge {

@@ -5,7 +5,7 @@
 #include "cam/path/move.h"
 #include "cam/path/operation.h"
 #include "cam/path/stock_map.h"
-#include "cam/tool/workshop.h"
+#include "cam/workshop/workshop.h"
 #include "core/compute/executor.h"
 #include "core/compute/run_control.h"
 

@@ -6,7 +6,7 @@
 #include "cam/path/rough_moves.h"
 #include "cam/path/rough_passes.h"
 #include "cam/path/tip_floor.h"
-#include "cam/tool/workshop.h"
+#include "cam/workshop/workshop.h"
 
 namespace lensforge {
 

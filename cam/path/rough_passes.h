@@ -8,7 +8,7 @@
 
 #include "cam/path/operation.h"
 #include "cam/path/tip_floor.h"
-#include "cam/tool/process.h"
+#include "cam/workshop/workshop.h"
 #include "core/compute/executor.h"
 #include "core/compute/run_control.h"
 

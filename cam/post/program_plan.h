@@ -9,7 +9,7 @@
 
 #include "cam/path/move.h"
 #include "cam/path/operation.h"
-#include "cam/tool/tool.h"
+#include "cam/workshop/tool.h"
 #include "machine/planner/planner_settings.h"
 
 namespace lensforge {

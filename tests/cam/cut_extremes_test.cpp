@@ -21,6 +21,7 @@
 #include "core/error.h"
 #include "core/stop_bound.h"
 #include "core/temp_folder.h"
+#include "core/text/toml_fields.h"
 
 namespace lensforge {
 namespace {

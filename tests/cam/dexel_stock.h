@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "cam/path/move.h"
-#include "cam/tool/cutter_profile.h"
+#include "cam/workshop/tool.h"
 
 namespace lensforge::testing {
 

@@ -17,7 +17,7 @@
 #include "cam/post_plans.h"
 #include "cam/prediction.h"
 #include "cam/report/leak_words.h"
-#include "cam/tool/standard_balls.h"
+#include "cam/workshop/tool.h"
 #include "core/temp_folder.h"
 
 namespace lensforge {

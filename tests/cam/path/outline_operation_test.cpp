@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "cam/path/outline_offset.h"
-#include "cam/tool/workshop.h"
+#include "cam/workshop/workshop.h"
 #include "core/error.h"
 #include "core/optics/outline.h"
 #include "core/surface/corners.h"

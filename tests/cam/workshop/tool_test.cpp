@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "cam/workshop/tool.h"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
 #include <string>
 
-#include "cam/tool/cutter_profile.h"
-#include "cam/tool/workshop.h"
+#include "cam/workshop/workshop.h"
 #include "core/error.h"
 
 namespace lensforge {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "cam/tool/workshop.h"
+#include "cam/workshop/workshop.h"
 
 #include <algorithm>
 #include <cmath>
@@ -229,26 +229,6 @@ void validate(const Workshop& workshop, const std::string& file) {
   for (std::size_t i = 0; i < workshop.tools.size(); ++i) check_tool(rules, workshop, i);
   check_keep_outs(rules, workshop);
   check_process(rules, workshop);
-}
-
-Tool resized(Tool tool, double diameter) {
-  const double before = tool.diameter;
-  const double scale = diameter / before;
-  double lift = (scale - 1.0) * tool.flute_length;
-  tool.diameter = diameter;
-  tool.corner_radius *= scale;
-  tool.flute_length *= scale;
-  tool.name = "diameter as given";
-  for (ToolSection& section : tool.sections) {
-    const bool neck = &section == &tool.sections.front() && section.diameter <= before;
-    if (neck) {
-      lift = (scale - 1.0) * section.to;
-      section = {scale * section.diameter, scale * section.from, scale * section.to};
-    } else {
-      section = {std::max(section.diameter, diameter), section.from + lift, section.to + lift};
-    }
-  }
-  return tool;
 }
 
 }  // namespace lensforge

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "cam/tool/workshop.h"
+#include "cam/workshop/workshop.h"
 #include "core/error.h"
 #include "core/text/number_text.h"
 #include "core/text/toml_fields.h"
