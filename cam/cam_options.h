@@ -9,7 +9,7 @@
 
 #include "cam/leakage/leakage.h"
 #include "cam/path/finish_raster.h"
-#include "cam/path/outline_operation.h"
+#include "cam/path/outline_cut.h"
 #include "cam/post/post_description.h"
 #include "cam/post/program_plan.h"
 #include "cam/report/verdict.h"

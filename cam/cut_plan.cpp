@@ -7,7 +7,7 @@
 
 #include "cam/contact/mould.h"
 #include "cam/meant_surface.h"
-#include "cam/path/rough_links.h"
+#include "cam/path/rough_passes.h"
 #include "core/error.h"
 #include "core/text/number_text.h"
 

@@ -7,7 +7,7 @@
 
 #include "cam/milled/ball_path.h"
 #include "cam/path/finish_raster.h"
-#include "cam/path/move.h"
+#include "cam/path/operation.h"
 #include "cam/workshop/workshop.h"
 #include "core/compute/run_control.h"
 #include "machine/gcode/gcode_dialect.h"

@@ -19,7 +19,7 @@
 #include "cam/cut_safety.h"
 #include "cam/job_files.h"
 #include "cam/nest_drawing.h"
-#include "cam/path/rough_links.h"
+#include "cam/path/rough_passes.h"
 #include "cam/post/program_writer.h"
 #include "cam/report/report_json.h"
 #include "core/error.h"

@@ -9,7 +9,7 @@
 
 #include "cam/cut_estimate.h"
 #include "cam/nest_layout.h"
-#include "cam/path/outline_operation.h"
+#include "cam/path/outline_cut.h"
 #include "cam/path/rough.h"
 #include "core/error.h"
 #include "core/text/number_text.h"

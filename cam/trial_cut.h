@@ -11,7 +11,7 @@
 #include "cam/leakage/leak_map.h"
 #include "cam/leakage/leakage.h"
 #include "cam/milled/surface_field.h"
-#include "cam/path/move.h"
+#include "cam/path/operation.h"
 #include "core/compute/executor.h"
 #include "core/compute/run_control.h"
 #include "core/surface/lens.h"

@@ -2,7 +2,6 @@
 #pragma once
 
 #include "cam/contact/profile_cutter.h"
-#include "cam/path/move.h"
 #include "cam/path/operation.h"
 #include "cam/path/stock_map.h"
 #include "cam/workshop/workshop.h"

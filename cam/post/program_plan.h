@@ -7,7 +7,6 @@
 #include <string>
 #include <vector>
 
-#include "cam/path/move.h"
 #include "cam/path/operation.h"
 #include "cam/workshop/tool.h"
 #include "machine/planner/planner_settings.h"

@@ -9,7 +9,7 @@
 #include <functional>
 #include <vector>
 
-#include "cam/path/move.h"
+#include "cam/path/operation.h"
 #include "cam/workshop/tool.h"
 
 namespace lensforge::testing {

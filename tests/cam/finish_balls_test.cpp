@@ -19,7 +19,7 @@
 #include "cam/milled/milled_field.h"
 #include "cam/milled/polished_field.h"
 #include "cam/milled_paths.h"
-#include "cam/path/finish_operation.h"
+#include "cam/path/finish_raster.h"
 #include "core/error.h"
 #include "core/surface/lens_surface.h"
 #include "core/temp_folder.h"

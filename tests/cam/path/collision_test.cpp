@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "cam/cam_meshes.h"
-#include "cam/path/move_pieces.h"
+#include "cam/path/operation.h"
 #include "cam/path/rough.h"
 
 namespace lensforge {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "cam/path/arc_fit.h"
+#include "cam/path/row_fit.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "cam/path/move_pieces.h"
+#include "cam/path/operation.h"
 
 #include <algorithm>
 #include <cmath>

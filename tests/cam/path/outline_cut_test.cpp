@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "cam/path/outline_operation.h"
+#include "cam/path/outline_cut.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -11,7 +11,6 @@
 #include <numbers>
 #include <vector>
 
-#include "cam/path/outline_offset.h"
 #include "cam/workshop/workshop.h"
 #include "core/error.h"
 #include "core/optics/outline.h"
