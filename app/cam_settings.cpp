@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "app/cam_settings.h"
 
-#include "cam/cam_fields.h"
+#include "cam/plan/cam_options.h"
 
 namespace lensforge::app {
 

@@ -6,7 +6,7 @@
 
 #include "app/json_output.h"
 #include "app/overview.h"
-#include "cam/cam_job.h"
+#include "cam/cam.h"
 #include "core/image/image_io.h"
 #include "core/io/checkpoint_file.h"
 #include "core/io/lens_folder.h"

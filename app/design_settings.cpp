@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "app/json_output.h"
-#include "cam/cam_fields.h"
+#include "cam/plan/cam_options.h"
 #include "cam/workshop/workshop.h"
 #include "core/error.h"
 #include "core/image/image_io.h"

@@ -17,7 +17,7 @@
 #include "app/option_set.h"
 #include "app/output_folder.h"
 #include "app/progress_display.h"
-#include "cam/cut_estimate.h"
+#include "cam/cam.h"
 #include "core/io/files.h"
 #include "core/io/folder_lock.h"
 #include "core/text/number_text.h"

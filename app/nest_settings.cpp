@@ -7,7 +7,7 @@
 #include <span>
 
 #include "app/cam_settings.h"
-#include "cam/cam_fields.h"
+#include "cam/plan/cam_options.h"
 #include "core/error.h"
 #include "core/text/number_list.h"
 

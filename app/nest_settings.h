@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "app/option_set.h"
-#include "cam/nest_job.h"
+#include "cam/job/nest_job.h"
 
 namespace lensforge::app {
 

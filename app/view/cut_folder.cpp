@@ -7,10 +7,9 @@
 #include <optional>
 #include <system_error>
 
-#include "cam/cam_job.h"
-#include "cam/part_layers.h"
-#include "cam/part_surfaces.h"
+#include "cam/cam.h"
 #include "cam/post/program_reader.h"
+#include "cam/predict/part_surfaces.h"
 #include "core/error.h"
 #include "core/image/layered_image.h"
 #include "core/io/cut_layers.h"

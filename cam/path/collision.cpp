@@ -192,7 +192,7 @@ void CollisionCheck::check_table(const PathMove& move) {
   if (!hangs && std::min(at_.z(), move.end.z()) >= table) return;
   split_move(at_, move, kPiece, [&](const MovePiece& piece) {
     const double lowest = hangs ? piece.lowest : std::min(piece.from.z(), piece.to.z());
-    if (lowest < table) note({parts_.front().name, kTable, piece.to, table - lowest});
+    if (lowest < table) note({parts_.front().name, kTableObstacle, piece.to, table - lowest});
   });
 }
 

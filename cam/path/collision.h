@@ -92,15 +92,15 @@ class DescentCheck {
 };
 
 /// What the blank lies on, as an obstacle.
-inline constexpr const char* kTable = "the table under the blank";
+inline constexpr const char* kTableObstacle = "the table under the blank";
 
 /// One part of one tool that touches one thing, in one operation.
 struct Collision {
   std::string operation;
-  int tool = 1;                 ///< Tool::number
-  std::string part;             ///< "cutter", "tool above its flutes", "section of 4 mm"
-  std::string obstacle;         ///< "the lens", "the blank", kTable, "the keep-out box 'vice'"
-  std::int64_t moves = 0;       ///< How many moves touch it.
+  int tool = 1;            ///< Tool::number
+  std::string part;        ///< "cutter", "tool above its flutes", "section of 4 mm"
+  std::string obstacle;    ///< "the lens", "the blank", kTableObstacle, "the keep-out box 'vice'"
+  std::int64_t moves = 0;  ///< How many moves touch it.
   Eigen::Vector3d first_place;  ///< Tip, mm, lens frame.
   Extreme worst;                ///< How much too low the tool is at most, mm, and where.
 

@@ -8,7 +8,7 @@
 #include "app/nest_settings.h"
 #include "app/reflect_settings.h"
 #include "app/send_settings.h"
-#include "cam/cam_fields.h"
+#include "cam/plan/cam_options.h"
 #include "core/temp_folder.h"
 #include "design/design_fields.h"
 #include "design/render_fields.h"
