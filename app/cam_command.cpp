@@ -18,7 +18,6 @@
 #include "app/output_folder.h"
 #include "app/progress_display.h"
 #include "cam/cam.h"
-#include "cam/job/cut_compare.h"
 #include "cam/job/job_files.h"
 #include "cam/plan/finishing.h"
 #include "cam/report/leak_words.h"

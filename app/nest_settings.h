@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "app/option_set.h"
-#include "cam/job/nest_job.h"
+#include "cam/cam.h"
 
 namespace lensforge::app {
 

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "cam/job/cut_compare.h"
-
 #include <algorithm>
 #include <array>
 #include <charconv>

@@ -2,17 +2,12 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <Eigen/Geometry>
-#include <optional>
 #include <string>
 #include <vector>
 
-#include "cam/plan/cam_options.h"
-#include "cam/report/report_data.h"
-#include "core/compute/work_estimate.h"
-#include "core/surface/lens.h"
-
 namespace lensforge {
+
+struct NestLayout;
 
 /// A rectangle that is to lie on a blank; mm.
 struct NestItem {
@@ -38,54 +33,6 @@ std::vector<Eigen::Vector2d> place_in_rows(const std::vector<NestItem>& items,
 /// mm; a whole number of units of any program's last decimal, so that moved numbers are rounded as
 /// they were.
 inline constexpr double kNestStep = 0.01;
-
-/// One of the lenses that share a blank.
-struct NestLens {
-  std::string name;  ///< Of its folder of reports: no two have the same.
-  const Lens* lens = nullptr;
-};
-
-/// How lenses share a blank; mm. Clamps are placed from the blank's lower left corner.
-struct NestOptions {
-  CamOptions cam;  ///< Of all lenses; stock.margin is kept free at the blank's edge.
-  Eigen::Vector2d blank = Eigen::Vector2d::Zero();
-  std::optional<double> thickness;  ///< Of the blank; none: what the highest lens needs.
-  double gap = 0.0;                 ///< Between lenses; 0: the least that the tools need.
-};
-
-/// A lens where it lies on the blank.
-struct NestedLens {
-  std::string name;
-  Eigen::AlignedBox2d box;               ///< Its rectangle from the blank's corner, mm.
-  std::vector<Eigen::Vector2d> outline;  ///< Likewise, counter-clockwise.
-  bool cut_out = false;                  ///< Else it stays joined to the blank.
-  ReportData report;
-};
-
-/// How a nest is laid out.
-struct NestLayout {
-  Eigen::Vector3d blank = Eigen::Vector3d::Zero();  ///< mm
-  double gap = 0.0;
-  double edge = 0.0;
-  double slot = 0.0;  ///< Width of the cut around lenses, mm; 0 if none is cut out.
-  std::vector<NestedLens> lenses;
-  std::vector<KeepOut> keep_outs;
-};
-
-/// The options of each lens's cut in the order of the lenses, and where they lie.
-struct NestPlan {
-  NestLayout layout;
-  std::vector<CamOptions> cuts;
-};
-
-/// Of the common blank, at least: the highest lens with the stock above it, mm.
-double least_thickness(const std::vector<NestLens>& lenses, const NestOptions& options);
-
-/// @throw InputError as make_nest().
-NestPlan plan_nest(const std::vector<NestLens>& lenses, const NestOptions& options);
-
-/// What make_nest() takes: all that estimate_cut() says of each lens.
-WorkEstimate estimate_nest(const NestPlan& plan, const std::vector<NestLens>& lenses, int threads);
 
 /// The blank seen from above as SVG: lenses with their names and places, the cut around them,
 /// clamps, the program's zero. One unit is a millimetre.

@@ -17,7 +17,6 @@
 #include "cam/cam_meshes.h"
 #include "cam/contact/profile_contact.h"
 #include "cam/dexel_stock.h"
-#include "cam/job/nest_job.h"
 #include "cam/path/collision.h"
 #include "cam/path/rough.h"
 #include "cam/plan/program_watch.h"

@@ -8,7 +8,6 @@
 
 #include "cam/cam.h"
 #include "cam/cam_meshes.h"
-#include "cam/job/cut_compare.h"
 #include "core/error.h"
 #include "core/temp_folder.h"
 
