@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "app/frame/option_set.h"
-#include "cam/cam_options.h"
+#include "cam/plan/cam_options.h"
 #include "cam/report/verdict.h"
 
 namespace lensforge::app {

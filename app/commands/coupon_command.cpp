@@ -14,6 +14,7 @@
 #include "cam/coupon/fitted_workshop.h"
 #include "core/error.h"
 #include "core/text/number_text.h"
+#include "core/text/toml_fields.h"
 
 namespace lensforge::app {
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "app/frame/option_set.h"
-#include "cam/nest_job.h"
+#include "cam/cam.h"
 
 namespace lensforge::app {
 

@@ -14,10 +14,9 @@
 #include <variant>
 #include <vector>
 
-#include "cam/cam_job.h"
-#include "cam/part_layers.h"
-#include "cam/part_surfaces.h"
+#include "cam/cam.h"
 #include "cam/post/program_reader.h"
+#include "cam/predict/part_surfaces.h"
 #include "cam/report/path_sketch.h"
 #include "core/compute/run_control.h"
 #include "core/error.h"

@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 
 #include "cam/contact/ball_cutter.h"
-#include "cam/tool/cutter_profile.h"
+#include "cam/workshop/tool.h"
 
 /// A vertical cutter of any profile against points, edges and facets.
 ///

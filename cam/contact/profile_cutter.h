@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "cam/contact/drop_cutter.h"
-#include "cam/tool/cutter_profile.h"
+#include "cam/workshop/tool.h"
 #include "core/surface/surface_mesh.h"
 
 namespace lensforge {

@@ -6,7 +6,7 @@
 
 #include "cam/coupon/coupon_readings.h"
 #include "cam/coupon/coupon_state.h"
-#include "cam/tool/workshop.h"
+#include "cam/workshop/workshop.h"
 
 namespace lensforge {
 

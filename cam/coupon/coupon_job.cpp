@@ -6,7 +6,7 @@
 
 #include "cam/coupon/coupon_plan.h"
 #include "cam/coupon/coupon_sheet.h"
-#include "cam/job_files.h"
+#include "cam/job/job_files.h"
 #include "cam/post/program_part.h"
 #include "cam/post/program_writer.h"
 #include "core/error.h"

@@ -3,7 +3,7 @@
 
 #include "cam/post/post_description.h"
 #include "cam/post/program_plan.h"
-#include "cam/tool/workshop.h"
+#include "cam/workshop/workshop.h"
 #include "core/text/option_field.h"
 
 namespace lensforge {

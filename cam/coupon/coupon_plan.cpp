@@ -5,9 +5,8 @@
 #include <array>
 #include <cmath>
 
-#include "cam/path/finish_operation.h"
 #include "cam/path/finish_raster.h"
-#include "cam/path/rough_links.h"
+#include "cam/path/rough_passes.h"
 #include "cam/post/program_time.h"
 #include "core/text/number_text.h"
 

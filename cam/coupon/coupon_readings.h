@@ -8,7 +8,7 @@
 
 #include "cam/coupon/coupon_layout.h"
 #include "cam/coupon/coupon_light.h"
-#include "cam/tool/workshop.h"
+#include "cam/workshop/workshop.h"
 
 namespace lensforge {
 

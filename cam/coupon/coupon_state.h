@@ -2,7 +2,7 @@
 #pragma once
 
 #include "cam/coupon/coupon_light.h"
-#include "cam/tool/workshop.h"
+#include "cam/workshop/workshop.h"
 
 namespace lensforge {
 

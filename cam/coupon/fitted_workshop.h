@@ -6,7 +6,7 @@
 #include <string>
 
 #include "cam/coupon/coupon_fit.h"
-#include "cam/tool/workshop.h"
+#include "cam/workshop/workshop.h"
 
 namespace lensforge {
 

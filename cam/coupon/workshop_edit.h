@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "cam/tool/workshop.h"
+#include "cam/workshop/workshop.h"
 
 namespace lensforge {
 

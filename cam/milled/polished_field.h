@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "cam/milled/surface_field.h"
-#include "cam/tool/polish_model.h"
+#include "cam/workshop/workshop.h"
 
 namespace lensforge {
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "cam/tool/polish_model.h"
+#include "cam/workshop/workshop.h"
 
 namespace lensforge {
 

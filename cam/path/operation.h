@@ -4,10 +4,50 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <functional>
+#include <span>
 #include <string>
 #include <vector>
 
 namespace lensforge {
+
+/// What a motion of the tool is for.
+enum class MoveKind : std::uint8_t {
+  kRapid,   ///< In air, as fast as the axes go.
+  kPlunge,  ///< Down into material at the plunge feed, or a ramp or helix at it.
+  kLink,    ///< At feed, in air or over finished surface.
+  kCut,     ///< At the cutting feed.
+};
+
+/// One motion of the tool's tip from where it is to `end`: mm, lens frame (not the program's).
+struct PathMove {
+  MoveKind kind = MoveKind::kCut;
+  Eigen::Vector3d end = Eigen::Vector3d::Zero();
+  /// Arcs lie in a plane x = const (G19), y = const (G18) or z = const (G17, a helix where z
+  /// changes): the number of the axis that the plane is normal to, or -1 for a straight move.
+  int arc_axis = -1;
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< Of the arc.
+  bool clockwise = false;  ///< G2: seen from the positive end of the normal axis.
+  double feed = 0.0;       ///< mm/min; 0 for rapids.
+};
+
+/// Takes the moves of an operation in order, many at a time; the span is valid during the call.
+using MoveSink = std::function<void(std::span<const PathMove>)>;
+
+/// A short part of a move.
+struct MovePiece {
+  Eigen::Vector3d from;
+  Eigen::Vector3d to;
+  double lowest;  ///< No point of the part is below this, mm.
+  double reach;   ///< No point of it is farther than this from its middle, seen from above, mm.
+
+  [[nodiscard]] Eigen::Vector2d middle() const { return 0.5 * (from + to).head<2>(); }
+};
+
+/// Cuts a straight move or an arc that begins at `begin` into parts of at most `length` mm along it
+/// and hands them to `take` in order; one part at least.
+void split_move(const Eigen::Vector3d& begin, const PathMove& move, double length,
+                const std::function<void(const MovePiece&)>& take);
 
 /// A number that was found to be the largest, and where.
 struct Extreme {

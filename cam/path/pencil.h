@@ -5,8 +5,7 @@
 #include <vector>
 
 #include "cam/contact/cut_surface.h"
-#include "cam/path/finish_operation.h"
-#include "cam/path/move.h"
+#include "cam/path/finish_raster.h"
 #include "cam/path/operation.h"
 #include "core/compute/executor.h"
 #include "core/compute/run_control.h"

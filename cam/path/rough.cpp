@@ -6,8 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "cam/path/rough_links.h"
-#include "cam/path/rough_moves.h"
 #include "cam/path/rough_passes.h"
 #include "cam/path/tip_floor.h"
 #include "core/error.h"

@@ -2,10 +2,9 @@
 #pragma once
 
 #include "cam/contact/profile_cutter.h"
-#include "cam/path/move.h"
 #include "cam/path/operation.h"
 #include "cam/path/stock_map.h"
-#include "cam/tool/workshop.h"
+#include "cam/workshop/workshop.h"
 #include "core/compute/executor.h"
 #include "core/compute/run_control.h"
 

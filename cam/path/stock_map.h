@@ -9,7 +9,7 @@
 
 #include "cam/contact/profile_cutter.h"
 #include "cam/path/operation.h"
-#include "cam/tool/cutter_profile.h"
+#include "cam/workshop/tool.h"
 #include "core/compute/executor.h"
 
 namespace lensforge {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "cam/contact/profile_cutter.h"
-#include "cam/tool/workshop.h"
+#include "cam/workshop/workshop.h"
 
 namespace lensforge {
 

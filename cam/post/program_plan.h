@@ -7,9 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "cam/path/move.h"
 #include "cam/path/operation.h"
-#include "cam/tool/tool.h"
+#include "cam/workshop/tool.h"
 #include "machine/planner/planner_settings.h"
 
 namespace lensforge {

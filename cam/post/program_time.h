@@ -4,7 +4,7 @@
 #include <cstdint>
 
 #include "cam/post/program_reader.h"
-#include "cam/tool/workshop.h"
+#include "cam/workshop/workshop.h"
 #include "machine/planner/planner_model.h"
 
 namespace lensforge {

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "cam/path/move.h"
+#include "cam/path/operation.h"
 
 namespace lensforge {
 

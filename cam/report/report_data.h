@@ -15,7 +15,7 @@
 #include "cam/report/path_sketch.h"
 #include "cam/report/verdict.h"
 #include "cam/tolerance/tolerance_forecast.h"
-#include "cam/tool/tool.h"
+#include "cam/workshop/tool.h"
 #include "core/image/image.h"
 #include "core/optics/front_surface.h"
 #include "core/optics/optical_setup.h"

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "cam/tolerance/passes.h"
-#include "cam/tool/tolerances.h"
+#include "cam/workshop/workshop.h"
 
 namespace lensforge {
 

@@ -10,7 +10,7 @@
 #include "cam/tolerance/part_error.h"
 #include "cam/tolerance/part_light.h"
 #include "cam/tolerance/passes.h"
-#include "cam/tool/polish_model.h"
+#include "cam/workshop/workshop.h"
 #include "core/compute/executor.h"
 #include "core/compute/run_control.h"
 #include "core/optics/optical_setup.h"

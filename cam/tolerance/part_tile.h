@@ -12,7 +12,7 @@
 #include "cam/tolerance/line_filter.h"
 #include "cam/tolerance/part_light.h"
 #include "cam/tolerance/ripple.h"
-#include "cam/tool/polish_model.h"
+#include "cam/workshop/workshop.h"
 #include "design/flux/flux_triangle.h"
 
 namespace lensforge {

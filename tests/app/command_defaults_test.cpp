@@ -8,7 +8,7 @@
 #include "app/commands/nest_command.h"
 #include "app/commands/reflect_command.h"
 #include "app/commands/send_command.h"
-#include "cam/cam_fields.h"
+#include "cam/plan/cam_options.h"
 #include "core/temp_folder.h"
 #include "design/design_fields.h"
 #include "design/render_fields.h"

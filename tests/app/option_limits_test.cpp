@@ -5,9 +5,8 @@
 
 #include "app/frame/command_line.h"
 #include "app/frame/option_set.h"
-#include "cam/cam_fields.h"
-#include "cam/cam_options.h"
 #include "cam/coupon/coupon_options.h"
+#include "cam/plan/cam_options.h"
 #include "core/error.h"
 #include "core/text/number_text.h"
 #include "design/design_fields.h"

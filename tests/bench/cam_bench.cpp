@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "bench/process_usage.h"
-#include "cam/cam_job.h"
+#include "cam/cam.h"
 #include "core/surface/lens.h"
 
 namespace lensforge {

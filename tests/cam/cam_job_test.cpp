@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "cam/cam_job.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -12,9 +10,9 @@
 #include <string>
 #include <vector>
 
+#include "cam/cam.h"
 #include "cam/cam_meshes.h"
 #include "cam/contact/height_field.h"
-#include "cam/cut_estimate.h"
 #include "cam/small_cuts.h"
 #include "core/error.h"
 #include "core/full_disk.h"

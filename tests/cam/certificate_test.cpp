@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "cam/adversarial_meshes.h"
-#include "cam/path/arc_fit.h"
+#include "cam/path/row_fit.h"
 #include "cam/row_certificate.h"
 
 namespace lensforge {

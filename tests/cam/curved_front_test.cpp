@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "cam/cam_job.h"
+#include "cam/cam.h"
 #include "cam/cam_meshes.h"
 #include "cam/small_cuts.h"
 #include "core/error.h"

@@ -8,7 +8,7 @@
 #include <string>
 
 #include "cam/adversarial_meshes.h"
-#include "cam/cam_job.h"
+#include "cam/cam.h"
 #include "cam/contact/profile_cutter.h"
 #include "cam/post/program_reader.h"
 #include "core/temp_folder.h"

@@ -14,13 +14,13 @@
 #include <utility>
 #include <vector>
 
-#include "cam/cam_job.h"
+#include "cam/cam.h"
 #include "cam/cam_meshes.h"
-#include "cam/cut_estimate.h"
-#include "cam/finish_setup.h"
+#include "cam/plan/finishing.h"
 #include "core/error.h"
 #include "core/stop_bound.h"
 #include "core/temp_folder.h"
+#include "core/text/toml_fields.h"
 
 namespace lensforge {
 namespace {

@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "cam/cam_job.h"
+#include "cam/cam.h"
 #include "cam/cam_meshes.h"
 #include "cam/dexel_stock.h"
 #include "cam/path/collision.h"
@@ -143,7 +143,7 @@ TEST(CutSafety, NoToolIsBelowTheTableAndNoRapidInTheBlankUnlessTheReportSaysSo) 
     EXPECT_NEAR(table.value, std::max(0.0, -deeds.lowest), kRounding) << seed;
     if (!table.passes()) {
       EXPECT_FALSE(collisions.passes()) << seed;
-      EXPECT_THAT(result.report.warnings, Contains(HasSubstr(kTable))) << seed;
+      EXPECT_THAT(result.report.warnings, Contains(HasSubstr(kTableObstacle))) << seed;
     }
     if (deeds.deepest_rapid > kLattice) {
       EXPECT_FALSE(collisions.passes()) << seed << " " << deeds.deepest_rapid;

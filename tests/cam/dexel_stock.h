@@ -9,8 +9,8 @@
 #include <functional>
 #include <vector>
 
-#include "cam/path/move.h"
-#include "cam/tool/cutter_profile.h"
+#include "cam/path/operation.h"
+#include "cam/workshop/tool.h"
 
 namespace lensforge::testing {
 

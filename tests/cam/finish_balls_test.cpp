@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "cam/finish_balls.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -12,14 +10,14 @@
 #include <vector>
 
 #include "cam/cam_meshes.h"
-#include "cam/finish_paths.h"
-#include "cam/meant_surface.h"
 #include "cam/milled/designed_field.h"
 #include "cam/milled/lens_grid.h"
 #include "cam/milled/milled_field.h"
 #include "cam/milled/polished_field.h"
 #include "cam/milled_paths.h"
-#include "cam/path/finish_operation.h"
+#include "cam/path/finish_raster.h"
+#include "cam/plan/finishing.h"
+#include "cam/predict/part_surfaces.h"
 #include "core/error.h"
 #include "core/surface/lens_surface.h"
 #include "core/temp_folder.h"

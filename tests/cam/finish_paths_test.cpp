@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "cam/finish_paths.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -8,6 +6,7 @@
 
 #include "cam/milled/milled_field.h"
 #include "cam/milled_paths.h"
+#include "cam/plan/finishing.h"
 
 namespace lensforge {
 namespace {

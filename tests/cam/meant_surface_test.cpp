@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A third model of surfaces: cam asks the interface, so that it is cut and predicted as it is.
-#include "cam/meant_surface.h"
-
 #include <gtest/gtest.h>
 
 #include <array>
@@ -11,6 +9,7 @@
 
 #include "cam/cam_meshes.h"
 #include "cam/milled_tiles.h"
+#include "cam/predict/part_surfaces.h"
 
 namespace lensforge {
 namespace {

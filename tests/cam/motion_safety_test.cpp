@@ -13,14 +13,13 @@
 #include <string>
 #include <vector>
 
-#include "cam/cam_job.h"
+#include "cam/cam.h"
 #include "cam/cam_meshes.h"
 #include "cam/contact/profile_contact.h"
 #include "cam/dexel_stock.h"
-#include "cam/nest_job.h"
 #include "cam/path/collision.h"
 #include "cam/path/rough.h"
-#include "cam/program_watch.h"
+#include "cam/plan/program_watch.h"
 #include "cam/program_ways.h"
 #include "core/temp_folder.h"
 

@@ -8,10 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "cam/cam_job.h"
+#include "cam/cam.h"
 #include "cam/cam_meshes.h"
-#include "cam/nest_job.h"
-#include "cam/nest_layout.h"
+#include "cam/job/nest_plan.h"
 #include "cam/post/program_reader.h"
 #include "cam/rs274_interpreter.h"
 #include "core/error.h"

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "cam/part_layers.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "cam/analytic_fields.h"
 #include "cam/milled/lens_grid.h"
+#include "cam/predict/part_surfaces.h"
 
 namespace lensforge {
 namespace {

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "cam/remedies.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -9,15 +7,15 @@
 #include <string>
 #include <vector>
 
-#include "cam/cam_job.h"
+#include "cam/cam.h"
 #include "cam/cam_meshes.h"
-#include "cam/finish_setup.h"
 #include "cam/milled/designed_field.h"
-#include "cam/part_layers.h"
+#include "cam/plan/finishing.h"
 #include "cam/post_plans.h"
-#include "cam/prediction.h"
+#include "cam/predict/part_surfaces.h"
+#include "cam/predict/prediction.h"
 #include "cam/report/leak_words.h"
-#include "cam/tool/standard_balls.h"
+#include "cam/workshop/tool.h"
 #include "core/temp_folder.h"
 
 namespace lensforge {

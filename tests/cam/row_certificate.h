@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 #include <span>
 
-#include "cam/path/row_error.h"
+#include "cam/path/row_profile.h"
 
 namespace lensforge::testing {
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "cam/cam_job.h"
+#include "cam/cam.h"
 #include "cam/cam_meshes.h"
 #include "core/temp_folder.h"
 

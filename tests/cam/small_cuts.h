@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "cam/cam_job.h"
+#include "cam/cam.h"
 #include "core/temp_folder.h"
 
 /// Cuts that are quick enough for a test.

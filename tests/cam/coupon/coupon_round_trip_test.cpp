@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "cam/cam_job.h"
+#include "cam/cam.h"
 #include "cam/cam_meshes.h"
 #include "cam/coupon/coupon_fit.h"
 #include "cam/coupon/coupon_job.h"

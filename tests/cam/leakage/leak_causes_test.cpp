@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "cam/cam_job.h"
+#include "cam/cam.h"
 #include "cam/cam_meshes.h"
 #include "core/temp_folder.h"
 

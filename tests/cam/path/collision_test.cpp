@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "cam/cam_meshes.h"
-#include "cam/path/move_pieces.h"
+#include "cam/path/operation.h"
 #include "cam/path/rough.h"
 
 namespace lensforge {
@@ -63,7 +63,7 @@ TEST(Collision, FindsTheTableUnderTheBlankAndBesideIt) {
   for (const MoveKind kind : {MoveKind::kRapid, MoveKind::kCut}) {
     const auto beside = bench.check({to(MoveKind::kRapid, -20, 5, 1), to(kind, -20, 5, -0.37)});
     ASSERT_EQ(beside.size(), 1u);
-    EXPECT_EQ(beside[0].obstacle, kTable);
+    EXPECT_EQ(beside[0].obstacle, kTableObstacle);
     EXPECT_NEAR(beside[0].worst.value, 0.37, 1e-8);
   }
   // An arc that hangs below its ends.

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "cam/path/descent.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "cam/path/finish_operation.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -10,6 +8,7 @@
 #include <vector>
 
 #include "cam/cam_meshes.h"
+#include "cam/path/finish_raster.h"
 
 namespace lensforge {
 namespace {

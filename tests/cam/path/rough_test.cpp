@@ -14,7 +14,7 @@
 #include "cam/cam_meshes.h"
 #include "cam/contact/profile_contact.h"
 #include "cam/dexel_stock.h"
-#include "cam/path/rough_links.h"
+#include "cam/path/rough_passes.h"
 #include "core/error.h"
 
 namespace lensforge {

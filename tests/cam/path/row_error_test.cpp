@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "cam/path/row_error.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <random>
 #include <vector>
 
+#include "cam/path/row_profile.h"
 #include "cam/row_certificate.h"
 
 namespace lensforge {

@@ -3,7 +3,7 @@
 // into place) and by our own parser: the same motions, and the modes that the machine needs.
 #include <gtest/gtest.h>
 
-#include "cam/cam_job.h"
+#include "cam/cam.h"
 #include "cam/cam_meshes.h"
 #include "cam/post/program_reader.h"
 #include "cam/rs274_interpreter.h"

@@ -6,9 +6,8 @@
 #include <stop_token>
 #include <string>
 
-#include "cam/cam_job.h"
+#include "cam/cam.h"
 #include "cam/cam_meshes.h"
-#include "cam/cut_compare.h"
 #include "core/error.h"
 #include "core/temp_folder.h"
 

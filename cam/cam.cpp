@@ -1,0 +1,328 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cam/cam.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <optional>
+#include <string>
+#include <system_error>
+#include <utility>
+
+#include "cam/job/cut_report.h"
+#include "cam/job/job_files.h"
+#include "cam/plan/cut_plan.h"
+#include "cam/plan/finishing.h"
+#include "cam/predict/prediction.h"
+#include "cam/tolerance/part_model.h"
+#include "cam/tolerance/tolerance_forecast.h"
+#include "core/error.h"
+#include "core/io/files.h"
+#include "core/io/pending_files.h"
+#include "core/text/number_text.h"
+
+namespace lensforge {
+namespace {
+
+namespace fs = std::filesystem;
+
+using Clock = std::chrono::steady_clock;
+
+std::string names_of(const std::vector<fs::path>& paths) {
+  std::string names;
+  for (const fs::path& path : paths) {
+    names += (names.empty() ? "" : ", ") + path.filename().string();
+  }
+  return names;
+}
+
+/// One run of make_cut().
+class Job {
+ public:
+  Job(const Lens& lens, const CamOptions& options, fs::path folder, const Executor& executor,
+      const RunControl& control)
+      : lens_(lens),
+        options_(options),
+        folder_(std::move(folder)),
+        executor_(executor.with_stop(control.stop_token())),
+        control_(control),
+        plan_(lens, options, executor_) {}
+
+  CamResult run() {
+    const Clock::time_point start = Clock::now();
+    const ProgramPlan plan = plan_.programs(control_);
+    const ProgramSettings settings = plan_.settings();
+    require_replaceable_cut(folder_, programs_in_the_way(plan, options_.post, settings, folder_),
+                            cut_file_names(options_), options_.force);
+    PendingPrograms programs(plan, options_.post, settings, folder_, control_);
+    std::optional<Prediction> prediction;
+    if (options_.render) {
+      prediction = predict_cut(plan_, lens_, programs.programs(), executor_, control_);
+    }
+    CamResult result;
+    result.report = make_report(plan_, programs.programs(), prediction, lens_);
+    const OtherPrograms others = other_programs(folder_, paths_of(programs.programs()));
+    warn_of(others, result.report);
+    result.report.seconds = std::chrono::duration<double>(Clock::now() - start).count();
+    PendingFiles files(folder_);
+    if (prediction) add_prediction_files(*prediction, lens_, files);
+    add_report_files(result.report, files);
+    publish(programs, others, files, result);
+    const Verdict& verdict = result.report.verdict;
+    result.message = verdict_words(verdict.missed(), verdict.advice());
+    return result;
+  }
+
+ private:
+  static std::vector<fs::path> paths_of(const ProgramFiles& programs) {
+    std::vector<fs::path> paths;
+    for (const ProgramFile& file : programs.files) paths.push_back(file.path);
+    return paths;
+  }
+
+  static void warn_of(const OtherPrograms& others, ReportData& report) {
+    if (others.kept.empty()) return;
+    report.warnings.push_back("the folder holds programs of another job, which were kept: " +
+                              names_of(others.kept) + "; do not run them with it");
+  }
+
+  /// The old job goes and the new one comes, its report first and last, so that no report ever
+  /// stands beside programs that it is not about.
+  void publish(PendingPrograms& programs, const OtherPrograms& others, PendingFiles& files,
+               CamResult& result) const {
+    remove_prediction(folder_);
+    programs.publish();
+    for (const fs::path& path : others.earlier) {
+      std::error_code ignored;
+      fs::remove(path, ignored);
+    }
+    result.files = paths_of(programs.programs());
+    for (const fs::path& path : files.publish()) result.files.push_back(path);
+  }
+
+  const Lens& lens_;
+  const CamOptions& options_;
+  fs::path folder_;
+  Executor executor_;
+  const RunControl& control_;
+  CutPlan plan_;
+};
+
+}  // namespace
+
+void remove_cut(const fs::path& folder) {
+  remove_prediction(folder);
+  std::error_code ignored;
+  for (const fs::path& program : other_programs(folder, {}).earlier) fs::remove(program, ignored);
+}
+
+CamResult make_cut(const Lens& lens, const CamOptions& options, const fs::path& folder,
+                   const Executor& executor, const RunControl& control) {
+  validate(options, lens.setup);
+  try {
+    Job job(lens, options, folder, executor, control);
+    require_writable_folder(folder);
+    return job.run();
+  } catch (const Interrupted&) {
+    return {CamResult::Status::kInterrupted, "interrupted", {}, {}};
+  }
+}
+
+namespace {
+
+// Measured on a portrait of 100 mm with the default tools, 6e-5 rad: 2.4 moves and 0.2 ms a
+// millimetre of row. The powers are of one of 25 mm, on one core of 2.5 GHz: with 1e-3, 1.5e-4 and
+// 5e-5 rad 0.8, 2.3 and 9.1 moves and 0.12, 0.18 and 3.8 ms a millimetre of row.
+
+/// Moves a millimetre of row that the default tolerances take; how their number grows with coarser
+/// and with finer slopes, and, as chords of arcs shorten with the root of their height, with
+/// heights.
+constexpr double kMovesPerMm = 2.4;
+constexpr double kCoarserPower = 0.6;
+constexpr double kFinerPower = 1.3;
+constexpr double kTolerancePower = 0.5;
+
+constexpr double kBytesPerMove = 40.0;     ///< "G3 X12.345678 Z-1.234567 I-1.234567 K-12.345678"
+constexpr double kMemoryPerMove = 1000.0;  ///< Bytes: exact, fitted and written way of the ball.
+/// Bytes: the way of a machine with a pitch error. A lens of 100 x 67 mm at a pitch of 0.08 mm took
+/// 617 MB with one and 534 MB without.
+constexpr double kStretchedMemoryPerMove = 400.0;
+constexpr double kMemory = 1.5e8;          ///< Bytes of everything else.
+constexpr double kMemoryPerNode = 200.0;   ///< Bytes of milled.ply and of what it is made from.
+constexpr double kDiskPerNode = 50.0;      ///< Bytes of a vertex and two triangles.
+constexpr double kSecondsPerMm = 2e-4;     ///< Of a finishing row: drop curve, fit, reading back.
+constexpr double kMinSecondsPerMm = 1e-4;  ///< With any tolerance.
+constexpr double kFinerSeconds = 2.75;     ///< Their power of finer slopes: moves are tried often.
+constexpr double kTraced = 3.0;            ///< Times as long where the part is rendered.
+constexpr double kSecondsPerPoint = 1e-5;  ///< Of a roughing or semi-finishing pass.
+constexpr double kMovesPerPoint = 0.1;     ///< Most of them lie on straight ways.
+constexpr double kSecondsPerSample = 2.5e-7;    ///< Of a surface, milled, polished and rendered.
+constexpr double kSecondsPerPartNode = 1.9e-7;  ///< Of a part with errors (docs/performance.md).
+constexpr double kMemoryPerPartNode = 24.0;     ///< Bytes: three heights while they are sampled.
+constexpr double kSurfaces = 8.0;               ///< That are rendered.
+
+/// What the advised value leaves free.
+constexpr double kSpare = 1.5;
+
+double finish_length(const CamOptions& options, const Eigen::Vector2d& size) {
+  const FinishProcess& finish = options.workshop.process.finish;
+  const double radius = finishing_ball(options).radius();
+  const double pitch = finish_pitch(finish, radius);
+  const auto rows_of = [&](const Tool& ball, double apart) {
+    return (size + Eigen::Vector2d::Constant(ball.diameter)).prod() / apart;
+  };
+  double length = rows_of(finishing_ball(options), pitch) * (finish.cross ? 2.0 : 1.0);
+  // How much the larger ball leaves is not known yet: all of it at most.
+  if (const Tool* const large = larger_ball(options)) {
+    length += rows_of(*large, finish.large_every * pitch);
+  }
+  return length;
+}
+
+/// How many times as fine the directions are as by default; finer heights take moves like slopes.
+double fineness(const FinishProcess& finish) {
+  const FinishProcess usual;
+  const double height = std::pow(usual.tolerance / finish.tolerance, kTolerancePower);
+  return std::max(usual.slope_tolerance / finish.slope_tolerance, 0.1 * height);
+}
+
+double moves_per_mm(const FinishProcess& finish) {
+  const double fine = fineness(finish);
+  return kMovesPerMm * std::pow(fine, fine > 1.0 ? kFinerPower : kCoarserPower);
+}
+
+double seconds_per_mm(const CamOptions& options) {
+  const double fine = fineness(options.workshop.process.finish);
+  const double seconds = kSecondsPerMm * std::pow(fine, kFinerSeconds);
+  return std::max(seconds, kMinSecondsPerMm) * (options.render ? kTraced : 1.0);
+}
+
+/// Points of a pass that follows the surface, over one level.
+template <class Level>
+double points_of(const Level& level, const Eigen::Vector2d& size) {
+  return level.enabled ? size.prod() / (level.stepover * level.spacing) : 0.0;
+}
+
+double rough_points(const CamOptions& options, const Eigen::Vector2d& size) {
+  const Workshop& shop = options.workshop;
+  const double levels = std::ceil((shop.stock.allowance + 1.0) / shop.process.rough.stepdown);
+  return levels * points_of(shop.process.rough, size) + points_of(shop.process.semi, size);
+}
+
+double samples_of(const CamOptions& options, const OpticalSetup& setup) {
+  if (!options.render) return 0.0;
+  return kSurfaces * setup.lens_size.prod() / sample_spacings(options, setup).prod();
+}
+
+double memory_per_move(const FinishProcess& finish) {
+  return kMemoryPerMove + (finish.pitch_error != 0.0 ? kStretchedMemoryPerMove : 0.0);
+}
+
+double nodes_of(const Eigen::Vector2d& size) { return size.prod() / (kMeshSpacing * kMeshSpacing); }
+
+/// Parts that are predicted with errors, and nodes of each.
+double drawn_parts(const CamOptions& options) {
+  if (options.tolerances == 0) return 0.0;
+  const auto parts = static_cast<double>(options.tolerances);
+  return 1.0 + parts +
+         static_cast<double>(kErrorCauses) * static_cast<double>(paired_parts(options.tolerances));
+}
+
+double part_nodes(const CamOptions& options, const OpticalSetup& setup) {
+  const FinishProcess& finish = options.workshop.process.finish;
+  PartPlan plan;
+  plan.optics = setup;
+  plan.passes.pitch = finish_pitch(finish, finishing_ball(options).radius());
+  plan.passes.axis = finish.along == PassAxis::kX ? 0 : 1;
+  plan.passes.cross = finish.cross;
+  plan.polish = options.workshop.polish;
+  return options.tolerances > 0 ? static_cast<double>(part_nodes(plan)) : 0.0;
+}
+
+Eigen::Vector2d size_of(const CamOptions& options, const OpticalSetup& setup) {
+  const double shrinkage = options.part == PartKind::kMould ? options.shrinkage : 0.0;
+  return setup.lens_size / (1.0 - shrinkage);
+}
+
+/// Comparisons are written so that a NaN is refused as well.
+void require_bearable(const WorkEstimate& on_one_core, const std::string& what,
+                      const std::string& advice) {
+  if (on_one_core.seconds <= kMaxCutSeconds && on_one_core.disk_bytes <= kMaxCutBytes) return;
+  throw InputError(what + ": takes " + estimate_words(on_one_core) +
+                   " on one core; no more than 1000 h and 100 GB are begun; " + advice);
+}
+
+/// The next larger number of one digit.
+double rounded_up(double value) {
+  const double unit = std::pow(10.0, std::floor(std::log10(value)));
+  return unit * std::ceil(value / unit);
+}
+
+}  // namespace
+
+WorkEstimate estimate_cut(const CamOptions& options, const OpticalSetup& setup, int threads) {
+  const Eigen::Vector2d size = size_of(options, setup);
+  const double length = finish_length(options, size);
+  const double moves = length * moves_per_mm(options.workshop.process.finish);
+  const double points = rough_points(options, size);
+  WorkEstimate estimate;
+  estimate.seconds = (length * seconds_per_mm(options) + points * kSecondsPerPoint +
+                      samples_of(options, setup) * kSecondsPerSample +
+                      drawn_parts(options) * part_nodes(options, setup) * kSecondsPerPartNode) /
+                     threads;
+  estimate.disk_bytes = (moves + kMovesPerPoint * points) * kBytesPerMove;
+  estimate.memory_bytes = kMemory;
+  if (options.render) {
+    estimate.memory_bytes += moves * memory_per_move(options.workshop.process.finish) +
+                             nodes_of(size) * kMemoryPerNode +
+                             part_nodes(options, setup) * kMemoryPerPartNode;
+    estimate.disk_bytes += nodes_of(size) * kDiskPerNode;
+  }
+  return estimate;
+}
+
+void require_room_for_cut(const CamOptions& options, const OpticalSetup& setup,
+                          const WorkEstimate& estimate, const fs::path& folder) {
+  const Eigen::Vector2d size = size_of(options, setup);
+  const FinishProcess& finish = options.workshop.process.finish;
+  WorkEstimate on_one_core = estimate;
+  on_one_core.seconds = estimate_cut(options, setup, 1).seconds;
+  const double share = std::max(
+      {estimate.disk_bytes / free_disk_bytes(folder), estimate.memory_bytes / free_memory_bytes(),
+       estimate.disk_bytes / kMaxCutBytes, on_one_core.seconds / kMaxCutSeconds});
+  const double moves = finish_length(options, size) * moves_per_mm(finish);
+  const auto require = [&](const std::string& what, const std::string& advice) {
+    require_room(estimate, folder, what, advice);
+    require_bearable(on_one_core, what, advice);
+  };
+  if (kMovesPerPoint * rough_points(options, size) > moves) {
+    return require("the roughing and semi-finishing passes",
+                   "use larger steps and spacings in the workshop");
+  }
+  if (options.render && nodes_of(size) * kMemoryPerNode > moves * memory_per_move(finish)) {
+    return require("the milled surface of so large a lens", "--no-render needs less");
+  }
+  if (drawn_parts(options) * part_nodes(options, setup) * kSecondsPerPartNode >
+      0.5 * on_one_core.seconds) {
+    return require("--tolerances " + std::to_string(options.tolerances),
+                   "fewer parts, --tolerances 200, would fit");
+  }
+  if (samples_of(options, setup) * kSecondsPerSample > 0.5 * on_one_core.seconds) {
+    return require("--sample-spacing " + shortest_text(sample_spacing(options)) + "mm",
+                   "a larger --sample-spacing would fit");
+  }
+  const double radius = finishing_ball(options).radius();
+  const double pitch = finish_pitch(finish, radius);
+  const double fitting = rounded_up(pitch * share * kSpare);
+  if (fineness(finish) > 1.0 && fitting > radius) {
+    return require("tolerances this fine", "a larger --slope-tolerance or --tolerance would fit");
+  }
+  const std::string stated = "--pitch " + shortest_text(pitch) + "mm";
+  if (fitting > 2.0 * radius) {
+    return require(stated, std::string("a larger tool") +
+                               (options.render ? " or --no-render" : "") + " needs less");
+  }
+  require(stated, "--pitch " + shortest_text(fitting) + "mm would fit");
+}
+
+}  // namespace lensforge

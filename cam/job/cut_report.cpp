@@ -1,0 +1,584 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cam/job/cut_report.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <variant>
+
+#include "cam/plan/finishing.h"
+#include "cam/post/program_part.h"
+#include "core/io/lens_folder.h"
+#include "core/optics/fresnel.h"
+#include "core/optics/front_placement.h"
+#include "core/page/html_text.h"
+#include "core/surface/lit_surface.h"
+#include "core/text/number_text.h"
+#include "core/text/version.h"
+
+namespace lensforge {
+namespace {
+
+/// How deep tools go below the blank's underside, mm.
+double depth_in_table(const CutPlan& plan) {
+  double deepest = 0.0;
+  for (const Collision& collision : plan.collisions()) {
+    if (collision.obstacle == kTableObstacle) deepest = std::max(deepest, collision.worst.value);
+  }
+  return deepest;
+}
+
+double steep_moves(const CutPlan& plan) {
+  double moves = 0.0;
+  for (const SteepDescent& descent : plan.descents()) moves += static_cast<double>(descent.moves);
+  return moves;
+}
+
+/// Touches the part or its blank with what does not cut, while the outline is cut.
+bool is_short_outline_tool(const Collision& collision, int tool) {
+  return collision.tool == tool && collision.operation.starts_with("outline") &&
+         collision.part != "cutter" &&
+         (collision.obstacle == "the blank" || collision.obstacle == "the lens");
+}
+
+/// Of a cut alone: a nest's blank has a thickness of its own.
+std::string outline_warning(const CutPlan& plan, const Lens& lens) {
+  if (plan.place().shared() || !cuts_outline(plan.options(), lens.setup)) return "";
+  const double usual = Stock{}.allowance;
+  return outline_tool_advice(
+      plan, plan.blank().max().z(),
+      {"--stock " + trimmed_decimal(usual, 3), plan.part_box().max().z() + usual});
+}
+
+/// How deep a tool goes into a slot of its own width before what does not cut gets into it or
+/// beside it, mm.
+double free_length(const Tool& tool) {
+  double length = tool.flute_length;
+  for (const CutterProfile& part : shank_profiles(tool)) length = std::min(length, part.base);
+  return length;
+}
+
+}  // namespace
+
+std::vector<LimitCheck> safety_checks(const CutPlan& plan) {
+  const auto collisions =
+      static_cast<double>(plan.collisions().size() + plan.watch().faults().size());
+  std::vector<LimitCheck> checks{
+      {"collisions", "collisions", collisions, 0.0, "", 0},
+      {"table", "cut below the blank", depth_in_table(plan), 0.0, "mm", 4}};
+  const Eigen::Vector3d extent = plan.watch().extent();
+  const Eigen::Vector3d& travel = plan.options().workshop.machine.travel;
+  for (int axis = 0; axis < 3; ++axis) {
+    checks.push_back({std::string("travel_") + "xyz"[axis],
+                      std::string("machine travel along ") + "XYZ"[axis], extent[axis],
+                      travel[axis], "mm", 2});
+  }
+  checks.push_back({"descents", "moves down into material too steep for their feed",
+                    steep_moves(plan), 0.0, "", 0});
+  return checks;
+}
+
+std::vector<std::string> safety_warnings(const CutPlan& plan, const ProgramFiles& programs,
+                                         const Lens& lens) {
+  std::vector<std::string> warnings;
+  for (const Collision& collision : plan.collisions()) warnings.push_back(collision.sentence());
+  for (const SteepDescent& descent : plan.descents()) {
+    warnings.push_back(descent.sentence(programs.names[descent.first.program]));
+  }
+  for (const std::string& fault : plan.watch().faults()) warnings.push_back(fault);
+  for (const std::string& sentence :
+       {outline_warning(plan, lens),
+        travel_fault(plan.watch().extent(), plan.options().workshop.machine.travel)}) {
+    if (!sentence.empty()) warnings.push_back(sentence);
+  }
+  return warnings;
+}
+
+std::string outline_tool_advice(const CutPlan& plan, double thickness, const ThinBlank& thin) {
+  const Tool tool = plan.outline_cut().tool;
+  const std::vector<Collision>& collisions = plan.collisions();
+  if (std::none_of(collisions.begin(), collisions.end(), [&](const Collision& collision) {
+        return is_short_outline_tool(collision, tool.number);
+      })) {
+    return "";
+  }
+  const std::string fault =
+      joined({"--outline-tool ", std::to_string(tool.number), ": goes ",
+              trimmed_decimal(free_length(tool), 3), " mm deep at most, too short for a blank of ",
+              trimmed_decimal(thickness, 3), " mm; "});
+  const std::vector<Tool>& tools = plan.options().workshop.tools;
+  const auto other = std::find_if(tools.begin(), tools.end(), [&](const Tool& one) {
+    return one.shape == CutterShape::kFlat && one.diameter <= tool.diameter &&
+           free_length(one) >= thickness;
+  });
+  if (other != tools.end()) {
+    return joined({fault, "--outline-tool ", std::to_string(other->number), " would do"});
+  }
+  if (thin.thickness < thickness && thin.thickness <= free_length(tool)) {
+    return joined({fault, thin.option, " would do"});
+  }
+  return joined({fault, "a flat end mill with flutes of ",
+                 trimmed_decimal(std::ceil(1e3 * thickness) / 1e3, 3),
+                 " mm and nothing wider below that would do"});
+}
+
+namespace {
+
+constexpr double kMicrometres = 1e3;
+constexpr double kSecondsPerMinute = 60.0;
+
+/// Of a material's refractive index: makers state acrylic as 1.49 to 1.492, and 0.005 more turn
+/// light by a hundredth more.
+constexpr double kIndexTolerance = 0.005;
+
+std::string mm(double value, int decimals) { return decimal_text(value, decimals) + " mm"; }
+
+bool is_mirror(const Lens& lens) { return lens.setup.mode == LightMode::kReflect; }
+
+/// Which face lies down and which is cut. No light passes a mirror: its underside needs no polish.
+std::string up_words(PartKind part, const Lens& lens) {
+  if (part == PartKind::kMould) return "the mould's cavity is cut from above";
+  if (is_mirror(lens)) {
+    return "underside down, which needs no polish; the mirror's surface is cut from above";
+  }
+  if (lens.setup.front) {
+    const bool sphere = std::holds_alternative<SphericalFront>(*lens.setup.front);
+    return std::string("polished ") + (sphere ? "spherical" : "curved") +
+           " face down, in a nest; the optical surface is cut from above";
+  }
+  return "polished flat face down; the optical surface is cut from above";
+}
+
+/// Where a front lies in the program's coordinates.
+std::string place_words(const CutPlan& plan, const SphericalFront& front) {
+  return std::string(front.radius > 0.0 ? "bulging" : "hollow") + " sphere of radius " +
+         mm(std::abs(front.radius), 2) + ", there before the first cut: its apex lies at X " +
+         decimal_text(front.apex.x(), 3) + " Y " + decimal_text(front.apex.y(), 3) + " Z " +
+         decimal_text(front.apex.z() + plan.z_offset(), 3) + " of the program, " +
+         mm(plan.blank().max().z() - front.apex.z(), 3) + " below the top of the blank";
+}
+std::string place_words(const CutPlan& plan, const HeightFront& front) {
+  return joined({"height map, there before the first cut: the corner of ", lens_file::kFront,
+                 " at its lower left lies at X 0.000 Y 0.000, that at its upper right at X ",
+                 decimal_text(front.size.x(), 3), " Y ", decimal_text(front.size.y(), 3),
+                 ", its height 0 at Z ", decimal_text(plan.z_offset(), 3), " of the program, ",
+                 mm(plan.blank().max().z(), 3), " below the top of the blank; beyond the lens it ",
+                 "goes on straight"});
+}
+
+/// Where the front of the blank has to lie, and what comes of it where it does not.
+std::string front_words(const CutPlan& plan, const Lens& lens) {
+  const Eigen::Vector2d middle = 0.5 * lens.setup.lens_size;
+  const double top = lens.surface.vertices.row(2).mean();
+  const double shift = shift_by_front(lens.setup, {middle.x(), middle.y(), top});
+  return std::visit([&plan](const auto& front) { return place_words(plan, front); },
+                    lens.setup.front.value()) +
+         "; 0.1 mm aside moves the picture by " + mm(0.1 * shift, 3) +
+         ". The nest may reach up to Z " + decimal_text(plan.z_offset(), 3) + ", no higher";
+}
+
+/// The blank with what of its front lies below z = 0.
+Eigen::AlignedBox3d whole_box(const CutPlan& plan, const Front& front) {
+  Eigen::AlignedBox3d blank = plan.blank();
+  blank.min().z() =
+      std::min(blank.min().z(), lowest_of(front, {Eigen::Vector2d(blank.min().head<2>()),
+                                                  Eigen::Vector2d(blank.max().head<2>())}));
+  return blank;
+}
+
+/// How Z gets right in the programs with the most tools.
+std::string length_words_of(const PostDescription& post, const ProgramFiles& programs) {
+  std::size_t most = 1;
+  for (const ProgramFile& file : programs.files) most = std::max(most, file.reading.tools.size());
+  return length_words(post, most, "the tool of each program");
+}
+
+SetupSheet setup_sheet(const CutPlan& plan, const ProgramFiles& programs, const Lens& designed) {
+  const CamOptions& options = plan.options();
+  const bool lens = options.part == PartKind::kLens;
+  SetupSheet sheet;
+  sheet.machine = options.workshop.machine.name;
+  sheet.material = lens ? options.workshop.material.name : "mould material";
+  sheet.part = plan.part_box();
+  if (lens) sheet.part.min().z() = 0.0;  // The surface's box ends at its lowest point.
+  sheet.blank = plan.blank();
+  const Eigen::Vector2d& corner = plan.place().corner;
+  sheet.zero = {-corner.x(), -corner.y(), -plan.z_offset()};
+  const char* const part = is_mirror(designed) ? "mirror" : "lens";
+  sheet.zero_words = joined({"lower left corner of the ", plan.place().shared() ? "blank" : part,
+                             ", ", words_for(options.z_zero)});
+  sheet.up_words = up_words(options.part, designed);
+  sheet.length_words = length_words_of(options.post, programs);
+  if (lens && designed.setup.front) {
+    sheet.front = designed.setup.front;
+    sheet.front_words = front_words(plan, designed);
+    sheet.blank = whole_box(plan, *designed.setup.front);
+  }
+  for (const KeepOut& clamp : options.workshop.keep_outs) {
+    sheet.keep_outs.push_back({clamp.name, {clamp.low, clamp.high}});
+  }
+  return sheet;
+}
+
+/// Files that an operation stands in: "finish_1.ngc, finish_2.ngc".
+std::string files_of(const ProgramFiles& programs, std::size_t operation) {
+  std::string names;
+  for (const ProgramFile& file : programs.files) {
+    const bool holds =
+        std::any_of(file.operations.begin(), file.operations.end(),
+                    [&](const OperationTime& time) { return time.operation == operation; });
+    if (holds) names += (names.empty() ? "" : ", ") + file.path.filename().string();
+  }
+  return names;
+}
+
+std::vector<ReportOperation> report_operations(const CutPlan& plan, const ProgramFiles& programs) {
+  std::vector<ReportOperation> operations;
+  for (std::size_t i = 0; i < programs.summaries.size(); ++i) {
+    const Tool& tool = plan.options().workshop.tool(programs.summaries[i].tool);
+    const ProgramTime& time = programs.times[i];
+    operations.push_back({programs.summaries[i], files_of(programs, i), tool.feed, tool.spindle_rpm,
+                          time.seconds / kSecondsPerMinute, time.lines,
+                          time.peak_lines_per_second});
+  }
+  return operations;
+}
+
+std::vector<Tool> tools_of(const CutPlan& plan, const ProgramFiles& programs) {
+  std::vector<Tool> tools;
+  for (const OperationSummary& summary : programs.summaries) {
+    const bool known = std::any_of(tools.begin(), tools.end(),
+                                   [&](const Tool& tool) { return tool.number == summary.tool; });
+    if (!known) tools.push_back(plan.options().workshop.tool(summary.tool));
+  }
+  return tools;
+}
+
+ParameterGroup finish_parameters(const CutPlan& plan, SurfaceModel model) {
+  const FinishProcess& finish = plan.options().workshop.process.finish;
+  ParameterGroup group{
+      "Finishing",
+      {{"Stepover", mm(plan.pitch(), 4)},
+       {"Rows along", finish.along == PassAxis::kX ? "X" : "Y"},
+       {"Tolerance", mm(finish.tolerance, 5)},
+       {"Slope tolerance", decimal_text(1e3 * aimed_slope(plan.options()), 2) + " mrad"},
+       {"Decimals", std::to_string(plan.decimals())},
+       {"Surface", words_for(model)}}};
+  if (const RestMap* const rest = plan.balls().rest()) {
+    const Tool& large = *larger_ball(plan.options());
+    group.parameters.push_back(
+        {"Larger ball", mm(large.diameter, 2) + ", stepover " +
+                            mm(finish.large_every * plan.pitch(), 4) + ", leaves " +
+                            percent_text(rest->share_within(BallBlend::kWidth)) +
+                            " of the lens to the smaller one, overlap included"});
+  }
+  if (finish.pitch_error != 0.0) {
+    group.parameters.push_back(
+        {"Pitch error, as assumed", decimal_text(100.0 * finish.pitch_error, 3) + " %"});
+  }
+  return group;
+}
+
+template <class Level>
+NamedText entry_parameter(const char* name, const Level& level) {
+  const std::string angle = ", at most " + decimal_text(level.ramp_angle_deg, 1) + "°";
+  if (level.entry == EntryStyle::kRamp) return {name, "along the pass" + angle};
+  return {name, "down a helix of radius " + mm(level.helix_radius, 2) + angle};
+}
+
+/// How the tools before the finishing one get into material.
+ParameterGroup entry_parameters(const Process& process) {
+  ParameterGroup group{"Into material", {}};
+  if (process.rough.enabled) group.parameters.push_back(entry_parameter("Roughing", process.rough));
+  if (process.semi.enabled) {
+    group.parameters.push_back(entry_parameter("Semi-finishing", process.semi));
+  }
+  return group;
+}
+
+/// How the lens is cut out of its blank.
+ParameterGroup outline_parameters(const CutPlan& plan) {
+  const OutlineCut cut = plan.outline_cut();
+  return {
+      "Outline",
+      {{"Tool", "T" + std::to_string(cut.tool.number) + ", " + cut.tool.name},
+       {"Tabs", cut.tabs.count == 0
+                    ? "none: the lens comes free in the last turn"
+                    : std::to_string(cut.tabs.count) + ", " + mm(cut.tabs.width, 2) + " wide, " +
+                          mm(cut.tabs.height, 2) + " high, to be snapped by hand"}}};
+}
+
+std::string sampling_words(const CamOptions& options, const OpticalSetup& setup) {
+  const Eigen::Vector2d spacings = sample_spacings(options, setup);
+  if (spacings.x() == spacings.y()) return mm(spacings.x(), 4);
+  return mm(spacings.minCoeff(), 4) + " across the passes, " + mm(spacings.maxCoeff(), 4) +
+         " along";
+}
+
+ParameterGroup polish_parameters(const CamOptions& options, const OpticalSetup& setup) {
+  ParameterGroup group{"Polishing, as assumed",
+                       {{"Gaussian σ", mm(options.workshop.polish.sigma, 3)},
+                        {"Sampled every", sampling_words(options, setup)}}};
+  if (options.workshop.polish.rim_depth > 0.0) {
+    group.parameters.push_back(
+        {"Taken off at the rim", mm(options.workshop.polish.rim_depth, 4) + ", falling over " +
+                                     mm(options.workshop.polish.rim_length, 2)});
+  }
+  return group;
+}
+
+/// The certificates of all finishing operations in one.
+PathCertificate whole_certificate(const ProgramFiles& programs) {
+  PathCertificate whole;
+  const auto take = [](Extreme& to, const Extreme& from) {
+    if (from.value > to.value) to = from;
+  };
+  for (const OperationSummary& summary : programs.summaries) {
+    if (!summary.certified || summary.allowance > 0.0) continue;
+    take(whole.gouge, summary.certificate.gouge);
+    take(whole.excess, summary.certificate.excess);
+    take(whole.slope, summary.certificate.slope);
+  }
+  return whole;
+}
+
+CutFindings findings_of(const ProgramFiles& programs, const std::optional<Prediction>& prediction) {
+  const PathCertificate certificate = whole_certificate(programs);
+  CutFindings findings;
+  findings.gouge = certificate.gouge.value;
+  findings.excess = certificate.excess.value;
+  findings.slope = certificate.slope.value;
+  findings.block_rate = programs.total.peak_lines_per_second;
+  if (!prediction) return findings;
+  const PictureQuality& part = prediction->leakage.part().quality;
+  findings.leakage = part.leakage;
+  findings.dark_flux = part.dark_flux;
+  findings.mae_increase =
+      std::max(0.0, part.metrics.mae - prediction->leakage.designed.quality.metrics.mae);
+  findings.fillet_depth =
+      prediction->creases.worst.empty() ? 0.0 : prediction->creases.worst[0].depth;
+  return findings;
+}
+
+ReportMap fillet_map(const CreaseMap& creases) {
+  ReportMap map{"Material left in creases",
+                "What the ball cannot reach, the most in every square.",
+                "µm",
+                {static_cast<int>(creases.columns), static_cast<int>(creases.rows), {}}};
+  for (const float depth : creases.depth) {
+    map.raster.values.push_back(static_cast<float>(kMicrometres) * depth);
+  }
+  return map;
+}
+
+ReportMap fillet_share_map(const CreaseMap& creases) {
+  ReportMap map{"Light concerned by creases",
+                "Share of every square that is fillet instead of the designed surface.",
+                "%",
+                {static_cast<int>(creases.columns), static_cast<int>(creases.rows), {}}};
+  for (const float share : creases.share) map.raster.values.push_back(100.0F * share);
+  return map;
+}
+
+/// By how much the index of the workshop's material is off the one that the lens was designed for;
+/// 0 where it states none, and for a mould or a mirror, through whose material no light passes.
+double index_error(const CutPlan& plan, const Lens& lens) {
+  const double stated = plan.options().workshop.material.ior;
+  if (!(stated > 0.0) || plan.options().part == PartKind::kMould || is_mirror(lens)) return 0.0;
+  return std::abs(stated - lens.setup.ior);
+}
+
+/// Why tools touch the blank where nothing was roughed; empty if the first one's flutes are long
+/// enough. What another program has roughed is not known: the blank counts as whole.
+std::string unroughed_warning(const CutPlan& plan, const ProgramFiles& programs) {
+  const Workshop& workshop = plan.options().workshop;
+  if (workshop.process.rough.enabled || programs.summaries.empty()) return "";
+  const OperationSummary& first = programs.summaries.front();
+  const Tool& tool = workshop.tool(first.tool);
+  const double depth = plan.blank().max().z() - first.tip.min().z();
+  if (depth <= tool.flute_length) return "";
+  return joined({"nothing is roughed: '", first.name, "' cuts ", decimal_text(depth, 1),
+                 " mm deep into the whole blank, tool ", std::to_string(tool.number), " has ",
+                 decimal_text(tool.flute_length, 1),
+                 " mm of flutes; run a roughing program first, or use a tool with longer flutes"});
+}
+
+/// Why the part would project another picture than the designed one; empty if it would not.
+std::string index_warning(const CutPlan& plan, const Lens& lens) {
+  const double stated = plan.options().workshop.material.ior;
+  if (!(index_error(plan, lens) > kIndexTolerance)) return "";
+  return joined({"the workshop's material has index ", trimmed_decimal(stated, 4),
+                 ", the lens was designed for ", trimmed_decimal(lens.setup.ior, 4),
+                 ": it would project another picture"});
+}
+
+/// How the lens was meant to be made, if that is not how it is; empty if it is, or nothing is
+/// known.
+std::string process_warning(const CutPlan& plan, const Lens& lens) {
+  const nlohmann::json& provenance = lens.provenance;
+  if (!provenance.is_object() || !provenance.contains("made_by")) return "";
+  const nlohmann::json& meant = provenance["made_by"];
+  const Workshop& shop = plan.options().workshop;
+  const auto number = [&](const char* key, double otherwise) {
+    const bool known = meant.is_object() && meant.contains(key) && meant[key].is_number();
+    return known ? meant[key].get<double>() : otherwise;
+  };
+  const FinishProcess& finish = shop.process.finish;
+  // What is cast in a mould is smaller than it, and polished after it was cast.
+  const double scale =
+      plan.options().part == PartKind::kMould ? 1.0 - plan.options().shrinkage : 1.0;
+  const double pitch = scale * finish_pitch(finish, shop.tool(finish.tool).radius());
+  const double sigma = shop.polish.sigma;
+  const double meant_pitch = number("pitch_mm", pitch);
+  const double meant_sigma = number("polish_sigma_mm", sigma);
+  if (meant_pitch == pitch && meant_sigma == sigma) return "";
+  return joined({"the lens was designed for a pitch of ", trimmed_decimal(meant_pitch, 4),
+                 " mm and a polish of σ ", trimmed_decimal(meant_sigma, 4), " mm, not ",
+                 trimmed_decimal(pitch, 4), " and ", trimmed_decimal(sigma, 4),
+                 " mm: cut it as it was designed, or design it for this workshop (--made-by)"});
+}
+
+/// A speed that the controller's setting would lower unseen; empty where it has no such setting.
+std::string spindle_warning(const CutPlan& plan, const ProgramFiles& programs) {
+  const int setting = plan.options().post.reader.spindle_limit_setting;
+  if (setting == 0) return {};
+  double fastest = 0.0;
+  for (const Tool& tool : tools_of(plan, programs)) fastest = std::max(fastest, tool.spindle_rpm);
+  return "the controller runs the spindle no faster than its setting $" + std::to_string(setting) +
+         ", silently: set it to at least " + decimal_text(fastest, 0);
+}
+
+/// Light enters a curved front beyond the lens's edges.
+std::string margin_warning(const CutPlan& plan, const Lens& lens) {
+  const double margin = plan.options().workshop.stock.margin;
+  const double needed = overhang(lens.surface, lens.setup);
+  if (plan.options().part != PartKind::kLens || !(needed > margin)) return {};
+  return "light enters the front up to " + mm(needed, 2) +
+         " beyond the lens's edges, but the blank ends at " + mm(margin, 2) +
+         ": the picture's rim stays dark unless stock.margin is at least " +
+         mm(std::ceil(10.0 * needed) / 10.0, 1);
+}
+
+std::vector<std::string> warnings_of(const CutPlan& plan, const ProgramFiles& programs,
+                                     const Lens& lens) {
+  std::vector<std::string> warnings;
+  const std::string unroughed = unroughed_warning(plan, programs);
+  if (!unroughed.empty()) warnings.push_back(unroughed);
+  const std::vector<std::string> safety = safety_warnings(plan, programs, lens);
+  warnings.insert(warnings.end(), safety.begin(), safety.end());
+  for (const std::string& sentence :
+       {index_warning(plan, lens), margin_warning(plan, lens), process_warning(plan, lens),
+        decimals_warning(plan.options())}) {
+    if (!sentence.empty()) warnings.push_back(sentence);
+  }
+  const Eigen::Vector3d travel = plan.options().workshop.machine.travel;
+  if ((plan.blank().sizes().array() > travel.array()).any()) {
+    warnings.push_back("the blank is larger than the machine's travel of " +
+                       decimal_text(travel.x(), 0) + " x " + decimal_text(travel.y(), 0) + " x " +
+                       decimal_text(travel.z(), 0) + " mm");
+  }
+  const HeightField& field = plan.field();
+  if (field.steepest > kSteepestSlope) {
+    warnings.push_back("the surface rises by " + decimal_text(field.steepest, 2) +
+                       " mm a millimetre at x " + decimal_text(field.steepest_place.x(), 2) +
+                       " y " + decimal_text(field.steepest_place.y(), 2) +
+                       ": on slopes above 1 a rim may be left uncut");
+  }
+  const std::string spindle = spindle_warning(plan, programs);
+  if (!spindle.empty()) warnings.push_back(spindle);
+  if (programs.total.starved > 0) {
+    warnings.push_back(
+        "the controller will wait for lines " + std::to_string(programs.total.starved) +
+        " times at " + decimal_text(plan.options().workshop.machine.lines_per_second, 0) +
+        " lines/s: the cut then takes " +
+        decimal_text(programs.total.stream_limited_seconds / kSecondsPerMinute, 0) + " minutes");
+  }
+  return warnings;
+}
+
+/// What the machine must not do, and what must not go into it.
+std::vector<LimitCheck> all_safety_checks(const CutPlan& plan, const Lens& lens) {
+  std::vector<LimitCheck> checks = safety_checks(plan);
+  if (plan.options().workshop.material.ior > 0.0) {
+    checks.push_back({"material_ior", "material's refractive index off the design's",
+                      index_error(plan, lens), kIndexTolerance, "", 4});
+  }
+  return checks;
+}
+
+/// Safety first. A controller that takes lines without limit bears any load.
+Verdict whole_verdict(const CutPlan& plan, const ProgramFiles& programs,
+                      const std::optional<Prediction>& prediction, const Lens& lens) {
+  CutLimits limits = plan.options().limits;
+  limits.block_rate = plan.options().workshop.machine.lines_per_second;
+  CutFindings findings = findings_of(programs, prediction);
+  if (!(limits.block_rate > 0.0)) findings.block_rate.reset();
+  Verdict verdict = judge_cut(findings, limits, plan.options().stated_limits);
+  const std::vector<LimitCheck> safety = all_safety_checks(plan, lens);
+  verdict.checks.insert(verdict.checks.begin(), safety.begin(), safety.end());
+  return verdict;
+}
+
+void add_prediction(const Prediction& prediction, const Lens& lens, ReportData& data) {
+  data.target = lens.target;
+  data.leakage = prediction.leakage;
+  if (!data.mirror) data.ghost = ghost_share(lens.setup.ior);
+  data.sampling = prediction.sampling;
+  data.shown = {{surface_name::kDesigned, "what is meant"},
+                {surface_name::kRounded, "the most that the ball can reach"},
+                {surface_name::kMilled, "before polishing: its ridges scatter light"},
+                {surface_name::kPolished, "the finished part"}};
+  data.places = prediction.places;
+  data.tolerances = prediction.tolerances;
+  data.surface = prediction.surface;
+  data.maps = {prediction.height, fillet_map(prediction.creases),
+               fillet_share_map(prediction.creases)};
+}
+
+/// Of the design, as lens.json states it; empty if it does not.
+std::string fingerprint_of(const Lens& lens) {
+  if (!lens.provenance.is_object()) return "";
+  const auto stated = lens.provenance.find("fingerprint");
+  if (stated == lens.provenance.end() || !stated->is_string()) return "";
+  constexpr std::size_t kDigits = 16;
+  const auto& text = stated->get_ref<const std::string&>();
+  const bool hexadecimal = text.find_first_not_of("0123456789abcdef") == std::string::npos;
+  return text.size() == kDigits && hexadecimal ? text : "";
+}
+
+}  // namespace
+
+ReportData make_report(const CutPlan& plan, const ProgramFiles& programs,
+                       const std::optional<Prediction>& prediction, const Lens& lens) {
+  const CamOptions& options = plan.options();
+  ReportData data;
+  data.job = options.job;
+  data.program = program_mark();
+  data.lens_id = fingerprint_of(lens);
+  data.mirror = is_mirror(lens);
+  data.part = options.part == PartKind::kMould ? "mould" : (data.mirror ? "mirror" : "lens");
+  data.lens_size = lens.setup.lens_size;
+  data.leakage_options = options.leakage;
+  data.operations = report_operations(plan, programs);
+  data.tools = tools_of(plan, programs);
+  data.parameters = {finish_parameters(plan, plan.model())};
+  const Process& process = options.workshop.process;
+  if (process.rough.enabled || process.semi.enabled) {
+    data.parameters.push_back(entry_parameters(process));
+  }
+  if (cuts_outline(options, lens.setup)) data.parameters.push_back(outline_parameters(plan));
+  data.setup = setup_sheet(plan, programs, lens);
+  data.light = lens.setup;
+  data.light_height = lens.surface.vertices.row(2).maxCoeff();
+  data.z_offset = plan.z_offset();
+  data.warnings = warnings_of(plan, programs, lens);
+  data.path = plan.shown_path();
+  if (prediction) {
+    data.parameters.push_back(polish_parameters(options, lens.setup));
+    add_prediction(*prediction, lens, data);
+  }
+  data.verdict = whole_verdict(plan, programs, prediction, lens);
+  return data;
+}
+
+}  // namespace lensforge

@@ -1,0 +1,212 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cam/predict/part_surfaces.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <utility>
+
+#include "cam/contact/drop_cutter.h"
+#include "cam/milled/designed_field.h"
+#include "cam/milled/held_field.h"
+
+namespace lensforge {
+namespace {
+
+/// How finely a surface without creases is cut into facets where the ball's reach is judged: only
+/// heights count, since a fillet's slopes are the ball's.
+constexpr SmoothCutOptions kReachCut{1e-4, std::numeric_limits<double>::infinity()};
+
+/// Facets are cut and rendered as they are.
+class MeantFacets final : public MeantSurface {
+ public:
+  explicit MeantFacets(std::shared_ptr<const OpticalSurface> surface)
+      : surface_(std::move(surface)), facets_(surface_->mesh()), held_(facets_) {}
+
+  [[nodiscard]] const SurfaceField& field() const override { return held_; }
+
+  [[nodiscard]] std::unique_ptr<RoundedField> rounded(const CutSurface& cut,
+                                                      const Eigen::AlignedBox2d& rectangle,
+                                                      const Executor& executor) override {
+    cutter_ = cut.cutter(rectangle, executor);
+    return std::make_unique<RoundedField>(held_, facets_.grid(), *cutter_, executor);
+  }
+
+ private:
+  std::shared_ptr<const OpticalSurface> surface_;
+  FacetField facets_;
+  HeldField held_;
+  std::shared_ptr<const DropCutter> cutter_;
+};
+
+/// A surface without creases is cut through finer facets of its own.
+class MeantSmooth final : public MeantSurface {
+ public:
+  explicit MeantSmooth(std::shared_ptr<const OpticalSurface> surface)
+      : surface_(std::move(surface)), field_(*surface_), held_(field_) {}
+
+  [[nodiscard]] const SurfaceField& field() const override { return held_; }
+
+  [[nodiscard]] std::unique_ptr<RoundedField> rounded(const CutSurface& cut,
+                                                      const Eigen::AlignedBox2d& /*rectangle*/,
+                                                      const Executor& executor) override {
+    if (const auto* const same = dynamic_cast<const SmoothCutSurface*>(&cut)) {
+      reach_.emplace(*same, kReachCut, executor);
+    } else {
+      reach_.emplace(surface_, cut.radius(), kReachCut, executor);
+    }
+    return std::make_unique<RoundedField>(held_, *reach_, reach_->deviation().height, executor);
+  }
+
+ private:
+  std::shared_ptr<const OpticalSurface> surface_;
+  SmoothField field_;
+  HeldField held_;
+  std::optional<SmoothCutSurface> reach_;
+};
+
+}  // namespace
+
+std::unique_ptr<MeantSurface> meant_surface(std::shared_ptr<const OpticalSurface> surface) {
+  if (surface->has_creases()) return std::make_unique<MeantFacets>(std::move(surface));
+  return std::make_unique<MeantSmooth>(std::move(surface));
+}
+
+PartSurfaces::PartSurfaces(const Design& design, FinishPaths paths, const PolishModel& polish)
+    : design_(design),
+      ideal_(std::move(paths.ideal), design.blank_top),
+      fitted_(std::move(paths.fitted), design.blank_top),
+      written_(std::move(paths.written), design.blank_top) {
+  raw_ = {&design.surface, held(on_lens(design.rounded)), on_lens(ideal_), on_lens(fitted_),
+          held(on_lens(written_))};
+  if (!paths.stretched.empty()) {
+    stretched_.emplace(std::move(paths.stretched), design.blank_top);
+    raw_.push_back(held(on_lens(*stretched_)));
+  }
+  for (const SurfaceField* field : raw_) {
+    polished_.push_back(
+        std::make_unique<PolishedField>(*field, design.surface, design.rectangle, polish));
+  }
+}
+
+const SurfaceField* PartSurfaces::on_lens(const SurfaceField& cut) {
+  if (!design_.mould) return &cut;
+  cast_.push_back(std::make_unique<CastField>(cut, *design_.mould));
+  return cast_.back().get();
+}
+
+const SurfaceField* PartSurfaces::held(const SurfaceField* field) {
+  held_.push_back(std::make_unique<HeldField>(*field));
+  return held_.back().get();
+}
+
+LeakageChain PartSurfaces::chain() const {
+  LeakageChain chain;
+  chain.designed = {surface_name::kDesigned, &design_.surface};
+  const char* const causes[] = {leak_cause::kPolish,   leak_cause::kCrease,
+                                leak_cause::kScallop,  leak_cause::kChord,
+                                leak_cause::kDecimals, leak_cause::kPitchError};
+  for (std::size_t i = 0; i < polished_.size(); ++i) {
+    chain.steps.push_back({causes[i], polished_[i].get()});
+  }
+  chain.others = {{surface_name::kRounded, raw_[1]},
+                  {surface_name::kMilled, raw_.back()},
+                  {surface_name::kPolished, &part()}};
+  return chain;
+}
+
+namespace {
+
+/// Quotients that are whole but for this must not cost a cell.
+constexpr double kRounding = 1e-9;
+
+/// Nodes of one tile that are kept.
+void keep_nodes(const SurfacePatch& patch, const PartGrid& grid, const std::string& name,
+                const Executor& executor, LayeredImage& layers) {
+  const std::array values{&patch.z, &patch.slope_x, &patch.slope_y};
+  const std::array names{".z", ".slope_x", ".slope_y"};
+  const GridWindow& window = patch.window;
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    const auto layer = layers.layer(name + names[k]);
+    const auto keep_row = [&](std::int64_t j) {
+      const std::int64_t row = window.first_row + j;
+      if (row % grid.every.y() != 0) return;
+      const std::int64_t from_top = grid.nodes.y() - 1 - row / grid.every.y();
+      for (std::int64_t i = 0; i < window.columns; ++i) {
+        const std::int64_t column = window.first_column + i;
+        if (column % grid.every.x() != 0) continue;
+        const std::int64_t at = from_top * grid.nodes.x() + column / grid.every.x();
+        layer[static_cast<std::size_t>(at)] =
+            static_cast<float>((*values[k])[static_cast<std::size_t>(j * window.columns + i)]);
+      }
+    };
+    parallel_for(executor, "keep surface", window.rows, keep_row, 16);
+  }
+}
+
+std::vector<std::string> layer_names(const std::vector<NamedSurface>& surfaces) {
+  std::vector<std::string> names;
+  for (const NamedSurface& surface : surfaces) {
+    for (const char* layer : {".z", ".slope_x", ".slope_y"}) names.push_back(surface.name + layer);
+  }
+  return names;
+}
+
+}  // namespace
+
+PartGrid part_grid(const Eigen::Vector2d& lens_size, const Eigen::Vector2d& spacings, double most) {
+  const double coarse = std::sqrt(lens_size.prod() / most);
+  PartGrid grid;
+  for (int axis = 0; axis < 2; ++axis) {
+    // A spacing that is a part of the pitch should stay one: as many cells as it asks for, if their
+    // number allows that.
+    const double cells = std::ceil(lens_size[axis] / spacings[axis] - kRounding);
+    const double every = std::max(1.0, std::ceil(coarse / spacings[axis] - kRounding));
+    grid.every[axis] = static_cast<int>(every);
+    grid.nodes[axis] = static_cast<int>(std::max(1.0, std::ceil(cells / every))) + 1;
+  }
+  return grid;
+}
+
+GridWindow sampled_grid(const Eigen::Vector2d& lens_size, const Eigen::Vector2d& spacings) {
+  const PartGrid nodes = part_grid(lens_size, spacings, kPartNodes);
+  const Eigen::Array2i cells = (nodes.nodes.array() - 1) * nodes.every.array();
+  GridWindow grid;
+  grid.spacing = lens_size.cwiseQuotient(cells.cast<double>().matrix());
+  grid.columns = cells.x() + 1;
+  grid.rows = cells.y() + 1;
+  return grid;
+}
+
+PartLayers::PartLayers(std::vector<NamedSurface> surfaces, const Eigen::Vector2d& lens_size,
+                       const Eigen::Vector2d& spacings)
+    : surfaces_(std::move(surfaces)),
+      nodes_(part_grid(lens_size, spacings, kPartNodes)),
+      layers_(nodes_.nodes.x(), nodes_.nodes.y(), layer_names(surfaces_)) {}
+
+void PartLayers::take(const SurfaceField& field, const SurfacePatch& tile,
+                      const Executor& executor) {
+  for (const NamedSurface& surface : surfaces_) {
+    if (surface.field == &field) keep_nodes(tile, nodes_, surface.name, executor, layers_);
+  }
+}
+
+LayeredImage cause_layers(const LeakageResult& leakage, double total) {
+  std::vector<const RenderedSurface*> surfaces{&leakage.designed};
+  for (const RenderedSurface& step : leakage.steps) surfaces.push_back(&step);
+  std::vector<std::string> names;
+  for (const RenderedSurface* surface : surfaces) names.push_back(surface->name);
+  const FluxPicture& part = leakage.part().picture;
+  LayeredImage layers(part.columns, part.rows, names);
+  for (const RenderedSurface* surface : surfaces) {
+    const Image image = surface->picture.image(total);
+    std::copy(image.values().begin(), image.values().end(), layers.layer(surface->name).begin());
+  }
+  return layers;
+}
+
+}  // namespace lensforge

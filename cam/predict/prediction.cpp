@@ -1,0 +1,584 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cam/predict/prediction.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "cam/leakage/render_field.h"
+#include "cam/milled/cast_field.h"
+#include "cam/milled/crease_sum.h"
+#include "cam/milled/lens_grid.h"
+#include "cam/milled/milled_field.h"
+#include "cam/milled/polished_field.h"
+#include "cam/milled/sampled_mesh.h"
+#include "cam/plan/cut_plan.h"
+#include "cam/plan/finishing.h"
+#include "cam/predict/part_surfaces.h"
+#include "cam/tolerance/part_model.h"
+#include "cam/tolerance/tolerance_forecast.h"
+#include "cam/workshop/tool.h"
+#include "core/compute/executor.h"
+#include "core/compute/run_control.h"
+#include "core/error.h"
+#include "core/optics/light_colors.h"
+#include "core/optics/light_path.h"
+#include "core/page/html_text.h"
+#include "core/surface/lens.h"
+#include "core/surface/lit_surface.h"
+#include "core/surface/mesh_cut.h"
+#include "core/text/number_text.h"
+
+namespace lensforge {
+namespace {
+
+/// Side of the cells in which leaking light is looked for, mm: a groove of a few of them is what an
+/// operator can find again.
+constexpr double kLeakCell = 1.0;
+
+/// Nodes along the longer side of the surface that the report shows.
+constexpr double kViewNodes = 240.0;
+
+constexpr double kMicrometres = 1e3;
+
+/// A whole surface, coarsely.
+SurfacePatch coarse_patch(const SurfaceField& field, const Lens& lens, double spacing,
+                          const Executor& executor) {
+  SurfacePatch patch;
+  field.sample(lens_grid(lens.setup.lens_size, spacing), executor, patch);
+  return patch;
+}
+
+/// LightPath::intake() of all of the lens inside of its outline, mm².
+double lit_intake(const Lens& lens, const LightPath& light, const Executor& executor) {
+  const std::optional<Outline>& outline = lens.setup.outline;
+  if (!outline) return intake_of(lens.surface, light);
+  return intake_inside(lens.surface, cut_mesh(lens.surface, *outline, executor), light);
+}
+
+LensRaster raster_of(const SurfacePatch& patch) {
+  LensRaster raster;
+  raster.columns = static_cast<int>(patch.window.columns);
+  raster.rows = static_cast<int>(patch.window.rows);
+  raster.values.assign(patch.z.begin(), patch.z.end());
+  return raster;
+}
+
+/// Of the cells of a leak map.
+ReportMap height_map(const LeakMap& map) {
+  ReportMap heights{"Height",
+                    "Polished part against the design, the largest difference in every square; "
+                    "below 0 too much is taken off.",
+                    "µm",
+                    {static_cast<int>(map.columns), static_cast<int>(map.rows), {}}};
+  for (const HeightDifference& difference : map.height) {
+    heights.raster.values.push_back(static_cast<float>(kMicrometres * difference.value));
+  }
+  return heights;
+}
+
+}  // namespace
+
+Prediction predict_part(const PartSurfaces& surfaces, const Lens& lens, const CamOptions& options,
+                        const Executor& executor, const RunControl& control) {
+  Prediction result;
+  LeakageChain chain = surfaces.chain();
+  const Eigen::Vector2d spacings = sample_spacings(options, lens.setup);
+  const GridWindow grid = sampled_grid(lens.setup.lens_size, spacings);
+  PartLayers layers(
+      {{part_layer::kPolished, chain.steps.front().field}, {part_layer::kPart, &surfaces.part()}},
+      lens.setup.lens_size, spacings);
+  FieldRenderSetup setup{lens.setup, grid};
+  setup.surface_height = lens.surface.vertices.row(2).mean();
+  for (const LightColor& color : light_colors(lens.setup)) {
+    const LightPath light(color.setup);
+    if (!light.intake_is_plan_area()) setup.whole.push_back(lit_intake(lens, light, executor));
+  }
+  for (NamedSurface& other : chain.others) {
+    if (other.name != surface_name::kMilled) continue;
+    other.grid = lens_grid(lens.setup.lens_size, scallop_spacings(options, lens.setup));
+  }
+  CreaseMapper creases(grid, {});
+  const auto keep = [&](const SurfaceField& field, const CellRange& tile,
+                        const SurfacePatch& patch) {
+    layers.take(field, patch, executor);
+    if (&field == &surfaces.rounded()) creases.add(tile, patch, executor);
+  };
+  result.leakage =
+      measure_leakage(chain, lens.target, setup, options.leakage, executor, control, keep);
+  result.sampling = check_sampling(surfaces.designed(), surfaces.part(), result.leakage,
+                                   lens.target, setup, executor, control);
+  const std::vector<double> weights =
+      pixels_with_surplus(result.leakage.part().picture, result.leakage.designed.picture);
+  const LeakMap map =
+      map_leakage(chain.designed, chain.part(), setup, weights, kLeakCell, executor);
+  result.places = worst_places(map, chain, result.leakage, setup, {}, executor);
+  result.creases = creases.map();
+  result.height = height_map(map);
+  const double spacing = lens.setup.lens_size.maxCoeff() / kViewNodes;
+  result.surface = raster_of(coarse_patch(surfaces.milled(), lens, spacing, executor));
+  result.milled = mesh_of(coarse_patch(surfaces.milled(), lens, kMeshSpacing, executor));
+  result.surfaces = layers.layers();
+  return result;
+}
+
+namespace {
+
+/// A part of a grid, on that grid or a finer one.
+struct CellGrid {
+  GridWindow grid;
+  CellRange cells;
+};
+
+/// Every cell cut into parts, the same number of all, so that none is wider than `spacings`.
+CellGrid refined(const GridWindow& grid, const CellRange& cells, const Eigen::Vector2d& spacings) {
+  const auto parts = [&](int axis) {
+    const double ratio = grid.spacing[axis] / spacings[axis];
+    return std::max<std::int64_t>(1, std::llround(std::ceil(ratio * (1.0 - 1e-9))));
+  };
+  const std::int64_t across = parts(0);
+  const std::int64_t up = parts(1);
+  CellGrid fine{grid, cells};
+  fine.grid.spacing.x() /= static_cast<double>(across);
+  fine.grid.spacing.y() /= static_cast<double>(up);
+  fine.grid.columns = (grid.columns - 1) * across + 1;
+  fine.grid.rows = (grid.rows - 1) * up + 1;
+  fine.cells = {cells.column * across, cells.row * up, cells.columns * across, cells.rows * up};
+  return fine;
+}
+
+Eigen::AlignedBox2d box_of(const GridWindow& grid, const CellRange& cells) {
+  return {grid.node(cells.column, cells.row),
+          grid.node(cells.column + cells.columns, cells.row + cells.rows)};
+}
+
+/// Where a rectangle of the lens is cut: mirrored along x and larger in a mould (CastFrame).
+Eigen::AlignedBox2d in_mould(const Eigen::AlignedBox2d& lens,
+                             const std::optional<CastFrame>& mould) {
+  if (!mould) return lens;
+  const double s = mould->scale;
+  return {Eigen::Vector2d(s * (mould->width - lens.max().x()), s * lens.min().y()),
+          Eigen::Vector2d(s * (mould->width - lens.min().x()), s * lens.max().y())};
+}
+
+/// What a program has to say for a rectangle to be cut.
+Eigen::AlignedBox2d as_written(Eigen::AlignedBox2d box, const AxisStretch& stretch) {
+  box.min()[stretch.axis] /= stretch.factor;
+  box.max()[stretch.axis] /= stretch.factor;
+  return box;
+}
+
+Eigen::AlignedBox2d grown_within(const Eigen::AlignedBox2d& box, double beyond,
+                                 const Eigen::AlignedBox2d& limits) {
+  const Eigen::Vector2d all = Eigen::Vector2d::Constant(beyond);
+  return Eigen::AlignedBox2d(box.min() - all, box.max() + all).intersection(limits);
+}
+
+/// The rows of a raster that cross a box, no longer than the box: on the same places.
+RasterPlan raster_around(const RasterPlan& whole, const Eigen::AlignedBox2d& box) {
+  const int across = 1 - whole.options.along;
+  const double begin = whole.surface.min()[across];
+  Eigen::AlignedBox2d part = box;
+  const double first = std::floor((box.min()[across] - begin) / whole.pitch);
+  const double last = std::ceil((box.max()[across] - begin) / whole.pitch);
+  part.min()[across] = begin + std::max(0.0, first) * whole.pitch;
+  part.max()[across] = std::min(begin + last * whole.pitch, whole.surface.max()[across]);
+  RasterOptions options = whole.options;
+  options.pitch = whole.pitch;
+  options.every = 1;
+  RasterPlan plan = plan_finish_raster(part, whole.radius, options);
+  plan.rest = whole.rest;
+  return plan;
+}
+
+/// The runs of a valley's places that lie in a box.
+std::vector<Valley> parts_in(const Valley& valley, const Eigen::AlignedBox2d& box) {
+  std::vector<Valley> parts(1);
+  for (const Eigen::Vector2d& place : valley) {
+    if (box.contains(place)) {
+      parts.back().push_back(place);
+    } else if (!parts.back().empty()) {
+      parts.emplace_back();
+    }
+  }
+  std::erase_if(parts, [](const Valley& part) { return part.size() < 2; });
+  return parts;
+}
+
+/// What the light of a place changes in a picture when `now` takes the place of `before`.
+struct Exchange {
+  double leakage = 0.0;
+  double dark_flux = 0.0;
+};
+
+Exchange exchange(const LeakageResult& predicted, const FluxPicture& before,
+                  const FluxPicture& now) {
+  const std::vector<double>& part = predicted.part().picture.flux;
+  const std::vector<double>& designed = predicted.designed.picture.flux;
+  Exchange sum;
+  for (std::size_t i = 0; i < part.size(); ++i) {
+    const double more = now.flux[i] - before.flux[i];
+    sum.leakage +=
+        std::max(0.0, part[i] + more - designed[i]) - std::max(0.0, part[i] - designed[i]);
+    sum.dark_flux += predicted.dark[i] * more;
+  }
+  return sum;
+}
+
+}  // namespace
+
+TrialCut::TrialCut(const TrialSite& site, const CamOptions& changed, const Executor& executor)
+    : site_(site), options_(changed), executor_(executor), balls_(&site.plan.balls()) {
+  if (!same_balls(changed, site.plan.options())) {
+    own_ = std::make_unique<const FinishBalls>(site.plan.optical(), changed, executor);
+    balls_ = own_.get();
+  }
+  passes_ = balls_->passes(changed, site.plan.ground());
+  for (FinishPass& pass : passes_) pass.plan.options.traces = false;
+}
+
+TrialCut::Work TrialCut::work(const RunControl& control) const {
+  Work work;
+  for (const FinishPass& pass : passes_) {
+    const RasterPlan& plan = pass.plan;
+    std::vector<Work> rows(kWorkRows);
+    parallel_for(executor_, "remedies' work", kWorkRows, [&](std::int64_t i) {
+      if (control.stop_requested()) return;
+      const std::int64_t number = plan.rows * (2 * i + 1) / (2 * kWorkRows);
+      Work& one = rows[static_cast<std::size_t>(i)];
+      for (const RowSpan& span : plan.row_spans(number)) {
+        Eigen::AlignedBox2d axis(span.line.at(span.from));
+        axis.extend(span.line.at(span.to));
+        const RowCurves curves(*pass.surface, axis, Executor::serial());
+        one.moves += static_cast<double>(cut_row(curves, plan, number, span).moves.size());
+        one.minutes += (span.to - span.from + plan.pitch) / pass.tool.feed;
+      }
+    });
+    if (control.stop_requested()) throw Interrupted();
+    for (const Work& one : rows) {
+      work.moves += one.moves * static_cast<double>(plan.rows) / kWorkRows;
+      work.minutes += one.minutes * static_cast<double>(plan.rows) / kWorkRows;
+    }
+  }
+  return work;
+}
+
+std::vector<BallPath> TrialCut::paths_around(const Eigen::AlignedBox2d& box,
+                                             const RunControl& control) const {
+  const AxisStretch stretch = AxisStretch::of(options_.workshop.process.finish);
+  std::vector<BallPath> paths;
+  for (const FinishPass& pass : passes_) {
+    BallPath& path = paths.emplace_back(pass.tool.radius(), 0.0);
+    const MoveSink sink = path_sink(path, stretch);
+    const auto add = [&](const RasterRow& row) {
+      const PathMove start{MoveKind::kRapid, row.start};
+      sink({&start, 1});
+      sink(row.moves);
+    };
+    const RasterPlan plan = raster_around(pass.plan, box);
+    if (!cut_raster(*pass.surface, plan, executor_, add, control).complete) throw Interrupted();
+  }
+  if (options_.workshop.process.finish.pencil) {
+    BallPath& path = paths.emplace_back(finishing_ball(options_).radius(), 0.0);
+    add_pencil(box, path_sink(path, stretch), control);
+  }
+  return paths;
+}
+
+void TrialCut::add_pencil(const Eigen::AlignedBox2d& box, const MoveSink& sink,
+                          const RunControl& control) const {
+  const PencilOptions pencil =
+      pencil_options(options_, site_.plan.z_offset(), site_.plan.part_box().max().z());
+  std::vector<Valley> inside;
+  for (const Valley& valley :
+       find_valleys(site_.plan.mesh(), finishing_ball(options_).radius(), pencil)) {
+    for (Valley& part : parts_in(valley, box)) inside.push_back(std::move(part));
+  }
+  if (inside.empty()) return;
+  const FinishRun run{"pencil", finishing_ball(options_), site_.plan.blank().max().z(), {}, {}};
+  if (!cut_pencil(balls_->surface(), inside, pencil, run, sink, control).complete) {
+    throw Interrupted();
+  }
+}
+
+/// Rows reach as far as the polishing does and a diameter beyond, because the last radius of a row
+/// is level and what it cuts reaches a radius farther.
+LeakTrial TrialCut::at(const LeakPlace& place, const RunControl& control) const {
+  const RunControl silent(control.stop_token(), {});
+  const CamOptions& before = site_.plan.options();
+  const GridWindow grid =
+      sampled_grid(site_.lens.setup.lens_size, sample_spacings(before, site_.lens.setup));
+  const CellGrid fine = refined(grid, place.cells, sample_spacings(options_, site_.lens.setup));
+  const std::optional<CastFrame> mould = site_.plan.mould();
+  const double polished = PolishedField::kReach * options_.workshop.polish.sigma +
+                          (1.0 + kCreaseHalo) * grid.spacing.maxCoeff();
+  const double beyond = (mould ? mould->scale : 1.0) * polished + passes_.front().tool.diameter;
+  const AxisStretch stretch = AxisStretch::of(options_.workshop.process.finish);
+  const Eigen::AlignedBox2d box =
+      grown_within(as_written(in_mould(box_of(grid, place.cells), mould), stretch), beyond,
+                   site_.plan.rectangle());
+  const MilledField milled(paths_around(box, silent), site_.plan.blank().max().z());
+  std::optional<CastField> cast;
+  if (mould) cast.emplace(milled, *mould);
+  const SurfaceField& raw = cast ? static_cast<const SurfaceField&>(*cast) : milled;
+  const Eigen::Vector2d size = site_.lens.setup.lens_size;
+  const PolishedField part(raw, site_.designed, {Eigen::Vector2d(0.0, 0.0), size},
+                           options_.workshop.polish);
+  FieldRenderSetup setup{.optics = site_.lens.setup,
+                         .grid = grid,
+                         .surface_height = site_.lens.surface.vertices.row(2).mean()};
+  const FluxPicture predicted = render_cells(site_.part, setup, place.cells, executor_, silent);
+  setup.grid = fine.grid;
+  const FluxPicture now = render_cells(part, setup, fine.cells, executor_, silent);
+  const Exchange change = exchange(site_.leakage, predicted, now);
+  LeakTrial trial;
+  trial.leakage = place.leakage + change.leakage;
+  trial.dark_flux = place.dark_flux + change.dark_flux;
+  return trial;
+}
+
+namespace {
+
+constexpr std::size_t kMaxBalls = 3;   ///< Sizes tried.
+constexpr std::size_t kMaxCauses = 2;  ///< The larger ones of a place.
+constexpr double kMinPart = 0.1;       ///< Of a leak, for its cause to be tried.
+constexpr double kHalf = 0.5;
+
+/// A change of one thing, and what to call it.
+struct Change {
+  std::string words;
+  CamOptions options;
+};
+
+std::string length_words(double mm) { return trimmed_decimal(mm, 4) + " mm"; }
+
+Change with_ball(const CamOptions& options, double diameter) {
+  Change change{joined({"a ", length_words(diameter), " ball"}), options};
+  const int number = finishing_ball(options).number;
+  for (Tool& tool : change.options.workshop.tools) {
+    if (tool.number == number) tool = resized(tool, diameter);
+  }
+  return change;
+}
+
+Change with_half_the_pitch(const CamOptions& options, double pitch) {
+  Change change{joined({"a pitch of ", length_words(kHalf * pitch)}), options};
+  change.options.workshop.process.finish.set_pitch(kHalf * pitch);
+  return change;
+}
+
+/// Decimals follow where they were not chosen.
+Change with_half_the_tolerances(const CamOptions& options) {
+  Change change{"half the tolerances", options};
+  FinishProcess& finish = change.options.workshop.process.finish;
+  finish.tolerance *= kHalf;
+  finish.slope_tolerance *= kHalf;
+  return change;
+}
+
+std::optional<Change> with_another_decimal(const CamOptions& options) {
+  Change change{"one more decimal", options};
+  change.options.decimals = decimals_of(options) + 1;
+  if (change.options.decimals > options.post.most_decimals) return std::nullopt;
+  return change;
+}
+
+Change with_half_the_polish(const CamOptions& options) {
+  Change change{"half as much polishing", options};
+  change.options.workshop.polish.sigma *= kHalf;
+  change.options.workshop.polish.rim_depth *= kHalf;
+  return change;
+}
+
+/// What less polishing leaves of scallops, rows that lie closer make up for.
+Change with_half_the_polish_and_pitch(const CamOptions& options, double pitch) {
+  Change change = with_half_the_polish(with_half_the_pitch(options, pitch).options);
+  change.words = with_half_the_pitch(options, pitch).words + " and " + change.words;
+  return change;
+}
+
+/// What is tried against a cause but for creases, one after the other.
+std::vector<Change> changes_against(const std::string& cause, const CutPlan& plan) {
+  const CamOptions& options = plan.options();
+  if (cause == leak_cause::kScallop) return {with_half_the_pitch(options, plan.pitch())};
+  if (cause == leak_cause::kChord) return {with_half_the_tolerances(options)};
+  if (cause == leak_cause::kPolish) {
+    return {with_half_the_polish(options), with_half_the_polish_and_pitch(options, plan.pitch())};
+  }
+  const auto finer = with_another_decimal(options);
+  if (cause == leak_cause::kDecimals && finer) return {*finer};
+  return {};
+}
+
+bool is_valid(const CamOptions& options, const Lens& lens) {
+  try {
+    validate(options, lens.setup);
+  } catch (const InputError&) {
+    return false;
+  }
+  return true;
+}
+
+/// Tries changes and says how far it has come.
+class Trials {
+ public:
+  Trials(const TrialSite& site, const Executor& executor, const RunControl& control)
+      : site_(site),
+        executor_(executor),
+        control_(control),
+        now_(TrialCut(site, site.plan.options(), executor).work(control)) {}
+
+  void run(const Change& change, const std::vector<LeakPlace*>& places) {
+    if (places.empty() || !is_valid(change.options, site_.lens)) return;
+    const TrialCut cut(site_, change.options, executor_);
+    const TrialCut::Work& work = work_of(change, cut);
+    for (LeakPlace* place : places) {
+      if (control_.stop_requested()) throw Interrupted();
+      LeakTrial trial = cut.at(*place, control_);
+      trial.change = change.words;
+      trial.moves = work.moves / now_.moves;
+      trial.minutes = work.minutes / now_.minutes;
+      place->trials.push_back(trial);
+      control_.report({"remedies", ++done_, 0.0, change.words});
+    }
+  }
+
+ private:
+  /// The same change may be tried for several places.
+  const TrialCut::Work& work_of(const Change& change, const TrialCut& cut) {
+    const auto known = works_.find(change.words);
+    if (known != works_.end()) return known->second;
+    return works_.emplace(change.words, cut.work(control_)).first->second;
+  }
+
+  const TrialSite& site_;
+  const Executor& executor_;
+  const RunControl& control_;
+  TrialCut::Work now_;
+  std::map<std::string, TrialCut::Work> works_;  ///< By what changes are called.
+  double done_ = 0.0;
+};
+
+/// Causes that add to a place's leak, largest first.
+std::vector<std::string> causes_of(const LeakPlace& place) {
+  std::vector<CausePart> parts = place.parts;
+  std::erase_if(parts,
+                [&](const CausePart& part) { return part.leakage < kMinPart * place.leakage; });
+  std::stable_sort(parts.begin(), parts.end(),
+                   [](const CausePart& a, const CausePart& b) { return a.leakage > b.leakage; });
+  std::vector<std::string> causes(parts.size());
+  std::transform(parts.begin(), parts.end(), causes.begin(),
+                 [](const CausePart& part) { return part.cause; });
+  return causes;
+}
+
+bool is_halved(const LeakPlace* place) {
+  return std::any_of(place->trials.begin(), place->trials.end(), [&](const LeakTrial& trial) {
+    return trial.leakage <= kHalf * place->leakage;
+  });
+}
+
+}  // namespace
+
+void try_remedies(const TrialSite& site, std::vector<LeakPlace>& places, const Executor& executor,
+                  const RunControl& control) {
+  Trials trials(site, executor, control);
+  const CamOptions& options = site.plan.options();
+  for (std::size_t rank = 0; rank < kMaxCauses; ++rank) {
+    std::vector<LeakPlace*> creased;
+    for (LeakPlace& place : places) {
+      const std::vector<std::string> causes = causes_of(place);
+      if (rank >= causes.size() || is_halved(&place)) continue;
+      if (causes[rank] == leak_cause::kCrease) creased.push_back(&place);
+      for (const Change& change : changes_against(causes[rank], site.plan)) {
+        if (!is_halved(&place)) trials.run(change, {&place});
+      }
+    }
+    for (const double diameter : smaller_balls(finishing_ball(options).diameter, kMaxBalls)) {
+      trials.run(with_ball(options, diameter), creased);
+      std::erase_if(creased, is_halved);
+    }
+  }
+}
+
+namespace {
+
+/// A cut whose parts are drawn.
+struct ToleranceSite {
+  const CutPlan& plan;
+  const Lens& lens;
+  const PartSurfaces& surfaces;
+  const FluxPicture& designed;  ///< Picture of the design.
+};
+
+/// The rows as they lie on the lens: a mould is larger by what its cast shrinks.
+Passes passes_of(const CamOptions& options, const CutPlan& plan) {
+  const FinishProcess& finish = options.workshop.process.finish;
+  const std::optional<CastFrame> mould = plan.mould();
+  const double scale = mould ? mould->scale : 1.0;
+  Passes passes;
+  passes.pitch = plan.pitch() / scale;
+  passes.ball_radius = finishing_ball(options).radius() / scale;
+  passes.axis = finish.along == PassAxis::kX ? 0 : 1;
+  passes.zigzag = finish.style == PassStyle::kZigzag;
+  passes.cross = finish.cross;
+  passes.cast = mould.has_value();
+  return passes;
+}
+
+/// What the programs of a cut assume of a part.
+PartPlan part_plan(const CamOptions& options, const Lens& lens, const CutPlan& plan) {
+  const Workshop& shop = options.workshop;
+  return {lens.setup, passes_of(options, plan), shop.polish,
+          shop.polish.sigma * (1.0 + kSigmaBound * shop.tolerances.polish_sigma)};
+}
+
+/// Draws CamOptions::tolerances parts with the workshop's errors and predicts them.
+/// @throw Interrupted
+ToleranceForecast draw_parts(const ToleranceSite& site, const Executor& executor,
+                             const RunControl& control) {
+  const CamOptions& options = site.plan.options();
+  const PartPlan plan = part_plan(options, site.lens, site.plan);
+  const PartModel model(site.surfaces.milled(), site.surfaces.designed(), plan, executor, control);
+  const ErrorSource source{options.workshop.tolerances, site.lens.setup.lens_size, plan.passes,
+                           static_cast<std::uint64_t>(options.tolerance_seed)};
+  const PictureJudge judge(site.lens.target, site.designed, options.leakage);
+  return forecast_parts(model, source, judge, options.tolerances, executor, control);
+}
+
+Eigen::AlignedBox2d cut_rectangle(const CutPlan& plan) {
+  const Eigen::AlignedBox3d& box = plan.part_box();
+  return {box.min().head<2>(), box.max().head<2>()};
+}
+
+}  // namespace
+
+Prediction predict_cut(CutPlan& plan, const Lens& lens, const ProgramFiles& programs,
+                       const Executor& executor, const RunControl& control) {
+  const CamOptions& options = plan.options();
+  const std::unique_ptr<MeantSurface> cut = meant_surface(plan.optical());
+  const auto rounded = cut->rounded(plan.surface(), cut_rectangle(plan), executor);
+  // A mould's own surface is another than that of the lens that is cast in it.
+  std::unique_ptr<MeantSurface> meant;
+  if (plan.mould()) meant = meant_surface(optical_surface(lens, plan.model()));
+  const Eigen::AlignedBox2d rectangle(Eigen::Vector2d(0.0, 0.0), lens.setup.lens_size);
+  const PartSurfaces surfaces({meant ? meant->field() : cut->field(), *rounded, rectangle,
+                               plan.blank().max().z(), plan.mould()},
+                              plan.take_finish_paths(programs, control), options.workshop.polish);
+  Prediction prediction = predict_part(surfaces, lens, options, executor, control);
+  if (options.remedies) {
+    try_remedies({plan, lens, surfaces.designed(), surfaces.part(), prediction.leakage},
+                 prediction.places, executor, control);
+  }
+  if (options.tolerances > 0) {
+    prediction.tolerances =
+        draw_parts({plan, lens, surfaces, prediction.leakage.designed.picture}, executor, control);
+  }
+  return prediction;
+}
+
+}  // namespace lensforge

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "cam/contact/cut_surface.h"
+#include "cam/leakage/leak_map.h"
+#include "cam/leakage/leakage.h"
+#include "cam/leakage/sampling_check.h"
+#include "cam/milled/crease_map.h"
+#include "cam/milled/surface_field.h"
+#include "cam/path/operation.h"
+#include "cam/plan/cam_options.h"
+#include "cam/plan/cut_plan.h"
+#include "cam/post/program_writer.h"
+#include "cam/predict/part_surfaces.h"
+#include "cam/report/report_data.h"
+#include "cam/tolerance/tolerance_forecast.h"
+#include "core/compute/executor.h"
+#include "core/compute/run_control.h"
+#include "core/image/layered_image.h"
+#include "core/surface/lens.h"
+#include "core/surface/surface_mesh.h"
+
+namespace lensforge {
+
+/// What a part will project, before it is cut.
+struct Prediction {
+  LeakageResult leakage;
+  SamplingCheck sampling;         ///< Of the part.
+  std::vector<LeakPlace> places;  ///< That leak most, worst first.
+  CreaseMap creases;
+  ReportMap height;              ///< Part − designed, µm.
+  LensRaster surface;            ///< Heights of the part, mm.
+  SurfaceMesh milled;            ///< The surface as milled, at kMeshSpacing.
+  LayeredImage surfaces;         ///< Designed but polished, and the part: PartLayers.
+  ToleranceForecast tolerances;  ///< Empty unless it is asked for.
+};
+
+/// Spacing of the nodes of milled.ply, mm: 100 mm take 1 million.
+inline constexpr double kMeshSpacing = 0.1;
+
+/// Renders every surface from the design to the polished part and finds where light leaks. Memory
+/// does not grow with the number of samples. @throw Interrupted
+Prediction predict_part(const PartSurfaces& surfaces, const Lens& lens, const CamOptions& options,
+                        const Executor& executor, const RunControl& control);
+
+/// A predicted cut, of which places are to be tried again.
+struct TrialSite {
+  const CutPlan& plan;
+  const Lens& lens;
+  const SurfaceField& designed;  ///< Of the lens.
+  const SurfaceField& part;      ///< As predicted.
+  const LeakageResult& leakage;
+};
+
+/// Cuts places of a predicted cut again, with other options: the finishing rows and valleys around
+/// a place are planned, fitted and rounded as make_cut() does, and the light of the place is traced
+/// from the surface that they leave, cast and polished. It replaces the place's light in the
+/// predicted picture; by what that adds to the whole leakage, wherever the light lands, the place's
+/// own changes. What differs from a whole new cut is that the rest of the lens stays as predicted,
+/// and that rows begin where the place does, so that their moves join elsewhere.
+class TrialCut {
+ public:
+  /// @param changed  may differ from the plan's options in finishing tool and process, decimals,
+  ///                 tolerances and polishing.
+  /// All references must outlive this. @pre `changed` is valid for the lens.
+  TrialCut(const TrialSite& site, const CamOptions& changed, const Executor& executor);
+
+  /// What the rows of the finishing rasters come to over the whole lens.
+  struct Work {
+    double moves = 0.0;
+    double minutes = 0.0;  ///< Length ÷ feed.
+  };
+  /// From kWorkRows rows of every raster, evenly spread. @throw Interrupted
+  [[nodiscard]] Work work(const RunControl& control) const;
+  static constexpr std::int64_t kWorkRows = 6;
+
+  /// What would leak from a place. @throw Interrupted
+  [[nodiscard]] LeakTrial at(const LeakPlace& place, const RunControl& control) const;
+
+ private:
+  [[nodiscard]] std::vector<BallPath> paths_around(const Eigen::AlignedBox2d& box,
+                                                   const RunControl& control) const;
+  void add_pencil(const Eigen::AlignedBox2d& box, const MoveSink& sink,
+                  const RunControl& control) const;
+
+  TrialSite site_;
+  const CamOptions& options_;
+  const Executor& executor_;
+  std::unique_ptr<const FinishBalls> own_;  ///< Where balls or rows are others.
+  const FinishBalls* balls_;
+  std::vector<FinishPass> passes_;
+};
+
+/// Tries at every place what may help against its main cause, and against the next one if that
+/// does not halve the leak, and notes in LeakPlace::trials what would leak then. Against creases:
+/// smaller balls, one after the other until the leak is halved, three at most; against scallops
+/// half the pitch; against chords half the tolerances; against decimals one more; against polishing
+/// half of it, then half of it and half the pitch. Everything else stays as it is.
+/// @throw Interrupted
+void try_remedies(const TrialSite& site, std::vector<LeakPlace>& places, const Executor& executor,
+                  const RunControl& control);
+
+/// What a lens will project whose programs are written, with remedies and tolerances as its options
+/// ask for them. Takes the plan's finishing paths.
+/// @param programs  with this plan's operations alone. @throw Interrupted
+Prediction predict_cut(CutPlan& plan, const Lens& lens, const ProgramFiles& programs,
+                       const Executor& executor, const RunControl& control);
+
+}  // namespace lensforge

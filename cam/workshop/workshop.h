@@ -1,0 +1,256 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "cam/workshop/tool.h"
+
+namespace lensforge {
+
+struct NumberRule;
+
+/// Along which axis the passes of a raster run.
+enum class PassAxis { kX, kY };
+
+/// How the passes of a raster follow one another, with a spindle that turns clockwise (M3).
+enum class PassStyle {
+  kZigzag,        ///< To and fro.
+  kClimb,         ///< One way, uncut material on the right of the travel.
+  kConventional,  ///< One way, uncut material on the left.
+};
+
+/// How a tool gets down into material.
+enum class EntryStyle {
+  kRamp,   ///< Along its pass, to and fro.
+  kHelix,  ///< On a circle where one fits, else along its pass.
+};
+
+/// Level-by-level roughing.
+struct RoughProcess {
+  bool enabled = true;
+  int tool = 3;                 ///< Tool::number
+  double stepdown = 1.0;        ///< Between levels at most, mm, > 0.
+  double stepover = 1.2;        ///< Between passes at most, mm, in 0 … its diameter.
+  double allowance = 0.2;       ///< Left on the surface, along its normal, mm, ≥ 0.
+  double ramp_angle_deg = 3.0;  ///< Steepest way into material, degrees, in 0.1 … 45.
+  EntryStyle entry = EntryStyle::kRamp;
+  double helix_radius = 1.0;  ///< Of the axis' circle, mm, in 0 … the tool's radius.
+  double spacing = 0.1;       ///< Of points at which the surface is asked for, mm, > 0.
+  PassStyle style = PassStyle::kZigzag;
+  PassAxis along = PassAxis::kX;
+
+  friend bool operator==(const RoughProcess&, const RoughProcess&) = default;
+};
+
+/// One raster that follows the surface with a stock allowance.
+struct SemiProcess {
+  bool enabled = true;
+  int tool = 2;                 ///< Tool::number
+  double stepover = 0.15;       ///< Between passes at most, mm, in 0 … its diameter.
+  double allowance = 0.03;      ///< Left on the surface, along its normal, mm, ≥ 0.
+  double ramp_angle_deg = 3.0;  ///< Steepest way into material, degrees, in 0.1 … 45.
+  EntryStyle entry = EntryStyle::kRamp;
+  double helix_radius = 0.3;  ///< Of the axis' circle, mm, in 0 … the tool's radius.
+  double spacing = 0.05;      ///< Of points at which the surface is asked for, mm, > 0.
+  PassStyle style = PassStyle::kZigzag;
+  PassAxis along = PassAxis::kX;
+
+  friend bool operator==(const SemiProcess&, const SemiProcess&) = default;
+};
+
+/// The ball's raster that makes the optical surface.
+struct FinishProcess {
+  int tool = 1;               ///< Tool::number, a ball.
+  double pitch = 0.06;        ///< Between passes at most, mm, in 0 … its diameter.
+  double scallop = 0.0;       ///< If > 0, mm: the pitch follows from it, see finish_pitch().
+  double tolerance = 0.0005;  ///< Farthest from the drop curve, mm, > 0.
+  /// Largest error of a move's direction, rad, > 0. Polishing does not even out what neighbouring
+  /// rows have in common; docs/tuning.md, "Defaults of cam", has the leak and the moves by value.
+  double slope_tolerance = 6e-5;
+  PassStyle style = PassStyle::kZigzag;
+  PassAxis along = PassAxis::kX;
+  bool cross = false;   ///< A second raster along the other axis.
+  bool pencil = false;  ///< A pass along concave creases.
+  /// Tool::number of a larger ball that finishes wherever it reaches, before `tool` finishes the
+  /// rest; 0: `tool` alone.
+  int large_tool = 0;
+  int large_every = 1;  ///< Rows of `tool`, whose pitch holds, per row of the larger ball, ≥ 1.
+  /// By how much the machine goes too far across the passes, share of a length, −0.02 … 0.02. The
+  /// programs are as without it; the part that cam predicts is longer by it.
+  double pitch_error = 0.0;
+
+  /// Passes `mm` apart, whatever scallops they leave.
+  void set_pitch(double mm) {
+    pitch = mm;
+    scallop = 0.0;
+  }
+
+  friend bool operator==(const FinishProcess&, const FinishProcess&) = default;
+};
+
+/// Everything that is chosen about the cut.
+struct Process {
+  double safe_height = 5.0;  ///< Of rapid moves above the blank and the clamps, mm, > 0.
+  double clearance = 0.5;    ///< Of the tool to clamps, and above material before it is fed, mm.
+  RoughProcess rough;
+  SemiProcess semi;
+  FinishProcess finish;
+
+  friend bool operator==(const Process&, const Process&) = default;
+};
+
+/// The pitch as it will be cut at most, mm: FinishProcess::pitch, or what leaves scallops of
+/// FinishProcess::scallop on a plane, 2√(h(2R − h)).
+double finish_pitch(const FinishProcess& process, double ball_radius);
+
+/// What polishing does to a surface; all lengths in mm.
+struct PolishModel {
+  double sigma = 0.0;  ///< Of the Gaussian that heights are averaged with, ≥ 0; 0: not polished.
+  double rim_depth = 0.0;   ///< Taken off in addition at the rim, ≥ 0.
+  double rim_length = 1.0;  ///< Distance over which that falls to 1/e of itself, > 0.
+
+  friend bool operator==(const PolishModel&, const PolishModel&) = default;
+};
+
+/// Waves that an axis of the machine leaves in the surface, around one wavelength: its height is
+/// off by a function of that axis's place alone, the same in every row.
+struct WavinessBand {
+  double wavelength = 10.0;  ///< mm, > 0; waves of 0.7 to 1.4 of it are drawn.
+  double rms_um = 0.1;       ///< Root mean square of the height, µm, ≥ 0.
+
+  friend bool operator==(const WavinessBand&, const WavinessBand&) = default;
+};
+
+/// How far machine, tool, polish and light may be off what the programs assume. Measured quantities
+/// are normal with the stated standard deviation (σ), limits of what a maker or a person keeps are
+/// uniform up to the stated bound. Where the defaults come from: docs/fabrication.md, "How sure is
+/// the forecast".
+struct Tolerances {
+  /// Of the machine's X and Y axes each.
+  std::vector<WavinessBand> waviness{{30.0, 0.3}, {3.0, 0.03}};
+  double row_um = 0.02;      ///< Height of one row against the next, σ, µm, ≥ 0.
+  double row_length = 10.0;  ///< Along a row over which that changes, mm, > 0.
+  double backlash_um = 1.0;  ///< Of the axis along the rows, 0 to this, µm, ≥ 0.
+  double radius_um = 5.0;    ///< Radius of the ball, ± this, µm, ≥ 0.
+  double runout_um = 5.0;    ///< Total indicated run-out of the ball, 0 to this, µm, ≥ 0.
+
+  double polish_sigma = 0.1;  ///< Of the polish's σ from part to part, as a share: σ, 0 … 0.3.
+  double polish_within = 0.05;  ///< The same from place to place on a part, 0 … 0.3.
+
+  double index = 0.001;   ///< Refractive index, ± this, ≥ 0.
+  double distance = 1.0;  ///< Of the screen, ± this, mm, ≥ 0.
+  double tilt_deg = 0.2;  ///< Of the part about its x and y axes, σ each, degrees, ≥ 0.
+  /// Full angle of the source as the lens sees it, 0 to this, mrad, ≥ 0; the design assumes 0.
+  double source_mrad = 0.5;
+  double temperature_k = 5.0;     ///< Of the part, ± this, K, ≥ 0.
+  double expansion_per_k = 7e-5;  ///< Of the material's lengths.
+  double index_per_k = -1.05e-4;  ///< Of the material's refractive index.
+
+  friend bool operator==(const Tolerances&, const Tolerances&) = default;
+};
+
+/// The mill. Limits belong to the axes x, y, z.
+struct Machine {
+  std::string name = "JDGR100 in 3-axis mode";
+  Eigen::Vector3d travel{400.0, 400.0, 150.0};           ///< mm
+  double spindle_min_rpm = 3000.0;                       ///< ≥ 0
+  double spindle_max_rpm = 24000.0;                      ///< > 0
+  bool spindle_by_hand = false;                          ///< The program cannot switch it.
+  Eigen::Vector3d max_rate{10000.0, 10000.0, 6000.0};    ///< Rapids and feeds at most, mm/min.
+  Eigen::Vector3d acceleration{2000.0, 2000.0, 1000.0};  ///< mm/s²
+  double junction_deviation = 0.005;                     ///< Rounding of corners, mm.
+  double arc_tolerance = 0.0005;                ///< Of arcs as the controller splits them, mm.
+  Eigen::Vector3d steps_per_mm{0.0, 0.0, 0.0};  ///< 0 rounds to no steps.
+  int look_ahead = 200;                         ///< Moves that the controller plans ahead.
+  double lines_per_second = 1000.0;             ///< That it takes at most; 0 without limit.
+
+  friend bool operator==(const Machine&, const Machine&) = default;
+};
+
+/// The blank before the first cut: a box in the lens frame, entry face in z = 0.
+struct Stock {
+  double margin = 3.0;     ///< Beyond the lens's rectangle on every side, mm, ≥ 0.
+  double allowance = 0.5;  ///< Above the surface's highest point, mm, ≥ 0.
+
+  /// The blank around a surface, mm. @param surface  box of the surface.
+  [[nodiscard]] Eigen::AlignedBox3d box(const Eigen::AlignedBox3d& surface) const;
+  friend bool operator==(const Stock&, const Stock&) = default;
+};
+
+/// A box that no part of the tool may enter: a clamp, a vice's jaw. mm, lens frame.
+struct KeepOut {
+  std::string name;
+  Eigen::Vector3d low = Eigen::Vector3d::Zero();
+  Eigen::Vector3d high = Eigen::Vector3d::Zero();
+
+  friend bool operator==(const KeepOut&, const KeepOut&) = default;
+};
+
+/// What the blank is made of.
+struct Material {
+  std::string name = "cast acrylic (PMMA)";
+  double ior = 0.0;  ///< Refractive index against air, > 1; 0 where it is not stated.
+
+  friend bool operator==(const Material&, const Material&) = default;
+};
+
+/// The tools of the defaults: 3 a 3 mm flat end mill to rough, 2 a 1 mm ball to semi-finish, 1 the
+/// 0.4 mm ball of the paper (Sun et al., Section 5) to finish; 4 a 6 mm ball for FinishProcess::
+/// large_tool, whose feed takes 0.04 mm a tooth.
+std::vector<Tool> default_tools();
+
+/// Everything about a cut but the lens: machine, blank, clamps, tools and how they are used.
+struct Workshop {
+  Machine machine;
+  Material material;
+  Stock stock;
+  std::vector<KeepOut> keep_outs;
+  std::vector<Tool> tools = default_tools();
+  Process process;
+  PolishModel polish{0.03, 0.0, 1.0};  ///< What happens to the surface after the last cut.
+  Tolerances tolerances;               ///< How far all this may be off.
+
+  /// Null if no tool has this number.
+  [[nodiscard]] const Tool* find_tool(int number) const;
+  /// @throw InputError if no tool has this number.
+  [[nodiscard]] const Tool& tool(int number) const;
+  friend bool operator==(const Workshop&, const Workshop&) = default;
+};
+
+/// Rapid moves run at least this high above blank and clamps, mm: sheets of cast acrylic are up to
+/// half a millimetre thicker than stated (ISO 7823-1 allows 0.4 mm and a tenth of the thickness),
+/// and a touch-off and a blank that lies askew are off by a tenth or two.
+inline constexpr double kMinSafeHeight = 0.5;
+
+/// Least and most of one of the workshop's numbers, by its place in the file:
+/// "process.safe_height", "tool.diameter", "finish.pitch". What sets such a number from elsewhere
+/// follows the same rule.
+/// @pre there is such a number.
+NumberRule workshop_rule(const std::string& key);
+
+/// @param file  what to name in messages.
+/// @throw InputError naming file, key, value and rule where a number is out of its range, or where
+///        two entries contradict one another: tool numbers, shapes and sections, speeds beyond the
+///        machine, steps wider than the tool.
+void validate(const Workshop& workshop, const std::string& file);
+
+/// @throw InputError naming file, key, value and rule where a number is out of its range.
+void validate_ranges(const Workshop& workshop, const std::string& file);
+
+/// Reads a workshop from TOML text. What is missing keeps its default; tools and clamps replace the
+/// defaults as a whole.
+/// @throw InputError naming file, key, value and rule.
+Workshop parse_workshop(std::string_view text, const std::string& file);
+
+/// parse_workshop() of a file. @throw InputError also if it cannot be read.
+Workshop read_workshop(const std::filesystem::path& path);
+
+/// The workshop as commented TOML: parse_workshop() returns it unchanged.
+std::string workshop_toml(const Workshop& workshop);
+
+}  // namespace lensforge
