@@ -5,7 +5,7 @@
 #include <optional>
 #include <utility>
 
-#include "cam/contact/mould.h"
+#include "cam/milled/mould.h"
 #include "cam/post/program_writer.h"
 #include "core/error.h"
 #include "core/surface/surface_model.h"

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <utility>
 
-#include "cam/contact/mould.h"
 #include "cam/meant_surface.h"
+#include "cam/milled/mould.h"
 #include "cam/path/rough_links.h"
 #include "core/error.h"
 #include "core/text/number_text.h"

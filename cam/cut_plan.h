@@ -11,12 +11,11 @@
 
 #include "cam/cam_options.h"
 #include "cam/contact/cut_surface.h"
-#include "cam/contact/height_field.h"
 #include "cam/contact/profile_cutter.h"
 #include "cam/finish_balls.h"
 #include "cam/finish_paths.h"
 #include "cam/finish_setup.h"
-#include "cam/milled/cast_field.h"
+#include "cam/milled/mould.h"
 #include "cam/path/collision.h"
 #include "cam/path/finish_operation.h"
 #include "cam/path/finish_raster.h"

@@ -9,8 +9,6 @@
 #include "cam/cam_options.h"
 #include "cam/contact/ball_blend.h"
 #include "cam/contact/cut_surface.h"
-#include "cam/contact/lifted_surface.h"
-#include "cam/contact/rest_map.h"
 #include "cam/finish_setup.h"
 #include "cam/path/finish_raster.h"
 #include "core/compute/executor.h"

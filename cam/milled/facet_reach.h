@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "cam/contact/facet_grid.h"
+#include "cam/contact/cut_surface.h"
 #include "core/compute/executor.h"
 
 namespace lensforge {

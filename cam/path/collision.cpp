@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "cam/contact/profile_contact.h"
+#include "cam/contact/profile_cutter.h"
 #include "cam/path/move_pieces.h"
 #include "core/error.h"
 #include "core/text/number_text.h"

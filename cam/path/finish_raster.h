@@ -7,8 +7,8 @@
 #include <functional>
 #include <vector>
 
+#include "cam/contact/ball_blend.h"
 #include "cam/contact/cut_surface.h"
-#include "cam/contact/rest_map.h"
 #include "cam/path/arc_fit.h"
 #include "cam/path/move.h"
 #include "cam/path/operation.h"

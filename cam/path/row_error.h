@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "cam/contact/curve_piece.h"
+#include "cam/contact/drop_curve.h"
 #include "cam/path/operation.h"
 #include "cam/path/row_profile.h"
 

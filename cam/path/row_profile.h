@@ -11,8 +11,8 @@
 #include <stop_token>
 #include <vector>
 
-#include "cam/contact/curve_piece.h"
 #include "cam/contact/cut_surface.h"
+#include "cam/contact/drop_curve.h"
 #include "cam/contact/drop_cutter.h"
 
 namespace lensforge {

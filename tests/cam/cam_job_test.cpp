@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "cam/cam_meshes.h"
-#include "cam/contact/height_field.h"
+#include "cam/contact/cut_surface.h"
 #include "cam/cut_estimate.h"
 #include "cam/small_cuts.h"
 #include "core/error.h"

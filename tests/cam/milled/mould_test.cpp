@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "cam/contact/mould.h"
+#include "cam/milled/mould.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <numbers>
 
 #include "cam/cam_meshes.h"
-#include "cam/contact/height_field.h"
+#include "cam/contact/cut_surface.h"
 #include "cam/contact/profile_cutter.h"
 #include "core/error.h"
 
