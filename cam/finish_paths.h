@@ -5,7 +5,7 @@
 #include <functional>
 #include <vector>
 
-#include "cam/milled/ball_path.h"
+#include "cam/milled/ball_sweep.h"
 #include "cam/path/finish_raster.h"
 #include "cam/path/move.h"
 #include "cam/tool/process.h"

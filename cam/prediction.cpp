@@ -6,8 +6,7 @@
 #include <optional>
 
 #include "cam/leakage/render_field.h"
-#include "cam/milled/lens_grid.h"
-#include "cam/milled/sampled_mesh.h"
+#include "cam/milled/surface_field.h"
 #include "cam/part_layers.h"
 #include "core/error.h"
 #include "core/optics/light_colors.h"

@@ -8,7 +8,7 @@
 #include "cam/leakage/leak_map.h"
 #include "cam/leakage/leakage.h"
 #include "cam/leakage/sampling_check.h"
-#include "cam/milled/crease_map.h"
+#include "cam/milled/creases.h"
 #include "cam/part_surfaces.h"
 #include "cam/report/report_data.h"
 #include "cam/tolerance/tolerance_forecast.h"

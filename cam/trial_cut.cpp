@@ -8,7 +8,7 @@
 #include "cam/finish_paths.h"
 #include "cam/finish_setup.h"
 #include "cam/leakage/render_field.h"
-#include "cam/milled/crease_sum.h"
+#include "cam/milled/creases.h"
 #include "cam/milled/milled_field.h"
 #include "cam/milled/mould.h"
 #include "cam/milled/polished_field.h"

@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <limits>
 
-#include "cam/milled/crease_sum.h"
+#include "cam/milled/creases.h"
 #include "core/optics/light_path.h"
 #include "design/optics/image_triangle.h"
 

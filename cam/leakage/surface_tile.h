@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "cam/leakage/crease_split.h"
-#include "cam/milled/lens_grid.h"
 #include "cam/milled/surface_field.h"
 #include "core/compute/executor.h"
 #include "core/optics/light_path.h"

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "cam/milled/crease_sum.h"
-#include "cam/milled/lens_grid.h"
+#include "cam/milled/creases.h"
+#include "cam/milled/surface_field.h"
 #include "core/error.h"
 
 namespace lensforge {

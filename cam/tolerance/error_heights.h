@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "cam/milled/lens_grid.h"
+#include "cam/milled/surface_field.h"
 #include "cam/tolerance/base_heights.h"
 #include "cam/tolerance/part_error.h"
 #include "cam/tolerance/passes.h"

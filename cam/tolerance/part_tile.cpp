@@ -6,7 +6,7 @@
 #include <numbers>
 
 #include "cam/leakage/sharp_landing.h"
-#include "cam/milled/rim_loss.h"
+#include "cam/milled/polished_field.h"
 #include "core/surface/corners.h"
 #include "design/optics/image_triangle.h"
 

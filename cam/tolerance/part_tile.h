@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "cam/milled/lens_grid.h"
+#include "cam/milled/surface_field.h"
 #include "cam/tolerance/base_heights.h"
 #include "cam/tolerance/error_heights.h"
 #include "cam/tolerance/line_filter.h"

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "cam/analytic_fields.h"
-#include "cam/milled/lens_grid.h"
+#include "cam/milled/surface_field.h"
 
 namespace lensforge {
 namespace {

@@ -9,7 +9,7 @@
 #include <optional>
 #include <stop_token>
 
-#include "cam/milled/lens_grid.h"
+#include "cam/milled/surface_field.h"
 #include "cam/tolerance/picture_spread.h"
 #include "core/error.h"
 
