@@ -7,7 +7,6 @@
 #include "cam/cam_options.h"
 #include "cam/leakage/leak_map.h"
 #include "cam/leakage/leakage.h"
-#include "cam/leakage/sampling_check.h"
 #include "cam/milled/creases.h"
 #include "cam/part_surfaces.h"
 #include "cam/report/report_data.h"

@@ -10,7 +10,6 @@
 
 #include "cam/leakage/leak_map.h"
 #include "cam/leakage/leakage.h"
-#include "cam/leakage/sampling_check.h"
 #include "cam/path/operation.h"
 #include "cam/report/path_sketch.h"
 #include "cam/report/verdict.h"

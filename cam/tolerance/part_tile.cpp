@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "cam/leakage/sharp_landing.h"
+#include "cam/leakage/surface_tile.h"
 #include "cam/milled/polished_field.h"
 #include "core/surface/corners.h"
 #include "design/optics/image_triangle.h"

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "cam/leakage/picture_judge.h"
+#include "cam/leakage/leakage.h"
 #include "cam/tolerance/part_error.h"
 #include "cam/tolerance/part_model.h"
 #include "core/compute/executor.h"

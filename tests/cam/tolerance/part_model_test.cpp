@@ -13,7 +13,7 @@
 #include "cam/cam_meshes.h"
 #include "cam/contact/cut_surface.h"
 #include "cam/finish_paths.h"
-#include "cam/leakage/picture_judge.h"
+#include "cam/leakage/leakage.h"
 #include "cam/meant_surface.h"
 #include "cam/milled/milled_field.h"
 #include "cam/milled/polished_field.h"
