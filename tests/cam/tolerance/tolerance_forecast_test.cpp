@@ -10,7 +10,6 @@
 #include <stop_token>
 
 #include "cam/milled/surface_field.h"
-#include "cam/tolerance/picture_spread.h"
 #include "core/error.h"
 
 namespace lensforge {
