@@ -25,7 +25,7 @@
 #include "cam/path/stock_map.h"
 #include "cam/post/program_writer.h"
 #include "cam/program_watch.h"
-#include "cam/report/path_sketch.h"
+#include "cam/report/report_data.h"
 #include "core/compute/executor.h"
 #include "core/compute/run_control.h"
 #include "core/surface/lens.h"

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "cam/report/path_sketch.h"
+#include "cam/report/report_data.h"
 #include "core/compute/run_control.h"
 #include "core/image/image.h"
 #include "core/surface/lens.h"

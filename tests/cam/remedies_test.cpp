@@ -16,7 +16,7 @@
 #include "cam/part_layers.h"
 #include "cam/post_plans.h"
 #include "cam/prediction.h"
-#include "cam/report/leak_words.h"
+#include "cam/report/verdict.h"
 #include "cam/tool/standard_balls.h"
 #include "core/temp_folder.h"
 

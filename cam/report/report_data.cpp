@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "cam/report/path_sketch.h"
+#include "cam/report/report_data.h"
 
 #include <utility>
 
@@ -58,6 +58,12 @@ void PathSketch::thin_out() {
   }
   kept_.strips = std::move(half);
   kept_.every *= 2;
+}
+
+double ReportData::minutes() const {
+  double sum = 0.0;
+  for (const ReportOperation& operation : operations) sum += operation.minutes;
+  return sum;
 }
 
 }  // namespace lensforge
