@@ -8,7 +8,7 @@
 #include "app/option_set.h"
 #include "cam/cam_fields.h"
 #include "cam/cam_options.h"
-#include "cam/coupon/coupon_options.h"
+#include "cam/coupon/coupon_layout.h"
 #include "core/error.h"
 #include "core/text/number_text.h"
 #include "design/design_fields.h"

@@ -5,7 +5,6 @@
 
 #include <stop_token>
 
-#include "cam/coupon/coupon_plan.h"
 #include "cam/coupon/fitted_workshop.h"
 #include "cam/post/program_reader.h"
 #include "core/error.h"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "cam/coupon/workshop_edit.h"
-
 #include <gmock/gmock.h>
+
+#include "cam/coupon/fitted_workshop.h"
 
 namespace lensforge {
 namespace {
