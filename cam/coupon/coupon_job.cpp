@@ -12,7 +12,7 @@
 #include "cam/path/finish_raster.h"
 #include "cam/path/rough_links.h"
 #include "cam/post/program_part.h"
-#include "cam/post/program_time.h"
+#include "cam/post/program_reader.h"
 #include "cam/post/program_writer.h"
 #include "core/error.h"
 #include "core/io/files.h"

@@ -11,7 +11,7 @@
 #include "cam/coupon/coupon_fit.h"
 #include "cam/coupon/coupon_layout.h"
 #include "cam/path/collision.h"
-#include "cam/post/program_plan.h"
+#include "cam/post/program_writer.h"
 #include "cam/program_watch.h"
 #include "core/compute/executor.h"
 #include "core/compute/run_control.h"

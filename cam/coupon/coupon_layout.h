@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "cam/post/post_description.h"
-#include "cam/post/program_plan.h"
+#include "cam/post/program_writer.h"
 #include "cam/tool/workshop.h"
 #include "core/text/option_field.h"
 
