@@ -12,8 +12,8 @@
 #include "app/option_set.h"
 #include "app/output_folder.h"
 #include "app/progress_display.h"
+#include "cam/coupon/coupon_fit.h"
 #include "cam/coupon/coupon_job.h"
-#include "cam/coupon/fitted_workshop.h"
 #include "core/text/number_text.h"
 
 namespace lensforge::app {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <gmock/gmock.h>
 
-#include "cam/coupon/fitted_workshop.h"
+#include "cam/coupon/coupon_fit.h"
 
 namespace lensforge {
 namespace {
