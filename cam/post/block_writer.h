@@ -132,8 +132,7 @@ struct ArcMotion {
 /// Writes motions as the blocks of a dialect: program coordinates, mm. Words that a controller
 /// keeps in force are written when they change and not again, but for the feed, which is stated
 /// again after every rapid so that a program can be picked up there, or on every line if the
-/// dialect wants it. A motion to where the tool is
-/// already, to the decimals, leaves no line.
+/// dialect wants it. A motion to where the tool is already, to the decimals, leaves no line.
 ///
 /// Ends and centres are rounded to the decimals. A rapid along XY and Z becomes two, the upper
 /// corner first, so that no controller's way to rush can cut a corner. Arcs of more than half a
