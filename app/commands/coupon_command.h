@@ -4,7 +4,7 @@
 #include <string>
 
 #include "app/frame/option_set.h"
-#include "cam/coupon/coupon_options.h"
+#include "cam/coupon/coupon_layout.h"
 
 namespace lensforge::app {
 

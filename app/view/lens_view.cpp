@@ -17,7 +17,7 @@
 #include "cam/cam.h"
 #include "cam/post/program_reader.h"
 #include "cam/predict/part_surfaces.h"
-#include "cam/report/path_sketch.h"
+#include "cam/report/report_data.h"
 #include "core/compute/run_control.h"
 #include "core/error.h"
 #include "core/image/image.h"

@@ -9,8 +9,8 @@
 #include <variant>
 #include <vector>
 
-#include "cam/report/relief_picture.h"
 #include "cam/report/report_html.h"
+#include "cam/report/report_maps.h"
 #include "core/image/error_image.h"
 #include "core/image/transfer.h"
 #include "core/optics/dispersion.h"

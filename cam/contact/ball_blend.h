@@ -1,9 +1,44 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <memory>
 #include <vector>
 
+#include "cam/contact/cut_surface.h"
+#include "cam/contact/smooth_roll.h"
+#include "core/compute/executor.h"
+
 namespace lensforge {
+
+/// What a ball leaves of a smooth surface to a smaller one: where it could not roll (SmoothRoll)
+/// with a margin, and how far everything else is from there.
+class RestMap {
+ public:
+  /// @param reach  distances are told up to here, mm, > 0; farther places count as so far.
+  RestMap(const SmoothBed& bed, double reach, const Executor& executor);
+
+  /// From the nearest place that is left, seen from above, mm; 0 on it. Places beyond the rim count
+  /// as the rim's.
+  [[nodiscard]] double distance(const Eigen::Vector2d& place) const;
+  /// Of the rectangle: how much lies no farther than this from a place that is left, 0 … 1.
+  /// @pre distance < reach
+  [[nodiscard]] double share_within(double distance) const;
+
+  static constexpr double kCell = 0.1;  ///< Side of the cells that are judged, mm.
+
+ private:
+  [[nodiscard]] Eigen::AlignedBox2d box_of(std::int64_t cell) const;
+  void spread(std::int64_t reach_cells, const std::vector<std::uint8_t>& left);
+
+  Eigen::AlignedBox2d box_;
+  double cell_;
+  std::int64_t columns_ = 1;
+  std::int64_t rows_ = 1;
+  std::vector<float> distance_;  ///< At the middles of the cells, mm.
+};
 
 /// How two balls share a surface so that no step is left where one takes over from the other.
 ///
@@ -40,6 +75,50 @@ class BallBlend {
  private:
   double clear_ = 0.0;              ///< Of the smaller ball at kWidth, mm.
   std::vector<double> large_lift_;  ///< At even distances 0 … kWidth.
+};
+
+/// How one of two balls is held (BallBlend) over a surface that they share (RestMap). Both must
+/// outlive the lift.
+class SharedLift final : public BallLift {
+ public:
+  enum class Ball { kSmall, kLarge };
+
+  SharedLift(const RestMap& rest, const BallBlend& blend, Ball ball)
+      : rest_(rest), blend_(blend), ball_(ball) {}
+
+  /// The smaller ball touches so near to its axis that the axis tells as much, also where it
+  /// follows facets.
+  [[nodiscard]] double at(const Eigen::Vector2d& axis,
+                          const Eigen::Vector2d& contact) const override {
+    return ball_ == Ball::kLarge ? blend_.large_lift(rest_.distance(contact))
+                                 : blend_.small_lift(rest_.distance(axis));
+  }
+  [[nodiscard]] bool clears() const override { return ball_ == Ball::kLarge; }
+
+ private:
+  const RestMap& rest_;
+  const BallBlend& blend_;
+  Ball ball_;
+};
+
+/// A surface over which a ball is lifted. Both must outlive it.
+class LiftedSurface final : public CutSurface {
+ public:
+  LiftedSurface(const CutSurface& surface, const BallLift& lift) : surface_(surface), lift_(lift) {}
+
+  [[nodiscard]] std::shared_ptr<const DropCutter> cutter(const Eigen::AlignedBox2d& axis,
+                                                         const Executor& executor) const override {
+    return surface_.cutter(axis, executor);
+  }
+  [[nodiscard]] double radius() const override { return surface_.radius(); }
+  [[nodiscard]] const SmoothBed* bed() const override { return surface_.bed(); }
+  [[nodiscard]] SurfaceDeviation deviation() const override { return surface_.deviation(); }
+  [[nodiscard]] double band() const override { return surface_.band(); }
+  [[nodiscard]] const BallLift* lift() const override { return &lift_; }
+
+ private:
+  const CutSurface& surface_;
+  const BallLift& lift_;
 };
 
 }  // namespace lensforge

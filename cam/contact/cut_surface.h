@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <cstdint>
 #include <limits>
@@ -8,13 +9,53 @@
 #include <vector>
 
 #include "cam/contact/drop_cutter.h"
-#include "cam/contact/facet_grid.h"
 #include "cam/contact/smooth_roll.h"
 #include "core/compute/executor.h"
+#include "core/surface/height_field_check.h"
 #include "core/surface/optical_surface.h"
 #include "core/surface/surface_mesh.h"
 
 namespace lensforge {
+
+/// Size and steepness of a surface that was found to be a height field.
+struct HeightField {
+  Eigen::AlignedBox3d box;         ///< Of all triangles, mm.
+  double steepest = 0.0;           ///< Largest slope, rise over run.
+  Eigen::Vector3d steepest_place;  ///< Centre of that triangle, mm.
+};
+
+/// Looks over a surface that is to be cut from above.
+/// @param size  of the rectangle from (0, 0) that it has to cover, mm.
+/// @throw InputError if it has no triangles, has coordinates that are not finite, or does not cover
+///        the rectangle exactly once (height_field_fault()).
+HeightField inspect_height_field(const SurfaceMesh& mesh, const Eigen::Vector2d& size);
+
+/// The triangles of a height field by where they lie, seen from above.
+class FacetGrid {
+ public:
+  /// Points up to this far outside of the mesh belong to its nearest triangle, mm: a rim may be
+  /// that far off its rectangle (kRimDistance).
+  static constexpr double kRim = 0.02;
+
+  /// @param mesh  must outlive the grid. @pre every triangle faces +z, and there is one.
+  explicit FacetGrid(const SurfaceMesh& mesh);
+
+  /// Numbers of all triangles whose boxes, kRim wider, overlap `box`; ascending.
+  [[nodiscard]] std::vector<std::int32_t> near(const Eigen::AlignedBox2d& box) const;
+
+  [[nodiscard]] const SurfaceMesh& mesh() const { return mesh_; }
+
+ private:
+  [[nodiscard]] Eigen::Vector2i cell_at(const Eigen::Vector2d& xy) const;
+  [[nodiscard]] Eigen::AlignedBox2d box_of(std::int64_t triangle) const;
+
+  const SurfaceMesh& mesh_;
+  Eigen::AlignedBox2d box_;
+  Eigen::Vector2i cells_{1, 1};
+  /// Triangles that overlap cell c are triangles_[begin_[c] … begin_[c + 1]).
+  std::vector<std::int64_t> begin_;
+  std::vector<std::int32_t> triangles_;
+};
 
 /// How far the triangles that are cut may lie from the surface that is meant, everywhere.
 struct SurfaceDeviation {

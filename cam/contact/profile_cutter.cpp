@@ -1,16 +1,198 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cam/contact/profile_cutter.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <numbers>
 
-#include "cam/contact/profile_contact.h"
 #include "core/compute/float_bounds.h"
 
 namespace lensforge {
+namespace {
+
+/// The contact's place is a maximum of f, so an error of 1e-9 rad in it costs 1e-18 of the corner.
+constexpr double kAngleTolerance = 1e-9;
+/// Halving π/2 this often passes kAngleTolerance; Newton's steps need five or so.
+constexpr int kMaxSteps = 40;
+
+/// Rounding of what a facet's plane bounds, mm.
+constexpr double kBoundMargin = 1e-9;
+
+/// An edge as the tool sees it: places on its line count from the foot of the axis, uphill.
+struct EdgeLine {
+  double away = 0.0;   ///< Of the line from the axis, seen from above, mm.
+  double slope = 0.0;  ///< Rise over run, ≥ 0.
+};
+
+/// Angle on the rounded edge, from its lowest point, where it touches the line: the root of
+/// h(φ) = sin φ · w − m cos φ, w = √(1 − δ²/t²), t = flat + corner · sin φ, which is
+/// f'(σ) = m − g'(t)·σ/t = 0 with g' = tan φ and σ = t·w.
+double contact_angle(const CutterProfile& profile, const EdgeLine& line) {
+  const auto out_at = [&](double sine) { return profile.flat() + profile.corner * sine; };
+  double low = line.away <= profile.flat()
+                   ? 0.0
+                   : std::asin(std::fmin(1.0, (line.away - profile.flat()) / profile.corner));
+  double high = 0.5 * std::numbers::pi;
+  double angle = 0.5 * (low + high);
+  for (int step = 0; step < kMaxSteps && high - low > kAngleTolerance; ++step) {
+    const double sine = std::sin(angle);
+    const double cosine = std::cos(angle);
+    const double t = out_at(sine);
+    const double part = line.away / t;
+    const double w = std::sqrt(std::fmax(0.0, (1.0 - part) * (1.0 + part)));
+    const double h = sine * w - line.slope * cosine;
+    (h > 0.0 ? high : low) = angle;
+    const double bend = w > 0.0 ? part * part * profile.corner * cosine / (t * w) : HUGE_VAL;
+    const double next = angle - h / (cosine * w + sine * bend + line.slope * sine);
+    const bool inside = next > low && next < high;
+    if (inside && std::fabs(next - angle) < kAngleTolerance) return next;
+    angle = inside ? next : 0.5 * (low + high);
+  }
+  return angle;
+}
+
+/// Where on the line the tool rests if the line is long enough, mm uphill from the foot.
+double contact_place(const CutterProfile& profile, const EdgeLine& line) {
+  double t = profile.radius;
+  if (profile.corner > 0.0) {
+    if (line.slope == 0.0) return 0.0;
+    if (profile.flat() == 0.0) {
+      const double part = line.away / profile.radius;
+      const double sine2 =
+          (part * part + line.slope * line.slope) / (1.0 + line.slope * line.slope);
+      t = profile.radius * std::sqrt(sine2);
+    } else {
+      t = profile.flat() + profile.corner * std::sin(contact_angle(profile, line));
+    }
+  }
+  return std::sqrt(std::fmax(0.0, (t - line.away) * (t + line.away)));
+}
+
+/// True if f does not fall uphill of `place` on the line: m − g'(t)·σ/t ≥ 0.
+bool rises_at(const CutterProfile& profile, const EdgeLine& line, double place) {
+  const double t = std::sqrt(line.away * line.away + place * place);
+  const double out = t - profile.flat();
+  if (out <= 0.0 || place <= 0.0) return line.slope > 0.0 || place < 0.0;
+  const double down = std::sqrt(std::fmax(0.0, (profile.corner - out) * (profile.corner + out)));
+  return line.slope * t * down >= out * place;
+}
+
+/// Where between `low` and `high` f is largest. Most edges are short and rise or fall all along.
+double best_place(const CutterProfile& profile, const EdgeLine& line, double low, double high) {
+  if (rises_at(profile, line, high)) return high;
+  if (!rises_at(profile, line, low)) return low;
+  return std::fmin(std::fmax(contact_place(profile, line), low), high);
+}
+
+/// Barycentric coordinates of the point over (x, y) in the plane of the corners.
+Barycentric coordinates(const Eigen::Matrix3d& corners, const Eigen::Vector2d& at) {
+  const Eigen::Vector2d u = (corners.col(1) - corners.col(0)).head<2>();
+  const Eigen::Vector2d v = (corners.col(2) - corners.col(0)).head<2>();
+  const Eigen::Vector2d w = at - corners.col(0).head<2>();
+  const double area = u.x() * v.y() - u.y() * v.x();
+  const double b = (w.x() * v.y() - w.y() * v.x()) / area;
+  const double c = (u.x() * w.y() - u.y() * w.x()) / area;
+  return {1.0 - b - c, b, c};
+}
+
+/// From this coordinate on the contact surely lies on the inner side of an edge: rounding.
+constexpr double kOnEdge = 1e-9;
+
+/// What a facet's tangent contact came to.
+struct FacetTip {
+  double tip = kNoContact;
+  bool sure = false;    ///< The rest says something about the maximum over the triangle.
+  bool inside = false;  ///< `tip` is that maximum, else only no less than it.
+  Barycentric at{};     ///< The contact in the facet's plane.
+
+  /// Whether the maximum may lie on the edge from corner k: from a point of an edge on whose inner
+  /// side the contact lies, f rises, being concave, on the way there, which leads inside.
+  [[nodiscard]] bool may_lie_on_edge(int k) const {
+    return !sure || (k == 0 ? at.c : k == 1 ? at.a : at.b) < kOnEdge;
+  }
+};
+
+/// f at the tangent contact of the facet's plane: the tool touches a plane of normal n at
+/// flat · n_xy/|n_xy| + corner · n_xy before its axis. Where that is inside, f is evaluated at a
+/// point of the triangle, so never above the true maximum.
+FacetTip facet_contact(const CutterProfile& profile, const Eigen::Vector2d& p,
+                       const Eigen::Matrix3d& corners) {
+  const Eigen::Vector3d u = corners.col(1) - corners.col(0);
+  const Eigen::Vector3d v = corners.col(2) - corners.col(0);
+  const Eigen::Vector3d cross = u.cross(v);
+  const double area2 = cross.norm();
+  const double side2 =
+      std::fmax((v - u).squaredNorm(), std::fmax(u.squaredNorm(), v.squaredNorm()));
+  if (!(area2 > kThinnestFacet * side2)) return {};
+  const Eigen::Vector3d n = (cross.z() < 0.0 ? -cross : cross) / area2;
+  if (!(n.z() > kVerticalFacet)) return {};
+  const double level = n.head<2>().norm();
+  Eigen::Vector2d contact = p - profile.corner * n.head<2>();
+  if (level > 0.0) contact -= (profile.flat() / level) * n.head<2>();
+  FacetTip facet;
+  facet.at = coordinates(corners, contact);
+  facet.sure = n.z() >= kRegularFacet && area2 >= kRegularFacet * side2;
+  facet.inside = facet.at.inside();
+  if (!facet.inside && !facet.sure) return facet;
+  const double b = facet.inside ? std::fmin(std::fmax(facet.at.b, 0.0), 1.0) : facet.at.b;
+  const double c = facet.inside ? std::fmin(std::fmax(facet.at.c, 0.0), 1.0 - b) : facet.at.c;
+  const Eigen::Vector3d q = corners.col(0) + b * u + c * v;
+  const double away = std::fmin((q.head<2>() - p).norm(), profile.radius);
+  facet.tip = q.z() - profile.height(away);
+  return facet;
+}
+
+}  // namespace
+
+double profile_vertex_tip(const CutterProfile& profile, const Eigen::Vector2d& p,
+                          const Eigen::Vector3d& q) {
+  const double away = (q.head<2>() - p).norm();
+  return away <= profile.radius ? q.z() - profile.height(away) : kNoContact;
+}
+
+double profile_edge_tip(const CutterProfile& profile, const Eigen::Vector2d& p,
+                        const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  const Eigen::Vector3d& foot = a.z() <= b.z() ? a : b;
+  const Eigen::Vector3d u = (a.z() <= b.z() ? b : a) - foot;
+  const double run = u.head<2>().norm();
+  if (!(run > 0.0)) return profile_vertex_tip(profile, p, foot + u);
+  const Eigen::Vector2d w = p - foot.head<2>();
+  const EdgeLine line{std::fabs(u.x() * w.y() - u.y() * w.x()) / run, u.z() / run};
+  if (line.away > profile.radius) return kNoContact;
+  const double reach = std::sqrt((profile.radius - line.away) * (profile.radius + line.away));
+  const double begin = -(u.x() * w.x() + u.y() * w.y()) / run;
+  const double low = std::fmax(begin, -reach);
+  const double high = std::fmin(begin + run, reach);
+  if (low > high) return kNoContact;
+  const double place = best_place(profile, line, low, high);
+  const double part = std::fmin(std::fmax((place - begin) / run, 0.0), 1.0);
+  const double away = std::fmin(std::sqrt(line.away * line.away + place * place), profile.radius);
+  return foot.z() + part * u.z() - profile.height(away);
+}
+
+double profile_triangle_tip(const CutterProfile& profile, const Eigen::Vector2d& p,
+                            const Eigen::Matrix3d& corners, double enough) {
+  const FacetTip facet = facet_contact(profile, p, corners);
+  if (facet.sure && (facet.inside || facet.tip < enough - kBoundMargin)) return facet.tip;
+  double best = facet.inside ? facet.tip : kNoContact;
+  for (int k = 0; k < 3; ++k) {
+    if (!facet.may_lie_on_edge(k)) continue;
+    best = std::fmax(best, profile_edge_tip(profile, p, corners.col(k), corners.col((k + 1) % 3)));
+  }
+  return best;
+}
+
+double profile_box_tip(const CutterProfile& profile, const Eigen::Vector2d& p,
+                       const Eigen::AlignedBox3d& box) {
+  const Eigen::Vector2d near = p.cwiseMax(box.min().head<2>()).cwiseMin(box.max().head<2>());
+  const double away = (near - p).norm();
+  return away <= profile.radius ? box.max().z() - profile.height(away) : kNoContact;
+}
+
 namespace {
 
 /// Cells per triangle: two triangles a cell keep the pyramid as small as the items.

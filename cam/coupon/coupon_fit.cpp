@@ -1,19 +1,220 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cam/coupon/coupon_fit.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
 
-#include "cam/coupon/least_squares.h"
-#include "cam/coupon/reading_model.h"
+#include "cam/coupon/coupon_model.h"
+#include "cam/coupon/coupon_readings.h"
 #include "core/error.h"
+#include "core/io/files.h"
+#include "core/io/output_guard.h"
 #include "core/text/number_text.h"
+#include "core/text/printable.h"
+#include "core/text/toml_fields.h"
+#include "core/text/version.h"
 
 namespace lensforge {
 namespace {
+
+constexpr int kMostSteps = 200;
+constexpr double kSlightest = 1e-14;  ///< Share of the sum that is no progress: rounding.
+constexpr double kFirstDamping = 1e-3;
+constexpr double kMostDamping = 1e10;  ///< Steps are shorter than differences there.
+constexpr double kEasing = 10.0;
+
+/// Least eigenvalue of JᵀJ, its columns scaled to length 1, that counts: differences are exact to
+/// about 1e-8.
+constexpr double kSingular = 1e-12;
+
+/// Of a datum that alone determines something: others say nothing of it.
+constexpr double kAlone = 1e-6;
+
+struct Normal {
+  Eigen::MatrixXd jacobian;
+  Eigen::VectorXd scale;    ///< Lengths of the jacobian's columns, 1 for columns of zeros.
+  Eigen::MatrixXd inverse;  ///< Of JᵀJ.
+};
+
+Normal normal_of(const LeastSquares& problem, const Eigen::VectorXd& parameters) {
+  Normal normal;
+  normal.jacobian = problem.jacobian(parameters);
+  normal.scale = normal.jacobian.colwise().norm().transpose();
+  for (double& length : normal.scale) length = length > 0.0 ? length : 1.0;
+  const Eigen::MatrixXd unit = normal.jacobian * normal.scale.cwiseInverse().asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(unit.transpose() * unit);
+  const Eigen::VectorXd values = solver.eigenvalues().cwiseMax(kSingular);
+  const Eigen::MatrixXd half = normal.scale.cwiseInverse().asDiagonal() * solver.eigenvectors() *
+                               values.cwiseSqrt().cwiseInverse().asDiagonal();
+  normal.inverse = half * half.transpose();
+  return normal;
+}
+
+/// A damped step, no longer than it may be.
+Eigen::VectorXd step_of(const LeastSquares& problem, const Eigen::MatrixXd& jacobian,
+                        const Eigen::VectorXd& residuals, double damping) {
+  Eigen::MatrixXd matrix = jacobian.transpose() * jacobian;
+  const double floor = kSingular * std::max(matrix.diagonal().maxCoeff(), 1e-300);
+  matrix.diagonal() += damping * matrix.diagonal().cwiseMax(floor);
+  Eigen::VectorXd step = -matrix.ldlt().solve(jacobian.transpose() * residuals);
+  double longest = 1.0;
+  for (Eigen::Index i = 0; i < step.size(); ++i) {
+    longest = std::max(
+        longest, std::abs(step[i]) / problem.longest[problem.free[static_cast<std::size_t>(i)]]);
+  }
+  return step / longest;
+}
+
+}  // namespace
+
+Eigen::MatrixXd LeastSquares::jacobian(const Eigen::VectorXd& parameters) const {
+  Eigen::MatrixXd columns;
+  for (std::size_t i = 0; i < free.size(); ++i) {
+    Eigen::VectorXd moved = parameters;
+    const double step = steps[free[i]];
+    moved[free[i]] = parameters[free[i]] + step;
+    const Eigen::VectorXd above = residuals(moved);
+    moved[free[i]] = parameters[free[i]] - step;
+    const Eigen::VectorXd below = residuals(moved);
+    columns.conservativeResize(above.size(), static_cast<Eigen::Index>(free.size()));
+    columns.col(static_cast<Eigen::Index>(i)) = (above - below) / (2.0 * step);
+  }
+  return columns;
+}
+
+Eigen::VectorXd minimize(const LeastSquares& problem, Eigen::VectorXd start) {
+  if (problem.free.empty()) return start;
+  Eigen::VectorXd at = std::move(start);
+  Eigen::VectorXd residuals = problem.residuals(at);
+  double damping = kFirstDamping;
+  for (int k = 0; k < kMostSteps && damping < kMostDamping; ++k) {
+    const Eigen::MatrixXd jacobian = problem.jacobian(at);
+    const double before = residuals.squaredNorm();
+    for (; damping < kMostDamping; damping *= kEasing) {
+      const Eigen::VectorXd step = step_of(problem, jacobian, residuals, damping);
+      Eigen::VectorXd tried = at;
+      for (std::size_t i = 0; i < problem.free.size(); ++i) {
+        tried[problem.free[i]] += step[static_cast<Eigen::Index>(i)];
+      }
+      const Eigen::VectorXd now = problem.residuals(tried);
+      if (!(now.squaredNorm() < before)) continue;
+      at = tried;
+      residuals = now;
+      damping /= kEasing;
+      break;
+    }
+    if (before - residuals.squaredNorm() <= kSlightest * before) break;
+  }
+  return at;
+}
+
+FitQuality fit_quality(const LeastSquares& problem, const Eigen::VectorXd& minimum) {
+  const Eigen::VectorXd residuals = problem.residuals(minimum);
+  if (problem.free.empty()) return {{}, residuals};
+  const Normal normal = normal_of(problem, minimum);
+  FitQuality quality;
+  quality.uncertainties = normal.inverse.diagonal().cwiseSqrt();
+  quality.deletion = residuals;
+  for (Eigen::Index i = 0; i < residuals.size(); ++i) {
+    const Eigen::RowVectorXd row = normal.jacobian.row(i);
+    const double rest = 1.0 - row * normal.inverse * row.transpose();
+    quality.deletion[i] = rest > kAlone ? residuals[i] / std::sqrt(rest) : 0.0;
+  }
+  return quality;
+}
+
+namespace {
+
+/// One reading with what a coupon's state makes of it.
+struct ModelledReading {
+  std::string key;    ///< "groove[2].width_mm (G3)"
+  double unit = 1.0;  ///< Of the key: 1e-3 mm for a height in µm.
+  Reading reading;    ///< mm, or a share.
+  std::function<double(const CouponState&)> predicted;
+  double least = 0.0;  ///< Of reading ÷ what is usual; beyond it is no such reading.
+  double most = 0.0;
+  bool polished = false;  ///< What is usual is as if it were not polished, which is the most.
+};
+
+constexpr double kMicrometre = 1e-3;  ///< mm
+
+// Bounds of what a reading may be, in shares of what is expected. Marks: the largest pitch error of
+// a workshop and a reading's own. Widths and heights: a ball of half or twice its size; a unit is
+// wrong by a thousand. What polishing leaves may be as faint as it likes.
+constexpr double kMarkShare = 0.03;
+constexpr double kFactor = 3.0;
+constexpr double kAnyFactor = std::numeric_limits<double>::max();
+
+/// With the feature's name on the coupon: "groove[2].width_mm (G3)".
+std::string key_of(const char* array, std::size_t index, const char* key) {
+  std::string entry = std::string(array) + "[" + std::to_string(index) + "]." + key;
+  if (entry.starts_with("mark")) return entry;
+  return entry += " (" + feature_name(entry.starts_with("groove") ? 'G' : 'P', index) + ")";
+}
+
+/// Every reading that was taken.
+std::vector<ModelledReading> modelled_readings(const CouponReadings& readings) {
+  using State = CouponState;
+  std::vector<ModelledReading> all;
+  const auto add = [&](const std::optional<Reading>& reading, const ModelledReading& model) {
+    if (!reading) return;
+    all.push_back(model);
+    all.back().reading = *reading;
+  };
+  for (std::size_t i = 0; i < readings.marks.size(); ++i) {
+    const auto predicted = [mm = readings.marks[i].programmed](const State& s) {
+      return s.mark_distance(mm);
+    };
+    add(readings.marks[i].distance,
+        {key_of("mark", i, "distance_mm"), 1.0, {}, predicted, 1.0 - kMarkShare, 1.0 + kMarkShare});
+  }
+  for (std::size_t i = 0; i < readings.grooves.size(); ++i) {
+    const auto predicted = [mm = readings.grooves[i].depth](const State& s) {
+      return s.groove_width(mm);
+    };
+    add(readings.grooves[i].width,
+        {key_of("groove", i, "width_mm"), 1.0, {}, predicted, 1.0 / kFactor, kFactor});
+  }
+  for (std::size_t i = 0; i < readings.pads.size(); ++i) {
+    const PadReadings& pad = readings.pads[i];
+    const auto before = [mm = pad.pitch](const State& s) { return s.scallop_before(mm); };
+    const auto after = [mm = pad.pitch](const State& s) { return s.scallop_after(mm); };
+    const auto orders = [mm = pad.pitch, light = readings.light](const State& s) {
+      return s.order_ratio(mm, light);
+    };
+    add(pad.before,
+        {key_of("pad", i, "before_um"), kMicrometre, {}, before, 1.0 / kFactor, kFactor});
+    add(pad.after, {key_of("pad", i, "after_um"), kMicrometre, {}, after, 0.0, kFactor, true});
+    add(pad.orders, {key_of("pad", i, "order_ratio"), 1.0, {}, orders, 0.0, kAnyFactor});
+  }
+  return all;
+}
+
+/// @throw InputError naming file, key, value and rule for a reading that a coupon of such a
+///        workshop cannot have.
+void require_plausible(const std::vector<ModelledReading>& readings, const CouponState& expected,
+                       const std::string& file) {
+  CouponState unpolished = expected;
+  unpolished.sigma = 0.0;
+  for (const ModelledReading& one : readings) {
+    const double usual = one.predicted(one.polished ? unpolished : expected) / one.unit;
+    const double value = one.reading.value / one.unit;
+    if (value >= one.least * usual && value <= one.most * usual) continue;
+    throw InputError(file + ": " + one.key + ": " + number_text(value) + ": must be in " +
+                     number_text(one.least * usual, 4) + " to " + number_text(one.most * usual, 4) +
+                     ", since the workshop's " + (one.polished ? "ball leaves " : "values give ") +
+                     number_text(usual, 4) + (one.polished ? " before polishing" : "") +
+                     "; the key names the unit");
+  }
+}
 
 enum Parameter { kSigma, kRadius, kPitchError, kOffset, kParameters };
 
@@ -241,6 +442,139 @@ CouponFit fit_coupon(const CouponReadings& readings, const Workshop& workshop,
 
 CouponFit expected_fit(const CouponReadings& expected, const Workshop& workshop) {
   return fit_coupon(expected, workshop, "expected readings");
+}
+
+namespace {
+
+/// Where a line and a column of the text are, both counted from 1.
+std::size_t offset_of(const std::string& text, const toml::source_position& place) {
+  std::size_t begin = 0;
+  for (toml::source_index line = 1; line < place.line; ++line) begin = text.find('\n', begin) + 1;
+  return begin + place.column - 1;
+}
+
+/// Writes a number where one stands.
+void replace_number(std::string& text, const toml::node& node, double value) {
+  constexpr std::string_view kEnds = " \t\r\n,}]#";
+  const std::size_t begin = offset_of(text, node.source().begin);
+  const std::size_t end = std::min(text.find_first_of(kEnds, begin), text.size());
+  text.replace(begin, end - begin, shortest_text(value));
+}
+
+/// Sets a key of one of the document's tables, which may lack the key or be missing itself.
+void set_number(std::string& text, const std::string& table, const std::string& key, double value) {
+  const toml::table document = toml::parse(text);
+  const std::string line = key + " = " + shortest_text(value) + "\n";
+  const toml::table* const found = document[table].as_table();
+  if (found == nullptr) {
+    if (!text.empty()) text += text.ends_with('\n') ? "\n" : "\n\n";
+    text += "[" + table + "]\n" + line;
+  } else if (const toml::node* const node = found->get(key)) {
+    replace_number(text, *node, value);
+  } else {
+    const std::size_t header = offset_of(text, found->source().begin);
+    const std::size_t end = text.find('\n', header);
+    if (end == std::string::npos) text += "\n";
+    text.insert(std::min(end, text.size() - 1) + 1, line);
+  }
+}
+
+/// The diameter of a tool, which states it if there is a list of tools.
+void set_diameter(std::string& text, int number, double value) {
+  const toml::table document = toml::parse(text);
+  const toml::array* const tools = document["tool"].as_array();
+  if (tools == nullptr) return;
+  for (const toml::node& node : *tools) {
+    const toml::table* const tool = node.as_table();
+    if (tool == nullptr || (*tool)["number"].value_or(Tool{}.number) != number) continue;
+    if (const toml::node* const diameter = tool->get("diameter")) {
+      return replace_number(text, *diameter, value);
+    }
+  }
+}
+
+}  // namespace
+
+std::optional<std::string> edited_workshop(const std::string& text, const Workshop& to) {
+  try {
+    const Workshop from = parse_workshop(text, "workshop");
+    const FinishProcess& finish = to.process.finish;
+    std::string edited = text;
+    if (from.polish.sigma != to.polish.sigma) {
+      set_number(edited, "polish", "sigma", to.polish.sigma);
+    }
+    if (from.process.finish.pitch_error != finish.pitch_error) {
+      set_number(edited, "finish", "pitch_error", finish.pitch_error);
+    }
+    const double diameter = to.tool(finish.tool).diameter;
+    if (from.tool(finish.tool).diameter != diameter) set_diameter(edited, finish.tool, diameter);
+    if (parse_workshop(edited, "workshop") == to) return edited;
+  } catch (const InputError&) {
+  } catch (const toml::parse_error&) {
+  }
+  return std::nullopt;
+}
+
+namespace {
+
+constexpr std::size_t kLongestName = 200;  ///< Of the readings' file, in a comment.
+
+constexpr std::string_view kFitted = "# Fitted by ";
+constexpr std::string_view kValue = "#   ";
+
+std::array<const FittedValue*, 3> values_of(const CouponFit& fit) {
+  return {&fit.sigma, &fit.diameter, &fit.pitch_error};
+}
+
+bool determines_any(const CouponFit& fit) {
+  for (const FittedValue* value : values_of(fit)) {
+    if (value->determined) return true;
+  }
+  return false;
+}
+
+/// Comments that say what was fitted to what.
+std::string fitted_text(const CouponFit& fit, const std::string& readings) {
+  std::string text =
+      "# Fitted by " + program_mark() + " to " + printable_line(readings, kLongestName) + ":\n";
+  for (const FittedValue* value : values_of(fit)) {
+    text += std::string(kValue) + value->key +
+            (value->determined
+                 ? " = " + number_text(value->value) + " +- " + number_text(value->uncertainty, 2)
+                 : " is not determined, left as it was") +
+            "\n";
+  }
+  return text;
+}
+
+/// The file without the comments of an earlier fit at its beginning.
+std::string without_fitted(std::string text) {
+  if (!text.starts_with(kFitted)) return text;
+  do {
+    text.erase(0, std::min(text.find('\n'), text.size() - 1) + 1);
+  } while (text.starts_with(kValue));
+  return text;
+}
+
+}  // namespace
+
+CouponFit fit_workshop(const WorkshopFit& task) {
+  const std::string name = task.readings.string();
+  const CouponReadings readings =
+      parse_readings(read_toml_file(task.readings, "a file of readings"), name);
+  CouponFit fit = fit_coupon(readings, task.workshop, name);
+  if (!determines_any(fit)) {
+    throw InputError(name + ": " + std::to_string(readings.count()) +
+                     " readings: determine neither polish.sigma, tool.diameter nor "
+                     "finish.pitch_error; take more of them, or more exact ones");
+  }
+  const Workshop fitted = fit.applied_to(task.workshop);
+  validate(fitted, name + ", the workshop as fitted");
+  require_replaceable("--out", task.out, task.force);
+  task.before_writing();
+  const auto edited = edited_workshop(without_fitted(task.workshop_text), fitted);
+  write_whole_file(task.out, fitted_text(fit, name) + edited.value_or(workshop_toml(fitted)));
+  return fit;
 }
 
 }  // namespace lensforge

@@ -1,14 +1,46 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <Eigen/Core>
+#include <filesystem>
+#include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "cam/coupon/coupon_model.h"
 #include "cam/coupon/coupon_readings.h"
-#include "cam/coupon/coupon_state.h"
 #include "cam/workshop/workshop.h"
 
 namespace lensforge {
+
+/// A weighted least-squares problem in a few parameters: find the least |r(p)|².
+struct LeastSquares {
+  std::function<Eigen::VectorXd(const Eigen::VectorXd& parameters)> residuals;
+  std::vector<int> free;    ///< Parameters that may change; the others keep their value.
+  Eigen::VectorXd steps;    ///< Of differences, one a parameter, > 0.
+  Eigen::VectorXd longest;  ///< Change of a parameter in one step at most.
+
+  /// ∂r/∂p of the free parameters, by central differences.
+  [[nodiscard]] Eigen::MatrixXd jacobian(const Eigen::VectorXd& parameters) const;
+};
+
+/// What the fit is worth at its minimum, with residuals of standard deviation 1.
+struct FitQuality {
+  /// Standard uncertainty of each free parameter, √ of the diagonal of (JᵀJ)⁻¹; enormous for what
+  /// the residuals do not determine.
+  Eigen::VectorXd uncertainties;
+  /// By how many standard deviations each residual's datum is off what the others say of it:
+  /// r / √(1 − h), h the diagonal of J(JᵀJ)⁻¹Jᵀ (Belsley, Kuh, Welsch, "Regression Diagnostics",
+  /// 1980). 0 for a datum that others say nothing of.
+  Eigen::VectorXd deletion;
+};
+
+/// Levenberg-Marquardt steps (Marquardt 1963) from `start` until none lowers the sum by a part in
+/// 1e14.
+Eigen::VectorXd minimize(const LeastSquares& problem, Eigen::VectorXd start);
+
+FitQuality fit_quality(const LeastSquares& problem, const Eigen::VectorXd& minimum);
 
 /// A value of the workshop with what the readings say of it.
 struct FittedValue {
@@ -60,5 +92,32 @@ CouponFit fit_coupon(const CouponReadings& readings, const Workshop& workshop,
 
 /// What the fit of readings that are all as expected would know: the same uncertainties.
 CouponFit expected_fit(const CouponReadings& expected, const Workshop& workshop);
+
+/// A workshop's file with polish.sigma, the finishing ball's diameter and finish.pitch_error
+/// changed, and every other byte, comments among them, as it was.
+/// @param text  TOML that parse_workshop() takes.
+/// @param to    the same workshop with other values of these three.
+/// @return nothing where the file cannot be changed so: it states no tools and the ball changes, or
+///         it is written in a way that this does not follow.
+std::optional<std::string> edited_workshop(const std::string& text, const Workshop& to);
+
+/// From readings to a workshop file.
+struct WorkshopFit {
+  std::filesystem::path readings;  ///< A filled-in template.
+  Workshop workshop;               ///< That cut the coupon.
+  std::string workshop_text;       ///< The file that it was read from; empty for the defaults.
+  std::filesystem::path out;       ///< Workshop file to write.
+  bool force = false;              ///< Replace one that lensforge did not write.
+  /// Is called when the work is done and the file is to be written.
+  std::function<void()> before_writing = [] {};
+};
+
+/// Fits the readings and writes the workshop with the values that they determine. Everything else
+/// of it stays, comments too (edited_workshop(); else those of workshop_toml()). The first comments
+/// say what was fitted, in place of those of an earlier fit.
+/// @throw InputError as parse_readings() and fit_coupon(), if the readings determine none of the
+///        values, if the workshop breaks a rule with them, or if `out` must not be replaced.
+/// @throw RunError if it cannot be written.
+CouponFit fit_workshop(const WorkshopFit& task);
 
 }  // namespace lensforge

@@ -3,8 +3,20 @@
 
 #include <array>
 #include <cstddef>
+#include <numbers>
+
+#include "cam/workshop/workshop.h"
 
 namespace lensforge {
+
+/// The light with which a coupon's orders of diffraction are measured, through the blank.
+struct CouponLight {
+  double wavelength = 532e-6;  ///< In air, mm.
+  double ior = 1.49;           ///< Of the blank.
+
+  /// By how much a millimetre of the blank delays the light against air, rad/mm.
+  [[nodiscard]] double phase() const { return 2.0 * std::numbers::pi * (ior - 1.0) / wavelength; }
+};
 
 /// Width of a groove that a ball cuts in one pass, at the top of the blank: 2 √(d (2R − d)), and 2R
 /// from d = R on. mm; 0 for d ≤ 0.
@@ -38,6 +50,24 @@ class PolishedScallop {
 
   std::array<double, kHarmonics> waves_{};  ///< Amplitudes of the cosines, mm.
   std::size_t count_ = 0;                   ///< Of waves that are not zero: the first.
+};
+
+/// What decides how a coupon measures; mm.
+struct CouponState {
+  double sigma = 0.0;          ///< Of the polish.
+  double radius = 0.2;         ///< Of the ball as it cuts, run-out and wear included.
+  double pitch_error = 0.0;    ///< Share of a length, across the passes.
+  double groove_offset = 0.0;  ///< How much deeper grooves are than programmed: the touch-off.
+
+  /// As the workshop's file has it.
+  static CouponState of(const Workshop& workshop);
+
+  // What is measured of what was programmed.
+  [[nodiscard]] double mark_distance(double programmed) const;
+  [[nodiscard]] double groove_width(double depth) const;
+  [[nodiscard]] double scallop_before(double pitch) const;
+  [[nodiscard]] double scallop_after(double pitch) const;
+  [[nodiscard]] double order_ratio(double pitch, const CouponLight& light) const;
 };
 
 }  // namespace lensforge

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "cam/coupon/coupon_state.h"
+#include "cam/coupon/coupon_model.h"
 #include "core/error.h"
 #include "core/text/number_text.h"
 #include "core/text/toml_fields.h"

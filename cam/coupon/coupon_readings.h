@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "cam/coupon/coupon_layout.h"
-#include "cam/coupon/coupon_light.h"
+#include "cam/coupon/coupon_model.h"
 #include "cam/workshop/workshop.h"
 
 namespace lensforge {

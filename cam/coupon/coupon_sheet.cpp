@@ -14,6 +14,166 @@
 namespace lensforge {
 namespace {
 
+constexpr double kWidth = 560.0;  ///< Of the picture; all its lengths are in its own units.
+constexpr double kMargin = 74.0;
+
+std::string attribute(const char* name, double value) {
+  return std::string(" ") + name + "=\"" + decimal_text(value, 2) + "\"";
+}
+
+/// The coupon as the machine sees it, y upwards.
+class Drawing {
+ public:
+  explicit Drawing(const CouponLayout& layout)
+      : layout_(layout), size_(layout.xy(layout.size.x(), layout.size.y())) {
+    scale_ = (kWidth - 2.0 * kMargin) / size_.maxCoeff();
+  }
+
+  [[nodiscard]] double width() const { return scale_ * size_.x() + 2.0 * kMargin; }
+  [[nodiscard]] double height() const { return scale_ * size_.y() + 2.0 * kMargin; }
+
+  /// @param low, high  (x, y), mm.
+  void box(const Eigen::Vector2d& low, const Eigen::Vector2d& high, const std::string& style) {
+    svg_ += "<rect" + attribute("x", x(low.x())) + attribute("y", y(high.y())) +
+            attribute("width", scale_ * (high.x() - low.x())) +
+            attribute("height", scale_ * (high.y() - low.y())) + " " + style + "/>";
+  }
+  /// A cut of the ball: a line as wide as it.
+  void cut(const CouponGroove& groove) {
+    const Eigen::Vector2d from = layout_.xy(groove.along_begin, groove.across);
+    const Eigen::Vector2d to = layout_.xy(groove.along_end, groove.across);
+    line(from, to, std::max(1.5, 2.0 * scale_ * layout_.radius),
+         "#0b5cad\" stroke-linecap=\"round");
+  }
+  void line(const Eigen::Vector2d& from, const Eigen::Vector2d& to, double wide,
+            const std::string& colour) {
+    svg_ += "<line" + attribute("x1", x(from.x())) + attribute("y1", y(from.y())) +
+            attribute("x2", x(to.x())) + attribute("y2", y(to.y())) +
+            attribute("stroke-width", wide) + " stroke=\"" + colour + "\"/>";
+  }
+  /// @param anchor  start, middle or end.
+  void words(const Eigen::Vector2d& at, const std::string& text, const std::string& anchor,
+             const Eigen::Vector2d& shift = {0.0, 0.0}) {
+    svg_ += "<text" + attribute("x", x(at.x()) + shift.x()) +
+            attribute("y", y(at.y()) + shift.y()) + " text-anchor=\"" + anchor + "\">" +
+            escape_html(text) + "</text>";
+  }
+  void words_upwards(const Eigen::Vector2d& at, const std::string& text,
+                     const Eigen::Vector2d& shift) {
+    const std::string place =
+        decimal_text(x(at.x()) + shift.x(), 2) + " " + decimal_text(y(at.y()) + shift.y(), 2);
+    svg_ +=
+        "<text transform=\"translate(" + place + ") rotate(-90)\">" + escape_html(text) + "</text>";
+  }
+  /// A dimension between two places with the same x or the same y, `off` beside them.
+  void dimension(const Eigen::Vector2d& from, const Eigen::Vector2d& to, double off,
+                 const std::string& text) {
+    const bool level = from.y() == to.y();
+    const Eigen::Vector2d shift = level ? Eigen::Vector2d(0.0, off) : Eigen::Vector2d(off, 0.0);
+    const Eigen::Vector2d a = Eigen::Vector2d(x(from.x()), y(from.y())) + shift;
+    const Eigen::Vector2d b = Eigen::Vector2d(x(to.x()), y(to.y())) + shift;
+    svg_ += "<line" + attribute("x1", a.x()) + attribute("y1", a.y()) + attribute("x2", b.x()) +
+            attribute("y2", b.y()) +
+            " stroke=\"#1a1f24\" marker-start=\"url(#tick)\" marker-end=\"url(#tick)\"/>";
+    const Eigen::Vector2d middle = 0.5 * (a + b);
+    const std::string turn = level
+                                 ? ""
+                                 : " transform=\"rotate(-90 " + decimal_text(middle.x() - 5.0, 2) +
+                                       " " + decimal_text(middle.y(), 2) + ")\"";
+    svg_ += "<text" + attribute("x", level ? middle.x() : middle.x() - 5.0) +
+            attribute("y", level ? middle.y() - 5.0 : middle.y()) + " text-anchor=\"middle\"" +
+            turn + ">" + escape_html(text) + "</text>";
+  }
+  void zero() {
+    svg_ += "<circle" + attribute("cx", x(0.0)) + attribute("cy", y(0.0)) +
+            " r=\"5\" fill=\"#fff\" stroke=\"#a3161a\" stroke-width=\"2.5\"/>";
+    words({0.0, 0.0}, "X0 Y0", "end", {-9.0, 16.0});
+  }
+  [[nodiscard]] std::string result() const {
+    return "<svg viewBox=\"0 0 " + decimal_text(width(), 0) + " " + decimal_text(height(), 0) +
+           "\" role=\"img\" aria-label=\"Coupon from above\" font-family=\"Arial, sans-serif\" "
+           "font-size=\"13\"><defs><marker id=\"tick\" viewBox=\"-5 -5 10 10\" markerWidth=\"9\" "
+           "markerHeight=\"9\" orient=\"auto\"><path d=\"M-3 3L3 -3M0 -5V5\" stroke=\"#1a1f24\"/>"
+           "</marker></defs>" +
+           svg_ + "</svg>";
+  }
+
+ private:
+  [[nodiscard]] double x(double mm) const { return kMargin + scale_ * mm; }
+  [[nodiscard]] double y(double mm) const { return height() - kMargin - scale_ * mm; }
+
+  const CouponLayout& layout_;
+  Eigen::Vector2d size_;
+  double scale_ = 1.0;
+  std::string svg_;
+};
+
+void draw_pads(const CouponLayout& layout, Drawing& drawing) {
+  for (std::size_t i = 0; i < layout.pads.size(); ++i) {
+    const Eigen::AlignedBox2d& box = layout.pads[i].box;
+    const Eigen::Vector2d low = layout.xy(box.min().x(), box.min().y());
+    const Eigen::Vector2d high = layout.xy(box.max().x(), box.max().y());
+    drawing.box(low, high, "fill=\"#b9d3ea\" stroke=\"#0b5cad\"");
+    const std::string name = feature_name('P', i);
+    const std::string pitch = trimmed_decimal(layout.pads[i].pitch, 3);
+    if (layout.along == 0) {
+      const Eigen::Vector2d middle = 0.5 * (low + high);
+      drawing.words(middle, name, "middle", {0.0, -4.0});
+      drawing.words(middle, pitch, "middle", {0.0, 13.0});
+    } else {
+      drawing.words({high.x(), 0.5 * (low.y() + high.y())}, joined({name, " ", pitch}), "start",
+                    {7.0, 4.5});
+    }
+  }
+}
+
+void draw_grooves(const CouponLayout& layout, Drawing& drawing) {
+  for (std::size_t i = 0; i < layout.grooves.size(); ++i) {
+    const CouponGroove& groove = layout.grooves[i];
+    drawing.cut(groove);
+    const Eigen::Vector2d end = layout.xy(groove.along_end + layout.radius, groove.across);
+    if (layout.along == 0) {
+      drawing.words(end, feature_name('G', i), "start", {5.0, 4.5});
+    } else {
+      drawing.words_upwards(end, feature_name('G', i), {4.5, -5.0});
+    }
+  }
+  for (std::size_t i = 0; i < layout.marks.size(); ++i) {
+    const CouponGroove& mark = layout.marks[i];
+    drawing.cut(mark);
+    const Eigen::Vector2d middle =
+        layout.xy(0.5 * (mark.along_begin + mark.along_end), mark.across);
+    drawing.words(middle, i == 0 ? "A" : "B", "middle",
+                  layout.along == 0 ? Eigen::Vector2d(0.0, -8.0) : Eigen::Vector2d(-10.0, 4.0));
+  }
+}
+
+void draw_dimensions(const CouponLayout& layout, Drawing& drawing) {
+  const Eigen::Vector2d size = layout.xy(layout.size.x(), layout.size.y());
+  const auto mm = [](double value) { return trimmed_decimal(value, 3); };
+  drawing.dimension({0.0, 0.0}, {size.x(), 0.0}, 46.0, mm(size.x()));
+  drawing.dimension({0.0, 0.0}, {0.0, size.y()}, -44.0, mm(size.y()));
+  const double end = layout.size.x();
+  const Eigen::Vector2d a = layout.xy(end, layout.marks[0].across);
+  const Eigen::Vector2d b = layout.xy(end, layout.marks[1].across);
+  drawing.dimension(a, b, layout.along == 0 ? 34.0 : -24.0, "A–B " + mm(layout.mark_distance()));
+}
+
+}  // namespace
+
+std::string coupon_drawing(const CouponLayout& layout) {
+  Drawing drawing(layout);
+  drawing.box({0.0, 0.0}, layout.xy(layout.size.x(), layout.size.y()),
+              "fill=\"#eef4fa\" stroke=\"#1a1f24\" stroke-width=\"2\"");
+  draw_pads(layout, drawing);
+  draw_grooves(layout, drawing);
+  draw_dimensions(layout, drawing);
+  drawing.zero();
+  return drawing.result();
+}
+
+namespace {
+
 constexpr double kMicrometres = 1e3;
 
 constexpr const char* kHowMarks =

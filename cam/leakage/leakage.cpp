@@ -2,13 +2,92 @@
 #include "cam/leakage/leakage.h"
 
 #include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
 #include <map>
+#include <numeric>
 #include <span>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "core/error.h"
 
 namespace lensforge {
+namespace {
+
+double mean_of(const Image& target) {
+  return target.total() / static_cast<double>(target.values().size());
+}
+
+/// 1 for every pixel of the target that `chosen` takes, 0 for the others.
+template <class Chosen>
+std::vector<double> mask_of(const Image& target, const Chosen& chosen) {
+  std::vector<double> mask(target.values().size());
+  std::transform(target.values().begin(), target.values().end(), mask.begin(),
+                 [&](float value) { return chosen(static_cast<double>(value)) ? 1.0 : 0.0; });
+  return mask;
+}
+
+double weighted(const std::vector<double>& weights, const std::vector<double>& flux) {
+  return std::inner_product(weights.begin(), weights.end(), flux.begin(), 0.0);
+}
+
+double count_of(const std::vector<double>& mask) {
+  return std::accumulate(mask.begin(), mask.end(), 0.0);
+}
+
+}  // namespace
+
+void validate(const LeakageOptions& options) {
+  if (options.dark_below >= 0.0 && options.bright_from > options.dark_below) return;
+  throw InputError("dark pixels are those below " + std::to_string(options.dark_below) +
+                   " of the mean, bright ones those from " + std::to_string(options.bright_from) +
+                   ": dark must be at least 0 and below bright");
+}
+
+double contrast_of(double dark_ratio) {
+  return dark_ratio > 0.0 ? 1.0 / dark_ratio : std::numeric_limits<double>::infinity();
+}
+
+double leakage_share(const FluxPicture& picture, const FluxPicture& designed) {
+  double excess = 0.0;
+  for (std::size_t i = 0; i < picture.flux.size(); ++i) {
+    excess += std::max(0.0, picture.flux[i] - designed.flux[i]);
+  }
+  const double all = designed.inside();
+  return all > 0.0 ? excess / all : 0.0;
+}
+
+PictureJudge::PictureJudge(const Image& target, const FluxPicture& designed,
+                           const LeakageOptions& options)
+    : target_(target), designed_(designed) {
+  validate(options);
+  const double mean = mean_of(target);
+  dark_ = mask_of(target, [&](double v) { return v < options.dark_below * mean; });
+  bright_ = mask_of(target, [&](double v) { return v >= options.bright_from * mean; });
+}
+
+PictureQuality PictureJudge::judge(const FluxPicture& picture) const {
+  PictureQuality quality;
+  quality.metrics = compare(picture.image(target_.total()), target_);
+  quality.metrics.flux_inside = picture.inside();
+  quality.leakage = leakage_share(picture, designed_);
+  quality.dark_flux = weighted(dark_, picture.flux);
+  quality.dark_ratio = dark_ratio(picture);
+  return quality;
+}
+
+std::int64_t PictureJudge::dark_pixels() const { return std::llround(count_of(dark_)); }
+std::int64_t PictureJudge::bright_pixels() const { return std::llround(count_of(bright_)); }
+
+double PictureJudge::dark_ratio(const FluxPicture& picture) const {
+  const double bright_mean = weighted(bright_, picture.flux) / count_of(bright_);
+  const double dark_mean = weighted(dark_, picture.flux) / std::max(1.0, count_of(dark_));
+  return bright_mean > 0.0 ? dark_mean / bright_mean : 0.0;
+}
+
 namespace {
 
 /// Pictures of every surface of a chain, each rendered once. Steps come first: what they are made
@@ -119,6 +198,86 @@ LeakageResult measure_leakage(const LeakageChain& chain, const Image& target,
   result.dark_pixels = judge.dark_pixels();
   result.bright_pixels = judge.bright_pixels();
   return result;
+}
+
+namespace {
+
+GridWindow with_half_the_spacing(const GridWindow& grid) {
+  GridWindow fine = grid;
+  fine.spacing *= 0.5;
+  fine.columns = 2 * (grid.columns - 1) + 1;
+  fine.rows = 2 * (grid.rows - 1) + 1;
+  return fine;
+}
+
+/// The same cells on that grid.
+CellRange halved(const CellRange& cells) {
+  return {2 * cells.column, 2 * cells.row, 2 * cells.columns, 2 * cells.rows};
+}
+
+struct Stretch {
+  std::int64_t begin;
+  std::int64_t count;
+};
+
+/// The middle of the `index`th of kSamplingWindows equal parts of a side of `cells` cells.
+Stretch stretch(std::int64_t cells, int pixels, std::int64_t index) {
+  const double window = kWindowPixels / pixels * static_cast<double>(cells);
+  const std::int64_t part = std::max<std::int64_t>(1, cells / kSamplingWindows);
+  const std::int64_t count = std::clamp<std::int64_t>(std::llround(window), 1, part);
+  const std::int64_t middle = (2 * index + 1) * cells / (2 * kSamplingWindows);
+  return {std::clamp<std::int64_t>(middle - count / 2, 0, cells - count), count};
+}
+
+std::vector<CellRange> windows_of(const FieldRenderSetup& setup) {
+  const CellRange all = all_cells(setup.grid);
+  std::vector<CellRange> windows;
+  for (std::int64_t j = 0; j < kSamplingWindows; ++j) {
+    for (std::int64_t i = 0; i < kSamplingWindows; ++i) {
+      const Stretch x = stretch(all.columns, setup.optics.pixels.x(), i);
+      const Stretch y = stretch(all.rows, setup.optics.pixels.y(), j);
+      windows.push_back({x.begin, y.begin, x.count, y.count});
+    }
+  }
+  return windows;
+}
+
+double area_of(const CellRange& cells) { return static_cast<double>(cells.columns * cells.rows); }
+
+double mae_of(const FluxPicture& picture, const Image& target) {
+  return compare(picture.image(target.total()), target).mae;
+}
+
+}  // namespace
+
+SamplingCheck check_sampling(const SurfaceField& designed, const SurfaceField& part,
+                             const LeakageResult& result, const Image& target,
+                             const FieldRenderSetup& setup, const Executor& executor,
+                             const RunControl& control) {
+  const RunControl silent(control.stop_token(), {});
+  FieldRenderSetup fine_setup = setup;
+  fine_setup.grid = with_half_the_spacing(setup.grid);
+  const std::vector<CellRange> windows = windows_of(setup);
+  const auto with_fine_windows = [&](const SurfaceField& field, FluxPicture picture) {
+    for (const CellRange& window : windows) {
+      const FluxPicture coarse = render_cells(field, setup, window, executor, silent);
+      const FluxPicture fine = render_cells(field, fine_setup, halved(window), executor, silent);
+      for (std::size_t i = 0; i < picture.flux.size(); ++i) {
+        picture.flux[i] += fine.flux[i] - coarse.flux[i];
+      }
+    }
+    return picture;
+  };
+  const FluxPicture& before = result.part().picture;
+  const FluxPicture now = with_fine_windows(part, before);
+  const FluxPicture& design_before = result.designed.picture;
+  const FluxPicture design_now = with_fine_windows(designed, design_before);
+  double cells = 0.0;
+  for (const CellRange& window : windows) cells += area_of(window);
+  const double scale = area_of(all_cells(setup.grid)) / cells;
+  return {setup.grid.spacing.minCoeff(),
+          scale * (leakage_share(now, design_now) - leakage_share(before, design_before)),
+          scale * (mae_of(now, target) - mae_of(before, target))};
 }
 
 }  // namespace lensforge

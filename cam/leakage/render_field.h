@@ -7,7 +7,6 @@
 #include <span>
 #include <vector>
 
-#include "cam/milled/lens_grid.h"
 #include "cam/milled/surface_field.h"
 #include "core/compute/executor.h"
 #include "core/compute/run_control.h"

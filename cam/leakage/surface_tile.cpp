@@ -4,11 +4,9 @@
 #include <algorithm>
 #include <string>
 
-#include "cam/leakage/sharp_landing.h"
 #include "core/error.h"
 
 namespace lensforge {
-
 namespace {
 
 /// Seen along z, as far as light passes, mm².

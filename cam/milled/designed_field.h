@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "cam/contact/facet_grid.h"
+#include "cam/contact/cut_surface.h"
 #include "cam/milled/surface_field.h"
 #include "core/surface/optical_surface.h"
 #include "core/surface/surface_mesh.h"

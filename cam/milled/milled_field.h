@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "cam/milled/ball_path.h"
+#include "cam/milled/ball_sweep.h"
 #include "cam/milled/surface_field.h"
 
 namespace lensforge {

@@ -6,8 +6,7 @@
 #include <cstddef>
 #include <string>
 
-#include "cam/milled/crease_sum.h"
-#include "cam/milled/rim_loss.h"
+#include "cam/milled/creases.h"
 #include "core/error.h"
 #include "core/text/number_text.h"
 

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <vector>
 
@@ -9,6 +11,12 @@
 #include "cam/workshop/workshop.h"
 
 namespace lensforge {
+
+/// What over-polish takes off at a distance from one side of the lens, mm:
+/// rim_depth · exp(−distance / rim_length).
+inline double rim_loss(const PolishModel& model, double distance) {
+  return model.rim_depth * std::exp(-std::max(distance, 0.0) / model.rim_length);
+}
 
 /// Weights of the nodes 0, 1, … away, of their sum for averages and of the difference of the two
 /// sides for slopes.

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "cam/contact/profile_contact.h"
+#include "cam/contact/profile_cutter.h"
 #include "cam/path/operation.h"
 #include "core/error.h"
 #include "core/text/number_text.h"

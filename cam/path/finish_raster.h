@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "cam/contact/ball_blend.h"
 #include "cam/contact/cut_surface.h"
-#include "cam/contact/rest_map.h"
 #include "cam/path/operation.h"
 #include "cam/path/row_fit.h"
 #include "cam/path/row_profile.h"

@@ -13,8 +13,8 @@
 #include <stop_token>
 #include <vector>
 
-#include "cam/contact/curve_piece.h"
 #include "cam/contact/cut_surface.h"
+#include "cam/contact/drop_curve.h"
 #include "cam/contact/drop_cutter.h"
 #include "cam/path/operation.h"
 

@@ -8,7 +8,7 @@
 #include <utility>
 #include <variant>
 
-#include "cam/contact/mould.h"
+#include "cam/milled/mould.h"
 #include "cam/plan/finishing.h"
 #include "cam/post/program_writer.h"
 #include "core/error.h"

@@ -11,7 +11,7 @@
 #include "cam/path/finish_raster.h"
 #include "cam/path/outline_cut.h"
 #include "cam/post/post_description.h"
-#include "cam/post/program_plan.h"
+#include "cam/post/program_writer.h"
 #include "cam/report/verdict.h"
 #include "cam/workshop/workshop.h"
 #include "core/optics/optical_setup.h"

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <utility>
 
-#include "cam/contact/mould.h"
+#include "cam/milled/mould.h"
 #include "cam/path/rough_passes.h"
 #include "core/error.h"
 #include "core/text/number_text.h"

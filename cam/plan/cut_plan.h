@@ -10,9 +10,8 @@
 #include <vector>
 
 #include "cam/contact/cut_surface.h"
-#include "cam/contact/height_field.h"
 #include "cam/contact/profile_cutter.h"
-#include "cam/milled/cast_field.h"
+#include "cam/milled/mould.h"
 #include "cam/path/collision.h"
 #include "cam/path/finish_raster.h"
 #include "cam/path/outline_cut.h"
@@ -23,7 +22,7 @@
 #include "cam/plan/finishing.h"
 #include "cam/plan/program_watch.h"
 #include "cam/post/program_writer.h"
-#include "cam/report/path_sketch.h"
+#include "cam/report/report_data.h"
 #include "core/compute/executor.h"
 #include "core/compute/run_control.h"
 #include "core/surface/lens.h"

@@ -11,9 +11,7 @@
 
 #include "cam/contact/ball_blend.h"
 #include "cam/contact/cut_surface.h"
-#include "cam/contact/lifted_surface.h"
-#include "cam/contact/rest_map.h"
-#include "cam/milled/ball_path.h"
+#include "cam/milled/ball_sweep.h"
 #include "cam/path/finish_raster.h"
 #include "cam/path/operation.h"
 #include "cam/path/pencil.h"

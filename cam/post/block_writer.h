@@ -4,15 +4,111 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
+#include <fstream>
 #include <optional>
 #include <string>
+#include <string_view>
+#include <vector>
 
-#include "cam/post/path_digest.h"
 #include "cam/post/post_description.h"
-#include "cam/post/program_text.h"
+#include "core/compute/split_mix.h"
+#include "core/io/files.h"
+#include "core/io/sha256.h"
 #include "machine/gcode/arc.h"
 
 namespace lensforge {
+
+/// An arc's words in a digest; all zero for a straight motion.
+struct DigestArc {
+  std::int64_t direction = 0;            ///< 1 + twice the normal axis's number, + 1 clockwise.
+  std::array<std::int64_t, 3> centre{};  ///< Units; zero along the normal axis and with R words.
+
+  friend bool operator==(const DigestArc&, const DigestArc&) = default;
+};
+
+/// Numbers that two paths share if, and but for a chance of 2^-64 only if, they have the same
+/// motions at feed in the same order, to the last decimal: what is written and what is read back
+/// are compared by it.
+class PathDigest {
+ public:
+  using Units = std::array<std::int64_t, 3>;
+
+  /// One motion at feed; coordinates in units of the last decimal, the feed in 1e-6 mm/min.
+  void add(const Units& start, const Units& end, std::int64_t feed, const DigestArc& arc) {
+    for (const std::int64_t value : start) mix(value);
+    for (const std::int64_t value : end) mix(value);
+    mix(feed);
+    mix(arc.direction);
+    if (arc.direction != 0) {
+      for (const std::int64_t value : arc.centre) mix(value);
+    }
+    ++motions_;
+  }
+
+  [[nodiscard]] std::int64_t motions() const { return motions_; }
+
+  friend bool operator==(const PathDigest&, const PathDigest&) = default;
+
+ private:
+  /// One round of SplitMix64 over the state and the value.
+  void mix(std::int64_t value) {
+    state_ = mixed_bits(state_ + static_cast<std::uint64_t>(value) + kGoldenGamma);
+  }
+
+  std::uint64_t state_ = 0;
+  std::int64_t motions_ = 0;
+};
+
+/// The text of one program on its way into a file: counts lines and bytes, numbers lines, keeps
+/// room for comments that are known only at the end, and hashes what stands below them. Constant
+/// memory.
+class ProgramText {
+ public:
+  /// @throw RunError naming the file if it cannot be made.
+  ProgramText(const PostDescription& post, const std::filesystem::path& path);
+
+  /// One line, without its end. @throw InputError if it is longer than the dialect allows.
+  void line(std::string_view text);
+  /// A line of the dialect's own that is no G-code words: %, comments.
+  void plain_line(std::string_view text);
+  /// The next line() begins an operation.
+  void mark_operation() { marked_ = true; }
+  /// Keeps room for `comments` comment lines and the seal; what follows is sealed. Once only.
+  void reserve(int comments);
+  /// Brings all that was written into the file and closes it.
+  void close();
+  /// Fills the reserved lines in, the seal included (machine/gcode/program_seal.h).
+  /// @pre close() was called, and as many comments as were reserved. @throw RunError (disk full,
+  /// …).
+  void finish(const std::vector<std::string>& comments);
+
+  [[nodiscard]] std::int64_t lines() const { return lines_; }
+  [[nodiscard]] std::uintmax_t bytes() const { return bytes_; }
+  /// Of all below the seal; after finish().
+  [[nodiscard]] const std::string& sha256() const { return sha256_; }
+  [[nodiscard]] PendingFile& file() { return file_; }
+  [[nodiscard]] const PendingFile& file() const { return file_; }
+
+ private:
+  void put(std::string_view text);
+  void flush();
+  void check();
+
+  const PostDescription& post_;
+  PendingFile file_;
+  std::ofstream out_;
+  std::string buffer_;
+  std::string numbered_;
+  Sha256 hash_;
+  std::string sha256_;
+  bool sealed_ = false;
+  bool marked_ = false;
+  int reserved_ = 0;
+  std::ofstream::pos_type reserved_at_{};
+  std::int64_t lines_ = 0;
+  std::uintmax_t bytes_ = 0;
+  std::int64_t number_;
+};
 
 /// Feeds of rapids where the dialect has no word for them, mm/min: straight up or down, and across.
 using RapidFeeds = std::array<double, 2>;
@@ -36,8 +132,7 @@ struct ArcMotion {
 /// Writes motions as the blocks of a dialect: program coordinates, mm. Words that a controller
 /// keeps in force are written when they change and not again, but for the feed, which is stated
 /// again after every rapid so that a program can be picked up there, or on every line if the
-/// dialect wants it. A motion to where the tool is
-/// already, to the decimals, leaves no line.
+/// dialect wants it. A motion to where the tool is already, to the decimals, leaves no line.
 ///
 /// Ends and centres are rounded to the decimals. A rapid along XY and Z becomes two, the upper
 /// corner first, so that no controller's way to rush can cut a corner. Arcs of more than half a

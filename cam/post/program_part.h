@@ -9,9 +9,8 @@
 #include <vector>
 
 #include "cam/post/block_writer.h"
-#include "cam/post/post_text.h"
-#include "cam/post/program_plan.h"
-#include "cam/post/program_text.h"
+#include "cam/post/post_description.h"
+#include "cam/post/program_writer.h"
 
 namespace lensforge {
 

@@ -12,7 +12,7 @@
 
 #include "cam/contact/drop_cutter.h"
 #include "cam/milled/designed_field.h"
-#include "cam/milled/held_field.h"
+#include "cam/milled/surface_field.h"
 
 namespace lensforge {
 namespace {

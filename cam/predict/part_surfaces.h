@@ -10,9 +10,8 @@
 
 #include "cam/contact/cut_surface.h"
 #include "cam/leakage/leakage.h"
-#include "cam/milled/cast_field.h"
-#include "cam/milled/held_field.h"
 #include "cam/milled/milled_field.h"
+#include "cam/milled/mould.h"
 #include "cam/milled/polished_field.h"
 #include "cam/milled/rounded_field.h"
 #include "cam/milled/surface_field.h"

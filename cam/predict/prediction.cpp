@@ -10,12 +10,11 @@
 #include <utility>
 
 #include "cam/leakage/render_field.h"
-#include "cam/milled/cast_field.h"
-#include "cam/milled/crease_sum.h"
-#include "cam/milled/lens_grid.h"
+#include "cam/milled/creases.h"
 #include "cam/milled/milled_field.h"
+#include "cam/milled/mould.h"
 #include "cam/milled/polished_field.h"
-#include "cam/milled/sampled_mesh.h"
+#include "cam/milled/surface_field.h"
 #include "cam/plan/cut_plan.h"
 #include "cam/plan/finishing.h"
 #include "cam/predict/part_surfaces.h"

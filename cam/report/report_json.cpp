@@ -4,7 +4,7 @@
 #include <cmath>
 #include <variant>
 
-#include "cam/report/leak_words.h"
+#include "cam/report/verdict.h"
 #include "core/io/lens_folder.h"
 #include "core/text/version.h"
 

@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include <array>
 #include <string>
 
 #include "cam/report/report_data.h"
-#include "core/image/image_io.h"
 
 /// The report's sections as HTML; each is empty where its data is.
 namespace lensforge::report_section {
@@ -28,8 +26,5 @@ std::string view(const ReportData& data);
 std::string choices(const ReportData& data);
 std::string parameters(const ReportData& data);
 std::string footer(const ReportData& data);
-
-/// Blank, part, clamps and program zero from above and from the front, as SVG.
-std::string setup_drawing(const SetupSheet& setup, bool from_above);
 
 }  // namespace lensforge::report_section

@@ -2,8 +2,11 @@
 #include "cam/report/verdict.h"
 
 #include <algorithm>
+#include <cmath>
 
+#include "cam/leakage/leak_map.h"
 #include "core/error.h"
+#include "core/page/html_text.h"
 #include "core/text/number_text.h"
 
 namespace lensforge {
@@ -60,6 +63,96 @@ Verdict judge_cut(const CutFindings& findings, const CutLimits& limits,
   check("block_rate", "lines per second for the controller", findings.block_rate, limits.block_rate,
         {"lines/s", 1.0, 0, false});
   return verdict;
+}
+
+namespace {
+
+constexpr double kHelps = 0.8;      ///< A remedy leaves this share of a leak at most.
+constexpr double kSameWork = 0.05;  ///< Shares of work that make no difference.
+constexpr double kNearHalf = 0.05;  ///< Shares this near to a half are called that.
+
+/// What the surface has there that it should not have.
+std::string fault_words(const LeakPlace& place, const std::string& cause) {
+  const std::string at =
+      joined({" at x ", decimal_text(place.place.x(), 1), " y ", decimal_text(place.place.y(), 1)});
+  const std::string depth = decimal_text(1e3 * std::abs(place.height.value), 1) + " µm";
+  const bool left = place.height.value > 0.0;
+  if (cause == leak_cause::kCrease && left)
+    return "The groove" + at + " is left " + depth + " too high";
+  if (cause == leak_cause::kPolish) {
+    return "The polished edge" + at + (left ? " is filled by " : " is worn by ") + depth;
+  }
+  return "The surface" + at + (left ? " is " + depth + " too high" : " is " + depth + " too low");
+}
+
+/// The first that halves the leak, else the one that leaves least.
+const LeakTrial& best_trial(const LeakPlace& place) {
+  const auto halves = [&](const LeakTrial& trial) { return trial.leakage <= 0.5 * place.leakage; };
+  const auto first = std::find_if(place.trials.begin(), place.trials.end(), halves);
+  if (first != place.trials.end()) return *first;
+  return *std::min_element(
+      place.trials.begin(), place.trials.end(),
+      [](const LeakTrial& a, const LeakTrial& b) { return a.leakage < b.leakage; });
+}
+
+std::string sentence(std::string words) {
+  const char first = words.front();
+  if (first >= 'a' && first <= 'z') words.front() = static_cast<char>(first - 'a' + 'A');
+  return words;
+}
+
+std::string times(double factor) { return trimmed_decimal(factor, 1) + " times"; }
+
+bool is_more(double factor) { return factor > 1.0 + kSameWork; }
+
+/// What a remedy costs in finishing: " for 1.4 times as many moves and 2 times the minutes".
+std::string cost_words(const LeakTrial& trial) {
+  if (is_more(trial.moves) && is_more(trial.minutes)) {
+    return " for " + times(trial.moves) + " as many finishing moves and " + times(trial.minutes) +
+           " the finishing time";
+  }
+  if (is_more(trial.moves)) return " for " + times(trial.moves) + " as many finishing moves";
+  if (is_more(trial.minutes)) return " for " + times(trial.minutes) + " the finishing time";
+  return "";
+}
+
+std::string remedy_words(const LeakPlace& place) {
+  if (place.trials.empty()) return "";
+  const LeakTrial& best = best_trial(place);
+  const double left = std::max(0.0, best.leakage);
+  const double share = left / place.leakage;
+  if (share > kHelps) {
+    std::string tried;
+    for (const LeakTrial& trial : place.trials) {
+      tried += joined({tried.empty() ? "" : ", ", "with ", trial.change, " ",
+                       percent_text(std::max(0.0, trial.leakage))});
+      if (&trial == &place.trials.front()) tried += " would still leak";
+    }
+    return "No change that was tried helps much: " + tried + ".";
+  }
+  const bool half = std::abs(share - 0.5) < kNearHalf;
+  return sentence(best.change) + " would " + (half ? "halve it, to " : "bring it down to ") +
+         percent_text(left) + cost_words(best) + ".";
+}
+
+}  // namespace
+
+std::string main_cause(const LeakPlace& place) {
+  const auto most = std::max_element(
+      place.parts.begin(), place.parts.end(),
+      [](const CausePart& a, const CausePart& b) { return a.leakage < b.leakage; });
+  return most == place.parts.end() ? "" : most->cause;
+}
+
+std::string leak_words(const LeakPlace& place) {
+  const std::string cause = main_cause(place);
+  std::string words = fault_words(place, cause) + "; " + percent_text(place.leakage) +
+                      " of the light leaks from here";
+  if (place.dark_flux > 0.0) {
+    words += ", " + percent_text(place.dark_flux) + " into dark parts of the picture";
+  }
+  const std::string remedy = remedy_words(place);
+  return words + "." + (remedy.empty() ? "" : " " + remedy);
 }
 
 }  // namespace lensforge

@@ -7,10 +7,39 @@
 #include <cstdint>
 #include <vector>
 
-#include "cam/tolerance/passes.h"
 #include "cam/workshop/workshop.h"
 
 namespace lensforge {
+
+/// The finishing rows as they lie on the lens.
+struct Passes {
+  double pitch = 0.06;       ///< Between rows, mm, > 0; rows lie on the rim.
+  double ball_radius = 0.2;  ///< mm, > pitch / 2.
+  int axis = 0;              ///< Along which they run: 0 for x, 1 for y.
+  bool zigzag = true;        ///< To and fro.
+  bool cross = false;        ///< A second raster along the other axis.
+  bool cast = false;         ///< In a mould: what is cut deeper stands higher on the lens.
+};
+
+/// Random numbers that follow from what they are for: one stream for a seed, a part and a cause,
+/// whatever was drawn for others. SplitMix64 (Steele, Lea and Flood, "Fast Splittable Pseudorandom
+/// Number Generators", 2014); the same on every machine but for the last bit of a logarithm.
+class RandomDraw {
+ public:
+  RandomDraw(std::uint64_t seed, std::uint64_t part, std::uint64_t cause);
+
+  /// Even in 0 … 1, neither end included.
+  double share();
+  /// Even in −1 … 1.
+  double even() { return 2.0 * share() - 1.0; }
+  /// Normal with mean 0 and standard deviation 1 (Box and Muller).
+  double normal();
+
+ private:
+  std::uint64_t next();
+
+  std::uint64_t state_;
+};
 
 /// What may be off, in the order of Tolerances.
 enum class ErrorCause : std::uint8_t {

@@ -6,10 +6,9 @@
 
 #include "cam/leakage/render_field.h"
 #include "cam/milled/surface_field.h"
-#include "cam/tolerance/base_heights.h"
 #include "cam/tolerance/part_error.h"
+#include "cam/tolerance/part_heights.h"
 #include "cam/tolerance/part_light.h"
-#include "cam/tolerance/passes.h"
 #include "cam/workshop/workshop.h"
 #include "core/compute/executor.h"
 #include "core/compute/run_control.h"

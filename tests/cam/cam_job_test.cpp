@@ -12,7 +12,7 @@
 
 #include "cam/cam.h"
 #include "cam/cam_meshes.h"
-#include "cam/contact/height_field.h"
+#include "cam/contact/cut_surface.h"
 #include "cam/small_cuts.h"
 #include "core/error.h"
 #include "core/full_disk.h"

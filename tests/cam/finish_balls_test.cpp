@@ -11,9 +11,9 @@
 
 #include "cam/cam_meshes.h"
 #include "cam/milled/designed_field.h"
-#include "cam/milled/lens_grid.h"
 #include "cam/milled/milled_field.h"
 #include "cam/milled/polished_field.h"
+#include "cam/milled/surface_field.h"
 #include "cam/milled_paths.h"
 #include "cam/path/finish_raster.h"
 #include "cam/plan/finishing.h"

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "cam/contact/drop_cutter.h"
-#include "cam/milled/ball_path.h"
+#include "cam/milled/ball_sweep.h"
 #include "cam/milled/surface_field.h"
 
 namespace lensforge::testing {

@@ -15,7 +15,7 @@
 
 #include "cam/cam.h"
 #include "cam/cam_meshes.h"
-#include "cam/contact/profile_contact.h"
+#include "cam/contact/profile_cutter.h"
 #include "cam/dexel_stock.h"
 #include "cam/path/collision.h"
 #include "cam/path/rough.h"

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "cam/analytic_fields.h"
-#include "cam/milled/lens_grid.h"
+#include "cam/milled/surface_field.h"
 #include "cam/predict/part_surfaces.h"
 
 namespace lensforge {

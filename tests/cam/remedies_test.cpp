@@ -14,7 +14,7 @@
 #include "cam/post_plans.h"
 #include "cam/predict/part_surfaces.h"
 #include "cam/predict/prediction.h"
-#include "cam/report/leak_words.h"
+#include "cam/report/verdict.h"
 #include "cam/workshop/tool.h"
 #include "core/temp_folder.h"
 

@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "cam/adversarial_meshes.h"
-#include "cam/contact/curve_envelope.h"
 
 namespace lensforge {
 namespace {

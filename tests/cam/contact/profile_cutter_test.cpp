@@ -10,7 +10,6 @@
 
 #include "cam/cam_meshes.h"
 #include "cam/contact/ball_cutter.h"
-#include "cam/contact/profile_contact.h"
 
 namespace lensforge {
 namespace {

@@ -5,8 +5,7 @@
 
 #include <stop_token>
 
-#include "cam/coupon/coupon_plan.h"
-#include "cam/coupon/fitted_workshop.h"
+#include "cam/coupon/coupon_fit.h"
 #include "cam/post/program_reader.h"
 #include "core/error.h"
 #include "core/temp_folder.h"

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "cam/coupon/least_squares.h"
-
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
 #include <cmath>
 #include <random>
+
+#include "cam/coupon/coupon_fit.h"
 
 namespace lensforge {
 namespace {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "cam/coupon/workshop_edit.h"
-
 #include <gmock/gmock.h>
+
+#include "cam/coupon/coupon_fit.h"
 
 namespace lensforge {
 namespace {

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "cam/analytic_fields.h"
-#include "cam/leakage/crease_split.h"
+#include "cam/leakage/surface_tile.h"
 #include "core/error.h"
 #include "core/optics/image_plane.h"
 #include "core/optics/light_colors.h"

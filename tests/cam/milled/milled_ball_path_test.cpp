@@ -6,7 +6,7 @@
 #include <set>
 #include <vector>
 
-#include "cam/milled/ball_path.h"
+#include "cam/milled/ball_sweep.h"
 #include "cam/milled_paths.h"
 
 namespace lensforge {

@@ -2,9 +2,8 @@
 #include <gtest/gtest.h>
 
 #include "cam/cam_meshes.h"
-#include "cam/contact/mould.h"
-#include "cam/milled/cast_field.h"
 #include "cam/milled/designed_field.h"
+#include "cam/milled/mould.h"
 #include "cam/milled_tiles.h"
 
 namespace lensforge {

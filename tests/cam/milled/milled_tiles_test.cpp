@@ -7,13 +7,11 @@
 #include <utility>
 
 #include "cam/cam_meshes.h"
-#include "cam/milled/cast_field.h"
-#include "cam/milled/crease_map.h"
+#include "cam/milled/creases.h"
 #include "cam/milled/designed_field.h"
-#include "cam/milled/held_field.h"
-#include "cam/milled/lens_grid.h"
+#include "cam/milled/mould.h"
 #include "cam/milled/rounded_field.h"
-#include "cam/milled/sampled_mesh.h"
+#include "cam/milled/surface_field.h"
 #include "cam/milled_paths.h"
 
 namespace lensforge {

@@ -12,7 +12,7 @@
 
 #include "cam/adversarial_meshes.h"
 #include "cam/cam_meshes.h"
-#include "cam/contact/profile_contact.h"
+#include "cam/contact/profile_cutter.h"
 #include "cam/dexel_stock.h"
 #include "cam/path/rough_passes.h"
 #include "core/error.h"

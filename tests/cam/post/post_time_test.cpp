@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "cam/post/program_time.h"
+#include "cam/post/program_reader.h"
 #include "cam/post/program_writer.h"
 #include "cam/post_plans.h"
 

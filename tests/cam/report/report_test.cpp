@@ -9,8 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "cam/report/leak_words.h"
-#include "cam/report/path_sketch.h"
+#include "cam/report/report_data.h"
 #include "cam/report/report_html.h"
 #include "cam/report/report_json.h"
 #include "cam/report/verdict.h"

@@ -6,8 +6,6 @@
 #include <cmath>
 #include <numbers>
 
-#include "cam/tolerance/random_draw.h"
-
 namespace lensforge {
 namespace {
 

@@ -12,10 +12,10 @@
 
 #include "cam/cam_meshes.h"
 #include "cam/contact/cut_surface.h"
-#include "cam/leakage/picture_judge.h"
-#include "cam/milled/lens_grid.h"
+#include "cam/leakage/leakage.h"
 #include "cam/milled/milled_field.h"
 #include "cam/milled/polished_field.h"
+#include "cam/milled/surface_field.h"
 #include "cam/path/finish_raster.h"
 #include "cam/plan/finishing.h"
 #include "cam/predict/part_surfaces.h"

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "cam/tolerance/ripple.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <numbers>
+
+#include "cam/tolerance/polish_filter.h"
 
 namespace lensforge {
 namespace {

@@ -9,8 +9,7 @@
 #include <optional>
 #include <stop_token>
 
-#include "cam/milled/lens_grid.h"
-#include "cam/tolerance/picture_spread.h"
+#include "cam/milled/surface_field.h"
 #include "core/error.h"
 
 namespace lensforge {

@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cam/report/report_maps.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+
+#include "cam/report/sections.h"
+#include "core/image/error_image.h"
+#include "core/page/html_text.h"
+#include "core/text/number_text.h"
+
+namespace lensforge {
+namespace {
+
+constexpr double kPercentile = 0.995;
+constexpr double kSmallestTop = 1e-3;
+
+double percentile(std::vector<double> values, double share) {
+  const auto rank = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), values.begin() + rank, values.end());
+  return values[static_cast<std::size_t>(rank)];
+}
+
+void append(ColorImage& image, const std::array<unsigned char, 3>& color) {
+  image.rgb.insert(image.rgb.end(), color.begin(), color.end());
+}
+
+/// Slope of a raster at (column, row counted from the least y), from its neighbours.
+Eigen::Vector2d slope_at(const LensRaster& surface, const Eigen::Vector2d& step, int column,
+                         int row) {
+  const auto height = [&](int c, int r) {
+    const int at = std::clamp(r, 0, surface.rows - 1) * surface.columns +
+                   std::clamp(c, 0, surface.columns - 1);
+    return static_cast<double>(surface.values[static_cast<std::size_t>(at)]);
+  };
+  return {(height(column + 1, row) - height(column - 1, row)) / (2.0 * step.x()),
+          (height(column, row + 1) - height(column, row - 1)) / (2.0 * step.y())};
+}
+
+}  // namespace
+
+ColorImage relief_picture(const LensRaster& surface, const Eigen::Vector2d& size) {
+  const Eigen::Vector2d step(size.x() / std::max(1, surface.columns - 1),
+                             size.y() / std::max(1, surface.rows - 1));
+  std::vector<Eigen::Vector2d> slopes;
+  std::vector<double> steep;
+  for (int row = surface.rows - 1; row >= 0; --row) {
+    for (int column = 0; column < surface.columns; ++column) {
+      slopes.push_back(slope_at(surface, step, column, row));
+      steep.push_back(slopes.back().norm());
+    }
+  }
+  const double usual = std::max(1e-9, percentile(steep, 0.9));
+  const Eigen::Vector3d light = Eigen::Vector3d(-0.6, 0.6, 0.75).normalized();
+  ColorImage image{surface.columns, surface.rows, {}};
+  for (const Eigen::Vector2d& slope : slopes) {
+    const Eigen::Vector2d lean = slope / usual;
+    const Eigen::Vector3d normal = Eigen::Vector3d(-lean.x(), -lean.y(), 1.0).normalized();
+    const double shade = 0.1 + 0.9 * std::max(0.0, normal.dot(light));
+    const auto grey = static_cast<unsigned char>(std::lround(255.0 * std::min(1.0, shade)));
+    append(image, {grey, grey, grey});
+  }
+  return image;
+}
+
+double scale_top(const std::vector<double>& values) {
+  return std::max(kSmallestTop, percentile(values, kPercentile));
+}
+
+ColorImage scaled_picture(const std::vector<double>& values, int columns, int rows, double top) {
+  ColorImage image{columns, rows, {}};
+  for (const double value : values) append(image, false_color(value / top));
+  return image;
+}
+
+ColorImage raster_picture(const LensRaster& raster, double low, double high) {
+  ColorImage image{raster.columns, raster.rows, {}};
+  const double range = high > low ? high - low : 1.0;
+  for (int row = raster.rows - 1; row >= 0; --row) {
+    for (int column = 0; column < raster.columns; ++column) {
+      const int at = row * raster.columns + column;
+      const float value = raster.values[static_cast<std::size_t>(at)];
+      append(image, false_color((static_cast<double>(value) - low) / range));
+    }
+  }
+  return image;
+}
+
+}  // namespace lensforge
+
+namespace lensforge::report_section {
+namespace {
+
+/// Decimals with which a scale of this range has three digits.
+int decimals_for(double range) {
+  if (range <= 0.0) return 2;
+  return static_cast<int>(std::clamp(2.0 - std::floor(std::log10(range)), 0.0, 6.0));
+}
+
+/// A ring on a map that is `size` wide and high, in hundredths of its longer side.
+struct Ring {
+  Eigen::Vector2d centre;  ///< y down.
+  double radius;
+  std::string number;
+};
+
+constexpr double kRingRadius = 3.5;
+constexpr double kFontSize = 7.0;
+constexpr double kFontStroke = 1.4;
+/// Of a digit of the widest bold fonts that stand in for Arial (DejaVu Sans), in font sizes.
+constexpr double kDigitWidth = 0.7;
+constexpr double kDigitHeight = 0.74;
+
+/// Where the number's baseline has its middle: beside the ring towards the map's middle, and wholly
+/// on the map.
+Eigen::Vector2d number_place(const Ring& ring, const Eigen::Vector2d& size) {
+  const double half =
+      0.5 * (kDigitWidth * kFontSize * static_cast<double>(ring.number.size()) + kFontStroke);
+  const double height = kDigitHeight * kFontSize + 0.5 * kFontStroke;
+  const double away = 0.75 * ring.radius + half + kFontStroke;
+  const double side = ring.centre.x() + away + half > size.x() ? -away : away;
+  const auto within = [](double value, double low, double high) {
+    return std::max(std::min(value, high), low);
+  };
+  return {within(ring.centre.x() + side, half, size.x() - half),
+          within(ring.centre.y() - 0.75 * ring.radius, height, size.y() - 0.5 * kFontStroke)};
+}
+
+std::string ring_circle(const Ring& ring, const char* color, double width) {
+  return joined({"<circle cx=\"", decimal_text(ring.centre.x(), 2), "\" cy=\"",
+                 decimal_text(ring.centre.y(), 2), "\" r=\"", decimal_text(ring.radius, 2),
+                 "\" fill=\"none\" stroke=\"", color, "\" stroke-width=\"", decimal_text(width, 1),
+                 "\"/>"});
+}
+
+std::string ring_number(const Ring& ring, const Eigen::Vector2d& size) {
+  const Eigen::Vector2d place = number_place(ring, size);
+  return joined({"<text x=\"", decimal_text(place.x(), 2), "\" y=\"", decimal_text(place.y(), 2),
+                 "\" text-anchor=\"middle\" font-size=\"", decimal_text(kFontSize, 1),
+                 "\" font-weight=\"700\" fill=\"#fff\" stroke=\"#000\" stroke-width=\"",
+                 decimal_text(kFontStroke, 1), "\" paint-order=\"stroke\">", ring.number,
+                 "</text>"});
+}
+
+/// Numbered rings at the worst places.
+std::string place_rings(const ReportData& data) {
+  const double unit = data.lens_size.maxCoeff() / 100.0;
+  const Eigen::Vector2d size = data.lens_size / unit;
+  std::string rings;
+  for (std::size_t k = 0; k < data.places.size(); ++k) {
+    const LeakPlace& place = data.places[k];
+    const Eigen::Vector2d centre = place.place / unit;
+    const Ring ring{{centre.x(), size.y() - centre.y()},
+                    std::max(kRingRadius, 0.5 * place.side / unit),
+                    std::to_string(k + 1)};
+    rings += ring_circle(ring, "#000", 1.6) + ring_circle(ring, "#fff", 0.8);
+    rings += ring_number(ring, size);
+  }
+  return "<svg viewBox=\"0 0 " + decimal_text(size.x(), 3) + " " + decimal_text(size.y(), 3) +
+         "\" aria-hidden=\"true\" font-family=\"Arial, sans-serif\">" + rings + "</svg>";
+}
+
+std::string map_figure(const ReportMap& map, const ReportData& data) {
+  const auto [low, high] = std::minmax_element(map.raster.values.begin(), map.raster.values.end());
+  const int decimals = decimals_for(*high - *low);
+  const std::string picture = "<img src=\"" + png_uri(raster_picture(map.raster, *low, *high)) +
+                              "\" alt=\"" + escape_html(map.title) + "\">";
+  const std::string scale =
+      html_scale(decimal_text(*low, decimals), decimal_text(*high, decimals) + " " + map.unit);
+  const std::string caption =
+      element("b", "", escape_html(map.title)) + "<br>" + escape_html(map.note) + scale;
+  return element("figure", "class=\"map\"",
+                 element("div", "class=\"frame\"", picture + place_rings(data)) +
+                     element("figcaption", "", caption));
+}
+
+}  // namespace
+
+std::string maps(const ReportData& data) {
+  std::string figures;
+  for (const ReportMap& map : data.maps) {
+    if (!map.raster.empty()) figures += map_figure(map, data);
+  }
+  if (figures.empty()) return "";
+  return element(
+      "section", "",
+      element("h2", "", "Maps of the " + escape_html(data.part)) +
+          element("p", "",
+                  "Seen from above as mounted on the machine: x to the right, y away from the "
+                  "operator. Rings with numbers are the worst places.") +
+          element("div", "class=\"maps\"", figures));
+}
+
+}  // namespace lensforge::report_section

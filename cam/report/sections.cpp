@@ -1,0 +1,549 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cam/report/sections.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "cam/report/report_maps.h"
+#include "core/optics/front_surface.h"
+#include "core/page/html_text.h"
+#include "core/page/light_drawing.h"
+#include "core/text/number_text.h"
+
+namespace lensforge::report_section {
+namespace {
+
+constexpr double kWidth = 480.0;
+constexpr double kMargin = 66.0;
+
+/// A view of the setup: two of the three axes drawn right and up.
+struct DrawnView {
+  int right = 0;
+  int up;
+  Eigen::AlignedBox2d all;
+  double scale;
+
+  DrawnView(const SetupSheet& setup, bool from_above) : up(from_above ? 1 : 2) {
+    all.extend(flat(setup.blank));
+    all.extend(flat(setup.part));
+    for (const NamedBox& clamp : setup.keep_outs) all.extend(flat(clamp.box));
+    all.extend(Eigen::Vector2d(setup.zero[right], setup.zero[up]));
+    const double wide = std::max(1e-6, all.sizes().x());
+    // A thin blank is drawn no thinner than can be read, and no view taller than wide.
+    scale = (kWidth - 2.0 * kMargin) / std::max(wide, all.sizes().y());
+  }
+  [[nodiscard]] Eigen::AlignedBox2d flat(const Eigen::AlignedBox3d& box) const {
+    return {Eigen::Vector2d(box.min()[right], box.min()[up]),
+            Eigen::Vector2d(box.max()[right], box.max()[up])};
+  }
+  [[nodiscard]] double height() const { return scale * all.sizes().y() + 2.0 * kMargin; }
+  [[nodiscard]] double x(double mm) const { return kMargin + scale * (mm - all.min().x()); }
+  [[nodiscard]] double y(double mm) const {
+    return height() - kMargin - scale * (mm - all.min().y());
+  }
+};
+
+std::string attribute(std::string_view name, double value) {
+  return std::string(" ") + std::string(name) + "=\"" + decimal_text(value, 2) + "\"";
+}
+
+std::string rectangle(const DrawnView& view, const Eigen::AlignedBox3d& box,
+                      std::string_view style) {
+  const Eigen::AlignedBox2d flat = view.flat(box);
+  return "<rect" + attribute("x", view.x(flat.min().x())) + attribute("y", view.y(flat.max().y())) +
+         attribute("width", view.scale * flat.sizes().x()) +
+         attribute("height", view.scale * flat.sizes().y()) + " " + std::string(style) + "/>";
+}
+
+std::string words(double x, double y, std::string_view style, std::string_view text) {
+  return "<text" + attribute("x", x) + attribute("y", y) + " " + std::string(style) + ">" +
+         escape_html(text) + "</text>";
+}
+
+/// y of the section through a front: its apex, or a height map's middle.
+double section_y(const SphericalFront& front) { return front.apex.y(); }
+double section_y(const HeightFront& front) { return front.corner.y() + 0.5 * front.size.y(); }
+
+/// The blank seen from the front, in section through the apex of its front.
+std::string section(const DrawnView& view, const SetupSheet& setup, std::string_view style) {
+  const bool sphere = std::holds_alternative<SphericalFront>(*setup.front);
+  const int parts = sphere ? 40 : 400;
+  const FrontSurface front(*setup.front);
+  const double y = std::visit([](const auto& one) { return section_y(one); }, *setup.front);
+  const Eigen::AlignedBox2d blank = view.flat(setup.blank);
+  const auto point = [&](double x, double z) {
+    return decimal_text(view.x(x), 2) + "," + decimal_text(view.y(z), 2) + " ";
+  };
+  std::string points =
+      point(blank.max().x(), blank.max().y()) + point(blank.min().x(), blank.max().y());
+  for (int i = 0; i <= parts; ++i) {
+    const double x = blank.min().x() + blank.sizes().x() * i / parts;
+    points += point(x, front.height({x, y}));
+  }
+  return "<polygon points=\"" + points + "\" " + std::string(style) + "/>";
+}
+
+std::string blank_shape(const DrawnView& view, const SetupSheet& setup) {
+  const std::string_view style = "fill=\"#e3ecf5\" stroke=\"#1a1f24\" stroke-width=\"2\"";
+  if (setup.front && view.up == 2) return section(view, setup, style);
+  return rectangle(view, setup.blank, style);
+}
+
+/// An arrow from the program's zero along an axis of the drawing.
+std::string arrow(double x, double y, const Eigen::Vector2d& along, std::string_view name) {
+  constexpr double kLength = 46.0;
+  const Eigen::Vector2d tip(x + kLength * along.x(), y - kLength * along.y());
+  const Eigen::Vector2d side(along.y(), along.x());
+  const Eigen::Vector2d back(tip.x() - 9.0 * along.x(), tip.y() + 9.0 * along.y());
+  const Eigen::Vector2d a = back + 4.5 * side;
+  const Eigen::Vector2d b = back - 4.5 * side;
+  const auto pair = [](const Eigen::Vector2d& p) {
+    return decimal_text(p.x(), 2) + "," + decimal_text(p.y(), 2);
+  };
+  return "<line" + attribute("x1", x) + attribute("y1", y) + attribute("x2", tip.x()) +
+         attribute("y2", tip.y()) + " stroke=\"#a3161a\" stroke-width=\"2.5\"/><polygon points=\"" +
+         pair(tip) + " " + pair(a) + " " + pair(b) + "\" fill=\"#a3161a\"/>" +
+         words(tip.x() + 6.0 * along.x() - 14.0 * along.y(),
+               tip.y() - 4.0 * along.y() + 16.0 * along.x(),
+               "font-size=\"15\" font-weight=\"700\" fill=\"#a3161a\"", name);
+}
+
+std::string zero_mark(const DrawnView& view, const SetupSheet& setup) {
+  const double x = view.x(setup.zero[view.right]);
+  const double y = view.y(setup.zero[view.up]);
+  return arrow(x, y, {1.0, 0.0}, "X") + arrow(x, y, {0.0, 1.0}, view.up == 1 ? "Y" : "Z") +
+         "<circle" + attribute("cx", x) + attribute("cy", y) +
+         " r=\"6\" fill=\"#fff\" stroke=\"#a3161a\" stroke-width=\"2.5\"/>";
+}
+
+/// Width below and height at the right of the blank.
+std::string dimensions(const DrawnView& view, const SetupSheet& setup) {
+  const Eigen::AlignedBox2d blank = view.flat(setup.blank);
+  const double middle = 0.5 * (view.y(blank.min().y()) + view.y(blank.max().y()));
+  return words(0.5 * (view.x(blank.min().x()) + view.x(blank.max().x())), view.height() - 24.0,
+               "font-size=\"15\" text-anchor=\"middle\"",
+               "blank " + decimal_text(blank.sizes().x(), 1) + " mm") +
+         words(kWidth - 6.0, middle + 5.0,
+               "font-size=\"15\" text-anchor=\"middle\" transform=\"rotate(-90 " +
+                   decimal_text(kWidth - 12.0, 2) + " " + decimal_text(middle, 2) + ")\"",
+               decimal_text(blank.sizes().y(), 1) + " mm");
+}
+
+std::string clamps(const DrawnView& view, const SetupSheet& setup) {
+  std::string svg;
+  for (const NamedBox& clamp : setup.keep_outs) {
+    svg +=
+        rectangle(view, clamp.box, "fill=\"url(#hatch)\" stroke=\"#1a1f24\" stroke-width=\"1.5\"");
+    const Eigen::AlignedBox2d flat = view.flat(clamp.box);
+    svg += words(view.x(flat.center().x()), view.y(flat.max().y()) - 5.0,
+                 "font-size=\"13\" text-anchor=\"middle\"", clamp.name);
+  }
+  return svg;
+}
+
+/// Blank, part, clamps and program zero from above and from the front, as SVG.
+std::string setup_drawing(const SetupSheet& setup, bool from_above) {
+  const DrawnView view(setup, from_above);
+  const std::string hatch =
+      "<defs><pattern id=\"hatch\" width=\"7\" height=\"7\" patternUnits=\"userSpaceOnUse\" "
+      "patternTransform=\"rotate(45)\"><rect width=\"7\" height=\"7\" fill=\"#fff\"/><line "
+      "y2=\"7\" stroke=\"#56616b\" stroke-width=\"2.5\"/></pattern></defs>";
+  const std::string open =
+      "<svg viewBox=\"0 0 " + decimal_text(kWidth, 0) + " " + decimal_text(view.height(), 0) +
+      "\" role=\"img\" aria-label=\"Blank, part and zero seen from " +
+      (from_above ? "above" : "the front") + "\" font-family=\"Arial, sans-serif\">";
+  return open + (from_above ? hatch : "") + blank_shape(view, setup) +
+         rectangle(view, setup.part,
+                   "fill=\"#b9d3ea\" stroke=\"#0b5cad\" stroke-width=\"2\" "
+                   "stroke-dasharray=\"6 4\"") +
+         clamps(view, setup) + dimensions(view, setup) + zero_mark(view, setup) + "</svg>";
+}
+
+using Row = std::vector<std::string>;
+
+/// A table whose rows turn into blocks on a narrow screen.
+std::string stacked(const std::vector<TableColumn>& columns, const std::vector<Row>& rows) {
+  return element("div", "class=\"stack\"", html_table(columns, rows));
+}
+
+/// Program coordinates of a place, as the machine's display shows them.
+std::string place_text(const Eigen::Vector3d& place, double z_offset) {
+  return joined({"X ", decimal_text(place.x(), 2), " Y ", decimal_text(place.y(), 2), " Z ",
+                 decimal_text(place.z() + z_offset, 3)});
+}
+
+std::string box_text(const Eigen::AlignedBox3d& box) {
+  const Eigen::Vector3d size = box.sizes();
+  return decimal_text(size.x(), 1) + " × " + decimal_text(size.y(), 1) + " × " +
+         decimal_text(size.z(), 2) + " mm";
+}
+
+std::string certificate_cell(const Extreme& extreme, const std::string& value, double z_offset) {
+  if (extreme.value == 0.0) return "none";
+  return element("b", "", value) + "<br>" +
+         element("span", "class=\"soft\"", place_text(extreme.place, z_offset));
+}
+
+/// A difference with its sign.
+std::string signed_percent(double share) {
+  const std::string text = percent_text(share);
+  const bool number = text.front() >= '0' && text.front() <= '9';
+  return joined({share > 0.0 && number ? "+" : "", text});
+}
+
+std::string signed_decimal(double value, int decimals) {
+  return joined({value > 0.0 ? "+" : "", decimal_text(value, decimals)});
+}
+
+/// Of what is no leakage, but what leakage is told from.
+constexpr const char* kNoLeakage = "–";
+
+Row cause_row(const CausePart& part) {
+  const bool counts = part.cause != leak_cause::kSource;
+  return {escape_html(part.cause), counts ? signed_percent(part.leakage) : kNoLeakage,
+          signed_percent(part.dark_flux), signed_decimal(part.dark_ratio, 5)};
+}
+
+/// What the causes are added to.
+Row first_row(const LeakageResult& result) {
+  const PictureQuality& designed = result.designed.quality;
+  if (!result.point) {
+    return {"as designed", percent_text(designed.leakage), percent_text(designed.dark_flux),
+            decimal_text(designed.dark_ratio, 5)};
+  }
+  const PictureQuality& sharp = result.point->designed.quality;
+  return {"as designed, in the light of a point", kNoLeakage, percent_text(sharp.dark_flux),
+          decimal_text(sharp.dark_ratio, 5)};
+}
+
+std::string cause_table(const ReportData& data) {
+  const PictureQuality& last = data.leakage.part().quality;
+  std::vector<Row> rows{first_row(data.leakage)};
+  for (const CausePart& part : data.leakage.parts) rows.push_back(cause_row(part));
+  const auto bold = [](const std::string& html) { return element("b", "", html); };
+  rows.push_back({bold("the part"), bold(percent_text(last.leakage)),
+                  bold(percent_text(last.dark_flux)), bold(decimal_text(last.dark_ratio, 5))});
+  return stacked(
+      {{"cause", false}, {"leakage", true}, {"light in dark parts", true}, {"dark ÷ bright", true}},
+      rows);
+}
+
+std::string quality_table(const LeakageResult& result) {
+  std::vector<Row> rows;
+  const auto add = [&rows](const RenderedSurface& surface) {
+    const PictureQuality& q = surface.quality;
+    rows.push_back({escape_html(surface.name), decimal_text(q.metrics.mae, 4),
+                    std::isfinite(q.metrics.psnr) ? decimal_text(q.metrics.psnr, 1) + " dB" : "∞",
+                    decimal_text(q.metrics.ssim, 3), percent_text(q.leakage),
+                    percent_text(q.dark_flux), contrast_text(q.contrast()),
+                    percent_text(q.metrics.flux_inside)});
+  };
+  add(result.designed);
+  for (const RenderedSurface& surface : result.others) add(surface);
+  const auto is_part = [&](const RenderedSurface& surface) {
+    return surface.picture.flux == result.part().picture.flux;
+  };
+  if (std::none_of(result.others.begin(), result.others.end(), is_part)) add(result.part());
+  return stacked({{"surface", false},
+                  {"MAE", true},
+                  {"PSNR", true},
+                  {"SSIM", true},
+                  {"leakage", true},
+                  {"light in dark parts", true},
+                  {"contrast", true},
+                  {"light on the picture", true}},
+                 rows);
+}
+
+}  // namespace
+
+std::string warnings(const ReportData& data) {
+  std::string items;
+  for (const std::string& warning : data.warnings) items += element("li", "", escape_html(warning));
+  for (const ReportOperation& operation : data.operations) {
+    for (const std::string& warning : operation.summary.warnings) {
+      items += element("li", "", escape_html(operation.summary.name + ": " + warning));
+    }
+  }
+  if (items.empty()) return "";
+  return element("section", "class=\"warnings\"",
+                 element("h3", "", "⚠ Before you start") + element("ul", "", items));
+}
+
+/// What the part lies on, as the drawing has it.
+std::string nest_words(const SetupSheet& sheet) {
+  if (!sheet.front) return "The table is below";
+  const bool sphere = std::holds_alternative<SphericalFront>(*sheet.front);
+  return std::string("Section through the ") + (sphere ? "apex" : "middle") +
+         "; the nest is below, up to the dashed part";
+}
+
+std::string setup(const ReportData& data) {
+  const SetupSheet& sheet = data.setup;
+  if (sheet.blank.isEmpty()) return "";
+  std::vector<NamedText> list{
+      {"Machine", sheet.machine},       {"Blank", box_text(sheet.blank) + ", " + sheet.material},
+      {"Part", box_text(sheet.part)},   {"Program zero", sheet.zero_words},
+      {"Which way up", sheet.up_words}, {"Tool length", sheet.length_words}};
+  if (sheet.front) list.push_back({"Front", sheet.front_words});
+  if (data.mirror && data.part != "mould") {
+    list.push_back({"To reflect",
+                    "coat the polished surface, unless the blank is of a metal that "
+                    "reflects, such as aluminium"});
+  }
+  for (const NamedBox& clamp : sheet.keep_outs) {
+    const Eigen::Vector3d low = clamp.box.min() - sheet.zero;
+    const Eigen::Vector3d high = clamp.box.max() - sheet.zero;
+    const auto span = [&](const char* axis, int k) {
+      return std::string(axis) + " " + decimal_text(low[k], 1) + " … " + decimal_text(high[k], 1);
+    };
+    list.push_back(
+        {"Keep out: " + clamp.name, span("X", 0) + ", " + span("Y", 1) + ", " + span("Z", 2)});
+  }
+  const auto drawing = [&sheet](bool from_above, const std::string& caption) {
+    return element("figure", "",
+                   setup_drawing(sheet, from_above) + element("figcaption", "", caption));
+  };
+  const std::string drawings =
+      element("div", "class=\"setup\"",
+              drawing(true,
+                      "<b>From above.</b> Solid: blank; dashed: part; red: program zero; "
+                      "hatched: keep-out. The operator is below the drawing.") +
+                  drawing(false, std::string("<b>From the front.</b> ") + nest_words(sheet) +
+                                     "; the tool comes from above."));
+  return html_section("Setup", html_facts(list) + drawings);
+}
+
+std::string light(const ReportData& data) {
+  if (!data.light) return "";
+  const std::string words =
+      (data.part == "mould" ? "This is the " + data.lit_part() + ", not the mould. " : "") +
+      "Distances are from the middle of the shaped surface, places in mm in the lens frame.";
+  return html_section("Lamp, part and screen",
+                      element("div", "class=\"lamp\"",
+                              element("figure", "",
+                                      light_drawing(*data.light, data.light_height) +
+                                          element("figcaption", "", words))));
+}
+
+std::string operations(const ReportData& data) {
+  if (data.operations.empty()) return "";
+  std::vector<Row> rows;
+  for (const ReportOperation& op : data.operations) {
+    const OperationSummary& s = op.summary;
+    const std::string step =
+        decimal_text(s.stepover, 3) + " mm" +
+        (s.stepdown > 0.0 ? ", down " + decimal_text(s.stepdown, 2) + " mm" : std::string());
+    rows.push_back({element("b", "", escape_html(s.name)), joined({"T", std::to_string(s.tool)}),
+                    element("code", "", escape_html(op.file)), decimal_text(op.spindle_rpm, 0),
+                    decimal_text(op.feed, 0), step, decimal_text(s.allowance, 3) + " mm",
+                    decimal_text(1e-3 * s.cutting_length, 1) + " m", count_text(op.lines),
+                    decimal_text(op.lines_per_second, 0), duration_text(op.minutes)});
+  }
+  return html_section("Operations, in order", stacked({{"operation", false},
+                                                       {"tool", false},
+                                                       {"program", false},
+                                                       {"rpm", true},
+                                                       {"feed mm/min", true},
+                                                       {"stepover", true},
+                                                       {"leaves", true},
+                                                       {"cutting length", true},
+                                                       {"lines", true},
+                                                       {"lines/s", true},
+                                                       {"time", true}},
+                                                      rows));
+}
+
+std::string certificates(const ReportData& data) {
+  std::vector<Row> rows;
+  for (const ReportOperation& op : data.operations) {
+    if (!op.summary.certified) continue;
+    const PathCertificate& c = op.summary.certificate;
+    rows.push_back(
+        {element("b", "", escape_html(op.summary.name)),
+         certificate_cell(c.gouge, micrometre_text(c.gouge.value), data.z_offset),
+         certificate_cell(c.excess, micrometre_text(c.excess.value), data.z_offset),
+         certificate_cell(c.slope, decimal_text(1e3 * c.slope.value, 2) + " mrad", data.z_offset)});
+  }
+  if (rows.empty()) return "";
+  return html_section("Certificates",
+                      element("p", "",
+                              "Error bounds of every move over its whole length, against the exact "
+                              "path of the tool; places are the program’s coordinates, mm.") +
+                          stacked({{"operation", false},
+                                   {"deepest gouge", false},
+                                   {"most material left", false},
+                                   {"largest error of the path’s direction", false}},
+                                  rows));
+}
+
+/// What bounds the dark of a picture, by the kind of part: a lens's light parts at grooves, a
+/// mirror's at ridges.
+std::string part_words(const ReportData& data) {
+  if (data.mirror) {
+    return " Dark parts come from ridges of the mirror, which a ball cuts sharp: only polish "
+           "wears them.";
+  }
+  if (!(data.ghost > 0.0)) return "";
+  const std::string share = percent_text(data.ghost);
+  return " Light that both faces of the lens reflect, " + share +
+         " of all, is left out: spread evenly over the picture, it leaves no part darker than " +
+         share + " of the mean.";
+}
+
+/// What an extended source does, beside the part.
+std::string source_words(const LeakageResult& result) {
+  if (!result.point) return "";
+  return " The source’s extent is in all of that: it moves " + percent_text(result.point->moved) +
+         " of the light to where the light of a point would put less. Leakage does not count that, "
+         "but what the part adds to it.";
+}
+
+std::string leakage(const ReportData& data) {
+  if (data.leakage.steps.empty()) return "";
+  const LeakageOptions& o = data.leakage_options;
+  const std::string words =
+      "Leakage is the share of the light that lands where the design puts less. Dark parts are "
+      "pixels of the target below " +
+      percent_text(o.dark_below) + " of its mean (" + count_text(data.leakage.dark_pixels) +
+      " pixels), bright ones those from " + percent_text(o.bright_from) + " on (" +
+      count_text(data.leakage.bright_pixels) +
+      "). Contrast is the bright pixels’ mean to the dark ones’. Each cause is what it adds to "
+      "those above it; polishing is in every line, so the causes sum to the part." +
+      source_words(data.leakage) + part_words(data);
+  return html_section("Light and leakage",
+                      quality_table(data.leakage) +
+                          element("h3", "style=\"margin-top:1.2rem\"", "Leakage by cause") +
+                          cause_table(data) + element("p", "class=\"soft\"", escape_html(words)));
+}
+
+std::string choices(const ReportData& data) {
+  if (data.choices.empty()) return "";
+  const bool alone = data.operations.empty();
+  const char* const mark = alone ? " – recommended" : " – this report";
+  std::string body;
+  int rank = 0;
+  for (const ReportChoice& choice : data.choices) {
+    const std::string name = escape_html(choice.choice) + (choice.chosen ? mark : "");
+    std::string cells = element("td", "data-label=\"rank\"", std::to_string(++rank));
+    const auto cell = [&cells](const char* label, const std::string& html) {
+      cells += element("td", "class=\"number\" data-label=\"" + std::string(label) + "\"", html);
+    };
+    cells += element("td", "data-label=\"choice\"", name);
+    cell("leakage", percent_text(choice.leakage));
+    cell("light in dark parts", percent_text(choice.dark_flux));
+    cell("MAE", decimal_text(choice.mae, 4));
+    cell("finishing time", duration_text(60.0 * choice.hours));
+    body += element("tr", choice.chosen ? "class=\"chosen\"" : "", cells);
+  }
+  const std::string head = element(
+      "tr", "",
+      "<th>rank</th><th>choice</th><th class=\"number\">leakage</th><th class=\"number\">light in "
+      "dark parts</th><th class=\"number\">MAE</th><th class=\"number\">finishing time</th>");
+  const std::string note =
+      alone
+          ? element("p", "",
+                    "Computed, not cut: no program was written. The best is at the top; cut it by "
+                    "running cam with its tool and pitch.")
+          : "";
+  return html_section(
+      alone ? "Choices, least leakage first" : "Other choices, least leakage first",
+      note +
+          element("div", "class=\"stack\"",
+                  element("table", "", element("thead", "", head) + element("tbody", "", body))));
+}
+
+std::string parameters(const ReportData& data) {
+  if (data.parameters.empty()) return "";
+  std::string groups;
+  for (const ParameterGroup& group : data.parameters) {
+    groups += element("div", "",
+                      element("h3", "", escape_html(group.title)) + html_facts(group.parameters));
+  }
+  return html_section("Process parameters", element("div", "class=\"columns\"", groups));
+}
+
+namespace {
+
+constexpr int kMaeDecimals = 4;
+
+/// What the programs leave without errors stands beside the exact forecast of the same part.
+std::string quantile_table(const ToleranceForecast& forecast, const PictureQuality& part) {
+  const auto mae = [](double value) { return decimal_text(value, kMaeDecimals); };
+  const PartFigures& nominal = forecast.nominal;
+  std::vector<Row> rows{{"MAE", mae(forecast.mae.p10), mae(forecast.mae.median),
+                         mae(forecast.mae.p90), mae(nominal.mae), mae(part.metrics.mae)},
+                        {"leakage", percent_text(forecast.leakage.p10),
+                         percent_text(forecast.leakage.median), percent_text(forecast.leakage.p90),
+                         percent_text(nominal.leakage), percent_text(part.leakage)}};
+  if (forecast.has_dark) {
+    rows.push_back({"contrast", contrast_text(forecast.contrast.p10),
+                    contrast_text(forecast.contrast.median), contrast_text(forecast.contrast.p90),
+                    contrast_text(nominal.contrast()), contrast_text(part.contrast())});
+  }
+  return stacked({{"figure", false},
+                  {"1 of 10 parts below", true},
+                  {"median", true},
+                  {"9 of 10 parts below", true},
+                  {"without errors", true},
+                  {"by the forecast above", true}},
+                 rows);
+}
+
+std::string gain_table(const ToleranceForecast& forecast) {
+  std::vector<Row> rows;
+  for (const CauseEffect& effect : forecast.causes) {
+    Row row{name_of(effect.cause), signed_decimal(effect.mae, kMaeDecimals + 1),
+            "± " + decimal_text(effect.mae_error, kMaeDecimals + 1),
+            signed_decimal(100.0 * effect.leakage, 3) + " %"};
+    if (forecast.has_dark) row.push_back(contrast_text(contrast_with_half(forecast, effect)));
+    rows.push_back(std::move(row));
+  }
+  std::vector<TableColumn> columns{{"half as much of", false},
+                                   {"changes the MAE by", true},
+                                   {"known to", true},
+                                   {"the leakage by", true}};
+  if (forecast.has_dark) columns.push_back({"median contrast", true});
+  return stacked(columns, rows);
+}
+
+std::string spread_figure(const ToleranceForecast& forecast) {
+  const double top = scale_top(forecast.deviation);
+  const ColorImage picture =
+      scaled_picture(forecast.deviation, forecast.columns, forecast.rows, top);
+  const std::string caption =
+      "<b>How much parts differ</b><br>Standard deviation of every pixel from part to part, as "
+      "displayed (0 black, 1 white)" +
+      html_scale("0", decimal_text(top, 3));
+  return element("div", "class=\"map\" style=\"max-width:34rem\"",
+                 html_figure(picture, "How much pixels differ", caption));
+}
+
+}  // namespace
+
+std::string tolerances(const ReportData& data) {
+  const ToleranceForecast& forecast = data.tolerances;
+  if (forecast.empty()) return "";
+  const std::string words = "Drawn: " + count_text(forecast.parts) +
+                            " parts with random errors of machine, tool, polish, " +
+                            "material and light, as the workshop’s [tolerances] state them (seed " +
+                            std::to_string(forecast.seed) + "). To tell what matters, " +
+                            count_text(forecast.paired) +
+                            " of them were drawn again with half of each cause and all else the "
+                            "same; “known to” is the " +
+                            "standard error of that mean.";
+  return element("section", "",
+                 element("h2", "", "How sure is the forecast") +
+                     element("p", "", element("b", "", escape_html(tolerance_words(forecast)))) +
+                     quantile_table(forecast, data.leakage.part().quality) +
+                     element("h3", "style=\"margin-top:1.2rem\"", "What matters") +
+                     gain_table(forecast) +
+                     element("div", "class=\"maps\"", spread_figure(forecast)) +
+                     element("p", "class=\"soft\"", escape_html(words)));
+}
+
+}  // namespace lensforge::report_section
