@@ -9,7 +9,7 @@
 #include <string>
 
 #include "core/error.h"
-#include "machine/link/poll_wait.h"
+#include "machine/link/port.h"
 
 namespace lensforge::app {
 namespace {

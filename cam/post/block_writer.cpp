@@ -7,7 +7,7 @@
 
 #include "cam/post/post_text.h"
 #include "core/error.h"
-#include "machine/planner/motion_blocks.h"
+#include "machine/planner/planner_model.h"
 
 namespace lensforge {
 namespace {

@@ -10,7 +10,7 @@
 #include "cam/post/path_digest.h"
 #include "cam/post/post_description.h"
 #include "cam/post/program_text.h"
-#include "machine/gcode/arc.h"
+#include "machine/gcode/gcode_motion.h"
 
 namespace lensforge {
 

@@ -10,7 +10,7 @@
 #include "cam/post/post_text.h"
 #include "core/error.h"
 #include "machine/gcode/gcode_interpreter.h"
-#include "machine/gcode/header_line.h"
+#include "machine/gcode/program_seal.h"
 
 namespace lensforge {
 namespace {

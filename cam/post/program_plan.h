@@ -10,7 +10,7 @@
 #include "cam/path/move.h"
 #include "cam/path/operation.h"
 #include "cam/tool/tool.h"
-#include "machine/planner/planner_settings.h"
+#include "machine/planner/planner_model.h"
 
 namespace lensforge {
 

@@ -7,7 +7,7 @@
 
 #include "machine/guard/register_bus.h"
 #include "machine/guard/register_map.h"
-#include "machine/link/clock.h"
+#include "machine/link/link.h"
 
 namespace lensforge {
 

@@ -12,7 +12,7 @@
 #include "core/error.h"
 #include "core/io/descriptor.h"
 #include "machine/guard/map_folder.h"
-#include "machine/link/port_spec.h"
+#include "machine/link/port.h"
 
 namespace lensforge {
 namespace {

@@ -4,8 +4,7 @@
 #include <Eigen/Core>
 
 #include "machine/gcode/gcode_dialect.h"
-#include "machine/link/serial_link.h"
-#include "machine/link/tcp_link.h"
+#include "machine/link/port.h"
 
 namespace lensforge {
 namespace {

@@ -6,8 +6,7 @@
 #include <string>
 
 #include "machine/link/link.h"
-#include "machine/link/port_spec.h"
-#include "machine/link/steady_clock.h"
+#include "machine/link/port.h"
 #include "machine/sim/simulated_machine.h"
 
 namespace lensforge {

@@ -10,7 +10,6 @@
 #include <string_view>
 #include <vector>
 
-#include "machine/link/clock.h"
 #include "machine/link/link.h"
 #include "machine/sim/simulated_controller.h"
 #include "machine/sim/simulated_fault.h"

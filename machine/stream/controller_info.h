@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "machine/gcode/gcode_dialect.h"
-#include "machine/gcode/gcode_state.h"
-#include "machine/link/clock.h"
+#include "machine/gcode/gcode_motion.h"
+#include "machine/link/link.h"
 #include "machine/stream/status_report.h"
 #include "machine/stream/stream_fault.h"
 #include "machine/stream/wire.h"

@@ -9,7 +9,6 @@
 #include <string>
 
 #include "machine/guard/guard.h"
-#include "machine/link/clock.h"
 #include "machine/link/link.h"
 #include "machine/stream/controller_info.h"
 #include "machine/stream/journal.h"

@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "machine/gcode/gcode_motion.h"
-#include "machine/gcode/gcode_state.h"
 #include "machine/sim/simulated_options.h"
 
 namespace lensforge::campaign {

@@ -5,7 +5,7 @@
 
 #include "machine/guard/map_folder.h"
 #include "machine/guard/register_map_reader.h"
-#include "machine/link/clock.h"
+#include "machine/link/link.h"
 
 namespace lensforge::testing {
 

@@ -13,7 +13,7 @@
 #include "machine/guard/modbus_bus.h"
 #include "machine/guard/register_map_reader.h"
 #include "machine/guard_server.h"
-#include "machine/link/steady_clock.h"
+#include "machine/link/link.h"
 
 namespace lensforge {
 namespace {
