@@ -11,7 +11,7 @@
 
 #include "core/error.h"
 #include "core/io/descriptor.h"
-#include "machine/guard/map_folder.h"
+#include "machine/guard/register_map.h"
 #include "machine/link/port.h"
 
 namespace lensforge {

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "machine/guard/spindle_state_name.h"
+#include "machine/guard/guard.h"
 #include "machine/stream/realtime.h"
 
 namespace lensforge {

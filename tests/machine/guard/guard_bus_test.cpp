@@ -11,7 +11,7 @@
 
 #include "machine/guard/background_guard.h"
 #include "machine/guard/modbus_bus.h"
-#include "machine/guard/register_map_reader.h"
+#include "machine/guard/register_map.h"
 #include "machine/guard_server.h"
 #include "machine/link/link.h"
 

@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "machine/guard/bus_session.h"
+#include "machine/guard/device_watch.h"
 #include "machine/guard_clock.h"
 
 namespace lensforge {

@@ -7,7 +7,6 @@
 #include <string>
 #include <vector>
 
-#include "machine/guard/register_bus.h"
 #include "machine/guard/register_map.h"
 #include "machine/link/link.h"
 
