@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "machine/sim/simulated_fault.h"
-#include "machine/stream/stream_fault.h"
+#include "machine/stream/controller_dialogue.h"
 
 /// Faults at random bytes of jobs on the simulated controller, each followed by a resume.
 namespace lensforge::campaign {
