@@ -18,6 +18,7 @@
 #include "machine/guard/spindle_guard.h"
 #include "machine/guard_clock.h"
 #include "machine/sim/simulated_machine.h"
+#include "machine/sim_talk.h"
 #include "machine/simulated_spindle.h"
 #include "machine/spy_link.h"
 #include "machine/stream/journal.h"
