@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "core/compute/run_control.h"
-#include "machine/job/job_places.h"
 #include "machine/job/send_options.h"
 #include "machine/stream/controller_dialogue.h"
 #include "machine/stream/preflight.h"
@@ -19,6 +18,12 @@
 #include "machine/stream/sender.h"
 
 namespace lensforge {
+
+/// A file that is written beside a job.
+struct NamedFile {
+  std::string option;  ///< That names it.
+  std::filesystem::path path;
+};
 
 /// All that a job found out.
 struct SendSummary {
