@@ -44,6 +44,7 @@ function(lensforge_room name folder)
   add_library(lensforge::${name} ALIAS lensforge_${name})
   target_compile_features(lensforge_${name} PUBLIC cxx_std_20)
   set(root "${CMAKE_BINARY_DIR}/rooms/${name}")
+  file(REMOVE_RECURSE "${root}")  # An earlier configuration's link may stand where a folder is needed now.
   cmake_path(GET folder PARENT_PATH parent)
   file(MAKE_DIRECTORY "${root}/${parent}")
   file(CREATE_LINK "${CMAKE_SOURCE_DIR}/${folder}" "${root}/${folder}" SYMBOLIC)

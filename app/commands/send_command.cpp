@@ -21,7 +21,7 @@
 #include "core/error.h"
 #include "core/text/printable.h"
 #include "machine/job/send_job.h"
-#include "machine/link/poll_wait.h"
+#include "machine/link/port.h"
 
 namespace lensforge::app {
 

@@ -10,7 +10,7 @@
 #include "cam/post/post_description.h"
 #include "core/error.h"
 #include "machine/gcode/program_seal.h"
-#include "machine/planner/motion_blocks.h"
+#include "machine/planner/planner_model.h"
 
 namespace lensforge {
 namespace {

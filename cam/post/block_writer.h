@@ -14,7 +14,7 @@
 #include "core/compute/split_mix.h"
 #include "core/io/files.h"
 #include "core/io/sha256.h"
-#include "machine/gcode/arc.h"
+#include "machine/gcode/gcode_motion.h"
 
 namespace lensforge {
 

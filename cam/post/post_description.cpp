@@ -15,7 +15,7 @@
 #include "core/text/number_text.h"
 #include "core/text/toml_fields.h"
 #include "machine/gcode/gcode_interpreter.h"
-#include "machine/gcode/header_line.h"
+#include "machine/gcode/program_seal.h"
 
 namespace lensforge {
 namespace {

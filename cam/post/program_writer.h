@@ -15,7 +15,7 @@
 #include "cam/workshop/tool.h"
 #include "core/compute/run_control.h"
 #include "core/io/files.h"
-#include "machine/planner/planner_settings.h"
+#include "machine/planner/planner_model.h"
 
 namespace lensforge {
 

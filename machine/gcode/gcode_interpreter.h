@@ -6,10 +6,9 @@
 #include <optional>
 #include <span>
 
-#include "machine/gcode/gcode_block.h"
 #include "machine/gcode/gcode_dialect.h"
 #include "machine/gcode/gcode_motion.h"
-#include "machine/gcode/gcode_state.h"
+#include "machine/gcode/gcode_reader.h"
 
 namespace lensforge {
 

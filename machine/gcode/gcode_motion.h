@@ -3,12 +3,54 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <array>
 #include <cstdint>
 #include <optional>
-
-#include "machine/gcode/arc.h"
+#include <string>
 
 namespace lensforge {
+
+/// Plane of an arc: G17, G18, G19.
+enum class ArcPlane { kXY, kZX, kYZ };
+
+/// A circular arc, or a helix, from a start point; mm and radians.
+struct Arc {
+  int first = 0;   ///< Axis from which the angle counts.
+  int second = 1;  ///< Axis at a right angle to it, counter-clockwise.
+  int third = 2;   ///< Axis that the plane is normal to.
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< At the height of the start point.
+  double radius = 0.0;
+  double begin = 0.0;  ///< Angle of the start point.
+  double sweep = 0.0;  ///< Counter-clockwise positive; ±2π for a full circle.
+  double rise = 0.0;   ///< Along `third` over the whole sweep.
+
+  /// Length of the path.
+  [[nodiscard]] double length() const;
+  /// The point after the share `part` in 0 … 1 of the sweep.
+  [[nodiscard]] Eigen::Vector3d at(double part) const;
+  /// The box around all of it.
+  [[nodiscard]] Eigen::AlignedBox3d bounds() const;
+};
+
+/// What an arc word says of its shape, mm.
+struct ArcRequest {
+  ArcPlane plane = ArcPlane::kXY;
+  bool clockwise = false;                            ///< G2, seen from the third axis's tip.
+  Eigen::Vector3d offset = Eigen::Vector3d::Zero();  ///< I J K: from the start to the centre.
+  std::optional<double> radius;                      ///< R; negative for more than half a turn.
+};
+
+/// An arc, or why there is none.
+struct ArcResult {
+  Arc arc;
+  std::string reason;  ///< Empty for an arc.
+};
+
+/// The arc from `start` to `end`. Equal points in the plane are a full circle with I J K. With
+/// I J K the two radii may differ by 0.005 mm, or by 0.5 mm and a thousandth of the radius,
+/// whichever rule is kinder: Grbl's own rule.
+ArcResult make_arc(const Eigen::Vector3d& start, const Eigen::Vector3d& end,
+                   const ArcRequest& request);
 
 /// One motion of a program: machine coordinates, mm.
 struct GcodeMotion {
@@ -28,6 +70,58 @@ struct GcodeMotion {
     if (arc) return arc->bounds();
     Eigen::AlignedBox3d box(start);
     return box.extend(end);
+  }
+};
+
+/// What a program asks of the spindle.
+enum class SpindleTurn { kOff, kClockwise, kCounterClockwise };
+
+/// Motion words in force. kNone after G80.
+enum class MotionMode { kRapid, kFeed, kArcClockwise, kArcCounterClockwise, kNone };
+
+/// The words in force, and where the tool is. Lengths in mm, machine coordinates.
+struct GcodeState {
+  MotionMode motion = MotionMode::kRapid;
+  ArcPlane plane = ArcPlane::kXY;
+  std::optional<bool> inches;  ///< G20 or G21; nothing until one of them was read.
+  bool absolute = true;        ///< G90
+  bool inverse_time = false;   ///< G93
+  std::optional<double> feed;  ///< F under G94, mm/min.
+  int coordinate_system = 0;   ///< 0 for G54 … 5 for G59.
+  SpindleTurn spindle = SpindleTurn::kOff;
+  double rpm = 0.0;            ///< S
+  bool mist = false;           ///< M7
+  bool flood = false;          ///< M8
+  int tool = 0;                ///< T
+  int loaded_tool = 0;         ///< That of the last M6.
+  int tool_length = 0;         ///< H of G43, or the loaded tool's number; 0 after G49.
+  double stated_length = 0.0;  ///< Z of G43.1, mm; 0 after G49.
+  /// G64: how far corners may be cut, mm; 0 is without limit. Nothing outside G64.
+  std::optional<double> blending;
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+  /// Where G54 … G59 begin, offsets of the controller but the tool's length included; its `$#`
+  /// tells.
+  std::array<Eigen::Vector3d, 6> origins{Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(),
+                                         Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(),
+                                         Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
+  std::optional<Eigen::Vector3d> g28;  ///< Where G28 goes.
+  std::optional<Eigen::Vector3d> g30;
+
+  /// Where the coordinates in force begin.
+  [[nodiscard]] Eigen::Vector3d origin() const { return lengthened(origins[system_index()]); }
+  /// Where each of G54 … G59 begins with the tool's length in force.
+  [[nodiscard]] std::array<Eigen::Vector3d, 6> tool_origins() const {
+    std::array<Eigen::Vector3d, 6> all = origins;
+    for (Eigen::Vector3d& origin : all) origin = lengthened(origin);
+    return all;
+  }
+
+ private:
+  [[nodiscard]] std::size_t system_index() const {
+    return static_cast<std::size_t>(coordinate_system);
+  }
+  [[nodiscard]] Eigen::Vector3d lengthened(const Eigen::Vector3d& origin) const {
+    return origin + stated_length * Eigen::Vector3d::UnitZ();
   }
 };
 

@@ -1,9 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "machine/gcode/gcode_reader.h"
 
+#include <algorithm>
 #include <array>
+#include <charconv>
+#include <cmath>
 #include <cstdio>
 #include <ios>
+#include <system_error>
+
+#include "core/text/number_text.h"
 
 namespace lensforge {
 namespace {
@@ -115,6 +121,195 @@ void GcodeReader::skip_line_end(unsigned char end) {
     ++begin_;
     ++offset_;
   }
+}
+
+namespace {
+
+constexpr std::size_t kMaxWholeDigits = 8;
+constexpr std::size_t kMaxDigits = 16;
+
+bool is_blank(char c) { return c == ' ' || c == '\t'; }
+bool is_digit(char c) { return c >= '0' && c <= '9'; }
+char upper(char c) { return c >= 'a' && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c; }
+bool is_letter(char c) { return upper(c) >= 'A' && upper(c) <= 'Z'; }
+
+/// Walks along one line.
+class LineScanner {
+ public:
+  LineScanner(std::string_view text, std::int64_t line) : text_(text), line_(line) {}
+
+  [[nodiscard]] bool at_end() const { return at_ == text_.size(); }
+  [[nodiscard]] char peek() const { return at_end() ? '\0' : text_[at_]; }
+  char take() { return text_[at_++]; }
+
+  void skip_blanks() {
+    while (!at_end() && is_blank(text_[at_])) ++at_;
+  }
+
+  void skip_blanks_and_comments() {
+    for (skip_blanks(); peek() == '(' || peek() == ';'; skip_blanks()) {
+      if (peek() == ';') at_ = text_.size();
+      if (peek() == '(') skip_brackets();
+    }
+  }
+
+  /// The digits, signs and points that stand here.
+  double number(char letter) {
+    const std::size_t begin = at_;
+    if (peek() == '+' || peek() == '-') ++at_;
+    const std::size_t digits_begin = at_;
+    const std::size_t whole = skip_digits();
+    std::size_t digits = whole;
+    if (peek() == '.') {
+      ++at_;
+      digits += skip_digits();
+    }
+    const std::string_view written = text_.substr(begin, at_ - begin);
+    refuse_bad_number(letter, written, whole, digits);
+    double value = 0.0;
+    std::from_chars(text_.data() + digits_begin, text_.data() + at_, value,
+                    std::chars_format::fixed);
+    return text_[begin] == '-' ? -value : value;
+  }
+
+  [[noreturn]] void refuse(const std::string& reason) const { throw GcodeError(line_, reason); }
+
+ private:
+  std::size_t skip_digits() {
+    const std::size_t begin = at_;
+    while (!at_end() && is_digit(text_[at_])) ++at_;
+    return at_ - begin;
+  }
+
+  void skip_brackets() {
+    const std::size_t end = text_.find_first_of("()", at_ + 1);
+    if (end == std::string_view::npos) refuse("comment without its closing bracket");
+    if (text_[end] == '(') refuse("comment inside a comment");
+    at_ = end + 1;
+  }
+
+  void refuse_bad_number(char letter, std::string_view written, std::size_t whole,
+                         std::size_t digits) const {
+    const std::string name = std::string(1, letter).append(written);
+    if (digits == 0) refuse("'" + name + "': a number is missing after " + letter);
+    if (whole > kMaxWholeDigits || digits > kMaxDigits) {
+      refuse("'" + name + "': longer than " + std::to_string(kMaxWholeDigits) +
+             " digits before the point or " + std::to_string(kMaxDigits) + " in all");
+    }
+    const bool exponent =
+        upper(peek()) == 'E' && at_ + 1 < text_.size() &&
+        (is_digit(text_[at_ + 1]) || text_[at_ + 1] == '+' || text_[at_ + 1] == '-');
+    if (exponent) refuse("'" + name + peek() + "': numbers with an exponent are not G-code");
+  }
+
+  std::string_view text_;
+  std::int64_t line_;
+  std::size_t at_ = 0;
+};
+
+[[noreturn]] void refuse_sign(const LineScanner& scanner, char sign) {
+  switch (sign) {
+    case '#':
+    case '[':
+    case ']':
+      scanner.refuse(std::string("'") + sign + "': parameters and expressions are not supported");
+    case '/':
+      scanner.refuse("'/': block delete is not supported; the controller would run the line");
+    case ')':
+      scanner.refuse("')' without an opening bracket");
+    case '$':
+      scanner.refuse("'$': a controller's command, not G-code");
+    case '%':
+      scanner.refuse("'%' must be alone on its line");
+    default:
+      scanner.refuse(std::string("'") + sign + "' where a letter is expected");
+  }
+}
+
+int tenths_of(const LineScanner& scanner, const GcodeWord& word) {
+  const double tenths = word.value * 10.0;
+  const double rounded = std::round(tenths);
+  if (word.value < 0.0 || word.value >= 1000.0 || std::abs(tenths - rounded) > 1e-6) {
+    scanner.refuse(std::string(1, word.letter) + shortest_text(word.value) + ": unknown word");
+  }
+  return static_cast<int>(rounded);
+}
+
+std::int64_t line_number(const LineScanner& scanner, double value) {
+  if (value < 0.0 || value != std::floor(value)) {
+    scanner.refuse("N" + shortest_text(value) + ": line numbers are integers, 0 or above");
+  }
+  return static_cast<std::int64_t>(value);
+}
+
+void add_word(LineScanner& scanner, GcodeBlock& block) {
+  GcodeWord word;
+  word.letter = upper(scanner.take());
+  scanner.skip_blanks();
+  word.value = scanner.number(word.letter);
+  if (word.letter == 'N') {
+    if (block.number) scanner.refuse("N is given twice");
+    block.number = line_number(scanner, word.value);
+    return;
+  }
+  if (word.letter == 'G' || word.letter == 'M') {
+    word.tenths = tenths_of(scanner, word);
+  } else if (block.value(word.letter)) {
+    scanner.refuse(std::string(1, word.letter) + " is given twice");
+  }
+  if (block.words().size() == GcodeBlock::kMaxWords) {
+    scanner.refuse("more than " + std::to_string(GcodeBlock::kMaxWords) + " words");
+  }
+  block.add(word);
+}
+
+bool is_percent_line(std::string_view text) {
+  const std::size_t first = text.find_first_not_of(" \t");
+  return first != std::string_view::npos && text[first] == '%' &&
+         text.find_first_not_of(" \t", first + 1) == std::string_view::npos;
+}
+
+}  // namespace
+
+std::optional<double> GcodeBlock::value(char letter) const {
+  for (const GcodeWord& word : words()) {
+    if (word.letter == letter) return word.value;
+  }
+  return std::nullopt;
+}
+
+GcodeBlock parse_gcode_block(const GcodeText& text) {
+  GcodeBlock block;
+  block.line = text.line;
+  block.offset = text.offset;
+  block.percent = is_percent_line(text.text);
+  if (block.percent) return block;
+  LineScanner scanner(text.text, text.line);
+  for (scanner.skip_blanks_and_comments(); !scanner.at_end(); scanner.skip_blanks_and_comments()) {
+    if (!is_letter(scanner.peek())) refuse_sign(scanner, scanner.peek());
+    add_word(scanner, block);
+  }
+  return block;
+}
+
+std::string compact_gcode(std::string_view text, bool keep_number) {
+  std::string compact;
+  compact.reserve(text.size());
+  bool in_brackets = false;
+  bool in_number_word = false;
+  for (const char c : text) {
+    if (in_brackets) {
+      in_brackets = c != ')';
+    } else if (c == '(') {
+      in_brackets = true;
+    } else if (c == ';' || c == '%') {
+      break;
+    } else if (!is_blank(c)) {
+      if (is_letter(c)) in_number_word = upper(c) == 'N';
+      if (!in_number_word || keep_number) compact += upper(c);
+    }
+  }
+  return compact;
 }
 
 }  // namespace lensforge

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "machine/guard/modbus_bus.h"
-#include "machine/link/steady_clock.h"
+#include "machine/link/link.h"
 
 namespace lensforge {
 namespace {

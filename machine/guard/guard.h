@@ -54,4 +54,19 @@ class Guard {
   virtual std::vector<GuardRecord> take_records() { return {}; }
 };
 
+/// "stopped", "changing", "at speed" or "failed".
+constexpr const char* spindle_state_name(SpindleState state) {
+  switch (state) {
+    case SpindleState::kStopped:
+      return "stopped";
+    case SpindleState::kChanging:
+      return "changing";
+    case SpindleState::kAtSpeed:
+      return "at speed";
+    case SpindleState::kFailed:
+      break;
+  }
+  return "failed";
+}
+
 }  // namespace lensforge

@@ -11,7 +11,7 @@
 #include <string>
 
 #include "core/error.h"
-#include "machine/link/steady_clock.h"
+#include "machine/link/link.h"
 
 namespace lensforge {
 namespace {

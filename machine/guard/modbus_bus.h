@@ -4,7 +4,6 @@
 #include <memory>
 #include <vector>
 
-#include "machine/guard/register_bus.h"
 #include "machine/guard/register_map.h"
 
 struct _modbus;  // NOLINT(bugprone-reserved-identifier): libmodbus's own name

@@ -2,14 +2,56 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <map>
 #include <optional>
+#include <stdexcept>
 #include <string>
+#include <string_view>
 #include <vector>
 
-#include "machine/guard/register_bus.h"
-
 namespace lensforge {
+
+/// What went wrong in an exchange with a device.
+enum class BusFault {
+  kDown,     ///< Not connected, or the connection broke.
+  kSilent,   ///< No whole answer within the response time-out.
+  kRefused,  ///< The device answered with an exception.
+  kGarbled,  ///< An answer that does not belong to the request: checksum, length, unit, or echo.
+};
+
+/// An exchange failed; the message says how, without the device's name.
+class BusError : public std::runtime_error {
+ public:
+  BusError(BusFault fault, const std::string& what) : std::runtime_error(what), fault_(fault) {}
+  [[nodiscard]] BusFault fault() const { return fault_; }
+
+ private:
+  BusFault fault_;
+};
+
+/// One register or coil as a Modbus function reaches it.
+struct RegisterAddress {
+  int function = 3;  ///< 1 coil, 2 discrete input, 3 holding, 4 input register; 5, 6, 15, 16 write.
+  int address = 0;   ///< As sent on the wire, counted from 0.
+};
+
+/// The words and bits of one device. One exchange a call, no retry, no recovery of its own; every
+/// call is bounded by the device's time-outs.
+class RegisterBus {
+ public:
+  virtual ~RegisterBus() = default;
+  /// Connects. @throw BusError
+  virtual void open() = 0;
+  virtual void close() = 0;
+  [[nodiscard]] virtual bool is_open() const = 0;
+  /// Throws away whatever has come in.
+  virtual void discard() = 0;
+  /// @return the register's value, or 0 or 1 of a coil. @throw BusError
+  virtual std::uint16_t read(const RegisterAddress& at) = 0;
+  /// Writes and checks the device's echo. @throw BusError
+  virtual void write(const RegisterAddress& at, std::uint16_t value) = 0;
+};
 
 /// A register that is read again and again.
 struct ReadSignal {
@@ -125,5 +167,30 @@ double rpm_of_raw(const SpeedScale& scale, double rpm_per_hz, std::uint16_t raw)
 std::optional<std::uint16_t> raw_of_rpm(const SpeedScale& scale, double rpm_per_hz, double rpm);
 /// @return e.g. "holding register 0x200B".
 std::string address_text(const RegisterAddress& at);
+
+/// The register maps that come with the program ("yl620", "h100" ...), in alphabetical order; from
+/// share/lensforge/spindle beside the running program, or from the source tree of its build.
+std::vector<std::string> shipped_register_maps();
+
+/// @param name  a shipped map, or a path to a file (with a slash, or ending in .toml).
+/// @return the file. @throw InputError if there is no such map, or the name is one of the old
+/// Huanyang drives', which do not speak Modbus.
+std::filesystem::path find_register_map(const std::string& name);
+
+/// Why a Huanyang HY drive cannot be used.
+std::string huanyang_refusal();
+
+/// Reads a register map (TOML, see machine/guard/maps/generic_plc.toml for every key).
+/// @param file  what to call it in errors.
+/// @throw InputError naming file, key, value and rule: not TOML, a key that is unknown, missing or
+/// of the wrong type, a value out of range, or a protocol that is not Modbus.
+RegisterMap parse_register_map(std::string_view text, const std::string& file);
+
+/// parse_register_map() of a file of at most 1 MiB.
+RegisterMap read_register_map(const std::filesystem::path& path);
+
+/// Puts another serial port ("/dev/ttyUSB1") or another host ("10.0.0.7" or "10.0.0.7:1502") in
+/// place of the map's. @throw InputError if `endpoint` is not what the map's transport needs.
+void set_endpoint(RegisterMap& map, const std::string& endpoint);
 
 }  // namespace lensforge

@@ -9,16 +9,21 @@
 #include <vector>
 
 #include "core/compute/run_control.h"
-#include "machine/job/job_places.h"
 #include "machine/job/send_options.h"
-#include "machine/stream/controller_info.h"
-#include "machine/stream/job_identity.h"
+#include "machine/stream/controller_dialogue.h"
 #include "machine/stream/preflight.h"
 #include "machine/stream/program_facts.h"
+#include "machine/stream/program_file.h"
 #include "machine/stream/resume_plan.h"
 #include "machine/stream/sender.h"
 
 namespace lensforge {
+
+/// A file that is written beside a job.
+struct NamedFile {
+  std::string option;  ///< That names it.
+  std::filesystem::path path;
+};
 
 /// All that a job found out.
 struct SendSummary {

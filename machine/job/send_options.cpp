@@ -4,8 +4,7 @@
 #include <functional>
 
 #include "core/error.h"
-#include "machine/guard/map_folder.h"
-#include "machine/guard/register_map_reader.h"
+#include "machine/guard/register_map.h"
 
 namespace lensforge {
 namespace {

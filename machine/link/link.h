@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <thread>
 
 namespace lensforge {
 
@@ -24,6 +26,29 @@ class Link {
   /// Hands over as many bytes as the link takes at once, at least one unless its buffer is full.
   /// @return how many. @throw LinkLost
   virtual std::size_t write(std::string_view bytes) = 0;
+};
+
+/// Time as a sender lives it: the machine's own steady clock, or a simulated controller's virtual
+/// time, in which hours of cutting take seconds.
+class Clock {
+ public:
+  virtual ~Clock() = default;
+  /// Seconds since an arbitrary fixed moment; never runs backwards.
+  [[nodiscard]] virtual double now() const = 0;
+  /// Lets `seconds` pass.
+  virtual void wait(double seconds) = 0;
+};
+
+/// The machine's own time.
+class SteadyClock : public Clock {
+ public:
+  [[nodiscard]] double now() const override {
+    const auto since_start = std::chrono::steady_clock::now().time_since_epoch();
+    return std::chrono::duration<double>(since_start).count();
+  }
+  void wait(double seconds) override {
+    std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
+  }
 };
 
 }  // namespace lensforge

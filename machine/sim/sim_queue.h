@@ -7,7 +7,6 @@
 #include <functional>
 
 #include "machine/sim/sim_settings.h"
-#include "machine/sim/simulated_options.h"
 
 namespace lensforge {
 

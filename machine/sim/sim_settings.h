@@ -3,12 +3,77 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
 #include <map>
 #include <string>
 
-#include "machine/sim/simulated_options.h"
-
 namespace lensforge {
+
+/// A number with so many decimals, independent of the locale.
+std::string fixed_text(double value, int decimals);
+
+/// A word and a whole number behind it.
+std::string numbered(const std::string& word, std::int64_t number);
+
+/// Three of them with commas between.
+std::string fixed_text(const Eigen::Vector3d& value, int decimals);
+
+/// Firmware that the simulated controller behaves like.
+enum class SimulatedFirmware { kGrbl, kGrblHal };
+
+/// What the controller is built and set up as.
+struct SimulatedOptions {
+  SimulatedFirmware firmware = SimulatedFirmware::kGrbl;
+  std::size_t rx_bytes = 128;
+  int planner_blocks = 15;
+  double line_seconds = 0.0025;    ///< To take in one line: 400 lines/s of an 8-bit board.
+  double eeprom_seconds = 0.02;    ///< A write to the settings, deaf meanwhile.
+  bool line_numbers = false;       ///< Built with line numbers: `Ln:` in reports.
+  bool mist = false;               ///< Built with M7.
+  bool instant = false;            ///< Motions, dwells and lines take no time.
+  std::map<int, double> settings;  ///< `$` values other than the firmware's own.
+  Eigen::Vector3d stands_at = Eigen::Vector3d::Zero();  ///< In the machine, at power-up.
+};
+
+/// Grbl 1.1 on an 8-bit board with a homing mill of 400 × 300 × 100 mm; soft limits on, spindle
+/// of 24,000 rpm, line numbers built in.
+SimulatedOptions simulated_grbl();
+
+/// The same mill under grblHAL on a 32-bit board.
+SimulatedOptions simulated_grblhal();
+
+/// A straight piece of motion as the machine really ran it: mm, true machine coordinates, which
+/// differ from what the controller reports once steps were lost.
+struct ExecutedPiece {
+  Eigen::Vector3d start = Eigen::Vector3d::Zero();
+  Eigen::Vector3d end = Eigen::Vector3d::Zero();
+  double feed = 0.0;  ///< As programmed, mm/min; 0 for a rapid.
+  bool rapid = false;
+  bool jog = false;
+  bool complete = true;       ///< Ran to its planned end.
+  std::int64_t number = 0;    ///< N word of its line; 0 without one.
+  std::int64_t received = 0;  ///< Which line since power-up it came by, counted from 1.
+  int spindle = 0;            ///< +1 clockwise, −1 counter-clockwise, 0 off, when it began.
+  double rpm = 0.0;
+  double begin_time = 0.0;  ///< s
+  double end_time = 0.0;
+};
+
+/// Something else that happened to the machine.
+struct MachineEvent {
+  double time = 0.0;
+  std::string what;  ///< "reset", "alarm 3", "error 20", "hold", "resume", "door", "homed",
+                     ///< "overrun", "spindle 1 23000", "tool 2", "end", "power up"
+};
+
+/// Who watches the machine. Called as things happen, so that any length of program fits.
+struct MachineWatch {
+  std::function<void(const ExecutedPiece&)> piece;   ///< A piece ended.
+  std::function<void(const ExecutedPiece&)> begins;  ///< A piece begins; `end` is where it leads.
+  std::function<void(const MachineEvent&)> event;
+};
 
 /// The `$` values of a simulated controller and its start-up lines.
 class SimSettings {

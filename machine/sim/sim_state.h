@@ -1,9 +1,47 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <Eigen/Core>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
 #include <string>
+#include <string_view>
 
 namespace lensforge {
+
+/// Bytes that were received and not read yet.
+struct SimBuffer {
+  std::string bytes;
+  std::size_t read = 0;  ///< Those of `bytes` that are used up.
+
+  [[nodiscard]] bool empty() const { return read == bytes.size(); }
+  [[nodiscard]] std::size_t size() const { return bytes.size() - read; }
+  [[nodiscard]] std::string_view rest() const { return std::string_view(bytes).substr(read); }
+  /// Puts a byte behind the others.
+  void add(char byte);
+};
+
+/// The line in the making: what is left of the characters that came.
+struct SimIntake {
+  std::string line;
+  bool overflows = false;
+  char comment = 0;   ///< '(' or ';' while in one.
+  char last_end = 0;  ///< CR or LF, if that was the last character.
+};
+
+/// How a firmware takes lines in.
+struct SimIntakeRules {
+  std::size_t longest = 79;  ///< Characters that count.
+  bool crlf_is_one = false;  ///< grblHAL takes CR LF for one end; Grbl the second for a line.
+};
+
+/// A character comes. `ended` says whether it ends the line.
+struct SimTaken {
+  SimIntake intake;
+  bool ended = false;
+};
+SimTaken taken(SimIntake intake, char c, const SimIntakeRules& rules);
 
 /// States as reports name them.
 enum class MachineState { kIdle, kRun, kHold, kJog, kAlarm, kDoor, kCheck, kHome, kSleep, kTool };
@@ -91,4 +129,47 @@ SimState restarted(SimState now);
 std::string text(const SimState& now, bool hal, double time);
 
 }  // namespace sim_state
+
+/// Percent of what the program asks for.
+struct SimOverrides {
+  double feed = 100.0;
+  double rapid = 100.0;
+  double spindle = 100.0;
+};
+
+/// What a realtime byte makes of them; nothing if it is no override.
+std::optional<SimOverrides> overridden(SimOverrides before, unsigned char byte);
+
+/// Reports until the next WCO and the next Ov.
+struct SimCountdowns {
+  int offset = 0;
+  int overrides = 1;
+};
+
+/// What a status report is written from. Lengths in mm, times in s.
+struct SimSnapshot {
+  std::string state;
+  bool rests = true;  ///< Idle or in alarm: some fields come more often.
+  int mask = 0;       ///< $10
+  bool inches = false;
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< Of the machine.
+  Eigen::Vector3d offset = Eigen::Vector3d::Zero();    ///< Machine − work.
+  int free_blocks = 0;
+  std::size_t free_bytes = 0;
+  std::int64_t number = 0;  ///< N word of what runs; 0 for none.
+  double speed = 0.0;
+  double rpm = 0.0;
+  bool door_open = false;
+  SimOverrides overrides;
+  int spindle = 0;  ///< +1, −1, 0
+  int coolant = 0;  ///< Bits: 1 mist, 2 flood.
+};
+
+/// "<Idle|MPos:…>" with its end, and the countdowns after it.
+struct SimReport {
+  std::string text;
+  SimCountdowns next;
+};
+SimReport report_of(const SimSnapshot& machine, SimCountdowns countdowns);
+
 }  // namespace lensforge

@@ -2,9 +2,11 @@
 #include "machine/sim/simulated_controller.h"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
+#include <utility>
 
-#include "machine/sim/sim_text.h"
+#include "machine/sim/sim_settings.h"
 
 namespace lensforge {
 namespace {
@@ -300,6 +302,473 @@ void SimulatedController::leave_tool() {
   }
   machine_.state = MachineState::kIdle;
   event("resume");
+}
+
+// Bytes from the wire: the receive buffer, and the commands that go past it.
+
+void SimulatedController::receive(char byte) {
+  if (now_ < deaf_until_ || losing_ > 0) {
+    losing_ = std::max(0, losing_ - 1);
+    ++lost_;
+    return;
+  }
+  if (realtime(static_cast<unsigned char>(byte))) return;
+  if (rx_.size() >= options_.rx_bytes) {
+    ++lost_;
+    if (!losing_now_) event("overrun");
+    losing_now_ = true;
+    return;
+  }
+  losing_now_ = false;
+  rx_.add(byte);
+}
+
+/// Whether the byte was a command, or is none of the line's business.
+bool SimulatedController::realtime(unsigned char byte) {
+  switch (byte) {
+    case '?':
+      report();
+      return true;
+    case '!':
+      feed_hold();
+      return true;
+    case '~':
+      cycle_start();
+      return true;
+    case 0x18:
+      soft_reset();
+      return true;
+    case 0x84:
+      open_and_shut_door();
+      return true;
+    case 0x85:
+      cancel_jog();
+      return true;
+    default:
+      break;
+  }
+  if (byte < 0x80) return false;
+  if (is_hal()) hal_command(byte);
+  if (const auto changed = overridden(overrides_, byte)) {
+    set_overrides(*changed);
+    countdowns_.overrides = 0;
+  }
+  return true;
+}
+
+/// The command opens no switch: the machine stops as if one had opened and closed.
+void SimulatedController::open_and_shut_door() {
+  if (machine_.critical) return;
+  move_door(true);
+  machine_.door_open = false;
+}
+
+void SimulatedController::hal_command(unsigned char byte) {
+  if (byte == 0x80) report();
+  if (byte == 0x81) cycle_start();
+  if (byte == 0x82) feed_hold();
+  if (byte == 0x87) {
+    countdowns_.offset = 0;
+    report();
+  }
+  if (byte == 0xA3) acknowledge_tool();
+}
+
+void SimulatedController::report() {
+  // Grbl is silent while it homes and once a limit has locked it.
+  if (!is_hal() && (machine_.critical || machine_.state == MachineState::kHome)) return;
+  const SimReport report = report_of(snapshot(), countdowns_);
+  countdowns_ = report.next;
+  say(report.text);
+}
+
+SimSnapshot SimulatedController::snapshot() const {
+  const bool numbers = options_.line_numbers || is_hal();
+  SimSnapshot seen;
+  seen.state = state_text();
+  seen.rests = machine_.state == MachineState::kIdle || machine_.state == MachineState::kAlarm;
+  seen.mask = static_cast<int>(settings_[10]);
+  seen.inches = settings_.on(13);
+  seen.position = queue_.position();
+  seen.offset = gcode_.offset();
+  seen.free_blocks = queue_.room();
+  seen.free_bytes = options_.rx_bytes - rx_.size();
+  seen.number = numbers && machine_.state != MachineState::kJog ? queue_.number() : 0;
+  seen.speed = queue_.speed();
+  seen.rpm = queue_.rpm;
+  seen.door_open = machine_.door_open;
+  seen.overrides = overrides_;
+  seen.spindle = queue_.spindle;
+  seen.coolant = coolant_;
+  return seen;
+}
+
+// Lines: from characters to motions and answers.
+
+namespace {
+
+constexpr std::size_t kGrblLine = 79;
+constexpr std::size_t kHalLine = 256;
+
+}  // namespace
+
+/// One step of the firmware's main loop. @return whether anything was done.
+bool SimulatedController::step_parser() {
+  if (sim_state::suspended(machine_) || now_ < busy_until_) return false;
+  if (!errand_.actions.empty()) return run_action();
+  if (errand_.answer) {
+    errand_.answer = false;
+    answer(0);
+    return true;
+  }
+  if (line_waits_) {
+    line_waits_ = false;
+    run_line();
+    return true;
+  }
+  return read_characters();
+}
+
+bool SimulatedController::read_characters() {
+  const SimIntakeRules rules{is_hal() ? kHalLine : kGrblLine, is_hal()};
+  while (!rx_.empty()) {
+    SimTaken next = taken(std::move(intake_), rx_.bytes[rx_.read++], rules);
+    intake_ = std::move(next.intake);
+    if (!next.ended) continue;
+    line_waits_ = true;
+    const bool free = options_.instant || intake_.line.empty();
+    busy_until_ = now_ + (free ? 0.0 : options_.line_seconds);
+    return true;
+  }
+  return false;
+}
+
+void SimulatedController::run_line() {
+  const SimIntake came = std::exchange(intake_, SimIntake{{}, false, 0, intake_.last_end});
+  const std::string& line = came.line;
+  errand_.received = ++received_;
+  errand_.chord = 0;
+  int error = 0;
+  if (came.overflows) {
+    error = 11;
+  } else if (!line.empty() && line[0] == '$') {
+    error = run_system(line);
+  } else if (!line.empty()) {
+    error = run_gcode(line);
+  }
+  last_error_ = std::max(error, 0);
+  if (error > 0) return answer(error);
+  errand_.answer = error == 0;  // else it answers later by itself
+}
+
+int SimulatedController::run_gcode(const std::string& line) {
+  if (machine_.state == MachineState::kAlarm || machine_.state == MachineState::kJog) return 9;
+  if (is_hal() && last_error_ != 0) return last_error_;
+  if (scripted_error_ != 0) {
+    const int error = scripted_error_;
+    scripted_error_ = 0;
+    return error;
+  }
+  if (machine_.state == MachineState::kTool) return 40;
+  std::vector<SimAction> actions;
+  if (const int error = gcode_.run(line, actions); error != 0) return error;
+  errand_.actions.assign(actions.begin(), actions.end());
+  return 0;
+}
+
+void SimulatedController::answer(int error) {
+  if (error != 0) {
+    event(numbered("error ", error));
+    return say(numbered("error:", error) + "\r\n");
+  }
+  say("ok\r\n");
+  if (reset_after_answer_) restart();
+}
+
+void SimulatedController::wait(double seconds) {
+  if (!options_.instant) busy_until_ = now_ + seconds;
+}
+
+/// The first action of the line. @return whether it, or a part of it, was done.
+bool SimulatedController::run_action() {
+  const SimAction action = errand_.actions.front();
+  if (action.kind == SimAction::Kind::kMove) return queue_move(action);
+  const bool stands_first =
+      action.kind == SimAction::Kind::kSync || action.kind == SimAction::Kind::kStore;
+  if (stands_first && !queue_.empty()) {
+    begin_motion();
+    return false;
+  }
+  errand_.actions.pop_front();
+  carry_out(action);
+  return true;
+}
+
+/// What takes no place in the queue.
+void SimulatedController::carry_out(const SimAction& action) {
+  const bool checks = machine_.state == MachineState::kCheck;
+  switch (action.kind) {
+    case SimAction::Kind::kDwell:
+      if (!checks) wait(action.value);
+      break;
+    case SimAction::Kind::kSpindle: {
+      const double rpm = std::clamp(action.value, settings_[31], settings_[30]);
+      if (!checks) set_spindle(action.turn, action.turn == 0 ? 0.0 : rpm);
+      countdowns_.overrides = 0;
+      break;
+    }
+    case SimAction::Kind::kCoolant:
+      if (!checks) coolant_ = action.turn;
+      countdowns_.overrides = 0;
+      break;
+    case SimAction::Kind::kTool:
+      event(numbered("tool ", static_cast<int>(action.value)));
+      if (!checks) machine_.state = MachineState::kTool;
+      break;
+    case SimAction::Kind::kPause:
+      if (!checks) feed_hold();
+      break;
+    case SimAction::Kind::kEnd:
+      return end_program();
+    case SimAction::Kind::kStore:
+      store();
+      break;
+    default:
+      break;
+  }
+}
+
+void SimulatedController::end_program() {
+  if (machine_.state != MachineState::kCheck) set_spindle(0, 0.0);
+  coolant_ = 0;
+  set_overrides({});
+  say("[MSG:Pgm End]\r\n");
+  event("end");
+}
+
+bool SimulatedController::queue_move(const SimAction& action) {
+  if (queue_.room() == 0) {
+    begin_motion();
+    return false;
+  }
+  SimMove move = action.move;
+  move.received = errand_.received;
+  bool last = true;
+  if (action.arc) {
+    ++errand_.chord;
+    last = errand_.chord >= action.arc->chords;
+    move.target = action.arc->chord_end(errand_.chord);
+  }
+  if (settings_.on(20) && !move.jog && beyond_travel(move.target)) {
+    // The motion that runs comes to its stand first; the line is never answered.
+    errand_ = Errand();
+    machine_.limit_hit = machine_.critical = true;
+    if (!queue_.empty()) queue_.hold();
+    return true;
+  }
+  if (last) {
+    errand_.actions.pop_front();
+    errand_.chord = 0;
+  }
+  if (machine_.state == MachineState::kCheck) return true;
+  queue_.now = now_;
+  queue_.push(move);
+  if (move.jog && !queue_.empty()) machine_.state = MachineState::kJog;
+  if (options_.instant) queue_.finish_now();
+  return true;
+}
+
+bool SimulatedController::beyond_travel(const Eigen::Vector3d& target) const {
+  constexpr double kRounding = 1e-6;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double travel = settings_[130 + axis];
+    if (target[axis] > kRounding || target[axis] < -travel - kRounding) return true;
+  }
+  return false;
+}
+
+void SimulatedController::run_startup_lines() {
+  std::vector<SimAction> actions;
+  for (const std::string& line : settings_.startup) {
+    if (line.empty()) continue;
+    const int error = gcode_.run(line, actions);
+    std::string text(">");
+    text.append(line).append(error == 0 ? ":ok" : numbered(":error:", error)).append("\r\n");
+    say(text);
+  }
+  errand_.actions.assign(actions.begin(), actions.end());
+}
+
+// Lines that begin with $.
+
+namespace {
+
+/// The whole of `text` as a number; NaN if it is none.
+double number_in(const std::string& text) {
+  double value = 0.0;
+  const char* end = text.data() + text.size();
+  const auto [stop, error] = std::from_chars(text.data(), end, value, std::chars_format::fixed);
+  return error == std::errc() && stop == end ? value : std::nan("");
+}
+
+}  // namespace
+
+/// @return 0, the number of the error, or −1 for an answer that comes later.
+int SimulatedController::run_system(const std::string& line) {
+  if (line == "$") {
+    say("[HLP:$$ $# $G $I $N $x=val $Nx=line $J=line $SLP $C $X $H ~ ! ? ctrl-x]\r\n");
+    return 0;
+  }
+  if (line == "$$") return print_settings();
+  if (line == "$G") {
+    say(gcode_.state_text());
+    return 0;
+  }
+  if (line == "$C") return toggle_check();
+  if (line == "$X") return unlock();
+  if (line.rfind("$J", 0) == 0) return jog(line);
+  const bool taken = sim_state::still(machine_, motion()) || machine_.state == MachineState::kTool;
+  return taken ? idle_system(line) : 8;
+}
+
+int SimulatedController::idle_system(const std::string& line) {
+  if (line == "$#") {
+    say(gcode_.parameters_text());
+    return 0;
+  }
+  if (line == "$I") {
+    print_build();
+    return 0;
+  }
+  if (line == "$H") return home();
+  if (line == "$SLP") return sleep();
+  if (line.rfind("$RST=", 0) == 0) return restore(line);
+  if (line.rfind("$N", 0) == 0) return startup_lines(line);
+  return write_setting(line);
+}
+
+int SimulatedController::print_settings() {
+  if (machine_.state == MachineState::kRun || machine_.state == MachineState::kHold) return 8;
+  say(settings_.text());
+  return 0;
+}
+
+int SimulatedController::toggle_check() {
+  if (machine_.state == MachineState::kCheck) {
+    say("[MSG:Disabled]\r\n");
+    reset_after_answer_ = true;
+    return 0;
+  }
+  if (machine_.state != MachineState::kIdle || !queue_.empty()) return 8;
+  machine_.state = MachineState::kCheck;
+  say("[MSG:Enabled]\r\n");
+  return 0;
+}
+
+int SimulatedController::unlock() {
+  if (machine_.state != MachineState::kAlarm) return 0;
+  if (machine_.door_open) return 13;
+  say("[MSG:Caution: Unlocked]\r\n");
+  machine_.alarm = 0;
+  machine_.state = MachineState::kIdle;
+  event("unlocked");
+  return 0;
+}
+
+int SimulatedController::jog(const std::string& line) {
+  if (!sim_state::takes_jog(machine_, motion())) return 8;
+  if (line.size() < 3 || line[2] != '=') return 16;
+  std::vector<SimAction> actions;
+  SimGcode before = gcode_;
+  if (const int error = before.jog(std::string_view(line).substr(3), actions); error != 0) {
+    return error;
+  }
+  if (settings_.on(20) && beyond_travel(actions.back().move.target)) return 15;
+  gcode_.set_position(actions.back().move.target);
+  errand_.actions.assign(actions.begin(), actions.end());
+  return 0;
+}
+
+/// Z first, then X and Y together, at the search rate; then off the switches and on again slowly.
+int SimulatedController::home() {
+  if (!settings_.on(22)) return 5;
+  if (machine_.door_open) return 13;
+  const Eigen::Vector3d travel = settings_.axes(130);
+  const Eigen::Vector3d way = true_position().cwiseAbs().cwiseMin(travel);
+  const double search = (way.z() + std::max(way.x(), way.y())) / settings_[25];
+  const double locate = 2.0 * 3.0 * settings_[27] / settings_[24];
+  machine_.state = MachineState::kHome;
+  machine_.homing_until = options_.instant ? now_ : now_ + 60.0 * (search + locate);
+  return -1;
+}
+
+int SimulatedController::sleep() {
+  say("[MSG:Sleeping]\r\n");
+  set_spindle(0, 0.0);
+  answer(0);
+  machine_.state = MachineState::kSleep;
+  return -1;
+}
+
+int SimulatedController::restore(const std::string& line) {
+  if (line != "$RST=$" && line != "$RST=#" && line != "$RST=*") return 3;
+  if (line != "$RST=#") settings_.restore();
+  if (line != "$RST=$") {
+    for (int i = 0; i < 6; ++i) gcode_.set_origin(i, Eigen::Vector3d::Zero());
+  }
+  store();
+  say("[MSG:Restoring defaults]\r\n");
+  reset_after_answer_ = true;
+  return 0;
+}
+
+int SimulatedController::startup_lines(const std::string& line) {
+  if (line == "$N") {
+    for (std::size_t i = 0; i < 2; ++i) {
+      say(numbered("$N", static_cast<std::int64_t>(i)) + "=" + settings_.startup[i] + "\r\n");
+    }
+    return 0;
+  }
+  if (line.size() < 4 || (line[2] != '0' && line[2] != '1') || line[3] != '=') return 3;
+  const std::string words = line.substr(4);
+  SimGcode trial = gcode_;
+  std::vector<SimAction> actions;
+  if (const int error = trial.run(words, actions); error != 0) return error;
+  settings_.startup[static_cast<std::size_t>(line[2] - '0')] = words;
+  store();
+  return 0;
+}
+
+int SimulatedController::write_setting(const std::string& line) {
+  const std::size_t sign = line.find('=');
+  if (sign == std::string::npos || sign < 2) return 3;
+  const double number = number_in(line.substr(1, sign - 1));
+  const double value = number_in(line.substr(sign + 1));
+  if (std::isnan(number) || number < 0.0 || number > 1000.0) return 3;
+  if (std::isnan(value)) return 2;
+  const int error = settings_.set(static_cast<int>(number), value);
+  if (error == 0) store();
+  return error;
+}
+
+/// The board hears nothing while it writes.
+void SimulatedController::store() {
+  if (options_.instant) return;
+  busy_until_ = deaf_until_ = now_ + options_.eeprom_seconds;
+}
+
+void SimulatedController::print_build() {
+  const std::string sizes =
+      std::to_string(options_.planner_blocks) + "," + std::to_string(options_.rx_bytes);
+  if (is_hal()) {
+    say(std::string("[VER:1.1f.20240101:]\r\n[OPT:VNMSL,").append(sizes).append(",3,0]\r\n"));
+    say("[NEWOPT:ENUMS,RT+,TC]\r\n[FIRMWARE:grblHAL]\r\n");
+    return;
+  }
+  std::string built = "V";
+  if (options_.line_numbers) built += "N";
+  if (options_.mist) built += "M";
+  say(std::string("[VER:1.1h.20190830:]\r\n[OPT:").append(built) + "," + sizes + "]\r\n");
 }
 
 }  // namespace lensforge

@@ -9,12 +9,9 @@
 #include <vector>
 
 #include "machine/sim/sim_gcode.h"
-#include "machine/sim/sim_intake.h"
 #include "machine/sim/sim_queue.h"
-#include "machine/sim/sim_report.h"
 #include "machine/sim/sim_settings.h"
 #include "machine/sim/sim_state.h"
-#include "machine/sim/simulated_options.h"
 
 namespace lensforge {
 
@@ -28,8 +25,8 @@ struct Spoken {
 /// commands, line parser, planner, motion, alarms and reports, as the published documentation of
 /// Grbl 1.1 and grblHAL tells. Memory does not grow with what it runs.
 ///
-/// What it decides stands in functions of values: sim_state.h (what its machine does), sim_intake.h
-/// (bytes to lines), sim_line.h (lines to actions) and sim_report.h. This class carries it out.
+/// What it decides stands in functions of values: sim_state.h (bytes to lines, what its machine
+/// does, reports) and sim_gcode.h (lines to actions). This class carries it out.
 ///
 /// It remembers where the mill truly stands beside what the controller believes: a reset in motion,
 /// a hard stop or a power cycle makes the two differ until the next homing.
@@ -88,7 +85,7 @@ class SimulatedController {
     std::int64_t received = 0;
   };
 
-  // Time and state: simulated_controller.cpp
+  // Time and state.
   void power_up();
   void restart();
   void work();
@@ -110,7 +107,7 @@ class SimulatedController {
   void event(const std::string& what);
   void say(const std::string& text) { output_.push_back({now_, text}); }
 
-  // Bytes: controller_realtime.cpp
+  // Bytes from the wire.
   bool realtime(unsigned char byte);
   void hal_command(unsigned char byte);
   void open_and_shut_door();
@@ -118,7 +115,7 @@ class SimulatedController {
   void report();
   [[nodiscard]] SimSnapshot snapshot() const;
 
-  // Lines: controller_lines.cpp
+  // Lines.
   bool step_parser();
   bool read_characters();
   void run_line();
@@ -132,7 +129,7 @@ class SimulatedController {
   [[nodiscard]] bool beyond_travel(const Eigen::Vector3d& target) const;
   void answer(int error);
 
-  // `$` commands: controller_system.cpp
+  // `$` commands.
   int run_system(const std::string& line);
   int print_settings();
   int toggle_check();

@@ -12,15 +12,6 @@ constexpr double kNever = std::numeric_limits<double>::infinity();
 
 }  // namespace
 
-WireOptions instant_wire() {
-  WireOptions wire;
-  wire.bytes_per_second = 0.0;
-  wire.latency = 0.0;
-  wire.gathering = 0.0;
-  wire.host_buffer = 1 << 16;
-  return wire;
-}
-
 SimulatedMachine::SimulatedMachine(const SimulatedOptions& options, const WireOptions& wire,
                                    const MachineWatch& watch)
     : wire_(wire), controller_(options, watch) {}

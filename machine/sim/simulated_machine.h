@@ -10,12 +10,41 @@
 #include <string_view>
 #include <vector>
 
-#include "machine/link/clock.h"
 #include "machine/link/link.h"
 #include "machine/sim/simulated_controller.h"
-#include "machine/sim/simulated_fault.h"
 
 namespace lensforge {
+
+/// Way of a byte between host and controller.
+enum class WireDirection { kToController, kToHost };
+
+/// What can go wrong.
+enum class FaultKind {
+  kUnplug,        ///< The link is gone for `seconds`; the controller goes on.
+  kUnplugReset,   ///< Likewise, and the controller is without power meanwhile.
+  kReset,         ///< The controller starts anew by itself and greets (brown-out).
+  kAlarm,         ///< Alarm `code`; 0 stands for 1, a limit switch.
+  kError,         ///< The next G-code line is answered by error `code` (0: 20) and not run.
+  kLostReply,     ///< The next ok or error is lost on its way.
+  kGarbledReply,  ///< The next ok or error arrives with a wrong byte.
+  kDuplicatedOk,  ///< The next ok arrives twice.
+  kStall,         ///< Nothing is heard of the controller for `seconds`.
+  kRxOverrun,     ///< `code` (0: 8) bytes find the receive buffer full.
+  kPartialWrite,  ///< The link takes part of a write, then nothing for `seconds`.
+  kDoor,          ///< The door opens, and closes after `seconds`.
+  kHold,          ///< Somebody presses feed hold at the machine.
+  kDroppedByte,   ///< One byte vanishes.
+};
+
+/// One fault, once: it strikes when so many bytes have gone `direction`'s way since power-up, at
+/// the byte after them.
+struct SimulatedFault {
+  FaultKind kind = FaultKind::kStall;
+  WireDirection direction = WireDirection::kToController;
+  std::int64_t at_byte = 0;
+  double seconds = 1.0;
+  int code = 0;
+};
 
 /// The line between host and controller.
 struct WireOptions {
@@ -25,9 +54,6 @@ struct WireOptions {
   std::size_t host_buffer = 4096;     ///< Bytes that a write may leave on their way.
   bool reset_on_open = false;         ///< Opening the port restarts the board, as many do.
 };
-
-/// No limit and no delay: for measuring the sender itself, with SimulatedOptions::instant.
-WireOptions instant_wire();
 
 /// A simulated controller at the end of a line, with faults, and the clock that all of it runs by:
 /// time passes only while somebody waits or reads (a read takes 10 µs at least).

@@ -4,9 +4,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <string>
 
 #include "machine/stream/program_feed.h"
-#include "machine/stream/status_report.h"
+#include "machine/stream/reply_parser.h"
 
 namespace lensforge {
 
@@ -94,6 +95,23 @@ class LineTracker {
   std::deque<Known> untrusted_;  ///< known_ at the reports of the last kTrust seconds.
   std::int64_t executed_;
   std::int64_t offset_ = 0;
+};
+
+/// Sets the bytes that a controller says it holds (Bf:) against those that are not answered yet.
+/// Replies and reports come in one order, so a controller can never hold more than that, and what
+/// was handed over a while ago it must hold, but for the line it works on. A reply that came twice
+/// or not at all shows so before the stream next comes to rest.
+class BufferAudit {
+ public:
+  /// @param rx_bytes  size of the receive buffer.
+  explicit BufferAudit(int rx_bytes) : rx_bytes_(rx_bytes) {}
+
+  /// Why the counts do not match, or empty. @param now  s of the sender's clock.
+  std::string check(const StatusReport& report, const LineTracker& tracker, double now);
+
+ private:
+  int rx_bytes_;
+  int missing_ = 0;  ///< Reports in a row in which bytes were missing.
 };
 
 }  // namespace lensforge

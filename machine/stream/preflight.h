@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "machine/guard/register_map.h"
-#include "machine/stream/controller_info.h"
+#include "machine/stream/controller_dialogue.h"
 #include "machine/stream/program_facts.h"
 
 namespace lensforge {

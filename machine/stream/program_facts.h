@@ -10,7 +10,7 @@
 
 #include "core/compute/run_control.h"
 #include "machine/gcode/gcode_dialect.h"
-#include "machine/gcode/gcode_state.h"
+#include "machine/gcode/gcode_motion.h"
 #include "machine/planner/planner_model.h"
 
 namespace lensforge {

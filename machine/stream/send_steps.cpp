@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "core/text/printable.h"
-#include "machine/stream/controller_codes.h"
+#include "machine/stream/reply_parser.h"
 
 namespace lensforge {
 namespace {
@@ -328,4 +328,5 @@ double wait_time(const SendState& state, bool guarded, bool waiting, double now)
 }
 
 }  // namespace send_step
+
 }  // namespace lensforge

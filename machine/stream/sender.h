@@ -9,13 +9,10 @@
 #include <string>
 
 #include "machine/guard/guard.h"
-#include "machine/link/clock.h"
 #include "machine/link/link.h"
-#include "machine/stream/controller_info.h"
+#include "machine/stream/controller_dialogue.h"
 #include "machine/stream/journal.h"
 #include "machine/stream/program_feed.h"
-#include "machine/stream/stream_fault.h"
-#include "machine/stream/wire.h"
 
 namespace lensforge {
 

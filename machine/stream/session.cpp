@@ -5,8 +5,8 @@
 #include <array>
 
 #include "core/error.h"
+#include "machine/stream/controller_dialogue.h"
 #include "machine/stream/program_feed.h"
-#include "machine/stream/realtime.h"
 
 namespace lensforge {
 namespace {

@@ -5,7 +5,7 @@
 #include <stop_token>
 
 #include "core/compute/run_control.h"
-#include "machine/stream/controller_info.h"
+#include "machine/stream/controller_dialogue.h"
 
 namespace lensforge {
 

@@ -13,7 +13,7 @@
 
 #include "core/temp_folder.h"
 #include "machine/fast_controller.h"
-#include "machine/link/steady_clock.h"
+#include "machine/link/link.h"
 #include "machine/stream/program_facts.h"
 #include "machine/stream/sender.h"
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Programs, journals, records and register maps of send.
 #include "fuzz/scene.h"
-#include "machine/stream/journal_text.h"
+#include "machine/stream/journal.h"
 
 namespace lensforge::fuzz {
 namespace {

@@ -10,7 +10,7 @@
 #include <mutex>
 #include <stdexcept>
 
-#include "machine/sim/pty_controller.h"
+#include "machine/pty_controller.h"
 
 namespace lensforge::fuzz {
 namespace {

@@ -4,7 +4,6 @@
 #include <cstddef>
 #include <functional>
 
-#include "machine/link/clock.h"
 #include "machine/link/link.h"
 #include "machine/sim/simulated_machine.h"
 

@@ -9,8 +9,7 @@
 #include <vector>
 
 #include "machine/gcode/gcode_motion.h"
-#include "machine/gcode/gcode_state.h"
-#include "machine/sim/simulated_options.h"
+#include "machine/sim/sim_settings.h"
 
 namespace lensforge::campaign {
 

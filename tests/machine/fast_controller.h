@@ -8,7 +8,6 @@
 #include <string_view>
 #include <vector>
 
-#include "machine/link/clock.h"
 #include "machine/link/link.h"
 
 namespace lensforge::testing {

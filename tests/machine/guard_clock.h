@@ -3,9 +3,8 @@
 
 #include <string>
 
-#include "machine/guard/map_folder.h"
-#include "machine/guard/register_map_reader.h"
-#include "machine/link/clock.h"
+#include "machine/guard/register_map.h"
+#include "machine/link/link.h"
 
 namespace lensforge::testing {
 

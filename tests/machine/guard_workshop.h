@@ -8,9 +8,9 @@
 #include <utility>
 #include <vector>
 
-#include "machine/guard/simulated_spindle.h"
 #include "machine/guard/spindle_guard.h"
 #include "machine/guard_clock.h"
+#include "machine/simulated_spindle.h"
 
 namespace lensforge::testing {
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <array>
 #include <deque>
 #include <memory>
 #include <sstream>
@@ -10,6 +11,27 @@
 #include "machine/sim/simulated_machine.h"
 
 namespace lensforge {
+
+constexpr int kFaultKinds = 14;
+
+/// "unplug", "unplug-reset", "reset", … as tables name it.
+inline std::string fault_name(FaultKind kind) {
+  constexpr std::array<const char*, kFaultKinds> kNames{
+      "unplug",        "unplug-reset",  "reset",         "alarm",       "error",
+      "lost-reply",    "garbled-reply", "duplicated-ok", "stall",       "rx-overrun",
+      "partial-write", "door",          "hold",          "dropped-byte"};
+  return kNames[static_cast<std::size_t>(kind)];
+}
+
+/// No limit and no delay: for measuring the sender itself, with SimulatedOptions::instant.
+inline WireOptions instant_wire() {
+  WireOptions wire;
+  wire.bytes_per_second = 0.0;
+  wire.latency = 0.0;
+  wire.gathering = 0.0;
+  wire.host_buffer = 1 << 16;
+  return wire;
+}
 
 /// Talks to a simulated controller as a terminal would.
 class Talk {

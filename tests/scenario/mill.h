@@ -8,7 +8,7 @@
 #include <thread>
 #include <vector>
 
-#include "machine/sim/pty_controller.h"
+#include "machine/pty_controller.h"
 
 namespace lensforge::scenario {
 

@@ -12,7 +12,7 @@
 
 #include "cam/cam_meshes.h"
 #include "core/error.h"
-#include "machine/gcode/arc.h"
+#include "machine/gcode/gcode_motion.h"
 
 namespace lensforge {
 namespace {

@@ -5,7 +5,7 @@
 #include <numbers>
 #include <random>
 
-#include "machine/gcode/arc.h"
+#include "machine/gcode/gcode_motion.h"
 
 namespace lensforge {
 namespace {

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "machine/gcode/gcode_block.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -8,6 +6,8 @@
 #include <cstdlib>
 #include <random>
 #include <string>
+
+#include "machine/gcode/gcode_reader.h"
 
 namespace lensforge {
 namespace {

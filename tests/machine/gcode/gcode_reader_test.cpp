@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "core/error.h"
-#include "machine/gcode/gcode_block.h"
 
 namespace lensforge {
 namespace {

@@ -11,9 +11,9 @@
 
 #include "machine/guard/background_guard.h"
 #include "machine/guard/modbus_bus.h"
-#include "machine/guard/register_map_reader.h"
+#include "machine/guard/register_map.h"
 #include "machine/guard_server.h"
-#include "machine/link/steady_clock.h"
+#include "machine/link/link.h"
 
 namespace lensforge {
 namespace {

@@ -6,8 +6,7 @@
 
 #include "core/error.h"
 #include "core/temp_folder.h"
-#include "machine/guard/map_folder.h"
-#include "machine/guard/register_map_reader.h"
+#include "machine/guard/register_map.h"
 
 namespace lensforge {
 namespace {

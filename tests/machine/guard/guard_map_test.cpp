@@ -8,8 +8,7 @@
 
 #include "core/error.h"
 #include "core/temp_folder.h"
-#include "machine/guard/map_folder.h"
-#include "machine/guard/register_map_reader.h"
+#include "machine/guard/register_map.h"
 #include "machine/guard_clock.h"
 
 namespace lensforge {

@@ -2,7 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "machine/guard/spindle_watch.h"
+#include "machine/guard/spindle_guard.h"
 #include "machine/guard_clock.h"
 
 namespace lensforge {

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "machine/link/link.h"
+
 #include <arpa/inet.h>
 #include <fcntl.h>
 #include <gmock/gmock.h>
@@ -20,11 +22,7 @@
 #include "core/error.h"
 #include "core/io/descriptor.h"
 #include "core/temp_folder.h"
-#include "machine/link/port_lock.h"
-#include "machine/link/port_spec.h"
-#include "machine/link/serial_link.h"
-#include "machine/link/steady_clock.h"
-#include "machine/link/tcp_link.h"
+#include "machine/link/port.h"
 #include "machine/pseudo_terminal.h"
 
 namespace lensforge {

@@ -9,7 +9,6 @@
 
 #include "core/error.h"
 #include "machine/planner/planner_model.h"
-#include "machine/planner/speed_profile.h"
 
 namespace lensforge {
 namespace {

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "machine/sim/sim_line.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <string_view>
 #include <vector>
+
+#include "machine/sim/sim_gcode.h"
 
 namespace lensforge {
 namespace {

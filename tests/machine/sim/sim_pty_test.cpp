@@ -9,7 +9,7 @@
 #include <chrono>
 #include <string>
 
-#include "machine/sim/pty_controller.h"
+#include "machine/pty_controller.h"
 #include "machine/sim_talk.h"
 
 namespace lensforge {

@@ -8,9 +8,6 @@
 #include <string_view>
 #include <utility>
 
-#include "machine/sim/sim_intake.h"
-#include "machine/sim/sim_report.h"
-
 namespace lensforge {
 namespace {
 

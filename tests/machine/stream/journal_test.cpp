@@ -12,7 +12,6 @@
 
 #include "core/full_disk.h"
 #include "core/temp_folder.h"
-#include "machine/stream/journal_text.h"
 #include "machine/stream/program_file.h"
 
 namespace lensforge {

@@ -9,7 +9,7 @@
 #include <string>
 
 #include "core/temp_folder.h"
-#include "machine/gcode/gcode_error.h"
+#include "machine/gcode/gcode_reader.h"
 
 namespace lensforge {
 namespace {

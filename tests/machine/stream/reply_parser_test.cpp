@@ -9,8 +9,6 @@
 #include <string>
 #include <vector>
 
-#include "machine/stream/controller_codes.h"
-
 namespace lensforge {
 namespace {
 

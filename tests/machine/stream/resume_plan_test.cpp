@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "core/temp_folder.h"
-#include "machine/stream/entry_lines.h"
 
 namespace lensforge {
 namespace {

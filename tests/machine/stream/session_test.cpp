@@ -12,7 +12,7 @@
 
 #include "core/error.h"
 #include "core/temp_folder.h"
-#include "machine/gcode/gcode_error.h"
+#include "machine/gcode/gcode_reader.h"
 #include "machine/sim_talk.h"
 
 namespace lensforge {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "machine/guard/simulated_spindle.h"
+#include "machine/simulated_spindle.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "machine/gcode/arc.h"
+#include "machine/gcode/gcode_motion.h"
 
 #include <algorithm>
 #include <cmath>

@@ -7,9 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "machine/guard/register_bus.h"
 #include "machine/guard/register_map.h"
-#include "machine/link/clock.h"
+#include "machine/link/link.h"
 
 namespace lensforge {
 

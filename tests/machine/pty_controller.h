@@ -6,7 +6,7 @@
 #include <thread>
 
 #include "core/io/descriptor.h"
-#include "machine/sim/simulated_options.h"
+#include "machine/sim/sim_settings.h"
 
 namespace lensforge {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "machine/sim/pty_controller.h"
+#include "machine/pty_controller.h"
 
 #include <fcntl.h>
 #include <poll.h>
