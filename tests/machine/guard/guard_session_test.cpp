@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "machine/guard/device_watch.h"
+#include "machine/guard/modbus_bus.h"
 #include "machine/guard_clock.h"
 
 namespace lensforge {
