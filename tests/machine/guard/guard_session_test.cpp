@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "machine/guard/spindle_guard.h"
+#include "machine/guard/modbus_bus.h"
 #include "machine/guard_clock.h"
 
 namespace lensforge {
