@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Surfaces as the page holds them (view/stored_surface.h), decoded.
+// Surfaces as the page holds them (app/view/lens_view.h), decoded.
 
 function bytesOf(base64) {
   const text = atob(base64);
