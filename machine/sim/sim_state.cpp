@@ -50,9 +50,7 @@ SimTaken taken(SimIntake intake, char c, const SimIntakeRules& rules) {
   return {std::move(intake), !second};
 }
 
-}  // namespace lensforge
-
-namespace lensforge::sim_state {
+namespace sim_state {
 namespace {
 
 bool runs(const SimState& now) {
@@ -208,9 +206,8 @@ std::string text(const SimState& now, bool hal, double time) {
   return "Idle";
 }
 
-}  // namespace lensforge::sim_state
+}  // namespace sim_state
 
-namespace lensforge {
 namespace {
 
 // Reports between two that carry the field, at rest and in motion.

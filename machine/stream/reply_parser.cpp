@@ -11,9 +11,6 @@
 
 #include "core/error.h"
 
-// Numbers as documented for Grbl 1.1 (1 to 38, alarms 1 to 9) and grblHAL (the rest, which gives 5,
-// 9, 18 and 19 much the same meaning).
-
 namespace lensforge {
 namespace {
 
@@ -210,6 +207,8 @@ std::optional<StatusReport> parse_status_report(std::string_view line) {
   return report;
 }
 
+// Numbers as documented for Grbl 1.1 (1 to 38, alarms 1 to 9) and grblHAL (the rest, which gives 5,
+// 9, 18 and 19 much the same meaning).
 namespace {
 
 struct Code {
