@@ -76,7 +76,7 @@ class Job {
  private:
   static std::vector<fs::path> paths_of(const ProgramFiles& programs) {
     std::vector<fs::path> paths;
-    for (const ProgramFile& file : programs.files) paths.push_back(file.path);
+    for (const WrittenProgram& file : programs.files) paths.push_back(file.path);
     return paths;
   }
 

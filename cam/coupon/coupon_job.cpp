@@ -220,7 +220,7 @@ CouponSheet sheet_of(const CouponOptions& options, const CouponPlan& plan,
   sheet.known = expected_fit(sheet.expected, options.workshop);
   const Tool& ball = options.workshop.tool(options.workshop.process.finish.tool);
   sheet.tool = tool_text(ball);
-  for (const ProgramFile& file : programs.files) {
+  for (const WrittenProgram& file : programs.files) {
     sheet.files += (sheet.files.empty() ? "" : ", ") + file.path.filename().string();
   }
   sheet.minutes = programs.total.seconds / kSecondsPerMinute;
@@ -253,7 +253,7 @@ CouponResult make(const CouponOptions& options, const fs::path& folder, const Ex
   files.add(coupon_file::kReadings, readings_template(sheet.expected));
   programs.publish();
   CouponResult result;
-  for (const ProgramFile& file : programs.programs().files) result.files.push_back(file.path);
+  for (const WrittenProgram& file : programs.programs().files) result.files.push_back(file.path);
   remove_earlier(folder, result.files);
   for (const fs::path& path : files.publish()) result.files.push_back(path);
   result.layout = sheet.layout;

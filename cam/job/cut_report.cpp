@@ -189,7 +189,8 @@ Eigen::AlignedBox3d whole_box(const CutPlan& plan, const Front& front) {
 /// How Z gets right in the programs with the most tools.
 std::string length_words_of(const PostDescription& post, const ProgramFiles& programs) {
   std::size_t most = 1;
-  for (const ProgramFile& file : programs.files) most = std::max(most, file.reading.tools.size());
+  for (const WrittenProgram& file : programs.files)
+    most = std::max(most, file.reading.tools.size());
   return length_words(post, most, "the tool of each program");
 }
 
@@ -223,7 +224,7 @@ SetupSheet setup_sheet(const CutPlan& plan, const ProgramFiles& programs, const 
 /// Files that an operation stands in: "finish_1.ngc, finish_2.ngc".
 std::string files_of(const ProgramFiles& programs, std::size_t operation) {
   std::string names;
-  for (const ProgramFile& file : programs.files) {
+  for (const WrittenProgram& file : programs.files) {
     const bool holds =
         std::any_of(file.operations.begin(), file.operations.end(),
                     [&](const OperationTime& time) { return time.operation == operation; });

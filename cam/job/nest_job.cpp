@@ -225,7 +225,7 @@ class Job {
       own.times.push_back(all.times[i]);
       own.total += all.times[i];
     }
-    for (ProgramFile file : all.files) {
+    for (WrittenProgram file : all.files) {
       std::vector<OperationTime> kept;
       for (OperationTime time : file.operations) {
         if (!numbers[time.operation]) continue;
@@ -256,7 +256,7 @@ class Job {
 
   void describe(const ProgramFiles& all, NestResult& result) const {
     int last = -1;
-    for (const ProgramFile& file : all.files) {
+    for (const WrittenProgram& file : all.files) {
       NestProgram program{
           file.path.filename().string(), {}, file.time.seconds / 60.0, file.time.lines};
       for (const OperationTime& time : file.operations) {
@@ -299,7 +299,7 @@ class Job {
   /// The old job goes and the new one comes, its reports first and last.
   void publish(PendingPrograms& programs, std::vector<PendingFiles>& files, NestResult& result) {
     std::vector<fs::path> written;
-    for (const ProgramFile& file : programs.programs().files) written.push_back(file.path);
+    for (const WrittenProgram& file : programs.programs().files) written.push_back(file.path);
     const OtherPrograms others = other_programs(folder_, written);
     if (!others.kept.empty()) {
       result.warnings.push_back(

@@ -253,7 +253,7 @@ FinishPaths CutPlan::take_finish_paths(const ProgramFiles& programs, const RunCo
 void CutPlan::read_motions(const ProgramFiles& programs, int tool,
                            const std::function<void(const GcodeMotion&)>& take,
                            const RunControl& control) const {
-  for (const ProgramFile& file : programs.files) {
+  for (const WrittenProgram& file : programs.files) {
     const auto any = [&](const auto& holds) {
       return std::any_of(file.operations.begin(), file.operations.end(), holds);
     };

@@ -47,7 +47,7 @@ class PartReading {
     }
   }
 
-  ProgramFile finish() {
+  WrittenProgram finish() {
     close_operation();
     file_.reading = collector_.reading();
     file_.bytes = part_.text().bytes();
@@ -92,7 +92,7 @@ class PartReading {
   ReadingCollector collector_;
   ProgramTimer timer_;
   PathDigest digest_;
-  ProgramFile file_;
+  WrittenProgram file_;
   std::size_t next_ = 0;
 };
 
@@ -106,7 +106,7 @@ std::string minutes_text(const ProgramTime& time) {
 }
 
 std::string operation_text(const ProgramContext& context, std::size_t operation,
-                           const ProgramFile& file) {
+                           const WrittenProgram& file) {
   const std::string& name = context.plan.operations[operation].name;
   for (const OperationTime& time : file.operations) {
     if (time.operation == operation) return name + ": " + minutes_text(time.time);
@@ -117,8 +117,8 @@ std::string operation_text(const ProgramContext& context, std::size_t operation,
 /// Reads a part that has ended back, times it and compares it with what was written.
 /// @throw InputError naming the post and the reason if its own reader refuses the program or finds
 ///        another path in it; Interrupted.
-ProgramFile check_part(const ProgramContext& context, const ProgramPart& part,
-                       const RunControl& control) {
+WrittenProgram check_part(const ProgramContext& context, const ProgramPart& part,
+                          const RunControl& control) {
   PartReading reading(context, part);
   const fs::path& beside = part.text().file().beside();
   const std::string stage = "read back " + part.text().file().path().filename().string();
@@ -147,7 +147,7 @@ ProgramFile check_part(const ProgramContext& context, const ProgramPart& part,
 /// The comments for ProgramPart::finish().
 /// @param index_of_parts  number of the part, from 1, and how many there are.
 std::vector<std::string> late_comments(const ProgramContext& context, const ProgramPart& part,
-                                       const ProgramFile& file,
+                                       const WrittenProgram& file,
                                        std::pair<int, int> index_of_parts) {
   const int decimals = context.settings.decimals;
   const ProgramReading& reading = file.reading;
@@ -227,7 +227,7 @@ std::vector<Group> group_operations(const ProgramContext& context) {
 /// A part with what was found when it was read back.
 struct ReadPart {
   std::unique_ptr<ProgramPart> part;
-  ProgramFile file;
+  WrittenProgram file;
 };
 
 /// Writes the parts of one group, one after the other.
@@ -350,7 +350,7 @@ void finish_parts(const ProgramContext& context, std::vector<ReadPart>& parts) {
 void gather(std::vector<ReadPart>& parts, const std::vector<fs::path>& names,
             ProgramFiles& programs, std::vector<PendingFile>& pending) {
   for (std::size_t i = 0; i < parts.size(); ++i) {
-    ProgramFile& file = parts[i].file;
+    WrittenProgram& file = parts[i].file;
     for (const OperationTime& time : file.operations) programs.times[time.operation] += time.time;
     programs.total += file.time;
     file.path = names[i];

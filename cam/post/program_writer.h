@@ -83,7 +83,7 @@ struct OperationTime {
 };
 
 /// One program file as it was read back.
-struct ProgramFile {
+struct WrittenProgram {
   std::filesystem::path path;
   std::filesystem::path beside;  ///< Where it is until it is published; empty afterwards.
   std::uintmax_t bytes = 0;
@@ -95,7 +95,7 @@ struct ProgramFile {
 
 /// What a plan came to.
 struct ProgramFiles {
-  std::vector<ProgramFile> files;           ///< In the order in which they are to be run.
+  std::vector<WrittenProgram> files;        ///< In the order in which they are to be run.
   GcodeDialect reader;                      ///< By which they were read back.
   std::vector<OperationSummary> summaries;  ///< Of the plan's operations.
   std::vector<ProgramTime> times;           ///< Likewise, over all files.

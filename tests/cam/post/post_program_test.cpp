@@ -169,7 +169,7 @@ TEST(ProgramWriter, OperationsShareFilesAsAsked) {
     ProgramSettings settings = four_decimals();
     settings.grouping = grouping;
     std::vector<std::string> stems;
-    for (const ProgramFile& file : write(plan, post, folder, settings).files) {
+    for (const WrittenProgram& file : write(plan, post, folder, settings).files) {
       stems.push_back(file.path.stem().string());
     }
     return stems;

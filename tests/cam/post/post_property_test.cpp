@@ -30,7 +30,7 @@ constexpr double kPlunge = 77.0;  ///< Of the tool: no move of a path has it.
 /// Programs read back, whole or in parts.
 std::vector<GcodeMotion> motions_of(const ProgramFiles& files) {
   std::vector<GcodeMotion> motions;
-  for (const ProgramFile& file : files.files) {
+  for (const WrittenProgram& file : files.files) {
     EXPECT_EQ(check_seal(file.path), true);
     const auto sink = [&](const GcodeMotion& motion, int) { motions.push_back(motion); };
     const ProgramReading reading = read_program(file.path, files.reader, sink, {});
@@ -231,7 +231,7 @@ TEST(PostProperty, PartsCutTheSamePathAsTheWhole) {
     ASSERT_GT(files.files.size(), 1U);
     std::vector<GcodeMotion> parts;
     int number = 0;
-    for (const ProgramFile& file : files.files) {
+    for (const WrittenProgram& file : files.files) {
       EXPECT_EQ(file.path.stem(), std::string("finish_").append(std::to_string(++number)));
       EXPECT_LE(std::filesystem::file_size(file.path), settings.largest_file);
       EXPECT_EQ(check_seal(file.path), true);

@@ -60,7 +60,8 @@ class PostRs274 : public ::testing::Test {
     settings.coolant = Coolant::kFlood;
     settings.grouping = ProgramGrouping::kAll;
     settings.largest_file = limit;
-    for (const ProgramFile& file : write_programs(plan, post, settings, folder.path(), {}).files) {
+    for (const WrittenProgram& file :
+         write_programs(plan, post, settings, folder.path(), {}).files) {
       const Rs274Reading theirs = read_with_rs274(rs274_, file.path);
       ASSERT_TRUE(theirs.accepted) << file.path << theirs.errors;
       std::vector<GcodeMotion> ours;
@@ -114,7 +115,7 @@ TEST_F(PostRs274, TheTipOfEveryToolIsWhereTheProgramSaysIt) {
       settings.grouping = grouping;
       const ProgramFiles files = write_programs(plan, post, settings, folder.path(), {});
       std::set<int> cut;
-      for (const ProgramFile& file : files.files) {
+      for (const WrittenProgram& file : files.files) {
         const Rs274Reading theirs = read_with_rs274(rs274_, file.path, table);
         ASSERT_TRUE(theirs.accepted) << file.path << theirs.errors;
         std::vector<GcodeMotion> ours;
