@@ -30,7 +30,7 @@ class DesignLog {
 
   /// Progress within a level. @param iteration  of the round.
   void report(const std::string& detail, int iteration) const;
-void report_rendering() const;  ///< The levels are done.
+  void report_rendering() const;  ///< The levels are done.
   void report_done() const;
 
   /// Of a step of this round, which is worth a remark to the user.
