@@ -260,8 +260,13 @@ void OptionSet::add(const OptionSpec& spec, Getter get, Setter set) {
       parser_->options.emplace_back(BoundOption{spec, std::move(get), std::move(set)});
   CLI::App& app = parser_->app;
   if (spec.kind == OptionKind::kFlag) {
-    app.add_flag_function(
-        spec.name, [&option](std::int64_t count) { option.given = count > 0; }, spec.help);
+    const auto count = [&option](std::int64_t times) { option.given = times > 0; };
+    // Anything else that a --config file or --flag=value gives CLI11 tries to read as a number.
+    const auto refuse_others = [name = spec.name](const std::string& value) {
+      if (value == "true" || value == "false") return std::string();
+      throw InputError(name + " " + printable_line(value, kLongestKey) + ": must be true or false");
+    };
+    app.add_flag_function(spec.name, count, spec.help)->check(refuse_others);
     return;
   }
   const auto take = [&option](const std::string& text) {

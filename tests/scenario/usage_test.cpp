@@ -165,6 +165,11 @@ TEST_F(Usage, BrokenConfigFilesAreRefused) {
   expect_option_refused({"--config", path("unknown.toml")}, {"--config", "pixles"});
   write(at("value.toml"), "ior = 0.5\n");
   expect_option_refused({"--config", path("value.toml")}, {"--ior 0.5", "1.01 to 10"});
+  for (const char* value : {"\"abc\"", "\"0x\"", "\"99999999999999999999\"", "1.5", "2", "\"\""}) {
+    write(at("flag.toml"), std::string("resume = ") + value + "\n");
+    expect_option_refused({"--config", path("flag.toml")}, {"--resume", "true or false"});
+  }
+  expect_option_refused({"--resume=abc"}, {"--resume abc", "true or false"});
   write(at("syntax.toml"), "pixels = = 3\n");
   expect_option_refused({"--config", path("syntax.toml")}, {"--config", "line 1"});
   write(at("table.toml"), "[design]\npixels = 3\n");
