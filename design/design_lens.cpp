@@ -8,7 +8,10 @@
 
 #include "core/error.h"
 #include "core/image/spectral_color.h"
+#include "core/io/checkpoint_file.h"
 #include "core/optics/light_colors.h"
+#include "core/surface/lens_surface.h"
+#include "core/surface/spline_file.h"
 #include "design/optics/made_surface.h"
 #include "design/picture_values.h"
 #include "design/render_lens.h"
@@ -79,6 +82,16 @@ std::optional<DesignResult::Colors> colors_of(const Lens& lens, const Executor& 
                               fringe_of(lens)};
 }
 
+/// @throw InputError if the surface of a checkpoint is none that a lens can have: its bytes were
+/// changed.
+void require_surface(const DesignTask& task, const Checkpoint& state) {
+  Lens lens;
+  take_surface(task, state.mesh, lens);
+  const std::optional<std::string> fault = lens.spline ? spline_fault(*lens.spline, task.setup)
+                                                       : surface_fault(lens.surface, task.setup);
+  if (fault) refuse_checkpoint(task.options.checkpoint, "holds a surface of no lens: " + *fault);
+}
+
 bool run_all(const DesignTask& task, DesignLog& log, Checkpoint& state) try {
   return run_levels(task, log, state);
 } catch (const InputError&) {
@@ -128,6 +141,7 @@ DesignResult design_lens(const Image& target, const DesignOptions& options,
   const DesignOptions settled = with_smoothness_applied(options);
   const DesignTask task = make_task(target, settled, executor, control);
   Checkpoint state = first_state(task);
+  if (settled.resume) require_surface(task, state);
   DesignLog log(task, state);
   DesignResult result = run_to_end(task, log, state, executor);
   const bool done = result.status == DesignResult::Status::kDone;

@@ -11,7 +11,6 @@
 #include <deque>
 #include <exception>
 #include <filesystem>
-#include <sstream>
 #include <string>
 #include <utility>
 #include <vector>
@@ -56,11 +55,8 @@ std::string value_text(const std::string& key, const toml::node& value) {
   if (!value.is_number()) {
     throw InputError("--config: key " + key + ": must be a string, a number or a boolean");
   }
-  std::ostringstream text;
-  text.precision(17);
-  if (const auto* whole = value.as_integer()) text << whole->get();
-  if (const auto* real = value.as_floating_point()) text << real->get();
-  return text.str();
+  if (const auto* whole = value.as_integer()) return std::to_string(whole->get());
+  return shortest_text(value.as_floating_point()->get());
 }
 
 toml::table parsed(std::istream& input) {

@@ -14,10 +14,6 @@
 namespace lensforge {
 namespace {
 
-/// How far the surface's rim may be from the lens's, share of the lens's larger side: a design
-/// keeps its rim to the last bits of a double, other programs to those of a float (6e-8).
-constexpr double kRimShare = 1e-4;
-
 std::optional<std::string> extent_fault(const SurfaceMesh& mesh, const Eigen::Vector2d& size) {
   const double tolerance = kRimShare * size.maxCoeff();
   for (int axis = 0; axis < 2; ++axis) {

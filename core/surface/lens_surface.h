@@ -9,6 +9,10 @@
 
 namespace lensforge {
 
+/// Largest distance of the surface's rim from the lens's, share of the lens's longer side: a design
+/// keeps its rim to the last bits of a double, other programs to those of a float (6e-8).
+inline constexpr double kRimShare = 1e-4;
+
 /// Why a mesh cannot be the optical surface of a lens with this setup: a triangle that does not
 /// face +z, heights outside the entry face and the receiving plane, an extent other than the
 /// lens's. One clause without the surface's name; nothing if it can.

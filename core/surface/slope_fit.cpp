@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/surface/lens_surface.h"
 
 // The spline's x and y are given first (GridWarp): with knots where vertices are dense, 30,481
 // control points project the picture of a smooth 128² portrait with MAE 0.0031, where on even knot
@@ -60,7 +61,13 @@ double mesh_cell(const SmoothSurface& surface) {
 }
 
 SurfacePoint model_near(const SmoothSurface& surface, const Eigen::Vector2d& xy) {
-  const Eigen::Vector2d inside = nearest_inside(surface.box(), xy);
+  const Eigen::AlignedBox2d& box = surface.box();
+  if (const auto point = surface.model_at(nearest_inside(box, xy))) return *point;
+  // A rim that is not straight is within these bounds, see surface_fault().
+  const Eigen::Vector2d margin =
+      Eigen::Vector2d::Constant(2.0 * kRimShare * box.sizes().maxCoeff());
+  const Eigen::AlignedBox2d inner(box.min() + margin, box.max() - margin);
+  const Eigen::Vector2d inside = nearest_inside(inner, xy);
   const auto point = surface.model_at(inside);
   LF_CHECK(point.has_value(), std::to_string(inside.x()) + ", " + std::to_string(inside.y()));
   return *point;

@@ -154,6 +154,22 @@ TEST(DesignLens, StoppedWhileTheFinishedLensIsRenderedItResumes) {
   EXPECT_EQ(timeless_csv(resumed.convergence), timeless_csv(whole.convergence));
 }
 
+TEST(DesignLens, ACheckpointWhoseSurfaceIsNoLensesIsRefused) {
+  const TempFolder folder;
+  for (const SurfaceModel model : {SurfaceModel::kFacet, SurfaceModel::kSpline}) {
+    DesignOptions options = two_level_options();
+    options.model = model;
+    options.checkpoint = folder / "checkpoint";
+    ASSERT_EQ(design_stopped_at(7, options).status, Status::kInterrupted);
+    options.resume = true;
+    Checkpoint changed = read_checkpoint(options.checkpoint);
+    // A rim that bulges: there is no surface beside it.
+    changed.mesh.vertices(1, changed.mesh.vertices.cols() - 2) += 0.1;
+    write_checkpoint(changed, options.checkpoint);
+    EXPECT_THAT(message_of<InputError>([&] { design(options); }), HasSubstr("surface of no lens"));
+  }
+}
+
 TEST(DesignLens, StoppedSoonAfterTransportItKeepsTheBetterSurfaceBefore) {
   const TempFolder folder;
   DesignOptions options = small_options();

@@ -29,6 +29,7 @@ struct Command {
   Stream err = Stream::kUsual;
   unsigned long file_size_limit = 0;  ///< RLIMIT_FSIZE, bytes; 0: kMaxFile.
   bool exec = false;                  ///< Starts the built command instead of forking it.
+  bool json_by_config = false;        ///< A --config file asks for JSON.
 };
 
 /// Address space of a command.

@@ -77,7 +77,8 @@ bool shows_json(const Command& command, const Ending& ending) {
   for (const char* other : {"--help", "-h", "--version", "--show-workshop"}) {
     if (ending.exit_code == 0 && has_option(command, other)) return false;
   }
-  return has_option(command, "--json") && command.out == Stream::kUsual;
+  const bool asked = command.json_by_config || has_option(command, "--json");
+  return asked && command.out == Stream::kUsual;
 }
 
 void check_text(const std::string& where, const std::string& text, Texts& wrong) {

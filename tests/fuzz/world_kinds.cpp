@@ -2,6 +2,7 @@
 // Names, descriptors, disks, signals and neighbours.
 #include <sys/stat.h>
 
+#include "app/frame/option_set.h"
 #include "fuzz/scene.h"
 
 namespace lensforge::fuzz {
@@ -226,7 +227,8 @@ void config(Scene& scene) {
   std::string text = mutated_text(scene.base.bytes("config.toml"), scene.random);
   if (scene.random.one_in(3)) text = "threads = " + hostile_number(scene.random) + "\n";
   scene.write("config.toml", text);
-  scene.run(CommandLine(line).set("--config", "config.toml"));
+  Command& command = scene.run(CommandLine(line).set("--config", "config.toml"));
+  command.json_by_config = app::config_asks_for_json(scene.at("config.toml"));
 }
 
 void descriptors(Scene& scene) {
