@@ -160,7 +160,7 @@ TEST(DesignLens, ACheckpointWhoseSurfaceIsNoLensesIsRefused) {
     DesignOptions options = two_level_options();
     options.model = model;
     options.checkpoint = folder / "checkpoint";
-    ASSERT_EQ(design_stopped_at(7, options).status, Status::kInterrupted);
+    ASSERT_EQ(design_stopped_at(2, options).status, Status::kInterrupted);
     options.resume = true;
     Checkpoint changed = read_checkpoint(options.checkpoint);
     // A rim that bulges: there is no surface beside it.
