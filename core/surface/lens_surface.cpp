@@ -14,8 +14,8 @@
 namespace lensforge {
 namespace {
 
-/// How far the surface's rim may be from the lens's, share of the lens's larger side: a design
-/// keeps its rim to the last bits of a double, other programs to those of a float (6e-8).
+/// Maximum distance of the surface's rim from the lens's, share of the lens's larger side: a design
+/// keeps its rim to double precision, other programs to single (6e-8).
 constexpr double kRimShare = 1e-4;
 
 std::optional<std::string> extent_fault(const SurfaceMesh& mesh, const Eigen::Vector2d& size) {
@@ -30,8 +30,8 @@ std::optional<std::string> extent_fault(const SurfaceMesh& mesh, const Eigen::Ve
   return std::nullopt;
 }
 
-/// The cell of a grid that a triangle lies in and the corner of it that it leaves out; −1 if it is
-/// no half of a cell.
+/// A triangle's grid cell and the corner of the cell that it leaves out; −1 if it is not half of a
+/// cell.
 struct HalfCell {
   std::int64_t cell = -1;
   std::size_t left_out = 0;  ///< 0, 1 lower left and right, 2, 3 upper left and right.

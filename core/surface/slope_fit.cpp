@@ -21,7 +21,7 @@
 namespace lensforge {
 namespace {
 
-/// Samples a knot cell each way: three to eight give pictures whose MAE differ by 0.0001.
+/// Samples per knot cell each way: with three to eight the MAE of pictures differs by 0.0001.
 constexpr int kSamples = 4;
 
 /// Heights weigh as much as slopes for waves of this many mesh cells. Heights and normals of a
@@ -30,7 +30,7 @@ constexpr int kSamples = 4;
 /// it is the same.
 constexpr double kHeightReach = 16.0;
 
-/// Least share of its even area to which the parameters' map may squeeze a place.
+/// Minimum local area of the parameters' map, as a share of the even area.
 constexpr double kMinArea = 1e-3;
 
 AxisSamples make_axis(int cells, double length) {
@@ -78,7 +78,7 @@ SlopeFit::SlopeFit(const SmoothSurface& surface, const GridWarp& warp,
       areas_(area_moments()),
       height_weight_(std::pow(kHeightReach * mesh_cell(surface), -2.0)) {}
 
-/// As much of the vertices' movement as can be followed without a fold.
+/// The plan that follows the largest share of the vertices' movement without a fold.
 SplinePlan SlopeFit::make_plan(const GridWarp& warp, double most_share) const {
   for (double share = most_share; share > 0.0; share -= 0.25) {
     SplinePlan plan = warp.control_points(grid_.u.cells, grid_.v.cells, share);
@@ -87,7 +87,7 @@ SplinePlan SlopeFit::make_plan(const GridWarp& warp, double most_share) const {
   return warp.control_points(grid_.u.cells, grid_.v.cells, 0.0);
 }
 
-/// Over all samples.
+/// Minimum area over all samples.
 double SlopeFit::least_area(const SplinePlan& plan) const {
   Eigen::VectorXd least(grid_.u.values.rows());
   parallel_for(executor_, "spline plan", least.size(), [&](std::int64_t i) {
@@ -121,7 +121,7 @@ Eigen::MatrixXd SlopeFit::solve() const {
   return heights.array() + missing / areas_.sum();
 }
 
-/// Of the samples' areas: what a height says of the volume.
+/// Moments of the samples' areas: derivatives of the volume by the heights.
 Eigen::MatrixXd SlopeFit::area_moments() const {
   return grid_.moments(executor_, [&](std::int64_t i) {
     const PlanLine line = grid_.plan_line(plan_, i);
