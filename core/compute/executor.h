@@ -77,7 +77,7 @@ class Executor {
   [[nodiscard]] KernelProfile* profile() const { return profile_; }
   [[nodiscard]] const std::stop_token& stop_token() const { return stop_; }
 
-  /// Upper bound of the worker numbers handed to kernels: workers are 0 … concurrency() − 1.
+  /// Number of workers; kernels get worker numbers 0 … concurrency() − 1.
   [[nodiscard]] int concurrency() const;
 
   using Chunk = void (*)(const void* body, std::int64_t begin, std::int64_t end, int worker);

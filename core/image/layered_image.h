@@ -36,9 +36,8 @@ class LayeredImage {
 /// Writes losslessly compressed 32-bit floats; whole or not at all. @throw RunError
 void write_layers(const LayeredImage& image, const std::filesystem::path& path);
 
-/// @throw InputError if the file is missing, no EXR file, larger than kMaxImageSide a side, or
-/// holds
-///        a value that is not finite; the message names the file.
+/// @throw InputError if the file is missing, no EXR file, larger than kMaxImageSide per side, or
+///        holds a value that is not finite; the message names the file.
 LayeredImage read_layers(const std::filesystem::path& path);
 
 }  // namespace lensforge

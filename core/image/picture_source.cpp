@@ -58,7 +58,7 @@ std::string reason(const OIIO::ImageInput& input) {
   return ": " + printable_line(text, kLongestReason);
 }
 
-/// What of a look at the bytes a format's own check adds to.
+/// Arguments of a format's own check of the bytes.
 struct Checked {
   const fs::path& path;
   std::istream& file;

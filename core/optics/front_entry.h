@@ -31,7 +31,7 @@ struct FrontRefraction {
   Eigen::Vector2d gradient{0.0, 0.0};  ///< ∇h
   Eigen::Vector3d b_by_x{0.0, 0.0, 0.0};
   Eigen::Vector3d b_by_y{0.0, 0.0, 0.0};
-  bool lit = false;  ///< False where the light comes from the other side.
+  bool lit = false;  ///< False if the light comes from the other side.
 
   FrontRefraction() = default;
   LF_HD FrontRefraction(const FrontSurface& front, const FrontLight& light,

@@ -211,7 +211,7 @@ class LightSource {
   double scale_;          ///< mm² per steradian; negative if triangles are seen from above.
   double lambertian_;     ///< 1 of a flat source, 0 of an even one.
   Kind kind_;
-  FrontSurface front_;  ///< Of a lens with a curved one.
+  FrontSurface front_;  ///< The lens's front, if curved.
 };
 
 }  // namespace lensforge

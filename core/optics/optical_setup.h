@@ -46,7 +46,7 @@ struct OpticalSetup {
   /// Entry face of a lens; none: the plane z = 0.
   std::optional<Front> front;
   SourceExtent extent;  ///< For either kind of source; LightPath treats it as a point.
-  Spectrum spectrum;    ///< Of the light through a lens; LightPath uses ior for all of it.
+  Spectrum spectrum;    ///< Light through a lens; LightPath uses ior for all of it.
   /// True: light that a lens's faces reflect is missing behind them; steeper faces transmit less.
   bool fresnel = false;
   double ior = 1.49;                        ///< Refractive index of the lens against air, > 1.
@@ -73,10 +73,11 @@ struct OpticalSetup {
 };
 
 /// @throw InputError naming the field, its value and the rule, unless ior > 1, all sizes, the focal
-/// length and the pixel counts are positive, the light comes from the right side, the screen's
-/// vectors are of length 1, at a right angle and turn it by less than a right angle, a spherical
-/// front's radius is longer than half of the lens's diagonal, a height map spans the lens's
-/// rectangle, an outline is one closed line inside of that rectangle, and everything is finite.
+///        length and the pixel counts are positive, the light comes from the right side, the
+///        screen's vectors are of length 1, at a right angle and turn it by less than a right
+///        angle, a spherical front's radius is longer than half of the lens's diagonal, a height
+///        map spans the lens's rectangle, an outline is one closed line inside that rectangle, and
+///        everything is finite.
 void validate(const OpticalSetup& setup);
 
 }  // namespace lensforge

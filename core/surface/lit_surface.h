@@ -9,7 +9,7 @@ namespace lensforge {
 
 /// The light on a surface, with flux as a share of this surface's intake: a higher rim takes in
 /// less of a diverging beam, but the picture keeps its total.
-/// @pre the mesh has no triangles outside of setup.outline.
+/// @pre the mesh has no triangles outside setup.outline.
 LightPath light_on(const SurfaceMesh& mesh, const OpticalSetup& setup);
 
 /// The same for a mesh that extends beyond the outline.

@@ -75,8 +75,7 @@ SurfaceMesh read_binary(std::string_view content) {
   CornerMerger merger;
   for (std::size_t at = kHeadBytes; at < content.size(); at += kTriangleBytes) {
     std::array<Point, 3> corners{};
-    std::memcpy(&corners, content.data() + at + sizeof(Point),
-                sizeof corners);  // Past the normal.
+    std::memcpy(&corners, content.data() + at + sizeof(Point), sizeof corners);  // Past the normal.
     merger.add_triangle(corners);
   }
   return merger.mesh();

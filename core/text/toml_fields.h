@@ -28,12 +28,12 @@ struct TomlSource {
   std::string kind;  ///< With its article: "a register map".
 };
 
-/// @throw InputError naming file and line if `text` is not TOML, has more than 1 MiB, a key of more
-/// than 32 parts or brackets more than 32 deep.
+/// @throw InputError naming file and line if `text` is not TOML, exceeds 1 MiB, or has a key of
+///        more than 32 parts or brackets nested more than 32 deep.
 toml::table parse_toml(std::string_view text, const std::string& file);
 
 /// The text of a small file. @throw InputError naming the file and why it cannot be read, or that
-/// it has more than 1 MiB.
+/// it exceeds 1 MiB.
 std::string read_toml_file(const std::filesystem::path& path, const std::string& kind);
 
 /// A table of a TOML document, read strictly: every getter records its key, and finish() refuses
