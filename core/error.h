@@ -19,7 +19,7 @@ class RunError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// The caller asked for an end (RunControl) and the work was dropped where it stood.
+/// The caller requested a stop (RunControl) and the work was abandoned.
 class Interrupted : public std::runtime_error {
  public:
   Interrupted() : std::runtime_error("interrupted") {}
@@ -31,6 +31,6 @@ class Interrupted : public std::runtime_error {
 
 }  // namespace lensforge
 
-/// Aborts with the condition and `values` (anything std::string can be made of) if it is false.
+/// Aborts with the condition and `values` (anything convertible to std::string) if it is false.
 #define LF_CHECK(condition, values) \
   ((condition) ? (void)0 : ::lensforge::check_failed(#condition, __FILE__, __LINE__, (values)))

@@ -5,8 +5,8 @@
 
 namespace lensforge {
 
-/// min(max(x, low), high), low for a NaN. What the standard says of std::fmin() and std::fmax() and
-/// NaN makes each a call; these are two instructions.
+/// min(max(x, low), high), low for a NaN. std::fmin() and std::fmax() compile to calls because of
+/// their NaN rules; this compiles to two instructions.
 LF_HD LF_INLINE double clamped(double x, double low, double high) {
   const double raised = x > low ? x : low;
   return raised < high ? raised : high;

@@ -41,7 +41,7 @@ Executor Executor::serial() { return {}; }
 
 Executor Executor::cpu(int threads) {
   Executor executor;
-  // TBB warns on the terminal of more than it has workers for, and would not start them.
+  // TBB does not start more threads than it has workers; it prints a warning instead.
   const int most = tbb::info::default_concurrency();
   executor.arena_ = std::make_shared<Arena>(threads > 0 ? std::min(threads, most) : most);
   return executor;

@@ -32,52 +32,52 @@ class KernelProfile {
   std::map<std::string, Entry> entries_;
 };
 
-/// What renders and optimises: this processor, a GPU, or all processes that mpirun has started.
+/// The device that renders and optimises: this CPU, a GPU, or all processes started by mpirun.
 enum class Device { kCpu, kCuda, kRanks };
 
-/// A sum that is read later, so that an executor with its own memory need not be waited for.
+/// A sum that is read later, so nobody waits for an executor with its own memory.
 template <std::size_t N>
 struct FinishedSum {
   std::array<double, N> value{};
   [[nodiscard]] const std::array<double, N>& get() const { return value; }
 };
 
-/// Where kernels run. A small value that is passed down; copies share the same thread arena.
+/// Runs kernels. A small value to pass by copy; copies share one thread arena.
 ///
-/// Kernels written for any executor (`template <class Exec>`) use only what this one and the CUDA
-/// one (core/compute/cuda/cuda_executor.h) have in common: Buffer, PendingSum, concurrency(),
-/// parallel_for(), parallel_for_worker(), pending_sum(), scan_rows(), dot(), fill_zero(), upload()
-/// and download().
+/// Kernels written for any executor (`template <class Exec>`) use only what this class and
+/// CudaExecutor (core/compute/cuda/cuda_executor.h) have in common: Buffer, PendingSum,
+/// concurrency(), parallel_for(), parallel_for_worker(), pending_sum(), scan_rows(), dot(),
+/// fill_zero(), upload() and download().
 class Executor {
  public:
   /// Memory that its kernels read and write.
   template <class T>
   using Buffer = std::vector<T>;
-  /// Result of pending_sum(); zeros where nothing was summed.
+  /// Result of pending_sum(); zeros if nothing was summed.
   template <std::size_t N>
   using PendingSum = FinishedSum<N>;
 
   /// Runs everything in the calling thread, in index order.
   static Executor serial();
-  /// Runs on oneTBB with `threads` threads; 0 takes all that the process may use.
+  /// Runs on oneTBB with `threads` threads; 0 uses all that the process may use.
   static Executor cpu(int threads = 0);
 
   /// The same executor that also records the time of every kernel into `profile` (not owned).
   [[nodiscard]] Executor with_profile(KernelProfile* profile) const;
 
   /// The same executor whose kernels end as soon as `stop` is requested: run() then throws
-  /// Interrupted, and what the kernel was to write is left half done.
+  /// Interrupted and the kernel's output is incomplete.
   [[nodiscard]] Executor with_stop(std::stop_token stop) const;
 
-  /// The same executor that asks the stages which can do so to work on `device`. Kernels handed to
-  /// this executor itself run on the CPU all the same.
+  /// The same executor with a request that stages which can do so work on `device`. Kernels that
+  /// this executor runs itself still run on the CPU.
   [[nodiscard]] Executor with_device(Device device) const;
   [[nodiscard]] Device device() const { return device_; }
 
   [[nodiscard]] KernelProfile* profile() const { return profile_; }
   [[nodiscard]] const std::stop_token& stop_token() const { return stop_; }
 
-  /// Upper bound of the worker numbers handed to kernels: workers are 0 … concurrency() − 1.
+  /// Number of workers; kernels get worker numbers 0 … concurrency() − 1.
   [[nodiscard]] int concurrency() const;
 
   using Chunk = void (*)(const void* body, std::int64_t begin, std::int64_t end, int worker);
@@ -94,11 +94,11 @@ class Executor {
   Device device_ = Device::kCpu;
 };
 
-/// Items that one task handles at least: below this the scheduling costs more than the work.
+/// Minimum number of items per task: with fewer, scheduling costs more than the work.
 inline constexpr std::int64_t kDefaultGrain = 1024;
 
-/// Calls `functor(i)` for i in 0 … count − 1. Calls may run at the same time and in any order, so
-/// they must not write to the same place; then the result does not depend on the thread count.
+/// Calls `functor(i)` for i in 0 … count − 1. Calls may run at the same time and in any order and
+/// must not write to the same memory; the result then does not depend on the thread count.
 template <class Functor>
 void parallel_for(const Executor& executor, const char* kernel, std::int64_t count,
                   const Functor& functor, std::int64_t grain = kDefaultGrain) {
@@ -111,8 +111,8 @@ void parallel_for(const Executor& executor, const char* kernel, std::int64_t cou
       &functor);
 }
 
-/// parallel_for() whose functor is also told which worker calls it, `functor(i, worker)`; calls of
-/// one worker do not run at the same time.
+/// parallel_for() with the worker's number as second argument, `functor(i, worker)`. Calls of one
+/// worker never overlap.
 template <class Functor>
 void parallel_for_worker(const Executor& executor, const char* kernel, std::int64_t count,
                          const Functor& functor, std::int64_t grain = kDefaultGrain) {
@@ -150,14 +150,14 @@ std::array<double, N> parallel_sum(const Executor& executor, const char* kernel,
   return total;
 }
 
-/// parallel_sum() whose result `.get()` gives.
+/// parallel_sum() whose result is read with `.get()`.
 template <std::size_t N, class Functor>
 FinishedSum<N> pending_sum(const Executor& executor, const char* kernel, std::int64_t count,
                            const Functor& functor) {
   return {parallel_sum<N>(executor, kernel, count, functor)};
 }
 
-/// Rows that one task of scan_rows() handles at least.
+/// Minimum number of rows per task of scan_rows().
 inline constexpr std::int64_t kRowGrain = 16;
 
 /// Running sums along rows: in every row r calls `scan.store(r, c, sum)` with the sum of
@@ -175,7 +175,7 @@ void scan_rows(const Executor& executor, const char* kernel, std::int64_t rows, 
   parallel_for(executor, kernel, rows, scan_row, kRowGrain);
 }
 
-/// Entries that dot() multiplies as one block; its blocks are added in order.
+/// Entries per block of dot(); blocks are added in order.
 inline constexpr std::int64_t kDotBlock = 16384;
 
 /// Scalar product, in fixed order.

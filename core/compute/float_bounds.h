@@ -6,7 +6,7 @@
 
 namespace lensforge {
 
-/// A float below a double, so that boxes of floats hold what boxes of doubles do.
+/// A float below a double, so that a box of floats contains the box of doubles.
 inline float float_below(double value) {
   return std::nextafter(static_cast<float>(value), -std::numeric_limits<float>::infinity());
 }

@@ -5,11 +5,11 @@
 
 namespace lensforge {
 
-/// The GPU that Device::kCuda stands for: the first one.
+/// The GPU used for Device::kCuda: the first one.
 struct Gpu {
   bool usable = false;
-  std::string name;    ///< As its maker calls it.
-  std::string reason;  ///< Why it is not usable, to be read after a colon.
+  std::string name;    ///< The maker's name for it.
+  std::string reason;  ///< Why it is not usable, to follow a colon.
 };
 
 Gpu find_gpu();

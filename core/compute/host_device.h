@@ -8,16 +8,15 @@
 #define LF_HD
 #endif
 
-/// Marks a function that is to be part of its caller, so that what the caller does not use of it is
-/// not computed.
+/// Forces a function inline, so that results its caller does not use are not computed.
 #if defined(__CUDACC__)
 #define LF_INLINE __forceinline__
 #else
 #define LF_INLINE [[gnu::always_inline]] inline
 #endif
 
-/// Keeps a function out of its callers, so that light which never calls it does not pay for its
-/// registers: of parallel light 4 % of an objective.
+/// Keeps a function out of line, so that light which never calls it does not pay for its registers
+/// (4 % of an objective for parallel light).
 #if defined(__CUDACC__)
 #define LF_APART
 #else

@@ -8,14 +8,14 @@
 
 namespace lensforge {
 
-/// An array of the caller's that kernels read: a copy in the executor's memory, which is kept for
+/// Copy of a caller's array in the executor's memory, for kernels to read. The memory is kept for
 /// the next array.
 template <class T, class Exec>
 class KernelInput {
  public:
   void send(const Exec& executor, std::span<const T> values) {
     if (buffer_.size() < values.size()) {
-      buffer_ = {};  // The old memory first.
+      buffer_ = {};  // Frees the old memory first.
       buffer_ = Buffer(values.size() + values.size() / kSlack);
     }
     upload(executor, values, std::span<T>(buffer_.data(), values.size()));
@@ -29,7 +29,7 @@ class KernelInput {
   Buffer buffer_;
 };
 
-/// On the CPU the array itself, which must stay where it is as long as kernels read it.
+/// On the CPU it is the array itself, which must outlive the kernels that read it.
 template <class T>
 class KernelInput<T, Executor> {
  public:

@@ -16,7 +16,7 @@ constexpr std::uint64_t mixed_bits(std::uint64_t z) {
   return z ^ (z >> 31U);
 }
 
-/// The upper 53 bits as a number in 0 … 1, 1 not included.
+/// The upper 53 bits as a number in [0, 1).
 constexpr double unit_share(std::uint64_t bits) {
   return static_cast<double>(bits >> 11U) * 0x1p-53;
 }

@@ -23,7 +23,7 @@ struct Unit {
   const char* name;
 };
 
-/// Two significant digits in the largest unit of which it has one.
+/// Two significant digits in the largest unit not above the value.
 template <std::size_t N>
 std::string in_units(double value, const std::array<Unit, N>& units) {
   const auto fits = [&](const Unit& unit) { return value >= unit.size; };
@@ -87,7 +87,7 @@ double free_disk_bytes(const fs::path& folder) {
 
 void require_room(const WorkEstimate& estimate, const fs::path& folder, const std::string& what,
                   const std::string& advice) {
-  // Comparisons are written so that a NaN is refused as well.
+  // Comparisons are written to refuse NaN as well.
   const double memory = free_memory_bytes();
   if (!(estimate.memory_bytes <= memory)) {
     refuse(what, estimate.memory_bytes, "of memory", memory, advice);
@@ -98,7 +98,7 @@ void require_room(const WorkEstimate& estimate, const fs::path& folder, const st
 
 std::int64_t largest_with_room(const std::function<WorkEstimate(double)>& work, double wanted,
                                const fs::path& folder) {
-  constexpr double kShare = 0.8;  // Others need some, too.
+  constexpr double kShare = 0.8;  // Leaves some for other processes.
   const double memory = kShare * free_memory_bytes();
   const double disk = kShare * free_disk_bytes(folder);
   double fits = 0.0;

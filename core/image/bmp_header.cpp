@@ -9,7 +9,7 @@
 namespace lensforge {
 namespace {
 
-/// The file header, before the picture's, and the longest of these.
+/// Bytes of the file header and of the longest picture header after it.
 constexpr std::size_t kFileHeader = 14;
 constexpr std::size_t kLongestHeader = 124;
 constexpr std::uint32_t kCoreHeader = 12;
@@ -17,10 +17,10 @@ constexpr std::uint32_t kOs2Header = 64;
 constexpr std::array<std::uint32_t, 8> kHeaders{kCoreHeader, 16,         40,  52,
                                                 56,          kOs2Header, 108, kLongestHeader};
 
-/// Where masks begin: in longer headers, and right behind BITMAPINFOHEADER.
+/// Offset of the masks: inside longer headers, or directly after BITMAPINFOHEADER.
 constexpr std::size_t kMasks = 54;
 
-/// Longest profile that is read; those of printers have 3 MB.
+/// Maximum size of a profile; printer profiles have 3 MB.
 constexpr std::uint32_t kMostProfileBytes = 1U << 24U;
 
 enum Compression : std::uint32_t {
@@ -35,7 +35,7 @@ enum Compression : std::uint32_t {
 
 constexpr const char* kTruncated = "its BMP data end within the header";
 
-/// The first bytes of the file; 0 for what is not there.
+/// The first bytes of the file; 0 beyond its end.
 class FirstBytes {
  public:
   explicit FirstBytes(std::istream& file) {
@@ -63,7 +63,7 @@ void require(bool holds, const std::string& problem) {
   if (!holds) throw BmpProblem(problem);
 }
 
-/// Which compression goes with which bits a pixel.
+/// True if the compression is valid with so many bits per pixel.
 bool fit(std::uint32_t compression, int bits) {
   switch (compression) {
     case kRgb:
@@ -87,7 +87,7 @@ void require_compression(std::uint32_t compression, std::uint32_t header, int bi
                                       " has no " + std::to_string(bits) + " bits a pixel");
 }
 
-/// The masks that hold where a file has none of its own.
+/// Default masks for a file without masks.
 std::array<std::uint32_t, 4> usual_masks(int bits) {
   if (bits == 16) return {0x7C00, 0x03E0, 0x001F, 0};
   return {0xFF0000, 0x00FF00, 0x0000FF, 0};
@@ -112,7 +112,7 @@ std::array<BmpMask, 4> read_masks(const FirstBytes& bytes, std::uint32_t header,
   return result;
 }
 
-/// Reads so many bytes from a place. @throw BmpProblem if the file has fewer.
+/// Reads `count` bytes at an offset. @throw BmpProblem if the file has fewer.
 std::string read_at(std::istream& file, std::uint64_t place, std::size_t count) {
   std::string bytes(count, '\0');
   file.seekg(static_cast<std::streamoff>(place));
@@ -121,7 +121,7 @@ std::string read_at(std::istream& file, std::uint64_t place, std::size_t count) 
   return bytes;
 }
 
-/// @param entry  bytes of a colour: blue, green, red and perhaps one more.
+/// @param entry  bytes per colour: blue, green, red and possibly one more.
 std::vector<std::array<std::uint8_t, 3>> palette_of(const std::string& bytes, std::size_t entry) {
   std::vector<std::array<std::uint8_t, 3>> palette;
   for (std::size_t at = 0; at + entry <= bytes.size(); at += entry) {
@@ -131,7 +131,7 @@ std::vector<std::array<std::uint8_t, 3>> palette_of(const std::string& bytes, st
   return palette;
 }
 
-/// The palette, and where the pixels begin.
+/// Reads the palette and the offset of the pixels.
 void read_colors(std::istream& file, const FirstBytes& bytes, std::uint32_t compression,
                  BmpHeader& bmp) {
   const std::uint32_t header = bytes.number(kFileHeader);
@@ -153,7 +153,7 @@ void read_colors(std::istream& file, const FirstBytes& bytes, std::uint32_t comp
   bmp.pixels_at = std::max(pixels, at + entry * colors);
 }
 
-/// The profile that BITMAPV5HEADER points at.
+/// The profile referred to by BITMAPV5HEADER.
 std::string profile_of(std::istream& file, const FirstBytes& bytes) {
   constexpr std::uint32_t kEmbedded = 0x4D424544;  // 'MBED'
   if (bytes.number(kFileHeader) < kLongestHeader) return {};

@@ -10,7 +10,7 @@
 
 namespace lensforge {
 
-/// Why a BMP picture is not read, as the end of a sentence.
+/// Reason for refusing a BMP picture, worded as the end of a sentence.
 class BmpProblem : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -19,7 +19,7 @@ class BmpProblem : public std::runtime_error {
 /// The bits of a pixel that hold one channel.
 struct BmpMask {
   unsigned shift = 0;
-  unsigned bits = 0;  ///< 0: the picture has no such channel.
+  unsigned bits = 0;  ///< 0: no such channel.
 
   /// @throw BmpProblem if the bits are not side by side.
   static BmpMask of(std::uint32_t mask);
@@ -31,17 +31,17 @@ struct BmpMask {
 
 enum class BmpPacking { kNone, kRunsOfBytes, kRunsOfNibbles };
 
-/// What comes before the pixels of a BMP picture.
+/// Everything before the pixels of a BMP picture.
 struct BmpHeader {
   int columns = 0;
   int rows = 0;
   bool top_down = false;
-  int bits = 0;  ///< Of a pixel: 1, 4, 8 with a palette; 16, 24, 32 with masks.
+  int bits = 0;  ///< Per pixel: 1, 4, 8 with a palette; 16, 24, 32 with masks.
   BmpPacking packing = BmpPacking::kNone;
   std::vector<std::array<std::uint8_t, 3>> palette;  ///< Red, green, blue.
   std::array<BmpMask, 4> masks;                      ///< Red, green, blue, alpha.
   std::string profile;                               ///< ICC, embedded; empty without one.
-  std::uint64_t pixels_at = 0;                       ///< Byte of the file.
+  std::uint64_t pixels_at = 0;                       ///< Offset in the file.
 };
 
 /// Reads BITMAPCOREHEADER, BITMAPINFOHEADER with and without masks, BITMAPV4HEADER,

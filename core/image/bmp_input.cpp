@@ -19,8 +19,8 @@ namespace {
 
 constexpr const char* kTruncated = "its BMP data end before its pixels";
 
-/// Unpacks runs into palette indices, row by row in the order of the file. What is skipped keeps
-/// the palette's first colour.
+/// Unpacks runs into palette indices, row by row in the order of the file. Skipped pixels keep the
+/// palette's first colour.
 class RunDecoder {
  public:
   RunDecoder(const BmpHeader& bmp, std::string_view packed)
@@ -153,7 +153,7 @@ class BmpInput final : public OIIO::ImageInput {
     }
   }
 
-  /// Masks of eight bits give bytes; others are scaled to sixteen.
+  /// True if all masks have eight bits, which give bytes; others are scaled to sixteen.
   static bool has_bytes(const BmpHeader& bmp) {
     return std::all_of(bmp.masks.begin(), bmp.masks.end(),
                        [](const BmpMask& mask) { return mask.bits == 0 || mask.bits == 8; });
@@ -172,7 +172,7 @@ class BmpInput final : public OIIO::ImageInput {
     return spec;
   }
 
-  /// Bytes of a row, and of a row with what fills it up to a multiple of four.
+  /// Bytes of a row, and of a row padded to a multiple of four.
   [[nodiscard]] std::size_t row_bytes() const {
     return (static_cast<std::size_t>(bmp_.columns) * static_cast<std::size_t>(bmp_.bits) + 7) / 8;
   }
@@ -253,8 +253,8 @@ class BmpInput final : public OIIO::ImageInput {
 
   std::ifstream file_;
   BmpHeader bmp_;
-  std::vector<std::uint8_t> indices_;  ///< Of runs, in the order of the file.
-  std::string row_;                    ///< Its bytes.
+  std::vector<std::uint8_t> indices_;  ///< Unpacked runs, in the order of the file.
+  std::string row_;                    ///< Bytes of the row.
 };
 
 }  // namespace

@@ -7,8 +7,9 @@
 
 namespace lensforge {
 
-/// A reader of BMP pictures: 1 to 32 bits a pixel, palettes, channel masks, run-length encoding,
-/// either order of rows. OpenImageIO's own (2.4) takes no heed of masks and knows no runs.
+/// Returns a reader of BMP pictures: 1 to 32 bits per pixel, palettes, channel masks, run-length
+/// encoding, either order of rows. OpenImageIO's own (2.4) ignores masks and does not support
+/// run-length encoding.
 std::unique_ptr<OIIO::ImageInput> make_bmp_input();
 
 }  // namespace lensforge

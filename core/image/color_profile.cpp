@@ -15,8 +15,8 @@ namespace {
 using Bytes = std::span<const unsigned char>;
 using Handle = std::unique_ptr<void, decltype(&cmsCloseProfile)>;
 
-/// Largest difference from sRGB, display-encoded. Half a step of eight bits: the tables of common
-/// sRGB profiles are right to a tenth of that; a gamma of 2.2 is off by fifteen times as much.
+/// Largest difference from sRGB, display-encoded. Half a step of eight bits: common sRGB profiles
+/// differ by a tenth of it, a gamma of 2.2 by fifteen times as much.
 constexpr double kSameAsSrgb = 0.5 / 255.0;
 
 Handle opened(Bytes bytes) {
@@ -24,7 +24,7 @@ Handle opened(Bytes bytes) {
           cmsCloseProfile};
 }
 
-/// Light by Rec. 709's primaries, as the rest of the program has it.
+/// Linear light with Rec. 709 primaries, as in the rest of the program.
 Handle linear_rec709() {
   const cmsCIExyY white{0.3127, 0.3290, 1.0};
   const cmsCIExyYTRIPLE primaries{{0.64, 0.33, 1.0}, {0.30, 0.60, 1.0}, {0.15, 0.06, 1.0}};
@@ -39,7 +39,7 @@ Handle linear_rec709() {
 struct ColorProfile::Transform {
   std::unique_ptr<void, decltype(&cmsDeleteTransform)> transform{nullptr, cmsDeleteTransform};
   bool is_grey = false;
-  bool has_curves = false;  ///< And primaries: the light of the channels adds up.
+  bool has_curves = false;  ///< Curves and primaries: the channels' light adds up.
 };
 
 ColorProfile::ColorProfile(std::shared_ptr<const Transform> transform)

@@ -11,27 +11,27 @@
 
 namespace lensforge {
 
-/// An embedded colour profile (ICC.1:2022) of grey or of red, green and blue: how stored values
-/// encode light. Its white is 1; other whites than D65 are adapted, as a viewer's eyes do.
+/// An embedded grey or RGB colour profile (ICC.1:2022): maps stored values to light. Its white is
+/// 1; whites other than D65 are adapted.
 class ColorProfile {
  public:
-  /// Nothing if the profile is broken or of other colours.
+  /// Returns nothing if the profile is broken or for other colours.
   static std::optional<ColorProfile> open(std::span<const unsigned char> bytes);
 
-  /// Colours that the profile is of: "grey", "RGB", "CMYK", …; empty if it is broken.
+  /// The profile's colours: "grey", "RGB", "CMYK", …; empty if it is broken.
   static std::string colors_of(std::span<const unsigned char> bytes);
-  /// What the profile calls itself; empty if it does not, or is broken.
+  /// The profile's name; empty if it has none or is broken.
   static std::string name_of(std::span<const unsigned char> bytes);
 
-  /// Whether it says, to the rounding of eight bits, what sRGB says.
+  /// True if it equals sRGB to the rounding of eight bits.
   [[nodiscard]] bool is_srgb() const;
 
-  /// The luminance of stored values, linear. @param stored  one value of a grey profile, three of
-  /// another; equal ones for grey.
+  /// The luminance of stored values, linear. @param stored  one value for a grey profile, three for
+  /// RGB (equal for grey).
   [[nodiscard]] double light(const std::array<double, 3>& stored) const;
 
-  /// light() of values that are whole numbers in 0 … `most`, of a profile with curves and primaries
-  /// looked up in a table.
+  /// Prepares light() for whole values in 0 … `most`: a profile with curves and primaries then uses
+  /// tables.
   void tabulate(int most);
 
  private:

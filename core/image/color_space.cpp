@@ -15,7 +15,7 @@ namespace {
 
 using Curve = ColorSpace::Curve;
 
-/// ITU-R BT.709-6, item 1.2, solved for the light.
+/// ITU-R BT.709-6, item 1.2, inverted.
 double decode_rec709(double stored) {
   return stored < 0.081 ? stored / 4.5 : std::pow((stored + 0.099) / 1.099, 1.0 / 0.45);
 }

@@ -6,7 +6,7 @@
 
 namespace lensforge {
 
-/// How the numbers in a picture file encode light.
+/// Encoding of light by the numbers in a picture file.
 struct ColorSpace {
   enum class Curve { kLinear, kSrgb, kRec709, kGamma };
   Curve curve = Curve::kSrgb;

@@ -16,8 +16,8 @@ namespace {
 
 using Color = std::array<unsigned char, 3>;
 
-constexpr int kShorterSide = 256;  ///< Below it the labels could not be read.
-constexpr int kLongerSide = 4096;  ///< Enlarging stops here.
+constexpr int kShorterSide = 256;  ///< Below it the labels are illegible.
+constexpr int kLongerSide = 4096;  ///< Maximum after enlarging.
 constexpr double kSmallestScale = 1e-3;
 constexpr double kPercentile = 0.995;
 constexpr int kTicks = 5;
@@ -33,7 +33,7 @@ constexpr int kLegendWidth =
 constexpr Color kPaper{255, 255, 255};
 constexpr Color kInk{0, 0, 0};
 
-/// A canvas of one colour with the few drawing steps that are needed.
+/// A canvas with the few drawing functions needed here.
 class Canvas {
  public:
   Canvas(int columns, int rows, const Color& fill) {
@@ -64,8 +64,8 @@ class Canvas {
   ColorImage image_;
 };
 
-/// Rows of a 3 × 5 glyph, the leftmost dot in the highest of three bits. No font file can be
-/// counted on to be installed, and these are all the characters that a scale needs.
+/// Rows of a 3 × 5 glyph, the leftmost dot in the highest of three bits. A font file may not be
+/// installed, and a scale needs only these characters.
 std::array<int, kGlyphRows> glyph(char character) {
   static constexpr std::array<std::array<int, kGlyphRows>, 10> kDigits{{{7, 5, 5, 5, 7},
                                                                         {2, 6, 2, 2, 7},

@@ -9,7 +9,7 @@
 namespace lensforge {
 
 /// Heights on a grid whose outermost samples lie on a rectangle's edges, mm: row by row from the
-/// greatest y, each from the least x, as one sees the rectangle from +z.
+/// greatest y, each from the least x (the view from +z).
 struct HeightGrid {
   int columns = 0;
   int rows = 0;
@@ -18,15 +18,16 @@ struct HeightGrid {
   friend bool operator==(const HeightGrid&, const HeightGrid&) = default;
 };
 
-/// Samples each way of a grid that is read. A cubic needs four; 4096 on 100 mm are as fine as the
-/// step that no cutter follows.
+/// Minimum and maximum samples each way of a grid to read. A cubic needs four; 4096 on 100 mm are
+/// finer than any cutter follows.
 inline constexpr int kMinHeightSamples = 4;
 inline constexpr int kMaxHeightSamples = 4096;
 
-/// Reads the first channel of a picture of floats (EXR, PFM, TIFF), mm; of 64-bit ones rounded to
-/// 32 bits.
-/// @throw InputError naming the file if it is missing, no picture, of integers, has too few or too
-///        many samples or one that is not finite, or stands otherwise than it is stored.
+/// Reads the first channel of a picture of floats (EXR, PFM, TIFF), mm; 64-bit values are rounded
+/// to 32 bits.
+/// @throw InputError naming the file if it is missing, no picture or of integers, if it has too few
+///        or too many samples or one that is not finite, or if its display window or orientation
+///        differs from the stored data.
 HeightGrid read_heights(const std::filesystem::path& path, const RunControl& run = {});
 
 /// Writes an EXR file that read_heights() reads back to the bit; whole or not at all.

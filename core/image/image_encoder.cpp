@@ -13,7 +13,7 @@
 namespace lensforge {
 namespace {
 
-/// Rows that are encoded between two checks for a stop request; EXR packs 16 at a time.
+/// Rows encoded between two checks for a stop request; EXR packs 16 at a time.
 constexpr int kRowsAtOnce = 64;
 
 void write_rows(OIIO::ImageOutput& output, const OIIO::ImageSpec& spec, const EncodedRows& rows,

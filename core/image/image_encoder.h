@@ -11,11 +11,11 @@
 
 namespace lensforge {
 
-/// Gives the pixels of some rows as a file of a format wants them.
+/// Returns the pixels of rows first … end − 1 in the layout of the file format.
 using EncodedRows = std::function<const void*(int first, int end)>;
 
-/// The bytes of a picture file that bears the program's mark.
-/// @param what       what to name in messages. @param extension  ".png", ".exr".
+/// The bytes of a picture file with the program's mark.
+/// @param what       name for messages. @param extension  ".png", ".exr".
 /// @throw RunError if it cannot be encoded; Interrupted.
 std::vector<unsigned char> encode_rows(const std::string& what, OIIO::ImageSpec spec,
                                        const std::string& extension, const EncodedRows& rows,

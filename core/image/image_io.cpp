@@ -15,7 +15,7 @@
 #include "core/text/lower_case.h"
 
 // Reading is in image_reader.cpp. Files are encoded in memory and written by write_whole_file(), so
-// that the system's own reason for a failure (disk full, ...) reaches the message.
+// that messages give the system's reason for a failure (disk full, ...).
 namespace lensforge {
 namespace {
 
@@ -62,7 +62,7 @@ void write_exr(const Image& image, const fs::path& path, const RunControl& contr
   spec.channelnames = {"Y"};
   spec.attribute("oiio:ColorSpace", "linear");
   spec.attribute("compression", "zip");
-  // Else OpenImageIO adds the time, and the same picture would give another file every second.
+  // Otherwise OpenImageIO adds the time, and equal pictures give different files.
   spec.attribute("DateTime", "");
   const auto rows = [&](int first, int) { return row_of(image, first); };
   write_bytes(path, encode_rows(path.string(), spec, ".exr", rows, control));

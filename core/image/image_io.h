@@ -11,36 +11,34 @@
 
 namespace lensforge {
 
-/// A picture as read, and in plain words everything that was changed to make it grey linear light
-/// ("colour turned to luminance (Rec. 709)", "transparency flattened onto black", …).
+/// A picture as read, and in plain words every change made to obtain grey linear light ("colour
+/// turned to luminance (Rec. 709)", "transparency flattened onto black", …).
 struct LoadedImage {
   Image image;
   std::vector<std::string> changes;
 };
 
-/// Longest side and largest pixel count that are read; beyond it the file is refused before its
-/// pixels are touched.
+/// Maximum side of a picture; a larger file is refused before its pixels are read.
 inline constexpr int kMaxImageSide = 16384;
 
-/// Pixels of a drawing's longer side where nothing asks for others; that of a working picture.
+/// Default pixels of a drawing's longer side: that of a working picture.
 inline constexpr int kDrawnSide = 256;
 
-/// Reads a PNG, JPEG, TIFF, EXR or another of the formats in kReadableFormats
-/// (picture_outline.h), whatever its name: any channel count and depth, decoded by the colour
-/// profile or space that the file declares, else sRGB for integers, linear for floats. Decoders run
-/// in a child process (picture_child.h).
-/// @param drawn_side  pixels of the longer side of an SVG file, which has none of its own
-///        (svg_drawing.h).
-/// @param background  what shows through where the picture is transparent.
+/// Reads a picture in any of kReadableFormats (picture_outline.h), whatever its name, with any
+/// channel count and depth. It is decoded by the colour profile or space that the file declares,
+/// otherwise as sRGB for integers and linear for floats. Decoders run in a child process
+/// (picture_child.h).
+/// @param drawn_side  pixels of the longer side for an SVG file (svg_drawing.h).
+/// @param background  colour behind transparent parts of the picture.
 /// @throw InputError if the file is missing, no regular file, truncated, no picture, larger than
-///        kMaxImageSide or than the memory, holds NaN, infinite or negative values (but for what
-///        kRingingShare allows), cannot be told from the background, or crashes its decoder; the
-///        message names the file. Interrupted, at most 0.1 s after the stop request.
+///        kMaxImageSide or the memory, holds NaN, infinite or negative values (except those that
+///        kRingingShare allows), is indistinguishable from the background, or crashes its decoder;
+///        the message names the file. Interrupted, at most 0.1 s after the stop request.
 LoadedImage read_image(const std::filesystem::path& path, const RunControl& run = {},
                        int drawn_side = kDrawnSide, const Background& background = {});
 
 /// Box-filter (area-weighted) resampling in linear light: the mean value is kept to 1e-6 relative.
-/// Reports rows of the result. @pre columns, rows ≥ 1. @throw Interrupted.
+/// Progress is reported in rows of the result. @pre columns, rows ≥ 1. @throw Interrupted.
 Image resample(const Image& image, int columns, int rows, const RunControl& run = {});
 
 /// Writes 16-bit sRGB-encoded grey PNG (clipped to 0 … 1), or, for .exr, 32-bit float linear grey.
@@ -49,7 +47,7 @@ Image resample(const Image& image, int columns, int rows, const RunControl& run 
 void write_image(const Image& image, const std::filesystem::path& path,
                  const RunControl& control = {});
 
-/// An 8-bit sRGB colour picture, row by row from the top, three bytes a pixel.
+/// An 8-bit sRGB colour picture, row by row from the top, three bytes per pixel.
 struct ColorImage {
   int columns = 0;
   int rows = 0;

@@ -14,15 +14,15 @@
 #include "core/image/svg_drawing.h"
 #include "core/io/files.h"
 
-// Whatever decodes a file of pixels runs in a child process. What comes back are rows of light, and
-// as a text a Reading.
+// All decoding of raster files runs in a child process. It sends back rows of light and a Reading
+// as text.
 namespace lensforge {
 namespace {
 
 namespace fs = std::filesystem;
 
-/// Says what became of transparency. @throw InputError if nothing can be seen in front of the
-/// background, which ends with `why`.
+/// Reports the treatment of transparency. @throw InputError ending with `why` if nothing is visible
+/// in front of the background.
 void report_cover(const fs::path& path, const Cover& cover, const Background& background,
                   LoadedImage& loaded, const std::string& why = {}) {
   if (!cover.open) return;
@@ -42,17 +42,17 @@ void report_cover(const fs::path& path, const Cover& cover, const Background& ba
   }
 }
 
-/// Where the stored pixels lie in the picture that is meant to be seen.
+/// Position of the stored pixels in the displayed picture.
 struct Window {
   int columns = 0;
   int rows = 0;
   int left = 0;       ///< Column of the first stored column.
   int top = 0;        ///< Row of the first stored row.
-  float fill = 0.0F;  ///< Light of what is not stored.
+  float fill = 0.0F;  ///< Light of pixels that are not stored.
 };
 
-/// OpenEXR tells apart what is stored and what is shown. TIFF positions are print layout and do not
-/// count.
+/// OpenEXR distinguishes the stored and the displayed window. TIFF positions are print layout and
+/// are ignored.
 Window shown_window(const PictureSource& source, const Background& background,
                     std::vector<std::string>& changes) {
   const OIIO::ImageSpec& spec = source.spec();
@@ -70,7 +70,7 @@ Window shown_window(const PictureSource& source, const Background& background,
   return window;
 }
 
-/// Sends the picture that is to be seen, band by band.
+/// Sends the displayed picture, band by band.
 void send_pixels(PictureSource& source, const Window& window, PictureLight& light,
                  RowSender& sender, const RunControl& run) {
   const OIIO::ImageSpec& spec = source.spec();
@@ -97,8 +97,8 @@ void send_pixels(PictureSource& source, const Window& window, PictureLight& ligh
   }
 }
 
-/// Exif orientation (JEITA CP-3451, tag 274): bit pattern of 1 … 8 as what to do to the stored
-/// picture so that it stands upright.
+/// Exif orientation (JEITA CP-3451, tag 274): the bits of 1 … 8 give the operations that turn the
+/// stored picture upright.
 Image upright(Image image, int orientation) {
   if (orientation <= 1 || orientation > 8) return image;
   const bool swap_axes = orientation >= 5;
@@ -128,7 +128,7 @@ void report_header(PictureSource& source, std::vector<std::string>& changes) {
   }
 }
 
-/// What a decoding process says of a picture besides its pixels.
+/// What a decoding process returns besides the pixels.
 struct Reading {
   int orientation = 1;
   Cover cover;
@@ -150,7 +150,7 @@ struct Reading {
   }
 };
 
-/// In the decoding process.
+/// Runs in the decoding process.
 std::string decode_picture(const fs::path& path, const Background& background, RowSender& sender,
                            const RunControl& run) {
   PictureSource source(path);
@@ -183,7 +183,7 @@ LoadedImage read_pixels(const fs::path& path, const RunControl& run, const Backg
   return loaded;
 }
 
-/// The first things that a drawing lacks, to end a refusal with.
+/// The first things left out of a drawing, to end a refusal.
 std::string first_of(const std::vector<std::string>& left_out) {
   constexpr std::size_t kMost = 3;
   std::string text;

@@ -8,7 +8,8 @@
 
 namespace lensforge {
 
-/// An image between the middles of its pixels, bilinear; outside of them as on the border pixel.
+/// Bilinear interpolation between pixel centres; beyond the outermost centres the border pixel's
+/// value.
 /// @param at  pixels, x to the right and y down from the upper left corner.
 inline double bilinear(const Image& image, const Eigen::Vector2d& at) {
   const double x = std::clamp(at.x() - 0.5, 0.0, image.columns() - 1.0);

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "core/image/jpeg_outline.h"
 
-// libjpeg fills what a truncated file lacks with grey and only warns, and for progressive files it
-// allocates the whole picture on opening. So the end and the size are looked up before it is asked.
-// Markers: ITU-T T.81, Table B.1.
+// libjpeg fills the missing part of a truncated file with grey and only warns, and it allocates the
+// whole picture of a progressive file on opening. So end and size are checked before. Markers:
+// ITU-T T.81, Table B.1.
 namespace lensforge {
 namespace {
 
@@ -23,8 +23,8 @@ int read_two_bytes(std::istream& file) {
   return file ? 256 * high + low : kEndOfFile;
 }
 
-/// The next marker's code; entropy-coded data, where FF is followed by 00 or a restart marker, is
-/// passed over.
+/// The next marker's code. Skips entropy-coded data, where FF is followed by 00 or a restart
+/// marker.
 int next_marker(std::istream& file) {
   std::streambuf& bytes = *file.rdbuf();
   for (int byte = bytes.sbumpc(); byte != kEndOfFile; byte = bytes.sbumpc()) {

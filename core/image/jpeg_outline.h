@@ -6,7 +6,7 @@
 
 namespace lensforge {
 
-/// What the markers of a JPEG stream tell without decoding it.
+/// Properties of a JPEG stream from its markers, without decoding.
 struct JpegOutline {
   int columns = 0;
   int rows = 0;

@@ -18,10 +18,10 @@
 namespace lensforge {
 namespace {
 
-/// Of a file with more than any of ours.
+/// Maximum layers, more than any of our files has.
 constexpr int kMostLayers = 64;
 
-/// Names in the order in which EXR keeps its channels.
+/// Names in the order of EXR channels.
 std::vector<std::string> sorted(std::vector<std::string> names) {
   std::sort(names.begin(), names.end());
   return names;
@@ -43,8 +43,8 @@ std::vector<float> interleaved(const LayeredImage& image) {
   throw InputError(path.string() + ": " + rule);
 }
 
-/// In the decoding process: sends the layers one below the other. @return their names, each with a
-/// zero behind it.
+/// Runs in the decoding process: sends the layers one below the other. @return their names, each
+/// followed by a zero.
 std::string send_layers(const std::filesystem::path& path, RowSender& sender) {
   const auto input = OIIO::ImageInput::open(path.string());
   if (!input) refuse(path, "cannot be read as an EXR file");
@@ -100,7 +100,7 @@ void write_layers(const LayeredImage& image, const std::filesystem::path& path) 
   OIIO::ImageSpec spec(image.columns(), image.rows(), layers, OIIO::TypeDesc::FLOAT);
   spec.channelnames = image.names();
   spec.attribute("compression", "zip");
-  // Else OpenImageIO adds the time, and the same layers would give another file every second.
+  // Otherwise OpenImageIO adds the time, and equal layers give different files.
   spec.attribute("DateTime", "");
   const std::vector<float> values = interleaved(image);
   const auto rows = [&](int first, int) {

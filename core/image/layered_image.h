@@ -8,7 +8,7 @@
 
 namespace lensforge {
 
-/// Rasters of one size with a name each, as the channels of an EXR file: heights and slopes of a
+/// Named rasters of one size, stored as the channels of an EXR file: heights and slopes of a
 /// surface, pictures of several surfaces.
 class LayeredImage {
  public:
@@ -20,7 +20,7 @@ class LayeredImage {
   [[nodiscard]] const std::vector<std::string>& names() const { return names_; }
   [[nodiscard]] bool has(const std::string& name) const;
 
-  /// Row by row from the top. @pre has(name) for a name.
+  /// One layer, row by row from the top. @pre has(name).
   [[nodiscard]] std::span<float> layer(const std::string& name);
   [[nodiscard]] std::span<const float> layer(const std::string& name) const;
 
@@ -33,12 +33,11 @@ class LayeredImage {
   std::vector<float> values_;  ///< Layer by layer.
 };
 
-/// Writes 32-bit floats, packed without loss; whole or not at all. @throw RunError
+/// Writes losslessly compressed 32-bit floats; whole or not at all. @throw RunError
 void write_layers(const LayeredImage& image, const std::filesystem::path& path);
 
-/// @throw InputError if the file is missing, no EXR file, larger than kMaxImageSide a side, or
-/// holds
-///        a value that is not finite; the message names the file.
+/// @throw InputError if the file is missing, no EXR file, larger than kMaxImageSide per side, or
+///        holds a value that is not finite; the message names the file.
 LayeredImage read_layers(const std::filesystem::path& path);
 
 }  // namespace lensforge

@@ -67,7 +67,8 @@ double mean_similarity(std::span<const double> a, std::span<const double> b, int
   const int window = fits % 2 == 1 ? fits : fits - 1;
   const double count = static_cast<double>(window) * window;
   double total = 0.0;
-  // Windows are summed afresh: 14 additions a pixel cost little and no rounding piles up.
+  // Each window is summed anew: 14 additions per pixel cost little and rounding errors do not
+  // accumulate.
   for (int row = 0; row + window <= rows; ++row) {
     const std::vector<Sums> sums = column_sums(a, b, columns, row, window);
     for (std::size_t c = 0; c + static_cast<std::size_t>(window) <= sums.size(); ++c) {

@@ -5,7 +5,7 @@
 
 namespace lensforge {
 
-/// How close a projected picture is to its target (docs/interface.md, "Metrics").
+/// Differences between a projected picture and its target (docs/interface.md, "Metrics").
 struct ImageMetrics {
   double mae = 0.0;   ///< Mean absolute error of the display-encoded values, 0 … 1.
   double psnr = 0.0;  ///< Peak signal-to-noise ratio of the same, dB; +inf when equal.

@@ -9,19 +9,19 @@
 namespace lensforge {
 namespace {
 
-/// There is one OpenImageIO in a process.
+/// A process has one OpenImageIO, so the gate is global.
 std::shared_mutex& gate() {
   static std::shared_mutex only;
   return only;
 }
 
-/// The copy's thread has another number than the one that locked the gate, and cannot unlock it.
+/// The forked thread's id differs from the one that locked the gate, so it cannot unlock it.
 void open_gate_of_copy() { std::construct_at(&gate()); }
 
 bool set_up() {
   ::pthread_atfork([] { gate().lock(); }, [] { gate().unlock(); }, open_gate_of_copy);
   OIIO::attribute("threads", 1);
-  OIIO::attribute("exr_threads", -1);  // None but the caller's.
+  OIIO::attribute("exr_threads", -1);  // Only the caller's thread.
   return true;
 }
 

@@ -5,10 +5,9 @@
 
 namespace lensforge {
 
-/// While one lives, this thread calls OpenImageIO, and no other thread forks: the copy of a process
-/// whose thread is inside of the library would wait forever for the locks that it holds. Hold it
-/// for moments. OpenImageIO and OpenEXR start no threads of their own, for a forked process has
-/// none of them.
+/// Guard for calls of OpenImageIO: while one exists, no other thread forks. A process forked while
+/// a thread is inside the library would wait forever for the library's locks. Hold it briefly. It
+/// keeps OpenImageIO and OpenEXR from starting threads, since a forked process would lack them.
 class OpenImageIoUse {
  public:
   OpenImageIoUse();

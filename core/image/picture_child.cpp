@@ -20,22 +20,22 @@
 namespace lensforge {
 namespace {
 
-/// Memory that decoders may take whatever the picture's size, bytes, and for each thread that one
-/// of HEIF may start: a stack of 8 MB and a reserve of malloc's, 64 MB.
+/// Memory for decoders independent of the picture's size, bytes, and for each thread of a HEIF
+/// decoder: a stack of 8 MB and malloc's reserve, 64 MB.
 constexpr double kMemory = 1e9;
 constexpr double kMemoryPerThread = 8e7;
 
-/// For each pixel, bytes. At 4000² no decoder has more than 15 resident (HEIC).
+/// Per pixel, bytes. At 4000² no decoder needs more than 15 (HEIC).
 constexpr double kMemoryPerPixel = 24.0;
 
-/// For each byte of the file: some are held whole, and grow while they are read.
+/// Per byte of the file: some decoders hold it whole in growing buffers.
 constexpr double kMemoryPerByte = 4.0;
 
-/// Computing time, s. At 4000² every format takes less than 0.1 µs a pixel.
+/// Computing time, s. At 4000² every format takes less than 0.1 µs per pixel.
 constexpr double kSeconds = 20.0;
 constexpr double kSecondsPerPixel = 2e-6;
 
-/// Bytes of one piece: large enough that a call costs little, small beside a picture.
+/// Bytes of one piece: large enough for cheap calls, small compared to a picture.
 constexpr std::size_t kPieceBytes = std::size_t{1} << 18U;
 
 struct GridHead {
@@ -44,7 +44,8 @@ struct GridHead {
   float fill = 0.0F;
 };
 
-/// Puts pieces together: the head comes first, then groups of rows behind the first's number.
+/// Reassembles pieces: the head first, then groups of rows, each preceded by its first row's
+/// number.
 class RowTaker {
  public:
   void take(std::string_view piece) {

@@ -12,15 +12,15 @@
 
 namespace lensforge {
 
-/// What a decoder of a picture with so many pixels may take at most, whatever is in the file.
+/// Limits for the decoder of a picture with so many pixels, whatever the file contains.
 ChildLimits decoder_limits(const std::filesystem::path& path, double pixels);
 
-/// Where a decoding process sends what it read.
+/// Sends rows from a decoding process.
 class RowSender {
  public:
   explicit RowSender(const PieceSink& send) : send_(send) {}
 
-  /// To be called first. @param fill  value of the pixels that are not sent.
+  /// Call it first. @param fill  value of pixels that are not sent.
   void begin(int columns, int rows, float fill);
   /// Whole rows from `first` on. @pre begin()
   void send(int first, std::span<const float> rows);
@@ -30,16 +30,16 @@ class RowSender {
   std::size_t columns_ = 0;
 };
 
-/// A picture from a decoding process, and the text that its work returned.
+/// A picture from a decoding process, and the text that its work returned with it.
 struct DecodedPicture {
   Image image;
   std::string text;
 };
 
 /// Reads a picture file in a child process with limits of memory and time, so that no file can
-/// crash or hang this one; OpenImageIO can be called there.
-/// @throw InputError naming the file if its decoder crashes or comes to no end; what `decode`
-///        throws; Interrupted at most 0.1 s after the stop request.
+/// crash or hang this process. The child may call OpenImageIO.
+/// @throw InputError naming the file if its decoder crashes or does not end; what `decode` throws;
+///        Interrupted at most 0.1 s after the stop request.
 DecodedPicture decode_in_child(
     const std::filesystem::path& path,
     const std::function<std::string(RowSender&, const RunControl&)>& decode,

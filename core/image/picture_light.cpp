@@ -15,7 +15,7 @@
 namespace lensforge {
 namespace {
 
-/// Bytes of a name out of the file in a message.
+/// Maximum bytes of a file's name in a message.
 constexpr std::size_t kLongestName = 60;
 
 constexpr int kMost16 = 65535;
@@ -38,7 +38,7 @@ ColorSpace declared_space(const OIIO::ImageSpec& spec, std::vector<std::string>&
   return usual_space(spec);
 }
 
-/// Whether the stored values are whole numbers of at most 16 bits.
+/// True if the stored values are integers of at most 16 bits.
 bool has_short_numbers(const OIIO::ImageSpec& spec) {
   return !spec.format.is_floating_point() && spec.format.size() <= 2;
 }
@@ -78,7 +78,7 @@ PictureLight::Channels PictureLight::choose(const OIIO::ImageSpec& spec, bool is
   for (int c = 0; c < spec.nchannels; ++c) {
     if (c != channels.alpha && c != spec.z_channel) others.push_back(c);
   }
-  if (others.empty()) {  // Nothing but alpha or depth: take it as the picture.
+  if (others.empty()) {  // Only alpha or depth: use it as the picture.
     others.push_back(0);
     channels.alpha = -1;
   }
@@ -94,7 +94,7 @@ PictureLight::Channels PictureLight::choose(const OIIO::ImageSpec& spec, bool is
   return channels;
 }
 
-/// An embedded profile comes before what the file declares besides.
+/// An embedded profile has priority over the declared colour space.
 void PictureLight::choose_colors(const PictureSource& source, std::vector<std::string>& changes) {
   const std::string text = source.color_profile();
   space_ = usual_space(source.spec());
@@ -104,7 +104,7 @@ void PictureLight::choose_colors(const PictureSource& source, std::vector<std::s
   if (text.empty()) return;
   const std::span bytes(reinterpret_cast<const unsigned char*>(text.data()), text.size());
   const std::string colors = ColorProfile::colors_of(bytes);
-  // A grey picture may have a profile of RGB: its values are those of all three.
+  // A grey picture may have an RGB profile: its value counts for all three channels.
   const bool fits = colors == "RGB" || (colors == "grey" && channels_.light.size() == 1);
   if (fits) profile_ = ColorProfile::open(bytes);
   if (!profile_) {
@@ -135,7 +135,7 @@ double PictureLight::light_of(const std::array<double, 3>& stored, double alpha)
   }
   const std::array<double, 3> light{decoded(stored[0]) * alpha, decoded(stored[1]) * alpha,
                                     decoded(stored[2]) * alpha};
-  // Equal channels are taken as they are: the weights' sum would round.
+  // Equal channels are used directly: the weighted sum rounds.
   if (light[0] == light[1] && light[1] == light[2]) return light[0];
   saw_colour_ = true;
   return luminance_rec709(light);
@@ -155,8 +155,8 @@ float PictureLight::grey(const float* pixel, int column, int row) {
   const double alpha = channels_.alpha < 0 ? 1.0 : checked(pixel, channels_.alpha, column, row);
   std::array<double, 3> stored = stored_of(pixel, column, row);
   below_ = std::min(below_, below + 1);
-  // A file with associated alpha stores the encoded colour times alpha, so the alpha is taken out
-  // before decoding and put back after. Linear light needs neither.
+  // A file with associated alpha stores the encoded colour times alpha, so it is divided by alpha
+  // before decoding and multiplied after. Linear light needs neither.
   const bool linear = !profile_ && space_.curve == ColorSpace::Curve::kLinear;
   if (!unassociated_ && (linear || alpha == 1.0 || alpha == 0.0)) {
     return covering(light_of(stored, 1.0), alpha);
@@ -173,7 +173,7 @@ float PictureLight::covering(double light, double alpha) {
   return static_cast<float>(light + (1.0 - std::min(alpha, 1.0)) * background_);
 }
 
-/// The value, or 0 for one below, which is remembered.
+/// The value; a negative one is recorded and becomes 0.
 double PictureLight::checked(const float* pixel, int channel, int column, int row) {
   const float value = pixel[channel];
   if (!std::isfinite(value)) refuse({value, channel, column, row}, "must be finite");

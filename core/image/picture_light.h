@@ -14,25 +14,24 @@
 
 namespace lensforge {
 
-/// What is said of a picture whose colours were turned to grey.
+/// Message for a picture whose colours were turned to grey.
 inline constexpr const char* kColourTurned = "colour turned to luminance (Rec. 709)";
 
-/// Values below 0 that are taken for 0, as a share of the largest value. Filters that resample
-/// leave them beside what is bright: the weights below 0 of Lanczos' filter with three lobes sum up
-/// to 0.27, those of cubics to 0.25. It leaves 0.11 of an edge's height, 0.18 of fine bars', and up
-/// to 0.24 of random black and white's.
+/// Negative values down to this share of the largest value are read as 0. Resampling filters leave
+/// them beside bright areas: the negative weights of a three-lobed Lanczos filter sum to 0.27, and
+/// it leaves up to 0.24 on random black and white.
 inline constexpr double kRingingShare = 0.3;
 
-/// Light from which on a colour is not dark: middle grey as it is shown.
+/// Linear light from which a colour is not dark: middle grey on a display.
 inline constexpr double kBright = 0.2;
 
-/// What a picture hides of what is behind it.
+/// The picture's coverage of its background.
 struct Cover {
-  bool open = false;    ///< Somewhere less than all.
-  bool drawn = false;   ///< Somewhere something.
-  bool bright = false;  ///< Somewhere something of at least kBright.
+  bool open = false;    ///< Some pixel is not opaque.
+  bool drawn = false;   ///< Some pixel is not fully transparent.
+  bool bright = false;  ///< Some pixel has light of at least kBright.
 
-  /// Adds a pixel. @param light  of what is drawn, times alpha.
+  /// Adds a pixel. @param light  the pixel's light, times alpha.
   void add(double light, double alpha) {
     open = open || alpha != 1.0;
     drawn = drawn || alpha != 0.0;
@@ -40,17 +39,17 @@ struct Cover {
   }
 };
 
-/// Turns stored pixels into grey linear light and remembers what that took.
+/// Turns stored pixels into grey linear light and records the changes made.
 class PictureLight {
  public:
-  /// @param background  the light that shows through, linear. Says in `changes` what of the
-  ///        file's colours it goes by.
+  /// @param background  linear light behind the picture. @param changes  gets the colour encoding
+  ///        that is used.
   PictureLight(const PictureSource& source, double background, std::vector<std::string>& changes);
 
   /// @throw InputError naming the file, pixel and channel for a value that is not finite.
   [[nodiscard]] float grey(const float* pixel, int column, int row);
 
-  /// To be called after the last pixel. @throw InputError naming the lowest value if it is too low.
+  /// Call it after the last pixel. @throw InputError naming the lowest value if it is too low.
   void report(std::vector<std::string>& changes) const;
 
   [[nodiscard]] const Cover& cover() const { return cover_; }
@@ -73,7 +72,7 @@ class PictureLight {
   float covering(double light, double alpha);
   double checked(const float* pixel, int channel, int column, int row);
   std::array<double, 3> stored_of(const float* pixel, int column, int row);
-  /// Of an opaque colour, times alpha.
+  /// Light of the opaque colour, times alpha.
   double light_of(const std::array<double, 3>& stored, double alpha);
   [[nodiscard]] double decoded(double stored) const;
   [[noreturn]] void refuse(const Value& value, const std::string& rule) const;
@@ -84,8 +83,8 @@ class PictureLight {
   bool unassociated_;
   double background_;
   ColorSpace space_;
-  std::vector<double> table_;            ///< Light of 16-bit values; empty: to be computed.
-  std::optional<ColorProfile> profile_;  ///< Instead of the space.
+  std::vector<double> table_;            ///< Light of 16-bit values; empty: computed each time.
+  std::optional<ColorProfile> profile_;  ///< Used instead of the space.
   bool saw_colour_ = false;
   Cover cover_;
   float most_ = 0.0F;

@@ -19,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Longest chunk of metadata that is read; profiles of printers have 3 MB.
+/// Maximum size of a metadata chunk; printer profiles have 3 MB.
 constexpr std::uint32_t kMostBytes = 1U << 24U;
 
 void set_profile(OIIO::ImageSpec& spec, std::string_view profile) {
@@ -29,7 +29,7 @@ void set_profile(OIIO::ImageSpec& spec, std::string_view profile) {
                  profile.data());
 }
 
-/// @param exif  what TIFF has for a header; some writers put JPEG's prefix before it.
+/// @param exif  starts with a TIFF header; some writers add JPEG's prefix.
 void set_orientation(OIIO::ImageSpec& spec, std::string_view exif) {
   constexpr std::string_view kPrefix("Exif\0\0", 6);
   if (exif.starts_with(kPrefix)) exif.remove_prefix(kPrefix.size());

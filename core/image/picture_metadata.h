@@ -7,9 +7,9 @@
 
 namespace lensforge {
 
-/// Adds the "ICCProfile" of a HEIF file to what OpenImageIO (2.4) reads of it. How such a picture
-/// is turned is told by its transformations, which decoders apply, and not by Exif
-/// (ISO/IEC 23000-22, 7.2.2).
+/// Adds the "ICCProfile" of a HEIF file to the metadata that OpenImageIO (2.4) reads. Its
+/// orientation comes from transformations, which decoders apply, not from Exif (ISO/IEC 23000-22,
+/// 7.2.2).
 void add_heif_metadata(const std::filesystem::path& path, OIIO::ImageSpec& spec);
 
 /// Adds "ICCProfile" and "Orientation" of a WebP file (RFC 9649, sections 2.7.1.4 and 2.7.1.5).

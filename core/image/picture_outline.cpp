@@ -8,9 +8,9 @@
 #include <string_view>
 #include <vector>
 
-// OpenImageIO (2.4.7) opens some 25 formats. In random changes of small files its readers of ICO,
-// FITS, IFF and SGI crashed and that of DPX did not end, so only formats that people have pictures
-// in and whose readers stood it are handed on.
+// OpenImageIO (2.4.7) opens some 25 formats. In fuzz tests with small files its readers of ICO,
+// FITS, IFF and SGI crashed and that of DPX did not end. So only common formats whose readers
+// passed are allowed.
 namespace lensforge {
 namespace {
 
@@ -26,7 +26,7 @@ class Head {
   [[nodiscard]] bool has(std::string_view text, std::size_t at = 0) const {
     return bytes_.size() > at && bytes_.compare(at, text.size(), text) == 0;
   }
-  /// 0 for what lies beyond the end.
+  /// Little-endian number; 0 beyond the end.
   [[nodiscard]] std::int64_t little(std::size_t at, std::size_t bytes) const {
     std::int64_t value = 0;
     for (std::size_t i = bytes; i-- > 0;) value = value << 8 | byte(at + i);
@@ -58,7 +58,7 @@ PictureOutline bmp_outline(const Head& head) {
   PictureOutline bmp{"bmp", head.little(18, 2), head.little(20, 2), false, {}};
   if (!is_core) {
     bmp.columns = head.little_signed(18);
-    bmp.rows = std::abs(head.little_signed(22));  // Negative: from the top down.
+    bmp.rows = std::abs(head.little_signed(22));  // Negative: top down.
   }
   if (bmp.columns < 1 || bmp.rows < 1) {
     bmp.problem = "is corrupt: its BMP header has no size";
@@ -95,7 +95,7 @@ PictureOutline heif_outline(const Head& head) {
   return heif;
 }
 
-/// OpenEXR file layout: the reader makes tables as long as the data window is high.
+/// OpenEXR file layout: the reader allocates tables by the height of the data window.
 PictureOutline exr_outline(const Head& head) {
   constexpr std::string_view kWindow("dataWindow\0box2i\0\x10\0\0\0", 21);
   PictureOutline exr{"openexr", 0, 0, false, {}};

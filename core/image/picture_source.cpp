@@ -29,10 +29,10 @@ namespace fs = std::filesystem;
 /// Bytes of decoded rows held at once besides the result.
 constexpr std::int64_t kBandBytes = std::int64_t{64} << 20;
 
-/// Bytes of a decoder's sentence, which may quote the file, in a message.
+/// Maximum bytes of a decoder's message, which may quote the file.
 constexpr std::size_t kLongestReason = 200;
 
-/// Whether a decoder's sentence is for its programmers: it has the name of a function or a type.
+/// True if a decoder's message contains the name of a function or a type.
 bool names_code(const std::string& text) {
   for (const char* mark : {"::", "()", "_", "->", "0x"}) {
     if (text.find(mark) != std::string::npos) return true;
@@ -46,7 +46,7 @@ bool names_code(const std::string& text) {
   return false;
 }
 
-/// ": " and what the decoder says, if it says anything in words.
+/// ": " and the decoder's message, if it is readable.
 std::string reason(const OIIO::ImageInput& input) {
   const std::string text = input.geterror();
   for (const char* lacking : {"not configured", "not implemented"}) {
@@ -58,7 +58,7 @@ std::string reason(const OIIO::ImageInput& input) {
   return ": " + printable_line(text, kLongestReason);
 }
 
-/// What of a look at the bytes a format's own check adds to.
+/// Arguments of a format's own check of the bytes.
 struct Checked {
   const fs::path& path;
   std::istream& file;
@@ -134,7 +134,7 @@ void PictureSource::limit_decoder(std::int64_t columns, std::int64_t rows) const
   if (pixels > 0.0) limit_this_process(decoder_limits(path_, pixels));
 }
 
-/// @return whether the library says that it succeeded.
+/// @return true if the library reports success.
 template <class Call>
 bool PictureSource::succeeds(const Call& call) const {
   try {
@@ -144,7 +144,7 @@ bool PictureSource::succeeds(const Call& call) const {
   }
 }
 
-/// Everything that can be told from the bytes alone, before a decoder is trusted with them.
+/// All checks that need only the bytes, before a decoder opens the file.
 void PictureSource::look_over() {
   std::ifstream file = open_input(path_);
   if (file.peek() == std::ifstream::traits_type::eof()) fail("is empty");
@@ -152,7 +152,7 @@ void PictureSource::look_over() {
   if (!outline) fail(std::string("is no picture that can be read: ") + kReadableFormats + " are");
   if (!outline->problem.empty()) fail(outline->problem);
   check_picture_size(path_, outline->columns, outline->rows);
-  // Decoders of these formats unpack whole pictures on opening, four bytes a pixel.
+  // Decoders of these formats unpack whole pictures on opening, four bytes per pixel.
   require_memory(4.0 * static_cast<double>(outline->columns) * static_cast<double>(outline->rows));
   format_ = outline->format;
   const Checked checked{path_, file, *outline};
@@ -168,7 +168,7 @@ void PictureSource::open() {
   OIIO::ImageSpec hints;
   // Alpha is applied here, in linear light, and not by OpenImageIO to the encoded values.
   hints.attribute("oiio:UnassociatedAlpha", 1);
-  // By the format's name: as a file's name it would take what follows a '?' for settings.
+  // By format name: in a file name it would read settings after a '?'.
   input_ = is("bmp") ? make_bmp_input() : OIIO::ImageInput::create(format_);
   if (!input_) {
     OIIO::geterror();
@@ -194,14 +194,14 @@ void PictureSource::check_spec() const {
   }
   if (spec_.deep) fail("holds deep pixels: only flat pictures are read");
   const auto pixels = static_cast<double>(spec_.image_pixels());
-  const double row = 4.0 * spec_.width * spec_.nchannels;  // All as float.
+  const double row = 4.0 * spec_.width * spec_.nchannels;  // All channels as float.
   require_memory(4.0 * pixels + row * band_rows());
   limit_decoder(spec_.width, spec_.height);
 }
 
 std::string PictureSource::color_profile() const {
   const OIIO::ParamValue* const profile = spec_.find_attribute("ICCProfile");
-  // Of a PNG file libpng leaves a broken one out.
+  // libpng omits a broken profile of a PNG file.
   if (profile == nullptr) return png_.color_profile;
   return {static_cast<const char*>(profile->data()), profile->type().size()};
 }
@@ -232,7 +232,7 @@ void PictureSource::read_rows(int begin, int end, std::vector<float>& rows) {
                : input_->read_scanlines(0, 0, top, bottom, spec_.z, 0, spec_.nchannels,
                                         OIIO::TypeFloat, rows.data());
   });
-  // Some decoders report a damaged file but call the read a success.
+  // Some decoders report success despite a damaged file.
   if (!read || input_->has_error()) {
     fail("is truncated or corrupt" + reason(*input_));
   }

@@ -15,11 +15,11 @@
 
 namespace lensforge {
 
-/// An open picture file and what its header says. It is opened only after all that can be told from
-/// its bytes alone has been looked at. Every function throws InputError naming the file.
+/// An open picture file and its header. A decoder opens it only after all checks that need only its
+/// bytes. Every function throws InputError naming the file.
 class PictureSource {
  public:
-  /// Lowers the limits of the process to what a picture of this size needs.
+  /// Lowers the limits of the process to the needs of a picture of this size.
   /// @pre the process is decode_in_child()'s.
   explicit PictureSource(const std::filesystem::path& path);
 
@@ -28,12 +28,12 @@ class PictureSource {
   [[nodiscard]] bool is(std::string_view format) const { return format == format_; }
   [[nodiscard]] bool is_animated() const { return animated_; }
 
-  /// The embedded ICC profile, perhaps a broken one; empty without one.
+  /// The embedded ICC profile, possibly broken; empty without one.
   [[nodiscard]] std::string color_profile() const;
-  /// Ask it after the first picture was read; the file is at the next one afterwards.
+  /// Call it after reading the first picture; it moves the file to the next one.
   [[nodiscard]] bool has_more_pictures();
 
-  /// Rows that are read at once: tiles must be whole.
+  /// Rows to read at once: tiles must be whole.
   [[nodiscard]] int band_rows() const;
   /// Reads rows begin … end − 1, counted from the data's top, all channels side by side.
   void read_rows(int begin, int end, std::vector<float>& rows);
@@ -49,7 +49,7 @@ class PictureSource {
   [[noreturn]] void fail(const std::string& why) const;
 
   std::filesystem::path path_;
-  std::string format_;  ///< OpenImageIO's name of it.
+  std::string format_;  ///< OpenImageIO's name.
   bool animated_ = false;
   EssentialPng png_;  ///< Empty for other formats.
   std::unique_ptr<OIIO::Filesystem::IOProxy> png_reader_;
@@ -57,7 +57,7 @@ class PictureSource {
   OIIO::ImageSpec spec_;
 };
 
-/// @throw InputError if a picture of this size is not read.
+/// @throw InputError if a picture of this size is refused.
 void check_picture_size(const std::filesystem::path& path, std::int64_t columns, std::int64_t rows);
 
 /// @throw InputError "path: why", one short printable line.

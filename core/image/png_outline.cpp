@@ -7,9 +7,8 @@
 #include <cstdint>
 #include <string_view>
 
-// libpng takes a truncated file for a picture, as OpenImageIO sets it up. It is only given whole
-// files, without chunks that do not matter here. Layout and CRC: W3C PNG specification, 5.3
-// and 5.5.
+// As OpenImageIO configures it, libpng accepts truncated files. So it only gets whole files,
+// without chunks that do not matter here. Layout and CRC: W3C PNG specification, 5.3 and 5.5.
 namespace lensforge {
 namespace {
 
@@ -43,8 +42,8 @@ std::uint32_t big_endian(std::string_view bytes) {
   return value;
 }
 
-/// Appends up to `count` bytes in steps, so that a corrupt length cannot ask for memory that the
-/// file does not fill.
+/// Appends up to `count` bytes in steps, so that a corrupt length does not allocate more than the
+/// file holds.
 bool append_bytes(std::istream& file, std::size_t count, std::string& bytes) {
   constexpr std::size_t kStep = std::size_t{1} << 20;
   while (count > 0) {

@@ -5,8 +5,8 @@
 #include <cstddef>
 #include <vector>
 
-// OpenImageIO divides by a maximum of 0, wraps values above the maximum around and fills what is
-// missing with black. Layout: Netpbm, "pbm(5)", "pgm(5)", "ppm(5)".
+// OpenImageIO divides by a maximum of 0, wraps values above the maximum and fills missing pixels
+// with black. Layout: Netpbm, "pbm(5)", "pgm(5)", "ppm(5)".
 namespace lensforge {
 namespace {
 
@@ -16,7 +16,7 @@ constexpr std::int64_t kMaxNumber = 1 << 30;
 bool is_digit(int c) { return c >= '0' && c <= '9'; }
 bool is_blank(int c) { return c == ' ' || (c >= '\t' && c <= '\r'); }
 
-/// Passes over blanks and comments; the next character stays in the stream.
+/// Skips blanks and comments; the next character stays in the stream.
 int next_character(std::streambuf& bytes) {
   for (;;) {
     int c = bytes.sgetc();
@@ -30,7 +30,7 @@ int next_character(std::streambuf& bytes) {
   }
 }
 
-/// The next whole number; −1 if something else comes. Takes `digits` at most.
+/// The next whole number; −1 if there is none. Reads at most `digits` digits.
 std::int64_t next_number(std::streambuf& bytes, int digits = 10) {
   int c = next_character(bytes);
   if (!is_digit(c)) return -1;
@@ -59,7 +59,7 @@ std::string missing_problem(const PnmOutline& pnm, std::int64_t row) {
          std::to_string(pnm.rows);
 }
 
-/// Why a row of numbers as text is not what the header says.
+/// Returns why a row of numbers as text contradicts the header.
 std::string text_row_problem(std::streambuf& bytes, const PnmOutline& pnm, std::int64_t row) {
   const int digits = has_bits(pnm.kind) ? 1 : 10;  // The bits of PBM need no blanks between.
   for (std::int64_t i = 0; i < samples_per_row(pnm); ++i) {
@@ -122,7 +122,7 @@ PnmOutline read_pnm_outline(std::istream& file) {
                     " in its PNM header: it must be in 1 to 65535";
     }
   }
-  if (pnm.kind > '3') bytes.sbumpc();  // One blank stands between header and pixels.
+  if (pnm.kind > '3') bytes.sbumpc();  // One blank separates header and pixels.
   return pnm;
 }
 

@@ -7,9 +7,9 @@
 #include "core/error.h"
 #include "core/image/image_io.h"
 
-// OpenImageIO's own box resize samples the filter at pixel centres: on noise from 427² to 171²
-// single values were off by 0.25 and the mean by 4e-4 (version 2.4.7). Here every source pixel
-// counts by the area it shares with the result's pixel, worked out in whole numbers.
+// OpenImageIO's own box resize samples the filter at pixel centres: from 427² to 171² noise has
+// errors up to 0.25 (version 2.4.7). Here every source pixel is weighted by its overlap with the
+// result's pixel, computed in integers.
 namespace lensforge {
 namespace {
 
@@ -74,7 +74,7 @@ Image resample(const Image& image, int columns, int rows, const RunControl& run)
     const Coverage& coverage = down[static_cast<std::size_t>(row)];
     std::fill(sum.begin(), sum.end(), 0.0);
     for (std::size_t k = 0; k < coverage.weights.size(); ++k) {
-      // Neighbouring result rows may share a source row: it is resampled once.
+      // Neighbouring result rows may share a source row; it is resampled once.
       if (const int needed = coverage.first + static_cast<int>(k); needed != source_row) {
         source = resample_row(image, needed, across);
         source_row = needed;

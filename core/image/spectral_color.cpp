@@ -27,7 +27,7 @@ Eigen::Matrix3d rgb_of_xyz() {
   return m;
 }
 
-/// Linear RGB of every wavelength, so that their sum is white: each channel is scaled.
+/// Linear RGB of every wavelength, each channel scaled so that the sum is white.
 std::vector<Eigen::Vector3d> balanced_colors(const std::vector<double>& wavelengths,
                                              const std::vector<double>& powers) {
   std::vector<Eigen::Vector3d> colors;

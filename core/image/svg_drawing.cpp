@@ -32,26 +32,26 @@
 #include "core/sandbox/child_work.h"
 #include "core/text/printable.h"
 
-// librsvg opens nothing that a file refers to where it is not told the file's own address. It,
-// libxml2, fontconfig and gdk-pixbuf are called in a child process alone.
+// librsvg opens no file that a drawing refers to unless it knows the drawing's own address.
+// librsvg, libxml2, fontconfig and gdk-pixbuf are called only in a child process.
 namespace lensforge {
 namespace {
 
 namespace fs = std::filesystem;
 
-/// CSS pixels an inch, by which lengths in the file in millimetres or points become pixels.
+/// CSS pixels per inch, for lengths in millimetres or points.
 constexpr double kDotsPerInch = 96.0;
 
-/// Longest side that is drawn with more than one point a pixel: 64 MiB of points.
+/// Maximum side drawn with more than one point per pixel: 64 MiB of points.
 constexpr int kMaxSampledSide = 4096;
 
-/// Bytes at a file's beginning in which its first element has to begin.
+/// The first element must begin within so many bytes of the file.
 constexpr std::size_t kHeadBytes = std::size_t{64} << 10U;
 
 /// Threads of librsvg's filters.
 constexpr unsigned kMaxThreads = 4;
 
-/// Bytes of a library's sentence, which may quote the file, in a message.
+/// Maximum bytes of a library's message, which may quote the file.
 constexpr std::size_t kLongestReason = 200;
 
 template <auto kFree>
@@ -67,7 +67,7 @@ using Object = std::unique_ptr<T, Free<g_object_unref>>;
 using Surface = std::unique_ptr<cairo_surface_t, Free<cairo_surface_destroy>>;
 using Context = std::unique_ptr<cairo_t, Free<cairo_destroy>>;
 
-/// Takes what GLib says of a failure.
+/// Holds GLib's error.
 class Failure {
  public:
   Failure() = default;
@@ -76,7 +76,7 @@ class Failure {
   Failure& operator=(const Failure&) = delete;
   [[nodiscard]] GError** out() { return &error_; }
   explicit operator bool() const { return error_ != nullptr; }
-  /// ": " and the reason, without the parser's own numbers of it; empty if there is none.
+  /// ": " and the reason, without the parser's error numbers; empty if there is none.
   [[nodiscard]] std::string reason() const {
     if (error_ == nullptr) return "";
     std::string text = error_->message;
@@ -97,7 +97,7 @@ Object<GInputStream> stream_of(std::string_view bytes) {
 
 bool is_packed(std::string_view bytes) { return bytes.starts_with("\x1F\x8B"); }
 
-/// What gzip packed, up to `most` bytes; `failure` says why it ends early.
+/// Unpacks gzip data, up to `most` bytes; `failure` holds the reason for an early end.
 std::string unpacked(std::string_view packed, std::size_t most, Failure& failure) {
   const Object<GInputStream> source = stream_of(packed);
   const Object<GZlibDecompressor> unpacker(g_zlib_decompressor_new(G_ZLIB_COMPRESSOR_FORMAT_GZIP));
@@ -115,7 +115,7 @@ std::string unpacked(std::string_view packed, std::size_t most, Failure& failure
   return bytes;
 }
 
-/// UTF-16 as ASCII, with '?' for what is none; other text as it is.
+/// UTF-16 as ASCII, with '?' for other characters; other text unchanged.
 std::string narrow(std::string text) {
   constexpr std::string_view kLittle("<\0", 2);
   constexpr std::string_view kBig("\0<", 2);
@@ -166,7 +166,7 @@ bool is_svg(std::istream& file) {
 
 namespace {
 
-/// The text of the file, no longer packed.
+/// The unpacked text of the file.
 std::string svg_text(const fs::path& path) {
   std::string bytes = read_whole_file(path, kMaxSvgBytes);
   if (!is_packed(bytes)) return bytes;
@@ -190,7 +190,7 @@ Object<RsvgHandle> parse(const fs::path& path, const std::string& xml) {
   return handle;
 }
 
-/// Width and height in pixels; those of the viewBox where the file has no lengths.
+/// Width and height in pixels; those of the viewBox if the file has no lengths.
 std::pair<double, double> size_of(const fs::path& path, RsvgHandle* handle) {
   double width = 0.0;
   double height = 0.0;
@@ -209,7 +209,7 @@ std::pair<double, double> size_of(const fs::path& path, RsvgHandle* handle) {
   return {width, height};
 }
 
-/// Adds up what cairo drew, 4 bytes a point: blue, green and red times alpha, alpha.
+/// Adds up cairo's output, 4 bytes per point: blue, green and red times alpha, alpha.
 class PixelSum {
  public:
   PixelSum() {
@@ -232,7 +232,7 @@ class PixelSum {
     sum_ += luminance * static_cast<double>(alpha) / 255.0;
   }
 
-  /// Mean light and coverage of `points` points; begins anew.
+  /// Mean light and coverage of `points` points; resets the sums.
   [[nodiscard]] std::pair<float, float> take(int points) {
     const std::pair mean{static_cast<float>(sum_ / points), static_cast<float>(coverage_ / points)};
     sum_ = coverage_ = 0.0;
@@ -242,7 +242,7 @@ class PixelSum {
   [[nodiscard]] bool saw_colour() const { return colour_; }
 
  private:
-  /// Of a channel that is stored times alpha.
+  /// Light of a channel stored times alpha.
   [[nodiscard]] double light(std::uint32_t channel, std::uint32_t alpha) const {
     return light_[std::min<std::uint32_t>((channel * 255U + alpha / 2U) / alpha, 255U)];
   }
@@ -253,12 +253,12 @@ class PixelSum {
   bool colour_ = false;
 };
 
-/// Points a side in a pixel of a picture with this longer side.
+/// Points per side of a pixel in a picture with this longer side.
 int samples_for(int longer_side) {
   return std::clamp(kMaxSampledSide / longer_side, 1, kSvgSamples);
 }
 
-/// What the drawing fills, in its proportions, at least one pixel a side.
+/// A surface in the drawing's proportions, at least one pixel per side.
 Surface surface_for(const fs::path& path, std::pair<double, double> size, int longer_side) {
   const double scale = longer_side / std::max(size.first, size.second);
   const auto pixels = [&](double side) {
@@ -274,7 +274,7 @@ Surface surface_for(const fs::path& path, std::pair<double, double> size, int lo
       cairo_image_surface_create(CAIRO_FORMAT_ARGB32, samples * columns, samples * rows));
 }
 
-/// Lets librsvg draw into `surface`, which it fills.
+/// Draws with librsvg, filling `surface`.
 void draw(const fs::path& path, RsvgHandle* handle, std::pair<double, double> size,
           cairo_surface_t* surface) {
   const auto [width, height] = size;
@@ -318,7 +318,7 @@ SvgPicture averaged(cairo_surface_t* surface, int samples) {
   return picture;
 }
 
-/// In the child.
+/// Runs in the child.
 SvgPicture drawn(const fs::path& path, int longer_side) {
   SvgLog log;
   std::vector<std::string> remarks;
@@ -380,7 +380,7 @@ ChildLimits limits_for(int longer_side) {
 
 SvgPicture draw_svg(const fs::path& path, int longer_side, const RunControl& run) {
   const auto work = [&](const RunControl&) {
-    // Each thread of librsvg's filters takes address space, which is limited.
+    // Each thread of librsvg's filters uses address space, which is limited.
     if (std::thread::hardware_concurrency() > kMaxThreads) {
       setenv("RAYON_NUM_THREADS", std::to_string(kMaxThreads).c_str(), 1);
     }

@@ -14,7 +14,7 @@
 namespace lensforge {
 namespace {
 
-/// Bytes of a name out of the file in a message.
+/// Maximum bytes of a file's name in a message.
 constexpr std::size_t kLongestName = 60;
 
 /// CSS Fonts 4, section 2.1.3, the names that the drawing programs add, and keywords that name no
@@ -65,8 +65,7 @@ Pattern pattern_for(const std::string& family) {
   return pattern;
 }
 
-/// The family that text in `family` is drawn in: that one if it is installed, under any of its
-/// names.
+/// The family used to draw text in `family`: that one if it is installed under any of its names.
 std::optional<std::string> drawn_family(const std::string& family) {
   FcResult result = FcResultNoMatch;
   const Pattern match(FcFontMatch(nullptr, pattern_for(family).get(), &result));
@@ -96,7 +95,7 @@ std::string code_point(FcChar32 character) {
   return text.data();
 }
 
-/// Which font is drawn in place of all of these; empty where one of them is.
+/// Names the font that replaces all of these; empty if one of them is used.
 std::string remark_on(const std::vector<std::string>& families) {
   std::optional<std::string> drawn;
   for (const std::string& family : families) {

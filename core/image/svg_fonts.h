@@ -11,8 +11,8 @@
 
 namespace lensforge {
 
-/// Looks up in the installed fonts (fontconfig) what the text of a drawing needs. A font counts as
-/// there if one of the families that the text names is there, or a generic one.
+/// Checks the installed fonts (fontconfig) for a drawing's text. A font counts as installed if one
+/// of the families that the text names is installed or generic.
 class SvgFonts {
  public:
   /// @param families  as font-family lists them.
@@ -23,11 +23,11 @@ class SvgFonts {
   /// The first character that no installed font has, as a problem; empty if there is none.
   [[nodiscard]] std::string problem_of(const std::string& text);
 
-  /// In plain words, which fonts are drawn in place of others.
+  /// In plain words, the fonts that replace others.
   [[nodiscard]] std::vector<std::string> remarks() const;
 
  private:
-  /// Each takes a millisecond to look up, and a file may have a million.
+  /// A look-up takes a millisecond, and a file may have a million lists.
   static constexpr std::size_t kMostLists = 100;
 
   struct DestroyCharacters {

@@ -26,13 +26,13 @@
 namespace lensforge {
 namespace {
 
-/// Bytes of a name or a value out of the file in a finding.
+/// Maximum bytes of a file's name or value in a finding.
 constexpr std::size_t kLongestValue = 60;
 
-/// Bytes of a line that are looked at.
+/// Maximum bytes examined per line.
 constexpr std::size_t kLongestLine = std::size_t{64} << 10U;
 
-/// Kinds of findings that are kept: a file may be made of a thousand.
+/// Maximum kinds of findings: a file may cause a thousand.
 constexpr std::size_t kMostKinds = 24;
 
 struct Advice {
@@ -86,8 +86,8 @@ constexpr std::array<Advice, 39> kValueAdvice{{{"var", "write the value itself"}
                                                {"conic-gradient", kGradientElement},
                                                {"url", "only one at a time is drawn"}}};
 
-/// Pseudo-classes and elements that nothing in a still picture has: a rule for them alone changes
-/// nothing.
+/// Pseudo-classes and pseudo-elements that never match in a still picture: a rule for them alone
+/// has no effect.
 constexpr std::array<std::string_view, 11> kNeverSeen{
     "hover",  "focus", "focus-visible", "focus-within", "active",   "target",
     "before", "after", "selection",     "visited",      "disabled",
@@ -111,7 +111,7 @@ std::string in_quotes(std::string_view text) {
   return "'" + printable_line(text, kLongestValue) + "'";
 }
 
-/// The text between `before` and `after`; empty where it is not.
+/// The text between `before` and `after`; empty if there is none.
 std::string_view between(std::string_view text, std::string_view before, std::string_view after) {
   const std::size_t begin = text.find(before);
   if (begin == std::string_view::npos) return {};
@@ -139,7 +139,7 @@ std::string last_string(std::string_view line) {
 
 bool in_name(char c) { return std::isalpha(static_cast<unsigned char>(c)) != 0 || c == '-'; }
 
-/// The first function or unit in a value that there is advice for, or the first function at all.
+/// The first function or unit in a value with advice, otherwise the first function.
 std::string mark_of(std::string_view value) {
   std::string first;
   for (std::size_t i = 0; i < value.size();) {
@@ -157,7 +157,7 @@ std::string mark_of(std::string_view value) {
   return first;
 }
 
-/// A list of coordinates, which SvgNeeds speaks of.
+/// True for a list of coordinates, which SvgNeeds reports.
 bool is_list_of_places(std::string_view name, std::string_view value) {
   return (name == "x" || name == "y") &&
          value.find_first_not_of("0123456789.,-+eE \t\r\npxtmc") == std::string_view::npos;
@@ -278,7 +278,7 @@ void SvgLog::read() {
 
 std::vector<std::string> SvgLog::take() {
   if (thread_.joinable()) {
-    // The pipe ends with its last writing end, which is standard output.
+    // Closes the pipe's last writing end, standard output.
     const Descriptor nowhere(::open("/dev/null", O_WRONLY | O_CLOEXEC));
     ::dup2(nowhere.number(), STDOUT_FILENO);
     thread_.join();

@@ -11,8 +11,8 @@
 
 namespace lensforge {
 
-/// Collects findings out of lines that librsvg (2.54) prints of a file's styles and values that it
-/// passes over: one for each kind, in the order of their kinds.
+/// Collects findings from the lines that librsvg (2.54) prints about styles and values that it
+/// ignores: one per kind, in the order of their kinds.
 class SvgLogReader {
  public:
   void take_line(std::string_view line);
@@ -24,12 +24,12 @@ class SvgLogReader {
   void take_value(std::string_view name, std::string_view value);
   void add(const std::string& kind, const std::string& finding);
 
-  std::string attribute_;  ///< Whose value the next line gives.
+  std::string attribute_;  ///< Attribute whose value is on the next line.
   std::map<std::string, std::string> findings_;
 };
 
-/// Makes librsvg print what it passes over, and reads that, while one lives: in a process of its
-/// own whose standard output nobody else needs, before librsvg is called for the first time.
+/// While one exists, makes librsvg print what it ignores, and reads it. Use it in a separate
+/// process whose standard output is not needed, before the first call of librsvg.
 class SvgLog {
  public:
   SvgLog();
@@ -37,7 +37,7 @@ class SvgLog {
   SvgLog(const SvgLog&) = delete;
   SvgLog& operator=(const SvgLog&) = delete;
 
-  /// What was passed over, in plain words; ends it.
+  /// Ends the log and returns in plain words what was ignored.
   std::vector<std::string> take();
 
  private:

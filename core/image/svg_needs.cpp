@@ -21,13 +21,13 @@
 namespace lensforge {
 namespace {
 
-/// Bytes of a name out of the file in a message.
+/// Maximum bytes of a file's name in a message.
 constexpr std::size_t kLongestName = 60;
 
-/// Names out of the file that findings are made of: it may have a thousand.
+/// Maximum names from the file in findings: it may have a thousand.
 constexpr std::size_t kMostNames = 30;
 
-/// Drawings in drawings that are looked through.
+/// Maximum nesting of drawings that is examined.
 constexpr int kMostNested = 4;
 
 template <auto kFree>
@@ -64,8 +64,8 @@ std::string without_comments(std::string_view css) {
   }
 }
 
-/// Where a piece of CSS ends that begins at `at`: at a brace or a semicolon that is in no string
-/// and no brackets.
+/// End of the piece of CSS that begins at `at`: the next brace or semicolon outside strings and
+/// brackets.
 std::size_t end_of_piece(std::string_view css, std::size_t at) {
   char quote = '\0';
   int depth = 0;
@@ -93,7 +93,7 @@ std::vector<Declaration> declarations_in(const std::string& text) {
     const std::string_view piece = std::string_view(css).substr(at, end - at);
     at = end + 1;
     const std::size_t colon = piece.find(':');
-    // What stands before a brace is a selector.
+    // Text before a brace is a selector.
     if (colon == std::string_view::npos || (end < css.size() && css[end] == '{')) continue;
     const std::string_view value = piece.substr(colon + 1);
     all.push_back({lower_case(std::string(trimmed(piece.substr(0, colon)))),
@@ -115,7 +115,7 @@ std::vector<std::string> entries_of(std::string_view list) {
   }
 }
 
-/// The families in a value of the property font: they stand behind the size, "bold 12px/1.5 Serif".
+/// The families in a value of the property font: they follow the size, "bold 12px/1.5 Serif".
 std::string families_of_font(std::string_view font) {
   for (const std::string& entry : entries_of(font)) {
     const std::string_view size = std::string_view(entry).substr(0, entry.find('/'));
@@ -127,8 +127,8 @@ std::string families_of_font(std::string_view font) {
   return {};
 }
 
-/// Whether librsvg passes a child of a switch element over: it knows the features of SVG 1.1 but
-/// for other documents in it.
+/// True if librsvg skips a child of a switch element: it supports the features of SVG 1.1 except
+/// embedded documents.
 bool asks_too_much(const std::string& extensions, const std::string& features) {
   for (const std::string& feature : entries_of(features)) {
     if (!feature.starts_with("http://www.w3.org/TR/SVG11/feature#")) return true;
@@ -164,12 +164,12 @@ class Survey {
   }
 
  private:
-  /// What an element passes on to those in it.
+  /// State inherited by an element's children.
   struct Element {
     bool is_text = false;
     bool is_style = false;
     bool is_switch = false;
-    bool is_chosen = false;  ///< Of a switch: whether a child is drawn for sure.
+    bool is_chosen = false;  ///< For a switch: true if a child is certainly drawn.
     bool is_undrawn = false;
     std::string families;
   };
@@ -224,7 +224,7 @@ class Survey {
     }
   }
 
-  /// Names the element where it is not.
+  /// Reports the element if it is not drawn.
   bool is_drawn(const std::string& name, const std::string& space) {
     const bool svg = space.empty() || space == "http://www.w3.org/2000/svg";
     if (!svg && space != "http://www.w3.org/1999/xhtml") return false;
@@ -283,7 +283,7 @@ class Survey {
       }
     }
     xmlTextReaderMoveToElement(reader_);
-    // A style counts for more than attributes.
+    // A style has priority over attributes.
     for (const Declaration& one : declarations_in(attribute("style").value_or(""))) {
       look_at_style(one, element.families);
     }
@@ -301,7 +301,7 @@ class Survey {
     }
   }
 
-  /// As an attribute.
+  /// A property given as an attribute.
   void look_at_property(const Declaration& property) {
     if (property.name == "pathLength") has_path_length_ = true;
     if (property.name == "stroke-dasharray" && property.value != "none") has_dashes_ = true;
@@ -313,7 +313,7 @@ class Survey {
     look_at_addresses(property.value);
   }
 
-  /// In CSS. @param families  gets those of the text in it.
+  /// A property in CSS. @param families  gets the text's families.
   void look_at_style(const Declaration& property, std::string& families) {
     if (property.name == "font-family") families = property.value;
     if (property.name == "font") families = families_of_font(property.value);
@@ -324,7 +324,7 @@ class Survey {
     look_at_property(property);
   }
 
-  /// Those in url() that lead out of the file.
+  /// Addresses in url() that refer outside the file.
   void look_at_addresses(std::string_view value) {
     constexpr std::string_view kBefore = "url(";
     for (std::size_t at = value.find(kBefore); at != std::string_view::npos;
@@ -357,7 +357,7 @@ class Survey {
     }
   }
 
-  /// As an attribute or in its style.
+  /// True if given as an attribute or in a style.
   [[nodiscard]] bool has_length(const char* name) const {
     if (attribute(name)) return true;
     const auto style = declarations_in(attribute("style").value_or(""));
@@ -389,7 +389,7 @@ class Survey {
     if (needs_.problem.empty()) needs_.problem = fonts_.problem_of(text);
   }
 
-  /// Whether a name out of the file is met for the first time, and not one of too many.
+  /// True for the first occurrence of a name, until there are kMostNames.
   bool is_new(const std::string& name) {
     return names_.size() < kMostNames && names_.insert(name).second;
   }
@@ -420,15 +420,15 @@ class Survey {
     return text_of(value.get());
   }
 
-  int depth_;  ///< Of drawings in drawings.
+  int depth_;  ///< Nesting depth of drawings.
   xmlTextReader* reader_ = nullptr;
-  std::vector<Element> path_;  ///< From the outermost element to the one at hand.
+  std::vector<Element> path_;  ///< From the outermost element to the current one.
   SvgFonts fonts_;
   std::set<std::string> names_;
   bool has_text_ = false;
   bool has_path_length_ = false;
   bool has_dashes_ = false;
-  std::vector<std::string> of_text_;  ///< Left out if there is text.
+  std::vector<std::string> of_text_;  ///< Reported only if there is text.
   SvgNeeds needs_;
 };
 

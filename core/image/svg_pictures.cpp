@@ -17,7 +17,7 @@ namespace {
 constexpr std::string_view kData = "data:";
 constexpr std::string_view kBase64 = ";base64";
 
-/// Bytes of a type out of the file in a message.
+/// Maximum bytes of a file's type in a message.
 constexpr std::size_t kLongestType = 40;
 
 template <auto kFree>
@@ -37,7 +37,7 @@ struct Address {
   std::string bytes;
 };
 
-/// Takes what base64 encodes, over white space and its entities.
+/// Decodes base64, ignoring white space and its entities.
 std::string decoded(std::string_view text) {
   std::string plain;
   plain.reserve(text.size());
@@ -56,7 +56,7 @@ std::string decoded(std::string_view text) {
   return plain;
 }
 
-/// Takes what percent signs encode.
+/// Decodes percent signs.
 std::string unescaped(std::string_view text) {
   GBytes* const bytes =
       g_uri_unescape_bytes(text.data(), static_cast<gssize>(text.size()), nullptr, nullptr);
@@ -68,7 +68,7 @@ std::string unescaped(std::string_view text) {
   return plain;
 }
 
-/// The address's parts; no bytes where it is of another kind.
+/// The address's parts; no bytes if it is not a data: address.
 Address parts_of(std::string_view address) {
   const std::size_t comma = address.find(',');
   if (comma == std::string_view::npos) return {};
@@ -81,7 +81,7 @@ Address parts_of(std::string_view address) {
 
 bool is_drawing(const Address& address) { return address.type.find("svg") != std::string::npos; }
 
-/// Decodes it as librsvg does with this type; nothing if that fails.
+/// Decodes a picture of this type like librsvg; nothing if that fails.
 Pixbuf loaded(const std::string& bytes, const std::string& type) {
   const Loader loader(type.empty() ? gdk_pixbuf_loader_new()
                                    : gdk_pixbuf_loader_new_with_mime_type(type.c_str(), nullptr));
@@ -95,7 +95,7 @@ Pixbuf loaded(const std::string& bytes, const std::string& type) {
   return Pixbuf(GDK_PIXBUF(g_object_ref(pixbuf)));
 }
 
-/// How the picture has to be turned, as Exif numbers it; 1 for not at all.
+/// Exif number of the rotation needed; 1 for none.
 int orientation_of(GdkPixbuf* pixbuf) {
   const char* const text = gdk_pixbuf_get_option(pixbuf, "orientation");
   return text != nullptr ? static_cast<int>(g_ascii_strtoll(text, nullptr, 10)) : 1;
@@ -116,7 +116,7 @@ std::string upright_address(GdkPixbuf* pixbuf) {
   return address;
 }
 
-/// An address in place of this one; empty if it can stay.
+/// A replacement for this address; empty if none is needed.
 std::string fit_address(std::string_view address, std::vector<std::string>& remarks) {
   const Address parts = parts_of(address);
   if (parts.bytes.empty() || is_drawing(parts)) return {};

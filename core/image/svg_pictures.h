@@ -7,13 +7,14 @@
 
 namespace lensforge {
 
-/// The text of an SVG file with the pictures in its data: addresses as librsvg (2.54) draws them
-/// right: those that Exif turns are turned and written as PNG, and a type that is not theirs is
-/// taken out of their address. All else stays as it is. @param remarks  gets what was turned.
+/// Returns the text of an SVG file with the pictures in its data: addresses changed so that librsvg
+/// (2.54) draws them correctly: pictures with an Exif orientation are turned upright and written as
+/// PNG, and a wrong type is removed from an address. All else is unchanged. @param remarks  gets
+/// the pictures turned.
 /// @pre No other thread uses gdk-pixbuf.
 std::string with_fit_pictures(const std::string& xml, std::vector<std::string>& remarks);
 
-/// What is left out of a picture at a data: address, in plain words; empty if it is drawn whole and
+/// In plain words, what is left out of a picture at a data: address; empty if it is drawn whole and
 /// upright.
 std::string undrawn_of_picture(std::string_view address);
 

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <array>
 
-// Found out with librsvg 2.54.7 by drawing each with and without it; SvgLeftOut's tests do the
-// same. What librsvg says itself, svg_log.h reads: values, rules and selectors.
+// Determined by drawing with and without each feature in librsvg 2.54.7; SvgLeftOut's tests do the
+// same. Values, rules and selectors that librsvg reports itself are read by svg_log.h.
 namespace lensforge {
 namespace {
 
@@ -45,7 +45,7 @@ constexpr std::array kElements{
     UndrawnThing{"canvas", "what a script draws (canvas)", kNotSvg},
 };
 
-/// The last ones show nothing by themselves.
+/// The last entries show nothing by themselves.
 constexpr std::array<std::string_view, 76> kDrawn{
     "a",
     "circle",

@@ -20,7 +20,7 @@ constexpr int kStripByteCounts = 279;
 constexpr int kTileOffsets = 324;
 constexpr int kTileByteCounts = 325;
 
-/// The compressions of libtiff 4.5 (tiff.h, COMPRESSION_…) that it can have decoders of.
+/// The compressions that libtiff 4.5 can decode (tiff.h, COMPRESSION_…).
 constexpr std::array<std::uint64_t, 21> kKnownCompressions{
     1,     2,     3,     4,     5,     6,     7,     8,     32766, 32771, 32773,
     32809, 32909, 32946, 34661, 34676, 34677, 34887, 34925, 50000, 50001};

@@ -6,9 +6,8 @@
 
 namespace lensforge {
 
-/// Why no decoder should be given the stream: its first picture has pixel data beyond the stream's
-/// end, or a compression that no decoder knows. Empty for every other stream, also for one that is
-/// no TIFF.
+/// Returns why no decoder should open the stream: its first picture has pixel data beyond the
+/// stream's end, or an unknown compression. Empty for every other stream, TIFF or not.
 std::string tiff_problem(std::istream& file);
 
 }  // namespace lensforge

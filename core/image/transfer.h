@@ -5,8 +5,8 @@
 
 #include "core/compute/host_device.h"
 
-/// The one display transfer curve of the program: sRGB (IEC 61966-2-1) with its linear toe, which
-/// keeps the slope at black finite. Continued beyond 1 by the same power law, odd below 0.
+/// The program's only display transfer curve: sRGB (IEC 61966-2-1) with its linear toe, which keeps
+/// the slope at black finite. Beyond 1 the power law continues; below 0 it is odd.
 namespace lensforge {
 
 inline constexpr double kSrgbToeSlope = 12.92;

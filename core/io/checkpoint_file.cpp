@@ -15,7 +15,7 @@
 namespace lensforge {
 namespace {
 
-/// A checkpoint has 48 bytes a vertex: this one would have 178 million of them.
+/// A checkpoint has 48 bytes per vertex: the limit is 178 million vertices.
 constexpr std::uintmax_t kMaxBytes = std::uintmax_t{8} << 30U;
 
 static_assert(std::endian::native == std::endian::little, "checkpoints are little-endian");

@@ -32,13 +32,13 @@ std::string_view bytes_of(std::span<const T> values) {
 /// A fingerprint as 16 hexadecimal digits: JSON's numbers do not hold 64 bits.
 std::string fingerprint_text(std::uint64_t fingerprint);
 
-/// What a checkpoint holds: a JSON header and little-endian numbers.
+/// Content of a checkpoint: a JSON header and little-endian numbers.
 struct CheckpointContent {
   nlohmann::json header;
   std::string numbers;
 };
 
-/// What messages call the header of a checkpoint.
+/// Name of a checkpoint's header in messages.
 std::string checkpoint_header_name(const std::filesystem::path& path);
 
 /// @throw InputError "checkpoint 'path' why".

@@ -5,8 +5,8 @@
 
 namespace lensforge::lens_file {
 
-/// Files that `cam` writes beside kCutFiles, for a page to draw the part from: its surfaces, and
-/// what each cause of wrong light makes of the picture.
+/// Files that `cam` writes beside kCutFiles, for a page that draws the part: its surfaces, and the
+/// picture with each cause of misdirected light.
 inline constexpr const char* kPartSurfaces = "part.exr";
 inline constexpr const char* kCausePictures = "causes.exr";
 inline constexpr std::array kCutLayers = {kPartSurfaces, kCausePictures};

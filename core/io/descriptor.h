@@ -6,10 +6,10 @@
 namespace lensforge {
 
 /// An open file, device or socket that closes itself. It is never standard input, output or error:
-/// what a library prints there must not reach a controller, a journal, a result or a log.
+/// text that a library prints there must not reach a controller, a journal, a result or a log.
 class Descriptor {
  public:
-  /// Takes `number` over; 0 to 2 are moved up first (then open() is false if no number is free).
+  /// Takes ownership of `number`; 0 to 2 are moved up first (open() is false if no number is free).
   explicit Descriptor(int number = -1) : number_(above_standard(number)) {}
   ~Descriptor() { close(); }
   Descriptor(Descriptor&& other) noexcept : number_(std::exchange(other.number_, -1)) {}

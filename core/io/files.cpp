@@ -30,21 +30,21 @@ std::string reason(int error) { return std::generic_category().message(error); }
   throw RunError(path.string() + ": cannot be written: " + reason(error));
 }
 
-/// An empty file of our own, or why there is none (an errno value).
+/// A new empty file, or the errno value of the failure.
 struct Beside {
   fs::path path;
   int error = 0;
 };
 
-/// Makes an empty file with a name of its own in the folder of `path`, with its extension, so that
-/// writers which choose their format by the name work.
+/// Makes an empty file with a unique name in the folder of `path`, with its extension, for writers
+/// that choose the format by the name.
 Beside make_beside(const fs::path& path) {
   std::random_device random;
   for (;;) {
     const std::string number = std::to_string(random());
     const std::string end = std::string(kPartial) + number + path.extension().string();
     const std::string stem = path.stem().string();
-    // A name that just fits its folder leaves no room for the words that are added.
+    // A name of maximum length leaves no room for the added words.
     const std::size_t room = NAME_MAX - std::min<std::size_t>(NAME_MAX - 1, end.size() + 1);
     const std::string name = std::string(".").append(stem, 0, room).append(end);
     fs::path beside = path.parent_path() / name;
@@ -79,7 +79,7 @@ void write_all(int descriptor, std::string_view content, const fs::path& named_i
   }
 }
 
-/// What kind of thing that is no regular file a path names.
+/// Describes a path that is not a regular file.
 const char* kind_of(mode_t mode) {
   if (S_ISDIR(mode)) return "a folder";
   if (S_ISFIFO(mode)) return "a named pipe";
@@ -114,7 +114,7 @@ void PendingFile::publish() {
   flush_to_disk(beside_, path_);
   if (::rename(beside_.c_str(), path_.c_str()) != 0) fail_to_write(path_, errno);
   beside_.clear();
-  // The new name itself is only safe once the folder is.
+  // The new name is safe only once the folder is flushed.
   flush_to_disk(path_.parent_path(), path_);
 }
 
@@ -146,7 +146,7 @@ std::string name_of_partial(std::string_view name) {
   const std::size_t digits = std::min(rest.find_first_not_of("0123456789"), rest.size());
   if (digits == 0 || (digits < rest.size() && rest[digits] != '.')) return {};
   const std::string named = std::string(name.substr(1, found - 1)).append(rest.substr(digits));
-  // Writers that make whole files themselves do so beside a file that is in the making.
+  // Writers that make whole files themselves write beside an unpublished file.
   const std::string outer = name_of_partial(named);
   return outer.empty() ? named : outer;
 }
@@ -155,7 +155,7 @@ void require_regular_file(const fs::path& path) {
   struct stat status {};
   if (::stat(path.c_str(), &status) != 0) fail_to_read(path, errno);
   require_regular(status, path);
-  // A missing right is named here, since libraries give no reason.
+  // Missing permission is reported here, since libraries give no reason.
   if (::access(path.c_str(), R_OK) != 0) fail_to_read(path, errno);
 }
 

@@ -10,18 +10,18 @@
 
 namespace lensforge {
 
-/// A file in the making: it is written beside `path` (same folder, same extension) and appears
-/// under its name, whole, with publish(); without that nothing is left behind.
+/// An unpublished file: it is written beside `path` (same folder, same extension) and appears whole
+/// under its name with publish(); without publish() it is deleted.
 class PendingFile {
  public:
-  /// Makes the empty file beside. @throw RunError naming the file and the system's reason.
+  /// Creates the empty temporary file. @throw RunError naming the file and the system's reason.
   explicit PendingFile(std::filesystem::path path);
   ~PendingFile();
   PendingFile(PendingFile&& other) noexcept;
   PendingFile& operator=(PendingFile&&) = delete;
 
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
-  /// Where to write.
+  /// Path to write to.
   [[nodiscard]] const std::filesystem::path& beside() const { return beside_; }
   /// Flushes it to disk and renames it to path(). @throw RunError naming the file and the reason.
   void publish();
@@ -42,14 +42,14 @@ void write_whole_file(const std::filesystem::path& path,
 /// write_whole_file() for content that is already in memory.
 void write_whole_file(const std::filesystem::path& path, std::string_view content);
 
-/// The name that a file in the making is to have: "lens.stl" of PendingFile's
-/// ".lens.partial-7.stl", and of one made beside that; empty for a name of another form.
+/// Final name of an unpublished file: "lens.stl" for PendingFile's ".lens.partial-7.stl", and for
+/// one made beside that; empty for a name of another form.
 std::string name_of_partial(std::string_view name);
 
 /// The check of open_input() alone, for libraries that open files by name themselves.
 void require_regular_file(const std::filesystem::path& path);
 
-/// Opens a regular file to be read; never waits, as a named pipe or a device would make it.
+/// Opens a regular file for reading; it refuses named pipes and devices, so it never waits.
 /// @throw InputError naming the path and why: missing, no permission, a folder, a named pipe, ...
 std::ifstream open_input(const std::filesystem::path& path);
 
@@ -57,13 +57,13 @@ std::ifstream open_input(const std::filesystem::path& path);
 /// `max_bytes`.
 std::string read_whole_file(const std::filesystem::path& path, std::uintmax_t max_bytes);
 
-/// Whether the regular file begins with these bytes. @throw InputError as open_input() does.
+/// True if the regular file begins with these bytes. @throw InputError as open_input() does.
 bool file_starts_with(const std::filesystem::path& path, std::string_view start);
 
-/// Whether it is a folder; false for what cannot be looked at, such as a loop of links.
+/// True for a folder; false for a path that cannot be examined, such as a loop of links.
 bool is_folder(const std::filesystem::path& path);
 
-/// Makes `folder` (and its parents) if need be and proves that files can be made in it.
+/// Makes `folder` (and its parents) if needed and checks that files can be created in it.
 /// @throw InputError naming the folder and the system's reason.
 void require_writable_folder(const std::filesystem::path& folder);
 

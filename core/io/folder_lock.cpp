@@ -19,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// How long a command that is about to take an empty folder away is waited for.
+/// Attempts, and time between them, while another command removes an empty folder.
 constexpr int kAttempts = 50;
 constexpr std::chrono::milliseconds kBetweenAttempts{2};
 
@@ -48,12 +48,12 @@ MadeFolder FolderLock::make(const fs::path& folder, Kind kind) {
     fs::create_directories(folder, ignored);
     FolderLock lock;
     lock.open(folder);
-    // What was locked may have been taken away just before.
+    // The locked folder may have been removed just before.
     const bool held = lock.folder_.open() && lock.attempt(kind) && lock.is_at(folder);
     if (held) result.lock = std::move(lock);
   }
   require_writable_folder(folder);
-  // Says why it cannot be had.
+  // Throws the reason.
   if (!result.lock && kind == Kind::kExclusive) result.lock = FolderLock(folder, kind);
   return result;
 }
@@ -71,7 +71,7 @@ bool FolderLock::attempt(Kind kind) {
   do {
     result = ::flock(folder_.number(), operation | LOCK_NB);
   } while (result != 0 && errno == EINTR);
-  // A file system that has no locks is no reason not to work there.
+  // A file system without locks is accepted.
   return result == 0 || errno != EWOULDBLOCK;
 }
 

@@ -11,34 +11,33 @@ namespace lensforge {
 
 struct MadeFolder;
 
-/// Another process works in the folder.
+/// Another process holds the folder.
 class FolderHeld : public InputError {
  public:
   using InputError::InputError;
 };
 
 /// Keeps other lensforge commands out of a folder while it lives: an advisory lock (flock) on the
-/// folder itself, so that no file stands for it. The system drops it with the process, however that
-/// ends.
+/// folder itself, without a lock file. The system releases it when the process ends in any way.
 class FolderLock {
  public:
   enum class Kind {
-    kExclusive,  ///< Nobody else: this command writes here.
-    kShared,     ///< No writer: this command reads what must stay as it is.
+    kExclusive,  ///< No other command: this one writes here.
+    kShared,     ///< No writer: this command reads files that must not change.
   };
 
   /// @throw InputError if `folder` cannot be opened; FolderHeld if another process holds it.
   FolderLock(const std::filesystem::path& folder, Kind kind);
 
-  /// Makes `folder` (and its parents) if need be, and locks it before anybody takes it away again.
-  /// Waits for a command that comes and goes, 0.1 s at most; one that stays longer, sharing the
-  /// folder or not, makes an exclusive lock fail, and an exclusive one leaves others unlocked.
-  /// @throw InputError if the folder cannot be made or files cannot be made in it; FolderHeld if
-  ///        another process holds it, for an exclusive lock.
+  /// Makes `folder` (and its parents) if needed, and locks it before another command can remove it.
+  /// Waits at most 0.1 s for other commands. If one still holds the folder in any way, an exclusive
+  /// lock fails; if it holds it exclusively, a shared lock is left out (MadeFolder::lock).
+  /// @throw InputError if the folder or files in it cannot be made; FolderHeld if another process
+  ///        holds it, for an exclusive lock.
   static MadeFolder make(const std::filesystem::path& folder, Kind kind);
 
-  /// Whether nobody else holds the folder; from here on nobody else can. Where it returns false,
-  /// a shared lock may be lost: the system lets go of it before it tries (flock(2)).
+  /// Returns true if nobody else holds the folder; from then on nobody else can. If it returns
+  /// false, a shared lock may be lost: the system releases it before it tries (flock(2)).
   bool become_exclusive();
 
  private:
@@ -51,10 +50,10 @@ class FolderLock {
   Descriptor folder_;
 };
 
-/// A folder that FolderLock::make() has made or met.
+/// A folder that FolderLock::make() has made or found.
 struct MadeFolder {
-  std::optional<FolderLock> lock;  ///< None where a shared one could not be had.
-  bool made = false;               ///< It was not there.
+  std::optional<FolderLock> lock;  ///< None if a shared lock could not be taken.
+  bool made = false;               ///< False if it existed.
 };
 
 }  // namespace lensforge

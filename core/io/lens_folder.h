@@ -10,15 +10,15 @@ namespace lens_file {
 inline constexpr const char* kJson = "lens.json";
 inline constexpr const char* kSurface = "surface.ply";
 inline constexpr const char* kSpline = "surface.spline";
-/// Of a lens with an outline: the mesh that kSurface is cut out of.
+/// For a lens with an outline: the mesh that kSurface is cut from.
 inline constexpr const char* kSheet = "sheet.ply";
-/// Of a lens whose front is a height map: its heights.
+/// For a lens whose front is a height map: its heights.
 inline constexpr const char* kFront = "front.exr";
 inline constexpr const char* kTargetPng = "target.png";
 inline constexpr const char* kTargetExr = "target.exr";
 inline constexpr const char* kRenderPng = "render.png";
 inline constexpr const char* kRenderExr = "render.exr";
-inline constexpr const char* kRenderColor = "render_color.png";  ///< Of a spectrum.
+inline constexpr const char* kRenderColor = "render_color.png";  ///< With a spectrum.
 inline constexpr const char* kError = "error.png";
 inline constexpr const char* kConvergence = "convergence.csv";
 inline constexpr const char* kOverview = "overview.png";
@@ -30,10 +30,10 @@ inline constexpr std::array kAll = {kJson,      kSurface,   kSpline,    kSheet, 
                                     kTargetPng, kTargetExr, kRenderPng, kRenderExr,   kRenderColor,
                                     kError,     kOverview,  kSetup,     kConvergence, kCheckpoint};
 
-/// Folder in which earlier versions put a lens together; a killed one has left it behind.
+/// Temporary folder of old versions, left behind if one was killed.
 inline constexpr const char* kStaging = "lens";
 
-/// The folder inside that `cam` writes into, and what is in it beside the programs.
+/// The subfolder that `cam` writes into, and its files other than the programs.
 inline constexpr const char* kCut = "cam";
 inline constexpr std::array kCutFiles = {"report.html", "report.json", "compare.html",
                                          "milled.ply",  "milled.png",  "leakage.png"};

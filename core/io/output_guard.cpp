@@ -46,7 +46,7 @@ bool is_one_of(const fs::path& name, const auto& names) {
   return std::find(names.begin(), names.end(), name.string()) != names.end();
 }
 
-/// The folder of a file, also of one that is named without any.
+/// The folder of a file, also if its path names none.
 fs::path folder_of(const fs::path& path) {
   std::error_code error;
   const fs::path whole = fs::weakly_canonical(path, error);

@@ -11,11 +11,10 @@
 
 namespace lensforge {
 
-/// Files of a folder that get their names all at once: while one of them cannot be written, none
-/// of them appears.
+/// Files of a folder that are published together: if one of them cannot be written, none appears.
 class PendingFiles {
  public:
-  /// @param folder  is there, or is made before the first add().
+  /// @param folder  exists, or is made before the first add().
   explicit PendingFiles(std::filesystem::path folder) : folder_(std::move(folder)) {}
 
   [[nodiscard]] const std::filesystem::path& folder() const { return folder_; }
@@ -26,7 +25,7 @@ class PendingFiles {
   /// The same for content that is in memory.
   void add(const std::string& name, std::string_view content);
   [[nodiscard]] bool has(const std::string& name) const;
-  /// Gives them their names in the order of add(). @return the files by their names.
+  /// Renames them to their names in the order of add(). @return their paths.
   /// @throw RunError
   std::vector<std::filesystem::path> publish();
 

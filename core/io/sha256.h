@@ -8,7 +8,7 @@
 
 namespace lensforge {
 
-/// SHA-256 (FIPS 180-4) of bytes that come piece by piece.
+/// SHA-256 (FIPS 180-4) of bytes added piece by piece.
 class Sha256 {
  public:
   Sha256();
@@ -17,7 +17,7 @@ class Sha256 {
   Sha256& operator=(Sha256&&) noexcept;
 
   void update(std::string_view bytes);
-  /// 64 lower-case hexadecimal digits of all that was taken. Nothing may follow.
+  /// 64 lower-case hexadecimal digits for all bytes added. Ends the computation.
   std::string finish();
 
  private:
@@ -25,7 +25,7 @@ class Sha256 {
   std::unique_ptr<State> state_;
 };
 
-/// Of a file's content. @throw InputError if it cannot be read.
+/// SHA-256 of a file's content. @throw InputError if it cannot be read.
 std::string sha256_of(const std::filesystem::path& file);
 
 }  // namespace lensforge

@@ -11,7 +11,8 @@ namespace lensforge {
 
 /// Share of unpolarised light that goes through a face between a medium of index η and air, by
 /// Fresnel's formulas, and its derivative by c, the cosine of the angle to the normal on the
-/// medium's side; the same both ways. Without coating. 0 where all light is reflected.
+/// medium's side. The face is uncoated; both directions have the same share. 0 at total internal
+/// reflection.
 LF_HD inline ValueSlope transmittance(double c, double eta) {
   const double s = refracted_cosine_squared(c, eta);
   if (!(c > 0.0) || !(s > 0.0)) return {0.0, 0.0};
@@ -26,9 +27,9 @@ LF_HD inline ValueSlope transmittance(double c, double eta) {
   return {1.0 - 0.5 * (r_across * r_across + r_along * r_along), -slope};
 }
 
-/// Share of light that is reflected at both faces of a lens and follows the rest, at right angles.
-/// It spreads over picture and surroundings: a picture is not darker anywhere than this share of
-/// its mean, if all of it fell on the picture evenly.
+/// Share of light at normal incidence that is reflected by both faces of a lens and then leaves
+/// with the rest. It spreads over the picture and its surroundings: if all of it fell evenly on the
+/// picture, no pixel would be darker than this share of the mean.
 inline double ghost_share(double eta) {
   const double reflected = 1.0 - transmittance(1.0, eta).value;
   return reflected * reflected;

@@ -13,25 +13,25 @@
 
 namespace lensforge {
 
-/// What comes to a front: parallel light of one direction, or light from a point.
+/// Light that meets a front: parallel, or from a point.
 struct FrontLight {
-  Eigen::Vector3d from;  ///< A unit direction, or the place of the point, mm.
+  Eigen::Vector3d from;  ///< A unit direction, or the position of the point, mm.
   bool point;
-  double ior;  ///< Behind the front.
+  double ior;  ///< Refractive index behind the front.
 };
 
 /// The ray behind a curved front at one of the front's points (Sun et al., section 3.5).
 ///
-/// Notation: e the point on the front, x its place in x and y, a and b unit directions of the light
-/// before and behind it, b_by_x and b_by_y the derivatives by x, n the unit normal towards the
-/// inside, w = (−∇h, 1) = |w| n, m = (b_x, b_y)/b_z. A bar (…_bar) is a derivative by that.
+/// Notation: e the point on the front, x its x and y, a and b unit directions of the light before
+/// and behind it, b_by_x and b_by_y the derivatives by x, n the inward unit normal, w = (−∇h, 1) =
+/// |w| n, m = (b_x, b_y)/b_z. A bar (…_bar) is a derivative by that quantity.
 struct FrontRefraction {
   Eigen::Vector3d e = unknown();
   Eigen::Vector3d b = unknown();
   Eigen::Vector2d gradient{0.0, 0.0};  ///< ∇h
   Eigen::Vector3d b_by_x{0.0, 0.0, 0.0};
   Eigen::Vector3d b_by_y{0.0, 0.0, 0.0};
-  bool lit = false;  ///< False where the light comes from the other side.
+  bool lit = false;  ///< False if the light comes from the other side.
 
   FrontRefraction() = default;
   LF_HD FrontRefraction(const FrontSurface& front, const FrontLight& light,
@@ -78,34 +78,34 @@ struct FrontRefraction {
     }
     return by_x;
   }
-  /// Derivative by x of where the ray passes a height z; folded over where its determinant is not
-  /// above 0.
+  /// Derivative by x of the point where the ray reaches height z. The light has folded over if the
+  /// determinant is not positive.
   [[nodiscard]] LF_HD Eigen::Matrix2d landing_by_x(double z) const {
     const Eigen::Vector2d m = slope();
     Eigen::Matrix2d lands = Eigen::Matrix2d::Identity() + (z - e.z()) * slope_by_x();
     for (int j = 0; j < 2; ++j) lands.col(j) -= gradient[j] * m;
     return lands;
   }
-  /// @param x_by_p  change of x with the point behind the front whose ray this is.
+  /// @param x_by_p  derivative of x by the point behind the front that the ray goes through.
   [[nodiscard]] LF_HD IncidentRay ray(const Eigen::Matrix2d& x_by_p) const {
     return {slope(), {e.x(), e.y()}, e.z(), b.z(), gradient, slope_by_x() * x_by_p, x_by_p};
   }
-  /// To another point of the front, to first order.
+  /// Moves to another point of the front, to first order.
   LF_HD void move(const Eigen::Vector2d& step) {
     e += Eigen::Vector3d(step.x(), step.y(), gradient.dot(step));
     b += step.x() * b_by_x + step.y() * b_by_y;
   }
 };
 
-/// The last step of Newton's method, as a share of the point's coordinates, and in mm where they
-/// are 0, is taken to first order: what is left is of the order of its square. Lenses need three or
-/// four steps.
+/// Newton's method ends at a step below kNearEntry of the point's coordinates plus kTinyEntry mm.
+/// That step is taken to first order, so the error is of the order of its square. Lenses need three
+/// or four steps.
 inline constexpr double kNearEntry = 1e-9;
 inline constexpr double kTinyEntry = 1e-12;
 inline constexpr int kMaxEntrySteps = 30;
 
-/// The ray from a source through a curved front to a point p behind it: Newton's method on
-/// x + (p_z − h(x)) m(x) = p_xy. All NaN where none comes to p.
+/// The ray from a source through a curved front to a point p behind it: Newton's method on x + (p_z
+/// − h(x)) m(x) = p_xy. All NaN if no ray reaches p.
 LF_HD inline IncidentRay ray_through_front(const FrontSurface& front, const FrontLight& light,
                                            const Eigen::Vector3d& p) {
   IncidentRay found = FrontRefraction().ray(Eigen::Matrix2d::Identity());

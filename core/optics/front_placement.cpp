@@ -13,7 +13,7 @@
 namespace lensforge {
 namespace {
 
-/// Between samples, mm.
+/// Distance between samples, mm.
 Eigen::Vector2d step_of(const HeightFront& front) {
   const HeightGrid& grid = front.spline->grid();
   return front.size.cwiseQuotient(Eigen::Vector2d(grid.columns - 1, grid.rows - 1));
@@ -35,7 +35,7 @@ double lowest(const SphericalFront& front, const Eigen::AlignedBox2d& rectangle)
 }
 
 double lowest(const HeightFront& front, const Eigen::AlignedBox2d& rectangle) {
-  constexpr double kPlaces = 4.0;  // A sample's distance.
+  constexpr double kPlaces = 4.0;  // Per sample distance.
   const FrontSurface surface(front);
   const Eigen::Vector2d count =
       (kPlaces * rectangle.sizes().cwiseQuotient(step_of(front))).array().ceil();
@@ -65,7 +65,7 @@ bool is_shadowed(const OpticalSetup& setup, const Eigen::Vector2d& place) {
   const FrontSurface front(*setup.front);
   const Eigen::AlignedBox2d plan(Eigen::Vector2d(0.0, 0.0), setup.lens_size);
   const Eigen::Vector3d e(place.x(), place.y(), front.height(place));
-  // Parallel light as far back as the lens is wide has left the part's plan or its depth.
+  // Twice the diagonal back, parallel light is outside the part's plan or depth.
   const Eigen::Vector3d from =
       setup.point ? setup.point->position
                   : Eigen::Vector3d(e - 2.0 * setup.lens_size.norm() * setup.light);

@@ -14,7 +14,7 @@
 
 namespace lensforge {
 
-/// Entry face of a lens that is a part of a sphere. Millimetres, lens frame.
+/// Spherical entry face of a lens. Millimetres, lens frame.
 struct SphericalFront {
   double radius = 0.0;  ///< Above 0 convex, bulging towards −z; below 0 concave.
   Eigen::Vector3d apex{0.0, 0.0, 0.0};
@@ -22,11 +22,11 @@ struct SphericalFront {
   friend bool operator==(const SphericalFront&, const SphericalFront&) = default;
 };
 
-/// Entry face of a lens that is a height map, z = h(x, y) in the lens frame. Millimetres.
+/// Entry face of a lens as a height map, z = h(x, y) in the lens frame. Millimetres.
 struct HeightFront {
   std::shared_ptr<const HeightSpline> spline;
-  Eigen::Vector2d size{0.0, 0.0};    ///< That the outermost samples span.
-  Eigen::Vector2d corner{0.0, 0.0};  ///< Their least x and y; 0 of a lens's own.
+  Eigen::Vector2d size{0.0, 0.0};    ///< Extent between the outermost samples.
+  Eigen::Vector2d corner{0.0, 0.0};  ///< Least x and y of the samples; 0 for the lens's own.
 
   friend bool operator==(const HeightFront& a, const HeightFront& b) {
     return a.size == b.size && a.corner == b.corner &&
@@ -34,20 +34,20 @@ struct HeightFront {
   }
 };
 
-/// Entry face of a lens that is not flat.
+/// A lens's entry face that is not flat.
 using Front = std::variant<SphericalFront, HeightFront>;
 
-/// z of the front at a place and its derivatives.
+/// Height of the front at a point, with derivatives.
 struct FrontPoint {
   double z;
   Eigen::Vector2d gradient;
   Eigen::Vector3d bend;  ///< ∂²z/∂x², ∂²z/∂x∂y, ∂²z/∂y²
 };
 
-/// The front as a height field z = h(x, y). Of a sphere, with ρ the distance from the apex in x and
-/// y and κ one over the radius, h = apex + κρ² / (1 + √(1 − κ²ρ²)); without a curvature it is the
-/// plane z = 0. Of a height map it is a view of the spline, whose coefficients must outlive it;
-/// with those in an executor's memory (reading()) its kernels can ask it.
+/// The front as a height field z = h(x, y). For a sphere, with ρ the distance from the apex in x
+/// and y and κ one over the radius, h = apex + κρ² / (1 + √(1 − κ²ρ²)); with κ = 0 it is the plane
+/// z = 0. For a height map it is a view of the spline's coefficients, which must outlive it.
+/// Kernels use reading() with a copy of the coefficients in their executor's memory.
 class FrontSurface {
  public:
   FrontSurface() = default;
@@ -65,20 +65,20 @@ class FrontSurface {
       : FrontSurface(std::visit([](const auto& one) { return FrontSurface(one); }, front)) {}
 
   [[nodiscard]] LF_HD bool is_height_map() const { return coefficients_ != nullptr; }
-  /// Of a height map, else empty.
+  /// The coefficients of a height map; empty for a sphere.
   [[nodiscard]] std::span<const double> coefficients() const {
     if (!is_height_map()) return {};
     const std::size_t columns = static_cast<std::size_t>(columns_) + 2 * HeightSpline::kBeyond;
     return {coefficients_, columns * (static_cast<std::size_t>(rows_) + 2 * HeightSpline::kBeyond)};
   }
-  /// The same surface, its coefficients elsewhere. @pre is_height_map().
+  /// The same surface with its coefficients at another address. @pre is_height_map().
   [[nodiscard]] FrontSurface reading(const double* coefficients) const {
     FrontSurface other = *this;
     other.coefficients_ = coefficients;
     return other;
   }
 
-  /// True where the height field has a point: everywhere of a height map.
+  /// True if the front has a height there; always true for a height map.
   [[nodiscard]] LF_HD bool covers(const Eigen::Vector2d& xy) const {
     return is_height_map() || cosine_squared(xy) > 0;
   }
@@ -104,7 +104,7 @@ class FrontSurface {
   [[nodiscard]] LF_HD Eigen::Vector2d across(const Eigen::Vector2d& xy) const {
     return {xy.x() - apex_.x(), xy.y() - apex_.y()};
   }
-  /// Of the normal's angle with z.
+  /// Squared cosine of the angle between normal and z.
   [[nodiscard]] LF_HD double cosine_squared(const Eigen::Vector2d& xy) const {
     return 1.0 - curvature_ * curvature_ * across(xy).squaredNorm();
   }
@@ -135,12 +135,12 @@ class FrontSurface {
   }
 
   // An even number of words, so that no bytes of a kernel's argument are left unset.
-  Eigen::Vector3d apex_{0.0, 0.0, 0.0};   ///< Of a height map x and y of its corner, and 0.
-  double curvature_ = 0.0;                ///< Of a sphere, 1/mm.
-  const double* coefficients_ = nullptr;  ///< Of a height map, HeightSpline::coefficients().
+  Eigen::Vector3d apex_{0.0, 0.0, 0.0};   ///< For a height map: x and y of its corner, and 0.
+  double curvature_ = 0.0;                ///< Sphere only, 1/mm.
+  const double* coefficients_ = nullptr;  ///< Height map only: HeightSpline::coefficients().
   std::int32_t columns_ = 0;              ///< Samples.
   std::int32_t rows_ = 0;
-  double per_mm_x_ = 0.0;  ///< Steps between samples a mm.
+  double per_mm_x_ = 0.0;  ///< Sample steps per mm.
   double per_mm_y_ = 0.0;
 };
 

@@ -8,10 +8,10 @@
 namespace lensforge {
 namespace {
 
-using Lines = Eigen::MatrixXd;  ///< n × L: a line a column.
+using Lines = Eigen::MatrixXd;  ///< n × L: one line per column.
 
-/// m at all samples. Of "not a knot" ends m_0 = 2 m_1 − m_2, which with m_0 + 4 m_1 + m_2 = 6 d_1,
-/// d the second difference of the samples, leaves m_1 = d_1.
+/// m at all samples. "Not a knot" ends have m_0 = 2 m_1 − m_2; with m_0 + 4 m_1 + m_2 = 6 d_1, d
+/// the second difference of the samples, this gives m_1 = d_1.
 Lines second_derivatives(const Lines& samples) {
   const Eigen::Index n = samples.rows();
   Lines m(n, samples.cols());

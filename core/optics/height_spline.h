@@ -8,33 +8,33 @@
 #include "core/compute/host_device.h"
 #include "core/image/height_grid.h"
 
-/// Notation: t place along an axis in samples, 0 … n − 1 from the least coordinate; B_i the uniform
-/// cubic B-spline around t = i; c_i its coefficient; m_i = c_{i−1} − 2 c_i + c_{i+1} the second
-/// derivative at t = i.
+/// Notation: t position along an axis in samples, 0 … n − 1 from the least coordinate; B_i the
+/// uniform cubic B-spline around t = i; c_i its coefficient; m_i = c_{i−1} − 2 c_i + c_{i+1} the
+/// second derivative at t = i.
 namespace lensforge {
 
 /// Bicubic spline through a grid of heights, twice continuously differentiable. At the edges it is
 /// "not a knot" (de Boor 1978, ch. IV): the two outermost cells of a line share one cubic, so that
-/// the error is of fourth order up to the edge. Beyond the edge the curvature falls to nothing
-/// within one sample's distance, and the spline goes on straight.
+/// the error is of fourth order up to the edge. Beyond the edge the curvature falls to zero within
+/// one sample's distance; from there the spline is straight.
 class HeightSpline {
  public:
-  /// Samples beyond the edge that coefficients are kept for, on each side.
+  /// Samples beyond each edge that have coefficients.
   static constexpr int kBeyond = 2;
 
-  /// @pre kMinHeightSamples each way, as read_heights() gives them; all finite.
+  /// @pre at least kMinHeightSamples each way, in the order of read_heights(); all finite.
   explicit HeightSpline(HeightGrid grid);
 
   [[nodiscard]] const HeightGrid& grid() const { return grid_; }
   /// c of B_i(x) B_j(y) in mm, (columns + 2 kBeyond) × (rows + 2 kBeyond), i = −kBeyond …, row by
   /// row from the least y.
   [[nodiscard]] const std::vector<double>& coefficients() const { return coefficients_; }
-  /// One of them. @pre −kBeyond ≤ i < columns + kBeyond; the same of j.
+  /// One coefficient. @pre −kBeyond ≤ i < columns + kBeyond; the same for j.
   [[nodiscard]] double coefficient(int i, int j) const {
     const std::ptrdiff_t width = grid_.columns + 2 * kBeyond;
     return coefficients_[static_cast<std::size_t>((j + kBeyond) * width + i + kBeyond)];
   }
-  [[nodiscard]] float lowest() const;  ///< Of the samples.
+  [[nodiscard]] float lowest() const;  ///< Minimum of the samples.
   [[nodiscard]] float highest() const;
 
   friend bool operator==(const HeightSpline& a, const HeightSpline& b) {
@@ -46,17 +46,17 @@ class HeightSpline {
   std::vector<double> coefficients_;
 };
 
-/// The B-splines that are not 0 at a place: values and derivatives by t of four in a row, or of
-/// their straight continuation.
+/// Values and derivatives by t of the four B-splines that are not 0 at a point, or of their
+/// straight continuation.
 struct SplineWeights {
-  std::int64_t first;  ///< Place of the first one's coefficient in HeightSpline::coefficients().
+  std::int64_t first;  ///< Index of the first coefficient in HeightSpline::coefficients().
   double value[4];
   double slope[4];
   double bend[4];
 
   LF_HD SplineWeights(double t, std::int64_t samples) {
     const auto last = static_cast<double>(samples);
-    double inside = t > -1.0 ? t : -1.0;  // Also where t is not a number.
+    double inside = t > -1.0 ? t : -1.0;  // Also if t is NaN.
     if (inside > last) inside = last;
     auto cell = static_cast<std::int64_t>(inside + 1.0) - 1;
     if (cell > samples - 1) cell = samples - 1;

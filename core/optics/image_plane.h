@@ -9,7 +9,7 @@
 
 namespace lensforge {
 
-/// The one place that ties picture pixels to millimetres on the receiving plane.
+/// Converts between picture pixels and millimetres on the receiving plane.
 ///
 /// Pixel coordinates (u, v) are continuous: pixel (column c, row r) covers [c, c+1] × [r, r+1], row
 /// 0 on top. A viewer on the lens's side sees lens-frame +y up and +x to the left, so for

@@ -8,18 +8,18 @@
 
 namespace lensforge {
 
-/// The ray that comes to a point of the surface, and how it changes with that point: all that is
-/// costly to find of light whose direction varies. Moving the point along its ray changes nothing,
-/// so that derivatives by x and y are enough.
+/// The ray that reaches a surface point, and its derivatives by that point: everything that is
+/// costly to find if the light's direction varies. Moving the point along its ray changes nothing,
+/// so derivatives by x and y suffice.
 ///
-/// Notation: p the point, a the ray's unit direction there, m = (a_x, a_y)/a_z its slope, e where
-/// it enters the lens, x that place in x and y, ∇h the front's gradient there. A bar (…_bar) is a
-/// derivative by that. All NaN where no ray comes to p.
+/// Notation: p the point, a the ray's unit direction there, m = (a_x, a_y)/a_z its slope, e the
+/// point where it enters the lens, x the x and y of e, ∇h the front's gradient there. A bar (…_bar)
+/// is a derivative by that quantity. All NaN if no ray reaches p.
 struct IncidentRay {
   Eigen::Vector2d m;
   Eigen::Vector2d x;         ///< mm
-  double z;                  ///< Of e, mm.
-  double a_z;                ///< Below 0 of a mirror's light.
+  double z;                  ///< z of e, mm.
+  double a_z;                ///< Negative for a mirror's light.
   Eigen::Vector2d gradient;  ///< ∇h
   Eigen::Matrix2d m_by_p;    ///< ∂m/∂(p_x, p_y), 1/mm
   Eigen::Matrix2d x_by_p;    ///< ∂x/∂(p_x, p_y)
@@ -57,14 +57,14 @@ struct IncidentRay {
   }
 };
 
-/// Rays to a triangle's corners, where they have been found before: null elsewhere.
+/// Cached rays to a triangle's corners; null if not computed.
 struct CornerRays {
   const IncidentRay* r0 = nullptr;
   const IncidentRay* r1 = nullptr;
   const IncidentRay* r2 = nullptr;
 };
 
-/// Rays to all vertices of a mesh; none in light that comes from one direction.
+/// Rays to all vertices of a mesh; null for parallel light.
 struct VertexRays {
   const IncidentRay* of = nullptr;
 

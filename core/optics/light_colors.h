@@ -7,17 +7,17 @@
 
 namespace lensforge {
 
-/// The setup for light of one wavelength of its spectrum: its index is that of the line d.
+/// The setup for light of one wavelength; setup.ior is taken as the index at the d line.
 OpticalSetup in_color(OpticalSetup setup, double wavelength);
 
-/// A setup in the light of one wavelength, and the share of the brightness that this has.
+/// The setup for one wavelength, and that wavelength's share of the brightness.
 struct LightColor {
   OpticalSetup setup;
   double share;
 };
 
-/// The colours of a setup, from the shortest wavelength, which is bent most; one without a spectrum
-/// is its own only colour.
+/// The colours of a setup, shortest wavelength (bent most) first. A setup without a spectrum has
+/// one colour: itself.
 std::vector<LightColor> light_colors(const OpticalSetup& setup);
 
 }  // namespace lensforge

@@ -9,17 +9,17 @@
 namespace lensforge {
 namespace {
 
-/// Steps of Newton's method in place_on_start(), the shift that its derivatives are taken over, mm,
-/// and the change that ends it: vertices are moved by a few hundredths of a millimetre at least.
+/// Newton's method in place_on_start(): maximum steps, shift for its derivatives, mm, and the
+/// change that ends it. Vertices move by a few hundredths of a millimetre at least.
 constexpr int kMaxPlaceSteps = 8;
 constexpr double kPlaceShift = 1e-4;
 constexpr double kPlaceChange = 1e-9;
 
-/// Cells each way that the lit face is summed over: of a flat source the
-/// intake of a cell is right to second order in its size.
+/// Cells each way in the sum over the lit face: with a flat source the intake of a cell is exact to
+/// second order in its size.
 constexpr int kFrontCells = 64;
 
-/// Seen along z, mm².
+/// Area seen along z, mm².
 double aperture(const OpticalSetup& setup) {
   return setup.outline ? polygon_area(setup.outline->points) : setup.lens_size.prod();
 }
@@ -72,7 +72,7 @@ Eigen::Vector2d LightPath::place_on_start(const Eigen::Vector2d& pixel, double z
   };
   Eigen::Vector2d place = to.head<2>() - (to.z() - z) * slope_at(to.head<2>());
   if (!source_.varies()) return place;
-  // This slope changes with the place.
+  // The slope depends on the place.
   for (int step = 0; step < kMaxPlaceSteps; ++step) {
     const Eigen::Vector2d m = slope_at(place);
     Eigen::Matrix2d lands = Eigen::Matrix2d::Identity();

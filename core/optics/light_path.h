@@ -17,10 +17,10 @@
 #include "core/surface/corners.h"
 
 /// Notation: p surface point and t surface triangle, mm in the lens frame; n unit normal, n_z > 0;
-/// a unit direction of the light before the surface, inside a lens; b that of the ray after it, m
-/// its slope (dx/dz, dy/dz); u landing point in pixel coordinates. A bar (…_bar) is a derivative by
-/// that. `known` are the rays that ray_to() gave for the same points: a caller that asks several
-/// times finds them once.
+/// a unit direction of the light before the surface (inside a lens); b unit direction of the ray
+/// after it, m its slope (dx/dz, dy/dz); u landing point in pixel coordinates. A bar (…_bar) is a
+/// derivative by that quantity. `known` holds the results of ray_to() for the same points, so
+/// repeated calls need not solve for them again.
 namespace lensforge {
 
 /// Light after a plane facet. Parallel light leaves it as one beam; light from a point has a beam
@@ -43,42 +43,42 @@ struct FacetSlopes {
   Eigen::Vector2d m2{0.0, 0.0};
 };
 
-/// The way of the light from the lamp to the screen. All that depends on the kind of source, on
-/// whether the surface refracts or reflects, and on where the screen stands is asked here; no other
-/// room knows the refractive index, the direction of the light or the distance of the screen.
+/// The path of the light from the lamp to the screen. Everything that depends on the kind of
+/// source, on refraction or reflection, and on the screen is computed here; no other room uses the
+/// refractive index, the direction of the light or the distance of the screen.
 ///
-/// One value with tags, not a template or a base class: kernels carry it by value to any device,
-/// and the rooms that ask are compiled once. It refers to a height map's coefficients in its setup,
-/// which must outlive it. Light along +z, which nearly all lenses are made for,
-/// keeps its own shorter formulas; the branches cost less than 1 % of an objective's time.
+/// One value with tags, not a template or a base class: kernels copy it to any device, and its
+/// callers are compiled once. It refers to a height map's coefficients in its setup, which must
+/// outlive it. Light along +z, the usual case, has its own shorter formulas; the branches cost less
+/// than 1 % of an objective's time.
 class LightPath {
  public:
   explicit LightPath(const OpticalSetup& setup);
 
-  /// The same light, its flux as shares of another whole than a flat surface takes, mm².
+  /// The same light with flux() as a share of `whole`, mm², instead of a flat surface's intake.
   [[nodiscard]] LightPath sharing(double whole) const {
     LightPath other = *this;
     other.per_whole_ = 1.0 / whole;
     return other;
   }
 
-  /// Coefficients of a front that is a height map, which live in the setup; else empty.
+  /// Coefficients of a height-map front, owned by the setup; otherwise empty.
   [[nodiscard]] std::span<const double> front_coefficients() const {
     return source_.front().coefficients();
   }
-  /// The same light for kernels that read those coefficients elsewhere. @pre there are some.
+  /// The same light with those coefficients at another address, for kernels. @pre there are some.
   [[nodiscard]] LightPath reading(const double* coefficients) const {
     LightPath other = *this;
     other.source_ = source_.reading(coefficients);
     return other;
   }
 
-  /// Ties the screen's millimetres to the picture's pixels.
+  /// Converts between the screen's millimetres and the picture's pixels.
   [[nodiscard]] LF_HD const ImagePlane& plane() const { return screen_.plane(); }
 
-  /// True if light comes to each point from another direction, which has to be solved for.
+  /// True if the light's direction differs from point to point and must be solved for.
   [[nodiscard]] LF_HD bool varies() const { return source_.varies(); }
-  /// The ray that comes to p. @pre varies().
+  /// The ray that reaches p. @pre varies().
   [[nodiscard]] LF_HD IncidentRay ray_to(const Eigen::Vector3d& p) const {
     return source_.ray_to(p);
   }
@@ -93,7 +93,7 @@ class LightPath {
     }
     return leaves(source_.incident(p, known), n);
   }
-  /// The same of a whole facet.
+  /// The same for a whole facet.
   [[nodiscard]] LF_HD bool transmits(const Corners& t, const Eigen::Vector3d& n,
                                      const CornerRays& known = {}) const {
     if (!source_.varies()) return transmits(t.v0, n);
@@ -101,9 +101,9 @@ class LightPath {
            transmits(t.v2, n, known.r2);
   }
 
-  /// Barrier of a facet against what its light must not do; infinite where no light leaves. Of a
-  /// lens f_tir of Sun et al., Eq. 9, of a mirror 1 / (−n·a b_z); of light from a point the mean
-  /// over the corners.
+  /// Barrier that keeps a facet's light from being lost; infinite if no light leaves. For a lens
+  /// f_tir (Sun et al., Eq. 9), for a mirror 1 / (−n·a b_z); for light from a point the mean over
+  /// the corners.
   [[nodiscard]] LF_HD double barrier(const Corners& t, const Eigen::Vector3d& n,
                                      const CornerRays& known = {}) const {
     if (source_.along_z()) return barrier_along_z(n).value;
@@ -178,7 +178,7 @@ class LightPath {
            beam_adjoint(t.v2, n, facet.b2, m_bar.m2, t_bar.v2, rays.r2);
   }
 
-  /// Where a ray of slope m that leaves the surface at p meets the screen.
+  /// Point where a ray of slope m from p meets the screen, in pixel coordinates.
   [[nodiscard]] LF_HD Eigen::Vector2d land(const Eigen::Vector3d& p,
                                            const Eigen::Vector2d& m) const {
     return screen_.land(p, m);
@@ -191,27 +191,27 @@ class LightPath {
   }
   /// Distance of a surface point from the screen's plane, mm; negative beyond it.
   [[nodiscard]] double clearance(const Eigen::Vector3d& p) const { return screen_.clearance(p); }
-  /// True if the screen stands beyond a surface point.
+  /// True if the screen is beyond a surface point.
   [[nodiscard]] bool before_screen(const Eigen::Vector3d& p) const { return clearance(p) > 0.0; }
 
-  /// Light that a triangle takes, as the area of evenly lit lens that takes as much, mm²: where its
-  /// rays enter the lens. Moving a vertex inside a mesh never changes the sum over its triangles,
-  /// unless faces reflect: then it is what the triangle lets out, by its own normal and the light
-  /// at its middle, and of a lens that its light meets at right angles the same.
+  /// Light that a triangle takes in, as the area of an evenly lit lens that takes in the same, mm²,
+  /// measured where the rays enter. Moving a vertex inside a mesh does not change the sum over its
+  /// triangles. If faces reflect, it is the light that the triangle lets out, by its own normal and
+  /// the light at its middle, equal to the above at normal incidence.
   [[nodiscard]] LF_HD double intake(const Corners& t, const CornerRays& known = {}) const {
     const double even = source_.intake(t, known);
     return loses() ? even * Passage(*this, t).share() : even;
   }
-  /// True if intake() is the plan area however a triangle slopes, so that all cells of an even grid
-  /// take the same.
+  /// True if intake() is the plan area whatever the triangle's slope, so all cells of an even grid
+  /// take in the same.
   [[nodiscard]] LF_HD bool intake_is_plan_area() const { return source_.along_z() && !loses(); }
 
-  /// intake() as a share of the whole (Sun et al., Eq. 1): of what a flat surface of the lens's
-  /// size takes, of parallel light inside of its outline, or of what sharing() was given.
+  /// intake() as a share of a whole (Sun et al., Eq. 1): the intake of a flat surface of the lens's
+  /// size (for parallel light inside its outline), or the argument of sharing().
   [[nodiscard]] LF_HD double flux(const Corners& t, const CornerRays& known = {}) const {
     return intake(t, known) * per_whole_;
   }
-  /// Adjoint of flux(): adds to the derivatives by the corners, or by area_normal(t) where flux
+  /// Adjoint of flux(): adds to the derivatives by the corners, or by area_normal(t) if flux
   /// depends on that alone.
   LF_HD void flux_adjoint(const Corners& t, double flux_bar, Corners& t_bar,
                           Eigen::Vector3d& area_normal_bar, const CornerRays& known = {}) const {
@@ -226,21 +226,20 @@ class LightPath {
   [[nodiscard]] Eigen::Vector2d gradient_for(const Eigen::Vector3d& p,
                                              const Eigen::Vector2d& pixel) const;
 
-  /// True if the shape that a design starts from is flat. Behind a curved front, which may gather
-  /// the light of a flat surface anywhere, it is the surface that makes the light parallel.
+  /// True if a design starts from a flat surface. Behind a curved front, which could focus a flat
+  /// surface's light anywhere, it starts from the surface that makes the light parallel.
   [[nodiscard]] bool starts_flat() const { return !source_.is_bent(); }
-  /// Where the light of that shape lands from p, and the point of height z of that shape whose
-  /// light lands at a pixel.
+  /// For the starting surface: the landing point of the light from p, and the point at height z
+  /// whose light lands at a pixel.
   [[nodiscard]] Eigen::Vector2d land_from_start(const Eigen::Vector3d& p) const;
   [[nodiscard]] Eigen::Vector2d place_on_start(const Eigen::Vector2d& pixel, double z) const;
 
-  /// Slope of the ray from the middle of a flat surface of height z; behind a height map, which may
-  /// slope anyhow in its middle, that behind its mean gradient.
+  /// Slope of the ray from the middle of a flat surface of height z. Behind a height map, whose
+  /// slope in the middle is arbitrary, the mean gradient is used.
   [[nodiscard]] Eigen::Vector2d chief_slope(double z) const;
 
-  /// How far a change of slope moves the light over the screen, mm, to first order, around the
-  /// middle of a flat surface of height z: a magnitude, the geometric mean over all directions of
-  /// the slope.
+  /// Distance on the screen by which a change of slope moves the light, mm, to first order, at the
+  /// middle of a flat surface of height z: the geometric mean over all directions of the slope.
   [[nodiscard]] double reach(double slope, double z = 0.0) const;
 
  private:
@@ -251,8 +250,8 @@ class LightPath {
     Eigen::Vector3d by_n;
   };
 
-  /// What goes through both faces of a lens to a triangle's middle and out there, as a share of
-  /// what goes through at right angles.
+  /// Transmittance of both faces of a lens for the ray through a triangle's middle, relative to
+  /// that at normal incidence.
   class Passage {
    public:
     LF_HD Passage(const LightPath& light, const Corners& t)
@@ -286,14 +285,14 @@ class LightPath {
     Eigen::Vector3d middle_;
     Eigen::Vector3d n_;
     double length_;
-    IncidentRay ray_;  ///< To the middle, in light that varies.
+    IncidentRay ray_;  ///< To the middle, if varies().
     Eigen::Vector3d a_;
-    double straight_;  ///< Through both faces at right angles.
+    double straight_;  ///< Transmittance at normal incidence.
     ValueSlope front_{};
     ValueSlope back_{};
   };
 
-  /// Of kind_: a lens, one whose faces reflect (OpticalSetup::fresnel), a mirror.
+  /// Values of kind_: lens, lens whose faces reflect (OpticalSetup::fresnel), mirror.
   static constexpr std::int64_t kLens = 0;
   static constexpr std::int64_t kLosing = 1;
   static constexpr std::int64_t kMirror = 2;
@@ -359,7 +358,7 @@ class LightPath {
       return c < 0.0 && a.z() - 2.0 * c * n.z() > 0.0 &&
              (!screen_.turned() || screen_.faces(RefractedBeam::reflected(a, n).m));
     }
-    // b_z = √s n_z − η (c n_z − a_z), asked without the root.
+    // b_z = √s n_z − η (c n_z − a_z), compared without the root.
     const double s = refracted_cosine_squared(c, eta_);
     const double back = eta_ * (c * n.z() - a.z());
     return c > 0.0 && s > 0.0 && (back < 0.0 || s * n.z() * n.z() > back * back) &&
@@ -370,8 +369,8 @@ class LightPath {
   LightSource source_;
   double per_whole_;        ///< 1/mm²
   double eta_;              ///< n_lens / n_air
-  std::int64_t kind_;       ///< Wide, so that no bytes of a kernel's argument are left unset.
-  Eigen::Vector2d middle_;  ///< Of the lens, mm.
+  std::int64_t kind_;       ///< Wide, so a kernel's argument has no unset bytes.
+  Eigen::Vector2d middle_;  ///< The lens's, mm.
 };
 
 }  // namespace lensforge

@@ -21,7 +21,7 @@ LightSource::LightSource(const OpticalSetup& setup)
     const Eigen::Vector3d middle(0.5 * setup.lens_size.x(), 0.5 * setup.lens_size.y(), 0.0);
     const Eigen::Vector3d way = middle - position_;
     axis_ = way.normalized();
-    // An evenly lit lens takes its plan area: a solid angle is plan area × |way_z| / |way|³.
+    // An evenly lit lens takes in its plan area; a solid angle is plan area × |way_z| / |way|³.
     scale_ = way.squaredNorm() * way.norm() / way.z();
     lambertian_ = setup.point->emission == Emission::kLambertian ? 1.0 : 0.0;
   } else if (setup.front) {
@@ -36,7 +36,7 @@ LightSource::LightSource(const OpticalSetup& setup)
 
 Eigen::Vector3d LightSource::mean_direction(const Eigen::Vector2d& size) const {
   constexpr int kSamples = 64;  // Along an edge.
-  // The mean of a derivative along a line is by the line's ends.
+  // The mean derivative along a line follows from the line's ends.
   Eigen::Vector2d rise = Eigen::Vector2d::Zero();
   for (int k = 0; k < kSamples; ++k) {
     const Eigen::Vector2d along = (k + 0.5) / kSamples * size;

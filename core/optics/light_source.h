@@ -15,24 +15,24 @@
 
 namespace lensforge {
 
-/// The light before the surface: the direction in which it comes to a point, and how much of it a
-/// triangle takes. Notation: p surface point and t surface triangle, mm; a unit direction of the
-/// light at p, inside a lens. A bar (…_bar) is a derivative by that. `known` is what ray_to()
-/// gives, where a caller has it: without it, each answer solves for it in light that varies.
+/// The light before the surface: its direction at a point, and the amount that a triangle takes in.
+/// Notation: p surface point and t surface triangle, mm; a unit direction of the light at p (inside
+/// a lens). A bar (…_bar) is a derivative by that quantity. `known` holds results of ray_to();
+/// without it, each call solves for the ray again if varies().
 class LightSource {
  public:
   explicit LightSource(const OpticalSetup& setup);
 
   /// Parallel light along +z; its formulas are the shortest.
   [[nodiscard]] LF_HD bool along_z() const { return kind_ == Kind::kAlongZ; }
-  /// A direction for each point, not one for all.
+  /// True if each point has its own direction of light.
   [[nodiscard]] LF_HD bool varies() const { return kind_ >= Kind::kPointBehindFront; }
-  /// True behind a curved front.
+  /// True if the front is curved.
   [[nodiscard]] LF_HD bool is_bent() const { return kind_ >= Kind::kParallelBent; }
   /// The direction of parallel light inside a lens. @pre !varies().
   [[nodiscard]] LF_HD const Eigen::Vector3d& direction() const { return direction_; }
 
-  /// The ray that comes to p. @pre varies().
+  /// The ray that reaches p. @pre varies().
   [[nodiscard]] LF_HD LF_APART IncidentRay ray_to(const Eigen::Vector3d& p) const {
     if (kind_ == Kind::kPointBehindFront) {
       const Eigen::Vector2d across(p.x() - position_.x(), p.y() - position_.y());
@@ -57,28 +57,28 @@ class LightSource {
     return known != nullptr ? known->direction_adjoint(a_bar) : ray_to(p).direction_adjoint(a_bar);
   }
 
-  /// The entry face, if it is curved; else z = 0.
+  /// The entry face; the plane z = 0 unless it is curved.
   [[nodiscard]] const FrontSurface& front() const { return front_; }
-  /// The same light behind a height map whose coefficients lie elsewhere. @pre
+  /// The same light with the height map's coefficients at another address. @pre
   /// front().is_height_map().
   [[nodiscard]] LightSource reading(const double* coefficients) const {
     LightSource other = *this;
     other.front_ = front_.reading(coefficients);
     return other;
   }
-  /// The light inside behind the front as a plane of its mean gradient, at the middle of a lens of
-  /// this size: where a height map sends the light as a whole. @pre is_bent().
+  /// Direction of the light inside a lens of this size, at its middle, if the front were a plane of
+  /// its mean gradient: the mean direction behind a height map. @pre is_bent().
   [[nodiscard]] Eigen::Vector3d mean_direction(const Eigen::Vector2d& size) const;
 
-  /// Point of the entry face at a place, or of z = 0 under a mirror.
+  /// Point of the entry face at x and y; for a mirror of z = 0.
   [[nodiscard]] Eigen::Vector3d front_at(const Eigen::Vector2d& place) const {
     return {place.x(), place.y(), front_.height(place)};
   }
-  /// Where the ray to p enters the lens, or the place of p on a mirror, mm.
+  /// Point where the ray to p enters the lens, or p's point on a mirror, mm.
   [[nodiscard]] Eigen::Vector3d entry(const Eigen::Vector3d& p) const;
 
-  /// Cosine of the angle between a lens's front and the light behind it; 1 where it is the same for
-  /// all of the lens. @param ray  of light that varies, ray_to().
+  /// Cosine of the angle between the front's normal and the light behind it; 1 unless varies().
+  /// @param ray  from ray_to().
   [[nodiscard]] LF_HD double front_cosine(const IncidentRay& ray) const {
     if (!varies()) return 1.0;
     const Eigen::Vector3d w(-ray.gradient.x(), -ray.gradient.y(), 1.0);
@@ -97,14 +97,15 @@ class LightSource {
                               bend[1] * w_bar.x() + bend[2] * w_bar.y()});
   }
 
-  /// Light that a triangle takes, mm²: where the rays enter, the area of evenly lit lens that takes
-  /// as much, of a point source the solid angle on the scale of the middle of the lens.
+  /// Light that a triangle takes in, mm²: the area of an evenly lit lens that takes in the same,
+  /// measured where the rays enter; for a point source the solid angle, scaled to the middle of the
+  /// lens.
   [[nodiscard]] LF_HD double intake(const Corners& t, const CornerRays& known = {}) const {
     if (along_z()) return plan_area(t);
     if (!varies()) return area_across(t);
     return varied_intake(t, known);
   }
-  /// Adjoint of intake(): adds to the derivatives by the corners, or by area_normal(t) where the
+  /// Adjoint of intake(): adds to the derivatives by the corners, or by area_normal(t) if the
   /// intake depends on that alone.
   LF_HD void intake_adjoint(const Corners& t, double bar, Corners& t_bar,
                             Eigen::Vector3d& area_normal_bar, const CornerRays& known = {}) const {
@@ -120,7 +121,7 @@ class LightSource {
   }
 
  private:
-  /// As wide as a double, so that no bytes of a kernel's argument are left unset.
+  /// As wide as a double, so a kernel's argument has no unset bytes.
   enum class Kind : std::int64_t {
     kAlongZ,            ///< Parallel, along +z through a flat front.
     kParallel,          ///< Parallel, from any direction.
@@ -131,11 +132,11 @@ class LightSource {
   };
 
   [[nodiscard]] LF_HD bool lambertian() const { return lambertian_ != 0.0; }
-  /// Of a triangle across parallel light, on the scale of an evenly lit lens.
+  /// Area of a triangle across parallel light, scaled to an evenly lit lens.
   [[nodiscard]] LF_HD double area_across(const Corners& t) const {
     return 0.5 * area_normal(t).dot(direction_) / direction_.z();
   }
-  /// The straight ray from the source to p, which counts as the place where it enters.
+  /// The straight ray from the source to p; p counts as the point where it enters.
   [[nodiscard]] LF_HD IncidentRay ray_in_air(const Eigen::Vector3d& p) const {
     const Eigen::Vector3d way = p - position_;
     const Eigen::Matrix2d one = Eigen::Matrix2d::Identity();
@@ -147,7 +148,8 @@ class LightSource {
             one / way.z(),
             one};
   }
-  /// From the source, or the origin of the lens frame, to where the ray to p leaves the air.
+  /// From the source, or the origin of the lens frame, to the point where the ray to p leaves the
+  /// air.
   [[nodiscard]] LF_HD LF_INLINE Eigen::Vector3d vector_to(
       const Eigen::Vector3d& p, const IncidentRay* known = nullptr) const {
     if (kind_ == Kind::kPoint) return p - position_;
@@ -163,7 +165,7 @@ class LightSource {
     if (kind_ == Kind::kPoint) return bar;
     return known != nullptr ? known->entry_adjoint(bar) : ray_to(p).entry_adjoint(bar);
   }
-  /// Of the angle between a triangle's middle and the axis of a flat source.
+  /// Cosine of the angle between a triangle's middle and the axis of a flat source.
   [[nodiscard]] LF_HD double cosine(const VectorsBar& r) const {
     return axis_.dot((r.a + r.b + r.c).normalized());
   }
@@ -202,14 +204,14 @@ class LightSource {
     t_bar.v2 += vector_adjoint(t.v2, r_bar.c, known.r2);
   }
 
-  Eigen::Vector3d direction_;  ///< Behind a flat front, before a curved one.
+  Eigen::Vector3d direction_;  ///< Behind a flat front or before a curved one.
   Eigen::Vector3d position_;
-  Eigen::Vector3d axis_;  ///< Of a flat source, towards the middle of the lens.
+  Eigen::Vector3d axis_;  ///< Axis of a flat source, towards the middle of the lens.
   double eta_;            ///< n_lens / n_air
-  double scale_;          ///< mm² per steradian; negative where triangles are seen from above.
+  double scale_;          ///< mm² per steradian; negative if triangles are seen from above.
   double lambertian_;     ///< 1 of a flat source, 0 of an even one.
   Kind kind_;
-  FrontSurface front_;  ///< Of a lens with a curved one.
+  FrontSurface front_;  ///< The lens's front, if curved.
 };
 
 }  // namespace lensforge

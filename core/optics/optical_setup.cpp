@@ -16,9 +16,9 @@
 namespace lensforge {
 namespace {
 
-/// Of a unit vector's length: a few rounding errors.
+/// Tolerance of a unit vector's length: a few rounding errors.
 constexpr double kUnitTolerance = 1e-12;
-/// Of a height map's size against the lens's, relative: what a file's decimals may lose.
+/// Relative tolerance of a height map's size against the lens's: rounding of a file's decimals.
 constexpr double kSameSize = 1e-9;
 
 template <class Value>

@@ -28,14 +28,14 @@ void add_quarter(const Eigen::Vector2d& centre, double radius, int quarter, Poly
   }
 }
 
-/// Without corners that repeat the one before.
+/// The polygon without consecutive equal corners.
 Polygon without_repeats(Polygon points) {
   points.erase(std::unique(points.begin(), points.end()), points.end());
   while (points.size() > 1 && points.front() == points.back()) points.pop_back();
   return points;
 }
 
-/// Which side of a → b a point lies on: −1, 0 or 1.
+/// Side of a → b on which a point lies: −1, 0 or 1.
 int side(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vector2d& p) {
   const double s = cross(b - a, p - a);
   return s > 0.0 ? 1 : (s < 0.0 ? -1 : 0);
@@ -57,7 +57,7 @@ bool meet(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vecto
          (ca == 0 && between(c, d, a)) || (cb == 0 && between(c, d, b));
 }
 
-/// Two sides of a polygon that meet though they are no neighbours, or fold back on each other.
+/// Two sides of a polygon that meet without being neighbours, or that fold back on each other.
 std::optional<std::pair<std::size_t, std::size_t>> meeting_sides(const Polygon& points) {
   const std::size_t n = points.size();
   const auto start = [&](std::size_t k) -> const Eigen::Vector2d& { return points[k % n]; };

@@ -11,9 +11,9 @@
 /// Light from a point.
 ///
 /// Notation: a, b, c vectors from the source to the corners of a triangle; D depth of the source
-/// below a flat front, T height of a point above it, x its place across, from the source; η
+/// below a flat front, T height of a point above it, x its lateral offset from the source; η
 /// refractive index behind the front; μx slope of the ray behind the front, r = |x|². A bar (…_bar)
-/// is a derivative by that.
+/// is a derivative by that quantity.
 namespace lensforge {
 
 /// a × b; GCC 12 leaves Eigen's as a call.
@@ -35,8 +35,7 @@ struct SolidAngle {
       : la(a.norm()),
         lb(b.norm()),
         lc(c.norm()),
-        // Differences first: of a facet far away the products of whole vectors would keep few
-        // digits.
+        // Differences first: for a distant facet, products of whole vectors lose digits.
         n(a.dot(cross_product(b - a, c - a))),
         d(la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb) {}
 
@@ -89,7 +88,7 @@ struct FrontRay {
     const double r = x.squaredNorm();
     const double k = eta * eta - 1.0;
     const double optical = depth * eta;
-    // Bent at the place where a ray nearly along z would be: the error is of third order.
+    // Starts with the refraction point of a ray nearly along z: the error is of third order.
     const double g = 1.0 / (depth + height / eta);
     mu = g / std::sqrt(eta * eta + k * r * g * g);
     for (int i = 0; i < kMaxSteps; ++i) {
@@ -105,7 +104,7 @@ struct FrontRay {
     mu_by_r = -0.5 * optical * k * mu * mu * mu * q * q * q / steepness;
   }
 
-  /// @param source  the place of the source, mm.
+  /// @param source  position of the source, mm.
   [[nodiscard]] LF_HD IncidentRay ray(const Eigen::Vector3d& source) const {
     const Eigen::Vector2d m = mu * x;
     Eigen::Matrix2d m_by_p;
@@ -122,8 +121,8 @@ struct FrontRay {
   }
 
  private:
-  /// A step below this share leaves an error of its square. The usual lens needs one or two steps,
-  /// a source a tenth of the thickness below the front, 80 degrees aside, eight.
+  /// Iteration ends at a step below this share; the error is of the order of its square. The usual
+  /// lens needs one or two steps, a source close below the front at 80° eight.
   static constexpr double kNear = 1e-9;
   static constexpr int kMaxSteps = 50;
 

@@ -44,8 +44,8 @@ LF_HD inline Eigen::Vector3d refract_adjoint_by_incident(const Eigen::Vector3d& 
   return eta * b_bar + (n.dot(b_bar) * k_by_c) * n;
 }
 
-/// A ray after a surface of unit normal n, b = k n + η a with k = √s − ηc, and what its adjoint
-/// needs again. For light along +z, a = ẑ, in fewer operations.
+/// A ray after a surface of unit normal n, b = k n + η a with k = √s − ηc, and intermediate values
+/// for its adjoint. Light along +z, a = ẑ, takes fewer operations.
 struct RefractedBeam {
   double root;       ///< √s
   double inverse_z;  ///< 1/b_z
@@ -70,7 +70,7 @@ struct RefractedBeam {
     return beam;
   }
 
-  /// @pre as of refract(), and b_z > 0.
+  /// @pre those of refract(), and b_z > 0.
   LF_HD RefractedBeam(const Eigen::Vector3d& a, const Eigen::Vector3d& n, double eta)
       : root(std::sqrt(refracted_cosine_squared(n.dot(a), eta))),
         inverse_z(0.0),
@@ -80,7 +80,7 @@ struct RefractedBeam {
     m = inverse_z * b.head<2>();
   }
 
-  /// The derivative by b of a scalar whose derivative by m is m_bar.
+  /// Derivative by b of a scalar whose derivative by m is m_bar.
   [[nodiscard]] LF_HD Eigen::Vector3d direction_bar(const Eigen::Vector2d& m_bar) const {
     return inverse_z * Eigen::Vector3d(m_bar.x(), m_bar.y(), -m.dot(m_bar));
   }
@@ -93,7 +93,7 @@ struct RefractedBeam {
     n_bar.z() += n.dot(b_bar) * k_by_nz;
     return n_bar;
   }
-  /// Derivative of k by c, of a lens.
+  /// Derivative of a lens's k by c.
   [[nodiscard]] LF_HD double k_by_cosine(double c, double eta) const {
     return eta * eta * c / root - eta;
   }

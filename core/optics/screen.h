@@ -13,10 +13,9 @@ namespace lensforge {
 
 /// The plane that catches the light, and the pixels of the picture on it.
 ///
-/// Notation: p a point that a ray leaves, m its slope (dx/dz, dy/dz), w = (m, 1) its way; c the
-/// picture's centre, e_x and e_y the unit vectors along which the picture's millimetres count, n
-/// their normal, away from the lens; l = p + s w where the ray meets the plane, s = n·(c − p) /
-/// n·w.
+/// Notation: p a point that a ray leaves, m its slope (dx/dz, dy/dz), w = (m, 1) its direction; c
+/// the picture's centre, e_x and e_y the unit vectors of the picture's axes, n their normal, away
+/// from the lens; l = p + s w the point where the ray meets the plane, s = n·(c − p) / n·w.
 class Screen {
  public:
   explicit Screen(const OpticalSetup& setup)
@@ -35,12 +34,12 @@ class Screen {
   [[nodiscard]] LF_HD double clearance(const Eigen::Vector3d& p) const {
     return turned() ? normal_.dot(centre_ - p) : focal_length_ - p.z();
   }
-  /// True if a ray of this slope runs towards the side that is lit.
+  /// True if a ray of this slope meets the lit side.
   [[nodiscard]] LF_HD bool faces(const Eigen::Vector2d& m) const {
     return !turned() || normal_.dot(Eigen::Vector3d(m.x(), m.y(), 1.0)) > 0.0;
   }
 
-  /// Where a ray meets the plane, in pixel coordinates. @pre faces(m).
+  /// Point where a ray meets the plane, in pixel coordinates. @pre faces(m).
   [[nodiscard]] LF_HD Eigen::Vector2d land(const Eigen::Vector3d& p,
                                            const Eigen::Vector2d& m) const {
     if (!turned()) {
@@ -65,7 +64,7 @@ class Screen {
     const Eigen::Vector3d l_bar = mm_bar.x() * x_ + mm_bar.y() * y_;
     const double nw = normal_.dot(w);
     const double s = normal_.dot(centre_ - p) / nw;
-    // Along the ray nothing moves: both p and w count by what they are across it.
+    // Moving along the ray changes nothing: only the components of p and w across it count.
     const Eigen::Vector3d across = l_bar - (l_bar.dot(w) / nw) * normal_;
     p_bar += across;
     m_bar += s * Eigen::Vector2d(across.x(), across.y());
@@ -84,8 +83,8 @@ class Screen {
   Eigen::Vector3d x_;
   Eigen::Vector3d y_;
   Eigen::Vector3d normal_;
-  double focal_length_;  ///< z of the plane that is not turned.
-  std::int64_t turned_;  ///< Wide, so that no bytes of a kernel's argument are left unset.
+  double focal_length_;  ///< z of an unturned plane.
+  std::int64_t turned_;  ///< Wide, so a kernel's argument has no unset bytes.
 };
 
 }  // namespace lensforge

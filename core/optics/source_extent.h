@@ -5,8 +5,8 @@
 
 namespace lensforge {
 
-/// How the light of an extended source is spread over it: rows of pixels from the top, as the
-/// source is seen from the lens with the lens's y up. Empty: an evenly lit disc.
+/// Distribution of an extended source's light: rows of pixels from the top, seen from the lens with
+/// the lens's y up. Empty: an evenly lit disc.
 struct SourceShape {
   int columns = 0;
   int rows = 0;
@@ -17,13 +17,14 @@ struct SourceShape {
   friend bool operator==(const SourceShape&, const SourceShape&) = default;
 };
 
-/// Most pixels on a shape's longer side: each is a beam of its own in an exact rendering.
+/// Maximum number of pixels on a shape's longer side: each is a separate beam in an exact
+/// rendering.
 inline constexpr int kMaxShapeSide = 16;
 
-/// How large a source is. One that is a point, or infinitely far away in one direction, has width
-/// 0.
+/// Size of a source. A point, or parallel light of one direction, has width 0.
 struct SourceExtent {
-  double width = 0.0;  ///< Disc's diameter or shape's width: of parallel light rad, of a point mm.
+  double width =
+      0.0;  ///< Diameter of a disc or width of a shape: rad for parallel light, mm for a point.
   SourceShape shape;
 
   [[nodiscard]] bool none() const { return width == 0.0; }

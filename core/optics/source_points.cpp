@@ -26,7 +26,7 @@ std::vector<SourcePoint> disc_points(double diameter, int count) {
   return points;
 }
 
-/// The middles of a pixel's parts, `parts` each way. @param corner  upper left, y down.
+/// Adds the centres of a pixel's parts, `parts` each way. @param corner  upper left, y down.
 void divide_pixel(const Eigen::Vector2d& corner, int parts, const SourcePoint& whole,
                   std::vector<SourcePoint>& points) {
   for (int j = 0; j < parts; ++j) {
@@ -57,7 +57,7 @@ std::vector<SourcePoint> shape_points(const SourceExtent& extent, int count) {
   return points;
 }
 
-/// Right and up across the light as seen from where it goes, the lens's y up.
+/// Right and up across the light, seen against it, with the lens's y up.
 struct SourceFrame {
   Eigen::Vector3d right;
   Eigen::Vector3d up;
@@ -86,7 +86,7 @@ OpticalSetup lit_from(OpticalSetup setup, const Eigen::Vector2d& at) {
     return setup;
   }
   if (at.isZero()) return setup;
-  // Light comes from where the source is: it goes the other way.
+  // The light travels opposite to the direction of the source.
   const SourceFrame frame = frame_across(setup.light);
   setup.light = (setup.light - at.x() * frame.right - at.y() * frame.up).normalized();
   return setup;

@@ -6,33 +6,33 @@
 
 namespace lensforge {
 
-/// Fewest and most wavelengths of a picture.
+/// Minimum and maximum number of wavelengths.
 inline constexpr int kMinWavelengths = 2;
 inline constexpr int kMaxWavelengths = 5;
 
-/// Light of several wavelengths, and how a lens's material tells them apart.
+/// Light of several wavelengths, and the dispersion of the lens's material.
 struct Spectrum {
-  std::vector<double> wavelengths;  ///< nm, rising; none: all light has the setup's index.
-  std::vector<double> powers;       ///< Of the source at each, in any unit; none: the same at each.
+  std::vector<double> wavelengths;  ///< nm, ascending; none: all light has the setup's index.
+  std::vector<double> powers;       ///< Source's power at each, in any unit; none: all equal.
   double abbe = 57.0;               ///< Abbe number of the material; acrylic's.
 
   [[nodiscard]] bool none() const { return wavelengths.empty(); }
-  /// Shares of the brightness that the wavelengths have: power × V(λ), of sum 1.
+  /// Each wavelength's share of the brightness, power × V(λ), normalised to sum 1.
   [[nodiscard]] std::vector<double> shares() const;
 
   friend bool operator==(const Spectrum&, const Spectrum&) = default;
 };
 
 /// Wavelengths in nm from "450,550,650", with the source's powers from "450:0.6,550:1,650:0.8".
-/// @param name  of the option, for the message.
-/// @throw InputError unless there are 2 to 5 wavelengths that rise, from 380 to 780, and powers
-///        above 0 at all of them or at none.
+/// @param name  the option's name, for the message.
+/// @throw InputError unless there are 2 to 5 ascending wavelengths from 380 to 780, all with powers
+///        above 0 or all without.
 Spectrum parse_spectrum(const std::string& text, const std::string& name);
 
-/// The text from which parse_spectrum() reads the same wavelengths and powers; "" of none.
+/// The text from which parse_spectrum() reads the same wavelengths and powers; "" for none.
 std::string spectrum_text(const Spectrum& spectrum);
 
-/// Whether it could have been read, and has an Abbe number that a material has.
+/// True if parse_spectrum() would accept it and the Abbe number is one of a material.
 bool is_valid(const Spectrum& spectrum);
 
 }  // namespace lensforge

@@ -20,14 +20,14 @@ constexpr double kLeft = 70.0;
 constexpr double kMargin = 30.0;
 constexpr std::array<std::string_view, 8> kColors{"#0b5cad", "#a3161a", "#1b6b36", "#7a4fa3",
                                                   "#a35a00", "#007a7a", "#5c5c5c", "#b0307a"};
-/// Names stand in lines above the plot.
+/// Layout of the names in lines above the plot.
 constexpr std::size_t kNamesPerLine = 4;
 constexpr double kNameWidth = 190.0;
 constexpr double kNameHeight = 18.0;
-/// Drawn for values below it, 0 among them.
+/// Lower values, such as 0, are drawn at this one.
 constexpr double kFloor = 1e-12;
 
-/// From seconds and values to the drawing.
+/// Maps seconds and values to drawing coordinates.
 class Axes {
  public:
   explicit Axes(const std::vector<PlotCurve>& curves) {

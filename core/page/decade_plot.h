@@ -11,12 +11,12 @@ namespace lensforge {
 /// One line of a plot.
 struct PlotCurve {
   std::string name;
-  std::vector<Eigen::Vector2d> points;  ///< Seconds, ascending, and the value then.
+  std::vector<Eigen::Vector2d> points;  ///< Time in s, ascending, and value.
 };
 
-/// What falls over time, on a logarithmic scale of whole decades. SVG; empty for fewer than two
-/// points in all.
-/// @param label  what it shows, for those who cannot see it (text).
+/// SVG plot of decreasing values over time, on a logarithmic scale of whole decades. Empty for
+/// fewer than two points in all.
+/// @param label  text alternative.
 std::string decade_plot(const std::vector<PlotCurve>& curves, std::string_view label);
 
 }  // namespace lensforge

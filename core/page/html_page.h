@@ -5,17 +5,17 @@
 
 namespace lensforge {
 
-/// What a page holds; all but the title are HTML, and empty where there is none.
+/// Content of a page. All but the title are HTML and may be empty.
 struct PageContent {
   std::string title;  ///< Text.
   std::string header;
   std::string body;
   std::string footer;
   std::string script;  ///< JavaScript.
-  std::string head{};  ///< Of the page's head, behind the style of all pages.
+  std::string head{};  ///< Added to the page's head, after the common style.
 };
 
-/// A page that needs nothing from outside, with the look of all of the program's reports.
+/// A self-contained page in the style of all reports.
 std::string html_page(const PageContent& content);
 
 }  // namespace lensforge

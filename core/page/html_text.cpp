@@ -110,7 +110,7 @@ std::string percent_text(double share) {
   const double percent = 100.0 * share;
   if (percent == 0.0) return "0 %";
   const double decade = std::floor(std::log10(std::abs(percent)));
-  // Less is rounding to whoever reads it, and long rows of zeros are misread.
+  // Long rows of zeros are misread, and smaller values do not matter.
   if (decade < -3.0) return percent > 0.0 ? "below 0.001 %" : "above −0.001 %";
   return decimal_text(percent, static_cast<int>(std::clamp(2.0 - decade, 0.0, 4.0))) + " %";
 }

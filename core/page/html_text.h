@@ -12,7 +12,7 @@
 #include "core/image/image.h"
 #include "core/image/image_io.h"
 
-/// Pieces of HTML. Everything that takes `text` escapes it; `html` is put in as it is.
+/// Pieces of HTML. Functions escape `text`; `html` is inserted unchanged.
 namespace lensforge {
 
 /// &, <, >, " and ' as entities; control characters but tab and newline become spaces.
@@ -21,10 +21,10 @@ std::string escape_html(std::string_view text);
 /// <tag attributes>html</tag>. @param attributes  HTML, without the leading space.
 std::string element(std::string_view tag, std::string_view attributes, std::string_view html);
 
-/// One text after the other.
+/// Concatenates the texts.
 std::string joined(std::initializer_list<std::string_view> texts);
 
-/// A column of a table: its heading (text), and whether it holds numbers.
+/// A column of a table: heading (text), and true for numbers.
 struct TableColumn {
   std::string heading;
   bool numbers = false;
@@ -46,11 +46,11 @@ std::string html_facts(std::span<const NamedText> facts);
 /// A section with its heading (text).
 std::string html_section(const std::string& title, const std::string& html);
 
-/// A picture with what it shows, for those who cannot see it (text), and its caption (HTML).
+/// A picture with its text alternative and caption (HTML).
 std::string html_figure(const ColorImage& picture, const std::string& alt,
                         const std::string& caption);
 
-/// The colour bar of false_color() and what its ends stand for (text).
+/// The colour bar of false_color() with labels (text) for its ends.
 std::string html_scale(const std::string& least, const std::string& most);
 
 /// A share as percent with three significant digits: "1.30 %", "0.0412 %"; 0 is "0 %".
@@ -71,7 +71,7 @@ std::string png_uri(const ColorImage& image);
 /// The picture as shown, 8 bits grey.
 ColorImage grey_picture(const Image& image);
 
-/// Replaces every {{NAME}} of `page` by its value; values are not looked through again.
+/// Replaces every {{NAME}} in `page` by its value; values are not expanded again.
 /// @pre every name in the page has a value.
 std::string fill_in(std::string_view page,
                     std::span<const std::pair<std::string_view, std::string>> values);

@@ -19,11 +19,11 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr double kWidth = 760.0;    ///< Of the drawing; all its lengths are in its own units.
-constexpr double kMargin = 60.0;    ///< Around a view, for its words.
-constexpr double kTallest = 300.0;  ///< Of a view.
-constexpr double kLine = 18.0;      ///< Of text.
-/// The whole in diagonals of the part, beyond which the part would be a dot.
+constexpr double kWidth = 760.0;    ///< Width of the drawing; all lengths are in its units.
+constexpr double kMargin = 60.0;    ///< Around a view, for its labels.
+constexpr double kTallest = 300.0;  ///< Maximum height of a view.
+constexpr double kLine = 18.0;      ///< Line height of text.
+/// Maximum extent of a drawing to scale, in diagonals of the part; beyond it the part is a dot.
 constexpr double kLargestToScale = 20.0;
 constexpr double kDegree = std::numbers::pi / 180.0;
 
@@ -38,7 +38,7 @@ std::string place(const Vector3d& p) {
   return "x " + number(p.x()) + ", y " + number(p.y()) + ", z " + number(p.z()) + " mm";
 }
 
-/// What stands where, mm in the lens frame.
+/// Positions of all objects, mm in the lens frame.
 struct Scene {
   explicit Scene(const OpticalSetup& setup, double part_height)
       : high(setup.lens_size.x(), setup.lens_size.y(), part_height),
@@ -59,7 +59,7 @@ struct Scene {
     to_scale = farthest <= kLargestToScale * unit;
   }
 
-  /// Where a point is drawn, from the part's middle: its direction is kept, and where the drawing
+  /// Drawn position of a point relative to the part's middle. Its direction is kept; if the drawing
   /// is not to scale, its distance d is shown as asinh(d).
   [[nodiscard]] Vector3d shown(const Vector3d& p) const {
     const Vector3d from = p - middle;
@@ -68,7 +68,7 @@ struct Scene {
     return from * (std::asinh(d) / d);
   }
 
-  /// As far from a point along x or y as the part's edge is from its middle.
+  /// A point offset along x or y by half the part's size.
   [[nodiscard]] Vector3d beside(const Vector3d& p, int axis, double side) const {
     return p + 0.5 * side * high[axis] * Vector3d::Unit(axis);
   }
@@ -76,12 +76,12 @@ struct Scene {
   Vector3d low{0.0, 0.0, 0.0};
   Vector3d high;
   double unit;      ///< mm, the part's diagonal.
-  Vector3d middle;  ///< Of the part's upper side.
+  Vector3d middle;  ///< Middle of the part's upper side.
   Vector3d centre;
   Vector3d across;  ///< From the picture's centre to its edges.
   Vector3d upwards;
   Vector3d normal;
-  Vector3d lamp;  ///< Of parallel light a place that it comes through.
+  Vector3d lamp;  ///< For parallel light a point on its way.
   Vector3d eye;
   bool to_scale = true;
 };
@@ -174,7 +174,7 @@ std::string lamp(const OpticalSetup& setup, const Scene& scene, const View& view
          words(at + Vector2d(0.0, -12.0), "lamp", "text-anchor=\"middle\"");
 }
 
-/// Light from the lamp over the part's edges and its middle to the picture's.
+/// Rays from the lamp through the part's edges and middle to the picture's.
 std::string rays(const OpticalSetup& setup, const Scene& scene, const View& view) {
   std::string svg;
   for (const double side : {-1.0, 1.0}) {
@@ -205,7 +205,7 @@ std::vector<Vector2d> front_line(const OpticalSetup& setup, const Scene& scene, 
 std::string part(const OpticalSetup& setup, const Scene& scene, const View& view) {
   const Vector2d a = view.at(scene.low);
   const Vector2d b = view.at(scene.high);
-  const double back = std::min(a.x(), b.x() - 3.0);  // A thin part is drawn thick enough to see.
+  const double back = std::min(a.x(), b.x() - 3.0);  // A thin part is drawn visibly thick.
   std::vector<Vector2d> outline{{back, a.y()}, {back, b.y()}};
   if (setup.front) outline = front_line(setup, scene, view);
   outline.insert(outline.end(), {b, {b.x(), a.y()}});
@@ -255,7 +255,7 @@ std::string direction_words(const OpticalSetup& setup) {
          "° from the mirror's z axis";
 }
 
-/// How wide the source is; empty if it is a point.
+/// Width of the source; empty for a point.
 std::string extent_words(const OpticalSetup& setup) {
   constexpr double kMilliradian = 1e-3;
   if (setup.extent.none()) return "";
@@ -296,7 +296,7 @@ std::vector<std::string> description(const OpticalSetup& setup, const Scene& sce
                          : "Not to scale: directions from the part are right, distances are not."};
 }
 
-/// A drawing that is this high, with a name for those who do not see it.
+/// A drawing of this height, with a text alternative.
 std::string framed(const std::string& attributes, double height, const std::string& content) {
   const auto tip = [](const char* id, const char* colour) {
     return std::string("<marker id=\"") + id +

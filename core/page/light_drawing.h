@@ -7,14 +7,14 @@
 
 namespace lensforge {
 
-/// An SVG element of a page that says how to set the part up: lamp, part, screen and viewer from
-/// the side (y up) and from above (x up), z to the right in both, and the places in words. It is to
-/// scale unless the part would be too small to see; then all lies in its true direction from the
-/// middle of the part, but far things are drawn nearer, and the drawing says so.
-/// @param part_height  of the part above z = 0, mm.
+/// SVG element that shows how to set up the part: lamp, part, screen and viewer from the side (y
+/// up) and from above (x up), z to the right in both, with the positions in words. It is to scale
+/// unless the part would be too small to see; then everything keeps its true direction from the
+/// middle of the part, distant objects are drawn nearer, and the drawing says so.
+/// @param part_height  height of the part above z = 0, mm.
 std::string light_drawing(const OpticalSetup& setup, double part_height);
 
-/// The same as a file of its own.
+/// The same as a separate file.
 std::string light_drawing_file(const OpticalSetup& setup, double part_height);
 
 }  // namespace lensforge

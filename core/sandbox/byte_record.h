@@ -13,7 +13,7 @@
 
 namespace lensforge {
 
-/// Values one after another as bytes, for a process on the same machine.
+/// Serialises values as bytes, for a process on the same machine.
 class ByteWriter {
  public:
   template <class Value>
@@ -36,7 +36,7 @@ class ByteWriter {
   std::string bytes_;
 };
 
-/// Reads what a ByteWriter wrote, in the same order. Keeps a view.
+/// Reads the values of a ByteWriter in the same order. Does not copy the bytes.
 class ByteReader {
  public:
   explicit ByteReader(std::string_view bytes) : bytes_(bytes) {}

@@ -29,13 +29,13 @@
 #include "core/error.h"
 #include "core/io/descriptor.h"
 
-// The child sends frames through a pipe: a letter, the length of the text, the text. Its end
-// without a result or an error is a failure. It is killed together with its parent, and ends
-// without destructors: what is broken in it is not touched again.
+// The child sends frames through a pipe: a letter, the length of the text, the text. If it ends
+// without a result or an error, it has failed. It is killed together with its parent, and ends
+// without destructors, so that broken data are not touched again.
 namespace lensforge {
 namespace {
 
-/// How often a stop request is looked for, and how often the child may report.
+/// Interval of checks for a stop request, and minimum interval of the child's reports.
 constexpr int kPollMilliseconds = 100;
 constexpr std::chrono::milliseconds kReportInterval{50};
 
@@ -75,7 +75,7 @@ struct Share {
   double total = 0.0;
 };
 
-/// In the child: its pieces, and its progress now and then, to the parent.
+/// Used in the child: sends its pieces, and from time to time its progress, to the parent.
 class WorkPipe {
  public:
   explicit WorkPipe(int descriptor) : descriptor_(descriptor) {}
@@ -102,7 +102,7 @@ class WorkPipe {
   std::chrono::steady_clock::time_point sent_;
 };
 
-/// Bytes of address space that this process has, or nothing where the system does not say.
+/// Address space used by this process, bytes; nothing if unknown.
 std::optional<double> address_space() {
   std::ifstream file("/proc/self/statm");
   double pages = 0.0;
@@ -123,7 +123,7 @@ void silence_output() {
   for (const int descriptor : {STDOUT_FILENO, STDERR_FILENO}) ::dup2(nowhere, descriptor);
 }
 
-/// Signals of the terminal go to the whole group: what to do about them is the parent's to say.
+/// Signals of the terminal go to the whole process group; the parent decides about them.
 void leave_signals_to_parent(pid_t parent) {
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) std::signal(signal, SIG_IGN);
   for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGABRT, SIGILL, SIGXCPU}) {
@@ -155,7 +155,7 @@ void leave_signals_to_parent(pid_t parent) {
   _exit(0);
 }
 
-/// A running child; killed and waited for when this object goes.
+/// A running child; the destructor kills it and waits for it.
 class Child {
  public:
   Child(const ChildLimits& limits, const PiecewiseWork& work) {
@@ -185,7 +185,7 @@ class Child {
   Child(const Child&) = delete;
   Child& operator=(const Child&) = delete;
 
-  /// Appends what has come; false at the end. Waits a moment at most.
+  /// Appends received bytes; false at the end. Waits at most kPollMilliseconds.
   bool receive(std::string& bytes) {
     pollfd ready{reading_.number(), POLLIN, 0};
     if (::poll(&ready, 1, kPollMilliseconds) <= 0) return true;
@@ -197,7 +197,7 @@ class Child {
     return got > 0 || (got < 0 && errno == EINTR);
   }
 
-  /// Waits for its end; the status that waitpid() gives.
+  /// Waits for its end; returns the status of waitpid().
   int wait() {
     int status = 0;
     while (::waitpid(pid_, &status, 0) < 0 && errno == EINTR) {
@@ -216,7 +216,7 @@ class Child {
   Descriptor reading_;
 };
 
-/// The first whole frame of `bytes` from `at`, which moves behind it.
+/// The first whole frame of `bytes` from `at`; moves `at` behind it.
 std::optional<std::pair<Frame, std::string_view>> next_frame(const std::string& bytes,
                                                              std::size_t& at) {
   if (bytes.size() - at < kFrameHead) return std::nullopt;
@@ -229,7 +229,7 @@ std::optional<std::pair<Frame, std::string_view>> next_frame(const std::string& 
   return {{kind, text}};
 }
 
-/// What the child sent in the end, if it did.
+/// The child's final answer, if any.
 struct Answer {
   std::optional<std::string> result;
   Share share;
@@ -279,7 +279,8 @@ std::string run_in_child(const std::string& stage, const ChildLimits& limits,
   if (control.stop_requested()) throw Interrupted();
   Child child(limits, work);
   Answer answer;
-  // Another child, forked meanwhile, may have this one's end of the pipe: its end may come late.
+  // Another child, forked meanwhile, may hold this pipe's writing end, so end of file may come
+  // late.
   for (std::string bytes; !answer.result && child.receive(bytes);) {
     if (control.stop_requested()) throw Interrupted();
     take_frames(bytes, take, answer);

@@ -11,10 +11,10 @@
 
 namespace lensforge {
 
-/// What a child process may use at most.
+/// Limits of a child process.
 struct ChildLimits {
-  double memory_bytes = 0.0;  ///< Beside what its parent has; 0 for as much as there is.
-  double cpu_seconds = 0.0;   ///< Of all its threads together; 0 for no limit.
+  double memory_bytes = 0.0;  ///< In addition to its parent's; 0 for no limit.
+  double cpu_seconds = 0.0;   ///< All its threads together; 0 for no limit.
 };
 
 /// A child process ended without a result: what() says why in a clause, such as "crashed".
@@ -23,35 +23,35 @@ class ChildFailure : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Runs `work` in a forked copy of this process and returns what it returns. Whatever happens to
-/// the child, the caller goes on; the child's stdout and stderr lead nowhere. While it runs,
-/// `control` is told `stage` and, of what the work reports to its own RunControl, how far it is.
-/// @pre `work` uses no threads that the caller has started (oneTBB's are such), and no other thread
-///      is inside of the library that it calls.
-/// @throw InputError, RunError as the work throws them; ChildFailure if it crashes or exceeds the
+/// Runs `work` in a forked copy of this process and returns what it returns. The caller survives
+/// whatever happens to the child; the child's stdout and stderr are discarded. While it runs,
+/// `control` gets `stage` and the progress that the work reports to its own RunControl.
+/// @pre `work` uses no threads started by the caller (such as oneTBB's), and no other thread is
+///      inside the library that it calls.
+/// @throw InputError, RunError thrown by the work; ChildFailure if it crashes or exceeds the
 ///        limits; Interrupted, with the child killed, at most 0.1 s after the stop request.
 std::string run_in_child(const std::string& stage, const ChildLimits& limits,
                          const std::function<std::string(const RunControl&)>& work,
                          const RunControl& control);
 
-/// Takes the pieces of a large result, one after another.
+/// Receives the pieces of a large result, one after another.
 using PieceSink = std::function<void(std::string_view)>;
 
 /// Work that sends pieces before it returns the rest of its result.
 using PiecewiseWork = std::function<std::string(const RunControl&, const PieceSink& send)>;
 
-/// The same for a result that is too large to be kept twice: `take` gets every piece that the work
-/// sends, in this process and in their order. @throw what `take` throws, with the child killed.
+/// The same for a result too large to hold twice: `take` gets every piece that the work sends, in
+/// this process and in order. @throw what `take` throws, with the child killed.
 std::string run_in_child(const std::string& stage, const ChildLimits& limits,
                          const PiecewiseWork& work, const PieceSink& take,
                          const RunControl& control);
 
-/// Lowers the limits of a process from within: for work that knows better than its caller how much
-/// it may take. Memory counts beside what the process has now.
+/// Lowers the limits of this process, for work that knows its needs better than its caller. Memory
+/// is counted in addition to the present use.
 void limit_this_process(const ChildLimits& limits);
 
-/// Calls `functor(i)` for i in 0 … count − 1 on `threads` threads of its own, which a child process
-/// may do. The first exception reaches the caller.
+/// Calls `functor(i)` for i in 0 … count − 1 on `threads` new threads, which a child process may
+/// do. The first exception reaches the caller.
 void for_each_in_threads(int threads, std::int64_t count,
                          const std::function<void(std::int64_t)>& functor);
 

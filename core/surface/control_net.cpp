@@ -11,11 +11,11 @@
 namespace lensforge {
 namespace {
 
-/// Newton's method ends when a step is shorter than this, knot cells, or after so many.
+/// Newton's method ends at a step shorter than this, in knot cells, or after kMaxSteps.
 constexpr double kShortStep = 1e-13;
 constexpr int kMaxSteps = 30;
 
-/// At nodes first … last.
+/// Basis functions at nodes first … last.
 std::vector<CubicBasis> bases(int cells, int samples, int first, int last) {
   std::vector<CubicBasis> result;
   for (int k = first; k <= last; ++k) {
@@ -102,7 +102,7 @@ SampledSurface spline_rows(const ControlNet& net, int samples, int first, int la
   SampledSurface nodes = make_samples({static_cast<int>(u.size()), static_cast<int>(v.size())});
   Eigen::Index at = 0;
   for (const CubicBasis& across : v) {
-    // The curve v = const as a spline of its own, and its derivative by v.
+    // The curve v = const as a separate spline, and its derivative by v.
     const auto rows = net.points.middleCols(Eigen::Index{across.first} * net.shape.columns,
                                             Eigen::Index{4} * net.shape.columns);
     const auto row = [&](Eigen::Index j) {
@@ -126,7 +126,8 @@ SampledSurface spline_rows(const ControlNet& net, int samples, int first, int la
 }
 
 int samples_for(double nodes, double cells) {
-  // More do not change a picture: 64² splines of 29,000 cells have the same MAE to 0.00001 with 12.
+  // More do not change a picture: with 12, 64² splines of 29,000 cells have the same MAE to
+  // 0.00001.
   constexpr double kMostOfCell = 8.0 * 8.0;
   constexpr double kNodesOfFewCells = 250e3;
   const double useful = std::max(kMostOfCell * cells, kNodesOfFewCells);

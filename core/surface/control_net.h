@@ -20,7 +20,7 @@ struct SplineFrame {
   Eigen::Vector3d by_uv = Eigen::Vector3d::Zero();
   Eigen::Vector3d by_vv = Eigen::Vector3d::Zero();
 
-  /// Of the normal, z > 0 where the spline is a height field; any length.
+  /// Normal of any length; z > 0 where the spline is a height field.
   [[nodiscard]] Eigen::Vector3d normal() const { return by_u.cross(by_v); }
   /// Height and its derivatives by x and y. @pre normal().z() > 0.
   [[nodiscard]] SurfaceShape shape() const;
@@ -37,42 +37,42 @@ struct ControlNet {
   [[nodiscard]] std::int64_t cell_count() const {
     return std::int64_t{shape.columns - 3} * (shape.rows - 3);
   }
-  /// One coordinate of all control points as a table, row index along u.
+  /// One coordinate of all control points as a matrix, row index along u.
   [[nodiscard]] Eigen::MatrixXd table(int coordinate) const;
 
   /// @pre 0 ≤ uv ≤ cells().
   [[nodiscard]] SplineFrame at(const Eigen::Vector2d& uv) const;
-  /// Parameters of the point above xy, by Newton's method from `start`; the nearest parameters in
-  /// the rectangle where xy lies outside by rounding.
+  /// Parameters of the point above xy, by Newton's method from `start`; the nearest valid
+  /// parameters if rounding puts xy outside.
   [[nodiscard]] Eigen::Vector2d parameters_of(const Eigen::Vector2d& xy,
                                               const Eigen::Vector2d& start) const;
 };
 
-/// A spline on an even grid of its parameters.
-/// @param samples  nodes a knot cell each way, ≥ 1; the nodes include all knots.
+/// Samples a spline on an even grid of its parameters.
+/// @param samples  nodes per knot cell each way, ≥ 1; the nodes include all knots.
 SampledSurface spline_nodes(const ControlNet& net, int samples);
 
-/// Rows first … last of spline_nodes(), a surface of their own.
+/// Rows first … last of spline_nodes() as a separate surface.
 /// @pre 0 ≤ first < last ≤ samples × knot cells along v.
 SampledSurface spline_rows(const ControlNet& net, int samples, int first, int last);
 
-/// Nodes a knot cell each way of a mesh that stands for the spline, as surface.ply does.
+/// Nodes per knot cell each way in a mesh that represents the spline, such as surface.ply.
 inline constexpr int kMeshSamples = 2;
 
-/// Nodes at which a spline is looked at for its picture, about. The 128² portrait of 102,400 knot
-/// cells has MAE 0.00061, 0.00075 and 0.00080 with 2, 4 and 8 nodes a cell each way.
+/// Approximate number of nodes used to render a spline. The 128² portrait of 102,400 knot cells has
+/// MAE 0.00075 with 4 nodes per cell each way, 0.00080 with 8.
 inline constexpr double kPictureNodes = 4e6;
 
-/// Nodes a knot cell each way, 2 … 256, that make so many of so many cells; above 250,000 nodes
-/// not more than 8, which show the same picture.
+/// Nodes per knot cell each way, 2 … 256, that make about `nodes` nodes of `cells` cells; above
+/// 250,000 nodes at most 8, since more show the same picture.
 int samples_for(double nodes, double cells);
 
-/// Nodes a knot cell each way for a spline's picture.
+/// Nodes per knot cell each way to render a spline.
 inline int picture_samples(const ControlNet& net) {
   return samples_for(kPictureNodes, static_cast<double>(net.cell_count()));
 }
 
-/// spline_nodes() for its picture.
+/// spline_nodes() for rendering.
 inline SampledSurface picture_nodes(const ControlNet& net) {
   return spline_nodes(net, picture_samples(net));
 }

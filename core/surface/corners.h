@@ -15,7 +15,7 @@ struct Corners {
   Eigen::Vector3d v2{0.0, 0.0, 0.0};
 };
 
-/// z of a × b for vectors of the plan: twice the signed area of the triangle (0, a, b).
+/// z of a × b for vectors in the xy plane: twice the signed area of the triangle (0, a, b).
 LF_HD inline double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
   return a.x() * b.y() - a.y() * b.x();
 }
@@ -24,12 +24,12 @@ LF_HD inline double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
 LF_HD inline Eigen::Vector3d area_normal(const Corners& t) {
   const Eigen::Vector3d u = t.v1 - t.v0;
   const Eigen::Vector3d v = t.v2 - t.v0;
-  // u.cross(v), which GCC 12 leaves as a call: that costs an objective an eighth of its time.
+  // Not u.cross(v): GCC 12 leaves it as a call, an eighth of an objective's time.
   return {u.y() * v.z() - u.z() * v.y(), u.z() * v.x() - u.x() * v.z(),
           u.x() * v.y() - u.y() * v.x()};
 }
 
-/// What a triangle covers seen from +z, half the z of area_normal(); negative if it runs clockwise.
+/// Area of a triangle seen from +z, half the z of area_normal(); negative if clockwise.
 LF_HD inline double plan_area(const Corners& t) {
   return 0.5 * ((t.v1.x() - t.v0.x()) * (t.v2.y() - t.v0.y()) -
                 (t.v1.y() - t.v0.y()) * (t.v2.x() - t.v0.x()));

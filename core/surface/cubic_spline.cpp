@@ -16,7 +16,7 @@ int cell_of(double t, int cells) {
   return std::clamp(static_cast<int>(std::floor(t)), 0, cells - 1);
 }
 
-/// The values of the functions of one degree that are not zero in a cell (Cox–de Boor).
+/// Values of the basis functions of one degree that are not zero in a cell (Cox–de Boor).
 std::array<double, 4> functions(double t, int cell, int cells, int degree) {
   std::array<double, 4> n{1.0};
   const int span = cell + kDegree;
@@ -35,8 +35,8 @@ std::array<double, 4> functions(double t, int cell, int cells, int degree) {
   return n;
 }
 
-/// From the functions of one degree less, or their derivatives, to the derivatives of the functions
-/// of this degree: B' = p (B₋ / width₋ − B₊ / width₊).
+/// Derivatives of the functions of this degree from those of one degree less, or from their
+/// derivatives: B' = p (B₋ / width₋ − B₊ / width₊).
 std::array<double, 4> differences(const std::array<double, 4>& lower, int cell, int cells,
                                   int degree) {
   std::array<double, 4> result{};
@@ -68,7 +68,7 @@ double blossom(const Eigen::VectorXd& coefficients, int cell, const std::array<d
   return d[3];
 }
 
-/// Far enough from the ends all knots are single.
+/// The basis far enough from the ends, where all knots are single.
 CubicBasis inner_basis(double t, int cell) {
   const double s = t - cell;
   const double r = 1.0 - s;

@@ -21,15 +21,15 @@ struct CubicBasis {
 /// @pre 0 ≤ t ≤ cells, cells ≥ 1.
 CubicBasis cubic_basis(double t, int cells);
 
-/// Where coefficient `i` sits: with it as coefficient the spline is t itself.
+/// Greville point of coefficient `i`: with these as coefficients the spline is t itself.
 double greville_point(int i, int cells);
 
 /// One row per point with the values (or slopes) of all cells + 3 basis functions.
 Eigen::SparseMatrix<double, Eigen::RowMajor> basis_matrix(const std::vector<double>& points,
                                                           int cells, bool slopes);
 
-/// What takes coefficients from … to + 2 of a spline over [0, cells] to the coefficients, over
-/// [0, to − from], of the same spline between its knots `from` and `to` (Oslo algorithm).
+/// Matrix that maps coefficients from … to + 2 of a spline over [0, cells] to the coefficients over
+/// [0, to − from] of the same spline between its knots `from` and `to` (Oslo algorithm).
 /// @pre 0 ≤ from < to ≤ cells.
 Eigen::MatrixXd restriction(int cells, int from, int to);
 

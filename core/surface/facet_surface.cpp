@@ -16,7 +16,7 @@ SurfacePoint FacetSurface::in_triangle(std::int64_t triangle,
   return point;
 }
 
-/// Bernstein coefficients of a plane are its heights at their places.
+/// The Bernstein coefficients of a plane are its heights at their domain points.
 SmoothPatch FacetSurface::patch_in(std::int64_t triangle,
                                    const Eigen::Vector3d& /*weights*/) const {
   std::array<Eigen::Vector2d, 3> corners;

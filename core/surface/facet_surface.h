@@ -16,7 +16,7 @@ class FacetSurface final : public OpticalSurface {
                                          const Eigen::Vector3d& weights) const override;
   [[nodiscard]] SmoothPatch patch_in(std::int64_t triangle,
                                      const Eigen::Vector3d& weights) const override;
-  /// Of the flat triangle: the creases around it are no part of it.
+  /// Zero: the triangle is flat, and the creases around it do not count.
   [[nodiscard]] BendRange bend_range(std::int64_t /*triangle*/) const override { return {}; }
 };
 

@@ -3,10 +3,10 @@
 
 #include <algorithm>
 
-/// Where the vertices of a lens's grid lie while it is flat: rows of near-equilateral triangles.
+/// Vertex positions of a lens's flat grid: rows of near-equilateral triangles.
 namespace lensforge {
 
-/// Cells next to the border over which the half-cell shift of odd rows grows from 0 to its full.
+/// Cells next to the border over which the half-cell shift of odd rows grows from 0 to full.
 inline constexpr int kShiftFade = 4;
 
 /// x of a flat grid's vertex, in cells: every other row is moved half a cell to the right, and near
@@ -17,7 +17,7 @@ inline double rest_column(int column, int row, int cells) {
   return column + (row % 2 == 1 ? shift : 0.0);
 }
 
-/// Where x (in cells) lies in a row: a column and the fraction to the next one.
+/// Position of x (in cells) in a row: a column and the fraction to the next one.
 struct RowPosition {
   int column = 0;
   double fraction = 0.0;

@@ -61,7 +61,7 @@ SurfaceMesh make_grid_mesh(const Eigen::Vector2d& size, const GridShape& shape, 
       const int b = a + 1;
       const int d = a + shape.columns;
       const int e = d + 1;
-      // The diagonal runs along the shorter way: against the shift of the odd row.
+      // The shorter diagonal: against the shift of the odd row.
       const bool even = r % 2 == 0;
       mesh.triangles.col(t++) = even ? Eigen::Vector3i(a, b, d) : Eigen::Vector3i(a, b, e);
       mesh.triangles.col(t++) = even ? Eigen::Vector3i(b, e, d) : Eigen::Vector3i(a, e, d);

@@ -7,8 +7,8 @@
 
 namespace lensforge {
 
-/// Two triangles for every cell of a regular grid of samples, cut from its first corner to the one
-/// across, cell by cell and row by row. @pre at least 2 × 2 vertices.
+/// Two triangles for every cell of a regular grid of samples, split from the first corner to the
+/// opposite one, in row order. @pre at least 2 × 2 vertices.
 inline Eigen::Matrix3Xi grid_triangles(const GridShape& shape) {
   Eigen::Matrix3Xi triangles(3, Eigen::Index{2} * (shape.columns - 1) * (shape.rows - 1));
   Eigen::Index t = 0;

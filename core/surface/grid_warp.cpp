@@ -10,8 +10,8 @@
 namespace lensforge {
 namespace {
 
-/// x and y of control points are whole multiples of this (mm), which keeps files short; heights are
-/// fitted to where the points then are.
+/// x and y of control points are rounded to multiples of this (mm), which keeps files short;
+/// heights are fitted to the rounded points.
 constexpr double kPlanStep = 1e-5;
 
 double rounded(double value) { return std::round(value / kPlanStep) * kPlanStep; }

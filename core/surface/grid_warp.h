@@ -10,9 +10,9 @@
 
 namespace lensforge {
 
-/// Where the points of a flat grid have gone, seen from above, once its vertices have moved: design
-/// crowds them where the picture needs them, down to a thirtieth of the mean cell. The identity for
-/// a mesh that is no grid, or whose border vertices have left the border.
+/// Map from points of the flat grid to the moved grid, seen from above. Design concentrates
+/// vertices where the picture needs them, down to a thirtieth of the mean cell. The identity for a
+/// mesh that is no grid, or whose border vertices have left the border.
 class GridWarp {
  public:
   /// @param box  the mesh's rectangle, mm. Keeps a reference to the mesh.
@@ -20,7 +20,7 @@ class GridWarp {
 
   /// @pre uv lies in the box.
   [[nodiscard]] Eigen::Vector2d at(const Eigen::Vector2d& uv) const;
-  /// What at() takes to the vertex, about.
+  /// Approximate inverse of at() at the vertex.
   [[nodiscard]] Eigen::Vector2d before(Eigen::Index vertex) const;
 
   /// x and y of the control points of a spline with these knot cells: `share` of the way from the

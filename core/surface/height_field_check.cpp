@@ -14,16 +14,16 @@
 #include "core/surface/mesh_normals.h"
 #include "core/text/number_text.h"
 
-// How often a mesh covers a place can change only where an edge has more triangles on one side than
-// on the other. If all triangles face up, and all such edges lie on the rectangle's rim, then every
-// place within is covered equally often; and once, if the triangles' areas add up to the
+// The number of times a mesh covers a point can change only at an edge with more triangles on one
+// side than on the other. If all triangles face up and all such edges lie on the rectangle's rim,
+// every point inside is covered equally often; and once, if the triangles' areas sum to the
 // rectangle's.
 namespace lensforge {
 namespace {
 
 std::string millimetres(double value) { return decimal_text(value, 4); }
 
-/// One number for all vertices in the same place.
+/// One number for all vertices at the same point.
 std::vector<int> places_of(const SurfaceMesh& mesh) {
   const auto key = [&](int v) {
     const auto p = mesh.vertices.col(v);
@@ -66,7 +66,7 @@ std::vector<DirectedEdge> sorted_edges(const SurfaceMesh& mesh) {
   return edges;
 }
 
-/// Whether both ends lie on one side of the rectangle.
+/// True if both ends lie on the same side of the rectangle.
 bool on_rim(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vector2d& size) {
   for (int axis = 0; axis < 2; ++axis) {
     for (const double side : {0.0, size[axis]}) {
@@ -94,7 +94,7 @@ std::optional<Eigen::Vector2d> stray_border(const SurfaceMesh& mesh, const Eigen
   return std::nullopt;
 }
 
-/// Area seen from above, or which triangle has none.
+/// Area seen from above, or the number of a triangle without area.
 struct PlanArea {
   double area = 0.0;
   std::int64_t bad = -1;

@@ -35,9 +35,9 @@ using nlohmann::ordered_json;
 
 constexpr const char* kFormat = "lensforge.lens";
 constexpr int kVersion = 1;
-/// Beside the metrics of the models.
+/// Key beside the metrics of the models.
 constexpr const char* kSourceLimit = "source_limit";
-/// Of lens.json, which has some 2 kB.
+/// Maximum size of lens.json, which has about 2 kB.
 constexpr std::uintmax_t kMaxJsonBytes = std::uintmax_t{1} << 20U;
 
 std::string size_text(int columns, int rows) {
@@ -83,7 +83,7 @@ ordered_json to_json(const Lens& lens) {
   return document;
 }
 
-/// Of a front that is a height map, else nullptr.
+/// Heights of a front that is a height map, otherwise nullptr.
 const HeightGrid* front_heights(const OpticalSetup& setup) {
   const auto* const map = setup.front ? std::get_if<HeightFront>(&*setup.front) : nullptr;
   return map != nullptr ? &map->spline->grid() : nullptr;
@@ -122,8 +122,8 @@ void add_files(const Lens& lens, PendingFiles& files) {
   files.add(kJson, to_json(lens).dump(2, ' ', false, json::error_handler_t::replace) + "\n");
 }
 
-/// Removes what makes an older lens in the folder whole, and those of its files that this lens has
-/// not: none of them stays beside the new one.
+/// Removes the lens.json of an old lens in the folder, and those of its files that this lens does
+/// not have, so none of them stays beside the new lens.
 void remove_older(const PendingFiles& files) {
   using namespace lens_file;
   fs::remove(files.folder() / kJson);
@@ -149,7 +149,7 @@ json read_json(const fs::path& path) {
   return parse_json(read_whole_file(path, kMaxJsonBytes), path.string());
 }
 
-/// One of some words as one of some values.
+/// The value that belongs to a word.
 template <class Value>
 Value choice(const JsonFields& fields, const std::string& name,
              const std::vector<std::pair<std::string, Value>>& words) {
@@ -218,10 +218,10 @@ ControlNet read_own_spline(const JsonFields& fields, const OpticalSetup& setup,
   return net;
 }
 
-/// How far the mesh of a spline may be from its nodes, mm.
+/// Maximum distance of a spline's mesh from its nodes, mm.
 constexpr double kNodeTolerance = 1e-6;
 
-/// @throw InputError unless the mesh has the spline's nodes.
+/// @throw InputError unless the mesh matches the spline's nodes.
 void check_nodes(const SurfaceMesh& mesh, const ControlNet& net, const fs::path& folder) {
   const SurfaceMesh nodes = spline_nodes(net, kMeshSamples).mesh;
   if (mesh.vertex_count() == nodes.vertex_count() &&
@@ -247,7 +247,7 @@ void check_part(const SurfaceMesh& mesh, const Lens& lens, const fs::path& folde
                    std::to_string(part.vertex_count()) + " vertices");
 }
 
-/// @param field  that names the file.
+/// @param field  the field that names the file.
 SurfaceMesh read_surface(const JsonFields& fields, const std::string& field,
                          const OpticalSetup& setup, const fs::path& folder) {
   const fs::path file = named_file(fields, field, folder);
@@ -256,13 +256,13 @@ SurfaceMesh read_surface(const JsonFields& fields, const std::string& field,
     throw InputError(file.string() + ": " + *fault);
   }
   mesh.grid = read_grid(fields, mesh);
-  // A grid was checked cell by cell, which is faster.
+  // A grid is already checked cell by cell, which is faster.
   const auto fault = mesh.grid.is_grid() ? std::nullopt : height_field_fault(mesh, setup.lens_size);
   if (fault) throw InputError(file.string() + ": " + *fault);
   return mesh;
 }
 
-/// Sets the surface; a spline is known already.
+/// Sets the surface; a spline is already read.
 void read_surfaces(const JsonFields& fields, const fs::path& folder, Lens& lens) {
   if (!lens.setup.outline) {
     lens.surface = read_surface(fields, "surface", lens.setup, folder);

@@ -22,43 +22,43 @@
 
 namespace lensforge {
 
-/// How close the pictures of a surface under each model are to the target.
+/// Metrics of a surface's picture under each model, against the target.
 using ModelMetrics = std::map<SurfaceModel, ImageMetrics>;
 
-/// A designed lens: what one command hands to the next.
+/// A designed lens, passed from command to command.
 struct Lens {
-  /// The optical surface, z ≥ thickness; mm, lens frame. It fills the lens's rectangle, also where
-  /// setup.outline leaves less to the light.
+  /// The optical surface, z ≥ thickness; mm, lens frame. It fills the lens's rectangle even if
+  /// setup.outline is smaller.
   SurfaceMesh surface;
-  /// That surface itself if the model is a spline; `surface` then has its nodes (kMeshSamples).
+  /// The surface itself if the model is a spline; `surface` then holds its nodes (kMeshSamples).
   std::optional<ControlNet> spline;
   OpticalSetup setup;
   SurfaceModel model = SurfaceModel::kFacet;  ///< The model it was designed with.
   Image target;                               ///< Working picture, linear light.
-  Image render;                               ///< What the lens projects under `model`.
-  /// What it projects under each model that it has (models_of()).
+  Image render;                               ///< Predicted picture under `model`.
+  /// Metrics under each of its models (models_of()).
   ModelMetrics metrics{{SurfaceModel::kFacet, {}}, {SurfaceModel::kSmooth, {}}};
-  /// Under an extended source: of the best picture that any surface could make.
+  /// With an extended source: metrics of the best picture that any surface could make.
   std::optional<ImageMetrics> source_limit;
   nlohmann::json provenance = nlohmann::json::object();
 };
 
-/// The models that a lens's surface can be looked at with: a spline's nodes make a mesh, too.
+/// The models under which a lens's surface can be evaluated; a spline's nodes also form a mesh.
 std::vector<SurfaceModel> models_of(const Lens& lens);
 
 /// The lens's surface under one of them.
 std::shared_ptr<const OpticalSurface> optical_surface(const Lens& lens, SurfaceModel model);
 
-/// The optical surface as far as the lens's outline goes, its corners on the outline too, with the
-/// normals of the smooth model or the spline: light everywhere on it gives the lens's picture.
+/// The optical surface inside the lens's outline, with corners on the outline and the normals of
+/// the smooth model or the spline. Light over all of it gives the lens's picture.
 SampledSurface lens_part(const Lens& lens, const Executor& executor);
 
-/// Writes a lens into the folder of `files`, behind what these hold already. All are written beside
-/// before one is renamed, an older lens.json goes first and the new one comes last: a folder with a
-/// lens.json is whole. @throw RunError if something cannot be written.
+/// Writes a lens into the folder of `files`, after the files already added. All files are written
+/// before any is renamed; an old lens.json is removed first and the new one comes last, so a folder
+/// with a lens.json is complete. @throw RunError if something cannot be written.
 void write_lens(const Lens& lens, PendingFiles files);
 
-/// The same for a lens alone, without convergence.csv, overview.png and setup.svg of `design`.
+/// The same for the lens alone, without convergence.csv, overview.png and setup.svg of `design`.
 void write_lens(const Lens& lens, const std::filesystem::path& folder);
 
 /// Reads a lens folder back.

@@ -7,22 +7,22 @@
 
 namespace lensforge {
 
-/// The light on a surface, its flux as shares of what this surface takes: a higher rim takes in
-/// less of a beam that opens, and a picture keeps its total.
-/// @pre the mesh has no triangles outside of setup.outline.
+/// The light on a surface, with flux as a share of this surface's intake: a higher rim takes in
+/// less of a diverging beam, but the picture keeps its total.
+/// @pre the mesh has no triangles outside setup.outline.
 LightPath light_on(const SurfaceMesh& mesh, const OpticalSetup& setup);
 
-/// The same where a mesh goes on beyond the outline.
+/// The same for a mesh that extends beyond the outline.
 LightPath light_inside(const SurfaceMesh& mesh, const MeshCut& cut, const OpticalSetup& setup);
 
-/// LightPath::intake() of the parts of a mesh inside of an outline, mm².
+/// LightPath::intake() of the part of a mesh inside an outline, mm².
 double intake_inside(const SurfaceMesh& mesh, const MeshCut& cut, const LightPath& light);
 
 /// LightPath::intake() of a whole surface, mm².
 double intake_of(const SurfaceMesh& mesh, const LightPath& light);
 
-/// How far beyond the lens's edges light enters a curved front that comes to a vertex, mm, at most;
-/// 0 behind a flat one.
+/// Maximum distance beyond the lens's edges at which a vertex's light enters a curved front, mm; 0
+/// for a flat front.
 double overhang(const SurfaceMesh& mesh, const OpticalSetup& setup);
 
 }  // namespace lensforge

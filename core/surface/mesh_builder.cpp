@@ -23,7 +23,7 @@ void MeshBuilder::add_face(std::span<const int> corners) {
   ++faces_;
 }
 
-/// Replaces the fan of a polygon.
+/// Replaces a polygon's fan by polygon_triangles().
 void MeshBuilder::cut(const Polygon& polygon, SurfaceMesh& mesh) const {
   auto fan = mesh.triangles.middleCols(polygon.first, polygon.corners - 2);
   Eigen::VectorXi corners(polygon.corners);

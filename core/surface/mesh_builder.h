@@ -10,7 +10,7 @@
 
 namespace lensforge {
 
-/// A mesh in the making, vertex by vertex and face by face.
+/// Builds a mesh vertex by vertex and face by face.
 class MeshBuilder {
  public:
   [[nodiscard]] std::int64_t vertex_count() const { return std::ssize(points_) / 3; }
@@ -22,12 +22,12 @@ class MeshBuilder {
   /// A polygon; its vertices may follow later. @pre corners.size() ≥ 3
   void add_face(std::span<const int> corners);
 
-  /// Polygons are triangles here, see polygon_triangles(). Those with indices that are out of range
-  /// or with vertices that are not finite are fans.
+  /// The mesh with polygons cut by polygon_triangles(). Polygons with indices out of range or
+  /// vertices that are not finite become fans.
   [[nodiscard]] SurfaceMesh mesh() const;
 
  private:
-  /// A face with more than three corners, as the fan that stands for it in `triangles_`.
+  /// A face with more than three corners, stored as a fan in `triangles_`.
   struct Polygon {
     std::int64_t first = 0;  ///< Triangle.
     std::int64_t corners = 0;
@@ -41,7 +41,7 @@ class MeshBuilder {
   std::int64_t faces_ = 0;
 };
 
-/// What to say of a face that is no polygon.
+/// Message about a face that is no polygon.
 inline std::string corner_problem(std::int64_t face, std::int64_t corners) {
   return "face " + std::to_string(face) + " has " + std::to_string(corners) +
          " corners: it must have 3 at least";

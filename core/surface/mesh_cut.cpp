@@ -10,10 +10,10 @@
 namespace lensforge {
 namespace {
 
-/// Corners on one edge of the mesh that are nearer than this share of it are one.
+/// Corners on one edge of the mesh closer than this share of it are merged.
 constexpr double kSameCorner = 1e-9;
 
-/// Triangles that one task clips at least: each is clipped against the whole outline.
+/// Minimum triangles per task: each is clipped against the whole outline.
 constexpr std::int64_t kClipGrain = 16;
 
 PlanTriangle plan_of(const SurfaceMesh& mesh, std::int64_t face) {
@@ -62,7 +62,7 @@ class PartBuilder {
  private:
   static constexpr int kNone = -1;
 
-  /// Number in the part of a corner of a piece.
+  /// Number in the part of a piece's corner.
   int corner(const Eigen::Vector3i& face, const Eigen::Vector3d& weights) {
     const auto zeros = (weights.array() == 0.0).count();
     Eigen::Index largest = 0;
@@ -75,7 +75,7 @@ class PartBuilder {
     return zeros == 0 ? in_face(face, weights) : on_edge(face, weights);
   }
 
-  /// The same in all pieces of a face.
+  /// Shared by all pieces of a face.
   int in_face(const Eigen::Vector3i& face, const Eigen::Vector3d& weights) {
     for (const auto& [known, number] : inside_) {
       if (known == weights) return number;
@@ -84,7 +84,7 @@ class PartBuilder {
     return inside_.back().second;
   }
 
-  /// The same from both sides of an edge.
+  /// Shared by both sides of an edge.
   int on_edge(const Eigen::Vector3i& face, const Eigen::Vector3d& weights) {
     int a = weights[0] == 0.0 ? 1 : 0;
     int b = weights[2] == 0.0 ? 1 : 2;
@@ -112,10 +112,10 @@ class PartBuilder {
 
   const SurfaceMesh& mesh_;
   const Eigen::Matrix3Xd& normals_;
-  std::vector<int> kept_;  ///< Of a vertex of the mesh: its number in the part.
+  std::vector<int> kept_;  ///< Number in the part of each vertex of the mesh.
   std::map<std::pair<int, int>, std::vector<std::pair<double, int>>> edges_;
-  std::int64_t face_ = -1;                               ///< That pieces were added of last.
-  std::vector<std::pair<Eigen::Vector3d, int>> inside_;  ///< Its corners inside of it.
+  std::int64_t face_ = -1;                               ///< Face of the last piece added.
+  std::vector<std::pair<Eigen::Vector3d, int>> inside_;  ///< Corners inside that face.
   std::vector<Eigen::Vector3d> places_;
   std::vector<Eigen::Vector3d> directions_;
   std::vector<Eigen::Vector3i> triangles_;

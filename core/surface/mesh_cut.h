@@ -13,7 +13,7 @@
 
 namespace lensforge {
 
-/// How an outline cuts the triangles of a mesh, seen along z.
+/// The cut of a mesh's triangles by an outline, seen along z.
 struct MeshCut {
   struct Piece {
     std::int64_t face = -1;
@@ -22,18 +22,18 @@ struct MeshCut {
 
   static constexpr std::int32_t kWhole = -1;
 
-  /// Of every face: kWhole inside of the outline, otherwise the number in `pieces` of its first
-  /// piece. Pieces with another face from there on: nothing of it lies inside.
+  /// Per face: kWhole if inside the outline, otherwise the index in `pieces` of its first piece. If
+  /// that piece belongs to another face, nothing of this face is inside.
   std::vector<std::int32_t> first;
   std::vector<Piece> pieces;  ///< Face by face; the last belongs to no face.
-  std::vector<double> share;  ///< Of every face's area that lies inside, 0 … 1.
+  std::vector<double> share;  ///< Share of each face's area that is inside, 0 … 1.
 };
 
-/// Same answer for any number of threads. @pre every triangle faces +z.
+/// The result does not depend on the number of threads. @pre every triangle faces +z.
 MeshCut cut_mesh(const SurfaceMesh& mesh, const Outline& outline, const Executor& executor);
 
-/// The part of a surface inside of an outline as a mesh of its own. Corners on the outline take
-/// height and unit normal by linear interpolation, so that facets stay in their planes.
+/// The part of a surface inside an outline as a separate mesh. Height and unit normal of corners on
+/// the outline are interpolated linearly, so facets stay in their planes.
 /// @param normals  3 × V, of any length but 0.
 SampledSurface part_inside(const SurfaceMesh& mesh, const Eigen::Matrix3Xd& normals,
                            const MeshCut& cut);

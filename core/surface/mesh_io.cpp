@@ -25,11 +25,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Records are copied as they lie in memory.
+// Records are copied from memory unchanged.
 static_assert(std::endian::native == std::endian::little, "write_ply writes little-endian PLY");
 
-/// Largest file of another program that is read: its content is held in memory. A binary STL of
-/// this size has 85 million triangles.
+/// Maximum size of another program's file: its content is held in memory. A binary STL of this size
+/// has 85 million triangles.
 constexpr std::uintmax_t kMaxMeshBytes = std::uintmax_t{4} << 30U;
 
 constexpr std::size_t kTriangleBytes = 1 + 3 * sizeof(std::int32_t);
@@ -40,15 +40,15 @@ struct Counts {
 };
 
 constexpr std::string_view kFormatLines = "ply\nformat binary_little_endian 1.0\n";
-/// Before the version of the program that wrote it.
+/// Precedes the version of the program that wrote the file.
 constexpr std::string_view kMarkBegin = "comment lensforge ";
-/// Bytes of the longest mark line that is looked for.
+/// Maximum bytes of a mark line.
 constexpr std::size_t kLongestMark = 100;
 
 constexpr std::string_view kNormalLines =
     "property double nx\nproperty double ny\nproperty double nz\n";
 
-/// What follows the format and the mark.
+/// The header lines after the format and the mark.
 std::string element_lines(const Counts& counts, std::string_view normals = "") {
   return "element vertex " + std::to_string(counts.vertices) +
          "\nproperty double x\nproperty double y\nproperty double z\n" + std::string(normals) +
@@ -77,7 +77,7 @@ struct OwnHeader {
   [[nodiscard]] Eigen::Index numbers_per_vertex() const { return normals ? 6 : 3; }
 };
 
-/// The header if the file is in the very form that write_ply() makes, with or without its mark.
+/// The header if the file has exactly the form of write_ply(), with or without its mark.
 std::optional<OwnHeader> own_form(std::ifstream& file) {
   const std::size_t longest = kFormatLines.size() + kLongestMark +
                               element_lines({INT32_MAX, INT32_MAX}, kNormalLines).size();
@@ -101,7 +101,7 @@ std::optional<OwnHeader> own_form(std::ifstream& file) {
   return std::nullopt;
 }
 
-/// Our own form is read bit for bit, without rounding to single precision.
+/// Reads our own form exactly, without rounding to single precision.
 SurfaceMesh read_own_form(std::ifstream& file, const OwnHeader& header, const fs::path& path) {
   const Counts& counts = header.counts;
   const std::uintmax_t expected =
@@ -170,7 +170,7 @@ Eigen::MatrixXd with_normals(const SurfaceMesh& mesh, const Eigen::Matrix3Xd& no
   return records;
 }
 
-/// @param records  what is stored of the vertices, a column each.
+/// @param records  the stored data of the vertices, one column each.
 template <class Matrix>
 void write_blocks(const SurfaceMesh& mesh, const Matrix& records, std::ofstream& file) {
   const std::string_view normals = records.rows() > 3 ? kNormalLines : "";

@@ -32,7 +32,7 @@ MeshText::MeshText(std::string_view text, std::string name, Form form, std::int6
   if (text_.starts_with(kByteOrderMark)) next_ = kByteOrderMark.size();
 }
 
-/// The next line as it stands in the file; false at the end of the text.
+/// The next physical line; false at the end of the text.
 bool MeshText::take_line() {
   continues_ = false;
   rest_ = {};
@@ -42,7 +42,7 @@ bool MeshText::take_line() {
   next_ = std::min(end + (text_.substr(end).starts_with("\r\n") ? 2 : 1), text_.size());
   ++line_;
   if (form_ == Form::kPlain) return true;
-  // A comment ends with its line, whatever its last letter is.
+  // A comment ends with its line, even after a backslash.
   rest_ = rest_.substr(0, rest_.find('#'));
   const std::size_t last = rest_.find_last_not_of(kBlanks);
   continues_ =
@@ -51,7 +51,7 @@ bool MeshText::take_line() {
   return true;
 }
 
-/// Goes on to the next word of this line, if it has one.
+/// Moves to the next word of this line, if any.
 bool MeshText::at_word() {
   for (;;) {
     const std::size_t begin = rest_.find_first_not_of(kBlanks);
@@ -96,7 +96,7 @@ double MeshText::number_from(std::string_view word, const std::string& meaning) 
   if (stop != end || error == std::errc::invalid_argument) {
     refuse(meaning + " is " + quoted_word(word) + ": it must be a number");
   }
-  // Too large becomes infinite, too small 0.
+  // Too large a number becomes infinite, too small a one 0.
   return error == std::errc() ? value : std::strtod(std::string(digits).c_str(), nullptr);
 }
 

@@ -8,17 +8,17 @@
 namespace lensforge {
 
 /// A text file of a mesh, line by line and word by word. Lines end with LF, CR LF or CR; a byte
-/// order mark before the first is passed over.
+/// order mark before the first is skipped.
 class MeshText {
  public:
   enum class Form {
     kPlain,
     kHashComments,    ///< '#' begins a comment.
-    kContinuedLines,  ///< The same, and a line that ends with a backslash goes on in the next one.
+    kContinuedLines,  ///< The same, and a backslash at its end continues a line.
   };
 
   /// @param name    what to call the file in messages.
-  /// @param before  lines of the file that stand before `text`.
+  /// @param before  number of lines of the file before `text`.
   /// @pre `text` outlives this.
   MeshText(std::string_view text, std::string name, Form form, std::int64_t before = 0);
 
@@ -36,7 +36,7 @@ class MeshText {
   [[nodiscard]] std::int64_t whole_from(std::string_view word, const std::string& meaning) const;
 
   [[nodiscard]] std::int64_t line() const { return line_; }
-  /// Where the line after this one begins.
+  /// Offset of the next line.
   [[nodiscard]] std::size_t end_of_line() const { return next_; }
 
   /// @throw InputError "name: line N: why".
@@ -49,19 +49,19 @@ class MeshText {
   std::string_view text_;
   std::string name_;
   Form form_;
-  std::string_view rest_;   ///< Of this line.
-  bool continues_ = false;  ///< This line goes on in the next one.
+  std::string_view rest_;   ///< Rest of this line.
+  bool continues_ = false;  ///< The next line continues this one.
   std::size_t next_ = 0;
   std::int64_t line_;
 };
 
-/// `text` without a byte order mark and white space in front.
+/// `text` without leading byte order mark and white space.
 std::string_view without_lead(std::string_view text);
 
-/// Whether two words are the same but for capitals (ASCII).
+/// True if two words are equal apart from capitals (ASCII).
 bool same_word(std::string_view a, std::string_view small_letters);
 
-/// A word of a file as it may stand in a message: short and printable, in quotes.
+/// A word of a file for a message: short and printable, in quotes.
 std::string quoted_word(std::string_view word);
 
 }  // namespace lensforge

@@ -56,8 +56,8 @@ TriConnectivity make_connectivity(const SurfaceMesh& mesh) {
   return connectivity;
 }
 
-/// Calls visit(k, half-edge) for edges k = 0, 1, 2 of a triangle. OpenMesh starts its walk where it
-/// likes; the corner that an edge leaves tells its number.
+/// Calls visit(k, half-edge) for edges k = 0, 1, 2 of a triangle. OpenMesh may start at any edge;
+/// the corner at which an edge starts gives its number.
 template <class Visit>
 void for_each_edge(const TriConnectivity& connectivity, const SurfaceMesh& mesh, int triangle,
                    const Visit& visit) {
@@ -81,7 +81,7 @@ Eigen::Matrix3Xi triangles_across(const TriConnectivity& connectivity, const Sur
   return across;
 }
 
-/// Turns counts per vertex, stored one place late, into where each vertex's list begins.
+/// Turns counts per vertex, stored one place late, into the start of each vertex's list.
 void accumulate(std::vector<std::int32_t>& begin) {
   for (std::size_t v = 1; v < begin.size(); ++v) begin[v] += begin[v - 1];
 }
@@ -93,7 +93,7 @@ void list_corners(const SurfaceMesh& mesh, MeshTopology& topology) {
   accumulate(begin);
   topology.vertex_corners.resize(static_cast<std::size_t>(mesh.triangles.size()));
   std::vector<std::int32_t> next(begin.begin(), begin.end() - 1);
-  // Corners are visited in ascending order, so every list comes out ascending.
+  // Corners are visited in ascending order, so every list is ascending.
   std::int32_t corner = 0;
   for (const int v : mesh.triangles.reshaped()) {
     const std::int32_t place = next[static_cast<std::size_t>(v)]++;
@@ -101,8 +101,8 @@ void list_corners(const SurfaceMesh& mesh, MeshTopology& topology) {
   }
 }
 
-/// From the edges and not from OpenMesh's walk around a vertex, which sees one fan only where two
-/// touch in a single vertex.
+/// Uses the edges, since OpenMesh's walk around a vertex visits only one of two fans that touch in
+/// it.
 void list_neighbours(const TriConnectivity& connectivity, MeshTopology& topology) {
   auto& begin = topology.vertex_neighbour_begin;
   begin.assign(connectivity.n_vertices() + 1, 0);

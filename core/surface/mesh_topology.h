@@ -9,7 +9,7 @@
 
 namespace lensforge {
 
-/// Who touches whom in a triangle mesh, as flat arrays for the kernels.
+/// Adjacency of a triangle mesh, as flat arrays for the kernels.
 struct MeshTopology {
   /// 3 × T: triangle across edge k of a triangle (edge k runs from corner k to corner k+1 mod 3);
   /// −1 at the boundary.
@@ -26,8 +26,8 @@ struct MeshTopology {
 };
 
 /// Builds the tables through OpenMesh.
-/// @throw InputError if the mesh is not a manifold (an edge with three triangles, a triangle that
-///        is turned against its neighbour).
+/// @throw InputError if the mesh is not a manifold (an edge with three triangles, a triangle
+///        oriented against its neighbour).
 MeshTopology make_topology(const SurfaceMesh& mesh);
 
 }  // namespace lensforge

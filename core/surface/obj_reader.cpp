@@ -10,8 +10,8 @@
 #include "core/surface/mesh_text.h"
 
 // Wavefront, "Object Files (.obj)", version 3.0: indices count from 1, negative ones from the last
-// vertex back. Lines that are no part of the mesh (normals, groups, materials, …) are passed over,
-// and so is what follows z: a weight, or a colour.
+// vertex back. Lines that do not belong to the mesh (normals, groups, materials, …) are ignored,
+// and so are values after z: a weight, or a colour.
 namespace lensforge {
 namespace {
 
@@ -50,7 +50,7 @@ SurfaceMesh read_obj(std::string_view content, const std::string& name) {
   while (text.next_line()) {
     const std::string_view keyword = text.word();
     if (same_word(keyword, "v")) read_vertex(text, builder);
-    // "fo" is what faces were called before version 3.0.
+    // "fo" is the keyword for faces before version 3.0.
     if (same_word(keyword, "f") || same_word(keyword, "fo")) read_face(text, builder);
   }
   return builder.mesh();

@@ -12,8 +12,8 @@
 #include "core/surface/mesh_text.h"
 
 // Geomview manual, "OFF Files": [ST][C][N][4][n]OFF, which may be left out, then the numbers of
-// vertices, faces and edges, then a line for each vertex and each face. 4OFF and nOFF have other
-// than three coordinates.
+// vertices, faces and edges, then a line for each vertex and each face. 4OFF and nOFF do not have
+// three coordinates.
 namespace lensforge {
 namespace {
 
@@ -74,7 +74,7 @@ void read_faces(MeshText& text, std::int64_t count, MeshBuilder& builder) {
   }
 }
 
-/// The number of edges, which tells nothing, and is left out or stands on a line of its own.
+/// Skips the number of edges, which is not needed and may be missing or on a separate line.
 void pass_edges(MeshText& text) {
   if (!text.word().empty()) return;
   MeshText ahead = text;

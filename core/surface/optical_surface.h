@@ -20,7 +20,7 @@ struct SurfacePoint {
   Eigen::Vector2d slope = Eigen::Vector2d::Zero();  ///< ∂z/∂x, ∂z/∂y
 };
 
-/// The point of a box that is nearest: rounding may put points of the rim outside.
+/// The nearest point of a box: rounding may put points of the rim outside.
 inline Eigen::Vector2d nearest_inside(const Eigen::AlignedBox2d& box, const Eigen::Vector2d& at) {
   return at.cwiseMax(box.min()).cwiseMin(box.max());
 }
@@ -31,34 +31,35 @@ struct BendRange {
   double largest = 0.0;
 };
 
-/// A lens's optical surface as one of the models has it: a height field over the triangles of a
-/// mesh. What is cut, exported and predicted asks this interface, not the model's name; a model
-/// joins by answering the four questions that are virtual, and in optical_surface().
+/// A lens's optical surface under one of the models: a height field over the triangles of a mesh.
+/// Cutting, export and prediction use this interface, not the model's name. A new model implements
+/// the virtual functions and is added to optical_surface().
 class OpticalSurface {
  public:
   OpticalSurface(const OpticalSurface&) = delete;
   OpticalSurface& operator=(const OpticalSurface&) = delete;
   virtual ~OpticalSurface() = default;
 
-  /// Whether slopes may jump from one triangle to the next. If not, they are continuous everywhere.
+  /// True if slopes may jump from one triangle to the next; if false, they are continuous
+  /// everywhere.
   [[nodiscard]] virtual bool has_creases() const = 0;
   /// The point of a triangle with these barycentric weights, none below 0.
   [[nodiscard]] virtual SurfacePoint in_triangle(std::int64_t triangle,
                                                  const Eigen::Vector3d& weights) const = 0;
-  /// The cubic around such a point: one over the triangle, or one over each third of it
-  /// (has_thirds()), the one whose points weigh the same corner least.
+  /// The cubic around such a point: one per triangle, or one per third of it (has_thirds()), chosen
+  /// by the corner of least weight.
   [[nodiscard]] virtual SmoothPatch patch_in(std::int64_t triangle,
                                              const Eigen::Vector3d& weights) const = 0;
   [[nodiscard]] virtual bool has_thirds() const { return false; }
-  /// Bounds over a triangle, its border included.
+  /// Curvature bounds over a triangle, its border included.
   [[nodiscard]] virtual BendRange bend_range(std::int64_t triangle) const = 0;
 
-  /// Nothing outside of the mesh.
+  /// The point above xy; nothing outside the mesh.
   [[nodiscard]] std::optional<SurfacePoint> at(const Eigen::Vector2d& xy) const;
-  /// The cubic around a point: nothing outside of the mesh.
+  /// The cubic around a point; nothing outside the mesh.
   [[nodiscard]] std::optional<SmoothPatch> patch_at(const Eigen::Vector2d& xy) const;
 
-  /// With the surface's heights at the vertices.
+  /// The mesh, with the surface's heights at the vertices.
   [[nodiscard]] const SurfaceMesh& mesh() const { return mesh_; }
   [[nodiscard]] const Eigen::AlignedBox2d& box() const { return index_.box(); }
 
@@ -75,8 +76,8 @@ class OpticalSurface {
   TriangleIndex index_;
 };
 
-/// The surface that a mesh stands for under a model. @pre every triangle faces +z; a mesh can stand
-/// for the model (kMeshModels).
+/// The surface that a mesh represents under a model. @pre every triangle faces +z; the model is one
+/// of kMeshModels.
 std::shared_ptr<const OpticalSurface> optical_surface(const SurfaceMesh& mesh, SurfaceModel model);
 
 }  // namespace lensforge

@@ -13,23 +13,23 @@ namespace {
 
 using Polygon = std::vector<Eigen::Vector2d>;
 
-/// Weights this near to 0 are 0: then a corner lies on a side of the triangle, and that of its
-/// neighbour on the same side is the same.
+/// Weights this close to 0 become 0: the corner is then on a side of the triangle and coincides
+/// with the neighbouring triangle's.
 constexpr double kOnSide = 1e-12;
 
 double doubled_area(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vector2d& c) {
   return cross(b - a, c - a);
 }
 
-/// A stretch of a polygon to the left of a line, from where it comes across the line to where it
-/// goes back.
+/// A stretch of a polygon to the left of a line, from one crossing of the line to the next.
 struct Chain {
   Polygon points;
-  double start = 0.0;  ///< Along the line.
+  double start = 0.0;  ///< Position along the line.
   double end = 0.0;
 };
 
-/// The stretches of a polygon strictly to the left of a → b; one without ends if all of it is.
+/// The stretches of a polygon strictly to the left of a → b; one without ends if the whole polygon
+/// is.
 std::vector<Chain> left_chains(const Polygon& polygon, const Eigen::Vector2d& a,
                                const Eigen::Vector2d& b) {
   const std::size_t n = polygon.size();
@@ -58,8 +58,8 @@ std::vector<Chain> left_chains(const Polygon& polygon, const Eigen::Vector2d& a,
   return chains;
 }
 
-/// The parts of a polygon to the left of a → b, counter-clockwise as it is. Along the line, ends of
-/// its stretches and starts take turns: what ends goes on with the next start.
+/// The parts of a polygon to the left of a → b, counter-clockwise like the polygon. Along the line,
+/// ends and starts of stretches alternate: each end connects to the next start.
 std::vector<Polygon> left_parts(const Polygon& polygon, const Eigen::Vector2d& a,
                                 const Eigen::Vector2d& b) {
   std::vector<Chain> chains = left_chains(polygon, a, b);
@@ -87,7 +87,7 @@ std::vector<Polygon> left_parts(const Polygon& polygon, const Eigen::Vector2d& a
   return parts;
 }
 
-/// The parts of a polygon inside of a triangle (Weiler and Atherton, 1977, side by side).
+/// The parts of a polygon inside a triangle (Weiler and Atherton, 1977, one side at a time).
 std::vector<Polygon> parts_inside(const Polygon& polygon, const PlanTriangle& t) {
   std::vector<Polygon> parts{polygon};
   for (std::size_t k = 0; k < 3; ++k) {
@@ -120,8 +120,8 @@ bool is_ear(const Polygon& polygon, std::size_t k) {
   });
 }
 
-/// Cuts a polygon into triangles, ear by ear, the largest first: slivers only where there is no
-/// choice. @param least  doubled area below which a corner is dropped.
+/// Cuts a polygon into triangles by clipping ears, the largest first, which avoids slivers. @param
+/// least  doubled area below which a corner is dropped.
 std::vector<PlanTriangle> triangles_of(Polygon polygon, double least) {
   std::vector<PlanTriangle> triangles;
   while (polygon.size() >= 3) {

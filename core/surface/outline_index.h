@@ -16,14 +16,14 @@ using PlanTriangle = std::array<Eigen::Vector2d, 3>;
 
 Eigen::AlignedBox2d box_of(const PlanTriangle& t);
 
-/// A part of a triangle that is a triangle itself: column k has the barycentric weights of its
-/// corner k, counter-clockwise.
+/// A triangular part of a triangle: column k holds the barycentric weights of its corner k,
+/// counter-clockwise.
 struct TrianglePiece {
   Eigen::Matrix3d weights = Eigen::Matrix3d::Identity();
-  double share = 1.0;  ///< Of the triangle's area, above 0.
+  double share = 1.0;  ///< Share of the triangle's area, > 0.
 };
 
-/// Quick answers to what lies inside of an outline.
+/// Spatial index for the inside of an outline.
 class OutlineIndex {
  public:
   explicit OutlineIndex(const Outline& outline);
@@ -31,11 +31,12 @@ class OutlineIndex {
   enum class Side { kOutside, kInside, kAcross };
 
   [[nodiscard]] bool contains(const Eigen::Vector2d& p) const;
-  /// Where all of a box lies; kAcross if the box of a side of the outline touches it.
+  /// Side of the outline on which a box lies; kAcross if the bounding box of one of the outline's
+  /// sides touches it.
   [[nodiscard]] Side side_of(const Eigen::AlignedBox2d& box) const;
-  /// The part of a triangle inside of the outline, exactly, in triangles that do not overlap: one
-  /// that is the whole where all of it lies inside, none where nothing does. Shares below
-  /// kLeastShare of the triangle count as nothing, and what lacks less than that as whole.
+  /// The exact part of a triangle inside the outline, as triangles that do not overlap: the whole
+  /// triangle if all of it is inside, none if nothing is. A share below kLeastShare counts as
+  /// nothing; a share less than that short of the whole counts as whole.
   [[nodiscard]] std::vector<TrianglePiece> inside(const PlanTriangle& t) const;
 
   static constexpr double kLeastShare = 1e-12;
@@ -50,7 +51,7 @@ class OutlineIndex {
   std::vector<Eigen::Vector2d> points_;
   double low_ = 0.0;                             ///< Least y, mm.
   double step_ = 1.0;                            ///< Height of a slab, mm.
-  std::vector<std::vector<std::size_t>> slabs_;  ///< Sides that reach into a strip of y.
+  std::vector<std::vector<std::size_t>> slabs_;  ///< Sides that reach into each strip of y.
 };
 
 }  // namespace lensforge

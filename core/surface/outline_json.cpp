@@ -13,7 +13,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-/// How far a circle may be from the one that the lens's rectangle holds, mm.
+/// Maximum deviation of a circle from the one in the lens's rectangle, mm.
 constexpr double kAgreement = 1e-6;
 
 Outline read_circle(const JsonFields& fields, const Eigen::Vector2d& size) {

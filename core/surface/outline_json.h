@@ -9,8 +9,8 @@
 
 namespace lensforge {
 
-/// What lens.json says of an outline: its type, a circle's centre and radius, a rounded rectangle's
-/// radius, a polygon's corners; mm.
+/// The outline in lens.json: its type, a circle's centre and radius, a rounded rectangle's radius,
+/// a polygon's corners; mm.
 nlohmann::ordered_json outline_json(const Outline& outline, const Eigen::Vector2d& lens_size);
 
 /// outline_json() read back for a lens of this size. @throw InputError naming the field.

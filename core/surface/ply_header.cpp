@@ -87,12 +87,12 @@ PlyProperty read_property(MeshText& text, const PlyElement& element) {
   return property;
 }
 
-/// The least that one of these takes.
+/// Minimum bytes of one element.
 std::int64_t smallest_size(const PlyElement& element, PlyHeader::Format format) {
   std::int64_t bytes = 0;
   for (const PlyProperty& property : element.properties) {
     const PlyType& type = property.count_type ? *property.count_type : property.type;
-    // As text a digit and a blank.
+    // Text: a digit and a blank.
     bytes += format == PlyHeader::Format::kText ? 2 : static_cast<std::int64_t>(type.bytes);
   }
   return bytes;
@@ -169,7 +169,7 @@ PlyHeader read_ply_header(std::string_view content, const std::string& name) {
   }
   if (!has_format) text.refuse("has no \"format\" in its header");
   header.end = all.size();
-  // Where lines end with CR alone, an LF behind the header is the first byte of the data.
+  // If lines end with CR alone, an LF after the header is the first byte of the data.
   if (all.ends_with("\r\n") && std::count(all.begin(), all.end(), '\n') == 1) --header.end;
   header.lines = text.line();
   check_elements(header, content.size(), text);

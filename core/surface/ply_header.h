@@ -20,7 +20,7 @@ struct PlyType {
 struct PlyProperty {
   std::string name;
   PlyType type;
-  std::optional<PlyType> count_type;  ///< Of a list.
+  std::optional<PlyType> count_type;  ///< Lists only.
 };
 
 struct PlyElement {
@@ -28,7 +28,7 @@ struct PlyElement {
   std::int64_t count = 0;
   std::vector<PlyProperty> properties;
 
-  /// Place of the first property called one of `names`; nothing without one.
+  /// Index of the first property named in `names`; nothing if there is none.
   [[nodiscard]] std::optional<std::size_t> index_of(
       const std::vector<std::string_view>& names) const;
 };
@@ -37,17 +37,17 @@ struct PlyHeader {
   enum class Format { kText, kLittleEndian, kBigEndian };
   Format format = Format::kText;
   std::vector<PlyElement> elements;
-  std::size_t end = 0;     ///< Where the data begin.
-  std::int64_t lines = 0;  ///< Of the header, the last one included.
+  std::size_t end = 0;     ///< Offset of the data.
+  std::int64_t lines = 0;  ///< Lines of the header, including the last.
 };
 
 /// Reads the header of PLY 1.0 (Turk, "The PLY Polygon File Format").
-/// @throw InputError "name: line N: …" for a line that the format has not, a "vertex" without three
+/// @throw InputError "name: line N: …" for a line unknown to the format, a "vertex" without three
 ///        coordinates, a "face" without a list of vertices, or more data announced than `content`
 ///        can hold.
 PlyHeader read_ply_header(std::string_view content, const std::string& name);
 
-/// The names that the list of a face's vertices goes by.
+/// Names for the list of a face's vertices.
 inline const std::vector<std::string_view> kPlyVertexLists{"vertex_indices", "vertex_index"};
 
 }  // namespace lensforge

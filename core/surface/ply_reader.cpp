@@ -39,7 +39,7 @@ double number_of(const std::array<char, 8>& raw, const PlyType& type) {
   return is_signed ? as<std::int32_t>(raw) : as<std::uint32_t>(raw);
 }
 
-/// The numbers behind the header, one after the other.
+/// Reads the numbers after the header in sequence.
 class PlyNumbers {
  public:
   PlyNumbers(std::string_view content, const std::string& name, const PlyHeader& header)
@@ -62,7 +62,7 @@ class PlyNumbers {
     return number_of(raw, type);
   }
 
-  /// A whole number of at most 32 bits, as every type of PLY has.
+  /// A whole number of at most 32 bits, the maximum of PLY's types.
   std::int64_t next_whole(const PlyType& type) {
     const double value = next(type);
     if (!(std::abs(value) <= 4294967295.0) || value != std::trunc(value)) {
@@ -77,7 +77,7 @@ class PlyNumbers {
     return count;
   }
 
-  /// @throw InputError if text is left over, which nothing announces.
+  /// @throw InputError if surplus text follows.
   void finish() {
     if (format_ != PlyHeader::Format::kText) return;
     std::string_view word = text_.word();
@@ -88,7 +88,7 @@ class PlyNumbers {
     }
   }
 
-  /// With the line where there are lines.
+  /// Throws, naming the line if the file is text.
   [[noreturn]] void refuse(const std::string& why) const {
     if (format_ == PlyHeader::Format::kText) text_.refuse(why);
     throw InputError(name_ + ": " + why);
@@ -125,7 +125,7 @@ void read_corners(const PlyProperty& list, PlyNumbers& numbers, MeshBuilder& bui
   std::vector<int> corners;
   for (std::int64_t k = 0; k < count; ++k) {
     const std::int64_t vertex = numbers.next_whole(list.type);
-    // Whether there is such a vertex is looked up once all are read.
+    // Indices are checked after all vertices are read.
     if (!std::in_range<int>(vertex)) {
       numbers.refuse("a face uses vertex " + std::to_string(vertex) + ": there is none");
     }

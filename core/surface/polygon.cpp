@@ -18,8 +18,8 @@ Eigen::Vector3d newell_normal(const Eigen::Matrix3Xd& corners) {
   return normal;
 }
 
-/// The polygon without the axis along which it is nearest to flat, counter-clockwise. Leaving out a
-/// coordinate rounds nothing, so that corners in a line stay in a line.
+/// The polygon projected along the axis nearest to its normal, counter-clockwise. Dropping a
+/// coordinate does not round, so collinear corners stay collinear.
 Eigen::Matrix2Xd seen_flat(const Eigen::Matrix3Xd& corners) {
   const Eigen::Vector3d normal = newell_normal(corners);
   Eigen::Index axis = 0;
@@ -62,7 +62,7 @@ class EarClipper {
   }
   static std::size_t number(int i) { return static_cast<std::size_t>(i); }
 
-  /// All corners turn left, once around in all: a star turns left, too.
+  /// True if all corners turn left, once around in total (the corners of a star turn left too).
   [[nodiscard]] bool is_convex() const {
     double around = 0.0;
     for (int i = 0; i < left_; ++i) {
@@ -81,8 +81,8 @@ class EarClipper {
     return triangles;
   }
 
-  /// Whether a corner stands in the triangle or on its edges; one in the place of a corner of the
-  /// triangle, as where a polygon with a hole is cut open, does not.
+  /// True if a corner is in the triangle or on its edges. A corner that coincides with one of the
+  /// triangle's, as in a polygon cut open around a hole, does not count.
   [[nodiscard]] bool is_inside(int i, const Eigen::Vector2d& a, const Eigen::Vector2d& b,
                                const Eigen::Vector2d& c) const {
     const Eigen::Vector2d p = point(i);
@@ -90,8 +90,8 @@ class EarClipper {
     return turn(a, b, p) >= 0.0 && turn(b, c, p) >= 0.0 && turn(c, a, p) >= 0.0;
   }
 
-  /// Whether the triangle at a corner can be cut off. Only corners that do not turn left can be in
-  /// its way.
+  /// True if the triangle at a corner can be cut off. Only corners that do not turn left can
+  /// obstruct it.
   [[nodiscard]] bool is_ear(int i) const {
     if (!(turn_at(i) > 0.0)) return false;
     const int last = before_[number(i)];
@@ -104,7 +104,7 @@ class EarClipper {
     return true;
   }
 
-  /// The first ear from `at` on; `at` itself where there is none.
+  /// The first ear from `at` on; `at` itself if there is none.
   [[nodiscard]] int next_ear(int at) const {
     int i = at;
     while (!ear_[number(i)]) {
@@ -116,9 +116,8 @@ class EarClipper {
 
   void add(int i) { triangles_.emplace_back(before_[number(i)], i, next_[number(i)]); }
 
-  /// Cuts a corner off. What it hides from others does not change, so that only its neighbours are
-  /// looked at again. @return the next corner but one: thin fans are left to where nothing else
-  /// goes.
+  /// Cuts a corner off. Other corners' ears do not change, so only its neighbours are checked
+  /// again. @return the next corner but one, to avoid thin fans where possible.
   int clipped(int i) {
     add(i);
     const int before = before_[number(i)];

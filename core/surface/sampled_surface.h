@@ -7,14 +7,14 @@
 
 namespace lensforge {
 
-/// Points of a smooth surface, the triangles between them, and the surface's own normals there:
-/// the light that the normals send is what the surface sends, however coarse the triangles.
+/// Points of a smooth surface, the triangles between them, and the surface's own normals there: the
+/// normals send the surface's own light, however coarse the triangles.
 struct SampledSurface {
   SurfaceMesh mesh;
   Eigen::Matrix3Xd normals;  ///< 3 × V, z > 0, of any length.
 };
 
-/// A grid of points that are still to be filled in, row by row, and the triangles between them.
+/// A grid of points still to be filled in, row by row, with its triangles.
 SampledSurface make_samples(const GridShape& shape);
 
 }  // namespace lensforge

@@ -19,7 +19,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-/// How far what two keys say may be apart, mm.
+/// Maximum difference between the values of two keys, mm.
 constexpr double kAgreement = 1e-6;
 
 /// Keys of a source's extent.
@@ -34,7 +34,7 @@ ordered_json array_of(const Vector& vector) {
   return array;
 }
 
-/// The picture's right along x, as its viewer sees it.
+/// Direction along x that the viewer sees as the picture's right.
 double right_along_x(const OpticalSetup& setup) {
   return setup.view == ViewSide::kFront ? -1.0 : 1.0;
 }

@@ -12,25 +12,26 @@
 
 namespace lensforge {
 
-/// Side of a square as large as two triangles of the surface's mesh, mm.
+/// Side of a square with the mean area of two of the surface's triangles, mm.
 double mesh_cell(const SmoothSurface& surface);
 
 /// The vertex-normal model's height and slopes, at the nearest point of the surface's box.
 SurfacePoint model_near(const SmoothSurface& surface, const Eigen::Vector2d& xy);
 
-/// Heights of one spline over a surface's whole rectangle by least squares, all parameters alike.
+/// Least-squares heights of one spline over a surface's whole rectangle, all parameters weighted
+/// equally.
 class SlopeFit {
  public:
   /// Keeps references. @param cells  knot cells along u and v, ≥ 1.
-  /// @param most_share  of the vertices' movement that the knot lines follow, 0 … 1; less where
-  ///                    they would fold.
+  /// @param most_share  maximum share of the vertices' movement that the knot lines follow, 0 … 1;
+  ///        less where they would fold.
   SlopeFit(const SmoothSurface& surface, const GridWarp& warp, const std::array<int, 2>& cells,
            double most_share, const Executor& executor, const RunControl& control);
 
   /// Coefficients of z, mm, with the surface's volume. @throw Interrupted.
   [[nodiscard]] Eigen::MatrixXd solve() const;
 
-  /// The coefficients that have these moments: what solve() ends with.
+  /// The coefficients that have these moments: the last step of solve().
   [[nodiscard]] Eigen::MatrixXd heights_of(const Eigen::MatrixXd& moments) const;
 
   /// A change of heights less the constant that would change the volume.
@@ -39,7 +40,7 @@ class SlopeFit {
   [[nodiscard]] const SmoothSurface& surface() const { return surface_; }
   [[nodiscard]] const SplinePlan& plan() const { return plan_; }
   [[nodiscard]] const SplineGrid& grid() const { return grid_; }
-  /// What a squared height counts beside a squared slope, 1/mm².
+  /// Weight of a squared height against a squared slope, 1/mm².
   [[nodiscard]] double height_weight() const { return height_weight_; }
 
  private:

@@ -10,11 +10,11 @@
 namespace lensforge {
 namespace {
 
-/// A constant may be added to all heights: this share of an edge's weight on every vertex's own
-/// change keeps it near the mesh's.
+/// Slopes leave a constant height undetermined. This weight on every vertex's change, relative to
+/// an edge's, keeps heights near the mesh's.
 constexpr double kAnchor = 1e-9;
 
-/// Weight of edges that end on the border: the heights inside are not to follow its normals.
+/// Weight of edges that end on the border: heights inside must not follow the border's normals.
 constexpr double kBorderWeight = 1e-2;
 
 struct Edge {

@@ -8,7 +8,8 @@
 namespace lensforge {
 namespace {
 
-/// Coefficients of 1, s, t, s², st, t², s³, s²t, st², t³: differences of the Bernstein ones.
+/// Coefficients of 1, s, t, s², st, t², s³, s²t, st², t³: differences of the Bernstein
+/// coefficients.
 std::array<double, 10> in_weights(const SmoothPatch::Coefficients& b) {
   const auto [b300, b030, b003, b210, b120, b201, b021, b111, b102, b012] = b;
   const double ss = b120 - 2.0 * b210 + b300;

@@ -13,7 +13,7 @@ struct SurfaceShape {
   Eigen::Matrix2d bend = Eigen::Matrix2d::Zero();   ///< Second derivatives, 1/mm, symmetric.
 };
 
-/// A cubic over a triangle seen from above.
+/// A cubic height over a triangle seen from above.
 class SmoothPatch {
  public:
   /// Bernstein coefficients over corners 0, 1, 2 in the order 300, 030, 003, 210, 120, 201, 021,
@@ -23,28 +23,28 @@ class SmoothPatch {
   /// @pre the corners do not lie on one line.
   SmoothPatch(const std::array<Eigen::Vector2d, 3>& corners, const Coefficients& coefficients);
 
-  /// Whether a point lies on the triangle or within rounding of it.
+  /// True if a point is on the triangle or within rounding of it.
   [[nodiscard]] bool contains(const Eigen::Vector2d& xy) const {
     const Eigen::Vector2d b = to_weights_ * (xy - origin_);
     return b.x() >= -kOnPatch && b.y() >= -kOnPatch && b.x() + b.y() <= 1.0 + kOnPatch;
   }
 
-  /// Of the cubic, continued beyond the triangle.
+  /// The cubic at a point, continued beyond the triangle.
   [[nodiscard]] SurfaceShape at(const Eigen::Vector2d& xy) const;
 
   /// Bounds of the height over the triangle, mm: a cubic stays in the hull of its coefficients.
   [[nodiscard]] double lowest() const { return lowest_; }
   [[nodiscard]] double highest() const { return highest_; }
 
-  /// How far outside of its triangle a point counts as on it, barycentric.
+  /// Barycentric tolerance for points outside the triangle.
   static constexpr double kOnPatch = 1e-9;
 
  private:
   Eigen::Vector2d origin_;  ///< Corner 0.
   double lowest_;
   double highest_;
-  Eigen::Matrix2d to_weights_;  ///< From there to the barycentric coordinates of corners 1 and 2.
-  /// Of 1, x, y, x², xy, y², x³, x²y, xy², y³ from the origin on.
+  Eigen::Matrix2d to_weights_;  ///< Offset from corner 0 → barycentric weights of corners 1, 2.
+  /// Coefficients of 1, x, y, x², xy, y², x³, x²y, xy², y³ relative to the origin.
   std::array<double, 10> power_{};
 };
 

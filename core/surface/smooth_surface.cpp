@@ -47,7 +47,7 @@ struct PatchCorners {
     return 0.5 * (at_i + at_j) + (1.0 - t) * iij + t * ijj;
   }
 
-  /// Coefficient icc: what keeps slopes continuous across the line from corner i to the centroid.
+  /// Coefficient icc: keeps slopes continuous across the line from corner i to the centroid.
   [[nodiscard]] double inner(std::size_t i) const {
     return (toward(i, centroid) + across(i, (i + 1) % 3) + across(i, (i + 2) % 3)) / 3.0;
   }

@@ -12,10 +12,10 @@ namespace lensforge {
 /// The smooth surface of the vertex-normal model: above every vertex of a height field it has the
 /// vertex's own normal (the sum of the area normals around it), and its slopes are continuous
 /// everywhere. Since the normals project the picture, heights follow them (heights_from_slopes()),
-/// not the other way round: a surface through the vertices of an optimised lens waves between them,
-/// and projects a 128² portrait at MAE 0.0100 where the normals promise 0.0017; this one at 0.0028,
-/// for heights that move by up to 6 µm. Between the vertices it is the reduced Clough–Tocher
-/// interpolant: three cubics per triangle, the slope across an edge linear along the edge.
+/// not the other way round: a surface through the vertices of an optimised lens ripples between
+/// them and projects a 128² portrait at MAE 0.0100, this one at 0.0028. Heights change by up to 6
+/// µm. Between the vertices it is the reduced Clough–Tocher interpolant: three cubics per triangle,
+/// the slope across an edge linear along the edge.
 class SmoothSurface final : public OpticalSurface {
  public:
   /// @pre every triangle faces +z (height_field_fault()).
@@ -27,16 +27,15 @@ class SmoothSurface final : public OpticalSurface {
   [[nodiscard]] SmoothPatch patch_in(std::int64_t triangle,
                                      const Eigen::Vector3d& weights) const override;
   [[nodiscard]] bool has_thirds() const override { return true; }
-  /// Second derivatives are linear on each third of a triangle, so that its corners say all.
+  /// Second derivatives are linear on each third of a triangle, so its corners give the bounds.
   [[nodiscard]] BendRange bend_range(std::int64_t triangle) const override;
 
   /// The surface's height, and the slopes of the vertex-normal model itself: linear between the
-  /// vertices, as render_surface() takes them. Nothing outside of the mesh.
+  /// vertices, as in render_surface(). Nothing outside the mesh.
   [[nodiscard]] std::optional<SurfacePoint> model_at(const Eigen::Vector2d& xy) const;
 
-  /// How the model's slopes change along x and y (columns) around a point, 1/mm: constant on a
-  /// triangle, and no second derivatives of any surface where slopes contradict each other. Zero
-  /// outside of the mesh.
+  /// Derivatives of the model's slopes by x and y (columns) around a point, 1/mm: constant on a
+  /// triangle. They need not be the second derivatives of any surface. Zero outside the mesh.
   [[nodiscard]] Eigen::Matrix2d model_bend(const Eigen::Vector2d& xy) const;
 
   /// Slopes at the vertices, 2 × V.

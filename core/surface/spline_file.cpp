@@ -23,7 +23,7 @@ static_assert(std::endian::native == std::endian::little, "splines are little-en
 
 constexpr std::string_view kMagic = "lensforge spline 1\n";
 constexpr int kDegree = 3;
-/// 178 million control points.
+/// Maximum file size: 178 million control points.
 constexpr std::uintmax_t kMaxBytes = std::uintmax_t{4} << 30U;
 
 [[noreturn]] void refuse(const std::filesystem::path& path, const std::string& why) {

@@ -10,9 +10,9 @@
 
 namespace lensforge {
 
-/// Why a spline cannot be the optical surface of a lens with this setup: its rim is not the lens's
-/// rectangle to the last bit, or what surface_fault() says of its nodes. One clause; nothing if it
-/// can be.
+/// Returns why a spline cannot be the optical surface of a lens with this setup: its rim is not the
+/// lens's rectangle to the last bit, or surface_fault() of its nodes. One clause; nothing if it can
+/// be.
 std::optional<std::string> spline_fault(const ControlNet& net, const OpticalSetup& setup);
 
 /// Writes surface.spline (docs/interface.md), whole or not at all, exact to the bit.
@@ -23,7 +23,7 @@ void write_spline(const ControlNet& net, const std::filesystem::path& path);
 ///        of another version, truncated, or holds a number that is not finite.
 ControlNet read_spline(const std::filesystem::path& path);
 
-/// Whether this file begins as write_spline() does: no other program's files do.
+/// True if this file begins with the magic of write_spline().
 bool is_spline_file(const std::filesystem::path& path);
 
 }  // namespace lensforge

@@ -9,7 +9,7 @@
 
 #include "core/compute/executor.h"
 
-/// A tensor product of cubic splines that is looked at on a tensor grid of samples.
+/// A tensor product of cubic splines, sampled on a tensor grid.
 namespace lensforge {
 
 /// Coefficients of x and y, mm; row index runs along u.
@@ -19,24 +19,24 @@ using SplinePlan = std::array<Eigen::MatrixXd, 2>;
 struct AxisSamples {
   using Basis = Eigen::SparseMatrix<double, Eigen::RowMajor>;
 
-  /// @param at  the samples, in cells. @param length  of the whole direction, mm.
+  /// @param at  the samples, in cells. @param length  of the whole axis, mm.
   AxisSamples(const std::vector<double>& at, int knot_cells, double length);
 
   int cells = 0;
-  Basis values;  ///< One row a sample.
+  Basis values;  ///< One row per sample.
   Basis slopes;  ///< The same, 1/mm.
 };
 
-/// Vectors of coefficients over which a direction's sums of squares of values and of slopes are
+/// Basis of coefficient vectors in which a direction's sums of squares of values and of slopes are
 /// both diagonal.
 struct AxisModes {
   explicit AxisModes(const AxisSamples& axis);
 
   Eigen::MatrixXd modes;      ///< Columns; squares of values sum to 1.
-  Eigen::VectorXd stiffness;  ///< What squares of slopes sum to, 1/mm².
+  Eigen::VectorXd stiffness;  ///< Sum of squares of slopes per mode, 1/mm².
 };
 
-/// Places and their derivatives by the parameters along a line of samples, 2 × samples.
+/// Points and their derivatives by the parameters along a line of samples, 2 × samples.
 struct PlanLine {
   Eigen::Matrix2Xd xy, by_u, by_v;
 
@@ -57,8 +57,8 @@ struct SplineGrid {
   [[nodiscard]] PlanLine plan_line(const SplinePlan& plan, std::int64_t i) const;
   [[nodiscard]] HeightLine height_line(const Eigen::MatrixXd& heights, std::int64_t i) const;
 
-  /// Σ over all samples of (a·∂/∂u + b·∂/∂v + c) of every basis function, where `weigh(i)` gives a,
-  /// b and c (columns) along line i; called at the same time from several threads.
+  /// Σ over all samples of (a·∂/∂u + b·∂/∂v + c) of every basis function, where `weigh(i)` returns
+  /// a, b and c (columns) along line i. Several threads call it at the same time.
   template <class Weigh>
   [[nodiscard]] Eigen::MatrixXd moments(const Executor& executor, const Weigh& weigh) const {
     Eigen::MatrixXd by_slope(v.values.cols(), u.values.rows());

@@ -9,8 +9,8 @@
 
 namespace lensforge {
 
-/// A spline as the surface that is cut and predicted: twice continuously differentiable, exact at
-/// every point. Its mesh is spline_nodes() with kMeshSamples.
+/// A spline as the surface to cut and predict: twice continuously differentiable, exact at every
+/// point. Its mesh is spline_nodes() with kMeshSamples.
 class SplineSurface final : public OpticalSurface {
  public:
   /// @pre every triangle of the nodes faces +z (spline_fault()).
@@ -20,10 +20,10 @@ class SplineSurface final : public OpticalSurface {
   [[nodiscard]] SurfacePoint in_triangle(std::int64_t triangle,
                                          const Eigen::Vector3d& weights) const override;
   /// The cubic with the spline's heights and slopes at the triangle's corners and its height in the
-  /// middle: between them off by the fourth power of the triangle's size.
+  /// middle. Elsewhere the error is of fourth order in the triangle's size.
   [[nodiscard]] SmoothPatch patch_in(std::int64_t triangle,
                                      const Eigen::Vector3d& weights) const override;
-  /// Of the spline at the corners and of the cubic over the whole triangle.
+  /// Bounds of the spline at the corners and of the cubic over the whole triangle.
   [[nodiscard]] BendRange bend_range(std::int64_t triangle) const override;
 
   [[nodiscard]] const ControlNet& net() const { return net_; }

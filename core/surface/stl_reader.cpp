@@ -13,10 +13,10 @@
 #include "core/surface/mesh_readers.h"
 #include "core/surface/mesh_text.h"
 
-// Binary: 80 bytes of anything, a count, then 50 bytes a triangle (normal, three corners, two bytes
-// of anything). Text: solid { facet normal n { outer loop { vertex v } endloop } endfacet }
+// Binary: 80 arbitrary bytes, a count, then 50 bytes per triangle (normal, three corners, two
+// arbitrary bytes). Text: solid { facet normal n { outer loop { vertex v } endloop } endfacet }
 // endsolid, with any white space between words. A binary file may begin with "solid" too, so its
-// size decides, and where that is wrong, a zero byte, which no text has.
+// size decides; if the size does not match, a zero byte, which text never contains.
 namespace lensforge {
 namespace {
 
@@ -38,7 +38,7 @@ struct PointHash {
   }
 };
 
-/// Gives corners that coincide one vertex.
+/// Merges coincident corners into one vertex.
 class CornerMerger {
  public:
   void add_triangle(const std::array<Point, 3>& points) {
@@ -138,7 +138,7 @@ void read_solid(MeshText& text, CornerMerger& merger) {
 SurfaceMesh read_text(std::string_view content, const std::string& name) {
   MeshText text(content, name, MeshText::Form::kPlain);
   CornerMerger merger;
-  // What is left of the line of "endsolid" is the solid's name once more.
+  // The rest of the "endsolid" line repeats the solid's name.
   while (text.next_line()) {
     if (const auto word = text.word(); !same_word(word, "solid")) {
       text.refuse("has " + quoted_word(word) + " where \"solid\" must stand");

@@ -10,7 +10,7 @@
 namespace lensforge {
 namespace {
 
-// Records are copied as they lie in memory.
+// Records are copied from memory unchanged.
 static_assert(std::endian::native == std::endian::little, "write_stl writes little-endian STL");
 
 constexpr std::size_t kStlHeader = 80;
@@ -31,7 +31,7 @@ void append_stl_triangle(std::string& bytes, const SurfaceMesh& mesh, Eigen::Ind
 
 void write_stl(const SurfaceMesh& mesh, const std::string& title,
                const std::filesystem::path& path) {
-  // A header that begins with "solid" is taken for text STL.
+  // Readers take a header that begins with "solid" for text STL.
   std::string bytes = std::string(title.starts_with("solid") ? " " : "") + title;
   bytes.resize(kStlHeader, ' ');
   bytes.reserve(kStlHeader + 4 + kStlTriangle * static_cast<std::size_t>(mesh.triangle_count()));

@@ -8,7 +8,7 @@
 
 namespace lensforge {
 
-/// Vertices per row and number of rows of a mesh that is laid out as a grid; {0, 0} if it is not.
+/// Vertices per row and number of rows of a grid mesh; {0, 0} for other meshes.
 struct GridShape {
   int columns = 0;
   int rows = 0;
@@ -32,8 +32,8 @@ struct SurfaceMesh {
   [[nodiscard]] Corners corners(std::int64_t triangle) const {
     return {corner(triangle, 0), corner(triangle, 1), corner(triangle, 2)};
   }
-  /// What a triangle covers seen from +z, mm²; negative if it runs clockwise. Not its light: that
-  /// is the light path's to say.
+  /// Area of a triangle seen from +z, mm²; negative if clockwise. For its light see
+  /// LightPath::intake().
   [[nodiscard]] double plan_area(std::int64_t triangle) const {
     return lensforge::plan_area(corners(triangle));
   }

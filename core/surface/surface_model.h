@@ -8,17 +8,17 @@
 
 namespace lensforge {
 
-/// Which normals send the light: one per triangle (the paper's model), one per vertex (what a
-/// polished, smooth part does), or those of one C² spline, which is then the surface itself.
+/// The normals that direct the light: one per triangle (the paper's model), one per vertex (a
+/// polished, smooth part), or those of one C² spline, which is then the surface itself.
 enum class SurfaceModel { kFacet, kSmooth, kSpline };
 
 /// All of them, in the order in which files and commands list them.
 inline constexpr std::array kSurfaceModels{SurfaceModel::kFacet, SurfaceModel::kSmooth,
                                            SurfaceModel::kSpline};
-/// Those that a mesh alone can stand for.
+/// The models that a mesh alone can represent.
 inline constexpr std::array kMeshModels{SurfaceModel::kFacet, SurfaceModel::kSmooth};
 
-/// As files and options call a model.
+/// A model's name in files and options.
 inline std::string model_name(SurfaceModel model) {
   switch (model) {
     case SurfaceModel::kFacet:

@@ -10,7 +10,7 @@
 namespace lensforge {
 namespace {
 
-/// How far outside of its triangle a point may lie (barycentric) before it counts as off the mesh.
+/// Barycentric tolerance for points outside the mesh.
 constexpr double kOnMesh = 1e-9;
 
 }  // namespace

@@ -10,22 +10,22 @@
 
 namespace lensforge {
 
-/// A point seen from above: the triangle that it lies in and where; −1 if it lies in none.
+/// Position of a point seen from above: its triangle (−1 if none) and weights there.
 struct PlaceOnMesh {
   std::int64_t triangle = -1;
   Eigen::Vector3d weights = Eigen::Vector3d::Zero();  ///< Barycentric.
 };
 
-/// Finds the triangle of a height field that lies over a point.
+/// Finds the triangle of a height field above or below a point.
 class TriangleIndex {
  public:
-  /// Keeps numbers of triangles, not the mesh.
+  /// Stores triangle numbers, not the mesh.
   explicit TriangleIndex(const SurfaceMesh& mesh);
 
-  /// @param mesh  the one that the index was made for; heights may differ.
+  /// @param mesh  the mesh that the index was built for; heights may differ.
   [[nodiscard]] PlaceOnMesh locate(const SurfaceMesh& mesh, const Eigen::Vector2d& xy) const;
 
-  /// Around the mesh.
+  /// Bounding box of the mesh.
   [[nodiscard]] const Eigen::AlignedBox2d& box() const { return box_; }
 
  private:

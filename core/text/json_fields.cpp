@@ -14,7 +14,7 @@ namespace {
 
 using nlohmann::json;
 
-/// A value as it stands in the file, cut to what fits on a line.
+/// A value as JSON, cut to fit on a line.
 std::string shown(const json& value) {
   constexpr std::size_t kLongest = 60;
   const std::string text = value.dump(-1, ' ', false, json::error_handler_t::replace);

@@ -8,12 +8,12 @@
 namespace lensforge {
 
 /// Typed access to the fields of a JSON object; every refusal is an InputError that names the file
-/// and the field, e.g. "lens.json: field 'source.type' is missing". Fields that nobody asks for are
+/// and the field, e.g. "lens.json: field 'source.type' is missing". Fields that are not read are
 /// ignored.
 class JsonFields {
  public:
-  /// @param file    what to call the file in messages.
-  /// @param prefix  what stands before a field's name in messages, e.g. "source.".
+  /// @param file    the file's name in messages.
+  /// @param prefix  prefix of field names in messages, e.g. "source.".
   /// @pre `object` outlives this. @throw InputError if it is no JSON object.
   JsonFields(const nlohmann::json& object, std::string file, std::string prefix = "");
 

@@ -26,8 +26,8 @@ std::string quoted(const std::string& word) {
   return text;
 }
 
-/// Looks at a document as it is parsed: nlohmann::json keeps the last of several equal names, and
-/// other functions of it recurse into what is nested.
+/// Checks a document during parsing: nlohmann::json keeps the last of several equal names, and some
+/// of its functions recurse into nested values.
 class Watch {
  public:
   explicit Watch(const std::string& name) : name_(name) {}
@@ -47,7 +47,7 @@ class Watch {
 
  private:
   const std::string& name_;
-  std::vector<std::set<std::string>> names_;  ///< Of every open object or array.
+  std::vector<std::set<std::string>> names_;  ///< Names in each open object or array.
 };
 
 }  // namespace
@@ -59,7 +59,7 @@ json parse_json(std::string_view text, const std::string& name) {
     refuse(name, "is no JSON: byte " + std::to_string(error.byte) + " of " +
                      std::to_string(text.size()) + " cannot be understood");
   } catch (const json::exception&) {
-    // The only other one that the parser knows.
+    // The parser's only other error.
     refuse(name, "holds a number that is too large: at most 1.8e308 can be read");
   }
 }

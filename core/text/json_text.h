@@ -7,14 +7,14 @@
 
 namespace lensforge {
 
-/// Brackets within brackets that a JSON document may have.
+/// Maximum nesting depth of a JSON document.
 inline constexpr int kMaxJsonDepth = 64;
 
 /// Parses a JSON document strictly.
-/// @param name  what to call the file in messages.
+/// @param name  the file's name in messages.
 /// @throw InputError "name: is no JSON: …" naming the byte, or that a number is beyond the range of
-///        doubles, that a name stands twice in an object or that it is nested too deeply; a few
-///        words, never the library's.
+///        doubles, that a name is repeated in an object or that it is nested too deeply; in short
+///        words of our own, never the library's.
 nlohmann::json parse_json(std::string_view text, const std::string& name);
 
 }  // namespace lensforge

@@ -5,7 +5,7 @@
 
 namespace lensforge {
 
-/// The text with A to Z as a to z; all other bytes stay, in any locale.
+/// The text with A to Z as a to z and all other bytes unchanged, in any locale.
 std::string lower_case(std::string text);
 
 }  // namespace lensforge

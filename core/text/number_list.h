@@ -10,7 +10,7 @@ namespace lensforge {
 
 /// Reads numbers that are separated by commas, such as "50,50,-600"; spaces around them are
 /// allowed.
-/// @param name  what to call the value in the error, e.g. "--image-offset".
+/// @param name  name of the value in the error, e.g. "--image-offset".
 /// @throw InputError unless there are `count` finite numbers.
 std::vector<double> parse_numbers(std::string_view text, const std::string& name, int count);
 

@@ -13,12 +13,12 @@
 
 namespace lensforge {
 
-/// Which numbers an option takes.
+/// Range of an option's numbers.
 struct Limits {
   double low = -std::numeric_limits<double>::infinity();
   double high = std::numeric_limits<double>::infinity();
   bool low_excluded = false;
-  bool or_zero = false;  ///< 0 as well, where it stands for something of its own.
+  bool or_zero = false;  ///< Also allows 0, if it has a special meaning.
 
   static Limits between(double low, double high) { return {.low = low, .high = high}; }
   static Limits above(double low, double high) {
@@ -28,7 +28,7 @@ struct Limits {
     return {.low = low, .high = high, .or_zero = true};
   }
 
-  /// NaN is in no range.
+  /// True if the value is in the range; false for NaN.
   [[nodiscard]] bool hold(double value) const;
   /// "0.25 to 8", "above 0, at most 9", "0, or 4 to 6". @pre both are finite.
   [[nodiscard]] std::string rule() const;
@@ -43,34 +43,34 @@ enum class OptionKind {
   kText,
 };
 
-/// What is known of an option but its value.
+/// Description of an option without its value.
 struct OptionSpec {
-  std::string name;  ///< As it is written: "--width".
+  std::string name;  ///< As typed: "--width".
   OptionKind kind = OptionKind::kText;
   std::string help;
-  Limits limits;                   ///< Of numbers.
-  std::string unit;                ///< Of a number: "rpm"; of a text what it is: "FILE.toml".
-  std::vector<std::string> words;  ///< Of a word.
+  Limits limits;                   ///< Numbers only.
+  std::string unit;                ///< For a number: "rpm"; for a text its kind: "FILE.toml".
+  std::vector<std::string> words;  ///< Allowed words.
 
   [[nodiscard]] bool is_number() const {
     return kind == OptionKind::kWhole || kind == OptionKind::kNumber || kind == OptionKind::kLength;
   }
-  /// @param text  the value as somebody wrote it. @throw InputError naming option, value and rule.
+  /// @param text  the value as typed. @throw InputError naming option, value and rule.
   void require(const std::string& text, double value) const;
   /// @throw InputError naming option, text and words unless it is one of the words.
   void require_word(const std::string& text) const;
 };
 
 /// One row of the table of an options struct: the option and its value in the struct. Command line,
-/// help, man page, validation and fingerprint all go by the table.
+/// help, man page, validation and fingerprint all use the table.
 template <class Options>
 struct OptionField : OptionSpec {
   std::function<nlohmann::json(const Options&)> get;
   std::function<void(Options&, const nlohmann::json&)>
       set;  ///< @throw InputError as require_word()
-  /// What a fingerprint holds of it: get(), but what a word stands for and not the word.
+  /// Value in a fingerprint: get(), but for a word the value that it stands for.
   std::function<nlohmann::json(const Options&)> stored;
-  /// Why a fingerprint leaves it out; empty where it does not.
+  /// Why a fingerprint omits it; empty if it does not.
   std::string left_out;
 };
 
@@ -87,7 +87,7 @@ struct Row {
   static Field flag(const std::string& name, At at, const std::string& help) {
     return plain<bool>({name, OptionKind::kFlag, help, {}, {}, {}}, at);
   }
-  /// Set where the value is false.
+  /// A flag that is set if the value is false.
   template <class At>
   static Field without(const std::string& name, At at, const std::string& help) {
     Field field = plain<bool>({name, OptionKind::kFlag, help, {}, {}, {}}, at);

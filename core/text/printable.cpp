@@ -11,7 +11,7 @@ constexpr std::string_view kCut = " ... ";
 
 bool continues(unsigned char byte) { return (byte & 0xC0U) == 0x80U; }
 
-/// Bytes of the character that begins with `lead`; 0 where none does.
+/// Bytes of the character that begins with `lead`; 0 if none does.
 std::size_t length_of(unsigned char lead) {
   if (lead < 0x80) return 1;
   if (lead >= 0xC2 && lead < 0xE0) return 2;
@@ -19,8 +19,8 @@ std::size_t length_of(unsigned char lead) {
   return lead >= 0xF0 && lead < 0xF5 ? 4 : 0;
 }
 
-/// The first character of `text` as a number, and its bytes; 0 bytes where it is no UTF-8 (RFC
-/// 3629: no overlong forms, no surrogates, none above U+10FFFF).
+/// The first character of `text` as a number, and its bytes; 0 bytes if it is not UTF-8 (RFC 3629:
+/// no overlong forms, no surrogates, none above U+10FFFF).
 struct Character {
   std::uint32_t code = 0;
   std::size_t bytes = 0;
@@ -41,7 +41,7 @@ Character first_character(std::string_view text) {
   return overlong || surrogate || code > 0x10FFFF ? Character{} : Character{code, bytes};
 }
 
-/// C0, DEL, C1, and the marks that turn the direction of the text around them.
+/// C0, DEL, C1, and the marks that change the text direction.
 bool is_control(std::uint32_t code) {
   return code < 0x20 || (code >= 0x7F && code < 0xA0) || code == 0x2028 || code == 0x2029 ||
          (code >= 0x202A && code <= 0x202E) || (code >= 0x2066 && code <= 0x2069);
@@ -75,7 +75,7 @@ bool inside_character(const std::string& line, std::size_t at) {
 
 std::string printable_line(std::string_view text, std::size_t max_bytes) {
   while (!text.empty() && is_white(static_cast<unsigned char>(text.back()))) text.remove_suffix(1);
-  // Of a long text only its ends are looked at; a character takes four bytes at most.
+  // Only the ends of a long text are examined; a character takes four bytes at most.
   std::string cut_text;
   if (text.size() > 4 * max_bytes) {
     cut_text.append(text.substr(0, 2 * max_bytes)).append(text.substr(text.size() - 2 * max_bytes));

@@ -18,9 +18,9 @@ namespace lensforge {
 namespace {
 
 constexpr std::size_t kLongestText = 200;
-constexpr std::size_t kMostEdits = 2;  ///< Of a key that was mistyped: two letters swapped.
+constexpr std::size_t kMostEdits = 2;  ///< Maximum for a mistyped key: two letters swapped.
 
-/// The value as the file has it; a table or an array only by its kind.
+/// The value as in the file; for a table or array only its kind.
 std::string shown(const toml::node* value) {
   if (value == nullptr) return "missing";
   if (value->is_table()) return "a table";
@@ -37,7 +37,7 @@ std::string range_text(const NumberRule& rule) {
   return number_text(rule.least) + " to " + number_text(rule.most);
 }
 
-/// Letters to put in, take out or replace to make one text of another (Levenshtein).
+/// Insertions, deletions and replacements that turn one text into the other (Levenshtein).
 std::size_t edits_between(std::string_view a, std::string_view b) {
   std::vector<std::size_t> row(b.size() + 1);
   std::iota(row.begin(), row.end(), std::size_t{0});

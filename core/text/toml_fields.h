@@ -12,32 +12,32 @@
 
 namespace lensforge {
 
-/// A number that a TOML document may hold: its key, least and greatest value.
+/// Rule for a number in a TOML document: its key, minimum and maximum.
 struct NumberRule {
   std::string key;
   double least;
   double most;
 };
 
-/// Longest TOML document that is read.
+/// Maximum size of a TOML document.
 inline constexpr std::size_t kMaxTomlBytes = std::size_t{1} << 20U;
 
-/// Where a document comes from and what it is, for messages.
+/// A document's file and kind, for messages.
 struct TomlSource {
-  std::string file;  ///< As the user named it.
+  std::string file;  ///< As given by the user.
   std::string kind;  ///< With its article: "a register map".
 };
 
-/// @throw InputError naming file and line if `text` is not TOML, has more than 1 MiB, a key of more
-/// than 32 parts or brackets more than 32 deep.
+/// @throw InputError naming file and line if `text` is not TOML, exceeds 1 MiB, or has a key of
+///        more than 32 parts or brackets nested more than 32 deep.
 toml::table parse_toml(std::string_view text, const std::string& file);
 
 /// The text of a small file. @throw InputError naming the file and why it cannot be read, or that
-/// it has more than 1 MiB.
+/// it exceeds 1 MiB.
 std::string read_toml_file(const std::filesystem::path& path, const std::string& kind);
 
-/// A table of a TOML document, read strictly: every getter remembers its key, and finish() refuses
-/// any key that none asked for. All throw InputError naming file, key, value and rule.
+/// A table of a TOML document, read strictly: every getter records its key, and finish() refuses
+/// all other keys. All throw InputError naming file, key, value and rule.
 class TomlFields {
  public:
   /// @param table  must outlive the fields.
@@ -45,11 +45,11 @@ class TomlFields {
       : table_(table), source_(std::move(source)), path_(std::move(path)) {}
 
   [[nodiscard]] bool has(const std::string& key) const { return table_.contains(key); }
-  /// Not blank, one line, at most 200 bytes.
+  /// A text: not blank, one line, at most 200 bytes.
   [[nodiscard]] std::string text(const std::string& key);
-  /// As text(), or `otherwise` where the key is missing.
+  /// text(), or `otherwise` if the key is missing.
   [[nodiscard]] std::string text_or(const std::string& key, const std::string& otherwise);
-  /// An array of strings, each as text(); it may be empty.
+  /// An array of strings, each with the rules of text(); it may be empty.
   [[nodiscard]] std::vector<std::string> texts(const std::string& key);
   [[nodiscard]] std::string one_of(const std::string& key,
                                    std::initializer_list<std::string_view> words);
@@ -60,18 +60,18 @@ class TomlFields {
   [[nodiscard]] bool flag(const std::string& key);
   [[nodiscard]] bool flag_or(const std::string& key, bool otherwise);
   [[nodiscard]] TomlFields table(const std::string& key);
-  /// The tables of an array that is there and not empty.
+  /// The tables of an array, which must exist and not be empty.
   [[nodiscard]] std::vector<TomlFields> tables(const std::string& key);
-  /// The keys of this table, as they stand.
+  /// The keys of this table.
   [[nodiscard]] std::vector<std::string> keys() const;
-  /// @throw InputError for a key that none asked for.
+  /// @throw InputError for a key that no getter has read.
   void finish() const;
 
   /// "spindle.status.speed" for the key "speed" of this table.
   [[nodiscard]] std::string name_of(const std::string& key) const;
-  /// Where the document has this table, e.g. "spindle.status".
+  /// Path of this table in the document, e.g. "spindle.status".
   [[nodiscard]] const std::string& path() const { return path_; }
-  /// @throw InputError: file, key, the value as it stands, the rule.
+  /// @throw InputError: with file, key, value and rule.
   [[noreturn]] void refuse(const std::string& key, const std::string& rule) const;
 
  private:

@@ -9,7 +9,7 @@
 namespace lensforge {
 namespace {
 
-/// Walks over a document and passes over what is quoted or commented out.
+/// Scans a document, skipping strings and comments.
 class Scanner {
  public:
   explicit Scanner(std::string_view text) : text_(text) {}

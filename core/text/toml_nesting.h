@@ -7,11 +7,11 @@
 
 namespace lensforge {
 
-/// Parts of a dotted key, and brackets within brackets, that a TOML document may have.
+/// Maximum parts of a dotted key, and maximum depth of brackets, in a TOML document.
 inline constexpr int kMaxTomlDepth = 32;
 
-/// Why a TOML document is nested too deeply to be parsed: "line N: …"; nothing if it is not. It
-/// need not be well-formed.
+/// Returns why a TOML document is nested too deeply to parse: "line N: …"; nothing if it is not.
+/// The document need not be well-formed.
 std::optional<std::string> toml_nesting_problem(std::string_view text);
 
 }  // namespace lensforge

@@ -8,8 +8,8 @@ namespace lensforge {
 
 /// Reads a length such as "100", "100mm", "10cm", "0.1m", "4in" or "250um", spaces allowed before
 /// the unit; millimetres without one.
-/// @param name  what to call the value in the error, e.g. "--width".
-/// @return millimetres. @throw InputError if it is no finite number with a known unit.
+/// @param name  name of the value in the error, e.g. "--width".
+/// @return millimetres. @throw InputError unless it is a finite number with a known unit or none.
 double parse_length_mm(std::string_view text, const std::string& name);
 
 }  // namespace lensforge

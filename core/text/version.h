@@ -9,7 +9,7 @@ namespace lensforge {
 /// "x.y.z"
 std::string_view version();
 
-/// "lensforge x.y.z": what every file that the program writes says of itself.
+/// "lensforge x.y.z", the mark in every file that the program writes.
 std::string program_mark();
 
 }  // namespace lensforge

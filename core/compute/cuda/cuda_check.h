@@ -8,7 +8,7 @@
 
 namespace lensforge {
 
-/// @throw RunError naming the call and what CUDA says, unless `status` is success.
+/// @throw RunError naming the call and CUDA's message, unless `status` is success.
 void check_cuda(cudaError_t status, const char* call);
 
 /// Message for a request of `bytes` of GPU memory when `free` of `total` are free.

@@ -36,7 +36,7 @@ void* allocate(std::size_t bytes) {
   const cudaError_t status = cudaMalloc(&memory, bytes);
   if (status == cudaErrorMemoryAllocation) {
     static_cast<void>(
-        cudaGetLastError());  // What was asked for in vain is no error of later calls.
+        cudaGetLastError());  // Clears the error, which later calls must not report as their own.
     std::size_t free = 0;
     std::size_t total = 0;
     LF_CUDA(cudaMemGetInfo(&free, &total));
@@ -47,7 +47,7 @@ void* allocate(std::size_t bytes) {
 }
 
 void release(void* memory) noexcept {
-  // An error here is one of an earlier kernel, which wait() reports.
+  // An error here comes from an earlier kernel; wait() reports it.
   if (memory != nullptr) static_cast<void>(cudaFree(memory));
 }
 
@@ -78,7 +78,7 @@ struct CudaExecutor::State {
   cudaStream_t stream = nullptr;
   cudaEvent_t begin = nullptr;
   cudaEvent_t end = nullptr;
-  double* collected = nullptr;   ///< Page-locked memory of the caller's side.
+  double* collected = nullptr;   ///< Page-locked host memory.
   DeviceBuffer<double> results;  ///< A ring of kMaxPendingSums × kMaxTerms.
   std::size_t next = 0;
   DeviceBuffer<double> partial;
@@ -113,7 +113,7 @@ void CudaExecutor::end_kernel(const char* kernel) const {
 double* CudaExecutor::partial_sums(std::size_t blocks) const {
   const std::size_t size = blocks * static_cast<std::size_t>(kMaxTerms);
   if (state_->partial.size() < size) {
-    wait();  // Kernels that are on their way may still use the old ones.
+    wait();  // Running kernels may still use the old ones.
     state_->partial = DeviceBuffer<double>(size);
   }
   return state_->partial.data();

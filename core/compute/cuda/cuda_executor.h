@@ -16,17 +16,16 @@
 
 namespace lensforge {
 
-/// Runs kernels on the first GPU, one after the other in a stream of its own. What it has in common
-/// with Executor is told there; the functions that start kernels are in
-/// core/compute/cuda/launch.cuh. Copies share stream and memory. Not for use by several threads at
-/// a time.
+/// Runs kernels on the first GPU, one after the other in its own stream. Members shared with
+/// Executor are documented there; the functions that start kernels are in
+/// core/compute/cuda/launch.cuh. Copies share stream and memory. Not thread-safe.
 class CudaExecutor {
  public:
   template <class T>
   using Buffer = DeviceBuffer<T>;
 
-  /// Result of pending_sum(): asked for, it waits for the GPU. To be asked for before
-  /// kMaxPendingSums more sums are begun.
+  /// Result of pending_sum(); get() waits for the GPU. Call get() before kMaxPendingSums more sums
+  /// are begun.
   template <std::size_t N>
   class PendingSum {
    public:
@@ -47,30 +46,30 @@ class CudaExecutor {
   };
 
   static constexpr int kMaxPendingSums = 32;
-  static constexpr int kMaxTerms = 8;  ///< Of one sum.
+  static constexpr int kMaxTerms = 8;  ///< Per sum.
 
   /// Takes over profile and stop token of `options`. @throw RunError without a usable GPU.
   explicit CudaExecutor(const Executor& options);
 
-  /// Kernels of all "workers" add to shared memory with atomics: there is but one.
+  /// All kernels add to shared memory with atomics, so there is one worker.
   [[nodiscard]] int concurrency() const { return 1; }
 
   [[nodiscard]] cudaStream_t stream() const;
-  /// Waits until all that was begun is done. @throw RunError if a kernel has failed.
+  /// Waits until everything begun is done. @throw RunError if a kernel has failed.
   void wait() const;
 
-  /// To be called before and after a kernel is launched. @throw Interrupted, see Executor.
+  /// Called before and after each kernel launch. @throw Interrupted, see Executor.
   void begin_kernel() const;
   void end_kernel(const char* kernel) const;
 
   /// Memory for the partial sums of `blocks` blocks; valid until the next call.
   [[nodiscard]] double* partial_sums(std::size_t blocks) const;
-  /// Where a sum's terms are to be put on the GPU.
+  /// Address on the GPU for the next sum's terms.
   [[nodiscard]] double* next_result() const;
-  /// Sends that result to the caller's memory and tells where it will be.
+  /// Starts the copy of that result to the caller's memory and returns its address there.
   [[nodiscard]] const double* collect_result(const double* result) const;
 
-  /// Bytes from the caller's memory to the GPU's and back, after all that was begun before.
+  /// Copies bytes from the caller's memory to the GPU's and back, after everything already begun.
   void copy_in(void* to, const void* from, std::size_t bytes) const;
   void copy_out(void* to, const void* from, std::size_t bytes) const;
   void clear(void* memory, std::size_t bytes) const;

@@ -15,7 +15,7 @@ void release(void* memory) noexcept;
 
 }  // namespace cuda_detail
 
-/// Owns an array in the memory of the GPU. Its contents are undefined to start with.
+/// Owns an array in the memory of the GPU. Initially its contents are undefined.
 template <class T>
 class DeviceBuffer {
   static_assert(

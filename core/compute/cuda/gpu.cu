@@ -7,7 +7,7 @@ namespace lensforge {
 
 namespace {
 
-/// Any kernel: whether it can be loaded tells whether this build has code for the GPU.
+/// An empty kernel: it loads only if this build has code for the GPU.
 __global__ void probe() {}
 
 }  // namespace

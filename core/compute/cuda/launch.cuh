@@ -14,8 +14,7 @@ namespace lensforge {
 
 namespace cuda_detail {
 
-/// Threads of a block. The heavy kernels use so many registers that larger blocks would not fit
-/// better.
+/// Threads per block. The heavy kernels use so many registers that larger blocks gain nothing.
 inline constexpr int kThreads = 128;
 
 inline unsigned blocks_for(std::int64_t count, std::int64_t per_block) {
@@ -39,7 +38,7 @@ __global__ void __launch_bounds__(kThreads)
   if (i < count) functor(i, 0);
 }
 
-/// Sum over the threads of a block, as a tree of fixed shape.
+/// Sum over the threads of a block, in a fixed tree order.
 __device__ inline double block_sum(double value) {
   __shared__ double shared[kThreads];
   const int thread = static_cast<int>(threadIdx.x);
@@ -54,7 +53,7 @@ __device__ inline double block_sum(double value) {
   return sum;
 }
 
-/// partial[k · blocks + block] ← Σ of term k over the block's items, one item a thread.
+/// partial[k · blocks + block] ← Σ of term k over the block's items, one item per thread.
 template <std::size_t N, class Functor>
 __global__ void __launch_bounds__(kThreads)
     sum_blocks(std::int64_t count, const Functor functor, double* partial) {
@@ -67,7 +66,7 @@ __global__ void __launch_bounds__(kThreads)
   }
 }
 
-/// result[k] ← Σ of partial[k · count …], one block a term.
+/// result[k] ← Σ of partial[k · count …], one block per term.
 template <int Threads>
 __global__ void __launch_bounds__(Threads)
     sum_partial(std::int64_t count, const double* partial, double* result) {
@@ -84,7 +83,7 @@ __global__ void __launch_bounds__(kThreads) scan_row(int columns, const Scan sca
   __shared__ Value shared[kThreads];
   const std::int64_t row = blockIdx.x;
   const int thread = static_cast<int>(threadIdx.x);
-  Value before{};  // Sum of the strips that are done.
+  Value before{};  // Sum of the finished strips.
   for (int first = 0; first < columns; first += kThreads) {
     const int column = first + thread;
     shared[thread] = column < columns ? scan.item(row, column) : Value{};
