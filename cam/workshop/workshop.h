@@ -14,17 +14,17 @@ namespace lensforge {
 
 struct NumberRule;
 
-/// Along which axis the passes of a raster run.
+/// Axis along which the passes of a raster run.
 enum class PassAxis { kX, kY };
 
-/// How the passes of a raster follow one another, with a spindle that turns clockwise (M3).
+/// Order and direction of a raster's passes, with a spindle that turns clockwise (M3).
 enum class PassStyle {
   kZigzag,        ///< To and fro.
   kClimb,         ///< One way, uncut material on the right of the travel.
   kConventional,  ///< One way, uncut material on the left.
 };
 
-/// How a tool gets down into material.
+/// Entry of a tool into material.
 enum class EntryStyle {
   kRamp,   ///< Along its pass, to and fro.
   kHelix,  ///< On a circle where one fits, else along its pass.
@@ -34,13 +34,13 @@ enum class EntryStyle {
 struct RoughProcess {
   bool enabled = true;
   int tool = 3;                 ///< Tool::number
-  double stepdown = 1.0;        ///< Between levels at most, mm, > 0.
-  double stepover = 1.2;        ///< Between passes at most, mm, in 0 … its diameter.
+  double stepdown = 1.0;        ///< Maximum distance of levels, mm, > 0.
+  double stepover = 1.2;        ///< Maximum distance of passes, mm, in 0 … its diameter.
   double allowance = 0.2;       ///< Left on the surface, along its normal, mm, ≥ 0.
   double ramp_angle_deg = 3.0;  ///< Steepest way into material, degrees, in 0.1 … 45.
   EntryStyle entry = EntryStyle::kRamp;
-  double helix_radius = 1.0;  ///< Of the axis' circle, mm, in 0 … the tool's radius.
-  double spacing = 0.1;       ///< Of points at which the surface is asked for, mm, > 0.
+  double helix_radius = 1.0;  ///< Of the axis's circle, mm, in 0 … the tool's radius.
+  double spacing = 0.1;       ///< Distance of points at which the surface is sampled, mm, > 0.
   PassStyle style = PassStyle::kZigzag;
   PassAxis along = PassAxis::kX;
 
@@ -51,12 +51,12 @@ struct RoughProcess {
 struct SemiProcess {
   bool enabled = true;
   int tool = 2;                 ///< Tool::number
-  double stepover = 0.15;       ///< Between passes at most, mm, in 0 … its diameter.
+  double stepover = 0.15;       ///< Maximum distance of passes, mm, in 0 … its diameter.
   double allowance = 0.03;      ///< Left on the surface, along its normal, mm, ≥ 0.
   double ramp_angle_deg = 3.0;  ///< Steepest way into material, degrees, in 0.1 … 45.
   EntryStyle entry = EntryStyle::kRamp;
-  double helix_radius = 0.3;  ///< Of the axis' circle, mm, in 0 … the tool's radius.
-  double spacing = 0.05;      ///< Of points at which the surface is asked for, mm, > 0.
+  double helix_radius = 0.3;  ///< Of the axis's circle, mm, in 0 … the tool's radius.
+  double spacing = 0.05;      ///< Distance of points at which the surface is sampled, mm, > 0.
   PassStyle style = PassStyle::kZigzag;
   PassAxis along = PassAxis::kX;
 
@@ -66,25 +66,26 @@ struct SemiProcess {
 /// The ball's raster that makes the optical surface.
 struct FinishProcess {
   int tool = 1;               ///< Tool::number, a ball.
-  double pitch = 0.06;        ///< Between passes at most, mm, in 0 … its diameter.
-  double scallop = 0.0;       ///< If > 0, mm: the pitch follows from it, see finish_pitch().
-  double tolerance = 0.0005;  ///< Farthest from the drop curve, mm, > 0.
-  /// Largest error of a move's direction, rad, > 0. Polishing does not even out what neighbouring
-  /// rows have in common; docs/tuning.md, "Defaults of cam", has the leak and the moves by value.
+  double pitch = 0.06;        ///< Maximum distance of passes, mm, in 0 … its diameter.
+  double scallop = 0.0;       ///< If > 0, mm: determines the pitch, see finish_pitch().
+  double tolerance = 0.0005;  ///< Maximum distance from the drop curve, mm, > 0.
+  /// Maximum error of a move's direction, rad, > 0. Polishing does not remove an error that
+  /// neighbouring rows share; for leakage and number of moves by value see docs/tuning.md,
+  /// "Defaults of cam".
   double slope_tolerance = 6e-5;
   PassStyle style = PassStyle::kZigzag;
   PassAxis along = PassAxis::kX;
   bool cross = false;   ///< A second raster along the other axis.
   bool pencil = false;  ///< A pass along concave creases.
-  /// Tool::number of a larger ball that finishes wherever it reaches, before `tool` finishes the
-  /// rest; 0: `tool` alone.
+  /// Tool::number of a larger ball that finishes all it can reach before `tool` finishes the rest;
+  /// 0: `tool` alone.
   int large_tool = 0;
-  int large_every = 1;  ///< Rows of `tool`, whose pitch holds, per row of the larger ball, ≥ 1.
-  /// By how much the machine goes too far across the passes, share of a length, −0.02 … 0.02. The
-  /// programs are as without it; the part that cam predicts is longer by it.
+  int large_every = 1;  ///< Rows of `tool`, at its pitch, per row of the larger ball, ≥ 1.
+  /// Overshoot of the machine across the passes, share of a length, −0.02 … 0.02. It does not
+  /// change the programs; the part that cam predicts is longer by it.
   double pitch_error = 0.0;
 
-  /// Passes `mm` apart, whatever scallops they leave.
+  /// Sets the pitch, in mm, whatever the scallops.
   void set_pitch(double mm) {
     pitch = mm;
     scallop = 0.0;
@@ -93,7 +94,7 @@ struct FinishProcess {
   friend bool operator==(const FinishProcess&, const FinishProcess&) = default;
 };
 
-/// Everything that is chosen about the cut.
+/// All choices about the cut.
 struct Process {
   double safe_height = 5.0;  ///< Of rapid moves above the blank and the clamps, mm, > 0.
   double clearance = 0.5;    ///< Of the tool to clamps, and above material before it is fed, mm.
@@ -104,23 +105,23 @@ struct Process {
   friend bool operator==(const Process&, const Process&) = default;
 };
 
-/// The pitch as it will be cut at most, mm: FinishProcess::pitch, or what leaves scallops of
+/// Maximum pitch as cut, mm: FinishProcess::pitch, or the pitch that leaves scallops of
 /// FinishProcess::scallop on a plane, 2√(h(2R − h)).
 double finish_pitch(const FinishProcess& process, double ball_radius);
 
-/// What polishing does to a surface; all lengths in mm.
+/// Model of polishing; all lengths in mm.
 struct PolishModel {
-  double sigma = 0.0;  ///< Of the Gaussian that heights are averaged with, ≥ 0; 0: not polished.
-  double rim_depth = 0.0;   ///< Taken off in addition at the rim, ≥ 0.
-  double rim_length = 1.0;  ///< Distance over which that falls to 1/e of itself, > 0.
+  double sigma = 0.0;       ///< Of the Gaussian that averages the heights, ≥ 0; 0: not polished.
+  double rim_depth = 0.0;   ///< Additional removal at the rim, ≥ 0.
+  double rim_length = 1.0;  ///< Distance over which that falls to 1/e, > 0.
 
   friend bool operator==(const PolishModel&, const PolishModel&) = default;
 };
 
-/// Waves that an axis of the machine leaves in the surface, around one wavelength: its height is
-/// off by a function of that axis's place alone, the same in every row.
+/// Waves that an axis of the machine leaves in the surface, around one wavelength: the height error
+/// depends on that axis's position alone and is the same in every row.
 struct WavinessBand {
-  double wavelength = 10.0;  ///< mm, > 0; waves of 0.7 to 1.4 of it are drawn.
+  double wavelength = 10.0;  ///< mm, > 0; waves of 0.7 to 1.4 times this are drawn.
   double rms_um = 0.1;       ///< Root mean square of the height, µm, ≥ 0.
 
   friend bool operator==(const WavinessBand&, const WavinessBand&) = default;
