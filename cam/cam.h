@@ -48,9 +48,9 @@ struct CamResult {
 /// does not write are removed then; programs that were changed since, or that no cut wrote, are
 /// kept and named in the report. The same bytes for any number of threads.
 /// @throw InputError naming option, value and rule if an option breaks its rule; naming the surface
-/// if it has no triangles, is no height field over the lens's rectangle or does not cover it;
-/// naming files that would be replaced but were changed since, or were not written by a cut,
-/// without CamOptions::force.
+///        if it has no triangles, is no height field over the lens's rectangle or does not cover
+///        it; naming files that would be replaced but were changed since, or were not written by a
+///        cut, without CamOptions::force.
 /// @throw RunError if the files cannot be written (disk full, …).
 CamResult make_cut(const Lens& lens, const CamOptions& options, const std::filesystem::path& folder,
                    const Executor& executor, const RunControl& control);
@@ -70,8 +70,8 @@ inline constexpr double kMaxCutSeconds = 1000.0 * 3600.0;
 inline constexpr double kMaxCutBytes = 1e11;
 
 /// @throw InputError naming the option that asks for most (--pitch, --sample-spacing, …) and a
-/// value that would fit, if the disk of `folder` or the memory is too small for the cut, or if the
-/// cut exceeds kMaxCutSeconds of one core or kMaxCutBytes of programs.
+///        value that would fit, if the disk of `folder` or the memory is too small for the cut, or
+///        if the cut exceeds kMaxCutSeconds of one core or kMaxCutBytes of programs.
 void require_room_for_cut(const CamOptions& options, const OpticalSetup& setup,
                           const WorkEstimate& estimate, const std::filesystem::path& folder);
 
@@ -107,7 +107,7 @@ struct CutComparison {
 
 /// Estimates a comparison, whose combinations are computed one after another.
 /// @throw InputError if an option breaks its rule in some combination, or disk or memory is too
-/// small.
+///        small.
 WorkEstimate require_room_for_comparison(const Lens& lens, const CamOptions& options,
                                          const CutChoices& choices,
                                          const std::filesystem::path& folder, int threads);
@@ -116,7 +116,7 @@ WorkEstimate require_room_for_comparison(const Lens& lens, const CamOptions& opt
 /// Programs are written to a temporary folder below `folder` and removed again. Roughing and
 /// semi-finishing are left out because they are the same for all.
 /// @throw InputError before any work if an option breaks its rule in some combination, or if the
-/// page exists and lensforge did not write it, without CamOptions::force; RunError.
+///        page exists and lensforge did not write it, without CamOptions::force; RunError.
 CutComparison compare_cuts(const Lens& lens, const CamOptions& options, const CutChoices& choices,
                            const std::filesystem::path& folder, const Executor& executor,
                            const RunControl& control);
@@ -209,7 +209,7 @@ struct NestResult {
 /// the programs, layout.svg and nest.json into `folder`, and each lens's other make_cut() files
 /// into a subfolder with the lens's name. All files appear at the end, or none.
 /// @throw InputError naming option or lens, value and rule if the lenses do not fit the blank or
-/// cannot share one; as make_cut(). @throw RunError
+///        cannot share one; as make_cut(). @throw RunError
 NestResult make_nest(const std::vector<NestLens>& lenses, const NestOptions& options,
                      const std::filesystem::path& folder, const Executor& executor,
                      const RunControl& control);

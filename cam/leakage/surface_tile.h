@@ -138,7 +138,7 @@ class SurfaceTile {
  public:
   /// @param grid   the whole lens.
   /// @param whole  light on the lens, mm², of which fluxes are shares; 0: the grid's area, as far
-  /// as light passes.
+  ///               as light passes.
   SurfaceTile(const OpticalSetup& setup, const GridWindow& grid, double whole = 0.0);
 
   /// Samples the surface over `range` with one more node on every side where the grid has one, so

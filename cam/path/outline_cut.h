@@ -51,8 +51,8 @@ inline constexpr double kTabFrame = 2.0;
 OutlineCut with_tabs_that_fit(const std::vector<Eigen::Vector2d>& outline, OutlineCut cut);
 
 /// @throw InputError naming option, value and rule where a tool, or tabs, do not fit this part in
-/// this blank: tabs too close for the tool to get down between them, or without a frame outside of
-/// the slot.
+///        this blank: tabs too close for the tool to get down between them, or without a frame
+///        outside of the slot.
 void require_outline_cut(const std::vector<Eigen::Vector2d>& outline, const OutlineCut& cut,
                          const Eigen::AlignedBox3d& blank);
 

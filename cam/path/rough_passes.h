@@ -146,7 +146,7 @@ class RoughLinks {
 
   /// Goes straight to `end` at feed, no lower than `level` and the floor; may cut.
   /// @return false, without moving, if the floor on the way is above the blank, if a clamp lifts
-  /// it, or if the end is so far below that the tool would have to plunge.
+  ///         it, or if the end is so far below that the tool would have to plunge.
   bool cross(const Eigen::Vector3d& end, double level);
 
   /// Goes up to the safe height.

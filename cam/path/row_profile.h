@@ -37,8 +37,8 @@ inline constexpr double kProfileError = 5e-8;
 struct RowProfile {
   std::vector<double> u;  ///< Ascending, mm.
   std::vector<double> z;  ///< mm
-  /// Where moves may well begin and end, ascending: where the curve goes over from one piece to the
-  /// next, and on its arcs so close that chords between them are `bow` off.
+  /// Preferred places for moves to begin and end, ascending: the ends of the curve's pieces, and
+  /// places on its arcs so close that chords between them are off by `bow`.
   std::vector<double> joints;
   double error = 0.0;             ///< mm
   double finest = kProfileError;  ///< Intended maximum error of chords, mm.
@@ -67,7 +67,7 @@ class RowCurves {
   RowCurves(const CutSurface& surface, const Eigen::AlignedBox2d& axis, const Executor& executor);
 
   /// @param bow  approximate maximum error of chords between joints on arcs, mm, > 0. The
-  /// polyline's error is kBowShare of it, at most kProfileError.
+  ///             polyline's error is kBowShare of it, at most kProfileError.
   /// @throw InputError if there is nothing under the ball somewhere on the row.
   /// @throw Interrupted when stop() is requested.
   [[nodiscard]] RowProfile profile(const RowSpan& span, double bow) const;

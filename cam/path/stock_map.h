@@ -19,8 +19,8 @@ struct StockCut {
   /// Maximum height of the material above the cutter's silhouette, mm, and the tip there: the depth
   /// of cut, sampled at the centres of cells; 0 in air.
   Extreme deepest;
-  /// By how much a cell was lowered at most, mm: 0 where the cutter was before. The depth of a
-  /// cutter so narrow that it may pass without lowering any.
+  /// Maximum lowering of a cell, mm; 0 where the cutter was before. For a cutter so narrow that it
+  /// may pass without lowering any cell, the depth.
   double taken = 0.0;
 };
 

@@ -12,7 +12,7 @@ namespace lensforge {
 /// "places", "tools", "operations", "setup", "parameters", "warnings", "choices", …
 nlohmann::json report_json(const ReportData& data);
 
-/// One line of what --compare ranks.
+/// One line of the ranking of --compare.
 nlohmann::json choice_json(const ReportChoice& choice);
 
 }  // namespace lensforge

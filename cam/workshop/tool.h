@@ -74,9 +74,9 @@ struct CutterProfile {
 /// Profile of the cutting part: the lower end of a tool.
 CutterProfile cutting_profile(const Tool& tool);
 
-/// What may touch nothing: the tool above its flutes, at the cutter's own diameter, and its
-/// sections as cylinders. Material beside a section that is no wider than the cutter was cut away
-/// before, so such a section is left out.
+/// Profiles of the parts that must not touch anything: the tool above its flutes, at the cutter's
+/// own diameter, and its sections as cylinders. Sections no wider than the cutter are left out: the
+/// cutter has already removed the material beside them.
 std::vector<CutterProfile> shank_profiles(const Tool& tool);
 
 /// cutting_profile() and shank_profiles() together.

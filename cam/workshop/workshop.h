@@ -63,7 +63,7 @@ struct SemiProcess {
   friend bool operator==(const SemiProcess&, const SemiProcess&) = default;
 };
 
-/// The ball's raster that makes the optical surface.
+/// The ball's raster that cuts the optical surface.
 struct FinishProcess {
   int tool = 1;               ///< Tool::number, a ball.
   double pitch = 0.06;        ///< Maximum distance of passes, mm, in 0 … its diameter.
