@@ -57,7 +57,6 @@ struct SteepDescent {
 /// surface and ramp allow, over any stretch that removes material. Descents that sink by 0.2 mm, or
 /// by twice DescentRule::spacing where that is more, are found; those within half of that are not
 /// reported.
-/// stays within half of that is.
 class DescentCheck {
  public:
   /// @param surface  must outlive this.

@@ -69,7 +69,7 @@ class Ripple {
   double sigma_;
   double sign_;  ///< −1 in a mould, where rows leave ridges.
   double largest_ = 0.0;
-  std::vector<double> slope_;  ///< At equal parts of a period, from the lowest place on.
+  std::vector<double> slope_;  ///< At equal parts of a period, starting at the lowest place.
 };
 
 }  // namespace lensforge
