@@ -16,7 +16,7 @@ struct CutLimits {
   double leakage = 0.05;       ///< Share of the light that lands where the design puts less.
   double dark_flux = 0.02;     ///< Share of the light in the target's dark parts.
   double mae_increase = 0.01;  ///< MAE of the part minus that of the design.
-  double gouge = 0.001;        ///< Deepest cut below the nominal surface, mm.
+  double gouge = 0.001;        ///< Deepest cut below the surface that the tool should leave, mm.
   double excess = 0.002;       ///< Most material left above it between passes, mm.
   double slope = 0.002;        ///< Largest error of a move's direction, rad.
   double fillet_depth = 0.01;  ///< Most material that the ball leaves in a crease, mm.
