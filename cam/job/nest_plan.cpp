@@ -33,7 +33,7 @@ struct Row {
 /// All rows, as high as they need to be.
 struct Rows {
   std::vector<Eigen::Vector2d> corners;
-  double width = 0.0;   ///< Required by the widest row.
+  double width = 0.0;   ///< Required by the widest rectangle.
   double height = 0.0;  ///< Required by all rows.
 };
 

@@ -23,7 +23,7 @@ struct ProgramGrid {
   }
 };
 
-/// Where moves may begin and end, ascending along the row, each place on the grid once.
+/// Possible ends of moves, ascending along the row, each place on the grid once.
 struct RowJoints {
   std::vector<Eigen::Vector2d> exact;    ///< On the drop curve.
   std::vector<Eigen::Vector2d> written;  ///< On the program's grid.

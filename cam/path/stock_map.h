@@ -14,7 +14,7 @@
 
 namespace lensforge {
 
-/// What a cut took from a StockMap.
+/// Result of a cut of a StockMap.
 struct StockCut {
   /// Maximum height of the material above the cutter's silhouette, mm, and the tip there: the depth
   /// of cut, sampled at the centres of cells; 0 in air.

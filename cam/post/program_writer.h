@@ -39,7 +39,7 @@ struct ProgramPlan {
   double safe_z = 5.0;    ///< Z of the retracts between operations, program frame, mm.
 };
 
-/// Which operations share a file. A dialect without tool change never has two tools in one.
+/// Grouping of operations into files. A dialect without tool change never has two tools in one.
 enum class ProgramGrouping {
   kOperation,  ///< One file for each name: rough.ngc, finish.ngc.
   kTool,       ///< Operations in a row with one tool, their names joined: finish-pencil.ngc.

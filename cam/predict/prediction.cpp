@@ -371,7 +371,7 @@ Change with_half_the_pitch(const CamOptions& options, double pitch) {
   return change;
 }
 
-/// Decimals follow where they were not chosen.
+/// Decimals are adapted unless they were chosen.
 Change with_half_the_tolerances(const CamOptions& options) {
   Change change{"half the tolerances", options};
   FinishProcess& finish = change.options.workshop.process.finish;
@@ -394,14 +394,14 @@ Change with_half_the_polish(const CamOptions& options) {
   return change;
 }
 
-/// What less polishing leaves of scallops, rows that lie closer make up for.
+/// Closer rows compensate for the scallops that less polishing leaves.
 Change with_half_the_polish_and_pitch(const CamOptions& options, double pitch) {
   Change change = with_half_the_polish(with_half_the_pitch(options, pitch).options);
   change.words = with_half_the_pitch(options, pitch).words + " and " + change.words;
   return change;
 }
 
-/// What is tried against a cause but for creases, one after the other.
+/// Changes to try against a cause other than creases, in this order.
 std::vector<Change> changes_against(const std::string& cause, const CutPlan& plan) {
   const CamOptions& options = plan.options();
   if (cause == leak_cause::kScallop) return {with_half_the_pitch(options, plan.pitch())};
@@ -423,7 +423,7 @@ bool is_valid(const CamOptions& options, const Lens& lens) {
   return true;
 }
 
-/// Tries changes and says how far it has come.
+/// Tries changes and reports progress.
 class Trials {
  public:
   Trials(const TrialSite& site, const Executor& executor, const RunControl& control)
@@ -448,7 +448,7 @@ class Trials {
   }
 
  private:
-  /// The same change may be tried for several places.
+  /// Cached: the same change may be tried for several places.
   const TrialCut::Work& work_of(const Change& change, const TrialCut& cut) {
     const auto known = works_.find(change.words);
     if (known != works_.end()) return known->second;
@@ -459,7 +459,7 @@ class Trials {
   const Executor& executor_;
   const RunControl& control_;
   TrialCut::Work now_;
-  std::map<std::string, TrialCut::Work> works_;  ///< By what changes are called.
+  std::map<std::string, TrialCut::Work> works_;  ///< By the changes' names.
   double done_ = 0.0;
 };
 
@@ -507,7 +507,7 @@ void try_remedies(const TrialSite& site, std::vector<LeakPlace>& places, const E
 
 namespace {
 
-/// A cut whose parts are drawn.
+/// A cut and its picture, for drawing parts.
 struct ToleranceSite {
   const CutPlan& plan;
   const Lens& lens;
@@ -515,7 +515,7 @@ struct ToleranceSite {
   const FluxPicture& designed;  ///< Picture of the design.
 };
 
-/// The rows as they lie on the lens: a mould is larger by what its cast shrinks.
+/// The rows' layout on the lens: a mould is larger by its cast's shrinkage.
 Passes passes_of(const CamOptions& options, const CutPlan& plan) {
   const FinishProcess& finish = options.workshop.process.finish;
   const std::optional<CastFrame> mould = plan.mould();
@@ -530,7 +530,7 @@ Passes passes_of(const CamOptions& options, const CutPlan& plan) {
   return passes;
 }
 
-/// What the programs of a cut assume of a part.
+/// Nominal values that a cut's programs assume.
 PartPlan part_plan(const CamOptions& options, const Lens& lens, const CutPlan& plan) {
   const Workshop& shop = options.workshop;
   return {lens.setup, passes_of(options, plan), shop.polish,
@@ -562,7 +562,7 @@ Prediction predict_cut(CutPlan& plan, const Lens& lens, const ProgramFiles& prog
   const CamOptions& options = plan.options();
   const std::unique_ptr<MeantSurface> cut = meant_surface(plan.optical());
   const auto rounded = cut->rounded(plan.surface(), cut_rectangle(plan), executor);
-  // A mould's own surface is another than that of the lens that is cast in it.
+  // The mould's surface differs from the surface of the lens cast in it.
   std::unique_ptr<MeantSurface> meant;
   if (plan.mould()) meant = meant_surface(optical_surface(lens, plan.model()));
   const Eigen::AlignedBox2d rectangle(Eigen::Vector2d(0.0, 0.0), lens.setup.lens_size);

@@ -381,8 +381,8 @@ std::string certificates(const ReportData& data) {
                                   rows));
 }
 
-/// Name of the features that light the dark of a picture: a lens's light parts at grooves, a
-/// mirror's at ridges.
+/// A note on the light in dark parts, by the kind of part: from the ridges of a mirror, or from
+/// reflections at a lens's faces.
 std::string part_words(const ReportData& data) {
   if (data.mirror) {
     return " Dark parts come from ridges of the mirror, which a ball cuts sharp: only polish "

@@ -127,20 +127,20 @@ struct WavinessBand {
   friend bool operator==(const WavinessBand&, const WavinessBand&) = default;
 };
 
-/// How far machine, tool, polish and light may be off what the programs assume. Measured quantities
-/// are normal with the stated standard deviation (σ), limits of what a maker or a person keeps are
-/// uniform up to the stated bound. Where the defaults come from: docs/fabrication.md, "How sure is
-/// the forecast".
+/// Deviations of machine, tool, polish and light from the values that the programs assume. Measured
+/// quantities are normal with the stated standard deviation (σ); limits kept by a maker or a person
+/// are uniform up to the stated bound. For the origin of the defaults see docs/fabrication.md, "How
+/// sure is the forecast".
 struct Tolerances {
-  /// Of the machine's X and Y axes each.
+  /// Of the machine's X axis and of its Y axis.
   std::vector<WavinessBand> waviness{{30.0, 0.3}, {3.0, 0.03}};
   double row_um = 0.02;      ///< Height of one row against the next, σ, µm, ≥ 0.
-  double row_length = 10.0;  ///< Along a row over which that changes, mm, > 0.
+  double row_length = 10.0;  ///< Length along a row over which that changes, mm, > 0.
   double backlash_um = 1.0;  ///< Of the axis along the rows, 0 to this, µm, ≥ 0.
   double radius_um = 5.0;    ///< Radius of the ball, ± this, µm, ≥ 0.
   double runout_um = 5.0;    ///< Total indicated run-out of the ball, 0 to this, µm, ≥ 0.
 
-  double polish_sigma = 0.1;  ///< Of the polish's σ from part to part, as a share: σ, 0 … 0.3.
+  double polish_sigma = 0.1;    ///< Relative σ of the polish's σ from part to part, 0 … 0.3.
   double polish_within = 0.05;  ///< The same from place to place on a part, 0 … 0.3.
 
   double index = 0.001;   ///< Refractive index, ± this, ≥ 0.
@@ -168,7 +168,7 @@ struct Machine {
   double arc_tolerance = 0.0005;                ///< Of arcs as the controller splits them, mm.
   Eigen::Vector3d steps_per_mm{0.0, 0.0, 0.0};  ///< 0 rounds to no steps.
   int look_ahead = 200;                         ///< Moves that the controller plans ahead.
-  double lines_per_second = 1000.0;             ///< That it takes at most; 0 without limit.
+  double lines_per_second = 1000.0;             ///< Maximum that it takes; 0: no limit.
 
   friend bool operator==(const Machine&, const Machine&) = default;
 };
@@ -192,7 +192,7 @@ struct KeepOut {
   friend bool operator==(const KeepOut&, const KeepOut&) = default;
 };
 
-/// What the blank is made of.
+/// Material of the blank.
 struct Material {
   std::string name = "cast acrylic (PMMA)";
   double ior = 0.0;  ///< Refractive index against air, > 1; 0 where it is not stated.
@@ -200,12 +200,13 @@ struct Material {
   friend bool operator==(const Material&, const Material&) = default;
 };
 
-/// The tools of the defaults: 3 a 3 mm flat end mill to rough, 2 a 1 mm ball to semi-finish, 1 the
-/// 0.4 mm ball of the paper (Sun et al., Section 5) to finish; 4 a 6 mm ball for FinishProcess::
-/// large_tool, whose feed takes 0.04 mm a tooth.
+/// The default tools: 3, a 3 mm flat end mill for roughing; 2, a 1 mm ball for semi-finishing; 1,
+/// the 0.4 mm ball of the paper (Sun et al., Section 5) for finishing; 4, a 6 mm ball for
+/// FinishProcess::large_tool, with a feed of 0.04 mm per tooth.
 std::vector<Tool> default_tools();
 
-/// Everything about a cut but the lens: machine, blank, clamps, tools and how they are used.
+/// A whole workshop: machine, blank, clamps, tools and their use; everything about a cut except the
+/// lens.
 struct Workshop {
   Machine machine;
   Material material;
@@ -213,8 +214,8 @@ struct Workshop {
   std::vector<KeepOut> keep_outs;
   std::vector<Tool> tools = default_tools();
   Process process;
-  PolishModel polish{0.03, 0.0, 1.0};  ///< What happens to the surface after the last cut.
-  Tolerances tolerances;               ///< How far all this may be off.
+  PolishModel polish{0.03, 0.0, 1.0};  ///< Polish after the last cut.
+  Tolerances tolerances;               ///< Errors of all these.
 
   /// Null if no tool has this number.
   [[nodiscard]] const Tool* find_tool(int number) const;
@@ -223,18 +224,18 @@ struct Workshop {
   friend bool operator==(const Workshop&, const Workshop&) = default;
 };
 
-/// Rapid moves run at least this high above blank and clamps, mm: sheets of cast acrylic are up to
-/// half a millimetre thicker than stated (ISO 7823-1 allows 0.4 mm and a tenth of the thickness),
-/// and a touch-off and a blank that lies askew are off by a tenth or two.
+/// Minimum height of rapid moves above blank and clamps, mm: sheets of cast acrylic are up to 0.5
+/// mm thicker than stated (ISO 7823-1 allows 0.4 mm and a tenth of the thickness), and a touch-off
+/// and a tilted blank are off by 0.1 to 0.2 mm.
 inline constexpr double kMinSafeHeight = 0.5;
 
-/// Least and most of one of the workshop's numbers, by its place in the file:
-/// "process.safe_height", "tool.diameter", "finish.pitch". What sets such a number from elsewhere
-/// follows the same rule.
+/// Minimum and maximum of one of the workshop's numbers, by its key in the file:
+/// "process.safe_height", "tool.diameter", "finish.pitch". Options that set such a number follow
+/// the same rule.
 /// @pre there is such a number.
 NumberRule workshop_rule(const std::string& key);
 
-/// @param file  what to name in messages.
+/// @param file  its name in messages.
 /// @throw InputError naming file, key, value and rule where a number is out of its range, or where
 ///        two entries contradict one another: tool numbers, shapes and sections, speeds beyond the
 ///        machine, steps wider than the tool.
@@ -243,7 +244,7 @@ void validate(const Workshop& workshop, const std::string& file);
 /// @throw InputError naming file, key, value and rule where a number is out of its range.
 void validate_ranges(const Workshop& workshop, const std::string& file);
 
-/// Reads a workshop from TOML text. What is missing keeps its default; tools and clamps replace the
+/// Reads a workshop from TOML text. Missing keys keep their defaults; tools and clamps replace the
 /// defaults as a whole.
 /// @throw InputError naming file, key, value and rule.
 Workshop parse_workshop(std::string_view text, const std::string& file);
