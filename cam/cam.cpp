@@ -86,8 +86,8 @@ class Job {
                               names_of(others.kept) + "; do not run them with it");
   }
 
-  /// The old job goes and the new one comes, its report first and last, so that no report ever
-  /// stands beside programs that it is not about.
+  /// Deletes the old report first and publishes the new one last, so that a report never describes
+  /// other programs than those beside it.
   void publish(PendingPrograms& programs, const OtherPrograms& others, PendingFiles& files,
                CamResult& result) const {
     remove_prediction(folder_);
@@ -130,38 +130,38 @@ CamResult make_cut(const Lens& lens, const CamOptions& options, const fs::path& 
 
 namespace {
 
-// Measured on a portrait of 100 mm with the default tools, 6e-5 rad: 2.4 moves and 0.2 ms a
-// millimetre of row. The powers are of one of 25 mm, on one core of 2.5 GHz: with 1e-3, 1.5e-4 and
-// 5e-5 rad 0.8, 2.3 and 9.1 moves and 0.12, 0.18 and 3.8 ms a millimetre of row.
+// Fitted to a portrait of 100 mm with the default tools, 6e-5 rad: 2.4 moves and 0.2 ms per
+// millimetre of row. The powers were fitted to slope tolerances from 1e-3 to 5e-5 rad on a portrait
+// of 25 mm.
 
-/// Moves a millimetre of row that the default tolerances take; how their number grows with coarser
-/// and with finer slopes, and, as chords of arcs shorten with the root of their height, with
-/// heights.
+/// Moves per millimetre of row at the default tolerances, and powers of their growth with coarser
+/// and with finer slopes, and with heights: chords of arcs shorten with the root of their height.
 constexpr double kMovesPerMm = 2.4;
 constexpr double kCoarserPower = 0.6;
 constexpr double kFinerPower = 1.3;
 constexpr double kTolerancePower = 0.5;
 
 constexpr double kBytesPerMove = 40.0;     ///< "G3 X12.345678 Z-1.234567 I-1.234567 K-12.345678"
-constexpr double kMemoryPerMove = 1000.0;  ///< Bytes: exact, fitted and written way of the ball.
-/// Bytes: the way of a machine with a pitch error. A lens of 100 x 67 mm at a pitch of 0.08 mm took
-/// 617 MB with one and 534 MB without.
+constexpr double kMemoryPerMove = 1000.0;  ///< Bytes: exact, fitted and written path of the ball.
+/// Bytes: the path of a machine with a pitch error, 617 instead of 534 MB for a lens of 100 x 67 mm
+/// at a pitch of 0.08 mm.
 constexpr double kStretchedMemoryPerMove = 400.0;
 constexpr double kMemory = 1.5e8;          ///< Bytes of everything else.
-constexpr double kMemoryPerNode = 200.0;   ///< Bytes of milled.ply and of what it is made from.
+constexpr double kMemoryPerNode = 200.0;   ///< Bytes of milled.ply and of its sources.
 constexpr double kDiskPerNode = 50.0;      ///< Bytes of a vertex and two triangles.
 constexpr double kSecondsPerMm = 2e-4;     ///< Of a finishing row: drop curve, fit, reading back.
 constexpr double kMinSecondsPerMm = 1e-4;  ///< With any tolerance.
-constexpr double kFinerSeconds = 2.75;     ///< Their power of finer slopes: moves are tried often.
-constexpr double kTraced = 3.0;            ///< Times as long where the part is rendered.
-constexpr double kSecondsPerPoint = 1e-5;  ///< Of a roughing or semi-finishing pass.
-constexpr double kMovesPerPoint = 0.1;     ///< Most of them lie on straight ways.
+constexpr double kFinerSeconds = 2.75;  ///< Exponent of finer slopes in the time: moves are tried
+                                        ///< often.
+constexpr double kTraced = 3.0;         ///< Time factor where the part is rendered.
+constexpr double kSecondsPerPoint = 1e-5;       ///< Of a roughing or semi-finishing pass.
+constexpr double kMovesPerPoint = 0.1;          ///< Most of them lie on straight passes.
 constexpr double kSecondsPerSample = 2.5e-7;    ///< Of a surface, milled, polished and rendered.
 constexpr double kSecondsPerPartNode = 1.9e-7;  ///< Of a part with errors (docs/performance.md).
 constexpr double kMemoryPerPartNode = 24.0;     ///< Bytes: three heights while they are sampled.
-constexpr double kSurfaces = 8.0;               ///< That are rendered.
+constexpr double kSurfaces = 8.0;               ///< Number rendered.
 
-/// What the advised value leaves free.
+/// Reserve left free by the advised value.
 constexpr double kSpare = 1.5;
 
 double finish_length(const CamOptions& options, const Eigen::Vector2d& size) {
@@ -172,14 +172,15 @@ double finish_length(const CamOptions& options, const Eigen::Vector2d& size) {
     return (size + Eigen::Vector2d::Constant(ball.diameter)).prod() / apart;
   };
   double length = rows_of(finishing_ball(options), pitch) * (finish.cross ? 2.0 : 1.0);
-  // How much the larger ball leaves is not known yet: all of it at most.
+  // The larger ball's remainder is not known yet: at most all of it.
   if (const Tool* const large = larger_ball(options)) {
     length += rows_of(*large, finish.large_every * pitch);
   }
   return length;
 }
 
-/// How many times as fine the directions are as by default; finer heights take moves like slopes.
+/// Factor by which slope errors are smaller than by default; finer heights take as many moves as
+/// slopes.
 double fineness(const FinishProcess& finish) {
   const FinishProcess usual;
   const double height = std::pow(usual.tolerance / finish.tolerance, kTolerancePower);
@@ -197,7 +198,7 @@ double seconds_per_mm(const CamOptions& options) {
   return std::max(seconds, kMinSecondsPerMm) * (options.render ? kTraced : 1.0);
 }
 
-/// Points of a pass that follows the surface, over one level.
+/// Points of a pass that follows the surface, on one level.
 template <class Level>
 double points_of(const Level& level, const Eigen::Vector2d& size) {
   return level.enabled ? size.prod() / (level.stepover * level.spacing) : 0.0;
@@ -220,7 +221,7 @@ double memory_per_move(const FinishProcess& finish) {
 
 double nodes_of(const Eigen::Vector2d& size) { return size.prod() / (kMeshSpacing * kMeshSpacing); }
 
-/// Parts that are predicted with errors, and nodes of each.
+/// Parts predicted with errors, times the nodes of each.
 double drawn_parts(const CamOptions& options) {
   if (options.tolerances == 0) return 0.0;
   const auto parts = static_cast<double>(options.tolerances);
@@ -244,7 +245,7 @@ Eigen::Vector2d size_of(const CamOptions& options, const OpticalSetup& setup) {
   return setup.lens_size / (1.0 - shrinkage);
 }
 
-/// Comparisons are written so that a NaN is refused as well.
+/// Comparisons are written so that NaN is refused too.
 void require_bearable(const WorkEstimate& on_one_core, const std::string& what,
                       const std::string& advice) {
   if (on_one_core.seconds <= kMaxCutSeconds && on_one_core.disk_bytes <= kMaxCutBytes) return;

@@ -10,18 +10,18 @@
 namespace lensforge {
 namespace {
 
-/// Cells at most: 64 MB.
+/// Maximum number of cells: 64 MB.
 constexpr double kMaxCells = 1.6e7;
 
-/// Of where the axis may be when the ball touches a cell, mm: rows are judged in stretches that may
-/// reach a little beyond.
+/// Margin around the axis of a ball that touches a cell, mm: rows are checked in stretches that may
+/// extend slightly beyond.
 constexpr double kMargin = 0.02;
 
-/// Places where bends come this near to what the ball rolls along at most are left as well.
+/// Share of the maximum curvature that the ball can roll along; places with more are left as well.
 constexpr double kSafe = 0.95;
 
-/// Where the axis of a ball is that touches the surface somewhere in a box: over the contact by R
-/// n, n being the normal seen from above, which turns by no more than the surface bends.
+/// Box of the axis of a ball that touches the surface somewhere in a box: R n beside the contact, n
+/// being the normal seen from above, which turns by at most the surface's curvature.
 Eigen::AlignedBox2d axis_over(const SmoothBed& bed, const Eigen::AlignedBox2d& box,
                               const Eigen::Vector2d& slope) {
   const BendRange bend = bed.bounds().over(box).bend;
@@ -44,7 +44,7 @@ bool rolls_over(const SmoothBed& bed, const Eigen::AlignedBox2d& box) {
   return bend * bed.radius() <= kSafe * SmoothBed::kMaxBend;
 }
 
-/// Four cells in a row with the weights of a uniform cubic B-spline.
+/// Four neighbouring cells with the weights of a uniform cubic B-spline.
 struct SplinePart {
   std::array<std::int64_t, 4> cell{};
   std::array<double, 4> weight{};
@@ -86,7 +86,7 @@ Eigen::AlignedBox2d RestMap::box_of(std::int64_t cell) const {
   return {nearest_inside(box_, corner), nearest_inside(box_, end)};
 }
 
-/// From every cell that is left to those around it.
+/// Spreads distances from every cell that is left to those around it.
 void RestMap::spread(std::int64_t reach_cells, const std::vector<std::uint8_t>& left) {
   const auto index = [&](std::int64_t column, std::int64_t row) {
     return static_cast<std::size_t>(row * columns_ + column);
@@ -111,7 +111,7 @@ void RestMap::spread(std::int64_t reach_cells, const std::vector<std::uint8_t>& 
   }
 }
 
-/// A uniform cubic B-spline with the cells' values: a path that is lifted by it has no corners.
+/// A uniform cubic B-spline of the cells' values: a path lifted by it has no corners.
 double RestMap::distance(const Eigen::Vector2d& place) const {
   const Eigen::Vector2d at = (place - box_.min()) / cell_ - Eigen::Vector2d::Constant(0.5);
   const SplinePart x(at.x(), columns_);
@@ -140,14 +140,14 @@ namespace {
 /// 1e-5 of a scallop.
 constexpr int kPlaces = 128;
 
-/// Values of a table over the zone; between them it is linear.
+/// Values of a table over the zone, interpolated linearly.
 constexpr std::size_t kTable = 257;
 
 /// Halvings: to the last bit.
 constexpr int kHalvings = 60;
 
-/// How the smaller ball bends off on its way out of the zone, 1/mm: no more sharply than a lens,
-/// and at the end of its row 6 µm above the surface, more than that rises over the row's level end.
+/// Curvature of the smaller ball's path out of the zone, 1/mm: no more than that of a lens, and at
+/// the end of its row 6 µm above the surface, more than that rises over the row's level end.
 constexpr double kExit = 0.15;
 
 /// From 0 at 0 to 1 at 1, level at both.
@@ -179,7 +179,7 @@ struct Profiles {
   }
 };
 
-/// The lift of the larger ball with which the mean is what it is to be; it grows with the lift.
+/// Lift of the larger ball that gives the wanted mean; the mean grows with the lift.
 double lift_for(const Profiles& profiles, double small_lift, double mean, double low, double high) {
   for (int i = 0; i < kHalvings; ++i) {
     const double middle = 0.5 * (low + high);

@@ -13,21 +13,21 @@
 
 namespace lensforge {
 
-/// What a ball leaves of a smooth surface to a smaller one: where it could not roll (SmoothRoll)
-/// with a margin, and how far everything else is from there.
+/// The part of a smooth surface that a ball leaves to a smaller one: where it cannot roll
+/// (SmoothRoll), with a margin; and the distance of every place from it.
 class RestMap {
  public:
-  /// @param reach  distances are told up to here, mm, > 0; farther places count as so far.
+  /// @param reach  maximum distance computed, mm, > 0; farther places get this value.
   RestMap(const SmoothBed& bed, double reach, const Executor& executor);
 
-  /// From the nearest place that is left, seen from above, mm; 0 on it. Places beyond the rim count
-  /// as the rim's.
+  /// Distance to the nearest place that is left, seen from above, mm; 0 on it. Places beyond the
+  /// rim use the nearest on it.
   [[nodiscard]] double distance(const Eigen::Vector2d& place) const;
-  /// Of the rectangle: how much lies no farther than this from a place that is left, 0 … 1.
+  /// Share of the rectangle within this distance of a place that is left, 0 … 1.
   /// @pre distance < reach
   [[nodiscard]] double share_within(double distance) const;
 
-  static constexpr double kCell = 0.1;  ///< Side of the cells that are judged, mm.
+  static constexpr double kCell = 0.1;  ///< Side of the cells, mm.
 
  private:
   [[nodiscard]] Eigen::AlignedBox2d box_of(std::int64_t cell) const;
@@ -40,15 +40,15 @@ class RestMap {
   std::vector<float> distance_;  ///< At the middles of the cells, mm.
 };
 
-/// How two balls share a surface so that no step is left where one takes over from the other.
+/// Shares a surface between two balls without a step where one takes over from the other.
 ///
-/// Rows leave scallops, on average p²/(24 R) high, so that a surface of one ball lies higher than
-/// that of the other, and lower than either where both cut. So both are held above the surface by
-/// amounts that depend on how far a place is from what the larger ball leaves (RestMap): the
-/// smaller one cuts on the surface there and rises by a few micrometres on the way out; the larger
-/// one is as high as its scallops allow out there and rises to the smaller one's crests on the way
-/// in. In between their common lower envelope has the same mean everywhere, p²/(24 r). Rows of the
-/// larger ball lie on every n-th row of the smaller one's, since other pitches would beat.
+/// Rows leave scallops, on average p²/(24 R) high, so the surfaces of the two balls have different
+/// mean heights, and the surface is lower where both cut. Therefore both are held above the surface
+/// by amounts that depend on the distance from what the larger ball leaves (RestMap). The smaller
+/// ball cuts on the surface there and rises by a few micrometres outwards; the larger ball's height
+/// farther out matches its scallops, and it rises to the smaller one's crests inwards. In between
+/// their common lower envelope has the same mean everywhere, p²/(24 r). Rows of the larger ball
+/// coincide with every n-th row of the smaller one, since other pitches would beat.
 ///
 /// Notation: p pitch of the smaller ball, n rows of it per row of the larger, R, r radii.
 class BallBlend {
@@ -62,8 +62,8 @@ class BallBlend {
 
   explicit BallBlend(const Rows& rows);
 
-  /// Of either ball above its drop curve where it touches `distance` mm from what the larger one
-  /// leaves, mm, ≥ 0.
+  /// Lift of either ball above its drop curve where it touches `distance` mm from what the larger
+  /// one leaves, mm, ≥ 0.
   [[nodiscard]] double small_lift(double distance) const;
   [[nodiscard]] double large_lift(double distance) const;
 
@@ -77,8 +77,8 @@ class BallBlend {
   std::vector<double> large_lift_;  ///< At even distances 0 … kWidth.
 };
 
-/// How one of two balls is held (BallBlend) over a surface that they share (RestMap). Both must
-/// outlive the lift.
+/// Lift (BallBlend) of one of two balls over a surface that they share (RestMap). Both must outlive
+/// the lift.
 class SharedLift final : public BallLift {
  public:
   enum class Ball { kSmall, kLarge };
@@ -86,8 +86,8 @@ class SharedLift final : public BallLift {
   SharedLift(const RestMap& rest, const BallBlend& blend, Ball ball)
       : rest_(rest), blend_(blend), ball_(ball) {}
 
-  /// The smaller ball touches so near to its axis that the axis tells as much, also where it
-  /// follows facets.
+  /// The smaller ball's contact is so close to its axis that the axis is used instead, also on
+  /// facets.
   [[nodiscard]] double at(const Eigen::Vector2d& axis,
                           const Eigen::Vector2d& contact) const override {
     return ball_ == Ball::kLarge ? blend_.large_lift(rest_.distance(contact))

@@ -14,10 +14,10 @@
 /// Notation: R ball radius, p = (x, y) position of the tool axis, c the ball's centre, tip height
 /// c.z − R. A point q of the mesh holds the ball up at
 ///     f(q) = q.z + √(R² − |q.xy − p|²) − R,
-/// and the drop-cutter's answer for a set of points is the largest f over it. On a triangle f is
-/// concave, so its maximum is the tangent contact inside the facet if there is one, else it lies on
-/// an edge that separates the facet from the tangent contact of its plane. Facets seen from below
-/// are sets of points as any other: the orientation of a triangle does not matter.
+/// and the drop height for a set of points is the largest f over it. On a triangle f is concave, so
+/// its maximum is the tangent contact inside the facet if there is one, else it lies on an edge
+/// that separates the facet from the tangent contact of its plane. Facets seen from below are
+/// treated as sets of points too: the orientation of a triangle does not matter.
 namespace lensforge {
 
 /// Tip height where nothing holds the ball up.
@@ -58,23 +58,25 @@ LF_HD inline double edge_tip(const Eigen::Vector2d& p, double radius, const Eige
   return top.z() + u.z() * (s / run) + r * (run / length) - radius;
 }
 
-/// How well the tangent contact of a facet's plane is determined.
+/// Conditioning of the tangent contact of a facet's plane.
 enum class FacetShape : std::uint8_t {
   kRegular,   ///< Contact point and height are accurate: edges matter only beyond them.
   kDelicate,  ///< Thin or steep: evaluate at a point of the facet and try every edge as well.
-  kNone,      ///< Vertical or without area: its edges stand for it.
+  kNone,      ///< Vertical or without area: its edges replace it.
 };
 
-/// Smallest vertical part of a unit normal with which the height on a plane, a quotient by it,
-/// keeps 1e-12 of a millimetre: rounding 2e-16 · 1 mm ÷ 1e-3. Also the least height ÷ longest side
-/// of a facet whose normal is trusted to say on which side of an edge the contact lies.
+/// Smallest vertical component of a unit normal for which the height on a plane, a quotient by it,
+/// is accurate to 1e-12 mm: rounding 2e-16 · 1 mm ÷ 1e-3. Also the minimum height ÷ longest side of
+/// a facet whose normal decides on which side of an edge the contact lies.
 inline constexpr double kRegularFacet = 1e-3;
-/// Below this the facet is vertical: it is seen from above in a strip 1e-12 of its size wide.
+/// Below this the facet is vertical: seen from above it is a strip 1e-12 of its size wide.
 inline constexpr double kVerticalFacet = 1e-12;
-/// Below this height ÷ longest side leaving out a facet lowers the tip by (1e-9 L)²/(2R), nothing.
+/// Below this height ÷ longest side, omitting a facet lowers the tip by a negligible (1e-9
+/// L)²/(2R).
 inline constexpr double kThinnestFacet = 1e-9;
 /// Tangent contacts this far outside, in barycentric units, count as inside, so that no gap opens
-/// between coplanar neighbours; tangent height there is too high by (1e-10 L)²/(2 R n_z) at most.
+/// between coplanar neighbours; the tangent height there is too high by at most (1e-10 L)²/(2 R
+/// n_z).
 inline constexpr double kFacetMargin = 1e-10;
 
 /// The tangent contact of a ball of one radius with one facet abc: for a fixed radius the contact's
@@ -98,7 +100,7 @@ struct Barycentric {
   }
 };
 
-/// The number of the corner that lies across from the longest side.
+/// Number of the corner opposite the longest side.
 LF_HD inline int apex_of(const Eigen::Matrix3d& corners) {
   const double side0 = (corners.col(2) - corners.col(1)).squaredNorm();
   const double side1 = (corners.col(0) - corners.col(2)).squaredNorm();
@@ -132,7 +134,7 @@ LF_HD inline FacetContact make_facet_contact(double radius, const Eigen::Vector3
   return facet;
 }
 
-/// Where the ball over p touches the plane of the facet. @pre facet.shape is not kNone.
+/// Contact of the ball over p with the facet's plane. @pre facet.shape is not kNone.
 LF_HD inline Barycentric contact_point(const FacetContact& facet, const Eigen::Vector2d& p) {
   const double wx = p.x() - facet.origin.x();
   const double wy = p.y() - facet.origin.y();
@@ -149,8 +151,8 @@ LF_HD inline double tangent_tip(const FacetContact& facet, const Eigen::Vector2d
   return facet.tip + (facet.slope.x() * wx + facet.slope.y() * wy);
 }
 
-/// f at the point of facet abc that is nearest to `at` in barycentric coordinates: never above the
-/// true height, and below it only by the square of what `at` is off.
+/// f at the point of facet abc nearest to `at` in barycentric coordinates: never above the true
+/// height, and below it only by the square of the error of `at`.
 LF_HD inline double tip_at(const Barycentric& at, const Eigen::Vector2d& p, double radius,
                            const Eigen::Vector3d& a, const Eigen::Vector3d& b,
                            const Eigen::Vector3d& c) {
@@ -162,7 +164,7 @@ LF_HD inline double tip_at(const Barycentric& at, const Eigen::Vector2d& p, doub
   return tip > kNoContact ? a.z() + tip : kNoContact;
 }
 
-/// Height of the tip of a ball that touches facet abc inside, mm; kNoContact if it does not.
+/// Height of the tip of a ball that touches facet abc inside, mm; kNoContact if none does.
 LF_HD inline double facet_tip(const FacetContact& facet, const Eigen::Vector2d& p, double radius,
                               const Eigen::Vector3d& a, const Eigen::Vector3d& b,
                               const Eigen::Vector3d& c) {
@@ -175,8 +177,9 @@ LF_HD inline double facet_tip(const FacetContact& facet, const Eigen::Vector2d& 
 
 /// Height of the tip of a ball that rests on a whole triangle (columns: its corners), edges and
 /// corners included, mm; kNoContact if no part of it is under the ball. Error against the exact
-/// maximum of f: 1e-12 mm for facets of a few millimetres that are not steeper than 1 : 1000
-/// (BallCutter.AgreesWithTheDefinition); on steeper ones it answers for a p within 1e-13 mm.
+/// maximum of f: 1e-12 mm for facets of a few millimetres not steeper than 1 : 1000
+/// (BallCutter.AgreesWithTheDefinition); on steeper ones the height is exact for a p within 1e-13
+/// mm.
 LF_HD inline double triangle_tip(const Eigen::Vector2d& p, double radius,
                                  const Eigen::Matrix3d& corners) {
   const int apex = apex_of(corners);

@@ -100,10 +100,10 @@ std::vector<std::int32_t> FacetGrid::near(const Eigen::AlignedBox2d& box) const 
 
 namespace {
 
-/// Facets are taken this far beyond the ball, mm: rounding.
+/// Facets are included this far beyond the ball, mm: rounding.
 constexpr double kWindowMargin = 1e-6;
 
-/// What a triangle makes of a bend of 1/mm, before it is split.
+/// Interpolation error of a triangle per 1/mm of curvature, before it is split.
 struct Interpolation {
   double height = 0.0;  ///< mm² · bend
   double slope = 0.0;   ///< mm · bend
@@ -142,7 +142,7 @@ int splits_for(const Interpolation& shape, double bend, const SmoothCutOptions& 
   return static_cast<int>(std::clamp(std::ceil(needed), 1.0, double{kMaxSplits}));
 }
 
-/// The parts of one triangle that a window touches.
+/// The parts of one triangle that touch a window.
 class TriangleParts {
  public:
   TriangleParts(const OpticalSurface& surface, std::int64_t triangle, int n,
@@ -173,7 +173,7 @@ class TriangleParts {
 
   [[nodiscard]] std::int64_t point_count() const { return std::int64_t{n_ + 1} * (n_ + 2) / 2; }
 
-  /// Of a point, counted as for_each_point() visits them.
+  /// Number of a point in the order of for_each_point().
   [[nodiscard]] std::int64_t number(const Eigen::Vector2i& place) const {
     const std::int64_t j = place.y();
     return j * (n_ + 1) - j * (j - 1) / 2 + place.x();
@@ -244,7 +244,7 @@ SmoothCutSurface::SmoothCutSurface(const SmoothCutSurface& same, const SmoothCut
   split(options, executor);
 }
 
-/// Settles how finely every triangle is cut.
+/// Determines the number of parts of every triangle.
 void SmoothCutSurface::split(const SmoothCutOptions& options, const Executor& executor) {
   const SurfaceMesh& mesh = surface_->mesh();
   splits_.resize(bent_->bends.size());
@@ -278,7 +278,8 @@ SurfaceMesh SmoothCutSurface::facets(const Eigen::AlignedBox2d& window,
   const SurfaceMesh& mesh = surface_->mesh();
   std::vector<std::int32_t> triangles = grid_.near(window);
   std::erase_if(triangles, [&](std::int32_t t) { return !window.intersects(box_of(mesh, t)); });
-  // Facets and points before each triangle; neighbours have points of their own along their edge.
+  // Facets and points before each triangle; neighbours have separate points along their common
+  // edge.
   std::vector<std::int64_t> begin(triangles.size() + 1, 0);
   std::vector<std::int64_t> points(triangles.size() + 1, 0);
   const auto parts_of = [&](std::int64_t i) {

@@ -17,24 +17,24 @@
 
 namespace lensforge {
 
-/// Size and steepness of a surface that was found to be a height field.
+/// Size and steepness of a height field.
 struct HeightField {
   Eigen::AlignedBox3d box;         ///< Of all triangles, mm.
   double steepest = 0.0;           ///< Largest slope, rise over run.
   Eigen::Vector3d steepest_place;  ///< Centre of that triangle, mm.
 };
 
-/// Looks over a surface that is to be cut from above.
+/// Checks a surface that is to be cut from above.
 /// @param size  of the rectangle from (0, 0) that it has to cover, mm.
 /// @throw InputError if it has no triangles, has coordinates that are not finite, or does not cover
 ///        the rectangle exactly once (height_field_fault()).
 HeightField inspect_height_field(const SurfaceMesh& mesh, const Eigen::Vector2d& size);
 
-/// The triangles of a height field by where they lie, seen from above.
+/// The triangles of a height field, indexed by their place seen from above.
 class FacetGrid {
  public:
-  /// Points up to this far outside of the mesh belong to its nearest triangle, mm: a rim may be
-  /// that far off its rectangle (kRimDistance).
+  /// Points up to this far outside of the mesh belong to its nearest triangle, mm: a rim may
+  /// deviate that far from its rectangle (kRimDistance).
   static constexpr double kRim = 0.02;
 
   /// @param mesh  must outlive the grid. @pre every triangle faces +z, and there is one.
@@ -57,13 +57,13 @@ class FacetGrid {
   std::vector<std::int32_t> triangles_;
 };
 
-/// How far the triangles that are cut may lie from the surface that is meant, everywhere.
+/// Maximum distance of the cut triangles from the designed surface.
 struct SurfaceDeviation {
   double height = 0.0;  ///< mm, along z
   double slope = 0.0;   ///< Difference of slopes, no less than the angle in rad.
 };
 
-/// How a ball is held above its drop curve.
+/// Height at which a ball is held above its drop curve.
 class BallLift {
  public:
   BallLift() = default;
@@ -71,15 +71,15 @@ class BallLift {
   BallLift& operator=(const BallLift&) = delete;
   virtual ~BallLift() = default;
 
-  /// With its axis and its contact, as it rolls, at these places, mm, ≥ 0. Where it follows facets
-  /// the axis stands for both.
+  /// Lift for these places of its axis and its contact, as it rolls, mm, ≥ 0. Where the ball
+  /// follows facets, both are the axis.
   [[nodiscard]] virtual double at(const Eigen::Vector2d& axis,
                                   const Eigen::Vector2d& contact) const = 0;
-  /// Whether the ball stays clear of what it cannot roll along, instead of following its facets.
+  /// True if the ball stays clear of places where it cannot roll instead of following their facets.
   [[nodiscard]] virtual bool clears() const = 0;
 };
 
-/// The surface that a strategy cuts, as drop-cutters for parts of it.
+/// The surface that a strategy cuts, with drop-cutters for parts of it.
 class CutSurface {
  public:
   CutSurface() = default;
@@ -87,23 +87,23 @@ class CutSurface {
   CutSurface& operator=(const CutSurface&) = delete;
   virtual ~CutSurface() = default;
 
-  /// A drop-cutter that holds all of the surface that a ball with its axis in the box can touch.
-  /// Drop curves have the same bits whatever box they are taken from.
+  /// A drop-cutter with all of the surface that a ball whose axis is in the box can touch. Drop
+  /// curves have the same bits for any box.
   [[nodiscard]] virtual std::shared_ptr<const DropCutter> cutter(
       const Eigen::AlignedBox2d& axis, const Executor& executor) const = 0;
   [[nodiscard]] virtual double radius() const = 0;
-  /// The surface without facets, on which most drop curves can be followed more closely; none where
-  /// the facets are what is meant.
+  /// The surface without facets, on which most drop curves can be followed more closely; null where
+  /// the facets are the designed surface.
   [[nodiscard]] virtual const SmoothBed* bed() const { return nullptr; }
   [[nodiscard]] virtual SurfaceDeviation deviation() const { return {}; }
-  /// Where the ball is to be held above its drop curve; none if nowhere.
+  /// Lift of the ball above its drop curve; null if none.
   [[nodiscard]] virtual const BallLift* lift() const { return nullptr; }
-  /// How far, mm, the axis should move at most across the rows that share a cutter, so that it
-  /// fits in memory.
+  /// Maximum movement of the axis across the rows that share a cutter, mm, so that it fits in
+  /// memory.
   [[nodiscard]] virtual double band() const { return std::numeric_limits<double>::infinity(); }
 };
 
-/// The facets of a mesh as they are.
+/// The facets of a mesh, not smoothed.
 class FacetCutSurface final : public CutSurface {
  public:
   /// @param radius  of the ball, mm, > 0.
@@ -120,31 +120,31 @@ class FacetCutSurface final : public CutSurface {
   std::shared_ptr<const DropCutter> cutter_;
 };
 
-/// How finely a surface without creases is cut into facets. Where a triangle would need more than
-/// kMaxSplits, as at a crease, it gets no more, and deviation() says so.
+/// Fineness of the facets of a surface without creases. A triangle that would need more than
+/// kMaxSplits parts, as at a crease, gets kMaxSplits, and deviation() includes it.
 struct SmoothCutOptions {
   double deviation = 2e-5;        ///< Of a facet from the surface, mm, > 0.
   double slope_deviation = 4e-3;  ///< Of a facet's slopes from the surface's, > 0.
-  /// Facets that a cutter holds at most, about: 260 bytes each.
+  /// Approximate maximum number of facets in a cutter: 260 bytes each.
   std::int64_t facets_at_once = 4'000'000;
 };
 
-/// Parts of a triangle's edges at most.
+/// Maximum number of parts of a triangle's edge.
 inline constexpr int kMaxSplits = 48;
 
-/// A surface without creases, as facets between points of it: every triangle in n² equal parts, n
-/// from how it bends. Facets are made for a band at a time.
+/// A surface without creases, as facets between points of it: every triangle is divided into n²
+/// equal parts, n depending on its curvature. Facets are made for a band at a time.
 ///
-/// On a triangle of second derivatives ≤ c an interpolant is off by c r²/2 at most, r being the
-/// radius of the smallest circle around it, and its slopes by c l₁ l₂ (l₃ + 4 r_in) / (4 A), l₁ ≥
-/// l₂ ≥ l₃ (Shewchuk, "What is a good linear element?", 2002). Triangles of other n beside each
-/// other leave slits no higher than that.
+/// On a triangle with second derivatives ≤ c the error of an interpolant is at most c r²/2, r being
+/// the radius of the smallest circle around it, and that of its slopes c l₁ l₂ (l₃ + 4 r_in) / (4
+/// A), l₁ ≥ l₂ ≥ l₃ (Shewchuk, "What is a good linear element?", 2002). Slits between neighbouring
+/// triangles of different n are no higher than that.
 class SmoothCutSurface final : public CutSurface {
  public:
   /// @param radius  of the ball, mm, > 0. @pre not surface->has_creases()
   SmoothCutSurface(std::shared_ptr<const OpticalSurface> surface, double radius,
                    const SmoothCutOptions& options, const Executor& executor);
-  /// The same surface and ball, cut into other facets.
+  /// The same surface and ball with other facets.
   SmoothCutSurface(const SmoothCutSurface& same, const SmoothCutOptions& options,
                    const Executor& executor);
   /// The smooth model's surface over a mesh. @pre every triangle faces +z.
@@ -159,15 +159,15 @@ class SmoothCutSurface final : public CutSurface {
   [[nodiscard]] SurfaceDeviation deviation() const override { return deviation_; }
   [[nodiscard]] double band() const override { return band_; }
 
-  /// The facets that lie in a window or touch it, in the order of the mesh's triangles.
+  /// The facets that overlap or touch a window, in the order of the mesh's triangles.
   [[nodiscard]] SurfaceMesh facets(const Eigen::AlignedBox2d& window,
                                    const Executor& executor) const;
   [[nodiscard]] const OpticalSurface& surface() const { return *surface_; }
-  /// Facets of the whole surface.
+  /// Number of facets of the whole surface.
   [[nodiscard]] std::int64_t facet_count() const;
 
  private:
-  /// What does not depend on the facets.
+  /// The part that does not depend on the facets.
   struct Bent {
     std::vector<float> bends;  ///< Of each triangle, the largest second derivative, 1/mm.
     SmoothBed bed;

@@ -20,8 +20,8 @@
 namespace lensforge {
 namespace {
 
-/// Whether two pieces are one curve but for rounding, as a vertex and an edge that ends there at a
-/// right angle to the line are: bounds would tell so only on stretches of a micrometre.
+/// True if two pieces are the same curve except for rounding, such as a vertex and an edge that
+/// ends there at a right angle to the line: bounds would show it only on stretches of a micrometre.
 bool same_curve(const CurvePiece& a, const CurvePiece& b, double from, double to) {
   constexpr double kRounding = 1e-13;
   if (std::abs(a.bow - b.bow) > kRounding || std::abs(a.rho2 - b.rho2) > kRounding) return false;
@@ -38,15 +38,15 @@ bool same_curve(const CurvePiece& a, const CurvePiece& b, double from, double to
   return true;
 }
 
-/// Whether a line is above the chord of two heights by more than a tie somewhere between them.
+/// True if a line is above the chord of two heights by more than a tie somewhere between them.
 bool rises_above(const CurveTangent& line, double from, double at_from, double to, double at_to) {
   return line.at(from) - at_from > kEnvelopeTie || line.at(to) - at_to > kEnvelopeTie;
 }
 
-/// Steps of crossing() at most; seven or so are usual.
+/// Maximum steps of crossing(); about seven are usual.
 constexpr std::uintmax_t kCrossingSteps = 60;
 
-/// Where a difference that rises or falls all the way is zero.
+/// Zero of a difference that rises or falls throughout.
 double crossing(const CurvePiece& a, const CurvePiece& b, double from, double to,
                 const PieceDifference& difference) {
   const auto above = [&](double u) { return a.value(u) - b.value(u); };
@@ -57,8 +57,8 @@ double crossing(const CurvePiece& a, const CurvePiece& b, double from, double to
   return 0.5 * (low + high);
 }
 
-/// Where to look next when the bounds leave it open who is on top: where the difference's chord
-/// crosses zero, else the middle.
+/// Next place to evaluate when the bounds do not decide which piece is on top: where the
+/// difference's chord crosses zero, else the middle.
 double split_point(const PieceDifference& above, double from, double to) {
   if (above.at_from * above.at_to >= 0.0) return 0.5 * (from + to);
   const double part = above.at_from / (above.at_from - above.at_to);
@@ -85,7 +85,7 @@ void CurveEnvelope::append(const CurvePiece& piece, double from, double to) {
   merged_ends_.push_back(ends_of(merged_.back()));
 }
 
-/// Appends what is on top of all of piece number `i`.
+/// Appends all of piece number `i` that stays on top.
 void CurveEnvelope::keep(std::size_t i) {
   const CurvePiece& piece = pieces_[i];
   const bool goes_on = !merged_.empty() && merged_.back().feature == piece.feature;
@@ -94,8 +94,9 @@ void CurveEnvelope::keep(std::size_t i) {
   merged_ends_.push_back(ends_[i]);
 }
 
-/// Whether `fresh` is above piece number `i` by more than a tie anywhere. Between two places the
-/// old piece, being concave, is nowhere below its chord and the fresh one nowhere above a tangent.
+/// True if `fresh` may be above piece number `i` by more than a tie anywhere. Between two places
+/// the old piece, being concave, is nowhere below its chord and the fresh one nowhere above a
+/// tangent.
 /// @param tangent  of `fresh` somewhere.
 bool CurveEnvelope::may_rise_above(const CurvePiece& fresh, const CurveTangent& tangent,
                                    std::size_t i) const {
@@ -171,23 +172,23 @@ void CurveEnvelope::insert(const CurvePiece& piece) {
 
 namespace {
 
-/// Length of the stretches that are searched one at a time, in radii: longer ones have more
-/// contenders each, shorter ones repeat them more often. Measured on the benchmark's lens, a row of
-/// its facets and of its smooth surface in facets of 12 µm: 0.3 R 6 and 800 ms, 0.1 R 9 and 370 ms,
-/// 0.06 R 12 and 380 ms.
+/// Length of the stretches searched one at a time, in radii: longer ones have more contenders each,
+/// shorter ones repeat them more often. A row of the benchmark's lens takes 9 ms on its facets and
+/// 370 ms on its smooth surface with 0.1 R, 6 and 800 ms with 0.3 R.
 constexpr double kStretchPerRadius = 0.1;
 
-/// Shorter rests, mm, are searched with the stretch beside them: no facet would be found on them.
+/// Shorter remainders, mm, are searched with the neighbouring stretch: no facet would be found on
+/// them.
 constexpr double kShortestStretch = 1e-6;
 
-/// Edges steeper than this, run ÷ length, stand for their upper vertex: the ball leaves one for the
-/// other within R · 1e-6 of it.
+/// Edges steeper than this, run ÷ length, are replaced by their upper vertex: the ball changes
+/// between the two within R · 1e-6.
 constexpr double kSteepEdge = 1e-6;
 
 /// Rounding allowance, mm or mm², of the quick tests for contact with an edge or corner.
 constexpr double kTouchMargin = 1e-9;
 
-/// A facet's line is trusted from this length on, mm; shorter, its edges stand for it.
+/// Minimum length of a facet's line, mm; shorter ones are replaced by the facet's edges.
 constexpr double kShortestFacet = 1e-10;
 
 /// Pieces shorter than this, mm, are not part of the curve.
@@ -205,7 +206,8 @@ struct Stretch {
   [[nodiscard]] double v(const Eigen::Vector2d& p) const { return p[1 - line.along]; }
 };
 
-/// Where the ball touches a facet's plane with its axis at both ends of a stretch; linear between.
+/// Contact of the ball with a facet's plane with its axis at both ends of a stretch; linear
+/// between.
 struct PlaneContact {
   std::array<double, 3> from{};  ///< Barycentric.
   std::array<double, 3> to{};
@@ -275,8 +277,8 @@ bool clip_arc(CurvePiece& piece) {
   return piece.end > piece.begin;
 }
 
-/// Whether a ball on the stretch can rest on corner q of a triangle whose corner `other` is
-/// another: from q the edge there must lead away from the ball's centre, (p − q, √(R² − |p − q|²))
+/// True if a ball on the stretch can rest on corner q of a triangle with another corner `other`:
+/// from q the edge there must lead away from the ball's centre, (p − q, √(R² − |p − q|²))
 /// · (other − q) ≤ 0.
 bool may_rest_on(const Eigen::Vector3d& q, const Eigen::Vector3d& other, const CurvePiece& arc,
                  const Stretch& stretch) {
@@ -319,7 +321,7 @@ struct Edge {
   double e_u = 0.0, e_v = 0.0;
   double v_top = 0.0;  ///< v* − v of the upper end.
 
-  /// Where along the edge it touches, 0 … run from its upper end.
+  /// Contact along the edge, 0 … run from its upper end.
   [[nodiscard]] double touch(double u, double radius) const {
     const double t = u - piece.u0;
     const double d = e_u * v_top - e_v * t;
@@ -327,7 +329,7 @@ struct Edge {
   }
 };
 
-/// Whether a ball on the piece can touch the edge between its ends, at a quick look.
+/// Quick test: false if a ball on the piece cannot touch the edge between its ends.
 bool may_touch(const Edge& edge) {
   const CurvePiece& piece = edge.piece;
   const double d_from = piece.offset + piece.rate * (piece.begin - piece.u0);
@@ -368,7 +370,7 @@ Edge make_edge(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Stretch
   return edge;
 }
 
-/// Appends where on the line the ball touches the edge at c: touch(u) = c squares to
+/// Appends the places on the line where the ball touches the edge at c: touch(u) = c squares to
 /// (s_u − c)² + k² d² = k² R², a quadratic A t² + 2 B t + C = 0 with B² − AC = k² (A R² − w²), w
 /// being the line's distance from that point of the edge across the line.
 void add_crossings(const Edge& edge, double c, double radius, std::vector<double>& places) {
@@ -405,8 +407,8 @@ void offer_edge(const Eigen::Vector3d& a, const Eigen::Vector3d& b, std::int64_t
   }
 }
 
-/// Which edges and corners of a triangle can hold the ball on the stretch: as in DropCutter, none
-/// that a regular facet's tangent contact lies on the near side of all along.
+/// Edges and corners of a triangle that can hold the ball on the stretch: as in DropCutter, none
+/// that a regular facet's tangent contact lies on the near side of throughout.
 ContactFeatures boundary_in_play(const Contender& contender, const Stretch& stretch) {
   const FacetContact& facet = *contender.facet;
   if (facet.shape != FacetShape::kRegular) return contender.features;
@@ -440,8 +442,8 @@ void offer_boundary(const Contender& contender, const Stretch& stretch, Offers& 
   }
 }
 
-/// What is put on top first keeps most of the others from ever being merged. Heights count from a
-/// line as steep as the pieces are on average.
+/// Sorts the highest to the front, which saves merging most of the others. Heights are measured
+/// from a line with the pieces' mean slope.
 void put_highest_first(Offers& offers) {
   double slope = 0.0;
   std::vector<std::pair<double, std::size_t>> order;
@@ -460,8 +462,9 @@ void put_highest_first(Offers& offers) {
   offers.swap(sorted);
 }
 
-/// Appends the pieces of a stretch. Slits are left out: what held the ball there was too short on
-/// this stretch to be looked at, and what lies lower shows through. Gaps go to the piece before.
+/// Appends the pieces of a stretch. Slits are left out: the feature that held the ball there was
+/// too short on this stretch to be searched, and lower ones show through. Gaps go to the previous
+/// piece.
 void append(const std::vector<CurvePiece>& pieces, std::vector<CurvePiece>& curve) {
   for (const CurvePiece& piece : pieces) {
     if (piece.end - piece.begin < kSlit) continue;
@@ -476,7 +479,7 @@ void append(const std::vector<CurvePiece>& pieces, std::vector<CurvePiece>& curv
   }
 }
 
-/// Lets the outermost pieces reach the ends that they miss by slits.
+/// Extends the outermost pieces to the ends that they miss by slits.
 void close_ends(double from, double to, std::vector<CurvePiece>& curve) {
   if (curve.empty()) return;
   if (curve.front().begin - from < 4.0 * kSlit) curve.front().begin = from;
@@ -491,8 +494,8 @@ std::vector<CurvePiece> drop_curve(const DropCutter& cutter, const AxisLine& lin
   std::vector<Contender> contenders;
   Offers offers;
   CurveEnvelope envelope;
-  // Stretches end at fixed places, so that a line has the same curve whatever part of it is asked
-  // for.
+  // Stretches end at fixed places, so that a line has the same curve whatever part of it is
+  // requested.
   const double length = kStretchPerRadius * cutter.radius();
   double begin = from;
   for (auto i = static_cast<std::int64_t>(std::floor(from / length)); begin < to; ++i) {

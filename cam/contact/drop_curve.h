@@ -33,11 +33,10 @@ struct CurveTangent {
 
 /// A piece of a curve in the vertical plane over an AxisLine, u → height:
 ///     z(u) = height + rise·t + bow·√(ρ² − (offset + rate·t)²),  t = u − u₀,
-/// a straight line (bow 0), an arc of a circle or of an ellipse. What one facet, edge or vertex
-/// makes of a ball's tip has this form with bow ≥ 0, and so has a circular move of the tool with
-/// bow ±1.
+/// a straight line (bow 0), an arc of a circle or of an ellipse. The tip height of a ball on one
+/// facet, edge or vertex has this form with bow ≥ 0, and a circular move of the tool with bow ±1.
 struct CurvePiece {
-  double begin = 0.0, end = 0.0;  ///< Where it holds, mm.
+  double begin = 0.0, end = 0.0;  ///< Its interval, mm.
   double u0 = 0.0;                ///< mm
   double height = 0.0;            ///< mm
   double rise = 0.0;
@@ -48,7 +47,7 @@ struct CurvePiece {
   std::int64_t feature = -1;  ///< 8 · triangle + 0 for its facet, 1 + k edge k, 4 + k corner k.
 
   [[nodiscard]] bool straight() const { return bow == 0.0; }
-  /// Bends down everywhere, or is straight.
+  /// True if it bends down everywhere, or is straight.
   [[nodiscard]] bool concave() const { return bow >= 0.0; }
 
   [[nodiscard]] double value(double u) const {
@@ -59,7 +58,7 @@ struct CurvePiece {
     return linear + bow * std::sqrt(std::max(rho2 - d * d, 0.0));
   }
   [[nodiscard]] double slope(double u) const { return tangent(u).slope; }
-  /// Both at once.
+  /// Height and slope together.
   [[nodiscard]] CurveTangent tangent(double u) const {
     const double t = u - u0;
     const double linear = height + rise * t;
@@ -70,12 +69,12 @@ struct CurvePiece {
     const double up = below2 >= kSteepest * rho2 ? root : std::sqrt(std::max(below2, 0.0));
     return {u, linear + bow * up, rise - bow * rate * d / root};
   }
-  /// Arcs end where they are 1 : 30,000 from vertical: what holds a ball there is a wall.
+  /// Arcs end where they are 1 : 30,000 from vertical: there a wall holds the ball.
   static constexpr double kSteepest = 1e-9;
 };
 
-/// How far a piece can be off its chord between two places, mm: the tangents at its ends meet no
-/// farther away, because it bends one way only. Falls by the square of the distance of the places.
+/// Maximum distance of a piece from its chord between two places, mm: the tangents at its ends meet
+/// no farther away, because it bends one way only. Proportional to the square of the chord's width.
 inline double bulge(const CurveTangent& from, const CurveTangent& to) {
   const double width = to.u - from.u;
   const double chord = (to.height - from.height) / width;
@@ -87,11 +86,11 @@ inline double bulge(const CurvePiece& piece, double from, double to) {
   return piece.straight() ? 0.0 : bulge(piece.tangent(from), piece.tangent(to));
 }
 
-/// What a − b is between two places where both hold.
+/// Bounds of a − b between two places where both are defined.
 struct PieceDifference {
   double at_from = 0.0, at_to = 0.0;  ///< At both places.
   double low = 0.0, high = 0.0;       ///< Bounds in between.
-  bool monotone = false;              ///< Certainly rises or falls all the way.
+  bool monotone = false;              ///< Certainly rises or falls throughout.
 };
 
 inline PieceDifference difference(const CurvePiece& a, const CurvePiece& b, double from,
@@ -116,7 +115,7 @@ inline PieceDifference difference(const CurvePiece& a, const CurvePiece& b, doub
   return result;
 }
 
-/// The largest of concave curve pieces over one coordinate, kept as the pieces that are on top.
+/// Upper envelope of concave curve pieces over one coordinate, stored as its pieces.
 class CurveEnvelope {
  public:
   void clear() {
@@ -143,23 +142,23 @@ class CurveEnvelope {
   void contest(const CurvePiece& old, const CurvePiece& fresh, double from, double to);
 
   std::vector<CurvePiece> pieces_;
-  std::vector<Ends> ends_;  ///< One a piece.
+  std::vector<Ends> ends_;  ///< One per piece.
   std::vector<CurvePiece> merged_;
   std::vector<Ends> merged_ends_;
 };
 
-/// Curves that are no farther apart than this, mm, are one: rounding of a height is 1e-13.
+/// Curves closer than this, mm, count as equal: rounding of a height is 1e-13.
 inline constexpr double kEnvelopeTie = 1e-12;
-/// Pieces shorter than this, mm, are left to their neighbours: at a slope of 10 the height is off
-/// by 1e-10 mm.
+/// Pieces shorter than this, mm, are replaced by their neighbours: at a slope of 10 the height
+/// error is 1e-10 mm.
 inline constexpr double kShortestPiece = 1e-11;
 
-/// The height of a ball's tip along a line as what it is: the largest of the curves on which single
+/// The exact height of a ball's tip along a line: the upper envelope of the curves on which single
 /// facets (straight), edges (arcs of ellipses) and vertices (arcs of circles) hold the ball.
 ///
-/// The pieces lie in order; where nothing is under the ball there are none. Equal to
-/// DropCutter::drop() everywhere to 1e-9 mm (DropCurve.EqualsTheDropCutter…): 1e-12 but where a
-/// wall falls off steeper than the ball's own flank.
+/// The pieces are in order; there are none where nothing is under the ball. Equal to
+/// DropCutter::drop() everywhere to 1e-9 mm (DropCurve.EqualsTheDropCutter…), and to 1e-12 except
+/// where a wall falls off steeper than the ball's own flank.
 std::vector<CurvePiece> drop_curve(const DropCutter& cutter, const AxisLine& line, double from,
                                    double to);
 

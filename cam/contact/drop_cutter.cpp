@@ -107,11 +107,11 @@ std::pair<std::size_t, int> partner(const EdgeTable& table, std::size_t i, std::
   return found;
 }
 
-/// Marks the half-edges that have to be tried among those whose smaller vertex is v.
+/// Marks the half-edges to be tried among those whose smaller vertex is v.
 struct KeepEdges {
   const SurfaceMesh& mesh;
   const EdgeTable& table;
-  std::vector<std::uint8_t>& kept;  ///< One a half-edge, 3·triangle + k.
+  std::vector<std::uint8_t>& kept;  ///< One per half-edge, 3·triangle + k.
 
   void operator()(std::int64_t v) const {
     const auto begin = static_cast<std::size_t>(table.begin[static_cast<std::size_t>(v)]);
@@ -152,19 +152,18 @@ std::vector<ContactFeatures> contact_features(const SurfaceMesh& mesh, const Exe
 namespace {
 
 /// Boxes are this much larger than their triangles, mm: far above the rounding of a height, so that
-/// passing a triangle over never changes a bit of the result, and far below anything it could save.
+/// skipping a triangle never changes a bit of the result, and far below anything it could save.
 constexpr double kReachMargin = 1e-6;
 
-/// Cells of the finest grid are at least this part of the radius. Measured along rows: on triangles
-/// of 0.8 R (the benchmark's lens) cells as small as the triangles are best, 0.78 R; 1.0 R costs a
-/// sixth more. On triangles of R/8: 0.25 R is best, 0.125 R and 0.75 R cost two fifths more.
+/// Minimum cell size of the finest grid, as a share of the radius. On triangles of R/8 a row is
+/// fastest with 0.25 R; 0.125 R and 0.75 R take two fifths longer.
 constexpr double kCellPerRadius = 0.25;
 
-/// Cells are this much larger than nine tenths of the triangles: rounding of equal triangles must
-/// not send a part of them to a second grid.
+/// Cells are this much larger than nine tenths of the triangles, so that rounding cannot send some
+/// of a set of equal triangles to a second grid.
 constexpr double kCellPerTriangle = 1.001;
 
-/// Most cells of a grid per triangle; beyond it cells grow, so that memory stays in proportion.
+/// Maximum cells of a grid per triangle; beyond it cells grow, which bounds memory.
 constexpr double kCellsPerTriangle = 4.0;
 
 Eigen::AlignedBox3d box_of(const SurfaceMesh& mesh, std::int64_t triangle) {
@@ -189,7 +188,7 @@ std::size_t index_of(std::int64_t value) { return static_cast<std::size_t>(value
 
 }  // namespace
 
-/// One ball on its way down. Local coordinates are relative to the lowest corner of the mesh's box.
+/// State of one drop. Local coordinates are relative to the lowest corner of the mesh's box.
 struct DropCutter::Search {
   Eigen::Vector2d p;
   double x, y;  ///< p, local.
@@ -263,8 +262,8 @@ void DropCutter::visit_cells(const Level& level, const Eigen::AlignedBox2d& axis
   }
 }
 
-/// A height that the tip nowhere falls below between two places: the triangle that holds it at one
-/// of them would still hold it at the other, and what one triangle holds is concave.
+/// A lower bound of the tip between two places: the triangle that holds it at one of them would
+/// still hold it at the other, and the height on one triangle is concave.
 double DropCutter::floor_between(const Eigen::Vector2d& from, const Eigen::Vector2d& to) const {
   const CutterLocation at_from = drop(from);
   const CutterLocation at_to = drop(to, at_from);
@@ -341,7 +340,7 @@ void DropCutter::try_item(std::size_t item, Search& search) const {
 }
 
 /// Tries the item's own corners, and its own edges with the contact `at` on their far side: f is
-/// concave on the triangle, so it is largest on one of these.
+/// concave on the triangle, so its maximum lies on one of these.
 void DropCutter::try_boundary(std::size_t item, const Barycentric& at, Search& search) const {
   const ContactFeatures features = items_[item].features;
   const Eigen::Matrix3d& corners = corners_[item];
@@ -359,8 +358,8 @@ void DropCutter::try_boundary(std::size_t item, const Barycentric& at, Search& s
 
 namespace {
 
-/// Side of the finest grid's cells: holds most triangles, is no small part of the ball, and makes
-/// no more cells than the triangles pay for.
+/// Side of the finest grid's cells: larger than most triangles, not too small against the ball, and
+/// limited by the number of triangles.
 double finest_cell(std::vector<double> extents, double radius, const Eigen::AlignedBox3d& bounds) {
   const std::size_t most = extents.size() * 9 / 10;
   const auto nth = extents.begin() + static_cast<std::ptrdiff_t>(most);

@@ -14,8 +14,8 @@
 
 namespace lensforge {
 
-/// Which edges and corners of a triangle have to be tried against a ball, as bits: edge k (from
-/// corner k to corner k+1 mod 3) is bit k, corner k is bit 3 + k.
+/// Edges and corners of a triangle to be tried against a ball, as bits: edge k (from corner k to
+/// corner k+1 mod 3) is bit k, corner k is bit 3 + k.
 using ContactFeatures = std::uint8_t;
 
 inline constexpr ContactFeatures edge_bit(int k) { return static_cast<ContactFeatures>(1 << k); }
@@ -23,15 +23,15 @@ inline constexpr ContactFeatures corner_bit(int k) {
   return static_cast<ContactFeatures>(1 << (3 + k));
 }
 
-/// Hands every edge and vertex of a mesh to one of its triangles, the first, so that a search over
-/// triangles tries it once; valleys and flat seams, which a ball cannot touch without touching a
-/// facet beside them as high, to none. Edges of one triangle, of three or more, and of triangles
-/// too thin or steep to judge are kept.
-/// @return one set of bits a triangle.
+/// Assigns every edge and vertex of a mesh to the first of its triangles, so that a search over
+/// triangles tries it once. Valleys and flat seams are assigned to none: a ball that touches them
+/// touches a facet beside them at the same height. Edges of one triangle, of three or more, and of
+/// triangles too thin or steep to judge are kept.
+/// @return one set of bits per triangle.
 /// @pre vertex numbers are in range.
 std::vector<ContactFeatures> contact_features(const SurfaceMesh& mesh, const Executor& executor);
 
-/// Where a ball that was let down came to rest.
+/// Resting position of a ball let down on a mesh.
 struct CutterLocation {
   double tip = kNoContact;     ///< Height of the tip, mm; kNoContact if nothing is under the ball.
   std::int32_t triangle = -1;  ///< A triangle that holds the ball up; −1 if none does.
@@ -42,7 +42,7 @@ struct CutterLocation {
 /// A triangle that may hold the ball up; the pointers live as long as the drop-cutter.
 struct Contender {
   std::int32_t triangle = -1;
-  ContactFeatures features = 0;              ///< Which edges and corners it stands for.
+  ContactFeatures features = 0;              ///< Edges and corners assigned to it.
   const FacetContact* facet = nullptr;       ///< From `corners`.
   const Eigen::Matrix3d* corners = nullptr;  ///< Columns a, b, c; bc is the longest side.
 };
@@ -51,9 +51,9 @@ struct Contender {
 /// ball touches the mesh and cuts into none of it; exact, over facets, edges and vertices.
 ///
 /// The mesh need not be a height field or a manifold; triangles may be vertical, upside down, thin,
-/// without area, or doubled. Triangles lie once each in the cells of a grid over x and y, by size
-/// in grids of doubling cells; a cell or triangle is passed over when even its highest point, as
-/// near as it comes, could not lift the ball any more.
+/// without area, or doubled. Each triangle is stored in one cell of a grid over x and y; its size
+/// chooses among grids of doubling cell size. A cell or triangle is skipped if even its highest
+/// point at the nearest distance could not lift the ball further.
 class DropCutter {
  public:
   /// @param radius  of the ball, mm, > 0.
@@ -61,8 +61,8 @@ class DropCutter {
   DropCutter(const SurfaceMesh& mesh, double radius, const Executor& executor);
 
   /// The location of the tip over p (mm). Equal to the largest triangle_tip() over all triangles to
-  /// 1e-12 mm (DropCutter.EqualsBruteForce…). `near`, a location close by, makes it faster and does
-  /// not change the result by a bit.
+  /// 1e-12 mm (DropCutter.EqualsBruteForce…). `near`, a close location, makes it faster; the result
+  /// has the same bits.
   [[nodiscard]] CutterLocation drop(const Eigen::Vector2d& p,
                                     const CutterLocation& near = {}) const;
 
@@ -70,8 +70,9 @@ class DropCutter {
   void drop(std::span<const Eigen::Vector2d> points, std::span<CutterLocation> locations,
             const Executor& executor) const;
 
-  /// Every triangle that holds the ball up somewhere on the way from `from` to `to` (mm), by its
-  /// number; others as well. Short ways have few. Over `contenders`, which is emptied first.
+  /// Finds every triangle that holds the ball up somewhere between `from` and `to` (mm), in order
+  /// of number, and possibly others. Short stretches have few. Replaces the contents of
+  /// `contenders`.
   void find_contenders(const Eigen::Vector2d& from, const Eigen::Vector2d& to,
                        std::vector<Contender>& contenders) const;
 
@@ -88,7 +89,7 @@ class DropCutter {
   struct Reach {
     float x_min, x_max, y_min, y_max, z_max;
   };
-  /// Grid whose cells are no smaller than its triangles; they sit in the cell of their box's
+  /// Grid whose cells are no smaller than its triangles, each stored in the cell of its box's
   /// centre.
   struct Level {
     double cell = 0.0;  ///< Side of a cell, mm.

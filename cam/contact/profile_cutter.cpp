@@ -14,15 +14,15 @@
 namespace lensforge {
 namespace {
 
-/// The contact's place is a maximum of f, so an error of 1e-9 rad in it costs 1e-18 of the corner.
+/// The contact is a maximum of f, so an error of 1e-9 rad in it costs 1e-18 of the corner.
 constexpr double kAngleTolerance = 1e-9;
-/// Halving π/2 this often passes kAngleTolerance; Newton's steps need five or so.
+/// Halving π/2 this often reaches kAngleTolerance; Newton's method needs about five steps.
 constexpr int kMaxSteps = 40;
 
-/// Rounding of what a facet's plane bounds, mm.
+/// Rounding allowance of the bound from a facet's plane, mm.
 constexpr double kBoundMargin = 1e-9;
 
-/// An edge as the tool sees it: places on its line count from the foot of the axis, uphill.
+/// An edge relative to the tool: places on its line are measured uphill from the foot of the axis.
 struct EdgeLine {
   double away = 0.0;   ///< Of the line from the axis, seen from above, mm.
   double slope = 0.0;  ///< Rise over run, ≥ 0.
@@ -55,7 +55,8 @@ double contact_angle(const CutterProfile& profile, const EdgeLine& line) {
   return angle;
 }
 
-/// Where on the line the tool rests if the line is long enough, mm uphill from the foot.
+/// Place on the line where the tool would rest if the line were long enough, mm uphill from the
+/// foot.
 double contact_place(const CutterProfile& profile, const EdgeLine& line) {
   double t = profile.radius;
   if (profile.corner > 0.0) {
@@ -81,7 +82,7 @@ bool rises_at(const CutterProfile& profile, const EdgeLine& line, double place) 
   return line.slope * t * down >= out * place;
 }
 
-/// Where between `low` and `high` f is largest. Most edges are short and rise or fall all along.
+/// Place of the maximum of f between `low` and `high`. Most edges are short and f is monotone.
 double best_place(const CutterProfile& profile, const EdgeLine& line, double low, double high) {
   if (rises_at(profile, line, high)) return high;
   if (!rises_at(profile, line, low)) return low;
@@ -99,18 +100,19 @@ Barycentric coordinates(const Eigen::Matrix3d& corners, const Eigen::Vector2d& a
   return {1.0 - b - c, b, c};
 }
 
-/// From this coordinate on the contact surely lies on the inner side of an edge: rounding.
+/// From this coordinate on the contact certainly lies on the inner side of an edge: rounding.
 constexpr double kOnEdge = 1e-9;
 
-/// What a facet's tangent contact came to.
+/// Result of a facet's tangent contact.
 struct FacetTip {
   double tip = kNoContact;
-  bool sure = false;    ///< The rest says something about the maximum over the triangle.
-  bool inside = false;  ///< `tip` is that maximum, else only no less than it.
+  bool sure = false;    ///< The facet is regular: `tip` and `at` bound the maximum.
+  bool inside = false;  ///< `tip` is the maximum over the triangle, else an upper bound.
   Barycentric at{};     ///< The contact in the facet's plane.
 
-  /// Whether the maximum may lie on the edge from corner k: from a point of an edge on whose inner
-  /// side the contact lies, f rises, being concave, on the way there, which leads inside.
+  /// True if the maximum can lie on the edge that starts at corner k. If the contact is on the
+  /// edge's inner side, f, being concave, rises from every point of the edge towards it, which
+  /// leads inside.
   [[nodiscard]] bool may_lie_on_edge(int k) const {
     return !sure || (k == 0 ? at.c : k == 1 ? at.a : at.b) < kOnEdge;
   }
@@ -195,14 +197,14 @@ double profile_box_tip(const CutterProfile& profile, const Eigen::Vector2d& p,
 
 namespace {
 
-/// Cells per triangle: two triangles a cell keep the pyramid as small as the items.
+/// Cells per triangle: with two triangles per cell the pyramid is as small as the items.
 constexpr double kCellsPerTriangle = 0.5;
 
 std::size_t index_of(std::int64_t value) { return static_cast<std::size_t>(value); }
 
 }  // namespace
 
-/// One tool on its way down. Local coordinates are relative to the lowest corner of the mesh's box.
+/// State of one drop. Local coordinates are relative to the lowest corner of the mesh's box.
 struct ProfileCutter::Search {
   const CutterProfile& profile;
   Eigen::Vector2d p;
@@ -213,14 +215,14 @@ struct ProfileCutter::Search {
     if (tip > best.tip) best = {tip, triangle};
   }
 
-  /// Highest that anything in the box could lift the tip.
+  /// Upper bound of the tip for anything in the box.
   [[nodiscard]] double most(const Node& box) const {
     const double dx = std::max({box.x_min - x, x - box.x_max, 0.0});
     const double dy = std::max({box.y_min - y, y - box.y_max, 0.0});
     return box.z_max - profile.height(std::sqrt(dx * dx + dy * dy));
   }
 
-  /// Where the box's highest point lifts the tip wherever in the box it is.
+  /// Lower bound of the tip from the box's highest point, wherever it is in the box.
   [[nodiscard]] double least(const Node& box) const {
     const double dx = std::max(x - box.x_min, box.x_max - x);
     const double dy = std::max(y - box.y_min, box.y_max - y);

@@ -31,9 +31,10 @@ double profile_edge_tip(const CutterProfile& profile, const Eigen::Vector2d& p,
 
 /// Height of the tip of the tool that rests on a whole triangle (columns: its corners), mm;
 /// kNoContact if no part of it is under the tool. Error against the exact maximum of f: 1e-12 mm
-/// for triangles of a few millimetres (ProfileContact.AgreesWithTheBall); on ones steeper than 1 :
-/// 1000 it answers for a p within 1e-13 mm.
-/// @param enough  where the maximum is lower, mm, any height below it may be answered: sooner.
+/// for triangles of a few millimetres (ProfileContact.AgreesWithTheBall); on steeper ones than
+/// 1 : 1000 the height is exact for a p within 1e-13 mm.
+/// @param enough  if the maximum is lower than this, mm, any height below it may be returned
+///                (faster).
 double profile_triangle_tip(const CutterProfile& profile, const Eigen::Vector2d& p,
                             const Eigen::Matrix3d& corners, double enough = kNoContact);
 
@@ -44,12 +45,12 @@ double profile_box_tip(const CutterProfile& profile, const Eigen::Vector2d& p,
 
 /// Lets tools of any profile down on a mesh: for any (x, y) the lowest height of the tip at which
 /// the profile cuts into no triangle; exact, over facets, edges and vertices. One index serves
-/// every profile. For the finishing ball, which needs millions of points a second, there is
-/// DropCutter.
+/// every profile. DropCutter is faster for the finishing ball, which needs millions of points a
+/// second.
 ///
-/// Triangles lie in the cells of a grid by their boxes' centres; over it stands a pyramid, each
-/// node the box of four below it and its highest point. A search goes down the node that could lift
-/// the tool most, and passes over those that could not lift it further than what it rests on
+/// Triangles are stored in the cells of a grid by their boxes' centres. Above it is a pyramid: each
+/// node has the box of the four below it and its highest point. A search descends into the node
+/// that could lift the tool most, and skips those that could not lift it above what it rests on
 /// already.
 class ProfileCutter {
  public:
@@ -57,14 +58,14 @@ class ProfileCutter {
   explicit ProfileCutter(const SurfaceMesh& mesh);
 
   /// The location of the tip over p (mm). Equal to the largest profile_triangle_tip() over all
-  /// triangles to 1e-12 mm (ProfileCutter.EqualsBruteForce…). `near`, a location close by, makes it
-  /// faster and changes the height by no more than rounding. A profile of radius 0 answers the
+  /// triangles to 1e-12 mm (ProfileCutter.EqualsBruteForce…). `near`, a close location, makes it
+  /// faster and changes the height by no more than rounding. A profile of radius 0 returns the
   /// surface's own height.
   [[nodiscard]] CutterLocation drop(const CutterProfile& profile, const Eigen::Vector2d& p,
                                     const CutterLocation& near = {}) const;
 
-  /// Height of the tip over p on the triangle alone that holds it up at a location close by, mm:
-  /// no more than drop() answers; kNoContact if it is not under the tool.
+  /// Height of the tip over p on the triangle alone that holds it up at a close location, mm: at
+  /// most that of drop(); kNoContact if it is not under the tool.
   [[nodiscard]] double rest_on(const CutterProfile& profile, const Eigen::Vector2d& p,
                                const CutterLocation& near) const;
 
@@ -75,7 +76,7 @@ class ProfileCutter {
   /// Box seen from above, relative to the grid's origin, rounded outwards; highest corner, exact.
   struct Node {
     float x_min, x_max, y_min, y_max;
-    std::int32_t top;  ///< The item that has it.
+    std::int32_t top;  ///< The item with the highest corner.
     double z_max;
   };
   struct Level {

@@ -14,13 +14,13 @@
 namespace lensforge {
 namespace {
 
-/// Cells at most: 64 MB.
+/// Maximum number of cells: 64 MB.
 constexpr double kMaxCells = 4e6;
 
 /// Cells of one level along the side of one of the next.
 constexpr std::int64_t kCoarser = 4;
 
-/// Cells along the longer side of a box that roughly_over() looks at at most.
+/// Maximum cells that roughly_over() uses along the longer side of a box.
 constexpr double kRoughCells = 6.0;
 
 }  // namespace
@@ -108,32 +108,31 @@ SurfaceBounds BoundsMap::roughly_over(const Eigen::AlignedBox2d& box) const {
 
 namespace {
 
-/// Newton's method ends where |g| is below this: the tip then is exact to g²/(2m) ≤ 5e-11 mm for
-/// R = 0.2 mm, m ≥ 0.2/R being what f bends down by at least.
+/// Newton's method ends where |g| is below this: the tip is then exact to g²/(2m) ≤ 5e-11 mm for R
+/// = 0.2 mm, m ≥ 0.2/R being the minimum downward curvature of f.
 constexpr double kFlat = 1e-5;
 
-/// Steps at most; two are usual.
+/// Maximum number of steps; two are usual.
 constexpr int kMaxSteps = 40;
 
-/// Contacts are sought no farther from the axis than this, in radii.
+/// Maximum distance of contacts from the axis, in radii.
 constexpr double kFarthest = 0.98;
 
-/// Side of the cells in which bends are held, in radii and mm at most: what bends in a cell that a
-/// footprint touches counts.
+/// Curvature bounds are stored per cell. Maximum cell size, in ball radii and in mm.
 constexpr double kCellPerRadius = 0.25;
 constexpr double kLargestCell = 0.1;
 
-/// Footprints are this much larger than they need be, mm: rounding.
+/// Footprints are enlarged by this, mm: rounding.
 constexpr double kMargin = 1e-6;
 
-/// Steps in which a footprint is narrowed at most, and the share of it that a step has to leave
-/// over to be the last.
+/// Maximum number of steps that narrow a footprint, and the share of it that must remain after a
+/// step for it to be the last.
 constexpr int kReachSteps = 8;
 constexpr double kReachGain = 0.9;
 
 using Fixed = std::array<bool, 2>;
 
-/// Which coordinates of the contact are held at the rectangle's rim by the gradient.
+/// Coordinates of the contact that the gradient holds at the rectangle's rim.
 Fixed held_by_rim(const Eigen::Vector2d& q, const Eigen::Vector2d& gradient,
                   const Eigen::AlignedBox2d& box) {
   Fixed fixed{};
@@ -159,7 +158,7 @@ Eigen::AlignedBox2d grown(const Eigen::AlignedBox2d& box, double by) {
   return {Eigen::Vector2d(box.min() - around), Eigen::Vector2d(box.max() + around)};
 }
 
-/// Of a box, what is nearest to it of another one.
+/// The box of the places of another box that are nearest to a box.
 Eigen::AlignedBox2d clamped(const Eigen::AlignedBox2d& axis, const Eigen::AlignedBox2d& box) {
   return {nearest_inside(box, axis.min()), nearest_inside(box, axis.max())};
 }
@@ -172,7 +171,7 @@ SmoothBed::SmoothBed(const OpticalSurface& surface, double radius,
       radius_(radius),
       bounds_(surface, bounds, std::min(kCellPerRadius * radius, kLargestCell)) {}
 
-/// What lies nearer rises less, and what rises less is nearer.
+/// Closer places rise less, and a smaller rise brings the contact closer.
 double SmoothBed::reach(const Eigen::AlignedBox2d& axis) const {
   const Eigen::AlignedBox2d over = clamped(axis, surface_.box());
   const double lowest = bounds_.roughly_over(over).lowest;
@@ -212,8 +211,8 @@ std::optional<SurfaceShape> SmoothRoll::shape_at(const Eigen::Vector2d& q) {
   return patch_->at(q);
 }
 
-/// Newton's method with the step halved as long as f falls. Where the gradient points over the rim
-/// a coordinate stays there. By concavity no other point of the surface holds the ball higher than
+/// Newton's method with the step halved while f falls. Where the gradient points over the rim a
+/// coordinate stays there. By concavity no other point of the surface holds the ball higher than
 /// g²/(2m) above f(q), m = 1/R − bend.
 std::optional<SmoothRoll::Rest> SmoothRoll::rest_at(double u, const Eigen::Vector2d& guess) {
   const Eigen::AlignedBox2d& box = bed_.surface().box();
@@ -290,8 +289,8 @@ std::optional<CurveNodes> SmoothRoll::follow(double from, double to, double erro
   if (!first) return std::nullopt;
   const std::optional<Rest> last = rest_at(to, first->q + (to - from) * first->rate);
   if (!last) return std::nullopt;
-  // Over both places a stationary point of f was found. It is the contact if it lies where contacts
-  // can be at all and f is concave there.
+  // A stationary point of f was found over both places. It is the contact if it lies where contacts
+  // are possible and f is concave there.
   const double tip =
       std::max(bed_.tip_over(axis, first->point()), bed_.tip_over(axis, last->point()));
   const Eigen::AlignedBox2d foot = bed_.footprint(axis, tip);

@@ -21,18 +21,18 @@ struct SurfaceBounds {
   double highest = 0.0;  ///< mm
 };
 
-/// How a smooth surface bends and how high it is where, in cells, and in cells of those.
+/// Curvature and height bounds of a smooth surface in a hierarchy of cells.
 class BoundsMap {
  public:
   /// @param bounds  of every triangle.
-  /// @param cell    side of a cell, mm, > 0; larger where the surface has too many of them.
+  /// @param cell    side of a cell, mm, > 0; enlarged if there would be too many.
   BoundsMap(const OpticalSurface& surface, std::span<const SurfaceBounds> bounds, double cell);
 
-  /// Bounds over all of the surface in a box. @pre some of it is there.
+  /// Bounds over all of the surface in a box. @pre the box contains some of it.
   [[nodiscard]] SurfaceBounds over(const Eigen::AlignedBox2d& box) const;
-  /// The same, from larger cells where the box has many: quicker, and at most as close.
+  /// The same, from larger cells where the box has many: faster, and never tighter.
   [[nodiscard]] SurfaceBounds roughly_over(const Eigen::AlignedBox2d& box) const;
-  /// The box of those cells over a box in which `holds(cell's box, its bounds)`; empty if in none.
+  /// Bounding box of the cells over a box for which `holds(cell's box, its bounds)`; empty if none.
   template <class Holds>
   [[nodiscard]] Eigen::AlignedBox2d part_where(const Eigen::AlignedBox2d& box,
                                                const Holds& holds) const {
@@ -78,20 +78,20 @@ class BoundsMap {
   [[nodiscard]] SurfaceBounds over(const Level& level, const Eigen::AlignedBox2d& box) const;
 
   Eigen::AlignedBox2d box_;
-  std::vector<Level> levels_;  ///< From the finest on.
+  std::vector<Level> levels_;  ///< Finest first.
 };
 
 /// A smooth surface that a ball rolls on.
 ///
 /// The height f(q) = z(q) + √(R² − |q − p|²) − R at which a point q of it holds the tip over p is
-/// largest within √(2 R h) of the place p′ of the surface's rectangle that is nearest to p, h being
-/// how far the surface rises above p′ at most: with v = q − p′, |q − p|² ≥ |p′ − p|² + v², the
-/// rectangle being convex, so that f(q) ≥ f(p′) asks for z(q) − z(p′) ≥ v²/(2R). Where no second
-/// derivative of the surface there exceeds kMaxBend / R, f is strictly concave: there is one
-/// contact, and Newton's method finds it. It depends continuously on p, and the drop surface
-/// f(q(p)) has second derivatives between −b⁻ and b⁺ / (1 − b⁺R), the surface's own lying between
-/// −b⁻ and b⁺: the Hessians' inverses add. At the rim of the surface's rectangle, where the contact
-/// stays behind, the ball's own flank bounds them.
+/// largest within √(2 R h) of p′, the place of the surface's rectangle nearest to p, h being the
+/// maximum rise of the surface above p′: with v = q − p′, |q − p|² ≥ |p′ − p|² + v² because the
+/// rectangle is convex, so f(q) ≥ f(p′) requires z(q) − z(p′) ≥ v²/(2R). Where no second derivative
+/// of the surface there exceeds kMaxBend / R, f is strictly concave: there is one contact, and
+/// Newton's method finds it. It depends continuously on p, and the drop surface f(q(p)) has second
+/// derivatives between −b⁻ and b⁺ / (1 − b⁺R), those of the surface lying between −b⁻ and b⁺: the
+/// Hessians' inverses add. At the rim of the rectangle, where the contact stays behind, the ball's
+/// own flank bounds them.
 class SmoothBed {
  public:
   /// @param radius   of the ball, mm, > 0.
@@ -102,13 +102,13 @@ class SmoothBed {
   [[nodiscard]] const OpticalSurface& surface() const { return surface_; }
   [[nodiscard]] double radius() const { return radius_; }
   [[nodiscard]] const BoundsMap& bounds() const { return bounds_; }
-  /// All of the surface that can touch a ball with its axis in a box.
+  /// All of the surface that can touch a ball whose axis is in a box.
   [[nodiscard]] Eigen::AlignedBox2d footprint(const Eigen::AlignedBox2d& axis) const;
-  /// The same if the tip is known to be nowhere below `tip`, mm: z(q) − tip ≥ |q − p|²/(2R).
+  /// The same if the tip is nowhere below `tip`, mm: z(q) − tip ≥ |q − p|²/(2R).
   [[nodiscard]] Eigen::AlignedBox2d footprint(const Eigen::AlignedBox2d& axis, double tip) const;
-  /// How far a contact can be from p′ at most, mm.
+  /// Maximum distance of a contact from p′, mm.
   [[nodiscard]] double reach(const Eigen::AlignedBox2d& axis) const;
-  /// How low the tip is over a box at least, mm, if a point of the surface is under the ball.
+  /// Minimum height of the tip over a box, mm, if a point of the surface is under the ball.
   [[nodiscard]] double tip_over(const Eigen::AlignedBox2d& axis,
                                 const Eigen::Vector3d& point) const;
 
@@ -120,12 +120,12 @@ class SmoothBed {
   BoundsMap bounds_;
 };
 
-/// Places of a curve, joined by straight lines.
+/// Points of a curve, joined by straight lines.
 struct CurveNodes {
   std::vector<double> u;                 ///< Ascending, mm.
   std::vector<double> z;                 ///< mm
-  std::vector<Eigen::Vector2d> contact;  ///< Where the ball touches, mm.
-  double error = 0.0;                    ///< Farthest that the curve is from the polyline, mm.
+  std::vector<Eigen::Vector2d> contact;  ///< Contact of the ball, mm.
+  double error = 0.0;                    ///< Maximum distance of the curve from the polyline, mm.
 };
 
 /// A ball that rolls along a line over a smooth surface.
@@ -133,13 +133,13 @@ class SmoothRoll {
  public:
   SmoothRoll(const SmoothBed& bed, const AxisLine& line) : bed_(bed), line_(line) {}
 
-  /// The drop curve from `from` to `to`, both included, to `error` mm, with nodes no more than
-  /// `apart` mm apart; nothing if the ball may rest in more than one place or on a flank steeper
-  /// than kSteepest somewhere on the way, or leaves the surface. Short ways are judged more finely.
+  /// The drop curve from `from` to `to`, both included, to `error` mm, with nodes at most `apart`
+  /// mm apart. Nothing if somewhere in between the ball may rest in more than one place or on a
+  /// flank steeper than kSteepest, or leaves the surface. Short stretches are checked more finely.
   [[nodiscard]] std::optional<CurveNodes> follow(double from, double to, double error,
                                                  double apart = HUGE_VAL);
 
-  /// Distance of contact and axis at most, in radii.
+  /// Maximum distance of contact and axis, in radii.
   static constexpr double kSteepest = 0.85;
 
  private:
@@ -147,21 +147,21 @@ class SmoothRoll {
   struct Rest {
     Eigen::Vector2d q{0.0, 0.0};     ///< Contact.
     Eigen::Vector2d rate{0.0, 0.0};  ///< ∂q/∂u
-    double z = 0.0;                  ///< There, mm.
+    double z = 0.0;                  ///< Of the surface there, mm.
     double tip = 0.0;
-    double doubt = 0.0;  ///< Of the tip, mm.
+    double doubt = 0.0;  ///< Uncertainty of the tip, mm.
 
     [[nodiscard]] Eigen::Vector3d point() const { return {q.x(), q.y(), z}; }
   };
   [[nodiscard]] std::optional<Rest> rest_at(double u, const Eigen::Vector2d& guess);
   [[nodiscard]] std::optional<SurfaceShape> shape_at(const Eigen::Vector2d& q);
-  /// How sharply the drop curve bends at most between two rests, 1/mm; nothing if that is open.
+  /// Maximum curvature of the drop curve between two rests, 1/mm; nothing if unknown.
   [[nodiscard]] std::optional<double> sharpest(double from, const Rest& first, double to,
                                                const Rest& last, double bend) const;
 
   const SmoothBed& bed_;
   AxisLine line_;
-  std::optional<SmoothPatch> patch_;  ///< Where the last shape was taken.
+  std::optional<SmoothPatch> patch_;  ///< Patch of the last shape.
   std::optional<Eigen::Vector2d> last_;
 };
 

@@ -26,16 +26,16 @@ namespace lensforge {
 namespace {
 
 constexpr int kMostSteps = 200;
-constexpr double kSlightest = 1e-14;  ///< Share of the sum that is no progress: rounding.
+constexpr double kSlightest = 1e-14;  ///< Share of the sum that counts as no progress: rounding.
 constexpr double kFirstDamping = 1e-3;
-constexpr double kMostDamping = 1e10;  ///< Steps are shorter than differences there.
+constexpr double kMostDamping = 1e10;  ///< Steps are then shorter than the differences.
 constexpr double kEasing = 10.0;
 
-/// Least eigenvalue of JᵀJ, its columns scaled to length 1, that counts: differences are exact to
+/// Minimum significant eigenvalue of JᵀJ with columns scaled to length 1: differences are exact to
 /// about 1e-8.
 constexpr double kSingular = 1e-12;
 
-/// Of a datum that alone determines something: others say nothing of it.
+/// 1 − h of a datum that alone determines a parameter: the others do not determine it.
 constexpr double kAlone = 1e-6;
 
 struct Normal {
@@ -58,7 +58,7 @@ Normal normal_of(const LeastSquares& problem, const Eigen::VectorXd& parameters)
   return normal;
 }
 
-/// A damped step, no longer than it may be.
+/// A damped step within its maximum length.
 Eigen::VectorXd step_of(const LeastSquares& problem, const Eigen::MatrixXd& jacobian,
                         const Eigen::VectorXd& residuals, double damping) {
   Eigen::MatrixXd matrix = jacobian.transpose() * jacobian;
@@ -133,22 +133,22 @@ FitQuality fit_quality(const LeastSquares& problem, const Eigen::VectorXd& minim
 
 namespace {
 
-/// One reading with what a coupon's state makes of it.
+/// One reading and its prediction from a coupon's state.
 struct ModelledReading {
   std::string key;    ///< "groove[2].width_mm (G3)"
   double unit = 1.0;  ///< Of the key: 1e-3 mm for a height in µm.
   Reading reading;    ///< mm, or a share.
   std::function<double(const CouponState&)> predicted;
-  double least = 0.0;  ///< Of reading ÷ what is usual; beyond it is no such reading.
+  double least = 0.0;  ///< Range of reading ÷ usual value; outside, the reading is implausible.
   double most = 0.0;
-  bool polished = false;  ///< What is usual is as if it were not polished, which is the most.
+  bool polished = false;  ///< The usual value is the unpolished one, which is the maximum.
 };
 
 constexpr double kMicrometre = 1e-3;  ///< mm
 
-// Bounds of what a reading may be, in shares of what is expected. Marks: the largest pitch error of
-// a workshop and a reading's own. Widths and heights: a ball of half or twice its size; a unit is
-// wrong by a thousand. What polishing leaves may be as faint as it likes.
+// Plausible ranges of readings, as shares of the expected value. Marks: the largest pitch error of
+// a workshop and a reading's own. Widths and heights: a ball of half or twice its size; a wrong
+// unit is off by a thousand. After polishing any small value is plausible.
 constexpr double kMarkShare = 0.03;
 constexpr double kFactor = 3.0;
 constexpr double kAnyFactor = std::numeric_limits<double>::max();
@@ -198,8 +198,8 @@ std::vector<ModelledReading> modelled_readings(const CouponReadings& readings) {
   return all;
 }
 
-/// @throw InputError naming file, key, value and rule for a reading that a coupon of such a
-///        workshop cannot have.
+/// @throw InputError naming file, key, value and rule for a reading impossible for a coupon of such
+///        a workshop.
 void require_plausible(const std::vector<ModelledReading>& readings, const CouponState& expected,
                        const std::string& file) {
   CouponState unpolished = expected;
@@ -218,12 +218,12 @@ void require_plausible(const std::vector<ModelledReading>& readings, const Coupo
 
 enum Parameter { kSigma, kRadius, kPitchError, kOffset, kParameters };
 
-// σ from which the search begins: beyond them no ripple is changed, or none is left.
+// Range of σ for the search: outside it no ripple is changed, or none is left.
 constexpr double kLeastSigma = 0.002;  ///< mm
 constexpr double kMostSigma = 0.3;     ///< mm
 constexpr double kNoSigma = 1e-6;      ///< mm; in place of 0, which has no logarithm.
 constexpr int kSigmas = 161;           ///< In equal ratios of 1.03.
-constexpr std::size_t kStarts = 4;     ///< Of them, as many are followed to their minimum.
+constexpr std::size_t kStarts = 4;     ///< Number of them followed to their minimum.
 
 CouponState state_of(const Eigen::VectorXd& p) {
   return {std::exp(p[kSigma]), std::exp(p[kRadius]), p[kPitchError], p[kOffset]};
@@ -252,7 +252,7 @@ LeastSquares problem_of(const std::vector<ModelledReading>& readings) {
   return problem;
 }
 
-/// Values of σ where the readings agree better than for its neighbours.
+/// Values of σ where the readings agree better than at its neighbours.
 std::vector<Eigen::VectorXd> starts(const LeastSquares& problem, const Eigen::VectorXd& begin) {
   if (std::find(problem.free.begin(), problem.free.end(), kSigma) == problem.free.end()) {
     return {begin};
@@ -292,7 +292,7 @@ Eigen::VectorXd best_fit(const LeastSquares& problem, const Eigen::VectorXd& beg
   return best;
 }
 
-/// The parameters that readings of these kinds say anything of.
+/// The parameters on which readings of these kinds depend.
 std::vector<int> touched(const CouponReadings& readings) {
   const auto any = [](const auto& entries, auto... kinds) {
     return std::any_of(entries.begin(), entries.end(),
@@ -314,7 +314,7 @@ struct Solution {
   Eigen::VectorXd best;
   FitQuality quality;
 
-  /// Place of a parameter among those that are free; none where it is held.
+  /// Index of a parameter among the free ones; none where it is held.
   [[nodiscard]] std::optional<Eigen::Index> place(int parameter) const {
     const auto at = std::find(problem.free.begin(), problem.free.end(), parameter);
     if (at == problem.free.end()) return std::nullopt;
@@ -326,7 +326,7 @@ struct Solution {
   }
 };
 
-/// Which parameter has to be held, −1 for none. The radius first: it has a maker, who states it.
+/// Parameter to be held, −1 for none. The radius first: its maker states it.
 int unknown_among(const Solution& solution) {
   const std::array limits{std::pair(kRadius, kRadiusShare), std::pair(kSigma, kSigmaShare),
                           std::pair(kPitchError, kPitchErrorMost)};
@@ -337,7 +337,7 @@ int unknown_among(const Solution& solution) {
   return -1;
 }
 
-/// A ball that is held may be off by kRadiusShare, which goes into the uncertainty of ln σ.
+/// Adds an error of kRadiusShare of a held ball to the uncertainty of ln σ.
 void take_in_ball(Solution& solution) {
   constexpr double kChange = 0.01;
   const auto sigma = solution.place(kSigma);
@@ -349,8 +349,8 @@ void take_in_ball(Solution& solution) {
   known = std::hypot(known, kRadiusShare / kChange * change);
 }
 
-/// @throw InputError naming the reading that is farthest from what the others say, if it is farther
-///        than kMostDeviation; and any that is as far.
+/// @throw InputError naming the reading that deviates most from the others, if by more than
+///        kMostDeviation, and any with an equal deviation.
 void require_agreement(const std::vector<ModelledReading>& readings, const FitQuality& quality,
                        const std::string& file) {
   constexpr double kAsFar = 0.95;
@@ -369,13 +369,13 @@ void require_agreement(const std::vector<ModelledReading>& readings, const FitQu
       (others.empty() ? "" : ", as far as " + others) + ": measure it again or take it out");
 }
 
-/// To between a hundredth and a thousandth of its uncertainty, so that files can be read.
+/// Rounds to between a hundredth and a thousandth of its uncertainty, for readable files.
 double to_digits(double value, double uncertainty) {
   const double digits = std::pow(10.0, 2.0 - std::floor(std::log10(uncertainty)));
   return std::round(value * digits) / digits;
 }
 
-/// @param unit  of the value for one of the parameter's.
+/// @param unit  of the value per unit of the parameter.
 FittedValue value_of(const Solution& solution, Parameter parameter, double unit,
                      FittedValue workshops, double fitted) {
   const auto place = solution.place(parameter);
@@ -446,14 +446,14 @@ CouponFit expected_fit(const CouponReadings& expected, const Workshop& workshop)
 
 namespace {
 
-/// Where a line and a column of the text are, both counted from 1.
+/// Offset of a line and a column in the text, both counted from 1.
 std::size_t offset_of(const std::string& text, const toml::source_position& place) {
   std::size_t begin = 0;
   for (toml::source_index line = 1; line < place.line; ++line) begin = text.find('\n', begin) + 1;
   return begin + place.column - 1;
 }
 
-/// Writes a number where one stands.
+/// Replaces a number in the text.
 void replace_number(std::string& text, const toml::node& node, double value) {
   constexpr std::string_view kEnds = " \t\r\n,}]#";
   const std::size_t begin = offset_of(text, node.source().begin);
@@ -479,7 +479,7 @@ void set_number(std::string& text, const std::string& table, const std::string& 
   }
 }
 
-/// The diameter of a tool, which states it if there is a list of tools.
+/// Sets the diameter of a tool, which states it if there is a list of tools.
 void set_diameter(std::string& text, int number, double value) {
   const toml::table document = toml::parse(text);
   const toml::array* const tools = document["tool"].as_array();
@@ -533,7 +533,7 @@ bool determines_any(const CouponFit& fit) {
   return false;
 }
 
-/// Comments that say what was fitted to what.
+/// Comments that state the fitted values and their source.
 std::string fitted_text(const CouponFit& fit, const std::string& readings) {
   std::string text =
       "# Fitted by " + program_mark() + " to " + printable_line(readings, kLongestName) + ":\n";

@@ -196,7 +196,7 @@ namespace {
 
 constexpr double kSecondsPerMinute = 60.0;
 
-/// Whether it can be read as readings and has none.
+/// True if it can be read as readings and has none.
 bool holds_no_readings(const fs::path& file) {
   try {
     return parse_readings(read_toml_file(file, "a file of readings"), file.string()).count() == 0;
@@ -205,7 +205,7 @@ bool holds_no_readings(const fs::path& file) {
   }
 }
 
-/// A day's work at the bench is not written over.
+/// Readings at the bench are not overwritten.
 void require_no_readings(const fs::path& file, bool force) {
   std::error_code error;
   if (force || !fs::exists(file, error) || holds_no_readings(file)) return;
@@ -229,7 +229,7 @@ CouponSheet sheet_of(const CouponOptions& options, const CouponPlan& plan,
   return sheet;
 }
 
-/// Programs of an earlier coupon in another dialect, which the sheet is not about.
+/// Removes programs of an earlier coupon in another dialect, which the sheet does not describe.
 void remove_earlier(const fs::path& folder, const std::vector<fs::path>& written) {
   for (const fs::path& path : other_programs(folder, written).earlier) {
     std::error_code ignored;

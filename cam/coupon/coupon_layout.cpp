@@ -17,7 +17,7 @@ namespace {
 using O = CouponOptions;
 using R = Row<O>;
 
-constexpr double kShortest = 5.0;     ///< mm between marks; below it a calliper reads nothing.
+constexpr double kShortest = 5.0;  ///< mm between marks; shorter ones are too short for a calliper.
 constexpr double kLongest = 500.0;    ///< mm
 constexpr double kShallowest = 0.01;  ///< mm; a clamped sheet is no flatter.
 constexpr double kDeepest = 1.0;      ///< mm
@@ -57,27 +57,26 @@ const OptionTable<CouponOptions>& coupon_fields() {
 
 namespace {
 
-/// Pitches in σ. At 2.5 σ polish leaves 4 % of a ripple, at 6 σ 58 %: between them lies what a
-/// laser and what a roughness tester can read, also where σ is half or twice what was believed.
+/// Pitches in σ. Polish leaves 4 % of a ripple at 2.5 σ and 58 % at 6 σ: in between it can be read
+/// by a laser or a roughness tester, even where σ is half or twice the assumed value.
 constexpr std::array kPitches{2.5, 3.0, 3.5, 4.5, 6.0};
 constexpr double kWidestPitch = 1.2;    ///< Of R; scallops are 0.2 R high there.
 constexpr double kAssumedSigma = 0.03;  ///< mm, where the workshop does not polish.
 
-/// Depths in R. Not in their order, so that a blank that lies askew does not look like another
-/// radius.
+/// Depths in R. They are not sorted, so that a tilted blank does not look like another radius.
 constexpr std::array kDepths{0.45, 0.15, 0.8, 0.3, 0.6};
 constexpr double kDeepestGroove = 0.2;  ///< mm; in one pass through acrylic.
 
 constexpr double kMargin = 2.0;     ///< mm from the blank's border to the first cut.
 constexpr double kGap = 1.0;        ///< mm of untouched top between cuts.
 constexpr double kPadAlong = 4.0;   ///< mm; a laser's spot is 1 to 2 mm wide.
-constexpr double kPadAcross = 6.0;  ///< mm; a roughness tester's way is 4.8 mm (ISO 4288).
+constexpr double kPadAcross = 6.0;  ///< mm; a roughness tester's stroke is 4.8 mm (ISO 4288).
 constexpr double kMicrometre = 1e-3;
 constexpr double kMarkDepth = 0.5;  ///< Of the deepest groove.
 
 double to_micrometre(double mm) { return std::round(mm / kMicrometre) * kMicrometre; }
 
-/// Places one thing behind the other across the passes.
+/// Places one thing after the other across the passes.
 class Across {
  public:
   Across(double at, double gap) : at_(at), gap_(gap) {}

@@ -13,7 +13,7 @@
 
 namespace lensforge {
 
-/// What shapes a coupon, the test piece that calibrates a workshop's polish, ball and pitch.
+/// Options of a coupon, the test piece that calibrates a workshop's polish, ball and pitch.
 struct CouponOptions {
   Workshop workshop;
   PostDescription post = find_post("linuxcnc", "--post");
@@ -22,10 +22,10 @@ struct CouponOptions {
   double thickness = 5.0;  ///< Of the blank, mm.
   double spin_up = 3.0;    ///< Dwell after the spindle was switched on, s.
   Coolant coolant = Coolant::kOff;
-  bool force = false;  ///< Replace files that lensforge did not write as they stand.
+  bool force = false;  ///< Replace files that lensforge did not write or that were changed.
 };
 
-/// The options as the command has them.
+/// The command's options.
 const OptionTable<CouponOptions>& coupon_fields();
 
 /// @throw InputError naming option or key, value and rule.
@@ -33,29 +33,29 @@ void validate(const CouponOptions& options);
 
 /// A straight cut of the ball along the passes; mm.
 struct CouponGroove {
-  double along_begin = 0.0;  ///< Of the tip's way.
+  double along_begin = 0.0;  ///< Of the tip's path.
   double along_end = 0.0;
   double across = 0.0;
   double depth = 0.0;  ///< Below the top of the blank.
 };
 
-/// A field that is cut with passes of one pitch; mm.
+/// A field cut with passes of one pitch; mm.
 struct CouponPad {
   Eigen::AlignedBox2d box;  ///< (along, across); the first and the last pass run on its borders.
   double pitch = 0.0;
 };
 
-/// What is cut into a coupon and where; mm from the blank's corner, which is X0 Y0. "Along" is the
-/// axis along which the workshop's finishing passes run, "across" the other.
+/// Layout of a coupon; mm from the blank's corner, which is X0 Y0. "Along" is the axis of the
+/// workshop's finishing passes, "across" the other.
 ///
 /// - Two marks, far apart across the passes: their distance gives the pitch error.
-/// - Grooves of one pass each and several depths: their widths give the ball's radius, whatever the
-///   touch-off was off by.
-/// - Pads: the scallops' heights p²/(8R) before polishing give the radius too; the ripples that
-///   polishing leaves, less by exp(−2π²σ²/p²), give σ.
+/// - Grooves of one pass each at several depths: their widths give the ball's radius, independently
+///   of the touch-off error.
+/// - Pads: the scallops' heights p²/(8R) before polishing also give the radius; the ripples after
+///   polishing, smaller by exp(−2π²σ²/p²), give σ.
 struct CouponLayout {
   int along = 0;        ///< Axis of the passes: 0 for x, 1 for y.
-  double radius = 0.0;  ///< Of the ball as the workshop has it.
+  double radius = 0.0;  ///< Of the ball, from the workshop.
   double pad_depth = 0.0;
   std::vector<CouponGroove> marks;  ///< Two.
   std::vector<CouponGroove> grooves;
@@ -72,14 +72,14 @@ struct CouponLayout {
   }
 };
 
-/// What drawing, sheet and template call the groove (G) or pad (P) of an index: "G1", "P5".
+/// Name of a groove (G) or pad (P) in drawing, sheet and template: "G1", "P5".
 std::string feature_name(char letter, std::size_t index);
 
 /// Pitches and depths suit the workshop's ball and polish: pitches are 2.5 to 6 σ, but at most
 /// 1.2 R, depths 0.15 to 0.8 R, but at most 0.2 mm.
-/// @pre the numbers of the options hold their limits.
-/// @throw InputError naming option or key, value and rule, where marks are too near to one another
-///        for what lies between them, pads are not deeper than their scallops, or flutes too short.
+/// @pre the options are within their limits.
+/// @throw InputError naming option or key, value and rule, where the marks are too close for the
+///        features between them, pads are not deeper than their scallops, or flutes are too short.
 CouponLayout coupon_layout(const CouponOptions& options);
 
 }  // namespace lensforge

@@ -9,12 +9,12 @@
 
 namespace lensforge {
 
-/// The light with which a coupon's orders of diffraction are measured, through the blank.
+/// Light for measuring a coupon's orders of diffraction through the blank.
 struct CouponLight {
   double wavelength = 532e-6;  ///< In air, mm.
   double ior = 1.49;           ///< Of the blank.
 
-  /// By how much a millimetre of the blank delays the light against air, rad/mm.
+  /// Phase delay of a millimetre of the blank against air, rad/mm.
   [[nodiscard]] double phase() const { return 2.0 * std::numbers::pi * (ior - 1.0) / wavelength; }
 };
 
@@ -49,20 +49,20 @@ class PolishedScallop {
   [[nodiscard]] double at(std::size_t node) const;
 
   std::array<double, kHarmonics> waves_{};  ///< Amplitudes of the cosines, mm.
-  std::size_t count_ = 0;                   ///< Of waves that are not zero: the first.
+  std::size_t count_ = 0;                   ///< Number of leading waves that are not zero.
 };
 
-/// What decides how a coupon measures; mm.
+/// Parameters of a coupon's measurements; mm.
 struct CouponState {
   double sigma = 0.0;          ///< Of the polish.
   double radius = 0.2;         ///< Of the ball as it cuts, run-out and wear included.
   double pitch_error = 0.0;    ///< Share of a length, across the passes.
-  double groove_offset = 0.0;  ///< How much deeper grooves are than programmed: the touch-off.
+  double groove_offset = 0.0;  ///< Excess depth of grooves over the program: the touch-off.
 
-  /// As the workshop's file has it.
+  /// Values of the workshop's file.
   static CouponState of(const Workshop& workshop);
 
-  // What is measured of what was programmed.
+  // Expected measurements of programmed features.
   [[nodiscard]] double mark_distance(double programmed) const;
   [[nodiscard]] double groove_width(double depth) const;
   [[nodiscard]] double scallop_before(double pitch) const;

@@ -25,9 +25,9 @@ constexpr double kHeightUncertainty = 5e-5;  ///< mm
 constexpr double kOrderShare = 0.15;
 constexpr double kFaintestRipple = 2.0 * kHeightUncertainty;  ///< mm, worth a tester's reading.
 
-constexpr double kFaintest = 0.002;  ///< Ratio of light that a phone's meter can tell.
-/// Amplitude of the light's delay up to which the ratio rises with the ripples, rad: J₁/J₀ has its
-/// first pole at 2.4.
+constexpr double kFaintest = 0.002;  ///< Minimum ratio of light for a phone's meter.
+/// Maximum amplitude of the light's delay for which the ratio rises with the ripples, rad: J₁/J₀
+/// has its first pole at 2.4.
 constexpr double kMostDelay = 1.5;
 
 constexpr std::size_t kMostEntries = 100;  ///< Of one kind: ten coupons.
@@ -47,7 +47,7 @@ const ReadingKeys kBefore{"before_um", "before_uncertainty_um", kMicrometre, 1e-
 const ReadingKeys kAfter{"after_um", "after_uncertainty_um", kMicrometre, 1e-3, 1000.0};
 const ReadingKeys kOrders{"order_ratio", "order_ratio_uncertainty", 1.0, 1e-6, 1e3};
 
-constexpr double kFinestUncertainty = 1e-6;  ///< Of the least value; nothing is known so well.
+constexpr double kFinestUncertainty = 1e-6;  ///< Of the least value; no instrument is better.
 
 /// Two significant digits.
 double rounded(double value) {

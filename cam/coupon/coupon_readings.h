@@ -12,7 +12,7 @@
 
 namespace lensforge {
 
-/// What was measured, with its standard uncertainty (one σ), > 0; both in the same unit.
+/// A measured value with its standard uncertainty (one σ), > 0; both in the same unit.
 struct Reading {
   double value = 0.0;
   double uncertainty = 0.0;
@@ -34,7 +34,7 @@ struct PadReadings {
   std::optional<Reading> orders;  ///< Light of a first order over the zeroth, polished.
 };
 
-/// Everything that was read off one coupon or several.
+/// All readings of one or several coupons.
 struct CouponReadings {
   std::vector<MarkReadings> marks;
   std::vector<GrooveReadings> grooves;
@@ -44,18 +44,18 @@ struct CouponReadings {
   [[nodiscard]] int count() const;
 };
 
-/// What a coupon is expected to measure in a workshop that is as its file says, with uncertainties
-/// of common tools: calliper in grooves 0.03 mm, measuring microscope 3 µm, roughness tester 5 %
-/// but at least 0.05 µm, light meter 15 %. Ripples and light that are too faint for these tools are
-/// left out, as is light that does not rise with the ripples.
+/// Readings expected if the workshop is as its file states, with uncertainties of common tools:
+/// calliper in grooves 0.03 mm, measuring microscope 3 µm, roughness tester 5 % but at least 0.05
+/// µm, light meter 15 %. Ripples and light too faint for these tools are left out, as is light that
+/// does not rise with the ripples.
 CouponReadings expected_readings(const CouponLayout& layout, const Workshop& workshop);
 
-/// Readings as a commented TOML file to be filled in: what is expected stands in comments.
+/// Readings as a commented TOML file to be filled in; comments state the expected values.
 std::string readings_template(const CouponReadings& expected);
 
 /// Reads a filled-in template. Entries without a reading count as not measured.
 /// @param file  its name in messages.
-/// @throw InputError naming file, key, value and rule: what is no number or out of its range,
+/// @throw InputError naming file, key, value and rule: values that are no numbers or out of range,
 ///        readings without an uncertainty, unknown keys.
 CouponReadings parse_readings(std::string_view text, const std::string& file);
 

@@ -21,7 +21,7 @@ std::string attribute(const char* name, double value) {
   return std::string(" ") + name + "=\"" + decimal_text(value, 2) + "\"";
 }
 
-/// The coupon as the machine sees it, y upwards.
+/// The coupon in machine coordinates, y upwards.
 class Drawing {
  public:
   explicit Drawing(const CouponLayout& layout)
@@ -235,7 +235,7 @@ std::string after_table(const CouponSheet& sheet) {
   return html_table(kColumns, rows);
 }
 
-/// What all readings together will tell.
+/// Expected accuracy of all readings together.
 std::string known(const CouponFit& fit) {
   const auto words = [](const char* name, const FittedValue& value, const std::string& text) {
     return std::string(name) + " to " +

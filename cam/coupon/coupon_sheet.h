@@ -10,11 +10,11 @@
 
 namespace lensforge {
 
-/// What stands on the sheet that goes with a coupon to the bench.
+/// Content of the measuring sheet of a coupon.
 struct CouponSheet {
   CouponLayout layout;
   CouponReadings expected;
-  CouponFit known;    ///< How well the readings will tell each value, if all are taken.
+  CouponFit known;    ///< Uncertainty of each value if all readings are taken.
   std::string tool;   ///< In words.
   std::string files;  ///< Names of the programs.
   double minutes = 0.0;
@@ -22,7 +22,7 @@ struct CouponSheet {
   std::vector<std::string> warnings;
 };
 
-/// One printable page: drawing, steps, what to measure with what, and under which key it goes.
+/// One printable page: drawing, steps, quantities to measure, tools, and the keys for the readings.
 std::string coupon_sheet(const CouponSheet& sheet);
 
 /// The drawing alone, SVG: the coupon from above with its dimensions, marks, grooves and pads.

@@ -28,7 +28,7 @@ struct Choice {
   CamOptions options;
 };
 
-/// A folder that is gone in the end.
+/// A temporary folder, removed in the end.
 class PassingFolder {
  public:
   explicit PassingFolder(fs::path path) : path_(std::move(path)) {
@@ -91,7 +91,7 @@ std::vector<int> tool_numbers_of(std::string_view list, const std::string& where
   });
 }
 
-/// What one combination sets; what it does not name stays the workshop's.
+/// Settings of one combination; the rest stays the workshop's.
 struct Setting {
   double tool = 0.0;
   double pitch = 0.0;
@@ -150,7 +150,7 @@ std::vector<Choice> combinations(const CamOptions& options, const CutChoices& ch
   return all;
 }
 
-/// Marks the quickest choice that reaches the goal. @return what to say of it.
+/// Marks the quickest choice that reaches the goal. @return the advice.
 std::string choose(double goal, std::vector<ReportChoice>& ranking) {
   if (goal <= 0.0) return "";
   ReportChoice* quickest = nullptr;
@@ -179,7 +179,7 @@ ReportChoice ranked(const Choice& choice, const ReportData& report) {
           false};
 }
 
-/// The lists that may be asked for.
+/// Reads one of the allowed lists.
 void take_list(const std::string& key, std::string_view list, const std::string& where,
                CutChoices& choices) {
   const auto take = [&](auto& values, const auto& read) {

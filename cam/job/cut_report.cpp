@@ -19,7 +19,7 @@
 namespace lensforge {
 namespace {
 
-/// How deep tools go below the blank's underside, mm.
+/// Depth of tools below the blank's underside, mm.
 double depth_in_table(const CutPlan& plan) {
   double deepest = 0.0;
   for (const Collision& collision : plan.collisions()) {
@@ -34,14 +34,14 @@ double steep_moves(const CutPlan& plan) {
   return moves;
 }
 
-/// Touches the part or its blank with what does not cut, while the outline is cut.
+/// True if a part that does not cut touches the part or its blank while the outline is cut.
 bool is_short_outline_tool(const Collision& collision, int tool) {
   return collision.tool == tool && collision.operation.starts_with("outline") &&
          collision.part != "cutter" &&
          (collision.obstacle == "the blank" || collision.obstacle == "the lens");
 }
 
-/// Of a cut alone: a nest's blank has a thickness of its own.
+/// For a single cut: a nest's blank has a thickness of its own.
 std::string outline_warning(const CutPlan& plan, const Lens& lens) {
   if (plan.place().shared() || !cuts_outline(plan.options(), lens.setup)) return "";
   const double usual = Stock{}.allowance;
@@ -50,7 +50,7 @@ std::string outline_warning(const CutPlan& plan, const Lens& lens) {
       {"--stock " + trimmed_decimal(usual, 3), plan.part_box().max().z() + usual});
 }
 
-/// How deep a tool goes into a slot of its own width before what does not cut gets into it or
+/// Depth of a tool in a slot of its own width before a part that does not cut gets into it or
 /// beside it, mm.
 double free_length(const Tool& tool) {
   double length = tool.flute_length;
@@ -127,15 +127,15 @@ namespace {
 constexpr double kMicrometres = 1e3;
 constexpr double kSecondsPerMinute = 60.0;
 
-/// Of a material's refractive index: makers state acrylic as 1.49 to 1.492, and 0.005 more turn
-/// light by a hundredth more.
+/// Of a material's refractive index: makers state acrylic as 1.49 to 1.492, and an error of 0.005
+/// changes the refraction by 1 %.
 constexpr double kIndexTolerance = 0.005;
 
 std::string mm(double value, int decimals) { return decimal_text(value, decimals) + " mm"; }
 
 bool is_mirror(const Lens& lens) { return lens.setup.mode == LightMode::kReflect; }
 
-/// Which face lies down and which is cut. No light passes a mirror: its underside needs no polish.
+/// Faces that lie down and that are cut. No light passes a mirror: its underside needs no polish.
 std::string up_words(PartKind part, const Lens& lens) {
   if (part == PartKind::kMould) return "the mould's cavity is cut from above";
   if (is_mirror(lens)) {
@@ -149,7 +149,7 @@ std::string up_words(PartKind part, const Lens& lens) {
   return "polished flat face down; the optical surface is cut from above";
 }
 
-/// Where a front lies in the program's coordinates.
+/// Place of a front in program coordinates.
 std::string place_words(const CutPlan& plan, const SphericalFront& front) {
   return std::string(front.radius > 0.0 ? "bulging" : "hollow") + " sphere of radius " +
          mm(std::abs(front.radius), 2) + ", there before the first cut: its apex lies at X " +
@@ -166,7 +166,7 @@ std::string place_words(const CutPlan& plan, const HeightFront& front) {
                  "goes on straight"});
 }
 
-/// Where the front of the blank has to lie, and what comes of it where it does not.
+/// Required place of the blank's front, and the effect of an error.
 std::string front_words(const CutPlan& plan, const Lens& lens) {
   const Eigen::Vector2d middle = 0.5 * lens.setup.lens_size;
   const double top = lens.surface.vertices.row(2).mean();
@@ -177,7 +177,7 @@ std::string front_words(const CutPlan& plan, const Lens& lens) {
          ". The nest may reach up to Z " + decimal_text(plan.z_offset(), 3) + ", no higher";
 }
 
-/// The blank with what of its front lies below z = 0.
+/// The blank including the part of its front below z = 0.
 Eigen::AlignedBox3d whole_box(const CutPlan& plan, const Front& front) {
   Eigen::AlignedBox3d blank = plan.blank();
   blank.min().z() =
@@ -186,7 +186,7 @@ Eigen::AlignedBox3d whole_box(const CutPlan& plan, const Front& front) {
   return blank;
 }
 
-/// How Z gets right in the programs with the most tools.
+/// Explains how Z is set in the programs with the most tools.
 std::string length_words_of(const PostDescription& post, const ProgramFiles& programs) {
   std::size_t most = 1;
   for (const WrittenProgram& file : programs.files)
@@ -221,7 +221,7 @@ SetupSheet setup_sheet(const CutPlan& plan, const ProgramFiles& programs, const 
   return sheet;
 }
 
-/// Files that an operation stands in: "finish_1.ngc, finish_2.ngc".
+/// Files that contain an operation: "finish_1.ngc, finish_2.ngc".
 std::string files_of(const ProgramFiles& programs, std::size_t operation) {
   std::string names;
   for (const WrittenProgram& file : programs.files) {
@@ -287,7 +287,7 @@ NamedText entry_parameter(const char* name, const Level& level) {
   return {name, "down a helix of radius " + mm(level.helix_radius, 2) + angle};
 }
 
-/// How the tools before the finishing one get into material.
+/// Parameters of the entry into material before finishing.
 ParameterGroup entry_parameters(const Process& process) {
   ParameterGroup group{"Into material", {}};
   if (process.rough.enabled) group.parameters.push_back(entry_parameter("Roughing", process.rough));
@@ -297,7 +297,7 @@ ParameterGroup entry_parameters(const Process& process) {
   return group;
 }
 
-/// How the lens is cut out of its blank.
+/// Parameters of the outline cut.
 ParameterGroup outline_parameters(const CutPlan& plan) {
   const OutlineCut cut = plan.outline_cut();
   return {
@@ -381,16 +381,16 @@ ReportMap fillet_share_map(const CreaseMap& creases) {
   return map;
 }
 
-/// By how much the index of the workshop's material is off the one that the lens was designed for;
-/// 0 where it states none, and for a mould or a mirror, through whose material no light passes.
+/// Difference of the index of the workshop's material from the design's; 0 where it states none,
+/// and for a mould or a mirror, through whose material no light passes.
 double index_error(const CutPlan& plan, const Lens& lens) {
   const double stated = plan.options().workshop.material.ior;
   if (!(stated > 0.0) || plan.options().part == PartKind::kMould || is_mirror(lens)) return 0.0;
   return std::abs(stated - lens.setup.ior);
 }
 
-/// Why tools touch the blank where nothing was roughed; empty if the first one's flutes are long
-/// enough. What another program has roughed is not known: the blank counts as whole.
+/// Explains why tools touch the blank without roughing; empty if the first one's flutes are long
+/// enough. Roughing by other programs is unknown: the blank counts as whole.
 std::string unroughed_warning(const CutPlan& plan, const ProgramFiles& programs) {
   const Workshop& workshop = plan.options().workshop;
   if (workshop.process.rough.enabled || programs.summaries.empty()) return "";
@@ -404,7 +404,7 @@ std::string unroughed_warning(const CutPlan& plan, const ProgramFiles& programs)
                  " mm of flutes; run a roughing program first, or use a tool with longer flutes"});
 }
 
-/// Why the part would project another picture than the designed one; empty if it would not.
+/// Explains why the part's picture would differ from the designed one; empty if it does not.
 std::string index_warning(const CutPlan& plan, const Lens& lens) {
   const double stated = plan.options().workshop.material.ior;
   if (!(index_error(plan, lens) > kIndexTolerance)) return "";
@@ -413,8 +413,7 @@ std::string index_warning(const CutPlan& plan, const Lens& lens) {
                  ": it would project another picture"});
 }
 
-/// How the lens was meant to be made, if that is not how it is; empty if it is, or nothing is
-/// known.
+/// Intended process of the lens if it differs from the actual one; else, or if unknown, empty.
 std::string process_warning(const CutPlan& plan, const Lens& lens) {
   const nlohmann::json& provenance = lens.provenance;
   if (!provenance.is_object() || !provenance.contains("made_by")) return "";
@@ -425,7 +424,7 @@ std::string process_warning(const CutPlan& plan, const Lens& lens) {
     return known ? meant[key].get<double>() : otherwise;
   };
   const FinishProcess& finish = shop.process.finish;
-  // What is cast in a mould is smaller than it, and polished after it was cast.
+  // A cast is smaller than its mould, and is polished after casting.
   const double scale =
       plan.options().part == PartKind::kMould ? 1.0 - plan.options().shrinkage : 1.0;
   const double pitch = scale * finish_pitch(finish, shop.tool(finish.tool).radius());
@@ -439,7 +438,8 @@ std::string process_warning(const CutPlan& plan, const Lens& lens) {
                  " mm: cut it as it was designed, or design it for this workshop (--made-by)"});
 }
 
-/// A speed that the controller's setting would lower unseen; empty where it has no such setting.
+/// Warns of a speed that the controller's setting would silently lower; empty without such a
+/// setting.
 std::string spindle_warning(const CutPlan& plan, const ProgramFiles& programs) {
   const int setting = plan.options().post.reader.spindle_limit_setting;
   if (setting == 0) return {};
@@ -497,7 +497,7 @@ std::vector<std::string> warnings_of(const CutPlan& plan, const ProgramFiles& pr
   return warnings;
 }
 
-/// What the machine must not do, and what must not go into it.
+/// Checks of what the machine must not do, and of what must not be machined.
 std::vector<LimitCheck> all_safety_checks(const CutPlan& plan, const Lens& lens) {
   std::vector<LimitCheck> checks = safety_checks(plan);
   if (plan.options().workshop.material.ior > 0.0) {
@@ -507,7 +507,7 @@ std::vector<LimitCheck> all_safety_checks(const CutPlan& plan, const Lens& lens)
   return checks;
 }
 
-/// Safety first. A controller that takes lines without limit bears any load.
+/// Safety first. A controller without a line limit takes any load.
 Verdict whole_verdict(const CutPlan& plan, const ProgramFiles& programs,
                       const std::optional<Prediction>& prediction, const Lens& lens) {
   CutLimits limits = plan.options().limits;
@@ -536,7 +536,7 @@ void add_prediction(const Prediction& prediction, const Lens& lens, ReportData& 
                fillet_share_map(prediction.creases)};
 }
 
-/// Of the design, as lens.json states it; empty if it does not.
+/// Fingerprint of the design from lens.json; empty if it has none.
 std::string fingerprint_of(const Lens& lens) {
   if (!lens.provenance.is_object()) return "";
   const auto stated = lens.provenance.find("fingerprint");

@@ -15,27 +15,27 @@
 
 namespace lensforge {
 
-/// What the machine must not do, whatever becomes of the light: collisions, ways down into material
-/// that are too steep for their feed, motion below the blank or beyond the travel.
+/// Checks of what the machine must not do: collisions, descents too steep for their feed, motion
+/// below the blank or beyond the travel.
 /// @pre the plan's programs were read back.
 std::vector<LimitCheck> safety_checks(const CutPlan& plan);
 
-/// The same in sentences; none where nothing was found.
+/// The same in sentences; empty if nothing was found.
 std::vector<std::string> safety_warnings(const CutPlan& plan, const ProgramFiles& programs,
                                          const Lens& lens);
 
-/// A blank that is as thin as the part allows, and the option that asks for it.
+/// The thinnest blank that the part allows, and its option.
 struct ThinBlank {
   std::string option;
   double thickness = 0.0;  ///< mm
 };
 
-/// Why the outline's tool touches the blank with what does not cut, ending with a tool or a blank
-/// that would do; empty if it does not. @pre the plan cuts an outline.
+/// Explains why a part of the outline's tool that does not cut touches the blank, ending with a
+/// tool or a blank that works; empty if none touches. @pre the plan cuts an outline.
 std::string outline_tool_advice(const CutPlan& plan, double thickness, const ThinBlank& thin);
 
-/// What the report says of a cut that was written. Without a prediction it has no pictures, and its
-/// verdict judges the programs alone.
+/// The report of a written cut. Without a prediction it has no pictures, and its verdict judges the
+/// programs alone.
 /// @throw InputError naming a limit that is negative or no number.
 ReportData make_report(const CutPlan& plan, const ProgramFiles& programs,
                        const std::optional<Prediction>& prediction, const Lens& lens);

@@ -32,22 +32,22 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// What programs are called that machines read.
+/// Extensions of programs that machines read.
 const std::set<std::string> kProgramExtensions{".ngc",   ".nc", ".tap", ".cnc",
                                                ".gcode", ".gc", ".g",   ".mpf"};
 
 constexpr std::size_t kLinesToJob = 6;     ///< "job:" is the first comment below %, O and such.
 constexpr std::size_t kLongestLine = 256;  ///< Of a program's header.
-constexpr std::size_t kShortestCut = 30;   ///< Of a job's name that a comment cut short.
+constexpr std::size_t kShortestCut = 30;   ///< Of a job's name shortened in a comment.
 constexpr std::string_view kJobKey = "job: ";
 
-/// What a cut writes beside its programs.
+/// Files that a cut writes beside its programs.
 constexpr std::array kBesidePrograms{cam_file::kReport,        cam_file::kPage,
                                      cam_file::kMilledMesh,    cam_file::kMilledPicture,
                                      cam_file::kLeakage,       lens_file::kPartSurfaces,
                                      lens_file::kCausePictures};
 
-/// check_seal(); what cannot be read bears none.
+/// check_seal(); unreadable files have none.
 std::optional<bool> seal_of(const fs::path& path) {
   try {
     return check_seal(path);
@@ -75,7 +75,7 @@ bool names_operations(std::string_view stem) {
   }
 }
 
-/// The job as a program's header has it, in lower case; empty if it has none.
+/// The job in a program's header, in lower case; empty if it has none.
 std::string stated_job(const fs::path& path) {
   std::ifstream file(path, std::ios::binary);
   std::string line(kLongestLine, '\0');
@@ -88,7 +88,8 @@ std::string stated_job(const fs::path& path) {
   return {};
 }
 
-/// A comment has other letters than a name, and both may be cut short.
+/// True if the stem matches the header's job. Comments replace some letters, and both may be
+/// shortened.
 bool names_job(const std::string& stem, const fs::path& path) {
   const std::string job = stated_job(path);
   const std::string name = lower_case(stem);
@@ -198,7 +199,7 @@ void add_prediction_files(const Prediction& prediction, const Lens& lens, Pendin
 
 void add_report_files(const ReportData& report, PendingFiles& files) {
   files.add(cam_file::kPage, report_html(report));
-  // The job is called as its folder, whose name need not be UTF-8.
+  // The job is named after its folder, whose name need not be UTF-8.
   constexpr auto kReplace = nlohmann::json::error_handler_t::replace;
   files.add(cam_file::kReport, report_json(report).dump(1, ' ', false, kReplace) + "\n");
 }

@@ -16,16 +16,15 @@ class PendingFiles;
 struct Prediction;
 struct ReportData;
 
-/// Names of operations, of which those of programs are made, in the order in which a blank takes
-/// them.
+/// Names of operations, used in the names of programs, in the order of cutting.
 inline constexpr std::array<std::string_view, 8> kOperationNames{
     "rough", "semi", "large", "finish", "rest", "cross", "pencil", "outline"};
 
-/// Whether a file is a program as a cut wrote it: under a name that a cut gives, and unchanged
-/// since (check_seal()).
+/// True if a cut wrote this file as a program: its name is one of a cut, and it is unchanged since
+/// (check_seal()).
 bool is_own_program(const std::filesystem::path& path);
 
-/// Whether a file of this name may be one of a cut: a program, a report, a predicted picture.
+/// True if a file of this name may belong to a cut: a program, a report, a predicted picture.
 bool is_name_of_cut(const std::string& name);
 
 /// Programs in a folder that a new cut did not write.
@@ -38,24 +37,24 @@ struct OtherPrograms {
 OtherPrograms other_programs(const std::filesystem::path& folder,
                              std::span<const std::filesystem::path> written);
 
-/// Keeps a cut from replacing what it did not write.
+/// Keeps a cut from replacing files that it did not write.
 /// @param programs  files in the way of programs. @param others  names of its other files.
 /// @throw InputError naming all files that no cut wrote or that were changed since, unless `force`;
-///        and, whatever `force` says, those that are no regular files.
+///        and, regardless of `force`, those that are no regular files.
 void require_replaceable_cut(const std::filesystem::path& folder,
                              std::span<const std::filesystem::path> programs,
                              std::span<const char* const> others, bool force);
 
-/// What a cut writes beside its programs.
+/// Names of the files that a cut writes beside its programs.
 std::vector<const char*> cut_file_names(const CamOptions& options);
 
-/// The milled surface and the pictures.
+/// Adds the milled surface and the pictures.
 void add_prediction_files(const Prediction& prediction, const Lens& lens, PendingFiles& files);
 
-/// The report as page and as JSON.
+/// Adds the report as page and as JSON.
 void add_report_files(const ReportData& report, PendingFiles& files);
 
-/// Removes from a folder what an earlier run predicted.
+/// Removes an earlier run's prediction from a folder.
 void remove_prediction(const std::filesystem::path& folder);
 
 }  // namespace lensforge

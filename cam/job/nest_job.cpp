@@ -29,10 +29,11 @@
 #include "core/text/number_text.h"
 #include "core/text/version.h"
 
-// Every lens has a CutPlan of its own, on a blank of its own: its rectangle and a margin so wide
-// that no roughing breaks out of it, at the height of the common blank. The lenses' blanks overlap;
-// what one lens has cleared of its neighbour's counts as still there. What the programs do to the
-// common blank is looked over as a whole (CollisionCheck), tables, clamps and travel as well.
+// Every lens has its own CutPlan, on its own blank: its rectangle and a margin so wide that no
+// roughing breaks out of it, at the height of the common blank. The lenses' blanks overlap;
+// material that one lens has cleared of its neighbour's counts as still there. The effect of the
+// programs on the common blank is checked as a whole (CollisionCheck), including table, clamps and
+// travel.
 namespace lensforge {
 namespace {
 
@@ -40,11 +41,11 @@ namespace fs = std::filesystem;
 
 using Clock = std::chrono::steady_clock;
 
-/// Cells of the common blank's model, mm, and along its longer side at most.
+/// Cells of the common blank's model, mm, and their maximum number along its longer side.
 constexpr double kStockCell = 0.1;
 constexpr double kMaxCells = 2000.0;
 
-/// What the programs of all lenses are looked over with; blank's frame in x and y, lens's in z.
+/// Common checks of the programs of all lenses; blank's frame in x and y, lens's in z.
 struct CommonBlank {
   CommonBlank(const std::vector<NestLens>& lenses, const NestLayout& layout, const CamOptions& cut,
               double z_offset)
@@ -86,7 +87,7 @@ struct NestStep {
   std::size_t operation = 0;  ///< In the lens's own plan.
 };
 
-/// The moves as they are on the blank.
+/// Moves shifted to their place on the blank.
 MoveSink shifted(const MoveSink& sink, const Eigen::Vector2d& by) {
   return [sink, by, held = std::vector<PathMove>()](std::span<const PathMove> moves) mutable {
     held.assign(moves.begin(), moves.end());
@@ -212,7 +213,7 @@ class Job {
     }
   }
 
-  /// The programs as if they held this lens alone.
+  /// The programs, with this lens's operations alone.
   [[nodiscard]] ProgramFiles programs_of(std::size_t k, const ProgramFiles& all) const {
     ProgramFiles own;
     own.names = all.names;
@@ -238,7 +239,7 @@ class Job {
     return own;
   }
 
-  /// Beside their names.
+  /// Report files under temporary names.
   [[nodiscard]] PendingFiles report_files(std::size_t k, const ProgramFiles& all) {
     CutPlan& plan = *plans_[k];
     const Lens& lens = *lenses_[k].lens;
@@ -283,7 +284,7 @@ class Job {
     }
   }
 
-  /// Empty if the outlines' tool is long enough, or none is cut.
+  /// Advice on the outlines' tool; empty if it is long enough, or none is cut.
   [[nodiscard]] std::string outline_advice() const {
     const auto cut_out = [](const NestedLens& lens) { return lens.cut_out; };
     const auto first = std::find_if(layout_.lenses.begin(), layout_.lenses.end(), cut_out);
@@ -296,7 +297,7 @@ class Job {
     return outline_tool_advice(plan, layout_.blank.z(), {thinner, least});
   }
 
-  /// The old job goes and the new one comes, its reports first and last.
+  /// Deletes the old reports first and publishes the new ones last.
   void publish(PendingPrograms& programs, std::vector<PendingFiles>& files, NestResult& result) {
     std::vector<fs::path> written;
     for (const WrittenProgram& file : programs.programs().files) written.push_back(file.path);
@@ -324,7 +325,7 @@ class Job {
     all.insert(all.end(), some.begin(), some.end());
   }
 
-  /// Reports of an earlier nest, those of lenses that are in this one no more, too.
+  /// Removes reports of an earlier nest, including those of lenses that are no longer in it.
   void remove_older() const {
     if (!written_by_lensforge(folder_ / nest_file::kJson)) return;
     std::error_code none;
@@ -334,7 +335,7 @@ class Job {
       const bool used = std::any_of(lenses_.begin(), lenses_.end(), [&](const NestLens& one) {
         return one.name == entry.path().filename().string();
       });
-      if (!used) fs::remove(entry.path(), none);  // If nothing else is in it.
+      if (!used) fs::remove(entry.path(), none);  // If it is empty.
     }
   }
 

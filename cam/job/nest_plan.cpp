@@ -19,7 +19,7 @@
 namespace lensforge {
 namespace {
 
-/// Rectangles that end where the blank does may overlap by rounding, mm.
+/// Rounding allowed where rectangles end at the blank's edge, mm.
 constexpr double kRounding = 1e-9;
 
 double on_step(double value) { return kNestStep * std::ceil(value / kNestStep - 1e-6); }
@@ -27,14 +27,14 @@ double on_step(double value) { return kNestStep * std::ceil(value / kNestStep - 
 struct Row {
   double low = 0.0;     ///< Least y of its rectangles.
   double height = 0.0;  ///< Of the first one, which is the highest.
-  double end = 0.0;     ///< Greatest x that is taken.
+  double end = 0.0;     ///< Greatest x occupied.
 };
 
 /// All rows, as high as they need to be.
 struct Rows {
   std::vector<Eigen::Vector2d> corners;
-  double width = 0.0;   ///< That the widest rectangle needs of the blank.
-  double height = 0.0;  ///< That all rows need.
+  double width = 0.0;   ///< Required by the widest rectangle.
+  double height = 0.0;  ///< Required by all rows.
 };
 
 Rows stacked(const std::vector<NestItem>& items, const NestSheet& sheet) {
@@ -96,7 +96,7 @@ std::vector<Eigen::Vector2d> place_in_rows(const std::vector<NestItem>& items,
 
 namespace {
 
-/// Indices of refraction that one sheet may stand for, as the reports' check of the material.
+/// Maximum difference of refractive indices on one sheet, as in the reports' check of the material.
 constexpr double kSameIndex = 0.005;
 
 std::string mm(double value) { return trimmed_decimal(value, 3) + " mm"; }
@@ -120,7 +120,7 @@ void require_options(const NestOptions& options) {
   }
 }
 
-/// What lenses of one sheet have in common.
+/// Checks that lenses of one sheet match.
 void require_alike(const std::vector<NestLens>& lenses) {
   if (lenses.empty()) throw InputError("DIR: no lens folder is named; must be one or more");
   const OpticalSetup& first = lenses.front().lens->setup;
@@ -153,7 +153,7 @@ const NestLens& highest_of(const std::vector<NestLens>& lenses) {
   });
 }
 
-/// Of the common blank: as given, or what the highest lens needs. @throw InputError
+/// Thickness of the common blank: as given, or what the highest lens needs. @throw InputError
 double thickness_of(const std::vector<NestLens>& lenses, const NestOptions& options) {
   const double needed = least_thickness(lenses, options);
   const double thickness = options.thickness.value_or(needed);
@@ -164,7 +164,7 @@ double thickness_of(const std::vector<NestLens>& lenses, const NestOptions& opti
                    trimmed_decimal(options.cam.workshop.stock.allowance, 3) + " included");
 }
 
-/// What tools need around every lens, mm.
+/// Room that tools need around every lens, mm.
 struct Room {
   double slot = 0.0;    ///< Width of the cut around lenses; 0 if none is cut out.
   double gap = 0.0;     ///< Between lenses.
@@ -188,7 +188,7 @@ Room room_for(const std::vector<NestLens>& lenses, const NestOptions& options, d
                                  workshop.tool(process.semi.tool).diameter);
   room.gap = std::max(reach + process.clearance, room.slot > 0.0 ? frame + room.slot : 0.0);
   room.edge = std::max(workshop.stock.margin, frame);
-  // A roughing that is nearer to the edge than its tool's radius takes all that is left there.
+  // A roughing closer to the edge than its tool's radius removes the rest there.
   room.margin = std::max({room.edge, frame, reach + widest});
   return room;
 }
@@ -201,7 +201,7 @@ double gap_of(const NestOptions& options, const Room& room) {
                    " mm for the tools, or 0 for that");
 }
 
-/// Of one lens: the shop with clamps where they lie from that lens, and its own blank.
+/// Options of one lens: the workshop with clamps placed relative to that lens, and its own blank.
 CamOptions cut_of(const NestLens& one, const NestOptions& options, const NestedLens& placed,
                   const Room& room, double top) {
   CamOptions cut = options.cam;
@@ -268,7 +268,7 @@ constexpr double kLetters = 0.022;
 constexpr double kLine = 0.002;
 constexpr double kMargin = 0.12;
 
-/// A letter is so many times its height wide, on average.
+/// Mean width of a letter, in heights.
 constexpr double kLetterWidth = 0.6;
 
 std::string number(double value) { return trimmed_decimal(value, 3); }
@@ -277,7 +277,7 @@ std::string attribute(const char* name, double value) {
   return joined({" ", name, "=\"", number(value), "\""});
 }
 
-/// Draws with y up, as the machine has it.
+/// Draws with y up, as on the machine.
 class Drawing {
  public:
   explicit Drawing(const NestLayout& layout)

@@ -9,29 +9,29 @@ namespace lensforge {
 
 struct NestLayout;
 
-/// A rectangle that is to lie on a blank; mm.
+/// A rectangle to be placed on a blank; mm.
 struct NestItem {
   std::string name;
   Eigen::Vector2d size = Eigen::Vector2d::Zero();
 };
 
-/// The blank and what of it has to stay around rectangles; mm.
+/// The blank and the distances to keep around rectangles; mm.
 struct NestSheet {
   Eigen::Vector2d size = Eigen::Vector2d::Zero();
-  double gap = 0.0;   ///< Between rectangles, at least.
-  double edge = 0.0;  ///< Between them and the blank's edge, at least.
+  double gap = 0.0;   ///< Minimum between rectangles.
+  double edge = 0.0;  ///< Minimum to the blank's edge.
 };
 
 /// Places rectangles in rows along x, the highest first, each in the first row that has room for
-/// it; none is turned, since the cut of a turned lens would be another one.
+/// it. None is turned, because a turned lens would be cut differently.
 /// @return their lower left corners from that of the blank, in the order of the items, on whole
 ///         multiples of kNestStep.
-/// @throw InputError naming --blank and a size that would do, if they do not fit.
+/// @throw InputError naming --blank and a size that works, if they do not fit.
 std::vector<Eigen::Vector2d> place_in_rows(const std::vector<NestItem>& items,
                                            const NestSheet& sheet);
 
-/// mm; a whole number of units of any program's last decimal, so that moved numbers are rounded as
-/// they were.
+/// mm; a whole number of units of any program's last decimal, so that shifted numbers round the
+/// same.
 inline constexpr double kNestStep = 0.01;
 
 /// The blank seen from above as SVG: lenses with their names and places, the cut around them,

@@ -17,7 +17,7 @@ namespace {
 
 std::size_t index_of(std::int64_t i) { return static_cast<std::size_t>(i); }
 
-/// Weights of the pixels as deposit_adjoint() wants them, with their sums from the right.
+/// Weights of the pixels for deposit_adjoint(), with their sums from the right.
 class PixelWeights {
  public:
   PixelWeights(std::span<const double> weights, int columns, int rows)
@@ -31,7 +31,7 @@ class PixelWeights {
     }
   }
 
-  /// Σ weight · flux over the pixels that a cell's light lands in.
+  /// Σ weight · flux over the pixels lit by a cell.
   [[nodiscard]] double gather(const SurfaceTile& tile, std::int64_t cell) const {
     const FluxCotangent view{pixel_.data(), suffix_.data(), columns_, rows_};
     double sum = 0.0;
@@ -48,7 +48,7 @@ class PixelWeights {
   std::vector<double> suffix_;
 };
 
-/// Weights of light before an extended source blurs it, of those of the pixels.
+/// Weights of light before the blur of an extended source, from those of the pixels.
 std::vector<double> in_parts(std::span<const double> weights, const SourceKernel& kernel,
                              const Eigen::Vector2i& pixels, const Executor& executor) {
   if (kernel.none()) return {weights.begin(), weights.end()};
@@ -102,7 +102,7 @@ double square_sum(const LeakMap& map, const CellRange& square) {
   return sum;
 }
 
-/// Whether two squares of one size are less than their side apart.
+/// True if two squares of one size are less than their side apart.
 bool are_near(const CellRange& a, const CellRange& b) {
   return std::abs(a.column - b.column) < 2 * a.columns && std::abs(a.row - b.row) < 2 * a.rows;
 }
@@ -123,7 +123,7 @@ std::vector<std::pair<double, CellRange>> ranked_squares(const LeakMap& map, std
   return squares;
 }
 
-/// Worst squares that do leak, apart from one another.
+/// Worst squares that leak, apart from one another.
 std::vector<CellRange> worst_squares(const LeakMap& map, const LeakPlaceOptions& options) {
   std::vector<CellRange> worst;
   for (const auto& [sum, square] : ranked_squares(map, std::max(1, options.span))) {
@@ -169,7 +169,7 @@ class PlaceStudy {
     return render_cells(*surface.field, setup_, cells, executor_, RunControl());
   }
 
-  /// Sets where the square lies, and the middle and height of its worst cell.
+  /// Sets the square's place, and the middle and height of its worst cell.
   void find_spot(const LeakMap& map, const CellRange& square, LeakPlace& place) const {
     const GridWindow& grid = setup_.grid;
     const CellCounts& m = map.grid_cells;
@@ -200,7 +200,7 @@ class PlaceStudy {
     return sum;
   }
 
-  /// Centre of the light that lands where there is a surplus and would not by design.
+  /// Centre of the light that lands in a surplus, contrary to the design.
   [[nodiscard]] Eigen::Vector2d centre(const FluxPicture& now, const FluxPicture& before) const {
     Eigen::Vector2d sum(0.0, 0.0);
     double all = 0.0;

@@ -21,7 +21,7 @@ double mean_of(const Image& target) {
   return target.total() / static_cast<double>(target.values().size());
 }
 
-/// 1 for every pixel of the target that `chosen` takes, 0 for the others.
+/// 1 for every pixel of the target for which `chosen` is true, 0 for the others.
 template <class Chosen>
 std::vector<double> mask_of(const Image& target, const Chosen& chosen) {
   std::vector<double> mask(target.values().size());
@@ -90,8 +90,8 @@ double PictureJudge::dark_ratio(const FluxPicture& picture) const {
 
 namespace {
 
-/// Pictures of every surface of a chain, each rendered once. Steps come first: what they are made
-/// of, among others the designed surface, is then at hand.
+/// Pictures of every surface of a chain, each rendered once. Steps come first: the surfaces that
+/// they are made from, including the designed one, are then cached.
 class ChainPictures {
  public:
   ChainPictures(const LeakageChain& chain, const FieldRenderSetup& setup, const Executor& executor,

@@ -12,7 +12,7 @@
 
 namespace lensforge {
 
-/// Which pixels of a target count as dark and as bright, in shares of its mean.
+/// Limits of a target's dark and bright pixels, as shares of its mean.
 struct LeakageOptions {
   double dark_below = 0.1;   ///< Dark: linear target below it, ≥ 0.
   double bright_from = 1.0;  ///< Bright: linear target from it on, > dark_below.
@@ -21,11 +21,11 @@ struct LeakageOptions {
 /// @throw InputError if dark_below and bright_from break their rules.
 void validate(const LeakageOptions& options);
 
-/// Mean of the bright pixels ÷ mean of the dark ones from its inverse; infinite where the dark ones
-/// get nothing.
+/// Mean of the bright pixels ÷ mean of the dark ones, from its inverse; infinite for dark pixels
+/// without light.
 double contrast_of(double dark_ratio);
 
-/// How good a picture is, against the target and against the designed picture.
+/// Quality of a picture against the target and against the designed picture.
 struct PictureQuality {
   ImageMetrics metrics;     ///< Against the target, with all of the lens's flux as its total.
   double leakage = 0.0;     ///< Σ max(0, g − g_designed) / Σ g_designed over all pixels.
@@ -39,7 +39,7 @@ struct PictureQuality {
 /// has none. @pre equal sizes.
 double leakage_share(const FluxPicture& picture, const FluxPicture& designed);
 
-/// What pictures of a lens are judged by.
+/// Judges pictures of a lens against its target and its designed picture.
 class PictureJudge {
  public:
   /// @param target, designed  of equal sizes; both must outlive the judge.
@@ -63,29 +63,29 @@ class PictureJudge {
   std::vector<double> bright_;
 };
 
-/// A surface with what it is called.
+/// A surface and its name.
 struct NamedSurface {
   std::string name;
   const SurfaceField* field = nullptr;
-  std::optional<GridWindow> grid = {};  ///< It is rendered on, if not on FieldRenderSetup::grid.
+  std::optional<GridWindow> grid = {};  ///< Its own grid; else FieldRenderSetup::grid.
 };
 
 /// Names of the causes in the chain that cam measures.
 namespace leak_cause {
-inline constexpr const char* kSource = "source";  ///< That is no point: in front of the chain.
+inline constexpr const char* kSource = "source";  ///< An extended one: in front of the chain.
 inline constexpr const char* kPolish = "polish";
 inline constexpr const char* kCrease = "crease rounding";
 inline constexpr const char* kScallop = "scallop";
 inline constexpr const char* kChord = "chord";
 inline constexpr const char* kDecimals = "decimals";
-inline constexpr const char* kPitchError = "pitch error";  ///< Where the workshop states one.
+inline constexpr const char* kPitchError = "pitch error";  ///< If the workshop states one.
 }  // namespace leak_cause
 
-/// Surfaces from the designed one to the part, each with one cause of wrong light more than the one
+/// Surfaces from the designed one to the part; each adds one cause of wrong light to the one
 /// before.
 struct LeakageChain {
   NamedSurface designed;
-  std::vector<NamedSurface> steps;   ///< Named after the cause each adds; the last is the part.
+  std::vector<NamedSurface> steps;   ///< Named after the added cause; the last is the part.
   std::vector<NamedSurface> others;  ///< Only rendered and compared.
 
   [[nodiscard]] const NamedSurface& part() const { return steps.back(); }
@@ -98,9 +98,9 @@ struct RenderedSurface {
   PictureQuality quality;
 };
 
-/// What one cause adds to the picture's faults: the difference of two neighbours in the chain. The
-/// parts of a chain sum to the difference of its ends. Contrast is split by its inverse, which
-/// stays finite where the design leaves the dark pixels without any light.
+/// Contribution of one cause to the picture's faults: the difference of two neighbours in the
+/// chain. The parts of a chain sum to the difference of its ends. Contrast is split by its inverse,
+/// which stays finite where the design leaves the dark pixels without light.
 struct CausePart {
   std::string cause;
   double leakage = 0.0;
@@ -108,15 +108,15 @@ struct CausePart {
   double dark_ratio = 0.0;
 };
 
-/// The designed surface in the light of a point, beside the picture in that of an extended source.
+/// The designed surface in the light of a point source, for comparison with an extended one.
 struct PointLight {
   RenderedSurface designed;
-  /// Share of the light that the source's extent moves to where the light of a point puts less.
+  /// Share of the light that the source's extent moves to where a point source puts less.
   double moved = 0.0;
 };
 
-/// The pictures of a chain and what is wrong with them. Leakage is that against the designed
-/// surface in the same light: of an extended source it is what the part adds to the blur.
+/// The pictures of a chain and their faults. Leakage is measured against the designed surface in
+/// the same light: with an extended source it is what the part adds to the blur.
 struct LeakageResult {
   RenderedSurface designed;
   std::optional<PointLight> point;     ///< Where the source is extended.
@@ -130,10 +130,10 @@ struct LeakageResult {
   [[nodiscard]] const RenderedSurface& part() const { return steps.back(); }
 };
 
-/// Renders every surface of a chain and splits the leakage by cause. A surface that stands in the
-/// chain more than once (the same object) is rendered once. Under an extended source the designed
-/// surface is also rendered in the light of a point: what the dark pixels get more is the source's
-/// part.
+/// Renders every surface of a chain and splits the leakage by cause. A surface that occurs in the
+/// chain more than once (the same object) is rendered once. With an extended source the designed
+/// surface is also rendered in the light of a point: the additional light in the dark pixels is the
+/// source's part.
 /// @pre the chain has a designed surface and at least one step; target has the setup's pixels.
 /// @throw InputError if dark_below and bright_from break their rules; Interrupted.
 LeakageResult measure_leakage(const LeakageChain& chain, const Image& target,
@@ -148,17 +148,17 @@ std::vector<double> pixels_with_surplus(const FluxPicture& part, const FluxPictu
 /// the leakage times the designed picture's flux. @pre equal sizes.
 std::vector<double> surplus(const FluxPicture& part, const FluxPicture& designed);
 
-/// How far half the spacing of the samples would move the figures of a part: about their error.
+/// Estimated change of a part's figures at half the sample spacing: about their error.
 struct SamplingCheck {
   double spacing = 0.0;  ///< Of the samples, mm.
   double leakage = 0.0;  ///< Of the part at half the spacing − as measured; estimated.
-  double mae = 0.0;      ///< Likewise of its display-encoded mean absolute error.
+  double mae = 0.0;      ///< The same for its display-encoded mean absolute error.
 };
 
-/// Renders kSamplingWindows² windows that lie evenly over the lens with half the spacing and
-/// extrapolates what that changes to the whole lens. Costs about a fifth of the two surfaces'
-/// pictures for 128² pixels and less for more.
-/// @param designed, part  the first and the last surface of the chain that `result` is of.
+/// Renders kSamplingWindows² windows, evenly spaced over the lens, at half the spacing and
+/// extrapolates the change to the whole lens. Costs about a fifth of the two surfaces' pictures for
+/// 128² pixels and less for more.
+/// @param designed, part  the first and the last surface of the chain behind `result`.
 /// @param target  with the setup's pixels.
 /// @throw Interrupted.
 SamplingCheck check_sampling(const SurfaceField& designed, const SurfaceField& part,
@@ -166,11 +166,11 @@ SamplingCheck check_sampling(const SurfaceField& designed, const SurfaceField& p
                              const FieldRenderSetup& setup, const Executor& executor,
                              const RunControl& control);
 
-/// Windows along a side of the lens.
+/// Number of windows along a side of the lens.
 inline constexpr int kSamplingWindows = 6;
 
-/// Side of a window, in pixels as wide as if lens and picture were one: only pixels whose light
-/// comes from the window as a whole tell what leaks.
+/// Side of a window, in pixels as if lens and picture had the same size: only pixels whose light
+/// comes entirely from the window show the leakage.
 inline constexpr double kWindowPixels = 4.0;
 
 }  // namespace lensforge

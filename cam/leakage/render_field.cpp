@@ -31,7 +31,7 @@ OpticalSetup FieldRenderSetup::optics_in_parts(const SourceKernel& kernel) const
 
 namespace {
 
-/// Adds what a loaded tile sends to the screen in light of every colour.
+/// Adds the picture of a loaded tile in light of every colour.
 void add_colors(SurfaceTile& tile, const FieldRenderSetup& setup,
                 const std::vector<LightColor>& colors, const Executor& executor, FluxImage& image) {
   for (std::size_t color = 0; color < colors.size(); ++color) {

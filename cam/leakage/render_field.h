@@ -16,62 +16,61 @@
 
 namespace lensforge {
 
-/// What a surface projects onto the picture: share of the lens's flux per pixel, row by row from
-/// the top.
+/// Picture that a surface projects: share of the lens's flux per pixel, row by row from the top.
 struct FluxPicture {
   int columns = 0;
   int rows = 0;
   std::vector<double> flux;
 
-  /// Share of the flux that lands on the picture at all.
+  /// Share of the flux that lands on the picture.
   [[nodiscard]] double inside() const;
-  /// The picture with `total` as the sum that all of the lens's flux would have.
+  /// The picture scaled so that all of the lens's flux sums to `total`.
   [[nodiscard]] Image image(double total) const;
 };
 
-/// What every surface of a lens is rendered with.
+/// Common settings for rendering the surfaces of a lens.
 struct FieldRenderSetup {
   OpticalSetup optics;
   GridWindow grid;          ///< Over the whole lens, see lens_grid().
-  std::int64_t tile = 768;  ///< Side of the tiles that are sampled at once, cells: 30 MB.
-  /// LightPath::intake() of the whole surface, mm², in each of light_colors(); empty takes the
-  /// grid's area, that of light along z.
+  std::int64_t tile = 768;  ///< Side of the tiles sampled at once, cells: 30 MB.
+  /// LightPath::intake() of the whole surface, mm², in each of light_colors(); if empty, the grid's
+  /// area, that of light along z.
   std::vector<double> whole{};
-  /// About where the surface is, mm: the image of an extended source is taken from there.
+  /// Approximate height of the surface, mm, for the image of an extended source.
   double surface_height = 0.0;
 
   [[nodiscard]] double whole_in(std::size_t color) const {
     return whole.empty() ? 0.0 : whole[color];
   }
 
-  /// What an extended source makes of the light of a point.
+  /// Blur of an extended source against a point.
   [[nodiscard]] SourceKernel blur() const { return source_kernel(optics, surface_height); }
-  /// The optics with the picture in the parts of pixels that the blur wants.
+  /// The optics with pixels divided as the blur requires.
   [[nodiscard]] OpticalSetup optics_in_parts(const SourceKernel& kernel) const;
 };
 
 /// Renders a surface tile by tile: memory does not grow with the grid. Every image triangle is
-/// deposited exactly (design/flux); what is neglected is how the slope bends inside a triangle.
+/// deposited exactly (design/flux); only the curvature of the slope inside a triangle is neglected.
 /// Under an extended source the picture is blurred as the optimiser does it, see source_kernel();
-/// of a spectrum it is the sum of the colours' pictures. Same bits for any tile and any number of
+/// for a spectrum it is the sum of the colours' pictures. Same bits for any tile and any number of
 /// threads.
 /// @throw Interrupted if `control` or the executor asks for an end.
 FluxPicture render_field(const SurfaceField& field, const FieldRenderSetup& setup,
                          const Executor& executor, const RunControl& control);
 
-/// Told of every tile that a surface was sampled in; the patch has a node more around it where
+/// Called for every sampled tile of a surface; the patch includes one more node around it where
 /// there is one.
 using TileObserver =
     std::function<void(const SurfaceField&, const CellRange&, const SurfacePatch&)>;
 
-/// Renders several surfaces, tile by tile each tile of all of them in order, so that surfaces which
-/// are made from one another can share samples (HeldField). One picture per surface, with the bits
-/// that it has alone.
+/// Renders several surfaces tile by tile, each tile for all of them in order, so that surfaces made
+/// from one another can share samples (HeldField). One picture per surface, with the same bits as
+/// when rendered alone.
 std::vector<FluxPicture> render_fields(std::span<const SurfaceField* const> fields,
                                        const FieldRenderSetup& setup, const Executor& executor,
                                        const RunControl& control, const TileObserver& observe = {});
 
-/// What a part of the lens projects, as shares of the whole lens's flux.
+/// Picture that a part of the lens projects, as shares of the whole lens's flux.
 FluxPicture render_cells(const SurfaceField& field, const FieldRenderSetup& setup,
                          const CellRange& cells, const Executor& executor,
                          const RunControl& control);

@@ -90,8 +90,8 @@ void SurfaceTile::sharpen_landing(const Executor& executor) {
   landing_.swap(sharpened_);
 }
 
-/// Derivative of the slope along one axis, from the neighbours on the same cut; zero where there
-/// are none, so that the node's own beam is kept.
+/// Derivative of the slope along one axis, from neighbours on the same cut; zero without any, which
+/// keeps the node's own beam.
 Eigen::Vector2d SurfaceTile::bend_along(std::size_t node, std::int64_t step, bool has_before,
                                         bool has_after) const {
   const auto offset = static_cast<std::size_t>(step);

@@ -25,8 +25,8 @@ namespace lensforge {
 // Light of a grid triangle that a crease runs through.
 //
 // Notation: a *side* is the smooth piece of surface that a corner belongs to, continued to second
-// order around that corner; x_k where sides k and k + 1 meet on the edge between their corners; m
-// a point inside the triangle where all sides meet.
+// order around that corner; x_k the point where sides k and k + 1 meet on the edge between their
+// corners; m a point inside the triangle where all sides meet.
 
 /// The surface around a node, continued as if there were no crease.
 struct SurfaceSide {
@@ -48,9 +48,9 @@ struct SurfaceSide {
   }
 };
 
-/// Where the ray of a surface point of height z and the given slope lands, in pixel coordinates;
-/// NaN if the light is reflected totally.
-/// @param known  LightPath::enter() of the point, if it has been found before.
+/// Landing place of the ray from a surface point of height z and the given slope, in pixel
+/// coordinates; NaN if the light is reflected totally.
+/// @param known  LightPath::enter() of the point, if already known.
 inline Eigen::Vector2d land_of(const LightPath& light, const Eigen::Vector2d& place, double z,
                                const Eigen::Vector2d& slope, const IncidentRay* known = nullptr) {
   const Eigen::Vector3d n = Eigen::Vector3d(-slope.x(), -slope.y(), 1.0).normalized();
@@ -61,16 +61,16 @@ inline Eigen::Vector2d land_of(const LightPath& light, const Eigen::Vector2d& pl
   return light.land(p, light.beam(p, n, known).m);
 }
 
-/// Where two sides meet between their nodes, as a share of the way from a to b.
+/// Meeting point of two sides between their nodes, as a share of the way from a to b.
 inline double meeting_share(const SurfaceSide& a, const SurfaceSide& b) {
   return meeting_share(b.height_at(a.place) - a.z, b.z - a.height_at(b.place));
 }
 
-/// Hands the image triangles of a surface triangle whose corners lie on different cuts to `sink`:
+/// Passes the image triangles of a surface triangle whose corners lie on different cuts to `sink`:
 /// every corner keeps the quadrilateral (corner, x_k, m, x_k−1) of its own side, whose points land
-/// where that side's own slope sends them. Each side's light stays on its side, and the pieces
-/// cover the triangle exactly: nothing is projected between the two landing places.
-/// @param lens_area  mm², of the grid; fluxes are shares of the light that it takes.
+/// according to that side's slope. Each side's light stays on its side, and the pieces cover the
+/// triangle exactly: nothing is projected between the two landing places.
+/// @param lens_area  mm², of the grid; fluxes are shares of the light on it.
 template <class Sink>
 void split_at_crease(const std::array<SurfaceSide, 3>& sides, const LightPath& light,
                      double lens_area, const Sink& sink) {
@@ -104,16 +104,15 @@ void split_at_crease(const std::array<SurfaceSide, 3>& sides, const LightPath& l
   }
 }
 
-/// Whether a node of a grid has neighbours on both sides along x and along y.
+/// True for each axis along which a node of a grid has neighbours on both sides.
 struct InnerNode {
   bool column = true;
   bool row = true;
 };
 
-/// Where a node's beam is to land so that beams between the nodes, which land linear between
-/// theirs, do right on average over the triangles: v − Δ/24, Δ being the sum of the second
-/// differences along the three directions of the triangles' edges. Its own place where a neighbour
-/// has none.
+/// Landing place for a node's beam such that the beams between nodes, interpolated linearly, are
+/// right on average over the triangles: v − Δ/24, Δ being the sum of the second differences along
+/// the three directions of the triangles' edges. Unchanged where a neighbour has none.
 /// @param columns  of the grid, row by row.
 inline Eigen::Vector2d sharp_landing(const std::vector<Eigen::Vector2d>& landing, std::size_t node,
                                      std::int64_t columns, InnerNode inner = {}) {
@@ -129,28 +128,28 @@ inline Eigen::Vector2d sharp_landing(const std::vector<Eigen::Vector2d>& landing
   return landing[node] - bends / 24.0;
 }
 
-/// The image triangles of a rectangle of a sampled surface: two a cell, their corners where the
-/// refracted ray of the node's own slope lands; a triangle across a crease (nodes of different
+/// The image triangles of a rectangle of a sampled surface: two per cell, with their corners where
+/// the refracted rays of the nodes' own slopes land. A triangle across a crease (nodes of different
 /// SurfacePatch::cut) is split by split_at_crease(). On a surface without creases corners are moved
-/// a little, see sharpen_landing(). Outside of the lens's outline there is no light; a triangle
-/// across it sends the parts inside, exactly, or, across a crease too, that share of all of its
-/// light. Keeps its buffers between tiles.
+/// slightly, see sharpen_landing(). There is no light outside of the lens's outline: a triangle
+/// across it projects exactly its inner parts or, if a crease also crosses it, that share of all of
+/// its light. Keeps its buffers between tiles.
 class SurfaceTile {
  public:
   /// @param grid   the whole lens.
-  /// @param whole  light that it takes, mm², of which fluxes are shares; 0: its area, as far as
-  ///               light passes.
+  /// @param whole  light on the lens, mm², of which fluxes are shares; 0: the grid's area, as far
+  ///               as light passes.
   SurfaceTile(const OpticalSetup& setup, const GridWindow& grid, double whole = 0.0);
 
   /// Samples the surface over `range` with one more node on every side where the grid has one, so
   /// that creases on the tile's rim are split as they are inside.
   void load(const SurfaceField& field, const CellRange& range, const Executor& executor);
-  /// Puts what was loaded, and what will be, into other light, of another colour say.
-  /// @param whole  as of the constructor.
+  /// Puts the loaded and all later tiles into other light, such as another colour.
+  /// @param whole  as in the constructor.
   void relight(const OpticalSetup& setup, double whole, const Executor& executor);
 
   [[nodiscard]] const CellRange& range() const { return range_; }
-  /// What was sampled.
+  /// The sampled nodes.
   [[nodiscard]] const SurfacePatch& patch() const { return patch_; }
   [[nodiscard]] std::int64_t cells() const { return range_.columns * range_.rows; }
 
@@ -168,7 +167,7 @@ class SurfaceTile {
     return side_of_cell(cell) != OutlineIndex::Side::kOutside;
   }
 
-  /// Hands the image triangles of a cell, counted row by row, to `sink`.
+  /// Passes the image triangles of a cell, counted row by row, to `sink`.
   template <class Sink>
   void visit_cell(std::int64_t cell, const Sink& sink) const {
     if (!is_lit(cell)) return;
@@ -200,7 +199,7 @@ class SurfaceTile {
       split_at_crease({side_of(a), side_of(b), side_of(c)}, light_, lens_area_, sink);
     }
   }
-  /// A triangle that the outline may cut.
+  /// Visits a triangle that the outline may cut.
   template <class Sink>
   void visit_rim(std::size_t a, std::size_t b, std::size_t c, const Sink& sink) const {
     const std::vector<TrianglePiece> pieces =
@@ -230,8 +229,8 @@ class SurfaceTile {
   }
   /// Moves the corners so that triangles land in the right place on average.
   ///
-  /// Between nodes the landing place v is taken as linear, which blurs it by the box spline of the
-  /// triangulation: what a wave of six nodes across scallops moves light by comes out 9 % too
+  /// Between nodes the landing place v is interpolated linearly, which blurs it by the box spline
+  /// of the triangulation: the light moved by a wave of six nodes across scallops comes out 9 % too
   /// small. v − Δ/24, with Δ the sum of the second differences of v along the three edges of the
   /// triangles, cancels that to second order in the spacing: 1 % is left.
   void sharpen_landing(const Executor& executor);
@@ -255,7 +254,7 @@ class SurfaceTile {
   SurfacePatch patch_;
   std::vector<IncidentRay> entries_;        ///< One per node in light that varies, else none.
   std::vector<Eigen::Vector2d> landing_;    ///< One per node, pixel coordinates; NaN without light.
-  std::vector<Eigen::Vector2d> sharpened_;  ///< What becomes of it; kept for its memory.
+  std::vector<Eigen::Vector2d> sharpened_;  ///< Next landing_; kept for its memory.
 };
 
 }  // namespace lensforge

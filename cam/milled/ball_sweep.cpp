@@ -23,7 +23,7 @@ Eigen::Vector3d direction_at(const Arc& arc, double part) {
   return direction;
 }
 
-/// So many chords stay within kHelixError of a helix: a chord of angle φ is off by r φ²/8.
+/// Number of chords that stay within kHelixError of a helix: a chord of angle φ is off by r φ²/8.
 int chords_of(const Arc& helix) {
   const double angle = std::sqrt(8.0 * BallPath::kHelixError / helix.radius);
   return std::max(1, static_cast<int>(std::ceil(std::abs(helix.sweep) / angle)));
@@ -102,7 +102,7 @@ void BallPath::add_move(BallMove move, const Eigen::Vector3d& begin, const Eigen
 bool BallPath::begins_piece(const BallMove& move, const Tangent& begin, const Tangent& end,
                             double length) const {
   if (moves_.empty()) return true;
-  constexpr double kBroken = 0.01;  // mm: what an arc's end may be off its circle is no break.
+  constexpr double kBroken = 0.01;  // mm: the error of an arc's end against its circle is no break.
   if ((move.start - moves_.back().end).norm() > kBroken) return true;
   constexpr double kTurned = 0.5;  // cos 60°
   if (piece_heading_.dot(begin.heading) < kTurned || piece_heading_.dot(end.heading) < kTurned) {
@@ -113,8 +113,8 @@ bool BallPath::begins_piece(const BallMove& move, const Tangent& begin, const Ta
   return bend > kRidgeAngle || bend * (radius_ + kRidgeRadius) > way;
 }
 
-/// True for an arc that lies above its centre and is about as tight as the ball: what the ball
-/// leaves under it is next to nothing, the ridge itself.
+/// True for an arc above its centre that is about as tight as the ball: what the ball leaves under
+/// it is almost only the ridge itself.
 bool BallPath::rolls_over_ridge(const BallMove& move) const {
   if (move.arc < 0) return false;
   const Arc& arc = arcs_[static_cast<std::size_t>(move.arc)];
@@ -123,7 +123,7 @@ bool BallPath::rolls_over_ridge(const BallMove& move) const {
 
 namespace {
 
-/// The deepest of the balls offered.
+/// The deepest of several balls.
 struct Deepest {
   double radius, x, y;
   Eigen::Vector3d centre;
@@ -178,10 +178,10 @@ std::optional<GraphArc> ArcSweep::graph(double radius) const {
   return arc;
 }
 
-/// Zeros of the derivative. In a horizontal plane: the point of the circle that is nearest to q. In
-/// a vertical one: the line from the arc's centre through the ball's meets the circle of radius r
-/// at a right angle, so q lies under the ball at the distance ρ + r from the arc's centre where the
-/// way runs below it, and at ρ − r where it runs above; the ball is ρ/(ρ ± r) as far out as q.
+/// Zeros of the derivative. In a horizontal plane: the point of the circle nearest to q. In a
+/// vertical one: the line from the arc's centre through the ball's meets the circle of radius r at
+/// a right angle, so q lies under the ball at the distance ρ + r from the arc's centre where the
+/// path runs below it, and at ρ − r where it runs above; the ball is ρ/(ρ ± r) as far out as q.
 Eigen::Vector3d ArcSweep::centre(double radius, double qx, double qy) const {
   const Eigen::Vector3d start = point(begin_.x(), begin_.y());
   Deepest deepest{radius, qx, qy, start, ball_below(start, radius, qx, qy)};

@@ -17,7 +17,7 @@ namespace lensforge {
 /// The part of an arc between two shares of its sweep, without its rise.
 Arc part_of(const Arc& arc, double from, double to);
 
-/// A straight or circular way of the ball's centre; mm, lens frame.
+/// A straight or circular move of the ball's centre; mm, lens frame.
 struct BallMove {
   Eigen::Vector3d start = Eigen::Vector3d::Zero();
   Eigen::Vector3d end = Eigen::Vector3d::Zero();
@@ -25,12 +25,13 @@ struct BallMove {
   std::int32_t arc = -1;   ///< In BallPath::arcs(); −1 for a straight move.
 };
 
-/// All motions of a program's ball-end mill as ways of the ball's centre.
+/// All motions of a program's ball-end mill as moves of the ball's centre.
 ///
-/// Moves are numbered by pieces, each of which leaves one smooth strip: a new one begins where the
-/// path is broken, where its heading has turned by more than 60° since the piece began (the next
-/// row of a raster), and where it goes over a ridge, that is turns downwards by more than
-/// kRidgeAngle at once or as sharply as a ball that rolls over a ridge of radius kRidgeRadius.
+/// Moves are numbered by pieces, each of which leaves one smooth strip. A new piece begins where
+/// the path is interrupted, where its heading has turned by more than 60° since the piece began
+/// (the next row of a raster), and where it goes over a ridge: where it turns downwards by more
+/// than kRidgeAngle at once, or as sharply as a ball that rolls over a ridge of radius
+/// kRidgeRadius.
 class BallPath {
  public:
   static constexpr double kRidgeAngle = 0.01;   ///< rad
@@ -40,13 +41,13 @@ class BallPath {
   /// @param z_offset  program Z − lens-frame z, mm.
   BallPath(double radius, double z_offset);
 
-  /// Appends a motion of the tool's tip as the program has it. Arcs become sub-arcs of at most a
+  /// Appends a motion of the tool's tip in program coordinates. Arcs become sub-arcs of at most a
   /// third of a turn, helices chords within kHelixError of them.
   void add(const GcodeMotion& motion);
 
   [[nodiscard]] double radius() const { return radius_; }
   [[nodiscard]] const std::vector<BallMove>& moves() const { return moves_; }
-  /// Of the moves that are not straight: of the ball's centre, rise 0.
+  /// Arcs of the ball's centre for the moves that are not straight; rise 0.
   [[nodiscard]] const std::vector<Arc>& arcs() const { return arcs_; }
   /// Pieces are numbered 0 … pieces() − 1.
   [[nodiscard]] std::int32_t pieces() const { return piece_ + 1; }
@@ -54,7 +55,7 @@ class BallPath {
   static constexpr double kHelixError = 1e-6;  ///< mm
 
  private:
-  /// The way's direction where it begins or ends.
+  /// Direction of the path at an end of a move.
   struct Tangent {
     Eigen::Vector2d heading = Eigen::Vector2d::Zero();  ///< Unit; zero for straight up or down.
     double incline = 0.0;                               ///< Angle above the horizontal, rad.
@@ -69,7 +70,7 @@ class BallPath {
   [[nodiscard]] bool rolls_over_ridge(const BallMove& move) const;
 
   double radius_;
-  double lift_;  ///< From the tip as written to the ball's centre, mm.
+  double lift_;  ///< From the programmed tip to the ball's centre, mm.
   std::vector<BallMove> moves_;
   std::vector<Arc> arcs_;
   std::int32_t piece_ = -1;
@@ -81,14 +82,14 @@ class BallPath {
 
 // The lower envelope of a ball that is swept along one move.
 //
-// Notation: R ball radius, c(s) way of its centre, q a place seen from above. The ball cuts down
+// Notation: R ball radius, c(s) path of its centre, q a place seen from above. The ball cuts down
 // to
 //     z(q) = min over s of  c.z(s) − √(R² − |q − c.xy(s)|²).
-// The minimum lies at an end of the way or where the derivative is zero; the surface's normal
-// there is the ball's, (c − (q, z))/R. In a vertical plane at the distance w from that of the way
+// The minimum lies at an end of the path or where the derivative is zero; the surface's normal
+// there is the ball's, (c − (q, z))/R. In a vertical plane at the distance w from that of the path
 // the ball is a circle of radius r = √(R² − w²).
 
-/// Height where a ball does not pass over.
+/// Height of a place over which no ball passes.
 inline constexpr double kUncut = std::numeric_limits<double>::infinity();
 
 /// Height of the lower side of a ball around `centre` over q; kUncut outside of it.
@@ -143,7 +144,7 @@ struct StraightSweep {
     return {x + s * ux, y + s * uy, z + s * slope};
   }
 
-  /// What ball_below() gives for that ball over places of a line along x, with the same bits and
+  /// Values of ball_below() for that ball over places of a line along x, with the same bits and
   /// without a branch. @param room  below 0 where the ball does not pass over.
   template <class Places, class Values>
   void below(double radius, double qy, const Places& qx, Values& room, Values& height) const {
@@ -157,22 +158,22 @@ struct StraightSweep {
   }
 };
 
-/// A circular move in a vertical plane along an axis that is a graph over that axis and bends less
-/// than the ball, prepared: finishing rows have no others.
+/// A prepared circular move in a vertical plane along an axis, which is a graph over that axis and
+/// has a smaller curvature than the ball. All arcs of finishing rows are such moves.
 ///
-/// Where z's derivative along the way is zero, the way bends down by 1/ρ at most and the ball's
-/// lower side up by 1/r ≥ 1/R > 1/ρ, so that z is least there, and there alone: the zero, clamped
-/// to the move, is the minimum. The line from the arc's centre through the ball's meets the circle
-/// of radius r at a right angle, so that q lies under the ball at the distance ρ − r from the arc's
+/// Where z's derivative along the path is zero, the path bends down by at most 1/ρ and the ball's
+/// lower side up by 1/r ≥ 1/R > 1/ρ, so this is the only minimum of z: the zero, clamped to the
+/// move, is the minimum. The line from the arc's centre through the ball's meets the circle of
+/// radius r at a right angle, so that q lies under the ball at the distance ρ − r from the arc's
 /// centre on a cap and at ρ + r in a bowl.
 struct GraphArc {
   bool along_x = true;
   double x = 0.0, y = 0.0, z = 0.0;  ///< Centre.
   double rho = 0.0;                  ///< Radius.
   double side = 1.0;                 ///< 1 for a cap, −1 for a bowl.
-  double low = 0.0, high = 0.0;      ///< Where the move ends, along its axis from the centre.
+  double low = 0.0, high = 0.0;      ///< Ends of the move, along its axis from the centre.
 
-  /// Along the axis, from the arc's centre: where the ball is that cuts deepest over q.
+  /// Place of the ball that cuts deepest over q, along the axis from the arc's centre.
   [[nodiscard]] double foot(double radius, double qx, double qy) const {
     const double across = along_x ? qy - y : qx - x;
     const double out = along_x ? qx - x : qy - y;
@@ -185,8 +186,8 @@ struct GraphArc {
     return {along_x ? x + h : x, along_x ? y : y + h, top};
   }
 
-  /// Likewise over places of a line along the axis.
-  /// @param across  the places' other coordinate. @param out  theirs along the axis.
+  /// The same as StraightSweep::below(), over places of a line along the axis.
+  /// @param across  the places' other coordinate. @param out  their coordinates along the axis.
   template <class Places, class Values>
   void below(double radius, double across, const Places& out, Values& room, Values& height) const {
     const double beside = across - (along_x ? y : x);
@@ -208,7 +209,8 @@ class ArcSweep {
   /// The arc as a GraphArc, if it is one for a ball of this radius.
   [[nodiscard]] std::optional<GraphArc> graph(double radius) const;
 
-  /// Centre of the ball that cuts deepest over q; where none does, one that does not either.
+  /// Centre of the ball that cuts deepest over q; if none cuts there, that of any ball that does
+  /// not.
   [[nodiscard]] Eigen::Vector3d centre(double radius, double qx, double qy) const;
 
  private:

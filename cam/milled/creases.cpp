@@ -15,13 +15,13 @@
 namespace lensforge {
 namespace {
 
-/// What two nodes beside a crease are raised by, mm.
+/// Excess heights of two nodes beside a crease, mm.
 struct NodePair {
   double first = 0.0;
   double second = 0.0;
 };
 
-/// Jumps whose parts along x and y are this alike lie along y, whatever rounding says: diagonals of
+/// Jumps whose x and y parts are this close count along y, regardless of rounding: diagonals of
 /// square meshes.
 constexpr double kTie = 1.0 + 1e-6;
 
@@ -35,14 +35,14 @@ class NodeLine {
         count_(axis == 0 ? patch.window.columns : patch.window.rows),
         spacing_(patch.window.spacing[axis]) {}
 
-  /// What a node is raised by. @param at  from the line's begin. @param node  index in the patch.
+  /// Excess height of a node. @param at  from the line's begin. @param node  index in the patch.
   [[nodiscard]] double rise(std::int64_t at, std::int64_t node) const {
     if (at == 0 || at + 1 == count_) return 0.0;
     return beside_crease(at - 1, node - step_).second + beside_crease(at, node).first;
   }
 
  private:
-  /// For the crease, if there is one, between a node and the next.
+  /// Excess at the crease, if there is one, between a node and the next.
   [[nodiscard]] NodePair beside_crease(std::int64_t at, std::int64_t node) const {
     if (at == 0 || at + 2 == count_ || cut(node) == cut(node + step_)) return {};
     const std::int64_t next = node + step_;
@@ -74,7 +74,7 @@ class NodeLine {
   [[nodiscard]] double across(std::int64_t node) const {
     return value(axis_ == 0 ? patch_.slope_y : patch_.slope_x, node);
   }
-  /// Derivative of the slope between two nodes; none between two pieces.
+  /// Derivative of the slope between two nodes; nothing across two pieces.
   [[nodiscard]] std::optional<double> bend(std::int64_t first, std::int64_t second) const {
     if (cut(first) != cut(second)) return std::nullopt;
     return (slope(second) - slope(first)) / spacing_;
@@ -134,8 +134,8 @@ std::int64_t CreaseMapper::cell_at(double at, int axis) const {
   return std::min(cell, (axis == 0 ? columns_ : rows_) - 1);
 }
 
-/// Tiles share their rims: the first row and column count only where the grid begins. Rows of the
-/// map are filled at once, each by one thread.
+/// Tiles share their rims: the first row and column count only at the grid's border. Rows of the
+/// map are filled in parallel, each by one thread.
 void CreaseMapper::add(const CellRange& tile, const SurfacePatch& patch, const Executor& executor) {
   const GridWindow& window = patch.window;
   // The tile's first node, counted in the patch.
@@ -191,7 +191,7 @@ CreaseMap CreaseMapper::map() const {
   return map;
 }
 
-/// Deepest spots first, none near another.
+/// Deepest spots first, none close to another.
 std::vector<CreaseSpot> CreaseMapper::worst() const {
   std::vector<CreaseSpot> spots;
   for (const Cell& cell : cells_) {

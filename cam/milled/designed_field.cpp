@@ -17,11 +17,11 @@
 namespace lensforge {
 namespace {
 
-/// Nodes along either side of the blocks that are filled at once.
+/// Nodes along either side of the blocks that are filled together.
 constexpr std::int64_t kBlockSide = 64;
 
-/// Nodes this far outside of a facet, in units of its height over an edge, count as on it, so that
-/// no gap opens between neighbours.
+/// Nodes this far outside of a facet, as a share of its height over an edge, count as on it, so
+/// that no gap opens between neighbours.
 constexpr double kOnFacet = 1e-9;
 
 /// One facet seen from above.
@@ -55,7 +55,7 @@ struct Facet {
     return corner.z() + slope.x() * (x - corner.x()) + slope.y() * (y - corner.y());
   }
 
-  /// How far a point lies beyond the line through an edge at most, mm; ≤ 0 inside.
+  /// Maximum distance of a point beyond the line through an edge, mm; ≤ 0 inside.
   [[nodiscard]] double outside(double x, double y) const {
     const Eigen::Vector3d at = barycentric(x, y);
     return (-at.array() / gradient.rowwise().norm().array()).maxCoeff();
@@ -79,7 +79,7 @@ struct NodeBlock {
   std::int64_t column, column_end, row, row_end;
 };
 
-/// A facet's own points.
+/// The facet itself as a surface.
 struct FlatFacet {
   const Facet& facet;
 
@@ -88,7 +88,7 @@ struct FlatFacet {
   }
 };
 
-/// A surface without creases over a facet: of its cubics, those that are asked for.
+/// A surface without creases over a facet; makes its cubics on demand.
 class SmoothFacet {
  public:
   SmoothFacet(const OpticalSurface& surface, const Facet& facet, std::int32_t triangle)
@@ -96,7 +96,7 @@ class SmoothFacet {
     for (int k = 0; k < 3; ++k) corners_.col(k) = surface.mesh().corner(triangle, k).head<2>();
   }
 
-  /// Beside the facet: on the tangent plane of the nearest point of its rim, about.
+  /// Beside the facet: on the tangent plane at about the nearest point of its rim.
   [[nodiscard]] SurfacePoint operator()(const Eigen::Vector2d& q) {
     Eigen::Vector3d weights = facet_.barycentric(q.x(), q.y()).cwiseMax(0.0);
     weights /= weights.sum();
@@ -108,7 +108,8 @@ class SmoothFacet {
   }
 
  private:
-  /// The cubic of the points whose weight of `corner` is least, found from the middle of its third.
+  /// The cubic for points whose weight of `corner` is smallest, determined at the middle of its
+  /// third.
   [[nodiscard]] const SmoothPatch& patch(int corner) {
     std::optional<SmoothPatch>& patch = patches_[static_cast<std::size_t>(corner)];
     if (!patch) {
@@ -126,8 +127,8 @@ class SmoothFacet {
   std::array<std::optional<SmoothPatch>, 3> patches_;
 };
 
-/// Finds the facet of every node of a block and the point over it: `surface(facet, triangle)` makes
-/// what gives the points of a facet.
+/// Finds the facet of every node of a block and the point over it: `surface(facet, triangle)`
+/// returns a functor that gives the points of a facet.
 template <class Surface>
 class BlockFiller {
  public:

@@ -8,14 +8,14 @@
 
 namespace lensforge {
 
-/// The facets of a mesh as they are; `cut` is the number of the facet, the lowest one on a seam.
+/// The facets of a mesh, not smoothed; `cut` is the number of the facet, the lowest one on a seam.
 /// Nodes beside the mesh, up to FacetGrid::kRim, lie on the plane of the nearest facet.
 class FacetField final : public SurfaceField {
  public:
   /// @param mesh  must outlive the field. @pre every triangle faces +z, and there is one.
   explicit FacetField(const SurfaceMesh& mesh) : grid_(mesh) {}
 
-  /// @throw InputError naming a node that is farther than that from the mesh.
+  /// @throw InputError naming a node farther from the mesh than FacetGrid::kRim.
   void sample(const GridWindow& window, const Executor& executor,
               SurfacePatch& patch) const override;
 
@@ -32,7 +32,7 @@ class SmoothField final : public SurfaceField {
   /// @param surface  must outlive the field. @pre not surface.has_creases()
   explicit SmoothField(const OpticalSurface& surface) : surface_(surface), grid_(surface.mesh()) {}
 
-  /// @throw InputError naming a node that is farther than that from the mesh.
+  /// @throw InputError naming a node farther from the mesh than FacetGrid::kRim.
   void sample(const GridWindow& window, const Executor& executor,
               SurfacePatch& patch) const override;
 

@@ -17,18 +17,18 @@
 namespace lensforge {
 namespace {
 
-/// Nodes along either side of the blocks that are cut at once. On the benchmark's raster at 10 µm
-/// (MilledNodes) 16 is best.
+/// Nodes along either side of the blocks that are cut together; 16 is fastest on the benchmark's
+/// raster at 10 µm (MilledNodes).
 constexpr std::int64_t kBlockSide = 16;
 constexpr std::size_t kBlockNodes = kBlockSide * kBlockSide;
 
 /// Side of the cells that spans are sorted into, in radii.
 constexpr double kCellPerRadius = 0.5;
 
-/// Cells of a grid at most, but for four a move: memory stays in proportion.
+/// Maximum number of cells of a grid, unless four per move are more: bounds memory.
 constexpr double kMaxCells = 4e6;
 
-/// Far above the rounding of a height, mm: passing a span over never changes a bit of the result.
+/// Far above the rounding of a height, mm: skipping a span never changes a bit of the result.
 constexpr double kBoundMargin = 1e-9;
 
 /// Far above the rounding of a span's box to single precision, mm.
@@ -61,7 +61,7 @@ double cell_of(const BallPath& path) {
 
 }  // namespace
 
-/// Slopes that moves leave. Nodes beside each other mostly ask for the same one.
+/// Cache of slopes that moves leave: neighbouring nodes mostly need the same one.
 class MilledField::MoveSlopes {
  public:
   explicit MoveSlopes(const std::vector<BallPath>& paths) : paths_(paths) {}
@@ -105,7 +105,7 @@ struct MilledField::NodeRange {
   std::pair<std::int64_t, std::int64_t> rows;
 };
 
-/// Nodes of a window that are cut at once, and what has cut them deepest so far.
+/// Nodes of a window that are cut together, and the deepest cut at each so far.
 struct MilledField::Block {
   std::int64_t column = 0, row = 0;  ///< First node, in the window.
   std::int64_t columns = 0, rows = 0;
@@ -113,12 +113,12 @@ struct MilledField::Block {
   std::array<double, kBlockNodes> z{};
   std::array<std::int32_t, kBlockNodes> move{};  ///< −1: the blank's top.
   std::array<std::int32_t, kBlockNodes> path{};
-  std::int32_t cutting = 0;  ///< The path that is being tried.
+  std::int32_t cutting = 0;  ///< The path being tried.
   double radius = 0.0;       ///< Of its ball.
-  // A plane that the surface is about parallel to, see lay_plane().
+  // A plane approximately parallel to the surface, see lay_plane().
   Eigen::Vector2d slope{0.0, 0.0};
   double secant = 1.0;
-  Eigen::Vector2d touch{0.0, 0.0};  ///< From a ball's centre to where it touches such a plane.
+  Eigen::Vector2d touch{0.0, 0.0};  ///< From a ball's centre to its contact with such a plane.
   std::array<double, kBlockNodes> plane{};
 
   Block(const GridWindow& window, std::int64_t block, double blank_top) {
@@ -140,7 +140,7 @@ struct MilledField::Block {
   [[nodiscard]] double x_end() const { return x[index_of(columns - 1)]; }
   [[nodiscard]] double y_end() const { return y[index_of(rows - 1)]; }
 
-  /// Heights count from a plane through (x[0], y[0], 0) from now on, where bounds are concerned.
+  /// Measures heights in bounds from a plane through (x[0], y[0], 0) from now on.
   void lay_plane(const Eigen::Vector2d& gradient) {
     slope = gradient;
     secant = std::sqrt(1.0 + gradient.squaredNorm());
@@ -156,7 +156,7 @@ struct MilledField::Block {
     return slope.x() * (at_x - x[0]) + slope.y() * (at_y - y[0]);
   }
 
-  /// Of all nodes above the plane.
+  /// Height of the highest node above the plane.
   [[nodiscard]] double highest_node() const {
     using Nodes = Eigen::Map<const Eigen::Array<double, kBlockNodes, 1>>;
     return (Nodes(z.data()) - Nodes(plane.data())).maxCoeff();
@@ -169,8 +169,8 @@ struct MilledField::Block {
     return dx * dx + dy * dy <= radius * radius;
   }
 
-  /// The least height above the plane at which a ball of the span, a part of `way`, touches
-  /// a plane that is parallel to it: R·√(1 + g²) below the centre.
+  /// Minimum height above the plane at which a ball of the span, a part of `way`, touches a plane
+  /// parallel to it: R·√(1 + g²) below the centre.
   [[nodiscard]] double touch_height(const Span& span, const BallMove& way) const {
     const double along_x = slope.x() * ((slope.x() > 0.0 ? span.x_max : span.x_min) - x[0]);
     const double along_y = slope.y() * ((slope.y() > 0.0 ? span.y_max : span.y_min) - y[0]);
@@ -182,8 +182,8 @@ struct MilledField::Block {
     return least - radius * secant - kBoundMargin;
   }
 
-  /// Distance from where that plane is touched to the nearest node, squared. As the ball's
-  /// curvature is at least 1/R, over a node that far away it is higher by distance²/(2R) or more.
+  /// Squared distance from that contact to the nearest node. As the ball's curvature is at least
+  /// 1/R, it is higher over a node that far away by at least distance²/(2R).
   [[nodiscard]] double beside2(const Span& span) const {
     const double px = touch.x();
     const double py = touch.y();
@@ -200,7 +200,7 @@ struct MilledField::Block {
     path[node] = cutting;
   }
 
-  /// Nodes over which the span's ball can be below `highest` at all.
+  /// Nodes over which the span's ball can be below `highest`.
   [[nodiscard]] NodeRange nodes_under(const Candidate& candidate, const Span& span,
                                       double highest) const {
     const double room = 2.0 * radius * (highest - candidate.touch_height);
@@ -216,8 +216,8 @@ struct MilledField::Block {
             range(y, rows, span.y_min + touch.y(), span.y_max + touch.y())};
   }
 
-  /// Offers what a move leaves at every node of a range, line by line along x or y:
-  /// `below(across, along, room, height)` gives it for the nodes of a line, as GraphArc does.
+  /// Offers the surface of a move at every node of a range, line by line along x or y:
+  /// `below(across, along, room, height)` computes it for the nodes of a line, as in GraphArc.
   template <class Below>
   void cut_lines(bool along_x, const NodeRange& range, std::int32_t by, const Below& below) {
     using Line = Eigen::Array<double, Eigen::Dynamic, 1, Eigen::ColMajor, kBlockSide, 1>;
@@ -278,7 +278,7 @@ MilledField::MilledField(std::vector<BallPath> paths, double blank_top)
   }
 }
 
-/// Every move in parts no longer than a cell; those that stay above the blank are left out.
+/// Divides every move into parts no longer than a cell, without those that stay above the blank.
 std::vector<MilledField::Span> MilledField::spans_of(const BallPath& path, double blank_top) {
   const double cell = cell_of(path);
   std::vector<Span> spans;
@@ -347,8 +347,8 @@ void MilledField::for_each_span(const SpanGrid& grid, const Block& block, const 
   }
 }
 
-/// Gradient of the plane that fits the centres of spans best; it may be any as far as results are
-/// concerned, the better it is the fewer spans are tried.
+/// Gradient of the plane that best fits the centres of spans. Any plane gives the same results; a
+/// better one tries fewer spans.
 Eigen::Vector2d MilledField::mean_slope(const SpanGrid& grid, const std::vector<Candidate>& spans) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
@@ -364,7 +364,8 @@ Eigen::Vector2d MilledField::mean_slope(const SpanGrid& grid, const std::vector<
   const auto count = static_cast<double>(spans.size());
   const Eigen::Matrix3d spread = squares - sum * sum.transpose() / count;
   const double determinant = spread.topLeftCorner<2, 2>().determinant();
-  constexpr double kOneLine = 1e-3;  // Less than this share of the square: no plane to be found.
+  constexpr double kOneLine = 1e-3;  // Below this share of the square there is no plane to be
+                                     // found.
   const double trace = spread.topLeftCorner<2, 2>().trace();
   if (!(determinant > kOneLine * trace * trace)) return Eigen::Vector2d::Zero();
   const Eigen::Vector2d slope =
@@ -372,7 +373,7 @@ Eigen::Vector2d MilledField::mean_slope(const SpanGrid& grid, const std::vector<
   return slope.cwiseMax(-1.0).cwiseMin(1.0);
 }
 
-/// Spans that may cut into the block, those first that may cut deepest below its plane.
+/// Spans that may cut into the block, those with the deepest possible cut below its plane first.
 std::vector<MilledField::Candidate> MilledField::candidates_of(std::size_t path,
                                                                Block& block) const {
   const SpanGrid& grid = grids_[path];
@@ -396,7 +397,7 @@ std::vector<MilledField::Candidate> MilledField::candidates_of(std::size_t path,
   return candidates;
 }
 
-/// Once none of the spans that are left can cut below the highest node the block is done.
+/// Ends when none of the remaining spans can cut below the highest node.
 void MilledField::cut_block(std::size_t path, Block& block) const {
   const SpanGrid& grid = grids_[path];
   if (grid.spans.empty()) return;

@@ -11,12 +11,12 @@
 
 namespace lensforge {
 
-/// What programs leave of a blank: the lower envelope of the balls swept along every move, in
-/// double precision; slopes are those of the ball that touched the node last
+/// Surface that programs leave of a blank: the lower envelope of the balls swept along every move,
+/// in double precision; slopes are those of the ball that touched the node last
 /// (MilledField.EqualsBruteForce…).
 ///
-/// `cut` is 0 where the blank's top was not touched; else it tells the piece of the path
-/// (BallPath), counted through all paths from 1.
+/// `cut` is 0 where the blank's top was not touched; else the piece of the path (BallPath), counted
+/// through all paths from 1.
 class MilledField final : public SurfaceField {
  public:
   /// @param paths      of one blank, each of one ball; moves above the blank cost nothing.

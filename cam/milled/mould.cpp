@@ -23,7 +23,7 @@ void validate(const MouldOptions& options) {
   }
 }
 
-/// New number of a vertex: turning over reverses the rows of a grid.
+/// New number of a vertex: turning the lens over reverses the rows of a grid.
 std::int64_t turned(const GridShape& grid, std::int64_t vertex) {
   if (!grid.is_grid()) return vertex;
   const std::int64_t column = vertex % grid.columns;
@@ -44,7 +44,7 @@ Eigen::Matrix3Xd turned_over(const Eigen::Matrix3Xd& points, const GridShape& gr
   return result;
 }
 
-/// Right side and top of a lens, which are left and bottom of its mould.
+/// Right side and top of a lens, which become left and bottom of its mould.
 Eigen::Vector2d far_corner(const SurfaceMesh& lens) {
   return {lens.vertices.row(0).maxCoeff(), lens.vertices.row(2).maxCoeff()};
 }
@@ -58,7 +58,7 @@ SurfaceMesh mould_surface(const SurfaceMesh& lens, const MouldOptions& options) 
   mould.triangles.resize(3, lens.triangle_count());
   if (lens.vertex_count() == 0) return mould;
   mould.vertices = turned_over(lens.vertices, lens.grid, far_corner(lens), options);
-  // A rotation keeps the triangles' sense; the mould is the other side of the same surface.
+  // A rotation keeps the triangles' orientation; the mould is the other side of the same surface.
   for (std::int64_t t = 0; t < lens.triangle_count(); ++t) {
     for (int k = 0; k < 3; ++k) {
       mould.triangles(2 - k, t) = static_cast<int>(turned(lens.grid, lens.triangles(k, t)));

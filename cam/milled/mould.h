@@ -8,35 +8,35 @@ namespace lensforge {
 
 struct Lens;
 
-/// More than any casting resin loses, share of a length.
+/// Maximum shrinkage, as a share of a length: above that of any casting resin.
 inline constexpr double kMaxShrinkage = 0.2;
 
-/// How a mould differs from the part that is cast from it.
+/// Difference between a mould and the part cast from it.
 struct MouldOptions {
   double shrinkage = 0.0;  ///< Share of its size that the cast loses, in 0 … 0.2.
-  double thickness = 5.0;  ///< Of the mould where it is thinnest, mm, > 0.
+  double thickness = 5.0;  ///< Minimum thickness of the mould, mm, > 0.
 };
 
-/// The surface to cut into a mould so that what is cast on it has the lens's optical surface: the
-/// lens turned over about its y axis onto the mould, with all lengths 1/(1 − shrinkage) as long.
-/// So it is mirrored from left to right seen from above, its valleys are the lens's ridges, and the
-/// cast, turned back, is neither mirrored nor negative.
+/// The surface to cut into a mould so that its cast has the lens's optical surface: the lens turned
+/// over about its y axis, with all lengths multiplied by 1/(1 − shrinkage). Seen from above it is
+/// mirrored from left to right, and its valleys are the lens's ridges; the cast, turned back, is
+/// neither mirrored nor negative.
 /// @return mm, in a lens frame of its own: from (0, 0) on, entry face z = 0, triangles
 ///         counter-clockwise seen from +z; a grid stays a grid.
 /// @pre the lens's rectangle begins at (0, 0).
 /// @throw InputError naming option, value and rule.
 SurfaceMesh mould_surface(const SurfaceMesh& lens, const MouldOptions& options);
 
-/// The same of a lens that is a spline: its spline too, and the mesh of that spline's nodes.
+/// The same for a lens with a spline: the mould's spline too, and the mesh of that spline's nodes.
 /// @throw InputError as mould_surface() does.
 Lens mould_lens(const Lens& lens, const MouldOptions& options);
 
-/// Where a lens lies in the mould that it is cast in: mould_surface()'s numbers.
+/// Frame of a lens in the mould that it is cast in, from mould_surface().
 struct CastFrame {
   double scale = 1.0;      ///< 1 / (1 − shrinkage)
   double width = 0.0;      ///< Of the lens along x, mm.
   double top = 0.0;        ///< Highest point of the lens's surface, mm.
-  double thickness = 0.0;  ///< Of the mould where it is thinnest, mm.
+  double thickness = 0.0;  ///< Minimum thickness of the mould, mm.
 };
 
 /// The surface of the lens that is cast in a mould, in the lens's frame.

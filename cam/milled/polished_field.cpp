@@ -45,7 +45,7 @@ PolishKernel make_kernel(double sigma, double spacing) {
 }
 
 /// Averages over the neighbours of many nodes at once: `values(k)` points to the k-th neighbours of
-/// nodes 0 … count − 1. Every node's sum runs outwards, whatever nodes are beside it.
+/// nodes 0 … count − 1. Every node's sum runs outwards, independently of its neighbours.
 template <class Values>
 void average(const Values& values, const PolishKernel& kernel, std::int64_t count, double* out) {
   const double* const own = values(0);
@@ -58,7 +58,7 @@ void average(const Values& values, const PolishKernel& kernel, std::int64_t coun
   }
 }
 
-/// Slopes likewise.
+/// Slopes over the neighbours of many nodes at once.
 template <class Values>
 void differentiate(const Values& values, const PolishKernel& kernel, std::int64_t count,
                    double* out) {
@@ -144,8 +144,8 @@ void PolishedField::sample(const GridWindow& window, const Executor& executor,
   take_off_rim(executor, patch);
 }
 
-/// Where the value of neighbour `at` of an axis comes from beyond the rim: turned about the last
-/// node on the lens.
+/// Sources of the value of neighbour `at` of an axis beyond the rim: turned about the last node on
+/// the lens.
 PolishedField::Turned PolishedField::Axis::turned(std::int64_t at) const {
   const std::int64_t last = at < sampled ? sampled : sampled_end - 1;
   return {last, std::clamp(2 * last - at, sampled, sampled_end - 1)};
@@ -155,8 +155,8 @@ bool PolishedField::Axis::turns() const {
   return begin - kernel.reach() < sampled || end + kernel.reach() > sampled_end;
 }
 
-/// A row's heights from `reach` before the nodes asked for to `reach` after them. @param heights,
-/// form  of the nodes that were sampled.
+/// A row's heights from `reach` before the requested nodes to `reach` after them. @param heights,
+/// form  of the sampled nodes.
 std::vector<double> PolishedField::turned_line(const Axis& x, const double* heights,
                                                const double* form) {
   std::vector<double> line;
@@ -173,7 +173,7 @@ std::vector<double> PolishedField::turned_line(const Axis& x, const double* heig
   return line;
 }
 
-/// Of every row that the kernel along y reaches.
+/// Filters every row within the kernel along y.
 PolishedField::Lines PolishedField::along_x(const Axis& x, const Axis& y, const SurfacePatch& raw,
                                             const SurfacePatch& form, const Executor& executor) {
   const std::int64_t columns = x.end - x.begin;
@@ -183,7 +183,7 @@ PolishedField::Lines PolishedField::along_x(const Axis& x, const Axis& y, const 
               std::vector<double>(index_of(rows * columns))};
   const auto along = [&](std::int64_t row) {
     const std::int64_t to = row + y.sampled - y.begin + y.kernel.reach();
-    if (to < 0 || to >= rows) return;  // Of the halo.
+    if (to < 0 || to >= rows) return;  // In the halo.
     const std::size_t first = index_of(row * sampled);
     const std::vector<double> line = turned_line(x, &raw.z[first], &form.z[first]);
     const auto values = [&](std::int64_t k) { return &line[index_of(x.kernel.reach() + k)]; };
@@ -194,8 +194,8 @@ PolishedField::Lines PolishedField::along_x(const Axis& x, const Axis& y, const 
   return lines;
 }
 
-/// Fills the rows beyond the rim likewise. @param values, form  row by row from `reach` before the
-/// nodes asked for.
+/// Fills the rows beyond the rim in the same way. @param values, form  row by row from `reach`
+/// before the requested nodes.
 void PolishedField::turn_rows(const Axis& y, std::int64_t columns, const std::vector<double>& form,
                               std::vector<double>& values) {
   const std::int64_t first = y.begin - y.kernel.reach();

@@ -43,9 +43,9 @@ FacetReach::FacetReach(const FacetGrid& grid, double radius, const Executor& exe
   for (const auto& list : found) suspects_.insert(suspects_.end(), list.begin(), list.end());
 }
 
-/// A ball that is tangent to facet f cuts no triangle that lies below the plane of f, and none from
-/// whose plane its centre is at least R away; that distance is linear over the facet, so that its
-/// corners tell.
+/// A ball tangent to facet f cuts no triangle below the plane of f, and none whose plane is at
+/// least R from its centre; that distance is linear over the facet, so checking its corners is
+/// enough.
 std::vector<std::int32_t> FacetReach::suspects_of(const FacetGrid& grid, std::int32_t facet) const {
   const SurfaceMesh& mesh = grid.mesh();
   const Plane& plane = planes_[index_of(facet)];
@@ -83,10 +83,10 @@ namespace {
 /// Side of the cells, in radii.
 constexpr double kCellPerRadius = 0.25;
 
-/// Cells at most: 16 MB.
+/// Maximum number of cells: 16 MB.
 constexpr double kMaxCells = 1.6e7;
 
-/// Boxes are this much larger than cells, mm: rounding of a centre's cell.
+/// Boxes exceed cells by this, mm: rounding of a centre's cell.
 constexpr double kMargin = 1e-6;
 
 }  // namespace
@@ -112,8 +112,8 @@ SmoothReach::SmoothReach(const SmoothBed& bed, const Executor& executor)
   parallel_for(executor, "reach of the ball", columns_ * rows_, judge);
 }
 
-/// A centre beyond the rim belongs to the outermost cell, around which lies all of the surface that
-/// its ball can touch.
+/// A centre beyond the rim belongs to the outermost cell, whose box includes all of the surface
+/// that its ball can touch.
 std::int64_t SmoothReach::cell_of(double at, double begin, double cell, std::int64_t cells) {
   const double place = std::floor((at - begin) / cell);
   return static_cast<std::int64_t>(std::clamp(place, 0.0, static_cast<double>(cells - 1)));
@@ -121,18 +121,18 @@ std::int64_t SmoothReach::cell_of(double at, double begin, double cell, std::int
 
 namespace {
 
-/// Contacts that are kept at most, and how often another is looked for: on creased meshes 3 to 6 is
-/// the rule (RoundedField.EqualsTheBestOfManyBalls).
+/// Maximum number of contacts kept, and of searches for another: 3 to 6 are usual on creased meshes
+/// (RoundedField.EqualsTheBestOfManyBalls).
 constexpr std::size_t kMaxPlanes = 8;
 constexpr int kMaxDrops = 40;
 
 /// The search ends when another step gains less than this, mm.
 constexpr double kGain = 1e-10;
 
-/// Valleys of two planes whose normals are closer than this, rad, have no direction to trust.
+/// Valleys of two planes whose normals are closer than this, rad, have no reliable direction.
 constexpr double kParallel = 1e-9;
 
-/// How far below a plane a ball's centre may be, mm, and count as on it: rounding.
+/// Depth of a ball's centre below a plane at which it counts as on it, mm: rounding.
 constexpr double kOnPlane = 1e-12;
 
 /// The point of a triangle that is nearest to p.
@@ -158,19 +158,19 @@ Eigen::Vector3d nearest_point(const Eigen::Matrix3d& corners, const Eigen::Vecto
   return p - normal * (normal.dot(p - corners.col(0)) / normal.squaredNorm());
 }
 
-/// n·c ≥ level: what one contact asks of the ball's centre.
+/// n·c ≥ level: the condition of one contact on the ball's centre.
 struct Plane {
   Eigen::Vector3d normal;
   double level = 0.0;
 };
 
-/// The triangles found so far, and the lowest ball on the planes that stand for some of them.
+/// The triangles found so far, and the lowest ball over the planes that replace some of them.
 class Contacts {
  public:
   Contacts(const DropCutter& cutter, const Eigen::Vector2d& q)
       : cutter_(cutter), q_(q), radius_(cutter.radius()) {}
 
-  /// Takes up a triangle, in the place of the oldest if there are too many.
+  /// Adds a triangle, replacing the oldest if there are too many.
   void add(std::int32_t triangle) {
     for (std::size_t k = 0; k < size_; ++k) {
       if (triangles_[k] == triangle) return;
@@ -183,9 +183,9 @@ class Contacts {
     }
   }
 
-  /// Puts a plane in the place of every triangle, for balls near one that cuts none of them: its
-  /// tangent plane if it touches the triangle, parallel to that if it does not. The distance of a
-  /// triangle is convex in the centre, so that no ball above these planes cuts into a triangle.
+  /// Replaces every triangle by a plane, for balls near one that cuts none of them: its tangent
+  /// plane if it touches the triangle, parallel to that if it does not. The distance from a
+  /// triangle is convex in the centre, so a ball above these planes cuts into no triangle.
   void lay_planes(const Eigen::Vector3d& centre) {
     for (std::size_t k = 0; k < size_; ++k) {
       const Eigen::Vector3d touched = nearest_point(cutter_.corners(triangles_[k]), centre);
@@ -194,8 +194,8 @@ class Contacts {
     }
   }
 
-  /// The least over all sets of up to three planes of the ball that touches just these, if it is
-  /// not below another.
+  /// The lowest ball among those that touch exactly one set of up to three planes and are not below
+  /// another.
   [[nodiscard]] std::optional<LowestBall> lowest() const {
     std::optional<LowestBall> best;
     const auto offer = [&](const std::optional<LowestBall>& ball) {
@@ -228,7 +228,7 @@ class Contacts {
   }
 
   /// Both planes hold the ball: its centre is on a line a + t·d. The vertical through q is within R
-  /// of the line above the lower of the two places where it is as far as R.
+  /// of the line above the lower of the two places at the distance R.
   [[nodiscard]] std::optional<LowestBall> in_valley(const Plane& first, const Plane& second) const {
     const Eigen::Vector3d across = first.normal.cross(second.normal);
     const double sine2 = across.squaredNorm();
@@ -237,7 +237,7 @@ class Contacts {
     const Eigen::Vector3d a =
         (first.level * second.normal.cross(across) + second.level * across.cross(first.normal)) /
         sine2;
-    // |(q, z) − a|² less its part along d is R²: a quadratic in z.
+    // |(q, z) − a|² minus its part along d is R²: a quadratic in z.
     const Eigen::Vector3d o(q_.x() - a.x(), q_.y() - a.y(), 0.0);
     const Eigen::Vector3d from = o - o.dot(d) * d;
     const Eigen::Vector3d up(-d.z() * d.x(), -d.z() * d.y(), 1.0 - d.z() * d.z());
@@ -279,7 +279,7 @@ class Contacts {
   std::size_t size_ = 0;
 };
 
-/// The ball that rests with its axis where that of `ball` is.
+/// The resting ball with the axis of `ball`.
 LowestBall lifted(const LowestBall& ball, const Eigen::Vector2d& q, double radius, double tip) {
   LowestBall rest = ball;
   rest.centre.z() = std::max(ball.centre.z(), tip + radius);
@@ -289,8 +289,8 @@ LowestBall lifted(const LowestBall& ball, const Eigen::Vector2d& q, double radiu
 
 }  // namespace
 
-/// Steps from one ball that rests to another that reaches deeper; where the next one cuts into a
-/// triangle that was not known, that is taken up.
+/// Steps from one resting ball to a lower one; if the next one cuts into an unknown triangle, that
+/// is added.
 LowestBall LowestBallSearch::over(const Eigen::Vector2d& q, const TangentPlane& plane,
                                   CutterLocation& near) const {
   const double radius = cutter_.radius();
@@ -320,8 +320,7 @@ LowestBall LowestBallSearch::over(const Eigen::Vector2d& q, const TangentPlane& 
 
 namespace {
 
-/// Nodes of a row that are rounded one after the other, so that each begins where the last was
-/// held.
+/// Nodes of a row that are rounded one after the other; each starts from the location of the last.
 constexpr std::int64_t kRun = 256;
 
 TangentPlane plane_at(const SurfacePatch& patch, std::size_t node) {
@@ -378,7 +377,7 @@ std::vector<RoundedField::Range> RoundedField::squares_of(const GridWindow& wind
   return squares;
 }
 
-/// Facets are made where nodes may be in a fillet, and for these alone.
+/// Makes facets only where nodes may be in a fillet.
 void RoundedField::round_facets_of(const Range& range, SurfacePatch& patch) const {
   Eigen::AlignedBox2d doubtful;
   for (std::int64_t row = range.rows.first; row < range.rows.second; ++row) {

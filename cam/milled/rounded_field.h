@@ -17,8 +17,8 @@
 
 namespace lensforge {
 
-/// Which triangles of a mesh a ball that is tangent to a facet may cut: for most facets none, for
-/// those beside valleys a few.
+/// Triangles of a mesh that a ball tangent to a facet may cut: none for most facets, a few for
+/// those beside valleys.
 class FacetReach {
  public:
   /// @param grid  must outlive this.
@@ -44,11 +44,11 @@ class FacetReach {
   std::vector<std::int32_t> suspects_;
 };
 
-/// Where a ball that is tangent to a smooth surface certainly cuts nothing of it.
+/// Places where a ball that is tangent to a smooth surface certainly cuts nothing of it.
 ///
 /// Where no second derivative of the surface under the ball exceeds 1/R, the height at which a
-/// point of the surface holds the ball is concave in that point (SmoothBed), so that the one where
-/// the ball is tangent holds it highest.
+/// point of the surface holds the ball is concave in that point (SmoothBed), so the tangent point
+/// holds it highest.
 class SmoothReach {
  public:
   SmoothReach(const SmoothBed& bed, const Executor& executor);
@@ -73,42 +73,42 @@ class SmoothReach {
   double cell_ = 0.0;
   std::int64_t columns_ = 1;
   std::int64_t rows_ = 1;
-  std::vector<std::uint8_t> free_;  ///< Of balls with their centres in a cell.
+  std::vector<std::uint8_t> free_;  ///< For balls with their centres in a cell.
 };
 
-/// The ball that reaches deepest over a place, cutting into nothing.
+/// The lowest ball over a place that cuts into nothing.
 struct LowestBall {
   double z = 0.0;                                    ///< Its lower side over the place, mm.
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< mm
   double spread = 0.0;  ///< Largest distance between the points that hold it, mm; 0 with one.
 };
 
-/// A height and slopes of a surface over a place.
+/// Height and slopes of a surface at a place.
 struct TangentPlane {
   double z = 0.0;  ///< mm
   Eigen::Vector2d slope = Eigen::Vector2d::Zero();
 };
 
-/// Moves a ball over a place of a surface until it reaches deepest.
+/// Moves a ball over a place of a surface to its lowest position.
 ///
-/// Sought is the centre c that makes c.z − √(R² − |q − c.xy|²) least while the ball cuts into no
-/// triangle. Triangles are taken up one by one as the drop-cutter finds them cut. Each is replaced
-/// by a plane that keeps the ball off it; over planes the lowest ball is known in closed form (on
-/// one, in the valley of two, in the pit of three), and there the planes are laid anew: the
+/// Finds the centre c with the least c.z − √(R² − |q − c.xy|²) for which the ball cuts into no
+/// triangle. Triangles are added one by one as the drop-cutter finds them cut. Each is replaced by
+/// a plane that keeps the ball off it; the lowest ball over planes has a closed form (on one, in
+/// the valley of two, in the pit of three), and there the planes are set up anew: the
 /// convex–concave procedure (Yuille and Rangarajan 2003). Over facets that meet in valleys one
-/// round is exact. From the ball that is tangent at q it leads to a minimum next to it.
+/// round is exact. Starting from the ball tangent at q it finds a nearby minimum.
 class LowestBallSearch {
  public:
-  /// A ball rests where it cuts no deeper than this, mm.
+  /// Maximum cut of a resting ball into the mesh, mm.
   static constexpr double kResting = 1e-10;
 
   /// @param cutter  of the surface; must outlive the search.
-  /// @param margin  how deep a ball may cut into the mesh and still count as resting, mm: what the
-  ///                mesh may be off the surface that tangent planes are given of.
+  /// @param margin  additional cut into the mesh with which a ball still counts as resting, mm: the
+  ///                mesh's error against the surface of the tangent planes.
   explicit LowestBallSearch(const DropCutter& cutter, double margin = 0.0)
       : cutter_(cutter), resting_(kResting + margin) {}
 
-  /// @param near  a location close by, which makes it faster; is set to the last one.
+  /// @param near  a close location, which speeds the search up; set to the last one.
   [[nodiscard]] LowestBall over(const Eigen::Vector2d& q, const TangentPlane& plane,
                                 CutterLocation& near) const;
 
@@ -117,16 +117,16 @@ class LowestBallSearch {
   double resting_;
 };
 
-/// What a ball can reach of a surface when its rows lie infinitely close: the morphological closing
-/// of the surface by the ball. Where the ball that is tangent to the designed surface cuts into
-/// nothing the two surfaces are one; elsewhere it is the lower side of the ball that reaches
-/// deepest (LowestBallSearch), with that ball's normal.
+/// The surface that a ball can reach with infinitely close rows: the morphological closing of the
+/// designed surface by the ball. Where the ball tangent to the designed surface cuts into nothing
+/// the two are equal; elsewhere it is the lower side of the lowest ball (LowestBallSearch), with
+/// that ball's normal.
 ///
-/// Two faces whose normals are Δ apart keep a fillet R·tan(Δ/2) wide on either face, and
-/// R(1/cos(Δ/2) − 1) is left standing over the crease; the ball touches them 2R·sin(Δ/2) apart.
+/// Two faces whose normals are Δ apart keep a fillet R·tan(Δ/2) wide on either face and
+/// R(1/cos(Δ/2) − 1) high over the crease; the ball touches them 2R·sin(Δ/2) apart.
 class RoundedField final : public SurfaceField {
  public:
-  /// A fillet's `cut`; elsewhere it is that of the designed surface, empty where that has none.
+  /// Value of `cut` in a fillet; elsewhere that of the designed surface, empty if it has none.
   static constexpr std::int32_t kFillet = -1;
 
   /// Rounds the facets of a mesh. All must outlive the field; `cutter` was built on the mesh of
@@ -134,17 +134,17 @@ class RoundedField final : public SurfaceField {
   RoundedField(const SurfaceField& designed, const FacetGrid& grid, const DropCutter& cutter,
                const Executor& executor);
 
-  /// Rounds any surface, of which the facets of `cut` are an approximation; fillets follow those,
-  /// everything else the surface. Facets are made for a square of kPatch at a time, and where the
-  /// surface bends less than the ball not at all. Both must outlive the field.
-  /// @param error  how far those facets may lie from the surface, mm: a ball that cuts no deeper
-  ///               into them does not count as held.
+  /// Rounds any surface approximated by the facets of `cut`; fillets follow the facets, everything
+  /// else the surface. Facets are made for a square of kPatch at a time, and not at all where the
+  /// surface bends less than the ball. Both must outlive the field.
+  /// @param error  maximum distance of those facets from the surface, mm: a ball that cuts no
+  ///               deeper into them does not count as held.
   RoundedField(const SurfaceField& designed, const CutSurface& cut, double error,
                const Executor& executor);
 
   static constexpr double kPatch = 2.0;  ///< mm
 
-  /// Tells as well what was left standing: SurfacePatch::depth and width.
+  /// Also computes the remaining material: SurfacePatch::depth and width.
   void sample(const GridWindow& window, const Executor& executor,
               SurfacePatch& patch) const override;
 

@@ -115,7 +115,7 @@ void HeldField::sample(const GridWindow& window, const Executor& executor,
                        SurfacePatch& patch) const {
   const GridWindow& all = held_.window;
   if (!same_grid(all, window) || !contains(all, window)) {
-    held_.window = {};  // Until the sample is whole.
+    held_.window = {};  // Until the sample is complete.
     field_.sample(window, executor, held_);
     held_.window = window;
   }

@@ -12,8 +12,8 @@
 namespace lensforge {
 
 /// A rectangle of nodes of a regular grid: node (i, j) of the window lies at origin + spacing ·
-/// (first_column + i, first_row + j), so that it has the same coordinates, to the bit, in every
-/// window of the grid.
+/// (first_column + i, first_row + j), so it has the same coordinates, to the bit, in every window
+/// of the grid.
 struct GridWindow {
   Eigen::Vector2d origin{0.0, 0.0};   ///< Of the grid, mm.
   Eigen::Vector2d spacing{0.0, 0.0};  ///< mm
@@ -38,16 +38,17 @@ struct SurfacePatch {
   std::vector<double> z;        ///< mm, lens frame.
   std::vector<double> slope_x;  ///< ∂z/∂x, of the surface itself, not a difference of heights.
   std::vector<double> slope_y;  ///< ∂z/∂y
-  /// Which piece the node lies on: nodes of one smooth piece share it, between nodes of two pieces
-  /// the slope may jump. Empty where the whole surface is smooth.
+  /// Number of the piece that the node lies on. Nodes of one smooth piece share it; between nodes
+  /// of two pieces the slope may jump. Empty where the whole surface is smooth.
   std::vector<std::int32_t> cut;
-  // What a ball cannot reach, of a surface that it rounds (RoundedField) or one cast in that; else
-  // empty.
-  std::vector<double> depth;  ///< Left standing above the designed surface, mm; 0 where reached.
+  // What a ball cannot reach on a surface that it rounds (RoundedField), or on one cast in that;
+  // else empty.
+  std::vector<double> depth;  ///< Remaining material above the designed surface, mm; 0 where
+                              ///< reached.
   std::vector<double> width;  ///< Of the fillet: largest distance of its ball's contacts, mm; or 0.
 };
 
-/// Makes room for a window's nodes. @param cuts  whether the surface has pieces.
+/// Makes room for a window's nodes. @param cuts  true if the surface has pieces.
 inline void resize_patch(const GridWindow& window, bool cuts, SurfacePatch& patch) {
   const auto count = static_cast<std::size_t>(window.size());
   patch.window = window;
@@ -59,9 +60,9 @@ inline void resize_patch(const GridWindow& window, bool cuts, SurfacePatch& patc
   patch.width.clear();
 }
 
-/// A surface that is known as finely as one likes, window by window, so that a whole lens never has
-/// to be in memory: the designed one, what a ball can reach of it, what a program leaves, what
-/// polishing makes of that.
+/// A surface that can be sampled at any resolution, window by window, so that a whole lens never
+/// has to be in memory: the designed surface, what a ball can reach of it, what a program leaves,
+/// the polished surface.
 class SurfaceField {
  public:
   SurfaceField() = default;
@@ -69,8 +70,8 @@ class SurfaceField {
   SurfaceField& operator=(const SurfaceField&) = delete;
   virtual ~SurfaceField() = default;
 
-  /// Fills `patch` for a window inside the lens's rectangle; the same bits whatever windows the
-  /// grid is cut into and for any number of threads. @throw Interrupted as the executor does.
+  /// Fills `patch` for a window inside the lens's rectangle; the same bits for any division of the
+  /// grid into windows and any number of threads. @throw Interrupted as the executor does.
   virtual void sample(const GridWindow& window, const Executor& executor,
                       SurfacePatch& patch) const = 0;
 };
@@ -78,7 +79,7 @@ class SurfaceField {
 /// The grid over a lens's rectangle from (0, 0) whose nodes are at most `spacing` apart, mm, the
 /// last ones on the rim and none beyond.
 /// @throw InputError unless both sides are positive, at most 1 m, and the spacing is from 0.1 µm
-/// up.
+///        up.
 GridWindow lens_grid(const Eigen::Vector2d& size, double spacing);
 
 /// The same with a spacing of its own along x and y.
@@ -92,8 +93,7 @@ struct CellRange {
   std::int64_t rows = 0;
 };
 
-/// The part of a grid that holds a range's nodes and `halo` more on every side, as far as there
-/// are.
+/// The part of a grid that holds a range's nodes and up to `halo` more on every side.
 GridWindow window_of(const GridWindow& grid, const CellRange& range, std::int64_t halo);
 
 /// Every cell of a grid.
@@ -106,9 +106,8 @@ using CellCounts = Eigen::Matrix<std::int64_t, 2, 1>;
 std::vector<CellRange> tiles_of(const CellRange& range, const CellCounts& sides);
 std::vector<CellRange> tiles_of(const CellRange& range, std::int64_t side);
 
-/// A surface that keeps the last window it sampled: surfaces that are made from it, tile by tile,
-/// find it there. The first to ask should be the one that asks for most. Not for several threads
-/// at once.
+/// A surface that keeps the last window it sampled, for surfaces that are made from it tile by
+/// tile. The largest window should be sampled first. Not for several threads at once.
 class HeldField final : public SurfaceField {
  public:
   /// @param field  must outlive this.
@@ -122,7 +121,7 @@ class HeldField final : public SurfaceField {
   mutable SurfacePatch held_;
 };
 
-/// The sampled surface as a mesh that is laid out as a grid: two triangles between four nodes.
+/// The sampled surface as a grid mesh: two triangles between four nodes.
 SurfaceMesh mesh_of(const SurfacePatch& patch);
 
 }  // namespace lensforge

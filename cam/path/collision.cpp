@@ -15,11 +15,12 @@ namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0;
 
-/// What cells of the stock map may show of material where there is none, mm.
+/// Height of material that cells of the stock map may show where there is none, mm.
 constexpr double kThinMaterial = 0.01;
 
-/// What a way may sink below surface and ramp, mm: passes are above the floor by its slope times
-/// their spacing at most (PassGrid), which is less on slopes up to 0.9 with the default spacing.
+/// Depth by which a path may sink below surface and ramp, mm: passes are above the floor by at most
+/// its slope times their spacing (PassGrid), which is less on slopes up to 0.9 with the default
+/// spacing.
 constexpr double kSlack = 0.1;
 
 /// F words are rounded.
@@ -61,7 +62,7 @@ void DescentCheck::begin(const std::string& operation, const Tool& tool, const D
   rest();
 }
 
-/// The surface is asked only where what is known without it does not do.
+/// Samples the surface only where the rest leaves the result open.
 void DescentCheck::take(const PathMove& move, const MovePiece& piece, double taken,
                         const ProgramPlace& place) {
   if (move.feed <= tool_.plunge * (1.0 + kFeedRounding)) return rest();
@@ -77,7 +78,7 @@ void DescentCheck::take(const PathMove& move, const MovePiece& piece, double tak
   rest();
 }
 
-/// How much lower the surface lets the tip go at the end of the stretch, mm, ≥ 0.
+/// Maximum descent that the surface allows the tip at the end of the stretch, mm, ≥ 0.
 double DescentCheck::surface_drop(const Eigen::Vector3d& to) {
   const double before = floor_->over_surface(start_.head<2>(), 0.0, trace_);
   const double after = floor_->over_surface(to.head<2>(), 0.0, trace_);
@@ -110,14 +111,14 @@ void DescentCheck::note(const PathMove& move, const MovePiece& piece, const Prog
 
 namespace {
 
-/// Parts of moves, mm: a cell of the stock map on blanks up to 200 mm.
+/// Length of pieces of moves, mm: a cell of the stock map on blanks up to 200 mm.
 constexpr double kPiece = 0.1;
 
-/// A rapid move this little in the stock map's material is in air: the map overstates material
-/// beside the cutter's path by what the silhouette rises over a cell, mm.
+/// Depth in the stock map's material below which a rapid move counts as in air, mm: the map
+/// overstates material beside the cutter's path by the silhouette's rise over a cell.
 constexpr double kRapidMargin = 0.05;
 
-/// A tip this little below the table touches it only in the last bit of a sum, mm.
+/// Depth below the table that is only rounding of a sum, mm.
 constexpr double kTableMargin = 1e-9;
 
 bool only_rises(const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
@@ -185,7 +186,7 @@ void CollisionCheck::place(const Eigen::Vector3d& at) {
   descents_.rest();
 }
 
-/// No part of a tool is lower than its tip. An arc in an upright plane hangs below its ends.
+/// No part of a tool is lower than its tip. An arc in an upright plane may hang below its ends.
 void CollisionCheck::check_table(const PathMove& move) {
   const double table = stock_.blank().min().z() - kTableMargin;
   const bool hangs = move.arc_axis == 0 || move.arc_axis == 1;

@@ -19,21 +19,21 @@
 
 namespace lensforge {
 
-/// How a tool may go down into material at more than its plunge feed.
+/// Limits of a tool's descent into material at more than its plunge feed.
 struct DescentRule {
-  double ramp_angle_deg = 3.0;  ///< Steepest way into material.
-  double allowance = 0.0;       ///< That the operation leaves on the surface, mm.
-  double spacing = 0.0;         ///< Of points at which it asks for the surface, mm.
-  /// Of the part at hand, where the surface holds several; empty: of the whole surface.
+  double ramp_angle_deg = 3.0;  ///< Steepest path into material.
+  double allowance = 0.0;       ///< Left on the surface by the operation, mm.
+  double spacing = 0.0;         ///< Distance of points at which it samples the surface, mm.
+  /// Of the current part, where the surface holds several; empty: of the whole surface.
   Eigen::AlignedBox2d rim;
 };
 
-/// As a process has it for the operation of this name.
+/// The rule of a process for the operation of this name.
 DescentRule descent_rule(const Process& process, const std::string& operation);
 
-/// Where a move stands.
+/// Place of a move in the programs.
 struct ProgramPlace {
-  std::size_t program = 0;  ///< Of those that were read, in order.
+  std::size_t program = 0;  ///< Index of the program in reading order.
   std::int64_t line = 0;
 };
 
@@ -42,21 +42,21 @@ struct SteepDescent {
   std::string operation;
   Tool tool;
   ProgramPlace first;
-  Eigen::Vector3d place = Eigen::Vector3d::Zero();  ///< Tip, mm, lens frame, in the first.
+  Eigen::Vector3d place = Eigen::Vector3d::Zero();  ///< Tip at the first, mm, lens frame.
   double angle_deg = 0.0;                           ///< Of the first, against the horizontal.
   double feed = 0.0;                                ///< Of the first, mm/min.
-  double ramp_angle_deg = 0.0;                      ///< That would have been right.
+  double ramp_angle_deg = 0.0;                      ///< The limit that it exceeds.
   std::int64_t moves = 0;
 
-  /// One plain sentence. @param program  name of the file that `first` stands in.
+  /// One plain sentence. @param program  name of the file that contains `first`.
   [[nodiscard]] std::string sentence(const std::string& program) const;
 };
 
-/// Finds ways down into material that are steeper than the ramp angle at more than the tool's
-/// plunge feed. A tool that follows the surface goes down with it: what counts is by how much the
-/// way sinks below what the surface and the ramp allow, over any stretch of it that takes material.
-/// Found is what sinks so by 0.2 mm, or twice DescentRule::spacing where that is more; nothing that
-/// stays within half of that is.
+/// Finds descents into material that are steeper than the ramp angle at more than the tool's plunge
+/// feed. A tool may descend with the surface: what counts is how far the path sinks below what
+/// surface and ramp allow, over any stretch that removes material. Descents that sink by 0.2 mm, or
+/// by twice DescentRule::spacing where that is more, are found; those within half of that are not
+/// reported.
 class DescentCheck {
  public:
   /// @param surface  must outlive this.
@@ -64,13 +64,13 @@ class DescentCheck {
 
   void begin(const std::string& operation, const Tool& tool, const DescentRule& rule);
 
-  /// The tool is elsewhere, or comes from a rapid move.
+  /// Ends the stretch: the tool is elsewhere, or comes from a rapid move.
   void rest() { sunk_ = 0.0; }
 
-  /// The next part of a move at feed. @param taken  material that it took, upwards, mm.
+  /// Takes the next piece of a move at feed. @param taken  height of material that it removed, mm.
   void take(const PathMove& move, const MovePiece& piece, double taken, const ProgramPlace& place);
 
-  /// One an operation and tool, in the order in which they were met.
+  /// One per operation and tool, in the order found.
   [[nodiscard]] const std::vector<SteepDescent>& descents() const { return descents_; }
 
  private:
@@ -84,14 +84,14 @@ class DescentCheck {
   Tool tool_;
   double ramp_angle_deg_ = 0.0;
   double ramp_ = 0.0;     ///< Rise over run.
-  double allowed_ = 0.0;  ///< Of sunk_, mm.
-  double sunk_ = 0.0;     ///< By how much the stretch sinks below what is allowed, mm.
+  double allowed_ = 0.0;  ///< Limit of sunk_, mm.
+  double sunk_ = 0.0;     ///< Depth of the stretch below what is allowed, mm.
   Eigen::Vector3d start_ = Eigen::Vector3d::Zero();  ///< Of the stretch.
-  ProgramPlace last_;                                ///< That was counted.
+  ProgramPlace last_;                                ///< The last one counted.
   std::vector<SteepDescent> descents_;
 };
 
-/// What the blank lies on, as an obstacle.
+/// Name of the support under the blank as an obstacle.
 inline constexpr const char* kTableObstacle = "the table under the blank";
 
 /// One part of one tool that touches one thing, in one operation.
@@ -100,40 +100,40 @@ struct Collision {
   int tool = 1;            ///< Tool::number
   std::string part;        ///< "cutter", "tool above its flutes", "section of 4 mm"
   std::string obstacle;    ///< "the lens", "the blank", kTableObstacle, "the keep-out box 'vice'"
-  std::int64_t moves = 0;  ///< How many moves touch it.
+  std::int64_t moves = 0;  ///< Number of moves that touch it.
   Eigen::Vector3d first_place;  ///< Tip, mm, lens frame.
-  Extreme worst;                ///< How much too low the tool is at most, mm, and where.
+  Extreme worst;  ///< Largest depth of the tool below the free height, mm, and its place.
 
   /// One plain sentence.
   [[nodiscard]] std::string sentence() const;
 };
 
-/// Follows the moves of all operations, cuts them from a model of the blank, and finds where what
-/// does not cut touches something: the tool above its flutes, its shank and holder against the lens
-/// and the remaining blank; the whole tool against the keep-out boxes and against the table,
-/// which is everywhere at the height of the blank's underside; and the cutter against material in
-/// rapid moves. Ways down into material are looked over as well (DescentCheck). Moves are looked at
-/// in parts of a tenth of a millimetre, each with all that the tool sweeps in it.
+/// Follows the moves of all operations, cuts them from a model of the blank and finds forbidden
+/// contacts: of the tool above its flutes, its shank and holder with the lens and the remaining
+/// blank; of the whole tool with the keep-out boxes and with the table, which is everywhere at the
+/// height of the blank's underside; and of the cutter with material in rapid moves. Descents into
+/// material are checked as well (DescentCheck). Moves are checked in pieces of 0.1 mm, each with
+/// all that the tool sweeps in it.
 ///
-/// What is left of the blank is known as an upper bound (StockMap): a touch may be reported where
-/// the tool passes material closer than a cell of it, and none is missed.
+/// The remaining blank is an upper bound (StockMap): a contact may be reported where the tool
+/// passes material closer than a cell, but none is missed.
 class CollisionCheck {
  public:
   /// References must outlive this. @param stock  the blank before the first move that is checked.
   CollisionCheck(const ProfileCutter& surface, const Workshop& workshop, StockMap stock);
 
-  /// What comes next is an operation of this name, with this tool, from an unknown place.
+  /// Begins an operation of this name, with this tool, from an unknown place.
   void begin(const std::string& operation, const Tool& tool, const DescentRule& rule = {});
 
-  /// Where the tool is when the next move begins.
+  /// Sets the tool's place at the beginning of the next move.
   void place(const Eigen::Vector3d& at);
 
-  /// The operation's next moves; a MoveSink may hand them on. @param place  where they stand.
+  /// Checks the operation's next moves; a MoveSink may pass them on. @param place  of the moves.
   void check(std::span<const PathMove> moves, const ProgramPlace& place = {});
 
-  /// All collisions so far, in the order in which they were first met.
+  /// All collisions so far, in the order found.
   [[nodiscard]] const std::vector<Collision>& collisions() const { return collisions_; }
-  /// All ways down into material that are too steep for their feed, likewise.
+  /// All descents into material too steep for their feed, in the order found.
   [[nodiscard]] const std::vector<SteepDescent>& descents() const { return descents_.descents(); }
   [[nodiscard]] const StockMap& stock() const { return stock_; }
 
@@ -157,13 +157,13 @@ class CollisionCheck {
   double highest_ = 0.0;  ///< Of the stock when the operation began.
   std::string operation_;
   const Tool* tool_ = nullptr;
-  std::vector<Part> parts_;  ///< The cutter, then what may touch nothing.
+  std::vector<Part> parts_;  ///< The cutter, then the parts that must not touch anything.
   bool placed_ = false;
   Eigen::Vector3d at_ = Eigen::Vector3d::Zero();
   std::int64_t move_ = 0;
   std::vector<Collision> collisions_;
-  std::vector<std::int64_t> last_move_;  ///< One a collision: the last move that was counted.
-  ProgramPlace place_;                   ///< Of the moves that are checked.
+  std::vector<std::int64_t> last_move_;  ///< Per collision: the last move counted.
+  ProgramPlace place_;                   ///< Of the moves being checked.
   DescentCheck descents_;
 };
 

@@ -15,14 +15,14 @@
 namespace lensforge {
 namespace {
 
-/// Rows that are cut at the same time: a few tenths of a second of work, so that a stop is heard.
+/// Rows cut at the same time: a few tenths of a second of work, so that a stop takes effect soon.
 constexpr std::int64_t kBatchRows = 16;
 
-/// Gaps in rows that are cut all the same, mm: at 500 mm/min they take no longer than a way up,
-/// across and down.
+/// Gaps in rows that are cut anyway, mm: at 500 mm/min they take no longer than going up, across
+/// and down.
 constexpr double kShortGap = 1.5;
 
-/// Unit of the last decimal of exact ways, mm.
+/// Unit of the last decimal of exact paths, mm.
 constexpr double kExactResolution = 1e-12;
 
 RowFitOptions fit_options(const RasterOptions& options) {
@@ -34,7 +34,7 @@ void take_larger(const Extreme& one, Extreme& largest) {
   if (one.value > largest.value) largest = one;
 }
 
-/// From the plane of a row into space.
+/// Maps the plane of a row into space.
 class RowFrame {
  public:
   RowFrame(int along, double across) : line_{along, across} {}
@@ -79,7 +79,7 @@ RasterWay in_space(const RowWay& way, const RowFrame& frame, bool forward) {
   return result;
 }
 
-/// For the exact way of a row: decimals are those of doubles, and arcs save memory.
+/// Options of a row's exact path: decimals are those of doubles, and arcs save memory.
 RowFitOptions exact_fit(const RowFitOptions& fit) {
   return {kExactRow * fit.tolerance,
           kExactRow * fit.slope_tolerance,
@@ -94,7 +94,7 @@ std::int64_t rows_at_once(const CutSurface& surface, const RasterPlan& plan) {
   return static_cast<std::int64_t>(std::clamp(rows, 1.0, static_cast<double>(kBatchRows)));
 }
 
-/// Where the tool's axis goes on some rows.
+/// Region of the tool's axis over some rows.
 Eigen::AlignedBox2d axis_box(const RasterPlan& plan, std::int64_t begin, std::int64_t count) {
   Eigen::AlignedBox2d axis;
   for (const std::int64_t row : {begin, begin + count - 1}) {
@@ -178,7 +178,7 @@ RowSpan RasterPlan::row_span(std::int64_t row) const {
           end + remaining};
 }
 
-/// Parts that are apart by less than kShortGap are one: the way up, across and down takes longer.
+/// Joins parts less than kShortGap apart: going up, across and down takes longer.
 std::vector<RowSpan> RasterPlan::row_spans(std::int64_t row) const {
   const RowSpan whole = row_span(row);
   if (rest == nullptr) return {whole};
@@ -224,7 +224,7 @@ RasterPlan plan_finish_raster(const Eigen::AlignedBox2d& surface, double radius,
                               const RasterOptions& options) {
   RasterPlan plan{surface, radius, options};
   const double width = surface.sizes()[1 - options.along];
-  // A quotient that is whole but for rounding must not cost a row.
+  // A quotient that is whole except for rounding must not cost a row.
   const double every = options.every;
   const double steps = every * std::max(1.0, std::ceil(width / (every * options.pitch) - 1e-9));
   plan.pitch = width / steps;
@@ -300,14 +300,14 @@ RasterSummary cut_raster(const CutSurface& surface, const RasterPlan& plan,
 
 namespace {
 
-/// Straight moves that go down by more than this, mm, and more steeply than surfaces that are
-/// finished to their rim are made at plunge feed: where a larger ball comes down from a lift.
+/// Straight moves that descend by more than this, mm, and more steeply than surfaces finished to
+/// their rim run at plunge feed: there a larger ball comes down from a lift.
 constexpr double kLow = 0.05;
 
-/// The same of ways from row to row where rows may end lifted, rise over run.
+/// The same limit for links between rows that may end lifted, rise over run.
 constexpr double kLiftedSlope = 0.3;
 
-/// Height over the row's highest point on the way back, mm: above rounding and what a servo lags.
+/// Height over the row's highest point on the way back, mm: above rounding and servo lag.
 constexpr double kHop = 0.05;
 
 double highest_of(const Eigen::Vector3d& start, const PathMove& move, int along) {
@@ -329,7 +329,7 @@ double highest_of(const RasterRow& row, int along) {
   return highest;
 }
 
-/// Makes the moves between rows and adds everything up.
+/// Makes the moves between rows and sums everything up.
 class FinishMoves {
  public:
   FinishMoves(const CutSurface& surface, const RasterPlan& plan, const FinishRun& run,

@@ -57,7 +57,7 @@ void split_move(const Eigen::Vector3d& begin, const PathMove& move, double lengt
       straight ? (move.end - begin).norm()
                : std::hypot(arc.radius * arc.sweep, move.end[arc.axis] - begin[arc.axis]);
   const double count = std::max(1.0, std::ceil(along / length - 1e-9));
-  // How far an arc leaves the chord of a part: r(1 − cos(sweep/2)).
+  // Maximum distance of an arc from the chord of a part: r(1 − cos(sweep/2)).
   const double bow = straight ? 0.0 : arc.radius * (1.0 - std::cos(0.5 * arc.sweep / count));
   Eigen::Vector3d from = begin;
   for (double i = 1.0; i <= count; ++i) {

@@ -11,7 +11,7 @@
 
 namespace lensforge {
 
-/// What a motion of the tool is for.
+/// Purpose of a motion of the tool.
 enum class MoveKind : std::uint8_t {
   kRapid,   ///< In air, as fast as the axes go.
   kPlunge,  ///< Down into material at the plunge feed, or a ramp or helix at it.
@@ -19,7 +19,8 @@ enum class MoveKind : std::uint8_t {
   kCut,     ///< At the cutting feed.
 };
 
-/// One motion of the tool's tip from where it is to `end`: mm, lens frame (not the program's).
+/// One motion of the tool's tip from its current place to `end`: mm, lens frame (not the
+/// program's).
 struct PathMove {
   MoveKind kind = MoveKind::kCut;
   Eigen::Vector3d end = Eigen::Vector3d::Zero();
@@ -34,7 +35,7 @@ struct PathMove {
 /// Takes the moves of an operation in order, many at a time; the span is valid during the call.
 using MoveSink = std::function<void(std::span<const PathMove>)>;
 
-/// A short part of a move.
+/// A short piece of a move.
 struct MovePiece {
   Eigen::Vector3d from;
   Eigen::Vector3d to;
@@ -44,28 +45,28 @@ struct MovePiece {
   [[nodiscard]] Eigen::Vector2d middle() const { return 0.5 * (from + to).head<2>(); }
 };
 
-/// Cuts a straight move or an arc that begins at `begin` into parts of at most `length` mm along it
-/// and hands them to `take` in order; one part at least.
+/// Cuts a straight move or an arc that begins at `begin` into pieces at most `length` mm long and
+/// passes them to `take` in order; at least one piece.
 void split_move(const Eigen::Vector3d& begin, const PathMove& move, double length,
                 const std::function<void(const MovePiece&)>& take);
 
-/// A number that was found to be the largest, and where.
+/// The largest value found, and its place.
 struct Extreme {
   double value = 0.0;
   Eigen::Vector3d place = Eigen::Vector3d::Zero();  ///< Tip, mm, lens frame.
 };
 
-/// What is known of every move of a finishing operation over its whole length, not only at its
-/// ends, against the exact drop curve.
+/// Bounds on every move of a finishing operation over its whole length, not only at its ends,
+/// against the exact drop curve.
 struct PathCertificate {
-  Extreme gouge;   ///< Deepest that the path runs below the drop curve, mm, ≥ 0.
-  Extreme excess;  ///< Highest that it runs above, mm, ≥ 0.
+  Extreme gouge;   ///< Maximum depth of the path below the drop curve, mm, ≥ 0.
+  Extreme excess;  ///< Maximum height of the path above it, mm, ≥ 0.
   /// Largest difference of mean slope over any 5 µm of a move where the ball shapes the surface,
   /// not only the rim, rad.
   Extreme slope;
 };
 
-/// What one operation came to; mm, lens frame.
+/// Summary of one operation; mm, lens frame.
 struct OperationSummary {
   std::string name;  ///< "rough", "semi", "finish", "cross", "pencil"
   int tool = 1;      ///< Tool::number
@@ -80,7 +81,7 @@ struct OperationSummary {
   double allowance = 0.0;   ///< Material left on the surface on purpose.
   Eigen::AlignedBox3d tip;  ///< Of all moves at feed.
   PathCertificate certificate;
-  bool certified = false;  ///< Whether `certificate` was computed.
+  bool certified = false;  ///< True if `certificate` was computed.
   std::vector<std::string> warnings;
 };
 

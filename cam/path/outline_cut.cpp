@@ -27,7 +27,7 @@ using Polygons = bg::model::multi_polygon<Polygon>;
 /// Chords of a full circle around a corner.
 constexpr int kChords = 720;
 
-/// Corners that stand out less than this from the line between their neighbours are left out, mm.
+/// Corners closer than this to the line between their neighbours are dropped, mm.
 constexpr double kSimplify = 0.002;
 
 Polygons grown(const Polygon& polygon, double distance) {
@@ -39,7 +39,7 @@ Polygons grown(const Polygon& polygon, double distance) {
   return result;
 }
 
-/// The largest part without what it encloses: no tool gets there from outside.
+/// The largest part without its holes, which no tool reaches from outside.
 Polygon outer(const Polygons& polygons) {
   const auto largest = std::max_element(
       polygons.begin(), polygons.end(),
@@ -56,8 +56,8 @@ OutlineWay offset_outline(const std::vector<Eigen::Vector2d>& polygon, double ra
   Polygon part;
   for (const Eigen::Vector2d& p : polygon) bg::append(part.outer(), Point(p.x(), p.y()));
   bg::correct(part);
-  // Chords lie inside of the circle around a corner; simplifying moves the way by kSimplify at
-  // most.
+  // Chords lie inside of the circle around a corner; simplifying moves the path by at most
+  // kSimplify.
   const double chord = std::cos(std::numbers::pi / kChords);
   const Polygon way = outer(grown(part, (radius + 0.5 * kOutlineOversize) / chord));
   Polygon simple;
@@ -77,13 +77,13 @@ namespace {
 constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr double kNever = -std::numeric_limits<double>::infinity();
 
-/// Starts of the tabs that are tried, in one interval from tab to tab.
+/// Starting points tried for the tabs, in one interval between tabs.
 constexpr int kStarts = 32;
 
-/// A notch that is left is worth a word from this area on, mm².
+/// Minimum area of a notch left uncut that is reported, mm².
 constexpr double kWorthTelling = 0.05;
 
-/// A closed way by its length from the first point.
+/// A closed path, parametrised by length from its first point.
 class Loop {
  public:
   explicit Loop(std::vector<Eigen::Vector2d> points) : points_(std::move(points)) {
@@ -96,7 +96,7 @@ class Loop {
   [[nodiscard]] double length() const { return at_.back(); }
   /// Lengths of the corners, 0 … length().
   [[nodiscard]] const std::vector<double>& corners() const { return at_; }
-  /// A length on the first turn.
+  /// A length reduced to the first turn.
   [[nodiscard]] double wrapped(double s) const { return s - length() * std::floor(s / length()); }
   [[nodiscard]] Eigen::Vector2d place(double s) const {
     const double on = wrapped(s);
@@ -116,7 +116,7 @@ class Loop {
 
 double ramp_slope(const OutlineCut& cut) { return std::tan(cut.ramp_angle_deg * kDegree); }
 
-/// Where the tool stays above the tabs, and comes down behind them.
+/// Heights of the tool over the tabs and on the ramps behind them.
 class Tabs {
  public:
   Tabs(const Loop& loop, const OutlineCut& cut, const Eigen::AlignedBox3d& blank)
@@ -133,16 +133,16 @@ class Tabs {
     for (int k = 0; k < cut.tabs.count; ++k) middles_.push_back(start + k * apart);
   }
 
-  /// Of the tab that has least, mm.
+  /// Of the tab with the least, mm.
   [[nodiscard]] double frame() const { return frame_; }
   [[nodiscard]] double ramp_length() const { return cut_.tabs.height / ramp_slope(cut_); }
 
-  /// Lowest that the tip may be at a place of the way, mm. @param sense  of the turn, 1 or −1.
+  /// Minimum height of the tip at a place of the path, mm. @param sense  of the turn, 1 or −1.
   [[nodiscard]] double floor(double s, double sense) const {
     double floor = kNever;
     for (const double middle : middles_) {
       double past = loop_.wrapped(sense * (s - middle) + half_);
-      // A place on the edge is in the tab whichever way it was rounded.
+      // A place on the edge belongs to the tab, however it was rounded.
       if (past > loop_.length() - kEdge) past = 0.0;
       const double behind = past - 2.0 * half_;
       floor = std::max(floor, cut_.tabs.height - ramp_slope(cut_) * std::max(0.0, behind));
@@ -165,9 +165,9 @@ class Tabs {
 
  private:
   static constexpr double kEdge = 1e-7;  ///< mm
-  static constexpr double kStep = 1e-3;  ///< On which the tool is lifted before a tab, mm.
+  static constexpr double kStep = 1e-3;  ///< Step over which the tool is lifted before a tab, mm.
 
-  /// Between the slot and the blank's edge, at the tab that has least.
+  /// Distance between the slot and the blank's edge, at the tab with the least.
   [[nodiscard]] double frame_at(double start, double apart,
                                 const Eigen::AlignedBox3d& blank) const {
     double least = std::numeric_limits<double>::infinity();
@@ -189,7 +189,7 @@ class Tabs {
   std::vector<double> middles_;
 };
 
-/// Of the way, for one tab and for getting down to the underside on both sides of it, mm.
+/// Length of the path for one tab and for ramping to the underside on both sides of it, mm.
 double room_for_tab(const OutlineCut& cut) {
   return cut.tabs.width + cut.tool.diameter + 2.0 * cut.tabs.height / ramp_slope(cut);
 }
@@ -200,7 +200,8 @@ class OutlineRun {
   OutlineRun(const Loop& loop, const Tabs& tabs, RoughMoves& moves)
       : loop_(loop), tabs_(tabs), moves_(moves) {}
 
-  /// One turn from height `from` to `to`, from the way's first point to it. @param sense  1 or −1.
+  /// One turn from height `from` to `to`, starting and ending at the path's first point. @param
+  /// sense  1 or −1.
   void turn(double from, double to, double sense) {
     std::vector<double> stops = stops_of(sense);
     if (sense < 0.0) std::reverse(stops.begin(), stops.end());
@@ -212,8 +213,8 @@ class OutlineRun {
     }
   }
 
-  /// To the way's first point at the bottom, where the tool may still be behind a tab: on along the
-  /// ramp to its end, and back.
+  /// Ends at the path's first point at the bottom. The tool may still be behind a tab: it follows
+  /// the ramp to its end, and returns.
   void settle(double bottom) {
     const std::vector<double> stops = stops_of(1.0);
     std::size_t k = 0;
@@ -224,7 +225,7 @@ class OutlineRun {
   }
 
  private:
-  static constexpr double kLevel = 1e-6;  ///< Of heights that are the same but for rounding, mm.
+  static constexpr double kLevel = 1e-6;  ///< Of heights that are equal except for rounding, mm.
 
   /// All places where the height may change, on the first turn.
   [[nodiscard]] std::vector<double> stops_of(double sense) const {
@@ -244,7 +245,7 @@ class OutlineRun {
   RoughMoves& moves_;
 };
 
-/// Lowest height of the tip at which it touches nothing anywhere on the way.
+/// Minimum height of the tip at which it touches nothing anywhere on the path.
 double top_of_material(const Loop& loop, const Tool& tool, StockMap& stock) {
   double top = stock.blank().min().z();
   const CutterProfile profile = cutting_profile(tool);

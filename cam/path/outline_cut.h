@@ -11,58 +11,57 @@
 
 namespace lensforge {
 
-/// Closed way of a tool's axis around a part.
+/// Closed path of a tool's axis around a part.
 struct OutlineWay {
   std::vector<Eigen::Vector2d> points;  ///< Counter-clockwise, mm.
   /// Area beside the part that the tool cannot reach, in notches narrower than it, mm².
   double left = 0.0;
 };
 
-/// How far the axis stays outside of its exact way, mm: the tool never cuts into the part, which is
-/// larger by this at most on straight sides and around its corners.
+/// Offset of the axis outwards from its exact path, mm: the tool never cuts into the part, which is
+/// at most this much larger on straight sides and around its corners.
 inline constexpr double kOutlineOversize = 0.005;
 
-/// The way on which a tool of this radius touches a polygon from outside.
+/// The path on which a tool of this radius touches a polygon from outside.
 /// @param polygon  counter-clockwise, not self-crossing, mm.
 OutlineWay offset_outline(const std::vector<Eigen::Vector2d>& polygon, double radius);
 
-/// What holds the part in its frame until it is snapped out.
+/// Tabs that hold the part in its frame until it is snapped out.
 struct TabOptions {
   int count = 4;        ///< ≥ 0
   double width = 3.0;   ///< Along the outline, at its narrowest, mm, > 0.
   double height = 0.8;  ///< Above the underside, mm, > 0.
 };
 
-/// How a part is cut out of its blank.
+/// Options for cutting a part out of its blank.
 struct OutlineCut {
   Tool tool;
   TabOptions tabs;
-  double stepdown = 1.0;        ///< A turn, at most, mm, > 0.
+  double stepdown = 1.0;        ///< Maximum per turn, mm, > 0.
   double ramp_angle_deg = 3.0;  ///< Steepest way into material.
   double safe_z = 5.0;          ///< Of rapid moves, mm, lens frame.
   double bottom = 0.0;          ///< Lowest tip, mm, lens frame: not below the blank's underside.
   double clearance = 0.5;       ///< Above material before the tool is fed, mm.
 };
 
-/// Frame that a tab has to hold on to, at least, mm.
+/// Minimum width of the frame behind a tab, mm.
 inline constexpr double kTabFrame = 2.0;
 
-/// The same cut with fewer tabs, where it has so many that the tool could not get down between them
-/// along its ramp; at least one.
+/// The same cut with fewer tabs, at least one, if the tool could not ramp down between them.
 OutlineCut with_tabs_that_fit(const std::vector<Eigen::Vector2d>& outline, OutlineCut cut);
 
 /// @throw InputError naming option, value and rule where a tool, or tabs, do not fit this part in
-///        this blank: tabs so near that the tool cannot get down between them, or without a frame
+///        this blank: tabs too close for the tool to get down between them, or without a frame
 ///        outside of the slot.
 void require_outline_cut(const std::vector<Eigen::Vector2d>& outline, const OutlineCut& cut,
                          const Eigen::AlignedBox3d& blank);
 
-/// Goes around the part in a helix from above the material down to the bottom, then once more each
-/// way along it. Where a tab stays the tool is lifted straight up and comes down behind
-/// it along the ramp; the turn the other way round takes what that has left. Tabs are evenly
-/// spaced, from where their frame is widest.
+/// Cuts around the part in a helix from above the material down to the bottom, then once more each
+/// way along it. At a tab the tool is lifted straight up and comes down behind it along the ramp;
+/// the turn in the other direction removes what the ramp left. Tabs are evenly spaced, starting
+/// where their frame is widest.
 /// @param outline  of the part, counter-clockwise, mm.
-/// @param stock    as it was left so far; the operation takes its cut from it.
+/// @param stock    current stock; the operation takes its cut from it.
 /// @pre require_outline_cut() passed. @throw Interrupted.
 OperationSummary cut_outline(const std::vector<Eigen::Vector2d>& outline, const OutlineCut& cut,
                              StockMap& stock, const MoveSink& sink, const RunControl& control);

@@ -19,7 +19,7 @@ namespace {
 /// A chain goes on over a vertex if it turns by less than this there: 60°.
 constexpr double kStraightOn = 0.5;
 
-/// Points of a valley that share a drop-cutter: about a millimetre.
+/// Number of points of a valley that share a drop-cutter: about a millimetre.
 constexpr std::size_t kStretchPoints = 100;
 
 /// An edge at the bottom of a valley.
@@ -65,7 +65,7 @@ class ValleyChains {
     }
   }
 
-  /// First from where valleys end or branch, then around those that close.
+  /// Starts where valleys end or branch, then takes closed ones.
   std::vector<Valley> run() {
     std::vector<Valley> valleys;
     for (const bool ends : {true, false}) {
@@ -168,7 +168,7 @@ Valley spaced(const Valley& valley, const PencilOptions& options) {
   return points;
 }
 
-/// A valley at the drop height, raised by what the drop curve can rise between points.
+/// A valley at the drop height, raised by the drop curve's maximum rise between points.
 struct RaisedValley {
   std::vector<Eigen::Vector3d> tips;
   Extreme excess;  ///< At the points.
@@ -184,7 +184,7 @@ CutterLocation resting(const DropCutter& cutter, const Eigen::Vector2d& p,
   return location;
 }
 
-/// A cutter for each stretch: the facets of a whole smooth surface would fill gigabytes.
+/// Uses a cutter for each stretch: the facets of a whole smooth surface would fill gigabytes.
 RaisedValley raised(const CutSurface& surface, const Valley& points, const PencilOptions& options) {
   constexpr double kSecant2 = 1.0 + kSteepestSlope * kSteepestSlope;
   const double rise =

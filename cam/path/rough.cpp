@@ -14,8 +14,8 @@
 namespace lensforge {
 namespace {
 
-/// Cells of the stock map: a quarter of the smallest default ball's diameter. On slopes of 0.3 it
-/// overstates the material by 0.03 mm.
+/// Cells of the stock map: a quarter of the smallest default ball's diameter. On slopes of 0.3 the
+/// map overstates the material by 0.03 mm.
 constexpr double kStockCell = 0.1;
 constexpr double kMaxCells = 2000.0;  ///< Along the blank's longer side.
 
@@ -54,14 +54,13 @@ Eigen::AlignedBox2d grown_by(const Eigen::AlignedBox2d& box, double beyond) {
   return {box.min() - all, box.max() + all};
 }
 
-/// How far beyond the lens the axes of later tools go: the finishing ball turns a full radius
-/// outside, and what it leaves untouched there has to be below it, so the semi-finishing tool goes
-/// twice as far.
+/// Distance beyond the lens of later tools' axes: the finishing ball turns a full radius outside
+/// and needs clear material there, so the semi-finishing tool goes twice as far.
 double axis_beyond(const Workshop& workshop) {
   return 2.0 * workshop.tool(workshop.process.finish.tool).radius();
 }
 
-/// Width beside the lens that has to be down at the rim's height when later tools come, mm.
+/// Width beside the lens that must be cleared to the rim's height before later tools come, mm.
 double cleared_width(const Workshop& workshop, const Eigen::AlignedBox3d& surface, double top) {
   const Tool& ball = workshop.tool(workshop.process.finish.tool);
   const double depth = top - surface.min().z() + ball.radius();
@@ -73,8 +72,8 @@ double cleared_width(const Workshop& workshop, const Eigen::AlignedBox3d& surfac
   return width + workshop.process.clearance;
 }
 
-/// Rectangle of the axis: `beyond` around the lens, or out of the blank altogether on a side where
-/// less than the tool's radius of it would be left standing.
+/// Rectangle of the axis: `beyond` around the lens, or out of the blank on sides where less than
+/// the tool's radius would be left standing.
 Eigen::AlignedBox2d axis_area(const RoughSite& site, double radius, double beyond) {
   const Eigen::AlignedBox2d lens = from_above(site.surface.bounds());
   const Eigen::AlignedBox2d blank = from_above(site.stock.blank());
@@ -99,8 +98,8 @@ std::vector<double> level_heights(double top, double lowest, double stepdown) {
   return levels;
 }
 
-/// With a spindle that turns clockwise a tool climbs where the uncut side, here that of the later
-/// passes, is on the right of its travel: towards −x with passes along x, towards +y along y.
+/// With a clockwise spindle a tool climbs where the uncut side, here that of the later passes, is
+/// on the right of its travel: towards −x with passes along x, towards +y along y.
 bool starts_backwards(const Raster& raster) {
   const bool climb_is_back = raster.along == PassAxis::kX;
   if (raster.style == PassStyle::kClimb) return climb_is_back;
@@ -121,7 +120,7 @@ class RasterRun {
                moves),
         backwards_(starts_backwards(raster)) {}
 
-  /// @return the parts of passes that were cut.
+  /// @return the number of parts of passes cut.
   std::int64_t level(double height, double previous, const RunControl& control) {
     std::int64_t cut = 0;
     for (std::int64_t pass = 0; pass < grid_.passes(); ++pass) {
@@ -153,7 +152,7 @@ class RasterRun {
                         (path.front() - moves_.at()).head<2>().norm() <= near;
     if (!beside || !cutting_ || !links_.cross(path.front(), height)) links_.enter(path);
     for (std::size_t i = 1; i < path.size(); ++i) moves_.feed(MoveKind::kCut, path[i]);
-    // What a clamp has lifted must not come down at the cutting feed.
+    // A tool lifted by a clamp must not come down at the cutting feed.
     cutting_ = !part.lifted;
   }
 
@@ -162,7 +161,7 @@ class RasterRun {
   RoughMoves& moves_;
   RoughLinks links_;
   bool backwards_;
-  bool cutting_ = false;  ///< The tool is where a pass ended that no clamp has lifted.
+  bool cutting_ = false;  ///< The tool is at the end of a pass that no clamp has lifted.
 };
 
 void warn_of_clamps(const RoughSite& site, const Raster& raster, OperationSummary& summary) {
@@ -189,10 +188,10 @@ void warn_of_flutes(const Tool& tool, const Extreme& deepest, OperationSummary& 
       decimal_text(tool.flute_length, 2) + " mm long: use smaller steps down or a longer tool");
 }
 
-/// What a run needs besides its site and raster.
+/// Further inputs of a run.
 struct RunPlan {
   double beyond;    ///< Of the axis, around the lens, mm.
-  double stepdown;  ///< 0: one level, wherever the surface is.
+  double stepdown;  ///< 0: one level that follows the surface.
 };
 
 RoughResult cut(const RoughSite& site, const Raster& raster, const RunPlan& plan,

@@ -11,7 +11,7 @@
 namespace lensforge {
 namespace {
 
-constexpr std::size_t kHeld = 4096;  ///< Moves handed on at a time.
+constexpr std::size_t kHeld = 4096;  ///< Moves passed on at a time.
 
 }  // namespace
 
@@ -50,11 +50,11 @@ void RoughMoves::flush() {
 
 namespace {
 
-/// Chords run at most this part of the spacing above the nodes: on slopes of a tenth as much as
-/// asking the surface at intervals costs.
+/// Maximum height of chords above the nodes, as a share of the spacing: on slopes a tenth of the
+/// cost of sampling the surface at intervals.
 constexpr double kChordShare = 0.1;
 
-/// Material thinner than this is none: rounding of heights.
+/// Thinner material is due to rounding of heights.
 constexpr double kNothing = 1e-9;
 
 std::int64_t intervals(double length, double step) {
@@ -111,7 +111,7 @@ void PassGrid::fill(std::int64_t pass, const TipFloor& floor) {
       ground_before = ground;
     }
     const Eigen::Vector2d p = place(pass, at);
-    // The floor itself is asked for where that can be the most only.
+    // The floor itself is computed only where it can be the maximum.
     if (nodes[i] - floor.at_least(p, trace) > excess.value) {
       const double above = nodes[i] - floor.over(p, 0.0, trace);
       if (above > excess.value) excess = {above, {p.x(), p.y(), nodes[i]}};
@@ -145,7 +145,7 @@ std::vector<PassPart> PassGrid::parts(std::int64_t pass, double level, double pr
   return all;
 }
 
-/// Whether a clamp keeps the tip above where level and surface let it go.
+/// True if a clamp keeps the tip above level and surface.
 bool PassGrid::lifted(std::int64_t pass, std::int64_t i, double level) const {
   if (ground_.empty()) return false;
   const double ground = ground_[static_cast<std::size_t>(pass * count_ + i)];
@@ -179,8 +179,8 @@ TipPath PassGrid::level_part(std::int64_t pass, std::int64_t begin, std::int64_t
   return path;
 }
 
-/// Greedy: every chord leaves on the nodes' height or above, with the least slope that clears all
-/// nodes passed, and runs as far as it stays within the chord's share of them.
+/// Greedy: every chord starts at the nodes' height or above, with the least slope that clears all
+/// nodes passed, and runs as far as it stays within kChordShare of them.
 TipPath PassGrid::chords(std::int64_t pass, std::int64_t begin, std::int64_t end,
                          double level) const {
   const double gate = kChordShare * spacing_;
@@ -213,15 +213,15 @@ TipPath PassGrid::chords(std::int64_t pass, std::int64_t begin, std::int64_t end
 
 namespace {
 
-/// Material no thicker than this is entered without a ramp: what a cell of the stock map, which is
-/// an upper bound, may show where there is none, mm.
+/// Maximum thickness of material entered without a ramp, mm: a cell of the stock map, an upper
+/// bound, may show as much where there is none.
 constexpr double kThinMaterial = 0.01;
 
-/// Rise over run of the floor on a helix' circle at most: lenses have no more. Over a rim or beside
-/// a clamp, where there is more, another circle or a ramp is taken.
+/// Maximum slope of the floor on a helix's circle: lenses have no more. Over a rim or beside a
+/// clamp, where it is steeper, another circle or a ramp is used.
 constexpr double kSteepestHelix = 0.5;
 
-/// A path cut off after some length seen from above, with that length up to each point.
+/// The first part of a path, of given length seen from above, with the length up to each point.
 struct Prefix {
   TipPath points;
   std::vector<double> lengths;
@@ -255,8 +255,8 @@ double steepest_of(const TipPath& path) {
   return steepest;
 }
 
-/// A closed circle around `centre` from `begin` on, counter-clockwise, in chords no longer than
-/// `spacing` and no fewer than twelve, at the height of `begin`.
+/// A closed circle around `centre` from `begin`, counter-clockwise, in at least twelve chords no
+/// longer than `spacing`, at the height of `begin`.
 TipPath circle_from(const Eigen::Vector3d& begin, const Eigen::Vector2d& centre, double spacing) {
   const Eigen::Vector2d arm = begin.head<2>() - centre;
   const double around = 2.0 * std::numbers::pi;
@@ -294,7 +294,7 @@ void RoughLinks::enter(const TipPath& path) {
   moves_.feed(MoveKind::kPlunge, begin);
 }
 
-/// Tried are the circles ahead, where the pass goes anyway, to its left and right, and behind.
+/// Tries the circles ahead, where the pass goes anyway, to its left and right, and behind.
 bool RoughLinks::helix(const TipPath& path) {
   if (!(site_.helix_radius > 0.0)) return false;
   const Eigen::Vector3d& begin = path.front();
@@ -313,8 +313,7 @@ bool RoughLinks::helix(const TipPath& path) {
   return false;
 }
 
-/// Every point as high as the floor over the chords beside it, so that none of them is below it
-/// anywhere on its length.
+/// Raises every point to the floor over the chords beside it, so that they are nowhere below it.
 void RoughLinks::lift_to_floor(TipPath& circle) const {
   TipFloor::Trace trace;
   const double lowest = circle.front().z();
@@ -330,7 +329,7 @@ void RoughLinks::lift_to_floor(TipPath& circle) const {
   circle.back() = circle.front();
 }
 
-/// From above all material on the circle, so that it is met from above only.
+/// Starts above all material on the circle, so that the tool meets it only from above.
 void RoughLinks::wind_down(const TipPath& circle) {
   double lift = 0.0;
   for (const Eigen::Vector3d& p : circle) {
@@ -348,8 +347,8 @@ void RoughLinks::wind_down(const TipPath& circle) {
   }
 }
 
-/// Forth and back along the first of the path, as often as its length asks for, sinking all the
-/// way.
+/// Goes to and fro along the first part of the path, as often as its length requires, descending
+/// all the time.
 void RoughLinks::ramp(const TipPath& path, double lift) {
   const double need = 0.5 * lift / std::tan(site_.ramp_angle_deg * std::numbers::pi / 180.0);
   const double leg = std::min(need, length_of(path));
@@ -414,8 +413,8 @@ double RoughLinks::air_above(const Eigen::Vector2d& p) {
   return height;
 }
 
-/// A height at which the whole tool goes straight to `to` above all material and clear of clamps;
-/// nothing if that is no lower than the safe height, or slower.
+/// A height at which the whole tool can go straight to `to` above all material and clear of clamps;
+/// nothing if that is not below the safe height, or slower.
 std::optional<double> RoughLinks::clear_height(const Eigen::Vector3d& to) {
   const Eigen::Vector3d& from = moves_.at();
   const Eigen::Vector3d& rate = site_.workshop.machine.max_rate;
@@ -437,7 +436,8 @@ std::optional<double> RoughLinks::clear_height(const Eigen::Vector3d& to) {
   return height;
 }
 
-/// To a place above `to` from which the tool is fed down through air, or to the material there.
+/// Moves to a place above `to` from which the tool is fed down through air, or to the material
+/// there.
 void RoughLinks::travel(const Eigen::Vector3d& to) {
   const std::optional<double> height = moves_.placed() ? clear_height(to) : std::nullopt;
   if (height) {

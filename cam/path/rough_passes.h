@@ -17,19 +17,19 @@
 
 namespace lensforge {
 
-/// Writes moves down: hands them to the sink many at a time, adds them up, and takes what they cut
-/// from the stock.
+/// Records moves: passes them to the sink many at a time, sums them up, and removes their cuts from
+/// the stock.
 class RoughMoves {
  public:
-  /// All references must outlive this; flush() is the caller's.
+  /// All references must outlive this. The caller calls flush().
   RoughMoves(const Tool& tool, StockMap& stock, const MoveSink& sink, OperationSummary& summary);
 
   void rapid(const Eigen::Vector3d& end);
   void feed(MoveKind kind, const Eigen::Vector3d& end);
-  /// The moves that are still held go to the sink.
+  /// Passes the moves still held to the sink.
   void flush();
 
-  /// False before the first move: nothing is known of where the tool is.
+  /// False before the first move: the tool's place is unknown.
   [[nodiscard]] bool placed() const { return placed_; }
   [[nodiscard]] const Eigen::Vector3d& at() const { return at_; }
   [[nodiscard]] const Extreme& deepest_cut() const { return deepest_; }
@@ -48,16 +48,16 @@ class RoughMoves {
   Extreme deepest_;
 };
 
-/// Parallel passes over a rectangle and how closely the surface is asked for along them.
+/// Parallel passes over a rectangle, and the sampling of the surface along them.
 struct PassLayout {
   Eigen::AlignedBox2d area;      ///< Of the tool's axis, mm.
-  Eigen::AlignedBox2d material;  ///< Where the axis is when the tool is over the blank, mm.
+  Eigen::AlignedBox2d material;  ///< Region of the axis where the tool is over the blank, mm.
   PassAxis along = PassAxis::kX;
-  double stepover = 1.0;  ///< Between passes at most, mm, > 0.
-  double spacing = 0.1;   ///< Between nodes along them at most, mm, > 0.
+  double stepover = 1.0;  ///< Maximum distance of passes, mm, > 0.
+  double spacing = 0.1;   ///< Maximum distance of nodes along them, mm, > 0.
 };
 
-/// Tips of the tool in the order of travel, mm, lens frame; two at least.
+/// Tips of the tool in the order of travel, mm, lens frame; at least two.
 using TipPath = std::vector<Eigen::Vector3d>;
 
 /// A part of a pass. Where a clamp lifts the tip off the surface, the part runs level.
@@ -66,10 +66,9 @@ struct PassPart {
   bool lifted = false;  ///< By a clamp.
 };
 
-/// The lowest that the tip may run along parallel passes. Heights belong to nodes, evenly spaced;
-/// a straight move between neighbouring nodes that is nowhere below them stays above the floor over
-/// its whole length, because each node is as high as the floor over the intervals beside it
-/// (TipFloor::over), not only as the floor at its place.
+/// Minimum heights of the tip along parallel passes, at evenly spaced nodes. A straight move
+/// between neighbouring nodes that is nowhere below them stays above the floor over its whole
+/// length, because each node is as high as the floor over the intervals beside it (TipFloor::over).
 class PassGrid {
  public:
   /// @throw Interrupted if `control` asks for an end.
@@ -77,19 +76,19 @@ class PassGrid {
            const RunControl& control);
 
   [[nodiscard]] std::int64_t passes() const { return passes_; }
-  /// Of neighbouring passes as laid out, mm.
+  /// Distance of neighbouring passes as laid out, mm.
   [[nodiscard]] double stepover() const { return stepover_; }
   /// Lowest of all nodes, mm.
   [[nodiscard]] double lowest() const;
-  /// Highest that a node is above the floor at its very place, mm; between nodes it can be more by
+  /// Maximum height of a node above the floor at its own place, mm; between nodes it can be more by
   /// the floor's slope times half a spacing.
   [[nodiscard]] Extreme excess() const;
 
-  /// The parts of a pass that have something to cut between the heights `previous` and `level`:
-  /// where its nodes are over the material and below `previous`, with one node beyond at either
-  /// end. The tip follows the nodes but never goes below `level`; chords are nowhere below the
-  /// nodes and at most a tenth of the spacing above them. A pass is divided beside every clamp, and
-  /// no part goes up or down along one: how the tool gets from part to part is for links.
+  /// The parts of a pass with something to cut between the heights `previous` and `level`: nodes
+  /// over the material and below `previous`, and one more at either end. The tip follows the nodes
+  /// but never goes below `level`; chords are nowhere below the nodes and at most a tenth of the
+  /// spacing above them. A pass is divided beside every clamp, and no part goes up or down along
+  /// one; RoughLinks connects the parts.
   [[nodiscard]] std::vector<PassPart> parts(std::int64_t pass, double level, double previous) const;
 
  private:
@@ -108,15 +107,15 @@ class PassGrid {
 
   PassLayout layout_;
   std::int64_t passes_;
-  std::int64_t count_;  ///< Nodes a pass.
+  std::int64_t count_;  ///< Nodes per pass.
   double stepover_;
   double spacing_;
   std::vector<double> nodes_;
-  std::vector<double> ground_;   ///< Nodes as they were without clamps; empty where there are none.
-  std::vector<Extreme> excess_;  ///< One a pass.
+  std::vector<double> ground_;   ///< Nodes without clamps; empty if there are none.
+  std::vector<Extreme> excess_;  ///< One per pass.
 };
 
-/// What links need to know of an operation. All references must outlive them.
+/// Inputs of the links of an operation. All references must outlive them.
 struct LinkSite {
   const Workshop& workshop;
   const Tool& tool;
@@ -124,33 +123,33 @@ struct LinkSite {
   StockMap& stock;
   double safe_z = 0.0;  ///< Of rapid moves, mm.
   double ramp_angle_deg = 3.0;
-  double helix_radius = 0.0;  ///< Of the axis' circle when entering, mm; 0 for ramps.
-  double spacing = 0.1;       ///< Of points at which floor and stock are asked for, mm.
+  double helix_radius = 0.0;  ///< Of the axis's circle when entering, mm; 0 for ramps.
+  double spacing = 0.1;       ///< Distance of points at which floor and stock are sampled, mm.
 };
 
-/// Nothing of blank and clamps is higher than this, mm.
+/// Height of the highest point of blank and clamps, mm.
 double highest_obstacle(const Workshop& workshop, const Eigen::AlignedBox3d& blank);
 
 /// Height of rapid moves in a workshop: Process::safe_height above blank and clamps, mm.
 double safe_height_of(const Workshop& workshop, const Eigen::AlignedBox3d& blank);
 
-/// Ways from one pass to the next.
+/// Links from one pass to the next.
 class RoughLinks {
  public:
   RoughLinks(const LinkSite& site, RoughMoves& moves);
 
-  /// To the beginning of `path` and into the material there, if there is any, no steeper against
-  /// path and floor than the ramp angle: down a helix through that beginning, counter-clockwise,
-  /// which a tool that turns clockwise cuts in climb, where one of four circles is nowhere steep;
-  /// else along the path, to and fro. Ends at the beginning of the path.
+  /// Moves to the beginning of `path` and into any material there, no steeper against path and
+  /// floor than the ramp angle: down a helix through that beginning, counter-clockwise (climb for a
+  /// tool that turns clockwise), if one of four circles is nowhere too steep; else to and fro along
+  /// the path. Ends at the beginning of the path.
   void enter(const TipPath& path);
 
-  /// Straight to `end` at feed, no lower than `level` and the floor, which may cut.
-  /// @return false, and does nothing, if the floor on the way is above the blank, if a clamp lifts
-  ///         it, or if the end is so far below the way that the tool would have to plunge to it.
+  /// Goes straight to `end` at feed, no lower than `level` and the floor; may cut.
+  /// @return false, without moving, if the floor on the way is above the blank, if a clamp lifts
+  ///         it, or if the end is so far below that the tool would have to plunge.
   bool cross(const Eigen::Vector3d& end, double level);
 
-  /// Up to the safe height.
+  /// Goes up to the safe height.
   void retract();
 
  private:

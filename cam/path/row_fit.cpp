@@ -11,29 +11,29 @@
 namespace lensforge {
 namespace {
 
-/// How far joints are moved, in gaps between them.
+/// Maximum movement of joints, in gaps between them.
 constexpr double kJointRoom = 0.45;
 
-/// Steps of the grid to either side among which a place for a joint is sought, and heights that
-/// need no better place, in units of the last decimal.
+/// Grid steps to either side searched for a joint's place; and the height error, in units of the
+/// last decimal, that needs no better place.
 constexpr int kGridTries = 8;
 constexpr double kOnGrid = 0.05;
 
-/// How far a joint between straight pieces may be cut off by being moved, in RowProfile::finest; of
-/// a coarse grid as much as heights are left off it: otherwise joints could not be moved by a step.
+/// Maximum cut at a joint between straight pieces when it is moved, in RowProfile::finest; on a
+/// coarse grid the heights' own rounding, since otherwise joints could not move by a step.
 constexpr double kCutOff = 4.0;
 
-/// Steps of the grid by which a level end is lengthened at most.
+/// Maximum grid steps by which a level end is lengthened.
 constexpr int kEndTries = 64;
 
-/// How far a height is off the grid, in units of the last decimal.
+/// Distance of a height from the grid, in units of the last decimal.
 double off_grid(double z, const ProgramGrid& grid) {
   const double units = (z - grid.z_zero) / grid.resolution;
   return std::abs(units - std::nearbyint(units));
 }
 
-/// The place at most `tries` steps of the grid from u at which a line through (u, z) is nearest to
-/// a height of the grid.
+/// The place within `tries` grid steps of u at which a line through (u, z) is closest to a height
+/// of the grid.
 double best_step(double u, double z, double slope, int tries, const ProgramGrid& grid) {
   const double first = grid.place(u) - u;
   double best = u;
@@ -48,8 +48,8 @@ double best_step(double u, double z, double slope, int tries, const ProgramGrid&
   return best;
 }
 
-/// First to where the curve crosses the nearest height of the grid, if that is near, which leaves
-/// what the curve rises within a step; then by whole steps.
+/// Moves first to where the curve crosses the nearest height of the grid, if that is close, which
+/// leaves the curve's rise within a step; then by whole steps.
 double place_on_grid(const RowProfile& profile, std::size_t joint, const ProgramGrid& grid,
                      std::size_t& hint) {
   const double u = profile.joints[joint];
@@ -70,7 +70,7 @@ double place_on_grid(const RowProfile& profile, std::size_t joint, const Program
   return best_step(u + moved, moved != 0.0 ? profile.at(u + moved, hint) : z, slope, tries, grid);
 }
 
-/// The place at most kEndTries steps from u, which lies on the grid, whose height is best.
+/// The place within kEndTries steps of u, which is on the grid, with the best height.
 double best_end(const RowProfile& profile, double u, double step, const ProgramGrid& grid) {
   std::size_t hint = step < 0.0 ? profile.u.size() : 0;
   double best = u;
@@ -88,7 +88,7 @@ double best_end(const RowProfile& profile, double u, double step, const ProgramG
 }  // namespace
 
 double to_resolution(double value, double resolution) {
-  // Dividing by the inverse, a power of ten, gives the double next to the decimal number.
+  // Dividing by the inverse, a power of ten, gives the double closest to the decimal number.
   const double inverse = std::round(1.0 / resolution);
   return std::round(value * inverse) / inverse;
 }
@@ -146,53 +146,53 @@ void level_ends(const ProgramGrid& grid, RowProfile& profile) {
 
 namespace {
 
-/// Part of the tolerances that chords between joints may use up.
+/// Share of the tolerances for chords between joints.
 constexpr double kJointShare = 0.2;
 
-/// How often the move before is shortened to let one from its end hold.
+/// Maximum number of times the previous move is shortened so that one from its end holds.
 constexpr int kRetries = 4;
 
 /// Arcs end this far from vertical: slope 5.
 constexpr double kArcRoom = 0.98;
 
-/// Unit of numbers that are not rounded, mm: only the rounding of doubles remains.
+/// Unit of numbers that are not rounded, mm: only rounding of doubles remains.
 constexpr double kUnrounded = 1e-12;
 
-/// Moves that look as if they held are shortened by this part as long as they do not.
+/// Moves that pass the quick test but do not hold are shortened by this fraction each time.
 constexpr std::size_t kShorten = 8;
 
-/// What a move that is long enough may turn off where nothing keeps the tolerances, in slope
-/// tolerances: blunter ones keep the moves after them from holding.
+/// Maximum turn of a move that is long enough where nothing keeps the tolerances, in slope
+/// tolerances: with more, the moves after it cannot hold.
 constexpr double kBlunt = 6.0;
 
-/// Moves shorter than this part of RowFitOptions::shortest are what a controller falls behind with:
-/// in their place one that is long enough turns off by up to so many slope tolerances.
+/// Share of RowFitOptions::shortest below which moves overload a controller. A longer move with an
+/// error of up to kMostTurn slope tolerances replaces them.
 constexpr double kTooShort = 0.5;
 constexpr double kMostTurn = 16.0;
 
-/// How near to the tolerances a look at the joints alone goes: what lies between adds to it.
+/// Share of the tolerances used by the quick test at joints: errors between the joints add to it.
 constexpr double kLookShare = 0.95;
 
-/// What the choice of an arc's centre may turn its ends by, in slope tolerances, and how many
-/// places to either side are looked at.
+/// Maximum turn of an arc's ends by the choice of its centre, in slope tolerances, and the places
+/// to either side that are tried.
 constexpr double kCentreTurn = 0.02;
 constexpr double kCentreTries = 16.0;
 
-/// What the radii of an arc may differ by without a look for a better centre, in what the slope
-/// tolerance allows over a kSlopeStretch.
+/// Difference of an arc's radii accepted without a search for a better centre, relative to the
+/// slope tolerance over a kSlopeStretch.
 constexpr double kMisfit = 0.01;
 
-/// Whether the arc from a to b is the graph of a height, and away from where it is steep.
+/// True if the arc from a to b is the graph of a height and nowhere too steep.
 bool is_graph(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const RowMove& move) {
   const double room = kArcRoom * (a - move.centre).norm();
   return std::abs(a.x() - move.centre.x()) < room && std::abs(b.x() - move.centre.x()) < room &&
          (a.y() > move.centre.y()) == move.cap && (b.y() > move.centre.y()) == move.cap;
 }
 
-/// The place on the program's grid near the bisector of a and b, `out` to the left of the chord,
-/// from which both are equally far as nearly as can be: what the radii differ by, about (b − a) ·
-/// (a + b − 2c) / 2ρ, counts as slack. Along the bisector the centre has room: moved by d it turns
-/// the arc's ends by L d / 2ρ².
+/// The place on the program's grid near the bisector of a and b, `out` to the left of the chord, at
+/// which their distances are most nearly equal: the radii's difference, about (b − a) · (a + b −
+/// 2c) / 2ρ, counts as slack. The centre may move along the bisector: a shift by d turns the arc's
+/// ends by L d / 2ρ².
 Eigen::Vector2d written_centre(const Eigen::Vector2d& a, const Eigen::Vector2d& b, double out,
                                const RowFitOptions& options) {
   const Eigen::Vector2d way = b - a;
@@ -218,14 +218,14 @@ Eigen::Vector2d written_centre(const Eigen::Vector2d& a, const Eigen::Vector2d& 
   return best;
 }
 
-/// The arc from one point to another that follows the points between them best. It is free of its
-/// neighbours' tangents, which differ by no more than the slope tolerance: where curvature changes
-/// at the rate k, an arc of length h is k h³/125 off the curve and k h²/12 off its slope, each of a
-/// biarc, bound to tangents at its ends, k h³/40 and k h²/6. Measured on rows of designed lenses,
-/// biarcs take 1.1 (facets) to 1.7 times (smooth surfaces) as many moves for the same tolerances,
-/// and a free choice between both none fewer. With s along the
-/// chord of length L and h square to it, circles through both ends are h = q (s (L − s) − h²) with
-/// their centre 1/(2q) below the chord's middle: q by least squares. `largest` is the radius, mm.
+/// The arc between two points that best fits the points between them. It ignores its neighbours'
+/// tangents, which differ by at most the slope tolerance: where curvature changes at the rate k, an
+/// arc of length h is off the curve by k h³/125 and off its slope by k h²/12; each arc of a biarc,
+/// bound to tangents at its ends, by k h³/40 and k h²/6. Biarcs take 1.1 times (facets) to 1.7
+/// times (smooth surfaces) as many moves on rows of designed lenses. With s along the chord of
+/// length L and h perpendicular to it, circles through both ends are h = q (s (L − s) − h²) with
+/// their centre 1/(2q) below the chord's middle: q by least squares. `largest` is the maximum
+/// radius, mm.
 std::optional<RowMove> arc_through(const std::vector<Eigen::Vector2d>& points, std::size_t from,
                                    std::size_t to, const RowFitOptions& options, double largest) {
   const Eigen::Vector2d& a = points[from];
@@ -250,13 +250,13 @@ std::optional<RowMove> arc_through(const std::vector<Eigen::Vector2d>& points, s
   return is_graph(a, b, move) ? std::optional(move) : std::nullopt;
 }
 
-/// Covers one row; keeps the error of what is settled.
+/// Fits one row; keeps the error of the settled moves.
 class RowFit {
  public:
   RowFit(const RowProfile& profile, const RowFitOptions& options)
       : options_(options), joints_(row_joints(profile, options.grid)), error_(profile) {}
 
-  /// Finds the moves; what they are is asked afterwards.
+  /// Finds the moves, which way() returns.
   void run() {
     const std::size_t last = joints_.written.size() - 1;
     std::size_t at = 0;
@@ -301,7 +301,7 @@ class RowFit {
     for (const Step& step : steps_) {
       const Reach& reach = step.reach;
       std::optional<RowMove> move;
-      // An arc as flat as may be must stay one without its rounding.
+      // An arc of maximum radius must still be one before rounding.
       if (reach.move.arc) {
         move = arc_through(joints_.exact, step.from, reach.joint, unrounded, 2.0 * kLargestArc);
       }
@@ -328,7 +328,7 @@ class RowFit {
   }
 
   /// One move between two joints that keeps the tolerances; its nodes are added to the error.
-  /// @param turn  what it may turn off, in slope tolerances.
+  /// @param turn  slope error allowed, in slope tolerances.
   std::optional<Reach> one_move(std::size_t from, std::size_t to, double turn = 1.0) {
     for (const bool arc : {false, true}) {
       if (arc && (!options_.arcs || to - from < 2)) continue;
@@ -338,8 +338,8 @@ class RowFit {
     return std::nullopt;
   }
 
-  /// Puts two moves of about the same length in place of the last one and of a short one that
-  /// follows, if they keep the tolerances.
+  /// Replaces the last move and a short one after it by two moves of about equal length, if they
+  /// keep the tolerances.
   bool share_way(const Reach& reach) {
     Step& last = steps_.back();
     const std::size_t middle = middle_of(last.from, reach.joint);
@@ -360,8 +360,8 @@ class RowFit {
     return false;
   }
 
-  /// A move, or a longer one in its place that turns off no farther than it must. Its nodes are
-  /// added to the error. @param settled  nodes of the error before it.
+  /// The move, or a longer replacement with the smallest slope error found. Adds its nodes to the
+  /// error. @param settled  nodes of the error before it.
   Reach long_enough(std::size_t from, std::size_t settled, const Reach& reach) {
     const double end = joints_.written[from].x() + kTooShort * options_.shortest;
     if (joints_.written[reach.joint].x() >= end) return reach;
@@ -376,7 +376,7 @@ class RowFit {
     return reach;
   }
 
-  /// The joint nearest to half the way from one to another.
+  /// The joint nearest to the middle between two.
   [[nodiscard]] std::size_t middle_of(std::size_t from, std::size_t to) const {
     const double place = 0.5 * (joints_.written[from].x() + joints_.written[to].x());
     const auto begin = joints_.written.begin() + static_cast<std::ptrdiff_t>(from);
@@ -391,8 +391,8 @@ class RowFit {
     return RowMove{joints_.written[to]};
   }
 
-  /// The farthest joint up to `limit` that one move from `from` reaches, as far as looks at the
-  /// joints tell; its nodes are added to the error.
+  /// The farthest joint up to `limit` that one move from `from` reaches, by the quick test; adds
+  /// its nodes to the error.
   std::optional<Reach> best_reach(std::size_t from, std::size_t limit) {
     if (error_.is_blunt(joints_.written[from], options_.slope_tolerance)) return std::nullopt;
     std::size_t by_line = farthest(from, limit, false);
@@ -407,9 +407,9 @@ class RowFit {
     return std::nullopt;
   }
 
-  /// The straight move from a joint that rounding turns least, of those of doubled lengths that
-  /// keep the height; where heights are coarse and directions fine, none keeps both. Its nodes are
-  /// added to the error.
+  /// The straight move from a joint with the smallest turn by rounding, among doubled lengths that
+  /// keep the height; where heights are coarse and slope tolerances fine, none keeps both. Adds its
+  /// nodes to the error.
   Reach straightest(std::size_t from, std::size_t last) {
     const std::size_t settled = error_.size();
     std::size_t best = from + 1;
@@ -420,7 +420,7 @@ class RowFit {
       const double turn = error_.turn(settled);
       error_.resize(settled);
       if (step > 1 && !close) break;
-      // Many moves too short for their decimals are no straighter than one that is long enough.
+      // Many moves too short for their decimals are no straighter than one long enough.
       if (turn < least || (turn < kBlunt * options_.slope_tolerance && too_short(from, best))) {
         least = turn;
         best = from + step;
@@ -431,7 +431,7 @@ class RowFit {
     return {best, move};
   }
 
-  /// Whether the move keeps the tolerances; its nodes are added to the error if so.
+  /// True if the move keeps the tolerances; its nodes are then added to the error.
   bool holds(std::size_t from, const RowMove& move, double turn = 1.0) {
     const std::size_t settled = error_.size();
     const double slope = turn * options_.slope_tolerance;
@@ -440,7 +440,7 @@ class RowFit {
     return false;
   }
 
-  /// Whether a move keeps the tolerances at its joints: few, but a good guess of the whole.
+  /// Quick test: true if a move keeps the tolerances at its joints.
   [[nodiscard]] bool looks_good(std::size_t from, std::size_t to, bool arc) {
     const std::optional<RowMove> move = move_to(from, to, arc);
     if (!move) return false;
@@ -448,7 +448,7 @@ class RowFit {
     const double slope = kLookShare * options_.slope_tolerance;
     const auto shapes = [&](double place) { return error_.profile().shapes(place); };
     look_.clear();
-    std::size_t back = 0;  // The last joint a kSlopeStretch or more behind.
+    std::size_t back = 0;  // The last joint at least a kSlopeStretch behind.
     for (std::size_t j = from; j <= to; ++j) {
       const double u = joints_.written[j].x();
       look_.push_back(curve.value(u) - joints_.height[j]);
@@ -467,8 +467,8 @@ class RowFit {
     return true;
   }
 
-  /// The farthest joint that one move seems to reach, as far as doubling and halving steps tell;
-  /// `from` if there is none.
+  /// The farthest joint that one move reaches by the quick test, found by doubling and halving
+  /// steps; `from` if there is none.
   std::size_t farthest(std::size_t from, std::size_t last, bool arc) {
     std::size_t good = from;
     std::size_t bad = last + 1;
@@ -497,7 +497,7 @@ class RowFit {
   RowJoints joints_;
   RowError error_;
   std::vector<Step> steps_;
-  std::vector<double> look_;  ///< Errors at the joints that were looked at last.
+  std::vector<double> look_;  ///< Errors at the joints tested last.
 };
 
 }  // namespace

@@ -9,7 +9,7 @@
 
 namespace lensforge {
 
-/// The value on the program's grid that is nearest to `value` mm.
+/// The value on the program's grid nearest to `value`, mm.
 double to_resolution(double value, double resolution);
 
 /// The numbers that a program can hold.
@@ -23,38 +23,38 @@ struct ProgramGrid {
   }
 };
 
-/// Where moves may begin and end, ascending along the row, each place on the grid once.
+/// Possible ends of moves, ascending along the row, each place on the grid once.
 struct RowJoints {
   std::vector<Eigen::Vector2d> exact;    ///< On the drop curve.
   std::vector<Eigen::Vector2d> written;  ///< On the program's grid.
   std::vector<double> height;            ///< Of the drop curve at the written places.
 };
 
-/// The joints of a profile, moved to where the drop curve's height is one that the program can
-/// hold: half a unit of the sixth decimal at both ends of a kSlopeStretch is 0.2 mrad, and a move
-/// that begins with such an error hands it on to the next.
+/// The joints of a profile, moved to places where the drop curve's height is on the program's grid:
+/// half a unit of the sixth decimal at both ends of a kSlopeStretch is 0.2 mrad, and a move that
+/// begins with such an error passes it on to the next.
 RowJoints row_joints(const RowProfile& profile, const ProgramGrid& grid);
 
-/// Lets the level ends of a profile begin a little earlier, where the drop curve's height is one
-/// that the program can hold: the corners there can be left by no other way.
+/// Moves the beginnings of a profile's level ends inwards to where the drop curve's height is on
+/// the program's grid; otherwise no move could leave the corners there.
 /// @pre the profile is that of RowCurves::profile(): its first and last pieces are level.
 void level_ends(const ProgramGrid& grid, RowProfile& profile);
 
-/// How closely moves follow a row's drop curve, and what numbers a program can hold.
+/// Tolerances of a row's fit, and the numbers that a program can hold.
 struct RowFitOptions {
   double tolerance = 0.0005;      ///< Farthest from the drop curve, mm.
   double slope_tolerance = 1e-3;  ///< Largest difference of slope over a kSlopeStretch.
   ProgramGrid grid;
-  bool arcs = false;          ///< Whether moves may be arcs of circles.
-  double shortest = 0.0;      ///< Moves should not be shorter, mm, ≥ 0: controllers fall behind.
+  bool arcs = false;      ///< True if moves may be circular arcs.
+  double shortest = 0.0;  ///< Shortest move to aim for, mm, ≥ 0: shorter ones overload controllers.
   std::stop_token stop = {};  ///< Ends the fit.
 };
 
-/// Radius of an arc at most, mm: a controller that reckons in single precision places a point of it
-/// to a tenth of a micrometre.
+/// Maximum radius of an arc, mm: a controller with single precision places a point of it to a tenth
+/// of a micrometre.
 inline constexpr double kLargestArc = 1000.0;
 
-/// A way along a row.
+/// Path along a row.
 struct RowWay {
   Eigen::Vector2d start = Eigen::Vector2d::Zero();
   std::vector<RowMove> moves;
@@ -65,19 +65,19 @@ struct FittedRow : RowWay {
   PathCertificate certificate;  ///< RowError::certificate() of the rounded ones.
 };
 
-/// Covers a row's drop curve with straight moves and arcs, greedily: from every end a move that
-/// reaches about the farthest joint within the tolerances. Moves begin and end on the drop curve to
-/// the resolution, and hold the tolerances over their whole length (RowError) unless not even the
-/// way to the next joint does, because rounding turns it: the certificate says what came of it.
-/// Where a move ends up shorter than `shortest`, it shares the way of the one before; where it
-/// stays shorter than half of that, a longer one that turns off farther takes its place, as the
-/// certificate says.
+/// Covers a row's drop curve with straight moves and arcs, greedily: each move reaches about the
+/// farthest joint within the tolerances. Moves begin and end on the drop curve to the resolution.
+/// They hold the tolerances over their whole length (RowError) unless rounding turns even the move
+/// to the next joint too far; the certificate then states the result. A move shorter than
+/// `shortest` is merged with the one before and both are divided anew; if it stays shorter than
+/// half of `shortest`, a longer move with a larger slope error replaces it, which the certificate
+/// includes.
 FittedRow fit_row(const RowProfile& profile, const RowFitOptions& options);
 
-/// The way of fit_row() alone.
+/// The path of fit_row() alone.
 RowWay fit_way(const RowProfile& profile, const RowFitOptions& options);
 
-/// How far straight moves between joints may be off.
+/// Error allowed to straight moves between joints, mm.
 double joint_bow(const RowFitOptions& options);
 
 }  // namespace lensforge

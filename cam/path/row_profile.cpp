@@ -12,45 +12,45 @@
 namespace lensforge {
 namespace {
 
-/// Arcs are cut no finer than this, mm; only next to a vertical wall is it not fine enough.
+/// Minimum step on arcs, mm; too coarse only next to a vertical wall.
 constexpr double kFinestStep = 1e-9;
 
-/// Arcs whose slope turns by less than this count as parabolas.
+/// Arcs whose slope changes by less than this count as parabolas.
 constexpr double kParabolaTurn = 0.1;
 
-/// How far a polyline is off, as a share of what chords between joints may be: what a certificate
-/// adds for it, 4 times as much, is a tenth of the tolerances then.
+/// Error of a polyline as a share of that of chords between joints: a certificate then adds 4 times
+/// as much, a tenth of the tolerances.
 constexpr double kBowShare = 0.125;
 
-/// Gaps up to this length, mm, are rounding.
+/// Gaps up to this length, mm, are due to rounding.
 constexpr double kGap = 1e-8;
 
-/// Length of the stretches that a ball rolls along at once, and of those it is given up on, in
-/// radii: on longer ones the bounds of what bends where are coarser.
+/// Length of the stretches that a ball rolls along at once, and the minimum at which it gives up,
+/// in radii: curvature bounds are coarser over longer ones.
 constexpr double kStretch = 0.125;
 constexpr double kMinStretch = 0.005;
 
-/// Distance of nodes of a ball that is lifted, mm, at most: at each of them the lift is known.
+/// Maximum distance of nodes of a lifted ball, mm; the lift is computed at each.
 constexpr double kLiftNodes = 0.02;
 
-/// A ball clears a gap rising this many times as steeply as its drop curve can.
+/// To clear a gap, a ball rises this many times as steeply as its drop curve can.
 constexpr double kRoof = 1.1;
 
-/// Length over which that is judged, mm.
+/// Length over which that slope is bounded, mm.
 constexpr double kRoofRun = 1.0;
 
-/// How far above what could hold it a ball passes over a gap, and how long the way there is, mm, at
-/// least.
+/// Minimum height of a ball above anything that could hold it in a gap, and minimum length of its
+/// path there, mm.
 constexpr double kClear = 0.01;
 
-/// Distance of contact and axis at most, in radii: farther out a ball rests on slopes above 4.9
-/// only, steeper than anything that is finished (RasterOptions::rim_slope).
+/// Maximum distance of contact and axis, in radii: beyond it a ball rests only on slopes above 4.9,
+/// steeper than any finished surface (RasterOptions::rim_slope).
 constexpr double kFarthestRest = 0.98;
 
-/// Length of the stretches that facets are made for at once, mm.
+/// Length of the stretches whose facets are made at once, mm.
 constexpr double kFacetStretch = 1.0;
 
-/// Places this near before the end of a stretch, in stretches, belong to the next: rounding.
+/// Places this close before the end of a stretch, in stretches, belong to the next: rounding.
 constexpr double kSameStretch = 1e-6;
 
 [[noreturn]] void throw_nothing_under(const AxisLine& line, double u) {
@@ -77,8 +77,9 @@ void follow(const CurvePiece& piece, double from, double to, RowProfile& profile
   add_node(to, piece.value(to), profile);
 }
 
-/// Appends joints after `from` up to `to`. Over a chord a parabola rises by half of what its end
-/// tangents rise, by the square of its width; steep arcs are no parabolas and are halved first.
+/// Appends joints after `from` up to `to`. A parabola rises over a chord by half the rise of its
+/// end tangents, proportional to the square of the chord's width; steep arcs are no parabolas and
+/// are halved first.
 void add_joints(const CurvePiece& piece, double from, double to, double bow, RowProfile& profile) {
   const double off = 0.5 * bulge(piece, from, to);
   const double turn = std::abs(piece.slope(to) - piece.slope(from));
@@ -121,7 +122,7 @@ void add_facets(const DropCutter& cutter, const AxisLine& line, double from, dou
   }
 }
 
-/// Appends the nodes of a smooth stretch, every so many of them a joint.
+/// Appends the nodes of a smooth stretch, with joints at regular intervals.
 void add_nodes(const CurveNodes& nodes, double bow, bool lifted, RowProfile& profile) {
   const std::size_t last = nodes.u.size() - 1;
   // A lift may turn at every node.
@@ -137,8 +138,9 @@ void add_nodes(const CurveNodes& nodes, double bow, bool lifted, RowProfile& pro
   profile.error = std::max(profile.error, nodes.error);
 }
 
-/// Rise over run of the drop curve at most over a part of a row: that of the ball where it touches,
-/// which is no farther from the axis than the axis is outside the rim, and the contact from there.
+/// Maximum slope of the drop curve over a part of a row: that of the ball at its contact, whose
+/// distance from the axis is at most that of the axis outside the rim plus that of the contact from
+/// there.
 double steepest_drop(const SmoothBed& bed, const Eigen::AlignedBox2d& axis) {
   const Eigen::AlignedBox2d& box = bed.surface().box();
   const double outside =
@@ -152,7 +154,8 @@ void extend_shaped(double place, RowProfile& profile) {
   profile.shaped_to = std::max(profile.shaped_to, place);
 }
 
-/// Takes in the places where the ball touches the surface within its rim across the row.
+/// Extends the shaped range by the places where the ball touches the surface within its rim across
+/// the row.
 void extend_shaped(const CurveNodes& nodes, const Eigen::AlignedBox2d& box, int along,
                    RowProfile& profile) {
   for (std::size_t i = 0; i < nodes.u.size(); ++i) {
@@ -163,8 +166,8 @@ void extend_shaped(const CurveNodes& nodes, const Eigen::AlignedBox2d& box, int 
   }
 }
 
-/// How long a line from the end of a gap at `u` towards `far`, `rise` mm high, has to be so that
-/// the drop curve stays below it: the bound is closer over a short way, if that is long enough.
+/// Length of a line from the end of a gap at `u` towards `far`, `rise` mm high, that keeps the drop
+/// curve below it: the bound is tighter over a short line, if that is long enough.
 double run_of(const SmoothBed& bed, const AxisLine& line, double u, double far, double rise) {
   const double end = u + std::clamp(far - u, -kRoofRun, kRoofRun);
   const auto run_to = [&](double to) {
@@ -205,13 +208,13 @@ const DropCutter& RowCurves::facets(int along, std::int64_t number) const {
     const auto place = static_cast<double>(number);
     axis.min()[along] = std::max(axis.min()[along], place * kFacetStretch);
     axis.max()[along] = std::min(axis.max()[along], (place + 1.0) * kFacetStretch);
-    // By one thread: the others wait here.
+    // On one thread: the others wait here.
     stretch.cutter = surface_->cutter(axis, Executor::serial());
   });
   return *stretch.cutter;
 }
 
-/// Facets are made for the stretches where they are followed.
+/// Makes facets only for the stretches where they are followed.
 void RowCurves::follow_facets(const RowSpan& span, double from, double to, double bow,
                               RowProfile& profile) const {
   for (double at = from; at < to;) {
@@ -224,9 +227,9 @@ void RowCurves::follow_facets(const RowSpan& span, double from, double to, doubl
   }
 }
 
-/// Facets lie off the surface that is rolled on by CutSurface::deviation() at most. So that a path
-/// does not step where one goes over into the other, the facets' curve is lifted by what it is off
-/// at its ends, in between by a share of both.
+/// Facets deviate from the surface by at most CutSurface::deviation(). So that the path has no step
+/// between them, the facets' curve is lifted by its deviation at its ends and interpolated in
+/// between.
 void RowCurves::bridge(const RowSpan& span, double from, const CurveNodes* next, double to,
                        double bow, RowProfile& profile) const {
   const std::size_t first = profile.u.size();
@@ -249,8 +252,8 @@ void RowCurves::bridge(const RowSpan& span, double from, const CurveNodes* next,
   }
 }
 
-/// Between two places where its height is known the drop curve lies below lines that rise from both
-/// more steeply than it can, and nowhere is it higher than what can hold the ball there.
+/// Between two places of known height the drop curve lies below lines that rise from both more
+/// steeply than it can, and nowhere above anything that can hold the ball there.
 void RowCurves::clear(const RowSpan& span, double from, const CurveNodes* next, double to,
                       RowProfile& profile) const {
   Eigen::AlignedBox2d axis(span.line.at(from));
@@ -259,7 +262,7 @@ void RowCurves::clear(const RowSpan& span, double from, const CurveNodes* next, 
   const double highest = bed.bounds().over(bed.footprint(axis)).highest;
   const double before = profile.u.size() > 1 ? profile.z.back() : highest;
   const double after = next != nullptr ? next->z.front() : highest;
-  // Lifted ends may be above. Moves too short for the program's decimals are left out.
+  // Lifted ends may be higher. Moves too short for the program's decimals are left out.
   const double top = std::max({highest, before, after}) + kClear;
   const double left = run_of(bed, span.line, from, to, top - before);
   const double right = run_of(bed, span.line, to, from, top - after);
@@ -280,8 +283,8 @@ void RowCurves::clear(const RowSpan& span, double from, const CurveNodes* next, 
   add(to, after);
 }
 
-/// Stretches end at fixed places. One that cannot be rolled along is halved down to kMinStretch:
-/// shorter ones are judged more finely. What is left open at last is cut from facets.
+/// Stretches end at fixed places. A stretch that cannot be rolled along is halved down to
+/// kMinStretch, because shorter ones have tighter bounds. What remains is cut from facets.
 void RowCurves::roll(const RowSpan& span, double bow, RowProfile& profile) const {
   SmoothRoll ball(*surface_->bed(), span.line);
   const BallLift* const lift = surface_->lift();
@@ -290,7 +293,7 @@ void RowCurves::roll(const RowSpan& span, double bow, RowProfile& profile) const
   const double least = kMinStretch * surface_->radius();
   const Eigen::AlignedBox2d& box = surface_->bed()->surface().box();
   std::swap(profile.shaped_from, profile.shaped_to);  // Nothing yet.
-  double open = span.held_from;  // From here to `begin` the curve is not known yet.
+  double open = span.held_from;                       // The curve is unknown from here to `begin`.
   double begin = span.held_from;
   while (begin < span.held_to) {
     if (stop_.stop_requested()) throw Interrupted();
@@ -345,8 +348,8 @@ RowProfile RowCurves::profile(const RowSpan& span, double bow) const {
 
 namespace {
 
-/// Length of the chords of a move's curve that are off by `error` at most, mm: wherever it is
-/// no steeper than at its ends, a circle bends by ρ²/(ρ² − d²)^1.5 at most, d being the distance
+/// Maximum length of chords of a move's curve with an error of at most `error`, mm: where it is no
+/// steeper than at its ends, a circle's curvature is at most ρ²/(ρ² − d²)^1.5, d being the distance
 /// from its centre along u.
 double longest_chord(const CurvePiece& curve, double error) {
   if (curve.straight()) return HUGE_VAL;
@@ -356,8 +359,9 @@ double longest_chord(const CurvePiece& curve, double error) {
   return std::sqrt(8.0 * error * rise2 * std::sqrt(rise2) / curve.rho2);
 }
 
-/// How far a controller's way from start to end can be off the circle through the start, along z:
-/// where rounding leaves two radii, some keep the first and jump, some wind from one to the other.
+/// Maximum deviation along z of a controller's path from start to end from the circle through the
+/// start: where rounding leaves two radii, some controllers keep the first and jump, others spiral
+/// from one to the other.
 double radius_slack(const Eigen::Vector2d& start, const RowMove& move, const CurvePiece& curve) {
   const double radius = (start - move.centre).norm();
   const double misfit = std::abs((move.end - move.centre).norm() - radius);
@@ -390,15 +394,15 @@ std::size_t RowError::node_after(double u) const {
   return next;
 }
 
-/// The error where a move starts; where the drop curve jumps there, that beyond the jump: the move
-/// before it ended below. @param next  node_after()
+/// The error at a move's start; where the drop curve jumps there, that after the jump: the previous
+/// move ended before it. @param next  node_after()
 double RowError::start_error(const Eigen::Vector2d& start, std::size_t next) const {
   std::size_t hint = std::max<std::size_t>(next, 1) - 1;
   return start.y() - profile_.at(start.x(), hint);
 }
 
 /// Appends the nodes of a move, one piece of the drop curve after the other while `go_on()`.
-/// @return whether it did so to the end.
+/// @return true if it reached the end.
 template <class GoOn>
 bool RowError::append(const Eigen::Vector2d& start, const RowMove& move, const GoOn& go_on) {
   const CurvePiece curve = move_curve(start, move);
@@ -447,8 +451,8 @@ void RowError::add_node(const CurvePiece& curve, const Eigen::Vector2d& at, doub
   nodes_.push_back({at.x(), path - at.y(), slack, path});
 }
 
-/// Appends the nodes from the last one to `to`, a point of the drop curve between which and the
-/// last node the drop curve is straight.
+/// Appends the nodes from the last one to `to`, a point of the drop curve; the drop curve is
+/// straight in between.
 void RowError::follow(const CurvePiece& curve, double from, const Eigen::Vector2d& to,
                       double slack) {
   if (bulge(curve, from, to.x()) > profile_.finest) {
@@ -473,26 +477,26 @@ RowError::Error RowError::error_at(double u, std::size_t& hint) const {
   return {error, std::max(a.slack, b.slack)};
 }
 
-/// Whether the direction shapes the surface at a node and `way` from it.
+/// True if the direction shapes the surface at a node and at a distance `way` from it.
 bool RowError::shapes(std::size_t node, double way) const {
   return profile_.shapes(nodes_[node].u) && profile_.shapes(nodes_[node].u + way);
 }
 
-/// The difference of slope over a stretch with these errors at its ends, at most.
+/// Maximum difference of slope over a stretch with these errors at its ends.
 double RowError::turn_between(const Error& a, const Error& b) {
   return (std::abs(a.value - b.value) + a.slack + b.slack) / kSlopeStretch;
 }
 
-/// The difference of slope over the stretch before a node, at most; 0 where none is looked at.
+/// Maximum difference of slope over the stretch before a node; 0 if none is checked.
 double RowError::turn_behind(std::size_t node, std::size_t& hint) const {
   const double u = nodes_[node].u - kSlopeStretch;
   if (u < nodes_.front().u || !shapes(node, -kSlopeStretch)) return 0.0;
   return turn_between(error_of(node), error_at(u, hint));
 }
 
-/// The largest over stretches that begin at nodes and end at node `first` or later; stops at one
-/// that is more than enough.
-/// @param goes_on  whether stretches may reach beyond the end, where the error stays as it is.
+/// The maximum over stretches that begin at nodes and end at node `first` or later; stops at one
+/// above `enough`.
+/// @param goes_on  true if stretches may extend beyond the end, where the error stays constant.
 RowError::Turn RowError::most_turn_ahead(std::size_t first, double enough, bool goes_on) const {
   Turn most;
   const double end = nodes_.back().u;

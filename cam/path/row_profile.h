@@ -20,58 +20,58 @@
 
 namespace lensforge {
 
-/// Where a row runs: over the whole of from … to, along the drop curve on held_from … held_to and
+/// Extent of a row: it runs from `from` to `to`, along the drop curve on held_from … held_to and
 /// level beyond.
 struct RowSpan {
-  AxisLine line;  ///< Over which the drop curve is taken.
+  AxisLine line;  ///< Line over which the drop curve is taken.
   double from = 0.0, to = 0.0;
   double held_from = 0.0, held_to = 0.0;
 };
 
-/// Farthest that the polyline of a profile may be off, mm: both ends of a kSlopeStretch then add
-/// 2e-5 rad to a certificate. Reached but on walls steeper than 1 : 1000.
+/// Maximum error of a profile's polyline, mm; the errors at both ends of a kSlopeStretch then add
+/// 2e-5 rad to a certificate. Reached except on walls steeper than 1 : 1000.
 inline constexpr double kProfileError = 5e-8;
 
-/// The drop curve of a row as a polyline that is nowhere farther from it than `error`, an upper
-/// bound: what fits and certificates are made against.
+/// The drop curve of a row as a polyline whose distance from it is at most `error`. Fits and
+/// certificates use it.
 struct RowProfile {
   std::vector<double> u;  ///< Ascending, mm.
   std::vector<double> z;  ///< mm
-  /// Where moves may well begin and end, ascending: where the curve goes over from one piece to the
-  /// next, and on its arcs so close that chords between them are `bow` off.
+  /// Preferred places for moves to begin and end, ascending: the ends of the curve's pieces, and
+  /// places on its arcs so close that chords between them are off by `bow`.
   std::vector<double> joints;
   double error = 0.0;             ///< mm
-  double finest = kProfileError;  ///< What chords are meant to be off at most, mm.
-  /// Beyond these places the ball touches but the surface's rim, mm: its direction shapes nothing.
+  double finest = kProfileError;  ///< Intended maximum error of chords, mm.
+  /// Beyond these places the ball touches only the surface's rim, mm: its direction shapes nothing.
   double shaped_from = -HUGE_VAL, shaped_to = HUGE_VAL;
 
   [[nodiscard]] bool shapes(double place) const {
     return place >= shaped_from && place <= shaped_to;
   }
 
-  /// Height on the polyline. `hint` is where the search begins and the segment it ended in.
+  /// Height on the polyline. `hint` is the segment to start the search from; set to the one found.
   [[nodiscard]] double at(double place, std::size_t& hint) const;
 };
 
-/// Drop curves for rows that lie beside each other.
+/// Drop curves of neighbouring rows.
 ///
-/// On a smooth surface they follow a ball that rolls on the surface itself (SmoothRoll). Where it
-/// cannot, because the surface bends upwards about as sharply as the ball, they follow the facets
-/// of the surface, whose heights are off by CutSurface::deviation(). A ball that CutSurface::lift()
-/// holds above its drop curve is lifted at every node; it may stay clear of such places.
+/// On a smooth surface they follow a ball that rolls on the surface itself (SmoothRoll). Where the
+/// surface's upward curvature is close to the ball's, they follow its facets, whose heights have an
+/// error of CutSurface::deviation(). Where CutSurface::lift() holds the ball above its drop curve,
+/// it is lifted at every node; it may stay clear of such places.
 class RowCurves {
  public:
-  /// Of facets. `cutter` must outlive this.
+  /// Drop curves of facets. `cutter` must outlive this.
   explicit RowCurves(const DropCutter& cutter);
-  /// @param axis  where the tool's axis goes on all rows. `surface` must outlive this.
+  /// @param axis  region of the tool's axis over all rows. `surface` must outlive this.
   RowCurves(const CutSurface& surface, const Eigen::AlignedBox2d& axis, const Executor& executor);
 
-  /// @param bow  of chords between joints on arcs at most, about, mm, > 0. The polyline is off by
-  ///             kBowShare of it, but by no more than kProfileError.
+  /// @param bow  approximate maximum error of chords between joints on arcs, mm, > 0. The
+  ///             polyline's error is kBowShare of it, at most kProfileError.
   /// @throw InputError if there is nothing under the ball somewhere on the row.
   /// @throw Interrupted when stop() is requested.
   [[nodiscard]] RowProfile profile(const RowSpan& span, double bow) const;
-  /// Whether a ball rolls on the surface itself, but for some places.
+  /// True if the ball rolls on the surface itself, except in some places.
   [[nodiscard]] bool rolls() const { return surface_ != nullptr && surface_->bed() != nullptr; }
   /// The executor's.
   [[nodiscard]] const std::stop_token& stop() const { return stop_; }
@@ -86,7 +86,7 @@ class RowCurves {
              RowProfile& profile) const;
   void follow_facets(const RowSpan& span, double from, double to, double bow,
                      RowProfile& profile) const;
-  /// Of a stretch of rows along x or y, made when the first row asks for it.
+  /// Facets of a stretch of rows along x or y, made when the first row asks for them.
   [[nodiscard]] const DropCutter& facets(int along, std::int64_t number) const;
 
   struct Stretch {
@@ -103,49 +103,49 @@ class RowCurves {
   const DropCutter* given_ = nullptr;
 };
 
-/// One motion of the tip in the vertical plane of a row, (u, z) in mm, to `end`; as it will be
-/// written: all numbers lie on the program's grid.
+/// One motion of the tip in the vertical plane of a row, (u, z) in mm, to `end`; all numbers are on
+/// the program's grid.
 struct RowMove {
   Eigen::Vector2d end = Eigen::Vector2d::Zero();
   bool arc = false;
-  bool cap = false;                                  ///< The arc bends down, its centre is below.
+  bool cap = false;                                  ///< The arc bends down; its centre is below.
   Eigen::Vector2d centre = Eigen::Vector2d::Zero();  ///< Of the arc.
 };
 
-/// Length over which directions are compared, mm: a crease that the path rounds off counts by what
-/// it turns this much of the path, not by its own angle on the last nanometre before it. Half of
-/// the finest spacing at which a milled surface is looked at.
+/// Length over which directions are compared, mm: a crease that the path rounds off counts by the
+/// change of slope over this length, not by its own angle. Half of the finest spacing at which a
+/// milled surface is sampled.
 inline constexpr double kSlopeStretch = 0.005;
 
-/// The height of a path over the drop curve along one row: a polyline that is nowhere off by more
-/// than its slack, so that its extremes with the slack added bound those of the path.
+/// Height of a path over the drop curve along one row: a polyline with an error bound, its slack,
+/// so that its extremes plus the slack bound those of the path.
 class RowError {
  public:
   explicit RowError(const RowProfile& profile) : profile_(profile) {}
 
   [[nodiscard]] const RowProfile& profile() const { return profile_; }
 
-  /// Appends a move from `start`, where the last one ended.
+  /// Appends a move that begins at `start`, the end of the last one.
   void add(const Eigen::Vector2d& start, const RowMove& move);
-  /// The same if path and drop curve differ nowhere along the move by more than `tolerance` (mm),
-  /// and in slope over no kSlopeStretch that ends there by more than `slope_tolerance`, where the
-  /// direction shapes the surface (RowProfile::shapes()); beyond the move's end the difference is
-  /// taken to stay as it is, which a next move about does. Stops at the first place that is off;
-  /// resize() takes back what was added until then.
+  /// Appends a move and returns true if path and drop curve differ nowhere along it by more than
+  /// `tolerance` (mm), and in slope over no kSlopeStretch that ends there by more than
+  /// `slope_tolerance`, where the direction shapes the surface (RowProfile::shapes()). Beyond the
+  /// move's end the difference is taken as constant, a good approximation of the next move. Stops
+  /// at the first violation; resize() removes the nodes added until then.
   [[nodiscard]] bool add_within(const Eigen::Vector2d& start, const RowMove& move, double tolerance,
                                 double slope_tolerance);
   [[nodiscard]] std::size_t size() const { return nodes_.size(); }
-  /// Takes back all nodes but the first `size`.
+  /// Removes all nodes after the first `size`.
   void resize(std::size_t size) { nodes_.resize(size); }
 
-  /// Whether the kSlopeStretch before `start`, where the last move ended, turns off by more than
-  /// this already, so that no move from there can be added within it.
+  /// True if the slope over the kSlopeStretch before `start`, the end of the last move, is already
+  /// off by more than this, so that no move from there can pass add_within().
   [[nodiscard]] bool is_blunt(const Eigen::Vector2d& start, double slope_tolerance) const;
 
-  /// Whether path and drop curve differ nowhere by more than `tolerance` (mm) from node `first` on.
+  /// True if path and drop curve differ nowhere by more than `tolerance` (mm) from node `first` on.
   [[nodiscard]] bool is_close(std::size_t first, double tolerance) const;
 
-  /// The largest difference of slope from node `first` on, as add_within() takes it.
+  /// Largest difference of slope from node `first` on, as in add_within().
   [[nodiscard]] double turn(std::size_t first) const;
 
   /// Bounds over the whole row; places are (u, path's height, 0).
@@ -155,7 +155,7 @@ class RowError {
   struct Node {
     double u = 0.0;
     double error = 0.0;  ///< Path − drop curve.
-    double slack = 0.0;  ///< How far the true difference may be from the polyline around here.
+    double slack = 0.0;  ///< Error bound of the polyline near here.
     double path = 0.0;   ///< Height of the path.
   };
   struct Turn {
@@ -171,7 +171,7 @@ class RowError {
   [[nodiscard]] bool is_close_at(std::size_t node, double tolerance) const {
     return std::abs(nodes_[node].error) + nodes_[node].slack <= tolerance;
   }
-  /// The error there, with the slack of the polyline around it.
+  /// Error at a place, with the slack of the polyline around it.
   struct Error {
     double value = 0.0;
     double slack = 0.0;

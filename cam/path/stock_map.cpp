@@ -43,7 +43,7 @@ StockMap::Window StockMap::cells_in(const Eigen::Vector2d& p, double radius) con
           std::min(rows_ - 1, at(local.y() + radius, rows_))};
 }
 
-/// From p to the nearest point of a rectangle of cells.
+/// Distance from p to the nearest point of a rectangle of cells.
 double StockMap::distance(const Eigen::Vector2d& p, const Window& cells) const {
   const Eigen::Vector2d local = p - blank_.min().head<2>();
   const double dx = std::max(
@@ -64,7 +64,7 @@ StockCut StockMap::cut(const CutterProfile& profile, const Eigen::Vector3d& from
   StockCut cut;
   const auto steps = std::max<std::int64_t>(
       1, static_cast<std::int64_t>(std::ceil((to - from).head<2>().norm() / cell_)));
-  // Where the same cutter was last, everything is cut already.
+  // Where the same cutter was last, everything is already cut.
   const bool goes_on = last_tip_ == from && last_profile_ == profile;
   for (std::int64_t i = goes_on ? 1 : 0; i <= steps; ++i) {
     const double part = static_cast<double>(i) / static_cast<double>(steps);
@@ -72,13 +72,13 @@ StockCut StockMap::cut(const CutterProfile& profile, const Eigen::Vector3d& from
   }
   last_tip_ = to;
   last_profile_ = profile;
-  // A disc that is sure to hold a whole cell.
+  // A disc of this radius certainly contains a whole cell.
   if (profile.radius < std::numbers::sqrt2 * cell_) cut.taken = cut.deepest.value;
   return cut;
 }
 
 /// Lowers the cells that lie wholly under the cutter to its silhouette at their farthest corner. A
-/// ball's rises by more than d²/(2R): material below that is passed over without a root.
+/// ball's rises by more than d²/(2R): material below that is skipped without a root.
 void StockMap::stamp(const CutterProfile& profile, const Eigen::Vector3d& tip, StockCut& cut) {
   const Window cells = cells_in(tip.head<2>(), profile.radius);
   const double half = 0.5 * cell_;

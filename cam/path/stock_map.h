@@ -14,36 +14,36 @@
 
 namespace lensforge {
 
-/// What a cut took from a StockMap.
+/// Result of a cut of a StockMap.
 struct StockCut {
-  /// How far the material stood above the cutter's silhouette at most, mm, and the tip there: the
-  /// depth of cut, as seen at the centres of cells; 0 in air.
+  /// Maximum height of the material above the cutter's silhouette, mm, and the tip there: the depth
+  /// of cut, sampled at the centres of cells; 0 in air.
   Extreme deepest;
-  /// By how much a cell was lowered at most, mm: 0 where the cutter was before. The depth of a
-  /// cutter so narrow that it may pass without lowering any.
+  /// Maximum lowering of a cell, mm; 0 where the cutter was before. For a cutter so narrow that it
+  /// may pass without lowering any cell, the depth.
   double taken = 0.0;
 };
 
-/// What is left of the blank while it is cut: for each cell of a grid a height that no material in
-/// it exceeds. Always an upper bound: a cell is lowered only to where the cutter has swept all of
-/// it. Above the true material by at most what the cutter's silhouette and path rise over a cell.
+/// Remaining stock during a cut: for each cell of a grid an upper bound of the material's height. A
+/// cell is lowered only to where the cutter has swept all of it. The bound exceeds the true height
+/// by at most the rise of the cutter's silhouette and path over a cell.
 class StockMap {
  public:
   /// @param blank  box of the material, mm, lens frame.
-  /// @param cell   side of a cell at most, mm, > 0.
+  /// @param cell   maximum side of a cell, mm, > 0.
   StockMap(const Eigen::AlignedBox3d& blank, double cell);
 
-  /// Takes away what the cutter sweeps on a straight way of its tip. mm.
+  /// Removes the material that the cutter sweeps on a straight move of its tip. mm.
   StockCut cut(const CutterProfile& profile, const Eigen::Vector3d& from,
                const Eigen::Vector3d& to);
 
   /// Lowest height of the tip over p at which the profile certainly touches no material, mm;
-  /// kNoContact if there is none under it. @param above  lower heights are of no interest: it is
-  /// returned instead, the sooner the higher it is.
+  /// kNoContact if there is none under it. @param above  is returned instead of any lower height;
+  /// higher values make the search faster.
   [[nodiscard]] double drop(const CutterProfile& profile, const Eigen::Vector2d& p,
                             double above = kNoContact);
 
-  /// True if the profile over p is above some of the blank, seen from above.
+  /// True if the profile over p covers part of the blank, seen from above.
   [[nodiscard]] bool under(const CutterProfile& profile, const Eigen::Vector2d& p) const;
 
   [[nodiscard]] const Eigen::AlignedBox3d& blank() const { return blank_; }
@@ -57,12 +57,12 @@ class StockMap {
   [[nodiscard]] double height(int column, int row) const { return heights_[index(column, row)]; }
 
  private:
-  /// Square of cells with an upper bound of their heights, made exact again when it is asked for.
+  /// Square of cells with an upper bound of their heights, updated on demand.
   struct Block {
     double highest;
     bool stale;
   };
-  /// Cells or blocks that a disc may meet: first and last, both included.
+  /// Cells or blocks that a disc may touch: first and last, both included.
   struct Window {
     int column_begin, column_end, row_begin, row_end;
   };
@@ -88,8 +88,8 @@ class StockMap {
   CutterProfile last_profile_;
 };
 
-/// The most material that is left on a surface: height of the stock above it, as an upper bound at
-/// the cells' centres, and where. Between centres it can be more by the surface's slope times 0.71
+/// The most material left on a surface: height of the stock above it, as an upper bound at the
+/// cells' centres, and the place. Between centres it can be more by the surface's slope times 0.71
 /// cells. @param surface  a height field.
 Extreme most_left(const StockMap& stock, const ProfileCutter& surface, const Executor& executor);
 

@@ -33,7 +33,7 @@ double TipFloor::hold_of(const Tool& tool, double allowance) {
   return cutter.flat() + cutter.corner / std::numbers::sqrt2;
 }
 
-/// Where the tip has the height that it keeps over p.
+/// The place whose height the tip keeps over p.
 Eigen::Vector2d TipFloor::held(const Eigen::Vector2d& p) const {
   const Eigen::Vector2d rim = p.cwiseMax(rim_.min()).cwiseMin(rim_.max());
   const double beyond = (p - rim).norm();
@@ -58,7 +58,7 @@ double TipFloor::over_surface(const Eigen::Vector2d& p, double reach, Trace& tra
   const Eigen::Vector2d held = this->held(p);
   double floor = kNoContact;
   for (std::size_t part = 0; part < parts_.size(); ++part) {
-    // A shank is most often so high that not even the surface's highest point could reach it.
+    // A shank is usually so high that not even the surface's highest point could reach it.
     if (surface_.bounds().max().z() - parts_[part].base <= floor) continue;
     trace[part] = surface_.drop(widened(parts_[part], reach), held, trace[part]);
     floor = std::max(floor, trace[part].tip);

@@ -20,17 +20,15 @@
 namespace lensforge {
 namespace {
 
-/// How much farther apart samples may be along the passes than across them.
+/// Maximum ratio of the sample spacing along the passes to that across them.
 constexpr double kAlongPasses = 3.0;
 
-/// The same as a share of the lens that a pixel's light comes from, on average: 0.15 of it predicts
-/// the design of a 128² portrait with an MAE of 0.0020, which is 0.0018.
+/// The same limit as a share of the mean area of lens that lights a pixel: with 0.15 the design of
+/// a 128² portrait has a predicted MAE of 0.0020 instead of 0.0018.
 constexpr double kAlongPixel = 0.1;
 
-/// How much farther apart nodes of a surface with all of its scallops may be along the passes, and
-/// that as a share likewise: its light spreads over so many pixels that a picture of it takes
-/// longer than those of all polished surfaces. As milled a 256² portrait of 100 mm has an MAE of
-/// 0.0949 so, and 0.0947 otherwise.
+/// Rendering the unpolished surface is slow because its light spreads widely. Along the passes its
+/// samples are 3 times as far apart; the MAE of a 256² portrait changes from 0.0947 to 0.0949.
 constexpr double kAlongScallops = 3.0;
 constexpr double kScallopPixel = 0.25;
 
@@ -38,7 +36,7 @@ constexpr double kScallopPixel = 0.25;
   throw InputError(std::string(option) + " " + shortest_text(value) + ": " + rule);
 }
 
-/// A tolerance has to leave room for rounding: a quarter of it.
+/// Rounding takes a quarter of a tolerance.
 void validate_decimals(const CamOptions& options) {
   if (options.decimals > options.post.most_decimals) {
     refuse("--decimals", options.decimals,
@@ -73,7 +71,7 @@ void validate_tolerances(const CamOptions& options) {
   }
 }
 
-/// Parts are blurred by the errors of a source that is a point otherwise.
+/// Parts have the error of an extended source where the design assumes a point.
 void validate_tolerances(const CamOptions& options, const OpticalSetup& setup) {
   if (options.tolerances == 0) return;
   if (setup.outline) {
@@ -96,7 +94,7 @@ void validate_outline(const CamOptions& options) {
   }
 }
 
-/// A lens with a curved front lies in a nest while it is cut, and its blank has the front already.
+/// A lens with a curved front lies in a nest during the cut, and its blank already has the front.
 void validate_front(const CamOptions& options, const OpticalSetup& setup) {
   if (!setup.front || options.part != PartKind::kLens) return;
   if (options.z_zero == ZZero::kTable) {
@@ -104,7 +102,7 @@ void validate_front(const CamOptions& options, const OpticalSetup& setup) {
         "--z-zero table: the lens's front is curved and has no plane to lie on; use stock or lens");
   }
   const auto* const sphere = std::get_if<SphericalFront>(&*setup.front);
-  if (sphere == nullptr) return;  // A height map goes on straight beyond the lens.
+  if (sphere == nullptr) return;  // A height map continues straight beyond the lens.
   const double margin = options.workshop.stock.margin;
   const Eigen::Vector2d middle = 0.5 * setup.lens_size;
   const Eigen::Vector2d reach = (sphere->apex.head<2>() - middle).cwiseAbs() + middle;
@@ -120,7 +118,7 @@ void validate_front(const CamOptions& options, const OpticalSetup& setup) {
              decimal_text(std::floor(10.0 * most) / 10.0, 1) + " mm would do");
 }
 
-/// Before hours are spent on programs that the controller could not read.
+/// Fails before hours are spent on programs that the controller could not read.
 void validate_tool_numbers(const CamOptions& options) {
   if (!options.post.changes_tools()) return;
   const Process& process = options.workshop.process;
@@ -178,7 +176,7 @@ Eigen::Vector2d sample_spacings(const CamOptions& options, const OpticalSetup& s
   const double across = sample_spacing(options);
   Eigen::Vector2d spacings = Eigen::Vector2d::Constant(across);
   if (finish.cross) return spacings;
-  // Scallops do not vary along passes. A Gaussian's weights σ apart sum to its integral but for
+  // Scallops do not vary along passes. A Gaussian's weights σ apart sum to its integral within
   // 5e-9.
   const int axis = finish.along == PassAxis::kX ? 0 : 1;
   const double pixel = setup.lens_size[axis] / setup.pixels[axis];
@@ -269,14 +267,14 @@ constexpr auto kRougher = [](auto& o) -> auto& {
 };
 constexpr auto kFinish = [](auto& o) -> auto& { return o.workshop.process.finish; };
 
-/// A member of something in the options: `at` leads to it.
+/// A member of a part of the options, which `at` returns.
 template <class At, class Member>
 auto in(At at, Member member) {
   return [ at, member ](auto& o) -> auto& { return std::invoke(member, at(o)); };
 }
 
 /// The diameter of a tool, whose flutes and neck keep their proportions; null where the workshop
-/// has no such tool, which a process that is left out may name.
+/// has no such tool, which a disabled process may name.
 template <class At, class Number>
 Field diameter(const char* name, At tool, Number number, const char* help) {
   Field row = R::length(name, in(tool, &Tool::diameter), as_in_workshop("tool.diameter"), help);
@@ -290,7 +288,7 @@ Field diameter(const char* name, At tool, Number number, const char* help) {
   return row;
 }
 
-/// A pitch that is given goes before one that would follow from a scallop.
+/// A given pitch takes precedence over one from a scallop.
 Field pitch_row() {
   Field row = R::length("--pitch", in(kFinish, &FinishProcess::pitch),
                         as_in_workshop("finish.pitch"), "maximum stepover between rows");
@@ -364,7 +362,7 @@ OptionTable<O> outline_rows() {
                     "of a tab above the blank's underside")};
 }
 
-/// What can be cut of a lens.
+/// The surfaces of a lens that can be cut.
 R::Choices<std::optional<SurfaceModel>> surfaces() {
   R::Choices<std::optional<SurfaceModel>> words{{"designed", std::nullopt}};
   for (const auto& [word, model] : named_models()) words.emplace_back(word, model);
@@ -397,7 +395,7 @@ OptionTable<O> blank_rows() {
                        "lens's own spline")};
 }
 
-/// The size of a program, which the options hold in bytes.
+/// The size limit of a program, stored in bytes.
 Field split() {
   const Limits limits =
       Limits::zero_or(static_cast<double>(kSmallestProgramLimit) / kMegabyte, 1e5);

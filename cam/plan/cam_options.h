@@ -22,27 +22,27 @@ namespace lensforge {
 template <class Options>
 struct OptionField;
 
-/// Where program Z = 0 lies.
+/// Position of program Z = 0.
 enum class ZZero {
   kStock,  ///< Top of the blank.
-  kTable,  ///< What the blank lies on: z = 0 of the lens frame. Of flat fronts only.
+  kTable,  ///< Underside of the blank: z = 0 of the lens frame. For flat fronts only.
   kLens,   ///< Highest point of the finished surface.
 };
 
-/// What is milled.
+/// The milled part.
 enum class PartKind {
   kLens,
   kMould,  ///< The negative, from which lenses are cast.
 };
 
-/// Whether the part is cut out of its blank, last of all.
+/// Parts to be cut out of their blank, last of all.
 enum class OutlineWish {
   kIfShaped,  ///< A lens that has an outline.
   kAlways,    ///< A rectangular one, too.
   kNever,
 };
 
-/// Everything that shapes the cut of a lens and what is predicted of it, but the lens itself.
+/// All options of a lens's cut and of its prediction, except the lens itself.
 struct CamOptions {
   Workshop workshop;  ///< Machine, blank, clamps, tools, process.
   PostDescription post = find_post("linuxcnc", "--post");
@@ -50,59 +50,59 @@ struct CamOptions {
   std::uintmax_t largest_file = 0;  ///< Bytes of a program, ≥ 65536; 0 for the dialect's limit.
   double spin_up = 3.0;             ///< Dwell after the spindle was switched on, s, 0 … 3600.
   Coolant coolant = Coolant::kOff;
-  /// Digits after the point in the programs, 4 … 6; 0 takes what the tolerances ask for.
+  /// Digits after the point in the programs, 4 … 6; 0: as many as the tolerances require.
   int decimals = 0;
-  bool arcs = true;  ///< Arcs in the finishing rows, where the dialect has them.
+  bool arcs = true;  ///< Arcs in the finishing rows if the dialect has them.
   ZZero z_zero = ZZero::kStock;
   std::string job = "lens";  ///< Name of the part.
 
   PartKind part = PartKind::kLens;
-  double shrinkage = 0.0;  ///< Of what is cast in a mould, share of a length, 0 … 0.2.
-  /// What is cut: the facets as they are, the smooth surface over the mesh (SmoothSurface), or the
-  /// lens's own spline; none takes what the lens was designed as.
+  double shrinkage = 0.0;  ///< Of casts from a mould, share of a length, 0 … 0.2.
+  /// Surface to cut: the mesh's facets, the smooth surface over the mesh (SmoothSurface), or the
+  /// lens's own spline; none: the model that the lens was designed with.
   std::optional<SurfaceModel> surface;
 
   OutlineWish cut_outline = OutlineWish::kIfShaped;
   int outline_tool = 0;  ///< Tool::number, a flat end mill; 0 takes the roughing tool.
   TabOptions tabs;
 
-  bool force = false;  ///< Replace files that no cut wrote as they stand.
+  bool force = false;  ///< Replace files that no cut wrote or that were changed since.
 
-  bool render = true;      ///< Compute what the part will project; else programs only.
-  bool remedies = true;    ///< Try what helps where most light leaks, if it is computed.
-  int tolerances = 0;      ///< Parts with errors that are drawn (Workshop::tolerances), 0 or 10 up.
-  int tolerance_seed = 1;  ///< Of the random numbers that they are drawn with, ≥ 0.
-  /// Of the surface that is rendered, mm, 0.001 … 1; 0 takes a sixth of the pitch, or a third of
-  /// the polish's σ if that is more.
+  bool render = true;    ///< Compute the picture of the part; else programs only.
+  bool remedies = true;  ///< Try remedies where most light leaks, if the picture is computed.
+  int tolerances = 0;    ///< Number of parts drawn with errors (Workshop::tolerances), 0 or ≥ 10.
+  int tolerance_seed = 1;  ///< Of the random numbers for drawing them, ≥ 0.
+  /// Of the rendered surface, mm, 0.001 … 1; 0: the larger of a sixth of the pitch and a third of
+  /// the polish's σ.
   double sample_spacing = 0.0;
   LeakageOptions leakage;
   CutLimits limits;
-  std::set<std::string> stated_limits;  ///< Keys of CutLimits that count as limits, not as advice.
+  std::set<std::string> stated_limits;  ///< Keys of CutLimits that are limits, not advice.
 };
 
-/// Maximum or minimum of the options below; those of the workshop follow workshop_rule().
+/// Minimum and maximum of the options below; for those of the workshop see workshop_rule().
 namespace cam_limit {
-inline constexpr double kDark = 1e3;  ///< Of LeakageOptions::dark_below: brighter than any picture.
-inline constexpr double kLimit = 1e6;           ///< Of each of CutLimits, in its own unit.
+inline constexpr double kDark = 1e3;   ///< Of LeakageOptions::dark_below: above any picture.
+inline constexpr double kLimit = 1e6;  ///< Of each of CutLimits, in its own unit.
 inline constexpr double kFinestSample = 1e-3;   ///< mm
 inline constexpr double kCoarsestSample = 1.0;  ///< mm
-/// Parts that are drawn: the tenth of fewer than 10 is none, and 100,000 take a day.
+/// Number of drawn parts: fewer than 10 have no tenth, and 100,000 take a day.
 inline constexpr int kFewestParts = 10;
 inline constexpr int kMostParts = 100000;
 inline constexpr int kLargestSeed = 999999;
-/// Of tabs, mm: below it a tab does not hold, above it nobody snaps it by hand.
+/// Of tabs, mm: a thinner tab does not hold, and a wider one cannot be snapped by hand.
 inline constexpr double kThinnestTab = 0.1;
 inline constexpr double kWidestTab = 50.0;
 inline constexpr double kHighestTab = 10.0;
 inline constexpr int kMostTabs = 100;
 }  // namespace cam_limit
 
-/// The spacing at which the surface is sampled across the passes, mm.
+/// Sample spacing of the surface across the passes, mm.
 double sample_spacing(const CamOptions& options);
-/// The same along x and y: up to three times that along passes, which do not cross, as far as
+/// The same along x and y: up to three times as large along passes that do not cross, as far as
 /// polish and pixels allow.
 Eigen::Vector2d sample_spacings(const CamOptions& options, const OpticalSetup& setup);
-/// The same of a surface that nothing polished: another three times that along passes.
+/// The same for an unpolished surface: another three times as large along passes.
 Eigen::Vector2d scallop_spacings(const CamOptions& options, const OpticalSetup& setup);
 
 /// The lens's edge: its outline, or its rectangle; counter-clockwise, mm.
@@ -115,11 +115,11 @@ bool cuts_outline(const CamOptions& options, const OpticalSetup& setup);
 ///        against the size of the lens.
 void validate(const CamOptions& options, const OpticalSetup& setup);
 
-/// The height in plain words: "top of the blank".
+/// Names in plain words: "top of the blank".
 const char* words_for(ZZero zero);
 const char* words_for(SurfaceModel surface);
 
-/// Every option of a cut. Numbers that a workshop file states are the workshop's, with its limits.
+/// Table of a cut's options. Numbers of the workshop file use its values and limits.
 const std::vector<OptionField<CamOptions>>& cam_fields();
 
 }  // namespace lensforge

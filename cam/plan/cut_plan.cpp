@@ -13,7 +13,7 @@
 namespace lensforge {
 namespace {
 
-/// Distance of points kept of a path that is only looked at, mm.
+/// Distance of the points kept in a path for display, mm.
 constexpr double kSketchSpacing = 0.5;
 
 /// Unit of a program's last decimal where nothing is rounded, mm.
@@ -37,7 +37,7 @@ Eigen::Vector2d size_to_cut(const Lens& lens, const CamOptions& options) {
   return lens.setup.lens_size / (1.0 - shrinkage);
 }
 
-/// @throw InputError if the surface is lower than what the blank lies on: no tool can cut there.
+/// @throw InputError if the surface is below the table, where no tool can cut.
 HeightField above_table(const HeightField& field) {
   if (field.box.min().z() >= 0.0) return field;
   throw InputError("surface: reaches " + decimal_text(-field.box.min().z(), 4) +
@@ -227,7 +227,7 @@ ProgramSettings CutPlan::settings() {
 FinishPaths CutPlan::take_finish_paths(const ProgramFiles& programs, const RunControl& control) {
   FinishPaths paths = std::move(paths_);
   if (finish().pencil) {
-    // No row: its points lie on the drop surface already, so that there is nothing more exact.
+    // The pencil has no rows: its points are already on the drop surface, so nothing is more exact.
     BallPath pencil(ball().radius(), 0.0);
     if (!run_pencil(kUnrounded, path_sink(pencil), control).complete) throw Interrupted();
     paths.ideal.push_back(pencil);

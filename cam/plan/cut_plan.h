@@ -31,17 +31,17 @@
 
 namespace lensforge {
 
-/// Where a lens lies in programs that cut several.
+/// Place of a lens in programs that cut several.
 struct CutPlace {
   Eigen::Vector2d corner = Eigen::Vector2d::Zero();  ///< X and Y of its lower left corner, mm.
-  /// What looks over the programs of all lenses; both must outlive the plan. None: its own do.
+  /// Shared checks of the programs of all lenses; both must outlive the plan. Null: the plan's own.
   const CollisionCheck* collisions = nullptr;
   const ProgramWatch* watch = nullptr;
 
   [[nodiscard]] bool shared() const { return watch != nullptr; }
 };
 
-/// What is cut out of which blank, and the operations that do it.
+/// A part, its blank, and the operations that cut it.
 class CutPlan {
  public:
   /// @param lens  must outlive the plan. @pre validate(options, lens.setup) passed.
@@ -51,14 +51,14 @@ class CutPlan {
   CutPlan(const CutPlan&) = delete;
   CutPlan& operator=(const CutPlan&) = delete;
 
-  /// The programs' plan: roughing, semi-finishing, finishing, as far as they are wanted. Its
-  /// operations work on this object, one after the other, once.
+  /// Plan of the programs: roughing, semi-finishing and finishing, as enabled. Its operations use
+  /// this object, one after the other, and can run once.
   [[nodiscard]] ProgramPlan programs(const RunControl& control);
-  /// What is read back of the programs is looked over by this object.
+  /// Settings of the programs, whose read-back lines go to this object's checks.
   [[nodiscard]] ProgramSettings settings();
 
-  /// The finishing ball's ways, from the exact drop curves to the written programs; the former are
-  /// handed over, so once. @param programs  with this plan's operations alone, in its place.
+  /// Returns the finishing ball's paths: exact, fitted and as written. Moves the first two out of
+  /// this plan. @param programs  with this plan's operations alone, in its place.
   /// @pre programs() was streamed, and CamOptions::render is set.
   /// @throw Interrupted; InputError or RunError if a program cannot be read back.
   [[nodiscard]] FinishPaths take_finish_paths(const ProgramFiles& programs,
@@ -66,51 +66,51 @@ class CutPlan {
 
   [[nodiscard]] const CamOptions& options() const { return options_; }
   [[nodiscard]] const CutPlace& place() const { return place_; }
-  /// What is cut: the lens's surface or the mould's; mm, in a lens frame of its own.
+  /// The surface to cut: the lens's or the mould's; mm, in a lens frame of its own.
   [[nodiscard]] const SurfaceMesh& mesh() const { return cut().surface; }
-  /// Under which model the surface is cut.
+  /// Model under which the surface is cut.
   [[nodiscard]] SurfaceModel model() const { return model_; }
-  /// The optical surface that it stands for.
+  /// The optical surface behind mesh().
   [[nodiscard]] const std::shared_ptr<const OpticalSurface>& optical() const { return optical_; }
-  /// The same for the finishing ball.
+  /// The surface for the finishing ball.
   [[nodiscard]] const CutSurface& surface() const { return balls_.surface(); }
   [[nodiscard]] const FinishBalls& balls() const { return balls_; }
-  /// Where the lens lies in the mould, if there is one.
+  /// Frame of the lens in the mould, if there is one.
   [[nodiscard]] std::optional<CastFrame> mould() const;
   [[nodiscard]] const Eigen::AlignedBox3d& part_box() const { return field_.box; }
-  /// Size and steepness of what is cut.
+  /// Size and steepness of the surface to cut.
   [[nodiscard]] const HeightField& field() const { return field_; }
   [[nodiscard]] const Eigen::AlignedBox3d& blank() const { return blank_; }
   [[nodiscard]] double z_offset() const { return z_offset_; }
-  /// Of what is cut, seen from above.
+  /// Rectangle of the surface to cut, seen from above.
   [[nodiscard]] Eigen::AlignedBox2d rectangle() const {
     return {field_.box.min().head<2>(), field_.box.max().head<2>()};
   }
   [[nodiscard]] FinishGround ground() const { return {rectangle(), field_.steepest, z_offset_}; }
-  /// Between finishing rows, as cut, mm.
+  /// Distance of finishing rows as cut, mm.
   [[nodiscard]] double pitch() const { return finish_rasters(options_, ground()).front().pitch; }
   [[nodiscard]] int decimals() const { return decimals_; }
-  /// What touches something that it must not, in the programs as they were read back so far.
+  /// Collisions in the programs read back so far.
   [[nodiscard]] const std::vector<Collision>& collisions() const {
     return (place_.shared() ? *place_.collisions : collisions_).collisions();
   }
-  /// What goes down too steeply for its feed in them.
+  /// Descents in them that are too steep for their feed.
   [[nodiscard]] const std::vector<SteepDescent>& descents() const {
     return (place_.shared() ? *place_.collisions : collisions_).descents();
   }
-  /// What else was found in them.
+  /// Other faults in them.
   [[nodiscard]] const ProgramWatch& watch() const {
     return place_.shared() ? *place_.watch : watch_;
   }
-  /// How the outline is cut. @pre cuts_outline().
+  /// Options of the outline cut. @pre cuts_outline().
   [[nodiscard]] OutlineCut outline_cut() const;
-  /// Every operation's way, thinned out, as far as programs() were streamed.
+  /// Every operation's path, thinned out, as far as programs() were streamed.
   [[nodiscard]] std::vector<ReportPath> shown_path() const;
 
  private:
   [[nodiscard]] const FinishProcess& finish() const { return options_.workshop.process.finish; }
   [[nodiscard]] const Tool& ball() const { return finishing_ball(options_); }
-  /// The lens, or what its mould would be as a lens.
+  /// The lens, or its mould as a lens.
   [[nodiscard]] const Lens& cut() const { return mould_lens_ ? *mould_lens_ : lens_; }
   [[nodiscard]] double safe_z() const;
   ProgramOperation rough_operation(const RunControl& control);
@@ -120,11 +120,12 @@ class CutPlan {
   ProgramOperation outline_operation(const RunControl& control);
   OperationSummary run_pencil(double resolution, const MoveSink& sink,
                               const RunControl& control) const;
-  /// Hands over all motions at feed with a tool in the plan's operations, lens frame's x and y.
+  /// Passes all motions at feed with a tool in the plan's operations to `take`, x and y in the lens
+  /// frame.
   void read_motions(const ProgramFiles& programs, int tool,
                     const std::function<void(const GcodeMotion&)>& take,
                     const RunControl& control) const;
-  /// The sink behind a sketch of the operation.
+  /// A sink that sketches the operation and passes its moves to `sink`.
   MoveSink sketched(const std::string& operation, const MoveSink& sink);
 
   const Lens& lens_;

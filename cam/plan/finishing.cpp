@@ -16,11 +16,11 @@
 namespace lensforge {
 namespace {
 
-/// Moves are meant to be this many times as long as the controller needs: some are cut in two.
+/// Factor by which moves should exceed the controller's shortest: some are cut in two.
 constexpr double kAboveShortest = 2.0;
 
-/// What the path's direction is aimed at, at least, for each millimetre of the last decimal: finer
-/// aims than the decimals can hold leave nothing but moves of a few micrometres, which turn more.
+/// Minimum target of the path's slope error per millimetre of the last decimal: finer targets than
+/// the decimals allow lead only to moves of a few micrometres, which turn more.
 constexpr double kGridSlope = 10.0;
 
 RasterPlan finish_raster(const CamOptions& options, const FinishGround& ground, PassAxis along) {
@@ -103,12 +103,12 @@ PencilOptions pencil_options(const CamOptions& options, double z_offset, double 
 
 namespace {
 
-/// How finely a surface without creases is cut into facets, which are followed only in grooves that
-/// bend as sharply as the ball (RowCurves), and by the pencil.
+/// Facets of a surface without creases, which are followed only in grooves about as tight as the
+/// ball (RowCurves), and by the pencil.
 constexpr SmoothCutOptions kSmoothCut{1e-4, 2e-2};
 
-/// Slope up to which the larger ball finishes a surface to its rim, rise over run: what is steeper
-/// there it leaves.
+/// Slope up to which the larger ball finishes a surface to its rim, rise over run; it leaves
+/// steeper places there.
 constexpr double kRimSlope = 0.4;
 
 std::unique_ptr<CutSurface> larger_surface(const std::shared_ptr<const OpticalSurface>& surface,
@@ -214,8 +214,8 @@ GcodeMotion motion_of(const Eigen::Vector3d& start, const PathMove& move) {
   return motion;
 }
 
-/// The arc through three points of another one's plane, in its direction; straight where they are
-/// on a line.
+/// The arc through three points in another one's plane, in its direction; straight if they are
+/// collinear.
 GcodeMotion through(const Eigen::Vector3d& start, const Eigen::Vector3d& middle,
                     const Eigen::Vector3d& end, const Arc& like) {
   GcodeMotion motion = straight(start, end);
@@ -244,8 +244,8 @@ GcodeMotion through(const Eigen::Vector3d& start, const Eigen::Vector3d& middle,
   return motion;
 }
 
-/// So many arcs through points of a stretched one stay within kStretchError of it. With the share e
-/// its curvature changes by 3 e / r² along it at most, from which an arc of length l through its
+/// Number of arcs through points of a stretched one that stay within kStretchError of it. With the
+/// share e its curvature changes by at most 3 e / r² along it, so an arc of length l through its
 /// ends and its middle is off by l³ / (72 √3) times that.
 int parts_of(const Arc& arc, double share) {
   const double off = std::abs(share) * arc.radius / (24.0 * std::numbers::sqrt3);

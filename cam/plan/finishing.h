@@ -27,37 +27,37 @@ namespace lensforge {
 /// The finishing ball.
 const Tool& finishing_ball(const CamOptions& options);
 
-/// The larger ball that finishes wherever it reaches; none if the finishing ball does it alone.
+/// The larger ball, which finishes all that it can reach; null if the finishing ball works alone.
 const Tool* larger_ball(const CamOptions& options);
 
-/// Digits after the point in the programs: as chosen, or what the tolerances ask for.
+/// Digits after the point in the programs: as chosen, or as many as the tolerances require.
 int decimals_of(const CamOptions& options);
 
 /// Unit of the programs' last decimal, mm.
 double resolution_of(const CamOptions& options);
 
-/// What the path's direction is aimed at, rad: the workshop's slope tolerance, or what the
-/// programs' decimals can hold if that is more.
+/// Target for the error of the path's direction, rad: the workshop's slope tolerance, or the error
+/// that the programs' decimals allow if that is larger.
 double aimed_slope(const CamOptions& options);
 
-/// That the decimals are too few for the slope tolerance, in a sentence; empty if they are not.
+/// Warning that the decimals are too few for the slope tolerance; empty if they are not.
 std::string decimals_warning(const CamOptions& options);
 
-/// Length that moves of a tool should have at least, mm: the controller takes no more lines a
-/// second. 0 where it has no such limit.
+/// Minimum length of a tool's moves, mm, given the controller's maximum lines per second. 0 without
+/// such a limit.
 double shortest_move(const CamOptions& options, const Tool& tool);
 
-/// What the finishing is laid out on; mm, lens frame.
+/// Extent of the surface to be finished; mm, lens frame.
 struct FinishGround {
-  Eigen::AlignedBox2d rectangle;  ///< Of what is cut.
-  double steepest = 0.0;          ///< Rise over run of its steepest place.
+  Eigen::AlignedBox2d rectangle;  ///< Of the surface to cut.
+  double steepest = 0.0;          ///< Rise over run at its steepest place.
   double z_offset = 0.0;          ///< Program Z − lens-frame z.
 };
 
-/// The finishing raster, and the one across if it is wanted.
+/// The finishing raster, and the crossing one if enabled.
 std::vector<RasterPlan> finish_rasters(const CamOptions& options, const FinishGround& ground);
 
-/// For the pass along the creases. @param top  highest point of what is cut, mm, lens frame.
+/// Options of the pencil pass. @param top  highest point of the surface to cut, mm, lens frame.
 PencilOptions pencil_options(const CamOptions& options, double z_offset, double top);
 
 /// The surface that a ball of this radius (mm, > 0) cuts.
@@ -72,21 +72,21 @@ struct FinishPass {
   RasterPlan plan;
 };
 
-/// The ball, or the two, that finish a surface.
+/// The ball, or the two balls, that finish a surface.
 class FinishBalls {
  public:
-  /// @throw InputError naming finish.large_tool if a larger ball is asked for and the surface has
+  /// @throw InputError naming finish.large_tool if a larger ball is chosen and the surface has
   ///        creases.
   FinishBalls(const std::shared_ptr<const OpticalSurface>& surface, const CamOptions& options,
               const Executor& executor);
   FinishBalls(const FinishBalls&) = delete;
   FinishBalls& operator=(const FinishBalls&) = delete;
 
-  /// For the finishing ball on its own.
+  /// The surface for the finishing ball alone.
   [[nodiscard]] const CutSurface& surface() const { return *surface_; }
-  /// What the larger ball leaves, if there is one.
+  /// What the larger ball leaves; null without one.
   [[nodiscard]] const RestMap* rest() const { return shared_ ? &shared_->rest : nullptr; }
-  /// In the order in which they are cut. @pre `options` have the same balls, pitch and rows.
+  /// Passes in cutting order. @pre `options` have the same balls, pitch and rows.
   [[nodiscard]] std::vector<FinishPass> passes(const CamOptions& options,
                                                const FinishGround& ground) const;
 
@@ -108,40 +108,40 @@ class FinishBalls {
   std::unique_ptr<const Shared> shared_;
 };
 
-/// Whether balls for one set of options cut a surface for the other as well.
+/// True if the balls of one set of options are also valid for the other.
 bool same_balls(const CamOptions& one, const CamOptions& other);
 
-/// The finishing ball's ways in the lens frame, from what is meant to what is written.
+/// The finishing ball's paths in the lens frame, from the exact ones to the written ones.
 struct FinishPaths {
-  std::vector<BallPath> ideal;    ///< Along the exact drop curves, to kExactRow.
-  std::vector<BallPath> fitted;   ///< The moves before their numbers are rounded.
-  std::vector<BallPath> written;  ///< As the programs have them.
-  /// As a machine makes them that goes too far across the passes; empty for one that does not.
+  std::vector<BallPath> ideal;    ///< Along the drop curves, to kExactRow.
+  std::vector<BallPath> fitted;   ///< The moves before rounding.
+  std::vector<BallPath> written;  ///< As in the programs.
+  /// As made by a machine that goes too far across the passes; empty if it does not.
   std::vector<BallPath> stretched;
 };
 
-/// An axis that goes farther than a program says: from the program's zero, `factor` times as far.
+/// Scale error of an axis: it moves `factor` times as far from the program's zero.
 struct AxisStretch {
   int axis = 1;
   double factor = 1.0;
 
-  /// What FinishProcess::pitch_error does.
+  /// Stretch by FinishProcess::pitch_error.
   static AxisStretch of(const FinishProcess& finish);
   [[nodiscard]] bool any() const { return factor != 1.0; }
 };
 
-/// Adds a motion as a machine makes it whose axis is stretched. Arcs in a plane that holds this
-/// axis are ellipses then: arcs within 1e-6 mm of them.
+/// Adds a motion as made by a machine with a stretched axis. Arcs in a plane with this axis become
+/// ellipses, approximated by arcs within 1e-6 mm.
 void add_stretched(const GcodeMotion& motion, const AxisStretch& stretch, BallPath& path);
 
-/// Adds a row's exact way and that of its moves before rounding to the last of `ideal` and of
+/// Adds a row's exact path and that of its moves before rounding to the last of `ideal` and of
 /// `fitted`. @pre the row has traces.
 void add_row(const RasterRow& row, FinishPaths& paths);
 
-/// A MoveSink that hands moves at feed to a path.
+/// A MoveSink that adds moves at feed to a path.
 MoveSink path_sink(BallPath& path, const AxisStretch& stretch = {});
 
-/// Hands a program's motions at feed with one tool to `take`.
+/// Passes a program's motions at feed with one tool to `take`.
 /// @throw InputError, RunError if the program cannot be read; Interrupted.
 void read_path(const std::filesystem::path& program, const GcodeDialect& dialect, int tool,
                const std::function<void(const GcodeMotion&)>& take, const RunControl& control);

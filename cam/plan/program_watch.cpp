@@ -10,7 +10,7 @@
 namespace lensforge {
 namespace {
 
-/// How far above everything a tool is taken to be that was lifted to a place of the machine's, mm.
+/// Height above everything of a tool that was lifted to a place known only to the machine, mm.
 constexpr double kLift = 1.0;
 
 bool has_word(const GcodeBlock& block, int tenths) {
@@ -100,7 +100,7 @@ void ProgramWatch::move(const GcodeMotion& motion, const GcodeBlock& block, bool
   reach(Eigen::AlignedBox3d(at_));
 }
 
-/// Where the tool comes to. A relative way from a place of the machine's ends nobody knows where.
+/// Target of a motion. A relative motion from a place known only to the machine has an unknown end.
 void ProgramWatch::step(const GcodeMotion& motion, const GcodeBlock& block, bool absolute) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     if (!names(block, axis)) continue;
@@ -127,7 +127,7 @@ void ProgramWatch::follow(const GcodeMotion& motion) {
   reach(box);
 }
 
-/// To a place that only the machine knows, in the axes that the line names, or in all.
+/// Goes to a place known only to the machine, in the axes that the line names, or in all.
 void ProgramWatch::go_home(const GcodeMotion& motion, const GcodeBlock& block) {
   const bool all = !names(block, 0) && !names(block, 1) && !names(block, 2);
   const bool lateral = all || names(block, 0) || names(block, 1);

@@ -16,38 +16,37 @@
 
 namespace lensforge {
 
-/// What a line belongs to.
+/// The operation of a program line.
 struct WatchedOperation {
   std::string name;
-  Tool tool;  ///< That it is meant for.
+  Tool tool;  ///< Intended tool.
   DescentRule rule;
 };
 
-/// Follows programs as they were read back, lines of the post's own included, and finds what a
-/// machine must not do: collisions and ways down into material that are too steep for their feed
-/// (CollisionCheck), and ways that nobody can know because they
-/// begin or end where the program has not said. Where a tool is when a program begins, and after a
-/// tool change, is not known; G28, G30 and G53 are taken to lift a tool above everything and to
-/// leave their other axes at places that are not known.
+/// Follows programs as they were read back, including the post's own lines, and finds faults:
+/// collisions and descents too steep for their feed (CollisionCheck), and unknown motions, which
+/// begin or end where the program has not stated. The tool's place is unknown at the beginning of a
+/// program and after a tool change; G28, G30 and G53 are taken to lift it above everything and to
+/// leave their other axes at unknown places.
 class ProgramWatch {
  public:
   /// @param collisions  must outlive this, as must `tools`, the workshop's.
   /// @param z_offset    program Z − lens-frame z, mm.
-  /// @param top         nothing stands higher than this on the table, mm, lens frame.
+  /// @param top         highest point of anything on the table, mm, lens frame.
   ProgramWatch(CollisionCheck& collisions, const std::vector<Tool>& tools, double z_offset,
                double top);
 
-  /// The next line.
+  /// Takes the next line.
   void take(const WatchedOperation& operation, const ProgramLine& line);
 
-  /// Ways that nobody can know, a sentence for each operation.
+  /// Unknown motions: a sentence for each operation.
   [[nodiscard]] std::vector<std::string> faults() const;
-  /// How far the motions of all programs reach, mm: along Z of the tool for which that is most,
-  /// since tools differ in length.
+  /// Extent of the motions of all programs, mm: along Z the largest of any single tool, since tools
+  /// differ in length.
   [[nodiscard]] Eigen::Vector3d extent() const;
 
  private:
-  /// First line of an operation that goes where nobody knows.
+  /// Unknown motions of an operation: their first line and their number.
   struct Fault {
     std::int64_t line = 0;
     std::int64_t lines = 0;
@@ -69,19 +68,19 @@ class ProgramWatch {
   double z_offset_;
   double top_;
   std::string operation_;
-  std::size_t programs_ = 0;  ///< That have begun.
+  std::size_t programs_ = 0;  ///< Number begun.
   int tool_ = 0;              ///< In the spindle.
-  int changed_ = 0;           ///< The last that was changed to in this program; 0 for none.
+  int changed_ = 0;           ///< Last tool change in this program; 0: none.
   Known known_{false, false, false};
   bool lifted_ = false;                           ///< By G28, G30 or G53: above everything.
-  Eigen::Vector3d at_ = Eigen::Vector3d::Zero();  ///< Lens frame, as far as it is known.
+  Eigen::Vector3d at_ = Eigen::Vector3d::Zero();  ///< Lens frame, as far as known.
   std::vector<std::string> order_;                ///< Of faults' operations.
   std::map<std::string, Fault> faults_;
-  Eigen::AlignedBox2d places_;                  ///< All that are known, seen from above.
+  Eigen::AlignedBox2d places_;                  ///< All known ones, seen from above.
   std::map<int, Eigen::AlignedBox1d> heights_;  ///< Tool → heights of its tip.
 };
 
-/// Which axes would have to go farther than the machine can, a sentence; empty if none would.
+/// Names the axes whose extent exceeds the machine's travel, in a sentence; empty if none.
 std::string travel_fault(const Eigen::Vector3d& extent, const Eigen::Vector3d& travel);
 
 }  // namespace lensforge

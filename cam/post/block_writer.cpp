@@ -15,7 +15,7 @@
 namespace lensforge {
 namespace {
 
-constexpr std::size_t kBufferBytes = 1 << 16;  ///< Collected before it goes to the file.
+constexpr std::size_t kBufferBytes = 1 << 16;  ///< Collected before writing to the file.
 
 }  // namespace
 
@@ -68,7 +68,7 @@ void ProgramText::reserve(int comments) {
   sealed_ = true;
 }
 
-/// Closed early, so that any number of parts may wait for the last one.
+/// Closes early, so that any number of parts may wait for the last one.
 void ProgramText::close() {
   flush();
   buffer_.shrink_to_fit();
@@ -139,7 +139,7 @@ Arc arc_around(const ArcMotion& motion, const Eigen::Vector3d& start) {
   return arc;
 }
 
-/// How far the arc runs from its chord.
+/// Maximum distance of the arc from its chord.
 double sagitta(double radius, double sweep) { return radius * (1.0 - std::cos(0.5 * sweep)); }
 
 using Units = PathDigest::Units;
@@ -159,7 +159,7 @@ std::int64_t reach(const Arc& arc, const Units& start, const Units& end) {
   return most;
 }
 
-/// The smallest R with which a circle reaches both ends.
+/// Minimum R of a circle through both ends.
 std::int64_t half_chord(const Arc& arc, const Units& start, const Units& end) {
   const auto first = static_cast<std::size_t>(arc.first);
   const auto second = static_cast<std::size_t>(arc.second);
@@ -261,7 +261,7 @@ void BlockWriter::write_chords(const Arc& arc, const Eigen::Vector3d& end, doubl
 }
 
 /// Straight where the arc leaves its chord by less than half a unit, and where its rounded ends are
-/// so near that rounding could turn it into a full circle or none.
+/// so close that rounding could turn it into a full circle or none.
 void BlockWriter::write_arc(const Arc& arc, const Eigen::Vector3d& end, double feed) {
   const int pieces = pieces_of(arc);
   const bool flat = sagitta(arc.radius, arc.sweep / pieces) * scale_ < 0.5;
@@ -325,12 +325,12 @@ void BlockWriter::add_coordinates(const Units& end) {
   }
 }
 
-/// The feed is rounded here, so that what is written is what the digest holds.
+/// The feed is rounded here, so that the digest holds the written value.
 void BlockWriter::set_feed(double feed) {
   if (asked_feed_ == feed) return;
   const double scale = std::pow(10.0, post_.feed_decimals);
   double rounded = std::max(std::round(feed * scale), 1.0) / scale;
-  // By their feed cuts are told from rapids that have no word of their own.
+  // The feed distinguishes cuts from rapids that have no word of their own.
   while (post_.rapids_are_feeds() && is_rapid_feed(rounded)) rounded += 1.0 / scale;
   LF_CHECK(feed > 0.0 && rounded < kFarthest, std::to_string(feed));
   asked_feed_ = feed;

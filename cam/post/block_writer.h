@@ -18,7 +18,7 @@
 
 namespace lensforge {
 
-/// An arc's words in a digest; all zero for a straight motion.
+/// An arc in a digest; all zero for a straight motion.
 struct DigestArc {
   std::int64_t direction = 0;            ///< 1 + twice the normal axis's number, + 1 clockwise.
   std::array<std::int64_t, 3> centre{};  ///< Units; zero along the normal axis and with R words.
@@ -26,9 +26,8 @@ struct DigestArc {
   friend bool operator==(const DigestArc&, const DigestArc&) = default;
 };
 
-/// Numbers that two paths share if, and but for a chance of 2^-64 only if, they have the same
-/// motions at feed in the same order, to the last decimal: what is written and what is read back
-/// are compared by it.
+/// Digest of a path's motions at feed, in order, to the last decimal; compares what is written with
+/// what is read back. Different paths share a digest with a probability of 2^-64.
 class PathDigest {
  public:
   using Units = std::array<std::int64_t, 3>;
@@ -59,9 +58,8 @@ class PathDigest {
   std::int64_t motions_ = 0;
 };
 
-/// The text of one program on its way into a file: counts lines and bytes, numbers lines, keeps
-/// room for comments that are known only at the end, and hashes what stands below them. Constant
-/// memory.
+/// Writes the text of one program to a file: counts lines and bytes, numbers lines, reserves room
+/// for comments that are known only at the end, and hashes what follows them. Constant memory.
 class ProgramText {
  public:
   /// @throw RunError naming the file if it cannot be made.
@@ -69,13 +67,13 @@ class ProgramText {
 
   /// One line, without its end. @throw InputError if it is longer than the dialect allows.
   void line(std::string_view text);
-  /// A line of the dialect's own that is no G-code words: %, comments.
+  /// Writes a line that is no G-code words: %, comments.
   void plain_line(std::string_view text);
-  /// The next line() begins an operation.
+  /// Marks the next line() as the beginning of an operation.
   void mark_operation() { marked_ = true; }
-  /// Keeps room for `comments` comment lines and the seal; what follows is sealed. Once only.
+  /// Reserves room for `comments` comment lines and the seal; what follows is sealed. Once only.
   void reserve(int comments);
-  /// Brings all that was written into the file and closes it.
+  /// Writes what is buffered and closes the file.
   void close();
   /// Fills the reserved lines in, the seal included (machine/gcode/program_seal.h).
   /// @pre close() was called, and as many comments as were reserved. @throw RunError (disk full,
@@ -84,7 +82,7 @@ class ProgramText {
 
   [[nodiscard]] std::int64_t lines() const { return lines_; }
   [[nodiscard]] std::uintmax_t bytes() const { return bytes_; }
-  /// Of all below the seal; after finish().
+  /// Hash of everything below the seal; valid after finish().
   [[nodiscard]] const std::string& sha256() const { return sha256_; }
   [[nodiscard]] PendingFile& file() { return file_; }
   [[nodiscard]] const PendingFile& file() const { return file_; }
@@ -113,32 +111,31 @@ class ProgramText {
 /// Feeds of rapids where the dialect has no word for them, mm/min: straight up or down, and across.
 using RapidFeeds = std::array<double, 2>;
 
-/// How a path is written.
+/// Options for writing a path.
 struct BlockOptions {
   int decimals = 5;               ///< Of coordinates, 0 … 6.
   double chord_tolerance = 5e-4;  ///< Of chords where the dialect has no such arc, mm, > 0.
   RapidFeeds rapid_feeds = {};    ///< Of a dialect without a word for rapids, each > 0.
 };
 
-/// A circular arc, or a helix, from where the tool is; program coordinates, mm.
+/// A circular arc, or a helix, from the tool's position; program coordinates, mm.
 struct ArcMotion {
   int normal = 2;          ///< Number of the axis that its plane is normal to.
   bool clockwise = false;  ///< Seen from that axis's positive end.
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
-  /// A full circle where it is the start in the plane.
+  /// Equal to the start in the plane for a full circle.
   Eigen::Vector3d end = Eigen::Vector3d::Zero();
 };
 
-/// Writes motions as the blocks of a dialect: program coordinates, mm. Words that a controller
-/// keeps in force are written when they change and not again, but for the feed, which is stated
-/// again after every rapid so that a program can be picked up there, or on every line if the
-/// dialect wants it. A motion to where the tool is already, to the decimals, leaves no line.
+/// Writes motions as blocks of a dialect: program coordinates, mm. Modal words are written only
+/// when they change, except the feed, which is repeated after every rapid so that a program can be
+/// resumed there, or on every line if the dialect requires it. A motion shorter than the last
+/// decimal leaves no line.
 ///
 /// Ends and centres are rounded to the decimals. A rapid along XY and Z becomes two, the upper
-/// corner first, so that no controller's way to rush can cut a corner. Arcs of more than half a
-/// turn (a third with R) become several; arcs that rounding leaves straight or shorter than 3 units
-/// become straight; arcs that the dialect lacks, or with a radius below 5 µm or above 100 m, become
-/// chords.
+/// corner first, so that no controller can cut the corner. Arcs of more than half a turn (a third
+/// with R) are split; arcs that rounding leaves straight or shorter than 3 units become straight;
+/// arcs that the dialect lacks, or with a radius below 5 µm or above 100 m, become chords.
 class BlockWriter {
  public:
   /// @param text  must outlive the writer, as must `post`.
@@ -152,12 +149,12 @@ class BlockWriter {
   void feed(const Eigen::Vector3d& end, double feed);
   /// Along an arc at `feed`.
   void arc(const ArcMotion& motion, double feed);
-  /// The lines that arc() would write at most.
+  /// Maximum number of lines that arc() would write.
   [[nodiscard]] std::size_t most_lines(const ArcMotion& motion) const;
-  /// The controller's words in force and position are not known any more.
+  /// Forgets the modal state and position of the controller.
   void forget();
 
-  /// Of all motions at feed.
+  /// Digest of all motions at feed.
   [[nodiscard]] const PathDigest& digest() const { return digest_; }
 
  private:
@@ -186,7 +183,7 @@ class BlockWriter {
   ProgramText& text_;
   double scale_;  ///< 10^decimals
   double most_sweep_;
-  std::string line_;  ///< In the making.
+  std::string line_;  ///< Line being written.
   PathDigest digest_;
   Eigen::Vector3d at_ = Eigen::Vector3d::Zero();  ///< Not rounded.
   // Words in force; coordinates in units of the last decimal.

@@ -63,7 +63,7 @@ std::string feed_text(const PostDescription& post, double feed) {
   return text;
 }
 
-/// Whole units with the point put in.
+/// Whole units with the point inserted.
 void append_coordinate(std::string& line, std::int64_t units, int decimals,
                        const PostDescription& post) {
   if (units < 0) line += '-';
@@ -104,10 +104,10 @@ std::string padded_comment_line(const PostDescription& post, std::string_view te
 
 namespace {
 
-/// Where a reference point is put while lines are tried out, mm.
+/// Place of a reference point in trials, mm.
 constexpr double kReferenceZ = 100.0;
 
-/// The tool length offset that a program before has left in force: no line of a description's own.
+/// Tool length offset left in force by a previous program; no description uses it.
 constexpr int kForeignLength = 77;
 
 GcodeText text_of(const std::string& line) {
@@ -198,7 +198,7 @@ bool writes_as_programs_are(const GcodeState& state) {
   return state.inches == false && state.absolute && !state.inverse_time;
 }
 
-/// What a program before may have left in force: the opposite of what ours rely on.
+/// State that a previous program may have left: the opposite of what ours rely on.
 GcodeState left_behind(int coordinate_system) {
   GcodeState state;
   state.motion = MotionMode::kFeed;
@@ -211,7 +211,7 @@ GcodeState left_behind(int coordinate_system) {
   return state;
 }
 
-/// Whether one of the lines has a G word, times ten.
+/// True if one of the lines has a G word, times ten.
 bool states(const std::vector<std::string>& lines, int tenths) {
   return std::any_of(lines.begin(), lines.end(), [&](const std::string& line) {
     if (line.find('{') != std::string::npos) return false;
@@ -222,7 +222,7 @@ bool states(const std::vector<std::string>& lines, int tenths) {
   });
 }
 
-/// Holds what `start` leaves in force against what programs rely on, whatever was in force before.
+/// Checks that `start` sets everything that programs rely on, whatever was in force before.
 void check_start(const PostDescription& post, const TomlFields& fields) {
   std::set<int> systems;
   for (const int before : {0, 1}) {
@@ -241,13 +241,13 @@ void check_start(const PostDescription& post, const TomlFields& fields) {
   }
   Trial trial(post, fields);
   trial.require("start", states(post.start, 800), "must cancel canned cycles from before (G80)");
-  // The others have no such words.
+  // Other dialects have no such words.
   const bool compensates = post.reader.tool_length || post.reader.path_blending;
   trial.require("start", !compensates || states(post.start, 400),
                 "must cancel cutter compensation from before (G40)");
 }
 
-/// Whether `word` alone on a line makes `holds` true of the state.
+/// True if `word` alone on a line makes `holds` true of the state.
 template <class Holds>
 void check_word(const PostDescription& post, const TomlFields& fields, const std::string& key,
                 const std::string& word, const Holds& holds) {
@@ -260,7 +260,7 @@ void check_word(const PostDescription& post, const TomlFields& fields, const std
 void check_plane(const PostDescription& post, const TomlFields& fields, const std::string& key,
                  ArcPlane plane) {
   const std::size_t normal = plane == ArcPlane::kXY ? 2 : plane == ArcPlane::kZX ? 1 : 0;
-  // From another plane than that of a reset, so that a word that does nothing is found.
+  // Starts from another plane than after a reset, so that a word without effect is found.
   const std::string other = plane == ArcPlane::kXY ? "G19" : "G17";
   Trial trial(post, fields);
   trial.run(key, {other, post.planes[normal]});
@@ -299,7 +299,7 @@ void check_words(const PostDescription& post, const TomlFields& fields) {
 }
 
 /// Tries out the lines of a program with the description's own reader.
-/// @return whether those before a tool's first operation put its length into force.
+/// @return true if the lines before a tool's first operation apply its length.
 /// @throw InputError naming the key in `fields` and the line with what the reader says, or which
 ///        rule the lines break.
 bool check_program_lines(const PostDescription& post, const TomlFields& fields) {
@@ -395,7 +395,7 @@ void read_lines(TomlFields fields, PostDescription& post) {
   fields.finish();
 }
 
-/// Our parser, and every controller that is read here, knows two kinds of comment.
+/// Our parser, like every supported controller, knows two kinds of comment.
 void read_comments(TomlFields fields, PostDescription& post) {
   post.comment_open = fields.one_of("open", {"(", ";"});
   post.comment_close = fields.text_or("close", "");

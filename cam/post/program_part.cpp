@@ -12,7 +12,7 @@
 namespace lensforge {
 namespace {
 
-constexpr std::size_t kJobCharacters = 40;  ///< Of {job}, which stands beside other words.
+constexpr std::size_t kJobCharacters = 40;  ///< Of {job}, which shares a line with other words.
 constexpr std::size_t kLinesOfMove = 3;     ///< A rapid is at most three lines.
 
 std::string coolant_word(const ProgramContext& context) {
@@ -113,7 +113,7 @@ void ProgramPart::write_header() {
   text_.reserve(kLateComments + static_cast<int>(operations_.size()));
 }
 
-/// What stands in a description may move the machine and change its words.
+/// Forgets the modal state: a description's lines may move the machine and change it.
 void ProgramPart::write_lines(const std::vector<std::string>& lines) {
   for (const std::string& line : lines) {
     if (const auto filled = fill_line(line, texts_)) text_.line(*filled);

@@ -14,44 +14,45 @@
 
 namespace lensforge {
 
-/// What every file of a plan is written from; all must outlive what uses it.
+/// Common inputs of every file of a plan; all must outlive their users.
 struct ProgramContext {
   const ProgramPlan& plan;
   const PostDescription& post;
   const ProgramSettings& settings;
-  RapidFeeds rapid_feeds = {};  ///< Where the dialect has no word for rapids.
+  RapidFeeds rapid_feeds = {};  ///< For dialects without a word for rapids.
 };
 
-/// How the tool's length gets into Z: by the control's table, or by touching off, in a sentence
-/// without its end. @param tools  that a program uses. @param tool  the one, in words.
+/// Explains how the tool's length gets into Z, by the control's table or by touching off: a
+/// sentence without its end. @param tools  number of tools of a program. @param tool  the one, in
+/// words.
 std::string length_words(const PostDescription& post, std::size_t tools, const std::string& tool);
 
-/// Where an operation begins in a file.
+/// Place in a file where an operation begins.
 struct OperationStart {
   std::size_t operation = 0;  ///< Index in the plan.
   std::int64_t line = 0;      ///< Counted from 1.
 };
 
-/// One file in the making: a complete program that begins with a retract to the safe height and
+/// One file being written: a complete program that begins with a retract to the safe height and
 /// ends there with the spindle off.
 class ProgramPart {
  public:
-  /// Writes the header and the words that all programs begin with.
-  /// @param operations  of the plan that the file may hold, its reserved comments among them.
-  /// @param number      what {number} stands for.
+  /// Writes the header and the common opening words.
+  /// @param operations  the plan's operations in the file; each gets a reserved comment.
+  /// @param number      value of {number}.
   ProgramPart(const ProgramContext& context, const std::filesystem::path& path,
               std::vector<std::size_t> operations, std::int64_t number);
 
-  /// Changes the tool if need be and starts its spindle; the tool is at the safe height then.
+  /// Changes the tool if needed and starts its spindle; leaves the tool at the safe height.
   void begin_operation(std::size_t operation);
-  /// Over the point at the safe height and down to it at the tool's plunge feed.
+  /// Moves over the point at the safe height and down to it at the tool's plunge feed.
   void plunge_to(const Eigen::Vector3d& point);
   void move(const PathMove& move);
-  /// Whether the program would still be within `limit` bytes after this move and its end.
+  /// True if the program is still within `limit` bytes after this move and its end.
   [[nodiscard]] bool has_room(const PathMove& move, std::uintmax_t limit) const;
-  /// Retract, spindle off, end; all is in the file then but what finish() fills in.
+  /// Retracts, stops the spindle and ends the program; only finish() remains.
   void end();
-  /// @param late  comments in place of those reserved, kLateComments and one an operation.
+  /// @param late  texts for the reserved comments: kLateComments and one per operation.
   void finish(const std::vector<std::string>& late) { text_.finish(late); }
 
   static constexpr int kLateComments = 4;

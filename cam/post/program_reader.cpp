@@ -21,7 +21,7 @@ GcodeState start_state() {
   return state;
 }
 
-/// Length of the line as a controller would get it: compact_gcode() without making the text.
+/// Length of the line as sent to a controller: that of compact_gcode(), without making the text.
 std::size_t sent_bytes(std::string_view text) {
   std::size_t bytes = 0;
   bool in_brackets = false;
@@ -40,7 +40,8 @@ bool goes_to_reference(const GcodeBlock& block) {
   });
 }
 
-/// What a part is cut with has to stand in the program, not in the controller's memory.
+/// Checks that programs state everything they cut with instead of relying on the controller's
+/// memory.
 class Checks {
  public:
   explicit Checks(const GcodeDialect& dialect)

@@ -16,7 +16,7 @@
 
 namespace lensforge {
 
-/// One line of a program with what it does.
+/// One line of a program and its effect.
 struct ProgramLine {
   const GcodeBlock& block;
   const GcodeEffect& effect;
@@ -26,16 +26,16 @@ struct ProgramLine {
 
 using LineSink = std::function<void(const ProgramLine&)>;
 
-/// Hands every line of a program to `sink`, in constant memory. G28 and G30 go to Z 100 mm above
-/// X0 Y0: where they really go only the machine knows.
+/// Passes every line of a program to `sink`, in constant memory. G28 and G30 are taken to go to Z
+/// 100 mm above X0 Y0: their true target is known only to the machine.
 /// @throw InputError naming file, line and reason for the first line that the dialect refuses, that
-///        is longer than it takes, that cuts with the spindle off or with an unknown height, and
-///        for a program without an end or with motions that are not in millimetres;
-///        Interrupted; RunError if the file cannot be read.
+///        is too long for it, or that cuts with the spindle off or at an unknown height, and for a
+///        program without an end or with motions that are not in millimetres; Interrupted; RunError
+///        if the file cannot be read.
 void walk_program(const std::filesystem::path& path, const GcodeDialect& dialect,
                   const LineSink& sink, const RunControl& control);
 
-/// What a whole program says; program coordinates, mm. Motions by G28 and G30 count nowhere.
+/// Totals of a program; program coordinates, mm. Motions by G28 and G30 are not counted.
 struct ProgramReading {
   Eigen::AlignedBox3d cutting;  ///< Of all motions at feed, arcs over their whole length.
   double cutting_length = 0.0;
@@ -43,7 +43,7 @@ struct ProgramReading {
   std::int64_t lines = 0;
   std::int64_t motions = 0;
   std::int64_t arcs = 0;
-  std::vector<int> tools;   ///< In the order of their first use; empty where none is named.
+  std::vector<int> tools;   ///< In the order of first use; empty if none is named.
   double least_feed = 0.0;  ///< mm/min; 0 without a motion at feed.
   double most_feed = 0.0;
   std::optional<double> blending;  ///< G64 P in force at the last motion at feed, mm.
@@ -62,29 +62,29 @@ class ReadingCollector {
   ProgramReading reading_;
 };
 
-/// Takes the motions of a program, one by one; `tool` is the number of the last T word, 0 without.
+/// Takes the motions of a program, one by one; `tool` is the number of the last T word, or 0.
 using MotionSink = std::function<void(const GcodeMotion& motion, int tool)>;
 
-/// Streams all motions of a program to `sink`, in constant memory; those by G28 and G30 are left
-/// out, so that a motion may start elsewhere than where the one before it ended.
+/// Streams all motions of a program to `sink`, in constant memory. Motions by G28 and G30 are left
+/// out, so a motion may start elsewhere than where the one before it ended.
 /// @throw as walk_program()
 ProgramReading read_program(const std::filesystem::path& path, const GcodeDialect& dialect,
                             const MotionSink& sink, const RunControl& control);
 
-/// How long a stretch of a program takes, and what it asks of the controller and the link to it.
+/// Time of a stretch of a program, and its load on the controller and the link.
 struct ProgramTime {
-  double seconds = 0.0;  ///< With lines always there in time.
-  /// With lines no faster than PlannerSettings::lines_per_second and bytes_per_second.
+  double seconds = 0.0;  ///< If lines are always there in time.
+  /// If lines come no faster than PlannerSettings::lines_per_second and bytes_per_second.
   double stream_limited_seconds = 0.0;
-  std::int64_t lines = 0;    ///< That move.
-  std::int64_t blocks = 0;   ///< As the planner has them, chords of arcs one by one.
+  std::int64_t lines = 0;    ///< Lines with motion.
+  std::int64_t blocks = 0;   ///< Of the planner; chords of arcs count one by one.
   std::int64_t starved = 0;  ///< Times that the limited stream let the queue run empty.
-  /// Most lines a second over as many lines as the queue holds, at the speeds that the machine
-  /// reaches, and where.
+  /// Maximum lines per second over as many lines as the queue holds, at the speeds that the machine
+  /// reaches, and its place.
   double peak_lines_per_second = 0.0;
   std::int64_t peak_line = 0;
 
-  /// The sum of two stretches: of rates the larger.
+  /// Adds another stretch; of rates the larger is kept.
   ProgramTime& operator+=(const ProgramTime& other);
 };
 
@@ -99,7 +99,7 @@ class ProgramTimer {
   ProgramTimer(const PlannerSettings& settings, double tool_change);
 
   void take(const ProgramLine& line);
-  /// All up to here, the machine standing still. Nothing may follow.
+  /// Time of all lines so far, with the machine stopped at the end. Nothing may follow.
   [[nodiscard]] ProgramTime finish();
 
  private:

@@ -114,7 +114,7 @@ std::string operation_text(const ProgramContext& context, std::size_t operation,
   return name + ": in another part";
 }
 
-/// Reads a part that has ended back, times it and compares it with what was written.
+/// Reads a finished part back, times it and compares it with what was written.
 /// @throw InputError naming the post and the reason if its own reader refuses the program or finds
 ///        another path in it; Interrupted.
 WrittenProgram check_part(const ProgramContext& context, const ProgramPart& part,
@@ -123,7 +123,7 @@ WrittenProgram check_part(const ProgramContext& context, const ProgramPart& part
   const fs::path& beside = part.text().file().beside();
   const std::string stage = "read back " + part.text().file().path().filename().string();
   const auto take = [&](const ProgramLine& line) {
-    // What looks on may take long over a line.
+    // The observer may take long for a line.
     if (control.stop_requested()) throw Interrupted();
     reading.take(line);
     if (line.block.line % kLinesBetweenReports != 0) return;
@@ -168,7 +168,7 @@ std::vector<std::string> late_comments(const ProgramContext& context, const Prog
   return comments;
 }
 
-constexpr double kEarlySplit = 0.9;  ///< Share of the limit from which a rapid is a place to split.
+constexpr double kEarlySplit = 0.9;  ///< Share of the limit from which a rapid is used to split.
 
 void require(bool holds, const char* what, double value, const std::string& rule) {
   if (!holds) throw InputError(std::string(what) + ": " + shortest_text(value) + " " + rule);
@@ -180,10 +180,10 @@ struct Group {
   std::vector<std::size_t> operations;
 };
 
-/// Names of files end at 255 bytes, and those beside need some of them.
+/// File names have at most 255 bytes; temporary names need some of them.
 constexpr std::size_t kLongestStem = 100;
 
-/// Cut short, but not within a letter of UTF-8.
+/// Shortens a name, but not within a UTF-8 character.
 std::string shortened(std::string name) {
   if (name.size() <= kLongestStem) return name;
   std::size_t end = kLongestStem;
@@ -211,7 +211,7 @@ std::vector<Group> group_operations(const ProgramContext& context) {
   std::vector<Group> groups;
   for (std::size_t i = 0; i < operations.size(); ++i) {
     const bool same_tool = i > 0 && operations[i].tool.number == operations[i - 1].tool.number;
-    // Several lenses on one blank: what is done to one is done to the next.
+    // Several lenses on one blank: an operation is done on each in turn.
     const bool same_name = i > 0 && same_tool && operations[i].name == operations[i - 1].name;
     const bool joins = i > 0 && (same_name || (!apart && (all || same_tool)));
     if (!joins) groups.emplace_back();
@@ -224,7 +224,7 @@ std::vector<Group> group_operations(const ProgramContext& context) {
   return groups;
 }
 
-/// A part with what was found when it was read back.
+/// A part and its read-back results.
 struct ReadPart {
   std::unique_ptr<ProgramPart> part;
   WrittenProgram file;
@@ -321,14 +321,14 @@ class GroupWriter {
   Eigen::Vector3d last_ = Eigen::Vector3d::Zero();
 };
 
-/// Whether `name` is `stem`_<digits>.
+/// True if `name` is `stem`_<digits>.
 bool is_part_name(const std::string& name, const std::string& stem) {
   if (!name.starts_with(stem + "_")) return false;
   const std::string digits = name.substr(stem.size() + 1);
   return !digits.empty() && digits.find_first_not_of("0123456789") == std::string::npos;
 }
 
-/// Names that the parts of a group take once all of them are known.
+/// Final names of a group's parts, once all of them are known.
 std::vector<fs::path> final_names(const std::vector<ReadPart>& parts, const Group& group,
                                   const ProgramContext& context, const fs::path& folder) {
   if (parts.size() == 1) return {folder / (group.stem + "." + context.post.extension)};
@@ -361,7 +361,7 @@ void gather(std::vector<ReadPart>& parts, const std::vector<fs::path>& names,
   }
 }
 
-/// As fast as the axes go, to the dialect's decimals.
+/// The axes' maximum feeds, rounded to the dialect's decimals.
 RapidFeeds rapid_feeds(const PostDescription& post, const Eigen::Vector3d& rate) {
   const double scale = std::pow(10.0, post.feed_decimals);
   const auto rounded = [scale](double feed) {

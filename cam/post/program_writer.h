@@ -19,18 +19,18 @@
 
 namespace lensforge {
 
-/// One operation of a cut: a tool and the moves that it makes.
+/// One operation of a cut: a tool and its moves.
 struct ProgramOperation {
   std::string name;  ///< "rough", "finish": names its file.
   Tool tool;
   std::vector<std::string> comments;  ///< Below its heading in the program.
-  /// Streams the moves, lens frame. The tool stands at the safe height beforehand and is brought
-  /// back there afterwards. A first move at feed is a point that is plunged to; a first move that
-  /// is an arc is not allowed. What is not complete() was interrupted.
+  /// Streams the moves, lens frame. The tool is at the safe height beforehand and is brought back
+  /// there afterwards. A first move at feed is a point to plunge to; it must not be an arc. An
+  /// operation that is not complete() was interrupted.
   std::function<OperationSummary(const MoveSink&)> stream;
 };
 
-/// A whole cut as it is to be written.
+/// A whole cut to be written.
 struct ProgramPlan {
   std::string job = "lens";           ///< In the first comment and for {job}.
   std::vector<std::string> comments;  ///< Of the header: units, zero, blank.
@@ -39,7 +39,7 @@ struct ProgramPlan {
   double safe_z = 5.0;    ///< Z of the retracts between operations, program frame, mm.
 };
 
-/// Which operations share a file. A dialect without tool change never has two tools in one.
+/// Grouping of operations into files. A dialect without tool change never has two tools in one.
 enum class ProgramGrouping {
   kOperation,  ///< One file for each name: rough.ngc, finish.ngc.
   kTool,       ///< Operations in a row with one tool, their names joined: finish-pencil.ngc.
@@ -48,16 +48,16 @@ enum class ProgramGrouping {
 
 enum class Coolant { kOff, kMist, kFlood };
 
-/// Is shown every line of every program as it was read back, in the order in which they are run,
-/// with the index in the plan of the operation that it belongs to. A program begins with its
-/// line 1.
+/// Receives every line of every program as it was read back, in the order in which they are run,
+/// with the plan's index of its operation. A program begins with its line 1.
 using ReadBackSink = std::function<void(std::size_t operation, const ProgramLine& line)>;
 
-/// How a plan is written.
+/// Settings for writing a plan.
 struct ProgramSettings {
-  int decimals = 5;  ///< Of coordinates, 0 … the dialect's most.
-  /// How far LinuxCNC may cut corners to keep its feed, mm; without a limit it keeps the feed at
-  /// any distance. 0 leaves the machine's setting; dialects without the word ignore it.
+  int decimals = 5;  ///< Of coordinates, 0 … the dialect's maximum.
+  /// Maximum distance by which LinuxCNC may cut corners to keep its feed, mm; without a limit it
+  /// keeps the feed at any distance. 0 leaves the machine's setting; dialects without the word
+  /// ignore it.
   double blend_tolerance = 0.0;
   double chord_tolerance = 5e-4;  ///< Of chords where the dialect has no such arc, mm, > 0.
   double spin_up = 3.0;           ///< Dwell after the spindle was switched on, s, ≥ 0.
@@ -71,10 +71,10 @@ struct ProgramSettings {
   ReadBackSink look = {};
 };
 
-/// ProgramSettings::largest_file at least, bytes: head, end and one long arc fit.
+/// Minimum of ProgramSettings::largest_file, bytes: head, end and one long arc fit.
 inline constexpr std::uintmax_t kSmallestProgramLimit = 1 << 16;
 
-/// An operation, or the share of it that one file holds.
+/// An operation, or its part in one file.
 struct OperationTime {
   std::size_t operation = 0;  ///< Index in the plan.
   std::int64_t line = 0;      ///< Where it begins in the file; 0 for a whole operation.
@@ -85,20 +85,20 @@ struct OperationTime {
 /// One program file as it was read back.
 struct WrittenProgram {
   std::filesystem::path path;
-  std::filesystem::path beside;  ///< Where it is until it is published; empty afterwards.
+  std::filesystem::path beside;  ///< Path until published; empty afterwards.
   std::uintmax_t bytes = 0;
-  std::string sha256;  ///< Of all below the seal line, as its header states.
+  std::string sha256;  ///< Of everything below the seal line, as its header states.
   ProgramReading reading;
   ProgramTime time;
   std::vector<OperationTime> operations;
 };
 
-/// What a plan came to.
+/// Result of a plan.
 struct ProgramFiles {
   std::vector<WrittenProgram> files;        ///< In the order in which they are to be run.
-  GcodeDialect reader;                      ///< By which they were read back.
+  GcodeDialect reader;                      ///< Dialect used to read them back.
   std::vector<OperationSummary> summaries;  ///< Of the plan's operations.
-  std::vector<ProgramTime> times;           ///< Likewise, over all files.
+  std::vector<ProgramTime> times;           ///< The same, over all files.
   std::vector<std::string> names;           ///< Of all files that were read back, in that order.
   ProgramTime total;
 };
@@ -106,12 +106,11 @@ struct ProgramFiles {
 /// Writes a plan as programs of the dialect, streamed to disk in constant memory. Each file is a
 /// complete program: header with job, tools, extents, minutes and a hash of what follows; modes;
 /// retract to the safe height; tool; spindle; the motions; retract, spindle off, end. A file that
-/// would grow beyond the size limit is split (finish_1.ngc, finish_2.ngc), at a rapid if one comes
-/// in the last tenth; the next file then plunges at the tool's plunge feed to where the cut was
-/// left.
+/// would exceed the size limit is split (finish_1.ngc, finish_2.ngc), at a rapid if one comes in
+/// the last tenth; the next file then plunges at the tool's plunge feed to where the cut stopped.
 ///
-/// Every file is read back by our own parser: its motions at feed have to be those that were
-/// written, to the last decimal. None has its name before publish().
+/// Every file is read back by our own parser: its motions at feed must be those written, to the
+/// last decimal. No file has its name before publish().
 class PendingPrograms {
  public:
   /// @throw InputError naming what, value and rule for bad settings, or a description whose
@@ -126,16 +125,16 @@ class PendingPrograms {
 
  private:
   ProgramFiles programs_;
-  std::vector<PendingFile> pending_;  ///< One a file.
+  std::vector<PendingFile> pending_;  ///< One per file.
 };
 
-/// What stands in `folder` under names that a plan's programs, or parts of them, may get.
+/// Existing files in `folder` under names that a plan's programs, or parts of them, may get.
 std::vector<std::filesystem::path> programs_in_the_way(const ProgramPlan& plan,
                                                        const PostDescription& post,
                                                        const ProgramSettings& settings,
                                                        const std::filesystem::path& folder);
 
-/// Longest spin-up or tool change, s.
+/// Maximum spin-up or tool change, s.
 inline constexpr double kMaxPause = 3600.0;
 
 /// @throw InputError naming what, value and rule.

@@ -17,11 +17,11 @@
 namespace lensforge {
 namespace {
 
-/// How finely a surface without creases is cut into facets where the ball's reach is judged: only
-/// heights count, since a fillet's slopes are the ball's.
+/// Facets of a surface without creases for checking the ball's reach: only heights count, since a
+/// fillet's slopes are the ball's.
 constexpr SmoothCutOptions kReachCut{1e-4, std::numeric_limits<double>::infinity()};
 
-/// Facets are cut and rendered as they are.
+/// Facets, cut and rendered without smoothing.
 class MeantFacets final : public MeantSurface {
  public:
   explicit MeantFacets(std::shared_ptr<const OpticalSurface> surface)
@@ -121,10 +121,10 @@ LeakageChain PartSurfaces::chain() const {
 
 namespace {
 
-/// Quotients that are whole but for this must not cost a cell.
+/// Rounding allowed in quotients, so that whole ones do not cost a cell.
 constexpr double kRounding = 1e-9;
 
-/// Nodes of one tile that are kept.
+/// Keeps the nodes of one tile.
 void keep_nodes(const SurfacePatch& patch, const PartGrid& grid, const std::string& name,
                 const Executor& executor, LayeredImage& layers) {
   const std::array values{&patch.z, &patch.slope_x, &patch.slope_y};
@@ -162,7 +162,7 @@ PartGrid part_grid(const Eigen::Vector2d& lens_size, const Eigen::Vector2d& spac
   const double coarse = std::sqrt(lens_size.prod() / most);
   PartGrid grid;
   for (int axis = 0; axis < 2; ++axis) {
-    // A spacing that is a part of the pitch should stay one: as many cells as it asks for, if their
+    // A spacing that divides the pitch should stay so: use as many cells as it requires if their
     // number allows that.
     const double cells = std::ceil(lens_size[axis] / spacings[axis] - kRounding);
     const double every = std::max(1.0, std::ceil(coarse / spacings[axis] - kRounding));

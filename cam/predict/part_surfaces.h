@@ -22,8 +22,8 @@
 
 namespace lensforge {
 
-/// An optical surface as the prediction asks for it. Its tiles are held (HeldField): not for
-/// several threads at once.
+/// An optical surface for the prediction. Its tiles are held (HeldField): not for several threads
+/// at once.
 class MeantSurface {
  public:
   MeantSurface() = default;
@@ -33,7 +33,7 @@ class MeantSurface {
 
   [[nodiscard]] virtual const SurfaceField& field() const = 0;
 
-  /// What the ball can reach of it. `cut` is the same surface; both must outlive the result.
+  /// The surface that the ball can reach. `cut` is the same surface; both must outlive the result.
   [[nodiscard]] virtual std::unique_ptr<RoundedField> rounded(const CutSurface& cut,
                                                               const Eigen::AlignedBox2d& rectangle,
                                                               const Executor& executor) = 0;
@@ -41,14 +41,14 @@ class MeantSurface {
 
 std::unique_ptr<MeantSurface> meant_surface(std::shared_ptr<const OpticalSurface> surface);
 
-/// Every surface between the design and the polished part, each with one cause of wrong light more
-/// than the one before (LeakageChain). Tiles are held (HeldField): not for several threads at once.
+/// Every surface between the design and the polished part; each adds one cause of wrong light to
+/// the one before (LeakageChain). Tiles are held (HeldField): not for several threads at once.
 class PartSurfaces {
  public:
-  /// What is designed and what mills it. All must outlive the surfaces.
+  /// The designed surfaces and their frame. All must outlive the surfaces.
   struct Design {
     const SurfaceField& surface;     ///< Of the lens; held, if tiles are to be shared.
-    const RoundedField& rounded;     ///< Of what is cut, lens or mould.
+    const RoundedField& rounded;     ///< Of the surface to cut, lens or mould.
     Eigen::AlignedBox2d rectangle;   ///< Of the lens, mm.
     double blank_top = 0.0;          ///< mm
     std::optional<CastFrame> mould;  ///< If the lens is cast.
@@ -63,24 +63,24 @@ class PartSurfaces {
   [[nodiscard]] const SurfaceField& part() const { return *polished_.back(); }
 
  private:
-  /// As the lens has it: cast if it is cut in a mould.
+  /// The surface on the lens: a cast one if it is cut in a mould.
   const SurfaceField* on_lens(const SurfaceField& cut);
 
-  /// For surfaces that are rendered themselves and polished.
+  /// Holds tiles of a surface that is both rendered itself and polished.
   const SurfaceField* held(const SurfaceField* field);
 
   Design design_;
   MilledField ideal_;
   MilledField fitted_;
   MilledField written_;
-  std::optional<MilledField> stretched_;  ///< If the machine makes other ways than are written.
+  std::optional<MilledField> stretched_;  ///< If the machine's paths differ from the written ones.
   std::vector<std::unique_ptr<CastField>> cast_;
   std::vector<std::unique_ptr<HeldField>> held_;
   std::vector<const SurfaceField*> raw_;                  ///< In the order of the chain.
-  std::vector<std::unique_ptr<PolishedField>> polished_;  ///< Likewise.
+  std::vector<std::unique_ptr<PolishedField>> polished_;  ///< In the same order.
 };
 
-/// Names of the surfaces that are rendered beside the chain's.
+/// Names of the surfaces rendered in addition to the chain's.
 namespace surface_name {
 inline constexpr const char* kDesigned = "designed";
 inline constexpr const char* kRounded = "tool-rounded";
@@ -94,34 +94,34 @@ inline constexpr const char* kPolished = "polished";  ///< As designed, but poli
 inline constexpr const char* kPart = "part";          ///< Cut and polished.
 }  // namespace part_layer
 
-/// Nodes of a surface in part.exr, about: what a page of 25 MB can hold.
+/// Approximate number of nodes of a surface in part.exr: the limit for a page of 25 MB.
 inline constexpr double kPartNodes = 4e5;
 
-/// The nodes of a surface's layers: columns and rows, evenly over the lens, and how many cells of
-/// the grid that is sampled lie between two of them.
+/// The nodes of a surface's layers: columns and rows, evenly over the lens, and the cells of the
+/// sampled grid between two of them.
 struct PartGrid {
   Eigen::Vector2i nodes;
   Eigen::Vector2i every;
 };
 
-/// @param spacings  of the grid that is sampled, along x and y, at most, mm. @param most  nodes,
-/// about.
+/// @param spacings  maximum of the sampled grid's, along x and y, mm. @param most  approximate
+///                  number of nodes.
 PartGrid part_grid(const Eigen::Vector2d& lens_size, const Eigen::Vector2d& spacings, double most);
 
-/// The grid over the lens that is sampled, at most `spacings` apart: nodes of part_grid() with
-/// kPartNodes are nodes of it.
+/// The sampled grid over the lens, with nodes at most `spacings` apart; it contains the nodes of
+/// part_grid() with kPartNodes.
 GridWindow sampled_grid(const Eigen::Vector2d& lens_size, const Eigen::Vector2d& spacings);
 
 /// Heights, mm, and slopes of surfaces as layers "NAME.z", "NAME.slope_x" and "NAME.slope_y", at
-/// nodes evenly over the lens, the upper left one first, kept from the tiles that are sampled for
-/// the surfaces' pictures.
+/// nodes evenly over the lens, the upper left one first, taken from the tiles sampled for the
+/// surfaces' pictures.
 class PartLayers {
  public:
   /// @param spacings  as of sampled_grid(), whose tiles are taken.
   PartLayers(std::vector<NamedSurface> surfaces, const Eigen::Vector2d& lens_size,
              const Eigen::Vector2d& spacings);
 
-  /// Keeps what layers need of a surface's tile; of other surfaces that is nothing.
+  /// Keeps the layers' nodes of a surface's tile; ignores other surfaces.
   void take(const SurfaceField& field, const SurfacePatch& tile, const Executor& executor);
 
   /// @pre every tile was taken.
@@ -133,8 +133,8 @@ class PartLayers {
   LayeredImage layers_;
 };
 
-/// The pictures of the designed surface and of a chain's steps, under the names that they have
-/// there, linear light.
+/// The pictures of the designed surface and of a chain's steps, under their names in the chain,
+/// linear light.
 /// @param total  of a picture with all of the lens's light.
 LayeredImage cause_layers(const LeakageResult& leakage, double total);
 

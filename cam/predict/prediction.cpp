@@ -35,16 +35,16 @@
 namespace lensforge {
 namespace {
 
-/// Side of the cells in which leaking light is looked for, mm: a groove of a few of them is what an
-/// operator can find again.
+/// Side of the cells in which leaking light is located, mm: an operator can find a groove a few of
+/// them long.
 constexpr double kLeakCell = 1.0;
 
-/// Nodes along the longer side of the surface that the report shows.
+/// Nodes along the longer side of the surface shown in the report.
 constexpr double kViewNodes = 240.0;
 
 constexpr double kMicrometres = 1e3;
 
-/// A whole surface, coarsely.
+/// Samples a whole surface coarsely.
 SurfacePatch coarse_patch(const SurfaceField& field, const Lens& lens, double spacing,
                           const Executor& executor) {
   SurfacePatch patch;
@@ -52,7 +52,7 @@ SurfacePatch coarse_patch(const SurfaceField& field, const Lens& lens, double sp
   return patch;
 }
 
-/// LightPath::intake() of all of the lens inside of its outline, mm².
+/// LightPath::intake() of the lens inside of its outline, mm².
 double lit_intake(const Lens& lens, const LightPath& light, const Executor& executor) {
   const std::optional<Outline>& outline = lens.setup.outline;
   if (!outline) return intake_of(lens.surface, light);
@@ -67,7 +67,7 @@ LensRaster raster_of(const SurfacePatch& patch) {
   return raster;
 }
 
-/// Of the cells of a leak map.
+/// Height map from the cells of a leak map.
 ReportMap height_map(const LeakMap& map) {
   ReportMap heights{"Height",
                     "Polished part against the design, the largest difference in every square; "
@@ -133,7 +133,7 @@ struct CellGrid {
   CellRange cells;
 };
 
-/// Every cell cut into parts, the same number of all, so that none is wider than `spacings`.
+/// Divides every cell into the same number of parts, none wider than `spacings`.
 CellGrid refined(const GridWindow& grid, const CellRange& cells, const Eigen::Vector2d& spacings) {
   const auto parts = [&](int axis) {
     const double ratio = grid.spacing[axis] / spacings[axis];
@@ -155,7 +155,8 @@ Eigen::AlignedBox2d box_of(const GridWindow& grid, const CellRange& cells) {
           grid.node(cells.column + cells.columns, cells.row + cells.rows)};
 }
 
-/// Where a rectangle of the lens is cut: mirrored along x and larger in a mould (CastFrame).
+/// Rectangle to cut for a rectangle of the lens: mirrored along x and larger in a mould
+/// (CastFrame).
 Eigen::AlignedBox2d in_mould(const Eigen::AlignedBox2d& lens,
                              const std::optional<CastFrame>& mould) {
   if (!mould) return lens;
@@ -164,7 +165,7 @@ Eigen::AlignedBox2d in_mould(const Eigen::AlignedBox2d& lens,
           Eigen::Vector2d(s * (mould->width - lens.min().x()), s * lens.max().y())};
 }
 
-/// What a program has to say for a rectangle to be cut.
+/// Rectangle in the program for one to be cut by a stretched axis.
 Eigen::AlignedBox2d as_written(Eigen::AlignedBox2d box, const AxisStretch& stretch) {
   box.min()[stretch.axis] /= stretch.factor;
   box.max()[stretch.axis] /= stretch.factor;
@@ -177,7 +178,7 @@ Eigen::AlignedBox2d grown_within(const Eigen::AlignedBox2d& box, double beyond,
   return Eigen::AlignedBox2d(box.min() - all, box.max() + all).intersection(limits);
 }
 
-/// The rows of a raster that cross a box, no longer than the box: on the same places.
+/// The rows of a raster that cross a box, cut to its length, at the same places.
 RasterPlan raster_around(const RasterPlan& whole, const Eigen::AlignedBox2d& box) {
   const int across = 1 - whole.options.along;
   const double begin = whole.surface.min()[across];
@@ -208,7 +209,7 @@ std::vector<Valley> parts_in(const Valley& valley, const Eigen::AlignedBox2d& bo
   return parts;
 }
 
-/// What the light of a place changes in a picture when `now` takes the place of `before`.
+/// Change of a picture when the light `now` of a place replaces `before`.
 struct Exchange {
   double leakage = 0.0;
   double dark_flux = 0.0;
@@ -304,8 +305,8 @@ void TrialCut::add_pencil(const Eigen::AlignedBox2d& box, const MoveSink& sink,
   }
 }
 
-/// Rows reach as far as the polishing does and a diameter beyond, because the last radius of a row
-/// is level and what it cuts reaches a radius farther.
+/// Rows extend beyond the place by the polish's reach and a diameter, because the last radius of a
+/// row is level and its cut extends a radius farther.
 LeakTrial TrialCut::at(const LeakPlace& place, const RunControl& control) const {
   const RunControl silent(control.stop_token(), {});
   const CamOptions& before = site_.plan.options();
@@ -344,10 +345,10 @@ namespace {
 
 constexpr std::size_t kMaxBalls = 3;   ///< Sizes tried.
 constexpr std::size_t kMaxCauses = 2;  ///< The larger ones of a place.
-constexpr double kMinPart = 0.1;       ///< Of a leak, for its cause to be tried.
+constexpr double kMinPart = 0.1;       ///< Minimum share of a leak for its cause to be tried.
 constexpr double kHalf = 0.5;
 
-/// A change of one thing, and what to call it.
+/// A change of one thing, and its name.
 struct Change {
   std::string words;
   CamOptions options;
@@ -370,7 +371,7 @@ Change with_half_the_pitch(const CamOptions& options, double pitch) {
   return change;
 }
 
-/// Decimals follow where they were not chosen.
+/// Decimals are adapted unless they were chosen.
 Change with_half_the_tolerances(const CamOptions& options) {
   Change change{"half the tolerances", options};
   FinishProcess& finish = change.options.workshop.process.finish;
@@ -393,14 +394,14 @@ Change with_half_the_polish(const CamOptions& options) {
   return change;
 }
 
-/// What less polishing leaves of scallops, rows that lie closer make up for.
+/// Closer rows compensate for the scallops that less polishing leaves.
 Change with_half_the_polish_and_pitch(const CamOptions& options, double pitch) {
   Change change = with_half_the_polish(with_half_the_pitch(options, pitch).options);
   change.words = with_half_the_pitch(options, pitch).words + " and " + change.words;
   return change;
 }
 
-/// What is tried against a cause but for creases, one after the other.
+/// Changes to try against a cause other than creases, in this order.
 std::vector<Change> changes_against(const std::string& cause, const CutPlan& plan) {
   const CamOptions& options = plan.options();
   if (cause == leak_cause::kScallop) return {with_half_the_pitch(options, plan.pitch())};
@@ -422,7 +423,7 @@ bool is_valid(const CamOptions& options, const Lens& lens) {
   return true;
 }
 
-/// Tries changes and says how far it has come.
+/// Tries changes and reports progress.
 class Trials {
  public:
   Trials(const TrialSite& site, const Executor& executor, const RunControl& control)
@@ -447,7 +448,7 @@ class Trials {
   }
 
  private:
-  /// The same change may be tried for several places.
+  /// Cached: the same change may be tried for several places.
   const TrialCut::Work& work_of(const Change& change, const TrialCut& cut) {
     const auto known = works_.find(change.words);
     if (known != works_.end()) return known->second;
@@ -458,7 +459,7 @@ class Trials {
   const Executor& executor_;
   const RunControl& control_;
   TrialCut::Work now_;
-  std::map<std::string, TrialCut::Work> works_;  ///< By what changes are called.
+  std::map<std::string, TrialCut::Work> works_;  ///< By the changes' names.
   double done_ = 0.0;
 };
 
@@ -506,7 +507,7 @@ void try_remedies(const TrialSite& site, std::vector<LeakPlace>& places, const E
 
 namespace {
 
-/// A cut whose parts are drawn.
+/// A cut and its picture, for drawing parts.
 struct ToleranceSite {
   const CutPlan& plan;
   const Lens& lens;
@@ -514,7 +515,7 @@ struct ToleranceSite {
   const FluxPicture& designed;  ///< Picture of the design.
 };
 
-/// The rows as they lie on the lens: a mould is larger by what its cast shrinks.
+/// The rows' layout on the lens: a mould is larger by its cast's shrinkage.
 Passes passes_of(const CamOptions& options, const CutPlan& plan) {
   const FinishProcess& finish = options.workshop.process.finish;
   const std::optional<CastFrame> mould = plan.mould();
@@ -529,7 +530,7 @@ Passes passes_of(const CamOptions& options, const CutPlan& plan) {
   return passes;
 }
 
-/// What the programs of a cut assume of a part.
+/// Nominal values that a cut's programs assume.
 PartPlan part_plan(const CamOptions& options, const Lens& lens, const CutPlan& plan) {
   const Workshop& shop = options.workshop;
   return {lens.setup, passes_of(options, plan), shop.polish,
@@ -561,7 +562,7 @@ Prediction predict_cut(CutPlan& plan, const Lens& lens, const ProgramFiles& prog
   const CamOptions& options = plan.options();
   const std::unique_ptr<MeantSurface> cut = meant_surface(plan.optical());
   const auto rounded = cut->rounded(plan.surface(), cut_rectangle(plan), executor);
-  // A mould's own surface is another than that of the lens that is cast in it.
+  // The mould's surface differs from the surface of the lens cast in it.
   std::unique_ptr<MeantSurface> meant;
   if (plan.mould()) meant = meant_surface(optical_surface(lens, plan.model()));
   const Eigen::AlignedBox2d rectangle(Eigen::Vector2d(0.0, 0.0), lens.setup.lens_size);

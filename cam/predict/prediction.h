@@ -27,17 +27,17 @@
 
 namespace lensforge {
 
-/// What a part will project, before it is cut.
+/// Prediction of a part before it is cut.
 struct Prediction {
   LeakageResult leakage;
   SamplingCheck sampling;         ///< Of the part.
-  std::vector<LeakPlace> places;  ///< That leak most, worst first.
+  std::vector<LeakPlace> places;  ///< Places that leak most, worst first.
   CreaseMap creases;
   ReportMap height;              ///< Part − designed, µm.
   LensRaster surface;            ///< Heights of the part, mm.
   SurfaceMesh milled;            ///< The surface as milled, at kMeshSpacing.
   LayeredImage surfaces;         ///< Designed but polished, and the part: PartLayers.
-  ToleranceForecast tolerances;  ///< Empty unless it is asked for.
+  ToleranceForecast tolerances;  ///< Empty unless requested.
 };
 
 /// Spacing of the nodes of milled.ply, mm: 100 mm take 1 million.
@@ -48,7 +48,7 @@ inline constexpr double kMeshSpacing = 0.1;
 Prediction predict_part(const PartSurfaces& surfaces, const Lens& lens, const CamOptions& options,
                         const Executor& executor, const RunControl& control);
 
-/// A predicted cut, of which places are to be tried again.
+/// A predicted cut, for trying its places again.
 struct TrialSite {
   const CutPlan& plan;
   const Lens& lens;
@@ -58,11 +58,11 @@ struct TrialSite {
 };
 
 /// Cuts places of a predicted cut again, with other options: the finishing rows and valleys around
-/// a place are planned, fitted and rounded as make_cut() does, and the light of the place is traced
-/// from the surface that they leave, cast and polished. It replaces the place's light in the
-/// predicted picture; by what that adds to the whole leakage, wherever the light lands, the place's
-/// own changes. What differs from a whole new cut is that the rest of the lens stays as predicted,
-/// and that rows begin where the place does, so that their moves join elsewhere.
+/// a place are planned, fitted and rounded as in make_cut(), and the light of the place is traced
+/// from the resulting surface, cast and polished. It replaces the place's light in the predicted
+/// picture; the change of the whole leakage, wherever the light lands, is added to the place's own.
+/// Unlike in a new cut, the rest of the lens stays as predicted, and rows begin at the place, so
+/// their moves join elsewhere.
 class TrialCut {
  public:
   /// @param changed  may differ from the plan's options in finishing tool and process, decimals,
@@ -70,16 +70,16 @@ class TrialCut {
   /// All references must outlive this. @pre `changed` is valid for the lens.
   TrialCut(const TrialSite& site, const CamOptions& changed, const Executor& executor);
 
-  /// What the rows of the finishing rasters come to over the whole lens.
+  /// Work of the finishing rasters over the whole lens.
   struct Work {
     double moves = 0.0;
     double minutes = 0.0;  ///< Length ÷ feed.
   };
-  /// From kWorkRows rows of every raster, evenly spread. @throw Interrupted
+  /// Estimated from kWorkRows rows of every raster, evenly spread. @throw Interrupted
   [[nodiscard]] Work work(const RunControl& control) const;
   static constexpr std::int64_t kWorkRows = 6;
 
-  /// What would leak from a place. @throw Interrupted
+  /// Predicts the leakage of a place with the changed options. @throw Interrupted
   [[nodiscard]] LeakTrial at(const LeakPlace& place, const RunControl& control) const;
 
  private:
@@ -91,22 +91,22 @@ class TrialCut {
   TrialSite site_;
   const CamOptions& options_;
   const Executor& executor_;
-  std::unique_ptr<const FinishBalls> own_;  ///< Where balls or rows are others.
+  std::unique_ptr<const FinishBalls> own_;  ///< If balls or rows differ.
   const FinishBalls* balls_;
   std::vector<FinishPass> passes_;
 };
 
-/// Tries at every place what may help against its main cause, and against the next one if that
-/// does not halve the leak, and notes in LeakPlace::trials what would leak then. Against creases:
-/// smaller balls, one after the other until the leak is halved, three at most; against scallops
-/// half the pitch; against chords half the tolerances; against decimals one more; against polishing
-/// half of it, then half of it and half the pitch. Everything else stays as it is.
+/// Tries remedies at every place against its main cause, and against the next one if that does not
+/// halve the leak, and records the predicted leakage in LeakPlace::trials. Against creases: smaller
+/// balls, one after the other until the leak is halved, at most three; against scallops half the
+/// pitch; against chords half the tolerances; against decimals one more; against polishing half of
+/// it, then half of it and half the pitch. Everything else stays unchanged.
 /// @throw Interrupted
 void try_remedies(const TrialSite& site, std::vector<LeakPlace>& places, const Executor& executor,
                   const RunControl& control);
 
-/// What a lens will project whose programs are written, with remedies and tolerances as its options
-/// ask for them. Takes the plan's finishing paths.
+/// Predicts the picture of a lens whose programs are written, with the remedies and tolerances that
+/// its options request. Takes the plan's finishing paths.
 /// @param programs  with this plan's operations alone. @throw Interrupted
 Prediction predict_cut(CutPlan& plan, const Lens& lens, const ProgramFiles& programs,
                        const Executor& executor, const RunControl& control);

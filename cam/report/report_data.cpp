@@ -48,7 +48,7 @@ void PathSketch::begin_strip() {
   if (points_ > most_) thin_out();
 }
 
-/// Leaves out every second strip.
+/// Drops every second strip.
 void PathSketch::thin_out() {
   std::vector<std::vector<Eigen::Vector3f>> half;
   points_ = 0;

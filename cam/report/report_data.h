@@ -22,26 +22,26 @@
 
 namespace lensforge {
 
-/// A tool's path, thinned out to be looked at; mm, lens frame.
+/// A tool's path, thinned out for display; mm, lens frame.
 struct ReportPath {
   std::string operation;
   std::vector<std::vector<Eigen::Vector3f>> strips;  ///< Each drawn as one line.
-  std::int64_t every = 1;                            ///< One strip in so many was kept.
+  std::int64_t every = 1;                            ///< One strip in this many was kept.
 };
 
-/// Thins a path of any length out in constant memory. Whole strips are kept or left out, so that no
+/// Thins out a path of any length in constant memory. Whole strips are kept or left out, so that no
 /// line is drawn where the tool never went: a strip ends where the tool is lifted, and where it
 /// turns back (the next pass of a zig-zag).
 class PathSketch {
  public:
-  /// @param spacing  of the points that are kept along a strip, mm, > 0.
-  /// @param most     points that are kept, ≥ 2.
+  /// @param spacing  distance of the points kept along a strip, mm, > 0.
+  /// @param most     maximum number of points kept, ≥ 2.
   PathSketch(std::string operation, double spacing, std::size_t most = 40000);
 
   /// Takes the next moves, in order; fits MoveSink.
   void add(std::span<const PathMove> moves);
 
-  /// What was kept so far, with the strip that is not ended yet.
+  /// The strips kept so far, including the unfinished one.
   [[nodiscard]] ReportPath path() const;
 
  private:
@@ -71,33 +71,33 @@ struct LensRaster {
 /// A map over the lens that the report shows in false colour, with its colour bar.
 struct ReportMap {
   std::string title;
-  std::string note;  ///< What one sees, in a sentence.
+  std::string note;  ///< What it shows, in a sentence.
   std::string unit;  ///< Of the values.
   LensRaster raster;
 };
 
-/// A box with what it is called; mm, lens frame.
+/// A box and its name; mm, lens frame.
 struct NamedBox {
   std::string name;
   Eigen::AlignedBox3d box;
 };
 
-/// How the blank is put on the machine; mm, lens frame.
+/// Setup of the blank on the machine; mm, lens frame.
 struct SetupSheet {
   std::string machine;
   std::string material;
   Eigen::AlignedBox3d part;                        ///< The lens, entry face in z = 0.
   Eigen::AlignedBox3d blank;                       ///< The block before the first cut.
-  Eigen::Vector3d zero = Eigen::Vector3d::Zero();  ///< Where the program's X0 Y0 Z0 lies.
+  Eigen::Vector3d zero = Eigen::Vector3d::Zero();  ///< Place of the program's X0 Y0 Z0.
   std::string zero_words;                          ///< "top of the blank, lower left corner …"
-  std::string up_words;                            ///< Which face lies up and which down.
-  std::string length_words;                        ///< How the tools' lengths get into Z.
-  std::optional<Front> front;                      ///< Of the blank, there before the first cut.
-  std::string front_words;                         ///< Where it has to lie.
-  std::vector<NamedBox> keep_outs;                 ///< Clamps and whatever else no tool may enter.
+  std::string up_words;                            ///< The faces that lie up and down.
+  std::string length_words;                        ///< Explains how the tools' lengths get into Z.
+  std::optional<Front> front;                      ///< Of the blank, made before the first cut.
+  std::string front_words;                         ///< Explains where it has to lie.
+  std::vector<NamedBox> keep_outs;                 ///< Clamps and other regions closed to tools.
 };
 
-/// One program or part of one, as the operator runs it.
+/// One program or part of one, for the operator.
 struct ReportOperation {
   OperationSummary summary;
   std::string file;
@@ -105,7 +105,7 @@ struct ReportOperation {
   double spindle_rpm = 0.0;
   double minutes = 0.0;  ///< By the machine model.
   std::int64_t lines = 0;
-  double lines_per_second = 0.0;  ///< That the controller has to take, at most.
+  double lines_per_second = 0.0;  ///< Maximum load on the controller.
 };
 
 /// Parameters under one heading.
@@ -114,23 +114,23 @@ struct ParameterGroup {
   std::vector<NamedText> parameters;
 };
 
-/// One line of what --compare ranks.
+/// One line of the ranking of --compare.
 struct ReportChoice {
   std::string choice;  ///< "tool 0.3 mm, pitch 0.04 mm"
   double leakage = 0.0;
   double dark_flux = 0.0;
   double mae = 0.0;
   double hours = 0.0;
-  bool chosen = false;  ///< What the rest of the report is about, or what --compare recommends.
+  bool chosen = false;  ///< The subject of the rest of the report, or recommended by --compare.
 };
 
 /// A surface whose picture is shown.
 struct ShownSurface {
   std::string name;   ///< RenderedSurface::name
-  std::string words;  ///< What it is, in a few words.
+  std::string words;  ///< A few words about it.
 };
 
-/// Everything that report.html and report.json say.
+/// All contents of report.html and report.json.
 struct ReportData {
   std::string job;      ///< Name of the part.
   std::string program;  ///< "lensforge 0.1.0"
@@ -140,11 +140,11 @@ struct ReportData {
   Image target;                     ///< Linear light.
   LeakageResult leakage;            ///< designed, chain and the other surfaces.
   SamplingCheck sampling;           ///< Of the part.
-  std::vector<ShownSurface> shown;  ///< Whose pictures stand side by side.
+  std::vector<ShownSurface> shown;  ///< Their pictures are shown side by side.
   LeakageOptions leakage_options;
   bool mirror = false;                  ///< Or a mould of one.
   double ghost = 0.0;                   ///< ghost_share() of a lens; 0 of a mirror.
-  ToleranceForecast tolerances;         ///< Empty where it was not asked for.
+  ToleranceForecast tolerances;         ///< Empty unless requested.
   std::vector<LeakPlace> places;        ///< Worst first.
   Eigen::Vector2d lens_size{0.0, 0.0};  ///< mm
 
@@ -153,10 +153,10 @@ struct ReportData {
   std::vector<ReportOperation> operations;
   std::vector<ParameterGroup> parameters;
   SetupSheet setup;
-  std::optional<OpticalSetup> light;  ///< Where lamp and screen stand.
+  std::optional<OpticalSetup> light;  ///< Position of lamp and screen.
   double light_height = 0.0;          ///< Of the part in that light, mm.
   double z_offset = 0.0;              ///< Program Z = lens-frame z + z_offset.
-  double seconds = 0.0;               ///< Spent on making all this.
+  double seconds = 0.0;               ///< Time spent on all this.
   std::vector<std::string> warnings;
 
   LensRaster surface;            ///< Heights of the part, mm, for the view.
@@ -165,7 +165,7 @@ struct ReportData {
   std::vector<ReportChoice> choices;
 
   [[nodiscard]] double minutes() const;
-  /// What light falls on: "lens", or what is cast in the mould.
+  /// The lit part: "lens", or the cast from the mould.
   [[nodiscard]] std::string lit_part() const {
     const std::string kind = mirror ? "mirror" : "lens";
     return part == "mould" ? kind + " that is cast" : kind;

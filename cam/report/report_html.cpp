@@ -189,13 +189,13 @@ std::string footer(const ReportData& data) {
 
 namespace {
 
-/// Vertices along a side at most: 16-bit indices reach 65,536 of them.
+/// Maximum vertices along a side: 16-bit indices reach 65,536 of them.
 constexpr int kMaxNodes = 240;
 
-/// Of every packed number; surface_view.js reads 16 bits.
+/// Bytes of every packed number; surface_view.js reads 16 bits.
 constexpr int kBytes = 2;
 
-/// Colours that differ in lightness too, so that they read in grey and to colour-blind eyes.
+/// Colours that also differ in lightness, for grey prints and colour-blind readers.
 constexpr std::array<std::array<double, 3>, 5> kPathColors{{{0.00, 0.30, 0.60},
                                                             {0.85, 0.45, 0.00},
                                                             {0.55, 0.05, 0.25},
@@ -307,7 +307,7 @@ std::string view(const ReportData& data) {
 namespace lensforge {
 namespace {
 
-/// What is seen first.
+/// The first screen.
 std::string summary(const ReportData& data) {
   namespace section = report_section;
   const std::string panels =

@@ -7,12 +7,12 @@
 
 namespace lensforge {
 
-/// What the report says, without its pictures, as the fields that report.json has for it (lengths
-/// in mm, flux as shares, what is infinite as null): "z_offset", "verdict", "surfaces", "leakage",
-/// "places", "tools", "operations", "setup", "parameters", "warnings", "choices", …
+/// The report without its pictures, in the fields of report.json (lengths in mm, flux as shares,
+/// infinite values as null): "z_offset", "verdict", "surfaces", "leakage", "places", "tools",
+/// "operations", "setup", "parameters", "warnings", "choices", …
 nlohmann::json report_json(const ReportData& data);
 
-/// One line of what --compare ranks.
+/// One line of the ranking of --compare.
 nlohmann::json choice_json(const ReportChoice& choice);
 
 }  // namespace lensforge

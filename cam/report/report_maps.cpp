@@ -113,8 +113,8 @@ constexpr double kFontStroke = 1.4;
 constexpr double kDigitWidth = 0.7;
 constexpr double kDigitHeight = 0.74;
 
-/// Where the number's baseline has its middle: beside the ring towards the map's middle, and wholly
-/// on the map.
+/// Middle of the number's baseline: beside the ring towards the map's middle, and entirely on the
+/// map.
 Eigen::Vector2d number_place(const Ring& ring, const Eigen::Vector2d& size) {
   const double half =
       0.5 * (kDigitWidth * kFontSize * static_cast<double>(ring.number.size()) + kFontStroke);

@@ -9,11 +9,11 @@
 
 namespace lensforge {
 
-/// The surface as relief, seen from above (+y up) and lit from the upper left; slopes are enlarged
-/// until the usual ones are well seen. @param size  of the raster's rectangle, mm.
+/// The surface as relief, seen from above (+y up) and lit from the upper left; slopes are
+/// exaggerated until typical ones are visible. @param size  of the raster's rectangle, mm.
 ColorImage relief_picture(const LensRaster& surface, const Eigen::Vector2d& size);
 
-/// What a map's scale ends at: the 99.5th percentile of its values, 0.001 at least.
+/// Upper end of a map's scale: the 99.5th percentile of its values, at least 0.001.
 double scale_top(const std::vector<double>& values);
 
 /// Values ≥ 0 in false colour without a legend, from 0 to `top`; columns × rows, row by row from

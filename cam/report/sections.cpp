@@ -33,7 +33,7 @@ struct DrawnView {
     for (const NamedBox& clamp : setup.keep_outs) all.extend(flat(clamp.box));
     all.extend(Eigen::Vector2d(setup.zero[right], setup.zero[up]));
     const double wide = std::max(1e-6, all.sizes().x());
-    // A thin blank is drawn no thinner than can be read, and no view taller than wide.
+    // A thin blank is drawn thick enough to be read, and no view is taller than wide.
     scale = (kWidth - 2.0 * kMargin) / std::max(wide, all.sizes().y());
   }
   [[nodiscard]] Eigen::AlignedBox2d flat(const Eigen::AlignedBox3d& box) const {
@@ -199,7 +199,7 @@ std::string signed_decimal(double value, int decimals) {
   return joined({value > 0.0 ? "+" : "", decimal_text(value, decimals)});
 }
 
-/// Of what is no leakage, but what leakage is told from.
+/// Leakage of the reference that it is measured against.
 constexpr const char* kNoLeakage = "–";
 
 Row cause_row(const CausePart& part) {
@@ -208,7 +208,7 @@ Row cause_row(const CausePart& part) {
           signed_percent(part.dark_flux), signed_decimal(part.dark_ratio, 5)};
 }
 
-/// What the causes are added to.
+/// First row of the table, to which the causes are added.
 Row first_row(const LeakageResult& result) {
   const PictureQuality& designed = result.designed.quality;
   if (!result.point) {
@@ -274,7 +274,7 @@ std::string warnings(const ReportData& data) {
                  element("h3", "", "⚠ Before you start") + element("ul", "", items));
 }
 
-/// What the part lies on, as the drawing has it.
+/// Description of the support under the part, as in the drawing.
 std::string nest_words(const SetupSheet& sheet) {
   if (!sheet.front) return "The table is below";
   const bool sphere = std::holds_alternative<SphericalFront>(*sheet.front);
@@ -381,8 +381,8 @@ std::string certificates(const ReportData& data) {
                                   rows));
 }
 
-/// What bounds the dark of a picture, by the kind of part: a lens's light parts at grooves, a
-/// mirror's at ridges.
+/// A note on the light in dark parts, by the kind of part: from the ridges of a mirror, or from
+/// reflections at a lens's faces.
 std::string part_words(const ReportData& data) {
   if (data.mirror) {
     return " Dark parts come from ridges of the mirror, which a ball cuts sharp: only polish "
@@ -395,7 +395,7 @@ std::string part_words(const ReportData& data) {
          share + " of the mean.";
 }
 
-/// What an extended source does, beside the part.
+/// Describes the effect of an extended source, apart from the part's.
 std::string source_words(const LeakageResult& result) {
   if (!result.point) return "";
   return " The source’s extent is in all of that: it moves " + percent_text(result.point->moved) +
@@ -471,7 +471,7 @@ namespace {
 
 constexpr int kMaeDecimals = 4;
 
-/// What the programs leave without errors stands beside the exact forecast of the same part.
+/// Compares the forecast without errors with the exact prediction of the same part.
 std::string quantile_table(const ToleranceForecast& forecast, const PictureQuality& part) {
   const auto mae = [](double value) { return decimal_text(value, kMaeDecimals); };
   const PartFigures& nominal = forecast.nominal;

@@ -67,11 +67,11 @@ Verdict judge_cut(const CutFindings& findings, const CutLimits& limits,
 
 namespace {
 
-constexpr double kHelps = 0.8;      ///< A remedy leaves this share of a leak at most.
-constexpr double kSameWork = 0.05;  ///< Shares of work that make no difference.
-constexpr double kNearHalf = 0.05;  ///< Shares this near to a half are called that.
+constexpr double kHelps = 0.8;      ///< Maximum share of a leak that a useful remedy leaves.
+constexpr double kSameWork = 0.05;  ///< Differences of work that do not matter.
+constexpr double kNearHalf = 0.05;  ///< Shares this close to a half are called that.
 
-/// What the surface has there that it should not have.
+/// Fault of the surface at a place.
 std::string fault_words(const LeakPlace& place, const std::string& cause) {
   const std::string at =
       joined({" at x ", decimal_text(place.place.x(), 1), " y ", decimal_text(place.place.y(), 1)});
@@ -85,7 +85,7 @@ std::string fault_words(const LeakPlace& place, const std::string& cause) {
   return "The surface" + at + (left ? " is " + depth + " too high" : " is " + depth + " too low");
 }
 
-/// The first that halves the leak, else the one that leaves least.
+/// The first trial that halves the leak, else the one that leaves least.
 const LeakTrial& best_trial(const LeakPlace& place) {
   const auto halves = [&](const LeakTrial& trial) { return trial.leakage <= 0.5 * place.leakage; };
   const auto first = std::find_if(place.trials.begin(), place.trials.end(), halves);
@@ -105,7 +105,7 @@ std::string times(double factor) { return trimmed_decimal(factor, 1) + " times";
 
 bool is_more(double factor) { return factor > 1.0 + kSameWork; }
 
-/// What a remedy costs in finishing: " for 1.4 times as many moves and 2 times the minutes".
+/// Cost of a remedy in finishing: " for 1.4 times as many moves and 2 times the minutes".
 std::string cost_words(const LeakTrial& trial) {
   if (is_more(trial.moves) && is_more(trial.minutes)) {
     return " for " + times(trial.moves) + " as many finishing moves and " + times(trial.minutes) +

@@ -35,7 +35,7 @@ constexpr double kMicrometre = 1e-3;
 constexpr double kMilliradian = 1e-3;
 constexpr double kDegree = std::numbers::pi / 180.0;
 
-/// Waves of a band: as many as make its sum nearly normal.
+/// Waves per band: enough to make its sum nearly normal.
 constexpr int kWavesPerBand = 6;
 /// Waves of a band have wavelengths of 1/√2 … √2 of its own.
 constexpr double kHalfBand = 0.5;
@@ -71,8 +71,7 @@ RowHeights draw_rows(const ErrorSource& source, double scale, RandomDraw& random
   return rows;
 }
 
-/// The polisher dwells longer in one part of the lens than in another: waves of half the lens to
-/// the whole of it.
+/// The polisher dwells longer in some parts of the lens: waves from half the lens to the whole.
 std::vector<PlaneWave> draw_polish_waves(double side, RandomDraw& random) {
   std::vector<PlaneWave> waves;
   for (int k = 0; k < kPolishWaves; ++k) {

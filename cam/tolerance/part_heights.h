@@ -13,11 +13,11 @@
 
 namespace lensforge {
 
-/// How the unpolished surface is laid out along one axis.
+/// Sampling of the unpolished surface along one axis.
 struct BaseAxis {
   double spacing = 0.0;      ///< Of the nodes, mm; the first and last lie on the rim.
   std::int64_t nodes = 0;    ///< On the lens.
-  std::int64_t samples = 1;  ///< Of the surface from one node to the next.
+  std::int64_t samples = 1;  ///< Samples of the surface per node.
   std::int64_t half = 1;     ///< Samples in half a box; at most `samples`.
 
   /// Width of the boxes over which heights are averaged, mm.
@@ -26,23 +26,23 @@ struct BaseAxis {
   }
 };
 
-/// Nodes as far apart as what polishing leaves of the surface allows. Across rows a box is a whole
-/// number of pitches wide, so that scallops vanish from the means and only what rows have in common
-/// is left; along them it is as wide as the nodes are apart.
+/// Node spacing as large as the polish allows. Across rows a box is a whole number of pitches wide,
+/// so that scallops vanish from the means and only what rows have in common remains; along them it
+/// is one node spacing wide.
 /// @param size    of the lens, mm. @param sigma  of the polish, mm.
-/// @param detail  side of the piece of lens that lights a pixel, mm: an eighth of it is resolved
-///                along the rows in any case.
+/// @param detail  side of the piece of lens that lights a pixel, mm: an eighth of it is always
+///                resolved along the rows.
 std::array<BaseAxis, 2> base_axes(const Eigen::Vector2d& size, const Passes& passes, double sigma,
                                   const Eigen::Vector2d& detail);
 
-/// The surface as cut, before it is polished, at the nodes of a grid over the lens and `pad` nodes
+/// The surface as cut, before polishing, at the nodes of a grid over the lens and `pad` nodes
 /// beyond its rim: means of its heights over boxes around the nodes (BaseAxis). Beyond the rim it
-/// goes on as PolishedField has it: what was meant is turned about the rim, the tool's marks are
+/// is continued as in PolishedField: the form is turned about the rim, the tool's marks are
 /// mirrored.
 class BaseHeights {
  public:
   /// Samples the whole lens once, a sixth of a pitch apart across the rows.
-  /// @param cut, designed  of one lens, as PolishedField takes them.
+  /// @param cut, designed  of one lens, as in PolishedField.
   /// @throw Interrupted
   static BaseHeights sample(const SurfaceField& cut, const SurfaceField& designed,
                             const std::array<BaseAxis, 2>& axes, std::int64_t pad,
@@ -66,21 +66,20 @@ class BaseHeights {
   std::vector<double> heights_;
 };
 
-/// What one part's errors change in the heights as cut, before they are polished, at the nodes of
-/// BaseHeights and as means over its boxes. To first order in every error:
+/// Effect of one part's errors on the heights as cut, before polishing, at the nodes of BaseHeights
+/// and as means over its boxes. To first order in every error:
 ///
-/// - waviness: a height by the place along x and one by the place along y;
-/// - rows: every row's height from half a pitch before where its ball touches to half a pitch
-///   behind (Ripple::slope());
+/// - waviness: a height by position along x and one by position along y;
+/// - rows: every row's height within half a pitch of its contact (Ripple::slope());
 /// - backlash b of rows to and fro: they are shifted by ±b/2, which changes heights by ∓s b/2 with
-///   the slope s along them; rows one way are shifted as one, which nobody sees;
-/// - a ball of radius R + δ on the same way of its tip: −δ (√(1 + |s|²) − 1);
-/// - a ball that turns about an axis e beside its own cuts as wide as a ball whose every latitude
-///   is e wider: −e |s|;
-/// - polish σ (1 + ε) at a place: ½ ((1 + ε)² − 1) σ² Δz, to first order the same as averaging with
-///   that σ there.
+///   the slope s along them; rows in one direction are all shifted alike, which is invisible;
+/// - a ball of radius R + δ on the same path of its tip: −δ (√(1 + |s|²) − 1);
+/// - a ball that turns about an axis e beside its own cuts like a ball whose every latitude is e
+///   wider: −e |s|;
+/// - polish σ (1 + ε) at a place: ½ ((1 + ε)² − 1) σ² Δz, which equals averaging with that σ to
+///   first order.
 ///
-/// Of a raster that is crossed only the first one's rows are counted.
+/// With a crossing raster only the first one's rows are counted.
 class ErrorHeights {
  public:
   /// @param base  must outlive this. @param sigma  of the polish, this part's mean, mm.
@@ -90,11 +89,11 @@ class ErrorHeights {
   /// @pre one node more on every side lies within the base's padding.
   void fill(const CellRange& nodes, double* heights) const;
 
-  /// How many times its mean the polish's σ is at a node.
+  /// The polish's σ at a node, as a multiple of its mean.
   [[nodiscard]] double sigma_factor(std::int64_t i, std::int64_t j) const;
 
  private:
-  /// A function of one place for every node of an axis, padding included.
+  /// A function of one coordinate at every node of an axis, including padding.
   using Line = std::vector<double>;
 
   [[nodiscard]] Line waves_along(int axis, const std::vector<Wave>& waves) const;
@@ -115,7 +114,7 @@ class ErrorHeights {
 
   const BaseHeights& base_;
   Passes passes_;
-  double contact_;  ///< Radius of the ball, below 0 in a mould, where it touches from below.
+  double contact_;  ///< Radius of the ball, negative in a mould, where it touches from below.
   double radius_;
   double eccentricity_;
   double half_backlash_;
@@ -125,9 +124,9 @@ class ErrorHeights {
   Line by_row_;
   std::int64_t row_places_ = 0;
   double row_length_ = 1.0;
-  /// For every place across the rows, kPlacesPerNode to a node, the places along them.
+  /// For every place across the rows, kPlacesPerNode per node, the places along them.
   Line row_means_;
-  Line alternation_;                   ///< For every such place: mean of +1 and −1 in turns.
+  Line alternation_;                   ///< At every such place: mean of alternating +1 and −1.
   std::vector<Line> cosines_, sines_;  ///< Of the polish's waves: along x, then along y.
 };
 

@@ -22,7 +22,7 @@ Eigen::Vector3d centre_of(const OpticalSetup& setup) {
   return {0.5 * setup.lens_size.x(), 0.5 * setup.lens_size.y(), 0.0};
 }
 
-/// Lamp and screen as a part sees them that was turned about its centre: turned the other way.
+/// Lamp and screen in the frame of a part turned about its centre: turned the other way.
 void turn_back(OpticalSetup& seen, const Eigen::Matrix3d& turn) {
   const Eigen::Matrix3d back = turn.transpose();
   const Eigen::Vector3d centre = centre_of(seen);
@@ -35,10 +35,11 @@ void turn_back(OpticalSetup& seen, const Eigen::Matrix3d& turn) {
   seen.focal_length = screen.z();
 }
 
-/// The setup as the part sees it from its own frame.
+/// The setup in the part's own frame.
 OpticalSetup seen_by_part(const OpticalSetup& setup, const PartError& error) {
   OpticalSetup seen = setup;
-  // Parts are compared with each other: what their faces reflect differs by less than they do.
+  // Parts are only compared with each other: the reflection at their faces differs less than they
+  // do.
   seen.fresnel = false;
   seen.ior += error.index;
   const Eigen::Vector3d away = error.distance * setup.screen_x.cross(setup.screen_y);
@@ -48,7 +49,7 @@ OpticalSetup seen_by_part(const OpticalSetup& setup, const PartError& error) {
   return seen;
 }
 
-/// Parallel light straight through a lens onto a screen that is parallel to it.
+/// True for parallel light along a lens's axis onto a screen parallel to it.
 bool is_straight(const OpticalSetup& setup) {
   return setup.mode == LightMode::kRefract && !setup.point && !setup.screen_is_turned() &&
          setup.light == Eigen::Vector3d::UnitZ();
@@ -113,12 +114,12 @@ Eigen::Vector2d PartLight::source_radii(double angle, double z) const {
 
 namespace {
 
-/// Rings of equal area a pixel of radius, and places a pixel of their length: finer ones change no
-/// share by more than 0.001.
+/// Rings of equal area per pixel of radius, and places per pixel of their length: finer ones change
+/// no share by more than 0.001.
 constexpr double kRings = 6.0;
 constexpr double kPlaces = 8.0;
 
-/// Steps of the search for the radius: to 1e-9 of it.
+/// Bisections for the radius: to 1e-9 of it.
 constexpr int kBisections = 30;
 
 /// Splits every place of a disc between the four pixels around it.

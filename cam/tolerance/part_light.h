@@ -14,63 +14,63 @@
 
 namespace lensforge {
 
-/// Places on a part before it has grown, mm: a grid, row by row.
+/// Places on a part before thermal growth, mm: a grid, row by row.
 struct PartNodes {
   std::size_t columns = 0;
   std::vector<Eigen::Vector3d> places;
 };
 
-/// The light's way to the screen by a part that stands, is made of and is lit as its errors say:
-/// turned about its centre, with another refractive index, grown, before a screen that is farther
-/// along its own axis. Lamp and screen stay where they are.
+/// Light path to the screen through a part with errors: turned about its centre, with another
+/// refractive index, grown, and with the screen farther away along its own axis. Lamp and screen
+/// stay in place.
 class PartLight {
  public:
   PartLight(const OpticalSetup& setup, const PartError& error);
 
-  /// A point of the part as it has grown, from its place and height in the lens frame, mm.
+  /// A point of the grown part, from its place and height in the lens frame, mm.
   [[nodiscard]] Eigen::Vector3d grown(const Eigen::Vector2d& place, double z) const {
     return centre_ + growth_ * (Eigen::Vector3d(place.x(), place.y(), z) - centre_);
   }
-  /// Where the ray of such a point lands, in pixel coordinates; NaN where none goes to the screen.
+  /// Landing place of the ray from such a point, in pixel coordinates; NaN if it misses the screen.
   [[nodiscard]] Eigen::Vector2d land(const Eigen::Vector3d& point,
                                      const Eigen::Vector2d& slope) const;
-  /// Light that a triangle of such points takes, mm² (LightPath::intake()).
+  /// Light on a triangle of such points, mm² (LightPath::intake()).
   [[nodiscard]] double intake(const Corners& triangle) const { return light_.intake(triangle); }
-  /// What the whole part takes, mm²: of light straight onto a lens its area as it has grown, else
-  /// what goes through the triangles between its nodes. That hardly depends on how many there are:
-  /// what light goes through follows from the rim.
+  /// Light on the whole part, mm²: for light along a lens's axis its grown area, else the light
+  /// through the triangles between its nodes. That hardly depends on their number: the light
+  /// through the part follows from its rim.
   [[nodiscard]] double whole(const PartNodes& nodes) const;
-  /// Slope that sends the light of the part's middle, at height z, to the picture's; of light that
-  /// comes straight, the flat one's.
+  /// Slope that sends the light of the part's middle, at height z, to the picture's middle; for
+  /// parallel light, that of a flat part.
   [[nodiscard]] Eigen::Vector2d slope_of_middle(double z) const;
-  /// How far a change of slope along an axis moves the light over the screen, pixels; NaN where
-  /// none leaves.
+  /// Movement of the light on the screen per change of slope along an axis, pixels; NaN where no
+  /// light leaves.
   [[nodiscard]] Eigen::Vector2d moved_by(const Eigen::Vector3d& point, const Eigen::Vector2d& slope,
                                          int axis) const;
-  /// How far along the picture's x and y the spot reaches that a point of height z in the middle
-  /// lights with a source of this full angle (rad) as the part sees it, pixels: to first order.
+  /// Half axes, along the picture's x and y, of the spot lit by a point of height z in the middle
+  /// under a source of this full angle (rad), as seen by the part, pixels: to first order.
   [[nodiscard]] Eigen::Vector2d source_radii(double angle, double z) const;
 
  private:
-  OpticalSetup seen_;  ///< From the part's own frame.
+  OpticalSetup seen_;  ///< In the part's own frame.
   LightPath light_;
   Eigen::Vector3d centre_;
   double growth_;
   bool straight_;
-  double screen_;  ///< z of one that is parallel to the part, mm.
+  double screen_;  ///< z of a screen parallel to the part, mm.
 };
 
-/// Shares of a pixel's flux that go −reach … reach pixels on, over a square row by row; none is
-/// below 0, and their sum is 1.
+/// Shares of a pixel's flux that move by −reach … reach pixels, over a square, row by row; all ≥ 0
+/// with the sum 1.
 struct BlurKernel {
   std::int64_t reach = 0;
   std::vector<double> share{1.0};
 };
 
-/// The blur of a picture by a source of which every place of the part makes an evenly lit disc, or
-/// an ellipse with these half axes along x and y, pixels, ≥ 0. What is moved by a part of a pixel
-/// is split between its neighbours, which alone would widen the blur; the disc is made so much
-/// smaller that the kernel's variance is radius² / 4 along either axis, the disc's own.
+/// Blur kernel of a source whose image through every place of the part is an evenly lit disc, or an
+/// ellipse with these half axes along x and y, pixels, ≥ 0. Movement by a fraction of a pixel is
+/// split between neighbours, which widens the blur; the disc is reduced so that the kernel's
+/// variance is the disc's own, radius² / 4 along either axis.
 BlurKernel disc_blur(const Eigen::Vector2d& radii);
 
 /// Flux of a picture, row by row.
@@ -80,7 +80,8 @@ struct FluxRaster {
   std::vector<double> flux;
 };
 
-/// What is moved off the raster is lost, and nothing comes from outside of it.
+/// The raster convolved with the kernel. Flux moved off the raster is lost, and none comes from
+/// outside.
 FluxRaster blurred(const FluxRaster& raster, const BlurKernel& kernel, const Executor& executor);
 
 }  // namespace lensforge

@@ -24,17 +24,16 @@
 namespace lensforge {
 namespace {
 
-/// How a part is rendered along one axis.
+/// Rendering of a part along one axis.
 struct SceneAxis {
-  /// One for every place of a node cell that has a node of its own: the first, or the first and the
-  /// middle.
+  /// One for every node in a cell of the base: the first, or the first and the middle.
   std::vector<LineFilter> filters;
-  bool ripples = false;  ///< Whether scallops are to be seen along it.
+  bool ripples = false;  ///< True if scallops are visible along it.
 
   [[nodiscard]] std::int64_t parts() const { return static_cast<std::int64_t>(filters.size()); }
 };
 
-/// What every tile of one part is rendered with.
+/// Common inputs of the tiles of one part.
 struct PartScene {
   const BaseHeights& base;
   const ErrorHeights& heights;
@@ -42,14 +41,14 @@ struct PartScene {
   const Ripple& ripple;
   const PolishModel& polish;
   std::array<SceneAxis, 2> axes;
-  Eigen::Vector2d lens_size;  ///< mm
-  std::int64_t margin = 0;    ///< Pixels around the picture.
-  double whole = 0.0;         ///< Light that the part takes, mm², of which fluxes are shares.
+  Eigen::Vector2d lens_size;         ///< mm
+  std::int64_t margin = 0;           ///< Pixels around the picture.
+  double whole = 0.0;                ///< Light on the part, mm², of which fluxes are shares.
   Eigen::Vector2d source{0.0, 0.0};  ///< Half axes of the spot that a point lights, pixels.
 };
 
-/// A rectangle of cells of one part: its heights with errors are polished, its nodes' rays are
-/// landed, and two triangles a cell are deposited.
+/// A rectangle of cells of one part: polishes its heights with errors, lands its nodes' rays and
+/// deposits two triangles per cell.
 class PartTile {
  public:
   /// @param cells  of BaseHeights.
@@ -58,13 +57,13 @@ class PartTile {
   void deposit(const FluxAccumulator& image) const;
 
  private:
-  /// Nodes of one axis, those between the base's included.
+  /// Nodes of one axis, including those between the base's.
   struct Nodes {
     std::int64_t parts;  ///< Of a cell of the base.
     std::int64_t first;  ///< One before the tile's.
     std::int64_t count;  ///< Up to one behind it.
     std::int64_t base;   ///< First node of the base that polishing needs.
-    std::int64_t bases;  ///< How many.
+    std::int64_t bases;  ///< Number of base nodes.
     double spacing;      ///< mm
   };
 
@@ -91,14 +90,14 @@ class PartTile {
   std::vector<Eigen::Vector2d> landing_;
 };
 
-/// Between four nodes a period, as many as a ripple has (PartModel), linear interpolation leaves
-/// sinc²(1/4) of a sine's amplitude; this makes up for it.
+/// Between four nodes per period of a ripple (PartModel), linear interpolation leaves sinc²(1/4) of
+/// a sine's amplitude; this factor restores it.
 constexpr double kRippleGain = 0.125 * std::numbers::pi * std::numbers::pi;
 
-/// Pixels a millimetre of the part, below which its light is all in one place.
+/// Minimum pixels per millimetre of the part; below it all its light is in one place.
 constexpr double kLeastScale = 1e-6;
 
-/// The cell that a node lies in: node −1 lies in cell −1.
+/// The cell of a node: node −1 is in cell −1.
 std::int64_t cell_of(std::int64_t node, std::int64_t parts) {
   return node >= 0 ? node / parts : -((-node + parts - 1) / parts);
 }
@@ -161,7 +160,8 @@ const LineFilter& PartTile::filter_of(const SceneAxis& axis, std::int64_t node) 
   return axis.filters[static_cast<std::size_t>(part)];
 }
 
-/// One row of the base along x. Nodes of one part of their cells lie in a row of their own first.
+/// Polishes one row of the base along x. Nodes at the same position in their cells are stored
+/// together first.
 void PartTile::polish_line(const double* raw, double* heights, double* slopes) const {
   std::vector<double> line(static_cast<std::size_t>(2 * x_.bases));
   for (std::int64_t first = 0; first < x_.parts; ++first) {
@@ -248,8 +248,8 @@ void PartTile::sharpen() {
   landing_.swap(sharp);
 }
 
-/// How strongly the ripple is polished and how far a slope moves light hardly changes over a tile:
-/// both are taken in its middle.
+/// The ripple's polish and the light's movement per slope hardly change over a tile: both are taken
+/// in its middle.
 void PartTile::add_ripple(int axis) {
   const std::size_t middle = index(x_.count / 2, y_.count / 2);
   const Eigen::Vector2d moved =
@@ -268,8 +268,8 @@ void PartTile::add_ripple(int axis) {
   }
 }
 
-/// What a source leaves of the light that a ripple moves over a pixel's border: from every
-/// direction of its disc the border lies at another place of the ripple. What is left is a blur
+/// Share of the light moved by a ripple over a pixel's border that remains with a source: for every
+/// direction of its disc the border lies at another place of the ripple. The rest is a blur
 /// (PartModel).
 double PartTile::seen_by_source(int axis) const {
   const std::size_t low = index(0, 0);
@@ -297,7 +297,7 @@ void PartTile::deposit(const FluxAccumulator& image) const {
   }
 }
 
-/// Cells of a tile: its buffers, 1 MB, stay in a core's cache, and an interrupt waits for two.
+/// Cells of a tile: its buffers, 1 MB, fit a core's cache, and an interrupt waits for two.
 constexpr std::int64_t kTile = 96;
 
 std::array<BaseAxis, 2> axes_of(const PartPlan& plan) {
@@ -306,8 +306,8 @@ std::array<BaseAxis, 2> axes_of(const PartPlan& plan) {
   return base_axes(size, plan.passes, plan.polish.sigma, detail);
 }
 
-/// Nodes that the filters of the strongest polish need beyond the rim, one more for the slopes
-/// there that errors ask for, and one for the landing places beside the rim's.
+/// Nodes beyond the rim needed by the filters of the strongest polish, one more for the slopes
+/// there that errors need, and one for the landing places beside the rim's.
 std::int64_t pad_of(const std::array<BaseAxis, 2>& axes, double sigma) {
   return std::max(line_filter_reach(sigma, axes[0].spacing),
                   line_filter_reach(sigma, axes[1].spacing)) +
@@ -322,7 +322,7 @@ double mean_height(const BaseHeights& base) {
   return sum / static_cast<double>(base.axis(0).nodes * base.axis(1).nodes);
 }
 
-/// Every so many of the base's nodes along an axis, and the last.
+/// Regularly spaced nodes of the base along an axis, and the last.
 std::vector<std::int64_t> coarse_nodes(const BaseAxis& axis) {
   constexpr std::int64_t kCells = 64;
   std::vector<std::int64_t> nodes;
@@ -332,7 +332,7 @@ std::vector<std::int64_t> coarse_nodes(const BaseAxis& axis) {
   return nodes;
 }
 
-/// Through which the light goes that the part takes.
+/// Nodes for the light on the whole part.
 PartNodes light_nodes(const BaseHeights& base) {
   const std::vector<std::int64_t> columns = coarse_nodes(base.axis(0));
   PartNodes nodes{columns.size(), {}};
@@ -345,7 +345,7 @@ PartNodes light_nodes(const BaseHeights& base) {
   return nodes;
 }
 
-/// Across rows that leave a ripple there are four nodes a pitch.
+/// Across rows with a ripple there are four nodes per pitch.
 SceneAxis scene_axis(const BaseAxis& axis, double sigma, bool ripples) {
   SceneAxis scene;
   scene.ripples = ripples;
@@ -361,7 +361,7 @@ SceneAxis scene_axis(const BaseAxis& axis, double sigma, bool ripples) {
 /// than 1e-5 of a scallop's slope.
 bool ripples(const BaseAxis& axis, const Passes& passes) { return axis.box() < 1.5 * passes.pitch; }
 
-/// With the scene's margin.
+/// Includes the scene's margin.
 FluxRaster render_tiles(const PartScene& scene, const Eigen::Vector2i& pixels,
                         const Executor& executor) {
   FluxRaster raster{pixels.x() + 2 * scene.margin, pixels.y() + 2 * scene.margin, {}};
@@ -389,9 +389,9 @@ FluxPicture cropped(const FluxRaster& raster, std::int64_t margin) {
   return picture;
 }
 
-/// Radii along x and y of the spot that a point of the part lights: that of the source, and, along
-/// a ripple of which the source sees less than there is (PartTile), so much more that the variance
-/// is that of all of it.
+/// Radii along x and y of the spot lit by a point of the part: that of the source, increased along
+/// a ripple that the source sees only in part (PartTile) so that the variance is that of the whole
+/// ripple.
 Eigen::Vector2d blur_radii(const PartScene& scene, const Eigen::Vector2d& scale,
                            const Eigen::Vector3d& middle) {
   Eigen::Vector2d square = scene.source.cwiseAbs2();

@@ -16,24 +16,23 @@
 
 namespace lensforge {
 
-/// What the programs assume.
+/// Nominal values that the programs assume.
 struct PartPlan {
   OpticalSetup optics;
   Passes passes;
   PolishModel polish;
-  double largest_sigma = 0.0;  ///< Of the polish that is asked for, mm, ≥ polish.sigma.
+  double largest_sigma = 0.0;  ///< Of the polish, with errors, mm, ≥ polish.sigma.
 };
 
-/// Predicts what parts with errors project, many of them for one sampling of the surface as cut.
-///
-/// Polishing leaves nothing of that surface which is finer than its σ but the scallops' ripple. So
-/// the heights without scallops (BaseHeights), changed by the part's errors (ErrorHeights), are
-/// polished on a grid as coarse as σ allows; the ripple (Ripple) is added where rays land, with
-/// four nodes a pitch, and the source blurs the picture. PartModel.* in its test hold that against
-/// cam's own chain of surfaces.
+/// Predicts the pictures of many parts with errors from one sampling of the surface as cut.
+/// Polishing removes everything finer than its σ except the scallops' ripple. So the heights
+/// without scallops (BaseHeights), changed by the part's errors (ErrorHeights), are polished on a
+/// grid as coarse as σ allows; the ripple (Ripple) is added where rays land, with four nodes per
+/// pitch, and the source blurs the picture. The PartModel.* tests compare it with cam's own chain
+/// of surfaces.
 class PartModel {
  public:
-  /// @param cut, designed  as BaseHeights::sample() takes them; needed only here.
+  /// @param cut, designed  as in BaseHeights::sample(); used only during construction.
   /// @throw Interrupted
   PartModel(const SurfaceField& cut, const SurfaceField& designed, const PartPlan& plan,
             const Executor& executor, const RunControl& control);
@@ -50,7 +49,7 @@ class PartModel {
   PartNodes lit_;
 };
 
-/// Nodes of the grid on which a part is rendered: what time and memory go by.
+/// Number of nodes of the grid on which a part is rendered; time and memory depend on it.
 std::int64_t part_nodes(const PartPlan& plan);
 
 }  // namespace lensforge

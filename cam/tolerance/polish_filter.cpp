@@ -12,10 +12,10 @@
 namespace lensforge {
 namespace {
 
-/// Up to here (waves of three nodes) the response is that of the polish; above it falls to none,
-/// where a box's own response comes near zero and nothing is left to be restored.
+/// Up to here (waves of three nodes) the response is that of the polish; above it falls to zero,
+/// because a box's own response is close to zero there and nothing can be restored.
 constexpr double kBand = 2.0;
-/// At which the response is fitted, at least, and for every weight.
+/// Minimum number of phases for fitting the response, and the number per weight.
 constexpr std::int64_t kPhases = 96;
 constexpr std::int64_t kPhasesPerWeight = 8;
 
@@ -40,8 +40,8 @@ double response(const LinePolish& polish, double theta) {
 
 double weight(double theta) { return (theta <= kBand ? 1.0 : kBeyond) / (kGentle + theta * theta); }
 
-/// Solves for the weights of pairs first … reach: `basis(k, θ)` is what pair k adds to the
-/// response, `target(θ)` what it should come to.
+/// Solves for the weights of pairs first … reach: `basis(k, θ)` is the contribution of pair k to
+/// the response, `target(θ)` the wanted response.
 template <class Basis, class Target>
 Eigen::VectorXd fit(std::int64_t first, std::int64_t reach, const Basis& basis,
                     const Target& target) {
@@ -67,7 +67,7 @@ std::int64_t line_filter_reach(double sigma, double spacing) {
   return static_cast<std::int64_t>(std::ceil(kSigmas * std::max(sigma / spacing, 0.5))) + 3;
 }
 
-/// The innermost pair that counts takes what makes the sum 1 and the slope of a straight line its
+/// The innermost significant pair is set so that the sum is 1, or the slope of a straight line its
 /// own; the others are free. For a node itself that is pair 0, twice the node, and pair 1.
 LineFilter line_filter(const LinePolish& polish, std::int64_t shift, std::int64_t reach) {
   const auto size = static_cast<std::size_t>(reach + 1);
@@ -108,9 +108,9 @@ namespace {
 
 constexpr double kTwoPi = 2.0 * std::numbers::pi;
 
-constexpr int kProfile = 96;    ///< Places of a period at which the scallop is known.
-constexpr int kHarmonics = 32;  ///< Of it: without polish the last has 0.1 % of the first's height.
-/// Parts of a period at which the slope is kept; between them it is linear, to 1e-4 of a sine.
+constexpr int kProfile = 96;    ///< Sampled places of a scallop's period.
+constexpr int kHarmonics = 32;  ///< Used; without polish the last has 0.1 % of the first's height.
+/// Stored slopes per period; linear interpolation between them is exact to 1e-4 of a sine.
 constexpr std::size_t kSlopePlaces = 256;
 
 /// Height of the scallop at the middles of kProfile equal parts of a period, mm.
@@ -123,7 +123,7 @@ std::array<double, kProfile> scallop(double pitch, double radius) {
   return height;
 }
 
-/// What a second raster across leaves of a scallop, on average.
+/// Mean of what a crossing second raster leaves of a scallop.
 std::array<double, kProfile> crossed(const std::array<double, kProfile>& height) {
   std::array<double, kProfile> lower{};
   for (std::size_t i = 0; i < kProfile; ++i) {

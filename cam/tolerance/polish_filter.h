@@ -9,9 +9,9 @@
 
 namespace lensforge {
 
-/// Weights of pairs of nodes around a place on a line: pair k is the nodes k before node n and k
-/// behind node n + shift, of which averages take the sum and slopes the difference. With shift 0
-/// the place is node n itself, with 1 the middle between it and the next.
+/// Weights of pairs of nodes around a place on a line: pair k is node n − k and node n + shift + k;
+/// averages use the sum, slopes the difference. With shift 0 the place is node n itself, with 1 the
+/// middle between it and the next.
 struct LineFilter {
   std::int64_t shift = 0;
   std::vector<double> average;
@@ -20,48 +20,47 @@ struct LineFilter {
   [[nodiscard]] std::int64_t reach() const { return static_cast<std::int64_t>(average.size()) - 1; }
 };
 
-/// What a polish still has to do to heights that are means over boxes of nodes around them.
+/// Remaining polish of heights that are means over boxes around the nodes.
 struct LinePolish {
   double sigma = 0.0;        ///< Of the Gaussian, mm, ≥ 0.
   double spacing = 0.0;      ///< Of the nodes, mm, > 0.
   double box = 0.0;          ///< Width of the boxes, mm, 0 … 2 spacings.
-  std::int64_t samples = 1;  ///< That each box is the mean of, evenly spaced.
+  std::int64_t samples = 1;  ///< Samples averaged by each box, evenly spaced.
 };
 
-/// The filter that turns means over boxes into the polished heights and their slopes: of all with
-/// `reach` nodes to either side the one that comes nearest to exp(−σ²k²/2) / B(k) over the
-/// frequencies that the nodes can carry, in the least squares, where B(k) is the box's own
-/// response. Straight lines stay as they are. LineFilter.* in its test have the error: 0.2 % for
-/// waves of five nodes and more.
+/// The filter that turns means over boxes into the polished heights and their slopes: the
+/// least-squares approximation, with `reach` nodes to either side, of exp(−σ²k²/2) / B(k) over the
+/// frequencies that the nodes can carry, where B(k) is the box's own response. Straight lines are
+/// preserved. The LineFilter.* tests bound the error: 0.2 % for waves of five nodes and more.
 /// @param shift  0 or 1. @pre reach ≥ 2, and ≥ 4.2 σ / spacing for that error.
 LineFilter line_filter(const LinePolish& polish, std::int64_t shift, std::int64_t reach);
 
 /// The reach that line_filter() needs.
 std::int64_t line_filter_reach(double sigma, double spacing);
 
-/// The slopes across the rows that polishing leaves of a raster's scallops: over a period p, the
-/// k-th harmonic of the ball's profile keeps exp(−2π²k²σ²/p²) of its height. Of rows that cross,
-/// the mean of what the second raster leaves of each scallop is taken.
+/// The slopes across the rows that remain of a raster's scallops after polishing: over a period p,
+/// the k-th harmonic of the ball's profile keeps exp(−2π²k²σ²/p²) of its height. For crossing rows
+/// it uses the mean of what the second raster leaves of each scallop.
 class Ripple {
  public:
-  /// @param radius  of the ball as it is, mm. @param sigma  of the polish, mm.
+  /// @param radius  of the actual ball, mm. @param sigma  of the polish, mm.
   Ripple(const Passes& passes, double radius, double sigma);
 
-  /// Slope (rise over run) at a place across the rows on a surface of this slope, mm. A ball over
-  /// row y touches the surface at y + R s / √(1 + |s|²), where its scallops then are lowest; the
-  /// ball's own bend, and so the ripple, is (1 + s²) √(1 + |s|²) times as strong there.
-  /// @param across  of the two axes the one that the ripple runs along.
+  /// Slope (rise over run) at a place across the rows, mm, on a surface of this slope. A ball over
+  /// row y touches the surface at y + R s / √(1 + |s|²), where its scallops are lowest; the ball's
+  /// curvature there, and so the ripple, is (1 + s²) √(1 + |s|²) times as strong.
+  /// @param across  axis across the rows.
   [[nodiscard]] double slope(double place, const Eigen::Vector2d& surface, int across) const;
 
-  /// What is left of the ripple where σ is this many times its mean, of what is left elsewhere: by
-  /// its first harmonic.
+  /// Ratio of the ripple where σ is this multiple of its mean to the ripple elsewhere, from its
+  /// first harmonic.
   [[nodiscard]] double kept(double factor) const;
 
   /// Mean of a wave as long as a pitch over a disc of this radius, mm, as a share of the wave:
   /// 2 J₁(x) / x with x = 2π radius / p.
   [[nodiscard]] double seen_by_disc(double radius) const;
 
-  /// Largest slope; rows that lie closer than σ leave next to none.
+  /// Maximum slope; rows closer than σ leave almost none.
   [[nodiscard]] double largest() const { return largest_; }
 
  private:
@@ -70,7 +69,7 @@ class Ripple {
   double sigma_;
   double sign_;  ///< −1 in a mould, where rows leave ridges.
   double largest_ = 0.0;
-  std::vector<double> slope_;  ///< At equal parts of a period, from the lowest place on.
+  std::vector<double> slope_;  ///< At equal parts of a period, starting at the lowest place.
 };
 
 }  // namespace lensforge

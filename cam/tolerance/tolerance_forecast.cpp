@@ -35,7 +35,7 @@ namespace {
 
 constexpr double kHalf = 0.5;
 
-/// Parts that a mean over pairs takes: its error is told, and pairs differ by one cause alone.
+/// Minimum number of pairs for a mean: its error is stated, and pairs differ by one cause alone.
 constexpr std::int64_t kLeastPaired = 5;
 constexpr std::int64_t kMostPaired = 20;
 constexpr std::int64_t kPartsPerPair = 20;
@@ -137,7 +137,7 @@ std::string ratio_words(double contrast) {
   return decimal_text(contrast, contrast < 10.0 ? 1 : 0) + " : 1";
 }
 
-/// What matters most.
+/// Names the causes that matter most.
 std::string most_words(const ToleranceForecast& forecast) {
   const CauseEffect& most = forecast.causes.front();
   if (!(most.mae < 0.0)) return "No single cause matters much.";

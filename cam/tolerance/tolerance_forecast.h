@@ -14,14 +14,14 @@
 
 namespace lensforge {
 
-/// How much every pixel differs from part to part: the standard deviation of its display-encoded
-/// value, 0 … 1, of all pictures that were added (Welford's sums, in one pass and constant memory).
+/// Variation of every pixel from part to part: the standard deviation of its display-encoded value,
+/// 0 … 1, over all added pictures (Welford's sums, in one pass and constant memory).
 class PictureSpread {
  public:
   /// Adds a part's picture; all of one size.
   void add(const Image& picture);
 
-  /// Row by row from the top; zeros of one picture.
+  /// Row by row from the top; zeros for one picture.
   [[nodiscard]] std::vector<double> deviation() const;
 
  private:
@@ -30,7 +30,7 @@ class PictureSpread {
   std::vector<double> squares_;  ///< Sums of squared differences from the mean.
 };
 
-/// What is told of a part's picture (PictureQuality).
+/// Figures of a part's picture (PictureQuality).
 struct PartFigures {
   double mae = 0.0;
   double leakage = 0.0;
@@ -39,7 +39,7 @@ struct PartFigures {
   [[nodiscard]] double contrast() const { return contrast_of(dark_ratio); }
 };
 
-/// What one part in ten stays below, one in two, and nine in ten.
+/// Values below which one part in ten, one in two, and nine in ten lie.
 struct Quantiles {
   double p10 = 0.0;
   double median = 0.0;
@@ -50,8 +50,8 @@ struct Quantiles {
 /// @pre there is at least one.
 Quantiles quantiles(std::vector<double> values);
 
-/// What it would bring to halve everything that is off by one cause: the mean, over parts that are
-/// drawn with and without that by the same random numbers, of the change.
+/// Effect of halving all errors of one cause: the mean change over parts drawn with whole and with
+/// halved errors from the same random numbers.
 struct CauseEffect {
   ErrorCause cause = ErrorCause::kWaviness;
   double mae = 0.0;         ///< Change; below 0 is better.
@@ -60,10 +60,10 @@ struct CauseEffect {
   double dark_ratio = 0.0;  ///< Change.
 };
 
-/// How sure a forecast is.
+/// Forecast over parts with errors.
 struct ToleranceForecast {
-  std::int64_t parts = 0;   ///< That were drawn.
-  std::int64_t paired = 0;  ///< Of them drawn again for every cause.
+  std::int64_t parts = 0;   ///< Number drawn.
+  std::int64_t paired = 0;  ///< Number of those drawn again for every cause.
   std::uint64_t seed = 0;
   PartFigures nominal;  ///< Of the part without any error, by the same model.
   Quantiles mae, leakage, contrast;
@@ -71,13 +71,13 @@ struct ToleranceForecast {
   std::vector<double> deviation;    ///< PictureSpread::deviation()
   int columns = 0;
   int rows = 0;
-  bool has_dark = false;  ///< Whether the target has dark parts; without them there is no contrast.
-  double seconds = 0.0;   ///< That it took.
+  bool has_dark = false;  ///< True if the target has dark parts; without them there is no contrast.
+  double seconds = 0.0;   ///< Time taken.
 
   [[nodiscard]] bool empty() const { return parts == 0; }
 };
 
-/// Parts that are drawn again for every cause, of `parts` in all: a twentieth, 5 to 20.
+/// Number of parts drawn again for every cause, of `parts` in all: a twentieth, 5 to 20.
 std::int64_t paired_parts(std::int64_t parts);
 
 /// Draws parts and predicts them. Same bits for any number of threads.
@@ -86,8 +86,8 @@ ToleranceForecast forecast_parts(const PartModel& model, const ErrorSource& sour
                                  const PictureJudge& judge, std::int64_t parts,
                                  const Executor& executor, const RunControl& control);
 
-/// What to expect in a plain sentence or two: "8 of 10 parts should have a contrast of 20 : 1 to
-/// 35 : 1 and an MAE of 0.0102 to 0.0151. …"
+/// The forecast in a sentence or two: "8 of 10 parts should have a contrast of 20 : 1 to 35 : 1 and
+/// an MAE of 0.0102 to 0.0151. …"
 std::string tolerance_words(const ToleranceForecast& forecast);
 
 /// The contrast that halving a cause would bring to the median part.

@@ -74,7 +74,7 @@ namespace {
 constexpr std::array kDiameters = {6.0, 5.0, 4.0, 3.0, 2.5, 2.0, 1.5, 1.2,
                                    1.0, 0.8, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1};
 
-/// Two diameters this near are one, mm.
+/// Diameters this close count as equal, mm.
 constexpr double kSame = 1e-6;
 
 }  // namespace

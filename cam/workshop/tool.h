@@ -10,14 +10,14 @@
 
 namespace lensforge {
 
-/// The lower end of a cutter.
+/// Shape of a cutter's lower end.
 enum class CutterShape {
   kBall,  ///< A half sphere.
   kBull,  ///< Flat with a rounded corner.
   kFlat,
 };
 
-/// A cylinder around the axis: shank, collet, holder. Heights count from the tip.
+/// A cylinder around the axis: shank, collet, holder. Heights are measured from the tip.
 struct ToolSection {
   double diameter = 0.0;  ///< mm
   double from = 0.0;      ///< mm above the tip
@@ -26,7 +26,7 @@ struct ToolSection {
   friend bool operator==(const ToolSection&, const ToolSection&) = default;
 };
 
-/// A milling cutter, how it is clamped and how it is run.
+/// A milling cutter, its clamping and its cutting data.
 struct Tool {
   int number = 1;  ///< T word, ≥ 1.
   std::string name;
@@ -34,7 +34,8 @@ struct Tool {
   double diameter = 0.4;       ///< mm, > 0.
   double corner_radius = 0.0;  ///< Of a bull-nose cutter, mm, in 0 … diameter / 2.
   int teeth = 2;
-  double flute_length = 1.0;  ///< What cuts, mm above the tip; above it nothing may touch material.
+  double flute_length = 1.0;  ///< Cutting length from the tip, mm; nothing above it may touch
+                              ///< material.
   std::vector<ToolSection> sections;  ///< Above the flutes, from below.
   double spindle_rpm = 23000.0;
   double feed = 500.0;    ///< mm/min
@@ -44,8 +45,8 @@ struct Tool {
   friend bool operator==(const Tool&, const Tool&) = default;
 };
 
-/// The tool in another diameter, mm, > 0: flutes and neck in proportion, shank and holder as they
-/// are.
+/// The tool scaled to another diameter, mm, > 0: flutes and neck scale with it, shank and holder do
+/// not.
 Tool resized(Tool tool, double diameter);
 
 /// Lower silhouette of one part of a tool, turned about its axis: a flat disc with a rounded edge.
@@ -53,13 +54,13 @@ Tool resized(Tool tool, double diameter);
 struct CutterProfile {
   double radius = 0.0;  ///< Of the part, mm, ≥ 0.
   double corner = 0.0;  ///< Radius of the rounded edge, mm, in 0 … radius.
-  double base = 0.0;    ///< Of the part's lowest point above the tool's tip, mm.
+  double base = 0.0;    ///< Height of the part's lowest point above the tool's tip, mm.
 
   /// Radius of the flat disc, mm.
   [[nodiscard]] double flat() const { return radius - corner; }
 
   /// Height of the silhouette above the tool's tip at distance d ≥ 0 from the axis, mm; infinite
-  /// beyond the radius. Convex and nowhere falling, which is what the drop relies on.
+  /// beyond the radius. Convex and nowhere falling; the drop-cutter relies on that.
   [[nodiscard]] double height(double d) const {
     if (d > radius) return std::numeric_limits<double>::infinity();
     const double out = d - flat();
@@ -70,30 +71,30 @@ struct CutterProfile {
   friend bool operator==(const CutterProfile&, const CutterProfile&) = default;
 };
 
-/// What cuts: the lower end of a tool.
+/// Profile of the cutting part: the lower end of a tool.
 CutterProfile cutting_profile(const Tool& tool);
 
-/// What may touch nothing: the tool above its flutes, at the cutter's own diameter, and its
-/// sections as cylinders. Material beside a section that is no wider than the cutter was cut away
-/// before, so such a section is left out.
+/// Profiles of the parts that must not touch anything: the tool above its flutes, at the cutter's
+/// own diameter, and its sections as cylinders. Sections no wider than the cutter are left out: the
+/// cutter has already removed the material beside them.
 std::vector<CutterProfile> shank_profiles(const Tool& tool);
 
 /// cutting_profile() and shank_profiles() together.
 std::vector<CutterProfile> whole_profile(const Tool& tool);
 
-/// Distance from the axis that the tool fills somewhere below `height` above its tip, mm.
+/// Radius of the widest part of the tool below `height` above its tip, mm.
 double widest_below(const Tool& tool, double height);
 
-/// The profile with a skin of `allowance` (mm, ≥ 0) all around: where it touches a surface, the
-/// tool is that far from it, measured along the surface's normal.
+/// The profile offset by `allowance` (mm, ≥ 0) all around: where it touches a surface, the tool's
+/// distance from it along the surface's normal is the allowance.
 CutterProfile grown(const CutterProfile& profile, double allowance);
 
 /// The profile swept over a disc of radius `reach` (mm, ≥ 0) around its axis.
 CutterProfile widened(const CutterProfile& profile, double reach);
 
-/// Diameters of ball-end mills as makers of small tools keep them, below a given one, largest
-/// first, mm: tenths down to 0.1 mm, above 0.6 mm in the steps of their lists.
-/// @param count  at most.
+/// Diameters of ball-end mills in makers' catalogues below a given one, largest first, mm: tenths
+/// from 0.6 mm down to 0.1 mm, catalogue steps above.
+/// @param count  maximum number returned.
 std::vector<double> smaller_balls(double diameter, std::size_t count);
 
 }  // namespace lensforge

@@ -10,7 +10,7 @@
 namespace lensforge {
 namespace {
 
-/// Throws for one file.
+/// Reports errors of one file.
 class Rules {
  public:
   explicit Rules(std::string file) : file_(std::move(file)) {}

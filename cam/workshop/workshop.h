@@ -14,17 +14,17 @@ namespace lensforge {
 
 struct NumberRule;
 
-/// Along which axis the passes of a raster run.
+/// Axis along which the passes of a raster run.
 enum class PassAxis { kX, kY };
 
-/// How the passes of a raster follow one another, with a spindle that turns clockwise (M3).
+/// Order and direction of a raster's passes, with a spindle that turns clockwise (M3).
 enum class PassStyle {
   kZigzag,        ///< To and fro.
   kClimb,         ///< One way, uncut material on the right of the travel.
   kConventional,  ///< One way, uncut material on the left.
 };
 
-/// How a tool gets down into material.
+/// Entry of a tool into material.
 enum class EntryStyle {
   kRamp,   ///< Along its pass, to and fro.
   kHelix,  ///< On a circle where one fits, else along its pass.
@@ -34,13 +34,13 @@ enum class EntryStyle {
 struct RoughProcess {
   bool enabled = true;
   int tool = 3;                 ///< Tool::number
-  double stepdown = 1.0;        ///< Between levels at most, mm, > 0.
-  double stepover = 1.2;        ///< Between passes at most, mm, in 0 … its diameter.
+  double stepdown = 1.0;        ///< Maximum distance of levels, mm, > 0.
+  double stepover = 1.2;        ///< Maximum distance of passes, mm, in 0 … its diameter.
   double allowance = 0.2;       ///< Left on the surface, along its normal, mm, ≥ 0.
   double ramp_angle_deg = 3.0;  ///< Steepest way into material, degrees, in 0.1 … 45.
   EntryStyle entry = EntryStyle::kRamp;
-  double helix_radius = 1.0;  ///< Of the axis' circle, mm, in 0 … the tool's radius.
-  double spacing = 0.1;       ///< Of points at which the surface is asked for, mm, > 0.
+  double helix_radius = 1.0;  ///< Of the axis's circle, mm, in 0 … the tool's radius.
+  double spacing = 0.1;       ///< Distance of points at which the surface is sampled, mm, > 0.
   PassStyle style = PassStyle::kZigzag;
   PassAxis along = PassAxis::kX;
 
@@ -51,40 +51,41 @@ struct RoughProcess {
 struct SemiProcess {
   bool enabled = true;
   int tool = 2;                 ///< Tool::number
-  double stepover = 0.15;       ///< Between passes at most, mm, in 0 … its diameter.
+  double stepover = 0.15;       ///< Maximum distance of passes, mm, in 0 … its diameter.
   double allowance = 0.03;      ///< Left on the surface, along its normal, mm, ≥ 0.
   double ramp_angle_deg = 3.0;  ///< Steepest way into material, degrees, in 0.1 … 45.
   EntryStyle entry = EntryStyle::kRamp;
-  double helix_radius = 0.3;  ///< Of the axis' circle, mm, in 0 … the tool's radius.
-  double spacing = 0.05;      ///< Of points at which the surface is asked for, mm, > 0.
+  double helix_radius = 0.3;  ///< Of the axis's circle, mm, in 0 … the tool's radius.
+  double spacing = 0.05;      ///< Distance of points at which the surface is sampled, mm, > 0.
   PassStyle style = PassStyle::kZigzag;
   PassAxis along = PassAxis::kX;
 
   friend bool operator==(const SemiProcess&, const SemiProcess&) = default;
 };
 
-/// The ball's raster that makes the optical surface.
+/// The ball's raster that cuts the optical surface.
 struct FinishProcess {
   int tool = 1;               ///< Tool::number, a ball.
-  double pitch = 0.06;        ///< Between passes at most, mm, in 0 … its diameter.
-  double scallop = 0.0;       ///< If > 0, mm: the pitch follows from it, see finish_pitch().
-  double tolerance = 0.0005;  ///< Farthest from the drop curve, mm, > 0.
-  /// Largest error of a move's direction, rad, > 0. Polishing does not even out what neighbouring
-  /// rows have in common; docs/tuning.md, "Defaults of cam", has the leak and the moves by value.
+  double pitch = 0.06;        ///< Maximum distance of passes, mm, in 0 … its diameter.
+  double scallop = 0.0;       ///< If > 0, mm: determines the pitch, see finish_pitch().
+  double tolerance = 0.0005;  ///< Maximum distance from the drop curve, mm, > 0.
+  /// Maximum error of a move's direction, rad, > 0. Polishing does not remove an error that
+  /// neighbouring rows share; for leakage and number of moves by value see docs/tuning.md,
+  /// "Defaults of cam".
   double slope_tolerance = 6e-5;
   PassStyle style = PassStyle::kZigzag;
   PassAxis along = PassAxis::kX;
   bool cross = false;   ///< A second raster along the other axis.
   bool pencil = false;  ///< A pass along concave creases.
-  /// Tool::number of a larger ball that finishes wherever it reaches, before `tool` finishes the
-  /// rest; 0: `tool` alone.
+  /// Tool::number of a larger ball that finishes all it can reach before `tool` finishes the rest;
+  /// 0: `tool` alone.
   int large_tool = 0;
-  int large_every = 1;  ///< Rows of `tool`, whose pitch holds, per row of the larger ball, ≥ 1.
-  /// By how much the machine goes too far across the passes, share of a length, −0.02 … 0.02. The
-  /// programs are as without it; the part that cam predicts is longer by it.
+  int large_every = 1;  ///< Rows of `tool`, at its pitch, per row of the larger ball, ≥ 1.
+  /// Overshoot of the machine across the passes, share of a length, −0.02 … 0.02. It does not
+  /// change the programs; the part that cam predicts is longer by it.
   double pitch_error = 0.0;
 
-  /// Passes `mm` apart, whatever scallops they leave.
+  /// Sets the pitch, in mm, whatever the scallops.
   void set_pitch(double mm) {
     pitch = mm;
     scallop = 0.0;
@@ -93,7 +94,7 @@ struct FinishProcess {
   friend bool operator==(const FinishProcess&, const FinishProcess&) = default;
 };
 
-/// Everything that is chosen about the cut.
+/// All choices about the cut.
 struct Process {
   double safe_height = 5.0;  ///< Of rapid moves above the blank and the clamps, mm, > 0.
   double clearance = 0.5;    ///< Of the tool to clamps, and above material before it is fed, mm.
@@ -104,42 +105,42 @@ struct Process {
   friend bool operator==(const Process&, const Process&) = default;
 };
 
-/// The pitch as it will be cut at most, mm: FinishProcess::pitch, or what leaves scallops of
+/// Maximum pitch as cut, mm: FinishProcess::pitch, or the pitch that leaves scallops of
 /// FinishProcess::scallop on a plane, 2√(h(2R − h)).
 double finish_pitch(const FinishProcess& process, double ball_radius);
 
-/// What polishing does to a surface; all lengths in mm.
+/// Model of polishing; all lengths in mm.
 struct PolishModel {
-  double sigma = 0.0;  ///< Of the Gaussian that heights are averaged with, ≥ 0; 0: not polished.
-  double rim_depth = 0.0;   ///< Taken off in addition at the rim, ≥ 0.
-  double rim_length = 1.0;  ///< Distance over which that falls to 1/e of itself, > 0.
+  double sigma = 0.0;       ///< Of the Gaussian that averages the heights, ≥ 0; 0: not polished.
+  double rim_depth = 0.0;   ///< Additional removal at the rim, ≥ 0.
+  double rim_length = 1.0;  ///< Distance over which that falls to 1/e, > 0.
 
   friend bool operator==(const PolishModel&, const PolishModel&) = default;
 };
 
-/// Waves that an axis of the machine leaves in the surface, around one wavelength: its height is
-/// off by a function of that axis's place alone, the same in every row.
+/// Waves that an axis of the machine leaves in the surface, around one wavelength: the height error
+/// depends on that axis's position alone and is the same in every row.
 struct WavinessBand {
-  double wavelength = 10.0;  ///< mm, > 0; waves of 0.7 to 1.4 of it are drawn.
+  double wavelength = 10.0;  ///< mm, > 0; waves of 0.7 to 1.4 times this are drawn.
   double rms_um = 0.1;       ///< Root mean square of the height, µm, ≥ 0.
 
   friend bool operator==(const WavinessBand&, const WavinessBand&) = default;
 };
 
-/// How far machine, tool, polish and light may be off what the programs assume. Measured quantities
-/// are normal with the stated standard deviation (σ), limits of what a maker or a person keeps are
-/// uniform up to the stated bound. Where the defaults come from: docs/fabrication.md, "How sure is
-/// the forecast".
+/// Deviations of machine, tool, polish and light from the values that the programs assume. Measured
+/// quantities are normal with the stated standard deviation (σ); limits kept by a maker or a person
+/// are uniform up to the stated bound. For the origin of the defaults see docs/fabrication.md, "How
+/// sure is the forecast".
 struct Tolerances {
-  /// Of the machine's X and Y axes each.
+  /// Of the machine's X axis and of its Y axis.
   std::vector<WavinessBand> waviness{{30.0, 0.3}, {3.0, 0.03}};
   double row_um = 0.02;      ///< Height of one row against the next, σ, µm, ≥ 0.
-  double row_length = 10.0;  ///< Along a row over which that changes, mm, > 0.
+  double row_length = 10.0;  ///< Length along a row over which that changes, mm, > 0.
   double backlash_um = 1.0;  ///< Of the axis along the rows, 0 to this, µm, ≥ 0.
   double radius_um = 5.0;    ///< Radius of the ball, ± this, µm, ≥ 0.
   double runout_um = 5.0;    ///< Total indicated run-out of the ball, 0 to this, µm, ≥ 0.
 
-  double polish_sigma = 0.1;  ///< Of the polish's σ from part to part, as a share: σ, 0 … 0.3.
+  double polish_sigma = 0.1;    ///< Relative σ of the polish's σ from part to part, 0 … 0.3.
   double polish_within = 0.05;  ///< The same from place to place on a part, 0 … 0.3.
 
   double index = 0.001;   ///< Refractive index, ± this, ≥ 0.
@@ -167,7 +168,7 @@ struct Machine {
   double arc_tolerance = 0.0005;                ///< Of arcs as the controller splits them, mm.
   Eigen::Vector3d steps_per_mm{0.0, 0.0, 0.0};  ///< 0 rounds to no steps.
   int look_ahead = 200;                         ///< Moves that the controller plans ahead.
-  double lines_per_second = 1000.0;             ///< That it takes at most; 0 without limit.
+  double lines_per_second = 1000.0;             ///< Maximum that it takes; 0: no limit.
 
   friend bool operator==(const Machine&, const Machine&) = default;
 };
@@ -191,7 +192,7 @@ struct KeepOut {
   friend bool operator==(const KeepOut&, const KeepOut&) = default;
 };
 
-/// What the blank is made of.
+/// Material of the blank.
 struct Material {
   std::string name = "cast acrylic (PMMA)";
   double ior = 0.0;  ///< Refractive index against air, > 1; 0 where it is not stated.
@@ -199,12 +200,13 @@ struct Material {
   friend bool operator==(const Material&, const Material&) = default;
 };
 
-/// The tools of the defaults: 3 a 3 mm flat end mill to rough, 2 a 1 mm ball to semi-finish, 1 the
-/// 0.4 mm ball of the paper (Sun et al., Section 5) to finish; 4 a 6 mm ball for FinishProcess::
-/// large_tool, whose feed takes 0.04 mm a tooth.
+/// The default tools: 3, a 3 mm flat end mill for roughing; 2, a 1 mm ball for semi-finishing; 1,
+/// the 0.4 mm ball of the paper (Sun et al., Section 5) for finishing; 4, a 6 mm ball for
+/// FinishProcess::large_tool, with a feed of 0.04 mm per tooth.
 std::vector<Tool> default_tools();
 
-/// Everything about a cut but the lens: machine, blank, clamps, tools and how they are used.
+/// A whole workshop: machine, blank, clamps, tools and their use; everything about a cut except the
+/// lens.
 struct Workshop {
   Machine machine;
   Material material;
@@ -212,8 +214,8 @@ struct Workshop {
   std::vector<KeepOut> keep_outs;
   std::vector<Tool> tools = default_tools();
   Process process;
-  PolishModel polish{0.03, 0.0, 1.0};  ///< What happens to the surface after the last cut.
-  Tolerances tolerances;               ///< How far all this may be off.
+  PolishModel polish{0.03, 0.0, 1.0};  ///< Polish after the last cut.
+  Tolerances tolerances;               ///< Errors of all these.
 
   /// Null if no tool has this number.
   [[nodiscard]] const Tool* find_tool(int number) const;
@@ -222,18 +224,18 @@ struct Workshop {
   friend bool operator==(const Workshop&, const Workshop&) = default;
 };
 
-/// Rapid moves run at least this high above blank and clamps, mm: sheets of cast acrylic are up to
-/// half a millimetre thicker than stated (ISO 7823-1 allows 0.4 mm and a tenth of the thickness),
-/// and a touch-off and a blank that lies askew are off by a tenth or two.
+/// Minimum height of rapid moves above blank and clamps, mm: sheets of cast acrylic are up to 0.5
+/// mm thicker than stated (ISO 7823-1 allows 0.4 mm and a tenth of the thickness), and a touch-off
+/// and a tilted blank are off by 0.1 to 0.2 mm.
 inline constexpr double kMinSafeHeight = 0.5;
 
-/// Least and most of one of the workshop's numbers, by its place in the file:
-/// "process.safe_height", "tool.diameter", "finish.pitch". What sets such a number from elsewhere
-/// follows the same rule.
+/// Minimum and maximum of one of the workshop's numbers, by its key in the file:
+/// "process.safe_height", "tool.diameter", "finish.pitch". Options that set such a number follow
+/// the same rule.
 /// @pre there is such a number.
 NumberRule workshop_rule(const std::string& key);
 
-/// @param file  what to name in messages.
+/// @param file  its name in messages.
 /// @throw InputError naming file, key, value and rule where a number is out of its range, or where
 ///        two entries contradict one another: tool numbers, shapes and sections, speeds beyond the
 ///        machine, steps wider than the tool.
@@ -242,7 +244,7 @@ void validate(const Workshop& workshop, const std::string& file);
 /// @throw InputError naming file, key, value and rule where a number is out of its range.
 void validate_ranges(const Workshop& workshop, const std::string& file);
 
-/// Reads a workshop from TOML text. What is missing keeps its default; tools and clamps replace the
+/// Reads a workshop from TOML text. Missing keys keep their defaults; tools and clamps replace the
 /// defaults as a whole.
 /// @throw InputError naming file, key, value and rule.
 Workshop parse_workshop(std::string_view text, const std::string& file);

@@ -12,29 +12,30 @@
 #include "core/text/number_text.h"
 #include "core/text/toml_fields.h"
 
-// Each describe() below lists the keys of one table, once, for the reader and the writer: key,
-// range, where it is kept, and what the writer says about it.
+// Each describe() below lists the keys of one table once, for the reader and the writer: key,
+// range, member, and the writer's comment.
 namespace lensforge {
 namespace {
 
-constexpr double kLength = 10000.0;  ///< mm; longer than any mill.
-constexpr double kBlank = 1000.0;  ///< mm that a blank may be larger than its lens, or a tool long.
+constexpr double kLength = 10000.0;    ///< mm; longer than any mill.
+constexpr double kBlank = 1000.0;      ///< mm by which a blank may exceed its lens, or length of a
+                                       ///< tool.
 constexpr double kMinLength = 1e-6;    ///< mm; the last decimal of a program.
 constexpr double kMinDiameter = 0.01;  ///< mm; a third of the smallest that is sold.
 constexpr double kFinestStep = 1e-3;   ///< mm; of passes that only take material away.
 constexpr double kMinRate = 0.1;       ///< mm/min, mm/s²; slower than any mill.
 constexpr double kRate = 1e6;          ///< mm/min, mm/s², rpm.
 constexpr double kSpin = 1e6;          ///< rpm
-/// mm; four units of the last decimal that any dialect has, of which rounding takes one.
+/// mm; four units of the last decimal of any dialect, of which rounding takes one.
 constexpr double kFinestTolerance = 4e-6;
-/// rad; rounding to that decimal turns a move of a tenth of a millimetre as much.
+/// rad; rounding to that decimal turns a move of 0.1 mm by as much.
 constexpr double kFinestSlope = 1e-5;
 /// mm; of a circle down which a tool winds: below it the turns are too many to write.
 constexpr double kMinHelix = 0.01;
-/// mm that a tool is fed through air above material: less than a twist of a chuck's jaws.
+/// mm of feed through air above material: less than a twist of a chuck's jaws.
 constexpr double kMinClearance = 0.05;
 
-/// Share of a length; a controller with such a wrong number of steps a millimetre shows at once.
+/// Share of a length; a controller with such a wrong number of steps per millimetre shows at once.
 constexpr double kMaxPitchError = 0.02;
 
 /// σ and depth at the rim, mm; beyond it no picture is left.
@@ -63,7 +64,7 @@ std::string word_for(Enum value) {
   return std::string(words_of(value).begin()[static_cast<std::size_t>(value)]);
 }
 
-/// Takes values from a table; a key that is missing keeps its value.
+/// Reads values from a table; a missing key keeps its value.
 class Reader {
  public:
   explicit Reader(TomlFields fields) : fields_(std::move(fields)) {}
@@ -77,7 +78,7 @@ class Reader {
   void needed(const NumberRule& rule, double& value, const char* /*says*/) {
     value = fields_.number(rule);
   }
-  /// A number that may be left unsaid, which is 0.
+  /// An optional number, 0 if missing.
   void stated(const NumberRule& rule, double& value, const char* says) {
     number(rule, value, says);
   }
@@ -126,7 +127,7 @@ std::string quoted(const std::string& value) {
   return text + "\"";
 }
 
-/// Appends keys, each with its comment behind it.
+/// Writes keys, each followed by its comment.
 class Writer {
  public:
   explicit Writer(std::string prefix = {}) : prefix_(std::move(prefix)) {}
@@ -184,7 +185,7 @@ class Writer {
   std::string text_;
 };
 
-/// Holds every number against its rule.
+/// Checks every number against its rule.
 class RangeCheck {
  public:
   RangeCheck(std::string file, std::string prefix)
