@@ -89,13 +89,12 @@ inline constexpr double kCertificateMargin = 1.25;
 struct NormalBound {
   double largest = 0.0;                          ///< Minimum of the largest normal error, rad,
   Eigen::Vector2d at = Eigen::Vector2d::Zero();  ///< in the triangle with this centroid.
-  double share_above =
-      0.0;  ///< Share of the area in triangles where no surface holds the tolerance.
+  double share_above = 0.0;  ///< Area share of triangles where no surface holds the tolerance.
 };
 
-/// Around a triangle ∮ ∇z·dl = 0 for any surface z; hence somewhere on its border |s − ∇z| ≥ |∮
-/// s·dl| / perimeter for the model's slopes s. To first order the angle is that divided by 1 +
-/// |s|². @param tolerance  rad
+/// Around a triangle ∮ ∇z·dl = 0 for any surface z; hence |s − ∇z| ≥ |∮ s·dl| / perimeter somewhere
+/// on its border, for the model's slopes s. To first order the angle is that divided by 1 + |s|².
+/// @param tolerance  rad
 NormalBound normal_bound(const SmoothSurface& surface, double tolerance);
 
 }  // namespace lensforge

@@ -59,8 +59,7 @@ struct PatchFrame {
 /// A bicubic B-spline surface over a rectangle of parameters: `cells_u` × `cells_v` knot cells,
 /// twice continuously differentiable, one height above every (x, y).
 struct SplinePatch {
-  Eigen::AlignedBox2d
-      box;  ///< Box of the parameters (u, v): mm on the lens as long as its grid is not moved.
+  Eigen::AlignedBox2d box;  ///< Of the parameters (u, v): mm on the lens while its grid is flat.
   int cells_u = 0;
   int cells_v = 0;
   /// Coefficients of x, y and z in mm, (cells_u + 3) × (cells_v + 3) each; row index along u.
