@@ -41,9 +41,8 @@ struct StoredSurface {
   std::vector<StoredChannel> channels;
   /// Vertex numbers of the triangles, 32 bits each, base 64; empty if they follow from the grid.
   std::string corners;
-  bool zigzag = false;  ///< The diagonals alternate from row to row (make_grid_mesh()).
-  SampledSurface
-      read_back;  ///< The surface as a page decodes it; without normals if there are no slopes.
+  bool zigzag = false;       ///< The diagonals alternate from row to row (make_grid_mesh()).
+  SampledSurface read_back;  ///< As a page decodes it; without normals if there are no slopes.
 
   [[nodiscard]] const StoredChannel* channel(const std::string& name) const;
 };

@@ -13,9 +13,8 @@ namespace lensforge {
 /// The optical surface of a solid from any program.
 struct SolidSurface {
   SampledSurface samples;
-  int faces = 0;  ///< Number of the solid's faces that form it.
-  bool by_name =
-      false;  ///< The faces are named "optical surface"; otherwise they were found by shape.
+  int faces = 0;         ///< Number of the solid's faces that form it.
+  bool by_name = false;  ///< Found by the name "optical surface", else by shape.
 };
 
 /// Reads a STEP file's one solid and samples its optical surface: the faces named "optical
