@@ -429,8 +429,8 @@ struct RimCurve {
   Handle(Geom2d_BSplineCurve) plan;
 };
 
-/// Maximum distance of a rim's curves from the rim and from each other, mm: a fiftieth of a
-/// wavelength. Between its points rim_curve() reaches a quarter of it.
+/// Maximum distance of a rim's curves from the rim and from each other, mm: about 1/30 of a
+/// wavelength of light. Between its points rim_curve() reaches a quarter of it.
 constexpr double kRimTolerance = 2e-5;
 
 /// Of one wall: with 16 a knot cell it needs no more on any lens measured.
@@ -537,7 +537,7 @@ RimPoint point_on_sphere(const SphericalFront& front, const Eigen::Vector3d& poi
 /// Parameter of a quarter cylinder's first upright: the seam is opposite the wall.
 constexpr double kFirstAngle = 0.25 * std::numbers::pi;
 
-/// Geometry of an outline's corner.
+/// Vertices and edge at an outline's corner.
 struct Corner {
   TopoDS_Vertex back;
   TopoDS_Vertex top;
