@@ -17,10 +17,9 @@ enum class SpindleState {
 /// State of the spindle and the interlocks.
 struct GuardReport {
   SpindleState spindle = SpindleState::kStopped;
-  double rpm = 0.0;  ///< Last reading.
-  bool interlocks_ok =
-      true;            ///< Door, vacuum, coolant, e-stop have the values that the map expects.
-  std::string reason;  ///< The fault: device, signal, value and rule; empty if none.
+  double rpm = 0.0;           ///< Last reading.
+  bool interlocks_ok = true;  ///< Door, vacuum, coolant, e-stop are as the map expects.
+  std::string reason;         ///< The fault: device, signal, value and rule; empty if none.
 };
 
 /// Kind of a guard record.
