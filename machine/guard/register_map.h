@@ -141,11 +141,13 @@ struct BusTransport {
   std::string host;    ///< TCP.
   int port = 502;      ///< TCP.
   int unit = 1;
-  double response_timeout = 0.3;     ///< s from the request to the first byte of the answer.
-  double byte_timeout = 0.05;        ///< s between bytes; 0: the response time-out spans them all.
-  double connect_timeout = 1.0;      ///< s, TCP.
-  double request_gap = 0.01;         ///< Minimum silence before a request, s.
-  double late_answer_window = 0.3;   ///< s, RTU: wait after a time-out, for late answers.
+  double response_timeout = 0.3;  ///< s from the request to the first byte of the answer.
+  double byte_timeout = 0.05;     ///< s between bytes; 0: the response time-out spans them all.
+  double connect_timeout = 1.0;   ///< s, TCP.
+  double request_gap = 0.01;      ///< Minimum silence before a request, s.
+  /// s, RTU: after a time-out the line stays idle this long and input is discarded. RTU answers
+  /// have no number; a late one would be taken for the next answer.
+  double late_answer_window = 0.3;
   double reconnect_pause = 0.2;      ///< s before the first new connection; doubles ...
   double reconnect_pause_max = 3.0;  ///< ... up to this.
   double silence_limit = 2.0;        ///< s without one good answer: the device is lost.

@@ -66,7 +66,7 @@ BENCHMARK(DropCutterRaster)->ArgName("threads")->Arg(1)->Arg(2)->UseRealTime();
 void DropCutterScattered(benchmark::State& state) { run_drop(state, scattered_points(200'000)); }
 BENCHMARK(DropCutterScattered)->ArgName("threads")->Arg(1)->Arg(2)->UseRealTime();
 
-/// Lower bound: contact with one known facet per point. The ratio of DropCutterRaster's rate to
+/// Minimum work: contact with one known facet per point. The ratio of DropCutterRaster's rate to
 /// this one shows the cost of finding the facet.
 void OneFacetPerPoint(benchmark::State& state) {
   const SurfaceMesh& mesh = lens_mesh();

@@ -1,6 +1,6 @@
-// SPDX-License-Identifier: GPL-3.0-or-later Cost of a million moves of a finishing raster: written
-// and timed, and only read back. The process's peak memory shows that it does not grow with their
-// number.
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Cost of a million moves of a finishing raster: written and timed, and only read back. The
+// process's peak memory shows that it does not grow with their number.
 #include <benchmark/benchmark.h>
 #include <sys/resource.h>
 

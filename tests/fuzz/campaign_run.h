@@ -19,7 +19,7 @@ struct Campaign {
   double budget = 3.0;         ///< Seconds that a run may take before a signal asks it to stop.
   bool exec = false;           ///< Every run starts the built command.
   std::string kind;            ///< The only kind that is run; empty: all.
-  std::filesystem::path kept;  ///< Keeps the folders of failed runs.
+  std::filesystem::path kept;  ///< Folder that keeps failed runs.
 };
 
 /// Result of one run.

@@ -1,5 +1,6 @@
-// SPDX-License-Identifier: GPL-3.0-or-later Answers of the page of a running design; no client can
-// keep it from answering others or from ending.
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Answers of the page of a running design; no client can keep it from answering others or from
+// ending.
 #include "app/view/live_server.h"
 
 #include <fcntl.h>
