@@ -48,7 +48,7 @@ const Words& formats() {
   return words;
 }
 
-/// It stands in one field of the file's header.
+/// It is one field of the file's header.
 void require_author(const std::string& author) {
   constexpr std::size_t kMaxBytes = 200;
   if (author.size() > kMaxBytes) {
@@ -130,14 +130,13 @@ void validate(const ExportOptions& options, const fs::path& out) {
 
 namespace {
 
-// What an export takes was measured on two cores at 2.6 GHz, with a lens of 96 x 71 pixels'
-// vertices.
+// The costs below were measured on two cores at 2.6 GHz, with a lens of 96 x 71 pixels.
 
 /// The program itself, the lens and its pictures.
 constexpr double kProgramBytes = 1.5e8;
 
-/// 8192 x 5982 pixels take 27 s as EXR and 30 s as PNG; the files have 3.1 and 0.3 bytes a pixel,
-/// 4 and 2 at most.
+/// 8192 x 5982 pixels take 27 s as EXR and 30 s as PNG; the files have 3.1 and 0.3 bytes per pixel,
+/// at most 4 and 2.
 constexpr double kSecondsPerPixel = 6e-7;
 
 /// 500,000 control points take 51 s and 0.68 GB, 1,073,000 take 163 s and 1.25 GB.
@@ -151,7 +150,7 @@ constexpr double kFilePerPoint = 72.0;
 WorkEstimate height_map_work(double pixels, bool grey) {
   const double file = grey ? 2.0 : 4.0;
   const double images = grey ? 8.0 : 4.0;
-  // The file's bytes stand in memory, twice while they grow.
+  // The file's bytes are in memory, twice while the buffer grows.
   return {.seconds = kSecondsPerPixel * pixels,
           .disk_bytes = file * pixels,
           .memory_bytes = kProgramBytes + (images + 2.0 * file) * pixels};
@@ -245,7 +244,7 @@ void announce_splines(const Job& job, std::int64_t control_points) {
   job.announce(require_room_for(&spline_solid_work, {"--max-points", points}, job.folder()));
 }
 
-/// Of a mesh: splines that project its picture.
+/// Fits splines to a mesh; they project its picture.
 SplineSolid fitted_splines(const Job& job) {
   const Lens& lens = job.source.lens;
   FitOptions options{.tolerance = job.options.tolerance,
@@ -266,7 +265,7 @@ SplineSolid fitted_splines(const Job& job) {
   return solid;
 }
 
-/// Of a lens that is a spline: that spline.
+/// The spline of a lens that is one.
 SplineSolid own_spline(const Job& job) {
   const Lens& lens = job.source.lens;
   announce_splines(job, control_points_of_net(*lens.spline));
@@ -277,7 +276,7 @@ SplineSolid own_spline(const Job& job) {
   return solid;
 }
 
-/// What the solid's optical face is, as a mesh with the normals by which it projects its picture.
+/// The solid's optical face as a mesh with the normals that determine its picture.
 SampledSurface part_of(const Job& job) { return lens_part(job.source.lens, job.executor); }
 
 SplineSolid write_splines(const Job& job) {
@@ -331,7 +330,7 @@ MeshSolid write_mesh(const Job& job) {
   return {static_cast<std::int64_t>(solid.triangle_count()), enclosed_volume(solid)};
 }
 
-/// Tells what a height map takes. @throw InputError if there is no room for it.
+/// Reports the cost of a height map. @throw InputError if there is no room for it.
 void announce_heights(const Job& job) {
   const auto work = [&](double side) {
     const GridShape shape =

@@ -19,15 +19,15 @@
 
 namespace lensforge {
 
-/// What a lens can be written as.
+/// File formats of an export.
 enum class ExportFormat { kByExtension, kStep, kIges, kStl, kObj, kPly, k3mf, kGlb, kExr, kPng };
 
-/// How a lens is written as a file for other programs.
+/// Options for writing a lens as a file for other programs.
 struct ExportOptions {
   bool force = false;  ///< Replace a file that lensforge did not write.
   ExportFormat format = ExportFormat::kByExtension;
   int pixels = 1024;  ///< Longer side of a height map.
-  // Of solids of splines.
+  // Solids of splines only.
   double tolerance = FitOptions{}.tolerance;                ///< mm
   double normal_tolerance = FitOptions{}.normal_tolerance;  ///< rad
   std::int64_t max_points = 0;                              ///< FitOptions::max_control_points
@@ -51,80 +51,81 @@ ExportFormat export_format(const ExportOptions& options, const std::filesystem::
 ///        replaced.
 void validate(const ExportOptions& options, const std::filesystem::path& out);
 
-/// What a height map of so many pixels takes, as grey PNG or as EXR.
+/// Estimated cost of a height map with `pixels` pixels, as grey PNG or as EXR.
 WorkEstimate height_map_work(double pixels, bool grey);
 
-/// What a solid of splines with so many control points takes.
+/// Estimated cost of a solid of splines with `control_points` control points.
 WorkEstimate spline_solid_work(double control_points);
 
-/// What is exported.
+/// Input of an export.
 struct ExportSource {
-  Lens lens;                   ///< Its surface is the one to export.
-  std::filesystem::path file;  ///< That it was read from.
+  Lens lens;                   ///< The lens with the surface to export.
+  std::filesystem::path file;  ///< The file it was read from.
 };
 
-/// Which surface of a lens folder is exported.
+/// Surface of a lens folder to export.
 enum class ExportSurface {
   kDesigned,
-  kMilled,  ///< What the cutter leaves.
+  kMilled,  ///< The surface that the cutter leaves.
 };
 
-/// Reads a lens folder with the surface that is wanted.
+/// Reads a lens folder with the requested surface.
 /// @throw InputError as read_lens() does, or if the surface is no height field.
 ExportSource read_export_source(const std::filesystem::path& folder, ExportSurface surface);
 
-/// How a mesh's splines were found.
+/// Fit of splines to a mesh.
 struct SplineFit {
   FitOptions options;
-  NormalBound bound;  ///< What no surface can do better.
+  NormalBound bound;  ///< Error that no surface can go below.
 };
 
-/// A solid of splines as it was written.
+/// A written solid of splines.
 struct SplineSolid {
   SplineNet net;
-  std::optional<SplineFit> fit;  ///< Nothing of a lens that is a spline itself.
-  ImageMetrics picture;          ///< That the splines project.
+  std::optional<SplineFit> fit;  ///< Empty for a lens that is a spline itself.
+  ImageMetrics picture;          ///< Metrics of the splines' projected picture.
   SolidContent content;
-  double mesh_volume = 0.0;  ///< Of the facets, mm³.
+  double mesh_volume = 0.0;  ///< Volume under the facets, mm³.
 };
 
-/// A closed mesh as it was written.
+/// A written closed mesh.
 struct MeshSolid {
   std::int64_t triangles = 0;
   double volume = 0.0;  ///< mm³
 };
 
-/// A height map as it was written.
+/// A written height map.
 struct HeightMap {
   GridShape pixels;
-  double pixel = 0.0;              ///< Width of one, mm.
-  std::optional<GreyScale> scale;  ///< Of a grey picture.
+  double pixel = 0.0;              ///< Pixel width, mm.
+  std::optional<GreyScale> scale;  ///< Grey pictures only.
 };
 
-/// What was written; one of the last three.
+/// Result of an export; one of `splines`, `mesh` and `heights` is set.
 struct ExportResult {
   ExportFormat format = ExportFormat::kByExtension;
-  ModelMetrics metrics;  ///< Of the pictures that the mesh projects.
+  ModelMetrics metrics;  ///< Metrics of the mesh's projected pictures.
   std::optional<SplineSolid> splines;
   std::optional<MeshSolid> mesh;
   std::optional<HeightMap> heights;
 
-  /// Whether a solid of splines holds its tolerances everywhere; true of all else.
+  /// False if a solid of splines exceeds its tolerances anywhere.
   [[nodiscard]] bool within_tolerance() const {
     return !splines || !splines->fit || holds(splines->net.error(), splines->fit->options);
   }
 };
 
-/// Whom an export tells what it is about to do; either may be empty.
+/// Callbacks of an export; either may be empty.
 struct ExportHooks {
-  std::function<void(const WorkEstimate&)> announce;  ///< What a large one takes, before it begins.
-  std::function<void()> begin_writing;                ///< The file is being written from here on.
+  std::function<void(const WorkEstimate&)> announce;  ///< Cost of a large export, before it begins.
+  std::function<void()> begin_writing;                ///< Called just before the file is written.
 };
 
 /// Writes the surface of a lens as a solid, a closed mesh or a height map, whole or not at all. A
-/// solid's header has the surface's own time and hash: the same lens gives the same bytes.
+/// solid's header has the surface's own time and hash; the same lens gives the same bytes.
 /// @throw InputError if an option breaks its rule, the surface has no outline for the format, or
-///        memory and disk have no room, with the value that would fit; RunError; Interrupted.
+///        memory or disk space is too small (the message states a value that fits); RunError;
+///        Interrupted.
 ExportResult export_lens(const ExportSource& source, const std::filesystem::path& out,
                          const ExportOptions& options, const Executor& executor,
                          const RunControl& control = {}, const ExportHooks& hooks = {});

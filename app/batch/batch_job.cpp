@@ -25,7 +25,7 @@ using nlohmann::json;
 constexpr std::uintmax_t kMaxBytes = std::uintmax_t{64} << 20U;
 constexpr std::size_t kMaxName = 200;
 
-/// Whether a job's folder can have this name: letters, digits, '.', '_' and '-', not starting with
+/// True if a job's folder can have this name: letters, digits, '.', '_' and '-', not starting with
 /// '.' or '-', at most 200 of them.
 bool is_job_name(const std::string& name) {
   const auto allowed = [](char c) {
@@ -54,7 +54,7 @@ const JobCommand* command_named(const std::string& name) {
   return found == kCommands.end() ? nullptr : found;
 }
 
-/// What batch itself says to a command.
+/// True for options that batch itself sets.
 bool is_for_batch(const std::string& option) {
   static const std::set<std::string> reserved{"config", "force", "help",   "json",
                                               "out",    "quiet", "resume", "version"};
@@ -275,7 +275,7 @@ void fingerprint_targets(std::vector<BatchJob>& jobs) {
 
 namespace {
 
-/// As in a file name.
+/// The value as part of a file name.
 std::string name_part(const GridAxis& axis, const std::string& value) {
   std::string part = "-" + axis.option + value;
   for (char& c : part) {

@@ -15,10 +15,10 @@ struct BatchStep {
   std::string command;     ///< "design", "cam", …
   nlohmann::json options;  ///< An object: option names without dashes, and their values.
 
-  /// Whether the command has such an option. @param name  without dashes.
+  /// True if the command has this option. @param name  without dashes.
   [[nodiscard]] bool has_option(const std::string& name) const;
-  /// @throw InputError naming option, value and rule: no such option of the command, one that batch
-  ///        sets itself, or a value that the command's option table refuses.
+  /// @throw InputError naming option, value and rule: an option that the command lacks or that
+  ///        batch sets itself, or a value that the command's option table refuses.
   void set(const std::string& name, const nlohmann::json& value);
   /// The options as words of a command line: a flag if it is true, an array as several words.
   [[nodiscard]] Arguments words() const;
@@ -26,27 +26,28 @@ struct BatchStep {
 
 /// One line of a jobs file.
 struct BatchJob {
-  std::string name;    ///< Of its folder.
+  std::string name;    ///< Also the folder's name.
   std::string target;  ///< Picture or mesh; relative to the folder that batch was called from.
   std::vector<BatchStep> steps;
-  std::string target_sha256 = {};  ///< Of its content; empty until fingerprint_targets().
+  std::string target_sha256 = {};  ///< Hash of the content; empty until fingerprint_targets().
 
-  /// What was asked for, to tell whether a folder is of this very job: what is the same has the
-  /// same outcome.
+  /// The job as requested. Two jobs with equal JSON have the same result; it is compared with that
+  /// of an existing folder.
   [[nodiscard]] nlohmann::json json() const;
 };
 
 /// Reads JSON lines: {"name": …, "command": "design"|"reflect", "target": …, "options": {…},
-/// "then": ["cam", {"command": "export", "options": {…}}]}. Only a design can be followed by
-/// others: cam, export and render. Empty lines are passed over.
-/// @throw InputError naming file, line and rule: no JSON, an unknown key or command, a name twice
-///        or that is no file name, options as BatchStep::set() does.
+/// "then": ["cam", {"command": "export", "options": {…}}]}. Only a design can be followed by other
+/// commands: cam, export and render. Empty lines are skipped.
+/// @throw InputError naming file, line and rule: invalid JSON, an unknown key or command, a name
+///        that is repeated or is no file name, an option that BatchStep::set() refuses.
 std::vector<BatchJob> read_jobs(const std::filesystem::path& path);
 
-/// Reads every target once, however many jobs have it. @throw InputError if one cannot be read.
+/// Hashes the targets; reads each file once, even if several jobs share it. @throw InputError if
+/// one cannot be read.
 void fingerprint_targets(std::vector<BatchJob>& jobs);
 
-/// An option and the values that it takes in turn.
+/// An option and the list of its values.
 struct GridAxis {
   std::string command;  ///< Empty: the job's first command that has the option.
   std::string option;
@@ -56,8 +57,8 @@ struct GridAxis {
 /// Reads "focal=250,300" and "cam.pitch=0.05,0.06". @throw InputError naming word and rule.
 std::vector<GridAxis> read_grid(const std::vector<std::string>& words);
 
-/// Every job with every combination of values, the last axis fastest. A job's name takes what it is
-/// given: "portrait-focal250-pitch0.05".
+/// Returns every job with every combination of values; the last axis varies fastest. The values are
+/// appended to the job's name: "portrait-focal250-pitch0.05".
 /// @throw InputError if none of a job's commands has an option, or two names become the same.
 std::vector<BatchJob> expanded(const std::vector<BatchJob>& jobs,
                                const std::vector<GridAxis>& axes);

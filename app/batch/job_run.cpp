@@ -35,7 +35,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// How a command ended that was run as a process of its own.
+/// Result of a command that ran in its own process.
 struct StepEnd {
   int exit_code = 0;  ///< 128 + the signal's number if a signal ended it.
   double seconds = 0.0;
@@ -54,7 +54,7 @@ Descriptor open_output(const fs::path& path, int how) {
   return file;
 }
 
-/// What execv() takes.
+/// Arguments of execv().
 struct CommandLine {
   explicit CommandLine(const Arguments& words) : words_(words) {
     for (std::string& word : words_) pointers_.push_back(word.data());
@@ -67,8 +67,8 @@ struct CommandLine {
   std::vector<char*> pointers_;
 };
 
-/// The child's way to its program: only what may be called between fork() and execv(). It has a
-/// process group of its own, so that Ctrl-C on the terminal reaches it once, through the parent.
+/// Starts the program in the child, with only the calls allowed between fork() and execv(). The
+/// child has its own process group: Ctrl-C on the terminal reaches it once, through the parent.
 [[noreturn]] void become(const char* program, const CommandLine& command, int in, int out, int err,
                          pid_t parent) {
   ::setpgid(0, 0);
@@ -86,7 +86,7 @@ struct CommandLine {
 
 int wait_for(pid_t child, const std::stop_token& stop) {
   {
-    // Not reaped before nobody signals it any more: its number could be another process's then.
+    // Reaped only after the last possible signal: its number could then belong to another process.
     const std::stop_callback interrupt(stop, [child] { ::kill(child, SIGINT); });
     siginfo_t ended{};
     while (::waitid(P_PID, static_cast<id_t>(child), &ended, WEXITED | WNOWAIT) != 0) {
@@ -127,7 +127,7 @@ using Status = JobOutcome::Status;
 
 constexpr const char* kWork = ".work";
 constexpr const char* kLens = "out";  ///< In a job's work folder: what gets its name.
-constexpr const char* kOld = "old";   ///< What it replaces.
+constexpr const char* kOld = "old";   ///< The replaced folder.
 constexpr const char* kStepOutput = "step.json";
 constexpr const char* kFormat = "lensforge.job";
 
@@ -202,7 +202,7 @@ class JobWork {
   }
 
  private:
-  /// Goes on with what an earlier batch has done of the very same job, or begins.
+  /// Continues an earlier batch's work on the same job, or begins.
   void take_up() {
     wait_for_lens();
     record_ = record_in(folder_);
@@ -380,7 +380,7 @@ JobOutcome run_job(const BatchJob& job, const BatchPlace& place, const std::stop
 
 namespace {
 
-/// What every table begins with.
+/// First columns of every table.
 const std::vector<std::string> kFirstColumns{"name", "status", "message", "seconds"};
 
 /// Columns in the order in which they first came after kFirstColumns, and a row's cells.

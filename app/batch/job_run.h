@@ -11,25 +11,25 @@
 
 namespace lensforge::app {
 
-/// What every folder of a finished job has: the job, its steps' results, and how it ended.
+/// File in every finished job's folder: the job, the results of its steps, and its status.
 inline constexpr const char* kJobFile = "job.json";
-/// What its commands said.
+/// Output of the job's commands.
 inline constexpr const char* kJobLog = "job.log";
 
-/// How things stand with a job.
+/// Status of a job.
 struct JobOutcome {
   enum class Status {
-    kOpen,         ///< Not done, and nothing has gone wrong.
-    kDone,         ///< Its folder is there.
-    kLimitMissed,  ///< The same; a command missed a stated limit (exit code 3).
+    kOpen,         ///< Not done yet, no failure.
+    kDone,         ///< Finished; its folder exists.
+    kLimitMissed,  ///< Finished, but a command missed a stated limit (exit code 3).
     kFailed,       ///< A command failed; the next run repeats it.
-    kBusy,         ///< Another batch is at work on it.
+    kBusy,         ///< Another batch is running it.
     kInterrupted,
   };
   Status status = Status::kOpen;
-  std::string message;   ///< Why it failed, or which limit was missed.
-  bool earlier = false;  ///< It had been done before.
-  double seconds = 0.0;  ///< Of all its commands.
+  std::string message;   ///< Reason of the failure, or the limit that was missed.
+  bool earlier = false;  ///< An earlier run had finished it.
+  double seconds = 0.0;  ///< Run time of all its commands.
 
   [[nodiscard]] bool finished() const {
     return status == Status::kDone || status == Status::kLimitMissed;
@@ -38,29 +38,29 @@ struct JobOutcome {
 
 std::string status_word(JobOutcome::Status status);
 
-/// Where a batch does its work.
+/// Files and settings of a batch.
 struct BatchPlace {
-  std::filesystem::path out;  ///< A folder for each job that is done, and `.work` for the others.
+  std::filesystem::path out;  ///< Holds a folder for each finished job, and `.work` for the others.
   std::string jobs_file;      ///< For messages.
-  int threads = 0;            ///< Of every command that does not say so itself; 0 leaves it to it.
-  bool force = false;         ///< Jobs that were done with other options are done again.
+  int threads = 0;            ///< For commands that do not set it; 0: the command's default.
+  bool force = false;         ///< Repeat jobs that were done with other options.
 };
 
-/// What job.json says of this very job, finished or not: "status", "message", "seconds" of the
-/// commands that were done, "steps" with their results. Null before anybody began with it.
+/// Returns this job's job.json, finished or not: "status", "message", "seconds" of the finished
+/// commands, "steps" with their results. Null if the job was never started.
 nlohmann::json job_record(const BatchJob& job, const std::filesystem::path& out);
 
-/// @throw InputError if the job's folder is there and is not of this very job: another job's
-///        without `place.force`, or somebody else's.
+/// @throw InputError if the job's folder exists and belongs to another job (unless `place.force`)
+///        or was not written by batch.
 void require_room_for(const BatchJob& job, const BatchPlace& place);
 
-/// Does a job in `.work/NAME` and gives it its name in one step when it is done, so that a folder
-/// NAME is always whole. A command that was finished before is not run again, an interrupted design
-/// goes on from its checkpoint. Never throws for what a command or the disk does.
+/// Runs a job in `.work/NAME` and renames the folder when the job is done: a folder NAME is always
+/// complete. Finished commands are not repeated; an interrupted design continues from its
+/// checkpoint. Failures of commands or of the disk are reported in the result, not thrown.
 /// @pre fingerprint_targets()
 JobOutcome run_job(const BatchJob& job, const BatchPlace& place, const std::stop_token& stop);
 
-/// A row of the table: what was asked for and what came of it.
+/// A row of the table: a job and its result.
 struct TableJob {
   nlohmann::json job;  ///< BatchJob::json()
   std::string status;  ///< status_word()
@@ -70,11 +70,11 @@ struct TableJob {
 
 /// The jobs as CSV (RFC 4180): name, status, message, seconds, then every option that any job has
 /// ("design.focal") and every number, word and truth value of the commands' results
-/// ("design.metrics.smooth.mae"), empty where a job has none. What a command repeats of how it was
-/// called is left out.
+/// ("design.metrics.smooth.mae"), empty where a job has none. Results that only repeat a command's
+/// options are left out.
 std::string job_table(const std::vector<TableJob>& jobs);
 
-/// Whether the file begins as a table of jobs does.
+/// True if the file begins like a table of jobs.
 bool is_job_table(const std::filesystem::path& file);
 
 }  // namespace lensforge::app

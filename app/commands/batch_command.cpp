@@ -137,7 +137,7 @@ class BatchRun {
   std::size_t told_ = 0;
 };
 
-/// All jobs of the file, those of other shards too.
+/// Table of all jobs of the file, including other shards'.
 std::string table_of(const std::vector<BatchJob>& jobs, const BatchRun& run,
                      const BatchPlace& place) {
   std::vector<TableJob> rows;

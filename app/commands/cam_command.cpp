@@ -54,7 +54,7 @@ void settle(OptionSet& options, CamSettings& settings) {
     options.restate();
   }
   if (!settings.source.empty()) settings.cam.job = folder_name(settings.source);
-  // A file's own values have been read and found in order: what is wrong now is an option's doing.
+  // The file's own values were already checked: any error now comes from an option.
   validate(settings.cam.workshop, file + " with the options given");
 }
 

@@ -11,12 +11,12 @@
 
 namespace lensforge::app {
 
-/// What `lensforge cam` was asked for.
+/// Options of `lensforge cam`.
 struct CamSettings {
   std::string source;
   std::string workshop;  ///< TOML file; empty for the defaults.
   bool show_workshop = false;
-  std::vector<std::string> compare;  ///< What to compare; empty: make programs.
+  std::vector<std::string> compare;  ///< Items to compare; empty: make programs.
   CamOptions cam;
 
   /// DIR/cam
@@ -25,17 +25,17 @@ struct CamSettings {
   }
 };
 
-/// What a folder is called, also where it is named as "." or with a slash behind it.
+/// Returns a folder's own name, also for "." or a path with a trailing slash.
 std::string folder_name(const std::filesystem::path& folder);
 
 /// Adds every option of the command.
 void add_cam_options(OptionSet& options, CamSettings& settings);
 
-/// Puts what was given over the workshop file. @throw InputError naming file or option, value and
-/// rule.
+/// Overrides the workshop file with the given options. @throw InputError naming file or option,
+/// value and rule.
 void settle(OptionSet& options, CamSettings& settings);
 
-/// A line for every limit that a cut misses, and for what is advice.
+/// Returns one line for every limit that a cut misses and for every piece of advice.
 std::string verdict_text(const Verdict& verdict);
 
 }  // namespace lensforge::app

@@ -8,20 +8,20 @@
 
 namespace lensforge::app {
 
-/// What `lensforge coupon` was asked for.
+/// Options of `lensforge coupon`.
 struct CouponSettings {
   std::string out;            ///< Folder of the coupon, or the fitted workshop's file.
   std::string fit;            ///< Readings to fit; empty: make a coupon.
   std::string workshop;       ///< TOML file; empty for the defaults.
-  std::string workshop_text;  ///< Of that file.
+  std::string workshop_text;  ///< Content of that file.
   CouponOptions coupon;
 };
 
 /// Adds every option of the command.
 void add_coupon_options(OptionSet& options, CouponSettings& settings);
 
-/// Reads the workshop. @throw InputError naming file or option, value and rule; an option of the
-/// cut that is given with --fit.
+/// Reads the workshop. @throw InputError naming file or option, value and rule, also if an option
+/// of the cut is given with --fit.
 void settle(const OptionSet& options, CouponSettings& settings);
 
 }  // namespace lensforge::app

@@ -64,7 +64,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The rows of `cam` that say what is milled.
+/// The rows of `cam` that determine the milled part.
 const OptionTable<CamOptions>& part_fields() {
   static const OptionTable<CamOptions> fields = [] {
     OptionTable<CamOptions> rows;
@@ -105,8 +105,8 @@ void note_changes(DesignSettings& settings, const std::string& picture,
   for (const std::string& change : changes) settings.changes.push_back(picture + ": " + change);
 }
 
-/// A drawing has as many pixels as are asked for. @throw InputError naming a --pixels that would
-/// do.
+/// Checks that a drawing has the requested number of pixels. @throw InputError naming a --pixels
+/// that works.
 void require_wide_drawing(const Image& drawing, const DesignSettings& settings) {
   const int shorter = std::min(drawing.columns(), drawing.rows());
   if (shorter >= kMinPixels) return;
@@ -212,7 +212,7 @@ namespace {
 /// A lens.json is a few kilobytes.
 constexpr std::uintmax_t kMaxJson = 1 << 20;
 
-/// Whether lensforge wrote this file of a lens folder, by what it says of itself.
+/// True if the content shows that lensforge wrote this file of a lens folder.
 bool is_own(const fs::path& path) {
   std::error_code ignored;
   if (fs::file_size(path, ignored) == 0) return true;
@@ -223,7 +223,7 @@ bool is_own(const fs::path& path) {
   return written_by_lensforge(path);
 }
 
-/// Null where the file cannot be understood: whoever needs it says so.
+/// Null if the file cannot be parsed; callers that need it report that.
 nlohmann::json provenance_of(const fs::path& json) {
   const std::string text = read_whole_file(json, kMaxJson);
   try {
@@ -238,7 +238,7 @@ nlohmann::json provenance_of(const fs::path& json) {
   throw InputError("--out " + folder.string() + ": holds " + holds);
 }
 
-/// What no option lets a design replace.
+/// Refuses what no option lets a design replace.
 void require_files(const fs::path& folder) {
   for (const char* name : lens_file::kAll) {
     std::error_code ignored;
@@ -385,12 +385,12 @@ void LiveDesign::watch(const std::stop_token& stop) {
       server_.publish(state_of_design(checkpoint_, goal_, number, executor));
       ++number;
     } catch (const std::exception&) {
-      // The design itself says what is wrong with its checkpoint, and ends where it cannot go on.
+      // The design itself reports a bad checkpoint and ends if it cannot continue.
     }
   }
 }
 
-/// How nearly the picture under an extended source is known.
+/// Accuracy of the picture under an extended source.
 nlohmann::json source_json(const SourceCheck& source) {
   return {{"blur_pixels", source.blur},
           {"points", source.points},
@@ -398,7 +398,7 @@ nlohmann::json source_json(const SourceCheck& source) {
           {"convolution_mae", source.convolution}};
 }
 
-/// How far the colours of the light land apart, mm.
+/// Distance between the colours' landing points, mm.
 nlohmann::json fringe_json(const Fringe& fringe) {
   return {{"mean", fringe.mean}, {"max", fringe.max}};
 }
@@ -475,7 +475,7 @@ std::vector<std::string> changes_made(const LoadedImage& loaded, const DesignSet
   return changes;
 }
 
-/// Says so where the source hides the picture's finest detail.
+/// Prints a note if the source blurs the picture's finest detail.
 void note_source(const Image& picture, const DesignOptions& design, const Console& console) {
   const Eigen::Vector2i pixels = working_size(picture.columns(), picture.rows(), design.pixels);
   const double blur = source_blur(optical_setup(design, pixels), design.thickness);
@@ -513,8 +513,8 @@ std::string summary_text(const fs::path& folder, const DesignResult& result) {
          fixed(lens.provenance["seconds"].get<double>(), 1) + " s\n";
 }
 
-/// Stores what came out and says so. An earlier lens of another design stays until this one is
-/// done. @return the exit code.
+/// Saves and reports the result. An earlier lens of another design stays until this one is done.
+/// @return the exit code.
 int finish(const OptionSet& options, const ChosenDevice& device, const DesignOptions& design,
            const OutputFolder& folder, DesignResult& result) {
   const Console console(options.common().json, options.common().quiet);
@@ -556,10 +556,10 @@ std::unique_ptr<LiveDesign> live_page(const DesignSettings& settings, const Imag
   return page;
 }
 
-/// Who is told while a design runs.
+/// Observers of a running design.
 struct DesignWatchers {
-  /// Once, as soon as the library has accepted all its input: what no lens can do is only known
-  /// after the first transport, before any share of the work is done.
+  /// Called once, when the library has accepted all its input. Impossible requests are only
+  /// detected after the first transport, before any progress is reported.
   std::function<void()> begin;
   std::function<void()> look;  ///< Whenever there may be something to see.
 };
@@ -668,7 +668,7 @@ int design_command(const Arguments& command_line) {
   try {
     return run(options, settings);
   } catch (const Interrupted&) {
-    // While the picture was read: later the design ends with what it has.
+    // Interrupted while the picture was read; later the design saves its current state.
     return report_error("interrupted; nothing was written", kInterrupted, options.common().json);
   }
 }

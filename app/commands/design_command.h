@@ -17,7 +17,7 @@
 
 namespace lensforge::app {
 
-/// What `lensforge design` was asked for.
+/// Options of `lensforge design`.
 struct DesignSettings {
   std::string target;
   std::string out;
@@ -25,10 +25,10 @@ struct DesignSettings {
   std::string outline;         ///< Edge of the lens; empty: its rectangle.
   Background background;       ///< Behind target, source's shape and outline.
   std::string made_by;         ///< Workshop file, or "default"; empty: not designed for a process.
-  bool robust = false;         ///< For parts that are polished less and more than made_by says.
-  CamOptions cut;  ///< What of it is milled for made_by: the part or a mould, its shrinkage.
+  bool robust = false;         ///< Design for parts polished less or more than made_by states.
+  CamOptions cut;  ///< For made_by: whether the part or a mould is milled, and the shrinkage.
   DesignOptions design;
-  std::vector<std::string> changes;  ///< What was changed of the pictures above, in words.
+  std::vector<std::string> changes;  ///< Changes made to the pictures above, in words.
   std::string live;  ///< Port of a page that shows the design while it runs; empty: none.
   bool resume = false;
   bool force = false;
@@ -40,39 +40,39 @@ void add_design_options(OptionSet& options, DesignSettings& settings);
 /// Reads the picture to project. @throw InputError; Interrupted.
 LoadedImage read_target(const DesignSettings& settings, const RunControl& control);
 
-/// What nobody asked for is as the library has it for this picture; pictures that options name are
-/// read. @throw InputError naming option or picture, value and rule; Interrupted.
+/// Fills options that were not given with the library's values for this picture, and reads the
+/// pictures that options name. @throw InputError naming option or picture, value and rule;
+/// Interrupted.
 void settle(OptionSet& options, DesignSettings& settings, const Image& picture,
             const RunControl& control);
 
-/// What an output folder holds of an earlier design.
+/// Files of an earlier design in an output folder.
 struct EarlierDesign {
-  bool lens = false;        ///< A lens.json: of a finished or an interrupted design.
-  bool checkpoint = false;  ///< Something to go on from.
+  bool lens = false;        ///< There is a lens.json, of a finished or an interrupted design.
+  bool checkpoint = false;  ///< There is a checkpoint to resume from.
   /// Files with names that `design` writes, which lensforge did not write.
   std::vector<std::string> foreign;
-  nlohmann::json provenance;  ///< Of the lens; null where there is none.
+  nlohmann::json provenance;  ///< The lens's; null without a lens.
 
   static EarlierDesign in(const std::filesystem::path& folder);
 
-  /// Whether the lens is of the design with this fingerprint, finished or not.
+  /// True if the lens belongs to the design with this fingerprint, finished or not.
   [[nodiscard]] bool is_of(const std::string& fingerprint) const;
 
   friend bool operator==(const EarlierDesign&, const EarlierDesign&) = default;
 };
 
-/// @throw InputError if `folder` holds something that the design would replace and neither `resume`
-///        nor `force` says that it may; or, whatever they say, a folder or device in the place of a
-///        file.
+/// @throw InputError if the design would replace something in `folder` and neither `resume` nor
+///        `force` is set, or, in any case, if a folder or device has the name of one of its files.
 void refuse_to_overwrite(const std::filesystem::path& folder, const EarlierDesign& earlier,
                          bool resume, bool force);
 
-/// Where a lens comes from: program, options, time, outcome.
+/// Returns the origin of a lens: program, options, time, result.
 nlohmann::json design_provenance(const OptionSet& options, const ChosenDevice& device,
                                  const DesignOptions& design, const DesignResult& result);
 
-/// Writes all that a design leaves in its folder, and puts it in the place of what was there. The
-/// cut of an earlier lens goes with it: milled, it would not be this one.
+/// Writes all files of a design and replaces those of an earlier one. The programs of an earlier
+/// lens are deleted: they would mill another surface.
 /// @throw RunError if something cannot be written.
 void write_design(const std::filesystem::path& folder, const DesignResult& result,
                   const Console& console);

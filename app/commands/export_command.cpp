@@ -142,7 +142,7 @@ ExportReport export_report(const ExportResult& result) {
 
 namespace {
 
-/// What the library is told by the source that it is given.
+/// Options that reach the library through its source.
 const OptionTable<ExportSettings>& source_fields() {
   static const OptionTable<ExportSettings> table{Row<ExportSettings>::word<ExportSurface>(
       "--surface", &ExportSettings::surface,
@@ -151,8 +151,8 @@ const OptionTable<ExportSettings>& source_fields() {
   return table;
 }
 
-/// What helps where the splines of a mesh miss its tolerances. More control points do not where no
-/// surface has all of its normals.
+/// Remedy if splines miss a mesh's tolerances. More control points do not help if no surface has
+/// all its normals.
 std::string remedy_for(const SplineSolid& solid, ExportSurface surface) {
   std::string remedy = solid.fit->bound.share_above > 0.0
                            ? ": the normals of the mesh contradict each other"

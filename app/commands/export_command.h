@@ -9,7 +9,7 @@
 
 namespace lensforge::app {
 
-/// What `lensforge export` was asked for.
+/// Options of `lensforge export`.
 struct ExportSettings {
   std::string source;
   std::string out;
@@ -20,10 +20,10 @@ struct ExportSettings {
 /// Adds every option of the command.
 void add_export_options(OptionSet& options, ExportSettings& settings);
 
-/// @throw InputError naming an option that was given though the format has no use for it.
+/// @throw InputError naming an option that was given but does not apply to the format.
 void require_fitting_options(const OptionSet& options, ExportFormat format);
 
-/// What an export says of what it wrote, for programs and for people.
+/// Report of an export, for programs and for people.
 struct ExportReport {
   nlohmann::json json;
   std::string text;

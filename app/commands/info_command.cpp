@@ -36,7 +36,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// What a look through a G-code program tells without interpreting it.
+/// Facts about a G-code program that need no interpretation.
 struct GcodeSummary {
   std::vector<std::string> header;  ///< Comments before the first command, brackets taken off.
   std::int64_t lines = 0;
@@ -87,8 +87,8 @@ SplitLine split(const std::string& line) {
   return parts;
 }
 
-/// Whether a controller computes what the line says: #1, #<name>, [1+2], O<name> CALL. Its numbers
-/// and letters then mean something else than words.
+/// True if a line has expressions: #1, #<name>, [1+2], O<name> CALL. Its letters and numbers then
+/// are not plain words.
 bool computes(std::string_view code) {
   return code.find_first_of("#[]<>=") != std::string_view::npos;
 }
@@ -138,7 +138,7 @@ GcodeSummary summarise_gcode(const fs::path& path) {
   return summary;
 }
 
-/// What is known of a thing, for people and for programs.
+/// Description of a file, for people and for programs.
 struct Description {
   nlohmann::json json;
   std::string text;
@@ -175,7 +175,7 @@ std::string place_text(const Eigen::Vector3d& p) {
   return fixed(p.x(), 2) + ", " + fixed(p.y(), 2) + ", " + fixed(p.z(), 2);
 }
 
-/// Of an extended source: ", 3.00 mm wide".
+/// Size of an extended source: ", 3.00 mm wide".
 std::string extent_text(const OpticalSetup& setup) {
   if (setup.extent.none()) return "";
   const std::string width = setup.point ? fixed(setup.extent.width, 3) + " mm"
@@ -204,7 +204,7 @@ std::string front_text(const HeightFront& front) {
          fixed(static_cast<double>(spline.highest()), 3) + " mm";
 }
 
-/// How much wider than the lens the front has to be, so that all of the surface is lit.
+/// Describes by how much the front must exceed the lens for the whole surface to be lit.
 void describe_overhang(Description& d, const Lens& lens) {
   if (!lens.setup.front) return;
   const double most = overhang(lens.surface, lens.setup);
@@ -293,7 +293,7 @@ Description describe_gcode(const fs::path& path) {
   d.json["lines"] = summary.lines;
   d.json["moves"] = summary.moves;
   d.json["passed_over"] = summary.passed_over;
-  // Words as they stand: their unit and their zero are the program's.
+  // Values as written, in the program's unit and coordinates.
   describe_extent(d, summary.extent, " as written");
   return d;
 }
@@ -359,7 +359,7 @@ Description describe_package(const MeshContent& content) {
   return d;
 }
 
-/// What is no picture by its name; nothing for a picture.
+/// Describes a file that is no picture by its name; empty for a picture.
 std::optional<Description> describe(const fs::path& path, const CommonOptions& common) {
   if (is_folder(path)) return describe_lens(path);
   if (has_extension(path, {".ngc", ".nc", ".gcode", ".tap"})) return describe_gcode(path);

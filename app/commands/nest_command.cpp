@@ -210,7 +210,8 @@ int exit_code(const NestResult& result) {
   return result.missed() == 0 ? kDone : kLimitMissed;
 }
 
-/// What stands in every lens's report, as collisions on the common blank do, once.
+/// Prints warnings that are in every lens's report, such as collisions on the common blank, only
+/// once.
 void note_warnings(const NestResult& result, const Console& console) {
   for (const std::string& warning : result.warnings) console.note("warning: " + warning);
   const std::vector<NestedLens>& lenses = result.layout.lenses;

@@ -9,9 +9,9 @@
 
 namespace lensforge::app {
 
-/// What `lensforge nest` was asked for.
+/// Options of `lensforge nest`.
 struct NestSettings {
-  /// Unless it is told otherwise, every lens is cut out: rectangles come apart, too.
+  /// By default every lens is cut out, rectangles too.
   NestSettings() { nest.cam.cut_outline = OutlineWish::kAlways; }
 
   std::vector<std::string> sources;  ///< Lens folders; one named twice is cut twice.
@@ -23,11 +23,11 @@ struct NestSettings {
 /// Adds every option of the command.
 void add_nest_options(OptionSet& options, NestSettings& settings);
 
-/// Puts what was given over the workshop file. @throw InputError naming file or option, value and
-/// rule.
+/// Overrides the workshop file with the given options. @throw InputError naming file or option,
+/// value and rule.
 void settle(OptionSet& options, NestSettings& settings);
 
-/// Names of the sources' folders; what comes again has its number behind it: "bee", "bee_2".
+/// Names of the sources' folders; repeated names are numbered: "bee", "bee_2".
 std::vector<std::string> nest_names(const std::vector<std::string>& sources);
 
 }  // namespace lensforge::app

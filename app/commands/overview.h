@@ -6,11 +6,11 @@
 
 namespace lensforge::app {
 
-/// One picture for people: the target, the projected picture, that of the part as it is made where
-/// a design knows it, and the surface side by side, each in the orientation of the target. The
-/// surface is shown as a relief lit from the upper left, its broad swells flattened and its
-/// contrast stretched, so that creases far too shallow to see stand out.
-/// @param made  in the pixels of the lens's render; may be null.
+/// Overview picture: the target, the projected picture, the predicted picture of the part as made
+/// (if known), and the surface side by side, each in the orientation of the target. The surface is
+/// a relief lit from the upper left, without its broad curvature and with stretched contrast, which
+/// shows creases too shallow to see otherwise.
+/// @param made  picture of the part as made, in the pixels of the lens's render; may be null.
 Image draw_overview(const Lens& lens, const Image* made);
 
 /// The relief alone, `columns` × `rows`, linear light.

@@ -38,8 +38,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Nothing is written yet: a remeshing, which does not look at the stop token, is left behind with
-/// the process.
+/// Nothing is written yet: a remeshing, which does not check the stop token, is abandoned with the
+/// process.
 reflect::ReflectInput prepared(const ReflectSettings& settings, const CommonOptions& common) {
   InterruptibleJob job(common);
   const RunControl control = job.control();
@@ -124,7 +124,8 @@ bool is_of_result(const std::string& name) {
          std::find(all.begin(), all.end(), name) != all.end();
 }
 
-/// @throw InputError if the folder holds an unfinished run, which nobody says may go or go on.
+/// @throw InputError if the folder has an unfinished run and no option says to replace or resume
+///        it.
 void require_no_unfinished_run(const ReflectSettings& settings) {
   std::error_code ignored;
   if (fs::exists(fs::path(settings.out) / reflect::reflect_file::kCheckpoint, ignored) &&
@@ -142,8 +143,8 @@ void require_readable_checkpoint(const ReflectSettings& settings) {
   if (settings.resume && fs::exists(checkpoint, ignored)) reflect::read_checkpoint(checkpoint);
 }
 
-/// Sets where checkpoints go and whether the run goes on from one. @return false if the run has
-/// ended before and there is nothing left to do.
+/// Sets the checkpoint's path and whether the run resumes from one. @return false if the run is
+/// already finished.
 bool settle_checkpoint(ReflectSettings& settings, const reflect::ReflectInput& input,
                        const OutputFolder& folder, const Console& console) {
   reflect::ReflectOptions& options = settings.reflect;
@@ -228,7 +229,7 @@ int reflect_command(const Arguments& command_line) {
   try {
     return settings.evaluate ? evaluate(options, settings) : shape(options, settings);
   } catch (const Interrupted&) {
-    // Before the first update: later a run ends with what it has.
+    // Interrupted before the first update; later a run keeps its current state.
     return report_interrupted(options.common().json);
   }
 }

@@ -8,7 +8,7 @@
 
 namespace lensforge::app {
 
-/// What `lensforge reflect` was asked for.
+/// Options of `lensforge reflect`.
 struct ReflectSettings {
   std::string mesh;  ///< File to read.
   std::string out;   ///< Folder; empty with `evaluate`.

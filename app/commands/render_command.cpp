@@ -39,7 +39,7 @@ struct RenderArguments {
   RenderOptions render;
 };
 
-/// What is rendered and, if known, what it should look like.
+/// The surface to render and, if known, its target.
 struct Scene {
   SurfaceMesh surface;
   std::optional<Eigen::Matrix3Xd> normals;  ///< Of a solid's own surface, for the smooth model.
@@ -85,7 +85,7 @@ Scene load(const std::string& source, const Executor& executor, const RunControl
   return {std::move(mesh), {}, {}, render, {}};
 }
 
-/// What a picture takes. @throw InputError where there is no room for it.
+/// Returns the cost of a picture. @throw InputError if there is no room for it.
 WorkEstimate require_room_for_picture(const OpticalSetup& setup, const std::string& out) {
   const double shape = setup.pixels.cast<double>().prod() / std::pow(setup.pixels.maxCoeff(), 2);
   const auto work = [&](double side) { return rendering_work(shape * side * side); };
@@ -93,7 +93,7 @@ WorkEstimate require_room_for_picture(const OpticalSetup& setup, const std::stri
   return require_room_for(work, {"--pixels", 1.0 * setup.pixels.maxCoeff()}, folder);
 }
 
-/// @throw InputError where what is said of colour does not go with the rest.
+/// @throw InputError if the colour options do not fit the others.
 void require_spectrum(const Scene& scene, const OptionSet& options,
                       const RenderArguments& arguments) {
   const OpticalSetup& setup = scene.render.setup;
@@ -148,7 +148,7 @@ float scale_to_white(Image& image) {
   return white;
 }
 
-/// What a command says at the end, and what it wrote.
+/// Result of the command, and its files.
 struct Rendering {
   Image image;
   std::optional<ColorImage> color;  ///< Instead of it.
@@ -209,7 +209,7 @@ Rendering render_alone(const Scene& scene, const Executor& executor) {
               fixed(100.0 * result.flux_inside, 1) + " %\n"};
 }
 
-/// Of the surface under its model, as vertex_area_normals() has them.
+/// Fringe of the surface under its model, with vertex_area_normals().
 Fringe fringe_of(const Scene& scene) {
   const OpticalSetup& setup = scene.render.setup;
   if (scene.render.model == SurfaceModel::kSpline) {

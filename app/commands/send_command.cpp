@@ -177,7 +177,7 @@ std::string send_text(const SendSettings& settings, const SendSummary& summary) 
 
 constexpr double kStopCheck = 0.1;  ///< Longest time without a look at the stop token, s.
 
-/// What is typed up to Enter; empty at the end of the input.
+/// Reads the input up to Enter; empty at the end of the input.
 std::string read_answer(const std::stop_token& stop) {
   while (wait_for(STDIN_FILENO, POLLIN, kStopCheck) == 0) {
     if (stop.stop_requested()) throw Interrupted();
@@ -188,8 +188,8 @@ std::string read_answer(const std::stop_token& stop) {
   return answer.substr(0, answer.find('\n'));
 }
 
-/// Asks on the terminal whether to go on. @throw InputError if there is nobody to ask, or the
-/// answer is not yes; Interrupted soon after `stop` asks for it.
+/// Asks on the terminal whether to continue. @throw InputError if there is no terminal or the
+/// answer is not yes; Interrupted soon after `stop` requests it.
 void require_consent(const std::stop_token& stop) {
   if (::isatty(STDIN_FILENO) == 0) {
     throw InputError(
@@ -242,7 +242,7 @@ class JobConsole : public JobWatcher {
 
   void passing(const Progress& progress) override {
     if (!bar_) bar_.emplace(options_.common().quiet);
-    // None where progress is not shown.
+    // Empty if progress is not shown.
     if (const auto show = bar_->sink()) show(progress);
   }
   void passed() override { bar_.reset(); }
@@ -281,7 +281,7 @@ class JobConsole : public JobWatcher {
     events_->end(result);
   }
 
-  /// For the record, if there is one by now.
+  /// Logs the refusal if the log is already open.
   void refused(const std::exception& why) {
     if (log_) log_->line(std::string("nothing was sent: ") + why.what());
   }

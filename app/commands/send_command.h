@@ -10,11 +10,11 @@
 
 namespace lensforge::app {
 
-/// What `lensforge send` was asked for.
+/// Options of `lensforge send`.
 struct SendSettings {
   std::string file;
   std::string log;     ///< FILE.log if empty.
-  std::string events;  ///< JSON lines go here; none if empty.
+  std::string events;  ///< Destination of the JSON lines; none if empty.
   bool yes = false;    ///< Do not ask before resuming.
   SendOptions job;
 
@@ -30,7 +30,7 @@ void add_send_options(OptionSet& options, SendSettings& settings);
 /// "done", "interrupted" or "fault".
 std::string status_word(SendStatus status);
 
-/// Size, extent and time of a program, a line each.
+/// Size, extent and run time of a program, one line each.
 std::string facts_text(const ProgramFacts& facts);
 
 }  // namespace lensforge::app

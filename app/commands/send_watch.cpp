@@ -70,7 +70,7 @@ std::string machine_text(const SendEvent& event) {
   return text;
 }
 
-/// How full a buffer is: "12/15".
+/// Fill level of a buffer: "12/15".
 std::string level(int free, int size) {
   return size > 0 ? std::to_string(std::clamp(size - free, 0, size)) + "/" + std::to_string(size)
                   : std::to_string(free) + " free";
@@ -124,7 +124,7 @@ void TimeLeft::take(const SendEvent& event) {
 
 namespace {
 
-/// A running job in three lines: how far; what the machine does; buffers and what is wrong.
+/// A running job in three lines: progress; the machine's state; buffers and warnings.
 std::vector<std::string> view_lines(const SendEvent& event, const JobView& job, double left,
                                     const std::string& warning) {
   std::vector<std::string> lines = {
@@ -193,7 +193,7 @@ void OperatorView::wipe() {
 
 namespace {
 
-/// What is read of a file to tell what it is: more than any first line of ours.
+/// Bytes read to identify a file: more than any first line of ours.
 constexpr std::size_t kFirstLine = 1 << 16;
 
 std::string reason(int error) { return std::generic_category().message(error); }
@@ -202,7 +202,7 @@ std::string reason(int error) { return std::generic_category().message(error); }
   throw InputError(path.string() + ": " + why);
 }
 
-/// The first line without its end, of what a file may be told from; empty if it cannot be read.
+/// The first line of a file without its end; empty if it cannot be read.
 std::string first_line(const std::filesystem::path& path) {
   const Descriptor file(::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC));
   std::string text(kFirstLine, '\0');
@@ -212,7 +212,7 @@ std::string first_line(const std::filesystem::path& path) {
   return end == std::string::npos ? std::string() : text.substr(0, end);
 }
 
-/// Whether a terminal is the one that this process was started from, not the port of a machine.
+/// True if a terminal is the one from which this process was started, not a machine's port.
 bool is_own_terminal(int descriptor) {
   struct stat about {};
   struct stat own {};
@@ -253,7 +253,7 @@ std::string time_stamp() {
   return text.data();
 }
 
-/// Whether a text begins as time_stamp() does.
+/// True if a text begins like time_stamp().
 bool begins_with_time(std::string_view text) {
   constexpr std::string_view kForm = "0000-00-00T00:00:00.000Z";
   if (text.size() < kForm.size()) return false;
@@ -264,7 +264,7 @@ bool begins_with_time(std::string_view text) {
 
 }  // namespace
 
-// A named pipe that nobody reads would block here for ever without O_NONBLOCK.
+// Without O_NONBLOCK a named pipe without a reader would block here for ever.
 TextSink::TextSink(const std::filesystem::path& path, const SinkKind& kind)
     : path_(path),
       file_(path == "-"
@@ -279,8 +279,8 @@ TextSink::TextSink(const std::filesystem::path& path, const SinkKind& kind)
   if (path != "-") require_own(path, file_.number(), kind);
 }
 
-// Standard output may be shared, so it is not made non-blocking: a pipe that poll() finds ready
-// takes a line of up to PIPE_BUF bytes whole and at once.
+// Standard output may be shared and is not made non-blocking: a pipe that poll() reports ready
+// accepts a line of up to PIPE_BUF bytes whole and at once.
 std::string TextSink::write(const std::string& line) {
   if (!file_.open()) return {};
   const std::string text = line + "\n";
@@ -310,7 +310,7 @@ long TextSink::take_lost() { return std::exchange(lost_, 0); }
 
 namespace {
 
-/// How often a log says where the job stands when nothing happens, s.
+/// Interval of progress lines in the log when nothing happens, s.
 constexpr double kStanding = 60.0;
 
 /// Reports, soft limits, homing, spindle and laser, rates, accelerations and travels.
@@ -339,7 +339,7 @@ std::string standing_text(const SendEvent& event) {
 /// Longest line, bytes: that of the options.
 constexpr std::size_t kLongestLine = 1 << 14;
 
-/// "2026-07-30T14:05:09.250Z  lensforge 0.1.0 send …", as begin() writes it.
+/// "2026-07-30T14:05:09.250Z lensforge 0.1.0 send …", as written by begin().
 bool begins_log(std::string_view line) {
   constexpr std::string_view kBegin = "  lensforge ";
   constexpr std::size_t kTime = std::string_view("0000-00-00T00:00:00.000Z").size();
@@ -461,7 +461,7 @@ nlohmann::json standing_json(const SendEvent& event, const JobView& view, double
   return json;
 }
 
-/// As write() makes them.
+/// Lines of write().
 bool begins_events(std::string_view line) {
   const nlohmann::json first = nlohmann::json::parse(line, nullptr, false);
   const auto is_text = [&](const char* key) {

@@ -17,20 +17,20 @@
 
 namespace lensforge::app {
 
-/// What a view of a running job has to know beside the events.
+/// Data that a view of a running job needs in addition to the events.
 struct JobView {
-  std::int64_t bytes = 0;       ///< Of the file.
-  std::int64_t lines = 0;       ///< Of the file.
-  std::int64_t first_byte = 0;  ///< Where this run began.
-  double estimate = 0.0;        ///< s, of the whole program.
+  std::int64_t bytes = 0;       ///< Size of the file.
+  std::int64_t lines = 0;       ///< In the file.
+  std::int64_t first_byte = 0;  ///< First byte of this run.
+  double estimate = 0.0;        ///< Run time of the whole program, s.
   int planner_blocks = 0;       ///< 0 if not known.
-  int rx_bytes = 0;             ///< Likewise.
+  int rx_bytes = 0;             ///< 0 if not known.
 };
 
 /// "1:02:03"
 std::string duration_text(double seconds);
 
-/// How long a job still takes: what the estimate leaves, at the pace so far. Times of hold do not
+/// Remaining time of a job: the rest of the estimate, scaled by the pace so far. Holds do not
 /// count.
 class TimeLeft {
  public:
@@ -46,8 +46,8 @@ class TimeLeft {
   double last_ = 0.0;
 };
 
-/// Shows a running job on stderr: three lines that redraw themselves on a terminal, one line every
-/// few seconds otherwise, nothing if `quiet`. The lines stay on the terminal in the end.
+/// Shows a running job on stderr: three lines that are redrawn on a terminal, one line every few
+/// seconds otherwise, nothing if `quiet`. The last lines remain on the terminal.
 class OperatorView {
  public:
   OperatorView(bool quiet, const JobView& job);
@@ -68,31 +68,31 @@ class OperatorView {
   const bool terminal_;
   const JobView job_;
   Clock::time_point shown_ = Clock::now();
-  std::size_t drawn_ = 0;  ///< Lines that stand on the terminal.
-  std::string warning_;    ///< The last one.
+  std::size_t drawn_ = 0;  ///< Number of lines on the terminal.
+  std::string warning_;    ///< Latest warning.
 };
 
-/// What a TextSink is filled with, and how it is told from other people's files.
+/// Kind of text in a TextSink, and how to recognise its files.
 struct SinkKind {
   const char* name;                             ///< "log"
-  bool (*begins)(std::string_view first_line);  ///< Whether one of this kind begins with that line.
+  bool (*begins)(std::string_view first_line);  ///< True if such a file begins with the line.
 };
 
-/// A file, pipe or device that lines are appended to beside a running job, which it never stops: a
-/// reader that does not keep up loses whole lines, and a failure ends the writing and is said once.
+/// A file, pipe or device to which lines are appended during a job. It never stops the job: a slow
+/// reader loses whole lines, and after a failure, reported once, nothing more is written.
 class TextSink {
  public:
-  /// Is open() at once. Nothing is written to a file that holds anything else than what an earlier
-  /// sink of this kind wrote, nor to a disk or to a serial port.
-  /// @param path  "-" for standard output. @throw InputError if it cannot be.
+  /// Opens the sink. Refuses a file with content that no sink of this kind wrote, a disk and a
+  /// serial port.
+  /// @param path  "-" for standard output. @throw InputError if it cannot be opened.
   TextSink(const std::filesystem::path& path, const SinkKind& kind);
   TextSink() = default;
 
   [[nodiscard]] bool open() const { return file_.open(); }
-  /// Writes a line with its end. @return why it could not and nothing is written from now on, or
-  /// empty.
+  /// Writes a line with its end. @return empty, or the reason of the failure, after which nothing
+  /// more is written.
   std::string write(const std::string& line);
-  /// Lines that were lost to a slow reader since the last call.
+  /// Number of lines lost to a slow reader since the last call.
   long take_lost();
 
  private:
@@ -101,11 +101,11 @@ class TextSink {
   long lost_ = 0;
 };
 
-/// Where a trouble with a file beside the job is said.
+/// Reports a problem with a file that accompanies the job.
 using Warn = std::function<void(const std::string&)>;
 
-/// What happened to a job, in words for whoever looks into it later: one line each with a time
-/// stamp (UTC), appended. A log that cannot be written is a warning and stops nothing.
+/// Log of a job in words: lines with a time stamp (UTC), appended to a file. If the log cannot be
+/// written, the operator is warned and the job goes on.
 class JobLog {
  public:
   /// @throw InputError if a file that --log names cannot be opened.
@@ -113,11 +113,11 @@ class JobLog {
 
   /// Version, options, file and hash.
   void begin(const OptionSet& options, const JobIdentity& job);
-  /// Who the controller is, and those of its settings that decide what it does with the program.
+  /// The controller's identity, and those of its settings that affect the program.
   void controller(const ControllerInfo& info);
   void preflight(const ProgramFacts& facts, const Findings& findings);
   void resume(const ResumePlan& plan);
-  /// What an event says, and where the job stands once a minute.
+  /// Logs an event, and once a minute the job's progress.
   void take(const SendEvent& event);
   void end(const SendResult& result);
   void line(const std::string& text);
@@ -128,8 +128,8 @@ class JobLog {
   double next_standing_ = 0.0;
 };
 
-/// A running job as JSON, one object a line that needs no other to be understood (--events). A
-/// reader that does not keep up loses lines; the next one says how many. Stops nothing.
+/// Events of a running job as JSON lines, each complete in itself (--events). A slow reader loses
+/// lines; the next line states how many. Never stops the job.
 class JobEvents {
  public:
   /// @throw InputError if the file that --events names cannot be opened.
@@ -147,7 +147,7 @@ class JobEvents {
   TextSink file_;
   JobIdentity job_;
   JobView view_;
-  nlohmann::json last_;  ///< Where the job stood at the last event.
+  nlohmann::json last_;  ///< The job's progress at the last event.
 };
 
 }  // namespace lensforge::app

@@ -20,7 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// What `lensforge view` was asked for.
+/// Options of `lensforge view`.
 struct ViewSettings {
   std::string source;
   std::string out;

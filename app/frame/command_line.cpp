@@ -28,7 +28,7 @@
 namespace lensforge::app {
 namespace {
 
-/// Opened for what it is not used for, so that a result that cannot be printed stays an error.
+/// Opened in the wrong direction: printing a result remains an error.
 long open_placeholder(const char* path, int number) {
   const int mode = number == STDIN_FILENO ? O_WRONLY : O_RDONLY;
   return ::syscall(SYS_openat, AT_FDCWD, path, mode, 0);
@@ -36,8 +36,8 @@ long open_placeholder(const char* path, int number) {
 
 }  // namespace
 
-// System calls without their wrappers: it runs before any library, a sanitizer's included, is set
-// up. The lowest free number is the one that is closed, as those below it are open by then.
+// System calls without their wrappers: it runs before any library, including a sanitizer's, is set
+// up. The lowest free number is the closed one: those below it are open by then.
 __attribute__((no_sanitize("address", "undefined"))) void hold_standard_descriptors() noexcept {
   for (int number = STDIN_FILENO; number <= STDERR_FILENO; ++number) {
     if (::syscall(SYS_fcntl, number, F_GETFD) >= 0) continue;
@@ -56,15 +56,15 @@ struct CompletedCommand {
   std::vector<OptionSpec> options;
 };
 
-/// What can stand for the value of an option.
+/// Possible values of an option, for completion.
 struct Value {
   enum class Kind { kNone, kFree, kWords, kFile, kFolder };
   Kind kind = Kind::kFree;
   std::vector<std::string> words;  ///< Beside files, too.
-  std::string extension;           ///< Of the files that are meant: "toml"; empty for all.
+  std::string extension;           ///< Files to offer: "toml"; empty for all.
 };
 
-/// By what stands for the value in the help: "FILE.toml", "DIR", "default|FILE.toml".
+/// From the value's placeholder in the help: "FILE.toml", "DIR", "default|FILE.toml".
 Value value_of_text(const std::string& type) {
   Value value;
   std::istringstream parts(type);
@@ -106,7 +106,8 @@ std::string joined(const std::vector<std::string>& words) {
   return text;
 }
 
-/// In single quotes, as all three shells read it. @param escaped  gets a backslash in front.
+/// Quotes a text in single quotes, valid in all three shells. @param escaped  characters that get a
+/// backslash.
 std::string quoted(const std::string& text, std::string_view escaped = {}) {
   std::string all = "'";
   for (const char c : text) {
@@ -124,7 +125,7 @@ std::string command_names(const std::vector<CompletedCommand>& commands) {
 
 // --- bash ----------------------------------------------------------------------------------------
 
-/// What follows "COMMAND --option) " in the script.
+/// The text after "COMMAND --option) " in the script.
 std::string bash_value(const Value& value) {
   const std::string words = "_lensforge_words " + quoted(joined(value.words));
   switch (value.kind) {
@@ -331,7 +332,7 @@ std::string overall_help() {
   return text;
 }
 
-/// What `lensforge completions SHELL` prints.
+/// The output of `lensforge completions SHELL`.
 std::string completions_for(const Arguments& shells) {
   if (shells.size() != 1) throw InputError("completions: takes one shell: bash, zsh or fish");
   std::vector<CompletedCommand> commands;
@@ -405,7 +406,7 @@ int run_command_line(const std::vector<std::string>& arguments) noexcept {
   try {
     return guarded(arguments);
   } catch (const std::exception& e) {
-    // Only printing can have failed here, so stdout is of no use any more.
+    // Only printing can have failed here; stdout is not usable.
     return report_error(e.what(), kFailed, false);
   }
 }

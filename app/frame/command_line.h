@@ -6,13 +6,13 @@
 
 namespace lensforge::app {
 
-/// What the command returns to the shell (docs/interface.md, "Exit codes").
+/// Exit codes of the command (docs/interface.md, "Exit codes").
 enum ExitCode : int {
   kDone = 0,
   kFailed = 1,         ///< It failed while running.
   kBadInput = 2,       ///< Bad usage or bad input.
   kLimitMissed = 3,    ///< Done, but a stated quality or safety limit was not met.
-  kInterrupted = 130,  ///< Interrupted, everything done so far kept.
+  kInterrupted = 130,  ///< Interrupted; finished work is kept.
 };
 
 using Arguments = std::vector<std::string>;
@@ -31,20 +31,20 @@ int view_command(const Arguments& arguments);
 int batch_command(const Arguments& arguments);
 int info_command(const Arguments& arguments);
 
-/// Occupies those of standard input, output and error that are closed, so that no file, port or
-/// socket that is opened later takes their place and is written to by whatever prints. Reading and
-/// writing them still fails. To be called before anything else; async-signal-safe.
+/// Occupies those of standard input, output and error that are closed. Otherwise a file, port or
+/// socket opened later would get their number and receive printed text. Reading and writing them
+/// still fails. Call this first; async-signal-safe.
 void hold_standard_descriptors() noexcept;
 
-/// Whether errors are to be told as JSON too: also where the command line is what is wrong.
+/// True if errors are printed as JSON too, even for an invalid command line.
 bool wants_json(const std::vector<std::string>& arguments);
 
-/// Runs the subcommand that `arguments` (without the program's name) asks for and returns the exit
-/// code of docs/interface.md. Every error ends up as one line on stderr; nothing is thrown.
+/// Runs the subcommand named in `arguments` (without the program's name) and returns the exit code
+/// (docs/interface.md). Every error becomes one line on stderr; nothing is thrown.
 int run_command_line(const std::vector<std::string>& arguments) noexcept;
 
-/// All that main() does: holds the standard descriptors, ignores the signals that writing raises,
-/// and runs the command line.
+/// The body of main(): holds the standard descriptors, ignores the signals that writing raises, and
+/// runs the command line.
 int run_main(int argc, char** argv) noexcept;
 
 }  // namespace lensforge::app

@@ -18,11 +18,12 @@
 #include "core/io/folder_lock.h"
 #include "core/text/lower_case.h"
 
-/// What a command works with: files known by their names, the folder that it writes, and a job that
-/// an interrupt ends.
+/// Tools of a command: file types by extension, the output folder, and a job that an interrupt
+/// ends.
 namespace lensforge::app {
 
-/// Whether a file's name ends so, in capitals or not. @param extensions  as ".ply".
+/// True if the file has one of these extensions, in any case. @param extensions  with the dot:
+/// ".ply".
 inline bool has_extension(const std::filesystem::path& path,
                           std::initializer_list<const char*> extensions) {
   const std::string own = lower_case(path.extension().string());
@@ -33,12 +34,12 @@ inline bool is_step_file(const std::filesystem::path& path) {
   return has_extension(path, {".step", ".stp"});
 }
 
-/// A folder that a command writes into: made if it is not there, locked, and taken away again if
-/// nothing was put into it and nobody else is at work in it.
+/// A command's output folder: created if missing, locked, and removed again if it was created but
+/// stayed empty and nobody else uses it.
 class OutputFolder {
  public:
-  /// @param kind  exclusive for what fills the folder; shared for a file among others', which is
-  ///              also let in where another command fills it.
+  /// @param kind  exclusive for a command that fills the folder; shared for one that writes a
+  ///        single file, which is allowed even while another command fills the folder.
   /// @throw InputError if files cannot be made in `path`; for an exclusive one also if another
   ///        command is working there.
   OutputFolder(std::filesystem::path path, FolderLock::Kind kind);
@@ -48,8 +49,8 @@ class OutputFolder {
 
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
 
-  /// Removes what a process that was killed here was about to write under names that are `ours`.
-  /// @pre the folder is exclusive: what a live process is writing must not go.
+  /// Removes partial files that a killed process left for names that are `ours`.
+  /// @pre the folder is exclusive: files of a running process must not be removed.
   void remove_partial_files(const std::function<bool(const std::string& name)>& ours) const;
 
  private:
@@ -57,16 +58,16 @@ class OutputFolder {
   MadeFolder folder_;
 };
 
-/// What a command runs under that writes one file at its end, or none: progress on stderr, and an
-/// end within a second of the first interrupt. Work that does not look for it in time (a large
-/// system of equations, a library's) is abandoned with the process, unless the file is being
-/// written. @throw InputError if `out` has a folder in which files cannot be made.
+/// Environment of a command that writes one file at its end, or none: progress on stderr, and an
+/// end within a second of the first interrupt. Work that does not check for it in time (a large
+/// system of equations, a library call) is abandoned by ending the process, unless the file is
+/// being written. @throw InputError if `out` has a folder in which files cannot be made.
 class InterruptibleJob {
  public:
   explicit InterruptibleJob(const CommonOptions& common, const std::filesystem::path& out = {});
 
   [[nodiscard]] RunControl control() { return {watch_.token(), progress_.sink()}; }
-  /// The same executor, which ends at an interrupt.
+  /// The executor, stopped by an interrupt.
   [[nodiscard]] Executor stoppable(const Executor& executor) const {
     return executor.with_stop(watch_.token());
   }
@@ -85,11 +86,10 @@ class InterruptibleJob {
   InterruptWatch watch_;  ///< Last, so that it ends first.
 };
 
-/// What a command says that was interrupted before it wrote anything. Returns the exit code.
+/// Reports that a command was interrupted before it wrote anything. Returns the exit code.
 int report_interrupted(bool json) noexcept;
 
-/// Tells about how much a long job takes, at once.
-/// @param what  as the subject of a sentence.
+/// Prints the approximate cost of a long job at once. @param what  the subject of the sentence.
 void announce_work(const WorkEstimate& needed, const Console& console,
                    const std::string& what = "this takes");
 

@@ -9,26 +9,26 @@
 #include "core/surface/lens.h"
 #include "design/fringe.h"
 
-/// The words and numbers that more than one command prints.
+/// Texts and JSON that several commands print.
 namespace lensforge::app {
 
 class Console;
 
 /// {"mae", "psnr", "ssim", "mae_linear", "flux_inside"}; psnr is null where it is infinite.
 nlohmann::json metrics_json(const ImageMetrics& metrics);
-/// An object with those of every model.
+/// An object with the metrics of every model.
 nlohmann::json metrics_json(const ModelMetrics& metrics);
-/// The same with "source_limit", where the lens's source has an extent.
+/// The lens's metrics, with "source_limit" if its source has an extent.
 nlohmann::json metrics_json(const Lens& lens);
 
 /// One line: "MAE 0.0123  PSNR 31.2 dB  SSIM 0.961  linear MAE 0.0042  flux inside 99.8 %".
 std::string metrics_text(const ImageMetrics& metrics);
-/// A line for every model.
+/// One line per model.
 std::string metrics_text(const ModelMetrics& metrics);
-/// And one for the limit of the lens's source, if there is one.
+/// One line per model, and one for the limit of the lens's source, if it has one.
 std::string metrics_text(const Lens& lens);
 
-/// A number with `digits` digits after the point.
+/// Formats a number with `digits` decimals.
 std::string fixed(double value, int digits);
 
 /// "  fringe  0.123 mm on average, at most 0.200 mm" and a line's end.
@@ -37,11 +37,11 @@ std::string fringe_text(const Fringe& fringe);
 /// Joins two counts as "256 x 192".
 std::string size_text(long columns, long rows);
 
-/// What check_seal() said of a program: true, false, or null without a seal; and in words.
+/// Result of check_seal(): true, false, or null without a seal; and in words.
 nlohmann::json seal_json(const std::optional<bool>& holds);
 std::string seal_words(const std::optional<bool>& holds);
 
-/// Tells the reader if the design of the lens was interrupted.
+/// Prints a note if the design of the lens was interrupted.
 void note_unfinished_design(const Lens& lens, const Console& console);
 
 }  // namespace lensforge::app

@@ -17,7 +17,7 @@
 namespace lensforge::app {
 namespace {
 
-/// DEL and C1, which JSON lets stand in its strings and terminals obey, as \u escapes.
+/// Writes DEL and C1, which JSON allows in strings and terminals obey, as \u escapes.
 std::string without_controls(const std::string& json) {
   std::string text;
   text.reserve(json.size());
@@ -45,7 +45,7 @@ std::string dump(const nlohmann::json& object) {
 /// Longest value that is shown whole: a list of numbers, say. Paths may be longer.
 constexpr std::size_t kLongestValue = 200;
 
-/// A message with long values cut, so that what is wrong with them is still to be seen.
+/// A message with long values truncated, which keeps the reason visible.
 std::string message_line(const std::string& message) {
   std::string line;
   for (std::size_t at = 0; at < message.size();) {

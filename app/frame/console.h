@@ -25,22 +25,22 @@ void print_to_stdout(std::string_view text);
 /// stdout. Returns `exit_code`; never throws.
 int report_error(const std::string& message, int exit_code, bool json) noexcept;
 
-/// Characters in a line of the terminal on stderr; 80 where that cannot be told.
+/// Columns of the terminal on stderr; 80 if unknown.
 std::size_t terminal_width();
 
-/// Where a command's words go: messages to stderr, the result to stdout.
+/// Output of a command: messages go to stderr, the result to stdout.
 class Console {
  public:
   Console(bool json, bool quiet) : json_(json), quiet_(quiet) {}
 
-  /// A sentence for the reader, on stderr; nothing with --quiet. It is held back until begin(), so
-  /// that a refusal, after which nothing else matters, is the only line.
+  /// Prints a note on stderr; nothing with --quiet. Notes are held back until begin(): if the
+  /// command is refused, the error is the only line.
   void note(const std::string& message) const;
 
-  /// Says that nothing is refused any more: notes so far are printed, later ones at once.
+  /// The input is accepted: prints the held notes; later ones are printed at once.
   void begin() const;
 
-  /// The result: `object` with --json, else `text`. Notes so far are printed before it.
+  /// Prints the held notes, then the result: `object` with --json, else `text`.
   void result(const nlohmann::json& object, const std::string& text) const;
 
  private:
@@ -50,9 +50,9 @@ class Console {
   mutable std::vector<std::string> held_;
 };
 
-/// Shows progress on stderr: a bar that redraws itself on a terminal, a line every few seconds
-/// otherwise, nothing if `quiet`; what was reported last also while no news comes. The bar is wiped
-/// on destruction.
+/// Shows progress on stderr: a bar on a terminal, a line every few seconds otherwise, nothing if
+/// `quiet`. The latest report is shown again while no new one arrives. The destructor erases the
+/// bar.
 class ProgressDisplay {
  public:
   explicit ProgressDisplay(bool quiet);
@@ -63,7 +63,7 @@ class ProgressDisplay {
   /// The sink for a RunControl; may be called from any thread while this object lives.
   [[nodiscard]] std::function<void(const Progress&)> sink();
 
-  /// Takes the bar off the terminal.
+  /// Erases the bar.
   void wipe();
 
  private:

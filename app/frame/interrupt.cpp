@@ -14,9 +14,9 @@
 #include "app/frame/command_line.h"
 #include "app/frame/terminal_keys.h"
 
-// The handler does no more than wake a thread, so that nothing else has to be async-signal-safe.
-// Blocking the signals and waiting for them would not do: libraries that are only linked in
-// (OpenBLAS is) start threads of their own before main(), and those have the signals open.
+// The handler only wakes a thread; nothing else must be async-signal-safe. Blocking the signals and
+// waiting for them does not work: linked libraries such as OpenBLAS start threads before main()
+// that do not block the signals.
 namespace lensforge::app {
 namespace {
 
@@ -75,7 +75,7 @@ InterruptWatch::InterruptWatch(SecondInterrupt second, std::function<void()> ove
     : second_(second), overdue_(std::move(overdue)) {
   sem_init(&wake, 0, 0);
   before = handle_with(wake_waiter);
-  // One that came when an earlier watch was about to go, and nobody looked at its token any more.
+  // A signal that came at the end of an earlier watch, whose token was no longer checked.
   if (interrupted != 0) stop_.request_stop();
   waiter_ = std::thread([this] { wait_for_signals(); });
 }
@@ -90,7 +90,8 @@ InterruptWatch::~InterruptWatch() {
 
 void InterruptWatch::interrupt() { sem_post(&wake); }
 
-/// Whether a signal came, or the end; the patience with the first request is over otherwise.
+/// True for a signal or the end of the watch; false if the time limit after the first request has
+/// passed.
 bool InterruptWatch::wait_for_one() {
   if (!overdue_ || !stop_.stop_requested()) return sem_wait(&wake) == 0;
   constexpr long kPatience = 700'000'000;  // Nanoseconds.

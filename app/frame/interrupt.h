@@ -8,38 +8,39 @@
 
 namespace lensforge::app {
 
-/// Until a watch is there, Ctrl-C (SIGINT), SIGTERM and SIGHUP end the process at once with exit
-/// code 130; signals that the caller had ignored stay ignored. For the beginning of main(): while
-/// the libraries of the program are being loaded, the system ends it by that signal.
+/// Until an InterruptWatch exists, Ctrl-C (SIGINT), SIGTERM and SIGHUP end the process at once with
+/// exit code 130; signals that the caller had ignored stay ignored. Call it at the beginning of
+/// main(). While libraries are being loaded before that, the signal itself ends the process.
 void exit_at_signals() noexcept;
 
-/// Whether a process that ends so prints an object on stdout, as --json asks for.
+/// Sets whether such an exit prints a JSON object on stdout (--json).
 void print_json_at_signals(bool json) noexcept;
 
-/// For the end of main(): the command is done and says so by its exit code.
+/// Call it at the end of main(): a signal no longer changes the exit code of a finished command.
 void ignore_signals() noexcept;
 
-/// What the second interrupt does.
+/// Effect of the second interrupt.
 enum class SecondInterrupt {
   kExit,     ///< Ends the process at once with exit code 130.
-  kRequest,  ///< Is a request of its own (InterruptWatch::second_token()); the third ends it.
+  kRequest,  ///< A second request (InterruptWatch::second_token()); the third interrupt ends the
+             ///< process.
 };
 
 /// Turns the first Ctrl-C (SIGINT), SIGTERM or SIGHUP into a stop request; the second ends the
-/// process at once with exit code 130, or is a request of its own. Signals that the caller had
-/// ignored stay ignored. At most one at a time; a signal that came while an earlier one lived is a
-/// request to this one, too.
+/// process at once with exit code 130, or is a second request. Signals that the caller had ignored
+/// stay ignored. At most one watch at a time; a signal received by an earlier watch is a request to
+/// this one, too.
 class InterruptWatch {
  public:
-  /// @param overdue  called by the watch's own thread if this object still lives some 0.7 s after
-  ///                 the first request; not where it is empty.
+  /// @param overdue  called by the watch's own thread if this object still exists about 0.7 s after
+  ///        the first request; may be empty.
   explicit InterruptWatch(SecondInterrupt second = SecondInterrupt::kExit,
                           std::function<void()> overdue = {});
   ~InterruptWatch();
   InterruptWatch(const InterruptWatch&) = delete;
   InterruptWatch& operator=(const InterruptWatch&) = delete;
 
-  /// Acts as a signal does.
+  /// Has the effect of a signal.
   static void interrupt();
 
   [[nodiscard]] std::stop_token token() const { return stop_.get_token(); }

@@ -93,7 +93,7 @@ bool config_asks_for_json(const std::filesystem::path& file) noexcept {
     std::ifstream input = open_input(file);
     return parsed(input)["json"].value_or(false);
   } catch (const std::exception&) {
-    return false;  // What is wrong with it is told where its options are read.
+    return false;  // Errors are reported when its options are read.
   }
 }
 
@@ -121,7 +121,7 @@ std::string joined(const std::vector<std::string>& words) {
   return text;
 }
 
-/// What stands for a value in the help: "MM", "a|b".
+/// A value's placeholder in the help: "MM", "a|b".
 std::string type_of(const OptionSpec& spec) {
   switch (spec.kind) {
     case OptionKind::kWhole:

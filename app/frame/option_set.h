@@ -21,14 +21,14 @@ struct HelpText {
   std::string text;
 };
 
-/// Thrown for kListOptions, by which the completions of shells ask: the options of the command,
-/// common ones included, and what it takes without a name.
+/// Thrown for kListOptions, which shell completions use: the options of the command, including the
+/// common ones, and its positional arguments.
 struct ListedOptions {
   std::vector<OptionSpec> options;
 };
 inline constexpr const char* kListOptions = "--list-options";
 
-/// A value as its option asks for it. @throw InputError naming option, value and rule.
+/// Converts a value to its option's type. @throw InputError naming option, value and rule.
 nlohmann::json option_value(const OptionSpec& spec, const std::string& text);
 
 /// "lensforge x.y.z" and a line break.
@@ -38,18 +38,18 @@ std::string version_line();
 struct CommonOptions {
   bool json = false;
   bool quiet = false;
-  int threads = 0;  ///< 0 takes all that the process may use.
+  int threads = 0;  ///< 0: all that the process may use.
   std::string device = "auto";
 };
 
-/// Where a command computes.
+/// Device on which a command computes.
 struct ChosenDevice {
   Executor executor;
   std::string word;  ///< "cpu", or "cuda: " and the GPU's name.
 };
 
-/// The options of one command, read from the command line and --config. Each option names where its
-/// value goes; what is there beforehand is the default that --help shows.
+/// The options of one command, read from the command line and --config. Each option is bound to a
+/// variable; the variable's initial value is the default in --help.
 class OptionSet {
  public:
   OptionSet(const std::string& command, const std::string& description);
@@ -62,12 +62,12 @@ class OptionSet {
                      const std::string& help);
   void text(const std::string& name, std::string& value, const std::string& type,
             const std::string& help);
-  /// An option that takes one word or more, up to the next option.
+  /// Adds an option with one or more words, up to the next option.
   void texts(const std::string& name, std::vector<std::string>& values, const std::string& type,
              const std::string& help);
   void flag(const std::string& name, bool& value, const std::string& help);
 
-  /// An option for every row of a table. @param options  takes what was given; the table and it
+  /// Adds an option for every row of a table. @param options  receives the values; it and the table
   /// must outlive the set.
   template <class Options>
   void fields(const OptionTable<Options>& table, Options& options) {
@@ -78,21 +78,21 @@ class OptionSet {
     }
   }
 
-  /// To be called once, after all options were added.
+  /// Reads the arguments. Call it once, after all options were added.
   /// @throw HelpText; ListedOptions; InputError naming option, value and rule.
   void parse(const Arguments& arguments);
 
-  /// Puts all that was given where it goes, again: after what lies beneath has changed.
+  /// Assigns all given values again, after the defaults below them have changed.
   void restate();
 
-  /// Whether the command line or the configuration file set the option.
+  /// True if the command line or the configuration file sets the option.
   [[nodiscard]] bool given(const std::string& name) const;
-  /// Every option of the command with its value, the common ones left out.
+  /// All options of the command with their values, without the common ones.
   [[nodiscard]] nlohmann::json used() const;
   [[nodiscard]] const CommonOptions& common() const { return common_; }
   /// The CPU executor that --threads asks for.
   [[nodiscard]] Executor executor() const;
-  /// executor() on the device that --device asks for; `auto` takes a GPU where there is one.
+  /// executor() on the device of --device; `auto` takes a GPU if there is one.
   [[nodiscard]] ChosenDevice device_executor() const;
 
  private:
@@ -103,14 +103,14 @@ class OptionSet {
   void add(const OptionSpec& spec, Getter get, Setter set);
   void add_common();
   [[nodiscard]] std::vector<OptionSpec> listed() const;
-  /// The options of the command as items of a list in mdoc.
+  /// The options of the command as mdoc list items.
   [[nodiscard]] std::string manual() const;
 
   std::unique_ptr<Parser> parser_;
   CommonOptions common_;
 };
 
-/// Whether a --config file has `json = true`; false for one that cannot be read.
+/// True if a --config file has `json = true`; false if it cannot be read.
 bool config_asks_for_json(const std::filesystem::path& file) noexcept;
 
 }  // namespace lensforge::app

@@ -15,7 +15,7 @@
 namespace lensforge::app {
 namespace {
 
-/// How soon a process that came to the foreground again reads keys, ms.
+/// Interval at which a background process checks whether it is in the foreground again, ms.
 constexpr int kForegroundCheckMs = 300;
 
 /// Signals that end the process without a destructor; a sanitizer may have taken some of them.
@@ -46,8 +46,8 @@ void end_by(int signal) {
   ::raise(signal);  // Strikes when this handler returns.
 }
 
-/// Stops as it would without a handler: that goes by the default action only, and in a process
-/// group that nobody could continue it does nothing.
+/// Stops the process as without a handler, by the default action; in an orphaned process group it
+/// does nothing.
 void stop_by(int signal) {
   const int error = errno;
   restore_terminal();
@@ -97,9 +97,8 @@ void release_signals() {
   ::sigaction(SIGCONT, &continue_before, nullptr);
 }
 
-/// Without Enter and echo; Ctrl-C still is a signal, and Ctrl-S must not stop what is written to
-/// the terminal, which would stop the sender with it. What was typed earlier is dropped: it was not
-/// meant for a running machine.
+/// Without Enter and echo; Ctrl-C is still a signal. Ctrl-S is disabled: stopped terminal output
+/// would stop the sender too. Earlier input is dropped: it was not meant for a running machine.
 bool enter() {
   if (::isatty(STDIN_FILENO) == 0 || !in_foreground()) return false;
   if (::tcgetattr(STDIN_FILENO, &before) != 0) return false;

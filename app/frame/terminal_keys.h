@@ -13,16 +13,16 @@
 
 namespace lensforge::app {
 
-/// What the keys mean, in a line.
+/// One-line help for the keys.
 inline constexpr std::string_view kKeyHelp =
     "space or h holds, r resumes, + - = feed up, down and 100 %, 1 2 3 rapids at 100, 50 and 25 %, "
     "> < . spindle up, down and 100 %, Q (capital) ends the job like Ctrl-C";
 
-/// Keys typed on the terminal that is standard input, without Enter and without echo; no keys where
-/// standard input is no terminal, and none while the process is in the background. Ctrl-Z does
-/// nothing meanwhile: a sender that sleeps watches no spindle. The terminal is as before after
-/// destruction, while the process is stopped by a signal and after one that ends it. At most one at
-/// a time.
+/// Reads keys from the terminal on standard input, without Enter and without echo. There are no
+/// keys if standard input is no terminal or while the process is in the background. Ctrl-Z is
+/// disabled: a suspended sender does not watch the spindle. The terminal's settings are restored by
+/// the destructor, while a signal stops the process, and when a signal ends it. At most one object
+/// at a time.
 class TerminalKeys {
  public:
   /// @param abort  called for each Q, from another thread.
@@ -31,9 +31,9 @@ class TerminalKeys {
   TerminalKeys(const TerminalKeys&) = delete;
   TerminalKeys& operator=(const TerminalKeys&) = delete;
 
-  /// Whether there is a terminal to read from.
+  /// True if there is a terminal to read from.
   [[nodiscard]] bool active() const { return reader_.joinable(); }
-  /// The oldest order that was not handed over yet.
+  /// Takes the oldest pending order.
   std::optional<OperatorKey> next();
 
  private:
@@ -48,8 +48,8 @@ class TerminalKeys {
   std::thread reader_;
 };
 
-/// Gives the terminal back as TerminalKeys found it; does nothing without one. For ends of the
-/// process that run no destructor; async-signal-safe.
+/// Restores the terminal's settings if a TerminalKeys has changed them. For exits that run no
+/// destructor; async-signal-safe.
 void restore_terminal() noexcept;
 
 }  // namespace lensforge::app

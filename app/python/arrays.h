@@ -13,9 +13,8 @@
 #include "core/image/image.h"
 #include "core/surface/surface_mesh.h"
 
-/// Between numpy's arrays and the libraries' values. What a function returns and what an object
-/// shows is the libraries' own memory; what a function is given is copied once, into the value that
-/// the libraries own.
+/// Conversion between numpy arrays and the libraries' values. Results and attributes share the
+/// libraries' memory; arguments are copied once.
 namespace lensforge::python {
 
 namespace py = pybind11;
@@ -25,11 +24,12 @@ using Numbers = py::array_t<double, py::array::c_style | py::array::forcecast>;
 using Indices = py::array_t<std::int32_t, py::array::c_style | py::array::forcecast>;
 
 /// A picture in linear light from an (H, W) array of floats. @param name  for messages.
-/// @throw InputError if it has another shape or type, or holds what is no light.
+/// @throw InputError if it has another shape or type, or a value that is negative or not finite.
 Image image_from(const py::array& array, const std::string& name);
 
 /// A mesh from (V, 3) coordinates, mm, and (F, 3) vertex numbers.
-/// @throw InputError if the shapes differ, a number is not finite or no vertex's.
+/// @throw InputError if the shapes differ, a coordinate is not finite or a vertex number out of
+///        range.
 SurfaceMesh mesh_from(const py::array& vertices, const py::array& faces);
 
 /// One number for every pixel of an (H, W) array. @throw InputError for another shape.

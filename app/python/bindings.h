@@ -20,14 +20,14 @@ void add_lens(pybind11::module_& module);
 void add_flux(pybind11::module_& module);
 void add_commands(pybind11::module_& module);
 
-/// JSON as Python's own values.
+/// Converts JSON to Python values.
 pybind11::object object_from(const nlohmann::json& json);
 
-/// How often long work lets Python look for Ctrl-C; the work itself then ends within a second.
+/// Interval at which Python checks for Ctrl-C during long work, which then ends within a second.
 inline constexpr std::chrono::milliseconds kSignalInterval{50};
 
 /// Runs `work(stop_token)` in a thread of its own, without the interpreter's lock, and returns what
-/// it returns. Ctrl-C, or whatever a signal handler raises, stops the work and is raised when it
+/// it returns. Ctrl-C, or any exception of a signal handler, stops the work and is raised when it
 /// has ended. @pre `work` touches no Python object. @throw what `work` throws.
 template <class Work>
 auto run_released(Work&& work) {

@@ -13,13 +13,13 @@ namespace lensforge::python {
 
 namespace py = pybind11;
 
-/// The options that a function takes as keywords: those of the command of the same name, with '_'
-/// for '-' and without dashes in front. The command's own parser reads them, so that limits,
-/// defaults and the words of errors are the same.
+/// Keyword arguments of a function: the options of the command of the same name, with '_' for '-'
+/// and without leading dashes. The command's own parser reads them; limits, defaults and error
+/// messages are the same.
 class Keywords {
  public:
   /// @param add       adds the command's options to a set.
-  /// @param withheld  those that a function has no use for, "--out".
+  /// @param withheld  options that the function does not take, such as "--out".
   template <class Settings>
   static Keywords of(const std::string& function, void (*add)(app::OptionSet&, Settings&),
                      const std::set<std::string>& withheld) {
@@ -29,12 +29,12 @@ class Keywords {
     return {function, options, withheld};
   }
 
-  /// The words of a command line.
-  /// @throw TypeError (Python's) naming function and keyword for an unknown one, or for a value
-  ///        that is none of its kind.
+  /// Converts keywords to the words of a command line.
+  /// @throw TypeError (Python's) naming function and keyword for an unknown keyword or a value of
+  ///        the wrong type.
   [[nodiscard]] app::Arguments words(const py::kwargs& given) const;
 
-  /// What each is and which values it takes, for a docstring.
+  /// Describes the keywords and their values, for a docstring.
   [[nodiscard]] std::string text() const;
 
  private:

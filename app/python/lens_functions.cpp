@@ -41,7 +41,7 @@ namespace fs = std::filesystem;
 /// A lens in Python: what a design gave, or what a folder holds.
 struct LensObject {
   DesignResult design;  ///< Without convergence, and `made`, of a lens that was read.
-  fs::path folder;      ///< Where it lies; empty until it is saved.
+  fs::path folder;      ///< Its folder; empty until it is saved.
 
   [[nodiscard]] const Lens& lens() const { return design.lens; }
 };
@@ -164,7 +164,7 @@ namespace {
 // The commands as functions: the same options, the same library call; what a command prints is
 // returned.
 
-/// What stands on the command line where a function has an argument of its own.
+/// Command-line placeholder for a function's own argument.
 constexpr const char* kArgument = "picture";
 
 RunControl stopping_at(const std::stop_token& stop) { return {stop, {}}; }
@@ -211,7 +211,7 @@ py::object design(const py::object& picture, const app::Arguments& words) {
 
 // --- render
 
-/// Of a lens in one colour.
+/// Render options for a lens in one colour.
 const OptionTable<RenderOptions>& lens_render_fields() {
   static const OptionTable<RenderOptions> table = [] {
     OptionTable<RenderOptions> rows = render_fields();
@@ -226,7 +226,7 @@ void add_render_options(app::OptionSet& options, RenderOptions& render) {
   options.fields(lens_render_fields(), render);
 }
 
-/// What a lens projects, in its target's light.
+/// The picture that a lens projects, in its target's light.
 Image picture_of(const Lens& lens, const RenderOptions& render, const Executor& executor) {
   const OpticalSetup& setup = render.setup;
   const std::vector<double> flux =

@@ -41,9 +41,10 @@
 namespace lensforge {
 namespace {
 
-/// Of a place. On a grid it is an offset of a few cells: 100 mm of 640 cells are off by 10 nm.
+/// Bytes per coordinate on a grid, an offset of a few cells: with 640 cells on 100 mm the error is
+/// 10 nm.
 constexpr int kPlaceBytes = 2;
-/// Of a place on a mesh that is no grid.
+/// Bytes per coordinate on a mesh that is no grid.
 constexpr int kFreePlaceBytes = 3;
 /// Heights make the facets' slopes: 16 bits would move their light by tenths of a pixel.
 constexpr int kHeightBytes = 3;
@@ -53,8 +54,7 @@ constexpr int kSlopeBytes = 2;
 /// Numbers no farther apart, mm, are the same: x and y of an even grid differ by rounding.
 constexpr double kSame = 1e-9;
 
-/// Packs one number of every vertex, counted from `base`, and puts what is read back into its
-/// place.
+/// Packs one number per vertex, relative to `base`, and replaces it by the decoded value.
 template <class Row, class Base>
 StoredChannel pack(const std::string& name, int bytes, Row row, const Base& base) {
   StoredChannel channel{name, bytes, 0.0, 0.0, {}};
@@ -110,7 +110,7 @@ std::string packed_corners(const SurfaceMesh& mesh) {
   return base64(bytes);
 }
 
-/// Says how the triangles lie on the grid, or stores them.
+/// Records the grid's triangulation, or stores the triangles.
 void add_triangles(StoredSurface& stored, const SurfaceMesh& mesh) {
   if (mesh.grid.is_grid()) {
     if (mesh.triangles == grid_triangles(mesh.grid)) return;
@@ -150,29 +150,29 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// What a cause makes of the picture that came before it.
+/// The picture after a cause of error.
 struct CausePicture {
   std::string cause;
   Image picture;  ///< Linear light.
 };
 
-/// What `cam` predicted of the part, as a page shows it.
+/// `cam`'s prediction of the part, for a page.
 struct CutForecast {
-  /// In the order in which they come: what lies between the vertices, which the design's picture
-  /// does not count, polish, … ; the last is the part's.
+  /// In order: the surface between the vertices, which the design's picture ignores, polish, …; the
+  /// last is the part's.
   std::vector<CausePicture> causes;
   SampledSurface polished;       ///< As designed, but polished.
   SampledSurface part;           ///< Cut and polished.
   std::string leakage_map;       ///< Bytes of a PNG.
-  std::vector<ReportPath> path;  ///< Of finishing; empty of a mould, whose frame is another.
-  std::string note;              ///< Why there is none though there is a cut; else empty.
+  std::vector<ReportPath> path;  ///< Finishing paths; empty for a mould, which has another frame.
+  std::string note;              ///< Reason for which a cut has none; else empty.
 
   [[nodiscard]] bool empty() const { return causes.empty(); }
 };
 
-/// Of report.json, which has some 30 kB.
+/// Maximum size of report.json, which has about 30 kB.
 constexpr std::uintmax_t kMaxReportBytes = std::uintmax_t{16} << 20U;
-/// Of leakage.png.
+/// Maximum size of leakage.png.
 constexpr std::uintmax_t kMaxMapBytes = std::uintmax_t{64} << 20U;
 /// Between the points of a path that is shown, mm.
 constexpr double kPathSpacing = 0.5;

@@ -45,22 +45,22 @@ namespace {
 // before the body. cpp-httplib cannot hold such limits: its times are for one read, each client
 // holds one of its threads, and none of its hooks closes a client's socket.
 
-/// What a browser asks for.
+/// Request of a browser.
 struct LoopbackRequest {
   bool post = false;      ///< GET otherwise.
   std::string_view path;  ///< Without a query.
 };
 
-/// What is sent. The bytes are shared, not copied for every client.
+/// Answer to a request. The bytes are shared, not copied for every client.
 struct LoopbackAnswer {
   const char* type = "";                     ///< Content-Type.
-  std::shared_ptr<const std::string> bytes;  ///< None: there is no such page.
+  std::shared_ptr<const std::string> bytes;  ///< Null: there is no such page.
 };
 
-/// Serves pages to browsers on this machine by HTTP. Others' pages can neither read nor frame what
-/// it serves, nor POST to it. It answers one request on a connection, and decides by its header: no
-/// body is kept. Each client has 2 s for a header of 8 kB at most; of 32 connections the oldest
-/// idle one is closed for a new one.
+/// Serves pages to browsers on this machine by HTTP. Other sites' pages can neither read nor frame
+/// its pages, nor POST to it. It answers one request per connection by its header; bodies are
+/// discarded. Each client has 2 s for a header of at most 8 kB; of 32 connections the oldest idle
+/// one is closed for a new one.
 class LoopbackServer {
  public:
   /// Called by the server's thread.
@@ -110,7 +110,7 @@ bool is_own(std::string_view host, int port) {
   return host == "127.0.0.1:" + number || host == "localhost:" + number;
 }
 
-/// What is wrong with a whole header; ok if nothing is.
+/// Error status of a complete header; ok if it is valid.
 http::status verdict(const Request& request, std::uint64_t body, int port) {
   if (request.count(http::field::host) != 1) return http::status::bad_request;
   const auto host = request[http::field::host];
@@ -122,7 +122,7 @@ http::status verdict(const Request& request, std::uint64_t body, int port) {
   return body > kMaxBody ? http::status::payload_too_large : http::status::ok;
 }
 
-/// What a header that could not be read is answered; unknown if there is nobody to answer.
+/// Status for a header that could not be read; unknown if no answer is possible.
 http::status verdict(error_code error) {
   static const auto& of_http = make_error_code(http::error::end_of_stream).category();
   if (error == http::error::end_of_stream || error.category() != of_http) {
@@ -140,7 +140,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
 
   void read() {
     parser_.header_limit(kMaxHeader);
-    // verdict() has the limit: a client that may not ask hears that first.
+    // verdict() applies the limit: a client without permission is refused first.
     parser_.body_limit(std::numeric_limits<std::uint64_t>::max());
     stream_.expires_after(kHeaderTime);
     http::async_read_header(
@@ -312,7 +312,7 @@ std::string live_page(const std::string& name) {
 
 }  // namespace
 
-/// What is served, and the server. Everything but publish() is called by the server's thread.
+/// The served content and the server. Everything except publish() is called by the server's thread.
 class LiveServer::Content {
  public:
   Content(int port, std::string page, std::string target, std::function<void()> stop)
@@ -337,7 +337,7 @@ class LiveServer::Content {
     if (request.path == "/error.png") return {"image/png", shown(&LiveState::error)};
     return {};
   }
-  /// Nothing before the first state.
+  /// Null before the first state.
   std::shared_ptr<const std::string> shown(std::string LiveState::*part) {
     const std::lock_guard lock(mutex_);
     if ((*state_.*part).empty()) return nullptr;

@@ -14,22 +14,22 @@
 
 namespace lensforge {
 
-/// What a running design shows of itself.
+/// State of a running design, as served.
 struct LiveState {
-  std::int64_t number = 0;  ///< Of the state: pictures change with it.
+  std::int64_t number = 0;  ///< Number of the state; pictures change with it.
   std::string json;         ///< For the page's script.
   std::string picture;      ///< Bytes of a PNG each.
   std::string error;
 };
 
-/// Serves the page of a running design to browsers on this machine: loopback only, and only to
-/// pages of its own.
+/// Serves the page of a running design to browsers on this machine: loopback only, and only to its
+/// own pages.
 class LiveServer {
  public:
-  /// @param port    0 takes a free one.
-  /// @param name    of what is designed. @param target  bytes of a PNG.
+  /// @param port    0: any free port.
+  /// @param name    name of the design. @param target bytes of a PNG.
   /// @param stop    called once, by a thread of the server, when the page's stop button is pressed.
-  /// @throw InputError naming --live and the port if it cannot be had.
+  /// @throw InputError naming --live and the port if the port is not available.
   LiveServer(int port, const std::string& name, std::string target, std::function<void()> stop);
   ~LiveServer();
   LiveServer(const LiveServer&) = delete;
@@ -37,7 +37,7 @@ class LiveServer {
 
   /// "http://127.0.0.1:8080/"
   [[nodiscard]] std::string address() const;
-  /// What is served from now on.
+  /// Serves `state` from now on.
   void publish(LiveState state);
 
  private:
@@ -45,15 +45,15 @@ class LiveServer {
   std::unique_ptr<Content> content_;
 };
 
-/// What a design is to reach.
+/// Goal of a design.
 struct DesignGoalView {
   Image target;  ///< Working picture, linear light.
   OpticalSetup setup;
   SurfaceModel model = SurfaceModel::kSmooth;
 };
 
-/// The state of a running design by what it has saved after its last round: its picture at the full
-/// size, that picture's error, and every step so far.
+/// Computes the state of a running design from its latest checkpoint: the picture at full size, its
+/// error, and every step so far.
 /// @param number  of the state. @throw InputError if the checkpoint cannot be read.
 LiveState state_of_design(const std::filesystem::path& checkpoint, const DesignGoalView& goal,
                           std::int64_t number, const Executor& executor);

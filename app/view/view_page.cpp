@@ -27,7 +27,7 @@ namespace {
 
 using nlohmann::json;
 
-/// Nothing is fetched, whatever a name in a lens folder holds.
+/// Nothing is fetched, whatever names a lens folder contains.
 constexpr const char* kPolicy =
     "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; "
     "style-src 'unsafe-inline'; script-src 'unsafe-inline'\">";
@@ -35,14 +35,14 @@ constexpr const char* kPolicy =
 /// Passes of a picture, each moved by a part of a sample: MAE of a 64² portrait against the
 /// program's own picture 0.0009.
 constexpr int kPasses = 16;
-/// Of a display-encoded value: off by 1e-5 at most.
+/// Bytes per display-encoded value; error below 1e-5.
 constexpr int kPictureBytes = 2;
 /// Of a height map's coefficient: a sixteen-millionth of its depth, or of that of a flat one, mm.
 constexpr int kHeightBytes = 3;
 constexpr double kLeastDepth = 1e-3;
 constexpr int kColors = 256;
 
-/// Puts data into elements of their own and keeps what says where they are.
+/// Puts data into separate elements and keeps their index.
 class PageData {
  public:
   [[nodiscard]] const std::string& elements() const { return elements_; }
@@ -164,7 +164,7 @@ std::string leakage_figure(const LensView& view) {
 
 std::string nanometre_text(double mm) { return decimal_text(1e6 * mm, 2) + " nm"; }
 
-/// What it costs to hold a surface in few bytes.
+/// Describes the error of a surface stored in few bytes.
 std::string storage_words(const ViewedSurface& viewed) {
   const StoredSurface& stored = viewed.surface;
   std::string words = "heights to ± " + nanometre_text(0.5 * stored.channel("z")->step());
@@ -212,7 +212,7 @@ std::string header(const LensView& view) {
   return element("h1", "", escape_html(view.name)) + element("p", "", escape_html(words));
 }
 
-/// The lens in three dimensions, as the cutting report has it.
+/// The lens in three dimensions, as in the cutting report.
 std::string lens_section(const LensView& view) {
   ReportData data;
   data.surface = view.relief;

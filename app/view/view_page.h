@@ -7,8 +7,8 @@
 
 namespace lensforge {
 
-/// The page that shows a lens: one HTML file that needs nothing from outside and draws the lens's
-/// light itself.
+/// Returns the page that shows a lens: one self-contained HTML file that computes the projected
+/// picture itself.
 std::string view_page(const LensView& view);
 
 }  // namespace lensforge

@@ -80,7 +80,7 @@ std::vector<int> walk(const std::vector<int>& next, const std::string& name) {
   return loop;
 }
 
-/// All of an outline is seen from the middle, so that triangles from there close its back.
+/// True if the outline is star-shaped about the middle: triangles from there close its back.
 bool is_seen_from_middle(const SurfaceMesh& surface, const std::vector<int>& loop) {
   const Eigen::Vector2d centre = middle(surface);
   for (std::size_t i = 0; i < loop.size(); ++i) {

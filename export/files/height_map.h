@@ -13,9 +13,9 @@ namespace lensforge {
 /// Columns and rows of a height map over a rectangle.
 GridShape height_map_shape(const Eigen::Vector2d& size, int longer_side);
 
-/// Heights in mm on a raster that covers the surface's rectangle, taken at the middles of the
-/// pixels, seen from +z with y upwards (row 0 is the farthest). 0 where there is no surface.
-/// @param longer_side  pixels on the longer side; the other one follows the rectangle.
+/// Heights in mm on a raster that covers the surface's rectangle, sampled at the pixel centres,
+/// seen from +z with y upwards (row 0 is the farthest). 0 where there is no surface.
+/// @param longer_side  pixels on the longer side; the shorter side follows from the rectangle.
 /// @throw Interrupted.
 Image height_map(const OpticalSurface& surface, int longer_side, const Executor& executor,
                  const RunControl& control = {});

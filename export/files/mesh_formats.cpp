@@ -138,7 +138,7 @@ class ZipWriter {
     zip_file_set_dostime(zip_.get(), static_cast<zip_uint64_t>(index), 0, kFirstDay, 0);
   }
 
-  /// Text that stands uncompressed at the archive's end.
+  /// Uncompressed text at the archive's end.
   void comment(const std::string& text) {
     if (zip_set_archive_comment(zip_.get(), text.data(), static_cast<zip_uint16_t>(text.size()))) {
       fail();
@@ -229,7 +229,7 @@ Zip opened_zip(const fs::path& path) {
   return zip;
 }
 
-/// Where the model stands as a rule, or the first file that is called one.
+/// Opens the model at its usual path, or else the first file with a model's name.
 ZipEntry opened_model(const Zip& zip, const fs::path& path) {
   zip_int64_t found = zip_name_locate(zip.get(), "3D/3dmodel.model", ZIP_FL_NOCASE);
   const zip_int64_t entries = zip_get_num_entries(zip.get(), 0);
@@ -248,7 +248,7 @@ struct ModelStream {
   ZipEntry entry;
   std::uint64_t bytes = 0;
 
-  /// As libxml2 asks for more.
+  /// Callback by which libxml2 reads more.
   static int read(void* context, char* buffer, int size) {
     auto& stream = *static_cast<ModelStream*>(context);
     const zip_int64_t got = zip_fread(stream.entry.get(), buffer, static_cast<zip_uint64_t>(size));

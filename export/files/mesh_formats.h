@@ -10,8 +10,8 @@
 #include "core/surface/surface_mesh.h"
 
 /// Meshes in the formats that printers, CAM programs and viewers read; millimetres. Each file
-/// appears whole or not at all, and shows its title to one who looks at its bytes. PLY and
-/// STL are core/surface/mesh_io.h's.
+/// appears whole or not at all and contains its title as plain text. PLY and STL are in
+/// core/surface/mesh_io.h.
 namespace lensforge {
 
 /// Wavefront OBJ; coordinates read back as the same doubles. `title` becomes a comment.
@@ -25,40 +25,41 @@ void write_obj(const SurfaceMesh& mesh, const std::string& title,
 void write_3mf(const SurfaceMesh& mesh, const std::string& title,
                const std::filesystem::path& path);
 
-/// A solid for scenes of other programs.
+/// A solid for scenes in other programs.
 struct GltfPart {
   SurfaceMesh solid;  ///< Closed, mm; the optical surface's triangles first (closed_solid()).
-  Eigen::Matrix3Xd normals;  ///< Of the optical surface at its vertices, the solid's first ones.
+  Eigen::Matrix3Xd normals;  ///< At the optical surface's vertices, which come first in the solid.
   std::int64_t surface_triangles = 0;
-  /// How many triangles at the solid's end are a curved face, which is shaded smoothly.
+  /// Number of triangles at the solid's end that form a curved back, which is shaded smoothly.
   std::int64_t curved_back = 0;
-  double ior = 1.49;    ///< Of a lens.
+  double ior = 1.49;    ///< Lenses only.
   bool mirror = false;  ///< Polished metal instead of clear glass.
 };
 
 /// Writes binary glTF 2.0 in metres: x, y and z are the lens frame's, so that the picture's up is
 /// glTF's. A lens is clear by KHR_materials_transmission, KHR_materials_volume and
-/// KHR_materials_ior. Walls and a flat back have normals of their own. The file appears whole or
-/// not at all. @throw RunError if it cannot be written, or would be longer than 4 GiB.
+/// KHR_materials_ior. Walls and a flat back are shaded flat, with their own normals. The file
+/// appears whole or not at all. @throw RunError if it cannot be written, or would be longer than 4
+/// GiB.
 void write_glb(const GltfPart& part, const std::string& title, const std::filesystem::path& path);
 
-/// What a file of meshes says of itself: enough to know it again.
+/// Summary of a file of meshes, enough to identify it.
 struct MeshContent {
   std::string format;  ///< "3MF" or "glTF 2.0".
-  std::string title;   ///< As it is given; may be empty.
+  std::string title;   ///< As in the file; may be empty.
   std::int64_t meshes = 0;
   std::int64_t vertices = 0;
   std::int64_t triangles = 0;
   Eigen::AlignedBox3d box;  ///< Of the meshes as they are stored, mm.
-  bool moved = false;       ///< The file moves or turns meshes, which `box` leaves out.
+  bool moved = false;       ///< The file moves or turns meshes; `box` ignores that.
 };
 
-/// Reads a 3MF package ("3D Manufacturing Format", core specification 1.3) but for what only
-/// printers need. @throw InputError if it is no such package, or holds no mesh.
+/// Reads a 3MF package ("3D Manufacturing Format", core specification 1.3) except for data that
+/// only printers need. @throw InputError if it is no such package, or holds no mesh.
 MeshContent inspect_3mf(const std::filesystem::path& path);
 
-/// Reads the description in a binary glTF file (glTF 2.0); the numbers of its vertices are taken on
-/// trust. @throw InputError if it is no such file, or holds no mesh.
+/// Reads the description in a binary glTF file (glTF 2.0); its vertex data are not checked. @throw
+/// InputError if it is no such file, or holds no mesh.
 MeshContent inspect_glb(const std::filesystem::path& path);
 
 }  // namespace lensforge

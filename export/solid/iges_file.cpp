@@ -36,7 +36,7 @@ constexpr std::string_view kAdvice = "; write the file anew with the program tha
 
 enum Section : std::size_t { kStart, kGlobal, kDirectory, kParameters, kTerminate };
 
-/// A line without its end, and where it stands in the file.
+/// A line without its end, and its position in the file.
 struct Line {
   std::string_view text;
   std::int64_t number = 0;
@@ -179,7 +179,7 @@ void check_entry(const Line& first, const Line& second, const Sections& sections
     refuse.line(second, "is of another entity than the line before it");
   }
   const auto lines = static_cast<std::int64_t>(sections[kDirectory].size());
-  // Where a number may stand as well, a pointer is negative.
+  // In fields that may also hold a number, a pointer is negative.
   for (const std::size_t which : {kStructure, kFont, kLevel}) {
     check_pointer(first, std::max<std::int64_t>(0, -field(first, which, refuse)), lines, refuse);
   }
@@ -248,11 +248,11 @@ void fill_header(const StepHeader& header, const fs::path& path, IGESControl_Wri
   section.SetDate(text(iges_date(header.time_stamp)));
   section.SetLastChangeDate(text(iges_date(header.time_stamp)));
   writer.Model()->SetGlobalSection(section);
-  // There it stands whole; lines of the global section break anywhere.
+  // The start section keeps it in one piece; lines of the global section break anywhere.
   writer.Model()->AddStartLine(header.program.c_str());
 }
 
-/// What happens in the child process.
+/// Body of the child process.
 SolidContent write_beside(const SplineNet& net, const StepHeader& header, const fs::path& beside,
                           const fs::path& path) {
   silence_opencascade();

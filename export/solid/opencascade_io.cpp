@@ -65,7 +65,7 @@ ChildLimits limits_for(const fs::path& path) {
           .cpu_seconds = kSeconds + kSecondsPerByte * bytes};
 }
 
-/// What a reader of either format does. @param name  of the format.
+/// Reads either format. @param name  of the format.
 template <class Reader>
 void load(Reader& reader, const char* name, const fs::path& path, const RunControl& control) {
   silence_opencascade();

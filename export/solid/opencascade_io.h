@@ -12,47 +12,47 @@
 #include "core/compute/run_control.h"
 #include "export/solid/step_file.h"
 
-/// How files of solids are read and written, whatever their format. OpenCASCADE crashes at some
-/// broken files, and takes for ever over others, so that all of its work on a file that is not our
-/// own happens in a child process. Its types stay inside of this room.
+/// Reading and writing of solids in any format. OpenCASCADE crashes on some broken files and never
+/// ends on others; it therefore reads files that are not our own in a child process. Its types are
+/// used only in this folder.
 namespace lensforge {
 
-/// Bytes of a file at most; export's largest has 0.7 GB, and OpenCASCADE takes 15 bytes for one.
+/// Maximum file size in bytes. The largest file that export writes has 0.7 GB; OpenCASCADE needs 15
+/// bytes of memory per byte.
 inline constexpr std::uintmax_t kMaxSolidBytes = 2'000'000'000;
 
 /// Runs OpenCASCADE's `work` on a file in a child process (run_in_child()) and returns its result.
 /// @throw InputError naming the file: it is missing or no regular file, or the child crashes, fails
-///        or needs more memory or time than a file of this size is given; Interrupted.
+///        or needs more memory or time than a file of this size may use; Interrupted.
 std::string read_guarded(const std::filesystem::path& path,
                          const std::function<std::string(const RunControl&)>& work,
                          const RunControl& control);
 
 /// Reads a STEP file and turns it into shapes; lengths become millimetres.
 /// @pre in a child process, or the file is our own.
-/// @throw InputError if OpenCASCADE takes it for no STEP file.
+/// @throw InputError if OpenCASCADE does not accept it as a STEP file.
 void load_step(STEPControl_Reader& reader, const std::filesystem::path& path,
                const RunControl& control);
 
-/// The shape of a STEP or an IGES file. @pre as for load_step().
+/// Reads the shape of a STEP or an IGES file. @pre as for load_step().
 /// @throw InputError if the file cannot be read or holds no shape.
 TopoDS_Shape read_step_shape(const std::filesystem::path& path, const RunControl& control);
 TopoDS_Shape read_iges_shape(const std::filesystem::path& path, const RunControl& control);
 
-/// OpenCASCADE reports on stdout, which belongs to the command.
+/// Silences OpenCASCADE's messages: it prints them to stdout, which is the command's.
 void silence_opencascade();
 
 int count_shapes(const TopoDS_Shape& shape, TopAbs_ShapeEnum kind);
 
-/// @param expected  the volume in mm³, if known: coarse integration that finds it is enough.
+/// @param expected  the volume in mm³, if known; a coarse integration that matches it is accepted.
 SolidContent inspect_shape(const TopoDS_Shape& shape, std::optional<double> expected = {});
 
-/// SolidContent as bytes, for a child process's result, and back.
+/// Converts SolidContent to bytes, for the result of a child process, and back.
 std::string bytes_of(const SolidContent& content);
 SolidContent content_of(const std::string& bytes);
 
-/// Runs `write`, which writes `path` with OpenCASCADE and reads it back, in a child process, so
-/// that a stop request ends it at once. @throw RunError if it cannot be written or read;
-/// Interrupted.
+/// Runs `write`, which writes `path` with OpenCASCADE and reads it back, in a child process, which
+/// a stop request ends at once. @throw RunError if it cannot be written or read; Interrupted.
 SolidContent write_guarded(const std::filesystem::path& path, const RunControl& control,
                            const std::function<SolidContent(const RunControl&)>& write);
 
@@ -63,7 +63,7 @@ void require_read_back(const SolidContent& content, double volume,
 /// @throw RunError "cannot be written".
 [[noreturn]] void fail_to_write(const std::filesystem::path& path, const std::string& why);
 
-/// Why the system refused the last write.
+/// Reason for which the system refused the last write.
 std::string last_system_error();
 
 }  // namespace lensforge

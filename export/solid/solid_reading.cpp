@@ -54,11 +54,11 @@ namespace {
 namespace fs = std::filesystem;
 
 // Splines that fill the rectangles of their parameters, as export writes them, are sampled evenly
-// over their knot cells, which are small where the lens has much to say. Other faces are sampled on
-// a raster over the lens; a point of it is found on a face by Newton's method in the face's own
+// over their knot cells, which are small where the lens has detail. Other faces are sampled on a
+// raster over the lens; a point of it is found on a face by Newton's method in the face's own
 // parameters, from where the point before it was. Normals are the faces' own.
 
-/// How near Newton's method must come, and what counts as inside at an edge, mm.
+/// Convergence tolerance of Newton's method, and tolerance for points at an edge, mm.
 constexpr double kNearFace = 1e-6;
 
 /// A point of a face and the normal there, z > 0.
@@ -228,7 +228,7 @@ constexpr double kOverlapPoints = 1e4;
   throw InputError(path.string() + ": " + why);
 }
 
-/// What is to be read, and how.
+/// Input of a reading.
 struct Work {
   const fs::path& path;
   double points = 0.0;  ///< To sample, about.
@@ -350,7 +350,7 @@ class RowSampler {
   RowSampler(const std::vector<OpticalFace>& faces, const Raster& raster)
       : faces_(faces), raster_(raster), samplers_(faces.size()) {}
 
-  /// Of the face that had the point before, or else of the first one that has this one.
+  /// The point on the previous point's face, or else on the first face that has it.
   [[nodiscard]] std::optional<FacePoint> at(int column, int row) {
     const Eigen::Vector2d xy = raster_.at(column, row);
     if (const auto found = above(last_, xy)) return found;
@@ -487,7 +487,7 @@ SampledSurface on_raster(const std::vector<OpticalFace>& faces, const Work& work
   return builder.build();
 }
 
-/// Nothing unless every face is a spline over its whole rectangle.
+/// Empty unless every face is a spline over its whole rectangle.
 std::optional<SampledSurface> on_knots(const std::vector<OpticalFace>& faces, double points) {
   std::vector<std::array<int, 2>> cells;
   double all = 0.0;
@@ -520,7 +520,7 @@ void require_finite(const SampledSurface& samples, const fs::path& path) {
   refuse(path, "its optical surface has points that are no numbers");
 }
 
-/// What happens in the child process.
+/// Body of the child process.
 std::string surface_bytes(const Work& work) {
   const Solid solid = read_solid(work.path, work.control);
   std::vector<OpticalFace> faces;
@@ -626,7 +626,7 @@ class FaceJoiner {
     return {edges_.FindIndex(edge), k};
   }
 
-  /// Of the face's nodes, which count from 1.
+  /// Numbers of the face's nodes, which count from 1.
   std::vector<int> numbers(const TopoDS_Face& face, const Handle(Poly_Triangulation) & triangles,
                            const TopLoc_Location& location) {
     std::vector<int> number(index(triangles->NbNodes() + 1), -1);

@@ -54,7 +54,8 @@ namespace {
 
 constexpr int kSplineDegree = 3;
 
-/// The knots of `cells` cells of one width, each once; clamped_multiplicities() says how often.
+/// The knots of `cells` cells of one width, each once; clamped_multiplicities() gives their
+/// multiplicities.
 TColStd_Array1OfReal even_knots(double from, double to, int cells) {
   TColStd_Array1OfReal result(1, cells + 1);
   for (int i = 0; i <= cells; ++i) result(i + 1) = from + (to - from) * i / cells;
@@ -94,7 +95,7 @@ gp_Sphere sphere_of(const SphericalFront& front) {
   return {gp_Ax3(centre, gp_Dir(0.0, 1.0, 0.0), away), std::abs(front.radius)};
 }
 
-/// All of a curve as an edge between two vertices that other edges share.
+/// A whole curve as an edge between two vertices shared with other edges.
 TopoDS_Edge edge_along(const Handle(Geom_Curve) & curve, const TopoDS_Vertex& from,
                        const TopoDS_Vertex& to, double tolerance) {
   const BRep_Builder builder;
@@ -117,9 +118,9 @@ class SolidShell {
   [[nodiscard]] static TopoDS_Wire wire(const Edges& edges);
 
   void add(const TopoDS_Face& face, const char* name);
-  /// A surface whose own normal points out of the solid, as far as edges reach.
+  /// Adds a surface, bounded by edges, whose own normal points out of the solid.
   void add(TopoDS_Face face, const Edges& edges, const char* name);
-  /// The same of one whose normal points into the solid.
+  /// Adds a surface whose own normal points into the solid.
   void add_turned(TopoDS_Face face, const Edges& edges, const char* name);
 
   /// @pre every edge is that of two faces.
@@ -186,7 +187,7 @@ gp_Dir outwards_of(int side) {
   return {x, y, 0.0};
 }
 
-/// Builds vertices first, then edges, then faces, so that all are shared.
+/// Builds vertices first, then edges, then faces; all are shared.
 class SolidBuilder {
  public:
   explicit SolidBuilder(const SplineNet& net) : net_(net) {
@@ -428,8 +429,8 @@ struct RimCurve {
   Handle(Geom2d_BSplineCurve) plan;
 };
 
-/// How far a rim's curves may be from the rim and from each other, mm; a tenth of the light's
-/// wavelength is five times as much. rim_curve() stays at a quarter of it between its points.
+/// Maximum distance of a rim's curves from the rim and from each other, mm: about 1/30 of a
+/// wavelength of light. Between its points rim_curve() reaches a quarter of it.
 constexpr double kRimTolerance = 2e-5;
 
 /// Of one wall: with 16 a knot cell it needs no more on any lens measured.
@@ -533,17 +534,17 @@ RimPoint point_on_sphere(const SphericalFront& front, const Eigen::Vector3d& poi
           {(p.x() * d.y() - p.y() * d.x()) / across, d.z() / std::sqrt(across)}};
 }
 
-/// The parameter of a quarter cylinder's first upright: its seam lies across from the wall.
+/// Parameter of a quarter cylinder's first upright: the seam is opposite the wall.
 constexpr double kFirstAngle = 0.25 * std::numbers::pi;
 
-/// What an outline's corner has.
+/// Vertices and edge at an outline's corner.
 struct Corner {
   TopoDS_Vertex back;
   TopoDS_Vertex top;
   TopoDS_Edge upright;
 };
 
-/// What a wall has.
+/// Edges of a wall.
 struct WallEdges {
   RimCurve top_curve;
   TopoDS_Edge top;

@@ -11,13 +11,13 @@
 
 namespace lensforge {
 
-/// A solid in OpenCASCADE's terms and the names of its faces.
+/// An OpenCASCADE solid and the names of its faces.
 struct NamedSolid {
   TopoDS_Solid solid;
   std::vector<std::pair<TopoDS_Face, std::string>> names;
 };
 
-/// The solid between a net and the face below it; neighbouring faces share their edges.
+/// Returns the solid between a net and the face below it; neighbouring faces share their edges.
 NamedSolid make_spline_solid(const SplineNet& net);
 
 }  // namespace lensforge

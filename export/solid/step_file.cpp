@@ -35,7 +35,7 @@ constexpr std::int64_t kMaxNumber = 2'147'483'647;
 
 bool is_space(char c) { return std::isspace(static_cast<unsigned char>(c)) != 0; }
 bool is_digit(char c) { return std::isdigit(static_cast<unsigned char>(c)) != 0; }
-/// Of a keyword, a number or an enumeration (.T.).
+/// True for a character of a keyword, a number or an enumeration (.T.).
 bool is_word(char c) {
   return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_' || c == '-' || c == '+' ||
          c == '.';
@@ -48,7 +48,7 @@ bool is_number(std::string_view word) {
   return error == std::errc() && end == word.data() + word.size() && std::isfinite(value);
 }
 
-/// An entity's number and the line where it stands.
+/// An entity's number and its line.
 struct Place {
   std::int64_t number = 0;
   std::int64_t line = 0;
@@ -130,7 +130,7 @@ class Part21Scanner {
     at_start_ = false;
   }
 
-  /// #NAME and @NAME stand for values in edition 3.
+  /// #NAME and @NAME are values in edition 3.
   void take_name() {
     while (!rest_.empty() && is_word(rest_.front())) take();
     at_start_ = false;
@@ -244,7 +244,7 @@ void fill_header(const StepHeader& header, STEPControl_Writer& writer) {
   section.SetTimeStamp(text(header.time_stamp));
 }
 
-/// What happens in the child process.
+/// Body of the child process.
 SolidContent write_beside(const SplineNet& net, const StepHeader& header, StepSchema schema,
                           const fs::path& beside, const fs::path& path) {
   silence_opencascade();

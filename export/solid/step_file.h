@@ -12,30 +12,30 @@
 
 namespace lensforge {
 
-/// Checks what holds for every STEP file (ISO 10303-21) before OpenCASCADE trusts it: it begins as
-/// one, has a whole DATA section, texts, comments and parentheses end, no entity is defined twice,
-/// and each one that is named is defined. Returns the number of entities.
+/// Checks the structure of a STEP file (ISO 10303-21) before OpenCASCADE reads it: a STEP header, a
+/// complete DATA section, closed strings, comments and parentheses, no entity defined twice, and no
+/// undefined entity used. Returns the number of entities.
 /// @throw InputError "NAME: line 12: #34 is used but nowhere defined" and the like.
 std::int64_t check_part21(std::string_view content, const std::string& name);
 
 /// Application protocol of a STEP file.
 enum class StepSchema { kAp214, kAp242 };
 
-/// What the header of a solid's file says; ASCII.
+/// Header of a solid's file; ASCII.
 struct StepHeader {
-  std::string name;         ///< Of the part.
-  std::string description;  ///< One line: what it was made from.
+  std::string name;         ///< The part's name.
+  std::string description;  ///< One line: the part's source.
   std::string author;
   std::string program;
-  std::string time_stamp;  ///< ISO 8601; the same input then gives the same bytes.
+  std::string time_stamp;  ///< ISO 8601. Given by the caller: the same input gives the same bytes.
 };
 
-/// What a file of solids holds, as OpenCASCADE sees it.
+/// Content of a file of solids, according to OpenCASCADE.
 struct SolidContent {
   int solids = 0;
   int faces = 0;
-  std::int64_t entities = 0;    ///< Of a file that was read by inspect_step() or inspect_iges().
-  bool valid = false;           ///< BRepCheck_Analyzer finds nothing.
+  std::int64_t entities = 0;    ///< Set by inspect_step() and inspect_iges() only.
+  bool valid = false;           ///< BRepCheck_Analyzer finds no fault.
   bool closed = false;          ///< Every edge has a face on both sides.
   double volume = 0.0;          ///< mm³
   std::array<double, 3> low{};  ///< Corners of the box around it, mm
@@ -53,7 +53,7 @@ struct SolidContent {
 SolidContent write_step(const SplineNet& net, const StepHeader& header, StepSchema schema,
                         const std::filesystem::path& path, const RunControl& control = {});
 
-/// OpenCASCADE works in a child process: what makes it crash is an InputError as well.
+/// Reads a STEP file. OpenCASCADE runs in a child process; its crash is an InputError too.
 /// @throw InputError if the file cannot be read or holds no shape; Interrupted.
 SolidContent inspect_step(const std::filesystem::path& path, const RunControl& control = {});
 

@@ -23,7 +23,7 @@ struct OutlineWall {
   Eigen::Vector2d to = Eigen::Vector2d::Zero();
   std::optional<WallArc> arc;
 
-  /// Parameter of the end; it is 0 at the start: mm along a line, rad along an arc.
+  /// Parameter of the end: mm along a line, rad along an arc. It is 0 at the start.
   [[nodiscard]] double last() const;
   [[nodiscard]] Eigen::Vector2d at(double t) const;
   /// Derivative of at().
@@ -32,16 +32,17 @@ struct OutlineWall {
   [[nodiscard]] double length() const;
 };
 
-/// The edge of a lens as it is meant, counter-clockwise: arcs are arcs, not chords. Corners of a
-/// polygon that are nearer than kShortestWall to the one before are left out.
+/// Returns the nominal edge of a lens, counter-clockwise, with true arcs instead of chords. Polygon
+/// corners closer than kShortestWall to the previous one are omitted.
 std::vector<OutlineWall> walls_of(const Outline& outline);
 
-/// mm; far above what edges of a solid may be off, far below what a mill cuts.
+/// Shortest wall, mm: far above the tolerance of a solid's edges, far below the precision of a
+/// mill.
 inline constexpr double kShortestWall = 1e-3;
 
 /// Volume between a net of one patch and the face below it inside of the net's outline, mm³:
 /// Gauss's rule in the knot cells inside; small triangles, clipped at the outline, in those that it
-/// crosses; arcs are arcs. Right to 1e-7 of itself (OutlineVolume.IsTheIntegral).
+/// crosses; arcs are exact. Relative error below 1e-7 (OutlineVolume.IsTheIntegral).
 /// @pre net.outline; one patch.
 double outlined_volume(const SplineNet& net);
 

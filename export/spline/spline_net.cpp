@@ -315,7 +315,7 @@ namespace {
 /// control points along their borders (3 of 67 here), and take longer in other programs.
 constexpr int kOwnPatchCells = 64;
 
-/// Nothing else rounds a lens's own spline: 1e-7 rad at knots 0.001 mm apart.
+/// The only rounding of a lens's own spline: 1e-7 rad at knots 0.001 mm apart.
 constexpr double kOwnStep = 1e-10;
 
 std::vector<Eigen::MatrixXd> restrictions(const std::vector<int>& lines) {
@@ -394,7 +394,7 @@ class SplineCutter {
     return net_.patches[table_index(column, row, net_.columns)];
   }
 
-  /// Rounding may have told two patches apart along their common line.
+  /// Rounding may have separated two patches along their common line.
   void share_borders() {
     for (int r = 0; r < net_.rows; ++r) {
       for (int c = 0; c < net_.columns; ++c) {

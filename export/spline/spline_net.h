@@ -18,34 +18,34 @@
 
 namespace lensforge {
 
-/// How far a fit is from the smooth surface's heights and from the normals of the vertex-normal
-/// model (SmoothSurface::model_at()).
+/// Error of a fit against the smooth surface's heights and the vertex-normal model's normals
+/// (SmoothSurface::model_at()).
 struct FitError {
   double height = 0.0;      ///< Largest, mm along z
   double normal = 0.0;      ///< Largest angle, rad
-  double height_rms = 0.0;  ///< Root of the mean square over the parameters
+  double height_rms = 0.0;  ///< Root mean square over the parameters
   double normal_rms = 0.0;
   double area = 0.0;                                    ///< mm², seen from above
   double area_within = 0.0;                             ///< Where both tolerances hold
-  Eigen::Vector2d height_at = Eigen::Vector2d::Zero();  ///< x, y of the largest ones, mm
+  Eigen::Vector2d height_at = Eigen::Vector2d::Zero();  ///< x, y of the largest error, mm
   Eigen::Vector2d normal_at = Eigen::Vector2d::Zero();
 
   [[nodiscard]] double share_within() const { return area > 0.0 ? area_within / area : 0.0; }
-  /// Takes the other's largest errors where they are larger.
+  /// Takes the other's maximum errors where they are larger.
   void raise(const FitError& other);
-  /// Adds a point's errors, squares for roots of means; divide() ends this, with the points and
-  /// the parameters' area.
+  /// Adds a point's errors, with squares for the RMS values. divide() then completes the means,
+  /// given the number of points and the parameters' area.
   void add(FitError other, const Eigen::Vector2d& at);
   void divide(double points, double unit_area);
 };
 
-/// A point of a height field, seen from above, and its height and slopes there.
+/// A point of a height field: position seen from above, height and slopes.
 struct SplinePoint {
   Eigen::Vector2d xy = Eigen::Vector2d::Zero();  ///< mm
   SurfacePoint surface;
 };
 
-/// The point with these coordinates and derivatives by two parameters.
+/// Returns the point with these coordinates and derivatives by two parameters.
 SplinePoint spline_point(const Eigen::Vector3d& p, const Eigen::Vector3d& du,
                          const Eigen::Vector3d& dv);
 
@@ -59,12 +59,12 @@ struct PatchFrame {
 /// A bicubic B-spline surface over a rectangle of parameters: `cells_u` × `cells_v` knot cells,
 /// twice continuously differentiable, one height above every (x, y).
 struct SplinePatch {
-  Eigen::AlignedBox2d box;  ///< Of the parameters (u, v), mm on the lens while its grid is flat.
+  Eigen::AlignedBox2d box;  ///< Of the parameters (u, v): mm on the lens while its grid is flat.
   int cells_u = 0;
   int cells_v = 0;
   /// Coefficients of x, y and z in mm, (cells_u + 3) × (cells_v + 3) each; row index along u.
   std::array<Eigen::MatrixXd, 3> coefficients;
-  FitError error;  ///< Certificate: no point of the patch is farther off.
+  FitError error;  ///< Certificate: error bound for every point of the patch.
 
   [[nodiscard]] Eigen::Vector2d cells() const { return Eigen::Vector2d(cells_u, cells_v); }
   /// @pre uv lies in the box, as for frame().
@@ -84,7 +84,7 @@ class PatchTable {
   [[nodiscard]] SplinePoint at(Eigen::Index i, Eigen::Index j) const {
     return spline_point(take(value_, i, j), take(by_u_, i, j), take(by_v_, i, j));
   }
-  /// That a unit of the parameters covers, seen from above.
+  /// Area covered by a unit of the parameters, seen from above.
   [[nodiscard]] double area(Eigen::Index i, Eigen::Index j) const {
     return by_u_[0](i, j) * by_v_[1](i, j) - by_u_[1](i, j) * by_v_[0](i, j);
   }
@@ -100,28 +100,27 @@ class PatchTable {
   Table value_, by_u_, by_v_;
 };
 
-/// A line between two patches, or on the rim: a cubic B-spline that both patches contain.
+/// Edge between two patches or on the rim: a cubic B-spline that both patches contain.
 struct SplineEdge {
   int cells = 0;
   Eigen::Matrix3Xd coefficients;  ///< 3 × (cells + 3), mm
 };
 
-/// Place of (column, row) in a table with `columns` columns that is stored row by row.
+/// Index of (column, row) in a row-major table with `columns` columns.
 inline std::size_t table_index(int column, int row, int columns) {
   return static_cast<std::size_t>(std::int64_t{row} * columns + column);
 }
 
 /// A rectangle tiled with spline patches that join with equal heights, slopes and curvatures, and
-/// the face below it. The parameters' rectangle is the lens's own, corner for corner and side for
-/// side.
+/// the face below it. The parameters' rectangle is the lens's own.
 struct SplineNet {
   int columns = 0;
   int rows = 0;
   std::vector<double> u;             ///< columns + 1 lines, mm
   std::vector<double> v;             ///< rows + 1 lines, mm
   std::vector<SplinePatch> patches;  ///< Patch (column, row) is row·columns + column.
-  std::vector<SplineEdge> edges_u;   ///< Along u: (column, line) is line·columns + column.
-  std::vector<SplineEdge> edges_v;   ///< Along v: (line, row) is row·(columns + 1) + line.
+  std::vector<SplineEdge> edges_u;   ///< Along u: edge (column, line) is line·columns + column.
+  std::vector<SplineEdge> edges_v;   ///< Along v: edge (line, row) is row·(columns + 1) + line.
   /// The face below; none: the plane z = 0. @pre a sphere's radius is longer than half of the
   /// diagonal, a height map spans the rectangle.
   std::optional<Front> front;
@@ -129,56 +128,56 @@ struct SplineNet {
   std::optional<Outline> outline;
 
   [[nodiscard]] FitError error() const;
-  /// Volume between the patches and the face below, mm³; exact, or as outlined_volume().
+  /// Volume between the patches and the face below, mm³; exact, or outlined_volume() with an
+  /// outline.
   [[nodiscard]] double volume() const;
   [[nodiscard]] std::int64_t control_points() const;
   /// @pre uv lies in the rectangle.
   [[nodiscard]] SplinePoint at(const Eigen::Vector2d& uv) const;
-  /// Number of the patch that holds a point of the parameters.
+  /// Index of the patch that contains a point of the parameters.
   [[nodiscard]] int patch_at(const Eigen::Vector2d& uv) const;
-  /// Parameters of the point above xy by Newton's method from `start`; nothing if it does not
-  /// come there.
+  /// Parameters of the point above xy by Newton's method from `start`; empty if it does not
+  /// converge.
   [[nodiscard]] std::optional<Eigen::Vector2d> parameters_of(const Eigen::Vector2d& xy,
                                                              const Eigen::Vector2d& start) const;
 };
 
-/// The net's surface and its own normals at columns × rows points, evenly over the parameters.
+/// The net's surface and its own normals at columns × rows points, evenly spaced in the parameters.
 SampledSurface sampled(const SplineNet& net, const GridShape& shape);
 
-/// Volume between a curved front and the plane z = 0 over a rectangle, mm³; counted below 0 where
-/// the front lies below the plane. Exact but for rounding. @pre the front covers the rectangle.
+/// Volume between a curved front and the plane z = 0 over a rectangle, mm³; negative where the
+/// front lies below the plane. Exact except for rounding. @pre the front covers the rectangle.
 double volume_below(const Front& front, const Eigen::AlignedBox2d& box);
 
-/// A height map over its rectangle as one patch: the same surface, its knots fourfold at the ends.
+/// A height map over its rectangle as one patch: the same surface with fourfold end knots.
 SplinePatch patch_of(const HeightFront& front);
 
 /// One bicubic spline over a rectangle of parameters, even knots clamped at the rim.
 struct WholeSpline {
-  Eigen::AlignedBox2d box;  ///< Of the parameters.
+  Eigen::AlignedBox2d box;  ///< Box of the parameters.
   /// Coefficients of x, y and z in mm, row index along u.
   std::array<Eigen::MatrixXd, 3> coefficients;
 };
 
-/// Where the spline is cut, numbers of knots, ascending, the first and last one included.
+/// Knot indices at which the spline is cut, ascending, including the first and the last.
 struct CutLines {
   std::vector<int> u;
   std::vector<int> v;
 };
 
-/// The same surface as a net of patches. Inner coefficients stay as they are but for rounding;
-/// those next to a cut follow by the Oslo algorithm.
-/// @param step  mm, on whole multiples of which coefficients are rounded.
+/// The same surface as a net of patches. Inner coefficients are only rounded; those next to a cut
+/// come from the Oslo algorithm. @param step  mm; coefficients are rounded to multiples of it.
 SplineNet cut_spline(const WholeSpline& whole, const CutLines& lines, double step,
                      const Executor& executor);
 
-/// A lens's own spline as a net of patches: nothing is fitted. Its coordinates are those of the
-/// control points to 1e-10 mm.
+/// A lens's own spline as a net of patches: nothing is fitted. Coordinates are the control points',
+/// rounded to 1e-10 mm.
 SplineNet net_of(const ControlNet& spline, const Executor& executor);
 
-/// The same as one patch.
+/// A lens's own spline as one patch.
 SplineNet patch_of(const ControlNet& spline, const Executor& executor);
 
-/// Control points of net_of().
+/// Number of control points of net_of().
 std::int64_t control_points_of_net(const ControlNet& spline);
 
 }  // namespace lensforge

@@ -6,7 +6,7 @@
 namespace lensforge {
 namespace {
 
-/// What all of the Grbl family have in common.
+/// Common properties of the Grbl family.
 GcodeDialect grbl_family() {
   GcodeDialect dialect;
   dialect.max_line_number = 9'999'999;

@@ -16,7 +16,7 @@
 namespace lensforge {
 namespace {
 
-/// Groups of which at most one word may stand on a line. RS-274/NGC, table 4.
+/// Modal groups: at most one word of each is allowed on a line. RS-274/NGC, table 4.
 enum class ModalGroup {
   kNonModal,  ///< G4 G28 G30 G53
   kMotion,
@@ -130,7 +130,7 @@ std::optional<ModalGroup> m_group(int tenths) {
   }
 }
 
-/// Whether a word that some controllers know is unknown to this one.
+/// True if this controller lacks a word that others know.
 bool lacks(const GcodeDialect& dialect, const GcodeWord& word) {
   if (word.letter == 'M') {
     return (word.tenths == 60 && !dialect.tool_change) || (word.tenths == 70 && !dialect.mist);
@@ -154,7 +154,7 @@ bool lacks(const GcodeDialect& dialect, const GcodeWord& word) {
   }
 }
 
-/// What does instead of a word that a controller lacks; empty where nothing is known of it.
+/// Suggests a replacement for a word that a controller lacks; empty if there is none.
 std::string way_out(const GcodeWord& word, const GcodeDialect& dialect) {
   const bool tool_change = word.letter == 'M' && word.tenths == 60;
   if (tool_change) return "; send one program for each tool";
@@ -581,7 +581,7 @@ class BlockRun {
     if (effect_.ends) reset_modes();
   }
 
-  /// What M2 and M30 put back, in Grbl and in RS-274/NGC.
+  /// Resets the modes that M2 and M30 reset, in Grbl and in RS-274/NGC.
   void reset_modes() {
     state_.motion = MotionMode::kFeed;
     state_.plane = ArcPlane::kXY;

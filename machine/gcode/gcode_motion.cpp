@@ -36,8 +36,8 @@ Arc in_plane(ArcPlane plane) {
   return arc;
 }
 
-/// The centre lies on the chord's bisector, h from its middle, h² = r² − (d/2)²; to the left of
-/// the way for a counter-clockwise arc of less than half a turn.
+/// The centre lies on the chord's bisector, h from its middle, h² = r² − (d/2)²; to the left of the
+/// chord for a counter-clockwise arc of less than half a turn.
 std::string place_centre(Arc& arc, const Eigen::Vector2d& start, const Eigen::Vector2d& end,
                          const ArcRequest& request) {
   const double radius = *request.radius;

@@ -15,9 +15,9 @@ enum class ArcPlane { kXY, kZX, kYZ };
 
 /// A circular arc, or a helix, from a start point; mm and radians.
 struct Arc {
-  int first = 0;   ///< Axis from which the angle counts.
+  int first = 0;   ///< Axis from which the angle is measured.
   int second = 1;  ///< Axis at a right angle to it, counter-clockwise.
-  int third = 2;   ///< Axis that the plane is normal to.
+  int third = 2;   ///< Axis normal to the plane.
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< At the height of the start point.
   double radius = 0.0;
   double begin = 0.0;  ///< Angle of the start point.
@@ -26,13 +26,13 @@ struct Arc {
 
   /// Length of the path.
   [[nodiscard]] double length() const;
-  /// The point after the share `part` in 0 … 1 of the sweep.
+  /// The point after the fraction `part` (0 … 1) of the sweep.
   [[nodiscard]] Eigen::Vector3d at(double part) const;
   /// The box around all of it.
   [[nodiscard]] Eigen::AlignedBox3d bounds() const;
 };
 
-/// What an arc word says of its shape, mm.
+/// Shape of an arc as stated by its words, mm.
 struct ArcRequest {
   ArcPlane plane = ArcPlane::kXY;
   bool clockwise = false;                            ///< G2, seen from the third axis's tip.
@@ -40,15 +40,15 @@ struct ArcRequest {
   std::optional<double> radius;                      ///< R; negative for more than half a turn.
 };
 
-/// An arc, or why there is none.
+/// An arc, or the reason for which there is none.
 struct ArcResult {
   Arc arc;
   std::string reason;  ///< Empty for an arc.
 };
 
-/// The arc from `start` to `end`. Equal points in the plane are a full circle with I J K. With
-/// I J K the two radii may differ by 0.005 mm, or by 0.5 mm and a thousandth of the radius,
-/// whichever rule is kinder: Grbl's own rule.
+/// The arc from `start` to `end`. With I J K, equal points in the plane give a full circle, and the
+/// two radii may differ by up to 0.005 mm, or by up to both 0.5 mm and a thousandth of the radius.
+/// This is Grbl's own rule.
 ArcResult make_arc(const Eigen::Vector3d& start, const Eigen::Vector3d& end,
                    const ArcRequest& request);
 
@@ -57,10 +57,10 @@ struct GcodeMotion {
   Eigen::Vector3d start = Eigen::Vector3d::Zero();
   Eigen::Vector3d end = Eigen::Vector3d::Zero();
   std::optional<Arc> arc;              ///< Straight without one.
-  bool rapid = false;                  ///< G0, G28, G30: as fast as the axes go.
-  double feed = 0.0;                   ///< mm/min; of a rapid 0. G93 is converted by the length.
-  std::int64_t line = 0;               ///< In the file, counted from 1.
-  std::int64_t offset = 0;             ///< Of the line's first byte.
+  bool rapid = false;                  ///< G0, G28, G30: at the axes' maximum rates.
+  double feed = 0.0;                   ///< mm/min; 0 for a rapid. G93 is converted with the length.
+  std::int64_t line = 0;               ///< Line in the file, from 1.
+  std::int64_t offset = 0;             ///< Offset of the line's first byte.
   std::optional<std::int64_t> number;  ///< The line's N word.
 
   /// Length of the path.
@@ -73,17 +73,17 @@ struct GcodeMotion {
   }
 };
 
-/// What a program asks of the spindle.
+/// Spindle state commanded by a program.
 enum class SpindleTurn { kOff, kClockwise, kCounterClockwise };
 
-/// Motion words in force. kNone after G80.
+/// Active motion mode. kNone after G80.
 enum class MotionMode { kRapid, kFeed, kArcClockwise, kArcCounterClockwise, kNone };
 
-/// The words in force, and where the tool is. Lengths in mm, machine coordinates.
+/// The active modes and the tool's position. Lengths in mm, machine coordinates.
 struct GcodeState {
   MotionMode motion = MotionMode::kRapid;
   ArcPlane plane = ArcPlane::kXY;
-  std::optional<bool> inches;  ///< G20 or G21; nothing until one of them was read.
+  std::optional<bool> inches;  ///< G20 or G21; empty until one was read.
   bool absolute = true;        ///< G90
   bool inverse_time = false;   ///< G93
   std::optional<double> feed;  ///< F under G94, mm/min.
@@ -93,23 +93,22 @@ struct GcodeState {
   bool mist = false;           ///< M7
   bool flood = false;          ///< M8
   int tool = 0;                ///< T
-  int loaded_tool = 0;         ///< That of the last M6.
+  int loaded_tool = 0;         ///< T at the last M6.
   int tool_length = 0;         ///< H of G43, or the loaded tool's number; 0 after G49.
   double stated_length = 0.0;  ///< Z of G43.1, mm; 0 after G49.
-  /// G64: how far corners may be cut, mm; 0 is without limit. Nothing outside G64.
+  /// G64: corner tolerance, mm; 0 is unlimited. Empty outside G64.
   std::optional<double> blending;
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
-  /// Where G54 … G59 begin, offsets of the controller but the tool's length included; its `$#`
-  /// tells.
+  /// Origins of G54 … G59, including the controller's offsets (`$#`) except the tool's length.
   std::array<Eigen::Vector3d, 6> origins{Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(),
                                          Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(),
                                          Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
-  std::optional<Eigen::Vector3d> g28;  ///< Where G28 goes.
+  std::optional<Eigen::Vector3d> g28;  ///< Target of G28.
   std::optional<Eigen::Vector3d> g30;
 
-  /// Where the coordinates in force begin.
+  /// Origin of the active coordinates.
   [[nodiscard]] Eigen::Vector3d origin() const { return lengthened(origins[system_index()]); }
-  /// Where each of G54 … G59 begins with the tool's length in force.
+  /// Origins of G54 … G59 with the active tool length.
   [[nodiscard]] std::array<Eigen::Vector3d, 6> tool_origins() const {
     std::array<Eigen::Vector3d, 6> all = origins;
     for (Eigen::Vector3d& origin : all) origin = lengthened(origin);

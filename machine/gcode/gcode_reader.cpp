@@ -23,7 +23,7 @@ std::string hexadecimal(unsigned char byte) {
   return text.data();
 }
 
-/// Why a byte may not stand in a program, or empty.
+/// Reason for which a byte is not allowed in a program; empty if it is.
 std::string reason_against(unsigned char byte) {
   if (byte == '?' || byte == '!' || byte == '~' || byte == 0x18 || byte >= 0x80) {
     return "the controller treats this byte as a realtime command anywhere in a line";
@@ -153,7 +153,7 @@ class LineScanner {
     }
   }
 
-  /// The digits, signs and points that stand here.
+  /// Reads the digits, signs and points at this position.
   double number(char letter) {
     const std::size_t begin = at_;
     if (peek() == '+' || peek() == '-') ++at_;

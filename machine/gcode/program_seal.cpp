@@ -34,7 +34,7 @@ bool take_number(std::string_view& rest, char letter) {
   return true;
 }
 
-/// What is left behind comments in brackets.
+/// The rest of a line after its comments in brackets.
 std::string_view behind_comments(std::string_view rest) {
   while (rest.starts_with('(')) {
     const std::size_t end = rest.find_first_of("()", 1);
@@ -57,7 +57,7 @@ bool HeaderLines::take(std::string_view line) {
   return tape_word && (rest.empty() || rest.front() == ';');
 }
 
-/// @return false for a % or O where none may stand.
+/// @return false for a misplaced % or O.
 bool HeaderLines::take_tape_word(std::string_view& rest) {
   if (rest.front() == '%') {
     if (begun_) return false;
@@ -78,9 +78,9 @@ constexpr std::string_view kPrefix = "sha256 below ";
 /// Comments that cam writes into every program, and no other software does, in lower case.
 constexpr std::array<std::string_view, 2> kMarks = {
     "sha256 below", "units: mm; x0 y0: lower left corner of the lens"};
-/// The same with a number behind it: a version.
+/// Followed by a number: a version.
 constexpr std::string_view kProgram = "lensforge ";
-constexpr std::size_t kLongestLine = 1024;  ///< What a line has beyond it is not looked at.
+constexpr std::size_t kLongestLine = 1024;  ///< The rest of a longer line is ignored.
 constexpr std::size_t kPiece = 1 << 16;
 
 char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
@@ -93,7 +93,7 @@ std::string lower_case(std::string_view line) {
 
 bool is_hexadecimal(char c) { return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f'); }
 
-/// Whether a comment of the line is one that only cam writes.
+/// True if the line has a comment that only cam writes.
 bool speaks_of_cam(std::string_view line) {
   if (line.find_first_of("(;") == std::string_view::npos) return false;
   const std::string text = lower_case(line);
@@ -106,8 +106,8 @@ bool speaks_of_cam(std::string_view line) {
   return next >= '0' && next <= '9';
 }
 
-/// Looks for the seal line by line, then hashes what stands below it. Lines end as GcodeReader
-/// ends them: with LF, CR LF or CR.
+/// Searches for the seal line by line, then hashes the bytes below it. As for GcodeReader, lines
+/// end with LF, CR LF or CR.
 class SealScan {
  public:
   void take(std::string_view bytes) {
@@ -115,7 +115,7 @@ class SealScan {
     if (hashing_) hash_.update(bytes);
   }
 
-  /// Nothing that comes can change the answer any more.
+  /// The rest of the file cannot change the result.
   [[nodiscard]] bool settled() const { return cams_ && !header_ && !hashing_; }
 
   std::optional<bool> result() {

@@ -17,7 +17,7 @@ using Milliseconds = std::chrono::milliseconds;
 
 /// Between two polls of the guard; its shortest interval is 10 ms.
 constexpr Milliseconds kPollPause{5};
-/// As SpindleGuard keeps.
+/// Same limit as in SpindleGuard.
 constexpr std::size_t kMaxRecords = 20000;
 
 double steady_now() { return SteadyClock().now(); }

@@ -13,16 +13,15 @@
 
 namespace lensforge {
 
-/// Runs a SpindleGuard on a thread of its own, so that no call of a sender ever waits for the bus:
-/// poll() hands over the newest report. What lasted only between two polls is not lost: a failure
-/// or an open interlock stands in one report at least. A report that is older than the limit is
-/// kFailed, whatever it says.
+/// Runs a SpindleGuard on its own thread; a sender never waits for the bus. poll() returns the
+/// newest report. Failures and open interlocks that lasted only between two polls appear in at
+/// least one report. A report older than the limit counts as kFailed.
 class BackgroundGuard final : public Guard {
  public:
-  /// @param stale_limit  s without a new report after which poll() gives kFailed; see
+  /// @param stale_limit  seconds without a new report after which poll() returns kFailed; see
   /// stale_limit_of().
   BackgroundGuard(std::unique_ptr<SpindleGuard> guard, double stale_limit);
-  /// Delivers a command that was not taken yet, for at most the stale limit.
+  /// Tries to deliver a pending command, for at most the stale limit.
   ~BackgroundGuard() override;
   BackgroundGuard(const BackgroundGuard&) = delete;
   BackgroundGuard& operator=(const BackgroundGuard&) = delete;
@@ -39,28 +38,28 @@ class BackgroundGuard final : public Guard {
   void ask(Command command);
   void publish(const GuardReport& report, bool obeyed);
 
-  std::unique_ptr<SpindleGuard> guard_;  ///< Of the thread alone.
+  std::unique_ptr<SpindleGuard> guard_;  ///< Used by the thread only.
   double stale_limit_;
-  std::mutex mutex_;  ///< Guards what follows.
+  std::mutex mutex_;  ///< Guards the members below.
   std::condition_variable wake_;
   Command command_;
   bool answered_ = true;  ///< newest_ was made after the last command.
   bool ends_ = false;
   GuardReport newest_;
   double published_at_;
-  std::string failure_unseen_;    ///< Of a report that no poll() saw.
-  std::string interlock_unseen_;  ///< Likewise.
+  std::string failure_unseen_;    ///< From a report that no poll() returned.
+  std::string interlock_unseen_;  ///< From a report that no poll() returned.
   std::vector<GuardRecord> records_;
   std::thread thread_;
 };
 
-/// A stale limit that fits the devices, s: the longest silence that one of them is allowed, and for
-/// each device a connection and an exchange that run into their time-outs.
+/// Returns the age in seconds at which a report counts as stale: the longest silence allowed to any
+/// device, plus one connection and one exchange time-out per device.
 double stale_limit_of(const std::vector<RegisterMap>& maps);
 
-/// A guard of real devices, one a map, over ModbusBus and on a thread of its own; connects by and
-/// by.
-/// @param clock  the steady one; must outlive the guard. @throw InputError as SpindleGuard does.
+/// Creates a guard of real devices, one per map, over ModbusBus and on its own thread; it connects
+/// in the background.
+/// @param clock  a steady clock; must outlive the guard. @throw InputError as SpindleGuard does.
 std::unique_ptr<BackgroundGuard> guard_devices(const std::vector<RegisterMap>& maps,
                                                const GuardOptions& options, Clock& clock);
 

@@ -18,7 +18,7 @@
 namespace lensforge {
 namespace {
 
-/// Of a time in seconds, as libmodbus takes it.
+/// A time in seconds in libmodbus's format.
 struct SecondsParts {
   explicit SecondsParts(double time)
       : seconds(static_cast<std::uint32_t>(std::floor(time))),
@@ -137,8 +137,8 @@ std::uint16_t ModbusBus::read(const RegisterAddress& at) {
   return at.function <= MODBUS_FC_READ_DISCRETE_INPUTS ? std::uint16_t{bit} : word;
 }
 
-// libmodbus 3.1.6 does not compare the echo of a single write with what was written, so the answer
-// is taken as bytes and compared here.
+// libmodbus 3.1.6 does not compare the echo of a single write with the written value; the raw
+// answer is compared here.
 void ModbusBus::write(const RegisterAddress& at, std::uint16_t value) {
   LF_CHECK(is_open(), endpoint_text(transport_));
   begin_request();
@@ -173,7 +173,7 @@ std::vector<std::uint8_t> ModbusBus::answer_to(const std::vector<std::uint8_t>& 
   return {answer.begin() + header, answer.begin() + end};
 }
 
-/// Whatever still lies there was not asked for by the request that comes now.
+/// Discards bytes that belong to earlier requests.
 void ModbusBus::begin_request() {
   SteadyClock clock;
   const double early = last_exchange_ + transport_.request_gap - clock.now();
@@ -241,8 +241,9 @@ std::uint16_t BusSession::exchange(const std::function<std::uint16_t()>& exchang
   }
 }
 
-// A connection of TCP dies with its late answers; an RTU line has to be waited out. The response
-// time-out is counted from the request, not from the failure: a simulated bus fails at once.
+// Closing a TCP connection discards late answers; on an RTU line they have to be waited out. The
+// response time-out is counted from the request, not from the failure: a simulated bus fails at
+// once.
 void BusSession::recover(BusFault fault, double started) {
   if (fault == BusFault::kRefused) return;
   if (fault == BusFault::kDown) return hang_up(clock_.now());

@@ -15,8 +15,7 @@ namespace lensforge {
 
 /// A device on a serial line (RTU) or a network (TCP), through libmodbus with its automatic
 /// recovery switched off. An exchange takes at most the connect time-out (TCP, when not open), the
-/// request gap, the response time-out and 16 byte time-outs; a host that is a name adds the
-/// resolver's time.
+/// request gap, the response time-out and 16 byte time-outs; a host name adds the resolver's time.
 class ModbusBus final : public RegisterBus {
  public:
   explicit ModbusBus(const BusTransport& transport);
@@ -44,14 +43,14 @@ class ModbusBus final : public RegisterBus {
   double last_exchange_;  ///< s on the steady clock.
 };
 
-/// Keeps one device's bus connected: opens it when it is needed, closes it when it broke, pauses
-/// longer and longer before the next try, and leaves an RTU line alone until a late answer has
-/// gone by. Retries nothing by itself.
+/// Keeps one device's bus connected: opens it on demand, closes it after a failure, waits longer
+/// after each failed attempt, and leaves an RTU line idle until a late answer has passed. Repeats
+/// no exchange.
 class BusSession {
  public:
   BusSession(std::unique_ptr<RegisterBus> bus, const BusTransport& transport, Clock& clock);
 
-  /// Whether an exchange may start now; false during a pause.
+  /// True if an exchange may start now; false during a pause.
   [[nodiscard]] bool ready() const;
   /// @pre ready(). @throw BusError
   std::uint16_t read(const RegisterAddress& at);

@@ -63,11 +63,11 @@ std::string address_text(const RegisterAddress& at) {
 
 namespace {
 
-/// What people call the drives of the old protocol.
+/// Common names of the drives with the old protocol.
 constexpr std::array<std::string_view, 6> kHuanyangNames = {
     "huanyang", "hy", "hy_vfd", "huanyang_hy", "hy-series", "huanyang1"};
 
-/// The folder beside the program wins, so that an installed program never reads a source tree.
+/// The folder beside the program has priority: an installed program never reads a source tree.
 fs::path map_folder() {
   std::error_code error;
   const fs::path program = fs::read_symlink("/proc/self/exe", error);
@@ -130,7 +130,7 @@ std::optional<Cell> read_cell(const RegisterAddress& at) {
   return Cell{at.function == 1, at.address};
 }
 
-/// What a command leaves behind: the last value of each cell.
+/// Result of a command: the last value of each cell.
 using Outcome = std::map<Cell, std::uint16_t>;
 
 Outcome outcome_of(const std::vector<WriteStep>& steps) {
@@ -172,7 +172,7 @@ class MapCheck {
                                       number_text(slowest) + " (rpm_min less tolerance)");
   }
 
-  /// The scale has to tell speeds apart as finely as they are judged, and a standstill from them.
+  /// The scale must resolve speeds as finely as the tolerance, and distinguish a standstill.
   void check_reading(const std::string& key, const SpeedScale& scale) const {
     const SpindleMap& spindle = *map_.spindle;
     check_resolution(key, scale);
@@ -223,7 +223,7 @@ class MapCheck {
                       " too; each needs an address or bits (mask) of its own");
   }
 
-  /// What is read where it was written tells what was asked for, not what the device does.
+  /// A register that is written returns the requested value, not the device's state.
   void require_unwritten(const ReadSignal& signal) const {
     const std::optional<Cell> cell = read_cell(signal.at);
     if (!cell || !map_.spindle->commands) return;
@@ -250,7 +250,7 @@ class MapCheck {
     require_own_speed("stop", commands, commands.stop);
   }
 
-  /// Of two commands neither may leave behind all that the other does.
+  /// Two commands must not have the same result, nor one include the other's.
   void require_different(const std::string& name, const std::vector<WriteStep>& steps,
                          const std::string& other_name, const std::vector<WriteStep>& other) const {
     const Outcome one = outcome_of(steps);
@@ -278,18 +278,17 @@ class MapCheck {
   std::string file_;
 };
 
-/// Checks what the keys of a register map say together, beyond what each may hold: that the
-/// commands differ in what they leave in the drive, that the speed has a register of its own and is
-/// told and read as finely as it is judged, that nothing is read back from where it was written,
-/// and that standing still is no speed.
-/// @param file  what to call it in errors. @throw InputError naming file, keys and rule.
+/// Checks the keys of a register map in combination: the commands have different results in the
+/// drive, the speed has its own register and is written and read as finely as the tolerance, no
+/// register is both written and read back, and standstill is no valid speed. @param file  its name
+/// in errors. @throw InputError naming file, keys and rule.
 void check_register_map(const RegisterMap& map, const std::string& file) {
   MapCheck(map, file).run();
 }
 
 constexpr const char* kKind = "a register map";
 constexpr double kMaxRpm = 200000.0;
-/// The rates that libmodbus sets; for any other it takes 9600 without a word.
+/// The rates that libmodbus sets; for any other it silently sets 9600.
 constexpr std::array kBauds = {1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200, 230400};
 
 std::uint16_t word(TomlFields& fields, const std::string& key) {
@@ -438,7 +437,7 @@ SpindleCommands read_commands(TomlFields fields, SpindleMap& spindle) {
   return commands;
 }
 
-/// A map without a fault register has to say why, so that nobody leaves it out unawares.
+/// A map without a fault register must state a reason, which prevents leaving it out by mistake.
 void read_fault_or_reason(TomlFields& status, SpindleMap& spindle) {
   if (status.has("fault")) {
     spindle.fault = read_fault(status.table("fault"));

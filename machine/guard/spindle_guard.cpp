@@ -17,7 +17,7 @@ std::size_t DeviceWatch::add(const ReadSignal& signal) {
   return polled_.size() - 1;
 }
 
-// The most overdue goes first, so that a slow bus starves no signal.
+// The most overdue signal is read first; a slow bus then starves none.
 std::vector<DeviceWatch::Reading> DeviceWatch::poll() {
   std::vector<std::size_t> order(polled_.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
@@ -109,7 +109,7 @@ void SpindleWatch::expect_stop(double now) {
   ask(Goal::kStop, now);
 }
 
-// Readings from before the command say nothing about what it brought, so the streak starts anew.
+// Readings from before the command do not show its effect; the count restarts.
 void SpindleWatch::command_taken(double now) {
   taken_ = true;
   good_reads_ = 0;
@@ -222,7 +222,7 @@ void SpindleWatch::judge(double now) {
   check_time(now);
 }
 
-/// What has kept the request from being verified.
+/// The reason for which the request is not verified.
 std::string SpindleWatch::unverified_text() const {
   if (!taken_) {
     return "the command was not taken" +
@@ -249,7 +249,7 @@ SpindleState SpindleWatch::state() const {
   return goal_ == Goal::kSpeed ? SpindleState::kAtSpeed : SpindleState::kStopped;
 }
 
-// A drive that trips is often seen to lose speed before its fault is read: both are told then.
+// A drive that trips often loses speed before its fault is read; both are reported.
 std::string SpindleWatch::reason() const {
   if (!latched_.empty() && latched_.find(fault_trouble_) == std::string::npos) {
     return latched_ + "; " + fault_trouble_;
@@ -262,7 +262,7 @@ std::string SpindleWatch::reason() const {
 
 namespace {
 
-/// Hours of records at one a second, if nobody takes them.
+/// Hours of records at one per second, if they are not taken.
 constexpr std::size_t kMaxRecords = 20000;
 
 std::vector<RegisterMap> maps_of(const std::vector<GuardedDevice>& devices) {
@@ -351,9 +351,9 @@ std::string SpindleGuard::refusal(double rpm, bool clockwise) const {
   return {};
 }
 
-// The speed goes first, so that the spindle never starts towards the speed of an earlier job. One
-// that runs is given only the new speed: a drive such as the V20 takes the first step of its start
-// for a stop.
+// The speed is written first; the spindle never starts towards an earlier job's speed. A running
+// spindle gets only the new speed: a drive such as the V20 takes the first step of its start as a
+// stop.
 std::deque<WriteStep> SpindleGuard::start_steps(double rpm, bool clockwise) const {
   const SpindleCommands& commands = *spindle().commands;
   std::deque<WriteStep> steps{
@@ -481,9 +481,9 @@ void SpindleGuard::read_signals() {
   }
 }
 
-// Commands go before readings. While they fail, the two take turns at starting, as the one that
-// fails leaves the bus in a pause and the other nothing to do: a command that is not taken keeps no
-// interlock from being read, and readings that fail keep no stop from being tried.
+// Commands come before readings. While they fail, the two alternate in going first, because a
+// failure puts the bus in a pause that blocks the other. A failing command thus does not block the
+// interlocks' readings, and failing readings do not block a stop.
 void SpindleGuard::exchange() {
   const bool ready = devices_[spindle_device_].watch.ready();
   const bool commands_first = commands_first_;

@@ -16,13 +16,13 @@
 
 namespace lensforge {
 
-/// Polls the signals of one device, each at its interval, and tells which of them cannot be read
-/// any more: more failures in a row than its retries, its own or the whole device's, or silence
+/// Polls the signals of one device, each at its interval, and reports those that can no longer be
+/// read: more failures in a row than its retries, of the signal or of the whole device, or silence
 /// beyond the device's limit.
 class DeviceWatch {
  public:
   struct Reading {
-    std::size_t signal;   ///< As counted by add().
+    std::size_t signal;   ///< Number returned by add().
     std::uint16_t value;  ///< Masked.
     double time;
   };
@@ -30,16 +30,16 @@ class DeviceWatch {
   DeviceWatch(BusSession session, double silence_limit, Clock& clock)
       : session_(std::move(session)), silence_limit_(silence_limit), clock_(clock) {}
 
-  /// Takes a signal up. @return its number.
+  /// Adds a signal. @return its number.
   std::size_t add(const ReadSignal& signal);
-  /// Reads what is due, each signal at most once, and none more after one that was not answered:
-  /// at most one time-out a call.
+  /// Reads the due signals, each at most once, and stops after the first one without an answer: at
+  /// most one time-out per call.
   std::vector<Reading> poll();
-  /// Whether write() may be called now.
+  /// True if write() may be called now.
   [[nodiscard]] bool ready() const { return session_.ready(); }
-  /// @pre ready(). @return what went wrong, or nothing.
+  /// @pre ready(). @return the error; empty on success.
   std::optional<std::string> write(const RegisterAddress& at, std::uint16_t value);
-  /// Why the signal's last value is not to be relied on; or empty.
+  /// The reason for which the signal's last value is unreliable; empty if it is reliable.
   [[nodiscard]] std::string trouble(std::size_t signal) const;
 
  private:
@@ -56,45 +56,45 @@ class DeviceWatch {
   double silence_limit_;
   Clock& clock_;
   std::vector<Polled> polled_;
-  std::optional<double> silent_since_;  ///< The first request since which none was answered.
+  std::optional<double> silent_since_;  ///< Time of the first of the unanswered requests.
   std::string last_error_;
   int unanswered_ = 0;  ///< Requests in a row.
 };
 
-/// Judges readings of a spindle against what was asked of it. Pure logic: time and readings come in
-/// through the calls, nothing is read or written. A failure while a speed is asked for, or one that
-/// stands when it is asked for, stays until the next request; while stopping or idle it lasts as
-/// long as its cause.
+/// Compares a spindle's readings with the requested speed. Pure logic: time and readings are
+/// arguments, nothing is read or written. A failure during a request for a speed, or already
+/// present when it is made, stays until the next request; while stopping or idle it lasts as long
+/// as its cause.
 class SpindleWatch {
  public:
   explicit SpindleWatch(const SpindleMap& map) : map_(map) {}
 
   void expect_speed(double rpm, bool clockwise, double now);
   void expect_stop(double now);
-  /// The device has taken the command: readings from now on count.
+  /// The device has accepted the command: readings count from now on.
   void command_taken(double now);
-  /// The device has not taken it yet.
+  /// The device has not accepted the command yet.
   void command_failed(const std::string& error) { command_error_ = error; }
 
   void see_speed(double rpm, double now);
   void see_fault(std::uint16_t code, double now);
   void see_at_speed(bool at_speed, double now);
   void see_direction(std::uint16_t value, double now);
-  /// The device cannot be read or written; empty: it can again.
+  /// The device cannot be read or written; empty: it works again.
   void set_bus_trouble(const std::string& reason);
-  /// A request that cannot be fulfilled: stays failed until the next.
+  /// The request cannot be fulfilled: failed until the next request.
   void refuse(const std::string& reason);
-  /// Judges the time since the request.
+  /// Checks the time since the request against the limits.
   void check_time(double now);
 
   [[nodiscard]] SpindleState state() const;
-  /// What is wrong, without the device's name; or empty.
+  /// The fault, without the device's name; empty if none.
   [[nodiscard]] std::string reason() const;
   [[nodiscard]] double rpm() const { return rpm_; }
 
  private:
   enum class Goal { kNone, kSpeed, kStop };
-  /// A signal beside the speed: what it last said, and when.
+  /// Latest value of a signal other than the speed, and its time.
   struct Flag {
     bool good = false;
     double seen = 0.0;
@@ -128,27 +128,27 @@ class SpindleWatch {
   Flag at_speed_;
   Flag direction_;
 
-  std::string latched_;        ///< The first failure since a speed was asked for.
+  std::string latched_;        ///< The first failure since a speed was requested.
   std::string bus_trouble_;    ///< Live.
   std::string fault_trouble_;  ///< Live.
   std::string speed_trouble_;  ///< Live.
 };
 
-/// Who tells the spindle to turn.
+/// The party that commands the spindle.
 enum class SpindleOwner {
   kHost,        ///< The guard writes the commands of the register map.
-  kController,  ///< The controller's M3 does; the guard only watches. Tell it by spin() and stop()
-                ///< what to expect, before the controller executes the word.
+  kController,  ///< The controller's M3; the guard only watches. Call spin() and stop() before the
+                ///< controller executes the word.
 };
 
 struct GuardOptions {
   SpindleOwner owner = SpindleOwner::kHost;
-  double record_interval = 1.0;  ///< s between records of a speed that stays.
-  double record_change = 0.01;   ///< Share by which a speed has to move to be recorded at once.
+  double record_interval = 1.0;  ///< s between records of a constant speed.
+  double record_change = 0.01;   ///< Relative change of speed that is recorded at once.
 };
 
-/// The spindle of the devices that are to be guarded. @throw InputError unless exactly one has a
-/// spindle, with commands where the host is to drive it.
+/// Returns the spindle of the guarded devices. @throw InputError unless exactly one has a spindle,
+/// with commands if the host drives it.
 SpindleMap only_spindle(const std::vector<RegisterMap>& maps, SpindleOwner owner);
 
 /// A device and the bus to it.
@@ -157,13 +157,13 @@ struct GuardedDevice {
   std::unique_ptr<RegisterBus> bus;
 };
 
-/// Watches a spindle and interlocks over Modbus, on the thread that calls it; a poll() lasts as
-/// long as its exchanges, of which at most one a device runs into a time-out (BackgroundGuard
-/// keeps that off a sender's thread).
+/// Watches a spindle and interlocks over Modbus, on the thread that calls it; poll() takes as long
+/// as its exchanges, with at most one time-out per device (BackgroundGuard keeps this off a
+/// sender's thread).
 ///
-/// A failure never stops the spindle: only stop() does. A start that fails, or is asked for while
-/// something is wrong, is given up for good; a stop is tried until it is taken. Interlocks that
-/// were not read yet, or cannot be read, are not ok.
+/// A failure never stops the spindle; only stop() does. A start that fails, or is requested during
+/// a fault, is abandoned; a stop is repeated until the device accepts it. Interlocks that were not
+/// read yet or cannot be read are not ok.
 class SpindleGuard final : public Guard {
  public:
   /// @throw InputError as only_spindle() does.
@@ -174,15 +174,15 @@ class SpindleGuard final : public Guard {
   GuardReport poll() override;
   std::vector<GuardRecord> take_records() override;
 
-  /// Whether a command has not been taken yet.
+  /// True while the device has not accepted a command.
   [[nodiscard]] bool commands_pending() const { return !pending_.empty(); }
 
  private:
   enum class Role { kSpeed, kFault, kAtSpeed, kDirection, kInterlock };
-  /// What a device's signal means.
+  /// Meaning of a device's signal.
   struct Meaning {
     Role role;
-    std::size_t interlock;  ///< Of interlocks_.
+    std::size_t interlock;  ///< Index in interlocks_.
   };
   struct Device {
     std::string name;
@@ -227,11 +227,11 @@ class SpindleGuard final : public Guard {
   std::vector<std::string> interlock_names_;
 
   std::deque<WriteStep> pending_;
-  bool stopping_ = false;  ///< What is pending is a stop.
+  bool stopping_ = false;  ///< The pending command is a stop.
   int failed_writes_ = 0;
   bool commands_first_ = true;
   Running asked_ = Running::kNo;
-  Running running_ = Running::kNo;  ///< What the device last took.
+  Running running_ = Running::kNo;  ///< Last command that the device accepted.
 
   std::deque<GuardRecord> records_;
   GuardReport reported_;

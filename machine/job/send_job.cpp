@@ -43,7 +43,7 @@ struct MachinePort {
   }
 };
 
-/// Where the part lies in the simulated mill of 400 x 300 x 100 mm.
+/// Position of the part in the simulated mill of 400 x 300 x 100 mm.
 const Eigen::Vector3d kSimulatedOrigin(-350.0, -250.0, -60.0);
 
 SimulatedOptions simulated_options(const std::string& name) {
@@ -74,7 +74,7 @@ MachinePort open_machine_port(const std::string& text, const std::stop_token& st
   return port;
 }
 
-constexpr int kMaxLinks = 40;  ///< As the system follows.
+constexpr int kMaxLinks = 40;  ///< The system's limit for links.
 
 enum class Use { kRead, kWritten, kMachine };
 
@@ -86,7 +86,7 @@ struct Place {
   std::optional<struct stat> file;  ///< Nothing if it does not exist yet.
 };
 
-/// Where a file would be made: a link that leads nowhere yet is followed as well.
+/// Path at which a file would be created; dangling links are followed too.
 fs::path resolved(fs::path path) {
   std::error_code error;
   for (int i = 0; i < kMaxLinks && fs::is_symlink(path, error); ++i) {
@@ -149,7 +149,7 @@ std::vector<Place> places_of(const fs::path& program, const SendOptions& options
   return places;
 }
 
-/// Devices on one bus may share it; a controller shares its port with nobody.
+/// Devices may share a bus; a controller's port is never shared.
 bool on_one_bus(const Place& a, const Place& b) {
   const auto modbus = [](const Place& place) { return !place.name.starts_with("--port "); };
   return a.use == Use::kMachine && b.use == Use::kMachine && modbus(a) && modbus(b);
@@ -161,7 +161,7 @@ void silence(int descriptor) {
   if (!nowhere.open() || ::dup2(nowhere.number(), descriptor) < 0) ::close(descriptor);
 }
 
-/// Whether a descriptor of this process leads to a place that is written or a machine.
+/// True if a descriptor of this process refers to a written file or a machine at `place`.
 bool leads_to(int descriptor, const Place& place) {
   struct stat found {};
   if (place.use == Use::kRead || ::fstat(descriptor, &found) != 0) return false;
@@ -194,10 +194,9 @@ void require_own_address(const SendOptions& options, const std::vector<RegisterM
   }
 }
 
-/// The program, journal, other files, ports and register maps of a job have to be different files
-/// and devices, by whatever names they go, and none that is written may be where standard output or
-/// standard error lead to.
-/// @param maps  as register_maps() gave them. @throw InputError naming the two.
+/// The program, journal, other files, ports and register maps of a job must be different files and
+/// devices, whatever their names, and no written one may be the target of standard output or
+/// standard error. @param maps  from register_maps(). @throw InputError naming the two.
 void require_apart(const fs::path& program, const SendOptions& options,
                    const std::vector<RegisterMap>& maps, const std::vector<NamedFile>& beside) {
   const std::vector<Place> places = places_of(program, options, maps, beside);
@@ -216,7 +215,7 @@ void require_apart(const fs::path& program, const SendOptions& options,
 /// Bytes of a line as cam writes them, for the pace of a serial line.
 constexpr double kUsualLine = 24.0;
 
-/// What a dry run without a controller assumes of it: mm/min and mm/s².
+/// Controller settings assumed in a dry run without one: mm/min and mm/s².
 constexpr double kUsualRate = 5000.0;
 constexpr double kUsualAcceleration = 500.0;
 
@@ -327,7 +326,7 @@ class SendJob {
     }
   }
 
-  /// What stands in a journal must not be lost, and must be of this program.
+  /// An existing journal must not be lost and must belong to this program.
   void require_journal() {
     const fs::path path = options_.journal_of(file_);
     if (options_.resume) {
@@ -344,7 +343,7 @@ class SendJob {
                      ": an unfinished job; go on with --resume or begin again with --restart");
   }
 
-  /// What the controller and the way to it make of the program.
+  /// Options for examining the program for this controller and connection.
   [[nodiscard]] FactsOptions facts_of(Wire& wire, const MachinePort& port) const {
     const ControllerInfo& info = *summary_.controller;
     FactsOptions facts;

@@ -19,16 +19,16 @@
 
 namespace lensforge {
 
-/// A file that is written beside a job.
+/// A file that is written during a job.
 struct NamedFile {
-  std::string option;  ///< That names it.
+  std::string option;  ///< The option that names it.
   std::filesystem::path path;
 };
 
-/// All that a job found out.
+/// Results of a job.
 struct SendSummary {
   JobIdentity job;
-  std::optional<bool> seal_holds;  ///< machine/gcode/program_seal.h; nothing without a seal.
+  std::optional<bool> seal_holds;  ///< machine/gcode/program_seal.h; empty without a seal.
   ProgramFacts facts;
   std::optional<ControllerInfo> controller;
   Findings findings;
@@ -37,7 +37,7 @@ struct SendSummary {
   std::optional<SendResult> result;
 };
 
-/// Whom a job tells what happens, in this order. What nobody cares for does nothing.
+/// Observer of a job. Its functions are called in the order listed; each does nothing by default.
 class JobWatcher {
  public:
   JobWatcher() = default;
@@ -45,18 +45,18 @@ class JobWatcher {
   JobWatcher(const JobWatcher&) = delete;
   JobWatcher& operator=(const JobWatcher&) = delete;
 
-  /// What the watcher writes while the job runs: none may be the job's own.
+  /// Files that the watcher writes while the job runs; none may be one of the job's own.
   [[nodiscard]] virtual std::vector<NamedFile> files() const { return {}; }
-  /// The program can be read; nothing was made or touched yet.
+  /// The program can be read; nothing was written yet.
   virtual void opened(const JobIdentity& /*program*/) {}
   virtual void warned(const std::string& /*text*/) {}
-  /// How far a pass over the program is, and that it is over.
+  /// Progress of a pass over the program, and its end.
   virtual void passing(const Progress& /*progress*/) {}
   virtual void passed() {}
   virtual void connected(const ControllerInfo& /*controller*/) {}
-  /// The program against the controller; refusals end the job.
+  /// Result of checking the program against the controller; refusals end the job.
   virtual void examined(const ProgramFacts& /*facts*/, const Findings& /*findings*/) {}
-  /// Before the machine moves to go on. @throw InputError to refuse
+  /// Called before the machine moves to resume. @throw InputError to refuse
   virtual void confirm(const JournalRecord& /*before*/, const ResumePlan& /*plan*/) {}
   virtual void resumed(const ResumePlan& /*plan*/) {}
   /// The first line is about to leave. @param first_byte  where this run begins in the file.
@@ -67,10 +67,10 @@ class JobWatcher {
 };
 
 /// Sends a program to a machine: its seal, its limits and the controller's are checked first, its
-/// spindle and interlocks are watched, and a journal says how far it came.
+/// spindle and interlocks are watched, and a journal records its progress.
 /// @param stop, reset  SendControl's.
-/// @throw InputError for options, files and programs that will not do; StreamFault; LinkLost;
-///        Interrupted: in all these cases nothing of the program was sent.
+/// @throw InputError for unsuitable options, files and programs; StreamFault; LinkLost;
+///        Interrupted. In all these cases nothing of the program was sent.
 SendSummary send_job(const std::filesystem::path& program, const SendOptions& options,
                      JobWatcher& watcher, const std::stop_token& stop = {},
                      const std::stop_token& reset = {});

@@ -12,7 +12,7 @@ namespace {
 using O = SendOptions;
 using R = Row<O>;
 
-/// Somebody who holds a job comes back within a fortnight, s.
+/// Longest hold, about 11 days, s.
 constexpr double kMaxHold = 1e6;
 /// A spindle is looked at some times a second, and none takes an hour to start, s.
 constexpr double kMinWait = 0.1;

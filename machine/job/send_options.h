@@ -13,22 +13,22 @@
 
 namespace lensforge {
 
-/// How a program is sent to a machine.
+/// Options for sending a program to a machine.
 struct SendOptions {
-  std::string port;              ///< As parse_port_spec() reads it; empty for a dry run alone.
-  std::string dialect = "grbl";  ///< What a dry run without port checks for.
+  std::string port;              ///< For parse_port_spec(); empty only for a dry run.
+  std::string dialect = "grbl";  ///< Dialect for a dry run without a port.
   bool home = false;             ///< Home the machine first.
   bool dry_run = false;          ///< Check only.
   bool allow_changed = false;    ///< Send a program whose seal does not hold.
   std::string spindle;           ///< MAP[@PLACE]; empty for none.
   SpindleOwner owner = SpindleOwner::kHost;
   std::string interlocks;  ///< MAP[@PLACE] of a device without a spindle; empty for none.
-  /// Nothing but the operator switches the spindle: cuts need no M3.
+  /// Only the operator switches the spindle: cuts need no M3.
   bool spindle_by_hand = false;
-  double spin_up = 5.0;  ///< Of every spindle change, for the estimate of the time, s.
-  std::string journal;   ///< File; the program's with ".journal" if empty.
-  bool resume = false;   ///< Go on after a fault.
-  bool restart = false;  ///< Begin again in spite of an unfinished journal.
+  double spin_up = 5.0;  ///< Time per spindle change, for the time estimate, s.
+  std::string journal;   ///< File; if empty, the program's name with ".journal".
+  bool resume = false;   ///< Resume after a fault.
+  bool restart = false;  ///< Start again despite an unfinished journal.
   ResumeOptions entry;
   SenderOptions sender;
 
@@ -45,7 +45,7 @@ const OptionTable<SendOptions>& send_fields();
 ///        are missing.
 void validate(const SendOptions& options);
 
-/// The register maps that `spindle` and `interlocks` name, with their places. @throw InputError
+/// The register maps named by `spindle` and `interlocks`, with their endpoints. @throw InputError
 std::vector<RegisterMap> register_maps(const SendOptions& options);
 
 }  // namespace lensforge

@@ -20,16 +20,16 @@ class LinkLost : public std::runtime_error {
 class Link {
  public:
   virtual ~Link() = default;
-  /// The bytes that have arrived; waits for the first of them at most `wait` seconds of the link's
-  /// clock. Empty: none came. @throw LinkLost
+  /// Returns the bytes that have arrived; waits at most `wait` seconds of the link's clock for the
+  /// first one. Empty if none arrived. @throw LinkLost
   virtual std::string read(double wait) = 0;
-  /// Hands over as many bytes as the link takes at once, at least one unless its buffer is full.
-  /// @return how many. @throw LinkLost
+  /// Writes as many bytes as the link accepts at once, at least one unless its buffer is full.
+  /// @return their number. @throw LinkLost
   virtual std::size_t write(std::string_view bytes) = 0;
 };
 
-/// Time as a sender lives it: the machine's own steady clock, or a simulated controller's virtual
-/// time, in which hours of cutting take seconds.
+/// A sender's time: the computer's steady clock, or a simulated controller's virtual time, in which
+/// hours of cutting take seconds.
 class Clock {
  public:
   virtual ~Clock() = default;
@@ -39,7 +39,7 @@ class Clock {
   virtual void wait(double seconds) = 0;
 };
 
-/// The machine's own time.
+/// The computer's steady clock.
 class SteadyClock : public Clock {
  public:
   [[nodiscard]] double now() const override {

@@ -68,8 +68,8 @@ PortSpec tcp_spec(std::string_view whole, std::string_view rest) {
   return {PortSpec::Kind::kTcp, std::string(host), 0, static_cast<std::uint16_t>(*number)};
 }
 
-/// Device names hold colons too (/dev/serial/by-path/…-usb-0:1.2:1.0-port0): what stands after the
-/// last one is a speed only if it is all digits, at least four of them.
+/// Device names have colons too (/dev/serial/by-path/…-usb-0:1.2:1.0-port0): the text after the
+/// last one is a speed only if it consists of at least four digits.
 PortSpec serial_spec(std::string_view text) {
   PortSpec spec{PortSpec::Kind::kSerial, std::string(text)};
   const std::size_t colon = text.rfind(':');
@@ -112,7 +112,7 @@ std::string port_name(const PortSpec& spec) {
 
 namespace {
 
-/// For anybody, so that a second user is kept off as well.
+/// Readable and writable by all: the lock must also keep off another user.
 constexpr mode_t kForAnybody = 0666;
 
 /// A device must not become the controlling terminal, nor wait for a carrier.
@@ -124,8 +124,8 @@ constexpr int kOpenFlags = O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC;
 
 std::string reason(int error) { return std::generic_category().message(error); }
 
-/// Folders such as /run/lock let everybody make files and nobody take those of others, and Linux
-/// then refuses O_CREAT on a file of somebody else, even to root: so first without.
+/// In sticky folders such as /run/lock Linux refuses O_CREAT on another user's existing file, even
+/// for root; hence the first attempt is without it.
 Descriptor open_to_lock(const fs::path& file, bool may_create) {
   const int there = ::open(file.c_str(), kOpenFlags);
   if (there >= 0 || errno != ENOENT || !may_create) return Descriptor(there);
@@ -207,7 +207,7 @@ void make_raw(int descriptor) {
   ::tcsetattr(descriptor, TCSANOW, &settings);
 }
 
-/// Without HUPCL the system keeps DTR raised when the port is closed, so the next opening makes no
+/// Without HUPCL the system keeps DTR raised when the port is closed; the next opening makes no
 /// edge and resets no board.
 void keep_dtr_when_closed(int descriptor) {
   termios settings{};
@@ -287,7 +287,7 @@ struct FreeAddresses {
 };
 using Addresses = std::unique_ptr<addrinfo, FreeAddresses>;
 
-/// What the resolver says of a host; `flags` of getaddrinfo().
+/// The resolver's result for a host; `flags` of getaddrinfo().
 struct Lookup {
   int error = 0;
   Addresses list;
@@ -304,8 +304,8 @@ Lookup ask_resolver(const PortSpec& spec, int flags) {
   return {error, Addresses(error == 0 ? list : nullptr)};
 }
 
-/// The resolver may take half a minute and cannot be interrupted, so it works on a thread that is
-/// left alone if nobody waits for it any more.
+/// The resolver may take half a minute and cannot be interrupted; it runs on a thread that is
+/// abandoned on a stop request.
 Lookup look_up_name(const PortSpec& spec, const std::stop_token& stop) {
   struct Shared {
     std::mutex mutex;

@@ -15,7 +15,7 @@ struct sp_port;
 
 namespace lensforge {
 
-/// Where a controller is to be found.
+/// Address of a controller.
 struct PortSpec {
   enum class Kind { kSerial, kTcp, kSimulated };
   Kind kind = Kind::kSimulated;
@@ -28,18 +28,18 @@ struct PortSpec {
 /// @throw InputError naming --port, the value and the rule it broke.
 PortSpec parse_port_spec(std::string_view text);
 
-/// What parse_port_spec() takes, for messages.
+/// The port in the form of parse_port_spec(), for messages.
 std::string port_name(const PortSpec& spec);
 
-/// The right to be the only sender on a port while it lives, root included: an advisory lock
-/// (flock) on the device itself, or on a file that stands for a TCP address. The system drops it
-/// with the process, however that ends.
+/// Exclusive use of a port among senders, including root's, during this object's life: an advisory
+/// lock (flock) on the device itself, or on a file that represents a TCP address. The system
+/// releases it when the process ends, however it ends.
 class PortLock {
  public:
   /// @throw InputError if another sender has the port or the device cannot be opened.
   explicit PortLock(const PortSpec& spec);
 
-  /// The locked file, open for reading and writing without waiting; −1 for the simulation.
+  /// The locked file, open for non-blocking reading and writing; −1 for the simulation.
   [[nodiscard]] int descriptor() const { return file_.number(); }
 
  private:
@@ -51,14 +51,13 @@ class PortLock {
 std::filesystem::path lock_file(const PortSpec& spec);
 
 /// Waits at most `seconds` until `descriptor` is ready for `events` (poll(2)); a signal does not
-/// cut it short.
-/// @return the events that came, 0 for none.
+/// interrupt it. @return the events, 0 for none.
 short wait_for(int descriptor, short events, double seconds);
 
-/// A serial port, 8N1 without flow control, or a pseudo-terminal, for one sender alone.
+/// A serial port, 8N1 without flow control, or a pseudo-terminal, for one sender.
 ///
-/// Opening raises DTR, which resets the 8-bit boards that have it wired so; the port is left such
-/// that neither closing nor opening it again does.
+/// Opening raises DTR, which resets 8-bit boards that connect it to reset. The port is then
+/// configured so that closing and reopening it does not reset the board.
 class SerialLink : public Link {
  public:
   /// @throw InputError if the device cannot be opened, is in use or does not take the speed.
@@ -77,16 +76,16 @@ class SerialLink : public Link {
 
   std::string name_;
   PortLock lock_;
-  std::unique_ptr<sp_port, ClosePort> port_;  ///< None for a pseudo-terminal.
+  std::unique_ptr<sp_port, ClosePort> port_;  ///< Null for a pseudo-terminal.
 };
 
-/// A TCP connection to a controller, for one sender of this computer alone. Bytes go out as soon as
-/// they are written (no Nagle delay); a peer that falls silent is found dead in about ten seconds.
+/// A TCP connection to a controller, for one sender on this computer. Bytes are sent at once (no
+/// Nagle delay); a peer that falls silent is detected in about ten seconds.
 class TcpLink : public Link {
  public:
-  /// Connects, waiting at most `timeout` seconds for each address that the name stands for.
-  /// @throw InputError if the name stands for nothing, another sender has the address, or nobody
-  ///        answers there; Interrupted soon after `stop` asks for it.
+  /// Connects, waiting at most `timeout` seconds for each address of the name. @throw InputError if
+  /// the name has no address, another sender uses it, or there is no answer; Interrupted soon after
+  /// `stop` requests it.
   explicit TcpLink(const PortSpec& spec, const std::stop_token& stop = {}, double timeout = 5.0);
 
   std::string read(double wait) override;

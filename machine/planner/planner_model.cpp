@@ -187,8 +187,8 @@ void PlanTimeline::stand(double seconds) {
   interrupted_ = false;
 }
 
-/// Backward from the new end: v² ≤ v_next² + 2as; then forward from where nothing changed. The
-/// first piece is running: its entry is what it is.
+/// Backward from the new end: v² ≤ v_next² + 2as; then forward from the first change. The first
+/// piece is running: its entry is fixed.
 void PlanTimeline::plan() {
   std::size_t changed = size_ - 1;
   double next = 0.0;
@@ -226,7 +226,7 @@ void PlanTimeline::run_until(double time) {
   }
 }
 
-/// What is left of the running piece is planned anew with whatever arrives.
+/// The rest of the running piece is planned again when pieces arrive.
 void PlanTimeline::run_part(double seconds) {
   Entry& entry = at(0);
   const double exit = size_ > 1 ? std::sqrt(at(1).entry_square) : 0.0;
@@ -279,8 +279,8 @@ void PlannerModel::add(const GcodeMotion& motion) {
   note_demand(motion.line);
 }
 
-/// A full queue takes a line when a piece has run, so lines are taken as fast as they are needed;
-/// what fills it from empty can wait.
+/// A full queue accepts a line when a piece has run: this is the rate at which lines are needed.
+/// Lines that fill an empty queue can wait.
 void PlannerModel::note_demand(std::int64_t line) {
   if (!free_.full()) return;
   Demand& oldest = recent_[noted_ % recent_.size()];

@@ -126,7 +126,7 @@ Slot group_of_g(int code) {
   }
 }
 
-/// Null for one that this firmware, as it is built, does not know.
+/// Null for a word that this firmware build does not know.
 Slot group_of_m(int code, const SimulatedOptions& options) {
   switch (code) {
     case 0:
@@ -297,7 +297,7 @@ SimAction& add(SimLineState& state, Kind kind) {
   return action;
 }
 
-/// Where the line's axis words lead. @param machine  in machine coordinates (G53).
+/// Target of the line's axis words. @param machine  in machine coordinates (G53).
 Eigen::Vector3d target_of(const SimLine& line, const SimLineState& state, bool machine) {
   const SimModes& modes = state.modes;
   Eigen::Vector3d target = modes.position;
@@ -467,7 +467,7 @@ SimModes at_program_end(SimModes modes) {
   return modes;
 }
 
-/// Whether a jog's line has words beyond units, distance, G53, axes and feed.
+/// True if a jog's line has words other than units, distance, G53, axes and feed.
 bool beyond_jog(const SimLine& line) {
   const SimGroups& g = line.groups;
   return g.motion || g.plane || g.feed_mode || g.frame || g.stop || g.spindle || g.coolant ||

@@ -14,10 +14,10 @@
 
 namespace lensforge {
 
-/// The words of one line as the firmware takes them apart.
+/// The words of one line, as parsed by the firmware.
 struct SimWords {
-  std::array<std::optional<double>, 26> values;  ///< By letter, G and M apart.
-  std::vector<int> g;                            ///< Ten times the numbers.
+  std::array<std::optional<double>, 26> values;  ///< By letter, except G and M.
+  std::vector<int> g;                            ///< Ten times the number of each G word.
   std::vector<int> m;
 
   [[nodiscard]] std::optional<double> operator[](char letter) const {
@@ -26,13 +26,13 @@ struct SimWords {
   [[nodiscard]] bool any(std::string_view letters) const;
 };
 
-/// Takes a line apart that is free of blanks and comments, in upper case.
-/// @return 0, or the number of the error: 1, 2, 20, 23, 25.
+/// Parses a line without blanks and comments, in upper case. @return 0 or an error number: 1, 2,
+/// 20, 23, 25.
 int split_words(std::string_view line, SimWords& words);
 
 /// The G and M words of one line by modal group, ten times their numbers.
 struct SimGroups {
-  std::optional<int> special;  ///< What is in force for this line only: G4, G10, G28, G53 …
+  std::optional<int> special;  ///< Active for this line only: G4, G10, G28, G53 …
   std::optional<int> motion;
   std::optional<int> plane;
   std::optional<int> units;
@@ -40,17 +40,17 @@ struct SimGroups {
   std::optional<int> feed_mode;
   std::optional<int> frame;
   std::optional<int> tool_length;           ///< G43.1, G49
-  std::array<std::optional<int>, 3> quiet;  ///< What is taken and changes nothing: G40, G61 …
+  std::array<std::optional<int>, 3> quiet;  ///< Accepted without effect: G40, G61 …
   std::optional<int> stop;
   std::optional<int> spindle;
   std::optional<int> coolant;
   std::optional<int> tool;
-  int error = 0;  ///< 0, or 4, 20, 21, 27: what is wrong with the words.
+  int error = 0;  ///< 0 or an error number: 4, 20, 21, 27.
 
   [[nodiscard]] bool any_quiet() const;
 };
 
-/// Sorts a line's words, and checks what can be checked of each alone.
+/// Sorts a line's words by group and checks each by itself.
 SimGroups group_words(const SimWords& words, const SimulatedOptions& options);
 
 /// The chords that the simulated controller runs instead of an arc.
@@ -68,7 +68,7 @@ struct SimArc {
   [[nodiscard]] double length() const;
 };
 
-/// What a line says of an arc, mm.
+/// Arc words of a line, mm.
 struct SimArcWords {
   int plane = 17;
   bool clockwise = false;
@@ -77,13 +77,13 @@ struct SimArcWords {
   double tolerance = 0.002;
 };
 
-/// Fills `arc`. @return 0, or the number of the error: 33, 34.
+/// Fills `arc`. @return 0 or an error number: 33, 34.
 int lay_arc(const Eigen::Vector3d& start, const Eigen::Vector3d& end, const SimArcWords& words,
             SimArc& arc);
 
-/// What is in force in the firmware's parser. A value: a line makes a new one of it.
+/// Active modes of the firmware's parser. Each line returns a new value.
 struct SimModes {
-  int motion = 0;  ///< Ten times the word.
+  int motion = 0;  ///< Ten times the number.
   int plane = 17;
   bool inches = false;
   bool absolute = true;
@@ -102,7 +102,7 @@ struct SimModes {
   [[nodiscard]] double scale() const { return inches ? 25.4 : 1.0; }
 };
 
-/// What the firmware keeps in its EEPROM for G-code.
+/// G-code data in the firmware's EEPROM.
 struct SimStored {
   std::array<Eigen::Vector3d, 6> origins = no_origins();  ///< G54 … G59
   Eigen::Vector3d g28 = Eigen::Vector3d::Zero();
@@ -122,13 +122,13 @@ inline Eigen::Vector3d offset_of(const SimModes& modes, const SimStored& stored)
          modes.tool_length * Eigen::Vector3d::UnitZ();
 }
 
-/// One thing that a line makes the controller do; those of a line are done one after another.
+/// One action of the controller; a line's actions run one after another.
 struct SimAction {
   enum class Kind {
     kMove,     ///< `move`, or `arc` in its chords.
     kSync,     ///< Wait until nothing moves.
     kDwell,    ///< `value` seconds.
-    kSpindle,  ///< `turn`, `value` rpm asked for.
+    kSpindle,  ///< `turn`, `value`: requested rpm.
     kCoolant,  ///< `turn` bits: 1 mist, 2 flood.
     kTool,     ///< Wait for the operator.
     kPause,    ///< M0: hold until resumed.
@@ -142,7 +142,7 @@ struct SimAction {
   int turn = 0;
 };
 
-/// One line as it was read.
+/// One parsed line.
 struct SimLine {
   SimWords words;
   SimGroups groups;
@@ -151,13 +151,13 @@ struct SimLine {
   [[nodiscard]] bool has_axes() const { return words.any("XYZ"); }
 };
 
-/// The parser on its way through a line: each step takes one and gives the next.
+/// State of the parser within a line: each step maps one state to the next.
 struct SimLineState {
   SimModes modes;
   SimStored stored;
-  std::vector<SimAction> actions;  ///< What the line makes the controller do so far.
-  std::string used = "N";          ///< Letters of words that a step took up.
-  int error = 0;                   ///< Number of the error that ends the line here, or 0.
+  std::vector<SimAction> actions;  ///< The line's actions so far.
+  std::string used = "N";          ///< Letters of the words already used.
+  int error = 0;                   ///< Error number that ends the line here, or 0.
 };
 
 /// The steps of a line. @pre state.error == 0
@@ -167,36 +167,36 @@ SimLineState tool(const SimLine& line, SimLineState state);     ///< T M6
 SimLineState spindle(const SimLine& line, SimLineState state);  ///< S M3 M4 M5
 SimLineState coolant(const SimLine& line, SimLineState state);  ///< M7 M8 M9
 SimLineState dwell(const SimLine& line, SimLineState state);    ///< G4
-/// G17 G18 G19 G90 G91 G54 … G59, and the motion that is in force from here on.
+/// G17 G18 G19 G90 G91 G54 … G59, and the motion mode from here on.
 SimLineState frame(const SimLine& line, SimLineState state);
-/// What the axis words are for: G10 G28 G30 G92, or a motion.
+/// Applies the axis words: G10 G28 G30 G92, or a motion.
 SimLineState axes(const SimLine& line, SimLineState state);
-SimLineState unused(const SimLine& line, SimLineState state);  ///< Refuses words that nobody took.
+SimLineState unused(const SimLine& line, SimLineState state);  ///< Refuses unused words.
 SimLineState stop(const SimLine& line, SimLineState state);    ///< M0 M1 M2 M30
 }  // namespace sim_step
 
-/// Runs a line through all steps, in the order that the Grbl documentation gives for its words,
-/// until one ends it. @param state  of the parser before it.
+/// Runs a line through all steps, in the order of the Grbl documentation, until one ends it. @param
+/// state  the parser's state before the line.
 SimLineState run_sim_line(const SimLine& line, SimLineState state);
 
 /// Runs the part of `$J=` behind the sign.
 SimLineState jog_sim_line(const SimLine& line, SimLineState state);
 
-/// The firmware's G-code parser: it keeps modes and stores from line to line (run_sim_line()).
+/// The firmware's G-code parser: keeps modes and stored data from line to line (run_sim_line()).
 class SimGcode {
  public:
   SimGcode(const SimSettings& settings, const SimulatedOptions& options)
       : settings_(settings), options_(options) {}
 
-  /// Runs one clean line (no blanks, no comments, upper case); appends to `actions`.
-  /// @return 0, or the number of the error; nothing has changed then.
+  /// Runs one clean line (no blanks, no comments, upper case); appends to `actions`. @return 0, or
+  /// an error number; then nothing has changed.
   int run(std::string_view line, std::vector<SimAction>& actions);
   /// Runs the part of `$J=` behind the sign. Changes no mode.
   int jog(std::string_view line, std::vector<SimAction>& actions);
 
-  /// Back to what holds after a reset; stored offsets stay.
+  /// Restores the modes after a reset; stored offsets stay.
   void reset();
-  /// Where the tool is, once it is not where the lines led it.
+  /// Sets the tool's position when it differs from the programmed one.
   void set_position(const Eigen::Vector3d& position) { modes_.position = position; }
   void stop_spindle() { modes_.spindle = 0; }
 

@@ -86,7 +86,7 @@ void SimQueue::plan() {
   }
 }
 
-/// What the front piece does next, and for how long.
+/// The front piece's next phase of motion and its duration.
 SimQueue::Phase SimQueue::phase() const {
   const Block& block = blocks_.front();
   const double a = block.acceleration;

@@ -10,9 +10,9 @@
 
 namespace lensforge {
 
-/// A straight piece that the controller is told to run.
+/// A straight piece to run.
 struct SimMove {
-  Eigen::Vector3d target = Eigen::Vector3d::Zero();  ///< What the controller calls it, mm.
+  Eigen::Vector3d target = Eigen::Vector3d::Zero();  ///< In the controller's coordinates, mm.
   double feed = 0.0;                                 ///< mm/min; ignored for a rapid.
   bool rapid = false;
   bool jog = false;
@@ -20,53 +20,52 @@ struct SimMove {
   std::int64_t received = 0;  ///< Ordinal of its line.
 };
 
-/// The simulated controller's planner and step generator: it keeps pieces, plans their corner
-/// speeds, and moves along them in time.
+/// The simulated controller's planner and step generator: queues pieces, plans their corner speeds,
+/// and moves along them in time.
 ///
-/// It shares no code with the time model in machine/planner/, so that each can be held against
-/// the other.
+/// It shares no code with the time model in machine/planner/; each is a check of the other.
 class SimQueue {
  public:
-  /// @param settings  must outlive the queue; read as pieces come in.
+  /// @param settings  must outlive the queue; read when pieces are pushed.
   SimQueue(const SimSettings& settings, int capacity);
 
-  /// Hears of every piece that ended, whole or not.
+  /// Called for every piece that ended, complete or not.
   std::function<void(const ExecutedPiece&)> ended;
-  /// Hears of every piece that begins.
+  /// Called for every piece that begins.
   std::function<void(const ExecutedPiece&)> begun;
 
   [[nodiscard]] bool empty() const { return blocks_.empty(); }
   [[nodiscard]] int room() const { return capacity_ - static_cast<int>(blocks_.size()); }
-  /// Appends a piece; less than a step is nothing. @pre room() > 0
+  /// Appends a piece; ignores one shorter than a step. @pre room() > 0
   void push(const SimMove& move);
-  /// Runs for at most `seconds`; stops early when a piece ends or a hold has come to its stand.
+  /// Runs for at most `seconds`; stops early when a piece ends or a hold has stopped the motion.
   /// @return the seconds used.
   double run(double seconds);
-  /// Runs everything in no time.
+  /// Runs everything without using time.
   void finish_now();
-  /// Ends every piece at once where it is and forgets all of them.
+  /// Stops at the current position and discards all pieces.
   void clear();
 
   void hold() { holding_ = true; }
   void resume();
   [[nodiscard]] bool holding() const { return holding_; }
-  /// A hold has come to its stand.
+  /// True if a hold has stopped the motion.
   [[nodiscard]] bool stands() const { return speed_ == 0.0; }
 
   /// Percent of the programmed feed and of the rapid rate.
   void set_overrides(double feed, double rapid);
 
-  /// What the controller believes, mm.
+  /// Position according to the controller, mm.
   [[nodiscard]] Eigen::Vector3d position() const;
   void set_position(const Eigen::Vector3d& position) { position_ = position; }
   [[nodiscard]] double speed() const { return speed_; }  ///< mm/s
-  /// N word of the piece that runs; 0 for none.
+  /// N word of the running piece; 0 for none.
   [[nodiscard]] std::int64_t number() const { return empty() ? 0 : blocks_.front().move.number; }
   [[nodiscard]] Eigen::Vector3d direction() const;
 
-  double now = 0.0;  ///< Kept by the owner; stamps the pieces.
-  int spindle = 0;   ///< Likewise.
-  double rpm = 0.0;  ///< Likewise.
+  double now = 0.0;  ///< Set by the owner; recorded with the pieces.
+  int spindle = 0;   ///< Set by the owner.
+  double rpm = 0.0;  ///< Set by the owner.
 
  private:
   struct Block {
@@ -75,7 +74,7 @@ class SimQueue {
     Eigen::Vector3d unit;
     double length = 0.0;
     double acceleration = 0.0;
-    double fastest = 0.0;  ///< That the axes allow along it, mm/s.
+    double fastest = 0.0;  ///< Limit of the axes along it, mm/s.
     double corner = 0.0;   ///< Speed at the corner before it.
     double entry = 0.0;    ///< Planned.
     bool begun = false;
@@ -100,7 +99,7 @@ class SimQueue {
   const SimSettings& settings_;
   int capacity_;
   std::deque<Block> blocks_;
-  Eigen::Vector3d position_ = Eigen::Vector3d::Zero();  ///< Where the front piece began.
+  Eigen::Vector3d position_ = Eigen::Vector3d::Zero();  ///< Start of the front piece.
   double done_ = 0.0;                                   ///< mm of the front piece.
   double speed_ = 0.0;
   bool holding_ = false;

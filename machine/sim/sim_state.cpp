@@ -239,7 +239,7 @@ std::string override_text(const SimSnapshot& machine) {
   return text;
 }
 
-/// Offsets now and then; overrides likewise, never in the same report.
+/// Offsets and overrides are sent at intervals, never in the same report.
 SimReport extras(const SimSnapshot& machine, SimCountdowns countdowns) {
   if (countdowns.offset-- <= 0) {
     countdowns.offset = (machine.rests ? kOffsetAtRest : kOffsetInMotion) - 1;

@@ -10,19 +10,19 @@
 
 namespace lensforge {
 
-/// Bytes that were received and not read yet.
+/// Received, unread bytes.
 struct SimBuffer {
   std::string bytes;
-  std::size_t read = 0;  ///< Those of `bytes` that are used up.
+  std::size_t read = 0;  ///< Number of bytes already read.
 
   [[nodiscard]] bool empty() const { return read == bytes.size(); }
   [[nodiscard]] std::size_t size() const { return bytes.size() - read; }
   [[nodiscard]] std::string_view rest() const { return std::string_view(bytes).substr(read); }
-  /// Puts a byte behind the others.
+  /// Appends a byte.
   void add(char byte);
 };
 
-/// The line in the making: what is left of the characters that came.
+/// The line being received, without dropped characters.
 struct SimIntake {
   std::string line;
   bool overflows = false;
@@ -30,41 +30,41 @@ struct SimIntake {
   char last_end = 0;  ///< CR or LF, if that was the last character.
 };
 
-/// How a firmware takes lines in.
+/// A firmware's rules for reading lines.
 struct SimIntakeRules {
-  std::size_t longest = 79;  ///< Characters that count.
-  bool crlf_is_one = false;  ///< grblHAL takes CR LF for one end; Grbl the second for a line.
+  std::size_t longest = 79;  ///< Maximum number of characters.
+  bool crlf_is_one = false;  ///< grblHAL: CR LF is one line end; Grbl: two.
 };
 
-/// A character comes. `ended` says whether it ends the line.
+/// Result of taken(). `ended`: the character ends the line.
 struct SimTaken {
   SimIntake intake;
   bool ended = false;
 };
 SimTaken taken(SimIntake intake, char c, const SimIntakeRules& rules);
 
-/// States as reports name them.
+/// States, named as in reports.
 enum class MachineState { kIdle, kRun, kHold, kJog, kAlarm, kDoor, kCheck, kHome, kSleep, kTool };
 
-/// What the firmware takes its machine to be doing. Times in s of the simulation.
+/// The firmware's view of the machine. Times in s of the simulation.
 struct SimState {
   static constexpr double kNever = -1.0;
 
   MachineState state = MachineState::kIdle;
   int alarm = 0;           ///< Last one, for grblHAL's reports.
-  bool critical = false;   ///< Nothing but a reset helps.
-  bool stopped = true;     ///< A hold or a door has come to its stand.
-  bool door_open = false;  ///< The switch, not the state.
-  bool limit_hit = false;  ///< A line asked for more than the travel: stop, then alarm 2.
+  bool critical = false;   ///< Only a reset is accepted.
+  bool stopped = true;     ///< The motion has stopped after a hold or a door.
+  bool door_open = false;  ///< State of the switch.
+  bool limit_hit = false;  ///< A line exceeded the travel: stop, then alarm 2.
   bool homed = false;
   bool tool_acknowledged = false;   ///< Other lines run beside the tool change.
   double restoring_until = kNever;  ///< Spindle after a door.
   double homing_until = kNever;
-  int door_spindle = 0;  ///< To be restored after a door.
+  int door_spindle = 0;  ///< Restored after a door.
   double door_rpm = 0.0;
 };
 
-/// What the queue of motions is at.
+/// State of the motion queue.
 struct SimMotion {
   bool empty = true;
   bool holding = false;
@@ -73,53 +73,53 @@ struct SimMotion {
   [[nodiscard]] bool at_stand() const { return empty || (holding && stands); }
 };
 
-/// The firmware's decisions and changes of state as functions of values: what happens to queue,
-/// spindle and output with them is the controller's.
+/// The firmware's decisions and state changes as pure functions. The controller applies them to
+/// queue, spindle and output.
 namespace sim_state {
 
-/// Whether the mill moves.
+/// True if the mill moves.
 bool moving(const SimState& now, const SimMotion& motion);
-/// Whether no line is taken.
+/// True if no line is accepted.
 bool suspended(const SimState& now);
-/// Whether nothing moves or holds, so that most `$` lines are taken.
+/// True if nothing moves or is held; most `$` lines are then accepted.
 bool still(const SimState& now, const SimMotion& motion);
 bool takes_jog(const SimState& now, const SimMotion& motion);
 
-/// What has come to pass and is to be dealt with next.
+/// Next event to handle.
 enum class Due {
   kNothing,
   kHomed,
   kRestored,  ///< The spindle turns again after a door.
-  kStopped,   ///< A hold, a door or a cancelled jog has come to its stand.
+  kStopped,   ///< The motion has stopped after a hold, a door or a cancelled jog.
   kRanOut,    ///< Nothing is left to run.
-  kLimit,     ///< The motion before a line beyond the travel has ended.
+  kLimit,     ///< The motion before a line that exceeds the travel has ended.
 };
 Due due(const SimState& now, const SimMotion& motion, double time);
 
-/// What a cycle start brings about.
+/// Effect of a cycle start.
 enum class Start { kNothing, kLeaveTool, kBegin, kRestoreSpindle, kResume };
 Start on_cycle_start(const SimState& now);
 
-/// What a feed hold brings about.
+/// Effect of a feed hold.
 enum class Hold { kNothing, kCancelJog, kStop };
 Hold on_feed_hold(const SimState& now);
 
-/// What an opened door brings about.
+/// Effect of an opened door.
 enum class Door { kNothing, kAlarm, kStop };
 Door on_door(const SimState& now);
 
-/// The alarm that a soft reset brings, or 0.
+/// The alarm caused by a soft reset, or 0.
 int alarm_of_reset(const SimState& now);
 
-/// Slows down to a stand; `shown` is the state from now on.
+/// Decelerates to a stop; `shown` is the state from now on.
 SimState stopping(SimState now, MachineState shown, bool moves);
-/// A jog slows down to its end.
+/// Decelerates a cancelled jog.
 SimState cancelling(SimState now);
-/// Goes on with what is queued.
+/// Continues with the queue.
 SimState resumed(SimState now, const SimMotion& motion);
-/// Nothing runs any more.
+/// The queue has ended.
 SimState ran_out(SimState now);
-/// Everything has ended at once.
+/// Everything was stopped at once by alarm `code`.
 SimState alarmed(SimState now, int code);
 SimState homed(SimState now);
 /// After any reset: alarms stay, also through sleep.
@@ -130,14 +130,14 @@ std::string text(const SimState& now, bool hal, double time);
 
 }  // namespace sim_state
 
-/// Percent of what the program asks for.
+/// Overrides, percent of the programmed values.
 struct SimOverrides {
   double feed = 100.0;
   double rapid = 100.0;
   double spindle = 100.0;
 };
 
-/// What a realtime byte makes of them; nothing if it is no override.
+/// The overrides after a realtime byte; empty if it is no override.
 std::optional<SimOverrides> overridden(SimOverrides before, unsigned char byte);
 
 /// Reports until the next WCO and the next Ov.
@@ -146,17 +146,17 @@ struct SimCountdowns {
   int overrides = 1;
 };
 
-/// What a status report is written from. Lengths in mm, times in s.
+/// Data of a status report. Lengths in mm, times in s.
 struct SimSnapshot {
   std::string state;
-  bool rests = true;  ///< Idle or in alarm: some fields come more often.
+  bool rests = true;  ///< Idle or in alarm: some fields are sent more often.
   int mask = 0;       ///< $10
   bool inches = false;
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< Of the machine.
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< Machine position.
   Eigen::Vector3d offset = Eigen::Vector3d::Zero();    ///< Machine − work.
   int free_blocks = 0;
   std::size_t free_bytes = 0;
-  std::int64_t number = 0;  ///< N word of what runs; 0 for none.
+  std::int64_t number = 0;  ///< N word of the running motion; 0 for none.
   double speed = 0.0;
   double rpm = 0.0;
   bool door_open = false;

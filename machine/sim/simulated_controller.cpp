@@ -12,7 +12,7 @@ namespace lensforge {
 namespace {
 
 constexpr double kSpindleRestore = 4.0;  ///< s, after a door (Grbl's SAFETY_DOOR_SPINDLE_DELAY).
-/// A mill whose pulses end at once goes on for about this long: steps are lost.
+/// A mill whose pulses stop abruptly coasts for about this long: steps are lost.
 constexpr double kCoasting = 0.01;  ///< s
 
 }  // namespace
@@ -56,7 +56,7 @@ void SimulatedController::power_cycle() {
   power_up();
 }
 
-/// What every reset does: buffers empty, modes as new, greeting; an alarm stays.
+/// Common part of all resets: empties buffers, resets modes, sends the banner; an alarm stays.
 void SimulatedController::restart() {
   queue_.clear();
   gcode_.reset();
@@ -108,7 +108,7 @@ double SimulatedController::run_until(double time) {
 void SimulatedController::work() {
   while (settle() || step_parser()) {
   }
-  // Nothing more to read: what is queued begins to run.
+  // Nothing more to read: the queue starts to run.
   if (rx_.empty() && !line_waits_) begin_motion();
 }
 
@@ -284,7 +284,7 @@ void SimulatedController::finish_homing() {
   run_startup_lines();
 }
 
-/// Other lines run beside the tool change until the operator goes on.
+/// Other lines run during the tool change until the operator resumes.
 void SimulatedController::acknowledge_tool() {
   if (machine_.state != MachineState::kTool || machine_.tool_acknowledged) return;
   machine_.tool_acknowledged = true;
@@ -323,7 +323,7 @@ void SimulatedController::receive(char byte) {
   rx_.add(byte);
 }
 
-/// Whether the byte was a command, or is none of the line's business.
+/// True if the byte was a command or does not belong to the line.
 bool SimulatedController::realtime(unsigned char byte) {
   switch (byte) {
     case '?':
@@ -504,7 +504,7 @@ bool SimulatedController::run_action() {
   return true;
 }
 
-/// What takes no place in the queue.
+/// Actions that need no place in the queue.
 void SimulatedController::carry_out(const SimAction& action) {
   const bool checks = machine_.state == MachineState::kCheck;
   switch (action.kind) {
@@ -560,7 +560,7 @@ bool SimulatedController::queue_move(const SimAction& action) {
     move.target = action.arc->chord_end(errand_.chord);
   }
   if (settings_.on(20) && !move.jog && beyond_travel(move.target)) {
-    // The motion that runs comes to its stand first; the line is never answered.
+    // The running motion stops first; the line is never answered.
     errand_ = Errand();
     machine_.limit_hit = machine_.critical = true;
     if (!queue_.empty()) queue_.hold();
@@ -751,7 +751,7 @@ int SimulatedController::write_setting(const std::string& line) {
   return error;
 }
 
-/// The board hears nothing while it writes.
+/// The board loses bytes while it writes.
 void SimulatedController::store() {
   if (options_.instant) return;
   busy_until_ = deaf_until_ = now_ + options_.eeprom_seconds;

@@ -15,32 +15,32 @@
 
 namespace lensforge {
 
-/// Something that the controller said, and when.
+/// Output of the controller and its time.
 struct Spoken {
   double time = 0.0;
   std::string text;
 };
 
 /// A Grbl 1.1 or grblHAL controller and its mill, in virtual time: receive buffer, realtime
-/// commands, line parser, planner, motion, alarms and reports, as the published documentation of
-/// Grbl 1.1 and grblHAL tells. Memory does not grow with what it runs.
+/// commands, line parser, planner, motion, alarms and reports, as documented for Grbl 1.1 and
+/// grblHAL. Memory does not grow with the program.
 ///
-/// What it decides stands in functions of values: sim_state.h (bytes to lines, what its machine
-/// does, reports) and sim_gcode.h (lines to actions). This class carries it out.
+/// Its decisions are pure functions: sim_state.h (bytes to lines, machine states, reports) and
+/// sim_gcode.h (lines to actions). This class carries them out.
 ///
-/// It remembers where the mill truly stands beside what the controller believes: a reset in motion,
-/// a hard stop or a power cycle makes the two differ until the next homing.
+/// It tracks the mill's true position as well as the controller's: a reset in motion, a hard stop
+/// or a power cycle makes the two differ until the next homing.
 class SimulatedController {
  public:
   explicit SimulatedController(const SimulatedOptions& options, const MachineWatch& watch = {});
   SimulatedController(const SimulatedController&) = delete;
   SimulatedController& operator=(const SimulatedController&) = delete;
 
-  /// A byte arrives, now.
+  /// A byte arrives.
   void receive(char byte);
-  /// Everything said since the last call.
+  /// Takes the output since the last call.
   std::vector<Spoken> take_output();
-  /// Lets time pass up to `time`, or up to the next moment at which something was said.
+  /// Lets time pass up to `time` or the next output.
   /// @return now().
   double run_until(double time);
   [[nodiscard]] double now() const { return now_; }
@@ -51,20 +51,22 @@ class SimulatedController {
   void feed_hold();
   void cycle_start();
   void move_door(bool open);
-  /// Alarm `code`: 1 and 2 as limits do, any other as the firmware does.
+  /// Raises alarm `code`: 1 and 2 as limits do, others as the firmware does.
   void raise_alarm(int code);
-  /// The next G-code line is answered by this error and not run.
+  /// The next G-code line is answered with this error and not run.
   void fail_next_line(int error) { scripted_error_ = error; }
   /// The next homing ends in alarm 8 or 9.
   void fail_next_homing(int alarm) { scripted_homing_ = alarm; }
   /// The next bytes find the receive buffer full.
   void lose_bytes(int count) { losing_ = count; }
 
-  // What can be seen of it.
+  // Observers.
   [[nodiscard]] MachineState state() const { return machine_.state; }
   /// "Run", "Hold:0"
   [[nodiscard]] std::string state_text() const { return sim_state::text(machine_, is_hal(), now_); }
-  [[nodiscard]] Eigen::Vector3d position() const { return queue_.position(); }  ///< As it believes.
+  [[nodiscard]] Eigen::Vector3d position() const {
+    return queue_.position();
+  }  ///< According to the controller.
   [[nodiscard]] Eigen::Vector3d true_position() const { return queue_.position() + slip_; }
   [[nodiscard]] bool moving() const { return sim_state::moving(machine_, motion()); }
   [[nodiscard]] int spindle() const { return queue_.spindle; }
@@ -73,14 +75,14 @@ class SimulatedController {
   [[nodiscard]] std::int64_t received_lines() const { return received_; }
   [[nodiscard]] std::int64_t lost_bytes() const { return lost_; }
   [[nodiscard]] const SimSettings& settings() const { return settings_; }
-  /// Sets G54 … G59 (0 … 5), as an operator did before.
+  /// Sets G54 … G59 (0 … 5), as an operator does before a job.
   void set_origin(int index, const Eigen::Vector3d& origin) { gcode_.set_origin(index, origin); }
 
  private:
   /// A line in progress: its remaining work and its answer.
   struct Errand {
     std::deque<SimAction> actions;
-    int chord = 0;  ///< Of the first action's arc, next to be queued.
+    int chord = 0;  ///< Next chord of the first action's arc to queue.
     bool answer = false;
     std::int64_t received = 0;
   };
@@ -160,7 +162,7 @@ class SimulatedController {
 
   SimBuffer rx_;
   SimIntake intake_;
-  bool line_waits_ = false;  ///< A whole line is being taken in until busy_until_.
+  bool line_waits_ = false;  ///< A complete line is being processed until busy_until_.
   Errand errand_;
   Errand saved_errand_;  ///< The tool change while other lines run.
   std::string saved_rx_;

@@ -24,7 +24,7 @@ std::unique_ptr<Link> SimulatedMachine::open() {
   incoming_.clear();
   if (powerless_ || wire_.reset_on_open) controller_.power_cycle();
   powerless_ = false;
-  // What is said from now on is heard; the greeting at power-up only if nobody waited.
+  // Output from now on is received; the power-up banner only if no time has passed.
   hear();
   return std::make_unique<SimulatedLink>(*this, opened_);
 }

@@ -15,29 +15,29 @@
 
 namespace lensforge {
 
-/// Way of a byte between host and controller.
+/// Direction of a byte between host and controller.
 enum class WireDirection { kToController, kToHost };
 
-/// What can go wrong.
+/// Kinds of fault.
 enum class FaultKind {
-  kUnplug,        ///< The link is gone for `seconds`; the controller goes on.
-  kUnplugReset,   ///< Likewise, and the controller is without power meanwhile.
-  kReset,         ///< The controller starts anew by itself and greets (brown-out).
+  kUnplug,        ///< The link is down for `seconds`; the controller keeps running.
+  kUnplugReset,   ///< The link and the controller's power are off for `seconds`.
+  kReset,         ///< The controller restarts and sends its banner (brown-out).
   kAlarm,         ///< Alarm `code`; 0 stands for 1, a limit switch.
-  kError,         ///< The next G-code line is answered by error `code` (0: 20) and not run.
-  kLostReply,     ///< The next ok or error is lost on its way.
+  kError,         ///< The next G-code line is answered with error `code` (0: 20), not run.
+  kLostReply,     ///< The next ok or error is lost.
   kGarbledReply,  ///< The next ok or error arrives with a wrong byte.
   kDuplicatedOk,  ///< The next ok arrives twice.
-  kStall,         ///< Nothing is heard of the controller for `seconds`.
+  kStall,         ///< The controller sends nothing for `seconds`.
   kRxOverrun,     ///< `code` (0: 8) bytes find the receive buffer full.
   kPartialWrite,  ///< The link takes part of a write, then nothing for `seconds`.
   kDoor,          ///< The door opens, and closes after `seconds`.
-  kHold,          ///< Somebody presses feed hold at the machine.
+  kHold,          ///< Feed hold is pressed at the machine.
   kDroppedByte,   ///< One byte vanishes.
 };
 
-/// One fault, once: it strikes when so many bytes have gone `direction`'s way since power-up, at
-/// the byte after them.
+/// A fault that occurs once: at the byte after the stated number of bytes in `direction` since
+/// power-up.
 struct SimulatedFault {
   FaultKind kind = FaultKind::kStall;
   WireDirection direction = WireDirection::kToController;
@@ -46,17 +46,17 @@ struct SimulatedFault {
   int code = 0;
 };
 
-/// The line between host and controller.
+/// Connection between host and controller.
 struct WireOptions {
   double bytes_per_second = 11520.0;  ///< Each way; 0 for no limit.
   double latency = 0.001;             ///< s, each way.
-  double gathering = 0.001;           ///< s that arriving bytes are gathered for one read.
-  std::size_t host_buffer = 4096;     ///< Bytes that a write may leave on their way.
+  double gathering = 0.001;           ///< s for which arriving bytes are collected into one read.
+  std::size_t host_buffer = 4096;     ///< Maximum number of written bytes in transit.
   bool reset_on_open = false;         ///< Opening the port restarts the board, as many do.
 };
 
-/// A simulated controller at the end of a line, with faults, and the clock that all of it runs by:
-/// time passes only while somebody waits or reads (a read takes 10 µs at least).
+/// A simulated controller with its connection, faults and clock. Time passes only during waits and
+/// reads (a read takes at least 10 µs).
 class SimulatedMachine : public Clock {
  public:
   explicit SimulatedMachine(const SimulatedOptions& options, const WireOptions& wire = {},
@@ -65,18 +65,18 @@ class SimulatedMachine : public Clock {
   [[nodiscard]] double now() const override { return controller_.now(); }
   void wait(double seconds) override { run_until(now() + seconds); }
 
-  /// Opens the port, closing what was open. @throw LinkLost while it is unplugged.
+  /// Opens the port and closes any earlier link. @throw LinkLost while it is unplugged.
   std::unique_ptr<Link> open();
 
-  /// Adds a fault to those that wait for their byte.
+  /// Adds a pending fault.
   void add_fault(const SimulatedFault& fault) { faults_.push_back(fault); }
-  /// Faults that have struck, in order, and when.
+  /// A fault that occurred, and its time.
   struct Strike {
     SimulatedFault fault;
     double time = 0.0;
   };
   [[nodiscard]] const std::vector<Strike>& strikes() const { return strikes_; }
-  /// Bytes that have gone that way since power-up.
+  /// Number of bytes in that direction since power-up.
   [[nodiscard]] std::int64_t bytes(WireDirection direction) const {
     return carried_[static_cast<std::size_t>(direction)];
   }
@@ -86,7 +86,7 @@ class SimulatedMachine : public Clock {
  private:
   friend class SimulatedLink;
   struct Chunk {
-    double begin = 0.0;  ///< When its first byte starts to arrive.
+    double begin = 0.0;  ///< Arrival time of its first byte.
     std::string text;
     std::size_t taken = 0;
   };
@@ -111,15 +111,15 @@ class SimulatedMachine : public Clock {
 
   WireOptions wire_;
   SimulatedController controller_;
-  std::int64_t opened_ = 0;  ///< Ordinal of the link that is open; 0 for none.
+  std::int64_t opened_ = 0;  ///< Number of the open link; 0 for none.
   std::int64_t opens_ = 0;
   double unplugged_until_ = -1.0;
   bool powerless_ = false;
   std::string outgoing_;
   std::size_t outgoing_read_ = 0;
-  double next_byte_ = 0.0;  ///< When the next outgoing byte arrives.
+  double next_byte_ = 0.0;  ///< Arrival time of the next outgoing byte.
   std::deque<Chunk> incoming_;
-  double line_free_ = 0.0;  ///< When the line to the host is free for the next chunk.
+  double line_free_ = 0.0;  ///< Time at which the line to the host is free.
   std::array<std::int64_t, 2> carried_{};
   std::int64_t accepted_ = 0;
   std::vector<SimulatedFault> faults_;
@@ -132,7 +132,7 @@ class SimulatedMachine : public Clock {
   bool double_ok_ = false;
 };
 
-/// The port of a SimulatedMachine; lost for good once the machine was unplugged or opened anew.
+/// The port of a SimulatedMachine; lost for good once the machine is unplugged or opened again.
 class SimulatedLink : public Link {
  public:
   SimulatedLink(SimulatedMachine& machine, std::int64_t opened)

@@ -240,7 +240,7 @@ constexpr std::array<std::string_view, 6> kSystems = {"G54", "G55", "G56", "G57"
 /// Bytes of the receive buffer that stay empty: rings cannot be filled wholly.
 constexpr int kRingGap = 1;
 
-/// No setting, size or position is larger; what is, or is no number, was garbled.
+/// Maximum setting, size or position; a larger value or no number was garbled.
 constexpr double kLargestNumber = 1e9;
 
 std::vector<double> numbers(std::string_view text) {
@@ -317,7 +317,7 @@ void take_status(const StatusReport& report, ControllerInfo& info) {
   info.status = report;
   if (const auto at = info.machine_position(report)) info.start.position = *at;
   if (!report.room || !at_rest(report)) return;
-  // Measured while empty, which is better than what it says of itself.
+  // Measured while empty, which is more reliable than the stated size.
   info.reports_room = true;
   info.rx_bytes = report.room->bytes;
   info.planner_blocks = report.room->blocks;

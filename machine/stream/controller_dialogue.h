@@ -17,30 +17,30 @@
 
 namespace lensforge {
 
-/// Why a stream was stopped.
+/// Reason for stopping a stream.
 enum class StopCause {
   kNone,
-  kInterrupted,      ///< Somebody asked for it.
-  kGarbledReply,     ///< A reply that no controller sends.
+  kInterrupted,      ///< Requested by the operator or a signal.
+  kGarbledReply,     ///< An invalid reply.
   kCountMismatch,    ///< More or fewer replies than lines.
   kError,            ///< The controller refused a line.
   kAlarm,            ///< The controller is in alarm.
-  kReset,            ///< The controller started afresh.
+  kReset,            ///< The controller restarted.
   kStall,            ///< No answer, or no motion and no answer.
   kLinkLost,         ///< Unplugged, closed.
   kDoor,             ///< The controller reports its safety door open.
   kHeld,             ///< Held from outside for longer than allowed.
-  kUnexpectedState,  ///< Somebody homes, jogs, checks or puts the controller to sleep.
-  kSpindle,          ///< Not at speed, failed, or not to be verified.
-  kInterlock,        ///< Door, vacuum, coolant, e-stop on the bus.
-  kJournal,          ///< The journal cannot be kept.
-  kProgram,          ///< The program cannot be read on, or was changed.
+  kUnexpectedState,  ///< Homing, jog, check mode or sleep, started elsewhere.
+  kSpindle,          ///< Not at speed, failed, or not verifiable.
+  kInterlock,        ///< An interlock on the bus: door, vacuum, coolant, e-stop.
+  kJournal,          ///< The journal cannot be written.
+  kProgram,          ///< The program cannot be read further or was changed.
 };
 
 /// "garbled reply", "link lost" …
 std::string_view cause_name(StopCause cause);
 
-/// A reason to stop the stream, on its way to the place that stops it.
+/// Thrown to stop the stream.
 class StreamFault : public std::runtime_error {
  public:
   StreamFault(StopCause cause, const std::string& reason)
@@ -51,7 +51,7 @@ class StreamFault : public std::runtime_error {
   StopCause cause_;
 };
 
-/// Bytes on which a Grbl-family controller acts at once, wherever in the stream they stand.
+/// Realtime bytes: a Grbl-family controller acts on them at once, anywhere in the stream.
 namespace realtime {
 inline constexpr char kStatusReport = '?';
 inline constexpr char kFeedHold = '!';
@@ -68,25 +68,25 @@ inline constexpr char kSpindleUp10 = '\x9A';
 inline constexpr char kSpindleDown10 = '\x9B';
 }  // namespace realtime
 
-/// Lines out, replies in. What the link does not take at once waits here; realtime bytes pass it
-/// by.
+/// Sends lines and receives replies. Bytes that the link does not accept at once are queued;
+/// realtime bytes overtake them.
 class Wire {
  public:
   /// @param link  must outlive the wire.
   explicit Wire(Link& link) : link_(link) {}
 
-  /// Puts a line, which gets its end here, behind those that wait.
+  /// Appends a line to the queue and adds its line end.
   void line(std::string_view text);
-  /// Sends a realtime byte, ahead of all that waits. @throw LinkLost
+  /// Sends a realtime byte ahead of the queue. @throw LinkLost
   void urgent(char byte);
-  /// Writes as much as the link takes. @throw LinkLost
+  /// Writes as much as the link accepts. @throw LinkLost
   void flush();
-  /// Whether something waits to be written.
+  /// True if something is queued.
   [[nodiscard]] bool waiting() const { return written_ < lines_.size() || !urgent_.empty(); }
-  /// Drops all lines and parts of lines that were not written; realtime bytes stay.
+  /// Drops all unwritten lines and parts of lines; realtime bytes stay.
   void discard();
-  /// Waits at most `wait` seconds for bytes and hands on the replies that they complete.
-  /// @throw LinkLost, and whatever `take` throws
+  /// Waits at most `wait` seconds for bytes and passes completed replies to `take`. @throw
+  /// LinkLost, and what `take` throws
   void receive(double wait, const std::function<void(const Reply&)>& take);
 
  private:
@@ -94,53 +94,53 @@ class Wire {
   ReplyReader reader_;
   std::string urgent_;
   std::string lines_;
-  std::size_t written_ = 0;  ///< Bytes of lines_ that are gone.
+  std::size_t written_ = 0;  ///< Number of bytes of lines_ already written.
 };
 
-/// What a controller tells of itself before a job.
+/// Properties of a controller, read before a job.
 struct ControllerInfo {
   std::string banner;
   std::string version;  ///< [VER:…]
   std::string options;  ///< Letters of [OPT:…].
   GcodeDialect dialect;
-  int rx_bytes = 0;                ///< Of the receive buffer that may be filled.
-  int planner_blocks = 0;          ///< Motions that it looks ahead.
-  bool reports_room = false;       ///< Bf: stands in its reports.
+  int rx_bytes = 0;                ///< Usable size of the receive buffer.
+  int planner_blocks = 0;          ///< Number of look-ahead motions.
+  bool reports_room = false;       ///< Its reports have Bf:.
   bool line_numbers = false;       ///< It reports Ln:.
   std::map<int, double> settings;  ///< $N=value, numbers only.
-  StatusReport status;             ///< The last one, while it stood still.
-  GcodeState start;                ///< Where the tool is; where the coordinate systems begin.
+  StatusReport status;             ///< Latest report at rest.
+  GcodeState start;                ///< Tool position and coordinate origins.
 
   [[nodiscard]] std::optional<double> setting(int number) const;
   [[nodiscard]] bool inches() const { return setting(13).value_or(0.0) != 0.0; }
-  /// mm in one unit of its reports.
+  /// Unit of its reports, mm.
   [[nodiscard]] double report_unit() const { return inches() ? 25.4 : 1.0; }
-  /// Machine position of a report, mm; nothing if it tells the work position and no offset is
-  /// known.
+  /// Machine position of a report, mm; empty if it gives the work position and the offset is
+  /// unknown.
   [[nodiscard]] std::optional<Eigen::Vector3d> machine_position(const StatusReport& report) const;
 };
 
-/// Questions and answers while no job runs. Firmware before Grbl 1.1, which reports in another
-/// form, is refused by all with an InputError that names it.
+/// Dialogue with the controller while no job runs. Every function refuses firmware before Grbl 1.1,
+/// which has another report format, with an InputError that names it.
 class Dialogue {
  public:
   Dialogue(Wire& wire, Clock& clock, std::stop_token stop)
       : wire_(wire), clock_(clock), stop_(std::move(stop)) {}
 
-  /// Asks until a report comes or the time is over. @throw StreamFault for a request to stop.
+  /// Asks until a report arrives or the time is up. @throw StreamFault for a request to stop.
   std::optional<StatusReport> ask_status(double timeout);
-  /// What to say if there is none. @throw StreamFault kStall
+  /// Reports that no answer came. @throw StreamFault kStall
   [[noreturn]] static void silence();
-  /// Sends a line and waits for its ok. @return what came before it.
-  /// @throw StreamFault for an error, an alarm, nonsense, silence or a request to stop.
+  /// Sends a line and waits for its ok. @return the replies before it.
+  /// @throw StreamFault for an error, an alarm, an invalid reply, silence or a request to stop.
   std::vector<Reply> ask(const std::string& line, double timeout);
-  /// A report that was asked for now. @throw StreamFault
+  /// Asks for a new report. @throw StreamFault
   StatusReport status(double timeout = 3.0);
-  /// Soft reset, and what the controller says of itself. @pre nothing moves. @throw StreamFault
+  /// Soft reset; returns the controller's banner. @pre nothing moves. @throw StreamFault
   std::string reset(double timeout = 10.0);
-  /// reset(), empty where no answer comes.
+  /// Like reset(), but returns an empty string if there is no answer.
   std::string try_reset(double timeout);
-  /// Feed hold, until nothing moves any more. @throw StreamFault
+  /// Feed hold; waits until nothing moves. @throw StreamFault
   StatusReport hold(double timeout = 20.0);
 
  private:
@@ -153,11 +153,11 @@ class Dialogue {
   std::vector<Reply> replies_;
 };
 
-/// Whether a report says that nothing moves.
+/// True if a report states that nothing moves.
 bool at_rest(const StatusReport& report);
 
-/// Asks for build, settings and coordinate systems. @pre the controller is idle or in alarm.
-/// @throw StreamFault; InputError if it is none of the Grbl family.
+/// Reads build, settings and coordinate systems. @pre the controller is idle or in alarm. @throw
+/// StreamFault; InputError if it is not of the Grbl family.
 ControllerInfo learn_controller(Dialogue& dialogue, const std::string& banner);
 
 }  // namespace lensforge

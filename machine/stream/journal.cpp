@@ -36,7 +36,7 @@ std::string check_sum(std::string_view text) {
 }  // namespace
 
 std::string line_of(const nlohmann::json& record) {
-  // What controllers say need not be UTF-8.
+  // A controller's output need not be UTF-8.
   const std::string text = record.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
   LF_CHECK(text.size() + kSumDigits + 2 <= kLongestLine, text);
   return check_sum(text) + ' ' + text + '\n';
@@ -67,7 +67,7 @@ namespace fs = std::filesystem;
 constexpr double kShortReserve = 1.0;
 constexpr double kLongReserve = 4.0;
 constexpr std::int64_t kMaxAhead = 1 << 16;
-/// Of a program, bytes: as file systems have it.
+/// Maximum length of a program's name in bytes, as in file systems.
 constexpr std::size_t kLongestName = 255;
 
 double seconds_now() {
@@ -92,7 +92,7 @@ nlohmann::json json_of(const JobProgress& at, const char* kind) {
   return record;
 }
 
-/// Another file than an empty one or a journal is somebody's work. @throw InputError
+/// A file that is neither empty nor a journal is not overwritten. @throw InputError
 void require_own(int descriptor, const fs::path& path) {
   struct stat about {};
   if (::fstat(descriptor, &about) != 0 || !S_ISREG(about.st_mode)) {
@@ -172,8 +172,8 @@ void Journal::origins(const WorkOrigins& origins) {
   request_flush(true);
 }
 
-/// Half of a reservation is left when the next is asked for, so the disk has that long.
-/// Reservations grow with the rate of lines until one is enough for a second or so.
+/// The next reservation is requested when half of the last is left; the disk has that long.
+/// Reservations grow with the rate of lines to about one second's worth.
 void Journal::reserve(std::int64_t line) {
   if (asked_ == reserved_) {
     const double now = seconds_now();
@@ -217,7 +217,7 @@ void Journal::append(const nlohmann::json& record) {
     if (count < 0 && errno == EINTR) continue;
     if (count < 0) {
       const int error = errno;
-      // What was written of it would be a torn record with whole ones behind it later on.
+      // Otherwise complete records would later follow a truncated one.
       if (::ftruncate(file_.number(), size_) == 0) ::lseek(file_.number(), size_, SEEK_SET);
       fail(error);
     }
@@ -258,15 +258,15 @@ using nlohmann::json;
 
 /// More lines or bytes than any program has; leaves room for sums.
 constexpr std::int64_t kMaxLines = std::int64_t{1} << 48;
-/// Beyond what controllers and register maps can tell of a place, mm, or a speed, rpm.
+/// Exceeds any position, mm, or speed, rpm, from controllers and register maps.
 constexpr double kLargest = 1e12;
 
 [[noreturn]] void refuse(const fs::path& path, const std::string& why) {
   throw InputError(path.string() + ": " + why);
 }
 
-/// The fields of one record. What is missing is 0 or empty; what has another type or a value that
-/// no sender writes is refused.
+/// The fields of one record. Missing fields are 0 or empty; a wrong type or a value that no sender
+/// writes is refused.
 class Fields {
  public:
   Fields(const json& record, const fs::path& path, std::int64_t number)
@@ -365,7 +365,7 @@ void take_origins(const Fields& record, JournalRecord& journal) {
   if (!journal.origins) journal.origins = origins;
 }
 
-/// What was reserved in a run that told its end was not sent beyond what it told.
+/// If a run recorded its end, the lines reserved beyond that were not sent.
 struct Bounds {
   std::int64_t told = 0;
   std::int64_t reserved = 0;
@@ -396,9 +396,9 @@ void take(const Fields& record, JournalRecord& journal, Bounds& bounds) {
   }
 }
 
-/// The next line without its end, of which no more is kept than a record may have; nothing at the
-/// end of the file. A record without its line end may be cut short by chance where it still reads
-/// well, so that one counts as none.
+/// Returns the next line without its end, truncated to a record's maximum length; empty at the end
+/// of the file. A record without its line end is ignored: truncated by chance, it might still
+/// parse.
 std::optional<std::string> next_line(std::ifstream& file) {
   std::string line;
   for (int c = file.get(); c != std::ifstream::traits_type::eof(); c = file.get()) {
@@ -408,7 +408,7 @@ std::optional<std::string> next_line(std::ifstream& file) {
   return std::nullopt;
 }
 
-/// Whether a whole record stands anywhere behind a bad one.
+/// True if a valid record follows a bad one.
 bool goes_on(std::ifstream& file) {
   while (const auto line = next_line(file)) {
     if (journal_text::record_of(*line)) return true;

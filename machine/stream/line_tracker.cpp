@@ -56,8 +56,8 @@ void LineTracker::all_done() {
   known_ = executed_ = std::max(executed_, acknowledged_);
 }
 
-/// A line that was not taken is not carried out, even if later ones were: Grbl goes on with what it
-/// has received after an error.
+/// A refused line is not executed even if later ones are: after an error Grbl continues with the
+/// lines it has received.
 void LineTracker::note_known(std::int64_t line) {
   known_ = std::max(known_, std::min(line, acknowledged_));
 }

@@ -11,7 +11,7 @@
 namespace lensforge {
 namespace {
 
-/// Positions are told with three decimals, mm.
+/// Positions are reported with three decimals, mm.
 constexpr double kTravelTolerance = 0.001;
 
 constexpr double kBitsPerByte = 10.0;

@@ -12,40 +12,39 @@
 
 namespace lensforge {
 
-/// What the way to the controller carries.
+/// Transfer rate to the controller.
 struct StreamRate {
-  double bytes_per_second = 0.0;  ///< 0 without limit.
-  double lines_per_second = 0.0;  ///< Likewise.
+  double bytes_per_second = 0.0;  ///< 0 for no limit.
+  double lines_per_second = 0.0;  ///< 0 for no limit.
 };
 
-/// What stands against a job, in plain sentences.
+/// Objections to a job, in plain sentences.
 struct Findings {
-  std::vector<std::string> refusals;  ///< It must not start.
-  std::vector<std::string> warnings;  ///< The operator should know.
+  std::vector<std::string> refusals;  ///< The job must not start.
+  std::vector<std::string> warnings;  ///< For the operator.
 };
 
-/// The box that the settings allow, machine coordinates, mm: nothing where homing is off or a
-/// travel is not set.
+/// The travel allowed by the settings, machine coordinates, mm; empty if homing is off or a travel
+/// is not set.
 std::optional<Eigen::AlignedBox3d> travel_box(const ControllerInfo& info);
 
-/// What the operator should know of a program, whatever it is sent to.
+/// Warnings about a program that apply to any controller.
 std::vector<std::string> program_warnings(const ProgramFacts& facts);
 
-/// Sets a program's facts against a controller's settings and state. Every refusal names what, the
-/// value and the rule.
-/// @param facts  with the controller's start state.
+/// Checks a program's facts against a controller's settings and state. Every refusal names the
+/// item, the value and the rule. @param facts  computed with the controller's start state.
 Findings check_program(const ProgramFacts& facts, const ControllerInfo& info);
 
-/// Adds the speeds that a program asks for and a spindle under a register map does not have.
+/// Adds findings for programmed speeds outside the range of the register map's spindle.
 void check_spindle_range(const ProgramFacts& facts, const std::vector<RegisterMap>& maps,
                          Findings& found);
 
-/// What a program that moves nothing lacks, in a sentence without its name; empty if it moves.
+/// The reason for which a program moves nothing, in a sentence without its name; empty if it moves.
 std::string lack_of_motion(const ProgramFacts& facts);
 
-/// What the stream of a program is limited by: the serial speed (10 bits a byte), the lines that an
-/// 8-bit board digests, and, sent line by line, the way there and back.
-/// @param baud  0 for no serial line. @param round_trip  s. @param mean_bytes  of a line.
+/// Limits of the stream of a program: the serial speed (10 bits per byte), the line rate of an
+/// 8-bit board, and, if sent line by line, the round trip. @param baud  0 for no serial line.
+/// @param round_trip  s. @param mean_bytes  per line.
 StreamRate stream_rate(const ControllerInfo& info, int baud, double round_trip, double mean_bytes);
 
 }  // namespace lensforge

@@ -10,8 +10,8 @@ namespace lensforge {
 namespace {
 
 constexpr double kMillimetresPerInch = 25.4;
-/// As programs have at most, so that what is added reads as what led there: the end of a circle
-/// that rounding moves makes a tiny arc of it.
+/// The most that programs have. A circle's added end must equal its start: rounding would turn it
+/// into a tiny arc.
 constexpr int kDecimals = 8;
 
 /// G words, times ten, for which Grbl reads or writes its EEPROM.
@@ -36,7 +36,7 @@ bool has_axis_word(const GcodeBlock& block) {
   });
 }
 
-/// Whether a word says what the axis words are for.
+/// True if the line has a word that uses the axis words.
 bool has_motion_word(const GcodeBlock& block) {
   const auto words = block.words();
   return std::any_of(words.begin(), words.end(), [](const GcodeWord& word) {

@@ -20,7 +20,7 @@ namespace lensforge {
 namespace {
 
 constexpr std::int64_t kPiece = 1 << 16;
-constexpr std::size_t kDigits = 64;  ///< Of a piece's SHA-256.
+constexpr std::size_t kDigits = 64;  ///< SHA-256 of a piece.
 
 std::string hash_of(std::string_view bytes) {
   Sha256 hash;
@@ -47,7 +47,7 @@ std::size_t read_at(int file, std::vector<char>& bytes, std::int64_t offset,
 
 }  // namespace
 
-/// The open file, and what it held at the first reading.
+/// The open file and the hashes of its content at the first reading.
 struct ProgramPieces {
   std::filesystem::path path;
   Descriptor file;
@@ -128,7 +128,7 @@ Descriptor open_program(const std::filesystem::path& path) {
   require_regular_file(path);
   Descriptor file(::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC));
   struct stat about {};
-  // What took the name in between, a named pipe say, is caught here.
+  // Catches a file that took the name in between, such as a named pipe.
   if (file.open() && ::fstat(file.number(), &about) == 0 && S_ISREG(about.st_mode)) return file;
   throw InputError(path.string() + ": cannot be read: " + std::generic_category().message(errno));
 }

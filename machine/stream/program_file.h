@@ -11,11 +11,11 @@
 
 namespace lensforge {
 
-/// Which program a job runs: another file is another job, whatever its name.
+/// Identity of a job's program, by content: the name does not matter.
 struct JobIdentity {
-  std::string sha256;      ///< Of the whole file, 64 hexadecimal digits.
+  std::string sha256;      ///< Hash of the whole file, 64 hexadecimal digits.
   std::int64_t bytes = 0;  ///< Its size.
-  std::string name;        ///< Its name without folder, for the reader's eyes only.
+  std::string name;        ///< File name without folder, for display only.
 
   [[nodiscard]] bool same_program(const JobIdentity& other) const {
     return sha256 == other.sha256 && bytes == other.bytes;
@@ -24,12 +24,12 @@ struct JobIdentity {
 
 struct ProgramPieces;
 
-/// A program that is opened and read through once, and from then on gives the bytes of that reading
-/// or none: whatever happens to the file meanwhile (another one takes its name, it is written over,
-/// cut short or made longer), nothing is checked or sent that does not belong to identity().
+/// A program that is read once when opened; later reads return the same bytes or fail. If the file
+/// is replaced, overwritten, truncated or extended meanwhile, nothing is checked or sent that does
+/// not belong to identity().
 ///
-/// Each piece of 64 KiB is hashed at the first reading and again whenever it is read: a 2000th of
-/// the file's size in memory.
+/// Each piece of 64 KiB is hashed at the first reading and again whenever it is read; the hashes
+/// take 1/2000 of the file's size in memory.
 class ProgramFile {
  public:
   /// @throw InputError naming the path if it is missing, is no regular file or cannot be read;
@@ -37,8 +37,8 @@ class ProgramFile {
   explicit ProgramFile(const std::filesystem::path& path, const RunControl& control = {});
 
   [[nodiscard]] const JobIdentity& identity() const;
-  /// Its bytes from the first on; seekable, and independent of this object's life. Reading throws
-  /// RunError naming the path if the file is not what it was.
+  /// Returns a seekable stream of its bytes, independent of this object's life. Reading throws
+  /// RunError naming the path if the file has changed.
   [[nodiscard]] std::unique_ptr<std::istream> open() const;
 
  private:

@@ -29,7 +29,7 @@ constexpr std::array<std::pair<std::string_view, ReportedState>, 10> kStates{
      {"Sleep", ReportedState::kSleep},
      {"Tool", ReportedState::kTool}}};
 
-/// Of positions, mm or inches, and speeds: what is more was garbled.
+/// Maximum position, mm or inches, and speed; a larger number was garbled.
 constexpr int kLargestNumber = 1'000'000'000;
 
 /// A field being read: whether it is as it should be.

@@ -19,7 +19,7 @@ constexpr double kMillimetresPerInch = 25.4;
 /// for a lift of 0.3 mm over 2 mm.
 constexpr double kPointDistance = 0.1;
 
-/// What rounding makes of equal heights, mm.
+/// Maximum rounding difference of equal heights, mm.
 constexpr double kSameHeight = 1e-4;
 
 /// Builds the lines one after another, in the program's unit and work coordinates.
@@ -53,8 +53,8 @@ class EntryWriter {
     return ramp_points(entry_.path, entry_.options.ramp, entry_.options.lift);
   }
 
-  /// Where rapid descent ends, machine Z: where the program's own rapids run, not above the retract
-  /// height and not below the target.
+  /// End of the rapid descent, machine Z: the height of the program's own rapids, limited to
+  /// between the target and the retract height.
   [[nodiscard]] double clear_z(double target) const {
     return std::max(std::min(entry_.facts.rapid_z, retract_z()), target);
   }
@@ -219,7 +219,7 @@ std::vector<std::string> entry_steps(const Entry& entry) {
 
 namespace {
 
-/// Coordinate systems are told with three decimals, mm.
+/// Coordinate systems are reported with three decimals, mm.
 constexpr double kOriginTolerance = 0.0015;
 
 /// A move that goes less than this part of its height across is a plunge or a retract.
@@ -228,7 +228,7 @@ constexpr double kMinShareAcross = 0.1;
 /// Motions kept to choose the entry among.
 constexpr std::size_t kHistory = 4096;
 
-/// One line that was carried out: what was in force before it, and what it moved.
+/// One executed line: the state before it and its motions.
 struct Done {
   std::int64_t line = 0;
   std::int64_t offset = 0;
@@ -277,8 +277,7 @@ History read_history(std::istream& program, std::int64_t last, const ControllerI
   return history;
 }
 
-/// The cuts right before the end of the history, long enough to come down along, as the path that
-/// they make; empty if there is no such path.
+/// The path of the last cuts in the history, long enough for the descent; empty if there is none.
 std::vector<GcodeMotion> ramp_path(const History& history, double length) {
   std::vector<GcodeMotion> path;
   double found = 0.0;
@@ -318,7 +317,7 @@ void require_same_place(const JournalRecord& record, const ControllerInfo& info)
   }
 }
 
-/// The way in has to begin below where the tool stands: nothing is known of what is above that.
+/// The entry must begin below the tool's current height: nothing is known about the space above.
 void require_below_retract(const Entry& entry) {
   if (entry.path.empty()) return;
   const double retract = entry.info.start.position.z();

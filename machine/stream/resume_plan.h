@@ -17,55 +17,57 @@
 
 namespace lensforge {
 
-/// How a job is taken up again. Lengths in mm.
+/// Options for resuming a job. Lengths in mm.
 struct ResumeOptions {
-  std::int64_t margin = 20;  ///< Lines before the last one carried out that are cut again at least.
-  /// Length of path, cut before, over which the tool comes down onto it.
+  std::int64_t margin = 20;  ///< Minimum number of executed lines to cut again.
+  /// Length of already cut path over which the tool descends onto it.
   double ramp = 2.0;
   double lift = 0.3;          ///< Height above the path at which the ramp begins.
-  double plunge_feed = 60.0;  ///< Where the program has none straight down, mm/min.
+  double plunge_feed = 60.0;  ///< Used if the program has no feed straight down, mm/min.
 };
 
-/// How a job goes on: the sender's own lines, then the program from a line on.
+/// Plan for resuming a job: the sender's own lines, then the program from a given line.
 struct ResumePlan {
   std::int64_t line = 1;         ///< First line of the program that is sent.
-  std::int64_t offset = 0;       ///< Where it begins in the file.
-  GcodeState state;              ///< In force before it, the tool at the end of the ramp.
-  std::int64_t entry_line = 1;   ///< First line of whose motion something is cut again.
-  std::int64_t overlap_end = 0;  ///< Last line of which something may be cut twice.
+  std::int64_t offset = 0;       ///< Its offset in the file.
+  GcodeState state;              ///< State before it, with the tool at the end of the ramp.
+  std::int64_t entry_line = 1;   ///< First line that is cut again, at least in part.
+  std::int64_t overlap_end = 0;  ///< Last line that may be cut twice, at least in part.
   std::deque<OutgoingLine> before;
-  std::vector<std::string> steps;  ///< The same for the operator, in plain sentences.
+  std::vector<std::string> steps;  ///< `before` in plain sentences, for the operator.
 };
 
-/// Plans how to go on after `record`, no later than `margin` lines before the last that was carried
-/// out. The tool goes up to where it stands now, over the entry, down above the path at feed, and
-/// comes down onto what was cut before along the path itself, its height above it falling to zero
-/// with zero slope, so that it leaves no mark. Where the path before does not allow that, the
-/// program's own approach is run again.
-/// @param info  of the homed machine: its Z is the retract height.
-/// @throw InputError if the job is finished, or the coordinate system has moved since.
+/// Plans how to continue after `record`, at least `margin` lines before the last executed one. The
+/// tool rises to its current (homed) height, moves over the entry, descends at feed to just above
+/// the path, and follows the already cut path while its height above it falls to zero with zero
+/// slope, which leaves no mark. If the path does not allow that, the program's own approach is
+/// repeated.
+/// @param info  of the homed machine, whose Z is the retract height.
+/// @throw InputError if the job is finished, or the coordinate origin has moved since.
 ResumePlan plan_resume(std::istream& program, const JournalRecord& record,
                        const ControllerInfo& info, const ProgramFacts& facts,
                        const ResumeOptions& options);
 
-/// What a safe re-entry into a program is made from.
+/// Input for a safe re-entry into a program.
 struct Entry {
-  const std::vector<GcodeMotion>& path;  ///< To come down along; empty: straight down to the tool.
-  const GcodeState& state;               ///< In force where the program goes on; the tool's place.
+  const std::vector<GcodeMotion>&
+      path;                 ///< Path of the descent; empty: straight down to the tool's place.
+  const GcodeState& state;  ///< State at the re-entry, with the tool's place.
   const ControllerInfo& info;
   const ProgramFacts& facts;
   const ResumeOptions& options;
 };
 
-/// Lines that bring a homed machine there: modes, up, spindle, coolant, over, down, along, modes of
-/// the program. In the program's unit. @param line, offset  of the program, that they count as.
+/// Returns the lines that bring a homed machine to the entry: modes, up, spindle, coolant, over,
+/// down, along, modes of the program. In the program's unit. @param line, offset  position in the
+/// program that they are assigned to.
 std::deque<OutgoingLine> entry_lines(const Entry& entry, std::int64_t line, std::int64_t offset);
 
-/// The same in sentences.
+/// entry_lines() in plain sentences.
 std::vector<std::string> entry_steps(const Entry& entry);
 
-/// Points along the path with their height above it falling to zero with zero slope at its end.
-/// Machine coordinates, mm. The first is where the tool comes down to, the last the path's end.
+/// Points above the path; their height above it falls to zero, with zero slope at the path's end.
+/// Machine coordinates, mm. The first is the bottom of the plunge, the last the path's end.
 std::vector<Eigen::Vector3d> ramp_points(const std::vector<GcodeMotion>& path, double length,
                                          double lift);
 

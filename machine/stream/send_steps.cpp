@@ -15,15 +15,15 @@ namespace {
 constexpr double kWriteAgain = 0.002;
 /// Longest time without a look at the stop token and the keys, s.
 constexpr double kStopCheck = 0.1;
-/// Grbl tells "Idle" between taking a motion and starting it, hence more than one.
+/// Grbl reports "Idle" between accepting a motion and starting it, hence more than one.
 constexpr int kIdleReports = 2;
 /// A ? that got lost is asked again after this, s.
 constexpr double kAskAgain = 1.0;
 /// Five ? a second, s.
 constexpr double kStatusPause = 0.2;
-/// How far the controller's own report of the speed may be off; it rounds to whole rpm.
+/// Tolerance of the controller's own speed report, which is rounded to whole rpm.
 constexpr double kSpeedTolerance = 0.01;
-/// Share of the speed asked for that an encoder's reading may be off, and what it shows at rest.
+/// Tolerance of an encoder's reading, share of the requested speed, and its reading at rest.
 constexpr double kMeasuredTolerance = 0.05;
 constexpr double kAtRestRpm = 10.0;
 /// A position that differs by more is motion, mm.
@@ -38,7 +38,8 @@ std::string line_words(std::int64_t line) {
   return line > 0 ? "line " + std::to_string(line) : "no line";
 }
 
-/// What a controller without a guard beside it tells of its spindle. Nothing: it tells too little.
+/// The spindle's verification by the controller's report, without a guard. Empty: the report has
+/// too little information.
 std::optional<bool> reported_spindle(const StatusReport& report, const SpindleOrder& order) {
   const double share = report.overrides ? kPercent * report.overrides->z() : 1.0;
   const double wanted = order.turning() ? order.rpm * share : 0.0;
@@ -66,7 +67,7 @@ bool waits_for_operator(const SendState& state) {
   return state.phase == SendPhase::kAnswer && (state.barrier.pauses || state.barrier.tool_change);
 }
 
-/// Controllers tell overrides now and then only. @return a note of what changed, or nothing
+/// Controllers report overrides only at intervals. @return a note of the change, or empty
 std::string take_overrides(const Eigen::Vector3i& before, StatusReport& report) {
   if (!report.overrides) report.overrides = before;
   const Eigen::Vector3i& now = *report.overrides;
@@ -98,7 +99,7 @@ SendStep held(SendStep step, double hold_limit, double now) {
   return step;
 }
 
-/// What the controller does, against what it should be doing.
+/// Compares the controller's state with the expected one.
 SendStep judge(SendStep step, double hold_limit, double now) {
   const StatusReport& report = step.state.status.report;
   switch (report.state) {

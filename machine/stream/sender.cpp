@@ -19,7 +19,7 @@ namespace {
 /// into steps. It decides nothing itself.
 class SendRun {
  public:
-  /// All but `first_line` must outlive the run.
+  /// All arguments except `first_line` must outlive the run.
   SendRun(const SenderParts& parts, const SendRules& rules, std::int64_t first_line,
           ProgramFeed& feed, const SendControl& control);
 
@@ -37,14 +37,14 @@ class SendRun {
   void poll_guard();
   void take_guard_records();
   void ask_status();
-  /// Takes over a step's state, tells its notes and stops for its fault. @throw StreamFault
+  /// Takes over a step's state, reports its notes and stops for its fault. @throw StreamFault
   void apply(SendStep step);
   void note(const std::string& text);
   void tell(SendEventKind kind, const std::string& message);
   [[nodiscard]] JobProgress progress() const;
   [[nodiscard]] double rpm_seen() const;
 
-  // How it ends.
+  // Ends the run.
   SendResult end(SendStatus status, StopCause cause, std::string reason);
   SendResult stop_for(StopCause cause, std::string reason);
   void hold(StopCause cause, const std::string& reason);
@@ -195,8 +195,8 @@ void SendRun::fill() {
   state_.phase = SendPhase::kDone;
 }
 
-/// Journal and guard come first: nothing leaves that is not written down, and a guard which only
-/// watches knows what is to come.
+/// Journal and guard come first: every line is recorded before it is sent, and a guard that only
+/// watches knows the next command.
 void SendRun::hand_over() {
   const OutgoingLine line = *std::exchange(next_, std::nullopt);
   if (const auto fault = send_step::cut_fault(state_, line, rules_)) throw StreamFault(*fault);
@@ -326,7 +326,7 @@ JobProgress SendRun::progress() const {
 
 constexpr double kStatusPause = 0.2;  ///< Five ? a second.
 constexpr double kHoldAgain = 2.0;    ///< A ! that got lost is sent again after this, s.
-constexpr double kBannerWait = 3.0;   ///< For the banner after a reset, s.
+constexpr double kBannerWait = 3.0;   ///< Wait for the banner after a reset, s.
 constexpr double kReadWait = 0.05;    ///< Longest wait without a look at the second stop token, s.
 
 std::string word_for(SendStatus status) {
@@ -335,8 +335,8 @@ std::string word_for(SendStatus status) {
                                               : "fault";
 }
 
-/// Nothing more of the program leaves from here on. The feed hold comes before all else; what the
-/// controller has received but not begun stays where it is.
+/// From here on nothing more of the program is sent. The feed hold comes first; lines received but
+/// not begun stay in the controller.
 SendResult SendRun::stop_for(StopCause cause, std::string reason) {
   parts_.wire.discard();
   try {

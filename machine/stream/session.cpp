@@ -17,9 +17,9 @@ constexpr double kLastTry = 0.5;       ///< A reset is answered at once.
 constexpr double kLeaveTimeout = 5.0;  ///< A reset is repeated in it, see Dialogue::reset().
 constexpr std::int64_t kLinesBetweenReports = 256;
 
-/// What must be so before a reset: nothing moves, and it is ours to take over.
+/// Preconditions of a reset: nothing moves, and the machine may be taken over.
 void require_rest(Dialogue& dialogue, const StatusReport& report, bool resume) {
-  // Door:0 is closed again, and waits to be resumed as a hold does.
+  // Door:0: the door is closed again; the machine waits to be resumed as in a hold.
   if (report.state == ReportedState::kDoor && report.sub_state != 0) {
     throw InputError("the controller reports its safety door open; close it first");
   }
@@ -40,7 +40,7 @@ std::string wake(Dialogue& dialogue) {
   return banner;
 }
 
-/// A machine that homes goes on doing so without its sender: whoever gives up waiting stops it.
+/// A machine continues homing without its sender: after a failed wait it must be stopped.
 void home_machine(Dialogue& dialogue, Wire& wire, double timeout) {
   try {
     dialogue.ask("$H", timeout);

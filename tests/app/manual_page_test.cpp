@@ -16,7 +16,7 @@ namespace {
 constexpr std::array kCommands{"design", "render",  "cam",  "nest",  "coupon", "export",
                                "send",   "reflect", "view", "batch", "info"};
 
-/// What a command prints on standard output.
+/// Output of a command on standard output.
 std::string printed(const std::vector<std::string>& arguments) {
   ::testing::internal::CaptureStdout();
   EXPECT_EQ(run_command_line(arguments), 0);

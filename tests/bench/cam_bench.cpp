@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What `lensforge cam` with its defaults costs for one lens folder: seconds and processor seconds
-// of every stage, seconds of every kernel, peak memory.
+// Cost of `lensforge cam` with its defaults for one lens folder: seconds and processor seconds of
+// every stage, seconds of every kernel, peak memory.
 //   cam_bench LENS_FOLDER OUT_FOLDER [THREADS] [smooth|facet]
 #include <chrono>
 #include <cstdio>

@@ -7,7 +7,7 @@
 
 namespace lensforge::bench {
 
-/// How a child process ended and what it used.
+/// A child process's exit and resource usage.
 struct ChildResult {
   int exit_code = -1;  ///< −1 if a signal ended it.
   int signal = 0;

@@ -6,7 +6,7 @@
 
 #include "core/page/decade_plot.h"
 
-/// Where the time of a design went, from its convergence.csv.
+/// Time of a design by stage, from its convergence.csv.
 namespace lensforge::bench {
 
 /// One kind of step.

@@ -66,8 +66,8 @@ BENCHMARK(DropCutterRaster)->ArgName("threads")->Arg(1)->Arg(2)->UseRealTime();
 void DropCutterScattered(benchmark::State& state) { run_drop(state, scattered_points(200'000)); }
 BENCHMARK(DropCutterScattered)->ArgName("threads")->Arg(1)->Arg(2)->UseRealTime();
 
-/// What cannot be saved: the contact with one facet a point, its number known beforehand. The share
-/// of this rate that DropCutterRaster reaches is what finding the facet costs.
+/// Minimum work: contact with one known facet per point. The ratio of DropCutterRaster's rate to
+/// this one shows the cost of finding the facet.
 void OneFacetPerPoint(benchmark::State& state) {
   const SurfaceMesh& mesh = lens_mesh();
   std::vector<FacetContact> facets;

@@ -8,7 +8,7 @@
 
 namespace lensforge::bench {
 
-/// What a GPU does at most, measured: what kernels are held against.
+/// Measured maximum rates of a GPU, for comparison with kernels.
 struct GpuRates {
   double copy = 0.0;        ///< Bytes read and written per second by a long copy.
   double operations = 0.0;  ///< Additions and multiplications of doubles per second, not fused.

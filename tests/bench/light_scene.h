@@ -9,7 +9,7 @@
 
 namespace lensforge::bench {
 
-/// Rays that are looked up together: neighbours, so that they walk the same branches of the tree.
+/// Number of rays traced together: neighbours, which visit the same branches of the tree.
 inline constexpr int kLanes = 16;
 
 /// Places on the lens, mm; one column each.
@@ -40,7 +40,7 @@ class LightScene {
   /// The triangle that a ray up +z from each of the first `count` places (mm) meets; −1 for none.
   [[nodiscard]] std::array<int, kLanes> triangles_above(const Places& places, int count) const;
 
-  /// How many of these rays meet the surface again, farther than kClearance from their origin.
+  /// Number of these rays that meet the surface again, farther than kClearance from their origin.
   [[nodiscard]] int blocked(const RayPacket& rays) const;
 
   /// mm; a hundred times the rounding of Embree's single precision at 100 mm, a hundredth of a

@@ -84,7 +84,7 @@ void SmoothNodes(benchmark::State& state) {
 }
 BENCHMARK(SmoothNodes)->ArgName("threads")->Arg(1)->Arg(2)->UseRealTime();
 
-/// What polishing costs beside the facets that are polished.
+/// Cost of polishing in addition to the facets.
 void PolishedNodes(benchmark::State& state) {
   const Eigen::AlignedBox2d lens(Eigen::Vector2d(0.0, 0.0), Eigen::Vector2d(kSide, kSide));
   const PolishedField field(lens_facets(), lens, {0.03, 0.0, 1.0});

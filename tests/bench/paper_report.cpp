@@ -167,7 +167,7 @@ std::string ablation_table(const Results& results) {
   return table.text();
 }
 
-/// What the marks in the tables mean, and every message of a row that was not done.
+/// Legend of the marks in the tables, and the message of every row that was not done.
 std::string notes(const Results& results) {
   std::string text;
   const auto some = [&](bool PaperResult::*mark) {

@@ -84,7 +84,7 @@ class RowRun {
     result_.message = message;
   }
 
-  /// Whether `made` is by the options and from the picture of this row.
+  /// True if `made` has the options and the picture of this row.
   [[nodiscard]] bool same_work(const json& made) const {
     if (!made.is_object()) return false;
     const auto same = [&](const char* key) { return made.value(key, json()) == asked_[key]; };

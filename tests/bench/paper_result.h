@@ -21,7 +21,7 @@ struct PaperResult {
 
   PaperRow row;
   Status status = Status::kDone;
-  std::string message = {};   ///< Why not, if not done.
+  std::string message = {};   ///< Reason, if not done.
   nlohmann::json lens = {};   ///< lens.json
   nlohmann::json trace = {};  ///< ray_trace's figures; null if there is no ray_trace.
   double wall_seconds = 0.0;  ///< Of the design, from its first start on.
@@ -39,7 +39,7 @@ struct PaperPrograms {
   std::filesystem::path design;     ///< lensforge
   std::filesystem::path ray_trace;  ///< Need not be there.
   std::filesystem::path out;
-  std::int64_t rays = 0;  ///< Of each ray trace; 0 leaves it to ray_trace.
+  std::int64_t rays = 0;  ///< Per ray trace; 0: ray_trace's default.
 };
 
 /// Designs a lens and ray-traces it in child processes, or takes what an earlier call left in the

@@ -5,13 +5,13 @@
 #include <string>
 #include <vector>
 
-/// What is designed to stand beside the figures of Sun, Deng and Zhang, "End-to-end Surface
-/// Optimization for Light Control" (Tables 1 and 2, Fig. 10).
+/// Designs to compare with the figures of Sun, Deng and Zhang, "End-to-end Surface Optimization for
+/// Light Control" (Tables 1 and 2, Fig. 10).
 namespace lensforge::bench {
 
 inline constexpr double kNotGiven = std::numeric_limits<double>::quiet_NaN();
 
-/// What the paper reports for a picture of the same kind; NaN where it reports nothing.
+/// The paper's figures for a picture of the same kind; NaN if it has none.
 struct PaperFigures {
   std::string picture;             ///< Its name there.
   double mae = kNotGiven;          ///< Table 1: the paper's own rendering.
@@ -38,7 +38,7 @@ struct PaperRow {
   }
 };
 
-/// Where the pictures lie and how far to shrink the work.
+/// The pictures' folder and the factor by which to shrink the work.
 struct RowChoice {
   std::string fixtures;                   ///< Folder of the generated pictures.
   int most_pixels = 0;                    ///< Longer sides are cut to this; 0 leaves them.
@@ -47,8 +47,8 @@ struct RowChoice {
   std::vector<std::string> more_options;  ///< Added to every design.
 };
 
-/// All rows that `choice` asks for, in the order in which they are run: the paper's kinds
-/// first, the ablation last. Whether the pictures are there is not looked at.
+/// All rows of `choice`, in the order of the runs: the paper's kinds first, the ablation last. Does
+/// not check that the pictures exist.
 std::vector<PaperRow> choose_rows(const RowChoice& choice);
 
 /// The ablation's variants in the order of Fig. 10, "full" last.

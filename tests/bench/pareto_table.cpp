@@ -37,7 +37,7 @@ struct Subject {
   std::string name;
 };
 
-/// What docs/performance.md follows from commit to commit.
+/// Designs that docs/performance.md tracks from commit to commit.
 const std::vector<Subject>& subjects() {
   static const std::vector<Subject> all = {
       {"portrait", 128, {"--model", "smooth"}, "smooth-128-portrait"},

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a million moves of a finishing raster cost: written and timed, and read back alone. The
+// Cost of a million moves of a finishing raster: written and timed, and only read back. The
 // process's peak memory shows that it does not grow with their number.
 #include <benchmark/benchmark.h>
 #include <sys/resource.h>

@@ -18,7 +18,7 @@ struct RayTraceOptions {
   std::uint64_t seed = 1;
 };
 
-/// Where the rays went and what picture they made.
+/// Counts of the rays by destination, and their picture.
 struct RayTraceResult {
   Image render;          ///< Linear light relative to the target's white, as render.exr.
   ImageMetrics metrics;  ///< Against the lens's target.

@@ -9,7 +9,7 @@
 /// Ways to shape a reflection that Tojo et al. compare theirs with.
 namespace lensforge::bench {
 
-/// What a gradient by vertex positions is multiplied by (Nicolet et al. 2021); L is the
+/// Matrix that multiplies a gradient by vertex positions (Nicolet et al. 2021); L is the
 /// combinatorial Laplacian.
 enum class Smoothing {
   kNone,         ///< The gradient itself.

@@ -20,8 +20,8 @@ const std::vector<std::string>& figure_names();
 MarkdownTable reflect_figures(const std::vector<std::string>& names,
                               const std::filesystem::path& plots, const Executor& executor);
 
-/// For every drawn shape the derivative of its energy along a descent direction: by normals alone
-/// and of the whole shape.
+/// The derivative of every drawn shape's energy along a descent direction: by normals alone and of
+/// the whole shape.
 MarkdownTable slope_table(const Executor& executor);
 
 }  // namespace lensforge::bench

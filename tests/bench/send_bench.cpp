@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How fast the sender is against a controller that takes every line at once, what the journal
-// costs, and how much memory five million lines take. LENSFORGE_SEND_LINES sets another number.
+// Speed of the sender with a controller that accepts every line at once, cost of the journal, and
+// memory for five million lines. LENSFORGE_SEND_LINES sets another number.
 #include <sys/resource.h>
 
 #include <array>

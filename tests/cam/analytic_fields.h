@@ -52,7 +52,7 @@ inline AnalyticField::Formula plane(const Eigen::Vector2d& slope) {
   return [slope](const Eigen::Vector2d& p) { return SurfacePoint{5.0 + slope.dot(p), slope, 0}; };
 }
 
-/// What a ball of radius R leaves of the plane z = 5 when it runs along y in rows `pitch` apart.
+/// The plane z = 5 after a ball of radius R was moved along y in rows `pitch` apart.
 inline AnalyticField::Formula scalloped_plane(double radius, double pitch) {
   return [=](const Eigen::Vector2d& p) {
     const double row = std::round(p.x() / pitch);

@@ -35,7 +35,7 @@ Lens lens_with_front(double radius) {
   return lens;
 }
 
-/// What a lens projects by the normals of its vertices.
+/// The picture that a lens projects by its vertex normals.
 Image picture_of(const Lens& lens) {
   Image picture(lens.setup.pixels.x(), lens.setup.pixels.y());
   (void)evaluate(lens, SurfaceModel::kSmooth, &picture, Executor::serial());

@@ -35,7 +35,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 const std::vector<double> kExtremes{0.0,   -1.0,   1e-300,       1e-9,      1e9,
                                     1e308, -1e308, std::nan(""), kInfinity, -kInfinity};
 
-/// How long a job may run before it is stopped, and how long that may take.
+/// Time before a job is stopped, and limit for the stop.
 constexpr milliseconds kTime{40};
 
 CamOptions coarse() {

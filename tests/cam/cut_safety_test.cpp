@@ -41,7 +41,7 @@ constexpr double kRounding = 1e-4;
 /// What a rapid may seem to touch: the lattice's and the stock map's cells, on slopes up to 1.
 constexpr double kLattice = 0.15;
 
-/// What the programs of a cut do.
+/// Actions of a cut's programs.
 struct Deeds {
   double lowest = HUGE_VAL;    ///< Of any tip, mm, lens frame.
   double deepest_rapid = 0.0;  ///< Of a cutter in material, mm.
@@ -258,7 +258,7 @@ TEST(CutSafety, MotionsInThePostsOwnLinesAreLookedOver) {
   }
 }
 
-/// Whether a cut has missed a limit of this name; no limit, none missed.
+/// True if a cut has missed the limit of this name; false without such a limit.
 bool misses(const ReportData& report, const std::string& key) {
   const auto& checks = report.verdict.checks;
   return std::any_of(checks.begin(), checks.end(),

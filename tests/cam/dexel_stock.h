@@ -29,7 +29,7 @@ class DexelStock {
     return sweep(profile, from, to, true);
   }
 
-  /// The most material that stands above the silhouette on a straight way, mm; nothing is cut.
+  /// Maximum height of material above the silhouette on a straight path, mm; nothing is cut.
   double touched(const CutterProfile& profile, const Eigen::Vector3d& from,
                  const Eigen::Vector3d& to) {
     return sweep(profile, from, to, false);

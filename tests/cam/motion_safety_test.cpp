@@ -44,7 +44,7 @@ constexpr double kSteepest = 0.5;
 /// the lens's rim.
 constexpr double kSlack = 0.25;
 
-/// What programs did to a blank.
+/// Effects of programs on a blank.
 struct Deeds {
   double sunk = 0.0;                   ///< Most that a tool dived at more than its plunge feed, mm.
   std::map<std::string, double> into;  ///< By program: how deep a tool was in a clamp, mm.

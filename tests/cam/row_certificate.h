@@ -8,7 +8,7 @@
 
 namespace lensforge::testing {
 
-/// What is known of a row of moves from `start` on, against the drop curve.
+/// Certifies a row of moves from `start` on against the drop curve.
 inline PathCertificate certify_row(const RowProfile& profile, const Eigen::Vector2d& start,
                                    std::span<const RowMove> moves) {
   RowError error(profile);

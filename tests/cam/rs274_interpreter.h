@@ -44,12 +44,12 @@ struct Rs274Motion {
   double tool_offset = 0.0;  ///< By which the spindle is above `to`, mm.
 };
 
-/// What the interpreter made of a program.
+/// The interpreter's result for a program.
 struct Rs274Reading {
   bool accepted = false;
   std::vector<Rs274Motion> motions;
   std::string text;    ///< Its whole canonical output.
-  std::string errors;  ///< What it said on its way.
+  std::string errors;  ///< Its messages.
 };
 
 /// Follows the canonical output call by call.

@@ -7,8 +7,8 @@
 
 namespace lensforge::testing {
 
-/// While it lives no file can grow beyond `bytes`, as if the disk were full: writes fail with EFBIG
-/// ("File too large"). Needs no rights.
+/// During its life no file can grow beyond `bytes`, as on a full disk: writes fail with EFBIG
+/// ("File too large"). Needs no privileges.
 class FullDisk {
  public:
   explicit FullDisk(rlim_t bytes) : old_handler_(std::signal(SIGXFSZ, SIG_IGN)) {

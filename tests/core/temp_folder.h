@@ -51,7 +51,7 @@ inline void write_bytes(const std::filesystem::path& path, std::string_view byte
   std::ofstream(path, std::ios::binary) << bytes;
 }
 
-/// What the Error says that `action` throws; a test failure if it throws none.
+/// Message of the Error that `action` throws; a test failure if it throws none.
 template <class Error, class Action>
 std::string message_of(const Action& action) {
   try {

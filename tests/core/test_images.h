@@ -35,7 +35,7 @@ inline OIIO::ImageSpec pixel_spec(int channels, const OIIO::TypeDesc& type) {
   return OIIO::ImageSpec(1, 1, channels, type);
 }
 
-/// A grey ramp from 0 to 1 over columns and rows, as many values as the spec has.
+/// A grey ramp from 0 to 1 over columns and rows, with the spec's channels.
 inline std::vector<float> ramp(const OIIO::ImageSpec& spec) {
   std::vector<float> values;
   const auto count = static_cast<float>(spec.width * spec.height - 1);

@@ -8,8 +8,8 @@
 #include "design/transport/cell_kernels.h"
 #include "design/transport/cell_stage.h"
 
-/// Scenes for transport on several executors, and what the CPU makes of them; compiled apart, as
-/// cpu_reference.h is.
+/// Scenes for transport on several executors, and the CPU's results for them; compiled separately,
+/// like cpu_reference.h.
 namespace lensforge::testing {
 
 /// A power diagram, taken apart, and a density.

@@ -37,7 +37,7 @@ class EmulatedMemory {
     return memory;
   }
 
-  /// From now on there are this many bytes more, as on a GPU whose memory others take.
+  /// Limits further allocations to this many bytes, as on a GPU whose memory others use.
   void limit_to(std::size_t more) { limit_ = used_ + more; }
   void lift_limit() { limit_ = std::numeric_limits<std::size_t>::max(); }
 
@@ -123,9 +123,9 @@ class EmulatedExecutor {
   template <std::size_t N>
   using PendingSum = FinishedSum<N>;
 
-  static constexpr int kThreads = 128;  ///< Of a block, as on the GPU.
-  /// Whether arguments are searched for addresses. Without optimisation, or with sanitizers, copies
-  /// take along what lies between members, which may hold old ones.
+  static constexpr int kThreads = 128;  ///< Per block, as on the GPU.
+  /// True if arguments are searched for addresses. Without optimisation, or with sanitizers, copies
+  /// include the padding between members, which may hold old addresses.
 #if defined(__OPTIMIZE__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
   static constexpr bool kFindsAddresses = true;
 #else
@@ -135,7 +135,7 @@ class EmulatedExecutor {
   explicit EmulatedExecutor(const Executor& options) : stop_(options.stop_token()) {}
   [[nodiscard]] int concurrency() const { return 1; }
 
-  /// What comes before every kernel.
+  /// Checks before every kernel.
   template <class Functor>
   void begin_kernel(const char* kernel, const Functor& functor) const {
     if (stop_.stop_requested()) throw Interrupted();
@@ -166,7 +166,7 @@ class EmulatedExecutor {
     return words;
   }
 
-  /// Whether a word is the address of anything in this process.
+  /// True if a word is an address in this process.
   static bool is_mapped(std::uintptr_t word) {
     if (word < 4096 || word >= (std::uintptr_t{1} << 47)) return false;
     const std::uintptr_t page = word & ~std::uintptr_t{4095};

@@ -21,8 +21,8 @@
 #include "design/random_triangles.h"
 #include "design/schedule/guided_stage.h"
 
-/// What another executor computes, beside what the CPU's computes. One suite for the emulated GPU,
-/// which runs in every build, and for a real one, where there is one.
+/// Compares another executor's results with the CPU's. One suite for the emulated GPU, which runs
+/// in every build, and for a real one, where there is one.
 ///
 /// A `Side` names the executor: `using Exec`, `make(const Executor&)`, `missing()`, why it is not
 /// there (empty if it is), and what it offers: `stage(SurfaceModel, Goal, const Executor&)`, a

@@ -145,7 +145,7 @@ Correspondence transport(const OpticalSetup& setup, SurfaceModel model, const Im
   return {map_faces(light, map, executor), light.flux};
 }
 
-/// What a small lens throws that is designed for `setup`.
+/// Metrics of a small lens designed for `setup`.
 ImageMetrics designed(const OpticalSetup& setup, SurfaceModel model) {
   const Image target = testing::spot_picture(setup.pixels.x(), setup.pixels.y());
   const Executor executor = Executor::cpu(2);
@@ -205,7 +205,7 @@ TEST(CurvedFront, EveryVertexsRayIsSolvedForOnceAnEvaluation) {
   }
 }
 
-/// Where a ray meets a triangle, on either side of its origin.
+/// Intersection of a ray's line with a triangle, on either side of its origin.
 std::optional<double> hit(const Corners& t, const Eigen::Vector3d& origin,
                           const Eigen::Vector3d& a) {
   Eigen::Matrix3d sides;
@@ -254,7 +254,7 @@ SourceRay source_ray(const OpticalSetup& setup, const FrontPlace& front) {
   return {way, intensity * std::abs(across.dot(way)) / from.squaredNorm()};
 }
 
-/// Where a ray meets a surface.
+/// Intersection of a ray with a surface.
 struct Meeting {
   Eigen::Vector3d place;
   Eigen::Vector3d normal;

@@ -81,7 +81,7 @@ class RayTracer {
     }
     return sums;
   }
-  /// Where a ray from p meets the receiving plane, mm.
+  /// Point at which a ray from p meets the receiving plane, mm.
   [[nodiscard]] Eigen::Vector2d landing(const Eigen::Vector3d& p, const Eigen::Vector3d& n) const {
     const Eigen::Vector3d b = refract_by_angles(Eigen::Vector3d::UnitZ(), n, setup_.ior);
     const Eigen::Vector3d hit = p + (setup_.focal_length - p.z()) / b.z() * b;
@@ -110,8 +110,8 @@ class RayTracer {
     }
   }
 
-  /// Where the ray at p lands: its place in the triangle above it, carried to the landing points of
-  /// the corners (for a facet they share one direction, so this is the ray's own path).
+  /// Landing point of the ray at p: its place in the triangle above it, mapped to the landing
+  /// points of the corners (for a facet they share one direction, so this is the ray's own path).
   [[nodiscard]] Eigen::Vector2d send(const Eigen::Vector2d& p) const {
     const int u = bucket(p.x(), setup_.lens_size.x());
     const int v = bucket(p.y(), setup_.lens_size.y());

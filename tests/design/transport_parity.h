@@ -17,9 +17,9 @@
 #include "design/cpu_transport.h"
 #include "design/transport/cell_stage_on.h"
 
-/// Transport on another executor beside the CPU's, as in executor_parity.h. A `Side` names the
-/// executor: `using Exec`, `make(const Executor&)`, and `missing()`, why it is not there (empty if
-/// it is).
+/// Compares transport on another executor with the CPU's, as in executor_parity.h. A `Side` names
+/// the executor: `using Exec`, `make(const Executor&)`, and `missing()`, why it is not there (empty
+/// if it is).
 namespace lensforge::testing {
 
 /// A scene in a stage of the executor.

@@ -66,7 +66,7 @@ std::string joined(const std::vector<std::string>& lines, const char* end = "\n"
   return text;
 }
 
-/// What is said of good() with line `which`, from 1, replaced.
+/// Error for good() with line `which`, from 1, replaced.
 std::string refusal_with(std::size_t which, const std::string& replacement) {
   std::vector<std::string> lines = good();
   lines.at(which - 1) = replacement;

@@ -7,7 +7,7 @@
 #include <vector>
 
 /// A small reader of STEP exchange structures (ISO 10303-21) and an evaluator of their B-splines,
-/// so that what was written is judged by something else than the kernel that wrote it.
+/// independent of the kernel that writes the files.
 namespace lensforge::testing {
 
 /// One "#number = KEYWORD(parameters);" as text.

@@ -45,7 +45,7 @@ double volume_of(const SurfaceMesh& mesh) {
   return volume;
 }
 
-/// Whether every edge is run through once in either direction.
+/// True if every edge is used once in each direction.
 bool is_closed(const SurfaceMesh& mesh) {
   std::map<std::pair<int, int>, int> runs;
   for (Eigen::Index t = 0; t < mesh.triangle_count(); ++t) {

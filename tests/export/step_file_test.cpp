@@ -150,7 +150,7 @@ TEST_F(StepFile, Ap242IsAnOption) {
   EXPECT_THAT(parse_part21(read_bytes(path_)).header, HasSubstr("AP242"));
 }
 
-/// What a shell command prints.
+/// Output of a shell command.
 std::string output_of(const std::string& command) {
   std::string text;
   FILE* pipe = ::popen(command.c_str(), "r");

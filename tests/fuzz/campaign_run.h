@@ -19,14 +19,14 @@ struct Campaign {
   double budget = 3.0;         ///< Seconds that a run may take before a signal asks it to stop.
   bool exec = false;           ///< Every run starts the built command.
   std::string kind;            ///< The only kind that is run; empty: all.
-  std::filesystem::path kept;  ///< Where the folders of failed runs stay.
+  std::filesystem::path kept;  ///< Folder that keeps failed runs.
 };
 
-/// What came of one run.
+/// Result of one run.
 struct RunResult {
   std::uint64_t run = 0;
   std::string kind;
-  std::string command;     ///< As a shell would take it.
+  std::string command;     ///< In shell syntax.
   std::vector<int> codes;  ///< Exit codes; minus the number of a signal.
   double seconds = 0.0;
   double stop_seconds = -1.0;

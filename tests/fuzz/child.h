@@ -13,7 +13,7 @@ namespace lensforge::fuzz {
 
 using Arguments = std::vector<std::string>;
 
-/// What a descriptor of the command is when it starts.
+/// Initial kind of a descriptor of the command.
 enum class Stream {
   kUsual,   ///< Input /dev/null; output and errors a file that is kept.
   kClosed,  ///< Not open at all.
@@ -37,7 +37,7 @@ inline constexpr unsigned long kMaxMemory = 4UL << 30U;
 /// Bytes of one file: nothing in a campaign is near it but what got out of hand.
 inline constexpr unsigned long kMaxFile = 1UL << 28U;
 
-/// How a command ended.
+/// A command's end.
 struct Ending {
   int exit_code = -1;   ///< −1 if a signal ended it.
   int signal = 0;       ///< Which one; 0 for none.

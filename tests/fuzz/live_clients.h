@@ -18,7 +18,7 @@ class LiveClients {
 
   /// Kept free for the page, which may listen there.
   [[nodiscard]] int port() const { return port_; }
-  /// Whether proper requests to a page that was there have got no answer so far.
+  /// True if valid requests to an existing page have got no answer so far.
   [[nodiscard]] bool unanswered() const;
 
  private:

@@ -6,7 +6,7 @@
 
 #include "fuzz/random.h"
 
-/// How good input becomes bad input. Everything follows from the Random that is handed in.
+/// Mutations of good input into bad input, determined by the given Random.
 namespace lensforge::fuzz {
 
 /// A number as nobody wants it: 0, −1, nan, 1e400, 2^32, 300 digits … or now and then a decent one.

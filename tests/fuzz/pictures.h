@@ -5,8 +5,8 @@
 
 #include "fuzz/random.h"
 
-/// Pictures drawn by the campaign itself. Their check sums hold, so that what is wrong with them is
-/// met behind the first look at them.
+/// Pictures drawn by the campaign itself. Their checksums are valid: faults are found only after
+/// the first checks.
 namespace lensforge::fuzz {
 
 /// A PNG with an odd size, depth, colour type, palette, chunk, text, order or amount of data.

@@ -10,11 +10,11 @@
 
 namespace lensforge::fuzz {
 
-/// What stands under a name.
+/// Entry of a folder.
 struct Entry {
   char kind = 'f';  ///< f file, d folder, l link, o anything else.
   std::uintmax_t bytes = 0;
-  std::size_t hash = 0;  ///< Of a file's bytes or a link's goal.
+  std::size_t hash = 0;  ///< Hash of a file's bytes or a link's target.
 
   bool operator==(const Entry&) const = default;
 };
@@ -23,12 +23,12 @@ struct Entry {
 using Snapshot = std::map<std::string, Entry>;
 Snapshot snapshot(const std::filesystem::path& folder);
 
-/// How two states of a folder differ.
+/// Difference between two states of a folder.
 struct Difference {
   enum class Kind { kNew, kChanged, kGone };
   Kind kind = Kind::kNew;
   std::string path;
-  bool folder = false;  ///< What is new or gone is a folder.
+  bool folder = false;  ///< The new or removed entry is a folder.
 };
 std::vector<Difference> differences(const Snapshot& before, const Snapshot& after);
 

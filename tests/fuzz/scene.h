@@ -17,8 +17,8 @@
 
 namespace lensforge::fuzz {
 
-/// What is run, and what may come of it. Paths are relative to the sandbox; those of folders end
-/// with a slash and stand for all that is in them.
+/// A run and its permitted results. Paths are relative to the sandbox; a folder's path ends with a
+/// slash and includes its content.
 struct Plan {
   std::string kind;
   std::vector<Command> commands;  ///< More than one run at the same time.
@@ -30,7 +30,7 @@ struct Plan {
   std::vector<std::string> must_not_say;  ///< Findings that would be the command's own fault.
   std::vector<std::string> outputs;  ///< Where files may appear, and those of `ours` be replaced.
   std::vector<std::string> logs;     ///< Records that are kept even of a refusal.
-  std::set<std::string> ours;        ///< Files that lensforge wrote, as it wrote them.
+  std::set<std::string> ours;        ///< Unchanged files that lensforge wrote.
   std::set<std::string> forced;      ///< Others' files that the command, given --force, replaces.
   std::string lens;          ///< A folder whose lens must be whole after all, old or new; or empty.
   std::string product;       ///< What `info` must accept after success; empty: nothing.
@@ -39,7 +39,7 @@ struct Plan {
   std::optional<std::uint64_t> page_clients;
 };
 
-/// A command line that knows its options, so that each is given once.
+/// A command line that contains each option only once.
 class CommandLine {
  public:
   CommandLine(std::string command, Arguments operands)
@@ -82,7 +82,7 @@ class Scene {
   Command& run(const CommandLine& line);
   /// Ends the run with SIGINT, SIGTERM or SIGHUP within `longest` seconds.
   void interrupt_within(double longest);
-  /// Ends it with SIGINT, SIGTERM or SIGKILL, as soon as not.
+  /// Ends it with SIGINT, SIGTERM or SIGKILL within `longest` seconds.
   void kill_within(double longest);
 
   // Cheap commands that work.
@@ -112,7 +112,7 @@ class Scene {
 /// A kind of run.
 struct Kind {
   const char* name;
-  int share;  ///< How often among the others.
+  int share;  ///< Relative frequency.
   void (*make)(Scene&);
 };
 

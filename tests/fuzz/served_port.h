@@ -19,9 +19,9 @@ class ServedPort {
 
   [[nodiscard]] const std::string& path() const { return path_; }
 
-  /// What the machine did.
+  /// Record of the machine's actions.
   struct Record {
-    int pieces = 0;  ///< Of motion, homing left out.
+    int pieces = 0;  ///< Pieces of motion without homing.
     std::vector<std::string> events;
   };
   /// Ends the process. To be called once.

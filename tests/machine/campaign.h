@@ -12,7 +12,7 @@
 /// Faults at random bytes of jobs on the simulated controller, each followed by a resume.
 namespace lensforge::campaign {
 
-/// What goes wrong: the simulated controller's own faults, and what happens beside it.
+/// Faults: the simulated controller's own and those around it.
 enum class Mishap {
   kUnplug,
   kUnplugReset,
@@ -45,11 +45,11 @@ struct Case {
   std::uint64_t seed = 0;
 };
 
-/// What came of it.
+/// Outcome of a run.
 struct Outcome {
   bool struck = false;                 ///< The mishap came to pass before the job's end.
   bool finished_at_once = false;       ///< The job came to its end in spite of it.
-  StopCause cause = StopCause::kNone;  ///< What the sender stopped for; kNone for a killed one.
+  StopCause cause = StopCause::kNone;  ///< The sender's stop cause; kNone if it was killed.
   bool resumed = false;                ///< A second run took it to its end.
   /// Bytes lost on their way to the controller glued two lines into one that it took for good: Grbl
   /// has no check sum that could tell.

@@ -23,7 +23,7 @@ class FastController : public Link, public Clock {
   bool keep_lines = true;             ///< Remember what was received.
   std::vector<std::string> lines;     ///< Received so far, without their ends.
   std::vector<std::string> urgent;    ///< Realtime bytes but ?, and how many lines stood before.
-  std::size_t most_bytes = 1U << 20;  ///< That one write() takes.
+  std::size_t most_bytes = 1U << 20;  ///< Maximum per write().
   /// Answers to a line in place of "ok"; the line's number in order of arrival is the second value.
   std::function<std::string(const std::string&, std::int64_t)> answer;
   std::int64_t received = 0;

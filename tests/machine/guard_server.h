@@ -11,7 +11,7 @@
 
 namespace lensforge::testing {
 
-/// How a DriveServer answers.
+/// Behaviour of a DriveServer.
 enum class Manner {
   kHonest,
   kMute,       ///< Obeys and does not answer.
@@ -39,11 +39,11 @@ class DriveServer {
   void set_manner(Manner manner) { manner_ = manner; }
   void set_fault(std::uint16_t code) { fault_ = code; }
   void set_door(bool closed) { door_closed_ = closed; }
-  /// How fast the shaft changes its speed, rpm/s.
+  /// Rate of change of the shaft's speed, rpm/s.
   void set_ramp(double ramp) { ramp_ = ramp; }
-  /// Whether the last command was to turn.
+  /// True if the last command was to turn.
   [[nodiscard]] bool told_to_turn() const { return told_to_turn_; }
-  /// What the shaft does, rpm; negative: counter-clockwise.
+  /// Speed of the shaft, rpm; negative: counter-clockwise.
   [[nodiscard]] double rpm() const { return rpm_; }
   [[nodiscard]] int requests() const { return requests_; }
 

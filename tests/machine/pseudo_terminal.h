@@ -26,7 +26,7 @@ class PseudoTerminal {
 
   [[nodiscard]] int master() const { return master_.number(); }
   [[nodiscard]] const std::string& device() const { return device_; }
-  /// As when the cable is pulled.
+  /// Simulates a pulled cable.
   void unplug() { master_ = Descriptor(); }
 
  private:

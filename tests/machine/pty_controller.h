@@ -10,8 +10,8 @@
 
 namespace lensforge {
 
-/// A simulated controller behind a pseudo-terminal, so that any sender can talk to it as to a
-/// serial port. It runs on a thread of its own, in real time or a multiple of it.
+/// A simulated controller behind a pseudo-terminal, which any sender can use like a serial port. It
+/// runs on its own thread, in real time or a multiple of it.
 class PtyController {
  public:
   /// @param speed  simulated seconds in a second.
@@ -29,7 +29,7 @@ class PtyController {
   void serve(const SimulatedOptions& options, double speed, const MachineWatch& watch);
 
   Descriptor master_;
-  Descriptor slave_;  ///< Kept open, so that a sender may come and go.
+  Descriptor slave_;  ///< Kept open: a sender may close and reopen it.
   std::string path_;
   std::atomic<bool> ends_{false};
   std::thread thread_;

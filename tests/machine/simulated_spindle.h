@@ -12,15 +12,15 @@
 
 namespace lensforge {
 
-/// What can go wrong with a simulated device.
+/// Faults of a simulated device.
 enum class SpindleTrouble {
   kDown,       ///< The connection breaks and no new one can be made.
   kSilent,     ///< Requests are obeyed and not answered.
   kLate,       ///< Answers come `value` seconds after the request.
-  kStall,      ///< The shaft stands still, and the device says so.
+  kStall,      ///< The shaft is stopped, and the device reports it.
   kSag,        ///< The shaft reaches only the share `value` of the speed asked for.
   kFault,      ///< The fault register shows `value`; the spindle coasts to a stop.
-  kLies,       ///< The shaft stands still; at-speed and direction read as if it turned.
+  kLies,       ///< The shaft is stopped; at-speed and direction read as if it turned.
   kWrongEcho,  ///< Writes are not obeyed and echoed with another value.
   kRefuses,    ///< Every request is answered with an exception.
   kInterlock,  ///< The interlock `name` reads what it should not.
@@ -52,9 +52,9 @@ class SimulatedSpindle {
   /// Drives the spindle as a controller's M3, M4 and M5 (0 rpm) do.
   void drive(double rpm, bool clockwise);
 
-  /// What the shaft does: rpm, negative counter-clockwise.
+  /// Speed of the shaft: rpm, negative counter-clockwise.
   [[nodiscard]] double rpm();
-  /// What the drive was told: rpm, 0 when stopped.
+  /// Commanded speed: rpm, 0 when stopped.
   [[nodiscard]] double asked_rpm() const { return runs_ ? asked_rpm_ : 0.0; }
   [[nodiscard]] int exchanges() const { return exchanges_; }
 

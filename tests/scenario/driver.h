@@ -17,7 +17,7 @@ namespace lensforge::scenario {
 namespace fs = std::filesystem;
 using Arguments = std::vector<std::string>;
 
-/// How a process ended and what it said.
+/// A process's end and output.
 struct Outcome {
   int exit_code = -1;  ///< −1 if a signal ended it.
   int signal = 0;
@@ -38,15 +38,15 @@ class Process {
   Process& operator=(const Process&) = delete;
 
   void send(int signal) const;
-  /// Whether it has a handler for this signal by now (Linux's /proc).
+  /// True if it already has a handler for this signal (Linux's /proc).
   [[nodiscard]] bool catches(int signal) const;
   /// Kills it and the processes that it has made, as the system does when memory runs out.
   void kill_all() const;
   /// Waits for the end; a process that takes longer than `limit` is killed and fails the test.
   Outcome wait(std::chrono::seconds limit = std::chrono::seconds(120));
-  /// Whether it is still running after `time`, or ends earlier.
+  /// True if it is still running after `time`.
   bool runs_for(std::chrono::milliseconds time);
-  /// What it has said on stderr so far.
+  /// Its output on stderr so far.
   [[nodiscard]] std::string said() const;
 
  private:

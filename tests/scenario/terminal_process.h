@@ -12,8 +12,8 @@
 
 namespace lensforge::scenario {
 
-/// `lensforge ARGUMENTS` on a terminal of its own, as a job in the foreground of a shell; killed
-/// when this object goes.
+/// `lensforge ARGUMENTS` on its own terminal, like a foreground job of a shell; killed by the
+/// destructor.
 class TerminalProcess {
  public:
   explicit TerminalProcess(const Arguments& arguments);
@@ -26,9 +26,9 @@ class TerminalProcess {
   /// All that was written to the terminal so far.
   [[nodiscard]] std::string screen();
   bool shows(const std::string& text);
-  /// Whether typed lines wait for Enter and are echoed, as usual.
+  /// True if the terminal is in its normal mode: typed lines wait for Enter and are echoed.
   [[nodiscard]] bool line_by_line() const;
-  /// Whether a signal has stopped it.
+  /// True if a signal has stopped it.
   [[nodiscard]] bool stopped() const;
   /// Its exit code, 128 + the signal's number, or −1 if it does not end.
   int wait();

@@ -14,7 +14,7 @@ class ClippedPicture {
  public:
   ClippedPicture(int columns, int rows);
 
-  /// What lies beside the picture is lost.
+  /// Light outside the picture is dropped.
   void add(const Triangle& t, double light);
   [[nodiscard]] const std::vector<double>& light() const { return light_; }
 

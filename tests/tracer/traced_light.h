@@ -12,7 +12,7 @@ namespace tracer {
 
 /// A ray on its way to a point of the surface.
 struct Ray {
-  Vec3 from;  ///< Where it enters the lens; of a mirror the point itself.
+  Vec3 from;  ///< Point of entry into the lens; for a mirror the point itself.
   Vec3 way;   ///< Unit direction in which it comes to the point.
 };
 
@@ -29,8 +29,8 @@ class TracedLight {
   /// Light through a small triangle, on any scale that is the same for all of them.
   [[nodiscard]] double light_through(const Ray& a, const Ray& b, const Ray& c) const;
 
-  /// Where a ray that meets a surface of unit normal n at p lands, in columns and rows of the
-  /// picture; none if it does not get to the screen.
+  /// Landing point of a ray that meets a surface of unit normal n at p, in columns and rows of the
+  /// picture; empty if it misses the screen.
   [[nodiscard]] std::optional<Vec2> landing(const Ray& ray, const Vec3& p, const Vec3& n) const;
 
  private:
@@ -40,19 +40,19 @@ class TracedLight {
     Vec3 normal;
   };
   [[nodiscard]] std::optional<Front> front_at(const Vec2& place) const;
-  /// Where the light that enters there passes the height of p, from p.
+  /// Offset from p of the light that enters at `entry`, at p's height.
   [[nodiscard]] std::optional<Vec2> miss(const Vec2& entry, const Vec3& p, Ray& ray) const;
   [[nodiscard]] std::optional<Ray> through_front(const Vec3& p) const;
 
   bool mirror_;
   double ior_ = 1.0;
-  std::optional<Vec3> source_;  ///< Of light from a point.
-  Vec3 direction_;              ///< Of parallel light.
-  std::optional<Vec3> axis_;    ///< Of a flat source.
-  double radius_ = 0.0;         ///< Of a spherical front; 0 of another.
+  std::optional<Vec3> source_;  ///< Set for light from a point.
+  Vec3 direction_;              ///< For parallel light.
+  std::optional<Vec3> axis_;    ///< Set for a flat source.
+  double radius_ = 0.0;         ///< Radius of a spherical front; else 0.
   std::optional<HeightMap> heights_;
   Vec3 apex_;
-  Vec3 centre_;  ///< Of the screen.
+  Vec3 centre_;  ///< Centre of the screen.
   Vec3 right_;
   Vec3 up_;
   Vec2 size_;

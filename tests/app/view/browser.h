@@ -9,15 +9,15 @@
 /// Opens pages in a real browser: Debian's chromium, without a window and on a software renderer.
 namespace lensforge::testing {
 
-/// What came of a page.
+/// Result of a page.
 struct PageRun {
   nlohmann::json result;              ///< What the script returned; null if it threw.
   std::string error;                  ///< What the script or the page threw.
   std::vector<std::string> console;   ///< Lines of the console: errors, warnings, notes.
-  std::vector<std::string> requests;  ///< What the page has asked for.
+  std::vector<std::string> requests;  ///< The page's requests.
 };
 
-/// Whether there is a browser; a test without it is skipped.
+/// True if there is a browser; tests are skipped without one.
 bool has_browser();
 
 /// Opens a copy of a page with `script` at its end, the body of an asynchronous function whose

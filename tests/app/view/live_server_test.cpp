@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the page of a running design answers, and that no client keeps it from answering others or
-// from ending.
+// Answers of the page of a running design; no client can keep it from answering others or from
+// ending.
 #include "app/view/live_server.h"
 
 #include <fcntl.h>

@@ -19,7 +19,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// Whether the socket is ready for `events` before `end`.
+/// True if the socket is ready for `events` before `end`.
 bool ready(int socket, short events, Clock::time_point end) {
   const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(end - Clock::now());
   pollfd entry{socket, events, 0};

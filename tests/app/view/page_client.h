@@ -26,9 +26,9 @@ class PageClient {
 
   /// @return how many bytes were taken before the server closed the connection or the time was up.
   std::size_t send(std::string_view bytes, std::chrono::milliseconds limit = kPromptly) const;
-  /// What comes until the server closes the connection or the time is up.
+  /// Receives until the server closes the connection or the time is up.
   std::string receive(std::chrono::milliseconds limit = kPromptly);
-  /// Whether receive() has seen the server close the connection.
+  /// True if receive() has seen the server close the connection.
   [[nodiscard]] bool closed() const { return closed_; }
 
  private:
@@ -40,7 +40,7 @@ class PageClient {
 std::string page_request(int port, const std::string& first_line = "GET /",
                          const std::string& more = "");
 
-/// What a server answers.
+/// Answer of a server.
 struct PageAnswer {
   int status = 0;  ///< 0: nothing came, or the answer did not end in time.
   std::string head;

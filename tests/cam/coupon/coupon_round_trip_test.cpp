@@ -20,7 +20,7 @@ using testing::TrueWorkshop;
 /// A workshop that is not as its file says.
 constexpr TrueWorkshop kTrue{0.036, 0.2075, 8e-4, 0.006};
 
-/// What is measured of the default coupon in that workshop, without noise.
+/// Readings of the default coupon in that workshop, without noise.
 CouponReadings simulated(const CouponOptions& options, const TrueWorkshop& shop) {
   const TempFolder folder;
   const CouponResult coupon = make_coupon(options, folder.path(), Executor::serial(), {});

@@ -17,12 +17,12 @@
 
 namespace lensforge::testing {
 
-/// What a workshop really does; mm.
+/// A workshop's true properties; mm.
 struct TrueWorkshop {
   double sigma = 0.03;
   double radius = 0.2;
   double pitch_error = 0.0;  ///< Share of a length, across the passes.
-  double touch_off = 0.0;    ///< How much deeper everything is cut.
+  double touch_off = 0.0;    ///< Extra depth of all cuts.
 };
 
 /// Heights along a line across the passes, equally spaced; mm.

@@ -51,7 +51,7 @@ LeakageResult measure(const LeakageChain& chain, const Image& target,
   return measure_leakage(chain, target, setup, {}, Executor::serial(), RunControl());
 }
 
-/// What the sharp groove throws, as a target.
+/// The sharp groove's projected picture, as a target.
 Image groove_target() {
   const AnalyticField sharp(sharp_groove());
   return render_field(sharp, groove_setup(), Executor::serial(), RunControl()).image(400.0);

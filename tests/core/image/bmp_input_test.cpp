@@ -35,7 +35,7 @@ using ::testing::Not;
 
 enum Compression : std::uint32_t { kRgb, kRle8, kRle4, kBitFields, kAlphaBitFields = 6 };
 
-/// What a file is to be like, apart from its pixels.
+/// Properties of a file, apart from its pixels.
 struct Variant {
   std::uint32_t header = 40;
   int bits = 24;

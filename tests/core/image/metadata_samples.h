@@ -60,7 +60,7 @@ inline std::string grey_profile(double gamma) {
 
 inline std::string srgb_profile() { return saved_profile(cmsCreate_sRGBProfile()); }
 
-/// Of ink, with no more than its header needs.
+/// A profile for ink with only the data that its header needs.
 inline std::string cmyk_profile() {
   cmsHPROFILE const profile = cmsCreateProfilePlaceholder(nullptr);
   cmsSetProfileVersion(profile, 4.3);
@@ -84,7 +84,7 @@ inline std::string little_endian(std::uint64_t value, int bytes) {
   return text;
 }
 
-/// Exif's one entry that says how a picture is turned, as TIFF has it.
+/// Exif data with only the orientation entry, in TIFF format.
 inline std::string exif_of(int orientation) {
   return "II*" + std::string(1, '\0') + little_endian(8, 4) + little_endian(1, 2) +
          little_endian(0x112, 2) + little_endian(3, 2) + little_endian(1, 4) +
@@ -118,7 +118,7 @@ inline void write_webp(const std::filesystem::path& path, OIIO::ImageSpec spec,
   write_bytes(path, "RIFF" + little_endian(body.size(), 4) + body);
 }
 
-/// How a HEIC file is written.
+/// Options for writing a HEIC file.
 struct HeicOptions {
   std::string profile;
   std::string exif;
@@ -164,8 +164,8 @@ inline void encode_heic(const std::filesystem::path& path, int columns, int rows
   heif_image_release(image);
 }
 
-/// Grey 128 with a white square in the right lower corner, without loss. The encoder leaves the
-/// registers of floating point in disorder, so it has a thread of its own.
+/// Grey 128 with a white square in the right lower corner, without loss. The encoder corrupts the
+/// floating-point registers and therefore runs on its own thread.
 inline void write_heic(const std::filesystem::path& path, int columns, int rows,
                        const HeicOptions& options) {
   std::thread([&] { encode_heic(path, columns, rows, options); }).join();

@@ -29,7 +29,7 @@ std::vector<float> white_corner() {
   return pixels;
 }
 
-/// Where the white is as a viewer shows it, in words.
+/// Corner in which a viewer shows the white square, in words.
 std::string corner_of(const Image& image) {
   const int right = image.columns() - 1;
   const int bottom = image.rows() - 1;

@@ -236,7 +236,7 @@ TEST(SvgDrawing, RefusesEntitiesThatGrowWithoutEnd) {
   EXPECT_NE(refusal_of(text + "]>" + svg("<text fill='white'>&a11;</text>")), "");
 }
 
-/// What gzip makes of it.
+/// Compresses it with gzip.
 std::string packed(const std::string& text) {
   z_stream stream{};
   deflateInit2(&stream, 9, Z_DEFLATED, 16 + MAX_WBITS, 9, Z_DEFAULT_STRATEGY);

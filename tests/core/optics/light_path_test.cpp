@@ -240,7 +240,7 @@ TEST(LightPath, LandAdjointAddsToWhatIsThere) {
   EXPECT_EQ(m_bar, Eigen::Vector2d(4.0, 5.0));
 }
 
-/// Where the ray to a point leaves the air, or passes z = 0.
+/// Point at which the ray to p leaves the air or passes z = 0.
 Eigen::Vector3d entry_of(const OpticalSetup& setup, const Eigen::Vector3d& p) {
   if (setup.front) return reference_front_ray(setup, p).place;
   const Eigen::Vector3d a = reference_incident(setup, p);

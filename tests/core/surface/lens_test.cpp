@@ -396,7 +396,7 @@ TEST(Lens, APictureOfAnotherSizeIsRefused) {
   }
 }
 
-/// What read_lens() says of a sample lens with a changed surface.
+/// Error of read_lens() for a sample lens with a changed surface.
 std::string surface_refusal(const std::function<void(SurfaceMesh&)>& change) {
   const TempFolder folder;
   Lens lens = sample_lens();

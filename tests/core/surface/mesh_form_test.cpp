@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What may differ between files of one mesh: white space, ends of lines, comments, capitals.
+// Permitted differences between files of one mesh: white space, ends of lines, comments, capitals.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

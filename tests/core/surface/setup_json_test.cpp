@@ -28,7 +28,7 @@ OpticalSetup written_and_read(const OpticalSetup& setup) {
   return read;
 }
 
-/// What is said of a document with one value changed.
+/// Error for a document with one changed value.
 std::string refusal(const char* pointer, const json& value) {
   json document = json::parse(setup_json(OpticalSetup{}).dump());
   document[json::json_pointer(pointer)] = value;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What an iteration costs each rank, for docs/scale.md: mpirun -n N rank_cost PIXELS [ITERATIONS]
+// Cost of an iteration on each rank, for docs/scale.md:
+//   mpirun -n N rank_cost PIXELS [ITERATIONS]
 #include <algorithm>
 #include <chrono>
 #include <cmath>

@@ -59,7 +59,7 @@ std::string sample_bytes(const TempFolder& folder) {
   return testing::read_bytes(folder / "good");
 }
 
-/// What reading these bytes is refused with.
+/// Error of reading these bytes.
 std::string refusal_of(const TempFolder& folder, const std::string& bytes) {
   testing::write_bytes(folder / "bad", bytes);
   return message_of<InputError>([&] { read_checkpoint(folder / "bad"); });

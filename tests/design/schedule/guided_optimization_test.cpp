@@ -148,7 +148,7 @@ TEST(GuidedOptimization, ValueIsWhereARunStarts) {
   EXPECT_EQ(stage.run(options, go_on, mesh).initial_value, value);
 }
 
-/// Where a converging lens sends the light of its faces.
+/// Landing points of the light of a converging lens's faces.
 Correspondence converging() {
   const SurfaceMesh lens = testing::height_field(kSize, kShape, [](double x, double y) {
     return 5.0 - 4e-4 * ((x - 13.0) * (x - 13.0) + (y - 10.0) * (y - 10.0));
