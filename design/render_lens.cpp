@@ -67,14 +67,17 @@ RenderResult result_of(const std::vector<double>& flux, const OpticalSetup& setu
 /// thread.
 constexpr double kBriefNodes = 4e6;
 
+constexpr int kBriefSamples = 4;  ///< Nodes per knot cell each way.
+constexpr int kBriefPoints = 4;   ///< Least number of source points.
+
 /// flux_of_lens() under one of its models at Look::kBrief.
 std::vector<double> brief_flux(const Lens& lens, SurfaceModel model, const Executor& executor) {
   const bool spline = model == SurfaceModel::kSpline;
-  const int samples = spline ? std::min(4, picture_samples(*lens.spline)) : 1;
+  const int samples = spline ? std::min(kBriefSamples, picture_samples(*lens.spline)) : 1;
   const double nodes = spline ? static_cast<double>(lens.spline->cell_count()) * samples * samples
                               : static_cast<double>(lens.surface.vertex_count());
   const int points = std::min(points_for(lens.surface, lens.setup),
-                              std::max(4, static_cast<int>(kBriefNodes / nodes)));
+                              std::max(kBriefPoints, static_cast<int>(kBriefNodes / nodes)));
   return picture_under(lens.setup, points, [&](const OpticalSetup& point) {
     if (spline) return render_spline(*lens.spline, samples, point, executor);
     return flux_of_surface(lens.surface, point, model, executor);

@@ -43,11 +43,19 @@ class TomlConfig : public CLI::Config {
   ///        array or a date.
   std::vector<CLI::ConfigItem> from_config(std::istream& input) const override;
 
+  /// CLI11 takes an empty text for true. @throw InputError for all but true and false.
+  std::string to_flag(const CLI::ConfigItem& item) const override;
+
  private:
   std::vector<std::string> keys_;
 };
 
 constexpr std::size_t kLongestKey = 60;  ///< In a message.
+
+std::string flag_value(const std::string& name, const std::string& value) {
+  if (value == "true" || value == "false") return value;
+  throw InputError(name + " " + printable_line(value, kLongestKey) + ": must be true or false");
+}
 
 std::string value_text(const std::string& key, const toml::node& value) {
   if (const auto* text = value.as_string()) return text->get();
@@ -69,6 +77,10 @@ toml::table parsed(std::istream& input) {
 std::string TomlConfig::to_config(const CLI::App* /*app*/, bool /*default_also*/,
                                   bool /*write_description*/, std::string /*prefix*/) const {
   return {};
+}
+
+std::string TomlConfig::to_flag(const CLI::ConfigItem& item) const {
+  return flag_value("--" + item.name, item.inputs.front());
 }
 
 std::vector<CLI::ConfigItem> TomlConfig::from_config(std::istream& input) const {
@@ -259,8 +271,8 @@ void OptionSet::add(const OptionSpec& spec, Getter get, Setter set) {
     const auto count = [&option](std::int64_t times) { option.given = times > 0; };
     // Anything else that a --config file or --flag=value gives CLI11 tries to read as a number.
     const auto refuse_others = [name = spec.name](const std::string& value) {
-      if (value == "true" || value == "false") return std::string();
-      throw InputError(name + " " + printable_line(value, kLongestKey) + ": must be true or false");
+      flag_value(name, value);
+      return std::string();
     };
     app.add_flag_function(spec.name, count, spec.help)->check(refuse_others);
     return;

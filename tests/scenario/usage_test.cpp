@@ -165,7 +165,7 @@ TEST_F(Usage, BrokenConfigFilesAreRefused) {
   expect_option_refused({"--config", path("unknown.toml")}, {"--config", "pixles"});
   write(at("value.toml"), "ior = 0.5\n");
   expect_option_refused({"--config", path("value.toml")}, {"--ior 0.5", "1.01 to 10"});
-  for (const char* value : {"\"abc\"", "\"0x\"", "\"99999999999999999999\"", "1.5", "2"}) {
+  for (const char* value : {"\"abc\"", "\"0x\"", "\"99999999999999999999\"", "1.5", "2", "\"\""}) {
     write(at("flag.toml"), std::string("resume = ") + value + "\n");
     expect_option_refused({"--config", path("flag.toml")}, {"--resume", "true or false"});
   }
