@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cstddef>
 
-#include "core/surface/control_net.h"
+#include "core/spline/control_net.h"
 #include "design/schedule/level_plan.h"
 #include "design/schedule/transport_step.h"
 

@@ -5,8 +5,8 @@
 #include <optional>
 
 #include "core/image/image.h"
+#include "core/lens/optical_surface.h"
 #include "core/optics/optical_setup.h"
-#include "core/surface/surface_model.h"
 #include "design/energy/weights.h"
 #include "design/light_options.h"
 #include "design/optics/made_by.h"

@@ -8,9 +8,9 @@
 #include <numeric>
 
 #include "core/error.h"
-#include "core/optics/source_points.h"
-#include "core/surface/lit_surface.h"
-#include "core/surface/mesh_normals.h"
+#include "core/mesh/surface_mesh.h"
+#include "core/optics/light_path.h"
+#include "core/optics/light_source.h"
 #include "design/flux/flux_image.h"
 #include "design/optics/surface_kernels.h"
 #include "design/render_flux.h"

@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "core/compute/executor.h"
+#include "core/lens/optical_surface.h"
+#include "core/mesh/surface_mesh.h"
 #include "core/optics/optical_setup.h"
-#include "core/surface/surface_mesh.h"
-#include "core/surface/surface_model.h"
 
 namespace lensforge {
 

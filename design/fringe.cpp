@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <optional>
 
-#include "core/optics/light_colors.h"
+#include "core/mesh/surface_mesh.h"
 #include "core/optics/light_path.h"
-#include "core/surface/mesh_normals.h"
-#include "core/surface/outline_index.h"
+#include "core/optics/optical_setup.h"
+#include "core/optics/outline.h"
 #include "design/render_spline.h"
 
 namespace lensforge {

@@ -7,7 +7,7 @@
 
 #include "core/error.h"
 #include "core/image/height_grid.h"
-#include "core/optics/front_placement.h"
+#include "core/optics/front.h"
 #include "core/optics/light_path.h"
 #include "core/text/number_text.h"
 #include "design/design_options.h"

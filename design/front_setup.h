@@ -4,7 +4,7 @@
 #include <memory>
 #include <string>
 
-#include "core/compute/run_control.h"
+#include "core/compute/executor.h"
 #include "core/optics/optical_setup.h"
 
 namespace lensforge {

@@ -6,7 +6,7 @@
 #include <optional>
 #include <string>
 
-#include "core/optics/height_spline.h"
+#include "core/optics/front.h"
 #include "core/optics/optical_setup.h"
 
 namespace lensforge {

@@ -9,12 +9,12 @@
 #include <string>
 #include <vector>
 
+#include "core/compute/scalar.h"
 #include "core/error.h"
-#include "core/optics/front_placement.h"
+#include "core/optics/front.h"
 #include "core/optics/light_path.h"
 #include "core/text/number_list.h"
 #include "core/text/number_text.h"
-#include "core/value_slope.h"
 #include "design/front_setup.h"
 #include "design/outline_setup.h"
 #include "design/source_setup.h"

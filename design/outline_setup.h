@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "core/compute/run_control.h"
+#include "core/compute/executor.h"
 #include "core/image/background.h"
 #include "core/image/image.h"
 #include "core/optics/outline.h"

@@ -2,7 +2,7 @@
 #include "design/render_fields.h"
 
 #include "core/image/image_io.h"
-#include "core/optics/dispersion.h"
+#include "core/optics/optical_setup.h"
 #include "design/design_options.h"
 #include "design/render_setup.h"
 

@@ -6,11 +6,10 @@
 #include <vector>
 
 #include "core/compute/executor.h"
+#include "core/lens/optical_surface.h"
+#include "core/mesh/surface_mesh.h"
+#include "core/optics/light_path.h"
 #include "core/optics/optical_setup.h"
-#include "core/surface/lit_surface.h"
-#include "core/surface/mesh_normals.h"
-#include "core/surface/surface_mesh.h"
-#include "core/surface/surface_model.h"
 #include "design/flux/flux_image.h"
 #include "design/optics/surface_kernels.h"
 

@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
-#include "core/surface/mesh_cut.h"
-#include "core/surface/mesh_normals.h"
+#include "core/mesh/surface_mesh.h"
+#include "core/optics/outline.h"
 #include "design/flux_of_surface.h"
 #include "design/render_flux.h"
 #include "design/render_spline.h"

@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
-#include "core/surface/lit_surface.h"
-#include "core/surface/mesh_cut.h"
+#include "core/optics/light_path.h"
+#include "core/optics/outline.h"
 #include "design/flux/flux_image.h"
 #include "design/optics/surface_kernels.h"
 

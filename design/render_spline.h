@@ -5,7 +5,7 @@
 
 #include "core/compute/executor.h"
 #include "core/optics/optical_setup.h"
-#include "core/surface/control_net.h"
+#include "core/spline/control_net.h"
 
 namespace lensforge {
 

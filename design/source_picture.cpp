@@ -6,8 +6,8 @@
 #include <cstddef>
 
 #include "core/image/metrics.h"
-#include "core/optics/light_colors.h"
-#include "core/optics/source_points.h"
+#include "core/optics/light_source.h"
+#include "core/optics/optical_setup.h"
 #include "design/flux/source_blur.h"
 #include "design/picture_values.h"
 #include "design/render_lens.h"

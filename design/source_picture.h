@@ -6,8 +6,8 @@
 
 #include "core/compute/executor.h"
 #include "core/image/image.h"
+#include "core/lens/lens.h"
 #include "core/optics/optical_setup.h"
-#include "core/surface/lens.h"
 
 namespace lensforge {
 

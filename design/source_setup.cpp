@@ -8,7 +8,7 @@
 #include "core/error.h"
 #include "core/image/image_io.h"
 #include "core/optics/light_path.h"
-#include "core/optics/source_points.h"
+#include "core/optics/light_source.h"
 #include "core/text/number_text.h"
 
 namespace lensforge {

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "core/image/image_sample.h"
-#include "core/optics/source_points.h"
+#include "core/optics/light_source.h"
 #include "design/optics/smooth.h"
 #include "design/render_lens.h"
 

@@ -13,7 +13,6 @@
 #include "app/frame/interrupt.h"
 #include "app/frame/option_set.h"
 #include "core/compute/executor.h"
-#include "core/compute/run_control.h"
 #include "core/compute/work_estimate.h"
 #include "core/io/folder_lock.h"
 #include "core/text/lower_case.h"

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "core/image/metrics.h"
-#include "core/surface/lens.h"
+#include "core/lens/lens.h"
 #include "design/fringe.h"
 
 /// Texts and JSON that several commands print.

@@ -32,7 +32,7 @@
 #include "core/page/decade_plot.h"
 #include "core/page/html_page.h"
 #include "core/page/html_text.h"
-#include "core/surface/control_net.h"
+#include "core/spline/control_net.h"
 #include "core/text/version.h"
 #include "design/render_lens.h"
 #include "design/schedule/checkpoint.h"

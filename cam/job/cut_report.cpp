@@ -9,10 +9,10 @@
 #include "cam/plan/finishing.h"
 #include "cam/post/program_part.h"
 #include "core/io/lens_folder.h"
-#include "core/optics/fresnel.h"
-#include "core/optics/front_placement.h"
+#include "core/optics/front.h"
+#include "core/optics/light_path.h"
+#include "core/optics/refraction.h"
 #include "core/page/html_text.h"
-#include "core/surface/lit_surface.h"
 #include "core/text/number_text.h"
 #include "core/text/version.h"
 

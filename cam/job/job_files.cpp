@@ -23,7 +23,7 @@
 #include "core/io/lens_folder.h"
 #include "core/io/output_guard.h"
 #include "core/io/pending_files.h"
-#include "core/surface/mesh_io.h"
+#include "core/mesh/mesh_files.h"
 #include "core/text/lower_case.h"
 #include "machine/gcode/program_seal.h"
 

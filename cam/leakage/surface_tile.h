@@ -16,7 +16,7 @@
 #include "core/compute/executor.h"
 #include "core/optics/light_path.h"
 #include "core/optics/optical_setup.h"
-#include "core/surface/outline_index.h"
+#include "core/optics/outline.h"
 #include "design/optics/image_piece.h"
 #include "design/optics/image_triangle.h"
 

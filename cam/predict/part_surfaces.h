@@ -18,7 +18,7 @@
 #include "cam/plan/finishing.h"
 #include "core/compute/executor.h"
 #include "core/image/layered_image.h"
-#include "core/surface/optical_surface.h"
+#include "core/lens/optical_surface.h"
 
 namespace lensforge {
 

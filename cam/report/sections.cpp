@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "cam/report/report_maps.h"
-#include "core/optics/front_surface.h"
+#include "core/optics/front.h"
 #include "core/page/html_text.h"
 #include "core/page/light_drawing.h"
 #include "core/text/number_text.h"

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "core/compute/run_control.h"
+#include "core/compute/executor.h"
 
 namespace lensforge {
 

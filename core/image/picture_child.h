@@ -6,7 +6,7 @@
 #include <span>
 #include <string>
 
-#include "core/compute/run_control.h"
+#include "core/compute/executor.h"
 #include "core/image/image.h"
 #include "core/sandbox/child_work.h"
 

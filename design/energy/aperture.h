@@ -9,8 +9,8 @@
 
 #include "core/compute/executor.h"
 #include "core/compute/host_device.h"
-#include "core/surface/mesh_cut.h"
-#include "core/surface/surface_mesh.h"
+#include "core/mesh/surface_mesh.h"
+#include "core/optics/outline.h"
 #include "design/optics/image_piece.h"
 
 /// A lens's outline in the objective. The faces that it cuts keep their corners' x and y, so that

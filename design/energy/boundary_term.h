@@ -3,7 +3,6 @@
 
 #include <Eigen/Core>
 
-#include "core/compute/clamped.h"
 #include "core/compute/host_device.h"
 #include "design/optics/image_triangle.h"
 

@@ -5,11 +5,10 @@
 #include <variant>
 #include <vector>
 
-#include "core/optics/light_colors.h"
+#include "core/mesh/surface_mesh.h"
 #include "core/optics/light_path.h"
-#include "core/surface/lit_surface.h"
-#include "core/surface/mesh_cut.h"
-#include "core/surface/surface_mesh.h"
+#include "core/optics/optical_setup.h"
+#include "core/optics/outline.h"
 #include "design/energy/objective_options.h"
 #include "design/optics/surface_kernels.h"
 

@@ -7,7 +7,7 @@
 
 #include "core/compute/executor.h"
 #include "core/compute/host_device.h"
-#include "core/surface/mesh_topology.h"
+#include "core/mesh/mesh_topology.h"
 #include "design/energy/mesh_view.h"
 
 namespace lensforge {

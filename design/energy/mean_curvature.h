@@ -2,7 +2,7 @@
 #pragma once
 
 #include "core/compute/host_device.h"
-#include "core/value_slope.h"
+#include "core/compute/scalar.h"
 #include "design/energy/weingarten.h"
 
 namespace lensforge {

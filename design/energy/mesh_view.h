@@ -7,8 +7,8 @@
 
 #include "core/compute/executor.h"
 #include "core/compute/host_device.h"
-#include "core/surface/mesh_topology.h"
-#include "core/surface/surface_mesh.h"
+#include "core/mesh/mesh_topology.h"
+#include "core/mesh/surface_mesh.h"
 #include "design/optics/columns.h"
 
 namespace lensforge {

@@ -6,8 +6,8 @@
 #include <variant>
 
 #include "core/image/image.h"
+#include "core/lens/optical_surface.h"
 #include "core/optics/optical_setup.h"
-#include "core/surface/surface_model.h"
 #include "design/energy/area_barrier.h"
 #include "design/energy/correspondence_term.h"
 #include "design/energy/weights.h"

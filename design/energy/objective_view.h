@@ -4,8 +4,8 @@
 #include <cstdint>
 
 #include "core/compute/host_device.h"
+#include "core/mesh/surface_mesh.h"
 #include "core/optics/light_path.h"
-#include "core/surface/corners.h"
 #include "design/energy/aperture.h"
 #include "design/energy/area_barrier.h"
 #include "design/energy/face_frame.h"

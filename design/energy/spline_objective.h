@@ -9,8 +9,8 @@
 #include <variant>
 #include <vector>
 
-#include "core/surface/control_net.h"
-#include "core/surface/surface_mesh.h"
+#include "core/mesh/surface_mesh.h"
+#include "core/spline/control_net.h"
 #include "design/energy/objective_on.h"
 #include "design/optics/axis_basis.h"
 #include "design/optics/columns.h"

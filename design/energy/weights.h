@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "core/surface/surface_model.h"
+#include "core/lens/optical_surface.h"
 
 namespace lensforge {
 

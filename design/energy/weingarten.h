@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "core/compute/host_device.h"
-#include "core/value_slope.h"
+#include "core/compute/scalar.h"
 #include "design/energy/face_frame.h"
 
 /// The Weingarten map of every face and its consistency across edges.

@@ -4,7 +4,6 @@
 #include <Eigen/Core>
 #include <cmath>
 
-#include "core/compute/clamped.h"
 #include "core/compute/host_device.h"
 
 /// Walks a straight edge through the pixels it crosses.

@@ -13,9 +13,9 @@
 #include <vector>
 
 #include "core/compute/executor.h"
+#include "core/mesh/surface_mesh.h"
 #include "core/optics/light_path.h"
-#include "core/surface/mesh_cut.h"
-#include "core/surface/surface_mesh.h"
+#include "core/optics/outline.h"
 #include "design/energy/gradient_term.h"
 #include "design/energy/image_term.h"
 #include "design/energy/laplacian_term.h"

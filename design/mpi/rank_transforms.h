@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "core/compute/executor.h"
-#include "core/surface/surface_mesh.h"
+#include "core/mesh/surface_mesh.h"
 #include "design/mpi/ranks.h"
 #include "design/mpi/row_slabs.h"
 #include "design/optimize/cosine_transform.h"

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/surface/surface_mesh.h"
+#include "core/mesh/surface_mesh.h"
 
 /// How the rows of a grid mesh are shared out over ranks. The vertices of a rank lie together, and
 /// so do its faces, as both are numbered row by row.

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "core/value_slope.h"
+#include "core/compute/scalar.h"
 #include "design/optimize/lbfgs_on.h"
 
 namespace lensforge {

@@ -4,8 +4,8 @@
 #include <Eigen/Core>
 
 #include "core/compute/host_device.h"
+#include "core/mesh/surface_mesh.h"
 #include "core/optics/light_path.h"
-#include "core/surface/corners.h"
 #include "design/optics/image_triangle.h"
 
 namespace lensforge {

@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 
 #include "core/compute/host_device.h"
-#include "core/surface/outline_index.h"
+#include "core/optics/outline.h"
 #include "design/optics/image_triangle.h"
 
 namespace lensforge {

@@ -10,7 +10,7 @@ namespace lensforge {
 /// What one surface triangle projects onto the receiving plane: a triangle of uniform irradiance.
 /// The same struct holds derivatives of a scalar with respect to these numbers.
 struct ImageTriangle {
-  Eigen::Vector2d p0{0.0, 0.0};  ///< Corners in pixel coordinates (core/optics/image_plane.h).
+  Eigen::Vector2d p0{0.0, 0.0};  ///< Corners in pixel coordinates (core/optics/screen.h).
   Eigen::Vector2d p1{0.0, 0.0};
   Eigen::Vector2d p2{0.0, 0.0};
   double flux = 0.0;  ///< Share of the lens's total flux.

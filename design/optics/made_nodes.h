@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "core/compute/executor.h"
-#include "core/surface/control_net.h"
+#include "core/spline/control_net.h"
 #include "design/optics/averaging_grid.h"
 #include "design/optics/made_by.h"
 #include "design/optics/spline_nodes.h"

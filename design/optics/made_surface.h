@@ -4,9 +4,9 @@
 #include <Eigen/Core>
 
 #include "core/compute/executor.h"
-#include "core/surface/control_net.h"
-#include "core/surface/optical_surface.h"
-#include "core/surface/sampled_surface.h"
+#include "core/lens/optical_surface.h"
+#include "core/mesh/surface_mesh.h"
+#include "core/spline/control_net.h"
 #include "design/optics/averaging_grid.h"
 #include "design/optics/made_by.h"
 

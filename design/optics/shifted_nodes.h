@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/compute/executor.h"
-#include "core/surface/control_net.h"
+#include "core/spline/control_net.h"
 #include "design/optics/columns.h"
 #include "design/optics/made_surface.h"
 #include "design/optics/spline_nodes.h"

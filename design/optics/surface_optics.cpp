@@ -6,9 +6,9 @@
 #include <optional>
 #include <vector>
 
-#include "core/surface/lit_surface.h"
-#include "core/surface/mesh_cut.h"
-#include "core/surface/mesh_normals.h"
+#include "core/mesh/surface_mesh.h"
+#include "core/optics/light_path.h"
+#include "core/optics/outline.h"
 #include "design/optics/facet.h"
 #include "design/optics/surface_kernels.h"
 

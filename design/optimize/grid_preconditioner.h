@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 
 #include "core/compute/executor.h"
-#include "core/surface/surface_mesh.h"
+#include "core/mesh/surface_mesh.h"
 #include "design/optimize/grid_preconditioner_on.h"
 
 namespace lensforge {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "core/surface/surface_mesh.h"
+#include "core/mesh/surface_mesh.h"
 #include "design/reflect/reflect_options.h"
 
 namespace lensforge::reflect {

@@ -6,7 +6,7 @@
 #include "core/io/files.h"
 #include "core/io/output_guard.h"
 #include "core/io/pending_files.h"
-#include "core/surface/mesh_io.h"
+#include "core/mesh/mesh_files.h"
 #include "core/text/number_text.h"
 #include "core/text/version.h"
 #include "design/reflect/light/light_field.h"

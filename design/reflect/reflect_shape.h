@@ -7,8 +7,7 @@
 #include <vector>
 
 #include "core/compute/executor.h"
-#include "core/compute/run_control.h"
-#include "core/surface/surface_mesh.h"
+#include "core/mesh/surface_mesh.h"
 #include "design/reflect/light/evaluate.h"
 #include "design/reflect/radar/radar_comparison.h"
 #include "design/reflect/reflect_input.h"

@@ -7,9 +7,9 @@
 #include <string>
 #include <utility>
 
+#include "core/compute/scalar.h"
 #include "core/error.h"
-#include "core/surface/control_net.h"
-#include "core/value_slope.h"
+#include "core/spline/control_net.h"
 #include "design/flux_of_surface.h"
 #include "design/render_spline.h"
 #include "design/schedule/level_start.h"

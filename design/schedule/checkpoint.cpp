@@ -10,7 +10,7 @@
 #include <string_view>
 
 #include "core/io/checkpoint_file.h"
-#include "core/surface/grid_mesh.h"
+#include "core/mesh/surface_mesh.h"
 #include "core/text/json_fields.h"
 #include "design/design_fields.h"
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/image/image.h"
-#include "core/surface/surface_mesh.h"
+#include "core/mesh/surface_mesh.h"
 #include "design/design_options.h"
 #include "design/schedule/convergence.h"
 #include "design/schedule/guided_optimization.h"

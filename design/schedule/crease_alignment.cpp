@@ -9,8 +9,8 @@
 #include <tuple>
 #include <vector>
 
+#include "core/mesh/mesh_topology.h"
 #include "core/optics/light_path.h"
-#include "core/surface/mesh_topology.h"
 #include "design/schedule/transport_sites.h"
 
 namespace lensforge {

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <cstdio>
 
-#include "core/surface/control_net.h"
+#include "core/spline/control_net.h"
 
 namespace lensforge {
 namespace {

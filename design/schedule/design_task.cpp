@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "core/image/image_io.h"
-#include "core/surface/control_net.h"
+#include "core/spline/control_net.h"
 #include "design/light_setup.h"
 
 namespace lensforge {

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "core/compute/executor.h"
-#include "core/compute/run_control.h"
 #include "core/image/image.h"
 #include "core/optics/optical_setup.h"
 #include "design/design_options.h"

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "core/optics/light_path.h"
-#include "core/surface/mesh_cut.h"
+#include "core/optics/outline.h"
 #include "design/optics/surface_optics.h"
 #include "design/schedule/transport_sites.h"
 

@@ -4,12 +4,11 @@
 #include <Eigen/Core>
 
 #include "core/compute/executor.h"
-#include "core/compute/run_control.h"
 #include "core/image/image.h"
+#include "core/lens/lens.h"
+#include "core/lens/optical_surface.h"
+#include "core/mesh/surface_mesh.h"
 #include "core/optics/optical_setup.h"
-#include "core/surface/lens.h"
-#include "core/surface/surface_mesh.h"
-#include "core/surface/surface_model.h"
 #include "design/energy/correspondence_term.h"
 #include "design/transport/brenier_map.h"
 #include "design/transport/height_fit.h"

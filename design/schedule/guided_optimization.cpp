@@ -8,9 +8,8 @@
 #include <numbers>
 #include <variant>
 
-#include "core/compute/split_mix.h"
+#include "core/compute/scalar.h"
 #include "core/optics/light_path.h"
-#include "core/value_slope.h"
 #include "design/energy/spline_objective.h"
 #include "design/mpi/rank_stage.h"
 #include "design/optics/image_triangle.h"

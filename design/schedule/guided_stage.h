@@ -6,8 +6,8 @@
 #include <memory>
 
 #include "core/compute/executor.h"
+#include "core/mesh/surface_mesh.h"
 #include "core/optics/optical_setup.h"
-#include "core/surface/surface_mesh.h"
 #include "design/energy/objective_options.h"
 #include "design/optimize/grid_symbol.h"
 #include "design/optimize/lbfgs.h"

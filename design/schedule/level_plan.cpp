@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/mesh/surface_mesh.h"
 #include "core/optics/light_path.h"
-#include "core/surface/grid_mesh.h"
 #include "design/light_setup.h"
 
 namespace lensforge {

@@ -3,8 +3,8 @@
 
 #include <cmath>
 
-#include "core/surface/control_net.h"
-#include "core/surface/grid_mesh.h"
+#include "core/mesh/surface_mesh.h"
+#include "core/spline/control_net.h"
 #include "design/schedule/mesh_evening.h"
 #include "design/schedule/spline_start.h"
 #include "design/schedule/start_surface.h"

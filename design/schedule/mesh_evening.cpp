@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "core/surface/mesh_topology.h"
+#include "core/mesh/mesh_topology.h"
 
 namespace lensforge {
 namespace {

@@ -5,8 +5,8 @@
 
 #include "core/compute/executor.h"
 #include "core/image/image.h"
+#include "core/mesh/surface_mesh.h"
 #include "core/optics/optical_setup.h"
-#include "core/surface/surface_mesh.h"
 #include "design/energy/correspondence_term.h"
 #include "design/energy/objective_options.h"
 

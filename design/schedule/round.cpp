@@ -6,9 +6,9 @@
 #include <string>
 #include <utility>
 
+#include "core/compute/scalar.h"
 #include "core/error.h"
 #include "core/text/number_text.h"
-#include "core/value_slope.h"
 #include "design/schedule/level_start.h"
 #include "design/schedule/reach.h"
 #include "design/schedule/start_surface.h"

@@ -3,10 +3,9 @@
 
 #include <cmath>
 
-#include "core/surface/grid_triangles.h"
-#include "core/surface/grid_warp.h"
-#include "core/surface/slope_fit.h"
-#include "core/surface/smooth_surface.h"
+#include "core/lens/slope_fit.h"
+#include "core/lens/smooth_surface.h"
+#include "core/mesh/surface_mesh.h"
 
 namespace lensforge {
 namespace {

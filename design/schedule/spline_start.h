@@ -2,9 +2,8 @@
 #pragma once
 
 #include "core/compute/executor.h"
-#include "core/compute/run_control.h"
-#include "core/surface/control_net.h"
-#include "core/surface/surface_mesh.h"
+#include "core/mesh/surface_mesh.h"
+#include "core/spline/control_net.h"
 
 namespace lensforge {
 

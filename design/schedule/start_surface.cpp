@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "design/schedule/start_surface.h"
 
+#include "core/mesh/surface_mesh.h"
 #include "core/optics/light_path.h"
-#include "core/surface/grid_mesh.h"
 #include "design/schedule/face_transport.h"
 
 namespace lensforge {

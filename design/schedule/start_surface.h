@@ -2,8 +2,8 @@
 #pragma once
 
 #include "core/compute/executor.h"
+#include "core/mesh/surface_mesh.h"
 #include "core/optics/optical_setup.h"
-#include "core/surface/surface_mesh.h"
 
 namespace lensforge {
 

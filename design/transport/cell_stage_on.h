@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "core/compute/executor.h"
-#include "core/compute/kernel_input.h"
 #include "core/error.h"
 #include "design/transport/cell_kernels.h"
 #include "design/transport/cell_stage.h"

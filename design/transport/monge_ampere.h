@@ -3,7 +3,7 @@
 
 #include <Eigen/Core>
 
-#include "core/compute/run_control.h"
+#include "core/compute/executor.h"
 #include "core/image/image.h"
 
 namespace lensforge {

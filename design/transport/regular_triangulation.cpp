@@ -14,7 +14,7 @@
 #include <cstdint>
 
 #include "core/error.h"
-#include "core/surface/corners.h"
+#include "core/mesh/surface_mesh.h"
 
 namespace lensforge {
 

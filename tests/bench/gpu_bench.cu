@@ -16,7 +16,7 @@
 #include "bench/gpu_transport.h"
 #include "bench/lens_scene.h"
 #include "core/compute/cuda/cuda_executor.h"
-#include "core/compute/gpu.h"
+#include "core/compute/executor.h"
 #include "design/design_lens.h"
 #include "design/energy/objective_cuda.h"
 #include "design/schedule/guided_optimization.h"

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "core/compute/executor.h"
-#include "core/surface/surface_mesh.h"
+#include "core/mesh/surface_mesh.h"
 #include "design/reflect/reflect_options.h"
 #include "design/reflect/reflect_shape.h"
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/image/metrics.h"
-#include "core/optics/source_points.h"
+#include "core/optics/light_source.h"
 #include "design/design_lens.h"
 #include "design/finite_difference.h"
 #include "design/objective_setups.h"

@@ -8,8 +8,8 @@
 
 #include "core/error.h"
 #include "core/image/spectral_color.h"
-#include "core/optics/light_colors.h"
-#include "core/surface/mesh_normals.h"
+#include "core/mesh/surface_mesh.h"
+#include "core/optics/optical_setup.h"
 #include "core/temp_folder.h"
 #include "design/test_setups.h"
 

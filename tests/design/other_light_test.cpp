@@ -13,7 +13,7 @@
 #include <variant>
 #include <vector>
 
-#include "core/optics/front_placement.h"
+#include "core/optics/front.h"
 #include "core/optics/height_fronts.h"
 #include "core/optics/light_path.h"
 #include "design/energy/objective.h"

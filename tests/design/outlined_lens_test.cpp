@@ -13,9 +13,8 @@
 
 #include "core/error.h"
 #include "core/image/transfer.h"
-#include "core/surface/corners.h"
-#include "core/surface/mesh_cut.h"
-#include "core/surface/mesh_normals.h"
+#include "core/mesh/surface_mesh.h"
+#include "core/optics/outline.h"
 #include "core/surface/sample_splines.h"
 #include "core/temp_folder.h"
 #include "design/design_lens.h"

@@ -9,7 +9,7 @@
 
 #include "core/error.h"
 #include "core/io/output_guard.h"
-#include "core/surface/mesh_normals.h"
+#include "core/mesh/surface_mesh.h"
 #include "core/temp_folder.h"
 #include "export/files/closed_solid.h"
 #include "export/files/mesh_formats.h"

@@ -8,8 +8,7 @@
 #include <vector>
 
 #include "core/compute/executor.h"
-#include "core/compute/run_control.h"
-#include "core/surface/surface_mesh.h"
+#include "core/mesh/surface_mesh.h"
 #include "design/reflect/light/directions.h"
 #include "design/reflect/light/goal.h"
 #include "design/reflect/light/light_lanes.h"

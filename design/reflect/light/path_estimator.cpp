@@ -7,7 +7,7 @@
 #include <numbers>
 #include <vector>
 
-#include "core/compute/split_mix.h"
+#include "core/compute/scalar.h"
 #include "design/reflect/light/phong.h"
 #include "design/reflect/light/reflection_energy.h"
 

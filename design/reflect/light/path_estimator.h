@@ -5,7 +5,7 @@
 #include <cstdint>
 
 #include "core/compute/executor.h"
-#include "core/surface/surface_mesh.h"
+#include "core/mesh/surface_mesh.h"
 #include "design/reflect/light/light_field.h"
 #include "design/reflect/light/ray_scene.h"
 #include "design/reflect/mesh/faces.h"

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/surface/surface_mesh.h"
+#include "core/mesh/surface_mesh.h"
 
 namespace lensforge::reflect {
 

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "core/surface/surface_mesh.h"
+#include "core/mesh/surface_mesh.h"
 
 namespace lensforge::reflect {
 

@@ -3,7 +3,7 @@
 
 #include <Eigen/Core>
 
-#include "core/surface/surface_mesh.h"
+#include "core/mesh/surface_mesh.h"
 #include "design/reflect/light/light_field.h"
 
 namespace lensforge::reflect {

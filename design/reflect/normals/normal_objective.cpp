@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "core/surface/corners.h"
+#include "core/mesh/surface_mesh.h"
 #include "design/optimize/lbfgs_on.h"
 
 namespace lensforge::reflect {

@@ -4,7 +4,6 @@
 #include <Eigen/Core>
 
 #include "core/compute/executor.h"
-#include "core/compute/run_control.h"
 #include "design/reflect/light/reflection_energy.h"
 
 namespace lensforge::reflect {

@@ -5,7 +5,7 @@
 #include <memory>
 
 #include "core/compute/executor.h"
-#include "core/surface/surface_mesh.h"
+#include "core/mesh/surface_mesh.h"
 
 namespace lensforge::reflect {
 

@@ -10,7 +10,7 @@
 #include <numbers>
 #include <string>
 
-#include "core/compute/split_mix.h"
+#include "core/compute/scalar.h"
 #include "core/error.h"
 #include "core/text/number_text.h"
 #include "design/reflect/light/ray_scene.h"

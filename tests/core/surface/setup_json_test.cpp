@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/surface/setup_json.h"
+#include "core/lens/setup_json.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -9,7 +9,7 @@
 #include <numeric>
 #include <vector>
 
-#include "core/optics/source_points.h"
+#include "core/optics/light_source.h"
 #include "design/random_input.h"
 #include "design/test_setups.h"
 

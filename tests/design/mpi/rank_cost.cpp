@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "core/surface/grid_mesh.h"
+#include "core/mesh/surface_mesh.h"
 #include "design/flux_of_surface.h"
 #include "design/mpi/rank_stage.h"
 #include "design/mpi/ranks.h"

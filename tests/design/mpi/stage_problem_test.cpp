@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "core/surface/grid_mesh.h"
+#include "core/mesh/surface_mesh.h"
 #include "design/mpi/block_share.h"
 #include "design/mpi/rank_test.h"
 #include "design/mpi/row_slabs.h"

@@ -7,7 +7,7 @@
 #include <numbers>
 
 #include "core/error.h"
-#include "core/surface/cubic_spline.h"
+#include "core/spline/cubic_spline.h"
 
 namespace lensforge {
 namespace {

@@ -7,8 +7,8 @@
 #include <cmath>
 #include <utility>
 
-#include "core/optics/image_plane.h"
-#include "core/surface/grid_mesh.h"
+#include "core/mesh/surface_mesh.h"
+#include "core/optics/screen.h"
 #include "design/optics/image_triangle.h"
 #include "design/schedule/face_transport.h"
 #include "design/transport_scenes.h"

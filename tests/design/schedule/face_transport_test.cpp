@@ -9,7 +9,7 @@
 #include <string>
 
 #include "core/error.h"
-#include "core/optics/image_plane.h"
+#include "core/optics/screen.h"
 #include "design/graded_mesh.h"
 #include "design/render_lens.h"
 #include "design/snell.h"

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "core/surface/grid_mesh.h"
+#include "core/mesh/surface_mesh.h"
 #include "design/random_input.h"
 #include "design/schedule/alternation.h"
 #include "design/test_setups.h"

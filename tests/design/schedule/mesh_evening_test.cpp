@@ -6,7 +6,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "core/surface/grid_mesh.h"
+#include "core/mesh/surface_mesh.h"
 #include "design/graded_mesh.h"
 #include "design/random_input.h"
 

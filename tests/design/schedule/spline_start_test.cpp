@@ -3,9 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include "core/lens/smooth_surface.h"
+#include "core/lens/surface_check.h"
 #include "core/surface/sample_splines.h"
-#include "core/surface/smooth_surface.h"
-#include "core/surface/spline_file.h"
 #include "design/test_setups.h"
 
 namespace lensforge {

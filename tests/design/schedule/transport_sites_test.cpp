@@ -7,8 +7,8 @@
 #include <numbers>
 #include <string>
 
+#include "core/mesh/surface_mesh.h"
 #include "core/optics/light_path.h"
-#include "core/surface/surface_mesh.h"
 #include "design/schedule/face_transport.h"
 #include "design/schedule/reach.h"
 #include "design/schedule/start_surface.h"

@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/surface/grid_mesh.h"
+#include "core/mesh/surface_mesh.h"
 #include "design/test_setups.h"
 #include "design/transport_scenes.h"
 

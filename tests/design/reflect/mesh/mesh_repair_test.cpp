@@ -4,7 +4,7 @@
 #include <gmock/gmock.h>
 
 #include "core/error.h"
-#include "core/surface/mesh_normals.h"
+#include "core/mesh/surface_mesh.h"
 #include "design/reflect/mesh/edges.h"
 #include "design/reflect/mesh/faces.h"
 #include "fixtures/shapes/shapes.h"
