@@ -14,8 +14,6 @@
 #include "core/image/image_io.h"
 #include "core/io/files.h"
 #include "core/io/lens_folder.h"
-#include "core/io/output_guard.h"
-#include "core/io/sha256.h"
 #include "core/surface/mesh_io.h"
 #include "core/surface/mesh_normals.h"
 #include "core/text/lower_case.h"

@@ -39,8 +39,6 @@
 #include "core/io/checkpoint_file.h"
 #include "core/io/files.h"
 #include "core/io/lens_folder.h"
-#include "core/io/output_guard.h"
-#include "core/io/pending_files.h"
 #include "core/optics/source_points.h"
 #include "core/page/html_text.h"
 #include "core/page/light_drawing.h"

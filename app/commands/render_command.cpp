@@ -13,7 +13,7 @@
 #include "core/image/image_io.h"
 #include "core/image/spectral_color.h"
 #include "core/io/files.h"
-#include "core/io/output_guard.h"
+#include "core/io/lens_folder.h"
 #include "core/optics/light_colors.h"
 #include "core/surface/lens.h"
 #include "core/surface/mesh_io.h"

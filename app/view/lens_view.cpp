@@ -22,7 +22,6 @@
 #include "core/error.h"
 #include "core/image/image.h"
 #include "core/image/layered_image.h"
-#include "core/io/cut_layers.h"
 #include "core/io/files.h"
 #include "core/io/lens_folder.h"
 #include "core/page/html_text.h"

@@ -7,7 +7,7 @@
 #include <thread>
 #include <vector>
 
-#include "core/io/descriptor.h"
+#include "core/io/files.h"
 
 namespace lensforge {
 

@@ -27,7 +27,7 @@
 #include <vector>
 
 #include "core/error.h"
-#include "core/io/descriptor.h"
+#include "core/io/files.h"
 
 // The child sends frames through a pipe: a letter, the length of the text, the text. If it ends
 // without a result or an error, it has failed. It is killed together with its parent, and ends

@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "core/error.h"
-#include "core/io/output_guard.h"
+#include "core/io/lens_folder.h"
 #include "core/temp_folder.h"
 
 namespace lensforge {

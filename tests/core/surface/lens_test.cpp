@@ -13,7 +13,7 @@
 #include "core/error.h"
 #include "core/full_disk.h"
 #include "core/image/image_io.h"
-#include "core/io/output_guard.h"
+#include "core/io/lens_folder.h"
 #include "core/surface/mesh_io.h"
 #include "core/surface/sample_splines.h"
 #include "core/surface/spline_file.h"
