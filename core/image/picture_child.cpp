@@ -15,7 +15,7 @@
 #include "core/image/openimageio_use.h"
 #include "core/image/picture_source.h"
 #include "core/io/files.h"
-#include "core/sandbox/byte_record.h"
+#include "core/sandbox/child_work.h"
 
 namespace lensforge {
 namespace {
