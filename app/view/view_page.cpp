@@ -15,8 +15,6 @@
 #include "core/image/transfer.h"
 #include "core/optics/dispersion.h"
 #include "core/page/html_page.h"
-#include "core/page/html_text.h"
-#include "core/page/script_data.h"
 #include "core/surface/setup_json.h"
 #include "core/text/number_text.h"
 #include "core/text/version.h"

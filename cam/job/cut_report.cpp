@@ -11,7 +11,7 @@
 #include "core/io/lens_folder.h"
 #include "core/optics/fresnel.h"
 #include "core/optics/front_placement.h"
-#include "core/page/html_text.h"
+#include "core/page/html_page.h"
 #include "core/surface/lit_surface.h"
 #include "core/text/number_text.h"
 #include "core/text/version.h"

@@ -26,7 +26,7 @@
 #include "core/error.h"
 #include "core/optics/light_colors.h"
 #include "core/optics/light_path.h"
-#include "core/page/html_text.h"
+#include "core/page/html_page.h"
 #include "core/surface/lens.h"
 #include "core/surface/lit_surface.h"
 #include "core/surface/mesh_cut.h"
