@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/error.h"
-#include "core/image/spectral_color.h"
+#include "core/image/color.h"
 #include "core/io/checkpoint_file.h"
 #include "core/optics/light_colors.h"
 #include "core/surface/lens_surface.h"

@@ -10,7 +10,6 @@
 #include "core/compute/run_control.h"
 #include "core/image/image.h"
 #include "core/image/image_io.h"
-#include "core/image/metrics.h"
 #include "core/surface/lens.h"
 #include "design/design_options.h"
 #include "design/fringe.h"

@@ -6,7 +6,7 @@
 #include <system_error>
 
 #include "core/error.h"
-#include "core/image/height_grid.h"
+#include "core/image/rasters.h"
 #include "core/optics/front_placement.h"
 #include "core/optics/light_path.h"
 #include "core/text/number_text.h"

@@ -5,7 +5,6 @@
 
 #include "core/compute/executor.h"
 #include "core/image/image.h"
-#include "core/image/metrics.h"
 #include "core/optics/optical_setup.h"
 #include "core/surface/lens.h"
 #include "core/surface/surface_mesh.h"

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstddef>
 
-#include "core/image/metrics.h"
+#include "core/image/image.h"
 #include "core/optics/light_colors.h"
 #include "core/optics/source_points.h"
 #include "design/flux/source_blur.h"

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "core/image/image_sample.h"
+#include "core/image/image.h"
 #include "core/optics/source_points.h"
 #include "design/optics/smooth.h"
 #include "design/render_lens.h"

@@ -10,7 +10,6 @@
 #include "app/frame/option_set.h"
 #include "cam/plan/cam_options.h"
 #include "core/compute/run_control.h"
-#include "core/image/background.h"
 #include "core/image/image_io.h"
 #include "design/design_lens.h"
 #include "design/design_options.h"

@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "core/image/metrics.h"
+#include "core/image/image.h"
 #include "core/surface/lens.h"
 #include "design/fringe.h"
 

@@ -21,7 +21,7 @@
 #include "core/compute/run_control.h"
 #include "core/error.h"
 #include "core/image/image.h"
-#include "core/image/layered_image.h"
+#include "core/image/rasters.h"
 #include "core/io/files.h"
 #include "core/io/lens_folder.h"
 #include "core/page/html_page.h"

@@ -26,9 +26,8 @@
 #include <vector>
 
 #include "core/error.h"
-#include "core/image/error_image.h"
+#include "core/image/image.h"
 #include "core/image/image_io.h"
-#include "core/image/metrics.h"
 #include "core/page/drawings.h"
 #include "core/page/html_page.h"
 #include "core/surface/control_net.h"

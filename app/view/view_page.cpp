@@ -11,7 +11,7 @@
 
 #include "cam/report/report_html.h"
 #include "cam/report/report_maps.h"
-#include "core/image/error_image.h"
+#include "core/image/image.h"
 #include "core/image/transfer.h"
 #include "core/optics/dispersion.h"
 #include "core/page/html_page.h"

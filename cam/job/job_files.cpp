@@ -16,7 +16,7 @@
 #include "cam/report/report_html.h"
 #include "cam/report/report_json.h"
 #include "core/error.h"
-#include "core/image/error_image.h"
+#include "core/image/image.h"
 #include "core/image/image_io.h"
 #include "core/io/files.h"
 #include "core/io/lens_folder.h"

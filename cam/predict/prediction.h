@@ -21,7 +21,7 @@
 #include "cam/tolerance/tolerance_forecast.h"
 #include "core/compute/executor.h"
 #include "core/compute/run_control.h"
-#include "core/image/layered_image.h"
+#include "core/image/rasters.h"
 #include "core/surface/lens.h"
 #include "core/surface/surface_mesh.h"
 

@@ -7,6 +7,13 @@
 
 namespace lensforge {
 
+/// Returns the text of an SVG file with the pictures in its data: addresses changed so that librsvg
+/// (2.54) draws them correctly: pictures with an Exif orientation are turned upright and written as
+/// PNG, and a wrong type is removed from an address. All else is unchanged. @param remarks  gets
+/// the pictures turned.
+/// @pre No other thread uses gdk-pixbuf.
+std::string with_fit_pictures(const std::string& xml, std::vector<std::string>& remarks);
+
 /// Needs of an SVG file beyond its own content and librsvg's features.
 struct SvgNeeds {
   /// In plain words: fonts that are not installed and their replacements. Each once.

@@ -1,8 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <map>
 #include <span>
+#include <string>
 #include <string_view>
+#include <thread>
+#include <vector>
+
+#include "core/io/files.h"
 
 namespace lensforge {
 
@@ -35,5 +41,42 @@ const UndrawnThing* find_undrawn(std::span<const UndrawnThing> table, std::strin
 
 /// True if this value, trimmed, has no effect.
 bool is_harmless(const UndrawnThing& thing, std::string_view value);
+
+/// Collects findings from the lines that librsvg (2.54) prints about styles and values that it
+/// ignores: one per kind, in the order of their kinds.
+class SvgLogReader {
+ public:
+  void take_line(std::string_view line);
+  [[nodiscard]] std::vector<std::string> findings() const;
+
+ private:
+  void take_declaration(std::string_view declaration);
+  void take_rule(std::string_view error, std::string_view rule);
+  void take_value(std::string_view name, std::string_view value);
+  void add(const std::string& kind, const std::string& finding);
+
+  std::string attribute_;  ///< Attribute whose value is on the next line.
+  std::map<std::string, std::string> findings_;
+};
+
+/// While one exists, makes librsvg print what it ignores, and reads it. Use it in a separate
+/// process whose standard output is not needed, before the first call of librsvg.
+class SvgLog {
+ public:
+  SvgLog();
+  ~SvgLog();
+  SvgLog(const SvgLog&) = delete;
+  SvgLog& operator=(const SvgLog&) = delete;
+
+  /// Ends the log and returns in plain words what was ignored.
+  std::vector<std::string> take();
+
+ private:
+  void read();
+
+  Descriptor reading_;
+  SvgLogReader reader_;
+  std::thread thread_;
+};
 
 }  // namespace lensforge

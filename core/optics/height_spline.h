@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "core/compute/host_device.h"
-#include "core/image/height_grid.h"
+#include "core/image/rasters.h"
 
 /// Notation: t position along an axis in samples, 0 … n − 1 from the least coordinate; B_i the
 /// uniform cubic B-spline around t = i; c_i its coefficient; m_i = c_{i−1} − 2 c_i + c_{i+1} the

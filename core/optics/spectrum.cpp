@@ -7,7 +7,7 @@
 #include <functional>
 
 #include "core/error.h"
-#include "core/image/spectral_color.h"
+#include "core/image/color.h"
 #include "core/optics/dispersion.h"
 #include "core/text/number_list.h"
 #include "core/text/number_text.h"

@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "core/error.h"
-#include "core/image/error_image.h"
+#include "core/image/image_io.h"
 #include "core/text/number_text.h"
 #include "core/text/version.h"
 #include "page_files.h"

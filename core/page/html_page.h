@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "core/image/image.h"
-#include "core/image/image_io.h"
 
 /// Pages: pieces of HTML, whole pages, and data for their scripts. Functions escape `text`; `html`
 /// is inserted unchanged.

@@ -10,7 +10,6 @@
 
 #include "core/compute/executor.h"
 #include "core/image/image.h"
-#include "core/image/metrics.h"
 #include "core/io/files.h"
 #include "core/io/lens_folder.h"
 #include "core/optics/optical_setup.h"

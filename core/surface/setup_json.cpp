@@ -10,7 +10,7 @@
 #include <variant>
 #include <vector>
 
-#include "core/image/height_grid.h"
+#include "core/image/rasters.h"
 #include "core/io/lens_folder.h"
 #include "core/surface/outline_json.h"
 

@@ -8,7 +8,7 @@
 #include <tuple>
 #include <vector>
 
-#include "core/image/spectral_color.h"
+#include "core/image/color.h"
 #include "core/image/transfer.h"
 #include "core/optics/front_placement.h"
 #include "core/optics/light_colors.h"

@@ -6,7 +6,7 @@
 #include <numbers>
 #include <vector>
 
-#include "core/image/metrics.h"
+#include "core/image/image.h"
 #include "core/optics/source_points.h"
 #include "design/design_lens.h"
 #include "design/finite_difference.h"

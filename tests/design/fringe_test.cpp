@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "core/error.h"
-#include "core/image/spectral_color.h"
+#include "core/image/color.h"
 #include "core/optics/light_colors.h"
 #include "core/surface/mesh_normals.h"
 #include "core/temp_folder.h"
