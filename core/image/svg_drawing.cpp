@@ -23,7 +23,6 @@
 #include "core/error.h"
 #include "core/image/image_io.h"
 #include "core/image/picture_outline.h"
-#include "core/image/svg_needs.h"
 #include "core/image/svg_support.h"
 #include "core/image/transfer.h"
 #include "core/io/files.h"
