@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/error.h"
-#include "core/image/spectral_color.h"
+#include "core/image/color.h"
 #include "core/io/checkpoint_file.h"
 #include "core/lens/surface_check.h"
 #include "core/optics/optical_setup.h"

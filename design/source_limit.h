@@ -3,7 +3,6 @@
 
 #include "core/compute/executor.h"
 #include "core/image/image.h"
-#include "core/image/metrics.h"
 #include "core/optics/optical_setup.h"
 
 namespace lensforge {

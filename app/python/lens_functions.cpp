@@ -24,7 +24,7 @@
 #include "cam/report/report_json.h"
 #include "core/error.h"
 #include "core/image/image_io.h"
-#include "core/io/folder_lock.h"
+#include "core/io/lens_folder.h"
 #include "design/design_estimate.h"
 #include "design/design_lens.h"
 #include "design/flux_of_surface.h"

@@ -18,7 +18,7 @@
 #include "core/image/image.h"
 #include "core/optics/front.h"
 #include "core/optics/optical_setup.h"
-#include "core/page/html_text.h"
+#include "core/page/html_page.h"
 
 namespace lensforge {
 

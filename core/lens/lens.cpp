@@ -11,9 +11,9 @@
 #include <vector>
 
 #include "core/error.h"
-#include "core/image/error_image.h"
-#include "core/image/height_grid.h"
+#include "core/image/image.h"
 #include "core/image/image_io.h"
+#include "core/image/rasters.h"
 #include "core/io/files.h"
 #include "core/lens/optical_surface.h"
 #include "core/lens/setup_json.h"

@@ -12,7 +12,7 @@
 #include <variant>
 #include <vector>
 
-#include "core/image/height_grid.h"
+#include "core/image/rasters.h"
 #include "core/io/lens_folder.h"
 #include "core/optics/outline.h"
 #include "core/text/json_fields.h"

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/image/image_sample.h"
+#include "core/image/image.h"
 #include "design/optimize/cosine_transform.h"
 
 namespace lensforge {

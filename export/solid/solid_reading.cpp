@@ -42,7 +42,6 @@
 
 #include "core/error.h"
 #include "core/io/files.h"
-#include "core/sandbox/byte_record.h"
 #include "core/sandbox/child_work.h"
 #include "core/spline/control_net.h"
 #include "export/solid/opencascade_io.h"

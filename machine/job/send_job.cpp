@@ -14,7 +14,6 @@
 #include <utility>
 
 #include "core/error.h"
-#include "core/io/descriptor.h"
 #include "core/io/files.h"
 #include "machine/gcode/gcode_dialect.h"
 #include "machine/gcode/program_seal.h"

@@ -8,7 +8,7 @@
 #include <tuple>
 #include <vector>
 
-#include "core/image/spectral_color.h"
+#include "core/image/color.h"
 #include "core/image/transfer.h"
 #include "core/optics/front.h"
 #include "core/optics/optical_setup.h"

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "core/image/metrics.h"
+#include "core/image/image.h"
 #include "design/ray_tracer.h"
 #include "design/test_setups.h"
 

@@ -4,9 +4,8 @@
 #include <array>
 #include <vector>
 
-#include "core/page/decade_plot.h"
+#include "core/page/drawings.h"
 #include "core/page/html_page.h"
-#include "core/page/html_text.h"
 #include "core/text/number_text.h"
 
 namespace lensforge::reflect {

@@ -7,7 +7,7 @@
 #include <functional>
 #include <numbers>
 
-#include "core/image/error_image.h"
+#include "core/image/image.h"
 #include "core/image/transfer.h"
 #include "design/reflect/light/light_paths.h"
 #include "design/reflect/light/ray_scene.h"

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/image/color_profile.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -11,9 +9,9 @@
 #include <string>
 #include <vector>
 
+#include "core/image/color.h"
 #include "core/image/image_io.h"
 #include "core/image/metadata_samples.h"
-#include "core/image/rec709.h"
 #include "core/image/transfer.h"
 #include "core/temp_folder.h"
 #include "core/test_images.h"

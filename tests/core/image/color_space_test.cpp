@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/image/color_space.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 
+#include "core/image/color.h"
 #include "core/image/transfer.h"
 
 namespace lensforge {

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/image/error_image.h"
-
 #include <gtest/gtest.h>
 
+#include "core/image/image.h"
 #include "core/image/transfer.h"
 
 namespace lensforge {

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/image/height_grid.h"
-
 #include <OpenImageIO/imageio.h>
 #include <gmock/gmock.h>
 
@@ -9,6 +7,7 @@
 #include <string>
 
 #include "core/error.h"
+#include "core/image/rasters.h"
 #include "core/temp_folder.h"
 
 namespace lensforge {

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/image/layered_image.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <limits>
 
 #include "core/error.h"
-#include "core/io/output_guard.h"
+#include "core/image/rasters.h"
+#include "core/io/lens_folder.h"
 #include "core/temp_folder.h"
 
 namespace lensforge {

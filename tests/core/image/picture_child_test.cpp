@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/image/picture_child.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/wait.h>
@@ -16,7 +14,8 @@
 
 #include "core/error.h"
 #include "core/image/image_io.h"
-#include "core/image/layered_image.h"
+#include "core/image/picture_codec.h"
+#include "core/image/rasters.h"
 #include "core/stop_bound.h"
 #include "core/temp_folder.h"
 #include "core/test_images.h"

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/image/picture_metadata.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -10,6 +8,7 @@
 
 #include "core/image/image_io.h"
 #include "core/image/metadata_samples.h"
+#include "core/image/picture_codec.h"
 #include "core/temp_folder.h"
 #include "core/test_images.h"
 

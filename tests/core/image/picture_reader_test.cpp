@@ -20,7 +20,7 @@
 #include "core/error.h"
 #include "core/image/image_io.h"
 #include "core/image/picture_refusal.h"
-#include "core/io/output_guard.h"
+#include "core/io/lens_folder.h"
 #include "core/temp_folder.h"
 #include "core/test_images.h"
 #include "core/text/printable.h"

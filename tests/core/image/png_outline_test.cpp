@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/image/png_outline.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <sstream>
 
+#include "core/image/picture_outline.h"
 #include "core/sample_files.h"
 
 namespace lensforge {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/image/spectral_color.h"
-
 #include <gtest/gtest.h>
 
 #include <numeric>
+
+#include "core/image/color.h"
 
 namespace lensforge {
 namespace {

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/io/folder_lock.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -14,6 +12,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/io/lens_folder.h"
 #include "core/temp_folder.h"
 
 namespace lensforge {

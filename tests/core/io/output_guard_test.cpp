@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/io/output_guard.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -8,6 +6,7 @@
 #include <string>
 
 #include "core/error.h"
+#include "core/io/lens_folder.h"
 #include "core/temp_folder.h"
 #include "core/text/version.h"
 

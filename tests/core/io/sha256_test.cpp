@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/io/sha256.h"
-
 #include <gtest/gtest.h>
 
 #include <string>
 #include <utility>
+
+#include "core/io/files.h"
 
 namespace lensforge {
 namespace {

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/page/html_text.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/page/light_drawing.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -8,6 +6,8 @@
 #include <cmath>
 #include <numbers>
 #include <regex>
+
+#include "core/page/drawings.h"
 
 namespace lensforge {
 namespace {

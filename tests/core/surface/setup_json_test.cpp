@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/error.h"
-#include "core/image/height_grid.h"
+#include "core/image/rasters.h"
 #include "core/optics/height_fronts.h"
 #include "core/temp_folder.h"
 

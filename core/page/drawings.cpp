@@ -1,15 +1,19 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/page/light_drawing.h"
+#include "core/page/drawings.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
+#include <limits>
 #include <numbers>
+#include <string_view>
 #include <variant>
 #include <vector>
 
-#include "core/optics/front.h"
+#include "core/optics/front_surface.h"
+#include "core/page/html_page.h"
 #include "core/text/number_text.h"
 #include "core/text/version.h"
 
@@ -345,6 +349,115 @@ std::string light_drawing(const OpticalSetup& setup, double part_height) {
 
 std::string light_drawing_file(const OpticalSetup& setup, double part_height) {
   return drawing("xmlns=\"http://www.w3.org/2000/svg\" ", setup, part_height);
+}
+
+namespace {
+
+constexpr double kPlotWidth = 900.0;
+constexpr double kPlotHeight = 300.0;
+constexpr double kPlotLeft = 70.0;
+constexpr double kPlotMargin = 30.0;
+constexpr std::array<std::string_view, 8> kColors{"#0b5cad", "#a3161a", "#1b6b36", "#7a4fa3",
+                                                  "#a35a00", "#007a7a", "#5c5c5c", "#b0307a"};
+/// Layout of the names in lines above the plot.
+constexpr std::size_t kNamesPerLine = 4;
+constexpr double kNameWidth = 190.0;
+constexpr double kNameHeight = 18.0;
+/// Lower values, such as 0, are drawn at this one.
+constexpr double kFloor = 1e-12;
+
+/// Maps seconds and values to drawing coordinates.
+class Axes {
+ public:
+  explicit Axes(const std::vector<PlotCurve>& curves) {
+    double least = std::numeric_limits<double>::infinity();
+    double most = -least;
+    for (const PlotCurve& curve : curves) {
+      for (const Eigen::Vector2d& point : curve.points) {
+        seconds_ = std::max(seconds_, point.x());
+        least = std::min(least, decade_of(point.y()));
+        most = std::max(most, decade_of(point.y()));
+      }
+    }
+    low_ = static_cast<int>(std::floor(least));
+    high_ = std::max(low_ + 1, static_cast<int>(std::ceil(most)));
+    top_ += kNameHeight * static_cast<double>((curves.size() - 1) / kNamesPerLine);
+  }
+
+  [[nodiscard]] double seconds() const { return seconds_; }
+  [[nodiscard]] int low() const { return low_; }
+  [[nodiscard]] int high() const { return high_; }
+  [[nodiscard]] double x(double seconds) const {
+    return kPlotLeft + (kPlotWidth - kPlotLeft - kPlotMargin) * seconds / seconds_;
+  }
+  [[nodiscard]] double y(double decade) const {
+    return kPlotHeight - kPlotMargin -
+           (kPlotHeight - kPlotMargin - top_) * (decade - low_) / (high_ - low_);
+  }
+  [[nodiscard]] std::string drawn(const Eigen::Vector2d& point) const {
+    return decimal_text(x(point.x()), 1) + "," + decimal_text(y(decade_of(point.y())), 1) + " ";
+  }
+
+ private:
+  static double decade_of(double value) { return std::log10(std::max(std::abs(value), kFloor)); }
+
+  double top_ = kPlotMargin;
+  double seconds_ = 1e-3;
+  int low_ = 0;
+  int high_ = 1;
+};
+
+std::string plot_words(double x, double y, std::string_view attributes, std::string_view text) {
+  return element(
+      "text",
+      joined({"x=\"", decimal_text(x, 1), "\" y=\"", decimal_text(y, 1), "\" ", attributes}),
+      escape_html(text));
+}
+
+std::string decades(const Axes& axes) {
+  std::string lines;
+  for (int decade = axes.low(); decade <= axes.high(); ++decade) {
+    const std::string y = decimal_text(axes.y(decade), 1);
+    lines += joined({"<path d=\"M", decimal_text(kPlotLeft, 0), " ", y, "H",
+                     decimal_text(kPlotWidth - kPlotMargin, 0), "\" stroke=\"#c9d0d6\"/>"});
+    lines += plot_words(kPlotLeft - 8.0, axes.y(decade) + 4.0, "text-anchor=\"end\"",
+                        "1e" + std::to_string(decade));
+  }
+  return lines;
+}
+
+/// The curves, each with its name.
+std::string lines_of(const std::vector<PlotCurve>& curves, const Axes& axes) {
+  std::string lines;
+  for (std::size_t i = 0; i < curves.size(); ++i) {
+    std::string points;
+    for (const Eigen::Vector2d& point : curves[i].points) points += axes.drawn(point);
+    const std::string_view color = kColors[i % kColors.size()];
+    lines += joined({"<polyline points=\"", points, "\" fill=\"none\" stroke-width=\"2\" stroke=\"",
+                     color, "\"/>"});
+    lines += plot_words(kPlotLeft + kNameWidth * static_cast<double>(i % kNamesPerLine),
+                        kPlotMargin - 10.0 + kNameHeight * static_cast<double>(i / kNamesPerLine),
+                        joined({"fill=\"", color, "\""}), curves[i].name);
+  }
+  return lines;
+}
+
+}  // namespace
+
+std::string decade_plot(const std::vector<PlotCurve>& curves, std::string_view label) {
+  std::size_t points = 0;
+  for (const PlotCurve& curve : curves) points += curve.points.size();
+  if (points < 2) return "";
+  const Axes axes(curves);
+  const std::string end = decimal_text(axes.seconds(), 1) + " s";
+  return element(
+      "svg",
+      joined({"xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 ", decimal_text(kPlotWidth, 0),
+              " ", decimal_text(kPlotHeight, 0), "\" role=\"img\" aria-label=\"",
+              escape_html(label),
+              "\" font-size=\"13\" font-family=\"Arial, sans-serif\" style=\"background:#fff\""}),
+      decades(axes) + lines_of(curves, axes) + plot_words(kPlotLeft, kPlotHeight - 8.0, "", "0 s") +
+          plot_words(kPlotWidth - kPlotMargin, kPlotHeight - 8.0, "text-anchor=\"end\"", end));
 }
 
 }  // namespace lensforge
