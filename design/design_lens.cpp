@@ -12,7 +12,6 @@
 #include "core/optics/light_colors.h"
 #include "core/surface/lens_surface.h"
 #include "core/surface/spline_file.h"
-#include "design/optics/made_surface.h"
 #include "design/picture_values.h"
 #include "design/render_lens.h"
 #include "design/schedule/alternation.h"
@@ -20,6 +19,7 @@
 #include "design/schedule/design_log.h"
 #include "design/schedule/design_task.h"
 #include "design/schedule/spline_start.h"
+#include "design/spline/made_surface.h"
 
 namespace lensforge {
 namespace {

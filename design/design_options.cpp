@@ -9,8 +9,8 @@
 #include "core/text/number_text.h"
 #include "design/design_fields.h"
 #include "design/light_setup.h"
-#include "design/optics/averaging_grid.h"
 #include "design/schedule/level_plan.h"
+#include "design/spline/made_surface.h"
 
 namespace lensforge {
 namespace {

@@ -9,7 +9,7 @@
 #include "core/surface/surface_model.h"
 #include "design/energy/weights.h"
 #include "design/light_options.h"
-#include "design/optics/made_by.h"
+#include "design/spline/made_by.h"
 
 namespace lensforge {
 

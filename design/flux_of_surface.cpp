@@ -12,7 +12,7 @@
 #include "core/surface/lit_surface.h"
 #include "core/surface/mesh_normals.h"
 #include "design/flux/flux_image.h"
-#include "design/optics/surface_kernels.h"
+#include "design/flux/surface_projection.h"
 #include "design/render_flux.h"
 #include "design/source_picture.h"
 

@@ -12,7 +12,7 @@
 #include "core/surface/surface_mesh.h"
 #include "core/surface/surface_model.h"
 #include "design/flux/flux_image.h"
-#include "design/optics/surface_kernels.h"
+#include "design/flux/surface_projection.h"
 
 namespace lensforge {
 

@@ -9,7 +9,7 @@
 #include "core/surface/lit_surface.h"
 #include "core/surface/mesh_cut.h"
 #include "design/flux/flux_image.h"
-#include "design/optics/surface_kernels.h"
+#include "design/flux/surface_projection.h"
 
 namespace lensforge {
 namespace {

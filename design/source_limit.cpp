@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "core/image/transfer.h"
-#include "design/flux/source_blur.h"
+#include "design/flux/flux_image.h"
 #include "design/optimize/lbfgs_on.h"
 #include "design/picture_values.h"
 

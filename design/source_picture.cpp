@@ -8,7 +8,7 @@
 #include "core/image/metrics.h"
 #include "core/optics/light_colors.h"
 #include "core/optics/source_points.h"
-#include "design/flux/source_blur.h"
+#include "design/flux/flux_image.h"
 #include "design/picture_values.h"
 #include "design/render_lens.h"
 

@@ -5,7 +5,7 @@
 
 #include "core/image/image_sample.h"
 #include "core/optics/source_points.h"
-#include "design/optics/smooth.h"
+#include "design/flux/surface_projection.h"
 #include "design/render_lens.h"
 
 namespace lensforge {

@@ -11,7 +11,7 @@
 #include "core/compute/host_device.h"
 #include "core/surface/mesh_cut.h"
 #include "core/surface/surface_mesh.h"
-#include "design/optics/image_piece.h"
+#include "design/flux/surface_projection.h"
 
 /// A lens's outline in the objective. The faces that it cuts keep their corners' x and y, so that
 /// the parts inside are the same triangles of them until the surface is looked at anew; as a face's

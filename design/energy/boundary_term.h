@@ -5,7 +5,7 @@
 
 #include "core/compute/clamped.h"
 #include "core/compute/host_device.h"
-#include "design/optics/image_triangle.h"
+#include "design/flux/flux_triangle.h"
 
 namespace lensforge {
 

@@ -11,7 +11,7 @@
 #include "core/surface/mesh_cut.h"
 #include "core/surface/surface_mesh.h"
 #include "design/energy/objective_options.h"
-#include "design/optics/surface_kernels.h"
+#include "design/flux/surface_projection.h"
 
 namespace lensforge {
 

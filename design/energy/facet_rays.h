@@ -9,7 +9,7 @@
 #include "design/energy/objective_adjoint.h"
 #include "design/energy/objective_sums.h"
 #include "design/energy/objective_view.h"
-#include "design/optics/facet.h"
+#include "design/flux/surface_projection.h"
 
 /// Facet model in the objective: every face sends its light by its own normal.
 namespace lensforge {

@@ -9,7 +9,7 @@
 #include "core/compute/host_device.h"
 #include "core/surface/mesh_topology.h"
 #include "core/surface/surface_mesh.h"
-#include "design/optics/columns.h"
+#include "design/flux/columns.h"
 
 namespace lensforge {
 

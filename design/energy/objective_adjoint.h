@@ -11,8 +11,8 @@
 #include "design/energy/smoothness_term.h"
 #include "design/energy/unlit_pixels.h"
 #include "design/energy/unlit_term.h"
-#include "design/optics/columns.h"
-#include "design/optics/image_triangle.h"
+#include "design/flux/columns.h"
+#include "design/flux/flux_triangle.h"
 
 /// What the objective does for one face or vertex on the way from the picture's cotangent back to
 /// the vertices; the way there is in objective_kernels.h, Rays too.

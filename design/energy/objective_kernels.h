@@ -10,8 +10,8 @@
 #include "core/image/transfer.h"
 #include "design/energy/objective_view.h"
 #include "design/energy/smoothness_term.h"
-#include "design/optics/columns.h"
-#include "design/optics/image_triangle.h"
+#include "design/flux/columns.h"
+#include "design/flux/flux_triangle.h"
 
 /// What the objective does for one face, vertex or pixel on the way to its value: surface → frames,
 /// Weingarten maps, image triangles, picture error. The way back is in objective_adjoint.h. How a

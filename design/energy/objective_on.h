@@ -29,8 +29,7 @@
 #include "design/energy/smooth_rays.h"
 #include "design/energy/unlit_pixels.h"
 #include "design/flux/flux_image.h"
-#include "design/flux/source_blur.h"
-#include "design/optics/surface_kernels.h"
+#include "design/flux/surface_projection.h"
 
 namespace lensforge {
 

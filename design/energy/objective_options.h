@@ -11,7 +11,7 @@
 #include "design/energy/area_barrier.h"
 #include "design/energy/correspondence_term.h"
 #include "design/energy/weights.h"
-#include "design/optics/made_by.h"
+#include "design/spline/made_by.h"
 
 namespace lensforge {
 

@@ -12,8 +12,8 @@
 #include "design/energy/objective_kernels.h"
 #include "design/energy/objective_sums.h"
 #include "design/energy/objective_view.h"
-#include "design/optics/columns.h"
-#include "design/optics/smooth.h"
+#include "design/flux/columns.h"
+#include "design/flux/surface_projection.h"
 
 /// Smooth and spline model in the objective: every vertex sends one ray by its normal, and image
 /// triangles share corners.

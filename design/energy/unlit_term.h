@@ -6,7 +6,7 @@
 
 #include "core/compute/host_device.h"
 #include "design/energy/boundary_term.h"
-#include "design/optics/image_triangle.h"
+#include "design/flux/flux_triangle.h"
 
 namespace lensforge {
 

@@ -24,7 +24,7 @@
 #include "design/energy/smooth_rays.h"
 #include "design/energy/smoothness_term.h"
 #include "design/energy/unlit_pixels.h"
-#include "design/flux/flux_kernels.h"
+#include "design/flux/flux_image.h"
 #include "design/mpi/block_share.h"
 #include "design/mpi/ranks.h"
 #include "design/mpi/row_slabs.h"

@@ -15,7 +15,7 @@
 #include "design/finite_difference.h"
 #include "design/flux/flux_image.h"
 #include "design/objective_setups.h"
-#include "design/optics/surface_optics.h"
+#include "design/render/surface_optics.h"
 
 namespace lensforge {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/optics/surface_optics.h"
+#include "design/render/surface_optics.h"
 
 #include <gtest/gtest.h>
 

@@ -9,7 +9,7 @@
 
 #include "core/optics/image_plane.h"
 #include "core/surface/grid_mesh.h"
-#include "design/optics/image_triangle.h"
+#include "design/flux/flux_triangle.h"
 #include "design/schedule/face_transport.h"
 #include "design/transport_scenes.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/optics/axis_basis.h"
+#include "design/spline/spline_nodes.h"
 
 #include <algorithm>
 #include <cmath>

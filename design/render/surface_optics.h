@@ -7,7 +7,7 @@
 #include "core/optics/optical_setup.h"
 #include "core/surface/surface_mesh.h"
 #include "core/surface/surface_model.h"
-#include "design/optics/image_triangle.h"
+#include "design/flux/flux_triangle.h"
 
 namespace lensforge {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/optics/surface_optics.h"
+#include "design/render/surface_optics.h"
 
 #include <cstddef>
 #include <cstdint>
@@ -9,8 +9,7 @@
 #include "core/surface/lit_surface.h"
 #include "core/surface/mesh_cut.h"
 #include "core/surface/mesh_normals.h"
-#include "design/optics/facet.h"
-#include "design/optics/surface_kernels.h"
+#include "design/flux/surface_projection.h"
 
 namespace lensforge {
 

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/optics/made_nodes.h"
+#include "design/spline/made_surface.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <utility>
 
@@ -15,6 +16,189 @@ namespace {
 
 constexpr std::size_t kCount = GaussianWeights::kCount;
 constexpr int kReach = GaussianWeights::kReach;
+constexpr double kSpacing = 0.75;  ///< Between samples, in σ.
+constexpr double kMaxSamples = 1e8;
+
+}  // namespace
+
+GaussianWeights::GaussianWeights(double offset, double step, double sigma) {
+  // Neighbours' weights differ by a factor that itself shrinks by the same factor from one to the
+  // next.
+  const double shrink = std::exp(-step * step / (sigma * sigma));
+  double factor = std::exp(-step * (offset + 0.5 * step) / (sigma * sigma));
+  double weight = std::exp(-0.5 * offset * offset / (sigma * sigma));
+  std::array<double, kCount> apart{};
+  double sum = 0.0;
+  for (std::size_t k = 0; k < kCount; ++k) {
+    apart[k] = offset + static_cast<double>(k) * step;
+    value[k] = weight;
+    sum += weight;
+    weight *= factor;
+    factor *= shrink;
+  }
+  double mean = 0.0;
+  for (std::size_t k = 0; k < kCount; ++k) {
+    value[k] /= sum;
+    mean += value[k] * apart[k];
+  }
+  // A constant has no slope, and a straight line its own.
+  double variance = 0.0;
+  for (std::size_t k = 0; k < kCount; ++k) {
+    slope[k] = value[k] * (apart[k] - mean);
+    variance += slope[k] * apart[k];
+  }
+  for (std::size_t k = 0; k < kCount; ++k) {
+    slope[k] /= variance;
+    bend[k] = (slope[k] * (apart[k] - mean) - value[k]) / variance;
+  }
+}
+
+AveragingGrid::AveragingGrid(const Eigen::Vector2d& lens_size, const MadeBy& made)
+    : size_(lens_size),
+      sigma_(made.polish_sigma, std::hypot(made.polish_sigma, made.pitch / std::sqrt(12.0))),
+      rim_depth_(made.rim_depth),
+      rim_length_(made.rim_length) {
+  if (!made.rows_along_x) sigma_.reverseInPlace();
+  const Eigen::Array2d wanted = size_.array() / (kSpacing * sigma_.array());
+  cells_ = wanted.ceil().cast<int>().max(kReach);
+  step_ = size_.array() / cells_.cast<double>().array();
+}
+
+Eigen::MatrixXd AveragingGrid::make_heights() const {
+  return Eigen::MatrixXd::Zero(cells_.x() + 1 + 2 * kReach, cells_.y() + 1 + 2 * kReach);
+}
+
+void AveragingGrid::turn_about_rim(Eigen::MatrixXd& heights) {
+  const Eigen::Index right = heights.rows() - 1 - kReach;
+  const Eigen::Index top = heights.cols() - 1 - kReach;
+  for (Eigen::Index k = 1; k <= kReach; ++k) {
+    heights.row(kReach - k) = 2.0 * heights.row(kReach) - heights.row(kReach + k);
+    heights.row(right + k) = 2.0 * heights.row(right) - heights.row(right - k);
+  }
+  for (Eigen::Index k = 1; k <= kReach; ++k) {
+    heights.col(kReach - k) = 2.0 * heights.col(kReach) - heights.col(kReach + k);
+    heights.col(top + k) = 2.0 * heights.col(top) - heights.col(top - k);
+  }
+}
+
+void AveragingGrid::turn_about_rim_adjoint(Eigen::MatrixXd& heights_bar) {
+  const Eigen::Index right = heights_bar.rows() - 1 - kReach;
+  const Eigen::Index top = heights_bar.cols() - 1 - kReach;
+  for (Eigen::Index k = 1; k <= kReach; ++k) {
+    heights_bar.col(kReach) += 2.0 * heights_bar.col(kReach - k);
+    heights_bar.col(kReach + k) -= heights_bar.col(kReach - k);
+    heights_bar.col(top) += 2.0 * heights_bar.col(top + k);
+    heights_bar.col(top - k) -= heights_bar.col(top + k);
+  }
+  for (Eigen::Index k = 1; k <= kReach; ++k) {
+    heights_bar.row(kReach) += 2.0 * heights_bar.row(kReach - k);
+    heights_bar.row(kReach + k) -= heights_bar.row(kReach - k);
+    heights_bar.row(right) += 2.0 * heights_bar.row(right + k);
+    heights_bar.row(right - k) -= heights_bar.row(right + k);
+  }
+}
+
+int AveragingGrid::first_sample(double at, int axis) const {
+  return std::clamp(static_cast<int>(at / step_[axis]), 0, cells_[axis] - 1);
+}
+
+GaussianWeights AveragingGrid::weights(double at, int axis) const {
+  const double first = (first_sample(at, axis) - kReach) * step_[axis];
+  return {first - at, step_[axis], sigma_[axis]};
+}
+
+AveragingGrid::RimLoss AveragingGrid::rim_loss(const Eigen::Vector2d& xy) const {
+  RimLoss loss;
+  for (int k = 0; k < 2; ++k) {
+    const double low = rim_depth_ * std::exp(-xy[k] / rim_length_);
+    const double high = rim_depth_ * std::exp((xy[k] - size_[k]) / rim_length_);
+    loss.z += low + high;
+    loss.slope[k] = (high - low) / rim_length_;
+    loss.bend[k] = (low + high) / (rim_length_ * rim_length_);
+  }
+  return loss;
+}
+
+double AveragingGrid::least_sigma(const Eigen::Vector2d& lens_size) {
+  return std::sqrt(lens_size.prod() / kMaxSamples) / kSpacing;
+}
+
+namespace {
+
+Eigen::Matrix2d plan_of(const SplineFrame& frame) {
+  Eigen::Matrix2d plan;
+  plan << frame.by_u.head<2>(), frame.by_v.head<2>();
+  return plan;
+}
+
+}  // namespace
+
+MadeSurface::MadeSurface(const ControlNet& net, const MadeBy& made, const Executor& executor)
+    : grid_({net.points.row(0).maxCoeff(), net.points.row(1).maxCoeff()}, made),
+      heights_(grid_.make_heights()) {
+  const auto sample = [&](std::int64_t row) { sample_row(net, static_cast<int>(row)); };
+  parallel_for(executor, "heights to polish", grid_.cells().y() + 1, sample, 1);
+  AveragingGrid::turn_about_rim(heights_);
+}
+
+/// Newton's method from the sample before, and the Taylor series over what it leaves.
+void MadeSurface::sample_row(const ControlNet& net, int row) {
+  constexpr int kSteps = 2;
+  const Eigen::Vector2d high = net.cells().cast<double>();
+  Eigen::Vector2d uv =
+      net.parameters_of(grid_.place(0, row), {0.0, high.y() * row / grid_.cells().y()});
+  SplineFrame frame = net.at(uv);
+  for (int i = 0; i <= grid_.cells().x(); ++i) {
+    const Eigen::Vector2d xy = grid_.place(i, row);
+    for (int step = 0; step < kSteps; ++step) {
+      uv += plan_of(frame).inverse() * (xy - frame.point.head<2>());
+      uv = uv.cwiseMax(0.0).cwiseMin(high);
+      frame = net.at(uv);
+    }
+    const SurfaceShape shape = frame.shape();
+    const Eigen::Vector2d rest = xy - frame.point.head<2>();
+    heights_(i + kReach, row + kReach) =
+        shape.z + rest.dot(shape.slope) + 0.5 * rest.dot(shape.bend * rest);
+  }
+}
+
+SurfacePoint MadeSurface::at(const Eigen::Vector2d& xy) const {
+  const GaussianWeights x = grid_.weights(xy.x(), 0);
+  const GaussianWeights y = grid_.weights(xy.y(), 1);
+  const Eigen::Index first = grid_.first_sample(xy.y(), 1);
+  SurfacePoint made;
+  for (std::size_t n = 0; n < kCount; ++n) {
+    const double* const z =
+        &heights_(grid_.first_sample(xy.x(), 0), first + static_cast<Eigen::Index>(n));
+    double value = 0.0;
+    double slope = 0.0;
+    for (std::size_t m = 0; m < kCount; ++m) {
+      value += x.value[m] * z[m];
+      slope += x.slope[m] * z[m];
+    }
+    made.z += y.value[n] * value;
+    made.slope += Eigen::Vector2d(y.value[n] * slope, y.slope[n] * value);
+  }
+  const AveragingGrid::RimLoss loss = grid_.rim_loss(xy);
+  made.z -= loss.z;
+  made.slope -= loss.slope;
+  return made;
+}
+
+SampledSurface made_nodes(const ControlNet& net, const MadeBy& made, int samples,
+                          const Executor& executor) {
+  SampledSurface nodes = spline_nodes(net, samples);
+  const MadeSurface surface(net, made, executor);
+  const auto make = [&](std::int64_t i) {
+    const SurfacePoint point = surface.at(nodes.mesh.vertices.col(i).head<2>());
+    nodes.mesh.vertices(2, i) = point.z;
+    nodes.normals.col(i) << -point.slope, 1.0;
+  };
+  parallel_for(executor, "made nodes", nodes.mesh.vertex_count(), make);
+  return nodes;
+}
+
+namespace {
 
 /// Newton's steps to a sample end when one is shorter than this, knot cells; what is left then is
 /// its square.

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <Eigen/Core>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -9,12 +11,95 @@
 #include "core/compute/executor.h"
 #include "core/compute/host_device.h"
 #include "core/optics/light_path.h"
-#include "design/optics/columns.h"
-#include "design/optics/facet.h"
-#include "design/optics/smooth.h"
+#include "core/surface/corners.h"
+#include "core/surface/outline_index.h"
+#include "design/flux/columns.h"
+#include "design/flux/flux_triangle.h"
 
-/// What rendering a surface does for one triangle or vertex.
 namespace lensforge {
+
+/// Facet model: one normal for the whole triangle (Sun et al., section 3.2).
+///
+/// @param beam  what the facet sends out, LightPath::facet_beam().
+/// @param flux  the share of the light that it takes (Eq. 1), LightPath::flux().
+LF_HD inline ImageTriangle land_facet(const Corners& t, const FacetBeam& beam,
+                                      const LightPath& light, double flux) {
+  return {light.land(t.v0, beam.slope(0)), light.land(t.v1, beam.slope(1)),
+          light.land(t.v2, beam.slope(2)), flux};
+}
+LF_HD inline ImageTriangle project_facet(const Corners& t, const FacetBeam& beam,
+                                         const LightPath& light) {
+  return land_facet(t, beam, light, light.flux(t, beam.known));
+}
+
+/// Adjoint of project_facet() without the flux: adds to the corners' derivatives directly and
+/// returns n_bar, the derivative by the unit normal.
+LF_HD inline Eigen::Vector3d project_facet_adjoint(const Corners& t, const Eigen::Vector3d& n,
+                                                   const FacetBeam& beam, const LightPath& light,
+                                                   const ImageTriangle& bar, Corners& grad) {
+  FacetSlopes m_bar;
+  light.land_adjoint(t.v0, beam.slope(0), bar.p0, grad.v0, m_bar.m0);
+  light.land_adjoint(t.v1, beam.slope(1), bar.p1, grad.v1, m_bar.m1);
+  light.land_adjoint(t.v2, beam.slope(2), bar.p2, grad.v2, m_bar.m2);
+  return light.facet_beam_adjoint(t, n, beam, m_bar, grad);
+}
+
+// Smooth model: one ray per vertex, refracted at the vertex normal; image triangles share corners
+// and stretch. It is what a milled and polished part does.
+
+/// Normal of a vertex: the sum of the area normals around it, normalised (area weighting).
+struct VertexNormal {
+  Eigen::Vector3d n;
+  double length;  ///< |sum of area normals|, mm²·2
+
+  LF_HD explicit VertexNormal(const Eigen::Vector3d& area_normal_sum)
+      : n(area_normal_sum), length(area_normal_sum.norm()) {
+    n *= 1.0 / length;
+  }
+};
+
+/// Where the ray of a vertex lands, in pixel coordinates. @pre n transmits.
+LF_HD inline Eigen::Vector2d project_vertex(const Eigen::Vector3d& p, const Eigen::Vector3d& n,
+                                            const LightPath& light,
+                                            const IncidentRay* known = nullptr) {
+  return light.land(p, light.beam(p, n, known).m);
+}
+
+/// Adjoint of project_vertex(): adds to p_bar, returns n_bar.
+LF_HD inline Eigen::Vector3d project_vertex_adjoint(
+    const Eigen::Vector3d& p, const Eigen::Vector3d& n, const LightPath& light,
+    const Eigen::Vector2d& u_bar, Eigen::Vector3d& p_bar, const IncidentRay* known = nullptr) {
+  const RefractedBeam beam = light.beam(p, n, known);
+  Eigen::Vector2d m_bar(0.0, 0.0);
+  light.land_adjoint(p, beam.m, u_bar, p_bar, m_bar);
+  return light.beam_adjoint(p, n, beam, m_bar, p_bar, known);
+}
+
+// Faces that an outline cuts.
+
+/// The image of a part of a face.
+LF_HD inline ImageTriangle image_of(const ImageTriangle& face, const TrianglePiece& piece) {
+  const auto corner = [&](int k) -> Eigen::Vector2d {
+    return piece.weights(0, k) * face.p0 + piece.weights(1, k) * face.p1 +
+           piece.weights(2, k) * face.p2;
+  };
+  return {corner(0), corner(1), corner(2), piece.share * face.flux};
+}
+
+/// Adjoint of image_of(): adds to the derivatives by the face's image.
+LF_HD inline void image_of_adjoint(const TrianglePiece& piece, const ImageTriangle& bar,
+                                   ImageTriangle& face_bar) {
+  const auto corner = [&](int j) -> Eigen::Vector2d {
+    return piece.weights(j, 0) * bar.p0 + piece.weights(j, 1) * bar.p1 +
+           piece.weights(j, 2) * bar.p2;
+  };
+  face_bar.p0 += corner(0);
+  face_bar.p1 += corner(1);
+  face_bar.p2 += corner(2);
+  face_bar.flux += piece.share * bar.flux;
+}
+
+// Kernels that project a surface, one triangle or vertex at a time.
 
 /// A mesh's arrays in the memory of an executor, and the light that falls on it.
 struct SurfaceView {
