@@ -13,7 +13,7 @@ install(FILES
   DESTINATION "${package_folder}")
 install(EXPORT lensforgeTargets NAMESPACE lensforge:: DESTINATION "${package_folder}")
 
-# Headers keep their paths: "design/design_lens.h" lies in include/lensforge/design/.
+# Headers keep their paths: "design/design.h" lies in include/lensforge/design/.
 install(DIRECTORY core design cam export machine
   DESTINATION "${LENSFORGE_INCLUDE_FOLDER}" FILES_MATCHING PATTERN "*.h")
 

@@ -18,11 +18,9 @@
 #include "core/surface/lens.h"
 #include "core/surface/mesh_io.h"
 #include "core/surface/mesh_normals.h"
-#include "design/design_estimate.h"
-#include "design/fringe.h"
-#include "design/render_fields.h"
-#include "design/render_lens.h"
-#include "design/render_setup.h"
+#include "design/design.h"
+#include "design/render.h"
+#include "design/setup/option_tables.h"
 #include "export/solid/solid_reading.h"
 
 namespace lensforge::app {

@@ -7,7 +7,7 @@
 
 #include "core/image/metrics.h"
 #include "core/surface/lens.h"
-#include "design/fringe.h"
+#include "design/render.h"
 
 /// Texts and JSON that several commands print.
 namespace lensforge::app {

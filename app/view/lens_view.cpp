@@ -35,7 +35,7 @@
 #include "core/surface/sampled_surface.h"
 #include "core/text/json_fields.h"
 #include "core/text/json_text.h"
-#include "design/render_lens.h"
+#include "design/render.h"
 #include "machine/gcode/gcode_dialect.h"
 
 namespace lensforge {

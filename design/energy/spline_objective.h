@@ -11,7 +11,7 @@
 
 #include "core/surface/control_net.h"
 #include "core/surface/surface_mesh.h"
-#include "design/energy/objective_on.h"
+#include "design/energy/objective.h"
 #include "design/flux/columns.h"
 #include "design/spline/made_surface.h"
 #include "design/spline/spline_nodes.h"

@@ -16,19 +16,15 @@
 #include "core/optics/light_path.h"
 #include "core/surface/mesh_cut.h"
 #include "core/surface/surface_mesh.h"
-#include "design/energy/gradient_term.h"
-#include "design/energy/image_term.h"
-#include "design/energy/laplacian_term.h"
-#include "design/energy/objective_adjoint.h"
 #include "design/energy/objective_kernels.h"
-#include "design/energy/smooth_rays.h"
-#include "design/energy/smoothness_term.h"
-#include "design/energy/unlit_pixels.h"
+#include "design/energy/picture_terms.h"
+#include "design/energy/rays.h"
+#include "design/energy/smoothness.h"
 #include "design/flux/flux_image.h"
 #include "design/mpi/block_share.h"
 #include "design/mpi/ranks.h"
 #include "design/mpi/row_slabs.h"
-#include "design/optimize/vector_kernels.h"
+#include "design/optimize/lbfgs.h"
 
 /// An executor of one rank of several. Kernels run on all that the rank holds, its halo too. Sums
 /// count what it owns, and are taken over all ranks in the order in which one process takes them:

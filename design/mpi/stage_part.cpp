@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "core/value_slope.h"
-#include "design/optimize/lbfgs_on.h"
+#include "design/optimize/lbfgs.h"
 
 namespace lensforge {
 namespace {

@@ -10,11 +10,11 @@
 #include "core/error.h"
 #include "core/surface/control_net.h"
 #include "core/value_slope.h"
-#include "design/flux_of_surface.h"
-#include "design/render_spline.h"
+#include "design/render.h"
+#include "design/render/render_flux.h"
+#include "design/render/source_picture.h"
 #include "design/schedule/level_start.h"
 #include "design/schedule/start_surface.h"
-#include "design/source_picture.h"
 
 namespace lensforge {
 namespace {

@@ -8,9 +8,9 @@
 
 #include "core/image/image.h"
 #include "core/surface/surface_mesh.h"
-#include "design/design_options.h"
 #include "design/schedule/convergence.h"
 #include "design/schedule/guided_optimization.h"
+#include "design/setup/design_options.h"
 
 namespace lensforge {
 

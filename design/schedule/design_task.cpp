@@ -5,7 +5,7 @@
 
 #include "core/image/image_io.h"
 #include "core/surface/control_net.h"
-#include "design/light_setup.h"
+#include "design/setup/light_setup.h"
 
 namespace lensforge {
 Image working_picture(const Image& target, const DesignOptions& options, const RunControl& run) {

@@ -7,7 +7,7 @@
 
 #include "core/optics/light_path.h"
 #include "core/surface/mesh_cut.h"
-#include "design/render/surface_optics.h"
+#include "design/render/render_flux.h"
 #include "design/schedule/transport_sites.h"
 
 namespace lensforge {

@@ -10,7 +10,7 @@
 #include "core/surface/lens.h"
 #include "core/surface/surface_mesh.h"
 #include "core/surface/surface_model.h"
-#include "design/energy/correspondence_term.h"
+#include "design/energy/picture_terms.h"
 #include "design/transport/brenier_map.h"
 #include "design/transport/height_fit.h"
 #include "design/transport/semi_discrete.h"

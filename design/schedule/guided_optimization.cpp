@@ -14,7 +14,7 @@
 #include "design/energy/spline_objective.h"
 #include "design/flux/flux_triangle.h"
 #include "design/mpi/rank_stage.h"
-#include "design/optimize/levelling.h"
+#include "design/optimize/grid_preconditioner.h"
 #include "design/schedule/guided_stage_on.h"
 
 namespace lensforge {

@@ -6,7 +6,7 @@
 
 #include "core/optics/light_path.h"
 #include "core/surface/grid_mesh.h"
-#include "design/light_setup.h"
+#include "design/setup/light_setup.h"
 
 namespace lensforge {
 

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "core/surface/surface_mesh.h"
-#include "design/design_options.h"
 #include "design/energy/objective_options.h"
+#include "design/setup/design_options.h"
 
 namespace lensforge {
 

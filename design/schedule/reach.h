@@ -7,8 +7,8 @@
 #include "core/image/image.h"
 #include "core/optics/optical_setup.h"
 #include "core/surface/surface_mesh.h"
-#include "design/energy/correspondence_term.h"
 #include "design/energy/objective_options.h"
+#include "design/energy/picture_terms.h"
 
 namespace lensforge {
 

@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "core/surface/surface_mesh.h"
-#include "design/energy/correspondence_term.h"
+#include "design/energy/picture_terms.h"
 #include "design/schedule/design_log.h"
 #include "design/schedule/design_task.h"
 

@@ -8,13 +8,12 @@
 
 #include "core/image/metrics.h"
 #include "core/optics/source_points.h"
-#include "design/design_lens.h"
+#include "design/design.h"
 #include "design/finite_difference.h"
 #include "design/objective_setups.h"
-#include "design/render_lens.h"
+#include "design/render.h"
+#include "design/render/source_picture.h"
 #include "design/snell.h"
-#include "design/source_limit.h"
-#include "design/source_picture.h"
 
 namespace lensforge {
 namespace {

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/fringe.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -11,6 +9,7 @@
 #include "core/optics/light_colors.h"
 #include "core/surface/mesh_normals.h"
 #include "core/temp_folder.h"
+#include "design/render.h"
 #include "design/test_setups.h"
 
 namespace lensforge {

@@ -14,9 +14,9 @@
 #include <vector>
 
 #include "core/surface/grid_mesh.h"
-#include "design/flux_of_surface.h"
 #include "design/mpi/rank_stage.h"
 #include "design/mpi/ranks.h"
+#include "design/render.h"
 #include "design/schedule/guided_optimization.h"
 
 namespace lensforge {

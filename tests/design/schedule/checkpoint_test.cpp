@@ -16,7 +16,7 @@
 #include "core/surface/grid_mesh.h"
 #include "core/temp_folder.h"
 #include "core/value_slope.h"
-#include "design/design_fields.h"
+#include "design/setup/option_tables.h"
 #include "design/test_setups.h"
 
 namespace lensforge {
