@@ -48,16 +48,13 @@
 #include "core/text/json_text.h"
 #include "core/text/printable.h"
 #include "core/text/version.h"
-#include "design/design_estimate.h"
-#include "design/design_fields.h"
-#include "design/design_lens.h"
-#include "design/front_setup.h"
-#include "design/light_setup.h"
+#include "design/design.h"
 #include "design/mpi/session.h"
-#include "design/outline_setup.h"
 #include "design/schedule/design_task.h"
 #include "design/schedule/level_plan.h"
-#include "design/source_setup.h"
+#include "design/setup/light_setup.h"
+#include "design/setup/option_tables.h"
+#include "design/setup/outline_setup.h"
 
 namespace lensforge::app {
 namespace {

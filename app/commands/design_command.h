@@ -12,8 +12,8 @@
 #include "core/compute/executor.h"
 #include "core/image/background.h"
 #include "core/image/image_io.h"
-#include "design/design_lens.h"
-#include "design/design_options.h"
+#include "design/design.h"
+#include "design/setup/design_options.h"
 
 namespace lensforge::app {
 

@@ -32,7 +32,7 @@
 #include "core/page/script_data.h"
 #include "core/text/json_fields.h"
 #include "core/text/json_text.h"
-#include "design/render_lens.h"
+#include "design/render.h"
 #include "machine/gcode/gcode_dialect.h"
 
 namespace lensforge {

@@ -34,7 +34,7 @@
 #include "core/page/html_text.h"
 #include "core/spline/control_net.h"
 #include "core/text/version.h"
-#include "design/render_lens.h"
+#include "design/render.h"
 #include "design/schedule/checkpoint.h"
 #include "view_files.h"
 

@@ -11,7 +11,7 @@
 #include "core/compute/executor.h"
 #include "core/image/image.h"
 #include "core/optics/optical_setup.h"
-#include "design/flux/source_blur.h"
+#include "design/flux/flux_image.h"
 
 namespace lensforge {
 

@@ -19,7 +19,6 @@
 #include "core/mesh/surface_mesh.h"
 #include "design/flux/flux_image.h"
 #include "design/flux/flux_triangle.h"
-#include "design/optics/image_triangle.h"
 
 namespace lensforge {
 namespace {

@@ -9,14 +9,12 @@
 #include <variant>
 #include <vector>
 
-#include "core/mesh/surface_mesh.h"
-#include "core/spline/control_net.h"
-#include "design/energy/objective_on.h"
-#include "design/optics/axis_basis.h"
-#include "design/optics/columns.h"
-#include "design/optics/made_nodes.h"
-#include "design/optics/shifted_nodes.h"
-#include "design/optics/spline_nodes.h"
+#include "core/surface/control_net.h"
+#include "core/surface/surface_mesh.h"
+#include "design/energy/objective.h"
+#include "design/flux/columns.h"
+#include "design/spline/made_surface.h"
+#include "design/spline/spline_nodes.h"
 
 namespace lensforge {
 

@@ -7,8 +7,7 @@
 
 #include "core/compute/executor.h"
 #include "design/mpi/rank_transforms.h"
-#include "design/optimize/grid_preconditioner_on.h"
-#include "design/optimize/grid_symbol.h"
+#include "design/optimize/grid_preconditioner.h"
 
 namespace lensforge {
 

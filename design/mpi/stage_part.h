@@ -7,7 +7,7 @@
 #include <stop_token>
 #include <vector>
 
-#include "design/energy/objective_on.h"
+#include "design/energy/objective.h"
 #include "design/mpi/rank_executor.h"
 #include "design/mpi/rank_preconditioner.h"
 #include "design/mpi/stage_problem.h"

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "design/energy/weights.h"
+#include "design/energy/objective_options.h"
 
 namespace lensforge {
 

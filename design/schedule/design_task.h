@@ -8,10 +8,10 @@
 #include "core/compute/executor.h"
 #include "core/image/image.h"
 #include "core/optics/optical_setup.h"
-#include "design/design_options.h"
 #include "design/energy/objective_options.h"
+#include "design/render/source_picture.h"
 #include "design/schedule/level_plan.h"
-#include "design/source_limit.h"
+#include "design/setup/design_options.h"
 
 namespace lensforge {
 

@@ -11,9 +11,9 @@
 #include "core/compute/scalar.h"
 #include "core/optics/light_path.h"
 #include "design/energy/spline_objective.h"
+#include "design/flux/flux_triangle.h"
 #include "design/mpi/rank_stage.h"
-#include "design/optics/image_triangle.h"
-#include "design/optimize/levelling.h"
+#include "design/optimize/grid_preconditioner.h"
 #include "design/schedule/guided_stage_on.h"
 
 namespace lensforge {

@@ -5,10 +5,10 @@
 #include <cmath>
 
 #include "core/optics/light_path.h"
-#include "design/design_options.h"
-#include "design/light_setup.h"
 #include "design/schedule/face_transport.h"
 #include "design/schedule/guided_optimization.h"
+#include "design/setup/design_options.h"
+#include "design/setup/light_setup.h"
 
 namespace lensforge {
 namespace {

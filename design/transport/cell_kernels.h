@@ -6,7 +6,7 @@
 #include <cstdint>
 
 #include "core/compute/host_device.h"
-#include "design/flux/edge_walk.h"
+#include "design/flux/flux_triangle.h"
 #include "design/transport/cell_edges.h"
 #include "design/transport/summed_density.h"
 

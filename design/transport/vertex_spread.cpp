@@ -8,7 +8,7 @@
 
 #include "core/optics/light_path.h"
 #include "design/flux/flux_image.h"
-#include "design/optics/image_triangle.h"
+#include "design/flux/flux_triangle.h"
 #include "design/transport/monge_ampere.h"
 
 namespace lensforge {

@@ -14,7 +14,7 @@
 #include "core/optics/light_path.h"
 #include "design/energy/objective.h"
 #include "design/flux/flux_image.h"
-#include "design/optics/surface_optics.h"
+#include "design/render/render_flux.h"
 
 namespace lensforge::bench {
 namespace {

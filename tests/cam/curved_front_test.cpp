@@ -14,7 +14,7 @@
 #include "core/optics/height_fronts.h"
 #include "core/temp_folder.h"
 #include "core/text/number_text.h"
-#include "design/render_lens.h"
+#include "design/render.h"
 
 namespace lensforge {
 namespace {

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "core/optics/optical_setup.h"
+#include "design/flux/flux_triangle.h"
 #include "design/objective_setups.h"
-#include "design/optics/image_triangle.h"
 #include "design/schedule/guided_stage.h"
 
 /// The CPU's results, for comparison with other executors. Compiled apart: nvcc, which compiles the

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/design_estimate.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
@@ -11,6 +9,7 @@
 
 #include "core/error.h"
 #include "core/temp_folder.h"
+#include "design/design.h"
 
 namespace lensforge {
 namespace {

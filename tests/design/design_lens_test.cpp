@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/design_lens.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -16,7 +14,8 @@
 
 #include "core/error.h"
 #include "core/temp_folder.h"
-#include "design/render_lens.h"
+#include "design/design.h"
+#include "design/render.h"
 #include "design/schedule/checkpoint.h"
 #include "design/test_setups.h"
 #include "design/transport_scenes.h"

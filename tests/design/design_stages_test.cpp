@@ -14,8 +14,8 @@
 
 #include "core/lens/surface_check.h"
 #include "core/temp_folder.h"
-#include "design/design_lens.h"
-#include "design/render_lens.h"
+#include "design/design.h"
+#include "design/render.h"
 #include "design/test_setups.h"
 #include "design/transport_scenes.h"
 

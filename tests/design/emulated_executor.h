@@ -20,8 +20,7 @@
 
 #include "core/compute/executor.h"
 #include "core/error.h"
-#include "design/optimize/extended_transforms.h"
-#include "design/optimize/grid_transforms.h"
+#include "design/optimize/cosine_transform.h"
 
 /// A GPU without a GPU: the kernels, buffers and orders of summation of a CudaExecutor, run by the
 /// calling thread. Its memory can be touched by kernels and copies alone: anything else that reads

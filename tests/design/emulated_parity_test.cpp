@@ -13,8 +13,7 @@
 #include "core/optics/height_fronts.h"
 #include "design/emulated_executor.h"
 #include "design/executor_parity.h"
-#include "design/optics/surface_optics.h"
-#include "design/render_flux.h"
+#include "design/render/render_flux.h"
 #include "design/stage_on_rough_mesh.h"
 #include "design/transport_parity.h"
 

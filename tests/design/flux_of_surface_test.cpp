@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/flux_of_surface.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -15,7 +13,7 @@
 #include "design/finite_difference.h"
 #include "design/objective_setups.h"
 #include "design/random_input.h"
-#include "design/render_lens.h"
+#include "design/render.h"
 
 namespace lensforge {
 namespace {

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/fringe.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -11,6 +9,7 @@
 #include "core/mesh/surface_mesh.h"
 #include "core/optics/optical_setup.h"
 #include "core/temp_folder.h"
+#include "design/render.h"
 #include "design/test_setups.h"
 
 namespace lensforge {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/light_setup.h"
+#include "design/setup/light_setup.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -19,7 +19,7 @@
 #include "design/energy/objective.h"
 #include "design/finite_difference.h"
 #include "design/objective_setups.h"
-#include "design/render_lens.h"
+#include "design/render.h"
 #include "design/schedule/crease_alignment.h"
 #include "design/schedule/face_transport.h"
 #include "design/schedule/guided_optimization.h"

@@ -17,14 +17,14 @@
 #include "core/optics/outline.h"
 #include "core/surface/sample_splines.h"
 #include "core/temp_folder.h"
-#include "design/design_lens.h"
+#include "design/design.h"
 #include "design/energy/spline_objective.h"
 #include "design/finite_difference.h"
 #include "design/objective_setups.h"
-#include "design/outline_setup.h"
 #include "design/ray_tracer.h"
-#include "design/render_lens.h"
+#include "design/render.h"
 #include "design/schedule/spline_start.h"
+#include "design/setup/outline_setup.h"
 
 /// Lenses that are no rectangle.
 namespace lensforge {

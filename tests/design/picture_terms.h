@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/compute/executor.h"
-#include "design/energy/picture_error.h"
+#include "design/energy/picture_terms.h"
 #include "design/finite_difference.h"
 #include "design/random_input.h"
 

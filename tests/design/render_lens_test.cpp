@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/render_lens.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -10,6 +8,7 @@
 
 #include "core/image/image.h"
 #include "design/ray_tracer.h"
+#include "design/render.h"
 #include "design/test_setups.h"
 
 namespace lensforge {

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/render_setup.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "core/error.h"
 #include "core/temp_folder.h"
 #include "core/test_meshes.h"
-#include "design/render_fields.h"
+#include "design/render.h"
+#include "design/setup/option_tables.h"
 
 namespace lensforge {
 namespace {

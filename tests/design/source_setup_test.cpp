@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/source_setup.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -9,8 +7,8 @@
 
 #include "core/error.h"
 #include "core/temp_folder.h"
-#include "design/light_setup.h"
 #include "design/schedule/checkpoint.h"
+#include "design/setup/light_setup.h"
 
 namespace lensforge {
 namespace {

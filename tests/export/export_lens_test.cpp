@@ -9,7 +9,7 @@
 #include "core/optics/height_fronts.h"
 #include "core/optics/outline.h"
 #include "core/temp_folder.h"
-#include "design/render_lens.h"
+#include "design/render.h"
 #include "export/export.h"
 #include "export/sample_surfaces.h"
 #include "export/solid/solid_reading.h"

@@ -4,8 +4,7 @@
 #include <cufft.h>
 
 #include "core/compute/cuda/cuda_executor.h"
-#include "design/optimize/extended_transforms.h"
-#include "design/optimize/grid_transforms.h"
+#include "design/optimize/cosine_transform.h"
 
 namespace lensforge {
 

@@ -16,7 +16,7 @@
 #include "core/optics/height_fronts.h"
 #include "core/optics/light_path.h"
 #include "core/temp_folder.h"
-#include "design/render_lens.h"
+#include "design/render.h"
 
 namespace lensforge {
 namespace {

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/energy/boundary_term.h"
-
 #include <gtest/gtest.h>
 
+#include "design/energy/picture_terms.h"
 #include "design/finite_difference.h"
 #include "design/random_input.h"
 

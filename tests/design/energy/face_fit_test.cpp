@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/energy/face_fit.h"
-
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
 
+#include "design/energy/smoothness.h"
 #include "design/random_input.h"
 
 namespace lensforge {

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/energy/face_frame.h"
-
 #include <gtest/gtest.h>
 
 #include <vector>
 
+#include "design/energy/smoothness.h"
 #include "design/random_corners.h"
 
 namespace lensforge {

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/energy/gradient_term.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 
+#include "design/energy/picture_terms.h"
 #include "design/picture_terms.h"
 
 namespace lensforge {

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/energy/image_term.h"
-
 #include <gtest/gtest.h>
 
+#include "design/energy/picture_terms.h"
 #include "design/picture_terms.h"
 
 namespace lensforge {

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/energy/laplacian_term.h"
-
 #include <gtest/gtest.h>
 
+#include "design/energy/smoothness.h"
 #include "design/finite_difference.h"
 #include "design/test_setups.h"
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/energy/mean_curvature.h"
-
 #include <gtest/gtest.h>
+
+#include "design/energy/smoothness.h"
 
 namespace lensforge {
 namespace {

@@ -10,12 +10,12 @@
 #include <vector>
 
 #include "core/image/transfer.h"
-#include "design/energy/boundary_term.h"
-#include "design/energy/laplacian_term.h"
+#include "design/energy/picture_terms.h"
+#include "design/energy/smoothness.h"
 #include "design/finite_difference.h"
 #include "design/flux/flux_image.h"
 #include "design/objective_setups.h"
-#include "design/optics/surface_optics.h"
+#include "design/render/render_flux.h"
 
 namespace lensforge {
 namespace {

@@ -13,11 +13,11 @@
 #include "core/image/transfer.h"
 #include "core/surface/sample_splines.h"
 #include "design/finite_difference.h"
-#include "design/optics/made_surface.h"
-#include "design/outline_setup.h"
 #include "design/random_input.h"
-#include "design/render_lens.h"
+#include "design/render.h"
 #include "design/schedule/spline_start.h"
+#include "design/setup/outline_setup.h"
+#include "design/spline/made_surface.h"
 #include "design/test_setups.h"
 
 namespace lensforge {

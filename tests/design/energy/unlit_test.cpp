@@ -8,8 +8,7 @@
 
 #include "core/image/transfer.h"
 #include "design/energy/objective.h"
-#include "design/energy/unlit_pixels.h"
-#include "design/energy/unlit_term.h"
+#include "design/energy/picture_terms.h"
 #include "design/finite_difference.h"
 #include "design/objective_setups.h"
 #include "design/random_input.h"

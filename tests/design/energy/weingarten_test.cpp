@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/energy/weingarten.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 #include <string>
 
+#include "design/energy/smoothness.h"
 #include "design/finite_difference.h"
 #include "design/random_input.h"
 

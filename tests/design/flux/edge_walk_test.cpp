@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/flux/edge_walk.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -8,6 +6,7 @@
 #include <cstdlib>
 #include <vector>
 
+#include "design/flux/flux_triangle.h"
 #include "design/random_triangles.h"
 
 namespace lensforge {

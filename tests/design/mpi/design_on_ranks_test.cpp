@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "design/design_lens.h"
+#include "design/design.h"
 #include "design/mpi/rank_test.h"
 #include "design/transport_scenes.h"
 

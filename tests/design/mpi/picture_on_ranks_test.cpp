@@ -8,7 +8,7 @@
 #include "design/flux/flux_image.h"
 #include "design/mpi/rank_executor.h"
 #include "design/mpi/rank_test.h"
-#include "design/optics/surface_optics.h"
+#include "design/render/render_flux.h"
 
 namespace lensforge {
 namespace {

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/optics/facet.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "design/finite_difference.h"
+#include "design/flux/surface_projection.h"
 #include "design/random_corners.h"
 #include "design/snell.h"
 #include "design/test_setups.h"

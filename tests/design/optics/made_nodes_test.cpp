@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/optics/made_nodes.h"
-
 #include <gtest/gtest.h>
 
 #include <cstddef>
@@ -9,8 +7,8 @@
 
 #include "core/surface/sample_splines.h"
 #include "design/finite_difference.h"
-#include "design/optics/made_surface.h"
 #include "design/random_input.h"
+#include "design/spline/made_surface.h"
 
 namespace lensforge {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/optics/made_surface.h"
+#include "design/spline/made_surface.h"
 
 #include <gtest/gtest.h>
 

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/optics/smooth.h"
-
 #include <gtest/gtest.h>
 
 #include "design/finite_difference.h"
+#include "design/flux/surface_projection.h"
 #include "design/random_input.h"
 #include "design/snell.h"
 #include "design/test_setups.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/optics/spline_nodes.h"
+#include "design/spline/spline_nodes.h"
 
 #include <gtest/gtest.h>
 

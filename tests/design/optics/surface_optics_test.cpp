@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/optics/surface_optics.h"
-
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
@@ -10,6 +8,7 @@
 #include <numeric>
 #include <vector>
 
+#include "design/render/render_flux.h"
 #include "design/snell.h"
 #include "design/test_setups.h"
 

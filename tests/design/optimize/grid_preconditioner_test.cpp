@@ -5,6 +5,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <cmath>
+#include <cstddef>
 #include <numbers>
 #include <vector>
 
@@ -18,6 +19,25 @@ using testing::Random;
 constexpr GridShape kShape{7, 6};
 constexpr int kVertices = 42;
 constexpr double kAspect = 0.87;
+
+/// The preconditioner on the CPU, by Eigen's vectors.
+class GridPreconditioner : private GridPreconditionerOn<Executor> {
+ public:
+  using GridPreconditionerOn<Executor>::GridPreconditionerOn;
+  using GridPreconditionerOn<Executor>::set_reach;
+  using GridPreconditionerOn<Executor>::xy;
+  using GridPreconditionerOn<Executor>::z;
+
+  void apply(const Eigen::VectorXd& g, Eigen::VectorXd& r) { apply_power(g, 1.0, r); }
+  void apply_root(const Eigen::VectorXd& g, Eigen::VectorXd& r) { apply_power(g, 0.5, r); }
+
+ private:
+  void apply_power(const Eigen::VectorXd& g, double exponent, Eigen::VectorXd& r) {
+    r.resize(g.size());
+    const auto size = static_cast<std::size_t>(g.size());
+    GridPreconditionerOn<Executor>::apply({g.data(), size}, exponent, {r.data(), size});
+  }
+};
 
 /// x held on the left and right, y on the lower and upper border, as on a lens.
 Eigen::Matrix3Xd movable() {

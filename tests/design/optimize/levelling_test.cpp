@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/optimize/levelling.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
 
+#include "design/optimize/grid_preconditioner.h"
 #include "design/random_input.h"
 
 namespace lensforge {

@@ -11,7 +11,7 @@
 #include "core/error.h"
 #include "core/optics/screen.h"
 #include "design/graded_mesh.h"
-#include "design/render_lens.h"
+#include "design/render.h"
 #include "design/snell.h"
 #include "design/test_setups.h"
 

@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+#include <span>
+#include <vector>
+
+#include "core/compute/executor.h"
+#include "core/compute/work_estimate.h"
+#include "core/image/image.h"
+#include "core/image/metrics.h"
+#include "core/optics/optical_setup.h"
+#include "core/surface/lens.h"
+#include "core/surface/surface_mesh.h"
+#include "core/surface/surface_model.h"
+
+/// Renders what a lens or a surface projects, and compares it with the picture that it was made
+/// for.
+///
+///     const lensforge::Lens lens = lensforge::read_lens("lens");
+///     lensforge::Image picture;
+///     const lensforge::ImageMetrics metrics =
+///         lensforge::evaluate(lens, lens.model, &picture, lensforge::Executor::cpu());
+///     std::cout << "MAE " << metrics.mae << '\n';
+///
+/// A mesh that comes alone has no setup of its own: setup_for_mesh() gives one to render_surface().
+
+namespace lensforge {
+
+/// A projected picture.
+struct RenderResult {
+  Image image;  ///< Linear flux relative to a uniformly lit picture; mean = flux_inside.
+  double flux_inside = 0.0;  ///< Share of the lens's flux that lands on the image rectangle.
+};
+
+/// Renders what a surface projects onto the image rectangle of `setup`, exactly (no sampling but of
+/// a source that has an extent, see picture_under()).
+RenderResult render_surface(const SurfaceMesh& mesh, const OpticalSetup& setup, SurfaceModel model,
+                            const Executor& executor);
+
+/// Renders a surface and compares it with `target` (linear light). The picture is scaled so that
+/// the lens's whole flux would equal the target's total; `rendered` takes it unless null.
+/// @pre target has setup.pixels columns and rows.
+ImageMetrics evaluate(const SurfaceMesh& mesh, const OpticalSetup& setup, SurfaceModel model,
+                      const Image& target, Image* rendered, const Executor& executor);
+
+/// How long a lens is looked at.
+enum class Look {
+  kThorough,  ///< A spline at the nodes of picture_nodes(), an extended source at all its points.
+  kBrief,  ///< At most 4 nodes per knot cell each way and as many points of the source as fit into
+           ///< 4 million nodes, at least 4. A 64² photograph under a source of 2 mrad has MAE
+           ///< 0.0022 instead of 0.0020.
+};
+
+/// evaluate() of a lens under one of its models.
+ImageMetrics evaluate(const Lens& lens, SurfaceModel model, Image* rendered,
+                      const Executor& executor, Look look = Look::kThorough);
+
+/// The same for a smooth surface that is known by its own normals at the vertices, 3 × V with
+/// z > 0: what the triangles between them hide does not matter. Computed on the CPU.
+RenderResult render_surface(const SurfaceMesh& mesh, const Eigen::Matrix3Xd& normals,
+                            const OpticalSetup& setup, const Executor& executor);
+
+/// evaluate() by the normals given.
+ImageMetrics evaluate(const SurfaceMesh& mesh, const Eigen::Matrix3Xd& normals,
+                      const OpticalSetup& setup, const Image& target, Image* rendered,
+                      const Executor& executor);
+
+/// Flux that a mesh sends to every pixel of `setup`, as shares of the lens's (Sun et al., section
+/// 3.2), row by row from the top; setup.pixels values. An extended source is the sum of its points.
+/// @param model  facet or smooth.
+/// @pre vertex numbers are in range, coordinates finite, the setup valid.
+/// @throw Interrupted, see Executor::with_stop().
+std::vector<double> flux_of_surface(const SurfaceMesh& mesh, const OpticalSetup& setup,
+                                    SurfaceModel model, const Executor& executor);
+
+/// The same of a smooth surface that is known by its own normals at the vertices, 3 × V with z > 0.
+/// Computed on the CPU.
+std::vector<double> flux_of_surface(const SurfaceMesh& mesh, const Eigen::Matrix3Xd& normals,
+                                    const OpticalSetup& setup, const Executor& executor);
+
+/// Adjoint of flux_of_surface(): Σ ∂(flux of pixel i)/∂(vertices) × cotangent[i], 3 × V, per mm.
+/// Triangles whose light does not leave, and needles of light (deposit_adjoint()), have no
+/// derivative but by what they take in. Same bits for any number of threads.
+/// @param cotangent  setup.pixels values, row by row from the top.
+/// @throw InputError if the setup has an outline: what it cuts off a face has no derivative here.
+///        Interrupted, see Executor::with_stop().
+/// Error: 1e-6 of the product against central differences (FluxOfSurface.* in
+/// tests/design/flux_of_surface_test.cpp).
+Eigen::Matrix3Xd flux_of_surface_adjoint(const SurfaceMesh& mesh, const OpticalSetup& setup,
+                                         SurfaceModel model, std::span<const double> cotangent,
+                                         const Executor& executor);
+
+/// Flux per pixel, as shares of the lens's, of its surface under its model in another setup.
+std::vector<double> flux_of_lens(const Lens& lens, const OpticalSetup& setup,
+                                 const Executor& executor);
+
+/// How far apart on the screen the first and last wavelength of the spectrum land, mm.
+struct Fringe {
+  double mean = 0.0;  ///< Over the vertices of the surface.
+  double max = 0.0;
+};
+
+/// @param normals  3 × V of the surface at its vertices, of any length, z > 0. Rays that do not
+///                 leave the surface are left out. @pre the setup has a spectrum.
+Fringe fringe_of(const SurfaceMesh& mesh, const Eigen::Matrix3Xd& normals,
+                 const OpticalSetup& setup);
+
+/// The same of a lens under its own model.
+Fringe fringe_of(const Lens& lens);
+
+/// A setup for a mesh that comes alone: the image rectangle lies straight above the lens and is as
+/// large, the working picture has 256 pixels on its longer side.
+OpticalSetup setup_for_mesh(const SurfaceMesh& mesh);
+
+/// The same setup with `pixels` on the longer side of the picture.
+OpticalSetup with_longer_side(OpticalSetup setup, int pixels);
+
+/// The same setup with an image rectangle of this width, proportions and centre kept.
+OpticalSetup with_image_width(OpticalSetup setup, double width);
+
+/// @throw InputError unless the wall lies above the whole surface and the setup is valid.
+void require_wall_above(const SurfaceMesh& mesh, const OpticalSetup& setup);
+
+/// What a rendering of so many pixels takes, its comparison with a target and its file.
+WorkEstimate rendering_work(double pixels);
+
+}  // namespace lensforge
