@@ -3,7 +3,7 @@
 
 #include "core/optics/optical_setup.h"
 #include "core/surface/surface_mesh.h"
-#include "design/transport/brenier_map.h"
+#include "design/transport/semi_discrete.h"
 
 namespace lensforge {
 

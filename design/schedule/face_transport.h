@@ -11,8 +11,7 @@
 #include "core/surface/surface_mesh.h"
 #include "core/surface/surface_model.h"
 #include "design/energy/correspondence_term.h"
-#include "design/transport/brenier_map.h"
-#include "design/transport/height_fit.h"
+#include "design/transport/mesh_fit.h"
 #include "design/transport/semi_discrete.h"
 
 namespace lensforge {

@@ -11,7 +11,7 @@
 #include "design/schedule/guided_optimization.h"
 #include "design/schedule/reach.h"
 #include "design/schedule/start_surface.h"
-#include "design/transport/vertex_spread.h"
+#include "design/transport/mesh_fit.h"
 
 namespace lensforge {
 namespace {
