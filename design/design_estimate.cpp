@@ -5,8 +5,8 @@
 #include <cstddef>
 
 #include "core/surface/control_net.h"
-#include "design/schedule/level_plan.h"
-#include "design/schedule/transport_step.h"
+#include "design/schedule/levels.h"
+#include "design/schedule/rounds.h"
 
 namespace lensforge {
 namespace {

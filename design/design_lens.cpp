@@ -15,11 +15,9 @@
 #include "design/optics/made_surface.h"
 #include "design/picture_values.h"
 #include "design/render_lens.h"
-#include "design/schedule/alternation.h"
 #include "design/schedule/checkpoint.h"
-#include "design/schedule/design_log.h"
-#include "design/schedule/design_task.h"
-#include "design/schedule/spline_start.h"
+#include "design/schedule/levels.h"
+#include "design/schedule/rounds.h"
 
 namespace lensforge {
 namespace {

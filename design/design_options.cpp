@@ -10,7 +10,7 @@
 #include "design/design_fields.h"
 #include "design/light_setup.h"
 #include "design/optics/averaging_grid.h"
-#include "design/schedule/level_plan.h"
+#include "design/schedule/levels.h"
 
 namespace lensforge {
 namespace {

@@ -55,8 +55,7 @@
 #include "design/light_setup.h"
 #include "design/mpi/session.h"
 #include "design/outline_setup.h"
-#include "design/schedule/design_task.h"
-#include "design/schedule/level_plan.h"
+#include "design/schedule/levels.h"
 #include "design/source_setup.h"
 
 namespace lensforge::app {

@@ -25,7 +25,7 @@
 #include "design/outline_setup.h"
 #include "design/ray_tracer.h"
 #include "design/render_lens.h"
-#include "design/schedule/spline_start.h"
+#include "design/schedule/levels.h"
 
 /// Lenses that are no rectangle.
 namespace lensforge {

@@ -17,7 +17,7 @@
 #include "design/outline_setup.h"
 #include "design/random_input.h"
 #include "design/render_lens.h"
-#include "design/schedule/spline_start.h"
+#include "design/schedule/levels.h"
 #include "design/test_setups.h"
 
 namespace lensforge {
