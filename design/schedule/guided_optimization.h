@@ -3,16 +3,63 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <functional>
 #include <memory>
 
 #include "core/compute/executor.h"
 #include "core/mesh/surface_mesh.h"
 #include "core/optics/optical_setup.h"
 #include "design/energy/objective.h"
+#include "design/energy/objective_options.h"
+#include "design/optimize/grid_symbol.h"
 #include "design/optimize/lbfgs.h"
-#include "design/schedule/guided_stage.h"
 
 namespace lensforge {
+
+/// The numerical half of a GuidedOptimization: objective, preconditioner and minimiser on one
+/// device. Vectors cross its border before and after a minimisation, not during it.
+class GuidedStage {
+ public:
+  using Observer = std::function<bool(int iteration, const ObjectiveEvaluation&)>;
+
+  GuidedStage() = default;
+  virtual ~GuidedStage() = default;
+  GuidedStage(const GuidedStage&) = delete;
+  GuidedStage& operator=(const GuidedStage&) = delete;
+
+  /// See DesignObjective.
+  [[nodiscard]] virtual const Eigen::Matrix3Xd& movable() const = 0;
+  virtual void relinearize(const Eigen::Matrix3Xd& vertices) = 0;
+  virtual ObjectiveEvaluation evaluate(const Eigen::Matrix3Xd& vertices,
+                                       Eigen::Matrix3Xd& gradient) = 0;
+
+  /// See GridPreconditioner.
+  virtual void set_symbols(const GridSymbol& xy, const GridSymbol& z) = 0;
+  virtual void set_reach(const Eigen::Matrix3Xd& reach) = 0;
+  virtual Eigen::Matrix3Xd apply_root(const Eigen::Matrix3Xd& g) = 0;
+
+  /// Moves `vertices` to the best surface found, also where an exception ends the run.
+  virtual LbfgsSummary minimize(const LbfgsOptions& options, const Observer& observe,
+                                Eigen::Matrix3Xd& vertices) = 0;
+};
+
+/// The stage on all ranks, to be used by rank 0 while the others are in serve_rank(); see the
+/// constructor of GuidedStageOn. Null where one process does it as well: without other ranks, for a
+/// spline, for a grid with too few rows for so many ranks, and in a build without MPI.
+/// @param executor  its threads are those of each rank; its stop token ends all ranks' kernels.
+std::unique_ptr<GuidedStage> make_stage_on_ranks(const SurfaceMesh& mesh, const OpticalSetup& setup,
+                                                 double aspect, const DesignGoal& goal,
+                                                 const ObjectiveOptions& options,
+                                                 const Executor& executor);
+
+#if defined(LENSFORGE_CUDA)
+/// The stage on the GPU; see the constructor of GuidedStageOn. @throw RunError if its memory does
+/// not suffice.
+std::unique_ptr<GuidedStage> make_cuda_stage(const SurfaceMesh& mesh, const OpticalSetup& setup,
+                                             double aspect, const DesignGoal& goal,
+                                             const ObjectiveOptions& options,
+                                             const Executor& executor);
+#endif
 
 /// How far vertices step, measured on one surface; see GuidedOptimization::run(). Further rounds
 /// keep them: where the surface fits already there is little curvature to measure. MAE in

@@ -12,7 +12,7 @@
 #include "design/energy/objective_on.h"
 #include "design/optimize/grid_preconditioner_on.h"
 #include "design/optimize/lbfgs_on.h"
-#include "design/schedule/guided_stage.h"
+#include "design/schedule/guided_optimization.h"
 
 namespace lensforge {
 

@@ -15,8 +15,8 @@
 
 #include "core/mesh/surface_mesh.h"
 #include "design/flux_of_surface.h"
-#include "design/mpi/rank_stage.h"
 #include "design/mpi/ranks.h"
+#include "design/mpi/session.h"
 #include "design/schedule/guided_optimization.h"
 
 namespace lensforge {

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/mpi/rank_transforms.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <vector>
 
+#include "design/mpi/rank_executor.h"
 #include "design/mpi/rank_test.h"
 #include "design/random_input.h"
 

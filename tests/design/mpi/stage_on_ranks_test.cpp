@@ -8,7 +8,7 @@
 
 #include "core/error.h"
 #include "design/mpi/rank_test.h"
-#include "design/mpi/row_slabs.h"
+#include "design/mpi/ranks.h"
 #include "design/schedule/guided_optimization.h"
 #include "design/stage_on_rough_mesh.h"
 

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/schedule/level_start.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -9,7 +7,8 @@
 
 #include "core/mesh/surface_mesh.h"
 #include "design/random_input.h"
-#include "design/schedule/alternation.h"
+#include "design/schedule/levels.h"
+#include "design/schedule/rounds.h"
 #include "design/test_setups.h"
 
 namespace lensforge {

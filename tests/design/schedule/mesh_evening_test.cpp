@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/schedule/mesh_evening.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -9,6 +7,7 @@
 #include "core/mesh/surface_mesh.h"
 #include "design/graded_mesh.h"
 #include "design/random_input.h"
+#include "design/schedule/levels.h"
 
 namespace lensforge {
 namespace {

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/schedule/transport_sites.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -10,8 +8,6 @@
 #include "core/mesh/surface_mesh.h"
 #include "core/optics/light_path.h"
 #include "design/schedule/face_transport.h"
-#include "design/schedule/reach.h"
-#include "design/schedule/start_surface.h"
 #include "design/test_setups.h"
 
 namespace lensforge {

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/transport/brenier_map.h"
-
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
@@ -9,6 +7,7 @@
 
 #include "core/mesh/surface_mesh.h"
 #include "design/test_setups.h"
+#include "design/transport/semi_discrete.h"
 #include "design/transport_scenes.h"
 
 namespace lensforge {

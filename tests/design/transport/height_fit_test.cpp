@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/transport/height_fit.h"
-
 #include <gtest/gtest.h>
 
 #include <Eigen/QR>
@@ -11,6 +9,7 @@
 #include "core/error.h"
 #include "design/graded_mesh.h"
 #include "design/test_setups.h"
+#include "design/transport/mesh_fit.h"
 
 namespace lensforge {
 namespace {

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/transport/monge_ampere.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -10,6 +8,7 @@
 
 #include "design/random_input.h"
 #include "design/test_setups.h"
+#include "design/transport/mesh_fit.h"
 
 namespace lensforge {
 namespace {

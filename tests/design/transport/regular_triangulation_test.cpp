@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/transport/regular_triangulation.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -11,6 +9,7 @@
 
 #include "core/error.h"
 #include "design/test_setups.h"
+#include "design/transport/power_diagram.h"
 #include "design/transport_scenes.h"
 
 namespace lensforge {

@@ -11,7 +11,6 @@
 
 #include "core/error.h"
 #include "design/test_setups.h"
-#include "design/transport/density_blur.h"
 #include "design/transport_scenes.h"
 #include "design/vector_lbfgs.h"
 #include "fixtures/scenes/scenes.h"

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/transport/vertex_spread.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -11,6 +9,7 @@
 
 #include "design/graded_mesh.h"
 #include "design/test_setups.h"
+#include "design/transport/mesh_fit.h"
 
 namespace lensforge {
 namespace {

@@ -2,7 +2,7 @@
 #include <memory>
 
 #include "core/compute/cuda/launch.cuh"
-#include "design/transport/cell_stage_on.h"
+#include "design/transport/power_cells_on.h"
 
 namespace lensforge {
 
