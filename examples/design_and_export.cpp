@@ -5,7 +5,7 @@
 
 #include "core/image/image_io.h"
 #include "core/mesh/mesh_files.h"
-#include "design/design_lens.h"
+#include "design/design.h"
 #include "export/files/closed_solid.h"
 #include "export/files/mesh_formats.h"
 

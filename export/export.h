@@ -9,7 +9,7 @@
 
 #include "core/compute/executor.h"
 #include "core/compute/work_estimate.h"
-#include "core/image/metrics.h"
+#include "core/image/image.h"
 #include "core/lens/lens.h"
 #include "core/text/option_field.h"
 #include "export/files/height_map.h"

@@ -10,7 +10,6 @@
 #include "app/frame/option_set.h"
 #include "cam/plan/cam_options.h"
 #include "core/compute/executor.h"
-#include "core/image/background.h"
 #include "core/image/image_io.h"
 #include "design/design.h"
 #include "design/setup/design_options.h"

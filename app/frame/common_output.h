@@ -5,9 +5,9 @@
 #include <optional>
 #include <string>
 
-#include "core/image/metrics.h"
+#include "core/image/image.h"
 #include "core/lens/lens.h"
-#include "design/fringe.h"
+#include "design/render.h"
 
 /// Texts and JSON that several commands print.
 namespace lensforge::app {

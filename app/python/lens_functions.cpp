@@ -25,12 +25,9 @@
 #include "core/error.h"
 #include "core/image/image_io.h"
 #include "core/io/lens_folder.h"
-#include "design/design_estimate.h"
-#include "design/design_lens.h"
-#include "design/flux_of_surface.h"
-#include "design/render_fields.h"
-#include "design/render_lens.h"
-#include "design/render_setup.h"
+#include "design/design.h"
+#include "design/render.h"
+#include "design/setup/option_tables.h"
 
 /// The class Lens, and the commands as functions.
 namespace lensforge::python {

@@ -12,7 +12,7 @@
 #include "core/optics/front.h"
 #include "core/optics/light_path.h"
 #include "core/optics/refraction.h"
-#include "core/page/html_text.h"
+#include "core/page/html_page.h"
 #include "core/text/number_text.h"
 #include "core/text/version.h"
 

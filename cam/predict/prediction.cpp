@@ -27,7 +27,7 @@
 #include "core/optics/light_path.h"
 #include "core/optics/optical_setup.h"
 #include "core/optics/outline.h"
-#include "core/page/html_text.h"
+#include "core/page/html_page.h"
 #include "core/text/number_text.h"
 
 namespace lensforge {

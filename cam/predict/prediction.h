@@ -20,7 +20,7 @@
 #include "cam/report/report_data.h"
 #include "cam/tolerance/tolerance_forecast.h"
 #include "core/compute/executor.h"
-#include "core/image/layered_image.h"
+#include "core/image/rasters.h"
 #include "core/lens/lens.h"
 #include "core/mesh/surface_mesh.h"
 

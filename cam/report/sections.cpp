@@ -10,8 +10,8 @@
 
 #include "cam/report/report_maps.h"
 #include "core/optics/front.h"
-#include "core/page/html_text.h"
-#include "core/page/light_drawing.h"
+#include "core/page/drawings.h"
+#include "core/page/html_page.h"
 #include "core/text/number_text.h"
 
 namespace lensforge::report_section {

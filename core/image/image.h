@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "core/compute/run_control.h"
+#include "core/compute/executor.h"
 
 namespace lensforge {
 

@@ -14,7 +14,7 @@
 #include <string_view>
 #include <vector>
 
-#include "core/compute/run_control.h"
+#include "core/compute/executor.h"
 #include "core/image/image.h"
 #include "core/image/picture_outline.h"
 #include "core/sandbox/child_work.h"

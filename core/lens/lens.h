@@ -10,9 +10,8 @@
 
 #include "core/compute/executor.h"
 #include "core/image/image.h"
-#include "core/image/metrics.h"
+#include "core/io/files.h"
 #include "core/io/lens_folder.h"
-#include "core/io/pending_files.h"
 #include "core/lens/optical_surface.h"
 #include "core/mesh/surface_mesh.h"
 #include "core/optics/optical_setup.h"

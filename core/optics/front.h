@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "core/compute/host_device.h"
-#include "core/image/height_grid.h"
+#include "core/image/rasters.h"
 
 namespace lensforge {
 

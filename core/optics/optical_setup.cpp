@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "core/error.h"
-#include "core/image/spectral_color.h"
+#include "core/image/color.h"
 #include "core/text/number_list.h"
 #include "core/text/number_text.h"
 

@@ -12,7 +12,7 @@
 #include <variant>
 #include <vector>
 
-#include "core/optics/front_surface.h"
+#include "core/optics/front.h"
 #include "core/page/html_page.h"
 #include "core/text/number_text.h"
 #include "core/text/version.h"

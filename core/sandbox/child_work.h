@@ -11,7 +11,7 @@
 #include <type_traits>
 #include <utility>
 
-#include "core/compute/run_control.h"
+#include "core/compute/executor.h"
 #include "core/error.h"
 
 namespace lensforge {

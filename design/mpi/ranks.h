@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/mesh/surface_mesh.h"
 #include "core/optics/optical_setup.h"
-#include "core/surface/surface_mesh.h"
 #include "design/energy/objective_options.h"
 
 namespace lensforge {

@@ -16,13 +16,12 @@
 #include <utility>
 #include <vector>
 
+#include "core/compute/scalar.h"
 #include "core/error.h"
-#include "core/value_slope.h"
-#include "design/energy/objective_on.h"
+#include "design/energy/objective.h"
 #include "design/mpi/rank_executor.h"
 #include "design/mpi/ranks.h"
 #include "design/optimize/lbfgs.h"
-#include "design/optimize/lbfgs_on.h"
 #include "design/schedule/guided_optimization.h"
 
 namespace lensforge {

@@ -8,9 +8,8 @@
 
 #include "core/compute/executor.h"
 #include "core/image/image.h"
-#include "core/image/metrics.h"
+#include "core/lens/lens.h"
 #include "core/optics/optical_setup.h"
-#include "core/surface/lens.h"
 
 namespace lensforge {
 

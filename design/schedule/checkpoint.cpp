@@ -12,10 +12,10 @@
 #include <string_view>
 
 #include "core/io/checkpoint_file.h"
-#include "core/surface/control_net.h"
-#include "core/surface/grid_mesh.h"
+#include "core/mesh/surface_mesh.h"
+#include "core/spline/control_net.h"
 #include "core/text/json_fields.h"
-#include "design/design_fields.h"
+#include "design/setup/option_tables.h"
 
 // The numbers are the vertices and, if the header says so, the reach of their steps, as doubles.
 

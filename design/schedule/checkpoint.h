@@ -10,10 +10,10 @@
 
 #include "core/image/image.h"
 #include "core/mesh/surface_mesh.h"
-#include "design/design_options.h"
 #include "design/schedule/convergence.h"
 #include "design/schedule/guided_optimization.h"
 #include "design/schedule/levels.h"
+#include "design/setup/design_options.h"
 #include "design/transport/semi_discrete.h"
 
 namespace lensforge {

@@ -12,14 +12,14 @@
 #include <tuple>
 #include <vector>
 
+#include "core/mesh/mesh_topology.h"
+#include "core/mesh/surface_mesh.h"
 #include "core/optics/light_path.h"
-#include "core/surface/grid_mesh.h"
-#include "core/surface/mesh_cut.h"
-#include "core/surface/mesh_topology.h"
-#include "design/design_options.h"
-#include "design/light_setup.h"
-#include "design/optics/surface_optics.h"
+#include "core/optics/outline.h"
+#include "design/render/render_flux.h"
 #include "design/schedule/guided_optimization.h"
+#include "design/setup/design_options.h"
+#include "design/setup/light_setup.h"
 
 namespace lensforge {
 namespace {

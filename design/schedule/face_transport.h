@@ -10,8 +10,8 @@
 #include "core/lens/optical_surface.h"
 #include "core/mesh/surface_mesh.h"
 #include "core/optics/optical_setup.h"
-#include "design/energy/correspondence_term.h"
 #include "design/energy/objective_options.h"
+#include "design/energy/picture_terms.h"
 #include "design/transport/mesh_fit.h"
 #include "design/transport/semi_discrete.h"
 

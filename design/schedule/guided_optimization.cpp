@@ -8,12 +8,11 @@
 #include <numbers>
 #include <variant>
 
-#include "core/compute/split_mix.h"
+#include "core/compute/scalar.h"
 #include "core/optics/light_path.h"
-#include "core/value_slope.h"
 #include "design/energy/spline_objective.h"
-#include "design/optics/image_triangle.h"
-#include "design/optimize/levelling.h"
+#include "design/flux/flux_triangle.h"
+#include "design/optimize/grid_preconditioner.h"
 #include "design/schedule/guided_stage_on.h"
 
 namespace lensforge {

@@ -11,7 +11,7 @@
 #include "core/optics/optical_setup.h"
 #include "design/energy/objective.h"
 #include "design/energy/objective_options.h"
-#include "design/optimize/grid_symbol.h"
+#include "design/optimize/grid_preconditioner.h"
 #include "design/optimize/lbfgs.h"
 
 namespace lensforge {

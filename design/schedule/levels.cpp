@@ -8,16 +8,14 @@
 #include <vector>
 
 #include "core/image/image_io.h"
+#include "core/lens/slope_fit.h"
+#include "core/lens/smooth_surface.h"
+#include "core/mesh/mesh_topology.h"
+#include "core/mesh/surface_mesh.h"
 #include "core/optics/light_path.h"
-#include "core/surface/control_net.h"
-#include "core/surface/grid_mesh.h"
-#include "core/surface/grid_triangles.h"
-#include "core/surface/grid_warp.h"
-#include "core/surface/mesh_topology.h"
-#include "core/surface/slope_fit.h"
-#include "core/surface/smooth_surface.h"
-#include "design/light_setup.h"
+#include "core/spline/control_net.h"
 #include "design/schedule/face_transport.h"
+#include "design/setup/light_setup.h"
 
 namespace lensforge {
 namespace {

@@ -7,15 +7,14 @@
 #include <vector>
 
 #include "core/compute/executor.h"
-#include "core/compute/run_control.h"
 #include "core/image/image.h"
+#include "core/mesh/surface_mesh.h"
 #include "core/optics/optical_setup.h"
-#include "core/surface/control_net.h"
-#include "core/surface/surface_mesh.h"
-#include "design/design_options.h"
+#include "core/spline/control_net.h"
 #include "design/energy/objective_options.h"
+#include "design/render/source_picture.h"
 #include "design/schedule/guided_optimization.h"
-#include "design/source_limit.h"
+#include "design/setup/design_options.h"
 
 namespace lensforge {
 

@@ -9,16 +9,16 @@
 #include <string>
 #include <utility>
 
+#include "core/compute/scalar.h"
 #include "core/error.h"
-#include "core/surface/control_net.h"
+#include "core/spline/control_net.h"
 #include "core/text/number_text.h"
-#include "core/value_slope.h"
-#include "design/flux_of_surface.h"
-#include "design/render_spline.h"
+#include "design/render.h"
+#include "design/render/render_flux.h"
+#include "design/render/source_picture.h"
 #include "design/schedule/face_transport.h"
 #include "design/schedule/guided_optimization.h"
 #include "design/schedule/levels.h"
-#include "design/source_picture.h"
 #include "design/transport/mesh_fit.h"
 
 namespace lensforge {

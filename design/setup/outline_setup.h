@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "core/compute/executor.h"
-#include "core/image/background.h"
 #include "core/image/image.h"
+#include "core/image/image_io.h"
 #include "core/optics/outline.h"
 #include "design/setup/design_options.h"
 

@@ -11,10 +11,10 @@
 #include <utility>
 #include <vector>
 
-#include "core/image/image_sample.h"
+#include "core/image/image.h"
 #include "core/optics/light_path.h"
 #include "design/flux/flux_image.h"
-#include "design/optics/image_triangle.h"
+#include "design/flux/flux_triangle.h"
 #include "design/optimize/cosine_transform.h"
 
 namespace lensforge {

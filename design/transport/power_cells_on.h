@@ -14,9 +14,8 @@
 
 #include "core/compute/executor.h"
 #include "core/compute/host_device.h"
-#include "core/compute/kernel_input.h"
 #include "core/error.h"
-#include "design/flux/edge_walk.h"
+#include "design/flux/flux_triangle.h"
 #include "design/transport/power_cells.h"
 
 namespace lensforge {

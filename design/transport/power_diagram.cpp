@@ -22,7 +22,7 @@
 #include <utility>
 
 #include "core/error.h"
-#include "core/surface/corners.h"
+#include "core/mesh/surface_mesh.h"
 
 namespace lensforge {
 namespace {

@@ -17,7 +17,7 @@
 #include "bench/lens_scene.h"
 #include "core/compute/cuda/cuda_executor.h"
 #include "core/compute/executor.h"
-#include "design/design_lens.h"
+#include "design/design.h"
 #include "design/energy/objective_cuda.h"
 #include "design/schedule/guided_optimization.h"
 #include "fixtures/scenes/scenes.h"

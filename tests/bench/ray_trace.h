@@ -5,7 +5,6 @@
 
 #include "core/compute/executor.h"
 #include "core/image/image.h"
-#include "core/image/metrics.h"
 #include "core/lens/lens.h"
 
 /// A forward ray tracer over Embree that judges a designed lens from outside: it shares the lens's

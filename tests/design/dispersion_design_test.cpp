@@ -12,11 +12,11 @@
 #include "core/image/transfer.h"
 #include "core/optics/front.h"
 #include "core/optics/optical_setup.h"
-#include "design/design_lens.h"
+#include "design/design.h"
 #include "design/finite_difference.h"
 #include "design/objective_setups.h"
-#include "design/outline_setup.h"
-#include "design/render_lens.h"
+#include "design/render.h"
+#include "design/setup/outline_setup.h"
 
 namespace lensforge {
 namespace {

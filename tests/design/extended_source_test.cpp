@@ -6,15 +6,14 @@
 #include <numbers>
 #include <vector>
 
-#include "core/image/metrics.h"
+#include "core/image/image.h"
 #include "core/optics/light_source.h"
-#include "design/design_lens.h"
+#include "design/design.h"
 #include "design/finite_difference.h"
 #include "design/objective_setups.h"
-#include "design/render_lens.h"
+#include "design/render.h"
+#include "design/render/source_picture.h"
 #include "design/snell.h"
-#include "design/source_limit.h"
-#include "design/source_picture.h"
 
 namespace lensforge {
 namespace {

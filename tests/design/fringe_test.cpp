@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "core/error.h"
-#include "core/image/spectral_color.h"
+#include "core/image/color.h"
 #include "core/mesh/surface_mesh.h"
 #include "core/optics/optical_setup.h"
 #include "core/temp_folder.h"

@@ -20,13 +20,10 @@
 #include "design/finite_difference.h"
 #include "design/objective_setups.h"
 #include "design/render.h"
-#include "design/schedule/crease_alignment.h"
 #include "design/schedule/face_transport.h"
 #include "design/schedule/guided_optimization.h"
-#include "design/schedule/reach.h"
-#include "design/schedule/start_surface.h"
 #include "design/snell.h"
-#include "design/transport/vertex_spread.h"
+#include "design/transport/mesh_fit.h"
 
 namespace lensforge {
 namespace {

@@ -23,7 +23,7 @@
 #include "design/objective_setups.h"
 #include "design/ray_tracer.h"
 #include "design/render.h"
-#include "design/schedule/spline_start.h"
+#include "design/schedule/levels.h"
 #include "design/setup/outline_setup.h"
 
 /// Lenses that are no rectangle.

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "core/mesh/surface_mesh.h"
-#include "design/optimize/lbfgs_on.h"
+#include "design/optimize/lbfgs.h"
 
 namespace lensforge::reflect {
 namespace {

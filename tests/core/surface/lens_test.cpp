@@ -13,7 +13,7 @@
 #include "core/error.h"
 #include "core/full_disk.h"
 #include "core/image/image_io.h"
-#include "core/io/output_guard.h"
+#include "core/io/lens_folder.h"
 #include "core/mesh/mesh_files.h"
 #include "core/spline/control_net.h"
 #include "core/surface/sample_splines.h"

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/flux/source_blur.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -10,6 +8,7 @@
 #include <vector>
 
 #include "core/optics/light_source.h"
+#include "design/flux/flux_image.h"
 #include "design/random_input.h"
 #include "design/test_setups.h"
 

@@ -14,9 +14,9 @@
 #include <vector>
 
 #include "core/mesh/surface_mesh.h"
-#include "design/flux_of_surface.h"
 #include "design/mpi/ranks.h"
 #include "design/mpi/session.h"
+#include "design/render.h"
 #include "design/schedule/guided_optimization.h"
 
 namespace lensforge {

@@ -1,12 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/mpi/stage_problem.h"
-
 #include <gtest/gtest.h>
 
 #include "core/mesh/surface_mesh.h"
-#include "design/mpi/block_share.h"
 #include "design/mpi/rank_test.h"
-#include "design/mpi/row_slabs.h"
+#include "design/mpi/ranks.h"
 
 namespace lensforge {
 namespace {

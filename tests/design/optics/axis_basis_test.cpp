@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/optics/axis_basis.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -12,6 +10,7 @@
 #include <vector>
 
 #include "core/spline/cubic_spline.h"
+#include "design/spline/spline_nodes.h"
 
 namespace lensforge {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "core/mesh/surface_mesh.h"
 #include "core/optics/screen.h"
-#include "design/optics/image_triangle.h"
+#include "design/flux/flux_triangle.h"
 #include "design/schedule/face_transport.h"
 #include "design/transport_scenes.h"
 

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/schedule/round.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -8,7 +6,7 @@
 
 #include "core/error.h"
 #include "core/mesh/surface_mesh.h"
-#include "design/schedule/alternation.h"
+#include "design/schedule/rounds.h"
 #include "design/test_setups.h"
 
 namespace lensforge {

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/schedule/spline_start.h"
-
 #include <gtest/gtest.h>
 
 #include "core/lens/smooth_surface.h"
 #include "core/lens/surface_check.h"
 #include "core/surface/sample_splines.h"
+#include "design/schedule/levels.h"
 #include "design/test_setups.h"
 
 namespace lensforge {
