@@ -17,8 +17,8 @@
 #include "core/error.h"
 #include "core/surface/mesh_io.h"
 #include "core/text/number_text.h"
-#include "design/reflect/reflect_checkpoint.h"
-#include "design/reflect/reflect_job.h"
+#include "design/reflect/reflect_shape.h"
+#include "design/reflect/result_files.h"
 #include "export/solid/solid_reading.h"
 
 namespace lensforge::app {

@@ -10,7 +10,7 @@
 #include "core/error.h"
 #include "core/text/number_text.h"
 #include "design/design_fields.h"
-#include "design/reflect/reflect_options.h"
+#include "design/reflect/input.h"
 #include "design/render_fields.h"
 #include "export/export.h"
 #include "machine/job/send_options.h"

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/reflect/reflect_checkpoint.h"
-
 #include <gmock/gmock.h>
 
 #include <limits>
@@ -10,6 +8,7 @@
 
 #include "core/error.h"
 #include "core/temp_folder.h"
+#include "design/reflect/reflect_shape.h"
 #include "fixtures/shapes/shapes.h"
 
 namespace lensforge::reflect {

@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/reflect/reflect_input.h"
-
 #include <gmock/gmock.h>
 
 #include <numeric>
 
 #include "core/error.h"
 #include "core/temp_folder.h"
-#include "design/reflect/mesh/edges.h"
+#include "design/reflect/input.h"
 #include "design/reflect/mesh/faces.h"
 #include "fixtures/shapes/shapes.h"
 

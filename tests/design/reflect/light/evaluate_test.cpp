@@ -1,12 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/reflect/light/evaluate.h"
-
 #include <gmock/gmock.h>
 
 #include <cmath>
 #include <numbers>
 
-#include "design/reflect/light/light_paths.h"
 #include "design/reflect/light/reflection_energy.h"
 #include "fixtures/shapes/shapes.h"
 

@@ -6,8 +6,6 @@
 #include <random>
 #include <vector>
 
-#include "design/reflect/light/phong.h"
-
 namespace lensforge::reflect {
 namespace {
 

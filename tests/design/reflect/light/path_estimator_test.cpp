@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/reflect/light/path_estimator.h"
-
 #include <gmock/gmock.h>
 
 #include <cmath>
 
+#include "design/reflect/input.h"
 #include "design/reflect/light/reflection_energy.h"
-#include "design/reflect/reflect_options.h"
 #include "fixtures/shapes/shapes.h"
 
 namespace lensforge::reflect {

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/reflect/light/phong.h"
-
 #include <gmock/gmock.h>
 
 #include <cmath>
 #include <random>
 
 #include "design/finite_difference.h"
+#include "design/reflect/light/light_lanes.h"
 
 namespace lensforge::reflect {
 namespace {

@@ -1,13 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/reflect/mesh/edge_split.h"
-
 #include <gmock/gmock.h>
 
 #include <set>
 
-#include "design/reflect/mesh/edges.h"
 #include "design/reflect/mesh/faces.h"
-#include "design/reflect/mesh/mirror.h"
 #include "fixtures/shapes/shapes.h"
 
 namespace lensforge::reflect {

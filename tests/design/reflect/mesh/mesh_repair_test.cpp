@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/reflect/mesh/mesh_repair.h"
-
 #include <gmock/gmock.h>
 
 #include "core/error.h"
 #include "core/surface/mesh_normals.h"
-#include "design/reflect/mesh/edges.h"
+#include "design/reflect/input.h"
 #include "design/reflect/mesh/faces.h"
 #include "fixtures/shapes/shapes.h"
 

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/reflect/normals/fixed_steps.h"
-
 #include <gtest/gtest.h>
 
+#include "design/reflect/input.h"
 #include "design/reflect/mesh/faces.h"
-#include "design/reflect/reflect_options.h"
+#include "design/reflect/shape/normals.h"
 #include "fixtures/shapes/shapes.h"
 
 namespace lensforge::reflect {

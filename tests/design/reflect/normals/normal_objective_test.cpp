@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/reflect/normals/normal_objective.h"
-
 #include <gmock/gmock.h>
 
 #include "design/finite_difference.h"
-#include "design/reflect/normals/face_descent.h"
+#include "design/reflect/shape/normals.h"
 #include "fixtures/shapes/shapes.h"
 
 namespace lensforge::reflect {

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/reflect/normals/tv_denoise.h"
-
 #include <gmock/gmock.h>
 
 #include <random>
 
 #include "design/reflect/mesh/faces.h"
+#include "design/reflect/shape/normals.h"
 #include "fixtures/shapes/shapes.h"
 
 namespace lensforge::reflect {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/reflect/normals/unmet_turns.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
+
+#include "design/reflect/shape/normals.h"
 
 namespace lensforge::reflect {
 namespace {

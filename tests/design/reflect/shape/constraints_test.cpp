@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/reflect/shape/constraints.h"
-
 #include <gmock/gmock.h>
 
 #include "design/reflect/mesh/faces.h"
-#include "design/reflect/mesh/mirror.h"
+#include "design/reflect/shape/shape_update.h"
 #include "fixtures/shapes/shapes.h"
 
 namespace lensforge::reflect {

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
+#include <vector>
 
+#include "core/surface/surface_mesh.h"
 #include "core/text/option_field.h"
-#include "design/reflect/light/goal.h"
+#include "design/reflect/light/light_field.h"
 
 namespace lensforge::reflect {
 
@@ -58,5 +61,41 @@ const OptionTable<ReflectOptions>& reflect_fields();
 
 /// @throw InputError naming option, value and rule.
 void validate(const ReflectOptions& options);
+
+/// A mesh that the reflector stage works on, and what was changed to make it one.
+struct RepairedMesh {
+  SurfaceMesh mesh;
+  std::vector<std::string> changes;  ///< In words: "12 duplicate vertices merged".
+  std::vector<int> vertex;  ///< What became of every vertex: its number, −1 if it was dropped.
+  std::vector<int> face;    ///< What every face was part of: its number in the mesh as it came.
+  bool closed = false;
+};
+
+/// Merges vertices that stand in the same place, removes faces without area and vertices without a
+/// face, and turns faces that disagree with their neighbours; the faces of a closed piece then look
+/// outwards.
+/// @param name  of the file, for messages.
+/// @throw InputError naming the face or edge: no face with an area, an edge with more than two
+///        faces, a piece with one side only (a Möbius strip), coordinates so large or small that
+///        areas vanish.
+RepairedMesh repair_mesh(const SurfaceMesh& mesh, const std::string& name);
+
+/// A mesh that is ready to be deformed, with the parts that are to stay as they are.
+struct ReflectInput {
+  SurfaceMesh mesh;
+  bool closed = false;
+  std::vector<std::string> changes;      ///< What was repaired, in words.
+  std::vector<std::uint8_t> fixed;       ///< One flag per vertex; empty: all move.
+  std::vector<std::vector<int>> planar;  ///< Groups of faces, each of which stays in one plane.
+  std::vector<int> partner;              ///< Mirror image of every vertex; empty: no symmetry.
+};
+
+/// Repairs a mesh, remeshes it for --faces, and finds what the options hold fast.
+/// @param name  of its file, for messages.
+/// @throw InputError naming file or option: what cannot be repaired, an open mesh where a volume or
+///        a thickness is to be kept, numbers of vertices or faces that it does not have, no vertex
+///        left that may move, options that contradict each other.
+ReflectInput prepared_input(const SurfaceMesh& mesh, const std::string& name,
+                            const ReflectOptions& options);
 
 }  // namespace lensforge::reflect

@@ -3,10 +3,11 @@
 
 #include <array>
 #include <filesystem>
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
+#include "core/image/image_io.h"
 #include "design/reflect/reflect_shape.h"
 
 namespace lensforge::reflect {
@@ -45,5 +46,16 @@ std::vector<std::filesystem::path> write_result(const ReflectResult& result,
                                                 const ReflectOptions& options,
                                                 const std::filesystem::path& folder,
                                                 const Executor& executor);
+
+/// The pictures of a result.
+struct ReflectPictures {
+  ColorImage views;         ///< retroreflection_views()
+  ColorImage displacement;  ///< displacement_views()
+};
+
+/// A page that needs nothing from outside: energies before and after, pictures, how the energy
+/// fell, radar cross-sections, what is broken, options.
+std::string reflect_report(const ReflectResult& result, const ReflectOptions& options,
+                           const ReflectPictures& pictures);
 
 }  // namespace lensforge::reflect
