@@ -17,8 +17,7 @@
 #include "core/error.h"
 #include "core/surface/mesh_io.h"
 #include "core/text/number_text.h"
-#include "design/reflect/reflect_shape.h"
-#include "design/reflect/result_files.h"
+#include "design/reflect.h"
 #include "export/solid/solid_reading.h"
 
 namespace lensforge::app {
