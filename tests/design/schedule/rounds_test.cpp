@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "design/schedule/rounds.h"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -6,7 +8,6 @@
 
 #include "core/error.h"
 #include "core/surface/grid_mesh.h"
-#include "design/schedule/rounds.h"
 #include "design/test_setups.h"
 
 namespace lensforge {

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "design/reflect/radar.h"
+
 #include <gmock/gmock.h>
 
 #include <cmath>
 #include <numbers>
 
 #include "core/error.h"
-#include "design/reflect/radar.h"
 #include "fixtures/shapes/shapes.h"
 
 // Lengths are metres. The closed forms are for 3 GHz and sides of 1.5 m.

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "design/mpi/ranks.h"
+
 #include <gtest/gtest.h>
 
 #include "core/surface/grid_mesh.h"
 #include "design/mpi/rank_test.h"
-#include "design/mpi/ranks.h"
 
 namespace lensforge {
 namespace {

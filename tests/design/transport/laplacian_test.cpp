@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "design/transport/laplacian.h"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <string>
 
 #include "design/random_input.h"
-#include "design/transport/laplacian.h"
 
 namespace lensforge {
 namespace {

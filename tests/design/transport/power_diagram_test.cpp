@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "design/transport/power_diagram.h"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -9,7 +11,6 @@
 
 #include "core/error.h"
 #include "design/test_setups.h"
-#include "design/transport/power_diagram.h"
 #include "design/transport_scenes.h"
 
 namespace lensforge {

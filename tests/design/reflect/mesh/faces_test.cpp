@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "design/reflect/mesh/faces.h"
+
 #include <gmock/gmock.h>
 
 #include <set>
 
-#include "design/reflect/mesh/faces.h"
 #include "fixtures/shapes/shapes.h"
 
 namespace lensforge::reflect {

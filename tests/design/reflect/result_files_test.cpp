@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "design/reflect/result_files.h"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <string>
 
-#include "design/reflect/result_files.h"
 #include "fixtures/shapes/shapes.h"
 
 namespace lensforge::reflect {

@@ -7,10 +7,12 @@
 #include <thread>
 
 #include "core/error.h"
+#include "design/design_lens.h"
 #include "design/mpi/rank_test.h"
 #include "design/mpi/ranks.h"
 #include "design/schedule/guided_optimization.h"
 #include "design/stage_on_rough_mesh.h"
+#include "design/transport_scenes.h"
 
 namespace lensforge {
 namespace {
@@ -218,5 +220,29 @@ TEST_F(StageOnRanks, IsNotMadeWhereRowsAreTooFew) {
   });
 }
 
+/// The surface of a small design, from which everything else follows.
+SurfaceMesh designed(SurfaceModel model, const Executor& executor) {
+  const Image picture = testing::spot_picture(64, 56);
+  DesignOptions options = default_design_options(model, picture);
+  options.rounds = 3;
+  options.transport_rounds = 2;
+  options.iterations = 30;
+  const DesignResult result = design_lens(picture, options, executor, {});
+  EXPECT_EQ(result.status, DesignResult::Status::kDone) << result.message;
+  return result.lens.surface;
+}
+
+TEST(DesignOnRanks, IsThatOfOneProcess) {
+  if (Ranks::world().count() == 1) GTEST_SKIP() << "that is one process";
+  testing::on_first_rank([] {
+    for (const SurfaceModel model : testing::kModels) {
+      const SurfaceMesh whole = designed(model, Executor::serial());
+      const SurfaceMesh shared = designed(model, Executor::serial().with_device(Device::kRanks));
+      EXPECT_TRUE(shared.vertices == whole.vertices) << model_name(model);
+    }
+  });
+}
+
 }  // namespace
+
 }  // namespace lensforge
