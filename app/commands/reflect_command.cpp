@@ -17,8 +17,7 @@
 #include "core/error.h"
 #include "core/mesh/mesh_files.h"
 #include "core/text/number_text.h"
-#include "design/reflect/reflect_checkpoint.h"
-#include "design/reflect/reflect_job.h"
+#include "design/reflect.h"
 #include "export/solid/solid_reading.h"
 
 namespace lensforge::app {

@@ -17,7 +17,8 @@
 #include "core/text/json_fields.h"
 #include "design/setup/option_tables.h"
 
-// The numbers are the vertices and, if the header says so, the reach of their steps, as doubles.
+// After the header come the vertices and, if the header has scales, the reach of their steps, as
+// doubles.
 
 namespace lensforge {
 namespace {
@@ -30,7 +31,7 @@ std::span<const double> entries(const Eigen::Matrix3Xd& matrix) {
   return {matrix.data(), static_cast<std::size_t>(matrix.size())};
 }
 
-/// Appends every option that a table holds.
+/// Appends all options of a table.
 template <class Options>
 void append(const OptionTable<Options>& table, const Options& options, json& description) {
   for (const OptionField<Options>& field : table) {
@@ -38,8 +39,8 @@ void append(const OptionTable<Options>& table, const Options& options, json& des
   }
 }
 
-/// Appends what of the light is not the default, so that designs for the usual light keep their
-/// fingerprint.
+/// Appends the light's options that differ from the default, so that designs for the usual light
+/// keep their fingerprint.
 void append_light(const LightOptions& light, json& description) {
   const LightOptions usual;
   for (const OptionField<LightOptions>& field : light_fields()) {
@@ -169,7 +170,7 @@ Checkpoint read_checkpoint(const std::filesystem::path& path) {
 
 namespace {
 
-/// Iterations weighted by their rays.
+/// Work of a level: its iterations, weighted by their rays.
 double level_work(const DesignTask& task, std::size_t level) {
   const Level& at = task.levels[level];
   const double vertices = double{1} * at.grid.columns * at.grid.rows;
@@ -177,7 +178,7 @@ double level_work(const DesignTask& task, std::size_t level) {
   return double{1} * at.rounds * at.iterations * rays;
 }
 
-/// Of all levels before this one.
+/// Work of all levels before this one.
 double work_before(const DesignTask& task, std::size_t level) {
   double sum = 0.0;
   for (std::size_t l = 0; l < level; ++l) sum += level_work(task, l);

@@ -28,7 +28,7 @@ namespace {
 /// the screen, which leaves 1e-8 of them.
 constexpr double kDifferenceStep = 1e-4;
 
-/// Below it M differs from the identity by the differences' own errors.
+/// Below it M differs from the identity only by the error of the differences.
 constexpr double kMinUnevenness = 1e-6;
 
 /// The symmetric part of M at the middle of the start surface.
@@ -59,7 +59,7 @@ TransportSites::TransportSites(const OpticalSetup& setup)
     : centre_(0.5 * setup.pixels.cast<double>()) {
   const Eigen::Matrix2d motion = motion_of(setup);
   const double determinant = motion.determinant();
-  // Where both signs occur no potential is convex; then light is moved least.
+  // With eigenvalues of both signs no potential is convex; then light is moved least.
   if (!(determinant > 0.0)) return;
   // Light that moves against its slope has the concave potential.
   const double sign = motion(0, 0) < 0.0 ? -1.0 : 1.0;
@@ -71,11 +71,11 @@ TransportSites::TransportSites(const OpticalSetup& setup)
 
 namespace {
 
-/// Of a face's light: less than this share inside of the outline counts as none. Cells that hold
-/// next to no light hold up all others.
+/// A face with less than this share of its light inside the outline counts as dark. Cells that hold
+/// almost no light hold up all others.
 constexpr double kLeastShare = 0.05;
 
-/// Flux of faces of which next to nothing lies inside of the outline.
+/// Sets the flux of faces almost entirely outside the outline to 0.
 void drop_slivers(const SurfaceMesh& mesh, const Outline& outline, const Executor& executor,
                   Eigen::VectorXd& flux) {
   const MeshCut cut = cut_mesh(mesh, outline, executor);
@@ -135,8 +135,8 @@ void aim_faces(const Correspondence& correspondence, const OpticalSetup& setup,
 
 namespace {
 
-/// The slopes that are wanted depend on the heights: each pass brings both nearer by the heights'
-/// range over the distance to where the front gathers light, a tenth or so.
+/// Passes of the start surface. The wanted slopes depend on the heights: each pass reduces the
+/// error by the heights' range over the distance to where the front gathers light, about a tenth.
 constexpr int kStartPasses = 4;
 
 }  // namespace
@@ -166,15 +166,15 @@ SurfaceMesh start_surface(const OpticalSetup& setup, GridShape grid, double thic
 
 namespace {
 
-/// Times that heights are fitted to a transport; each brings them nearer by the sag over the focal
-/// length, a hundredth or so.
+/// Number of times that heights are fitted to a transport; each reduces the error by the sag over
+/// the focal length, about a hundredth.
 constexpr int kAimPasses = 3;
 
-/// Of each pass (HeightFitOptions): the surface is a start, which is optimised. With 1e-8 the first
-/// picture of a 256² portrait has the same MAE to 1e-7, and comes 2 of 72 processor seconds later.
+/// Tolerance of each pass (HeightFitOptions): the surface is only a start for optimisation. With
+/// 1e-8 the MAE of a 256² portrait's first picture is the same to 1e-7.
 constexpr double kAimTolerance = 1e-5;
 
-/// The shortest focal length is found to this factor: two digits are told.
+/// The shortest focal length is found to this factor; two digits are stated.
 constexpr double kNear = 1.05;
 
 bool feasible(const Demand& demand, double focal_length, const Executor& executor) {
@@ -190,7 +190,7 @@ bool feasible(const Demand& demand, double focal_length, const Executor& executo
   return std::isfinite(stage.value(mesh));
 }
 
-/// The next number of two significant digits.
+/// Rounds up to two significant digits.
 double rounded_up(double value) {
   const double digit = std::pow(10.0, std::floor(std::log10(value)) - 1.0);
   return std::ceil(value / digit) * digit;
@@ -200,7 +200,7 @@ double rounded_up(double value) {
 
 void aim_surface(const Correspondence& wanted, const OpticalSetup& setup, double thickness,
                  const Executor& executor, SurfaceMesh& mesh) {
-  // Heights enter the aim themselves, and lifting the surface scales the picture.
+  // The wanted slopes depend on the heights, and lifting the surface scales the picture.
   for (int pass = 0; pass < kAimPasses; ++pass) {
     aim_faces(wanted, setup, executor, mesh, {.tolerance = kAimTolerance});
     mesh.vertices.row(2).array() += thickness - mesh.vertices.row(2).minCoeff();
@@ -224,8 +224,9 @@ std::optional<double> reachable_focal_length(const Demand& demand, const Executo
 
 namespace {
 
-/// Reach of a crease in shortest edges of a vertex: above a half, so that of every edge across it
-/// one end is in reach; and the share of its area that a triangle keeps.
+/// A crease attracts vertices within this many of their shortest edges: above a half, so that one
+/// end of every edge across it is in reach. Second: minimum share of its area that a triangle
+/// keeps.
 constexpr double kCreaseReach = 0.6;
 constexpr double kMinShrinkage = 0.1;
 
@@ -253,7 +254,7 @@ class Alignment {
 
  private:
   struct Move {
-    double share;  ///< Of the vertex's shortest edge.
+    double share;  ///< Distance to the crease ÷ the vertex's shortest edge.
     int vertex;
     Eigen::Vector2d way;  ///< mm
   };
@@ -285,7 +286,7 @@ class Alignment {
     return shortest;
   }
 
-  /// False, and the vertex stays, if a triangle would become too small.
+  /// Moves a vertex; false if a triangle would become too small, and the vertex then stays.
   bool make(const Move& move) {
     mesh_.vertices.col(move.vertex).head<2>() += move.way;
     const auto v = static_cast<std::size_t>(move.vertex);

@@ -23,9 +23,9 @@ namespace {
 /// Longer side of the coarsest picture (Sun et al., Appendix E).
 constexpr double kCoarsestPixels = 32.0;
 
-/// α_max and α_min of Sun et al., Appendix E, which leaves them open. Measured on the 256² portrait
-/// fixture, MAE of the facet and of the smooth model: 0.0189 and 0.0195 with 1 at the end (the edge
-/// term outweighs the picture), 0.0098 and 0.0131 with 3, 0.0152 and 0.0266 with 10 (ripples).
+/// α_max and α_min of Sun et al., Appendix E, which leaves them open. MAE of the 256² portrait as
+/// facets: 0.0189 with 1 at the end (the edge term outweighs the picture), 0.0098 with 3, 0.0152
+/// with 10 (ripples).
 constexpr double kNuStart = 10.0;
 constexpr double kNuEnd = 3.0;
 
@@ -33,55 +33,46 @@ int rounded(double value, int least) {
   return std::max(least, static_cast<int>(std::lround(value)));
 }
 
-/// Knot cells of a spline across one cell of the mesh, twice a control point for each vertex. With
-/// 1, 1.5 and 2 a 128² portrait of smooth MAE 0.00082 ends at 0.0019, 0.0012 and 0.00074 as a
-/// spline, a 96² logo of 0.0027 at 0.0053, 0.0033 and 0.0026.
+/// Knot cells of a spline across one cell of the mesh, so two control points per vertex each way. A
+/// 128² portrait of smooth MAE 0.00082 has 0.0019 as a spline with 1 and 0.00074 with 2.
 constexpr double kKnotCellsPerCell = 2.0;
 
-/// Share of the rounds that are the smooth mesh's before the spline, and as many again are the
-/// spline's, each with these shares of the iterations: one of the spline costs three to six times
-/// as much. The longer the mesh's, the more its normals contradict its heights and the worse the
-/// spline begins: a 64² logo ends at 0.0069 after 160 and 2 × 40, at 0.0043 after 60 and 2 × 32,
-/// calligraphy at 0.0022 and 0.0011 (docs/tuning.md). A larger mesh needs more to become as good:
-/// splines of 128², logo, portrait and a photograph, end at 0.0034, 0.00099 and 0.0018 with 61, at
-/// 0.0029, 0.00083 and 0.0016 with 120 iterations of the mesh, in 1.1 times the time. Designs for a
-/// process keep the mesh's rounds.
+/// A spline's rounds: one part for the smooth mesh, one for the spline, each with these shares of
+/// the iterations; an iteration of the spline costs three to six times as much. The longer the mesh
+/// is optimised, the more its normals contradict its heights and the worse the spline's start: a
+/// 64² logo ends at 0.0069 after 160 iterations of the mesh, at 0.0043 after 60 (docs/tuning.md). A
+/// larger mesh needs more iterations. Designs for a process keep the mesh's iterations.
 constexpr int kPartsOfRounds = 3;
-constexpr double kStartIterations = 0.375;  ///< At kStartPixels; they grow with the picture's side.
+constexpr double kStartIterations = 0.375;  ///< At kStartPixels; grows with the picture's side.
 constexpr double kStartPixels = 64.0;
 constexpr double kSplineIterations = 0.36;
 
-/// Of a design for a process. Mean width of its knot cells at most, in σ of the polish: cutting
-/// undoes beforehand what polish rounds. A 96² logo on 25 mm, σ 0.03 mm, by the design's own
-/// account: 0.0145 with 0.104 mm (3.5 σ), 0.0112 with 0.052 mm; a 128² portrait 0.0025 with 0.078
-/// mm, 0.0020 with 0.052 mm.
+/// For a process: maximum mean width of the knot cells, in σ of the polish, so that the design can
+/// undo the polish. A 96² logo on 25 mm with σ 0.03 mm ends at 0.0145 with 3.5 σ and 0.0112 with
+/// 1.75 σ.
 constexpr double kWidestKnotCell = 1.75;
 
-/// Of fine knot cells (kFineKnotCell): how far they follow the vertices, and the least area of
-/// their triangles as a share of the mean, as their plan must not fold between two nodes. With 1
-/// for `kEvenerShare` a 64² portrait on 12.5 mm, 0.052 mm, ends at 0.0042 instead of 0.0025, with
-/// 0.001 for the area at 0.0025, too, but a 64² logo's spline folds.
+/// For fine knot cells (kFineKnotCell): share of the vertices' displacement that they follow, and
+/// minimum area of their triangles as a share of the mean, because their plan must not fold between
+/// two nodes. With a share of 1 a 64² portrait on 12.5 mm ends at 0.0042 instead of 0.0025; with an
+/// area of 0.001 a 64² logo's spline folds.
 constexpr double kEvenerShare = 0.5;
 constexpr double kFineLeastArea = 0.02;
 
-/// Share of the iterations in each of its rounds. ShiftedNodes measure at the beginning of each;
-/// with MadeNodes fewer and longer rounds keep more of what L-BFGS has learnt: that portrait ends
-/// at 0.0025, 0.0023 and 0.0021 after 6 × 30, 3 × 60 and 1 × 180 iterations, a 64² logo at 0.0147,
-/// – and 0.0155 after 6 × 30 and 2 × 90.
+/// Share of the iterations in each round of a process's spline. ShiftedNodes measure at the start
+/// of each round; with MadeNodes fewer and longer rounds keep more of what L-BFGS has learnt: that
+/// portrait ends at 0.0025 after 6 × 30 and 0.0021 after 1 × 180 iterations.
 constexpr double kMadeIterations = 0.3;
 constexpr int kLongRounds = 2;
 
-/// The smooth model takes its rounds together by this many, if only the first begins with
-/// transport, with this share of their iterations: what L-BFGS has learnt is worth more than new
-/// weights of the edges. MAE in thousandths at 128² after 6 × 100 iterations with 8 pairs kept and
-/// λ4 0.002, and after 2 × 240 with 20 and 0.001: portrait 0.82 and 0.72, logo 2.20 and 1.59, city
-/// 7.3 and 6.8, lake 1.96 and 1.61. One round of 600 ends worse than 2 × 300. Facets are led to
-/// unlit pixels at the beginning of each round, and keep theirs: that portrait 2.52, after 2 × 180
-/// 2.90.
+/// The smooth model merges this many rounds, with this share of their iterations, if only the first
+/// begins with transport: L-BFGS's history is worth more than new edge weights. MAE in thousandths
+/// of a 128² portrait: 0.82 after 6 × 100, 0.72 after 2 × 240 iterations. Facets are assigned to
+/// unlit pixels at the start of each round and keep their rounds.
 constexpr int kMergedRounds = 3;
 constexpr double kMergedIterations = 0.8;
 
-/// Takes rounds together by `merged`, with `share` of their iterations in all.
+/// Merges every `merged` rounds into one, with `share` of their iterations in all.
 void merge_rounds(int merged, double share, Level& level) {
   const double iterations = share * level.rounds * level.iterations;
   level.rounds = (level.rounds + merged - 1) / merged;
@@ -204,7 +195,7 @@ LevelProblem make_problem(const DesignTask& task, const Level& level, std::int64
   problem.objective.nu = level.nu;
   problem.objective.surface_height = task.options.thickness;
   if (level.spline) {
-    // Smoothness is the spline's own; barriers are those of the triangles between its nodes.
+    // A spline is smooth by itself; barriers act on the triangles between its nodes.
     problem.objective.weights.smooth = 0.0;
     problem.objective.samples = kMeshSamples;
     problem.objective.made_by = task.options.made_by;
@@ -219,8 +210,8 @@ LevelProblem make_problem(const DesignTask& task, const Level& level, std::int64
 
 namespace {
 
-/// Sweeps at most over the vertices of small triangles alone, of which interpolated meshes took 8.
-/// Then all vertices move, which ends in a mesh without folds (Tutte 1963).
+/// Maximum number of sweeps over the vertices of small triangles alone; interpolated meshes took 8.
+/// After that all vertices move, which ends in a mesh without folds (Tutte 1963).
 constexpr int kMostSweeps = 50;
 
 using Marks = std::vector<char>;
@@ -250,7 +241,7 @@ class Evening {
   }
 
  private:
-  /// Mean of the neighbours, of those on the same border if there is one; a corner stays.
+  /// Mean of the neighbours; on a border, of those on the same border. Corners stay.
   [[nodiscard]] Eigen::Vector3d middle(const Eigen::Matrix3Xd& vertices, int v) const {
     const auto [columns, rows] = mesh_.grid;
     const bool keeps_x = v % columns == 0 || v % columns == columns - 1;
@@ -292,7 +283,7 @@ constexpr double kHeightStep = 1e-9;
 
 double rounded_to(double value, double step) { return std::round(value / step) * step; }
 
-/// The rim exactly on the lens's rectangle.
+/// Puts the rim exactly on the lens's rectangle.
 void clamp_rim(const Eigen::Vector2d& size, ControlNet& net) {
   const Eigen::Index columns = net.shape.columns;
   const Eigen::Index rows = net.shape.rows;
@@ -320,7 +311,7 @@ ControlNet spline_through(const SurfaceMesh& mesh, const Eigen::Vector2d& size,
   const SlopeFit fit(surface, warp, {shape.columns - 3, shape.rows - 3}, share, executor, control);
   const Eigen::MatrixXd heights = fit.solve();
   ControlNet net{shape, Eigen::Matrix3Xd(3, heights.size())};
-  // A table of coefficients has its rows along u, so that it lies in memory as the net does.
+  // A table of coefficients has its rows along u: the same memory layout as the net.
   net.points.row(0) = fit.plan()[0].reshaped().transpose();
   net.points.row(1) = fit.plan()[1].reshaped().transpose();
   net.points.row(2) = heights.reshaped().transpose();
@@ -346,14 +337,14 @@ ControlNet settled(ControlNet net, double thickness) {
 
 namespace {
 
-/// Of the mean triangle, that those of a level's start have at least. Aligning to creases may leave
-/// a tenth of it, which is still above kLeastArea.
+/// Minimum area of a triangle at a level's start, as a share of the mean. Aligning to creases may
+/// leave a tenth of it, which is still above kLeastArea.
 constexpr double kLeastOfStart = 0.02;
 
-/// Steps in which draw_towards() goes all the way.
+/// Number of steps of draw_towards().
 constexpr int kDrawingSteps = 10;
 
-/// The spline that a mesh's surface becomes, as a mesh of its control points.
+/// The spline fitted to a mesh, as a mesh of its control points.
 SurfaceMesh spline_start(const DesignTask& task, const Level& level, const SurfaceMesh& mesh) {
   constexpr double kShareStep = 0.125;
   const auto fitted = [&](const SurfaceMesh& surface, double share) {

@@ -20,42 +20,42 @@ namespace lensforge {
 
 /// One resolution of the coarse-to-fine schedule.
 struct Level {
-  Eigen::Vector2i pixels{0, 0};    ///< Working picture, columns and rows.
-  GridShape grid;                  ///< Vertices of the mesh.
-  double nu = 0.0;                 ///< ν of the Welsch function, 1/mm.
-  bool spline = false;             ///< The mesh's vertices are control points of a spline.
-  double knot_share = 1.0;         ///< Of the vertices' way from an even grid, that its knots go.
-  double least_area = kLeastArea;  ///< Of a triangle, share of the mean (AreaBarrier).
+  Eigen::Vector2i pixels{0, 0};  ///< Working picture, columns and rows.
+  GridShape grid;                ///< Vertices of the mesh.
+  double nu = 0.0;               ///< ν of the Welsch function, 1/mm.
+  bool spline = false;           ///< The mesh's vertices are control points of a spline.
+  double knot_share = 1.0;  ///< Share of the vertices' displacement that its knots take part in.
+  double least_area = kLeastArea;  ///< Of a triangle, as a share of the mean (AreaBarrier).
   int rounds = 0;                  ///< Alternations.
-  int iterations = 0;              ///< Most of one round.
+  int iterations = 0;              ///< Maximum of one round.
 };
 
-/// Size of the working picture: the longer side has options.pixels, the other follows the source's
-/// shape (at least 1).
+/// Size of the working picture: the longer side has options.pixels, the other is at least 1 and
+/// keeps the source's proportions.
 Eigen::Vector2i working_size(int source_columns, int source_rows, int longer_side);
 
-/// Knot cells of a spline at most: a STEP file of them has 45 MB.
+/// Maximum number of knot cells of a spline; its STEP file then has 45 MB.
 inline constexpr double kMaxKnotCells = 500'000.0;
 
-/// The model of a design for which none is given: one spline, as long as its file has room for a
-/// knot cell to each cell of the mesh; else smooth. With half a cell each way a 64² portrait's
-/// spline has MAE 0.0097, the surface that is cut of a smooth mesh 0.0025; with one 0.0022.
-/// @param options  what is asked for otherwise.
+/// Default model: a spline if its file has room for one knot cell per cell of the mesh, else
+/// smooth. With one knot cell per cell a 64² portrait's spline has MAE 0.0022, with half a cell
+/// each way 0.0097.
+/// @param options  all other options.
 SurfaceModel default_model(const Eigen::Vector2i& pixels, const DesignOptions& options);
 
-/// The levels for a working picture: at most options.levels, doubling up to full size, the first
-/// not below about 32 pixels on the longer side (Sun et al., Appendix E); the mesh's cells double
-/// with them, mesh_ratio per pixel.
+/// The levels for a working picture: at most options.levels, doubling up to full size, the first at
+/// least about 32 pixels on the longer side (Sun et al., Appendix E). The mesh has mesh_ratio cells
+/// per pixel; its cells double too.
 ///
 /// ν falls from kNuStart × D_e to kNuEnd × D_e by a fixed ratio. The typical residual D_e is the
 /// curvature that moves light by one pixel over one cell, (pixel / cell) / LightPath::reach(1).
 ///
-/// A spline is designed as a smooth mesh in fewer rounds, and one more level optimises the spline
-/// that follows from it, with two knot cells for each cell of the mesh; for a process, with as fine
-/// ones as undo its polish, and for longer.
+/// A spline is designed as a smooth mesh in fewer rounds. One more level then optimises the spline
+/// fitted to it, with two knot cells per cell of the mesh. For a process its cells are fine enough
+/// to undo the polish, and it is optimised longer.
 std::vector<Level> plan_levels(const Eigen::Vector2i& pixels, const DesignOptions& options);
 
-/// What a design is to do, at full size; no step changes it.
+/// A design's input at full size; no step changes it.
 struct DesignTask {
   const DesignOptions& options;
   const RunControl& control;
@@ -63,10 +63,10 @@ struct DesignTask {
   Image target;       ///< Working picture.
   OpticalSetup setup;
   std::vector<Level> levels;
-  std::optional<SourceLimit> limit;  ///< Of an extended source.
+  std::optional<SourceLimit> limit;  ///< Set for an extended source.
 };
 
-/// The picture at the size that the options ask for. @throw Interrupted
+/// Returns the picture at the size that the options ask for. @throw Interrupted
 Image working_picture(const Image& target, const DesignOptions& options, const RunControl& run);
 
 /// Options and control must outlive the task.
@@ -75,57 +75,54 @@ Image working_picture(const Image& target, const DesignOptions& options, const R
 DesignTask make_task(const Image& target, const DesignOptions& options, const Executor& executor,
                      const RunControl& control);
 
-/// What is to be solved at one resolution.
+/// The problem at one resolution.
 struct LevelProblem {
   OpticalSetup setup;
   Image target;
-  Image aim;  ///< What transport makes: under an extended source the light that is best blurred.
+  Image aim;  ///< Goal of transport; an extended source blurs it to `target`.
   ObjectiveOptions objective;
 };
 
-/// @param triangles  of the level's mesh; a spline's follow from its nodes.
+/// @param triangles  number in the level's mesh; not used for a spline.
 LevelProblem make_problem(const DesignTask& task, const Level& level, std::int64_t triangles);
 
-/// Evens out a grid mesh that has been interpolated from a coarser one: vertices move to the middle
-/// of their neighbours, those on the border along it, all of them kEveningSweeps times and then
-/// those of triangles that are folded or too small. Cubics overshoot where neighbouring vertices
-/// have moved differently, and fold triangles over; heights that are fitted to a folded mesh are
-/// those of no surface.
-/// @param least  area that every triangle has in the end, mm², well below the mean.
+/// Evens out a grid mesh that was interpolated from a coarser one. All vertices move to the mean of
+/// their neighbours (border vertices along the border) kEveningSweeps times, then those of folded
+/// or too small triangles. Cubic interpolation overshoots where neighbouring vertices moved
+/// differently and folds triangles over; heights fitted to a folded mesh belong to no surface.
+/// @param least  minimum area of every triangle afterwards, mm², well below the mean.
 /// @pre mesh.grid is set; border vertices lie on the border.
 void even_out(double least, SurfaceMesh& mesh);
 
-/// Vertices that an optimisation has moved stand unevenly by whole cells. MAE in thousandths of
-/// 48² at draft quality, two levels, 6 rounds, with 0, 1, 3 and 10 sweeps: smooth, rings 2.4, 1.0,
-/// 0.3 and 0.1, logo 13, 11, 11 and 12, portrait 2.6, 2.2, 1.9 and 2.2; facets, logo 0.9, 0.9, 0.5
-/// and 0.5, portrait 8.2, 8.8, 9.3 and 8.5.
+/// Optimisation leaves vertices uneven by whole cells. MAE in thousandths of 48² at draft quality
+/// with 0, 3 and 10 sweeps: smooth, rings 2.4, 0.3 and 0.1, portrait 2.6, 1.9 and 2.2; facets,
+/// portrait 8.2, 9.3 and 8.5.
 inline constexpr int kEveningSweeps = 3;
 
-/// Control points that follow a mesh as a grid mesh of their own, for which the stages of a design
-/// are made.
+/// The control points as a grid mesh, which is what the stages of a design work on.
 SurfaceMesh net_mesh(const ControlNet& net);
 
-/// The spline nearest to what a grid mesh projects by its vertex normals: its knot lines follow
-/// the vertices, its slopes theirs (SlopeFit).
+/// The spline closest to what a grid mesh projects by its vertex normals: its knot lines follow the
+/// vertices, its slopes their normals (SlopeFit).
 /// @param size   of the lens, mm. @param shape  control points each way, ≥ 4.
-/// @param share  of the vertices' movement that the knot lines take part in, 0 … 1.
-/// @throw Interrupted.
+/// @param share  of the vertices' displacement that the knot lines take part in, 0 … 1.
+/// @throw Interrupted
 ControlNet spline_through(const SurfaceMesh& mesh, const Eigen::Vector2d& size,
                           const GridShape& shape, double share, const Executor& executor,
                           const RunControl& control);
 
-/// The net on coordinates that a file of a solid writes in few digits: x and y of inner points on
-/// whole 1e-7 mm, heights on whole 1e-9 mm, which turns normals by up to 1e-6 rad where knots are
-/// densest. Lifted so that the lowest node is `thickness` above the entry face.
+/// Rounds the net to coordinates that a solid's file states in few digits: x and y of inner points
+/// to 1e-7 mm, heights to 1e-9 mm, which turns normals by up to 1e-6 rad where knots are densest.
+/// Lifts it so that the lowest node is `thickness` above the entry face.
 ControlNet settled(ControlNet net, double thickness);
 
-/// What a level begins with: the surface of the one before on its own grid. A mesh has no folded
-/// and no tiny triangles (even_out()). A spline's knot lines follow the vertices as far as no
-/// barrier refuses it. @throw Interrupted
+/// Returns a level's first surface: the previous one on the level's grid. A mesh has no folded and
+/// no tiny triangles (even_out()). A spline's knot lines follow the vertices as far as no barrier
+/// refuses it. @throw Interrupted
 SurfaceMesh level_start(const DesignTask& task, const Level& level, const SurfaceMesh& mesh);
 
-/// Draws the first `coordinates` of x, y and z towards another surface on the same grid, no farther
-/// than it needs until no barrier refuses the mesh. @return false if one still does.
+/// Moves the first `coordinates` of x, y and z towards another surface on the same grid, in steps,
+/// until no barrier refuses the mesh. @return false if one still does.
 bool draw_towards(const SurfaceMesh& other, int coordinates, GuidedOptimization& stage,
                   SurfaceMesh& mesh);
 

@@ -24,33 +24,33 @@
 namespace lensforge {
 namespace {
 
-/// A mesh that sends its light to where transport wants it, as nearly as its heights can.
+/// A mesh whose heights send its light as near as they can to where transport wants it.
 struct AimedMesh {
   SurfaceMesh mesh;
   Correspondence wanted;
 };
 
-/// What becomes of a mesh's x and y before its light is given places.
+/// Changes to a mesh's x and y before transport assigns places to its light.
 enum class MeshShaping {
-  kNone,     ///< They stay, and the light is where the surface sends it.
-  kCreases,  ///< The mesh follows the picture already; align_to_creases(), and heights begin flat.
-  kSpread    ///< The mesh is even; spread_vertices() first, then as kCreases.
+  kNone,     ///< None; the light starts where the surface sends it.
+  kCreases,  ///< For a mesh that follows the picture: align_to_creases(); heights start flat.
+  kSpread    ///< For an even mesh: spread_vertices(), then as kCreases.
 };
 
-/// Mass error that ends a transport, and the Newton steps after which it stops where it is:
-/// the remaining error is below that of taking a face's light for a point.
+/// Mass error that ends a transport, and maximum number of its Newton steps: the remaining error is
+/// below the error of taking a face's light for a point.
 constexpr double kTransportTolerance = 1e-2;
 constexpr int kMaxNewtonSteps = 150;
 
-/// On a mesh that has been spread: Newton steps under one blur and floor after which its own
-/// transport ends, the share of the light that may be in the wrong place then (cells that hold
-/// next to no light hold up all others), and the share of black pixels above which it is not tried
-/// (logo, 69 % black, spread over dark and bright: 43 and 59 steps in two stages, and no end).
+/// For the transport of a spread mesh: maximum number of Newton steps under one blur and floor;
+/// maximum share of light in the wrong place (cells that hold almost no light hold up all others);
+/// share of black pixels above which it is not tried, because there it does not converge (logo, 69
+/// % black).
 constexpr int kMaxStageSteps = 25;
 constexpr double kMaxMisplaced = 0.05;
 constexpr double kMaxBlack = 0.3;
 
-/// Share of the pixels that are black (kBlack).
+/// Share of black pixels (kBlack).
 double black_share(const Image& picture) {
   const auto pixels = static_cast<double>(picture.values().size());
   const double black = kBlack * picture.total() / pixels;
@@ -75,7 +75,7 @@ struct Matching {
   TransportResult result;
 };
 
-/// What one transport step works on.
+/// Input of a transport step.
 struct StepSite {
   const DesignTask& task;
   const LevelProblem& problem;
@@ -101,7 +101,7 @@ Matching match_all(const StepSite& site, const SurfaceMesh& mesh) {
   return match(site, mesh, options);
 }
 
-/// Of a mesh that has been spread, if it can be had.
+/// Transport of a spread mesh; nothing if it cannot be found.
 std::optional<Matching> match_spread(const StepSite& site, const SurfaceMesh& mesh) {
   if (black_share(site.problem.aim) > kMaxBlack) return std::nullopt;
   TransportOptions options;
@@ -112,8 +112,9 @@ std::optional<Matching> match_spread(const StepSite& site, const SurfaceMesh& me
   return matching;
 }
 
-/// Facets are needed where there is light. A smooth surface also needs narrow triangles at its
-/// creases, which send their light into the black between; there it is that cells own the black.
+/// Spreads the vertices. Facets are needed where there is light. A smooth surface also needs narrow
+/// triangles at its creases, which send their light into the black between, so there cells own
+/// black pixels too.
 void spread(const StepSite& site, const SurfaceMesh& even_mesh, const Matching& even,
             SurfaceMesh& mesh) {
   const DesignTask& task = site.task;
@@ -129,13 +130,10 @@ void spread(const StepSite& site, const SurfaceMesh& even_mesh, const Matching& 
 }
 
 /// Shapes the mesh by an even mesh's transport and finds the places for the light of the flat
-/// surface through it. Facets have a transport of their own, which brings out detail in the dark
-/// that the even mesh has no facets for. For a smooth surface the even mesh's map does, as it has
-/// to where black leaves cells too thin for Newton steps: more iterations are worth more than the
-/// time of another transport. MAE in thousandths with it and 2 × 200, without it and 2 × 240
-/// iterations: city 6.8 and 6.8 at 128², 6.5 and 5.9 at 256², portrait 0.74 and 0.72, 0.64 and
-/// 0.61, lake at 128² 1.81 and 1.61, a photograph with dark detail at 112², 128², 144² and
-/// 256² 2.19 and 1.77, 1.63 and 1.98, 2.14 and 1.84, 1.74 and 1.68.
+/// surface through it. Facets get a transport of their own, which brings out detail in the dark
+/// that the even mesh has no facets for. A smooth surface uses the even mesh's map: more iterations
+/// are worth more than the time of another transport. MAE in thousandths at 128² with a transport
+/// of its own and without it in the same time: portrait 0.74 and 0.72, lake 1.81 and 1.61.
 Matching fit_mesh(const StepSite& site, MeshShaping shaping, const SurfaceMesh& even_mesh,
                   const Matching& even, SurfaceMesh& mesh) {
   const DesignTask& task = site.task;
@@ -168,7 +166,7 @@ void follow_correspondence(const StepSite& site, const Correspondence& wanted, S
 }
 
 /// The correspondence-guided half of a round (Sun et al., section 3.4).
-/// @return nothing where transport finds nothing. @throw Interrupted
+/// @return nothing if transport finds no place for the light. @throw Interrupted
 std::optional<AimedMesh> transport_step(const DesignTask& task, const LevelProblem& problem,
                                         const SurfaceMesh& mesh, MeshShaping shaping,
                                         DesignLog& log) {
@@ -186,16 +184,15 @@ std::optional<AimedMesh> transport_step(const DesignTask& task, const LevelProbl
   return aimed;
 }
 
-/// A round that lowers the objective by less than this share has brought nothing.
+/// A round that lowers the objective by less than this share counts as idle.
 constexpr double kIdleRound = 1e-3;
 
-/// Pairs that L-BFGS keeps. MAE in thousandths after 6 × 100 iterations with 8 and 20 at 128²:
-/// facets, portrait 2.54 and 2.52, logo 0.222 and 0.195; smooth, see kMergedRounds; 40 are no
-/// better, 3 are worse.
+/// Number of pairs that L-BFGS keeps. MAE in thousandths of the 128² logo as facets after 6 × 100
+/// iterations: 0.222 with 8, 0.195 with 20; 40 are no better, 3 are worse.
 constexpr int kHistory = 20;
 
-/// Draws the first `coordinates` of x, y and z back towards the surface that designs start from
-/// until no barrier refuses the mesh. @return false if one still does.
+/// Moves the first `coordinates` of x, y and z back towards the start surface until no barrier
+/// refuses the mesh. @return false if one still does.
 bool relax(const LevelSite& site, int coordinates, SurfaceMesh& mesh) {
   if (std::isfinite(site.stage.value(mesh))) return true;
   const DesignTask& task = site.task;
@@ -204,7 +201,8 @@ bool relax(const LevelSite& site, int coordinates, SurfaceMesh& mesh) {
   return draw_towards(start, coordinates, site.stage, mesh);
 }
 
-/// @param aimed  the first surface, before its mesh was relaxed.
+/// Refuses a setup whose first surface sends light too far. @param aimed  the surface before its
+/// mesh was relaxed.
 [[noreturn]] void refuse_unreachable(const LevelSite& site, const AimedMesh& aimed) {
   site.log.report("searching for a focal length that works", 0);
   const DesignOptions& options = site.task.options;
@@ -222,8 +220,8 @@ bool relax(const LevelSite& site, int coordinates, SurfaceMesh& mesh) {
                    advice);
 }
 
-/// Not even the surface that designs start from is allowed. A screen that is not tilted meets the
-/// light of any source behind a flat front.
+/// Refuses a setup whose start surface is not allowed. An untilted screen receives the light of any
+/// source behind a flat front.
 [[noreturn]] void refuse_start(const DesignTask& task) {
   const Eigen::Vector2d& tilt = task.options.light.screen_tilt;
   const bool front = task.setup.front.has_value();
@@ -235,14 +233,15 @@ bool relax(const LevelSite& site, int coordinates, SurfaceMesh& mesh) {
                    (front ? "--front flat" : "--screen-tilt 0,0") + " would do");
 }
 
-/// What transport does to the mesh's x and y. Later rounds keep what optimisation has made of them.
+/// Returns what transport does to the mesh's x and y. Later rounds keep what optimisation has made
+/// of them.
 MeshShaping shaping_of(const DesignOptions& options, const Checkpoint& state) {
   if (options.spread == 0.0 || state.round > 0) return MeshShaping::kNone;
   return state.level == 0 ? MeshShaping::kSpread : MeshShaping::kCreases;
 }
 
-/// The first half of a round: a mesh that transport aims, or the one before where transport finds
-/// none that the barriers allow.
+/// The first half of a round: takes the mesh that transport aims, or keeps the mesh if transport
+/// finds none that the barriers allow.
 void start_from_transport(const LevelSite& site, Checkpoint& state) {
   const std::optional<AimedMesh> aimed = transport_step(
       site.task, site.problem, state.mesh, shaping_of(site.task.options, state), site.log);
@@ -271,7 +270,7 @@ bool follow_picture(const LevelSite& site, const GuidedOptimization::Observer& o
   return summary.status != Status::kStopped;
 }
 
-/// Both halves and what follows from them. @return false if it was asked to stop.
+/// Runs both halves and conclude_round(). @return false if it was asked to stop.
 bool alternate(const LevelSite& site, const SurfaceMesh& before,
                const GuidedOptimization::Observer& observe, Checkpoint& state) {
   const DesignOptions& options = site.task.options;
@@ -297,7 +296,7 @@ bool run_round(const LevelSite& site, Checkpoint& state) {
     reached = step.energy.total;
     return log(iteration, step);
   };
-  // A mesh that transport has aimed anew is often worse than the one before until it is optimised.
+  // A newly aimed mesh is often worse than the one before until it is optimised.
   const auto keep_the_better = [&] {
     if (!(reached <= state.value)) state.mesh = before;
   };
@@ -328,8 +327,8 @@ void conclude_round(const RoundOutcome& outcome, int rounds, Checkpoint& state) 
 
 namespace {
 
-/// Of a design that is not the task's: the model, where that alone is another one, as after a
-/// change of its default.
+/// Describes the design that a checkpoint belongs to: names its model if only the model differs,
+/// for example after a change of the default.
 std::string owner_of(const Checkpoint& saved, const DesignTask& task) {
   for (const SurfaceModel model : kSurfaceModels) {
     DesignOptions options = task.options;
@@ -362,19 +361,19 @@ void begin_next_level(Checkpoint& state) {
   ++state.level;
 }
 
-/// True if the surface is so near to its picture that what the optimiser's account of it gets wrong
-/// counts: the convolution with a source, and the few rays of a spline. The part that a process
-/// makes is blurred by more than either, and not corrected.
+/// True if the surface is so close to its picture that the optimiser's approximations matter: the
+/// convolution with a source, and the few rays of a spline. A process blurs its part by more than
+/// either, so it is not corrected.
 bool needs_correction(const LevelProblem& problem, const Level& level, const Checkpoint& state) {
   if (problem.objective.made_by) return false;
   return level.spline || (!problem.setup.extent.none() && state.round > 0);
 }
 
-/// Nodes a knot cell each way of the picture that a spline is corrected to. The error of few nodes
-/// falls with their square: with 6 a ninth is left of that of 2.
+/// Nodes per knot cell each way of the picture that a spline is corrected to. The error falls with
+/// the square of the number: with 6 it is a ninth of that with 2.
 constexpr int kCorrectionSamples = 6;
 
-/// The picture that the level's surface has to aim at now.
+/// Returns the picture to aim at so that the surface makes `target`.
 Image corrected_target(const DesignTask& task, const LevelProblem& problem, const Level& level,
                        const SurfaceMesh& mesh, const Image& target) {
   const ControlNet net{mesh.grid, mesh.vertices};

@@ -8,11 +8,11 @@
 
 namespace lensforge {
 
-/// Faces at most of the even mesh whose transport shapes the mesh: a finer one is not worth it. On
-/// the 512² logo, 942,080 sites were not done after 11 processor minutes, 235,520 in 80 s at most.
+/// Maximum number of faces of the even mesh whose transport shapes the mesh. On the 512² logo
+/// 942,080 sites were not done after 11 processor minutes, 235,520 took at most 80 s.
 inline constexpr double kMaxEvenFaces = 250'000.0;
 
-/// One level at work.
+/// A level while its rounds run.
 struct LevelSite {
   const DesignTask& task;
   const Level& level;
@@ -21,15 +21,15 @@ struct LevelSite {
   DesignLog& log;
 };
 
-/// One alternation of Sun et al., section 3.4: transport_step() where it is due (never of a
-/// spline), then rendering-guided optimisation, then conclude_round(). Where it is stopped on the
-/// way, the state holds the best surface so far and names the same round.
+/// One alternation of Sun et al., section 3.4: transport_step() if it is due (never for a spline),
+/// then rendering-guided optimisation, then conclude_round(). If it is stopped in between, the
+/// state holds the best surface so far and the same round number.
 /// @return false if it was asked to stop.
-/// @throw Interrupted; InputError if no surface can send the light so far in so short a distance,
-///        or none can be begun with.
+/// @throw Interrupted; InputError if no surface can send the light so far over so short a distance,
+///        or no surface to start from is allowed.
 bool run_round(const LevelSite& site, Checkpoint& state);
 
-/// What came of a round's two halves.
+/// Result of a round's two halves.
 struct RoundOutcome {
   const SurfaceMesh& before;
   double value = 0.0;        ///< Objective of the state's mesh.
@@ -37,20 +37,20 @@ struct RoundOutcome {
   bool rescaled = false;     ///< Its steps were measured anew.
 };
 
-/// Takes a round's mesh or the one before, whichever is better, and says what is next. A round that
-/// lowers the objective by less than a thousandth has brought nothing: if it began with transport,
-/// the level's further rounds do without; if its steps were scaled for an earlier surface, the next
-/// one measures them anew; if neither, the level ends.
-/// @param rounds  of a level.
+/// Keeps a round's mesh or the one before, whichever is better, and decides what is next. A round
+/// that lowers the objective by less than a thousandth has failed: if it began with transport, the
+/// level's further rounds do without; if its steps were scaled for an earlier surface, the next one
+/// measures them anew; if neither, the level ends.
+/// @param rounds  number of rounds of the level.
 void conclude_round(const RoundOutcome& outcome, int rounds, Checkpoint& state);
 
-/// The state that a design begins with: a flat surface, or what its checkpoint holds.
+/// Returns the state that a design starts from: a flat surface, or the state in its checkpoint.
 /// @throw InputError if a checkpoint to resume from is missing, corrupt, or belongs to another
 ///        picture or other options.
 Checkpoint first_state(const DesignTask& task);
 
-/// Does all levels that are left, coarse to fine, round by round (Sun et al., section 3.4 and
-/// Appendix E), and writes the state after each. @return false if it was asked to stop.
+/// Runs the remaining levels, coarse to fine, round by round (Sun et al., section 3.4 and Appendix
+/// E), and writes the state after each round. @return false if it was asked to stop.
 /// @throw InputError as run_round() does.
 bool run_levels(const DesignTask& task, DesignLog& log, Checkpoint& state);
 

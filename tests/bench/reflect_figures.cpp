@@ -15,7 +15,6 @@
 #include "core/io/files.h"
 #include "core/page/drawings.h"
 #include "core/text/number_text.h"
-#include "design/reflect/mesh/edges.h"
 #include "design/reflect/mesh/faces.h"
 #include "fixtures/shapes/shapes.h"
 
