@@ -14,7 +14,6 @@
 
 #include "core/error.h"
 #include "core/image/image_io.h"
-#include "core/image/picture_codec.h"
 #include "core/image/picture_refusal.h"
 #include "core/image/transfer.h"
 #include "core/temp_folder.h"

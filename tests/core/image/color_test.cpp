@@ -1,15 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "core/image/color.h"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 #include <random>
 #include <string>
 #include <vector>
 
-#include "core/image/color.h"
 #include "core/image/image_io.h"
 #include "core/image/metadata_samples.h"
 #include "core/image/transfer.h"
@@ -18,6 +20,72 @@
 
 namespace lensforge {
 namespace {
+
+TEST(Transfer, BlackAndWhiteStay) {
+  EXPECT_EQ(encode(0.0), 0.0);
+  EXPECT_DOUBLE_EQ(encode(1.0), 1.0);
+  EXPECT_DOUBLE_EQ(decode(1.0), 1.0);
+}
+
+TEST(Transfer, MiddleGreyIsTheStandardsFigure) {
+  // IEC 61966-2-1: code 128 of 255 is 21.586 % light.
+  EXPECT_NEAR(decode(128.0 / 255.0), 0.215861, 1e-6);
+}
+
+TEST(Transfer, DecodeUndoesEncode) {
+  for (int i = 0; i <= 2000; ++i) {
+    const double linear = i / 1000.0;
+    EXPECT_NEAR(decode(encode(linear)), linear, 1e-7);
+  }
+}
+
+TEST(Transfer, SlopeAgreesWithCentralDifferences) {
+  for (const double linear : {1e-4, 0.003, 0.0032, 0.01, 0.3, 1.0, 1.7}) {
+    for (const double step : {1e-6 * linear, 5e-7 * linear}) {
+      const double slope = (encode(linear + step) - encode(linear - step)) / (2.0 * step);
+      EXPECT_NEAR(encode_slope(linear), slope, 1e-8 * slope + 1e-9);
+    }
+  }
+}
+
+TEST(Transfer, IsOddBelowZeroInsideTheToe) { EXPECT_EQ(encode(-0.002), -encode(0.002)); }
+
+using Curve = ColorSpace::Curve;
+
+TEST(ColorSpace, KnowsOpenImageIoNamesInAnyCase) {
+  EXPECT_EQ(parse_color_space("sRGB")->curve, Curve::kSrgb);
+  EXPECT_EQ(parse_color_space("linear")->curve, Curve::kLinear);
+  EXPECT_EQ(parse_color_space("Linear")->curve, Curve::kLinear);
+  EXPECT_EQ(parse_color_space("scene_linear")->curve, Curve::kLinear);
+  EXPECT_EQ(parse_color_space("Rec709")->curve, Curve::kRec709);
+  EXPECT_EQ(*parse_color_space("Gamma2.2"), (ColorSpace{Curve::kGamma, 2.2}));
+  EXPECT_EQ(*parse_color_space("GammaCorrected1.8"), (ColorSpace{Curve::kGamma, 1.8}));
+  EXPECT_EQ(parse_color_space("Gamma1.0")->curve, Curve::kLinear);
+}
+
+TEST(ColorSpace, OtherNamesAreUnknown) {
+  for (const char* name : {"", "AdobeRGB", "Gamma", "Gammax", "Gamma2.2x", "Gamma-1", "Gamma0"}) {
+    EXPECT_FALSE(parse_color_space(name).has_value()) << name;
+  }
+}
+
+TEST(ColorSpace, EveryCurveKeepsBlackAndWhite) {
+  for (const ColorSpace& space :
+       {ColorSpace{Curve::kLinear, 1.0}, ColorSpace{Curve::kSrgb, 1.0},
+        ColorSpace{Curve::kRec709, 1.0}, ColorSpace{Curve::kGamma, 2.2}}) {
+    EXPECT_EQ(to_linear(0.0, space), 0.0);
+    EXPECT_NEAR(to_linear(1.0, space), 1.0, 1e-12);
+  }
+}
+
+TEST(ColorSpace, CurvesFollowTheirStandards) {
+  EXPECT_EQ(to_linear(0.5, {Curve::kLinear, 1.0}), 0.5);
+  EXPECT_EQ(to_linear(0.5, {Curve::kSrgb, 1.0}), decode(0.5));
+  EXPECT_DOUBLE_EQ(to_linear(0.5, {Curve::kGamma, 2.2}), std::pow(0.5, 2.2));
+  // BT.709: V = 1.099 L^0.45 − 0.099, and 4.5 L below L = 0.018.
+  EXPECT_NEAR(to_linear(1.099 * std::pow(0.3, 0.45) - 0.099, {Curve::kRec709, 1.0}), 0.3, 1e-12);
+  EXPECT_NEAR(to_linear(0.045, {Curve::kRec709, 1.0}), 0.01, 1e-12);
+}
 
 using namespace lensforge::testing;
 using OIIO::TypeDesc;
@@ -172,5 +240,41 @@ TEST(ColorProfile, NoBytesOfAProfileCrashTheReader) {
   }
 }
 
+TEST(SpectralColor, MatchesTheTablesOfCie1931) {
+  // CIE 1931 2° observer.
+  const struct {
+    double nm;
+    Eigen::Vector3d xyz;
+  } table[] = {{450.0, {0.3362, 0.0380, 1.7721}},
+               {500.0, {0.0049, 0.3230, 0.2720}},
+               {550.0, {0.4334, 0.9950, 0.0087}},
+               {600.0, {1.0622, 0.6310, 0.0008}},
+               {650.0, {0.2835, 0.1070, 0.0000}}};
+  for (const auto& row : table) {
+    EXPECT_LT((color_matching(row.nm) - row.xyz).cwiseAbs().maxCoeff(), 0.03) << row.nm;
+  }
+}
+
+TEST(SpectralColor, BrightnessSumsToOneAndIsMostlyGreen) {
+  const std::vector<double> shares = brightness_shares({450.0, 550.0, 650.0});
+  EXPECT_NEAR(std::accumulate(shares.begin(), shares.end(), 0.0), 1.0, 1e-15);
+  EXPECT_GT(shares[1], 0.8);
+}
+
+TEST(SpectralColor, AllWavelengthsTogetherAreWhiteAndEachAloneIsItsColour) {
+  const std::vector<double> wavelengths{450.0, 550.0, 620.0};
+  const Image on(1, 1, 1.0F);
+  const Image off(1, 1, 0.0F);
+  EXPECT_EQ(color_picture({on, on, on}, wavelengths).rgb,
+            (std::vector<unsigned char>{255, 255, 255}));
+  const std::vector<unsigned char> blue = color_picture({on, off, off}, wavelengths).rgb;
+  EXPECT_GT(blue[2], 200);
+  EXPECT_LT(blue[1], 60);
+  const std::vector<unsigned char> red = color_picture({off, off, on}, wavelengths).rgb;
+  EXPECT_GT(red[0], 200);
+  EXPECT_LT(red[2], 60);
+}
+
 }  // namespace
+
 }  // namespace lensforge
