@@ -14,7 +14,7 @@
 
 #include "core/error.h"
 #include "core/io/files.h"
-#include "core/surface/surface_mesh.h"
+#include "core/mesh/surface_mesh.h"
 #include "core/text/number_text.h"
 #include "design/reflect/light/light_field.h"
 #include "design/reflect/mesh/faces.h"

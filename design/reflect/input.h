@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "core/surface/surface_mesh.h"
+#include "core/mesh/surface_mesh.h"
 #include "core/text/option_field.h"
 #include "design/reflect/light/light_field.h"
 

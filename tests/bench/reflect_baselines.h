@@ -3,7 +3,7 @@
 
 #include "core/compute/executor.h"
 #include "core/mesh/surface_mesh.h"
-#include "design/reflect/reflect_options.h"
+#include "design/reflect/input.h"
 #include "design/reflect/reflect_shape.h"
 
 /// Ways to shape a reflection that Tojo et al. compare theirs with.

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/compute/split_mix.h"
+#include "core/compute/scalar.h"
 #include "design/reflect/light/light_lanes.h"
 #include "design/reflect/mesh/faces.h"
 

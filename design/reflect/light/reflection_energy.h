@@ -8,8 +8,7 @@
 #include <vector>
 
 #include "core/compute/executor.h"
-#include "core/compute/run_control.h"
-#include "core/surface/surface_mesh.h"
+#include "core/mesh/surface_mesh.h"
 #include "design/reflect/light/light_field.h"
 #include "design/reflect/light/light_lanes.h"
 #include "design/reflect/mesh/faces.h"

@@ -8,8 +8,8 @@
 #include <span>
 #include <vector>
 
-#include "core/surface/corners.h"
-#include "design/optimize/lbfgs_on.h"
+#include "core/mesh/surface_mesh.h"
+#include "design/optimize/lbfgs.h"
 #include "design/reflect/light/reflection_energy.h"
 #include "design/reflect/mesh/faces.h"
 

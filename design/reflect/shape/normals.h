@@ -7,8 +7,7 @@
 #include <utility>
 
 #include "core/compute/executor.h"
-#include "core/compute/run_control.h"
-#include "core/surface/surface_mesh.h"
+#include "core/mesh/surface_mesh.h"
 #include "design/reflect/light/reflection_energy.h"
 
 namespace lensforge::reflect {

@@ -10,7 +10,7 @@
 #include <limits>
 #include <utility>
 
-#include "core/surface/mesh_normals.h"
+#include "core/mesh/surface_mesh.h"
 #include "core/text/number_text.h"
 #include "design/reflect/mesh/faces.h"
 

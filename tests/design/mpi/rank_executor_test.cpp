@@ -10,8 +10,8 @@
 
 #include "design/flux/flux_image.h"
 #include "design/mpi/rank_test.h"
-#include "design/optics/surface_optics.h"
 #include "design/random_input.h"
+#include "design/render/render_flux.h"
 
 namespace lensforge {
 namespace {

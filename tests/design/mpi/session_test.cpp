@@ -7,7 +7,7 @@
 #include <thread>
 
 #include "core/error.h"
-#include "design/design_lens.h"
+#include "design/design.h"
 #include "design/mpi/rank_test.h"
 #include "design/mpi/ranks.h"
 #include "design/schedule/guided_optimization.h"

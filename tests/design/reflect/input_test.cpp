@@ -6,7 +6,7 @@
 #include <numeric>
 
 #include "core/error.h"
-#include "core/surface/mesh_normals.h"
+#include "core/mesh/surface_mesh.h"
 #include "core/temp_folder.h"
 #include "design/reflect/mesh/faces.h"
 #include "fixtures/shapes/shapes.h"

@@ -11,13 +11,12 @@
 #include <utility>
 
 #include "core/error.h"
-#include "core/optics/image_plane.h"
+#include "core/mesh/surface_mesh.h"
 #include "core/optics/light_path.h"
-#include "core/surface/grid_mesh.h"
-#include "core/surface/surface_mesh.h"
+#include "core/optics/screen.h"
+#include "design/flux/flux_triangle.h"
 #include "design/graded_mesh.h"
-#include "design/optics/image_triangle.h"
-#include "design/render_lens.h"
+#include "design/render.h"
 #include "design/snell.h"
 #include "design/test_setups.h"
 #include "design/transport_scenes.h"

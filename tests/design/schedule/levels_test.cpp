@@ -9,10 +9,10 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/surface/grid_mesh.h"
+#include "core/lens/smooth_surface.h"
+#include "core/mesh/surface_mesh.h"
+#include "core/spline/control_net.h"
 #include "core/surface/sample_splines.h"
-#include "core/surface/smooth_surface.h"
-#include "core/surface/spline_file.h"
 #include "design/graded_mesh.h"
 #include "design/random_input.h"
 #include "design/schedule/rounds.h"

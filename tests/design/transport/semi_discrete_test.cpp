@@ -11,7 +11,7 @@
 #include <string>
 
 #include "core/error.h"
-#include "core/surface/grid_mesh.h"
+#include "core/mesh/surface_mesh.h"
 #include "design/test_setups.h"
 #include "design/transport_scenes.h"
 #include "design/vector_lbfgs.h"
