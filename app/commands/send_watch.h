@@ -13,7 +13,7 @@
 #include "app/commands/send_command.h"
 #include "app/frame/option_set.h"
 #include "core/io/descriptor.h"
-#include "machine/stream/sender.h"
+#include "machine/send.h"
 
 namespace lensforge::app {
 

@@ -9,7 +9,7 @@
 #include <thread>
 
 #include "core/io/descriptor.h"
-#include "machine/stream/sender.h"
+#include "machine/send.h"
 
 namespace lensforge::app {
 

@@ -36,7 +36,7 @@
 #include "core/text/json_fields.h"
 #include "core/text/json_text.h"
 #include "design/render_lens.h"
-#include "machine/gcode/gcode_dialect.h"
+#include "machine/gcode.h"
 
 namespace lensforge {
 namespace {

@@ -13,7 +13,7 @@
 #include "design/reflect/reflect_options.h"
 #include "design/render_fields.h"
 #include "export/export.h"
-#include "machine/job/send_options.h"
+#include "machine/send.h"
 
 namespace lensforge::app {
 namespace {
