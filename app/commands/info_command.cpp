@@ -29,7 +29,7 @@
 #include "export/files/mesh_formats.h"
 #include "export/solid/iges_file.h"
 #include "export/solid/step_file.h"
-#include "machine/gcode/program_seal.h"
+#include "machine/gcode.h"
 
 namespace lensforge::app {
 namespace {

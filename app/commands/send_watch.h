@@ -13,6 +13,7 @@
 #include "app/commands/send_command.h"
 #include "app/frame/option_set.h"
 #include "core/io/files.h"
+#include "machine/send.h"
 #include "machine/stream/sender.h"
 
 namespace lensforge::app {

@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "core/io/files.h"
+#include "machine/send.h"
 #include "machine/stream/sender.h"
 
 namespace lensforge::app {

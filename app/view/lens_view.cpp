@@ -31,6 +31,7 @@
 #include "core/text/json_fields.h"
 #include "core/text/json_text.h"
 #include "design/render.h"
+#include "machine/gcode.h"
 #include "machine/gcode/gcode_dialect.h"
 
 namespace lensforge {

@@ -12,7 +12,7 @@
 #include "design/reflect/input.h"
 #include "design/setup/option_tables.h"
 #include "export/export.h"
-#include "machine/job/send_options.h"
+#include "machine/send.h"
 
 namespace lensforge::app {
 namespace {

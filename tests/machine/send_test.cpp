@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "machine/job/send_job.h"
+#include "machine/send.h"
 
 #include <gmock/gmock.h>
 
