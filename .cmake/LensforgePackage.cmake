@@ -16,8 +16,8 @@ install(EXPORT lensforgeTargets NAMESPACE lensforge:: DESTINATION "${package_fol
 # The doors of the rooms, and the headers that they include, are installed; all others are private. Headers keep
 # their paths: "design/design.h" lies in include/lensforge/design/.
 set(LENSFORGE_DOORS
-  core/lens.h core/picture.h core/options.h design/design.h design/render.h design/reflect.h
-  cam/cam.h cam/coupon.h machine/send.h machine/gcode.h export/export.h)
+  core/lens.h core/picture.h design/design.h design/render.h design/reflect.h
+  cam/cam.h machine/send.h machine/gcode.h export/export.h)
 set(public_headers "")
 set(unread ${LENSFORGE_DOORS})
 while(unread)

@@ -3,8 +3,8 @@
 #include <iostream>
 #include <stdexcept>
 
-#include "core/image/image_io.h"
-#include "core/mesh/mesh_files.h"
+#include "core/picture.h"
+#include "core/lens.h"
 #include "design/design.h"
 #include "export/files/closed_solid.h"
 #include "export/files/mesh_formats.h"

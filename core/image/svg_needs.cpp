@@ -618,7 +618,8 @@ class Survey {
   void look_at_link(const std::string& link) {
     if (link.empty() || link.starts_with('#') || lower_case(link.substr(0, 5)) == "data:") return;
     if (!is_new(link)) return;
-    leave_out("'" + printable_line(link, kLongestName) + "', which is not in the file", "embed it");
+    leave_out(std::string("'") + printable_line(link, kLongestName) + "', which is not in the file",
+              "embed it");
   }
 
   void look_at_picture() {

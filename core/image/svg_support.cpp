@@ -351,7 +351,7 @@ std::string_view trimmed(std::string_view text) {
 }
 
 std::string in_quotes(std::string_view text) {
-  return "'" + printable_line(text, kLongestValue) + "'";
+  return std::string("'") + printable_line(text, kLongestValue) + "'";
 }
 
 /// The text between `before` and `after`; empty if there is none.

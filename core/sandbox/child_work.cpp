@@ -110,6 +110,13 @@ std::optional<double> address_space() {
   return pages * static_cast<double>(::sysconf(_SC_PAGESIZE));
 }
 
+/// The address sanitizer's allocator reserves address space far beyond what it uses.
+#ifdef __SANITIZE_ADDRESS__
+constexpr bool kSpaceIsMemory = false;
+#else
+constexpr bool kSpaceIsMemory = true;
+#endif
+
 void limit(__rlimit_resource resource, double value) {
   rlimit now{};
   if (::getrlimit(resource, &now) != 0) return;
@@ -262,7 +269,9 @@ std::string why_it_ended(int status) {
 void limit_this_process(const ChildLimits& limits) {
   if (limits.cpu_seconds > 0.0) limit(RLIMIT_CPU, std::ceil(limits.cpu_seconds));
   const std::optional<double> before = address_space();
-  if (limits.memory_bytes > 0.0 && before) limit(RLIMIT_AS, *before + limits.memory_bytes);
+  if (kSpaceIsMemory && limits.memory_bytes > 0.0 && before) {
+    limit(RLIMIT_AS, *before + limits.memory_bytes);
+  }
 }
 
 std::string run_in_child(const std::string& stage, const ChildLimits& limits,
