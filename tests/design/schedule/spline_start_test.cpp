@@ -5,7 +5,7 @@
 
 #include "core/lens/smooth_surface.h"
 #include "core/lens/surface_check.h"
-#include "core/surface/sample_splines.h"
+#include "core/spline/sample_splines.h"
 #include "design/test_setups.h"
 
 namespace lensforge {
