@@ -118,7 +118,7 @@ inline Eigen::Matrix3Xi grid_triangles(const GridShape& shape) {
   return triangles;
 }
 
-// Grid meshes: the vertices of a lens's flat grid stand in rows of near-equilateral triangles.
+// Grid meshes: the vertices of a lens's flat grid form rows of near-equilateral triangles.
 
 /// Cells next to the border over which the half-cell shift of odd rows grows from 0 to full.
 inline constexpr int kShiftFade = 4;

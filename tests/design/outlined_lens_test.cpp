@@ -15,7 +15,7 @@
 #include "core/image/transfer.h"
 #include "core/mesh/surface_mesh.h"
 #include "core/optics/outline.h"
-#include "core/surface/sample_splines.h"
+#include "core/spline/sample_splines.h"
 #include "core/temp_folder.h"
 #include "design/design.h"
 #include "design/energy/spline_objective.h"

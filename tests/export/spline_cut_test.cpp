@@ -6,7 +6,7 @@
 #include <filesystem>
 
 #include "core/optics/outline.h"
-#include "core/surface/sample_splines.h"
+#include "core/spline/sample_splines.h"
 #include "core/temp_folder.h"
 #include "design/render.h"
 #include "export/export.h"

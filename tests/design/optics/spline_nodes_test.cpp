@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "core/surface/sample_splines.h"
+#include "core/spline/sample_splines.h"
 #include "design/finite_difference.h"
 #include "design/random_input.h"
 

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "core/optics/light_source.h"
+
 #include <gtest/gtest.h>
 
 #include <Eigen/Core>
@@ -6,7 +8,6 @@
 #include <vector>
 
 #include "core/optics/light_path.h"
-#include "core/optics/light_source.h"
 
 namespace lensforge {
 namespace {

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "core/mesh/mesh_files.h"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
@@ -11,7 +13,6 @@
 
 #include "core/error.h"
 #include "core/full_disk.h"
-#include "core/mesh/mesh_files.h"
 #include "core/temp_folder.h"
 #include "core/test_meshes.h"
 #include "core/text/version.h"

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "core/lens/surface_check.h"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cstdint>
 #include <random>
 
-#include "core/lens/surface_check.h"
+#include "core/spline/sample_splines.h"
 #include "core/test_meshes.h"
 
 namespace lensforge {
@@ -86,6 +88,27 @@ TEST(HeightFieldCheck, FindsTrianglesThatDoNotFaceUp) {
   SurfaceMesh folded = whole();
   folded.vertices(0, 16) += 1.7;
   EXPECT_THAT(height_field_fault(folded, kSize), Optional(HasSubstr("turned over")));
+}
+
+OpticalSetup setup_of_sample() {
+  OpticalSetup setup;
+  setup.lens_size = setup.image_size = {15.0, 10.0};
+  return setup;
+}
+
+TEST(SplineFault, NamesWhatCannotBeALens) {
+  const ControlNet good = testing::sample_spline();
+  const OpticalSetup setup = setup_of_sample();
+  EXPECT_FALSE(spline_fault(good, setup));
+  ControlNet net = good;
+  net.points(0, 13 * 1) += 1e-3;  // The last point of the first row.
+  EXPECT_THAT(spline_fault(net, setup).value_or(""), HasSubstr("by lens_size it must be 15"));
+  net = good;
+  net.points(0, 14 * 5 + 6) = 1.0;
+  EXPECT_THAT(spline_fault(net, setup).value_or(""), HasSubstr("counter-clockwise"));
+  net = good;
+  net.points.row(2).array() -= 6.0;
+  EXPECT_THAT(spline_fault(net, setup).value_or(""), HasSubstr("entry face"));
 }
 
 }  // namespace

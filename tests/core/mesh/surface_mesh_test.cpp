@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "core/mesh/surface_mesh.h"
+
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
@@ -7,11 +9,83 @@
 #include <vector>
 
 #include "core/mesh/mesh_topology.h"
-#include "core/mesh/surface_mesh.h"
+#include "design/finite_difference.h"
+#include "design/random_corners.h"
 #include "design/random_input.h"
+#include "export/sample_surfaces.h"
 
-namespace lensforge {
+namespace lensforge::testing {
 namespace {
+
+TEST(Corners, AreaNormalIsTwiceTheAreaLong) {
+  const Corners t{{0.0, 0.0, 2.0}, {3.0, 0.0, 2.0}, {0.0, 4.0, 2.0}};
+  EXPECT_EQ(area_normal(t), Eigen::Vector3d(0.0, 0.0, 12.0));
+}
+
+TEST(Corners, CrossIsPositiveCounterClockwise) {
+  EXPECT_EQ(cross({3.0, 0.0}, {1.0, 4.0}), 12.0);
+  EXPECT_EQ(cross({1.0, 4.0}, {3.0, 0.0}), -12.0);
+}
+
+TEST(Corners, AreaNormalAdjointEqualsCentralDifferences) {
+  Random random(1);
+  for (int i = 0; i < 200; ++i) {
+    const Corners t = random_corners(random);
+    const Eigen::Vector3d bar = random.vector3();
+    const auto f = [&](const Eigen::VectorXd& x) {
+      return bar.dot(area_normal(testing::unpack_corners(x)));
+    };
+    Corners grad;
+    area_normal_adjoint(t, bar, grad);
+    EXPECT_LT(testing::plateau_error(testing::pack(grad), f, testing::pack(t), 1e-2), 1e-9);
+  }
+}
+
+TEST(Corners, NormalizeAdjointEqualsCentralDifferences) {
+  Random random(2);
+  for (int i = 0; i < 200; ++i) {
+    const Eigen::Vector3d whole = random.magnitude(1e-3, 1e3) * random.near_z(3.0);
+    const Eigen::Vector3d bar = random.vector3();
+    const double length = whole.norm();
+    const auto f = [&](const Eigen::VectorXd& x) { return bar.dot(x.normalized()); };
+    const Eigen::VectorXd computed = normalize_adjoint(whole / length, length, bar);
+    EXPECT_LT(testing::plateau_error(computed, f, whole, 1e-3 * length), 1e-9);
+  }
+}
+
+TEST(MeshNormals, OfVerticesAreTheSumsOfTheirTriangles) {
+  const SurfaceMesh mesh = smooth_lens(7);
+  const Eigen::Matrix3Xd normals = vertex_area_normals(mesh);
+  for (Eigen::Index v = 0; v < mesh.vertices.cols(); ++v) {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (Eigen::Index t = 0; t < mesh.triangles.cols(); ++t) {
+      if ((mesh.triangles.col(t).array() != static_cast<int>(v)).all()) continue;
+      const Eigen::Vector3d a = mesh.corner(t, 0);
+      sum += (mesh.corner(t, 1) - a).cross(mesh.corner(t, 2) - a);
+    }
+    EXPECT_LT((normals.col(v) - sum).norm(), 1e-14);
+  }
+}
+
+TEST(SurfaceMesh, PlanAreaIsHalfTheAreaNormalsHeightToTheBit) {
+  const SurfaceMesh mesh = noisy_lens();
+  double sum = 0.0;
+  for (Eigen::Index t = 0; t < mesh.triangles.cols(); ++t) {
+    EXPECT_EQ(mesh.plan_area(t), 0.5 * area_normal(mesh, t).z());
+    sum += mesh.plan_area(t);
+  }
+  const Eigen::Vector2d size = mesh.vertices.topRows<2>().rowwise().maxCoeff();
+  EXPECT_NEAR(sum, size.prod(), 1e-10);
+}
+
+TEST(SurfaceMesh, PlanAreaOfAClockwiseTriangleIsNegative) {
+  SurfaceMesh mesh;
+  mesh.vertices.resize(3, 3);
+  mesh.vertices << 0.0, 0.0, 3.0, 0.0, 4.0, 0.0, 1.0, 9.0, 2.0;
+  mesh.triangles.resize(3, 1);
+  mesh.triangles << 0, 1, 2;
+  EXPECT_EQ(mesh.plan_area(0), -6.0);
+}
 
 const Eigen::Vector2d kSize(80.0, 60.0);
 
@@ -140,4 +214,5 @@ TEST(Regrid, BorderVerticesStayOnTheBorder) {
 }
 
 }  // namespace
-}  // namespace lensforge
+
+}  // namespace lensforge::testing

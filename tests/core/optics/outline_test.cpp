@@ -17,7 +17,7 @@
 #include "core/mesh/mesh_files.h"
 #include "core/mesh/mesh_topology.h"
 #include "core/mesh/surface_mesh.h"
-#include "core/surface/sample_splines.h"
+#include "core/spline/sample_splines.h"
 #include "core/temp_folder.h"
 
 namespace lensforge {
