@@ -106,11 +106,10 @@ class MpiSession {
 
 /// Traffic of one rank since its start, for measurements.
 struct Traffic {
-  std::int64_t messages = 0;  ///< Number of sending calls of MPI.
-  std::int64_t bytes = 0;     ///< Bytes given to those calls.
-  double seconds = 0.0;       ///< Time inside MPI, including waits for others.
-  double processor_seconds =
-      0.0;  ///< Processor time of `seconds`; Open MPI uses it while it waits, too.
+  std::int64_t messages = 0;       ///< Number of sending calls of MPI.
+  std::int64_t bytes = 0;          ///< Bytes given to those calls.
+  double seconds = 0.0;            ///< Time inside MPI, including waits for others.
+  double processor_seconds = 0.0;  ///< Processor time in `seconds`; Open MPI waits actively.
 };
 Traffic traffic_so_far();
 
