@@ -209,7 +209,7 @@ void Ranks::abort(const std::string& reason) const {
   std::fprintf(stderr, "lensforge: %s\n", line.c_str());
   std::fflush(stderr);
   MPI_Abort(MPI_COMM_WORLD, 1);
-  std::abort();  // MPI_Abort() does not come back, but does not say so either.
+  std::abort();  // MPI_Abort() does not return, but is not marked so.
 }
 
 namespace {

@@ -42,7 +42,7 @@ inline constexpr double kBlack = 1e-3;
 struct TransportStep {
   int level = 0;            ///< 0 is the finest.
   int sites = 0;            ///< Number of sites of the level.
-  double blur = 0.0;        ///< σ of the Gaussian that the density is blurred with, pixels.
+  double blur = 0.0;        ///< Length of the blur of the density (soften()), pixels.
   double floor = 0.0;       ///< Share of the mass spread evenly over the picture.
   int number = 0;           ///< Steps taken before this one on the level.
   double length = 0.0;      ///< Share of the Newton direction taken.
