@@ -22,7 +22,7 @@ struct AddPicture {
   void operator()(std::int64_t i) const { to[i] += from[i]; }
 };
 
-/// Rows of a scan from one of them on.
+/// The rows of a scan from row `first` on.
 struct ScanFrom {
   using Value = ResolveFlux::Value;
 
@@ -36,7 +36,7 @@ struct ScanFrom {
   }
 };
 
-/// Entries of both in turn.
+/// Entries of both, alternating.
 std::vector<double> joined(std::span<const double> a, std::span<const double> b) {
   std::vector<double> pairs(2 * a.size());
   for (std::size_t i = 0; i < a.size(); ++i) {
@@ -56,7 +56,7 @@ double dot_of_pairs(std::span<const double> pairs) {
   return dot(Executor::serial(), a, b);
 }
 
-/// Of an array with so many for every row of the picture.
+/// Entries per rank of an array with `per_row` entries per row of the picture.
 std::vector<int> entries_per_rank(const RankExecutor& executor, int per_row) {
   std::vector<int> counts(static_cast<std::size_t>(executor.ranks().count()));
   for (std::size_t r = 0; r < counts.size(); ++r) {
@@ -65,7 +65,7 @@ std::vector<int> entries_per_rank(const RankExecutor& executor, int per_row) {
   return counts;
 }
 
-/// The sums of the rows that the rank looks at.
+/// Adds up the rows that the rank uses.
 void join_rows(const RankExecutor& executor, std::span<std::uint64_t> units) {
   const Ranks& ranks = executor.ranks();
   const auto per_row = static_cast<int>(executor.pixels_of({0, 1}).count()) + 1;
@@ -75,7 +75,7 @@ void join_rows(const RankExecutor& executor, std::span<std::uint64_t> units) {
   };
   const ItemRange own = executor.own_rows();
   const ItemRange seen = executor.seen_rows();
-  // A rank at the end receives nothing there.
+  // A rank at an end receives nothing there.
   ranks.shift<std::uint64_t>(1, row(own.end - 1), row(seen.begin));
   ranks.shift<std::uint64_t>(-1, row(own.begin), row(seen.end - 1));
 }
@@ -175,7 +175,7 @@ std::vector<double> RankExecutor::joined_block(Counted items, std::int64_t block
 }
 
 void RankExecutor::add_in_order(std::span<const double> blocks, std::span<double> sum) const {
-  // One more entry tells whether to stop, so that no rank goes on alone.
+  // One more entry is the stop flag, so that no rank continues alone.
   std::vector<double> running(sum.size() + 1, 0.0);
   const std::span<double> message(running);
   const int rank = ranks_.rank();
@@ -189,7 +189,7 @@ void RankExecutor::add_in_order(std::span<const double> blocks, std::span<double
   std::copy(running.begin(), running.end() - 1, sum.begin());
 }
 
-/// Block by block, as in one process, where dot() of one block is what it adds.
+/// Block by block, as in one process, which adds dot() of each block.
 double dot(const RankExecutor& executor, std::span<const double> a, std::span<const double> b) {
   const ItemRange own = executor.own(Counted::kUnknowns);
   const BlockShare share(own, kDotBlock, executor.total(Counted::kUnknowns));
@@ -226,7 +226,7 @@ void join_pictures(const RankExecutor& executor, std::span<std::int64_t> units,
                  AddPicture{worker.data(), first.data()});
     std::fill(worker.begin(), worker.end(), 0);
   }
-  // Sums on the way may leave the range of the type, as they do in ResolveFlux.
+  // Intermediate sums may overflow, as in ResolveFlux.
   const std::span<std::uint64_t> joined(reinterpret_cast<std::uint64_t*>(first.data()),
                                         first.size());
   if (executor.shares_pixels()) {
@@ -269,7 +269,7 @@ double intake_of(const RankExecutor& executor, const SurfaceMesh& mesh, const Me
   }
   const bool last = ranks.rank() + 1 == ranks.count();
   if (!last) ranks.send(ranks.rank() + 1, std::span<const double>(&sum, 1));
-  // From the last one to all.
+  // The last rank has the sum; all need it.
   if (last && ranks.count() > 1) ranks.send(0, std::span<const double>(&sum, 1));
   if (ranks.is_first() && ranks.count() > 1) {
     ranks.receive(ranks.count() - 1, std::span<double>(&sum, 1));
@@ -357,8 +357,7 @@ void RankTransforms::transform(const CosineRows& lines) {
       [&](std::int64_t k) { lines.run(plane(static_cast<int>(k))); }, 1);
 }
 
-/// On the way a block holds, column by column, what one rank has of the rows and another takes of
-/// the columns.
+/// A block in transit holds, column by column, one rank's rows of another rank's columns.
 void RankTransforms::to_columns(std::vector<double>& plane) {
   double* block = packed_.data();
   for (std::int64_t c = 0; c < grid_.columns; ++c) {
@@ -444,7 +443,7 @@ PreconditionerView RankPreconditioner::view_of_rows(double exponent) {
           transforms_.rows().begin};
 }
 
-/// The planes transposed: rows and columns change their parts.
+/// View of the transposed planes: rows and columns are exchanged.
 PreconditionerView RankPreconditioner::view_of_columns(double exponent) {
   return {grid_.rows,
           grid_.columns,

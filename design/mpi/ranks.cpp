@@ -26,16 +26,16 @@ namespace {
 
 using std::chrono::steady_clock;
 
-/// MPI counts in int.
+/// Limits per call: MPI counts in int.
 constexpr std::size_t kMostBytes = std::size_t{1} << 30;
 constexpr std::size_t kMostWords = std::size_t{1} << 27;
 
-/// How long a rank without work sleeps between two looks. What comes then takes far longer.
+/// Sleep of a rank without work between two checks; the work then takes far longer.
 constexpr std::chrono::microseconds kNap{200};
 
 constexpr int kTag = 0;
 
-/// MPI's world is the process's, and so is what went through it.
+/// MPI's world belongs to the process, and so does its traffic.
 Traffic& traffic() {
   static Traffic sum;
   return sum;
@@ -46,7 +46,7 @@ bool& session_lives() {
   return lives;
 }
 
-/// Counts one call of MPI, from here to the end of the scope.
+/// Counts one call of MPI, from its construction to the end of the scope.
 class CountedCall {
  public:
   explicit CountedCall(std::size_t bytes) {
@@ -209,7 +209,7 @@ void Ranks::abort(const std::string& reason) const {
   std::fprintf(stderr, "lensforge: %s\n", line.c_str());
   std::fflush(stderr);
   MPI_Abort(MPI_COMM_WORLD, 1);
-  std::abort();  // MPI_Abort() does not come back, but does not say so either.
+  std::abort();  // MPI_Abort() does not return, but is not marked so.
 }
 
 namespace {
@@ -307,7 +307,7 @@ ObjectiveOptions take_options(Parcel& parcel) {
   return options;
 }
 
-/// All that every rank has of a problem.
+/// The parts of a problem that every rank has.
 Parcel common_part(const StageProblem& problem) {
   Parcel parcel;
   parcel.put(problem.mesh.grid);
@@ -320,7 +320,7 @@ Parcel common_part(const StageProblem& problem) {
   return parcel;
 }
 
-/// From rank 0 to all.
+/// Sends rank 0's parcel to all.
 Parcel shared(const Parcel& own, const Ranks& ranks) {
   std::vector<std::byte> bytes = own.bytes();
   std::size_t size = bytes.size();
@@ -330,7 +330,7 @@ Parcel shared(const Parcel& own, const Ranks& ranks) {
   return Parcel(std::move(bytes));
 }
 
-/// Columns `held` of rank 0's matrix, which is null on the others.
+/// Returns columns `held` of rank 0's matrix, which is null on the others.
 template <class Matrix>
 Matrix held_columns(const Matrix* whole, const Ranks& ranks, Eigen::Index rows,
                     const std::function<ItemRange(int)>& held) {

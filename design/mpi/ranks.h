@@ -18,12 +18,12 @@
 
 namespace lensforge {
 
-/// The processes that mpirun has started together, numbered from 0: all that the program says to
-/// MPI. Functions marked collective end when every rank has called them, in the same order; only
-/// the thread that began the MpiSession may call any. An error inside MPI ends all ranks.
+/// The processes that mpirun has started together, numbered from 0; the only code that calls MPI.
+/// Functions marked collective end when every rank has called them, in the same order. Only the
+/// thread that began the MpiSession may call any. An error inside MPI ends all ranks.
 class Ranks {
  public:
-  /// All of them. @pre an MpiSession lives.
+  /// All ranks. @pre an MpiSession lives.
   static Ranks world();
 
   [[nodiscard]] int rank() const { return rank_; }
@@ -37,19 +37,20 @@ class Ranks {
     broadcast_bytes(&value, sizeof(T));
   }
   void broadcast_bytes(void* data, std::size_t bytes, int from = 0) const;
-  /// broadcast() that may be long in coming: the others sleep meanwhile, where MPI would spin.
+  /// broadcast() for a value that may take long to arrive: the others sleep meanwhile, where MPI
+  /// would spin.
   void await_bytes(void* data, std::size_t bytes) const;
 
-  /// Replaces every entry by its sum over the ranks, modulo 2⁶⁴: the same for any order.
+  /// Replaces every entry by its sum over the ranks, modulo 2⁶⁴, so the order does not matter.
   /// Collective.
   void add_up(std::span<std::uint64_t> entries) const;
-  /// The same, but each rank gets the sums of its part only: rank r's are the next counts[r]
-  /// entries. The others become anything. Collective.
+  /// add_up(), but each rank gets only the sums of its part: rank r's are the next counts[r]
+  /// entries. The other entries become undefined. Collective.
   void add_up_parts(std::span<std::uint64_t> entries, std::span<const int> counts) const;
-  /// Every rank gets the parts of all; rank r's are the next counts[r] entries. Collective.
+  /// Gives every rank the parts of all; rank r's are the next counts[r] entries. Collective.
   void collect_parts(std::span<double> entries, std::span<const int> counts) const;
 
-  /// One to one. @pre the other side calls the counterpart with the same length.
+  /// Sends to one rank. @pre the other side calls receive() with the same length.
   template <class T>
   void send(int to, std::span<const T> values) const {
     static_assert(std::is_trivially_copyable_v<T>);
@@ -61,21 +62,21 @@ class Ranks {
     receive_bytes(from, values.data(), values.size_bytes());
   }
 
-  /// Sends `out` to rank `to` unless it is empty, while the next counts[k] entries of `in` come
-  /// from rank first + k. @pre the other sides do their parts.
+  /// Sends `out` to rank `to` unless it is empty, and receives the next counts[k] entries of `in`
+  /// from rank first + k. @pre the other ranks call their counterparts.
   void relay(int to, std::span<const double> out, int first, std::span<const int> counts,
              std::span<double> in) const;
 
-  /// Sends `out` to the next rank (`step` 1) or the one before (−1) while `in` comes from the other
-  /// side; at the ends one of them stays as it is. Collective.
+  /// Sends `out` to the next rank (`step` 1) or the previous one (−1) and receives `in` from the
+  /// other side; at an end `in` stays as it is. Collective.
   template <class T>
   void shift(int step, std::span<const T> out, std::span<T> in) const {
     static_assert(std::is_trivially_copyable_v<T>);
     shift_bytes(step, std::as_bytes(out), std::as_writable_bytes(in));
   }
 
-  /// Sends to rank r the next counts_out[r] entries of `out` and takes counts_in[r] of it into
-  /// `in`. Collective.
+  /// Sends the next counts_out[r] entries of `out` to rank r and receives counts_in[r] entries of
+  /// `in` from it. Collective.
   void exchange(std::span<const double> out, std::span<const int> counts_out, std::span<double> in,
                 std::span<const int> counts_in) const;
 
@@ -92,7 +93,7 @@ class Ranks {
   int count_ = 1;
 };
 
-/// MPI from its begin to its end. At most one in a process's life.
+/// MPI from its start to its end. At most one in a process's life.
 class MpiSession {
  public:
   MpiSession();
@@ -103,17 +104,17 @@ class MpiSession {
   [[nodiscard]] static bool lives();
 };
 
-/// What one rank has sent since it began, for measurements.
+/// Traffic of one rank since its start, for measurements.
 struct Traffic {
-  std::int64_t messages = 0;       ///< Calls of MPI that send.
-  std::int64_t bytes = 0;          ///< Given to those calls.
-  double seconds = 0.0;            ///< Inside of MPI, waiting for others included.
-  double processor_seconds = 0.0;  ///< Of these, on a processor: Open MPI waits there, too.
+  std::int64_t messages = 0;       ///< Number of sending calls of MPI.
+  std::int64_t bytes = 0;          ///< Bytes given to those calls.
+  double seconds = 0.0;            ///< Time inside MPI, including waits for others.
+  double processor_seconds = 0.0;  ///< Processor time in `seconds`; Open MPI waits actively.
 };
 Traffic traffic_so_far();
 
-/// Values as bytes for another process of the same program, to be taken out in the order in which
-/// they were put in.
+/// Values as bytes for another process of the same program, taken out in the order in which they
+/// were put in.
 class Parcel {
  public:
   Parcel() = default;
@@ -167,13 +168,13 @@ class Parcel {
   std::size_t taken_ = 0;
 };
 
-// How the rows of a grid mesh are shared out over ranks. The vertices of a rank lie together, and
-// so do its faces, as both are numbered row by row.
+// Rows of a grid mesh are shared out over ranks. Vertices and faces are numbered row by row, so
+// those of a rank are contiguous.
 
-/// Rows of vertices on each side that a rank keeps of its neighbours'. As far reaches what a
-/// vertex's gradient hangs on: a face's bend takes in its neighbours', whose fits take in theirs,
-/// and three sweeps of weights each go one face further, two faces to a row. With one row fewer the
-/// gradient is another (GradientOnRanks).
+/// Rows of vertices on each side that a rank copies from its neighbours. A vertex's gradient
+/// depends on vertices that far away: a face's bend uses its neighbours' fits, which use theirs,
+/// and three sweeps of weights reach one face farther each, two faces per row. With one row fewer
+/// the gradient differs (GradientOnRanks).
 inline constexpr int kHaloRows = 4;
 
 /// Numbers begin … end − 1.
@@ -183,17 +184,17 @@ struct ItemRange {
 
   [[nodiscard]] std::int64_t count() const { return end - begin; }
   [[nodiscard]] bool contains(std::int64_t i) const { return i >= begin && i < end; }
-  /// The same, counted from `origin`.
+  /// This range counted from `origin`.
   [[nodiscard]] ItemRange from(std::int64_t origin) const { return {begin - origin, end - origin}; }
 };
 
-/// Part `rank` of `total` items that are shared out evenly over `ranks`.
+/// Part `rank` of `total` items shared out evenly over `ranks`.
 inline ItemRange even_share(std::int64_t total, int ranks, int rank) {
   return {total * rank / ranks, total * (rank + 1) / ranks};
 }
 
-/// What one rank holds of a grid mesh: the rows that it owns and a halo of kHaloRows around them.
-/// Its own mesh of these numbers vertices and faces anew, in the same order.
+/// A rank's part of a grid mesh: the rows that it owns and a halo of kHaloRows around them. Its own
+/// mesh numbers these vertices and faces from 0, in the same order.
 class RowSlab {
  public:
   RowSlab(const GridShape& grid, int ranks, int rank)
@@ -202,12 +203,12 @@ class RowSlab {
     held_rows_.end = own_rows_.end + kHaloRows < grid.rows ? own_rows_.end + kHaloRows : grid.rows;
   }
 
-  /// Whether every rank owns as many rows as its neighbours keep of it.
+  /// True if every rank owns at least as many rows as its neighbours copy.
   [[nodiscard]] static bool suffices(const GridShape& grid, int ranks) {
     return grid.rows / ranks >= kHaloRows;
   }
 
-  [[nodiscard]] const GridShape& grid() const { return grid_; }  ///< Of the whole.
+  [[nodiscard]] const GridShape& grid() const { return grid_; }  ///< The whole mesh's grid.
   [[nodiscard]] GridShape held_grid() const {
     return {grid_.columns, static_cast<int>(held_rows_.count())};
   }
@@ -217,7 +218,7 @@ class RowSlab {
   // In the numbers of the whole mesh.
   [[nodiscard]] ItemRange own_vertices() const { return vertices_of(own_rows_); }
   [[nodiscard]] ItemRange held_vertices() const { return vertices_of(held_rows_); }
-  /// Faces above the rows that are owned.
+  /// Faces above the owned rows.
   [[nodiscard]] ItemRange own_faces() const {
     return faces_of({own_rows_.begin, own_rows_.end < grid_.rows ? own_rows_.end + 1 : grid_.rows});
   }
@@ -233,7 +234,7 @@ class RowSlab {
   [[nodiscard]] ItemRange vertices_of(const ItemRange& rows) const {
     return {rows.begin * grid_.columns, rows.end * grid_.columns};
   }
-  /// Between the first and the last of these rows of vertices.
+  /// Faces between the first and the last of these rows of vertices.
   [[nodiscard]] ItemRange faces_of(const ItemRange& rows) const {
     const std::int64_t per_row = std::int64_t{2} * (grid_.columns - 1);
     return {rows.begin * per_row, (rows.end - 1) * per_row};
@@ -244,8 +245,7 @@ class RowSlab {
   ItemRange held_rows_;
 };
 
-/// Whether a mesh's faces lie row by row between their rows of vertices, as make_grid_mesh() has
-/// them.
+/// True if a mesh's faces lie row by row between their rows of vertices, as in make_grid_mesh().
 inline bool has_row_order(const SurfaceMesh& mesh) {
   const GridShape& grid = mesh.grid;
   const std::int64_t per_row = std::int64_t{2} * (grid.columns - 1);
@@ -259,12 +259,12 @@ inline bool has_row_order(const SurfaceMesh& mesh) {
   return true;
 }
 
-/// A rank's items of a sum that is taken in blocks of fixed length and then over the blocks in
-/// order, as parallel_sum() does it. A block belongs to the rank that has its last item.
+/// A rank's items of a sum that is taken over blocks of fixed length and then over the blocks in
+/// order, as in parallel_sum(). A block belongs to the rank that has its last item.
 struct BlockShare {
-  ItemRange head;   ///< Of the rank's first block, if that begins on another rank.
-  ItemRange whole;  ///< Blocks that lie on this rank alone.
-  ItemRange tail;   ///< Of a block that belongs to another rank.
+  ItemRange head;   ///< Items of the rank's first block, if it begins on another rank.
+  ItemRange whole;  ///< Items of blocks that are entirely on this rank.
+  ItemRange tail;   ///< Items of a block that belongs to another rank.
 
   /// @param own  items begin … end − 1 of `total`, not none.
   BlockShare(const ItemRange& own, std::int64_t block, std::int64_t total) {
@@ -275,7 +275,7 @@ struct BlockShare {
     if (own.begin % block != 0 && own.end >= end_of(own.begin)) next = end_of(own.begin);
     head = {own.begin, next};
     std::int64_t last = own.end == total ? total : own.end / block * block;
-    // Inside of one block that neither begins nor ends here, all is tail.
+    // Within a block that neither begins nor ends here, all items are tail.
     if (last < next) last = next;
     if (next % block != 0 && next != total) last = next;
     whole = {next, last};
@@ -283,7 +283,7 @@ struct BlockShare {
   }
 };
 
-/// What a GuidedStage is made of; see GuidedStageOn.
+/// Input of a GuidedStage; see GuidedStageOn.
 struct StageProblem {
   SurfaceMesh mesh;
   OpticalSetup setup;
@@ -292,14 +292,14 @@ struct StageProblem {
   ObjectiveOptions options;
 };
 
-/// A setup there and back, every bit of it.
+/// Write and read a setup without loss.
 void put_setup(const OpticalSetup& setup, Parcel& parcel);
 OpticalSetup take_setup(Parcel& parcel);
 
-/// Rank 0's problem in the part that this rank holds: its mesh is that of its RowSlab, a
-/// correspondence that of the faces there. Collective. @param whole  of rank 0; null elsewhere.
+/// Shares out rank 0's problem and returns this rank's part: the mesh of its RowSlab and the
+/// correspondence of the faces there. Collective. @param whole  rank 0's problem; null elsewhere.
 /// @pre RowSlab::suffices() and has_row_order() of the mesh, and no spline.
-/// @param grid  receives the whole mesh's.
+/// @param grid  receives the whole mesh's grid.
 StageProblem share_problem(const StageProblem* whole, const Ranks& ranks, GridShape& grid);
 
 }  // namespace lensforge

@@ -27,13 +27,13 @@
 namespace lensforge {
 namespace {
 
-/// One rank's part of a GuidedStage. Vectors of a minimisation hold the vertices that the rank
-/// owns, the objective works on those of its halo too. Everything is collective; whole matrices,
-/// 3 × V, are rank 0's, null on the others.
+/// One rank's part of a GuidedStage. Vectors of a minimisation hold the rank's own vertices; the
+/// objective works on those of its halo too. Everything is collective. Whole matrices, 3 × V, are
+/// rank 0's and null on the others.
 /// @throw Interrupted, on all ranks, if rank 0 is asked to stop.
 class StagePart {
  public:
-  /// @param problem  rank 0's whole one; null elsewhere.
+  /// @param problem  rank 0's whole problem; null elsewhere.
   StagePart(const StageProblem* problem, const Ranks& ranks, const Executor& threads,
             std::stop_token stop);
 
@@ -44,7 +44,7 @@ class StagePart {
   void set_reach(const Eigen::Matrix3Xd* reach);
   void apply_root(const Eigen::Matrix3Xd* g, Eigen::Matrix3Xd* r);
 
-  /// @param observe  asked on rank 0; what it throws is kept for thrown_by_observer().
+  /// @param observe  called on rank 0; an exception is kept for thrown_by_observer().
   LbfgsSummary minimize(const LbfgsOptions& options, const GuidedStage::Observer& observe,
                         Eigen::Matrix3Xd* vertices);
   [[nodiscard]] std::exception_ptr thrown_by_observer() const { return thrown_; }
@@ -73,12 +73,12 @@ class StagePart {
   DesignObjectiveOn<RankExecutor> objective_;
   RankPreconditioner preconditioner_;
   Vector held_;           ///< Vertices with the halo, 3 each.
-  Vector held_gradient_;  ///< Likewise; right where the rank owns them.
+  Vector held_gradient_;  ///< 3 each; valid for the rank's own vertices.
   ObjectiveEvaluation last_;
   std::exception_ptr thrown_;
 };
 
-/// An extended source's blur takes in rows of other ranks.
+/// An extended source's blur uses rows of other ranks.
 SharedPicture shared_picture(const StageProblem& problem, const Ranks& ranks) {
   const Eigen::Vector2i& pixels = problem.setup.pixels;
   const bool shared = problem.setup.extent.none() && pixels.y() >= ranks.count();
@@ -233,7 +233,7 @@ LbfgsSummary StagePart::minimize(const LbfgsOptions& options, const GuidedStage:
   }
 }
 
-/// What rank 0 asks of the others. Arguments follow in messages of their own.
+/// A request of rank 0 to the others. Arguments follow in messages of their own.
 struct Order {
   enum class Kind {
     kMake,
@@ -249,7 +249,7 @@ struct Order {
   };
   Kind kind = Kind::kEnd;
   int stage = 0;
-  int threads = 1;  ///< Of a new stage.
+  int threads = 1;  ///< For a new stage.
 };
 
 struct Symbols {
@@ -262,8 +262,8 @@ void announce(const Order& order) {
   Ranks::world().await_bytes(&copy, sizeof(copy));
 }
 
-/// Does its part of something that all ranks do. What fails on one rank would leave the others
-/// waiting, so that it ends them all.
+/// Runs this rank's part of a common task. A failure on one rank would leave the others waiting, so
+/// it ends them all.
 template <class Body>
 auto together(const Body& body) {
   try {
@@ -282,7 +282,7 @@ class RankStage final : public GuidedStage {
   RankStage(const StageProblem& problem, const Executor& executor) : number_(next_number()) {
     const Ranks ranks = Ranks::world();
     announce({Order::Kind::kMake, number_, executor.concurrency()});
-    // Made or interrupted together: an interrupted one is not there on any rank.
+    // All ranks make it or are interrupted together: an interrupted stage exists on no rank.
     part_ = together([&] {
       return std::make_unique<StagePart>(&problem, ranks, executor, executor.stop_token());
     });
@@ -351,15 +351,15 @@ class RankStage final : public GuidedStage {
   Eigen::Matrix3Xd movable_;
 };
 
-/// The parts of rank 0's stages on another rank.
+/// Holds another rank's parts of rank 0's stages.
 class Server {
  public:
-  /// False at the end.
+  /// Returns false at the end.
   bool follow(const Order& order) {
     try {
       together([&] { obey(order); });
     } catch (const Interrupted&) {
-      // Rank 0 knows and goes on from there.
+      // Rank 0 throws too and decides how to continue.
     }
     return order.kind != Order::Kind::kEnd;
   }
@@ -444,13 +444,13 @@ void dismiss_ranks() { announce({Order::Kind::kEnd}); }
 
 namespace {
 
-/// The number that a variable holds, 0 where there is none.
+/// Value of an environment variable; 0 if it is not set.
 int number_in(const char* variable) {
   const char* const text = std::getenv(variable);
   return text != nullptr ? std::atoi(text) : 0;
 }
 
-/// The first of these variables that is set.
+/// Value of the first of these variables that is set.
 int first_of(std::initializer_list<const char*> variables) {
   for (const char* variable : variables) {
     if (const int number = number_in(variable); number > 0) return number;
@@ -458,7 +458,7 @@ int first_of(std::initializer_list<const char*> variables) {
   return 0;
 }
 
-/// What starts processes tells them their number, each in its own way: Open MPI, then MPICH's and
+/// Number of processes started together, as each launcher states it: Open MPI, then MPICH's and
 /// Slurm's PMI, then Slurm with PMIx.
 int started_together() {
   if (const int number = first_of({"OMPI_COMM_WORLD_SIZE", "PMI_SIZE"}); number > 0) return number;

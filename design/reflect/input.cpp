@@ -118,18 +118,20 @@ void validate(const ReflectOptions& options) {
 
 namespace {
 
-/// A mesh of which every face has an area.
+/// A mesh whose faces all have an area.
 struct FullFaces {
   SurfaceMesh mesh;
-  std::vector<int> origin;   ///< Of every face: the face of the mesh as it came that it is part of.
-  std::int64_t removed = 0;  ///< Faces that had no area.
+  std::vector<int> origin;   ///< Original face of every face.
+  std::int64_t removed = 0;  ///< Number of faces without area.
 };
 
-/// A face is without area below this share of the square of its longest side: 1e-9 is a needle a
-/// thousand million times as long as it is wide, which single precision cannot tell from a line.
+/// Minimum area of a face, as a share of the square of its longest side: at 1e-9 a face is a
+/// thousand million times as long as it is wide, which single precision cannot distinguish from a
+/// line.
 constexpr double kLeastFlatness = 1e-9;
 
-/// Faces in one line may have to wait for each other; those that are left then are dropped.
+/// Maximum number of passes: collinear faces may have to wait for each other. Those left then are
+/// dropped.
 constexpr int kPasses = 16;
 
 Eigen::Vector3d squared_sides(const Corners& c) {
@@ -158,15 +160,15 @@ void drop(FullFaces& full, const std::function<bool(Eigen::Index)>& unwanted) {
   full.origin.resize(static_cast<std::size_t>(kept));
 }
 
-/// The side of a face that joins two of its corners.
+/// The side of a face between two of its corners.
 int side_between(const Eigen::Vector3i& face, int a, int b) {
   int k = 0;
   while (k < 2 && (face[(k + 2) % 3] == a || face[(k + 2) % 3] == b)) ++k;
   return k;
 }
 
-/// Divides `neighbour` at the corner of a flat face that is opposite to side k, which they share.
-/// Two faces with the same corners have nothing between them: both get a corner twice.
+/// Divides `neighbour` at the corner of a flat face opposite to side k, which they share. Two faces
+/// with the same corners have nothing between them: both get a corner twice.
 void divide(FullFaces& full, Eigen::Index flat, int k, Eigen::Index neighbour) {
   Eigen::Matrix3Xi& triangles = full.mesh.triangles;
   const int middle = triangles((k + 2) % 3, flat);
@@ -180,7 +182,7 @@ void divide(FullFaces& full, Eigen::Index flat, int k, Eigen::Index neighbour) {
   full.origin[static_cast<std::size_t>(flat)] = full.origin[static_cast<std::size_t>(neighbour)];
 }
 
-/// @return whether any face was divided.
+/// @return true if any face was divided.
 bool divide_neighbours(FullFaces& full) {
   const EdgeTable table = make_edges(full.mesh);
   std::vector<bool> changed(full.origin.size());
@@ -198,9 +200,9 @@ bool divide_neighbours(FullFaces& full) {
   return any;
 }
 
-/// Takes faces without area out so that the surface stays closed where it was. A face that has a
-/// corner twice is dropped. Where a face's corners stand in a line, the face across its longest
-/// side is divided at the corner in the middle, and its halves take the place of both.
+/// Removes faces without area so that the surface stays closed where it was. A face that has a
+/// corner twice is dropped. If a face's corners are collinear, the face across its longest side is
+/// divided at the middle corner, and its halves replace both.
 FullFaces without_flat_faces(const SurfaceMesh& mesh) {
   FullFaces full{mesh, std::vector<int>(static_cast<std::size_t>(mesh.triangle_count())), 0};
   std::iota(full.origin.begin(), full.origin.end(), 0);
@@ -214,7 +216,7 @@ FullFaces without_flat_faces(const SurfaceMesh& mesh) {
   return full;
 }
 
-/// Diagonals of the box around a mesh whose squares are still far from the ends of doubles.
+/// Limits of the bounding box's diagonal; its square is still far from the limits of doubles.
 constexpr double kLeastDiagonal = 1e-60;
 constexpr double kGreatestDiagonal = 1e60;
 
@@ -226,7 +228,7 @@ std::string counted(std::int64_t count, const std::string& one, const std::strin
   return std::to_string(count) + " " + (count == 1 ? one : more);
 }
 
-/// For every vertex the first one in the same place.
+/// Returns for every vertex the first one in the same place.
 std::vector<int> first_of_place(const SurfaceMesh& mesh) {
   std::vector<int> order(static_cast<std::size_t>(mesh.vertex_count()));
   std::iota(order.begin(), order.end(), 0);
@@ -245,7 +247,7 @@ std::vector<int> first_of_place(const SurfaceMesh& mesh) {
 }
 
 /// Keeps the vertices that faces use, in their order.
-/// @param number  becomes the new number of every vertex, −1 for those that were dropped.
+/// @param number  receives the new number of every vertex; −1 if it was dropped.
 SurfaceMesh compacted(const SurfaceMesh& mesh, std::vector<int>& number) {
   number.assign(static_cast<std::size_t>(mesh.vertex_count()), -1);
   for (const int v : mesh.triangles.reshaped()) number[static_cast<std::size_t>(v)] = 0;
@@ -263,8 +265,7 @@ SurfaceMesh compacted(const SurfaceMesh& mesh, std::vector<int>& number) {
   return result;
 }
 
-/// Gives vertices in the same place one number and drops those without a face, and faces without
-/// area.
+/// Merges vertices in the same place and drops vertices without a face and faces without area.
 void merge_vertices(const SurfaceMesh& mesh, RepairedMesh& result) {
   const std::vector<int> first = first_of_place(mesh);
   SurfaceMesh merged = mesh;
@@ -332,7 +333,7 @@ class Orientation {
     return static_cast<std::size_t>(mesh_.triangle_count());
   }
 
-  /// Whether two faces run along their common edge in the same direction as given.
+  /// True if two faces, as given, run along their common edge in the same direction.
   [[nodiscard]] bool disagree(int face, int k, int other) const {
     const int from = mesh_.triangles(k, face);
     const int to = mesh_.triangles((k + 1) % 3, face);
@@ -378,7 +379,8 @@ class Orientation {
     });
   }
 
-  /// An open piece keeps the side that most of its faces have.
+  /// True if a piece's faces must all be turned. An open piece keeps the side that most of its
+  /// faces have.
   [[nodiscard]] bool wrong_way(const std::vector<int>& piece) const {
     if (is_closed(piece)) return piece_volume(piece) < 0.0;
     const auto turned = std::count_if(piece.begin(), piece.end(), [&](int face) {
@@ -424,10 +426,10 @@ RepairedMesh repair_mesh(const SurfaceMesh& mesh, const std::string& name) {
 
 namespace {
 
-/// Largest file of numbers that is read.
+/// Maximum size of a file of numbers.
 constexpr std::uintmax_t kMaxListBytes = std::uintmax_t{64} << 20U;
 
-/// Whole numbers below `limit`, a group for every line that has some.
+/// Reads whole numbers below `limit`, a group for every line that has any.
 std::vector<std::vector<int>> number_groups(const std::string& option, const std::string& file,
                                             std::int64_t limit) {
   std::vector<std::vector<int>> groups;
@@ -525,8 +527,8 @@ void require_no_numbers(const ReflectOptions& options) {
   }
 }
 
-/// The groups of --planar-faces. Faces without area are in none any more, and halves of a face are
-/// in its group.
+/// The groups of --planar-faces. Faces without area are removed from their group; halves of a face
+/// join it.
 std::vector<std::vector<int>> planar_groups(const ReflectOptions& options, std::int64_t faces,
                                             const RepairedMesh& repaired) {
   std::vector<std::vector<int>> parts(static_cast<std::size_t>(faces));

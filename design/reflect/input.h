@@ -12,89 +12,89 @@
 
 namespace lensforge::reflect {
 
-/// How target normals are found.
+/// Method to find target normals.
 enum class Method {
-  kExact,  ///< Cached paths, gradients without noise, steps that every face chooses.
+  kExact,  ///< Cached paths, gradients without noise, a step length per face.
   kPaper,  ///< Monte-Carlo gradients and fixed steps: the published algorithm.
 };
 
-/// Across which axis, through the middle of the bounding box, a shape stays symmetric.
+/// Axis across which a shape stays symmetric, about the middle of the bounding box.
 enum class Symmetry { kNone = -1, kX = 0, kY = 1, kZ = 2 };
 
-/// What shapes a reflection. Lengths and places are in the units of the mesh, z is up.
+/// Options of a run. Lengths and places are in the units of the mesh, z is up.
 struct ReflectOptions {
   GoalKind goal = GoalKind::kStealth;
-  std::string place;  ///< Of a goal: "X,Y,Z" a point, "X,Y,Z,X,Y,Z" the ends of a line.
+  std::string place;  ///< Goal's "X,Y,Z" of a point or "X,Y,Z,X,Y,Z" of a line's ends.
   std::string light;  ///< "X,Y,Z;X,Y,Z;…" towards the light; empty: the band or the sun.
   Method method = Method::kExact;
-  int seed = 1;                 ///< Of the paper's random paths.
+  int seed = 1;                 ///< For the paper's random paths.
   double elevation_deg = 20.0;  ///< Half height of the band of directions.
-  int direction_rows = 8;       ///< Heights in the band, each with six times as many azimuths.
-  int sun_positions = 24;       ///< On the sun's half circle.
-  double anchor = 0.1;          ///< β: how strongly normals are held.
+  int direction_rows = 8;       ///< Heights in the band; each has six times as many azimuths.
+  int sun_positions = 24;       ///< Directions on the sun's half circle.
+  double anchor = 0.1;          ///< β, the strength with which normals are held.
   double denoise = 0.0;         ///< α for a mesh whose diagonal is 3; 0: none.
   double normal_weight = 1000;  ///< λ of Eq. 3.
   int rim_updates = 30;         ///< Vertex updates with rim-spoke elements.
   int face_updates = 30;        ///< Vertex updates with face elements.
   int normal_steps = 8;         ///< Steps of the normals before each vertex update.
   bool split = true;            ///< Split edges that hamper creases, then update again.
-  int faces = 0;                ///< Remesh to about so many first; 0: the mesh as it is.
-  std::string fix_box;          ///< "X,Y,Z,X,Y,Z": what is inside does not move.
-  std::string fix_plane;        ///< "NX,NY,NZ,D": what has n·x ≤ d does not move.
-  std::string fix_vertices;     ///< File of the numbers of vertices that do not move.
-  std::string planar_faces;     ///< File of groups of faces that stay planar, one a line.
+  int faces = 0;                ///< Remesh to about this many first; 0: no remeshing.
+  std::string fix_box;          ///< "X,Y,Z,X,Y,Z": vertices inside do not move.
+  std::string fix_plane;        ///< "NX,NY,NZ,D": vertices with n·x ≤ d do not move.
+  std::string fix_vertices;     ///< File with the numbers of vertices that do not move.
+  std::string planar_faces;     ///< File with groups of faces that stay planar, one per line.
   Symmetry symmetry = Symmetry::kNone;
   bool keep_volume = false;
   bool keep_box = false;          ///< Nothing leaves the bounding box.
-  double max_displacement = 0.0;  ///< Of a vertex; 0: no limit.
-  double min_thickness = 0.0;     ///< Of the material behind a vertex; 0: no limit.
+  double max_displacement = 0.0;  ///< Limit for a vertex; 0: none.
+  double min_thickness = 0.0;     ///< Minimum of the material behind a vertex; 0: none.
   double radar_ghz = 0.0;         ///< Frequency of radar cross-sections; 0: none.
   bool force = false;             ///< Replace files that lensforge did not write.
   /// File that takes a checkpoint every second; none is written if empty.
   std::filesystem::path checkpoint;
-  /// Go on from `checkpoint`. Same mesh and options → same shape as without interruption.
+  /// Continue from `checkpoint`. The same mesh and options give the same shape as without
+  /// interruption.
   bool resume = false;
 };
 
-/// The options as the command has them.
+/// All options, as the command has them.
 const OptionTable<ReflectOptions>& reflect_fields();
 
 /// @throw InputError naming option, value and rule.
 void validate(const ReflectOptions& options);
 
-/// A mesh that the reflector stage works on, and what was changed to make it one.
+/// A mesh that the reflector stage can use, and the changes made to it.
 struct RepairedMesh {
   SurfaceMesh mesh;
-  std::vector<std::string> changes;  ///< In words: "12 duplicate vertices merged".
-  std::vector<int> vertex;  ///< What became of every vertex: its number, −1 if it was dropped.
-  std::vector<int> face;    ///< What every face was part of: its number in the mesh as it came.
+  std::vector<std::string> changes;  ///< For example "12 duplicate vertices merged".
+  std::vector<int> vertex;           ///< New number of every vertex; −1 if it was dropped.
+  std::vector<int> face;             ///< Original face of every face.
   bool closed = false;
 };
 
-/// Merges vertices that stand in the same place, removes faces without area and vertices without a
-/// face, and turns faces that disagree with their neighbours; the faces of a closed piece then look
-/// outwards.
+/// Merges vertices in the same place, removes faces without area and vertices without a face, and
+/// turns faces that disagree with their neighbours; the faces of a closed piece then look outwards.
 /// @param name  of the file, for messages.
 /// @throw InputError naming the face or edge: no face with an area, an edge with more than two
 ///        faces, a piece with one side only (a Möbius strip), coordinates so large or small that
 ///        areas vanish.
 RepairedMesh repair_mesh(const SurfaceMesh& mesh, const std::string& name);
 
-/// A mesh that is ready to be deformed, with the parts that are to stay as they are.
+/// A mesh that is ready to be deformed, with the parts that stay as they are.
 struct ReflectInput {
   SurfaceMesh mesh;
   bool closed = false;
-  std::vector<std::string> changes;      ///< What was repaired, in words.
+  std::vector<std::string> changes;      ///< Repairs, in words.
   std::vector<std::uint8_t> fixed;       ///< One flag per vertex; empty: all move.
-  std::vector<std::vector<int>> planar;  ///< Groups of faces, each of which stays in one plane.
+  std::vector<std::vector<int>> planar;  ///< Groups of faces that each stay in one plane.
   std::vector<int> partner;              ///< Mirror image of every vertex; empty: no symmetry.
 };
 
-/// Repairs a mesh, remeshes it for --faces, and finds what the options hold fast.
+/// Repairs a mesh, remeshes it for --faces, and finds the parts that the options fix.
 /// @param name  of its file, for messages.
-/// @throw InputError naming file or option: what cannot be repaired, an open mesh where a volume or
-///        a thickness is to be kept, numbers of vertices or faces that it does not have, no vertex
-///        left that may move, options that contradict each other.
+/// @throw InputError naming file or option: a mesh that cannot be repaired, an open mesh where a
+///        volume or a thickness is to be kept, numbers of vertices or faces that it does not have,
+///        no vertex left that may move, options that contradict each other.
 ReflectInput prepared_input(const SurfaceMesh& mesh, const std::string& name,
                             const ReflectOptions& options);
 

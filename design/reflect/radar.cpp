@@ -34,7 +34,7 @@ constexpr double kTubesPerWavelength = 10.0;
 constexpr int kBounces = 3;
 constexpr double kAnywhere = std::numeric_limits<double>::infinity();
 
-/// A number in 0 … 1 of a counter (SplitMix64).
+/// A pseudo-random number in 0 … 1 for a counter (SplitMix64).
 double jitter(std::uint64_t counter) { return unit_share(mixed_bits(counter * kGoldenGamma)); }
 
 double tubes_across(const SurfaceMesh& mesh, double wavelength) {
@@ -58,7 +58,7 @@ std::complex<double> triangle_wave(std::array<double, 3> phase) {
   return -(mean_wave(phase[1], phase[2]) - mean_wave(phase[0], phase[1])) / spread;
 }
 
-/// One bounce: Σ (n·ω) ∫ e^{2ikω·r} dA over the faces, each by the share of it that is seen.
+/// One bounce: Σ (n·ω) ∫ e^{2ikω·r} dA over the faces, each weighted by its visible share.
 class OneBounce {
  public:
   OneBounce(const SurfaceMesh& mesh, const Vector3d& towards, double wavelength)
@@ -83,7 +83,7 @@ class OneBounce {
   }
 
  private:
-  /// Of four points of the face.
+  /// Visible share of four points of the face.
   [[nodiscard]] double seen_share(const Corners& c, const Vector3d& n) const {
     const Vector3d middle = (c.v0 + c.v1 + c.v2) / 3.0;
     int seen = 0;
@@ -209,9 +209,9 @@ namespace {
 
 constexpr double kLightSpeed = 299.792458;   ///< mm·GHz
 constexpr double kSquareMillimetres = 1e-6;  ///< m²
-constexpr double kFloor = 1e-12;             ///< m²; below it −120 dBsm is stated.
+constexpr double kFloor = 1e-12;             ///< m²; smaller sections are reported as −120 dBsm.
 constexpr double kHalf = 260.0;              ///< Half the drawing's side.
-constexpr double kRing = 40.0;               ///< Distance of two rings, 10 dB.
+constexpr double kRing = 40.0;               ///< Distance between rings, 10 dB.
 constexpr int kRings = 6;
 
 double dbsm(double section) { return 10.0 * std::log10(std::max(section, kFloor)); }

@@ -26,36 +26,37 @@
 namespace lensforge::reflect {
 namespace {
 
-/// A face that looks straight back at the light has no gradient by symmetry: before the first
-/// update normals are tilted up above the middle and down below it by this at most, rad. A tenth
-/// of the lobe's width.
+/// Maximum tilt of the normals before the first update, up above the middle and down below it, rad:
+/// a tenth of the lobe's width. A face that looks straight back at the light has no gradient, by
+/// symmetry.
 constexpr double kTilt = 0.01;
 
-/// A stage ends when its energy changed by less than this share over so many updates. Directions
-/// turn from update to update, which alone changes an energy by up to 0.5 %.
+/// A stage ends when its energy changed by less than this share over kStageWindow updates.
+/// Directions turn from update to update, which alone changes an energy by up to 0.5 %.
 constexpr double kStageChange = 0.01;
 constexpr std::size_t kStageWindow = 3;
-/// Stealth asks for more and more where faces hold each other back, which takes updates to show.
+/// For stealth the window is longer: where faces hold each other back the targets grow from update
+/// to update, and the effect comes late.
 constexpr std::size_t kStealthWindow = 8;
 
-/// How strongly stealth holds normals where the last update left them, in units of β. The paper's 8
+/// Strength with which stealth holds normals at the last update's, in units of β. The paper's 8
 /// steps of 200/5914 take normals 1.35·β of their way to the reference, and so does one implicit
-/// step with this weight. Without it faces that send no light back are taken all the way, however
-/// small β is, and hold their neighbours there: an ellipsoid of 400 faces ends at 0.0124 and not at
+/// step with this weight. Without it faces that reflect no light are taken all the way, however
+/// small β is, and hold their neighbours back: an ellipsoid of 400 faces ends at 0.0124 instead of
 /// 0.0075 for the same displacement.
 constexpr double kStay = 0.74;
 
-/// Vertices beyond this many diagonals have lost the shape; Embree ends the program for rays from
-/// far beyond.
+/// Vertices beyond this distance have lost the shape; Embree ends the program for rays from far
+/// beyond.
 constexpr double kFarthest = 1e6 * kUnitDiagonal;
 
-/// Between two checkpoints; what a killed run has to do again.
+/// Time between two checkpoints, which a killed run has to repeat.
 constexpr double kSaveSeconds = 1.0;
 
-/// Steps of the normals that one seed may number.
+/// Maximum number of steps of the normals per seed.
 constexpr std::uint64_t kSeedStride = std::uint64_t{1} << 32U;
 
-/// What is said of a run that gained too little.
+/// Message for a run that gained too little.
 std::string gain_words(double before, double after) {
   return "the energy went from " + number_text(before, 4) + " to " + number_text(after, 4) +
          ": less than a tenth of it was gained; a smaller --anchor, another number of --faces, "
@@ -140,7 +141,7 @@ class Schedule {
     return {number == 1 ? "face" : "split", ElementKind::kFace, options_.face_updates};
   }
 
-  /// Takes over what a checkpoint holds. @throw InputError
+  /// Takes over the state of a checkpoint. @throw InputError
   void resume() {
     state_ = read_checkpoint(options_.checkpoint, state_.fingerprint);
     if (!state_.split.empty()) {
@@ -171,7 +172,7 @@ class Schedule {
     ++saves_;
   }
 
-  /// Begins a stage, or goes on with that of the checkpoint.
+  /// Begins a stage, or continues the checkpoint's.
   void begin_stage(int number) {
     const bool goes_on = state_.stage == number && state_.unmet.cols() > 0;
     if (goes_on) return;
@@ -218,19 +219,19 @@ class Schedule {
     return vertices.allFinite() && vertices.cwiseAbs().maxCoeff() < kFarthest;
   }
 
-  /// Without the denoiser's and the anchor's hold the published steps may lose a shape altogether.
+  /// Without denoiser and anchor the published steps may lose a shape altogether.
   void require_near(const Eigen::Matrix3Xd& vertices) const {
     if (is_near(vertices)) return;
     throw RunError("update " + std::to_string(number() + 1) +
                    " moved vertices out of all bounds; another --anchor or --seed may help");
   }
 
-  /// Whether normals go a part of the way in each update, and further where they did not arrive.
+  /// True if normals go a part of the way in each update, and farther where faces did not follow.
   [[nodiscard]] bool pursues() const {
     return options_.method == Method::kExact && field_.goal.kind == GoalKind::kStealth;
   }
 
-  /// The anchor of one update: where normals are held by β and by kStay, as one square.
+  /// The anchor of one update: the positions held by β and by kStay, combined into one square.
   [[nodiscard]] NormalAnchor held(const Faces& faces) const {
     if (!pursues()) return anchor_;
     const double strength = anchor_.strength + kStay;
@@ -253,7 +254,7 @@ class Schedule {
          "energy " + number_text(row.energy, 4)});
   }
 
-  /// Whether the stage no longer gains.
+  /// True if the stage no longer gains.
   [[nodiscard]] bool settled() const {
     if (options_.method == Method::kPaper) return false;
     const std::vector<ReflectUpdate>& updates = state_.updates;
@@ -338,7 +339,7 @@ class Schedule {
     if (!keep_.partner.empty()) keep_.partner = mirror_partners(cut.mesh, keep_.axis);
   }
 
-  /// Distances from where the vertices were, as shares of the diagonal.
+  /// Displacements of the vertices, as shares of the diagonal.
   [[nodiscard]] Eigen::RowVectorXd displacements() const {
     return (mesh_.vertices - reference_.vertices).colwise().norm() / kUnitDiagonal;
   }
@@ -357,7 +358,7 @@ class Schedule {
   LightField field_;
   ConstraintSet keep_;
   NormalAnchor anchor_;
-  ReflectCheckpoint state_;  ///< But for its vertices, which `mesh_` has.
+  ReflectCheckpoint state_;  ///< Its vertices are in `mesh_` until it is saved.
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
   std::chrono::steady_clock::time_point saved_ = start_;
   int saves_ = 0;
@@ -389,7 +390,7 @@ namespace {
 
 using nlohmann::json;
 
-/// The numbers behind the header are the vertices and the unmet turns, as doubles.
+/// After the header come the vertices and the unmet turns, as doubles.
 constexpr std::string_view kMagic = "lensforge reflect checkpoint 1\n";
 
 /// Stages of a run: rim-spoke, face, split.
@@ -432,7 +433,7 @@ ReflectCheckpoint from_header(const json& header, const JsonFields& fields) {
   return checkpoint;
 }
 
-/// Takes a matrix of three rows off the front of the numbers.
+/// Takes a matrix of three rows from the front of the numbers.
 Eigen::Matrix3Xd taken(std::string_view& numbers, int columns, const std::filesystem::path& path) {
   constexpr std::size_t kBytes = 3 * sizeof(double);
   if (columns < 0 || static_cast<std::size_t>(columns) > numbers.size() / kBytes) {

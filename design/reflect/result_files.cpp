@@ -31,13 +31,13 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// Two shapes of the same faces in unit frame: as it came, and the new one.
+/// Two shapes with the same faces in the unit frame: the original and the new one.
 struct ShapePair {
   const SurfaceMesh& before;
   const SurfaceMesh& after;
 };
 
-/// Radiance that is shown as white: half of what a mirror-like facet sends straight back.
+/// Radiance shown as white: half of what a mirror-like facet reflects straight back.
 constexpr double kWhiteRadiance = 2.0;
 
 constexpr int kViews = 8;
@@ -46,9 +46,9 @@ constexpr double kField = 2.8;  ///< Width that a view shows; the shapes' diagon
 constexpr double kElevation = 8.0 * std::numbers::pi / 180.0;
 constexpr std::array<unsigned char, 3> kBackground{24, 26, 32};
 
-/// Looks at the origin from far away.
+/// A view of the origin from far away.
 struct View {
-  Vector3d towards;  ///< The eye.
+  Vector3d towards;  ///< Towards the eye.
   Vector3d right;
   Vector3d up;
 
@@ -69,7 +69,7 @@ struct View {
 
 using Color = std::array<unsigned char, 3>;
 
-/// What is drawn where a ray hits a face at a point.
+/// Returns the colour of a face at the point that a ray hits.
 using Shader = std::function<Color(int view, int face, const Vector3d& point)>;
 
 ColorImage canvas(int columns, int rows) {
@@ -113,7 +113,7 @@ DirectionSet eyes() {
   return listed_directions(towards);
 }
 
-/// Radiance of every face towards the sensor: a column per view for stealth, else one for all.
+/// Radiance of every face towards the sensor: a column per view for stealth, else one column.
 Eigen::MatrixXd face_radiances(const SurfaceMesh& mesh, const LightField& field,
                                const Executor& executor) {
   const bool stealth = !field.goal.has_place();
@@ -133,10 +133,10 @@ Eigen::MatrixXd face_radiances(const SurfaceMesh& mesh, const LightField& field,
   return radiance;
 }
 
-/// What the sensor sees of both shapes from eight directions around the z axis, before above after,
-/// all with the same scale: for stealth the light of a lamp beside the eye; for other goals the
-/// light that goes to their place, averaged over the sun's positions, on the shape seen from there
-/// and around. White is the radiance of kWhiteRadiance. @throw Interrupted
+/// Draws the sensor's view of both shapes from eight directions around the z axis, the original
+/// above the new one, all with the same scale: for stealth the light of a lamp beside the eye; for
+/// other goals the light that goes to their place, averaged over the sun's positions, on the shape
+/// seen from there and around. White is the radiance kWhiteRadiance. @throw Interrupted
 ColorImage retroreflection_views(const ShapePair& shapes, const LightField& field,
                                  const Executor& executor) {
   ColorImage image = canvas(kViews, 2);
@@ -151,7 +151,7 @@ ColorImage retroreflection_views(const ShapePair& shapes, const LightField& fiel
   return image;
 }
 
-/// How far every vertex moved, in false colour from eight directions; the brightest colour is the
+/// Draws the displacement in false colour from eight directions; the brightest colour is the
 /// largest displacement.
 ColorImage displacement_views(const ShapePair& shapes, const Executor& executor) {
   const Eigen::RowVectorXd moved =
@@ -271,7 +271,7 @@ std::string picture_sections(const ReflectResult& result, const GoalWords& words
                                   "Displacement of the surface" + html_scale("0", most)));
 }
 
-/// The energy of every update over the time in which it was reached, a curve for each stage.
+/// The energy of every update over time, a curve per stage.
 std::vector<PlotCurve> stage_curves(const std::vector<ReflectUpdate>& updates) {
   std::vector<PlotCurve> curves;
   for (const ReflectUpdate& update : updates) {
@@ -336,7 +336,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A reflect.json is a few kilobytes.
+/// Maximum size of reflect.json, which has a few kilobytes.
 constexpr std::uintmax_t kMaxJsonBytes = 1 << 20;
 
 nlohmann::json energies_json(const Energies& energies) {

@@ -24,23 +24,23 @@ inline constexpr const char* kConvergence = "convergence.csv";
 inline constexpr const char* kReport = "report.html";
 inline constexpr const char* kRadarTable = "radar.csv";
 inline constexpr const char* kRadarPlot = "radar.svg";
-/// Of an unfinished run; write_result() leaves it alone.
+/// Checkpoint of an unfinished run; write_result() does not touch it.
 inline constexpr const char* kCheckpoint = "reflect.checkpoint";
 inline constexpr std::array kAll{kRadarTable, kRadarPlot,    kSurface,     kPrint,  kReference,
                                  kViews,      kDisplacement, kConvergence, kReport, kJson};
 }  // namespace reflect_file
 
-/// @throw InputError for a file of these names in `folder` that lensforge did not write, unless
-/// `force`.
+/// @throw InputError if `folder` has a file of these names that lensforge did not write, unless
+///        `force`.
 void require_replaceable_result(const std::filesystem::path& folder, bool force);
 
-/// Whether the folder holds the finished result of this mesh and these options.
+/// True if the folder holds the finished result of this mesh and these options.
 bool holds_result(const std::filesystem::path& folder, std::uint64_t fingerprint);
 
-/// What a result says of itself: energies before and after, displacements, options.
+/// A result in the format of reflect.json: energies before and after, displacements, options.
 nlohmann::json result_json(const ReflectResult& result, const ReflectOptions& options);
 
-/// Writes all files of a result; they get their names together. @return their paths.
+/// Writes all files of a result and renames them together. @return their paths.
 /// @throw RunError
 std::vector<std::filesystem::path> write_result(const ReflectResult& result,
                                                 const ReflectOptions& options,
@@ -53,8 +53,8 @@ struct ReflectPictures {
   ColorImage displacement;  ///< displacement_views()
 };
 
-/// A page that needs nothing from outside: energies before and after, pictures, how the energy
-/// fell, radar cross-sections, what is broken, options.
+/// Returns a self-contained page: energies before and after, pictures, the energy over time, radar
+/// cross-sections, broken constraints, options.
 std::string reflect_report(const ReflectResult& result, const ReflectOptions& options,
                            const ReflectPictures& pictures);
 

@@ -15,7 +15,7 @@
 namespace lensforge {
 namespace {
 
-/// Keeps the factorisation positive; far above rounding of the diagonal's sums.
+/// Relative shift that keeps the factorisation positive; far above rounding of the diagonal's sums.
 constexpr double kShift = 1e-13;
 
 using Sparse = Eigen::SparseMatrix<double>;
@@ -30,7 +30,7 @@ Sparse laplacian(const WeightedGraph& graph) {
     diagonal[e.a] += e.weight;
     diagonal[e.b] += e.weight;
   }
-  // A node without any weight must not end the factorisation either.
+  // Lets the factorisation succeed with a node without weights.
   const double least = std::max(1e-30, 0.1 * kShift * diagonal.maxCoeff());
   for (int i = 0; i < graph.nodes; ++i) {
     entries.emplace_back(i, i, (1.0 + kShift) * diagonal[i] + least);
@@ -75,7 +75,7 @@ struct Rows {
   [[nodiscard]] std::size_t size() const { return diagonal.size(); }
 };
 
-/// Puts lower neighbours first, each part in the order it had.
+/// Moves lower neighbours to the front and keeps the order of both parts.
 void part_rows(Rows& rows) {
   rows.higher.resize(rows.size());
   std::vector<std::pair<std::int32_t, double>> later;
@@ -126,7 +126,7 @@ Rows rows_of(const WeightedGraph& graph) {
   return rows;
 }
 
-/// Pairs every node with the free neighbour it is tied to most, if that tie is not weak.
+/// Pairs every node with the unpaired neighbour of the largest weight, unless that is weak.
 std::vector<std::int32_t> pair_nodes(const Rows& rows, int& count) {
   constexpr double kWeak = 0.25;  // of the strongest tie; Notay's choice
   std::vector<std::int32_t> pair(rows.size(), -1);
@@ -259,7 +259,7 @@ class Hierarchy {
       std::vector<std::int32_t> aggregate = pair_nodes(fine, pairs);
       const Rows paired = aggregated(fine, aggregate, pairs);
       const std::vector<std::int32_t> second = pair_nodes(paired, count);
-      // Nodes that no tie joins to others would be carried along for ever.
+      // Unconnected nodes would never be merged.
       if (static_cast<double>(count) > 0.8 * static_cast<double>(fine.size())) break;
       for (std::int32_t& a : aggregate) a = second[static_cast<std::size_t>(a)];
       levels_.back().aggregate = std::move(aggregate);
@@ -335,7 +335,7 @@ class Hierarchy {
     return {x.data(), x.data() + x.size()};
   }
 
-  /// Gauss-Seidel from 0, where higher neighbours add nothing.
+  /// Gauss-Seidel from 0; higher neighbours add nothing.
   static Vector swept_forward(const Rows& rows, const Vector& right) {
     Vector x(right.size());
     for (std::size_t i = 0; i < x.size(); ++i) {
@@ -343,7 +343,7 @@ class Hierarchy {
     }
     return x;
   }
-  /// What such a sweep leaves of a row is what its higher neighbours became after it.
+  /// The residual of such a sweep in a row is the sum over its higher neighbours' new values.
   [[nodiscard]] Vector residual_after_sweep(const Rows& rows, const Vector& right,
                                             const Vector& x) const {
     Vector residual(x.size());
@@ -361,7 +361,7 @@ class Hierarchy {
 
   const Executor& executor_;
   std::vector<Level> levels_;
-  std::unique_ptr<LaplacianFactor> coarsest_;  ///< A cycle asks for several solutions.
+  std::unique_ptr<LaplacianFactor> coarsest_;  ///< Factorised once for a cycle's several solutions.
 };
 
 }  // namespace

@@ -9,7 +9,7 @@
 
 namespace lensforge {
 
-/// A graph with positive edge weights: its Laplacian is the Newton matrix of optimal transport.
+/// A graph with positive edge weights; its Laplacian is the Newton matrix of optimal transport.
 struct WeightedGraph {
   struct Edge {
     int a;
@@ -20,9 +20,9 @@ struct WeightedGraph {
   std::vector<Edge> edges;
 };
 
-/// Solves Σ_b weight_ab (x_a − x_b) = right_a by a sparse Cholesky factorisation (Eigen's: it
-/// brings no multi-threaded BLAS into the process, whose bits would hang on the machine). Parts
-/// that do not hang together are held in place by a diagonal of 1e-13 relative to their own.
+/// Solves Σ_b weight_ab (x_a − x_b) = right_a by a sparse Cholesky factorisation. Eigen's is used
+/// because it brings in no multi-threaded BLAS, whose bits depend on the machine. Disconnected
+/// parts are held in place by a diagonal of 1e-13 relative to their own.
 class LaplacianFactor {
  public:
   explicit LaplacianFactor(const WeightedGraph& graph);
@@ -46,14 +46,14 @@ struct MultigridOptions {
 
 struct MultigridSolution {
   Eigen::VectorXd x;      ///< Up to a constant.
-  int iterations = 0;     ///< Of conjugate gradients.
+  int iterations = 0;     ///< Iterations of conjugate gradients.
   double residual = 0.0;  ///< Relative to the right side.
 };
 
 /// Solves a graph's Laplace equation by flexible conjugate gradients, preconditioned by a K-cycle
 /// over aggregates of about four nodes (Notay, "An aggregation-based algebraic multigrid method",
-/// 2010). Weights may differ by many orders of magnitude between regions, as they do between white
-/// and black; where neighbouring edges differ so at random it does not converge.
+/// 2010). Weights may differ by many orders of magnitude between regions, for example between white
+/// and black; if neighbouring edges differ so at random, it does not converge.
 /// @pre right sums to about 0. @throw Interrupted if the executor's stop is requested.
 MultigridSolution solve_by_multigrid(const WeightedGraph& graph, const Eigen::VectorXd& right,
                                      const MultigridOptions& options, const Executor& executor);

@@ -34,7 +34,7 @@ class Iteration {
     floor_ = floor;
   }
 
-  /// One step of the fixed point; returns the largest change of a landing point.
+  /// One step of the fixed-point iteration; returns the largest change of a landing point.
   double step() {
     const auto right = transform_.values();
     for (int r = 0; r < rows_; ++r) {
@@ -80,7 +80,8 @@ class Iteration {
     return {0.5 * (at(f, c + 1, r) - at(f, c - 1, r)), 0.5 * (at(f, c, r + 1) - at(f, c, r - 1))};
   }
 
-  /// Floored density of mean 1 at a point in pixel coordinates, bilinear between pixel centres.
+  /// Density of mean 1 with its floor at a point in pixel coordinates, bilinear between pixel
+  /// centres.
   [[nodiscard]] double density(const Eigen::Vector2d& y) const {
     return floor_ + scale_ * bilinear(picture_, y);
   }
@@ -129,21 +130,22 @@ MongeAmpereResult solve_monge_ampere(const Image& picture, const MongeAmpereOpti
 
 namespace {
 
-/// Most vertices per mean cell: what lies between black and bright may serve any image area.
+/// Maximum density of vertices, in vertices per mean cell: the pixels between black and bright may
+/// serve any image area.
 constexpr double kMaxDense = 30.0;
 
-/// Area that a triangle keeps at least, a third of what kMaxDense leaves it. The transport map is
-/// monotone, but its differences over a pixel need not be where the density jumps: a step to the
-/// sixtyfold folded triangles over.
+/// Minimum share of its area that a triangle keeps, a third of what kMaxDense leaves. The transport
+/// map is monotone, but its differences over a pixel may not be where the density jumps: a step to
+/// the sixtyfold folded triangles over.
 constexpr double kMinShrinkage = 0.01;
 
-/// Most passes of smoothing against that; one is enough for that step.
+/// Maximum number of smoothing passes against that; one is enough for that step.
 constexpr int kMaxSmoothing = 8;
 
 /// See favour_dark().
 constexpr double kDarkPower = 0.3;
 constexpr double kDarkCost = 0.1;
-constexpr int kDarkHalvings = 10;  ///< Of the interval that p is sought in.
+constexpr int kDarkHalvings = 10;  ///< Halvings of the interval of p.
 
 /// Wanted density of vertices on the lens, drawn on a grid of setup.pixels.
 Image vertex_density(const ServedAreas& served, double share, const OpticalSetup& setup,
@@ -169,7 +171,7 @@ Image vertex_density(const ServedAreas& served, double share, const OpticalSetup
   return density;
 }
 
-/// A vector field on the pixels' corners, bilinear between them.
+/// Samples a vector field on the pixels' corners, bilinear between them.
 Eigen::Vector2d sample(const MongeAmpereResult& map, const Eigen::Vector2d& p) {
   const int c = std::clamp(static_cast<int>(p.x()), 0, map.columns - 2);
   const int r = std::clamp(static_cast<int>(p.y()), 0, map.rows - 2);
@@ -307,7 +309,7 @@ System assemble(const SurfaceMesh& mesh, const Eigen::Matrix2Xd& gradients) {
   return system;
 }
 
-/// The inverse Laplacian of the even grid, free of the mean. A node on the border stands for half a
+/// Inverse Laplacian of the even grid, free of the mean. A node on the border stands for half a
 /// cell; dividing by that makes the mirrored differences of the transform symmetric.
 class EvenGridPoisson {
  public:

@@ -14,7 +14,7 @@
 namespace lensforge {
 namespace {
 
-/// The integrals one pixel further to the right; `left` is the pixel's left side.
+/// The integrals one pixel to the right; `left` is the pixel's left side.
 DensityPixel advanced(const DensityPixel& before, double left) {
   DensityPixel after = before;
   after.value = 0.0;
@@ -52,7 +52,7 @@ SummedDensity::SummedDensity(const Image& picture, double total)
 
 namespace {
 
-/// Rays are cut this many extents of picture and sites away from it.
+/// Rays are cut at this many extents of picture and sites.
 constexpr double kReach = 16.0;
 
 int corner_cell(const PowerDiagram& diagram, const std::vector<DualEdge>& edges, int columns,
@@ -67,7 +67,7 @@ int corner_cell(const PowerDiagram& diagram, const std::vector<DualEdge>& edges,
       site = crossing.direction > 0 ? edge.left : edge.right;
     }
   }
-  // Where no edge crosses the border one cell holds all of it: its middle is the safest place.
+  // If no edge crosses the border, one cell has all of it; its middle is the safest point.
   return site >= 0 ? site : diagram.owner({columns, 0.5 * rows});
 }
 
@@ -123,7 +123,7 @@ WeightedGraph coupling(std::span<const DualEdge> edges, std::span<const EdgeMeas
   graph.edges.reserve(edges.size());
   for (std::size_t e = 0; e < edges.size(); ++e) {
     const EdgeMeasure& m = measures[e];
-    // Edges outside of the picture couple nothing.
+    // Edges outside the picture couple nothing.
     if (!(m.even_coupling > 0.0)) continue;
     graph.edges.push_back({edges[e].left, edges[e].right, m.coupling + even * m.even_coupling});
   }
@@ -147,7 +147,7 @@ Eigen::VectorXd NewtonSystem<Executor>::solve(const CellView& /*cells*/,
   MultigridOptions options;
   options.tolerance = kDirectionTolerance;
   MultigridSolution solution = solve_by_multigrid(graph, right, options, executor_);
-  // Not seen yet; the factorisation is slower but takes any weights.
+  // Has not happened yet; the factorisation is slower but works for any weights.
   if (!(solution.residual <= options.tolerance)) return LaplacianFactor(graph).solve(right);
   return std::move(solution.x);
 }

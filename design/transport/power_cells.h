@@ -55,7 +55,7 @@ LF_HD inline Moments density_strip(const DensityPixel& row, double y0, double y1
           row.second * height + row.mass * squares};
 }
 
-/// What kernels read of a SummedDensity.
+/// A SummedDensity's arrays, for kernels.
 struct DensityView {
   int columns;
   int rows;
@@ -68,7 +68,7 @@ struct DensityView {
     return pixels[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns) +
                   static_cast<std::size_t>(column)];
   }
-  /// ∮ along the right border from y = 0 to `y`: all that lies between those heights.
+  /// ∮ along the right border from y = 0 to `y`: everything between those heights.
   /// @pre 0 ≤ y ≤ rows.
   [[nodiscard]] LF_HD Moments right_border(double y) const {
     int row = static_cast<int>(y);
@@ -79,13 +79,13 @@ struct DensityView {
   }
 };
 
-/// A density ρ, constant on every pixel [c, c+1] × [r, r+1] and zero outside of the picture, with
-/// its integrals along rows from the left border: what Green's theorem needs to integrate over any
+/// A density ρ, constant on every pixel [c, c+1] × [r, r+1] and zero outside the picture, with its
+/// integrals along rows from the left border. By Green's theorem they give the integral over a
 /// polygon by a walk along its edges, ∫ρ dA = ∮ F dy with F(x, y) = ∫₀ˣ ρ(x′, y) dx′.
 class SummedDensity {
  public:
   /// Scales `picture` so that its integral is `total`.
-  /// @pre no value is negative or not finite, their sum is positive, and so is `total`.
+  /// @pre all values are finite and not negative; their sum and `total` are positive.
   SummedDensity(const Image& picture, double total);
 
   [[nodiscard]] int columns() const { return columns_; }
@@ -109,7 +109,7 @@ class SummedDensity {
   std::vector<Moments> border_;
 };
 
-/// A cell's place at one of its edges.
+/// One of a cell's edges.
 struct CellSide {
   std::int32_t code;       ///< The edge's number; its complement if the cell is on the right.
   std::int32_t neighbour;  ///< The cell on the other side.
@@ -118,21 +118,22 @@ struct CellSide {
   [[nodiscard]] LF_HD std::int32_t edge() const { return code >= 0 ? code : ~code; }
 };
 
-/// The edges of a power diagram, and which cell has which: all that a device must know of it.
+/// Edges of a power diagram and their assignment to cells: all that a device needs of it.
 struct CellEdges {
   std::vector<DualEdge> edges;
-  /// Cell i's sides are numbers first[i] … first[i + 1] − 1, in the order of the edges.
+  /// Cell i has sides first[i] … first[i + 1] − 1, in the order of the edges.
   std::vector<std::int32_t> first;
   std::vector<CellSide> sides;
-  /// The cell at the right border's far end, (columns, rows): Green's theorem leaves that border
-  /// out, and what a cell has of it shows only where edges cross it.
+  /// The cell at (columns, rows), the right border's far end. Green's theorem leaves that border
+  /// out, so a cell's part of it is known only where edges cross it.
   int corner = 0;
 };
 
-/// Edges for measuring under densities of columns × rows pixels.
+/// Returns the edges for measuring under densities of columns × rows pixels.
 CellEdges cell_edges(const PowerDiagram& diagram, int columns, int rows, const Executor& executor);
 
-/// Where an edge leaves (+1) or enters (−1) the half-plane left of the picture's right border.
+/// Crossing of an edge that leaves (+1) or enters (−1) the half-plane left of the picture's right
+/// border.
 struct BorderCrossing {
   int direction = 0;
   double y = 0.0;
@@ -147,15 +148,15 @@ LF_HD inline BorderCrossing right_crossing(const DualEdge& edge, double columns)
   return {from_inside ? 1 : -1, edge.from.y() + share * (edge.to.y() - edge.from.y())};
 }
 
-/// What is held by the cells of a power diagram cut to the picture.
+/// Contents of the cells of a power diagram cut to the picture.
 struct PowerCells {
   std::vector<double> mass;  ///< Per site, ∫ρ over its cell.
   std::vector<double> area;  ///< Per site, the part of the picture in its cell, pixels².
 };
 
-/// The numerical half of transport on one device, for sites that stay: all but the triangulation,
-/// which needs exact predicates and is the CPU's. Per diagram its edges go to the device; back come
-/// numbers of the cells.
+/// The numerical half of transport on one device, for fixed sites: everything but the
+/// triangulation, which needs exact predicates and runs on the CPU. Each diagram's edges go to the
+/// device; numbers of the cells come back.
 class CellStage {
  public:
   CellStage() = default;
@@ -163,7 +164,7 @@ class CellStage {
   CellStage(const CellStage&) = delete;
   CellStage& operator=(const CellStage&) = delete;
 
-  /// What is measured from now on; to be called first.
+  /// Sets the density to measure; called first.
   virtual void set_density(std::shared_ptr<const SummedDensity> density) = 0;
   [[nodiscard]] virtual const SummedDensity& density() const = 0;
 
@@ -173,25 +174,24 @@ class CellStage {
   /// Mass, first and second moments of every cell, for centroids and the energy.
   virtual std::vector<Moments> moments(const CellEdges& edges) = 0;
 
-  /// Change of the weights by which the masses change by `residual` to first order: solves
-  /// L δ = residual, L = ∂mass/∂w, up to kDirectionTolerance of the residual.
-  /// @pre `edges` were the last to be measured. @return not finite where it cannot be found.
+  /// Change of the weights that changes the masses by `residual` to first order: solves L δ =
+  /// residual, L = ∂mass/∂w, to kDirectionTolerance of the residual.
+  /// @pre `edges` were the last to be measured. @return not finite if it cannot be found.
   virtual Eigen::VectorXd newton_direction(const CellEdges& edges,
                                            const Eigen::VectorXd& residual) = 0;
 };
 
-/// Residual of an iterated Newton direction. Steps are as many as with exact directions (58,880
-/// sites: 31 on a photograph, 56 on the logo, both ways); a tenth of it costs a third more time.
+/// Residual of an iterated Newton direction. It takes as many steps as exact directions (58,880
+/// sites: 31 on a photograph, 56 on the logo); a tenth of it costs a third more time.
 inline constexpr double kDirectionTolerance = 1e-2;
 
-/// Sites above which Newton directions are iterated instead of factorised, and a GPU is worth its
-/// transfers. Processor seconds for a Newton system on 2 cores (CHOLMOD, supernodal, on OpenBLAS),
-/// logo on black: equal at 14,720 sites, 0.08 against 0.2 at 58,880, 1.1 against 4 at 942,080;
-/// black pixels take no more iterations than grey ones.
+/// Number of sites above which Newton directions are iterated instead of factorised, and a GPU is
+/// worth its transfers. Processor seconds of a Newton system on 2 cores, iterated against CHOLMOD:
+/// equal at 14,720 sites, 0.08 against 0.2 at 58,880, 1.1 against 4 at 942,080.
 inline constexpr int kDirectLimit = 12000;
 
 /// The stage on the executor's device; few sites stay on the CPU.
-/// @param sites  2 × n, pixels. @throw RunError if a GPU's memory does not suffice.
+/// @param sites  2 × n, pixels. @throw RunError if a GPU's memory is too small.
 std::unique_ptr<CellStage> make_cell_stage(const Eigen::Matrix2Xd& sites, const Executor& executor);
 
 #if defined(LENSFORGE_CUDA)

@@ -20,17 +20,17 @@
 
 namespace lensforge {
 
-// What one edge of a power diagram contributes to its two cells, and one cell's sum of that. An
+// Contribution of one edge of a power diagram to its two cells, and each cell's sum of them. An
 // edge is walked through the pixels that it crosses; no cell is ever cut with a pixel. Every cell
-// adds up its own edges, in their order: the same bits whoever does it.
+// adds up its own edges in their order, so all executors give the same bits.
 
-/// An edge's contribution to the cell on its left, that of the right gets the opposite; and what
-/// its length couples. As it is walked, `coupling` is ∫ρ dℓ and `even_coupling` ∫dℓ.
+/// Contribution of an edge to the cell on its left; the cell on its right gets the opposite. During
+/// the walk `coupling` is ∫ρ dℓ and `even_coupling` is ∫dℓ.
 struct EdgeMeasure {
   double mass = 0.0;
   double area = 0.0;
   double coupling = 0.0;  ///< −∂mass_left/∂w_right = ∫ρ dℓ / (2 |c_left − c_right|).
-  double even_coupling = 0.0;  ///< The same for a density of 1.
+  double even_coupling = 0.0;  ///< `coupling` for a density of 1.
 
   LF_HD void add_piece(const DensityPixel& pixel, const EdgePiece& piece) {
     const double dx = piece.x1 - piece.x0;
@@ -85,7 +85,7 @@ LF_HD Contribution walk_cell_edge(const DualEdge& edge, const DensityView& densi
   walk_edge(edge.from, edge.to, density.columns, density.rows, [&](const EdgePiece& piece) {
     if (piece.column >= 0) sum.add_piece(density.pixel(piece.column, piece.row), piece);
   });
-  // The cell on the left of an edge that leaves begins there on the border, its neighbour ends.
+  // The left cell of an edge that leaves begins there on the border; its neighbour ends.
   const BorderCrossing crossing = right_crossing(edge, columns);
   if (crossing.direction != 0 && crossing.y >= 0.0 && crossing.y < density.rows) {
     sum.add_border(density, crossing.y, -crossing.direction);
@@ -178,12 +178,12 @@ struct FindCellMoments {
 // Conjugate gradients on the graph of cells, scaled by the diagonal: one cell of each step.
 // Notation: L x = b; r = b − L x; D the diagonal of L; p the search direction, q = L p.
 
-/// An edge's weight in L, for both of its cells; and D⁻¹, 0 for a cell without any.
+/// Weights of a cell's edges in L, and D⁻¹; 0 for a cell without weights.
 struct FillRow {
   const std::int32_t* first;
   const CellSide* sides;
   const EdgeMeasure* edges;
-  double even;  ///< Density that is added everywhere.
+  double even;  ///< Density added everywhere.
   double* weights;
   double* inverse_diagonal;
 
@@ -257,20 +257,20 @@ struct TakeStep {
   }
 };
 
-/// Borders that run through black do not couple their cells at all, and whole groups of cells would
-/// hang loose from the others. So L is that of a density with this share spread evenly; masses are
-/// not touched by it, and nothing but the direction of a step depends on it.
+/// Share of the mass that is spread evenly over the density for L. Borders within black do not
+/// couple their cells, and whole groups of cells would be disconnected from the others. Masses are
+/// not affected; only a step's direction depends on it.
 inline constexpr double kCouplingFloor = 1e-9;
 
-/// Newton directions from edges in the caller's memory, by factorisation.
+/// Newton direction by factorisation, from edges in the caller's memory.
 Eigen::VectorXd factorised_direction(std::span<const DualEdge> edges,
                                      std::span<const EdgeMeasure> measures, double even,
                                      const Eigen::VectorXd& right);
 
-/// Newton directions on an executor. The CPU factorises or takes multigrid, whose set-up runs from
-/// node to node and whose coarse levels are small; any other executor takes conjugate gradients
-/// scaled by the diagonal, which need no set-up at all and are nothing but sums over long vectors:
-/// 400 iterations on average and 966 at most for the 51,200 sites of a 128² design.
+/// Newton directions on an executor. The CPU factorises or uses multigrid, whose set-up runs from
+/// node to node and whose coarse levels are small. Other executors use conjugate gradients scaled
+/// by the diagonal, which need no set-up and consist of sums over long vectors: 400 iterations on
+/// average for the 51,200 sites of a 128² design.
 template <class Exec>
 class NewtonSystem {
  public:
@@ -282,7 +282,7 @@ class NewtonSystem {
         direction_(cells),
         image_(cells) {}
 
-  /// @param edges  in the caller's memory, `measures` and what `cells` names in the executor's.
+  /// @param edges  in the caller's memory; `measures` and `cells` are in the executor's.
   Eigen::VectorXd solve(const CellView& cells, std::span<const DualEdge> edges,
                         std::span<const EdgeMeasure> measures, double even,
                         const Eigen::VectorXd& right) {
@@ -293,7 +293,7 @@ class NewtonSystem {
     fill_zero(executor_, direction_);
     upload(executor_, numbers(right), std::span<double>(residual_.data(), residual_.size()));
     if (!iterate(GraphRows{cells.first, cells.sides, weights_.data()})) {
-      // Cells that nothing ties to the others; no Newton step meets them.
+      // For disconnected cells; no Newton step meets them.
       std::vector<EdgeMeasure> here(measures.size());
       download(executor_, measures, std::span<EdgeMeasure>(here));
       return factorised_direction(edges, here, even, right);
@@ -307,11 +307,11 @@ class NewtonSystem {
  private:
   using Vector = typename Exec::template Buffer<double>;
 
-  /// Residual of a direction. What conjugate gradients leave is smooth, and a picture shows that:
-  /// the MAE of a 128² design (two rounds of 30 iterations) is 0.0055 with 1e-2, 0.0032 with 1e-3
-  /// and 0.0029 with this; 0.0027 with multigrid, whose 1e-2 is rough. 1e-2 takes 170 iterations.
+  /// Residual of a direction. Conjugate gradients leave a smooth error, which a picture shows: the
+  /// MAE of a 128² design (two rounds of 30 iterations) is 0.0055 with 1e-2 and 0.0029 with 1e-4;
+  /// 0.0027 with multigrid, whose 1e-2 is rough.
   static constexpr double kTolerance = 1e-4;
-  /// Iterations are given up after this many times √cells; 4.3 is the most that any took.
+  /// Maximum number of iterations, in √cells; the largest number so far is 4.3.
   static constexpr double kMaxIterations = 20.0;
 
   [[nodiscard]] static std::span<const double> numbers(const Eigen::VectorXd& v) {
@@ -323,7 +323,7 @@ class NewtonSystem {
     parallel_for(executor_, kernel, count(), functor);
   }
 
-  /// Conjugate gradients from 0. @return whether they came to the end.
+  /// Conjugate gradients from 0. @return true if they converged.
   bool iterate(const GraphRows& rows) {
     const auto sizes = pending_sum<2>(executor_, "newton residual", count(),
                                       ResidualSizes{residual_.data(), inverse_diagonal_.data()})
@@ -429,7 +429,7 @@ class CellStageOn final : public CellStage {
     return system_.solve(view(edges), edges.edges, measures, even, residual);
   }
 
-  /// What the edges that were measured last contribute, in the caller's memory.
+  /// Contributions of the edges measured last, in the caller's memory.
   [[nodiscard]] std::vector<EdgeMeasure> edge_measures(const CellEdges& edges) const {
     return fetched(measures_, edges.edges.size());
   }
@@ -459,7 +459,7 @@ class CellStageOn final : public CellStage {
   static void fit(Buffer<T>& buffer, std::size_t size) {
     if (buffer.size() >= size) return;
     buffer = {};
-    buffer = Buffer<T>(size + size / 16);  // The next diagram has a few edges more.
+    buffer = Buffer<T>(size + size / 16);  // The next diagram has a few more edges.
   }
   template <class T>
   [[nodiscard]] std::vector<T> fetched(const Buffer<T>& from, std::size_t size) const {
@@ -481,7 +481,7 @@ class CellStageOn final : public CellStage {
   Buffer<double> mass_;
   Buffer<double> area_;
   NewtonSystem<Exec> system_;
-  const DualEdge* sent_ = nullptr;      ///< Whose edges the device has,
+  const DualEdge* sent_ = nullptr;      ///< Diagram whose edges the device has,
   const DualEdge* measured_ = nullptr;  ///< and whose measures.
 };
 

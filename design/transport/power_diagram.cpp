@@ -74,7 +74,7 @@ using FaceBase =
 using Structure = CGAL::Triangulation_data_structure_2<VertexBase, FaceBase>;
 using Regular = CGAL::Regular_triangulation_2<Kernel, Structure>;
 
-/// Insertions, or flips, between two checks of the stop token; about 10 ms.
+/// Insertions or flips between two checks of the stop token; about 10 ms.
 constexpr std::size_t kStopInterval = 4096;
 
 Regular inserted(const Eigen::Matrix2Xd& sites, const Eigen::VectorXd& weights,
@@ -92,8 +92,7 @@ Regular inserted(const Eigen::Matrix2Xd& sites, const Eigen::VectorXd& weights,
   return regular;
 }
 
-/// Numbers the faces by their lowest site: faces of neighbours are near to each other in memory if
-/// the sites are.
+/// Numbers the faces by their lowest site, so that faces of neighbouring sites are close in memory.
 void number_faces(Regular& regular, std::size_t sites) {
   const auto lowest = [&](const Regular::Face_handle& f) {
     int low = static_cast<int>(sites);
@@ -149,8 +148,8 @@ std::size_t RegularTriangulation::corner_towards(std::size_t f, int neighbour) c
   return n[0] == neighbour ? 0 : (n[1] == neighbour ? 1 : 2);
 }
 
-/// Sides of the hull stay: which sites are its corners does not depend on weights, and a site on
-/// one of its sides is hidden only if a side inside proves it.
+/// Sides of the hull stay: the sites at its corners do not depend on weights, and a site on one of
+/// its sides is hidden only if a side inside proves it.
 bool RegularTriangulation::is_proper(const PowerTest& test, std::size_t f, std::size_t k) const {
   const TriangleFace& face = faces_[f];
   const auto g = static_cast<std::size_t>(face.neighbour[k]);
@@ -189,8 +188,8 @@ bool RegularTriangulation::can_flip(const PowerTest& test, std::size_t f, std::s
          test.is_counterclockwise(opposite, face.second(k), face.vertex[k]);
 }
 
-/// From triangles p a b and q b a to p a q and q b p, which take their places; corners 0 and 2 of
-/// both then lie opposite to the four outer sides.
+/// Turns triangles p a b and q b a into p a q and q b p in their places; corners 0 and 2 of both
+/// then lie opposite to the four outer sides.
 void RegularTriangulation::flip(std::size_t f, std::size_t k) {
   TriangleFace& left = faces_[f];
   const int g = left.neighbour[k];
@@ -239,13 +238,13 @@ void RegularTriangulation::append_star(std::size_t f, int site, std::vector<Side
 
 namespace {
 
-/// A raised site comes to lie this share of its depth before below the triangle around it, and of
-/// the depth that it has without weights, where that is more: far above rounding, so that sites
-/// that hide each other by turns come to an end.
+/// A raised site lies below the triangle around it by this share of its previous depth, or by the
+/// second share of its depth without weights if that is more. Both are far above rounding, so sites
+/// that hide each other in turn come to an end.
 constexpr double kDepthKept = 0.5;
 constexpr double kLeastDepth = 1e-6;
 
-/// How far a site's height lies below the plane through those of the triangle around it.
+/// Depth of a site's height below the plane through those of the triangle around it.
 class Depth {
  public:
   Depth(const Eigen::Matrix2Xd& sites, int site, const std::array<int, 3>& around)
@@ -280,8 +279,8 @@ bool RegularTriangulation::reweight(const Eigen::Matrix2Xd& sites, const Eigen::
                                     const Executor& executor) {
   LF_CHECK(is_planar() && hidden_.empty(), std::to_string(hidden_.size()));
   const PowerTest test(sites, weights);
-  // A flip lowers the lifted surface, so this ends; a side that another flip has moved is met again
-  // among the outer sides of that flip.
+  // A flip lowers the lifted surface, so this terminates. A side that another flip has moved is
+  // checked again among that flip's outer sides.
   std::vector<Side> todo = improper_sides(test, executor);
   std::reverse(todo.begin(), todo.end());
   int raises = 0;
@@ -298,7 +297,7 @@ bool RegularTriangulation::reweight(const Eigen::Matrix2Xd& sites, const Eigen::
       const double wanted =
           std::max(kDepthKept * depth.under(before), kLeastDepth * depth.without_weights());
       const double raise = wanted - depth.under(weights);
-      if (!std::isfinite(raise)) return false;  // The triangle is too thin to tell.
+      if (!std::isfinite(raise)) return false;  // The triangle is too thin.
       weights[site] += raise;
       append_star(f, site, todo);
       continue;
@@ -322,7 +321,7 @@ struct RadicalAxis {
   Eigen::Vector2d base;
   Eigen::Vector2d direction;
 
-  /// `near` is the point to whose foot on the axis `base` is moved.
+  /// @param near  `base` is its foot on the axis.
   RadicalAxis(const Eigen::Vector2d& a, const Eigen::Vector2d& b, double weight_difference,
               const Eigen::Vector2d& near) {
     const Eigen::Vector2d d = b - a;
@@ -333,8 +332,8 @@ struct RadicalAxis {
     direction = left_of(normal);
   }
 
-  /// `end` itself, or, where it is farther than `reach` from the base or not finite, the point of
-  /// the axis at that distance, forward if `forward` cannot be read off `end`.
+  /// Returns `end`; if it is farther than `reach` from the base or not finite, the point of the
+  /// axis at that distance. `forward` decides the direction if `end` does not.
   [[nodiscard]] Eigen::Vector2d bounded(const Eigen::Vector2d& end, double reach,
                                         bool forward) const {
     if ((end - base).squaredNorm() <= reach * reach) return end;
@@ -395,7 +394,7 @@ int PowerDiagram::owner(const Eigen::Vector2d& point) const {
 
 std::vector<PowerDiagram::Side> PowerDiagram::sorted_sides() const {
   const std::vector<TriangleFace>& faces = triangulation_.faces();
-  // Of the two faces at a side, one sees the lower number first.
+  // One of the two faces at a side has the lower number first.
   const auto each_side = [&](const auto& visit) {
     for (std::size_t f = 0; f < faces.size(); ++f) {
       for (std::size_t k = 0; k < 3; ++k) {
@@ -412,7 +411,7 @@ std::vector<PowerDiagram::Side> PowerDiagram::sorted_sides() const {
   each_side([&](std::size_t first, const Side&) { ++begin[first + 1]; });
   for (std::size_t i = 1; i < begin.size(); ++i) begin[i] += begin[i - 1];
   std::vector<Side> sides(begin.back());
-  // Afterwards begin[i] is where those of i end.
+  // Afterwards begin[i] is the end of i's sides.
   each_side([&](std::size_t first, const Side& side) { sides[begin[first]++] = side; });
   std::size_t from = 0;
   for (const std::size_t to : begin) {
@@ -434,7 +433,7 @@ std::vector<std::pair<int, int>> PowerDiagram::neighbours() const {
   return pairs;
 }
 
-/// Of sites on one line: whole radical axes.
+/// Edges of sites on one line: whole radical axes.
 std::vector<DualEdge> PowerDiagram::parallel_edges(double reach) const {
   std::vector<DualEdge> edges;
   for (const auto& [a, b] : triangulation_.line()) {
@@ -447,16 +446,16 @@ std::vector<DualEdge> PowerDiagram::parallel_edges(double reach) const {
 
 namespace {
 
-/// Where the power distances to a face's three sites agree. Seen from the lowest site, so that the
-/// bits do not depend on which corner comes first.
+/// Point of equal power distance to a face's three sites, computed from the lowest site so that the
+/// bits do not depend on the first corner.
 Eigen::Vector2d radical_centre(const Eigen::Matrix2Xd& sites, const Eigen::VectorXd& weights,
                                std::array<int, 3> v) {
   std::rotate(v.begin(), std::min_element(v.begin(), v.end()), v.end());
   const Eigen::Vector2d origin = sites.col(v[0]);
   const Eigen::Vector2d b = sites.col(v[1]) - origin;
   const Eigen::Vector2d c = sites.col(v[2]) - origin;
-  // Faces run counterclockwise, by exact arithmetic. On the hull there are some so thin that
-  // rounding can leave any sign: their centres lie far out, not far in.
+  // Faces run counterclockwise, by exact arithmetic. Some on the hull are so thin that rounding can
+  // give any sign; their centres lie far outside.
   const double least = std::numeric_limits<double>::epsilon() * b.norm() * c.norm();
   const double double_area = std::max(least, b.x() * c.y() - b.y() * c.x());
   const double rb = 0.5 * (b.squaredNorm() - (weights[v[1]] - weights[v[0]])) / double_area;
@@ -500,7 +499,7 @@ std::vector<DualEdge> PowerDiagram::dual_edges(double reach, const Executor& exe
 
 namespace {
 
-/// Nearest place on the segment between two sites.
+/// Nearest point of the segment between two sites.
 PowerDiagram::Place place_on_segment(const Eigen::Matrix2Xd& sites, int a, int b,
                                      const Eigen::Vector2d& point) {
   const Eigen::Vector2d d = sites.col(b) - sites.col(a);
@@ -532,8 +531,8 @@ class FaceWalk {
     while (!face(at_).is_finite()) ++at_;
   }
 
-  /// @return the face that holds the point, or one beyond a side of the hull that it lies behind.
-  /// Towards a point regular triangulations have no circle of faces, so it comes to an end.
+  /// Returns the face that holds the point, or a face beyond a side of the hull that separates it.
+  /// Faces of regular triangulations are acyclic towards a point, so the walk ends.
   int find(const Eigen::Vector2d& point) {
     int next = at_;
     while (next >= 0) {
@@ -548,7 +547,7 @@ class FaceWalk {
     return at_;
   }
 
-  /// Nearest place on the hull, from a face beyond it.
+  /// Nearest point of the hull, starting from a face beyond it.
   [[nodiscard]] PowerDiagram::Place on_hull(int outside, const Eigen::Vector2d& point) const {
     PowerDiagram::Place best = on_side(outside, point);
     for (const std::size_t turn : {1U, 2U}) {
@@ -568,7 +567,7 @@ class FaceWalk {
   }
 
  private:
-  /// The face behind a side of this one that the point lies behind; −1 if there is none.
+  /// The face across a side that separates this face from the point; −1 if there is none.
   [[nodiscard]] int towards(const Eigen::Vector2d& point) const {
     for (std::size_t k = 0; k < 3; ++k) {
       if (side_of_line(sites_.col(face(at_).first(k)), sites_.col(face(at_).second(k)), point) < 0)

@@ -18,10 +18,10 @@
 namespace lensforge {
 namespace {
 
-/// Sites that make one coarser site, at most.
+/// Maximum number of sites merged into one coarser site.
 constexpr std::size_t kClusterSize = 4;
 
-/// False if all sites lie on one line, or nearly: then there are no triangles to upsample in.
+/// False if all sites lie on or near one line: then there are no triangles to upsample in.
 bool is_two_dimensional(const Eigen::Matrix2Xd& sites) {
   const Eigen::Matrix2Xd offsets = sites.colwise() - sites.rowwise().mean();
   const Eigen::Matrix2d spread = offsets * offsets.transpose();
@@ -33,7 +33,7 @@ double extent_of(const Eigen::Matrix2Xd& sites) {
   return (sites.rowwise().maxCoeff() - sites.rowwise().minCoeff()).maxCoeff();
 }
 
-/// Sums masses and mass-weighted places per parent.
+/// Sums masses and mass-weighted positions per parent.
 SiteClusters gather(const Eigen::Matrix2Xd& sites, const Eigen::VectorXd& masses,
                     std::vector<int> parent, int count) {
   SiteClusters clusters;
@@ -69,7 +69,7 @@ SiteClusters merge_coincident(const Eigen::Matrix2Xd& sites, const Eigen::Vector
     leader[static_cast<std::size_t>(keys[k][2])] =
         static_cast<int>(same ? leader[static_cast<std::size_t>(keys[k - 1][2])] : keys[k][2]);
   }
-  // Numbers in the order of the sites, so that without coincidences nothing is renumbered.
+  // Numbers follow the order of the sites, so nothing is renumbered without coincidences.
   std::vector<int> number(leader.size(), -1);
   std::vector<int> parent(leader.size(), -1);
   int count = 0;
@@ -84,7 +84,7 @@ SiteClusters merge_coincident(const Eigen::Matrix2Xd& sites, const Eigen::Vector
 
 namespace {
 
-/// Halves a part across its longer side until no piece has more than kClusterSize sites.
+/// Halves parts across their longer side until none has more than kClusterSize sites.
 class Splitting {
  public:
   explicit Splitting(const Eigen::Matrix2Xd& sites)
@@ -152,26 +152,25 @@ std::vector<SiteLevel> make_site_levels(const Eigen::Matrix2Xd& sites,
 
 namespace {
 
-/// Halvings of a step before it is given up.
+/// Maximum number of halvings of a step.
 constexpr int kMaxHalvings = 24;
 
-/// Where the next step begins, in lengths of the last: every halving costs a power diagram, and
-/// lengths change slowly from step to step. (58,880 sites, logo on black, mesh spread over it: 7.4
-/// processor seconds; from 1 each time 9.6.)
-constexpr double kGrowth = 4.0;  ///< If that was accepted at once,
+/// First length of the next step, in lengths of the last: every halving costs a power diagram, and
+/// lengths change slowly from step to step. (58,880 sites, logo on black: 7.4 processor seconds;
+/// 9.6 starting from 1 each time.)
+constexpr double kGrowth = 4.0;  ///< If the last was accepted at once,
 constexpr double kRetry = 2.0;   ///< and if not.
 
-/// Share of the sites whose weights a trial may raise to keep their cells, before it is given up. A
-/// handful of cells would otherwise hold back the step of all others: 41 instead of 56 Newton steps
-/// for the logo on 235,520 sites. From 0.001 to 0.03 it took the same.
+/// Maximum share of the sites whose weights a trial may raise to keep their cells. Otherwise a
+/// handful of cells would hold back the step of all others: 56 instead of 41 Newton steps for the
+/// logo on 235,520 sites. From 0.001 to 0.03 it took the same.
 constexpr double kMaxRaised = 0.01;
 
 Eigen::Map<const Eigen::VectorXd> masses_of(const PowerCells& cells) {
   return {cells.mass.data(), static_cast<Eigen::Index>(cells.mass.size())};
 }
 
-/// The diagram that `from` becomes under `weights`; sites that these would hide are shown where
-/// that is possible.
+/// Returns the diagram for other weights; sites that these would hide are shown if possible.
 PowerDiagram shown(const PowerDiagram& from, const SiteLevel& level, const Eigen::VectorXd& weights,
                    const Executor& executor) {
   std::optional<PowerDiagram> diagram =
@@ -212,14 +211,14 @@ double misplaced_share(const SiteLevel& level, const PowerCells& cells) {
 
 namespace {
 
-/// What trial steps are measured with and held against.
+/// Measures trial steps.
 struct Search {
   const SiteLevel& level;
   const Executor& executor;
   CellStage& stage;
   double least;  ///< Mass that every cell keeps.
 
-  /// The state that a step of `length` times the Newton direction leads to, if that is good enough.
+  /// Returns the state after a step of `length` times the Newton direction, if it is good enough.
   [[nodiscard]] std::optional<PowerState> step(const PowerState& state,
                                                const Eigen::VectorXd& direction,
                                                double length) const {
@@ -288,7 +287,7 @@ Eigen::Matrix2Xd cell_centroids(const PowerDiagram& diagram, const SummedDensity
 }
 
 Eigen::VectorXd stretched_weights(const Eigen::Matrix2Xd& sites, const SummedDensity& density) {
-  // A box without width is taken as wide as this share of the picture.
+  // Minimum width of a box, as a share of the picture.
   constexpr double kMinWidth = 1e-3;
   constexpr double kInset = 0.95;
   const Eigen::Vector2d size(density.columns(), density.rows());
@@ -314,7 +313,7 @@ struct PotentialSamples {
   std::vector<double> values;
 
   /// Adds the mirror images about `line` of the samples closer to it than `reach`; ψ is continued
-  /// evenly about the slope `border`, where the picture ends.
+  /// evenly about the slope `border` at the picture's border.
   void mirror(Eigen::Index axis, double line, double border, double reach) {
     const std::size_t count = sites.size();
     for (std::size_t i = 0; i < count; ++i) {
@@ -377,7 +376,7 @@ Eigen::Matrix2Xd columns_of(const Eigen::Matrix2Xd& all, const std::vector<int>&
   return some;
 }
 
-/// Where the hidden sites lie among the visible ones.
+/// Places of the hidden sites among the visible ones.
 std::vector<PowerDiagram::Place> hidden_places(const PowerDiagram& diagram) {
   if (diagram.hidden().empty()) return {};
   const Eigen::Matrix2Xd points = columns_of(diagram.sites(), diagram.hidden());
@@ -407,7 +406,7 @@ Eigen::VectorXd upsampled_weights(const PowerState& coarse, CellStage& stage,
 
 namespace {
 
-/// Who borders on whom in the whole plane; a hidden site borders on the triangle it lies in.
+/// Neighbours in the whole plane; a hidden site has the triangle around it as neighbours.
 class Neighbourhood {
  public:
   explicit Neighbourhood(const PowerDiagram& diagram)
@@ -440,23 +439,23 @@ class Neighbourhood {
   std::vector<int> others_;
 };
 
-/// Cells with less than this share of their wanted mass are mended in the first rounds; later only
-/// those that have next to nothing, since a round costs a triangulation.
+/// The first rounds mend cells with less than this share of their wanted mass, later ones only
+/// those that are empty, because a round costs a triangulation.
 constexpr double kNearlyEmpty = 0.02;
 constexpr double kEmpty = 1e-4;
 constexpr int kThoroughRounds = 4;
 constexpr int kMendingRounds = 60;
-/// Rings of neighbours that are asked for room: two, and more only while none of them has any.
+/// Rings of neighbours that are searched for room: two, and more only while none has any.
 constexpr int kRings = 2;
 constexpr int kMaxRings = 12;
-/// Neighbours that are asked at most: a site beside a wide black part borders on thousands.
+/// Maximum number of neighbours searched: a site beside a wide black part has thousands.
 constexpr std::size_t kMaxAsked = 256;
-/// Share of the cells above which mending is given up: it mends stragglers, a round at a time.
+/// Share of empty cells above which mending is given up; it can only mend stragglers.
 constexpr double kMaxEmpty = 0.15;
 
-/// Takers of one cell in a round, and where along its extent, in standard deviations from the
-/// centroid towards the taker, each one's border is put: nearer sites cut closer, else the farther
-/// one's steeper plane would hide them.
+/// Maximum number of takers of one cell in a round, and the position of each one's border in the
+/// cell, in standard deviations from the centroid towards the taker. Nearer sites cut closer, or
+/// the farther one's steeper plane would hide them.
 constexpr std::size_t kMaxTakers = 4;
 constexpr std::array<std::array<double, kMaxTakers>, kMaxTakers> kCuts = {{
     {0.0, 0.0, 0.0, 0.0},
@@ -476,7 +475,7 @@ class Mending {
         centroids_(cell_centroids(state.diagram, stage.density(), moments_)),
         psi_(potential_of_weights(level.sites, state.diagram.weights())) {}
 
-  /// New weights; cells below `share` of their wanted mass are given room.
+  /// Returns new weights; cells below `share` of their wanted mass are given room.
   [[nodiscard]] Eigen::VectorXd weights(double share) const {
     std::vector<Taking> takings;
     for (int i = 0; i < static_cast<int>(psi_.size()); ++i) {
@@ -550,7 +549,7 @@ class Mending {
   Eigen::VectorXd psi_;
 };
 
-/// How many cells hold less than `share` of their wanted mass.
+/// Number of cells with less than `share` of their wanted mass.
 std::size_t count_below(const SiteLevel& level, const PowerCells& cells, double share) {
   std::size_t count = 0;
   for (std::size_t i = 0; i < cells.mass.size(); ++i) {

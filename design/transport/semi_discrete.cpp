@@ -22,11 +22,11 @@
 namespace lensforge {
 namespace {
 
-/// Blurs a line by one recursive pass each way (a discrete exponential). Work holds two lines.
+/// Blurs a line by one recursive pass each way (a discrete exponential). @param work  scratch.
 void blur_line(std::span<double> line, double decay, std::vector<double>& work) {
   const std::size_t n = line.size();
   work.resize(n);
-  // What the mirrored line, repeated for ever, has summed up before its start: a period is 2n.
+  // Sum of the mirrored, periodically repeated line before its start; a period is 2n.
   double before = 0.0;
   for (std::size_t i = 0; i < n; ++i) before = line[i] + decay * before;
   for (std::size_t i = n; i-- > 0;) before = line[i] + decay * before;
@@ -35,7 +35,7 @@ void blur_line(std::span<double> line, double decay, std::vector<double>& work) 
     sum = line[i] + decay * sum;
     work[i] = sum;
   }
-  // Mirrored at the end, the sum from the right starts with the sum from the left.
+  // The line is mirrored at its end, so the sum from the right starts with the sum from the left.
   for (std::size_t i = n; i-- > 0;) {
     const double value = line[i];
     const double right = decay * sum;
@@ -73,20 +73,21 @@ Image soften(const Image& picture, double length, double floor) {
 
 namespace {
 
-/// Sites of the coarsest level, at least: there a step takes milliseconds and can start anywhere.
+/// Minimum number of sites of the coarsest level: there a step takes milliseconds and can start
+/// anywhere.
 constexpr int kCoarsest = 500;
-/// Blur of a level in mean cell widths. 0.5 to 2 took the same steps at 58,880 sites with black
-/// pixels; below, upsampling leaves thousands of cells empty.
+/// Blur of a level in mean cell widths. 0.5 to 2 took the same number of steps at 58,880 sites with
+/// black pixels; with less, upsampling leaves thousands of cells empty.
 constexpr double kBlurPerCell = 1.0;
-/// The coarsest level starts with this blur, as a share of the picture's longer side.
+/// First blur of the coarsest level, as a share of the picture's longer side.
 constexpr double kFirstBlur = 0.125;
-/// Blur falls by this factor from stage to stage, and to 0 from below kMinBlur pixels.
+/// Factor of the blur from stage to stage; below kMinBlur pixels it becomes 0.
 constexpr double kBlurFactor = 0.5;
 constexpr double kMinBlur = 0.1;
-/// Evenly spread share of the light while there is blur, so that no density vanishes; without blur
-/// it falls by kFloorFactor from stage to stage, and to 0 from below kMinFloor. At once to 0,
-/// cells that lie in black lose all of their mass, and no Newton step helps (logo, mesh spread over
-/// it).
+/// Evenly spread share of the light while there is blur, so that no density vanishes. Without blur
+/// it falls by kFloorFactor from stage to stage; below kMinFloor it becomes 0. If it fell to 0 at
+/// once, cells in black would lose all of their mass, and no Newton step would help (logo, spread
+/// mesh).
 constexpr double kFloor = 1e-4;
 constexpr double kFloorFactor = 0.1;
 constexpr double kMinFloor = 1e-9;
@@ -127,14 +128,14 @@ Density lit_part(const Image& picture) {
   return std::make_shared<SummedDensity>(lit, lit.total());
 }
 
-/// A density on the way to the picture itself.
+/// A density of the sequence that ends with the picture.
 struct Stage {
   double blur;
   double floor;
   Density density;
 };
 
-/// The hierarchy, what is known on it, and the log.
+/// Solves transport over the levels and logs its steps.
 class TransportSolver {
  public:
   TransportSolver(SiteClusters merged, const Image& picture, const TransportOptions& options,
@@ -147,7 +148,7 @@ class TransportSolver {
         result_(result),
         levels_(make_site_levels(merged_.sites, merged_.masses, kCoarsest)) {}
 
-  /// Coarse to fine. @return the balanced diagram, or the best there is.
+  /// Solves coarse to fine. @return the balanced diagram, or the best found.
   std::optional<PowerState> solve() {
     std::optional<PowerState> state;
     for (int l = static_cast<int>(levels_.size()) - 1; l >= 0; --l) {
@@ -157,13 +158,13 @@ class TransportSolver {
       } else {
         state = stretched(l);
       }
-      // What a coarser level got is nothing to the given sites.
+      // A coarser level's result is of no use for the given sites.
       if (!descend(l, *state) && l > 0) return std::nullopt;
     }
     return state;
   }
 
-  /// Weights and centroids of the given sites from those of the merged ones.
+  /// Writes weights and centroids of the given sites from those of the merged ones.
   void write(const PowerState& state, const Eigen::Matrix2Xd& sites,
              const Eigen::VectorXd& masses) {
     cells_->set_density(stage(0.0, 0.0).density);
@@ -210,14 +211,14 @@ class TransportSolver {
     return kBlurPerCell * std::sqrt(area / static_cast<double>(level(l).sites.cols()));
   }
 
-  /// Begins a level: its sites go to the device.
+  /// Starts a level: sends its sites to the device.
   PowerState measured(int l, const Eigen::VectorXd& weights, const Stage& s) {
     cells_ = make_cell_stage(level(l).sites, executor_);
     cells_->set_density(s.density);
     return power_state(level(l), weights, executor_, *cells_);
   }
 
-  /// The same diagram under another density.
+  /// Measures the same diagram under another density.
   void refill(const Stage& s, PowerState& state) {
     cells_->set_density(s.density);
     state.cells = cells_->measure(state.edges);
@@ -228,7 +229,7 @@ class TransportSolver {
     return std::nullopt;
   }
 
-  /// Newton steps under one density, logged.
+  /// Runs and logs Newton steps under one density.
   bool run_stage(int l, const Stage& s, double goal, PowerState& state) {
     int number = 0;
     double wall = wall_seconds();
@@ -258,7 +259,7 @@ class TransportSolver {
     return done;
   }
 
-  /// Lowers the blur from the level above to this level's own, on the finest to nothing.
+  /// Lowers the blur from the coarser level's to this level's own; on the finest to 0.
   bool descend(int l, PowerState& state) {
     const bool finest = l == 0;
     const double last = level_blur(l);
@@ -292,7 +293,7 @@ class TransportSolver {
     return state;
   }
 
-  /// A level's start from the solved one above, under that one's blur.
+  /// A level's start from the solved coarser level, under that level's blur.
   std::optional<PowerState> upsampled(int l, const PowerState& coarse) {
     const Stage s = stage(level_blur(l + 1), kFloor);
     cells_->set_density(s.density);
@@ -303,7 +304,7 @@ class TransportSolver {
     return state;
   }
 
-  /// Sites without mass: ψ and centroid as interpolated between the visible sites around.
+  /// Sites without mass get ψ and centroid interpolated between the visible sites around.
   void write_massless(const PowerState& state, const Eigen::Matrix2Xd& sites,
                       const Eigen::Matrix2Xd& centroids, double mean,
                       const std::vector<int>& massless) {
@@ -340,7 +341,7 @@ class TransportSolver {
   const RunControl& control_;
   TransportResult& result_;
   std::vector<SiteLevel> levels_;
-  std::unique_ptr<CellStage> cells_;  ///< Of the level that is worked on.
+  std::unique_ptr<CellStage> cells_;  ///< Stage of the current level.
 };
 
 }  // namespace
@@ -368,14 +369,14 @@ TransportResult solve_semi_discrete(const Eigen::Matrix2Xd& sites, const Eigen::
 
 namespace {
 
-/// Buckets to each side of a place's own whose sites are looked at.
+/// Number of buckets searched to each side of a point's own.
 constexpr int kReach = 2;
 
-/// Distance between the places at which a way is looked at for black, pixels.
+/// Distance between the points at which a segment is checked for black, pixels.
 constexpr double kLook = 0.5;
 
-/// Added to the moments of the neighbours' places, as a share of their trace, so that neighbours
-/// in one line do not give an unbounded slope across it.
+/// Added to the moments of the neighbours' positions, as a share of their trace, so that collinear
+/// neighbours do not give an unbounded slope across their line.
 constexpr double kRidge = 1e-3;
 
 }  // namespace
@@ -495,7 +496,7 @@ std::optional<Eigen::Vector2d> BrenierMap::way_to_crease(const Eigen::Vector2d& 
   std::erase_if(sites, [&](int s) { return is_lit_between(landing, centroids_.col(s)); });
   const int there = highest(sites, p);
   if (there < 0) return std::nullopt;
-  // Where the two planes are level.
+  // The two planes intersect there.
   const Eigen::Vector2d jump = centroids_.col(there) - landing;
   return (plane_at(here, p) - plane_at(there, p)) / jump.squaredNorm() * jump;
 }

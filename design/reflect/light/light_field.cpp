@@ -87,7 +87,7 @@ namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0;
 
-/// Rows and columns of the band for energies that are stated.
+/// Rows and columns of the band for energies that are reported.
 constexpr BandSampling kEvaluationBand{12, 64, 0.0};
 constexpr int kEvaluationSun = 96;
 

@@ -9,7 +9,7 @@
 
 namespace lensforge::reflect {
 
-/// What the reflected light is to do (Tojo et al., 4.1 and Fig. 12).
+/// Goal for the reflected light (Tojo et al., 4.1 and Fig. 12).
 enum class GoalKind {
   kStealth,  ///< As little as possible goes back to where the light comes from.
   kPoint,    ///< As much as possible goes to a point.
@@ -23,14 +23,14 @@ struct Goal {
   Eigen::Vector3d from{0.0, 0.0, 0.0};  ///< The point, or an end of the line.
   Eigen::Vector3d to{0.0, 0.0, 0.0};    ///< The line's other end.
 
-  /// Whether the sensor stands in one place, rather than where the light comes from.
+  /// True if the sensor has a fixed place, instead of being where the light comes from.
   [[nodiscard]] bool has_place() const { return kind != GoalKind::kStealth; }
   [[nodiscard]] bool maximizes() const {
     return kind == GoalKind::kPoint || kind == GoalKind::kLine;
   }
 
-  /// Where light that leaves `p` is to go to or not to go to: on a line q1 + s·d it is
-  /// s = clamp((p − q1)·d/|d|², 0, 1). @pre has_place()
+  /// The place that light leaving `p` should reach or avoid: on a line q1 + s·d it is s = clamp((p
+  /// − q1)·d/|d|², 0, 1). @pre has_place()
   [[nodiscard]] Eigen::Vector3d place(const Eigen::Vector3d& p) const {
     if (kind != GoalKind::kLine) return from;
     const Eigen::Vector3d d = to - from;
@@ -46,19 +46,20 @@ struct DirectionSet {
   [[nodiscard]] Eigen::Index count() const { return light.cols(); }
 };
 
-/// How finely a band of directions is sampled.
+/// Sampling of a band of directions.
 struct BandSampling {
   int rows = 6;       ///< Heights: Gauss points in z.
   int columns = 48;   ///< Azimuths of a row; neighbouring rows are staggered.
-  double turn = 0.0;  ///< Turns all about z, as a share of the distance of two azimuths.
+  double turn = 0.0;  ///< Turns all about z, in distances between azimuths.
 };
 
-/// The band |elevation| ≤ `elevation` about the z axis, every solid angle with the same weight
+/// Samples the band |elevation| ≤ `elevation` about the z axis with equal weight per solid angle
 /// (Tojo et al., 4.1): exact for polynomials in z of degree 2·rows − 1.
 /// @param elevation  rad, above 0, at most π/2. @pre rows, columns ≥ 1
 DirectionSet band_directions(double elevation, const BandSampling& sampling);
 
-/// Towards the sun on its half circle from east (+x, angle 0) over noon, (0, −1, 1)/√2, to west.
+/// Direction towards the sun on its half circle from east (+x, angle 0) over noon, (0, −1, 1)/√2,
+/// to west.
 Eigen::Vector3d sun_direction(double angle);
 
 /// `count` directions of the sun at even angles, none of them on the horizon. @pre count ≥ 1
@@ -71,7 +72,7 @@ DirectionSet listed_directions(const Eigen::Matrix3Xd& towards_light);
 /// 3 × count.
 Eigen::Matrix3Xd hemisphere_directions(int count);
 
-/// Where the light comes from and what it is to do.
+/// Directions of the light, and its goal.
 struct LightField {
   Goal goal;
   std::optional<Eigen::Matrix3Xd> listed;  ///< --light
@@ -79,17 +80,18 @@ struct LightField {
   int rows = 0;
   int sun_positions = 0;
 
-  /// Directions of an update; a band is turned by a golden share of its azimuths from one update to
+  /// Directions of an update. A band is turned by a golden share of its azimuths from one update to
   /// the next, so that a shape cannot hide between directions.
   [[nodiscard]] DirectionSet directions(int update) const;
-  /// A direction drawn from the whole band, the sun's half circle or the list by two numbers in
-  /// 0 … 1.
+  /// Draws a direction from the whole band, the sun's half circle or the list by two numbers in 0 …
+  /// 1.
   [[nodiscard]] Eigen::Vector3d random_direction(double u, double v) const;
-  /// Finer, for energies that are stated: the band average of a face is exact to 0.1 %.
+  /// Finer directions, for energies that are reported: the band average of a face is exact to 0.1
+  /// %.
   [[nodiscard]] DirectionSet evaluation_directions() const;
 };
 
-/// Reflected energy ½ Σ a_k ⟨L² V⟩·5 of a shape: by one reflection alone, and by one and two.
+/// Reflected energy 5·½ Σ a_k ⟨L² V⟩ of a shape, by one reflection alone and by one and two.
 struct Energies {
   double direct = 0.0;
   double total = 0.0;
@@ -100,13 +102,13 @@ struct ReflectOptions;
 /// @throw InputError naming --place or --light, the value and the rule.
 LightField make_light_field(const ReflectOptions& options);
 
-/// Numbers with commas between them. @throw InputError "option text: must be …"
+/// Reads numbers separated by commas. @throw InputError "option text: must be …"
 Eigen::VectorXd number_list(const std::string& option, const std::string& text, int count);
 
 /// Diagonal of the bounding box that the paper's parameters are stated for (Tojo et al., 4.6).
 inline constexpr double kUnitDiagonal = 3.0;
 
-/// Takes a mesh to a bounding box about the origin with that diagonal, and back.
+/// Maps a mesh to a bounding box of that diagonal about the origin, and back.
 class UnitFrame {
  public:
   explicit UnitFrame(const SurfaceMesh& mesh);

@@ -15,11 +15,11 @@ namespace lensforge::reflect {
 /// ε of the loss 1/(L + ε).
 inline constexpr double kLossFloor = 1e-5;
 
-/// What is minimised for a radiance L.
+/// Function of a radiance L that is minimised.
 enum class Loss {
   kSquare,          ///< L²
-  kNegativeSquare,  ///< −L², where L is to be large.
-  kInverse,         ///< 1/(L + ε), where L is to be large (Tojo et al., 4.1).
+  kNegativeSquare,  ///< −L², for a large L.
+  kInverse,         ///< 1/(L + ε), for a large L (Tojo et al., 4.1).
 };
 
 [[nodiscard]] LF_HD inline double loss_of(Loss loss, double radiance) {
@@ -56,7 +56,7 @@ inline constexpr double kDiffuseFactor = kAlbedo * kDiffuse / std::numbers::pi;
 inline constexpr double kGlossyFactor =
     kAlbedo * kGlossy * (kExponent + 2) / (2.0 * std::numbers::pi);
 
-/// Below this cosine c the lobe is left out: 0.3^30 is 2e-16 of its top.
+/// Below this cosine c the lobe is left out: 0.3^30 is 2e-16 of its maximum.
 inline constexpr double kLobeEnd = 0.3;
 
 /// c^29; times c it is the lobe.
@@ -111,8 +111,8 @@ LF_HD inline Eigen::Vector3d reflected_adjoint(const Eigen::Vector3d& n, const E
   return terms.along_i * w_i + terms.along_o * w_o;
 }
 
-/// What F is at most after the normal has turned by about a lobe's width: with a third of the
-/// exponent, and the cosine larger by 0.2. @param c  cosine between w_i and w_o's mirror image.
+/// Upper bound of F after the normal has turned by about a lobe's width: a third of the exponent,
+/// and the cosine larger by 0.2. @param c  cosine between w_i and w_o's mirror image.
 template <class T>
 LF_HD inline T reflected_at_most(T c, T cos_i) {
   const T lobe = c > T(0) ? c : T(0);
@@ -120,10 +120,10 @@ LF_HD inline T reflected_at_most(T c, T cos_i) {
   return (T(kDiffuseFactor) + T(kGlossyFactor) * c2 * c2 * c2 * c2 * c2) * (cos_i + T(0.2));
 }
 
-// Reflected light of one face for all directions at once, written so that the compiler uses the
-// processor's vector units. Every number is the same whatever their width.
+// Reflected light of one face for all directions at once, written for the processor's vector units.
+// Results do not depend on their width.
 
-/// Directions are padded with zeros to whole packs of so many.
+/// Directions are padded with zeros to multiples of this number.
 inline constexpr Eigen::Index kLanes = 8;
 
 [[nodiscard]] inline Eigen::Index padded(Eigen::Index count) {
@@ -134,7 +134,7 @@ inline constexpr Eigen::Index kLanes = 8;
 template <class T>
 using LaneVectors = Eigen::Matrix<T, Eigen::Dynamic, 3>;
 
-/// `value` where the direction's flags have `bit`, else 0.
+/// Selects `value` where the direction's flags have `bit`, else 0.
 void select_lanes(const std::uint8_t* flags, std::uint8_t bit, const Eigen::VectorXd& value,
                   Eigen::VectorXd& selected);
 
@@ -166,24 +166,24 @@ struct LossLanes {
 /// Sums over the directions.
 struct LossSums {
   double value = 0.0;        ///< Σ weight·loss(L)
-  Eigen::Vector3d gradient;  ///< Of the value by the face's normal, through direct light.
+  Eigen::Vector3d gradient;  ///< Of `value` by the face's normal, through direct light.
   double curvature = 0.0;    ///< Σ weight·loss″(direct)·|∂L/∂n|²
 };
 
-/// @param indirect  light to be added to the direct one. @param lanes  receives what is summed.
+/// @param indirect  light added to the direct light. @param lanes  receives the summands.
 LossSums sum_losses(Loss loss, const DirectLanes& direct, const Eigen::VectorXd& indirect,
                     const Eigen::VectorXd& weight, const LaneVectors<double>& light,
                     const LaneVectors<double>& sensor, LossLanes& lanes);
 
-/// One way by which light reaches a face: k, by way of another one, q.
+/// A path by which light reaches face k by way of face q.
 struct HitGeometry {
   Eigen::Vector3f n_k;
   Eigen::Vector3f n_q;
   Eigen::Vector3f w;  ///< From k towards q.
 };
 
-/// Light by way of q for every direction, and what it is at most when normals turn by about a
-/// lobe's width (reflected_at_most()); 1/sr, single precision. @param lit  of q.
+/// Light by way of q for every direction, and its upper bound when normals turn by about a lobe's
+/// width (reflected_at_most()); 1/sr, single precision. @param lit  flags of q.
 void reflect_twice(const HitGeometry& hit, const LaneVectors<float>& light,
                    const LaneVectors<float>& sensor, const std::uint8_t* lit,
                    Eigen::VectorXf& value, Eigen::VectorXf& at_most);

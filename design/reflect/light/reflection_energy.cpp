@@ -23,7 +23,7 @@
 namespace lensforge::reflect {
 namespace {
 
-/// Faces per task: some ten thousand rays.
+/// Faces per task: about ten thousand rays.
 constexpr std::int64_t kFaceGrain = 32;
 
 /// Steps of the R2 sequence and, between faces, of the golden ratio.
@@ -33,7 +33,7 @@ constexpr double kStepFace = 0.6180339887498949;
 
 double fraction(double x) { return x - std::floor(x); }
 
-/// Points that cover a triangle evenly, the same for every face but for a shift.
+/// Points that cover a triangle evenly, the same for every face up to a shift.
 class FacePoints {
  public:
   explicit FacePoints(Eigen::Index count) {
@@ -61,7 +61,7 @@ class FacePoints {
   std::vector<double> v_;
 };
 
-/// Orthonormal, with n as its last column; the others are turned about it.
+/// Orthonormal frame with n as its last column, turned about it.
 Eigen::Matrix3d frame_of(const Eigen::Vector3d& n, double turn) {
   const Eigen::Vector3d a = n.unitOrthogonal();
   const Eigen::Vector3d b = n.cross(a);
@@ -125,9 +125,9 @@ class LightPaths::Caster {
     return static_cast<std::uint8_t>((lit ? kLit : 0) | (seen ? kSeen : 0));
   }
 
-  /// Faces met from behind, as on an open mesh, pass no light on.
+  /// Faces hit from behind, as on an open mesh, reflect no light.
   void gather(const Face& face) const {
-    if (face.normal.isZero()) return;  // A face that lost its area looks nowhere.
+    if (face.normal.isZero()) return;  // A face without area has no normal.
     const Eigen::Matrix3d frame = frame_of(face.normal, 2.0 * std::numbers::pi * face.shift);
     std::int32_t count = 0;
     for (int i = 0; i < paths_.gather_; ++i) {
@@ -174,15 +174,15 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// Light that comes back from a hit scatters its derivative over the mesh: every block of faces
-/// has a gradient of its own, and their sum in order does not depend on the threads.
+/// The derivative by way of a hit is scattered over the mesh: every block of faces has its own
+/// gradient, and their sum in order does not depend on the threads.
 constexpr std::int64_t kBlocks = 16;
 
-/// Towards the sensor of one face for every direction.
+/// Directions from one face towards the sensor, for every direction of the light.
 template <class T>
 class SensorLanes {
  public:
-  /// @param light  towards the light, where the sensor stands beside it.
+  /// @param light  directions towards the light, used if the sensor is beside it.
   SensorLanes(const LightPaths& paths, const LaneVectors<T>& light) : paths_(paths), light_(light) {
     if (paths.has_place()) to_place_.resize(light.rows(), 3);
   }
@@ -199,7 +199,7 @@ class SensorLanes {
   LaneVectors<T> to_place_;
 };
 
-/// Calls `of_face(worker_state, face)` for all faces, with a new state for every few of them.
+/// Calls `of_face(state, face)` for all faces, with a new state per group of faces.
 template <class MakeState, class OfFace>
 void for_faces(const Executor& executor, const char* kernel, Eigen::Index faces,
                const MakeState& make_state, const OfFace& of_face) {
@@ -214,7 +214,7 @@ void for_faces(const Executor& executor, const char* kernel, Eigen::Index faces,
 
 }  // namespace
 
-/// Tells hits that follow the normals from those that keep their light.
+/// Separates hits that follow the normals from those that keep their light.
 class ReflectionEnergy::HitSelection {
  public:
   HitSelection(const LightPaths& paths, const LaneVectors<float>& light, double floor)
@@ -281,7 +281,7 @@ ReflectionEnergy::ReflectionEnergy(const LightPaths& paths, Loss loss, const Exe
       });
 }
 
-/// Light of one face after the other, for all directions.
+/// Computes the light of one face at a time, for all directions.
 class ReflectionEnergy::FaceLight {
  public:
   FaceLight(const ReflectionEnergy& energy, const Eigen::Matrix3Xd& normals)
@@ -296,7 +296,7 @@ class ReflectionEnergy::FaceLight {
         indirect_(light_.rows()),
         loss_(light_.rows()) {}
 
-  /// @param hits  whether light by way of other faces is wanted, too.
+  /// @param hits  true to include light by way of other faces.
   void look_at(Eigen::Index face, bool hits) {
     face_ = face;
     toward_ = &sensor_.of(face);
@@ -474,14 +474,15 @@ Vector3d random_point(const Corners& c, Random& random) {
   return (1.0 - root) * c.v0 + root * (1.0 - v) * c.v1 + root * v * c.v2;
 }
 
-/// About an axis: cosine and azimuth.
+/// Direction at this cosine and azimuth about an axis.
 Vector3d around(const Vector3d& axis, double cosine, double azimuth) {
   const double sine = std::sqrt(std::max(0.0, 1.0 - cosine * cosine));
   const Vector3d u = axis.unitOrthogonal();
   return sine * std::cos(azimuth) * u + sine * std::sin(azimuth) * axis.cross(u) + cosine * axis;
 }
 
-/// Draws w_i: by the diffuse share around the normal, else by the lobe around the mirror direction.
+/// Draws w_i: around the normal with the probability of the diffuse share, else by the lobe around
+/// the mirror direction.
 Vector3d drawn_direction(const Vector3d& n, const Vector3d& w_o, Random& random) {
   const bool diffuse = random.next() < kDiffuse;
   const double u = random.next();
@@ -499,7 +500,7 @@ double density(const Vector3d& n, const Vector3d& w_o, const Vector3d& w_i) {
 
 }  // namespace
 
-/// Works through the faces of one block.
+/// Estimates the gradient of one block's faces.
 class PathEstimator::Walker {
  public:
   Walker(const PathEstimator& estimator, const Eigen::Matrix3Xd& normals, std::uint64_t seed)
@@ -516,14 +517,14 @@ class PathEstimator::Walker {
   [[nodiscard]] const Eigen::Matrix3Xd& gradient() const { return gradient_; }
 
  private:
-  /// A point of a face with the light and the sensor as seen from there.
+  /// A point of a face with the directions of light and sensor.
   struct Place {
     Eigen::Index face;
     Vector3d p;
     Vector3d w_o;
     Vector3d w_l;
   };
-  /// The other end of a path, if there is one that is lit.
+  /// The other end of a path; none if it is not lit.
   struct Bounce {
     int face = -1;
     Vector3d w_i;
@@ -564,8 +565,7 @@ class PathEstimator::Walker {
     const Vector3d n = normals_.col(place.face);
     Bounce bounce;
     bounce.w_i = drawn_direction(n, place.w_o, random);
-    // Said so that a direction which is no number goes nowhere, either: Embree would end the
-    // program.
+    // Written so that NaN is rejected too; Embree would end the program.
     if (!(n.dot(bounce.w_i) > 0.0)) return bounce;
     const RayHit hit = e_.scene_.nearest(place.p, bounce.w_i);
     if (!hit.met() || e_.faces_.normal.col(hit.face).dot(bounce.w_i) >= 0.0) return bounce;

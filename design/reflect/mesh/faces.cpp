@@ -149,12 +149,12 @@ std::vector<int> by_falling_value(const Eigen::VectorXd& value) {
   return order;
 }
 
-/// Whether two edges have a vertex in common.
+/// True if two edges have a vertex in common.
 bool touch(const Edge& a, const Edge& b) {
   return a.from == b.from || a.from == b.to || a.to == b.from || a.to == b.to;
 }
 
-/// The edge that mirrors each edge; itself where there is none.
+/// The mirror image of each edge; the edge itself if there is none.
 std::vector<int> mirrored_edges(const EdgeTable& table, const std::vector<int>& partner) {
   std::map<std::pair<int, int>, int> number;
   for (int e = 0; e < table.count(); ++e) {
@@ -252,8 +252,8 @@ SplitMesh split_at_middles(const SurfaceMesh& mesh, const std::vector<int>& edge
 
 namespace {
 
-/// Share of the diagonal within which vertices count as mirror images: single precision's rounding
-/// of large coordinates, and a thousandth of what an edge measures.
+/// Share of the diagonal within which vertices count as mirror images: above single precision's
+/// rounding of large coordinates, and a thousandth of an edge's length.
 constexpr double kMatch = 1e-4;
 
 using Cell = std::tuple<long, long, long>;
@@ -293,8 +293,8 @@ std::vector<int> mirror_partners(const SurfaceMesh& mesh, int axis) {
   return partner;
 }
 
-/// Owns Embree's objects. A device that is told how many threads to use keeps the whole process to
-/// as many for as long as it lives, so that this one is told nothing.
+/// Owns Embree's objects. The device is not given a number of threads, because that would limit the
+/// whole process for as long as the device lives.
 struct RayScene::Handles {
   Handles() : device(rtcNewDevice(nullptr)), scene(rtcNewScene(device)) {
     rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
@@ -348,7 +348,7 @@ RayScene::RayScene(const SurfaceMesh& mesh) {
   rtcCommitGeometry(geometry);
   rtcAttachGeometry(handles->scene, geometry);
   rtcReleaseGeometry(geometry);
-  // One thread builds the tree, so that it is the same every time.
+  // One thread builds the tree, so it is always the same.
   tbb::task_arena(1).execute([&] { rtcCommitScene(handles->scene); });
   handles_ = handles;
   const Eigen::Vector3d size =

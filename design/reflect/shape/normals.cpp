@@ -16,8 +16,8 @@
 namespace lensforge::reflect {
 namespace {
 
-/// Least curvature of a face per unit of its share of the area, so that faces without light and
-/// anchor have one: a thousandth of the largest, 200.
+/// Minimum curvature of a face per unit of its share of the area, for faces without light and
+/// anchor: a thousandth of the largest, 200.
 constexpr double kLeastCurvature = 0.2;
 
 Eigen::Map<const Eigen::Matrix3Xd> columns_of(std::span<const double> values) {
@@ -78,28 +78,28 @@ Eigen::Matrix3Xd optimized_normals(const NormalObjective& objective, const Eigen
 
 namespace {
 
-/// A normal turns by at most this much in a step, rad: two lobe widths.
+/// Maximum turn of a normal in a step, rad: two lobe widths.
 constexpr double kLongestStep = 0.15;
 constexpr double kGrowth = 2.0;
 constexpr double kShrinkage = 0.25;
 
-/// Turns that are tried to leave a plateau, rad: in steps of a lobe's width up to beyond the band.
+/// Turns tried to leave a plateau, rad: in steps of a lobe's width up to beyond the band.
 constexpr std::array kTilts{0.15, 0.3, 0.45};
 
-/// The normal turned away from the horizon.
+/// Turns a normal away from the horizon.
 Eigen::Vector3d tilted(const Eigen::Vector3d& n, double angle) {
   const Eigen::Vector3d up = Eigen::Vector3d::UnitZ() - n.z() * n;
   if (up.norm() < std::sin(angle)) return n;
   return (n + std::copysign(std::tan(angle), n.z()) * up.normalized()).normalized();
 }
 
-/// Normals with what every face adds to the objective.
+/// Normals with every face's contribution to the objective.
 struct Candidate {
   Eigen::Matrix3Xd normal;
   Eigen::VectorXd value;
 };
 
-/// Takes over the faces whose share is lower.
+/// Takes the new normals of faces whose contribution is lower.
 void keep_lower(const NormalObjective& objective, const Eigen::Matrix3Xd& normal, Candidate& best) {
   const Eigen::VectorXd value = objective.values(normal);
   for (Eigen::Index k = 0; k < normal.cols(); ++k) {
@@ -172,7 +172,7 @@ Eigen::Matrix3Xd stepped_normals(const PathEstimator& estimator, const NormalAnc
                                  const Eigen::VectorXd& area_share, const Eigen::Matrix3Xd& start,
                                  int steps, std::uint64_t seed) {
   Eigen::Matrix3Xd t = start;
-  // A face that has lost its area sends no light.
+  // A face without area reflects no light.
   const Eigen::VectorXd per_area =
       area_share.unaryExpr([](double share) { return share > 0.0 ? 1.0 / share : 0.0; });
   for (int step = 0; step < steps; ++step) {

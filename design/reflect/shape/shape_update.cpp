@@ -28,8 +28,8 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using Sparse = Eigen::SparseMatrix<double>;
 
-/// Weight of "stay where you are" relative to the mean of the system's diagonal: it fixes the place
-/// of a piece that nothing holds and changes nothing else by more than 1e-7.
+/// Weight of a pull to the start, relative to the mean of the system's diagonal. It fixes the
+/// position of free pieces and changes nothing else by more than 1e-7.
 constexpr double kAnchor = 1e-8;
 
 constexpr std::int64_t kElementGrain = 64;
@@ -38,10 +38,10 @@ struct ElementEdge {
   int from;
   int to;
   double weight;
-  Vector3d edge;  ///< In the reference.
+  Vector3d edge;  ///< Edge vector in the reference.
 };
 
-/// Elements as flat arrays: edges and faces of element i are those from begin[i] to begin[i + 1].
+/// Elements as flat arrays: element i has edges and faces begin[i] … begin[i + 1] − 1.
 struct Elements {
   std::vector<int> edge_begin{0};
   std::vector<ElementEdge> edges;
@@ -66,7 +66,7 @@ std::array<ElementEdge, 3> face_edges(const SurfaceMesh& mesh, Eigen::Index face
 }
 
 /// @param groups  the faces of every element.
-/// @param share   of its faces' area that is the element's own.
+/// @param share   share of its faces' area that belongs to an element.
 Elements make_elements(const SurfaceMesh& mesh, const std::vector<std::vector<int>>& groups,
                        double share) {
   const Faces faces = measure_faces(mesh);
@@ -104,7 +104,7 @@ std::vector<std::vector<int>> faces_of_elements(const SurfaceMesh& mesh, Element
   return groups;
 }
 
-/// The rotation R that makes tr(R S) largest.
+/// The rotation R that maximises tr(R S).
 Matrix3d best_rotation(const Matrix3d& s) {
   const Eigen::JacobiSVD<Matrix3d> svd(s, Eigen::ComputeFullU | Eigen::ComputeFullV);
   Matrix3d v = svd.matrixV();
@@ -274,14 +274,14 @@ double ShapeUpdate::energy(const Eigen::Matrix3Xd& vertices, const Eigen::Matrix
 
 namespace {
 
-/// Times that all constraints are enforced in turn.
+/// Number of sweeps over all constraints.
 constexpr int kSweeps = 4;
 
 constexpr double kVolumeTolerance = 0.01;
 constexpr double kThicknessTolerance = 0.01;
 constexpr double kPlaneTolerance = 1e-3;
 
-/// Share of the area that may be turned over: what slivers in creases have.
+/// Maximum share of the area that may be turned over, for slivers in creases.
 constexpr double kTurnedTolerance = 0.01;
 
 /// Share of the area of faces whose normals have turned by more than a right angle.
@@ -303,7 +303,7 @@ struct Plane {
   [[nodiscard]] double distance(const Eigen::Vector3d& p) const { return normal.dot(p - point); }
 };
 
-/// The plane with the least squares of distances.
+/// The plane of least squared distances.
 Plane fitted_plane(const Eigen::Matrix3Xd& vertices, const std::vector<int>& numbers) {
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
   for (const int v : numbers) mean += vertices.col(v);
@@ -348,7 +348,7 @@ SurfaceMesh Constraints::with(const Eigen::Matrix3Xd& vertices) const {
   return {vertices, reference_.triangles, {}};
 }
 
-/// What lies behind every vertex along its normal.
+/// Thickness behind every vertex, against its normal.
 Eigen::VectorXd Constraints::thickness(const Eigen::Matrix3Xd& vertices) const {
   const SurfaceMesh mesh = with(vertices);
   const RayScene scene(mesh);
@@ -370,7 +370,7 @@ void Constraints::flatten(Eigen::Matrix3Xd& vertices) const {
   }
 }
 
-/// Both sides move apart, each by half of what is missing.
+/// Both sides move apart, each by half of the missing thickness.
 void Constraints::thicken(Eigen::Matrix3Xd& vertices) const {
   if (set_.min_thickness == 0.0) return;
   const Eigen::Matrix3Xd normal = vertex_area_normals(with(vertices)).colwise().normalized();
@@ -378,8 +378,8 @@ void Constraints::thicken(Eigen::Matrix3Xd& vertices) const {
   vertices += 0.5 * normal * missing.asDiagonal();
 }
 
-/// The same offset along all normals: to first order the volume changes by the offset's share of
-/// the moved vertices' area.
+/// Moves all vertices by the same offset along their normals: to first order the volume changes by
+/// the offset times the moved vertices' area.
 void Constraints::keep_volume(Eigen::Matrix3Xd& vertices) const {
   if (!set_.volume) return;
   const Eigen::Matrix3Xd sums = vertex_area_normals(with(vertices));

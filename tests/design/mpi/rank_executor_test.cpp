@@ -16,7 +16,7 @@
 namespace lensforge {
 namespace {
 
-/// A rank's coefficients and values, there and back, beside those of one process.
+/// Compares a rank's coefficients and values, forward and back, with those of one process.
 void expect_transforms(const GridShape& grid) {
   CosineTransform whole(grid.columns, grid.rows);
   testing::Random random(5);
@@ -56,10 +56,10 @@ TEST(RankTransforms, HaveTheBitsOfTheCosineTransformThereAndBack) {
 
 TEST(RankTransforms, ServeRanksWithoutColumns) { expect_transforms({3, 40}); }
 
-/// Shares of a surface's image triangles go into one picture.
+/// Draws shares of a surface's image triangles into one picture.
 class PictureOnRanks : public ::testing::TestWithParam<int> {
  protected:
-  /// @return the rows of the picture that this rank looks at, and in `rows` which.
+  /// @return the pixels of the rows that this rank uses; `rows` receives their numbers.
   static std::vector<double> shared(const std::vector<ImageTriangle>& triangles,
                                     const SharedPicture& picture, ItemRange& rows) {
     const Ranks ranks = Ranks::world();

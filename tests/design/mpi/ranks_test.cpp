@@ -36,7 +36,8 @@ TEST(RowSlab, EveryRowAndFaceIsOwnedOnce) {
   }
 }
 
-/// Every item is in one part; a block is whole on the rank that has its last item, or joined there.
+/// Every item is in exactly one part; a block is whole on the rank that has its last item, or
+/// joined there.
 TEST(BlockShare, PartsCoverTheItemsInOrder) {
   for (const std::int64_t total : {1, 7, 40, 41}) {
     for (int ranks = 1; ranks <= 9; ++ranks) {

@@ -60,7 +60,7 @@ void expect_same_energy(const ObjectiveEvaluation& found, const ObjectiveEvaluat
   EXPECT_EQ(a.total, b.total);
 }
 
-/// Both stages where the mesh is, and where it has moved to since it was linearized.
+/// Compares both stages at the mesh where it was linearized, and after a move.
 void expect_same_objective(SurfaceModel model, Goal goal, const OpticalSetup& setup) {
   const auto shared = shared_stage(model, goal, setup);
   const auto whole = whole_stage(model, goal, setup);
@@ -99,7 +99,7 @@ class GradientOnRanks : public StageOnRanks,
 INSTANTIATE_TEST_SUITE_P(Setups, GradientOnRanks, ::testing::ValuesIn(testing::all_setups()),
                          [](const auto& one) { return one.param.name; });
 
-/// To the last bit, both.
+/// Both agree to the last bit.
 TEST_P(GradientOnRanks, AndEnergyAreThoseOfOneProcess) {
   testing::on_first_rank([] {
     for (const SurfaceModel model : testing::kModels) {
@@ -131,7 +131,7 @@ TEST_F(StageOnRanks, RootOfThePreconditionerEqualsThatOfOneProcess) {
   });
 }
 
-/// The whole of what a round does with a stage, scales included, over so many steps.
+/// Everything that a round does with a stage, including scales, for this number of steps.
 struct Descent {
   SurfaceMesh mesh = testing::rough_mesh();
   LbfgsSummary summary;
@@ -171,7 +171,7 @@ double value_in_one_process(const SurfaceMesh& mesh) {
       .value(mesh);
 }
 
-/// Stopped by another thread, as a signal does it.
+/// Stopped by another thread, like a signal.
 TEST_F(StageOnRanks, StopsOnAllRanksAndKeepsTheBest) {
   testing::on_first_rank([] {
     std::stop_source stop;
@@ -187,14 +187,14 @@ TEST_F(StageOnRanks, StopsOnAllRanksAndKeepsTheBest) {
         Interrupted);
     EXPECT_LT(value_in_one_process(descent.mesh),
               0.9 * value_in_one_process(testing::rough_mesh()));
-    // The ranks are in step: they do more together.
+    // The ranks are still in step and can do more together.
     Descent again;
     again.run(SurfaceModel::kSmooth, on_ranks(), 2, go_on);
     EXPECT_EQ(again.summary.iterations, 2);
   });
 }
 
-/// A full disk, say.
+/// For example because the disk is full.
 TEST_F(StageOnRanks, PassesOnWhatItsObserverThrows) {
   testing::on_first_rank([] {
     const auto observe = [](int iteration, const ObjectiveEvaluation& /*there*/) {
@@ -220,7 +220,7 @@ TEST_F(StageOnRanks, IsNotMadeWhereRowsAreTooFew) {
   });
 }
 
-/// The surface of a small design, from which everything else follows.
+/// The surface of a small design, which determines everything else.
 SurfaceMesh designed(SurfaceModel model, const Executor& executor) {
   const Image picture = testing::spot_picture(64, 56);
   DesignOptions options = default_design_options(model, picture);

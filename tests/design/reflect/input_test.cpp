@@ -16,7 +16,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-/// Every face with corners of its own, as STL has them.
+/// A mesh whose faces share no vertices, as in STL.
 SurfaceMesh soup(const SurfaceMesh& mesh) {
   SurfaceMesh result{Eigen::Matrix3Xd(3, 3 * mesh.triangle_count()), mesh.triangles, {}};
   for (int i = 0; i < 3 * mesh.triangle_count(); ++i) {
@@ -76,7 +76,7 @@ TEST(MeshRepair, DropsAFaceThatHasACornerTwice) {
 }
 
 /// A mesh with flat faces on some of its edges: the middle of an edge becomes a vertex of the face
-/// on one side, and the other side is closed with a face whose corners stand in a line.
+/// on one side, and the other side is closed with a face whose corners are collinear.
 SurfaceMesh with_flat_faces(const SurfaceMesh& mesh, const std::vector<int>& edges) {
   const EdgeTable table = make_edges(mesh);
   std::vector<Eigen::Vector3d> vertices;

@@ -125,7 +125,7 @@ TEST(ReflectShape, ATenthOfTheEnergyHasToBeGained) {
   EXPECT_TRUE(gained_enough(GoalKind::kPoint, 0.2, 0.3));
   EXPECT_FALSE(gained_enough(GoalKind::kLine, 0.2, 0.21));
   EXPECT_FALSE(gained_enough(GoalKind::kPoint, 0.0, 0.0));
-  // There was nothing to gain.
+  // There is nothing to gain.
   EXPECT_TRUE(gained_enough(GoalKind::kStealth, 8e-5, 8e-5));
   EXPECT_FALSE(gained_enough(GoalKind::kStealth, 8e-5, 0.02));
   const double nan = std::numeric_limits<double>::quiet_NaN();
@@ -236,7 +236,7 @@ TEST(ReflectCheckpoint, FingerprintChangesWithMeshAndOptions) {
   EXPECT_TRUE(seen.insert(reflect_fingerprint(moved, usual)).second);
 }
 
-/// Stopped after every update and resumed until it is done.
+/// Runs a shape that is stopped after every update and resumed until it is done.
 ReflectResult in_pieces(const ReflectInput& input, ReflectOptions options) {
   options.resume = false;
   for (;;) {

@@ -59,13 +59,13 @@ std::string sample_bytes(const TempFolder& folder) {
   return testing::read_bytes(folder / "good");
 }
 
-/// Error of reading these bytes.
+/// Message of the error for a checkpoint of these bytes.
 std::string refusal_of(const TempFolder& folder, const std::string& bytes) {
   testing::write_bytes(folder / "bad", bytes);
   return message_of<InputError>([&] { read_checkpoint(folder / "bad"); });
 }
 
-/// `bytes` with one text for another and the check sum (FNV-1a over all but the last 8) made right.
+/// Replaces a text in `bytes` and corrects the check sum (FNV-1a over all but the last 8).
 std::string forged(std::string bytes, const std::string& from, const std::string& to) {
   bytes.resize(bytes.size() - 8);
   bytes.replace(bytes.find(from), from.size(), to);
@@ -197,7 +197,7 @@ TEST(Checkpoint, AFolderThatDoesNotExistIsARunError) {
   message_of<RunError>([&] { write_checkpoint(sample(), folder / "no" / "such" / "place"); });
 }
 
-/// Another value than the one that a row has, within its limits.
+/// A value within a row's limits that differs from the current one.
 template <class Options>
 nlohmann::json other_value(const OptionField<Options>& row, const Options& options) {
   const nlohmann::json value = row.get(options);
@@ -257,8 +257,8 @@ TEST(DesignFingerprint, ChangesWithEveryNumberOfTheProcess) {
 }
 
 TEST(DesignFingerprint, EveryMemberOfTheOptionsHasARow) {
-  // Weights and light have tables of their own, the process is a workshop's, the outline may be a
-  // file's; checkpoint and resume say where and when, not what.
+  // Weights and light have tables of their own, the process comes from a workshop, the outline may
+  // come from a file; checkpoint and resume do not change the result.
   constexpr std::size_t kWithoutRow = 6;
   EXPECT_EQ(design_fields().size() + kWithoutRow, testing::member_count<DesignOptions>());
   EXPECT_EQ(weight_fields().size(), testing::member_count<ObjectiveWeights>());

@@ -53,8 +53,8 @@ TEST(TransportSites, OfAMirrorAreDrawnTogetherAlongThePlaneOfIncidence) {
   EXPECT_LT((sites.way(site - centre) - Eigen::Vector2d(10.0, -4.0)).norm(), 1e-12);
 }
 
-/// Root mean square distance, pixels, of where faces send their light from where it is wanted,
-/// after the heights have been fitted.
+/// Root mean square distance, pixels, between the faces' landing points after the height fit and
+/// the wanted ones.
 double missed(const TransportResult& result, const FaceLight& light, const OpticalSetup& setup,
               SurfaceMesh mesh) {
   aim_surface({result.centroids, light.flux}, setup, kThickness, Executor::cpu(2), mesh);
@@ -105,7 +105,7 @@ Eigen::Vector3d centre_of(const SurfaceMesh& mesh, std::int64_t face) {
   return (mesh.corner(face, 0) + mesh.corner(face, 1) + mesh.corner(face, 2)) / 3.0;
 }
 
-/// Of a picture's light, pixel coordinates.
+/// Centre of mass of a picture's light, pixel coordinates.
 Eigen::Vector2d centre_of_mass(const Image& picture) {
   Eigen::Vector2d moment = Eigen::Vector2d::Zero();
   for (int r = 0; r < picture.rows(); ++r) {
@@ -152,10 +152,10 @@ TEST(FaceLight, APrismDeflectsItByTheAnglesOfSnellsLaw) {
 }
 
 TEST(FaceLight, CentreOfMassIsThatOfTheRenderedPicture) {
-  // Within a pixel the picture does not tell where its light lies: small ones.
+  // Small pixels, because the picture does not resolve light within one.
   OpticalSetup setup = setup_for(ViewSide::kFront);
   setup.pixels = {600, 480};
-  // A converging lens: all of its light lands inside.
+  // A converging lens; all of its light lands inside.
   const SurfaceMesh mesh = with_heights(testing::graded_mesh(kSize, kShape, 0.1, 2), paraboloid);
   for (const SurfaceModel model : kModels) {
     const FaceLight light = face_light(mesh, setup, model, Executor::serial());
@@ -192,7 +192,7 @@ TEST(AimFaces, GivesAKnownSurfaceItsHeights) {
       SurfaceMesh mesh = flattened(known);
       const double sag = height_error(mesh, known);
       aim_faces(wanted, setup, Executor::serial(), mesh);
-      // The heights that the light starts from are those of before.
+      // The light starts from the previous heights.
       EXPECT_LT(height_error(mesh, known), 5e-3 * sag);
       for (int i = 0; i < 3; ++i) aim_faces(wanted, setup, Executor::serial(), mesh);
       EXPECT_LT(height_error(mesh, known), 1e-7 * sag);
@@ -250,7 +250,7 @@ TEST(FaceTransport, UniformLightStaysInPlace) {
   ASSERT_TRUE(result.converged()) << result.message;
   const double moved = (result.centroids - light.landing).colwise().norm().maxCoeff();
   RecordProperty("pixels_moved", std::to_string(moved));
-  // Two pixels to a cell; the centroids of the triangles' power cells are nearly their own.
+  // Two pixels per cell: the centroids of the triangles' power cells are almost their own.
   EXPECT_LT(moved, 0.3);
 }
 
@@ -277,8 +277,8 @@ OpticalSetup setup_of(double side) {
   return setup;
 }
 
-/// Light in the left 6 and the right 8 columns alone: the only crease of the even transport is
-/// the line u = 32 · 6/14, give or take half a site.
+/// A picture with light only in its first 6 and last 8 columns: the only crease of the even
+/// transport is the line u = 32 · 6/14, to half a site.
 Image two_bands() {
   Image picture(kPixels, kPixels);
   for (int r = 0; r < kPixels; ++r) {
@@ -304,7 +304,7 @@ struct Scene {
   BrenierMap map;
 };
 
-/// Faces whose corners, pulled in by a tenth, do not all lie on one side of the black.
+/// Number of faces across the black: their corners, pulled in by a tenth, are not all on one side.
 int faces_across(const Scene& scene, const SurfaceMesh& mesh) {
   const ImagePlane plane(scene.setup);
   int count = 0;
@@ -327,7 +327,7 @@ TEST(CreaseAlignment, PutsEdgesAlongACrease) {
   const int before = faces_across(scene, mesh);
   ASSERT_GT(before, 20);
   EXPECT_GT(align_to_creases(scene.map, scene.setup, mesh), 20);
-  // What is left are the border's own triangles, and those that a move would have flattened.
+  // Left are the border's own triangles and those that a move would have flattened.
   EXPECT_LT(faces_across(scene, mesh), before / 5);
 }
 

@@ -119,7 +119,7 @@ TEST(LevelPlan, ASplineFollowsFewerRoundsOfTheMesh) {
   EXPECT_TRUE(levels[1].spline);
   EXPECT_EQ(levels[1].rounds, 2);
   EXPECT_EQ(levels[1].iterations, 36);
-  // Two knot cells each way in a cell of 160 across.
+  // Two knot cells each way per cell, 160 cells across.
   EXPECT_EQ(levels[1].grid, (GridShape{323, 163}));
 }
 
@@ -231,7 +231,7 @@ TEST(EvenOut, AnEvenMeshStaysWhereItIs) {
   const SurfaceMesh flat = make_grid_mesh(kSize, kFine, 5.0);
   SurfaceMesh mesh = flat;
   even_out(0.02 * mean_area(kFine), mesh);
-  // Where the half-cell shift fades vertices are not in the middle of their neighbours.
+  // Where the half-cell shift fades, vertices are not midway between their neighbours.
   const double cell = kSize.x() / (kFine.columns - 1);
   EXPECT_LT((mesh.vertices - flat.vertices).cwiseAbs().maxCoeff(), 0.3 * cell);
   EXPECT_GT(testing::projected_areas(mesh).minCoeff(), 0.6 * mean_area(kFine));

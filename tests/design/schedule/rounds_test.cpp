@@ -17,7 +17,7 @@ constexpr int kRounds = 6;
 
 SurfaceMesh mesh_at(double z) { return make_grid_mesh({2.0, 2.0}, {3, 3}, z); }
 
-/// After the first round of a level, of value 1.
+/// State after the first round of a level, of value 1.
 Checkpoint second_round() {
   Checkpoint state;
   state.round = 1;
@@ -81,7 +81,7 @@ DesignOptions narrow_lens(int transport_rounds, double focal_length) {
   return options;
 }
 
-/// A design at work.
+/// A running design.
 struct Work {
   explicit Work(const DesignOptions& given) : options(given) {}
 

@@ -44,8 +44,8 @@ Image ramp(int columns, int rows, bool across) {
   return image;
 }
 
-/// Where the monotone rearrangement sends x: the share of light below y equals x,
-/// (1 − k) y + k y² = x.
+/// Image of x under the monotone rearrangement: the share of light below y equals x, (1 − k) y + k
+/// y² = x.
 double rearranged(double x) {
   const double b = 1.0 - kRamp;
   return (-b + std::sqrt(b * b + 4.0 * kRamp * x)) / (2.0 * kRamp);
@@ -172,7 +172,7 @@ const Eigen::Vector2d kSize(60.0, 40.0);
 const OpticalSetup kSetup = testing::setup_of(kSize, {60, 40}, 200.0);
 constexpr GridShape kShape{76, 58};
 
-/// What the faces serve if the image area per lens area is density(x / width, y / height).
+/// Areas served by the faces if the image area per lens area is density(x / width, y / height).
 Eigen::VectorXd image_area(const SurfaceMesh& mesh,
                            const std::function<double(double, double)>& density) {
   Eigen::VectorXd area = projected_areas(mesh);
@@ -186,7 +186,7 @@ Eigen::VectorXd image_area(const SurfaceMesh& mesh,
 double uniform(double, double) { return 1.0; }
 double left_half_serves_three_quarters(double x, double) { return x < 0.5 ? 1.5 : 0.5; }
 double falling_ramp(double x, double) { return 1.8 - 1.6 * x; }
-/// An ellipse on the lens, 9 by 6 mm in half axes, that serves most of the picture.
+/// An ellipse on the lens with half axes of 9 and 6 mm that serves most of the picture.
 double dark_spot(double x, double y) { return std::hypot(x - 0.4, y - 0.55) < 0.15 ? 8.0 : 0.1; }
 
 SurfaceMesh spread(const std::function<double(double, double)>& density, double share) {
@@ -260,8 +260,8 @@ TEST(VertexSpread, NoShareLeavesTheMesh) {
   EXPECT_LT(largest_motion(spread(left_half_serves_three_quarters, 0.0)), 1e-4);
 }
 
-/// Where the monotone rearrangement sends a column: the share of vertices left of the result is x.
-/// By bisection of the density's integral.
+/// Image of a column under the monotone rearrangement: the share of vertices left of the result is
+/// x. By bisection of the density's integral.
 double rearranged(const std::function<double(double)>& cumulative, double x) {
   double low = 0.0;
   double high = 1.0;
@@ -297,7 +297,7 @@ TEST(VertexSpread, HalfThatServesThreeQuartersOfThePictureGetsItsVertices) {
   double worst = 0.0;
   for (std::int64_t t = 0; t < mesh.triangle_count(); ++t) {
     const double x = (mesh.corner(t, 0).x() + mesh.corner(t, 1).x() + mesh.corner(t, 2).x()) / 3.0;
-    // Where the density jumps, the map is smooth over some pixels.
+    // At a jump of the density the map is smooth over some pixels.
     if (std::fabs(x - 0.5 * kSize.x()) < 6.0) continue;
     const double density = 1.0 - share + share * (x < 0.5 * kSize.x() ? 1.5 : 0.5);
     worst = std::max(worst, std::fabs(after[t] / before[t] * density - 1.0));
@@ -341,7 +341,7 @@ TEST(VertexSpread, ASmallSpotGetsItsShareOfVertices) {
     if (in_spot((flat.corner(t, 0) + flat.corner(t, 1) + flat.corner(t, 2)) / 3.0)) {
       wanted += share * served[t] + (1.0 - share) * before[t] / kSize.prod();
     }
-    // As many faces as the even mesh has on this area.
+    // The number of faces of the even mesh on this area.
     if (in_spot((mesh.corner(t, 0) + mesh.corner(t, 1) + mesh.corner(t, 2)) / 3.0)) {
       got += before[t] / kSize.prod();
     }
@@ -499,8 +499,8 @@ TEST_P(HeightFitMeshes, FewIterationsAreEnough) {
   EXPECT_LT(summary.iterations, 60);
 }
 
-/// √A_i times the gradient of a triangle by the heights, two rows a triangle: by differences of
-/// unit heights.
+/// √A_i times a triangle's gradient as a matrix on the heights, two rows per triangle: by
+/// differences of unit heights.
 Eigen::MatrixXd dense_gradient_rows(SurfaceMesh mesh, const Eigen::VectorXd& root_areas) {
   Eigen::MatrixXd rows(2 * mesh.triangle_count(), mesh.vertex_count());
   for (Eigen::Index v = 0; v < mesh.vertices.cols(); ++v) {
@@ -519,7 +519,7 @@ TEST(HeightFit, ContradictoryGradientsGiveTheDenseLeastSquaresSolution) {
     const Eigen::MatrixXd rows = dense_gradient_rows(mesh, root_areas);
     const Eigen::Matrix2Xd weighted = gradients * root_areas.asDiagonal();
     const Eigen::VectorXd wanted = weighted.reshaped();
-    // Of least norm, so of mean zero.
+    // The solution of minimum norm has mean zero.
     const Eigen::VectorXd expected = rows.completeOrthogonalDecomposition().solve(wanted);
     ASSERT_NEAR(expected.mean(), 0.0, 1e-12);
     ASSERT_TRUE(fit_face_gradients(gradients, thorough_fit(), Executor::serial(), mesh).converged);

@@ -27,7 +27,7 @@ std::optional<PowerDiagram> reweighted(const PowerDiagram& diagram,
   return diagram.reweighted(weights, spatial_order(diagram.sites()), Executor::serial());
 }
 
-/// Sites 1 apart, all rings of four on a circle.
+/// Sites 1 apart; every four neighbours lie on a circle.
 Eigen::Matrix2Xd square_grid(int columns, int rows) {
   Eigen::Matrix2Xd sites(2, columns * rows);
   for (int i = 0; i < columns * rows; ++i) sites.col(i) = Eigen::Vector2d(i % columns, i / columns);
@@ -60,7 +60,7 @@ void expect_same_edges(const PowerDiagram& diagram, const PowerDiagram& expected
   }
 }
 
-/// Flips from diagram to diagram; each is held against one that is built from nothing.
+/// Flips from diagram to diagram and compares each with one built from scratch.
 void expect_flips_to_agree(const Eigen::Matrix2Xd& sites,
                            const std::vector<Eigen::VectorXd>& weights) {
   PowerDiagram diagram = diagram_of(sites, Eigen::VectorXd::Zero(sites.cols()));
@@ -96,7 +96,7 @@ TEST(RegularTriangulation, FlippedIsAsRebuiltWhereSitesLieOnCirclesAndLines) {
   for (const auto& [columns, rows] : {std::pair{2, 2}, {2, 9}, {7, 5}, {30, 30}}) {
     const Eigen::Matrix2Xd sites = square_grid(columns, rows);
     expect_flips_to_agree(sites, convex_and_back(sites, random));
-    // Whole weights: heights that are equal, or on one plane, to the bit.
+    // Integer weights: heights are equal or in one plane, to the bit.
     std::vector<Eigen::VectorXd> weights;
     for (int round = 0; round < 20; ++round) {
       weights.emplace_back(Eigen::VectorXd::NullaryExpr(
@@ -168,7 +168,7 @@ TEST(RegularTriangulation, RaisesNoMoreOftenThanAllowed) {
   EXPECT_FALSE(start.reweighted(weights, spatial_order(sites), Executor::serial(), 0));
   const auto shown = start.reweighted(weights, spatial_order(sites), Executor::serial(), 1);
   ASSERT_TRUE(shown);
-  // Among heights 0, 16 and 16 the plane passes the site at 8; the height was 2, so 6 below.
+  // Heights 0, 16 and 16: the plane passes the site at 8; the site's height was 2, so 6 below.
   EXPECT_NEAR(shown->weights()[3], 2.0 - (8.0 - 0.5 * 6.0), 1e-14);
 }
 
@@ -244,7 +244,7 @@ TEST(PowerTest, TiesGoOneWaySeenFromEitherSide) {
       const int b = a + 1;
       const int c = b + 6;
       const int d = a + 6;
-      // Of a square's diagonals one stays: a c is to go if and only if b d is to stay.
+      // One of a square's diagonals stays: a c has to go if and only if b d stays.
       EXPECT_EQ(test.is_below(a, b, c, d), test.is_below(c, d, a, b));
       EXPECT_EQ(test.is_below(b, c, d, a), test.is_below(d, a, b, c));
       EXPECT_NE(test.is_below(a, b, c, d), test.is_below(b, c, d, a));
@@ -256,7 +256,7 @@ TEST(PowerTest, TellsHeightsApartThatRoundTogether) {
   Eigen::Matrix2Xd sites(2, 4);
   sites << 0.1, 1.1, 1.1, 0.1, 0.3, 0.3, 1.3, 1.3;
   Eigen::VectorXd weights = Eigen::VectorXd::Constant(4, 1000.0);
-  // One unit in the last place of the weight moves the site over or below the plane.
+  // One unit in the last place of the weight moves the site above or below the plane.
   weights[3] = std::nextafter(1000.0, 2000.0);
   EXPECT_TRUE(PowerTest(sites, weights).is_below(0, 1, 2, 3));
   weights[3] = std::nextafter(1000.0, 0.0);

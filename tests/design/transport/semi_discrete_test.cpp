@@ -75,7 +75,7 @@ TEST(SemiDiscrete, EvenPictureOfRegularSitesHasEqualWeights) {
   EXPECT_LT((result.centroids - sites).cwiseAbs().maxCoeff(), 1e-4);
 }
 
-/// The paper's way: L-BFGS on H(w).
+/// The paper's method: L-BFGS on H(w).
 Eigen::VectorXd minimised_weights(const Eigen::Matrix2Xd& sites, const SummedDensity& density) {
   const Eigen::VectorXd wanted = Eigen::VectorXd::Ones(sites.cols());
   const std::vector<int> order = spatial_order(sites);
@@ -303,7 +303,7 @@ TEST(DensityBlur, MirrorsAtBordersAndMixesInTheFloor) {
   EXPECT_NEAR(soften(corner, 0.0, 0.5).at(8, 8), 0.5 / 81.0, 1e-7);
 }
 
-/// An even lens's light: every face's area at its centroid.
+/// Light of an even lens: every face's area at its centroid.
 struct EvenLens {
   Eigen::Matrix2Xd sites;
   Eigen::VectorXd masses;
@@ -326,7 +326,7 @@ TransportResult solve(const EvenLens& lens, const Image& picture) {
   return solve_semi_discrete(sites, masses, picture, {}, Executor::cpu(1), RunControl());
 }
 
-/// Light in the left `left` and the right `right` columns alone.
+/// A picture with light only in its first `left` and last `right` columns.
 Image two_bands(int pixels, int left, int right) {
   Image picture(pixels, pixels);
   for (int r = 0; r < pixels; ++r) {

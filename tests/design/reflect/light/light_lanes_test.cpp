@@ -19,7 +19,7 @@ Vector3d random_unit(std::mt19937& random) {
   return Vector3d(normal(random), normal(random), normal(random)).normalized();
 }
 
-/// The closed form of what comes back to the light for μ = n·ω.
+/// Closed form of the light that returns to its source, for μ = n·ω.
 double retroreflected(double mu) {
   const double lobe = std::pow(std::max(0.0, 2.0 * mu * mu - 1.0), 30);
   return 0.85 * (0.05 / std::numbers::pi + 0.95 * 32.0 / (2.0 * std::numbers::pi) * lobe) * mu;

@@ -108,7 +108,7 @@ TEST(Evaluate, CubeAndOctahedronMatchTheirBandAverages) {
   EXPECT_NEAR(energies(shapes::octahedron()).direct, 8.27e-5, 0.01 * 8.27e-5);
 }
 
-/// One face whose normal stands at this elevation.
+/// One face whose normal has this elevation.
 SurfaceMesh tilted_face(double elevation) {
   const Eigen::Vector3d n(std::cos(elevation), 0.0, std::sin(elevation));
   const Eigen::Vector3d u = Eigen::Vector3d::UnitY();
@@ -138,8 +138,8 @@ TEST(Evaluate, ConvexShapesKeepTheirEnergyOverTheWholeSphereOfDirections) {
   }
 }
 
-/// Radiance of a face at the edge of a dihedral, for light across it; the plates are some hundred
-/// times as long and wide as the face is far from the edge.
+/// Radiance of a face near the edge of a dihedral, for light across it; the plates are some hundred
+/// times as long and wide as the face's distance from the edge.
 FaceRadiance dihedral_radiance(double phi) {
   SurfaceMesh mesh = shapes::dihedral(4.0, 4, 21);
   for (const int axis : {0, 2}) {
@@ -176,8 +176,8 @@ TEST(Evaluate, SameBitsForAnyNumberOfThreads) {
 
 constexpr int kRuns = 100;
 
-/// Mean and standard error of the estimates, of which every run gives one number: the gradient's
-/// product with a fixed direction.
+/// Mean and standard error of the estimates; every run gives the gradient's product with a fixed
+/// direction.
 struct Estimate {
   double mean = 0.0;
   double error = 0.0;
