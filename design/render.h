@@ -86,7 +86,7 @@ std::vector<double> flux_of_surface(const SurfaceMesh& mesh, const Eigen::Matrix
 /// @throw InputError if the setup has an outline: what it cuts off a face has no derivative here.
 ///        Interrupted, see Executor::with_stop().
 /// Error: 1e-6 of the product against central differences (FluxOfSurface.* in
-/// tests/design/flux_of_surface_test.cpp).
+/// tests/design/render/render_flux_test.cpp).
 Eigen::Matrix3Xd flux_of_surface_adjoint(const SurfaceMesh& mesh, const OpticalSetup& setup,
                                          SurfaceModel model, std::span<const double> cotangent,
                                          const Executor& executor);
