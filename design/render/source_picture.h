@@ -10,9 +10,10 @@
 #include "core/image/image.h"
 #include "core/image/metrics.h"
 #include "core/optics/optical_setup.h"
-#include "core/surface/lens.h"
 
 namespace lensforge {
+
+struct Lens;
 
 /// Picture from values in double precision, row by row from the top. @pre columns × rows values.
 inline Image image_of(std::span<const double> values, int columns, int rows) {
