@@ -149,7 +149,7 @@ TEST(DesignLens, StoppedWhileTheFinishedLensIsRenderedItResumes) {
              }));
   EXPECT_EQ(part.status, Status::kInterrupted);
   EXPECT_EQ(part.lens.surface.vertices, whole.lens.surface.vertices);
-  // Of fewer points of the source.
+  // Rendered with fewer points of the source.
   const double mae = whole.lens.metrics.at(SurfaceModel::kSmooth).mae;
   EXPECT_NEAR(part.lens.metrics.at(SurfaceModel::kSmooth).mae, mae, 0.5 * mae);
   options.resume = true;

@@ -237,7 +237,7 @@ class FreeMaps {
   [[nodiscard]] std::size_t neighbour(std::int64_t t, int k) const {
     return static_cast<std::size_t>(topology_.neighbours(k, t));
   }
-  /// Of face j from face i.
+  /// Offset of face j from face i.
   [[nodiscard]] NeighbourOffset offset(std::size_t i, std::size_t j) const {
     return {frames_[i], TangentBasis(frames_[i].n), frames_[j]};
   }
@@ -347,7 +347,7 @@ TEST(Objective, ASphereHasItsMeanCurvatureEnergy) {
   }
   const EnergyValues e = evaluate_at(objective, mesh.vertices).energy;
   EXPECT_NEAR(e.face * radius * radius / area, 1.0, 0.015);
-  // Of 10,500 edges.
+  // Sum over 10,500 edges.
   EXPECT_LT(e.edge, 15.0);
 }
 

@@ -375,8 +375,7 @@ TEST(FluxTriangle, SliversLoseNoFlux) {
   }
 }
 
-/// Share of a tent over a → b with its peak at `peak` that lies in every pixel, by the midpoint
-/// rule.
+/// Share of a tent over a → b with its peak at `peak` in every pixel, by the midpoint rule.
 std::vector<double> integrated_tent(const Eigen::Vector2d& a, const Eigen::Vector2d& b,
                                     double peak) {
   constexpr int kSteps = 200000;

@@ -140,11 +140,11 @@ TEST(MadeSurface, NodesStayWhereTheyAreInThePlane) {
 }
 
 constexpr int kSamples = 2;
-/// With 25 × 17 cells of its grid, so that no node lies where its average begins to count other
-/// samples: there it steps by 1e-8.
+/// Its grid has 25 × 17 cells, so no node is where its average changes samples: there it steps by
+/// 1e-8.
 constexpr MadeBy kCoarse{0.8, false, 0.8, 0.05, 3.0};
 
-/// What look() gives, as one vector: positions, then slopes.
+/// Result of look(), as one vector: positions, then slopes.
 struct Looked {
   Eigen::Matrix3Xd positions;
   Eigen::Matrix3Xd normals;

@@ -72,8 +72,8 @@ TEST(AxisBasis, SlopesAreThoseOfTheValues) {
   }
 }
 
-/// What balls leave of a wave a cos(kt), one row every `pitch`, averaged with a Gaussian: the share
-/// of the wave that is left. By brute force: every ball is lowered onto the wave.
+/// Share of a wave a cos(kt) that remains after balls, one row every `pitch`, averaged with a
+/// Gaussian. By brute force: every ball is lowered onto the wave.
 double share_left(double wavelength, double pitch, double sigma, double radius) {
   constexpr double kAmplitude = 1e-4;
   constexpr double kFine = 5e-4;
@@ -195,7 +195,7 @@ TEST(SplineNodes, AreThoseOfTheControlNet) {
   }
 }
 
-/// Of a random sum of positions and normals against central differences.
+/// Error of the adjoint of a random sum of positions and normals, against central differences.
 double adjoint_error(SplineNodesOn<Executor>& nodes, const ControlNet& net) {
   const Looked at = look(nodes, net.points);
   Random random(5);
