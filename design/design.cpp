@@ -24,12 +24,13 @@
 namespace lensforge {
 namespace {
 
-/// Lowers or lifts the surface so that its thinnest place is `thickness` above the entry face.
+/// Moves the surface along z so that its minimum is `thickness` above the entry face.
 void rest_on_thickness(SurfaceMesh& mesh, double thickness) {
   mesh.vertices.row(2).array() += thickness - mesh.vertices.row(2).minCoeff();
 }
 
-/// The surface of a design, finished or not: before its last level a spline is a smooth mesh.
+/// Takes the surface of a finished or unfinished design: before its last level a spline is a smooth
+/// mesh.
 void take_surface(const DesignTask& task, SurfaceMesh mesh, Lens& lens) {
   const Level& last = task.levels.back();
   if (last.spline && mesh.grid == last.grid) {
@@ -43,7 +44,7 @@ void take_surface(const DesignTask& task, SurfaceMesh mesh, Lens& lens) {
   rest_on_thickness(lens.surface, task.options.thickness);
 }
 
-/// @param look  at its pictures.
+/// @param look  effort of its pictures.
 Lens make_lens(const DesignTask& task, SurfaceMesh mesh, Look look, const Executor& executor) {
   Lens lens;
   take_surface(task, std::move(mesh), lens);
@@ -57,7 +58,7 @@ Lens make_lens(const DesignTask& task, SurfaceMesh mesh, Look look, const Execut
   return lens;
 }
 
-/// By the design's own account of cutting and polishing.
+/// Predicts the part by the design's own model of cutting and polishing.
 std::optional<DesignResult::Made> made_part(const DesignOptions& options, const Lens& lens,
                                             const Executor& executor) {
   if (!options.made_by || !lens.spline) return std::nullopt;
@@ -82,8 +83,7 @@ std::optional<DesignResult::Colors> colors_of(const Lens& lens, const Executor& 
                               fringe_of(lens)};
 }
 
-/// @throw InputError if the surface of a checkpoint is none that a lens can have: its bytes were
-/// changed.
+/// @throw InputError if no lens can have a checkpoint's surface: its bytes were changed.
 void require_surface(const DesignTask& task, const Checkpoint& state) {
   Lens lens;
   take_surface(task, state.mesh, lens);
@@ -95,13 +95,13 @@ void require_surface(const DesignTask& task, const Checkpoint& state) {
 bool run_all(const DesignTask& task, DesignLog& log, Checkpoint& state) try {
   return run_levels(task, log, state);
 } catch (const InputError&) {
-  // Resumed, it could only fail again, and it would be in the way of better options.
+  // Resuming would fail again, and the checkpoint would refuse better options.
   std::error_code ignored;
   if (!task.options.resume) std::filesystem::remove(task.options.checkpoint, ignored);
   throw;
 }
 
-/// The lens after the last level and all that is said of it. @throw Interrupted
+/// The lens after the last level, with its checks. @throw Interrupted
 DesignResult finished(const DesignTask& task, const DesignLog& log, const SurfaceMesh& mesh) {
   log.report_rendering();
   DesignResult result;
@@ -113,7 +113,7 @@ DesignResult finished(const DesignTask& task, const DesignLog& log, const Surfac
   return result;
 }
 
-/// The lens that there is when the design is interrupted: nobody wants to wait for it.
+/// The lens of an interrupted design, at Look::kBrief because nobody wants to wait for it.
 DesignResult unfinished(const DesignTask& task, SurfaceMesh mesh, const Executor& executor) {
   DesignResult result;
   result.message = "interrupted";
@@ -127,7 +127,7 @@ DesignResult run_to_end(const DesignTask& task, DesignLog& log, Checkpoint& stat
     try {
       return finished(task, log, state.mesh);
     } catch (const Interrupted&) {
-      // Resumed, it goes on from the last level's end.
+      // Resuming continues after the last level.
     }
   }
   return unfinished(task, std::move(state.mesh), executor);
@@ -159,34 +159,33 @@ std::uint64_t design_identity(const Image& target, const DesignOptions& options)
 
 namespace {
 
-/// Processor seconds for a triangle, on 2 GHz cores: of an iteration of facets and smooth model at
-/// 256² and 512² (5.0e-7 to 5.5e-7), of one of a spline, a triangle being one between nodes (96²
-/// and 128²), of one designed for a process (64² and 128²), and of its transport with the mesh's
-/// start (5e-5 to 8e-5; facets have two).
+/// Processor seconds per triangle, on 2 GHz cores: one iteration with facets or the smooth model
+/// (measured at 256² and 512²), with a spline, per triangle between nodes (96² and 128²), and with
+/// a spline for a process (64² and 128²); transport with the start of the mesh (5e-5 to 8e-5;
+/// facets need two).
 constexpr double kIterationSeconds = 5.1e-7;
 constexpr double kSplineSeconds = 2.5e-7;
 constexpr double kMadeSeconds = 1e-6;
 constexpr double kTransportSeconds = 6e-5;
 
-/// Bytes for a triangle: of its transport, of the optimisation of a mesh (512², 1.12 GB) and of a
-/// spline (128², 0.57 GB), and of what is written: surface and checkpoint, each twice while it is
-/// replaced.
+/// Bytes per triangle: transport, optimisation of a mesh (512²: 1.12 GB) and of a spline (128²:
+/// 0.57 GB), and files: surface and checkpoint, each twice while it is replaced.
 constexpr double kTransportMemory = 2000.0;
 constexpr double kMeshMemory = 1000.0;
 constexpr double kSplineMemory = 500.0;
 constexpr double kTriangleDisk = 120.0;
-/// What rank 0 of several machines has of the whole mesh (docs/scale.md).
+/// Bytes per triangle of the whole mesh on rank 0 of several machines (docs/scale.md).
 constexpr double kWholeMemory = 200.0;
 
-/// Bytes for a pixel of the working picture: PNG, EXR and double copies.
+/// Bytes per pixel of the working picture: PNG, EXR and double copies.
 constexpr double kPixelMemory = 100.0;
 constexpr double kPixelDisk = 30.0;
 
-/// Of the program itself with its libraries.
+/// Bytes of the program itself with its libraries.
 constexpr double kBaseMemory = 1.6e8;
 
-/// What each further wavelength adds to an iteration: 64² portrait and logo, smooth, whole designs
-/// for one and three of them 5.9 and 9.5 s, 7.0 and 10.8 s.
+/// Relative cost of each further wavelength (64² portrait, smooth, whole designs: 5.9 s for one,
+/// 9.5 s for three).
 constexpr double kColorShare = 0.35;
 
 double iteration_seconds(const Level& level, const DesignOptions& options) {
@@ -196,7 +195,7 @@ double iteration_seconds(const Level& level, const DesignOptions& options) {
   return growth * (options.made_by ? kMadeSeconds : kSplineSeconds);
 }
 
-/// Sites of a level's transports: of the even mesh, and of facets' own.
+/// Sites of a level's transports: those of the even mesh, for facets also their own.
 double transport_sites(double triangles, const DesignOptions& options) {
   const double even = std::min(triangles, kMaxEvenFaces);
   return options.model == SurfaceModel::kFacet ? even + triangles : even;

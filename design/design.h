@@ -41,47 +41,48 @@ namespace lensforge {
 struct DesignResult {
   enum class Status { kDone, kInterrupted };
   Status status = Status::kInterrupted;
-  std::string message;            ///< Why it ended, in one line.
+  std::string message;            ///< Reason for the end, in one line.
   std::uint64_t fingerprint = 0;  ///< design_identity() of picture and options.
-  /// What the part will project that DesignOptions::made_by makes of the lens.
+  /// Predicted picture of the part that DesignOptions::made_by makes of the lens.
   struct Made {
     ImageMetrics metrics;
     Image picture;
   };
   std::optional<Made> made;
-  std::optional<SourceCheck> source;  ///< Of an extended source.
-  /// Of a spectrum.
+  std::optional<SourceCheck> source;  ///< Extended sources only.
+  /// Result for a spectrum.
   struct Colors {
-    ColorImage picture;  ///< What the lens projects; white where all wavelengths do the target's.
+    ColorImage picture;  ///< Projected picture; white where all wavelengths match the target.
     Fringe fringe;
   };
   std::optional<Colors> colors;
-  Lens lens;  ///< The best surface so far, at the resolution that was reached.
+  Lens lens;  ///< Best surface so far, at the resolution reached.
   std::vector<ConvergenceRow> convergence;
 };
 
-/// Shapes a lens that projects `target` (linear light, any size, not all black).
-/// Coarse to fine over picture and mesh (Sun et al., section 3.4 and Appendix E).
+/// Designs a lens that projects `target` (linear light, any size, not all black), coarse to fine
+/// over picture and mesh (Sun et al., section 3.4 and Appendix E).
 /// @throw InputError if an option breaks its rule, the picture is all black, or a checkpoint to
-///        resume from is missing, corrupt, or belongs to another picture or other options;
-///        RunError if a checkpoint cannot be written or a GPU's memory does not suffice;
-///        Interrupted if it is stopped before its first surface: later it returns what it has.
+///        resume from is missing, corrupt, or belongs to another picture or other options; RunError
+///        if a checkpoint cannot be written or a GPU's memory does not suffice; Interrupted if it
+///        is stopped before its first surface; a later stop returns the best surface so far.
 DesignResult design_lens(const Image& target, const DesignOptions& options,
                          const Executor& executor, const RunControl& control);
 
-/// A number that differs for pictures or options that give another result.
+/// Number that differs for pictures or options that give another result.
 /// @pre validate(options, target) passes.
 std::uint64_t design_identity(const Image& target, const DesignOptions& options);
 
-/// What a design of a picture of `columns` x `rows` pixels is about to take on `threads` threads of
-/// the CPU. Assumes that every round uses all its iterations.
-/// @param share  of an optimisation that takes memory on this machine, 1 but for several (MPI).
+/// Estimates what a design for a picture of `columns` × `rows` pixels takes on `threads` threads of
+/// the CPU, if every round uses all its iterations.
+/// @param share  of the optimisation's memory that is on this machine; 1 except with MPI on
+///        several.
 /// @pre the options are in their ranges.
 WorkEstimate estimate_design(int columns, int rows, const DesignOptions& options, int threads,
                              double share = 1.0);
 
-/// The same. @throw InputError with the --pixels that would fit, if any would, where the disk of
-///        `folder` or the memory do not hold it.
+/// The same estimate. @throw InputError if the disk of `folder` or the memory is too small, naming
+///        the --pixels that fit, if any do.
 WorkEstimate require_room_for_design(int columns, int rows, const DesignOptions& options,
                                      int threads, const std::filesystem::path& folder,
                                      double share = 1.0);

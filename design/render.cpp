@@ -23,8 +23,8 @@
 namespace lensforge {
 namespace {
 
-/// For a pixel of a rendering, and of the lens that is rendered: 4096 and 8192 pixels a side take
-/// 0.58 and 1.87 GB, and at most 40 s.
+/// Cost per pixel of a rendering, and memory for the rendered lens: 8192 pixels a side take 1.87 GB
+/// and at most 40 s.
 constexpr double kRenderedSeconds = 6e-7;
 constexpr double kRenderedMemory = 45.0;
 constexpr double kRenderedDisk = 4.0;
@@ -46,7 +46,7 @@ std::vector<double> flux_of_point(const SurfaceMesh& mesh, const OpticalSetup& s
   return render_flux(mesh, setup, model, executor);
 }
 
-/// The part of a surface that the light goes through.
+/// The part of a surface inside the outline.
 SampledSurface lit_part(const SurfaceMesh& mesh, const Eigen::Matrix3Xd& normals,
                         const OpticalSetup& setup, const Executor& executor) {
   return part_inside(mesh, normals, cut_mesh(mesh, *setup.outline, executor));
@@ -63,7 +63,7 @@ std::vector<double> flux_through(const SurfaceMesh& mesh, const OpticalSetup& se
   });
 }
 
-/// By the normals given.
+/// With given normals.
 std::vector<double> flux_through(const SurfaceMesh& mesh, const Eigen::Matrix3Xd& normals,
                                  const OpticalSetup& setup, const Executor& executor) {
   return picture_under(setup, points_for(mesh, setup), [&](const OpticalSetup& point) {
@@ -76,12 +76,12 @@ RenderResult result_of(const std::vector<double>& flux, const OpticalSetup& setu
           std::accumulate(flux.begin(), flux.end(), 0.0)};
 }
 
-/// Nodes whose light is followed for a brief look, over all points of a source: about 0.5 s of one
+/// Maximum number of nodes for Look::kBrief, over all points of a source: about 0.5 s on one
 /// thread.
 constexpr double kBriefNodes = 4e6;
 
 constexpr int kBriefSamples = 4;  ///< Nodes per knot cell each way.
-constexpr int kBriefPoints = 4;   ///< Least number of source points.
+constexpr int kBriefPoints = 4;   ///< Minimum number of source points.
 
 /// flux_of_lens() under one of its models at Look::kBrief.
 std::vector<double> brief_flux(const Lens& lens, SurfaceModel model, const Executor& executor) {
@@ -236,7 +236,7 @@ void require_wall_above(const SurfaceMesh& mesh, const OpticalSetup& setup) {
     clearance = std::min(clearance, light.clearance(p));
   }
   if (clearance > 0.0) return;
-  // Moved along z, the screen gains its normal's z in distance.
+  // Per mm along z, the screen's distance grows by its normal's z.
   const double steepness = setup.screen_x.cross(setup.screen_y).z();
   throw InputError("--focal " + number_text(setup.focal_length) +
                    ": the wall must stand above the whole surface, beyond " +

@@ -32,8 +32,8 @@ struct RenderResult {
   double flux_inside = 0.0;  ///< Share of the lens's flux that lands on the image rectangle.
 };
 
-/// Renders what a surface projects onto the image rectangle of `setup`, exactly (no sampling but of
-/// a source that has an extent, see picture_under()).
+/// Renders what a surface projects onto the image rectangle of `setup`, exactly: only an extended
+/// source is sampled (see picture_under()).
 RenderResult render_surface(const SurfaceMesh& mesh, const OpticalSetup& setup, SurfaceModel model,
                             const Executor& executor);
 
@@ -43,9 +43,9 @@ RenderResult render_surface(const SurfaceMesh& mesh, const OpticalSetup& setup, 
 ImageMetrics evaluate(const SurfaceMesh& mesh, const OpticalSetup& setup, SurfaceModel model,
                       const Image& target, Image* rendered, const Executor& executor);
 
-/// How long a lens is looked at.
+/// Effort of a rendering.
 enum class Look {
-  kThorough,  ///< A spline at the nodes of picture_nodes(), an extended source at all its points.
+  kThorough,  ///< A spline at picture_nodes(), an extended source at all its points.
   kBrief,  ///< At most 4 nodes per knot cell each way and as many points of the source as fit into
            ///< 4 million nodes, at least 4. A 64² photograph under a source of 2 mrad has MAE
            ///< 0.0022 instead of 0.0020.
@@ -55,61 +55,62 @@ enum class Look {
 ImageMetrics evaluate(const Lens& lens, SurfaceModel model, Image* rendered,
                       const Executor& executor, Look look = Look::kThorough);
 
-/// The same for a smooth surface that is known by its own normals at the vertices, 3 × V with
-/// z > 0: what the triangles between them hide does not matter. Computed on the CPU.
+/// The same for a smooth surface given by its own normals at the vertices, 3 × V with z > 0, which
+/// do not depend on the triangles between them. Computed on the CPU.
 RenderResult render_surface(const SurfaceMesh& mesh, const Eigen::Matrix3Xd& normals,
                             const OpticalSetup& setup, const Executor& executor);
 
-/// evaluate() by the normals given.
+/// evaluate() with given normals.
 ImageMetrics evaluate(const SurfaceMesh& mesh, const Eigen::Matrix3Xd& normals,
                       const OpticalSetup& setup, const Image& target, Image* rendered,
                       const Executor& executor);
 
-/// Flux that a mesh sends to every pixel of `setup`, as shares of the lens's (Sun et al., section
-/// 3.2), row by row from the top; setup.pixels values. An extended source is the sum of its points.
+/// Flux that a mesh sends to every pixel of `setup`, as shares of the lens's total (Sun et al.,
+/// section 3.2), row by row from the top; setup.pixels values. An extended source is the sum of its
+/// points.
 /// @param model  facet or smooth.
 /// @pre vertex numbers are in range, coordinates finite, the setup valid.
 /// @throw Interrupted, see Executor::with_stop().
 std::vector<double> flux_of_surface(const SurfaceMesh& mesh, const OpticalSetup& setup,
                                     SurfaceModel model, const Executor& executor);
 
-/// The same of a smooth surface that is known by its own normals at the vertices, 3 × V with z > 0.
+/// The same for a smooth surface given by its own normals at the vertices, 3 × V with z > 0.
 /// Computed on the CPU.
 std::vector<double> flux_of_surface(const SurfaceMesh& mesh, const Eigen::Matrix3Xd& normals,
                                     const OpticalSetup& setup, const Executor& executor);
 
 /// Adjoint of flux_of_surface(): Σ ∂(flux of pixel i)/∂(vertices) × cotangent[i], 3 × V, per mm.
-/// Triangles whose light does not leave, and needles of light (deposit_adjoint()), have no
-/// derivative but by what they take in. Same bits for any number of threads.
+/// Triangles whose light does not leave, and needles of light (deposit_adjoint()), have a
+/// derivative only by the light that they take in. Same bits for any number of threads.
 /// @param cotangent  setup.pixels values, row by row from the top.
-/// @throw InputError if the setup has an outline: what it cuts off a face has no derivative here.
-///        Interrupted, see Executor::with_stop().
-/// Error: 1e-6 of the product against central differences (FluxOfSurface.* in
-/// tests/design/flux_of_surface_test.cpp).
+/// @throw InputError if the setup has an outline: the cut of a face has no derivative here.
+///        Interrupted, see Executor::with_stop(). Error: 1e-6 of the product against central
+///        differences (FluxOfSurface.* in tests/design/render/render_flux_test.cpp).
 Eigen::Matrix3Xd flux_of_surface_adjoint(const SurfaceMesh& mesh, const OpticalSetup& setup,
                                          SurfaceModel model, std::span<const double> cotangent,
                                          const Executor& executor);
 
-/// Flux per pixel, as shares of the lens's, of its surface under its model in another setup.
+/// Flux per pixel of a lens in another setup, as shares of the lens's total, under its own model.
 std::vector<double> flux_of_lens(const Lens& lens, const OpticalSetup& setup,
                                  const Executor& executor);
 
-/// How far apart on the screen the first and last wavelength of the spectrum land, mm.
+/// Distance on the screen between the landing points of the spectrum's first and last wavelength,
+/// mm.
 struct Fringe {
   double mean = 0.0;  ///< Over the vertices of the surface.
   double max = 0.0;
 };
 
-/// @param normals  3 × V of the surface at its vertices, of any length, z > 0. Rays that do not
-///                 leave the surface are left out. @pre the setup has a spectrum.
+/// @param normals 3 × V of the surface at its vertices, of any length, z > 0. Rays that do not
+///                 leave the surface are ignored. @pre the setup has a spectrum.
 Fringe fringe_of(const SurfaceMesh& mesh, const Eigen::Matrix3Xd& normals,
                  const OpticalSetup& setup);
 
-/// The same of a lens under its own model.
+/// The same for a lens under its own model.
 Fringe fringe_of(const Lens& lens);
 
-/// A setup for a mesh that comes alone: the image rectangle lies straight above the lens and is as
-/// large, the working picture has 256 pixels on its longer side.
+/// Setup for a mesh without one: the image rectangle is straight above the lens and as large, the
+/// working picture has 256 pixels on its longer side.
 OpticalSetup setup_for_mesh(const SurfaceMesh& mesh);
 
 /// The same setup with `pixels` on the longer side of the picture.
@@ -121,7 +122,7 @@ OpticalSetup with_image_width(OpticalSetup setup, double width);
 /// @throw InputError unless the wall lies above the whole surface and the setup is valid.
 void require_wall_above(const SurfaceMesh& mesh, const OpticalSetup& setup);
 
-/// What a rendering of so many pixels takes, its comparison with a target and its file.
+/// Estimates a rendering of `pixels` pixels, its comparison with a target, and its file.
 WorkEstimate rendering_work(double pixels);
 
 }  // namespace lensforge

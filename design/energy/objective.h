@@ -29,17 +29,17 @@
 
 namespace lensforge {
 
-/// The light of one colour, and what is kept of it for every vertex and face.
+/// The light of one colour, with its values per vertex and face.
 template <class Exec>
 struct ColoredLight {
-  LightPath path;  ///< Its flux as shares of all colours' together.
-  double share;    ///< Of the brightness.
+  LightPath path;  ///< Its flux is a share of all colours' total.
+  double share;    ///< Share of the brightness.
   typename Exec::template Buffer<IncidentRay> incident;  ///< V; empty in light of one direction.
-  typename Exec::template Buffer<double> face_flux;      ///< F; likewise.
+  typename Exec::template Buffer<double> face_flux;      ///< F; empty in light of one direction.
 };
 
-/// What the whole surface takes of the light, of which an executor holds all faces but for that of
-/// design/mpi/, mm². @param cut  by the setup's outline; null without one.
+/// The light that the whole surface takes in, mm². Executors hold all faces, except the one of
+/// design/mpi/. @param cut  by the setup's outline; null without one.
 template <class Exec>
 double intake_of(const Exec& /*executor*/, const SurfaceMesh& mesh, const MeshCut* cut,
                  const LightPath& light) {
@@ -48,8 +48,7 @@ double intake_of(const Exec& /*executor*/, const SurfaceMesh& mesh, const MeshCu
 
 namespace objective_detail {
 
-/// Colours in which a goal is looked at: all of a picture, that of the setup's index of a
-/// correspondence.
+/// Colours of a goal: all for a picture; for a correspondence that of the setup's index.
 inline std::vector<LightColor> colors_of(OpticalSetup setup, const DesignGoal& goal) {
   if (!std::holds_alternative<Image>(goal)) setup.spectrum = {};
   return light_colors(setup);
@@ -71,7 +70,7 @@ std::vector<ColoredLight<Exec>> lights_of(const SurfaceMesh& mesh, const Optical
                                           typename Exec::template Buffer<double>& front) {
   std::vector<ColoredLight<Exec>> lights;
   for (const LightColor& color : colors_of(setup, goal)) {
-    // An outline's is found with its cut.
+    // With an outline, the intake is computed with its cut.
     const LightPath path =
         setup.outline ? LightPath(color.setup) : light_of(executor, color, mesh, nullptr);
     lights.push_back({light_for(executor, path, front), color.share, {}, {}});
@@ -84,28 +83,29 @@ std::vector<ColoredLight<Exec>> lights_of(const SurfaceMesh& mesh, const Optical
 
 }  // namespace objective_detail
 
-/// DesignObjective on any executor: all arrays, the vertices and the gradient too, lie in its
-/// memory, and only sums come back to the caller.
+/// DesignObjective on any executor: all arrays, including vertices and gradient, are in its memory,
+/// and only sums return to the caller.
 template <class Exec>
 class DesignObjectiveOn {
  public:
   DesignObjectiveOn(const SurfaceMesh& mesh, const OpticalSetup& setup, const DesignGoal& goal,
                     const ObjectiveOptions& options, const Exec& executor);
 
-  /// DesignObjective::relinearize() and evaluate() of 3 × V numbers in the executor's memory.
+  /// DesignObjective::relinearize() and evaluate() for 3 × V numbers in the executor's memory.
   void relinearize(const double* vertices);
   ObjectiveEvaluation evaluate(const double* vertices, double* gradient);
 
   /// Normals of the surface that the vertices sample, 3 × V in the executor's memory, to be filled
   /// in before evaluate(). @pre the model is a spline.
   [[nodiscard]] double* normals() { return std::get<SmoothRaysOn<Exec>>(rays_).view(0).normals; }
-  /// Derivatives by them after evaluate().
+  /// Derivatives by the normals after evaluate().
   [[nodiscard]] double* normals_bar() {
     return lights_.size() > 1 ? normals_bar_.data()
                               : std::get<SmoothRaysOn<Exec>>(rays_).view(0).normal_bar;
   }
 
-  /// DesignObjective::movable(), in the caller's memory; with an outline as of relinearize().
+  /// DesignObjective::movable(), in the caller's memory; with an outline as of the last
+  /// relinearize().
   [[nodiscard]] const Eigen::Matrix3Xd& movable() const { return movable_; }
 
  private:
@@ -119,10 +119,10 @@ class DesignObjectiveOn {
   [[nodiscard]] std::vector<ObjectiveView> views(const double* vertices);
   [[nodiscard]] ObjectiveView view(const double* vertices, std::size_t color);
   [[nodiscard]] GoalView goal_view();
-  /// Sums of one evaluation; not asked for before all kernels are on their way.
+  /// Sums of one evaluation; read only after all kernels have been launched.
   struct Sums;
 
-  // What depends on the surface model; Rays is FacetRaysOn or SmoothRaysOn, views are views().
+  // Steps that depend on the surface model; Rays is FacetRaysOn or SmoothRaysOn, views are views().
   template <class Rays>
   void find_unlit(const std::vector<ObjectiveView>& views, Rays& rays);
   template <class Rays>
@@ -147,20 +147,20 @@ class DesignObjectiveOn {
 
   Exec executor_;
   ObjectiveOptions options_;
-  Buffer<double> front_;                    ///< What lights_ read of a front that is a height map.
-  std::vector<ColoredLight<Exec>> lights_;  ///< Of a spectrum's picture several, else one.
+  Buffer<double> front_;  ///< Coefficients that lights_ read, of a front that is a height map.
+  std::vector<ColoredLight<Exec>> lights_;  ///< Several for a spectrum's picture, else one.
   MeshOn<Exec> mesh_;
-  SurfaceMesh sheet_;   ///< Where it was linearized last; empty without an outline.
-  OpticalSetup setup_;  ///< Likewise.
+  SurfaceMesh sheet_;   ///< Surface of the last relinearize(); empty without an outline.
+  OpticalSetup setup_;  ///< Set only with an outline.
   ApertureOn<Exec> aperture_;
-  Eigen::Matrix3Xd unheld_;  ///< Movable but for the outline's rim.
+  Eigen::Matrix3Xd unheld_;  ///< movable_ ignoring the outline's rim.
   Eigen::Matrix3Xd movable_;
   Buffer<double> movable_here_;
 
   Buffer<double> target_;
   double target_total_ = 0.0;
-  std::vector<double> wanted_light_;  ///< The target's linear light, in the caller's memory.
-  Buffer<std::int32_t> led_;          ///< Empty if no facet is led to an unlit pixel.
+  std::vector<double> wanted_light_;  ///< Linear light of the target, in the caller's memory.
+  Buffer<std::int32_t> led_;          ///< Empty if no facet is assigned to an unlit pixel.
   Buffer<double> wanted_centroids_;
   Buffer<double> wanted_flux_;
 
@@ -171,25 +171,25 @@ class DesignObjectiveOn {
   double edge_offset_ = 0.0;  ///< Σ Ψ(h⁰) − w h⁰ over the edges.
 
   SourceBlurOn<Exec> blur_;
-  FluxImageOn<Exec> flux_;  ///< In the blur's parts of pixels.
+  FluxImageOn<Exec> flux_;  ///< In the blur's parts of a pixel.
   FluxCotangentImageOn<Exec> cotangent_;
   Buffer<double> error_;
   Buffer<Corners> corner_bar_;
   Buffer<double> laplacian_shares_;
 
   std::variant<FacetRaysOn<Exec>, SmoothRaysOn<Exec>> rays_;
-  Buffer<double> color_gradient_;  ///< Of one colour of several.
-  Buffer<double> normals_bar_;     ///< Of all of them, of a spline.
+  Buffer<double> color_gradient_;  ///< Gradient of one colour of several.
+  Buffer<double> normals_bar_;     ///< Sum over all colours, for splines.
 };
 
 namespace objective_detail {
 
-/// Relative distance from the lens's border within which a vertex counts as lying on it.
+/// Relative distance from the lens's border within which a vertex counts as on it.
 inline constexpr double kBorderTolerance = 1e-9;
 
-/// Sweeps of iteratively reweighted least squares that relinearize() does from equal weights. Three
-/// settle which edges count as creases; more change the weights by less than they change between
-/// two rounds.
+/// Number of sweeps of iteratively reweighted least squares in relinearize(), which starts from
+/// equal weights. Three settle which edges are creases; further sweeps change the weights by less
+/// than a round does.
 inline constexpr int kReweightingSweeps = 3;
 
 inline Eigen::Matrix3Xd movable_coordinates(const Eigen::Matrix3Xd& vertices,
@@ -281,7 +281,8 @@ void DesignObjectiveOn<Exec>::take(const Correspondence& wanted) {
   wanted_flux_ = buffer_of(executor_, objective_detail::entries(wanted.flux));
 }
 
-/// What does not depend on the colour, barriers too, counts with the first, which is bent most.
+/// Terms that do not depend on the colour, and the barriers, count with the first colour, which is
+/// refracted most.
 template <class Exec>
 ObjectiveView DesignObjectiveOn<Exec>::view(const double* vertices, std::size_t color) {
   ColoredLight<Exec>& light = lights_[color];
@@ -325,7 +326,7 @@ GoalView DesignObjectiveOn<Exec>::goal_view() {
           .wanted_flux = wanted_flux_.data()};
 }
 
-/// Cuts the faces anew where they are now, and holds those on the rim there.
+/// Cuts the faces at their current places and holds those on the rim.
 template <class Exec>
 void DesignObjectiveOn<Exec>::take_outline(const double* vertices) {
   Eigen::Matrix3Xd& here = sheet_.vertices;
@@ -368,7 +369,7 @@ void DesignObjectiveOn<Exec>::relinearize(const double* vertices) {
   }
 }
 
-/// Leads facets to the pixels that no facet reaches. @pre frames are up to date.
+/// Assigns facets to unlit pixels. @pre frames are up to date.
 template <class Exec>
 template <class Rays>
 void DesignObjectiveOn<Exec>::find_unlit(const std::vector<ObjectiveView>& views, Rays& rays) {
@@ -393,8 +394,8 @@ void DesignObjectiveOn<Exec>::find_unlit(const std::vector<ObjectiveView>& views
   }
 }
 
-/// Frames, and what the rays keep of the surface; false where a barrier is infinite or a ray is not
-/// let out.
+/// Updates frames and the rays' arrays; false if a barrier is infinite or a ray does not leave the
+/// surface.
 template <class Exec>
 template <class Rays>
 bool DesignObjectiveOn<Exec>::allowed(const std::vector<ObjectiveView>& views, Rays& rays) {
@@ -406,7 +407,7 @@ bool DesignObjectiveOn<Exec>::allowed(const std::vector<ObjectiveView>& views, R
   return true;
 }
 
-/// The picture in all colours. @pre of smooth surfaces: their rays have landed.
+/// Renders the picture in all colours. @pre smooth surfaces: the landing points are up to date.
 template <class Exec>
 template <class Rays>
 std::span<const double> DesignObjectiveOn<Exec>::project(const std::vector<ObjectiveView>& views,
@@ -427,7 +428,7 @@ struct DesignObjectiveOn<Exec>::Sums {
   Pending<1> absolute_error;
   Pending<1> image;
   Pending<1> gradient;
-  std::vector<Pending<4>> goal;   ///< GoalSums of each colour, as far as faces does not hold them.
+  std::vector<Pending<4>> goal;   ///< GoalSums of each colour that `faces` does not contain.
   std::vector<Pending<5>> faces;  ///< FaceSums of each colour.
   Pending<2> bends;               ///< E_face, and Σ w h of E_edge.
   Pending<1> laplacian;
@@ -451,7 +452,7 @@ void DesignObjectiveOn<Exec>::compare_picture(const std::vector<ObjectiveView>& 
   cotangent_.prepare(executor_);
 }
 
-/// From the goal, the barriers and the smoothness terms back to the vertices.
+/// Pulls the derivatives of the goal, the barriers and the smoothness terms back to the vertices.
 template <class Exec>
 template <class Rays>
 void DesignObjectiveOn<Exec>::pull_back(const std::vector<ObjectiveView>& views, Rays& rays,
@@ -543,33 +544,34 @@ ObjectiveEvaluation DesignObjectiveOn<Exec>::evaluate_by(Rays& rays, const doubl
   return result;
 }
 
-/// The function that both halves of the alternation minimise, of the vertex positions alone: Sun et
-/// al., Eq. 18 for a picture, Eq. 20 for a correspondence. On the CPU; DesignObjectiveOn is the
-/// same on any executor.
+/// The function of the vertex positions that both halves of the alternation minimise: Sun et al.,
+/// Eq. 18 for a picture, Eq. 20 for a correspondence. On the CPU; DesignObjectiveOn is the same on
+/// any executor.
 ///
-/// The Weingarten maps are eliminated. Ψ_ν is concave in h, so that at a given surface E_edge has a
-/// majorant linear in h, Σ Ψ(h⁰) + w (h − h⁰) with w = Ψ'(h⁰), tight at h⁰; with w held, every
-/// face's best map is a 3 × 3 least-squares solution, and by the envelope theorem the gradient by
-/// the vertices is the partial one. relinearize() moves h⁰ to a new surface; between two calls
+/// The Weingarten maps are eliminated. Ψ_ν is concave in h, so at a given surface E_edge has a
+/// majorant linear in h, Σ Ψ(h⁰) + w (h − h⁰) with w = Ψ'(h⁰), tight at h⁰. With w held, every
+/// face's best map solves a 3 × 3 least-squares problem, and by the envelope theorem the gradient
+/// by the vertices is the partial one. relinearize() moves h⁰ to a new surface; between two calls
 /// the objective is one smooth function, never less than the paper's.
 ///
-/// Lengths count in pixels in E_bdr and E_lap (the paper's unit); E_face and E_edge have none.
+/// E_bdr and E_lap measure lengths in pixels (the paper's unit); E_face and E_edge are
+/// dimensionless.
 class DesignObjective {
  public:
   using Evaluation = ObjectiveEvaluation;
 
-  /// @param mesh  gives the connectivity; its vertices are where relinearize() is first called.
-  /// @param goal  a picture has setup.pixels and is not all black.
+  /// @param mesh  gives the connectivity; relinearize() is first called at its vertices.
+  /// @param goal  a picture must have setup.pixels and not be all black.
   DesignObjective(const SurfaceMesh& mesh, const OpticalSetup& setup, const DesignGoal& goal,
                   const ObjectiveOptions& options, const Executor& executor)
       : core_(mesh, setup, goal, options, executor) {}
 
-  /// Takes the Welsch weights from this surface.
+  /// Recomputes the Welsch weights at this surface.
   void relinearize(const Eigen::Matrix3Xd& vertices) { core_.relinearize(vertices.data()); }
 
-  /// Value and gradient (3 × V, per mm; zero for coordinates that are held: x on the lens's left
-  /// and right border, y on the lower and upper one, both where relinearize() found a face on the
-  /// outline). Same bits for any number of threads.
+  /// Value and gradient (3 × V, per mm; zero for held coordinates: x on the lens's left and right
+  /// border, y on the lower and upper one, x and y of faces that the outline cut at the last
+  /// relinearize()). Same bits for any number of threads.
   Evaluation evaluate(const Eigen::Matrix3Xd& vertices, Eigen::Matrix3Xd& gradient) {
     gradient.resize(3, vertices.cols());
     return core_.evaluate(vertices.data(), gradient.data());

@@ -28,8 +28,8 @@ LF_HD inline ValueSlope area_barrier(double area, const AreaBarrier& barrier) {
 // Forward: surface → frames, Weingarten maps, image triangles, picture error, for one face, vertex
 // or pixel. Rays says how a face sends its light and is FacetRays or SmoothRays.
 
-/// Frame of a face, and its flux where that is costly; its share of E_barr, which is infinite where
-/// the surface is not allowed.
+/// Stores the frame of a face, and its flux where that is costly to compute. Returns its share of
+/// E_barr, which is infinite where the surface is not allowed.
 struct MeasureFace {
   ObjectiveView o;
 
@@ -44,9 +44,9 @@ struct MeasureFace {
   }
 };
 
-/// What the faces project onto the screen, as a source of FluxImageOn::render(): the image of every
-/// face that lies inside of the outline, nothing of the others, then those of their parts.
-/// @pre frames, and what the rays keep of the surface, are up to date.
+/// Image triangles of the faces, as a source of FluxImageOn::render(): first one for every face,
+/// empty unless the whole face is inside the outline, then those of the parts inside.
+/// @pre frames and the rays' arrays are up to date.
 template <class Rays>
 struct FaceLightSource {
   ObjectiveView o;
@@ -61,8 +61,7 @@ struct FaceLightSource {
   }
 };
 
-/// Centroid of what a face projects onto the screen; no number where less than all of its light
-/// does. @pre as of FaceLightSource.
+/// Centroid of a face's image; NaN if the outline cuts the face. @pre as for FaceLightSource.
 template <class Rays>
 struct FaceCentroid {
   ObjectiveView o;
@@ -96,7 +95,8 @@ struct ResetEdgeWeights {
   }
 };
 
-/// Welsch weights of a face's edges from its map and its neighbours'; its half of Σ Ψ(h⁰) − w h⁰.
+/// Stores the Welsch weights of a face's edges from its map and its neighbours'; returns its half
+/// of Σ Ψ(h⁰) − w h⁰.
 struct ReweightEdges {
   ObjectiveView o;
 
@@ -129,7 +129,7 @@ struct AddEntry {
   LF_HD void operator()(std::int64_t i) const { sum[i] += add[i]; }
 };
 
-/// |g − g̃| of a pixel; sets its error and clears its cotangent.
+/// Stores a pixel's error and clears its cotangent; returns |g − g̃|.
 struct ComparePixel {
   const double* flux;
   const double* target;
@@ -144,7 +144,7 @@ struct ComparePixel {
   }
 };
 
-/// Cotangent of a pixel: by its display-encoded value → by its flux.
+/// Turns a pixel's cotangent by its display-encoded value into that by its flux.
 struct EncodeAdjoint {
   const double* flux;
   double target_total;
@@ -157,14 +157,15 @@ struct EncodeAdjoint {
 
 // Adjoint: from the picture's cotangent back to the vertices, for one face or vertex.
 
-/// Derivatives by what a face is made of; summed up and carried to its corners at the end.
+/// Derivatives by a face's corners, unit normal and area normal; at the end all are carried to the
+/// corners.
 struct FaceBar {
   Corners corners;
   Eigen::Vector3d n{0.0, 0.0, 0.0};  ///< Its unit normal.
   Eigen::Vector3d area_normal{0.0, 0.0, 0.0};
 };
 
-/// Weighted derivatives of what a picture says of an image triangle, and the values.
+/// Weighted derivatives of the picture terms by one image triangle, and their values.
 LF_HD inline GoalSums picture_adjoint(const ObjectiveView& o, const ImageTriangle& image,
                                       ImageTriangle& bar) {
   const GoalView& goal = o.goal;
@@ -175,7 +176,7 @@ LF_HD inline GoalSums picture_adjoint(const ObjectiveView& o, const ImageTriangl
   return values;
 }
 
-/// The same of the parts of a face that lie inside of the outline.
+/// The same, summed over the parts of a face inside the outline.
 LF_HD inline GoalSums rim_adjoint(const ObjectiveView& o, std::int64_t face,
                                   const ImageTriangle& image, ImageTriangle& bar) {
   GoalSums values;
@@ -188,7 +189,7 @@ LF_HD inline GoalSums rim_adjoint(const ObjectiveView& o, std::int64_t face,
   return values;
 }
 
-/// Weighted derivatives of what the goal says of one face's image triangle, and the values.
+/// Weighted derivatives of the goal's terms by one face's image triangle, and their values.
 LF_HD inline GoalSums goal_adjoint(const ObjectiveView& o, std::int64_t face,
                                    const ImageTriangle& image, ImageTriangle& bar) {
   const ObjectiveWeights& w = o.weights;
@@ -213,7 +214,7 @@ LF_HD inline GoalSums goal_adjoint(const ObjectiveView& o, std::int64_t face,
   return values;
 }
 
-/// Weighted derivatives of a face's barriers; returns its E_barr.
+/// Adds the weighted derivatives of a face's barriers; returns its E_barr.
 LF_HD inline double barrier_adjoint(const ObjectiveView& o, std::int64_t face, const Corners& t,
                                     FaceBar& bar) {
   const double weight = o.weights.barrier;
@@ -223,7 +224,7 @@ LF_HD inline double barrier_adjoint(const ObjectiveView& o, std::int64_t face, c
                                               bar.n, o.incident_at(face));
 }
 
-/// Derivatives of everything by one face's corners.
+/// Derivatives of all terms by one face's corners.
 template <class Rays>
 struct PullBackFace {
   ObjectiveView o;
@@ -273,7 +274,7 @@ struct GatherVertex {
   }
 };
 
-/// Clears what a held coordinate's derivative is.
+/// Clears the derivatives by held coordinates.
 struct HoldCoordinate {
   const double* movable;
   double* gradient;

@@ -13,17 +13,15 @@
 
 namespace lensforge {
 
-/// Weights of the objective (Sun et al., Eqs. 17, 18 and 20). All ≥ 0; values of their Appendix E
-/// but for two.
-/// - λ2, for which the paper has 1e3: E_grad weighs the finest detail of the picture's error up to
-///   81 times as much as its large shapes, and the optimiser then leaves those, and the faces that
-///   a crease has left in black. 128², MAE after 300 iterations with 1e3, 10 and 0: logo 0.0145,
-///   0.0058 and 0.0031, portrait 0.0084, 0.0071 and 0.0072. Even E_grad itself ends lower on the
-///   logo without it (23, 16, 14).
-/// - λ4, for which it has 20: what E_edge weighs hangs on ν, whose scale the paper leaves open, and
-///   with the ν of plan_levels() its share of the total soon exceeds the picture's. See
-///   default_smoothness().
-/// Lengths enter the terms in working-picture pixels, the paper's unit of length.
+/// Weights of the objective (Sun et al., Eqs. 17, 18 and 20). All ≥ 0; the values are those of
+/// their Appendix E, with two exceptions.
+/// - λ2 (paper: 1e3). E_grad weighs the finest detail of the picture's error up to 81 times as much
+///   as its large shapes; the optimiser then neglects these, and the faces that a crease left in
+///   black. MAE of a 128² logo after 300 iterations: 0.0145 with 1e3, 0.0031 with 0.
+/// - λ4 (paper: 20). The weight of E_edge depends on ν, whose scale the paper leaves open; with the
+///   ν of plan_levels() its share of the total soon exceeds the picture's. See
+///   default_smoothness(). Lengths enter the terms in working-picture pixels, the paper's unit of
+///   length.
 struct ObjectiveWeights {
   double image = 1e2;       ///< λ1, E_img
   double gradient = 0.0;    ///< λ2, E_grad
@@ -36,20 +34,18 @@ struct ObjectiveWeights {
   double flux = 1e1;        ///< γ2, E_flux
 };
 
-/// λ4 by what is optimised. MAE in thousandths after six rounds with 2e-3, 2e-4 and 2e-5. Facets:
-/// 64² relief with 2.5 vertices per pixel side 0.012, 0.006 and 0.001, butterfly so 0.024, 0.012
-/// and 0.005, city so 0.35, 0.21 and 0.18; 128² portrait 2.5, 2.6 and 2.6; 256 × 128 calligraphy
-/// 2.9, 2.8 and 2.8. Smooth, as a surface: 128² portrait 1.75, 1.76 and 1.78, 96² logo 4.7 and,
-/// with 2e-5, 6.0; 1e-3 ends nearer by the normals than 2e-3 in fewer and longer rounds (see
-/// kMergedRounds) and no farther as a surface (128² portrait 1.78 and 1.82).
+/// λ4 by surface model. MAE after six rounds with 2e-3 and 2e-5: facets, 64² city with 2.5 vertices
+/// per pixel side 0.00035 and 0.00018; smooth, as a surface, 96² logo 0.0047 and 0.0060. For smooth
+/// models 1e-3 ends closer than 2e-3 with merged rounds (kMergedRounds): 128² portrait 0.00178 and
+/// 0.00182.
 inline double default_smoothness(SurfaceModel model) {
   return model == SurfaceModel::kFacet ? 2e-5 : 1e-3;
 }
 
-/// Values of the terms before weighting, and the weighted total.
+/// Unweighted values of the terms, and the weighted total.
 struct EnergyValues {
   double image = 0.0;
-  double unlit = 0.0;  ///< E_unlit, weighted by λ1 as well; see unlit_term().
+  double unlit = 0.0;  ///< E_unlit, also weighted by λ1; see unlit_term().
   double gradient = 0.0;
   double boundary = 0.0;
   double barrier = 0.0;
@@ -77,17 +73,18 @@ struct EnergyValues {
 };
 
 /// Thresholds of the area barrier, 0 < lower < upper, in the unit of the areas. All problems that
-/// share a mesh must use the same ones, or one's result is outside another's domain.
+/// share a mesh must use the same thresholds, or the result of one is outside another's domain.
 struct AreaBarrier {
   double lower;  ///< ε1: the projected area of every triangle stays above.
-  double upper;  ///< ε2: triangles larger than this are left alone.
+  double upper;  ///< ε2: larger triangles are not penalised.
 };
 
-/// Dark parts need small facets (a facet's flux is its projected area), and a thousandth of the
-/// mean still divides without loss of digits.
+/// Minimum projected area of a facet, as a share of the mean. Dark parts need small facets (a
+/// facet's flux is its projected area); a thousandth of the mean still divides without loss of
+/// digits.
 inline constexpr double kLeastArea = 0.001;
 
-/// Thresholds of the area barrier for a mesh of so many triangles over the lens.
+/// Thresholds of the area barrier for a mesh of `triangles` triangles over the lens.
 /// @param least  ε1 as a share of the mean projected triangle; ε2 is five times that.
 AreaBarrier default_area_barrier(const OpticalSetup& setup, std::int64_t triangles,
                                  double least = kLeastArea);
@@ -95,25 +92,25 @@ AreaBarrier default_area_barrier(const OpticalSetup& setup, std::int64_t triangl
 struct ObjectiveOptions {
   ObjectiveWeights weights;
   SurfaceModel model = SurfaceModel::kFacet;
-  int samples = 1;                ///< Of a spline: rays a knot cell each way, ≥ 1.
-  std::optional<MadeBy> made_by;  ///< Of a spline: what its surface becomes; else it is as it is.
+  int samples = 1;                ///< Splines only: rays per knot cell each way, ≥ 1.
+  std::optional<MadeBy> made_by;  ///< Splines only: how the part is made; none: the spline itself.
   double nu = 1.0;                ///< ν of the Welsch function, 1/mm, > 0.
   AreaBarrier area{1e-6, 5e-6};   ///< mm²
-  double surface_height = 0.0;  ///< About where the surface is, mm: its source is seen from there.
+  double surface_height = 0.0;  ///< Approximate height of the surface, mm, for the source's image.
 };
 
-/// Where transport wants the light of every face (Sun et al., section 3.4).
+/// Targets of transport for the light of every face (Sun et al., section 3.4).
 struct Correspondence {
   Eigen::Matrix2Xd centroids;  ///< c̃ of Eq. 22, pixel coordinates, 2 × F.
   Eigen::VectorXd flux;        ///< Φ^old of Eq. 23, shares of the lens's total, F.
 };
 
-/// What a surface is shaped after: a picture in linear light (Sun et al., Eq. 18), or where
-/// transport wants the light of each face (Eq. 20).
+/// Goal of the optimisation: a picture in linear light (Sun et al., Eq. 18), or a target for the
+/// light of each face (Eq. 20).
 using DesignGoal = std::variant<Image, Correspondence>;
 
 struct ObjectiveEvaluation {
-  bool feasible = false;  ///< False where a barrier is infinite; nothing else is set then.
+  bool feasible = false;  ///< False if a barrier is infinite; nothing else is set then.
   EnergyValues energy;
   double mae = 0.0;  ///< Mean |g − g̃|, display-encoded, not clipped; 0 for a correspondence.
 };

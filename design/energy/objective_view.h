@@ -37,7 +37,7 @@ struct MeshView {
   [[nodiscard]] LF_HD int neighbour(std::int64_t face, int k) const {
     return neighbours[3 * face + k];
   }
-  /// The edge by which a face borders on another.
+  /// The edge that a face shares with its neighbour `other`.
   [[nodiscard]] LF_HD int edge_to(std::int64_t face, std::int64_t other) const {
     return neighbour(face, 0) == other ? 0 : (neighbour(face, 1) == other ? 1 : 2);
   }
@@ -47,7 +47,7 @@ struct MeshView {
   }
 };
 
-/// The arrays behind a MeshView.
+/// Owns the arrays of a MeshView.
 template <class Exec>
 class MeshOn {
  public:
@@ -93,16 +93,16 @@ class MeshOn {
   std::int64_t vertices_;
 };
 
-// A lens's outline in the objective. The faces that it cuts keep their corners' x and y, so that
-// the parts inside are the same triangles of them until the surface is looked at anew; as a face's
-// light lands by an affine map, each part's image is exact and its derivative a weighted sum.
+// A lens's outline in the objective. Faces that it cuts keep their corners' x and y, so their parts
+// inside stay the same triangles until the next relinearize(). A face's light lands by an affine
+// map: each part's image is exact and its derivative a weighted sum.
 
-/// What an outline leaves of the faces. MeshCut in the memory of an executor.
+/// Parts of the faces inside an outline: MeshCut in the memory of an executor.
 struct ApertureView {
   const std::int32_t* first = nullptr;  ///< F; null without an outline.
   const MeshCut::Piece* pieces = nullptr;
   const double* shares = nullptr;  ///< F
-  std::int64_t count = 0;          ///< Of pieces that belong to a face.
+  std::int64_t count = 0;          ///< Number of pieces that belong to a face.
 
   [[nodiscard]] LF_HD bool is_whole(std::int64_t face) const {
     return first == nullptr || first[face] == MeshCut::kWhole;
@@ -112,7 +112,7 @@ struct ApertureView {
   }
 };
 
-/// The arrays behind an ApertureView.
+/// Owns the arrays of an ApertureView.
 template <class Exec>
 class ApertureOn {
  public:
@@ -147,10 +147,10 @@ inline void hold_rim(const SurfaceMesh& mesh, const MeshCut& cut, Eigen::Matrix3
   }
 }
 
-// Values of the objective's terms that are summed over faces. Executors sum arrays: packed()
-// and of() go from one to the other.
+// Values of the objective's terms that are summed over faces. Executors sum arrays: packed() and
+// of() convert.
 
-/// What the goal says of one face or of all.
+/// Values of the goal's terms, for one face or all.
 struct GoalSums {
   using Packed = std::array<double, 4>;
 
@@ -171,7 +171,7 @@ struct GoalSums {
   }
 };
 
-/// All of it.
+/// Values of the goal's terms and the barrier.
 struct FaceSums {
   using Packed = std::array<double, 5>;
 
@@ -184,16 +184,15 @@ struct FaceSums {
   [[nodiscard]] static FaceSums of(const Packed& p) { return {{p[0], p[1], p[2], p[3]}, p[4]}; }
 };
 
-// What the objective's kernels read and write, as raw arrays in the memory of an executor. Handed
-// to them by value.
+// Arguments of the objective's kernels, passed by value: raw arrays in the memory of an executor.
 
-/// What the surface is shaped after: a picture or a correspondence.
+/// The goal: a picture or a correspondence.
 struct GoalView {
-  int columns;  ///< Of the picture.
+  int columns;  ///< Columns of the picture.
   int rows;
-  double parts;  ///< Of a pixel each way, in which the cotangent counts.
+  double parts;  ///< Parts of a pixel each way, in which the cotangent is stored.
   FluxCotangent cotangent;
-  const double* target;            ///< Display-encoded, row by row; of a picture.
+  const double* target;            ///< Display-encoded, row by row; for a picture.
   const std::int32_t* led;         ///< F, lead_to_unlit_pixels(); null if no facet is led.
   const double* wanted_centroids;  ///< 2 × F, Correspondence::centroids; null for a picture.
   const double* wanted_flux;       ///< F, Correspondence::flux.
@@ -206,7 +205,7 @@ struct FaceBend;
 struct FaceFrame;
 struct WeingartenMap;
 
-/// What is kept of every face from one kernel to the next.
+/// Values per face that one kernel leaves for the next.
 struct FaceScratch {
   FaceFrame* frames;
   WeingartenMap* maps;
@@ -216,15 +215,15 @@ struct FaceScratch {
   double* flux;          ///< F, LightPath::flux(); null in light of one direction.
 };
 
-/// The vectors of a light path begin at multiples of 16 bytes: with an even number of words before
-/// and after it there are no gaps.
+/// State of the objective for its kernels. The vectors of a light path are aligned to 16 bytes:
+/// with an even number of words before and after it there are no gaps.
 struct ObjectiveView {
   ObjectiveWeights weights;
   double nu;         ///< ObjectiveOptions::nu.
   AreaBarrier area;  ///< ObjectiveOptions::area.
   LightPath light;
   const double* vertices;  ///< 3 × V, mm
-  VertexRays incident;     ///< On the vertices where they are now.
+  VertexRays incident;     ///< Rays to the vertices at their current places.
   MeshView mesh;
   GoalView goal;
   FaceScratch scratch;

@@ -13,16 +13,16 @@ namespace {
 /// Share of the wanted light below which a pixel counts as unlit.
 constexpr double kMinLight = 0.3;
 
-/// Linear light, white is one, below which a pixel may stay black.
+/// Linear light (white is 1) below which a pixel may stay black.
 constexpr double kMinWanted = 1e-4;
 
-/// Farthest pixel that a facet is taken from, along columns and rows.
+/// Maximum distance of a facet from its assigned pixel, in columns and rows.
 constexpr int kUnlitReach = 3;
 
-/// Pixels by which a facet that is alone in its pixel counts as farther.
+/// Added distance, in pixels, of a facet that is alone in its pixel.
 constexpr double kLonelyLoss = 1.0;
 
-/// Facets by the pixel that their centroid lies in; those outside count for the nearest one.
+/// Facets by the pixel of their centroid; those outside belong to the nearest pixel.
 class FacetsByPixel {
  public:
   FacetsByPixel(int columns, int rows, const Eigen::Matrix2Xd& centroids)
@@ -56,11 +56,11 @@ class FacetsByPixel {
  private:
   int columns_;
   int rows_;
-  std::vector<std::size_t> begin_;   ///< Of every pixel's part of facets_.
+  std::vector<std::size_t> begin_;   ///< Begin of every pixel's part of facets_.
   std::vector<std::size_t> facets_;  ///< In ascending order within a pixel.
 };
 
-/// Gives every unlit pixel its facet, row by row.
+/// Assigns a facet to every unlit pixel, row by row.
 class Guide {
  public:
   Guide(const LitPicture& picture, const Eigen::Matrix2Xd& centroids)
@@ -94,7 +94,7 @@ class Guide {
   struct Candidate {
     double distance = std::numeric_limits<double>::infinity();
     std::size_t facet = 0;
-    std::size_t home = 0;  ///< The pixel that it would leave.
+    std::size_t home = 0;  ///< The pixel that it leaves.
   };
 
   void lead_to(int row, int column) {
@@ -124,7 +124,8 @@ class Guide {
   LitPicture picture_;
   const Eigen::Matrix2Xd& centroids_;
   FacetsByPixel facets_;
-  std::vector<std::size_t> staying_;  ///< Facets of every pixel that are not led away.
+  std::vector<std::size_t>
+      staying_;  ///< Per pixel: number of facets that are not assigned elsewhere.
   std::vector<std::int32_t> led_;
 };
 

@@ -17,9 +17,9 @@ namespace lensforge {
 
 // Facet model: every face sends its light by its own normal.
 
-/// What kernels ask. @pre frames are up to date.
+/// The kernels' part. @pre frames are up to date.
 struct FacetRays {
-  std::int64_t nothing = 0;  ///< Without it bytes of a kernel's argument would be left unset.
+  std::int64_t nothing = 0;  ///< Keeps all bytes of a kernel's argument set.
 
   [[nodiscard]] LF_HD ImageTriangle image(const ObjectiveView& o, std::int64_t face) const {
     const Corners t = o.corners(face);
@@ -40,17 +40,17 @@ struct FacetRays {
     return values;
   }
 
-  /// Derivative by a vertex that no face carries.
+  /// Derivative by a vertex, apart from those by its faces.
   [[nodiscard]] LF_HD Eigen::Vector3d vertex_bar(std::int64_t /*v*/) const {
     return {0.0, 0.0, 0.0};
   }
 };
 
-/// What the objective asks; facets need no arrays of their own.
+/// The objective's part; facets need no arrays of their own.
 template <class Exec>
 class FacetRaysOn {
  public:
-  /// Facets can be led to unlit pixels one by one.
+  /// Facets can be assigned to unlit pixels one by one.
   static constexpr bool kLeadable = true;
   using View = FacetRays;
 
@@ -58,14 +58,14 @@ class FacetRaysOn {
 
   [[nodiscard]] FacetRays view(std::size_t /*color*/) { return {}; }
 
-  /// Follows the rays to the screen; false where one is not let out.
+  /// Traces the rays to the screen; false if one does not leave the surface.
   [[nodiscard]] bool land(const Exec& /*executor*/, const ObjectiveView& /*o*/,
                           std::size_t /*color*/) {
     return true;
   }
 
-  /// Goes back from the goal to what FacetRays::pull_back() needs; the goal's values as far as that
-  /// does not return them.
+  /// Computes the derivatives that FacetRays::pull_back() needs; returns the values of the goal's
+  /// terms that it does not return.
   [[nodiscard]] auto pull_back(const Exec& /*executor*/, const ObjectiveView& /*o*/,
                                std::size_t /*color*/) {
     return typename Exec::template PendingSum<4>();
@@ -78,10 +78,10 @@ class FacetRaysOn {
 // Smooth and spline model: every vertex sends one ray by its normal, and image
 // triangles share corners.
 
-/// What kernels ask, and the arrays that they share. @pre landing is up to date.
+/// The kernels' part, and the arrays that they share. @pre landing is up to date.
 struct SmoothRays {
-  bool normals_given;  ///< The caller's, of a surface that the mesh samples; not the mesh's own.
-  double* normals;     ///< 3 × V, the caller's, or else sums of area normals.
+  bool normals_given;  ///< Normals are the caller's, not the mesh's own.
+  double* normals;     ///< 3 × V, the caller's, or sums of area normals.
   double* landing;     ///< 2 × V, pixel coordinates.
   ImageTriangle* image_bar;
   double* position_bar;  ///< 3 × V, direct derivative by position.
@@ -92,7 +92,7 @@ struct SmoothRays {
     return {column2(landing, v[0]), column2(landing, v[1]), column2(landing, v[2]), o.flux(face)};
   }
 
-  /// Weighted derivatives of the goal by one face; SmoothImageAdjoint has counted its values.
+  /// Weighted derivatives of the goal by one face; SmoothImageAdjoint returned its values.
   LF_HD GoalSums pull_back(const ObjectiveView& o, std::int64_t face, const Corners& t,
                            FaceBar& bar) const {
     const int* v = o.mesh.triangle(face);
@@ -102,13 +102,13 @@ struct SmoothRays {
     return {};
   }
 
-  /// Derivative by a vertex that no face carries.
+  /// Derivative by a vertex, apart from those by its faces.
   [[nodiscard]] LF_HD Eigen::Vector3d vertex_bar(std::int64_t v) const {
     return column3(position_bar, v);
   }
 };
 
-/// Normal and landing point of a vertex; 1 where it does not transmit, else 0.
+/// Stores the normal and landing point of a vertex; returns 1 if it does not transmit, else 0.
 struct LandVertex {
   ObjectiveView o;
   SmoothRays rays;
@@ -132,7 +132,7 @@ struct LandVertex {
   }
 };
 
-/// Derivatives of the goal by one image triangle, and the goal's values.
+/// Stores the derivatives of the goal by one image triangle; returns the goal's values.
 struct SmoothImageAdjoint {
   ObjectiveView o;
   SmoothRays rays;
@@ -143,7 +143,7 @@ struct SmoothImageAdjoint {
   }
 };
 
-/// Derivatives by a landing point, carried to position and normal.
+/// Carries the derivatives by a landing point to position and normal.
 struct PullBackVertex {
   ObjectiveView o;
   SmoothRays rays;
@@ -165,14 +165,14 @@ struct PullBackVertex {
   }
 };
 
-/// What the objective asks; see FacetRaysOn.
+/// The objective's part; see FacetRaysOn.
 template <class Exec>
 class SmoothRaysOn {
  public:
   static constexpr bool kLeadable = false;
   using View = SmoothRays;
 
-  /// @param colors  of which each lands elsewhere.
+  /// @param colors  number of colours; each has its own landing points.
   SmoothRaysOn(std::int64_t faces, std::int64_t vertices, bool normals_given, std::size_t colors)
       : normals_given_(normals_given),
         normals_(3 * static_cast<std::size_t>(vertices)),
@@ -199,7 +199,7 @@ class SmoothRaysOn {
     return sums;
   }
 
-  /// Adds the derivatives by the normals that pull_back() has found last.
+  /// Adds the derivatives by the normals from the last pull_back().
   void add_normal_bar(const Exec& executor, double* sum) {
     parallel_for(executor, "add a colour", static_cast<std::int64_t>(normal_bar_.size()),
                  AddEntry{normal_bar_.data(), sum});
@@ -211,7 +211,7 @@ class SmoothRaysOn {
 
   bool normals_given_;
   Buffer<double> normals_;
-  Buffer<double> landing_;  ///< Of one colour after the other.
+  Buffer<double> landing_;  ///< One colour after the other.
   Buffer<ImageTriangle> image_bar_;
   Buffer<double> position_bar_;
   Buffer<double> normal_bar_;

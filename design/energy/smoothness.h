@@ -16,8 +16,8 @@
 
 namespace lensforge {
 
-/// What the smoothness terms need of a triangle: centroid c and unit normal n, n_z > −1 (Sun et
-/// al., section 3.3). The same struct holds derivatives by these vectors.
+/// Centroid c and unit normal n of a triangle, n_z > −1 (Sun et al., section 3.3). The same struct
+/// holds derivatives by these vectors.
 struct FaceFrame {
   Eigen::Vector3d n{0.0, 0.0, 0.0};
   Eigen::Vector3d c{0.0, 0.0, 0.0};
@@ -29,8 +29,8 @@ LF_HD inline FaceFrame face_frame(const Corners& t) {
 }
 
 /// Two unit vectors at right angles to each other and to a normal, e2 = n × e1 (Duff et al. 2017,
-/// Building an Orthonormal Basis, Revisited). The paper takes e1 along an edge: which vectors of
-/// the tangent plane they are changes none of the terms, since each face's map is fitted in them.
+/// Building an Orthonormal Basis, Revisited). The paper takes e1 along an edge; the choice changes
+/// no term, because each face's map is fitted in this basis.
 struct TangentBasis {
   Eigen::Vector3d e1;
   Eigen::Vector3d e2;
@@ -42,12 +42,12 @@ struct TangentBasis {
     e1 = {1.0 - n.x() * n.x() * share, mixed, -n.x()};
     e2 = {mixed, 1.0 - n.y() * n.y() * share, -n.y()};
   }
-  /// Coordinates of a vector's part in the tangent plane.
+  /// Coordinates of a vector's projection onto the tangent plane.
   [[nodiscard]] LF_HD Eigen::Vector2d local(const Eigen::Vector3d& v) const {
     return {e1.x() * v.x() + e1.y() * v.y() + e1.z() * v.z(),
             e2.x() * v.x() + e2.y() * v.y() + e2.z() * v.z()};
   }
-  /// The vector of such coordinates.
+  /// The vector with these coordinates.
   [[nodiscard]] LF_HD Eigen::Vector3d world(const Eigen::Vector2d& v) const {
     return {v.x() * e1.x() + v.y() * e2.x(), v.x() * e1.y() + v.y() * e2.y(),
             v.x() * e1.z() + v.y() * e2.z()};
@@ -56,8 +56,8 @@ struct TangentBasis {
 
 // The Weingarten map of every face and its consistency across edges.
 //
-// Two numbers that were just computed are read one by one here: taken together as a vector of
-// Eigen's, each pair stalls a processor, and the smoothness terms take twice as long.
+// Numbers that were just computed are read one by one: read in pairs, as an Eigen vector, they
+// stall a processor and the smoothness terms take twice as long.
 //
 // Notation: face i with frame (n, c) and symmetric map M = [[a, c], [c, b]] in the tangent basis
 // (e1, e2); d̄, n̄ local coordinates of the differences of centroids and normals to a
@@ -121,12 +121,13 @@ LF_HD inline ValueSlope welsch(double h, double nu) {
 
 // Least-squares fit of a face's Weingarten map.
 
-/// Tikhonov share that keeps the fit of a face with one neighbour (a mesh corner) determined.
+/// Tikhonov regularisation that keeps the fit of a face with one neighbour (a mesh corner)
+/// determined.
 inline constexpr double kFitRegularization = 1e-9;
 
-/// Solution of a symmetric positive definite system; only the matrix's lower triangle is read. By
-/// cofactors because every face solves one in every evaluation: one division, where those of a
-/// factorisation wait for each other.
+/// Solution of a symmetric positive definite system; only the matrix's lower triangle is read. It
+/// uses cofactors, with one division, because every face solves a system in every evaluation; the
+/// divisions of a factorisation wait for each other.
 LF_HD inline Eigen::Vector3d solve_positive(const Eigen::Matrix3d& m,
                                             const Eigen::Vector3d& right) {
   const double c00 = m(1, 1) * m(2, 2) - m(2, 1) * m(2, 1);
@@ -146,10 +147,10 @@ struct FaceFit {
   double xx = 0.0;  ///< Σ w d̄x²/|d̄|², and so on.
   double yy = 0.0;
   double xy = 0.0;
-  double curvature = 0.0;  ///< Of H²A by a + b, A/4.
+  double curvature = 0.0;  ///< Coefficient of H²A for a + b, A/4.
   Eigen::Vector3d right{0.0, 0.0, 0.0};
 
-  /// Adds a neighbour's share w |M d̄ − n̄|²/|d̄|².
+  /// Adds a neighbour's term w |M d̄ − n̄|²/|d̄|².
   LF_HD void add(const NeighbourOffset& offset, double weight) {
     const double w = weight * offset.inverse;
     const double wx = w * offset.d.x();
@@ -177,26 +178,26 @@ struct FaceFit {
   }
 };
 
-/// E_face of one triangle, H² A (Sun et al., Eq. 15), and its slope by the area: a pure number,
-/// whatever the unit of length. @param area  mm²
+/// E_face of one triangle, H² A (Sun et al., Eq. 15), and its slope by the area. Dimensionless.
+/// @param area mm²
 LF_HD inline ValueSlope mean_curvature_term(const WeingartenMap& m, double area) {
   const double squared = m.mean_curvature() * m.mean_curvature();
   return {squared * area, squared};
 }
 
-// E_face and the linear part of E_edge. Both are sums over faces of F = H²A + τ1 Σ w δ, each the
-// least over the face's own map. So the map does not count in the derivatives (envelope theorem),
-// nor does how the tangent basis is turned in its plane.
+// E_face and the linear part of E_edge. Both are sums over faces of F = H²A + τ1 Σ w δ, each
+// minimised over the face's own map. So neither the map's derivative (envelope theorem) nor a
+// rotation of the tangent basis in its plane enters the derivatives.
 
-/// Derivatives of one face's F. In single precision, since they are but added to others of the
-/// same size: an evaluation waits for them to come from memory.
+/// Derivatives of one face's F. In single precision: they are only added to others of the same
+/// size, and reading them from memory limits an evaluation's speed.
 struct FaceBend {
   struct ByNeighbour {
     Eigen::Vector3f n;
     Eigen::Vector3f c;
   };
-  ByNeighbour by_neighbours[3];  ///< Anything at the boundary.
-  Eigen::Vector3f by_tilt;       ///< By the face's own normal, which tilts the basis.
+  ByNeighbour by_neighbours[3];  ///< Undefined at the boundary.
+  Eigen::Vector3f by_tilt;       ///< By the face's own normal, through the tilt of the basis.
   float by_area;                 ///< mm²
 };
 
@@ -224,8 +225,8 @@ struct FittedFace {
   }
 };
 
-/// Weighted derivatives of a face's F; its shares of E_face and of Σ w h. @pre frames are up to
-/// date.
+/// Stores the weighted derivatives of a face's F; returns its shares of E_face and of Σ w h. @pre
+/// frames are up to date.
 struct BendFace {
   ObjectiveView o;
 
@@ -275,8 +276,8 @@ LF_HD inline FaceFrame bend_adjoint(const ObjectiveView& o, std::int64_t face, d
   return bar;
 }
 
-/// One vertex of E_lap. Its distance from the mean of its neighbours, divided by their number so
-/// that LaplacianGradient can gather it, goes to `shares` (2 × V); zero on the boundary.
+/// One vertex of E_lap. Stores its offset from the mean of its neighbours, divided by their number,
+/// in `shares` (2 × V), where LaplacianGradient gathers it; zero on the boundary.
 struct LaplacianDistance {
   MeshView mesh;
   const double* vertices;
@@ -316,7 +317,7 @@ struct LaplacianGradient {
 
 /// E_lap = Σ over interior vertices of ‖P_U(v) − mean of P_U(neighbours)‖² (Sun et al., Eq. 16),
 /// mm². Adds weight × derivative to x and y of `gradient` (3 × V), `.get()[0]` is the value.
-/// @param distance  holds mesh, vertices and memory to work with.
+/// @param distance  mesh, vertices and scratch memory.
 template <class Exec>
 auto laplacian_term(const Exec& executor, const LaplacianDistance& distance, double weight,
                     double* gradient) {

@@ -24,7 +24,7 @@ LF_HD inline Eigen::Map<Eigen::Vector2d> column2(double* data, std::int64_t i) {
   return Eigen::Map<Eigen::Vector2d>(data + 2 * i);
 }
 
-/// Corners of a triangle, three vertex numbers, given all vertices (3 × V).
+/// Corners of a triangle from its three vertex numbers and all vertices (3 × V).
 LF_HD inline Corners corners_at(const int* triangle, const double* vertices) {
   return {column3(vertices, triangle[0]), column3(vertices, triangle[1]),
           column3(vertices, triangle[2])};

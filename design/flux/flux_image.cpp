@@ -14,24 +14,24 @@ template class FluxCotangentImageOn<Executor>;
 
 namespace {
 
-/// Points that stand for the source: of a disc 50 parts wide, ten for each.
+/// Number of points that represent the source: ten per part for a disc 50 parts wide.
 constexpr int kKernelPoints = 20000;
 
 /// Parts of a pixel each way.
 constexpr int kParts = 2;
 
-/// Weights over the parts around a source's middle, as far as `reach` on either side.
+/// Weights of the parts around a source's middle, up to `reach` on either side.
 struct PartWeights {
   Eigen::Vector2i reach;
   Eigen::MatrixXd weights;  ///< Rows by columns.
 };
 
-/// Weights of −1, 0, 1 that shift by t, |t| ≤ ½, exactly what is a quadratic.
+/// Weights of the values at −1, 0, 1 for a shift by t, |t| ≤ ½; exact for quadratics.
 Eigen::Vector3d shift_weights(double t) {
   return {0.5 * t * (t - 1.0), 1.0 - t * t, 0.5 * t * (t + 1.0)};
 }
 
-/// The source's image. @param motion  parts per rad or mm.
+/// Image of the source. @param motion  parts per rad or mm.
 PartWeights part_weights(const SourceExtent& extent, const Eigen::Matrix2d& motion) {
   std::vector<SourcePoint> points = source_points(extent, kKernelPoints);
   Eigen::Vector2d farthest = Eigen::Vector2d::Zero();
@@ -51,7 +51,7 @@ PartWeights part_weights(const SourceExtent& extent, const Eigen::Matrix2d& moti
   return result;
 }
 
-/// Light of part q goes to part p by k(p − q); to pixel P by the sum over its parts.
+/// Part q sends light to part p by k(p − q); to pixel P by the sum over its parts.
 SourceKernel sum_over_pixel(const PartWeights& k) {
   SourceKernel kernel;
   kernel.parts = kParts;

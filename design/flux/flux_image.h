@@ -34,7 +34,7 @@ struct DepositFlux {
   }
 };
 
-/// Hands item i the picture of its worker to deposit into.
+/// Gives item i its worker's picture to deposit into.
 template <class Item>
 struct DepositItem {
   const Item& item;
@@ -48,7 +48,7 @@ struct DepositItem {
 
 /// Row differences of all workers → flux, along a row from the left.
 struct ResolveFlux {
-  using Value = std::uint64_t;  ///< Sums on the way are taken modulo 2⁶⁴.
+  using Value = std::uint64_t;  ///< Intermediate sums are taken modulo 2⁶⁴.
 
   const std::int64_t* units;
   double* flux;
@@ -86,20 +86,18 @@ struct SumFromRight {
   }
 };
 
-/// Adds what other processes have deposited to a picture of row differences, the first of the
-/// workers' in `units`. Executors of one process have nothing to add; design/mpi/ has the other
-/// one.
+/// Adds the deposits of other processes to the first worker's picture of row differences in
+/// `units`. Executors of one process have nothing to add; design/mpi/ overloads this.
 template <class Exec>
 void join_pictures(const Exec& /*executor*/, std::span<std::int64_t> /*units*/,
                    std::size_t /*per_picture*/) {}
 
-/// Gets the derivatives that other processes have found, of which this one has some rows; nothing
-/// in one process.
+/// Collects rows of derivatives that other processes have computed; nothing in one process.
 template <class Exec>
 void collect_rows(const Exec& /*executor*/, std::span<double> /*pixels*/) {}
 
-/// Adds up image triangles into a picture of flux, bit-identically for any number of threads and
-/// any order of triangles. Keeps its buffers, in the memory of the executor, between pictures.
+/// Adds up image triangles to a picture of flux, to the same bits for any number of threads and any
+/// order of triangles. Keeps its buffers, in the memory of the executor, between pictures.
 template <class Exec>
 class FluxImageOn {
  public:
@@ -122,20 +120,20 @@ class FluxImageOn {
     return resolve(executor);
   }
 
-  /// Adds triangles as of render() between begin() and resolve().
+  /// Adds triangles as render() does, between begin() and resolve().
   template <class Source>
   void deposit(const Exec& executor, std::int64_t count, const Source& source) {
     parallel_for_worker(executor, "flux deposit", count,
                         DepositFlux<Source>{source, {units_.data(), columns_, rows_}, stride()});
   }
 
-  /// render() of triangles in the executor's memory.
+  /// render() for triangles in the executor's memory.
   std::span<const double> render(const Exec& executor, std::span<const ImageTriangle> triangles) {
     return render(executor, static_cast<std::int64_t>(triangles.size()),
                   StoredTriangles{triangles.data()});
   }
 
-  /// Begins a picture that is made of parts: add() them, then resolve().
+  /// Begins a picture that is made of parts: add() them or deposit() them, then resolve().
   void begin(const Exec& executor) {
     const auto workers = static_cast<std::size_t>(executor.concurrency());
     if (units_.size() != units_per_picture() * workers) {
@@ -145,9 +143,9 @@ class FluxImageOn {
   }
 
   /// Calls `item(i, image)` for i = 0 … count − 1, at the same time from several threads; each
-  /// deposits as many triangles as it likes into `image`, a FluxAccumulator. CPU only.
+  /// deposits any number of triangles into `image`, a FluxAccumulator. CPU only.
   /// @pre begin() was called with an executor of the same concurrency.
-  /// @param grain  items that one task handles at least.
+  /// @param grain  minimum number of items per task.
   template <class Item>
   void add(const Exec& executor, std::int64_t count, const Item& item,
            std::int64_t grain = kDefaultGrain) {
@@ -155,7 +153,7 @@ class FluxImageOn {
                         DepositItem<Item>{item, {units_.data(), columns_, rows_}, stride()}, grain);
   }
 
-  /// The flux of every pixel of all that was added, as render() returns it.
+  /// Flux per pixel of everything added, as render() returns it.
   std::span<const double> resolve(const Exec& executor) {
     join_pictures(executor, std::span(units_.data(), units_.size()), units_per_picture());
     scan_rows(executor, "flux resolve", rows_, columns_,
@@ -193,7 +191,7 @@ class FluxCotangentImageOn {
         pixel_(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows)),
         suffix_((static_cast<std::size_t>(columns) + 1) * static_cast<std::size_t>(rows)) {}
 
-  /// Derivatives to be filled in; call prepare() afterwards.
+  /// Derivatives, to be filled in before prepare().
   [[nodiscard]] std::span<double> pixels() { return {pixel_.data(), pixel_.size()}; }
   /// Sums the rows from the right.
   void prepare(const Exec& executor) {
@@ -217,14 +215,15 @@ using FluxCotangentImage = FluxCotangentImageOn<Executor>;
 extern template class FluxImageOn<Executor>;
 extern template class FluxCotangentImageOn<Executor>;
 
-/// How an extended source spreads light over the picture. Light is told apart in parts of pixels,
-/// `parts` each way: in whole ones an optimiser finds light that only seems to add up.
+/// Spread of light over the picture under an extended source. Light is resolved in parts of pixels,
+/// `parts` each way: with whole pixels an optimiser finds light that adds up only in this
+/// approximation.
 ///
 /// Notation: q a part and P a pixel, counted in one direction; out(P) = Σ_d w(d) in(parts·P + d −
 /// o).
 struct SourceKernel {
   int parts = 1;
-  int columns = 1;  ///< Of the weights.
+  int columns = 1;  ///< Columns of the weights.
   int rows = 1;
   int offset_x = 0;  ///< o
   int offset_y = 0;
@@ -233,16 +232,16 @@ struct SourceKernel {
   [[nodiscard]] bool none() const { return weights.size() == 1; }
 };
 
-/// The image of the setup's source through the middle of a lens whose surface there is at height z,
-/// mm. Every point of the source shifts the picture, by quadratic interpolation between the parts:
+/// Image of the setup's source through the middle of a lens, where its surface is at height z, mm.
+/// Every point of the source shifts the picture, by quadratic interpolation between the parts:
 /// linear interpolation would add a blur of its own. One kernel serves the whole picture: a
 /// paraxial approximation.
 SourceKernel source_kernel(const OpticalSetup& setup, double z);
 
-/// Neighbours in a row that one item sums, so that a compiler takes them side by side.
+/// Neighbours in a row that one item sums, so that compilers vectorise.
 inline constexpr int kBlurStrip = 8;
 
-/// A kernel and two pictures of so many pixels: in parts and in whole ones.
+/// A kernel, and the size of its two pictures: in parts and in whole pixels.
 struct BlurView {
   const double* weights;
   std::int64_t parts;
@@ -258,7 +257,8 @@ struct BlurView {
   }
 };
 
-/// Adds w times the items begin, begin + step, … of a line to a strip's sums; none beyond its ends.
+/// Adds w times the items begin, begin + step, … of a line to a strip's sums; ignores items beyond
+/// its ends.
 LF_HD inline void add_to_strip(double w, const double* line, std::int64_t length,
                                std::int64_t begin, std::int64_t step, double* sum) {
   if (begin >= 0 && begin + step * (kBlurStrip - 1) < length) {
@@ -271,8 +271,7 @@ LF_HD inline void add_to_strip(double w, const double* line, std::int64_t length
   }
 }
 
-/// Parts → pixels, a strip of a row of pixels. Light that leaves the picture is lost, none comes
-/// in.
+/// Parts → pixels, a strip of a row of pixels. Light that leaves the picture is lost; none enters.
 struct BlurStrip {
   BlurView blur;
   const double* parts;
@@ -298,8 +297,8 @@ struct BlurStrip {
   }
 };
 
-/// Its transpose, pixels → parts: of a row of parts every parts-th one, which all have the same
-/// weights.
+/// Transpose of BlurStrip, pixels → parts. A strip has every parts-th part of a row, which all have
+/// the same weights.
 struct BlurStripAdjoint {
   BlurView blur;
   const double* pixels_bar;
@@ -337,8 +336,8 @@ struct BlurStripAdjoint {
   }
 };
 
-/// A kernel at work on pictures of one size in the memory of an executor. Same bits for any number
-/// of threads: every sum has one order.
+/// Blurs pictures of one size in the memory of an executor. Same bits for any number of threads:
+/// every sum has a fixed order.
 template <class Exec>
 class SourceBlurOn {
  public:
@@ -352,11 +351,11 @@ class SourceBlurOn {
                     : static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows)),
         bar_(pixels_.size()) {}
 
-  /// True if there is nothing to do.
+  /// True if the source has no extent.
   [[nodiscard]] bool none() const { return kernel_.none(); }
   [[nodiscard]] int parts() const { return kernel_.parts; }
 
-  /// A picture in parts → the one that is seen, in pixels; valid until the next call.
+  /// Blurs a picture in parts to one in pixels; the result is valid until the next call.
   std::span<const double> apply(const Exec& executor, std::span<const double> parts) {
     if (none()) return parts;
     const BlurStrip blur{view(), parts.data(), pixels_.data()};
@@ -365,7 +364,7 @@ class SourceBlurOn {
   }
   /// Derivatives by the pixels, to be filled in before apply_adjoint(). @pre !none().
   [[nodiscard]] std::span<double> bar() { return {bar_.data(), bar_.size()}; }
-  /// Transpose of apply(), of bar().
+  /// Transpose of apply(), applied to bar().
   void apply_adjoint(const Exec& executor, std::span<double> parts_bar) {
     if (none()) return;
     const BlurStripAdjoint blur{view(), bar_.data(), parts_bar.data()};
@@ -373,7 +372,7 @@ class SourceBlurOn {
   }
 
  private:
-  /// Strips that one task sums at least.
+  /// Minimum number of strips per task.
   static constexpr std::int64_t kStripGrain = 16;
 
   [[nodiscard]] BlurView view() const {

@@ -9,8 +9,8 @@
 
 namespace lensforge {
 
-/// What one surface triangle projects onto the receiving plane: a triangle of uniform irradiance.
-/// The same struct holds derivatives of a scalar with respect to these numbers.
+/// Image of one surface triangle on the receiving plane: a triangle of uniform irradiance. The same
+/// struct holds derivatives of a scalar with respect to these numbers.
 struct ImageTriangle {
   Eigen::Vector2d p0{0.0, 0.0};  ///< Corners in pixel coordinates (core/optics/image_plane.h).
   Eigen::Vector2d p1{0.0, 0.0};
@@ -18,8 +18,8 @@ struct ImageTriangle {
   double flux = 0.0;  ///< Share of the lens's total flux.
 };
 
-/// The same light in a picture of `scale` times as many pixels each way. Of derivatives the
-/// adjoint.
+/// The same light in a picture with `scale` times as many pixels each way. For derivatives this is
+/// the adjoint.
 LF_HD inline ImageTriangle magnified(const ImageTriangle& t, double scale) {
   return {scale * t.p0, scale * t.p1, scale * t.p2, t.flux};
 }
@@ -32,13 +32,13 @@ LF_HD inline double doubled_area(const Eigen::Vector2d& a, const Eigen::Vector2d
 
 // Walks a straight edge through the pixels it crosses.
 //
-// Notation: the edge runs p → q with parameter s from 0 to 1; pixel (column c, row r) covers
-// [c, c+1] × [r, r+1]; a *piece* is the part of the edge inside one pixel. At a row boundary a
-// piece's y is exactly that integer, and neighbouring pieces share their end points to the bit, so
-// that sums over a closed polygon telescope exactly.
+// Notation: the edge runs p → q with parameter s from 0 to 1; pixel (column c, row r) covers [c,
+// c+1] × [r, r+1]; a *piece* is the part of the edge inside one pixel. At a row boundary a piece's
+// y is exactly that integer, and neighbouring pieces share their end points to the bit, so sums
+// over a closed polygon telescope exactly.
 
-/// One piece of an edge. `column` is −1 for a piece left of the picture; of such a piece only row,
-/// y0 and y1 mean anything.
+/// One piece of an edge. `column` is −1 for a piece left of the picture; such a piece defines only
+/// row, y0 and y1.
 struct EdgePiece {
   int column;
   int row;
@@ -49,7 +49,7 @@ struct EdgePiece {
 
 namespace edge_walk_detail {
 
-/// State of the walk along one axis: the next grid line and where the edge meets it.
+/// State of the walk along one axis: the next grid line and the edge's crossing with it.
 struct Axis {
   int cell, last, step;  ///< Current cell, final cell, direction of travel.
   double origin, inverse;
@@ -65,7 +65,7 @@ struct Axis {
   [[nodiscard]] LF_HD double parameter_at_next_line() const {
     return (next_line() - origin) * inverse;
   }
-  /// Largest cell is limit − 1: a point on the far border belongs to the last cell.
+  /// The largest cell is limit − 1: a point on the far border belongs to the last cell.
   LF_HD static int clamp_cell(double value, int limit) {
     const int cell = static_cast<int>(std::floor(value));
     return cell < 0 ? 0 : (cell >= limit ? limit - 1 : cell);
@@ -85,12 +85,12 @@ LF_HD inline void walk_inside(const Eigen::Vector2d& p, const Eigen::Vector2d& d
     piece.column = u.cell;
     piece.row = v.cell;
     const bool cross_row = sv <= su;
-    // Rounding may put a crossing outside the remaining part; the order of cells is what counts.
+    // Rounding may put a crossing outside the remaining part; only the order of cells matters.
     const double s = clamped(cross_row ? sv : su, piece.s0, part.s1);
     piece.s1 = s;
     piece.x1 = cross_row ? p.x() + s * d.x() : u.next_line();
     piece.y1 = cross_row ? v.next_line() : p.y() + s * d.y();
-    // Keep the end inside this row (and column), whatever the rounding.
+    // Keep the end inside this row (and column) despite rounding.
     if (cross_row) {
       piece.x1 = clamped(piece.x1, u.cell, u.cell + 1.0);
       v.cell += v.step;
@@ -143,8 +143,8 @@ LF_HD inline EdgePiece cut_at_column(const Eigen::Vector2d& p, const Eigen::Vect
   return before;
 }
 
-/// Visits a part whose rows are inside the picture, given that it does not cross x = 0 or
-/// x = columns. What is right of the picture is dropped.
+/// Visits a part whose rows are inside the picture, given that it does not cross x = 0 or x =
+/// columns. Parts right of the picture are dropped.
 template <class Visit>
 LF_HD inline void walk_part(const Eigen::Vector2d& p, const Eigen::Vector2d& d,
                             const EdgePiece& part, int columns, int rows, Visit& visit) {
@@ -206,9 +206,9 @@ LF_HD inline void walk_edge(const Eigen::Vector2d& p, const Eigen::Vector2d& q, 
 
 namespace flux_detail {
 
-// Triangles that touch at most 2 × 2 pixels, in closed form and without branches that depend on
-// where the triangle lies: most triangles of a fine mesh are of this kind, and a mispredicted
-// branch costs as much as all the arithmetic of an edge.
+// Triangles that touch at most 2 × 2 pixels, in closed form and without branches that depend on the
+// triangle's place: most triangles of a fine mesh are of this kind, and a mispredicted branch costs
+// as much as all the arithmetic of an edge.
 //
 // Notation: X and Y are the pixel borders that cross the triangle's box; a quadrant is one of the
 // four parts they cut the plane into. An edge runs a → b with parameter s.
@@ -216,7 +216,8 @@ namespace flux_detail {
 LF_HD inline double least(double a, double b) { return a < b ? a : b; }
 LF_HD inline double most(double a, double b) { return a > b ? a : b; }
 
-/// Floor of a value that an int can hold; a library call where the processor has no instruction.
+/// Floor of a value that an int can hold. std::floor() is a library call on processors without an
+/// instruction for it.
 LF_HD inline int floor_to_int(double value) {
   const int truncated = static_cast<int>(value);
   return truncated - (value < truncated ? 1 : 0);
@@ -251,8 +252,8 @@ struct PixelBox {
     return c0 >= 0 && r0 >= 0 && c1 < columns && r1 < rows;
   }
   [[nodiscard]] LF_HD double extent() const { return most(x1 - x0, y1 - y0); }
-  /// Where X and Y cross. Without a border in the box the box's own lower side serves: then all of
-  /// the triangle is right of X (below Y), and offsets stay small.
+  /// Crossing of X and Y. Without a border in the box the box's own lower side is used: then the
+  /// whole triangle is right of X (below Y), and offsets stay small.
   [[nodiscard]] LF_HD Eigen::Vector2d crossing() const {
     return {c0 < c1 ? static_cast<double>(c1) : x0, r0 < r1 ? static_cast<double>(r1) : y0};
   }
@@ -316,7 +317,7 @@ LF_HD inline Quadrants quadrant_areas(const ImageTriangle& t, const Eigen::Vecto
 }
 
 /// Parameter at which a coordinate that runs from `from` to `to` changes sign; 1 if it does not. It
-/// divides in any case, since a branch around a division stays one.
+/// always divides, because compilers keep a branch around a division.
 LF_HD inline double crossing_parameter(double from, double to) {
   const bool crosses = (from < 0.0) != (to < 0.0);
   const double share = from / (crosses ? from - to : 1.0);
@@ -353,13 +354,13 @@ struct HatWeights {
 // Notation: t triangle of flux Φ, A its signed area, ρ = Φ/A; g = ∂E/∂(pixel flux), S(c) = Σ of g
 // over the columns ≥ c of a row; x̄ mean offset of an edge piece from its column's left side.
 //
-// With Green's theorem a pixel's covered area is a sum over edge pieces: a piece in column c
-// covers −Δy(1 − x̄) of that pixel and −Δy of every pixel to its right. Deposits are therefore made
-// into the picture's *row differences*: one prefix sum along each row (ResolveFlux) yields the
-// picture, and no polygon is ever clipped.
+// With Green's theorem a pixel's covered area is a sum over edge pieces: a piece in column c covers
+// −Δy(1 − x̄) of that pixel and −Δy of every pixel to its right. So deposits go into the picture's
+// *row differences*: one prefix sum along each row (ResolveFlux) yields the picture, and no polygon
+// is ever clipped.
 
 /// Fixed-point unit of the flux picture: 2⁻⁵² of the lens's total flux. A pixel's sum is at most
-/// the total, 2⁵², whatever the number of triangles; sums on the way are taken modulo 2⁶⁴, so they
+/// the total, 2⁵², for any number of triangles; intermediate sums are taken modulo 2⁶⁴, so they
 /// cannot overflow. Single deposits stay below 2⁶³ because ρ ≤ kMaxDensity.
 inline constexpr double kFluxUnits = 4503599627370496.0;
 
@@ -367,13 +368,13 @@ inline constexpr double kFluxUnits = 4503599627370496.0;
 inline constexpr double kMaxDensity = 1024.0;
 
 /// Below this ratio of area to the square of the longest side a triangle is treated as a needle, a
-/// line of light. There the rounding error of the exact formula (2⁻⁵³ over the ratio) and the error
-/// of neglecting the width are both about 1e-8, measured up to 1.4e-7, of the triangle's own flux;
-/// only a needle that runs along a pixel border gives all of it to one of the two sides.
+/// line of light. At this ratio the rounding error of the exact formula (2⁻⁵³ over the ratio) and
+/// the error of neglecting the width are both about 1e-8 of the triangle's own flux (measured: up
+/// to 1.4e-7). A needle that runs along a pixel border gives all its flux to one of the two sides.
 inline constexpr double kNeedleRatio = 1e-8;
 
 /// Row differences of a flux picture in units of 1/kFluxUnits; each row has one column more than
-/// the picture, which takes what is cancelled right of the last pixel.
+/// the picture, for what is cancelled right of the last pixel.
 struct FluxAccumulator {
   std::int64_t* units = nullptr;
   int columns = 0;
@@ -391,7 +392,7 @@ struct FluxAccumulator {
 #endif
   }
 
-  /// Gives flux to one pixel; nothing happens outside the picture.
+  /// Gives flux to one pixel; ignores pixels outside the picture.
   LF_HD void add_pixel(int row, int column, std::int64_t amount) const {
     if (row < 0 || row >= rows || column < 0 || column >= columns) return;
     add(row, column, amount);
@@ -427,8 +428,8 @@ LF_HD inline std::int64_t to_units(double flux) {
   return static_cast<std::int64_t>(std::llrint(flux * kFluxUnits));
 }
 
-/// Deposit of a triangle that touches at most 2 × 2 pixels. Untouched pixels get exactly nothing,
-/// and no density enters, so that a triangle may be as small as it likes.
+/// Deposit of a triangle that touches at most 2 × 2 pixels. Untouched pixels get exactly nothing.
+/// No density is used, so a triangle may be arbitrarily small.
 LF_HD inline void deposit_small(const ImageTriangle& t, const PixelBox& box,
                                 const FluxAccumulator& image) {
   const Quadrants areas = quadrant_areas(t, box.crossing());
@@ -451,8 +452,8 @@ LF_HD inline void deposit_small(const ImageTriangle& t, const PixelBox& box,
   image.add_pixel(box.r1, box.c1, below_right);
 }
 
-/// Row differences of ρ × (covered area) of one edge. Quantised per end point, so that the pieces
-/// of a closed polygon cancel exactly in every row.
+/// Row differences of ρ × (covered area) of one edge. Quantised per end point, so the pieces of a
+/// closed polygon cancel exactly in every row.
 struct DepositEdge {
   double units_per_area;
   FluxAccumulator image;
@@ -472,8 +473,8 @@ struct DepositEdge {
   }
 };
 
-/// A triangle without width: its flux lies on its longest side a → b with the density of a tent
-/// whose peak is where the third corner projects to.
+/// A triangle without width: its flux is on its longest side a → b, with a tent-shaped density
+/// whose peak is the projection of the third corner.
 struct Needle {
   Eigen::Vector2d a, b;
   double peak = 0.0;  ///< Parameter of the tent's peak on a → b.
@@ -513,7 +514,7 @@ LF_HD inline bool is_needle(const ImageTriangle& t, double doubled, double exten
   return !(area > kNeedleRatio * extent * extent && std::fabs(t.flux) <= kMaxDensity * area);
 }
 
-/// In 2 × 2 pixels no density enters, so only the loss of digits in the area counts.
+/// In 2 × 2 pixels no density is used, so only the loss of digits in the area matters.
 LF_HD inline bool is_small_needle(double doubled, double extent) {
   return !(0.5 * std::fabs(doubled) > kNeedleRatio * extent * extent);
 }
@@ -560,7 +561,7 @@ namespace flux_detail {
 /// its outward normal, weighted by the hat functions 1 − s and s of its ends.
 struct GatherEdge {
   FluxCotangent cotangent;
-  double integral = 0.0;  ///< Share of G of the edges so far.
+  double integral = 0.0;  ///< Share of G from the edges so far.
   double weight_p = 0.0;  ///< ∫ g (1 − s) ds along the current edge.
   double weight_q = 0.0;  ///< ∫ g s ds.
 
@@ -598,9 +599,9 @@ LF_HD inline void add_swept(const Eigen::Vector2d& p, const Eigen::Vector2d& q,
   q_bar += weights.end * normal;
 }
 
-/// G and its derivatives by the corners for a triangle within 2 × 2 pixels. Seen from where the
-/// pixel borders cross, g does not change under scaling, so G is homogeneous of degree two and
-/// follows from its derivatives by Euler's theorem.
+/// G and its derivatives by the corners for a triangle within 2 × 2 pixels. g does not change under
+/// scaling about the crossing of the pixel borders, so G is homogeneous of degree two and follows
+/// from its derivatives by Euler's theorem.
 LF_HD inline double gather_small(const ImageTriangle& t, const PixelBox& box,
                                  const FluxCotangent& cotangent, ImageTriangle& bar) {
   const Eigen::Vector2d crossing = box.crossing();

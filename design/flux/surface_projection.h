@@ -20,8 +20,8 @@ namespace lensforge {
 
 /// Facet model: one normal for the whole triangle (Sun et al., section 3.2).
 ///
-/// @param beam  what the facet sends out, LightPath::facet_beam().
-/// @param flux  the share of the light that it takes (Eq. 1), LightPath::flux().
+/// @param beam  light that leaves the facet, LightPath::facet_beam().
+/// @param flux  share of the light that the facet takes in (Eq. 1), LightPath::flux().
 LF_HD inline ImageTriangle land_facet(const Corners& t, const FacetBeam& beam,
                                       const LightPath& light, double flux) {
   return {light.land(t.v0, beam.slope(0)), light.land(t.v1, beam.slope(1)),
@@ -32,8 +32,8 @@ LF_HD inline ImageTriangle project_facet(const Corners& t, const FacetBeam& beam
   return land_facet(t, beam, light, light.flux(t, beam.known));
 }
 
-/// Adjoint of project_facet() without the flux: adds to the corners' derivatives directly and
-/// returns n_bar, the derivative by the unit normal.
+/// Adjoint of project_facet() without the flux: adds to the corners' derivatives and returns n_bar,
+/// the derivative by the unit normal.
 LF_HD inline Eigen::Vector3d project_facet_adjoint(const Corners& t, const Eigen::Vector3d& n,
                                                    const FacetBeam& beam, const LightPath& light,
                                                    const ImageTriangle& bar, Corners& grad) {
@@ -45,7 +45,7 @@ LF_HD inline Eigen::Vector3d project_facet_adjoint(const Corners& t, const Eigen
 }
 
 // Smooth model: one ray per vertex, refracted at the vertex normal; image triangles share corners
-// and stretch. It is what a milled and polished part does.
+// and stretch. A milled and polished part is like this.
 
 /// Normal of a vertex: the sum of the area normals around it, normalised (area weighting).
 struct VertexNormal {
@@ -58,7 +58,7 @@ struct VertexNormal {
   }
 };
 
-/// Where the ray of a vertex lands, in pixel coordinates. @pre n transmits.
+/// Landing point of a vertex's ray, in pixel coordinates. @pre n transmits.
 LF_HD inline Eigen::Vector2d project_vertex(const Eigen::Vector3d& p, const Eigen::Vector3d& n,
                                             const LightPath& light,
                                             const IncidentRay* known = nullptr) {
@@ -106,16 +106,16 @@ struct SurfaceView {
   const int* triangles;    ///< 3 × T
   const double* vertices;  ///< 3 × V, mm
   LightPath light;
-  VertexRays incident;       ///< As find_rays() gives them.
-  std::int64_t nothing = 0;  ///< Without it bytes of a kernel's argument would be left unset.
+  VertexRays incident;       ///< From find_rays().
+  std::int64_t nothing = 0;  ///< Keeps all bytes of a kernel's argument set.
 
   [[nodiscard]] LF_HD Corners corners(std::int64_t i) const {
     return corners_at(triangles + 3 * i, vertices);
   }
 };
 
-/// The same light for an executor's kernels: what it refers to is copied into `front`, a buffer of
-/// that executor, which must outlive it.
+/// The same light for an executor's kernels: the front's coefficients are copied into `front`, a
+/// buffer of that executor, which must outlive the result.
 template <class Exec>
 LightPath light_for(const Exec& executor, const LightPath& light,
                     typename Exec::template Buffer<double>& front) {
@@ -125,7 +125,7 @@ LightPath light_for(const Exec& executor, const LightPath& light,
   return light.reading(front.data());
 }
 
-/// The ray that comes to a vertex.
+/// Finds the ray to a vertex.
 struct FindRay {
   LightPath light;
   const double* vertices;
@@ -134,8 +134,8 @@ struct FindRay {
   LF_HD void operator()(std::int64_t v) const { rays[v] = light.ray_to(column3(vertices, v)); }
 };
 
-/// Fills `rays` with those that come to all vertices, and lets it be empty in light of one
-/// direction: each is solved for once, not for every corner that asks.
+/// Fills `rays` with the rays to all vertices, so each is solved for only once; leaves it empty in
+/// light of one direction.
 template <class Exec>
 VertexRays find_rays(const Exec& executor, const LightPath& light, const double* vertices,
                      std::int64_t count, typename Exec::template Buffer<IncidentRay>& rays) {
@@ -146,7 +146,7 @@ VertexRays find_rays(const Exec& executor, const LightPath& light, const double*
   return {rays.data()};
 }
 
-/// Facet model: the image triangle of a triangle; without flux where it does not transmit.
+/// Facet model: image triangle of a triangle; without flux if it does not transmit.
 struct ProjectFacet {
   SurfaceView surface;
 
@@ -159,7 +159,7 @@ struct ProjectFacet {
   }
 };
 
-/// Smooth model: where a vertex's ray lands; NaN where it does not transmit.
+/// Smooth model: stores the landing point of a vertex's ray; NaN if it does not transmit.
 struct LandRay {
   SurfaceView surface;
   const double* normals;  ///< 3 × V, vertex_area_normals().
@@ -177,7 +177,8 @@ struct LandRay {
   }
 };
 
-/// Smooth model: the image triangle of a triangle; without flux where it is not lit from below.
+/// Smooth model: image triangle of a triangle; without flux if a corner does not transmit or its
+/// flux is negative.
 struct ProjectSmooth {
   SurfaceView surface;
   const double* landing;  ///< 2 × V

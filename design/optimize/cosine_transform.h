@@ -16,7 +16,7 @@ namespace lensforge {
 /// A two-dimensional cosine transform of the first kind (DCT-I) of a grid of nodes, in place, in a
 /// buffer of its own. It diagonalises differences with mirrored ends (Neumann borders). DCT-I
 /// because its lengths, 2(n − 1), are smooth numbers for our grids, while n is often prime (641).
-/// Plans without timing, so that every run takes the same path and gives the same bits.
+/// Plans without timing, so every run uses the same algorithm and gives the same bits.
 class CosineTransform {
  public:
   /// @pre columns, rows ≥ 2.
@@ -27,18 +27,18 @@ class CosineTransform {
 
   /// The buffer, row by row.
   [[nodiscard]] std::span<double> values();
-  /// Transforms the buffer. Doing it twice multiplies by inverse_scale()⁻¹.
+  /// Transforms the buffer. Two runs multiply it by inverse_scale()⁻¹.
   void run();
   /// 1 / (4 (columns − 1) (rows − 1)).
   [[nodiscard]] double inverse_scale() const;
 
-  /// Replaces f in the buffer by the solution of Δφ = f − mean(f) of mean zero: second differences
-  /// at unit spacing, mirrored at the borders.
+  /// Replaces f in the buffer by the solution φ, of mean zero, of Δφ = f − mean(f): second
+  /// differences at unit spacing, mirrored at the borders.
   void solve_poisson();
 
   /// Eigenvalue of the negative second difference along n nodes: (2 − 2 cos(πk/(n − 1)))/spacing².
   static double eigenvalue(int k, int n, double spacing);
-  /// All n of them.
+  /// All n eigenvalues.
   static std::vector<double> eigenvalues(int n, double spacing);
 
  private:
@@ -48,8 +48,8 @@ class CosineTransform {
   int rows_;
 };
 
-/// The same transform along rows only, each for itself, in place, of planes of one size. Rows, then
-/// columns make the transform of a plane.
+/// The same transform along rows only, in place, for planes of one size. Rows and then columns make
+/// the transform of a plane.
 class CosineRows {
  public:
   /// @pre length ≥ 2, rows ≥ 0.
@@ -58,7 +58,7 @@ class CosineRows {
   CosineRows(const CosineRows&) = delete;
   CosineRows& operator=(const CosineRows&) = delete;
 
-  /// Transforms rows · length values, row by row. May run for several planes at the same time.
+  /// Transforms rows · length values, row by row. Thread-safe for different planes.
   void run(double* plane) const;
 
  private:
@@ -66,8 +66,8 @@ class CosineRows {
   std::unique_ptr<Plan> plan_;
 };
 
-/// Three cosine transforms of one size, one per coordinate, in the memory of an executor. Every
-/// executor has its own: FFTW on the CPU, cuFFT on a GPU.
+/// Three cosine transforms of one size, one per coordinate, in the memory of an executor. Executors
+/// have their own implementations: FFTW on the CPU, cuFFT on a GPU.
 template <class Exec>
 class GridTransforms;
 
@@ -110,12 +110,12 @@ struct EvenExtension {
   [[nodiscard]] LF_HD std::int64_t extended_nodes() const {
     return static_cast<std::int64_t>(extended_columns()) * extended_rows();
   }
-  /// Complex coefficients that a transform of real values keeps of an extended grid: half of every
-  /// row and its middle, which is columns of them.
+  /// Number of complex coefficients that a transform of real values stores for an extended grid:
+  /// half of every row and its middle, `columns` per row.
   [[nodiscard]] LF_HD std::int64_t coefficients() const {
     return static_cast<std::int64_t>(columns) * extended_rows();
   }
-  /// Node of the grid that node i of n extended ones mirrors.
+  /// Node of the grid that node i of the extended grid mirrors.
   [[nodiscard]] LF_HD static int mirrored(int i, int n) { return i < n ? i : 2 * (n - 1) - i; }
 };
 
@@ -134,7 +134,7 @@ struct ExtendNode {
   }
 };
 
-/// Takes a cosine coefficient out of the extended grid's complex ones.
+/// Extracts a cosine coefficient from the extended grid's complex coefficients.
 struct TakeCoefficient {
   EvenExtension size;
   const double* coefficients;  ///< Real and imaginary parts in turn.
@@ -148,8 +148,8 @@ struct TakeCoefficient {
 };
 
 /// GridTransforms by Fourier transforms of the even extensions, for executors whose library has no
-/// cosine transform. @tparam Fourier  made from (extension, planes, executor); run(in, out) then
-/// transforms that many extended grids of real values into complex coefficients.
+/// cosine transform. @tparam Fourier  constructed from (extension, planes, executor); run(in, out)
+/// transforms `planes` extended grids of real values into complex coefficients.
 template <class Exec, class Fourier>
 class ExtendedTransforms {
  public:

@@ -21,11 +21,12 @@ namespace lensforge {
 
 struct LbfgsOptions {
   int max_iterations = 100;
-  int history = 8;  ///< Pairs of steps and gradient changes that are kept, ≥ 1.
-  /// Ends when the value fell by less than this share of itself over `stall_window` iterations.
+  int history = 8;  ///< Stored pairs of steps and gradient changes, ≥ 1.
+  /// Stops when the value fell by less than this share of itself over `stall_window` iterations.
   double relative_decrease = 1e-4;
   int stall_window = 10;
-  /// Sufficient decrease and curvature of the weak Wolfe conditions (Nocedal & Wright, 3.6).
+  /// Constants of sufficient decrease and curvature in the weak Wolfe conditions (Nocedal & Wright,
+  /// 3.6).
   double armijo = 1e-4;
   double wolfe = 0.9;
   int max_evaluations_per_step = 20;
@@ -34,7 +35,7 @@ struct LbfgsOptions {
 struct LbfgsSummary {
   enum class Status { kConverged, kIterationLimit, kStopped, kNoDescent, kInfeasibleStart };
   Status status = Status::kIterationLimit;
-  std::string message;  ///< Why it ended, in one line.
+  std::string message;  ///< Reason for the end, in one line.
   double initial_value = 0.0;
   double value = 0.0;
   int iterations = 0;
@@ -43,12 +44,12 @@ struct LbfgsSummary {
   [[nodiscard]] bool converged() const { return status == Status::kConverged; }
 };
 
-/// Asked after every accepted step with the step's number; returning false ends the minimisation.
+/// Called after every accepted step with the step's number; returning false ends the minimisation.
 using LbfgsObserver = std::function<bool(int iteration, double value)>;
 
-// One entry of the vector operations of a minimiser.
+// Kernels of the minimiser's vector operations, for one entry.
 
-/// Entries that one task of a vector operation handles.
+/// Entries per task of a vector operation.
 inline constexpr std::int64_t kVectorGrain = 16384;
 
 /// y ← x + a d
@@ -76,11 +77,11 @@ struct ScaleEntry {
   LF_HD void operator()(std::int64_t i) const { x[i] *= a; }
 };
 
-/// Vectors that one pass over memory handles together.
+/// Number of vectors that one pass over memory handles together.
 inline constexpr std::size_t kVectorGroup = 4;
 using VectorGroup = std::array<const float*, kVectorGroup>;
 
-/// Products of each vector of a group with v.
+/// Products of v with each vector of a group.
 template <class T>
 struct GroupProducts {
   VectorGroup group;
@@ -117,16 +118,16 @@ struct AddGroup {
   }
 };
 
-/// The latest steps s of a minimisation with the gradient's changes y over them, and the two loops
-/// of limited-memory BFGS over these pairs (Nocedal & Wright, algorithm 7.4). With sᵢ·yⱼ at hand
-/// each loop reads its vectors twice in all, a few in one pass. They are in single precision, and
-/// rounded before anything is made of them: the matrix stays positive definite.
+/// The latest steps s of a minimisation with the gradient changes y, and the two loops of
+/// limited-memory BFGS over these pairs (Nocedal & Wright, algorithm 7.4). With stored sᵢ·yⱼ each
+/// loop reads its vectors only twice, several per pass. Vectors are rounded to single precision
+/// before any product is computed, so the matrix stays positive definite.
 template <class Exec>
 class CurvaturePairsOn {
  public:
   using Vector = typename Exec::template Buffer<double>;
 
-  /// @param most  pairs that are kept, ≥ 1.
+  /// @param most  maximum number of pairs, ≥ 1.
   CurvaturePairsOn(const Exec& executor, int most)
       : executor_(executor), most_(static_cast<std::size_t>(most)) {}
 
@@ -136,8 +137,9 @@ class CurvaturePairsOn {
     pairs_.clear();
   }
 
-  /// Adds s = to.x − from.x and y = to.gradient − from.gradient, for the oldest where there are too
-  /// many. @return s·y; 0, with nothing added, unless it is above kCurvatureFloor × |s||y|.
+  /// Adds s = to.x − from.x and y = to.gradient − from.gradient, in place of the oldest pair if
+  /// there are too many. @return s·y; 0, and adds nothing, unless it is above kCurvatureFloor ×
+  /// |s||y|.
   template <class Point>
   double add(const Point& from, const Point& to);
 
@@ -152,11 +154,11 @@ class CurvaturePairsOn {
   struct Pair {
     Floats s, y;
     double curvature = 0.0;        ///< s·y
-    std::vector<double> products;  ///< sᵢ·y with the steps before, oldest first.
+    std::vector<double> products;  ///< sᵢ·y with the earlier steps, oldest first.
   };
   using Member = Floats Pair::*;
 
-  /// Pairs with s·y below this share of |s||y| would spoil the matrix.
+  /// Pairs with s·y below this share of |s||y| are rejected: they make the matrix ill-conditioned.
   static constexpr double kCurvatureFloor = 1e-12;
 
   [[nodiscard]] Pair free_pair(std::size_t size);
@@ -168,7 +170,7 @@ class CurvaturePairsOn {
   Exec executor_;
   std::size_t most_;
   std::vector<Pair> pairs_;  ///< Oldest first.
-  std::vector<Pair> spare_;  ///< Vectors to use again.
+  std::vector<Pair> spare_;  ///< Vectors for reuse.
   std::vector<double> alpha_;
 };
 
@@ -180,7 +182,7 @@ typename CurvaturePairsOn<Exec>::Pair CurvaturePairsOn<Exec>::free_pair(std::siz
   return pair;
 }
 
-/// The vectors of a few pairs from `first` on; the last one again where there are fewer.
+/// Vectors of kVectorGroup pairs from `first` on; if there are fewer, the last one is repeated.
 template <class Exec>
 VectorGroup CurvaturePairsOn<Exec>::group(Member member, std::size_t first) const {
   VectorGroup vectors;
@@ -276,17 +278,18 @@ void CurvaturePairsOn<Exec>::second_loop(Vector& r) {
   combine(&Pair::s, a, r, r);
 }
 
-/// Value and gradient of a function at x, in an executor's memory. An infinite value means that x
-/// is not allowed; the gradient is then not read.
+/// Computes value and gradient of a function at x, in an executor's memory. An infinite value means
+/// that x is not allowed; the gradient is then not read.
 using RawObjective = std::function<double(std::span<const double> x, std::span<double> gradient)>;
 
-/// A symmetric positive definite guess of the inverse Hessian, in an executor's memory: r ← P g.
+/// Symmetric positive definite approximation of the inverse Hessian, in an executor's memory: r ← P
+/// g.
 using RawPreconditioner = std::function<void(std::span<const double> g, std::span<double> r)>;
 
 /// Limited-memory BFGS (Liu & Nocedal 1989) with a preconditioner as initial matrix and a line
 /// search that meets the weak Wolfe conditions by bisection (Lewis & Overton 2013), stepping back
-/// where the value is infinite. All vectors stay in the executor's memory, only scalar products
-/// leave it. Sums run in fixed order: the path does not depend on the thread count.
+/// where the value is infinite. All vectors stay in the executor's memory; only scalar products
+/// leave it. Sums have a fixed order, so the result does not depend on the thread count.
 template <class Exec>
 class LbfgsOn {
  public:
@@ -300,7 +303,7 @@ class LbfgsOn {
         executor_(executor),
         pairs_(executor, options.history) {}
 
-  /// Moves `x` to the best point found, also where an exception ends the run.
+  /// Moves `x` to the best point found, also if an exception ends the run.
   LbfgsSummary run(const LbfgsObserver& observe, Vector& x) {
     current_ = Point(x.size());
     current_.x.swap(x);
@@ -327,7 +330,7 @@ class LbfgsOn {
     explicit Point(std::size_t size) : x(size), gradient(size) {}
   };
 
-  /// Once the value has fallen, the curvature condition is worth only so many evaluations.
+  /// Evaluations per step after which a lower value is accepted without the curvature condition.
   static constexpr int kEnoughEvaluations = 4;
 
   template <class Functor>
@@ -363,7 +366,7 @@ class LbfgsOn {
   Vector direction_;
   Vector work_;
   CurvaturePairsOn<Exec> pairs_;
-  double scale_ = 1.0;  ///< Of the initial matrix.
+  double scale_ = 1.0;  ///< Scale of the initial matrix.
 };
 
 /// direction ← −H g by the two-loop recursion.
@@ -395,7 +398,7 @@ void LbfgsOn<Exec>::remember() {
 }
 
 /// The weak Wolfe line search along direction_ from current_; next_ receives the accepted point.
-/// @return evaluations spent; `decreased` tells whether a point of sufficient decrease was found.
+/// @return number of evaluations; `decreased` is true if a point of sufficient decrease was found.
 template <class Exec>
 int LbfgsOn<Exec>::search(double slope, bool& decreased) {
   double low = 0.0;

@@ -23,7 +23,7 @@
 namespace lensforge {
 namespace {
 
-/// Rows of triangles that are looked at together: four million nodes have 63 strips.
+/// Rows of triangles per strip: four million nodes make 63 strips.
 constexpr int kStripRows = 32;
 
 class Strips {
@@ -39,7 +39,7 @@ class Strips {
     return part_inside(rows.mesh, rows.normals,
                        cut_mesh(rows.mesh, *setup_.outline, Executor::serial()));
   }
-  /// light_on() of all.
+  /// light_on() for all strips.
   [[nodiscard]] LightPath light() const {
     const LightPath light(setup_);
     if (light.intake_is_plan_area()) return light;
@@ -123,7 +123,7 @@ std::vector<ImageTriangle> project_all(const char* kernel, const Scene& scene,
   return triangles;
 }
 
-/// Landing points of all vertices; NaN where a vertex does not transmit.
+/// Landing points of all vertices; NaN for those that do not transmit.
 Eigen::Matrix2Xd land_rays(const SurfaceMesh& mesh, const SurfaceView& surface,
                            const Executor& executor) {
   const Eigen::Matrix3Xd normals = vertex_area_normals(mesh);
@@ -150,13 +150,13 @@ namespace {
 // Adjoint, from pixels to vertices. Notation: g cotangent, φ picture, E = Σ g φ; t triangle, N its
 // area normal, n = N/|N|; …_bar the derivative of E by that.
 
-/// A surface in the light of one point or direction, and what its picture is asked for.
+/// A surface in the light of one point or direction, and the cotangent of its picture.
 struct PullBack {
   SurfaceView surface;
   FluxCotangent cotangent;
-  double whole_bar;  ///< By the flux of every face, as flux_whole_bar() gives it.
+  double whole_bar;  ///< Derivative by the flux of every face, from flux_whole_bar().
 
-  /// From flux and area normal of a face to its corners.
+  /// Carries derivatives by a face's flux and area normal to its corners.
   void carry_to_corners(std::int64_t face, double flux_bar, Eigen::Vector3d area_normal_bar,
                         Corners& bar) const {
     const Corners t = surface.corners(face);
@@ -193,7 +193,7 @@ struct PullBackFacet {
   }
 };
 
-/// Smooth model: derivatives by a face's image triangle; none where it gives no light.
+/// Smooth model: derivatives by a face's image triangle; zero if it gives no light.
 struct PullBackImage {
   ProjectSmooth source;
   FluxCotangent cotangent;
@@ -205,7 +205,7 @@ struct PullBackImage {
   }
 };
 
-/// Smooth model: from where a vertex's ray lands to its position and normal.
+/// Smooth model: carries derivatives by a vertex's landing point to its position and normal.
 struct PullBackRay {
   SurfaceView surface;
   const double* normals;      ///< 3 × V, vertex_area_normals().
@@ -215,7 +215,7 @@ struct PullBackRay {
 
   void operator()(std::int64_t v) const {
     const Eigen::Vector2d u_bar = column2(landing_bar, v);
-    // Of no lit face, it need not transmit, nor have a normal.
+    // A vertex of no lit face need not transmit or have a normal.
     if (u_bar.isZero(0.0)) return;
     const VertexNormal normal(column3(normals, v));
     Eigen::Vector3d p_bar(0.0, 0.0, 0.0);
@@ -227,7 +227,8 @@ struct PullBackRay {
   }
 };
 
-/// Smooth model: from a face's flux and the normals of its vertices to its corners.
+/// Smooth model: carries derivatives by a face's flux and the normals of its vertices to its
+/// corners.
 struct PullBackSmooth {
   PullBack pull;
   const ImageTriangle* image_bars;  ///< F
@@ -296,8 +297,8 @@ Eigen::Matrix3Xd pull_back_smooth(const SurfaceMesh& mesh, const PullBack& pull,
   return gradient;
 }
 
-/// What every face's flux says of E through the whole that it is a share of: with a what the faces
-/// take in, φ ~ a/Σa, and by a the derivative is (g − Σ g φ)/Σa. 0 where the whole does not move.
+/// Derivative of E by every face's flux through the total that it is a share of: with the intake a
+/// of the faces, φ ~ a/Σa, and the derivative by a is (g − Σ g φ)/Σa. 0 if the total is constant.
 double flux_whole_bar(const SurfaceMesh& mesh, const OpticalSetup& setup, SurfaceModel model,
                       std::span<const double> cotangent, const Executor& executor) {
   if (LightPath(setup).intake_is_plan_area()) return 0.0;

@@ -18,8 +18,8 @@
 namespace lensforge {
 
 /// Flux that a surface sends to every pixel, as shares of the lens's total, row by row from the
-/// top; computed on any executor, returned in the caller's memory.
-/// @param normals_given  3 × V, those of the smooth model; nullptr takes the mesh's own.
+/// top. Computed on any executor, returned in the caller's memory.
+/// @param normals_given  3 × V, for the smooth model; nullptr: the mesh's own.
 template <class Exec>
 std::vector<double> render_flux(const SurfaceMesh& mesh, const OpticalSetup& setup,
                                 SurfaceModel model, const Exec& executor,
@@ -29,7 +29,7 @@ std::vector<double> render_flux(const SurfaceMesh& mesh, const OpticalSetup& set
   };
   const auto triangles = buffer_of(executor, numbers(mesh.triangles));
   const auto vertices = buffer_of(executor, numbers(mesh.vertices));
-  // Without rays: those of a spline's four million nodes would take 0.5 GB.
+  // Without known rays: for a spline's four million nodes they take 0.5 GB.
   typename Exec::template Buffer<double> front;
   const LightPath light = light_for(executor, light_on(mesh, setup), front);
   const SurfaceView surface{triangles.data(), vertices.data(), light, {}};
@@ -57,19 +57,19 @@ std::vector<double> render_flux_cuda(const SurfaceMesh& mesh, const OpticalSetup
                                      SurfaceModel model, const Executor& executor);
 #endif
 
-/// render_flux() of a spline by its own normals at the nodes of its picture, picture_nodes(), which
-/// are not kept: strip by strip, the same picture to rounding in the light of a point, else to the
-/// bit.
+/// render_flux() of a spline by its own normals at picture_nodes(). Nodes are computed strip by
+/// strip and not kept. The picture is the same as with all nodes: to rounding in the light of a
+/// point, else to the bit.
 std::vector<double> render_spline(const ControlNet& net, const OpticalSetup& setup,
                                   const Executor& executor);
 
-/// The same with so many nodes a knot cell each way.
+/// The same with `samples` nodes per knot cell each way.
 std::vector<double> render_spline(const ControlNet& net, int samples, const OpticalSetup& setup,
                                   const Executor& executor);
 
-/// The image triangles of a whole surface under either model, one per mesh triangle, in pixel
-/// coordinates. Triangles that reflect the light totally have no flux; of those across the lens's
-/// outline the flux is that of the part inside.
+/// Image triangles of a whole surface under either model, one per mesh triangle, in pixel
+/// coordinates. Triangles that reflect the light totally have no flux; triangles across the lens's
+/// outline have the flux of the part inside.
 /// @pre the mesh's triangle indices are in range.
 std::vector<ImageTriangle> project_surface(const SurfaceMesh& mesh, const OpticalSetup& setup,
                                            SurfaceModel model, const Executor& executor);

@@ -20,16 +20,15 @@
 namespace lensforge {
 namespace {
 
-/// Points for every pixel of the source's image, and the least and most of all: 64² portrait, a
-/// source of 2.2 pixels, half of 123 points change the picture by an MAE of 0.0010; half of 32 by
-/// 0.0043.
+/// Source points per pixel of the source's image, minimum and maximum. With a 64² portrait and a
+/// source of 2.2 pixels, 123 points instead of half as many change the picture by an MAE of 0.0010.
 constexpr double kPointsPerPixel = 25.0;
 constexpr int kMinPoints = 64;
 constexpr int kMaxPoints = 256;
 
 double surface_height(const Lens& lens) { return lens.surface.vertices.row(2).mean(); }
 
-/// What a lens projects in the light of one point, in the target's units.
+/// Picture of a lens in the light of one point, in the target's units.
 std::vector<double> point_picture(const Lens& lens, const OpticalSetup& setup,
                                   const Executor& executor) {
   std::vector<double> picture = flux_of_lens(lens, setup, executor);
@@ -106,16 +105,16 @@ SourceCheck check_source(const Lens& lens, const Executor& executor) {
   return check;
 }
 
-// Notation: μ_i = T e^{q_i} / Σ e^q, so that any q is allowed; T the target's total. In q a step is
-// a share of a pixel's light, which suits a curve that shows shares.
+// Notation: μ_i = T e^{q_i} / Σ e^q, so any q is allowed; T the target's total. A step in q is a
+// relative change of a pixel's light, which suits the display encoding.
 
 namespace {
 
-/// Light of the darkest pixels at the start, in shares of the mean: one that starts without light
-/// could never get any.
+/// Minimum light of a pixel at the start, relative to the mean: a pixel that starts without light
+/// can never get any.
 constexpr double kLeastStart = 1e-4;
 
-/// End of the search: 64² portrait, a source of 2.2 pixels: MAE 0.0021 after 3 s.
+/// Limits of the search (64² portrait, source of 2.2 pixels: MAE 0.0021 after 3 s).
 constexpr int kMaxIterations = 400;
 constexpr double kRelativeDecrease = 1e-3;
 
@@ -147,10 +146,10 @@ class LimitObjective {
     return value;
   }
 
-  /// k∗μ of the last q.
+  /// k∗μ for the last q.
   std::span<const double> picture() { return blur_.apply(executor_, light_); }
 
-  /// μ of q.
+  /// Sets and returns μ for q.
   const std::vector<double>& set_light(std::span<const double> q) {
     const double highest = *std::max_element(q.begin(), q.end());
     for (std::size_t i = 0; i < q.size(); ++i) light_[i] = std::exp(q[i] - highest);
@@ -168,7 +167,7 @@ class LimitObjective {
   std::vector<double> bar_;
 };
 
-/// The target's light, evenly over the parts of a pixel.
+/// The target's light, spread evenly over the parts of a pixel.
 std::vector<double> start_from(const Image& target, int parts) {
   const double least = kLeastStart * target.total() / static_cast<double>(target.values().size());
   std::vector<double> q;

@@ -11,14 +11,15 @@
 namespace lensforge {
 namespace {
 
-/// Zero off the picture.
+/// Zero outside of the picture.
 double picture_at(const Image& image, const Eigen::Vector2d& at) {
   const Eigen::Array2d size(image.columns(), image.rows());
   if ((at.array() < 0.0).any() || (at.array() > size).any()) return 0.0;
   return bilinear(image, at);
 }
 
-/// wanted − projected; one is an evenly lit picture of `total` flux as large as the lens.
+/// wanted − projected; 1 is the value of an evenly lit picture of `total` flux as large as the
+/// lens.
 Image difference(const Image& wanted, const Image& projected, const OpticalSetup& setup,
                  double total) {
   Image image(wanted.columns(), wanted.rows());

@@ -39,7 +39,7 @@ void require_process(const DesignOptions& o) {
   }
 }
 
-/// @throw InputError naming the finest polish of a lens this large that can be computed.
+/// @throw InputError naming the finest polish that can be computed for a lens of this size.
 void require_coarse_polish(const DesignOptions& o, const Eigen::Vector2i& pixels) {
   if (!o.made_by) return;
   const double least = AveragingGrid::least_sigma(optical_setup(o, pixels).lens_size);
@@ -48,14 +48,14 @@ void require_coarse_polish(const DesignOptions& o, const Eigen::Vector2i& pixels
               number_text(std::ceil(1e5 * least) / 1e5) + " mm, or --model spline without it");
 }
 
-/// The smallest longer side at which a picture's shorter one has enough pixels.
+/// Minimum longer side at which a picture's shorter side has enough pixels.
 int least_pixels(const Image& picture) {
   int longer = kMinPixels;
   while (working_size(picture.columns(), picture.rows(), longer).minCoeff() < kMinPixels) ++longer;
   return longer;
 }
 
-/// @throw InputError naming the longer side that would do, if its shorter one has too few pixels.
+/// @throw InputError naming a longer side that works, if the shorter side has too few pixels.
 void require_wide_enough(const Eigen::Vector2i& pixels, const Image& picture, int longer_side) {
   if (pixels.minCoeff() >= kMinPixels) return;
   const std::string least = std::to_string(kMinPixels);

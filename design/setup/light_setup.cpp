@@ -34,11 +34,11 @@ namespace {
 
 constexpr double kMilliradian = 1e-3;
 
-/// Widest image of the source in shorter sides of the picture: two spots side by side are the least
-/// that can be called a picture.
+/// Maximum width of the source's image, in shorter sides of the picture: a picture needs room for
+/// at least two spots.
 constexpr double kMaxBlur = 0.5;
 
-/// Where the search for a narrower source ends: a source of a kilometre becomes one of a micron.
+/// End of the search for a narrower source: a source of a kilometre becomes one of a micron.
 constexpr double kLeastShare = 1e-9;
 
 std::string angle_text(double mrad) { return "--source-angle " + number_text(mrad); }
@@ -49,7 +49,7 @@ std::string width_text(const LightOptions& light) {
                                             : angle_text(light.source_angle);
 }
 
-/// The same source at another width, in its own unit, to two digits downwards.
+/// The same source at another width, in its own unit, rounded down to two digits.
 std::string narrower_text(const LightOptions& light, double share) {
   LightOptions other = light;
   for (double* width : {&other.source_angle, &other.source_size}) {
@@ -61,14 +61,14 @@ std::string narrower_text(const LightOptions& light, double share) {
   return width_text(other);
 }
 
-/// Normal of the surface that sends the light of its middle to the picture's centre.
+/// Normal of a surface whose middle sends its light to the picture's centre.
 Eigen::Vector3d middle_normal(const OpticalSetup& setup, const Eigen::Vector3d& middle) {
   const LightPath light(lit_from(setup, Eigen::Vector2d::Zero()));
   const Eigen::Vector2d gradient = light.gradient_for(middle, 0.5 * setup.pixels.cast<double>());
   return Eigen::Vector3d(-gradient.x(), -gradient.y(), 1.0).normalized();
 }
 
-/// True if light comes from all of the source to the middle of the surface and leaves it.
+/// True if light from the whole source reaches the middle of the surface and leaves it.
 bool lights_surface(const OpticalSetup& setup, double thickness) {
   const Eigen::Vector3d middle(0.5 * setup.lens_size.x(), 0.5 * setup.lens_size.y(), thickness);
   const Eigen::Vector3d n = middle_normal(setup, middle);
@@ -90,13 +90,13 @@ bool allows(const OpticalSetup& setup, double thickness) {
   return source_blur(setup, thickness) <= kMaxBlur * setup.pixels.minCoeff();
 }
 
-/// How large the options' source is; @pre require_source_options().
+/// Extent of the options' source. @pre require_source_options().
 SourceExtent source_extent(const LightOptions& light) {
   const bool point = light.source == SourceKind::kPoint;
   return {point ? light.source_size : kMilliradian * light.source_angle, light.source_shape};
 }
 
-/// @throw InputError where angle, size and shape do not go with each other or with the source.
+/// @throw InputError if angle, size and shape do not fit each other or the source.
 void require_source_options(const LightOptions& light) {
   if (light.source_angle > 0.0 && light.source_size > 0.0) {
     refuse(size_text(light.source_size), "cannot be given with --source-angle; leave one out");
@@ -117,8 +117,8 @@ void require_source_options(const LightOptions& light) {
   }
 }
 
-/// @throw InputError with the largest source that would do, if its image is wider than half of the
-///        picture, or it is so wide that its edge is on the wrong side.
+/// @throw InputError with the largest source that works, if its image is wider than half of the
+///        picture or its edge is on the wrong side of the surface.
 void require_source_extent(const DesignOptions& options, const OpticalSetup& setup) {
   if (setup.extent.none() || allows(setup, options.thickness)) return;
   OpticalSetup narrower = setup;
@@ -134,11 +134,11 @@ void require_source_extent(const DesignOptions& options, const OpticalSetup& set
 
 // The front, where light enters a lens.
 
-/// Height of the start surface over its lowest point, in depths of the front, and more: with less,
-/// radii are let through (and advised) behind which no start is found.
+/// Upper bound of the start surface's height over its lowest point, in depths of the front: with
+/// less, radii are accepted (and advised) for which no start surface is found.
 constexpr double kStartRise = 2.0;
 
-/// Cells that a height map is looked at with, each way.
+/// Limits of the number of cells each way on which a height map is checked.
 constexpr int kFewestCells = 16;
 constexpr int kMostCells = 128;
 
@@ -164,8 +164,9 @@ void require_heights(const HeightSpline& spline, double thickness, const std::st
   }
 }
 
-/// True if light comes to every point of two start surfaces, `thickness` high and kStartRise times
-/// the front's depth more, and gets out, and no part of the front is shaded. Looked at on a raster.
+/// True if light reaches and leaves every point of two start surfaces, at height `thickness` and
+/// kStartRise × the front's depth above it, and no part of the front is shaded. Checked on a
+/// raster.
 /// @param depth  between the front's highest and lowest point, mm. @param cells  each way.
 bool start_works(const OpticalSetup& setup, double thickness, double depth, int cells) {
   const LightPath light(setup);
@@ -179,7 +180,7 @@ bool start_works(const OpticalSetup& setup, double thickness, double depth, int 
   return true;
 }
 
-/// @param given  the option as it was written.
+/// @param given  the option as typed.
 /// @throw InputError naming option, value and rule if the front of setup, a height map, leaves less
 ///        than the thickness, folds its light, or is too steep for it.
 void require_height_map(const OpticalSetup& setup, double thickness, const std::string& given) {
@@ -205,13 +206,13 @@ void require_height_map(const OpticalSetup& setup, double thickness, const std::
 
 constexpr double kDegree = std::numbers::pi / 180.0;
 
-/// What is proposed for a source that stands wrong: as far away as the paper's pictures.
+/// Proposed distance of a misplaced source: that of the paper's pictures.
 constexpr double kUsualDistance = 600.0;
-/// And for a mirror's light (Sun et al., Table 1).
+/// Proposed incidence on a mirror, degrees (Sun et al., Table 1).
 constexpr double kUsualIncidence = 30.0;
 
-/// Least width of a picture in lens widths: at a hundredth two thirds of a draft's light are on the
-/// picture (16² portrait; 95 % at a tenth), at a hundred-thousandth none.
+/// Minimum width of the picture in lens widths: at a hundredth two thirds of a draft's light are on
+/// the picture (16² portrait), at a hundred-thousandth none.
 constexpr double kLeastMagnification = 0.01;
 
 std::string text_of(const Eigen::Vector3d& v) { return numbers_text(std::span(v.data(), 3)); }
@@ -219,7 +220,8 @@ std::string text_of(const Eigen::Vector2d& v) { return numbers_text(std::span(v.
 
 bool is_mirror(const DesignOptions& o) { return o.light.mode == LightMode::kReflect; }
 
-/// A source above or below the middle of the lens, beside the light's way back from a mirror.
+/// A place for the source below the middle of a lens, or above a mirror and beside its reflected
+/// light.
 std::string usual_position(const DesignOptions& o, const Eigen::Vector2d& size) {
   if (!is_mirror(o)) return text_of(Eigen::Vector3d(size.x() / 2, size.y() / 2, -kUsualDistance));
   const double height = std::round(0.5 * o.focal_length);
@@ -276,8 +278,7 @@ void require_source(const DesignOptions& o, const Eigen::Vector2d& size) {
 
 std::string front_text(double radius) { return "--front sphere:" + number_text(radius); }
 
-/// True if the front is lit as a whole, and the surface that a design starts from lets its light
-/// out.
+/// True if the whole front is lit and its light leaves the start surface of a design.
 bool front_works(const DesignOptions& o, const Eigen::Vector2i& pixels, double radius) {
   constexpr int kCells = 16;
   if (!(std::abs(radius) > 0.5 * lens_size(o, pixels).norm())) return false;
@@ -289,7 +290,7 @@ bool front_works(const DesignOptions& o, const Eigen::Vector2i& pixels, double r
   return start_works(setup, o.thickness, depth, kCells);
 }
 
-/// The next radius of two digits that works.
+/// The next larger radius, to two digits, that works.
 std::string working_front(const DesignOptions& o, const Eigen::Vector2i& pixels, double radius) {
   constexpr double kStep = 1.1;
   const double least = 0.5 * lens_size(o, pixels).norm();
@@ -342,7 +343,7 @@ void require_front(const DesignOptions& o, const Eigen::Vector2i& pixels) {
   require_height_map(setup, o.thickness, given);
 }
 
-/// Turns the screen's vectors.
+/// Rotates the screen's vectors.
 void tilt_screen(const Eigen::Vector2d& degrees, OpticalSetup& setup) {
   if (degrees.isZero()) return;
   const double side = setup.view == ViewSide::kFront ? -1.0 : 1.0;  // The picture's right along x.
@@ -380,7 +381,7 @@ void require_picture(const DesignOptions& o) {
   }
 }
 
-/// @throw InputError where colours do not go with the rest.
+/// @throw InputError if the spectrum does not fit the other options.
 void require_spectrum(const DesignOptions& o) {
   const Spectrum& spectrum = o.light.spectrum;
   if (spectrum.none() && spectrum.abbe != Spectrum{}.abbe) {
@@ -393,7 +394,7 @@ void require_spectrum(const DesignOptions& o) {
   }
 }
 
-/// True if a surface can send the light of its middle to the picture's centre.
+/// True if the middle of some surface can send its light to the picture's centre.
 bool reaches_centre(const OpticalSetup& setup, double thickness) {
   const LightPath light(setup);
   const Eigen::Vector3d p(0.5 * setup.lens_size.x(), 0.5 * setup.lens_size.y(), thickness);
@@ -416,8 +417,8 @@ void require_reach(const DesignOptions& o, const OpticalSetup& setup) {
          "no surface bends the light so far; 0,0 would do");
 }
 
-/// What must be above 0: heights of the picture's corners over the surface, and distances of the
-/// lens's corners before the screen.
+/// Values that must be above 0: heights of the picture's corners over the surface, and distances of
+/// the lens's corners from the screen.
 std::vector<double> clearances(const OpticalSetup& setup, double thickness) {
   std::vector<double> all;
   const LightPath light(setup);
@@ -436,7 +437,7 @@ std::vector<double> clearances(const OpticalSetup& setup, double thickness) {
   return all;
 }
 
-/// All of them are linear in the focal length.
+/// Uses that all clearances are linear in the focal length.
 void require_screen_beyond(const DesignOptions& o, const OpticalSetup& setup) {
   const std::vector<double> here = clearances(setup, o.thickness);
   if (std::all_of(here.begin(), here.end(), [](double c) { return c > 0.0; })) return;
@@ -459,7 +460,7 @@ void require_screen_beyond(const DesignOptions& o, const OpticalSetup& setup) {
                    number_text(std::ceil(1.1 * needed)) + "mm would do");
 }
 
-/// True if the screen's picture is in the way of the light that comes to a point of a mirror.
+/// True if the picture on the screen blocks the light to a point of a mirror.
 /// @param a  unit direction of that light.
 bool screen_shades(const OpticalSetup& setup, const Eigen::Vector3d& p, const Eigen::Vector3d& a) {
   const Eigen::Vector3d normal = setup.screen_x.cross(setup.screen_y);
@@ -471,7 +472,7 @@ bool screen_shades(const OpticalSetup& setup, const Eigen::Vector3d& p, const Ei
          std::abs(setup.screen_y.dot(l)) < 0.5 * setup.image_size.y();
 }
 
-/// True if the screen is in the way of the light of a flat mirror.
+/// True if the screen blocks light to a flat mirror.
 bool is_shaded(const OpticalSetup& setup, double thickness) {
   constexpr int kCells = 16;
   const LightSource source(setup);
@@ -484,7 +485,7 @@ bool is_shaded(const OpticalSetup& setup, double thickness) {
   return false;
 }
 
-/// Another light of a mirror that its screen leaves free, as an option; empty if none was found.
+/// An option for a mirror's light that its screen does not block; empty if none was found.
 std::string free_light(const DesignOptions& o, const Eigen::Vector2i& pixels) {
   const auto works = [&](const DesignOptions& other) {
     const OpticalSetup setup = optical_setup(other, pixels);

@@ -99,7 +99,7 @@ LightField front() {
       o.front_file = text;
     }
   };
-  // A fingerprint goes by what a file holds.
+  // A fingerprint depends on a file's content.
   const auto stored = [](const LightOptions& o) {
     return nlohmann::json(o.front_file.empty() ? front_text(o) : "heights");
   };
@@ -245,7 +245,7 @@ namespace {
 
 using RenderField = OptionField<RenderOptions>;
 
-/// Of pictures on walls, mm: beyond a kilometre nothing is projected any more.
+/// Limits of the width of a picture on a wall, mm: nobody projects beyond a kilometre.
 constexpr Limits kImageWidths{.low = 1e-3, .high = 1e6};
 
 RenderField picture_pixels() {

@@ -8,23 +8,23 @@
 
 namespace lensforge {
 
-/// Every option of a design but the weights, in the order in which a fingerprint holds them.
+/// Every option of a design except the weights, in the order in which a fingerprint stores them.
 const OptionTable<DesignOptions>& design_fields();
 
-/// Light and screen. A fingerprint holds what is not the default.
+/// Options of light and screen. A fingerprint stores only those that differ from the default.
 const OptionTable<LightOptions>& light_fields();
 
-/// The weights, as design_fields().
+/// The weights, stored like design_fields().
 const OptionTable<ObjectiveWeights>& weight_fields();
 
-/// How a surface is rendered.
+/// Options of a rendering.
 struct RenderOptions {
   SurfaceModel model = SurfaceModel::kFacet;
   OpticalSetup setup;  ///< With a spectrum the picture is in colour.
 };
 
-/// Every option of a rendering. A width of the picture keeps its proportions and centre, a count of
-/// pixels the proportions: set in the table's order.
+/// Every option of a rendering, to be set in the table's order: setting the picture's width keeps
+/// its proportions and centre, setting its pixels keeps the proportions.
 const OptionTable<RenderOptions>& render_fields();
 
 }  // namespace lensforge

@@ -28,8 +28,8 @@ using Ring = bg::model::ring<Point, false>;
 
 constexpr double kHalf = 0.5;
 
-/// Follows the line at one half through the cells between the pixels' middles (marching squares,
-/// Lorensen and Cline 1987 in the plane). The picture has a dark frame of one pixel.
+/// Follows the contour at one half through the cells between the pixels' centres (marching squares,
+/// Lorensen and Cline 1987 in the plane). The picture gets a dark frame of one pixel.
 class Contours {
  public:
   explicit Contours(const Image& picture)
@@ -39,7 +39,7 @@ class Contours {
     }
   }
 
-  /// Closed lines, the light to their left with y upwards.
+  /// Closed contours; with y upwards the light is on their left.
   [[nodiscard]] std::vector<Ring> lines() const {
     std::vector<Ring> lines;
     std::unordered_map<std::int64_t, bool> done;
@@ -57,7 +57,7 @@ class Contours {
   }
 
  private:
-  /// Of a pixel of the framed picture.
+  /// Value of a pixel of the framed picture.
   [[nodiscard]] double value(std::int64_t column, std::int64_t row) const {
     const bool frame = column == 0 || row == 0 || column + 1 == columns_ || row + 1 == rows_;
     if (frame) return 0.0;
@@ -65,12 +65,12 @@ class Contours {
         static_cast<double>(picture_.at(static_cast<int>(column) - 1, static_cast<int>(row) - 1)));
   }
 
-  /// Number of the line from a pixel's middle to that of the next one to the right or below.
+  /// Number of the line from a pixel's centre to that of its right or lower neighbour.
   [[nodiscard]] std::int64_t edge(std::int64_t column, std::int64_t row, bool down) const {
     return 2 * (row * columns_ + column) + (down ? 1 : 0);
   }
 
-  /// Where the contour crosses such a line.
+  /// Point where the contour crosses such a line.
   [[nodiscard]] Point place(std::int64_t edge) const {
     const bool down = edge % 2 == 1;
     const std::int64_t column = edge / 2 % columns_;
@@ -82,9 +82,9 @@ class Contours {
             -static_cast<double>(row) - (down ? share : 0.0)};
   }
 
-  /// The contour through the cell to the right of and below a pixel's middle. Its sides in the
-  /// order of the walk around it, counter-clockwise with y upwards; side k runs from corner k to
-  /// corner k + 1. With the light to the left the line enters where a side leaves the light.
+  /// Adds the contour through the cell to the right of and below a pixel's centre. Sides are
+  /// ordered counter-clockwise with y upwards; side k runs from corner k to corner k + 1. With the
+  /// light on its left, the contour enters through a side that goes from light to dark.
   void cross(std::int64_t column, std::int64_t row) {
     const double corners[4] = {value(column, row), value(column, row + 1),
                                value(column + 1, row + 1), value(column + 1, row)};
@@ -94,7 +94,7 @@ class Contours {
     const bool middle = corners[0] + corners[1] + corners[2] + corners[3] >= 4.0 * kHalf;
     for (int k = 0; k < 4; ++k) {
       if (!(lit(k) && !lit(k + 1))) continue;
-      // Around the dark corner where the middle is light, else around the light one.
+      // A saddle: around the dark corner if the middle is light, else around the light one.
       int out = k;
       const bool saddle = !lit(k + 3) && lit(k + 2);
       if (saddle) {
@@ -166,7 +166,7 @@ OutlineChoice outline_from(const std::string& text, const Background& background
   LoadedImage loaded = read_image(text, control, kOutlineDrawing, background);
   Image& picture = loaded.image;
   if (is_svg_file(text)) {
-    // Its pixels are mean light: half of it is where the shape covers half.
+    // Its pixels are mean light, so half of the value is where the shape covers half.
     for (float& value : picture.values()) {
       value = static_cast<float>(decode(static_cast<double>(value)));
     }

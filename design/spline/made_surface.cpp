@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::size_t kCount = GaussianWeights::kCount;
 constexpr int kReach = GaussianWeights::kReach;
-constexpr double kSpacing = 0.75;  ///< Between samples, in σ.
+constexpr double kSpacing = 0.75;  ///< Distance between samples, in σ.
 constexpr double kMaxSamples = 1e8;
 
 }  // namespace
@@ -141,7 +141,7 @@ MadeSurface::MadeSurface(const ControlNet& net, const MadeBy& made, const Execut
   AveragingGrid::turn_about_rim(heights_);
 }
 
-/// Newton's method from the sample before, and the Taylor series over what it leaves.
+/// Newton's method from the last sample, and a Taylor expansion over its remaining error.
 void MadeSurface::sample_row(const ControlNet& net, int row) {
   constexpr int kSteps = 2;
   const Eigen::Vector2d high = net.cells().cast<double>();
@@ -200,16 +200,16 @@ SampledSurface made_nodes(const ControlNet& net, const MadeBy& made, int samples
 
 namespace {
 
-/// Newton's steps to a sample end when one is shorter than this, knot cells; what is left then is
-/// its square.
+/// Newton's method stops at steps shorter than this, in knot cells; the remaining error is its
+/// square.
 constexpr double kShortStep = 1e-3;
 constexpr int kMaxSteps = 20;
 constexpr int kMaxHalvings = 8;
 
-/// Parts in which derivatives are summed on their own, whatever the number of threads.
+/// Number of bands whose derivatives are summed separately, for any number of threads.
 constexpr std::int64_t kBands = 32;
 
-/// Weighted sums along y of a block of heights, one for each column of it.
+/// Weighted sums along y of a block of heights, one per column.
 using BlockRow = std::array<double, kCount>;
 
 BlockRow weighted_rows(const double* block, Eigen::Index stride, const BlockRow& weights) {
@@ -227,16 +227,16 @@ double dot(const BlockRow& a, const BlockRow& b) {
   return sum;
 }
 
-/// Sums that several bands of work add to: each has rows of its own, which are added in the bands'
+/// Sums over several bands of work: each band has its own rows, which are added in the bands'
 /// order.
 class BandSums {
  public:
-  /// @param row_size  numbers in a row.
+  /// @param row_size  numbers per row.
   explicit BandSums(Eigen::Index row_size) : row_size_(row_size) {}
 
   struct Band {
     Eigen::Index first = 0;
-    Eigen::MatrixXd sums;  ///< Row size × rows from `first` on.
+    Eigen::MatrixXd sums;  ///< Row size × rows, starting at `first`.
     [[nodiscard]] double* row(Eigen::Index i) { return sums.col(i - first).data(); }
   };
 
@@ -297,7 +297,7 @@ void MadeNodes::look(const double* points, double* positions, double* normals) {
                [&](std::int64_t i) { average(i, positions, normals); });
 }
 
-/// Newton's method, whose steps are halved until they come nearer.
+/// Newton's method; steps are halved until they come closer.
 Eigen::Vector2d MadeNodes::search(const Eigen::Vector2d& xy, Eigen::Vector2d uv,
                                   SplineFrame& frame) const {
   const Eigen::Vector2d high = net_.cells().cast<double>();
@@ -366,7 +366,7 @@ void MadeNodes::look_adjoint(const double* position_bar, const double* normal_ba
   spread_samples(points_bar);
 }
 
-/// From the nodes to the heights on the grid and to their own places.
+/// Carries derivatives from the nodes to the heights on the grid and to the nodes' places.
 void MadeNodes::spread_nodes(const double* position_bar, const double* normal_bar) {
   const std::int64_t columns = shape().columns;
   const auto nodes_of = [&](std::int64_t band) {
@@ -415,7 +415,7 @@ void MadeNodes::spread_nodes(const double* position_bar, const double* normal_ba
       [&](std::int64_t j) { sums.add_row(j, heights_bar_.col(j).data()); }, 16);
 }
 
-/// From the heights on the grid to the control points.
+/// Carries derivatives from the heights on the grid to the control points.
 void MadeNodes::spread_samples(double* points_bar) {
   const std::int64_t rows = grid_.cells().y() + 1;
   const int last_cell = net_.cells().y() - 1;

@@ -18,11 +18,11 @@
 
 namespace lensforge {
 
-/// How heights on an even grid are averaged with a Gaussian of unit integral around a place, along
-/// one axis: z ≈ Σ value z_k, ∂z ≈ Σ slope z_k, ∂²z ≈ Σ bend z_k. Constants and straight lines are
-/// averaged exactly.
+/// Weights of heights on an even grid in a Gaussian average (unit integral) around a place, along
+/// one axis: z ≈ Σ value z_k, ∂z ≈ Σ slope z_k, ∂²z ≈ Σ bend z_k. Exact for constants and straight
+/// lines.
 struct GaussianWeights {
-  /// Samples to both sides that an average counts: 5.25 σ.
+  /// Samples on each side of an average: 5.25 σ.
   static constexpr int kReach = 7;
   static constexpr std::size_t kCount = 2 * kReach + 2;
 
@@ -34,11 +34,11 @@ struct GaussianWeights {
   GaussianWeights(double offset, double step, double sigma);
 };
 
-/// The even grid of heights over a lens whose averages a made surface is, with the samples beyond
-/// the rim that averages at the rim count.
+/// The even grid of heights over a lens whose averages make up a made surface. It includes the
+/// samples beyond the rim that averages at the rim need.
 ///
-/// Samples are at most 3/4 σ apart: a sum over a Gaussian then has a wave of wave number k right to
-/// exp(−(2π/0.75 − kσ)²/2).
+/// Samples are at most 3/4 σ apart: the relative error of a wave of wave number k in a Gaussian sum
+/// is then exp(−(2π/0.75 − kσ)²/2).
 class AveragingGrid {
  public:
   AveragingGrid(const Eigen::Vector2d& lens_size, const MadeBy& made);
@@ -46,32 +46,32 @@ class AveragingGrid {
   /// Grid cells over the lens.
   [[nodiscard]] const Eigen::Vector2i& cells() const { return cells_; }
   [[nodiscard]] const Eigen::Vector2d& size() const { return size_; }
-  /// Where sample (i, j) is, mm.
+  /// Place of sample (i, j), mm.
   [[nodiscard]] Eigen::Vector2d place(int i, int j) const {
     return step_.cwiseProduct(Eigen::Vector2d(i, j));
   }
 
   /// Heights of all samples: sample (i, j) of the lens is at (i + kReach, j + kReach).
   [[nodiscard]] Eigen::MatrixXd make_heights() const;
-  /// Fills the samples beyond the rim, where the surface goes on turned about it:
-  /// f(−x) = 2 f(0) − f(x).
+  /// Fills the samples beyond the rim, where the surface continues point-symmetrically: f(−x) = 2
+  /// f(0) − f(x).
   static void turn_about_rim(Eigen::MatrixXd& heights);
-  /// Its adjoint; the derivatives by the samples beyond the rim are left as they are.
+  /// Adjoint of turn_about_rim(); leaves the derivatives by the samples beyond the rim unchanged.
   static void turn_about_rim_adjoint(Eigen::MatrixXd& heights_bar);
 
-  /// Number, in make_heights(), of the first sample that the average at `at` counts along an axis.
+  /// Index in make_heights() of the first sample in the average at `at`, along an axis.
   [[nodiscard]] int first_sample(double at, int axis) const;
   [[nodiscard]] GaussianWeights weights(double at, int axis) const;
 
-  /// What polish takes off in addition near the rim, and its derivatives.
+  /// Additional depth polished off near the rim, and its derivatives.
   struct RimLoss {
     double z = 0.0;
     Eigen::Vector2d slope{0.0, 0.0};
-    Eigen::Vector2d bend{0.0, 0.0};  ///< ∂²/∂x², ∂²/∂y²; the mixed one is 0.
+    Eigen::Vector2d bend{0.0, 0.0};  ///< ∂²/∂x², ∂²/∂y²; ∂²/∂x∂y is 0.
   };
   [[nodiscard]] RimLoss rim_loss(const Eigen::Vector2d& xy) const;
 
-  /// σ of the polish, mm, below which the grid takes more than 0.8 GB.
+  /// Minimum σ of the polish, mm: below it the grid takes more than 0.8 GB.
   static double least_sigma(const Eigen::Vector2d& lens_size);
 
  private:
@@ -83,20 +83,19 @@ class AveragingGrid {
   Eigen::Vector2d step_;  ///< mm
 };
 
-/// What comes off the machine where a spline is cut and polished: the average of the spline with a
-/// Gaussian, less what polish takes off at the rim.
+/// The surface of a spline after cutting and polishing: the average of the spline with a Gaussian,
+/// minus the depth polished off at the rim.
 ///
 /// Along the rows the Gaussian's variance is the polish's σ²; across them p²/12 is added. A ball of
-/// radius R whose axis runs over y touches f at y + R f′, so that contacts are p (1 + R f″) apart.
-/// At the distance d of one it leaves (1/R − f″) d²/2 more than f, on average
-/// (1/R − f″) (1 + R f″)² p²/24 = p²/24R + f″ p²/24 + …, of which the first part is the same
-/// everywhere. What that leaves out are waves of the pitch, of which polishing leaves
-/// exp(−2π²σ²/p²), and what the ball fills of valleys sharper than itself. In a mould it is the
-/// same, with f turned over. Beyond the rim the surface goes on turned about it, as PolishedField
-/// has it.
+/// radius R with its axis at y touches f at y + R f′, so contacts are p (1 + R f″) apart. At
+/// distance d from a contact it leaves (1/R − f″) d²/2 above f, on average (1/R − f″) (1 + R f″)²
+/// p²/24 = p²/24R + f″ p²/24 + …; the first part is the same everywhere. This neglects waves of the
+/// pitch, of which polishing leaves exp(−2π²σ²/p²), and valleys sharper than the ball. A mould is
+/// the same with f turned over. Beyond the rim the surface continues point-symmetrically, as in
+/// PolishedField.
 ///
-/// Averages are sums over an AveragingGrid: of waves at least 2σ long they are off by less than
-/// 1e-5 of the height, of a spline with bumps of 1 µm by 5e-8 mm and 1e-6 rad
+/// Averages are sums over an AveragingGrid. Their error is below 1e-5 of the height for waves at
+/// least 2σ long; for a spline with bumps of 1 µm it is 5e-8 mm and 1e-6 rad
 /// (MadeSurface.IsTheAverageOfTheSpline).
 class MadeSurface {
  public:
@@ -117,8 +116,8 @@ class MadeSurface {
 SampledSurface made_nodes(const ControlNet& net, const MadeBy& made, int samples,
                           const Executor& executor);
 
-/// Nodes of a spline, moved in z to what is made of it there (MadeSurface), and the adjoint. As
-/// SplineNodesOn has it, for the processor.
+/// Nodes of a spline, moved in z to its made surface (MadeSurface), and the adjoint. Same interface
+/// as SplineNodesOn, on the CPU.
 ///
 /// Notation: x place of a sample on the averaging grid, f(x) the spline's height there, w the
 /// Gaussian's weights; p a node in the plane, m = Σ w(p − x) f(x) the made height above it; a bar
@@ -126,24 +125,24 @@ SampledSurface made_nodes(const ControlNet& net, const MadeBy& made, int samples
 /// moves the node: δm = Σ w δf + m′·δp.
 class MadeNodes {
  public:
-  /// @param net  control points of the spline; its lens has this size.
+  /// @param net  control points of the spline. @param size  of its lens, mm.
   MadeNodes(const GridShape& net, const Eigen::Vector2d& size, int samples, const MadeBy& made,
             const Executor& executor);
 
   [[nodiscard]] GridShape shape() const { return plan_.shape(); }
 
-  /// Forgets what look() has found before, so that its results depend on its arguments alone.
+  /// Forgets the last look(), so the next one depends on its arguments alone.
   void forget() { known_ = false; }
 
-  /// Points and normals (of any length) of all nodes. Searches the grid's samples from where the
-  /// last call has found them. @throw Interrupted.
+  /// Computes points and normals (of any length) of all nodes. The search for the grid's samples
+  /// starts from the last call's. @throw Interrupted.
   void look(const double* points, double* positions, double* normals);
 
-  /// Adjoint of look() at the control points that were looked at last. @throw Interrupted.
+  /// Adjoint of look() at the control points of its last call. @throw Interrupted.
   void look_adjoint(const double* position_bar, const double* normal_bar, double* points_bar);
 
  private:
-  /// Where a sample lies on the spline, and the slope there.
+  /// Parameters of a sample on the spline, and the slope there.
   struct Sample {
     Eigen::Vector2d uv;
     Eigen::Vector2d slope;
@@ -169,25 +168,24 @@ class MadeNodes {
 
   Executor executor_;
   AveragingGrid grid_;
-  ControlNet net_;  ///< That was looked at last.
+  ControlNet net_;  ///< Control points of the last look().
   SplineNodesOn<Executor> plan_;
   Eigen::MatrixXd heights_;
   Eigen::MatrixXd heights_bar_;
   std::vector<Sample> samples_;
   std::vector<Node> nodes_;
   std::vector<double> plan_bar_;  ///< 3 × nodes
-  std::vector<double> no_bar_;    ///< 3 × nodes, zeros: normals do not count in the plane.
-  bool known_ = false;            ///< Are samples_ those of a look()?
+  std::vector<double> no_bar_;    ///< 3 × nodes, zeros: normals have no effect in the plane.
+  bool known_ = false;            ///< True if samples_ are from a look().
 };
 
-/// Nodes of a spline, moved in z to what is made of it there, as MadeNodes has them, for knot cells
-/// much wider than the polish's σ: what becomes of even knots is in the nodes (made_basis()) and in
-/// the adjoint; what that leaves out is measured by measure() (MadeSurface) and stays until the
-/// next call. The grid of MadeNodes would have many samples for each knot cell; how the rest
-/// depends on the control points counts little here.
+/// Like MadeNodes, for knot cells much wider than the polish's σ, where the grid of MadeNodes would
+/// have many samples per knot cell. Nodes and adjoint use made_basis(), which is exact for even
+/// knots; measure() computes the remaining difference to MadeSurface, which stays constant until
+/// its next call. The difference hardly depends on the control points.
 class ShiftedNodes {
  public:
-  /// @param net  control points of the spline; its lens has this size.
+  /// @param net  control points of the spline. @param size  of its lens, mm.
   ShiftedNodes(const GridShape& net, const Eigen::Vector2d& size, int samples, const MadeBy& made,
                const Executor& executor)
       : executor_(executor),
@@ -198,7 +196,7 @@ class ShiftedNodes {
 
   [[nodiscard]] GridShape shape() const { return nodes_.shape(); }
 
-  /// Measures at these control points what is added to the nodes. @throw Interrupted.
+  /// Computes the difference at these control points. @throw Interrupted.
   void measure(const double* points) {
     if (!shift_.empty() && std::equal(points, points + net_.points.size(), net_.points.data())) {
       return;  // A round begins where one ended.
@@ -218,7 +216,7 @@ class ShiftedNodes {
     parallel_for(executor_, "measure shift", static_cast<std::int64_t>(count()), measure);
   }
 
-  /// Points and normals (of any length) of all nodes.
+  /// Computes points and normals (of any length) of all nodes.
   void look(const double* points, double* positions, double* normals) {
     nodes_.look(points, positions, normals);
     if (shift_.empty()) return;
@@ -230,8 +228,8 @@ class ShiftedNodes {
     });
   }
 
-  /// Adjoint of look() at the control points that were looked at last.
-  /// @param normal_bar  is changed.
+  /// Adjoint of look() at the control points of its last call.
+  /// @param normal_bar  is modified.
   void look_adjoint(const double* position_bar, double* normal_bar, double* points_bar) {
     if (!shift_.empty()) {
       parallel_for(executor_, "shift nodes adjoint", static_cast<std::int64_t>(count()),
@@ -252,7 +250,7 @@ class ShiftedNodes {
   }
 
   Executor executor_;
-  ControlNet net_;  ///< That was measured last.
+  ControlNet net_;  ///< Control points of the last measure().
   MadeBy made_;
   SplineNodesOn<Executor> nodes_;
   std::vector<double> shift_;  ///< 3 × nodes: ∂z/∂x, ∂z/∂y and z; empty before measure().

@@ -10,14 +10,14 @@
 namespace lensforge {
 namespace {
 
-/// The Gaussian ends here, in σ, as in PolishedField.
+/// Radius of the Gaussian, in σ, as in PolishedField.
 constexpr double kReach = 5.0;
 
-/// Points a σ of the sum that stands for its integral.
+/// Points per σ of the sum that replaces its integral.
 constexpr int kPointsPerSigma = 32;
 
-/// A point of a sum that stands for an integral over a Gaussian: what the surface counts there in
-/// its average, and in the average's derivatives.
+/// A point of a sum that replaces an integral over a Gaussian: weights of the surface there in its
+/// average and in the average's derivatives.
 struct SumPoint {
   double at = 0.0;
   double weight = 0.0;
@@ -27,8 +27,8 @@ struct SumPoint {
 };
 
 /// Derivatives are those of the Gaussian, G′ = −s/v G, G″ = (s²/v − 1)/v G, G‴ = (κ − s²/v) s/v² G
-/// with its variance v and κ = 3, both as the points have them: then those of a straight line are
-/// what they should be.
+/// with its variance v and κ = 3, both as computed from the points: so derivatives of a straight
+/// line are exact.
 std::vector<SumPoint> gaussian_points(double sigma) {
   const int count = static_cast<int>(kReach * kPointsPerSigma);
   std::vector<SumPoint> points;
@@ -56,14 +56,14 @@ std::vector<SumPoint> gaussian_points(double sigma) {
   return points;
 }
 
-/// Adds up what one node is a sum of, over all coefficients.
+/// One node as a sum over all coefficients.
 class NodeSum {
  public:
   explicit NodeSum(int cells)
       : cells_(cells), value_(static_cast<std::size_t>(cells) + 3), slope_(value_.size()) {}
 
-  /// Adds `value` times the surface at t, turned about its ends beyond them, to the node's value
-  /// and `slope` times the same to its slope.
+  /// Adds `value` times the surface at t to the node's value and `slope` times it to its slope;
+  /// beyond its ends the surface continues point-symmetrically.
   void add(double t, double value, double slope) {
     const double inside = t < 0.0 ? -t : (t > cells_ ? 2.0 * cells_ - t : t);
     const double sign = inside == t ? 1.0 : -1.0;
@@ -88,7 +88,7 @@ class NodeSum {
   std::vector<double> slope_;
 };
 
-/// Keeps the entries of one node that lie in its window of coefficients.
+/// Appends the entries of one node within its window of coefficients.
 void append(const NodeSum& sum, int first, AxisBasis& basis) {
   basis.first.push_back(first);
   for (int j = 0; j < basis.taps; ++j) {

@@ -17,23 +17,22 @@
 
 namespace lensforge {
 
-/// Nodes along one direction of a spline as sums of its coefficients, and what is added to their
-/// heights.
+/// Nodes along one direction of a spline as sums of its coefficients, and offsets of their heights.
 struct AxisBasis {
   int coefficients = 0;
-  int taps = 0;                    ///< Coefficients that a node is a sum of.
-  std::vector<int> first;          ///< Of a node: the first of its coefficients; never falls.
-  std::vector<double> value;       ///< Of heights; taps × nodes.
+  int taps = 0;                    ///< Coefficients per node.
+  std::vector<int> first;          ///< Per node: number of its first coefficient; non-decreasing.
+  std::vector<double> value;       ///< For heights; taps × nodes.
   std::vector<double> slope;       ///< taps × nodes, derivatives by the knot cell.
-  std::vector<double> plan_value;  ///< Of x and y, those of the spline itself; taps × nodes.
+  std::vector<double> plan_value;  ///< For x and y: the spline itself; taps × nodes.
   std::vector<double> plan_slope;  ///< taps × nodes, derivatives by the knot cell.
   std::vector<double> lift;        ///< Added to a node's height, mm.
-  std::vector<double> tilt;        ///< Its derivative, mm by the knot cell.
+  std::vector<double> tilt;        ///< Derivative of lift, mm per knot cell.
 
   [[nodiscard]] int nodes() const { return static_cast<int>(first.size()); }
 };
 
-/// Points k / samples of 0 … cells, in knot cells.
+/// Points k / samples in 0 … cells, in knot cells.
 std::vector<double> even_points(int cells, int samples);
 
 /// The spline itself: cubic B-splines with a knot at every whole number, fourfold at both ends.
@@ -47,16 +46,16 @@ struct AxisLength {
   double length = 1.0;  ///< mm
 };
 
-/// An even spline as it comes off the machine (MadeSurface): f replaced by G_σ ∗ (f + p²/24 · f″),
-/// less what polish takes off at the rim. Both are linear in the coefficients, so that the made
-/// surface is a sum of the same coefficients by other functions. Of a spline whose knots are not
-/// even it is about what is made.
+/// The made surface (MadeSurface) of an even spline: f replaced by G_σ ∗ (f + p²/24 · f″), minus
+/// the depth polished off at the rim. It is linear in the coefficients, so the made surface is a
+/// sum of the same coefficients with other functions. For a spline with uneven knots it is an
+/// approximation.
 /// @param points  as for plain_basis(). @pre made.polish_sigma > 0.
 AxisBasis made_basis(const AxisLength& along, const std::vector<double>& points,
                      const MadeBy& made);
 
-// Spline model: a tensor product of cubic B-splines looked at on an even grid of nodes, and the
-// adjoint of looking. Both are two passes of few taps (AxisBasis), first along u, then along v.
+// Spline model: a tensor product of cubic B-splines evaluated on an even grid of nodes, and the
+// adjoint. Both are two passes with few taps (AxisBasis), first along u, then along v.
 //
 // Notation: c control point, B the basis' functions, a = Σ B(u) c, a' = Σ B'(u) c along a row of
 // control points; p = Σ B(v) a a node, p_u = Σ B(v) a', p_v = Σ B'(v) a, n = p_u × p_v; a bar is
@@ -64,18 +63,18 @@ AxisBasis made_basis(const AxisLength& along, const std::vector<double>& points,
 
 /// AxisBasis for kernels.
 struct AxisTaps {
-  int taps;                  ///< Coefficients that a node is a sum of.
-  const int* first;          ///< Of a node: number of its first coefficient.
-  const double* value;       ///< Of heights; taps × nodes.
-  const double* slope;       ///< taps × nodes, by the knot cell.
-  const double* plan_value;  ///< Of x and y.
+  int taps;                  ///< Coefficients per node.
+  const int* first;          ///< Per node: number of its first coefficient.
+  const double* value;       ///< For heights; taps × nodes.
+  const double* slope;       ///< taps × nodes, per knot cell.
+  const double* plan_value;  ///< For x and y.
   const double* plan_slope;
-  const double* lift;  ///< Of a node, mm.
-  const double* tilt;  ///< Likewise, mm by the knot cell.
-  const int* begin;    ///< Of a coefficient: its first node, and one after its last.
+  const double* lift;  ///< Per node, mm.
+  const double* tilt;  ///< Per node, mm per knot cell.
+  const int* begin;    ///< Per coefficient: its first node, and one past its last.
   const int* end;
 
-  /// What a coefficient counts in x, y and z of a node, and in their derivatives.
+  /// Weights of a coefficient in x, y and z of a node, and in their derivatives.
   [[nodiscard]] LF_HD Eigen::Vector3d values(std::int64_t tap) const {
     return {plan_value[tap], plan_value[tap], value[tap]};
   }
@@ -135,11 +134,11 @@ class AxisTapsOn {
   Buffer<int> end_;
 };
 
-/// What the kernels read and write; tables are stored row by row, x y z of each entry in turn.
+/// Arguments of the kernels; tables are stored row by row, x y z of each entry in turn.
 struct SplineNodesView {
   AxisTaps u;
   AxisTaps v;
-  std::int64_t columns;  ///< Of control points.
+  std::int64_t columns;  ///< Columns of control points.
   std::int64_t nodes_u;
   double* along;  ///< nodes_u × rows of control points: a, and in an adjoint its bar.
   double* steep;  ///< The same of a'.
@@ -167,7 +166,7 @@ struct LookAlongRow {
   }
 };
 
-/// One node and its normal.
+/// Computes one node and its normal.
 struct LookAcrossRows {
   SplineNodesView s;
   double* positions;
@@ -197,8 +196,8 @@ struct LookAcrossRows {
   }
 };
 
-/// Bars of a and a' of one node column and one row of control points. From
-/// n̄ · dn = dp_u · (p_v × n̄) + dp_v · (n̄ × p_u).
+/// Computes the bars of a and a' for one node column and one row of control points. They follow
+/// from n̄ · dn = dp_u · (p_v × n̄) + dp_v · (n̄ × p_u).
 struct GatherAcrossRows {
   SplineNodesView s;
   const double* position_bar;
@@ -223,7 +222,7 @@ struct GatherAcrossRows {
   }
 };
 
-/// Bar of one control point.
+/// Computes the bar of one control point.
 struct GatherAlongRow {
   SplineNodesView s;
   double* points_bar;
@@ -242,7 +241,7 @@ struct GatherAlongRow {
   }
 };
 
-/// The nodes of a net of control points.
+/// Nodes of a net of control points, and their adjoint.
 template <class Exec>
 class SplineNodesOn {
  public:
@@ -258,14 +257,14 @@ class SplineNodesOn {
 
   [[nodiscard]] GridShape shape() const { return {u_.nodes(), v_.nodes()}; }
 
-  /// Points and normals (of any length) of all nodes from the control points.
+  /// Computes points and normals (of any length) of all nodes from the control points.
   void look(const double* points, double* positions, double* normals) {
     parallel_for(executor_, "spline rows", table_size(), LookAlongRow{view(), points});
     parallel_for(executor_, "spline nodes", node_count(),
                  LookAcrossRows{view(), positions, normals});
   }
 
-  /// Adjoint of look() at the control points that were looked at last.
+  /// Adjoint of look() at the control points of its last call.
   void look_adjoint(const double* position_bar, const double* normal_bar, double* points_bar) {
     parallel_for(executor_, "spline nodes adjoint", table_size(),
                  GatherAcrossRows{view(), position_bar, normal_bar});
@@ -293,7 +292,7 @@ class SplineNodesOn {
   typename Exec::template Buffer<double> by_v_;
 };
 
-/// Nodes of the spline itself. @param samples  nodes a knot cell each way.
+/// Nodes of the spline itself. @param samples  nodes per knot cell each way.
 template <class Exec>
 SplineNodesOn<Exec> spline_nodes_on(const GridShape& net, int samples, const Exec& executor) {
   const auto basis = [&](int coefficients) {

@@ -129,7 +129,7 @@ TEST_P(SplineStage, StoppedInTheSplineAndResumedGivesTheSameBits) {
   expect_resumed_equals(whole, "spline nodes", calls / 2);
 }
 
-/// What there is before the spline begins is the smooth mesh, and says so.
+/// Before the spline's level a design is a smooth mesh, and its lens says so.
 TEST_P(SplineStage, StoppedBeforeTheSplineIsASmoothLens) {
   StopAtKernel stop("image term", 1);
   options_.iterations = 100;

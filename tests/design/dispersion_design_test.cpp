@@ -30,7 +30,7 @@ OpticalSetup colored_setup() {
   return setup;
 }
 
-/// What else may be asked of the lens.
+/// Another property that a dispersing lens may have.
 struct Kind {
   const char* name;
   void (*apply)(OpticalSetup&);
@@ -56,7 +56,7 @@ constexpr Kind kKinds[] = {{"Nothing", nothing_else},
                            {"WideSource", wide_source},
                            {"Fresnel", reflecting_faces}};
 
-/// With every weight, so that no term is counted once for each colour.
+/// All weights above 0, to find terms that are counted once per colour.
 constexpr ObjectiveWeights kWeights{1e2, 1e3, 1e-3, 2e1, 1e-8, 3e0, 2e-1, 2e0, 1e1};
 
 class DispersedObjective : public ::testing::TestWithParam<std::tuple<SurfaceModel, Kind>> {

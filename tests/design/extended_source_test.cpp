@@ -222,7 +222,7 @@ TEST(ExtendedDesign, LaterRoundsMendWhatTheConvolutionMisses) {
   for (std::size_t i = 0; i < convolved.size(); ++i) {
     picture.values()[i] = static_cast<float>(convolved[i] * target.total());
   }
-  // What the optimiser goes by is off on purpose.
+  // The picture by convolution, which the optimiser sees, misses the target on purpose.
   EXPECT_LT(lens.metrics.at(SurfaceModel::kSmooth).mae, compare(picture, target).mae);
 }
 

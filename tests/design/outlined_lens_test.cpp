@@ -46,7 +46,7 @@ OpticalSetup disc_setup(const OpticalSetup& rectangle) {
   return setup;
 }
 
-/// Of a picture that is not clipped, as the objective has it.
+/// Mean absolute error of a picture that is not clipped, as in the objective.
 double mean_absolute_error(const RenderResult& rendered, const Image& target) {
   const auto pixels = static_cast<double>(target.values().size());
   double sum = 0.0;

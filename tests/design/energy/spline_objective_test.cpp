@@ -42,7 +42,7 @@ class SplineObjective : public ::testing::Test {
     return {net_mesh(net_), setup_, target_, options_, executor};
   }
 
-  /// Of what a surface projects, display-encoded.
+  /// Mean absolute error of a surface's picture, display-encoded.
   [[nodiscard]] double mean_absolute_error(const SampledSurface& nodes) const {
     const Image picture =
         render_surface(nodes.mesh, nodes.normals, setup_, Executor::serial()).image;
@@ -56,7 +56,7 @@ class SplineObjective : public ::testing::Test {
     return absolute / pixels;
   }
 
-  /// Of a gradient along a direction, against central differences.
+  /// Error of a gradient along a direction, against central differences.
   [[nodiscard]] double slope_error(SplineObjectiveOn<Executor>& function,
                                    const Eigen::Matrix3Xd& gradient,
                                    const Eigen::Matrix3Xd& direction) const {
@@ -136,7 +136,7 @@ TEST_F(SplineObjective, GradientOfTheMadePartEqualsCentralDifferences) {
   }
 }
 
-/// Of the spline itself and of what is made of it, in both ways.
+/// For the spline itself and for its made surface with narrow and wide knot cells.
 TEST_F(SplineObjective, GradientInSeveralColorsEqualsCentralDifferences) {
   setup_.spectrum = {{480.0, 550.0, 620.0}, {}, 12.0};
   for (const std::optional<MadeBy>& made_by :

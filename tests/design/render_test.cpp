@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "design/render.h"
+
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -6,15 +9,25 @@
 #include <string>
 #include <vector>
 
-#include "core/image/image.h"
+#include "core/error.h"
+#include "core/image/metrics.h"
+#include "core/image/spectral_color.h"
+#include "core/optics/light_colors.h"
+#include "core/surface/mesh_normals.h"
+#include "core/temp_folder.h"
+#include "core/test_meshes.h"
 #include "design/ray_tracer.h"
-#include "design/render.h"
+#include "design/setup/option_tables.h"
 #include "design/test_setups.h"
 
 namespace lensforge {
 namespace {
 
+using ::testing::EndsWith;
+using testing::grid_mesh;
+using ::testing::HasSubstr;
 using testing::height_field;
+using testing::message_of;
 using testing::setup_of;
 
 constexpr SurfaceModel kModels[] = {SurfaceModel::kFacet, SurfaceModel::kSmooth};
@@ -166,5 +179,116 @@ TEST_P(RenderLensModels, EvaluateScalesTheLensToTheTargetsTotal) {
 INSTANTIATE_TEST_SUITE_P(RenderLens, RenderLensModels, ::testing::ValuesIn(kModels),
                          testing::model_name);
 
+TEST(Fringe, OfAPrismIsTheDifferenceOfItsDeflections) {
+  const double slope = 0.2;
+  OpticalSetup setup = testing::setup_of({20.0, 20.0}, {20, 20}, 300.0);
+  setup.spectrum.wavelengths = {486.13, 656.27};
+  const SurfaceMesh mesh = testing::height_field({20.0, 20.0}, {3, 3},
+                                                 [&](double x, double) { return 5.0 + slope * x; });
+  const Fringe fringe = fringe_of(mesh, vertex_area_normals(mesh), setup);
+  // Snell's law in angles at both indices.
+  const auto deflection = [&](double n) {
+    const double lean = std::atan(slope);
+    return std::tan(std::asin(n * std::sin(lean)) - lean);
+  };
+  const double spread =
+      deflection(in_color(setup, 486.13).ior) - deflection(in_color(setup, 656.27).ior);
+  EXPECT_NEAR(fringe.mean, (300.0 - mesh.vertices.row(2).mean()) * spread, 1e-9);
+  EXPECT_NEAR(fringe.max, 295.0 * spread, 1e-9);
+}
+
+TEST(Fringe, TheAbbeNumberIsThatOfTheIndices) {
+  const OpticalSetup setup;
+  const double spread = in_color(setup, 486.13).ior - in_color(setup, 656.27).ior;
+  EXPECT_NEAR(0.49 / spread, 57.0, 1e-9);
+  EXPECT_NEAR(in_color(setup, 587.56).ior, 1.49, 1e-15);
+}
+
+TEST(Fringe, SharesAreThoseOfPowerAndBrightness) {
+  OpticalSetup setup;
+  setup.spectrum = parse_spectrum("500:2,600:1", "--wavelengths");
+  const std::vector<LightColor> colors = light_colors(setup);
+  ASSERT_EQ(colors.size(), 2U);
+  EXPECT_NEAR(colors[0].share / colors[1].share,
+              2.0 * color_matching(500.0).y() / color_matching(600.0).y(), 1e-12);
+  EXPECT_NEAR(colors[0].share + colors[1].share, 1.0, 1e-12);
+  EXPECT_GT(colors[0].setup.ior, colors[1].setup.ior);
+  EXPECT_TRUE(colors[0].setup.spectrum.none());
+  EXPECT_EQ(light_colors(OpticalSetup()).front().setup, OpticalSetup());
+}
+
+TEST(Fringe, WavelengthsAreReadOrRefusedInOneLine) {
+  EXPECT_EQ(parse_spectrum("450, 550,650", "--wavelengths").wavelengths,
+            (std::vector<double>{450.0, 550.0, 650.0}));
+  const Spectrum led = parse_spectrum("450:0.6,550:1,650:0.8", "--wavelengths");
+  EXPECT_EQ(led.wavelengths, (std::vector<double>{450.0, 550.0, 650.0}));
+  EXPECT_EQ(led.powers, (std::vector<double>{0.6, 1.0, 0.8}));
+  EXPECT_EQ(spectrum_text(led), "450:0.6,550:1,650:0.8");
+  for (const char* text : {"", "550", "650,550", "550,550", "300,550", "550,800", "1,2,3,4,5,6",
+                           "450:1,550", "450:1,550:0", "450:1,550:-1", "450:1:550"}) {
+    EXPECT_THAT(message_of<InputError>([&] { (void)parse_spectrum(text, "--wavelengths"); }),
+                EndsWith("450,550,650 would do"));
+  }
+}
+
+/// 15 x 10 mm, moved off the origin.
+SurfaceMesh shifted_mesh() {
+  SurfaceMesh mesh = grid_mesh(7, 5, 2.5, 5.0);
+  mesh.vertices.topRows<2>().colwise() += Eigen::Vector2d(-3.0, 4.0);
+  return mesh;
+}
+
+TEST(RenderSetup, OfAMeshHasAnImageStraightAboveOfTheSameSize) {
+  const OpticalSetup setup = setup_for_mesh(shifted_mesh());
+  EXPECT_EQ(setup.lens_size, Eigen::Vector2d(15.0, 10.0));
+  EXPECT_EQ(setup.image_size, setup.lens_size);
+  EXPECT_EQ(setup.image_origin, Eigen::Vector2d(-3.0, 4.0));
+  EXPECT_EQ(setup.pixels, Eigen::Vector2i(256, 171));
+  EXPECT_EQ(setup.ior, OpticalSetup{}.ior);
+}
+
+TEST(RenderSetup, PixelsKeepTheImagesProportions) {
+  OpticalSetup setup;
+  setup.image_size = {20.0, 50.0};
+  EXPECT_EQ(with_longer_side(setup, 100).pixels, Eigen::Vector2i(40, 100));
+  setup.image_size = {1000.0, 1.0};
+  EXPECT_EQ(with_longer_side(setup, 10).pixels, Eigen::Vector2i(10, 1));
+}
+
+TEST(RenderSetup, AWidthKeepsTheImagesProportionsAndCentre) {
+  OpticalSetup setup;
+  setup.image_size = {20.0, 50.0};
+  setup.image_origin = {-4.0, 10.0};
+  const OpticalSetup wide = with_image_width(setup, 80.0);
+  EXPECT_EQ(wide.image_size, Eigen::Vector2d(80.0, 200.0));
+  EXPECT_EQ(wide.image_origin + 0.5 * wide.image_size, setup.image_origin + 0.5 * setup.image_size);
+  EXPECT_EQ(wide.pixels, setup.pixels);
+}
+
+TEST(RenderSetup, OptionsInTheTablesOrderSetTheWidthAndThenThePixels) {
+  RenderOptions options{SurfaceModel::kFacet, setup_for_mesh(shifted_mesh())};
+  for (const OptionField<RenderOptions>& row : render_fields()) {
+    if (row.name == "--image-width") row.set(options, 30.0);
+    if (row.name == "--pixels") row.set(options, 60);
+  }
+  EXPECT_EQ(options.setup.image_size, Eigen::Vector2d(30.0, 20.0));
+  EXPECT_EQ(options.setup.image_origin, Eigen::Vector2d(-10.5, -1.0));
+  EXPECT_EQ(options.setup.pixels, Eigen::Vector2i(60, 40));
+  for (const OptionField<RenderOptions>& row : render_fields()) {
+    if (row.name != "--image-width" && row.name != "--pixels") continue;
+    EXPECT_EQ(row.get(options), row.name == "--pixels" ? 60.0 : 30.0) << row.name;
+  }
+}
+
+TEST(RenderSetup, TheWallLiesAboveTheSurface) {
+  OpticalSetup setup = setup_for_mesh(shifted_mesh());
+  setup.focal_length = shifted_mesh().vertices.row(2).maxCoeff();
+  EXPECT_THAT(message_of<InputError>([&] { require_wall_above(shifted_mesh(), setup); }),
+              HasSubstr("must stand above the whole surface"));
+  setup.focal_length += 0.1;
+  require_wall_above(shifted_mesh(), setup);
+}
+
 }  // namespace
+
 }  // namespace lensforge

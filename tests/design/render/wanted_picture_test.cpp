@@ -53,7 +53,7 @@ TEST_F(WantedPictureOfAPlate, LacksMinusThreeWhereLightIsGatheredFourfold) {
   }
 }
 
-/// Where light lands from a surface of slope s₀ + B (x − x₀), by central differences.
+/// Landing points of light from a surface of slope s₀ + B (x − x₀), by central differences.
 TEST(WantedPicture, StretchIsHowLandingPlacesChange) {
   OpticalSetup setup;
   setup.pixels = {40, 40};
