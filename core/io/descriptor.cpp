@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <system_error>
 
 namespace lensforge {
 
@@ -21,5 +22,16 @@ int Descriptor::close() {
   const int number = std::exchange(number_, -1);
   return number >= 0 && ::close(number) != 0 ? errno : 0;
 }
+
+bool write_all(int descriptor, std::string_view bytes) {
+  while (!bytes.empty()) {
+    const ssize_t written = ::write(descriptor, bytes.data(), bytes.size());
+    if (written < 0 && errno != EINTR) return false;
+    if (written > 0) bytes.remove_prefix(static_cast<std::size_t>(written));
+  }
+  return true;
+}
+
+std::string system_reason(int error) { return std::generic_category().message(error); }
 
 }  // namespace lensforge

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <string>
+#include <string_view>
 #include <utility>
 
 namespace lensforge {
@@ -31,5 +33,12 @@ class Descriptor {
 
   int number_;
 };
+
+/// Writes all bytes; a signal does not interrupt it. Async-signal-safe. @return false if the system
+/// refuses them, with its reason in errno.
+bool write_all(int descriptor, std::string_view bytes);
+
+/// The system's words for an errno value.
+std::string system_reason(int error);
 
 }  // namespace lensforge
