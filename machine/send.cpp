@@ -16,6 +16,7 @@
 
 #include "core/error.h"
 #include "core/io/files.h"
+#include "core/text/words.h"
 #include "machine/gcode/gcode_dialect.h"
 #include "machine/gcode/program_seal.h"
 #include "machine/guard/background_guard.h"
@@ -494,11 +495,7 @@ class SendJob {
     check_spindle_range(summary_.facts, maps_, summary_.findings);
     watcher_.examined(summary_.facts, summary_.findings);
     if (summary_.findings.refusals.empty()) return;
-    std::string all;
-    for (const std::string& refusal : summary_.findings.refusals) {
-      all += (all.empty() ? "" : "; ") + refusal;
-    }
-    throw InputError(file_.string() + ": " + all);
+    throw InputError(file_.string() + ": " + joined(summary_.findings.refusals, "; "));
   }
 
   void check_mode(Wire& wire, const MachinePort& port) {

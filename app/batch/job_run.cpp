@@ -44,7 +44,7 @@ constexpr int kSignalBase = 128;
 constexpr int kCannotStart = 127;
 
 [[noreturn]] void fail(const std::string& what) {
-  throw RunError(what + ": " + std::generic_category().message(errno));
+  throw RunError(what + ": " + system_reason(errno));
 }
 
 Descriptor open_output(const fs::path& path, int how) {

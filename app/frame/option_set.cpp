@@ -23,6 +23,7 @@
 #include "core/text/toml_fields.h"
 #include "core/text/units.h"
 #include "core/text/version.h"
+#include "core/text/words.h"
 #include "design/mpi/session.h"
 
 namespace lensforge::app {
@@ -126,13 +127,6 @@ Value parsed(const std::string& name, const std::string& text, const char* kind)
   return value;
 }
 
-/// "a|b"
-std::string joined(const std::vector<std::string>& words) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : "|") + word;
-  return text;
-}
-
 /// A value's placeholder in the help: "MM", "a|b".
 std::string type_of(const OptionSpec& spec) {
   switch (spec.kind) {
@@ -143,7 +137,7 @@ std::string type_of(const OptionSpec& spec) {
     case OptionKind::kLength:
       return "MM";
     case OptionKind::kWord:
-      return joined(spec.words);
+      return joined(spec.words, "|");
     case OptionKind::kText:
       return spec.unit;
     case OptionKind::kFlag:

@@ -276,10 +276,9 @@ py::object cam(const py::object& lens, const app::Arguments& words) {
     folder.remove_partial_files(is_name_of_cut);
     return make_cut(designed, settings.cam, folder.path(), executor, stopping_at(stop));
   });
-  nlohmann::json cut = {{"warnings", result.report.warnings},
-                        {"files", nlohmann::json::array()},
-                        {"report", report_json(result.report)}};
-  for (const fs::path& file : result.files) cut["files"].push_back(file.string());
+  const nlohmann::json cut = {{"warnings", result.report.warnings},
+                              {"files", app::files_json(result.files)},
+                              {"report", report_json(result.report)}};
   return object_from(cut);
 }
 

@@ -301,15 +301,15 @@ CutForecast read_forecast(const fs::path& lens_folder, const Lens& lens,
 }
 
 /// Nodes of a spline at most: more would not fit a page of 25 MB.
-constexpr double kMostNodes = 480e3;
+constexpr double kMaxNodes = 480e3;
 /// Samples of a height map, 4 bytes each in a page.
-constexpr std::size_t kMostHeights = 1'000'000;
+constexpr std::size_t kMaxHeights = 1'000'000;
 
 /// The surface with the normals that send its light: none of facets.
 SampledSurface surface_of(const Lens& lens) {
   if (lens.spline) {
     const auto cells = static_cast<double>(lens.spline->cell_count());
-    return spline_nodes(*lens.spline, samples_for(kMostNodes, cells));
+    return spline_nodes(*lens.spline, samples_for(kMaxNodes, cells));
   }
   if (lens.model == SurfaceModel::kFacet) return {lens.surface, {}};
   return {lens.surface, vertex_area_normals(lens.surface)};
@@ -330,8 +330,8 @@ double storage_error(const SampledSurface& stored, const OpticalSetup& setup, co
 /// @throw InputError if a height map would not fit a page of 25 MB beside the surfaces.
 void require_small_front(const OpticalSetup& setup, const std::string& name) {
   const auto* const map = setup.front ? std::get_if<HeightFront>(&*setup.front) : nullptr;
-  if (map == nullptr || map->spline->coefficients().size() <= kMostHeights) return;
-  throw InputError(name + ": its front has more than " + std::to_string(kMostHeights) +
+  if (map == nullptr || map->spline->coefficients().size() <= kMaxHeights) return;
+  throw InputError(name + ": its front has more than " + std::to_string(kMaxHeights) +
                    " samples, too many for a page; render draws its picture");
 }
 

@@ -370,7 +370,7 @@ void LiveServer::publish(LiveState state) { content_->publish(std::move(state));
 namespace {
 
 /// Points of the curve of errors: more than a screen has columns.
-constexpr std::size_t kMostPoints = 2000;
+constexpr std::size_t kMaxPoints = 2000;
 constexpr const char* kSplineStage = "spline";
 
 bool is_spline(const Checkpoint& saved) {
@@ -393,7 +393,7 @@ Image picture_of(const Checkpoint& saved, const DesignGoalView& goal, const Exec
 /// MAE over seconds, of the steps that have a picture.
 std::string plot_of(const Checkpoint& saved) {
   PlotCurve curve{"", {}};
-  const std::size_t step = 1 + saved.convergence.size() / kMostPoints;
+  const std::size_t step = 1 + saved.convergence.size() / kMaxPoints;
   for (std::size_t i = 0; i < saved.convergence.size(); i += step) {
     const ConvergenceRow& row = saved.convergence[i];
     if (row.mae > 0.0) curve.points.emplace_back(row.seconds, row.mae);

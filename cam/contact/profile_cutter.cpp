@@ -9,6 +9,7 @@
 #include <limits>
 #include <numbers>
 
+#include "cam/contact/index_of.h"
 #include "core/compute/scalar.h"
 
 namespace lensforge {
@@ -199,8 +200,6 @@ namespace {
 
 /// Cells per triangle: with two triangles per cell the pyramid is as small as the items.
 constexpr double kCellsPerTriangle = 0.5;
-
-std::size_t index_of(std::int64_t value) { return static_cast<std::size_t>(value); }
 
 }  // namespace
 

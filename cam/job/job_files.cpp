@@ -22,6 +22,7 @@
 #include "core/io/lens_folder.h"
 #include "core/mesh/mesh_files.h"
 #include "core/text/lower_case.h"
+#include "core/text/words.h"
 #include "machine/gcode/program_seal.h"
 
 namespace lensforge {
@@ -111,7 +112,7 @@ ColorImage leakage_picture(const LeakageResult& leakage) {
 
 std::string listed(const std::vector<fs::path>& paths) {
   std::string text;
-  for (const fs::path& path : paths) text += (text.empty() ? "" : ", ") + path.string();
+  for (const fs::path& path : paths) text = with_word(text, path.string());
   return text;
 }
 

@@ -7,6 +7,7 @@
 #include <numeric>
 #include <utility>
 
+#include "cam/contact/index_of.h"
 #include "cam/leakage/surface_tile.h"
 #include "core/error.h"
 #include "core/optics/optical_setup.h"
@@ -14,8 +15,6 @@
 
 namespace lensforge {
 namespace {
-
-std::size_t index_of(std::int64_t i) { return static_cast<std::size_t>(i); }
 
 /// Weights of the pixels for deposit_adjoint(), with their sums from the right.
 class PixelWeights {

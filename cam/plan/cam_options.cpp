@@ -351,7 +351,7 @@ OptionTable<O> outline_rows() {
                                "cut the lens out of its blank, last; auto: if it has an outline"),
           R::whole("--outline-tool", &O::outline_tool, Limits::between(0, 9999),
                    "number of the flat end mill for it; 0: the roughing tool"),
-          R::whole("--tabs", in(tabs, &TabOptions::count), Limits::between(0, cam_limit::kMostTabs),
+          R::whole("--tabs", in(tabs, &TabOptions::count), Limits::between(0, cam_limit::kMaxTabs),
                    "tabs that hold the lens in its frame until they are snapped; fewer where they "
                    "do not fit"),
           R::length("--tab-width", in(tabs, &TabOptions::width),
@@ -447,7 +447,7 @@ OptionTable<O> prediction_rows() {
       R::without("--no-render", &O::render, "programs only, without the predicted picture"),
       R::without("--no-remedies", &O::remedies, "do not try what helps where most light leaks"),
       R::whole("--tolerances", &O::tolerances,
-               Limits::zero_or(cam_limit::kFewestParts, cam_limit::kMostParts),
+               Limits::zero_or(cam_limit::kFewestParts, cam_limit::kMaxParts),
                "how sure the forecast is: predict so many parts with the errors of the workshop's "
                "[tolerances]; 0: none"),
       R::whole("--tolerance-seed", &O::tolerance_seed, Limits::between(0, cam_limit::kLargestSeed),

@@ -25,6 +25,9 @@ struct DigestArc {
   friend bool operator==(const DigestArc&, const DigestArc&) = default;
 };
 
+/// Units of feeds in a digest per mm/min.
+inline constexpr double kFeedUnits = 1e6;
+
 /// Digest of a path's motions at feed, in order, to the last decimal; compares what is written with
 /// what is read back. Different paths share a digest with a probability of 2^-64.
 class PathDigest {

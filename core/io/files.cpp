@@ -72,15 +72,6 @@ void flush_to_disk(const fs::path& file, const fs::path& named_in_error) {
   if (const int error = opened.close(); error != 0) fail_to_write(named_in_error, error);
 }
 
-void write_all(int descriptor, std::string_view content, const fs::path& named_in_error) {
-  while (!content.empty()) {
-    const ssize_t written = ::write(descriptor, content.data(), content.size());
-    if (written < 0 && errno == EINTR) continue;
-    if (written < 0) fail_to_write(named_in_error, errno);
-    content.remove_prefix(static_cast<std::size_t>(written));
-  }
-}
-
 /// Describes a path that is not a regular file.
 const char* kind_of(mode_t mode) {
   if (S_ISDIR(mode)) return "a folder";
@@ -136,7 +127,7 @@ void write_whole_file(const fs::path& path, std::string_view content) {
   write_whole_file(path, [&](const fs::path& beside) {
     Descriptor file(::open(beside.c_str(), O_WRONLY | O_TRUNC | O_CLOEXEC));
     if (!file.open()) fail_to_write(path, errno);
-    write_all(file.number(), content, path);
+    if (!write_all(file.number(), content)) fail_to_write(path, errno);
     if (const int error = file.close(); error != 0) fail_to_write(path, error);
   });
 }
@@ -247,6 +238,15 @@ int Descriptor::above_standard(int number) {
 int Descriptor::close() {
   const int number = std::exchange(number_, -1);
   return number >= 0 && ::close(number) != 0 ? errno : 0;
+}
+
+bool write_all(int descriptor, std::string_view bytes) {
+  while (!bytes.empty()) {
+    const ssize_t written = ::write(descriptor, bytes.data(), bytes.size());
+    if (written < 0 && errno != EINTR) return false;
+    if (written > 0) bytes.remove_prefix(static_cast<std::size_t>(written));
+  }
+  return true;
 }
 
 namespace {

@@ -120,6 +120,10 @@ class Descriptor {
   int number_;
 };
 
+/// Writes all bytes; a signal does not interrupt it. Async-signal-safe. @return false if the system
+/// refuses them, with its reason in errno.
+bool write_all(int descriptor, std::string_view bytes);
+
 /// SHA-256 (FIPS 180-4) of bytes added piece by piece.
 class Sha256 {
  public:

@@ -51,23 +51,12 @@ enum class Frame : char {
 /// Bytes before a frame's text: its letter and its length.
 constexpr std::size_t kFrameHead = 1 + sizeof(std::uint64_t);
 
-bool write_all(int descriptor, const char* data, std::size_t size) {
-  while (size > 0) {
-    const ssize_t written = ::write(descriptor, data, size);
-    if (written < 0 && errno == EINTR) continue;
-    if (written < 0) return false;
-    data += written;
-    size -= static_cast<std::size_t>(written);
-  }
-  return true;
-}
-
 void send(int descriptor, Frame kind, std::string_view text) {
   std::array<char, kFrameHead> head{static_cast<char>(kind)};
   const std::uint64_t size = text.size();
   std::memcpy(head.data() + 1, &size, sizeof size);
-  if (!write_all(descriptor, head.data(), head.size())) _exit(1);
-  if (!write_all(descriptor, text.data(), text.size())) _exit(1);
+  if (!write_all(descriptor, {head.data(), head.size()})) _exit(1);
+  if (!write_all(descriptor, text)) _exit(1);
 }
 
 struct Share {
