@@ -164,10 +164,10 @@ constexpr double kSurfaces = 8.0;               ///< Number rendered.
 /// Reserve left free by the advised value.
 constexpr double kSpare = 1.5;
 
-double finish_length(const CamOptions& options, const Eigen::Vector2d& size) {
+double finish_length(const CamOptions& options, const OpticalSetup& setup) {
   const FinishProcess& finish = options.workshop.process.finish;
-  const double radius = finishing_ball(options).radius();
-  const double pitch = finish_pitch(finish, radius);
+  const Eigen::Vector2d size = size_to_cut(options, setup);
+  const double pitch = finish_pitch(options, unknown_ground(options, setup));
   const auto rows_of = [&](const Tool& ball, double apart) {
     return (size + Eigen::Vector2d::Constant(ball.diameter)).prod() / apart;
   };
@@ -210,9 +210,14 @@ double rough_points(const CamOptions& options, const Eigen::Vector2d& size) {
   return levels * points_of(shop.process.rough, size) + points_of(shop.process.semi, size);
 }
 
+Passes planned_passes(const CamOptions& options, const OpticalSetup& setup) {
+  return passes_on_lens(options, unknown_ground(options, setup));
+}
+
 double samples_of(const CamOptions& options, const OpticalSetup& setup) {
   if (!options.render) return 0.0;
-  return kSurfaces * setup.lens_size.prod() / sample_spacings(options, setup).prod();
+  const Eigen::Vector2d spacings = sample_spacings(options, setup, planned_passes(options, setup));
+  return kSurfaces * setup.lens_size.prod() / spacings.prod();
 }
 
 double memory_per_move(const FinishProcess& finish) {
@@ -230,19 +235,11 @@ double drawn_parts(const CamOptions& options) {
 }
 
 double part_nodes(const CamOptions& options, const OpticalSetup& setup) {
-  const FinishProcess& finish = options.workshop.process.finish;
   PartPlan plan;
   plan.optics = setup;
-  plan.passes.pitch = finish_pitch(finish, finishing_ball(options).radius());
-  plan.passes.axis = finish.along == PassAxis::kX ? 0 : 1;
-  plan.passes.cross = finish.cross;
+  plan.passes = planned_passes(options, setup);
   plan.polish = options.workshop.polish;
   return options.tolerances > 0 ? static_cast<double>(part_nodes(plan)) : 0.0;
-}
-
-Eigen::Vector2d size_of(const CamOptions& options, const OpticalSetup& setup) {
-  const double shrinkage = options.part == PartKind::kMould ? options.shrinkage : 0.0;
-  return setup.lens_size / (1.0 - shrinkage);
 }
 
 /// Comparisons are written so that NaN is refused too.
@@ -262,8 +259,8 @@ double rounded_up(double value) {
 }  // namespace
 
 WorkEstimate estimate_cut(const CamOptions& options, const OpticalSetup& setup, int threads) {
-  const Eigen::Vector2d size = size_of(options, setup);
-  const double length = finish_length(options, size);
+  const Eigen::Vector2d size = size_to_cut(options, setup);
+  const double length = finish_length(options, setup);
   const double moves = length * moves_per_mm(options.workshop.process.finish);
   const double points = rough_points(options, size);
   WorkEstimate estimate;
@@ -284,14 +281,14 @@ WorkEstimate estimate_cut(const CamOptions& options, const OpticalSetup& setup, 
 
 void require_room_for_cut(const CamOptions& options, const OpticalSetup& setup,
                           const WorkEstimate& estimate, const fs::path& folder) {
-  const Eigen::Vector2d size = size_of(options, setup);
+  const Eigen::Vector2d size = size_to_cut(options, setup);
   const FinishProcess& finish = options.workshop.process.finish;
   WorkEstimate on_one_core = estimate;
   on_one_core.seconds = estimate_cut(options, setup, 1).seconds;
   const double share = std::max(
       {estimate.disk_bytes / free_disk_bytes(folder), estimate.memory_bytes / free_memory_bytes(),
        estimate.disk_bytes / kMaxCutBytes, on_one_core.seconds / kMaxCutSeconds});
-  const double moves = finish_length(options, size) * moves_per_mm(finish);
+  const double moves = finish_length(options, setup) * moves_per_mm(finish);
   const auto require = [&](const std::string& what, const std::string& advice) {
     require_room(estimate, folder, what, advice);
     require_bearable(on_one_core, what, advice);
@@ -309,11 +306,12 @@ void require_room_for_cut(const CamOptions& options, const OpticalSetup& setup,
                    "fewer parts, --tolerances 200, would fit");
   }
   if (samples_of(options, setup) * kSecondsPerSample > 0.5 * on_one_core.seconds) {
-    return require("--sample-spacing " + shortest_text(sample_spacing(options)) + "mm",
+    const double spacing = sample_spacing(options, planned_passes(options, setup));
+    return require("--sample-spacing " + shortest_text(spacing) + "mm",
                    "a larger --sample-spacing would fit");
   }
   const double radius = finishing_ball(options).radius();
-  const double pitch = finish_pitch(finish, radius);
+  const double pitch = max_pitch(finish, radius, kUnknownSlope);
   const double fitting = rounded_up(pitch * share * kSpare);
   if (fineness(finish) > 1.0 && fitting > radius) {
     return require("tolerances this fine", "a larger --slope-tolerance or --tolerance would fit");

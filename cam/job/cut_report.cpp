@@ -127,6 +127,10 @@ namespace {
 constexpr double kMicrometres = 1e3;
 constexpr double kSecondsPerMinute = 60.0;
 
+/// Share by which a pitch may differ from the one that a lens was designed for: the variance of what
+/// rows average, p²/12, then changes by 2 %.
+constexpr double kSamePitch = 0.01;
+
 /// Of a material's refractive index: makers state acrylic as 1.49 to 1.492, and an error of 0.005
 /// changes the refraction by 1 %.
 constexpr double kIndexTolerance = 0.005;
@@ -309,17 +313,18 @@ ParameterGroup outline_parameters(const CutPlan& plan) {
                           mm(cut.tabs.height, 2) + " high, to be snapped by hand"}}};
 }
 
-std::string sampling_words(const CamOptions& options, const OpticalSetup& setup) {
-  const Eigen::Vector2d spacings = sample_spacings(options, setup);
+std::string sampling_words(const CutPlan& plan, const OpticalSetup& setup) {
+  const Eigen::Vector2d spacings = sample_spacings(plan.options(), setup, plan.passes());
   if (spacings.x() == spacings.y()) return mm(spacings.x(), 4);
   return mm(spacings.minCoeff(), 4) + " across the passes, " + mm(spacings.maxCoeff(), 4) +
          " along";
 }
 
-ParameterGroup polish_parameters(const CamOptions& options, const OpticalSetup& setup) {
+ParameterGroup polish_parameters(const CutPlan& plan, const OpticalSetup& setup) {
+  const CamOptions& options = plan.options();
   ParameterGroup group{"Polishing, as assumed",
                        {{"Gaussian σ", mm(options.workshop.polish.sigma, 3)},
-                        {"Sampled every", sampling_words(options, setup)}}};
+                        {"Sampled every", sampling_words(plan, setup)}}};
   if (options.workshop.polish.rim_depth > 0.0) {
     group.parameters.push_back(
         {"Taken off at the rim", mm(options.workshop.polish.rim_depth, 4) + ", falling over " +
@@ -427,15 +432,21 @@ std::string process_warning(const CutPlan& plan, const Lens& lens) {
   // A cast is smaller than its mould, and is polished after casting.
   const double scale =
       plan.options().part == PartKind::kMould ? 1.0 - plan.options().shrinkage : 1.0;
-  const double pitch = scale * finish_pitch(finish, shop.tool(finish.tool).radius());
+  const double radius = finishing_ball(plan.options()).radius();
+  const double pitch = scale * max_pitch(finish, radius, plan.field().steepest);
   const double sigma = shop.polish.sigma;
   const double meant_pitch = number("pitch_mm", pitch);
   const double meant_sigma = number("polish_sigma_mm", sigma);
-  if (meant_pitch == pitch && meant_sigma == sigma) return "";
+  const bool closer = std::abs(meant_pitch - pitch) > kSamePitch * meant_pitch;
+  if (!closer && meant_sigma == sigma) return "";
+  // A design for a scallop does not know its slopes: designed again, it would assume the same.
+  const std::string advice =
+      closer && finish.scallop > 0.0
+          ? "cut it with --pitch " + trimmed_decimal(meant_pitch / scale, 4) + "mm"
+          : "cut it as it was designed, or design it for this workshop (--made-by)";
   return joined({"the lens was designed for a pitch of ", trimmed_decimal(meant_pitch, 4),
                  " mm and a polish of σ ", trimmed_decimal(meant_sigma, 4), " mm, not ",
-                 trimmed_decimal(pitch, 4), " and ", trimmed_decimal(sigma, 4),
-                 " mm: cut it as it was designed, or design it for this workshop (--made-by)"});
+                 trimmed_decimal(pitch, 4), " and ", trimmed_decimal(sigma, 4), " mm: ", advice});
 }
 
 /// Warns of a speed that the controller's setting would silently lower; empty without such a
@@ -575,7 +586,7 @@ ReportData make_report(const CutPlan& plan, const ProgramFiles& programs,
   data.warnings = warnings_of(plan, programs, lens);
   data.path = plan.shown_path();
   if (prediction) {
-    data.parameters.push_back(polish_parameters(options, lens.setup));
+    data.parameters.push_back(polish_parameters(plan, lens.setup));
     add_prediction(*prediction, lens, data);
   }
   data.verdict = whole_verdict(plan, programs, prediction, lens);

@@ -32,11 +32,6 @@ SurfaceModel model_to_cut(const Lens& lens, const CamOptions& options) {
                    model_name(lens.model));
 }
 
-Eigen::Vector2d size_to_cut(const Lens& lens, const CamOptions& options) {
-  const double shrinkage = options.part == PartKind::kLens ? 0.0 : options.shrinkage;
-  return lens.setup.lens_size / (1.0 - shrinkage);
-}
-
 /// @throw InputError if the surface is below the table, where no tool can cut.
 HeightField above_table(const HeightField& field) {
   if (field.box.min().z() >= 0.0) return field;
@@ -74,14 +69,14 @@ CutPlan::CutPlan(const Lens& lens, const CamOptions& options, const Executor& ex
       executor_(executor),
       mould_lens_(mould_to_cut(lens, options)),
       model_(model_to_cut(lens, options)),
-      field_(above_table(inspect_height_field(mesh(), size_to_cut(lens, options)))),
+      field_(above_table(inspect_height_field(mesh(), size_to_cut(options, lens.setup)))),
       blank_(options_.workshop.stock.box(field_.box)),
       z_offset_(z_offset_of(options.z_zero, field_.box.max().z(), blank_.max().z())),
       decimals_(decimals_of(options_)),
       profile_(mesh()),
       stock_(whole_blank(options_.workshop, field_.box)),
       optical_(optical_surface(cut(), model_)),
-      balls_(optical_, options_, executor),
+      balls_(optical_, options_, ground(), executor),
       collisions_(profile_, options_.workshop, stock_),
       watch_(collisions_, options_.workshop.tools, z_offset_,
              highest_obstacle(options_.workshop, blank_)) {

@@ -87,8 +87,10 @@ class CutPlan {
     return {field_.box.min().head<2>(), field_.box.max().head<2>()};
   }
   [[nodiscard]] FinishGround ground() const { return {rectangle(), field_.steepest, z_offset_}; }
-  /// Distance of finishing rows as cut, mm.
-  [[nodiscard]] double pitch() const { return finish_rasters(options_, ground()).front().pitch; }
+  /// Stepover of finishing rows, mm.
+  [[nodiscard]] double pitch() const { return finish_pitch(options_, ground()); }
+  /// The finishing rows on the lens.
+  [[nodiscard]] Passes passes() const { return passes_on_lens(options_, ground()); }
   [[nodiscard]] int decimals() const { return decimals_; }
   /// Collisions in the programs read back so far.
   [[nodiscard]] const std::vector<Collision>& collisions() const {

@@ -83,10 +83,10 @@ ReportMap height_map(const LeakMap& map) {
 }  // namespace
 
 Prediction predict_part(const PartSurfaces& surfaces, const Lens& lens, const CamOptions& options,
-                        const Executor& executor, const RunControl& control) {
+                        const Passes& passes, const Executor& executor, const RunControl& control) {
   Prediction result;
   LeakageChain chain = surfaces.chain();
-  const Eigen::Vector2d spacings = sample_spacings(options, lens.setup);
+  const Eigen::Vector2d spacings = sample_spacings(options, lens.setup, passes);
   const GridWindow grid = sampled_grid(lens.setup.lens_size, spacings);
   PartLayers layers(
       {{part_layer::kPolished, chain.steps.front().field}, {part_layer::kPart, &surfaces.part()}},
@@ -99,7 +99,7 @@ Prediction predict_part(const PartSurfaces& surfaces, const Lens& lens, const Ca
   }
   for (NamedSurface& other : chain.others) {
     if (other.name != surface_name::kMilled) continue;
-    other.grid = lens_grid(lens.setup.lens_size, scallop_spacings(options, lens.setup));
+    other.grid = lens_grid(lens.setup.lens_size, scallop_spacings(options, lens.setup, passes));
   }
   CreaseMapper creases(grid, {});
   const auto keep = [&](const SurfaceField& field, const CellRange& tile,
@@ -233,11 +233,12 @@ Exchange exchange(const LeakageResult& predicted, const FluxPicture& before,
 
 TrialCut::TrialCut(const TrialSite& site, const CamOptions& changed, const Executor& executor)
     : site_(site), options_(changed), executor_(executor), balls_(&site.plan.balls()) {
-  if (!same_balls(changed, site.plan.options())) {
-    own_ = std::make_unique<const FinishBalls>(site.plan.optical(), changed, executor);
+  const FinishGround ground = site.plan.ground();
+  if (!same_balls(changed, site.plan.options(), ground)) {
+    own_ = std::make_unique<const FinishBalls>(site.plan.optical(), changed, ground, executor);
     balls_ = own_.get();
   }
-  passes_ = balls_->passes(changed, site.plan.ground());
+  passes_ = balls_->passes(changed, ground);
   for (FinishPass& pass : passes_) pass.plan.options.traces = false;
 }
 
@@ -310,9 +311,12 @@ void TrialCut::add_pencil(const Eigen::AlignedBox2d& box, const MoveSink& sink,
 LeakTrial TrialCut::at(const LeakPlace& place, const RunControl& control) const {
   const RunControl silent(control.stop_token(), {});
   const CamOptions& before = site_.plan.options();
+  const OpticalSetup& optics = site_.lens.setup;
   const GridWindow grid =
-      sampled_grid(site_.lens.setup.lens_size, sample_spacings(before, site_.lens.setup));
-  const CellGrid fine = refined(grid, place.cells, sample_spacings(options_, site_.lens.setup));
+      sampled_grid(optics.lens_size, sample_spacings(before, optics, site_.plan.passes()));
+  const CellGrid fine = refined(
+      grid, place.cells,
+      sample_spacings(options_, optics, passes_on_lens(options_, site_.plan.ground())));
   const std::optional<CastFrame> mould = site_.plan.mould();
   const double polished = PolishedField::kReach * options_.workshop.polish.sigma +
                           (1.0 + kCreaseHalo) * grid.spacing.maxCoeff();
@@ -325,10 +329,9 @@ LeakTrial TrialCut::at(const LeakPlace& place, const RunControl& control) const 
   std::optional<CastField> cast;
   if (mould) cast.emplace(milled, *mould);
   const SurfaceField& raw = cast ? static_cast<const SurfaceField&>(*cast) : milled;
-  const Eigen::Vector2d size = site_.lens.setup.lens_size;
-  const PolishedField part(raw, site_.designed, {Eigen::Vector2d(0.0, 0.0), size},
+  const PolishedField part(raw, site_.designed, {Eigen::Vector2d(0.0, 0.0), optics.lens_size},
                            options_.workshop.polish);
-  FieldRenderSetup setup{.optics = site_.lens.setup,
+  FieldRenderSetup setup{.optics = optics,
                          .grid = grid,
                          .surface_height = site_.lens.surface.vertices.row(2).mean()};
   const FluxPicture predicted = render_cells(site_.part, setup, place.cells, executor_, silent);
@@ -515,25 +518,10 @@ struct ToleranceSite {
   const FluxPicture& designed;  ///< Picture of the design.
 };
 
-/// The rows' layout on the lens: a mould is larger by its cast's shrinkage.
-Passes passes_of(const CamOptions& options, const CutPlan& plan) {
-  const FinishProcess& finish = options.workshop.process.finish;
-  const std::optional<CastFrame> mould = plan.mould();
-  const double scale = mould ? mould->scale : 1.0;
-  Passes passes;
-  passes.pitch = plan.pitch() / scale;
-  passes.ball_radius = finishing_ball(options).radius() / scale;
-  passes.axis = finish.along == PassAxis::kX ? 0 : 1;
-  passes.zigzag = finish.style == PassStyle::kZigzag;
-  passes.cross = finish.cross;
-  passes.cast = mould.has_value();
-  return passes;
-}
-
 /// Nominal values that a cut's programs assume.
 PartPlan part_plan(const CamOptions& options, const Lens& lens, const CutPlan& plan) {
   const Workshop& shop = options.workshop;
-  return {lens.setup, passes_of(options, plan), shop.polish,
+  return {lens.setup, plan.passes(), shop.polish,
           shop.polish.sigma * (1.0 + kSigmaBound * shop.tolerances.polish_sigma)};
 }
 
@@ -569,7 +557,7 @@ Prediction predict_cut(CutPlan& plan, const Lens& lens, const ProgramFiles& prog
   const PartSurfaces surfaces({meant ? meant->field() : cut->field(), *rounded, rectangle,
                                plan.blank().max().z(), plan.mould()},
                               plan.take_finish_paths(programs, control), options.workshop.polish);
-  Prediction prediction = predict_part(surfaces, lens, options, executor, control);
+  Prediction prediction = predict_part(surfaces, lens, options, plan.passes(), executor, control);
   if (options.remedies) {
     try_remedies({plan, lens, surfaces.designed(), surfaces.part(), prediction.leakage},
                  prediction.places, executor, control);

@@ -45,8 +45,9 @@ inline constexpr double kMeshSpacing = 0.1;
 
 /// Renders every surface from the design to the polished part and finds where light leaks. Memory
 /// does not grow with the number of samples. @throw Interrupted
+/// @param passes  on the lens.
 Prediction predict_part(const PartSurfaces& surfaces, const Lens& lens, const CamOptions& options,
-                        const Executor& executor, const RunControl& control);
+                        const Passes& passes, const Executor& executor, const RunControl& control);
 
 /// A predicted cut, for trying its places again.
 struct TrialSite {

@@ -69,7 +69,7 @@ class Predicted {
     surfaces_.emplace(PartSurfaces::Design{designed_, *rounded_, rectangle, plan_.blank().max().z(),
                                            plan_.mould()},
                       plan_.take_finish_paths(programs, control), options_.workshop.polish);
-    prediction_ = predict_part(*surfaces_, lens_, options_, executor_, control);
+    prediction_ = predict_part(*surfaces_, lens_, options_, plan_.passes(), executor_, control);
   }
 
   [[nodiscard]] TrialSite site() const {
@@ -126,7 +126,7 @@ TEST(TrialCut, OfAPartOfTheLensLeaksAsThatPartDoes) {
   const Predicted cut(grooved_lens(), options);
   const FieldRenderSetup setup{
       cut.site().lens.setup,
-      sampled_grid({3.0, 2.0}, sample_spacings(options, cut.site().lens.setup))};
+      sampled_grid({3.0, 2.0}, sample_spacings(options, cut.site().lens.setup, cut.site().plan.passes()))};
   LeakPlace place = cut.prediction().places[0];
   const auto coarser = std::llround(setup.grid.spacing.x() / setup.grid.spacing.y());
   place.cells = {120 / coarser, 70, 60 / coarser, 40};
