@@ -11,7 +11,6 @@
 #include "app/frame/command_run.h"
 #include "app/frame/common_output.h"
 #include "app/frame/console.h"
-#include "app/frame/interrupt.h"
 #include "app/frame/option_set.h"
 #include "cam/cam.h"
 #include "cam/job/job_files.h"
@@ -47,15 +46,40 @@ void add_cam_options(OptionSet& options, CamSettings& settings) {
   options.fields(cam_fields(), settings.cam);
 }
 
-void settle(OptionSet& options, CamSettings& settings) {
-  const std::string file = settings.workshop.empty() ? "workshop" : settings.workshop;
-  if (!settings.workshop.empty()) {
-    settings.cam.workshop = read_workshop(settings.workshop);
-    options.restate();
-  }
-  if (!settings.source.empty()) settings.cam.job = folder_name(settings.source);
+void take_workshop(OptionSet& options, const std::string& file, CamOptions& cam) {
+  if (file.empty()) return;
+  cam.workshop = read_workshop(file);
+  options.restate();
+}
+
+void check_workshop(const std::string& file, const CamOptions& cam) {
   // The file's own values were already checked: any error now comes from an option.
-  validate(settings.cam.workshop, file + " with the options given");
+  validate(cam.workshop, (file.empty() ? "workshop" : file) + " with the options given");
+}
+
+void settle(OptionSet& options, CamSettings& settings) {
+  take_workshop(options, settings.workshop, settings.cam);
+  if (!settings.source.empty()) settings.cam.job = folder_name(settings.source);
+  check_workshop(settings.workshop, settings.cam);
+}
+
+nlohmann::json job_json(const std::string& command, const OptionSet& options,
+                        const JobResult& result, const std::vector<std::string>& warnings) {
+  nlohmann::json json = {
+      {"command", command},        {"status", result.done() ? "done" : "interrupted"},
+      {"message", result.message}, {"warnings", warnings},
+      {"options", options.used()}, {"files", nlohmann::json::array()}};
+  for (const fs::path& file : result.files) json["files"].push_back(file.string());
+  return json;
+}
+
+int exit_code_of(const JobResult& result, int missed) {
+  if (!result.done()) return kInterrupted;
+  return missed == 0 ? kDone : kLimitMissed;
+}
+
+std::string z_text(double z_offset) {
+  return "  Z         program Z = lens z + " + fixed(z_offset, 4) + " mm\n";
 }
 
 namespace {
@@ -102,16 +126,11 @@ std::string summary_text(const fs::path& folder, const CamResult& result) {
     for (const LeakPlace& place : report.places) text += "  " + leak_words(place) + "\n";
     if (!report.tolerances.empty()) text += "  " + tolerance_words(report.tolerances) + "\n";
   }
-  return text + verdict_text(report.verdict) + "  Z         program Z = lens z + " +
-         fixed(report.z_offset, 4) + " mm\n";
+  return text + verdict_text(report.verdict) + z_text(report.z_offset);
 }
 
 nlohmann::json summary_json(const OptionSet& options, const CamResult& result) {
-  nlohmann::json json = {
-      {"command", "cam"},          {"status", result.done() ? "done" : "interrupted"},
-      {"message", result.message}, {"warnings", result.report.warnings},
-      {"options", options.used()}, {"files", nlohmann::json::array()}};
-  for (const fs::path& file : result.files) json["files"].push_back(file.string());
+  nlohmann::json json = job_json("cam", options, result, result.report.warnings);
   if (result.done()) json["report"] = report_json(result.report);
   return json;
 }
@@ -121,20 +140,13 @@ CamResult run(const OptionSet& options, const CamOptions& cam, const Lens& lens,
   const Executor executor = options.executor();
   const WorkEstimate estimate = estimate_cut(cam, lens.setup, executor.concurrency());
   require_room_for_cut(cam, lens.setup, estimate, out);
-  const InterruptWatch interrupt;
-  const OutputFolder folder(out, FolderLock::Kind::kExclusive);
-  folder.remove_partial_files(is_name_of_cut);
-  announce_work(estimate, console, "the cut takes");
-  const std::string few = decimals_warning(cam);
-  if (!few.empty()) console.note(few);
-  ProgressDisplay progress(options.common().quiet);
-  const RunControl control(interrupt.token(), progress.sink());
-  return make_cut(lens, cam, out, executor, control);
-}
-
-int exit_code(const CamResult& result) {
-  if (!result.done()) return kInterrupted;
-  return result.report.verdict.missed() == 0 ? kDone : kLimitMissed;
+  const FolderJob job{out, is_name_of_cut, estimate, "the cut takes"};
+  return run_in_folder(job, options, console,
+                       [&](const fs::path& folder, const RunControl& control) {
+                         const std::string few = decimals_warning(cam);
+                         if (!few.empty()) console.note(few);
+                         return make_cut(lens, cam, folder, executor, control);
+                       });
 }
 
 std::string choice_text(const ReportChoice& choice) {
@@ -149,13 +161,11 @@ int compare(const OptionSet& options, const CamSettings& settings, const CamOpti
   const Executor executor = options.executor();
   const WorkEstimate estimate =
       require_room_for_comparison(lens, cam, choices, settings.folder(), executor.concurrency());
-  const InterruptWatch interrupt;
-  const OutputFolder folder(settings.folder(), FolderLock::Kind::kExclusive);
-  folder.remove_partial_files(is_name_of_cut);
-  announce_work(estimate, console, "the comparison takes");
-  ProgressDisplay progress(options.common().quiet);
-  const RunControl control(interrupt.token(), progress.sink());
-  const CutComparison result = compare_cuts(lens, cam, choices, folder.path(), executor, control);
+  const FolderJob job{settings.folder(), is_name_of_cut, estimate, "the comparison takes"};
+  const CutComparison result =
+      run_in_folder(job, options, console, [&](const fs::path& folder, const RunControl& control) {
+        return compare_cuts(lens, cam, choices, folder, executor, control);
+      });
   nlohmann::json json = {{"command", "cam"},
                          {"status", result.complete ? "done" : "interrupted"},
                          {"options", options.used()},
@@ -212,7 +222,7 @@ int cam_command(const Arguments& command_line) {
   for (const std::string& warning : result.report.warnings) console.note("warning: " + warning);
   console.result(summary_json(options, result),
                  result.done() ? summary_text(settings.folder(), result) : result.message + "\n");
-  return exit_code(result);
+  return exit_code_of(result, result.report.verdict.missed());
 }
 
 }  // namespace lensforge::app

@@ -8,7 +8,6 @@
 #include "app/frame/command_run.h"
 #include "app/frame/common_output.h"
 #include "app/frame/console.h"
-#include "app/frame/interrupt.h"
 #include "app/frame/option_set.h"
 #include "cam/coupon/coupon_fit.h"
 #include "cam/coupon/coupon_job.h"
@@ -133,13 +132,11 @@ nlohmann::json coupon_json(const OptionSet& options, const CouponResult& result)
 int make(const OptionSet& options, const CouponSettings& settings) {
   const Console console(options.common().json, options.common().quiet);
   validate(settings.coupon);
-  const InterruptWatch interrupt;
-  const OutputFolder folder(settings.out, FolderLock::Kind::kExclusive);
-  folder.remove_partial_files(is_name_of_coupon);
-  ProgressDisplay progress(options.common().quiet);
-  const RunControl control(interrupt.token(), progress.sink());
   const CouponResult result =
-      make_coupon(settings.coupon, folder.path(), options.executor(), control);
+      run_in_folder({settings.out, is_name_of_coupon}, options, console,
+                    [&](const fs::path& folder, const RunControl& control) {
+                      return make_coupon(settings.coupon, folder, options.executor(), control);
+                    });
   for (const std::string& fault : result.faults) console.note("warning: " + fault);
   console.result(coupon_json(options, result),
                  result.done() ? coupon_text(settings, result) : "interrupted\n");

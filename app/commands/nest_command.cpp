@@ -14,7 +14,6 @@
 #include "app/frame/command_run.h"
 #include "app/frame/common_output.h"
 #include "app/frame/console.h"
-#include "app/frame/interrupt.h"
 #include "app/frame/option_set.h"
 #include "cam/cam.h"
 #include "cam/plan/cam_options.h"
@@ -79,17 +78,13 @@ void add_nest_options(OptionSet& options, NestSettings& settings) {
 }
 
 void settle(OptionSet& options, NestSettings& settings) {
-  const std::string file = settings.workshop.empty() ? "workshop" : settings.workshop;
-  if (!settings.workshop.empty()) {
-    settings.nest.cam.workshop = read_workshop(settings.workshop);
-    options.restate();
-  }
+  take_workshop(options, settings.workshop, settings.nest.cam);
   if (settings.sources.empty()) {
     throw InputError("DIR: is required; name the lens folders, such as nest bee disc");
   }
   if (!options.given(kBlank)) throw InputError("--blank: is required; such as --blank 300,200");
   settings.nest.cam.job = folder_name(settings.out);
-  validate(settings.nest.cam.workshop, file + " with the options given");
+  check_workshop(settings.workshop, settings.nest.cam);
 }
 
 std::vector<std::string> nest_names(const std::vector<std::string>& sources) {
@@ -171,17 +166,12 @@ std::string summary_text(const fs::path& folder, const NestResult& result) {
             fixed(program.minutes, 1) + " min\n";
   }
   return text + "  in all    " + fixed(result.minutes(), 1) + " min, " +
-         std::to_string(result.tool_changes) + " tools put in\n" +
-         "  Z         program Z = lens z + " + fixed(result.z_offset, 4) + " mm\n";
+         std::to_string(result.tool_changes) + " tools put in\n" + z_text(result.z_offset);
 }
 
 nlohmann::json summary_json(const OptionSet& options, const NestResult& result,
                             const Sources& sources) {
-  nlohmann::json json = {
-      {"command", "nest"},         {"status", result.done() ? "done" : "interrupted"},
-      {"message", result.message}, {"warnings", result.warnings},
-      {"options", options.used()}, {"files", nlohmann::json::array()}};
-  for (const fs::path& file : result.files) json["files"].push_back(file.string());
+  nlohmann::json json = job_json("nest", options, result, result.warnings);
   if (!result.done()) return json;
   json.update(nest_json(result, true));
   for (std::size_t k = 0; k < json["lenses"].size(); ++k) {
@@ -196,18 +186,11 @@ NestResult run(const OptionSet& options, const NestSettings& settings,
   const NestPlan plan = plan_nest(lenses, settings.nest);
   const WorkEstimate estimate = estimate_nest(plan, lenses, executor.concurrency());
   require_room_for_cut(plan.cuts.front(), lenses.front().lens->setup, estimate, settings.out);
-  const InterruptWatch interrupt;
-  const OutputFolder folder(settings.out, FolderLock::Kind::kExclusive);
-  folder.remove_partial_files(is_name_of_nest);
-  announce_work(estimate, console, "the cuts take");
-  ProgressDisplay progress(options.common().quiet);
-  const RunControl control(interrupt.token(), progress.sink());
-  return make_nest(lenses, settings.nest, folder.path(), executor, control);
-}
-
-int exit_code(const NestResult& result) {
-  if (!result.done()) return kInterrupted;
-  return result.missed() == 0 ? kDone : kLimitMissed;
+  const FolderJob job{settings.out, is_name_of_nest, estimate, "the cuts take"};
+  return run_in_folder(job, options, console,
+                       [&](const fs::path& folder, const RunControl& control) {
+                         return make_nest(lenses, settings.nest, folder, executor, control);
+                       });
 }
 
 /// Prints warnings that are in every lens's report, such as collisions on the common blank, only
@@ -244,7 +227,7 @@ int nest_command(const Arguments& command_line) {
   const NestResult result = run(options, settings, lenses, console);
   note_warnings(result, console);
   console.result(summary_json(options, result, sources), summary_text(settings.out, result));
-  return exit_code(result);
+  return exit_code_of(result, result.missed());
 }
 
 }  // namespace lensforge::app

@@ -86,11 +86,32 @@ class InterruptibleJob {
   InterruptWatch watch_;  ///< Last, so that it ends first.
 };
 
-/// Reports that a command was interrupted before it wrote anything. Returns the exit code.
-int report_interrupted(bool json) noexcept;
-
 /// Prints the approximate cost of a long job at once. @param what  the subject of the sentence.
 void announce_work(const WorkEstimate& needed, const Console& console,
                    const std::string& what = "this takes");
+
+/// A job that fills a folder of its own.
+struct FolderJob {
+  std::filesystem::path folder;
+  std::function<bool(const std::string& name)> ours;  ///< True for names that the job writes.
+  WorkEstimate estimate = {};                         ///< Announced if it is long.
+  std::string takes = {};                             ///< "the cut takes"
+};
+
+/// Runs `make(folder, control)` with progress on stderr, in a folder that no other command uses
+/// meanwhile; an interrupt asks it to stop. @throw InputError as OutputFolder.
+template <class Make>
+auto run_in_folder(const FolderJob& job, const OptionSet& options, const Console& console,
+                   const Make& make) {
+  const InterruptWatch interrupt;
+  const OutputFolder folder(job.folder, FolderLock::Kind::kExclusive);
+  folder.remove_partial_files(job.ours);
+  announce_work(job.estimate, console, job.takes);
+  ProgressDisplay progress(options.common().quiet);
+  return make(folder.path(), RunControl(interrupt.token(), progress.sink()));
+}
+
+/// Reports that a command was interrupted before it wrote anything. Returns the exit code.
+int report_interrupted(bool json) noexcept;
 
 }  // namespace lensforge::app

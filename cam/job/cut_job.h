@@ -57,9 +57,9 @@ struct WrittenJob {
   std::vector<std::unique_ptr<PlannedPart>> parts;
   std::unique_ptr<ProgramChecks> checks;  ///< Of the whole blank.
   std::unique_ptr<PendingPrograms> programs;
-  OtherPrograms others;              ///< Programs in the folder that the job did not write.
-  std::vector<ReportData> reports;   ///< One for each part.
-  std::vector<PendingFiles> files;   ///< The same: report and prediction.
+  OtherPrograms others;             ///< Programs in the folder that the job did not write.
+  std::vector<ReportData> reports;  ///< One for each part.
+  std::vector<PendingFiles> files;  ///< The same: report and prediction.
 
   [[nodiscard]] std::vector<std::filesystem::path> program_paths() const;
 };

@@ -30,7 +30,8 @@ double depth_in_table(const WrittenCut& cut) {
 
 double steep_moves(const WrittenCut& cut) {
   double moves = 0.0;
-  for (const SteepDescent& descent : cut.checks.descents()) moves += static_cast<double>(descent.moves);
+  for (const SteepDescent& descent : cut.checks.descents())
+    moves += static_cast<double>(descent.moves);
   return moves;
 }
 
@@ -81,7 +82,8 @@ std::vector<LimitCheck> safety_checks(const WrittenCut& cut) {
 /// The same in sentences; empty if nothing was found.
 std::vector<std::string> safety_warnings(const WrittenCut& cut) {
   std::vector<std::string> warnings;
-  for (const Collision& collision : cut.checks.collisions()) warnings.push_back(collision.sentence());
+  for (const Collision& collision : cut.checks.collisions())
+    warnings.push_back(collision.sentence());
   for (const SteepDescent& descent : cut.checks.descents()) {
     warnings.push_back(descent.sentence(cut.programs.names[descent.first.program]));
   }
@@ -130,8 +132,8 @@ namespace {
 constexpr double kMicrometres = 1e3;
 constexpr double kSecondsPerMinute = 60.0;
 
-/// Share by which a pitch may differ from the one that a lens was designed for: the variance of what
-/// rows average, p²/12, then changes by 2 %.
+/// Share by which a pitch may differ from the one that a lens was designed for: the variance of
+/// what rows average, p²/12, then changes by 2 %.
 constexpr double kSamePitch = 0.01;
 
 /// Of a material's refractive index: makers state acrylic as 1.49 to 1.492, and an error of 0.005
@@ -216,8 +218,8 @@ SetupSheet setup_sheet(const WrittenCut& cut) {
   const Eigen::Vector2d& corner = cut.corner;
   sheet.zero = {-corner.x(), -corner.y(), -setup.z_offset};
   const char* const part = is_mirror(designed) ? "mirror" : "lens";
-  sheet.zero_words = joined({"lower left corner of the ", cut.shared ? "blank" : part,
-                             ", ", words_for(options.z_zero)});
+  sheet.zero_words = joined(
+      {"lower left corner of the ", cut.shared ? "blank" : part, ", ", words_for(options.z_zero)});
   sheet.up_words = up_words(options.part, designed);
   sheet.length_words = length_words_of(options.post, cut.programs);
   if (lens && designed.setup.front) {
@@ -322,7 +324,8 @@ ParameterGroup outline_parameters(const CutSetup& setup) {
 }
 
 std::string sampling_words(const CutSetup& setup) {
-  const Eigen::Vector2d spacings = sample_spacings(setup.options, setup.lens->setup, setup.passes());
+  const Eigen::Vector2d spacings =
+      sample_spacings(setup.options, setup.lens->setup, setup.passes());
   if (spacings.x() == spacings.y()) return mm(spacings.x(), 4);
   return mm(spacings.minCoeff(), 4) + " across the passes, " + mm(spacings.maxCoeff(), 4) +
          " along";
@@ -398,7 +401,8 @@ ReportMap fillet_share_map(const CreaseMap& creases) {
 /// and for a mould or a mirror, through whose material no light passes.
 double index_error(const CutSetup& setup) {
   const double stated = setup.options.workshop.material.ior;
-  if (!(stated > 0.0) || setup.options.part == PartKind::kMould || is_mirror(*setup.lens)) return 0.0;
+  if (!(stated > 0.0) || setup.options.part == PartKind::kMould || is_mirror(*setup.lens))
+    return 0.0;
   return std::abs(stated - setup.lens->setup.ior);
 }
 
@@ -438,8 +442,7 @@ std::string process_warning(const CutSetup& setup) {
   };
   const FinishProcess& finish = shop.process.finish;
   // A cast is smaller than its mould, and is polished after casting.
-  const double scale =
-      setup.options.part == PartKind::kMould ? 1.0 - setup.options.shrinkage : 1.0;
+  const double scale = setup.options.part == PartKind::kMould ? 1.0 - setup.options.shrinkage : 1.0;
   const double radius = finishing_ball(setup.options).radius();
   const double pitch = scale * max_pitch(finish, radius, setup.field.steepest);
   const double sigma = shop.polish.sigma;
@@ -487,9 +490,8 @@ std::vector<std::string> warnings_of(const WrittenCut& cut) {
   if (!unroughed.empty()) warnings.push_back(unroughed);
   const std::vector<std::string> safety = safety_warnings(cut);
   warnings.insert(warnings.end(), safety.begin(), safety.end());
-  for (const std::string& sentence :
-       {index_warning(setup), margin_warning(setup), process_warning(setup),
-        decimals_warning(setup.options)}) {
+  for (const std::string& sentence : {index_warning(setup), margin_warning(setup),
+                                      process_warning(setup), decimals_warning(setup.options)}) {
     if (!sentence.empty()) warnings.push_back(sentence);
   }
   const Eigen::Vector3d travel = setup.options.workshop.machine.travel;
@@ -509,8 +511,8 @@ std::vector<std::string> warnings_of(const WrittenCut& cut) {
   if (!spindle.empty()) warnings.push_back(spindle);
   if (total.starved > 0) {
     warnings.push_back(
-        "the controller will wait for lines " + std::to_string(total.starved) +
-        " times at " + decimal_text(setup.options.workshop.machine.lines_per_second, 0) +
+        "the controller will wait for lines " + std::to_string(total.starved) + " times at " +
+        decimal_text(setup.options.workshop.machine.lines_per_second, 0) +
         " lines/s: the cut then takes " +
         decimal_text(total.stream_limited_seconds / kSecondsPerMinute, 0) + " minutes");
   }

@@ -18,8 +18,8 @@ struct WrittenCut {
   const CutSetup& setup;
   const CutPasses& passes;
   const CutRecord& record;
-  const ProgramChecks& checks;   ///< Of the whole blank.
-  const ProgramFiles& programs;  ///< With this part's operations alone.
+  const ProgramChecks& checks;                       ///< Of the whole blank.
+  const ProgramFiles& programs;                      ///< With this part's operations alone.
   Eigen::Vector2d corner = Eigen::Vector2d::Zero();  ///< The part's place in the programs, mm.
   bool shared = false;                               ///< The blank holds other parts, too.
 };

@@ -51,8 +51,7 @@ void require_no_lens_folder(const std::vector<NestLens>& lenses, const fs::path&
     const fs::path own = folder / lens.name;
     if (!fs::exists(own / lens_file::kJson)) continue;
     throw InputError("--out " + folder.string() + ": the reports of " + lens.name +
-                     " would come into the lens folder " + own.string() +
-                     "; name another folder");
+                     " would come into the lens folder " + own.string() + "; name another folder");
   }
 }
 
@@ -80,9 +79,9 @@ std::string outline_advice(const std::vector<NestLens>& lenses, const NestOption
   if (first == layout.lenses.end()) return "";
   const auto part = static_cast<std::size_t>(first - layout.lenses.begin());
   const double least = std::ceil(1e3 * least_thickness(lenses, options)) / 1e3;
-  const std::string thinner = joined({"--blank ", trimmed_decimal(layout.blank.x(), 3), ",",
-                                      trimmed_decimal(layout.blank.y(), 3), ",",
-                                      trimmed_decimal(least, 3)});
+  const std::string thinner =
+      joined({"--blank ", trimmed_decimal(layout.blank.x(), 3), ",",
+              trimmed_decimal(layout.blank.y(), 3), ",", trimmed_decimal(least, 3)});
   return outline_tool_advice(written.parts[part]->setup, *written.checks, layout.blank.z(),
                              {thinner, least});
 }

@@ -73,8 +73,7 @@ CutSetup cut_setup(const Lens& lens, const CamOptions& options) {
   setup.model = model_to_cut(lens, options);
   setup.field = above_table(inspect_height_field(setup.mesh(), size_to_cut(options, lens.setup)));
   setup.blank = options.workshop.stock.box(setup.field.box);
-  setup.z_offset =
-      z_offset_of(options.z_zero, setup.field.box.max().z(), setup.blank.max().z());
+  setup.z_offset = z_offset_of(options.z_zero, setup.field.box.max().z(), setup.blank.max().z());
   setup.optical = optical_surface(setup.mould_lens ? *setup.mould_lens : lens, setup.model);
   return setup;
 }
@@ -87,8 +86,7 @@ std::optional<CastFrame> CutSetup::mould() const {
 }
 
 double CutSetup::safe_z() const {
-  return to_resolution(safe_height_of(options.workshop, blank) + z_offset,
-                       resolution_of(options)) -
+  return to_resolution(safe_height_of(options.workshop, blank) + z_offset, resolution_of(options)) -
          z_offset;
 }
 
@@ -106,8 +104,8 @@ OutlineCut CutSetup::outline_cut() const {
 CutPasses cut_passes(const CutSetup& setup, const Executor& executor) {
   CutPasses passes;
   passes.profile = std::make_shared<const ProfileCutter>(setup.mesh());
-  passes.balls = std::make_shared<const FinishBalls>(setup.optical, setup.options, setup.ground(),
-                                                     executor);
+  passes.balls =
+      std::make_shared<const FinishBalls>(setup.optical, setup.options, setup.ground(), executor);
   passes.finish = passes.balls->passes(setup.options, setup.ground());
   if (setup.cuts_outline())
     require_outline_cut(edge_of(setup.lens->setup), setup.outline_cut(), setup.blank);
@@ -129,8 +127,7 @@ namespace {
 OperationSummary run_pencil(const CutSetup& setup, const CutPasses& passes, double resolution,
                             const MoveSink& sink, const RunControl& control) {
   const Tool& ball = finishing_ball(setup.options);
-  PencilOptions pencil =
-      pencil_options(setup.options, setup.z_offset, setup.field.box.max().z());
+  PencilOptions pencil = pencil_options(setup.options, setup.z_offset, setup.field.box.max().z());
   pencil.resolution = resolution;
   return cut_pencil(passes.balls->surface(), find_valleys(setup.mesh(), ball.radius(), pencil),
                     pencil, {"pencil", ball, setup.safe_z(), {}, {}}, sink, control);
@@ -145,9 +142,7 @@ struct Operations {
   const RunControl& control;
 
   [[nodiscard]] const Process& process() const { return setup.options.workshop.process; }
-  [[nodiscard]] const Tool& tool(int number) const {
-    return setup.options.workshop.tool(number);
-  }
+  [[nodiscard]] const Tool& tool(int number) const { return setup.options.workshop.tool(number); }
 
   /// A sink that sketches the operation and passes its moves to `sink`.
   [[nodiscard]] MoveSink sketched(const std::string& operation, const MoveSink& sink) const {

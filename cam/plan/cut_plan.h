@@ -30,11 +30,11 @@ namespace lensforge {
 struct CutSetup {
   const Lens* lens = nullptr;
   CamOptions options;
-  std::shared_ptr<const Lens> mould_lens;  ///< Null if the lens itself is cut.
+  std::shared_ptr<const Lens> mould_lens;      ///< Null if the lens itself is cut.
   SurfaceModel model = SurfaceModel::kSmooth;  ///< Under which the surface is cut.
   HeightField field;                           ///< Size and steepness of the surface to cut.
   Eigen::AlignedBox3d blank;
-  double z_offset = 0.0;                         ///< Program Z − lens-frame z, mm.
+  double z_offset = 0.0;                          ///< Program Z − lens-frame z, mm.
   std::shared_ptr<const OpticalSurface> optical;  ///< The surface behind mesh().
 
   /// The surface to cut: the lens's or the mould's; mm, in a lens frame of its own.

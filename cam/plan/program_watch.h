@@ -103,9 +103,7 @@ class ProgramChecks {
     return collisions_.collisions();
   }
   /// Descents that are too steep for their feed.
-  [[nodiscard]] const std::vector<SteepDescent>& descents() const {
-    return collisions_.descents();
-  }
+  [[nodiscard]] const std::vector<SteepDescent>& descents() const { return collisions_.descents(); }
   /// Other faults.
   [[nodiscard]] const ProgramWatch& watch() const { return watch_; }
 

@@ -113,9 +113,9 @@ CutSurfaces::CutSurfaces(const CutSetup& setup, const CutPasses& passes, FinishP
   if (setup.mould()) lens_ = meant_surface(optical_surface(lens, setup.model));
   const SurfaceField& meant = lens_ ? lens_->field() : cut_->field();
   const Eigen::AlignedBox2d rectangle(Eigen::Vector2d(0.0, 0.0), lens.setup.lens_size);
-  surfaces_.emplace(PartSurfaces::Design{meant, *rounded_, rectangle, setup.blank.max().z(),
-                                         setup.mould()},
-                    std::move(paths), setup.options.workshop.polish);
+  surfaces_.emplace(
+      PartSurfaces::Design{meant, *rounded_, rectangle, setup.blank.max().z(), setup.mould()},
+      std::move(paths), setup.options.workshop.polish);
 }
 
 LeakageChain PartSurfaces::chain() const {

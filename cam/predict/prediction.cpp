@@ -314,9 +314,9 @@ LeakTrial TrialCut::at(const LeakPlace& place, const RunControl& control) const 
   const OpticalSetup& optics = site_.setup.lens->setup;
   const GridWindow grid =
       sampled_grid(optics.lens_size, sample_spacings(before, optics, site_.setup.passes()));
-  const CellGrid fine = refined(
-      grid, place.cells,
-      sample_spacings(options_, optics, passes_on_lens(options_, site_.setup.ground())));
+  const CellGrid fine =
+      refined(grid, place.cells,
+              sample_spacings(options_, optics, passes_on_lens(options_, site_.setup.ground())));
   const std::optional<CastFrame> mould = site_.setup.mould();
   const double polished = PolishedField::kReach * options_.workshop.polish.sigma +
                           (1.0 + kCreaseHalo) * grid.spacing.maxCoeff();

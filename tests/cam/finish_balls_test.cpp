@@ -66,7 +66,8 @@ struct Shop {
   FinishBalls balls;
 
   explicit Shop(int large_tool, int every = 1)
-      : options(options_with(large_tool, every)), balls(surface, options, ground(), Executor::cpu(2)) {}
+      : options(options_with(large_tool, every)),
+        balls(surface, options, ground(), Executor::cpu(2)) {}
 
   [[nodiscard]] std::vector<PathMove> moves_of(const FinishPass& pass) const {
     std::vector<PathMove> moves;
@@ -287,9 +288,9 @@ TEST(FinishBalls, ABallAsLargeAsTheLensIsRefused) {
 
 TEST(FinishBalls, FacetsAreRefusedForALargerBall) {
   const auto facets = valley_surface(SurfaceModel::kFacet);
-  EXPECT_THAT(
-      message_of<InputError>([&] { FinishBalls(facets, options_with(4), ground(), Executor::serial()); }),
-      AllOf(HasSubstr("finish.large_tool 4"), HasSubstr("--surface smooth")));
+  EXPECT_THAT(message_of<InputError>(
+                  [&] { FinishBalls(facets, options_with(4), ground(), Executor::serial()); }),
+              AllOf(HasSubstr("finish.large_tool 4"), HasSubstr("--surface smooth")));
 }
 
 }  // namespace

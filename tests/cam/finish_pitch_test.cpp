@@ -96,9 +96,10 @@ std::vector<std::string> warnings_of(Lens lens, CamOptions options, double desig
 }
 
 TEST(FinishPitch, OnSlopesOtherThanDesignedForIsWarnedOf) {
-  EXPECT_THAT(warnings_of(wedge(), finishing(kScallop), kOnPlane),
-              ElementsAre("the lens was designed for a pitch of 0.0564 mm and a polish of σ 0.02 mm, "
-                          "not 0.0505 and 0.02 mm: cut it with --pitch 0.0564mm"));
+  EXPECT_THAT(
+      warnings_of(wedge(), finishing(kScallop), kOnPlane),
+      ElementsAre("the lens was designed for a pitch of 0.0564 mm and a polish of σ 0.02 mm, "
+                  "not 0.0505 and 0.02 mm: cut it with --pitch 0.0564mm"));
   CamOptions as_designed = finishing(0.0);
   as_designed.workshop.process.finish.set_pitch(0.0564);
   EXPECT_THAT(warnings_of(wedge(), as_designed, kOnPlane), IsEmpty());

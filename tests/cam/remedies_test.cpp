@@ -120,7 +120,8 @@ TEST(TrialCut, OfAPartOfTheLensLeaksAsThatPartDoes) {
   const Predicted cut(grooved_lens(), options);
   const FieldRenderSetup setup{
       cut.site().setup.lens->setup,
-      sampled_grid({3.0, 2.0}, sample_spacings(options, cut.site().setup.lens->setup, cut.site().setup.passes()))};
+      sampled_grid({3.0, 2.0}, sample_spacings(options, cut.site().setup.lens->setup,
+                                               cut.site().setup.passes()))};
   LeakPlace place = cut.prediction().places[0];
   const auto coarser = std::llround(setup.grid.spacing.x() / setup.grid.spacing.y());
   place.cells = {120 / coarser, 70, 60 / coarser, 40};
