@@ -30,8 +30,9 @@ double depth_in_table(const WrittenCut& cut) {
 
 double steep_moves(const WrittenCut& cut) {
   double moves = 0.0;
-  for (const SteepDescent& descent : cut.checks.descents())
+  for (const SteepDescent& descent : cut.checks.descents()) {
     moves += static_cast<double>(descent.moves);
+  }
   return moves;
 }
 
@@ -82,8 +83,9 @@ std::vector<LimitCheck> safety_checks(const WrittenCut& cut) {
 /// The same in sentences; empty if nothing was found.
 std::vector<std::string> safety_warnings(const WrittenCut& cut) {
   std::vector<std::string> warnings;
-  for (const Collision& collision : cut.checks.collisions())
+  for (const Collision& collision : cut.checks.collisions()) {
     warnings.push_back(collision.sentence());
+  }
   for (const SteepDescent& descent : cut.checks.descents()) {
     warnings.push_back(descent.sentence(cut.programs.names[descent.first.program]));
   }
@@ -401,8 +403,8 @@ ReportMap fillet_share_map(const CreaseMap& creases) {
 /// and for a mould or a mirror, through whose material no light passes.
 double index_error(const CutSetup& setup) {
   const double stated = setup.options.workshop.material.ior;
-  if (!(stated > 0.0) || setup.options.part == PartKind::kMould || is_mirror(*setup.lens))
-    return 0.0;
+  const bool transmits = setup.options.part == PartKind::kLens && !is_mirror(*setup.lens);
+  if (!(stated > 0.0) || !transmits) return 0.0;
   return std::abs(stated - setup.lens->setup.ior);
 }
 
@@ -448,11 +450,11 @@ std::string process_warning(const CutSetup& setup) {
   const double sigma = shop.polish.sigma;
   const double meant_pitch = number("pitch_mm", pitch);
   const double meant_sigma = number("polish_sigma_mm", sigma);
-  const bool closer = std::abs(meant_pitch - pitch) > kSamePitch * meant_pitch;
-  if (!closer && meant_sigma == sigma) return "";
+  const bool other_pitch = std::abs(meant_pitch - pitch) > kSamePitch * meant_pitch;
+  if (!other_pitch && meant_sigma == sigma) return "";
   // A design for a scallop does not know its slopes: designed again, it would assume the same.
   const std::string advice =
-      closer && finish.scallop > 0.0
+      other_pitch && finish.scallop > 0.0
           ? "cut it with --pitch " + trimmed_decimal(meant_pitch / scale, 4) + "mm"
           : "cut it as it was designed, or design it for this workshop (--made-by)";
   return joined({"the lens was designed for a pitch of ", trimmed_decimal(meant_pitch, 4),
