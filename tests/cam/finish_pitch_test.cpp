@@ -25,9 +25,10 @@ constexpr double kScallop = 0.002;
 /// A ball of 0.4 mm leaves that scallop on a plane.
 const double kOnPlane = 2.0 * std::sqrt(kScallop * (0.4 - kScallop));
 
-/// A lens that rises across the rows.
+/// A lens that rises across the rows, and the picture where its light lands.
 Lens wedge() {
   Lens lens = testing::small_lens();
+  lens.setup.image_origin = {0.0, 1.5};
   lens.surface =
       testing::grid_mesh(21, 17, 3.0, 2.0, [](double, double y) { return 6.0 + kSlope * y; });
   return lens;
@@ -52,7 +53,7 @@ std::string parameter(const ReportData& report, const std::string& name) {
   return "";
 }
 
-TEST(FinishPitch, OfAScallopIsTheSameInProgramsReportAndSamples) {
+TEST(FinishPitch, IsTheSameInProgramsReportAndSamples) {
   const TempFolder folder;
   const ReportData report = testing::run_cut(wedge(), finishing(kScallop), folder).report;
   const double cut = report.operations.at(0).summary.stepover;
@@ -63,7 +64,7 @@ TEST(FinishPitch, OfAScallopIsTheSameInProgramsReportAndSamples) {
 }
 
 /// Two balls blend on the rows that the programs have.
-TEST(FinishPitch, OfAScallopTellsBallsApartBySlope) {
+TEST(FinishPitch, OfAScallopMakesTheBallsOfAnEqualStatedOne) {
   CamOptions one = finishing(kScallop);
   one.workshop.process.finish.large_tool = 4;
   CamOptions other = one;
@@ -75,8 +76,8 @@ TEST(FinishPitch, OfAScallopTellsBallsApartBySlope) {
   EXPECT_FALSE(same_balls(one, other, level));
 }
 
-/// Before the surface is known, an estimate takes a level one of the lens's size.
-TEST(FinishPitch, IsFittedToALevelSurfaceBeforeItsSlopesAreKnown) {
+/// For estimates.
+TEST(FinishPitch, OfAnUnknownSurfaceIsThatOfALevelOneOfTheLensesSize) {
   const CamOptions options = finishing(kScallop);
   const double planned = finish_pitch(options, unknown_ground(options, wedge().setup));
   EXPECT_NEAR(planned, 2.0 / std::ceil(2.0 / kOnPlane), 1e-12);
@@ -95,7 +96,7 @@ std::vector<std::string> warnings_of(Lens lens, CamOptions options, double desig
   return warnings;
 }
 
-TEST(FinishPitch, OnSlopesOtherThanDesignedForIsWarnedOf) {
+TEST(FinishPitch, OtherThanDesignedForIsWarnedOf) {
   EXPECT_THAT(
       warnings_of(wedge(), finishing(kScallop), kOnPlane),
       ElementsAre("the lens was designed for a pitch of 0.0564 mm and a polish of σ 0.02 mm, "
