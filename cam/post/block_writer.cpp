@@ -8,7 +8,7 @@
 
 #include "cam/post/post_description.h"
 #include "core/error.h"
-#include "core/io/descriptor.h"
+#include "core/io/files.h"
 #include "machine/gcode/program_seal.h"
 #include "machine/planner/planner_model.h"
 
