@@ -9,21 +9,16 @@
 #include <vector>
 
 #include "core/error.h"
-#include "core/image/spectral_color.h"
+#include "core/image/color.h"
 #include "core/io/checkpoint_file.h"
-#include "core/optics/light_colors.h"
-#include "core/surface/control_net.h"
-#include "core/surface/lens_surface.h"
-#include "core/surface/spline_file.h"
+#include "core/lens/surface_check.h"
+#include "core/optics/optical_setup.h"
+#include "core/spline/control_net.h"
 #include "design/render.h"
 #include "design/render/source_picture.h"
-#include "design/schedule/alternation.h"
 #include "design/schedule/checkpoint.h"
-#include "design/schedule/design_log.h"
-#include "design/schedule/design_task.h"
-#include "design/schedule/level_plan.h"
-#include "design/schedule/spline_start.h"
-#include "design/schedule/transport_step.h"
+#include "design/schedule/levels.h"
+#include "design/schedule/rounds.h"
 #include "design/spline/made_surface.h"
 
 namespace lensforge {

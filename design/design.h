@@ -8,12 +8,10 @@
 #include <vector>
 
 #include "core/compute/executor.h"
-#include "core/compute/run_control.h"
 #include "core/compute/work_estimate.h"
 #include "core/image/image.h"
 #include "core/image/image_io.h"
-#include "core/image/metrics.h"
-#include "core/surface/lens.h"
+#include "core/lens/lens.h"
 #include "design/render.h"
 #include "design/render/source_picture.h"
 #include "design/schedule/convergence.h"

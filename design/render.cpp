@@ -12,11 +12,10 @@
 #include <vector>
 
 #include "core/error.h"
-#include "core/optics/light_colors.h"
+#include "core/mesh/surface_mesh.h"
 #include "core/optics/light_path.h"
-#include "core/surface/mesh_cut.h"
-#include "core/surface/mesh_normals.h"
-#include "core/surface/outline_index.h"
+#include "core/optics/optical_setup.h"
+#include "core/optics/outline.h"
 #include "core/text/number_text.h"
 #include "design/render/render_flux.h"
 #include "design/render/source_picture.h"

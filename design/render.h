@@ -8,11 +8,10 @@
 #include "core/compute/executor.h"
 #include "core/compute/work_estimate.h"
 #include "core/image/image.h"
-#include "core/image/metrics.h"
+#include "core/lens/lens.h"
+#include "core/lens/optical_surface.h"
+#include "core/mesh/surface_mesh.h"
 #include "core/optics/optical_setup.h"
-#include "core/surface/lens.h"
-#include "core/surface/surface_mesh.h"
-#include "core/surface/surface_model.h"
 
 /// Renders what a lens or a surface projects, and compares it with the picture that it was made
 /// for.

@@ -4,7 +4,7 @@
 #include <stdexcept>
 
 #include "core/image/image_io.h"
-#include "core/surface/mesh_io.h"
+#include "core/mesh/mesh_files.h"
 #include "design/design.h"
 #include "export/files/closed_solid.h"
 #include "export/files/mesh_formats.h"

@@ -25,9 +25,8 @@
 
 #include "app/frame/command_line.h"
 #include "core/error.h"
-#include "core/io/descriptor.h"
 #include "core/io/files.h"
-#include "core/io/folder_lock.h"
+#include "core/io/lens_folder.h"
 #include "core/text/version.h"
 
 namespace lensforge::app {

@@ -16,7 +16,7 @@
 #include "app/frame/option_set.h"
 #include "core/error.h"
 #include "core/io/files.h"
-#include "core/io/output_guard.h"
+#include "core/io/lens_folder.h"
 
 namespace lensforge::app {
 namespace {

@@ -21,15 +21,15 @@
 #include "core/error.h"
 #include "core/image/image_io.h"
 #include "core/io/files.h"
-#include "core/surface/lens.h"
-#include "core/surface/lit_surface.h"
-#include "core/surface/mesh_io.h"
-#include "core/surface/setup_json.h"
+#include "core/lens/lens.h"
+#include "core/lens/setup_json.h"
+#include "core/mesh/mesh_files.h"
+#include "core/optics/light_path.h"
 #include "core/text/printable.h"
 #include "export/files/mesh_formats.h"
 #include "export/solid/iges_file.h"
 #include "export/solid/step_file.h"
-#include "machine/gcode/program_seal.h"
+#include "machine/gcode.h"
 
 namespace lensforge::app {
 namespace {

@@ -15,10 +15,9 @@
 #include "app/frame/interrupt.h"
 #include "app/frame/option_set.h"
 #include "core/error.h"
-#include "core/surface/mesh_io.h"
+#include "core/mesh/mesh_files.h"
 #include "core/text/number_text.h"
-#include "design/reflect/reflect_checkpoint.h"
-#include "design/reflect/reflect_job.h"
+#include "design/reflect.h"
 #include "export/solid/solid_reading.h"
 
 namespace lensforge::app {

@@ -20,8 +20,7 @@
 #include "app/frame/terminal_keys.h"
 #include "core/error.h"
 #include "core/text/printable.h"
-#include "machine/job/send_job.h"
-#include "machine/link/port.h"
+#include "machine/send.h"
 
 namespace lensforge::app {
 

@@ -11,7 +11,7 @@
 #include "app/view/view_page.h"
 #include "core/error.h"
 #include "core/io/files.h"
-#include "core/io/output_guard.h"
+#include "core/io/lens_folder.h"
 #include "core/text/lower_case.h"
 #include "core/text/printable.h"
 

@@ -13,9 +13,8 @@
 #include "app/frame/interrupt.h"
 #include "app/frame/option_set.h"
 #include "core/compute/executor.h"
-#include "core/compute/run_control.h"
 #include "core/compute/work_estimate.h"
-#include "core/io/folder_lock.h"
+#include "core/io/lens_folder.h"
 #include "core/text/lower_case.h"
 
 /// Tools of a command: file types by extension, the output folder, and a job that an interrupt

@@ -5,8 +5,8 @@
 #include <optional>
 #include <string>
 
-#include "core/image/metrics.h"
-#include "core/surface/lens.h"
+#include "core/image/image.h"
+#include "core/lens/lens.h"
 #include "design/render.h"
 
 /// Texts and JSON that several commands print.

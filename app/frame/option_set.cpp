@@ -15,7 +15,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/compute/gpu.h"
+#include "core/compute/executor.h"
 #include "core/error.h"
 #include "core/io/files.h"
 #include "core/text/number_text.h"

@@ -24,7 +24,7 @@
 #include "cam/report/report_json.h"
 #include "core/error.h"
 #include "core/image/image_io.h"
-#include "core/io/folder_lock.h"
+#include "core/io/lens_folder.h"
 #include "design/design.h"
 #include "design/render.h"
 #include "design/setup/option_tables.h"

@@ -26,13 +26,11 @@
 #include <vector>
 
 #include "core/error.h"
-#include "core/image/error_image.h"
+#include "core/image/image.h"
 #include "core/image/image_io.h"
-#include "core/image/metrics.h"
-#include "core/page/decade_plot.h"
+#include "core/page/drawings.h"
 #include "core/page/html_page.h"
-#include "core/page/html_text.h"
-#include "core/surface/control_net.h"
+#include "core/spline/control_net.h"
 #include "core/text/version.h"
 #include "design/render.h"
 #include "design/schedule/checkpoint.h"

@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "cam/contact/ball_cutter.h"
-#include "core/compute/float_bounds.h"
+#include "core/compute/scalar.h"
 #include "core/error.h"
 
 namespace lensforge {

@@ -9,7 +9,7 @@
 #include <limits>
 #include <numbers>
 
-#include "core/compute/float_bounds.h"
+#include "core/compute/scalar.h"
 
 namespace lensforge {
 namespace {

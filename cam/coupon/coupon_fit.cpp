@@ -16,7 +16,7 @@
 #include "cam/coupon/coupon_readings.h"
 #include "core/error.h"
 #include "core/io/files.h"
-#include "core/io/output_guard.h"
+#include "core/io/lens_folder.h"
 #include "core/text/number_text.h"
 #include "core/text/printable.h"
 #include "core/text/toml_fields.h"

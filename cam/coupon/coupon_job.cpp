@@ -15,7 +15,6 @@
 #include "cam/post/program_writer.h"
 #include "core/error.h"
 #include "core/io/files.h"
-#include "core/io/pending_files.h"
 #include "core/text/number_text.h"
 #include "core/text/toml_fields.h"
 

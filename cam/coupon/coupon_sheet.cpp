@@ -6,7 +6,7 @@
 #include <string_view>
 #include <utility>
 
-#include "core/page/html_text.h"
+#include "core/page/html_page.h"
 #include "core/text/number_text.h"
 #include "core/text/version.h"
 #include "coupon_page.h"

@@ -12,7 +12,7 @@
 #include "cam/path/outline_cut.h"
 #include "cam/path/rough.h"
 #include "core/error.h"
-#include "core/page/html_text.h"
+#include "core/page/html_page.h"
 #include "core/text/number_text.h"
 #include "core/text/version.h"
 

@@ -9,7 +9,6 @@
 
 #include "cam/milled/surface_field.h"
 #include "core/compute/executor.h"
-#include "core/compute/run_control.h"
 #include "core/image/image.h"
 #include "core/optics/optical_setup.h"
 #include "design/flux/flux_image.h"

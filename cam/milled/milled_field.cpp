@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "cam/milled/ball_sweep.h"
-#include "core/compute/float_bounds.h"
+#include "core/compute/scalar.h"
 #include "core/error.h"
 
 namespace lensforge {

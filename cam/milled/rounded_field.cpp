@@ -10,7 +10,7 @@
 #include <optional>
 
 #include "cam/milled/ball_sweep.h"
-#include "core/surface/mesh_normals.h"
+#include "core/mesh/surface_mesh.h"
 
 namespace lensforge {
 namespace {

@@ -12,7 +12,7 @@
 #include "cam/plan/finishing.h"
 #include "cam/post/program_writer.h"
 #include "core/error.h"
-#include "core/surface/surface_model.h"
+#include "core/lens/optical_surface.h"
 #include "core/text/number_text.h"
 #include "core/text/option_field.h"
 #include "core/text/toml_fields.h"

@@ -14,8 +14,8 @@
 #include "cam/post/program_writer.h"
 #include "cam/report/verdict.h"
 #include "cam/workshop/workshop.h"
+#include "core/lens/optical_surface.h"
 #include "core/optics/optical_setup.h"
-#include "core/surface/surface_model.h"
 
 namespace lensforge {
 

@@ -11,9 +11,8 @@
 #include <vector>
 
 #include "cam/post/post_description.h"
-#include "core/compute/split_mix.h"
+#include "core/compute/scalar.h"
 #include "core/io/files.h"
-#include "core/io/sha256.h"
 #include "machine/gcode/gcode_motion.h"
 
 namespace lensforge {

@@ -7,8 +7,8 @@
 #include <cstddef>
 
 #include "cam/report/sections.h"
-#include "core/image/error_image.h"
-#include "core/page/html_text.h"
+#include "core/image/image.h"
+#include "core/page/html_page.h"
 #include "core/text/number_text.h"
 
 namespace lensforge {

@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "cam/report/report_maps.h"
-#include "core/optics/front_surface.h"
-#include "core/page/html_text.h"
-#include "core/page/light_drawing.h"
+#include "core/optics/front.h"
+#include "core/page/drawings.h"
+#include "core/page/html_page.h"
 #include "core/text/number_text.h"
 
 namespace lensforge::report_section {

@@ -16,7 +16,7 @@
 #include "cam/tolerance/part_light.h"
 #include "cam/tolerance/polish_filter.h"
 #include "cam/workshop/workshop.h"
-#include "core/surface/corners.h"
+#include "core/mesh/surface_mesh.h"
 #include "design/flux/flux_image.h"
 #include "design/flux/flux_triangle.h"
 

@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "core/compute/executor.h"
 
+#include <Eigen/Core>
+#include <algorithm>
+#include <chrono>
 #include <tbb/blocked_range.h>
 #include <tbb/info.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
-
-#include <Eigen/Core>
-#include <algorithm>
-#include <chrono>
 #include <utility>
 
 #include "core/error.h"

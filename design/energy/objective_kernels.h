@@ -7,8 +7,8 @@
 #include <limits>
 
 #include "core/compute/host_device.h"
+#include "core/compute/scalar.h"
 #include "core/image/transfer.h"
-#include "core/value_slope.h"
 #include "design/energy/objective_view.h"
 #include "design/energy/picture_terms.h"
 #include "design/energy/smoothness.h"

@@ -7,8 +7,8 @@
 #include <variant>
 
 #include "core/image/image.h"
+#include "core/lens/optical_surface.h"
 #include "core/optics/optical_setup.h"
-#include "core/surface/surface_model.h"
 #include "design/spline/made_by.h"
 
 namespace lensforge {

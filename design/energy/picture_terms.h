@@ -7,7 +7,6 @@
 #include <span>
 #include <vector>
 
-#include "core/compute/clamped.h"
 #include "core/compute/executor.h"
 #include "core/compute/host_device.h"
 #include "design/energy/objective_options.h"

@@ -9,9 +9,9 @@
 
 #include "core/compute/executor.h"
 #include "core/compute/host_device.h"
-#include "core/surface/corners.h"
-#include "core/surface/mesh_topology.h"
-#include "core/value_slope.h"
+#include "core/compute/scalar.h"
+#include "core/mesh/mesh_topology.h"
+#include "core/mesh/surface_mesh.h"
 #include "design/energy/objective_view.h"
 
 namespace lensforge {

@@ -9,8 +9,8 @@
 #include <variant>
 #include <vector>
 
-#include "core/surface/control_net.h"
-#include "core/surface/surface_mesh.h"
+#include "core/mesh/surface_mesh.h"
+#include "core/spline/control_net.h"
 #include "design/energy/objective.h"
 #include "design/flux/columns.h"
 #include "design/spline/made_surface.h"

@@ -5,7 +5,7 @@
 #include <cstdint>
 
 #include "core/compute/host_device.h"
-#include "core/surface/corners.h"
+#include "core/mesh/surface_mesh.h"
 
 namespace lensforge {
 

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/optics/source_points.h"
+#include "core/optics/light_source.h"
 
 namespace lensforge {
 

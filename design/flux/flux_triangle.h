@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstdint>
 
-#include "core/compute/clamped.h"
 #include "core/compute/host_device.h"
 
 namespace lensforge {

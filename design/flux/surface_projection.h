@@ -10,9 +10,9 @@
 
 #include "core/compute/executor.h"
 #include "core/compute/host_device.h"
+#include "core/mesh/surface_mesh.h"
 #include "core/optics/light_path.h"
-#include "core/surface/corners.h"
-#include "core/surface/outline_index.h"
+#include "core/optics/outline.h"
 #include "design/flux/columns.h"
 #include "design/flux/flux_triangle.h"
 

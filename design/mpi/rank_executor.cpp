@@ -2,6 +2,7 @@
 #include "design/mpi/rank_executor.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "core/error.h"
 
@@ -311,6 +312,150 @@ void fill_halo(const RankExecutor& executor, std::span<double> vertices) {
   };
   ranks.shift<double>(1, part(own.end - halo, own.end), part(0, own.begin));
   ranks.shift<double>(-1, part(own.begin, own.begin + halo), part(own.end, all));
+}
+
+namespace {
+
+int length_of(const ItemRange& range) { return static_cast<int>(range.count()); }
+
+std::size_t size_of(const ItemRange& range, int length) {
+  return static_cast<std::size_t>(range.count()) * static_cast<std::size_t>(length);
+}
+
+}  // namespace
+
+RankTransforms::RankTransforms(const GridShape& grid, const Ranks& ranks, const Executor& threads)
+    : grid_(grid),
+      ranks_(ranks),
+      threads_(threads),
+      along_rows_(grid.columns, length_of(rows())),
+      along_columns_(grid.rows, length_of(columns())) {
+  for (int r = 0; r < ranks.count(); ++r) {
+    by_row_owner_.push_back(static_cast<int>(rows_of(r).count() * columns().count()));
+    by_column_owner_.push_back(static_cast<int>(rows().count() * columns_of(r).count()));
+  }
+  const std::size_t most = std::max(size_of(rows(), grid.columns), size_of(columns(), grid.rows));
+  for (std::vector<double>& plane : planes_) plane.resize(most);
+  packed_.resize(most);
+}
+
+void RankTransforms::forward() {
+  transform(along_rows_);
+  for (std::vector<double>& plane : planes_) to_columns(plane);
+  transform(along_columns_);
+}
+
+void RankTransforms::backward() {
+  for (std::vector<double>& plane : planes_) to_rows(plane);
+  forward();
+  for (std::vector<double>& plane : planes_) to_rows(plane);
+}
+
+void RankTransforms::transform(const CosineRows& lines) {
+  parallel_for(
+      threads_, "cosine transform", 3,
+      [&](std::int64_t k) { lines.run(plane(static_cast<int>(k))); }, 1);
+}
+
+/// On the way a block holds, column by column, what one rank has of the rows and another takes of
+/// the columns.
+void RankTransforms::to_columns(std::vector<double>& plane) {
+  double* block = packed_.data();
+  for (std::int64_t c = 0; c < grid_.columns; ++c) {
+    const double* value = plane.data() + c;
+    for (std::int64_t r = 0; r < rows().count(); ++r, value += grid_.columns) *block++ = *value;
+  }
+  const std::size_t out = size_of(rows(), grid_.columns);
+  const std::size_t in = size_of(columns(), grid_.rows);
+  ranks_.exchange({packed_.data(), out}, by_column_owner_, {plane.data(), in}, by_row_owner_);
+  std::copy(plane.begin(), plane.begin() + static_cast<std::ptrdiff_t>(in), packed_.begin());
+  const double* from = packed_.data();
+  for (int rank = 0; rank < ranks_.count(); ++rank) {
+    const ItemRange rows = rows_of(rank);
+    for (std::int64_t c = 0; c < columns().count(); ++c, from += rows.count()) {
+      std::copy(from, from + rows.count(), plane.data() + c * grid_.rows + rows.begin);
+    }
+  }
+}
+
+void RankTransforms::to_rows(std::vector<double>& plane) {
+  double* to = packed_.data();
+  for (int rank = 0; rank < ranks_.count(); ++rank) {
+    const ItemRange rows = rows_of(rank);
+    for (std::int64_t c = 0; c < columns().count(); ++c) {
+      const double* column = plane.data() + c * grid_.rows;
+      to = std::copy(column + rows.begin, column + rows.end, to);
+    }
+  }
+  const std::size_t out = size_of(columns(), grid_.rows);
+  const std::size_t in = size_of(rows(), grid_.columns);
+  ranks_.exchange({packed_.data(), out}, by_row_owner_, {plane.data(), in}, by_column_owner_);
+  std::copy(plane.begin(), plane.begin() + static_cast<std::ptrdiff_t>(in), packed_.begin());
+  const double* block = packed_.data();
+  for (std::int64_t c = 0; c < grid_.columns; ++c) {
+    double* value = plane.data() + c;
+    for (std::int64_t r = 0; r < rows().count(); ++r, value += grid_.columns) *value = *block++;
+  }
+}
+
+RankPreconditioner::RankPreconditioner(const GridShape& grid, double aspect,
+                                       std::span<const double> movable, const Ranks& ranks,
+                                       const Executor& threads)
+    : grid_(grid),
+      threads_(threads),
+      movable_(movable.begin(), movable.end()),
+      reach_(movable.size(), 1.0),
+      eigen_x_(CosineTransform::eigenvalues(grid.columns, 1.0)),
+      eigen_y_(CosineTransform::eigenvalues(grid.rows, aspect)),
+      transforms_(grid, ranks, threads) {}
+
+void RankPreconditioner::set_reach(std::span<const double> reach) {
+  reach_.assign(reach.begin(), reach.end());
+}
+
+void RankPreconditioner::set_movable(std::span<const double> movable) {
+  movable_.assign(movable.begin(), movable.end());
+}
+
+void RankPreconditioner::apply(std::span<const double> g, double exponent, std::span<double> r) {
+  const auto vertices = static_cast<std::int64_t>(reach_.size() / 3);
+  const PreconditionerView rows = view_of_rows(exponent);
+  parallel_for(threads_, "enter planes", vertices, EnterPlanes{rows, g.data()});
+  transforms_.forward();
+  const double inverse = 1.0 / (4.0 * (grid_.columns - 1.0) * (grid_.rows - 1.0));
+  const double scale_xy = std::pow(xy.scale, exponent) * inverse;
+  const double scale_z = std::pow(z.scale, exponent) * inverse;
+  parallel_for(threads_, "scale coefficients", transforms_.columns().count() * grid_.rows,
+               ScaleCoefficient{view_of_columns(exponent), {scale_xy, scale_xy, scale_z}});
+  transforms_.backward();
+  parallel_for(threads_, "leave planes", vertices, LeavePlanes{rows, r.data()});
+}
+
+PreconditionerView RankPreconditioner::view_of_rows(double exponent) {
+  return {grid_.columns,
+          grid_.rows,
+          movable_.data(),
+          reach_.data(),
+          eigen_x_.data(),
+          eigen_y_.data(),
+          {xy, xy, z},
+          exponent,
+          {transforms_.plane(0), transforms_.plane(1), transforms_.plane(2)},
+          transforms_.rows().begin};
+}
+
+/// The planes transposed: rows and columns change their parts.
+PreconditionerView RankPreconditioner::view_of_columns(double exponent) {
+  return {grid_.rows,
+          grid_.columns,
+          nullptr,
+          nullptr,
+          eigen_y_.data(),
+          eigen_x_.data(),
+          {xy, xy, z},
+          exponent,
+          {transforms_.plane(0), transforms_.plane(1), transforms_.plane(2)},
+          transforms_.columns().begin};
 }
 
 }  // namespace lensforge

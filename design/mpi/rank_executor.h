@@ -13,22 +13,23 @@
 #include <vector>
 
 #include "core/compute/executor.h"
+#include "core/mesh/surface_mesh.h"
 #include "core/optics/light_path.h"
-#include "core/surface/mesh_cut.h"
-#include "core/surface/surface_mesh.h"
+#include "core/optics/outline.h"
 #include "design/energy/objective_kernels.h"
 #include "design/energy/picture_terms.h"
 #include "design/energy/rays.h"
 #include "design/energy/smoothness.h"
 #include "design/flux/flux_image.h"
-#include "design/mpi/block_share.h"
 #include "design/mpi/ranks.h"
-#include "design/mpi/row_slabs.h"
+#include "design/optimize/cosine_transform.h"
+#include "design/optimize/grid_preconditioner.h"
 #include "design/optimize/lbfgs.h"
 
 /// An executor of one rank of several. Kernels run on all that the rank holds, its halo too. Sums
 /// count what it owns, and are taken over all ranks in the order in which one process takes them:
 /// all ranks see the bits that it would, and take the decisions that it would.
+
 namespace lensforge {
 
 /// What the items of a sum are.
@@ -276,5 +277,80 @@ std::vector<std::int32_t> lead_to_unlit_pixels(const RankExecutor& executor,
 
 /// Fills the halo of 3 numbers per vertex that the rank holds with what its neighbours own.
 void fill_halo(const RankExecutor& executor, std::span<double> vertices);
+
+/// GridTransforms over ranks: the cosine transform of three planes whose rows are shared out. Each
+/// rank transforms its rows; then the planes are transposed between the ranks, and each transforms
+/// the columns that it has now. FFTW takes rows and columns in that order, too: the coefficients
+/// have the bits of CosineTransform's. A transform and its inverse take four transpositions; with
+/// the inverse's columns first two would do, and its last bits be others.
+class RankTransforms {
+ public:
+  /// @pre at least 2 columns and rows.
+  RankTransforms(const GridShape& grid, const Ranks& ranks, const Executor& threads);
+
+  /// Values of coordinate k: those of the rank's rows, row by row, or between forward() and
+  /// backward() the coefficients of its columns, column by column, from the top.
+  [[nodiscard]] double* plane(int k) { return planes_[static_cast<std::size_t>(k)].data(); }
+
+  [[nodiscard]] ItemRange rows() const { return rows_of(ranks_.rank()); }
+  [[nodiscard]] ItemRange columns() const { return columns_of(ranks_.rank()); }
+
+  /// Rows of values → columns of coefficients. Collective, as is the way back.
+  void forward();
+  /// Coefficients → (inverse scale)⁻¹ × values.
+  void backward();
+
+ private:
+  [[nodiscard]] ItemRange rows_of(int rank) const {
+    return even_share(grid_.rows, ranks_.count(), rank);
+  }
+  [[nodiscard]] ItemRange columns_of(int rank) const {
+    return even_share(grid_.columns, ranks_.count(), rank);
+  }
+  void transform(const CosineRows& lines);
+  void to_columns(std::vector<double>& plane);
+  void to_rows(std::vector<double>& plane);
+
+  GridShape grid_;
+  Ranks ranks_;
+  Executor threads_;
+  CosineRows along_rows_;
+  CosineRows along_columns_;
+  std::vector<int> by_row_owner_;     ///< Values that a rank shares with each other one: of its own
+  std::vector<int> by_column_owner_;  ///< columns the others' rows, of its own rows their columns.
+  std::array<std::vector<double>, 3> planes_;
+  std::vector<double> packed_;
+};
+
+/// GridPreconditioner over ranks. Vectors hold the vertices that the rank owns. apply() is
+/// collective.
+class RankPreconditioner {
+ public:
+  /// @param aspect   cell height ÷ cell width of the grid.
+  /// @param movable  3 per vertex, 1 or 0.
+  RankPreconditioner(const GridShape& grid, double aspect, std::span<const double> movable,
+                     const Ranks& ranks, const Executor& threads);
+
+  GridSymbol xy;
+  GridSymbol z;
+
+  void set_reach(std::span<const double> reach);
+  void set_movable(std::span<const double> movable);
+
+  /// r ← P^exponent g.
+  void apply(std::span<const double> g, double exponent, std::span<double> r);
+
+ private:
+  [[nodiscard]] PreconditionerView view_of_rows(double exponent);
+  [[nodiscard]] PreconditionerView view_of_columns(double exponent);
+
+  GridShape grid_;
+  Executor threads_;
+  std::vector<double> movable_;
+  std::vector<double> reach_;
+  std::vector<double> eigen_x_;
+  std::vector<double> eigen_y_;
+  RankTransforms transforms_;
+};
 
 }  // namespace lensforge

@@ -17,4 +17,10 @@ int ranks_here();
 /// @return what `first` returns, on the other ranks 0.
 int run_on_ranks(const std::function<int()>& first);
 
+/// Does the parts of rank 0's stages until dismiss_ranks(). @pre not rank 0.
+void serve_rank();
+
+/// Lets the others' serve_rank() end. @pre rank 0; no stage on ranks lives.
+void dismiss_ranks();
+
 }  // namespace lensforge

@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <Eigen/Core>
 #include <cstdint>
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "core/compute/executor.h"
-#include "core/compute/run_control.h"
-#include "core/surface/surface_mesh.h"
-#include "design/reflect/light/evaluate.h"
-#include "design/reflect/radar/radar_comparison.h"
-#include "design/reflect/reflect_input.h"
-#include "design/reflect/reflect_options.h"
+#include "core/mesh/surface_mesh.h"
+#include "design/reflect/input.h"
+#include "design/reflect/light/light_field.h"
+#include "design/reflect/radar.h"
 
 namespace lensforge::reflect {
 
@@ -63,5 +63,30 @@ ReflectResult reflect_shape(const ReflectInput& input, const ReflectOptions& opt
 
 /// The energies of a shape under the light of the options. @throw Interrupted
 Energies evaluate(const SurfaceMesh& mesh, const ReflectOptions& options, const Executor& executor);
+
+/// Everything that the rest of a run depends on, taken between two updates.
+struct ReflectCheckpoint {
+  std::uint64_t fingerprint = 0;  ///< Of mesh and options, see reflect_fingerprint().
+  int stage = 0;                  ///< That the last update belongs to, from 0.
+  int first = 0;                  ///< Updates before this stage.
+  std::vector<int> split;         ///< Edges that were cut, ascending; before that empty.
+  Energies before;                ///< Of the mesh as it came.
+  std::vector<ReflectUpdate> updates;
+  double seconds = 0.0;       ///< Spent so far.
+  Eigen::Matrix3Xd vertices;  ///< In the unit frame, 3 × V.
+  Eigen::Matrix3Xd unmet;     ///< UnmetTurns::sum(), 3 × F.
+};
+
+/// A number that differs for other meshes and for other options that change the shape.
+std::uint64_t reflect_fingerprint(const ReflectInput& input, const ReflectOptions& options);
+
+/// Writes a checkpoint, whole or not at all. @throw RunError if it cannot be written.
+void write_checkpoint(const ReflectCheckpoint& checkpoint, const std::filesystem::path& path);
+
+/// Reads a checkpoint back, to the bit. @param fingerprint  of its run, where that is known.
+/// @throw InputError if the file is missing, truncated, corrupt, of another version or of another
+///        mesh or options than `fingerprint`.
+ReflectCheckpoint read_checkpoint(const std::filesystem::path& path,
+                                  std::optional<std::uint64_t> fingerprint = {});
 
 }  // namespace lensforge::reflect

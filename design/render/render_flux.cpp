@@ -11,10 +11,10 @@
 #include <vector>
 
 #include "core/error.h"
-#include "core/optics/source_points.h"
-#include "core/surface/lit_surface.h"
-#include "core/surface/mesh_cut.h"
-#include "core/surface/mesh_normals.h"
+#include "core/mesh/surface_mesh.h"
+#include "core/optics/light_path.h"
+#include "core/optics/light_source.h"
+#include "core/optics/outline.h"
 #include "design/flux/flux_image.h"
 #include "design/flux/surface_projection.h"
 #include "design/render.h"

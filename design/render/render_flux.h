@@ -6,12 +6,11 @@
 #include <vector>
 
 #include "core/compute/executor.h"
+#include "core/lens/optical_surface.h"
+#include "core/mesh/surface_mesh.h"
+#include "core/optics/light_path.h"
 #include "core/optics/optical_setup.h"
-#include "core/surface/control_net.h"
-#include "core/surface/lit_surface.h"
-#include "core/surface/mesh_normals.h"
-#include "core/surface/surface_mesh.h"
-#include "core/surface/surface_model.h"
+#include "core/spline/control_net.h"
 #include "design/flux/flux_image.h"
 #include "design/flux/flux_triangle.h"
 #include "design/flux/surface_projection.h"

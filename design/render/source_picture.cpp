@@ -9,10 +9,10 @@
 #include <utility>
 #include <vector>
 
-#include "core/image/metrics.h"
+#include "core/image/image.h"
 #include "core/image/transfer.h"
-#include "core/optics/light_colors.h"
-#include "core/optics/source_points.h"
+#include "core/optics/light_source.h"
+#include "core/optics/optical_setup.h"
 #include "design/flux/flux_image.h"
 #include "design/optimize/lbfgs.h"
 #include "design/render.h"

@@ -8,7 +8,7 @@
 
 #include "core/compute/executor.h"
 #include "core/image/image.h"
-#include "core/image/metrics.h"
+#include "core/lens/lens.h"
 #include "core/optics/optical_setup.h"
 
 namespace lensforge {

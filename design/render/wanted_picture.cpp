@@ -3,8 +3,8 @@
 
 #include <cmath>
 
-#include "core/image/image_sample.h"
-#include "core/optics/source_points.h"
+#include "core/image/image.h"
+#include "core/optics/light_source.h"
 #include "design/flux/surface_projection.h"
 #include "design/render.h"
 

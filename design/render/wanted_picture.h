@@ -5,9 +5,9 @@
 
 #include "core/compute/executor.h"
 #include "core/image/image.h"
+#include "core/mesh/surface_mesh.h"
 #include "core/optics/light_path.h"
 #include "core/optics/optical_setup.h"
-#include "core/surface/surface_mesh.h"
 
 namespace lensforge {
 

@@ -8,9 +8,9 @@
 #include <string>
 
 #include "core/image/image.h"
-#include "core/optics/height_spline.h"
+#include "core/lens/optical_surface.h"
+#include "core/optics/front.h"
 #include "core/optics/optical_setup.h"
-#include "core/surface/surface_model.h"
 #include "design/energy/objective_options.h"
 #include "design/spline/made_by.h"
 

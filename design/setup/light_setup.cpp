@@ -11,15 +11,15 @@
 #include <system_error>
 #include <vector>
 
+#include "core/compute/scalar.h"
 #include "core/error.h"
-#include "core/image/height_grid.h"
 #include "core/image/image_io.h"
-#include "core/optics/front_placement.h"
+#include "core/image/rasters.h"
+#include "core/optics/front.h"
 #include "core/optics/light_path.h"
-#include "core/optics/source_points.h"
+#include "core/optics/light_source.h"
 #include "core/text/number_list.h"
 #include "core/text/number_text.h"
-#include "core/value_slope.h"
 #include "design/setup/design_options.h"
 #include "design/setup/outline_setup.h"
 

@@ -5,7 +5,7 @@
 #include <memory>
 #include <string>
 
-#include "core/compute/run_control.h"
+#include "core/compute/executor.h"
 #include "core/image/image.h"
 #include "core/optics/optical_setup.h"
 #include "design/setup/design_options.h"

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "core/image/image_io.h"
-#include "core/optics/dispersion.h"
+#include "core/optics/optical_setup.h"
 #include "core/text/number_list.h"
 #include "core/text/number_text.h"
 #include "core/text/units.h"

@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "core/compute/run_control.h"
-#include "core/image/background.h"
+#include "core/compute/executor.h"
 #include "core/image/image.h"
+#include "core/image/image_io.h"
 #include "core/optics/outline.h"
 #include "design/setup/design_options.h"
 

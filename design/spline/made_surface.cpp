@@ -9,7 +9,7 @@
 #include <functional>
 #include <utility>
 
-#include "core/surface/cubic_spline.h"
+#include "core/spline/cubic_spline.h"
 
 namespace lensforge {
 namespace {

@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "core/compute/executor.h"
-#include "core/surface/control_net.h"
-#include "core/surface/optical_surface.h"
-#include "core/surface/sampled_surface.h"
+#include "core/lens/optical_surface.h"
+#include "core/mesh/surface_mesh.h"
+#include "core/spline/control_net.h"
 #include "design/flux/columns.h"
 #include "design/spline/made_by.h"
 #include "design/spline/spline_nodes.h"

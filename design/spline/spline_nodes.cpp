@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstddef>
 
-#include "core/surface/cubic_spline.h"
+#include "core/spline/cubic_spline.h"
 
 namespace lensforge {
 namespace {

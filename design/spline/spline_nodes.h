@@ -11,7 +11,7 @@
 
 #include "core/compute/executor.h"
 #include "core/compute/host_device.h"
-#include "core/surface/surface_mesh.h"
+#include "core/mesh/surface_mesh.h"
 #include "design/flux/columns.h"
 #include "design/spline/made_by.h"
 

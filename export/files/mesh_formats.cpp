@@ -24,7 +24,7 @@
 
 #include "core/error.h"
 #include "core/io/files.h"
-#include "core/surface/mesh_normals.h"
+#include "core/mesh/surface_mesh.h"
 #include "core/text/json_fields.h"
 #include "core/text/json_text.h"
 #include "core/text/printable.h"

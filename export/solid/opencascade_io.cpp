@@ -28,7 +28,6 @@
 #include "core/compute/work_estimate.h"
 #include "core/error.h"
 #include "core/io/files.h"
-#include "core/sandbox/byte_record.h"
 #include "core/sandbox/child_work.h"
 
 namespace lensforge {

@@ -9,7 +9,7 @@
 #include <optional>
 #include <string>
 
-#include "core/compute/run_control.h"
+#include "core/compute/executor.h"
 #include "export/solid/step_file.h"
 
 /// Reading and writing of solids in any format. OpenCASCADE crashes on some broken files and never

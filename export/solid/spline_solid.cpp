@@ -44,7 +44,7 @@
 #include <vector>
 
 #include "core/error.h"
-#include "core/optics/front_surface.h"
+#include "core/optics/front.h"
 #include "export/spline/net_outline.h"
 
 namespace lensforge {

@@ -12,9 +12,7 @@
 #include <vector>
 
 #include "core/error.h"
-#include "core/io/descriptor.h"
 #include "core/io/files.h"
-#include "core/io/sha256.h"
 
 namespace lensforge {
 namespace {

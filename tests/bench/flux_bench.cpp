@@ -10,7 +10,7 @@
 
 #include "bench/lens_scene.h"
 #include "core/compute/executor.h"
-#include "core/optics/front_placement.h"
+#include "core/optics/front.h"
 #include "core/optics/light_path.h"
 #include "design/energy/objective.h"
 #include "design/flux/flux_image.h"

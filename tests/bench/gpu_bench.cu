@@ -16,7 +16,7 @@
 #include "bench/gpu_transport.h"
 #include "bench/lens_scene.h"
 #include "core/compute/cuda/cuda_executor.h"
-#include "core/compute/gpu.h"
+#include "core/compute/executor.h"
 #include "design/design.h"
 #include "design/energy/objective_cuda.h"
 #include "design/schedule/guided_optimization.h"
@@ -101,7 +101,7 @@ struct KernelBytes {
   }
 };
 
-/// By the sizes of what objective_view.h and grid_preconditioner.h list: a frame has 72 bytes, a
+/// By the sizes of what objective_view.h and grid_preconditioner_on.h list: a frame has 72 bytes, a
 /// map 24, corner derivatives 72, connectivity 12 a face or neighbour table.
 const std::map<std::string, KernelBytes>& least_bytes() {
   static const std::map<std::string, KernelBytes> bytes{

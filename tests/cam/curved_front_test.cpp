@@ -10,7 +10,7 @@
 #include "cam/cam_meshes.h"
 #include "cam/small_cuts.h"
 #include "core/error.h"
-#include "core/optics/front_placement.h"
+#include "core/optics/front.h"
 #include "core/optics/height_fronts.h"
 #include "core/temp_folder.h"
 #include "core/text/number_text.h"

@@ -7,7 +7,7 @@
 #include "core/optics/optical_setup.h"
 #include "design/flux/flux_triangle.h"
 #include "design/objective_setups.h"
-#include "design/schedule/guided_stage.h"
+#include "design/schedule/guided_optimization.h"
 
 /// The CPU's results, for comparison with other executors. Compiled separately: nvcc, which
 /// compiles the tests on a GPU, rounds the CPU's part in other places than the C++ compiler does.

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "core/compute/cuda/launch.cuh"
-#include "core/compute/gpu.h"
+#include "core/compute/executor.h"
 #include "design/design.h"
 #include "design/executor_parity.h"
 #include "design/render/render_flux.h"

@@ -12,7 +12,7 @@
 #include <thread>
 #include <vector>
 
-#include "core/surface/spline_file.h"
+#include "core/lens/surface_check.h"
 #include "core/temp_folder.h"
 #include "design/design.h"
 #include "design/render.h"

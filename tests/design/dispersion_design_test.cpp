@@ -8,10 +8,10 @@
 #include <tuple>
 #include <vector>
 
-#include "core/image/spectral_color.h"
+#include "core/image/color.h"
 #include "core/image/transfer.h"
-#include "core/optics/front_placement.h"
-#include "core/optics/light_colors.h"
+#include "core/optics/front.h"
+#include "core/optics/optical_setup.h"
 #include "design/design.h"
 #include "design/finite_difference.h"
 #include "design/objective_setups.h"

@@ -19,7 +19,7 @@
 #include "design/flux/flux_image.h"
 #include "design/objective_setups.h"
 #include "design/random_triangles.h"
-#include "design/schedule/guided_stage.h"
+#include "design/schedule/guided_optimization.h"
 
 /// Compares another executor's results with the CPU's. One suite for the emulated GPU, which runs
 /// in every build, and for a real one, where there is one.

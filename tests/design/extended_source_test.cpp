@@ -6,8 +6,8 @@
 #include <numbers>
 #include <vector>
 
-#include "core/image/metrics.h"
-#include "core/optics/source_points.h"
+#include "core/image/image.h"
+#include "core/optics/light_source.h"
 #include "design/design.h"
 #include "design/finite_difference.h"
 #include "design/objective_setups.h"

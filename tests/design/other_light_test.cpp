@@ -13,20 +13,17 @@
 #include <variant>
 #include <vector>
 
-#include "core/optics/front_placement.h"
+#include "core/optics/front.h"
 #include "core/optics/height_fronts.h"
 #include "core/optics/light_path.h"
 #include "design/energy/objective.h"
 #include "design/finite_difference.h"
 #include "design/objective_setups.h"
 #include "design/render.h"
-#include "design/schedule/crease_alignment.h"
 #include "design/schedule/face_transport.h"
 #include "design/schedule/guided_optimization.h"
-#include "design/schedule/reach.h"
-#include "design/schedule/start_surface.h"
 #include "design/snell.h"
-#include "design/transport/vertex_spread.h"
+#include "design/transport/mesh_fit.h"
 
 namespace lensforge {
 namespace {

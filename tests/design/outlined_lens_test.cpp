@@ -13,9 +13,8 @@
 
 #include "core/error.h"
 #include "core/image/transfer.h"
-#include "core/surface/corners.h"
-#include "core/surface/mesh_cut.h"
-#include "core/surface/mesh_normals.h"
+#include "core/mesh/surface_mesh.h"
+#include "core/optics/outline.h"
 #include "core/surface/sample_splines.h"
 #include "core/temp_folder.h"
 #include "design/design.h"
@@ -24,7 +23,7 @@
 #include "design/objective_setups.h"
 #include "design/ray_tracer.h"
 #include "design/render.h"
-#include "design/schedule/spline_start.h"
+#include "design/schedule/levels.h"
 #include "design/setup/outline_setup.h"
 
 /// Lenses that are no rectangle.

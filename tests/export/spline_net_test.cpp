@@ -5,8 +5,8 @@
 
 #include <random>
 
-#include "core/surface/cubic_spline.h"
-#include "core/surface/grid_warp.h"
+#include "core/lens/slope_fit.h"
+#include "core/spline/cubic_spline.h"
 #include "design/design.h"
 #include "design/render.h"
 #include "design/render/wanted_picture.h"

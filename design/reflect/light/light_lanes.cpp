@@ -3,8 +3,6 @@
 
 #include <array>
 
-#include "design/reflect/light/phong.h"
-
 /// Compiled for wider vector units, too; the running processor picks. No sum depends on the width.
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
 #define LF_WIDE_LANES __attribute__((target_clones("avx2", "default")))
@@ -13,6 +11,7 @@
 #endif
 
 // The loops take bare arrays, which the compiler knows to be apart.
+
 namespace lensforge::reflect {
 namespace {
 

@@ -3,12 +3,89 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <numbers>
+#include <span>
 #include <vector>
 
 #include "core/compute/executor.h"
-#include "design/reflect/light/light_paths.h"
+#include "core/mesh/surface_mesh.h"
+#include "design/reflect/light/light_field.h"
+#include "design/reflect/light/light_lanes.h"
+#include "design/reflect/mesh/faces.h"
 
 namespace lensforge::reflect {
+
+/// Light that reaches a face by way of another one.
+struct PathHit {
+  Eigen::Vector3f w;  ///< From the face towards the other one.
+  std::int32_t face;  ///< The other one.
+};
+
+/// Directions per half sphere along which light from other faces is gathered: on a right-angled
+/// dihedral their mean differs from the closed form by less than 0.1 %.
+inline constexpr int kGatherDirections = 128;
+
+/// All that depends on where faces stand and not on how their normals are turned: which face is lit
+/// and seen in which direction, and which other faces it sees. Cached, so that energies and
+/// gradients of one shape are sums without noise.
+///
+/// Visibility is asked at one point of the face per direction; the points of all directions cover
+/// the face evenly (the R2 sequence, Roberts 2018).
+class LightPaths {
+ public:
+  static constexpr std::uint8_t kLit = 1;
+  static constexpr std::uint8_t kSeen = 2;
+
+  /// @param gather  directions per half sphere for light by way of another face; 0: direct only.
+  /// @throw Interrupted
+  LightPaths(const SurfaceMesh& mesh, const Goal& goal, DirectionSet directions, int gather,
+             const Executor& executor);
+
+  [[nodiscard]] const Faces& faces() const { return faces_; }
+  [[nodiscard]] const DirectionSet& directions() const { return directions_; }
+  [[nodiscard]] Eigen::Vector3d light(Eigen::Index d) const { return directions_.light.col(d); }
+  [[nodiscard]] bool has_place() const { return to_place_.cols() > 0; }
+  /// Where the sensor stands as seen from the face.
+  [[nodiscard]] Eigen::Vector3d sensor(Eigen::Index face, Eigen::Index d) const {
+    return has_place() ? Eigen::Vector3d(to_place_.col(face)) : light(d);
+  }
+  /// Directions towards the light, padded().
+  [[nodiscard]] const LaneVectors<double>& light_lanes() const { return light_lanes_; }
+  /// Of a face one byte for every direction, padded(): kLit and kSeen.
+  [[nodiscard]] const std::uint8_t* flags(Eigen::Index face) const {
+    return flags_.data() + slot(face, 0);
+  }
+  [[nodiscard]] bool lit(Eigen::Index face, Eigen::Index d) const {
+    return (flags_[slot(face, d)] & kLit) != 0;
+  }
+  [[nodiscard]] bool seen(Eigen::Index face, Eigen::Index d) const {
+    return (flags_[slot(face, d)] & kSeen) != 0;
+  }
+  [[nodiscard]] std::span<const PathHit> hits(Eigen::Index face) const {
+    const auto begin = static_cast<std::size_t>(face * gather_);
+    return {hits_.data() + begin,
+            static_cast<std::size_t>(hit_count_[static_cast<std::size_t>(face)])};
+  }
+  /// Solid angle that every hit stands for, sr.
+  [[nodiscard]] double hit_angle() const {
+    return gather_ > 0 ? 2.0 * std::numbers::pi / gather_ : 0.0;
+  }
+
+ private:
+  [[nodiscard]] std::size_t slot(Eigen::Index face, Eigen::Index d) const {
+    return static_cast<std::size_t>(face * light_lanes_.rows() + d);
+  }
+  class Caster;
+
+  Faces faces_;
+  DirectionSet directions_;
+  LaneVectors<double> light_lanes_;
+  Eigen::Matrix3Xd to_place_;  ///< Of a goal that has a place, else empty.
+  std::vector<std::uint8_t> flags_;
+  int gather_;
+  std::vector<PathHit> hits_;  ///< `gather_` slots per face.
+  std::vector<std::int32_t> hit_count_;
+};
 
 /// Energies are stated as kEnergyScale·½ Σ a_k ⟨loss(L) V⟩ with a_k = A_k/ΣA: the energy of the
 /// paper's Eq. 8 for a surface of area 5, about that of its models, whose diagonal is 3.
@@ -17,6 +94,12 @@ inline constexpr double kEnergyScale = 5.0;
 /// Radiance below which light by way of another face is kept as it is: with it the gradients of a
 /// torus and of a trihedral differ by less than 1 % from those of all hits.
 inline constexpr double kRadianceFloor = 0.02;
+
+/// The energy itself, with its sign. 1/(L + ε), averaged over many directions of the light, asks
+/// for a little light from all of them, which a matt surface gives, and not for much light.
+[[nodiscard]] inline Loss loss_for(const Goal& goal) {
+  return goal.maximizes() ? Loss::kNegativeSquare : Loss::kSquare;
+}
 
 /// Radiance of one face towards the sensor for every direction, by one reflection and by two; the
 /// latter only where the sensor sees the face.
@@ -90,6 +173,49 @@ class ReflectionEnergy {
   Eigen::VectorXd one_lanes_;
   std::vector<std::vector<MovingHit>> moving_;  ///< Of every face.
   std::vector<float> resting_;
+};
+
+/// Light paths of meshes with fewer faces than this are asked on a finer mesh of the same surface,
+/// so that shadows need not follow its faces.
+inline constexpr std::int64_t kEvaluatedFaces = 4096;
+
+/// The energies with the normals of the mesh's own faces, always of the square of the radiance.
+/// @throw Interrupted
+Energies evaluate(const SurfaceMesh& mesh, const Goal& goal, const DirectionSet& directions,
+                  const Executor& executor);
+
+/// Samples of the published algorithm (Tojo et al., 4.6).
+inline constexpr int kPaperDirections = 16;  ///< N_dir of every face.
+inline constexpr int kPaperPaths = 8;        ///< N_path of every direction.
+
+/// Monte-Carlo estimate of the reflectivity energy's gradient by the faces' normals (Tojo et al.,
+/// 4.2): random directions of the light, random points on the face, paths of one and two
+/// reflections sampled by the lobe (Lafortune & Willems 1994), and unbiased radiative
+/// back-propagation, whose paths are drawn anew (Nimier-David et al. 2020). Every number follows
+/// from seed and face: the same bits for any number of threads.
+class PathEstimator {
+ public:
+  /// @param mesh, field  must outlive it.
+  PathEstimator(const SurfaceMesh& mesh, const LightField& field, Loss loss,
+                const Executor& executor);
+
+  /// An unbiased estimate of what ReflectionEnergy::value_and_gradient() returns for infinitely
+  /// many directions, 3 × F, but for the inverse loss, whose slope is taken at an estimated
+  /// radiance.
+  /// @param normals  3 × F, unit. @throw Interrupted
+  [[nodiscard]] Eigen::Matrix3Xd gradient(const Eigen::Matrix3Xd& normals,
+                                          std::uint64_t seed) const;
+
+ private:
+  class Walker;
+
+  const SurfaceMesh& mesh_;
+  const LightField& field_;
+  Loss loss_;
+  Executor executor_;
+  Faces faces_;
+  Eigen::VectorXd share_;
+  RayScene scene_;
 };
 
 }  // namespace lensforge::reflect

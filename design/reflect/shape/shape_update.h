@@ -4,10 +4,12 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <memory>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "core/compute/executor.h"
-#include "core/surface/surface_mesh.h"
+#include "core/mesh/surface_mesh.h"
 
 namespace lensforge::reflect {
 
@@ -53,6 +55,58 @@ class ShapeUpdate {
  private:
   struct System;
   std::unique_ptr<System> system_;
+};
+
+/// What a new shape has to keep, in the units of its mesh.
+struct ConstraintSet {
+  std::vector<std::uint8_t> fixed;       ///< One flag per vertex.
+  std::vector<int> partner;              ///< Mirror image of every vertex; empty: no symmetry.
+  int axis = 0;                          ///< Of the symmetry, about the box's middle.
+  std::vector<std::vector<int>> planar;  ///< Groups of faces, each of which stays in one plane.
+  bool volume = false;                   ///< Of the closed mesh.
+  bool box = false;                      ///< Nothing leaves the bounding box.
+  double max_displacement = 0.0;         ///< Of a vertex; 0: no limit.
+  double min_thickness = 0.0;            ///< Material behind a vertex; 0: no limit.
+
+  [[nodiscard]] bool empty() const {
+    return partner.empty() && planar.empty() && !volume && !box && max_displacement == 0.0 &&
+           min_thickness == 0.0;
+  }
+};
+
+/// Brings the vertices of a moved mesh back to what its constraints allow.
+class Constraints {
+ public:
+  /// @param reference  the mesh before it moved.
+  Constraints(SurfaceMesh reference, ConstraintSet set, const Executor& executor);
+
+  /// The nearby vertices that meet the constraints: each is enforced in turn, several times over,
+  /// those that cut off (displacement, box) last.
+  [[nodiscard]] Eigen::Matrix3Xd enforced(const Eigen::Matrix3Xd& vertices) const;
+
+  /// What a shape breaks, in words; empty if nothing. Thickness and volume are kept to 1 %, planes
+  /// to 1e-3 of the diagonal; at most 1 % of the area may be turned over.
+  [[nodiscard]] std::vector<std::string> broken(const Eigen::Matrix3Xd& vertices) const;
+
+ private:
+  [[nodiscard]] SurfaceMesh with(const Eigen::Matrix3Xd& vertices) const;
+  [[nodiscard]] Eigen::VectorXd thickness(const Eigen::Matrix3Xd& vertices) const;
+  void flatten(Eigen::Matrix3Xd& vertices) const;
+  void thicken(Eigen::Matrix3Xd& vertices) const;
+  void keep_volume(Eigen::Matrix3Xd& vertices) const;
+  void mirror(Eigen::Matrix3Xd& vertices) const;
+  void cut_off(Eigen::Matrix3Xd& vertices) const;
+  void keep_fixed(Eigen::Matrix3Xd& vertices) const;
+
+  SurfaceMesh reference_;
+  ConstraintSet set_;
+  Executor executor_;
+  double volume_ = 0.0;
+  double diagonal_ = 0.0;
+  Eigen::Vector3d low_;
+  Eigen::Vector3d high_;
+  Eigen::VectorXd wanted_thickness_;  ///< The limit, or less where the reference has less.
+  std::vector<std::vector<int>> planar_vertices_;
 };
 
 }  // namespace lensforge::reflect

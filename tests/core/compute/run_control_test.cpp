@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/compute/run_control.h"
-
 #include <gtest/gtest.h>
+
+#include "core/compute/executor.h"
 
 namespace lensforge {
 namespace {

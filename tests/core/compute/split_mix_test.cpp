@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/compute/split_mix.h"
-
 #include <gtest/gtest.h>
+
+#include "core/compute/scalar.h"
 
 namespace lensforge {
 namespace {

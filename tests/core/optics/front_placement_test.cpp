@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/optics/front_placement.h"
-
 #include <gtest/gtest.h>
 
+#include "core/optics/front.h"
 #include "core/optics/light_setups.h"
 
 namespace lensforge {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/optics/image_plane.h"
-
 #include <gtest/gtest.h>
+
+#include "core/optics/screen.h"
 
 namespace lensforge {
 namespace {

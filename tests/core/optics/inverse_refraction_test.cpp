@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/optics/inverse_refraction.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>

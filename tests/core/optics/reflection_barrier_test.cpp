@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/optics/reflection_barrier.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
 
+#include "core/optics/refraction.h"
 #include "design/finite_difference.h"
 #include "design/random_input.h"
 

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/optics/source_points.h"
-
 #include <gtest/gtest.h>
 
 #include <Eigen/Core>
@@ -8,6 +6,7 @@
 #include <vector>
 
 #include "core/optics/light_path.h"
+#include "core/optics/light_source.h"
 
 namespace lensforge {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/surface/control_net.h"
+#include "core/spline/control_net.h"
 
 #include <gtest/gtest.h>
 

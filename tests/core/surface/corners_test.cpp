@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/surface/corners.h"
-
 #include <gtest/gtest.h>
 
+#include "core/mesh/surface_mesh.h"
 #include "design/finite_difference.h"
 #include "design/random_corners.h"
 

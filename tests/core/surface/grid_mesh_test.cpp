@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/surface/grid_mesh.h"
-
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
@@ -8,7 +6,8 @@
 #include <cmath>
 #include <vector>
 
-#include "core/surface/mesh_topology.h"
+#include "core/mesh/mesh_topology.h"
+#include "core/mesh/surface_mesh.h"
 #include "design/random_input.h"
 
 namespace lensforge {

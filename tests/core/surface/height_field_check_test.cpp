@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/surface/height_field_check.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cstdint>
 #include <random>
 
+#include "core/lens/surface_check.h"
 #include "core/test_meshes.h"
 
 namespace lensforge {

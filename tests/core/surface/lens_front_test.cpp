@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <gtest/gtest.h>
 
+#include "core/lens/lens.h"
+#include "core/mesh/surface_mesh.h"
 #include "core/optics/height_fronts.h"
-#include "core/surface/grid_mesh.h"
-#include "core/surface/lens.h"
 #include "core/temp_folder.h"
 
 namespace lensforge {

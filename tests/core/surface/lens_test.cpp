@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/surface/lens.h"
+#include "core/lens/lens.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -13,10 +13,10 @@
 #include "core/error.h"
 #include "core/full_disk.h"
 #include "core/image/image_io.h"
-#include "core/io/output_guard.h"
-#include "core/surface/mesh_io.h"
+#include "core/io/lens_folder.h"
+#include "core/mesh/mesh_files.h"
+#include "core/spline/control_net.h"
 #include "core/surface/sample_splines.h"
-#include "core/surface/spline_file.h"
 #include "core/temp_folder.h"
 #include "core/test_meshes.h"
 

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "core/error.h"
-#include "core/surface/mesh_readers.h"
+#include "core/mesh/mesh_readers.h"
 
 namespace lensforge {
 namespace {

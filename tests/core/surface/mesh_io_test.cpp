@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/surface/mesh_io.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
@@ -13,6 +11,7 @@
 
 #include "core/error.h"
 #include "core/full_disk.h"
+#include "core/mesh/mesh_files.h"
 #include "core/temp_folder.h"
 #include "core/test_meshes.h"
 #include "core/text/version.h"

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/surface/mesh_normals.h"
-
 #include <gtest/gtest.h>
 
+#include "core/mesh/surface_mesh.h"
 #include "export/sample_surfaces.h"
 
 namespace lensforge::testing {

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "core/error.h"
-#include "core/surface/mesh_readers.h"
+#include "core/mesh/mesh_readers.h"
 #include "core/text/printable.h"
 
 namespace lensforge {

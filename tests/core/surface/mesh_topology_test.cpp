@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/surface/mesh_topology.h"
+#include "core/mesh/mesh_topology.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/surface/optical_surface.h"
+#include "core/lens/optical_surface.h"
 
 #include <gtest/gtest.h>
 
-#include "core/surface/facet_surface.h"
-#include "core/surface/mesh_normals.h"
+#include "core/mesh/surface_mesh.h"
 #include "export/sample_surfaces.h"
 
 namespace lensforge::testing {

@@ -13,14 +13,10 @@
 #include <vector>
 
 #include "core/error.h"
-#include "core/surface/corners.h"
-#include "core/surface/grid_mesh.h"
-#include "core/surface/lens.h"
-#include "core/surface/mesh_cut.h"
-#include "core/surface/mesh_io.h"
-#include "core/surface/mesh_normals.h"
-#include "core/surface/mesh_topology.h"
-#include "core/surface/outline_index.h"
+#include "core/lens/lens.h"
+#include "core/mesh/mesh_files.h"
+#include "core/mesh/mesh_topology.h"
+#include "core/mesh/surface_mesh.h"
 #include "core/surface/sample_splines.h"
 #include "core/temp_folder.h"
 

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/surface/polygon.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -8,6 +6,8 @@
 #include <cmath>
 #include <numbers>
 #include <random>
+
+#include "core/mesh/mesh_readers.h"
 
 namespace lensforge {
 namespace {

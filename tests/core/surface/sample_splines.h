@@ -4,8 +4,8 @@
 #include <Eigen/Core>
 #include <cmath>
 
-#include "core/surface/control_net.h"
-#include "core/surface/cubic_spline.h"
+#include "core/spline/control_net.h"
+#include "core/spline/cubic_spline.h"
 
 namespace lensforge::testing {
 

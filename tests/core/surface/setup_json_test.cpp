@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/surface/setup_json.h"
+#include "core/lens/setup_json.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/error.h"
-#include "core/image/height_grid.h"
+#include "core/image/rasters.h"
 #include "core/optics/height_fronts.h"
 #include "core/temp_folder.h"
 

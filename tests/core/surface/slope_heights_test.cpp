@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/surface/slope_heights.h"
-
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
 #include <Eigen/QR>
 #include <random>
 
+#include "core/lens/smooth_surface.h"
 #include "core/test_meshes.h"
 
 namespace lensforge::testing {

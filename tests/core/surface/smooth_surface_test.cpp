@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/surface/smooth_surface.h"
+#include "core/lens/smooth_surface.h"
 
 #include <gtest/gtest.h>
 
 #include <random>
 #include <utility>
 
-#include "core/surface/mesh_normals.h"
-#include "core/surface/slope_heights.h"
+#include "core/mesh/surface_mesh.h"
 #include "export/sample_surfaces.h"
 
 namespace lensforge::testing {

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/surface/spline_file.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -10,6 +8,8 @@
 #include <string>
 
 #include "core/error.h"
+#include "core/lens/surface_check.h"
+#include "core/spline/control_net.h"
 #include "core/surface/sample_splines.h"
 #include "core/temp_folder.h"
 

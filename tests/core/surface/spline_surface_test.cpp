@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/surface/spline_surface.h"
-
 #include <gtest/gtest.h>
 
 #include <Eigen/Eigenvalues>
 #include <random>
 
+#include "core/lens/optical_surface.h"
 #include "core/surface/sample_splines.h"
 
 namespace lensforge::testing {

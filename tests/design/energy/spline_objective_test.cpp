@@ -15,7 +15,7 @@
 #include "design/finite_difference.h"
 #include "design/random_input.h"
 #include "design/render.h"
-#include "design/schedule/spline_start.h"
+#include "design/schedule/levels.h"
 #include "design/setup/outline_setup.h"
 #include "design/spline/made_surface.h"
 #include "design/test_setups.h"

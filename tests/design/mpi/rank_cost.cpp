@@ -13,9 +13,9 @@
 #include <string>
 #include <vector>
 
-#include "core/surface/grid_mesh.h"
-#include "design/mpi/rank_stage.h"
+#include "core/mesh/surface_mesh.h"
 #include "design/mpi/ranks.h"
+#include "design/mpi/session.h"
 #include "design/render.h"
 #include "design/schedule/guided_optimization.h"
 

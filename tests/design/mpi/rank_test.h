@@ -10,12 +10,12 @@
 #include <string>
 #include <vector>
 
-#include "core/optics/front_placement.h"
+#include "core/optics/front.h"
 #include "core/optics/height_fronts.h"
 #include "core/optics/light_path.h"
 #include "core/optics/outline.h"
-#include "design/mpi/rank_stage.h"
 #include "design/mpi/ranks.h"
+#include "design/mpi/session.h"
 #include "design/objective_setups.h"
 
 /// Every rank runs every test. What needs a rank 0 that the others serve is on_first_rank().

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "core/surface/grid_mesh.h"
+#include "core/mesh/surface_mesh.h"
 
 namespace lensforge::testing {
 namespace {

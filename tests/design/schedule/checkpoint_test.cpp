@@ -11,11 +11,11 @@
 #include <string>
 #include <vector>
 
+#include "core/compute/scalar.h"
 #include "core/error.h"
 #include "core/member_count.h"
-#include "core/surface/grid_mesh.h"
+#include "core/mesh/surface_mesh.h"
 #include "core/temp_folder.h"
-#include "core/value_slope.h"
 #include "design/setup/option_tables.h"
 #include "design/test_setups.h"
 

@@ -8,8 +8,8 @@
 #include <stop_token>
 #include <string>
 
+#include "core/compute/scalar.h"
 #include "core/error.h"
-#include "core/value_slope.h"
 #include "design/schedule/face_transport.h"
 #include "design/test_setups.h"
 

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "core/error.h"
-#include "core/surface/cubic_spline.h"
+#include "core/spline/cubic_spline.h"
 #include "core/surface/sample_splines.h"
 #include "design/finite_difference.h"
 #include "design/random_input.h"
