@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "core/lens/smooth_surface.h"
+#include "core/lens/surface_check.h"
 #include "core/mesh/surface_mesh.h"
 #include "core/spline/control_net.h"
 #include "core/spline/sample_splines.h"
