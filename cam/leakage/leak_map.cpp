@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "cam/leakage/leak_map.h"
+#include "cam/leakage/leakage.h"
 
 #include <algorithm>
 #include <cmath>
@@ -11,6 +11,7 @@
 #include "cam/leakage/surface_tile.h"
 #include "core/error.h"
 #include "core/optics/optical_setup.h"
+#include "design/flux/flux_image.h"
 #include "design/flux/flux_triangle.h"
 
 namespace lensforge {

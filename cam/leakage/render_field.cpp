@@ -23,6 +23,8 @@ Image FluxPicture::image(double total) const {
   return image;
 }
 
+SourceKernel FieldRenderSetup::blur() const { return source_kernel(optics, surface_height); }
+
 OpticalSetup FieldRenderSetup::optics_in_parts(const SourceKernel& kernel) const {
   OpticalSetup fine = optics;
   fine.pixels *= kernel.parts;

@@ -11,9 +11,10 @@
 #include "core/compute/executor.h"
 #include "core/image/image.h"
 #include "core/optics/optical_setup.h"
-#include "design/flux/flux_image.h"
 
 namespace lensforge {
+
+struct SourceKernel;
 
 /// Picture that a surface projects: share of the lens's flux per pixel, row by row from the top.
 struct FluxPicture {
@@ -43,7 +44,7 @@ struct FieldRenderSetup {
   }
 
   /// Blur of an extended source against a point.
-  [[nodiscard]] SourceKernel blur() const { return source_kernel(optics, surface_height); }
+  [[nodiscard]] SourceKernel blur() const;
   /// The optics with pixels divided as the blur requires.
   [[nodiscard]] OpticalSetup optics_in_parts(const SourceKernel& kernel) const;
 };

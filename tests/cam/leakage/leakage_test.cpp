@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "cam/analytic_fields.h"
-#include "cam/leakage/leak_map.h"
 #include "core/error.h"
 
 namespace lensforge {

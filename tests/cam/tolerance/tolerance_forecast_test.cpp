@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "cam/tolerance/part_error.h"
+#include "cam/tolerance/part_model.h"
 #include "cam/tolerance/tolerance_forecast.h"
 
 #include <gmock/gmock.h>
