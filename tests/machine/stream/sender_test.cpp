@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "machine/stream/journal.h"
+#include "machine/stream/program_feed.h"
 #include "machine/stream/sender.h"
 
 #include <gmock/gmock.h>
