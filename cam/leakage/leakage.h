@@ -3,15 +3,19 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
-#include "cam/leakage/render_field.h"
+#include "cam/milled/surface_field.h"
+#include "core/compute/executor.h"
 #include "core/image/image.h"
 
 namespace lensforge {
+
+struct FieldRenderSetup;
 
 /// Limits of a target's dark and bright pixels, as shares of its mean.
 struct LeakageOptions {
@@ -25,6 +29,18 @@ void validate(const LeakageOptions& options);
 /// Mean of the bright pixels ÷ mean of the dark ones, from its inverse; infinite for dark pixels
 /// without light.
 double contrast_of(double dark_ratio);
+
+/// Picture that a surface projects: share of the lens's flux per pixel, row by row from the top.
+struct FluxPicture {
+  int columns = 0;
+  int rows = 0;
+  std::vector<double> flux;
+
+  /// Share of the flux that lands on the picture.
+  [[nodiscard]] double inside() const;
+  /// The picture scaled so that all of the lens's flux sums to `total`.
+  [[nodiscard]] Image image(double total) const;
+};
 
 /// Quality of a picture against the target and against the designed picture.
 struct PictureQuality {
@@ -130,6 +146,11 @@ struct LeakageResult {
 
   [[nodiscard]] const RenderedSurface& part() const { return steps.back(); }
 };
+
+/// Called for every sampled tile of a surface; the patch includes one more node around it where
+/// there is one.
+using TileObserver =
+    std::function<void(const SurfaceField&, const CellRange&, const SurfacePatch&)>;
 
 /// Renders every surface of a chain and splits the leakage by cause. A surface that occurs in the
 /// chain more than once (the same object) is rendered once. With an extended source the designed

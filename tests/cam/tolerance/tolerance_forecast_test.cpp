@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "cam/tolerance/part_error.h"
-#include "cam/tolerance/part_model.h"
 #include "cam/tolerance/tolerance_forecast.h"
 
 #include <gmock/gmock.h>
@@ -12,6 +10,8 @@
 #include <stop_token>
 
 #include "cam/milled/surface_field.h"
+#include "cam/tolerance/part_error.h"
+#include "cam/tolerance/part_model.h"
 #include "core/error.h"
 
 namespace lensforge {

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "machine/stream/journal.h"
-#include "machine/stream/program_feed.h"
 #include "machine/stream/sender.h"
 
 #include <gmock/gmock.h>
@@ -14,6 +12,8 @@
 #include "core/temp_folder.h"
 #include "machine/fast_controller.h"
 #include "machine/guard/guard.h"
+#include "machine/stream/journal.h"
+#include "machine/stream/program_feed.h"
 
 namespace lensforge {
 namespace {
