@@ -32,8 +32,8 @@ while(unread)
 endwhile()
 list(LENGTH public_headers public_count)
 if(public_count GREATER 60)
-  message(FATAL_ERROR "${public_count} headers would be installed, and at most 60 may be: a door includes only \
-headers of options and results, not those of algorithms (forward declarations do)")
+  message(FATAL_ERROR "${public_count} headers would be installed, and at most 60 may be: \
+doors include data, not algorithms")
 endif()
 foreach(header IN LISTS public_headers)
   cmake_path(GET header PARENT_PATH folder)
