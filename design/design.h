@@ -12,12 +12,9 @@
 #include "core/image/image.h"
 #include "core/image/image_io.h"
 #include "core/lens/lens.h"
+#include "design/energy/objective_options.h"
 #include "design/render.h"
-#include "design/render/source_picture.h"
-#include "design/schedule/convergence.h"
 #include "design/setup/design_options.h"
-#include "design/setup/light_setup.h"
-#include "design/setup/outline_setup.h"
 
 /// Designs a lens or a mirror that projects a picture.
 ///

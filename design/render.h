@@ -109,6 +109,16 @@ Fringe fringe_of(const SurfaceMesh& mesh, const Eigen::Matrix3Xd& normals,
 /// The same for a lens under its own model.
 Fringe fringe_of(const Lens& lens);
 
+/// Accuracy of the picture of a lens under its extended source.
+struct SourceCheck {
+  double blur = 0.0;  ///< Width of the source's image on the screen, pixels.
+  int points = 0;     ///< Source points whose pictures are summed.
+  /// Mean absolute differences of display-encoded pixels between that picture and the picture with
+  /// half as many points, and the picture by the optimiser's convolution.
+  double halving = 0.0;
+  double convolution = 0.0;
+};
+
 /// Setup for a mesh without one: the image rectangle is straight above the lens and as large, the
 /// working picture has 256 pixels on its longer side.
 OpticalSetup setup_for_mesh(const SurfaceMesh& mesh);

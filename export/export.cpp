@@ -14,6 +14,7 @@
 #include "core/image/image_io.h"
 #include "core/io/files.h"
 #include "core/io/lens_folder.h"
+#include "core/lens/smooth_surface.h"
 #include "core/mesh/mesh_files.h"
 #include "core/mesh/surface_mesh.h"
 #include "core/text/lower_case.h"

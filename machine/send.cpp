@@ -21,7 +21,11 @@
 #include "machine/gcode/program_seal.h"
 #include "machine/guard/background_guard.h"
 #include "machine/link/link.h"
+#include "machine/link/port.h"
 #include "machine/sim/simulated_machine.h"
+#include "machine/stream/journal.h"
+#include "machine/stream/preflight.h"
+#include "machine/stream/program_file.h"
 #include "machine/stream/session.h"
 
 namespace lensforge {

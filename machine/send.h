@@ -11,13 +11,8 @@
 #include "core/compute/executor.h"
 #include "core/text/option_field.h"
 #include "machine/guard/register_map.h"
-#include "machine/guard/spindle_guard.h"
-#include "machine/link/port.h"
 #include "machine/stream/controller_dialogue.h"
-#include "machine/stream/journal.h"
-#include "machine/stream/preflight.h"
 #include "machine/stream/program_facts.h"
-#include "machine/stream/program_file.h"
 #include "machine/stream/resume_plan.h"
 #include "machine/stream/sender.h"
 

@@ -49,9 +49,8 @@
 #include "design/design.h"
 #include "design/mpi/session.h"
 #include "design/schedule/levels.h"
-#include "design/setup/light_setup.h"
+#include "design/setup/design_options.h"
 #include "design/setup/option_tables.h"
-#include "design/setup/outline_setup.h"
 
 namespace lensforge::app {
 namespace {

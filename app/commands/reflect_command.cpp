@@ -15,6 +15,7 @@
 #include "core/mesh/mesh_files.h"
 #include "core/text/number_text.h"
 #include "design/reflect.h"
+#include "design/reflect/radar.h"
 #include "export/solid/solid_reading.h"
 
 namespace lensforge::app {

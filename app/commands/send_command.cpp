@@ -21,6 +21,7 @@
 #include "app/frame/terminal_keys.h"
 #include "core/error.h"
 #include "core/text/printable.h"
+#include "machine/link/port.h"
 #include "machine/send.h"
 
 namespace lensforge::app {

@@ -16,7 +16,7 @@
 #include "core/lens/setup_json.h"
 #include "core/optics/optical_setup.h"
 #include "design/render.h"
-#include "design/setup/light_setup.h"
+#include "design/setup/design_options.h"
 #include "design/setup/option_tables.h"
 
 namespace lensforge::python {

@@ -17,6 +17,7 @@
 #include "cam/predict/prediction.h"
 #include "core/error.h"
 #include "core/io/files.h"
+#include "core/io/lens_folder.h"
 #include "core/text/number_text.h"
 
 // Every part is planned on its own blank. On a shared one that is its rectangle and a margin so

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "cam/leakage/leak_map.h"
-
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -8,9 +6,12 @@
 #include <utility>
 
 #include "cam/contact/index_of.h"
+#include "cam/leakage/leakage.h"
+#include "cam/leakage/render_field.h"
 #include "cam/leakage/surface_tile.h"
 #include "core/error.h"
 #include "core/optics/optical_setup.h"
+#include "design/flux/flux_image.h"
 #include "design/flux/flux_triangle.h"
 
 namespace lensforge {

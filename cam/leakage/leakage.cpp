@@ -12,9 +12,20 @@
 #include <utility>
 #include <vector>
 
+#include "cam/leakage/render_field.h"
 #include "core/error.h"
 
 namespace lensforge {
+
+double FluxPicture::inside() const { return std::accumulate(flux.begin(), flux.end(), 0.0); }
+
+Image FluxPicture::image(double total) const {
+  Image image(columns, rows);
+  std::transform(flux.begin(), flux.end(), image.values().begin(),
+                 [total](double share) { return static_cast<float>(share * total); });
+  return image;
+}
+
 namespace {
 
 double mean_of(const Image& target) {

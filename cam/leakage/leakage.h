@@ -1,15 +1,21 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <Eigen/Core>
 #include <cstdint>
+#include <functional>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
-#include "cam/leakage/render_field.h"
+#include "cam/milled/surface_field.h"
+#include "core/compute/executor.h"
 #include "core/image/image.h"
 
 namespace lensforge {
+
+struct FieldRenderSetup;
 
 /// Limits of a target's dark and bright pixels, as shares of its mean.
 struct LeakageOptions {
@@ -23,6 +29,18 @@ void validate(const LeakageOptions& options);
 /// Mean of the bright pixels ÷ mean of the dark ones, from its inverse; infinite for dark pixels
 /// without light.
 double contrast_of(double dark_ratio);
+
+/// Picture that a surface projects: share of the lens's flux per pixel, row by row from the top.
+struct FluxPicture {
+  int columns = 0;
+  int rows = 0;
+  std::vector<double> flux;
+
+  /// Share of the flux that lands on the picture.
+  [[nodiscard]] double inside() const;
+  /// The picture scaled so that all of the lens's flux sums to `total`.
+  [[nodiscard]] Image image(double total) const;
+};
 
 /// Quality of a picture against the target and against the designed picture.
 struct PictureQuality {
@@ -129,6 +147,11 @@ struct LeakageResult {
   [[nodiscard]] const RenderedSurface& part() const { return steps.back(); }
 };
 
+/// Called for every sampled tile of a surface; the patch includes one more node around it where
+/// there is one.
+using TileObserver =
+    std::function<void(const SurfaceField&, const CellRange&, const SurfacePatch&)>;
+
 /// Renders every surface of a chain and splits the leakage by cause. A surface that occurs in the
 /// chain more than once (the same object) is rendered once. With an extended source the designed
 /// surface is also rendered in the light of a point: the additional light in the dark pixels is the
@@ -171,5 +194,70 @@ inline constexpr int kSamplingWindows = 6;
 /// Side of a window, in pixels as if lens and picture had the same size: only pixels whose light
 /// comes entirely from the window show the leakage.
 inline constexpr double kWindowPixels = 4.0;
+
+/// A difference of heights and its place.
+struct HeightDifference {
+  double value = 0.0;  ///< mm, part − designed: above 0 where material is left.
+  Eigen::Vector2d place{0.0, 0.0};
+};
+
+/// Places on the lens whose light lands in chosen pixels, contrary to the design.
+struct LeakMap {
+  std::int64_t columns = 0;     ///< Cells along x.
+  std::int64_t rows = 0;        ///< Cells along y, from the least.
+  CellCounts grid_cells{1, 1};  ///< Cells of the rendered grid in a (square) map cell.
+  /// Share of the lens's flux, signed: negative for a cell that takes light away from those pixels.
+  std::vector<double> leakage;
+  std::vector<HeightDifference> height;  ///< Largest by absolute value in every cell.
+
+  [[nodiscard]] double total() const;
+};
+
+/// Traces the light of both surfaces cell by cell: a cell's leakage is Σ weight · (flux of the
+/// part's cell − flux of the designed cell) over all pixels, exact as the pictures are. With
+/// pixels_with_surplus() as weights the map sums to Σ max(0, g − g_designed), and a cell left as
+/// designed counts 0, wherever its light lands. All light of a spectrum is traced in its middle
+/// colour. Same bits for any number of threads.
+/// @param weights  one per pixel, row by row from the top.
+/// @param cell  requested side of a map cell, mm, > 0.
+/// @throw Interrupted as the executor does.
+LeakMap map_leakage(const NamedSurface& designed, const NamedSurface& part,
+                    const FieldRenderSetup& setup, std::span<const double> weights, double cell,
+                    const Executor& executor);
+
+/// Selection of places from a map.
+struct LeakPlaceOptions {
+  int span = 5;   ///< A place is a square of span × span cells, ≥ 1.
+  int count = 3;  ///< Maximum number of places, ≥ 0.
+};
+
+/// Predicted leakage of a place if one thing were changed.
+struct LeakTrial {
+  std::string change;      ///< "a 0.3 mm ball"
+  double leakage = 0.0;    ///< As LeakPlace::leakage, all else unchanged.
+  double dark_flux = 0.0;  ///< As LeakPlace::dark_flux.
+  double moves = 1.0;      ///< Moves of the whole lens's finishing with the change ÷ without it.
+  double minutes = 1.0;    ///< The same for its minutes at the finishing feed.
+};
+
+/// A part of the lens from which light leaks.
+struct LeakPlace {
+  CellRange cells;                  ///< Of the rendered grid.
+  Eigen::Vector2d place{0.0, 0.0};  ///< Source of most of it, mm on the lens.
+  double side = 0.0;                ///< Of the square, mm.
+  double leakage = 0.0;    ///< Share of the lens's flux that leaves here and lands where the design
+                           ///< puts less, minus the designed share.
+  double dark_flux = 0.0;  ///< The same for the dark pixels.
+  HeightDifference height;          ///< Largest difference of height in the worst cell.
+  Eigen::Vector2d lands{0.0, 0.0};  ///< Centre of that light, pixel coordinates.
+  std::vector<CausePart> parts;     ///< `leakage` and `dark_flux` by cause; dark_ratio stays 0.
+  std::vector<LeakTrial> trials;    ///< Of remedies, if any were tried.
+};
+
+/// The places that leak most, worst first, at least a square's side apart. `map` gives the places,
+/// the chain the causes. @throw Interrupted as the executor does.
+std::vector<LeakPlace> worst_places(const LeakMap& map, const LeakageChain& chain,
+                                    const LeakageResult& result, const FieldRenderSetup& setup,
+                                    const LeakPlaceOptions& options, const Executor& executor);
 
 }  // namespace lensforge

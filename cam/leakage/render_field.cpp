@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cam/leakage/render_field.h"
 
-#include <algorithm>
 #include <cstddef>
-#include <numeric>
 #include <span>
 #include <utility>
 
@@ -13,15 +11,6 @@
 #include "design/flux/flux_image.h"
 
 namespace lensforge {
-
-double FluxPicture::inside() const { return std::accumulate(flux.begin(), flux.end(), 0.0); }
-
-Image FluxPicture::image(double total) const {
-  Image image(columns, rows);
-  std::transform(flux.begin(), flux.end(), image.values().begin(),
-                 [total](double share) { return static_cast<float>(share * total); });
-  return image;
-}
 
 OpticalSetup FieldRenderSetup::optics_in_parts(const SourceKernel& kernel) const {
   OpticalSetup fine = optics;

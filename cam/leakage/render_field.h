@@ -3,29 +3,16 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <span>
 #include <vector>
 
+#include "cam/leakage/leakage.h"
 #include "cam/milled/surface_field.h"
 #include "core/compute/executor.h"
-#include "core/image/image.h"
 #include "core/optics/optical_setup.h"
 #include "design/flux/flux_image.h"
 
 namespace lensforge {
-
-/// Picture that a surface projects: share of the lens's flux per pixel, row by row from the top.
-struct FluxPicture {
-  int columns = 0;
-  int rows = 0;
-  std::vector<double> flux;
-
-  /// Share of the flux that lands on the picture.
-  [[nodiscard]] double inside() const;
-  /// The picture scaled so that all of the lens's flux sums to `total`.
-  [[nodiscard]] Image image(double total) const;
-};
 
 /// Common settings for rendering the surfaces of a lens.
 struct FieldRenderSetup {
@@ -56,11 +43,6 @@ struct FieldRenderSetup {
 /// @throw Interrupted if `control` or the executor asks for an end.
 FluxPicture render_field(const SurfaceField& field, const FieldRenderSetup& setup,
                          const Executor& executor, const RunControl& control);
-
-/// Called for every sampled tile of a surface; the patch includes one more node around it where
-/// there is one.
-using TileObserver =
-    std::function<void(const SurfaceField&, const CellRange&, const SurfacePatch&)>;
 
 /// Renders several surfaces tile by tile, each tile for all of them in order, so that surfaces made
 /// from one another can share samples (HeldField). One picture per surface, with the same bits as

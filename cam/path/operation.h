@@ -85,4 +85,11 @@ struct OperationSummary {
   std::vector<std::string> warnings;
 };
 
+/// Tabs that hold the part in its frame until it is snapped out.
+struct TabOptions {
+  int count = 4;        ///< ≥ 0
+  double width = 3.0;   ///< Along the outline, at its narrowest, mm, > 0.
+  double height = 0.8;  ///< Above the underside, mm, > 0.
+};
+
 }  // namespace lensforge

@@ -26,13 +26,6 @@ inline constexpr double kOutlineOversize = 0.005;
 /// @param polygon  counter-clockwise, not self-crossing, mm.
 OutlineWay offset_outline(const std::vector<Eigen::Vector2d>& polygon, double radius);
 
-/// Tabs that hold the part in its frame until it is snapped out.
-struct TabOptions {
-  int count = 4;        ///< ≥ 0
-  double width = 3.0;   ///< Along the outline, at its narrowest, mm, > 0.
-  double height = 0.8;  ///< Above the underside, mm, > 0.
-};
-
 /// Options for cutting a part out of its blank.
 struct OutlineCut {
   Tool tool;

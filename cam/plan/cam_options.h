@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <Eigen/Core>
 #include <cstdint>
 #include <optional>
 #include <set>
@@ -8,10 +9,8 @@
 #include <vector>
 
 #include "cam/leakage/leakage.h"
-#include "cam/path/finish_raster.h"
-#include "cam/path/outline_cut.h"
+#include "cam/path/operation.h"
 #include "cam/post/post_description.h"
-#include "cam/post/program_writer.h"
 #include "cam/report/verdict.h"
 #include "cam/workshop/workshop.h"
 #include "core/lens/optical_surface.h"

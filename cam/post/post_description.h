@@ -28,6 +28,15 @@ enum class LineNumbers {
   kAll,
 };
 
+/// Grouping of operations into files. A dialect without tool change never has two tools in one.
+enum class ProgramGrouping {
+  kOperation,  ///< One file for each name: rough.ngc, finish.ngc.
+  kTool,       ///< Operations in a row with one tool, their names joined: finish-pencil.ngc.
+  kAll,        ///< One file, named after the job, where the dialect changes tools; else as kTool.
+};
+
+enum class Coolant { kOff, kMist, kFlood };
+
 /// A dialect of G-code as data, with the keys of cam/post/linuxcnc.toml and its neighbours.
 struct PostDescription {
   std::string name;

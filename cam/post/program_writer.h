@@ -39,15 +39,6 @@ struct ProgramPlan {
   double safe_z = 5.0;    ///< Z of the retracts between operations, program frame, mm.
 };
 
-/// Grouping of operations into files. A dialect without tool change never has two tools in one.
-enum class ProgramGrouping {
-  kOperation,  ///< One file for each name: rough.ngc, finish.ngc.
-  kTool,       ///< Operations in a row with one tool, their names joined: finish-pencil.ngc.
-  kAll,        ///< One file, named after the job, where the dialect changes tools; else as kTool.
-};
-
-enum class Coolant { kOff, kMist, kFlood };
-
 /// Receives every line of every program as it was read back, in the order in which they are run,
 /// with the plan's index of its operation. A program begins with its line 1.
 using ReadBackSink = std::function<void(std::size_t operation, const ProgramLine& line)>;

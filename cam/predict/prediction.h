@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "cam/contact/cut_surface.h"
-#include "cam/leakage/leak_map.h"
 #include "cam/leakage/leakage.h"
 #include "cam/milled/creases.h"
 #include "cam/milled/surface_field.h"

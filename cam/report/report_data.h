@@ -9,7 +9,6 @@
 #include <string>
 #include <vector>
 
-#include "cam/leakage/leak_map.h"
 #include "cam/leakage/leakage.h"
 #include "cam/path/operation.h"
 #include "cam/report/verdict.h"
@@ -18,7 +17,7 @@
 #include "core/image/image.h"
 #include "core/optics/front.h"
 #include "core/optics/optical_setup.h"
-#include "core/page/html_page.h"
+#include "core/text/number_text.h"
 
 namespace lensforge {
 

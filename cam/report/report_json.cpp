@@ -5,6 +5,7 @@
 #include <variant>
 
 #include "cam/report/verdict.h"
+#include "cam/tolerance/part_error.h"
 #include "core/io/lens_folder.h"
 #include "core/text/version.h"
 

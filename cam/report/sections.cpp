@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "cam/report/report_maps.h"
+#include "cam/tolerance/part_error.h"
 #include "core/optics/front.h"
 #include "core/page/drawings.h"
 #include "core/page/html_page.h"

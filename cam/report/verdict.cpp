@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "cam/leakage/leak_map.h"
+#include "cam/leakage/leakage.h"
 #include "core/error.h"
 #include "core/page/html_page.h"
 #include "core/text/number_text.h"

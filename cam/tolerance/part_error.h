@@ -41,21 +41,6 @@ class RandomDraw {
   std::uint64_t state_;
 };
 
-/// Causes of error, in the order of Tolerances.
-enum class ErrorCause : std::uint8_t {
-  kWaviness,
-  kRows,
-  kBacklash,
-  kTool,
-  kPolish,
-  kIndex,
-  kDistance,
-  kTilt,
-  kSource,
-  kTemperature,
-};
-inline constexpr std::size_t kErrorCauses = 10;
-
 /// Every cause, in the order of ErrorCause.
 std::array<ErrorCause, kErrorCauses> error_causes();
 

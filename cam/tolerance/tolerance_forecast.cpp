@@ -6,6 +6,8 @@
 #include <chrono>
 #include <cmath>
 
+#include "cam/tolerance/part_error.h"
+#include "cam/tolerance/part_model.h"
 #include "core/error.h"
 #include "core/page/html_page.h"
 #include "core/text/number_text.h"

@@ -6,12 +6,14 @@
 #include <vector>
 
 #include "cam/leakage/leakage.h"
-#include "cam/tolerance/part_error.h"
-#include "cam/tolerance/part_model.h"
+#include "cam/workshop/workshop.h"
 #include "core/compute/executor.h"
 #include "core/image/image.h"
 
 namespace lensforge {
+
+struct ErrorSource;
+class PartModel;
 
 /// Variation of every pixel from part to part: the standard deviation of its display-encoded value,
 /// 0 … 1, over all added pictures (Welford's sums, in one pass and constant memory).

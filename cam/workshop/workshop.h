@@ -3,6 +3,8 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <string_view>
@@ -159,6 +161,21 @@ struct Tolerances {
 
   friend bool operator==(const Tolerances&, const Tolerances&) = default;
 };
+
+/// Causes of error, in the order of Tolerances.
+enum class ErrorCause : std::uint8_t {
+  kWaviness,
+  kRows,
+  kBacklash,
+  kTool,
+  kPolish,
+  kIndex,
+  kDistance,
+  kTilt,
+  kSource,
+  kTemperature,
+};
+inline constexpr std::size_t kErrorCauses = 10;
 
 /// The mill. Limits belong to the axes x, y, z.
 struct Machine {

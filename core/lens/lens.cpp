@@ -15,6 +15,7 @@
 #include "core/image/image_io.h"
 #include "core/image/rasters.h"
 #include "core/io/files.h"
+#include "core/io/lens_folder.h"
 #include "core/lens/optical_surface.h"
 #include "core/lens/setup_json.h"
 #include "core/lens/surface_check.h"

@@ -10,14 +10,14 @@
 
 #include "core/compute/executor.h"
 #include "core/image/image.h"
-#include "core/io/files.h"
-#include "core/io/lens_folder.h"
 #include "core/lens/optical_surface.h"
 #include "core/mesh/surface_mesh.h"
 #include "core/optics/optical_setup.h"
 #include "core/spline/control_net.h"
 
 namespace lensforge {
+
+class PendingFiles;
 
 /// Metrics of a surface's picture under each model, against the target.
 using ModelMetrics = std::map<SurfaceModel, ImageMetrics>;

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/image/image.h"
+#include "core/text/number_text.h"
 
 /// Pages: pieces of HTML, whole pages, and data for their scripts. Functions escape `text`; `html`
 /// is inserted unchanged.
@@ -34,12 +35,6 @@ struct TableColumn {
 /// A table whose cells are HTML; on narrow screens each row is a block with its headings in front.
 std::string html_table(std::span<const TableColumn> columns,
                        const std::vector<std::vector<std::string>>& rows);
-
-/// A fact and its value; text.
-struct NamedText {
-  std::string name;
-  std::string value;
-};
 
 /// A table of two columns, values in bold.
 std::string html_facts(std::span<const NamedText> facts);

@@ -41,4 +41,10 @@ inline std::string trimmed_decimal(double value, int decimals) {
   return text;
 }
 
+/// A fact and its value; text.
+struct NamedText {
+  std::string name;
+  std::string value;
+};
+
 }  // namespace lensforge

@@ -8,9 +8,22 @@
 
 #include "core/mesh/surface_mesh.h"
 #include "core/text/option_field.h"
-#include "design/reflect/light/light_field.h"
 
 namespace lensforge::reflect {
+
+/// Goal for the reflected light (Tojo et al., 4.1 and Fig. 12).
+enum class GoalKind {
+  kStealth,  ///< As little as possible goes back to where the light comes from.
+  kPoint,    ///< As much as possible goes to a point.
+  kLine,     ///< As much as possible goes to the nearest point of a line.
+  kDeflect,  ///< As little as possible goes to a point.
+};
+
+/// Reflected energy 5·½ Σ a_k ⟨L² V⟩ of a shape, by one reflection alone and by one and two.
+struct Energies {
+  double direct = 0.0;
+  double total = 0.0;
+};
 
 /// Method to find target normals.
 enum class Method {

@@ -8,6 +8,7 @@
 
 #include "core/compute/executor.h"
 #include "core/mesh/surface_mesh.h"
+#include "design/reflect/reflect_shape.h"
 
 namespace lensforge::reflect {
 
@@ -36,14 +37,6 @@ inline constexpr int kRadarAzimuths = 72;
 
 /// Wavelength of a frequency, mm.
 double radar_wavelength(double ghz);
-
-/// Cross-sections around the horizon of the original mesh and of the new shape, m²; the meshes are
-/// in millimetres.
-struct RadarComparison {
-  double ghz = 0.0;
-  std::vector<double> before;
-  std::vector<double> after;
-};
 
 /// @throw InputError naming --radar; Interrupted.
 RadarComparison compare_radar(const SurfaceMesh& before, const SurfaceMesh& after, double ghz,

@@ -20,6 +20,7 @@
 #include "design/reflect/light/light_field.h"
 #include "design/reflect/light/reflection_energy.h"
 #include "design/reflect/mesh/faces.h"
+#include "design/reflect/radar.h"
 #include "design/reflect/shape/normals.h"
 #include "design/reflect/shape/shape_update.h"
 

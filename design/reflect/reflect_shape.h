@@ -11,8 +11,6 @@
 #include "core/compute/executor.h"
 #include "core/mesh/surface_mesh.h"
 #include "design/reflect/input.h"
-#include "design/reflect/light/light_field.h"
-#include "design/reflect/radar.h"
 
 namespace lensforge::reflect {
 
@@ -24,6 +22,14 @@ struct ReflectUpdate {
   double mean_displacement = 0.0;  ///< Of all vertices after it, as a share of the diagonal.
   double max_displacement = 0.0;
   double seconds = 0.0;  ///< Since the start of the run.
+};
+
+/// Cross-sections around the horizon of the original mesh and of the new shape, m²; the meshes are
+/// in millimetres.
+struct RadarComparison {
+  double ghz = 0.0;
+  std::vector<double> before;
+  std::vector<double> after;
 };
 
 struct ReflectResult {

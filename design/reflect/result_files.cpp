@@ -25,6 +25,7 @@
 #include "design/reflect/light/light_field.h"
 #include "design/reflect/light/reflection_energy.h"
 #include "design/reflect/mesh/faces.h"
+#include "design/reflect/radar.h"
 
 namespace lensforge::reflect {
 namespace {

@@ -10,10 +10,9 @@
 #include "core/image/image.h"
 #include "core/lens/lens.h"
 #include "core/optics/optical_setup.h"
+#include "design/render.h"
 
 namespace lensforge {
-
-struct Lens;
 
 /// Picture from values in double precision, row by row from the top. @pre columns × rows values.
 inline Image image_of(std::span<const double> values, int columns, int rows) {
@@ -50,16 +49,6 @@ Image corrected(const Image& target, const std::vector<double>& exact,
 /// @param z  of the surface, mm. @param picture  projected by the surface.
 Image corrected_for_convolution(const Image& target, const OpticalSetup& setup, double z,
                                 const PointPicture& picture, const Executor& executor);
-
-/// Accuracy of the picture of a lens under its extended source.
-struct SourceCheck {
-  double blur = 0.0;  ///< Width of the source's image on the screen, pixels.
-  int points = 0;     ///< Source points whose pictures are summed.
-  /// Mean absolute differences of display-encoded pixels between that picture and the picture with
-  /// half as many points, and the picture by the optimiser's convolution.
-  double halving = 0.0;
-  double convolution = 0.0;
-};
 
 /// @pre the lens's source has an extent.
 SourceCheck check_source(const Lens& lens, const Executor& executor);

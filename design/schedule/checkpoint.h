@@ -10,7 +10,7 @@
 
 #include "core/image/image.h"
 #include "core/mesh/surface_mesh.h"
-#include "design/schedule/convergence.h"
+#include "design/energy/objective_options.h"
 #include "design/schedule/guided_optimization.h"
 #include "design/schedule/levels.h"
 #include "design/setup/design_options.h"

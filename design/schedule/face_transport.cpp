@@ -19,7 +19,6 @@
 #include "design/render/render_flux.h"
 #include "design/schedule/guided_optimization.h"
 #include "design/setup/design_options.h"
-#include "design/setup/light_setup.h"
 
 namespace lensforge {
 namespace {

@@ -15,7 +15,7 @@
 #include "core/optics/light_path.h"
 #include "core/spline/control_net.h"
 #include "design/schedule/face_transport.h"
-#include "design/setup/light_setup.h"
+#include "design/setup/design_options.h"
 
 namespace lensforge {
 namespace {

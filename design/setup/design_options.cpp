@@ -8,7 +8,6 @@
 #include "core/error.h"
 #include "core/text/number_text.h"
 #include "design/schedule/levels.h"
-#include "design/setup/light_setup.h"
 #include "design/setup/option_tables.h"
 #include "design/spline/made_surface.h"
 

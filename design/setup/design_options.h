@@ -6,11 +6,15 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
+#include "core/compute/executor.h"
 #include "core/image/image.h"
+#include "core/image/image_io.h"
 #include "core/lens/optical_surface.h"
 #include "core/optics/front.h"
 #include "core/optics/optical_setup.h"
+#include "core/optics/outline.h"
 #include "design/energy/objective_options.h"
 #include "design/spline/made_by.h"
 
@@ -131,5 +135,63 @@ DesignOptions with_smoothness_applied(DesignOptions options);
 /// @throw InputError naming option, value and rule if an option breaks its rule on its own or
 ///        against the picture, or the picture is all black.
 void validate(const DesignOptions& options, const Image& target);
+
+/// The shape of a source from its picture, averaged to at most kMaxShapeSide pixels per side.
+/// @throw InputError if it is all black.
+SourceShape shape_of(const Image& picture);
+
+/// Reads the height map of `--front FILE`. @throw InputError naming the file and its fault, or the
+/// option if there is no such file.
+std::shared_ptr<const HeightSpline> front_from(const std::string& file, const RunControl& control);
+
+/// The optical setup that the options describe, for a working picture of `pixels`. The picture's
+/// centre is the point where the light from the middle of a flat surface at height `thickness`
+/// meets z = focal_length, moved by image_offset. @pre require_light().
+OpticalSetup optical_setup(const DesignOptions& options, const Eigen::Vector2i& pixels);
+
+/// The same setup with the picture's centre moved along that light to another z.
+OpticalSetup at_focal_length(OpticalSetup setup, double focal_length, double thickness);
+
+/// @throw InputError naming option, value and rule if the source is on the wrong side of the
+///        surface, an option does not belong to this kind of light, or the screen is not beyond the
+///        surface.
+void require_light(const DesignOptions& options, const Eigen::Vector2i& pixels);
+
+/// Minimum share of the lens's rectangle that an outline covers: below it nearly the whole mesh is
+/// dark.
+inline constexpr double kLeastOutlineShare = 0.05;
+
+/// Pixels of the longer side at which an SVG file is drawn to find its outline.
+inline constexpr int kOutlineDrawing = 2048;
+
+/// Maximum distance of a simplified outline from the original, pixels.
+inline constexpr double kOutlineTolerance = 0.1;
+
+/// The edge between the light and the dark part of a picture as one closed polygon: the line where
+/// its display-encoded values, interpolated linearly between the pixels' centres, pass one half.
+/// Outside of the picture is dark. Simplified by Douglas and Peucker's method, within
+/// kOutlineTolerance.
+/// @return corners in pixels, y upwards. @throw InputError naming `what` if nothing is light, or
+///         the light has holes or several pieces.
+std::vector<Eigen::Vector2d> contour_of(const Image& picture, const std::string& what);
+
+/// The requested outline, and the changes made to its picture, in plain words.
+struct OutlineChoice {
+  std::optional<Outline> outline;
+  std::vector<std::string> changes;
+};
+
+/// Reads `--outline`: rectangle (none), circle, rounded:R, or the name of a picture or SVG file in
+/// which the lens is white, seen from +z.
+/// @param background  shown where the picture is transparent.
+/// @throw InputError naming option, value and rule; Interrupted.
+OutlineChoice outline_from(const std::string& text, const Background& background,
+                           const RunControl& control);
+
+/// Fits an outline of DesignOptions into a lens of this size. @pre require_outline() passed.
+Outline fitted(const Outline& outline, const Eigen::Vector2d& lens_size);
+
+/// @throw InputError naming option, value and rule if an outline does not fit a lens of this size.
+void require_outline(const std::optional<Outline>& outline, const Eigen::Vector2d& lens_size);
 
 }  // namespace lensforge

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/setup/light_setup.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -21,7 +20,6 @@
 #include "core/text/number_list.h"
 #include "core/text/number_text.h"
 #include "design/setup/design_options.h"
-#include "design/setup/outline_setup.h"
 
 namespace lensforge {
 namespace {

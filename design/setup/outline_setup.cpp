@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/setup/outline_setup.h"
-
 #include <boost/geometry.hpp>
 #include <boost/geometry/geometries/point_xy.hpp>
 #include <boost/geometry/geometries/polygon.hpp>
@@ -18,6 +16,7 @@
 #include "core/io/files.h"
 #include "core/text/number_text.h"
 #include "core/text/units.h"
+#include "design/setup/design_options.h"
 
 namespace lensforge {
 namespace {

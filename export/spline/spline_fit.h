@@ -6,11 +6,13 @@
 #include <functional>
 
 #include "core/compute/executor.h"
-#include "core/lens/smooth_surface.h"
+#include "core/lens/optical_surface.h"
 #include "core/mesh/surface_mesh.h"
 #include "export/spline/spline_net.h"
 
 namespace lensforge {
+
+class SmoothSurface;
 
 /// Difference between the picture that a surface projects and the wanted one.
 struct PictureMiss {

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "core/compute/executor.h"
-#include "core/lens/smooth_surface.h"
+#include "core/lens/optical_surface.h"
 #include "core/mesh/surface_mesh.h"
 #include "core/optics/front.h"
 #include "core/optics/outline.h"

@@ -100,6 +100,13 @@ struct WriteStep {
   std::uint16_t value = 0;
 };
 
+/// The party that commands the spindle.
+enum class SpindleOwner {
+  kHost,        ///< The guard writes the commands of the register map.
+  kController,  ///< The controller's M3; the guard only watches. Call spin() and stop() before the
+                ///< controller executes the word.
+};
+
 /// Commands of a host-driven spindle. Each command's steps are written in order.
 struct SpindleCommands {
   RegisterAddress set_speed;

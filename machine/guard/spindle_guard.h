@@ -134,13 +134,6 @@ class SpindleWatch {
   std::string speed_trouble_;  ///< Live.
 };
 
-/// The party that commands the spindle.
-enum class SpindleOwner {
-  kHost,        ///< The guard writes the commands of the register map.
-  kController,  ///< The controller's M3; the guard only watches. Call spin() and stop() before the
-                ///< controller executes the word.
-};
-
 struct GuardOptions {
   SpindleOwner owner = SpindleOwner::kHost;
   double record_interval = 1.0;  ///< s between records of a constant speed.

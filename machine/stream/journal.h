@@ -16,7 +16,7 @@
 
 #include "core/error.h"
 #include "core/io/files.h"
-#include "machine/stream/program_file.h"
+#include "machine/stream/program_facts.h"
 
 /// Format of a journal record: eight hexadecimal digits of its CRC-32, a blank, one JSON object, a
 /// line feed.
@@ -43,35 +43,6 @@ namespace lensforge {
 class JournalFailed : public RunError {
  public:
   using RunError::RunError;
-};
-
-/// Progress of a job. Lines are those of the file, counted from 1; 0 before the first.
-struct JobProgress {
-  std::int64_t sent = 0;                    ///< Last line that was sent, in part or whole.
-  std::int64_t acknowledged = 0;            ///< Every line up to this one was accepted.
-  std::int64_t executed = 0;                ///< At least every line up to this one was executed.
-  std::int64_t byte = 0;                    ///< Offset in the file after the acknowledged line.
-  std::string state;                        ///< The controller's last state: "Run", "Hold" …
-  std::optional<Eigen::Vector3d> position;  ///< Machine coordinates, mm.
-  std::string spindle;                      ///< Its state, in a word.
-  double rpm = 0.0;                         ///< Last reading.
-};
-
-/// Origins of G54 … G59, machine coordinates, mm.
-using WorkOrigins = std::array<Eigen::Vector3d, 6>;
-
-/// Content of a journal: bounds on what the sender has done.
-struct JournalRecord {
-  JobIdentity job;
-  bool finished = false;  ///< The program reached its end.
-  std::string status;     ///< Status of the last run; empty if it ended without one.
-  std::string reason;     ///< Reason for that status.
-  JobProgress last;  ///< From the last record with progress; sent, acknowledged and executed are
-                     ///< the maxima over all runs, and sent includes reserved lines.
-  std::optional<WorkOrigins> origins;  ///< At the job's start.
-  std::int64_t runs = 0;               ///< Number of starts and resumptions of the job.
-  std::int64_t bytes = 0;              ///< Length of the valid part of the file.
-  std::int64_t torn = 0;               ///< Number of bytes after it: a truncated record.
 };
 
 /// Options for flushing the journal to the disk.

@@ -18,12 +18,6 @@ struct StreamRate {
   double lines_per_second = 0.0;  ///< 0 for no limit.
 };
 
-/// Objections to a job, in plain sentences.
-struct Findings {
-  std::vector<std::string> refusals;  ///< The job must not start.
-  std::vector<std::string> warnings;  ///< For the operator.
-};
-
 /// The travel allowed by the settings, machine coordinates, mm; empty if homing is off or a travel
 /// is not set.
 std::optional<Eigen::AlignedBox3d> travel_box(const ControllerInfo& info);

@@ -8,19 +8,9 @@
 #include <string>
 
 #include "core/compute/executor.h"
+#include "machine/stream/program_facts.h"
 
 namespace lensforge {
-
-/// Identity of a job's program, by content: the name does not matter.
-struct JobIdentity {
-  std::string sha256;      ///< Hash of the whole file, 64 hexadecimal digits.
-  std::int64_t bytes = 0;  ///< Its size.
-  std::string name;        ///< File name without folder, for display only.
-
-  [[nodiscard]] bool same_program(const JobIdentity& other) const {
-    return sha256 == other.sha256 && bytes == other.bytes;
-  }
-};
 
 struct ProgramPieces;
 

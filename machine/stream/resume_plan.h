@@ -11,7 +11,6 @@
 #include "core/compute/executor.h"
 #include "machine/gcode/gcode_motion.h"
 #include "machine/stream/controller_dialogue.h"
-#include "machine/stream/journal.h"
 #include "machine/stream/program_facts.h"
 #include "machine/stream/program_feed.h"
 

@@ -9,6 +9,7 @@
 
 #include "machine/guard/guard.h"
 #include "machine/stream/controller_dialogue.h"
+#include "machine/stream/journal.h"
 #include "machine/stream/line_tracker.h"
 #include "machine/stream/send_steps.h"
 

@@ -8,13 +8,14 @@
 #include <stop_token>
 #include <string>
 
-#include "machine/guard/guard.h"
-#include "machine/link/link.h"
 #include "machine/stream/controller_dialogue.h"
-#include "machine/stream/journal.h"
-#include "machine/stream/program_feed.h"
 
 namespace lensforge {
+
+class Clock;
+class Guard;
+class Journal;
+class ProgramFeed;
 
 /// Options for streaming a program. Times in s.
 struct SenderOptions {

@@ -8,6 +8,7 @@
 
 #include "bench/process_usage.h"
 #include "cam/cam_meshes.h"
+#include "core/lens/smooth_surface.h"
 #include "core/temp_folder.h"
 #include "export/solid/step_file.h"
 #include "export/spline/spline_fit.h"

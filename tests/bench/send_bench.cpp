@@ -14,7 +14,9 @@
 #include "core/temp_folder.h"
 #include "machine/fast_controller.h"
 #include "machine/link/link.h"
+#include "machine/stream/journal.h"
 #include "machine/stream/program_facts.h"
+#include "machine/stream/program_feed.h"
 #include "machine/stream/sender.h"
 
 namespace lensforge::bench {

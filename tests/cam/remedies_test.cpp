@@ -9,6 +9,7 @@
 
 #include "cam/cam.h"
 #include "cam/cam_meshes.h"
+#include "cam/leakage/render_field.h"
 #include "cam/plan/finishing.h"
 #include "cam/post_plans.h"
 #include "cam/predict/part_surfaces.h"

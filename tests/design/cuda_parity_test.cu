@@ -11,6 +11,7 @@
 
 #include "core/compute/cuda/launch.cuh"
 #include "core/compute/executor.h"
+#include "core/error.h"
 #include "design/design.h"
 #include "design/executor_parity.h"
 #include "design/render/render_flux.h"

@@ -16,7 +16,7 @@
 #include "design/finite_difference.h"
 #include "design/objective_setups.h"
 #include "design/render.h"
-#include "design/setup/outline_setup.h"
+#include "design/setup/design_options.h"
 
 namespace lensforge {
 namespace {

@@ -24,7 +24,7 @@
 #include "design/ray_tracer.h"
 #include "design/render.h"
 #include "design/schedule/levels.h"
-#include "design/setup/outline_setup.h"
+#include "design/setup/design_options.h"
 
 /// Lenses that are no rectangle.
 namespace lensforge {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <string>
 
+#include "core/lens/smooth_surface.h"
 #include "core/optics/front.h"
 #include "core/optics/height_fronts.h"
 #include "core/temp_folder.h"

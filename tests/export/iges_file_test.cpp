@@ -5,6 +5,7 @@
 
 #include "core/error.h"
 #include "core/io/lens_folder.h"
+#include "core/lens/smooth_surface.h"
 #include "core/temp_folder.h"
 #include "export/sample_surfaces.h"
 #include "export/solid/opencascade_io.h"

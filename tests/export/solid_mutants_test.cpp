@@ -7,6 +7,7 @@
 #include <random>
 
 #include "core/error.h"
+#include "core/lens/smooth_surface.h"
 #include "core/temp_folder.h"
 #include "export/sample_surfaces.h"
 #include "export/solid/iges_file.h"

@@ -11,6 +11,7 @@
 #include <cstdlib>
 
 #include "core/error.h"
+#include "core/lens/smooth_surface.h"
 #include "core/temp_folder.h"
 #include "export/foreign_step.h"
 #include "export/sample_surfaces.h"

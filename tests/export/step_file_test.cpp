@@ -8,6 +8,7 @@
 
 #include "core/error.h"
 #include "core/io/lens_folder.h"
+#include "core/lens/smooth_surface.h"
 #include "core/temp_folder.h"
 #include "export/files/closed_solid.h"
 #include "export/part21.h"

@@ -7,6 +7,7 @@
 #include <numbers>
 #include <random>
 
+#include "core/lens/smooth_surface.h"
 #include "core/mesh/surface_mesh.h"
 #include "core/optics/front.h"
 #include "core/optics/outline.h"

@@ -5,6 +5,7 @@
 
 #include "core/error.h"
 #include "core/temp_folder.h"
+#include "machine/stream/journal.h"
 
 namespace lensforge {
 namespace {

@@ -6,16 +6,9 @@
 #include <optional>
 
 #include "core/mesh/surface_mesh.h"
+#include "design/reflect/input.h"
 
 namespace lensforge::reflect {
-
-/// Goal for the reflected light (Tojo et al., 4.1 and Fig. 12).
-enum class GoalKind {
-  kStealth,  ///< As little as possible goes back to where the light comes from.
-  kPoint,    ///< As much as possible goes to a point.
-  kLine,     ///< As much as possible goes to the nearest point of a line.
-  kDeflect,  ///< As little as possible goes to a point.
-};
 
 /// A goal with its place, in the units of the mesh.
 struct Goal {
@@ -90,14 +83,6 @@ struct LightField {
   /// %.
   [[nodiscard]] DirectionSet evaluation_directions() const;
 };
-
-/// Reflected energy 5·½ Σ a_k ⟨L² V⟩ of a shape, by one reflection alone and by one and two.
-struct Energies {
-  double direct = 0.0;
-  double total = 0.0;
-};
-
-struct ReflectOptions;
 
 /// @throw InputError naming --place or --light, the value and the rule.
 LightField make_light_field(const ReflectOptions& options);

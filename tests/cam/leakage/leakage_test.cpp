@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "cam/analytic_fields.h"
-#include "cam/leakage/leak_map.h"
+#include "cam/leakage/render_field.h"
 #include "core/error.h"
 
 namespace lensforge {

@@ -10,6 +10,8 @@
 #include <stop_token>
 
 #include "cam/milled/surface_field.h"
+#include "cam/tolerance/part_error.h"
+#include "cam/tolerance/part_model.h"
 #include "core/error.h"
 
 namespace lensforge {

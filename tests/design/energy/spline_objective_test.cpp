@@ -16,7 +16,7 @@
 #include "design/random_input.h"
 #include "design/render.h"
 #include "design/schedule/levels.h"
-#include "design/setup/outline_setup.h"
+#include "design/setup/design_options.h"
 #include "design/spline/made_surface.h"
 #include "design/test_setups.h"
 

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/setup/light_setup.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -13,6 +11,7 @@
 #include "core/optics/light_path.h"
 #include "core/temp_folder.h"
 #include "design/schedule/checkpoint.h"
+#include "design/setup/design_options.h"
 
 namespace lensforge {
 namespace {

@@ -12,6 +12,8 @@
 #include "core/temp_folder.h"
 #include "machine/fast_controller.h"
 #include "machine/guard/guard.h"
+#include "machine/stream/journal.h"
+#include "machine/stream/program_feed.h"
 
 namespace lensforge {
 namespace {
