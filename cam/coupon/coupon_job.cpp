@@ -10,7 +10,7 @@
 
 #include "cam/job/job_files.h"
 #include "cam/path/finish_raster.h"
-#include "cam/path/rough_passes.h"
+#include "cam/path/rough.h"
 #include "cam/post/program_part.h"
 #include "cam/post/program_reader.h"
 #include "cam/post/program_writer.h"
