@@ -19,14 +19,14 @@
 #include "core/text/words.h"
 #include "machine/gcode/gcode_dialect.h"
 #include "machine/gcode/program_seal.h"
-#include "machine/guard/background_guard.h"
+#include "machine/guard/spindle_guard.h"
 #include "machine/link/link.h"
 #include "machine/link/port.h"
 #include "machine/sim/simulated_machine.h"
+#include "machine/stream/controller_dialogue.h"
 #include "machine/stream/journal.h"
 #include "machine/stream/preflight.h"
 #include "machine/stream/program_file.h"
-#include "machine/stream/session.h"
 
 namespace lensforge {
 namespace {

@@ -12,7 +12,6 @@
 #include <string_view>
 #include <vector>
 
-#include "cam/coupon/coupon_model.h"
 #include "cam/coupon/coupon_readings.h"
 #include "core/error.h"
 #include "core/io/files.h"

@@ -8,7 +8,6 @@
 #include <string>
 #include <vector>
 
-#include "cam/coupon/coupon_model.h"
 #include "cam/coupon/coupon_readings.h"
 #include "cam/workshop/workshop.h"
 

@@ -4,20 +4,25 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <string_view>
 #include <system_error>
+#include <utility>
 
-#include "cam/coupon/coupon_sheet.h"
 #include "cam/job/job_files.h"
 #include "cam/path/finish_raster.h"
-#include "cam/path/rough_passes.h"
+#include "cam/path/rough.h"
 #include "cam/post/program_part.h"
 #include "cam/post/program_reader.h"
 #include "cam/post/program_writer.h"
 #include "core/error.h"
 #include "core/io/files.h"
+#include "core/page/html_page.h"
+#include "core/page/svg_writer.h"
 #include "core/text/number_text.h"
 #include "core/text/toml_fields.h"
+#include "core/text/version.h"
 #include "core/text/words.h"
+#include "coupon_page.h"
 
 namespace lensforge {
 namespace {
@@ -280,6 +285,284 @@ CouponResult make_coupon(const CouponOptions& options, const fs::path& folder,
     interrupted.status = CouponResult::Status::kInterrupted;
     return interrupted;
   }
+}
+
+namespace {
+
+constexpr double kWidth = 560.0;  ///< Of the picture; all its lengths are in its own units.
+constexpr double kMargin = 74.0;
+
+/// The coupon in machine coordinates, y upwards.
+class Drawing {
+ public:
+  explicit Drawing(const CouponLayout& layout)
+      : layout_(layout), size_(layout.xy(layout.size.x(), layout.size.y())) {
+    scale_ = (kWidth - 2.0 * kMargin) / size_.maxCoeff();
+    svg_.add(
+        {"<defs><marker id=\"tick\" viewBox=\"-5 -5 10 10\" markerWidth=\"9\" markerHeight=\"9\" "
+         "orient=\"auto\"><path d=\"M-3 3L3 -3M0 -5V5\" stroke=\"#1a1f24\"/></marker></defs>"});
+  }
+
+  [[nodiscard]] double width() const { return scale_ * size_.x() + 2.0 * kMargin; }
+  [[nodiscard]] double height() const { return scale_ * size_.y() + 2.0 * kMargin; }
+
+  /// @param low, high  (x, y), mm.
+  void box(const Eigen::Vector2d& low, const Eigen::Vector2d& high, const std::string& style) {
+    svg_.rectangle({x(low.x()), y(high.y())}, scale_ * (high - low), style);
+  }
+  /// A cut of the ball: a line as wide as it.
+  void cut(const CouponGroove& groove) {
+    const double wide = std::max(1.5, 2.0 * scale_ * layout_.radius);
+    svg_.line(
+        at(layout_.xy(groove.along_begin, groove.across)),
+        at(layout_.xy(groove.along_end, groove.across)),
+        svg_.attribute("stroke-width", wide) + " stroke=\"#0b5cad\" stroke-linecap=\"round\"");
+  }
+  /// @param anchor  start, middle or end.
+  void words(const Eigen::Vector2d& place, const std::string& text, const std::string& anchor,
+             const Eigen::Vector2d& shift = {0.0, 0.0}) {
+    svg_.text(at(place) + shift, joined({"text-anchor=\"", anchor, "\""}), text);
+  }
+  void words_upwards(const Eigen::Vector2d& place, const std::string& text,
+                     const Eigen::Vector2d& shift) {
+    svg_.add({"<text transform=\"translate(", svg_.pair(at(place) + shift, " "), ") rotate(-90)\">",
+              escape_html(text), "</text>"});
+  }
+  /// A dimension between two places with the same x or the same y, `off` beside them.
+  void dimension(const Eigen::Vector2d& from, const Eigen::Vector2d& to, double off,
+                 const std::string& text) {
+    const bool level = from.y() == to.y();
+    const Eigen::Vector2d shift = level ? Eigen::Vector2d(0.0, off) : Eigen::Vector2d(off, 0.0);
+    const Eigen::Vector2d a = at(from) + shift;
+    const Eigen::Vector2d b = at(to) + shift;
+    svg_.line(a, b, "stroke=\"#1a1f24\" marker-start=\"url(#tick)\" marker-end=\"url(#tick)\"");
+    const Eigen::Vector2d middle = 0.5 * (a + b);
+    const Eigen::Vector2d beside =
+        middle - (level ? Eigen::Vector2d(0.0, 5.0) : Eigen::Vector2d(5.0, 0.0));
+    const std::string turn =
+        level ? "" : " transform=\"rotate(-90 " + svg_.pair(beside, " ") + ")\"";
+    svg_.text(beside, "text-anchor=\"middle\"" + turn, text);
+  }
+  void zero() {
+    svg_.circle(at({0.0, 0.0}), "r=\"5\" fill=\"#fff\" stroke=\"#a3161a\" stroke-width=\"2.5\"");
+    words({0.0, 0.0}, "X0 Y0", "end", {-9.0, 16.0});
+  }
+  [[nodiscard]] std::string result() const {
+    return svg_.drawing(
+        joined({"viewBox=\"0 0 ", decimal_text(width(), 0), " ", decimal_text(height(), 0),
+                "\" role=\"img\" aria-label=\"Coupon from above\" "
+                "font-family=\"Arial, sans-serif\" font-size=\"13\""}));
+  }
+
+ private:
+  [[nodiscard]] double x(double mm) const { return kMargin + scale_ * mm; }
+  [[nodiscard]] double y(double mm) const { return height() - kMargin - scale_ * mm; }
+  [[nodiscard]] Eigen::Vector2d at(const Eigen::Vector2d& mm) const {
+    return {x(mm.x()), y(mm.y())};
+  }
+
+  const CouponLayout& layout_;
+  Eigen::Vector2d size_;
+  double scale_ = 1.0;
+  SvgWriter svg_{2};
+};
+
+void draw_pads(const CouponLayout& layout, Drawing& drawing) {
+  for (std::size_t i = 0; i < layout.pads.size(); ++i) {
+    const Eigen::AlignedBox2d& box = layout.pads[i].box;
+    const Eigen::Vector2d low = layout.xy(box.min().x(), box.min().y());
+    const Eigen::Vector2d high = layout.xy(box.max().x(), box.max().y());
+    drawing.box(low, high, "fill=\"#b9d3ea\" stroke=\"#0b5cad\"");
+    const std::string name = feature_name('P', i);
+    const std::string pitch = trimmed_decimal(layout.pads[i].pitch, 3);
+    if (layout.along == 0) {
+      const Eigen::Vector2d middle = 0.5 * (low + high);
+      drawing.words(middle, name, "middle", {0.0, -4.0});
+      drawing.words(middle, pitch, "middle", {0.0, 13.0});
+    } else {
+      drawing.words({high.x(), 0.5 * (low.y() + high.y())}, joined({name, " ", pitch}), "start",
+                    {7.0, 4.5});
+    }
+  }
+}
+
+void draw_grooves(const CouponLayout& layout, Drawing& drawing) {
+  for (std::size_t i = 0; i < layout.grooves.size(); ++i) {
+    const CouponGroove& groove = layout.grooves[i];
+    drawing.cut(groove);
+    const Eigen::Vector2d end = layout.xy(groove.along_end + layout.radius, groove.across);
+    if (layout.along == 0) {
+      drawing.words(end, feature_name('G', i), "start", {5.0, 4.5});
+    } else {
+      drawing.words_upwards(end, feature_name('G', i), {4.5, -5.0});
+    }
+  }
+  for (std::size_t i = 0; i < layout.marks.size(); ++i) {
+    const CouponGroove& mark = layout.marks[i];
+    drawing.cut(mark);
+    const Eigen::Vector2d middle =
+        layout.xy(0.5 * (mark.along_begin + mark.along_end), mark.across);
+    drawing.words(middle, i == 0 ? "A" : "B", "middle",
+                  layout.along == 0 ? Eigen::Vector2d(0.0, -8.0) : Eigen::Vector2d(-10.0, 4.0));
+  }
+}
+
+void draw_dimensions(const CouponLayout& layout, Drawing& drawing) {
+  const Eigen::Vector2d size = layout.xy(layout.size.x(), layout.size.y());
+  const auto mm = [](double value) { return trimmed_decimal(value, 3); };
+  drawing.dimension({0.0, 0.0}, {size.x(), 0.0}, 46.0, mm(size.x()));
+  drawing.dimension({0.0, 0.0}, {0.0, size.y()}, -44.0, mm(size.y()));
+  const double end = layout.size.x();
+  const Eigen::Vector2d a = layout.xy(end, layout.marks[0].across);
+  const Eigen::Vector2d b = layout.xy(end, layout.marks[1].across);
+  drawing.dimension(a, b, layout.along == 0 ? 34.0 : -24.0, "A–B " + mm(layout.mark_distance()));
+}
+
+}  // namespace
+
+std::string coupon_drawing(const CouponLayout& layout) {
+  Drawing drawing(layout);
+  drawing.box({0.0, 0.0}, layout.xy(layout.size.x(), layout.size.y()),
+              "fill=\"#eef4fa\" stroke=\"#1a1f24\" stroke-width=\"2\"");
+  draw_pads(layout, drawing);
+  draw_grooves(layout, drawing);
+  draw_dimensions(layout, drawing);
+  drawing.zero();
+  return drawing.result();
+}
+
+namespace {
+
+constexpr double kMicrometres = 1e3;
+
+constexpr const char* kHowMarks =
+    "distance, centre to centre: calliper's points in the marks, or a measuring microscope";
+
+using Rows = std::vector<std::vector<std::string>>;
+
+const std::array<TableColumn, 6> kColumns{{{"where"},
+                                           {"programmed", true},
+                                           {"what, and with what"},
+                                           {"expected", true},
+                                           {"key under its name"},
+                                           {"read off"}}};
+
+std::string mm(double value) { return trimmed_decimal(value, 4) + " mm"; }
+std::string um(double value) { return number_text(kMicrometres * value, 3) + " µm"; }
+std::string rough_um(double value) { return number_text(kMicrometres * value, 2) + " µm"; }
+std::string code(const std::string& text) { return element("code", "", escape_html(text)); }
+
+std::string before_table(const CouponSheet& sheet) {
+  const CouponReadings& expected = sheet.expected;
+  Rows rows;
+  for (const MarkReadings& mark : expected.marks) {
+    rows.push_back({"A to B", mm(mark.programmed), kHowMarks, mm(mark.distance->value),
+                    code("distance_mm"), ""});
+  }
+  for (std::size_t i = 0; i < expected.grooves.size(); ++i) {
+    const GrooveReadings& groove = expected.grooves[i];
+    rows.push_back({feature_name('G', i), mm(groove.depth) + " deep",
+                    "width at the top: microscope with a scale", mm(groove.width->value),
+                    code("width_mm"), ""});
+  }
+  for (std::size_t i = 0; i < expected.pads.size(); ++i) {
+    const PadReadings& pad = expected.pads[i];
+    rows.push_back({feature_name('P', i), "pitch " + mm(pad.pitch),
+                    "height of the scallops: Rz of a roughness tester across the passes",
+                    um(pad.before->value), code("before_um"), ""});
+  }
+  return html_table(kColumns, rows);
+}
+
+std::string after_table(const CouponSheet& sheet) {
+  Rows rows;
+  for (std::size_t i = 0; i < sheet.expected.pads.size(); ++i) {
+    const PadReadings& pad = sheet.expected.pads[i];
+    const std::string name = feature_name('P', i);
+    const std::string pitch = "pitch " + mm(pad.pitch);
+    if (pad.after) {
+      rows.push_back({name, pitch,
+                      "height of the ripples: the same roughness tester, or an interferometer",
+                      um(pad.after->value), code("after_um"), ""});
+    }
+    if (!pad.orders) continue;
+    rows.push_back(
+        {name, pitch,
+         "light of a first spot over that of the middle one: laser pointer and light meter",
+         number_text(pad.orders->value, 2), code("order_ratio"), ""});
+  }
+  return html_table(kColumns, rows);
+}
+
+/// Expected accuracy of all readings together.
+std::string known(const CouponFit& fit) {
+  const auto words = [](const char* name, const FittedValue& value, const std::string& text) {
+    return std::string(name) + " to " +
+           (value.determined ? text : std::string("no useful accuracy"));
+  };
+  const std::string sigma = words("the polish's σ", fit.sigma, rough_um(fit.sigma.uncertainty));
+  const std::string ball =
+      words("the ball's diameter", fit.diameter, rough_um(fit.diameter.uncertainty));
+  const std::string pitch = words("the pitch error", fit.pitch_error,
+                                  number_text(100.0 * fit.pitch_error.uncertainty, 2) + " %");
+  return element(
+      "p", "",
+      escape_html("With every reading of this sheet, and the uncertainties that the file "
+                  "states, the fit tells " +
+                  sigma + ", " + ball + " and " + pitch + "."));
+}
+
+/// Distance of the first spot from the middle one on the first pad, a metre behind it.
+std::string spot_distance(const CouponSheet& sheet) {
+  constexpr double kMetre = 1000.0;
+  const double angle = sheet.expected.light.wavelength / sheet.layout.pads.front().pitch;
+  return trimmed_decimal(kMetre * angle, 1) + " mm";
+}
+
+std::string warnings(const CouponSheet& sheet) {
+  if (sheet.warnings.empty()) return "";
+  std::string items;
+  for (const std::string& warning : sheet.warnings) {
+    items += element("p", "", escape_html(warning));
+  }
+  return element("div", "class=\"warnings\"", items);
+}
+
+double shallowest(const CouponLayout& layout) {
+  double least = layout.grooves.front().depth;
+  for (const CouponGroove& groove : layout.grooves) least = std::min(least, groove.depth);
+  return least;
+}
+
+}  // namespace
+
+std::string coupon_sheet(const CouponSheet& sheet) {
+  const CouponLayout& layout = sheet.layout;
+  const Eigen::Vector2d size = layout.xy(layout.size.x(), layout.size.y());
+  const std::string blank =
+      mm(size.x()) + " x " + mm(size.y()) + ", " + mm(sheet.thickness) + " thick";
+  const std::string along =
+      std::string("Passes run along ") + (layout.along == 0 ? "X" : "Y") +
+      ". Pads, with their pitches: " + mm(layout.pads.front().box.sizes().x()) +
+      " along the passes, " + mm(layout.pads.front().box.sizes().y()) + " across, " +
+      mm(layout.pad_depth) + " deep.";
+  const std::array<std::pair<std::string_view, std::string>, 14> values{{
+      {"PROGRAM", program_mark()},
+      {"STYLE", std::string(coupon_page::kStyle)},
+      {"TOOL", escape_html(sheet.tool)},
+      {"TIME", duration_text(sheet.minutes)},
+      {"WARNINGS", warnings(sheet)},
+      {"DRAWING", coupon_drawing(layout)},
+      {"ALONG", along},
+      {"BLANK", blank},
+      {"SHALLOWEST", mm(shallowest(layout))},
+      {"FILES", escape_html(sheet.files)},
+      {"KNOWN", known(sheet.known)},
+      {"BEFORE", before_table(sheet)},
+      {"AFTER", after_table(sheet)},
+      {"SPOTS", spot_distance(sheet)},
+  }};
+  return fill_in(coupon_page::kHtml, values);
 }
 
 }  // namespace lensforge

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <string>
 
-#include "cam/coupon/coupon_model.h"
+#include "cam/coupon/coupon_readings.h"
 #include "cam/post/program_writer.h"
 #include "core/error.h"
 #include "core/text/number_text.h"

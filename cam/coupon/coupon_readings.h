@@ -1,16 +1,79 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <array>
+#include <cstddef>
+#include <numbers>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "cam/coupon/coupon_layout.h"
-#include "cam/coupon/coupon_model.h"
 #include "cam/workshop/workshop.h"
 
 namespace lensforge {
+
+/// Light for measuring a coupon's orders of diffraction through the blank.
+struct CouponLight {
+  double wavelength = 532e-6;  ///< In air, mm.
+  double ior = 1.49;           ///< Of the blank.
+
+  /// Phase delay of a millimetre of the blank against air, rad/mm.
+  [[nodiscard]] double phase() const { return 2.0 * std::numbers::pi * (ior - 1.0) / wavelength; }
+};
+
+/// Width of a groove that a ball cuts in one pass, at the top of the blank: 2 √(d (2R − d)), and 2R
+/// from d = R on. mm; 0 for d ≤ 0.
+double groove_width(double radius, double depth);
+
+/// Height of the scallops between passes of a ball on a plane: R − √(R² − p²/4), mm; R where passes
+/// do not meet.
+double scallop_height(double radius, double pitch);
+
+/// The profile across the passes of a ball on a plane after polishing: arcs of radius R, repeated
+/// every p, averaged with a Gaussian, which leaves exp(−2π²n²σ²/p²) of the n-th harmonic.
+class PolishedScallop {
+ public:
+  /// mm. @pre radius > 0, pitch > 0, sigma ≥ 0.
+  PolishedScallop(double radius, double pitch, double sigma);
+
+  /// From valley to crest, mm; relative error below 3e-4 for σ from 0.02 to 0.5 p (test
+  /// CouponModel.PolishedScallops…).
+  [[nodiscard]] double height() const;
+
+  /// Intensity of each of the two first orders of diffraction over that of the zeroth, for light
+  /// that passes at right angles to the plane: |c₁|² / |c₀|², c_k the coefficients of exp(i φ z).
+  /// @param phase  2π (n − 1) / λ of the light, rad/mm.
+  [[nodiscard]] double order_ratio(double phase) const;
+
+ private:
+  static constexpr std::size_t kNodes = 256;  ///< A period; crest and valleys are nodes.
+  static constexpr std::size_t kHarmonics = kNodes / 2 + 1;
+
+  [[nodiscard]] double at(std::size_t node) const;
+
+  std::array<double, kHarmonics> waves_{};  ///< Amplitudes of the cosines, mm.
+  std::size_t count_ = 0;                   ///< Number of leading waves that are not zero.
+};
+
+/// Parameters of a coupon's measurements; mm.
+struct CouponState {
+  double sigma = 0.0;          ///< Of the polish.
+  double radius = 0.2;         ///< Of the ball as it cuts, run-out and wear included.
+  double pitch_error = 0.0;    ///< Share of a length, across the passes.
+  double groove_offset = 0.0;  ///< Excess depth of grooves over the program: the touch-off.
+
+  /// Values of the workshop's file.
+  static CouponState of(const Workshop& workshop);
+
+  // Expected measurements of programmed features.
+  [[nodiscard]] double mark_distance(double programmed) const;
+  [[nodiscard]] double groove_width(double depth) const;
+  [[nodiscard]] double scallop_before(double pitch) const;
+  [[nodiscard]] double scallop_after(double pitch) const;
+  [[nodiscard]] double order_ratio(double pitch, const CouponLight& light) const;
+};
 
 /// A measured value with its standard uncertainty (one σ), > 0; both in the same unit.
 struct Reading {

@@ -11,7 +11,7 @@
 #include <numbers>
 #include <string>
 
-#include "cam/path/rough_passes.h"
+#include "cam/path/rough.h"
 #include "cam/workshop/tool.h"
 #include "core/error.h"
 #include "core/text/number_text.h"

@@ -10,7 +10,6 @@
 #include "cam/milled/mould.h"
 #include "cam/path/pencil.h"
 #include "cam/path/rough.h"
-#include "cam/path/rough_passes.h"
 #include "core/error.h"
 #include "core/text/number_text.h"
 

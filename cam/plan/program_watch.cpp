@@ -5,7 +5,7 @@
 #include <span>
 #include <utility>
 
-#include "cam/path/rough_passes.h"
+#include "cam/path/rough.h"
 #include "core/page/html_page.h"
 #include "core/text/number_text.h"
 

@@ -8,10 +8,9 @@
 #include <string>
 #include <vector>
 
+#include "machine/sim/sim_firmware.h"
 #include "machine/sim/sim_gcode.h"
 #include "machine/sim/sim_queue.h"
-#include "machine/sim/sim_settings.h"
-#include "machine/sim/sim_state.h"
 
 namespace lensforge {
 

@@ -10,7 +10,7 @@
 
 #include "cam/cam.h"
 #include "cam/cam_meshes.h"
-#include "cam/job/nest_plan.h"
+#include "cam/job/nest_job.h"
 #include "cam/post/program_reader.h"
 #include "cam/rs274_interpreter.h"
 #include "core/error.h"

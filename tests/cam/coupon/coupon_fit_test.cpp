@@ -4,7 +4,7 @@
 #include <gmock/gmock.h>
 
 #include "cam/coupon/coupon_layout.h"
-#include "cam/coupon/coupon_model.h"
+#include "cam/coupon/coupon_readings.h"
 #include "core/error.h"
 #include "core/temp_folder.h"
 

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "cam/coupon/coupon_model.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <complex>
 #include <numbers>
+
+#include "cam/coupon/coupon_readings.h"
 
 namespace lensforge {
 namespace {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "cam/coupon/coupon_sheet.h"
-
 #include <gmock/gmock.h>
 
 #include <string>
+
+#include "cam/coupon/coupon_job.h"
 
 namespace lensforge {
 namespace {

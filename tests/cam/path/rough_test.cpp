@@ -14,7 +14,6 @@
 #include "cam/cam_meshes.h"
 #include "cam/contact/profile_cutter.h"
 #include "cam/dexel_stock.h"
-#include "cam/path/rough_passes.h"
 #include "core/error.h"
 
 namespace lensforge {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "cam/tolerance/polish_filter.h"
+#include "cam/tolerance/part_model.h"
 
 namespace lensforge {
 namespace {
