@@ -2,8 +2,8 @@
 #pragma once
 
 #include "core/optics/optical_setup.h"
+#include "core/schema/description.h"
 #include "core/surface/surface_model.h"
-#include "core/text/option_field.h"
 
 namespace lensforge {
 
@@ -14,7 +14,7 @@ struct RenderOptions {
 };
 
 /// Every option of a rendering. A width of the picture keeps its proportions and centre, a count of
-/// pixels the proportions: set in the table's order.
-const OptionTable<RenderOptions>& render_fields();
+/// pixels the proportions: set in this order.
+void describe(Description& d, RenderOptions& o);
 
 }  // namespace lensforge

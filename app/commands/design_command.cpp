@@ -44,8 +44,8 @@
 #include "core/optics/source_points.h"
 #include "core/page/html_text.h"
 #include "core/page/light_drawing.h"
+#include "core/schema/json.h"
 #include "core/surface/spline_file.h"
-#include "core/text/json_text.h"
 #include "core/text/printable.h"
 #include "core/text/version.h"
 #include "design/design_estimate.h"
@@ -64,16 +64,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The rows of `cam` that determine the milled part.
-const OptionTable<CamOptions>& part_fields() {
-  static const OptionTable<CamOptions> fields = [] {
-    OptionTable<CamOptions> rows;
-    for (const auto& row : cam_fields()) {
-      if (row.name == "--part" || row.name == "--shrinkage") rows.push_back(row);
-    }
-    return rows;
-  }();
-  return fields;
+/// The options of `cam` that determine the milled part.
+Description part_options(CamOptions& cut) {
+  return description_of(cut).only({"--part", "--shrinkage"});
 }
 
 MadeBy process_of(const Workshop& shop, const DesignSettings& settings) {
@@ -89,13 +82,13 @@ MadeBy process_of(const Workshop& shop, const DesignSettings& settings) {
 }
 
 /// @throw InputError unless nothing is said of how a part is made.
-void refuse_part_options(const OptionSet& options) {
+void refuse_part_options(const OptionSet& options, CamOptions& cut) {
   if (options.given("--robust")) {
     throw InputError("--robust: needs --made-by, which says how the part is made");
   }
-  for (const auto& row : part_fields()) {
-    if (options.given(row.name)) {
-      throw InputError(row.name + ": needs --made-by, which says how the part is made");
+  for (const Field& field : part_options(cut)) {
+    if (options.given(field.name)) {
+      throw InputError(field.name + ": needs --made-by, which says how the part is made");
     }
   }
 }
@@ -127,8 +120,8 @@ void add_design_options(OptionSet& options, DesignSettings& settings) {
   options.positional("TARGET", settings.target,
                      "picture to project: PNG, JPEG, TIFF, EXR, SVG, ...");
   options.required_text("--out", settings.out, "DIR", "lens folder to write");
-  options.fields(design_fields(), settings.design);
-  options.fields(light_fields(), settings.design.light);
+  options.fields(settings.design);
+  options.fields(settings.design.light);
   options.text("--source-picture", settings.source_picture, "FILE",
                "picture of the lamp as seen from the lens, as wide as --source-angle or "
                "--source-size; without it the lamp is an evenly lit disc");
@@ -136,14 +129,14 @@ void add_design_options(OptionSet& options, DesignSettings& settings) {
       "--outline", settings.outline, "rectangle|circle|rounded:R|FILE",
       "edge of the lens: the largest circle, corners of radius R, or the shape that is white "
       "in a picture, seen from the cutter's side");
-  options.fields(background_fields(), settings.background);
-  options.fields(weight_fields(), settings.design.weights);
+  options.fields(settings.background);
+  options.fields(settings.design.weights);
   options.text("--made-by", settings.made_by, "default|FILE.toml",
                "shape the part that this workshop cuts and polishes, not the surface alone");
   options.flag("--robust", settings.robust,
                "with --made-by: right on average over parts that are polished less and more by the "
                "workshop's tolerances.polish_sigma; takes twice as long");
-  options.fields(part_fields(), settings.cut);
+  options.add(part_options(settings.cut));
   options.text("--live", settings.live, "PORT",
                "serve a page that shows the design while it runs, to browsers on this machine; 0 "
                "takes a free port");
@@ -174,7 +167,7 @@ void settle(OptionSet& options, DesignSettings& settings, const Image& picture,
   }
   Workshop workshop;
   if (settings.made_by.empty()) {
-    refuse_part_options(options);
+    refuse_part_options(options, settings.cut);
     if (!options.given("--model")) {
       const int pixels = std::min(settings.design.pixels, longer);
       settings.design.model =

@@ -380,7 +380,7 @@ int info_command(const Arguments& command_line) try {
   OptionSet options("info", "Says what a lens folder, solid, mesh, picture or G-code program is.");
   options.positional("SOURCE", source, "lens folder, solid, mesh, picture or G-code program");
   Background background;
-  options.fields(background_fields(), background);
+  options.fields(background);
   options.parse(command_line);
   std::optional<Description> described = describe(source, options.common());
   if (described && options.given("--background")) {

@@ -212,18 +212,8 @@ py::object design(const py::object& picture, const app::Arguments& words) {
 // --- render
 
 /// Render options for a lens in one colour.
-const OptionTable<RenderOptions>& lens_render_fields() {
-  static const OptionTable<RenderOptions> table = [] {
-    OptionTable<RenderOptions> rows = render_fields();
-    std::erase_if(
-        rows, [](const auto& row) { return row.name == "--wavelengths" || row.name == "--abbe"; });
-    return rows;
-  }();
-  return table;
-}
-
 void add_render_options(app::OptionSet& options, RenderOptions& render) {
-  options.fields(lens_render_fields(), render);
+  options.add(description_of(render).except({"--wavelengths", "--abbe"}));
 }
 
 /// The picture that a lens projects, in its target's light.

@@ -16,8 +16,8 @@
 #include "core/error.h"
 #include "core/io/files.h"
 #include "core/io/pending_files.h"
+#include "core/schema/toml.h"
 #include "core/text/number_text.h"
-#include "core/text/toml_fields.h"
 
 namespace lensforge {
 namespace {

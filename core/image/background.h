@@ -4,9 +4,9 @@
 #include <array>
 #include <string>
 
-#include "core/text/option_field.h"
-
 namespace lensforge {
+
+class Description;
 
 /// sRGB colour behind the transparent parts of a picture.
 struct Background {
@@ -22,6 +22,6 @@ struct Background {
 };
 
 /// The option for all commands that read pictures.
-const OptionTable<Background>& background_fields();
+void describe(Description& d, Background& background);
 
 }  // namespace lensforge

@@ -15,6 +15,7 @@
 #include "core/image/height_grid.h"
 #include "core/image/image_io.h"
 #include "core/io/files.h"
+#include "core/schema/json.h"
 #include "core/surface/height_field_check.h"
 #include "core/surface/lens_surface.h"
 #include "core/surface/mesh_cut.h"
@@ -23,8 +24,6 @@
 #include "core/surface/setup_json.h"
 #include "core/surface/spline_file.h"
 #include "core/surface/spline_surface.h"
-#include "core/text/json_fields.h"
-#include "core/text/json_text.h"
 
 namespace lensforge {
 namespace {

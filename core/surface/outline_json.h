@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/optics/outline.h"
-#include "core/text/json_fields.h"
+#include "core/schema/json.h"
 
 namespace lensforge {
 

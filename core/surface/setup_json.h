@@ -6,7 +6,7 @@
 #include <string>
 
 #include "core/optics/optical_setup.h"
-#include "core/text/json_fields.h"
+#include "core/schema/json.h"
 
 namespace lensforge {
 

@@ -9,9 +9,8 @@
 
 #include "core/error.h"
 #include "core/io/files.h"
+#include "core/schema/json.h"
 #include "core/surface/lens_surface.h"
-#include "core/text/json_fields.h"
-#include "core/text/json_text.h"
 #include "core/text/number_text.h"
 
 // File: the magic line, a JSON header on one line, then x, y and z of every control point as

@@ -6,6 +6,7 @@
 #include "core/io/files.h"
 #include "core/io/output_guard.h"
 #include "core/io/pending_files.h"
+#include "core/schema/json.h"
 #include "core/surface/mesh_io.h"
 #include "core/text/number_text.h"
 #include "core/text/version.h"
@@ -41,8 +42,8 @@ std::string convergence_text(const ReflectResult& result) {
 
 nlohmann::json options_json(const ReflectOptions& options) {
   nlohmann::json json;
-  for (const OptionField<ReflectOptions>& row : reflect_fields()) {
-    json[row.name.substr(2)] = row.get(options);
+  for (const Field& field : description_of(options)) {
+    json[field.name.substr(2)] = json_of(field.get());
   }
   return json;
 }

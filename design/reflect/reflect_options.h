@@ -4,8 +4,11 @@
 #include <filesystem>
 #include <string>
 
-#include "core/text/option_field.h"
 #include "design/reflect/light/goal.h"
+
+namespace lensforge {
+class Description;
+}
 
 namespace lensforge::reflect {
 
@@ -54,7 +57,7 @@ struct ReflectOptions {
 };
 
 /// The options as the command has them.
-const OptionTable<ReflectOptions>& reflect_fields();
+void describe(Description& d, ReflectOptions& o);
 
 /// @throw InputError naming option, value and rule.
 void validate(const ReflectOptions& options);

@@ -24,9 +24,8 @@
 
 #include "core/error.h"
 #include "core/io/files.h"
+#include "core/schema/json.h"
 #include "core/surface/mesh_normals.h"
-#include "core/text/json_fields.h"
-#include "core/text/json_text.h"
 #include "core/text/printable.h"
 #include "core/text/version.h"
 

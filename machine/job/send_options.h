@@ -5,13 +5,14 @@
 #include <string>
 #include <vector>
 
-#include "core/text/option_field.h"
 #include "machine/guard/register_map.h"
 #include "machine/guard/spindle_guard.h"
 #include "machine/stream/resume_plan.h"
 #include "machine/stream/sender.h"
 
 namespace lensforge {
+
+class Description;
 
 /// Options for sending a program to a machine.
 struct SendOptions {
@@ -39,7 +40,7 @@ struct SendOptions {
 };
 
 /// Every option of a job.
-const OptionTable<SendOptions>& send_fields();
+void describe(Description& d, SendOptions& o);
 
 /// @throw InputError for an option that breaks its rule, and for those that exclude each other or
 ///        are missing.

@@ -7,6 +7,7 @@
 #include "core/page/decade_plot.h"
 #include "core/page/html_page.h"
 #include "core/page/html_text.h"
+#include "core/schema/json.h"
 #include "core/text/number_text.h"
 
 namespace lensforge::reflect {
@@ -144,10 +145,10 @@ std::string radar_section(const ReflectResult& result) {
 
 std::string option_section(const ReflectOptions& options) {
   std::vector<NamedText> facts;
-  for (const OptionField<ReflectOptions>& row : reflect_fields()) {
-    const nlohmann::json value = row.get(options);
+  for (const Field& field : description_of(options)) {
+    const nlohmann::json value = json_of(field.get());
     const std::string text = value.is_string() ? value.get<std::string>() : value.dump();
-    if (!text.empty()) facts.push_back({row.name, text});
+    if (!text.empty()) facts.push_back({field.name, text});
   }
   const std::size_t half = (facts.size() + 1) / 2;
   const std::span<const NamedText> all(facts);

@@ -74,16 +74,17 @@ TEST(ReflectCheckpoint, FingerprintChangesWithMeshAndOptions) {
   const ReflectOptions usual;
   const ReflectInput input = prepared_input(shapes::icosphere(1), "mesh", usual);
   std::set<std::uint64_t> seen{reflect_fingerprint(input, usual)};
-  for (const auto& row : reflect_fields()) {
-    ReflectOptions options;
-    const nlohmann::json now = row.get(options);
-    if (row.kind == OptionKind::kFlag) row.set(options, !now.get<bool>());
-    if (row.kind == OptionKind::kText) row.set(options, "x");
-    if (row.kind == OptionKind::kWord) row.set(options, row.words.back());
-    if (row.kind == OptionKind::kWhole) row.set(options, now.get<int>() + 1);
-    if (row.kind == OptionKind::kNumber) row.set(options, now.get<double>() + 1.0);
+  ReflectOptions options;
+  for (const Field& row : description_of(options)) {
+    const FieldValue now = row.get();
+    if (row.kind == FieldKind::kFlag) row.set(!std::get<bool>(now));
+    if (row.kind == FieldKind::kText) row.set("x");
+    if (row.kind == FieldKind::kWord) row.set(row.words.back());
+    if (row.kind == FieldKind::kWhole) row.set(std::get<int>(now) + 1);
+    if (row.kind == FieldKind::kNumber) row.set(std::get<double>(now) + 1.0);
     const bool is_new = seen.insert(reflect_fingerprint(input, options)).second;
     EXPECT_EQ(is_new, row.left_out.empty()) << row.name;
+    row.set(now);
   }
   ReflectInput fixed = input;
   fixed.fixed.assign(static_cast<std::size_t>(input.mesh.vertex_count()), 1);
