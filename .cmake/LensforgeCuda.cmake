@@ -3,7 +3,7 @@
 
 option(LENSFORGE_CUDA "Build for NVIDIA GPUs too, where nvcc is found" ON)
 option(LENSFORGE_CUDA_FMA "Let the GPU contract a·b + c; without, it rounds as the CPU does" OFF)
-set(LENSFORGE_HAS_CUDA OFF)
+set(LENSFORGE_HAS_CUDA OFF CACHE INTERNAL "GPU code is built")
 if(NOT LENSFORGE_CUDA)
   return()
 endif()
@@ -35,7 +35,7 @@ if(NOT CUDAToolkit_FOUND OR NOT TARGET CUDA::cufft)
   message(STATUS "No CUDA runtime or cuFFT of version 12 or later: building for the CPU alone")
   return()
 endif()
-set(LENSFORGE_HAS_CUDA ON)
+set(LENSFORGE_HAS_CUDA ON CACHE INTERNAL "GPU code is built")
 if(NOT DEFINED CMAKE_CUDA20_STANDARD_COMPILE_OPTION)  # CMake 3.25 does not know it.
   set(CMAKE_CUDA20_STANDARD_COMPILE_OPTION -std=c++20)
   set(CMAKE_CUDA20_EXTENSION_COMPILE_OPTION -std=c++20)
@@ -46,8 +46,8 @@ set(CMAKE_CUDA_EXTENSIONS OFF)
 set(CMAKE_CUDA_RUNTIME_LIBRARY Static)
 message(STATUS "GPU: CUDA ${CUDAToolkit_VERSION}, architectures ${CMAKE_CUDA_ARCHITECTURES}")
 
-# How .cu files are compiled; all code that is built beside them knows it by LENSFORGE_CUDA. 20012: Eigen 3.4 marks functions that need no mark. Constexpr functions
-# of the standard library (std::array, std::span) may run on the device.
+# Options of .cu files; LENSFORGE_CUDA tells all code that is built beside them. 20012: Eigen 3.4 marks functions
+# that need no mark. Constexpr functions of the standard library (std::array, std::span) may run on the device.
 add_library(lensforge_cuda_options INTERFACE)
 target_compile_definitions(lensforge_cuda_options INTERFACE LENSFORGE_CUDA)
 target_compile_options(lensforge_cuda_options INTERFACE

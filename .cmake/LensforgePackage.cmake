@@ -13,9 +13,27 @@ install(FILES
   DESTINATION "${package_folder}")
 install(EXPORT lensforgeTargets NAMESPACE lensforge:: DESTINATION "${package_folder}")
 
-# Headers keep their paths: "design/design_lens.h" lies in include/lensforge/design/.
-install(DIRECTORY core design cam export machine
-  DESTINATION "${LENSFORGE_INCLUDE_FOLDER}" FILES_MATCHING PATTERN "*.h")
+# The doors of the rooms, and the headers that they include, are installed; all others are private. Headers keep
+# their paths: "design/design.h" lies in include/lensforge/design/.
+set(LENSFORGE_DOORS
+  core/lens.h core/picture.h design/design.h design/render.h design/reflect.h
+  cam/cam.h machine/send.h machine/gcode.h export/export.h)
+set(public_headers "")
+set(unread ${LENSFORGE_DOORS})
+while(unread)
+  list(POP_FRONT unread header)
+  list(APPEND public_headers "${header}")
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS "${header}")
+  file(STRINGS "${header}" includes REGEX "^#include \"")
+  list(TRANSFORM includes REPLACE "^#include \"(.*)\".*" "\\1")
+  list(APPEND unread ${includes})
+  list(REMOVE_DUPLICATES unread)
+  list(REMOVE_ITEM unread ${public_headers})
+endwhile()
+foreach(header IN LISTS public_headers)
+  cmake_path(GET header PARENT_PATH folder)
+  install(FILES "${header}" DESTINATION "${LENSFORGE_INCLUDE_FOLDER}/${folder}")
+endforeach()
 
 # cpack makes a Debian package of the command, and of the Python module where it is built; what they
 # need is found by dpkg-shlibdeps. The module is for Debian's own Python, which the command is not.

@@ -33,13 +33,14 @@ function(lensforge_install target name)
   install(TARGETS ${target} EXPORT lensforgeTargets ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}")
 endfunction()
 
-# lensforge_room(NAME FOLDER SOURCES ... PUBLIC ... PRIVATE ... [HEADERS ...] [INTERNAL])
+# lensforge_room(NAME FOLDER SOURCES ... PUBLIC ... PRIVATE ... [DOOR ...] [HEADERS ...] [INTERNAL])
 # A static library lensforge_NAME, alias lensforge::NAME, for the sources in FOLDER (relative to the
 # root). Its headers are reached as "FOLDER/header.h" through a link of its own, so that only
-# targets that link the room can include from it: the arrows between rooms are enforced. HEADERS
-# are precompiled beside the common ones. INTERNAL rooms are not installed.
+# targets that link the room can include from it: the arrows between rooms are enforced. DOOR is a
+# header beside FOLDER that comes with the room. HEADERS are precompiled beside the common ones.
+# INTERNAL rooms are not installed.
 function(lensforge_room name folder)
-  cmake_parse_arguments(arg "INTERNAL" "" "SOURCES;PUBLIC;PRIVATE;HEADERS" ${ARGN})
+  cmake_parse_arguments(arg "INTERNAL" "DOOR" "SOURCES;PUBLIC;PRIVATE;HEADERS" ${ARGN})
   add_library(lensforge_${name} STATIC ${arg_SOURCES})
   add_library(lensforge::${name} ALIAS lensforge_${name})
   target_compile_features(lensforge_${name} PUBLIC cxx_std_20)
@@ -48,6 +49,9 @@ function(lensforge_room name folder)
   cmake_path(GET folder PARENT_PATH parent)
   file(MAKE_DIRECTORY "${root}/${parent}")
   file(CREATE_LINK "${CMAKE_SOURCE_DIR}/${folder}" "${root}/${folder}" SYMBOLIC)
+  if(arg_DOOR)
+    file(CREATE_LINK "${CMAKE_SOURCE_DIR}/${arg_DOOR}" "${root}/${arg_DOOR}" SYMBOLIC)
+  endif()
   target_include_directories(lensforge_${name} PUBLIC
     "$<BUILD_INTERFACE:${root}>" "$<INSTALL_INTERFACE:${LENSFORGE_INCLUDE_FOLDER}>")
   target_link_libraries(lensforge_${name}

@@ -18,7 +18,6 @@
 #include "cam/tolerance/tolerance_forecast.h"
 #include "core/error.h"
 #include "core/io/files.h"
-#include "core/io/pending_files.h"
 #include "core/text/number_text.h"
 
 namespace lensforge {

@@ -14,10 +14,9 @@
 #include "cam/plan/cam_options.h"
 #include "cam/report/report_data.h"
 #include "core/compute/executor.h"
-#include "core/compute/run_control.h"
 #include "core/compute/work_estimate.h"
+#include "core/lens/lens.h"
 #include "core/optics/optical_setup.h"
-#include "core/surface/lens.h"
 
 namespace lensforge {
 

@@ -3,9 +3,9 @@
 #include <iostream>
 #include <stdexcept>
 
-#include "core/image/image_io.h"
-#include "core/surface/mesh_io.h"
-#include "design/design_lens.h"
+#include "core/picture.h"
+#include "core/lens.h"
+#include "design/design.h"
 #include "export/files/closed_solid.h"
 #include "export/files/mesh_formats.h"
 

@@ -8,10 +8,10 @@
 #include <string>
 
 #include "core/compute/executor.h"
-#include "core/compute/run_control.h"
 #include "core/compute/work_estimate.h"
-#include "core/image/metrics.h"
-#include "core/surface/lens.h"
+#include "core/image/image.h"
+#include "core/lens/lens.h"
+#include "core/schema/description.h"
 #include "export/files/height_map.h"
 #include "export/solid/step_file.h"
 #include "export/spline/spline_fit.h"

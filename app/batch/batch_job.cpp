@@ -12,7 +12,6 @@
 #include "app/frame/option_set.h"
 #include "core/error.h"
 #include "core/io/files.h"
-#include "core/io/sha256.h"
 #include "core/schema/json.h"
 #include "core/schema/option_text.h"
 #include "core/text/number_text.h"

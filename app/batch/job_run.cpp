@@ -25,9 +25,8 @@
 
 #include "app/frame/command_line.h"
 #include "core/error.h"
-#include "core/io/descriptor.h"
 #include "core/io/files.h"
-#include "core/io/folder_lock.h"
+#include "core/io/lens_folder.h"
 #include "core/text/version.h"
 
 namespace lensforge::app {
@@ -45,7 +44,7 @@ constexpr int kSignalBase = 128;
 constexpr int kCannotStart = 127;
 
 [[noreturn]] void fail(const std::string& what) {
-  throw RunError(what + ": " + std::generic_category().message(errno));
+  throw RunError(what + ": " + system_reason(errno));
 }
 
 Descriptor open_output(const fs::path& path, int how) {

@@ -10,13 +10,14 @@
 #include "app/batch/batch_job.h"
 #include "app/batch/job_run.h"
 #include "app/frame/command_line.h"
+#include "app/frame/command_run.h"
 #include "app/frame/common_output.h"
 #include "app/frame/console.h"
 #include "app/frame/interrupt.h"
 #include "app/frame/option_set.h"
 #include "core/error.h"
 #include "core/io/files.h"
-#include "core/io/output_guard.h"
+#include "core/io/lens_folder.h"
 
 namespace lensforge::app {
 namespace {
@@ -161,7 +162,7 @@ nlohmann::json result_json(const BatchSettings& settings, const std::vector<Batc
                     {"earlier", outcome.earlier},
                     {"seconds", outcome.seconds}});
   }
-  return {{"command", "batch"}, {"out", settings.out}, {"jobs", list}};
+  return {{"out", settings.out}, {"jobs", list}};
 }
 
 std::string result_text(const BatchSettings& settings, const std::vector<BatchJob>& jobs,
@@ -181,18 +182,17 @@ std::string result_text(const BatchSettings& settings, const std::vector<BatchJo
   return text;
 }
 
-int exit_code_of(const BatchRun& run, const std::stop_token& stop) {
+int exit_code(const BatchRun& run, const std::stop_token& stop) {
   if (stop.stop_requested()) return kInterrupted;
   if (run.count(Status::kFailed) + run.count(Status::kBusy) > 0) return kFailed;
   return run.count(Status::kLimitMissed) > 0 ? kLimitMissed : kDone;
 }
 
-int run_batch(const OptionSet& options, const BatchSettings& settings) {
-  const Console console(options.common().json, options.common().quiet);
+CommandResult run(CommandFrame& frame, BatchSettings& settings) {
   const Shard shard = read_shard(settings.shard);
   std::vector<BatchJob> jobs = expanded(read_jobs(settings.jobs_file), read_grid(settings.grid));
   fingerprint_targets(jobs);
-  const int threads = std::max(1, options.executor().concurrency() / settings.parallel);
+  const int threads = std::max(1, frame.options().executor().concurrency() / settings.parallel);
   const BatchPlace place{settings.out, settings.jobs_file, threads, settings.force};
   for (const BatchJob& job : jobs) require_room_for(job, place);
   if (!settings.table.empty()) {
@@ -200,22 +200,20 @@ int run_batch(const OptionSet& options, const BatchSettings& settings) {
   }
   require_writable_folder(settings.out);
   const InterruptWatch interrupt;
-  console.begin();
-  BatchRun run(jobs, shard, place, console);
-  run.run(settings.parallel, interrupt.token());
-  if (!settings.table.empty()) write_whole_file(settings.table, table_of(jobs, run, place));
-  console.result(result_json(settings, jobs, run), result_text(settings, jobs, run));
-  return exit_code_of(run, interrupt.token());
+  frame.console().begin();
+  BatchRun batch(jobs, shard, place, frame.console());
+  batch.run(settings.parallel, interrupt.token());
+  if (!settings.table.empty()) write_whole_file(settings.table, table_of(jobs, batch, place));
+  return {result_json(settings, jobs, batch), result_text(settings, jobs, batch),
+          exit_code(batch, interrupt.token())};
 }
 
 }  // namespace
 
-int batch_command(const Arguments& command_line) {
-  BatchSettings settings;
-  OptionSet options("batch", "Does the jobs of a file, each in a folder of its own.");
-  add_batch_options(options, settings);
-  options.parse(command_line);
-  return run_batch(options, settings);
+int batch_command(const Arguments& arguments) {
+  return run_command<BatchSettings>(
+      {"batch", "Does the jobs of a file, each in a folder of its own.", add_batch_options, run},
+      arguments);
 }
 
 }  // namespace lensforge::app

@@ -21,7 +21,7 @@
 #include "cam/report/verdict.h"
 #include "core/error.h"
 #include "core/io/files.h"
-#include "core/io/folder_lock.h"
+#include "core/io/lens_folder.h"
 #include "core/schema/description.h"
 #include "core/schema/toml_document.h"
 

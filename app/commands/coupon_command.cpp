@@ -7,8 +7,6 @@
 #include "app/frame/command_line.h"
 #include "app/frame/command_run.h"
 #include "app/frame/common_output.h"
-#include "app/frame/console.h"
-#include "app/frame/interrupt.h"
 #include "app/frame/option_set.h"
 #include "cam/coupon/coupon_fit.h"
 #include "cam/coupon/coupon_job.h"
@@ -79,15 +77,13 @@ std::string reading_text(const FittedReading& reading) {
          ", " + fixed(reading.deviation, 1) + " standard deviations off\n";
 }
 
-int fit(const OptionSet& options, const CouponSettings& settings) {
-  const Console console(options.common().json, options.common().quiet);
-  InterruptibleJob job(options.common(), settings.out);
+CommandResult fit(CommandFrame& frame, const CouponSettings& settings) {
+  frame.begin_file(settings.out);
   const CouponFit result =
       fit_workshop({settings.fit, settings.coupon.workshop, settings.workshop_text, settings.out,
-                    settings.coupon.force, [&] { job.begin_writing(); }});
-  nlohmann::json json = {{"command", "coupon"},
-                         {"status", "done"},
-                         {"options", options.used()},
+                    settings.coupon.force, [&] { frame.begin_writing(); }});
+  nlohmann::json json = {{"status", "done"},
+                         {"options", frame.options().used()},
                          {"files", {settings.out}},
                          {"fit", values_json(result)},
                          {"chi_square", result.chi_square},
@@ -106,9 +102,8 @@ int fit(const OptionSet& options, const CouponSettings& settings) {
                                 {"deviation", reading.deviation}});
     text += reading_text(reading);
   }
-  console.result(json, text + "  chi square " + fixed(result.chi_square, 1) + " for " +
-                           std::to_string(result.freedom) + " degrees of freedom\n");
-  return kDone;
+  return {json, text + "  chi square " + fixed(result.chi_square, 1) + " for " +
+                    std::to_string(result.freedom) + " degrees of freedom\n"};
 }
 
 std::string coupon_text(const CouponSettings& settings, const CouponResult& result) {
@@ -119,45 +114,38 @@ std::string coupon_text(const CouponSettings& settings, const CouponResult& resu
 }
 
 nlohmann::json coupon_json(const OptionSet& options, const CouponResult& result) {
-  nlohmann::json json = {{"command", "coupon"},
-                         {"status", result.done() ? "done" : "interrupted"},
+  nlohmann::json json = {{"status", result.done() ? "done" : "interrupted"},
                          {"options", options.used()},
-                         {"files", nlohmann::json::array()},
+                         {"files", files_json(result.files)},
                          {"warnings", result.faults}};
-  for (const fs::path& file : result.files) json["files"].push_back(file.string());
   if (!result.done()) return json;
   json["minutes"] = result.minutes;
   json["expected"] = values_json(result.known);
   return json;
 }
 
-int make(const OptionSet& options, const CouponSettings& settings) {
-  const Console console(options.common().json, options.common().quiet);
+CommandResult make(CommandFrame& frame, const CouponSettings& settings) {
   validate(settings.coupon);
-  const InterruptWatch interrupt;
-  const OutputFolder folder(settings.out, FolderLock::Kind::kExclusive);
-  folder.remove_partial_files(is_name_of_coupon);
-  ProgressDisplay progress(options.common().quiet);
-  const RunControl control(interrupt.token(), progress.sink());
+  frame.begin_folder(settings.out).remove_partial_files(is_name_of_coupon);
   const CouponResult result =
-      make_coupon(settings.coupon, folder.path(), options.executor(), control);
-  for (const std::string& fault : result.faults) console.note("warning: " + fault);
-  console.result(coupon_json(options, result),
-                 result.done() ? coupon_text(settings, result) : "interrupted\n");
-  if (!result.done()) return kInterrupted;
-  return result.faults.empty() ? kDone : kLimitMissed;
+      make_coupon(settings.coupon, settings.out, frame.executor(), frame.control());
+  return {coupon_json(frame.options(), result),
+          result.done() ? coupon_text(settings, result) : "interrupted\n",
+          exit_code(result.done(), result.faults.empty()), result.faults};
+}
+
+CommandResult run(CommandFrame& frame, CouponSettings& settings) {
+  settle(frame.options(), settings);
+  return settings.fit.empty() ? make(frame, settings) : fit(frame, settings);
 }
 
 }  // namespace
 
-int coupon_command(const Arguments& command_line) {
-  CouponSettings settings;
-  OptionSet options("coupon",
-                    "Makes a test piece that calibrates a workshop, or fits the workshop to it.");
-  add_coupon_options(options, settings);
-  options.parse(command_line);
-  settle(options, settings);
-  return settings.fit.empty() ? make(options, settings) : fit(options, settings);
+int coupon_command(const Arguments& arguments) {
+  return run_command<CouponSettings>(
+      {"coupon", "Makes a test piece that calibrates a workshop, or fits the workshop to it.",
+       add_coupon_options, run},
+      arguments);
 }
 
 }  // namespace lensforge::app

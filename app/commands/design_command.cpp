@@ -32,6 +32,7 @@
 #include "cam/plan/cam_options.h"
 #include "cam/workshop/workshop.h"
 #include "core/compute/executor.h"
+#include "core/compute/run_control.h"
 #include "core/compute/work_estimate.h"
 #include "core/error.h"
 #include "core/image/image_io.h"
@@ -39,25 +40,19 @@
 #include "core/io/checkpoint_file.h"
 #include "core/io/files.h"
 #include "core/io/lens_folder.h"
-#include "core/io/output_guard.h"
-#include "core/io/pending_files.h"
-#include "core/optics/source_points.h"
-#include "core/page/html_text.h"
-#include "core/page/light_drawing.h"
+#include "core/optics/light_source.h"
+#include "core/page/drawings.h"
+#include "core/page/html_page.h"
 #include "core/schema/json.h"
-#include "core/surface/spline_file.h"
+#include "core/spline/control_net.h"
 #include "core/text/printable.h"
 #include "core/text/version.h"
-#include "design/design_estimate.h"
-#include "design/design_fields.h"
-#include "design/design_lens.h"
-#include "design/front_setup.h"
-#include "design/light_setup.h"
+#include "design/design.h"
 #include "design/mpi/session.h"
-#include "design/outline_setup.h"
-#include "design/schedule/design_task.h"
-#include "design/schedule/level_plan.h"
-#include "design/source_setup.h"
+#include "design/schedule/levels.h"
+#include "design/setup/light_setup.h"
+#include "design/setup/option_tables.h"
+#include "design/setup/outline_setup.h"
 
 namespace lensforge::app {
 namespace {
@@ -479,8 +474,7 @@ void note_source(const Image& picture, const DesignOptions& design, const Consol
 
 nlohmann::json summary_json(const fs::path& folder, const DesignResult& result) {
   const Lens& lens = result.lens;
-  nlohmann::json summary = {{"command", "design"},
-                            {"out", folder.string()},
+  nlohmann::json summary = {{"out", folder.string()},
                             {"status", lens.provenance["status"]},
                             {"message", result.message},
                             {"pixels", {lens.setup.pixels.x(), lens.setup.pixels.y()}},
@@ -506,33 +500,26 @@ std::string summary_text(const fs::path& folder, const DesignResult& result) {
          fixed(lens.provenance["seconds"].get<double>(), 1) + " s\n";
 }
 
-/// Saves and reports the result. An earlier lens of another design stays until this one is done.
-/// @return the exit code.
-int finish(const OptionSet& options, const ChosenDevice& device, const DesignOptions& design,
-           const OutputFolder& folder, DesignResult& result) {
-  const Console console(options.common().json, options.common().quiet);
+/// Saves the result. An earlier lens of another design stays until this one is done.
+CommandResult finish(CommandFrame& frame, const ChosenDevice& device, const DesignOptions& design,
+                     const fs::path& folder, DesignResult& result) {
   const bool done = result.status == DesignResult::Status::kDone;
-  result.lens.provenance = design_provenance(options, device, design, result);
-  const EarlierDesign earlier = EarlierDesign::in(folder.path());
+  result.lens.provenance = design_provenance(frame.options(), device, design, result);
+  const EarlierDesign earlier = EarlierDesign::in(folder);
   const bool replaces = earlier.lens && !earlier.is_of(fingerprint_text(result.fingerprint));
   const bool keeps = replaces && !done;
   if (result.lens.surface.triangle_count() > 0 && !keeps) {
-    write_design(folder.path(), result, console);
+    write_design(folder, result, frame.console());
   }
   std::error_code ignored;
-  if (done) fs::remove(folder.path() / lens_file::kCheckpoint, ignored);
-  console.result(summary_json(folder.path(), result), summary_text(folder.path(), result));
+  if (done) fs::remove(folder / lens_file::kCheckpoint, ignored);
+  CommandResult outcome{summary_json(folder, result), summary_text(folder, result),
+                        exit_code(done)};
   if (keeps) {
-    console.note(folder.path().string() + " keeps its earlier lens until the new one is done");
+    outcome.notes.push_back(folder.string() + " keeps its earlier lens until the new one is done");
   }
-  if (!done) console.note("interrupted; run the same command with --resume to continue");
-  return done ? kDone : kInterrupted;
-}
-
-int report_finished(const DesignSettings& settings, const Console& console) {
-  console.result({{"command", "design"}, {"out", settings.out}, {"status", "done"}},
-                 settings.out + ": the design is finished, there is nothing to resume\n");
-  return kDone;
+  if (!done) outcome.notes.emplace_back(kContinueWithResume);
+  return outcome;
 }
 
 /// The page of the design, if one is asked for.
@@ -549,33 +536,17 @@ std::unique_ptr<LiveDesign> live_page(const DesignSettings& settings, const Imag
   return page;
 }
 
-/// Observers of a running design.
-struct DesignWatchers {
-  /// Called once, when the library has accepted all its input. Impossible requests are only
-  /// detected after the first transport, before any progress is reported.
-  std::function<void()> begin;
-  std::function<void()> look;  ///< Whenever there may be something to see.
-};
-
-/// Runs the design.
-DesignResult shape(bool quiet, const Executor& executor, const DesignOptions& design,
-                   const Image& target, const std::stop_token& stop,
-                   const DesignWatchers& watchers) {
-  std::once_flag begun;
-  ProgressDisplay progress(quiet);
-  const auto show = progress.sink();
-  const RunControl control(stop, [&](const Progress& p) {
-    if (p.done > 0.0) {
-      std::call_once(begun, [&] {
-        progress.wipe();
-        watchers.begin();
-      });
-    }
-    if (show) show(p);
-    watchers.look();
+/// Runs the design. Impossible requests are only detected after the first transport, before any
+/// work is reported as done. @param accepted  called once after that, unless it is interrupted.
+DesignResult shape(CommandFrame& frame, const Executor& executor, const DesignOptions& design,
+                   const Image& target, LiveDesign* page, std::function<void()> accepted) {
+  const RunControl shown = frame.control(std::move(accepted));
+  const RunControl control(shown.stop_token(), [&](const Progress& progress) {
+    shown.report(progress);
+    if (page != nullptr) page->look();
   });
   DesignResult result = design_lens(target, design, executor, control);
-  if (result.status != DesignResult::Status::kInterrupted) std::call_once(begun, watchers.begin);
+  if (result.status != DesignResult::Status::kInterrupted) frame.accept();
   return result;
 }
 
@@ -585,10 +556,11 @@ bool is_of_lens(const std::string& name) {
 }
 
 /// Reads target, source's shape, front and outline. Nothing is written yet.
-LoadedImage read_pictures(OptionSet& options, DesignSettings& settings) {
-  InterruptibleJob job(options.common());
-  LoadedImage loaded = read_target(settings, job.control());
-  settle(options, settings, loaded.image, job.control());
+LoadedImage read_pictures(CommandFrame& frame, DesignSettings& settings) {
+  frame.begin_file();
+  const RunControl control = frame.control();
+  LoadedImage loaded = read_target(settings, control);
+  settle(frame.options(), settings, loaded.image, control);
   return loaded;
 }
 
@@ -600,24 +572,42 @@ void refuse_splines_on_ranks(const DesignOptions& design) {
       "--model smooth or facet");
 }
 
-int run(OptionSet& options, DesignSettings& settings) {
-  const Console console(options.common().json, options.common().quiet);
+/// Notes what was accepted, once a design can no longer be refused.
+void note_begin(const DesignSettings& settings, const LoadedImage& loaded,
+                const ChosenDevice& device, const Console& console) {
+  const DesignOptions& design = settings.design;
+  console.begin();
+  if (device.executor.device() != Device::kCpu) {
+    const bool spline = design.model == SurfaceModel::kSpline;
+    console.note("computing on " + device.word +
+                 (spline ? "; the spline on the processor, unlike --model smooth or facet" : ""));
+  }
+  for (const std::string& change : changes_made(loaded, settings)) console.note(change);
+  note_source(loaded.image, design, console);
+  // A design that was killed before its first checkpoint starts at the beginning.
+  if (settings.resume && !design.resume) {
+    console.note("nothing to resume: started the design from the beginning");
+  }
+}
+
+CommandResult run(CommandFrame& frame, DesignSettings& settings) {
+  const Console& console = frame.console();
   const EarlierDesign earlier = EarlierDesign::in(settings.out);
   if (!settings.live.empty()) live_port(settings.live);
   refuse_to_overwrite(settings.out, earlier, settings.resume, settings.force);
-  const LoadedImage loaded = read_pictures(options, settings);
-  const InterruptWatch interrupt;
+  const LoadedImage loaded = read_pictures(frame, settings);
   DesignOptions& design = settings.design;
   refuse_splines_on_ranks(design);
   if (settings.resume && earlier.lens && !earlier.checkpoint) {
     require_finished(settings.out, earlier,
                      fingerprint_text(design_identity(loaded.image, design)));
-    return report_finished(settings, console);
+    return {{{"out", settings.out}, {"status", "done"}},
+            settings.out + ": the design is finished, there is nothing to resume\n"};
   }
   design.checkpoint = fs::path(settings.out) / lens_file::kCheckpoint;
+  const OutputFolder& folder = frame.begin_folder(settings.out);
   const std::unique_ptr<LiveDesign> page = live_page(settings, loaded.image, console);
-  const ChosenDevice device = options.device_executor();
-  const OutputFolder folder(settings.out, FolderLock::Kind::kExclusive);
+  const ChosenDevice device = frame.device_executor();
   if (EarlierDesign::in(settings.out) != earlier) {
     throw InputError("--out " + settings.out +
                      ": another command has changed what is in it; run the command again");
@@ -628,42 +618,18 @@ int run(OptionSet& options, DesignSettings& settings) {
                               static_cast<double>(ranks_here()) / rank_count());
   design.resume = settings.resume && earlier.checkpoint;
   if (expected.seconds > kWorthTelling) console.note("takes " + estimate_words(expected));
-  const auto begin = [&] {
-    console.begin();
+  DesignResult result = shape(frame, device.executor, design, loaded.image, page.get(), [&] {
     folder.remove_partial_files(is_of_lens);
-    if (device.executor.device() != Device::kCpu) {
-      const bool spline = design.model == SurfaceModel::kSpline;
-      console.note("computing on " + device.word +
-                   (spline ? "; the spline on the processor, unlike --model smooth or facet" : ""));
-    }
-    for (const std::string& change : changes_made(loaded, settings)) console.note(change);
-    note_source(loaded.image, design, console);
-    // A design that was killed before its first checkpoint starts at the beginning.
-    if (settings.resume && !design.resume) {
-      console.note("nothing to resume: started the design from the beginning");
-    }
-  };
-  const auto look = [&page] {
-    if (page) page->look();
-  };
-  DesignResult result = shape(options.common().quiet, device.executor, design, loaded.image,
-                              interrupt.token(), {begin, look});
-  return finish(options, device, design, folder, result);
+    note_begin(settings, loaded, device, console);
+  });
+  return finish(frame, device, design, settings.out, result);
 }
 
 }  // namespace
 
-int design_command(const Arguments& command_line) {
-  DesignSettings settings;
-  OptionSet options("design", "Shapes a lens that projects a picture.");
-  add_design_options(options, settings);
-  options.parse(command_line);
-  try {
-    return run(options, settings);
-  } catch (const Interrupted&) {
-    // Interrupted while the picture was read; later the design saves its current state.
-    return report_error("interrupted; nothing was written", kInterrupted, options.common().json);
-  }
+int design_command(const Arguments& arguments) {
+  return run_command<DesignSettings>(
+      {"design", "Shapes a lens that projects a picture.", add_design_options, run}, arguments);
 }
 
 }  // namespace lensforge::app

@@ -9,11 +9,10 @@
 #include "app/frame/console.h"
 #include "app/frame/option_set.h"
 #include "cam/plan/cam_options.h"
-#include "core/compute/run_control.h"
-#include "core/image/background.h"
+#include "core/compute/executor.h"
 #include "core/image/image_io.h"
-#include "design/design_lens.h"
-#include "design/design_options.h"
+#include "design/design.h"
+#include "design/setup/design_options.h"
 
 namespace lensforge::app {
 

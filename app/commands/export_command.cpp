@@ -10,7 +10,6 @@
 #include "app/frame/command_line.h"
 #include "app/frame/command_run.h"
 #include "app/frame/common_output.h"
-#include "app/frame/console.h"
 #include "core/error.h"
 #include "export/export.h"
 
@@ -45,7 +44,7 @@ nlohmann::json certificate(const SplineNet& net) {
   return patches;
 }
 
-void describe_fit(const SplineNet& net, const FitOptions& fit, ExportReport& report) {
+void describe_fit(const SplineNet& net, const FitOptions& fit, CommandResult& report) {
   const FitError error = net.error();
   const auto good =
       std::count_if(net.patches.begin(), net.patches.end(),
@@ -72,7 +71,7 @@ void describe_fit(const SplineNet& net, const FitOptions& fit, ExportReport& rep
                  scientific(error.normal_rms) + " rad\n";
 }
 
-void describe_bound(const NormalBound& bound, ExportReport& report) {
+void describe_bound(const NormalBound& bound, CommandResult& report) {
   report.json["least_possible_normal_error_rad"] = bound.largest;
   report.json["share_no_surface_can_hold"] = bound.share_above;
   report.text +=
@@ -81,7 +80,7 @@ void describe_bound(const NormalBound& bound, ExportReport& report) {
       fixed(100.0 * bound.share_above, 1) + " % of the area no surface holds the limit\n";
 }
 
-void describe_solid(const SolidContent& content, double facets, ExportReport& report) {
+void describe_solid(const SolidContent& content, double facets, CommandResult& report) {
   report.json["faces"] = content.faces;
   report.json["volume_mm3"] = content.volume;
   report.json["mesh_volume_mm3"] = facets;
@@ -90,12 +89,12 @@ void describe_solid(const SolidContent& content, double facets, ExportReport& re
                  "), read back valid and closed\n";
 }
 
-void describe_metrics(const std::string& word, const ImageMetrics& metrics, ExportReport& report) {
+void describe_metrics(const std::string& word, const ImageMetrics& metrics, CommandResult& report) {
   report.json["metrics"][word] = metrics_json(metrics);
   report.text += "  " + word + std::string(10 - word.size(), ' ') + metrics_text(metrics) + "\n";
 }
 
-void describe(const SplineSolid& solid, ExportReport& report) {
+void describe(const SplineSolid& solid, CommandResult& report) {
   describe_solid(solid.content, solid.mesh_volume, report);
   if (solid.fit) {
     describe_fit(solid.net, solid.fit->options, report);
@@ -108,14 +107,14 @@ void describe(const SplineSolid& solid, ExportReport& report) {
   describe_metrics("solid", solid.picture, report);
 }
 
-void describe(const MeshSolid& solid, ExportReport& report) {
+void describe(const MeshSolid& solid, CommandResult& report) {
   report.json["triangles"] = solid.triangles;
   report.json["volume_mm3"] = solid.volume;
   report.text = "  solid     " + std::to_string(solid.triangles) + " triangles, " +
                 fixed(solid.volume / 1000.0, 3) + " cm3\n";
 }
 
-void describe(const HeightMap& map, ExportReport& report) {
+void describe(const HeightMap& map, CommandResult& report) {
   report.json["pixels"] = {map.pixels.columns, map.pixels.rows};
   report.json["pixel_mm"] = map.pixel;
   report.text = "  heights   " + size_text(map.pixels.columns, map.pixels.rows) + " pixels of " +
@@ -129,8 +128,8 @@ void describe(const HeightMap& map, ExportReport& report) {
 
 }  // namespace
 
-ExportReport export_report(const ExportResult& result) {
-  ExportReport report;
+CommandResult export_report(const ExportResult& result) {
+  CommandResult report;
   if (result.splines) describe(*result.splines, report);
   if (result.mesh) describe(*result.mesh, report);
   if (result.heights) describe(*result.heights, report);
@@ -183,33 +182,39 @@ void require_fitting_options(const OptionSet& options, ExportFormat format) {
   }
 }
 
-int export_command(const Arguments& command_line) try {
-  ExportSettings settings;
-  OptionSet options("export", "Writes a lens as a closed solid or height map for other programs.");
-  add_export_options(options, settings);
-  options.parse(command_line);
-  require_fitting_options(options, export_format(settings.options, settings.out));
+namespace {
+
+CommandResult run(CommandFrame& frame, ExportSettings& settings) {
+  require_fitting_options(frame.options(), export_format(settings.options, settings.out));
   validate(settings.options, settings.out);
-  const Console console(options.common().json, options.common().quiet);
   const ExportSource source = read_export_source(settings.source, settings.surface);
-  note_unfinished_design(source.lens, console);
-  InterruptibleJob job(options.common(), settings.out);
-  const ExportHooks hooks{[&](const WorkEstimate& needed) { announce_work(needed, console); },
-                          [&] { job.begin_writing(); }};
-  const ExportResult result = export_lens(source, settings.out, settings.options,
-                                          job.stoppable(options.executor()), job.control(), hooks);
-  ExportReport report = export_report(result);
-  report.json["command"] = "export";
+  note_unfinished_design(source.lens, frame.console());
+  frame.begin_file(settings.out);
+  const ExportHooks hooks{
+      [&](const WorkEstimate& needed) { announce_work(needed, frame.console()); },
+      [&] { frame.begin_writing(); }};
+  const ExportResult result =
+      export_lens(source, settings.out, settings.options, frame.executor(), frame.control(), hooks);
+  CommandResult report = export_report(result);
   report.json["out"] = settings.out;
   report.json["format"] = word_of(result.format);
   report.json["bytes"] = std::filesystem::file_size(settings.out);
-  console.result(report.json, settings.out + "\n" + report.text);
-  if (result.within_tolerance()) return kDone;
-  console.note("warning: the tolerances do not hold everywhere" +
-               remedy_for(*result.splines, settings.surface));
-  return kLimitMissed;
-} catch (const Interrupted&) {
-  return report_interrupted(wants_json(command_line));
+  report.text = settings.out + "\n" + report.text;
+  if (!result.within_tolerance()) {
+    report.exit_code = kLimitMissed;
+    report.notes.push_back("warning: the tolerances do not hold everywhere" +
+                           remedy_for(*result.splines, settings.surface));
+  }
+  return report;
+}
+
+}  // namespace
+
+int export_command(const Arguments& arguments) {
+  return run_command<ExportSettings>(
+      {"export", "Writes a lens as a closed solid or height map for other programs.",
+       add_export_options, run},
+      arguments);
 }
 
 }  // namespace lensforge::app

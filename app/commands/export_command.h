@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include <nlohmann/json.hpp>
 #include <string>
 
+#include "app/frame/command_run.h"
 #include "app/frame/option_set.h"
 #include "export/export.h"
 
@@ -23,12 +23,7 @@ void add_export_options(OptionSet& options, ExportSettings& settings);
 /// @throw InputError naming an option that was given but does not apply to the format.
 void require_fitting_options(const OptionSet& options, ExportFormat format);
 
-/// Report of an export, for programs and for people.
-struct ExportReport {
-  nlohmann::json json;
-  std::string text;
-};
-
-ExportReport export_report(const ExportResult& result);
+/// What was written, without the file itself.
+CommandResult export_report(const ExportResult& result);
 
 }  // namespace lensforge::app

@@ -16,20 +16,19 @@
 #include "app/frame/command_line.h"
 #include "app/frame/command_run.h"
 #include "app/frame/common_output.h"
-#include "app/frame/console.h"
 #include "app/frame/option_set.h"
 #include "core/error.h"
 #include "core/image/image_io.h"
 #include "core/io/files.h"
-#include "core/surface/lens.h"
-#include "core/surface/lit_surface.h"
-#include "core/surface/mesh_io.h"
-#include "core/surface/setup_json.h"
+#include "core/lens/lens.h"
+#include "core/lens/setup_json.h"
+#include "core/mesh/mesh_files.h"
+#include "core/optics/light_path.h"
 #include "core/text/printable.h"
 #include "export/files/mesh_formats.h"
 #include "export/solid/iges_file.h"
 #include "export/solid/step_file.h"
-#include "machine/gcode/program_seal.h"
+#include "machine/gcode.h"
 
 namespace lensforge::app {
 namespace {
@@ -138,11 +137,8 @@ GcodeSummary summarise_gcode(const fs::path& path) {
   return summary;
 }
 
-/// Description of a file, for people and for programs.
-struct Description {
-  nlohmann::json json;
-  std::string text;
-
+/// Description of a file.
+struct Description : CommandResult {
   /// Names and values may come from the file.
   void line(const std::string& foreign_name, const std::string& value) {
     const std::string name = printable_line(foreign_name, 60);
@@ -257,7 +253,7 @@ void describe_provenance(Description& d, const nlohmann::json& provenance) {
 
 Description describe_lens(const fs::path& folder) {
   const Lens lens = read_lens(folder);
-  Description d{{{"kind", "lens"}, {"model", model_name(lens.model)}}, {}};
+  Description d{{{{"kind", "lens"}, {"model", model_name(lens.model)}}}};
   describe_setup(d, lens.setup);
   describe_overhang(d, lens);
   d.line("model", model_name(lens.model));
@@ -275,7 +271,7 @@ Description describe_lens(const fs::path& folder) {
 
 Description describe_gcode(const fs::path& path) {
   const GcodeSummary summary = summarise_gcode(path);
-  Description d{{{"kind", "gcode"}}, {}};
+  Description d{{{{"kind", "gcode"}}}};
   for (const std::string& comment : summary.header) d.line("comment", comment);
   const bool idle = summary.moves == 0 && summary.passed_over == 0;
   d.line("program", std::to_string(summary.lines) + " lines, " + std::to_string(summary.moves) +
@@ -299,11 +295,9 @@ Description describe_gcode(const fs::path& path) {
 }
 
 /// A solid as STEP or IGES.
-Description describe_solid(const fs::path& path, bool iges, const CommonOptions& common) {
-  InterruptibleJob job(common);
-  const SolidContent content =
-      iges ? inspect_iges(path, job.control()) : inspect_step(path, job.control());
-  Description d{{{"kind", "solid"}}, {}};
+Description describe_solid(const fs::path& path, bool iges, const RunControl& control) {
+  const SolidContent content = iges ? inspect_iges(path, control) : inspect_step(path, control);
+  Description d{{{{"kind", "solid"}}}};
   d.line("solids", std::to_string(content.solids) + " with " + std::to_string(content.faces) +
                        " faces, " + (content.valid ? "valid" : "not valid") + ", " +
                        (content.closed ? "closed" : "not closed"));
@@ -320,14 +314,13 @@ Description describe_solid(const fs::path& path, bool iges, const CommonOptions&
 }
 
 Description describe_picture(const fs::path& path, const Background& background,
-                             const CommonOptions& common) {
-  InterruptibleJob job(common);
-  const LoadedImage loaded = read_image(path, job.control(), kDrawnSide, background);
+                             const RunControl& control) {
+  const LoadedImage loaded = read_image(path, control, kDrawnSide, background);
   const auto values = loaded.image.values();
   const double count = static_cast<double>(values.size());
   const double mean = loaded.image.total() / count;
   const double black = static_cast<double>(std::count(values.begin(), values.end(), 0.0F)) / count;
-  Description d{{{"kind", "picture"}}, {}};
+  Description d{{{{"kind", "picture"}}}};
   d.line("picture", size_text(loaded.image.columns(), loaded.image.rows()) + " pixels");
   d.line("mean", fixed(mean, 4) + " of display white, in linear light");
   d.line("exact black", fixed(100.0 * black, 2) + " % of the pixels");
@@ -341,7 +334,7 @@ Description describe_picture(const fs::path& path, const Background& background,
 
 /// A mesh in a package for printers or scenes.
 Description describe_package(const MeshContent& content) {
-  Description d{{{"kind", "mesh"}}, {}};
+  Description d{{{{"kind", "mesh"}}}};
   d.line("format", content.format);
   if (!content.title.empty()) d.line("title", content.title);
   d.line("mesh",
@@ -360,42 +353,56 @@ Description describe_package(const MeshContent& content) {
 }
 
 /// Describes a file that is no picture by its name; empty for a picture.
-std::optional<Description> describe(const fs::path& path, const CommonOptions& common) {
+std::optional<Description> describe(const fs::path& path, CommandFrame& frame) {
   if (is_folder(path)) return describe_lens(path);
   if (has_extension(path, {".ngc", ".nc", ".gcode", ".tap"})) return describe_gcode(path);
   const bool iges = has_extension(path, {".igs", ".iges"});
-  if (iges || is_step_file(path)) return describe_solid(path, iges, common);
+  if (iges || is_step_file(path)) {
+    frame.begin_file();
+    return describe_solid(path, iges, frame.control());
+  }
   if (has_extension(path, {".3mf"})) return describe_package(inspect_3mf(path));
   if (has_extension(path, {".glb"})) return describe_package(inspect_glb(path));
   if (!has_extension(path, {".ply", ".obj", ".stl", ".off"})) return std::nullopt;
-  Description d{{{"kind", "mesh"}}, {}};
+  Description d{{{{"kind", "mesh"}}}};
   describe_mesh(d, read_mesh(path));
   return d;
 }
 
-}  // namespace
-
-int info_command(const Arguments& command_line) try {
+struct InfoSettings {
   std::string source;
-  OptionSet options("info", "Says what a lens folder, solid, mesh, picture or G-code program is.");
-  options.positional("SOURCE", source, "lens folder, solid, mesh, picture or G-code program");
   Background background;
-  options.fields(background);
-  options.parse(command_line);
-  std::optional<Description> described = describe(source, options.common());
-  if (described && options.given("--background")) {
+};
+
+void add_info_options(OptionSet& options, InfoSettings& settings) {
+  options.positional("SOURCE", settings.source,
+                     "lens folder, solid, mesh, picture or G-code program");
+  options.fields(settings.background);
+}
+
+CommandResult run(CommandFrame& frame, InfoSettings& settings) {
+  const std::string& source = settings.source;
+  std::optional<Description> described = describe(source, frame);
+  if (described && frame.options().given("--background")) {
     throw InputError("--background: is for pictures, and " + source + " is none");
   }
-  if (!described) described = describe_picture(source, background, options.common());
-  Description& d = *described;
-  d.json["command"] = "info";
-  d.json["source"] = source;
-  const Console console(options.common().json, options.common().quiet);
-  console.result(d.json,
-                 printable_line(source) + ": " + d.json["kind"].get<std::string>() + "\n" + d.text);
-  return kDone;
-} catch (const Interrupted&) {
-  return report_interrupted(wants_json(command_line));
+  if (!described) {
+    frame.begin_file();
+    described = describe_picture(source, settings.background, frame.control());
+  }
+  described->json["source"] = source;
+  described->text = printable_line(source) + ": " + described->json["kind"].get<std::string>() +
+                    "\n" + described->text;
+  return *described;
+}
+
+}  // namespace
+
+int info_command(const Arguments& arguments) {
+  return run_command<InfoSettings>(
+      {"info", "Says what a lens folder, solid, mesh, picture or G-code program is.",
+       add_info_options, run},
+      arguments);
 }
 
 }  // namespace lensforge::app

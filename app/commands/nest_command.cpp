@@ -20,7 +20,7 @@
 #include "cam/plan/cam_options.h"
 #include "core/error.h"
 #include "core/io/files.h"
-#include "core/io/folder_lock.h"
+#include "core/io/lens_folder.h"
 #include "core/text/number_list.h"
 #include "core/text/number_text.h"
 

@@ -8,8 +8,8 @@
 
 #include "core/image/image_io.h"
 #include "core/image/transfer.h"
-#include "core/optics/image_plane.h"
-#include "core/surface/mesh_normals.h"
+#include "core/mesh/surface_mesh.h"
+#include "core/optics/screen.h"
 
 namespace lensforge::app {
 namespace {

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "core/image/image.h"
-#include "core/surface/lens.h"
+#include "core/lens/lens.h"
 
 namespace lensforge::app {
 

@@ -3,22 +3,18 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <stop_token>
 #include <string>
 #include <system_error>
-#include <utility>
 
 #include "app/frame/command_line.h"
 #include "app/frame/command_run.h"
 #include "app/frame/common_output.h"
 #include "app/frame/console.h"
-#include "app/frame/interrupt.h"
 #include "app/frame/option_set.h"
 #include "core/error.h"
-#include "core/surface/mesh_io.h"
+#include "core/mesh/mesh_files.h"
 #include "core/text/number_text.h"
-#include "design/reflect/reflect_checkpoint.h"
-#include "design/reflect/reflect_job.h"
+#include "design/reflect.h"
 #include "export/solid/solid_reading.h"
 
 namespace lensforge::app {
@@ -40,9 +36,7 @@ namespace fs = std::filesystem;
 
 /// Nothing is written yet: a remeshing, which does not check the stop token, is abandoned with the
 /// process.
-reflect::ReflectInput prepared(const ReflectSettings& settings, const CommonOptions& common) {
-  InterruptibleJob job(common);
-  const RunControl control = job.control();
+reflect::ReflectInput prepared(const ReflectSettings& settings, const RunControl& control) {
   control.report({"reflect, reading the mesh", 0.0, 0.0, ""});
   const SurfaceMesh mesh = is_step_file(settings.mesh) ? read_solid_mesh(settings.mesh, control)
                                                        : read_mesh(settings.mesh);
@@ -53,18 +47,19 @@ reflect::ReflectInput prepared(const ReflectSettings& settings, const CommonOpti
   return input;
 }
 
-reflect::ReflectInput load(const ReflectSettings& settings, const CommonOptions& common,
-                           const Console& console) {
-  reflect::ReflectInput input = prepared(settings, common);
-  for (const std::string& change : input.changes) console.note(settings.mesh + ": " + change);
+reflect::ReflectInput load(CommandFrame& frame, const ReflectSettings& settings) {
+  frame.begin_file();
+  reflect::ReflectInput input = prepared(settings, frame.control());
+  for (const std::string& change : input.changes) {
+    frame.console().note(settings.mesh + ": " + change);
+  }
   return input;
 }
 
 nlohmann::json evaluated(const OptionSet& options, const ReflectSettings& settings,
                          const SurfaceMesh& mesh, const Executor& executor) {
   const reflect::Energies energies = reflect::evaluate(mesh, settings.reflect, executor);
-  nlohmann::json json = {{"command", "reflect"},
-                         {"mesh", settings.mesh},
+  nlohmann::json json = {{"mesh", settings.mesh},
                          {"options", options.used()},
                          {"energy_direct", energies.direct},
                          {"energy", energies.total}};
@@ -76,13 +71,11 @@ nlohmann::json evaluated(const OptionSet& options, const ReflectSettings& settin
   return json;
 }
 
-int evaluate(const OptionSet& options, const ReflectSettings& settings) {
-  const Console console(options.common().json, options.common().quiet);
-  const reflect::ReflectInput input = load(settings, options.common(), console);
-  InterruptibleJob job(options.common());
-  job.control().report({"reflect, evaluating", 0.0, 0.0, ""});
-  const nlohmann::json json =
-      evaluated(options, settings, input.mesh, job.stoppable(options.executor()));
+CommandResult evaluate(CommandFrame& frame, const ReflectSettings& settings) {
+  const reflect::ReflectInput input = load(frame, settings);
+  frame.begin_file();
+  frame.control().report({"reflect, evaluating", 0.0, 0.0, ""});
+  const nlohmann::json json = evaluated(frame.options(), settings, input.mesh, frame.executor());
   std::string text = settings.mesh + "\n  energy of one reflection " +
                      number_text(json["energy_direct"]) + ", of one and two " +
                      number_text(json["energy"]) + "\n";
@@ -90,8 +83,7 @@ int evaluate(const OptionSet& options, const ReflectSettings& settings) {
     text += "  radar cross-section around the horizon " + fixed(json["radar"]["mean_dbsm"], 1) +
             " dBsm on average\n";
   }
-  console.result(json, text);
-  return kDone;
+  return {json, text};
 }
 
 std::string percent(double share, int digits) { return fixed(100.0 * share, digits) + " %"; }
@@ -161,77 +153,45 @@ bool settle_checkpoint(ReflectSettings& settings, const reflect::ReflectInput& i
   return true;
 }
 
-int report_finished(const ReflectSettings& settings, const Console& console) {
-  console.result({{"command", "reflect"}, {"out", settings.out}, {"status", "done"}},
-                 settings.out + ": the run is finished, there is nothing to resume\n");
-  return kDone;
-}
-
-/// Runs the shape. What speaks against it is known before its first update.
-reflect::ReflectResult reflected(const reflect::ReflectInput& input,
-                                 const ReflectSettings& settings, const OptionSet& options,
-                                 const std::stop_token& stop, const Console& console) {
-  ProgressDisplay progress(options.common().quiet);
-  const auto show = progress.sink();
-  const RunControl control(stop, [&, begun = false](const Progress& p) mutable {
-    if (!std::exchange(begun, true)) {
-      progress.wipe();
-      console.begin();
-    }
-    if (show) show(p);
-  });
-  return reflect::reflect_shape(input, settings.reflect, options.executor(), control);
-}
-
-int shape(const OptionSet& options, ReflectSettings& settings) {
-  const Console console(options.common().json, options.common().quiet);
+CommandResult shape(CommandFrame& frame, ReflectSettings& settings) {
   require_no_unfinished_run(settings);
   require_readable_checkpoint(settings);
-  const reflect::ReflectInput input = load(settings, options.common(), console);
-  const InterruptWatch interrupt;
-  const OutputFolder folder(settings.out, FolderLock::Kind::kExclusive);
+  const reflect::ReflectInput input = load(frame, settings);
+  const OutputFolder& folder = frame.begin_folder(settings.out);
   reflect::require_replaceable_result(folder.path(), settings.reflect.force);
   folder.remove_partial_files(is_of_result);
-  if (!settle_checkpoint(settings, input, folder, console)) {
-    return report_finished(settings, console);
+  if (!settle_checkpoint(settings, input, folder, frame.console())) {
+    return {{{"out", settings.out}, {"status", "done"}},
+            settings.out + ": the run is finished, there is nothing to resume\n"};
   }
   const reflect::ReflectResult result =
-      reflected(input, settings, options, interrupt.token(), console);
+      reflect::reflect_shape(input, settings.reflect, frame.executor(),
+                             frame.control([&frame] { frame.console().begin(); }));
   nlohmann::json json = reflect::result_json(result, settings.reflect);
-  json["command"] = "reflect";
-  json["files"] = nlohmann::json::array();
-  for (const fs::path& file :
-       reflect::write_result(result, settings.reflect, folder.path(), options.executor())) {
-    json["files"].push_back(file.string());
-  }
+  json["files"] =
+      files_json(reflect::write_result(result, settings.reflect, folder.path(), frame.executor()));
   std::error_code ignored;
   if (result.done()) fs::remove(settings.reflect.checkpoint, ignored);
-  for (const std::string& unmet : result.unmet) console.note("warning: " + unmet);
-  console.result(json, result_text(settings, result));
-  if (!result.done()) {
-    console.note("interrupted; run the same command with --resume to continue");
-    return kInterrupted;
-  }
-  return result.unmet.empty() ? kDone : kLimitMissed;
+  CommandResult outcome{json, result_text(settings, result),
+                        exit_code(result.done(), result.unmet.empty()), result.unmet};
+  if (!result.done()) outcome.notes.emplace_back(kContinueWithResume);
+  return outcome;
 }
 
-}  // namespace
-
-int reflect_command(const Arguments& command_line) {
-  ReflectSettings settings;
-  OptionSet options("reflect", "Deforms a mesh so that it reflects light as wanted.");
-  add_reflect_options(options, settings);
-  options.parse(command_line);
+CommandResult run(CommandFrame& frame, ReflectSettings& settings) {
   reflect::validate(settings.reflect);
   if (!settings.evaluate && settings.out.empty()) {
     throw InputError("--out: is missing; --out DIR writes a new shape, --evaluate only energies");
   }
-  try {
-    return settings.evaluate ? evaluate(options, settings) : shape(options, settings);
-  } catch (const Interrupted&) {
-    // Interrupted before the first update; later a run keeps its current state.
-    return report_interrupted(options.common().json);
-  }
+  return settings.evaluate ? evaluate(frame, settings) : shape(frame, settings);
+}
+
+}  // namespace
+
+int reflect_command(const Arguments& arguments) {
+  return run_command<ReflectSettings>(
+      {"reflect", "Deforms a mesh so that it reflects light as wanted.", add_reflect_options, run},
+      arguments);
 }
 
 }  // namespace lensforge::app

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "app/frame/option_set.h"
-#include "design/reflect/reflect_options.h"
+#include "design/reflect.h"
 
 namespace lensforge::app {
 

@@ -7,22 +7,19 @@
 #include "app/frame/command_line.h"
 #include "app/frame/command_run.h"
 #include "app/frame/common_output.h"
-#include "app/frame/console.h"
 #include "app/frame/option_set.h"
 #include "core/error.h"
+#include "core/image/color.h"
 #include "core/image/image_io.h"
-#include "core/image/spectral_color.h"
 #include "core/io/files.h"
-#include "core/io/output_guard.h"
-#include "core/optics/light_colors.h"
-#include "core/surface/lens.h"
-#include "core/surface/mesh_io.h"
-#include "core/surface/mesh_normals.h"
-#include "design/design_estimate.h"
-#include "design/fringe.h"
-#include "design/render_fields.h"
-#include "design/render_lens.h"
-#include "design/render_setup.h"
+#include "core/io/lens_folder.h"
+#include "core/lens/lens.h"
+#include "core/mesh/mesh_files.h"
+#include "core/mesh/surface_mesh.h"
+#include "core/optics/optical_setup.h"
+#include "design/design.h"
+#include "design/render.h"
+#include "design/setup/option_tables.h"
 #include "export/solid/solid_reading.h"
 
 namespace lensforge::app {
@@ -59,23 +56,21 @@ void add_render_options(OptionSet& options, RenderArguments& arguments) {
   options.fields(arguments.render);
 }
 
-Scene load_solid(const std::string& source, const Executor& executor, const RunControl& control,
-                 const Console& console) {
-  SolidSurface solid = read_solid_surface(source, kPictureNodes, executor, control);
-  console.note(std::to_string(solid.faces) + (solid.faces == 1 ? " face" : " faces") +
-               (solid.by_name ? " named \"optical surface\""
-                              : " found by shape: the faces that point towards +z"));
+Scene load_solid(const std::string& source, CommandFrame& frame) {
+  SolidSurface solid = read_solid_surface(source, kPictureNodes, frame.executor(), frame.control());
+  frame.console().note(std::to_string(solid.faces) + (solid.faces == 1 ? " face" : " faces") +
+                       (solid.by_name ? " named \"optical surface\""
+                                      : " found by shape: the faces that point towards +z"));
   SampledSurface& samples = solid.samples;
   const RenderOptions render{SurfaceModel::kSmooth, setup_for_mesh(samples.mesh)};
   return {std::move(samples.mesh), std::move(samples.normals), {}, render, {}};
 }
 
-Scene load(const std::string& source, const Executor& executor, const RunControl& control,
-           const Console& console) {
-  if (is_step_file(source)) return load_solid(source, executor, control, console);
+Scene load(const std::string& source, CommandFrame& frame) {
+  if (is_step_file(source)) return load_solid(source, frame);
   if (is_folder(source)) {
     Lens lens = read_lens(source);
-    note_unfinished_design(lens, console);
+    note_unfinished_design(lens, frame.console());
     Scene scene{std::move(lens.surface), {}, {}, {lens.model, lens.setup}, std::move(lens.target)};
     if (lens.spline) scene.spline = picture_nodes(*lens.spline);
     return scene;
@@ -111,8 +106,8 @@ void require_spectrum(const Scene& scene, const OptionSet& options,
 }
 
 /// The scene with everything that the options say instead.
-Scene adjusted(Scene scene, OptionSet& options, RenderArguments& arguments,
-               const RunControl& control, const Console& console) {
+Scene adjusted(Scene scene, CommandFrame& frame, RenderArguments& arguments) {
+  OptionSet& options = frame.options();
   arguments.render = scene.render;
   options.restate();
   scene.render = arguments.render;
@@ -124,10 +119,10 @@ Scene adjusted(Scene scene, OptionSet& options, RenderArguments& arguments,
   require_spectrum(scene, options, arguments);
   const WorkEstimate work = require_room_for_picture(setup, arguments.out);
   if (options.given("--target")) {
-    LoadedImage target =
-        read_image(arguments.target, control, setup.pixels.maxCoeff(), arguments.background);
+    LoadedImage target = read_image(arguments.target, frame.control(), setup.pixels.maxCoeff(),
+                                    arguments.background);
     for (const std::string& change : target.changes) {
-      console.note("--target " + arguments.target + ": " + change);
+      frame.console().note("--target " + arguments.target + ": " + change);
     }
     scene.target = std::move(target.image);
   } else if (options.given("--background")) {
@@ -135,7 +130,7 @@ Scene adjusted(Scene scene, OptionSet& options, RenderArguments& arguments,
   }
   if (scene.target) scene.target = resample(*scene.target, setup.pixels.x(), setup.pixels.y());
   require_wall_above(scene.surface, setup);
-  announce_work(work, console);
+  announce_work(work, frame.console());
   return scene;
 }
 
@@ -265,52 +260,46 @@ void require_picture_name(const std::string& out) {
 }
 
 void write_picture(Rendering& rendering, const Scene& scene, const std::string& out,
-                   InterruptibleJob& job, const Console& console) {
+                   CommandFrame& frame) {
   const bool scale = !rendering.color && !scene.target && fs::path(out).extension() == ".png";
   Image image = rendering.image;
   const float white = scale ? scale_to_white(image) : 0.0F;
-  job.begin_writing();
+  frame.begin_writing();
   if (rendering.color) {
     write_image(*rendering.color, out);
   } else {
-    write_image(image, out, job.control());
+    write_image(image, out, frame.control());
   }
   if (white > 0.0F) {
-    console.note("no target: white is the brightest pixel, " + fixed(white, 2) +
-                 " times even light");
+    frame.console().note("no target: white is the brightest pixel, " + fixed(white, 2) +
+                         " times even light");
   }
   rendering.json["out"] = out;
 }
 
-}  // namespace
-
-int render_command(const Arguments& command_line) try {
-  RenderArguments arguments;
-  OptionSet options("render",
-                    "Renders a lens, mesh or STEP solid and compares it with its target.");
-  add_render_options(options, arguments);
-  options.parse(command_line);
+CommandResult run(CommandFrame& frame, RenderArguments& arguments) {
   require_picture_name(arguments.out);
   if (!arguments.out.empty()) require_replaceable("--out", arguments.out, arguments.force);
-  const Console console(options.common().json, options.common().quiet);
-  InterruptibleJob job(options.common(), arguments.out);
-  const Scene scene =
-      adjusted(load(arguments.source, job.stoppable(options.executor()), job.control(), console),
-               options, arguments, job.control(), console);
-  ChosenDevice device = options.device_executor();
-  device.executor = job.stoppable(device.executor);
-  job.control().report({"picture", 0.0, 0.0, ""});
+  frame.begin_file(arguments.out);
+  const Scene scene = adjusted(load(arguments.source, frame), frame, arguments);
+  const ChosenDevice device = frame.device_executor();
+  frame.control().report({"picture", 0.0, 0.0, ""});
   Rendering rendering = rendered(scene, device.executor);
-  if (!arguments.out.empty()) write_picture(rendering, scene, arguments.out, job, console);
-  rendering.json["command"] = "render";
+  if (!arguments.out.empty()) write_picture(rendering, scene, arguments.out, frame);
   rendering.json["device"] = device.word;
   rendering.json["source"] = arguments.source;
   rendering.json["model"] = model_name(scene.render.model);
   rendering.json["pixels"] = {scene.render.setup.pixels.x(), scene.render.setup.pixels.y()};
-  console.result(rendering.json, arguments.source + "\n" + rendering.text);
-  return kDone;
-} catch (const Interrupted&) {
-  return report_interrupted(wants_json(command_line));
+  return {rendering.json, arguments.source + "\n" + rendering.text};
+}
+
+}  // namespace
+
+int render_command(const Arguments& arguments) {
+  return run_command<RenderArguments>(
+      {"render", "Renders a lens, mesh or STEP solid and compares it with its target.",
+       add_render_options, run},
+      arguments);
 }
 
 }  // namespace lensforge::app

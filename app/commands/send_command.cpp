@@ -13,6 +13,7 @@
 
 #include "app/commands/send_watch.h"
 #include "app/frame/command_line.h"
+#include "app/frame/command_run.h"
 #include "app/frame/common_output.h"
 #include "app/frame/console.h"
 #include "app/frame/interrupt.h"
@@ -20,8 +21,7 @@
 #include "app/frame/terminal_keys.h"
 #include "core/error.h"
 #include "core/text/printable.h"
-#include "machine/job/send_job.h"
-#include "machine/link/port.h"
+#include "machine/send.h"
 
 namespace lensforge::app {
 
@@ -136,8 +136,7 @@ std::string outcome_word(const SendSummary& summary) {
 }
 
 nlohmann::json send_json(const OptionSet& options, const SendSummary& summary) {
-  nlohmann::json json = {{"command", "send"},
-                         {"status", outcome_word(summary)},
+  nlohmann::json json = {{"status", outcome_word(summary)},
                          {"options", options.used()},
                          {"sha256", summary.job.sha256},
                          {"bytes", summary.job.bytes},
@@ -310,47 +309,49 @@ SendSummary watched_job(const OptionSet& options, const SendSettings& settings,
   }
 }
 
-void report(const OptionSet& options, const SendSettings& settings, const Console& console,
-            const SendSummary& summary) {
-  for (const std::string& warning : summary.findings.warnings) {
-    console.note("warning: " + warning);
-  }
-  console.result(send_json(options, summary), send_text(settings, summary));
-  if (!summary.result || summary.result->done()) return;
-  console.note(summary.result->reason + "; " + settings.job.journal_of(settings.file).string() +
-               " records how far the job came; continue with --resume");
-}
-
 int exit_code(const SendSummary& summary) {
   if (summary.result && summary.result->status == SendStatus::kInterrupted) return kInterrupted;
   if (summary.result && !summary.result->done()) return kFailed;
   return summary.facts.time.stream_limited() ? kLimitMissed : kDone;
 }
 
-}  // namespace
+CommandResult report(const OptionSet& options, const SendSettings& settings,
+                     const SendSummary& summary) {
+  CommandResult outcome{send_json(options, summary), send_text(settings, summary),
+                        exit_code(summary), summary.findings.warnings};
+  if (summary.result && !summary.result->done()) {
+    outcome.notes.push_back(summary.result->reason + "; " +
+                            settings.job.journal_of(settings.file).string() +
+                            " records how far the job came; continue with --resume");
+  }
+  return outcome;
+}
 
-int send_command(const Arguments& command_line) {
-  SendSettings settings;
-  OptionSet options("send",
-                    "Streams a G-code program to a Grbl-family controller. Keys while it runs: " +
-                        std::string(kKeyHelp) + ".");
-  add_send_options(options, settings);
-  options.parse(command_line);
+CommandResult run(CommandFrame& frame, SendSettings& settings) {
+  const OptionSet& options = frame.options();
   require_consistent(settings, options.common().json);
-  const Console console(options.common().json, options.common().quiet);
-  console.begin();  // The operator is asked and warned before the machine accepts the job.
+  // The operator is asked and warned before the machine accepts the job.
+  frame.console().begin();
   try {
-    const SendSummary summary = watched_job(options, settings, console);
-    report(options, settings, console, summary);
-    return exit_code(summary);
+    return report(options, settings, watched_job(options, settings, frame.console()));
   } catch (const Interrupted&) {
-    console.note("interrupted; nothing was sent");
-    return kInterrupted;
+    return {.exit_code = kInterrupted, .notes = {"interrupted; nothing was sent"}};
   } catch (const StreamFault& fault) {
     if (fault.cause() != StopCause::kInterrupted) throw;
-    console.note(std::string(fault.what()) + "; nothing of the program was sent");
-    return kInterrupted;
+    return {.exit_code = kInterrupted,
+            .notes = {std::string(fault.what()) + "; nothing of the program was sent"}};
   }
+}
+
+}  // namespace
+
+int send_command(const Arguments& arguments) {
+  return run_command<SendSettings>(
+      {"send",
+       "Streams a G-code program to a Grbl-family controller. Keys while it runs: " +
+           std::string(kKeyHelp) + ".",
+       add_send_options, run},
+      arguments);
 }
 
 }  // namespace lensforge::app

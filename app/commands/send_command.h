@@ -5,8 +5,7 @@
 #include <string>
 
 #include "app/frame/option_set.h"
-#include "machine/job/send_job.h"
-#include "machine/job/send_options.h"
+#include "machine/send.h"
 
 namespace lensforge::app {
 

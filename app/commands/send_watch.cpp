@@ -15,12 +15,12 @@
 #include <ctime>
 #include <sstream>
 #include <string_view>
-#include <system_error>
 #include <utility>
 
 #include "app/frame/common_output.h"
 #include "app/frame/console.h"
 #include "core/error.h"
+#include "core/io/descriptor.h"
 #include "core/text/printable.h"
 #include "core/text/version.h"
 
@@ -196,8 +196,6 @@ namespace {
 /// Bytes read to identify a file: more than any first line of ours.
 constexpr std::size_t kFirstLine = 1 << 16;
 
-std::string reason(int error) { return std::generic_category().message(error); }
-
 [[noreturn]] void refuse(const std::filesystem::path& path, const std::string& why) {
   throw InputError(path.string() + ": " + why);
 }
@@ -227,7 +225,7 @@ bool is_own_terminal(int descriptor) {
 
 void require_own(const std::filesystem::path& path, int descriptor, const SinkKind& kind) {
   struct stat about {};
-  if (::fstat(descriptor, &about) != 0) refuse(path, reason(errno));
+  if (::fstat(descriptor, &about) != 0) refuse(path, system_reason(errno));
   if (S_ISBLK(about.st_mode)) refuse(path, "is a disk; name a file or a pipe");
   if (::isatty(descriptor) != 0 && !is_own_terminal(descriptor)) {
     refuse(path,
@@ -274,7 +272,7 @@ TextSink::TextSink(const std::filesystem::path& path, const SinkKind& kind)
   const int error = errno;
   if (!file_.open()) {
     refuse(path, "cannot be written: " +
-                     (error == ENXIO ? "nobody reads from this pipe" : reason(error)));
+                     (error == ENXIO ? "nobody reads from this pipe" : system_reason(error)));
   }
   if (path != "-") require_own(path, file_.number(), kind);
 }
@@ -301,7 +299,7 @@ std::string TextSink::write(const std::string& line) {
     }
     const int error = errno;
     file_ = Descriptor();
-    return path_.string() + ": not written any more: " + std::generic_category().message(error);
+    return path_.string() + ": not written any more: " + system_reason(error);
   }
   return {};
 }

@@ -12,7 +12,8 @@
 
 #include "app/commands/send_command.h"
 #include "app/frame/option_set.h"
-#include "core/io/descriptor.h"
+#include "core/io/files.h"
+#include "machine/send.h"
 #include "machine/stream/sender.h"
 
 namespace lensforge::app {

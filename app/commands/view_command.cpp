@@ -5,13 +5,12 @@
 #include "app/frame/command_line.h"
 #include "app/frame/command_run.h"
 #include "app/frame/common_output.h"
-#include "app/frame/console.h"
 #include "app/frame/option_set.h"
 #include "app/view/lens_view.h"
 #include "app/view/view_page.h"
 #include "core/error.h"
 #include "core/io/files.h"
-#include "core/io/output_guard.h"
+#include "core/io/lens_folder.h"
 #include "core/text/lower_case.h"
 #include "core/text/printable.h"
 
@@ -61,32 +60,29 @@ std::string summary_text(const LensView& view, const std::string& out, std::uint
   return text;
 }
 
-}  // namespace
-
-int view_command(const Arguments& command_line) try {
-  ViewSettings settings;
-  OptionSet options("view", "Writes a page that draws a lens's light and lets one change it.");
-  add_view_options(options, settings);
-  options.parse(command_line);
+CommandResult run(CommandFrame& frame, ViewSettings& settings) {
   require_page_name(settings.out);
   require_replaceable("--out", settings.out, settings.force);
-  const Console console(options.common().json, options.common().quiet);
-  InterruptibleJob job(options.common(), settings.out);
-  const LensView view =
-      read_view(settings.source, job.stoppable(options.executor()), job.control());
-  for (const std::string& note : view.notes) console.note(note);
+  frame.begin_file(settings.out);
+  const LensView view = read_view(settings.source, frame.executor(), frame.control());
+  for (const std::string& note : view.notes) frame.console().note(note);
   const std::string page = view_page(view);
-  job.begin_writing();
+  frame.begin_writing();
   write_whole_file(settings.out, page);
-  console.result({{"command", "view"},
-                  {"source", settings.source},
-                  {"out", settings.out},
-                  {"bytes", page.size()},
-                  {"surfaces", surfaces_json(view)}},
-                 summary_text(view, settings.out, page.size()));
-  return kDone;
-} catch (const Interrupted&) {
-  return report_interrupted(wants_json(command_line));
+  return {{{"source", settings.source},
+           {"out", settings.out},
+           {"bytes", page.size()},
+           {"surfaces", surfaces_json(view)}},
+          summary_text(view, settings.out, page.size())};
+}
+
+}  // namespace
+
+int view_command(const Arguments& arguments) {
+  return run_command<ViewSettings>(
+      {"view", "Writes a page that draws a lens's light and lets one change it.", add_view_options,
+       run},
+      arguments);
 }
 
 }  // namespace lensforge::app

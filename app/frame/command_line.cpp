@@ -11,7 +11,6 @@
 #include <csignal>
 #include <exception>
 #include <new>
-#include <sstream>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -23,6 +22,7 @@
 #include "core/error.h"
 #include "core/schema/description.h"
 #include "core/text/version.h"
+#include "core/text/words.h"
 #include "design/mpi/session.h"
 
 namespace lensforge::app {
@@ -67,8 +67,7 @@ struct Value {
 /// From the value's placeholder in the help: "FILE.toml", "DIR", "default|FILE.toml".
 Value value_of_text(const std::string& type) {
   Value value;
-  std::istringstream parts(type);
-  for (std::string part; std::getline(parts, part, '|');) {
+  for (const std::string_view part : split(type, '|')) {
     if (part == "DIR" && value.kind == Value::Kind::kFree) {
       value.kind = Value::Kind::kFolder;
     } else if (part.starts_with("FILE") || part == "PICTURE" || part == "PORT") {
@@ -76,7 +75,7 @@ Value value_of_text(const std::string& type) {
       if (part.starts_with("FILE.")) value.extension = part.substr(5);
     } else if (!part.empty() && std::islower(static_cast<unsigned char>(part.front())) != 0) {
       if (value.kind == Value::Kind::kFree) value.kind = Value::Kind::kWords;
-      value.words.push_back(part);
+      value.words.emplace_back(part);
     }
   }
   return value;
@@ -100,12 +99,6 @@ bool is_option(const FieldSpec& spec) { return spec.name.starts_with("--"); }
 /// A help's first clause.
 std::string short_help(const FieldSpec& spec) { return spec.help.substr(0, spec.help.find(';')); }
 
-std::string joined(const std::vector<std::string>& words) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : " ") + word;
-  return text;
-}
-
 /// Quotes a text in single quotes, valid in all three shells. @param escaped  characters that get a
 /// backslash.
 std::string quoted(const std::string& text, std::string_view escaped = {}) {
@@ -120,14 +113,14 @@ std::string quoted(const std::string& text, std::string_view escaped = {}) {
 std::string command_names(const std::vector<CompletedCommand>& commands) {
   std::vector<std::string> names;
   for (const CompletedCommand& command : commands) names.push_back(command.name);
-  return joined(names);
+  return joined(names, " ");
 }
 
 // --- bash ----------------------------------------------------------------------------------------
 
 /// The text after "COMMAND --option) " in the script.
 std::string bash_value(const Value& value) {
-  const std::string words = "_lensforge_words " + quoted(joined(value.words));
+  const std::string words = "_lensforge_words " + quoted(joined(value.words, " "));
   switch (value.kind) {
     case Value::Kind::kWords:
       return words;
@@ -182,7 +175,7 @@ std::string bash_script(const std::vector<CompletedCommand>& commands) {
       text +=
           "    '" + command.name + " " + spec.name + "') " + bash_value(value) + "; return ;;\n";
     }
-    lists += "    " + command.name + ") options=" + quoted(joined(names)) + " ;;\n";
+    lists += "    " + command.name + ") options=" + quoted(joined(names, " ")) + " ;;\n";
   }
   return text + "  esac\n  case ${COMP_WORDS[1]} in\n" + lists +
          "  esac\n  if [[ $cur == -* ]]; then _lensforge_words \"$options\"; else _lensforge_files "
@@ -192,7 +185,7 @@ std::string bash_script(const std::vector<CompletedCommand>& commands) {
 // --- zsh -----------------------------------------------------------------------------------------
 
 std::string zsh_value(const Value& value) {
-  const std::string words = joined(value.words);
+  const std::string words = joined(value.words, " ");
   switch (value.kind) {
     case Value::Kind::kWords:
       return std::string("(").append(words).append(")");
@@ -243,7 +236,8 @@ std::string zsh_script(const std::vector<CompletedCommand>& commands) {
 // --- fish ----------------------------------------------------------------------------------------
 
 std::string fish_value(const Value& value) {
-  const std::string words = value.words.empty() ? "" : " -a " + quoted(joined(value.words), "\\");
+  const std::string words =
+      value.words.empty() ? "" : " -a " + quoted(joined(value.words, " "), "\\");
   switch (value.kind) {
     case Value::Kind::kNone:
       return "";

@@ -3,12 +3,15 @@
 
 #include <unistd.h>
 
+#include <mutex>
+#include <optional>
 #include <string>
 #include <system_error>
 #include <utility>
 #include <vector>
 
-#include "app/frame/command_line.h"
+#include "app/frame/interrupt.h"
+#include "core/error.h"
 #include "core/io/files.h"
 
 namespace lensforge::app {
@@ -37,34 +40,118 @@ void OutputFolder::remove_partial_files(
 
 namespace {
 
-std::unique_ptr<OutputFolder> folder_of(const fs::path& out) {
-  if (out.empty()) return nullptr;
-  return std::make_unique<OutputFolder>(fs::absolute(out).parent_path(), FolderLock::Kind::kShared);
+/// Reports that a command was interrupted before it wrote anything. Returns the exit code.
+int report_interrupted(bool json) noexcept {
+  return report_error("interrupted; nothing was written", kInterrupted, json);
 }
 
 }  // namespace
 
-InterruptibleJob::InterruptibleJob(const CommonOptions& common, const fs::path& out)
-    : json_(common.json),
-      folder_(folder_of(out)),
-      progress_(common.quiet),
-      watch_(SecondInterrupt::kExit, [this] { abandon(); }) {}
+/// Work that was begun. An interrupt ends the process if `abandoned`.
+struct CommandFrame::Work {
+  Work(const CommonOptions& common, std::unique_ptr<OutputFolder> out, bool abandoned)
+      : json(common.json),
+        stops_executors(abandoned),
+        folder(std::move(out)),
+        progress(std::in_place, common.quiet),
+        watch(SecondInterrupt::kExit, abandoned ? [this] { abandon(); } : std::function<void()>()) {
+  }
 
-void InterruptibleJob::begin_writing() {
-  const std::lock_guard lock(mutex_);
-  writing_ = true;
+  void begin_writing() {
+    const std::lock_guard lock(mutex);
+    writing = true;
+  }
+
+  void abandon() {
+    const std::lock_guard lock(mutex);
+    if (writing) return;
+    folder.reset();
+    progress->wipe();
+    _exit(report_interrupted(json));
+  }
+
+  bool json;
+  bool stops_executors;
+  std::unique_ptr<OutputFolder> folder;
+  std::optional<ProgressDisplay> progress;
+  std::function<void()> accepted;
+  std::once_flag accepted_once;
+  std::mutex mutex;
+  bool writing = false;
+  InterruptWatch watch;  ///< Last, so that it ends first.
+};
+
+CommandFrame::CommandFrame(OptionSet& options)
+    : options_(options), console_(options.common().json, options.common().quiet) {}
+
+CommandFrame::~CommandFrame() = default;
+
+void CommandFrame::begin_file(const fs::path& out) {
+  work_.reset();  // There is one watch for interrupts at a time.
+  auto folder = out.empty() ? nullptr
+                            : std::make_unique<OutputFolder>(fs::absolute(out).parent_path(),
+                                                             FolderLock::Kind::kShared);
+  work_ = std::make_unique<Work>(options_.common(), std::move(folder), true);
 }
 
-void InterruptibleJob::abandon() {
-  const std::lock_guard lock(mutex_);
-  if (writing_) return;
-  folder_.reset();
-  progress_.wipe();
-  _exit(report_interrupted(json_));
+void CommandFrame::begin_writing() { work_->begin_writing(); }
+
+const OutputFolder& CommandFrame::begin_folder(const fs::path& out) {
+  work_.reset();
+  auto folder = std::make_unique<OutputFolder>(out, FolderLock::Kind::kExclusive);
+  work_ = std::make_unique<Work>(options_.common(), std::move(folder), false);
+  return *work_->folder;
 }
 
-int report_interrupted(bool json) noexcept {
-  return report_error("interrupted; nothing was written", kInterrupted, json);
+RunControl CommandFrame::control(std::function<void()> accepted) {
+  const auto show = work_->progress->sink();
+  if (!accepted) return {work_->watch.token(), show};
+  work_->accepted = std::move(accepted);
+  return {work_->watch.token(), [this, show](const Progress& progress) {
+            if (progress.done > 0.0) accept();
+            if (show) show(progress);
+          }};
+}
+
+void CommandFrame::accept() {
+  std::call_once(work_->accepted_once, [this] {
+    work_->progress->wipe();
+    work_->accepted();
+  });
+}
+
+Executor CommandFrame::stoppable(const Executor& executor) const {
+  return work_ && work_->stops_executors ? executor.with_stop(work_->watch.token()) : executor;
+}
+
+ChosenDevice CommandFrame::device_executor() const {
+  const ChosenDevice device = options_.device_executor();
+  return {stoppable(device.executor), device.word};
+}
+
+int CommandFrame::print(CommandResult result, const std::string& command) {
+  if (work_) {
+    work_->begin_writing();  // It is no longer abandoned.
+    work_->progress.reset();
+  }
+  for (const std::string& warning : result.warnings) console_.note("warning: " + warning);
+  if (!result.json.is_null()) {
+    result.json["command"] = command;
+    console_.result(result.json, result.text);
+  }
+  for (const std::string& note : result.notes) console_.note(note);
+  return result.exit_code;
+}
+
+int run_framed(const std::string& command, OptionSet& options, const Arguments& arguments,
+               const std::function<CommandResult(CommandFrame&)>& work) {
+  options.parse(arguments);
+  try {
+    CommandFrame frame(options);
+    return frame.print(work(frame), command);
+  } catch (const Interrupted&) {
+    return report_interrupted(options.common().json);
+  }
 }
 
 void announce_work(const WorkEstimate& needed, const Console& console, const std::string& what) {

@@ -6,20 +6,19 @@
 #include <functional>
 #include <initializer_list>
 #include <memory>
-#include <mutex>
+#include <nlohmann/json.hpp>
 #include <string>
+#include <vector>
 
+#include "app/frame/command_line.h"
 #include "app/frame/console.h"
-#include "app/frame/interrupt.h"
 #include "app/frame/option_set.h"
 #include "core/compute/executor.h"
-#include "core/compute/run_control.h"
 #include "core/compute/work_estimate.h"
-#include "core/io/folder_lock.h"
+#include "core/io/lens_folder.h"
 #include "core/text/lower_case.h"
 
-/// Tools of a command: file types by extension, the output folder, and a job that an interrupt
-/// ends.
+/// The frame of all commands, with output folder and result. File types by extension.
 namespace lensforge::app {
 
 /// True if the file has one of these extensions, in any case. @param extensions  with the dot:
@@ -58,36 +57,90 @@ class OutputFolder {
   MadeFolder folder_;
 };
 
-/// Environment of a command that writes one file at its end, or none: progress on stderr, and an
-/// end within a second of the first interrupt. Work that does not check for it in time (a large
-/// system of equations, a library call) is abandoned by ending the process, unless the file is
-/// being written. @throw InputError if `out` has a folder in which files cannot be made.
-class InterruptibleJob {
- public:
-  explicit InterruptibleJob(const CommonOptions& common, const std::filesystem::path& out = {});
-
-  [[nodiscard]] RunControl control() { return {watch_.token(), progress_.sink()}; }
-  /// The executor, stopped by an interrupt.
-  [[nodiscard]] Executor stoppable(const Executor& executor) const {
-    return executor.with_stop(watch_.token());
-  }
-
-  /// From here on the work is no longer abandoned.
-  void begin_writing();
-
- private:
-  void abandon();
-
-  bool json_;
-  std::unique_ptr<OutputFolder> folder_;
-  ProgressDisplay progress_;
-  std::mutex mutex_;
-  bool writing_ = false;
-  InterruptWatch watch_;  ///< Last, so that it ends first.
+/// Result of a command.
+struct CommandResult {
+  nlohmann::json json = {};  ///< For --json; the frame adds "command". Null: nothing is printed.
+  std::string text = {};     ///< For people.
+  int exit_code = kDone;
+  std::vector<std::string> warnings = {};  ///< Noted before the result, after "warning: ".
+  std::vector<std::string> notes = {};     ///< Printed after the result.
 };
 
-/// Reports that a command was interrupted before it wrote anything. Returns the exit code.
-int report_interrupted(bool json) noexcept;
+/// Exit code of work that may have been interrupted, or have missed a stated limit.
+inline int exit_code(bool done, bool limits_met = true) {
+  if (!done) return kInterrupted;
+  return limits_met ? kDone : kLimitMissed;
+}
+
+/// Everything that commands have in common: messages, interrupts, output folder, progress, result.
+/// A command checks its input, with an estimate and the room for it, begins its work, announces the
+/// estimate, computes and returns its result (run_command()).
+class CommandFrame {
+ public:
+  explicit CommandFrame(OptionSet& options);
+  ~CommandFrame();
+  CommandFrame(const CommandFrame&) = delete;
+  CommandFrame& operator=(const CommandFrame&) = delete;
+
+  [[nodiscard]] OptionSet& options() const { return options_; }
+  [[nodiscard]] const Console& console() const { return console_; }
+
+  /// Begins work that writes one file at its end, or none, and ends earlier work. An interrupt
+  /// stops executors, too. Work that does not check for it within a second (a large system of
+  /// equations, a library call) is abandoned by ending the process, unless the file is being
+  /// written. @throw InputError if `out` has a folder in which files cannot be made.
+  void begin_file(const std::filesystem::path& out = {});
+  /// From here on the file is being written.
+  void begin_writing();
+  /// Begins work that fills a folder, and ends earlier work. Everything done before an interrupt is
+  /// kept. @throw InputError as OutputFolder's. @return the folder.
+  const OutputFolder& begin_folder(const std::filesystem::path& out);
+
+  // Of the work that was begun.
+  /// Shows progress, and stops at an interrupt. @param accepted  called once, at the first report
+  /// of work done or by accept(): the library has accepted its input.
+  [[nodiscard]] RunControl control(std::function<void()> accepted = {});
+  void accept();
+  [[nodiscard]] Executor executor() const { return stoppable(options_.executor()); }
+  [[nodiscard]] ChosenDevice device_executor() const;
+
+  /// Ends the work and prints its result. Returns the exit code.
+  int print(CommandResult result, const std::string& command);
+
+ private:
+  struct Work;
+  [[nodiscard]] Executor stoppable(const Executor& executor) const;
+
+  OptionSet& options_;
+  const Console console_;
+  std::unique_ptr<Work> work_;
+};
+
+/// A command: its name, a sentence for --help, its options and its work.
+template <class Settings>
+struct Command {
+  std::string name;
+  std::string description;
+  void (*add_options)(OptionSet& options, Settings& settings);
+  CommandResult (*run)(CommandFrame& frame, Settings& settings);
+};
+
+/// Parses the arguments, runs the work in a frame and prints its result. Returns the exit code.
+int run_framed(const std::string& command, OptionSet& options, const Arguments& arguments,
+               const std::function<CommandResult(CommandFrame&)>& work);
+
+template <class Settings>
+int run_command(const Command<Settings>& command, const Arguments& arguments) {
+  Settings settings;
+  OptionSet options(command.name, command.description);
+  command.add_options(options, settings);
+  return run_framed(command.name, options, arguments,
+                    [&](CommandFrame& frame) { return command.run(frame, settings); });
+}
+
+/// Note of an interrupted command whose work can be continued.
+inline constexpr const char* kContinueWithResume =
+    "interrupted; run the same command with --resume to continue";
 
 /// Prints the approximate cost of a long job at once. @param what  the subject of the sentence.
 void announce_work(const WorkEstimate& needed, const Console& console,

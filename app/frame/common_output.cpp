@@ -63,6 +63,12 @@ std::string fringe_text(const Fringe& fringe) {
          " mm\n";
 }
 
+nlohmann::json files_json(const std::vector<std::filesystem::path>& files) {
+  nlohmann::json list = nlohmann::json::array();
+  for (const std::filesystem::path& file : files) list.push_back(file.string());
+  return list;
+}
+
 std::string size_text(long columns, long rows) {
   return std::to_string(columns) + " x " + std::to_string(rows);
 }

@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <vector>
 
-#include "core/image/metrics.h"
-#include "core/surface/lens.h"
-#include "design/fringe.h"
+#include "core/image/image.h"
+#include "core/lens/lens.h"
+#include "design/render.h"
 
 /// Texts and JSON that several commands print.
 namespace lensforge::app {
@@ -33,6 +35,9 @@ std::string fixed(double value, int digits);
 
 /// "  fringe  0.123 mm on average, at most 0.200 mm" and a line's end.
 std::string fringe_text(const Fringe& fringe);
+
+/// The paths of files, in order.
+nlohmann::json files_json(const std::vector<std::filesystem::path>& files);
 
 /// Joins two counts as "256 x 192".
 std::string size_text(long columns, long rows);

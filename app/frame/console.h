@@ -13,7 +13,7 @@
 #include <thread>
 #include <vector>
 
-#include "core/compute/run_control.h"
+#include "core/compute/executor.h"
 
 namespace lensforge::app {
 

@@ -8,11 +8,11 @@
 #include <cerrno>
 #include <csignal>
 #include <ctime>
-#include <string_view>
 #include <utility>
 
 #include "app/frame/command_line.h"
 #include "app/frame/terminal_keys.h"
+#include "core/io/descriptor.h"
 
 // The handler only wakes a thread; nothing else must be async-signal-safe. Blocking the signals and
 // waiting for them does not work: linked libraries such as OpenBLAS start threads before main()
@@ -33,18 +33,10 @@ void wake_waiter(int /*signal*/) {
   sem_post(&wake);
 }
 
-void write_whole(int descriptor, std::string_view text) {
-  while (!text.empty()) {
-    const ssize_t written = ::write(descriptor, text.data(), text.size());
-    if (written <= 0) return;
-    text.remove_prefix(static_cast<std::size_t>(written));
-  }
-}
-
 void exit_interrupted(int /*signal*/) {
-  write_whole(STDERR_FILENO, "lensforge: interrupted\n");
+  write_all(STDERR_FILENO, "lensforge: interrupted\n");
   if (json_at_signals != 0) {
-    write_whole(STDOUT_FILENO, "{\n  \"error\": \"interrupted\",\n  \"exit_code\": 130\n}\n");
+    write_all(STDOUT_FILENO, "{\n  \"error\": \"interrupted\",\n  \"exit_code\": 130\n}\n");
   }
   _exit(kInterrupted);
 }

@@ -14,7 +14,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/compute/gpu.h"
+#include "core/compute/executor.h"
 #include "core/error.h"
 #include "core/io/files.h"
 #include "core/schema/json.h"
@@ -25,6 +25,7 @@
 #include "core/text/printable.h"
 #include "core/text/units.h"
 #include "core/text/version.h"
+#include "core/text/words.h"
 #include "design/mpi/session.h"
 
 namespace lensforge::app {

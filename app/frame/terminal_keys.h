@@ -8,7 +8,8 @@
 #include <string_view>
 #include <thread>
 
-#include "core/io/descriptor.h"
+#include "core/io/files.h"
+#include "machine/send.h"
 #include "machine/stream/sender.h"
 
 namespace lensforge::app {

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "core/image/image.h"
-#include "core/surface/surface_mesh.h"
+#include "core/mesh/surface_mesh.h"
 
 /// Conversion between numpy arrays and the libraries' values. Results and attributes share the
 /// libraries' memory; arguments are copied once.

@@ -24,13 +24,10 @@
 #include "cam/report/report_json.h"
 #include "core/error.h"
 #include "core/image/image_io.h"
-#include "core/io/folder_lock.h"
-#include "design/design_estimate.h"
-#include "design/design_lens.h"
-#include "design/flux_of_surface.h"
-#include "design/render_fields.h"
-#include "design/render_lens.h"
-#include "design/render_setup.h"
+#include "core/io/lens_folder.h"
+#include "design/design.h"
+#include "design/render.h"
+#include "design/setup/option_tables.h"
 
 /// The class Lens, and the commands as functions.
 namespace lensforge::python {
@@ -269,10 +266,9 @@ py::object cam(const py::object& lens, const app::Arguments& words) {
     folder.remove_partial_files(is_name_of_cut);
     return make_cut(designed, settings.cam, folder.path(), executor, stopping_at(stop));
   });
-  nlohmann::json cut = {{"warnings", result.report.warnings},
-                        {"files", nlohmann::json::array()},
-                        {"report", report_json(result.report)}};
-  for (const fs::path& file : result.files) cut["files"].push_back(file.string());
+  const nlohmann::json cut = {{"warnings", result.report.warnings},
+                              {"files", app::files_json(result.files)},
+                              {"report", report_json(result.report)}};
   return object_from(cut);
 }
 

@@ -11,13 +11,12 @@
 #include "app/python/keywords.h"
 #include "core/error.h"
 #include "core/image/image_io.h"
+#include "core/lens/optical_surface.h"
+#include "core/lens/setup_json.h"
 #include "core/optics/optical_setup.h"
-#include "core/surface/setup_json.h"
-#include "core/surface/surface_model.h"
-#include "design/design_fields.h"
-#include "design/flux_of_surface.h"
-#include "design/light_setup.h"
-#include "design/render_setup.h"
+#include "design/render.h"
+#include "design/setup/light_setup.h"
+#include "design/setup/option_tables.h"
 
 namespace lensforge::python {
 namespace {

@@ -18,23 +18,19 @@
 #include "cam/post/program_reader.h"
 #include "cam/predict/part_surfaces.h"
 #include "cam/report/report_data.h"
-#include "core/compute/run_control.h"
+#include "core/compute/executor.h"
 #include "core/error.h"
 #include "core/image/image.h"
-#include "core/image/layered_image.h"
-#include "core/io/cut_layers.h"
+#include "core/image/rasters.h"
 #include "core/io/files.h"
 #include "core/io/lens_folder.h"
-#include "core/page/html_text.h"
-#include "core/page/script_data.h"
+#include "core/lens/lens.h"
+#include "core/lens/optical_surface.h"
+#include "core/mesh/surface_mesh.h"
+#include "core/page/html_page.h"
 #include "core/schema/json.h"
-#include "core/surface/grid_mesh.h"
-#include "core/surface/grid_triangles.h"
-#include "core/surface/lens.h"
-#include "core/surface/mesh_normals.h"
-#include "core/surface/optical_surface.h"
-#include "core/surface/sampled_surface.h"
-#include "design/render_lens.h"
+#include "design/render.h"
+#include "machine/gcode.h"
 #include "machine/gcode/gcode_dialect.h"
 
 namespace lensforge {
@@ -304,15 +300,15 @@ CutForecast read_forecast(const fs::path& lens_folder, const Lens& lens,
 }
 
 /// Nodes of a spline at most: more would not fit a page of 25 MB.
-constexpr double kMostNodes = 480e3;
+constexpr double kMaxNodes = 480e3;
 /// Samples of a height map, 4 bytes each in a page.
-constexpr std::size_t kMostHeights = 1'000'000;
+constexpr std::size_t kMaxHeights = 1'000'000;
 
 /// The surface with the normals that send its light: none of facets.
 SampledSurface surface_of(const Lens& lens) {
   if (lens.spline) {
     const auto cells = static_cast<double>(lens.spline->cell_count());
-    return spline_nodes(*lens.spline, samples_for(kMostNodes, cells));
+    return spline_nodes(*lens.spline, samples_for(kMaxNodes, cells));
   }
   if (lens.model == SurfaceModel::kFacet) return {lens.surface, {}};
   return {lens.surface, vertex_area_normals(lens.surface)};
@@ -333,8 +329,8 @@ double storage_error(const SampledSurface& stored, const OpticalSetup& setup, co
 /// @throw InputError if a height map would not fit a page of 25 MB beside the surfaces.
 void require_small_front(const OpticalSetup& setup, const std::string& name) {
   const auto* const map = setup.front ? std::get_if<HeightFront>(&*setup.front) : nullptr;
-  if (map == nullptr || map->spline->coefficients().size() <= kMostHeights) return;
-  throw InputError(name + ": its front has more than " + std::to_string(kMostHeights) +
+  if (map == nullptr || map->spline->coefficients().size() <= kMaxHeights) return;
+  throw InputError(name + ": its front has more than " + std::to_string(kMaxHeights) +
                    " samples, too many for a page; render draws its picture");
 }
 

@@ -9,12 +9,10 @@
 
 #include "cam/report/report_data.h"
 #include "core/compute/executor.h"
-#include "core/compute/run_control.h"
 #include "core/image/image.h"
+#include "core/lens/lens.h"
+#include "core/mesh/surface_mesh.h"
 #include "core/optics/optical_setup.h"
-#include "core/surface/lens.h"
-#include "core/surface/sampled_surface.h"
-#include "core/surface/surface_mesh.h"
 
 namespace lensforge {
 

@@ -26,15 +26,13 @@
 #include <vector>
 
 #include "core/error.h"
-#include "core/image/error_image.h"
+#include "core/image/image.h"
 #include "core/image/image_io.h"
-#include "core/image/metrics.h"
-#include "core/page/decade_plot.h"
+#include "core/page/drawings.h"
 #include "core/page/html_page.h"
-#include "core/page/html_text.h"
-#include "core/surface/control_net.h"
+#include "core/spline/control_net.h"
 #include "core/text/version.h"
-#include "design/render_lens.h"
+#include "design/render.h"
 #include "design/schedule/checkpoint.h"
 #include "view_files.h"
 
@@ -372,7 +370,7 @@ void LiveServer::publish(LiveState state) { content_->publish(std::move(state));
 namespace {
 
 /// Points of the curve of errors: more than a screen has columns.
-constexpr std::size_t kMostPoints = 2000;
+constexpr std::size_t kMaxPoints = 2000;
 constexpr const char* kSplineStage = "spline";
 
 bool is_spline(const Checkpoint& saved) {
@@ -395,7 +393,7 @@ Image picture_of(const Checkpoint& saved, const DesignGoalView& goal, const Exec
 /// MAE over seconds, of the steps that have a picture.
 std::string plot_of(const Checkpoint& saved) {
   PlotCurve curve{"", {}};
-  const std::size_t step = 1 + saved.convergence.size() / kMostPoints;
+  const std::size_t step = 1 + saved.convergence.size() / kMaxPoints;
   for (std::size_t i = 0; i < saved.convergence.size(); i += step) {
     const ConvergenceRow& row = saved.convergence[i];
     if (row.mae > 0.0) curve.points.emplace_back(row.seconds, row.mae);

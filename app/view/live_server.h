@@ -9,8 +9,8 @@
 
 #include "core/compute/executor.h"
 #include "core/image/image.h"
+#include "core/lens/optical_surface.h"
 #include "core/optics/optical_setup.h"
-#include "core/surface/surface_model.h"
 
 namespace lensforge {
 

@@ -11,13 +11,11 @@
 
 #include "cam/report/report_html.h"
 #include "cam/report/report_maps.h"
-#include "core/image/error_image.h"
+#include "core/image/image.h"
 #include "core/image/transfer.h"
-#include "core/optics/dispersion.h"
+#include "core/lens/setup_json.h"
+#include "core/optics/optical_setup.h"
 #include "core/page/html_page.h"
-#include "core/page/html_text.h"
-#include "core/page/script_data.h"
-#include "core/surface/setup_json.h"
 #include "core/text/number_text.h"
 #include "core/text/version.h"
 #include "view_files.h"
@@ -39,7 +37,7 @@ constexpr int kPasses = 16;
 constexpr int kPictureBytes = 2;
 /// Of a height map's coefficient: a sixteen-millionth of its depth, or of that of a flat one, mm.
 constexpr int kHeightBytes = 3;
-constexpr double kLeastDepth = 1e-3;
+constexpr double kMinDepth = 1e-3;
 constexpr int kColors = 256;
 
 /// Puts data into separate elements and keeps their index.
@@ -76,7 +74,7 @@ class PageData {
     if (map == nullptr) return nullptr;
     const std::vector<double>& values = map->spline->coefficients();
     const auto [low, high] = std::minmax_element(values.begin(), values.end());
-    const double above = std::max(*high, *low + kLeastDepth);
+    const double above = std::max(*high, *low + kMinDepth);
     PackedNumbers numbers(kHeightBytes);
     for (const double value : values) numbers.add(value, *low, above);
     return {{"columns", map->spline->grid().columns},

@@ -10,9 +10,9 @@
 #include <string>
 #include <utility>
 
-#include "core/compute/float_bounds.h"
+#include "core/compute/scalar.h"
 #include "core/error.h"
-#include "core/surface/mesh_normals.h"
+#include "core/mesh/surface_mesh.h"
 
 namespace lensforge {
 

@@ -11,9 +11,9 @@
 #include "cam/contact/drop_cutter.h"
 #include "cam/contact/smooth_roll.h"
 #include "core/compute/executor.h"
-#include "core/surface/height_field_check.h"
-#include "core/surface/optical_surface.h"
-#include "core/surface/surface_mesh.h"
+#include "core/lens/optical_surface.h"
+#include "core/lens/surface_check.h"
+#include "core/mesh/surface_mesh.h"
 
 namespace lensforge {
 

@@ -10,7 +10,8 @@
 #include <utility>
 
 #include "cam/contact/ball_cutter.h"
-#include "core/compute/float_bounds.h"
+#include "cam/contact/index_of.h"
+#include "core/compute/scalar.h"
 #include "core/error.h"
 
 namespace lensforge {
@@ -183,8 +184,6 @@ ContactFeatures rotate_features(ContactFeatures features, int first) {
   }
   return rotated;
 }
-
-std::size_t index_of(std::int64_t value) { return static_cast<std::size_t>(value); }
 
 }  // namespace
 

@@ -10,7 +10,7 @@
 
 #include "cam/contact/ball_cutter.h"
 #include "core/compute/executor.h"
-#include "core/surface/surface_mesh.h"
+#include "core/mesh/surface_mesh.h"
 
 namespace lensforge {
 

@@ -9,7 +9,8 @@
 #include <limits>
 #include <numbers>
 
-#include "core/compute/float_bounds.h"
+#include "cam/contact/index_of.h"
+#include "core/compute/scalar.h"
 
 namespace lensforge {
 namespace {
@@ -199,8 +200,6 @@ namespace {
 
 /// Cells per triangle: with two triangles per cell the pyramid is as small as the items.
 constexpr double kCellsPerTriangle = 0.5;
-
-std::size_t index_of(std::int64_t value) { return static_cast<std::size_t>(value); }
 
 }  // namespace
 

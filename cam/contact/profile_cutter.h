@@ -9,7 +9,7 @@
 #include "cam/contact/ball_cutter.h"
 #include "cam/contact/drop_cutter.h"
 #include "cam/workshop/tool.h"
-#include "core/surface/surface_mesh.h"
+#include "core/mesh/surface_mesh.h"
 
 /// A vertical cutter of any profile against points, edges and facets.
 ///

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <cstddef>
 
-#include "core/compute/float_bounds.h"
+#include "core/compute/scalar.h"
 
 // Notation: p place of the axis, q contact, d = q − p, R radius, s = √(R² − |d|²) height of the
 // centre above the contact, g = ∇f(q) = ∇z − d/s, H = ∇²f = ∇²z − (1 + d dᵀ/s²)/s.

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "cam/contact/drop_curve.h"
-#include "core/surface/optical_surface.h"
+#include "core/lens/optical_surface.h"
 
 namespace lensforge {
 

@@ -18,19 +18,20 @@
 #include "cam/coupon/coupon_readings.h"
 #include "core/error.h"
 #include "core/io/files.h"
-#include "core/io/output_guard.h"
+#include "core/io/lens_folder.h"
 #include "core/schema/toml.h"
 #include "core/text/number_text.h"
 #include "core/text/printable.h"
 #include "core/text/version.h"
+#include "core/text/words.h"
 
 namespace lensforge {
 namespace {
 
-constexpr int kMostSteps = 200;
+constexpr int kMaxSteps = 200;
 constexpr double kSlightest = 1e-14;  ///< Share of the sum that counts as no progress: rounding.
 constexpr double kFirstDamping = 1e-3;
-constexpr double kMostDamping = 1e10;  ///< Steps are then shorter than the differences.
+constexpr double kMaxDamping = 1e10;  ///< Steps are then shorter than the differences.
 constexpr double kEasing = 10.0;
 
 /// Minimum significant eigenvalue of JᵀJ with columns scaled to length 1: differences are exact to
@@ -97,10 +98,10 @@ Eigen::VectorXd minimize(const LeastSquares& problem, Eigen::VectorXd start) {
   Eigen::VectorXd at = std::move(start);
   Eigen::VectorXd residuals = problem.residuals(at);
   double damping = kFirstDamping;
-  for (int k = 0; k < kMostSteps && damping < kMostDamping; ++k) {
+  for (int k = 0; k < kMaxSteps && damping < kMaxDamping; ++k) {
     const Eigen::MatrixXd jacobian = problem.jacobian(at);
     const double before = residuals.squaredNorm();
-    for (; damping < kMostDamping; damping *= kEasing) {
+    for (; damping < kMaxDamping; damping *= kEasing) {
       const Eigen::VectorXd step = step_of(problem, jacobian, residuals, damping);
       Eigen::VectorXd tried = at;
       for (std::size_t i = 0; i < problem.free.size(); ++i) {
@@ -221,11 +222,11 @@ void require_plausible(const std::vector<ModelledReading>& readings, const Coupo
 enum Parameter { kSigma, kRadius, kPitchError, kOffset, kParameters };
 
 // Range of σ for the search: outside it no ripple is changed, or none is left.
-constexpr double kLeastSigma = 0.002;  ///< mm
-constexpr double kMostSigma = 0.3;     ///< mm
-constexpr double kNoSigma = 1e-6;      ///< mm; in place of 0, which has no logarithm.
-constexpr int kSigmas = 161;           ///< In equal ratios of 1.03.
-constexpr std::size_t kStarts = 4;     ///< Number of them followed to their minimum.
+constexpr double kMinSigma = 0.002;  ///< mm
+constexpr double kMaxSigma = 0.3;    ///< mm
+constexpr double kNoSigma = 1e-6;    ///< mm; in place of 0, which has no logarithm.
+constexpr int kSigmas = 161;         ///< In equal ratios of 1.03.
+constexpr std::size_t kStarts = 4;   ///< Number of them followed to their minimum.
 
 CouponState state_of(const Eigen::VectorXd& p) {
   return {std::exp(p[kSigma]), std::exp(p[kRadius]), p[kPitchError], p[kOffset]};
@@ -264,7 +265,7 @@ std::vector<Eigen::VectorXd> starts(const LeastSquares& problem, const Eigen::Ve
   for (int k = 0; k < kSigmas; ++k) {
     const double share = k / (kSigmas - 1.0);
     places[static_cast<std::size_t>(k)][kSigma] =
-        std::log(kLeastSigma) + share * std::log(kMostSigma / kLeastSigma);
+        std::log(kMinSigma) + share * std::log(kMaxSigma / kMinSigma);
     sums.push_back(problem.residuals(places[static_cast<std::size_t>(k)]).squaredNorm());
   }
   std::vector<std::pair<double, std::size_t>> lowest;
@@ -352,18 +353,18 @@ void take_in_ball(Solution& solution) {
 }
 
 /// @throw InputError naming the reading that deviates most from the others, if by more than
-///        kMostDeviation, and any with an equal deviation.
+///        kMaxDeviation, and any with an equal deviation.
 void require_agreement(const std::vector<ModelledReading>& readings, const FitQuality& quality,
                        const std::string& file) {
   constexpr double kAsFar = 0.95;
   const Eigen::VectorXd far = quality.deletion.cwiseAbs();
   Eigen::Index worst = 0;
-  if (far.maxCoeff(&worst) <= kMostDeviation) return;
+  if (far.maxCoeff(&worst) <= kMaxDeviation) return;
   const ModelledReading& one = readings[static_cast<std::size_t>(worst)];
   std::string others;
   for (Eigen::Index i = 0; i < far.size(); ++i) {
     if (i == worst || far[i] < kAsFar * far[worst]) continue;
-    others += (others.empty() ? "" : ", ") + readings[static_cast<std::size_t>(i)].key;
+    others = with_word(others, readings[static_cast<std::size_t>(i)].key);
   }
   throw InputError(
       file + ": " + one.key + ": " + number_text(one.reading.value / one.unit) + ": is " +

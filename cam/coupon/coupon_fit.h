@@ -77,7 +77,7 @@ inline constexpr double kPitchErrorMost = 2e-3;  ///< Of a length; a worse machi
 
 /// Maximum deviation of a reading from the others, in standard deviations. Of 20 sound readings,
 /// one set in 800 has one beyond it.
-inline constexpr double kMostDeviation = 4.0;
+inline constexpr double kMaxDeviation = 4.0;
 
 /// Weighted least squares over ln σ, ln R, pitch error and touch-off, by Levenberg-Marquardt steps
 /// from several σ, because an order's light is not monotone in its ripple. Uncertainties are those

@@ -15,9 +15,9 @@
 #include "cam/post/program_writer.h"
 #include "core/error.h"
 #include "core/io/files.h"
-#include "core/io/pending_files.h"
 #include "core/schema/toml.h"
 #include "core/text/number_text.h"
+#include "core/text/words.h"
 
 namespace lensforge {
 namespace {
@@ -221,7 +221,7 @@ CouponSheet sheet_of(const CouponOptions& options, const CouponPlan& plan,
   const Tool& ball = options.workshop.tool(options.workshop.process.finish.tool);
   sheet.tool = tool_text(ball);
   for (const WrittenProgram& file : programs.files) {
-    sheet.files += (sheet.files.empty() ? "" : ", ") + file.path.filename().string();
+    sheet.files = with_word(sheet.files, file.path.filename().string());
   }
   sheet.minutes = programs.total.seconds / kSecondsPerMinute;
   sheet.thickness = options.thickness;

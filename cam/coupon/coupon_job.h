@@ -14,8 +14,7 @@
 #include "cam/plan/program_watch.h"
 #include "cam/post/program_writer.h"
 #include "core/compute/executor.h"
-#include "core/compute/run_control.h"
-#include "core/surface/surface_mesh.h"
+#include "core/mesh/surface_mesh.h"
 
 namespace lensforge {
 

@@ -28,9 +28,9 @@ constexpr double kFaintestRipple = 2.0 * kHeightUncertainty;  ///< mm, worth a t
 constexpr double kFaintest = 0.002;  ///< Minimum ratio of light for a phone's meter.
 /// Maximum amplitude of the light's delay for which the ratio rises with the ripples, rad: J₁/J₀
 /// has its first pole at 2.4.
-constexpr double kMostDelay = 1.5;
+constexpr double kMaxDelay = 1.5;
 
-constexpr std::size_t kMostEntries = 100;  ///< Of one kind: ten coupons.
+constexpr std::size_t kMaxEntries = 100;  ///< Of one kind: ten coupons.
 
 /// Keys of a reading: its value, and "…_uncertainty" before the unit.
 struct ReadingKeys {
@@ -109,8 +109,8 @@ std::vector<Entry> entries(TomlFields& file, const std::string& key, const Read&
   std::vector<Entry> all;
   if (!file.has(key)) return all;
   for (TomlFields& fields : file.tables(key)) {
-    if (all.size() == kMostEntries) {
-      file.refuse(key, "at most " + std::to_string(kMostEntries) + " of them");
+    if (all.size() == kMaxEntries) {
+      file.refuse(key, "at most " + std::to_string(kMaxEntries) + " of them");
     }
     all.push_back(read_entry(fields));
     fields.finish();
@@ -139,7 +139,7 @@ PadReadings expected_pad(double pitch, const CouponState& state, const CouponLig
   if (ripples > kFaintestRipple) pad.after = height_reading(ripples);
   const double ratio = state.order_ratio(pitch, light);
   const double delay = 0.5 * light.phase() * ripples;
-  if (ratio > kFaintest && delay < kMostDelay) pad.orders = Reading{ratio, kOrderShare * ratio};
+  if (ratio > kFaintest && delay < kMaxDelay) pad.orders = Reading{ratio, kOrderShare * ratio};
   return pad;
 }
 

@@ -6,7 +6,8 @@
 #include <string_view>
 #include <utility>
 
-#include "core/page/html_text.h"
+#include "core/page/html_page.h"
+#include "core/page/svg_writer.h"
 #include "core/text/number_text.h"
 #include "core/text/version.h"
 #include "coupon_page.h"
@@ -17,16 +18,15 @@ namespace {
 constexpr double kWidth = 560.0;  ///< Of the picture; all its lengths are in its own units.
 constexpr double kMargin = 74.0;
 
-std::string attribute(const char* name, double value) {
-  return std::string(" ") + name + "=\"" + decimal_text(value, 2) + "\"";
-}
-
 /// The coupon in machine coordinates, y upwards.
 class Drawing {
  public:
   explicit Drawing(const CouponLayout& layout)
       : layout_(layout), size_(layout.xy(layout.size.x(), layout.size.y())) {
     scale_ = (kWidth - 2.0 * kMargin) / size_.maxCoeff();
+    svg_.add(
+        {"<defs><marker id=\"tick\" viewBox=\"-5 -5 10 10\" markerWidth=\"9\" markerHeight=\"9\" "
+         "orient=\"auto\"><path d=\"M-3 3L3 -3M0 -5V5\" stroke=\"#1a1f24\"/></marker></defs>"});
   }
 
   [[nodiscard]] double width() const { return scale_ * size_.x() + 2.0 * kMargin; }
@@ -34,78 +34,63 @@ class Drawing {
 
   /// @param low, high  (x, y), mm.
   void box(const Eigen::Vector2d& low, const Eigen::Vector2d& high, const std::string& style) {
-    svg_ += "<rect" + attribute("x", x(low.x())) + attribute("y", y(high.y())) +
-            attribute("width", scale_ * (high.x() - low.x())) +
-            attribute("height", scale_ * (high.y() - low.y())) + " " + style + "/>";
+    svg_.rectangle({x(low.x()), y(high.y())}, scale_ * (high - low), style);
   }
   /// A cut of the ball: a line as wide as it.
   void cut(const CouponGroove& groove) {
-    const Eigen::Vector2d from = layout_.xy(groove.along_begin, groove.across);
-    const Eigen::Vector2d to = layout_.xy(groove.along_end, groove.across);
-    line(from, to, std::max(1.5, 2.0 * scale_ * layout_.radius),
-         "#0b5cad\" stroke-linecap=\"round");
-  }
-  void line(const Eigen::Vector2d& from, const Eigen::Vector2d& to, double wide,
-            const std::string& colour) {
-    svg_ += "<line" + attribute("x1", x(from.x())) + attribute("y1", y(from.y())) +
-            attribute("x2", x(to.x())) + attribute("y2", y(to.y())) +
-            attribute("stroke-width", wide) + " stroke=\"" + colour + "\"/>";
+    const double wide = std::max(1.5, 2.0 * scale_ * layout_.radius);
+    svg_.line(
+        at(layout_.xy(groove.along_begin, groove.across)),
+        at(layout_.xy(groove.along_end, groove.across)),
+        svg_.attribute("stroke-width", wide) + " stroke=\"#0b5cad\" stroke-linecap=\"round\"");
   }
   /// @param anchor  start, middle or end.
-  void words(const Eigen::Vector2d& at, const std::string& text, const std::string& anchor,
+  void words(const Eigen::Vector2d& place, const std::string& text, const std::string& anchor,
              const Eigen::Vector2d& shift = {0.0, 0.0}) {
-    svg_ += "<text" + attribute("x", x(at.x()) + shift.x()) +
-            attribute("y", y(at.y()) + shift.y()) + " text-anchor=\"" + anchor + "\">" +
-            escape_html(text) + "</text>";
+    svg_.text(at(place) + shift, joined({"text-anchor=\"", anchor, "\""}), text);
   }
-  void words_upwards(const Eigen::Vector2d& at, const std::string& text,
+  void words_upwards(const Eigen::Vector2d& place, const std::string& text,
                      const Eigen::Vector2d& shift) {
-    const std::string place =
-        decimal_text(x(at.x()) + shift.x(), 2) + " " + decimal_text(y(at.y()) + shift.y(), 2);
-    svg_ +=
-        "<text transform=\"translate(" + place + ") rotate(-90)\">" + escape_html(text) + "</text>";
+    svg_.add({"<text transform=\"translate(", svg_.pair(at(place) + shift, " "), ") rotate(-90)\">",
+              escape_html(text), "</text>"});
   }
   /// A dimension between two places with the same x or the same y, `off` beside them.
   void dimension(const Eigen::Vector2d& from, const Eigen::Vector2d& to, double off,
                  const std::string& text) {
     const bool level = from.y() == to.y();
     const Eigen::Vector2d shift = level ? Eigen::Vector2d(0.0, off) : Eigen::Vector2d(off, 0.0);
-    const Eigen::Vector2d a = Eigen::Vector2d(x(from.x()), y(from.y())) + shift;
-    const Eigen::Vector2d b = Eigen::Vector2d(x(to.x()), y(to.y())) + shift;
-    svg_ += "<line" + attribute("x1", a.x()) + attribute("y1", a.y()) + attribute("x2", b.x()) +
-            attribute("y2", b.y()) +
-            " stroke=\"#1a1f24\" marker-start=\"url(#tick)\" marker-end=\"url(#tick)\"/>";
+    const Eigen::Vector2d a = at(from) + shift;
+    const Eigen::Vector2d b = at(to) + shift;
+    svg_.line(a, b, "stroke=\"#1a1f24\" marker-start=\"url(#tick)\" marker-end=\"url(#tick)\"");
     const Eigen::Vector2d middle = 0.5 * (a + b);
-    const std::string turn = level
-                                 ? ""
-                                 : " transform=\"rotate(-90 " + decimal_text(middle.x() - 5.0, 2) +
-                                       " " + decimal_text(middle.y(), 2) + ")\"";
-    svg_ += "<text" + attribute("x", level ? middle.x() : middle.x() - 5.0) +
-            attribute("y", level ? middle.y() - 5.0 : middle.y()) + " text-anchor=\"middle\"" +
-            turn + ">" + escape_html(text) + "</text>";
+    const Eigen::Vector2d beside =
+        middle - (level ? Eigen::Vector2d(0.0, 5.0) : Eigen::Vector2d(5.0, 0.0));
+    const std::string turn =
+        level ? "" : " transform=\"rotate(-90 " + svg_.pair(beside, " ") + ")\"";
+    svg_.text(beside, "text-anchor=\"middle\"" + turn, text);
   }
   void zero() {
-    svg_ += "<circle" + attribute("cx", x(0.0)) + attribute("cy", y(0.0)) +
-            " r=\"5\" fill=\"#fff\" stroke=\"#a3161a\" stroke-width=\"2.5\"/>";
+    svg_.circle(at({0.0, 0.0}), "r=\"5\" fill=\"#fff\" stroke=\"#a3161a\" stroke-width=\"2.5\"");
     words({0.0, 0.0}, "X0 Y0", "end", {-9.0, 16.0});
   }
   [[nodiscard]] std::string result() const {
-    return "<svg viewBox=\"0 0 " + decimal_text(width(), 0) + " " + decimal_text(height(), 0) +
-           "\" role=\"img\" aria-label=\"Coupon from above\" font-family=\"Arial, sans-serif\" "
-           "font-size=\"13\"><defs><marker id=\"tick\" viewBox=\"-5 -5 10 10\" markerWidth=\"9\" "
-           "markerHeight=\"9\" orient=\"auto\"><path d=\"M-3 3L3 -3M0 -5V5\" stroke=\"#1a1f24\"/>"
-           "</marker></defs>" +
-           svg_ + "</svg>";
+    return svg_.drawing(
+        joined({"viewBox=\"0 0 ", decimal_text(width(), 0), " ", decimal_text(height(), 0),
+                "\" role=\"img\" aria-label=\"Coupon from above\" "
+                "font-family=\"Arial, sans-serif\" font-size=\"13\""}));
   }
 
  private:
   [[nodiscard]] double x(double mm) const { return kMargin + scale_ * mm; }
   [[nodiscard]] double y(double mm) const { return height() - kMargin - scale_ * mm; }
+  [[nodiscard]] Eigen::Vector2d at(const Eigen::Vector2d& mm) const {
+    return {x(mm.x()), y(mm.y())};
+  }
 
   const CouponLayout& layout_;
   Eigen::Vector2d size_;
   double scale_ = 1.0;
-  std::string svg_;
+  SvgWriter svg_{2};
 };
 
 void draw_pads(const CouponLayout& layout, Drawing& drawing) {

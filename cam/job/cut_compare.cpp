@@ -14,6 +14,7 @@
 #include "core/io/files.h"
 #include "core/text/number_text.h"
 #include "core/text/units.h"
+#include "core/text/words.h"
 
 namespace lensforge {
 namespace {
@@ -52,17 +53,14 @@ class PassingFolder {
 template <class Read>
 auto values_of(std::string_view list, const std::string& where, const Read& read) {
   std::vector<decltype(read(list))> values;
-  while (true) {
-    const std::size_t comma = list.find(',');
-    const std::string_view word = list.substr(0, comma);
+  for (const std::string_view word : split(list, ',')) {
     const auto value = read(word);
     if (std::find(values.begin(), values.end(), value) != values.end()) {
       throw InputError(where + ": " + std::string(word) + " is given twice");
     }
     values.push_back(value);
-    if (comma == std::string_view::npos) return values;
-    list.remove_prefix(comma + 1);
   }
+  return values;
 }
 
 std::vector<double> lengths_of(std::string_view list, const std::string& where) {

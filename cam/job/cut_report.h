@@ -11,7 +11,7 @@
 #include "cam/predict/prediction.h"
 #include "cam/report/report_data.h"
 #include "cam/report/verdict.h"
-#include "core/surface/lens.h"
+#include "core/lens/lens.h"
 
 namespace lensforge {
 

@@ -16,15 +16,13 @@
 #include "cam/report/report_html.h"
 #include "cam/report/report_json.h"
 #include "core/error.h"
-#include "core/image/error_image.h"
+#include "core/image/image.h"
 #include "core/image/image_io.h"
-#include "core/io/cut_layers.h"
 #include "core/io/files.h"
 #include "core/io/lens_folder.h"
-#include "core/io/output_guard.h"
-#include "core/io/pending_files.h"
-#include "core/surface/mesh_io.h"
+#include "core/mesh/mesh_files.h"
 #include "core/text/lower_case.h"
+#include "core/text/words.h"
 #include "machine/gcode/program_seal.h"
 
 namespace lensforge {
@@ -114,7 +112,7 @@ ColorImage leakage_picture(const LeakageResult& leakage) {
 
 std::string listed(const std::vector<fs::path>& paths) {
   std::string text;
-  for (const fs::path& path : paths) text += (text.empty() ? "" : ", ") + path.string();
+  for (const fs::path& path : paths) text = with_word(text, path.string());
   return text;
 }
 

@@ -23,9 +23,7 @@
 #include "core/error.h"
 #include "core/io/files.h"
 #include "core/io/lens_folder.h"
-#include "core/io/output_guard.h"
-#include "core/io/pending_files.h"
-#include "core/page/html_text.h"
+#include "core/page/html_page.h"
 #include "core/text/number_text.h"
 #include "core/text/version.h"
 

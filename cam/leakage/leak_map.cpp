@@ -7,15 +7,14 @@
 #include <numeric>
 #include <utility>
 
+#include "cam/contact/index_of.h"
 #include "cam/leakage/surface_tile.h"
 #include "core/error.h"
-#include "core/optics/light_colors.h"
+#include "core/optics/optical_setup.h"
 #include "design/flux/flux_triangle.h"
 
 namespace lensforge {
 namespace {
-
-std::size_t index_of(std::int64_t i) { return static_cast<std::size_t>(i); }
 
 /// Weights of the pixels for deposit_adjoint(), with their sums from the right.
 class PixelWeights {

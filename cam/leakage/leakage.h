@@ -8,7 +8,6 @@
 
 #include "cam/leakage/render_field.h"
 #include "core/image/image.h"
-#include "core/image/metrics.h"
 
 namespace lensforge {
 

@@ -9,7 +9,7 @@
 
 #include "cam/leakage/surface_tile.h"
 #include "core/error.h"
-#include "core/optics/light_colors.h"
+#include "core/optics/optical_setup.h"
 #include "design/flux/flux_image.h"
 
 namespace lensforge {

@@ -9,10 +9,9 @@
 
 #include "cam/milled/surface_field.h"
 #include "core/compute/executor.h"
-#include "core/compute/run_control.h"
 #include "core/image/image.h"
 #include "core/optics/optical_setup.h"
-#include "design/flux/source_blur.h"
+#include "design/flux/flux_image.h"
 
 namespace lensforge {
 

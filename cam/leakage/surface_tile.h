@@ -16,9 +16,9 @@
 #include "core/compute/executor.h"
 #include "core/optics/light_path.h"
 #include "core/optics/optical_setup.h"
-#include "core/surface/outline_index.h"
-#include "design/optics/image_piece.h"
-#include "design/optics/image_triangle.h"
+#include "core/optics/outline.h"
+#include "design/flux/flux_triangle.h"
+#include "design/flux/surface_projection.h"
 
 namespace lensforge {
 

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "core/error.h"
-#include "core/surface/mesh_normals.h"
+#include "core/mesh/surface_mesh.h"
 #include "core/text/number_text.h"
 
 namespace lensforge {

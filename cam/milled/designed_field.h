@@ -3,8 +3,8 @@
 
 #include "cam/contact/cut_surface.h"
 #include "cam/milled/surface_field.h"
-#include "core/surface/optical_surface.h"
-#include "core/surface/surface_mesh.h"
+#include "core/lens/optical_surface.h"
+#include "core/mesh/surface_mesh.h"
 
 namespace lensforge {
 

@@ -10,8 +10,9 @@
 #include <tuple>
 #include <utility>
 
+#include "cam/contact/index_of.h"
 #include "cam/milled/ball_sweep.h"
-#include "core/compute/float_bounds.h"
+#include "core/compute/scalar.h"
 #include "core/error.h"
 
 namespace lensforge {
@@ -33,8 +34,6 @@ constexpr double kBoundMargin = 1e-9;
 
 /// Far above the rounding of a span's box to single precision, mm.
 constexpr double kRounding = 1e-3;
-
-std::size_t index_of(std::int64_t value) { return static_cast<std::size_t>(value); }
 
 Eigen::AlignedBox3d box_of(const BallPath& path, const BallMove& move, double from, double to) {
   if (move.arc >= 0) {

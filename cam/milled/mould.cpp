@@ -6,7 +6,7 @@
 #include <string>
 
 #include "core/error.h"
-#include "core/surface/lens.h"
+#include "core/lens/lens.h"
 #include "core/text/number_text.h"
 
 namespace lensforge {

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "cam/milled/surface_field.h"
-#include "core/surface/surface_mesh.h"
+#include "core/mesh/surface_mesh.h"
 
 namespace lensforge {
 

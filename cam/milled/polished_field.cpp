@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <string>
 
+#include "cam/contact/index_of.h"
 #include "cam/milled/creases.h"
 #include "core/error.h"
 #include "core/text/number_text.h"
@@ -15,8 +16,6 @@ namespace {
 
 /// A node this far outside of the lens, in spacings, still lies on its rim.
 constexpr double kOnRim = 1e-6;
-
-std::size_t index_of(std::int64_t value) { return static_cast<std::size_t>(value); }
 
 void check(const char* name, double value, bool fits, const char* rule) {
   if (fits && std::isfinite(value)) return;

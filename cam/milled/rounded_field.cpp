@@ -9,15 +9,12 @@
 #include <limits>
 #include <optional>
 
+#include "cam/contact/index_of.h"
 #include "cam/milled/ball_sweep.h"
-#include "core/surface/mesh_normals.h"
+#include "core/mesh/surface_mesh.h"
 
 namespace lensforge {
-namespace {
-
-std::size_t index_of(std::int64_t value) { return static_cast<std::size_t>(value); }
-
-}  // namespace
+namespace {}  // namespace
 
 FacetReach::FacetReach(const FacetGrid& grid, double radius, const Executor& executor)
     : radius_(radius) {

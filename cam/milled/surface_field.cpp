@@ -8,7 +8,7 @@
 #include <string>
 
 #include "core/error.h"
-#include "core/surface/grid_triangles.h"
+#include "core/mesh/surface_mesh.h"
 
 namespace lensforge {
 namespace {

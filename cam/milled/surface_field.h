@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/compute/executor.h"
-#include "core/surface/surface_mesh.h"
+#include "core/mesh/surface_mesh.h"
 
 namespace lensforge {
 

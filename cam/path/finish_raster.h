@@ -16,7 +16,6 @@
 #include "cam/workshop/tool.h"
 #include "cam/workshop/workshop.h"
 #include "core/compute/executor.h"
-#include "core/compute/run_control.h"
 
 namespace lensforge {
 

@@ -7,7 +7,7 @@
 #include "cam/path/operation.h"
 #include "cam/path/stock_map.h"
 #include "cam/workshop/tool.h"
-#include "core/compute/run_control.h"
+#include "core/compute/executor.h"
 
 namespace lensforge {
 

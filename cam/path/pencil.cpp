@@ -9,8 +9,8 @@
 #include <string>
 
 #include "core/error.h"
-#include "core/surface/mesh_normals.h"
-#include "core/surface/mesh_topology.h"
+#include "core/mesh/mesh_topology.h"
+#include "core/mesh/surface_mesh.h"
 #include "core/text/number_text.h"
 
 namespace lensforge {

@@ -8,8 +8,7 @@
 #include "cam/path/finish_raster.h"
 #include "cam/path/operation.h"
 #include "core/compute/executor.h"
-#include "core/compute/run_control.h"
-#include "core/surface/surface_mesh.h"
+#include "core/mesh/surface_mesh.h"
 
 namespace lensforge {
 

@@ -6,7 +6,6 @@
 #include "cam/path/stock_map.h"
 #include "cam/workshop/workshop.h"
 #include "core/compute/executor.h"
-#include "core/compute/run_control.h"
 
 namespace lensforge {
 

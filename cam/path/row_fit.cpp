@@ -166,9 +166,9 @@ constexpr std::size_t kShorten = 8;
 constexpr double kBlunt = 6.0;
 
 /// Share of RowFitOptions::shortest below which moves overload a controller. A longer move with an
-/// error of up to kMostTurn slope tolerances replaces them.
+/// error of up to kMaxTurn slope tolerances replaces them.
 constexpr double kTooShort = 0.5;
-constexpr double kMostTurn = 16.0;
+constexpr double kMaxTurn = 16.0;
 
 /// Share of the tolerances used by the quick test at joints: errors between the joints add to it.
 constexpr double kLookShare = 0.95;
@@ -369,7 +369,7 @@ class RowFit {
     while (to + 1 < joints_.written.size() && joints_.written[to].x() < end) ++to;
     if (to == reach.joint) return reach;
     error_.resize(settled);
-    for (double turn = 2.0; turn <= kMostTurn; turn *= 2.0) {
+    for (double turn = 2.0; turn <= kMaxTurn; turn *= 2.0) {
       if (const std::optional<Reach> longer = one_move(from, to, turn)) return *longer;
     }
     error_.add(joints_.written[from], reach.move);

@@ -12,8 +12,8 @@
 #include "cam/plan/finishing.h"
 #include "cam/post/program_writer.h"
 #include "core/error.h"
+#include "core/lens/optical_surface.h"
 #include "core/schema/description.h"
-#include "core/surface/surface_model.h"
 #include "core/text/number_text.h"
 
 namespace lensforge {
@@ -318,7 +318,7 @@ void describe_outline(Description& d, CamOptions& o) {
          "cut the lens out of its blank, last; auto: if it has an outline");
   d.whole("--outline-tool", o.outline_tool, Limits::between(0, 9999),
           "number of the flat end mill for it; 0: the roughing tool");
-  d.whole("--tabs", o.tabs.count, Limits::between(0, cam_limit::kMostTabs),
+  d.whole("--tabs", o.tabs.count, Limits::between(0, cam_limit::kMaxTabs),
           "tabs that hold the lens in its frame until they are snapped; fewer where they do not "
           "fit");
   d.length("--tab-width", o.tabs.width,
@@ -381,7 +381,7 @@ void describe_prediction(Description& d, CamOptions& o, const Description& shop)
   d.without("--no-render", o.render, "programs only, without the predicted picture");
   d.without("--no-remedies", o.remedies, "do not try what helps where most light leaks");
   d.whole("--tolerances", o.tolerances,
-          Limits::zero_or(cam_limit::kFewestParts, cam_limit::kMostParts),
+          Limits::zero_or(cam_limit::kFewestParts, cam_limit::kMaxParts),
           "how sure the forecast is: predict so many parts with the errors of the workshop's "
           "[tolerances]; 0: none");
   d.whole("--tolerance-seed", o.tolerance_seed, Limits::between(0, cam_limit::kLargestSeed),

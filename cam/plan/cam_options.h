@@ -14,8 +14,8 @@
 #include "cam/post/program_writer.h"
 #include "cam/report/verdict.h"
 #include "cam/workshop/workshop.h"
+#include "core/lens/optical_surface.h"
 #include "core/optics/optical_setup.h"
-#include "core/surface/surface_model.h"
 
 namespace lensforge {
 
@@ -87,13 +87,13 @@ inline constexpr double kFinestSample = 1e-3;   ///< mm
 inline constexpr double kCoarsestSample = 1.0;  ///< mm
 /// Number of drawn parts: fewer than 10 have no tenth, and 100,000 take a day.
 inline constexpr int kFewestParts = 10;
-inline constexpr int kMostParts = 100000;
+inline constexpr int kMaxParts = 100000;
 inline constexpr int kLargestSeed = 999999;
 /// Of tabs, mm: a thinner tab does not hold, and a wider one cannot be snapped by hand.
 inline constexpr double kThinnestTab = 0.1;
 inline constexpr double kWidestTab = 50.0;
 inline constexpr double kHighestTab = 10.0;
-inline constexpr int kMostTabs = 100;
+inline constexpr int kMaxTabs = 100;
 }  // namespace cam_limit
 
 /// Sample spacing of the surface across the passes, mm.

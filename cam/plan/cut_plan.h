@@ -24,10 +24,9 @@
 #include "cam/post/program_writer.h"
 #include "cam/report/report_data.h"
 #include "core/compute/executor.h"
-#include "core/compute/run_control.h"
-#include "core/surface/lens.h"
-#include "core/surface/optical_surface.h"
-#include "core/surface/surface_mesh.h"
+#include "core/lens/lens.h"
+#include "core/lens/optical_surface.h"
+#include "core/mesh/surface_mesh.h"
 
 namespace lensforge {
 

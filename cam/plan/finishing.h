@@ -18,8 +18,7 @@
 #include "cam/plan/cam_options.h"
 #include "cam/workshop/workshop.h"
 #include "core/compute/executor.h"
-#include "core/compute/run_control.h"
-#include "core/surface/optical_surface.h"
+#include "core/lens/optical_surface.h"
 #include "machine/gcode/gcode_dialect.h"
 
 namespace lensforge {

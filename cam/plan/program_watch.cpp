@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <span>
 
-#include "core/page/html_text.h"
+#include "core/page/html_page.h"
 #include "core/text/number_text.h"
 
 namespace lensforge {

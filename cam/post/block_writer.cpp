@@ -5,10 +5,10 @@
 #include <cerrno>
 #include <cmath>
 #include <numbers>
-#include <system_error>
 
 #include "cam/post/post_description.h"
 #include "core/error.h"
+#include "core/io/descriptor.h"
 #include "machine/gcode/program_seal.h"
 #include "machine/planner/planner_model.h"
 
@@ -98,8 +98,7 @@ void ProgramText::flush() {
 void ProgramText::check() {
   if (out_) return;
   const int error = errno != 0 ? errno : EIO;
-  throw RunError(file_.path().string() +
-                 ": cannot be written: " + std::generic_category().message(error));
+  throw RunError(file_.path().string() + ": cannot be written: " + system_reason(error));
 }
 
 namespace {
@@ -110,7 +109,6 @@ constexpr double kFarthest = 1e5;    ///< mm; of coordinates and radii that are 
 /// mm. LinuxCNC refuses arcs of less than 0.00127 mm, rounded centre and ends taken (PostRs274).
 constexpr double kSmallestArc = 0.005;
 constexpr std::int64_t kShortestArc = 3;         ///< Units between the ends of an arc.
-constexpr double kFeedUnits = 1e6;               ///< Of a digest.
 constexpr double kAlmost = 1e-9;                 ///< Of a piece of an arc; takes rounding up.
 constexpr double kMaxSweepRadius = kTurn / 3.0;  ///< R is badly conditioned near half a turn.
 constexpr double kMaxSweepCentre = kTurn / 2.0;

@@ -11,9 +11,8 @@
 #include <vector>
 
 #include "cam/post/post_description.h"
-#include "core/compute/split_mix.h"
+#include "core/compute/scalar.h"
 #include "core/io/files.h"
-#include "core/io/sha256.h"
 #include "machine/gcode/gcode_motion.h"
 
 namespace lensforge {
@@ -25,6 +24,9 @@ struct DigestArc {
 
   friend bool operator==(const DigestArc&, const DigestArc&) = default;
 };
+
+/// Units of feeds in a digest per mm/min.
+inline constexpr double kFeedUnits = 1e6;
 
 /// Digest of a path's motions at feed, in order, to the last decimal; compares what is written with
 /// what is read back. Different paths share a digest with a probability of 2^-64.

@@ -13,7 +13,9 @@
 #include "cam/post/builtin_posts.h"
 #include "core/error.h"
 #include "core/schema/toml.h"
+#include "core/text/lower_case.h"
 #include "core/text/number_text.h"
+#include "core/text/words.h"
 #include "machine/gcode/gcode_interpreter.h"
 #include "machine/gcode/program_seal.h"
 
@@ -22,8 +24,6 @@ namespace {
 
 constexpr std::array<std::string_view, 9> kPlaceholders = {
     "job", "number", "tool", "rpm", "dwell", "safe_z", "tolerance", "coolant", "coolant_off"};
-
-char upper(char c) { return c >= 'a' && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c; }
 
 bool is_plain(char c) {
   const bool printable = c >= ' ' && c < '\x7f';
@@ -489,7 +489,7 @@ PostDescription find_post(const std::string& name_or_path, const std::string& op
   std::string names;
   for (const BuiltinPost& post : kBuiltinPosts) {
     if (post.name == name_or_path) return parse_post(post.text, std::string(post.name) + ".toml");
-    names.append(names.empty() ? "" : ", ").append(post.name);
+    names = with_word(names, post.name);
   }
   throw InputError(option + ": '" + name_or_path + "' is none of " + names +
                    " and no path of a .toml file");

@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <cerrno>
 #include <fstream>
-#include <system_error>
 
 #include "core/error.h"
+#include "core/io/descriptor.h"
 #include "machine/gcode/program_seal.h"
 
 namespace lensforge {
@@ -118,7 +118,7 @@ void walk_program(const std::filesystem::path& path, const GcodeDialect& dialect
   std::ifstream file(path, std::ios::binary);
   if (!file || std::filesystem::is_directory(path)) {
     const int why = std::filesystem::is_directory(path) ? EISDIR : errno;
-    throw InputError(path.string() + ": cannot be read: " + std::generic_category().message(why));
+    throw InputError(path.string() + ": cannot be read: " + system_reason(why));
   }
   try {
     Walk(file, dialect).run(sink, control);

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "cam/workshop/workshop.h"
-#include "core/compute/run_control.h"
+#include "core/compute/executor.h"
 #include "machine/gcode/gcode_interpreter.h"
 #include "machine/planner/planner_model.h"
 

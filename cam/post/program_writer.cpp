@@ -22,7 +22,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kFeedUnits = 1e6;  ///< As in BlockWriter's digest.
 constexpr std::int64_t kLinesBetweenReports = 4096;
 
 /// Reads a program and rebuilds what BlockWriter noted.

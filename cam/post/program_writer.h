@@ -13,7 +13,7 @@
 #include "cam/post/post_description.h"
 #include "cam/post/program_reader.h"
 #include "cam/workshop/tool.h"
-#include "core/compute/run_control.h"
+#include "core/compute/executor.h"
 #include "core/io/files.h"
 #include "machine/planner/planner_model.h"
 

@@ -17,8 +17,8 @@
 #include "cam/milled/surface_field.h"
 #include "cam/plan/finishing.h"
 #include "core/compute/executor.h"
-#include "core/image/layered_image.h"
-#include "core/surface/optical_surface.h"
+#include "core/image/rasters.h"
+#include "core/lens/optical_surface.h"
 
 namespace lensforge {
 

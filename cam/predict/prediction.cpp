@@ -22,14 +22,12 @@
 #include "cam/tolerance/tolerance_forecast.h"
 #include "cam/workshop/tool.h"
 #include "core/compute/executor.h"
-#include "core/compute/run_control.h"
 #include "core/error.h"
-#include "core/optics/light_colors.h"
+#include "core/lens/lens.h"
 #include "core/optics/light_path.h"
-#include "core/page/html_text.h"
-#include "core/surface/lens.h"
-#include "core/surface/lit_surface.h"
-#include "core/surface/mesh_cut.h"
+#include "core/optics/optical_setup.h"
+#include "core/optics/outline.h"
+#include "core/page/html_page.h"
 #include "core/text/number_text.h"
 
 namespace lensforge {

@@ -20,10 +20,9 @@
 #include "cam/report/report_data.h"
 #include "cam/tolerance/tolerance_forecast.h"
 #include "core/compute/executor.h"
-#include "core/compute/run_control.h"
-#include "core/image/layered_image.h"
-#include "core/surface/lens.h"
-#include "core/surface/surface_mesh.h"
+#include "core/image/rasters.h"
+#include "core/lens/lens.h"
+#include "core/mesh/surface_mesh.h"
 
 namespace lensforge {
 

@@ -16,9 +16,9 @@
 #include "cam/tolerance/tolerance_forecast.h"
 #include "cam/workshop/tool.h"
 #include "core/image/image.h"
-#include "core/optics/front_surface.h"
+#include "core/optics/front.h"
 #include "core/optics/optical_setup.h"
-#include "core/page/html_text.h"
+#include "core/page/html_page.h"
 
 namespace lensforge {
 

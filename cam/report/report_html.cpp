@@ -12,8 +12,6 @@
 #include "cam/report/sections.h"
 #include "cam/report/verdict.h"
 #include "core/page/html_page.h"
-#include "core/page/html_text.h"
-#include "core/page/script_data.h"
 #include "core/text/number_text.h"
 #include "report_page.h"
 

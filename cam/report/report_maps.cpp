@@ -7,8 +7,9 @@
 #include <cstddef>
 
 #include "cam/report/sections.h"
-#include "core/image/error_image.h"
-#include "core/page/html_text.h"
+#include "core/image/image.h"
+#include "core/page/html_page.h"
+#include "core/page/svg_writer.h"
 #include "core/text/number_text.h"
 
 namespace lensforge {
@@ -128,38 +129,36 @@ Eigen::Vector2d number_place(const Ring& ring, const Eigen::Vector2d& size) {
           within(ring.centre.y() - 0.75 * ring.radius, height, size.y() - 0.5 * kFontStroke)};
 }
 
-std::string ring_circle(const Ring& ring, const char* color, double width) {
-  return joined({"<circle cx=\"", decimal_text(ring.centre.x(), 2), "\" cy=\"",
-                 decimal_text(ring.centre.y(), 2), "\" r=\"", decimal_text(ring.radius, 2),
-                 "\" fill=\"none\" stroke=\"", color, "\" stroke-width=\"", decimal_text(width, 1),
-                 "\"/>"});
+void draw_ring(SvgWriter& svg, const Ring& ring, std::string_view stroke) {
+  svg.circle(ring.centre, joined({svg.attribute("r", ring.radius), " fill=\"none\" ", stroke}));
 }
 
-std::string ring_number(const Ring& ring, const Eigen::Vector2d& size) {
-  const Eigen::Vector2d place = number_place(ring, size);
-  return joined({"<text x=\"", decimal_text(place.x(), 2), "\" y=\"", decimal_text(place.y(), 2),
-                 "\" text-anchor=\"middle\" font-size=\"", decimal_text(kFontSize, 1),
-                 "\" font-weight=\"700\" fill=\"#fff\" stroke=\"#000\" stroke-width=\"",
-                 decimal_text(kFontStroke, 1), "\" paint-order=\"stroke\">", ring.number,
-                 "</text>"});
+void draw_number(SvgWriter& svg, const Ring& ring, const Eigen::Vector2d& size) {
+  svg.text(number_place(ring, size),
+           joined({"text-anchor=\"middle\" font-size=\"", decimal_text(kFontSize, 1),
+                   "\" font-weight=\"700\" fill=\"#fff\" stroke=\"#000\" stroke-width=\"",
+                   decimal_text(kFontStroke, 1), "\" paint-order=\"stroke\""}),
+           ring.number);
 }
 
 /// Numbered rings at the worst places.
 std::string place_rings(const ReportData& data) {
   const double unit = data.lens_size.maxCoeff() / 100.0;
   const Eigen::Vector2d size = data.lens_size / unit;
-  std::string rings;
+  SvgWriter svg(2);
   for (std::size_t k = 0; k < data.places.size(); ++k) {
     const LeakPlace& place = data.places[k];
     const Eigen::Vector2d centre = place.place / unit;
     const Ring ring{{centre.x(), size.y() - centre.y()},
                     std::max(kRingRadius, 0.5 * place.side / unit),
                     std::to_string(k + 1)};
-    rings += ring_circle(ring, "#000", 1.6) + ring_circle(ring, "#fff", 0.8);
-    rings += ring_number(ring, size);
+    draw_ring(svg, ring, "stroke=\"#000\" stroke-width=\"1.6\"");
+    draw_ring(svg, ring, "stroke=\"#fff\" stroke-width=\"0.8\"");
+    draw_number(svg, ring, size);
   }
-  return "<svg viewBox=\"0 0 " + decimal_text(size.x(), 3) + " " + decimal_text(size.y(), 3) +
-         "\" aria-hidden=\"true\" font-family=\"Arial, sans-serif\">" + rings + "</svg>";
+  return svg.drawing(
+      joined({"viewBox=\"0 0 ", decimal_text(size.x(), 3), " ", decimal_text(size.y(), 3),
+              "\" aria-hidden=\"true\" font-family=\"Arial, sans-serif\""}));
 }
 
 std::string map_figure(const ReportMap& map, const ReportData& data) {

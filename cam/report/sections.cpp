@@ -9,9 +9,10 @@
 #include <vector>
 
 #include "cam/report/report_maps.h"
-#include "core/optics/front_surface.h"
-#include "core/page/html_text.h"
-#include "core/page/light_drawing.h"
+#include "core/optics/front.h"
+#include "core/page/drawings.h"
+#include "core/page/html_page.h"
+#include "core/page/svg_writer.h"
 #include "core/text/number_text.h"
 
 namespace lensforge::report_section {
@@ -47,21 +48,10 @@ struct DrawnView {
   }
 };
 
-std::string attribute(std::string_view name, double value) {
-  return std::string(" ") + std::string(name) + "=\"" + decimal_text(value, 2) + "\"";
-}
-
-std::string rectangle(const DrawnView& view, const Eigen::AlignedBox3d& box,
-                      std::string_view style) {
+void draw_box(SvgWriter& svg, const DrawnView& view, const Eigen::AlignedBox3d& box,
+              std::string_view style) {
   const Eigen::AlignedBox2d flat = view.flat(box);
-  return "<rect" + attribute("x", view.x(flat.min().x())) + attribute("y", view.y(flat.max().y())) +
-         attribute("width", view.scale * flat.sizes().x()) +
-         attribute("height", view.scale * flat.sizes().y()) + " " + std::string(style) + "/>";
-}
-
-std::string words(double x, double y, std::string_view style, std::string_view text) {
-  return "<text" + attribute("x", x) + attribute("y", y) + " " + std::string(style) + ">" +
-         escape_html(text) + "</text>";
+  svg.rectangle({view.x(flat.min().x()), view.y(flat.max().y())}, view.scale * flat.sizes(), style);
 }
 
 /// y of the section through a front: its apex, or a height map's middle.
@@ -69,98 +59,92 @@ double section_y(const SphericalFront& front) { return front.apex.y(); }
 double section_y(const HeightFront& front) { return front.corner.y() + 0.5 * front.size.y(); }
 
 /// The blank seen from the front, in section through the apex of its front.
-std::string section(const DrawnView& view, const SetupSheet& setup, std::string_view style) {
+void draw_section(SvgWriter& svg, const DrawnView& view, const SetupSheet& setup,
+                  std::string_view style) {
   const bool sphere = std::holds_alternative<SphericalFront>(*setup.front);
   const int parts = sphere ? 40 : 400;
   const FrontSurface front(*setup.front);
   const double y = std::visit([](const auto& one) { return section_y(one); }, *setup.front);
   const Eigen::AlignedBox2d blank = view.flat(setup.blank);
-  const auto point = [&](double x, double z) {
-    return decimal_text(view.x(x), 2) + "," + decimal_text(view.y(z), 2) + " ";
-  };
-  std::string points =
-      point(blank.max().x(), blank.max().y()) + point(blank.min().x(), blank.max().y());
+  std::vector<Eigen::Vector2d> edge{{view.x(blank.max().x()), view.y(blank.max().y())},
+                                    {view.x(blank.min().x()), view.y(blank.max().y())}};
   for (int i = 0; i <= parts; ++i) {
     const double x = blank.min().x() + blank.sizes().x() * i / parts;
-    points += point(x, front.height({x, y}));
+    edge.emplace_back(view.x(x), view.y(front.height({x, y})));
   }
-  return "<polygon points=\"" + points + "\" " + std::string(style) + "/>";
+  svg.polygon(edge, style);
 }
 
-std::string blank_shape(const DrawnView& view, const SetupSheet& setup) {
+void draw_blank(SvgWriter& svg, const DrawnView& view, const SetupSheet& setup) {
   const std::string_view style = "fill=\"#e3ecf5\" stroke=\"#1a1f24\" stroke-width=\"2\"";
-  if (setup.front && view.up == 2) return section(view, setup, style);
-  return rectangle(view, setup.blank, style);
+  if (setup.front && view.up == 2) return draw_section(svg, view, setup, style);
+  draw_box(svg, view, setup.blank, style);
 }
 
 /// An arrow from the program's zero along an axis of the drawing.
-std::string arrow(double x, double y, const Eigen::Vector2d& along, std::string_view name) {
+void draw_arrow(SvgWriter& svg, const Eigen::Vector2d& from, const Eigen::Vector2d& along,
+                std::string_view name) {
   constexpr double kLength = 46.0;
-  const Eigen::Vector2d tip(x + kLength * along.x(), y - kLength * along.y());
+  const Eigen::Vector2d down(along.x(), -along.y());
+  const Eigen::Vector2d tip = from + kLength * down;
   const Eigen::Vector2d side(along.y(), along.x());
-  const Eigen::Vector2d back(tip.x() - 9.0 * along.x(), tip.y() + 9.0 * along.y());
-  const Eigen::Vector2d a = back + 4.5 * side;
-  const Eigen::Vector2d b = back - 4.5 * side;
-  const auto pair = [](const Eigen::Vector2d& p) {
-    return decimal_text(p.x(), 2) + "," + decimal_text(p.y(), 2);
-  };
-  return "<line" + attribute("x1", x) + attribute("y1", y) + attribute("x2", tip.x()) +
-         attribute("y2", tip.y()) + " stroke=\"#a3161a\" stroke-width=\"2.5\"/><polygon points=\"" +
-         pair(tip) + " " + pair(a) + " " + pair(b) + "\" fill=\"#a3161a\"/>" +
-         words(tip.x() + 6.0 * along.x() - 14.0 * along.y(),
-               tip.y() - 4.0 * along.y() + 16.0 * along.x(),
-               "font-size=\"15\" font-weight=\"700\" fill=\"#a3161a\"", name);
+  const Eigen::Vector2d back = tip - 9.0 * down;
+  svg.line(from, tip, "stroke=\"#a3161a\" stroke-width=\"2.5\"");
+  svg.add({"<polygon points=\"", svg.pair(tip), " ", svg.pair(back + 4.5 * side), " ",
+           svg.pair(back - 4.5 * side), "\" fill=\"#a3161a\"/>"});
+  svg.text(
+      {tip.x() + 6.0 * along.x() - 14.0 * along.y(), tip.y() - 4.0 * along.y() + 16.0 * along.x()},
+      "font-size=\"15\" font-weight=\"700\" fill=\"#a3161a\"", name);
 }
 
-std::string zero_mark(const DrawnView& view, const SetupSheet& setup) {
-  const double x = view.x(setup.zero[view.right]);
-  const double y = view.y(setup.zero[view.up]);
-  return arrow(x, y, {1.0, 0.0}, "X") + arrow(x, y, {0.0, 1.0}, view.up == 1 ? "Y" : "Z") +
-         "<circle" + attribute("cx", x) + attribute("cy", y) +
-         " r=\"6\" fill=\"#fff\" stroke=\"#a3161a\" stroke-width=\"2.5\"/>";
+void draw_zero(SvgWriter& svg, const DrawnView& view, const SetupSheet& setup) {
+  const Eigen::Vector2d at(view.x(setup.zero[view.right]), view.y(setup.zero[view.up]));
+  draw_arrow(svg, at, {1.0, 0.0}, "X");
+  draw_arrow(svg, at, {0.0, 1.0}, view.up == 1 ? "Y" : "Z");
+  svg.circle(at, "r=\"6\" fill=\"#fff\" stroke=\"#a3161a\" stroke-width=\"2.5\"");
 }
 
 /// Width below and height at the right of the blank.
-std::string dimensions(const DrawnView& view, const SetupSheet& setup) {
+void draw_dimensions(SvgWriter& svg, const DrawnView& view, const SetupSheet& setup) {
   const Eigen::AlignedBox2d blank = view.flat(setup.blank);
   const double middle = 0.5 * (view.y(blank.min().y()) + view.y(blank.max().y()));
-  return words(0.5 * (view.x(blank.min().x()) + view.x(blank.max().x())), view.height() - 24.0,
-               "font-size=\"15\" text-anchor=\"middle\"",
-               "blank " + decimal_text(blank.sizes().x(), 1) + " mm") +
-         words(kWidth - 6.0, middle + 5.0,
-               "font-size=\"15\" text-anchor=\"middle\" transform=\"rotate(-90 " +
-                   decimal_text(kWidth - 12.0, 2) + " " + decimal_text(middle, 2) + ")\"",
-               decimal_text(blank.sizes().y(), 1) + " mm");
+  const std::string style = "font-size=\"15\" text-anchor=\"middle\"";
+  svg.text({0.5 * (view.x(blank.min().x()) + view.x(blank.max().x())), view.height() - 24.0}, style,
+           "blank " + decimal_text(blank.sizes().x(), 1) + " mm");
+  svg.text({kWidth - 6.0, middle + 5.0},
+           style + " transform=\"rotate(-90 " + svg.pair({kWidth - 12.0, middle}, " ") + ")\"",
+           decimal_text(blank.sizes().y(), 1) + " mm");
 }
 
-std::string clamps(const DrawnView& view, const SetupSheet& setup) {
-  std::string svg;
+void draw_clamps(SvgWriter& svg, const DrawnView& view, const SetupSheet& setup) {
   for (const NamedBox& clamp : setup.keep_outs) {
-    svg +=
-        rectangle(view, clamp.box, "fill=\"url(#hatch)\" stroke=\"#1a1f24\" stroke-width=\"1.5\"");
+    draw_box(svg, view, clamp.box, "fill=\"url(#hatch)\" stroke=\"#1a1f24\" stroke-width=\"1.5\"");
     const Eigen::AlignedBox2d flat = view.flat(clamp.box);
-    svg += words(view.x(flat.center().x()), view.y(flat.max().y()) - 5.0,
-                 "font-size=\"13\" text-anchor=\"middle\"", clamp.name);
+    svg.text({view.x(flat.center().x()), view.y(flat.max().y()) - 5.0},
+             "font-size=\"13\" text-anchor=\"middle\"", clamp.name);
   }
-  return svg;
 }
 
 /// Blank, part, clamps and program zero from above and from the front, as SVG.
 std::string setup_drawing(const SetupSheet& setup, bool from_above) {
   const DrawnView view(setup, from_above);
-  const std::string hatch =
-      "<defs><pattern id=\"hatch\" width=\"7\" height=\"7\" patternUnits=\"userSpaceOnUse\" "
-      "patternTransform=\"rotate(45)\"><rect width=\"7\" height=\"7\" fill=\"#fff\"/><line "
-      "y2=\"7\" stroke=\"#56616b\" stroke-width=\"2.5\"/></pattern></defs>";
-  const std::string open =
-      "<svg viewBox=\"0 0 " + decimal_text(kWidth, 0) + " " + decimal_text(view.height(), 0) +
-      "\" role=\"img\" aria-label=\"Blank, part and zero seen from " +
-      (from_above ? "above" : "the front") + "\" font-family=\"Arial, sans-serif\">";
-  return open + (from_above ? hatch : "") + blank_shape(view, setup) +
-         rectangle(view, setup.part,
-                   "fill=\"#b9d3ea\" stroke=\"#0b5cad\" stroke-width=\"2\" "
-                   "stroke-dasharray=\"6 4\"") +
-         clamps(view, setup) + dimensions(view, setup) + zero_mark(view, setup) + "</svg>";
+  SvgWriter svg(2);
+  if (from_above) {
+    svg.add(
+        {"<defs><pattern id=\"hatch\" width=\"7\" height=\"7\" patternUnits=\"userSpaceOnUse\" "
+         "patternTransform=\"rotate(45)\"><rect width=\"7\" height=\"7\" fill=\"#fff\"/><line "
+         "y2=\"7\" stroke=\"#56616b\" stroke-width=\"2.5\"/></pattern></defs>"});
+  }
+  draw_blank(svg, view, setup);
+  draw_box(svg, view, setup.part,
+           "fill=\"#b9d3ea\" stroke=\"#0b5cad\" stroke-width=\"2\" stroke-dasharray=\"6 4\"");
+  draw_clamps(svg, view, setup);
+  draw_dimensions(svg, view, setup);
+  draw_zero(svg, view, setup);
+  return svg.drawing(
+      joined({"viewBox=\"0 0 ", decimal_text(kWidth, 0), " ", decimal_text(view.height(), 0),
+              "\" role=\"img\" aria-label=\"Blank, part and zero seen from ",
+              from_above ? "above" : "the front", "\" font-family=\"Arial, sans-serif\""}));
 }
 
 using Row = std::vector<std::string>;

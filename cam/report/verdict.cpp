@@ -6,7 +6,7 @@
 
 #include "cam/leakage/leak_map.h"
 #include "core/error.h"
-#include "core/page/html_text.h"
+#include "core/page/html_page.h"
 #include "core/text/number_text.h"
 
 namespace lensforge {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "core/compute/split_mix.h"
+#include "core/compute/scalar.h"
 
 namespace lensforge {
 

@@ -9,7 +9,6 @@
 #include "cam/milled/surface_field.h"
 #include "cam/tolerance/part_error.h"
 #include "core/compute/executor.h"
-#include "core/compute/run_control.h"
 
 namespace lensforge {
 

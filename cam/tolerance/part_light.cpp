@@ -7,7 +7,7 @@
 #include <limits>
 #include <numbers>
 
-#include "core/optics/source_points.h"
+#include "core/optics/light_source.h"
 
 namespace lensforge {
 namespace {

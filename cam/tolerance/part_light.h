@@ -8,9 +8,9 @@
 
 #include "cam/tolerance/part_error.h"
 #include "core/compute/executor.h"
+#include "core/mesh/surface_mesh.h"
 #include "core/optics/light_path.h"
 #include "core/optics/optical_setup.h"
-#include "core/surface/corners.h"
 
 namespace lensforge {
 

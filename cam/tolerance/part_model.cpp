@@ -16,10 +16,9 @@
 #include "cam/tolerance/part_light.h"
 #include "cam/tolerance/polish_filter.h"
 #include "cam/workshop/workshop.h"
-#include "core/surface/corners.h"
+#include "core/mesh/surface_mesh.h"
 #include "design/flux/flux_image.h"
 #include "design/flux/flux_triangle.h"
-#include "design/optics/image_triangle.h"
 
 namespace lensforge {
 namespace {
@@ -95,7 +94,7 @@ class PartTile {
 constexpr double kRippleGain = 0.125 * std::numbers::pi * std::numbers::pi;
 
 /// Minimum pixels per millimetre of the part; below it all its light is in one place.
-constexpr double kLeastScale = 1e-6;
+constexpr double kMinScale = 1e-6;
 
 /// The cell of a node: node −1 is in cell −1.
 std::int64_t cell_of(std::int64_t node, std::int64_t parts) {
@@ -277,7 +276,7 @@ double PartTile::seen_by_source(int axis) const {
   const double length = axis == 0 ? static_cast<double>(x_.count - 1) * x_.spacing
                                   : static_cast<double>(y_.count - 1) * y_.spacing;
   const double pixels_per_mm = std::abs((landing_[high] - landing_[low])[axis]) / length;
-  return scene_.ripple.seen_by_disc(scene_.source[axis] / std::max(pixels_per_mm, kLeastScale));
+  return scene_.ripple.seen_by_disc(scene_.source[axis] / std::max(pixels_per_mm, kMinScale));
 }
 
 double PartTile::flux_of(std::size_t a, std::size_t b, std::size_t c) const {

@@ -11,7 +11,6 @@
 #include "cam/tolerance/part_light.h"
 #include "cam/workshop/workshop.h"
 #include "core/compute/executor.h"
-#include "core/compute/run_control.h"
 #include "core/optics/optical_setup.h"
 
 namespace lensforge {

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "core/page/html_text.h"
 #include "core/text/number_text.h"
 
 namespace lensforge {
@@ -36,8 +37,8 @@ namespace {
 constexpr double kHalf = 0.5;
 
 /// Minimum number of pairs for a mean: its error is stated, and pairs differ by one cause alone.
-constexpr std::int64_t kLeastPaired = 5;
-constexpr std::int64_t kMostPaired = 20;
+constexpr std::int64_t kMinPaired = 5;
+constexpr std::int64_t kMaxPaired = 20;
 constexpr std::int64_t kPartsPerPair = 20;
 
 using Clock = std::chrono::steady_clock;
@@ -132,11 +133,6 @@ class Draws {
   double total_ = 0.0;
 };
 
-std::string ratio_words(double contrast) {
-  if (!std::isfinite(contrast)) return "no light in the dark";
-  return decimal_text(contrast, contrast < 10.0 ? 1 : 0) + " : 1";
-}
-
 /// Names the causes that matter most.
 std::string most_words(const ToleranceForecast& forecast) {
   const CauseEffect& most = forecast.causes.front();
@@ -144,8 +140,8 @@ std::string most_words(const ToleranceForecast& forecast) {
   std::string words = std::string("What matters most is the ") + name_of(most.cause) +
                       ": with half its error the MAE would be " + decimal_text(-most.mae, 4) +
                       " lower";
-  const std::string half = ratio_words(contrast_with_half(forecast, most));
-  const std::string whole = ratio_words(forecast.contrast.median);
+  const std::string half = contrast_text(contrast_with_half(forecast, most));
+  const std::string whole = contrast_text(forecast.contrast.median);
   if (forecast.has_dark && half != whole) {
     words += " and the median contrast " + half + " instead of " + whole;
   }
@@ -172,7 +168,7 @@ Quantiles quantiles(std::vector<double> values) {
 }
 
 std::int64_t paired_parts(std::int64_t parts) {
-  return std::min(parts, std::clamp(parts / kPartsPerPair, kLeastPaired, kMostPaired));
+  return std::min(parts, std::clamp(parts / kPartsPerPair, kMinPaired, kMaxPaired));
 }
 
 ToleranceForecast forecast_parts(const PartModel& model, const ErrorSource& source,
@@ -188,8 +184,8 @@ double contrast_with_half(const ToleranceForecast& forecast, const CauseEffect& 
 std::string tolerance_words(const ToleranceForecast& forecast) {
   std::string words = "8 of 10 parts should have ";
   if (forecast.has_dark) {
-    words += "a contrast of " + ratio_words(forecast.contrast.p10) + " to " +
-             ratio_words(forecast.contrast.p90) + " and ";
+    words += "a contrast of " + contrast_text(forecast.contrast.p10) + " to " +
+             contrast_text(forecast.contrast.p90) + " and ";
   }
   words +=
       "an MAE of " + decimal_text(forecast.mae.p10, 4) + " to " + decimal_text(forecast.mae.p90, 4);

@@ -9,7 +9,6 @@
 #include "cam/tolerance/part_error.h"
 #include "cam/tolerance/part_model.h"
 #include "core/compute/executor.h"
-#include "core/compute/run_control.h"
 #include "core/image/image.h"
 
 namespace lensforge {

@@ -5,15 +5,48 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
 #include <span>
 #include <stop_token>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace lensforge {
+
+/// Progress of a long job, in its own units of work.
+struct Progress {
+  std::string stage;   ///< Current stage, e.g. "design level 3/4".
+  double done = 0.0;   ///< Units of work finished.
+  double total = 0.0;  ///< Units of work in all; 0 if unknown.
+  std::string detail;  ///< One short free text, e.g. "MAE 0.0123".
+};
+
+/// Progress sink and stop token, the last argument of every long-running function. A
+/// default-constructed one neither reports nor stops.
+class RunControl {
+ public:
+  RunControl() = default;
+  RunControl(std::stop_token stop, std::function<void(const Progress&)> sink)
+      : stop_(std::move(stop)), sink_(std::move(sink)) {}
+
+  /// True once the caller wants the work to end. Call it at least once a second.
+  [[nodiscard]] bool stop_requested() const { return stop_.stop_requested(); }
+
+  /// The token itself, to pass on with another sink.
+  [[nodiscard]] std::stop_token stop_token() const { return stop_; }
+
+  void report(const Progress& progress) const {
+    if (sink_) sink_(progress);
+  }
+
+ private:
+  std::stop_token stop_;
+  std::function<void(const Progress&)> sink_;
+};
 
 /// Wall-clock seconds and calls per kernel name; filled by an Executor that was given one.
 class KernelProfile {
@@ -34,6 +67,15 @@ class KernelProfile {
 
 /// The device that renders and optimises: this CPU, a GPU, or all processes started by mpirun.
 enum class Device { kCpu, kCuda, kRanks };
+
+/// The GPU used for Device::kCuda: the first one.
+struct Gpu {
+  bool usable = false;
+  std::string name;    ///< The maker's name for it.
+  std::string reason;  ///< Why it is not usable, to follow a colon.
+};
+
+Gpu find_gpu();
 
 /// A sum that is read later, so nobody waits for an executor with its own memory.
 template <std::size_t N>
@@ -204,5 +246,37 @@ typename Exec::template Buffer<T> buffer_of(const Exec& executor, std::span<cons
   upload(executor, values, std::span<T>(buffer.data(), buffer.size()));
   return buffer;
 }
+
+/// Copy of a caller's array in the executor's memory, for kernels to read. The memory is kept for
+/// the next array.
+template <class T, class Exec>
+class KernelInput {
+ public:
+  void send(const Exec& executor, std::span<const T> values) {
+    if (buffer_.size() < values.size()) {
+      buffer_ = {};  // Frees the old memory first.
+      buffer_ = Buffer(values.size() + values.size() / kSlack);
+    }
+    upload(executor, values, std::span<T>(buffer_.data(), values.size()));
+  }
+  [[nodiscard]] const T* data() const { return buffer_.data(); }
+
+ private:
+  using Buffer = typename Exec::template Buffer<T>;
+  static constexpr std::size_t kSlack = 16;  ///< Lengths that hardly change need no new memory.
+
+  Buffer buffer_;
+};
+
+/// On the CPU it is the array itself, which must outlive the kernels that read it.
+template <class T>
+class KernelInput<T, Executor> {
+ public:
+  void send(const Executor& /*executor*/, std::span<const T> values) { data_ = values.data(); }
+  [[nodiscard]] const T* data() const { return data_; }
+
+ private:
+  const T* data_ = nullptr;
+};
 
 }  // namespace lensforge

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/compute/gpu.h"
+#include "core/compute/executor.h"
 
 namespace lensforge {
 

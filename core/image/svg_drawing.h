@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "core/compute/run_control.h"
+#include "core/compute/executor.h"
 #include "core/image/image.h"
 
 namespace lensforge {

@@ -1,19 +1,22 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/image/svg_needs.h"
-
+#include <fontconfig/fontconfig.h>
+#include <gdk-pixbuf/gdk-pixbuf.h>
 #include <libxml/parser.h>
 #include <libxml/xmlreader.h>
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <cstddef>
+#include <cstdio>
 #include <memory>
 #include <optional>
 #include <set>
+#include <string>
+#include <string_view>
 #include <utility>
+#include <vector>
 
-#include "core/image/svg_fonts.h"
-#include "core/image/svg_pictures.h"
 #include "core/image/svg_support.h"
 #include "core/text/lower_case.h"
 #include "core/text/printable.h"
@@ -24,12 +27,6 @@ namespace {
 /// Maximum bytes of a file's name in a message.
 constexpr std::size_t kLongestName = 60;
 
-/// Maximum names from the file in findings: it may have a thousand.
-constexpr std::size_t kMostNames = 30;
-
-/// Maximum nesting of drawings that is examined.
-constexpr int kMostNested = 4;
-
 template <auto kFree>
 struct Free {
   template <class T>
@@ -38,14 +35,292 @@ struct Free {
   }
 };
 
-using Reader = std::unique_ptr<xmlTextReader, Free<xmlFreeTextReader>>;
-
+/// Without white space and quotes around it.
 std::string_view trimmed(std::string_view text) {
   constexpr std::string_view kAround = " \t\r\n\"'";
   const std::size_t begin = text.find_first_not_of(kAround);
   if (begin == std::string_view::npos) return {};
   return text.substr(begin, text.find_last_not_of(kAround) - begin + 1);
 }
+
+constexpr std::string_view kData = "data:";
+constexpr std::string_view kBase64 = ";base64";
+
+/// Maximum bytes of a file's type in a message.
+constexpr std::size_t kLongestType = 40;
+
+using Loader = std::unique_ptr<GdkPixbufLoader, Free<g_object_unref>>;
+using Pixbuf = std::unique_ptr<GdkPixbuf, Free<g_object_unref>>;
+
+/// A data: address (RFC 2397) in its parts.
+struct Address {
+  std::string type;  ///< "image/png", in small letters; empty without one.
+  std::string bytes;
+};
+
+/// Decodes base64, ignoring white space and its entities.
+std::string decoded(std::string_view text) {
+  std::string plain;
+  plain.reserve(text.size());
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const char c = text[i];
+    if (c == '&') {
+      i = std::min(text.find(';', i), text.size());
+    } else if (std::isspace(static_cast<unsigned char>(c)) == 0) {
+      plain += c;
+    }
+  }
+  gsize size = plain.size();
+  if (size < 2) return {};
+  g_base64_decode_inplace(plain.data(), &size);
+  plain.resize(size);
+  return plain;
+}
+
+/// Decodes percent signs.
+std::string unescaped(std::string_view text) {
+  GBytes* const bytes =
+      g_uri_unescape_bytes(text.data(), static_cast<gssize>(text.size()), nullptr, nullptr);
+  if (bytes == nullptr) return {};
+  gsize size = 0;
+  const auto* const data = static_cast<const char*>(g_bytes_get_data(bytes, &size));
+  std::string plain = size > 0 ? std::string(data, size) : std::string();
+  g_bytes_unref(bytes);
+  return plain;
+}
+
+/// The address's parts; no bytes if it is not a data: address.
+Address parts_of(std::string_view address) {
+  const std::size_t comma = address.find(',');
+  if (comma == std::string_view::npos) return {};
+  const std::string head = lower_case(std::string(address.substr(0, comma)));
+  if (!head.starts_with(kData)) return {};
+  address.remove_prefix(comma + 1);
+  return {head.substr(kData.size(), head.find(';') - kData.size()),
+          head.ends_with(kBase64) ? decoded(address) : unescaped(address)};
+}
+
+bool is_drawing(const Address& address) { return address.type.find("svg") != std::string::npos; }
+
+/// Decodes a picture of this type like librsvg; nothing if that fails.
+Pixbuf loaded(const std::string& bytes, const std::string& type) {
+  const Loader loader(type.empty() ? gdk_pixbuf_loader_new()
+                                   : gdk_pixbuf_loader_new_with_mime_type(type.c_str(), nullptr));
+  if (!loader) return nullptr;
+  const bool written =
+      gdk_pixbuf_loader_write(loader.get(), reinterpret_cast<const guchar*>(bytes.data()),
+                              bytes.size(), nullptr) != FALSE;
+  const bool closed = gdk_pixbuf_loader_close(loader.get(), nullptr) != FALSE;
+  GdkPixbuf* const pixbuf = gdk_pixbuf_loader_get_pixbuf(loader.get());
+  if (!written || !closed || pixbuf == nullptr) return nullptr;
+  return Pixbuf(GDK_PIXBUF(g_object_ref(pixbuf)));
+}
+
+/// Exif number of the rotation needed; 1 for none.
+int orientation_of(GdkPixbuf* pixbuf) {
+  const char* const text = gdk_pixbuf_get_option(pixbuf, "orientation");
+  return text != nullptr ? static_cast<int>(g_ascii_strtoll(text, nullptr, 10)) : 1;
+}
+
+/// A turned picture as an address; empty if it cannot be written.
+std::string upright_address(GdkPixbuf* pixbuf) {
+  const Pixbuf upright(gdk_pixbuf_apply_embedded_orientation(pixbuf));
+  gchar* png = nullptr;
+  gsize size = 0;
+  if (gdk_pixbuf_save_to_buffer(upright.get(), &png, &size, "png", nullptr, nullptr) == FALSE) {
+    return {};
+  }
+  gchar* const text = g_base64_encode(reinterpret_cast<const guchar*>(png), size);
+  std::string address = std::string("data:image/png;base64,") + text;
+  g_free(text);
+  g_free(png);
+  return address;
+}
+
+/// A replacement for this address; empty if none is needed.
+std::string fit_address(std::string_view address, std::vector<std::string>& remarks) {
+  const Address parts = parts_of(address);
+  if (parts.bytes.empty() || is_drawing(parts)) return {};
+  Pixbuf pixbuf = loaded(parts.bytes, parts.type);
+  const bool wrong_type = !pixbuf;
+  if (!pixbuf) pixbuf = loaded(parts.bytes, "");
+  if (!pixbuf) return {};
+  const int orientation = orientation_of(pixbuf.get());
+  if (orientation > 1) {
+    const std::string remark =
+        "turned a picture in it upright (EXIF orientation " + std::to_string(orientation) + ")";
+    if (std::find(remarks.begin(), remarks.end(), remark) == remarks.end()) {
+      remarks.push_back(remark);
+    }
+    return upright_address(pixbuf.get());
+  }
+  if (!wrong_type) return {};
+  const std::size_t comma = address.find(',');
+  const std::size_t rest = lower_case(std::string(address.substr(0, comma))).ends_with(kBase64)
+                               ? comma - kBase64.size()
+                               : comma;
+  return std::string(kData).append(address.substr(rest));
+}
+
+/// In plain words, what is left out of a picture at a data: address; empty if it is drawn whole and
+/// upright.
+std::string undrawn_of_picture(std::string_view address) {
+  const Address parts = parts_of(address);
+  if (is_drawing(parts)) return {};
+  const Pixbuf pixbuf = loaded(parts.bytes, parts.type);
+  if (!pixbuf) {
+    return "left out a picture of type '" + printable_line(parts.type, kLongestType) +
+           "', which cannot be read: embed it as PNG or JPEG";
+  }
+  const int orientation = orientation_of(pixbuf.get());
+  if (orientation <= 1) return {};
+  return "left out the turn of a picture (EXIF orientation " + std::to_string(orientation) +
+         "): embed it as PNG";
+}
+
+/// The text of a drawing at a data: address; empty if there is none.
+std::string drawing_at(std::string_view address) {
+  const Address parts = parts_of(address);
+  return is_drawing(parts) ? parts.bytes : "";
+}
+
+/// Checks the installed fonts (fontconfig) for a drawing's text. A font counts as installed if one
+/// of the families that the text names is installed or generic.
+class SvgFonts {
+ public:
+  /// @param families  as font-family lists them.
+  void add(const std::string& families) {
+    if (families_.size() < kMostLists) families_.insert(families);
+  }
+
+  /// The first character that no installed font has, as a problem; empty if there is none.
+  [[nodiscard]] std::string problem_of(const std::string& text);
+
+  /// In plain words, the fonts that replace others.
+  [[nodiscard]] std::vector<std::string> remarks() const;
+
+ private:
+  /// A look-up takes a millisecond, and a file may have a million lists.
+  static constexpr std::size_t kMostLists = 100;
+
+  struct DestroyCharacters {
+    void operator()(FcCharSet* characters) const { FcCharSetDestroy(characters); }
+  };
+
+  std::set<std::string> families_;
+  std::unique_ptr<FcCharSet, DestroyCharacters> installed_;  ///< The characters of all fonts.
+};
+
+/// CSS Fonts 4, section 2.1.3, the names that the drawing programs add, and keywords that name no
+/// family.
+constexpr std::array<std::string_view, 14> kGenericFamilies{
+    "serif", "sans-serif", "sans",     "monospace", "mono",    "cursive",      "fantasy",
+    "math",  "system-ui",  "ui-serif", "inherit",   "initial", "ui-monospace", "ui-sans-serif"};
+
+using Pattern = std::unique_ptr<FcPattern, Free<FcPatternDestroy>>;
+using Fonts = std::unique_ptr<FcFontSet, Free<FcFontSetDestroy>>;
+
+std::vector<std::string> families_in(std::string_view list) {
+  std::vector<std::string> families;
+  while (!list.empty()) {
+    const std::size_t comma = std::min(list.find(','), list.size());
+    const std::string_view family = trimmed(list.substr(0, comma));
+    if (!family.empty()) families.emplace_back(family);
+    list.remove_prefix(std::min(comma + 1, list.size()));
+  }
+  return families;
+}
+
+bool is_generic(const std::string& family) {
+  const auto& all = kGenericFamilies;
+  return std::find(all.begin(), all.end(), lower_case(family)) != all.end();
+}
+
+Pattern pattern_for(const std::string& family) {
+  Pattern pattern(FcPatternCreate());
+  FcPatternAddString(pattern.get(), FC_FAMILY, reinterpret_cast<const FcChar8*>(family.c_str()));
+  FcConfigSubstitute(nullptr, pattern.get(), FcMatchPattern);
+  FcDefaultSubstitute(pattern.get());
+  return pattern;
+}
+
+/// The family used to draw text in `family`: that one if it is installed under any of its names.
+std::optional<std::string> drawn_family(const std::string& family) {
+  FcResult result = FcResultNoMatch;
+  const Pattern match(FcFontMatch(nullptr, pattern_for(family).get(), &result));
+  FcChar8* name = nullptr;
+  std::optional<std::string> first;
+  for (int i = 0; match && FcPatternGetString(match.get(), FC_FAMILY, i, &name) == FcResultMatch;
+       ++i) {
+    const std::string one = reinterpret_cast<const char*>(name);
+    if (lower_case(one) == lower_case(family)) return family;
+    if (!first) first = one;
+  }
+  return first;
+}
+
+/// The characters of all installed fonts.
+FcCharSet* installed_characters() {
+  FcResult result = FcResultNoMatch;
+  FcCharSet* characters = nullptr;
+  const Fonts fonts(
+      FcFontSort(nullptr, pattern_for("sans-serif").get(), FcTrue, &characters, &result));
+  return characters;
+}
+
+std::string code_point(FcChar32 character) {
+  std::array<char, 16> text{};
+  std::snprintf(text.data(), text.size(), "U+%04X", character);
+  return text.data();
+}
+
+/// Names the font that replaces all of these; empty if one of them is used.
+std::string remark_on(const std::vector<std::string>& families) {
+  std::optional<std::string> drawn;
+  for (const std::string& family : families) {
+    const std::optional<std::string> found = drawn_family(family);
+    if (is_generic(family) || found == family) return {};
+    if (!drawn) drawn = found;
+  }
+  if (families.empty()) return {};
+  return "text is drawn in the font '" + printable_line(drawn.value_or("none"), kLongestName) +
+         "' because '" + printable_line(families.front(), kLongestName) +
+         "' is not installed: install it, or convert the text to paths";
+}
+
+std::string SvgFonts::problem_of(const std::string& text) {
+  if (!installed_) installed_.reset(installed_characters());
+  const auto* at = reinterpret_cast<const FcChar8*>(text.c_str());
+  int left = static_cast<int>(text.size());
+  FcChar32 character = 0;
+  for (int used = 0; left > 0; at += used, left -= used) {
+    used = FcUtf8ToUcs4(at, &character, left);
+    if (used <= 0) return {};
+    if (character <= ' ' || FcCharSetHasChar(installed_.get(), character) != FcFalse) continue;
+    return "its text has the character " +
+           printable_line({reinterpret_cast<const char*>(at), std::size_t(used)}) + " (" +
+           code_point(character) +
+           "), which no installed font has: install one, or convert the text to paths";
+  }
+  return {};
+}
+
+std::vector<std::string> SvgFonts::remarks() const {
+  std::vector<std::string> all;
+  for (const std::string& list : families_) {
+    const std::string remark = remark_on(families_in(list));
+    if (!remark.empty()) all.push_back(remark);
+  }
+  return all;
+}
+
+/// Maximum names from the file in findings: it may have a thousand.
+constexpr std::size_t kMostNames = 30;
+
+/// Maximum nesting of drawings that is examined.
+constexpr int kMostNested = 4;
+
+using Reader = std::unique_ptr<xmlTextReader, Free<xmlFreeTextReader>>;
 
 /// A property and its value in CSS.
 struct Declaration {
@@ -343,7 +618,8 @@ class Survey {
   void look_at_link(const std::string& link) {
     if (link.empty() || link.starts_with('#') || lower_case(link.substr(0, 5)) == "data:") return;
     if (!is_new(link)) return;
-    leave_out("'" + printable_line(link, kLongestName) + "', which is not in the file", "embed it");
+    leave_out(std::string("'") + printable_line(link, kLongestName) + "', which is not in the file",
+              "embed it");
   }
 
   void look_at_picture() {
@@ -433,6 +709,21 @@ class Survey {
 };
 
 }  // namespace
+
+std::string with_fit_pictures(const std::string& xml, std::vector<std::string>& remarks) {
+  std::string fit;
+  std::size_t kept = 0;
+  for (std::size_t at = xml.find(kData); at != std::string::npos; at = xml.find(kData, at + 1)) {
+    if (at == 0 || (xml[at - 1] != '"' && xml[at - 1] != '\'')) continue;
+    const std::size_t end = xml.find(xml[at - 1], at);
+    if (end == std::string::npos) break;
+    const std::string address = fit_address(std::string_view(xml).substr(at, end - at), remarks);
+    if (address.empty()) continue;
+    fit.append(xml, kept, at - kept).append(address);
+    kept = end;
+  }
+  return fit.append(xml, kept);
+}
 
 SvgNeeds svg_needs(std::string_view xml) { return Survey(0).of(xml); }
 

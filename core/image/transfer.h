@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <array>
 #include <cmath>
 
 #include "core/compute/host_device.h"
@@ -28,6 +29,11 @@ LF_HD inline double encode_slope(double linear) {
 LF_HD inline double decode(double encoded) {
   if (encoded <= kSrgbToeSlope * kSrgbToeEnd) return encoded / kSrgbToeSlope;
   return std::pow((encoded + 0.055) / 1.055, 2.4);
+}
+
+/// Luminance of red, green and blue light (ITU-R BT.709-6, item 3.2).
+inline double luminance_rec709(const std::array<double, 3>& light) {
+  return 0.2126 * light[0] + 0.7152 * light[1] + 0.0722 * light[2];
 }
 
 }  // namespace lensforge

@@ -2,20 +2,22 @@
 #include "core/io/files.h"
 
 #include <fcntl.h>
+#include <openssl/evp.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <climits>
 #include <cstring>
+#include <fstream>
 #include <random>
 #include <string>
 #include <system_error>
 #include <utility>
 
 #include "core/error.h"
-#include "core/io/descriptor.h"
 
 namespace lensforge {
 namespace {
@@ -68,15 +70,6 @@ void flush_to_disk(const fs::path& file, const fs::path& named_in_error) {
     fail_to_write(named_in_error, errno);
   }
   if (const int error = opened.close(); error != 0) fail_to_write(named_in_error, error);
-}
-
-void write_all(int descriptor, std::string_view content, const fs::path& named_in_error) {
-  while (!content.empty()) {
-    const ssize_t written = ::write(descriptor, content.data(), content.size());
-    if (written < 0 && errno == EINTR) continue;
-    if (written < 0) fail_to_write(named_in_error, errno);
-    content.remove_prefix(static_cast<std::size_t>(written));
-  }
 }
 
 /// Describes a path that is not a regular file.
@@ -134,9 +127,34 @@ void write_whole_file(const fs::path& path, std::string_view content) {
   write_whole_file(path, [&](const fs::path& beside) {
     Descriptor file(::open(beside.c_str(), O_WRONLY | O_TRUNC | O_CLOEXEC));
     if (!file.open()) fail_to_write(path, errno);
-    write_all(file.number(), content, path);
+    if (!write_all(file.number(), content)) fail_to_write(path, errno);
     if (const int error = file.close(); error != 0) fail_to_write(path, error);
   });
+}
+
+void PendingFiles::add(const std::string& name,
+                       const std::function<void(const fs::path& beside)>& write) {
+  PendingFile file(folder_ / name);
+  write(file.beside());
+  files_.push_back(std::move(file));
+}
+
+void PendingFiles::add(const std::string& name, std::string_view content) {
+  add(name, [&](const fs::path& beside) { write_whole_file(beside, content); });
+}
+
+bool PendingFiles::has(const std::string& name) const {
+  return std::any_of(files_.begin(), files_.end(),
+                     [&](const PendingFile& file) { return file.path().filename() == name; });
+}
+
+std::vector<fs::path> PendingFiles::publish() {
+  std::vector<fs::path> paths;
+  for (PendingFile& file : files_) {
+    file.publish();
+    paths.push_back(file.path());
+  }
+  return paths;
 }
 
 std::string name_of_partial(std::string_view name) {
@@ -206,6 +224,81 @@ void require_writable_folder(const fs::path& folder) {
     throw InputError(folder.string() +
                      ": files cannot be made in this folder: " + reason(probe.error));
   }
+}
+
+int Descriptor::above_standard(int number) {
+  if (number < 0 || number > STDERR_FILENO) return number;
+  const int moved = ::fcntl(number, F_DUPFD_CLOEXEC, STDERR_FILENO + 1);
+  const int error = errno;
+  ::close(number);
+  errno = error;
+  return moved;
+}
+
+int Descriptor::close() {
+  const int number = std::exchange(number_, -1);
+  return number >= 0 && ::close(number) != 0 ? errno : 0;
+}
+
+bool write_all(int descriptor, std::string_view bytes) {
+  while (!bytes.empty()) {
+    const ssize_t written = ::write(descriptor, bytes.data(), bytes.size());
+    if (written < 0 && errno != EINTR) return false;
+    if (written > 0) bytes.remove_prefix(static_cast<std::size_t>(written));
+  }
+  return true;
+}
+
+namespace {
+
+struct FreeDigest {
+  void operator()(EVP_MD_CTX* context) const { EVP_MD_CTX_free(context); }
+};
+
+std::string hexadecimal(const std::array<unsigned char, EVP_MAX_MD_SIZE>& bytes, unsigned count) {
+  constexpr const char* kDigits = "0123456789abcdef";
+  std::string text;
+  for (unsigned i = 0; i < count; ++i) {
+    text += kDigits[bytes[i] >> 4];
+    text += kDigits[bytes[i] & 15];
+  }
+  return text;
+}
+
+}  // namespace
+
+struct Sha256::State {
+  std::unique_ptr<EVP_MD_CTX, FreeDigest> context{EVP_MD_CTX_new()};
+};
+
+Sha256::Sha256() : state_(std::make_unique<State>()) {
+  EVP_MD_CTX* context = state_->context.get();
+  LF_CHECK(context && EVP_DigestInit_ex(context, EVP_sha256(), nullptr) == 1, "SHA-256");
+}
+
+Sha256::~Sha256() = default;
+Sha256::Sha256(Sha256&&) noexcept = default;
+Sha256& Sha256::operator=(Sha256&&) noexcept = default;
+
+void Sha256::update(std::string_view bytes) {
+  LF_CHECK(EVP_DigestUpdate(state_->context.get(), bytes.data(), bytes.size()) == 1, "SHA-256");
+}
+
+std::string Sha256::finish() {
+  std::array<unsigned char, EVP_MAX_MD_SIZE> digest{};
+  unsigned count = 0;
+  LF_CHECK(EVP_DigestFinal_ex(state_->context.get(), digest.data(), &count) == 1, "SHA-256");
+  return hexadecimal(digest, count);
+}
+
+std::string sha256_of(const std::filesystem::path& file) {
+  std::ifstream input = open_input(file);
+  Sha256 hash;
+  std::array<char, 1 << 16> block{};
+  while (input.read(block.data(), block.size()), input.gcount() > 0) {
+    hash.update({block.data(), static_cast<std::size_t>(input.gcount())});
+  }
+  return hash.finish();
 }
 
 }  // namespace lensforge

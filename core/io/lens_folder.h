@@ -2,6 +2,12 @@
 #pragma once
 
 #include <array>
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "core/error.h"
+#include "core/io/files.h"
 
 namespace lensforge {
 
@@ -37,6 +43,73 @@ inline constexpr const char* kStaging = "lens";
 inline constexpr const char* kCut = "cam";
 inline constexpr std::array kCutFiles = {"report.html", "report.json", "compare.html",
                                          "milled.ply",  "milled.png",  "leakage.png"};
+
+/// Files that `cam` writes beside kCutFiles, for a page that draws the part: its surfaces, and the
+/// picture with each cause of misdirected light.
+inline constexpr const char* kPartSurfaces = "part.exr";
+inline constexpr const char* kCausePictures = "causes.exr";
+inline constexpr std::array kCutLayers = {kPartSurfaces, kCausePictures};
 }  // namespace lens_file
+
+/// True if a regular file contains program_mark() of any version in its first or last 4 KiB. Files
+/// edited by a program that keeps the mark count too.
+bool written_by_lensforge(const std::filesystem::path& path);
+
+/// True if `path` is, or would be, one of the files of a lens folder or of the cut in it.
+bool belongs_to_lens(const std::filesystem::path& path);
+
+/// Keeps an output from replacing a file that must not be lost.
+/// @param option  the option that named the output, for the message: "--out".
+/// @param force   the user allows any file to be replaced.
+/// @throw InputError if `path` is a folder, a device, a pipe or a file of a lens folder, whatever
+///        `force` says; or a file that lensforge did not write, without `force`.
+void require_replaceable(const std::string& option, const std::filesystem::path& path, bool force);
+
+struct MadeFolder;
+
+/// Another process holds the folder.
+class FolderHeld : public InputError {
+ public:
+  using InputError::InputError;
+};
+
+/// Keeps other lensforge commands out of a folder while it lives: an advisory lock (flock) on the
+/// folder itself, without a lock file. The system releases it when the process ends in any way.
+class FolderLock {
+ public:
+  enum class Kind {
+    kExclusive,  ///< No other command: this one writes here.
+    kShared,     ///< No writer: this command reads files that must not change.
+  };
+
+  /// @throw InputError if `folder` cannot be opened; FolderHeld if another process holds it.
+  FolderLock(const std::filesystem::path& folder, Kind kind);
+
+  /// Makes `folder` (and its parents) if needed, and locks it before another command can remove it.
+  /// Waits at most 0.1 s for other commands. If one still holds the folder in any way, an exclusive
+  /// lock fails; if it holds it exclusively, a shared lock is left out (MadeFolder::lock).
+  /// @throw InputError if the folder or files in it cannot be made; FolderHeld if another process
+  ///        holds it, for an exclusive lock.
+  static MadeFolder make(const std::filesystem::path& folder, Kind kind);
+
+  /// Returns true if nobody else holds the folder; from then on nobody else can. If it returns
+  /// false, a shared lock may be lost: the system releases it before it tries (flock(2)).
+  bool become_exclusive();
+
+ private:
+  FolderLock() = default;
+
+  void open(const std::filesystem::path& folder);
+  bool attempt(Kind kind);
+  [[nodiscard]] bool is_at(const std::filesystem::path& folder) const;
+
+  Descriptor folder_;
+};
+
+/// A folder that FolderLock::make() has made or found.
+struct MadeFolder {
+  std::optional<FolderLock> lock;  ///< None if a shared lock could not be taken.
+  bool made = false;               ///< False if it existed.
+};
 
 }  // namespace lensforge

@@ -7,21 +7,20 @@
 #include <span>
 
 #include "core/compute/host_device.h"
-#include "core/optics/fresnel.h"
-#include "core/optics/image_plane.h"
+#include "core/mesh/surface_mesh.h"
 #include "core/optics/light_source.h"
 #include "core/optics/optical_setup.h"
-#include "core/optics/reflection_barrier.h"
+#include "core/optics/outline.h"
 #include "core/optics/refraction.h"
 #include "core/optics/screen.h"
-#include "core/surface/corners.h"
 
-/// Notation: p surface point and t surface triangle, mm in the lens frame; n unit normal, n_z > 0;
-/// a unit direction of the light before the surface (inside a lens); b unit direction of the ray
-/// after it, m its slope (dx/dz, dy/dz); u landing point in pixel coordinates. A bar (…_bar) is a
-/// derivative by that quantity. `known` holds the results of ray_to() for the same points, so
-/// repeated calls need not solve for them again.
 namespace lensforge {
+
+// Notation: p surface point and t surface triangle, mm in the lens frame; n unit normal, n_z > 0;
+// a unit direction of the light before the surface (inside a lens); b unit direction of the ray
+// after it, m its slope (dx/dz, dy/dz); u landing point in pixel coordinates. A bar (…_bar) is a
+// derivative by that quantity. `known` holds the results of ray_to() for the same points, so
+// repeated calls need not solve for them again.
 
 /// Light after a plane facet. Parallel light leaves it as one beam; light from a point has a beam
 /// for each corner.
@@ -372,5 +371,25 @@ class LightPath {
   std::int64_t kind_;       ///< Wide, so a kernel's argument has no unset bytes.
   Eigen::Vector2d middle_;  ///< The lens's, mm.
 };
+
+// The light on a whole surface.
+
+/// The light on a surface, with flux as a share of this surface's intake: a higher rim takes in
+/// less of a diverging beam, but the picture keeps its total.
+/// @pre the mesh has no triangles outside setup.outline.
+LightPath light_on(const SurfaceMesh& mesh, const OpticalSetup& setup);
+
+/// The same for a mesh that extends beyond the outline.
+LightPath light_inside(const SurfaceMesh& mesh, const MeshCut& cut, const OpticalSetup& setup);
+
+/// LightPath::intake() of the part of a mesh inside an outline, mm².
+double intake_inside(const SurfaceMesh& mesh, const MeshCut& cut, const LightPath& light);
+
+/// LightPath::intake() of a whole surface, mm².
+double intake_of(const SurfaceMesh& mesh, const LightPath& light);
+
+/// Maximum distance beyond the lens's edges at which a vertex's light enters a curved front, mm; 0
+/// for a flat front.
+double overhang(const SurfaceMesh& mesh, const OpticalSetup& setup);
 
 }  // namespace lensforge

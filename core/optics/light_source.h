@@ -5,15 +5,327 @@
 #include <Eigen/Geometry>
 #include <cmath>
 #include <cstdint>
+#include <limits>
+#include <vector>
 
 #include "core/compute/host_device.h"
-#include "core/optics/front_entry.h"
-#include "core/optics/incident_ray.h"
+#include "core/mesh/surface_mesh.h"
+#include "core/optics/front.h"
 #include "core/optics/optical_setup.h"
-#include "core/optics/point_light.h"
-#include "core/surface/corners.h"
+#include "core/optics/refraction.h"
 
 namespace lensforge {
+
+/// The ray that reaches a surface point, and its derivatives by that point: everything that is
+/// costly to find if the light's direction varies. Moving the point along its ray changes nothing,
+/// so derivatives by x and y suffice.
+///
+/// Notation: p the point, a the ray's unit direction there, m = (a_x, a_y)/a_z its slope, e the
+/// point where it enters the lens, x the x and y of e, ∇h the front's gradient there. A bar (…_bar)
+/// is a derivative by that quantity. All NaN if no ray reaches p.
+struct IncidentRay {
+  Eigen::Vector2d m;
+  Eigen::Vector2d x;         ///< mm
+  double z;                  ///< z of e, mm.
+  double a_z;                ///< Negative for a mirror's light.
+  Eigen::Vector2d gradient;  ///< ∇h
+  Eigen::Matrix2d m_by_p;    ///< ∂m/∂(p_x, p_y), 1/mm
+  Eigen::Matrix2d x_by_p;    ///< ∂x/∂(p_x, p_y)
+
+  [[nodiscard]] LF_HD LF_INLINE Eigen::Vector3d direction() const {
+    return {a_z * m.x(), a_z * m.y(), a_z};
+  }
+  [[nodiscard]] LF_HD LF_INLINE Eigen::Vector3d entry() const { return {x.x(), x.y(), z}; }
+
+  /// Adjoint of p ↦ direction(): the derivative by p.
+  [[nodiscard]] LF_HD LF_INLINE Eigen::Vector3d direction_adjoint(
+      const Eigen::Vector3d& a_bar) const {
+    // a is w/|w| of w = (m, 1), or its opposite: ∂a/∂w = a_z (1 − a aᵀ).
+    const double along = a_z * (m.x() * a_bar.x() + m.y() * a_bar.y() + a_bar.z());
+    const Eigen::Vector2d m_bar(a_z * (a_bar.x() - along * a_z * m.x()),
+                                a_z * (a_bar.y() - along * a_z * m.y()));
+    return by_point(m_by_p, m_bar);
+  }
+  /// Adjoint of p ↦ entry(): the derivative by p.
+  [[nodiscard]] LF_HD LF_INLINE Eigen::Vector3d entry_adjoint(const Eigen::Vector3d& e_bar) const {
+    return place_adjoint(
+        {e_bar.x() + gradient.x() * e_bar.z(), e_bar.y() + gradient.y() * e_bar.z()});
+  }
+  /// Adjoint of p ↦ x: the derivative by p.
+  [[nodiscard]] LF_HD LF_INLINE Eigen::Vector3d place_adjoint(const Eigen::Vector2d& x_bar) const {
+    return by_point(x_by_p, x_bar);
+  }
+
+ private:
+  [[nodiscard]] LF_HD LF_INLINE Eigen::Vector3d by_point(const Eigen::Matrix2d& change,
+                                                         const Eigen::Vector2d& bar) const {
+    const double by_x = change(0, 0) * bar.x() + change(1, 0) * bar.y();
+    const double by_y = change(0, 1) * bar.x() + change(1, 1) * bar.y();
+    return {by_x, by_y, -(m.x() * by_x + m.y() * by_y)};
+  }
+};
+
+/// Cached rays to a triangle's corners; null if not computed.
+struct CornerRays {
+  const IncidentRay* r0 = nullptr;
+  const IncidentRay* r1 = nullptr;
+  const IncidentRay* r2 = nullptr;
+};
+
+/// Rays to all vertices of a mesh; null for parallel light.
+struct VertexRays {
+  const IncidentRay* of = nullptr;
+
+  [[nodiscard]] LF_HD const IncidentRay* at(std::int64_t vertex) const {
+    return of != nullptr ? of + vertex : nullptr;
+  }
+  [[nodiscard]] LF_HD CornerRays at(const int* triangle) const {
+    return {at(triangle[0]), at(triangle[1]), at(triangle[2])};
+  }
+};
+
+// Light from a point.
+//
+// Notation: a, b, c vectors from the source to the corners of a triangle; D depth of the source
+// below a flat front, T height of a point above it, x its lateral offset from the source; η
+// refractive index behind the front; μx slope of the ray behind the front, r = |x|². A bar (…_bar)
+// is a derivative by that quantity.
+
+/// a × b; GCC 12 leaves Eigen's as a call.
+LF_HD inline Eigen::Vector3d cross_product(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  return {a.y() * b.z() - a.z() * b.y(), a.z() * b.x() - a.x() * b.z(),
+          a.x() * b.y() - a.y() * b.x()};
+}
+
+/// The two factors of a solid angle, tan(Ω/2) = N/D (Van Oosterom and Strackee 1983, Eq. 8).
+struct SolidAngle {
+  double la;  ///< |a|
+  double lb;
+  double lc;
+  double n;  ///< a·(b × c)
+  double d;  ///< |a||b||c| + (a·b)|c| + (b·c)|a| + (c·a)|b|
+
+  LF_HD LF_INLINE SolidAngle(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
+                             const Eigen::Vector3d& c)
+      : la(a.norm()),
+        lb(b.norm()),
+        lc(c.norm()),
+        // Differences first: for a distant facet, products of whole vectors lose digits.
+        n(a.dot(cross_product(b - a, c - a))),
+        d(la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb) {}
+
+  /// Ω, steradian; positive where a, b, c turn counter-clockwise seen along their sum.
+  [[nodiscard]] LF_HD double value() const {
+    const double x = n / d;
+    // atan by its series: a facet's x is far below the bound, where the next term is 1e-18.
+    if (d > 0.0 && std::fabs(x) < 5e-3) {
+      const double y = x * x;
+      return 2.0 * x * (1.0 - y * (1.0 / 3.0 - y * (0.2 - y / 7.0)));
+    }
+    return 2.0 * std::atan2(n, d);
+  }
+};
+
+/// Derivatives by the three vectors.
+struct VectorsBar {
+  Eigen::Vector3d a{0.0, 0.0, 0.0};
+  Eigen::Vector3d b{0.0, 0.0, 0.0};
+  Eigen::Vector3d c{0.0, 0.0, 0.0};
+};
+
+/// Derivative of SolidAngle(a, b, c).value() × bar by the three vectors:
+/// dΩ = 2 (D dN − N dD) / (N² + D²).
+LF_HD LF_INLINE VectorsBar solid_angle_adjoint(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
+                                               const Eigen::Vector3d& c, double bar) {
+  const SolidAngle angle(a, b, c);
+  const double s = 2.0 * bar / (angle.n * angle.n + angle.d * angle.d);
+  const double n_bar = s * angle.d;
+  const double d_bar = -s * angle.n;
+  const double by_a = (angle.lb * angle.lc + b.dot(c)) / angle.la;
+  const double by_b = (angle.lc * angle.la + c.dot(a)) / angle.lb;
+  const double by_c = (angle.la * angle.lb + a.dot(b)) / angle.lc;
+  return {n_bar * cross_product(b, c) + d_bar * (by_a * a + angle.lc * b + angle.lb * c),
+          n_bar * cross_product(c, a) + d_bar * (by_b * b + angle.lc * a + angle.la * c),
+          n_bar * cross_product(a, b) + d_bar * (by_c * c + angle.lb * a + angle.la * b)};
+}
+
+/// The ray from a point source below a flat front to a point above it, by Snell's law at the front:
+/// D η μ q + T μ = 1 with q = 1/√(1 − (η² − 1) μ² r).
+struct FrontRay {
+  Eigen::Vector2d x;
+  double height;  ///< T
+  double mu;
+  double mu_by_r;  ///< ∂μ/∂r
+
+  /// @pre depth > 0, height ≥ 0, eta > 1.
+  LF_HD FrontRay(const Eigen::Vector2d& across, double depth, double height_above, double eta)
+      : x(across), height(height_above) {
+    const double r = x.squaredNorm();
+    const double k = eta * eta - 1.0;
+    const double optical = depth * eta;
+    // Starts with the refraction point of a ray nearly along z: the error is of third order.
+    const double g = 1.0 / (depth + height / eta);
+    mu = g / std::sqrt(eta * eta + k * r * g * g);
+    for (int i = 0; i < kMaxSteps; ++i) {
+      const double q = inverse_root(k * r);
+      const double step = (optical * mu * q + height * mu - 1.0) / (optical * q * q * q + height);
+      const double next = mu - step;
+      // The left-hand side is convex and has its pole where k μ² r = 1.
+      mu = k * r * next * next < 1.0 ? next : 0.5 * (mu + 1.0 / std::sqrt(k * r));
+      if (std::fabs(step) <= kNear * mu) break;
+    }
+    const double q = inverse_root(k * r);
+    const double steepness = optical * q * q * q + height;
+    mu_by_r = -0.5 * optical * k * mu * mu * mu * q * q * q / steepness;
+  }
+
+  /// @param source  position of the source, mm.
+  [[nodiscard]] LF_HD IncidentRay ray(const Eigen::Vector3d& source) const {
+    const Eigen::Vector2d m = mu * x;
+    Eigen::Matrix2d m_by_p;
+    m_by_p << mu + 2.0 * mu_by_r * x.x() * x.x(), 2.0 * mu_by_r * x.x() * x.y(),
+        2.0 * mu_by_r * x.x() * x.y(), mu + 2.0 * mu_by_r * x.y() * x.y();
+    const double share = 1.0 - height * mu;
+    return {m,
+            {source.x() + share * x.x(), source.y() + share * x.y()},
+            0.0,
+            1.0 / std::sqrt(1.0 + m.squaredNorm()),
+            {0.0, 0.0},
+            m_by_p,
+            Eigen::Matrix2d::Identity() - height * m_by_p};
+  }
+
+ private:
+  /// Iteration ends at a step below this share; the error is of the order of its square. The usual
+  /// lens needs one or two steps, a source close below the front at 80° eight.
+  static constexpr double kNear = 1e-9;
+  static constexpr int kMaxSteps = 50;
+
+  [[nodiscard]] LF_HD double inverse_root(double kr) const {
+    return 1.0 / std::sqrt(1.0 - kr * mu * mu);
+  }
+};
+
+/// Light that meets a front: parallel, or from a point.
+struct FrontLight {
+  Eigen::Vector3d from;  ///< A unit direction, or the position of the point, mm.
+  bool point;
+  double ior;  ///< Refractive index behind the front.
+};
+
+/// The ray behind a curved front at one of the front's points (Sun et al., section 3.5).
+///
+/// Notation: e the point on the front, x its x and y, a and b unit directions of the light before
+/// and behind it, b_by_x and b_by_y the derivatives by x, n the inward unit normal, w = (−∇h, 1) =
+/// |w| n, m = (b_x, b_y)/b_z. A bar (…_bar) is a derivative by that quantity.
+struct FrontRefraction {
+  Eigen::Vector3d e = unknown();
+  Eigen::Vector3d b = unknown();
+  Eigen::Vector2d gradient{0.0, 0.0};  ///< ∇h
+  Eigen::Vector3d b_by_x{0.0, 0.0, 0.0};
+  Eigen::Vector3d b_by_y{0.0, 0.0, 0.0};
+  bool lit = false;  ///< False if the light comes from the other side.
+
+  FrontRefraction() = default;
+  LF_HD FrontRefraction(const FrontSurface& front, const FrontLight& light,
+                        const Eigen::Vector2d& x) {
+    const FrontPoint h = front.at(x);
+    e = {x.x(), x.y(), h.z};
+    gradient = h.gradient;
+    const Eigen::Vector3d w(-h.gradient.x(), -h.gradient.y(), 1.0);
+    const double length = w.norm();
+    const Eigen::Vector3d n = w / length;
+    const Eigen::Vector3d way = light.point ? Eigen::Vector3d(e - light.from) : light.from;
+    const double distance = way.norm();
+    const Eigen::Vector3d a = way / distance;
+    const double eta = 1.0 / light.ior;
+    const double c = n.dot(a);
+    lit = c > 0.0;
+    const double root = std::sqrt(refracted_cosine_squared(c, eta));
+    const double k = root - eta * c;
+    b = k * n + eta * a;
+    for (int j = 0; j < 2; ++j) {
+      const Eigen::Vector3d dw(-h.bend[j], -h.bend[j + 1], 0.0);
+      const Eigen::Vector3d dn = (dw - n.dot(dw) * n) / length;
+      const Eigen::Vector3d de(j == 0 ? 1.0 : 0.0, j == 0 ? 0.0 : 1.0, h.gradient[j]);
+      Eigen::Vector3d da(0.0, 0.0, 0.0);
+      if (light.point) da = (de - a.dot(de) * a) / distance;
+      const double dc = dn.dot(a) + n.dot(da);
+      const double dk = (eta * eta * c / root - eta) * dc;
+      (j == 0 ? b_by_x : b_by_y) = dk * n + k * dn + eta * da;
+    }
+  }
+
+  [[nodiscard]] LF_HD static Eigen::Vector3d unknown() {
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    return {nan, nan, nan};
+  }
+  [[nodiscard]] LF_HD Eigen::Vector2d slope() const { return {b.x() / b.z(), b.y() / b.z()}; }
+  /// Derivative of slope() by x.
+  [[nodiscard]] LF_HD Eigen::Matrix2d slope_by_x() const {
+    const Eigen::Vector2d m = slope();
+    Eigen::Matrix2d by_x;
+    for (int j = 0; j < 2; ++j) {
+      const Eigen::Vector3d& db = j == 0 ? b_by_x : b_by_y;
+      by_x.col(j) = (Eigen::Vector2d(db.x(), db.y()) - db.z() * m) / b.z();
+    }
+    return by_x;
+  }
+  /// Derivative by x of the point where the ray reaches height z. The light has folded over if the
+  /// determinant is not positive.
+  [[nodiscard]] LF_HD Eigen::Matrix2d landing_by_x(double z) const {
+    const Eigen::Vector2d m = slope();
+    Eigen::Matrix2d lands = Eigen::Matrix2d::Identity() + (z - e.z()) * slope_by_x();
+    for (int j = 0; j < 2; ++j) lands.col(j) -= gradient[j] * m;
+    return lands;
+  }
+  /// @param x_by_p  derivative of x by the point behind the front that the ray goes through.
+  [[nodiscard]] LF_HD IncidentRay ray(const Eigen::Matrix2d& x_by_p) const {
+    return {slope(), {e.x(), e.y()}, e.z(), b.z(), gradient, slope_by_x() * x_by_p, x_by_p};
+  }
+  /// Moves to another point of the front, to first order.
+  LF_HD void move(const Eigen::Vector2d& step) {
+    e += Eigen::Vector3d(step.x(), step.y(), gradient.dot(step));
+    b += step.x() * b_by_x + step.y() * b_by_y;
+  }
+};
+
+/// Newton's method ends at a step below kNearEntry of the point's coordinates plus kTinyEntry mm.
+/// That step is taken to first order, so the error is of the order of its square. Lenses need three
+/// or four steps.
+inline constexpr double kNearEntry = 1e-9;
+inline constexpr double kTinyEntry = 1e-12;
+inline constexpr int kMaxEntrySteps = 30;
+
+/// The ray from a source through a curved front to a point p behind it: Newton's method on x + (p_z
+/// − h(x)) m(x) = p_xy. All NaN if no ray reaches p.
+LF_HD inline IncidentRay ray_through_front(const FrontSurface& front, const FrontLight& light,
+                                           const Eigen::Vector3d& p) {
+  IncidentRay found = FrontRefraction().ray(Eigen::Matrix2d::Identity());
+  Eigen::Vector2d x(p.x(), p.y());
+  if (!front.covers(x)) return found;
+  for (int i = 0; i < kMaxEntrySteps; ++i) {
+    FrontRefraction ray(front, light, x);
+    if (!ray.lit || !(ray.b.z() > 0.0)) return found;
+    const Eigen::Vector2d m = ray.slope();
+    const double rise = p.z() - ray.e.z();
+    const Eigen::Matrix2d lands = ray.landing_by_x(p.z());
+    // Beyond where neighbouring rays meet, the light has folded over.
+    const double det = lands(0, 0) * lands(1, 1) - lands(0, 1) * lands(1, 0);
+    if (!(det > 0.0)) return found;
+    Eigen::Matrix2d inverse;
+    inverse << lands(1, 1), -lands(0, 1), -lands(1, 0), lands(0, 0);
+    inverse /= det;
+    Eigen::Vector2d step = inverse * (x + rise * m - Eigen::Vector2d(p.x(), p.y()));
+    if (step.norm() <= kNearEntry * (p.cwiseAbs().sum() + std::fabs(ray.e.z())) + kTinyEntry) {
+      ray.move(-step);
+      return ray.ray(inverse);
+    }
+    for (int k = 0; k < kMaxEntrySteps && !front.covers(x - step); ++k) step *= 0.5;
+    x -= step;
+  }
+  return found;
+}
 
 /// The light before the surface: its direction at a point, and the amount that a triangle takes in.
 /// Notation: p surface point and t surface triangle, mm; a unit direction of the light at p (inside
@@ -213,5 +525,32 @@ class LightSource {
   Kind kind_;
   FrontSurface front_;  ///< The lens's front, if curved.
 };
+
+// An extended source as points.
+
+/// A point of an extended source.
+struct SourcePoint {
+  Eigen::Vector2d at;  ///< Offset right and up from the middle, seen from the lens: rad or mm.
+  double share;        ///< Share of the source's light.
+};
+
+/// Points distributed over a source, with shares that sum to 1. A disc has `count` points of equal
+/// shares along Vogel's spiral (1979), of which every other point is spread as evenly. A shape has
+/// the centres of its lit pixels, each subdivided so that there are about `count` in all, at least
+/// one per pixel. A source without extent is one point. @pre count ≥ 1.
+std::vector<SourcePoint> source_points(const SourceExtent& extent, int count);
+
+/// The light of one point of the source alone: parallel light turned by `at`, or light from a point
+/// moved by `at` across the line to the middle of the lens.
+OpticalSetup lit_from(OpticalSetup setup, const Eigen::Vector2d& at);
+
+/// Jacobian J of the landing point by the source point, pixels per rad or mm: u = u₀ + J·at, for
+/// light that goes from the middle of the lens at height z to the picture's centre. A central
+/// difference over the source's width. For a thin lens along z it is −f per rad or −(f / D) per mm,
+/// times the pixels per mm. A tilted screen has two scales.
+Eigen::Matrix2d source_motion(const OpticalSetup& setup, double z);
+
+/// Width of the source's image on the screen along its widest direction, pixels.
+double source_blur(const OpticalSetup& setup, double z);
 
 }  // namespace lensforge

@@ -5,15 +5,84 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <functional>
 #include <sstream>
 #include <string>
 #include <variant>
 #include <vector>
 
 #include "core/error.h"
+#include "core/image/color.h"
+#include "core/text/number_list.h"
 #include "core/text/number_text.h"
 
 namespace lensforge {
+namespace {
+
+/// Fraunhofer's lines, nm.
+constexpr double kLineF = 486.13;
+constexpr double kLineD = 587.56;
+constexpr double kLineC = 656.27;
+
+constexpr double inverse_square(double x) { return 1.0 / (x * x); }
+
+}  // namespace
+
+double Dispersion::index_at(double wavelength) const {
+  const double b = (n_d - 1.0) / (abbe * (inverse_square(kLineF) - inverse_square(kLineC)));
+  return n_d + b * (inverse_square(wavelength) - inverse_square(kLineD));
+}
+
+std::vector<double> Spectrum::shares() const { return brightness_shares(wavelengths, powers); }
+
+Spectrum parse_spectrum(const std::string& text, const std::string& name) {
+  const auto refuse = [&] {
+    throw InputError(name + " " + text +
+                     ": must be 2 to 5 rising numbers of nanometres from 380 to 780, with a power "
+                     "above 0 after a colon at each or at none; 450,550,650 would do");
+  };
+  const auto count = static_cast<int>(std::count(text.begin(), text.end(), ',')) + 1;
+  const auto colons = static_cast<int>(std::count(text.begin(), text.end(), ':'));
+  if (count < kMinWavelengths || count > kMaxWavelengths || (colons != 0 && colons != count)) {
+    refuse();
+  }
+  std::string commas = text;
+  std::replace(commas.begin(), commas.end(), ':', ',');
+  const std::vector<double> numbers = parse_numbers(commas, name, count + colons);
+  Spectrum spectrum;
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    (colons > 0 && i % 2 == 1 ? spectrum.powers : spectrum.wavelengths).push_back(numbers[i]);
+  }
+  if (!is_valid(spectrum)) refuse();
+  return spectrum;
+}
+
+std::string spectrum_text(const Spectrum& spectrum) {
+  std::string text;
+  for (std::size_t k = 0; k < spectrum.wavelengths.size(); ++k) {
+    if (k > 0) text += ',';
+    text += shortest_text(spectrum.wavelengths[k]);
+    if (spectrum.powers.empty()) continue;
+    text += ':';
+    text += shortest_text(spectrum.powers[k]);
+  }
+  return text;
+}
+
+bool is_valid(const Spectrum& spectrum) {
+  const std::vector<double>& nm = spectrum.wavelengths;
+  const std::vector<double>& powers = spectrum.powers;
+  const bool has_material = spectrum.abbe >= kMinAbbe && spectrum.abbe <= kMaxAbbe;
+  if (nm.empty()) return powers.empty() && has_material;
+  const auto count = static_cast<int>(nm.size());
+  return has_material && count >= kMinWavelengths && count <= kMaxWavelengths &&
+         std::is_sorted(nm.begin(), nm.end(), std::less_equal<>()) &&
+         nm.front() >= kMinWavelength && nm.back() <= kMaxWavelength &&
+         (powers.empty() || powers.size() == nm.size()) &&
+         std::all_of(powers.begin(), powers.end(),
+                     [](double p) { return std::isfinite(p) && p > 0.0; });
+}
+
 namespace {
 
 /// Tolerance of a unit vector's length: a few rounding errors.
@@ -144,6 +213,22 @@ void validate(const OpticalSetup& setup) {
   require_front(setup);
   require_outline(setup);
   require_spectrum(setup);
+}
+
+OpticalSetup in_color(OpticalSetup setup, double wavelength) {
+  setup.ior = Dispersion{setup.ior, setup.spectrum.abbe}.index_at(wavelength);
+  setup.spectrum = {};
+  return setup;
+}
+
+std::vector<LightColor> light_colors(const OpticalSetup& setup) {
+  if (setup.spectrum.none()) return {{setup, 1.0}};
+  const std::vector<double> shares = setup.spectrum.shares();
+  std::vector<LightColor> colors;
+  for (std::size_t k = 0; k < shares.size(); ++k) {
+    colors.push_back({in_color(setup, setup.spectrum.wavelengths[k]), shares[k]});
+  }
+  return colors;
 }
 
 }  // namespace lensforge

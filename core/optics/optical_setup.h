@@ -3,13 +3,83 @@
 
 #include <Eigen/Core>
 #include <optional>
+#include <string>
+#include <vector>
 
-#include "core/optics/front_surface.h"
+#include "core/optics/front.h"
 #include "core/optics/outline.h"
-#include "core/optics/source_extent.h"
-#include "core/optics/spectrum.h"
 
 namespace lensforge {
+
+/// Range of Abbe numbers of optical materials, from dense flint to fluorite, with a margin.
+inline constexpr double kMinAbbe = 10.0;
+inline constexpr double kMaxAbbe = 200.0;
+
+/// A material's refractive index by wavelength. Acrylic has an Abbe number of about 57.
+struct Dispersion {
+  double n_d = 1.49;   ///< At the helium line d, 587.56 nm.
+  double abbe = 57.0;  ///< (n_d − 1) / (n_F − n_C), > 0.
+
+  /// n(λ) = A + B / λ² (Cauchy) through n_d with this Abbe number; λ in nm. For acrylic the error
+  /// is at most 0.001 from 400 to 700 nm.
+  [[nodiscard]] double index_at(double wavelength) const;
+};
+
+/// Minimum and maximum number of wavelengths.
+inline constexpr int kMinWavelengths = 2;
+inline constexpr int kMaxWavelengths = 5;
+
+/// Light of several wavelengths, and the dispersion of the lens's material.
+struct Spectrum {
+  std::vector<double> wavelengths;  ///< nm, ascending; none: all light has the setup's index.
+  std::vector<double> powers;       ///< Source's power at each, in any unit; none: all equal.
+  double abbe = 57.0;               ///< Abbe number of the material; acrylic's.
+
+  [[nodiscard]] bool none() const { return wavelengths.empty(); }
+  /// Each wavelength's share of the brightness, power × V(λ), normalised to sum 1.
+  [[nodiscard]] std::vector<double> shares() const;
+
+  friend bool operator==(const Spectrum&, const Spectrum&) = default;
+};
+
+/// Wavelengths in nm from "450,550,650", with the source's powers from "450:0.6,550:1,650:0.8".
+/// @param name  the option's name, for the message.
+/// @throw InputError unless there are 2 to 5 ascending wavelengths from 380 to 780, all with powers
+///        above 0 or all without.
+Spectrum parse_spectrum(const std::string& text, const std::string& name);
+
+/// The text from which parse_spectrum() reads the same wavelengths and powers; "" for none.
+std::string spectrum_text(const Spectrum& spectrum);
+
+/// True if parse_spectrum() would accept it and the Abbe number is one of a material.
+bool is_valid(const Spectrum& spectrum);
+
+/// Distribution of an extended source's light: rows of pixels from the top, seen from the lens with
+/// the lens's y up. Empty: an evenly lit disc.
+struct SourceShape {
+  int columns = 0;
+  int rows = 0;
+  std::vector<double> weights;  ///< ≥ 0, not all 0.
+
+  [[nodiscard]] bool is_disc() const { return weights.empty(); }
+
+  friend bool operator==(const SourceShape&, const SourceShape&) = default;
+};
+
+/// Maximum number of pixels on a shape's longer side: each is a separate beam in an exact
+/// rendering.
+inline constexpr int kMaxShapeSide = 16;
+
+/// Size of a source. A point, or parallel light of one direction, has width 0.
+struct SourceExtent {
+  double width =
+      0.0;  ///< Diameter of a disc or width of a shape: rad for parallel light, mm for a point.
+  SourceShape shape;
+
+  [[nodiscard]] bool none() const { return width == 0.0; }
+
+  friend bool operator==(const SourceExtent&, const SourceExtent&) = default;
+};
 
 /// The viewer's side: the lens's side of an opaque wall, or behind a translucent screen.
 enum class ViewSide { kFront, kRear };
@@ -79,5 +149,18 @@ struct OpticalSetup {
 ///        map spans the lens's rectangle, an outline is one closed line inside that rectangle, and
 ///        everything is finite.
 void validate(const OpticalSetup& setup);
+
+/// The setup for light of one wavelength; setup.ior is taken as the index at the d line.
+OpticalSetup in_color(OpticalSetup setup, double wavelength);
+
+/// The setup for one wavelength, and that wavelength's share of the brightness.
+struct LightColor {
+  OpticalSetup setup;
+  double share;
+};
+
+/// The colours of a setup, shortest wavelength (bent most) first. A setup without a spectrum has
+/// one colour: itself.
+std::vector<LightColor> light_colors(const OpticalSetup& setup);
 
 }  // namespace lensforge

@@ -2,14 +2,17 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <cmath>
 
 #include "core/compute/host_device.h"
+#include "core/compute/scalar.h"
 
-/// Notation: a incident and n normal unit vectors, c = n·a, η = n_inside / n_outside,
-/// s = 1 + η²(c² − 1) the squared cosine of the refracted angle, b refracted direction,
-/// m = (b_x, b_y)/b_z its slope. A bar (…_bar) is the derivative of a scalar by that quantity.
 namespace lensforge {
+
+// Notation: a incident and n normal unit vectors, c = n·a, η = n_inside / n_outside,
+// s = 1 + η²(c² − 1) the squared cosine of the refracted angle, b refracted direction,
+// m = (b_x, b_y)/b_z its slope. A bar (…_bar) is the derivative of a scalar by that quantity.
 
 /// cos² of the angle of refraction (Sun et al., Eq. 29); negative means total internal reflection.
 LF_HD inline double refracted_cosine_squared(double normal_dot_incident, double eta) {
@@ -110,6 +113,64 @@ LF_HD inline Eigen::Vector3d reflect_adjoint(const Eigen::Vector3d& a, const Eig
 LF_HD inline Eigen::Vector3d reflect_adjoint_by_incident(const Eigen::Vector3d& n,
                                                          const Eigen::Vector3d& b_bar) {
   return b_bar - (2.0 * n.dot(b_bar)) * n;
+}
+
+/// Gradient (∂z/∂x, ∂z/∂y) of the surface that sends parallel light along +z into a ray of slope
+/// m = (dx/dz, dy/dz): the inverse of RefractedBeam. By Snell's law b − ηẑ is parallel to the
+/// normal, so the gradient is b_xy / (η − b_z).
+LF_HD inline Eigen::Vector2d refracting_gradient(const Eigen::Vector2d& m, double eta) {
+  const Eigen::Vector3d b = Eigen::Vector3d(m.x(), m.y(), 1.0).normalized();
+  return b.head<2>() / (eta - b.z());
+}
+
+/// The same for light that travels along the unit vector a inside the lens, refracted by Snell's
+/// law with b − ηa parallel to the normal.
+LF_HD inline Eigen::Vector2d refracting_gradient(const Eigen::Vector2d& m, double eta,
+                                                 const Eigen::Vector3d& a) {
+  const Eigen::Vector3d b = Eigen::Vector3d(m.x(), m.y(), 1.0).normalized();
+  return (b.head<2>() - eta * a.head<2>()) / (eta * a.z() - b.z());
+}
+
+/// The same for a mirror that light along the unit vector a falls on: b − a is parallel to the
+/// normal.
+LF_HD inline Eigen::Vector2d reflecting_gradient(const Eigen::Vector2d& m,
+                                                 const Eigen::Vector3d& a) {
+  const Eigen::Vector3d b = Eigen::Vector3d(m.x(), m.y(), 1.0).normalized();
+  return (a.head<2>() - b.head<2>()) / (b.z() - a.z());
+}
+
+/// Share of unpolarised light that goes through a face between a medium of index η and air, by
+/// Fresnel's formulas, and its derivative by c, the cosine of the angle to the normal on the
+/// medium's side. The face is uncoated; both directions have the same share. 0 at total internal
+/// reflection.
+LF_HD inline ValueSlope transmittance(double c, double eta) {
+  const double s = refracted_cosine_squared(c, eta);
+  if (!(c > 0.0) || !(s > 0.0)) return {0.0, 0.0};
+  const double t = std::sqrt(s);
+  const double across = eta * c + t;
+  const double along = c + eta * t;
+  const double r_across = (eta * c - t) / across;
+  const double r_along = (c - eta * t) / along;
+  // ∂t/∂c = η²c/t; both amplitudes have the numerator 2η(t − c ∂t/∂c) over their sum squared.
+  const double numerator = 2.0 * eta * (t - eta * eta * c * c / t);
+  const double slope = numerator * (r_across / (across * across) + r_along / (along * along));
+  return {1.0 - 0.5 * (r_across * r_across + r_along * r_along), -slope};
+}
+
+/// Share of light at normal incidence that is reflected by both faces of a lens and then leaves
+/// with the rest. It spreads over the picture and its surroundings: if all of it fell evenly on the
+/// picture, no pixel would be darker than this share of the mean.
+inline double ghost_share(double eta) {
+  const double reflected = 1.0 - transmittance(1.0, eta).value;
+  return reflected * reflected;
+}
+
+/// f_tir = 1/(1 + η²((n·a)² − 1)), ∞ where light is totally reflected (Sun et al., Eq. 9), as a
+/// function of c = n·a.
+LF_HD inline ValueSlope reflection_barrier(double c, double eta) {
+  const double s = refracted_cosine_squared(c, eta);
+  if (!(s > 0.0) || !(c > 0.0)) return {kInfinity, 0.0};
+  return {1.0 / s, -2.0 * eta * eta * c / (s * s)};
 }
 
 }  // namespace lensforge

@@ -1,9 +1,81 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <cstdint>
+#include <initializer_list>
+#include <nlohmann/json_fwd.hpp>
+#include <span>
 #include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
 
+#include "core/image/image.h"
+
+/// Pages: pieces of HTML, whole pages, and data for their scripts. Functions escape `text`; `html`
+/// is inserted unchanged.
 namespace lensforge {
+
+/// &, <, >, " and ' as entities; control characters but tab and newline become spaces.
+std::string escape_html(std::string_view text);
+
+/// <tag attributes>html</tag>. @param attributes  HTML, without the leading space.
+std::string element(std::string_view tag, std::string_view attributes, std::string_view html);
+
+/// Concatenates the texts.
+std::string joined(std::initializer_list<std::string_view> texts);
+
+/// A column of a table: heading (text), and true for numbers.
+struct TableColumn {
+  std::string heading;
+  bool numbers = false;
+};
+
+/// A table whose cells are HTML; on narrow screens each row is a block with its headings in front.
+std::string html_table(std::span<const TableColumn> columns,
+                       const std::vector<std::vector<std::string>>& rows);
+
+/// A fact and its value; text.
+struct NamedText {
+  std::string name;
+  std::string value;
+};
+
+/// A table of two columns, values in bold.
+std::string html_facts(std::span<const NamedText> facts);
+
+/// A section with its heading (text).
+std::string html_section(const std::string& title, const std::string& html);
+
+/// A picture with its text alternative and caption (HTML).
+std::string html_figure(const ColorImage& picture, const std::string& alt,
+                        const std::string& caption);
+
+/// The colour bar of false_color() with labels (text) for its ends.
+std::string html_scale(const std::string& least, const std::string& most);
+
+/// A share as percent with three significant digits: "1.30 %", "0.0412 %"; 0 is "0 %".
+std::string percent_text(double share);
+/// Millimetres as micrometres with two decimals: "4.02 µm".
+std::string micrometre_text(double mm);
+/// "3 h 12 min", "12 min", "40 s".
+std::string duration_text(double minutes);
+/// A whole number with thin spaces between thousands.
+std::string count_text(std::int64_t count);
+/// A ratio to one as "85 : 1"; infinite as "no light in the dark".
+std::string contrast_text(double contrast);
+
+/// Base 64 (RFC 4648, with padding).
+std::string base64(std::span<const unsigned char> bytes);
+/// The picture as a data URI.
+std::string png_uri(const ColorImage& image);
+/// The picture as shown, 8 bits grey.
+ColorImage grey_picture(const Image& image);
+
+/// Replaces every {{NAME}} in `page` by its value; values are not expanded again.
+/// @pre every name in the page has a value.
+std::string fill_in(std::string_view page,
+                    std::span<const std::pair<std::string_view, std::string>> values);
 
 /// Content of a page. All but the title are HTML and may be empty.
 struct PageContent {
@@ -17,5 +89,29 @@ struct PageContent {
 
 /// A self-contained page in the style of all reports.
 std::string html_page(const PageContent& content);
+
+/// JSON for use inside a script element: without any "<".
+std::string script_json(const nlohmann::json& value);
+
+/// A script element that holds data, which a script finds by its id.
+/// @param type  MIME type. @param text  without any "<".
+std::string data_element(std::string_view id, std::string_view type, std::string_view text);
+
+/// Numbers packed into little-endian integers of a few bytes, 0 … 2^(8 bytes) − 1 for low … high.
+/// Error at most half a step.
+class PackedNumbers {
+ public:
+  /// @param bytes  per number, 1 … 3.
+  explicit PackedNumbers(int bytes) : bytes_(bytes) {}
+
+  /// Adds a number, clamped to its bounds. @return the value that is read back.
+  double add(double value, double low, double high);
+  /// All numbers in base 64.
+  [[nodiscard]] std::string text() const;
+
+ private:
+  int bytes_;
+  std::vector<unsigned char> packed_;
+};
 
 }  // namespace lensforge

@@ -1,13 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "core/sandbox/child_work.h"
 
-#include <fcntl.h>
-#include <poll.h>
-#include <sys/prctl.h>
-#include <sys/resource.h>
-#include <sys/wait.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -17,21 +10,28 @@
 #include <csignal>
 #include <cstring>
 #include <exception>
+#include <fcntl.h>
 #include <fstream>
 #include <mutex>
 #include <new>
 #include <optional>
+#include <poll.h>
 #include <string_view>
+#include <sys/prctl.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
 #include <system_error>
 #include <thread>
+#include <unistd.h>
 #include <vector>
 
 #include "core/error.h"
-#include "core/io/descriptor.h"
+#include "core/io/files.h"
 
 // The child sends frames through a pipe: a letter, the length of the text, the text. If it ends
 // without a result or an error, it has failed. It is killed together with its parent, and ends
 // without destructors, so that broken data are not touched again.
+
 namespace lensforge {
 namespace {
 
@@ -51,23 +51,12 @@ enum class Frame : char {
 /// Bytes before a frame's text: its letter and its length.
 constexpr std::size_t kFrameHead = 1 + sizeof(std::uint64_t);
 
-bool write_all(int descriptor, const char* data, std::size_t size) {
-  while (size > 0) {
-    const ssize_t written = ::write(descriptor, data, size);
-    if (written < 0 && errno == EINTR) continue;
-    if (written < 0) return false;
-    data += written;
-    size -= static_cast<std::size_t>(written);
-  }
-  return true;
-}
-
 void send(int descriptor, Frame kind, std::string_view text) {
   std::array<char, kFrameHead> head{static_cast<char>(kind)};
   const std::uint64_t size = text.size();
   std::memcpy(head.data() + 1, &size, sizeof size);
-  if (!write_all(descriptor, head.data(), head.size())) _exit(1);
-  if (!write_all(descriptor, text.data(), text.size())) _exit(1);
+  if (!write_all(descriptor, {head.data(), head.size()})) _exit(1);
+  if (!write_all(descriptor, text)) _exit(1);
 }
 
 struct Share {
@@ -109,6 +98,13 @@ std::optional<double> address_space() {
   if (!(file >> pages)) return std::nullopt;
   return pages * static_cast<double>(::sysconf(_SC_PAGESIZE));
 }
+
+/// The address sanitizer's allocator reserves address space far beyond what it uses.
+#ifdef __SANITIZE_ADDRESS__
+constexpr bool kSpaceIsMemory = false;
+#else
+constexpr bool kSpaceIsMemory = true;
+#endif
 
 void limit(__rlimit_resource resource, double value) {
   rlimit now{};
@@ -262,7 +258,9 @@ std::string why_it_ended(int status) {
 void limit_this_process(const ChildLimits& limits) {
   if (limits.cpu_seconds > 0.0) limit(RLIMIT_CPU, std::ceil(limits.cpu_seconds));
   const std::optional<double> before = address_space();
-  if (limits.memory_bytes > 0.0 && before) limit(RLIMIT_AS, *before + limits.memory_bytes);
+  if (kSpaceIsMemory && limits.memory_bytes > 0.0 && before) {
+    limit(RLIMIT_AS, *before + limits.memory_bytes);
+  }
 }
 
 std::string run_in_child(const std::string& stage, const ChildLimits& limits,

@@ -7,6 +7,7 @@
 #include "core/error.h"
 #include "core/text/number_text.h"
 #include "core/text/units.h"
+#include "core/text/words.h"
 
 namespace lensforge {
 namespace {
@@ -20,12 +21,6 @@ Value parsed(const std::string& name, const std::string& text, const char* kind)
     throw InputError(name + " " + text + ": must be " + kind);
   }
   return value;
-}
-
-std::string joined(const std::vector<std::string>& words, const char* between) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : between) + word;
-  return text;
 }
 
 /// Text for a manual page: no character begins a request or an escape.

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "core/compute/cuda/cuda_executor.h"
-#include "design/energy/objective_on.h"
+#include "design/energy/objective.h"
 
 namespace lensforge {
 

@@ -7,19 +7,29 @@
 #include <limits>
 
 #include "core/compute/host_device.h"
+#include "core/compute/scalar.h"
 #include "core/image/transfer.h"
 #include "design/energy/objective_view.h"
-#include "design/energy/smoothness_term.h"
-#include "design/optics/columns.h"
-#include "design/optics/image_triangle.h"
+#include "design/energy/picture_terms.h"
+#include "design/energy/smoothness.h"
+#include "design/flux/columns.h"
+#include "design/flux/flux_triangle.h"
 
-/// What the objective does for one face, vertex or pixel on the way to its value: surface → frames,
-/// Weingarten maps, image triangles, picture error. The way back is in objective_adjoint.h. How a
-/// face sends its light is the surface model's: Rays is FacetRays or SmoothRays.
 namespace lensforge {
 
-/// Frame of a face, and its flux where that is costly; its share of E_barr, which is infinite where
-/// the surface is not allowed.
+/// f_area(a) = ((ε2 − ε1)/(a − ε1) − 1)² for ε1 < a < ε2, 0 above, ∞ below (Sun et al., Eq. 8).
+LF_HD inline ValueSlope area_barrier(double area, const AreaBarrier& barrier) {
+  if (area >= barrier.upper) return {};
+  if (!(area > barrier.lower)) return {kInfinity, 0.0};
+  const double ratio = (barrier.upper - barrier.lower) / (area - barrier.lower);
+  return {(ratio - 1.0) * (ratio - 1.0), -2.0 * (ratio - 1.0) * ratio / (area - barrier.lower)};
+}
+
+// Forward: surface → frames, Weingarten maps, image triangles, picture error, for one face, vertex
+// or pixel. Rays says how a face sends its light and is FacetRays or SmoothRays.
+
+/// Stores the frame of a face, and its flux where that is costly to compute. Returns its share of
+/// E_barr, which is infinite where the surface is not allowed.
 struct MeasureFace {
   ObjectiveView o;
 
@@ -34,9 +44,9 @@ struct MeasureFace {
   }
 };
 
-/// What the faces project onto the screen, as a source of FluxImageOn::render(): the image of every
-/// face that lies inside of the outline, nothing of the others, then those of their parts.
-/// @pre frames, and what the rays keep of the surface, are up to date.
+/// Image triangles of the faces, as a source of FluxImageOn::render(): first one for every face,
+/// empty unless the whole face is inside the outline, then those of the parts inside.
+/// @pre frames and the rays' arrays are up to date.
 template <class Rays>
 struct FaceLightSource {
   ObjectiveView o;
@@ -51,8 +61,7 @@ struct FaceLightSource {
   }
 };
 
-/// Centroid of what a face projects onto the screen; no number where less than all of its light
-/// does. @pre as of FaceLightSource.
+/// Centroid of a face's image; NaN if the outline cuts the face. @pre as for FaceLightSource.
 template <class Rays>
 struct FaceCentroid {
   ObjectiveView o;
@@ -86,7 +95,8 @@ struct ResetEdgeWeights {
   }
 };
 
-/// Welsch weights of a face's edges from its map and its neighbours'; its half of Σ Ψ(h⁰) − w h⁰.
+/// Stores the Welsch weights of a face's edges from its map and its neighbours'; returns its half
+/// of Σ Ψ(h⁰) − w h⁰.
 struct ReweightEdges {
   ObjectiveView o;
 
@@ -119,7 +129,7 @@ struct AddEntry {
   LF_HD void operator()(std::int64_t i) const { sum[i] += add[i]; }
 };
 
-/// |g − g̃| of a pixel; sets its error and clears its cotangent.
+/// Stores a pixel's error and clears its cotangent; returns |g − g̃|.
 struct ComparePixel {
   const double* flux;
   const double* target;
@@ -134,7 +144,7 @@ struct ComparePixel {
   }
 };
 
-/// Cotangent of a pixel: by its display-encoded value → by its flux.
+/// Turns a pixel's cotangent by its display-encoded value into that by its flux.
 struct EncodeAdjoint {
   const double* flux;
   double target_total;
@@ -143,6 +153,132 @@ struct EncodeAdjoint {
   LF_HD void operator()(std::int64_t i) const {
     bar[i] *= encode_slope(target_total * flux[i]) * target_total;
   }
+};
+
+// Adjoint: from the picture's cotangent back to the vertices, for one face or vertex.
+
+/// Derivatives by a face's corners, unit normal and area normal; at the end all are carried to the
+/// corners.
+struct FaceBar {
+  Corners corners;
+  Eigen::Vector3d n{0.0, 0.0, 0.0};  ///< Its unit normal.
+  Eigen::Vector3d area_normal{0.0, 0.0, 0.0};
+};
+
+/// Weighted derivatives of the picture terms by one image triangle, and their values.
+LF_HD inline GoalSums picture_adjoint(const ObjectiveView& o, const ImageTriangle& image,
+                                      ImageTriangle& bar) {
+  const GoalView& goal = o.goal;
+  GoalSums values;
+  bar = deposit_adjoint(magnified(image, goal.parts), goal.cotangent);
+  bar = magnified(bar, goal.parts);
+  values.boundary = boundary_term(image, goal.columns, goal.rows, o.weights.boundary, bar);
+  return values;
+}
+
+/// The same, summed over the parts of a face inside the outline.
+LF_HD inline GoalSums rim_adjoint(const ObjectiveView& o, std::int64_t face,
+                                  const ImageTriangle& image, ImageTriangle& bar) {
+  GoalSums values;
+  for (std::int64_t k = o.aperture.first[face]; o.aperture.pieces[k].face == face; ++k) {
+    const TrianglePiece& piece = o.aperture.pieces[k].piece;
+    ImageTriangle piece_bar;
+    values += picture_adjoint(o, image_of(image, piece), piece_bar);
+    image_of_adjoint(piece, piece_bar, bar);
+  }
+  return values;
+}
+
+/// Weighted derivatives of the goal's terms by one face's image triangle, and their values.
+LF_HD inline GoalSums goal_adjoint(const ObjectiveView& o, std::int64_t face,
+                                   const ImageTriangle& image, ImageTriangle& bar) {
+  const ObjectiveWeights& w = o.weights;
+  const GoalView& goal = o.goal;
+  GoalSums values;
+  if (!goal.is_picture()) {
+    const double share = o.aperture.share(face);
+    const CorrespondenceValues v = correspondence_term(
+        {image.p0, image.p1, image.p2, share * image.flux}, column2(goal.wanted_centroids, face),
+        goal.wanted_flux[face], goal.pixels(), w, bar);
+    bar.flux *= share;
+    values.align = v.align;
+    values.flux = v.flux;
+    return values;
+  }
+  if (!o.aperture.is_whole(face)) return rim_adjoint(o, face, image, bar);
+  values = picture_adjoint(o, image, bar);
+  if (goal.led != nullptr && goal.led[face] != kNoPixel) {
+    const std::int32_t pixel = goal.led[face];
+    values.unlit = unlit_term(image, pixel, goal.columns, goal.target[pixel], w.image, bar);
+  }
+  return values;
+}
+
+/// Adds the weighted derivatives of a face's barriers; returns its E_barr.
+LF_HD inline double barrier_adjoint(const ObjectiveView& o, std::int64_t face, const Corners& t,
+                                    FaceBar& bar) {
+  const double weight = o.weights.barrier;
+  const ValueSlope area = area_barrier(plan_area(t), o.area);
+  bar.area_normal.z() += 0.5 * weight * area.slope;
+  return area.value + o.light.barrier_adjoint(t, o.scratch.frames[face].n, weight, bar.corners,
+                                              bar.n, o.incident_at(face));
+}
+
+/// Derivatives of all terms by one face's corners.
+template <class Rays>
+struct PullBackFace {
+  ObjectiveView o;
+  Rays rays;
+
+  LF_HD FaceSums::Packed operator()(std::int64_t i) const {
+    const Corners t = o.corners(i);
+    const FaceFrame& frame = o.scratch.frames[i];
+    const double doubled_area = frame.n.dot(area_normal(t));  // |N|, without its root
+    FaceBar bar;
+    FaceSums sums;
+    sums.goal = rays.pull_back(o, i, t, bar);
+    sums.barrier = barrier_adjoint(o, i, t, bar);
+    if (o.weights.smooth > 0.0) {
+      double area_bar = 0.0;
+      const FaceFrame bend = bend_adjoint(o, i, area_bar);
+      bar.n += bend.n;
+      bar.area_normal += 0.5 * area_bar * frame.n;
+      const Eigen::Vector3d third = (1.0 / 3.0) * bend.c;
+      bar.corners.v0 += third;
+      bar.corners.v1 += third;
+      bar.corners.v2 += third;
+    }
+    bar.area_normal += normalize_adjoint(frame.n, doubled_area, bar.n);
+    area_normal_adjoint(t, bar.area_normal, bar.corners);
+    o.scratch.corner_bar[i] = bar.corners;
+    return sums.packed();
+  }
+};
+
+/// Gradient by a vertex: the sum over its corners.
+template <class Rays>
+struct GatherVertex {
+  ObjectiveView o;
+  Rays rays;
+  double* gradient;
+
+  LF_HD void operator()(std::int64_t v) const {
+    Eigen::Vector3d sum = rays.vertex_bar(v);
+    const MeshView& mesh = o.mesh;
+    for (auto c = mesh.vertex_corner_begin[v]; c < mesh.vertex_corner_begin[v + 1]; ++c) {
+      const std::int32_t corner = mesh.vertex_corners[c];
+      const Corners& bar = o.scratch.corner_bar[corner / 3];
+      sum += corner % 3 == 0 ? bar.v0 : (corner % 3 == 1 ? bar.v1 : bar.v2);
+    }
+    column3(gradient, v) = sum;
+  }
+};
+
+/// Clears the derivatives by held coordinates.
+struct HoldCoordinate {
+  const double* movable;
+  double* gradient;
+  LF_HD void operator()(std::int64_t i) const { gradient[i] *= movable[i]; }
 };
 
 }  // namespace lensforge

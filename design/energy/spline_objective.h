@@ -9,23 +9,21 @@
 #include <variant>
 #include <vector>
 
-#include "core/surface/control_net.h"
-#include "core/surface/surface_mesh.h"
-#include "design/energy/objective_on.h"
-#include "design/optics/axis_basis.h"
-#include "design/optics/columns.h"
-#include "design/optics/made_nodes.h"
-#include "design/optics/shifted_nodes.h"
-#include "design/optics/spline_nodes.h"
+#include "core/mesh/surface_mesh.h"
+#include "core/spline/control_net.h"
+#include "design/energy/objective.h"
+#include "design/flux/columns.h"
+#include "design/spline/made_surface.h"
+#include "design/spline/spline_nodes.h"
 
 namespace lensforge {
 
-/// DesignObjective of a spline's control points: every node of the spline sends one ray by the
-/// spline's own normal. Barriers and the goal are those of the mesh of the nodes; there are no
-/// smoothness terms. Same interface as DesignObjectiveOn.
+/// DesignObjective as a function of a spline's control points: every node of the spline sends one
+/// ray by the spline's own normal. Barriers and goal are those of the mesh of the nodes; there are
+/// no smoothness terms. Same interface as DesignObjectiveOn.
 ///
-/// With ObjectiveOptions::made_by the nodes are those of what is made of the spline (MadeNodes, or
-/// ShiftedNodes where knot cells are wide), and value and gradient are means over MadeBy::drawn().
+/// With ObjectiveOptions::made_by the nodes are those of the made surface (MadeNodes, or
+/// ShiftedNodes for wide knot cells), and value and gradient are means over MadeBy::drawn().
 template <class Exec>
 class SplineObjectiveOn {
  public:
@@ -92,7 +90,7 @@ class SplineObjectiveOn {
  private:
   using Buffer = typename Exec::template Buffer<double>;
 
-  /// Nodes of the spline, or of what is made of it.
+  /// Nodes of the spline, or of the made surface.
   using Part = std::variant<SplineNodesOn<Exec>, MadeNodes, ShiftedNodes>;
 
   [[nodiscard]] Part part_nodes(const GridShape& net, const Eigen::Vector2d& size, int samples,
@@ -104,14 +102,14 @@ class SplineObjectiveOn {
     return MadeNodes(net, size, samples, made, executor_);
   }
 
-  /// Takes what may move from now on.
+  /// Sets the coordinates that may move.
   void hold(Eigen::Matrix3Xd movable) {
     movable_ = std::move(movable);
     const Eigen::Matrix3Xd share = movable_ / static_cast<double>(parts_.size());
     share_ = buffer_of(executor_, objective_detail::entries(share));
   }
 
-  /// Control points keep the x and y of nodes on the outline's rim, if these hang on theirs.
+  /// Coordinates that may move: control points that move a node on the outline's rim keep x and y.
   [[nodiscard]] Eigen::Matrix3Xd held_with_nodes() const {
     const AxisBasis& u = bases_[0];
     const AxisBasis& v = bases_[1];
@@ -140,7 +138,7 @@ class SplineObjectiveOn {
     return std::int64_t{shape.columns} * shape.rows;
   }
 
-  /// Value and gradient of one part; borders are not held.
+  /// Value and gradient of one part, without holding borders.
   ObjectiveEvaluation evaluate(const double* points, Part& part, double* gradient) {
     look(points, part);
     ObjectiveEvaluation result = core_.evaluate(positions_.data(), positions_bar_.data());
@@ -159,14 +157,14 @@ class SplineObjectiveOn {
 
   Exec executor_;
   DesignObjectiveOn<Exec> core_;
-  Eigen::Matrix3Xd unheld_;  ///< Movable but for the outline's rim.
+  Eigen::Matrix3Xd unheld_;  ///< movable_ ignoring the outline's rim.
   Eigen::Matrix3Xd movable_;
-  std::vector<AxisBasis> bases_;  ///< Of nodes along u and v; empty without an outline.
+  std::vector<AxisBasis> bases_;  ///< Bases of nodes along u and v; empty without an outline.
   std::vector<Part> parts_;
-  Buffer share_;      ///< One over the number of parts where a coordinate may move, else 0.
-  Buffer positions_;  ///< Of the part that was looked at last.
+  Buffer share_;      ///< 1 / number of parts where a coordinate may move, else 0.
+  Buffer positions_;  ///< Nodes of the last part.
   Buffer positions_bar_;
-  Buffer gradient_;  ///< Of one part.
+  Buffer gradient_;  ///< Gradient of one part.
 };
 
 }  // namespace lensforge

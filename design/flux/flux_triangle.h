@@ -5,25 +5,362 @@
 #include <cmath>
 #include <cstdint>
 
-#include "core/compute/clamped.h"
 #include "core/compute/host_device.h"
-#include "design/flux/edge_walk.h"
-#include "design/flux/quadrants.h"
-#include "design/optics/image_triangle.h"
 
-/// The flux that one image triangle gives to every pixel, exactly, and its adjoint.
-///
-/// Notation: t triangle of flux Φ, A its signed area, ρ = Φ/A; g = ∂E/∂(pixel flux), S(c) = Σ of g
-/// over the columns ≥ c of a row; x̄ mean offset of an edge piece from its column's left side.
-///
-/// With Green's theorem a pixel's covered area is a sum over edge pieces: a piece in column c
-/// covers −Δy(1 − x̄) of that pixel and −Δy of every pixel to its right. Deposits are therefore made
-/// into the picture's *row differences*: one prefix sum along each row (flux_image.cpp) yields the
-/// picture, and no polygon is ever clipped.
 namespace lensforge {
 
+/// Image of one surface triangle on the receiving plane: a triangle of uniform irradiance. The same
+/// struct holds derivatives of a scalar with respect to these numbers.
+struct ImageTriangle {
+  Eigen::Vector2d p0{0.0, 0.0};  ///< Corners in pixel coordinates (core/optics/image_plane.h).
+  Eigen::Vector2d p1{0.0, 0.0};
+  Eigen::Vector2d p2{0.0, 0.0};
+  double flux = 0.0;  ///< Share of the lens's total flux.
+};
+
+/// The same light in a picture with `scale` times as many pixels each way. For derivatives this is
+/// the adjoint.
+LF_HD inline ImageTriangle magnified(const ImageTriangle& t, double scale) {
+  return {scale * t.p0, scale * t.p1, scale * t.p2, t.flux};
+}
+
+/// Twice the signed area of (a, b, c), positive counter-clockwise in a right-handed frame.
+LF_HD inline double doubled_area(const Eigen::Vector2d& a, const Eigen::Vector2d& b,
+                                 const Eigen::Vector2d& c) {
+  return (b.x() - a.x()) * (c.y() - a.y()) - (c.x() - a.x()) * (b.y() - a.y());
+}
+
+// Walks a straight edge through the pixels it crosses.
+//
+// Notation: the edge runs p → q with parameter s from 0 to 1; pixel (column c, row r) covers [c,
+// c+1] × [r, r+1]; a *piece* is the part of the edge inside one pixel. At a row boundary a piece's
+// y is exactly that integer, and neighbouring pieces share their end points to the bit, so sums
+// over a closed polygon telescope exactly.
+
+/// One piece of an edge. `column` is −1 for a piece left of the picture; such a piece defines only
+/// row, y0 and y1.
+struct EdgePiece {
+  int column;
+  int row;
+  double s0, s1;  ///< Parameters of its ends.
+  double x0, y0;  ///< Its ends, in pixel coordinates.
+  double x1, y1;
+};
+
+namespace edge_walk_detail {
+
+/// State of the walk along one axis: the next grid line and the edge's crossing with it.
+struct Axis {
+  int cell, last, step;  ///< Current cell, final cell, direction of travel.
+  double origin, inverse;
+
+  LF_HD Axis(double from, double to, double p, double delta, int limit)
+      : cell(clamp_cell(from, limit)), last(clamp_cell(to, limit)), origin(p) {
+    step = last >= cell ? 1 : -1;
+    inverse = cell == last ? 0.0 : 1.0 / delta;
+  }
+
+  [[nodiscard]] LF_HD bool at_end() const { return cell == last; }
+  [[nodiscard]] LF_HD double next_line() const { return step > 0 ? cell + 1 : cell; }
+  [[nodiscard]] LF_HD double parameter_at_next_line() const {
+    return (next_line() - origin) * inverse;
+  }
+  /// The largest cell is limit − 1: a point on the far border belongs to the last cell.
+  LF_HD static int clamp_cell(double value, int limit) {
+    const int cell = static_cast<int>(std::floor(value));
+    return cell < 0 ? 0 : (cell >= limit ? limit - 1 : cell);
+  }
+};
+
+/// Visits the pieces of the part s0 … s1 of p → q, which lies inside columns × rows.
+template <class Visit>
+LF_HD inline void walk_inside(const Eigen::Vector2d& p, const Eigen::Vector2d& d, EdgePiece part,
+                              int columns, int rows, Visit& visit) {
+  Axis u(part.x0, part.x1, p.x(), d.x(), columns);
+  Axis v(part.y0, part.y1, p.y(), d.y(), rows);
+  EdgePiece piece = part;
+  while (!u.at_end() || !v.at_end()) {
+    const double su = u.at_end() ? 2.0 : u.parameter_at_next_line();
+    const double sv = v.at_end() ? 2.0 : v.parameter_at_next_line();
+    piece.column = u.cell;
+    piece.row = v.cell;
+    const bool cross_row = sv <= su;
+    // Rounding may put a crossing outside the remaining part; only the order of cells matters.
+    const double s = clamped(cross_row ? sv : su, piece.s0, part.s1);
+    piece.s1 = s;
+    piece.x1 = cross_row ? p.x() + s * d.x() : u.next_line();
+    piece.y1 = cross_row ? v.next_line() : p.y() + s * d.y();
+    // Keep the end inside this row (and column) despite rounding.
+    if (cross_row) {
+      piece.x1 = clamped(piece.x1, u.cell, u.cell + 1.0);
+      v.cell += v.step;
+    } else {
+      piece.y1 = clamped(piece.y1, v.cell, v.cell + 1.0);
+      u.cell += u.step;
+    }
+    visit(piece);
+    piece.s0 = piece.s1;
+    piece.x0 = piece.x1;
+    piece.y0 = piece.y1;
+  }
+  piece.column = u.cell;
+  piece.row = v.cell;
+  piece.s1 = part.s1;
+  piece.x1 = part.x1;
+  piece.y1 = part.y1;
+  visit(piece);
+}
+
+/// Visits, row by row, a part that lies left of the picture.
+template <class Visit>
+LF_HD inline void walk_left(const Eigen::Vector2d& p, const Eigen::Vector2d& d, EdgePiece part,
+                            int rows, Visit& visit) {
+  Axis v(part.y0, part.y1, p.y(), d.y(), rows);
+  EdgePiece piece = part;
+  piece.column = -1;
+  for (; !v.at_end(); v.cell += v.step) {
+    piece.row = v.cell;
+    piece.y1 = v.next_line();
+    visit(piece);
+    piece.y0 = piece.y1;
+  }
+  piece.row = v.cell;
+  piece.y1 = part.y1;
+  visit(piece);
+}
+
+/// Cuts `part` at the vertical line x = line: returns the part before, leaves the rest in `part`.
+LF_HD inline EdgePiece cut_at_column(const Eigen::Vector2d& p, const Eigen::Vector2d& d,
+                                     double line, EdgePiece& part) {
+  EdgePiece before = part;
+  const double s = clamped((line - p.x()) / d.x(), part.s0, part.s1);
+  const bool falls = part.y1 < part.y0;
+  const double low = falls ? part.y1 : part.y0;
+  const double high = falls ? part.y0 : part.y1;
+  before.s1 = part.s0 = s;
+  before.x1 = part.x0 = line;
+  before.y1 = part.y0 = clamped(p.y() + s * d.y(), low, high);
+  return before;
+}
+
+/// Visits a part whose rows are inside the picture, given that it does not cross x = 0 or x =
+/// columns. Parts right of the picture are dropped.
+template <class Visit>
+LF_HD inline void walk_part(const Eigen::Vector2d& p, const Eigen::Vector2d& d,
+                            const EdgePiece& part, int columns, int rows, Visit& visit) {
+  const double middle = 0.5 * (part.x0 + part.x1);
+  if (middle < 0.0) {
+    walk_left(p, d, part, rows, visit);
+  } else if (middle <= columns) {
+    walk_inside(p, d, part, columns, rows, visit);
+  }
+}
+
+/// Cuts p → q to 0 ≤ y ≤ rows. Returns false if nothing is left.
+LF_HD inline bool clip_rows(const Eigen::Vector2d& p, const Eigen::Vector2d& q, int rows,
+                            EdgePiece& part) {
+  const Eigen::Vector2d d = q - p;
+  part = {0, 0, 0.0, 1.0, p.x(), p.y(), q.x(), q.y()};
+  const double limit = rows;
+  if ((p.y() < 0.0 && q.y() < 0.0) || (p.y() > limit && q.y() > limit)) return false;
+  if (p.y() < 0.0 || p.y() > limit) {
+    part.y0 = p.y() < 0.0 ? 0.0 : limit;
+    part.s0 = (part.y0 - p.y()) / d.y();
+    part.x0 = p.x() + part.s0 * d.x();
+  }
+  if (q.y() < 0.0 || q.y() > limit) {
+    part.y1 = q.y() < 0.0 ? 0.0 : limit;
+    part.s1 = (part.y1 - p.y()) / d.y();
+    part.x1 = p.x() + part.s1 * d.x();
+  }
+  return part.s0 <= part.s1;
+}
+
+}  // namespace edge_walk_detail
+
+/// Calls `visit(const EdgePiece&)` for every piece of p → q in a picture of columns × rows pixels,
+/// in order. Parts above, below and right of the picture are left out; parts on its left come as
+/// pieces of column −1. At most |Δcolumn| + |Δrow| + 3 pieces, some may have length zero.
+template <class Visit>
+LF_HD inline void walk_edge(const Eigen::Vector2d& p, const Eigen::Vector2d& q, int columns,
+                            int rows, Visit&& visit) {
+  namespace detail = edge_walk_detail;
+  const Eigen::Vector2d d = q - p;
+  EdgePiece part{};
+  if (!detail::clip_rows(p, q, rows, part)) return;
+  const double limit = columns;
+  const bool rising = d.x() > 0.0;
+  const double first = rising ? 0.0 : limit;
+  const double second = rising ? limit : 0.0;
+  const auto crosses = [&part](double line) {
+    return (part.x0 < line && part.x1 > line) || (part.x0 > line && part.x1 < line);
+  };
+  if (crosses(first)) {
+    detail::walk_part(p, d, detail::cut_at_column(p, d, first, part), columns, rows, visit);
+  }
+  if (crosses(second)) {
+    detail::walk_part(p, d, detail::cut_at_column(p, d, second, part), columns, rows, visit);
+  }
+  detail::walk_part(p, d, part, columns, rows, visit);
+}
+
+namespace flux_detail {
+
+// Triangles that touch at most 2 × 2 pixels, in closed form and without branches that depend on the
+// triangle's place: most triangles of a fine mesh are of this kind, and a mispredicted branch costs
+// as much as all the arithmetic of an edge.
+//
+// Notation: X and Y are the pixel borders that cross the triangle's box; a quadrant is one of the
+// four parts they cut the plane into. An edge runs a → b with parameter s.
+
+LF_HD inline double least(double a, double b) { return a < b ? a : b; }
+LF_HD inline double most(double a, double b) { return a > b ? a : b; }
+
+/// Floor of a value that an int can hold. std::floor() is a library call on processors without an
+/// instruction for it.
+LF_HD inline int floor_to_int(double value) {
+  const int truncated = static_cast<int>(value);
+  return truncated - (value < truncated ? 1 : 0);
+}
+
+/// Smallest box of whole pixels around a triangle.
+struct PixelBox {
+  int c0, c1, r0, r1;
+  double x0, x1, y0, y1;
+
+  LF_HD explicit PixelBox(const ImageTriangle& t)
+      : x0(least(t.p0.x(), least(t.p1.x(), t.p2.x()))),
+        x1(most(t.p0.x(), most(t.p1.x(), t.p2.x()))),
+        y0(least(t.p0.y(), least(t.p1.y(), t.p2.y()))),
+        y1(most(t.p0.y(), most(t.p1.y(), t.p2.y()))) {
+    c0 = cell(x0);
+    c1 = cell(x1);
+    r0 = cell(y0);
+    r1 = cell(y1);
+  }
+  /// Column or row of a coordinate, kept within what an int can hold.
+  LF_HD static int cell(double value) { return floor_to_int(least(most(value, -1e9), 1e9)); }
+
+  /// True if nothing of the triangle can lie in the picture, or a corner is not finite.
+  [[nodiscard]] LF_HD bool misses(const ImageTriangle& t, int columns, int rows) const {
+    const double sum = t.p0.sum() + t.p1.sum() + t.p2.sum();
+    return !(x1 >= 0.0 && x0 <= columns && y1 >= 0.0 && y0 <= rows && std::fabs(sum) < 1e300);
+  }
+  [[nodiscard]] LF_HD bool within_one_pixel() const { return c0 == c1 && r0 == r1; }
+  [[nodiscard]] LF_HD bool within_two_by_two() const { return c1 - c0 <= 1 && r1 - r0 <= 1; }
+  [[nodiscard]] LF_HD bool inside(int columns, int rows) const {
+    return c0 >= 0 && r0 >= 0 && c1 < columns && r1 < rows;
+  }
+  [[nodiscard]] LF_HD double extent() const { return most(x1 - x0, y1 - y0); }
+  /// Crossing of X and Y. Without a border in the box the box's own lower side is used: then the
+  /// whole triangle is right of X (below Y), and offsets stay small.
+  [[nodiscard]] LF_HD Eigen::Vector2d crossing() const {
+    return {c0 < c1 ? static_cast<double>(c1) : x0, r0 < r1 ? static_cast<double>(r1) : y0};
+  }
+};
+
+/// A number for each quadrant; "above" is the row of smaller y.
+struct Quadrants {
+  double above_left = 0.0;
+  double above_right = 0.0;
+  double below_left = 0.0;
+  double below_right = 0.0;
+
+  [[nodiscard]] LF_HD double sum() const {
+    return (above_left + above_right) + (below_left + below_right);
+  }
+  [[nodiscard]] LF_HD double at(bool right, bool below) const {
+    const double above_value = right ? above_right : above_left;
+    const double below_value = right ? below_right : below_left;
+    return below ? below_value : above_value;
+  }
+};
+
+/// Adds ∫ min(x, 0) dy and ∫ max(x, 0) dy along a straight piece of height dy whose x runs from u
+/// to v. The share of x's range on the right is exactly 0 or 1 where the piece does not cross.
+LF_HD inline void add_piece(double u, double v, double dy, double& left, double& right) {
+  const double u_right = most(u, 0.0);
+  const double v_right = most(v, 0.0);
+  const double range = u - v;
+  const double share = range == 0.0 ? (u > 0.0 ? 1.0 : 0.0) : (u_right - v_right) / range;
+  const double half = 0.5 * dy;
+  right += half * (u_right + v_right) * share;
+  left += half * ((u - u_right) + (v - v_right)) * (1.0 - share);
+}
+
+/// Adds an edge's part of ∮ x dy to every quadrant; over a closed polygon the sums are the signed
+/// areas. a and b are relative to the crossing of X and Y.
+LF_HD inline void add_edge(const Eigen::Vector2d& a, const Eigen::Vector2d& b, Quadrants& areas) {
+  const double a_above = least(a.y(), 0.0);
+  const double b_above = least(b.y(), 0.0);
+  const bool crosses = (a.y() < 0.0) != (b.y() < 0.0);
+  const double fall = crosses ? a.y() - b.y() : 1.0;
+  const double x = a.x() + (b.x() - a.x()) * (a.y() / fall);
+  const bool from_above = a.y() < 0.0;
+  const bool to_above = b.y() < 0.0;
+  add_piece(from_above ? a.x() : x, to_above ? b.x() : x, b_above - a_above, areas.above_left,
+            areas.above_right);
+  add_piece(from_above ? x : a.x(), to_above ? x : b.x(), (b.y() - b_above) - (a.y() - a_above),
+            areas.below_left, areas.below_right);
+}
+
+/// Signed areas of a triangle's parts. @pre the triangle lies within the box's 2 × 2 pixels.
+LF_HD inline Quadrants quadrant_areas(const ImageTriangle& t, const Eigen::Vector2d& crossing) {
+  const Eigen::Vector2d a = t.p0 - crossing;
+  const Eigen::Vector2d b = t.p1 - crossing;
+  const Eigen::Vector2d c = t.p2 - crossing;
+  Quadrants areas;
+  add_edge(a, b, areas);
+  add_edge(b, c, areas);
+  add_edge(c, a, areas);
+  return areas;
+}
+
+/// Parameter at which a coordinate that runs from `from` to `to` changes sign; 1 if it does not. It
+/// always divides, because compilers keep a branch around a division.
+LF_HD inline double crossing_parameter(double from, double to) {
+  const bool crosses = (from < 0.0) != (to < 0.0);
+  const double share = from / (crosses ? from - to : 1.0);
+  return crosses ? share : 1.0;
+}
+
+/// ∫ g (1 − s) ds and ∫ g s ds along an edge, g constant in every quadrant.
+struct HatWeights {
+  double start;
+  double end;
+
+  LF_HD HatWeights(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Quadrants& g) {
+    const double sx = crossing_parameter(a.x(), b.x());
+    const double sy = crossing_parameter(a.y(), b.y());
+    const double s0 = least(sx, sy);
+    const double s1 = most(sx, sy);
+    const bool right_a = a.x() >= 0.0;
+    const bool right_b = b.x() >= 0.0;
+    const bool below_a = a.y() >= 0.0;
+    const bool below_b = b.y() >= 0.0;
+    const double first = g.at(right_a, below_a);
+    const double middle = sx < sy ? g.at(right_b, below_a) : g.at(right_a, below_b);
+    const double last = g.at(right_b, below_b);
+    const double whole = first * s0 + middle * (s1 - s0) + last * (1.0 - s1);
+    end = 0.5 * (first * s0 * s0 + middle * (s1 - s0) * (s1 + s0) + last * (1.0 - s1) * (1.0 + s1));
+    start = whole - end;
+  }
+};
+
+}  // namespace flux_detail
+
+// The flux that one image triangle gives to every pixel, exactly, and its adjoint.
+//
+// Notation: t triangle of flux Φ, A its signed area, ρ = Φ/A; g = ∂E/∂(pixel flux), S(c) = Σ of g
+// over the columns ≥ c of a row; x̄ mean offset of an edge piece from its column's left side.
+//
+// With Green's theorem a pixel's covered area is a sum over edge pieces: a piece in column c covers
+// −Δy(1 − x̄) of that pixel and −Δy of every pixel to its right. So deposits go into the picture's
+// *row differences*: one prefix sum along each row (ResolveFlux) yields the picture, and no polygon
+// is ever clipped.
+
 /// Fixed-point unit of the flux picture: 2⁻⁵² of the lens's total flux. A pixel's sum is at most
-/// the total, 2⁵², whatever the number of triangles; sums on the way are taken modulo 2⁶⁴, so they
+/// the total, 2⁵², for any number of triangles; intermediate sums are taken modulo 2⁶⁴, so they
 /// cannot overflow. Single deposits stay below 2⁶³ because ρ ≤ kMaxDensity.
 inline constexpr double kFluxUnits = 4503599627370496.0;
 
@@ -31,13 +368,13 @@ inline constexpr double kFluxUnits = 4503599627370496.0;
 inline constexpr double kMaxDensity = 1024.0;
 
 /// Below this ratio of area to the square of the longest side a triangle is treated as a needle, a
-/// line of light. There the rounding error of the exact formula (2⁻⁵³ over the ratio) and the error
-/// of neglecting the width are both about 1e-8, measured up to 1.4e-7, of the triangle's own flux;
-/// only a needle that runs along a pixel border gives all of it to one of the two sides.
+/// line of light. At this ratio the rounding error of the exact formula (2⁻⁵³ over the ratio) and
+/// the error of neglecting the width are both about 1e-8 of the triangle's own flux (measured: up
+/// to 1.4e-7). A needle that runs along a pixel border gives all its flux to one of the two sides.
 inline constexpr double kNeedleRatio = 1e-8;
 
 /// Row differences of a flux picture in units of 1/kFluxUnits; each row has one column more than
-/// the picture, which takes what is cancelled right of the last pixel.
+/// the picture, for what is cancelled right of the last pixel.
 struct FluxAccumulator {
   std::int64_t* units = nullptr;
   int columns = 0;
@@ -55,7 +392,7 @@ struct FluxAccumulator {
 #endif
   }
 
-  /// Gives flux to one pixel; nothing happens outside the picture.
+  /// Gives flux to one pixel; ignores pixels outside the picture.
   LF_HD void add_pixel(int row, int column, std::int64_t amount) const {
     if (row < 0 || row >= rows || column < 0 || column >= columns) return;
     add(row, column, amount);
@@ -91,8 +428,8 @@ LF_HD inline std::int64_t to_units(double flux) {
   return static_cast<std::int64_t>(std::llrint(flux * kFluxUnits));
 }
 
-/// Deposit of a triangle that touches at most 2 × 2 pixels. Untouched pixels get exactly nothing,
-/// and no density enters, so that a triangle may be as small as it likes.
+/// Deposit of a triangle that touches at most 2 × 2 pixels. Untouched pixels get exactly nothing.
+/// No density is used, so a triangle may be arbitrarily small.
 LF_HD inline void deposit_small(const ImageTriangle& t, const PixelBox& box,
                                 const FluxAccumulator& image) {
   const Quadrants areas = quadrant_areas(t, box.crossing());
@@ -115,8 +452,8 @@ LF_HD inline void deposit_small(const ImageTriangle& t, const PixelBox& box,
   image.add_pixel(box.r1, box.c1, below_right);
 }
 
-/// Row differences of ρ × (covered area) of one edge. Quantised per end point, so that the pieces
-/// of a closed polygon cancel exactly in every row.
+/// Row differences of ρ × (covered area) of one edge. Quantised per end point, so the pieces of a
+/// closed polygon cancel exactly in every row.
 struct DepositEdge {
   double units_per_area;
   FluxAccumulator image;
@@ -136,8 +473,8 @@ struct DepositEdge {
   }
 };
 
-/// A triangle without width: its flux lies on its longest side a → b with the density of a tent
-/// whose peak is where the third corner projects to.
+/// A triangle without width: its flux is on its longest side a → b, with a tent-shaped density
+/// whose peak is the projection of the third corner.
 struct Needle {
   Eigen::Vector2d a, b;
   double peak = 0.0;  ///< Parameter of the tent's peak on a → b.
@@ -177,7 +514,7 @@ LF_HD inline bool is_needle(const ImageTriangle& t, double doubled, double exten
   return !(area > kNeedleRatio * extent * extent && std::fabs(t.flux) <= kMaxDensity * area);
 }
 
-/// In 2 × 2 pixels no density enters, so only the loss of digits in the area counts.
+/// In 2 × 2 pixels no density is used, so only the loss of digits in the area matters.
 LF_HD inline bool is_small_needle(double doubled, double extent) {
   return !(0.5 * std::fabs(doubled) > kNeedleRatio * extent * extent);
 }
@@ -224,7 +561,7 @@ namespace flux_detail {
 /// its outward normal, weighted by the hat functions 1 − s and s of its ends.
 struct GatherEdge {
   FluxCotangent cotangent;
-  double integral = 0.0;  ///< Share of G of the edges so far.
+  double integral = 0.0;  ///< Share of G from the edges so far.
   double weight_p = 0.0;  ///< ∫ g (1 − s) ds along the current edge.
   double weight_q = 0.0;  ///< ∫ g s ds.
 
@@ -262,9 +599,9 @@ LF_HD inline void add_swept(const Eigen::Vector2d& p, const Eigen::Vector2d& q,
   q_bar += weights.end * normal;
 }
 
-/// G and its derivatives by the corners for a triangle within 2 × 2 pixels. Seen from where the
-/// pixel borders cross, g does not change under scaling, so G is homogeneous of degree two and
-/// follows from its derivatives by Euler's theorem.
+/// G and its derivatives by the corners for a triangle within 2 × 2 pixels. g does not change under
+/// scaling about the crossing of the pixel borders, so G is homogeneous of degree two and follows
+/// from its derivatives by Euler's theorem.
 LF_HD inline double gather_small(const ImageTriangle& t, const PixelBox& box,
                                  const FluxCotangent& cotangent, ImageTriangle& bar) {
   const Eigen::Vector2d crossing = box.crossing();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/mpi/rank_stage.h"
 #include "design/mpi/session.h"
+#include "design/schedule/guided_optimization.h"
 
 /// A build without MPI: there is one process.
 namespace lensforge {

@@ -2,6 +2,7 @@
 #include "design/mpi/rank_executor.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "core/error.h"
 
@@ -21,7 +22,7 @@ struct AddPicture {
   void operator()(std::int64_t i) const { to[i] += from[i]; }
 };
 
-/// Rows of a scan from one of them on.
+/// The rows of a scan from row `first` on.
 struct ScanFrom {
   using Value = ResolveFlux::Value;
 
@@ -35,7 +36,7 @@ struct ScanFrom {
   }
 };
 
-/// Entries of both in turn.
+/// Entries of both, alternating.
 std::vector<double> joined(std::span<const double> a, std::span<const double> b) {
   std::vector<double> pairs(2 * a.size());
   for (std::size_t i = 0; i < a.size(); ++i) {
@@ -55,7 +56,7 @@ double dot_of_pairs(std::span<const double> pairs) {
   return dot(Executor::serial(), a, b);
 }
 
-/// Of an array with so many for every row of the picture.
+/// Entries per rank of an array with `per_row` entries per row of the picture.
 std::vector<int> entries_per_rank(const RankExecutor& executor, int per_row) {
   std::vector<int> counts(static_cast<std::size_t>(executor.ranks().count()));
   for (std::size_t r = 0; r < counts.size(); ++r) {
@@ -64,7 +65,7 @@ std::vector<int> entries_per_rank(const RankExecutor& executor, int per_row) {
   return counts;
 }
 
-/// The sums of the rows that the rank looks at.
+/// Adds up the rows that the rank uses.
 void join_rows(const RankExecutor& executor, std::span<std::uint64_t> units) {
   const Ranks& ranks = executor.ranks();
   const auto per_row = static_cast<int>(executor.pixels_of({0, 1}).count()) + 1;
@@ -74,7 +75,7 @@ void join_rows(const RankExecutor& executor, std::span<std::uint64_t> units) {
   };
   const ItemRange own = executor.own_rows();
   const ItemRange seen = executor.seen_rows();
-  // A rank at the end receives nothing there.
+  // A rank at an end receives nothing there.
   ranks.shift<std::uint64_t>(1, row(own.end - 1), row(seen.begin));
   ranks.shift<std::uint64_t>(-1, row(own.begin), row(seen.end - 1));
 }
@@ -174,7 +175,7 @@ std::vector<double> RankExecutor::joined_block(Counted items, std::int64_t block
 }
 
 void RankExecutor::add_in_order(std::span<const double> blocks, std::span<double> sum) const {
-  // One more entry tells whether to stop, so that no rank goes on alone.
+  // One more entry is the stop flag, so that no rank continues alone.
   std::vector<double> running(sum.size() + 1, 0.0);
   const std::span<double> message(running);
   const int rank = ranks_.rank();
@@ -188,7 +189,7 @@ void RankExecutor::add_in_order(std::span<const double> blocks, std::span<double
   std::copy(running.begin(), running.end() - 1, sum.begin());
 }
 
-/// Block by block, as in one process, where dot() of one block is what it adds.
+/// Block by block, as in one process, which adds dot() of each block.
 double dot(const RankExecutor& executor, std::span<const double> a, std::span<const double> b) {
   const ItemRange own = executor.own(Counted::kUnknowns);
   const BlockShare share(own, kDotBlock, executor.total(Counted::kUnknowns));
@@ -225,7 +226,7 @@ void join_pictures(const RankExecutor& executor, std::span<std::int64_t> units,
                  AddPicture{worker.data(), first.data()});
     std::fill(worker.begin(), worker.end(), 0);
   }
-  // Sums on the way may leave the range of the type, as they do in ResolveFlux.
+  // Intermediate sums may overflow, as in ResolveFlux.
   const std::span<std::uint64_t> joined(reinterpret_cast<std::uint64_t*>(first.data()),
                                         first.size());
   if (executor.shares_pixels()) {
@@ -268,7 +269,7 @@ double intake_of(const RankExecutor& executor, const SurfaceMesh& mesh, const Me
   }
   const bool last = ranks.rank() + 1 == ranks.count();
   if (!last) ranks.send(ranks.rank() + 1, std::span<const double>(&sum, 1));
-  // From the last one to all.
+  // The last rank has the sum; all need it.
   if (last && ranks.count() > 1) ranks.send(0, std::span<const double>(&sum, 1));
   if (ranks.is_first() && ranks.count() > 1) {
     ranks.receive(ranks.count() - 1, std::span<double>(&sum, 1));
@@ -311,6 +312,149 @@ void fill_halo(const RankExecutor& executor, std::span<double> vertices) {
   };
   ranks.shift<double>(1, part(own.end - halo, own.end), part(0, own.begin));
   ranks.shift<double>(-1, part(own.begin, own.begin + halo), part(own.end, all));
+}
+
+namespace {
+
+int length_of(const ItemRange& range) { return static_cast<int>(range.count()); }
+
+std::size_t size_of(const ItemRange& range, int length) {
+  return static_cast<std::size_t>(range.count()) * static_cast<std::size_t>(length);
+}
+
+}  // namespace
+
+RankTransforms::RankTransforms(const GridShape& grid, const Ranks& ranks, const Executor& threads)
+    : grid_(grid),
+      ranks_(ranks),
+      threads_(threads),
+      along_rows_(grid.columns, length_of(rows())),
+      along_columns_(grid.rows, length_of(columns())) {
+  for (int r = 0; r < ranks.count(); ++r) {
+    by_row_owner_.push_back(static_cast<int>(rows_of(r).count() * columns().count()));
+    by_column_owner_.push_back(static_cast<int>(rows().count() * columns_of(r).count()));
+  }
+  const std::size_t most = std::max(size_of(rows(), grid.columns), size_of(columns(), grid.rows));
+  for (std::vector<double>& plane : planes_) plane.resize(most);
+  packed_.resize(most);
+}
+
+void RankTransforms::forward() {
+  transform(along_rows_);
+  for (std::vector<double>& plane : planes_) to_columns(plane);
+  transform(along_columns_);
+}
+
+void RankTransforms::backward() {
+  for (std::vector<double>& plane : planes_) to_rows(plane);
+  forward();
+  for (std::vector<double>& plane : planes_) to_rows(plane);
+}
+
+void RankTransforms::transform(const CosineRows& lines) {
+  parallel_for(
+      threads_, "cosine transform", 3,
+      [&](std::int64_t k) { lines.run(plane(static_cast<int>(k))); }, 1);
+}
+
+/// A block in transit holds, column by column, one rank's rows of another rank's columns.
+void RankTransforms::to_columns(std::vector<double>& plane) {
+  double* block = packed_.data();
+  for (std::int64_t c = 0; c < grid_.columns; ++c) {
+    const double* value = plane.data() + c;
+    for (std::int64_t r = 0; r < rows().count(); ++r, value += grid_.columns) *block++ = *value;
+  }
+  const std::size_t out = size_of(rows(), grid_.columns);
+  const std::size_t in = size_of(columns(), grid_.rows);
+  ranks_.exchange({packed_.data(), out}, by_column_owner_, {plane.data(), in}, by_row_owner_);
+  std::copy(plane.begin(), plane.begin() + static_cast<std::ptrdiff_t>(in), packed_.begin());
+  const double* from = packed_.data();
+  for (int rank = 0; rank < ranks_.count(); ++rank) {
+    const ItemRange rows = rows_of(rank);
+    for (std::int64_t c = 0; c < columns().count(); ++c, from += rows.count()) {
+      std::copy(from, from + rows.count(), plane.data() + c * grid_.rows + rows.begin);
+    }
+  }
+}
+
+void RankTransforms::to_rows(std::vector<double>& plane) {
+  double* to = packed_.data();
+  for (int rank = 0; rank < ranks_.count(); ++rank) {
+    const ItemRange rows = rows_of(rank);
+    for (std::int64_t c = 0; c < columns().count(); ++c) {
+      const double* column = plane.data() + c * grid_.rows;
+      to = std::copy(column + rows.begin, column + rows.end, to);
+    }
+  }
+  const std::size_t out = size_of(columns(), grid_.rows);
+  const std::size_t in = size_of(rows(), grid_.columns);
+  ranks_.exchange({packed_.data(), out}, by_row_owner_, {plane.data(), in}, by_column_owner_);
+  std::copy(plane.begin(), plane.begin() + static_cast<std::ptrdiff_t>(in), packed_.begin());
+  const double* block = packed_.data();
+  for (std::int64_t c = 0; c < grid_.columns; ++c) {
+    double* value = plane.data() + c;
+    for (std::int64_t r = 0; r < rows().count(); ++r, value += grid_.columns) *value = *block++;
+  }
+}
+
+RankPreconditioner::RankPreconditioner(const GridShape& grid, double aspect,
+                                       std::span<const double> movable, const Ranks& ranks,
+                                       const Executor& threads)
+    : grid_(grid),
+      threads_(threads),
+      movable_(movable.begin(), movable.end()),
+      reach_(movable.size(), 1.0),
+      eigen_x_(CosineTransform::eigenvalues(grid.columns, 1.0)),
+      eigen_y_(CosineTransform::eigenvalues(grid.rows, aspect)),
+      transforms_(grid, ranks, threads) {}
+
+void RankPreconditioner::set_reach(std::span<const double> reach) {
+  reach_.assign(reach.begin(), reach.end());
+}
+
+void RankPreconditioner::set_movable(std::span<const double> movable) {
+  movable_.assign(movable.begin(), movable.end());
+}
+
+void RankPreconditioner::apply(std::span<const double> g, double exponent, std::span<double> r) {
+  const auto vertices = static_cast<std::int64_t>(reach_.size() / 3);
+  const PreconditionerView rows = view_of_rows(exponent);
+  parallel_for(threads_, "enter planes", vertices, EnterPlanes{rows, g.data()});
+  transforms_.forward();
+  const double inverse = 1.0 / (4.0 * (grid_.columns - 1.0) * (grid_.rows - 1.0));
+  const double scale_xy = std::pow(xy.scale, exponent) * inverse;
+  const double scale_z = std::pow(z.scale, exponent) * inverse;
+  parallel_for(threads_, "scale coefficients", transforms_.columns().count() * grid_.rows,
+               ScaleCoefficient{view_of_columns(exponent), {scale_xy, scale_xy, scale_z}});
+  transforms_.backward();
+  parallel_for(threads_, "leave planes", vertices, LeavePlanes{rows, r.data()});
+}
+
+PreconditionerView RankPreconditioner::view_of_rows(double exponent) {
+  return {grid_.columns,
+          grid_.rows,
+          movable_.data(),
+          reach_.data(),
+          eigen_x_.data(),
+          eigen_y_.data(),
+          {xy, xy, z},
+          exponent,
+          {transforms_.plane(0), transforms_.plane(1), transforms_.plane(2)},
+          transforms_.rows().begin};
+}
+
+/// View of the transposed planes: rows and columns are exchanged.
+PreconditionerView RankPreconditioner::view_of_columns(double exponent) {
+  return {grid_.rows,
+          grid_.columns,
+          nullptr,
+          nullptr,
+          eigen_y_.data(),
+          eigen_x_.data(),
+          {xy, xy, z},
+          exponent,
+          {transforms_.plane(0), transforms_.plane(1), transforms_.plane(2)},
+          transforms_.columns().begin};
 }
 
 }  // namespace lensforge

@@ -13,49 +13,46 @@
 #include <vector>
 
 #include "core/compute/executor.h"
+#include "core/mesh/surface_mesh.h"
 #include "core/optics/light_path.h"
-#include "core/surface/mesh_cut.h"
-#include "core/surface/surface_mesh.h"
-#include "design/energy/gradient_term.h"
-#include "design/energy/image_term.h"
-#include "design/energy/laplacian_term.h"
-#include "design/energy/objective_adjoint.h"
+#include "core/optics/outline.h"
 #include "design/energy/objective_kernels.h"
-#include "design/energy/smooth_rays.h"
-#include "design/energy/smoothness_term.h"
-#include "design/energy/unlit_pixels.h"
-#include "design/flux/flux_kernels.h"
-#include "design/mpi/block_share.h"
+#include "design/energy/picture_terms.h"
+#include "design/energy/rays.h"
+#include "design/energy/smoothness.h"
+#include "design/flux/flux_image.h"
 #include "design/mpi/ranks.h"
-#include "design/mpi/row_slabs.h"
-#include "design/optimize/vector_kernels.h"
+#include "design/optimize/cosine_transform.h"
+#include "design/optimize/grid_preconditioner.h"
+#include "design/optimize/lbfgs.h"
 
-/// An executor of one rank of several. Kernels run on all that the rank holds, its halo too. Sums
-/// count what it owns, and are taken over all ranks in the order in which one process takes them:
-/// all ranks see the bits that it would, and take the decisions that it would.
+/// Executor of one rank of several. Kernels run on everything that the rank holds, including its
+/// halo. Sums count only what it owns and are taken over all ranks in the order of a single
+/// process: all ranks get the same bits as one process and take the same decisions.
+
 namespace lensforge {
 
-/// What the items of a sum are.
+/// Items of a sum.
 enum class Counted {
-  kFaces,     ///< Of the rank's own mesh: those it owns count.
-  kVertices,  ///< Likewise.
-  kUnknowns,  ///< Entries of a vector over the vertices that the rank owns: all count.
-  kPixels     ///< Of the picture: its rows are shared out, or each rank counts all of them.
+  kFaces,     ///< Faces of the rank's mesh; those it owns count.
+  kVertices,  ///< Vertices of the rank's mesh; those it owns count.
+  kUnknowns,  ///< Entries of a vector over the rank's own vertices; all count.
+  kPixels     ///< Pixels: rows are shared out, or each rank counts all of them.
 };
 
-/// The picture, of which every rank has memory for all pixels. If its rows are shared out, a rank
-/// looks at its own, and at one more on each side for the differences between them.
+/// The picture; every rank has memory for all pixels. If its rows are shared out, a rank uses its
+/// own and one more on each side, for the differences between them.
 struct SharedPicture {
   int columns = 0;
   int rows = 0;  ///< 0: not shared out.
 };
 
-/// Sums are collective: all ranks have to ask for them in the same order.
+/// Sums are collective: all ranks must ask for them in the same order.
 class RankExecutor : public Executor {
  public:
-  /// @param threads  of this rank; the kernels themselves cannot be stopped.
+  /// @param threads  this rank's threads; the kernels themselves cannot be stopped.
   /// @param picture  @pre at least as many rows as ranks, or none.
-  /// @param stop     heeded on rank 0: the next sum then throws Interrupted, on all ranks.
+  /// @param stop     checked on rank 0: the next sum then throws Interrupted on all ranks.
   RankExecutor(const Executor& threads, const Ranks& ranks, const RowSlab& slab,
                const SharedPicture& picture, std::stop_token stop)
       : Executor(threads.with_stop({})),
@@ -67,13 +64,13 @@ class RankExecutor : public Executor {
   [[nodiscard]] const Ranks& ranks() const { return ranks_; }
   [[nodiscard]] const RowSlab& slab() const { return slab_; }
 
-  /// The items that a rank adds to a sum, in the numbers of the whole, 0 … total − 1.
+  /// Items that a rank adds to a sum, numbered in the whole, 0 … total − 1.
   [[nodiscard]] ItemRange own_of(Counted items, int rank) const;
   [[nodiscard]] ItemRange own(Counted items) const { return own_of(items, ranks_.rank()); }
   [[nodiscard]] std::int64_t total(Counted items) const {
     return own_of(items, ranks_.count() - 1).end;
   }
-  /// The number in the whole of what is item 0 here.
+  /// Number in the whole of this rank's item 0.
   [[nodiscard]] std::int64_t origin(Counted items) const;
 
   [[nodiscard]] bool shares_pixels() const { return picture_.rows > 0; }
@@ -90,16 +87,16 @@ class RankExecutor : public Executor {
     return {rows.begin * picture_.columns, rows.end * picture_.columns};
   }
 
-  /// All items of the block that ends on this rank after it has begun on others, `per_item` numbers
-  /// each; empty if there is none. @param share  of all items in blocks. Collective.
+  /// All items of the block that ends on this rank but began on others, `per_item` numbers each;
+  /// empty if there is none. @param share  all items in blocks. Collective.
   [[nodiscard]] std::vector<double> joined_block(Counted items, std::int64_t block,
                                                  const BlockShare& share,
                                                  std::span<const double> head,
                                                  std::span<const double> tail,
                                                  std::size_t per_item) const;
 
-  /// The sum over all ranks' blocks, one after the other. @param blocks  of this rank, sum.size()
-  /// numbers each. Collective. @throw Interrupted on every rank if rank 0 is asked to stop.
+  /// Sums all ranks' blocks in order. @param blocks  this rank's, sum.size() numbers each.
+  /// Collective. @throw Interrupted on every rank if rank 0 is asked to stop.
   void add_in_order(std::span<const double> blocks, std::span<double> sum) const;
 
  private:
@@ -109,7 +106,7 @@ class RankExecutor : public Executor {
   std::stop_token stop_;
 };
 
-/// What the functor of a sum counts: a new one has to be named here.
+/// The items that a functor's sum counts; every functor of a sum is listed here.
 template <class Functor>
 struct CountedBy;
 template <Counted items>
@@ -141,7 +138,7 @@ struct CountedBy<ImageTermPixel> : Counts<Counted::kPixels> {};
 template <>
 struct CountedBy<GradientTermPixel> : Counts<Counted::kPixels> {};
 
-/// The items that a kernel is called for, in the numbers of the whole.
+/// Items that a kernel is called for, numbered in the whole.
 template <class Functor>
 ItemRange called_items(const RankExecutor& executor, std::int64_t count) {
   constexpr Counted kItems = CountedBy<Functor>::kItems;
@@ -150,7 +147,7 @@ ItemRange called_items(const RankExecutor& executor, std::int64_t count) {
   return {executor.origin(kItems), executor.origin(kItems) + count};
 }
 
-/// A sum in blocks as parallel_sum() takes it.
+/// A sum in blocks, as parallel_sum() takes it.
 template <std::size_t N, class Functor>
 class RankSum {
  public:
@@ -181,7 +178,7 @@ class RankSum {
   [[nodiscard]] std::array<double, N> value(std::int64_t item) const {
     return functor_(item - executor_.origin(kItems));
   }
-  /// For what it leaves behind.
+  /// Calls the functor for its side effects.
   void call_for(const ItemRange& items) const {
     parallel_for(threads(), kernel_, items.count(),
                  [&](std::int64_t i) { static_cast<void>(value(items.begin + i)); });
@@ -230,18 +227,18 @@ FinishedSum<N> pending_sum(const RankExecutor& executor, const char* kernel, std
   return {RankSum<N, Functor>(executor, kernel, count, functor).run()};
 }
 
-/// The rank's own pixels.
+/// Runs over the rank's own pixels.
 void parallel_for(const RankExecutor& executor, const char* kernel, std::int64_t count,
                   const EncodeAdjoint& functor);
 
-/// The rows of the picture that the rank looks at.
+/// Scans the rows of the picture that the rank uses.
 void scan_rows(const RankExecutor& executor, const char* kernel, std::int64_t rows, int columns,
                const ResolveFlux& scan);
 
-/// Scalar product of vectors over the vertices that each rank owns.
+/// Scalar product of vectors over the ranks' own vertices.
 double dot(const RankExecutor& executor, std::span<const double> a, std::span<const double> b);
 
-/// The face that item i of a source of triangles belongs to.
+/// The face of item i of a source of triangles.
 template <class Rays>
 std::int64_t face_of(const FaceLightSource<Rays>& source, std::int64_t i) {
   const std::int64_t faces = source.o.mesh.faces;
@@ -261,24 +258,99 @@ void parallel_for_worker(const RankExecutor& executor, const char* kernel, std::
   parallel_for_worker(threads, kernel, count, deposit_own);
 }
 
-/// The light of all ranks' faces in the pixels that the rank looks at: in whole units, so that
-/// their order does not count.
+/// Adds up the light of all ranks' faces in the pixels that the rank uses, in whole units, so the
+/// order does not matter.
 void join_pictures(const RankExecutor& executor, std::span<std::int64_t> units,
                    std::size_t per_picture);
 
-/// Derivatives by the pixels, from the ranks that have found them.
+/// Collects the derivatives by the pixels from the ranks that computed them.
 void collect_rows(const RankExecutor& executor, std::span<double> pixels);
 
-/// LightPath's intake of the whole mesh, added up face by face as in one process: the same bits.
+/// LightPath's intake of the whole mesh, summed face by face as in one process: the same bits.
 double intake_of(const RankExecutor& executor, const SurfaceMesh& mesh, const MeshCut* cut,
                  const LightPath& light);
 
-/// Which faces of the rank's mesh are led where; rank 0 looks at all of them.
+/// Assigns unlit pixels to the faces of the rank's mesh; rank 0 decides for all.
 std::vector<std::int32_t> lead_to_unlit_pixels(const RankExecutor& executor,
                                                const LitPicture& picture,
                                                const Eigen::Matrix2Xd& centroids);
 
-/// Fills the halo of 3 numbers per vertex that the rank holds with what its neighbours own.
+/// Fills the halo of a vector of 3 numbers per held vertex with the values that the neighbours own.
 void fill_halo(const RankExecutor& executor, std::span<double> vertices);
+
+/// GridTransforms over ranks: the cosine transform of three planes whose rows are shared out. Each
+/// rank transforms its rows; then the planes are transposed between the ranks, and each transforms
+/// its columns. FFTW takes rows and columns in the same order, so the coefficients have the bits of
+/// CosineTransform's. A transform and its inverse take four transpositions; two would suffice if
+/// the inverse began with the columns, but its last bits would differ.
+class RankTransforms {
+ public:
+  /// @pre at least 2 columns and rows.
+  RankTransforms(const GridShape& grid, const Ranks& ranks, const Executor& threads);
+
+  /// Values of coordinate k in the rank's rows, row by row; between forward() and backward() the
+  /// coefficients in its columns, column by column, from the top.
+  [[nodiscard]] double* plane(int k) { return planes_[static_cast<std::size_t>(k)].data(); }
+
+  [[nodiscard]] ItemRange rows() const { return rows_of(ranks_.rank()); }
+  [[nodiscard]] ItemRange columns() const { return columns_of(ranks_.rank()); }
+
+  /// Rows of values → columns of coefficients. Collective, like backward().
+  void forward();
+  /// Coefficients → (inverse scale)⁻¹ × values.
+  void backward();
+
+ private:
+  [[nodiscard]] ItemRange rows_of(int rank) const {
+    return even_share(grid_.rows, ranks_.count(), rank);
+  }
+  [[nodiscard]] ItemRange columns_of(int rank) const {
+    return even_share(grid_.columns, ranks_.count(), rank);
+  }
+  void transform(const CosineRows& lines);
+  void to_columns(std::vector<double>& plane);
+  void to_rows(std::vector<double>& plane);
+
+  GridShape grid_;
+  Ranks ranks_;
+  Executor threads_;
+  CosineRows along_rows_;
+  CosineRows along_columns_;
+  std::vector<int> by_row_owner_;     ///< Entry r: values of the own columns in rank r's rows.
+  std::vector<int> by_column_owner_;  ///< Entry r: values of the own rows in rank r's columns.
+  std::array<std::vector<double>, 3> planes_;
+  std::vector<double> packed_;
+};
+
+/// GridPreconditioner over ranks. Vectors hold the vertices that the rank owns. apply() is
+/// collective.
+class RankPreconditioner {
+ public:
+  /// @param aspect   cell height ÷ cell width of the grid.
+  /// @param movable  3 per vertex, 1 or 0.
+  RankPreconditioner(const GridShape& grid, double aspect, std::span<const double> movable,
+                     const Ranks& ranks, const Executor& threads);
+
+  GridSymbol xy;
+  GridSymbol z;
+
+  void set_reach(std::span<const double> reach);
+  void set_movable(std::span<const double> movable);
+
+  /// r ← P^exponent g.
+  void apply(std::span<const double> g, double exponent, std::span<double> r);
+
+ private:
+  [[nodiscard]] PreconditionerView view_of_rows(double exponent);
+  [[nodiscard]] PreconditionerView view_of_columns(double exponent);
+
+  GridShape grid_;
+  Executor threads_;
+  std::vector<double> movable_;
+  std::vector<double> reach_;
+  std::vector<double> eigen_x_;
+  std::vector<double> eigen_y_;
+  RankTransforms transforms_;
+};
 
 }  // namespace lensforge

@@ -10,7 +10,6 @@
 #include <vector>
 
 namespace lensforge {
-
 namespace {
 
 /// FFTW's planner is not thread-safe; its execution is.

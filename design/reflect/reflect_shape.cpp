@@ -4,62 +4,59 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstring>
+#include <nlohmann/json.hpp>
 #include <optional>
+#include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
 #include "core/error.h"
 #include "core/io/checkpoint_file.h"
+#include "core/schema/json.h"
 #include "core/text/number_text.h"
 #include "design/reflect/light/light_field.h"
 #include "design/reflect/light/reflection_energy.h"
-#include "design/reflect/mesh/edge_split.h"
-#include "design/reflect/mesh/edges.h"
-#include "design/reflect/mesh/mirror.h"
-#include "design/reflect/mesh/unit_frame.h"
-#include "design/reflect/normals/face_descent.h"
-#include "design/reflect/normals/fixed_steps.h"
-#include "design/reflect/normals/normal_objective.h"
-#include "design/reflect/normals/tv_denoise.h"
-#include "design/reflect/normals/unmet_turns.h"
-#include "design/reflect/reflect_checkpoint.h"
-#include "design/reflect/shape/constraints.h"
+#include "design/reflect/mesh/faces.h"
+#include "design/reflect/shape/normals.h"
 #include "design/reflect/shape/shape_update.h"
 
 namespace lensforge::reflect {
 namespace {
 
-/// A face that looks straight back at the light has no gradient by symmetry: before the first
-/// update normals are tilted up above the middle and down below it by this at most, rad. A tenth
-/// of the lobe's width.
+/// Maximum tilt of the normals before the first update, up above the middle and down below it, rad:
+/// a tenth of the lobe's width. A face that looks straight back at the light has no gradient, by
+/// symmetry.
 constexpr double kTilt = 0.01;
 
-/// A stage ends when its energy changed by less than this share over so many updates. Directions
-/// turn from update to update, which alone changes an energy by up to 0.5 %.
+/// A stage ends when its energy changed by less than this share over kStageWindow updates.
+/// Directions turn from update to update, which alone changes an energy by up to 0.5 %.
 constexpr double kStageChange = 0.01;
 constexpr std::size_t kStageWindow = 3;
-/// Stealth asks for more and more where faces hold each other back, which takes updates to show.
+/// For stealth the window is longer: where faces hold each other back the targets grow from update
+/// to update, and the effect comes late.
 constexpr std::size_t kStealthWindow = 8;
 
-/// How strongly stealth holds normals where the last update left them, in units of β. The paper's 8
+/// Strength with which stealth holds normals at the last update's, in units of β. The paper's 8
 /// steps of 200/5914 take normals 1.35·β of their way to the reference, and so does one implicit
-/// step with this weight. Without it faces that send no light back are taken all the way, however
-/// small β is, and hold their neighbours there: an ellipsoid of 400 faces ends at 0.0124 and not at
+/// step with this weight. Without it faces that reflect no light are taken all the way, however
+/// small β is, and hold their neighbours back: an ellipsoid of 400 faces ends at 0.0124 instead of
 /// 0.0075 for the same displacement.
 constexpr double kStay = 0.74;
 
-/// Vertices beyond this many diagonals have lost the shape; Embree ends the program for rays from
-/// far beyond.
+/// Vertices beyond this distance have lost the shape; Embree ends the program for rays from far
+/// beyond.
 constexpr double kFarthest = 1e6 * kUnitDiagonal;
 
-/// Between two checkpoints; what a killed run has to do again.
+/// Time between two checkpoints, which a killed run has to repeat.
 constexpr double kSaveSeconds = 1.0;
 
-/// Steps of the normals that one seed may number.
+/// Maximum number of steps of the normals per seed.
 constexpr std::uint64_t kSeedStride = std::uint64_t{1} << 32U;
 
-/// What is said of a run that gained too little.
+/// Message for a run that gained too little.
 std::string gain_words(double before, double after) {
   return "the energy went from " + number_text(before, 4) + " to " + number_text(after, 4) +
          ": less than a tenth of it was gained; a smaller --anchor, another number of --faces, "
@@ -144,7 +141,7 @@ class Schedule {
     return {number == 1 ? "face" : "split", ElementKind::kFace, options_.face_updates};
   }
 
-  /// Takes over what a checkpoint holds. @throw InputError
+  /// Takes over the state of a checkpoint. @throw InputError
   void resume() {
     state_ = read_checkpoint(options_.checkpoint, state_.fingerprint);
     if (!state_.split.empty()) {
@@ -175,7 +172,7 @@ class Schedule {
     ++saves_;
   }
 
-  /// Begins a stage, or goes on with that of the checkpoint.
+  /// Begins a stage, or continues the checkpoint's.
   void begin_stage(int number) {
     const bool goes_on = state_.stage == number && state_.unmet.cols() > 0;
     if (goes_on) return;
@@ -222,19 +219,19 @@ class Schedule {
     return vertices.allFinite() && vertices.cwiseAbs().maxCoeff() < kFarthest;
   }
 
-  /// Without the denoiser's and the anchor's hold the published steps may lose a shape altogether.
+  /// Without denoiser and anchor the published steps may lose a shape altogether.
   void require_near(const Eigen::Matrix3Xd& vertices) const {
     if (is_near(vertices)) return;
     throw RunError("update " + std::to_string(number() + 1) +
                    " moved vertices out of all bounds; another --anchor or --seed may help");
   }
 
-  /// Whether normals go a part of the way in each update, and further where they did not arrive.
+  /// True if normals go a part of the way in each update, and farther where faces did not follow.
   [[nodiscard]] bool pursues() const {
     return options_.method == Method::kExact && field_.goal.kind == GoalKind::kStealth;
   }
 
-  /// The anchor of one update: where normals are held by β and by kStay, as one square.
+  /// The anchor of one update: the positions held by β and by kStay, combined into one square.
   [[nodiscard]] NormalAnchor held(const Faces& faces) const {
     if (!pursues()) return anchor_;
     const double strength = anchor_.strength + kStay;
@@ -257,7 +254,7 @@ class Schedule {
          "energy " + number_text(row.energy, 4)});
   }
 
-  /// Whether the stage no longer gains.
+  /// True if the stage no longer gains.
   [[nodiscard]] bool settled() const {
     if (options_.method == Method::kPaper) return false;
     const std::vector<ReflectUpdate>& updates = state_.updates;
@@ -342,7 +339,7 @@ class Schedule {
     if (!keep_.partner.empty()) keep_.partner = mirror_partners(cut.mesh, keep_.axis);
   }
 
-  /// Distances from where the vertices were, as shares of the diagonal.
+  /// Displacements of the vertices, as shares of the diagonal.
   [[nodiscard]] Eigen::RowVectorXd displacements() const {
     return (mesh_.vertices - reference_.vertices).colwise().norm() / kUnitDiagonal;
   }
@@ -361,7 +358,7 @@ class Schedule {
   LightField field_;
   ConstraintSet keep_;
   NormalAnchor anchor_;
-  ReflectCheckpoint state_;  ///< But for its vertices, which `mesh_` has.
+  ReflectCheckpoint state_;  ///< Its vertices are in `mesh_` until it is saved.
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
   std::chrono::steady_clock::time_point saved_ = start_;
   int saves_ = 0;
@@ -387,6 +384,118 @@ Energies evaluate(const SurfaceMesh& mesh, const ReflectOptions& options,
   const UnitFrame frame(mesh);
   const LightField field = frame.to_unit(make_light_field(options));
   return evaluate(frame.to_unit(mesh), field.goal, field.evaluation_directions(), executor);
+}
+
+namespace {
+
+using nlohmann::json;
+
+/// After the header come the vertices and the unmet turns, as doubles.
+constexpr std::string_view kMagic = "lensforge reflect checkpoint 1\n";
+
+/// Stages of a run: rim-spoke, face, split.
+constexpr int kStages = 3;
+
+template <class Matrix>
+auto entries(const Matrix& matrix) {
+  using Scalar = typename Matrix::Scalar;
+  return std::span<const Scalar>(matrix.data(), static_cast<std::size_t>(matrix.size()));
+}
+
+json to_json(const ReflectUpdate& row) {
+  return {row.number,           row.stage,  row.energy, row.mean_displacement,
+          row.max_displacement, row.seconds};
+}
+
+ReflectUpdate update_from_json(const json& j) {
+  return {j.at(0), j.at(1), j.at(2), j.at(3), j.at(4), j.at(5)};
+}
+
+void require(bool holds, const JsonFields& fields, const char* name, const char* rule) {
+  if (!holds) fields.refuse(name, rule);
+}
+
+ReflectCheckpoint from_header(const json& header, const JsonFields& fields) {
+  ReflectCheckpoint checkpoint;
+  checkpoint.fingerprint = header.at("fingerprint");
+  checkpoint.stage = fields.integer("stage");
+  checkpoint.first = fields.integer("first");
+  checkpoint.split = header.at("split").get<std::vector<int>>();
+  checkpoint.before = {fields.number("direct"), fields.number("total")};
+  checkpoint.seconds = fields.number("seconds");
+  for (const json& row : header.at("updates")) {
+    checkpoint.updates.push_back(update_from_json(row));
+  }
+  require(checkpoint.stage >= 0 && checkpoint.stage < kStages, fields, "stage",
+          "it must be 0 to 2");
+  require(checkpoint.first >= 0 && checkpoint.first <= static_cast<int>(checkpoint.updates.size()),
+          fields, "first", "it must be 0 to the number of updates");
+  return checkpoint;
+}
+
+/// Takes a matrix of three rows from the front of the numbers.
+Eigen::Matrix3Xd taken(std::string_view& numbers, int columns, const std::filesystem::path& path) {
+  constexpr std::size_t kBytes = 3 * sizeof(double);
+  if (columns < 0 || static_cast<std::size_t>(columns) > numbers.size() / kBytes) {
+    refuse_checkpoint(path, "holds fewer numbers than its header says");
+  }
+  Eigen::Matrix3Xd matrix(3, columns);
+  const std::size_t bytes = kBytes * static_cast<std::size_t>(columns);
+  if (bytes > 0) std::memcpy(matrix.data(), numbers.data(), bytes);
+  numbers.remove_prefix(bytes);
+  if (!matrix.allFinite()) refuse_checkpoint(path, "holds a number that is not finite");
+  return matrix;
+}
+
+}  // namespace
+
+std::uint64_t reflect_fingerprint(const ReflectInput& input, const ReflectOptions& options) {
+  json description = {input.fixed, input.planar, input.partner};
+  append_fingerprint(description_of(options), description);
+  Fnv1a hash;
+  hash.add(description.dump());
+  hash.add(bytes_of(entries(input.mesh.vertices)));
+  hash.add(bytes_of(entries(input.mesh.triangles)));
+  return hash.value();
+}
+
+void write_checkpoint(const ReflectCheckpoint& checkpoint, const std::filesystem::path& path) {
+  json rows = json::array();
+  for (const ReflectUpdate& row : checkpoint.updates) rows.push_back(to_json(row));
+  const json header = {{"fingerprint", checkpoint.fingerprint},
+                       {"stage", checkpoint.stage},
+                       {"first", checkpoint.first},
+                       {"split", checkpoint.split},
+                       {"direct", checkpoint.before.direct},
+                       {"total", checkpoint.before.total},
+                       {"updates", rows},
+                       {"seconds", checkpoint.seconds},
+                       {"vertices", checkpoint.vertices.cols()},
+                       {"faces", checkpoint.unmet.cols()}};
+  std::string numbers(bytes_of(entries(checkpoint.vertices)));
+  numbers += bytes_of(entries(checkpoint.unmet));
+  write_checkpoint_file(path, kMagic, {header, numbers});
+}
+
+ReflectCheckpoint read_checkpoint(const std::filesystem::path& path,
+                                  std::optional<std::uint64_t> fingerprint) {
+  const CheckpointContent content = read_checkpoint_file(path, kMagic);
+  try {
+    const JsonFields fields(content.header, checkpoint_header_name(path));
+    ReflectCheckpoint checkpoint = from_header(content.header, fields);
+    if (fingerprint && checkpoint.fingerprint != *fingerprint) {
+      refuse_checkpoint(path,
+                        "is of another mesh or other options: run the command that began it, or "
+                        "start anew with --force");
+    }
+    std::string_view numbers = content.numbers;
+    checkpoint.vertices = taken(numbers, fields.integer("vertices"), path);
+    checkpoint.unmet = taken(numbers, fields.integer("faces"), path);
+    if (!numbers.empty()) refuse_checkpoint(path, "holds more numbers than its header says");
+    return checkpoint;
+  } catch (const json::exception&) {
+    refuse_checkpoint(path, "has a bad header: a field is missing or of another type");
+  }
 }
 
 }  // namespace lensforge::reflect

@@ -3,20 +3,24 @@
 
 #include <cmath>
 #include <cstddef>
+#include <cstdio>
 #include <cstring>
 #include <nlohmann/json.hpp>
 #include <span>
+#include <sstream>
 #include <string>
 #include <string_view>
 
 #include "core/io/checkpoint_file.h"
+#include "core/mesh/surface_mesh.h"
 #include "core/schema/json.h"
-#include "core/surface/grid_mesh.h"
-#include "design/design_fields.h"
+#include "core/spline/control_net.h"
+#include "design/setup/option_tables.h"
 
-// The numbers are the vertices and, if the header says so, the reach of their steps, as doubles.
+// After the header come the vertices and, if the header has scales, the reach of their steps, as
+// doubles.
+
 namespace lensforge {
-
 namespace {
 
 using nlohmann::json;
@@ -27,8 +31,8 @@ std::span<const double> entries(const Eigen::Matrix3Xd& matrix) {
   return {matrix.data(), static_cast<std::size_t>(matrix.size())};
 }
 
-/// Appends what of the light is not the default, so that designs for the usual light keep their
-/// fingerprint.
+/// Appends the light's options that differ from the default, so that designs for the usual light
+/// keep their fingerprint.
 void append_light(const LightOptions& light, json& description) {
   const Description usual = description_of(LightOptions());
   for (const Field& field : description_of(light)) {
@@ -155,6 +159,106 @@ Checkpoint read_checkpoint(const std::filesystem::path& path) {
   } catch (const json::exception&) {
     refuse_checkpoint(path, "has a bad header: a field is missing or of another type");
   }
+}
+
+namespace {
+
+/// Work of a level: its iterations, weighted by their rays.
+double level_work(const DesignTask& task, std::size_t level) {
+  const Level& at = task.levels[level];
+  const double vertices = double{1} * at.grid.columns * at.grid.rows;
+  const double rays = at.spline ? kMeshSamples * kMeshSamples * vertices : vertices;
+  return double{1} * at.rounds * at.iterations * rays;
+}
+
+/// Work of all levels before this one.
+double work_before(const DesignTask& task, std::size_t level) {
+  double sum = 0.0;
+  for (std::size_t l = 0; l < level; ++l) sum += level_work(task, l);
+  return sum;
+}
+
+double work_total(const DesignTask& task) { return work_before(task, task.levels.size()); }
+
+}  // namespace
+
+double DesignLog::seconds() const {
+  const auto since = std::chrono::steady_clock::now() - start_;
+  return spent_before_ + std::chrono::duration<double>(since).count();
+}
+
+ConvergenceRow DesignLog::new_row(const char* stage, int iteration) const {
+  ConvergenceRow row;
+  row.stage = stage;
+  row.level = state_.level;
+  row.round = state_.round;
+  row.iteration = iteration;
+  row.seconds = seconds();
+  return row;
+}
+
+void DesignLog::add(const std::vector<TransportStep>& steps) {
+  int number = 0;
+  for (const TransportStep& step : steps) {
+    ConvergenceRow row = new_row("transport", ++number);
+    row.mass_error = step.mass_error;
+    state_.convergence.push_back(row);
+  }
+}
+
+GuidedOptimization::Observer DesignLog::observer(const char* stage) {
+  return [this, stage](int iteration, const DesignObjective::Evaluation& e) {
+    ConvergenceRow row = new_row(stage, iteration);
+    row.energy = e.energy;
+    row.mae = e.mae;
+    state_.convergence.push_back(row);
+    char detail[64];
+    std::snprintf(detail, sizeof(detail), "MAE %.4f", e.mae);
+    report(detail, iteration);
+    return !task_.control.stop_requested();
+  };
+}
+
+void DesignLog::report(const std::string& detail, int iteration) const {
+  const std::string stage = "design, level " + std::to_string(state_.level + 1) + " of " +
+                            std::to_string(task_.levels.size());
+  const auto level = static_cast<std::size_t>(state_.level);
+  const Level& at = task_.levels[level];
+  const double rounds = state_.round + static_cast<double>(iteration) / at.iterations;
+  const double done = work_before(task_, level) + level_work(task_, level) * rounds / at.rounds;
+  task_.control.report({stage, done, work_total(task_), detail});
+}
+
+void DesignLog::ended_early(const std::string& step, const std::string& why) {
+  remark_ =
+      "; " + step + " of round " + std::to_string(state_.round + 1) + " ended early (" + why + ")";
+}
+
+void DesignLog::report_rendering() const {
+  task_.control.report({"design", work_total(task_), work_total(task_), "rendering the lens"});
+}
+
+void DesignLog::report_done() const {
+  task_.control.report({"design", work_total(task_), work_total(task_), "done"});
+}
+
+std::string convergence_csv(const std::vector<ConvergenceRow>& rows) {
+  std::ostringstream out;
+  out.precision(9);
+  out << "stage,level,round,iteration,image,unlit,gradient,boundary,barrier,face,edge,laplacian,"
+         "align,"
+         "flux,total,mass_error,mae,seconds\n";
+  for (const ConvergenceRow& r : rows) {
+    const EnergyValues& e = r.energy;
+    out << r.stage << ',' << r.level << ',' << r.round << ',' << r.iteration;
+    for (const double value :
+         {e.image, e.unlit, e.gradient, e.boundary, e.barrier, e.face, e.edge, e.laplacian, e.align,
+          e.flux, e.total, r.mass_error, r.mae, r.seconds}) {
+      out << ',' << value;
+    }
+    out << '\n';
+  }
+  return out.str();
 }
 
 }  // namespace lensforge

@@ -8,31 +8,28 @@
 #include <numbers>
 #include <variant>
 
-#include "core/compute/split_mix.h"
+#include "core/compute/scalar.h"
 #include "core/optics/light_path.h"
-#include "core/value_slope.h"
 #include "design/energy/spline_objective.h"
-#include "design/mpi/rank_stage.h"
-#include "design/optics/image_triangle.h"
-#include "design/optimize/levelling.h"
+#include "design/flux/flux_triangle.h"
+#include "design/optimize/grid_preconditioner.h"
 #include "design/schedule/guided_stage_on.h"
 
 namespace lensforge {
-
 namespace {
 
 /// Image motion, in pixels, of the finite difference that measures curvature.
 constexpr double kProbePixels = 0.02;
 
-/// Times that it is halved where a barrier is in the way.
+/// Maximum number of halvings of it if a barrier refuses the step.
 constexpr int kMaxHalvings = 20;
 
-/// Share of the grid Laplacian's lowest eigenvalue that bounds the height preconditioner: below
-/// it the lens as a whole tilts and bends.
+/// Lower bound of the height preconditioner, as a share of the grid Laplacian's lowest eigenvalue:
+/// below it the lens tilts and bends as a whole.
 constexpr double kHeightFloor = 0.5;
 
-/// Brightness is a second derivative of height, its squared error a biharmonic form; where light
-/// lands is a first derivative, its squared error the Laplacian's form.
+/// Brightness is a second derivative of height, so its squared error is a biharmonic form. The
+/// landing point is a first derivative, so its squared error is the Laplacian's form.
 constexpr double kPictureHeightPower = 2.0;
 constexpr double kCorrespondenceHeightPower = 1.0;
 
@@ -40,17 +37,17 @@ constexpr double kCorrespondenceHeightPower = 1.0;
 constexpr double kShiftFloor = 0.25;
 constexpr double kShiftPower = 1.0;
 
-/// Powers of the cells' size. Measured on a mesh that follows the picture (128² portrait, objective
-/// after 120 iterations, z and x, y): 15300 with 0 and 1, 14400 with 1 and 1, 14050 with 0 and 3/2,
-/// 12600 with 1/2 and 3/2, 12900 with 1/2 and 2; 20600 with x, y unscaled.
+/// Powers of the cells' size for a mesh that follows the picture. Objective of a 128² portrait
+/// after 120 iterations, z and x, y: 15300 with 0 and 1, 12600 with 1/2 and 3/2; 20600 with x, y
+/// unscaled.
 constexpr double kHeightSizePower = 0.5;
 constexpr double kShiftSizePower = 1.5;
 
-/// Probes of the curvature that is levelled; more bring nothing.
+/// Number of probes of the curvature that is levelled; more bring nothing.
 constexpr std::uint64_t kLevellingProbes = 4;
 
-/// Share of the mean triangle that a mesh's smallest has at least, by default_area_barrier(); the
-/// control points of a spline may overlap where the spline does not.
+/// Minimum triangle area of a mesh, as a share of the mean, by default_area_barrier(); the control
+/// points of a spline may overlap where the spline does not.
 constexpr double kSmallestCell = 1e-3;
 
 double lowest_eigenvalue(const GridShape& shape) {
@@ -84,7 +81,7 @@ std::unique_ptr<GuidedStage> make_stage(const SurfaceMesh& mesh, const OpticalSe
                                         const DesignGoal& goal, const ObjectiveOptions& options,
                                         const Executor& executor) {
   const double aspect = cell_aspect(setup, mesh.grid);
-  // A spline's stage works on the processor, whatever the device.
+  // A spline's stage works on the CPU, whatever the device.
   if (options.model == SurfaceModel::kSpline) {
     return std::make_unique<GuidedStageOn<Executor, SplineObjectiveOn<Executor>>>(
         mesh, setup, aspect, goal, options, executor);
@@ -131,7 +128,7 @@ double GuidedOptimization::value(const SurfaceMesh& mesh) {
   return e.feasible ? e.energy.total : kInfinity;
 }
 
-/// P^½ applied to random signs, in z or in x and y.
+/// Returns P^½ applied to random signs, in z or in x and y.
 Eigen::Matrix3Xd GuidedOptimization::probe(bool heights, std::uint64_t number) {
   Eigen::Matrix3Xd signs = Eigen::Matrix3Xd::Zero(3, stage_->movable().cols());
   const std::uint64_t first = number * static_cast<std::uint64_t>(signs.size());
@@ -143,8 +140,8 @@ Eigen::Matrix3Xd GuidedOptimization::probe(bool heights, std::uint64_t number) {
   return stage_->apply_root(signs);
 }
 
-/// Squares, per vertex, of P^½ H P^½ applied to random signs in z or in x and y, H by a central
-/// difference of the gradient; none if the neighbourhood is not allowed.
+/// Returns the squares, per vertex, of P^½ H P^½ applied to random signs in z or in x and y; H by a
+/// central difference of the gradient. Empty if a barrier refuses every step length.
 Eigen::VectorXd GuidedOptimization::squared_curvatures(const Eigen::Matrix3Xd& vertices,
                                                        bool heights, std::uint64_t number) {
   const Eigen::Matrix3Xd direction = probe(heights, number);
@@ -165,12 +162,10 @@ Eigen::VectorXd GuidedOptimization::squared_curvatures(const Eigen::Matrix3Xd& v
   return 0.5 * curved.topRows<2>().colwise().squaredNorm();
 }
 
-/// Lets every vertex shift as far in x and y as the preconditioned curvature around it asks for.
-/// What sizes of cells do not tell is how steeply the picture's error rises there: in the dark by
-/// far the most. MAE in thousandths after six rounds without and with it: facets, 128² portrait 3.2
-/// and 2.6, 96² logo 0.36 and 0.39, 160 × 80 calligraphy 2.7 and 3.1; smooth, 128² portrait 0.98
-/// and 0.92, 96² logo 2.6 and 2.1. The heights' curvature is even enough as it is: levelling it too
-/// gives 2.5, 0.34, 3.5, 0.93 and 1.9.
+/// Levels the preconditioned curvature in x and y: each vertex's reach follows the curvature
+/// measured around it. Cell sizes do not show how steeply the picture's error rises there; it is
+/// steepest in the dark. MAE in thousandths after six rounds without and with it: 128² portrait as
+/// facets 3.2 and 2.6, smooth 0.98 and 0.92. The heights' curvature is even enough.
 void GuidedOptimization::level_shifts(const Eigen::Matrix3Xd& vertices, Eigen::Matrix3Xd& reach) {
   Eigen::VectorXd squares = Eigen::VectorXd::Zero(vertices.cols());
   for (std::uint64_t number = 1; number <= kLevellingProbes; ++number) {
@@ -183,8 +178,8 @@ void GuidedOptimization::level_shifts(const Eigen::Matrix3Xd& vertices, Eigen::M
   stage_->set_reach(reach);
 }
 
-/// Scales both parts of the preconditioner so that the preconditioned curvature along random
-/// directions is one: then neither x, y nor z is left behind.
+/// Scales both parts of the preconditioner to a preconditioned curvature of one along random
+/// directions, so that x, y and z advance equally fast.
 void GuidedOptimization::calibrate(const Eigen::Matrix3Xd& vertices) {
   for (const bool heights : {false, true}) {
     const Eigen::VectorXd squares = squared_curvatures(vertices, heights, 0);
@@ -194,7 +189,7 @@ void GuidedOptimization::calibrate(const Eigen::Matrix3Xd& vertices) {
   stage_->set_symbols(xy_, z_);
 }
 
-/// P as for even curvature: by the grid and its cells' sizes.
+/// Sets P for even curvature, by the grid and its cells' sizes.
 void GuidedOptimization::begin_preconditioner(const SurfaceMesh& mesh, Eigen::Matrix3Xd& reach) {
   const Eigen::ArrayXd sizes = cell_sizes(mesh);
   reach.resize(3, sizes.size());

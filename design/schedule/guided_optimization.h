@@ -3,21 +3,68 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <functional>
 #include <memory>
 
 #include "core/compute/executor.h"
+#include "core/mesh/surface_mesh.h"
 #include "core/optics/optical_setup.h"
-#include "core/surface/surface_mesh.h"
 #include "design/energy/objective.h"
+#include "design/energy/objective_options.h"
+#include "design/optimize/grid_preconditioner.h"
 #include "design/optimize/lbfgs.h"
-#include "design/schedule/guided_stage.h"
 
 namespace lensforge {
 
-/// How far vertices step, measured on one surface; see GuidedOptimization::run(). Further rounds
-/// keep them: where the surface fits already there is little curvature to measure. MAE in
-/// thousandths after six rounds, measured anew for each and kept: 256 × 128 calligraphy 3.4 and
-/// 2.9, 64² city 0.45 and 0.35, 128² portrait 2.7 and 2.5; smooth, 128² portrait 0.88 and 0.82.
+/// The numerical half of a GuidedOptimization: objective, preconditioner and minimiser on one
+/// device. Vectors are transferred before and after a minimisation, not during it.
+class GuidedStage {
+ public:
+  using Observer = std::function<bool(int iteration, const ObjectiveEvaluation&)>;
+
+  GuidedStage() = default;
+  virtual ~GuidedStage() = default;
+  GuidedStage(const GuidedStage&) = delete;
+  GuidedStage& operator=(const GuidedStage&) = delete;
+
+  /// See DesignObjective.
+  [[nodiscard]] virtual const Eigen::Matrix3Xd& movable() const = 0;
+  virtual void relinearize(const Eigen::Matrix3Xd& vertices) = 0;
+  virtual ObjectiveEvaluation evaluate(const Eigen::Matrix3Xd& vertices,
+                                       Eigen::Matrix3Xd& gradient) = 0;
+
+  /// See GridPreconditioner.
+  virtual void set_symbols(const GridSymbol& xy, const GridSymbol& z) = 0;
+  virtual void set_reach(const Eigen::Matrix3Xd& reach) = 0;
+  virtual Eigen::Matrix3Xd apply_root(const Eigen::Matrix3Xd& g) = 0;
+
+  /// Moves `vertices` to the best surface found, also where an exception ends the run.
+  virtual LbfgsSummary minimize(const LbfgsOptions& options, const Observer& observe,
+                                Eigen::Matrix3Xd& vertices) = 0;
+};
+
+/// The stage on all ranks, used by rank 0 while the others run serve_rank(); parameters as in
+/// GuidedStageOn. Null if one process is enough: without other ranks, for a spline, for a grid with
+/// too few rows for the ranks, and in a build without MPI.
+/// @param executor  gives each rank's number of threads; its stop token ends all ranks' kernels.
+std::unique_ptr<GuidedStage> make_stage_on_ranks(const SurfaceMesh& mesh, const OpticalSetup& setup,
+                                                 double aspect, const DesignGoal& goal,
+                                                 const ObjectiveOptions& options,
+                                                 const Executor& executor);
+
+#if defined(LENSFORGE_CUDA)
+/// The stage on the GPU; parameters as in GuidedStageOn. @throw RunError if the GPU's memory is too
+/// small.
+std::unique_ptr<GuidedStage> make_cuda_stage(const SurfaceMesh& mesh, const OpticalSetup& setup,
+                                             double aspect, const DesignGoal& goal,
+                                             const ObjectiveOptions& options,
+                                             const Executor& executor);
+#endif
+
+/// Step lengths of the vertices, measured on one surface; see GuidedOptimization::run(). Further
+/// rounds keep them, because a surface that fits already has little curvature to measure. MAE in
+/// thousandths after six rounds, measured anew and kept: 256 × 128 calligraphy 3.4 and 2.9, 128²
+/// portrait 2.7 and 2.5.
 struct StepScales {
   Eigen::Matrix3Xd reach;  ///< 3 × V, factors of the preconditioner's x, y and z; empty: unknown.
   double xy = 1.0;         ///< Scales of its x, y and z parts.
@@ -31,16 +78,16 @@ struct StepScales {
 /// preconditioner whose scales are measured, not guessed. Works on the executor's device.
 class GuidedOptimization {
  public:
-  /// @param mesh  a grid mesh; it gives connectivity and which coordinates are held.
+  /// @param mesh  a grid mesh; defines connectivity and which coordinates are held.
   GuidedOptimization(const SurfaceMesh& mesh, const OpticalSetup& setup, const DesignGoal& goal,
                      const ObjectiveOptions& options, const Executor& executor);
 
-  /// Told after every iteration; false ends the run.
+  /// Called after every iteration; false ends the run.
   using Observer = GuidedStage::Observer;
 
-  /// Improves `mesh` by at most `options.max_iterations` steps. Scales that are not known are
-  /// measured on the mesh first. The outcome depends on mesh and scales alone, so that a run
-  /// resumed from them goes the same way.
+  /// Improves `mesh` by at most `options.max_iterations` steps. Unknown scales are measured on the
+  /// mesh first. The result depends on mesh and scales alone, so a resumed run takes the same
+  /// steps.
   /// @throw Interrupted if the executor is stopped; `mesh` then holds the best surface so far.
   LbfgsSummary run(const LbfgsOptions& options, const Observer& observe, StepScales& scales,
                    SurfaceMesh& mesh);
@@ -49,8 +96,8 @@ class GuidedOptimization {
     return run(options, observe, scales, mesh);
   }
 
-  /// The objective there, its Welsch weights taken from there too; infinite where it is not
-  /// allowed.
+  /// The objective of the mesh, with Welsch weights taken from it; infinite if a barrier refuses
+  /// it.
   [[nodiscard]] double value(const SurfaceMesh& mesh);
 
  private:

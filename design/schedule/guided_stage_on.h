@@ -6,13 +6,13 @@
 #include <span>
 
 #include "core/compute/executor.h"
+#include "core/compute/scalar.h"
+#include "core/mesh/surface_mesh.h"
 #include "core/optics/optical_setup.h"
-#include "core/surface/surface_mesh.h"
-#include "core/value_slope.h"
-#include "design/energy/objective_on.h"
-#include "design/optimize/grid_preconditioner_on.h"
-#include "design/optimize/lbfgs_on.h"
-#include "design/schedule/guided_stage.h"
+#include "design/energy/objective.h"
+#include "design/optimize/grid_preconditioner.h"
+#include "design/optimize/lbfgs.h"
+#include "design/schedule/guided_optimization.h"
 
 namespace lensforge {
 

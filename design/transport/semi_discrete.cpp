@@ -1,41 +1,93 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "design/transport/semi_discrete.h"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstddef>
 #include <ctime>
+#include <iterator>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "core/error.h"
-#include "design/transport/cell_stage.h"
-#include "design/transport/density_blur.h"
-#include "design/transport/potential_upsampling.h"
+#include "design/transport/power_cells.h"
 #include "design/transport/power_newton.h"
-#include "design/transport/site_levels.h"
 
 namespace lensforge {
+namespace {
+
+/// Blurs a line by one recursive pass each way (a discrete exponential). @param work  scratch.
+void blur_line(std::span<double> line, double decay, std::vector<double>& work) {
+  const std::size_t n = line.size();
+  work.resize(n);
+  // Sum of the mirrored, periodically repeated line before its start; a period is 2n.
+  double before = 0.0;
+  for (std::size_t i = 0; i < n; ++i) before = line[i] + decay * before;
+  for (std::size_t i = n; i-- > 0;) before = line[i] + decay * before;
+  double sum = before / (1.0 - std::pow(decay, 2.0 * static_cast<double>(n)));
+  for (std::size_t i = 0; i < n; ++i) {
+    sum = line[i] + decay * sum;
+    work[i] = sum;
+  }
+  // The line is mirrored at its end, so the sum from the right starts with the sum from the left.
+  for (std::size_t i = n; i-- > 0;) {
+    const double value = line[i];
+    const double right = decay * sum;
+    line[i] = (work[i] + right) * (1.0 - decay) / (1.0 + decay);
+    sum = value + right;
+  }
+}
+
+}  // namespace
+
+Image soften(const Image& picture, double length, double floor) {
+  const auto columns = static_cast<std::size_t>(picture.columns());
+  const auto rows = static_cast<std::size_t>(picture.rows());
+  std::vector<double> values(picture.values().begin(), picture.values().end());
+  if (length > 0.0) {
+    const double decay = std::exp(-1.0 / length);
+    std::vector<double> work;
+    for (std::size_t r = 0; r < rows; ++r) {
+      blur_line(std::span(values).subspan(r * columns, columns), decay, work);
+    }
+    std::vector<double> column(rows);
+    for (std::size_t c = 0; c < columns; ++c) {
+      for (std::size_t r = 0; r < rows; ++r) column[r] = values[r * columns + c];
+      blur_line(column, decay, work);
+      for (std::size_t r = 0; r < rows; ++r) values[r * columns + c] = column[r];
+    }
+  }
+  const double mean = picture.total() / static_cast<double>(values.size());
+  Image result(picture.columns(), picture.rows());
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    result.values()[i] = static_cast<float>((1.0 - floor) * values[i] + floor * mean);
+  }
+  return result;
+}
 
 namespace {
 
-/// Sites of the coarsest level, at least: there a step takes milliseconds and can start anywhere.
+/// Minimum number of sites of the coarsest level: there a step takes milliseconds and can start
+/// anywhere.
 constexpr int kCoarsest = 500;
-/// Blur of a level in mean cell widths. 0.5 to 2 took the same steps at 58,880 sites with black
-/// pixels; below, upsampling leaves thousands of cells empty.
+/// Blur of a level in mean cell widths. 0.5 to 2 took the same number of steps at 58,880 sites with
+/// black pixels; with less, upsampling leaves thousands of cells empty.
 constexpr double kBlurPerCell = 1.0;
-/// The coarsest level starts with this blur, as a share of the picture's longer side.
+/// First blur of the coarsest level, as a share of the picture's longer side.
 constexpr double kFirstBlur = 0.125;
-/// Blur falls by this factor from stage to stage, and to 0 from below kMinBlur pixels.
+/// Factor of the blur from stage to stage; below kMinBlur pixels it becomes 0.
 constexpr double kBlurFactor = 0.5;
 constexpr double kMinBlur = 0.1;
-/// Evenly spread share of the light while there is blur, so that no density vanishes; without blur
-/// it falls by kFloorFactor from stage to stage, and to 0 from below kMinFloor. At once to 0,
-/// cells that lie in black lose all of their mass, and no Newton step helps (logo, mesh spread over
-/// it).
+/// Evenly spread share of the light while there is blur, so that no density vanishes. Without blur
+/// it falls by kFloorFactor from stage to stage; below kMinFloor it becomes 0. If it fell to 0 at
+/// once, cells in black would lose all of their mass, and no Newton step would help (logo, spread
+/// mesh).
 constexpr double kFloor = 1e-4;
 constexpr double kFloorFactor = 0.1;
 constexpr double kMinFloor = 1e-9;
@@ -76,14 +128,14 @@ Density lit_part(const Image& picture) {
   return std::make_shared<SummedDensity>(lit, lit.total());
 }
 
-/// A density on the way to the picture itself.
+/// A density of the sequence that ends with the picture.
 struct Stage {
   double blur;
   double floor;
   Density density;
 };
 
-/// The hierarchy, what is known on it, and the log.
+/// Solves transport over the levels and logs its steps.
 class TransportSolver {
  public:
   TransportSolver(SiteClusters merged, const Image& picture, const TransportOptions& options,
@@ -96,7 +148,7 @@ class TransportSolver {
         result_(result),
         levels_(make_site_levels(merged_.sites, merged_.masses, kCoarsest)) {}
 
-  /// Coarse to fine. @return the balanced diagram, or the best there is.
+  /// Solves coarse to fine. @return the balanced diagram, or the best found.
   std::optional<PowerState> solve() {
     std::optional<PowerState> state;
     for (int l = static_cast<int>(levels_.size()) - 1; l >= 0; --l) {
@@ -106,13 +158,13 @@ class TransportSolver {
       } else {
         state = stretched(l);
       }
-      // What a coarser level got is nothing to the given sites.
+      // A coarser level's result is of no use for the given sites.
       if (!descend(l, *state) && l > 0) return std::nullopt;
     }
     return state;
   }
 
-  /// Weights and centroids of the given sites from those of the merged ones.
+  /// Writes weights and centroids of the given sites from those of the merged ones.
   void write(const PowerState& state, const Eigen::Matrix2Xd& sites,
              const Eigen::VectorXd& masses) {
     cells_->set_density(stage(0.0, 0.0).density);
@@ -159,14 +211,14 @@ class TransportSolver {
     return kBlurPerCell * std::sqrt(area / static_cast<double>(level(l).sites.cols()));
   }
 
-  /// Begins a level: its sites go to the device.
+  /// Starts a level: sends its sites to the device.
   PowerState measured(int l, const Eigen::VectorXd& weights, const Stage& s) {
     cells_ = make_cell_stage(level(l).sites, executor_);
     cells_->set_density(s.density);
     return power_state(level(l), weights, executor_, *cells_);
   }
 
-  /// The same diagram under another density.
+  /// Measures the same diagram under another density.
   void refill(const Stage& s, PowerState& state) {
     cells_->set_density(s.density);
     state.cells = cells_->measure(state.edges);
@@ -177,7 +229,7 @@ class TransportSolver {
     return std::nullopt;
   }
 
-  /// Newton steps under one density, logged.
+  /// Runs and logs Newton steps under one density.
   bool run_stage(int l, const Stage& s, double goal, PowerState& state) {
     int number = 0;
     double wall = wall_seconds();
@@ -207,7 +259,7 @@ class TransportSolver {
     return done;
   }
 
-  /// Lowers the blur from the level above to this level's own, on the finest to nothing.
+  /// Lowers the blur from the coarser level's to this level's own; on the finest to 0.
   bool descend(int l, PowerState& state) {
     const bool finest = l == 0;
     const double last = level_blur(l);
@@ -241,7 +293,7 @@ class TransportSolver {
     return state;
   }
 
-  /// A level's start from the solved one above, under that one's blur.
+  /// A level's start from the solved coarser level, under that level's blur.
   std::optional<PowerState> upsampled(int l, const PowerState& coarse) {
     const Stage s = stage(level_blur(l + 1), kFloor);
     cells_->set_density(s.density);
@@ -252,7 +304,7 @@ class TransportSolver {
     return state;
   }
 
-  /// Sites without mass: ψ and centroid as interpolated between the visible sites around.
+  /// Sites without mass get ψ and centroid interpolated between the visible sites around.
   void write_massless(const PowerState& state, const Eigen::Matrix2Xd& sites,
                       const Eigen::Matrix2Xd& centroids, double mean,
                       const std::vector<int>& massless) {
@@ -289,7 +341,7 @@ class TransportSolver {
   const RunControl& control_;
   TransportResult& result_;
   std::vector<SiteLevel> levels_;
-  std::unique_ptr<CellStage> cells_;  ///< Of the level that is worked on.
+  std::unique_ptr<CellStage> cells_;  ///< Stage of the current level.
 };
 
 }  // namespace
@@ -313,6 +365,140 @@ TransportResult solve_semi_discrete(const Eigen::Matrix2Xd& sites, const Eigen::
     result.message = "stopped on request";
   }
   return result;
+}
+
+namespace {
+
+/// Number of buckets searched to each side of a point's own.
+constexpr int kReach = 2;
+
+/// Distance between the points at which a segment is checked for black, pixels.
+constexpr double kLook = 0.5;
+
+/// Added to the moments of the neighbours' positions, as a share of their trace, so that collinear
+/// neighbours do not give an unbounded slope across their line.
+constexpr double kRidge = 1e-3;
+
+}  // namespace
+
+BrenierMap::BrenierMap(const Eigen::Matrix2Xd& sites, const TransportResult& result,
+                       const Image& density)
+    : sites_(sites),
+      centroids_(result.centroids),
+      density_(density),
+      black_(kBlack * density.total() / static_cast<double>(density.values().size())),
+      psi_(potential_of_weights(sites, result.weights)) {
+  for (Eigen::Index i = 0; i < sites.cols(); ++i) lit_.push_back(is_lit(centroids_.col(i)) ? 1 : 0);
+  low_ = sites.rowwise().minCoeff();
+  const Eigen::Vector2d size = sites.rowwise().maxCoeff() - low_;
+  spacing_ = std::sqrt(std::max(size.prod(), 1e-12) / static_cast<double>(sites.cols()));
+  buckets_ = (size / spacing_).cast<int>() + Eigen::Vector2i::Ones();
+  const auto number = [&](Eigen::Index i) {
+    return bucket(bucket_of(sites(0, i), 0), bucket_of(sites(1, i), 1));
+  };
+  begin_.assign(static_cast<std::size_t>(buckets_.prod()) + 1, 0);
+  for (Eigen::Index i = 0; i < sites.cols(); ++i) ++begin_[number(i) + 1];
+  for (std::size_t b = 1; b < begin_.size(); ++b) begin_[b] += begin_[b - 1];
+  std::vector<int> next(begin_.begin(), begin_.end() - 1);
+  members_.resize(static_cast<std::size_t>(sites.cols()));
+  for (Eigen::Index i = 0; i < sites.cols(); ++i) {
+    members_[static_cast<std::size_t>(next[number(i)]++)] = static_cast<int>(i);
+  }
+}
+
+int BrenierMap::bucket_of(double coordinate, Eigen::Index axis) const {
+  const int bucket = static_cast<int>(std::floor((coordinate - low_[axis]) / spacing_));
+  return std::clamp(bucket, 0, buckets_[axis] - 1);
+}
+
+std::size_t BrenierMap::bucket(int column, int row) const {
+  return static_cast<std::size_t>(row) * static_cast<std::size_t>(buckets_.x()) +
+         static_cast<std::size_t>(column);
+}
+
+std::vector<int> BrenierMap::around(const Eigen::Vector2d& p) const {
+  const int column = bucket_of(p.x(), 0);
+  const int row = bucket_of(p.y(), 1);
+  const int left = std::max(0, column - kReach);
+  const int right = std::min(buckets_.x() - 1, column + kReach);
+  std::vector<int> found;
+  for (int r = std::max(0, row - kReach); r <= std::min(buckets_.y() - 1, row + kReach); ++r) {
+    const int first = begin_[bucket(left, r)];
+    const int last = begin_[bucket(right, r) + 1];
+    std::copy_if(members_.begin() + first, members_.begin() + last, std::back_inserter(found),
+                 [&](int site) { return lit_[static_cast<std::size_t>(site)] != 0; });
+  }
+  return found;
+}
+
+int BrenierMap::highest(const std::vector<int>& sites, const Eigen::Vector2d& p) const {
+  int best = -1;
+  for (const int site : sites) {
+    if (best < 0 || plane_at(site, p) > plane_at(best, p)) best = site;
+  }
+  return best;
+}
+
+double BrenierMap::plane_at(int site, const Eigen::Vector2d& p) const {
+  return psi_[site] + centroids_.col(site).dot(p - sites_.col(site));
+}
+
+bool BrenierMap::is_lit(const Eigen::Vector2d& at) const {
+  const int column = std::clamp(static_cast<int>(at.x()), 0, density_.columns() - 1);
+  const int row = std::clamp(static_cast<int>(at.y()), 0, density_.rows() - 1);
+  return static_cast<double>(density_.at(column, row)) > black_;
+}
+
+bool BrenierMap::is_lit_between(const Eigen::Vector2d& a, const Eigen::Vector2d& b) const {
+  const int steps = static_cast<int>((b - a).norm() / kLook);
+  for (int k = 1; k <= steps; ++k) {
+    if (!is_lit(a + (b - a) * (static_cast<double>(k) / (steps + 1)))) return false;
+  }
+  return true;
+}
+
+Eigen::Matrix2d BrenierMap::slope_at(int site, const std::vector<int>& others) const {
+  Eigen::Matrix2d moments = Eigen::Matrix2d::Zero();
+  Eigen::Matrix2d products = Eigen::Matrix2d::Zero();
+  for (const int other : others) {
+    if (other == site) continue;
+    const Eigen::Vector2d d = sites_.col(other) - sites_.col(site);
+    if (!is_lit_between(centroids_.col(site), centroids_.col(other))) continue;
+    const double weight = 1.0 / (d.squaredNorm() + spacing_ * spacing_);
+    moments += weight * d * d.transpose();
+    products += weight * (centroids_.col(other) - centroids_.col(site)) * d.transpose();
+  }
+  if (!(moments.trace() > 0.0)) return Eigen::Matrix2d::Zero();
+  moments.diagonal().array() += kRidge * moments.trace();
+  return products * moments.inverse();
+}
+
+Eigen::Vector2d BrenierMap::operator()(const Eigen::Vector2d& p) const {
+  const std::vector<int> sites = around(p);
+  const int best = highest(sites, p);
+  if (best < 0) {
+    Eigen::Index nearest = 0;
+    (sites_.colwise() - p).colwise().squaredNorm().minCoeff(&nearest);
+    return centroids_.col(nearest);
+  }
+  const Eigen::Vector2d landing =
+      (centroids_.col(best) + slope_at(best, sites) * (p - sites_.col(best)))
+          .cwiseMax(0.0)
+          .cwiseMin(Eigen::Vector2d(density_.columns(), density_.rows()));
+  return is_lit(landing) ? landing : Eigen::Vector2d(centroids_.col(best));
+}
+
+std::optional<Eigen::Vector2d> BrenierMap::way_to_crease(const Eigen::Vector2d& p) const {
+  std::vector<int> sites = around(p);
+  const int here = highest(sites, p);
+  if (here < 0) return std::nullopt;
+  const Eigen::Vector2d landing = centroids_.col(here);
+  std::erase_if(sites, [&](int s) { return is_lit_between(landing, centroids_.col(s)); });
+  const int there = highest(sites, p);
+  if (there < 0) return std::nullopt;
+  // The two planes intersect there.
+  const Eigen::Vector2d jump = centroids_.col(there) - landing;
+  return (plane_at(here, p) - plane_at(there, p)) / jump.squaredNorm() * jump;
 }
 
 }  // namespace lensforge

@@ -8,9 +8,9 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/mesh/mesh_topology.h"
+#include "core/mesh/surface_mesh.h"
 #include "core/optics/outline.h"
-#include "core/surface/corners.h"
-#include "core/surface/mesh_topology.h"
 
 namespace lensforge {
 namespace {

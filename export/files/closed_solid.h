@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "core/optics/front_surface.h"
-#include "core/surface/surface_mesh.h"
+#include "core/mesh/surface_mesh.h"
+#include "core/optics/front.h"
 
 namespace lensforge {
 

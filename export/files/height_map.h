@@ -4,9 +4,8 @@
 #include <filesystem>
 
 #include "core/compute/executor.h"
-#include "core/compute/run_control.h"
 #include "core/image/image.h"
-#include "core/surface/optical_surface.h"
+#include "core/lens/optical_surface.h"
 
 namespace lensforge {
 

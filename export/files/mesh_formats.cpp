@@ -24,8 +24,8 @@
 
 #include "core/error.h"
 #include "core/io/files.h"
+#include "core/mesh/surface_mesh.h"
 #include "core/schema/json.h"
-#include "core/surface/mesh_normals.h"
 #include "core/text/printable.h"
 #include "core/text/version.h"
 

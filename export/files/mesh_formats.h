@@ -7,11 +7,11 @@
 #include <filesystem>
 #include <string>
 
-#include "core/surface/surface_mesh.h"
+#include "core/mesh/surface_mesh.h"
 
 /// Meshes in the formats that printers, CAM programs and viewers read; millimetres. Each file
 /// appears whole or not at all and contains its title as plain text. PLY and STL are in
-/// core/surface/mesh_io.h.
+/// core/mesh/mesh_files.h.
 namespace lensforge {
 
 /// Wavefront OBJ; coordinates read back as the same doubles. `title` becomes a comment.

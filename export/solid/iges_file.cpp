@@ -224,10 +224,6 @@ std::int64_t check_iges(std::string_view content, const std::string& name) {
 
 namespace {
 
-Handle(TCollection_HAsciiString) text(const std::string& value) {
-  return new TCollection_HAsciiString(value.c_str());
-}
-
 /// ISO 8601 as IGES has it: YYYYMMDD.HHNNSS.
 std::string iges_date(const std::string& time_stamp) {
   std::string date;
@@ -240,13 +236,13 @@ std::string iges_date(const std::string& time_stamp) {
 
 void fill_header(const StepHeader& header, const fs::path& path, IGESControl_Writer& writer) {
   IGESData_GlobalSection section = writer.Model()->GlobalSection();
-  section.SetSendName(text(header.name));
-  section.SetFileName(text(path.filename().string()));
-  section.SetSystemId(text(header.program));
-  section.SetInterfaceVersion(text(header.program));
-  section.SetAuthorName(text(header.author));
-  section.SetDate(text(iges_date(header.time_stamp)));
-  section.SetLastChangeDate(text(iges_date(header.time_stamp)));
+  section.SetSendName(occ_text(header.name));
+  section.SetFileName(occ_text(path.filename().string()));
+  section.SetSystemId(occ_text(header.program));
+  section.SetInterfaceVersion(occ_text(header.program));
+  section.SetAuthorName(occ_text(header.author));
+  section.SetDate(occ_text(iges_date(header.time_stamp)));
+  section.SetLastChangeDate(occ_text(iges_date(header.time_stamp)));
   writer.Model()->SetGlobalSection(section);
   // The start section keeps it in one piece; lines of the global section break anywhere.
   writer.Model()->AddStartLine(header.program.c_str());

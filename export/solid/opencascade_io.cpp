@@ -27,8 +27,8 @@
 
 #include "core/compute/work_estimate.h"
 #include "core/error.h"
+#include "core/io/descriptor.h"
 #include "core/io/files.h"
-#include "core/sandbox/byte_record.h"
 #include "core/sandbox/child_work.h"
 
 namespace lensforge {
@@ -168,6 +168,10 @@ void measure_extent(const TopoDS_Shape& shape, SolidContent& content) {
 
 }  // namespace
 
+Handle(TCollection_HAsciiString) occ_text(const std::string& value) {
+  return new TCollection_HAsciiString(value.c_str());
+}
+
 void silence_opencascade() {
   Message::DefaultMessenger()->RemovePrinters(STANDARD_TYPE(Message_PrinterOStream));
 }
@@ -227,8 +231,6 @@ void fail_to_write(const std::filesystem::path& path, const std::string& why) {
   throw RunError(path.string() + ": cannot be written: " + why);
 }
 
-std::string last_system_error() {
-  return errno != 0 ? std::generic_category().message(errno) : "unknown reason";
-}
+std::string last_system_error() { return errno != 0 ? system_reason(errno) : "unknown reason"; }
 
 }  // namespace lensforge

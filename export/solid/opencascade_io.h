@@ -2,6 +2,7 @@
 #pragma once
 
 #include <STEPControl_Reader.hxx>
+#include <TCollection_HAsciiString.hxx>
 #include <TopoDS_Shape.hxx>
 #include <cstdint>
 #include <filesystem>
@@ -9,7 +10,7 @@
 #include <optional>
 #include <string>
 
-#include "core/compute/run_control.h"
+#include "core/compute/executor.h"
 #include "export/solid/step_file.h"
 
 /// Reading and writing of solids in any format. OpenCASCADE crashes on some broken files and never
@@ -38,6 +39,9 @@ void load_step(STEPControl_Reader& reader, const std::filesystem::path& path,
 /// @throw InputError if the file cannot be read or holds no shape.
 TopoDS_Shape read_step_shape(const std::filesystem::path& path, const RunControl& control);
 TopoDS_Shape read_iges_shape(const std::filesystem::path& path, const RunControl& control);
+
+/// A text as OpenCASCADE takes it.
+Handle(TCollection_HAsciiString) occ_text(const std::string& value);
 
 /// Silences OpenCASCADE's messages: it prints them to stdout, which is the command's.
 void silence_opencascade();

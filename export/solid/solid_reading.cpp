@@ -42,9 +42,8 @@
 
 #include "core/error.h"
 #include "core/io/files.h"
-#include "core/sandbox/byte_record.h"
 #include "core/sandbox/child_work.h"
-#include "core/surface/control_net.h"
+#include "core/spline/control_net.h"
 #include "export/solid/opencascade_io.h"
 #include "export/solid/step_file.h"
 

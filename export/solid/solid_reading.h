@@ -4,9 +4,7 @@
 #include <filesystem>
 
 #include "core/compute/executor.h"
-#include "core/compute/run_control.h"
-#include "core/surface/sampled_surface.h"
-#include "core/surface/surface_mesh.h"
+#include "core/mesh/surface_mesh.h"
 
 namespace lensforge {
 

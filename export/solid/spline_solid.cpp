@@ -44,7 +44,7 @@
 #include <vector>
 
 #include "core/error.h"
-#include "core/optics/front_surface.h"
+#include "core/optics/front.h"
 #include "export/spline/net_outline.h"
 
 namespace lensforge {
@@ -434,7 +434,7 @@ struct RimCurve {
 constexpr double kRimTolerance = 2e-5;
 
 /// Of one wall: with 16 a knot cell it needs no more on any lens measured.
-constexpr int kMostPieces = 16384;
+constexpr int kMaxPieces = 16384;
 
 /// Points nearer than this are one to OpenCASCADE's interpolation, mm or parameters.
 constexpr double kSamePoint = 1e-12;
@@ -489,7 +489,7 @@ double distance(const RimCurve& curve, const std::vector<RimPoint>& points, doub
 }
 
 /// Cubic splines through points of an edge, at first over `pieces` equal parts, until they are as
-/// near as kRimTolerance asks for, or kMostPieces. @param last  parameter of the end, 0 the
+/// near as kRimTolerance asks for, or kMaxPieces. @param last  parameter of the end, 0 the
 /// start's.
 RimCurve rim_curve(const std::function<RimPoint(double)>& at, double last, int pieces) {
   constexpr double kNear = 0.25 * kRimTolerance;
@@ -497,7 +497,7 @@ RimCurve rim_curve(const std::function<RimPoint(double)>& at, double last, int p
     std::vector<RimPoint> points;
     for (int k = 0; k <= 2 * pieces; ++k) points.push_back(at(last * k / (2 * pieces)));
     RimCurve curve = curve_through(points, last);
-    if (2 * pieces > kMostPieces || distance(curve, points, last) <= kNear) return curve;
+    if (2 * pieces > kMaxPieces || distance(curve, points, last) <= kNear) return curve;
     pieces *= 2;
   }
 }

@@ -210,10 +210,6 @@ std::int64_t check_part21(std::string_view content, const std::string& name) {
 
 namespace {
 
-Handle(TCollection_HAsciiString) text(const std::string& value) {
-  return new TCollection_HAsciiString(value.c_str());
-}
-
 /// OpenCASCADE keeps what a file is to look like in process-wide settings.
 void set_up_writing(const StepHeader& header, StepSchema schema, bool outlined) {
   STEPControl_Controller::Init();
@@ -230,18 +226,18 @@ void name_faces(const NamedSolid& solid, STEPControl_Writer& writer) {
   const Handle(Transfer_FinderProcess) finder = writer.WS()->TransferWriter()->FinderProcess();
   for (const auto& [face, name] : solid.names) {
     const Handle(StepRepr_RepresentationItem) item = STEPConstruct::FindEntity(finder, face);
-    if (!item.IsNull()) item->SetName(text(name));
+    if (!item.IsNull()) item->SetName(occ_text(name));
   }
 }
 
 void fill_header(const StepHeader& header, STEPControl_Writer& writer) {
   APIHeaderSection_MakeHeader section(writer.Model());
-  section.SetName(text(header.name));
-  section.SetDescriptionValue(1, text(header.description));
-  section.SetAuthorValue(1, text(header.author));
-  section.SetOriginatingSystem(text(header.program));
-  section.SetPreprocessorVersion(text(header.program));
-  section.SetTimeStamp(text(header.time_stamp));
+  section.SetName(occ_text(header.name));
+  section.SetDescriptionValue(1, occ_text(header.description));
+  section.SetAuthorValue(1, occ_text(header.author));
+  section.SetOriginatingSystem(occ_text(header.program));
+  section.SetPreprocessorVersion(occ_text(header.program));
+  section.SetTimeStamp(occ_text(header.time_stamp));
 }
 
 /// Body of the child process.

@@ -7,7 +7,7 @@
 #include <string>
 #include <string_view>
 
-#include "core/compute/run_control.h"
+#include "core/compute/executor.h"
 #include "export/spline/spline_net.h"
 
 namespace lensforge {

@@ -8,8 +8,8 @@
 #include <numbers>
 #include <vector>
 
-#include "core/surface/corners.h"
-#include "core/surface/outline_index.h"
+#include "core/mesh/surface_mesh.h"
+#include "core/optics/outline.h"
 
 namespace lensforge {
 namespace {

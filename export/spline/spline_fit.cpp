@@ -8,8 +8,7 @@
 #include <cstddef>
 
 #include "core/error.h"
-#include "core/surface/grid_warp.h"
-#include "core/surface/slope_fit.h"
+#include "core/lens/slope_fit.h"
 
 // One spline over the whole rectangle is fitted (SlopeFit, LightFit) and then cut into patches,
 // which keeps them joined with equal curvature.

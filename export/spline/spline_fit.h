@@ -6,9 +6,8 @@
 #include <functional>
 
 #include "core/compute/executor.h"
-#include "core/compute/run_control.h"
-#include "core/surface/sampled_surface.h"
-#include "core/surface/smooth_surface.h"
+#include "core/lens/smooth_surface.h"
+#include "core/mesh/surface_mesh.h"
 #include "export/spline/spline_net.h"
 
 namespace lensforge {

@@ -10,11 +10,11 @@
 #include <vector>
 
 #include "core/compute/executor.h"
-#include "core/optics/front_surface.h"
+#include "core/lens/smooth_surface.h"
+#include "core/mesh/surface_mesh.h"
+#include "core/optics/front.h"
 #include "core/optics/outline.h"
-#include "core/surface/control_net.h"
-#include "core/surface/sampled_surface.h"
-#include "core/surface/smooth_surface.h"
+#include "core/spline/control_net.h"
 
 namespace lensforge {
 

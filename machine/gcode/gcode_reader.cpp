@@ -7,8 +7,8 @@
 #include <cmath>
 #include <cstdio>
 #include <ios>
-#include <system_error>
 
+#include "core/text/lower_case.h"
 #include "core/text/number_text.h"
 
 namespace lensforge {
@@ -130,7 +130,6 @@ constexpr std::size_t kMaxDigits = 16;
 
 bool is_blank(char c) { return c == ' ' || c == '\t'; }
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
-char upper(char c) { return c >= 'a' && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c; }
 bool is_letter(char c) { return upper(c) >= 'A' && upper(c) <= 'Z'; }
 
 /// Walks along one line.

@@ -8,7 +8,8 @@
 
 #include "core/error.h"
 #include "core/io/files.h"
-#include "core/io/sha256.h"
+#include "core/io/files.h"
+#include "core/text/lower_case.h"
 
 namespace lensforge {
 namespace {
@@ -82,8 +83,6 @@ constexpr std::array<std::string_view, 2> kMarks = {
 constexpr std::string_view kProgram = "lensforge ";
 constexpr std::size_t kLongestLine = 1024;  ///< The rest of a longer line is ignored.
 constexpr std::size_t kPiece = 1 << 16;
-
-char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
 
 std::string lower_case(std::string_view line) {
   std::string text(line);

@@ -8,7 +8,7 @@
 #include <string>
 #include <string_view>
 
-#include "core/compute/run_control.h"
+#include "core/compute/executor.h"
 
 namespace lensforge {
 

@@ -14,6 +14,7 @@
 #include "core/schema/toml.h"
 #include "core/text/lower_case.h"
 #include "core/text/number_text.h"
+#include "core/text/words.h"
 
 namespace lensforge {
 namespace {
@@ -76,12 +77,6 @@ fs::path map_folder() {
   return LENSFORGE_MAPS_SOURCE;
 }
 
-std::string joined(const std::vector<std::string>& names) {
-  std::string list;
-  for (const std::string& name : names) list += (list.empty() ? "" : ", ") + name;
-  return list;
-}
-
 }  // namespace
 
 std::string huanyang_refusal() {
@@ -110,7 +105,7 @@ fs::path find_register_map(const std::string& name) {
   const std::vector<std::string> names = shipped_register_maps();
   if (std::find(names.begin(), names.end(), lower) == names.end()) {
     throw InputError("register map '" + name + "': unknown register map; shipped ones are " +
-                     joined(names) + ", or give a path to a .toml file");
+                     joined(names, ", ") + ", or give a path to a .toml file");
   }
   return map_folder() / (lower + ".toml");
 }

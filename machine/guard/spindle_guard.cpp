@@ -8,6 +8,7 @@
 
 #include "core/error.h"
 #include "core/text/number_text.h"
+#include "core/text/words.h"
 #include "machine/guard/guard.h"
 
 namespace lensforge {
@@ -277,7 +278,7 @@ SpindleMap only_spindle(const std::vector<RegisterMap>& maps, SpindleOwner owner
   const SpindleMap* found = nullptr;
   std::string names;
   for (const RegisterMap& map : maps) {
-    names += (names.empty() ? "" : ", ") + map.name;
+    names = with_word(names, map.name);
     if (!map.spindle) continue;
     if (found != nullptr)
       throw InputError("register maps " + names + ": only one may have a spindle");
@@ -470,7 +471,7 @@ std::string SpindleGuard::interlock_trouble() const {
   std::string all;
   for (std::size_t i = 0; i < interlocks_.size(); ++i) {
     const std::string trouble = interlock_trouble(interlocks_[i], interlock_names_[i]);
-    if (!trouble.empty()) all += (all.empty() ? "" : "; ") + trouble;
+    if (!trouble.empty()) all = with_word(all, trouble, "; ");
   }
   return all;
 }
@@ -502,7 +503,7 @@ GuardReport SpindleGuard::poll() {
   GuardReport report{watch_.state(), watch_.rpm(), interlocks.empty(), watch_.reason()};
   if (!report.reason.empty()) report.reason = devices_[spindle_device_].name + ": " + report.reason;
   record_changes(report, interlocks);
-  if (!interlocks.empty()) report.reason += (report.reason.empty() ? "" : "; ") + interlocks;
+  if (!interlocks.empty()) report.reason = with_word(report.reason, interlocks, "; ");
   return report;
 }
 

@@ -30,6 +30,7 @@
 #include <thread>
 
 #include "core/error.h"
+#include "core/io/descriptor.h"
 
 namespace lensforge {
 namespace {
@@ -122,8 +123,6 @@ constexpr int kOpenFlags = O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC;
   throw InputError("--port " + port_name(spec) + ": " + why);
 }
 
-std::string reason(int error) { return std::generic_category().message(error); }
-
 /// In sticky folders such as /run/lock Linux refuses O_CREAT on another user's existing file, even
 /// for root; hence the first attempt is without it.
 Descriptor open_to_lock(const fs::path& file, bool may_create) {
@@ -159,10 +158,10 @@ PortLock::PortLock(const PortSpec& spec) {
   if (spec.kind == PortSpec::Kind::kSerial) require_device(spec);
   file_ = open_to_lock(lock_file(spec), spec.kind == PortSpec::Kind::kTcp);
   if (!file_.open() && errno == EBUSY) refuse(spec, "another program has it open");
-  if (!file_.open()) refuse(spec, "cannot be opened: " + reason(errno));
+  if (!file_.open()) refuse(spec, "cannot be opened: " + system_reason(errno));
   if (::flock(file_.number(), LOCK_EX | LOCK_NB) == 0) return;
   if (errno == EWOULDBLOCK) refuse(spec, "another sender is using it");
-  refuse(spec, "cannot be locked: " + reason(errno));
+  refuse(spec, "cannot be locked: " + system_reason(errno));
 }
 
 short wait_for(int descriptor, short events, double seconds) {
@@ -261,14 +260,14 @@ std::string SerialLink::read(double wait) {
   if (count > 0) return {bytes.data(), static_cast<std::size_t>(count)};
   if (count < 0 && (errno == EAGAIN || errno == EINTR)) return {};
   // A port that is ready but has nothing to give was unplugged or hung up.
-  lose(count == 0 ? "hung up" : reason(errno));
+  lose(count == 0 ? "hung up" : system_reason(errno));
 }
 
 std::size_t SerialLink::write(std::string_view bytes) {
   const ssize_t count = ::write(lock_.descriptor(), bytes.data(), bytes.size());
   if (count >= 0) return static_cast<std::size_t>(count);
   if (errno == EAGAIN || errno == EINTR) return 0;
-  lose(reason(errno));
+  lose(system_reason(errno));
 }
 
 namespace {
@@ -376,7 +375,7 @@ Descriptor connect_to_any(const PortSpec& spec, const std::stop_token& stop, dou
     set_options(socket.number());
     return socket;
   }
-  throw InputError("--port " + port_name(spec) + ": cannot be reached: " + reason(error));
+  throw InputError("--port " + port_name(spec) + ": cannot be reached: " + system_reason(error));
 }
 
 }  // namespace
@@ -393,14 +392,14 @@ std::string TcpLink::read(double wait) {
   if (count > 0) return {bytes.data(), static_cast<std::size_t>(count)};
   if (count == 0) lose("closed by the other side");
   if (errno == EAGAIN || errno == EINTR) return {};
-  lose(reason(errno));
+  lose(system_reason(errno));
 }
 
 std::size_t TcpLink::write(std::string_view bytes) {
   const ssize_t count = ::send(socket_.number(), bytes.data(), bytes.size(), MSG_NOSIGNAL);
   if (count >= 0) return static_cast<std::size_t>(count);
   if (errno == EAGAIN || errno == EINTR) return 0;
-  lose(reason(errno));
+  lose(system_reason(errno));
 }
 
 }  // namespace lensforge

@@ -8,7 +8,7 @@
 #include <string>
 #include <string_view>
 
-#include "core/io/descriptor.h"
+#include "core/io/files.h"
 #include "machine/link/link.h"
 
 struct sp_port;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/text/lower_case.h"
 #include "machine/sim/sim_settings.h"
 
 namespace lensforge {
@@ -11,8 +12,6 @@ namespace {
 
 /// Used-up bytes that are kept at most before the rest is moved to the front.
 constexpr std::size_t kUsedUp = 4096;
-
-char upper(char c) { return c >= 'a' && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c; }
 
 SimIntake with_character(SimIntake intake, char c, std::size_t longest) {
   if (intake.comment != 0) {

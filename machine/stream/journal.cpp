@@ -17,6 +17,7 @@
 #include <system_error>
 
 #include "core/error.h"
+#include "core/io/descriptor.h"
 #include "core/io/files.h"
 #include "core/text/printable.h"
 
@@ -161,8 +162,7 @@ Journal::~Journal() {
 }
 
 void Journal::fail(int error) const {
-  throw JournalFailed(path_.string() +
-                      ": the journal cannot be kept: " + std::generic_category().message(error));
+  throw JournalFailed(path_.string() + ": the journal cannot be kept: " + system_reason(error));
 }
 
 void Journal::origins(const WorkOrigins& origins) {
@@ -211,17 +211,11 @@ void Journal::end(std::string_view status, std::string_view reason, const JobPro
 
 void Journal::append(const nlohmann::json& record) {
   const std::string text = journal_text::line_of(record);
-  std::string_view left = text;
-  while (!left.empty()) {
-    const ssize_t count = ::write(file_.number(), left.data(), left.size());
-    if (count < 0 && errno == EINTR) continue;
-    if (count < 0) {
-      const int error = errno;
-      // Otherwise complete records would later follow a truncated one.
-      if (::ftruncate(file_.number(), size_) == 0) ::lseek(file_.number(), size_, SEEK_SET);
-      fail(error);
-    }
-    left.remove_prefix(static_cast<std::size_t>(count));
+  if (!write_all(file_.number(), text)) {
+    const int error = errno;
+    // Otherwise complete records would later follow a truncated one.
+    if (::ftruncate(file_.number(), size_) == 0) ::lseek(file_.number(), size_, SEEK_SET);
+    fail(error);
   }
   size_ += static_cast<std::int64_t>(text.size());
 }

@@ -15,7 +15,7 @@
 #include <thread>
 
 #include "core/error.h"
-#include "core/io/descriptor.h"
+#include "core/io/files.h"
 #include "machine/stream/program_file.h"
 
 /// Format of a journal record: eight hexadecimal digits of its CRC-32, a blank, one JSON object, a

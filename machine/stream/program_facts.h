@@ -8,7 +8,7 @@
 #include <optional>
 #include <string>
 
-#include "core/compute/run_control.h"
+#include "core/compute/executor.h"
 #include "machine/gcode/gcode_dialect.h"
 #include "machine/gcode/gcode_motion.h"
 #include "machine/planner/planner_model.h"

@@ -8,13 +8,10 @@
 #include <algorithm>
 #include <cerrno>
 #include <streambuf>
-#include <system_error>
 #include <vector>
 
 #include "core/error.h"
-#include "core/io/descriptor.h"
 #include "core/io/files.h"
-#include "core/io/sha256.h"
 
 namespace lensforge {
 namespace {
@@ -37,7 +34,7 @@ std::size_t read_at(int file, std::vector<char>& bytes, std::int64_t offset,
                                 offset + static_cast<std::int64_t>(count));
     if (got < 0 && errno == EINTR) continue;
     if (got < 0) {
-      throw RunError(path.string() + ": cannot be read: " + std::generic_category().message(errno));
+      throw RunError(path.string() + ": cannot be read: " + system_reason(errno));
     }
     if (got == 0) break;
     count += static_cast<std::size_t>(got);
@@ -130,7 +127,7 @@ Descriptor open_program(const std::filesystem::path& path) {
   struct stat about {};
   // Catches a file that took the name in between, such as a named pipe.
   if (file.open() && ::fstat(file.number(), &about) == 0 && S_ISREG(about.st_mode)) return file;
-  throw InputError(path.string() + ": cannot be read: " + std::generic_category().message(errno));
+  throw InputError(path.string() + ": cannot be read: " + system_reason(errno));
 }
 
 }  // namespace

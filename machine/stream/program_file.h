@@ -7,7 +7,7 @@
 #include <memory>
 #include <string>
 
-#include "core/compute/run_control.h"
+#include "core/compute/executor.h"
 
 namespace lensforge {
 

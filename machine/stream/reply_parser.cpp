@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/text/words.h"
 
 namespace lensforge {
 namespace {
@@ -56,12 +57,10 @@ std::optional<Number> number(std::string_view text) {
 template <class Number>
 std::vector<Number> numbers(std::string_view text) {
   std::vector<Number> values;
-  for (std::size_t begin = 0; begin <= text.size();) {
-    const std::size_t comma = std::min(text.find(',', begin), text.size());
-    const auto value = number<Number>(text.substr(begin, comma - begin));
+  for (const std::string_view word : split(text, ',')) {
+    const auto value = number<Number>(word);
     if (!value || values.size() >= kMaxAxes) return {};
     values.push_back(*value);
-    begin = comma + 1;
   }
   return values;
 }
@@ -189,19 +188,16 @@ std::string_view state_name(ReportedState state) {
 
 std::optional<StatusReport> parse_status_report(std::string_view line) {
   if (line.size() < 2 || line.front() != '<' || line.back() != '>') return std::nullopt;
-  std::string_view rest = line.substr(1, line.size() - 2);
-  if (rest.find_first_of("<>") != std::string_view::npos) return std::nullopt;
+  const std::string_view inside = line.substr(1, line.size() - 2);
+  if (inside.find_first_of("<>") != std::string_view::npos) return std::nullopt;
   StatusReport report;
   std::vector<std::string_view> names;
-  for (bool first = true; first || !rest.empty(); first = false) {
-    const std::size_t bar = std::min(rest.find('|'), rest.size());
-    const std::string_view field = rest.substr(0, bar);
+  for (const std::string_view field : split(inside, '|')) {
+    const bool first = names.empty();
     if (!(first ? read_state(field, report) : read_field(field, report))) return std::nullopt;
     const std::string_view name = field.substr(0, field.find(':'));
     if (std::find(names.begin(), names.end(), name) != names.end()) return std::nullopt;
     names.push_back(name);
-    if (bar + 1 == rest.size()) return std::nullopt;  // An empty field at the end.
-    rest.remove_prefix(std::min(bar + 1, rest.size()));
   }
   if (report.machine_position.has_value() == report.work_position.has_value()) return std::nullopt;
   return report;

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "core/compute/run_control.h"
+#include "core/compute/executor.h"
 #include "machine/gcode/gcode_motion.h"
 #include "machine/stream/controller_dialogue.h"
 #include "machine/stream/journal.h"

@@ -4,7 +4,7 @@
 #include <istream>
 #include <stop_token>
 
-#include "core/compute/run_control.h"
+#include "core/compute/executor.h"
 #include "machine/stream/controller_dialogue.h"
 
 namespace lensforge {

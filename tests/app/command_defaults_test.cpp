@@ -10,8 +10,7 @@
 #include "app/commands/send_command.h"
 #include "cam/plan/cam_options.h"
 #include "core/temp_folder.h"
-#include "design/design_fields.h"
-#include "design/render_fields.h"
+#include "design/setup/option_tables.h"
 
 namespace lensforge::app {
 namespace {

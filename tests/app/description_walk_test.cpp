@@ -10,15 +10,14 @@
 #include "cam/coupon/coupon_layout.h"
 #include "cam/plan/cam_options.h"
 #include "core/error.h"
-#include "core/image/background.h"
+#include "core/image/image_io.h"
 #include "core/schema/json.h"
 #include "core/schema/option_text.h"
 #include "core/schema/toml.h"
-#include "design/design_fields.h"
-#include "design/reflect/reflect_options.h"
-#include "design/render_fields.h"
+#include "design/reflect/input.h"
+#include "design/setup/option_tables.h"
 #include "export/export.h"
-#include "machine/job/send_options.h"
+#include "machine/send.h"
 
 /// Every description, by everything that works from one.
 namespace lensforge::app {

@@ -9,11 +9,10 @@
 #include "cam/plan/cam_options.h"
 #include "core/error.h"
 #include "core/text/number_text.h"
-#include "design/design_fields.h"
-#include "design/reflect/reflect_options.h"
-#include "design/render_fields.h"
+#include "design/reflect/input.h"
+#include "design/setup/option_tables.h"
 #include "export/export.h"
-#include "machine/job/send_options.h"
+#include "machine/send.h"
 
 namespace lensforge::app {
 namespace {

@@ -13,7 +13,7 @@
 
 #include "bench/process_usage.h"
 #include "cam/cam.h"
-#include "core/surface/lens.h"
+#include "core/lens/lens.h"
 
 namespace lensforge {
 namespace {

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "core/page/decade_plot.h"
+#include "core/page/drawings.h"
 
 /// Time of a design by stage, from its convergence.csv.
 namespace lensforge::bench {

@@ -10,11 +10,11 @@
 
 #include "bench/lens_scene.h"
 #include "core/compute/executor.h"
-#include "core/optics/front_placement.h"
+#include "core/optics/front.h"
 #include "core/optics/light_path.h"
 #include "design/energy/objective.h"
 #include "design/flux/flux_image.h"
-#include "design/optics/surface_optics.h"
+#include "design/render/render_flux.h"
 
 namespace lensforge::bench {
 namespace {

@@ -7,7 +7,6 @@
 
 #include "bench/gpu_rates.h"
 #include "core/compute/cuda/cuda_executor.h"
-#include "core/compute/cuda/device_buffer.h"
 
 namespace lensforge::bench {
 

@@ -11,9 +11,9 @@
 #include "bench/gpu_transport.h"
 #include "bench/lens_scene.h"
 #include "design/schedule/face_transport.h"
-#include "design/transport/cell_kernels.h"
-#include "design/transport/cell_stage.h"
-#include "design/transport/density_blur.h"
+#include "design/transport/power_cells.h"
+#include "design/transport/power_cells_on.h"
+#include "design/transport/semi_discrete.h"
 #include "fixtures/scenes/scenes.h"
 
 namespace lensforge::bench {

@@ -5,9 +5,8 @@
 #include <cmath>
 
 #include "core/image/image.h"
+#include "core/mesh/surface_mesh.h"
 #include "core/optics/optical_setup.h"
-#include "core/surface/grid_mesh.h"
-#include "core/surface/surface_mesh.h"
 
 namespace lensforge::bench {
 

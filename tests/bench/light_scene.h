@@ -5,7 +5,7 @@
 #include <array>
 #include <memory>
 
-#include "core/surface/surface_mesh.h"
+#include "core/mesh/surface_mesh.h"
 
 namespace lensforge::bench {
 

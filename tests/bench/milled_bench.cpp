@@ -14,7 +14,7 @@
 #include "cam/milled/polished_field.h"
 #include "cam/milled/rounded_field.h"
 #include "cam/milled_paths.h"
-#include "core/surface/smooth_surface.h"
+#include "core/lens/smooth_surface.h"
 
 namespace lensforge {
 namespace {

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "bench/light_scene.h"
-#include "core/compute/split_mix.h"
+#include "core/compute/scalar.h"
 
 // Notation
 //   u, v   whole cells of the grid of strata across and along the lens

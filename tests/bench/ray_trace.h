@@ -5,8 +5,7 @@
 
 #include "core/compute/executor.h"
 #include "core/image/image.h"
-#include "core/image/metrics.h"
-#include "core/surface/lens.h"
+#include "core/lens/lens.h"
 
 /// A forward ray tracer over Embree that judges a designed lens from outside: it shares the lens's
 /// files with the program, but neither its optics nor its rasteriser nor its pixel conventions.

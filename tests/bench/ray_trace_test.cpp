@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "bench/lens_scene.h"
-#include "design/render_lens.h"
+#include "design/render.h"
 
 namespace lensforge::bench {
 namespace {

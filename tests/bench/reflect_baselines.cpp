@@ -9,11 +9,8 @@
 #include <vector>
 
 #include "design/reflect/light/light_field.h"
-#include "design/reflect/light/light_paths.h"
 #include "design/reflect/light/reflection_energy.h"
-#include "design/reflect/mesh/edges.h"
 #include "design/reflect/mesh/faces.h"
-#include "design/reflect/mesh/unit_frame.h"
 #include "design/reflect/shape/shape_update.h"
 
 namespace lensforge::bench {

@@ -2,8 +2,8 @@
 #pragma once
 
 #include "core/compute/executor.h"
-#include "core/surface/surface_mesh.h"
-#include "design/reflect/reflect_options.h"
+#include "core/mesh/surface_mesh.h"
+#include "design/reflect/input.h"
 #include "design/reflect/reflect_shape.h"
 
 /// Ways to shape a reflection that Tojo et al. compare theirs with.

@@ -13,9 +13,8 @@
 #include "bench/reflect_baselines.h"
 #include "core/error.h"
 #include "core/io/files.h"
-#include "core/page/decade_plot.h"
+#include "core/page/drawings.h"
 #include "core/text/number_text.h"
-#include "design/reflect/mesh/edges.h"
 #include "design/reflect/mesh/faces.h"
 #include "fixtures/shapes/shapes.h"
 

@@ -12,8 +12,7 @@
 #include <memory>
 #include <vector>
 
-#include "design/transport/cell_stage.h"
-#include "design/transport/density_blur.h"
+#include "design/transport/power_cells.h"
 #include "design/transport/semi_discrete.h"
 #include "design/transport_scenes.h"
 #include "fixtures/scenes/scenes.h"

@@ -7,7 +7,7 @@
 #include <functional>
 #include <numbers>
 
-#include "core/surface/lens.h"
+#include "core/lens/lens.h"
 #include "core/test_meshes.h"
 
 namespace lensforge::testing {

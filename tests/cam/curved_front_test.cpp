@@ -10,11 +10,11 @@
 #include "cam/cam_meshes.h"
 #include "cam/small_cuts.h"
 #include "core/error.h"
-#include "core/optics/front_placement.h"
+#include "core/optics/front.h"
 #include "core/optics/height_fronts.h"
 #include "core/temp_folder.h"
 #include "core/text/number_text.h"
-#include "design/render_lens.h"
+#include "design/render.h"
 
 namespace lensforge {
 namespace {

@@ -19,7 +19,7 @@
 #include "cam/plan/finishing.h"
 #include "cam/predict/part_surfaces.h"
 #include "core/error.h"
-#include "core/surface/lens_surface.h"
+#include "core/lens/surface_check.h"
 #include "core/temp_folder.h"
 
 namespace lensforge {

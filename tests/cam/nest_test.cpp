@@ -15,7 +15,7 @@
 #include "cam/rs274_interpreter.h"
 #include "core/error.h"
 #include "core/io/lens_folder.h"
-#include "core/optics/front_placement.h"
+#include "core/optics/front.h"
 #include "core/temp_folder.h"
 #include "core/text/number_text.h"
 #include "machine/gcode/program_seal.h"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "core/surface/surface_mesh.h"
+#include "core/mesh/surface_mesh.h"
 
 namespace lensforge::testing {
 

@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "design/optics/image_triangle.h"
+#include "design/flux/flux_triangle.h"
 
 /// The slow way to a flux picture: every triangle is clipped with every pixel (Sutherland & Hodgman
 /// 1974) in extended precision.

@@ -3,7 +3,7 @@
 
 #include "core/compute/executor.h"
 #include "design/executor_parity.h"
-#include "design/render_flux.h"
+#include "design/render/render_flux.h"
 #include "design/stage_on_rough_mesh.h"
 
 namespace lensforge::testing {

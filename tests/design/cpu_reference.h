@@ -5,12 +5,12 @@
 #include <vector>
 
 #include "core/optics/optical_setup.h"
+#include "design/flux/flux_triangle.h"
 #include "design/objective_setups.h"
-#include "design/optics/image_triangle.h"
-#include "design/schedule/guided_stage.h"
+#include "design/schedule/guided_optimization.h"
 
-/// The CPU's results, for comparison with other executors. Compiled apart: nvcc, which compiles the
-/// tests on a GPU, would round the CPU's part in other places than the C++ compiler does.
+/// The CPU's results, for comparison with other executors. Compiled separately: nvcc, which
+/// compiles the tests on a GPU, rounds the CPU's part in other places than the C++ compiler does.
 namespace lensforge::testing {
 
 std::vector<double> cpu_flux(const std::vector<ImageTriangle>& triangles);

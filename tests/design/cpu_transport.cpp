@@ -3,7 +3,6 @@
 
 #include "design/random_input.h"
 #include "design/test_setups.h"
-#include "design/transport/potential_upsampling.h"
 #include "design/transport/power_newton.h"
 #include "design/transport_scenes.h"
 

@@ -5,8 +5,8 @@
 #include <memory>
 #include <vector>
 
-#include "design/transport/cell_kernels.h"
-#include "design/transport/cell_stage.h"
+#include "design/transport/power_cells.h"
+#include "design/transport/power_cells_on.h"
 
 /// Scenes for transport on several executors, and the CPU's results for them; compiled separately,
 /// like cpu_reference.h.

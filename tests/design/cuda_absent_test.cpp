@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "core/compute/gpu.h"
+#include "core/compute/executor.h"
 #include "design/cpu_reference.h"
 #include "design/emulated_executor.h"
 #include "design/executor_parity.h"

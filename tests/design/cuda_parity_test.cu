@@ -10,10 +10,10 @@
 #include <vector>
 
 #include "core/compute/cuda/launch.cuh"
-#include "core/compute/gpu.h"
-#include "design/design_lens.h"
+#include "core/compute/executor.h"
+#include "design/design.h"
 #include "design/executor_parity.h"
-#include "design/render_flux.h"
+#include "design/render/render_flux.h"
 #include "design/stage_on_rough_mesh.h"
 #include "design/test_setups.h"
 #include "design/transport_parity.h"

@@ -12,10 +12,10 @@
 #include <thread>
 #include <vector>
 
-#include "core/surface/spline_file.h"
+#include "core/lens/surface_check.h"
 #include "core/temp_folder.h"
-#include "design/design_lens.h"
-#include "design/render_lens.h"
+#include "design/design.h"
+#include "design/render.h"
 #include "design/test_setups.h"
 #include "design/transport_scenes.h"
 
@@ -129,7 +129,7 @@ TEST_P(SplineStage, StoppedInTheSplineAndResumedGivesTheSameBits) {
   expect_resumed_equals(whole, "spline nodes", calls / 2);
 }
 
-/// What there is before the spline begins is the smooth mesh, and says so.
+/// Before the spline's level a design is a smooth mesh, and its lens says so.
 TEST_P(SplineStage, StoppedBeforeTheSplineIsASmoothLens) {
   StopAtKernel stop("image term", 1);
   options_.iterations = 100;

@@ -8,15 +8,15 @@
 #include <tuple>
 #include <vector>
 
-#include "core/image/spectral_color.h"
+#include "core/image/color.h"
 #include "core/image/transfer.h"
-#include "core/optics/front_placement.h"
-#include "core/optics/light_colors.h"
-#include "design/design_lens.h"
+#include "core/optics/front.h"
+#include "core/optics/optical_setup.h"
+#include "design/design.h"
 #include "design/finite_difference.h"
 #include "design/objective_setups.h"
-#include "design/outline_setup.h"
-#include "design/render_lens.h"
+#include "design/render.h"
+#include "design/setup/outline_setup.h"
 
 namespace lensforge {
 namespace {
@@ -30,7 +30,7 @@ OpticalSetup colored_setup() {
   return setup;
 }
 
-/// What else may be asked of the lens.
+/// Another property that a dispersing lens may have.
 struct Kind {
   const char* name;
   void (*apply)(OpticalSetup&);
@@ -56,7 +56,7 @@ constexpr Kind kKinds[] = {{"Nothing", nothing_else},
                            {"WideSource", wide_source},
                            {"Fresnel", reflecting_faces}};
 
-/// With every weight, so that no term is counted once for each colour.
+/// All weights above 0, to find terms that are counted once per colour.
 constexpr ObjectiveWeights kWeights{1e2, 1e3, 1e-3, 2e1, 1e-8, 3e0, 2e-1, 2e0, 1e1};
 
 class DispersedObjective : public ::testing::TestWithParam<std::tuple<SurfaceModel, Kind>> {

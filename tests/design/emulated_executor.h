@@ -20,8 +20,7 @@
 
 #include "core/compute/executor.h"
 #include "core/error.h"
-#include "design/optimize/extended_transforms.h"
-#include "design/optimize/grid_transforms.h"
+#include "design/optimize/cosine_transform.h"
 
 /// A GPU without a GPU: the kernels, buffers and orders of summation of a CudaExecutor, run by the
 /// calling thread. Its memory can be touched by kernels and copies alone: anything else that reads
@@ -140,8 +139,8 @@ class EmulatedExecutor {
   void begin_kernel(const char* kernel, const Functor& functor) const {
     if (stop_.stop_requested()) throw Interrupted();
     static_assert(sizeof(Functor) <= 4096, "more than a kernel's arguments may take");
-    // What differs between copies made over zeros and over ones is not set: it lies between members
-    // and may be an old address.
+    // Bytes that differ between copies made over zeros and over ones are unset: padding, which may
+    // hold an old address.
     const auto zeros = copied_over(functor, 0x00);
     const auto ones = copied_over(functor, 0xFF);
     for (std::size_t i = 0; i < zeros.size(); ++i) {

@@ -13,8 +13,7 @@
 #include "core/optics/height_fronts.h"
 #include "design/emulated_executor.h"
 #include "design/executor_parity.h"
-#include "design/optics/surface_optics.h"
-#include "design/render_flux.h"
+#include "design/render/render_flux.h"
 #include "design/stage_on_rough_mesh.h"
 #include "design/transport_parity.h"
 
@@ -37,7 +36,7 @@ struct EmulatedSide {
 INSTANTIATE_TYPED_TEST_SUITE_P(EmulatedGpu, ExecutorParity, EmulatedSide);
 INSTANTIATE_TYPED_TEST_SUITE_P(EmulatedGpu, TransportParity, EmulatedSide);
 
-/// What a light path refers to is in the executor's memory, too.
+/// The front's coefficients, which a light path refers to, are in the executor's memory, too.
 TEST(EmulatedGpu, AFrontThatIsAHeightMapIsReadInItsOwnMemory) {
   OpticalSetup setup = kSetup;
   setup.front = height_front(kSize, {25, 21}, [](const Eigen::Vector2d& at) {

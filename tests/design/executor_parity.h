@@ -19,7 +19,7 @@
 #include "design/flux/flux_image.h"
 #include "design/objective_setups.h"
 #include "design/random_triangles.h"
-#include "design/schedule/guided_stage.h"
+#include "design/schedule/guided_optimization.h"
 
 /// Compares another executor's results with the CPU's. One suite for the emulated GPU, which runs
 /// in every build, and for a real one, where there is one.
@@ -89,7 +89,7 @@ std::vector<double> cotangent_sums(const std::vector<double>& pixels, int rows,
   return fetched(executor, std::span<const double>(image.view().suffix, size));
 }
 
-/// Symbols as GuidedOptimization would set them, about, and uneven reach.
+/// Symbols similar to those of GuidedOptimization, and uneven reach.
 inline void set_symbols(GuidedStage& stage) {
   stage.set_symbols({.scale = 1e-4, .floor = 0.25, .power = 1.0},
                     {.scale = 1e-7, .floor = 0.005, .growth = 0.1});

@@ -6,15 +6,14 @@
 #include <numbers>
 #include <vector>
 
-#include "core/image/metrics.h"
-#include "core/optics/source_points.h"
-#include "design/design_lens.h"
+#include "core/image/image.h"
+#include "core/optics/light_source.h"
+#include "design/design.h"
 #include "design/finite_difference.h"
 #include "design/objective_setups.h"
-#include "design/render_lens.h"
+#include "design/render.h"
+#include "design/render/source_picture.h"
 #include "design/snell.h"
-#include "design/source_limit.h"
-#include "design/source_picture.h"
 
 namespace lensforge {
 namespace {
@@ -223,7 +222,7 @@ TEST(ExtendedDesign, LaterRoundsMendWhatTheConvolutionMisses) {
   for (std::size_t i = 0; i < convolved.size(); ++i) {
     picture.values()[i] = static_cast<float>(convolved[i] * target.total());
   }
-  // What the optimiser goes by is off on purpose.
+  // The picture by convolution, which the optimiser sees, misses the target on purpose.
   EXPECT_LT(lens.metrics.at(SurfaceModel::kSmooth).mae, compare(picture, target).mae);
 }
 

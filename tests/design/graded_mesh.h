@@ -6,8 +6,7 @@
 #include <cstdint>
 #include <numbers>
 
-#include "core/surface/grid_mesh.h"
-#include "core/surface/surface_mesh.h"
+#include "core/mesh/surface_mesh.h"
 #include "design/random_input.h"
 
 namespace lensforge::testing {

@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/optics/image_plane.h"
+#include "core/optics/screen.h"
 #include "design/energy/objective.h"
 #include "design/finite_difference.h"
 #include "design/random_input.h"

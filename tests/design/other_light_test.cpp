@@ -13,20 +13,17 @@
 #include <variant>
 #include <vector>
 
-#include "core/optics/front_placement.h"
+#include "core/optics/front.h"
 #include "core/optics/height_fronts.h"
 #include "core/optics/light_path.h"
 #include "design/energy/objective.h"
 #include "design/finite_difference.h"
 #include "design/objective_setups.h"
-#include "design/render_lens.h"
-#include "design/schedule/crease_alignment.h"
+#include "design/render.h"
 #include "design/schedule/face_transport.h"
 #include "design/schedule/guided_optimization.h"
-#include "design/schedule/reach.h"
-#include "design/schedule/start_surface.h"
 #include "design/snell.h"
-#include "design/transport/vertex_spread.h"
+#include "design/transport/mesh_fit.h"
 
 namespace lensforge {
 namespace {
@@ -129,7 +126,7 @@ INSTANTIATE_TEST_SUITE_P(Kinds, OtherLight,
                                   model_name(std::get<1>(one.param));
                          });
 
-/// Where the light of the start's faces is to go, after the mesh has been fitted to it.
+/// Transport's targets for the light of the start's faces. Fits the mesh to them.
 Correspondence transport(const OpticalSetup& setup, SurfaceModel model, const Image& target,
                          SurfaceMesh& mesh) {
   const Executor executor = Executor::cpu(2);
@@ -236,8 +233,7 @@ FrontPlace front_place(const OpticalSetup& setup, double x, double y) {
   return {place, (centre - place) / radius};
 }
 
-/// A ray that reaches the front, and the light that it stands for where all have as much of the
-/// plan.
+/// A ray that reaches the front, and its light if all rays have the same share of the plan.
 struct SourceRay {
   Eigen::Vector3d way;
   double light;

@@ -13,19 +13,18 @@
 
 #include "core/error.h"
 #include "core/image/transfer.h"
-#include "core/surface/corners.h"
-#include "core/surface/mesh_cut.h"
-#include "core/surface/mesh_normals.h"
-#include "core/surface/sample_splines.h"
+#include "core/mesh/surface_mesh.h"
+#include "core/optics/outline.h"
+#include "core/spline/sample_splines.h"
 #include "core/temp_folder.h"
-#include "design/design_lens.h"
+#include "design/design.h"
 #include "design/energy/spline_objective.h"
 #include "design/finite_difference.h"
 #include "design/objective_setups.h"
-#include "design/outline_setup.h"
 #include "design/ray_tracer.h"
-#include "design/render_lens.h"
-#include "design/schedule/spline_start.h"
+#include "design/render.h"
+#include "design/schedule/levels.h"
+#include "design/setup/outline_setup.h"
 
 /// Lenses that are no rectangle.
 namespace lensforge {
@@ -47,7 +46,7 @@ OpticalSetup disc_setup(const OpticalSetup& rectangle) {
   return setup;
 }
 
-/// Of a picture that is not clipped, as the objective has it.
+/// Mean absolute error of a picture that is not clipped, as in the objective.
 double mean_absolute_error(const RenderResult& rendered, const Image& target) {
   const auto pixels = static_cast<double>(target.values().size());
   double sum = 0.0;

@@ -3,7 +3,7 @@
 
 #include <Eigen/Core>
 
-#include "core/surface/corners.h"
+#include "core/mesh/surface_mesh.h"
 #include "design/random_input.h"
 
 namespace lensforge::testing {

@@ -11,8 +11,8 @@
 #include <functional>
 #include <vector>
 
+#include "core/mesh/surface_mesh.h"
 #include "core/optics/optical_setup.h"
-#include "core/surface/surface_mesh.h"
 #include "design/random_input.h"
 #include "design/snell.h"
 

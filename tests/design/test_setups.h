@@ -9,10 +9,9 @@
 #include <string>
 
 #include "core/image/image.h"
+#include "core/lens/optical_surface.h"
+#include "core/mesh/surface_mesh.h"
 #include "core/optics/optical_setup.h"
-#include "core/surface/grid_mesh.h"
-#include "core/surface/surface_mesh.h"
-#include "core/surface/surface_model.h"
 #include "design/random_input.h"
 
 namespace lensforge::testing {

@@ -15,7 +15,7 @@
 #include "core/compute/executor.h"
 #include "core/error.h"
 #include "design/cpu_transport.h"
-#include "design/transport/cell_stage_on.h"
+#include "design/transport/power_cells_on.h"
 
 /// Compares transport on another executor with the CPU's, as in executor_parity.h. A `Side` names
 /// the executor: `using Exec`, `make(const Executor&)`, and `missing()`, why it is not there (empty

@@ -9,13 +9,12 @@
 #include <vector>
 
 #include "core/image/image.h"
-#include "core/surface/grid_mesh.h"
-#include "core/surface/surface_mesh.h"
+#include "core/mesh/surface_mesh.h"
 #include "design/clip_reference.h"
 #include "design/random_input.h"
-#include "design/transport/cell_stage_on.h"
+#include "design/transport/power_cells.h"
+#include "design/transport/power_cells_on.h"
 #include "design/transport/power_diagram.h"
-#include "design/transport/summed_density.h"
 
 namespace lensforge::testing {
 

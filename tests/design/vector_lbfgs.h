@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "core/compute/executor.h"
-#include "design/optimize/lbfgs_on.h"
+#include "design/optimize/lbfgs.h"
 
 namespace lensforge::testing {
 

@@ -27,7 +27,7 @@ function(require)
 endfunction()
 
 run("${CMAKE_COMMAND}" --install "${BUILD}" --prefix "${prefix}")
-require("${prefix}/bin/lensforge" "${prefix}/include/lensforge/design/design_lens.h")
+require("${prefix}/bin/lensforge" "${prefix}/include/lensforge/design/design.h")
 run("${prefix}/bin/lensforge" --version)
 
 set(flags "")

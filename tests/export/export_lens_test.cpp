@@ -4,12 +4,12 @@
 #include <utility>
 
 #include "core/error.h"
-#include "core/optics/front_placement.h"
+#include "core/mesh/mesh_files.h"
+#include "core/optics/front.h"
 #include "core/optics/height_fronts.h"
 #include "core/optics/outline.h"
-#include "core/surface/mesh_io.h"
 #include "core/temp_folder.h"
-#include "design/render_lens.h"
+#include "design/render.h"
 #include "export/export.h"
 #include "export/sample_surfaces.h"
 #include "export/solid/solid_reading.h"

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <string>
 
-#include "core/optics/front_placement.h"
+#include "core/optics/front.h"
 #include "core/optics/height_fronts.h"
 #include "core/temp_folder.h"
 #include "export/files/closed_solid.h"

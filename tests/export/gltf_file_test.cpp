@@ -8,8 +8,8 @@
 #include <string>
 
 #include "core/error.h"
-#include "core/io/output_guard.h"
-#include "core/surface/mesh_normals.h"
+#include "core/io/lens_folder.h"
+#include "core/mesh/surface_mesh.h"
 #include "core/temp_folder.h"
 #include "export/files/closed_solid.h"
 #include "export/files/mesh_formats.h"

@@ -6,7 +6,7 @@
 #include "core/error.h"
 #include "core/image/image_io.h"
 #include "core/image/transfer.h"
-#include "core/surface/smooth_surface.h"
+#include "core/lens/smooth_surface.h"
 #include "core/temp_folder.h"
 #include "export/export.h"
 #include "export/sample_surfaces.h"

@@ -4,7 +4,7 @@
 #include <gmock/gmock.h>
 
 #include "core/error.h"
-#include "core/io/output_guard.h"
+#include "core/io/lens_folder.h"
 #include "core/temp_folder.h"
 #include "export/sample_surfaces.h"
 #include "export/solid/opencascade_io.h"

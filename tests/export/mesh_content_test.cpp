@@ -8,7 +8,7 @@
 #include <string>
 
 #include "core/error.h"
-#include "core/surface/mesh_normals.h"
+#include "core/mesh/surface_mesh.h"
 #include "core/temp_folder.h"
 #include "core/text/printable.h"
 #include "export/files/closed_solid.h"

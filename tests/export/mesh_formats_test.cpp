@@ -7,8 +7,8 @@
 #include <sstream>
 
 #include "core/error.h"
-#include "core/io/output_guard.h"
-#include "core/surface/mesh_io.h"
+#include "core/io/lens_folder.h"
+#include "core/mesh/mesh_files.h"
 #include "core/temp_folder.h"
 #include "export/files/closed_solid.h"
 #include "export/sample_surfaces.h"

@@ -6,8 +6,7 @@
 #include <numbers>
 #include <random>
 
-#include "core/surface/grid_mesh.h"
-#include "core/surface/surface_mesh.h"
+#include "core/mesh/surface_mesh.h"
 
 namespace lensforge::testing {
 

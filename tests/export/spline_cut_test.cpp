@@ -6,9 +6,9 @@
 #include <filesystem>
 
 #include "core/optics/outline.h"
-#include "core/surface/sample_splines.h"
+#include "core/spline/sample_splines.h"
 #include "core/temp_folder.h"
-#include "design/render_lens.h"
+#include "design/render.h"
 #include "export/export.h"
 #include "export/solid/solid_reading.h"
 #include "export/spline/spline_net.h"

@@ -5,11 +5,11 @@
 
 #include <random>
 
-#include "core/surface/cubic_spline.h"
-#include "core/surface/grid_warp.h"
-#include "design/design_lens.h"
-#include "design/render_lens.h"
-#include "design/wanted_picture.h"
+#include "core/lens/slope_fit.h"
+#include "core/spline/cubic_spline.h"
+#include "design/design.h"
+#include "design/render.h"
+#include "design/render/wanted_picture.h"
 #include "export/files/closed_solid.h"
 #include "export/sample_surfaces.h"
 #include "export/spline/spline_fit.h"

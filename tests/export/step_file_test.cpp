@@ -7,7 +7,7 @@
 #include <cstdio>
 
 #include "core/error.h"
-#include "core/io/output_guard.h"
+#include "core/io/lens_folder.h"
 #include "core/temp_folder.h"
 #include "export/files/closed_solid.h"
 #include "export/part21.h"

@@ -7,10 +7,9 @@
 #include <numbers>
 #include <random>
 
-#include "core/optics/front_placement.h"
-#include "core/surface/mesh_cut.h"
-#include "core/surface/mesh_normals.h"
-#include "core/surface/outline_index.h"
+#include "core/mesh/surface_mesh.h"
+#include "core/optics/front.h"
+#include "core/optics/outline.h"
 #include "core/temp_folder.h"
 #include "export/files/closed_solid.h"
 #include "export/part21.h"

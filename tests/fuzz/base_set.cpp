@@ -14,7 +14,7 @@
 #include <stdexcept>
 #include <thread>
 
-#include "core/io/sha256.h"
+#include "core/io/files.h"
 #include "fuzz/child.h"
 #include "fuzz/meshes.h"
 #include "machine/gcode/program_seal.h"

@@ -28,8 +28,8 @@ namespace {
 using std::chrono::milliseconds;
 using testing::PageClient;
 
-constexpr std::size_t kMostClients = 60;  ///< Twice what the page keeps.
-constexpr milliseconds kBetween{2};       ///< Leaves the processor to the command.
+constexpr std::size_t kMaxClients = 60;  ///< Twice what the page keeps.
+constexpr milliseconds kBetween{2};      ///< Leaves the processor to the command.
 constexpr milliseconds kAnswerTime{static_cast<int>(1000.0 * kMaxStop)};
 
 bool answers(int port) {
@@ -45,8 +45,8 @@ bool answers(int port) {
     try {
       clients.emplace_back(port).send(testing::hostile_request(port, random), kBetween);
       random.pick(clients).send("X: y\r\n", milliseconds(0));
-      if (clients.size() == kMostClients) {
-        std::swap(clients[random.below(kMostClients)], clients.back());
+      if (clients.size() == kMaxClients) {
+        std::swap(clients[random.below(kMaxClients)], clients.back());
         clients.pop_back();
       }
       // A page that ends leaves one request open, and takes no second one.

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "core/compute/split_mix.h"
+#include "core/compute/scalar.h"
 
 namespace lensforge::fuzz {
 

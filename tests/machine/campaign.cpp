@@ -118,7 +118,7 @@ class Workshop {
     return spoilt;
   }
 
-  SimulatedMachine& machine() { return machine_; }
+  FaultyMachine& machine() { return machine_; }
   SimulatedSpindle& spindle() { return spindle_; }
   [[nodiscard]] const fs::path& journal() const { return journal_; }
 
@@ -206,7 +206,7 @@ class Workshop {
   std::string program_;
   fs::path file_;
   fs::path journal_;
-  SimulatedMachine machine_;
+  FaultyMachine machine_;
   RegisterMap map_;
   SimulatedSpindle spindle_;
   std::unique_ptr<SpindleGuard> guard_;

@@ -12,7 +12,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "core/io/descriptor.h"
+#include "core/io/files.h"
 
 namespace lensforge::campaign {
 namespace {

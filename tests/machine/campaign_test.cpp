@@ -11,6 +11,7 @@
 #include <string>
 
 #include "core/temp_folder.h"
+#include "core/text/words.h"
 
 namespace lensforge::campaign {
 namespace {
@@ -49,7 +50,7 @@ void print(const std::map<Mishap, Row>& table) {
   for (const auto& [mishap, row] : table) {
     std::string causes;
     for (const auto& [cause, count] : row.causes) {
-      causes += (causes.empty() ? "" : ", ") + cause + " " + std::to_string(count);
+      causes = with_word(causes, cause + " " + std::to_string(count));
     }
     std::printf("%-15s %5d %7d %9d %8d %9d %7d %12.1f  %s\n", mishap_name(mishap).c_str(), row.runs,
                 row.struck, row.finished, row.resumed, row.violations, row.spoilt,

@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "core/io/descriptor.h"
+#include "core/io/files.h"
 
 namespace lensforge::testing {
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <thread>
 
-#include "core/io/descriptor.h"
+#include "core/io/files.h"
 #include "machine/sim/sim_settings.h"
 
 namespace lensforge {

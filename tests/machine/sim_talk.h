@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "machine/sim/simulated_machine.h"
+#include "machine/faulty_machine.h"
 
 namespace lensforge {
 
@@ -122,7 +122,7 @@ class Talk {
   std::vector<ExecutedPiece> pieces;
   std::vector<ExecutedPiece> begun;
   std::vector<std::string> events;
-  SimulatedMachine machine;
+  FaultyMachine machine;
   std::unique_ptr<Link> link;
 
  private:

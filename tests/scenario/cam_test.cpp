@@ -4,7 +4,7 @@
 #include <csignal>
 #include <sstream>
 
-#include "core/io/folder_lock.h"
+#include "core/io/lens_folder.h"
 #include "core/stop_bound.h"
 #include "scenario/driver.h"
 

@@ -2,7 +2,7 @@
 #include <algorithm>
 
 #include "core/image/image_io.h"
-#include "core/surface/mesh_io.h"
+#include "core/mesh/mesh_files.h"
 #include "scenario/driver.h"
 
 namespace lensforge::scenario {

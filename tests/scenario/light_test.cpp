@@ -4,8 +4,8 @@
 #include <cstdio>
 #include <limits>
 
-#include "core/image/height_grid.h"
 #include "core/image/image_io.h"
+#include "core/image/rasters.h"
 #include "scenario/driver.h"
 
 namespace lensforge::scenario {

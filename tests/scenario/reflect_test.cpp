@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <csignal>
 
-#include "core/surface/mesh_io.h"
+#include "core/mesh/mesh_files.h"
 #include "scenario/driver.h"
 
 namespace lensforge::scenario {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/io/sha256.h"
+#include "core/io/files.h"
 #include "machine/gcode/program_seal.h"
 #include "scenario/driver.h"
 

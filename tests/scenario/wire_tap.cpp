@@ -29,11 +29,7 @@ std::string pass(int from, int to) {
   const ssize_t count = ::read(from, bytes.data(), bytes.size());
   if (count <= 0) return {};
   std::string text(bytes.data(), static_cast<std::size_t>(count));
-  for (std::size_t at = 0; at < text.size();) {
-    const ssize_t written = ::write(to, text.data() + at, text.size() - at);
-    if (written <= 0) break;
-    at += static_cast<std::size_t>(written);
-  }
+  write_all(to, text);
   return text;
 }
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <thread>
 
-#include "core/io/descriptor.h"
+#include "core/io/files.h"
 #include "machine/pseudo_terminal.h"
 
 namespace lensforge::scenario {

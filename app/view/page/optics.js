@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // From what the controls say to what the shaders are told: the lamp and the screen in the lens's
-// frame (core/optics/optical_setup.h, source_points.cpp).
+// frame (core/optics/optical_setup.h, light_source.cpp).
 
 const kDegree = Math.PI / 180;
 
@@ -22,7 +22,7 @@ function frameAcross(direction) {
   return { right: cross(up, direction), up };
 }
 
-// Cauchy's two terms through the index at 587.56 nm with an Abbe number (core/optics/dispersion.h).
+// Cauchy's two terms through the index at 587.56 nm with an Abbe number (core/optics/optical_setup.h).
 function indexAt(index, abbe, wavelength) {
   const square = (nm) => 1 / (nm * nm);
   const slope = (index - 1) / abbe / (square(486.13) - square(656.27));

@@ -8,7 +8,6 @@
 #include "core/error.h"
 
 namespace lensforge {
-
 namespace {
 
 std::string megabytes(std::size_t bytes) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <cuda_runtime_api.h>
 
-#include "core/compute/gpu.h"
+#include "core/compute/executor.h"
 
 namespace lensforge {
 

@@ -4,12 +4,11 @@
 #include <cufft.h>
 
 #include "core/compute/cuda/cuda_executor.h"
-#include "design/optimize/extended_transforms.h"
-#include "design/optimize/grid_transforms.h"
+#include "design/optimize/cosine_transform.h"
 
 namespace lensforge {
 
-/// cuFFT as ExtendedTransforms asks for it.
+/// cuFFT behind the interface of ExtendedTransforms.
 class CudaFourier {
  public:
   /// @throw RunError if cuFFT cannot plan it.
@@ -18,7 +17,7 @@ class CudaFourier {
   CudaFourier(const CudaFourier&) = delete;
   CudaFourier& operator=(const CudaFourier&) = delete;
 
-  /// Both in the GPU's memory; `in` is overwritten.
+  /// Transforms `in` to `out`, both in the GPU's memory; overwrites `in`.
   void run(double* in, double* out);
 
  private:

@@ -3,16 +3,16 @@
 
 #include <array>
 
-#include "design/reflect/light/phong.h"
-
-/// Compiled for wider vector units, too; the running processor picks. No sum depends on the width.
+/// Compiled for wider vector units, too; the running processor selects. No sum depends on the
+/// width.
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
 #define LF_WIDE_LANES __attribute__((target_clones("avx2", "default")))
 #else
 #define LF_WIDE_LANES
 #endif
 
-// The loops take bare arrays, which the compiler knows to be apart.
+// The loops take bare arrays, which the compiler knows not to overlap.
+
 namespace lensforge::reflect {
 namespace {
 
@@ -62,7 +62,7 @@ LF_WIDE_LANES void reflect_loop(Eigen::Index count, Vec3<double> n, Axes<double>
   }
 }
 
-/// Inlined, so that it is compiled for the same vector units as its caller.
+/// Inlined, so that it is compiled for its caller's vector units.
 template <Loss kLoss>
 [[gnu::always_inline]] inline void weigh(Eigen::Index count, const double* __restrict direct,
                                          const double* __restrict indirect,
@@ -116,7 +116,7 @@ LF_WIDE_LANES LossSums sum_loop(Eigen::Index count, Axes<double> l, Axes<double>
   return {total(value), {total(x), total(y), total(z)}, total(curvature)};
 }
 
-/// Of a hit: its cosines and w's mirror images, of w across n_k and of −w across n_q.
+/// A hit's cosine and the mirror images of w across n_k and of −w across n_q.
 struct HitLobes {
   explicit HitLobes(const HitGeometry& hit)
       : cos_k(hit.n_k.dot(hit.w)),

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/reflect/mesh/remesh.h"
-
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <CGAL/Polygon_mesh_processing/detect_features.h>
 #include <CGAL/Polygon_mesh_processing/orient_polygon_soup.h>
@@ -26,7 +24,7 @@ using CgalMesh = CGAL::Surface_mesh<Kernel::Point_3>;
 
 constexpr double kCreaseDegrees = 50.0;
 constexpr int kSmoothings = 3;
-/// Runs that correct the length of edges by the number of faces that the last one gave.
+/// Number of runs; each corrects the length of edges by the last number of faces.
 constexpr int kRuns = 4;
 constexpr double kTolerance = 0.05;
 
@@ -41,7 +39,7 @@ CgalMesh to_cgal(const SurfaceMesh& mesh) {
     const Eigen::Matrix<std::size_t, 3, 1> t = mesh.triangles.col(k).cast<std::size_t>();
     polygons.push_back({t[0], t[1], t[2]});
   }
-  pmp::orient_polygon_soup(points, polygons);  // Takes vertices apart where pieces touch in one.
+  pmp::orient_polygon_soup(points, polygons);  // Splits vertices where pieces touch in one.
   if (!pmp::is_polygon_soup_a_polygon_mesh(polygons)) {
     throw InputError("--faces: the mesh cannot be remeshed; --faces 0 takes it as it is");
   }
@@ -80,7 +78,7 @@ CgalMesh with_edges_of(CgalMesh mesh, double length) {
                            pmp::parameters::number_of_iterations(kSmoothings)
                                .protect_constraints(true)
                                .edge_is_constrained_map(crease));
-  // Between creases that are protected faces without area may be left.
+  // Faces without area may be left between protected creases.
   pmp::remove_degenerate_faces(mesh);
   return mesh;
 }

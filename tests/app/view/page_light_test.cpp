@@ -11,12 +11,12 @@
 #include "app/view/browser.h"
 #include "app/view/lens_view.h"
 #include "app/view/view_page.h"
-#include "core/optics/front_placement.h"
+#include "core/mesh/surface_mesh.h"
+#include "core/optics/front.h"
 #include "core/optics/height_fronts.h"
 #include "core/optics/light_path.h"
-#include "core/surface/grid_mesh.h"
 #include "core/temp_folder.h"
-#include "design/render_lens.h"
+#include "design/render.h"
 
 namespace lensforge {
 namespace {

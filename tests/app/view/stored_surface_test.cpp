@@ -4,9 +4,7 @@
 #include <cmath>
 
 #include "app/view/lens_view.h"
-#include "core/surface/grid_mesh.h"
-#include "core/surface/grid_triangles.h"
-#include "core/surface/mesh_normals.h"
+#include "core/mesh/surface_mesh.h"
 
 namespace lensforge {
 namespace {

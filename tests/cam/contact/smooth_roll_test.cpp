@@ -12,7 +12,7 @@
 #include "cam/contact/cut_surface.h"
 #include "cam/contact/drop_cutter.h"
 #include "cam/path/row_profile.h"
-#include "core/surface/smooth_surface.h"
+#include "core/lens/smooth_surface.h"
 
 namespace lensforge {
 namespace {

@@ -15,9 +15,9 @@
 #include "cam/analytic_fields.h"
 #include "cam/leakage/surface_tile.h"
 #include "core/error.h"
-#include "core/optics/image_plane.h"
-#include "core/optics/light_colors.h"
-#include "core/optics/source_points.h"
+#include "core/optics/light_source.h"
+#include "core/optics/optical_setup.h"
+#include "core/optics/screen.h"
 
 namespace lensforge {
 namespace {

@@ -11,7 +11,7 @@
 #include "cam/milled_paths.h"
 #include "cam/milled_tiles.h"
 #include "core/error.h"
-#include "core/surface/smooth_surface.h"
+#include "core/lens/smooth_surface.h"
 
 namespace lensforge {
 namespace {

@@ -13,8 +13,8 @@
 
 #include "cam/workshop/workshop.h"
 #include "core/error.h"
+#include "core/mesh/surface_mesh.h"
 #include "core/optics/outline.h"
-#include "core/surface/corners.h"
 #include "core/temp_folder.h"
 
 namespace lensforge {

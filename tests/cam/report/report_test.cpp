@@ -14,7 +14,7 @@
 #include "cam/report/report_json.h"
 #include "cam/report/verdict.h"
 #include "core/error.h"
-#include "core/page/html_text.h"
+#include "core/page/html_page.h"
 
 namespace lensforge {
 namespace {

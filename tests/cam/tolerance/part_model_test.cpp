@@ -21,7 +21,6 @@
 #include "cam/predict/part_surfaces.h"
 #include "core/error.h"
 #include "core/optics/light_path.h"
-#include "core/surface/lit_surface.h"
 
 namespace lensforge {
 namespace {

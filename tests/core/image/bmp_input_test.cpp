@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/image/bmp_input.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -17,7 +15,6 @@
 #include "core/error.h"
 #include "core/image/image_io.h"
 #include "core/image/picture_refusal.h"
-#include "core/image/rec709.h"
 #include "core/image/transfer.h"
 #include "core/temp_folder.h"
 

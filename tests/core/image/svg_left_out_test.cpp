@@ -13,7 +13,6 @@
 
 #include "core/image/picture_refusal.h"
 #include "core/image/svg_drawing.h"
-#include "core/image/svg_log.h"
 #include "core/image/svg_support.h"
 #include "core/temp_folder.h"
 #include "core/test_images.h"

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "core/io/files.h"
 
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
+#include <cerrno>
 #include <fstream>
 #include <string>
 #include <utility>
@@ -217,5 +220,95 @@ TEST(Files, ALoopOfLinksIsNoFolder) {
   EXPECT_TRUE(is_folder(folder.path()));
 }
 
+using ::testing::ElementsAre;
+
+TEST(PendingFiles, AppearTogetherInTheirOrder) {
+  const TempFolder folder;
+  PendingFiles files(folder.path());
+  files.add("b.txt", "first");
+  files.add("a.txt", [](const std::filesystem::path& beside) {
+    EXPECT_EQ(beside.extension(), ".txt");
+    write_whole_file(beside, "second");
+  });
+  EXPECT_TRUE(files.has("a.txt"));
+  EXPECT_FALSE(files.has("c.txt"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "b.txt"));
+  EXPECT_THAT(files.publish(), ElementsAre(folder / "b.txt", folder / "a.txt"));
+  EXPECT_EQ(read_whole_file(folder / "b.txt", 10), "first");
+  EXPECT_EQ(read_whole_file(folder / "a.txt", 10), "second");
+  EXPECT_EQ(folder.file_count(), 2U);
+}
+
+TEST(PendingFiles, NoneAppearsWhereOneCannotBeWritten) {
+  const TempFolder folder;
+  {
+    PendingFiles files(folder.path());
+    files.add("a.txt", "first");
+    EXPECT_THROW(files.add("b.txt", [](const auto&) { throw RunError("full"); }), RunError);
+  }
+  EXPECT_EQ(folder.file_count(), 0U);
+}
+
+int open_nothing() { return ::open("/dev/null", O_RDONLY | O_CLOEXEC); }
+bool is_open(int number) { return ::fcntl(number, F_GETFD) >= 0; }
+
+TEST(Descriptor, IsNeverAStandardOne) {
+  const int kept = ::fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, 10);
+  ::close(STDIN_FILENO);
+  {
+    const Descriptor file(open_nothing());
+    EXPECT_GT(file.number(), STDERR_FILENO);
+    EXPECT_TRUE(is_open(file.number()));
+    EXPECT_FALSE(is_open(STDIN_FILENO)) << "the number itself is given back";
+  }
+  ::dup2(kept, STDIN_FILENO);
+  ::close(kept);
+}
+
+TEST(Descriptor, ClosesItselfOnceWhereverItWent) {
+  int number = -1;
+  {
+    Descriptor first(open_nothing());
+    number = first.number();
+    Descriptor second;
+    EXPECT_FALSE(second.open());
+    second = std::move(first);
+    const Descriptor third(std::move(second));
+    EXPECT_EQ(third.number(), number);
+    EXPECT_TRUE(is_open(number));
+  }
+  EXPECT_FALSE(is_open(number));
+}
+
+TEST(Descriptor, CloseTellsTheSystemsError) {
+  Descriptor file(open_nothing());
+  EXPECT_EQ(file.close(), 0);
+  EXPECT_EQ(file.close(), 0) << "closed already";
+  Descriptor gone(open_nothing());
+  ::close(gone.number());
+  EXPECT_EQ(gone.close(), EBADF);
+}
+
+std::string hash_of(std::string_view bytes) {
+  Sha256 hash;
+  hash.update(bytes);
+  return hash.finish();
+}
+
+TEST(Sha256, EqualsThePublishedExamples) {
+  EXPECT_EQ(hash_of(""), "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
+  EXPECT_EQ(hash_of("abc"), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+  EXPECT_EQ(hash_of(std::string(1'000'000, 'a')),
+            "cdc76e5c9914fb9281a1c7e284d73e67f1809a48a497200e046d39ccc7112cd0");
+}
+
+TEST(Sha256, PiecesCountAsTheWhole) {
+  Sha256 hash;
+  for (const char c : std::string("abc")) hash.update({&c, 1});
+  Sha256 moved = std::move(hash);
+  EXPECT_EQ(moved.finish(), hash_of("abc"));
+}
+
 }  // namespace
+
 }  // namespace lensforge

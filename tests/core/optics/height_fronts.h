@@ -4,8 +4,8 @@
 #include <Eigen/Core>
 #include <memory>
 
-#include "core/optics/front_surface.h"
-#include "core/surface/surface_mesh.h"
+#include "core/mesh/surface_mesh.h"
+#include "core/optics/front.h"
 
 namespace lensforge::testing {
 

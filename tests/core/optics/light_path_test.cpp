@@ -8,8 +8,8 @@
 #include <numbers>
 #include <string>
 
-#include "core/optics/fresnel.h"
 #include "core/optics/light_setups.h"
+#include "core/optics/refraction.h"
 #include "design/finite_difference.h"
 #include "design/random_corners.h"
 #include "design/random_input.h"

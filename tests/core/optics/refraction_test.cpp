@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <string>
 
@@ -131,5 +132,139 @@ TEST(Refraction, SlopeAdjointEqualsCentralDifferences) {
   RecordProperty("log10_worst", std::to_string(std::log10(worst)));
 }
 
+/// Unit normal of a height field of this gradient.
+Eigen::Vector3d normal_of(const Eigen::Vector2d& gradient) {
+  return Eigen::Vector3d(-gradient.x(), -gradient.y(), 1.0).normalized();
+}
+
+/// Unit normal of a surface that lets parallel light along +z out.
+Eigen::Vector3d transmitting_normal(Random& random, double eta) {
+  return random.near_z(0.98 * std::asin(1.0 / eta));
+}
+
+TEST(InverseRefraction, UndoesTheRefractionOfASurface) {
+  Random random(1);
+  double worst = 0.0;
+  for (int i = 0; i < 5000; ++i) {
+    const double eta = random.between(1.05, 2.5);
+    const Eigen::Vector3d n = transmitting_normal(random, eta);
+    const Eigen::Vector2d expected = -n.head<2>() / n.z();
+    const Eigen::Vector2d computed = refracting_gradient(RefractedBeam(n, eta).m, eta);
+    worst = std::max(worst, (computed - expected).norm() / std::max(1.0, expected.norm()));
+  }
+  RecordProperty("log10_worst", std::to_string(std::log10(worst)));
+  EXPECT_LT(worst, 1e-12);
+}
+
+TEST(InverseRefraction, SendsLightWhereItIsWanted) {
+  Random random(2);
+  double worst = 0.0;
+  for (int i = 0; i < 5000; ++i) {
+    const double eta = random.between(1.05, 2.5);
+    // A slope that some surface of this glass can bring about: the deflection is at most 90° less
+    // the critical angle.
+    const double largest = std::tan(std::acos(1.0 / eta));
+    const double angle = random.between(0.0, 2.0 * std::numbers::pi);
+    const Eigen::Vector2d m =
+        random.between(0.0, 0.98 * largest) * Eigen::Vector2d(std::cos(angle), std::sin(angle));
+    const Eigen::Vector2d back = RefractedBeam(normal_of(refracting_gradient(m, eta)), eta).m;
+    worst = std::max(worst, (back - m).norm() / std::max(1.0, m.norm()));
+  }
+  RecordProperty("log10_worst", std::to_string(std::log10(worst)));
+  EXPECT_LT(worst, 1e-12);
+}
+
+TEST(InverseRefraction, FollowsSnellsLaw) {
+  Random random(3);
+  for (int i = 0; i < 5000; ++i) {
+    const double eta = random.between(1.05, 2.5);
+    const Eigen::Vector2d m = testing::slope_by_angles(transmitting_normal(random, eta), eta);
+    const Eigen::Vector3d n = normal_of(refracting_gradient(m, eta));
+    const Eigen::Vector3d b = Eigen::Vector3d(m.x(), m.y(), 1.0).normalized();
+    EXPECT_NEAR(n.cross(b).norm(), eta * n.cross(Eigen::Vector3d::UnitZ()).norm(), 1e-13);
+    EXPECT_LT((testing::slope_by_angles(n, eta) - m).norm(), 1e-11 * std::max(1.0, m.norm()));
+  }
+}
+
+TEST(InverseRefraction, LightThatGoesStraightOnNeedsNoSlope) {
+  EXPECT_EQ(refracting_gradient({0.0, 0.0}, 1.49), Eigen::Vector2d(0.0, 0.0));
+}
+
+TEST(InverseRefraction, SurfaceRisesTowardsWhereTheLightGoes) {
+  const Eigen::Vector2d gradient = refracting_gradient({0.049, -0.098}, 1.49);
+  EXPECT_NEAR(gradient.x(), 0.1, 2e-3);
+  EXPECT_NEAR(gradient.y(), -0.2, 4e-3);
+}
+
+constexpr double kDegree = std::numbers::pi / 180.0;
+
+TEST(Fresnel, AcrylicLetsThroughWhatFormulasByAnglesSay) {
+  for (double degrees = 1.0; degrees < 42.0; degrees += 1.0) {
+    const double i = degrees * kDegree;
+    const double t = std::asin(1.49 * std::sin(i));
+    const double across = std::sin(i - t) / std::sin(i + t);
+    const double along = std::tan(i - t) / std::tan(i + t);
+    const double expected = 1.0 - 0.5 * (across * across + along * along);
+    EXPECT_NEAR(transmittance(std::cos(i), 1.49).value, expected, 1e-12) << degrees;
+  }
+  EXPECT_NEAR(transmittance(1.0, 1.49).value, 1.0 - std::pow(0.49 / 2.49, 2), 1e-15);
+}
+
+TEST(Fresnel, LightAlongThePolarisingAngleLosesOnePolarisationAlone) {
+  const double i = std::atan(1.0 / 1.5);
+  const double t = 0.5 * std::numbers::pi - i;
+  const double across = std::sin(i - t);
+  EXPECT_NEAR(transmittance(std::cos(i), 1.5).value, 1.0 - 0.5 * across * across, 1e-12);
+}
+
+TEST(Fresnel, NothingPassesBeyondTheCriticalAngle) {
+  const double critical = std::sqrt(1.0 - 1.0 / (1.49 * 1.49));
+  EXPECT_EQ(transmittance(critical - 1e-9, 1.49).value, 0.0);
+  EXPECT_LT(transmittance(critical + 1e-9, 1.49).value, 1e-3);
+  EXPECT_EQ(transmittance(-0.9, 1.49).value, 0.0);
+}
+
+TEST(Fresnel, SlopeEqualsCentralDifferences) {
+  for (double c = 0.76; c < 0.999; c += 0.01) {
+    const double h = 1e-6;
+    const double expected =
+        (transmittance(c + h, 1.49).value - transmittance(c - h, 1.49).value) / (2.0 * h);
+    EXPECT_NEAR(transmittance(c, 1.49).slope, expected, 1e-8 * (1.0 + std::abs(expected)));
+  }
+}
+
+TEST(Fresnel, TwoReflectionsOfAcrylicAreAThousandthAndAHalf) {
+  EXPECT_NEAR(ghost_share(1.49), std::pow(0.49 / 2.49, 4), 1e-15);
+}
+
+TEST(ReflectionBarrier, IsTheInverseSquareCosineOfTheRefractedAngle) {
+  for (const double incidence : {0.0, 0.2, 0.5, 0.7}) {
+    const double refracted = std::asin(1.49 * std::sin(incidence));
+    EXPECT_NEAR(reflection_barrier(std::cos(incidence), 1.49).value,
+                1.0 / std::pow(std::cos(refracted), 2), 1e-12);
+  }
+}
+
+TEST(ReflectionBarrier, IsInfiniteBeyondTheCriticalAngle) {
+  const double critical = std::asin(1.0 / 1.49);
+  EXPECT_TRUE(std::isfinite(reflection_barrier(std::cos(critical - 1e-9), 1.49).value));
+  EXPECT_EQ(reflection_barrier(std::cos(critical + 1e-9), 1.49).value, kInfinity);
+  EXPECT_EQ(reflection_barrier(-1.0, 1.49).value, kInfinity);
+  EXPECT_EQ(reflection_barrier(std::numeric_limits<double>::quiet_NaN(), 1.49).value, kInfinity);
+}
+
+TEST(ReflectionBarrier, SlopeEqualsCentralDifferences) {
+  testing::Random random(1);
+  for (int i = 0; i < 200; ++i) {
+    const double eta = random.between(1.1, 2.0);
+    const double least = std::cos(0.9 * std::asin(1.0 / eta));
+    const Eigen::VectorXd c = Eigen::VectorXd::Constant(1, random.between(least, 1.0));
+    const auto f = [&](const Eigen::VectorXd& x) { return reflection_barrier(x[0], eta).value; };
+    const Eigen::VectorXd slope = Eigen::VectorXd::Constant(1, reflection_barrier(c[0], eta).slope);
+    EXPECT_LT(testing::plateau_error(slope, f, c, 1e-4), 1e-7);
+  }
+}
+
 }  // namespace
+
 }  // namespace lensforge

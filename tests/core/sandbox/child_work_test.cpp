@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "core/error.h"
-#include "core/sandbox/byte_record.h"
 #include "core/stop_bound.h"
 #include "core/temp_folder.h"
 

@@ -11,13 +11,13 @@
 #include <vector>
 
 #include "core/image/transfer.h"
-#include "core/surface/sample_splines.h"
+#include "core/spline/sample_splines.h"
 #include "design/finite_difference.h"
-#include "design/optics/made_surface.h"
-#include "design/outline_setup.h"
 #include "design/random_input.h"
-#include "design/render_lens.h"
-#include "design/schedule/spline_start.h"
+#include "design/render.h"
+#include "design/schedule/levels.h"
+#include "design/setup/outline_setup.h"
+#include "design/spline/made_surface.h"
 #include "design/test_setups.h"
 
 namespace lensforge {
@@ -42,7 +42,7 @@ class SplineObjective : public ::testing::Test {
     return {net_mesh(net_), setup_, target_, options_, executor};
   }
 
-  /// Of what a surface projects, display-encoded.
+  /// Mean absolute error of a surface's picture, display-encoded.
   [[nodiscard]] double mean_absolute_error(const SampledSurface& nodes) const {
     const Image picture =
         render_surface(nodes.mesh, nodes.normals, setup_, Executor::serial()).image;
@@ -56,7 +56,7 @@ class SplineObjective : public ::testing::Test {
     return absolute / pixels;
   }
 
-  /// Of a gradient along a direction, against central differences.
+  /// Error of a gradient along a direction, against central differences.
   [[nodiscard]] double slope_error(SplineObjectiveOn<Executor>& function,
                                    const Eigen::Matrix3Xd& gradient,
                                    const Eigen::Matrix3Xd& direction) const {
@@ -136,7 +136,7 @@ TEST_F(SplineObjective, GradientOfTheMadePartEqualsCentralDifferences) {
   }
 }
 
-/// Of the spline itself and of what is made of it, in both ways.
+/// For the spline itself and for its made surface with narrow and wide knot cells.
 TEST_F(SplineObjective, GradientInSeveralColorsEqualsCentralDifferences) {
   setup_.spectrum = {{480.0, 550.0, 620.0}, {}, 12.0};
   for (const std::optional<MadeBy>& made_by :

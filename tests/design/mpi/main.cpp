@@ -3,7 +3,7 @@
 
 #include "design/mpi/ranks.h"
 
-/// Only rank 0 prints, unless something fails: the others' cases are the same.
+/// Only rank 0 prints unless something fails; the others run the same cases.
 int main(int argc, char** argv) {
   ::testing::InitGoogleTest(&argc, argv);
   const lensforge::MpiSession session;

@@ -13,10 +13,10 @@
 #include <string>
 #include <vector>
 
-#include "core/surface/grid_mesh.h"
-#include "design/flux_of_surface.h"
-#include "design/mpi/rank_stage.h"
+#include "core/mesh/surface_mesh.h"
 #include "design/mpi/ranks.h"
+#include "design/mpi/session.h"
+#include "design/render.h"
 #include "design/schedule/guided_optimization.h"
 
 namespace lensforge {
@@ -24,7 +24,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// The most memory that the process has had resident, MB.
+/// Maximum resident memory of the process so far, MB.
 double peak_memory() {
   std::ifstream status("/proc/self/status");
   for (std::string line; std::getline(status, line);) {
@@ -68,7 +68,7 @@ struct Scene {
     add_waves(0.9);
   }
 
-  /// One for every 20 pixels; of height 1 they make the light a third brighter and darker.
+  /// One wave per 20 pixels; of height 1 they make the light a third brighter and darker.
   void add_waves(double height) {
     const double wave = 2.0 * std::numbers::pi * setup.pixels.x() / 20.0 / 100.0;
     for (auto p : mesh.vertices.colwise()) {

@@ -10,15 +10,15 @@
 #include <string>
 #include <vector>
 
-#include "core/optics/front_placement.h"
+#include "core/optics/front.h"
 #include "core/optics/height_fronts.h"
 #include "core/optics/light_path.h"
 #include "core/optics/outline.h"
-#include "design/mpi/rank_stage.h"
 #include "design/mpi/ranks.h"
+#include "design/mpi/session.h"
 #include "design/objective_setups.h"
 
-/// Every rank runs every test. What needs a rank 0 that the others serve is on_first_rank().
+/// Every rank runs every test. on_first_rank() runs a part on rank 0 while the others serve it.
 namespace lensforge::testing {
 
 inline void on_first_rank(const std::function<void()>& body) {
@@ -38,7 +38,7 @@ struct NamedSetup {
   friend void PrintTo(const NamedSetup& named, std::ostream* out) { *out << named.name; }
 };
 
-/// kSetup with what changes it; its picture is moved to where the light goes.
+/// kSetup changed for a kind; its picture is moved to where the light goes.
 inline NamedSetup changed(const std::string& name,
                           const std::function<void(OpticalSetup&)>& change) {
   OpticalSetup setup = kSetup;
@@ -54,7 +54,7 @@ inline void lit_from_a_point(OpticalSetup& setup) {
                             Emission::kLambertian};
 }
 
-/// One of everything that an OpticalSetup can hold.
+/// A setup with every part that an OpticalSetup can hold.
 inline std::vector<NamedSetup> all_setups() {
   const auto oblique = [](OpticalSetup& s) {
     s.light = Eigen::Vector3d(0.25, -0.15, 1.0).normalized();

@@ -4,7 +4,10 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <cstdlib>
 #include <numbers>
 #include <vector>
 
@@ -18,6 +21,25 @@ using testing::Random;
 constexpr GridShape kShape{7, 6};
 constexpr int kVertices = 42;
 constexpr double kAspect = 0.87;
+
+/// The preconditioner on the CPU, by Eigen's vectors.
+class GridPreconditioner : private GridPreconditionerOn<Executor> {
+ public:
+  using GridPreconditionerOn<Executor>::GridPreconditionerOn;
+  using GridPreconditionerOn<Executor>::set_reach;
+  using GridPreconditionerOn<Executor>::xy;
+  using GridPreconditionerOn<Executor>::z;
+
+  void apply(const Eigen::VectorXd& g, Eigen::VectorXd& r) { apply_power(g, 1.0, r); }
+  void apply_root(const Eigen::VectorXd& g, Eigen::VectorXd& r) { apply_power(g, 0.5, r); }
+
+ private:
+  void apply_power(const Eigen::VectorXd& g, double exponent, Eigen::VectorXd& r) {
+    r.resize(g.size());
+    const auto size = static_cast<std::size_t>(g.size());
+    GridPreconditionerOn<Executor>::apply({g.data(), size}, exponent, {r.data(), size});
+  }
+};
 
 /// x held on the left and right, y on the lower and upper border, as on a lens.
 Eigen::Matrix3Xd movable() {
@@ -195,5 +217,58 @@ TEST_F(GridPreconditionerTest, ReachScalesBothSides) {
   EXPECT_LT((apply(g) - expected).norm(), 1e-12 * expected.norm());
 }
 
+constexpr GridShape kGrid{40, 23};
+constexpr int kNodes = kGrid.columns * kGrid.rows;
+
+TEST(Levelling, LeavesEvenCurvatureAlone) {
+  const Eigen::ArrayXd factors = levelling_factors(Eigen::VectorXd::Constant(kNodes, 7.3), kGrid);
+  EXPECT_LT((factors - 1.0).abs().maxCoeff(), 1e-12);
+}
+
+/// Curvature goes with the square of reach: halves of 4 and 1 (squares 16 and 1) want 1 : 2.
+TEST(Levelling, EvensOutTwoHalves) {
+  Eigen::VectorXd squares = Eigen::VectorXd::Ones(kNodes);
+  for (int v = 0; v < kNodes; ++v) {
+    if (v % kGrid.columns < kGrid.columns / 2) squares[v] = 16.0;
+  }
+  const Eigen::ArrayXd factors = levelling_factors(squares, kGrid);
+  const double left = factors[0];
+  const double right = factors[kNodes - 1];
+  EXPECT_NEAR(right / left, 2.0, 1e-12);
+  EXPECT_LT(left, 1.0);
+  EXPECT_GT(right, 1.0);
+}
+
+TEST(Levelling, FollowsMeansOverTheNeighbourhood) {
+  testing::Random random(3);
+  Eigen::VectorXd squares(kNodes);
+  for (double& square : squares) square = random.between(0.5, 2.0);
+  Eigen::ArrayXd wanted(kNodes);
+  for (int r = 0; r < kGrid.rows; ++r) {
+    for (int c = 0; c < kGrid.columns; ++c) {
+      double sum = 0.0;
+      int count = 0;
+      for (int v = 0; v < kNodes; ++v) {
+        const int far = std::max(std::abs(v % kGrid.columns - c), std::abs(v / kGrid.columns - r));
+        if (far > kLevellingRadius) continue;
+        sum += squares[v];
+        ++count;
+      }
+      wanted[r * kGrid.columns + c] = -0.25 * std::log(sum / count);
+    }
+  }
+  const Eigen::ArrayXd expected = (wanted - wanted.mean()).exp();
+  EXPECT_LT((levelling_factors(squares, kGrid) - expected).abs().maxCoeff(), 1e-12);
+}
+
+TEST(Levelling, StaysWithinItsBoundWhereNothingIsFelt) {
+  Eigen::VectorXd squares = Eigen::VectorXd::Zero(kNodes);
+  squares.head(10 * kGrid.columns).setConstant(1e9);
+  const Eigen::ArrayXd factors = levelling_factors(squares, kGrid);
+  EXPECT_DOUBLE_EQ(factors.maxCoeff(), kMaxLevelling);
+  EXPECT_DOUBLE_EQ(factors.minCoeff(), 1.0 / kMaxLevelling);
+}
+
 }  // namespace
+
 }  // namespace lensforge

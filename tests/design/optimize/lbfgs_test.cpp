@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "design/optimize/lbfgs.h"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
 #include <vector>
 
-#include "design/optimize/lbfgs_on.h"
 #include "design/random_input.h"
 #include "design/vector_lbfgs.h"
 

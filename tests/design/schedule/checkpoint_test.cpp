@@ -11,12 +11,12 @@
 #include <string>
 #include <vector>
 
+#include "core/compute/scalar.h"
 #include "core/error.h"
 #include "core/member_count.h"
-#include "core/surface/grid_mesh.h"
+#include "core/mesh/surface_mesh.h"
 #include "core/temp_folder.h"
-#include "core/value_slope.h"
-#include "design/design_fields.h"
+#include "design/setup/option_tables.h"
 #include "design/test_setups.h"
 
 namespace lensforge {
@@ -59,13 +59,13 @@ std::string sample_bytes(const TempFolder& folder) {
   return testing::read_bytes(folder / "good");
 }
 
-/// Error of reading these bytes.
+/// Message of the error for a checkpoint of these bytes.
 std::string refusal_of(const TempFolder& folder, const std::string& bytes) {
   testing::write_bytes(folder / "bad", bytes);
   return message_of<InputError>([&] { read_checkpoint(folder / "bad"); });
 }
 
-/// `bytes` with one text for another and the check sum (FNV-1a over all but the last 8) made right.
+/// Replaces a text in `bytes` and corrects the check sum (FNV-1a over all but the last 8).
 std::string forged(std::string bytes, const std::string& from, const std::string& to) {
   bytes.resize(bytes.size() - 8);
   bytes.replace(bytes.find(from), from.size(), to);
@@ -250,8 +250,8 @@ TEST(DesignFingerprint, ChangesWithEveryNumberOfTheProcess) {
 }
 
 TEST(DesignFingerprint, EveryMemberOfTheOptionsHasARow) {
-  // Weights and light have tables of their own, the process is a workshop's, the outline may be a
-  // file's; checkpoint and resume say where and when, not what.
+  // Weights and light have tables of their own, the process comes from a workshop, the outline may
+  // come from a file; checkpoint and resume do not change the result.
   constexpr std::size_t kWithoutRow = 6;
   EXPECT_EQ(description_of(DesignOptions()).size() + kWithoutRow,
             testing::member_count<DesignOptions>());

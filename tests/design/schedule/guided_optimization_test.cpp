@@ -8,8 +8,8 @@
 #include <stop_token>
 #include <string>
 
+#include "core/compute/scalar.h"
 #include "core/error.h"
-#include "core/value_slope.h"
 #include "design/schedule/face_transport.h"
 #include "design/test_setups.h"
 
@@ -38,7 +38,7 @@ LbfgsSummary run(SurfaceMesh& mesh, int iterations, const Executor& executor,
 
 bool go_on(int, const DesignObjective::Evaluation&) { return true; }
 
-/// The lens that transport makes of a flat one.
+/// A flat lens after transport.
 SurfaceMesh transported() {
   SurfaceMesh mesh = make_grid_mesh(kSize, kShape, 5.0);
   const FaceLight light = face_light(mesh, kSetup, SurfaceModel::kFacet, Executor::serial());

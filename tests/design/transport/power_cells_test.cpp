@@ -30,7 +30,7 @@ Eigen::VectorXd random_weights(Eigen::Index count, double size, Random& random) 
   return Eigen::VectorXd::NullaryExpr(count, [&] { return random.between(-size, size); });
 }
 
-/// Largest difference of masses and moments to those of cells cut by hand, in units of the total.
+/// Largest difference of masses and moments from those of cells cut by hand, in units of the total.
 double worst_difference(const PowerDiagram& diagram, const SummedDensity& density) {
   const Executor executor = Executor::serial();
   const PowerCells cells = measure_cells(diagram, density, executor);
@@ -87,7 +87,7 @@ TEST(PowerCells, OfSitesOnALineAreStrips) {
 }
 
 TEST(PowerCells, OfARegularGridCoverItsCorners) {
-  // All vertices lie on pixel corners, four cells meet in each, borders run along the picture's.
+  // All vertices lie on pixel corners, four cells meet in each, and borders run along the pixels'.
   Eigen::Matrix2Xd sites(2, 36);
   const Eigen::Vector2d half(0.5, 0.5);
   for (int i = 0; i < 36; ++i) sites.col(i) = Eigen::Vector2d(i % 6, i / 6) - half;
@@ -96,7 +96,7 @@ TEST(PowerCells, OfARegularGridCoverItsCorners) {
 }
 
 TEST(PowerCells, OfATurnedGridReachThePicturesBorder) {
-  // Sites of a side lie on a line but for rounding: triangles of the hull have any area around 0.
+  // Sites of a side lie on a line up to rounding: triangles of the hull have areas around 0.
   const SummedDensity density(testing::random_picture(8, 8, 0.1, 8), 1.0);
   double worst = 0.0;
   for (int turn = 1; turn <= 40; ++turn) {
@@ -166,7 +166,7 @@ TEST(PowerCells, NewtonMatrixIsTheDerivativeOfTheMasses) {
     }
   }
   RecordProperty("worst", std::to_string(worst));
-  // Vertices that cross a pixel border within the difference make a kink.
+  // A vertex that crosses a pixel border within the difference causes a kink.
   EXPECT_LT(worst, 1e-4 * matrix.cwiseAbs().maxCoeff());
 }
 

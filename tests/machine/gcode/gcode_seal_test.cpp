@@ -8,7 +8,7 @@
 #include <string_view>
 
 #include "core/error.h"
-#include "core/io/sha256.h"
+#include "core/io/files.h"
 #include "core/temp_folder.h"
 #include "machine/gcode/program_seal.h"
 

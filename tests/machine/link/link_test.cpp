@@ -20,7 +20,7 @@
 #include <vector>
 
 #include "core/error.h"
-#include "core/io/descriptor.h"
+#include "core/io/files.h"
 #include "core/temp_folder.h"
 #include "machine/link/port.h"
 #include "machine/pseudo_terminal.h"

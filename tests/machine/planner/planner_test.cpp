@@ -4,11 +4,13 @@
 
 #include <cmath>
 #include <numbers>
+#include <optional>
 #include <random>
+#include <sstream>
 #include <vector>
 
 #include "core/error.h"
-#include "machine/planner/planner_model.h"
+#include "machine/gcode.h"
 
 namespace lensforge {
 namespace {
@@ -267,6 +269,20 @@ TEST(PlannerModel, StarvedMachineStopsAtEveryLine) {
   EXPECT_EQ(time.starved, 99);
   const double last = 2.0 * std::sqrt(0.1 / 400.0);
   EXPECT_NEAR(time.stream_limited_seconds, 100.0 / 5.0 + last, 1e-9);
+}
+
+TEST(PlannerModel, TimesAProgramAsTheDoorSays) {
+  std::istringstream file("G21 G90\nG1 X100 F600\nM2\n");
+  GcodeReader reader(file);
+  GcodeInterpreter interpreter(grbl_dialect());
+  PlannerModel model(smooth_machine());
+  while (const std::optional<GcodeText> text = reader.next()) {
+    model.line(text->text.size() + 1);
+    const GcodeEffect effect = interpreter.run(parse_gcode_block(*text));
+    for (const GcodeMotion& motion : effect.motions()) model.add(motion);
+  }
+  // 100 mm at 10 mm/s, with 400 mm/s² at both ends.
+  EXPECT_NEAR(model.finish().seconds, 10.0 + 10.0 / 400.0, 1e-9);
 }
 
 TEST(SpeedProfile, NeverBreaksItsLimits) {

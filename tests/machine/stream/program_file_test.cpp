@@ -9,7 +9,7 @@
 #include <string>
 
 #include "core/error.h"
-#include "core/io/sha256.h"
+#include "core/io/files.h"
 #include "core/temp_folder.h"
 #include "machine/stream/program_feed.h"
 

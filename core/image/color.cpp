@@ -1,0 +1,293 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "core/image/color.h"
+
+#include <lcms2.h>
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstddef>
+#include <numeric>
+#include <string_view>
+
+#include "core/image/transfer.h"
+#include "core/text/lower_case.h"
+
+namespace lensforge {
+namespace {
+
+using Curve = ColorSpace::Curve;
+
+/// ITU-R BT.709-6, item 1.2, inverted.
+double decode_rec709(double stored) {
+  return stored < 0.081 ? stored / 4.5 : std::pow((stored + 0.099) / 1.099, 1.0 / 0.45);
+}
+
+std::optional<ColorSpace> parse_gamma(std::string_view digits) {
+  double gamma = 0.0;
+  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), gamma);
+  const bool whole = error == std::errc{} && end == digits.data() + digits.size();
+  if (!whole || !std::isfinite(gamma) || gamma <= 0.0) return std::nullopt;
+  return ColorSpace{gamma == 1.0 ? Curve::kLinear : Curve::kGamma, gamma};
+}
+
+}  // namespace
+
+std::optional<ColorSpace> parse_color_space(const std::string& name) {
+  const std::string lower = lower_case(name);
+  const auto is_one_of = [&](const auto& names) {
+    return std::find(names.begin(), names.end(), lower) != names.end();
+  };
+  using Names = std::array<std::string_view, 4>;
+  if (is_one_of(Names{"srgb", "srgb_texture", "srgb_display", "srgb_tx"})) return ColorSpace{};
+  if (is_one_of(Names{"linear", "scene_linear", "lin_srgb", "lin_rec709"})) {
+    return ColorSpace{Curve::kLinear, 1.0};
+  }
+  if (is_one_of(Names{"rec709", "bt709", "rec.709", "itu-r bt.709"})) {
+    return ColorSpace{Curve::kRec709, 1.0};
+  }
+  for (const std::string_view prefix : {"gammacorrected", "gamma"}) {
+    if (lower.starts_with(prefix))
+      return parse_gamma(std::string_view(lower).substr(prefix.size()));
+  }
+  return std::nullopt;
+}
+
+double to_linear(double stored, const ColorSpace& space) {
+  switch (space.curve) {
+    case Curve::kLinear:
+      return stored;
+    case Curve::kSrgb:
+      return decode(stored);
+    case Curve::kRec709:
+      return decode_rec709(stored);
+    case Curve::kGamma:
+      return std::pow(stored, space.gamma);
+  }
+  return stored;
+}
+
+namespace {
+
+using Bytes = std::span<const unsigned char>;
+using Handle = std::unique_ptr<void, decltype(&cmsCloseProfile)>;
+
+/// Largest difference from sRGB, display-encoded. Half a step of eight bits: common sRGB profiles
+/// differ by a tenth of it, a gamma of 2.2 by fifteen times as much.
+constexpr double kSameAsSrgb = 0.5 / 255.0;
+
+Handle opened(Bytes bytes) {
+  return {cmsOpenProfileFromMem(bytes.data(), static_cast<cmsUInt32Number>(bytes.size())),
+          cmsCloseProfile};
+}
+
+/// Linear light with Rec. 709 primaries, as in the rest of the program.
+Handle linear_rec709() {
+  const cmsCIExyY white{0.3127, 0.3290, 1.0};
+  const cmsCIExyYTRIPLE primaries{{0.64, 0.33, 1.0}, {0.30, 0.60, 1.0}, {0.15, 0.06, 1.0}};
+  const std::unique_ptr<cmsToneCurve, decltype(&cmsFreeToneCurve)> linear(
+      cmsBuildGamma(nullptr, 1.0), cmsFreeToneCurve);
+  const std::array<cmsToneCurve*, 3> curves{linear.get(), linear.get(), linear.get()};
+  return {cmsCreateRGBProfile(&white, &primaries, curves.data()), cmsCloseProfile};
+}
+
+}  // namespace
+
+struct ColorProfile::Transform {
+  std::unique_ptr<void, decltype(&cmsDeleteTransform)> transform{nullptr, cmsDeleteTransform};
+  bool is_grey = false;
+  bool has_curves = false;  ///< Curves and primaries: the channels' light adds up.
+};
+
+ColorProfile::ColorProfile(std::shared_ptr<const Transform> transform)
+    : transform_(std::move(transform)) {
+  white_ = computed({1.0, 1.0, 1.0});
+}
+
+std::optional<ColorProfile> ColorProfile::open(Bytes bytes) {
+  const Handle profile = opened(bytes);
+  if (!profile) return std::nullopt;
+  const cmsColorSpaceSignature space = cmsGetColorSpace(profile.get());
+  if (space != cmsSigGrayData && space != cmsSigRgbData) return std::nullopt;
+  const Handle light = linear_rec709();
+  auto made = std::make_shared<Transform>();
+  made->is_grey = space == cmsSigGrayData;
+  made->has_curves = cmsIsMatrixShaper(profile.get()) != 0;
+  made->transform.reset(cmsCreateTransform(
+      profile.get(), made->is_grey ? TYPE_GRAY_DBL : TYPE_RGB_DBL, light.get(), TYPE_RGB_DBL,
+      INTENT_RELATIVE_COLORIMETRIC, cmsFLAGS_NOOPTIMIZE | cmsFLAGS_NOCACHE));
+  if (!made->transform) return std::nullopt;
+  ColorProfile result(std::move(made));
+  if (!(std::isfinite(result.white_) && result.white_ > 0.0)) return std::nullopt;
+  return result;
+}
+
+std::string ColorProfile::colors_of(Bytes bytes) {
+  const Handle profile = opened(bytes);
+  if (!profile) return {};
+  switch (cmsGetColorSpace(profile.get())) {
+    case cmsSigGrayData:
+      return "grey";
+    case cmsSigRgbData:
+      return "RGB";
+    case cmsSigCmykData:
+      return "CMYK";
+    default:
+      return "other";
+  }
+}
+
+std::string ColorProfile::name_of(Bytes bytes) {
+  const Handle profile = opened(bytes);
+  std::array<char, 256> name{};
+  if (!profile || cmsGetProfileInfoASCII(profile.get(), cmsInfoDescription, "en", "US", name.data(),
+                                         name.size()) == 0) {
+    return {};
+  }
+  name.back() = '\0';
+  return name.data();
+}
+
+double ColorProfile::computed(const std::array<double, 3>& stored) const {
+  std::array<double, 3> rgb{};
+  cmsDoTransform(transform_->transform.get(), stored.data(), rgb.data(), 1);
+  return luminance_rec709(rgb);
+}
+
+void ColorProfile::tabulate(int most) {
+  if (!transform_->has_curves) return;
+  const double dark = computed({0.0, 0.0, 0.0});
+  for (std::size_t channel = 0; channel < 3; ++channel) {
+    std::vector<double>& table = tables_[channel];
+    table.resize(static_cast<std::size_t>(most) + 1);
+    for (std::size_t i = 0; i < table.size(); ++i) {
+      std::array<double, 3> alone{};
+      alone[channel] = static_cast<double>(i) / most;
+      table[i] = computed(alone) - dark * 2.0 / 3.0;
+    }
+  }
+}
+
+double ColorProfile::light(const std::array<double, 3>& stored) const {
+  double light = 0.0;
+  if (tables_[0].empty()) {
+    light = computed(stored);
+  } else {
+    for (std::size_t c = 0; c < 3; ++c) {
+      const double most = static_cast<double>(tables_[c].size() - 1);
+      const double place = std::round(std::clamp(stored[c], 0.0, 1.0) * most);
+      light += tables_[c][static_cast<std::size_t>(place)];
+    }
+  }
+  return std::max(0.0, light / white_);
+}
+
+bool ColorProfile::is_srgb() const {
+  constexpr int kSamples = 64;
+  const auto differs = [](double light, double expected) {
+    return std::abs(encode(light) - encode(expected)) > kSameAsSrgb;
+  };
+  for (int i = 0; i <= kSamples; ++i) {
+    const double value = double{1} * i / kSamples;
+    if (differs(light({value, value, value}), decode(value))) return false;
+    for (std::size_t c = 0; c < 3 && !transform_->is_grey; ++c) {
+      std::array<double, 3> alone{};
+      alone[c] = value;
+      std::array<double, 3> linear{};
+      linear[c] = decode(value);
+      if (differs(light(alone), luminance_rec709(linear))) return false;
+    }
+  }
+  return true;
+}
+
+namespace {
+
+/// A Gaussian with two widths, nm: left and right of its peak.
+double lobe(double wavelength, double peak, double left, double right) {
+  const double t = (wavelength - peak) / (wavelength < peak ? left : right);
+  return std::exp(-0.5 * t * t);
+}
+
+/// CIE XYZ → linear sRGB (IEC 61966-2-1).
+Eigen::Matrix3d rgb_of_xyz() {
+  Eigen::Matrix3d m;
+  m << 3.2406, -1.5372, -0.4986,  //
+      -0.9689, 1.8758, 0.0415,    //
+      0.0557, -0.2040, 1.0570;
+  return m;
+}
+
+/// Linear RGB of every wavelength, each channel scaled so that the sum is white.
+std::vector<Eigen::Vector3d> balanced_colors(const std::vector<double>& wavelengths,
+                                             const std::vector<double>& powers) {
+  std::vector<Eigen::Vector3d> colors;
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (std::size_t k = 0; k < wavelengths.size(); ++k) {
+    colors.push_back(rgb_of_xyz() * color_matching(wavelengths[k]));
+    if (!powers.empty()) colors.back() *= powers[k];
+    sum += colors.back();
+  }
+  // A channel that the wavelengths do not light stays black.
+  const double least = 1e-3 * sum.cwiseAbs().maxCoeff();
+  for (Eigen::Vector3d& color : colors) {
+    for (int k = 0; k < 3; ++k) color[k] = sum[k] > least ? color[k] / sum[k] : 0.0;
+  }
+  return colors;
+}
+
+unsigned char byte_of(double linear) {
+  return static_cast<unsigned char>(std::lround(255.0 * encode(std::clamp(linear, 0.0, 1.0))));
+}
+
+}  // namespace
+
+Eigen::Vector3d color_matching(double wavelength) {
+  const double x = 1.056 * lobe(wavelength, 599.8, 37.9, 31.0) +
+                   0.362 * lobe(wavelength, 442.0, 16.0, 26.7) -
+                   0.065 * lobe(wavelength, 501.1, 20.4, 26.2);
+  const double y =
+      0.821 * lobe(wavelength, 568.8, 46.9, 40.5) + 0.286 * lobe(wavelength, 530.9, 16.3, 31.1);
+  const double z =
+      1.217 * lobe(wavelength, 437.0, 11.8, 36.0) + 0.681 * lobe(wavelength, 459.0, 26.0, 13.8);
+  return {x, y, z};
+}
+
+std::vector<double> brightness_shares(const std::vector<double>& wavelengths,
+                                      const std::vector<double>& powers) {
+  std::vector<double> shares;
+  for (std::size_t k = 0; k < wavelengths.size(); ++k) {
+    shares.push_back(color_matching(wavelengths[k]).y() * (powers.empty() ? 1.0 : powers[k]));
+  }
+  const double sum = std::accumulate(shares.begin(), shares.end(), 0.0);
+  for (double& share : shares) share /= sum;
+  return shares;
+}
+
+Image mixed(const std::vector<Image>& pictures, const std::vector<double>& shares) {
+  Image sum(pictures.front().columns(), pictures.front().rows());
+  for (std::size_t k = 0; k < pictures.size(); ++k) {
+    for (std::size_t i = 0; i < sum.values().size(); ++i) {
+      sum.values()[i] += static_cast<float>(shares[k]) * pictures[k].values()[i];
+    }
+  }
+  return sum;
+}
+
+ColorImage color_picture(const std::vector<Image>& pictures, const std::vector<double>& wavelengths,
+                         const std::vector<double>& powers) {
+  const std::vector<Eigen::Vector3d> colors = balanced_colors(wavelengths, powers);
+  ColorImage result{pictures.front().columns(), pictures.front().rows(), {}};
+  for (std::size_t i = 0; i < pictures.front().values().size(); ++i) {
+    Eigen::Vector3d rgb = Eigen::Vector3d::Zero();
+    for (std::size_t k = 0; k < colors.size(); ++k) {
+      rgb += static_cast<double>(pictures[k].values()[i]) * colors[k];
+    }
+    for (int k = 0; k < 3; ++k) result.rgb.push_back(byte_of(rgb[k]));
+  }
+  return result;
+}
+
+}  // namespace lensforge

@@ -1,0 +1,332 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "core/lens/setup_json.h"
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "core/image/rasters.h"
+#include "core/io/lens_folder.h"
+#include "core/optics/outline.h"
+#include "core/schema/json.h"
+#include "core/text/number_text.h"
+
+namespace lensforge {
+namespace {
+
+using nlohmann::ordered_json;
+
+/// Maximum difference between two keys that state the same place or length, mm.
+constexpr double kAgreement = 1e-6;
+
+Outline read_circle(const JsonFields& fields, const Eigen::Vector2d& size) {
+  Outline circle = circle_outline(size);
+  if (!((fields.number_pair("centre") - 0.5 * size).norm() <= kAgreement)) {
+    fields.refuse("centre", "it must be the middle of lens_size");
+  }
+  if (!(std::abs(fields.number("radius") - circle.radius) <= kAgreement)) {
+    fields.refuse("radius", "it must be half of the shorter side of lens_size, " +
+                                number_text(circle.radius));
+  }
+  return circle;
+}
+
+Outline read_rounded(const JsonFields& fields, const Eigen::Vector2d& size) {
+  const double radius = fields.number("radius");
+  if (!(radius > 0.0 && radius <= 0.5 * size.minCoeff())) {
+    fields.refuse("radius", "it must be above 0 and at most half of the shorter side, " +
+                                number_text(0.5 * size.minCoeff()));
+  }
+  return rounded_outline(size, radius);
+}
+
+Outline read_polygon(const JsonFields& fields) {
+  Outline polygon{OutlineKind::kPolygon, 0.0, {}};
+  const nlohmann::json& points = fields.at("points");
+  const auto is_pair = [](const nlohmann::json& p) {
+    return p.is_array() && p.size() == 2 && p[0].is_number() && p[1].is_number();
+  };
+  if (!points.is_array()) fields.refuse("points", "it must be a list of [x, y]");
+  for (const nlohmann::json& p : points) {
+    if (!is_pair(p)) fields.refuse("points", "it must be a list of [x, y]");
+    polygon.points.emplace_back(p[0].get<double>(), p[1].get<double>());
+  }
+  return polygon;
+}
+
+/// The outline in lens.json: its type, a circle's centre and radius, a rounded rectangle's radius,
+/// a polygon's corners; mm.
+ordered_json outline_json(const Outline& outline, const Eigen::Vector2d& lens_size) {
+  switch (outline.kind) {
+    case OutlineKind::kCircle:
+      return {{"type", "circle"},
+              {"centre", {0.5 * lens_size.x(), 0.5 * lens_size.y()}},
+              {"radius", outline.radius}};
+    case OutlineKind::kRoundedRectangle:
+      return {{"type", "rounded_rectangle"}, {"radius", outline.radius}};
+    case OutlineKind::kPolygon:
+      break;
+  }
+  ordered_json points = ordered_json::array();
+  for (const Eigen::Vector2d& p : outline.points) points.push_back({p.x(), p.y()});
+  return {{"type", "polygon"}, {"points", points}};
+}
+
+/// outline_json() read back for a lens of this size. @throw InputError naming the field.
+Outline read_outline(const JsonFields& outline, const Eigen::Vector2d& lens_size) {
+  const std::string type = outline.text("type");
+  if (type == "circle") return read_circle(outline, lens_size);
+  if (type == "rounded_rectangle") return read_rounded(outline, lens_size);
+  if (type == "polygon") return read_polygon(outline);
+  outline.refuse("type", R"(it must be "circle", "rounded_rectangle" or "polygon")");
+}
+
+/// Keys of a source's extent.
+constexpr const char* kAngle = "angle_mrad";
+constexpr const char* kSize = "size_mm";
+constexpr double kMilliradian = 1e-3;
+
+template <class Vector>
+ordered_json array_of(const Vector& vector) {
+  ordered_json array = ordered_json::array();
+  for (const auto& entry : vector) array.push_back(entry);
+  return array;
+}
+
+/// Direction along x that the viewer sees as the picture's right.
+double right_along_x(const OpticalSetup& setup) {
+  return setup.view == ViewSide::kFront ? -1.0 : 1.0;
+}
+
+ordered_json shape_json(const SourceShape& shape) {
+  ordered_json rows = ordered_json::array();
+  for (int r = 0; r < shape.rows; ++r) {
+    const auto row = shape.weights.begin() + std::ptrdiff_t{r} * shape.columns;
+    rows.push_back(std::vector<double>(row, row + shape.columns));
+  }
+  return rows;
+}
+
+ordered_json bare_source_json(const OpticalSetup& setup) {
+  if (!setup.point) return {{"type", "parallel"}, {"direction", array_of(setup.light)}};
+  const bool even = setup.point->emission == Emission::kIsotropic;
+  return {{"type", "point"},
+          {"position", array_of(setup.point->position)},
+          {"emission", even ? "isotropic" : "lambertian"}};
+}
+
+ordered_json source_json(const OpticalSetup& setup) {
+  ordered_json source = bare_source_json(setup);
+  const SourceExtent& extent = setup.extent;
+  if (extent.none()) return source;
+  source[setup.point ? kSize : kAngle] = setup.point ? extent.width : extent.width / kMilliradian;
+  if (!extent.shape.is_disc()) source["shape"] = shape_json(extent.shape);
+  return source;
+}
+
+SourceShape read_shape(const JsonFields& source) {
+  SourceShape shape;
+  const nlohmann::json& rows = source.at("shape");
+  const auto refuse = [&] {
+    source.refuse("shape", "it must be rows of numbers, all of the same length, at most " +
+                               std::to_string(kMaxShapeSide) + " a side");
+  };
+  if (!rows.is_array() || rows.empty() || rows.size() > kMaxShapeSide) refuse();
+  for (const nlohmann::json& row : rows) {
+    if (!row.is_array() || row.empty() || row.size() != rows.front().size() ||
+        row.size() > kMaxShapeSide) {
+      refuse();
+    }
+    for (const nlohmann::json& weight : row) {
+      if (!weight.is_number()) refuse();
+      shape.weights.push_back(weight.get<double>());
+    }
+  }
+  shape.rows = static_cast<int>(rows.size());
+  shape.columns = static_cast<int>(rows.front().size());
+  return shape;
+}
+
+void read_extent(const JsonFields& source, OpticalSetup& setup) {
+  const char* const key = setup.point ? kSize : kAngle;
+  if (source.has(key)) {
+    setup.extent.width = source.number(key) * (setup.point ? 1.0 : kMilliradian);
+  }
+  if (source.has("shape")) setup.extent.shape = read_shape(source);
+}
+
+ordered_json screen_json(const OpticalSetup& setup) {
+  const Eigen::Vector3d right = right_along_x(setup) * setup.screen_x;
+  // Adding 0 turns -0 into 0.
+  return {{"centre", array_of(setup.screen_centre())},
+          {"right", array_of(Eigen::Vector3d(right.array() + 0.0))},
+          {"up", array_of(setup.screen_y)},
+          {"size", array_of(setup.image_size)}};
+}
+
+void read_source(const JsonFields& source, OpticalSetup& setup) {
+  const std::string type = source.text("type");
+  if (type == "parallel") {
+    const Eigen::Vector3d usual(0.0, 0.0, 1.0);
+    setup.light = source.has("direction") ? source.number_triple("direction") : usual;
+  } else if (type == "point") {
+    PointSource point{source.number_triple("position"), Emission::kIsotropic};
+    const std::string emission = source.has("emission") ? source.text("emission") : "isotropic";
+    if (emission == "lambertian") {
+      point.emission = Emission::kLambertian;
+    } else if (emission != "isotropic") {
+      source.refuse("emission", R"(it must be "isotropic" or "lambertian")");
+    }
+    setup.point = point;
+  } else {
+    source.refuse("type", R"(it must be "parallel" or "point")");
+  }
+  read_extent(source, setup);
+}
+
+void read_front(const JsonFields& front, const std::filesystem::path& folder, OpticalSetup& setup) {
+  const std::string type = front.text("type");
+  if (type == "sphere") {
+    setup.front = SphericalFront{front.number("radius"), front.number_triple("apex")};
+  } else if (type == "heights") {
+    HeightGrid grid = read_heights(named_file(front, "file", folder));
+    setup.front =
+        HeightFront{std::make_shared<HeightSpline>(std::move(grid)), front.number_pair("size")};
+  } else if (type != "flat") {
+    front.refuse("type", R"(it must be "flat", "sphere" or "heights")");
+  } else if (front.number("z") != 0.0) {
+    front.refuse("z", "it must be 0, where the lens begins");
+  }
+}
+
+ordered_json front_json(const OpticalSetup& setup) {
+  if (!setup.front) return {{"type", "flat"}, {"z", 0}};
+  if (const auto* const map = std::get_if<HeightFront>(&*setup.front)) {
+    return {{"type", "heights"}, {"file", lens_file::kFront}, {"size", array_of(map->size)}};
+  }
+  const auto& sphere = std::get<SphericalFront>(*setup.front);
+  return {{"type", "sphere"}, {"radius", sphere.radius}, {"apex", array_of(sphere.apex)}};
+}
+
+ordered_json spectrum_json(const Spectrum& spectrum) {
+  ordered_json document = {{"wavelengths_nm", spectrum.wavelengths}};
+  if (!spectrum.powers.empty()) document["powers"] = spectrum.powers;
+  document["abbe"] = spectrum.abbe;
+  return document;
+}
+
+std::vector<double> read_numbers(const JsonFields& fields, const std::string& name) {
+  std::vector<double> numbers;
+  const nlohmann::json& list = fields.at(name);
+  const auto is_number = [](const nlohmann::json& entry) { return entry.is_number(); };
+  if (!list.is_array() || !std::all_of(list.begin(), list.end(), is_number)) {
+    fields.refuse(name, "it must be a list of numbers");
+  }
+  for (const nlohmann::json& entry : list) numbers.push_back(entry.get<double>());
+  return numbers;
+}
+
+Spectrum read_spectrum(const JsonFields& fields) {
+  Spectrum spectrum;
+  spectrum.wavelengths = read_numbers(fields, "wavelengths_nm");
+  if (fields.has("powers")) spectrum.powers = read_numbers(fields, "powers");
+  spectrum.abbe = fields.number("abbe");
+  return spectrum;
+}
+
+bool read_fresnel(const JsonFields& fields) {
+  const nlohmann::json& value = fields.at("fresnel");
+  if (!value.is_boolean()) fields.refuse("fresnel", "it must be true or false");
+  return value.get<bool>();
+}
+
+void read_screen(const JsonFields& screen, OpticalSetup& setup) {
+  setup.screen_x = right_along_x(setup) * screen.number_triple("right");
+  setup.screen_y = screen.number_triple("up");
+  setup.focal_length = screen.number_triple("centre").z();
+}
+
+}  // namespace
+
+void require_agreement(const JsonFields& fields, const OpticalSetup& setup) {
+  if (!fields.has("screen")) return;
+  const JsonFields screen = fields.object("screen");
+  const Eigen::Vector3d centre = screen.number_triple("centre");
+  if (!((setup.screen_centre() - centre).norm() <= kAgreement)) {
+    screen.refuse("centre",
+                  "the picture's centre by focal_length, image_origin and image_size is "
+                  "somewhere else");
+  }
+  if (!((screen.number_pair("size") - setup.image_size).norm() <= kAgreement)) {
+    screen.refuse("size", "it must be image_size");
+  }
+}
+
+ordered_json setup_json(const OpticalSetup& setup) {
+  const bool lens = setup.mode == LightMode::kRefract;
+  ordered_json document = {{"mode", lens ? "refract" : "reflect"}};
+  if (!lens && !setup.point) {
+    constexpr double kDegrees = 180.0 / 3.14159265358979323846;
+    document["incidence_deg"] = kDegrees * std::acos(-setup.light.z());
+  }
+  document["source"] = source_json(setup);
+  if (lens) document["front"] = front_json(setup);
+  document["ior"] = setup.ior;
+  if (!setup.spectrum.none()) document["spectrum"] = spectrum_json(setup.spectrum);
+  if (setup.fresnel) document["fresnel"] = true;
+  if (!setup.screen_is_turned()) document["focal_length"] = setup.focal_length;
+  document["lens_size"] = array_of(setup.lens_size);
+  if (setup.outline) document["outline"] = outline_json(*setup.outline, setup.lens_size);
+  document["image_size"] = array_of(setup.image_size);
+  document["image_origin"] = array_of(setup.image_origin);
+  document["screen"] = screen_json(setup);
+  document["pixels"] = array_of(setup.pixels);
+  document["view"] = setup.view == ViewSide::kFront ? "front" : "rear";
+  return document;
+}
+
+std::filesystem::path named_file(const JsonFields& fields, const std::string& field,
+                                 const std::filesystem::path& folder) {
+  const std::filesystem::path name = fields.text(field);
+  if (name.empty() || name == ".." || name != name.filename()) {
+    fields.refuse(field, "it must be the name of a file in the lens folder");
+  }
+  return folder / name;
+}
+
+OpticalSetup read_setup(const JsonFields& fields, const std::filesystem::path& folder) {
+  OpticalSetup setup;
+  const std::string mode = fields.text("mode");
+  if (mode == "reflect") {
+    setup.mode = LightMode::kReflect;
+  } else if (mode != "refract") {
+    fields.refuse("mode", R"(it must be "refract" or "reflect")");
+  }
+  read_source(fields.object("source"), setup);
+  if (fields.has("front")) read_front(fields.object("front"), folder, setup);
+  setup.ior = fields.number("ior");
+  if (fields.has("spectrum")) setup.spectrum = read_spectrum(fields.object("spectrum"));
+  if (fields.has("fresnel")) setup.fresnel = read_fresnel(fields);
+  setup.lens_size = fields.number_pair("lens_size");
+  if (fields.has("outline")) {
+    setup.outline = read_outline(fields.object("outline"), setup.lens_size);
+  }
+  setup.image_size = fields.number_pair("image_size");
+  setup.image_origin = fields.number_pair("image_origin");
+  setup.pixels = fields.integer_pair("pixels");
+  const std::string view = fields.text("view");
+  if (view != "front" && view != "rear") fields.refuse("view", R"(it must be "front" or "rear")");
+  setup.view = view == "front" ? ViewSide::kFront : ViewSide::kRear;
+  if (fields.has("screen")) read_screen(fields.object("screen"), setup);
+  if (!setup.screen_is_turned()) setup.focal_length = fields.number("focal_length");
+  return setup;
+}
+
+}  // namespace lensforge

@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "core/spline/control_net.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <nlohmann/json.hpp>
+#include <string_view>
+#include <vector>
+
+#include "core/error.h"
+#include "core/io/files.h"
+#include "core/schema/json.h"
+#include "core/spline/cubic_spline.h"
+
+namespace lensforge {
+namespace {
+
+/// Newton's method ends at a step shorter than this, in knot cells, or after kMaxSteps.
+constexpr double kShortStep = 1e-13;
+constexpr int kMaxSteps = 30;
+
+/// Basis functions at nodes first … last.
+std::vector<CubicBasis> bases(int cells, int samples, int first, int last) {
+  std::vector<CubicBasis> result;
+  for (int k = first; k <= last; ++k) {
+    result.push_back(cubic_basis(static_cast<double>(k) / samples, cells));
+  }
+  return result;
+}
+
+SplineFrame frame_of(const ControlNet& net, const CubicBasis& u, const CubicBasis& v) {
+  SplineFrame frame;
+  for (std::size_t j = 0; j < 4; ++j) {
+    SplineFrame row;
+    const Eigen::Index first =
+        Eigen::Index{v.first + static_cast<int>(j)} * net.shape.columns + u.first;
+    for (std::size_t i = 0; i < 4; ++i) {
+      const auto c = net.points.col(first + static_cast<Eigen::Index>(i));
+      row.point += u.value[i] * c;
+      row.by_u += u.slope[i] * c;
+      row.by_uu += u.bend[i] * c;
+    }
+    frame.point += v.value[j] * row.point;
+    frame.by_u += v.value[j] * row.by_u;
+    frame.by_uu += v.value[j] * row.by_uu;
+    frame.by_v += v.slope[j] * row.point;
+    frame.by_uv += v.slope[j] * row.by_u;
+    frame.by_vv += v.bend[j] * row.point;
+  }
+  return frame;
+}
+
+}  // namespace
+
+SurfaceShape SplineFrame::shape() const {
+  Eigen::Matrix2d plan;
+  plan << by_u.head<2>(), by_v.head<2>();
+  const Eigen::Matrix2d inverse = plan.inverse();
+  SurfaceShape shape;
+  shape.z = point.z();
+  shape.slope = inverse.transpose() * Eigen::Vector2d(by_u.z(), by_v.z());
+  // z_uu = z_x x_uu + z_y y_uu + (x_u, y_u) H (x_u, y_u)ᵀ, and so on.
+  const Eigen::Vector3d along(-shape.slope.x(), -shape.slope.y(), 1.0);
+  Eigen::Matrix2d second;
+  second << along.dot(by_uu), along.dot(by_uv), along.dot(by_uv), along.dot(by_vv);
+  shape.bend = inverse.transpose() * second * inverse;
+  return shape;
+}
+
+Eigen::MatrixXd ControlNet::table(int coordinate) const {
+  using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic>;
+  return Eigen::Map<const Rows, 0, Eigen::Stride<Eigen::Dynamic, 3>>(
+      points.data() + coordinate, shape.columns, shape.rows,
+      Eigen::Stride<Eigen::Dynamic, 3>(Eigen::Index{3} * shape.columns, 3));
+}
+
+SplineFrame ControlNet::at(const Eigen::Vector2d& uv) const {
+  return frame_of(*this, cubic_basis(uv.x(), shape.columns - 3),
+                  cubic_basis(uv.y(), shape.rows - 3));
+}
+
+Eigen::Vector2d ControlNet::parameters_of(const Eigen::Vector2d& xy,
+                                          const Eigen::Vector2d& start) const {
+  const Eigen::Vector2d high = cells().cast<double>();
+  Eigen::Vector2d uv = start.cwiseMax(0.0).cwiseMin(high);
+  for (int step = 0; step < kMaxSteps; ++step) {
+    const SplineFrame frame = at(uv);
+    Eigen::Matrix2d plan;
+    plan << frame.by_u.head<2>(), frame.by_v.head<2>();
+    const Eigen::Vector2d before = uv;
+    uv += plan.inverse() * (xy - frame.point.head<2>());
+    uv = uv.cwiseMax(0.0).cwiseMin(high);
+    if ((uv - before).cwiseAbs().maxCoeff() < kShortStep * high.maxCoeff()) break;
+  }
+  return uv;
+}
+
+SampledSurface spline_nodes(const ControlNet& net, int samples) {
+  return spline_rows(net, samples, 0, samples * net.cells().y());
+}
+
+SampledSurface spline_rows(const ControlNet& net, int samples, int first, int last) {
+  const Eigen::Vector2i cells = net.cells();
+  const std::vector<CubicBasis> u = bases(cells.x(), samples, 0, samples * cells.x());
+  const std::vector<CubicBasis> v = bases(cells.y(), samples, first, last);
+  SampledSurface nodes = make_samples({static_cast<int>(u.size()), static_cast<int>(v.size())});
+  Eigen::Index at = 0;
+  for (const CubicBasis& across : v) {
+    // The curve v = const as a separate spline, and its derivative by v.
+    const auto rows = net.points.middleCols(Eigen::Index{across.first} * net.shape.columns,
+                                            Eigen::Index{4} * net.shape.columns);
+    const auto row = [&](Eigen::Index j) {
+      return rows.middleCols(j * net.shape.columns, net.shape.columns);
+    };
+    const std::array<double, 4>& w = across.value;
+    const std::array<double, 4>& s = across.slope;
+    const Eigen::Matrix3Xd curve = w[0] * row(0) + w[1] * row(1) + w[2] * row(2) + w[3] * row(3);
+    const Eigen::Matrix3Xd bent = s[0] * row(0) + s[1] * row(1) + s[2] * row(2) + s[3] * row(3);
+    for (const CubicBasis& along : u) {
+      const Eigen::Map<const Eigen::Vector4d> value(along.value.data());
+      const Eigen::Map<const Eigen::Vector4d> slope(along.slope.data());
+      const auto taps = curve.middleCols<4>(along.first);
+      nodes.mesh.vertices.col(at) = taps * value;
+      nodes.normals.col(at++) =
+          Eigen::Vector3d(taps * slope)
+              .cross(Eigen::Vector3d(bent.middleCols<4>(along.first) * value));
+    }
+  }
+  return nodes;
+}
+
+int samples_for(double nodes, double cells) {
+  // More do not change a picture: with 12, 64² splines of 29,000 cells have the same MAE to
+  // 0.00001.
+  constexpr double kMostOfCell = 8.0 * 8.0;
+  constexpr double kNodesOfFewCells = 250e3;
+  const double useful = std::max(kMostOfCell * cells, kNodesOfFewCells);
+  const double samples = std::ceil(std::sqrt(std::min(nodes, useful) / cells));
+  return static_cast<int>(std::clamp(samples, 2.0, 256.0));
+}
+
+namespace {
+
+// File: the magic line, a JSON header on one line, then x, y and z of every control point as
+// little-endian doubles.
+
+static_assert(std::endian::native == std::endian::little, "splines are little-endian");
+
+constexpr std::string_view kMagic = "lensforge spline 1\n";
+constexpr int kDegree = 3;
+/// Maximum file size: 178 million control points.
+constexpr std::uintmax_t kMaxBytes = std::uintmax_t{4} << 30U;
+
+[[noreturn]] void refuse(const std::filesystem::path& path, const std::string& why) {
+  throw InputError(path.string() + ": " + why);
+}
+
+GridShape read_shape(const JsonFields& header) {
+  if (header.text("units") != "mm") header.refuse("units", "only \"mm\" can be read");
+  if (header.integer("degree") != kDegree) header.refuse("degree", "only 3 can be read");
+  if (header.text("knots") != "uniform, clamped") {
+    header.refuse("knots", "only \"uniform, clamped\" can be read");
+  }
+  const Eigen::Vector2i count = header.integer_pair("control_points");
+  if (count.minCoeff() <= kDegree) header.refuse("control_points", "at least 4 each way");
+  return {count.x(), count.y()};
+}
+
+}  // namespace
+
+void write_spline(const ControlNet& net, const std::filesystem::path& path) {
+  const nlohmann::ordered_json header = {{"units", "mm"},
+                                         {"degree", kDegree},
+                                         {"knots", "uniform, clamped"},
+                                         {"control_points", {net.shape.columns, net.shape.rows}}};
+  std::string content(kMagic);
+  content += header.dump() + "\n";
+  content.append(reinterpret_cast<const char*>(net.points.data()),
+                 static_cast<std::size_t>(net.points.size()) * sizeof(double));
+  write_whole_file(path, content);
+}
+
+ControlNet read_spline(const std::filesystem::path& path) {
+  const std::string content = read_whole_file(path, kMaxBytes);
+  std::string_view rest = content;
+  if (!rest.starts_with(kMagic)) refuse(path, "is no spline of this version");
+  rest.remove_prefix(kMagic.size());
+  const std::size_t end = rest.find('\n');
+  if (end == std::string_view::npos) refuse(path, "has no header");
+  const std::string name = path.string() + " header";
+  const nlohmann::json document = parse_json(rest.substr(0, end), name);
+  ControlNet net;
+  net.shape = read_shape(JsonFields(document, name));
+  rest.remove_prefix(end + 1);
+  const std::uintmax_t count = std::uintmax_t{static_cast<unsigned>(net.shape.columns)} *
+                               static_cast<unsigned>(net.shape.rows);
+  if (rest.size() / (3 * sizeof(double)) != count || rest.size() % (3 * sizeof(double)) != 0) {
+    refuse(path, "holds " + std::to_string(rest.size()) + " bytes of control points, its header " +
+                     "calls for " + std::to_string(count) +
+                     " points of 24 bytes: it is truncated " + "or corrupt");
+  }
+  net.points.resize(3, static_cast<Eigen::Index>(count));
+  std::memcpy(net.points.data(), rest.data(), rest.size());
+  for (Eigen::Index i = 0; i < net.points.cols(); ++i) {
+    if (!net.points.col(i).allFinite()) {
+      refuse(path, "control point " + std::to_string(i) + " is not finite");
+    }
+  }
+  return net;
+}
+
+bool is_spline_file(const std::filesystem::path& path) { return file_starts_with(path, kMagic); }
+
+}  // namespace lensforge

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace lensforge {
+
+/// The words of a range with `between` between them. @param words  strings or views of them.
+template <class Words>
+std::string joined(const Words& words, std::string_view between) {
+  std::string text;
+  bool first = true;
+  for (const std::string_view word : words) {
+    if (!first) text += between;
+    text += word;
+    first = false;
+  }
+  return text;
+}
+
+/// Appends a word to a list, after ", " unless it is the first. @return the longer list.
+inline std::string with_word(std::string list, std::string_view word,
+                             std::string_view between = ", ") {
+  if (!list.empty()) list += between;
+  return list += word;
+}
+
+/// The parts of a text between separators: one more than there are separators.
+/// @return views of `text`.
+inline std::vector<std::string_view> split(std::string_view text, char separator) {
+  std::vector<std::string_view> parts;
+  for (;;) {
+    const std::size_t end = text.find(separator);
+    parts.push_back(text.substr(0, end));
+    if (end == std::string_view::npos) return parts;
+    text.remove_prefix(end + 1);
+  }
+}
+
+}  // namespace lensforge

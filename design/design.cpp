@@ -1,0 +1,244 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "design/design.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <filesystem>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "core/error.h"
+#include "core/image/color.h"
+#include "core/io/checkpoint_file.h"
+#include "core/lens/surface_check.h"
+#include "core/optics/optical_setup.h"
+#include "core/spline/control_net.h"
+#include "design/render.h"
+#include "design/render/source_picture.h"
+#include "design/schedule/checkpoint.h"
+#include "design/schedule/levels.h"
+#include "design/schedule/rounds.h"
+#include "design/spline/made_surface.h"
+
+namespace lensforge {
+namespace {
+
+/// Moves the surface along z so that its minimum is `thickness` above the entry face.
+void rest_on_thickness(SurfaceMesh& mesh, double thickness) {
+  mesh.vertices.row(2).array() += thickness - mesh.vertices.row(2).minCoeff();
+}
+
+/// Takes the surface of a finished or unfinished design: before its last level a spline is a smooth
+/// mesh.
+void take_surface(const DesignTask& task, SurfaceMesh mesh, Lens& lens) {
+  const Level& last = task.levels.back();
+  if (last.spline && mesh.grid == last.grid) {
+    lens.model = SurfaceModel::kSpline;
+    lens.spline = settled({mesh.grid, std::move(mesh.vertices)}, task.options.thickness);
+    lens.surface = spline_nodes(*lens.spline, kMeshSamples).mesh;
+    return;
+  }
+  lens.model = last.spline ? SurfaceModel::kSmooth : task.options.model;
+  lens.surface = std::move(mesh);
+  rest_on_thickness(lens.surface, task.options.thickness);
+}
+
+/// @param look  effort of its pictures.
+Lens make_lens(const DesignTask& task, SurfaceMesh mesh, Look look, const Executor& executor) {
+  Lens lens;
+  take_surface(task, std::move(mesh), lens);
+  lens.setup = task.setup;
+  lens.target = task.target;
+  for (const SurfaceModel model : models_of(lens)) {
+    Image* const render = model == lens.model ? &lens.render : nullptr;
+    lens.metrics[model] = evaluate(lens, model, render, executor, look);
+  }
+  if (task.limit) lens.source_limit = task.limit->metrics;
+  return lens;
+}
+
+/// Predicts the part by the design's own model of cutting and polishing.
+std::optional<DesignResult::Made> made_part(const DesignOptions& options, const Lens& lens,
+                                            const Executor& executor) {
+  if (!options.made_by || !lens.spline) return std::nullopt;
+  const int samples = samples_for(kPictureNodes, static_cast<double>(lens.spline->cell_count()));
+  const SampledSurface part = made_nodes(*lens.spline, *options.made_by, samples, executor);
+  DesignResult::Made made;
+  made.metrics =
+      evaluate(part.mesh, part.normals, lens.setup, lens.target, &made.picture, executor);
+  return made;
+}
+
+std::optional<DesignResult::Colors> colors_of(const Lens& lens, const Executor& executor) {
+  const Spectrum& spectrum = lens.setup.spectrum;
+  if (spectrum.none()) return std::nullopt;
+  std::vector<Image> pictures;
+  for (const LightColor& color : light_colors(lens.setup)) {
+    std::vector<double> flux = flux_of_lens(lens, color.setup, executor);
+    for (double& value : flux) value *= lens.target.total();
+    pictures.push_back(image_of(flux, lens.target.columns(), lens.target.rows()));
+  }
+  return DesignResult::Colors{color_picture(pictures, spectrum.wavelengths, spectrum.powers),
+                              fringe_of(lens)};
+}
+
+/// @throw InputError if no lens can have a checkpoint's surface: its bytes were changed.
+void require_surface(const DesignTask& task, const Checkpoint& state) {
+  Lens lens;
+  take_surface(task, state.mesh, lens);
+  const std::optional<std::string> fault = lens.spline ? spline_fault(*lens.spline, task.setup)
+                                                       : surface_fault(lens.surface, task.setup);
+  if (fault) refuse_checkpoint(task.options.checkpoint, "holds a surface of no lens: " + *fault);
+}
+
+bool run_all(const DesignTask& task, DesignLog& log, Checkpoint& state) try {
+  return run_levels(task, log, state);
+} catch (const InputError&) {
+  // Resuming would fail again, and the checkpoint would refuse better options.
+  std::error_code ignored;
+  if (!task.options.resume) std::filesystem::remove(task.options.checkpoint, ignored);
+  throw;
+}
+
+/// The lens after the last level, with its checks. @throw Interrupted
+DesignResult finished(const DesignTask& task, const DesignLog& log, const SurfaceMesh& mesh) {
+  log.report_rendering();
+  DesignResult result;
+  result.status = DesignResult::Status::kDone;
+  result.lens = make_lens(task, mesh, Look::kThorough, task.executor);
+  if (task.limit) result.source = check_source(result.lens, task.executor);
+  result.colors = colors_of(result.lens, task.executor);
+  result.made = made_part(task.options, result.lens, task.executor);
+  return result;
+}
+
+/// The lens of an interrupted design, at Look::kBrief because nobody wants to wait for it.
+DesignResult unfinished(const DesignTask& task, SurfaceMesh mesh, const Executor& executor) {
+  DesignResult result;
+  result.message = "interrupted";
+  result.lens = make_lens(task, std::move(mesh), Look::kBrief, executor);
+  return result;
+}
+
+DesignResult run_to_end(const DesignTask& task, DesignLog& log, Checkpoint& state,
+                        const Executor& executor) {
+  if (run_all(task, log, state)) {
+    try {
+      return finished(task, log, state.mesh);
+    } catch (const Interrupted&) {
+      // Resuming continues after the last level.
+    }
+  }
+  return unfinished(task, std::move(state.mesh), executor);
+}
+
+}  // namespace
+
+DesignResult design_lens(const Image& target, const DesignOptions& options,
+                         const Executor& executor, const RunControl& control) {
+  validate(options, target);
+  const DesignOptions settled = with_smoothness_applied(options);
+  const DesignTask task = make_task(target, settled, executor, control);
+  Checkpoint state = first_state(task);
+  if (settled.resume) require_surface(task, state);
+  DesignLog log(task, state);
+  DesignResult result = run_to_end(task, log, state, executor);
+  const bool done = result.status == DesignResult::Status::kDone;
+  if (done) result.message = "all levels done" + log.remark();
+  result.fingerprint = state.fingerprint;
+  result.convergence = std::move(state.convergence);
+  // Rounds that stopped early leave work over.
+  if (done) log.report_done();
+  return result;
+}
+
+std::uint64_t design_identity(const Image& target, const DesignOptions& options) {
+  return design_fingerprint(working_picture(target, options, {}), options);
+}
+
+namespace {
+
+/// Processor seconds per triangle, on 2 GHz cores: one iteration with facets or the smooth model
+/// (measured at 256² and 512²), with a spline, per triangle between nodes (96² and 128²), and with
+/// a spline for a process (64² and 128²); transport with the start of the mesh (5e-5 to 8e-5;
+/// facets need two).
+constexpr double kIterationSeconds = 5.1e-7;
+constexpr double kSplineSeconds = 2.5e-7;
+constexpr double kMadeSeconds = 1e-6;
+constexpr double kTransportSeconds = 6e-5;
+
+/// Bytes per triangle: transport, optimisation of a mesh (512²: 1.12 GB) and of a spline (128²:
+/// 0.57 GB), and files: surface and checkpoint, each twice while it is replaced.
+constexpr double kTransportMemory = 2000.0;
+constexpr double kMeshMemory = 1000.0;
+constexpr double kSplineMemory = 500.0;
+constexpr double kTriangleDisk = 120.0;
+/// Bytes per triangle of the whole mesh on rank 0 of several machines (docs/scale.md).
+constexpr double kWholeMemory = 200.0;
+
+/// Bytes per pixel of the working picture: PNG, EXR and double copies.
+constexpr double kPixelMemory = 100.0;
+constexpr double kPixelDisk = 30.0;
+
+/// Bytes of the program itself with its libraries.
+constexpr double kBaseMemory = 1.6e8;
+
+/// Relative cost of each further wavelength (64² portrait, smooth, whole designs: 5.9 s for one,
+/// 9.5 s for three).
+constexpr double kColorShare = 0.35;
+
+double iteration_seconds(const Level& level, const DesignOptions& options) {
+  const std::size_t colors = std::max<std::size_t>(1, options.light.spectrum.wavelengths.size());
+  const double growth = 1.0 + kColorShare * (static_cast<double>(colors) - 1.0);
+  if (!level.spline) return growth * kIterationSeconds;
+  return growth * (options.made_by ? kMadeSeconds : kSplineSeconds);
+}
+
+/// Sites of a level's transports: those of the even mesh, for facets also their own.
+double transport_sites(double triangles, const DesignOptions& options) {
+  const double even = std::min(triangles, kMaxEvenFaces);
+  return options.model == SurfaceModel::kFacet ? even + triangles : even;
+}
+
+}  // namespace
+
+WorkEstimate estimate_design(int columns, int rows, const DesignOptions& options, int threads,
+                             double share) {
+  WorkEstimate estimate;
+  double processor = 0.0;
+  for (const Level& level : plan_levels(working_size(columns, rows, options.pixels), options)) {
+    const double per_cell = level.spline ? 2.0 * kMeshSamples * kMeshSamples : 2.0;
+    const double triangles = per_cell * (level.grid.columns - 1.0) * (level.grid.rows - 1.0);
+    const double pixels = level.pixels.cast<double>().prod();
+    const double iterations = static_cast<double>(level.rounds) * level.iterations;
+    double memory = kSplineMemory * triangles;
+    const double whole = share < 1.0 ? kWholeMemory : 0.0;
+    if (options.rendering_guided) {
+      processor += triangles * iteration_seconds(level, options) * iterations;
+    }
+    if (!level.spline) {
+      const double sites = transport_sites(triangles, options);
+      processor += kTransportSeconds * sites * options.transport_rounds;
+      memory = std::max(kTransportMemory * std::min(sites, triangles),
+                        (share * kMeshMemory + whole) * triangles);
+    }
+    estimate.memory_bytes = kBaseMemory + memory + kPixelMemory * pixels;
+    estimate.disk_bytes = kTriangleDisk * triangles + kPixelDisk * pixels;
+  }
+  estimate.seconds = processor / threads;
+  return estimate;
+}
+
+WorkEstimate require_room_for_design(int columns, int rows, const DesignOptions& options,
+                                     int threads, const std::filesystem::path& folder,
+                                     double share) {
+  const auto work = [&](double pixels) {
+    DesignOptions sized = options;
+    sized.pixels = std::max(kMinPixels, static_cast<int>(pixels));
+    return estimate_design(columns, rows, sized, threads, share);
+  };
+  return require_room_for(work, {"--pixels", 1.0 * options.pixels, kMinPixels}, folder);
+}
+
+}  // namespace lensforge

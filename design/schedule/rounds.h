@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "core/mesh/surface_mesh.h"
+#include "design/schedule/checkpoint.h"
+#include "design/schedule/guided_optimization.h"
+#include "design/schedule/levels.h"
+
+namespace lensforge {
+
+/// Maximum number of faces of the even mesh whose transport shapes the mesh. On the 512² logo
+/// 942,080 sites were not done after 11 processor minutes, 235,520 took at most 80 s.
+inline constexpr double kMaxEvenFaces = 250'000.0;
+
+/// A level while its rounds run.
+struct LevelSite {
+  const DesignTask& task;
+  const Level& level;
+  const LevelProblem& problem;
+  GuidedOptimization& stage;  ///< Rendering-guided.
+  DesignLog& log;
+};
+
+/// One alternation of Sun et al., section 3.4: transport_step() if it is due (never for a spline),
+/// then rendering-guided optimisation, then conclude_round(). If it is stopped in between, the
+/// state holds the best surface so far and the same round number.
+/// @return false if it was asked to stop.
+/// @throw Interrupted; InputError if no surface can send the light so far over so short a distance,
+///        or no surface to start from is allowed.
+bool run_round(const LevelSite& site, Checkpoint& state);
+
+/// Result of a round's two halves.
+struct RoundOutcome {
+  const SurfaceMesh& before;
+  double value = 0.0;        ///< Objective of the state's mesh.
+  bool transported = false;  ///< It began with transport.
+  bool rescaled = false;     ///< Its steps were measured anew.
+};
+
+/// Keeps a round's mesh or the one before, whichever is better, and decides what is next. A round
+/// that lowers the objective by less than a thousandth has failed: if it began with transport, the
+/// level's further rounds do without; if its steps were scaled for an earlier surface, the next one
+/// measures them anew; if neither, the level ends.
+/// @param rounds  number of rounds of the level.
+void conclude_round(const RoundOutcome& outcome, int rounds, Checkpoint& state);
+
+/// Returns the state that a design starts from: a flat surface, or the state in its checkpoint.
+/// @throw InputError if a checkpoint to resume from is missing, corrupt, or belongs to another
+///        picture or other options.
+Checkpoint first_state(const DesignTask& task);
+
+/// Runs the remaining levels, coarse to fine, round by round (Sun et al., section 3.4 and Appendix
+/// E), and writes the state after each round. @return false if it was asked to stop.
+/// @throw InputError as run_round() does.
+bool run_levels(const DesignTask& task, DesignLog& log, Checkpoint& state);
+
+}  // namespace lensforge

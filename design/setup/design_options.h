@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "core/image/image.h"
+#include "core/lens/optical_surface.h"
+#include "core/optics/front.h"
+#include "core/optics/optical_setup.h"
+#include "design/energy/objective_options.h"
+#include "design/spline/made_by.h"
+
+namespace lensforge {
+
+/// Maximum tilt of a screen from the lens's plane, and maximum angle of light on a mirror, degrees:
+/// beyond it light grazes.
+inline constexpr double kMaxTilt = 80.0;
+/// Limits of the picture's width on the screen, mm: up to a kilometre.
+inline constexpr double kMinImageWidth = 1e-3;
+inline constexpr double kMaxImageWidth = 1e6;
+
+/// Limits of a source's angle, mrad, and size, mm: from a laser to a lamp that fills half of the
+/// sky.
+inline constexpr double kMinSourceWidth = 1e-3;
+inline constexpr double kMaxSourceAngle = 1500.0;
+inline constexpr double kMaxSourceSize = 1e6;
+
+/// Maximum radius of a spherical front, mm: beyond it the front is flat to a nanometre.
+inline constexpr double kMaxFrontRadius = 1e9;
+
+enum class SourceKind { kParallel, kPoint };
+
+/// Light source, kind of surface (lens or mirror), and place of the picture.
+struct LightOptions {
+  LightMode mode = LightMode::kRefract;
+  double incidence = 0.0;  ///< Angle of parallel light from a mirror's z axis, degrees, in x.
+  SourceKind source = SourceKind::kParallel;
+  std::optional<double> front_radius;                 ///< Radius, mm; above 0: convex; none: flat.
+  std::string front_file;                             ///< File of a front that is a height map.
+  std::shared_ptr<const HeightSpline> front_heights;  ///< Content of front_file.
+  std::optional<Eigen::Vector3d> source_position;     ///< Place of a point source, mm, lens frame.
+  Emission emission = Emission::kIsotropic;           ///< Intensity of a point source.
+  double source_angle = 0.0;                          ///< Full angle of parallel light, mrad.
+  double source_size = 0.0;                           ///< Diameter of a point source, mm.
+  SourceShape source_shape;  ///< Shape of a source with an angle or a size.
+  bool fresnel = false;      ///< Count the light that a lens's faces reflect.
+  Spectrum spectrum;         ///< Colours of the light; none: DesignOptions::ior for all.
+  double image_width = 0.0;  ///< Width of the picture on the screen, mm; 0: the lens's.
+  /// Offset of the picture's centre from the point where a flat surface's chief ray meets the
+  /// screen, mm along the lens's x and y.
+  Eigen::Vector2d image_offset{0.0, 0.0};
+  /// Rotations of the screen by the right-hand rule, degrees: about the picture's right, then its
+  /// up.
+  Eigen::Vector2d screen_tilt{0.0, 0.0};
+};
+
+/// Limits of what can be made and computed: from a micro-lens to a shop window, from nearly no
+/// refraction (a lens in a liquid) to more than any optical material has, from a wall at arm's
+/// length to one kilometres away. Lengths in mm.
+inline constexpr double kMinLensWidth = 0.01;
+inline constexpr double kMaxLensWidth = 1e5;
+inline constexpr double kMinThickness = 1e-3;
+inline constexpr double kMaxThickness = 1e4;
+inline constexpr double kMaxFocalLength = 1e7;
+inline constexpr double kMinIor = 1.01;
+inline constexpr double kMaxIor = 10.0;
+/// Minimum pixels of the working picture on either side: below it there is nothing to shape.
+inline constexpr int kMinPixels = 4;
+/// Maximum weight of a term of the objective: beyond it the others are lost to rounding.
+inline constexpr double kMaxWeight = 1e12;
+
+/// Everything that shapes a design except the picture itself.
+struct DesignOptions {
+  double width = 100.0;         ///< Lens width, mm; the height follows the picture.
+  double focal_length = 300.0;  ///< z of the receiving plane, mm, > thickness.
+  double ior = 1.49;            ///< Refractive index, > 1.
+  double thickness = 5.0;       ///< Minimum z of the finished surface, mm, > 0.
+  LightOptions light;           ///< Source, mirror or lens, screen.
+  /// Edge of a lens that is not a rectangle: its kind and radius, mm, or the corners of a polygon
+  /// in any unit. optical_setup() fits it into the lens's rectangle.
+  std::optional<Outline> outline;
+  int pixels = 256;          ///< Longer side of the working picture; at most the source's.
+  double mesh_ratio = 1.25;  ///< Mesh vertices per pixel side, 0.25 … 8.
+  /// Number of resolutions, coarse to fine, each twice the one before; the coarsest picture keeps
+  /// at least 32 pixels. The default is one: with transport at full size the picture ends closer
+  /// than over coarse levels (128² portrait, two rounds, facets: MAE 0.0038 with one level, 0.0063
+  /// with three).
+  int levels = 1;
+  int rounds = 6;  ///< Alternations per level, ≥ 1 (Sun et al., section 3.4).
+  /// Rounds of a level that begin with transport, ≥ 0; 0 starts from a flat surface. Transport
+  /// moves light over distances, but it treats a facet as a point and undoes fine detail; once the
+  /// mesh follows the picture, little is left to move (128² photograph, facets: MAE 0.0039 with 1,
+  /// 0.0037 with 3).
+  int transport_rounds = 1;
+  bool rendering_guided = true;  ///< False: rounds consist of transport alone.
+  /// Share of the facets that is spread evenly over the picture instead of the lens, 0 … 0.95; see
+  /// spread_vertices().
+  double spread = 0.7;
+  /// Maximum L-BFGS iterations on Sun et al., Eq. 20, per round, ≥ 0. The default is none: the
+  /// fitted heights are closer to the picture than the surface that these iterations reach (128²
+  /// portrait, two rounds, facets: MAE 0.0048 with none, 0.0059 with 50).
+  int update_iterations = 0;
+  int iterations = 100;  ///< Maximum L-BFGS iterations per round, ≥ 1.
+  /// Surface model to optimise. A spline is one surface from design to part and STEP; the normals
+  /// of a smooth mesh belong to no surface (docs/accuracy.md, "One surface").
+  SurfaceModel model = SurfaceModel::kSpline;
+  ViewSide view = ViewSide::kFront;
+  ObjectiveWeights weights;
+  /// Process that the part is designed for; none: the designed surface itself. @pre model is
+  /// kSpline.
+  std::optional<MadeBy> made_by;
+  double smoothness = 1.0;  ///< Factor on weights.smooth.
+  /// File for a checkpoint after every round; empty: none is written.
+  std::filesystem::path checkpoint;
+  /// Continue from `checkpoint`. The same picture and options give the same result as without
+  /// interruption.
+  bool resume = false;
+};
+
+/// Default options for a design of `target`: the smoothness that the model needs, and no more
+/// pixels than the picture has.
+DesignOptions default_design_options(SurfaceModel model, const Image& target);
+
+/// The same options with `smoothness` multiplied into weights.smooth and set to 1.
+DesignOptions with_smoothness_applied(DesignOptions options);
+
+/// @throw InputError naming option, value and rule if an option breaks its rule on its own or
+///        against the picture, or the picture is all black.
+void validate(const DesignOptions& options, const Image& target);
+
+}  // namespace lensforge

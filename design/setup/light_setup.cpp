@@ -1,0 +1,609 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "design/setup/light_setup.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <numbers>
+#include <span>
+#include <string>
+#include <system_error>
+#include <vector>
+
+#include "core/compute/scalar.h"
+#include "core/error.h"
+#include "core/image/image_io.h"
+#include "core/image/rasters.h"
+#include "core/optics/front.h"
+#include "core/optics/light_path.h"
+#include "core/optics/light_source.h"
+#include "core/text/number_list.h"
+#include "core/text/number_text.h"
+#include "design/setup/design_options.h"
+#include "design/setup/outline_setup.h"
+
+namespace lensforge {
+namespace {
+
+[[noreturn]] void refuse(const std::string& what, const std::string& rule) {
+  throw InputError(what + ": " + rule);
+}
+
+// The size of the source.
+
+constexpr double kMilliradian = 1e-3;
+
+/// Maximum width of the source's image, in shorter sides of the picture: a picture needs room for
+/// at least two spots.
+constexpr double kMaxBlur = 0.5;
+
+/// End of the search for a narrower source: a source of a kilometre becomes one of a micron.
+constexpr double kLeastShare = 1e-9;
+
+std::string angle_text(double mrad) { return "--source-angle " + number_text(mrad); }
+std::string size_text(double mm) { return "--source-size " + number_text(mm) + "mm"; }
+
+std::string width_text(const LightOptions& light) {
+  return light.source == SourceKind::kPoint ? size_text(light.source_size)
+                                            : angle_text(light.source_angle);
+}
+
+/// The same source at another width, in its own unit, rounded down to two digits.
+std::string narrower_text(const LightOptions& light, double share) {
+  LightOptions other = light;
+  for (double* width : {&other.source_angle, &other.source_size}) {
+    if (*width <= 0.0) continue;
+    const double wanted = share * *width;
+    const double unit = std::pow(10.0, std::floor(std::log10(wanted)) - 1.0);
+    *width = std::floor(wanted / unit) * unit;
+  }
+  return width_text(other);
+}
+
+/// Normal of a surface whose middle sends its light to the picture's centre.
+Eigen::Vector3d middle_normal(const OpticalSetup& setup, const Eigen::Vector3d& middle) {
+  const LightPath light(lit_from(setup, Eigen::Vector2d::Zero()));
+  const Eigen::Vector2d gradient = light.gradient_for(middle, 0.5 * setup.pixels.cast<double>());
+  return Eigen::Vector3d(-gradient.x(), -gradient.y(), 1.0).normalized();
+}
+
+/// True if light from the whole source reaches the middle of the surface and leaves it.
+bool lights_surface(const OpticalSetup& setup, double thickness) {
+  const Eigen::Vector3d middle(0.5 * setup.lens_size.x(), 0.5 * setup.lens_size.y(), thickness);
+  const Eigen::Vector3d n = middle_normal(setup, middle);
+  for (const SourcePoint& point : source_points({setup.extent.width, {}}, 16)) {
+    const OpticalSetup one = lit_from(setup, 1.1 * point.at);
+    const bool lens = one.mode == LightMode::kRefract;
+    if (one.point &&
+        !(lens ? one.point->position.z() < 0.0 : one.point->position.z() > thickness)) {
+      return false;
+    }
+    if (!one.point && !(lens ? one.light.z() > 0.0 : one.light.z() < 0.0)) return false;
+    if (!LightPath(one).transmits(middle, n)) return false;
+  }
+  return true;
+}
+
+bool allows(const OpticalSetup& setup, double thickness) {
+  if (!lights_surface(setup, thickness)) return false;
+  return source_blur(setup, thickness) <= kMaxBlur * setup.pixels.minCoeff();
+}
+
+/// Extent of the options' source. @pre require_source_options().
+SourceExtent source_extent(const LightOptions& light) {
+  const bool point = light.source == SourceKind::kPoint;
+  return {point ? light.source_size : kMilliradian * light.source_angle, light.source_shape};
+}
+
+/// @throw InputError if angle, size and shape do not fit each other or the source.
+void require_source_options(const LightOptions& light) {
+  if (light.source_angle > 0.0 && light.source_size > 0.0) {
+    refuse(size_text(light.source_size), "cannot be given with --source-angle; leave one out");
+  }
+  if (light.source == SourceKind::kPoint && light.source_angle > 0.0) {
+    refuse(angle_text(light.source_angle),
+           "is of parallel light; with --source point --source-size 3mm would do");
+  }
+  if (light.source == SourceKind::kParallel && light.source_size > 0.0) {
+    refuse(size_text(light.source_size),
+           "needs --source point; of parallel light --source-angle 9.3 would do");
+  }
+  if (!light.source_shape.is_disc() && source_extent(light).none()) {
+    refuse("--source-picture",
+           "needs the width of what it shows; --source-" +
+               std::string(light.source == SourceKind::kPoint ? "size 3mm" : "angle 9.3") +
+               " would do");
+  }
+}
+
+/// @throw InputError with the largest source that works, if its image is wider than half of the
+///        picture or its edge is on the wrong side of the surface.
+void require_source_extent(const DesignOptions& options, const OpticalSetup& setup) {
+  if (setup.extent.none() || allows(setup, options.thickness)) return;
+  OpticalSetup narrower = setup;
+  double share = 1.0;
+  do {
+    share *= 0.9;
+    narrower.extent.width = share * setup.extent.width;
+  } while (share > kLeastShare && !allows(narrower, options.thickness));
+  refuse(width_text(options.light),
+         "the light of each point of the lens must cover at most half of the picture; " +
+             narrower_text(options.light, share) + " would do");
+}
+
+// The front, where light enters a lens.
+
+/// Upper bound of the start surface's height over its lowest point, in depths of the front: with
+/// less, radii are accepted (and advised) for which no start surface is found.
+constexpr double kStartRise = 2.0;
+
+/// Limits of the number of cells each way on which a height map is checked.
+constexpr int kFewestCells = 16;
+constexpr int kMostCells = 128;
+
+bool works_at(const OpticalSetup& setup, const LightPath& light, const Eigen::Vector3d& p) {
+  const Eigen::Vector2d slope = light.gradient_for(p, light.land_from_start(p));
+  const Eigen::Vector3d n = Eigen::Vector3d(-slope.x(), -slope.y(), 1.0).normalized();
+  return slope.allFinite() && light.transmits(p, n) && !is_shadowed(setup, p.head<2>());
+}
+
+void require_heights(const HeightSpline& spline, double thickness, const std::string& given) {
+  const double high = static_cast<double>(spline.highest());
+  const double low = static_cast<double>(spline.lowest());
+  if (high > 0.0) {
+    refuse(given, "its highest sample is z = " + number_text(high) + " mm" +
+                      (high < thickness ? "" : ", above the surface") +
+                      ": must be 0 or below, or less than --thickness " + number_text(thickness) +
+                      " is left; lower all heights by " + number_text(high) + " mm");
+  }
+  if (-low > kMaxThickness) {
+    refuse(given, "its lowest sample is z = " + number_text(low) + " mm: must be " +
+                      number_text(-kMaxThickness) + " or above; raise all heights by " +
+                      number_text(-high) + " mm");
+  }
+}
+
+/// True if light reaches and leaves every point of two start surfaces, at height `thickness` and
+/// kStartRise × the front's depth above it, and no part of the front is shaded. Checked on a
+/// raster.
+/// @param depth  between the front's highest and lowest point, mm. @param cells  each way.
+bool start_works(const OpticalSetup& setup, double thickness, double depth, int cells) {
+  const LightPath light(setup);
+  for (int k = 0; k < (cells + 1) * (cells + 1); ++k) {
+    const Eigen::Vector2d share(k % (cells + 1), k / (cells + 1));
+    const Eigen::Vector2d place = setup.lens_size.cwiseProduct(share) / cells;
+    for (const double rise : {0.0, kStartRise * depth}) {
+      if (!works_at(setup, light, {place.x(), place.y(), thickness + rise})) return false;
+    }
+  }
+  return true;
+}
+
+/// @param given  the option as typed.
+/// @throw InputError naming option, value and rule if the front of setup, a height map, leaves less
+///        than the thickness, folds its light, or is too steep for it.
+void require_height_map(const OpticalSetup& setup, double thickness, const std::string& given) {
+  const HeightSpline& spline = *std::get<HeightFront>(setup.front.value()).spline;
+  require_heights(spline, thickness, given);
+  const double depth = static_cast<double>(spline.highest() - spline.lowest());
+  const auto fault = height_map_fault(setup, thickness + kStartRise * depth);
+  if (fault == FrontFault::kFolds) {
+    refuse(given,
+           "folds the light: neighbouring rays meet inside the lens; smoother heights or a smaller "
+           "--thickness would do");
+  }
+  const HeightGrid& grid = spline.grid();
+  const int cells = std::clamp(std::max(grid.columns, grid.rows) - 1, kFewestCells, kMostCells);
+  if (fault == FrontFault::kUnlit || !start_works(setup, thickness, depth, cells)) {
+    refuse(given,
+           "is too steep: light passes a part of it by, or is reflected totally behind it; "
+           "smaller slopes would do");
+  }
+}
+
+// Source, surface and screen together.
+
+constexpr double kDegree = std::numbers::pi / 180.0;
+
+/// Proposed distance of a misplaced source: that of the paper's pictures.
+constexpr double kUsualDistance = 600.0;
+/// Proposed incidence on a mirror, degrees (Sun et al., Table 1).
+constexpr double kUsualIncidence = 30.0;
+
+/// Minimum width of the picture in lens widths: at a hundredth two thirds of a draft's light are on
+/// the picture (16² portrait), at a hundred-thousandth none.
+constexpr double kLeastMagnification = 0.01;
+
+std::string text_of(const Eigen::Vector3d& v) { return numbers_text(std::span(v.data(), 3)); }
+std::string text_of(const Eigen::Vector2d& v) { return numbers_text(std::span(v.data(), 2)); }
+
+bool is_mirror(const DesignOptions& o) { return o.light.mode == LightMode::kReflect; }
+
+/// A place for the source below the middle of a lens, or above a mirror and beside its reflected
+/// light.
+std::string usual_position(const DesignOptions& o, const Eigen::Vector2d& size) {
+  if (!is_mirror(o)) return text_of(Eigen::Vector3d(size.x() / 2, size.y() / 2, -kUsualDistance));
+  const double height = std::round(0.5 * o.focal_length);
+  return text_of(Eigen::Vector3d(-std::round(height * std::tan(kUsualIncidence * kDegree)),
+                                 size.y() / 2, height));
+}
+
+Eigen::Vector2d lens_size(const DesignOptions& o, const Eigen::Vector2i& pixels) {
+  return {o.width, o.width * pixels.y() / pixels.x()};
+}
+
+void require_point(const DesignOptions& o, const Eigen::Vector2d& size) {
+  const std::string usual = "--source-position " + usual_position(o, size) + " would do";
+  if (!o.light.source_position) refuse("--source point", "needs a place; " + usual);
+  const std::string given = "--source-position " + text_of(*o.light.source_position);
+  if (!(o.light.source_position->cwiseAbs().maxCoeff() <= kMaxFocalLength)) {
+    refuse(given, "must be at most " + number_text(kMaxFocalLength) + " mm away; " + usual);
+  }
+  const double z = o.light.source_position->z();
+  if (!is_mirror(o) && !(z <= -kMinThickness)) {
+    refuse(given,
+           "z must be below 0, where the lens begins and beyond which the screen stands; " + usual);
+  }
+  if (is_mirror(o) && !(z > o.thickness)) {
+    refuse(given,
+           "z must be above the mirror's surface, " + number_text(o.thickness) + " mm; " + usual);
+  }
+  if (is_mirror(o) && o.light.incidence != 0.0) {
+    refuse("--incidence " + number_text(o.light.incidence),
+           "is of parallel light; leave it out with --source point");
+  }
+}
+
+void require_source(const DesignOptions& o, const Eigen::Vector2d& size) {
+  if (is_mirror(o) && o.light.fresnel) {
+    refuse("--fresnel", "is of a lens; leave it out with --mode reflect");
+  }
+  if (!is_mirror(o) && o.light.incidence != 0.0) {
+    refuse("--incidence " + number_text(o.light.incidence), "needs --mode reflect, or must be 0");
+  }
+  if (o.light.source == SourceKind::kPoint) return require_point(o, size);
+  if (o.light.source_position) {
+    refuse("--source-position " + text_of(*o.light.source_position), "needs --source point");
+  }
+  if (o.light.emission != Emission::kIsotropic) {
+    refuse("--emission lambertian", "needs --source point");
+  }
+  if (is_mirror(o) && !(o.light.incidence > 0.0)) {
+    refuse("--mode reflect",
+           "needs light from the side, or the screen is in its way; --incidence " +
+               number_text(kUsualIncidence) + " would do");
+  }
+}
+
+std::string front_text(double radius) { return "--front sphere:" + number_text(radius); }
+
+/// True if the whole front is lit and its light leaves the start surface of a design.
+bool front_works(const DesignOptions& o, const Eigen::Vector2i& pixels, double radius) {
+  constexpr int kCells = 16;
+  if (!(std::abs(radius) > 0.5 * lens_size(o, pixels).norm())) return false;
+  DesignOptions other = o;
+  other.light.front_radius = radius;
+  const OpticalSetup setup = optical_setup(other, pixels);
+  const FrontSurface front(*setup.front);
+  const double depth = std::abs(front.height({0.0, 0.0}) - front.height(0.5 * setup.lens_size));
+  return start_works(setup, o.thickness, depth, kCells);
+}
+
+/// The next larger radius, to two digits, that works.
+std::string working_front(const DesignOptions& o, const Eigen::Vector2i& pixels, double radius) {
+  constexpr double kStep = 1.1;
+  const double least = 0.5 * lens_size(o, pixels).norm();
+  for (double r = std::max(std::abs(radius), least); r < kMaxFrontRadius; r *= kStep) {
+    const double digit = std::pow(10.0, std::floor(std::log10(r)) - 1.0);
+    const double rounded = std::copysign(std::ceil(r / digit) * digit, radius);
+    if (front_works(o, pixels, rounded)) return front_text(rounded) + " would do";
+  }
+  return "--front flat would do";
+}
+
+/// @throw InputError if the source lies inside the part.
+void require_source_outside(const DesignOptions& o, const OpticalSetup& setup) {
+  if (o.light.source != SourceKind::kPoint) return;
+  const FrontSurface front(*setup.front);
+  const Eigen::Vector3d& from = *o.light.source_position;
+  const Eigen::AlignedBox2d plan(Eigen::Vector2d(0.0, 0.0), setup.lens_size);
+  if (!plan.contains(from.head<2>()) || from.z() < front.height(from.head<2>())) return;
+  refuse(
+      "--source-position " + text_of(from),
+      "lies inside the part, whose front is at z = " + number_text(front.height(from.head<2>())) +
+          " there; --source-position " + usual_position(o, setup.lens_size) + " would do");
+}
+
+void require_sphere(const DesignOptions& o, const Eigen::Vector2i& pixels, double radius) {
+  const std::string given = front_text(radius);
+  if (!(std::abs(radius) <= kMaxFrontRadius)) refuse(given, "is flat; --front flat would do");
+  const Eigen::Vector2d size = lens_size(o, pixels);
+  if (!(std::abs(radius) > 0.5 * size.norm())) {
+    refuse(given, "the sphere is too small for the lens, whose half diagonal is " +
+                      number_text(0.5 * size.norm()) + " mm; " + working_front(o, pixels, radius));
+  }
+  require_source_outside(o, optical_setup(o, pixels));
+  if (!front_works(o, pixels, radius)) {
+    refuse(given, "light passes a part of the front by, or is reflected totally behind it; " +
+                      working_front(o, pixels, radius));
+  }
+}
+
+void require_front(const DesignOptions& o, const Eigen::Vector2i& pixels) {
+  const bool map = !o.light.front_file.empty();
+  if (!map && !o.light.front_radius) return;
+  const std::string given =
+      map ? "--front " + o.light.front_file : front_text(*o.light.front_radius);
+  if (is_mirror(o)) refuse(given, "is of a lens; --front flat would do with --mode reflect");
+  if (!map) return require_sphere(o, pixels, *o.light.front_radius);
+  LF_CHECK(o.light.front_heights != nullptr, given);
+  const OpticalSetup setup = optical_setup(o, pixels);
+  require_source_outside(o, setup);
+  require_height_map(setup, o.thickness, given);
+}
+
+/// Rotates the screen's vectors.
+void tilt_screen(const Eigen::Vector2d& degrees, OpticalSetup& setup) {
+  if (degrees.isZero()) return;
+  const double side = setup.view == ViewSide::kFront ? -1.0 : 1.0;  // The picture's right along x.
+  Eigen::Vector3d right(side, 0.0, 0.0);
+  const Eigen::Vector3d up =
+      Eigen::AngleAxisd(degrees.x() * kDegree, right) * Eigen::Vector3d::UnitY();
+  right = Eigen::AngleAxisd(degrees.y() * kDegree, up) * right;
+  setup.screen_x = side * right;
+  setup.screen_y = up;
+}
+
+double tilt_of(const Eigen::Vector2d& degrees) {
+  return std::acos(std::cos(degrees.x() * kDegree) * std::cos(degrees.y() * kDegree)) / kDegree;
+}
+
+void require_tilt(const Eigen::Vector2d& tilt) {
+  const double limit = kMaxTilt + 1e-9;
+  if (tilt.allFinite() && tilt.cwiseAbs().maxCoeff() <= limit && tilt_of(tilt) <= limit) return;
+  refuse(
+      "--screen-tilt " + text_of(tilt),
+      "must turn the screen by at most " + number_text(kMaxTilt) + " degrees in all; 0,0 would do");
+}
+
+void require_picture(const DesignOptions& o) {
+  const Eigen::Vector2d& offset = o.light.image_offset;
+  if (!(offset.cwiseAbs().maxCoeff() <= kMaxImageWidth)) {
+    refuse("--image-offset " + text_of(offset),
+           "must be at most " + number_text(kMaxImageWidth) + " mm; 0,0 would do");
+  }
+  const double least = kLeastMagnification * o.width;
+  if (o.light.image_width > 0.0 && o.light.image_width < least) {
+    refuse(
+        "--image-width " + number_text(o.light.image_width),
+        "must be at least a hundredth of the lens's width; " + number_text(least) + "mm would do");
+  }
+}
+
+/// @throw InputError if the spectrum does not fit the other options.
+void require_spectrum(const DesignOptions& o) {
+  const Spectrum& spectrum = o.light.spectrum;
+  if (spectrum.none() && spectrum.abbe != Spectrum{}.abbe) {
+    refuse("--abbe " + number_text(spectrum.abbe),
+           "needs --wavelengths; --wavelengths 450,550,650 would do");
+  }
+  if (!spectrum.none() && is_mirror(o)) {
+    refuse("--wavelengths " + spectrum_text(spectrum),
+           "a mirror bends light of all colours alike; leave it out");
+  }
+}
+
+/// True if the middle of some surface can send its light to the picture's centre.
+bool reaches_centre(const OpticalSetup& setup, double thickness) {
+  const LightPath light(setup);
+  const Eigen::Vector3d p(0.5 * setup.lens_size.x(), 0.5 * setup.lens_size.y(), thickness);
+  const Eigen::Vector2d centre = 0.5 * setup.pixels.cast<double>();
+  const Eigen::Vector2d gradient = light.gradient_for(p, centre);
+  const Eigen::Vector3d n = Eigen::Vector3d(-gradient.x(), -gradient.y(), 1.0).normalized();
+  return gradient.allFinite() && light.transmits(p, n) &&
+         (light.land(p, light.beam(p, n).m) - centre).norm() < 1.0;
+}
+
+void require_reach(const DesignOptions& o, const OpticalSetup& setup) {
+  if (reaches_centre(setup, o.thickness)) return;
+  for (double focal = 2.0 * setup.focal_length; focal <= kMaxFocalLength; focal *= 2.0) {
+    if (!reaches_centre(at_focal_length(setup, focal, o.thickness), o.thickness)) continue;
+    refuse("--focal " + number_text(o.focal_length),
+           "no surface bends the light so far as to the picture's centre; --focal " +
+               number_text(focal) + "mm would do");
+  }
+  refuse("--image-offset " + text_of(o.light.image_offset),
+         "no surface bends the light so far; 0,0 would do");
+}
+
+/// Values that must be above 0: heights of the picture's corners over the surface, and distances of
+/// the lens's corners from the screen.
+std::vector<double> clearances(const OpticalSetup& setup, double thickness) {
+  std::vector<double> all;
+  const LightPath light(setup);
+  for (const double x : {0.0, 1.0}) {
+    for (const double y : {0.0, 1.0}) {
+      const Eigen::Vector2d offset =
+          setup.image_size.cwiseProduct(Eigen::Vector2d(x - 0.5, y - 0.5));
+      all.push_back(setup.focal_length + offset.x() * setup.screen_x.z() +
+                    offset.y() * setup.screen_y.z() - thickness);
+      all.push_back(light.clearance({x * setup.lens_size.x(), y * setup.lens_size.y(), thickness}));
+    }
+  }
+  if (setup.point && setup.mode == LightMode::kReflect) {
+    all.push_back(light.clearance(setup.point->position));
+  }
+  return all;
+}
+
+/// Uses that all clearances are linear in the focal length.
+void require_screen_beyond(const DesignOptions& o, const OpticalSetup& setup) {
+  const std::vector<double> here = clearances(setup, o.thickness);
+  if (std::all_of(here.begin(), here.end(), [](double c) { return c > 0.0; })) return;
+  const std::vector<double> farther =
+      clearances(at_focal_length(setup, setup.focal_length + 1.0, o.thickness), o.thickness);
+  double needed = setup.focal_length;
+  for (std::size_t k = 0; k < here.size(); ++k) {
+    const double gain = farther[k] - here[k];
+    if (here[k] <= 0.0 && !(gain > 0.0)) {
+      refuse("--screen-tilt " + text_of(o.light.screen_tilt),
+             "turns the screen away from the light; --screen-tilt 0,0 would do");
+    }
+    if (here[k] <= 0.0) needed = std::max(needed, setup.focal_length - here[k] / gain);
+  }
+  const bool tilted = setup.screen_is_turned();
+  const std::string what = tilted ? "--screen-tilt " + text_of(o.light.screen_tilt)
+                                  : "--focal " + number_text(o.focal_length);
+  refuse(what, std::string("the screen must stand wholly beyond the surface") +
+                   (setup.point && is_mirror(o) ? " and the source" : "") + "; --focal " +
+                   number_text(std::ceil(1.1 * needed)) + "mm would do");
+}
+
+/// True if the picture on the screen blocks the light to a point of a mirror.
+/// @param a  unit direction of that light.
+bool screen_shades(const OpticalSetup& setup, const Eigen::Vector3d& p, const Eigen::Vector3d& a) {
+  const Eigen::Vector3d normal = setup.screen_x.cross(setup.screen_y);
+  const double back = normal.dot(setup.screen_centre() - p) / normal.dot(-a);
+  const double reach = setup.point ? (p - setup.point->position).norm() : kInfinity;
+  if (!(back > 0.0 && back < reach)) return false;
+  const Eigen::Vector3d l = p - back * a - setup.screen_centre();
+  return std::abs(setup.screen_x.dot(l)) < 0.5 * setup.image_size.x() &&
+         std::abs(setup.screen_y.dot(l)) < 0.5 * setup.image_size.y();
+}
+
+/// True if the screen blocks light to a flat mirror.
+bool is_shaded(const OpticalSetup& setup, double thickness) {
+  constexpr int kCells = 16;
+  const LightSource source(setup);
+  for (int k = 0; k < (kCells + 1) * (kCells + 1); ++k) {
+    const Eigen::Vector2d share(k % (kCells + 1), k / (kCells + 1));
+    const Eigen::Vector2d place = setup.lens_size.cwiseProduct(share) / kCells;
+    const Eigen::Vector3d p(place.x(), place.y(), thickness);
+    if (screen_shades(setup, p, source.incident(p))) return true;
+  }
+  return false;
+}
+
+/// An option for a mirror's light that its screen does not block; empty if none was found.
+std::string free_light(const DesignOptions& o, const Eigen::Vector2i& pixels) {
+  const auto works = [&](const DesignOptions& other) {
+    const OpticalSetup setup = optical_setup(other, pixels);
+    const std::vector<double> clear = clearances(setup, o.thickness);
+    return std::all_of(clear.begin(), clear.end(), [](double c) { return c > 0.0; }) &&
+           reaches_centre(setup, o.thickness) && !is_shaded(setup, o.thickness);
+  };
+  DesignOptions other = o;
+  if (o.light.source == SourceKind::kPoint) {
+    const double height = std::round(0.5 * o.focal_length);
+    for (double x = 0.0; x <= kMaxFocalLength && x < 20.0 * height; x += 0.1 * height) {
+      other.light.source_position = {-std::round(x), 0.5 * lens_size(o, pixels).y(), height};
+      if (works(other)) return "--source-position " + text_of(*other.light.source_position);
+    }
+    return {};
+  }
+  for (double degrees = std::ceil(o.light.incidence); degrees <= kMaxTilt; degrees += 1.0) {
+    other.light.incidence = degrees;
+    if (works(other)) return "--incidence " + number_text(degrees);
+  }
+  return {};
+}
+
+void require_unshaded(const DesignOptions& o, const Eigen::Vector2i& pixels,
+                      const OpticalSetup& setup) {
+  if (!is_mirror(o) || !is_shaded(setup, o.thickness)) return;
+  const std::string given = o.light.source == SourceKind::kPoint
+                                ? "--source-position " + text_of(*o.light.source_position)
+                                : "--incidence " + number_text(o.light.incidence);
+  const std::string free = free_light(o, pixels);
+  refuse(given, "the screen is in the way of the light that comes to the mirror; " +
+                    (free.empty() ? "a smaller --image-width" : free) + " would do");
+}
+
+}  // namespace
+
+SourceShape shape_of(const Image& picture) {
+  const int longer = std::max(picture.columns(), picture.rows());
+  const double scale = std::min(1.0, static_cast<double>(kMaxShapeSide) / longer);
+  const auto scaled = [&](int side) {
+    return std::max(1, static_cast<int>(std::lround(scale * side)));
+  };
+  const Image small = resample(picture, scaled(picture.columns()), scaled(picture.rows()));
+  SourceShape shape{small.columns(), small.rows(), {small.values().begin(), small.values().end()}};
+  const double most = *std::max_element(shape.weights.begin(), shape.weights.end());
+  if (!(most > 0.0)) {
+    throw InputError("--source-picture: is all black; leave it out for an evenly lit disc");
+  }
+  for (double& weight : shape.weights) weight = std::max(0.0, weight / most);
+  return shape;
+}
+
+std::shared_ptr<const HeightSpline> front_from(const std::string& file, const RunControl& control) {
+  std::error_code none;
+  if (!std::filesystem::exists(file, none)) {
+    refuse(
+        "--front '" + file + "'",
+        "is no file here; must be flat, sphere:R with R a radius in mm, or a picture of heights; "
+        "flat would do");
+  }
+  return std::make_shared<HeightSpline>(read_heights(file, control));
+}
+
+OpticalSetup optical_setup(const DesignOptions& options, const Eigen::Vector2i& pixels) {
+  OpticalSetup setup;
+  setup.mode = options.light.mode;
+  setup.ior = options.ior;
+  setup.fresnel = options.light.fresnel;
+  setup.spectrum = options.light.spectrum;
+  setup.focal_length = options.focal_length;
+  setup.lens_size = lens_size(options, pixels);
+  if (options.outline) setup.outline = fitted(*options.outline, setup.lens_size);
+  setup.image_size = setup.lens_size;
+  if (options.light.image_width > 0.0)
+    setup.image_size *= options.light.image_width / options.width;
+  setup.pixels = pixels;
+  setup.view = options.view;
+  if (options.light.front_radius) {
+    setup.front = spherical_front(*options.light.front_radius, setup.lens_size);
+  }
+  if (options.light.front_heights) {
+    setup.front = HeightFront{options.light.front_heights, setup.lens_size};
+  }
+  if (options.light.source == SourceKind::kPoint) {
+    setup.point = PointSource{options.light.source_position.value(), options.light.emission};
+  } else if (is_mirror(options)) {
+    setup.light = {std::sin(options.light.incidence * kDegree), 0.0,
+                   -std::cos(options.light.incidence * kDegree)};
+  }
+  const Eigen::Vector2d chief =
+      (options.focal_length - options.thickness) * LightPath(setup).chief_slope(options.thickness);
+  setup.extent = source_extent(options.light);
+  setup.image_origin =
+      0.5 * (setup.lens_size - setup.image_size) + chief + options.light.image_offset;
+  tilt_screen(options.light.screen_tilt, setup);
+  return setup;
+}
+
+OpticalSetup at_focal_length(OpticalSetup setup, double focal_length, double thickness) {
+  setup.image_origin +=
+      (focal_length - setup.focal_length) * LightPath(setup).chief_slope(thickness);
+  setup.focal_length = focal_length;
+  return setup;
+}
+
+void require_light(const DesignOptions& options, const Eigen::Vector2i& pixels) {
+  require_outline(options.outline, lens_size(options, pixels));
+  require_source_options(options.light);
+  require_spectrum(options);
+  require_source(options, lens_size(options, pixels));
+  require_tilt(options.light.screen_tilt);
+  require_front(options, pixels);
+  require_picture(options);
+  const OpticalSetup setup = optical_setup(options, pixels);
+  require_screen_beyond(options, setup);
+  require_reach(options, setup);
+  require_unshaded(options, pixels, setup);
+  require_source_extent(options, setup);
+}
+
+}  // namespace lensforge

@@ -1,0 +1,461 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "design/spline/made_surface.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <utility>
+
+#include "core/spline/cubic_spline.h"
+
+namespace lensforge {
+namespace {
+
+constexpr std::size_t kCount = GaussianWeights::kCount;
+constexpr int kReach = GaussianWeights::kReach;
+constexpr double kSpacing = 0.75;  ///< Distance between samples, in σ.
+constexpr double kMaxSamples = 1e8;
+
+}  // namespace
+
+GaussianWeights::GaussianWeights(double offset, double step, double sigma) {
+  // Neighbours' weights differ by a factor that itself shrinks by the same factor from one to the
+  // next.
+  const double shrink = std::exp(-step * step / (sigma * sigma));
+  double factor = std::exp(-step * (offset + 0.5 * step) / (sigma * sigma));
+  double weight = std::exp(-0.5 * offset * offset / (sigma * sigma));
+  std::array<double, kCount> apart{};
+  double sum = 0.0;
+  for (std::size_t k = 0; k < kCount; ++k) {
+    apart[k] = offset + static_cast<double>(k) * step;
+    value[k] = weight;
+    sum += weight;
+    weight *= factor;
+    factor *= shrink;
+  }
+  double mean = 0.0;
+  for (std::size_t k = 0; k < kCount; ++k) {
+    value[k] /= sum;
+    mean += value[k] * apart[k];
+  }
+  // A constant has no slope, and a straight line its own.
+  double variance = 0.0;
+  for (std::size_t k = 0; k < kCount; ++k) {
+    slope[k] = value[k] * (apart[k] - mean);
+    variance += slope[k] * apart[k];
+  }
+  for (std::size_t k = 0; k < kCount; ++k) {
+    slope[k] /= variance;
+    bend[k] = (slope[k] * (apart[k] - mean) - value[k]) / variance;
+  }
+}
+
+AveragingGrid::AveragingGrid(const Eigen::Vector2d& lens_size, const MadeBy& made)
+    : size_(lens_size),
+      sigma_(made.polish_sigma, std::hypot(made.polish_sigma, made.pitch / std::sqrt(12.0))),
+      rim_depth_(made.rim_depth),
+      rim_length_(made.rim_length) {
+  if (!made.rows_along_x) sigma_.reverseInPlace();
+  const Eigen::Array2d wanted = size_.array() / (kSpacing * sigma_.array());
+  cells_ = wanted.ceil().cast<int>().max(kReach);
+  step_ = size_.array() / cells_.cast<double>().array();
+}
+
+Eigen::MatrixXd AveragingGrid::make_heights() const {
+  return Eigen::MatrixXd::Zero(cells_.x() + 1 + 2 * kReach, cells_.y() + 1 + 2 * kReach);
+}
+
+void AveragingGrid::turn_about_rim(Eigen::MatrixXd& heights) {
+  const Eigen::Index right = heights.rows() - 1 - kReach;
+  const Eigen::Index top = heights.cols() - 1 - kReach;
+  for (Eigen::Index k = 1; k <= kReach; ++k) {
+    heights.row(kReach - k) = 2.0 * heights.row(kReach) - heights.row(kReach + k);
+    heights.row(right + k) = 2.0 * heights.row(right) - heights.row(right - k);
+  }
+  for (Eigen::Index k = 1; k <= kReach; ++k) {
+    heights.col(kReach - k) = 2.0 * heights.col(kReach) - heights.col(kReach + k);
+    heights.col(top + k) = 2.0 * heights.col(top) - heights.col(top - k);
+  }
+}
+
+void AveragingGrid::turn_about_rim_adjoint(Eigen::MatrixXd& heights_bar) {
+  const Eigen::Index right = heights_bar.rows() - 1 - kReach;
+  const Eigen::Index top = heights_bar.cols() - 1 - kReach;
+  for (Eigen::Index k = 1; k <= kReach; ++k) {
+    heights_bar.col(kReach) += 2.0 * heights_bar.col(kReach - k);
+    heights_bar.col(kReach + k) -= heights_bar.col(kReach - k);
+    heights_bar.col(top) += 2.0 * heights_bar.col(top + k);
+    heights_bar.col(top - k) -= heights_bar.col(top + k);
+  }
+  for (Eigen::Index k = 1; k <= kReach; ++k) {
+    heights_bar.row(kReach) += 2.0 * heights_bar.row(kReach - k);
+    heights_bar.row(kReach + k) -= heights_bar.row(kReach - k);
+    heights_bar.row(right) += 2.0 * heights_bar.row(right + k);
+    heights_bar.row(right - k) -= heights_bar.row(right + k);
+  }
+}
+
+int AveragingGrid::first_sample(double at, int axis) const {
+  return std::clamp(static_cast<int>(at / step_[axis]), 0, cells_[axis] - 1);
+}
+
+GaussianWeights AveragingGrid::weights(double at, int axis) const {
+  const double first = (first_sample(at, axis) - kReach) * step_[axis];
+  return {first - at, step_[axis], sigma_[axis]};
+}
+
+AveragingGrid::RimLoss AveragingGrid::rim_loss(const Eigen::Vector2d& xy) const {
+  RimLoss loss;
+  for (int k = 0; k < 2; ++k) {
+    const double low = rim_depth_ * std::exp(-xy[k] / rim_length_);
+    const double high = rim_depth_ * std::exp((xy[k] - size_[k]) / rim_length_);
+    loss.z += low + high;
+    loss.slope[k] = (high - low) / rim_length_;
+    loss.bend[k] = (low + high) / (rim_length_ * rim_length_);
+  }
+  return loss;
+}
+
+double AveragingGrid::least_sigma(const Eigen::Vector2d& lens_size) {
+  return std::sqrt(lens_size.prod() / kMaxSamples) / kSpacing;
+}
+
+namespace {
+
+Eigen::Matrix2d plan_of(const SplineFrame& frame) {
+  Eigen::Matrix2d plan;
+  plan << frame.by_u.head<2>(), frame.by_v.head<2>();
+  return plan;
+}
+
+}  // namespace
+
+MadeSurface::MadeSurface(const ControlNet& net, const MadeBy& made, const Executor& executor)
+    : grid_({net.points.row(0).maxCoeff(), net.points.row(1).maxCoeff()}, made),
+      heights_(grid_.make_heights()) {
+  const auto sample = [&](std::int64_t row) { sample_row(net, static_cast<int>(row)); };
+  parallel_for(executor, "heights to polish", grid_.cells().y() + 1, sample, 1);
+  AveragingGrid::turn_about_rim(heights_);
+}
+
+/// Newton's method from the last sample, and a Taylor expansion over its remaining error.
+void MadeSurface::sample_row(const ControlNet& net, int row) {
+  constexpr int kSteps = 2;
+  const Eigen::Vector2d high = net.cells().cast<double>();
+  Eigen::Vector2d uv =
+      net.parameters_of(grid_.place(0, row), {0.0, high.y() * row / grid_.cells().y()});
+  SplineFrame frame = net.at(uv);
+  for (int i = 0; i <= grid_.cells().x(); ++i) {
+    const Eigen::Vector2d xy = grid_.place(i, row);
+    for (int step = 0; step < kSteps; ++step) {
+      uv += plan_of(frame).inverse() * (xy - frame.point.head<2>());
+      uv = uv.cwiseMax(0.0).cwiseMin(high);
+      frame = net.at(uv);
+    }
+    const SurfaceShape shape = frame.shape();
+    const Eigen::Vector2d rest = xy - frame.point.head<2>();
+    heights_(i + kReach, row + kReach) =
+        shape.z + rest.dot(shape.slope) + 0.5 * rest.dot(shape.bend * rest);
+  }
+}
+
+SurfacePoint MadeSurface::at(const Eigen::Vector2d& xy) const {
+  const GaussianWeights x = grid_.weights(xy.x(), 0);
+  const GaussianWeights y = grid_.weights(xy.y(), 1);
+  const Eigen::Index first = grid_.first_sample(xy.y(), 1);
+  SurfacePoint made;
+  for (std::size_t n = 0; n < kCount; ++n) {
+    const double* const z =
+        &heights_(grid_.first_sample(xy.x(), 0), first + static_cast<Eigen::Index>(n));
+    double value = 0.0;
+    double slope = 0.0;
+    for (std::size_t m = 0; m < kCount; ++m) {
+      value += x.value[m] * z[m];
+      slope += x.slope[m] * z[m];
+    }
+    made.z += y.value[n] * value;
+    made.slope += Eigen::Vector2d(y.value[n] * slope, y.slope[n] * value);
+  }
+  const AveragingGrid::RimLoss loss = grid_.rim_loss(xy);
+  made.z -= loss.z;
+  made.slope -= loss.slope;
+  return made;
+}
+
+SampledSurface made_nodes(const ControlNet& net, const MadeBy& made, int samples,
+                          const Executor& executor) {
+  SampledSurface nodes = spline_nodes(net, samples);
+  const MadeSurface surface(net, made, executor);
+  const auto make = [&](std::int64_t i) {
+    const SurfacePoint point = surface.at(nodes.mesh.vertices.col(i).head<2>());
+    nodes.mesh.vertices(2, i) = point.z;
+    nodes.normals.col(i) << -point.slope, 1.0;
+  };
+  parallel_for(executor, "made nodes", nodes.mesh.vertex_count(), make);
+  return nodes;
+}
+
+namespace {
+
+/// Newton's method stops at steps shorter than this, in knot cells; the remaining error is its
+/// square.
+constexpr double kShortStep = 1e-3;
+constexpr int kMaxSteps = 20;
+constexpr int kMaxHalvings = 8;
+
+/// Number of bands whose derivatives are summed separately, for any number of threads.
+constexpr std::int64_t kBands = 32;
+
+/// Weighted sums along y of a block of heights, one per column.
+using BlockRow = std::array<double, kCount>;
+
+BlockRow weighted_rows(const double* block, Eigen::Index stride, const BlockRow& weights) {
+  BlockRow sum{};
+  for (std::size_t n = 0; n < kCount; ++n) {
+    const double* const row = block + static_cast<Eigen::Index>(n) * stride;
+    for (std::size_t m = 0; m < kCount; ++m) sum[m] += weights[n] * row[m];
+  }
+  return sum;
+}
+
+double dot(const BlockRow& a, const BlockRow& b) {
+  double sum = 0.0;
+  for (std::size_t m = 0; m < kCount; ++m) sum += a[m] * b[m];
+  return sum;
+}
+
+/// Sums over several bands of work: each band has its own rows, which are added in the bands'
+/// order.
+class BandSums {
+ public:
+  /// @param row_size  numbers per row.
+  explicit BandSums(Eigen::Index row_size) : row_size_(row_size) {}
+
+  struct Band {
+    Eigen::Index first = 0;
+    Eigen::MatrixXd sums;  ///< Row size × rows, starting at `first`.
+    [[nodiscard]] double* row(Eigen::Index i) { return sums.col(i - first).data(); }
+  };
+
+  /// @param rows_of  first and last row that a band adds to.
+  void run(const Executor& executor, const char* kernel,
+           const std::function<std::pair<int, int>(std::int64_t)>& rows_of,
+           const std::function<void(std::int64_t, Band&)>& fill) {
+    const auto work = [&](std::int64_t band) {
+      const auto [first, last] = rows_of(band);
+      if (last < first) return;
+      Band& sums = bands_[static_cast<std::size_t>(band)];
+      sums = {first, Eigen::MatrixXd::Zero(row_size_, last - first + 1)};
+      fill(band, sums);
+    };
+    parallel_for(executor, kernel, kBands, work, 1);
+  }
+
+  /// Adds row i of all bands to `to`.
+  void add_row(Eigen::Index i, double* to) const {
+    Eigen::Map<Eigen::VectorXd> sum(to, row_size_);
+    for (const Band& band : bands_) {
+      const Eigen::Index at = i - band.first;
+      if (at >= 0 && at < band.sums.cols()) sum += band.sums.col(at);
+    }
+  }
+
+ private:
+  Eigen::Index row_size_;
+  std::array<Band, kBands> bands_;
+};
+
+std::int64_t band_start(std::int64_t band, std::int64_t count) { return band * count / kBands; }
+
+}  // namespace
+
+MadeNodes::MadeNodes(const GridShape& net, const Eigen::Vector2d& size, int samples,
+                     const MadeBy& made, const Executor& executor)
+    : executor_(executor),
+      grid_(size, made),
+      net_{net, Eigen::Matrix3Xd(3, Eigen::Index{net.columns} * net.rows)},
+      plan_(spline_nodes_on(net, samples, executor)),
+      heights_(grid_.make_heights()),
+      samples_(static_cast<std::size_t>(grid_.cells().x() + 1) *
+               static_cast<std::size_t>(grid_.cells().y() + 1)),
+      nodes_(static_cast<std::size_t>(shape().columns) * static_cast<std::size_t>(shape().rows)),
+      plan_bar_(3 * nodes_.size()),
+      no_bar_(3 * nodes_.size(), 0.0) {}
+
+void MadeNodes::look(const double* points, double* positions, double* normals) {
+  std::copy_n(points, net_.points.size(), net_.points.data());
+  parallel_for(
+      executor_, "heights to polish", grid_.cells().y() + 1,
+      [&](std::int64_t row) { sample_row(static_cast<int>(row)); }, 1);
+  AveragingGrid::turn_about_rim(heights_);
+  known_ = true;
+  plan_.look(points, positions, normals);
+  parallel_for(executor_, "made nodes", static_cast<std::int64_t>(nodes_.size()),
+               [&](std::int64_t i) { average(i, positions, normals); });
+}
+
+/// Newton's method; steps are halved until they come closer.
+Eigen::Vector2d MadeNodes::search(const Eigen::Vector2d& xy, Eigen::Vector2d uv,
+                                  SplineFrame& frame) const {
+  const Eigen::Vector2d high = net_.cells().cast<double>();
+  frame = net_.at(uv);
+  Eigen::Vector2d rest = xy - frame.point.head<2>();
+  for (int step = 0; step < kMaxSteps; ++step) {
+    Eigen::Matrix2d plan;
+    plan << frame.by_u.head<2>(), frame.by_v.head<2>();
+    if (!(plan.determinant() > 0.0)) break;
+    Eigen::Vector2d move = plan.inverse() * rest;
+    const Eigen::Vector2d before = uv;
+    for (int halvings = 0; halvings < kMaxHalvings; ++halvings, move *= 0.5) {
+      const Eigen::Vector2d next = (before + move).cwiseMax(0.0).cwiseMin(high);
+      const SplineFrame there = net_.at(next);
+      const Eigen::Vector2d left = xy - there.point.head<2>();
+      if (!(left.squaredNorm() < rest.squaredNorm())) continue;
+      uv = next;
+      frame = there;
+      rest = left;
+      break;
+    }
+    if ((uv - before).cwiseAbs().maxCoeff() < kShortStep) break;
+  }
+  return uv;
+}
+
+void MadeNodes::sample_row(int row) {
+  const double v = static_cast<double>(net_.cells().y()) * row / grid_.cells().y();
+  Eigen::Vector2d before(0.0, v);
+  for (int i = 0; i <= grid_.cells().x(); ++i) {
+    const Eigen::Vector2d xy = grid_.place(i, row);
+    Sample& s = sample(i, row);
+    SplineFrame frame;
+    s.uv = search(xy, known_ ? s.uv : before, frame);
+    before = s.uv;
+    const SurfaceShape shape = frame.shape();
+    const Eigen::Vector2d rest = xy - frame.point.head<2>();
+    s.slope = shape.slope + shape.bend * rest;
+    heights_(i + kReach, row + kReach) = shape.z + 0.5 * rest.dot(shape.slope + s.slope);
+  }
+}
+
+void MadeNodes::average(std::int64_t i, double* positions, double* normals) {
+  Node& node = nodes_[static_cast<std::size_t>(i)];
+  node.place = column3(positions, i).head<2>();
+  const GaussianWeights x = grid_.weights(node.place.x(), 0);
+  const GaussianWeights y = grid_.weights(node.place.y(), 1);
+  const double* const block =
+      &heights_(grid_.first_sample(node.place.x(), 0), grid_.first_sample(node.place.y(), 1));
+  const BlockRow value = weighted_rows(block, heights_.rows(), y.value);
+  const BlockRow slope = weighted_rows(block, heights_.rows(), y.slope);
+  const BlockRow bend = weighted_rows(block, heights_.rows(), y.bend);
+  const AveragingGrid::RimLoss loss = grid_.rim_loss(node.place);
+  const double mixed = dot(slope, x.slope);
+  node.slope = Eigen::Vector2d(dot(value, x.slope), dot(slope, x.value)) - loss.slope;
+  node.bend << dot(value, x.bend) - loss.bend.x(), mixed, mixed, dot(bend, x.value) - loss.bend.y();
+  column3(positions, i).z() = dot(value, x.value) - loss.z;
+  column3(normals, i) << -node.slope, 1.0;
+}
+
+void MadeNodes::look_adjoint(const double* position_bar, const double* normal_bar,
+                             double* points_bar) {
+  spread_nodes(position_bar, normal_bar);
+  AveragingGrid::turn_about_rim_adjoint(heights_bar_);
+  plan_.look_adjoint(plan_bar_.data(), no_bar_.data(), points_bar);
+  spread_samples(points_bar);
+}
+
+/// Carries derivatives from the nodes to the heights on the grid and to the nodes' places.
+void MadeNodes::spread_nodes(const double* position_bar, const double* normal_bar) {
+  const std::int64_t columns = shape().columns;
+  const auto nodes_of = [&](std::int64_t band) {
+    return std::pair(band_start(band, shape().rows) * columns,
+                     band_start(band + 1, shape().rows) * columns);
+  };
+  const auto rows_of = [&](std::int64_t band) {
+    const auto [begin, end] = nodes_of(band);
+    int low = grid_.cells().y();
+    int high = 0;
+    for (std::int64_t i = begin; i < end; ++i) {
+      const int first = grid_.first_sample(nodes_[static_cast<std::size_t>(i)].place.y(), 1);
+      low = std::min(low, first);
+      high = std::max(high, first);
+    }
+    return std::pair(low, high + static_cast<int>(kCount) - 1);
+  };
+  BandSums sums(heights_.rows());
+  const auto spread = [&](std::int64_t band, BandSums::Band& to) {
+    const auto [begin, end] = nodes_of(band);
+    for (std::int64_t i = begin; i < end; ++i) {
+      const Node& node = nodes_[static_cast<std::size_t>(i)];
+      const double z_bar = column3(position_bar, i).z();
+      const Eigen::Vector2d slope_bar = -column3(normal_bar, i).head<2>();
+      column3(plan_bar_.data(), i)
+          << column3(position_bar, i).head<2>() + z_bar * node.slope + node.bend * slope_bar,
+          0.0;
+      const GaussianWeights x = grid_.weights(node.place.x(), 0);
+      const GaussianWeights y = grid_.weights(node.place.y(), 1);
+      const int column = grid_.first_sample(node.place.x(), 0);
+      const int row = grid_.first_sample(node.place.y(), 1);
+      for (std::size_t n = 0; n < kCount; ++n) {
+        double* const heights_bar = to.row(row + static_cast<Eigen::Index>(n)) + column;
+        const double by_value = y.value[n] * z_bar + y.slope[n] * slope_bar.y();
+        const double by_slope = y.value[n] * slope_bar.x();
+        for (std::size_t m = 0; m < kCount; ++m) {
+          heights_bar[m] += by_value * x.value[m] + by_slope * x.slope[m];
+        }
+      }
+    }
+  };
+  sums.run(executor_, "made nodes adjoint", rows_of, spread);
+  heights_bar_ = Eigen::MatrixXd::Zero(heights_.rows(), heights_.cols());
+  parallel_for(
+      executor_, "sum heights adjoint", heights_.cols(),
+      [&](std::int64_t j) { sums.add_row(j, heights_bar_.col(j).data()); }, 16);
+}
+
+/// Carries derivatives from the heights on the grid to the control points.
+void MadeNodes::spread_samples(double* points_bar) {
+  const std::int64_t rows = grid_.cells().y() + 1;
+  const int last_cell = net_.cells().y() - 1;
+  const auto rows_of = [&](std::int64_t band) {
+    int low = last_cell;
+    int high = 0;
+    for (std::int64_t row = band_start(band, rows); row < band_start(band + 1, rows); ++row) {
+      for (int i = 0; i <= grid_.cells().x(); ++i) {
+        const int cell =
+            std::clamp(static_cast<int>(sample(i, static_cast<int>(row)).uv.y()), 0, last_cell);
+        low = std::min(low, cell);
+        high = std::max(high, cell);
+      }
+    }
+    return std::pair(low, high + 3);
+  };
+  BandSums sums(Eigen::Index{3} * net_.shape.columns);
+  const auto spread = [&](std::int64_t band, BandSums::Band& to) {
+    for (std::int64_t row = band_start(band, rows); row < band_start(band + 1, rows); ++row) {
+      for (int i = 0; i <= grid_.cells().x(); ++i) {
+        const Sample& s = sample(i, static_cast<int>(row));
+        const double z_bar = heights_bar_(i + kReach, row + kReach);
+        const Eigen::Vector3d point_bar(-s.slope.x() * z_bar, -s.slope.y() * z_bar, z_bar);
+        const CubicBasis u = cubic_basis(s.uv.x(), net_.cells().x());
+        const CubicBasis v = cubic_basis(s.uv.y(), net_.cells().y());
+        for (std::size_t k = 0; k < 4; ++k) {
+          double* const to_row = to.row(v.first + static_cast<Eigen::Index>(k));
+          for (std::size_t m = 0; m < 4; ++m) {
+            column3(to_row, u.first + static_cast<std::int64_t>(m)) +=
+                v.value[k] * u.value[m] * point_bar;
+          }
+        }
+      }
+    }
+  };
+  sums.run(executor_, "heights to polish adjoint", rows_of, spread);
+  const Eigen::Index row_size = Eigen::Index{3} * net_.shape.columns;
+  parallel_for(
+      executor_, "sum points adjoint", net_.shape.rows,
+      [&](std::int64_t j) { sums.add_row(j, points_bar + j * row_size); }, 16);
+}
+
+}  // namespace lensforge

@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "design/spline/spline_nodes.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include "core/spline/cubic_spline.h"
+
+namespace lensforge {
+namespace {
+
+/// Radius of the Gaussian, in σ, as in PolishedField.
+constexpr double kReach = 5.0;
+
+/// Points per σ of the sum that replaces its integral.
+constexpr int kPointsPerSigma = 32;
+
+/// A point of a sum that replaces an integral over a Gaussian: weights of the surface there in its
+/// average and in the average's derivatives.
+struct SumPoint {
+  double at = 0.0;
+  double weight = 0.0;
+  double first = 0.0;
+  double second = 0.0;
+  double third = 0.0;
+};
+
+/// Derivatives are those of the Gaussian, G′ = −s/v G, G″ = (s²/v − 1)/v G, G‴ = (κ − s²/v) s/v² G
+/// with its variance v and κ = 3, both as computed from the points: so derivatives of a straight
+/// line are exact.
+std::vector<SumPoint> gaussian_points(double sigma) {
+  const int count = static_cast<int>(kReach * kPointsPerSigma);
+  std::vector<SumPoint> points;
+  double total = 0.0;
+  for (int i = -count; i <= count; ++i) {
+    const double t = static_cast<double>(i) / kPointsPerSigma;
+    SumPoint& p = points.emplace_back();
+    p.at = t * sigma;
+    p.weight = std::exp(-0.5 * t * t);
+    total += p.weight;
+  }
+  double v = 0.0;
+  double fourth = 0.0;
+  for (SumPoint& p : points) {
+    p.weight /= total;
+    v += p.weight * p.at * p.at;
+    fourth += p.weight * std::pow(p.at, 4);
+  }
+  for (SumPoint& p : points) {
+    const double square = p.at * p.at / v;
+    p.first = -p.at / v * p.weight;
+    p.second = (square - 1.0) / v * p.weight;
+    p.third = (fourth / (v * v) - square) * p.at / (v * v) * p.weight;
+  }
+  return points;
+}
+
+/// One node as a sum over all coefficients.
+class NodeSum {
+ public:
+  explicit NodeSum(int cells)
+      : cells_(cells), value_(static_cast<std::size_t>(cells) + 3), slope_(value_.size()) {}
+
+  /// Adds `value` times the surface at t to the node's value and `slope` times it to its slope;
+  /// beyond its ends the surface continues point-symmetrically.
+  void add(double t, double value, double slope) {
+    const double inside = t < 0.0 ? -t : (t > cells_ ? 2.0 * cells_ - t : t);
+    const double sign = inside == t ? 1.0 : -1.0;
+    const CubicBasis b = cubic_basis(std::clamp(inside, 0.0, static_cast<double>(cells_)), cells_);
+    for (std::size_t j = 0; j < b.value.size(); ++j) {
+      const std::size_t i = static_cast<std::size_t>(b.first) + j;
+      value_[i] += sign * value * b.value[j];
+      slope_[i] += sign * slope * b.value[j];
+    }
+    if (inside == t) return;
+    const std::size_t end = t < 0.0 ? 0 : value_.size() - 1;
+    value_[end] += 2.0 * value;
+    slope_[end] += 2.0 * slope;
+  }
+
+  [[nodiscard]] const std::vector<double>& value() const { return value_; }
+  [[nodiscard]] const std::vector<double>& slope() const { return slope_; }
+
+ private:
+  int cells_;
+  std::vector<double> value_;
+  std::vector<double> slope_;
+};
+
+/// Appends the entries of one node within its window of coefficients.
+void append(const NodeSum& sum, int first, AxisBasis& basis) {
+  basis.first.push_back(first);
+  for (int j = 0; j < basis.taps; ++j) {
+    const auto i = static_cast<std::size_t>(first + j);
+    basis.value.push_back(sum.value()[i]);
+    basis.slope.push_back(sum.slope()[i]);
+  }
+}
+
+/// Adds the four functions of the spline itself at t to the node that was appended last.
+void append_plan(double t, AxisBasis& basis) {
+  const CubicBasis at = cubic_basis(t, basis.coefficients - 3);
+  basis.plan_value.resize(basis.value.size());
+  basis.plan_slope.resize(basis.slope.size());
+  const auto window = static_cast<std::ptrdiff_t>(basis.value.size()) - basis.taps;
+  const std::ptrdiff_t to = window + at.first - basis.first.back();
+  std::copy(at.value.begin(), at.value.end(), basis.plan_value.begin() + to);
+  std::copy(at.slope.begin(), at.slope.end(), basis.plan_slope.begin() + to);
+}
+
+}  // namespace
+
+std::vector<double> even_points(int cells, int samples) {
+  std::vector<double> points;
+  for (int k = 0; k <= cells * samples; ++k) points.push_back(static_cast<double>(k) / samples);
+  return points;
+}
+
+AxisBasis plain_basis(int cells, const std::vector<double>& points) {
+  AxisBasis basis;
+  basis.coefficients = cells + 3;
+  basis.taps = 4;
+  for (const double t : points) {
+    const CubicBasis at = cubic_basis(t, cells);
+    basis.first.push_back(at.first);
+    basis.value.insert(basis.value.end(), at.value.begin(), at.value.end());
+    basis.slope.insert(basis.slope.end(), at.slope.begin(), at.slope.end());
+  }
+  basis.plan_value = basis.value;
+  basis.plan_slope = basis.slope;
+  basis.lift.resize(points.size());
+  basis.tilt.resize(points.size());
+  return basis;
+}
+
+AxisBasis made_basis(const AxisLength& along, const std::vector<double>& points,
+                     const MadeBy& made) {
+  const double cell = along.length / along.cells;
+  const double sigma = made.polish_sigma / cell;
+  const bool across = made.rows_along_x == (along.axis == 1);
+  const double bend = across ? std::pow(made.pitch / cell, 2) / 24.0 : 0.0;
+  const std::vector<SumPoint> gaussian = gaussian_points(sigma);
+  const int reach = static_cast<int>(std::ceil(kReach * sigma));
+  AxisBasis basis;
+  basis.coefficients = along.cells + 3;
+  basis.taps = std::min(basis.coefficients, 2 * reach + 4);
+  for (const double t : points) {
+    NodeSum sum(along.cells);
+    for (const SumPoint& g : gaussian) {
+      sum.add(t - g.at, g.weight + bend * g.second, g.first + bend * g.third);
+    }
+    const int here = std::min(static_cast<int>(t), along.cells - 1);
+    append(sum, std::clamp(here - reach, 0, basis.coefficients - basis.taps), basis);
+    append_plan(t, basis);
+    const double low = made.rim_depth * std::exp(-t * cell / made.rim_length);
+    const double high = made.rim_depth * std::exp((t * cell - along.length) / made.rim_length);
+    basis.lift.push_back(-low - high);
+    basis.tilt.push_back((low - high) * cell / made.rim_length);
+  }
+  return basis;
+}
+
+}  // namespace lensforge

@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <gmock/gmock.h>
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "app/frame/command_run.h"
+#include "core/error.h"
+#include "core/temp_folder.h"
+
+namespace lensforge::app {
+namespace {
+
+using ::testing::HasSubstr;
+using testing::TempFolder;
+
+struct Settings {
+  std::string out;
+};
+
+void add_options(OptionSet& options, Settings& settings) {
+  options.text("--out", settings.out, "DIR", "where");
+}
+
+struct Ending {
+  int exit_code = 0;
+  std::string out;
+  std::string err;
+};
+
+Ending run_with(CommandResult (*work)(CommandFrame& frame, Settings& settings),
+                const Arguments& arguments) {
+  ::testing::internal::CaptureStdout();
+  ::testing::internal::CaptureStderr();
+  Ending ending;
+  ending.exit_code = run_command<Settings>({"try", "Tries.", add_options, work}, arguments);
+  ending.out = ::testing::internal::GetCapturedStdout();
+  ending.err = ::testing::internal::GetCapturedStderr();
+  return ending;
+}
+
+CommandResult with_everything(CommandFrame& frame, Settings& /*settings*/) {
+  frame.console().note("held");
+  return {{{"size", 3}}, "three\n", kLimitMissed, {"hot"}, {"later"}};
+}
+
+TEST(CommandFrame, PrintsNotesWarningsTheResultAndWhatFollowsIt) {
+  const Ending text = run_with(with_everything, {});
+  EXPECT_EQ(text.exit_code, kLimitMissed);
+  EXPECT_EQ(text.out, "three\n");
+  EXPECT_EQ(text.err, "lensforge: held\nlensforge: warning: hot\nlensforge: later\n");
+  const Ending json = run_with(with_everything, {"--json"});
+  EXPECT_EQ(nlohmann::json::parse(json.out), nlohmann::json({{"command", "try"}, {"size", 3}}));
+}
+
+TEST(CommandFrame, WithoutAResultPrintsNotesAlone) {
+  const Ending ending = run_with(
+      [](CommandFrame& frame, Settings&) -> CommandResult {
+        frame.console().begin();
+        return {.exit_code = kInterrupted, .notes = {"nothing was sent"}};
+      },
+      {"--json"});
+  EXPECT_EQ(ending.exit_code, kInterrupted);
+  EXPECT_EQ(ending.out, "");
+  EXPECT_EQ(ending.err, "lensforge: nothing was sent\n");
+}
+
+TEST(CommandFrame, InterruptedWorkLeavesNoFolderBehind) {
+  const TempFolder folder;
+  const std::filesystem::path out = folder / "new";
+  const Ending ending = run_with(
+      [](CommandFrame& frame, Settings& settings) -> CommandResult {
+        frame.begin_folder(settings.out);
+        EXPECT_TRUE(std::filesystem::exists(settings.out));
+        throw Interrupted();
+      },
+      {"--out", out.string(), "--json"});
+  EXPECT_EQ(ending.exit_code, kInterrupted);
+  EXPECT_THAT(ending.err, HasSubstr("interrupted; nothing was written"));
+  EXPECT_EQ(nlohmann::json::parse(ending.out)["exit_code"], kInterrupted);
+  EXPECT_FALSE(std::filesystem::exists(out));
+}
+
+TEST(CommandFrame, InputCountsAsAcceptedOnceWorkIsReported) {
+  run_with(
+      [](CommandFrame& frame, Settings&) -> CommandResult {
+        int accepted = 0;
+        frame.begin_file();
+        const RunControl control = frame.control([&] { ++accepted; });
+        control.report({"stage", 0.0, 2.0, ""});
+        EXPECT_EQ(accepted, 0);
+        control.report({"stage", 1.0, 2.0, ""});
+        control.report({"stage", 2.0, 2.0, ""});
+        frame.accept();
+        EXPECT_EQ(accepted, 1);
+        return {};
+      },
+      {"--quiet"});
+}
+
+}  // namespace
+}  // namespace lensforge::app

@@ -1,0 +1,229 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "design/spline/made_surface.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstddef>
+#include <numbers>
+#include <utility>
+#include <vector>
+
+#include "core/error.h"
+#include "core/surface/cubic_spline.h"
+#include "core/surface/sample_splines.h"
+#include "design/finite_difference.h"
+#include "design/random_input.h"
+
+namespace lensforge {
+namespace {
+
+using testing::Random;
+
+constexpr double kWidth = 1.5;
+constexpr double kHeight = 1.0;
+constexpr MadeBy kMade{0.045, true, 0.03, 0.0, 1.0};
+
+/// A spline of bumps above knots that are up to 1.5 times as dense here as there.
+ControlNet warped_net() {
+  ControlNet net{{33, 23}, Eigen::Matrix3Xd(3, 33 * 23)};
+  const auto warped = [](double t, double s) {
+    return t + 0.03 * std::sin(2.0 * std::numbers::pi * t) * (1.0 + s);
+  };
+  for (int j = 0; j < 23; ++j) {
+    for (int i = 0; i < 33; ++i) {
+      const double u = greville_point(i, 30) / 30;
+      const double v = greville_point(j, 20) / 20;
+      const double x = kWidth * warped(u, v * (1.0 - v));
+      const double y = kHeight * warped(v, u * (1.0 - u));
+      net.points.col(j * 33 + i) << x, y, 5.0 + 1e-3 * std::sin(15.0 * x) * std::cos(12.0 * y);
+    }
+  }
+  return net;
+}
+
+/// The spline's height at a place, turned about the rim beyond it.
+double height_at(const ControlNet& net, double x, double y) {
+  const double rim_x = std::clamp(x, 0.0, kWidth);
+  const double rim_y = std::clamp(y, 0.0, kHeight);
+  if (rim_x != x) return 2.0 * height_at(net, rim_x, y) - height_at(net, 2.0 * rim_x - x, y);
+  if (rim_y != y) return 2.0 * height_at(net, x, rim_y) - height_at(net, x, 2.0 * rim_y - y);
+  const Eigen::Vector2d start(30.0 * x / kWidth, 20.0 * y / kHeight);
+  return net.at(net.parameters_of({x, y}, start)).point.z();
+}
+
+/// The average with a Gaussian as a sum over a fine grid of its own.
+double average_at(const ControlNet& net, const Eigen::Vector2d& at, const Eigen::Vector2d& sigma) {
+  constexpr int kHalf = 30;
+  constexpr double kStep = 0.2;  // In σ.
+  double sum = 0.0;
+  double weights = 0.0;
+  for (int j = -kHalf; j <= kHalf; ++j) {
+    for (int i = -kHalf; i <= kHalf; ++i) {
+      const double weight = std::exp(-0.5 * kStep * kStep * (i * i + j * j));
+      const Eigen::Vector2d apart = kStep * sigma.cwiseProduct(Eigen::Vector2d(i, j));
+      sum += weight * height_at(net, at.x() + apart.x(), at.y() + apart.y());
+      weights += weight;
+    }
+  }
+  return sum / weights;
+}
+
+TEST(MadeSurface, IsTheAverageOfTheSpline) {
+  const ControlNet net = warped_net();
+  const MadeSurface made(net, kMade, Executor::cpu(2));
+  const Eigen::Vector2d sigma(0.03, std::hypot(0.03, 0.045 / std::sqrt(12.0)));
+  for (const Eigen::Vector2d& at :
+       {Eigen::Vector2d(0.7, 0.4), {0.31, 0.77}, {0.02, 0.5}, {1.5, 0.01}}) {
+    EXPECT_NEAR(made.at(at).z, average_at(net, at, sigma), 1e-7) << at.transpose();
+    constexpr double kStep = 1e-3;
+    for (int k = 0; k < 2; ++k) {
+      const Eigen::Vector2d step = kStep * Eigen::Vector2d::Unit(k);
+      if (!(at - step).cwiseMax(0.0).isApprox(at - step) || at[k] + kStep > 1.0) continue;
+      const double slope =
+          (average_at(net, at + step, sigma) - average_at(net, at - step, sigma)) / (2.0 * kStep);
+      EXPECT_NEAR(made.at(at).slope[k], slope, 1e-6) << at.transpose() << ' ' << k;
+    }
+  }
+}
+
+TEST(MadeSurface, LeavesAPlaneAsItIs) {
+  ControlNet net = warped_net();
+  net.points.row(2) = 0.2 * net.points.row(0) - 0.1 * net.points.row(1);
+  const MadeSurface made(net, kMade, Executor::serial());
+  for (const Eigen::Vector2d& at : {Eigen::Vector2d(0.7, 0.4), {0.0, 0.0}, {1.5, 1.0}}) {
+    EXPECT_NEAR(made.at(at).z, 0.2 * at.x() - 0.1 * at.y(), 1e-9);
+    EXPECT_NEAR(made.at(at).slope.x(), 0.2, 1e-9);
+    EXPECT_NEAR(made.at(at).slope.y(), -0.1, 1e-9);
+  }
+}
+
+TEST(MadeSurface, RowsAlongYTurnTheGaussian) {
+  ControlNet net = warped_net();
+  ControlNet turned{{23, 33}, Eigen::Matrix3Xd(3, 33 * 23)};
+  for (int j = 0; j < 23; ++j) {
+    for (int i = 0; i < 33; ++i) {
+      const Eigen::Vector3d p = net.points.col(j * 33 + i);
+      turned.points.col(i * 23 + j) << p.y(), p.x(), p.z();
+    }
+  }
+  MadeBy along_y = kMade;
+  along_y.rows_along_x = false;
+  const SurfacePoint a = MadeSurface(net, kMade, Executor::serial()).at({0.7, 0.4});
+  const SurfacePoint b = MadeSurface(turned, along_y, Executor::serial()).at({0.4, 0.7});
+  EXPECT_NEAR(a.z, b.z, 1e-12);
+  EXPECT_NEAR(a.slope.x(), b.slope.y(), 1e-10);
+}
+
+TEST(MadeSurface, OfACastPartHasTheRowsOfItsMould) {
+  // A mould is the negative, 1 / (1 − shrinkage) as large; its rows are p apart.
+  const MadeBy cast = kMade.cast(0.1);
+  EXPECT_DOUBLE_EQ(cast.pitch, 0.9 * kMade.pitch);
+  MadeBy rest = cast;
+  rest.pitch = kMade.pitch;
+  EXPECT_EQ(rest, kMade);
+  const ControlNet net = warped_net();
+  ControlNet turned = net;
+  turned.points.row(2) *= -1.0;
+  const SurfacePoint part = MadeSurface(net, kMade, Executor::serial()).at({0.7, 0.4});
+  const SurfacePoint mould = MadeSurface(turned, kMade, Executor::serial()).at({0.7, 0.4});
+  EXPECT_NEAR(part.z, -mould.z, 1e-12);
+}
+
+TEST(MadeSurface, NodesStayWhereTheyAreInThePlane) {
+  const ControlNet net = warped_net();
+  const SampledSurface made = made_nodes(net, kMade, 2, Executor::cpu(2));
+  const SampledSurface plain = spline_nodes(net, 2);
+  EXPECT_EQ(made.mesh.vertices.topRows<2>(), plain.mesh.vertices.topRows<2>());
+  EXPECT_EQ(made.mesh.vertices, made_nodes(net, kMade, 2, Executor::serial()).mesh.vertices);
+  EXPECT_GT((made.mesh.vertices.row(2) - plain.mesh.vertices.row(2)).cwiseAbs().maxCoeff(), 1e-5);
+}
+
+constexpr int kSamples = 2;
+/// Its grid has 25 × 17 cells, so no node is where its average changes samples: there it steps by
+/// 1e-8.
+constexpr MadeBy kCoarse{0.8, false, 0.8, 0.05, 3.0};
+
+/// Result of look(), as one vector: positions, then slopes.
+struct Looked {
+  Eigen::Matrix3Xd positions;
+  Eigen::Matrix3Xd normals;
+};
+
+Looked looked(MadeNodes& nodes, const Eigen::Matrix3Xd& points) {
+  const Eigen::Index count = Eigen::Index{nodes.shape().columns} * nodes.shape().rows;
+  Looked result{Eigen::Matrix3Xd(3, count), Eigen::Matrix3Xd(3, count)};
+  nodes.look(points.data(), result.positions.data(), result.normals.data());
+  return result;
+}
+
+MadeNodes nodes_of(const ControlNet& net, const Executor& executor = Executor::serial()) {
+  return {net.shape, {15.0, 10.0}, kSamples, kCoarse, executor};
+}
+
+TEST(MadeNodes, AreTheMadeSurfaceAboveTheNodes) {
+  const ControlNet net = testing::sample_spline();
+  MadeNodes nodes = nodes_of(net);
+  const SampledSurface expected = made_nodes(net, kCoarse, kSamples, Executor::serial());
+  for (int call = 0; call < 2; ++call) {  // The second one knows where samples lie.
+    const Looked found = looked(nodes, net.points);
+    EXPECT_LE((found.positions - expected.mesh.vertices).cwiseAbs().maxCoeff(), 1e-9);
+    EXPECT_LE((found.normals - expected.normals).cwiseAbs().maxCoeff(), 1e-9);
+  }
+}
+
+TEST(MadeNodes, AdjointEqualsCentralDifferences) {
+  const ControlNet net = testing::sample_spline();
+  MadeNodes nodes = nodes_of(net);
+  Looked bar = looked(nodes, net.points);
+  Random random(5);
+  for (double& b : bar.positions.reshaped()) b = random.between(-1.0, 1.0);
+  for (double& b : bar.normals.topRows(2).reshaped()) b = random.between(-1.0, 1.0);
+  bar.normals.row(2).setZero();  // Normals are (−slope, 1).
+  Eigen::Matrix3Xd gradient(3, net.points.cols());
+  nodes.look_adjoint(bar.positions.data(), bar.normals.data(), gradient.data());
+  const testing::Scalar value = [&](const Eigen::VectorXd& x) {
+    const Looked at = looked(nodes, x.reshaped(3, net.points.cols()));
+    return at.positions.cwiseProduct(bar.positions).sum() +
+           at.normals.cwiseProduct(bar.normals).sum();
+  };
+  for (const auto& [first, count] : {std::pair{2, 1}, {0, 2}, {0, 3}}) {
+    Eigen::Matrix3Xd direction = Eigen::Matrix3Xd::Zero(3, net.points.cols());
+    for (int j = 0; j < net.shape.rows; ++j) {
+      for (int i = 0; i < net.shape.columns; ++i) {
+        Eigen::Vector3d d = random.vector3();
+        if (i == 0 || i + 1 == net.shape.columns) d.x() = 0.0;
+        if (j == 0 || j + 1 == net.shape.rows) d.y() = 0.0;
+        direction.col(j * net.shape.columns + i).segment(first, count) = d.segment(first, count);
+      }
+    }
+    const double expected = gradient.cwiseProduct(direction).sum();
+    std::vector<double> errors;
+    for (const double step : {1e-2, 1e-3, 1e-4}) {
+      errors.push_back(std::fabs(
+          testing::directional_slope(value, net.points.reshaped(), direction.reshaped(), step) /
+              expected -
+          1.0));
+    }
+    EXPECT_LE(testing::plateau_error(errors), 1e-5) << first << ' ' << count;
+  }
+}
+
+TEST(MadeNodes, ThreadCountDoesNotChangeABit) {
+  const ControlNet net = testing::sample_spline();
+  MadeNodes one = nodes_of(net);
+  MadeNodes two = nodes_of(net, Executor::cpu(2));
+  const Looked a = looked(one, net.points);
+  const Looked b = looked(two, net.points);
+  EXPECT_EQ(a.positions, b.positions);
+  EXPECT_EQ(a.normals, b.normals);
+  Eigen::Matrix3Xd by_one(3, net.points.cols());
+  Eigen::Matrix3Xd by_two = by_one;
+  one.look_adjoint(a.positions.data(), a.normals.data(), by_one.data());
+  two.look_adjoint(a.positions.data(), a.normals.data(), by_two.data());
+  EXPECT_EQ(by_one, by_two);
+}
+
+}  // namespace
+
+}  // namespace lensforge
