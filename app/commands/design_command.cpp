@@ -475,14 +475,14 @@ void note_source(const Image& picture, const DesignOptions& design, const Consol
 nlohmann::json summary_json(const fs::path& folder, const DesignResult& result) {
   const Lens& lens = result.lens;
   nlohmann::json summary = {{"out", folder.string()},
-                            {"status", lens.provenance["status"]},
+                            {"status", lens.provenance.json()["status"]},
                             {"message", result.message},
                             {"pixels", {lens.setup.pixels.x(), lens.setup.pixels.y()}},
                             {"grid", {lens.surface.grid.columns, lens.surface.grid.rows}},
                             {"lens_size", {lens.setup.lens_size.x(), lens.setup.lens_size.y()}},
                             {"metrics", metrics_json(lens)},
                             {"iterations", result.convergence.size()},
-                            {"seconds", lens.provenance["seconds"]}};
+                            {"seconds", lens.provenance.json()["seconds"]}};
   if (result.source) summary["source_check"] = source_json(*result.source);
   if (result.colors) summary["fringe_mm"] = fringe_json(result.colors->fringe);
   if (result.made) summary["made"] = metrics_json(result.made->metrics);
@@ -497,7 +497,7 @@ std::string summary_text(const fs::path& folder, const DesignResult& result) {
          (result.made ? "  made    " + metrics_text(result.made->metrics) + "\n" : "") + "  " +
          size_text(lens.setup.pixels.x(), lens.setup.pixels.y()) + " pixels, " +
          std::to_string(lens.surface.vertex_count()) + " vertices, " +
-         fixed(lens.provenance["seconds"].get<double>(), 1) + " s\n";
+         fixed(lens.provenance.json()["seconds"].get<double>(), 1) + " s\n";
 }
 
 /// Saves the result. An earlier lens of another design stays until this one is done.

@@ -265,7 +265,7 @@ Description describe_lens(const fs::path& folder) {
     d.line(model_name(model), metrics_text(metrics));
   if (lens.source_limit) d.line("limit", metrics_text(*lens.source_limit) + "  of the source");
   d.json["metrics"] = metrics_json(lens);
-  describe_provenance(d, lens.provenance);
+  describe_provenance(d, lens.provenance.json());
   return d;
 }
 

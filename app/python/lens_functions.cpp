@@ -142,7 +142,8 @@ void add_lens(py::module_& module) {
       "metrics", [](const LensObject& self) { return object_from(app::metrics_json(self.lens())); },
       "dict: for every surface model how close its picture is to the target.");
   type.def_property_readonly(
-      "provenance", [](const LensObject& self) { return object_from(self.lens().provenance); },
+      "provenance",
+      [](const LensObject& self) { return object_from(self.lens().provenance.json()); },
       "dict: the program, options and outcome that the lens comes from.");
   type.def_property_readonly(
       "folder",
